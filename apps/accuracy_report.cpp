@@ -36,6 +36,7 @@ Json point_json(const AccuracyPoint& p) {
           {"tolerance", p.setting.tolerance},
           {"accuracy", p.setting.accuracy},
           {"error", finite(p.error)},
+          {"error_bound", finite(p.bound)},
           {"median_error", finite(p.median)},
           {"within_share", finite(p.within)},
           {"simulated_seconds_per_cpu_second", finite(p.rate)},
@@ -50,6 +51,15 @@ Json points_json(const std::vector<AccuracyPoint>& points) {
   Json all = Json::array();
   for (const AccuracyPoint& p : points) all.push_back(point_json(p));
   return all;
+}
+
+/// The setting that comes nearest to a target that none meets.
+std::string nearest_text(const AccuracyReport& report) {
+  const auto nearest = std::ranges::min_element(report.points, {}, &AccuracyPoint::bound);
+  if (nearest == report.points.end() || !std::isfinite(nearest->bound)) return {};
+  return fmt::format(" {} comes nearest: {}, and {} in the worst environments.",
+                     setting_text(nearest->setting, nearest->step), percent(nearest->error),
+                     percent(nearest->bound));
 }
 
 /// Why the reference cannot judge, and what helps.
@@ -136,14 +146,19 @@ std::string advice_text(const AccuracySubject& subject, const AccuracyReport& re
                                             percent(report.own.error), report.own.rate)
                               : std::string();
   if (report.advice < 0)
-    return fmt::format("{} reaches {}.{}",
+    return fmt::format("{} is sure to reach {}.{}{}",
                        report.stopped ? "Stopped: none of the settings so far" : "No setting",
-                       percent(subject.target), own);
+                       percent(subject.target), nearest_text(report), own);
   const AccuracyPoint& best = report.points[static_cast<std::size_t>(report.advice)];
-  return fmt::format("{}For {} use {}, {} fields: {} at {:.4g} simulated seconds per CPU second.{}",
-                     report.stopped ? "Stopped: of the settings so far: " : "",
-                     percent(subject.target), setting_text(best.setting, best.step),
-                     to_string(best.precision), percent(best.error), best.rate, own);
+  const std::string others =
+      percent(best.bound) == percent(best.error)
+          ? std::string()
+          : fmt::format(" 95 of 100 other environments should stay below {}.", percent(best.bound));
+  return fmt::format(
+      "{}For {} use {}, {} fields: {} at {:.4g} simulated seconds per CPU second.{}{}",
+      report.stopped ? "Stopped: of the settings so far: " : "", percent(subject.target),
+      setting_text(best.setting, best.step), to_string(best.precision), percent(best.error),
+      best.rate, others, own);
 }
 
 Json accuracy_json(const AccuracySubject& subject, const AccuracyReport& report,
@@ -186,15 +201,16 @@ std::string accuracy_csv(const AccuracySubject& subject, const AccuracyReport& r
   for (const char c : subject.name) name += c == '"' ? std::string("\"\"") : std::string(1, c);
   name += '"';
   std::string text =
-      "scene,quantity,sweep,scheme,step,precision,tolerance,accuracy,error,median_error,"
+      "scene,quantity,sweep,scheme,step,precision,tolerance,accuracy,error,error_bound,median_"
+      "error,"
       "simulated_seconds_per_cpu_second,evaluations_per_step,split_share,blurred,failed\n";
   const auto rows = [&](const char* sweep, const std::vector<AccuracyPoint>& points) {
     for (const AccuracyPoint& p : points)
       text += fmt::format(
-          "{},{},{},{},{:.9g},{},{:g},{:g},{:.6g},{:.6g},{:.6g},{:.6g},{:.6g},{:d},{}\n", name,
-          to_string(subject.quantity), sweep, to_string(p.setting.integrator), p.step,
-          to_string(p.precision), p.setting.tolerance, p.setting.accuracy, p.error, p.median,
-          p.rate, p.evaluations, p.split, p.blurred, p.failed);
+          "{},{},{},{},{:.9g},{},{:g},{:g},{:.6g},{:.6g},{:.6g},{:.6g},{:.6g},{:.6g},{:d},{}\n",
+          name, to_string(subject.quantity), sweep, to_string(p.setting.integrator), p.step,
+          to_string(p.precision), p.setting.tolerance, p.setting.accuracy, p.error, p.bound,
+          p.median, p.rate, p.evaluations, p.split, p.blurred, p.failed);
   };
   rows("step", report.points);
   rows("tolerance", report.tolerances);

@@ -73,7 +73,7 @@ class Model {
   [[nodiscard]] int nb() const;  ///< bodies of the scene, folded or not, in file order
   [[nodiscard]] double mass(int body) const;  ///< [kg]
   [[nodiscard]] double timestep() const;      ///< [s]
-  /// The scene's scheme, or SDIRK2 where its accuracy asks for one (keeping_accuracy()).
+  /// The scene's scheme, or SDIRK3 where its accuracy asks for one (keeping_accuracy()).
   [[nodiscard]] Integrator integrator() const;
   [[nodiscard]] const SolverOptions& solver() const;
   /// The tolerance that leaves errors well below those of a step [s] of this scheme

@@ -4,13 +4,16 @@
 // Runge-Kutta: X_i = h Σ a_ij ẋ_j, V_i = v₀ + h Σ a_ij v̇_j. η solves η a_jk = a_ik over the rows
 // before i. Then
 //   ẋ_i = (X_i - Σ η_j X_j)/(a_ii h),  v̇_i = (V_i - v₀ - Σ η_j (V_j - v₀))/(a_ii h)
-// The estimate compares X_s with the interpolatory rule through t = 0 and the stages' ends c_i:
-//   e = X_s - h (w_0 v₀ + Σ w_i ẋ_i),  Σ w_i c_i^p = 1/(p + 1) for p = 0 … s, with 0^0 = 1
+// The estimate compares X_s with the rule that is exact for the first terms of ẋ = λx, where the
+// stages have the rates λ (A 1)ᵏ xₖ:
+//   e = X_s - h (w_0 v₀ + Σ w_i ẋ_i),  w_0 + Σ w_i = 1,  Σ w_i (Aᵏ 1)_i = 1/(k + 1)! for k = 1 … s
 #include "engine/model/scheme.hpp"
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <string>
+#include <utility>
 
 #include "engine/base/error.hpp"
 
@@ -27,38 +30,56 @@ int Scheme::most_inner_stages() const {
 
 namespace {
 
-/// Weights of the interpolatory rule on [0, 1] through 0 and `ends`: the integrals of Lagrange's
-/// polynomials. Not finite where two of the places coincide.
-std::vector<double> rule_through(const std::vector<double>& ends) {
-  std::vector<double> nodes = {0}, weights;
-  nodes.insert(nodes.end(), ends.begin(), ends.end());
-  for (std::size_t i = 0; i < nodes.size(); ++i) {
-    std::vector<double> polynomial = {1};  // coefficients, the constant first
-    for (std::size_t j = 0; j < nodes.size(); ++j) {
-      if (j == i) continue;
-      const double by = nodes[i] - nodes[j];
-      polynomial.push_back(0);
-      for (std::size_t p = polynomial.size(); p-- > 0;)
-        polynomial[p] = ((p > 0 ? polynomial[p - 1] : 0) - nodes[j] * polynomial[p]) / by;
+/// Solves equations, each a row of coefficients and the right-hand side. Not finite where they
+/// determine nothing.
+std::vector<double> solution_of(std::vector<std::vector<double>> rows) {
+  const std::size_t n = rows.size();
+  for (std::size_t k = 0; k < n; ++k) {
+    std::size_t largest = k;
+    for (std::size_t i = k + 1; i < n; ++i)
+      if (std::abs(rows[i][k]) > std::abs(rows[largest][k])) largest = i;
+    std::swap(rows[k], rows[largest]);
+    for (std::size_t i = 0; i < n; ++i) {
+      if (i == k) continue;
+      const double share = rows[i][k] / rows[k][k];
+      for (std::size_t j = k; j <= n; ++j) rows[i][j] -= share * rows[k][j];
     }
-    double integral = 0;
-    for (std::size_t p = 0; p < polynomial.size(); ++p)
-      integral += polynomial[p] / static_cast<double>(p + 1);
-    weights.push_back(integral);
   }
+  std::vector<double> x;
+  for (std::size_t k = 0; k < n; ++k) x.push_back(rows[k][n] / rows[k][k]);
+  return x;
+}
+
+/// Weights, on the rates at the start and at the stages' ends, of the rule that is exact for the
+/// first terms of ẋ = λx.
+std::vector<double> rule_of(const std::vector<std::vector<double>>& a) {
+  std::vector<std::vector<double>> conditions;
+  std::vector<double> power(a.size(), 1.0);  // Aᵏ 1
+  double integral = 1;                       // 1/(k + 1)!
+  for (std::size_t k = 1; k <= a.size(); ++k) {
+    for (std::size_t i = a.size(); i-- > 0;) {  // row i reads what rows above it still hold
+      double sum = 0;
+      for (std::size_t j = 0; j <= i; ++j) sum += a[i][j] * power[j];
+      power[i] = sum;
+    }
+    integral /= static_cast<double>(k + 1);
+    conditions.push_back(power);
+    conditions.back().push_back(integral);
+  }
+  std::vector<double> weights = solution_of(std::move(conditions));
+  weights.insert(weights.begin(), 1 - std::accumulate(weights.begin(), weights.end(), 0.0));
   return weights;
 }
 
 /// Weights of e on h v₀ and on the stages' x. `eta`: η of every stage.
-std::vector<double> estimate_of(const std::vector<double>& ends,
-                                const std::vector<std::vector<double>>& eta,
-                                const std::vector<double>& diagonal) {
-  const std::vector<double> w = rule_through(ends);
+std::vector<double> estimate_of(const std::vector<std::vector<double>>& a,
+                                const std::vector<std::vector<double>>& eta) {
+  const std::vector<double> w = rule_of(a);
   std::vector<double> estimate(w.size(), 0.0);
   estimate[0] = -w[0];
   estimate.back() = 1;
-  for (std::size_t i = 0; i < ends.size(); ++i) {  // h w_i ẋ_i in terms of x
-    const double share = w[i + 1] / diagonal[i];
+  for (std::size_t i = 0; i < a.size(); ++i) {  // h w_i ẋ_i in terms of x
+    const double share = w[i + 1] / a[i][i];
     estimate[i + 1] -= share;
     for (std::size_t j = 0; j < i; ++j) estimate[j + 1] += share * eta[i][j];
   }
@@ -74,7 +95,6 @@ Scheme runge_kutta(const char* name, int order, std::initializer_list<std::vecto
                      " stages; expected 1 to " + std::to_string(kMostStages));
   Scheme scheme{name, order, {}, 0, nullptr, nullptr, {}};
   std::vector<std::vector<double>> etas;
-  std::vector<double> ends, diagonal;
   for (std::size_t i = 0; i < a.size(); ++i) {
     if (a[i].size() != i + 1 || !(a[i][i] > 0))
       throw InputError(std::string(name) + ": stage " + std::to_string(i) +
@@ -89,15 +109,13 @@ Scheme runge_kutta(const char* name, int order, std::initializer_list<std::vecto
     }
     SchemeStage stage{i + 1 == a.size() ? 1 : end, 1 / a[i][i], 0, -1, 0, a[i][i], {}};
     for (const double weight : eta) stage.inner.push_back({-(weight / a[i][i]), -weight});
-    ends.push_back(stage.end);
-    diagonal.push_back(a[i][i]);
     etas.push_back(std::move(eta));
     scheme.stages.push_back(std::move(stage));
     if (i + 1 == a.size() && !(std::abs(end - 1) < 1e-9))
       throw InputError(std::string(name) + ": the last stage ends at " + std::to_string(end) +
                        " steps; expected 1");
   }
-  scheme.estimate = estimate_of(ends, etas, diagonal);
+  scheme.estimate = estimate_of(a, etas);
   if (!std::ranges::all_of(scheme.estimate, [](double x) { return std::isfinite(x); }))
     scheme.estimate.clear();
   return scheme;
@@ -151,7 +169,7 @@ constinit const Integrator Integrator::sdirk4{kSdirk4};
 
 Integrator keeping_accuracy(Integrator of_scene, double accuracy) {
   const bool keeps = !of_scene.scheme().estimate.empty() && of_scene.scheme().order > 1;
-  return accuracy > 0 && !keeps ? Integrator::sdirk2 : of_scene;
+  return accuracy > 0 && !keeps ? Integrator::sdirk3 : of_scene;
 }
 
 std::span<const Integrator> integrators() {

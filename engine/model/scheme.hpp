@@ -79,7 +79,7 @@ class Integrator {
   const Scheme* scheme_;
 };
 
-/// The scheme with which steps of a scene keep an accuracy (0: they need not): SDIRK2 in place of
+/// The scheme with which steps of a scene keep an accuracy (0: they need not): SDIRK3 in place of
 /// one that has no estimate or is of order 1.
 Integrator keeping_accuracy(Integrator of_scene, double accuracy);
 

@@ -52,22 +52,22 @@ void set_state(const LaneState& s, BasicWorkspace<L>& w, int lane) {
 template <int L>
 LaneBits GroupStep::run(const Scheme& scheme, const kernels::KernelTable& table,
                         BasicWorkspace<L>& w, LaneBits lanes, const Row<L>& h, bool inside_split,
-                        NewtonReport& report) const {
+                        NewtonReport& report, StageFactors<L>& factors) const {
   const int n = model_.nv;
   const NewtonLimits limits = {settings_.tolerance,
                                inside_split ? kSplitIterations : settings_.max_iterations,
                                inside_split ? kSplitHalvings : kHalvings,
                                inside_split ? kSplitPatience : kPatience, settings_.spare};
-  StageFactors<L> factors;
+  factors = {};
   choose_faces(model_, table, w);
   begin_memory(model_, table, w);
   for (int k = 0; k <= scheme.inner_stages(); ++k) {
     set_stage(model_, scheme, k, h, w);
     guess_stage(model_, scheme, k, h, w);
     lanes = solve_stage(model_, table, w, lanes, limits, factors, report);
-    // Who names a tolerance gets what Newton steps come to, which is far below it.
-    if (!settings_.spare) factors = {};
     if (k == scheme.inner_stages()) break;
+    // Who names a tolerance gets what Newton steps come to, which is far below it.
+    if (!settings_.spare) factors.begin_anew();
     std::copy_n(w.stage.x, n, w.x_inner + k * n);
     std::copy_n(w.stage.v, n, w.v_inner + k * n);
   }
@@ -301,7 +301,8 @@ void GroupStep::advance_plainly(const kernels::KernelTable& table, BasicWorkspac
       set_state(start, w, l);
       if (log != nullptr) solves_of(l)->clear();
       const Scheme& by = has(starting, l) ? *scheme.start : scheme;
-      run(by, table, w, 1U << l, Row<L>::all(h), false, report);
+      StageFactors<L> unused;
+      run(by, table, w, 1U << l, Row<L>::all(h), false, report, unused);
       commit(w, 1U << l);
       if (has(starting, l)) {
         note(w, l, by, h, solves_of(l));
@@ -340,7 +341,8 @@ void GroupStep::advance_plainly(const kernels::KernelTable& table, BasicWorkspac
 // step_parts.cpp uses these.
 #define TANGERE_FOR_LANES(L)                                                                       \
   template LaneBits GroupStep::run(const Scheme&, const kernels::KernelTable&, BasicWorkspace<L>&, \
-                                   LaneBits, const Row<L>&, bool, NewtonReport&) const;            \
+                                   LaneBits, const Row<L>&, bool, NewtonReport&, StageFactors<L>&) \
+      const;                                                                                       \
   template void GroupStep::commit(BasicWorkspace<L>&, LaneBits) const;                             \
   template void GroupStep::note(const BasicWorkspace<L>&, int, const Scheme&, double,              \
                                 std::vector<TapedSolve>*) const;                                   \

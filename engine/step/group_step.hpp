@@ -4,6 +4,7 @@
 // an accuracy.
 #pragma once
 
+#include "engine/step/contact_forces.hpp"
 #include "engine/step/newton.hpp"
 #include "engine/step/passing.hpp"
 #include "engine/step/step_watch.hpp"
@@ -58,13 +59,19 @@ class GroupStep {
                         SingleWorkspace& alone, LaneBits lanes, NewtonReport& report,
                         SolveLog* log) const;
   template <int L>
+  void weigh_displacement(const kernels::KernelTable& table, BasicWorkspace<L>& w, LaneBits lanes,
+                          const kernels::Row<L>& h, NewtonReport& report) const;
+  template <int L>
+  void weigh_velocity(const kernels::KernelTable& table, BasicWorkspace<L>& w, LaneBits lanes,
+                      const kernels::Row<L>& h, NewtonReport& report) const;
+  template <int L>
   kernels::Row<L> estimated_error(const kernels::KernelTable& table, BasicWorkspace<L>& w,
                                   LaneBits lanes, const kernels::Row<L>& h,
-                                  NewtonReport& report) const;
+                                  const StageFactors<L>& factors, NewtonReport& report) const;
   template <int L>
   LaneBits run(const Scheme& scheme, const kernels::KernelTable& table, BasicWorkspace<L>& w,
-               LaneBits lanes, const kernels::Row<L>& h, bool inside_split,
-               NewtonReport& report) const;
+               LaneBits lanes, const kernels::Row<L>& h, bool inside_split, NewtonReport& report,
+               StageFactors<L>& factors) const;
   bool split(const kernels::KernelTable& table, SingleWorkspace& w, double h, int depth,
              NewtonReport& report, std::vector<TapedSolve>* solves) const;
   bool take_part(const kernels::KernelTable& table, SingleWorkspace& w, double h, int depth,
@@ -107,6 +114,7 @@ class GroupStep {
   const CompiledModel& model_;
   StepSettings settings_;
   Passing passing_;
+  ContactForces contact_forces_;
   std::vector<double> component_mass_;  ///< [kg] without densities that vary
 };
 

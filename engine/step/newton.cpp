@@ -45,6 +45,14 @@
 
 namespace tangere {
 
+template <int L>
+void scaled_residual(const CompiledModel& model, const kernels::KernelTable& table,
+                     const BasicWorkspace<L>& w, kernels::Row<L>& out) {
+  const double gravity = std::sqrt(dot(model.view.gravity, model.view.gravity));
+  if (model.components() > 1) return worst_scaled_residuals(model, w, gravity, out);
+  table.stage<L>().scaled_residual(model.view, w.stage, gravity, out);
+}
+
 namespace {
 
 // Decrease that a trial must bring, per α: for Newton's directions, and for those by the secant, of
@@ -63,7 +71,6 @@ struct Search {
   const NewtonLimits& limits;
   StageFactors<L>& factors;
   NewtonReport& report;
-  double gravity;
   LaneBits searching;
   LaneBits on_trial = 0;   ///< lanes whose x is a trial along delta
   LaneBits spared = 0;     ///< lanes that ended without the last evaluation
@@ -132,10 +139,6 @@ struct Search {
     return row;
   }
 
-  void scaled_residuals(LaneRow& out) const {
-    if (model.components() > 1) return worst_scaled_residuals(model, w, gravity, out);
-    kernel().scaled_residual(model.view, w.stage, gravity, out);
-  }
   void weighted_norms(const LaneRow* a, LaneRow& out) const {
     kernel().weighted_norm(model.view, w.stage, a, out);
   }
@@ -150,7 +153,7 @@ struct Search {
   /// point.
   LaneBits judge() {
     LaneRow residual, test_norm{};
-    scaled_residuals(residual);
+    scaled_residual(model, table, w, residual);
     if ((factors.lanes & searching) != 0) {
       kernel().solve(model.view, w.stage, w.stage.g, w.test);
       for (int l = 0; l < L; ++l)
@@ -271,6 +274,7 @@ struct Search {
     for (int l = 0; l < L; ++l) {
       if (!has(accepted, l)) continue;
       factors.lanes |= 1U << l;
+      factors.any |= 1U << l;
       by_secant = secants[l] > 0 ? by_secant | (1U << l) : by_secant & ~(1U << l);
       factors.pivoted &= ~(1U << l);
       if (w.sound[l] > 0) continue;
@@ -304,15 +308,13 @@ struct Search {
   }
 };
 
-double magnitude(const kernels::Vec3<double>& a) { return std::sqrt(dot(a, a)); }
-
 }  // namespace
 
 template <int L>
 LaneBits solve_stage(const CompiledModel& model, const kernels::KernelTable& table,
                      BasicWorkspace<L>& w, LaneBits lanes, const NewtonLimits& limits,
                      StageFactors<L>& factors, NewtonReport& report) {
-  Search<L> s{model, table, w, limits, factors, report, magnitude(model.view.gravity), lanes};
+  Search<L> s{model, table, w, limits, factors, report, lanes};
   s.take_over();
   bool first = true;
   while (s.searching != 0) {
@@ -334,23 +336,35 @@ LaneBits solve_stage(const CompiledModel& model, const kernels::KernelTable& tab
 }
 
 template <int L>
-void residual_elsewhere(const CompiledModel& model, const kernels::KernelTable& table,
-                        BasicWorkspace<L>& w, LaneBits lanes, NewtonReport& report,
-                        kernels::Row<L>& out) {
+void evaluate_elsewhere(const CompiledModel& model, const kernels::KernelTable& table,
+                        BasicWorkspace<L>& w, LaneBits lanes, NewtonReport& report) {
   const NewtonLimits unused{};
   StageFactors<L> none;
-  Search<L> s{model, table, w, unused, none, report, magnitude(model.view.gravity), lanes};
+  Search<L> s{model, table, w, unused, none, report, lanes};
   s.locate(false);
   s.kernel().residual(model.view, w.stage, s.lone(lanes));
-  s.scaled_residuals(out);
   for (int l = 0; l < L; ++l)
     if (has(lanes, l)) ++report.iterations[l];
 }
 
-template void residual_elsewhere(const CompiledModel&, const kernels::KernelTable&, Workspace&,
-                                 LaneBits, NewtonReport&, kernels::Row<kernels::kGroup>&);
-template void residual_elsewhere(const CompiledModel&, const kernels::KernelTable&,
-                                 SingleWorkspace&, LaneBits, NewtonReport&, kernels::Row<1>&);
+template <int L>
+void solve_by_factor(const CompiledModel& model, const kernels::KernelTable& table,
+                     BasicWorkspace<L>& w, const StageFactors<L>& factors, kernels::Row<L>* out) {
+  table.stage<L>().solve(model.view, w.stage, w.stage.g, out);
+  for (int l = 0; l < L; ++l)
+    if (has(factors.pivoted & factors.any, l)) w.pivoted.solve(l, w.stage.g, out);
+}
+
+#define TANGERE_FOR_LANES(L)                                                          \
+  template void evaluate_elsewhere(const CompiledModel&, const kernels::KernelTable&, \
+                                   BasicWorkspace<L>&, LaneBits, NewtonReport&);      \
+  template void scaled_residual(const CompiledModel&, const kernels::KernelTable&,    \
+                                const BasicWorkspace<L>&, kernels::Row<L>&);          \
+  template void solve_by_factor(const CompiledModel&, const kernels::KernelTable&,    \
+                                BasicWorkspace<L>&, const StageFactors<L>&, kernels::Row<L>*);
+TANGERE_FOR_LANES(kernels::kGroup)
+TANGERE_FOR_LANES(1)
+#undef TANGERE_FOR_LANES
 template LaneBits solve_stage(const CompiledModel&, const kernels::KernelTable&, Workspace&,
                               LaneBits, const NewtonLimits&, StageFactors<kernels::kGroup>&,
                               NewtonReport&);

@@ -23,9 +23,16 @@ template <int L>
 struct StageFactors {
   bool weighted = false;          ///< the norm's weights and floor are those of this step
   LaneBits lanes = kNoLane;       ///< lanes with a factor at hand
+  LaneBits any = kNoLane;         ///< lanes that were factored in this step
   LaneBits pivoted = kNoLane;     ///< lanes in which that is the pivoted one
   std::array<double, L> share{};  ///< of the residual that a step by that factor left
   std::array<double, L> start{};  ///< residual at the first point of the stage before
+
+  /// The next stage begins as if it were the first. Factors that were made stay known.
+  void begin_anew() {
+    weighted = false;
+    lanes = kNoLane;
+  }
 };
 
 /// How the solve went, per lane. Lanes that were not requested keep their values.
@@ -47,10 +54,17 @@ LaneBits solve_stage(const CompiledModel& model, const kernels::KernelTable& tab
                      BasicWorkspace<L>& w, LaneBits lanes, const NewtonLimits& limits,
                      StageFactors<L>& factors, NewtonReport& report);
 
-/// Computes the scaled residual at another x of a solved stage. The stage keeps that x.
+/// Evaluates g at the stage's present x, r and s, which may be others than those of the last solve.
 template <int L>
-void residual_elsewhere(const CompiledModel& model, const kernels::KernelTable& table,
-                        BasicWorkspace<L>& w, LaneBits lanes, NewtonReport& report,
-                        kernels::Row<L>& out);
+void evaluate_elsewhere(const CompiledModel& model, const kernels::KernelTable& table,
+                        BasicWorkspace<L>& w, LaneBits lanes, NewtonReport& report);
+/// Computes the scaled norm of g as it is.
+template <int L>
+void scaled_residual(const CompiledModel& model, const kernels::KernelTable& table,
+                     const BasicWorkspace<L>& w, kernels::Row<L>& out);
+/// Computes out = A⁻¹ g by the last factor of the lanes `factors.any`; others have no meaning.
+template <int L>
+void solve_by_factor(const CompiledModel& model, const kernels::KernelTable& table,
+                     BasicWorkspace<L>& w, const StageFactors<L>& factors, kernels::Row<L>* out);
 
 }  // namespace tangere

@@ -1,18 +1,27 @@
 // SPDX-License-Identifier: Apache-2.0
 // Cuts a step into parts whose errors keep the accuracy that was asked for.
 //
-// The estimate e of a part's error (engine/model/scheme.hpp) is a displacement. What it means for
-// forces is the residual of the last stage at x - e, in the scale of the solver's tolerance: the
-// share of the acting forces that would have no counterpart. A part is taken when
-//   kSafety ‖residual(x - e)‖ ≤ accuracy
+// The estimates e and e_v of the errors of displacement and velocity (engine/model/scheme.hpp) say
+// how far the start and the stages are from one smooth motion. Stiff contacts pull most of either
+// back, so they are taken through the Jacobian A of the last stage:
+//   δ = A⁻¹ M (c₀/h)² e,   δ_v = A⁻¹ M (c₀/h) e_v
+// M (c₀/h)² e is the residual at the end with accelerations (c₀/h)² e more. M e_v follows from the
+// residual at the start with the accelerations that the stages, extrapolated, have there. A part is
+// taken when both of these are at most the accuracy:
+//   the share of the contact forces that moving the end by δ and by δ_v changes
+//       (contact_forces.hpp)
+//   M (c₀/h)² e, in the scale of the solver's tolerance: the share of all acting forces that would
+//       displace by e in a stage
 // A step begins with a part of its whole length whatever was before it, so it depends on its state
 // alone. Lanes have parts of their own lengths and are solved side by side, until the last has
 // arrived.
 #include "engine/step/step_parts.hpp"
 
+#include <algorithm>
 #include <utility>
 
 #include "engine/step/group_step.hpp"
+#include "engine/step/scheme_stage.hpp"
 
 namespace tangere {
 
@@ -21,27 +30,86 @@ using kernels::Row;
 namespace {
 
 /// The estimate of the parts taken stays below 1/kSafety of the accuracy.
-constexpr double kSafety = 2;
+constexpr double kSafety = 1.5;
 
 }  // namespace
 
-/// Returns kSafety times the scaled residual at x - e, of parts that were just solved.
+/// Sets the residual to M (c₀/h)² e at the end of the parts just solved.
 template <int L>
-Row<L> GroupStep::estimated_error(const kernels::KernelTable& table, BasicWorkspace<L>& w,
-                                  LaneBits lanes, const Row<L>& h, NewtonReport& report) const {
-  const Scheme& scheme = settings_.integrator.scheme();
-  const int n = model_.nv, inner = scheme.inner_stages();
+void GroupStep::weigh_displacement(const kernels::KernelTable& table, BasicWorkspace<L>& w,
+                                   LaneBits lanes, const Row<L>& h, NewtonReport& report) const {
+  const std::vector<double>& estimate = settings_.integrator.scheme().estimate;
+  const int n = model_.nv, inner = settings_.integrator.scheme().inner_stages();
+  kernels::Stage<L>& s = w.stage;
   for (int i = 0; i < n; ++i)
     for (int l = 0; l < L; ++l) {
-      double e = scheme.estimate[0] * h[l] * w.v0[i][l];
-      for (int k = 0; k < inner; ++k)
-        e += scheme.estimate[std::size_t(1 + k)] * w.x_inner[k * n + i][l];
-      e += scheme.estimate[std::size_t(1 + inner)] * w.stage.x[i][l];
-      w.stage.x[i][l] -= e;
+      double e = estimate.front() * h[l] * w.v0[i][l] + estimate.back() * s.x[i][l];
+      for (int k = 0; k < inner; ++k) e += estimate[std::size_t(1 + k)] * w.x_inner[k * n + i][l];
+      s.s[i][l] += s.c0_over_h[l] * s.c0_over_h[l] / s.inverse_h[l] * e;
     }
+  evaluate_elsewhere(model_, table, w, lanes, report);
+}
+
+/// Sets the residual to -M e_v/(h estimate[0]), at the start.
+template <int L>
+void GroupStep::weigh_velocity(const kernels::KernelTable& table, BasicWorkspace<L>& w,
+                               LaneBits lanes, const Row<L>& h, NewtonReport& report) const {
+  const std::vector<double>& estimate = settings_.integrator.scheme().estimate;
+  const int n = model_.nv, inner = settings_.integrator.scheme().inner_stages();
+  kernels::Stage<L>& s = w.stage;
+  for (int i = 0; i < n; ++i)
+    for (int l = 0; l < L; ++l) {
+      const double v0 = w.v0[i][l];
+      double change = estimate.back() * (w.v1[i][l] - v0);
+      for (int k = 0; k < inner; ++k)
+        change += estimate[std::size_t(1 + k)] * (w.v_inner[k * n + i][l] - v0);
+      // v = r/h and a = (c₀ v + s)/h
+      s.x[i][l] = 0;
+      s.r[i][l] = v0 / s.inverse_h[l];
+      s.s[i][l] = -change / (estimate.front() * h[l] * s.inverse_h[l]) -
+                  s.c0_over_h[l] / s.inverse_h[l] * v0;
+    }
+  evaluate_elsewhere(model_, table, w, lanes, report);
+}
+
+/// Returns the larger of the two shares at the head of this file, of parts that were just solved.
+template <int L>
+Row<L> GroupStep::estimated_error(const kernels::KernelTable& table, BasicWorkspace<L>& w,
+                                  LaneBits lanes, const Row<L>& h, const StageFactors<L>& factors,
+                                  NewtonReport& report) const {
+  const Scheme& scheme = settings_.integrator.scheme();
+  const int n = model_.nv;
+  kernels::Stage<L>& s = w.stage;
+  const auto& kernel = table.stage<L>();
+  const auto [start, end, by_displacement, by_velocity] = w.wrenches;
+  std::copy_n(s.x, n, w.base);
+  weigh_displacement(table, w, lanes, h, report);
+  kernel.contact_wrenches(model_.view, s, end);
   Row<L> error{};
-  residual_elsewhere(model_, table, w, lanes, report, error);
-  for (int l = 0; l < L; ++l) error[l] *= kSafety;
+  scaled_residual(model_, table, w, error);
+  if (contact_forces_.none()) return error;
+  solve_by_factor(model_, table, w, factors, w.delta);
+  weigh_velocity(table, w, lanes, h, report);
+  kernel.contact_wrenches(model_.view, s, start);
+  solve_by_factor(model_, table, w, factors, w.test);
+  // Where the first guess of every stage was a root there is no factor, and the motion is smooth.
+  const LaneBits touching =
+      lanes & factors.any & (contact_forces_.touching<L>(start) | contact_forces_.touching<L>(end));
+  if (touching == 0) return error;
+  set_stage(model_, scheme, scheme.inner_stages(), h, w);
+  const auto move = [&](const Row<L>* way, double share, Row<L>* wrenches) {
+    for (int i = 0; i < n; ++i)
+      for (int l = 0; l < L; ++l) s.x[i][l] = w.base[i][l] - share * way[i][l];
+    evaluate_elsewhere(model_, table, w, touching, report);
+    kernel.contact_wrenches(model_.view, s, wrenches);
+  };
+  move(w.delta, 1, by_displacement);
+  move(w.test, -scheme.stages.back().c0 * scheme.estimate.front(), by_velocity);
+  for (int l = 0; l < L; ++l) {
+    if (!has(touching, l)) continue;
+    const double change = contact_forces_.change<L>(start, end, by_displacement, by_velocity, l);
+    if (!(change <= error[l])) error[l] = change;
+  }
   return error;
 }
 
@@ -55,20 +123,21 @@ void GroupStep::advance_in_parts(const kernels::KernelTable& table, BasicWorkspa
   for (LaneBits open = lanes; open != 0;) {
     Row<L> h = Row<L>::all(settings_.timestep);
     for (int l = 0; l < L; ++l) h[l] *= at[l].length();
-    const LaneBits solved = run(scheme, table, w, open, h, false, report);
+    StageFactors<L> factors;
+    const LaneBits solved = run(scheme, table, w, open, h, false, report, factors);
     const LaneBits through = std::exchange(report.passed, kNoLane);
     LaneBits turned = 0;
     for (int l = 0; l < L; ++l)
       if (has(solved, l)) turned |= turning(scheme, w, 1U << l, h[l]);
     Row<L> error{};
-    if (solved != 0) error = estimated_error(table, w, solved, h, report);
+    if (solved != 0) error = estimated_error(table, w, solved, h, factors, report);
     for (int l = 0; l < L; ++l) {
       if (!has(open, l)) continue;
       const LaneBits bit = 1U << l;
       // A body that came through another is the worst error that there is. One that turned too far
       // is off by more than the displacement shows.
       const bool sound = has(solved & ~(through | turned), l);
-      const double ratio = sound ? error[l] / settings_.accuracy : HUGE_VAL;
+      const double ratio = sound ? kSafety * error[l] / settings_.accuracy : HUGE_VAL;
       std::vector<TapedSolve>* solves = log == nullptr ? nullptr : &log->special[std::size_t(l)];
       if (!(ratio <= 1) && !at[l].finest()) {
         at[l].shorten(ratio);

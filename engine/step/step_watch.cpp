@@ -32,7 +32,7 @@ constexpr double kMayCreate = 1e-3;
 }  // namespace
 
 GroupStep::GroupStep(const CompiledModel& model, const StepSettings& settings)
-    : model_(model), settings_(settings), passing_(model) {
+    : model_(model), settings_(settings), passing_(model), contact_forces_(model) {
   std::vector<double> of_dof(std::size_t(model.nv));  // a link's mass counts at its first dof
   for (const kernels::Link& link : model.links) of_dof[std::size_t(link.v)] = link.mass;
   for (int c = 0; c < model.components(); ++c) {
@@ -138,7 +138,8 @@ Solved GroupStep::solve_and_watch(const Scheme& scheme, const kernels::KernelTab
                                   NewtonReport& report) const {
   Solved solved;
   const LaneBits of_other_parts = std::exchange(report.passed, kNoLane);
-  solved.found = run(scheme, table, w, lanes, Row<L>::all(h), inside_split, report);
+  StageFactors<L> unused;
+  solved.found = run(scheme, table, w, lanes, Row<L>::all(h), inside_split, report, unused);
   solved.passed = std::exchange(report.passed, of_other_parts) & solved.found;
   solved.created = creating(table, w, solved.found & ~solved.passed, h);
   solved.turned = turning(scheme, w, solved.found & ~(solved.passed | solved.created), h);

@@ -33,6 +33,8 @@ std::size_t lay_out(const CompiledModel& m, BasicWorkspace<L>& w, Row<L>* base) 
   rows(s.excess, 1);
   rows(s.faces, 3 * static_cast<int>(m.pairs.size()));
   rows(w.faces_after, 3 * static_cast<int>(m.pairs.size()));
+  const auto contacts = static_cast<int>(m.link_pairs.size() + m.grounded.size());
+  for (LaneRow*& wrenches : w.wrenches) rows(wrenches, 6 * contacts);
   rows(w.zero, m.nv);
   rows(w.floors, m.components());
   for (LaneRow** p : {&w.q0, &w.q_before, &w.q1}) rows(*p, m.nq);

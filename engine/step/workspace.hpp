@@ -66,6 +66,8 @@ struct BasicWorkspace {
   LaneRow* faces_after;  ///< (n_pairs, 3) as stage.faces, but where the solve ended
   /// (n_links) where a solve began and ended, of steps that are looked at more closely.
   AlignedVector<kernels::LinkPose<LaneRow>> poses_before, poses_after;
+  /// Wrenches of contacts, (link pairs + grounded links, 6), of parts whose error is estimated.
+  std::array<LaneRow*, 4> wrenches;
   AlignedVector<double> search;  ///< (3, largest stride of a list)
   LaneRow* zero;                 ///< (nv) zeros
   LaneRow* floors;               ///< (components) stage.floor of each, where there are several

@@ -461,4 +461,17 @@ void residual(const ModelView& model, const StageArgs<N>& a) {
   without_negative_zeros(a.g, model.nv);
 }
 
+/// Copies the wrenches of all contacts at the x of residual(): those of pairs of links, then of
+/// grounded links, each on its first link, about that link's origin and in its axes.
+template <class N>
+void contact_wrenches(const ModelView& model, const StageArgs<N>& a, N* out) {
+  for (int k = 0; k < model.n_link_pairs + model.n_grounded; ++k) {
+    const ContactScratch<N>& o = a.contacts[k];
+    const Vec6<N> wrench = o.near ? o.sums.wrench : zero6<N>();
+    N* row = out + 6 * k;
+    row[0] = wrench.a.x, row[1] = wrench.a.y, row[2] = wrench.a.z;
+    row[3] = wrench.l.x, row[4] = wrench.l.y, row[5] = wrench.l.z;
+  }
+}
+
 }  // namespace tangere::kernels

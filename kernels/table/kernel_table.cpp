@@ -29,6 +29,7 @@ constexpr StageKernels<L> stage_kernels() {
           Step::near_pairs,
           Step::residual,
           Step::evaluate,
+          Step::contact_wrenches,
           Step::set_weights,
           Step::set_floor,
           Step::scaled_residual,

@@ -34,6 +34,9 @@ struct StageKernels {
   /// The same, with mass_diagonal and A. g, v and force_scale have the same bits as from
   /// residual().
   void (*evaluate)(const ModelView&, const Stage<L>&, int lone);
+  /// Copies the wrenches of contacts at the x of residual() or evaluate(), (n_link_pairs +
+  /// n_grounded, 6): torque, then force, on the first link about its origin, in its axes.
+  void (*contact_wrenches)(const ModelView&, const Stage<L>&, Row<L>* out);
   /// Computes weight and inverse_weight from mass_diagonal.
   void (*set_weights)(const ModelView&, Stage<L>&);
   /// Computes floor from A, in lanes where accept > 0. `unknown_scale`: (nv) the magnitudes to

@@ -22,6 +22,7 @@ struct StepPart {
   static void near_pairs(const ModelView&, const Stage<L>&, NearPairs<L>& out);
   static void residual(const ModelView&, const Stage<L>&, int lone);
   static void evaluate(const ModelView&, const Stage<L>&, int lone);
+  static void contact_wrenches(const ModelView&, const Stage<L>&, Row<L>* out);
   static void set_weights(const ModelView&, Stage<L>&);
   static void set_floor(const ModelView&, Stage<L>&, const double* unknown_scale,
                         const Row<L>& accept);

@@ -65,6 +65,12 @@ void StepPart<N, L>::evaluate(const ModelView& m, const Stage<L>& s, int lone) {
 }
 
 template <class N, int L>
+void StepPart<N, L>::contact_wrenches(const ModelView& m, const Stage<L>& s, Row<L>* out) {
+  using View = StageView<N, L>;
+  kernels::contact_wrenches(m, View::arguments(m, s, -1), View::view(out));
+}
+
+template <class N, int L>
 void StepPart<N, L>::set_weights(const ModelView& m, Stage<L>& s) {
   using View = StageView<N, L>;
   kernels::set_weights(m.nv, View::view(s.mass_diagonal), View::view(s.weight),

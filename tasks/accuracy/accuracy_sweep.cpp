@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 
 #include "engine/base/as_size.hpp"
 #include "engine/step/stepper.hpp"
@@ -169,6 +170,7 @@ class Sweep {
     point.precision = kPrecisions[p];
     point.step = episodes_.interval() / setting.parts;
     point.error = quantile(outcome.error[p], 0.95);
+    point.bound = sure_quantile(outcome.error[p], 0.95);
     point.median = quantile(outcome.error[p], 0.5);
     point.within = share_near(setting.accuracy, outcome.error[p]);
     const auto steps = static_cast<double>(std::max<std::int64_t>(1, outcome.environment_steps));
@@ -202,7 +204,7 @@ class Sweep {
   bool measure_cut_steps() {
     const Model& model = episodes_.start.model();
     const auto parts = std::ranges::find_if(kParts, [&](int n) { return episodes_.can_cut(n); });
-    AccuracySetting setting{Integrator::sdirk2, parts == kParts.end() ? episodes_.every : *parts};
+    AccuracySetting setting{Integrator::sdirk3, parts == kParts.end() ? episodes_.every : *parts};
     for (const double accuracy : kAccuracies) {
       setting.accuracy = accuracy;
       const Stepper as_set(model, {.integrator = setting.integrator,
@@ -231,7 +233,7 @@ class Sweep {
   void choose() {
     for (std::size_t i = 0; i < report_.points.size(); ++i) {
       const AccuracyPoint& p = report_.points[i];
-      if (!(p.error <= options_.target) || p.failed > report_.reference.failed) continue;
+      if (!(p.bound <= options_.target) || p.failed > report_.reference.failed) continue;
       if (report_.advice < 0 || p.rate > report_.points[as_size(report_.advice)].rate)
         report_.advice = static_cast<int>(i);
     }
@@ -257,6 +259,22 @@ class Sweep {
 };
 
 }  // namespace
+
+double sure_quantile(std::vector<double> numbers, double share) {
+  std::erase_if(numbers, [](double x) { return std::isnan(x); });
+  if (numbers.empty()) return std::nan("");
+  std::sort(numbers.begin(), numbers.end(), std::greater<>());
+  const double beyond = 1 - share;
+  double term = std::pow(share, static_cast<double>(numbers.size())), sum = term;
+  std::size_t larger = 0;
+  while (sum + (term *= static_cast<double>(numbers.size() - larger) /
+                        static_cast<double>(larger + 1) * beyond / share) <=
+         beyond) {
+    sum += term;
+    ++larger;
+  }
+  return numbers[larger];
+}
 
 AccuracyReport accuracy_sweep(const FixedEpisodes& episodes, const AccuracyOptions& options,
                               const AccuracyListener& listener) {

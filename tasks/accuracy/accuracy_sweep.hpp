@@ -27,6 +27,9 @@ struct AccuracyPoint {
   Precision precision = Precision::f64;  ///< of fields
   double step = 0;                       ///< [s]
   double error = 0;  ///< not exceeded in 95 % of the environments; infinite if more than 5 % failed
+  /// 95 % of all environments like these do not exceed it, with 95 % confidence; the largest error
+  /// where there are fewer than 59 environments, which cannot tell.
+  double bound = 0;
   double median = 0;  ///< of the errors of environments
   /// Of cut steps: share of the environments whose error is 0.3 to 3 times the accuracy; else NaN.
   double within = 0;
@@ -53,7 +56,7 @@ struct AccuracyReport {
   std::vector<AccuracyPoint> points;
   std::vector<AccuracyPoint> tolerances;  ///< tolerances alone, at the setting of the advice
   AccuracyPoint own;                      ///< the scene's setting: its scheme, step and tolerance
-  int advice = -1;        ///< index of the cheapest point that meets the target; -1: none does
+  int advice = -1;  ///< index of the cheapest point whose bound meets the target; -1: none does
   bool resolved = false;  ///< the reference is accurate enough to judge by
   Vibration vibration;    ///< where it is not
   bool stopped = false;
@@ -65,6 +68,11 @@ struct AccuracyListener {
   std::function<void(const AccuracyReference&)> reference;      ///< each attempt, ever finer
   std::function<void(std::span<const AccuracyPoint>)> setting;  ///< in every precision
 };
+
+/// The value below which `share` of the population lies with that confidence, from which the numbers
+/// were drawn. Of n numbers k are larger, the most for which P(Binomial(n, 1 - share) ≤ k) is at most
+/// 1 - share. The largest number where there is no such k. NaN entries do not count.
+double sure_quantile(std::vector<double> numbers, double share);
 
 /// A stop leaves what there is by then. Throws InputError when nothing touches in any environment,
 /// or nothing moves.

@@ -75,6 +75,12 @@ class StageBuffers {
     kernels::residual<true>(model_.view, a);
     kernels::jacobian(model_.view, a);
   }
+  /// What contact_wrenches() copies after one of these.
+  std::vector<N> wrenches() {
+    std::vector<N> out(6 * contacts_.size());
+    kernels::contact_wrenches(model_.view, arguments(1, 1, nullptr), out.data());
+    return out;
+  }
   [[nodiscard]] N entry(const std::vector<N>& matrix, int i, int j) const {
     const int at = model_.pattern.slot[std::size_t(i * model_.nv + j)];
     return at < 0 ? N(0.0) : matrix[std::size_t(at)];

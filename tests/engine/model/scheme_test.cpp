@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <utility>
 
 #include "engine/base/error.hpp"
 #include "tests/engine/runs.hpp"
@@ -35,9 +36,9 @@ TEST(Schemes, EveryStageKeepsUniformMotion) {
   }
 }
 
-/// For ẋ = tᵖ a stage's rate is endᵖ. The estimate is then the exact error of the result, up to the
-/// power that the rule through all stages integrates.
-TEST(Schemes, EstimatesAreErrorsOfPowers) {
+/// For ẋ = λ(1 + x) the exact result is e^λ - 1. A scheme of s stages leaves an error of order
+/// λ^(order + 1); the estimate must be that error up to λ^(s + 2).
+TEST(Schemes, EstimatesAreErrorsOfLinearEquations) {
   int with_estimate = 0;
   for (const Integrator integrator : testing::all_integrators()) {
     const Scheme& scheme = integrator.scheme();
@@ -45,16 +46,24 @@ TEST(Schemes, EstimatesAreErrorsOfPowers) {
     SCOPED_TRACE(scheme.name);
     ++with_estimate;
     ASSERT_EQ(scheme.estimate.size(), scheme.stages.size() + 1);
-    for (std::size_t p = 0; p <= scheme.stages.size(); ++p) {
+    const auto off = [&](double lambda) {
       std::vector<double> x;
-      for (const SchemeStage& stage : scheme.stages) {  // c₀ x + Σ r x_j = endᵖ
-        double rate = std::pow(stage.end, static_cast<double>(p));
-        for (std::size_t j = 0; j < x.size(); ++j) rate -= stage.inner[j].r * x[j];
-        x.push_back(rate / stage.c0);
+      for (const SchemeStage& stage : scheme.stages) {  // c₀ x + Σ r x_j = λ(1 + x)
+        double known = lambda;
+        for (std::size_t j = 0; j < x.size(); ++j) known -= stage.inner[j].r * x[j];
+        x.push_back(known / (stage.c0 - lambda));
       }
-      double e = p == 0 ? scheme.estimate[0] : 0;
+      double e = scheme.estimate[0] * lambda;
       for (std::size_t k = 0; k < x.size(); ++k) e += scheme.estimate[k + 1] * x[k];
-      EXPECT_NEAR(e, x.back() - 1 / static_cast<double>(p + 1), 1e-13) << "power " << p;
+      return std::pair(e - (x.back() - std::expm1(lambda)), x.back() - std::expm1(lambda));
+    };
+    for (const double sign : {-1.0, 1.0}) {
+      const auto [wrong, error] = off(0.2 * sign);
+      const auto [half_wrong, half_error] = off(0.1 * sign);
+      EXPECT_NEAR(std::log2(error / half_error), scheme.order + 1, 0.3);
+      EXPECT_NEAR(std::log2(wrong / half_wrong), static_cast<double>(scheme.stages.size()) + 2,
+                  0.3);
+      EXPECT_LT(std::abs(half_wrong), 0.2 * std::abs(half_error));
     }
   }
   EXPECT_EQ(with_estimate, 4) << "BDF1, SDIRK2, SDIRK3 and SDIRK4";

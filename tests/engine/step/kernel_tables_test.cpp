@@ -61,11 +61,16 @@ void set_constants(BasicWorkspace<L>& w) {
 }
 
 struct Outputs {
-  std::vector<double> g, v, A;
+  std::vector<double> g, v, A, wrenches;
 };
+/// Of the last evaluation.
 template <int L>
-Outputs outputs(const BasicWorkspace<L>& w, const CompiledModel& m, int lane) {
+Outputs outputs(const kernels::KernelTable& table, const BasicWorkspace<L>& w,
+                const CompiledModel& m, int lane) {
   Outputs o;
+  const std::size_t contacts = m.link_pairs.size() + m.grounded.size();
+  table.stage<L>().contact_wrenches(m.view, w.stage, w.wrenches[0]);
+  for (std::size_t i = 0; i < 6 * contacts; ++i) o.wrenches.push_back(w.wrenches[0][i][lane]);
   for (int i = 0; i < m.nv; ++i)
     o.g.push_back(w.stage.g[i][lane]), o.v.push_back(w.stage.v[i][lane]);
   for (int e = 0; e < m.pattern.entries; ++e) o.A.push_back(w.stage.A[e][lane]);
@@ -113,23 +118,27 @@ void compare_tables(const Scene& scene, unsigned seed, double friction_tangent =
         }
         table->group.kinematics(m->view, w.stage);
         table->group.evaluate(m->view, w.stage, -1);
-        const Outputs o = outputs(w, *m, lane);
+        const Outputs o = outputs(*table, w, *m, lane);
         if (first.g.empty()) first = o;
         // The residual without its Jacobian, and a lane evaluated alone across points: the same
         // bits.
         table->group.kinematics(m->view, w.stage);
         table->group.residual(m->view, w.stage, -1);
-        EXPECT_EQ(outputs(w, *m, lane).g, o.g);
+        const Outputs residual = outputs(*table, w, *m, lane);
+        EXPECT_EQ(residual.g, o.g);
+        EXPECT_EQ(residual.wrenches, o.wrenches);
         table->group.kinematics(m->view, w.stage);
         table->group.evaluate(m->view, w.stage, lane);
-        const Outputs alone = outputs(w, *m, lane);
+        const Outputs alone = outputs(*table, w, *m, lane);
         EXPECT_EQ(alone.g, o.g);
         EXPECT_EQ(alone.A, o.A);
+        EXPECT_EQ(alone.wrenches, o.wrenches);
         table->group.kinematics(m->view, w.stage);
         table->group.residual(m->view, w.stage, lane);
-        EXPECT_EQ(outputs(w, *m, lane).g, o.g);
+        EXPECT_EQ(outputs(*table, w, *m, lane).g, o.g);
         EXPECT_EQ(o.g, first.g);  // same bits in any lane, whatever the neighbours hold
         EXPECT_EQ(o.A, first.A);
+        EXPECT_EQ(o.wrenches, first.wrenches);
       }
     // The kernels of one lane: the same bits once more.
     SingleWorkspace single(*m);
@@ -139,15 +148,17 @@ void compare_tables(const Scene& scene, unsigned seed, double friction_tangent =
     fill_lane(single, *m, b, 0);
     table->single.kinematics(m->view, single.stage);
     table->single.evaluate(m->view, single.stage, 0);
-    const Outputs own = outputs(single, *m, 0);
+    const Outputs own = outputs(*table, single, *m, 0);
     EXPECT_EQ(own.g, first.g);
     EXPECT_EQ(own.v, first.v);
     EXPECT_EQ(own.A, first.A);
+    EXPECT_EQ(own.wrenches, first.wrenches);
     table->single.residual(m->view, single.stage, 0);
-    EXPECT_EQ(outputs(single, *m, 0).g, first.g);
+    EXPECT_EQ(outputs(*table, single, *m, 0).g, first.g);
     expect_close(first.g, b.g, 1e-12);
     expect_close(first.v, b.v_out, 1e-13);
     expect_close(first.A, b.A, 1e-12);
+    expect_close(first.wrenches, b.wrenches(), 1e-12);
     const std::string name = table->name;
     if (name == "avx2" || name == "avx512") {
       if (fused.g.empty()) fused = first;

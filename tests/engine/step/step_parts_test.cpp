@@ -64,8 +64,8 @@ TEST(StepParts, ErrorsAndCostFollowTheAccuracy) {
   for (const double accuracy : {1e-1, 1e-2, 1e-3, 1e-4}) {
     const Played run = play(model, keeping(accuracy));
     const double error = distance(run, exact) / 0.02;  // of the ball's radius
-    EXPECT_LT(error, 0.7 * last) << accuracy;
-    EXPECT_LT(error, accuracy);
+    EXPECT_LT(error, 1.01 * last) << accuracy << ": whole steps may do for two of them";
+    EXPECT_LT(error, 0.1 * accuracy);
     EXPECT_GT(run.evaluations, cost);
     last = error, cost = run.evaluations;
   }
@@ -126,10 +126,10 @@ TEST(StepParts, SchemeThatKeepsAnAccuracy) {
   Scene scene = testing::rolling_ball(false, 4);
   for (const Integrator low : {Integrator::bdf1, Integrator::bdf2}) {
     scene.integrator = low;
-    EXPECT_EQ(Stepper(Model(scene), keeping(1e-2)).integrator(), Integrator::sdirk2);
+    EXPECT_EQ(Stepper(Model(scene), keeping(1e-2)).integrator(), Integrator::sdirk3);
     EXPECT_EQ(Stepper(Model(scene), keeping(0)).integrator(), low);
     scene.solver.accuracy = 1e-2;
-    EXPECT_EQ(Model(scene).integrator(), Integrator::sdirk2);
+    EXPECT_EQ(Model(scene).integrator(), Integrator::sdirk3);
     scene.solver.accuracy.reset();
   }
   scene.integrator = Integrator::sdirk3;

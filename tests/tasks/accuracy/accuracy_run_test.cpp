@@ -154,6 +154,25 @@ TEST(AccuracyRun, ErrorsFallWithTheOrder) {
   EXPECT_NEAR(order(Integrator::sdirk3, 20), 3, 0.25);
 }
 
+/// Whole steps of 25 ms are off by 2 % on the ball and by 10 % in box pushing, whose box bounces on
+/// the pad for as long. Asked for 1 %, both are off by about that.
+TEST(AccuracyRun, CutStepsRealiseWhatIsAsked) {
+  for (const char* name : {"rolling_ball_small", "box_pushing"}) {
+    SCOPED_TRACE(name);
+    const Model model(read_scene(std::string(TANGERE_SOURCE_DIR "/scenes/") + name + ".xml").scene);
+    const FixedEpisodes episodes =
+        scene_episodes(Batch(model, 16, 5), ControlProgram(model, model.timestep(), 5), 300, 5);
+    AccuracyRun run(episodes, AccuracyQuantity::tactile, 1);
+    run.make_reference({Integrator::sdirk4, 20, 1e-10}, {});
+    const AccuracyOutcome cut = run.compare({Integrator::sdirk3, 1, 0, 1e-2, true}, {});
+    const auto kept = std::ranges::count_if(
+        cut.error[0], [](double error) { return error > 0.3e-2 && error < 3e-2; });
+    EXPECT_GE(kept, 14) << "of 16: " << ::testing::PrintToString(cut.error[0]);
+    const AccuracyOutcome whole = run.compare({Integrator::sdirk3, 1, 0, 0, true}, {});
+    EXPECT_GT(whole.error[0][0], cut.error[0][0]);
+  }
+}
+
 TEST(AccuracyRun, ErrorsAreTheSameBitsOnAnyNumberOfThreads) {
   const FixedEpisodes episodes = ball_episodes(40, 120);
   std::vector<double> first;
@@ -177,6 +196,20 @@ TEST(AccuracyRun, StopsWhereItIsTold) {
   EXPECT_EQ(asked, 4);
 }
 
+/// The sample sizes at which one, two and three numbers may lie beyond are in tables of order
+/// statistics: 59, 93, 124.
+TEST(AccuracySweep, BoundsTheQuantileOfAllByFewNumbers) {
+  const auto beyond = [](int n) {
+    std::vector<double> numbers{std::nan("")};
+    for (int i = n; i > 0; --i) numbers.push_back(i);
+    return n - sure_quantile(numbers, 0.95);
+  };
+  for (const int n : {1, 20, 58, 59, 92}) EXPECT_EQ(beyond(n), 0) << n;
+  for (const int n : {93, 100, 123}) EXPECT_EQ(beyond(n), 1) << n;
+  for (const int n : {124, 152}) EXPECT_EQ(beyond(n), 2) << n;
+  EXPECT_TRUE(std::isnan(sure_quantile({}, 0.95)));
+}
+
 AccuracyOptions quick() {
   AccuracyOptions options;
   options.target = 0.03;
@@ -191,8 +224,12 @@ TEST(AccuracySweep, NamesTheFastestSettingThatIsAccurateEnough) {
   EXPECT_LT(report.reference.error, 1e-3);
   ASSERT_GE(report.advice, 0);
   const AccuracyPoint& best = report.points[static_cast<std::size_t>(report.advice)];
-  EXPECT_LE(best.error, 0.03);
-  for (const AccuracyPoint& p : report.points) EXPECT_TRUE(p.error > 0.03 || p.rate <= best.rate);
+  EXPECT_LE(best.bound, 0.03);
+  for (const AccuracyPoint& p : report.points) {
+    EXPECT_TRUE(p.bound > 0.03 || p.rate <= best.rate);
+    EXPECT_GE(p.bound, p.error);
+    EXPECT_GE(p.error, p.median);
+  }
   EXPECT_EQ(report.own.setting.integrator, Integrator::bdf2);
   EXPECT_DOUBLE_EQ(report.own.step, 5e-3);
   for (const AccuracyPoint& p : report.points)
