@@ -216,9 +216,9 @@ int report(const GenerateOptions& options, const Console& console, const Job& jo
       summary.failures.size(), kept, options.output,
       shards.size() == 1 ? "1 shard" : fmt::format("{} shards", shards.size()), bytes,
       merged.line));
-  const Json costly = note_costly_steps(
-      console, integrator_named(job.layout.integrator), job.layout.accuracy,
-      summary.simulation_steps, summary.newton_iterations, summary.split_steps);
+  const Json costly =
+      note_costly_steps(console, integrator_named(job.layout.integrator), job.layout.accuracy,
+                        summary.simulation_steps, summary.newton_iterations, summary.split_steps);
   Json result{{"command", "generate"},
               {"exit_code", static_cast<int>(code)},
               {"scene", options.scene},

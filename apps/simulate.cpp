@@ -107,8 +107,7 @@ std::string audit_text(const std::optional<AuditSummary>& audit) {
   return fmt::format(
       "audit: motors did {:.4g} J, damping and friction took {:.4g} J, the scheme made {:.4g} J; "
       "at worst {:.2g} % of what environment {} had\n",
-      audit->motors, audit->taken, audit->made, 100 * audit->worst_share,
-      audit->worst_environment);
+      audit->motors, audit->taken, audit->made, 100 * audit->worst_share, audit->worst_environment);
 }
 Json audit_json(const std::optional<AuditSummary>& audit) {
   if (!audit) return nullptr;
@@ -128,15 +127,14 @@ int report(const SimulateArguments& options, const Console& console, const Batch
   const double per_step = static_cast<double>(summary.newton_iterations) /
                           static_cast<double>(std::max<std::int64_t>(1, summary.environment_steps));
   list_failures(console, "environment", failures_of(summary), "--json and the file name all");
-  console.print(
-      fmt::format("environments: {}, steps: {}, time: {:.2f} s, {:.0f} env-steps/s with output\n"
-                  "Newton iterations per step: {:.2f}, {}, environments failed: {}\n{}{}\n"
-                  "wrote {} ({} bytes)",
-                  batch.environments(), summary.steps, summary.seconds, rate, per_step,
-                  split_text(summary.split_steps, summary.coarse_steps, summary.passed_steps,
-                             summary.damped_steps),
-                  summary.failures.size(), audit_text(summary.audit), of_task.line, options.output,
-                  bytes));
+  console.print(fmt::format(
+      "environments: {}, steps: {}, time: {:.2f} s, {:.0f} env-steps/s with output\n"
+      "Newton iterations per step: {:.2f}, {}, environments failed: {}\n{}{}\n"
+      "wrote {} ({} bytes)",
+      batch.environments(), summary.steps, summary.seconds, rate, per_step,
+      split_text(summary.split_steps, summary.coarse_steps, summary.passed_steps,
+                 summary.damped_steps),
+      summary.failures.size(), audit_text(summary.audit), of_task.line, options.output, bytes));
   Json sensors = Json::array();
   for (const FieldOutput of : fields_of(batch.model(), rollout.outputs)) {
     const SensorInfo& sensor = batch.model().sensors()[static_cast<std::size_t>(of.sensor)];
@@ -145,9 +143,9 @@ int report(const SimulateArguments& options, const Console& console, const Batch
                        {"every", tactile_interval(sensor, rollout)},
                        {"frames", tactile_frames(sensor, rollout)}});
   }
-  const Json costly = note_costly_steps(console, stepper.integrator(), stepper.accuracy(),
-                                        summary.environment_steps, summary.newton_iterations,
-                                        summary.split_steps);
+  const Json costly =
+      note_costly_steps(console, stepper.integrator(), stepper.accuracy(),
+                        summary.environment_steps, summary.newton_iterations, summary.split_steps);
   Json result{{"command", "simulate"},
               {"exit_code", static_cast<int>(code)},
               {"scene", options.scene},

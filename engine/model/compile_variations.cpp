@@ -146,8 +146,11 @@ void vary_place(CompiledModel& m, int joint, const RandomizationDescription& d, 
     }
   const int parent = m.scene.links[std::size_t(joint)].parent;
   m.varying_places.push_back(
-      {joint, 0, parent < 0 ? Frame<double>{kIdentityFrame.R, Vec3<double>{0, 0, 0} - m.origin}
-                         : m.joints[std::size_t(parent)].frame, {{axis, row}}});
+      {joint,
+       0,
+       parent < 0 ? Frame<double>{kIdentityFrame.R, Vec3<double>{0, 0, 0} - m.origin}
+                  : m.joints[std::size_t(parent)].frame,
+       {{axis, row}}});
 }
 
 int add_derived_rows(CompiledModel& m, int next) {

@@ -301,7 +301,7 @@ class Compiler {
 
   // --- state and what varies ---
 
-  /// Returns where bodies are at rest.
+  /// Returns where bodies are at rest, then where links are.
   [[nodiscard]] std::vector<Vec3<double>> places() const {
     std::vector<Frame<double>> world;
     std::vector<Vec3<double>> found;
@@ -309,6 +309,7 @@ class Compiler {
       world.push_back(l.parent < 0 ? l.frame : compose(world[std::size_t(l.parent)], l.frame));
     for (const CompiledBody& b : m_.bodies)
       found.push_back((b.link < 0 ? b.frame : compose(world[std::size_t(b.link)], b.frame)).p);
+    for (const Frame<double>& link : world) found.push_back(link.p);
     return found;
   }
 
@@ -316,23 +317,37 @@ class Compiler {
   [[nodiscard]] double extent_about(const Vec3<double>& middle) const {
     const std::vector<Vec3<double>> all = places();
     double extent = 0;
-    for (std::size_t b = 0; b < all.size(); ++b) {
+    for (std::size_t b = 0; b < m_.bodies.size(); ++b) {
       const Vec3<double> arm = all[b] - middle;
       extent = std::max(extent, std::sqrt(dot(arm, arm)) + m_.bodies[b].extent);
     }
     return extent;
   }
 
+  /// Returns how far a scene reaches from a place: its bodies, its links and the ground below.
+  [[nodiscard]] double reach_about(const Vec3<double>& middle) const {
+    double reach = extent_about(middle);
+    for (const Vec3<double>& p : places()) {
+      const Vec3<double> arm = p - middle;
+      reach = std::max(reach, std::sqrt(dot(arm, arm)));
+    }
+    if (m_.scene.ground)
+      reach = std::max(reach, std::abs(dot(vec3_of(m_.scene.ground->normal),
+                                           middle - vec3_of(m_.scene.ground->position))));
+    return reach;
+  }
+
   /// Measures a scene that is far from the world's origin from its own middle.
   void move_near() {
-    constexpr double kFar = 100;  // extents
+    constexpr double kFar = 1000;  // times its reach
     Vec3<double> middle = {0, 0, 0};
     const std::vector<Vec3<double>> all = places();
     for (const Vec3<double>& p : all) middle = middle + (1.0 / double(all.size())) * p;
-    const double away = std::sqrt(dot(middle, middle));
-    if (!(away > kFar * extent_about(middle)) || !std::isfinite(away)) return;
+    const double away = std::sqrt(dot(middle, middle)), reach = reach_about(middle);
+    if (!(reach > 0 && away > kFar * reach) || !std::isfinite(away)) return;
     m_.moved = true;
     m_.origin = middle;
+    reach_of_moved_ = reach;
     for (Link& l : m_.links)
       if (l.parent < 0) l.frame.p = l.frame.p - middle;
     for (CompiledBody& b : m_.bodies)
@@ -342,9 +357,9 @@ class Compiler {
   }
 
   /// Sets the scales of unknowns. Lengths are rounded relative to the greatest distance of any
-  /// body's point from the model's origin at rest.
+  /// body's point from the model's origin at rest; a scene that was moved reaches as far as it does.
   void unknown_scales() {
-    const double extent = extent_about({0, 0, 0});
+    const double extent = m_.moved ? reach_of_moved_ : extent_about({0, 0, 0});
     m_.fall_time =
         std::sqrt(extent / std::sqrt(dot(vec3_of(m_.scene.gravity), vec3_of(m_.scene.gravity))));
     for (const Link& l : m_.links) {
@@ -432,6 +447,7 @@ class Compiler {
   CompiledModel m_;
   NameIndex links_, joints_, bodies_, sensors_, contacts_, grounds_;
   std::vector<std::pair<int, int>> touching_;
+  double reach_of_moved_ = 0;  ///< of a scene that is far away [m]
 };
 
 }  // namespace

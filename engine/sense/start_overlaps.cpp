@@ -92,8 +92,7 @@ std::vector<std::string> rounded_places(const Model& model) {
     const CompiledBody& body = m.bodies[b];
     const Vec3<double> p = compose(reader.link(body.link, 0, 0).world, body.frame).p;
     const double far = std::sqrt(std::max(dot(p, p), dot(m.origin, m.origin))),
-                 rounded = far * std::numeric_limits<double>::epsilon(),
-                 size = body.extent;
+                 rounded = far * std::numeric_limits<double>::epsilon(), size = body.extent;
     if (rounded > kShare * size && size > 0)
       found.push_back(fmt::format(
           "'{}' starts {:.3g} m away, where positions are rounded to {:.2g} m; expected a scene "

@@ -115,7 +115,8 @@ double ContactForces::change(const Row<L>* start, const Row<L>* end, const Row<L
                                             squared_distance<L>(end, nullptr, group, lane))) +
                          floor_[std::size_t(group)];
     const double share = std::sqrt(moved) / scale;
-    if (!(share <= worst)) worst = share;
+    if (std::isnan(share)) return share;
+    worst = std::max(worst, share);
   }
   return worst;
 }

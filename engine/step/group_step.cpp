@@ -189,8 +189,13 @@ bool GroupStep::take_part(const kernels::KernelTable& table, SingleWorkspace& w,
       scheme = own;
     }
   } else if (one.turned != 0 && scheme != &scheme->of_turns()) {
-    scheme = &scheme->of_turns();
-    one = solve();
+    const Scheme* const own = std::exchange(scheme, &scheme->of_turns());
+    const Solved again = solve();
+    if (again.found != 0) {
+      one = again;
+    } else {
+      scheme = own;
+    }
   }
   if (one.sound() != 0) return take();
   if (one.found == 0) return split(table, w, h, depth + 1, report, solves);

@@ -60,6 +60,7 @@ struct LaneAt {
           0.5 * (mass * dot(slide, slide) + 2 * dot(turn, cross(c, slide)) + dot(turn, J * turn));
       const Frame<double> at = world(static_cast<int>(i));
       sum.total -= dot(model.view.gravity, mass * at.p + at.R * c);
+      if (books != nullptr) sum.total -= mass * dot(model.view.gravity, model.origin);
     }
   }
 
@@ -76,8 +77,7 @@ struct LaneAt {
     if ((link.effects & kernels::kDriven) == 0) return;
     const double P = number(e.P);
     if (books != nullptr) {
-      books->motors +=
-          rate * std::clamp(P * error - number(e.D) * rate, e.force_low, e.force_high);
+      books->motors += rate * std::clamp(P * error - number(e.D) * rate, e.force_low, e.force_high);
       return;
     }
     const double force = std::clamp(P * error, e.force_low, e.force_high);

@@ -155,6 +155,8 @@ void GroupStep::advance_in_parts(const kernels::KernelTable& table, BasicWorkspa
       } else if (split_lane(table, w, l, h[l], alone, report, solves)) {
         split |= bit;
         passed |= std::exchange(report.passed, kNoLane);
+        if ((std::exchange(report.turned, kNoLane) | std::exchange(report.created, kNoLane)) != 0)
+          coarse |= bit;
       } else {
         open &= ~bit;  // its status says why
         continue;
@@ -163,8 +165,8 @@ void GroupStep::advance_in_parts(const kernels::KernelTable& table, BasicWorkspa
       if (!at[l].finished()) continue;
       open &= ~bit;
       report.status[l] = has(passed, l)   ? StepStatus::passed
-                         : has(split, l)  ? StepStatus::split
                          : has(coarse, l) ? StepStatus::coarse
+                         : has(split, l)  ? StepStatus::split
                                           : StepStatus::converged;
     }
   }

@@ -146,13 +146,13 @@ Solved GroupStep::solve_and_watch(const Scheme& scheme, const kernels::KernelTab
   return solved;
 }
 
-#define TANGERE_FOR_LANES(L)                                                              \
-  template void GroupStep::watch_passing(const kernels::KernelTable&, BasicWorkspace<L>&, \
-                                         LaneBits, NewtonReport&) const;                  \
-  template LaneBits GroupStep::turning(const Scheme&, const BasicWorkspace<L>&, LaneBits, \
-                                       double) const;                                     \
-  template Solved GroupStep::solve_and_watch(const Scheme&, const kernels::KernelTable&,  \
-                                             BasicWorkspace<L>&, LaneBits, double, bool,  \
+#define TANGERE_FOR_LANES(L)                                                                      \
+  template void GroupStep::watch_passing(const kernels::KernelTable&, BasicWorkspace<L>&,         \
+                                         LaneBits, NewtonReport&) const;                          \
+  template LaneBits GroupStep::turning(const Scheme&, const BasicWorkspace<L>&, LaneBits, double) \
+      const;                                                                                      \
+  template Solved GroupStep::solve_and_watch(const Scheme&, const kernels::KernelTable&,          \
+                                             BasicWorkspace<L>&, LaneBits, double, bool,          \
                                              NewtonReport&) const;
 TANGERE_FOR_LANES(kernels::kGroup)
 TANGERE_FOR_LANES(1)

@@ -74,8 +74,8 @@ struct TurningBody {
   }
 
   [[nodiscard]] Vec3<double> before() const {
-    const auto turn = rotation_log(conjugate(quat_at(w.q0 + link.q, lane)) *
-                                   quat_at(w.q_before + link.q, lane));
+    const auto turn =
+        rotation_log(conjugate(quat_at(w.q0 + link.q, lane)) * quat_at(w.q_before + link.q, lane));
     return turned(turn, J * column(w.v_before + link.v, lane));
   }
 
@@ -148,17 +148,16 @@ bool turned_too_far(const CompiledModel& model, const Scheme& scheme, const Basi
     if (link.kind != JointKind::spherical || !link.massive) continue;
     const double turn = std::sqrt(fastest(link, w, lane)) * h;
     if (!(turn > far_turn(scheme))) continue;
-    const TurningBody<L> body{scheme, w,    link,    inertia_of(model, link, w, lane),
-                              h,      lane, model.nv};
+    const TurningBody<L> body{scheme, w, link, inertia_of(model, link, w, lane), h, lane, model.nv};
     if (body.is_off(turn)) return true;
   }
   return false;
 }
 
-#define TANGERE_FOR_LANES(L)                                                                     \
-  template LaneBits far_turners(const CompiledModel&, const Scheme&, const BasicWorkspace<L>&,   \
-                                LaneBits, double);                                               \
-  template bool turned_too_far(const CompiledModel&, const Scheme&, const BasicWorkspace<L>&,    \
+#define TANGERE_FOR_LANES(L)                                                                   \
+  template LaneBits far_turners(const CompiledModel&, const Scheme&, const BasicWorkspace<L>&, \
+                                LaneBits, double);                                             \
+  template bool turned_too_far(const CompiledModel&, const Scheme&, const BasicWorkspace<L>&,  \
                                double, int);
 TANGERE_FOR_LANES(kernels::kGroup)
 TANGERE_FOR_LANES(1)

@@ -385,8 +385,7 @@ void TrajectoryFile::write(const AuditRow& row) {
   const hsize_t E = static_cast<hsize_t>(f.layout.environments);
   Impl::put<double>(f.audit.energy, row.step, {E, 3}, row.energy.data());
   Impl::put<double>(f.audit.momentum, row.step, {E, 6}, row.momentum.data());
-  if (!row.passed.empty())
-    Impl::put<double>(f.audit.step, row.step - 1, {E, 3}, row.passed.data());
+  if (!row.passed.empty()) Impl::put<double>(f.audit.step, row.step - 1, {E, 3}, row.passed.data());
   ++f.audit.written;
 }
 

@@ -26,8 +26,8 @@ AuditRecorder::AuditRecorder(const Batch& batch, double h, RowSink& sink)
 }
 
 double AuditRecorder::bytes(int environments) {
-  return environments * double(sizeof(Audit) + sizeof(Sums) +
-                               (kEnergies + kMomenta + kPassed) * sizeof(double));
+  return environments *
+         double(sizeof(Audit) + sizeof(Sums) + (kEnergies + kMomenta + kPassed) * sizeof(double));
 }
 
 Audit AuditRecorder::audit(int environment, std::span<const double> u) {

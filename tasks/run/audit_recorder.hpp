@@ -34,7 +34,7 @@ class AuditRecorder {
   double h_;
   RowSink& sink_;
   Auditor auditor_;
-  std::vector<Audit> before_;                      // (E)
+  std::vector<Audit> before_;                       // (E)
   std::vector<double> energy_, momentum_, passed_;  // as in AuditRow
   struct Sums {
     double motors = 0, taken = 0, made = 0, work = 0, most = 0;

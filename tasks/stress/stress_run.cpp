@@ -193,8 +193,8 @@ void judge(const BlockOutcome& out, StressRow& row) {
 std::string warning_of(const Scene& scene, const StressRow& row) {
   if (row.accuracy > 0) return "";
   if (!row.of->measure)
-    return costly_steps(row.integrator, row.steps, std::llround(row.evaluations * double(row.steps)),
-                        row.split_steps);
+    return costly_steps(row.integrator, row.steps,
+                        std::llround(row.evaluations * double(row.steps)), row.split_steps);
   const auto lines = short_touches(Model(scene), row.integrator, row.step);
   return lines.empty() ? "" : lines.front();
 }

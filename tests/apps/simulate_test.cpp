@@ -543,7 +543,8 @@ TEST(Simulate, AuditsEnergyAndMomentum) {
   const Array q = read_array(folder, "/q");
   const json audited = simulate(folder, kSmall, words + Words{"--audit", "--overwrite"});
   EXPECT_EQ(read_array(folder, "/q").values, q.values);
-  const Array energy = read_array(folder, "/audit/energy"), step = read_array(folder, "/audit/step"),
+  const Array energy = read_array(folder, "/audit/energy"),
+              step = read_array(folder, "/audit/step"),
               momentum = read_array(folder, "/audit/momentum");
   EXPECT_THAT(energy.dims, ElementsAre(91, 3, 3));
   EXPECT_THAT(momentum.dims, ElementsAre(91, 3, 6));

@@ -135,8 +135,9 @@ template <class A>
 
 /// Sums over y and x at sixteen places, one after the other. first: their first coefficients.
 template <class A>
-void sum_places_f(const DistanceGrid& g, const float* const* first, const SplineWeights<LanesF<A>, 1>& x,
-                  const SplineWeights<LanesF<A>, 1>& y, LanesF<A> (*out)[4]) {
+void sum_places_f(const DistanceGrid& g, const float* const* first,
+                  const SplineWeights<LanesF<A>, 1>& x, const SplineWeights<LanesF<A>, 1>& y,
+                  LanesF<A> (*out)[4]) {
   using N = LanesF<A>;
   alignas(64) float of_x[2][4][kLanesF];  // the four weights of place 4 q + j at [j][4 q]
   alignas(64) float of_y[2][4][kLanesF];
@@ -203,8 +204,8 @@ void spline_at(const DistanceGrid& g, const GridPlace<LanesF<A>>& at,
   const float* first[kLanesF];
   for (int c = 0; c < 3; ++c) store_lanes_f(at.whole[c], whole[c]);
   for (int l = 0; l < kLanesF; ++l)
-    first[l] = g.coefficients +
-               (int(whole[0][l]) * g.plane + int(whole[1][l]) * g.row + int(whole[2][l]));
+    first[l] =
+        g.coefficients + (int(whole[0][l]) * g.plane + int(whole[1][l]) * g.row + int(whole[2][l]));
   bool several = false;
   for (int c = 0; c < 3; ++c) {
     const N one(double{whole[c][0]});

@@ -16,11 +16,11 @@
 namespace tangere {
 namespace {
 
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
 using testing::link;
 using testing::q_of;
 using testing::v_of;
-using ::testing::HasSubstr;
-using ::testing::IsEmpty;
 
 Vector3 sum(const Vector3& a, const Vector3& b) { return {a[0] + b[0], a[1] + b[1], a[2] + b[2]}; }
 
@@ -35,8 +35,8 @@ Scene moved(Scene scene, const Vector3& by) {
 /// The rolling ball beside a fixed block with an arm, both with end effectors.
 Scene with_fixed_block() {
   Scene s = testing::rolling_ball(false, 24);
-  s.links.push_back(link("block", JointType::fixed, {0.03, 0, 0.01}, CuboidShape{{0.01, 0.2, 0.03}},
-                         1000));
+  s.links.push_back(
+      link("block", JointType::fixed, {0.03, 0, 0.01}, CuboidShape{{0.01, 0.2, 0.03}}, 1000));
   s.links.push_back(link("arm", JointType::revolute, {0, 0, 0.05}, SphereShape{0.005}, 1000));
   s.links.back().parent = 2;
   s.links.back().joint.axis0 = {1, 0, 0};
@@ -58,8 +58,7 @@ Ended run(const Scene& scene) {
   Batch batch(model, 1);
   Stepper stepper(model, testing::options(Integrator::bdf2, 5e-3, 1e-12));
   Readout readout(model);
-  for (int t = 0; t < 130; ++t)
-    testing::step_all(stepper, batch, testing::rolling_ball_control(t));
+  for (int t = 0; t < 130; ++t) testing::step_all(stepper, batch, testing::rolling_ball_control(t));
   EXPECT_FALSE(failed(batch.status(0)));
   Ended out{q_of(batch), v_of(batch), {}, {}, {}};
   out.field.resize(std::size_t(3 * model.sensors()[0].points));
@@ -116,6 +115,26 @@ TEST(FarScene, ScenesNearTheOriginStayWhereTheyAre) {
   EXPECT_TRUE(compiled(Model(moved(testing::two_balls(), {0, 0, 1000}))).moved);
 }
 
+/// Small bodies far from the origin, whose scenes are not: they hang on it, or fall to its ground.
+TEST(FarScene, SmallBodiesDoNotMakeASceneFar) {
+  AbstractShape point;
+  point.mass = 0.1;
+  point.inertia = {1e-9, 0, 0, 1e-9, 0, 1e-9};
+  for (const Shape& bob : {Shape(SphereShape{0.0005}), Shape(point)}) {
+    Scene pendulum;
+    pendulum.links = {link("bob", JointType::revolute, {0, 0, 0}, bob, 1000)};
+    pendulum.links[0].joint.axis0 = {0, 1, 0};
+    pendulum.links[0].body.pose.position = {0, 0, -1};
+    EXPECT_FALSE(compiled(Model(pendulum)).moved);
+    EXPECT_GT(compiled(Model(pendulum)).fall_time, 0.3);
+  }
+  Scene falling;
+  falling.ground = GroundDescription{};
+  falling.links = {link("ball", JointType::free, {0, 0, 3}, SphereShape{0.0005}, 1000)};
+  falling.ground_contacts.push_back({"ball", {1e4, 0, 0, 10}, ContactLaw::clamped, 1e-5, {}});
+  EXPECT_FALSE(compiled(Model(falling)).moved);
+}
+
 TEST(FarScene, IsWarnedOfWherePositionsAreTooCoarse) {
   EXPECT_THAT(rounded_places(Model(moved(testing::two_balls(), {0, 0, 1000}))), IsEmpty());
   const auto lines = rounded_places(Model(moved(testing::two_balls(), {1e7, 0, 0})));
@@ -135,7 +154,8 @@ Scene springy(double damping) {
 TEST(ShortTouches, AreWarnedOfWhereNothingDampsThem) {
   const auto lines = short_touches(Model(springy(0)), Integrator::sdirk2, 1e-3);
   ASSERT_EQ(lines.size(), 1U);
-  EXPECT_THAT(lines[0], HasSubstr("'ball' with 'ground' has no damping, and a touch lasts 0.0031 s"));
+  EXPECT_THAT(lines[0],
+              HasSubstr("'ball' with 'ground' has no damping, and a touch lasts 0.0031 s"));
   EXPECT_THAT(lines[0], HasSubstr("steps of 0.00016 s at most with SDIRK2"));
   EXPECT_THAT(short_touches(Model(springy(0)), Integrator::sdirk2, 1.5e-4), IsEmpty());
   EXPECT_EQ(short_touches(Model(springy(0)), Integrator::bdf1, 1.5e-4).size(), 1U);

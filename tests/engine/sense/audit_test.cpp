@@ -9,6 +9,7 @@
 #include <cmath>
 
 #include "engine/base/vector3.hpp"
+#include "engine/model/compiled_model.hpp"
 #include "engine/step/stepper.hpp"
 #include "tests/engine/gradient_run.hpp"
 #include "tests/engine/random_machine.hpp"
@@ -137,6 +138,15 @@ TEST(Audit, MomentumOfAFreeBodyStays) {
   EXPECT_NEAR(start.momentum[5], 300 * start.momentum[1], 1e-2);
   for (std::size_t k = 0; k < 6; ++k)
     EXPECT_NEAR(end.last.momentum[k], start.momentum[k], k < 3 ? 1e-6 : 1e-4) << k;
+}
+
+/// −Σ m gravity·x is that of the world, also where the scene is measured from its middle.
+TEST(Audit, HeightIsThatInTheWorld) {
+  Scene s;
+  s.links = {link("box", JointType::free, {0, 0, 500}, CuboidShape{{0.06, 0.04, 0.02}}, 1000)};
+  const Model model(s);
+  EXPECT_TRUE(compiled(model).moved);
+  EXPECT_NEAR(Auditor(model).audit(Batch(model, 1), 0, {}).height, model.mass(0) * 9.8 * 500, 1e-9);
 }
 
 /// Numbers of a scene that vary are those of the environment, and a batch has the bits of one.

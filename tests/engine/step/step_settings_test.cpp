@@ -46,8 +46,7 @@ TEST(StepTolerance, FollowsTheAccuracyAndTheStep) {
     return in_force(scene, {Integrator::sdirk2, h, std::nullopt, accuracy});
   };
   EXPECT_DOUBLE_EQ(at(2e-2, 1e-4), 1e-6);
-  EXPECT_DOUBLE_EQ(at(1e-3, 1e-2),
-                   10 * Model(scene).following_tolerance(Integrator::sdirk2, 1e-3));
+  EXPECT_DOUBLE_EQ(at(1e-3, 1e-2), 10 * Model(scene).following_tolerance(Integrator::sdirk2, 1e-3));
 }
 
 TEST(StepTolerance, IsTheCallersThenTheScenes) {

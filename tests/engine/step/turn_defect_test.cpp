@@ -112,9 +112,9 @@ TEST(TurningBodies, AreLeftAloneWhereTheirAxisStays) {
         scene.solver.bounded_energy = bounded;
         const Model model(scene);
         Batch batch(model, 1);
-        batch.set_state(
-            0, q_of(batch),
-            ball ? std::vector<double>{1, 0, 0, 60, -50, 40} : std::vector<double>{0, 0, 1, 0, 0, 100});
+        batch.set_state(0, q_of(batch),
+                        ball ? std::vector<double>{1, 0, 0, 60, -50, 40}
+                             : std::vector<double>{0, 0, 1, 0, 0, 100});
         Stepper stepper(model, testing::options(scheme, 5e-3, 1e-13));
         for (int t = 0; t < 20; ++t) {
           stepper.step(batch, {});
@@ -134,8 +134,7 @@ TEST(TurningBodies, BitsDoNotDependOnCompany) {
       const Model model(scene);
       Batch batch(model, environments);
       for (int e = 0; e < environments; ++e)
-        batch.set_state(e, q_of(batch, e),
-                        std::vector<double>{0, 0, 0, 1, 14.0 * (first + e), 2});
+        batch.set_state(e, q_of(batch, e), std::vector<double>{0, 0, 0, 1, 14.0 * (first + e), 2});
       Stepper stepper(model, testing::options(scheme, 5e-3));
       int split = 0;
       std::vector<std::vector<double>> ends;

@@ -207,6 +207,7 @@ TEST(AccuracySweep, BoundsTheQuantileOfAllByFewNumbers) {
   for (const int n : {1, 20, 58, 59, 92}) EXPECT_EQ(beyond(n), 0) << n;
   for (const int n : {93, 100, 123}) EXPECT_EQ(beyond(n), 1) << n;
   for (const int n : {124, 152}) EXPECT_EQ(beyond(n), 2) << n;
+  EXPECT_EQ(beyond(20000), 949) << "where 0.95^n is no number";
   EXPECT_TRUE(std::isnan(sure_quantile({}, 0.95)));
 }
 

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <fstream>
+#include <stdexcept>
 
 #include "io/scene/scene_reader.hpp"
 #include "tasks/gradients/identification.hpp"
@@ -29,6 +30,7 @@ struct Cycle {
     char comma = 0;
     for (double a = 0, b = 0, c = 0; file >> a >> comma >> b >> comma >> c;)
       t.push_back(a), x.push_back(b), f.push_back(c);
+    if (t.size() < 2) throw std::runtime_error(name + " has no rows");
     const auto at = [&](const std::vector<double>& y, double time) {
       const auto k = std::size_t(
           std::max<std::ptrdiff_t>(std::upper_bound(t.begin(), t.end() - 1, time) - t.begin(), 1));
