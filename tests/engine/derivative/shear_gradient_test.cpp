@@ -135,18 +135,6 @@ TEST_P(ShearGradient, ContactsMatchDifferences) {
   EXPECT_GT(compared, 50);
 }
 
-/// Points whose friction remembers touch meshes.
-TEST_P(ShearGradient, ContactsOfMeshesMatchDifferences) {
-  int compared = 0;
-  for (unsigned seed = 1; seed <= 5; ++seed) {
-    SCOPED_TRACE("seed " + std::to_string(seed));
-    const Scene scene = testing::with_meshes(elastic_contacts(seed, 2, ContactLaw(seed % 3)));
-    if (testing::has_mesh(scene) && !testing::splits(scene, GetParam(), seed, kShearSteps))
-      compared += testing::check_gradient(scene, GetParam(), seed, kShearSteps, 1e-5);
-  }
-  EXPECT_GT(compared, 20);
-}
-
 /// Steps that are cut to keep an accuracy hand memory from part to part.
 TEST_P(ShearGradient, CutStepsMatchDifferences) {
   const Integrator scheme = GetParam();
@@ -276,12 +264,25 @@ void expect_fields_match(const Scene& scene, Integrator scheme) {
 
 TEST_P(ShearGradient, FieldsMatchDifferences) { expect_fields_match(elastic_skin(), GetParam()); }
 
-TEST_P(ShearGradient, FieldsOnMeshesMatchDifferences) {
-  expect_fields_match(testing::with_meshes(elastic_skin()), GetParam());
-}
-
 INSTANTIATE_TEST_SUITE_P(Schemes, ShearGradient, ::testing::ValuesIn(testing::all_integrators()),
                          [](const auto& scheme) { return std::string(to_string(scheme.param)); });
+
+/// Points whose friction remembers touch meshes.
+TEST(ShearOnMeshes, ContactsMatchDifferences) {
+  int compared = 0;
+  for (unsigned seed = 1; seed <= 5; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    const Scene scene = testing::with_meshes(elastic_contacts(seed, 2, ContactLaw(seed % 3)));
+    const Integrator scheme = seed % 2 == 0 ? Integrator::bdf1 : Integrator::sdirk2;
+    if (testing::has_mesh(scene) && !testing::splits(scene, scheme, seed, kShearSteps))
+      compared += testing::check_gradient(scene, scheme, seed, kShearSteps, 1e-5);
+  }
+  EXPECT_GT(compared, 20);
+}
+
+TEST(ShearOnMeshes, FieldsMatchDifferences) {
+  expect_fields_match(testing::with_meshes(elastic_skin()), Integrator::sdirk2);
+}
 
 }  // namespace
 }  // namespace tangere
