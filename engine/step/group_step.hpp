@@ -99,8 +99,8 @@ class GroupStep {
   LaneBits creating(const kernels::KernelTable& table, BasicWorkspace<L>& w, LaneBits lanes,
                     double h) const;
   template <int L>
-  LaneBits turning(const Scheme& scheme, const BasicWorkspace<L>& w, LaneBits lanes,
-                   double h) const;
+  LaneBits turning(const Scheme& scheme, const kernels::KernelTable& table, BasicWorkspace<L>& w,
+                   LaneBits lanes, double h) const;
   template <int L>
   Solved solve_and_watch(const Scheme& scheme, const kernels::KernelTable& table,
                          BasicWorkspace<L>& w, LaneBits lanes, double h, bool inside_split,

@@ -119,15 +119,22 @@ LaneBits GroupStep::creating(const kernels::KernelTable& table, BasicWorkspace<L
   return found;
 }
 
-/// Returns the lanes in which a body turned too far for the scheme of the solve.
+/// Returns the lanes in which a body turned too far for the scheme of the solve. Where something
+/// touches, the scheme is left to damp what it meets.
 template <int L>
-LaneBits GroupStep::turning(const Scheme& scheme, const BasicWorkspace<L>& w, LaneBits lanes,
-                            double h) const {
+LaneBits GroupStep::turning(const Scheme& scheme, const kernels::KernelTable& table,
+                            BasicWorkspace<L>& w, LaneBits lanes, double h) const {
   if (!settings_.bounded_energy) return kNoLane;
   const LaneBits far = far_turners(model_, scheme, w, lanes, h);
   LaneBits found = 0;
   for (int l = 0; l < L; ++l)
     if (has(far, l) && turned_too_far(model_, scheme, w, h, l)) found |= 1U << l;
+  if (found == 0) return kNoLane;
+  find_poses(table, w);
+  for (int l = 0; l < L; ++l)
+    if (has(found, l) && (energy_of_contacts(model_, table, w, w.poses_before, l) > 0 ||
+                          energy_of_contacts(model_, table, w, w.poses_after, l) > 0))
+      found &= ~(1U << l);
   return found;
 }
 
@@ -142,17 +149,17 @@ Solved GroupStep::solve_and_watch(const Scheme& scheme, const kernels::KernelTab
   solved.found = run(scheme, table, w, lanes, Row<L>::all(h), inside_split, report, unused);
   solved.passed = std::exchange(report.passed, of_other_parts) & solved.found;
   solved.created = creating(table, w, solved.found & ~solved.passed, h);
-  solved.turned = turning(scheme, w, solved.found & ~(solved.passed | solved.created), h);
+  solved.turned = turning(scheme, table, w, solved.found & ~(solved.passed | solved.created), h);
   return solved;
 }
 
-#define TANGERE_FOR_LANES(L)                                                                      \
-  template void GroupStep::watch_passing(const kernels::KernelTable&, BasicWorkspace<L>&,         \
-                                         LaneBits, NewtonReport&) const;                          \
-  template LaneBits GroupStep::turning(const Scheme&, const BasicWorkspace<L>&, LaneBits, double) \
-      const;                                                                                      \
-  template Solved GroupStep::solve_and_watch(const Scheme&, const kernels::KernelTable&,          \
-                                             BasicWorkspace<L>&, LaneBits, double, bool,          \
+#define TANGERE_FOR_LANES(L)                                                              \
+  template void GroupStep::watch_passing(const kernels::KernelTable&, BasicWorkspace<L>&, \
+                                         LaneBits, NewtonReport&) const;                  \
+  template LaneBits GroupStep::turning(const Scheme&, const kernels::KernelTable&,        \
+                                       BasicWorkspace<L>&, LaneBits, double) const;       \
+  template Solved GroupStep::solve_and_watch(const Scheme&, const kernels::KernelTable&,  \
+                                             BasicWorkspace<L>&, LaneBits, double, bool,  \
                                              NewtonReport&) const;
 TANGERE_FOR_LANES(kernels::kGroup)
 TANGERE_FOR_LANES(1)

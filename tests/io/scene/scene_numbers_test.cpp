@@ -46,6 +46,11 @@ std::string scene_with(const std::string& lines) {
 <joint name="brick" type="translational" pos="0.6 0 0.2"/>
 <body name="brick" type="cuboid" size="0.03 0.04 0.05" density="700"/>
 </link>
+<link name="wedge">
+<joint name="wedge" type="translational" pos="0.9 0 0.2"/>
+<body name="wedge" type="mesh" filename=")" TANGERE_TEST_DATA
+         R"(/scenes/wedge.obj" transform_type="OBJ_TO_JOINT" scale="0.01 0.01 0.01" density="300"/>
+</link>
 </robot>
 <actuator><motor joint="skin" ctrl="position" P="7" D="0.8"/><motor joint="slide" ctrl="position" P="9" D="0.6"/></actuator>
 <contact>
@@ -93,6 +98,7 @@ const Row kRows[] = {
     {R"(body name="can" field="radius")", "body can radius", "m", true, 0.02},
     {R"(body name="can" field="length")", "body can length", "m", true, 0.04},
     {R"(body name="brick" size="2")", "body brick size[2]", "m", true, 0.05},
+    {R"(body name="wedge" field="scale")", "body wedge scale", "1", true, 1},
     {R"(joint name="skin" q="0")", "joint skin q[0]", "rad", false, NAN},
     {R"(joint name="slide" q="0")", "joint slide q[0]", "m", false, NAN},
     {R"(joint name="ball" q="3")", "joint ball q[3]", "1", false, NAN},
