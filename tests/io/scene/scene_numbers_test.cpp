@@ -49,7 +49,7 @@ std::string scene_with(const std::string& lines) {
 <link name="wedge">
 <joint name="wedge" type="translational" pos="0.9 0 0.2"/>
 <body name="wedge" type="mesh" filename=")" TANGERE_TEST_DATA
-         R"(/scenes/wedge.obj" transform_type="OBJ_TO_JOINT" scale="0.01 0.01 0.01" density="300"/>
+         R"(/scenes/wedge.obj" transform_type="OBJ_TO_JOINT" scale="0.01 0.01 0.01" resolution="0" density="300"/>
 </link>
 </robot>
 <actuator><motor joint="skin" ctrl="position" P="7" D="0.8"/><motor joint="slide" ctrl="position" P="9" D="0.6"/></actuator>
