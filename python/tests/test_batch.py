@@ -206,11 +206,11 @@ def test_no_warning_on_the_scenes_that_come_along():
 
 
 def test_steps_are_cut_to_keep_an_accuracy(model):
-    whole, cut = (tangere.Batch(model, timestep=0.025, accuracy=x) for x in (0, 1e-3))
-    fine = tangere.Batch(model, timestep=0.0025, accuracy=1e-3)
+    whole, cut = (tangere.Batch(model, timestep=0.025, accuracy=x) for x in (0, 1e-4))
+    fine = tangere.Batch(model, timestep=0.0025, accuracy=1e-5)
     for batch, steps in ((whole, 30), (cut, 30), (fine, 300)):
         for _ in range(steps):
             batch.step(np.array([0.0, 0.0, 0.2]))
-    assert np.abs(cut.q - fine.q).max() < 0.2 * np.abs(whole.q - fine.q).max()
+    assert np.abs(cut.q - fine.q).max() < 0.05 * np.abs(whole.q - fine.q).max()
     with pytest.raises(tangere.InputError, match="below 1"):
         tangere.Batch(model, accuracy=2)

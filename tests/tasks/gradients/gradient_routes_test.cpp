@@ -125,8 +125,6 @@ TEST(PublishedFaults, PositionControlGradientIsRight) {
   for (const char* name : {"insertion", "cap_opening"})
     for (const MotorTiming timing : {MotorTiming::end, MotorTiming::start}) {
       Scene scene = shipped(name);
-      // The explicit law spins bodies up. BDF1 damps that, a second look at the step would not.
-      scene.solver.bounded_energy = false;
       int motors = 0;
       for (MotorDescription& motor : scene.motors) {
         if (motor.control != MotorControl::position) continue;
