@@ -56,8 +56,8 @@ std::int64_t step_count(const std::optional<std::int64_t>& asked, const ControlP
 void warn_of_geometry(const Console& console, const Model& model);
 /// Warns of contacts whose touches are too short for the steps.
 void warn_of_touches(const Console& console, const Model& model, const Stepper& stepper);
-/// Says on stderr that steps were costly, if they were, and returns it; null if not, or if steps were
-/// cut to keep an accuracy.
+/// Says on stderr that steps were costly, if they were, and returns it; null if not, or if steps
+/// were cut to keep an accuracy.
 Json note_costly_steps(const Console& console, Integrator integrator, double accuracy,
                        std::int64_t steps, std::int64_t evaluations, std::int64_t split_steps);
 

@@ -60,7 +60,7 @@ int stress(const StressArguments& o, const Console& console) {
   if (report.stopped && report.rows.empty())
     return report_stop(console, "stress", signals.received(), "in the first case");
   console.print("\n" + stress_summary(report));
-  int code = unknown_failures(report) == 0 ? kDone : kSomeFailed;
+  int code = silent_failures(report) == 0 ? kDone : kSomeFailed;
   if (report.stopped) code = signals.received() == SIGINT ? kInterrupted : kTerminated;
   Json result{{"command", "stress"},
               {"exit_code", code},

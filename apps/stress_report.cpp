@@ -16,14 +16,8 @@ int count(const StressReport& report, StressVerdict verdict) {
                                         [&](const StressRow& r) { return r.verdict == verdict; }));
 }
 
-int known_failures(const StressReport& report) {
-  return static_cast<int>(std::count_if(report.rows.begin(), report.rows.end(),
-                                        [](const StressRow& r) { return r.known; }));
-}
-
 std::string verdict_text(const StressRow& row) {
   std::string text = to_string(row.verdict);
-  if (row.known) text += " (known)";
   if (row.verdict == StressVerdict::flagged) text += ": " + row.reason;
   return text;
 }
@@ -49,7 +43,6 @@ Json row_json(const StressRow& row) {
           {"envs", row.environments},
           {"failed", row.failed},
           {"verdict", to_string(row.verdict)},
-          {"known", row.known},
           {"reason", row.reason}};
 }
 
@@ -71,22 +64,11 @@ std::string stress_row(const StressRow& row) {
                      verdict_text(row));
 }
 
-int unknown_failures(const StressReport& report) {
-  return count(report, StressVerdict::fails) - known_failures(report);
-}
+int silent_failures(const StressReport& report) { return count(report, StressVerdict::fails); }
 
 std::string stress_summary(const StressReport& report) {
-  std::string text =
-      fmt::format("Holds: {}. Flagged: {}. Fails and is known to: {}. Fails and is not: {}.",
-                  count(report, StressVerdict::holds), count(report, StressVerdict::flagged),
-                  known_failures(report), unknown_failures(report));
-  const StressCase* last = nullptr;
-  for (const StressRow& row : report.rows) {
-    if (!row.known || row.of == last) continue;
-    last = row.of;
-    text += fmt::format("\n{}: {}", last->name, last->why);
-  }
-  return text;
+  return fmt::format("Holds: {}. Flagged: {}. Fails: {}.", count(report, StressVerdict::holds),
+                     count(report, StressVerdict::flagged), silent_failures(report));
 }
 
 Json stress_json(const StressReport& report) {
@@ -96,7 +78,6 @@ Json stress_json(const StressReport& report) {
           {"holds", count(report, StressVerdict::holds)},
           {"flagged", count(report, StressVerdict::flagged)},
           {"fails", count(report, StressVerdict::fails)},
-          {"known_fails", known_failures(report)},
           {"rows", rows}};
 }
 

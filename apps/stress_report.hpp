@@ -11,10 +11,10 @@ namespace tangere::apps {
 
 std::string stress_head();
 std::string stress_row(const StressRow& row);
-/// Counts of the verdicts, and what is known of the cases that fail.
+/// Counts of the verdicts.
 std::string stress_summary(const StressReport& report);
-/// Rows that fail although they are not known to.
-int unknown_failures(const StressReport& report);
+/// Rows that fail without a word of the engine.
+int silent_failures(const StressReport& report);
 Json stress_json(const StressReport& report);
 
 }  // namespace tangere::apps

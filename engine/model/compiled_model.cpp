@@ -357,7 +357,8 @@ class Compiler {
   }
 
   /// Sets the scales of unknowns. Lengths are rounded relative to the greatest distance of any
-  /// body's point from the model's origin at rest; a scene that was moved reaches as far as it does.
+  /// body's point from the model's origin at rest; a scene that was moved reaches as far as it
+  /// does.
   void unknown_scales() {
     const double extent = m_.moved ? reach_of_moved_ : extent_about({0, 0, 0});
     m_.fall_time =

@@ -166,8 +166,8 @@ inline constexpr std::size_t kRememberedBytes = 32;
 
 struct CompiledModel {
   Scene scene;
-  /// Where links, bodies and the ground are measured from, in the world [m]. It is the world's origin
-  /// but for scenes far from it, whose positions would be rounded. Outputs add it.
+  /// Where links, bodies and the ground are measured from, in the world [m]. It is the world's
+  /// origin but for scenes far from it, whose positions would be rounded. Outputs add it.
   kernels::Vec3<double> origin{0, 0, 0};
   bool moved = false;  ///< origin is not the world's
   [[nodiscard]] kernels::Vec3<double> in_world(const kernels::Vec3<double>& p) const {

@@ -15,8 +15,8 @@ struct MeshFit {
   double unresolved = 0;
 };
 
-/// Compares the grid with its mesh at ten thousand places or more: evenly over the area, at least one
-/// in each triangle. A wall of one cell is missed if its middle happens to lie on nodes.
+/// Compares the grid with its mesh at ten thousand places or more: evenly over the area, at least
+/// one in each triangle. A wall of one cell is missed if its middle happens to lie on nodes.
 MeshFit mesh_fit(const MeshShape& mesh, const kernels::DistanceGrid& grid);
 
 }  // namespace tangere

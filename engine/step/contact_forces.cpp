@@ -63,8 +63,8 @@ ContactForces::ContactForces(const CompiledModel& m) : floor_(2 * std::size_t(m.
     const int c = component_of(link1 < 0 ? link2 : link1);
     const bool unfelt = senses[std::size_t(c)] != 0 && !felt(link1) && !felt(link2);
     const Ball ball = around(points);
-    contacts_.push_back(
-        {2 * c + (unfelt ? 1 : 0), ball.middle, ball.radius > 0 ? 1 / ball.radius : 0});
+    contacts_.push_back({2 * c + (unfelt ? 1 : 0), 6 * contacts_.size(), ball.middle,
+                         ball.radius > 0 ? 1 / ball.radius : 0});
   };
   for (const kernels::LinkPair& links : m.link_pairs) {
     std::vector<Ball> points;
@@ -82,6 +82,10 @@ ContactForces::ContactForces(const CompiledModel& m) : floor_(2 * std::size_t(m.
     }
     add(grounded.link, -1, points);
   }
+  std::ranges::stable_sort(contacts_, {}, &Contact::group);
+  for (int group = 0; group <= static_cast<int>(floor_.size()); ++group)
+    begin_.push_back(std::size_t(std::ranges::lower_bound(contacts_, group, {}, &Contact::group) -
+                                 contacts_.begin()));
 }
 
 /// `b` null: zero.
@@ -89,11 +93,10 @@ template <int L>
 double ContactForces::squared_distance(const Row<L>* a, const Row<L>* b, int group,
                                        int lane) const {
   double sum = 0;
-  for (std::size_t k = 0; k < contacts_.size(); ++k) {
+  for (std::size_t k = begin_[std::size_t(group)]; k < begin_[std::size_t(group) + 1]; ++k) {
     const Contact& contact = contacts_[k];
-    if (contact.group != group) continue;
     const auto number = [&](std::size_t i) {
-      return a[6 * k + i][lane] - (b == nullptr ? 0 : b[6 * k + i][lane]);
+      return a[contact.row + i][lane] - (b == nullptr ? 0 : b[contact.row + i][lane]);
     };
     const Vec3<double> force = {number(3), number(4), number(5)};
     const Vec3<double> torque =

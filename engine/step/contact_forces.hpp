@@ -30,6 +30,7 @@ class ContactForces {
  private:
   struct Contact {
     int group = 0;
+    std::size_t row = 0;             ///< of its wrench
     kernels::Vec3<double> middle{};  ///< of its points, in the axes of its first link [m]
     double per_length = 0;           ///< 1/radius of a ball around `middle` that holds them [1/m]
   };
@@ -37,8 +38,9 @@ class ContactForces {
   double squared_distance(const kernels::Row<L>* a, const kernels::Row<L>* b, int group,
                           int lane) const;
 
-  std::vector<Contact> contacts_;  ///< pairs of links, then grounded links
-  std::vector<double> floor_;      ///< (groups) [N]
+  std::vector<Contact> contacts_;   ///< by group; in it pairs of links, then grounded links
+  std::vector<std::size_t> begin_;  ///< (groups + 1) first contact of each
+  std::vector<double> floor_;       ///< (groups) [N]
 };
 
 }  // namespace tangere

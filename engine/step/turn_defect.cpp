@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// One lane in doubles: bodies that turn so fast are few. Masses below a ball joint are left out, and
-// so is the turning of what it hangs on.
+// One lane in doubles: bodies that turn so fast are few. Masses below a ball joint are left out,
+// and so is the turning of what it hangs on.
 #include "engine/step/turn_defect.hpp"
 
 #include <algorithm>

@@ -11,9 +11,9 @@ namespace tangere {
 /// Corners in order, anticlockwise seen from outside [m].
 using Face = std::vector<Vector3>;
 
-/// Returns the faces of a shape in its body frame. A half-space is a square with this half edge [m].
-/// A mesh of more than `most` triangles is thinned until it has no more.
-/// An abstract body has none.
+/// Returns the faces of a shape in its body frame. A half-space is a square with this half edge
+/// [m]. A mesh of more than `most` triangles is thinned until it has no more. An abstract body has
+/// none.
 std::vector<Face> faces_of(const Shape& shape, double half_space, std::size_t most = 12000);
 
 }  // namespace tangere

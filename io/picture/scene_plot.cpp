@@ -186,9 +186,13 @@ class Picture {
   std::string joint(std::size_t link) {
     const JointDescription& d = scene_.links[link].joint;
     if (d.type == JointType::fixed) return "";
-    const Pose frame = joint_frame(link);
-    const auto axis = [&](const Vector3& a) { return outer_direction(frame, a); };
-    const Vector3& at = frame.position;
+    // The frame that moves with the joint, in its body's.
+    const Pose& in_joint = scene_.links[link].body.pose;
+    const Pose back = pose_at_end({&in_joint, 1}, Pose{});
+    const auto axis = [&](const Vector3& a) {
+      return outer_direction(bodies_[link], outer_direction(back, a));
+    };
+    const Vector3 at = outer_point(bodies_[link], back.position);
     const Vector3 x = axis({1, 0, 0}), y = axis({0, 1, 0}), z = axis({0, 0, 1});
     std::string out;
     switch (d.type) {
@@ -205,23 +209,6 @@ class Picture {
     }
     const svg::Place where = eye_(at);
     return out + label({where.x + 8, where.y - 8}, d.name, kJoint);
-  }
-
-  /// The frame that moves with a joint: that of its body without the body's own pose in it.
-  [[nodiscard]] Pose joint_frame(std::size_t link) const {
-    const Pose& in = scene_.links[link].body.pose;
-    const Quaternion& q = in.orientation;
-    const Pose turn_back{{0, 0, 0}, {q[0], -q[1], -q[2], -q[3]}};
-    const Pose back{outer_direction(turn_back, -1.0 * in.position), turn_back.orientation};
-    // Columns of the joint's axes in the world, as a pose: x_world = body(back(x)).
-    const Pose& body = bodies_[link];
-    const auto product = [](const Quaternion& a, const Quaternion& b) {
-      return Quaternion{a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3],
-                        a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2],
-                        a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1],
-                        a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0]};
-    };
-    return {outer_point(body, back.position), product(body.orientation, back.orientation)};
   }
 
   /// Points that look away are paler.

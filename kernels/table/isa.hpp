@@ -8,9 +8,9 @@ namespace tangere::kernels {
 /// the environment variable TANGERE_ISA when the program started.
 const char* active_isa_name();
 
-/// Returns "", or why the kernels cannot be used: TANGERE_ISA names a set that was not built or does
-/// not run here, or the processor runs none of those that were built. Models refuse to be compiled
-/// then, and programs check it at start.
+/// Returns "", or why the kernels cannot be used: TANGERE_ISA names a set that was not built or
+/// does not run here, or the processor runs none of those that were built. Models refuse to be
+/// compiled then, and programs check it at start.
 const char* isa_error();
 
 }  // namespace tangere::kernels

@@ -69,9 +69,9 @@ struct AccuracyListener {
   std::function<void(std::span<const AccuracyPoint>)> setting;  ///< in every precision
 };
 
-/// The value below which `share` of the population lies with that confidence, from which the numbers
-/// were drawn. Of n numbers k are larger, the most for which P(Binomial(n, 1 - share) ≤ k) is at most
-/// 1 - share. The largest number where there is no such k. NaN entries do not count.
+/// The value below which `share` of the population lies with that confidence, from which the
+/// numbers were drawn. Of n numbers k are larger, the most for which P(Binomial(n, 1 - share) ≤ k)
+/// is at most 1 - share. The largest number where there is no such k. NaN entries do not count.
 double sure_quantile(std::vector<double> numbers, double share);
 
 /// A stop leaves what there is by then. Throws InputError when nothing touches in any environment,

@@ -9,8 +9,8 @@
 
 namespace tangere {
 
-/// Returns a sentence where steps took more than 8 evaluations of the residual a stage, or more than
-/// a twentieth of them were split; "" where they did not, and for fewer than 20 steps.
+/// Returns a sentence where steps took more than 8 evaluations of the residual a stage, or more
+/// than a twentieth of them were split; "" where they did not, and for fewer than 20 steps.
 std::string costly_steps(Integrator integrator, std::int64_t steps, std::int64_t evaluations,
                          std::int64_t split_steps);
 

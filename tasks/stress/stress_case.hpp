@@ -34,10 +34,6 @@ struct StressCase {
   int environments = 1;
   double may_fail = 0;  ///< share of environments that may fail
   bool quick = false;   ///< belongs to a quick run
-  /// Schemes for which this version fails without saying so, and why. Whoever mends one takes it
-  /// off this list.
-  std::vector<Integrator> known{};
-  std::string why{};
 };
 
 /// All cases, by kind.

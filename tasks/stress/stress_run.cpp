@@ -217,9 +217,6 @@ bool measure(const Scene& scene, int threads, const std::function<bool()>& go_on
       row.verdict = StressVerdict::flagged;
       row.reason = "warning: " + warning;
     }
-  const auto& known = row.of->known;
-  row.known = row.verdict == StressVerdict::fails &&
-              std::find(known.begin(), known.end(), row.integrator) != known.end();
   return true;
 }
 
@@ -283,7 +280,6 @@ bool run_case(const StressCase& of, const StressOptions& options, const StressSc
     if (!measure(scene, options.threads, listener.go_on, row)) return false;
     if (row.verdict == StressVerdict::fails && !warnings.empty()) {
       row.verdict = StressVerdict::flagged;
-      row.known = false;
       row.reason = "warning: " + warnings.front();
     }
     add(std::move(row));

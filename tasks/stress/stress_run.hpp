@@ -36,7 +36,6 @@ struct StressRow {
   std::int64_t damped_steps = 0;  ///< that would have created energy
   int environments = 0, failed = 0;
   StressVerdict verdict = StressVerdict::fails;
-  bool known = false;  ///< fails, and is listed as failing
   std::string reason;  ///< why it is flagged; "" otherwise
 };
 

@@ -94,7 +94,7 @@ INSTANTIATE_TEST_SUITE_P(
             {"skin", "--modulus", "2e5", "--thickness", "3e-3", "--pitch", "1e-3", "--poisson",
              "0.5"}},
         Row{"stress", kDone, {"stress", "--case", "slope_below", "--integrator", "BDF1"}},
-        Row{"stress_unknown_failure",
+        Row{"stress_silent_failure",
             kSomeFailed,
             {"stress", "--case", "sliding_cube", "--integrator", "BDF1", "--timestep", "0.05"}},
         Row{"stress_unknown_case", kUsage, {"stress", "--case", "slope"}},

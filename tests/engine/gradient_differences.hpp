@@ -65,6 +65,28 @@ inline int check_gradient(const Scene& scene, Integrator scheme, unsigned seed, 
   return compared;
 }
 
+/// Expects the gradient of a run of six steps from velocities v against differences. Some of the
+/// steps must end with this status: the tape says which scheme took their parts.
+inline void expect_gradient_through(const Model& model, const StepperOptions& o,
+                                    const std::vector<double>& v, StepStatus status) {
+  RunInput in = random_input(model, 5, 6);
+  Batch batch(model, 1);
+  in.q = q_of(batch), in.v = v;
+  batch.set_state(0, in.q, in.v);
+  Stepper stepper(model, o);
+  int found = 0;
+  for (const std::vector<double>& u : in.u) {
+    stepper.step(batch, u);
+    found += batch.status(0) == status;
+  }
+  EXPECT_GT(found, 0);
+  const StateLoss loss(model, 6, 7);
+  const RunGradient adjoint = adjoint_of_run(model, o, {in}, loss, 0),
+                    differences = differences_of_run(model, o, in, loss);
+  EXPECT_EQ(compare(adjoint.q, differences.q, norm(differences.q), 1e-6, "q"), 6);
+  EXPECT_EQ(compare(adjoint.v, differences.v, norm(differences.v), 1e-6, "v"), 6);
+}
+
 /// Whether a step of the run is split because it found no root.
 inline bool splits(const Scene& scene, Integrator scheme, unsigned seed, int steps) {
   const Model model = without_second_looks(scene);

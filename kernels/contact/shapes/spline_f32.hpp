@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The spline of a mesh (spline.hpp) at sixteen places in single precision. A vector of lanes is also
-// taken as four blocks of four floats: block a has the coefficients of row a along x, four
+// The spline of a mesh (spline.hpp) at sixteen places in single precision. A vector of lanes is
+// also taken as four blocks of four floats: block a has the coefficients of row a along x, four
 // neighbours along z.
 #pragma once
 

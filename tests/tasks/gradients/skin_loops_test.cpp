@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Tests friction that remembers against a real skin: shear loops that a probe recorded
-// (tests/data/skin_loops) are fitted by identify(), and the fit is compared with a cycle that it has
-// not seen.
+// (tests/data/skin_loops) are fitted by identify(), and the fit is compared with a cycle that it
+// has not seen.
 #include <gmock/gmock.h>
 
 #include <algorithm>
