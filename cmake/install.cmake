@@ -43,6 +43,7 @@ set(public_headers
   engine/model/effects.hpp
   engine/model/field_form.hpp
   engine/model/model.hpp
+  engine/model/output_times.hpp
   engine/model/random.hpp
   engine/model/scene.hpp
   engine/model/scene_number.hpp

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <iterator>
+#include <string_view>
 
 #include "engine/base/error.hpp"
 
@@ -13,6 +14,7 @@ namespace {
 constexpr FieldForm kForms[] = {FieldForm::field, FieldForm::pressure, FieldForm::shear,
                                 FieldForm::sum, FieldForm::ideal};
 constexpr const char* kPlain[] = {"q", "v", "variables", "bodies"};
+constexpr const char* kBody = "bodies.";  // followed by the name of one
 }  // namespace
 
 const char* to_string(FieldForm form) {
@@ -53,7 +55,8 @@ std::vector<std::string> sensor_names(const Scene& scene) {
 }
 
 bool is_plain_output(const std::string& name) {
-  return std::find(std::begin(kPlain), std::end(kPlain), name) != std::end(kPlain);
+  return std::any_of(std::begin(kPlain), std::end(kPlain),
+                     [&](std::string_view plain) { return plain == name; });
 }
 
 std::optional<FieldOutput> find_output(std::span<const std::string> sensors,
@@ -65,14 +68,30 @@ std::optional<FieldOutput> find_output(std::span<const std::string> sensors,
   return std::nullopt;
 }
 
+std::string body_output(const std::string& body) { return kBody + body; }
+
+std::optional<int> find_body_output(const Scene& scene, const std::string& name) {
+  for (std::size_t b = 0; b < scene.links.size(); ++b)
+    if (name == body_output(scene.links[b].body.name)) return static_cast<int>(b);
+  return std::nullopt;
+}
+
+bool has_output(const Scene& scene, const std::string& word) {
+  const std::string name = split_times(word).name;
+  return is_plain_output(name) || find_body_output(scene, name) ||
+         find_output(sensor_names(scene), name);
+}
+
 void check_outputs(std::span<const FieldOutput> outputs, std::size_t sensors) {
   for (std::size_t k = 0; k < outputs.size(); ++k) {
     const FieldOutput of = outputs[k];
     if (of.sensor < 0 || static_cast<std::size_t>(of.sensor) >= sensors)
       throw InputError("an output of sensor " + std::to_string(of.sensor) + "; the scene has " +
                        std::to_string(sensors));
-    if (std::find(outputs.begin(), outputs.begin() + static_cast<std::ptrdiff_t>(k), of) !=
-        outputs.begin() + static_cast<std::ptrdiff_t>(k))
+    const auto before = outputs.first(k);
+    if (std::any_of(before.begin(), before.end(), [&](const FieldOutput& other) {
+          return other.sensor == of.sensor && other.form == of.form;
+        }))
       throw InputError("the " + std::string(to_string(of.form)) + " of sensor " +
                        std::to_string(of.sensor) + " is listed twice; expected it once");
   }
@@ -89,6 +108,12 @@ std::vector<std::string> output_names(std::span<const std::string> sensors) {
   std::vector<std::string> names(std::begin(kPlain), std::end(kPlain));
   for (const std::string& sensor : sensors)
     for (const FieldForm form : kForms) names.push_back(output_name(sensor, form));
+  return names;
+}
+
+std::vector<std::string> output_names(const Scene& scene) {
+  std::vector<std::string> names = output_names(sensor_names(scene));
+  for (const LinkDescription& link : scene.links) names.push_back(body_output(link.body.name));
   return names;
 }
 

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "engine/model/model.hpp"
+#include "engine/model/output_times.hpp"
 
 namespace tangere {
 
@@ -38,6 +39,7 @@ std::size_t numbers_of(int points, FieldForm form);
 struct FieldOutput {
   int sensor = 0;
   FieldForm form = FieldForm::field;
+  OutputTimes times = {};  ///< none: as often as the run reads this sensor
   friend bool operator==(const FieldOutput&, const FieldOutput&) = default;
 };
 
@@ -51,11 +53,21 @@ bool is_plain_output(const std::string& name);
 /// Returns the reading of this name; none where no sensor has it.
 std::optional<FieldOutput> find_output(std::span<const std::string> sensors,
                                        const std::string& name);
+/// Returns the name of the motion of one body: "bodies.box".
+std::string body_output(const std::string& body);
+/// Returns the index of the body whose motion has this name, "bodies.box"; none where there is no
+/// such body.
+std::optional<int> find_body_output(const Scene& scene, const std::string& name);
+/// Whether a scene has an output of this name, with or without times: "q/final", "bodies.box".
+/// Throws InputError as split_times() does.
+bool has_output(const Scene& scene, const std::string& word);
 /// Throws InputError for a sensor that is not there and for an output that is listed twice.
 void check_outputs(std::span<const FieldOutput> outputs, std::size_t sensors);
 /// Returns the field of every sensor: what a scene gives where nothing else is asked for.
 std::vector<FieldOutput> whole_fields(const Model& model);
 /// Returns all names of outputs, the plain ones included.
 std::vector<std::string> output_names(std::span<const std::string> sensors);
+/// The same with the names of single bodies.
+std::vector<std::string> output_names(const Scene& scene);
 
 }  // namespace tangere

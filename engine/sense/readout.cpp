@@ -447,8 +447,8 @@ Readout& Readout::operator=(Readout&&) noexcept = default;
 Precision Readout::precision() const { return impl_->precision; }
 
 void Readout::bodies(const Batch& batch, int environment, std::span<double> pose,
-                     std::span<double> twist) {
-  read_bodies(compiled(impl_->model), impl_->reader, batch, environment, pose, twist);
+                     std::span<double> twist, std::span<const int> chosen) {
+  read_bodies(compiled(impl_->model), impl_->reader, batch, environment, pose, twist, chosen);
 }
 void Readout::end_effectors(const Batch& batch, int environment, std::span<double> position,
                             std::span<double> velocity) {

@@ -31,8 +31,9 @@ class Readout {
 
   /// Reads world poses (nb, 7: x y z qw qx qy qz of the body frame) and twists (nb, 6: angular,
   /// then linear velocity of the body frame's origin, world axes) of one environment, for every
-  /// body of the scene in file order.
-  void bodies(const Batch& batch, int environment, std::span<double> pose, std::span<double> twist);
+  /// body of the scene in file order, or for those of `chosen` alone in their order.
+  void bodies(const Batch& batch, int environment, std::span<double> pose, std::span<double> twist,
+              std::span<const int> chosen = {});
 
   /// Reads world positions of the scene's end effectors, (end effectors, 3) [m], of one environment
   /// in file order; with `velocity`, also their velocities, (end effectors, 3) [m/s], world axes.

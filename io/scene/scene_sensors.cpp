@@ -261,10 +261,15 @@ void read_outputs(Scene& scene, const SceneNode& section) {
   outputs.source = section.source();
   outputs.record =
       split_names(section.source().prefix() + "<outputs>: record", section.text("record"));
-  const std::vector<std::string> sensors = sensor_names(scene);
-  for (const std::string& name : outputs.record)
-    if (!is_plain_output(name) && !find_output(sensors, name))
-      section.fail(fmt::format("record has '{}'{}", name, suggestion(name, output_names(sensors))));
+  for (const std::string& word : outputs.record) {
+    try {
+      if (has_output(scene, word)) continue;
+    } catch (const InputError& error) {
+      section.fail(fmt::format("record has {}", error.what()));
+    }
+    const std::string name = split_times(word).name;
+    section.fail(fmt::format("record has '{}'{}", name, suggestion(name, output_names(scene))));
+  }
   scene.outputs = std::move(outputs);
 }
 

@@ -26,7 +26,7 @@ struct SavedState {
   std::vector<std::string> q_names;            ///< (nq)
   std::vector<std::string> v_names;            ///< (nv)
   std::vector<double> q, v;                    ///< (E, nq), (E, nv)
-  std::vector<double> previous_q, previous_v;  ///< of row K - 1; empty for row 0
+  std::vector<double> previous_q, previous_v;  ///< of row K - 1; empty if the file lacks it
   std::vector<StepStatus> status;              ///< (E) of the step to this row; converged for row 0
 };
 

@@ -26,6 +26,7 @@ struct TrajectoryReader::Impl {
   double timestep = 0;
   std::vector<SensorLayout> sensors;
   std::vector<std::vector<FieldForm>> forms;  // (sensors) what was recorded
+  std::vector<std::string> steps_of;          // (sensors) name of the list of steps
   std::vector<std::string> sums;              // sensors of which only the sum was
   std::vector<std::int64_t> frames;
 
@@ -65,8 +66,14 @@ struct TrajectoryReader::Impl {
       return;
     }
     if (components_of(found[0]) == 3) found.resize(1);
+    // What was read at other steps makes no picture with the first.
+    const auto apart = std::find_if(found.begin() + 1, found.end(), [&](FieldForm form) {
+      return h5::has_link(group, own_steps(form));
+    });
+    found.erase(apart, found.end());
     add_sensor(group, name, found[0]);
     forms.push_back(found);
+    steps_of.push_back(h5::has_link(group, own_steps(found[0])) ? own_steps(found[0]) : "step");
     for (const FieldForm form : found) {
       h5::Dims dims = h5::dimensions(h5::open_dataset(group, dataset_of(form))),
                expected = h5::dimensions(h5::open_dataset(group, dataset_of(found[0])));
@@ -76,6 +83,9 @@ struct TrajectoryReader::Impl {
                                   dataset_of(form), dataset_of(found[0])));
     }
   }
+
+  /// The name of a reading's list of steps, if it has one of its own.
+  static std::string own_steps(FieldForm form) { return std::string(dataset_of(form)) + "_step"; }
 
   /// Reads what a picture of a list of points needs.
   void read_image(const h5::Id& group, SensorLayout& s) const {
@@ -161,7 +171,7 @@ struct TrajectoryReader::Impl {
     frames.push_back(static_cast<std::int64_t>(dims[0]));
   }
 
-  [[nodiscard]] h5::Id open(std::size_t sensor, const char* dataset) const {
+  [[nodiscard]] h5::Id open(std::size_t sensor, const std::string& dataset) const {
     return h5::open_dataset(h5::open_group(h5::open_group(file, "tactile"), sensors[sensor].name),
                             dataset);
   }
@@ -201,8 +211,8 @@ std::int64_t TrajectoryReader::frames(std::size_t sensor) const { return impl_->
 
 std::int64_t TrajectoryReader::step(std::size_t sensor, std::int64_t frame) const {
   std::int64_t value = 0;
-  h5::read_box<std::int64_t>(impl_->open(sensor, "step"), {static_cast<hsize_t>(frame)}, {1},
-                             &value);
+  h5::read_box<std::int64_t>(impl_->open(sensor, impl_->steps_of[sensor]),
+                             {static_cast<hsize_t>(frame)}, {1}, &value);
   return value;
 }
 
