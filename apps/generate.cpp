@@ -556,7 +556,8 @@ Command add_generate(CLI::App& program) {
            "Derivatives to store: none, return (for a scene with --loss), or jacobians of each row "
            "[default: none]");
   add_text(app, "--loss", o.loss, "NAME",
-           "Loss of a scene, with --gradients return: final, path, tactile, shear or variables");
+           "Loss of a scene, with --gradients return: final, path, tactile, shear, variables or "
+           "markers");
   add_memory_size(
       app, "--tape-memory", o.tape_memory,
       "With --gradients return: memory for the states that all threads keep [default: 1GB each]");

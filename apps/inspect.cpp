@@ -118,6 +118,7 @@ Json as_json(const Model& model) {
           {"meshes", meshes},
           {"sensors", sensors},
           {"variables", end_effectors},
+          {"outputs", scene.outputs ? Json(scene.outputs->record) : Json()},
           {"control", control_name(scene)},
           {"steps", steps < 0 ? Json() : Json(steps)},
           {"randomized", randomized_names(scene)},
@@ -156,6 +157,13 @@ std::string sensors_text(const Model& model) {
   return text;
 }
 
+/// What runs of the scene compute and store.
+std::string outputs_text(const Scene& scene) {
+  if (!scene.outputs) return "outputs: everything\n";
+  return fmt::format("outputs ({}:{}): {}\n", scene.outputs->source.file,
+                     scene.outputs->source.line, fmt::join(scene.outputs->record, ", "));
+}
+
 std::string end_effectors_text(const Model& model) {
   if (model.end_effectors().empty()) return "";
   std::string text = fmt::format("\nend effectors ({})\n", model.end_effectors().size());
@@ -185,7 +193,8 @@ std::string as_text(const Model& model) {
   for (const ContactInfo& c : model.contacts())
     text += fmt::format("  {} on {}: {} point{}, law {}\n", c.first, c.second, c.points,
                         c.points == 1 ? "" : "s", c.law);
-  text += '\n' + sensors_text(model) + end_effectors_text(model) + "\neffects\n";
+  text += '\n' + sensors_text(model) + end_effectors_text(model) + '\n' + outputs_text(scene);
+  text += "\neffects\n";
   for (const EffectInfo& e : model.effects())
     if (e.effect.element < 0)
       text += fmt::format("  {:<4} {:<24} {}\n", e.on ? "on" : "off", e.name, e.reason);

@@ -25,10 +25,14 @@ AskedOutput asked_of(const std::string& word, const std::string& where, const Mo
     throw InputError(where + ": " + error.what());
   }
   const std::string& name = asked.name;
-  const bool of_sensor = find_output(sensors, name).has_value(),
+  const std::optional<FieldOutput> reading = find_output(sensors, name);
+  const bool of_sensor = reading.has_value(),
              other = is_plain_output(name) || find_body_output(model.scene(), name);
   if (of_sensor && other)
     throw InputError(where + ": '" + name + "' is a sensor, too; expected one of another name");
+  if (reading)
+    if (const std::string reason = reason_against(model.scene(), *reading); !reason.empty())
+      throw InputError(fmt::format("{}: '{}', but {}", where, word, reason));
   if (!of_sensor && !other)
     throw InputError(fmt::format("{}: unknown observation '{}'{}", where, name,
                                  suggestion(name, output_names(model.scene()))));
@@ -57,8 +61,9 @@ Record record_of(const std::string& option, const Model& model) {
   for (const std::string& word : words) {
     AskedOutput asked = asked_of(word, record.where, model);
     if (record.find(asked.name) != nullptr)
-      throw InputError(fmt::format("{}: '{}' is listed twice; expected it once, at times of one kind",
-                                   record.where, asked.name));
+      throw InputError(
+          fmt::format("{}: '{}' is listed twice; expected it once, at times of one kind",
+                      record.where, asked.name));
     record.asked.push_back(std::move(asked));
   }
   RolloutOutputs& outputs = record.outputs;

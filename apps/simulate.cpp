@@ -486,7 +486,7 @@ Command add_simulate(CLI::App& program) {
   add_text(
       app, "--gradients", o.gradients, "LOSS",
       "Also write derivatives of a loss by controls, start and the scene's numbers: final, path, "
-      "tactile, shear or variables");
+      "tactile, shear, variables or markers");
   add_flag(app, "--point-gradients", o.point_gradients,
            "With --gradients: also by place and coefficients of every tactile point");
   add_memory_size(app, "--tape-memory", o.tape_memory,

@@ -56,6 +56,7 @@ set(public_headers
   engine/rows/task_spec.hpp
   engine/sense/audit.hpp
   engine/sense/flow_map.hpp
+  engine/sense/marker_map.hpp
   engine/sense/readout.hpp
   engine/sense/start_overlaps.hpp
   engine/sense/tactile_frame.hpp

@@ -12,7 +12,7 @@ namespace tangere {
 
 namespace {
 constexpr FieldForm kForms[] = {FieldForm::field, FieldForm::pressure, FieldForm::shear,
-                                FieldForm::sum, FieldForm::ideal};
+                                FieldForm::sum,   FieldForm::ideal,    FieldForm::markers};
 constexpr const char* kPlain[] = {"q", "v", "variables", "bodies"};
 constexpr const char* kBody = "bodies.";  // followed by the name of one
 }  // namespace
@@ -24,6 +24,7 @@ const char* to_string(FieldForm form) {
     case FieldForm::shear: return "shear";
     case FieldForm::sum: return "sum";
     case FieldForm::ideal: return "ideal";
+    case FieldForm::markers: return "markers";
   }
   return "unknown";
 }
@@ -33,7 +34,8 @@ int components_of(FieldForm form) {
     case FieldForm::field:
     case FieldForm::ideal: return 3;
     case FieldForm::pressure: return 1;
-    case FieldForm::shear: return 2;
+    case FieldForm::shear:
+    case FieldForm::markers: return 2;
     case FieldForm::sum: break;
   }
   return 0;
@@ -82,6 +84,13 @@ bool has_output(const Scene& scene, const std::string& word) {
          find_output(sensor_names(scene), name);
 }
 
+std::string reason_against(const Scene& scene, const FieldOutput& output) {
+  const TactileDescription& sensor = scene.sensors[static_cast<std::size_t>(output.sensor)];
+  if (output.form != FieldForm::markers || sensor.markers) return "";
+  return sensor.source.prefix() + "sensor '" + sensor.name +
+         "' has no <markers>; expected them in its <tactile>";
+}
+
 void check_outputs(std::span<const FieldOutput> outputs, std::size_t sensors) {
   for (std::size_t k = 0; k < outputs.size(); ++k) {
     const FieldOutput of = outputs[k];
@@ -101,6 +110,20 @@ std::vector<FieldOutput> whole_fields(const Model& model) {
   std::vector<FieldOutput> outputs;
   for (std::size_t s = 0; s < model.sensors().size(); ++s)
     outputs.push_back({static_cast<int>(s), FieldForm::field});
+  return outputs;
+}
+
+std::vector<FieldOutput> asked_fields(const Model& model) {
+  if (!model.scene().outputs) return whole_fields(model);
+  const std::vector<std::string> sensors = sensor_names(model.scene());
+  std::vector<FieldOutput> outputs;
+  for (const std::string& word : model.scene().outputs->record) {
+    const TimedName timed = split_times(word);
+    if (std::optional<FieldOutput> of = find_output(sensors, timed.name)) {
+      of->times = timed.times;
+      outputs.push_back(*of);
+    }
+  }
   return outputs;
 }
 

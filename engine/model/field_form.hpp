@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What is read of a tactile field: all of it, its pressure, its shear or its sum. What nobody asks
-// for is neither computed nor stored.
+// What is read of a tactile field: all of it, its pressure, its shear, its sum, or how it moves
+// markers. What nobody asks for is neither computed nor stored.
 #pragma once
 
 #include <array>
@@ -20,6 +20,7 @@ enum class FieldForm {
   shear,     ///< (points, 2) [N]: the first two
   sum,       ///< (6): force on the body [N], then where it presses [m], body axes
   ideal,     ///< the field without the sensor's imperfections
+  markers,   ///< (points, 2) [m]: where the ideal field pushes them, along axis0 and axis1
 };
 
 /// Force x y z on the body [N], then its centre x y z [m]: the mean of the points' places, each
@@ -27,10 +28,10 @@ enum class FieldForm {
 /// nothing presses.
 using FieldSum = std::array<double, 6>;
 
-/// The words of files and options: "field", "pressure", "shear", "sum", "ideal".
+/// The words of files and options: "field", "pressure", "shear", "sum", "ideal", "markers".
 const char* to_string(FieldForm form);
 
-/// Numbers of a point: 3, 1, 2, 3; 0 for a sum.
+/// Numbers of a point: 3, 1, 2, 3, 2; 0 for a sum.
 int components_of(FieldForm form);
 /// Numbers of a whole reading.
 std::size_t numbers_of(int points, FieldForm form);
@@ -43,7 +44,7 @@ struct FieldOutput {
   friend bool operator==(const FieldOutput&, const FieldOutput&) = default;
 };
 
-/// Returns "pad" for a field, else "pad.pressure", "pad.shear", "pad.sum" or "pad.ideal".
+/// Returns "pad" for a field, else "pad.pressure", "pad.shear", "pad.sum", "pad.ideal" or "pad.markers".
 std::string output_name(const std::string& sensor, FieldForm form);
 /// Returns the names of a scene's sensors, in file order.
 std::vector<std::string> sensor_names(const Scene& scene);
@@ -61,10 +62,15 @@ std::optional<int> find_body_output(const Scene& scene, const std::string& name)
 /// Whether a scene has an output of this name, with or without times: "q/final", "bodies.box".
 /// Throws InputError as split_times() does.
 bool has_output(const Scene& scene, const std::string& word);
+/// Returns why a scene lacks a reading, as in "sensor 'pad' has no <markers>"; "" where it has it.
+std::string reason_against(const Scene& scene, const FieldOutput& output);
 /// Throws InputError for a sensor that is not there and for an output that is listed twice.
 void check_outputs(std::span<const FieldOutput> outputs, std::size_t sensors);
 /// Returns the field of every sensor: what a scene gives where nothing else is asked for.
 std::vector<FieldOutput> whole_fields(const Model& model);
+/// Returns what the scene's <outputs> ask of its sensors, with their times; without <outputs>, the
+/// field of every sensor.
+std::vector<FieldOutput> asked_fields(const Model& model);
 /// Returns all names of outputs, the plain ones included.
 std::vector<std::string> output_names(std::span<const std::string> sensors);
 /// The same with the names of single bodies.

@@ -22,8 +22,8 @@ TimedName split_times(const std::string& word) {
   const char* const end = when.data() + when.size();
   split.times.final = when == "final";
   const auto [at, error] = std::from_chars(when.data(), end, split.times.every);
-  const bool number = error == std::errc() && at == end && split.times.every >= 1 &&
-                      split.times.every <= kMost;
+  const bool number =
+      error == std::errc() && at == end && split.times.every >= 1 && split.times.every <= kMost;
   if (!split.times.final && !number)
     throw InputError("'" + word + "': expected '" + split.name + "', '" + split.name +
                      "/10' for every 10th step (1 to 10⁹), or '" + split.name +

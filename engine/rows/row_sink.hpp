@@ -27,8 +27,9 @@ struct StateRow {
 
 /// What step t (from row t to row t + 1) used, and how its solve went.
 struct StepRow {
-  std::int64_t step;                         ///< t
-  std::span<const double> u;  ///< (E, nu) controls as given, before clipping; empty if not asked for
+  std::int64_t step;  ///< t
+  std::span<const double>
+      u;  ///< (E, nu) controls as given, before clipping; empty if not asked for
   std::span<const std::int32_t> iterations;  ///< (E) Newton passes, sub-steps included
   std::span<const std::int8_t> status;       ///< (E) StepStatus
   std::span<const double> residual;          ///< (E) scaled residual at acceptance, dimensionless

@@ -237,8 +237,8 @@ std::vector<SampleSaid> samples_said(const h5::Id& scene, std::int64_t every, st
   const std::vector<std::string> names = h5::read_texts(scene, "samples");
   const std::vector<std::int64_t> steps = h5::read_numbers<std::int64_t>(scene, "sample_every");
   if (steps.size() != names.size())
-    throw IoError(fmt::format("its 'sample_every' has {} numbers; expected {}", steps.size(),
-                              names.size()));
+    throw IoError(
+        fmt::format("its 'sample_every' has {} numbers; expected {}", steps.size(), names.size()));
   for (std::size_t k = 0; k < names.size(); ++k) {
     if (steps[k] < 0 || steps[k] % every != 0)
       throw IoError(fmt::format("its '{}' is sampled every {} steps; expected a multiple of {}",

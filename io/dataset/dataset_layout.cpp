@@ -212,8 +212,8 @@ void DatasetLayout::check() const {
   const std::vector<std::string> all = all_observation_names();
   for (std::size_t k = 0; k < record_times.size(); ++k)
     if (record_times[k].every % every != 0)
-      throw InputError(fmt::format("{} every {} steps, and a row is every {}; expected a multiple",
-                                   record.at(k), record_times[k].every, every));
+      throw InputError(fmt::format("'{}{}', and a row is every {} steps; expected a multiple of {}",
+                                   record.at(k), to_string(record_times[k]), every, every));
   for (const std::string& name : record)
     if (std::find(all.begin(), all.end(), name) == all.end())
       throw InputError(

@@ -80,9 +80,9 @@ struct DatasetLayout {
   std::string compression =
       "none";           ///< or "deflate", "lz4", for observations with rows large enough
   bool sparse = false;  ///< parts of large fields that are zero are left out
-  std::vector<std::string> record;  ///< observations to store; none: all of them
+  std::vector<std::string> record;        ///< observations to store; none: all of them
   std::vector<OutputTimes> record_times;  ///< when, in steps, parallel to `record`; none: always
-  std::string gradients_of;         ///< the quantity that derivatives are of, in words; empty: none
+  std::string gradients_of;  ///< the quantity that derivatives are of, in words; empty: none
   std::vector<GradientArray> gradients;  ///< those stored with an episode
 
   /// The data set's name for Minari: "tangere/TASK/NAME-v0", where NAME is set_name, or else the

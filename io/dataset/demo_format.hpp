@@ -100,7 +100,7 @@ class DemoFormat {
   std::size_t randomized_;
   std::vector<std::string> names_, titles_;  // of observations; of datasets
   std::vector<std::size_t> sources_, gradient_sources_;
-  std::vector<GradientArray> gradients_;            // by name
+  std::vector<GradientArray> gradients_;  // by name
   std::vector<DatasetSample> samples_;
   std::vector<ChunkPlan> plans_;                    // per observation, then per sample
   std::vector<std::vector<std::uint64_t>> shapes_;  // of a row, per dataset

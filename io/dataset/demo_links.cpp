@@ -116,7 +116,8 @@ DemoMembers members_of(const h5::Id& demo) {
   members.names.erase(std::remove(members.names.begin(), members.names.end(), "next_obs"),
                       members.names.end());
   for (const std::string& name : members.names)
-    if (name.starts_with("grad_") || name == "loss" || name == kSamples) members.besides.push_back(name);
+    if (name.starts_with("grad_") || name == "loss" || name == kSamples)
+      members.besides.push_back(name);
   const h5::Id obs = h5::open_group(demo, "obs");
   for (const std::string& name : h5::link_names(obs))
     members.observations.push_back(array_of(obs, name));

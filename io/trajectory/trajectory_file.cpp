@@ -214,8 +214,7 @@ struct TrajectoryFile::Impl {
                   E = static_cast<hsize_t>(layout.environments);
     const h5::Id group = h5::create_group(file, "variables");
     end_effector_step = create_steps(group, layout.of_end_effectors);
-    end_effectors =
-        rows<double>(group, "position", {R, E, layout.end_effector_names.size(), 3});
+    end_effectors = rows<double>(group, "position", {R, E, layout.end_effector_names.size(), 3});
     h5::write_attribute(end_effectors, "names",
                         std::span<const std::string>(layout.end_effector_names));
     h5::write_attribute(end_effectors, "units", "m");

@@ -99,7 +99,7 @@ struct RunDescription {
   std::vector<int> tactile_intervals;  ///< K in force, one per sensor
   /// Recorded; none: the field of every sensor.
   std::optional<std::vector<FieldOutput>> fields;
-  bool bodies = true, end_effectors = true, audit = false;  ///< recorded
+  bool bodies = true, end_effectors = true, audit = false;         ///< recorded
   OutputTimes states = {}, of_bodies = {}, of_end_effectors = {};  ///< as in TrajectoryLayout
   std::vector<int> chosen_bodies = {};                             ///< none: every body
   std::string precision, command_line, version, instruction_set;

@@ -27,7 +27,7 @@ struct TrajectoryReader::Impl {
   std::vector<SensorLayout> sensors;
   std::vector<std::vector<FieldForm>> forms;  // (sensors) what was recorded
   std::vector<std::string> steps_of;          // (sensors) name of the list of steps
-  std::vector<std::string> sums;              // sensors of which only the sum was
+  std::vector<std::string> sums;              // sensors of which only these were
   std::vector<std::int64_t> frames;
 
   explicit Impl(const std::string& p) : path(p), file(h5::open_file(p)) {
@@ -59,7 +59,8 @@ struct TrajectoryReader::Impl {
          {FieldForm::field, FieldForm::ideal, FieldForm::pressure, FieldForm::shear})
       if (h5::has_link(group, dataset_of(form))) found.push_back(form);
     if (found.empty()) {
-      if (!h5::has_link(group, dataset_of(FieldForm::sum)))
+      if (!h5::has_link(group, dataset_of(FieldForm::sum)) &&
+          !h5::has_link(group, dataset_of(FieldForm::markers)))
         throw IoError(
             fmt::format("{}: sensor '{}' has no reading: the file is damaged", path, name));
       sums.push_back(name);
@@ -194,7 +195,8 @@ std::size_t TrajectoryReader::find_sensor(const std::string& name) const {
     if (name.empty() || names.back() == name) return i;
   }
   if (std::find(impl_->sums.begin(), impl_->sums.end(), name) != impl_->sums.end())
-    throw InputError(impl_->path + ": of sensor '" + name + "' the run recorded only the sum");
+    throw InputError(impl_->path + ": of sensor '" + name +
+                     "' the run recorded only the sum or markers");
   if (names.empty())
     throw InputError(impl_->path + ": the run recorded no tactile field, pressure or shear");
   throw InputError(impl_->path + ": no sensor is named '" + name + "'" + suggestion(name, names));

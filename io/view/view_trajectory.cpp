@@ -58,9 +58,9 @@ class TrajectoryView {
       data_.notes.push_back(
           fmt::format("The first {} of {} environments.", count, fields_.environments()));
     const std::size_t traces = q_names_.size() + 2 * data_.sensors.size() + 2;
-    data_.stride =
-        stride_for(std::vector<std::int64_t>(static_cast<std::size_t>(count), std::ssize(state_steps_)),
-                   numbers_per_frame(data_.scene, data_.sensors, traces), options_);
+    data_.stride = stride_for(
+        std::vector<std::int64_t>(static_cast<std::size_t>(count), std::ssize(state_steps_)),
+        numbers_per_frame(data_.scene, data_.sensors, traces), options_);
     for (std::int64_t e = first; e < first + count; ++e) add_environment(e);
     return std::move(data_);
   }

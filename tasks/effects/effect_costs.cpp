@@ -21,11 +21,11 @@ TimedParts parts_of(EffectKind kind) {
           kind == EffectKind::force_motors};
 }
 
-/// Returns the bytes of one environment's state and fields.
+/// Returns the bytes of one environment's state and readings.
 std::size_t bytes_of(const Model& model) {
   std::size_t bytes = model.state_bytes_per_environment();
-  for (const SensorInfo& sensor : model.sensors())
-    bytes += 3 * sizeof(double) * as_size(sensor.points);
+  for (const FieldOutput of : asked_fields(model))
+    bytes += sizeof(double) * numbers_of(model.sensors()[as_size(of.sensor)].points, of.form);
   return bytes;
 }
 

@@ -5,6 +5,7 @@
 #include <ctime>
 
 #include <algorithm>
+#include <array>
 #include <utility>
 
 #include "engine/base/as_size.hpp"
@@ -46,7 +47,8 @@ TimedModel::TimedModel(const Model& model, const RecordedStates& recorded,
       options_(options),
       batch_(model, recorded.environments),
       stepper_(model, options),
-      readout_(model) {
+      readout_(model),
+      outputs_(asked_fields(model)) {
   const std::vector<std::size_t> columns = columns_of(model, recorded.model);
   const std::size_t nq = as_size(model.nq()), nv = as_size(model.nv());
   const std::size_t nu = as_size(recorded.model.nu());
@@ -69,9 +71,11 @@ TimedModel::TimedModel(const Model& model, const RecordedStates& recorded,
     controls_.push_back(std::move(u));
   }
   const int read = std::min(int(kBlock), recorded.environments);
-  for (std::size_t k = 0; k < model.sensors().size(); ++k) {
+  sums_.resize(as_size(read));
+  for (const FieldOutput of : outputs_) {
     frames_.emplace_back();
-    for (int e = 0; e < read; ++e) frames_.back().emplace_back(model, static_cast<int>(k));
+    for (int e = 0; e < read && of.form != FieldForm::sum; ++e)
+      frames_.back().emplace_back(model, of.sensor, of.form);
   }
 }
 
@@ -124,12 +128,24 @@ TimedStep TimedModel::time_step(int instant) {
   return step;
 }
 
-double TimedModel::time_reading(int sensor, int instant) {
-  std::vector<DenseFrame<double>>& frames = frames_[as_size(sensor)];
+double TimedModel::interval(std::size_t reading) const {
+  const FieldOutput& of = outputs_[reading];
+  if (of.times.final) return static_cast<double>(std::max<std::int64_t>(1, recorded_.steps));
+  if (of.times.every > 0) return static_cast<double>(of.times.every);
+  return std::max(1, model().sensors()[as_size(of.sensor)].every);
+}
+
+double TimedModel::time_reading(std::size_t reading, int instant) {
+  std::vector<DenseFrame<double>>& frames = frames_[reading];
+  std::array<std::span<double>, kBlock> sums;
+  for (std::size_t e = 0; e < sums_.size(); ++e) sums[e] = sums_[e];
   restore(instant);
   const double start = cpu_seconds();
-  readout_.read_block(batch_, 0, std::span(frames));
-  return (cpu_seconds() - start) / double(frames.size());
+  if (frames.empty())
+    readout_.read_block(batch_, 0, outputs_[reading], std::span<const std::span<double>>(sums));
+  else
+    readout_.read_block(batch_, 0, std::span(frames));
+  return (cpu_seconds() - start) / double(sums_.size());
 }
 
 }  // namespace tangere

@@ -31,9 +31,12 @@ class TimedModel {
   void solve_to(double tolerance);
   /// Takes one step of all environments from an instant, and times the step alone.
   TimedStep time_step(int instant);
-  /// Reads one sensor into frames of the first block's environments, and times the reading of one
-  /// [s].
-  double time_reading(int sensor, int instant);
+  /// Readings that the scene asks for: its <outputs>, else the field of every sensor.
+  [[nodiscard]] std::span<const FieldOutput> readings() const { return outputs_; }
+  /// Steps of a run for each taking of a reading, on average.
+  [[nodiscard]] double interval(std::size_t reading) const;
+  /// Takes a reading of the first block's environments, in double, and times that of one [s].
+  double time_reading(std::size_t reading, int instant);
 
   [[nodiscard]] const Model& model() const { return batch_.model(); }
   /// What the last step or reading left.
@@ -52,8 +55,10 @@ class TimedModel {
   Readout readout_;
   std::vector<std::vector<BlockState>> starts_;  // (instants, blocks)
   std::vector<std::vector<double>> controls_;    // (instants), (E, nu) each
+  std::vector<FieldOutput> outputs_;
   std::vector<std::vector<DenseFrame<double>>>
-      frames_;  // (sensors), one per environment of a block
+      frames_;                  // (readings), one per environment of a block; none for a sum
+  std::vector<FieldSum> sums_;  // of a block's environments
 };
 
 }  // namespace tangere

@@ -61,8 +61,8 @@ void check_held(const ControlProgram& controls, const EpisodeOptions& options, i
 /// Times in rows of those in steps.
 static OutputTimes in_rows(const std::string& what, const OutputTimes& times, int every) {
   if (times.every % every != 0)
-    throw InputError(fmt::format("{} every {} steps, and a row is every {}; expected a multiple",
-                                 what, times.every, every));
+    throw InputError(fmt::format("'{}{}', and a row is every {} steps; expected a multiple of {}",
+                                 what, to_string(times), every, every));
   return {times.every / every, times.final};
 }
 
@@ -214,18 +214,16 @@ bool EpisodeSlot<T>::simulate(const StopRequest& stop,
   next_row_ += rows_;
   if (last()) collect();
   for (std::size_t name = 0; name < values_.size(); ++name)
-    observations_[name] =
-        std::span<const T>(values_[name])
-            .first(as_size(batch_->environments()) * source_.widths[name] *
-                   (taken_before(source_, name, next_row_) -
-                    taken_before(source_, name, first_row_)));
+    observations_[name] = std::span<const T>(values_[name])
+                              .first(as_size(batch_->environments()) * source_.widths[name] *
+                                     (taken_before(source_, name, next_row_) -
+                                      taken_before(source_, name, first_row_)));
   return true;
 }
 
 template <class T>
 std::span<T> EpisodeSlot<T>::numbers(std::size_t name, int episode, int row) {
-  const std::size_t width = source_.widths[name],
-                    before = taken_before(source_, name, first_row_),
+  const std::size_t width = source_.widths[name], before = taken_before(source_, name, first_row_),
                     at = taken_before(source_, name, first_row_ + row) - before,
                     rows = taken_before(source_, name, first_row_ + rows_) - before;
   return std::span(values_[name]).subspan((as_size(episode) * rows + at) * width, width);

@@ -23,10 +23,10 @@ inline constexpr int kBlockEpisodes = 16;  // lanes of a block of a Batch: one s
 struct EpisodeSource {
   const Model* model = nullptr;
   StepperOptions solver;
-  std::int64_t rows = 0;            ///< R, actions of an episode, at most
-  std::size_t action = 0;           ///< numbers in one action
-  std::vector<FieldOutput> fields;  ///< of a scene
-  std::vector<BodyRows> bodies;     ///< of a scene
+  std::int64_t rows = 0;                        ///< R, actions of an episode, at most
+  std::size_t action = 0;                       ///< numbers in one action
+  std::vector<FieldOutput> fields;              ///< of a scene
+  std::vector<BodyRows> bodies;                 ///< of a scene
   std::size_t first_body = 0, first_field = 0;  ///< indices of the first of each in widths
   /// Numbers in a row of q and of v. Then, for a scene, of the end effectors if there are any, of
   /// each of `bodies` and of each of `fields`; for a task, of each observation.
