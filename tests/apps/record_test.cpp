@@ -331,6 +331,56 @@ TEST(Record, ADataSetSamplesWhatIsNotWantedInEveryRow) {
   EXPECT_EQ(run(folder, {"validate", "some"}).exit_code, 3);
 }
 
+TEST(Record, MarkersAreRecordedWhereASensorHasThem) {
+  const Folder folder;
+  const std::string ball = scene("rolling_ball_small.xml");
+  const Outcome none = run(folder, {"simulate", ball, "-o", "x.h5", "--record", "pad.markers"});
+  EXPECT_EQ(none.exit_code, 2);
+  EXPECT_THAT(none.err, HasSubstr("--record: 'pad.markers', but "));
+  EXPECT_THAT(none.err, HasSubstr("sensor 'pad' has no <markers>; expected them in its <tactile>"));
+  std::string text = file_bytes(ball);
+  const std::size_t tag = text.find("<tactile name"), end = text.find("/>", tag);
+  text.replace(end, 2, "><markers stiffness=\"20\"/></tactile>");
+  folder.write("gel.xml", text);
+  const Words size{"--steps", "120", "--every",  "20",
+                   "--seed",  "3",   "--record", "pad,pad.markers,pad.sum"};
+  run_json(folder, Words{"simulate", "gel.xml", "-o", "gel.h5", "--envs", "17"} + size);
+  run_json(folder, Words{"simulate", ball, "-o", "plain.h5", "--envs", "17", "--steps", "120",
+                         "--every", "20", "--seed", "3", "--record", "pad"});
+  EXPECT_EQ(shape(folder, "gel.h5", "tactile/pad/markers"), (h5::Dims{6, 17, 32, 32, 2}));
+  const std::vector<double> force = numbers(folder, "gel.h5", "tactile/pad/force"),
+                            markers = numbers(folder, "gel.h5", "tactile/pad/markers");
+  EXPECT_EQ(force, numbers(folder, "plain.h5", "tactile/pad/force"));
+  double most = 0;
+  for (std::size_t k = 0; k < markers.size(); ++k) {
+    ASSERT_NEAR(markers[k], force[k / 2 * 3 + k % 2] / 20, 1e-18);
+    most = std::max(most, std::abs(markers[k]));
+  }
+  EXPECT_GT(most, 0);
+  EXPECT_EQ(
+      h5::attribute_text(
+          h5::open_dataset(h5::open_file(folder.path("gel.h5")), "tactile/pad/markers"), "units"),
+      "m");
+  run_json(folder,
+           Words{"generate", "gel.xml", "-o", "set", "--episodes", "17", "--precision", "double"} +
+               size);
+  const std::vector<double> rows =
+      numbers(folder, "set/shard-00000.h5", "data/demo_16/obs/pad.markers");
+  const std::size_t n = 32 * 32 * 2;
+  for (std::size_t row = 1; row < 6; ++row)
+    for (std::size_t k = 0; k < n; ++k)
+      ASSERT_EQ(rows[row * n + k], markers[((row - 1) * 17 + 16) * n + k]);
+  EXPECT_EQ(run(folder, {"validate", "set"}).exit_code, 0);
+  run_json(folder,
+           {"simulate", "gel.xml", "-o", "only.h5", "--steps", "20", "--record", "pad.markers"});
+  EXPECT_EQ(run(folder, {"view", "only.h5", "-o", "only.html"}).exit_code, 0);
+  EXPECT_THAT(run(folder, {"plot", "only.h5", "-o", "only.svg", "--sensor", "pad"}).err,
+              HasSubstr("recorded only the sum or markers"));
+  const Outcome check = run(folder, {"gradcheck", ball, "--loss", "markers"});
+  EXPECT_EQ(check.exit_code, 2);
+  EXPECT_THAT(check.err, HasSubstr("no sensor of the scene has <markers>"));
+}
+
 TEST(Record, TimesThatContradictEachOtherAreRefused) {
   const Folder folder;
   const std::string ball = scene("rolling_ball_small.xml");

@@ -7,11 +7,13 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <numbers>
 #include <set>
 
 #include "engine/model/effects.hpp"
 #include "engine/model/random_run.hpp"
 #include "engine/sense/readout.hpp"
+#include "engine/step/stepper.hpp"
 #include "tests/engine/pad_scene.hpp"
 
 namespace tangere {
@@ -506,6 +508,114 @@ TEST(Imperfections, MemoryIsAMeanOfEarlierFields) {
   }
 }
 
+/// A pad on a spring swings without a loss inside of a block, so its field is a cosine. A share a of
+/// the answer has the lag τ: over a swing the reading y encloses, against the ideal field x,
+///   ∮ y dx = π X² a ωτ/(1 + (ωτ)²),
+/// which vanishes for slow and for fast swings.
+TEST(Imperfections, ALateAnswerEnclosesTheLoopOfAMaxwellElement) {
+  constexpr double kShare = 0.3, kStep = 1e-3, kPeriod = 0.5, kMiddle = 2e-3, kSwing = 1e-3;
+  constexpr double kOmega = 2 * std::numbers::pi / kPeriod;
+  const std::vector<double> lags = {0.01, 0.08, 0.3};
+  Scene s;
+  s.gravity = {0, 0, 0};
+  s.timestep = kStep;
+  s.integrator = Integrator::sdirk3;
+  s.solver.tolerance = 1e-12;
+  s.links = {testing::link("pad", JointType::prismatic, {0, 0, 0},
+                           CuboidShape{{0.02, 0.02, 0.02}, {2, 2, 2}}, 1000),
+             testing::link("block", JointType::fixed, {0, 0, -0.06 + kMiddle},
+                           CuboidShape{{0.1, 0.1, 0.1}, {2, 2, 2}}, 1000)};
+  s.links[0].joint.axis0 = {0, 0, 1};
+  s.links[0].joint.stiffness = kOmega * kOmega * 8e-6 * 1000;
+  s.initial.push_back({"pad_joint", {kSwing}, {}, {}});
+  for (const double lag : lags) {
+    TactileDescription t;
+    t.name = "skin" + std::to_string(lag);
+    t.body = "pad";
+    t.coefficients = {100, 0, 0, 0};
+    t.array = {{-0.001, -0.001, -0.01}, {0.001, 0.001, -0.01}, {1, 0, 0}, {0, -1, 0}, 1, 1};
+    t.imperfections.hysteresis = kShare;
+    t.imperfections.hysteresis_time = lag;
+    s.sensors.push_back(t);
+  }
+  const Model model(s);
+  Batch batch(model, 1);
+  Stepper stepper(model);
+  Readout readout(model);
+  const int swing = int(std::lround(kPeriod / kStep));
+  std::vector<double> field(3), before_x(lags.size()), before_y(lags.size()), area(lags.size()),
+      low(lags.size(), HUGE_VAL), high(lags.size(), -HUGE_VAL);
+  // Four swings until the start is forgotten, then one more, from one step before it.
+  for (int t = 0; t <= 9 * swing; ++t) {
+    if (t > 0) stepper.step(batch, {});
+    if (t < 8 * swing - 1) continue;
+    for (std::size_t k = 0; k < lags.size(); ++k) {
+      DenseFrame<double> ideal(model, int(k), FieldForm::ideal), read(model, int(k));
+      readout.read(batch, 0, ideal), readout.read(batch, 0, read);
+      const double x = std::abs(ideal.values()[2]), y = std::abs(read.values()[2]);
+      if (t >= 8 * swing) area[k] += 0.5 * (y + before_y[k]) * (x - before_x[k]);
+      low[k] = std::min(low[k], x), high[k] = std::max(high[k], x);
+      before_x[k] = x, before_y[k] = y;
+    }
+  }
+  for (std::size_t k = 0; k < lags.size(); ++k) {
+    const double amplitude = 0.5 * (high[k] - low[k]), w = kOmega * lags[k];
+    EXPECT_NEAR(amplitude, 100 * kSwing, 1e-3 * 100 * kSwing);
+    const double expected = std::numbers::pi * amplitude * amplitude * kShare * w / (1 + w * w);
+    EXPECT_NEAR(std::abs(area[k]), expected, 0.02 * expected) << lags[k];
+  }
+  EXPECT_GT(std::abs(area[1]), 2 * std::abs(area[0])) << "slow against the lag";
+  EXPECT_GT(std::abs(area[1]), 2 * std::abs(area[2])) << "fast against the lag";
+}
+
+/// A force that is held is read as it is, and what no share is late is ideal.
+TEST(Imperfections, ALateAnswerKeepsWhatIsHeld) {
+  for (const double low_pass : {0.0, 0.01}) {
+    const Model model(imperfect_scene([&](auto& i) {
+      i.hysteresis = 0.4, i.hysteresis_time = 0.03, i.low_pass = low_pass, i.delay = 0.0125;
+    }));
+    Batch batch(model, 3, 3);
+    touch(batch);
+    for (int e = 0; e < 3; ++e) {
+      const Numbers ideal = field_of(batch, e, FieldForm::ideal), read = field_of(batch, e);
+      for (std::size_t i = 0; i < read.size(); ++i)
+        EXPECT_NEAR(read[i], ideal[i], 1e-14 + 1e-13 * std::abs(ideal[i]));
+    }
+  }
+  const Model off(imperfect_scene([](auto&i) { i.hysteresis = i.hysteresis_time = 0; })),
+      plain(imperfect_scene([](auto&) {}));
+  EXPECT_EQ(off.state_bytes_per_environment(), plain.state_bytes_per_environment());
+  EXPECT_FALSE(off.sensors()[0].imperfect);
+}
+
+/// What is late comes from states that blocks keep: a block that is restored goes on alike.
+TEST(Imperfections, ALateAnswerGoesOnFromASavedBlock) {
+  const Model model(imperfect_scene([](auto& i) { i.hysteresis = 0.5, i.hysteresis_time = 0.02; }));
+  Batch batch(model, 18, 3);
+  touch(batch);
+  Stepper stepper(model);
+  const Numbers u(18 * std::size_t(model.nu()));
+  for (int t = 0; t < 9; ++t) stepper.step(batch, u);
+  const BlockState saved = batch.save_block(1);
+  std::vector<Numbers> first;
+  for (int t = 0; t < 6; ++t) {
+    stepper.step(batch, u);
+    first.push_back(field_of(batch, 17));
+  }
+  batch.restore_block(1, saved);
+  double late = 0;
+  for (int t = 0; t < 6; ++t) {
+    stepper.step(batch, u);
+    EXPECT_EQ(field_of(batch, 17), first[std::size_t(t)]);
+    const Numbers ideal = field_of(batch, 17, FieldForm::ideal);
+    for (std::size_t i = 0; i < ideal.size(); ++i)
+      late = std::max(late, std::abs(ideal[i] - first[std::size_t(t)][i]));
+  }
+  EXPECT_GT(late, 0);
+  batch.reset(17, 1);
+  EXPECT_EQ(batch.steps(17), 0) << "an episode begins anew";
+}
+
 TEST(Imperfections, ValuesOutOfRangeAreRefused) {
   const auto refused = [](const std::function<void(SensorImperfections&)>& set, Pad pad,
                           const std::string& text) {
@@ -526,6 +636,12 @@ TEST(Imperfections, ValuesOutOfRangeAreRefused) {
   refused([](auto& i) { i.crosstalk = 0.3; }, Pad::flat, "0 to 0.25");
   refused([](auto& i) { i.crosstalk = 0.1; }, Pad::curved, "crosstalk on a list of points");
   refused([](auto& i) { i.spread = 0.1; }, Pad::curved, "spread on a list of points");
+  refused([](auto& i) { i.hysteresis = 0.1; }, Pad::flat,
+          "hysteresis=\"0.1\" with hysteresis_time=\"0\" s; expected both above 0, or neither");
+  refused([](auto& i) { i.hysteresis_time = 0.1; }, Pad::flat, "expected both above 0");
+  refused([](auto& i) { i.hysteresis = 1.5, i.hysteresis_time = 0.1; }, Pad::flat, "from 0 to 1");
+  refused([](auto& i) { i.hysteresis = 0.5, i.hysteresis_time = 100; }, Pad::flat,
+          "steps of 0.005 s back");
   refused([](auto& i) { i.delay = 100; }, Pad::flat, "steps of 0.005 s back; expected less than");
 }
 
