@@ -10,8 +10,10 @@
 #include "apps/inspect_effects.hpp"
 #include "apps/inspect_joints.hpp"
 #include "apps/inspect_task.hpp"
+#include "apps/machine.hpp"
 #include "apps/scene_run.hpp"
 #include "apps/task_run.hpp"
+#include "apps/text_output.hpp"
 #include "engine/model/model.hpp"
 #include "engine/step/control.hpp"
 #include "engine/step/stepper.hpp"
@@ -24,7 +26,8 @@ namespace {
 struct InspectArguments {
   std::string scene;
   bool allow_unknown = false;
-  bool effects = false;
+  bool effects = false, overwrite = false;
+  std::string svg;
 };
 
 std::string parent_name(const Scene& scene, const LinkDescription& link) {
@@ -214,10 +217,18 @@ int report(const Model& model, const TaskSpec* task, const InspectArguments& opt
   Json result = as_json(model);
   result["task"] = task != nullptr ? task_json(*task) : Json();
   if (options.effects) {
+    TextOutput svg(options.svg, options.overwrite);
     const EffectCosts costs = measure_effects(model);
+    if (svg.wanted())
+      svg.write(
+          effect_costs_svg(costs, model.scene().name,
+                           fmt::format("{}, {}", processor_name(), kernels::active_isa_name())),
+          console);
     console.print(effect_costs_text(costs, kernels::active_isa_name()));
     result["effect_costs"] = effect_costs_json(costs);
+    result["run_costs"] = run_costs_json(costs);
     result["effect_measurement"] = effect_measurement_json(costs);
+    result["svg"] = options.svg.empty() ? Json() : Json(options.svg);
   } else {
     if (task != nullptr) console.print(task_text(*task));
     console.print(as_text(model));
@@ -227,6 +238,9 @@ int report(const Model& model, const TaskSpec* task, const InspectArguments& opt
 }
 
 int inspect(const InspectArguments& options, const Console& console) {
+  if (!options.svg.empty() && !options.effects)
+    throw InputError("--svg without --effects; expected both");
+  check_outputs(options.svg, "", {options.scene});
   if (const std::unique_ptr<Task> task = find_task(options.scene, console)) {
     refuse_with_task(*task, {{"--allow-unknown", options.allow_unknown}});
     return report(task->model(), &task->spec(), options, console);
@@ -249,6 +263,8 @@ Command add_inspect(CLI::App& program) {
            "Unknown elements and attributes are warnings, not errors");
   add_flag(app, "--effects", options->effects,
            "Measure what each effect of the scene costs, and print that instead");
+  add_text(app, "--svg", options->svg, "F.svg", "With --effects: write a picture of it");
+  add_flag(app, "--overwrite", options->overwrite, "Replace the picture if it exists");
   add_console_options(app, *console);
   return {&app, [=](const ProgramInfo&) { return inspect(*options, *console); }};
 }

@@ -464,7 +464,8 @@ Command add_simulate(CLI::App& program) {
   add_text(
       app, "--record", o.record, "LIST",
       "What to compute and store besides q and v, separated by commas: bodies or bodies.NAME, "
-      "variables, a sensor's field (pad), pad.pressure, pad.shear, pad.sum or pad.ideal; NAME/10 "
+      "variables, a sensor's field (pad), pad.pressure, pad.shear, pad.sum, pad.ideal or "
+      "pad.markers; NAME/10 "
       "every 10th step, NAME/final at the end, of q and v too [default: the scene's <outputs>, or "
       "all]");
   add_flag(app, "--audit", o.audit,

@@ -137,6 +137,7 @@ EffectCosts measure_effects(const Model& model, const EffectCostOptions& options
       costs.effects.push_back(measure(m, info));
     }
   }
+  costs.of_runs = measure_run_costs(m.timed, m.times, kLeastRounds);
   return costs;
 }
 

@@ -2,8 +2,6 @@
 // Recorded states become blocks of the model's own layout once; a sweep only restores them.
 #include "tasks/effects/timed_model.hpp"
 
-#include <ctime>
-
 #include <algorithm>
 #include <array>
 #include <utility>
@@ -11,6 +9,7 @@
 #include "engine/base/as_size.hpp"
 #include "engine/base/error.hpp"
 #include "kernels/numbers/block.hpp"
+#include "tasks/effects/thread_time.hpp"
 
 namespace tangere {
 namespace {
@@ -18,14 +17,6 @@ namespace {
 using kernels::kBlock;
 /// Environments that are solved together; half a block.
 constexpr int kLanesOfGroup = kBlock / 2;
-
-/// Returns the CPU time of this thread [s], which other processes do not disturb as they do the
-/// wall clock.
-double cpu_seconds() {
-  std::timespec now{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-}
 
 /// Controls have the names of the dofs that they drive, so a name stands for one control.
 std::vector<std::size_t> columns_of(const Model& model, const Model& of) {
@@ -103,12 +94,19 @@ void TimedModel::solve_to(double tolerance) {
   stepper_ = Stepper(model(), options_);
 }
 
+int TimedModel::show(int instant) {
+  restore(instant);
+  int live = 0;
+  for (int e = 0; e < batch_.environments(); ++e) live += batch_.held(e) ? 0 : 1;
+  return live;
+}
+
 TimedStep TimedModel::time_step(int instant) {
   TimedStep step;
   restore(instant);
-  const double start = cpu_seconds();
+  const double start = thread_seconds();
   stepper_.step(batch_, controls_[as_size(instant)]);
-  step.seconds = cpu_seconds() - start;
+  step.seconds = thread_seconds() - start;
   std::int32_t most = 0;
   int groups = 0;
   for (int e = 0; e < batch_.environments(); ++e) {
@@ -140,12 +138,12 @@ double TimedModel::time_reading(std::size_t reading, int instant) {
   std::array<std::span<double>, kBlock> sums;
   for (std::size_t e = 0; e < sums_.size(); ++e) sums[e] = sums_[e];
   restore(instant);
-  const double start = cpu_seconds();
+  const double start = thread_seconds();
   if (frames.empty())
     readout_.read_block(batch_, 0, outputs_[reading], std::span<const std::span<double>>(sums));
   else
     readout_.read_block(batch_, 0, std::span(frames));
-  return (cpu_seconds() - start) / double(sums_.size());
+  return (thread_seconds() - start) / double(sums_.size());
 }
 
 }  // namespace tangere

@@ -39,7 +39,15 @@ class TimedModel {
   double time_reading(std::size_t reading, int instant);
 
   [[nodiscard]] const Model& model() const { return batch_.model(); }
-  /// What the last step or reading left.
+  /// Puts the batch into the states of an instant. Returns how many environments have not failed.
+  int show(int instant);
+  /// (E, nu) of the step that follows an instant.
+  [[nodiscard]] std::span<const double> controls(int instant) const {
+    return controls_[static_cast<std::size_t>(instant)];
+  }
+  [[nodiscard]] const StepperOptions& options() const { return options_; }
+  [[nodiscard]] std::int64_t run_steps() const { return recorded_.steps; }
+  /// What the last step, reading or show() left.
   [[nodiscard]] const Batch& batch() const { return batch_; }
 
   [[nodiscard]] int instants() const { return static_cast<int>(starts_.size()); }

@@ -545,15 +545,15 @@ TEST(Imperfections, ALateAnswerEnclosesTheLoopOfAMaxwellElement) {
   const int swing = int(std::lround(kPeriod / kStep));
   std::vector<double> field(3), before_x(lags.size()), before_y(lags.size()), area(lags.size()),
       low(lags.size(), HUGE_VAL), high(lags.size(), -HUGE_VAL);
-  // Four swings until the start is forgotten, then one more, from one step before it.
-  for (int t = 0; t <= 9 * swing; ++t) {
+  // Five swings until the start is forgotten, then one more, from one step before it.
+  for (int t = 0; t <= 6 * swing; ++t) {
     if (t > 0) stepper.step(batch, {});
-    if (t < 8 * swing - 1) continue;
+    if (t < 5 * swing - 1) continue;
     for (std::size_t k = 0; k < lags.size(); ++k) {
       DenseFrame<double> ideal(model, int(k), FieldForm::ideal), read(model, int(k));
       readout.read(batch, 0, ideal), readout.read(batch, 0, read);
       const double x = std::abs(ideal.values()[2]), y = std::abs(read.values()[2]);
-      if (t >= 8 * swing) area[k] += 0.5 * (y + before_y[k]) * (x - before_x[k]);
+      if (t >= 5 * swing) area[k] += 0.5 * (y + before_y[k]) * (x - before_x[k]);
       low[k] = std::min(low[k], x), high[k] = std::max(high[k], x);
       before_x[k] = x, before_y[k] = y;
     }
