@@ -406,6 +406,31 @@ TEST(Command, InspectTellsPeopleAndProgramsTheSame) {
     EXPECT_THAT(text.out, HasSubstr(name.get<std::string>()));
 }
 
+TEST(Command, InspectDrawsWhereTheTimeGoesAndFollowsOutputs) {
+  const Folder folder;
+  std::string text = file_bytes(scene("rolling_ball_small.xml"));
+  text.insert(text.find("</tangere>"), "<outputs record=\"pad.sum/20,q/10\"/>\n");
+  folder.write("ball.xml", text);
+  const Outcome outcome =
+      run(folder, {"inspect", "ball.xml", "--effects", "--svg", "effects.svg", "--json"});
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  const json answer = json::parse(outcome.out);
+  EXPECT_EQ(answer.at("svg"), "effects.svg");
+  const std::string svg = file_bytes(folder.path("effects.svg"));
+  for (const char* part : {">contact pad ball<", ">tactile pad<", ">audit<", "Newton passes"})
+    EXPECT_THAT(svg, HasSubstr(part));
+  EXPECT_EQ(answer.at("effect_costs").at("tactile pad").at("bytes"), 6 * 8 + 8)
+      << "a sum, and kt that varies";
+  const json& runs = answer.at("run_costs");
+  EXPECT_THAT(runs[0].at("asked_by").get<std::string>(), HasSubstr("'q/10'"));
+  EXPECT_EQ(runs[1].at("on"), false) << "<outputs> leaves bodies out";
+  EXPECT_EQ(run(folder, {"inspect", "ball.xml", "--effects", "--svg", "effects.svg"}).exit_code, 3)
+      << "it exists";
+  const Outcome alone = run(folder, {"inspect", "ball.xml", "--svg", "x.svg"});
+  EXPECT_EQ(alone.exit_code, 2);
+  EXPECT_THAT(alone.err, HasSubstr("--svg without --effects; expected both"));
+}
+
 /// Times are never compared here, only that they are there.
 TEST(Command, InspectMeasuresWhatEffectsCost) {
   const Folder folder;
@@ -453,6 +478,15 @@ TEST(Command, InspectMeasuresWhatEffectsCost) {
   for (const char* words : {"called for by", "contact pad ball friction", "tactile pad shear",
                             "off, at no cost: joint springs (0 joints)", "kernel: "})
     EXPECT_THAT(outcome.err, HasSubstr(words));
+  EXPECT_TRUE(answer.at("svg").is_null());
+  std::vector<std::string> names;
+  for (const json& cost : answer.at("run_costs")) {
+    names.push_back(cost.at("name"));
+    EXPECT_GT(cost.at("seconds"), 0) << names.back();
+    EXPECT_GT(cost.at("bytes"), 0) << names.back();
+  }
+  EXPECT_EQ(names, (std::vector<std::string>{"rows of q and v", "rows of bodies", "audit",
+                                             "gradients of a loss"}));
 }
 
 TEST(Command, GradcheckTellsPeopleAndProgramsTheSame) {
