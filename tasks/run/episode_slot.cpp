@@ -91,9 +91,13 @@ EpisodeSource shape_of(const Model& model, const EpisodeOptions& options) {
         options.end_effectors.times);
   s.first_body = s.widths.size();
   s.bodies = options.bodies;
-  for (const BodyRows& some : s.bodies)
+  for (const BodyRows& some : s.bodies) {
+    for (const int body : some.bodies)
+      if (body < 0 || body >= model.nb())
+        throw InputError(fmt::format("rows of body {}; the scene has {} bodies", body, model.nb()));
     add("bodies", kMotion * (some.bodies.empty() ? as_size(model.nb()) : some.bodies.size()), true,
         some.times);
+  }
   s.first_field = s.widths.size();
   s.fields = options.fields ? *options.fields : whole_fields(model);
   check_outputs(s.fields, model.sensors().size());

@@ -122,6 +122,14 @@ class Recorder {
   std::vector<std::int8_t> status_;
 };
 
+/// Throws InputError for a body that is not there.
+void check_bodies(const Model& model, const std::vector<int>& bodies) {
+  for (const int body : bodies)
+    if (body < 0 || body >= model.nb())
+      throw InputError("an output of body " + std::to_string(body) + "; the scene has " +
+                       std::to_string(model.nb()));
+}
+
 void check(const RolloutOptions& options) {
   if (options.steps < 1)
     throw InputError("a rollout of " + std::to_string(options.steps) +
@@ -197,6 +205,7 @@ RolloutSummary run_rollout(Batch& batch, Stepper& stepper, EpisodeProgram& progr
                            const RolloutOptions& options, RowSink& sink,
                            const RolloutProgress& progress) {
   check(options);
+  check_bodies(batch.model(), options.outputs.chosen_bodies);
   check_sensor_memory(batch.model(), stepper.timestep());
   const auto start = std::chrono::steady_clock::now();
   Recorder recorder(batch, options, sink);

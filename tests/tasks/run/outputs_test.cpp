@@ -204,7 +204,13 @@ TEST(Outputs, EpisodesHoldWhatIsTakenAndComputeNothingElse) {
     }
   }
   o.fields = {{0, FieldForm::field, {3}}};
+  EXPECT_THROW(played(o), InputError) << "a row is two steps";
+  o.fields.reset();
+  o.bodies = {{{model.nb()}, {}}};
   EXPECT_THROW(played(o), InputError);
+  RolloutOutputs nobody;
+  nobody.chosen_bodies = {-1};
+  EXPECT_THROW(handed(model, nobody), InputError);
 }
 
 }  // namespace
