@@ -217,10 +217,11 @@ std::vector<std::int64_t> whole_numbers(const Folder& folder, const std::string&
 TEST(Record, ATrajectoryHoldsItsEndAloneOrEveryKthRow) {
   const Folder folder;
   const std::string ball = scene("rolling_ball_small.xml");
-  simulate(folder, ball, "whole.h5", {"--record", "bodies,pad,pad.sum", "--every", "20"});
-  const json said =
-      simulate(folder, ball, "some.h5",
-               {"--record", "q/final,pad/40,pad.sum,bodies.ball/60", "--every", "20"});
+  const Words words{"simulate", ball,     "--steps", "120",    "--every",
+                    "20",       "--envs", "2",       "--seed", "3"};
+  run_json(folder, words + Words{"-o", "whole.h5", "--record", "bodies,pad,pad.sum"});
+  const json said = run_json(
+      folder, words + Words{"-o", "some.h5", "--record", "q/final,pad/40,pad.sum,bodies.ball/60"});
   EXPECT_EQ(said["sensors"][0]["every"], 40);
   EXPECT_EQ(said["sensors"][0]["frames"], 3);
   EXPECT_EQ(said["sensors"][1]["frames"], 6);
