@@ -6,13 +6,14 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <functional>
 #include <limits>
+#include <numeric>
 #include <span>
 #include <string_view>
 
 #include "engine/base/error.hpp"
 #include "io/hdf5/h5.hpp"
-#include "io/trajectory/state_steps.hpp"
 
 namespace tangere {
 namespace {
@@ -65,7 +66,34 @@ void check_names(const SavedState& from, const char* what, const std::vector<std
                                    from.path, i, what, names[i], expected[i]));
 }
 
+/// Those of an open file of `steps` steps.
+std::vector<std::int64_t> steps_of_states(const h5::Id& file, std::int64_t steps) {
+  std::vector<std::int64_t> list;
+  if (!h5::has_link(file, "step")) {
+    list.resize(static_cast<std::size_t>(steps) + 1);
+    std::iota(list.begin(), list.end(), std::int64_t{0});
+    return list;
+  }
+  const h5::Id dataset = h5::open_dataset(file, "step");
+  const h5::Dims dims = h5::dimensions(dataset);
+  const bool fits = dims.size() == 1 && dims[0] <= static_cast<hsize_t>(steps) + 1;
+  if (fits) list.resize(dims[0]);
+  if (!list.empty()) h5::read_box<std::int64_t>(dataset, {0}, {dims[0]}, list.data());
+  const bool ascends =
+      std::adjacent_find(list.begin(), list.end(), std::greater_equal<>()) == list.end();
+  if (!fits || !ascends || (!list.empty() && (list.front() < 0 || list.back() > steps)))
+    throw IoError(fmt::format("{}: expected ascending steps from 0 to {}: the file is damaged",
+                              h5::place_of(dataset), steps));
+  return list;
+}
+
 }  // namespace
+
+std::vector<std::int64_t> state_steps(const std::string& path) {
+  const h5::Id file = h5::open_file(path);
+  return steps_of_states(
+      file, within(path, "steps", h5::read_number<std::int64_t>(file, "steps"), 0, kMost));
+}
 
 SavedState read_state(const std::string& path, std::optional<std::int64_t> row) {
   const h5::Id file = h5::open_file(path);
@@ -77,7 +105,7 @@ SavedState read_state(const std::string& path, std::optional<std::int64_t> row) 
     return within(path, name, h5::read_number<std::int64_t>(file, name), least, most);
   };
   const std::int64_t steps = number("steps", 0, kMost);
-  const std::vector<std::int64_t> rows = state_steps(file, steps);
+  const std::vector<std::int64_t> rows = steps_of_states(file, steps);
   state.row = row.value_or(rows.empty() ? steps : rows.back());
   if (state.row < 0 || state.row > steps)
     throw InputError(fmt::format("row {} of {}; expected 0 to {}", state.row, path, steps));

@@ -5,7 +5,7 @@
 #include <algorithm>
 
 #include "engine/base/error.hpp"
-#include "io/trajectory/state_steps.hpp"
+#include "io/trajectory/saved_state.hpp"
 #include "io/trajectory/trajectory_reader.hpp"
 #include "io/view/view_source.hpp"
 
@@ -35,7 +35,7 @@ class TrajectoryView {
       throw IoError(
           fmt::format("{}: {} steps of {} environments after {} steps: the file is damaged", path,
                       steps_, fields_.environments(), first_step_));
-    state_steps_ = state_steps(file_, steps_);
+    state_steps_ = state_steps(path);
     listed_ = h5::has_link(file_, "step");
     if (state_steps_.empty())
       throw IoError(path + ": the run recorded no state, so nothing says where bodies are");
