@@ -70,6 +70,10 @@ void check_names(const SavedState& from, const char* what, const std::vector<std
 std::vector<std::int64_t> steps_of_states(const h5::Id& file, std::int64_t steps) {
   std::vector<std::int64_t> list;
   if (!h5::has_link(file, "step")) {
+    const h5::Dims states = h5::dimensions(h5::open_dataset(file, "q"));
+    if (states.empty() || states[0] != static_cast<hsize_t>(steps) + 1)
+      throw IoError(fmt::format("{}: the states are damaged: expected {} rows of q",
+                                h5::place_of(file), steps + 1));
     list.resize(static_cast<std::size_t>(steps) + 1);
     std::iota(list.begin(), list.end(), std::int64_t{0});
     return list;

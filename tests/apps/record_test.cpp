@@ -120,6 +120,31 @@ TEST(Record, DamagedReadingsEndInAMessage) {
   EXPECT_THAT(empty.err, HasSubstr("sensor 'pad' has no reading"));
 }
 
+TEST(Record, ADamagedListOfStepsEndsInAMessage) {
+  const Folder folder;
+  simulate(folder, scene("rolling_ball_small.xml"), "run.h5", {"--record", "q/60,pad"});
+  const auto with = [&](std::vector<std::int64_t> steps) {
+    const hid_t file = H5Fopen(folder.path("run.h5").c_str(), H5F_ACC_RDWR, H5P_DEFAULT);
+    const hid_t list = H5Dopen2(file, "step", H5P_DEFAULT);
+    H5Dwrite(list, H5T_NATIVE_INT64, H5S_ALL, H5S_ALL, H5P_DEFAULT, steps.data());
+    H5Dclose(list);
+    H5Fclose(file);
+  };
+  for (const std::vector<std::int64_t>& steps :
+       {std::vector<std::int64_t>{0, 60, 121}, {60, 0, 120}, {-1, 60, 120}, {0, 60, 60}}) {
+    with(steps);
+    for (const Words& words : {Words{"view", "run.h5", "-o", "run.html", "--overwrite"},
+                               Words{"simulate", scene("rolling_ball_small.xml"), "-o", "x.h5",
+                                     "--state-from", "run.h5", "--steps", "1"}}) {
+      const Outcome outcome = run(folder, words);
+      EXPECT_EQ(outcome.exit_code, 3) << outcome.err;
+      EXPECT_THAT(outcome.err, HasSubstr("expected ascending steps from 0 to 120"));
+    }
+  }
+  with({0, 60, 120});
+  EXPECT_EQ(run(folder, {"view", "run.h5", "-o", "run.html"}).exit_code, 0);
+}
+
 TEST(Record, ADataSetHoldsTheFormsOfAWholeOne) {
   const Folder folder;
   const std::string ball = scene("rolling_ball_small.xml");
