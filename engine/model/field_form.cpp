@@ -135,7 +135,12 @@ std::vector<std::string> output_names(std::span<const std::string> sensors) {
 }
 
 std::vector<std::string> output_names(const Scene& scene) {
-  std::vector<std::string> names = output_names(sensor_names(scene));
+  const std::vector<std::string> sensors = sensor_names(scene);
+  std::vector<std::string> names = output_names(sensors);
+  std::erase_if(names, [&](const std::string& name) {
+    const std::optional<FieldOutput> of = find_output(sensors, name);
+    return of && !reason_against(scene, *of).empty();
+  });
   for (const LinkDescription& link : scene.links) names.push_back(body_output(link.body.name));
   return names;
 }

@@ -119,19 +119,22 @@ TEST(LateAnswer, KeepsWhatIsHeld) {
         EXPECT_NEAR(read[i], ideal[i], 1e-14 + 1e-13 * std::abs(ideal[i]));
     }
   }
-  const Model off(imperfect_scene([](auto&i) { i.hysteresis = i.hysteresis_time = 0; })),
-      plain(imperfect_scene([](auto&) {}));
+  Scene scene = late_scene(0, 0, 0);
+  scene.sensors[0].imperfections.delay = 0;
+  const Model off(scene);
+  scene.sensors[0].imperfections = {};
+  const Model plain(scene);
   EXPECT_EQ(off.state_bytes_per_environment(), plain.state_bytes_per_environment());
   EXPECT_FALSE(off.sensors()[0].imperfect);
 }
 
 /// What is late comes from states that blocks keep: a block that is restored goes on alike.
 TEST(LateAnswer, GoesOnFromASavedBlock) {
-  const Model model(imperfect_scene([](auto& i) { i.hysteresis = 0.5, i.hysteresis_time = 0.02; }));
-  Batch batch(model, 18, 3);
-  touch(batch);
+  const Model model(late_scene(0.5, 0.02, 0));
+  Batch batch = touching(model, 32);
+  Readout readout(model);
   Stepper stepper(model);
-  const Numbers u(18 * std::size_t(model.nu()));
+  const std::vector<double> u(32 * std::size_t(model.nu()));
   for (int t = 0; t < 9; ++t) stepper.step(batch, u);
   const BlockState saved = batch.save_block(1);
   std::vector<std::vector<double>> first;  // of all environments of block 1

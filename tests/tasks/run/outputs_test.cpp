@@ -13,6 +13,7 @@ namespace {
 
 using namespace testing;
 using kernels::KernelTable;
+using ::testing::ElementsAre;
 
 std::atomic<int> whole_calls{0}, pressure_calls{0};
 const KernelTable* counted = nullptr;
