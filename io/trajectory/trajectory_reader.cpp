@@ -22,7 +22,7 @@ constexpr hsize_t kMostPoints = hsize_t{1} << 26;              // of a sensor
 struct TrajectoryReader::Impl {
   std::string path, scene_name;
   h5::Id file;
-  std::int64_t environments = 0, steps = 0;
+  std::int64_t environments = 0, steps = 0, first_step = 0;
   double timestep = 0;
   std::vector<SensorLayout> sensors;
   std::vector<std::vector<FieldForm>> forms;  // (sensors) what was recorded
@@ -38,6 +38,7 @@ struct TrajectoryReader::Impl {
     environments = h5::read_number<std::int64_t>(file, "environments");
     timestep = h5::read_number<double>(file, "timestep");
     steps = h5::read_number<std::int64_t>(file, "steps");
+    first_step = h5::read_number<std::int64_t>(file, "first_step");
     if (!h5::has_link(file, "tactile")) return;
     const h5::Id group = h5::open_group(file, "tactile");
     H5G_info_t info;
@@ -186,6 +187,7 @@ const std::string& TrajectoryReader::path() const { return impl_->path; }
 const std::string& TrajectoryReader::scene_name() const { return impl_->scene_name; }
 std::int64_t TrajectoryReader::environments() const { return impl_->environments; }
 double TrajectoryReader::timestep() const { return impl_->timestep; }
+std::int64_t TrajectoryReader::first_step() const { return impl_->first_step; }
 const std::vector<SensorLayout>& TrajectoryReader::sensors() const { return impl_->sensors; }
 
 std::size_t TrajectoryReader::find_sensor(const std::string& name) const {
@@ -202,6 +204,9 @@ std::size_t TrajectoryReader::find_sensor(const std::string& name) const {
   throw InputError(impl_->path + ": no sensor is named '" + name + "'" + suggestion(name, names));
 }
 
+bool TrajectoryReader::has_field(std::size_t sensor) const {
+  return components_of(impl_->forms[sensor].front()) == 3;
+}
 bool TrajectoryReader::has_pressure(std::size_t sensor) const {
   return impl_->forms[sensor].front() != FieldForm::shear;
 }
