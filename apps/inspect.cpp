@@ -82,14 +82,17 @@ Json as_json(const Model& model) {
                       {"bytes", m.bytes},
                       {"error", m.error},
                       {"unresolved", m.unresolved}});
-  for (const SensorInfo& s : model.sensors())
+  for (std::size_t k = 0; k < model.sensors().size(); ++k) {
+    const SensorInfo& s = model.sensors()[k];
     sensors.push_back({{"name", s.name},
                        {"body", s.body},
                        {"rows", s.rows},
                        {"cols", s.cols},
                        {"points", s.points},
                        {"every", s.every},
-                       {"pressure_sign", s.pressure_sign}});
+                       {"pressure_sign", s.pressure_sign},
+                       {"markers", scene.sensors[k].markers.has_value()}});
+  }
   Json end_effectors = Json::array();
   for (const EndEffectorInfo& v : model.end_effectors())
     end_effectors.push_back({{"name", v.name}, {"joint", v.joint}});
@@ -151,12 +154,15 @@ std::string bodies_text(const Model& model) {
 
 std::string sensors_text(const Model& model) {
   std::string text = fmt::format("sensors ({})\n", model.sensors().size());
-  for (const SensorInfo& s : model.sensors())
-    text += fmt::format("  {} on {}: {}, read {}, pressure reads {}\n", s.name, s.body,
+  for (std::size_t k = 0; k < model.sensors().size(); ++k) {
+    const SensorInfo& s = model.sensors()[k];
+    text += fmt::format("  {} on {}: {}, read {}, pressure reads {}{}\n", s.name, s.body,
                         s.rows > 0 ? fmt::format("{} x {} = {} points", s.rows, s.cols, s.points)
                                    : fmt::format("{} point{}", s.points, s.points == 1 ? "" : "s"),
                         s.every > 0 ? fmt::format("every {} steps", s.every) : "every step",
-                        s.pressure_sign > 0 ? "positive (+1)" : "negative (-1)");
+                        s.pressure_sign > 0 ? "positive (+1)" : "negative (-1)",
+                        model.scene().sensors[k].markers ? ", markers" : "");
+  }
   return text;
 }
 

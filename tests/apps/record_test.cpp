@@ -368,6 +368,8 @@ TEST(Record, MarkersAreRecordedWhereASensorHasThem) {
   const std::size_t tag = text.find("<tactile name"), end = text.find("/>", tag);
   text.replace(end, 2, "><markers stiffness=\"20\"/></tactile>");
   folder.write("gel.xml", text);
+  EXPECT_EQ(run_json(folder, {"inspect", "gel.xml"}).at("sensors")[0].at("markers"), true);
+  EXPECT_EQ(run_json(folder, {"inspect", ball}).at("sensors")[0].at("markers"), false);
   const Words size{"--steps", "120", "--every",  "20",
                    "--seed",  "3",   "--record", "pad,pad.markers,pad.sum"};
   run_json(folder, Words{"simulate", "gel.xml", "-o", "gel.h5", "--envs", "17"} + size);
