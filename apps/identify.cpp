@@ -163,7 +163,7 @@ Command add_identify(CLI::App& program) {
   IdentifyArguments& a = *arguments;
   CLI::App& app = add_command(
       program, "identify", "Find numbers of a scene from recorded tactile fields",
-      "tangere identify skin.xml recording.h5 --number 'tactile pad kn' --number 'tactile pad mu'");
+      "tangere identify scenes/identify_ball.xml --number 'tactile pad kn' --svg fit.svg");
   add_text(app, "SCENE", a.scene, "", "Scene with the numbers where you would guess them")
       .required();
   add_text(app, "RECORDING", a.recording, "",
