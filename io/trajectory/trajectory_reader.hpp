@@ -28,7 +28,7 @@ class TrajectoryReader {
   /// Index of a sensor; "" is the first. Throws InputError that names the sensors of the file.
   [[nodiscard]] std::size_t find_sensor(const std::string& name) const;
   [[nodiscard]] std::int64_t frames(std::size_t sensor) const;
-  /// Returns the row of /q from which a frame was read.
+  /// Returns the steps of the run before a frame was read: the row of /q, where each is recorded.
   [[nodiscard]] std::int64_t step(std::size_t sensor, std::int64_t frame) const;
   /// Whether whole fields were recorded, and whether the numbers along the normal and those across
   /// it were.
