@@ -69,7 +69,11 @@ void check_sensor(const TrajectoryReader& file, std::size_t s, const SensorInfo&
   if (found.every != every)
     throw InputError(fmt::format("{} was read every {} steps; expected every {}, as in the scene",
                                  where, found.every, every));
-  if (file.frames(s) == 0) throw InputError(where + " has no field");
+  const std::int64_t frames = file.frames(s);
+  if (frames == 0) throw InputError(where + " has no field");
+  if (file.step(s, 0) != every || file.step(s, frames - 1) != frames * every)
+    throw InputError(fmt::format("{} has {} fields of steps {} to {}; expected all of them", where,
+                                 frames, file.step(s, 0), file.step(s, frames - 1)));
 }
 
 /// Reads the fields of all sensors of the scene.

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Weights of a low-pass and of a late answer end where less than a thousandth is left; then they are
-// scaled so that they sum to 1.
+// Weights of a low-pass and of a late answer end where less than a thousandth is left; then they
+// are scaled so that they sum to 1.
 #include "engine/model/compile_imperfections.hpp"
 
 #include <fmt/format.h>

@@ -44,7 +44,8 @@ struct FieldOutput {
   friend bool operator==(const FieldOutput&, const FieldOutput&) = default;
 };
 
-/// Returns "pad" for a field, else "pad.pressure", "pad.shear", "pad.sum", "pad.ideal" or "pad.markers".
+/// Returns "pad" for a field, else "pad.pressure", "pad.shear", "pad.sum", "pad.ideal" or
+/// "pad.markers".
 std::string output_name(const std::string& sensor, FieldForm form);
 /// Returns the names of a scene's sensors, in file order.
 std::vector<std::string> sensor_names(const Scene& scene);

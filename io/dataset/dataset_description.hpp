@@ -44,8 +44,8 @@ struct SampleSaid {
   OutputTimes times;      ///< in rows
   std::int64_t rows = 0;  ///< of an episode
 };
-/// Returns them in the order of the file; most have none. `every`: steps of a row; `rows`: R. Throws
-/// IoError for times that contradict them.
+/// Returns them in the order of the file; most have none. `every`: steps of a row; `rows`: R.
+/// Throws IoError for times that contradict them.
 std::vector<SampleSaid> samples_said(const h5::Id& scene, std::int64_t every, std::int64_t rows);
 
 /// Returns the numbers of the demos in an open /data, ascending.

@@ -114,9 +114,9 @@ struct DatasetLayout {
   /// most one.
   [[nodiscard]] EpisodeRange shard_episodes(std::int64_t shard) const;
   [[nodiscard]] std::int64_t shard_of(std::int64_t episode) const;
-  /// Throws InputError when a time is no multiple of K, when a sensor's name cannot be a name in a file, when set_name has
-  /// characters that Minari refuses, when there are more shards than blocks or than kMostShards, or
-  /// when an observation to record does not exist.
+  /// Throws InputError when a time is no multiple of K, when a sensor's name cannot be a name in a
+  /// file, when set_name has characters that Minari refuses, when there are more shards than blocks
+  /// or than kMostShards, or when an observation to record does not exist.
   void check() const;
 
  private:

@@ -104,6 +104,17 @@ TEST_F(Recorded, ARecordingOfALaterPartIsRefused) {
   EXPECT_THAT(r.err, HasSubstr("expected a recording that begins where the scene does"));
 }
 
+TEST_F(Recorded, TheLastFieldAloneIsRefused) {
+  ASSERT_EQ(run(folder,
+                {"simulate", scene("identify_ball.xml"), "-o", "final.h5", "--record", "pad/final"})
+                .exit_code,
+            0);
+  const Outcome r = run(
+      folder, {"identify", scene("identify_ball.xml"), "final.h5", "--number", "tactile pad kn"});
+  EXPECT_EQ(r.exit_code, 2);
+  EXPECT_THAT(r.err, HasSubstr("sensor 'pad'"));
+}
+
 TEST_F(Recorded, PressureAloneIsRefused) {
   ASSERT_EQ(run(folder, {"simulate", scene("identify_ball.xml"), "-o", "pressure.h5", "--record",
                          "pad.pressure"})

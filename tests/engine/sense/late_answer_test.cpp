@@ -41,8 +41,8 @@ std::vector<double> reading(Readout& readout, const Batch& batch, int environmen
   return {frame.values().begin(), frame.values().end()};
 }
 
-/// A pad on a spring swings without a loss inside of a block, so its field is a cosine. A share a of
-/// the answer has the lag τ: over a swing the reading y encloses, against the ideal field x,
+/// A pad on a spring swings without a loss inside of a block, so its field is a cosine. A share a
+/// of the answer has the lag τ: over a swing the reading y encloses, against the ideal field x,
 ///   ∮ y dx = π X² a ωτ/(1 + (ωτ)²),
 /// which vanishes for slow and for fast swings.
 TEST(LateAnswer, EnclosesTheLoopOfAMaxwellElement) {
