@@ -87,14 +87,27 @@ Row<L> GroupStep::estimated_error(const kernels::KernelTable& table, BasicWorksp
   kernel.contact_wrenches(model_.view, s, end);
   Row<L> error{};
   scaled_residual(model_, table, w, error);
-  if (contact_forces_.none()) return error;
+  // Where the first guess of every stage was a root there is no factor. The stages then felt no
+  // change of the forces, but did not see the start, and what changed since then is the error.
+  const LaneBits guessed = lanes & ~factors.any;
+  if (contact_forces_.none() && guessed == 0) return error;
   solve_by_factor(model_, table, w, factors, w.delta);
   weigh_velocity(table, w, lanes, h, report);
   kernel.contact_wrenches(model_.view, s, start);
+  const LaneBits touched =
+      lanes & (contact_forces_.touching<L>(start) | contact_forces_.touching<L>(end));
+  if (guessed != 0) {
+    Row<L> missed{};
+    scaled_residual(model_, table, w, missed);
+    for (int l = 0; l < L; ++l) {
+      if (!has(guessed, l)) continue;
+      const double change =
+          has(touched, l) ? contact_forces_.change<L>(start, end, end, start, l) : missed[l];
+      if (!(change <= error[l])) error[l] = change;
+    }
+  }
   solve_by_factor(model_, table, w, factors, w.test);
-  // Where the first guess of every stage was a root there is no factor, and the motion is smooth.
-  const LaneBits touching =
-      lanes & factors.any & (contact_forces_.touching<L>(start) | contact_forces_.touching<L>(end));
+  const LaneBits touching = touched & factors.any;
   if (touching == 0) return error;
   set_stage(model_, scheme, scheme.inner_stages(), h, w);
   const auto move = [&](const Row<L>* way, double share, Row<L>* wrenches) {

@@ -144,6 +144,39 @@ TEST(StepParts, SchemeThatKeepsAnAccuracy) {
 }
 
 /// A yardstick of Drake's CENIC: a ball of 0.1 m that rolls at 0.8 m/s goes 0.8 m in a second.
+/// Sends a joint at 1 m/s against something of 1e4 N/m that takes 3 ms to throw it back. Steps are
+/// 5 ms long, so one begins in the touch while all of its stages lie beyond.
+double speed_thrown_back(Scene scene, int dof) {
+  scene.gravity = {0, 0, 0};
+  scene.solver.bounded_energy = false;
+  const Model model(scene);
+  Stepper stepper(model, keeping(1e-3, 5e-3));
+  Batch batch(model, 1);
+  std::vector<double> v(std::size_t(model.nv()));
+  v[std::size_t(dof)] = -1;
+  batch.set_state(0, q_of(batch), v);
+  for (int k = 0; k < 4; ++k) stepper.step(batch, {});
+  EXPECT_EQ(batch.status(0), StepStatus::converged);
+  return v_of(batch)[std::size_t(dof)];
+}
+
+TEST(StepParts, NoticeAReleaseThatNoStageSees) {
+  Scene ball;
+  ball.integrator = Integrator::sdirk2;
+  ball.ground = GroundDescription{};
+  ball.links = {testing::link("ball", JointType::translational, {0, 0, 0.0123}, SphereShape{0.01},
+                              2387.3241)};  // 10 g
+  ball.ground_contacts.push_back({"ball", {1e4, 0, 0, 0}, ContactLaw::linear, 1e-5, {}});
+  EXPECT_NEAR(speed_thrown_back(ball, 2), 1, 1e-3);
+  Scene slide;
+  slide.integrator = Integrator::sdirk2;
+  slide.links = {
+      testing::link("slide", JointType::prismatic, {0, 0, 0}, SphereShape{0.01}, 2387.3241)};
+  slide.links[0].joint.limits = {-0.0023, 1};
+  slide.links[0].joint.limit_stiffness = 1e4;
+  EXPECT_NEAR(speed_thrown_back(slide, 0), 1, 1e-3);
+}
+
 TEST(StepParts, ARollingBallKeepsItsWay) {
   constexpr double kRadius = 0.1, kStiffness = 1e5, kSpeed = 0.8;
   Scene scene;
