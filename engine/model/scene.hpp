@@ -279,6 +279,10 @@ struct SolverOptions {
   std::optional<double> accuracy{};
   /// Steps that would create energy are taken again by BDF1 or in parts (docs/solver.md).
   bool bounded_energy = true;
+  /// Share of its size that a body may move and still rest, until it sleeps (docs/sleeping.md). 0:
+  /// none sleeps.
+  double sleep = 0;
+  Source sleep_source{};
 };
 
 struct Scene {
