@@ -83,8 +83,7 @@ class Filter {
       if (links.link1 == kGone || links.link2 == kGone) continue;
       links.first = static_cast<int>(m_.pair_order.size());
       for (int i = first; i < first + links.count; ++i) {
-        kernels::PairContact pair =
-            whole_.pairs[std::size_t(whole_.pair_order[std::size_t(i)])];
+        kernels::PairContact pair = whole_.pairs[std::size_t(whole_.pair_order[std::size_t(i)])];
         pair.link1 = links.link1;
         pair.link2 = links.link2;
         m_.pair_order.push_back(static_cast<int>(m_.pairs.size()));

@@ -17,8 +17,9 @@ std::vector<int> trees_of(const std::vector<kernels::Link>& links);
 /// Trees of a model. Rows of the batch's blocks that parameters name are those of the whole model,
 /// which must outlive its parts.
 struct ModelPart {
-  CompiledModel model;    ///< what a step reads: links, dofs and contacts of these trees
-  std::vector<int> q, v;  ///< (nq), (nv) coordinates and dofs of the part: their number in the whole
+  CompiledModel model;  ///< what a step reads: links, dofs and contacts of these trees
+  std::vector<int> q,
+      v;  ///< (nq), (nv) coordinates and dofs of the part: their number in the whole
 };
 
 /// Returns the trees that are not left out. Contacts with those that are go, too. `tree`: of each

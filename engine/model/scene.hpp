@@ -270,6 +270,9 @@ struct OutputsDescription {
   Source source;
 };
 
+/// SolverOptions::sleep where bodies shall sleep and nobody says how still they must be.
+inline constexpr double kUsualSleep = 1e-3;
+
 struct SolverOptions {
   /// Of the scaled residual, dimensionless. None: the one that follows scheme and step
   /// (docs/solver.md).

@@ -58,8 +58,8 @@ class AwakeParts {
       std::rotate(parts_.begin(), found, found + 1);
     } else {
       if (parts_.size() == kMost) parts_.pop_back();
-      parts_.insert(parts_.begin(), std::make_unique<AwakePart>(part_of(model_, tree, asleep),
-                                                                asleep, settings_));
+      parts_.insert(parts_.begin(),
+                    std::make_unique<AwakePart>(part_of(model_, tree, asleep), asleep, settings_));
     }
     return *parts_.front();
   }

@@ -92,7 +92,7 @@ void Sleep::measure() {
     const Link& link = model_.links[i];
     // What slides out lengthens the arms of joints that turn before it.
     if (link.parent >= 0 && kernels::slides(link.kind) && !link.steady) bounded_ = false;
-    const double weight = kernels::slides(link.kind)                ? 1
+    const double weight = kernels::slides(link.kind)          ? 1
                           : link.kind == JointKind::spherical ? kOfQuaternion * arm[i]
                                                               : arm[i];
     for (int k = 0; k < kernels::coordinates(link.kind); ++k) {
@@ -201,17 +201,17 @@ double Sleep::way_to_touch(const kernels::LinkPair& links, const double* column,
 bool Sleep::within(const kernels::KernelTable& table, const kernels::LinkPair& links,
                    const double* column, double reach, SingleWorkspace& single) const {
   bool found = false;
-  for_pairs(model_, links, column, single,
-            [&](const kernels::PairContact& pair, const Frame<double>& at, const auto& size) {
-              if (found) return;
-              double pose[12];
-              for (int i = 0; i < 9; ++i) pose[i] = at.R.m[i / 3][i % 3];
-              pose[9] = at.p.x, pose[10] = at.p.y, pose[11] = at.p.z;
-              const int stride = single.lists[std::size_t(&pair - model_.pairs.data())].stride;
-              found = table.find_candidates({&pair, size, pose, reach + pair.overhang,
-                                             single.search.data(), stride, Vec3<double>{},
-                                             nullptr}) > 0;
-            });
+  for_pairs(
+      model_, links, column, single,
+      [&](const kernels::PairContact& pair, const Frame<double>& at, const auto& size) {
+        if (found) return;
+        double pose[12];
+        for (int i = 0; i < 9; ++i) pose[i] = at.R.m[i / 3][i % 3];
+        pose[9] = at.p.x, pose[10] = at.p.y, pose[11] = at.p.z;
+        const int stride = single.lists[std::size_t(&pair - model_.pairs.data())].stride;
+        found = table.find_candidates({&pair, size, pose, reach + pair.overhang,
+                                       single.search.data(), stride, Vec3<double>{}, nullptr}) > 0;
+      });
   return found;
 }
 
@@ -252,8 +252,7 @@ bool Sleep::wake_touched(const kernels::KernelTable& table, const SleeperAt& at,
 bool Sleep::group_by_nearness(const kernels::KernelTable& table, const SleeperAt& at,
                               SingleWorkspace& single) {
   const SleepState& s = at.state;
-  for (int i = 0; i < model_.nq; ++i)
-    single.q0[i][0] = at.column[(model_.layout.q + i) * kBlock];
+  for (int i = 0; i < model_.nq; ++i) single.q0[i][0] = at.column[(model_.layout.q + i) * kBlock];
   find_poses(table, at.column, single);
   for (std::size_t t = 0; t < label_.size(); ++t) label_[t] = static_cast<int>(t);
   const auto rested = [&](int t) { return s.rested[std::size_t(t)] >= steps_[std::size_t(t)]; };

@@ -51,8 +51,8 @@ class Sleep {
 
   /// Lets trees fall asleep after a step that is in the block. `moved`: (trees) m of those that are
   /// awake. `plainly`: the step was neither split nor taken again. Overwrites q0 of `single`.
-  void settle(const kernels::KernelTable& table, const SleeperAt& at,
-              std::span<const double> moved, bool plainly, SingleWorkspace& single);
+  void settle(const kernels::KernelTable& table, const SleeperAt& at, std::span<const double> moved,
+              bool plainly, SingleWorkspace& single);
 
  private:
   /// Links of different trees that may touch.
@@ -74,13 +74,13 @@ class Sleep {
   void fall_asleep(const SleeperAt& at, int tree) const;
 
   const CompiledModel& model_;
-  std::vector<int> tree_;       // of each link
-  std::vector<int> tree_of_q_;  // (nq)
+  std::vector<int> tree_;        // of each link
+  std::vector<int> tree_of_q_;   // (nq)
   std::vector<int> motor_tree_;  // (nu)
-  std::vector<double> weight_;  // (nq) w_i
-  std::vector<double> limit_;   // (trees) largest m of a step at rest [m]
-  std::vector<int> steps_;      // (trees) n
-  std::vector<int> bodies_;     // (trees) bodies of the scene
+  std::vector<double> weight_;   // (nq) w_i
+  std::vector<double> limit_;    // (trees) largest m of a step at rest [m]
+  std::vector<int> steps_;       // (trees) n
+  std::vector<int> bodies_;      // (trees) bodies of the scene
   std::vector<Meeting> meetings_;
   bool bounded_ = true;  // m bounds how far points move
   std::vector<int> label_;
