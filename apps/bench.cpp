@@ -241,6 +241,10 @@ int bench(const BenchArguments& options, const Console& console) {
     return bench_task(options, console, *task);
   refuse_with_scene(options.scene, {{"--policy", !options.policy.empty()}});
   const Model model(read_scene_for(options.scene, options.allow_unknown, console, asked));
+  if (options.error && model.solver().sleep > 0)
+    throw InputError(model.solver().sleep_source.prefix() +
+                     "--error where bodies may sleep; expected no sleep: errors are those of the "
+                     "scheme (docs/sleeping.md says what sleep adds)");
   const std::uint64_t seed = options.seed.value_or(0);
   const ControlProgram controls(model, model.timestep(), seed);
   if (!model.scene().control && model.nu() > 0)

@@ -1,0 +1,157 @@
+// SPDX-License-Identifier: Apache-2.0
+// Measures what sleep gains where ten of eleven bodies rest, and what it costs where bodies may
+// sleep and none does.
+//
+// Google Benchmark runs each once per repetition, because a repetition is a whole comparison: runs
+// with and without sleep take turns from the same states, on one thread's CPU time, and the fastest
+// of each count.
+#include <benchmark/benchmark.h>
+
+#include <algorithm>
+#include <cmath>
+#include <ctime>
+#include <string>
+#include <vector>
+
+#include "engine/step/control.hpp"
+#include "engine/step/stepper.hpp"
+#include "io/scene/scene_reader.hpp"
+#include "kernels/table/isa.hpp"
+
+namespace tangere {
+namespace {
+
+constexpr int kRounds = 40;
+
+double cpu_seconds() {
+  std::timespec now{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+}
+
+Scene scene(const std::string& name) {
+  return read_scene(TANGERE_SOURCE_DIR "/scenes/" + name + ".xml").scene;
+}
+
+StepperOptions asleep(double share) {
+  StepperOptions options;
+  options.sleep = share;
+  return options;
+}
+
+/// Controls of all environments, step by step.
+using Controls = std::vector<std::vector<double>>;
+
+/// The finger goes along the aisle and touches no box; its target never stands still.
+Controls along_the_aisle(int environments, int steps) {
+  Controls all(static_cast<std::size_t>(steps));
+  for (int k = 0; k < steps; ++k)
+    for (int e = 0; e < environments; ++e)
+      for (const double u : {0.12 + 0.12 * std::sin(0.03 * k), 0.0, 0.0})
+        all[static_cast<std::size_t>(k)].push_back(u);
+  return all;
+}
+
+/// The scene's own controls, from its first step on.
+Controls of_scene(const Model& model, int environments, int steps) {
+  const ControlProgram program(model, model.timestep(), 0);
+  const auto nu = static_cast<std::size_t>(model.nu());
+  Controls all(static_cast<std::size_t>(steps));
+  for (int k = 0; k < steps; ++k) {
+    std::vector<double>& u = all[static_cast<std::size_t>(k)];
+    u.resize(nu * static_cast<std::size_t>(environments));
+    for (std::size_t e = 0; e < static_cast<std::size_t>(environments); ++e)
+      program.evaluate(k, static_cast<std::int64_t>(e), std::span(u).subspan(e * nu, nu));
+  }
+  return all;
+}
+
+/// A batch where a run begins, and a stepper for it.
+struct Runner {
+  Stepper stepper;
+  Batch start, batch;
+  double best = 1e300;  ///< seconds of the fastest run
+
+  Runner(const Model& model, const StepperOptions& options, int environments)
+      : stepper(model, options), start(model, environments, 1), batch(start) {}
+
+  /// Steps and starts from there.
+  void go(const Controls& controls) {
+    for (const std::vector<double>& u : controls) stepper.step(start, u);
+  }
+  void time(const Controls& controls) {
+    batch = start;
+    const double begin = cpu_seconds();
+    for (const std::vector<double>& u : controls) stepper.step(batch, u);
+    best = std::min(best, cpu_seconds() - begin);
+  }
+  [[nodiscard]] double bodies_asleep() const {
+    int sum = 0;
+    for (int e = 0; e < batch.environments(); ++e) sum += batch.sleep(e).bodies;
+    return static_cast<double>(sum) / batch.environments();
+  }
+};
+
+void compare(benchmark::State& state, Runner& with, Runner& without, const Controls& controls) {
+  for (auto _ : state) {
+    with.best = without.best = 1e300;
+    for (int round = 0; round < kRounds; ++round) {
+      with.time(controls);
+      without.time(controls);
+    }
+    const double steps =
+        static_cast<double>(controls.size()) * static_cast<double>(with.batch.environments());
+    state.SetIterationTime(with.best);
+    state.counters["step_us"] = 1e6 * with.best / steps;
+    state.counters["awake_us"] = 1e6 * without.best / steps;
+    state.counters["asleep"] = with.bodies_asleep();
+    state.counters["gain"] = without.best / with.best;
+    state.counters["cost"] = with.best / without.best;
+  }
+  state.SetLabel(kernels::active_isa_name());
+}
+
+/// Ten boxes have come to rest; the finger moves.
+void ten_of_eleven_rest(benchmark::State& state) {
+  const int environments = static_cast<int>(state.range(0));
+  const Model model(scene("ten_boxes"));
+  Runner with(model, asleep(kUsualSleep), environments), without(model, asleep(0), environments);
+  const Controls settling = along_the_aisle(environments, 200);
+  with.go(settling);
+  without.go(settling);
+  compare(state, with, without, along_the_aisle(environments, environments == 1 ? 400 : 100));
+}
+
+/// Bodies would have to stand still to the last bit to fall asleep. The boxes are on a slope, down
+/// which viscous friction lets them creep.
+void nobody_sleeps(benchmark::State& state, const std::string& name) {
+  const int environments = static_cast<int>(state.range(0));
+  Scene of = scene(name);
+  if (name == "ten_boxes") of.gravity[1] = 0.05 * of.gravity[2];
+  const Model model(of);
+  Runner with(model, asleep(1e-14), environments), without(model, asleep(0), environments);
+  compare(state, with, without, of_scene(model, environments, environments == 1 ? 300 : 100));
+}
+
+}  // namespace
+}  // namespace tangere
+
+int main(int argc, char** argv) {
+  using namespace tangere;
+  benchmark::RegisterBenchmark("ten_of_eleven_rest", ten_of_eleven_rest)
+      ->Arg(1)
+      ->Arg(16)
+      ->Arg(256)
+      ->Iterations(1)
+      ->UseManualTime();
+  for (const char* name :
+       {"ten_boxes", "rolling_ball", "box_pushing", "cap_opening", "insertion", "stable_grasp"})
+    benchmark::RegisterBenchmark((std::string("nobody_sleeps/") + name).c_str(),
+                                 [name](benchmark::State& state) { nobody_sleeps(state, name); })
+        ->Arg(1)
+        ->Arg(16)
+        ->Iterations(1)
+        ->UseManualTime();
+  benchmark::Initialize(&argc, argv);
+  benchmark::RunSpecifiedBenchmarks();
+}
