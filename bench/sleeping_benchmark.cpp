@@ -3,8 +3,9 @@
 // sleep and none does.
 //
 // Google Benchmark runs each once per repetition, because a repetition is a whole comparison: runs
-// with and without sleep take turns from the same states, on one thread's CPU time, and the fastest
-// of each count.
+// with and without sleep take turns from the same states, on one thread's CPU time. Neighbours in
+// time are compared, and the median of these ratios counts, because a busy machine slows down and
+// recovers.
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
@@ -21,7 +22,8 @@
 namespace tangere {
 namespace {
 
-constexpr int kRounds = 40;
+constexpr double kSecondsOfCase = 4;
+constexpr int kFewestRounds = 21;
 
 double cpu_seconds() {
   std::timespec now{};
@@ -70,7 +72,6 @@ Controls of_scene(const Model& model, int environments, int steps) {
 struct Runner {
   Stepper stepper;
   Batch start, batch;
-  double best = 1e300;  ///< seconds of the fastest run
 
   Runner(const Model& model, const StepperOptions& options, int environments)
       : stepper(model, options), start(model, environments, 1), batch(start) {}
@@ -79,11 +80,11 @@ struct Runner {
   void go(const Controls& controls) {
     for (const std::vector<double>& u : controls) stepper.step(start, u);
   }
-  void time(const Controls& controls) {
+  double time(const Controls& controls) {
     batch = start;
     const double begin = cpu_seconds();
     for (const std::vector<double>& u : controls) stepper.step(batch, u);
-    best = std::min(best, cpu_seconds() - begin);
+    return cpu_seconds() - begin;
   }
   [[nodiscard]] double bodies_asleep() const {
     int sum = 0;
@@ -92,21 +93,32 @@ struct Runner {
   }
 };
 
+double median(std::vector<double> of) {
+  std::nth_element(of.begin(), of.begin() + std::ssize(of) / 2, of.end());
+  return of[of.size() / 2];
+}
+
 void compare(benchmark::State& state, Runner& with, Runner& without, const Controls& controls) {
+  const double steps =
+      static_cast<double>(controls.size()) * static_cast<double>(with.batch.environments());
   for (auto _ : state) {
-    with.best = without.best = 1e300;
-    for (int round = 0; round < kRounds; ++round) {
-      with.time(controls);
-      without.time(controls);
+    std::vector<double> cost, slept, awake;
+    for (double spent = 0; spent < kSecondsOfCase || cost.size() < kFewestRounds;) {
+      const bool first = cost.size() % 2 == 0;
+      double time = first ? with.time(controls) : 0;
+      const double other = without.time(controls);
+      if (!first) time = with.time(controls);
+      spent += time + other;
+      slept.push_back(time);
+      awake.push_back(other);
+      cost.push_back(time / other);
     }
-    const double steps =
-        static_cast<double>(controls.size()) * static_cast<double>(with.batch.environments());
-    state.SetIterationTime(with.best);
-    state.counters["step_us"] = 1e6 * with.best / steps;
-    state.counters["awake_us"] = 1e6 * without.best / steps;
+    state.SetIterationTime(median(slept));
+    state.counters["step_us"] = 1e6 * median(slept) / steps;
+    state.counters["awake_us"] = 1e6 * median(awake) / steps;
     state.counters["asleep"] = with.bodies_asleep();
-    state.counters["gain"] = without.best / with.best;
-    state.counters["cost"] = with.best / without.best;
+    state.counters["cost"] = median(cost);
+    state.counters["gain"] = 1 / median(cost);
   }
   state.SetLabel(kernels::active_isa_name());
 }

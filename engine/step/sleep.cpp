@@ -216,7 +216,6 @@ bool Sleep::within(const kernels::KernelTable& table, const kernels::LinkPair& l
 }
 
 bool Sleep::is_clear(SleepState& s, double moved) const {
-  if (s.bodies == 0) return true;
   s.clearance -= moved;
   return bounded_ && s.clearance >= 2 * moved;
 }
@@ -289,19 +288,24 @@ void Sleep::fall_asleep(const SleeperAt& at, int tree) const {
   at.state.clearance = 0;
 }
 
-void Sleep::settle(const kernels::KernelTable& table, const SleeperAt& at,
-                   std::span<const double> moved, bool plainly, SingleWorkspace& single) {
-  SleepState& s = at.state;
+bool Sleep::count_rest(SleepState& s, const double* moved, int stride, bool plainly) const {
   s.slept += s.bodies;
   bool due = false;
   for (std::size_t t = 0; t < steps_.size(); ++t) {
     if (s.asleep[t] != 0) continue;
-    s.rested[t] = plainly && moved[t] <= limit_[t] ? s.rested[t] + 1 : 0;
-    due = due || (s.rested[t] > 0 && s.rested[t] % steps_[t] == 0);
+    const bool rests = plainly && moved[std::ptrdiff_t(t) * stride] <= limit_[t];
+    const int rested = rests ? s.rested[t] + 1 : 0;
+    s.rested[t] = rested;
+    due = due || (rested >= steps_[t] && rested % steps_[t] == 0);
   }
-  if (!due || !group_by_nearness(table, at, single)) return;
+  return due;
+}
+
+void Sleep::settle(const kernels::KernelTable& table, const SleeperAt& at,
+                   SingleWorkspace& single) {
+  if (!group_by_nearness(table, at, single)) return;
   for (std::size_t t = 0; t < steps_.size(); ++t)
-    if (s.asleep[t] == 0 && label_[t] >= 0) fall_asleep(at, static_cast<int>(t));
+    if (at.state.asleep[t] == 0 && label_[t] >= 0) fall_asleep(at, static_cast<int>(t));
 }
 
 template void Sleep::movements(const double*, const Workspace&, std::span<const int>,

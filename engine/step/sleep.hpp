@@ -40,7 +40,7 @@ class Sleep {
   void movements(const double* rows, const BasicWorkspace<L>& w, std::span<const int> q,
                  kernels::Row<L>* out) const;
 
-  /// Notes how far awake bodies moved in this step, at most [m]. Returns true where none of them can
+  /// Notes how far awake bodies moved in this step, at most [m], where some sleep. Returns true where none of them can
   /// come within reach of a sleeping one in the next step, by the last look.
   bool is_clear(SleepState& state, double moved) const;
   /// Looks, and wakes the bodies that awake ones may reach in the next step. `q`: (nq) coordinates at the end
@@ -49,10 +49,13 @@ class Sleep {
   bool wake_touched(const kernels::KernelTable& table, const SleeperAt& at,
                     std::span<const double> q, double moved, SingleWorkspace& single);
 
-  /// Lets trees fall asleep after a step that is in the block. `moved`: (trees) m of those that are
-  /// awake. `plainly`: the step was neither split nor taken again. Overwrites q0 of `single`.
-  void settle(const kernels::KernelTable& table, const SleeperAt& at, std::span<const double> moved,
-              bool plainly, SingleWorkspace& single);
+  /// Counts the steps of rest after one that is in the block. `moved`: m of tree t at t · stride, of
+  /// those that are awake. `plainly`: the step was neither split nor taken again. Returns whether
+  /// settle() may let some tree fall asleep; while its neighbours keep it awake, it is asked again
+  /// after as many steps.
+  bool count_rest(SleepState& state, const double* moved, int stride, bool plainly) const;
+  /// Lets trees fall asleep. Overwrites q0 of `single`.
+  void settle(const kernels::KernelTable& table, const SleeperAt& at, SingleWorkspace& single);
 
  private:
   /// Links of different trees that may touch.

@@ -45,16 +45,15 @@ struct SteppedModel {
 struct Sleeping {
   Sleep rules;
   AwakeParts parts;
-  AlignedVector<kernels::LaneRow> moved;         // (trees) in a group
-  std::vector<Row<1>> moved_alone;               // (trees) in one lane
-  std::vector<double> moved_in_lane, q_in_lane;  // (trees), (nq)
+  AlignedVector<kernels::LaneRow> moved;  // (trees) in a group
+  std::vector<Row<1>> moved_alone;        // (trees) in one lane
+  std::vector<double> q_in_lane;          // (nq)
 
   Sleeping(const CompiledModel& m, const StepSettings& s)
       : rules(m, s.sleep, s.timestep),
         parts(m, s),
         moved(as_size(rules.trees())),
         moved_alone(as_size(rules.trees())),
-        moved_in_lane(as_size(rules.trees())),
         q_in_lane(as_size(m.nq)) {}
 
   template <int L>
@@ -172,11 +171,14 @@ struct Stepper::Impl {
     for (int l = 0; l < kGroup; ++l)
       if (has(g.live, l))
         sleeping->rules.heed_controls(state(l), controls.subspan(as_size(g.first + l) * nu, nu));
+    const auto same = [](const SleepState& a, const SleepState& b) {
+      return a.bodies == b.bodies && (a.bodies == 0 || a.asleep == b.asleep);
+    };
     for (LaneBits left = g.live; left != 0;) {
       const int first = __builtin_ctz(left);
       GroupOfBlock alike = g;
       for (int l = 0; l < kGroup; ++l)
-        if (!has(left, l) || state(l).asleep != state(first).asleep) alike.live &= ~(1U << l);
+        if (!has(left, l) || !same(state(l), state(first))) alike.live &= ~(1U << l);
       left &= ~alike.live;
       const bool alone = (alike.live & (alike.live - 1)) == 0;
       left |= alone ? step_alike(batch, single, alike, first, controls)
@@ -190,9 +192,8 @@ struct Stepper::Impl {
     const SleepState& one = batch.sleep_[as_size(g.first + __builtin_ctz(g.live))];
     drive(batch, w, g, lane, controls);
     if (g.live == 0) return kNoLane;
-    const auto asleep = std::ranges::count(one.asleep, 1);
-    if (asleep == 0) return step_lanes(batch, whole(), w, g, lane, nullptr);
-    if (asleep == sleeping->rules.trees()) return rest(batch, g);
+    if (one.bodies == 0) return step_lanes(batch, whole(), w, g, lane, nullptr);
+    if (std::ranges::count(one.asleep, 0) == 0) return rest(batch, g);
     AwakePart& part = sleeping->parts.without(one.asleep, sleeping->rules.tree_of_link());
     BasicWorkspace<L>& p = part.workspace<L>();
     const ModelPart& of = *part.part;
@@ -231,6 +232,7 @@ struct Stepper::Impl {
     for (int l = 0; l < L; ++l) {
       if (!has(lanes, l) || failed(report.status[l])) continue;
       SleepState& state = batch.sleep_[as_size(g.first + lane + l)];
+      if (state.bodies == 0) continue;
       double most = 0;
       for (int t = 0; t < sleeping->rules.trees(); ++t) most = std::max(most, moved[t][l]);
       if (sleeping->rules.is_clear(state, most)) continue;
@@ -248,13 +250,14 @@ struct Stepper::Impl {
   /// Lets bodies of lanes that have stepped fall asleep.
   template <int L>
   void settle(Batch& batch, const GroupOfBlock& g, int lane, LaneBits lanes) {
-    std::vector<double>& moved = sleeping->moved_in_lane;
+    const double* const moved = sleeping->moved_rows<L>()->lane;
     for (int l = 0; l < L; ++l) {
       const std::size_t e = as_size(g.first + lane + l);
       if (!has(lanes, l) || failed(batch.status_[e])) continue;
-      for (std::size_t t = 0; t < moved.size(); ++t) moved[t] = sleeping->moved_rows<L>()[t][l];
-      sleeping->rules.settle(kernels::active_kernels(), {g.rows + lane + l, batch.sleep_[e]}, moved,
-                             batch.status_[e] == StepStatus::converged, single);
+      SleepState& state = batch.sleep_[e];
+      if (sleeping->rules.count_rest(state, moved + l, L,
+                                     batch.status_[e] == StepStatus::converged))
+        sleeping->rules.settle(kernels::active_kernels(), {g.rows + lane + l, state}, single);
     }
   }
 };
