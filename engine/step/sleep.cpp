@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <limits>
 
 #include "engine/model/model_part.hpp"
@@ -118,6 +119,7 @@ void Sleep::heed_controls(SleepState& s, std::span<const double> u) const {
     s.rested.assign(steps_.size(), 0);
     s.u.assign(u.begin(), u.end());
   }
+  if (std::memcmp(u.data(), s.u.data(), u.size_bytes()) == 0) return;
   for (std::size_t k = 0; k < u.size(); ++k) {
     if (u[k] == s.u[k]) continue;
     s.u[k] = u[k];
@@ -292,7 +294,7 @@ bool Sleep::count_rest(SleepState& s, const double* moved, int stride, bool plai
   s.slept += s.bodies;
   bool due = false;
   for (std::size_t t = 0; t < steps_.size(); ++t) {
-    if (s.asleep[t] != 0) continue;
+    if (s.bodies > 0 && s.asleep[t] != 0) continue;
     const bool rests = plainly && moved[std::ptrdiff_t(t) * stride] <= limit_[t];
     const int rested = rests ? s.rested[t] + 1 : 0;
     s.rested[t] = rested;

@@ -313,7 +313,7 @@ void add_batches(nb::module_& m) {
           "Draws `envs` starting states: environment e is episode first_episode + e of `seed`.\n"
           "`threads`: None for all cores. `precision`: of tactile fields; 'mixed' returns "
           "float32,\n"
-          "'double' float64. `timestep` [s], `tolerance` (of a solve, dimensionless) and\n"
+          "'double' float64. `timestep` [s], `tolerance` (of a solve, dimensionless),\n"
           "`accuracy` (of the parts that steps are cut into, relative; 0: they are not cut) and\n"
           "`sleep` (share of its size that a body may move and still rest until it sleeps; 0: "
           "none\n"
