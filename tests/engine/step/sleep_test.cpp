@@ -9,6 +9,7 @@
 #include "engine/derivative/adjoint.hpp"
 #include "engine/derivative/tangent.hpp"
 #include "kernels/table/kernel_table.hpp"
+#include "tests/engine/random_scene.hpp"
 #include "tests/engine/runs.hpp"
 #include "tests/engine/scenes.hpp"
 
@@ -79,6 +80,15 @@ double distance(const std::vector<double>& a, const std::vector<double>& b) {
   return most;
 }
 
+/// Everything that is stored of one environment after a run.
+struct Record {
+  std::vector<double> q, v;
+  std::vector<std::uint8_t> asleep;
+  std::int64_t slept = 0;
+  int evaluations = 0;
+  bool operator==(const Record&) const = default;
+};
+
 TEST(Sleep, BoxesFallAsleepAndStayWhereTheyAre) {
   const Model model(finger_and_boxes(5));
   Stepper with(model, sleepy()), without(model);
@@ -141,6 +151,28 @@ TEST(Sleep, AFastBodyWakesWhatItHits) {
   const std::vector<double> q = shoot(with, model), expected = shoot(without, model);
   EXPECT_GT(std::abs(expected[3 + 1]), 0.02);  // box 0 was hit
   EXPECT_LT(distance(q, expected), 1e-3);
+}
+
+/// The finger sleeps 3 mm from a box, and then is driven so hard that it gets there in one step: the
+/// step is taken again, with the box awake.
+TEST(Sleep, ATouchWithinOneStepIsNotMissed) {
+  const double gap = 3e-3, near = 0.08 - kEdge / 2 - 0.01 - gap;
+  const Model model(finger_and_boxes(1));
+  Stepper with(model, sleepy()), without(model);
+  Batch batch(model, 1, 1), awake(model, 1, 1);
+  for (int k = 0; k < 300; ++k) {
+    testing::step_all(with, batch, {0, near, 0});
+    testing::step_all(without, awake, {0, near, 0});
+  }
+  ASSERT_EQ(batch.sleep(0).bodies, 2);
+  ASSERT_NE(batch.sleep(0).island[0], batch.sleep(0).island[1]);
+  for (int k = 0; k < 3; ++k) {
+    testing::step_all(with, batch, {0, 0.5, 0});
+    testing::step_all(without, awake, {0, 0.5, 0});
+    EXPECT_EQ(batch.sleep(0).bodies, 0) << k;
+    EXPECT_GT(v_of(awake)[3 + 1], 0.1) << k;
+    EXPECT_NEAR(v_of(batch)[3 + 1], v_of(awake)[3 + 1], 1e-2 * v_of(awake)[3 + 1]) << k;
+  }
 }
 
 TEST(Sleep, AStackWakesWhole) {
@@ -217,6 +249,75 @@ TEST(Sleep, WhatIsInTheAirOrOnTheMoveStaysAwake) {
   }
 }
 
+/// Viscous friction lets a box creep down a slope at a constant speed, which sleep ends.
+TEST(Sleep, ABodyIsOffByNoMoreThanTheBound) {
+  Scene s = finger_and_boxes(1);
+  s.gravity[1] = -2e-3;  // the ground resists with 5 N s/m a point that touches, of 9
+  const Model model(s);
+  Stepper without(model);
+  Batch awake(model, 1, 1);
+  constexpr int kSteps = 600;
+  std::vector<double> before;
+  for (int k = 0; k < kSteps; ++k) {
+    if (k == 100) before = q_of(awake);
+    testing::step_all(without, awake, {0, 0, 0});
+  }
+  const double creep = std::abs(q_of(awake)[4] - before[4]) / (kSteps - 100);  // [m] a step
+  EXPECT_GT(creep, 1e-9);
+  // How far a step at rest may go: share · size / n, by a measure that at most doubles a slide.
+  const double size = kEdge / 2 * std::sqrt(3.0);
+  const double n = std::max(20.0, std::ceil(2 * std::sqrt(size / 9.8) / s.timestep));
+  for (const double times : {0.5, 4.0}) {
+    const double share = times * creep * n / size;
+    Stepper with(model, sleepy(share));
+    Batch batch(model, 1, 1);
+    for (int k = 0; k < kSteps; ++k) testing::step_all(with, batch, {0, 0, 0});
+    EXPECT_EQ(sleeps(batch, 1), times > 1);
+    const double off = distance(q_of(batch), q_of(awake));
+    EXPECT_LE(off, kSteps / n * share * size);
+    if (times > 1) {
+      EXPECT_GT(off, 0.5 * creep * (kSteps - 100));
+    }
+  }
+}
+
+/// Trees of random joints, with spheres and cuboids in contact, that damping brings to rest.
+TEST(Sleep, RandomMachinesHaveTheSameBitsAloneAndInAGroup) {
+  int slept = 0;
+  for (unsigned seed = 1; seed <= 16; ++seed) {
+    Scene scene =
+        testing::random_contacts(seed, 3 + static_cast<int>(seed % 4), ContactLaw::clamped);
+    for (LinkDescription& link : scene.links) link.joint.damping = 20;
+    const Model model(scene);
+    const auto run_of = [&](int environments, int wanted) {
+      Batch batch(model, environments);
+      Stepper stepper(model, sleepy(0.2));
+      for (int e = 0; e < environments; ++e) {
+        std::vector<double> v = v_of(batch, e);
+        testing::Random random(1000 * seed + static_cast<unsigned>(e == wanted ? 3 : 100 + e));
+        for (double& x : v) x = 0.02 * random.normal();
+        batch.set_state(e, q_of(batch, e), v);
+      }
+      const std::vector<double> u(std::size_t(environments * model.nu()));
+      Record r;
+      for (int k = 0; k < 150; ++k) {
+        stepper.step(batch, u);
+        r.evaluations += batch.iterations(wanted);
+      }
+      r.q = q_of(batch, wanted);
+      r.v = v_of(batch, wanted);
+      r.asleep = batch.sleep(wanted).asleep;
+      r.slept = batch.sleep(wanted).slept;
+      return r;
+    };
+    const Record alone = run_of(1, 0);
+    EXPECT_EQ(alone, run_of(8, 5)) << "seed " << seed;
+    EXPECT_EQ(alone, run_of(17, 2)) << "seed " << seed;
+    slept += alone.slept > 0 ? 1 : 0;
+  }
+  EXPECT_GT(slept, 4);
+}
+
 TEST(Sleep, WithNobodyAsleepTheBitsAreThoseWithoutSleep) {
   const Model model(testing::rolling_ball(false, 24));
   Stepper with(model, sleepy()), without(model);
@@ -239,15 +340,6 @@ TEST(Sleep, WithNobodyAsleepTheBitsAreThoseWithoutSleep) {
     EXPECT_EQ(v_of(batch, e), v_of(awake, e));
   }
 }
-
-/// Everything that is stored of one environment after a run.
-struct Record {
-  std::vector<double> q, v;
-  std::vector<std::uint8_t> asleep;
-  std::int64_t slept = 0;
-  int evaluations = 0;
-  bool operator==(const Record&) const = default;
-};
 
 Record run(const Model& model, const StepperOptions& options, int environments, int wanted,
            int steps = 420, bool crash = false) {
