@@ -39,8 +39,8 @@ if(TANGERE_SANITIZE)
     -fsanitize=${TANGERE_SANITIZE} -fno-omit-frame-pointer -fno-sanitize-recover=all -fno-sanitize=vptr)
   target_link_options(tangere_flags INTERFACE -fsanitize=${TANGERE_SANITIZE})
   # Every access of a pointer or a reference is also checked for null and for alignment where TANGERE_CASTS is set: in the
-  # libraries that turn bytes into numbers by casts. Elsewhere no pointer can be misaligned, and the address sanitizer stops at
-  # a null one, so the checks would only cost compile time there.
+  # kernels, which read numbers as lanes by casts. Elsewhere casts go to bytes, which have no alignment, and the address
+  # sanitizer stops at a null pointer, so the checks would only cost compile time: a sixth of it in io.
   if(TANGERE_SANITIZE MATCHES "undefined" AND TANGERE_SANITIZE MATCHES "address")
     target_compile_options(tangere_flags INTERFACE
       $<$<NOT:$<BOOL:$<TARGET_PROPERTY:TANGERE_CASTS>>>:-fno-sanitize=null,alignment>)

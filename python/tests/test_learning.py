@@ -60,7 +60,7 @@ def test_ppo_imitates_the_script():
 
 def test_a_model_learns_the_derivatives_that_it_is_shown(generate):
     data = generate("box_pushing", "--episodes", "12", "--seed", "1", "--gradients", "jacobians")
-    words = (str(data), "--sizes", "8", "--updates", "300")
+    words = (str(data), "--sizes", "8", "--updates", "50")
     plain, shown = (run("matching.py", *words, "--match", m)["curve"] for m in ("0", "0.1"))
     assert plain[0][0] == 8 and 0 < plain[0][1] < 1 and 0 < shown[0][1] < 1
     assert plain != shown
@@ -93,9 +93,9 @@ def test_clones_learn_from_a_data_set(generate):
 def test_offline_methods_learn_from_mixed_data(generate, method):
     data = generate("box_pushing", "--episodes", "40", "--seed", "1", "--noise", "0.3",
                     "--mix", "random=0.5")  # fmt: skip
-    found = run("offline.py", str(data), "--method", method, "--updates", "100", "--episodes",
+    found = run("offline.py", str(data), "--method", method, "--updates", "20", "--episodes",
                 "50", "--threads", "1")  # fmt: skip
-    assert found["test"]["score"] > 30, found
+    assert found["test"]["score"] > 50, found  # after one update: 38 to 45
     assert found["rows"] == 36 * 100  # those of mask/train
 
 
