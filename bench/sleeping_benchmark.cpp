@@ -11,6 +11,8 @@
 #include <algorithm>
 #include <cmath>
 #include <ctime>
+#include <numeric>
+#include <random>
 #include <string>
 #include <vector>
 
@@ -134,6 +136,35 @@ void ten_of_eleven_rest(benchmark::State& state) {
   compare(state, with, without, along_the_aisle(environments, environments == 1 ? 400 : 100));
 }
 
+/// In every environment other boxes are driven, so few environments have the same bodies asleep.
+void others_rest_in_every_environment(benchmark::State& state) {
+  const int driven = static_cast<int>(state.range(0)), environments = 16, steps = 100;
+  Scene of = scene("ten_boxes");
+  for (const LinkDescription& link : of.links)
+    if (link.body.name != "finger") of.motors.push_back({link.joint.name, -0.01, 0.01, {}});
+  const Model model(of);
+  Runner with(model, asleep(kUsualSleep), environments), without(model, asleep(0), environments);
+  const auto nu = static_cast<std::size_t>(model.nu());
+  std::mt19937 random(1);
+  std::vector<int> boxes(10);
+  std::iota(boxes.begin(), boxes.end(), 0);
+  Controls settling(200), running(steps);
+  for (Controls* part : {&settling, &running})
+    for (std::vector<double>& u : *part) u.assign(nu * environments, 0.0);
+  for (std::size_t e = 0; e < environments; ++e) {
+    std::shuffle(boxes.begin(), boxes.end(), random);
+    for (int k = 0; k < driven; ++k)
+      for (Controls* part : {&settling, &running})
+        for (std::vector<double>& u : *part) {
+          const double sign = (&u - part->data()) % 2 == 0 ? 1 : -1;
+          u[e * nu + 3 + 6 * static_cast<std::size_t>(boxes[static_cast<std::size_t>(k)])] = sign;
+        }
+  }
+  with.go(settling);
+  without.go(settling);
+  compare(state, with, without, running);
+}
+
 /// Bodies would have to stand still to the last bit to fall asleep. The boxes are on a slope, down
 /// which viscous friction lets them creep.
 void nobody_sleeps(benchmark::State& state, const std::string& name) {
@@ -154,6 +185,12 @@ int main(int argc, char** argv) {
       ->Arg(1)
       ->Arg(16)
       ->Arg(256)
+      ->Iterations(1)
+      ->UseManualTime();
+  benchmark::RegisterBenchmark("others_rest_in_every_environment", others_rest_in_every_environment)
+      ->Arg(1)
+      ->Arg(3)
+      ->Arg(5)
       ->Iterations(1)
       ->UseManualTime();
   for (const char* name :

@@ -4,6 +4,7 @@
 #include "engine/step/stepper.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <numeric>
 
 #include "engine/base/as_size.hpp"
@@ -179,6 +180,8 @@ struct Stepper::Impl {
       GroupOfBlock alike = g;
       for (int l = 0; l < kGroup; ++l)
         if (!has(left, l) || !same(state(l), state(first))) alike.live &= ~(1U << l);
+      // Two lanes one after the other take no longer than a group.
+      if (state(first).bodies > 0 && std::popcount(alike.live) <= 2) alike.live = 1U << first;
       left &= ~alike.live;
       const bool alone = (alike.live & (alike.live - 1)) == 0;
       left |= alone ? step_alike(batch, single, alike, first, controls)
