@@ -190,6 +190,7 @@ int main(int argc, char** argv) {
   benchmark::RegisterBenchmark("others_rest_in_every_environment", others_rest_in_every_environment)
       ->Arg(1)
       ->Arg(3)
+      ->Arg(4)
       ->Arg(5)
       ->Iterations(1)
       ->UseManualTime();

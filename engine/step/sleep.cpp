@@ -30,6 +30,10 @@ constexpr int kFewestSteps = 20;
 /// Of √(size/|gravity|), the time in which a body falls by half its size: what rests for so long is
 /// not at the top of a flight.
 constexpr double kFallTimes = 2;
+/// At most a third of the dofs may be awake where others sleep. If eight lanes of a group have eight
+/// different parts that are awake, they are stepped one after the other. With more than a third each
+/// that takes longer than all of the model in all lanes at once.
+constexpr int kFewestPerAwake = 3;
 /// A look tells up to this many times the distance that is needed now, by factors of kFiner.
 constexpr double kFarLook = 64, kFiner = 4;
 
@@ -45,6 +49,9 @@ Sleep::Sleep(const CompiledModel& model, double share, double h)
     : model_(model), tree_(trees_of(model.links)) {
   const std::size_t trees = tree_.empty() ? 0 : std::size_t(std::ranges::max(tree_)) + 1;
   label_.resize(trees);
+  dofs_.resize(trees);
+  for (std::size_t i = 0; i < model.links.size(); ++i)
+    dofs_[std::size_t(tree_[i])] += kernels::dofs(model.links[i].kind);
   bodies_.resize(trees);
   std::vector<double> size(trees, HUGE_VAL);
   for (const CompiledBody& body : model.bodies) {
@@ -144,14 +151,24 @@ void Sleep::movements(const double* rows, const BasicWorkspace<L>& w, std::span<
 
 void Sleep::wake_island(SleepState& s, int tree) const {
   const int island = s.island[std::size_t(tree)];
-  for (std::size_t t = 0; t < steps_.size(); ++t) {
-    if (s.island[t] != island) continue;
-    s.island[t] = -1;
-    s.asleep[t] = 0;
-    s.rested[t] = 0;
-    s.bodies -= bodies_[t];
-  }
+  const auto wake = [&](const auto& which) {
+    for (std::size_t t = 0; t < steps_.size(); ++t) {
+      if (s.asleep[t] == 0 || !which(t)) continue;
+      s.island[t] = -1;
+      s.asleep[t] = 0;
+      s.rested[t] = 0;
+      s.bodies -= bodies_[t];
+    }
+  };
+  wake([&](std::size_t t) { return s.island[t] == island; });
+  if (!pays(s.asleep)) wake([](std::size_t) { return true; });
   s.clearance = 0;
+}
+
+bool Sleep::pays(std::span<const std::uint8_t> asleep) const {
+  int awake = 0;
+  for (std::size_t t = 0; t < steps_.size(); ++t) awake += asleep[t] != 0 ? 0 : dofs_[t];
+  return kFewestPerAwake * awake <= model_.nv;
 }
 
 /// Computes the poses of all links at the q0 of `single`.
@@ -306,8 +323,13 @@ bool Sleep::count_rest(SleepState& s, const double* moved, int stride, bool plai
 void Sleep::settle(const kernels::KernelTable& table, const SleeperAt& at,
                    SingleWorkspace& single) {
   if (!group_by_nearness(table, at, single)) return;
+  SleepState& s = at.state;
+  soon_.assign(s.asleep.begin(), s.asleep.end());
   for (std::size_t t = 0; t < steps_.size(); ++t)
-    if (at.state.asleep[t] == 0 && label_[t] >= 0) fall_asleep(at, static_cast<int>(t));
+    if (label_[t] >= 0) soon_[t] = 1;
+  if (!pays(soon_)) return;
+  for (std::size_t t = 0; t < steps_.size(); ++t)
+    if (s.asleep[t] != soon_[t]) fall_asleep(at, static_cast<int>(t));
 }
 
 template void Sleep::movements(const double*, const Workspace&, std::span<const int>,

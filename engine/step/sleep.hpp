@@ -4,7 +4,8 @@
 // coordinate i, or 1 where the joint slides, no point of the tree moves further in a step than
 //   m = Σ w_i |Δq_i|
 // A tree rests where m ≤ share · size / n, n = max(20, 2 √(size/|gravity|) / h) steps, and may sleep
-// when it rested for n steps. It does when all trees that it could touch may, too.
+// when it rested for n steps. It does when all trees that it could touch may, too, and at most a third
+// of the dofs of the environment stays awake.
 #pragma once
 
 #include <span>
@@ -71,6 +72,7 @@ class Sleep {
                                     double reach, const SingleWorkspace& single) const;
   [[nodiscard]] bool within(const kernels::KernelTable& table, const kernels::LinkPair& links,
                             const double* column, double reach, SingleWorkspace& single) const;
+  [[nodiscard]] bool pays(std::span<const std::uint8_t> asleep) const;
   void wake_island(SleepState& state, int tree) const;
   bool group_by_nearness(const kernels::KernelTable& table, const SleeperAt& at,
                          SingleWorkspace& single);
@@ -84,9 +86,11 @@ class Sleep {
   std::vector<double> limit_;    // (trees) largest m of a step at rest [m]
   std::vector<int> steps_;       // (trees) n
   std::vector<int> bodies_;      // (trees) bodies of the scene
+  std::vector<int> dofs_;        // (trees)
   std::vector<Meeting> meetings_;
   bool bounded_ = true;  // m bounds how far points move
   std::vector<int> label_;
+  std::vector<std::uint8_t> soon_;
 };
 
 }  // namespace tangere

@@ -175,6 +175,28 @@ TEST(Sleep, ATouchWithinOneStepIsNotMissed) {
   }
 }
 
+/// Parts of a model that are larger than a third of it are not worth their while in a group where
+/// every lane has another.
+TEST(Sleep, NobodySleepsWhileMoreThanAThirdIsAwake) {
+  Scene s = finger_and_boxes(3);
+  for (int k = 0; k < 3; ++k)
+    s.motors.push_back({"box" + std::to_string(k) + "_joint", -0.01, 0.01, {}});
+  const Model model(s);  // 3 + 18 dofs
+  Stepper stepper(model, sleepy());
+  Batch batch(model, 1, 1);
+  const auto drive = [&](int boxes) {
+    for (int k = 0; k < 200; ++k) {
+      std::vector<double> u(std::size_t(model.nu()));
+      for (int b = 0; b < boxes; ++b) u[std::size_t(3 + 6 * b)] = k % 2 == 0 ? 1 : -1;
+      testing::step_all(stepper, batch, u);
+    }
+    return batch.sleep(0).bodies;
+  };
+  EXPECT_EQ(drive(2), 0);  // 12 dofs move
+  EXPECT_EQ(drive(1), 3);  // 6 dofs
+  EXPECT_EQ(drive(2), 0);
+}
+
 TEST(Sleep, AStackWakesWhole) {
   Scene s = finger_and_boxes(3);
   for (int k = 0; k < 3; ++k)
@@ -194,7 +216,7 @@ TEST(Sleep, AStackWakesWhole) {
 }
 
 TEST(Sleep, ControlsResetsAndSettersWake) {
-  Scene s = finger_and_boxes(2);
+  Scene s = finger_and_boxes(3);
   s.motors.push_back({"box1_joint", -0.5, 0.5, {}});
   Distribution d;
   d.a = 0.5, d.b = 0.7;
@@ -205,22 +227,22 @@ TEST(Sleep, ControlsResetsAndSettersWake) {
   std::vector<double> u(std::size_t(2 * model.nu()));
   const auto rest = [&] {
     for (int k = 0; k < 200; ++k) stepper.step(batch, u);
-    ASSERT_EQ(batch.sleep(0).bodies, 3) << "the finger's target stands still, so it sleeps, too";
-    ASSERT_EQ(batch.sleep(1).bodies, 3);
+    ASSERT_EQ(batch.sleep(0).bodies, 4) << "the finger's target stands still, so it sleeps, too";
+    ASSERT_EQ(batch.sleep(1).bodies, 4);
   };
   rest();
   u[3 + 1] = 0.9;  // environment 0: box 1 alone is driven
   stepper.step(batch, u);
   EXPECT_TRUE(sleeps(batch, 0, 0) && sleeps(batch, 1, 0) && !sleeps(batch, 2, 0));
-  EXPECT_EQ(batch.sleep(1).bodies, 3);
+  EXPECT_EQ(batch.sleep(1).bodies, 4);
   EXPECT_GT(v_of(batch)[3 + 6 + 1], 0);
   u[3 + 1] = 0;
   rest();
   batch.set_state(0, q_of(batch), v_of(batch));
   EXPECT_EQ(batch.sleep(0).bodies, 0);
-  EXPECT_EQ(batch.sleep(1).bodies, 3);
+  EXPECT_EQ(batch.sleep(1).bodies, 4);
   rest();
-  batch.set_randomized_value(0, 2, 0.65);
+  batch.set_randomized_value(0, 3, 0.65);
   EXPECT_EQ(batch.sleep(0).bodies, 0);
   rest();
   batch.reset(0, 0);
@@ -284,10 +306,10 @@ TEST(Sleep, ABodyIsOffByNoMoreThanTheBound) {
 /// Trees of random joints, with spheres and cuboids in contact, that damping brings to rest.
 TEST(Sleep, RandomMachinesHaveTheSameBitsAloneAndInAGroup) {
   int slept = 0;
-  for (unsigned seed = 1; seed <= 16; ++seed) {
+  for (unsigned seed = 1; seed <= 20; ++seed) {
     Scene scene =
         testing::random_contacts(seed, 3 + static_cast<int>(seed % 4), ContactLaw::clamped);
-    for (LinkDescription& link : scene.links) link.joint.damping = 20;
+    for (LinkDescription& link : scene.links) link.joint.damping = 500;
     const Model model(scene);
     const auto run_of = [&](int environments, int wanted) {
       Batch batch(model, environments);
@@ -315,7 +337,7 @@ TEST(Sleep, RandomMachinesHaveTheSameBitsAloneAndInAGroup) {
     EXPECT_EQ(alone, run_of(17, 2)) << "seed " << seed;
     slept += alone.slept > 0 ? 1 : 0;
   }
-  EXPECT_GT(slept, 4);
+  EXPECT_GT(slept, 3);
 }
 
 TEST(Sleep, WithNobodyAsleepTheBitsAreThoseWithoutSleep) {
@@ -434,16 +456,19 @@ TEST(Sleep, ABlockIsSavedAndRestoredWithWhoSleeps) {
 }
 
 TEST(Sleep, StepsThatKeepAnAccuracySleep) {
-  const Model model(finger_and_boxes(3));
+  const Model model(finger_and_boxes(4));
   StepperOptions options = sleepy();
   options.accuracy = 1e-2;
   Stepper stepper(model, options);
   Batch batch(model, 1, 1);
-  play(stepper, batch, 0, 250);
+  for (int k = 0; k < 600; ++k)  // looser solves take longer to come to rest
+    testing::step_all(stepper, batch, path(k % 300));
+  EXPECT_EQ(batch.sleep(0).bodies, 4);
+  play(stepper, batch, 300, 560);
   EXPECT_EQ(batch.sleep(0).bodies, 3);
-  play(stepper, batch, 250, 560);
-  EXPECT_EQ(batch.sleep(0).bodies, 2);
-  EXPECT_EQ(run(model, options, 1, 0, 320), run(model, options, 9, 6, 320));
+  const Record alone = run(model, options, 1, 0, 330);
+  EXPECT_GT(alone.slept, 0);
+  EXPECT_EQ(alone, run(model, options, 9, 6, 330));
 }
 
 /// Lanes that all sleep take steps for nothing.
