@@ -126,6 +126,8 @@ void Sleep::heed_controls(SleepState& s, std::span<const double> u) const {
     s.rested.assign(steps_.size(), 0);
     s.u.assign(u.begin(), u.end());
   }
+  if (!s.resting && s.bodies == 0)
+    return;  // the next rest begins with one step that does not count
   if (std::memcmp(u.data(), s.u.data(), u.size_bytes()) == 0) return;
   for (std::size_t k = 0; k < u.size(); ++k) {
     if (u[k] == s.u[k]) continue;
@@ -309,21 +311,26 @@ void Sleep::fall_asleep(const SleeperAt& at, int tree) const {
 
 bool Sleep::count_rest(SleepState& s, const double* moved, int stride, bool plainly) const {
   s.slept += s.bodies;
-  bool due = false;
+  bool due = false, resting = false;
   for (std::size_t t = 0; t < steps_.size(); ++t) {
     if (s.bodies > 0 && s.asleep[t] != 0) continue;
     const bool rests = plainly && moved[std::ptrdiff_t(t) * stride] <= limit_[t];
     const int rested = rests ? s.rested[t] + 1 : 0;
     s.rested[t] = rested;
+    resting = resting || rests;
     due = due || (rested >= steps_[t] && rested % steps_[t] == 0);
   }
+  s.resting = resting;
   return due;
 }
 
 void Sleep::settle(const kernels::KernelTable& table, const SleeperAt& at,
                    SingleWorkspace& single) {
-  if (!group_by_nearness(table, at, single)) return;
   SleepState& s = at.state;
+  soon_.assign(s.asleep.begin(), s.asleep.end());
+  for (std::size_t t = 0; t < steps_.size(); ++t)
+    if (s.rested[t] >= steps_[t]) soon_[t] = 1;
+  if (!pays(soon_) || !group_by_nearness(table, at, single)) return;
   soon_.assign(s.asleep.begin(), s.asleep.end());
   for (std::size_t t = 0; t < steps_.size(); ++t)
     if (label_[t] >= 0) soon_[t] = 1;
