@@ -146,7 +146,8 @@ BenchSetting setting_of(const BenchArguments& options, const Model& model,
   std::vector<std::string> names;
   for (const FieldOutput of : fields_of(model, setting.options.rollout.outputs))
     names.push_back(
-        output_name(model.sensors()[static_cast<std::size_t>(of.sensor)].name, of.form));
+        output_name(model.sensors()[static_cast<std::size_t>(of.sensor)].name, of.form) +
+        to_string(of.times));
   if (setting.options.frames != FrameKind::none)
     setting.record = fmt::format("{}", fmt::join(names, ","));
   setting.options.repeat = options.repeat.value_or(setting.options.repeat);
@@ -199,6 +200,7 @@ int bench_task(const BenchArguments& options, const Console& console, const Task
                           {"--frames", !options.frames.empty()},
                           {"--record", !options.record.empty()},
                           {"--error", options.error}});
+  note_outputs_of(console, task, "is timed with what it observes");
   const PolicyKind kind = policy_named(options.policy, "", PolicyKind::random);
   const Policy policy(task, kind);
   BenchSetting setting;
@@ -249,6 +251,9 @@ int bench(const BenchArguments& options, const Console& console) {
   const ControlProgram controls(model, model.timestep(), seed);
   if (!model.scene().control && model.nu() > 0)
     console.note("the scene has no <control>: every control is 0");
+  const RolloutOutputs wanted = record_of(options.record, model).outputs;
+  if (wanted.fields && (wanted.bodies || wanted.end_effectors))
+    console.note("bench reads sensors alone: bodies and variables are left out");
   BenchSetting setting = setting_of(options, model, controls);
   const std::vector<int> threads = thread_counts(options);
   const int most_threads = *std::max_element(threads.begin(), threads.end());
@@ -302,7 +307,9 @@ Command add_bench(CLI::App& program) {
   add_text(
       app, "--record", o.record, "LIST",
       "Readings to take, separated by commas: a sensor's field (pad), pad.pressure, pad.shear, "
-      "pad.sum or pad.ideal [default: the scene's <outputs>, or all fields]");
+      "pad.sum, pad.ideal or pad.markers; pad/10 every 10th step, pad/final at the end [default: "
+      "the scene's "
+      "<outputs>, or all fields]");
   add_whole_number<int>(app, "--repeat", o.repeat, 1, kMostPasses,
                         "Timed passes over the episode; the best counts [default: 3]");
   add_whole_number<std::uint64_t>(app, "--seed", o.seed, 0, UINT64_MAX,

@@ -49,14 +49,14 @@ std::vector<Failure> failures_of(const BenchRun& run) {
 }
 
 int common_interval(const Model& model, const RolloutOptions& rollout) {
-  int common = 0;
+  std::int64_t common = 0;
   for (const FieldOutput of : fields_of(model, rollout.outputs)) {
-    const int every =
-        tactile_interval(model.sensors()[static_cast<std::size_t>(of.sensor)], rollout);
+    const std::int64_t every = reading_times(model, of, rollout).every;
+    if (every == 0) return 0;  // at the end alone
     if (common != 0 && common != every) return 0;
     common = every;
   }
-  return common;
+  return static_cast<int>(common);
 }
 
 std::string bench_heading(const BenchSetting& setting) {

@@ -23,8 +23,8 @@ int export_table(const ExportArguments& options, const Console& console) {
   console.print(
       fmt::format("wrote {}: {} rows of {} columns", options.output, result.rows, result.columns));
   if (!result.left_out.empty())
-    console.note(
-        fmt::format("too wide for a table, left out: {}", fmt::join(result.left_out, ", ")));
+    console.note(fmt::format("too wide for a table or not in every row, left out: {}",
+                             fmt::join(result.left_out, ", ")));
   console.result({{"command", "export"},
                   {"exit_code", static_cast<int>(kDone)},
                   {"input", options.input},

@@ -59,16 +59,35 @@ std::string controls_named(const std::string& path) {
   return fmt::format("a table of checksum {:016x}", hash);
 }
 
-/// Poses of bodies are for trajectories: where the scene asks for them, a note says so.
-Record dataset_record(const GenerateOptions& options, const Model& model, const Console& console) {
-  Record record = record_of(options.record, model);
-  if (options.record.empty() && std::erase(record.names, "bodies") > 0)
-    console.note("a data set has no poses of bodies: 'bodies' of <outputs> is left out");
-  if (record.names.empty() && options.record.empty() && model.scene().outputs)
-    throw InputError(model.scene().outputs->source.prefix() +
-                     "<outputs>: nothing of record is in a data set; expected q, v, variables or "
-                     "readings of sensors, or --record");
-  return record;
+/// What of an episode's rows is computed: what the record asks for, or everything.
+void take(const Record& record, const Model& model, EpisodeOptions& run) {
+  const auto rows_of = [&](const char* name) -> RowOutput {
+    const AskedOutput* const asked = record.find(name);
+    return {record.asked.empty() || asked != nullptr, asked ? asked->times : OutputTimes{}};
+  };
+  run.fields = record.outputs.fields;
+  run.q = rows_of("q"), run.v = rows_of("v"), run.end_effectors = rows_of("variables");
+  if (const AskedOutput* const all = record.find("bodies")) run.bodies.push_back({{}, all->times});
+  for (int b = 0; b < model.nb(); ++b)  // in the order of the scene, whatever that of the words
+    if (const AskedOutput* const one =
+            record.find(body_output(model.body_names()[static_cast<std::size_t>(b)])))
+      run.bodies.push_back({{b}, one->times});
+}
+
+/// The same for the files.
+void describe(const Record& record, const Model& model, const EpisodeOptions& run,
+              DatasetDescription& description) {
+  for (const AskedOutput& asked : record.asked) {
+    description.record.push_back(asked.name);
+    description.record_times.push_back(asked.times);
+  }
+  const std::vector<std::string> names(model.body_names().begin(), model.body_names().end());
+  for (const BodyRows& rows : run.bodies) {
+    const bool all = rows.bodies.empty();
+    const std::string one = all ? "" : names[static_cast<std::size_t>(rows.bodies.front())];
+    description.bodies.push_back(
+        {all ? "bodies" : body_output(one), all ? names : std::vector{one}});
+  }
 }
 
 std::vector<std::string> split_if_any(const std::string& list) {
@@ -119,7 +138,10 @@ DatasetLayout make_layout(const GenerateOptions& options, const Model& model,
   description.command = command_of(options, run, played_by.policy);
   description.shards = options.shards.value_or(0);
   description.compression = options.compress;
-  description.record = task == nullptr ? record.names : split_if_any(options.record);
+  if (task == nullptr)
+    describe(record, model, run, description);
+  else
+    description.record = split_if_any(options.record);
   description.fields = record.outputs.fields;
   description.sparse = options.tactile == "sparse";
   description.gradients_of =
@@ -353,6 +375,7 @@ int generate_task(const GenerateOptions& options, const Console& console, const 
                   const Task& task) {
   refuse_with_task(
       task, {{"--steps", options.steps.has_value()}, {"--every", options.every.has_value()}});
+  note_outputs_of(console, task, "stores what it observes; --record chooses among that");
   const PolicyKind kind = policy_kind(options);
   const PolicyVariation variation = variation_of(options, kind);
   const StopSignals signals;  // from before a program starts, so that none outlives this one
@@ -453,8 +476,8 @@ int generate(GenerateOptions options, const Console& console, const ProgramInfo&
       make_controls(options.controls, options.seed.value_or(0), model, stepper, console);
   Job job;
   job.run = episode_options(options, model, controls);
-  const Record record = dataset_record(options, model, console);
-  job.run.fields = record.outputs.fields;
+  const Record record = record_of(options.record, model);
+  take(record, model, job.run);
   const GradientKind gradients = gradients_wanted(options, false);
   std::unique_ptr<RolloutLoss> loss;
   if (!options.loss.empty()) loss = make_loss(loss_named(options.loss), model, job.run.every);
@@ -535,14 +558,17 @@ Command add_generate(CLI::App& program) {
            "dense]");
   add_text(
       app, "--record", o.record, "LIST",
-      "Observations to store, separated by commas: q, v, variables, a sensor's field (pad), "
-      "pad.pressure, pad.shear, pad.sum or pad.ideal; other fields are not computed [default: the "
-      "scene's <outputs>, or all]");
+      "Observations to store, separated by commas: q, v, variables, bodies or bodies.NAME, a "
+      "sensor's field (pad), pad.pressure, pad.shear, pad.sum, pad.ideal or pad.markers; NAME/10 "
+      "every 10th "
+      "step, NAME/final at the end; the rest is not computed [default: the scene's <outputs>, or "
+      "all but bodies]");
   add_text(app, "--gradients", o.gradients, "KIND",
            "Derivatives to store: none, return (for a scene with --loss), or jacobians of each row "
            "[default: none]");
   add_text(app, "--loss", o.loss, "NAME",
-           "Loss of a scene, with --gradients return: final, path, tactile, shear or variables");
+           "Loss of a scene, with --gradients return: final, path, tactile, shear, variables or "
+           "markers");
   add_memory_size(
       app, "--tape-memory", o.tape_memory,
       "With --gradients return: memory for the states that all threads keep [default: 1GB each]");

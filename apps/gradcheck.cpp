@@ -219,7 +219,7 @@ Command add_gradcheck(CLI::App& program) {
       .required();
   add_text(app, "--loss", o.loss, "NAME",
            "Loss of a scene: final (last state), path (speeds), tactile or shear (fields), "
-           "variables (end effectors) "
+           "variables (end effectors), markers (of gels) "
            "[default: tactile, or final "
            "where there is no sensor]");
   add_whole_number<std::int64_t>(

@@ -10,8 +10,10 @@
 #include "apps/inspect_effects.hpp"
 #include "apps/inspect_joints.hpp"
 #include "apps/inspect_task.hpp"
+#include "apps/machine.hpp"
 #include "apps/scene_run.hpp"
 #include "apps/task_run.hpp"
+#include "apps/text_output.hpp"
 #include "engine/model/model.hpp"
 #include "engine/step/control.hpp"
 #include "engine/step/stepper.hpp"
@@ -24,7 +26,8 @@ namespace {
 struct InspectArguments {
   std::string scene;
   bool allow_unknown = false;
-  bool effects = false;
+  bool effects = false, overwrite = false;
+  std::string svg;
 };
 
 std::string parent_name(const Scene& scene, const LinkDescription& link) {
@@ -79,14 +82,17 @@ Json as_json(const Model& model) {
                       {"bytes", m.bytes},
                       {"error", m.error},
                       {"unresolved", m.unresolved}});
-  for (const SensorInfo& s : model.sensors())
+  for (std::size_t k = 0; k < model.sensors().size(); ++k) {
+    const SensorInfo& s = model.sensors()[k];
     sensors.push_back({{"name", s.name},
                        {"body", s.body},
                        {"rows", s.rows},
                        {"cols", s.cols},
                        {"points", s.points},
                        {"every", s.every},
-                       {"pressure_sign", s.pressure_sign}});
+                       {"pressure_sign", s.pressure_sign},
+                       {"markers", scene.sensors[k].markers.has_value()}});
+  }
   Json end_effectors = Json::array();
   for (const EndEffectorInfo& v : model.end_effectors())
     end_effectors.push_back({{"name", v.name}, {"joint", v.joint}});
@@ -119,6 +125,7 @@ Json as_json(const Model& model) {
           {"meshes", meshes},
           {"sensors", sensors},
           {"variables", end_effectors},
+          {"outputs", scene.outputs ? Json(scene.outputs->record) : Json()},
           {"control", control_name(scene)},
           {"steps", steps < 0 ? Json() : Json(steps)},
           {"randomized", randomized_names(scene)},
@@ -148,13 +155,23 @@ std::string bodies_text(const Model& model) {
 
 std::string sensors_text(const Model& model) {
   std::string text = fmt::format("sensors ({})\n", model.sensors().size());
-  for (const SensorInfo& s : model.sensors())
-    text += fmt::format("  {} on {}: {}, read {}, pressure reads {}\n", s.name, s.body,
+  for (std::size_t k = 0; k < model.sensors().size(); ++k) {
+    const SensorInfo& s = model.sensors()[k];
+    text += fmt::format("  {} on {}: {}, read {}, pressure reads {}{}\n", s.name, s.body,
                         s.rows > 0 ? fmt::format("{} x {} = {} points", s.rows, s.cols, s.points)
                                    : fmt::format("{} point{}", s.points, s.points == 1 ? "" : "s"),
                         s.every > 0 ? fmt::format("every {} steps", s.every) : "every step",
-                        s.pressure_sign > 0 ? "positive (+1)" : "negative (-1)");
+                        s.pressure_sign > 0 ? "positive (+1)" : "negative (-1)",
+                        model.scene().sensors[k].markers ? ", markers" : "");
+  }
   return text;
+}
+
+/// What runs of the scene compute and store.
+std::string outputs_text(const Scene& scene) {
+  if (!scene.outputs) return "outputs: everything\n";
+  return fmt::format("outputs ({}:{}): {}\n", scene.outputs->source.file,
+                     scene.outputs->source.line, fmt::join(scene.outputs->record, ", "));
 }
 
 std::string end_effectors_text(const Model& model) {
@@ -187,7 +204,8 @@ std::string as_text(const Model& model) {
   for (const ContactInfo& c : model.contacts())
     text += fmt::format("  {} on {}: {} point{}, law {}\n", c.first, c.second, c.points,
                         c.points == 1 ? "" : "s", c.law);
-  text += '\n' + sensors_text(model) + end_effectors_text(model) + "\neffects\n";
+  text += '\n' + sensors_text(model) + end_effectors_text(model) + '\n' + outputs_text(scene);
+  text += "\neffects\n";
   for (const EffectInfo& e : model.effects())
     if (e.effect.element < 0)
       text += fmt::format("  {:<4} {:<24} {}\n", e.on ? "on" : "off", e.name, e.reason);
@@ -207,10 +225,18 @@ int report(const Model& model, const TaskSpec* task, const InspectArguments& opt
   Json result = as_json(model);
   result["task"] = task != nullptr ? task_json(*task) : Json();
   if (options.effects) {
+    TextOutput svg(options.svg, options.overwrite);
     const EffectCosts costs = measure_effects(model);
+    if (svg.wanted())
+      svg.write(
+          effect_costs_svg(costs, model.scene().name,
+                           fmt::format("{}, {}", processor_name(), kernels::active_isa_name())),
+          console);
     console.print(effect_costs_text(costs, kernels::active_isa_name()));
     result["effect_costs"] = effect_costs_json(costs);
+    result["run_costs"] = run_costs_json(costs);
     result["effect_measurement"] = effect_measurement_json(costs);
+    result["svg"] = options.svg.empty() ? Json() : Json(options.svg);
   } else {
     if (task != nullptr) console.print(task_text(*task));
     console.print(as_text(model));
@@ -220,6 +246,9 @@ int report(const Model& model, const TaskSpec* task, const InspectArguments& opt
 }
 
 int inspect(const InspectArguments& options, const Console& console) {
+  if (!options.svg.empty() && !options.effects)
+    throw InputError("--svg without --effects; expected both");
+  check_outputs(options.svg, "", {options.scene});
   if (const std::unique_ptr<Task> task = find_task(options.scene, console)) {
     refuse_with_task(*task, {{"--allow-unknown", options.allow_unknown}});
     return report(task->model(), &task->spec(), options, console);
@@ -242,6 +271,8 @@ Command add_inspect(CLI::App& program) {
            "Unknown elements and attributes are warnings, not errors");
   add_flag(app, "--effects", options->effects,
            "Measure what each effect of the scene costs, and print that instead");
+  add_text(app, "--svg", options->svg, "F.svg", "With --effects: write a picture of it");
+  add_flag(app, "--overwrite", options->overwrite, "Replace the picture if it exists");
   add_console_options(app, *console);
   return {&app, [=](const ProgramInfo&) { return inspect(*options, *console); }};
 }

@@ -10,6 +10,8 @@
 #include <nlohmann/json.hpp>
 #include <vector>
 
+#include "io/picture/share_plot.hpp"
+
 namespace tangere::apps {
 namespace {
 
@@ -71,6 +73,23 @@ std::string row(const EffectCost& c, std::size_t width) {
                      padded(c.measured ? microseconds(c.seconds_without) : "-", 9, true),
                      padded(c.measured ? fmt::format("{:.2f}", c.passes_without) : "-", 6, true),
                      c.bytes, why);
+}
+
+/// Rows of a table of their own: they are no part of a step.
+std::string run_costs_text(const EffectCosts& costs) {
+  if (costs.of_runs.empty()) return "";
+  std::size_t width = 10;
+  for (const RunCost& c : costs.of_runs) width = std::max(width, c.name.size());
+  std::string text = fmt::format(
+      "\n  {} {} {} {:>7}  {}\n", padded("what a run adds", std::max<std::size_t>(width, 15)),
+      padded("share", 9, true), padded("time", 9, true), "bytes", "asked for by");
+  for (const RunCost& c : costs.of_runs)
+    text +=
+        fmt::format("  {} {} {} {:>7}  {}{}\n", padded(c.name, std::max<std::size_t>(width, 15)),
+                    padded(fmt::format("{:.1f} %", 100 * c.share), 9, true),
+                    padded(microseconds(c.seconds), 9, true), c.bytes,
+                    c.on ? "" : "not unless asked: ", c.asked_by);
+  return text;
 }
 
 }  // namespace
@@ -148,7 +167,44 @@ std::string effect_costs_text(const EffectCosts& costs, const std::string& instr
       off.push_back(fmt::format("{} ({})", c.effect.name, c.effect.reason));
   }
   if (!off.empty()) text += fmt::format("\n  off, at no cost: {}\n", fmt::join(off, ", "));
+  text += run_costs_text(costs);
   return text;
+}
+
+Json run_costs_json(const EffectCosts& costs) {
+  Json list = Json::array();
+  for (const RunCost& c : costs.of_runs)
+    list.push_back({{"name", c.name},
+                    {"on", c.on},
+                    {"asked_by", c.asked_by},
+                    {"share", c.share},
+                    {"seconds", c.seconds},
+                    {"bytes", c.bytes}});
+  return list;
+}
+
+std::string effect_costs_svg(const EffectCosts& costs, const std::string& scene,
+                             const std::string& machine) {
+  ShareBars shares;
+  shares.title = "where a step's time goes: " + scene;
+  shares.captions = {
+      fmt::format("a step of one environment takes {}{}, {:.2f} Newton passes",
+                  microseconds(costs.times.whole()),
+                  costs.times.reading > 0
+                      ? ", of it " + microseconds(costs.times.reading) + " to read sensors"
+                      : "",
+                  costs.times.passes),
+      fmt::format("{}; {} environments, {} instants of {}; chance alone shows {}", machine,
+                  costs.environments, costs.instants, steps_text(costs), percent(costs.itself))};
+  shares.groups = {"effects of the scene, as shares of a step",
+                   "part of a contact or sensor above it",
+                   "what a run adds to a step because it is asked to"};
+  for (const EffectCost& c : costs.effects)
+    if (c.effect.on && c.measured && is_shown(costs, c))
+      shares.bars.push_back({c.effect.name, c.measured->share, c.measured->spread,
+                             is_part(c.effect.effect.kind) ? 1 : 0});
+  for (const RunCost& c : costs.of_runs) shares.bars.push_back({c.name, c.share, 0, 2});
+  return render_share_svg(shares);
 }
 
 }  // namespace tangere::apps

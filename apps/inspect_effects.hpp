@@ -16,4 +16,11 @@ Json effect_measurement_json(const EffectCosts& costs);
 /// A row per effect that is on; those that are off in one paragraph.
 std::string effect_costs_text(const EffectCosts& costs, const std::string& instruction_set);
 
+/// What a run adds to steps, a list.
+Json run_costs_json(const EffectCosts& costs);
+/// A picture of the shares, those of single contacts and sensors where they are timed. `scene`: its
+/// name. `machine`: processor and instruction set.
+std::string effect_costs_svg(const EffectCosts& costs, const std::string& scene,
+                             const std::string& machine);
+
 }  // namespace tangere::apps

@@ -50,7 +50,7 @@ struct Program {
         "Print version, instruction set and compiler");
     for (const auto add : {add_inspect, add_import, add_simulate, add_generate, add_validate,
                            add_info, add_merge, add_export, add_plot, add_view, add_bench,
-                           add_gradcheck, add_accuracy, add_stress, add_skin})
+                           add_gradcheck, add_identify, add_accuracy, add_stress, add_skin})
       commands.push_back(add(parser.root()));
   }
 };

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Names of outputs become readings of sensors; bodies and end effectors are all or none.
+// Words become readings of sensors, bodies and times. '.' says which part, '/' says when, and a
+// comma parts them, so no word needs quotes in a shell.
 #include "apps/record.hpp"
 
 #include <fmt/format.h>
@@ -11,44 +12,110 @@
 #include "io/files/nearest_name.hpp"
 
 namespace tangere::apps {
+namespace {
+
+/// A word and what it means; throws for one that the scene does not have.
+AskedOutput asked_of(const std::string& word, const std::string& where, const Model& model) {
+  const std::vector<std::string> sensors = sensor_names(model.scene());
+  AskedOutput asked;
+  try {
+    TimedName split = split_times(word);
+    asked = {std::move(split.name), split.times};
+  } catch (const InputError& error) {
+    throw InputError(where + ": " + error.what());
+  }
+  const std::string& name = asked.name;
+  const std::optional<FieldOutput> reading = find_output(sensors, name);
+  const bool of_sensor = reading.has_value(),
+             other = is_plain_output(name) || find_body_output(model.scene(), name);
+  if (of_sensor && other)
+    throw InputError(where + ": '" + name + "' is a sensor, too; expected one of another name");
+  if (reading)
+    if (const std::string reason = reason_against(model.scene(), *reading); !reason.empty())
+      throw InputError(fmt::format("{}: '{}', but {}", where, word, reason));
+  if (!of_sensor && !other)
+    throw InputError(fmt::format("{}: unknown observation '{}'{}", where, name,
+                                 suggestion(name, output_names(model.scene()))));
+  return asked;
+}
+
+}  // namespace
+
+const AskedOutput* Record::find(const std::string& name) const {
+  const auto found = std::find_if(asked.begin(), asked.end(),
+                                  [&](const AskedOutput& a) { return a.name == name; });
+  return found == asked.end() ? nullptr : &*found;
+}
 
 Record record_of(const std::string& option, const Model& model) {
   Record record;
+  std::vector<std::string> words;
   if (!option.empty()) {
-    record.names = split_names("--record", option);
+    words = split_names("--record", option);
+    record.where = "--record";
   } else if (model.scene().outputs) {
-    record.names = model.scene().outputs->record;
+    words = model.scene().outputs->record;
+    record.where = model.scene().outputs->source.prefix() + "<outputs>";
   }
-  if (record.names.empty()) return record;
-  const auto asked = [&](const char* name) {
-    return std::find(record.names.begin(), record.names.end(), name) != record.names.end();
-  };
-  const std::string where =
-      option.empty() ? model.scene().outputs->source.prefix() + "<outputs>" : "--record";
+  if (words.empty()) return record;
+  for (const std::string& word : words) {
+    AskedOutput asked = asked_of(word, record.where, model);
+    if (record.find(asked.name) != nullptr)
+      throw InputError(
+          fmt::format("{}: '{}' is listed twice; expected it once, at times of one kind",
+                      record.where, asked.name));
+    record.asked.push_back(std::move(asked));
+  }
+  RolloutOutputs& outputs = record.outputs;
+  outputs.bodies = record.find("bodies") != nullptr;
+  outputs.end_effectors = record.find("variables") != nullptr;
+  if (outputs.end_effectors && model.end_effectors().empty())
+    throw InputError(record.where + ": 'variables', but the scene has no end effectors");
+  if (outputs.end_effectors) outputs.of_end_effectors = record.find("variables")->times;
+  const AskedOutput* const q = record.find("q");
+  const AskedOutput* const v = record.find("v");
+  if (q != nullptr) outputs.states = q->times;
+  if (v != nullptr) outputs.states = v->times;
+  outputs.fields.emplace();
   const std::vector<std::string> sensors = sensor_names(model.scene());
-  record.outputs.bodies = asked("bodies");
-  record.outputs.end_effectors = asked("variables");
-  if (record.outputs.end_effectors && model.end_effectors().empty())
-    throw InputError(where + ": 'variables', but the scene has no end effectors");
-  record.outputs.fields.emplace();
-  for (const std::string& name : record.names) {
-    if (is_plain_output(name)) {
-      if (find_output(sensors, name))
-        throw InputError(where + ": '" + name + "' is a sensor, too; expected one of another name");
-      continue;
+  for (const AskedOutput& asked : record.asked)
+    if (std::optional<FieldOutput> field = find_output(sensors, asked.name)) {
+      field->times = asked.times;
+      outputs.fields->push_back(*field);
     }
-    const std::optional<FieldOutput> field = find_output(sensors, name);
-    if (!field)
-      throw InputError(fmt::format("{}: unknown observation '{}'{}", where, name,
-                                   suggestion(name, output_names(sensors))));
-    record.outputs.fields->push_back(*field);
-  }
   // The order of words does not make another data set.
-  std::sort(record.outputs.fields->begin(), record.outputs.fields->end(),
+  std::sort(outputs.fields->begin(), outputs.fields->end(),
             [](const FieldOutput& a, const FieldOutput& b) {
               return std::pair(a.sensor, a.form) < std::pair(b.sensor, b.form);
             });
   return record;
+}
+
+void take_bodies(Record& record, const Model& model) {
+  const AskedOutput* first = record.find("bodies");
+  RolloutOutputs& outputs = record.outputs;
+  for (const AskedOutput& asked : record.asked) {
+    const std::optional<int> body = find_body_output(model.scene(), asked.name);
+    if (!body) continue;
+    if (outputs.bodies && outputs.chosen_bodies.empty())
+      throw InputError(fmt::format("{}: 'bodies' and '{}'; expected all bodies, or names of some",
+                                   record.where, asked.name));
+    if (first != nullptr && asked.times != first->times)
+      throw InputError(fmt::format("{}: '{}{}' and '{}{}'; expected one interval of all bodies",
+                                   record.where, first->name, to_string(first->times), asked.name,
+                                   to_string(asked.times)));
+    first = &asked;
+    outputs.bodies = true;
+    outputs.chosen_bodies.push_back(*body);
+  }
+  if (first != nullptr) outputs.of_bodies = first->times;
+  std::sort(outputs.chosen_bodies.begin(), outputs.chosen_bodies.end());
+  // A trajectory has one list of rows for both.
+  const AskedOutput* const q = record.find("q");
+  const AskedOutput* const v = record.find("v");
+  if (q != nullptr && v != nullptr && q->times != v->times)
+    throw InputError(fmt::format("{}: 'q{}' and 'v{}'; expected one interval of both", record.where,
+                                 to_string(q->times), to_string(v->times)));
 }
 
 }  // namespace tangere::apps

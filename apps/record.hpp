@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// --record, or <outputs> of the scene: what a run of a scene computes and stores.
+// --record, or <outputs> of the scene: what a run of a scene computes and stores, and when.
 #pragma once
 
 #include <string>
@@ -9,13 +9,25 @@
 
 namespace tangere::apps {
 
+/// What was asked for by name, with its times: "q/final", "bodies.box", "pad.sum/10".
+struct AskedOutput {
+  std::string name;  ///< without times
+  OutputTimes times;
+};
+
 struct Record {
-  std::vector<std::string> names;  ///< as asked for; none: everything
+  std::vector<AskedOutput> asked;  ///< none: everything
   RolloutOutputs outputs;
+  std::string where;  ///< "--record", or file, line and <outputs>; for messages
+
+  [[nodiscard]] const AskedOutput* find(const std::string& name) const;
 };
 
 /// Returns what the option asks for; if it is empty, what the scene asks for. Throws InputError for
-/// a name that the scene does not have.
+/// a name that the scene does not have. Single bodies are left to the caller, see take_bodies().
 Record record_of(const std::string& option, const Model& model);
+
+/// Makes the bodies that are asked for one output. Throws InputError where their times differ.
+void take_bodies(Record& record, const Model& model);
 
 }  // namespace tangere::apps

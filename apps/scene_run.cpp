@@ -122,10 +122,10 @@ Json note_costly_steps(const Console& console, Integrator integrator, double acc
 void note_empty_sensors(const Console& console, const Model& model, const RolloutOptions& rollout) {
   for (const FieldOutput of : fields_of(model, rollout.outputs)) {
     const SensorInfo& sensor = model.sensors()[static_cast<std::size_t>(of.sensor)];
-    const int every = tactile_interval(sensor, rollout);
-    if (tactile_frames(sensor, rollout) == 0)
+    if (tactile_frames(model, of, rollout) == 0)
       console.note(fmt::format("sensor {} is read every {} steps: no field in {} steps",
-                               sensor.name, every, rollout.steps));
+                               sensor.name, reading_times(model, of, rollout).every,
+                               rollout.steps));
   }
 }
 

@@ -61,9 +61,10 @@ void check_size(const Model& model, int environments, const RolloutOptions& roll
 }
 
 RolloutOutputs outputs_of(const SimulateArguments& options, const Model& model) {
-  RolloutOutputs outputs = record_of(options.record, model).outputs;
-  outputs.audit = options.audit;
-  return outputs;
+  Record record = record_of(options.record, model);
+  take_bodies(record, model);
+  record.outputs.audit = options.audit;
+  return record.outputs;
 }
 
 /// `task`: null for a scene alone.
@@ -76,6 +77,10 @@ TrajectoryLayout make_layout(const Batch& batch, const Stepper& stepper,
   run.fields = fields_of(batch.model(), rollout.outputs);
   run.bodies = rollout.outputs.bodies;
   run.end_effectors = rollout.outputs.end_effectors;
+  run.states = rollout.outputs.states;
+  run.of_bodies = rollout.outputs.of_bodies;
+  run.of_end_effectors = rollout.outputs.of_end_effectors;
+  run.chosen_bodies = rollout.outputs.chosen_bodies;
   run.audit = rollout.outputs.audit;
   run.steps = rollout.steps;
   run.first_step = rollout.first_step;
@@ -144,8 +149,8 @@ int report(const SimulateArguments& options, const Console& console, const Batch
     const SensorInfo& sensor = batch.model().sensors()[static_cast<std::size_t>(of.sensor)];
     sensors.push_back({{"name", sensor.name},
                        {"form", to_string(of.form)},
-                       {"every", tactile_interval(sensor, rollout)},
-                       {"frames", tactile_frames(sensor, rollout)}});
+                       {"every", reading_times(batch.model(), of, rollout).every},
+                       {"frames", tactile_frames(batch.model(), of, rollout)}});
   }
   const Json costly =
       note_costly_steps(console, stepper.integrator(), stepper.accuracy(),
@@ -232,10 +237,10 @@ struct Start {
           fmt::format("{} does not hold which bodies slept: the run goes on with all of "
                       "them awake, and not with the bits of one long run",
                       saved->path));
-    else if (saved->row == 0 && saved->step > 0)
+    else if (saved->previous_q.empty() && saved->step > 0)
       console.note(
-          fmt::format("row 0 of {} has no row before it: a scheme of two steps starts anew there",
-                      saved->path));
+          fmt::format("row {} of {} has no row before it: a scheme of two steps starts anew there",
+                      saved->row, saved->path));
     if (saved->scene_text != scene.text)
       console.note(fmt::format("the scene is not the one that {} was made with", saved->path));
     if (saved->seed != seed)
@@ -472,9 +477,11 @@ Command add_simulate(CLI::App& program) {
                         "Environments stepped together [default: 1, or those of --state-from]");
   add_text(
       app, "--record", o.record, "LIST",
-      "What to compute and store besides q and v, separated by commas: bodies, variables, a "
-      "sensor's field (pad), pad.pressure, pad.shear, pad.sum or pad.ideal [default: the scene's "
-      "<outputs>, or all]");
+      "What to compute and store besides q and v, separated by commas: bodies or bodies.NAME, "
+      "variables, a sensor's field (pad), pad.pressure, pad.shear, pad.sum, pad.ideal or "
+      "pad.markers; NAME/10 "
+      "every 10th step, NAME/final at the end, of q and v too [default: the scene's <outputs>, or "
+      "all]");
   add_flag(app, "--audit", o.audit,
            "Also compute and store energy and momentum, what motors, damping and friction did, and "
            "what the scheme made");
@@ -495,7 +502,7 @@ Command add_simulate(CLI::App& program) {
   add_text(
       app, "--gradients", o.gradients, "LOSS",
       "Also write derivatives of a loss by controls, start and the scene's numbers: final, path, "
-      "tactile, shear or variables");
+      "tactile, shear, variables or markers");
   add_flag(app, "--point-gradients", o.point_gradients,
            "With --gradients: also by place and coefficients of every tactile point");
   add_memory_size(app, "--tape-memory", o.tape_memory,

@@ -34,6 +34,13 @@ std::unique_ptr<Task> find_task(const std::string& word, const Console& console,
   return nullptr;
 }
 
+void note_outputs_of(const Console& console, const Task& task, const std::string& instead) {
+  const std::optional<OutputsDescription>& outputs = task.model().scene().outputs;
+  if (outputs)
+    console.note(fmt::format("{}<outputs> are for runs of the scene: task {} {}",
+                             outputs->source.prefix(), task.spec().name, instead));
+}
+
 PolicyKind policy_named(const std::string& name, const std::string& table, PolicyKind fallback) {
   PolicyKind kind = table.empty() ? fallback : PolicyKind::csv;
   if (!name.empty())

@@ -18,6 +18,10 @@ namespace tangere::apps {
 std::unique_ptr<Task> find_task(const std::string& word, const Console& console,
                                 const SolverOptions& asked = {});
 
+/// Says that the <outputs> of a task's scene are for runs of that scene, if it has some. `instead`:
+/// what happens to the task ("stores what it observes").
+void note_outputs_of(const Console& console, const Task& task, const std::string& instead);
+
 /// The policy called `name`, or `fallback` if that is empty. With a table it is csv. Throws
 /// InputError for another name, for csv without a table, and for a table with another policy.
 PolicyKind policy_named(const std::string& name, const std::string& table, PolicyKind fallback);

@@ -43,6 +43,7 @@ set(public_headers
   engine/model/effects.hpp
   engine/model/field_form.hpp
   engine/model/model.hpp
+  engine/model/output_times.hpp
   engine/model/random.hpp
   engine/model/scene.hpp
   engine/model/scene_number.hpp
@@ -55,6 +56,7 @@ set(public_headers
   engine/rows/task_spec.hpp
   engine/sense/audit.hpp
   engine/sense/flow_map.hpp
+  engine/sense/marker_map.hpp
   engine/sense/readout.hpp
   engine/sense/start_overlaps.hpp
   engine/sense/tactile_frame.hpp

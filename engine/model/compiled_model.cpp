@@ -8,6 +8,7 @@
 
 #include "engine/model/compile_imperfections.hpp"
 #include "engine/model/compile_joints.hpp"
+#include "engine/model/compile_markers.hpp"
 #include "engine/model/compile_memories.hpp"
 #include "engine/model/compile_variations.hpp"
 #include "engine/model/effects_and_stages.hpp"
@@ -280,6 +281,7 @@ class Compiler {
       sensor.body = b;
       sensor.number = static_cast<int>(i);
       compile_imperfections(d, m_.scene.timestep, sensor, info);
+      if (d.markers) static_cast<void>(compile_markers(d, info.pressure_sign));  // checks them
       m_.layout.past_states = std::max(m_.layout.past_states, info.past_states);
       sensor.parameters = constants(d.coefficients);
       for (int t = 0; t < static_cast<int>(m_.bodies.size()); ++t)

@@ -468,10 +468,8 @@ bool has_way(EffectKind kind, Way way) {
 /// Readings of sensors that are gone are no outputs.
 static void keep_known_outputs(Scene& scene) {
   if (!scene.outputs) return;
-  const std::vector<std::string> sensors = sensor_names(scene);
-  std::erase_if(scene.outputs->record, [&](const std::string& name) {
-    return !is_plain_output(name) && !find_output(sensors, name);
-  });
+  std::erase_if(scene.outputs->record,
+                [&](const std::string& word) { return !has_output(scene, word); });
 }
 
 Scene without(Scene scene, const Effect& effect, Way way) {

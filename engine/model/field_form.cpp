@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <iterator>
+#include <string_view>
 
 #include "engine/base/error.hpp"
 
@@ -11,8 +12,9 @@ namespace tangere {
 
 namespace {
 constexpr FieldForm kForms[] = {FieldForm::field, FieldForm::pressure, FieldForm::shear,
-                                FieldForm::sum, FieldForm::ideal};
+                                FieldForm::sum,   FieldForm::ideal,    FieldForm::markers};
 constexpr const char* kPlain[] = {"q", "v", "variables", "bodies"};
+constexpr const char* kBody = "bodies.";  // followed by the name of one
 }  // namespace
 
 const char* to_string(FieldForm form) {
@@ -22,6 +24,7 @@ const char* to_string(FieldForm form) {
     case FieldForm::shear: return "shear";
     case FieldForm::sum: return "sum";
     case FieldForm::ideal: return "ideal";
+    case FieldForm::markers: return "markers";
   }
   return "unknown";
 }
@@ -31,7 +34,8 @@ int components_of(FieldForm form) {
     case FieldForm::field:
     case FieldForm::ideal: return 3;
     case FieldForm::pressure: return 1;
-    case FieldForm::shear: return 2;
+    case FieldForm::shear:
+    case FieldForm::markers: return 2;
     case FieldForm::sum: break;
   }
   return 0;
@@ -53,7 +57,8 @@ std::vector<std::string> sensor_names(const Scene& scene) {
 }
 
 bool is_plain_output(const std::string& name) {
-  return std::find(std::begin(kPlain), std::end(kPlain), name) != std::end(kPlain);
+  return std::any_of(std::begin(kPlain), std::end(kPlain),
+                     [&](std::string_view plain) { return plain == name; });
 }
 
 std::optional<FieldOutput> find_output(std::span<const std::string> sensors,
@@ -65,14 +70,37 @@ std::optional<FieldOutput> find_output(std::span<const std::string> sensors,
   return std::nullopt;
 }
 
+std::string body_output(const std::string& body) { return kBody + body; }
+
+std::optional<int> find_body_output(const Scene& scene, const std::string& name) {
+  for (std::size_t b = 0; b < scene.links.size(); ++b)
+    if (name == body_output(scene.links[b].body.name)) return static_cast<int>(b);
+  return std::nullopt;
+}
+
+bool has_output(const Scene& scene, const std::string& word) {
+  const std::string name = split_times(word).name;
+  return is_plain_output(name) || find_body_output(scene, name) ||
+         find_output(sensor_names(scene), name);
+}
+
+std::string reason_against(const Scene& scene, const FieldOutput& output) {
+  const TactileDescription& sensor = scene.sensors[static_cast<std::size_t>(output.sensor)];
+  if (output.form != FieldForm::markers || sensor.markers) return "";
+  return sensor.source.prefix() + "sensor '" + sensor.name +
+         "' has no <markers>; expected them in its <tactile>";
+}
+
 void check_outputs(std::span<const FieldOutput> outputs, std::size_t sensors) {
   for (std::size_t k = 0; k < outputs.size(); ++k) {
     const FieldOutput of = outputs[k];
     if (of.sensor < 0 || static_cast<std::size_t>(of.sensor) >= sensors)
       throw InputError("an output of sensor " + std::to_string(of.sensor) + "; the scene has " +
                        std::to_string(sensors));
-    if (std::find(outputs.begin(), outputs.begin() + static_cast<std::ptrdiff_t>(k), of) !=
-        outputs.begin() + static_cast<std::ptrdiff_t>(k))
+    const auto before = outputs.first(k);
+    if (std::any_of(before.begin(), before.end(), [&](const FieldOutput& other) {
+          return other.sensor == of.sensor && other.form == of.form;
+        }))
       throw InputError("the " + std::string(to_string(of.form)) + " of sensor " +
                        std::to_string(of.sensor) + " is listed twice; expected it once");
   }
@@ -85,10 +113,35 @@ std::vector<FieldOutput> whole_fields(const Model& model) {
   return outputs;
 }
 
+std::vector<FieldOutput> asked_fields(const Model& model) {
+  if (!model.scene().outputs) return whole_fields(model);
+  const std::vector<std::string> sensors = sensor_names(model.scene());
+  std::vector<FieldOutput> outputs;
+  for (const std::string& word : model.scene().outputs->record) {
+    const TimedName timed = split_times(word);
+    if (std::optional<FieldOutput> of = find_output(sensors, timed.name)) {
+      of->times = timed.times;
+      outputs.push_back(*of);
+    }
+  }
+  return outputs;
+}
+
 std::vector<std::string> output_names(std::span<const std::string> sensors) {
   std::vector<std::string> names(std::begin(kPlain), std::end(kPlain));
   for (const std::string& sensor : sensors)
     for (const FieldForm form : kForms) names.push_back(output_name(sensor, form));
+  return names;
+}
+
+std::vector<std::string> output_names(const Scene& scene) {
+  const std::vector<std::string> sensors = sensor_names(scene);
+  std::vector<std::string> names = output_names(sensors);
+  std::erase_if(names, [&](const std::string& name) {
+    const std::optional<FieldOutput> of = find_output(sensors, name);
+    return of && !reason_against(scene, *of).empty();
+  });
+  for (const LinkDescription& link : scene.links) names.push_back(body_output(link.body.name));
   return names;
 }
 

@@ -162,6 +162,15 @@ struct TactilePoint {
   std::array<double, 4> factors{1, 1, 1, 1};  ///< multiply the sensor's kn, kt, mu, damping
 };
 
+/// Markers that are printed on a gel, one at every point: what a camera behind it sees
+/// (engine/sense/marker_map.hpp).
+struct MarkersDescription {
+  double stiffness = 0;  ///< of the gel under a point against shear [N/m]; 0: the sensor's ks
+  double thickness = 0;  ///< of the gel [m]; 0: it does not bulge beside a press
+  double spread = 0;     ///< distance over which the surface moves along [m]
+  Source source;
+};
+
 struct TactileDescription {
   std::string name;
   std::string body;
@@ -172,7 +181,8 @@ struct TactileDescription {
   int every = 0;                     ///< read every k-th step; 0: not given, the caller chooses
   std::optional<int> pressure_sign;  ///< +1 or -1; found from the geometry when not given
   Source source;
-  SensorImperfections imperfections{};  ///< of its readings; none to begin with
+  SensorImperfections imperfections{};          ///< of its readings; none to begin with
+  std::optional<MarkersDescription> markers{};  ///< none: it has none
 };
 
 /// Lists the points of a sensor in field order: those of an array row by row, with its axes. The

@@ -14,6 +14,8 @@ using Of = SensorImperfections;
 constexpr double kNoLimit = std::numeric_limits<double>::max();
 
 constexpr ImperfectionKind kImperfectionKinds[] = {
+    {"hysteresis", "1", 1, &Of::hysteresis, nullptr},
+    {"hysteresis_time", "s", 1e3, &Of::hysteresis_time, nullptr},
     {"low_pass", "s", 1e3, &Of::low_pass, nullptr},
     {"delay", "s", 1e3, &Of::delay, nullptr},
     {"spread", "m", 1e3, &Of::spread, nullptr},
@@ -43,7 +45,7 @@ bool is_imperfect(const SensorImperfections& imperfections) {
 }
 
 bool has_memory(const SensorImperfections& imperfections) {
-  return imperfections.low_pass != 0 || imperfections.delay != 0;
+  return imperfections.hysteresis != 0 || imperfections.low_pass != 0 || imperfections.delay != 0;
 }
 
 std::string text_of(const SensorImperfections& imperfections) {
@@ -73,6 +75,10 @@ void check_imperfections(const SensorImperfections& imperfections, const std::st
                                    unit == "1" ? "" : " " + unit));
     }
   }
+  if ((imperfections.hysteresis != 0) != (imperfections.hysteresis_time != 0))
+    throw InputError(fmt::format(
+        "{}hysteresis=\"{}\" with hysteresis_time=\"{}\" s; expected both above 0, or neither",
+        where, imperfections.hysteresis, imperfections.hysteresis_time));
   const char* const needs = imperfections.crosstalk != 0 ? "crosstalk"
                             : imperfections.spread != 0  ? "spread"
                                                          : nullptr;

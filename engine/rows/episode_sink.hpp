@@ -49,8 +49,8 @@ struct EpisodeRows {
   int rows = 0;
   int action_rows = 0;             ///< `rows`, or one less when the last row is among them
   std::span<const float> actions;  ///< (episodes, action_rows, nu) in [-1, 1]
-  /// q and v, then the observations of a task, or the end effectors (if any) and sensors of a
-  /// scene. Each is (episodes, rows, width).
+  /// q and v, then the observations of a task, or the end effectors (if any), bodies (if asked for)
+  /// and sensors of a scene. Each is (episodes, rows at which it is taken, width).
   std::span<const Observation> observations;
   std::span<const float> rewards = {};  ///< (episodes, action_rows); tasks only
   /// (episodes, as many as the scene varies) numbers that vary between episodes.

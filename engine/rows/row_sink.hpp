@@ -14,11 +14,12 @@ namespace tangere {
 struct StateRow {
   std::int64_t step;          ///< t
   double time;                ///< t h [s]
-  std::span<const double> q;  ///< (E, nq)
-  std::span<const double> v;  ///< (E, nv)
-  /// (E, nb, 7) x y z qw qx qy qz of each body frame in the world; empty if not asked for.
+  std::span<const double> q;  ///< (E, nq); empty if not asked for at this row
+  std::span<const double> v;  ///< (E, nv); as q
+  /// (E, nb, 7) x y z qw qx qy qz of each body frame in the world, or of those that are asked for;
+  /// empty if none is, or not at this row.
   std::span<const double> body_pose;
-  /// (E, nb, 6) angular, then linear velocity of its origin, world axes; empty if not asked for.
+  /// (E, nb, 6) angular, then linear velocity of its origin, world axes; as the poses.
   std::span<const double> body_twist;
   /// (E, n, 3) world positions of the end effectors [m]; empty if n = 0 or not asked for.
   std::span<const double> end_effectors = {};
@@ -26,8 +27,9 @@ struct StateRow {
 
 /// What step t (from row t to row t + 1) used, and how its solve went.
 struct StepRow {
-  std::int64_t step;                         ///< t
-  std::span<const double> u;                 ///< (E, nu) controls as given, before clipping
+  std::int64_t step;  ///< t
+  std::span<const double>
+      u;  ///< (E, nu) controls as given, before clipping; empty if not asked for
   std::span<const std::int32_t> iterations;  ///< (E) Newton passes, sub-steps included
   std::span<const std::int8_t> status;       ///< (E) StepStatus
   std::span<const double> residual;          ///< (E) scaled residual at acceptance, dimensionless

@@ -9,6 +9,7 @@
 
 #include "engine/model/random_run.hpp"
 #include "engine/sense/dense_tiles.hpp"
+#include "engine/sense/spread_field.hpp"
 
 namespace tangere {
 namespace {
@@ -114,39 +115,10 @@ ImperfectField::ImperfectField(const Model& model) {
   shared_.resize(most);
 }
 
-/// Multiplies what belongs to each place along an axis, `stride` numbers apart, by its scale.
-/// `lines`: how often the axis repeats.
-static void scale_along(const LateralSpread& of, int stride, int lines, double* x) {
-  for (int line = 0; line < lines; ++line)
-    for (const double scale : of.scale)
-      for (int k = 0; k < stride; ++k) *x++ *= scale;
-}
-
-/// y_i = Σ_j kernel[|i - j|] scale_j x_j along rows, then along columns; `back`: the transpose.
 void ImperfectField::spread(const CompiledSensor& s, int components, bool back,
                             std::span<double> field) {
   if (s.imperfections.spread == 0) return;
-  const int row = components * s.grid_cols;
-  const auto along = [&](const LateralSpread& of, int points, int stride, int lines) {
-    if (of.kernel.empty()) return;
-    if (!back) scale_along(of, stride, lines, field.data());
-    std::copy(field.begin(), field.end(), before_.begin());
-    std::fill(field.begin(), field.end(), 0.0);
-    const int reach = static_cast<int>(of.kernel.size()) - 1;
-    for (int line = 0; line < lines; ++line) {
-      double* const to = field.data() + line * points * stride;
-      const double* const from = before_.data() + line * points * stride;
-      for (int way = -reach; way <= reach; ++way) {
-        const double share = of.kernel[std::size_t(std::abs(way))];
-        const int first = stride * std::max(0, -way), end = stride * std::min(points, points - way),
-                  shift = stride * way;
-        for (int k = first; k < end; ++k) to[k] += share * from[k + shift];
-      }
-    }
-    if (back) scale_along(of, stride, lines, field.data());
-  };
-  along(s.spread[0], s.grid_rows, row, 1);
-  along(s.spread[1], s.grid_cols, components, s.grid_rows);
+  spread_field(s.spread, s.grid_rows, s.grid_cols, components, back, field, before_);
 }
 
 /// x += c Σ (neighbour - x) on a grid, component by component. The matrix is symmetric.
@@ -257,7 +229,7 @@ void check_has_no_memory(const Model& model, int sensor) {
   const std::string where =
       model.scene().sensors[std::size_t(sensor)].imperfections.source.prefix();
   throw InputError(where + "derivatives of sensor '" + info.name +
-                   "', which has low_pass or delay; expected a sensor without them");
+                   "', which has low_pass, hysteresis or delay; expected a sensor without them");
 }
 
 void read_ideal(PadReader& reader, const CompiledSensor& sensor, int group, int lane,

@@ -32,11 +32,12 @@ void write_positions(const CompiledModel& m, const PadReader& reader, int group,
 }  // namespace
 
 void read_bodies(const CompiledModel& m, PadReader& reader, const Batch& batch, int environment,
-                 std::span<double> pose, std::span<double> twist) {
+                 std::span<double> pose, std::span<double> twist, std::span<const int> chosen) {
   const int group = environment % kBlock / kGroup, lane = environment % kGroup;
   reader.move(batch, environment / kBlock, group);
-  for (std::size_t b = 0; b < m.bodies.size(); ++b) {
-    const CompiledBody& body = m.bodies[b];
+  const std::size_t count = chosen.empty() ? m.bodies.size() : chosen.size();
+  for (std::size_t b = 0; b < count; ++b) {
+    const CompiledBody& body = m.bodies[chosen.empty() ? b : std::size_t(chosen[b])];
     const kernels::LinkPose<double> link = reader.link(body.link, group, lane);
     const kernels::Frame<double> at = compose(link.world, body.frame);
     const kernels::Quat<double> o = quaternion_of(at.R);

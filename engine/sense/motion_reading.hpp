@@ -10,8 +10,9 @@
 namespace tangere {
 
 /// The reader of these functions is of the model `m`. It moves to the group of the environment.
+/// `chosen`: bodies to read; none: all.
 void read_bodies(const CompiledModel& m, PadReader& reader, const Batch& batch, int environment,
-                 std::span<double> pose, std::span<double> twist);
+                 std::span<double> pose, std::span<double> twist, std::span<const int> chosen);
 
 /// Leaves velocities out where `velocity` is empty.
 void read_end_effectors(const CompiledModel& m, PadReader& reader, const Batch& batch,

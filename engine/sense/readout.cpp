@@ -15,6 +15,7 @@
 #include "engine/sense/elastic_field.hpp"
 #include "engine/sense/field_sum.hpp"
 #include "engine/sense/imperfect_field.hpp"
+#include "engine/sense/marker_map.hpp"
 #include "engine/sense/motion_reading.hpp"
 #include "engine/sense/pad_reader.hpp"
 
@@ -39,7 +40,9 @@ struct Readout::Impl {
   // Of imperfect sensors: what they do, their reading, and those of a block of small pads.
   ImperfectField imperfections;
   ElasticField elastic;
-  std::vector<double> elastic_field;  // (points, 3)
+  std::vector<std::optional<MarkerMap>> markers;  // (sensors) of those that have them
+  std::vector<double> displacement;               // (points, 2)
+  std::vector<double> elastic_field;              // (points, 3)
   std::vector<double> one_reading, block_readings, of_tiles;
   // Of sensors with memory: a field of an earlier state, and a block that holds such states.
   std::vector<double> earlier;
@@ -55,7 +58,13 @@ struct Readout::Impl {
                        small(s) ? std::size_t(kBlock * 3 * s.points()) : std::size_t(0)});
       if (s.elastic)
         elastic_field.resize(std::max(elastic_field.size(), std::size_t(3 * s.points())));
-      if (!s.imperfect && !s.elastic) continue;
+      const bool marked = m.scene().sensors[std::size_t(s.number)].markers.has_value();
+      markers.emplace_back();
+      if (marked) {
+        markers.back().emplace(m, s.number);
+        displacement.resize(std::max(displacement.size(), std::size_t(2 * s.points())));
+      }
+      if (!s.imperfect && !s.elastic && !marked) continue;
       one_reading.resize(std::max(one_reading.size(), std::size_t(3 * s.points())));
       of_tiles.resize(std::max(of_tiles.size(), std::size_t(s.n_tiles()) * 3 * kTactileTile));
       if (small(s))
@@ -150,7 +159,8 @@ struct Readout::Impl {
   }
   /// Whether a reading is not simply what the kernels compute.
   [[nodiscard]] bool imperfect(FieldOutput of) const {
-    return is_elastic(of) || (of.form != FieldForm::ideal && sensor_of(of.sensor).imperfect);
+    return of.form == FieldForm::markers || is_elastic(of) ||
+           (of.form != FieldForm::ideal && sensor_of(of.sensor).imperfect);
   }
   static FieldPart part_of(FieldForm form) {
     const int components = components_of(form);
@@ -229,9 +239,27 @@ struct Readout::Impl {
     return field;
   }
 
+  /// Writes where the ideal field of a sensor whose touches were found pushes its markers.
+  template <class T>
+  void write_markers(const Batch& batch, int environment, int sensor, T* to) {
+    std::optional<MarkerMap>& map = markers[std::size_t(sensor)];
+    const FieldOutput ideal{sensor, FieldForm::ideal};
+    if (!map) throw InputError(reason_against(model.scene(), {sensor, FieldForm::markers}));
+    const std::size_t points = std::size_t(sensor_of(sensor).points());
+    const std::span<double> field = std::span(one_reading).first(3 * points),
+                            moved = std::span(displacement).first(2 * points);
+    if (sensor_of(sensor).elastic)
+      read_elastic(batch, environment, ideal, field);
+    else
+      fill(environment, ideal, field.data());
+    map->displace(field, moved);
+    std::transform(moved.begin(), moved.end(), to, [](double x) { return static_cast<T>(x); });
+  }
+
   /// Writes a reading of an imperfect sensor whose touches were found.
   template <class T>
   void write_imperfect(const Batch& batch, int environment, FieldOutput of, T* to) {
+    if (of.form == FieldForm::markers) return write_markers(batch, environment, of.sensor, to);
     if constexpr (std::is_same_v<T, double>)
       if (of.form != FieldForm::sum) {
         const std::size_t numbers = numbers_of(sensor_of(of.sensor).points(), of.form);
@@ -390,7 +418,8 @@ struct Readout::Impl {
              const One& one) {
     const int environments = environments_of(batch, number);
     place_block(batch, number, of.sensor);
-    if (of.form != FieldForm::sum && together(batch, number, of.sensor)) {
+    const bool derived = of.form == FieldForm::sum || of.form == FieldForm::markers;
+    if (!derived && together(batch, number, of.sensor)) {
       if (imperfect(of)) return fill_imperfect_block(batch, number, of, dense);
       fill_block(of, environments, dense);
     } else {
@@ -447,8 +476,8 @@ Readout& Readout::operator=(Readout&&) noexcept = default;
 Precision Readout::precision() const { return impl_->precision; }
 
 void Readout::bodies(const Batch& batch, int environment, std::span<double> pose,
-                     std::span<double> twist) {
-  read_bodies(compiled(impl_->model), impl_->reader, batch, environment, pose, twist);
+                     std::span<double> twist, std::span<const int> chosen) {
+  read_bodies(compiled(impl_->model), impl_->reader, batch, environment, pose, twist, chosen);
 }
 void Readout::end_effectors(const Batch& batch, int environment, std::span<double> position,
                             std::span<double> velocity) {

@@ -19,7 +19,8 @@ namespace tangere {
 /// then every reading of it but FieldForm::ideal has its imperfections, and the same reading taken
 /// twice in a step has the same noise. They feel every body that can move
 /// relative to the sensor. Every way of reading gives the same numbers: those of the readout's
-/// precision, converted where T is the other type. T is float or double.
+/// precision, converted where T is the other type. T is float or double. FieldForm::markers throws
+/// InputError for a sensor without markers.
 class Readout {
  public:
   explicit Readout(const Model& model, Precision precision = Precision::f64);
@@ -31,8 +32,9 @@ class Readout {
 
   /// Reads world poses (nb, 7: x y z qw qx qy qz of the body frame) and twists (nb, 6: angular,
   /// then linear velocity of the body frame's origin, world axes) of one environment, for every
-  /// body of the scene in file order.
-  void bodies(const Batch& batch, int environment, std::span<double> pose, std::span<double> twist);
+  /// body of the scene in file order, or for those of `chosen` alone in their order.
+  void bodies(const Batch& batch, int environment, std::span<double> pose, std::span<double> twist,
+              std::span<const int> chosen = {});
 
   /// Reads world positions of the scene's end effectors, (end effectors, 3) [m], of one environment
   /// in file order; with `velocity`, also their velocities, (end effectors, 3) [m/s], world axes.

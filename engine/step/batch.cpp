@@ -39,7 +39,7 @@ const char* to_string(StepStatus value) {
       return "converged, but its shortest parts missed the accuracy or created energy";
     case StepStatus::passed: return "converged, but a body came through one that it touches";
     case StepStatus::damped: return "converged, but damped, because the scheme created energy";
-    case StepStatus::not_converged: return "no solution found, step split down to h/64";
+    case StepStatus::not_converged: return "no solution found, step split down to h/256";
     case StepStatus::non_finite: return "a control or state was not finite";
     case StepStatus::rotation: return "a joint turned by pi or more in one step";
     case StepStatus::singular: return "the Jacobian is singular";

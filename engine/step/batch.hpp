@@ -17,12 +17,12 @@ namespace tangere {
 /// How the last step of an environment ended. Values are written to files: never renumber.
 enum class StepStatus : std::int8_t {
   converged = 0,
-  split = 1,           ///< converged after the step was split
+  split = 1,           ///< converged in parts, or by SDIRK2 because a body turned too far
   coarse = 2,          ///< converged, but a part of h/256 missed the accuracy that was asked for,
-                       ///< or one of h/64 created energy
+                       ///< created energy or turned a body too far
   passed = 3,          ///< converged, but a body came through another that it touches
   damped = 4,          ///< converged by BDF1 or in parts: the scheme would have created energy
-  not_converged = -1,  ///< no root found down to h/64
+  not_converged = -1,  ///< no root found down to h/256
   non_finite = -2,     ///< a control or state was NaN or infinite
   rotation = -3,       ///< a joint turned by π or more in one step
   singular = -4,       ///< the Jacobian could not be factored, pivoting included

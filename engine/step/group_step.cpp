@@ -19,7 +19,7 @@ using kernels::Vec3;
 
 namespace {
 
-constexpr int kDeepestSplit = 6;  // h / 2^6
+constexpr int kDeepestSplit = 8;  // h / 2^8
 // Inside a split the search may be long: a tight limit loses runs that a patient search finishes.
 constexpr int kHalvings = 10, kSplitHalvings = 20, kSplitIterations = 40;
 constexpr int kPatience = 4, kSplitPatience = 40;
@@ -180,22 +180,22 @@ bool GroupStep::take_part(const kernels::KernelTable& table, SingleWorkspace& w,
     return true;
   };
   Solved one = solve();
-  if (one.created != 0 && scheme->order > 1) {
-    const Scheme* const own = std::exchange(scheme, &Integrator::bdf1.scheme());
-    const Solved damped = solve();
-    if (damped.found != 0) {
-      one = damped;
-    } else {
-      scheme = own;
-    }
-  } else if (one.turned != 0 && scheme != &scheme->of_turns()) {
-    const Scheme* const own = std::exchange(scheme, &scheme->of_turns());
+  const auto try_by = [&](const Scheme& other) {
+    if (scheme == &other) return;
+    const Scheme* const own = std::exchange(scheme, &other);
     const Solved again = solve();
     if (again.found != 0) {
       one = again;
     } else {
       scheme = own;
     }
+  };
+  // Where one scheme finds no root of a shortest part, the equations of another may have one.
+  const bool lost = one.found == 0 && depth == kDeepestSplit;
+  if ((one.created != 0 || lost) && scheme->order > 1) {
+    try_by(Integrator::bdf1.scheme());
+  } else if (one.turned != 0 || lost) {
+    try_by(scheme->of_turns());
   }
   if (one.sound() != 0) return take();
   if (one.found == 0) return split(table, w, h, depth + 1, report, solves);

@@ -141,6 +141,8 @@ std::vector<ChunkPlan> chunk_plans(const DatasetLayout& layout) {
   std::vector<ChunkPlan> plans;
   for (const auto& shape : shapes)
     plans.push_back(chunk_plan(layout, shape, numbers_of(shape) * width, together));
+  for (const DatasetSample& sample : layout.samples())
+    plans.push_back(chunk_plan(layout, sample.shape, numbers_of(sample.shape) * width, 1));
   return plans;
 }
 

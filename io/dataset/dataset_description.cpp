@@ -9,6 +9,7 @@
 #include <charconv>
 #include <sstream>
 
+#include "engine/base/error.hpp"
 #include "io/dataset/learner_notes.hpp"
 #include "io/hdf5/h5_listing.hpp"
 #include "io/trajectory/sensor_description.hpp"
@@ -76,6 +77,22 @@ void describe_run(const h5::Id& scene, const DatasetLayout& layout) {
   h5::write_attribute(scene, "instruction_set", layout.instruction_set);
 }
 
+/// What is not stored at every row, and the steps between: 0 for the last state alone.
+void describe_samples(const h5::Id& scene, const DatasetLayout& layout) {
+  std::vector<std::string> names;
+  std::vector<std::int64_t> every;
+  for (const DatasetSample& sample : layout.samples()) {
+    names.push_back(sample.name);
+    every.push_back(sample.times.every * layout.every);
+  }
+  if (!names.empty()) {
+    h5::write_attribute(scene, "samples", std::span<const std::string>(names));
+    h5::write_list<std::int64_t>(scene, "sample_every", every);
+  }
+  for (const BodyObservation& some : layout.bodies)
+    h5::write_attribute(scene, "names of " + some.name, std::span<const std::string>(some.bodies));
+}
+
 void describe_numbers(const h5::Id& scene, const DatasetLayout& layout) {
   const auto texts = [&](const char* name, const std::vector<std::string>& list) {
     h5::write_attribute(scene, name, std::span<const std::string>(list));
@@ -83,6 +100,7 @@ void describe_numbers(const h5::Id& scene, const DatasetLayout& layout) {
   h5::write_attribute(scene, "quaternion_order", "w x y z");
   h5::write_attribute(scene, "observation_type", layout.single ? "float32" : "float64");
   texts("observations", layout.observation_names());
+  describe_samples(scene, layout);
   texts("q_names", layout.q_names);
   texts("q_units", layout.q_units);
   texts("v_names", layout.v_names);
@@ -212,6 +230,24 @@ std::vector<std::string> differences(const std::vector<Setting>& there,
     if (value_in(here, setting.name) == nullptr)
       lines.push_back(fmt::format("{}: missing here", setting.name));
   return lines;
+}
+
+std::vector<SampleSaid> samples_said(const h5::Id& scene, std::int64_t every, std::int64_t rows) {
+  std::vector<SampleSaid> list;
+  if (H5Aexists(scene.get(), "samples") <= 0) return list;
+  const std::vector<std::string> names = h5::read_texts(scene, "samples");
+  const std::vector<std::int64_t> steps = h5::read_numbers<std::int64_t>(scene, "sample_every");
+  if (steps.size() != names.size())
+    throw IoError(
+        fmt::format("its 'sample_every' has {} numbers; expected {}", steps.size(), names.size()));
+  for (std::size_t k = 0; k < names.size(); ++k) {
+    if (steps[k] < 0 || steps[k] % every != 0)
+      throw IoError(fmt::format("its '{}' is sampled every {} steps; expected a multiple of {}",
+                                names[k], steps[k], every));
+    const OutputTimes times{steps[k] / every, steps[k] == 0};
+    list.push_back({names[k], times, times.before(rows + 1, rows)});
+  }
+  return list;
 }
 
 std::vector<GradientSaid> gradients_said(const h5::Id& scene) {

@@ -38,6 +38,16 @@ struct GradientSaid {
 /// Returns the descriptions by name; most files have none.
 std::vector<GradientSaid> gradients_said(const h5::Id& scene);
 
+/// How a file describes an observation that is not stored at every row.
+struct SampleSaid {
+  std::string name;
+  OutputTimes times;      ///< in rows
+  std::int64_t rows = 0;  ///< of an episode
+};
+/// Returns them in the order of the file; most have none. `every`: steps of a row; `rows`: R.
+/// Throws IoError for times that contradict them.
+std::vector<SampleSaid> samples_said(const h5::Id& scene, std::int64_t every, std::int64_t rows);
+
 /// Returns the numbers of the demos in an open /data, ascending.
 std::vector<std::int64_t> demo_numbers(const h5::Id& data);
 

@@ -94,9 +94,29 @@ std::vector<std::size_t> DatasetLayout::recorded() const {
   const std::vector<std::string> names = all_observation_names();
   std::vector<std::size_t> places;
   for (std::size_t k = 0; k < names.size(); ++k)
-    if (record.empty() || std::find(record.begin(), record.end(), names[k]) != record.end())
+    if (const std::optional<OutputTimes> times = times_of(names[k]); times && !times->given())
       places.push_back(k);
   return places;
+}
+
+std::optional<OutputTimes> DatasetLayout::times_of(const std::string& name) const {
+  const auto at = std::find(record.begin(), record.end(), name);
+  if (at == record.end()) return record.empty() ? std::optional(OutputTimes{}) : std::nullopt;
+  return record_times.empty() ? OutputTimes{}
+                              : record_times[static_cast<std::size_t>(at - record.begin())];
+}
+
+std::vector<DatasetSample> DatasetLayout::samples() const {
+  const std::vector<std::string> names = all_observation_names();
+  const std::vector<std::vector<std::uint64_t>> shapes = all_shapes();
+  std::vector<DatasetSample> list;
+  for (std::size_t k = 0; k < names.size(); ++k) {
+    const std::optional<OutputTimes> times = times_of(names[k]);
+    if (!times || !times->given()) continue;
+    const OutputTimes by_row{times->every / every, times->final};
+    list.push_back({names[k], shapes[k], k, by_row, by_row.before(rows() + 1, rows())});
+  }
+  return list;
 }
 
 std::vector<std::string> DatasetLayout::all_observation_names() const {
@@ -106,36 +126,47 @@ std::vector<std::string> DatasetLayout::all_observation_names() const {
     return names;
   }
   if (!end_effector_names.empty()) names.emplace_back(kEndEffectors);
+  for (const BodyObservation& some : bodies) names.push_back(some.name);
   for (const FieldOutput of : fields)
     names.push_back(output_name(sensors[static_cast<std::size_t>(of.sensor)].name, of.form));
   return names;
 }
 
 std::vector<std::vector<std::uint64_t>> DatasetLayout::observation_shapes() const {
+  return chosen(all_shapes(), recorded());
+}
+
+std::vector<std::vector<std::uint64_t>> DatasetLayout::all_shapes() const {
+  constexpr std::uint64_t kPoseAndTwist = 13;
   std::vector<std::vector<std::uint64_t>> shapes{{q_names.size()}, {v_names.size()}};
   if (task) {
     for (const TensorSpec& tensor : task->observations)
       shapes.emplace_back(tensor.shape.begin(), tensor.shape.end());
-    return chosen(shapes, recorded());
+    return shapes;
   }
   if (!end_effector_names.empty()) shapes.push_back({end_effector_names.size(), 3});
+  for (const BodyObservation& some : bodies) shapes.push_back({some.bodies.size(), kPoseAndTwist});
   for (const FieldOutput of : fields)
     shapes.push_back(reading_shape(sensors[static_cast<std::size_t>(of.sensor)], of.form));
-  return chosen(shapes, recorded());
+  return shapes;
 }
 
 double DatasetLayout::episode_bytes() const {
-  double numbers = 0;
-  for (const std::vector<std::uint64_t>& shape : observation_shapes())
-    numbers += static_cast<double>(
+  const auto size_of = [](const std::vector<std::uint64_t>& shape) {
+    return static_cast<double>(
         std::accumulate(shape.begin(), shape.end(), std::uint64_t{1}, std::multiplies<>()));
+  };
+  double numbers = 0, of_samples = 0;
+  for (const std::vector<std::uint64_t>& shape : observation_shapes()) numbers += size_of(shape);
+  for (const DatasetSample& sample : samples())
+    of_samples += static_cast<double>(sample.rows) * size_of(sample.shape);
   const double r = static_cast<double>(rows());
   const double of_actions = static_cast<double>(action_names().size()) * sizeof(float);
   constexpr double kRewardAndDone = sizeof(float) + 1;
   double of_gradients = 0;
   for (const GradientArray& array : gradients)
     of_gradients += sizeof(double) * static_cast<double>(array.width()) * (array.by_row ? r : 1);
-  return (r + 1) * numbers * (single ? sizeof(float) : sizeof(double)) +
+  return ((r + 1) * numbers + of_samples) * (single ? sizeof(float) : sizeof(double)) +
          r * (of_actions + kRewardAndDone) + of_gradients;
 }
 
@@ -179,6 +210,10 @@ void DatasetLayout::check() const {
         "episodes with fewer rows",
         episodes, count, kMostShards));
   const std::vector<std::string> all = all_observation_names();
+  for (std::size_t k = 0; k < record_times.size(); ++k)
+    if (record_times[k].every % every != 0)
+      throw InputError(fmt::format("'{}{}', and a row is every {} steps; expected a multiple of {}",
+                                   record.at(k), to_string(record_times[k]), every, every));
   for (const std::string& name : record)
     if (std::find(all.begin(), all.end(), name) == all.end())
       throw InputError(

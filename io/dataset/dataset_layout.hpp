@@ -34,6 +34,21 @@ struct PlayedBy {
   double random_share = 0;  ///< share of the episodes that the random policy plays
 };
 
+/// Poses and twists of bodies as an observation of (bodies, 13).
+struct BodyObservation {
+  std::string name;                 ///< "bodies", or "bodies.box"
+  std::vector<std::string> bodies;  ///< names
+};
+
+/// An observation that is not stored at every row. It lies below `samples` of a demo.
+struct DatasetSample {
+  std::string name;
+  std::vector<std::uint64_t> shape;  ///< of a row
+  std::size_t source = 0;            ///< index in pieces of episodes
+  OutputTimes times;                 ///< in rows
+  std::int64_t rows = 0;             ///< of an episode
+};
+
 struct DatasetLayout {
   std::int64_t episodes = 0;  ///< N, of all shards
   std::int64_t steps = 0;     ///< of an episode
@@ -45,7 +60,8 @@ struct DatasetLayout {
   std::vector<std::string> u_names;             ///< (nu)
   std::vector<std::string> end_effector_names;  ///< (n) end effectors, empty when there are none
   std::vector<SensorLayout> sensors;
-  std::vector<FieldOutput> fields;  ///< what a scene's episodes hold of them
+  std::vector<BodyObservation> bodies;  ///< of a scene
+  std::vector<FieldOutput> fields;      ///< what a scene's episodes hold of them
   std::vector<std::string> randomized_names, randomized_units;  ///< what varies between episodes
   std::optional<TaskSpec> task;  ///< defines actions, observations and rewards; none: only a scene
   PlayedBy played_by;            ///< of a task
@@ -65,8 +81,9 @@ struct DatasetLayout {
   std::string compression =
       "none";           ///< or "deflate", "lz4", for observations with rows large enough
   bool sparse = false;  ///< parts of large fields that are zero are left out
-  std::vector<std::string> record;  ///< observations to store; none: all of them
-  std::string gradients_of;         ///< the quantity that derivatives are of, in words; empty: none
+  std::vector<std::string> record;        ///< observations to store; none: all of them
+  std::vector<OutputTimes> record_times;  ///< when, in steps, parallel to `record`; none: always
+  std::string gradients_of;  ///< the quantity that derivatives are of, in words; empty: none
   std::vector<GradientArray> gradients;  ///< those stored with an episode
 
   /// The data set's name for Minari: "tangere/TASK/NAME-v0", where NAME is set_name, or else the
@@ -78,10 +95,13 @@ struct DatasetLayout {
   /// Names of the numbers of an action.
   [[nodiscard]] std::vector<std::string> action_names() const;
   /// All observations: q and v, then what a task observes, or "variables" (if there are end
-  /// effectors) and what is read of the sensors.
+  /// effectors), `bodies` and what is read of the sensors.
   [[nodiscard]] std::vector<std::string> all_observation_names() const;
-  /// Indices of the stored observations in that list, and in pieces of episodes, ascending.
+  /// Indices of the observations that are stored at every row in that list, and in pieces of
+  /// episodes, ascending.
   [[nodiscard]] std::vector<std::size_t> recorded() const;
+  /// Those that are stored at other times, in the same order.
+  [[nodiscard]] std::vector<DatasetSample> samples() const;
   /// Names of the stored observations below obs.
   [[nodiscard]] std::vector<std::string> observation_names() const;
   /// Shapes of one row of each stored observation: {nq}, {nv}, {n, 3}, {rows, cols, 3} …
@@ -95,10 +115,15 @@ struct DatasetLayout {
   /// most one.
   [[nodiscard]] EpisodeRange shard_episodes(std::int64_t shard) const;
   [[nodiscard]] std::int64_t shard_of(std::int64_t episode) const;
-  /// Throws InputError when a sensor's name cannot be a name in a file, when set_name has
-  /// characters that Minari refuses, when there are more shards than blocks or than kMostShards, or
-  /// when an observation to record does not exist.
+  /// Throws InputError when a time is no multiple of K, when a sensor's name cannot be a name in a
+  /// file, when set_name has characters that Minari refuses, when there are more shards than blocks
+  /// or than kMostShards, or when an observation to record does not exist.
   void check() const;
+
+ private:
+  [[nodiscard]] std::vector<std::vector<std::uint64_t>> all_shapes() const;
+  /// When an observation is stored, in steps; none: not at all.
+  [[nodiscard]] std::optional<OutputTimes> times_of(const std::string& name) const;
 };
 
 /// What the model does not know about a data set.
@@ -117,6 +142,8 @@ struct DatasetDescription {
   std::vector<GradientArray> gradients;
   bool sparse = false;
   std::vector<std::string> record = {};
+  std::vector<OutputTimes> record_times = {};
+  std::vector<BodyObservation> bodies = {};
   std::optional<std::vector<FieldOutput>> fields = {};  ///< none: the field of every sensor
 };
 

@@ -42,6 +42,7 @@ DemoFormat::DemoFormat(const DatasetLayout& layout)
       randomized_(layout.randomized_names.size()),
       names_(layout.observation_names()),
       sources_(layout.recorded()),
+      samples_(layout.samples()),
       plans_(chunk_plans(layout)) {
   using h5::NumberType;
   const NumberType number = layout.single ? NumberType::float32 : NumberType::float64;
@@ -68,6 +69,11 @@ DemoFormat::DemoFormat(const DatasetLayout& layout)
     types_.push_back(NumberType::float64);
     titles_.push_back(array.name);
   }
+  for (const DatasetSample& sample : samples_) {
+    shapes_.push_back(sample.shape);
+    types_.push_back(number);
+    titles_.push_back("samples/" + sample.name);
+  }
   for (std::string& title : titles_) title += " of demo_";
   for (std::size_t k = 0; k < shapes_.size(); ++k)
     row_bytes_.push_back(std::accumulate(shapes_[k].begin(), shapes_[k].end(),
@@ -83,13 +89,16 @@ DemoFormat::DemoFormat(const DatasetLayout& layout)
 std::int64_t DemoFormat::rows_of(std::size_t dataset, std::int64_t rows) const {
   if (dataset < final_obs(0)) return rows;
   if (dataset < gradient(0)) return 1;
+  if (dataset >= sample(0)) return samples_[dataset - sample(0)].rows;
   const GradientArray& array = gradients_[dataset - gradient(0)];
   return array.by_row ? rows : static_cast<std::int64_t>(array.shape.at(0));
 }
 
 std::int64_t DemoFormat::chunk_rows(std::size_t dataset, std::int64_t rows) const {
-  if (dataset < kFirst || dataset >= gradient(0)) return 0;
+  const bool observed = dataset >= kFirst && dataset < gradient(0);
+  if (!observed && dataset < sample(0)) return 0;
   const ChunkPlan& cut = plan(dataset);
+  // Rows that are far apart in time have chunks of their own.
   if (dataset >= final_obs(0)) return cut.rows > 0 && cut.last_row ? 1 : 0;
   return std::min(cut.rows, rows);
 }
@@ -129,10 +138,11 @@ void DemoFormat::describe_dataset(h5::Bytes& out, std::size_t dataset, std::int6
 
 std::uint64_t DemoFormat::describe_observations(h5::Bytes& out, std::uint64_t base,
                                                 std::int64_t rows, std::size_t first,
+                                                std::span<const std::string> names,
                                                 std::span<const std::uint64_t> addresses) const {
   std::vector<h5::FileLink> links;
-  for (std::size_t name = 0; name < names_.size(); ++name) {
-    links.push_back({names_[name], base + out.size()});
+  for (std::size_t name = 0; name < names.size(); ++name) {
+    links.push_back({names[name], base + out.size()});
     describe_dataset(out, first + name, rows, addresses[first + name]);
   }
   const std::uint64_t group = base + out.size();
@@ -149,9 +159,9 @@ std::uint64_t DemoFormat::describe(h5::Bytes& out, std::uint64_t base, const Dem
     links.push_back({kNames[dataset], base + out.size()});
     describe_dataset(out, dataset, facts.rows, addresses[dataset]);
   }
-  links.push_back({"obs", describe_observations(out, base, facts.rows, obs(0), addresses)});
+  links.push_back({"obs", describe_observations(out, base, facts.rows, obs(0), names_, addresses)});
   links.push_back(
-      {"final_obs", describe_observations(out, base, facts.rows, final_obs(0), addresses)});
+      {"final_obs", describe_observations(out, base, facts.rows, final_obs(0), names_, addresses)});
   for (std::size_t k = 0; k < gradients_.size(); ++k) {
     const std::array meaning{
         h5::FileText{"meaning", texts, static_cast<std::uint32_t>(k),
@@ -159,6 +169,11 @@ std::uint64_t DemoFormat::describe(h5::Bytes& out, std::uint64_t base, const Dem
     links.push_back({gradients_[k].name, base + out.size()});
     describe_dataset(out, gradient(k), facts.rows, addresses[gradient(k)], meaning);
   }
+  std::vector<std::string> sampled;
+  for (const DatasetSample& one : samples_) sampled.push_back(one.name);
+  if (!sampled.empty())
+    links.push_back(
+        {"samples", describe_observations(out, base, facts.rows, sample(0), sampled, addresses)});
   const std::uint64_t group = base + out.size();
   h5::add_group(out, links, DemoAttributes(facts).all());
   return group;

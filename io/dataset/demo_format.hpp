@@ -38,14 +38,14 @@ class DemoAttributes {
 };
 
 /// Datasets of a demo: actions, rewards, dones, obs/<name> …, final_obs/<name> …, then derivatives
-/// in the order of their names.
+/// in the order of their names, then samples/<name> ….
 class DemoFormat {
  public:
   static constexpr std::size_t kActions = 0, kRewards = 1, kDones = 2, kFirst = 3;
 
   explicit DemoFormat(const DatasetLayout& layout);
 
-  [[nodiscard]] std::size_t datasets() const { return gradient(gradients_.size()); }
+  [[nodiscard]] std::size_t datasets() const { return sample(samples_.size()); }
   [[nodiscard]] std::size_t observations() const { return names_.size(); }
   [[nodiscard]] std::size_t obs(std::size_t name) const { return kFirst + name; }
   [[nodiscard]] std::size_t final_obs(std::size_t name) const {
@@ -53,6 +53,8 @@ class DemoFormat {
   }
   [[nodiscard]] std::size_t gradients() const { return gradients_.size(); }
   [[nodiscard]] std::size_t gradient(std::size_t k) const { return kFirst + 2 * names_.size() + k; }
+  [[nodiscard]] const std::vector<DatasetSample>& samples() const { return samples_; }
+  [[nodiscard]] std::size_t sample(std::size_t k) const { return gradient(gradients_.size()) + k; }
   /// "obs/pad of demo_": its number follows.
   [[nodiscard]] const std::string& title(std::size_t dataset) const { return titles_[dataset]; }
   [[nodiscard]] std::size_t row_bytes(std::size_t dataset) const { return row_bytes_[dataset]; }
@@ -63,6 +65,7 @@ class DemoFormat {
   [[nodiscard]] std::int64_t chunk_rows(std::size_t dataset, std::int64_t rows) const;
   /// How an observation is cut into chunks.
   [[nodiscard]] const ChunkPlan& plan(std::size_t dataset) const {
+    if (dataset >= sample(0)) return plans_[names_.size() + dataset - sample(0)];
     return plans_[(dataset - kFirst) % names_.size()];
   }
   /// Index of an observation in pieces of episodes.
@@ -88,7 +91,7 @@ class DemoFormat {
 
  private:
   std::uint64_t describe_observations(h5::Bytes& out, std::uint64_t base, std::int64_t rows,
-                                      std::size_t first,
+                                      std::size_t first, std::span<const std::string> names,
                                       std::span<const std::uint64_t> addresses) const;
   void describe_dataset(h5::Bytes& out, std::size_t dataset, std::int64_t rows,
                         std::uint64_t address, std::span<const h5::FileText> texts = {}) const;
@@ -97,8 +100,9 @@ class DemoFormat {
   std::size_t randomized_;
   std::vector<std::string> names_, titles_;  // of observations; of datasets
   std::vector<std::size_t> sources_, gradient_sources_;
-  std::vector<GradientArray> gradients_;            // by name
-  std::vector<ChunkPlan> plans_;                    // per observation
+  std::vector<GradientArray> gradients_;  // by name
+  std::vector<DatasetSample> samples_;
+  std::vector<ChunkPlan> plans_;                    // per observation, then per sample
   std::vector<std::vector<std::uint64_t>> shapes_;  // of a row, per dataset
   std::vector<h5::NumberType> types_;
   std::vector<std::size_t> row_bytes_;

@@ -18,6 +18,7 @@ namespace {
 
 using h5::Bytes;
 
+constexpr const char* kSamples = "samples";
 constexpr std::int64_t kMostRows = 1 << 26;  // of a demo; a claim becomes that many bytes
 
 /// "/data/demo_3/obs/pad".
@@ -115,10 +116,17 @@ DemoMembers members_of(const h5::Id& demo) {
   members.names.erase(std::remove(members.names.begin(), members.names.end(), "next_obs"),
                       members.names.end());
   for (const std::string& name : members.names)
-    if (name.starts_with("grad_") || name == "loss") members.derivatives.push_back(name);
+    if (name.starts_with("grad_") || name == "loss" || name == kSamples)
+      members.besides.push_back(name);
   const h5::Id obs = h5::open_group(demo, "obs");
   for (const std::string& name : h5::link_names(obs))
     members.observations.push_back(array_of(obs, name));
+  if (h5::has_link(demo, kSamples)) {
+    const h5::Id samples = h5::open_group(demo, kSamples);
+    for (const std::string& name : h5::link_names(samples))
+      members.samples.emplace_back(array_of(samples, name),
+                                   h5::dimensions(h5::open_dataset(samples, name)).at(0));
+  }
   members.actions = array_of(demo, "actions");
   const std::vector<std::string> said = h5::attribute_names(demo);
   members.of_task = std::binary_search(said.begin(), said.end(), "terminated");
@@ -159,7 +167,7 @@ void check_members(const h5::Id& demo, const DemoMembers& members, const DemoFac
                                 array.name, rows));
   };
   for (const std::string& name : members.names)
-    if (name != "obs" && name != "final_obs" && name != members.actions.name)
+    if (name != "obs" && name != "final_obs" && name != kSamples && name != members.actions.name)
       h5::open_dataset(demo, name);
   check(demo, members.actions, facts.rows);
   const h5::Id obs = h5::open_group(demo, "obs"), last = h5::open_group(demo, "final_obs");
@@ -167,6 +175,10 @@ void check_members(const h5::Id& demo, const DemoMembers& members, const DemoFac
     check(obs, array, facts.rows);
     check(last, array, 1);
   }
+  if (members.samples.empty()) return;
+  const h5::Id samples = h5::open_group(demo, kSamples);
+  for (const auto& [array, rows] : members.samples)
+    check(samples, array, static_cast<std::int64_t>(rows));
 }
 
 std::vector<h5::FileMember> add_demo_links(Bytes& out, std::uint64_t base,
@@ -210,10 +222,10 @@ std::vector<h5::FileMember> add_minari_episodes(Bytes& out, std::uint64_t base,
         {h5::NumberType::boolean, {static_cast<std::uint64_t>(demo.facts.rows)}, {}, all_false});
     const std::uint64_t shown = observations.add_group(demo.facts);
     std::vector<std::string> paths;
-    for (const std::string& name : members.derivatives) paths.push_back(path_of(demo.number, name));
+    for (const std::string& name : members.besides) paths.push_back(path_of(demo.number, name));
     std::vector<h5::FileLink> besides = states.add(demo.facts);
     for (std::size_t k = 0; k < paths.size(); ++k)
-      besides.push_back({members.derivatives[k], h5::kNowhere, file, paths[k]});
+      besides.push_back({members.besides[k], h5::kNowhere, file, paths[k]});
     const std::uint64_t infos = base + out.size();
     h5::add_group(out, besides);  // also if empty, because Minari prints no episode without it
     const std::array links{

@@ -27,8 +27,9 @@ struct DemoMembers {
   std::vector<std::string> names;       ///< of its links
   std::vector<DemoArray> observations;  ///< below obs
   std::vector<DemoArray> states;        ///< of these, what Minari gets below infos instead
+  std::vector<std::pair<DemoArray, std::uint64_t>> samples;  ///< below samples, with their rows
   DemoArray actions;
-  std::vector<std::string> derivatives;  ///< grad_… and the loss, among `names`
+  std::vector<std::string> besides;  ///< grad_…, the loss and samples, among `names`
   bool of_task = false, varies = false;
   std::int64_t policies = 0;  ///< that played, for a task
 };

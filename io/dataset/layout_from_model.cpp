@@ -15,6 +15,14 @@ std::vector<std::string> copy(std::span<const std::string> texts) {
   return {texts.begin(), texts.end()};
 }
 
+/// `chosen`: bodies; none: all.
+std::vector<std::string> chosen_names(const Model& model, const std::vector<int>& chosen) {
+  if (chosen.empty()) return copy(model.body_names());
+  std::vector<std::string> names;
+  for (const int body : chosen) names.push_back(model.body_names()[static_cast<std::size_t>(body)]);
+  return names;
+}
+
 std::vector<std::string> end_effector_names(const Model& model) {
   std::vector<std::string> names;
   for (const EndEffectorInfo& end_effector : model.end_effectors())
@@ -69,7 +77,10 @@ TrajectoryLayout layout_from(const Batch& batch, const Stepper& stepper,
   layout.v_units = copy(model.v_units());
   layout.u_names = copy(model.u_names());
   layout.u_units = copy(model.u_units());
-  if (run.bodies) layout.body_names = copy(model.body_names());
+  if (run.bodies) layout.body_names = chosen_names(model, run.chosen_bodies);
+  layout.states = run.states;
+  layout.of_bodies = run.of_bodies;
+  layout.of_end_effectors = run.of_end_effectors;
   if (run.end_effectors) layout.end_effector_names = end_effector_names(model);
   layout.audit = run.audit;
   for (std::size_t i = 0; i < model.sensors().size(); ++i)
@@ -146,6 +157,8 @@ DatasetLayout dataset_layout_from(const Model& model, const Stepper& stepper,
   layout.sparse = run.sparse;
   layout.tables = tables_of(model.scene());
   layout.record = run.record;
+  layout.record_times = run.record_times;
+  layout.bodies = run.bodies;
   layout.fields = run.fields ? *run.fields : whole_fields(model);
   return layout;
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // ContentSum numbers the datasets: 0 for actions, then observations, then rewards of tasks, then
-// derivatives.
+// derivatives, then samples.
 #include "io/dataset/prepared_piece.hpp"
 
 #include <algorithm>
@@ -40,6 +40,19 @@ void add_gradient(const DemoFormat& format, const EpisodeRows& piece, int episod
                       format.rows_of(dataset, rows), format.row_bytes(dataset)},
                      0,
                      reinterpret_cast<const unsigned char*>(all.data() + as_size(episode) * each)};
+}
+
+/// `rows`: R, which all episodes of a scene have.
+void add_sample(const DemoFormat& format, const EpisodeRows& piece, int episode, std::int64_t rows,
+                std::size_t k, std::vector<PieceSlice>& slices) {
+  const DatasetSample& sample = format.samples()[k];
+  const std::size_t dataset = format.sample(k), bytes = format.row_bytes(dataset);
+  const std::int64_t first = sample.times.before(piece.first_row, rows),
+                     count = sample.times.before(piece.first_row + piece.rows, rows) - first;
+  slices[dataset] = {{piece.first_episode + episode,
+                      format.observations() + 2 + format.gradients() + k, first, count, bytes},
+                     first,
+                     bytes_at(piece, sample.source) + as_size(episode) * as_size(count) * bytes};
 }
 
 /// Layout of a dataset's rows: height × width cells each. A cell is a point of a field, or the
@@ -157,6 +170,8 @@ std::vector<PieceSlice> slices_of(const DemoFormat& format, const EpisodeRows& p
   if (!piece.gradients.empty())
     for (std::size_t k = 0; k < format.gradients(); ++k)
       add_gradient(format, piece, episode, rows, k, slices);
+  for (std::size_t k = 0; k < format.samples().size(); ++k)
+    add_sample(format, piece, episode, rows, k, slices);
   return slices;
 }
 

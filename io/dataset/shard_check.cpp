@@ -101,6 +101,7 @@ class ShardChecker {
     of_task_ = !h5::read_text(scene_, "task").starts_with("none");
     if (of_task_) policies_ = std::ssize(h5::read_texts(scene_, "policies"));
     gradients_ = gradients_said(scene_);
+    samples_ = samples_said(scene_, every, rows_);
   }
   /// Whether there are as many as the file says: a claim alone must not become a loop.
   [[nodiscard]] bool count_episodes(const h5::Id& data, const h5::Id& failed) {
@@ -174,12 +175,23 @@ class ShardChecker {
     }
     for (std::size_t k = 0; k < gradients_.size(); ++k)
       add_gradient(demo, gradients_[k], episode, names_.size() + 2 + k, rows);
+    for (std::size_t k = 0; k < samples_.size(); ++k)
+      add_sample(h5::open_group(demo, "samples"), samples_[k], episode,
+                 names_.size() + 2 + gradients_.size() + k);
     if (h5::has_link(demo, "next_obs"))
       for (const std::string& name : names_)
         single_ ? check_next<float>(demo, name, episode, rows)
                 : check_next<double>(demo, name, episode, rows);
     content_.rows += rows;
     ++content_.demos;
+  }
+
+  void add_sample(const h5::Id& samples, const SampleSaid& said, std::int64_t episode,
+                  std::size_t index) {
+    if (single_)
+      add<float>(samples, said.name, episode, index, 0, said.rows);
+    else
+      add<double>(samples, said.name, episode, index, 0, said.rows);
   }
 
   void add_gradient(const h5::Id& demo, const GradientSaid& said, std::int64_t episode,
@@ -299,6 +311,7 @@ class ShardChecker {
   h5::Id file_, scene_;
   std::vector<std::string> names_;
   std::vector<GradientSaid> gradients_;
+  std::vector<SampleSaid> samples_;
   bool single_ = false, of_task_ = false;
   std::int64_t rows_ = 0, end_ = 0, policies_ = 0;
   std::tuple<std::vector<float>, std::vector<double>> buffers_;

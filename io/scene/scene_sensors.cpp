@@ -154,18 +154,14 @@ NormalAndShear read_coefficient(const SceneNode& node, const ImperfectionKind& k
   return {x.front(), x.back()};
 }
 
-/// Reads <imperfections> inside <tactile>, at most once.
-void read_imperfections(const SceneNode& node, TactileDescription& sensor) {
-  const std::vector<SceneNode> all = node.children({"imperfections"});
-  if (all.empty()) return;
-  if (all.size() > 1) all[1].fail("a second time in one <tactile>; expected one");
+void read_imperfections(const SceneNode& node, const SceneNode& part, TactileDescription& sensor) {
   std::vector<std::string> names;
   for (const ImperfectionKind& kind : imperfection_kinds()) names.emplace_back(kind.name);
-  all[0].check_attributes(names);
+  part.check_attributes(names);
   SensorImperfections& of = sensor.imperfections;
-  of.source = all[0].source();
+  of.source = part.source();
   for (const ImperfectionKind& kind : imperfection_kinds()) {
-    const NormalAndShear value = read_coefficient(all[0], kind);
+    const NormalAndShear value = read_coefficient(part, kind);
     const double factor = factor_of(node.context(), kind.unit);
     if (kind.pair != nullptr)
       of.*kind.pair = {factor * value.normal, factor * value.shear};
@@ -173,6 +169,33 @@ void read_imperfections(const SceneNode& node, TactileDescription& sensor) {
       of.*kind.number = factor * value.normal;
   }
   check_imperfections(of, sensor.name, sensor.points.empty());
+}
+
+void read_markers(const SceneNode& node, const SceneNode& part, TactileDescription& sensor) {
+  part.check_attributes({"stiffness", "thickness", "spread"});
+  MarkersDescription of;
+  of.source = part.source();
+  const auto read = [&](const char* name, double factor) {
+    return part.has(name) ? factor * part.positive(name) : 0;
+  };
+  of.stiffness = read("stiffness", factor_of(node.context(), "N/m"));
+  of.thickness = read("thickness", node.context().length);
+  of.spread = read("spread", node.context().length);
+  sensor.markers = of;
+}
+
+/// Reads what <tactile> holds, each at most once.
+void read_parts(const SceneNode& node, TactileDescription& sensor) {
+  bool imperfections = false;
+  for (const SceneNode& part : node.children({"imperfections", "markers"})) {
+    const bool marks = part.name() == "markers";
+    if (marks ? sensor.markers.has_value() : imperfections)
+      part.fail("a second time in one <tactile>; expected one");
+    if (marks)
+      read_markers(node, part, sensor);
+    else
+      read_imperfections(node, part, sensor), imperfections = true;
+  }
 }
 
 /// Lets the points of a sensor touch what they feel: a pair with every body that has a distance and
@@ -249,7 +272,7 @@ void read_sensors(Scene& scene, const SceneNode& section) {
     } else {
       d.points = read_points(node, type);
     }
-    read_imperfections(node, d);
+    read_parts(node, d);
     if (node.choice("feedback", {"false", "true"}, 0) == 1) add_feedback(scene, node, d, body);
     scene.sensors.push_back(std::move(d));
   }
@@ -262,9 +285,20 @@ void read_outputs(Scene& scene, const SceneNode& section) {
   outputs.record =
       split_names(section.source().prefix() + "<outputs>: record", section.text("record"));
   const std::vector<std::string> sensors = sensor_names(scene);
-  for (const std::string& name : outputs.record)
-    if (!is_plain_output(name) && !find_output(sensors, name))
-      section.fail(fmt::format("record has '{}'{}", name, suggestion(name, output_names(sensors))));
+  for (const std::string& word : outputs.record) {
+    std::string name;
+    try {
+      name = split_times(word).name;
+    } catch (const InputError& error) {
+      section.fail(fmt::format("record has {}", error.what()));
+    }
+    if (const std::optional<FieldOutput> of = find_output(sensors, name)) {
+      if (const std::string reason = reason_against(scene, *of); !reason.empty())
+        section.fail(fmt::format("record has '{}', but {}", word, reason));
+    } else if (!is_plain_output(name) && !find_body_output(scene, name)) {
+      section.fail(fmt::format("record has '{}'{}", name, suggestion(name, output_names(scene))));
+    }
+  }
   scene.outputs = std::move(outputs);
 }
 

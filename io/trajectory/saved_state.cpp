@@ -3,8 +3,13 @@
 #include "io/trajectory/saved_state.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
+#include <algorithm>
+#include <functional>
 #include <limits>
+#include <numeric>
+#include <span>
 #include <string_view>
 
 #include "engine/base/error.hpp"
@@ -14,6 +19,7 @@ namespace tangere {
 namespace {
 
 constexpr std::int64_t kMost = std::int64_t{1} << 53;  // steps, episodes; more is damage
+constexpr std::size_t kListed = 5;                     // rows that a message names
 
 /// Throws IoError unless `found` lies in [least, most].
 std::int64_t within(const std::string& path, const char* what, std::int64_t found,
@@ -60,7 +66,38 @@ void check_names(const SavedState& from, const char* what, const std::vector<std
                                    from.path, i, what, names[i], expected[i]));
 }
 
+/// Those of an open file of `steps` steps.
+std::vector<std::int64_t> steps_of_states(const h5::Id& file, std::int64_t steps) {
+  std::vector<std::int64_t> list;
+  if (!h5::has_link(file, "step")) {
+    const h5::Dims states = h5::dimensions(h5::open_dataset(file, "q"));
+    if (states.empty() || states[0] != static_cast<hsize_t>(steps) + 1)
+      throw IoError(fmt::format("{}: the states are damaged: expected {} rows of q",
+                                h5::place_of(file), steps + 1));
+    list.resize(static_cast<std::size_t>(steps) + 1);
+    std::iota(list.begin(), list.end(), std::int64_t{0});
+    return list;
+  }
+  const h5::Id dataset = h5::open_dataset(file, "step");
+  const h5::Dims dims = h5::dimensions(dataset);
+  const bool fits = dims.size() == 1 && dims[0] <= static_cast<hsize_t>(steps) + 1;
+  if (fits) list.resize(dims[0]);
+  if (!list.empty()) h5::read_box<std::int64_t>(dataset, {0}, {dims[0]}, list.data());
+  const bool ascends =
+      std::adjacent_find(list.begin(), list.end(), std::greater_equal<>()) == list.end();
+  if (!fits || !ascends || (!list.empty() && (list.front() < 0 || list.back() > steps)))
+    throw IoError(fmt::format("{}: expected ascending steps from 0 to {}: the file is damaged",
+                              h5::place_of(dataset), steps));
+  return list;
+}
+
 }  // namespace
+
+std::vector<std::int64_t> state_steps(const std::string& path) {
+  const h5::Id file = h5::open_file(path);
+  return steps_of_states(
+      file, within(path, "steps", h5::read_number<std::int64_t>(file, "steps"), 0, kMost));
+}
 
 SavedState read_state(const std::string& path, std::optional<std::int64_t> row) {
   const h5::Id file = h5::open_file(path);
@@ -72,9 +109,19 @@ SavedState read_state(const std::string& path, std::optional<std::int64_t> row) 
     return within(path, name, h5::read_number<std::int64_t>(file, name), least, most);
   };
   const std::int64_t steps = number("steps", 0, kMost);
-  state.row = row.value_or(steps);
+  const std::vector<std::int64_t> rows = steps_of_states(file, steps);
+  state.row = row.value_or(rows.empty() ? steps : rows.back());
   if (state.row < 0 || state.row > steps)
     throw InputError(fmt::format("row {} of {}; expected 0 to {}", state.row, path, steps));
+  const auto found = std::lower_bound(rows.begin(), rows.end(), state.row);
+  if (found == rows.end() || *found != state.row)
+    throw InputError(
+        rows.empty()
+            ? fmt::format("{} recorded no state", path)
+            : fmt::format("row {} of {} was not recorded; expected one of {}{}", state.row, path,
+                          fmt::join(std::span(rows).first(std::min(rows.size(), kListed)), ", "),
+                          rows.size() > kListed ? " …" : ""));
+  const std::int64_t at = found - rows.begin();
   state.step = number("first_step", 0, kMost) + state.row;
   state.environments = static_cast<int>(number("environments", 1, std::numeric_limits<int>::max()));
   state.seed = h5::read_number<std::uint64_t>(file, "seed");
@@ -91,16 +138,18 @@ SavedState read_state(const std::string& path, std::optional<std::int64_t> row) 
   state.v_names = h5::read_texts(v, "names");
   const h5::Dims dims = h5::dimensions(q), rates = h5::dimensions(v);
   const auto environments = static_cast<std::size_t>(state.environments);
-  if (dims != h5::Dims{static_cast<hsize_t>(steps) + 1, environments, state.q_names.size()} ||
-      rates != h5::Dims{static_cast<hsize_t>(steps) + 1, environments, state.v_names.size()})
+  if (dims != h5::Dims{rows.size(), environments, state.q_names.size()} ||
+      rates != h5::Dims{rows.size(), environments, state.v_names.size()})
     throw IoError(path + ": the states are damaged");
-  state.q = read_row(q, state.row);
-  state.v = read_row(v, state.row);
+  state.q = read_row(q, at);
+  state.v = read_row(v, at);
   state.status.assign(environments, StepStatus::converged);
-  if (state.row > 0) {
-    state.previous_q = read_row(q, state.row - 1);
-    state.previous_v = read_row(v, state.row - 1);
-    state.status = read_status(file, state.row - 1, environments);
+  // Where rows are listed, each has the status of the step that it follows.
+  const bool listed = h5::has_link(file, "step");
+  if (state.row > 0) state.status = read_status(file, listed ? at : at - 1, environments);
+  if (at > 0 && rows[static_cast<std::size_t>(at) - 1] == state.row - 1) {
+    state.previous_q = read_row(q, at - 1);
+    state.previous_v = read_row(v, at - 1);
   }
   return state;
 }
@@ -117,7 +166,7 @@ void restore_state(const SavedState& from, bool continues, Batch& batch) {
     const auto part = [e](const std::vector<double>& all, std::size_t width) {
       return std::span(all).subspan(static_cast<std::size_t>(e) * width, width);
     };
-    if (continues && from.row > 0) {
+    if (continues && !from.previous_q.empty()) {
       batch.set_state(e, part(from.q, nq), part(from.v, nv), part(from.previous_q, nq),
                       part(from.previous_v, nv));
     } else {

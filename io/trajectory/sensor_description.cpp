@@ -59,13 +59,17 @@ std::string components_text(const SensorLayout& sensor, FieldForm form) {
     case FieldForm::ideal: return across + ", " + along + "; f is the force on the body";
     case FieldForm::pressure: return along + "; f is the force on the body without friction";
     case FieldForm::shear: return across + "; f is the force on the body";
+    case FieldForm::markers: return "displacement of each marker along axis0, axis1";
     case FieldForm::sum: break;
   }
   return "force x y z on the body [N], then x y z of its centre of pressure [m]; body axes";
 }
 
 void describe_reading(const h5::Id& object, const SensorLayout& sensor, FieldForm form) {
-  h5::write_attribute(object, "units", form == FieldForm::sum ? "N, N, N, m, m, m" : "N");
+  h5::write_attribute(object, "units",
+                      form == FieldForm::sum       ? "N, N, N, m, m, m"
+                      : form == FieldForm::markers ? "m"
+                                                   : "N");
   h5::write_attribute(object, "body", sensor.body);
   h5::write_scalar<std::int64_t>(object, "pressure_sign", sensor.pressure_sign);
   h5::write_attribute(object, "components", components_text(sensor, form));
@@ -75,8 +79,9 @@ void describe_reading(const h5::Id& object, const SensorLayout& sensor, FieldFor
                           ? "axis0, axis1 of the sensor, in the body's axes"
                           : "axis0, axis1, normal of each point, in the body's axes");
   if (!sensor.imperfections.empty())
-    h5::write_attribute(object, "imperfections",
-                        form == FieldForm::ideal ? "none" : sensor.imperfections);
+    h5::write_attribute(
+        object, "imperfections",
+        form == FieldForm::ideal || form == FieldForm::markers ? "none" : sensor.imperfections);
   if (sensor.rectangular()) describe_array(object, sensor);
 }
 

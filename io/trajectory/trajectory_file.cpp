@@ -51,6 +51,7 @@ struct TrajectoryFile::Impl {
   TrajectoryLayout layout;
   PartFile part;
   h5::Id file, time, q, v, u, pose, twist, end_effectors, iterations, status, residual;
+  h5::Id state_step, body_step, end_effector_step;  // of rows that are taken at times of their own
   struct Reading {
     h5::Id numbers, step;
     h5::Dims frame;  // dimensions of one row
@@ -64,7 +65,7 @@ struct TrajectoryFile::Impl {
     h5::Id energy, momentum, step;
     std::int64_t written = 0;
   } audit;
-  std::int64_t states = 0, steps = 0, actions = 0;
+  std::int64_t states = 0, steps = 0, actions = 0, poses = 0, positions = 0;
 
   Impl(const std::string& output, const TrajectoryLayout& l, bool overwrite)
       : layout((l.check(), l)), part(output, overwrite) {
@@ -136,25 +137,44 @@ struct TrajectoryFile::Impl {
     h5::write_attribute(file, "world_axes", "right-handed, SI units");
   }
 
+  /// Rows of what is taken at these times, and for times of its own a list of them.
+  [[nodiscard]] hsize_t row_count(const OutputTimes& times) const {
+    return static_cast<hsize_t>(layout.rows(times));
+  }
+  h5::Id create_steps(const h5::Id& group, const OutputTimes& times) const {
+    if (!times.given()) return {};
+    h5::Id d = h5::create_dataset<std::int64_t>(group, "step", {row_count(times)});
+    h5::write_attribute(d, "meaning", "steps of this run before each row");
+    return d;
+  }
+  /// Row of the datasets that are taken at these times, and its number in the list of them.
+  [[nodiscard]] std::int64_t put_step(const h5::Id& steps_of, const OutputTimes& times,
+                                      std::int64_t t) const {
+    const std::int64_t row = times.before(t, layout.steps, layout.first_step);
+    if (times.given()) h5::write_box<std::int64_t>(steps_of, {static_cast<hsize_t>(row)}, {1}, &t);
+    return row;
+  }
+
   void create_trajectory() {
-    const hsize_t T = static_cast<hsize_t>(layout.steps),
+    const hsize_t T = static_cast<hsize_t>(layout.steps), R = row_count(layout.states),
                   E = static_cast<hsize_t>(layout.environments);
     const auto named = [](const h5::Id& d, const std::vector<std::string>& names,
                           const std::vector<std::string>& units) {
       h5::write_attribute(d, "names", std::span<const std::string>(names));
       h5::write_attribute(d, "units", std::span<const std::string>(units));
     };
-    time = rows<double>(file, "time", {T + 1});
+    time = rows<double>(file, "time", {R});
     h5::write_attribute(time, "units", "s");
-    q = rows<double>(file, "q", {T + 1, E, layout.q_names.size()});
+    q = rows<double>(file, "q", {R, E, layout.q_names.size()});
     named(q, layout.q_names, layout.q_units);
     h5::write_attribute(q, "frame",
                         "each joint's fixed frame; quaternions turn the moving frame into it");
-    v = rows<double>(file, "v", {T + 1, E, layout.v_names.size()});
+    v = rows<double>(file, "v", {R, E, layout.v_names.size()});
     named(v, layout.v_names, layout.v_units);
     h5::write_attribute(
         v, "frame", "linear: axes of the joint's fixed frame; angular: axes of the moving frame");
-    if (!layout.u_names.empty()) {
+    state_step = create_steps(file, layout.states);
+    if (has_controls()) {
       u = rows<double>(file, "u", {T, E, layout.u_names.size()});
       named(u, layout.u_names, layout.u_units);
       h5::write_attribute(u, "meaning",
@@ -166,32 +186,36 @@ struct TrajectoryFile::Impl {
     if (layout.audit) create_audit(named);
   }
 
+  [[nodiscard]] bool has_controls() const {
+    return !layout.u_names.empty() && !layout.states.given();
+  }
+
   void create_bodies(const auto& named) {
-    const hsize_t T = static_cast<hsize_t>(layout.steps),
-                  E = static_cast<hsize_t>(layout.environments);
+    const hsize_t R = row_count(layout.of_bodies), E = static_cast<hsize_t>(layout.environments);
     const h5::Id bodies = h5::create_group(file, "bodies");
     h5::write_attribute(bodies, "names", std::span<const std::string>(layout.body_names));
     const hsize_t nb = layout.body_names.size();
-    pose = rows<double>(bodies, "pose", {T + 1, E, nb, 7});
+    pose = rows<double>(bodies, "pose", {R, E, nb, 7});
     const std::vector<std::string> pose_names(std::begin(kPoseComponents),
                                               std::end(kPoseComponents));
     named(pose, pose_names, {"m", "m", "m", "1", "1", "1", "1"});
     h5::write_attribute(pose, "frame", "body frame in the world");
-    twist = rows<double>(bodies, "twist", {T + 1, E, nb, 6});
+    twist = rows<double>(bodies, "twist", {R, E, nb, 6});
     const std::vector<std::string> twist_names(std::begin(kTwistComponents),
                                                std::end(kTwistComponents));
     named(twist, twist_names, {"rad/s", "rad/s", "rad/s", "m/s", "m/s", "m/s"});
     h5::write_attribute(twist, "frame", "world axes; velocity of the body frame's origin");
     for (const h5::Id* d : {&pose, &twist})
       h5::write_attribute(*d, "bodies", std::span<const std::string>(layout.body_names));
+    body_step = create_steps(bodies, layout.of_bodies);
   }
 
   void create_end_effectors() {
-    const hsize_t T = static_cast<hsize_t>(layout.steps),
+    const hsize_t R = row_count(layout.of_end_effectors),
                   E = static_cast<hsize_t>(layout.environments);
     const h5::Id group = h5::create_group(file, "variables");
-    end_effectors =
-        rows<double>(group, "position", {T + 1, E, layout.end_effector_names.size(), 3});
+    end_effector_step = create_steps(group, layout.of_end_effectors);
+    end_effectors = rows<double>(group, "position", {R, E, layout.end_effector_names.size(), 3});
     h5::write_attribute(end_effectors, "names",
                         std::span<const std::string>(layout.end_effector_names));
     h5::write_attribute(end_effectors, "units", "m");
@@ -220,16 +244,22 @@ struct TrajectoryFile::Impl {
   void create_solver() {
     const hsize_t T = static_cast<hsize_t>(layout.steps),
                   E = static_cast<hsize_t>(layout.environments);
+    const bool all = !layout.states.given();
     const h5::Id solver = h5::create_group(file, "solver");
-    iterations = rows<std::int32_t>(solver, "iterations", {T, E});
-    h5::write_attribute(iterations, "meaning", "evaluations of the residual, sub-steps included");
-    status = rows<std::int8_t>(solver, "status", {T, E});
+    if (all) {
+      iterations = rows<std::int32_t>(solver, "iterations", {T, E});
+      h5::write_attribute(iterations, "meaning", "evaluations of the residual, sub-steps included");
+    }
+    status = rows<std::int8_t>(solver, "status", {all ? T : row_count(layout.states), E});
+    if (!all)
+      h5::write_attribute(status, "meaning", "of the step that ends at each row of /q; 0 at row 0");
     std::vector<std::string> meanings;
     std::vector<std::int8_t> values;
     for (const StatusMeaning& s : layout.statuses)
       values.push_back(s.value), meanings.push_back(s.meaning);
     h5::write_list<std::int8_t>(status, "values", values);
     h5::write_attribute(status, "meanings", std::span<const std::string>(meanings));
+    if (!all) return;
     residual = rows<double>(solver, "residual", {T, E});
     h5::write_attribute(residual, "meaning", "scaled residual at acceptance, dimensionless");
   }
@@ -237,7 +267,7 @@ struct TrajectoryFile::Impl {
   void create_reading(FieldOutput of) {
     const SensorLayout& s = layout.sensors[std::size_t(of.sensor)];
     const hsize_t E = static_cast<hsize_t>(layout.environments),
-                  F = static_cast<hsize_t>(s.frames(layout.steps, layout.first_step));
+                  F = static_cast<hsize_t>(layout.frames(of));
     if (!h5::has_link(file, "tactile")) h5::create_group(file, "tactile");
     const h5::Id tactile = h5::open_group(file, "tactile");
     const bool first = !h5::has_link(tactile, s.name);
@@ -252,13 +282,21 @@ struct TrajectoryFile::Impl {
     const h5::Storage storage = of.form == FieldForm::sum ? rows_of(dims, sizeof(double))
                                 : F > 0                   ? field_storage(dims)
                                                           : h5::Storage{};
-    out.numbers = h5::create_dataset<double>(group, dataset_of(of.form), dims, storage);
-    if (first) {
-      out.step = h5::create_dataset<std::int64_t>(group, "step", {F});
-      h5::write_attribute(out.step, "meaning", "row of /q that each field was read from");
-      describe_points(group, s);
+    const std::string name = dataset_of(of.form);
+    out.numbers = h5::create_dataset<double>(group, name, dims, storage);
+    // Readings of a sensor share their list of steps, unless they are taken at other times.
+    const OutputTimes times = layout.times_of(of);
+    const auto same = std::find_if(layout.fields.begin(), layout.fields.end(),
+                                   [&](const FieldOutput& f) { return f.sensor == of.sensor; });
+    if (first || times != layout.times_of(*same)) {
+      out.step = h5::create_dataset<std::int64_t>(group, first ? "step" : name + "_step", {F});
+      h5::write_attribute(out.step, "meaning",
+                          layout.states.given() ? "steps of this run before each field"
+                                                : "row of /q that each field was read from");
     }
-    h5::write_scalar<std::int64_t>(out.numbers, "every", s.every);
+    if (first) describe_points(group, s);
+    h5::write_scalar<std::int64_t>(out.numbers, "every",
+                                   times.final ? layout.first_step + layout.steps : times.every);
     describe_reading(out.numbers, s, of.form);
     readings.push_back(std::move(out));
   }
@@ -288,7 +326,9 @@ struct TrajectoryFile::Impl {
     h5::write_attribute(task.action, "unit", spec.action.unit);
     h5::write_attribute(task.action, "meaning", spec.action.meaning);
     task.step = h5::create_dataset<std::int64_t>(group, "step", {A});
-    h5::write_attribute(task.step, "meaning", "row of /q after each action");
+    h5::write_attribute(task.step, "meaning",
+                        layout.states.given() ? "steps of this run before the end of each action"
+                                              : "row of /q after each action");
     task.reward = rows<double>(group, "reward", {A, E});
     task.terminated = rows<std::int8_t>(group, "terminated", {A, E});
     task.truncated = rows<std::int8_t>(group, "truncated", {A, E});
@@ -318,34 +358,52 @@ TrajectoryFile::~TrajectoryFile() = default;
 
 void TrajectoryFile::write(const StateRow& row) {
   Impl& f = *impl_;
-  const hsize_t E = static_cast<hsize_t>(f.layout.environments), nb = f.layout.body_names.size();
+  const TrajectoryLayout& l = f.layout;
+  const hsize_t E = static_cast<hsize_t>(l.environments), nb = l.body_names.size(),
+                n = l.end_effector_names.size();
   const std::int64_t t = row.step;
-  const hsize_t one = 1;
-  h5::write_box<double>(f.time, {static_cast<hsize_t>(t)}, {one}, &row.time);
-  Impl::put<double>(f.q, t, {E, f.layout.q_names.size()}, row.q.data());
-  Impl::put<double>(f.v, t, {E, f.layout.v_names.size()}, row.v.data());
+  const auto due = [&](const OutputTimes& times) { return times.at(t, l.steps, l.first_step); };
+  if (due(l.states)) {
+    const std::int64_t at = f.put_step(f.state_step, l.states, t);
+    const hsize_t one = 1;
+    f.expect_numbers("q and v", t, row.q.size() + row.v.size(),
+                     E * (l.q_names.size() + l.v_names.size()));
+    h5::write_box<double>(f.time, {static_cast<hsize_t>(at)}, {one}, &row.time);
+    Impl::put<double>(f.q, at, {E, l.q_names.size()}, row.q.data());
+    Impl::put<double>(f.v, at, {E, l.v_names.size()}, row.v.data());
+    ++f.states;
+  }
+  const bool bodies = due(l.of_bodies), end_effectors = due(l.of_end_effectors);
   f.expect_numbers("poses and twists", t, row.body_pose.size() + row.body_twist.size(),
-                   E * nb * 13);
-  if (nb > 0) {
-    Impl::put<double>(f.pose, t, {E, nb, 7}, row.body_pose.data());
-    Impl::put<double>(f.twist, t, {E, nb, 6}, row.body_twist.data());
+                   bodies ? E * nb * 13 : 0);
+  if (nb > 0 && bodies) {
+    const std::int64_t at = f.put_step(f.body_step, l.of_bodies, t);
+    Impl::put<double>(f.pose, at, {E, nb, 7}, row.body_pose.data());
+    Impl::put<double>(f.twist, at, {E, nb, 6}, row.body_twist.data());
+    ++f.poses;
   }
-  if (const hsize_t n = f.layout.end_effector_names.size(); n > 0) {
+  if (n > 0 && end_effectors) {
     f.expect_numbers("end effectors", t, row.end_effectors.size(), E * n * 3);
-    Impl::put<double>(f.end_effectors, t, {E, n, 3}, row.end_effectors.data());
+    const std::int64_t at = f.put_step(f.end_effector_step, l.of_end_effectors, t);
+    Impl::put<double>(f.end_effectors, at, {E, n, 3}, row.end_effectors.data());
+    ++f.positions;
   }
-  ++f.states;
 }
 
 void TrajectoryFile::write(const StepRow& row) {
   Impl& f = *impl_;
-  const hsize_t E = static_cast<hsize_t>(f.layout.environments);
-  if (!f.layout.u_names.empty())
-    Impl::put<double>(f.u, row.step, {E, f.layout.u_names.size()}, row.u.data());
+  const TrajectoryLayout& l = f.layout;
+  const hsize_t E = static_cast<hsize_t>(l.environments);
+  ++f.steps;
+  if (l.states.given()) {
+    Impl::put<std::int8_t>(f.status, l.states.before(row.step + 1, l.steps, l.first_step), {E},
+                           row.status.data());
+    return;
+  }
+  if (f.has_controls()) Impl::put<double>(f.u, row.step, {E, l.u_names.size()}, row.u.data());
   Impl::put<std::int32_t>(f.iterations, row.step, {E}, row.iterations.data());
   Impl::put<std::int8_t>(f.status, row.step, {E}, row.status.data());
   Impl::put<double>(f.residual, row.step, {E}, row.residual.data());
-  ++f.steps;
 }
 
 void TrajectoryFile::write(const TactileRow& row) {
@@ -360,7 +418,7 @@ void TrajectoryFile::write(const TactileRow& row) {
   for (const hsize_t n : r.frame) numbers *= n;
   impl_->expect_numbers("a reading", row.step, row.numbers.size(), numbers);
   Impl::put<double>(r.numbers, row.frame, r.frame, row.numbers.data());
-  if (r.step.get() >= 0)  // once for all readings of a sensor
+  if (r.step.get() >= 0)  // once for all readings of a sensor at the same steps
     h5::write_box<std::int64_t>(r.step, {static_cast<hsize_t>(row.frame)}, {1}, &row.step);
   ++r.written;
 }
@@ -426,17 +484,21 @@ void TrajectoryFile::commit() {
       throw IoError(fmt::format("{}: {} {} of {} were written; the file is incomplete",
                                 f.part.output(), written, what, expected));
   };
-  expect("states", f.states, f.layout.steps + 1);
-  expect("steps", f.steps, f.layout.steps);
+  const TrajectoryLayout& l = f.layout;
+  expect("states", f.states, l.rows(l.states));
+  expect("poses", f.poses, l.body_names.empty() ? 0 : l.rows(l.of_bodies));
+  expect("end effectors", f.positions,
+         l.end_effector_names.empty() ? 0 : l.rows(l.of_end_effectors));
+  const bool at_start = l.states.given() && l.states.at(0, l.steps, l.first_step);
+  expect("steps", f.steps, l.states.given() ? l.rows(l.states) - (at_start ? 1 : 0) : l.steps);
   expect("actions", f.actions, f.layout.task ? f.layout.task->horizon : 0);
   expect("audits", f.audit.written, f.layout.audit ? f.layout.steps + 1 : 0);
   for (std::size_t i = 0; i < f.readings.size(); ++i) {
     const SensorLayout& sensor = f.layout.sensors[std::size_t(f.layout.fields[i].sensor)];
-    expect("fields of " + sensor.name, f.readings[i].written,
-           sensor.frames(f.layout.steps, f.layout.first_step));
+    expect("fields of " + sensor.name, f.readings[i].written, l.frames(l.fields[i]));
   }
   for (h5::Id* d : {&f.time, &f.q, &f.v, &f.u, &f.pose, &f.twist, &f.end_effectors, &f.iterations,
-                    &f.status, &f.residual})
+                    &f.status, &f.residual, &f.state_step, &f.body_step, &f.end_effector_step})
     d->reset();
   f.readings.clear();
   f.task = {};

@@ -37,23 +37,29 @@ std::int64_t count_of(const auto& list) { return static_cast<std::int64_t>(list.
 void add_small(const TrajectoryLayout& layout, Bytes& bytes) {
   const std::int64_t t = layout.steps, e = layout.environments;
   constexpr std::int64_t kPoseAndTwist = 13;
-  bytes.add({t, 8});
-  bytes.add({8});
-  const std::int64_t row = count_of(layout.q_names) + count_of(layout.v_names) +
-                           kPoseAndTwist * count_of(layout.body_names) +
-                           3 * count_of(layout.end_effector_names);
-  bytes.add({t, e, row, 8});
-  bytes.add({e, row, 8});
+  const auto add_rows = [&](const OutputTimes& times, std::int64_t width) {
+    bytes.add({layout.rows(times), e, width, 8});
+    if (times.given()) bytes.add({layout.rows(times), 8});  // which they are
+  };
+  bytes.add({layout.rows(layout.states), 8});
+  add_rows(layout.states, count_of(layout.q_names) + count_of(layout.v_names));
+  if (!layout.body_names.empty())
+    add_rows(layout.of_bodies, kPoseAndTwist * count_of(layout.body_names));
+  if (!layout.end_effector_names.empty())
+    add_rows(layout.of_end_effectors, 3 * count_of(layout.end_effector_names));
   if (layout.audit) {
     constexpr std::int64_t kOfRow = 9, kOfStep = 3;
     bytes.add({t, e, kOfRow + kOfStep, 8});
     bytes.add({e, kOfRow, 8});
   }
-  bytes.add({t, e, count_of(layout.u_names), 8});
-  bytes.add({t, e, 8 + 4 + 1});  // residual, iterations, status
+  if (layout.states.given()) {
+    bytes.add({layout.rows(layout.states), e});  // status
+  } else {
+    bytes.add({t, e, count_of(layout.u_names), 8});
+    bytes.add({t, e, 8 + 4 + 1});  // residual, iterations, status
+  }
   bytes.add({e, count_of(layout.randomized_names), 8});
-  for (const SensorLayout& sensor : layout.sensors)
-    bytes.add({sensor.frames(t, layout.first_step), 8});
+  for (const FieldOutput& of : layout.fields) bytes.add({layout.frames(of), 8});
 }
 
 void check_sensor(const SensorLayout& sensor, std::set<std::string>& names) {
@@ -94,6 +100,16 @@ std::array<double, 2> SensorLayout::pitch() const {
   return {rows > 1 ? along0 / (rows - 1) : 0.0, cols > 1 ? along1 / (cols - 1) : 0.0};
 }
 
+OutputTimes TrajectoryLayout::times_of(const FieldOutput& of) const {
+  if (of.times.given()) return of.times;
+  return {sensors[static_cast<std::size_t>(of.sensor)].every};
+}
+
+std::int64_t TrajectoryLayout::frames(const FieldOutput& of) const {
+  const OutputTimes times = times_of(of);
+  return times.before(steps + 1, steps, first_step) - times.before(1, steps, first_step);
+}
+
 void TrajectoryLayout::check() const {
   const auto same = [](const char* what, std::size_t names, std::size_t units) {
     if (names != units)
@@ -128,7 +144,7 @@ std::uint64_t TrajectoryLayout::bytes() const {
   add_small(*this, sum);
   for (const FieldOutput of : fields) {
     const SensorLayout& sensor = sensors[static_cast<std::size_t>(of.sensor)];
-    sum.add({sensor.frames(steps, first_step), environments,
+    sum.add({frames(of), environments,
              static_cast<std::int64_t>(numbers_of(sensor.points, of.form)), 8});
   }
   return sum.sum(*this);

@@ -34,10 +34,6 @@ struct SensorLayout {
   [[nodiscard]] bool rectangular() const { return rows > 0; }
   /// {pitch0, pitch1} [m]; negative when the corners run against an axis, 0 for a single row.
   [[nodiscard]] std::array<double, 2> pitch() const;
-  /// Fields that `steps` steps give after `first_step` steps of earlier runs.
-  [[nodiscard]] std::int64_t frames(std::int64_t steps, std::int64_t first_step) const {
-    return (first_step + steps) / every - first_step / every;
-  }
 };
 
 /// Returns the shape of one reading: {rows, cols, components}, {points, components} or {6}.
@@ -56,10 +52,13 @@ struct TrajectoryLayout {
   std::vector<std::string> q_names, q_units;    ///< (nq)
   std::vector<std::string> v_names, v_units;    ///< (nv)
   std::vector<std::string> u_names, u_units;    ///< (nu)
-  std::vector<std::string> body_names;          ///< (nb), empty when poses are not recorded
+  std::vector<std::string> body_names;          ///< (nb) recorded, empty when no poses are
   std::vector<std::string> end_effector_names;  ///< (n) end effectors, empty when there are none
+  /// At which rows q and v, bodies and end effectors are recorded; none: at all. Where `states` are
+  /// given, there are no controls, and of the solver's numbers the status alone.
+  OutputTimes states = {}, of_bodies = {}, of_end_effectors = {};
   std::vector<SensorLayout> sensors;
-  std::vector<FieldOutput> fields;  ///< what is recorded of them
+  std::vector<FieldOutput> fields;  ///< what is recorded of them; without times: every K steps
   bool audit = false;               ///< the books are recorded
   std::vector<StatusMeaning> statuses;
   std::vector<std::string> randomized_names, randomized_units;  ///< (k), empty when nothing varies
@@ -78,6 +77,14 @@ struct TrajectoryLayout {
   std::optional<TaskSpec> task;  ///< the task that a policy plays; none: only a scene
   std::string policy;            ///< of a task
 
+  /// Rows of q, bodies or end effectors that are taken at these times.
+  [[nodiscard]] std::int64_t rows(const OutputTimes& times) const {
+    return times.before(steps + 1, steps, first_step);
+  }
+  /// When a reading is taken, and how many the file has.
+  [[nodiscard]] OutputTimes times_of(const FieldOutput& of) const;
+  [[nodiscard]] std::int64_t frames(const FieldOutput& of) const;
+
   /// Throws InputError when counts contradict each other or a sensor cannot be a name in a file.
   void check() const;
   /// Size without compression of everything except the tactile fields, and of everything [bytes].
@@ -93,7 +100,9 @@ struct RunDescription {
   std::vector<int> tactile_intervals;  ///< K in force, one per sensor
   /// Recorded; none: the field of every sensor.
   std::optional<std::vector<FieldOutput>> fields;
-  bool bodies = true, end_effectors = true, audit = false;  ///< recorded
+  bool bodies = true, end_effectors = true, audit = false;         ///< recorded
+  OutputTimes states = {}, of_bodies = {}, of_end_effectors = {};  ///< as in TrajectoryLayout
+  std::vector<int> chosen_bodies = {};                             ///< none: every body
   std::string precision, command_line, version, instruction_set;
   std::optional<TaskSpec> task;
   std::string policy;

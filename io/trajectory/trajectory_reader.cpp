@@ -22,11 +22,12 @@ constexpr hsize_t kMostPoints = hsize_t{1} << 26;              // of a sensor
 struct TrajectoryReader::Impl {
   std::string path, scene_name;
   h5::Id file;
-  std::int64_t environments = 0, steps = 0;
+  std::int64_t environments = 0, steps = 0, first_step = 0;
   double timestep = 0;
   std::vector<SensorLayout> sensors;
   std::vector<std::vector<FieldForm>> forms;  // (sensors) what was recorded
-  std::vector<std::string> sums;              // sensors of which only the sum was
+  std::vector<std::string> steps_of;          // (sensors) name of the list of steps
+  std::vector<std::string> sums;              // sensors of which only these were
   std::vector<std::int64_t> frames;
 
   explicit Impl(const std::string& p) : path(p), file(h5::open_file(p)) {
@@ -37,6 +38,7 @@ struct TrajectoryReader::Impl {
     environments = h5::read_number<std::int64_t>(file, "environments");
     timestep = h5::read_number<double>(file, "timestep");
     steps = h5::read_number<std::int64_t>(file, "steps");
+    first_step = h5::read_number<std::int64_t>(file, "first_step");
     if (!h5::has_link(file, "tactile")) return;
     const h5::Id group = h5::open_group(file, "tactile");
     H5G_info_t info;
@@ -58,15 +60,22 @@ struct TrajectoryReader::Impl {
          {FieldForm::field, FieldForm::ideal, FieldForm::pressure, FieldForm::shear})
       if (h5::has_link(group, dataset_of(form))) found.push_back(form);
     if (found.empty()) {
-      if (!h5::has_link(group, dataset_of(FieldForm::sum)))
+      if (!h5::has_link(group, dataset_of(FieldForm::sum)) &&
+          !h5::has_link(group, dataset_of(FieldForm::markers)))
         throw IoError(
             fmt::format("{}: sensor '{}' has no reading: the file is damaged", path, name));
       sums.push_back(name);
       return;
     }
     if (components_of(found[0]) == 3) found.resize(1);
+    // What was read at other steps makes no picture with the first.
+    const auto apart = std::find_if(found.begin() + 1, found.end(), [&](FieldForm form) {
+      return h5::has_link(group, own_steps(form));
+    });
+    found.erase(apart, found.end());
     add_sensor(group, name, found[0]);
     forms.push_back(found);
+    steps_of.push_back(h5::has_link(group, own_steps(found[0])) ? own_steps(found[0]) : "step");
     for (const FieldForm form : found) {
       h5::Dims dims = h5::dimensions(h5::open_dataset(group, dataset_of(form))),
                expected = h5::dimensions(h5::open_dataset(group, dataset_of(found[0])));
@@ -76,6 +85,9 @@ struct TrajectoryReader::Impl {
                                   dataset_of(form), dataset_of(found[0])));
     }
   }
+
+  /// The name of a reading's list of steps, if it has one of its own.
+  static std::string own_steps(FieldForm form) { return std::string(dataset_of(form)) + "_step"; }
 
   /// Reads what a picture of a list of points needs.
   void read_image(const h5::Id& group, SensorLayout& s) const {
@@ -161,7 +173,7 @@ struct TrajectoryReader::Impl {
     frames.push_back(static_cast<std::int64_t>(dims[0]));
   }
 
-  [[nodiscard]] h5::Id open(std::size_t sensor, const char* dataset) const {
+  [[nodiscard]] h5::Id open(std::size_t sensor, const std::string& dataset) const {
     return h5::open_dataset(h5::open_group(h5::open_group(file, "tactile"), sensors[sensor].name),
                             dataset);
   }
@@ -175,6 +187,7 @@ const std::string& TrajectoryReader::path() const { return impl_->path; }
 const std::string& TrajectoryReader::scene_name() const { return impl_->scene_name; }
 std::int64_t TrajectoryReader::environments() const { return impl_->environments; }
 double TrajectoryReader::timestep() const { return impl_->timestep; }
+std::int64_t TrajectoryReader::first_step() const { return impl_->first_step; }
 const std::vector<SensorLayout>& TrajectoryReader::sensors() const { return impl_->sensors; }
 
 std::size_t TrajectoryReader::find_sensor(const std::string& name) const {
@@ -184,12 +197,16 @@ std::size_t TrajectoryReader::find_sensor(const std::string& name) const {
     if (name.empty() || names.back() == name) return i;
   }
   if (std::find(impl_->sums.begin(), impl_->sums.end(), name) != impl_->sums.end())
-    throw InputError(impl_->path + ": of sensor '" + name + "' the run recorded only the sum");
+    throw InputError(impl_->path + ": of sensor '" + name +
+                     "' the run recorded only the sum or markers");
   if (names.empty())
     throw InputError(impl_->path + ": the run recorded no tactile field, pressure or shear");
   throw InputError(impl_->path + ": no sensor is named '" + name + "'" + suggestion(name, names));
 }
 
+bool TrajectoryReader::has_field(std::size_t sensor) const {
+  return components_of(impl_->forms[sensor].front()) == 3;
+}
 bool TrajectoryReader::has_pressure(std::size_t sensor) const {
   return impl_->forms[sensor].front() != FieldForm::shear;
 }
@@ -201,8 +218,8 @@ std::int64_t TrajectoryReader::frames(std::size_t sensor) const { return impl_->
 
 std::int64_t TrajectoryReader::step(std::size_t sensor, std::int64_t frame) const {
   std::int64_t value = 0;
-  h5::read_box<std::int64_t>(impl_->open(sensor, "step"), {static_cast<hsize_t>(frame)}, {1},
-                             &value);
+  h5::read_box<std::int64_t>(impl_->open(sensor, impl_->steps_of[sensor]),
+                             {static_cast<hsize_t>(frame)}, {1}, &value);
   return value;
 }
 

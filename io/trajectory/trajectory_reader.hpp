@@ -22,13 +22,17 @@ class TrajectoryReader {
   [[nodiscard]] const std::string& scene_name() const;
   [[nodiscard]] std::int64_t environments() const;
   [[nodiscard]] double timestep() const;  ///< [s]
+  /// Steps before the file's own, of runs that it continues.
+  [[nodiscard]] std::int64_t first_step() const;
   [[nodiscard]] const std::vector<SensorLayout>& sensors() const;
   /// Index of a sensor; "" is the first. Throws InputError that names the sensors of the file.
   [[nodiscard]] std::size_t find_sensor(const std::string& name) const;
   [[nodiscard]] std::int64_t frames(std::size_t sensor) const;
-  /// Returns the row of /q from which a frame was read.
+  /// Returns the steps of the run before a frame was read: the row of /q, where each is recorded.
   [[nodiscard]] std::int64_t step(std::size_t sensor, std::int64_t frame) const;
-  /// Whether the numbers along the normal and those across it were recorded.
+  /// Whether whole fields were recorded, and whether the numbers along the normal and those across
+  /// it were.
+  [[nodiscard]] bool has_field(std::size_t sensor) const;
   [[nodiscard]] bool has_pressure(std::size_t sensor) const;
   [[nodiscard]] bool has_shear(std::size_t sensor) const;
   /// Returns a field, (points, 3) [N]. What was not recorded is 0. Where pressure was recorded

@@ -92,12 +92,20 @@ class DatasetView {
                       "it: tangere generate --record q",
                       demos_.front().file, demos_.front().number));
     const h5::Id scene = h5::open_group(file, "scene");
+    const auto steps = h5::read_number<std::int64_t>(scene, "steps"),
+               every = h5::read_number<std::int64_t>(scene, "every");
+    if (every < 1) throw IoError(fmt::format("{}: a row every {} steps", path_, every));
+    const std::vector<SampleSaid> samples = samples_said(scene, every, steps / every);
     // The observations of a task have names of their own, which may be those of sensors.
     const bool of_task = !value_of(dataset_.settings, "policy").empty();
     for (ViewSensor& sensor : scene_->sensors()) {
       std::string name;
       for (const std::string& reading : {sensor.name, sensor.name + ".ideal"})
         if (!of_task && name.empty() && h5::has_link(obs, reading)) name = reading;
+      std::optional<SampleSaid> sampled;
+      for (const SampleSaid& sample : samples)
+        if (name.empty() && (sample.name == sensor.name || sample.name == sensor.name + ".ideal"))
+          sampled = sample, name = sample.name;
       if (name.empty() || !h5::has_link(scene, "sensors")) {
         data_.notes.push_back(
             fmt::format("The field of sensor '{}' was not recorded.", sensor.name));
@@ -106,6 +114,7 @@ class DatasetView {
       const h5::Id group = h5::open_group(h5::open_group(scene, "sensors"), sensor.name);
       signs_.push_back(static_cast<int>(h5::read_number<std::int64_t>(group, "pressure_sign")));
       readings_.push_back(name);
+      sampled_.push_back(sampled);
       data_.sensors.push_back(std::move(sensor));
     }
   }
@@ -134,7 +143,11 @@ class DatasetView {
       for (std::size_t k = 0; k < state.size(); ++k)
         episode.traces[k].values.push_back(static_cast<float>(state[k]));
     }
-    for (std::size_t s = 0; s < data_.sensors.size(); ++s) add_fields(s, which, obs, end, episode);
+    for (std::size_t s = 0; s < data_.sensors.size(); ++s)
+      if (sampled_[s])
+        add_samples(s, which, h5::open_group(demo, "samples"), episode);
+      else
+        add_fields(s, which, obs, end, episode);
     add_reward(which, demo, episode);
     data_.episodes.push_back(std::move(episode));
   }
@@ -172,6 +185,43 @@ class DatasetView {
     episode.traces.push_back(std::move(shear));
   }
 
+  /// Of a sensor that is not read at every row: the newest field at each frame, once.
+  void add_samples(std::size_t sensor, const Demo& which, const h5::Id& samples,
+                   ViewEpisode& episode) {
+    const ViewSensor& view = data_.sensors[sensor];
+    const SampleSaid& said = *sampled_[sensor];
+    const h5::Id fields = h5::open_dataset(samples, said.name);
+    const std::size_t width = 3 * static_cast<std::size_t>(view.points);
+    const h5::Dims dims = h5::dimensions(fields);
+    std::size_t numbers = 1;
+    for (std::size_t i = 1; i < dims.size(); ++i) numbers *= dims[i];
+    if (dims.size() < 2 || dims[0] != static_cast<hsize_t>(said.rows) || numbers != width)
+      throw IoError(fmt::format("{}: expected {} fields of {} points: the file is damaged",
+                                h5::place_of(fields), said.rows, view.points));
+    ViewField field;
+    ViewTrace normal{"force [N]", view.name + " normal", "N", {}},
+        shear{"force [N]", view.name + " shear", "N", {}};
+    std::int64_t taken = -1;
+    std::int32_t at = -1;
+    std::array<double, 2> sums{};
+    for (const std::int64_t row : episode.rows) {
+      const std::int64_t newest = said.times.before(row + 1, which.rows) - 1;
+      if (newest > taken) {
+        const std::vector<double> force = row_numbers(fields, newest, width);
+        check_finite_field(force, fmt::format("{}: demo_{}: sensor '{}': row {}", which.file,
+                                              which.number, view.name, newest));
+        sums = add_field(view, signs_[sensor], force, field);
+        taken = newest, ++at;
+      }
+      field.at.push_back(at);
+      normal.values.push_back(taken < 0 ? kNoValue : static_cast<float>(sums[0]));
+      shear.values.push_back(taken < 0 ? kNoValue : static_cast<float>(sums[1]));
+    }
+    episode.fields.push_back(std::move(field));
+    episode.traces.push_back(std::move(normal));
+    episode.traces.push_back(std::move(shear));
+  }
+
   /// Of the action that a row begins; the last state begins none. A scene alone has no rewards.
   void add_reward(const Demo& which, const h5::Id& demo, ViewEpisode& episode) {
     if (value_of(dataset_.settings, "policy").empty()) return;
@@ -191,6 +241,7 @@ class DatasetView {
   std::unique_ptr<ViewScene> scene_;
   ViewData data_;
   std::vector<std::string> q_names_, randomized_, readings_;
+  std::vector<std::optional<SampleSaid>> sampled_;  // (sensors) those that are not in every row
   std::vector<int> signs_;
   double interval_ = 0;  // of rows [s]
 };

@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "engine/base/error.hpp"
+#include "io/trajectory/saved_state.hpp"
 #include "io/trajectory/trajectory_reader.hpp"
 #include "io/view/view_source.hpp"
 
@@ -34,9 +35,13 @@ class TrajectoryView {
       throw IoError(
           fmt::format("{}: {} steps of {} environments after {} steps: the file is damaged", path,
                       steps_, fields_.environments(), first_step_));
+    state_steps_ = state_steps(path);
+    listed_ = h5::has_link(file_, "step");
+    if (state_steps_.empty())
+      throw IoError(path + ": the run recorded no state, so nothing says where bodies are");
     check_shape(q, {rows(), environments(), q_names_.size()}, "q");
     check_shape(h5::open_dataset(h5::open_group(file_, "solver"), "status"),
-                {rows() - 1, environments()}, "status");
+                {listed_ ? rows() : rows() - 1, environments()}, "status");
   }
 
   ViewData read() {
@@ -53,9 +58,9 @@ class TrajectoryView {
       data_.notes.push_back(
           fmt::format("The first {} of {} environments.", count, fields_.environments()));
     const std::size_t traces = q_names_.size() + 2 * data_.sensors.size() + 2;
-    data_.stride =
-        stride_for(std::vector<std::int64_t>(static_cast<std::size_t>(count), steps_ + 1),
-                   numbers_per_frame(data_.scene, data_.sensors, traces), options_);
+    data_.stride = stride_for(
+        std::vector<std::int64_t>(static_cast<std::size_t>(count), std::ssize(state_steps_)),
+        numbers_per_frame(data_.scene, data_.sensors, traces), options_);
     for (std::int64_t e = first; e < first + count; ++e) add_environment(e);
     return std::move(data_);
   }
@@ -67,7 +72,8 @@ class TrajectoryView {
           fmt::format("{}: no attribute '{}': the file does not hold its scene", path_, name));
     return h5::read_text(file_, name);
   }
-  [[nodiscard]] hsize_t rows() const { return static_cast<hsize_t>(steps_) + 1; }
+  /// Of the states.
+  [[nodiscard]] hsize_t rows() const { return state_steps_.size(); }
   [[nodiscard]] hsize_t environments() const {
     return static_cast<hsize_t>(fields_.environments());
   }
@@ -109,13 +115,16 @@ class TrajectoryView {
     ViewEpisode episode;
     episode.label = fmt::format("environment {}", environment);
     episode.shapes = scene_.begin_episode(numbers(environment), data_);
-    episode.rows = frames_of(steps_ + 1, data_.stride);
+    const std::vector<std::int64_t> shown = frames_of(std::ssize(state_steps_), data_.stride);
+    for (const std::int64_t row : shown)
+      episode.rows.push_back(state_steps_[static_cast<std::size_t>(row)]);
     episode.traces = coordinate_traces(q_names_, scene_.q_units());
     const h5::Id q = h5::open_dataset(file_, "q");
     std::vector<double> state(q_names_.size());
-    for (const std::int64_t row : episode.rows) {
+    for (const std::int64_t row : shown) {
+      const std::int64_t step = state_steps_[static_cast<std::size_t>(row)];
       episode.time.push_back(
-          static_cast<float>(static_cast<double>(first_step_ + row) * fields_.timestep()));
+          static_cast<float>(static_cast<double>(first_step_ + step) * fields_.timestep()));
       h5::read_box<double>(q, {static_cast<hsize_t>(row), static_cast<hsize_t>(environment), 0},
                            {1, 1, state.size()}, state.data());
       scene_.add_state(state, episode);
@@ -182,20 +191,19 @@ class TrajectoryView {
   /// The worst status of the steps since the frame before: a failure, else the largest value.
   void add_status(std::int64_t environment, ViewEpisode& episode) {
     const h5::Id status = h5::open_dataset(h5::open_group(file_, "solver"), "status");
-    std::vector<std::int8_t> values(static_cast<std::size_t>(steps_));
-    if (steps_ > 0)
-      h5::read_box<std::int8_t>(status, {0, static_cast<hsize_t>(environment)},
-                                {static_cast<hsize_t>(steps_), 1}, values.data());
+    std::vector<std::int8_t> values(rows() - (listed_ ? 0 : 1));
+    if (!values.empty())
+      h5::read_box<std::int8_t>(status, {0, static_cast<hsize_t>(environment)}, {values.size(), 1},
+                                values.data());
     ViewTrace trace{"solver status", "status", "1", {}};
-    std::int64_t before = 0;
-    for (const std::int64_t row : episode.rows) {
+    std::int64_t next = 0;
+    for (const std::int64_t row : frames_of(std::ssize(state_steps_), data_.stride)) {
       int worst = 0;
-      for (std::int64_t step = before; step < row; ++step) {
-        const int value = values[static_cast<std::size_t>(step)];
+      for (; next < row + (listed_ ? 1 : 0); ++next) {  // listed: of the step that ends at a row
+        const int value = values[static_cast<std::size_t>(next)];
         if (value < 0 ? worst >= 0 || value < worst : worst >= 0 && value > worst) worst = value;
       }
       trace.values.push_back(static_cast<float>(worst));
-      before = row;
     }
     episode.traces.push_back(std::move(trace));
   }
@@ -208,6 +216,8 @@ class TrajectoryView {
   ViewData data_;
   std::int64_t steps_ = 0;
   std::int64_t first_step_ = 0;  // of a run that went on from another's state
+  std::vector<std::int64_t> state_steps_;
+  bool listed_ = false;  // the file lists them
   std::vector<std::string> q_names_;
   std::vector<std::size_t> recorded_;  // (sensors) indices in the reader
 };

@@ -37,7 +37,11 @@ void PythonBatch::step(const Argument<double>& u) {
 
 FieldOutput PythonBatch::reading_named(const std::string& name) const {
   const std::vector<std::string> sensors = sensor_names(model().scene());
-  if (const auto output = find_output(sensors, name)) return *output;
+  if (const auto output = find_output(sensors, name)) {
+    const std::string reason = reason_against(model().scene(), *output);
+    if (!reason.empty()) throw InputError(fmt::format("reading '{}': {}", name, reason));
+    return *output;
+  }
   std::vector<std::string> names;
   for (const std::string& n : output_names(sensors))
     if (!is_plain_output(n)) names.push_back(n);

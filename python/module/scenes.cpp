@@ -93,7 +93,16 @@ void add_model(nb::module_& m) {
                      return std::vector<SensorInfo>(s.sensors().begin(), s.sensors().end());
                    })
       .def_prop_ro(
-          "readings", [](const Model& s) { return output_names(sensor_names(s.scene())); },
+          "readings",
+          [](const Model& s) {
+            const std::vector<std::string> sensors = sensor_names(s.scene());
+            std::vector<std::string> names = output_names(sensors);
+            std::erase_if(names, [&](const std::string& name) {
+              const auto output = find_output(sensors, name);
+              return output && !reason_against(s.scene(), *output).empty();
+            });
+            return names;
+          },
           "Names of everything that can be read: q, v, …, pad, pad.pressure, pad.sum.")
       .def_prop_ro(
           "initial_q",

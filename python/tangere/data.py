@@ -131,6 +131,22 @@ class Episodes:
         last = self._demo(episode)["final_obs"]
         return {key: last[key][()] for key in last}
 
+    def samples(self, episode: int) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+        """What is not stored at every row: KEY → (rows, array), both of one length.
+
+        Row R of an episode of R actions is the last state. Empty for most data sets.
+        """
+        if "samples" not in self.attributes:
+            return {}
+        stored = self._demo(episode)["samples"]
+        every = int(self.attributes["every"])
+        taken = {}
+        for key, steps in zip(self.attributes["samples"], self.attributes["sample_every"]):
+            last = int(self.lengths[episode])
+            rows = np.arange(0, last + 1, int(steps) // every) if steps else np.array([last])
+            taken[str(key)] = (rows, stored[str(key)][()])
+        return taken
+
     def __getitem__(self, episode: int) -> dict[str, np.ndarray]:
         """Arrays by name: the observations, "actions", "rewards", and derivatives if stored.
 

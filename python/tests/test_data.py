@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import pickle
+from pathlib import Path
 
 import h5py
 import numpy as np
@@ -162,6 +163,22 @@ def test_a_scene_ends_no_episode(generate):
     balls = generate(str(tangere.scenes()["rolling_ball_small"]), "--episodes", "1", "--steps", "5",
                      "--every", "5", "--record", "q")  # fmt: skip
     assert Episodes(balls).terminated(0) is False
+
+
+def test_samples_have_their_rows(generate):
+    scene = Path(__file__).parents[2] / "scenes/rolling_ball_small.xml"
+    steps = ("--episodes", "2", "--steps", "60", "--every", "10", "--precision", "double")
+    whole = Episodes(generate(str(scene), *steps, "--record", "q,pad.sum"))
+    some = Episodes(generate(str(scene), *steps, "--record", "pad.sum/30,q/final,bodies.ball"))
+    assert some.keys == ["bodies.ball"] and whole.samples(0) == {}
+    rows, sums = some.samples(1)["pad.sum"]
+    np.testing.assert_array_equal(rows, [0, 3, 6])
+    every = np.concatenate([whole[1]["pad.sum"], whole.final(1)["pad.sum"]])
+    np.testing.assert_array_equal(sums, every[rows])
+    rows, q = some.samples(1)["q"]
+    np.testing.assert_array_equal(rows, [6])
+    np.testing.assert_array_equal(q, whole.final(1)["q"])
+    assert some[1]["bodies.ball"].shape == (6, 1, 13)
 
 
 def test_a_missing_shard_is_told(generate):

@@ -55,9 +55,8 @@ double saved(const std::vector<InstantTimes>& instants, const std::vector<std::s
 /// Returns the time of all readings, each weighed by how often it happens [s].
 double reading_time(TimedModel& model, int instant) {
   double sum = 0;
-  const std::span<const SensorInfo> sensors = model.model().sensors();
-  for (std::size_t s = 0; s < sensors.size(); ++s)
-    sum += model.time_reading(static_cast<int>(s), instant) / std::max(1, sensors[s].every);
+  for (std::size_t k = 0; k < model.readings().size(); ++k)
+    sum += model.time_reading(k, instant) / model.interval(k);
   return sum;
 }
 

@@ -11,6 +11,7 @@
 
 #include "engine/model/model.hpp"
 #include "tasks/effects/comparison.hpp"
+#include "tasks/effects/run_costs.hpp"
 
 namespace tangere {
 
@@ -44,6 +45,7 @@ struct EffectCosts {
   StepTimes times{};                ///< of the scene as it is
   MeasuredShare itself{};           ///< the scene against itself: what chance alone shows
   std::vector<EffectCost> effects;  ///< parallel to Model::effects()
+  std::vector<RunCost> of_runs;     ///< what a run adds to steps
 };
 
 /// Whether the elements of a kind are timed one by one: up to 12 contacts or sensors, or up to 4 of

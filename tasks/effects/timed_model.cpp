@@ -2,14 +2,14 @@
 // Recorded states become blocks of the model's own layout once; a sweep only restores them.
 #include "tasks/effects/timed_model.hpp"
 
-#include <ctime>
-
 #include <algorithm>
+#include <array>
 #include <utility>
 
 #include "engine/base/as_size.hpp"
 #include "engine/base/error.hpp"
 #include "kernels/numbers/block.hpp"
+#include "tasks/effects/thread_time.hpp"
 
 namespace tangere {
 namespace {
@@ -17,14 +17,6 @@ namespace {
 using kernels::kBlock;
 /// Environments that are solved together; half a block.
 constexpr int kLanesOfGroup = kBlock / 2;
-
-/// Returns the CPU time of this thread [s], which other processes do not disturb as they do the
-/// wall clock.
-double cpu_seconds() {
-  std::timespec now{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-}
 
 /// Controls have the names of the dofs that they drive, so a name stands for one control.
 std::vector<std::size_t> columns_of(const Model& model, const Model& of) {
@@ -46,7 +38,8 @@ TimedModel::TimedModel(const Model& model, const RecordedStates& recorded,
       options_(options),
       batch_(model, recorded.environments),
       stepper_(model, options),
-      readout_(model) {
+      readout_(model),
+      outputs_(asked_fields(model)) {
   const std::vector<std::size_t> columns = columns_of(model, recorded.model);
   const std::size_t nq = as_size(model.nq()), nv = as_size(model.nv());
   const std::size_t nu = as_size(recorded.model.nu());
@@ -69,9 +62,11 @@ TimedModel::TimedModel(const Model& model, const RecordedStates& recorded,
     controls_.push_back(std::move(u));
   }
   const int read = std::min(int(kBlock), recorded.environments);
-  for (std::size_t k = 0; k < model.sensors().size(); ++k) {
+  sums_.resize(as_size(read));
+  for (const FieldOutput of : outputs_) {
     frames_.emplace_back();
-    for (int e = 0; e < read; ++e) frames_.back().emplace_back(model, static_cast<int>(k));
+    for (int e = 0; e < read && of.form != FieldForm::sum; ++e)
+      frames_.back().emplace_back(model, of.sensor, of.form);
   }
 }
 
@@ -99,12 +94,19 @@ void TimedModel::solve_to(double tolerance) {
   stepper_ = Stepper(model(), options_);
 }
 
+int TimedModel::show(int instant) {
+  restore(instant);
+  int live = 0;
+  for (int e = 0; e < batch_.environments(); ++e) live += batch_.held(e) ? 0 : 1;
+  return live;
+}
+
 TimedStep TimedModel::time_step(int instant) {
   TimedStep step;
   restore(instant);
-  const double start = cpu_seconds();
+  const double start = thread_seconds();
   stepper_.step(batch_, controls_[as_size(instant)]);
-  step.seconds = cpu_seconds() - start;
+  step.seconds = thread_seconds() - start;
   std::int32_t most = 0;
   int groups = 0;
   for (int e = 0; e < batch_.environments(); ++e) {
@@ -124,12 +126,24 @@ TimedStep TimedModel::time_step(int instant) {
   return step;
 }
 
-double TimedModel::time_reading(int sensor, int instant) {
-  std::vector<DenseFrame<double>>& frames = frames_[as_size(sensor)];
+double TimedModel::interval(std::size_t reading) const {
+  const FieldOutput& of = outputs_[reading];
+  if (of.times.final) return static_cast<double>(std::max<std::int64_t>(1, recorded_.steps));
+  if (of.times.every > 0) return static_cast<double>(of.times.every);
+  return std::max(1, model().sensors()[as_size(of.sensor)].every);
+}
+
+double TimedModel::time_reading(std::size_t reading, int instant) {
+  std::vector<DenseFrame<double>>& frames = frames_[reading];
+  std::array<std::span<double>, kBlock> sums;
+  for (std::size_t e = 0; e < sums_.size(); ++e) sums[e] = sums_[e];
   restore(instant);
-  const double start = cpu_seconds();
-  readout_.read_block(batch_, 0, std::span(frames));
-  return (cpu_seconds() - start) / double(frames.size());
+  const double start = thread_seconds();
+  if (frames.empty())
+    readout_.read_block(batch_, 0, outputs_[reading], std::span<const std::span<double>>(sums));
+  else
+    readout_.read_block(batch_, 0, std::span(frames));
+  return (thread_seconds() - start) / double(sums_.size());
 }
 
 }  // namespace tangere

@@ -31,12 +31,23 @@ class TimedModel {
   void solve_to(double tolerance);
   /// Takes one step of all environments from an instant, and times the step alone.
   TimedStep time_step(int instant);
-  /// Reads one sensor into frames of the first block's environments, and times the reading of one
-  /// [s].
-  double time_reading(int sensor, int instant);
+  /// Readings that the scene asks for: its <outputs>, else the field of every sensor.
+  [[nodiscard]] std::span<const FieldOutput> readings() const { return outputs_; }
+  /// Steps of a run for each taking of a reading, on average.
+  [[nodiscard]] double interval(std::size_t reading) const;
+  /// Takes a reading of the first block's environments, in double, and times that of one [s].
+  double time_reading(std::size_t reading, int instant);
 
   [[nodiscard]] const Model& model() const { return batch_.model(); }
-  /// What the last step or reading left.
+  /// Puts the batch into the states of an instant. Returns how many environments have not failed.
+  int show(int instant);
+  /// (E, nu) of the step that follows an instant.
+  [[nodiscard]] std::span<const double> controls(int instant) const {
+    return controls_[static_cast<std::size_t>(instant)];
+  }
+  [[nodiscard]] const StepperOptions& options() const { return options_; }
+  [[nodiscard]] std::int64_t run_steps() const { return recorded_.steps; }
+  /// What the last step, reading or show() left.
   [[nodiscard]] const Batch& batch() const { return batch_; }
 
   [[nodiscard]] int instants() const { return static_cast<int>(starts_.size()); }
@@ -52,8 +63,10 @@ class TimedModel {
   Readout readout_;
   std::vector<std::vector<BlockState>> starts_;  // (instants, blocks)
   std::vector<std::vector<double>> controls_;    // (instants), (E, nu) each
+  std::vector<FieldOutput> outputs_;
   std::vector<std::vector<DenseFrame<double>>>
-      frames_;  // (sensors), one per environment of a block
+      frames_;                  // (readings), one per environment of a block; none for a sum
+  std::vector<FieldSum> sums_;  // of a block's environments
 };
 
 }  // namespace tangere

@@ -2,8 +2,10 @@
 // The losses are half squares, so their derivatives are the numbers themselves.
 #include "tasks/gradients/losses.hpp"
 
+#include <algorithm>
 #include <numeric>
 
+#include "engine/sense/marker_map.hpp"
 #include "engine/step/displacement.hpp"
 
 namespace tangere {
@@ -74,6 +76,59 @@ class Fields : public RolloutLoss {
   std::size_t components_;
 };
 
+/// Markers move linearly with the field, so its cotangent is the transposed map of theirs.
+class Markers : public RolloutLoss {
+ public:
+  Markers(const Model& model, int every) : model_(model), every_(every) {
+    bool any = false;
+    for (const TactileDescription& d : model.scene().sensors) {
+      if (!d.markers) continue;
+      any = true;
+      if (is_imperfect(d.imperfections) || !d.points.empty())
+        throw InputError(d.source.prefix() + "loss 'markers': sensor '" + d.name +
+                         "' is imperfect or a list of points; expected an ideal rect_array");
+    }
+    if (!any) throw InputError("loss 'markers': no sensor of the scene has <markers>");
+  }
+  [[nodiscard]] bool reads_fields(std::int64_t step) const override {
+    return step > 0 && step % every_ == 0;
+  }
+  double evaluate(const LossPoint& at, const LossCotangent& out) const override {
+    double squares = 0;
+    for (std::size_t s = 0; s < at.fields.size(); ++s) {
+      const SensorInfo& info = model_.sensors()[s];
+      if (!model_.scene().sensors[s].markers) continue;
+      const auto points = static_cast<std::size_t>(info.points);
+      std::vector<double> field(3 * points), moved(2 * points), cotangent(3 * points);
+      at.fields[s]->expand(field);
+      MarkerMap map(model_, static_cast<int>(s));  // losses serve many threads, a map one
+      map.displace(field, moved);
+      for (const double x : moved) squares += x * x;
+      map.pull_back(moved, cotangent);
+      add_to_tiles(*at.fields[s], info, cotangent, out.fields[s]);
+    }
+    return 0.5 * squares;
+  }
+
+ private:
+  static void add_to_tiles(const CompactFrame<double>& frame, const SensorInfo& info,
+                           std::span<const double> from, std::span<double> to) {
+    constexpr int kSide = 8;
+    for (std::size_t k = 0; k < frame.tiles().size(); ++k) {
+      const int tile = frame.tiles()[k], row0 = kSide * (tile / frame.tile_cols()),
+                col0 = kSide * (tile % frame.tile_cols());
+      for (int i = 0; i < std::min(kSide, info.rows - row0); ++i)
+        for (int j = 0; j < std::min(kSide, info.cols - col0); ++j)
+          for (std::size_t c = 0; c < 3; ++c)
+            to[(3 * k + c) * kSide * kSide + static_cast<std::size_t>(kSide * i + j)] +=
+                from[3 * static_cast<std::size_t>((row0 + i) * info.cols + col0 + j) + c];
+    }
+  }
+
+  Model model_;
+  int every_;
+};
+
 class EndEffectors : public RolloutLoss {
  public:
   [[nodiscard]] bool reads_end_effectors(std::int64_t /*step*/) const override { return true; }
@@ -97,6 +152,7 @@ const char* to_string(LossKind value) {
     case LossKind::tactile: return "tactile";
     case LossKind::shear: return "shear";
     case LossKind::end_effectors: return "variables";
+    case LossKind::markers: return "markers";
   }
   return "unknown";
 }
@@ -110,14 +166,16 @@ const char* loss_meaning(LossKind value) {
     case LossKind::tactile: return "half the squares of all tactile forces, summed over fields";
     case LossKind::shear: return "half the squares of all shear forces, summed over fields";
     case LossKind::end_effectors: return "half the squares of the end effectors' last positions";
+    case LossKind::markers:
+      return "half the squares of all markers' displacements, summed over fields";
   }
   return "";
 }
 
 const std::vector<LossKind>& loss_kinds() {
-  static const std::vector<LossKind> kinds = {LossKind::final_state, LossKind::path,
-                                              LossKind::tactile, LossKind::shear,
-                                              LossKind::end_effectors};
+  static const std::vector<LossKind> kinds = {LossKind::final_state,   LossKind::path,
+                                              LossKind::tactile,       LossKind::shear,
+                                              LossKind::end_effectors, LossKind::markers};
   return kinds;
 }
 
@@ -133,6 +191,7 @@ std::unique_ptr<RolloutLoss> make_loss(LossKind kind, const Model& model, int ev
     case LossKind::path: return std::make_unique<Path>();
     case LossKind::tactile: return std::make_unique<Fields>(every, 3);
     case LossKind::shear: return std::make_unique<Fields>(every, 2);
+    case LossKind::markers: return std::make_unique<Markers>(model, every);
     case LossKind::end_effectors: break;
   }
   return std::make_unique<EndEffectors>();

@@ -18,6 +18,7 @@ enum class LossKind {
   tactile,        ///< ½ Σ |T|² of all sensors, every k-th step
   shear,          ///< ½ Σ of the first two components squared, every k-th step
   end_effectors,  ///< ½ |x|² of all end effectors after the last step
+  markers,        ///< ½ Σ |u|² of all markers' displacements, every k-th step
 };
 const char* to_string(LossKind value);
 /// Describes the loss in words, for files.
@@ -26,7 +27,7 @@ const char* loss_meaning(LossKind value);
 const std::vector<LossKind>& loss_kinds();
 
 /// `every`: steps between fields. Throws InputError for a loss on sensors or end effectors that the
-/// scene does not have.
+/// scene does not have, and for one on markers where their sensor is imperfect or a list of points.
 std::unique_ptr<RolloutLoss> make_loss(LossKind kind, const Model& model, int every);
 
 }  // namespace tangere

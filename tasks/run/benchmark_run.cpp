@@ -185,8 +185,10 @@ class Benchmark {
                    bool checked, BlockTally& tally) {
     const std::span<const SensorInfo> sensors = batch_.model().sensors();
     for (std::size_t k = 0; k < fields_.outputs().size(); ++k) {
-      const SensorInfo& sensor = sensors[as_size(fields_.outputs()[k].sensor)];
-      if (done % tactile_interval(sensor, options_.rollout) != 0) continue;
+      const FieldOutput of = fields_.outputs()[k];
+      const SensorInfo& sensor = sensors[as_size(of.sensor)];
+      if (!reading_times(batch_.model(), of, options_.rollout).at(done, options_.rollout.steps))
+        continue;
       fields_.read(worker.readout, batch_, first / kBlock, k);
       for (int e = first; e < last; ++e) {
         if (!steps.live(e)) continue;

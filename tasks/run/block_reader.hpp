@@ -55,9 +55,9 @@ inline void check_sensor_memory(const Model& model, double timestep) {
   for (std::size_t s = 0; s < model.sensors().size(); ++s)
     if (model.sensors()[s].past_states > 0 && timestep != model.timestep())
       throw InputError(model.scene().sensors[s].imperfections.source.prefix() +
-                       "delay and low_pass of '" + model.sensors()[s].name + "' count steps of " +
-                       std::to_string(model.timestep()) + " s; expected this timestep, found " +
-                       std::to_string(timestep) + " s");
+                       "delay, low_pass and hysteresis of '" + model.sensors()[s].name +
+                       "' count steps of " + std::to_string(model.timestep()) +
+                       " s; expected this timestep, found " + std::to_string(timestep) + " s");
 }
 
 }  // namespace tangere

@@ -14,6 +14,7 @@ namespace tangere {
 namespace {
 
 constexpr std::size_t kQ = 0, kV = 1, kThird = 2;  // names of observations
+constexpr std::size_t kPose = 7, kMotion = 13;     // numbers of a body: its pose, and twist
 
 std::size_t number_bytes(const EpisodeOptions& options) {
   return options.precision == Precision::mixed ? sizeof(float) : sizeof(double);
@@ -22,8 +23,10 @@ std::size_t number_bytes(const EpisodeOptions& options) {
 /// Bytes of one row of one episode in a slot's buffers.
 double row_bytes(const EpisodeSource& source, const EpisodeOptions& options) {
   double bytes = static_cast<double>(source.action + (source.whole ? 1 : 0)) * sizeof(float);
-  for (const std::size_t width : source.widths)
-    bytes += static_cast<double>(width * number_bytes(options));
+  for (std::size_t name = 0; name < source.widths.size(); ++name)
+    if (source.taken[name].wanted && !source.taken[name].times.final)
+      bytes += static_cast<double>(source.widths[name] * number_bytes(options)) /
+               static_cast<double>(std::max<std::int64_t>(1, source.taken[name].times.every));
   return bytes;
 }
 
@@ -55,18 +58,54 @@ void check_held(const ControlProgram& controls, const EpisodeOptions& options, i
 
 }  // namespace
 
+/// Times in rows of those in steps.
+static OutputTimes in_rows(const std::string& what, const OutputTimes& times, int every) {
+  if (times.every % every != 0)
+    throw InputError(fmt::format("'{}{}', and a row is every {} steps; expected a multiple of {}",
+                                 what, to_string(times), every, every));
+  return {times.every / every, times.final};
+}
+
+bool is_taken(const EpisodeSource& source, std::size_t name, std::int64_t row) {
+  return source.taken[name].wanted && source.taken[name].times.at(row, source.rows);
+}
+std::size_t taken_before(const EpisodeSource& source, std::size_t name, std::int64_t row) {
+  if (!source.taken[name].wanted) return 0;
+  return static_cast<std::size_t>(source.taken[name].times.before(row, source.rows));
+}
+
 EpisodeSource shape_of(const Model& model, const EpisodeOptions& options) {
   EpisodeSource s;
   s.model = &model;
   s.rows = action_rows(options);
   s.action = as_size(model.nu());
-  s.widths = {as_size(model.nq()), as_size(model.nv())};
-  if (!model.end_effectors().empty()) s.widths.push_back(3 * model.end_effectors().size());
+  const auto add = [&](const std::string& what, std::size_t width, bool wanted,
+                       const OutputTimes& times) {
+    s.widths.push_back(width);
+    s.taken.push_back({wanted, in_rows(what, times, options.every)});
+  };
+  add("q", as_size(model.nq()), options.q.wanted, options.q.times);
+  add("v", as_size(model.nv()), options.v.wanted, options.v.times);
+  if (!model.end_effectors().empty())
+    add("variables", 3 * model.end_effectors().size(), options.end_effectors.wanted,
+        options.end_effectors.times);
+  s.first_body = s.widths.size();
+  s.bodies = options.bodies;
+  for (const BodyRows& some : s.bodies) {
+    for (const int body : some.bodies)
+      if (body < 0 || body >= model.nb())
+        throw InputError(fmt::format("rows of body {}; the scene has {} bodies", body, model.nb()));
+    add("bodies", kMotion * (some.bodies.empty() ? as_size(model.nb()) : some.bodies.size()), true,
+        some.times);
+  }
   s.first_field = s.widths.size();
   s.fields = options.fields ? *options.fields : whole_fields(model);
   check_outputs(s.fields, model.sensors().size());
-  for (const FieldOutput output : s.fields)
-    s.widths.push_back(numbers_of(model.sensors()[as_size(output.sensor)].points, output.form));
+  for (const FieldOutput output : s.fields) {
+    const SensorInfo& sensor = model.sensors()[as_size(output.sensor)];
+    add(output_name(sensor.name, output.form), numbers_of(sensor.points, output.form), true,
+        output.times);
+  }
   return s;
 }
 
@@ -77,7 +116,8 @@ EpisodeSource shape_of(const Task& task) {
   s.action = task.spec().action.size();
   s.widths = {as_size(task.model().nq()), as_size(task.model().nv())};
   for (const TensorSpec& tensor : task.spec().observations) s.widths.push_back(tensor.size());
-  s.first_field = s.widths.size();
+  s.first_body = s.first_field = s.widths.size();
+  s.taken.resize(s.widths.size());
   s.whole = true;
   return s;
 }
@@ -136,7 +176,7 @@ EpisodeSlot<T>::EpisodeSlot(const EpisodeSource& source, const EpisodeOptions& o
       rewards_(source.whole ? kBlockEpisodes * as_size(piece_rows_) : 0),
       observations_(source.widths.size()) {
   for (std::size_t name = 0; name < values_.size(); ++name) {
-    values_[name].resize(kBlockEpisodes * as_size(piece_rows_) * source.widths[name]);
+    values_[name].resize(kBlockEpisodes * taken_rows(name, piece_rows_) * source.widths[name]);
     small_.resize(std::max(small_.size(), name < source.first_field ? source.widths[name] : 0));
   }
 }
@@ -178,17 +218,34 @@ bool EpisodeSlot<T>::simulate(const StopRequest& stop,
   next_row_ += rows_;
   if (last()) collect();
   for (std::size_t name = 0; name < values_.size(); ++name)
-    observations_[name] =
-        std::span<const T>(values_[name])
-            .first(as_size(batch_->environments()) * as_size(rows_) * source_.widths[name]);
+    observations_[name] = std::span<const T>(values_[name])
+                              .first(as_size(batch_->environments()) * source_.widths[name] *
+                                     (taken_before(source_, name, next_row_) -
+                                      taken_before(source_, name, first_row_)));
   return true;
 }
 
 template <class T>
 std::span<T> EpisodeSlot<T>::numbers(std::size_t name, int episode, int row) {
-  const std::size_t width = source_.widths[name];
-  return std::span(values_[name])
-      .subspan((as_size(episode) * as_size(rows_) + as_size(row)) * width, width);
+  const std::size_t width = source_.widths[name], before = taken_before(source_, name, first_row_),
+                    at = taken_before(source_, name, first_row_ + row) - before,
+                    rows = taken_before(source_, name, first_row_ + rows_) - before;
+  return std::span(values_[name]).subspan((as_size(episode) * rows + at) * width, width);
+}
+
+/// Returns the most rows at which a name is taken among as many in a row.
+template <class T>
+std::size_t EpisodeSlot<T>::taken_rows(std::size_t name, int rows) const {
+  const RowOutput& taken = source_.taken[name];
+  if (!taken.wanted) return 0;
+  if (taken.times.final) return 1;
+  const std::int64_t every = std::max<std::int64_t>(1, taken.times.every);
+  return static_cast<std::size_t>((rows + every - 1) / every);
+}
+
+template <class T>
+bool EpisodeSlot<T>::takes(std::size_t name, int row) const {
+  return is_taken(source_, name, first_row_ + row);
 }
 
 template <class T>
@@ -206,14 +263,13 @@ std::int64_t EpisodeSlot<T>::environment_steps() const {
 /// Skips episodes that are over.
 template <class T>
 void EpisodeSlot<T>::observe(int row) {
+  const bool takes_q = takes(kQ, row), takes_v = takes(kV, row);
   for (int e = 0; e < batch_->environments(); ++e) {
     if (!playing_[as_size(e)]) continue;
     const std::span<double> q = std::span(small_).first(source_.widths[kQ]),
                             v = std::span(small_).first(source_.widths[kV]);
-    batch_->get_q(e, q);
-    put(kQ, e, row, q);
-    batch_->get_v(e, v);
-    put(kV, e, row, v);
+    if (takes_q) batch_->get_q(e, q), put(kQ, e, row, q);
+    if (takes_v) batch_->get_v(e, v), put(kV, e, row, v);
   }
   if (const TaskProgram* const task = program_->judged()) {
     observe_task(*task, row);
@@ -239,7 +295,7 @@ void EpisodeSlot<T>::observe_task(const TaskProgram& task, int row) {
 
 template <class T>
 void EpisodeSlot<T>::observe_scene(int row) {
-  if (source_.first_field > kThird) {
+  if (source_.first_body > kThird && takes(kThird, row)) {
     std::vector<double> positions(as_size(batch_->environments()) * source_.widths[kThird]);
     const auto place = [&](int e) {
       return std::span(positions).subspan(as_size(e) * source_.widths[kThird],
@@ -248,9 +304,31 @@ void EpisodeSlot<T>::observe_scene(int row) {
     read_end_effectors(readout_, *batch_, 0, place);
     for (int e = 0; e < batch_->environments(); ++e) put(kThird, e, row, place(e));
   }
+  observe_bodies(row);
   for (std::size_t name = source_.first_field; name < source_.widths.size(); ++name)
-    read_field<T>(readout_, *batch_, 0, source_.fields[name - source_.first_field],
-                  [&](int e) { return numbers(name, e, row); });
+    if (takes(name, row))
+      read_field<T>(readout_, *batch_, 0, source_.fields[name - source_.first_field],
+                    [&](int e) { return numbers(name, e, row); });
+}
+
+template <class T>
+void EpisodeSlot<T>::observe_bodies(int row) {
+  for (std::size_t name = source_.first_body; name < source_.first_field; ++name) {
+    if (!takes(name, row)) continue;
+    const std::size_t count = source_.widths[name] / kMotion;
+    std::vector<double> pose(kPose * count), twist((kMotion - kPose) * count);
+    for (int e = 0; e < batch_->environments(); ++e) {
+      readout_.bodies(*batch_, e, pose, twist, source_.bodies[name - source_.first_body].bodies);
+      const std::span<double> both = std::span(small_).first(source_.widths[name]);
+      for (std::size_t b = 0; b < count; ++b) {
+        const auto to = both.begin() + static_cast<std::ptrdiff_t>(kMotion * b);
+        std::copy_n(pose.begin() + static_cast<std::ptrdiff_t>(kPose * b), kPose, to);
+        std::copy_n(twist.begin() + static_cast<std::ptrdiff_t>((kMotion - kPose) * b),
+                    kMotion - kPose, to + kPose);
+      }
+      put(name, e, row, both);
+    }
+  }
 }
 
 template <class T>

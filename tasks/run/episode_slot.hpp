@@ -23,13 +23,16 @@ inline constexpr int kBlockEpisodes = 16;  // lanes of a block of a Batch: one s
 struct EpisodeSource {
   const Model* model = nullptr;
   StepperOptions solver;
-  std::int64_t rows = 0;            ///< R, actions of an episode, at most
-  std::size_t action = 0;           ///< numbers in one action
-  std::vector<FieldOutput> fields;  ///< of a scene
-  std::size_t first_field = 0;      ///< index of the first of them in widths
-  /// Numbers in a row of q and of v. Then, for a scene, of the end effectors if there are any and
-  /// of each of `fields`; for a task, of each observation.
+  std::int64_t rows = 0;                        ///< R, actions of an episode, at most
+  std::size_t action = 0;                       ///< numbers in one action
+  std::vector<FieldOutput> fields;              ///< of a scene
+  std::vector<BodyRows> bodies;                 ///< of a scene
+  std::size_t first_body = 0, first_field = 0;  ///< indices of the first of each in widths
+  /// Numbers in a row of q and of v. Then, for a scene, of the end effectors if there are any, of
+  /// each of `bodies` and of each of `fields`; for a task, of each observation.
   std::vector<std::size_t> widths;
+  /// Of each of these, at which rows it is taken: times in rows.
+  std::vector<RowOutput> taken;
   /// Episodes may end at any time. Their length is then known only at the end, so their blocks
   /// leave whole and in ascending order.
   bool whole = false;
@@ -46,6 +49,10 @@ EpisodeSource source_of(const Task& task, const Policy& policy, const EpisodeOpt
 /// Returns the same without a program, to compute memory sizes.
 EpisodeSource shape_of(const Model& model, const EpisodeOptions& options);
 EpisodeSource shape_of(const Task& task);
+
+/// Whether a row of an episode has the numbers of a name, and how many rows below it have.
+bool is_taken(const EpisodeSource& source, std::size_t name, std::int64_t row);
+std::size_t taken_before(const EpisodeSource& source, std::size_t name, std::int64_t row);
 
 /// Rows of a piece: as many as fit, at least one; all of them if blocks leave whole. The last piece
 /// may have fewer.
@@ -76,6 +83,9 @@ class EpisodeSlot {
 
  private:
   [[nodiscard]] std::span<T> numbers(std::size_t name, int episode, int row);
+  [[nodiscard]] std::size_t taken_rows(std::size_t name, int rows) const;
+  [[nodiscard]] bool takes(std::size_t name, int row) const;
+  void observe_bodies(int row);
   [[nodiscard]] std::int64_t environment_steps() const;
   void put(std::size_t name, int episode, int row, std::span<const double> from);
   void observe(int row);
@@ -100,7 +110,7 @@ class EpisodeSlot {
   std::vector<double> randomized_;      // (episodes, what varies)
   std::vector<double> u_;               // (episodes, nu)
   std::vector<double> small_;           // one episode, before conversion
-  std::vector<std::vector<T>> values_;  // per name: (episodes, rows, width)
+  std::vector<std::vector<T>> values_;  // per name: (episodes, rows at which it is taken, width)
   std::vector<float> actions_;          // (episodes, action rows, action)
   std::vector<float> rewards_;          // of a task: (episodes, action rows)
   std::vector<Observation> observations_;

@@ -23,6 +23,18 @@
 
 namespace tangere {
 
+/// Whether a scene's rows hold something, and when.
+struct RowOutput {
+  bool wanted = true;
+  OutputTimes times = {};  ///< in steps, a multiple of EpisodeOptions::every; none: in every row
+};
+/// Poses and twists of bodies in a scene's rows: (bodies, 13), each x y z qw qx qy qz, then angular
+/// and linear velocity, as Readout::bodies() gives them.
+struct BodyRows {
+  std::vector<int> bodies = {};  ///< none: every body
+  OutputTimes times = {};        ///< as in RowOutput
+};
+
 struct EpisodeOptions {
   std::int64_t episodes = 0;
   std::vector<EpisodeRange> ranges = {};  ///< episodes to simulate, ascending; none: all
@@ -31,6 +43,8 @@ struct EpisodeOptions {
   std::uint64_t seed = 0;
   /// What is read of a scene's tactile fields; none: the field of every sensor.
   std::optional<std::vector<FieldOutput>> fields = {};
+  RowOutput q = {}, v = {}, end_effectors = {};  ///< of a scene
+  std::vector<BodyRows> bodies = {};             ///< of a scene, one observation each
   Precision precision =
       Precision::f64;  ///< mixed: fields are computed in it, observations leave as float32
   int threads = 1;

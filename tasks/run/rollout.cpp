@@ -27,6 +27,12 @@ std::size_t largest_reading(const Model& model, const RolloutOutputs& outputs) {
   return largest;
 }
 
+std::size_t bodies_in(const Model& model, const RolloutOutputs& outputs) {
+  if (!outputs.bodies) return 0;
+  return outputs.chosen_bodies.empty() ? static_cast<std::size_t>(model.nb())
+                                       : outputs.chosen_bodies.size();
+}
+
 /// Copies a batch row by row into dense arrays and hands them on.
 class Recorder {
  private:
@@ -39,16 +45,18 @@ class Recorder {
   }
 
  public:
-  Recorder(const Batch& batch, Precision precision, const RolloutOutputs& outputs, RowSink& sink)
+  Recorder(const Batch& batch, const RolloutOptions& options, RowSink& sink)
       : batch_(batch),
         sink_(sink),
-        readout_(batch.model(), precision),
-        environments_(batch.environments()) {
+        readout_(batch.model(), options.precision),
+        environments_(batch.environments()),
+        options_(options) {
     const Model& model = batch.model();
+    const RolloutOutputs& outputs = options.outputs;
     const auto e = static_cast<std::size_t>(environments_);
     q_.resize(e * static_cast<std::size_t>(model.nq()));
     v_.resize(e * static_cast<std::size_t>(model.nv()));
-    const std::size_t bodies = outputs.bodies ? static_cast<std::size_t>(model.nb()) : 0;
+    const std::size_t bodies = bodies_in(model, outputs);
     pose_.resize(e * bodies * kPoseWidth);
     twist_.resize(e * bodies * kTwistWidth);
     if (outputs.end_effectors)
@@ -59,18 +67,29 @@ class Recorder {
   }
 
   void write_state(std::int64_t step, double time) {
+    const RolloutOutputs& outputs = options_.outputs;
+    const bool states = is_due(outputs.states, step),
+               bodies = !pose_.empty() && is_due(outputs.of_bodies, step),
+               end_effectors = !end_effectors_.empty() && is_due(outputs.of_end_effectors, step);
+    if (!states && !bodies && !end_effectors) return;
     for (int block = 0; block < batch_.blocks(); ++block) {
-      read_states(batch_, block, place(q_), place(v_));
-      if (!end_effectors_.empty())
-        read_end_effectors(readout_, batch_, block, place(end_effectors_));
+      if (states) read_states(batch_, block, place(q_), place(v_));
+      if (end_effectors) read_end_effectors(readout_, batch_, block, place(end_effectors_));
     }
-    for (int e = 0; e < environments_ && !pose_.empty(); ++e)
-      readout_.bodies(batch_, e, part(pose_, e), part(twist_, e));
-    sink_.write(StateRow{step, time, q_, v_, pose_, twist_, end_effectors_});
+    for (int e = 0; e < environments_ && bodies; ++e)
+      readout_.bodies(batch_, e, part(pose_, e), part(twist_, e), outputs.chosen_bodies);
+    StateRow row{step, time, {}, {}, {}, {}, {}};
+    if (states) row.q = q_, row.v = v_;
+    if (bodies) row.body_pose = pose_, row.body_twist = twist_;
+    if (end_effectors) row.end_effectors = end_effectors_;
+    sink_.write(row);
   }
 
   /// Writes step `step`, which has been taken but not counted yet.
   void write_step(std::int64_t step, std::span<const double> u, const StepTally& tally) {
+    const bool thinned = options_.outputs.states.given();
+    if (thinned && !is_due(options_.outputs.states, step + 1)) return;
+    if (thinned) u = {};
     for (int e = 0; e < environments_; ++e) {
       const auto i = static_cast<std::size_t>(e);
       iterations_[i] = tally.steps(batch_, e) ? batch_.iterations(e) : 0;
@@ -88,15 +107,28 @@ class Recorder {
   }
 
  private:
+  [[nodiscard]] bool is_due(const OutputTimes& times, std::int64_t row) const {
+    return times.at(row, options_.steps, options_.first_step);
+  }
+
   const Batch& batch_;
   RowSink& sink_;
   Readout readout_;
   int environments_;
+  const RolloutOptions& options_;
   std::vector<double> q_, v_, pose_, twist_, end_effectors_;  // as in StateRow
   std::vector<double> reading_;                               // shared by the sensors
   std::vector<std::int32_t> iterations_;
   std::vector<std::int8_t> status_;
 };
+
+/// Throws InputError for a body that is not there.
+void check_bodies(const Model& model, const std::vector<int>& bodies) {
+  for (const int body : bodies)
+    if (body < 0 || body >= model.nb())
+      throw InputError("an output of body " + std::to_string(body) + "; the scene has " +
+                       std::to_string(model.nb()));
+}
 
 void check(const RolloutOptions& options) {
   if (options.steps < 1)
@@ -133,15 +165,22 @@ int tactile_interval(const SensorInfo& sensor, const RolloutOptions& options) {
   return sensor.every > 0 ? sensor.every : 1;
 }
 
-std::int64_t tactile_frames(const SensorInfo& sensor, const RolloutOptions& options) {
-  const int every = tactile_interval(sensor, options);
-  return (options.first_step + options.steps) / every - options.first_step / every;
+OutputTimes reading_times(const Model& model, FieldOutput output, const RolloutOptions& options) {
+  if (output.times.given()) return output.times;
+  return {tactile_interval(model.sensors()[static_cast<std::size_t>(output.sensor)], options)};
+}
+
+/// Readings follow steps, so none is taken at row 0.
+std::int64_t tactile_frames(const Model& model, FieldOutput output, const RolloutOptions& options) {
+  const OutputTimes times = reading_times(model, output, options);
+  return times.before(options.steps + 1, options.steps, options.first_step) -
+         times.before(1, options.steps, options.first_step);
 }
 
 double rollout_bytes(const Model& model, int environments, const RolloutOutputs& outputs) {
   const double numbers =
       model.nq() + model.nv() + model.nu() +
-      (outputs.bodies ? double{kPoseWidth + kTwistWidth} * model.nb() : 0.0) +
+      double{kPoseWidth + kTwistWidth} * static_cast<double>(bodies_in(model, outputs)) +
       static_cast<double>((outputs.end_effectors ? model.end_effectors().size() : 0) *
                               kPositionWidth +
                           largest_reading(model, outputs));
@@ -166,13 +205,20 @@ RolloutSummary run_rollout(Batch& batch, Stepper& stepper, EpisodeProgram& progr
                            const RolloutOptions& options, RowSink& sink,
                            const RolloutProgress& progress) {
   check(options);
+  check_bodies(batch.model(), options.outputs.chosen_bodies);
   check_sensor_memory(batch.model(), stepper.timestep());
   const auto start = std::chrono::steady_clock::now();
-  const auto sensors = batch.model().sensors();
-  Recorder recorder(batch, options.precision, options.outputs, sink);
+  Recorder recorder(batch, options, sink);
   std::optional<AuditRecorder> audit;
   if (options.outputs.audit) audit.emplace(batch, stepper.timestep(), sink);
-  const std::vector<FieldOutput> fields = fields_of(batch.model(), options.outputs);
+  struct Reading {
+    FieldOutput output;
+    OutputTimes times;
+    std::int64_t frame = 0;  // the next one
+  };
+  std::vector<Reading> readings;
+  for (const FieldOutput output : fields_of(batch.model(), options.outputs))
+    readings.push_back({output, reading_times(batch.model(), output, options)});
   RolloutSummary summary;
   StepTally tally(batch, 0, batch.environments());
   std::vector<double> u(static_cast<std::size_t>(batch.environments()) *
@@ -200,13 +246,9 @@ RolloutSummary run_rollout(Batch& batch, Stepper& stepper, EpisodeProgram& progr
       write_action(program, t, sink);
     }
     recorder.write_state(t + 1, time(t + 1));
-    for (const FieldOutput output : fields) {
-      const std::int64_t every = tactile_interval(sensors[static_cast<std::size_t>(output.sensor)],
-                                                  options),
-                         done = options.first_step + t + 1;
-      if (done % every == 0)
-        recorder.write_field(output, done / every - options.first_step / every - 1, t + 1);
-    }
+    for (Reading& reading : readings)
+      if (reading.times.at(t + 1, options.steps, options.first_step))
+        recorder.write_field(reading.output, reading.frame++, t + 1);
     summary.steps = t + 1;
     summary.stopped = progress && !progress(t + 1);
     if (summary.stopped) break;

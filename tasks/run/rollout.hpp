@@ -22,6 +22,10 @@ struct RolloutOutputs {
   std::optional<std::vector<FieldOutput>> fields;  ///< none: the field of every sensor
   bool bodies = true, end_effectors = true;
   bool audit = false;  ///< the books of energy and momentum
+  /// When q and v, bodies and end effectors are taken; none: at every row. Where those of `states`
+  /// are given, controls leave no longer, and of steps those alone that end at a row of q.
+  OutputTimes states = {}, of_bodies = {}, of_end_effectors = {};
+  std::vector<int> chosen_bodies = {};  ///< ascending; none: every body
 };
 
 /// What the books of a run come to.
@@ -63,10 +67,11 @@ using RolloutProgress = std::function<bool(std::int64_t done)>;
 
 /// Steps the batch and hands every row to the sink: row 0 of the state, then for each step its
 /// StepRow, the ActionRow if it ends a task's action, the StateRow after it, and the tactile rows
-/// due. A tactile sensor is read after steps K, 2K, …, so field k comes from row (k + 1) K of q. In
-/// a StepRow, an environment that failed earlier has 0 iterations and its last status and residual.
-/// `program` must have started every block; it takes all of them through a step in turn. Throws
-/// InputError when steps < 1, every < 0 or first_step < 0. Passes on what the sink throws.
+/// due. A row of which nothing is wanted does not leave. A tactile sensor is read after steps K,
+/// 2K, …, so field k comes from row (k + 1) K of q. In a StepRow, an environment that failed
+/// earlier has 0 iterations and its last status and residual. `program` must have started every
+/// block; it takes all of them through a step in turn. Throws InputError when steps < 1, every < 0
+/// or first_step < 0. Passes on what the sink throws.
 RolloutSummary run_rollout(Batch& batch, Stepper& stepper, EpisodeProgram& program,
                            const RolloutOptions& options, RowSink& sink,
                            const RolloutProgress& progress = {});
@@ -78,10 +83,13 @@ RolloutSummary run_rollout(Batch& batch, Stepper& stepper, const ControlProgram&
 
 /// Returns what is read of tactile fields. Throws InputError as check_outputs() does.
 std::vector<FieldOutput> fields_of(const Model& model, const RolloutOutputs& outputs);
-/// Steps between the fields of a sensor under these options.
+/// Steps between the fields of a sensor under these options, where a reading has no times of its
+/// own.
 int tactile_interval(const SensorInfo& sensor, const RolloutOptions& options);
-/// Number of fields that a rollout reads of a sensor.
-std::int64_t tactile_frames(const SensorInfo& sensor, const RolloutOptions& options);
+/// When a reading is taken: its own times, else the interval of its sensor.
+OutputTimes reading_times(const Model& model, FieldOutput output, const RolloutOptions& options);
+/// Number of readings that a rollout takes.
+std::int64_t tactile_frames(const Model& model, FieldOutput output, const RolloutOptions& options);
 
 /// Memory that a rollout allocates besides batch and stepper [bytes].
 double rollout_bytes(const Model& model, int environments, const RolloutOutputs& outputs = {});

@@ -406,55 +406,6 @@ TEST(Command, InspectTellsPeopleAndProgramsTheSame) {
     EXPECT_THAT(text.out, HasSubstr(name.get<std::string>()));
 }
 
-/// Times are never compared here, only that they are there.
-TEST(Command, InspectMeasuresWhatEffectsCost) {
-  const Folder folder;
-  const std::string file = scene("rolling_ball_small.xml");
-  const Outcome outcome = run(folder, {"inspect", file, "--effects", "--json"});
-  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
-  const json answer = json::parse(outcome.out);
-  for (const char* key :
-       {"environments", "failed", "instants", "rounds", "run_steps", "step_seconds",
-        "field_seconds", "newton", "share_of_nothing", "spread_of_nothing"})
-    EXPECT_TRUE(answer.at("effect_measurement").at(key).is_number()) << key;
-  const json& costs = answer.at("effect_costs");
-  std::istringstream text(file_bytes(file));
-  std::vector<std::string> lines;
-  for (std::string line; std::getline(text, line);) lines.push_back(line);
-  for (const auto& [name, effect] : costs.items()) {
-    SCOPED_TRACE(name);
-    for (const char* key : {"kind", "on", "why", "lines", "variant", "bytes", "share", "spread",
-                            "step_seconds_without", "newton_without", "note"})
-      EXPECT_TRUE(effect.contains(key)) << key;
-    EXPECT_FALSE(effect.at("why").get<std::string>().empty());
-    EXPECT_EQ(effect.at("share").is_null(), !effect.at("note").get<std::string>().empty());
-    EXPECT_EQ(effect.at("lines").empty(), !effect.at("on").get<bool>());
-    if (!effect.at("on").get<bool>()) {
-      EXPECT_EQ(effect.at("share"), 0);
-      EXPECT_EQ(effect.at("bytes"), 0);
-    }
-    for (const std::string line : effect.at("lines")) EXPECT_THAT(line, HasSubstr(file + ":"));
-  }
-  const auto called_for_by = [&](const char* name) {
-    const std::string line = costs.at(name).at("lines").at(0);
-    return lines.at(std::stoul(line.substr(line.rfind(':') + 1)) - 1);
-  };
-  EXPECT_THAT(called_for_by("gravity"), HasSubstr("<option"));
-  EXPECT_THAT(called_for_by("joint damping"), HasSubstr("<joint name=\"pad_joint\""));
-  EXPECT_THAT(called_for_by("force motors"), HasSubstr("<motor"));
-  EXPECT_THAT(called_for_by("contact pad ball friction"), HasSubstr("<general_primitive_contact"));
-  EXPECT_THAT(called_for_by("ground ball"), HasSubstr("<ground_contact"));
-  EXPECT_THAT(called_for_by("tactile pad"), HasSubstr("<tactile"));
-  EXPECT_EQ(costs.at("joint springs").at("on"), false);
-  EXPECT_TRUE(costs.at("velocity products").at("share").is_null());
-  EXPECT_GT(costs.at("tactile pad").at("bytes"), 0);
-  // A kind with one element is that element.
-  EXPECT_EQ(costs.at("tactile").at("share"), costs.at("tactile pad").at("share"));
-  for (const char* words : {"called for by", "contact pad ball friction", "tactile pad shear",
-                            "off, at no cost: joint springs (0 joints)", "kernel: "})
-    EXPECT_THAT(outcome.err, HasSubstr(words));
-}
-
 TEST(Command, GradcheckTellsPeopleAndProgramsTheSame) {
   const Folder folder;
   const Words words{

@@ -87,7 +87,7 @@ TEST(Record, AnythingElseOfATrajectoryStillWorks) {
   EXPECT_EQ(none.exit_code, 2);
   EXPECT_THAT(none.err, HasSubstr("the run recorded no tactile field, pressure or shear"));
   EXPECT_THAT(run(folder, {"plot", "sum.h5", "-o", "sum.svg", "--sensor", "pad"}).err,
-              HasSubstr("of sensor 'pad' the run recorded only the sum"));
+              HasSubstr("of sensor 'pad' the run recorded only the sum or markers"));
   run_json(folder, {"simulate", "stable_grasp", "-o", "task.h5", "--record", "left_pad.sum"});
   EXPECT_EQ(shape(folder, "task.h5", "tactile/left_pad/sum").back(), 6U);
 }
@@ -118,6 +118,31 @@ TEST(Record, DamagedReadingsEndInAMessage) {
   });
   EXPECT_EQ(empty.exit_code, 3);
   EXPECT_THAT(empty.err, HasSubstr("sensor 'pad' has no reading"));
+}
+
+TEST(Record, ADamagedListOfStepsEndsInAMessage) {
+  const Folder folder;
+  simulate(folder, scene("rolling_ball_small.xml"), "run.h5", {"--record", "q/60,pad"});
+  const auto with = [&](std::vector<std::int64_t> steps) {
+    const hid_t file = H5Fopen(folder.path("run.h5").c_str(), H5F_ACC_RDWR, H5P_DEFAULT);
+    const hid_t list = H5Dopen2(file, "step", H5P_DEFAULT);
+    H5Dwrite(list, H5T_NATIVE_INT64, H5S_ALL, H5S_ALL, H5P_DEFAULT, steps.data());
+    H5Dclose(list);
+    H5Fclose(file);
+  };
+  for (const std::vector<std::int64_t>& steps :
+       {std::vector<std::int64_t>{0, 60, 121}, {60, 0, 120}, {-1, 60, 120}, {0, 60, 60}}) {
+    with(steps);
+    for (const Words& words : {Words{"view", "run.h5", "-o", "run.html", "--overwrite"},
+                               Words{"simulate", scene("rolling_ball_small.xml"), "-o", "x.h5",
+                                     "--state-from", "run.h5", "--steps", "1"}}) {
+      const Outcome outcome = run(folder, words);
+      EXPECT_EQ(outcome.exit_code, 3) << outcome.err;
+      EXPECT_THAT(outcome.err, HasSubstr("expected ascending steps from 0 to 120"));
+    }
+  }
+  with({0, 60, 120});
+  EXPECT_EQ(run(folder, {"view", "run.h5", "-o", "run.html"}).exit_code, 0);
 }
 
 TEST(Record, ADataSetHoldsTheFormsOfAWholeOne) {
@@ -158,7 +183,8 @@ TEST(Record, ADataSetHoldsTheFormsOfAWholeOne) {
 
 TEST(Record, TheSceneAsksAndTheOptionAsksInstead) {
   const Folder folder;
-  std::string text = file_bytes(scene("rolling_ball_small.xml"));
+  const std::string ball = scene("rolling_ball_small.xml");
+  std::string text = file_bytes(ball);
   const std::string end = "</tangere>";
   const std::size_t at = text.find(end);
   ASSERT_NE(at, std::string::npos);
@@ -173,21 +199,231 @@ TEST(Record, TheSceneAsksAndTheOptionAsksInstead) {
   const Outcome set =
       run(folder, {"generate", "ball.xml", "-o", "set", "--episodes", "1", "--steps", "5"});
   EXPECT_EQ(set.exit_code, 0) << set.err;
-  EXPECT_THAT(set.err, HasSubstr("'bodies' of <outputs> is left out"));
   EXPECT_EQ(shape(folder, "set/shard-00000.h5", "data/demo_0/obs/pad.sum"), (h5::Dims{1, 6}));
-  std::string bodies = text;
-  bodies.replace(bodies.find("bodies,pad.sum"), 14, "bodies");
-  folder.write("bodies.xml", bodies);
-  const Outcome nothing =
-      run(folder, {"generate", "bodies.xml", "-o", "none", "--episodes", "1", "--steps", "5"});
-  EXPECT_EQ(nothing.exit_code, 2);
-  EXPECT_THAT(nothing.err, HasSubstr("<outputs>: nothing of record is in a data set"));
+  EXPECT_EQ(shape(folder, "set/shard-00000.h5", "data/demo_0/obs/bodies").back(), 13U);
+  EXPECT_THAT(run(folder, {"bench", "ball.xml", "--steps", "5", "--envs", "16"}).err,
+              HasSubstr("bench reads sensors alone"));
+  EXPECT_EQ(run_json(folder, {"inspect", "ball.xml"}).at("outputs"),
+            json::array({"bodies", "pad.sum"}));
+  EXPECT_THAT(run(folder, {"inspect", "ball.xml"}).out, HasSubstr("): bodies, pad.sum\n"));
+  EXPECT_THAT(run(folder, {"inspect", ball}).out, HasSubstr("outputs: everything\n"));
+  std::string times = text;
+  times.replace(times.find("pad.sum"), 7, "pad/often");
+  folder.write("times.xml", times);
+  EXPECT_THAT(run(folder, {"inspect", "times.xml"}).err,
+              HasSubstr("record has 'pad/often': expected 'pad', 'pad/10'"));
   text.replace(text.find("pad.sum"), 7, "pad.sun");
   folder.write("wrong.xml", text);
   const Outcome wrong = run(folder, {"inspect", "wrong.xml"});
   EXPECT_EQ(wrong.exit_code, 2);
   EXPECT_THAT(wrong.err, HasSubstr("record has 'pad.sun'; did you mean 'pad.sum'?"));
   EXPECT_THAT(wrong.err, HasSubstr("wrong.xml:"));
+}
+
+/// The same rows of two trajectories: `rows` of the whole one.
+void expect_rows(const Folder& folder, const std::string& name,
+                 const std::vector<std::size_t>& rows) {
+  const std::vector<double> whole = numbers(folder, "whole.h5", name),
+                            some = numbers(folder, "some.h5", name);
+  const std::size_t width = some.size() / rows.size();
+  ASSERT_EQ(some.size(), width * rows.size()) << name;
+  for (std::size_t r = 0; r < rows.size(); ++r)
+    for (std::size_t k = 0; k < width; ++k)
+      ASSERT_EQ(some[r * width + k], whole[rows[r] * width + k]) << name << " " << r << " " << k;
+}
+
+std::vector<std::int64_t> whole_numbers(const Folder& folder, const std::string& file,
+                                        const std::string& name) {
+  std::vector<std::int64_t> list;
+  for (const double x : numbers(folder, file, name)) list.push_back(std::int64_t(x));
+  return list;
+}
+
+TEST(Record, ATrajectoryHoldsItsEndAloneOrEveryKthRow) {
+  const Folder folder;
+  const std::string ball = scene("rolling_ball_small.xml");
+  const Words words{"simulate", ball,     "--steps", "120",    "--every",
+                    "20",       "--envs", "2",       "--seed", "3"};
+  run_json(folder, words + Words{"-o", "whole.h5", "--record", "bodies,pad,pad.sum"});
+  const json said = run_json(
+      folder, words + Words{"-o", "some.h5", "--record", "q/final,pad/40,pad.sum,bodies.ball/60"});
+  EXPECT_EQ(said["sensors"][0]["every"], 40);
+  EXPECT_EQ(said["sensors"][0]["frames"], 3);
+  EXPECT_EQ(said["sensors"][1]["frames"], 6);
+  for (const char* name : {"q", "v", "time"}) expect_rows(folder, name, {120});
+  EXPECT_THAT(whole_numbers(folder, "some.h5", "step"), ElementsAre(120));
+  expect_rows(folder, "tactile/pad/force", {1, 3, 5});
+  EXPECT_THAT(whole_numbers(folder, "some.h5", "tactile/pad/step"), ElementsAre(40, 80, 120));
+  expect_rows(folder, "tactile/pad/sum", {0, 1, 2, 3, 4, 5});
+  EXPECT_EQ(whole_numbers(folder, "some.h5", "tactile/pad/sum_step").size(), 6U);
+  EXPECT_EQ(shape(folder, "some.h5", "bodies/pose"), (h5::Dims{3, 2, 1, 7}));
+  EXPECT_THAT(whole_numbers(folder, "some.h5", "bodies/step"), ElementsAre(0, 60, 120));
+  const std::vector<double> whole = numbers(folder, "whole.h5", "bodies/pose"),
+                            one = numbers(folder, "some.h5", "bodies/pose");
+  const std::size_t nb = shape(folder, "whole.h5", "bodies/pose")[2];
+  const auto names =
+      h5::read_texts(h5::open_group(h5::open_file(folder.path("whole.h5")), "bodies"), "names");
+  const auto at = std::size_t(std::find(names.begin(), names.end(), "ball") - names.begin());
+  ASSERT_LT(at, nb);
+  for (std::size_t r = 0; r < 3; ++r)
+    for (std::size_t e = 0; e < 2; ++e)
+      for (std::size_t i = 0; i < 7; ++i)
+        EXPECT_EQ(one[(r * 2 + e) * 7 + i], whole[((60 * r * 2 + e) * nb + at) * 7 + i]);
+  EXPECT_FALSE(has(folder, "some.h5", "/", "u"));
+  EXPECT_EQ(shape(folder, "some.h5", "solver/status"), (h5::Dims{1, 2}));
+  EXPECT_EQ(run(folder, {"plot", "some.h5", "-o", "pad.svg"}).exit_code, 0);
+  EXPECT_EQ(run(folder, {"view", "some.h5", "-o", "end.html"}).exit_code, 0);
+  simulate(folder, ball, "tenth.h5", {"--record", "q/10,pad.shear/30,pad.pressure"});
+  EXPECT_EQ(shape(folder, "tenth.h5", "q")[0], 13U);
+  EXPECT_EQ(run(folder, {"view", "tenth.h5", "-o", "tenth.html"}).exit_code, 0);
+  EXPECT_EQ(run(folder, {"plot", "tenth.h5", "-o", "tenth.svg"}).exit_code, 0);
+}
+
+/// A scheme of one step goes on from the end alone with the bits of one long run.
+TEST(Record, ARunGoesOnFromItsEndAlone) {
+  const Folder folder;
+  std::string text = file_bytes(scene("rolling_ball_small.xml"));
+  const std::size_t at = text.find("BDF2");
+  ASSERT_NE(at, std::string::npos);
+  folder.write("ball.xml", text.replace(at, 4, "BDF1"));
+  const Words what{"simulate", "ball.xml", "--envs", "2", "--seed", "3", "--every", "20"};
+  run_json(folder, what + Words{"-o", "whole.h5", "--steps", "120"});
+  run_json(folder, what + Words{"-o", "half.h5", "--steps", "60", "--record", "q/final"});
+  run_json(folder, Words{"simulate", "ball.xml", "-o", "some.h5", "--state-from", "half.h5",
+                         "--steps", "60", "--record", "q/final,pad/40"});
+  for (const char* name : {"q", "v", "time"}) expect_rows(folder, name, {120});
+  expect_rows(folder, "tactile/pad/force", {3, 5});
+  EXPECT_THAT(whole_numbers(folder, "some.h5", "tactile/pad/step"), ElementsAre(20, 60));
+  const Outcome other = run(folder, {"simulate", "ball.xml", "-o", "x.h5", "--state-from",
+                                     "half.h5", "--row", "7", "--steps", "5"});
+  EXPECT_EQ(other.exit_code, 2);
+  EXPECT_THAT(other.err, HasSubstr("row 7 of half.h5 was not recorded; expected one of 60"));
+}
+
+TEST(Record, ADataSetSamplesWhatIsNotWantedInEveryRow) {
+  const Folder folder;
+  const std::string ball = scene("rolling_ball_small.xml");
+  const Words size{"generate", ball, "--episodes", "17", "--steps", "120", "--every", "20"};
+  run_json(folder, size + Words{"-o", "whole", "--record", "q,v,pad,bodies"});
+  const std::string words = "q,v/final,pad/60,pad.sum,bodies.ball/40";
+  run_json(folder, size + Words{"-o", "some", "--record", words});
+  run_json(folder, size + Words{"-o", "packed", "--record", words, "--compress", "deflate",
+                                "--tactile", "sparse"});
+  run_json(folder, size + Words{"-o", "end", "--record", "q/final"});
+  const std::string of = "data/demo_16/";
+  for (const char* set : {"some", "packed"}) {
+    const std::string shard = std::string(set) + "/shard-00000.h5", whole = "whole/shard-00000.h5";
+    EXPECT_EQ(shape(folder, shard, of + "samples/pad"), (h5::Dims{3, 32, 32, 3}));
+    const std::vector<double> rows = numbers(folder, whole, of + "obs/pad"),
+                              last = numbers(folder, whole, of + "final_obs/pad"),
+                              some = numbers(folder, shard, of + "samples/pad");
+    const std::size_t n = last.size();
+    for (std::size_t k = 0; k < n; ++k) {
+      ASSERT_EQ(some[k], rows[k]);
+      ASSERT_EQ(some[n + k], rows[3 * n + k]);
+      ASSERT_EQ(some[2 * n + k], last[k]);
+    }
+    EXPECT_EQ(numbers(folder, shard, of + "samples/v"), numbers(folder, whole, of + "final_obs/v"));
+    EXPECT_EQ(shape(folder, shard, of + "samples/bodies.ball"), (h5::Dims{4, 1, 13}));
+    EXPECT_FALSE(has(folder, shard, of + "obs", "pad"));
+    const h5::Id file = h5::open_file(folder.path(shard)), said = h5::open_group(file, "scene");
+    EXPECT_THAT(h5::read_texts(said, "observations"), ElementsAre("q", "pad.sum"));
+    EXPECT_THAT(h5::read_texts(said, "samples"), ElementsAre("v", "bodies.ball", "pad"));
+    EXPECT_THAT(h5::read_numbers<std::int64_t>(said, "sample_every"), ElementsAre(0, 40, 60));
+    EXPECT_EQ(run(folder, {"view", set, "-o", std::string(set) + ".html"}).exit_code, 0);
+  }
+  for (const char* set : {"some", "packed", "end"}) {
+    EXPECT_EQ(run(folder, {"validate", set}).exit_code, 0) << set;
+    EXPECT_EQ(run(folder, {"validate", std::string(set) + "/robomimic.hdf5"}).exit_code, 0) << set;
+    EXPECT_EQ(run(folder, {"merge", set, "--copy", "--overwrite"}).exit_code, 0) << set;
+    EXPECT_EQ(run(folder, {"validate", std::string(set) + "/robomimic.hdf5"}).exit_code, 0) << set;
+    EXPECT_EQ(run(folder, {"info", set}).exit_code, 0) << set;
+  }
+  EXPECT_THAT(run(folder, {"export", "some", "--csv", "some.csv"}).err,
+              HasSubstr("left out: v, bodies.ball, pad"));
+  const Outcome odd = run(folder, size + Words{"-o", "odd", "--record", "pad/30"});
+  EXPECT_EQ(odd.exit_code, 2);
+  EXPECT_THAT(odd.err, HasSubstr("'pad/30', and a row is every 20 steps; expected a multiple"));
+  // Numbers that are damaged are noticed.
+  {
+    const hid_t file =
+        H5Fopen(folder.path("some/shard-00000.h5").c_str(), H5F_ACC_RDWR, H5P_DEFAULT);
+    const hid_t data = H5Dopen2(file, (of + "samples/v").c_str(), H5P_DEFAULT);
+    const std::vector<double> zeros(9, 0.5);
+    H5Dwrite(data, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, zeros.data());
+    H5Dclose(data);
+    H5Fclose(file);
+  }
+  EXPECT_EQ(run(folder, {"validate", "some"}).exit_code, 3);
+}
+
+TEST(Record, MarkersAreRecordedWhereASensorHasThem) {
+  const Folder folder;
+  const std::string ball = scene("rolling_ball_small.xml");
+  const Outcome none = run(folder, {"simulate", ball, "-o", "x.h5", "--record", "pad.markers"});
+  EXPECT_EQ(none.exit_code, 2);
+  EXPECT_THAT(none.err, HasSubstr("--record: 'pad.markers', but "));
+  EXPECT_THAT(none.err, HasSubstr("sensor 'pad' has no <markers>; expected them in its <tactile>"));
+  std::string text = file_bytes(ball);
+  const std::size_t tag = text.find("<tactile name"), end = text.find("/>", tag);
+  text.replace(end, 2, "><markers stiffness=\"20\"/></tactile>");
+  folder.write("gel.xml", text);
+  EXPECT_EQ(run_json(folder, {"inspect", "gel.xml"}).at("sensors")[0].at("markers"), true);
+  EXPECT_EQ(run_json(folder, {"inspect", ball}).at("sensors")[0].at("markers"), false);
+  const Words size{"--steps", "120", "--every",  "20",
+                   "--seed",  "3",   "--record", "pad,pad.markers,pad.sum"};
+  run_json(folder, Words{"simulate", "gel.xml", "-o", "gel.h5", "--envs", "17"} + size);
+  run_json(folder, Words{"simulate", ball, "-o", "plain.h5", "--envs", "17", "--steps", "120",
+                         "--every", "20", "--seed", "3", "--record", "pad"});
+  EXPECT_EQ(shape(folder, "gel.h5", "tactile/pad/markers"), (h5::Dims{6, 17, 32, 32, 2}));
+  const std::vector<double> force = numbers(folder, "gel.h5", "tactile/pad/force"),
+                            markers = numbers(folder, "gel.h5", "tactile/pad/markers");
+  EXPECT_EQ(force, numbers(folder, "plain.h5", "tactile/pad/force"));
+  double most = 0;
+  for (std::size_t k = 0; k < markers.size(); ++k) {
+    ASSERT_NEAR(markers[k], force[k / 2 * 3 + k % 2] / 20, 1e-18);
+    most = std::max(most, std::abs(markers[k]));
+  }
+  EXPECT_GT(most, 0);
+  EXPECT_EQ(
+      h5::attribute_text(
+          h5::open_dataset(h5::open_file(folder.path("gel.h5")), "tactile/pad/markers"), "units"),
+      "m");
+  run_json(folder,
+           Words{"generate", "gel.xml", "-o", "set", "--episodes", "17", "--precision", "double"} +
+               size);
+  const std::vector<double> rows =
+      numbers(folder, "set/shard-00000.h5", "data/demo_16/obs/pad.markers");
+  const std::size_t n = 32 * 32 * 2;
+  for (std::size_t row = 1; row < 6; ++row)
+    for (std::size_t k = 0; k < n; ++k)
+      ASSERT_EQ(rows[row * n + k], markers[((row - 1) * 17 + 16) * n + k]);
+  EXPECT_EQ(run(folder, {"validate", "set"}).exit_code, 0);
+  run_json(folder,
+           {"simulate", "gel.xml", "-o", "only.h5", "--steps", "20", "--record", "pad.markers"});
+  EXPECT_EQ(run(folder, {"view", "only.h5", "-o", "only.html"}).exit_code, 0);
+  EXPECT_THAT(run(folder, {"plot", "only.h5", "-o", "only.svg", "--sensor", "pad"}).err,
+              HasSubstr("recorded only the sum or markers"));
+  const Outcome check = run(folder, {"gradcheck", ball, "--loss", "markers"});
+  EXPECT_EQ(check.exit_code, 2);
+  EXPECT_THAT(check.err, HasSubstr("no sensor of the scene has <markers>"));
+}
+
+TEST(Record, TimesThatContradictEachOtherAreRefused) {
+  const Folder folder;
+  const std::string ball = scene("rolling_ball_small.xml");
+  const auto refused = [&](const std::string& list) {
+    const Outcome outcome =
+        run(folder, {"simulate", ball, "-o", "x.h5", "--steps", "3", "--record", list});
+    EXPECT_EQ(outcome.exit_code, 2) << list;
+    return outcome.err;
+  };
+  EXPECT_THAT(refused("q/5,v"), HasSubstr("'q/5' and 'v'; expected one interval of both"));
+  EXPECT_THAT(refused("pad/5,pad/10"), HasSubstr("'pad' is listed twice"));
+  EXPECT_THAT(refused("bodies,bodies.ball"), HasSubstr("expected all bodies, or names of some"));
+  EXPECT_THAT(refused("bodies.ball/2,bodies.pad"),
+              HasSubstr("expected one interval of all bodies"));
+  EXPECT_THAT(refused("pad/0"), HasSubstr("--record: 'pad/0': expected 'pad', 'pad/10'"));
 }
 
 /// The small ball with an imperfect sensor.
@@ -260,10 +496,11 @@ TEST(Record, ASensorWithMemoryKeepsToItsTimestepAndHasNoGradient) {
   const Words words{"simulate", "ball.xml", "-o", "x.h5", "--steps", "30", "--every", "10"};
   const Outcome other = run(folder, words + Words{"--timestep", "0.0025"});
   EXPECT_EQ(other.exit_code, 2);
-  EXPECT_THAT(other.err, HasSubstr("delay and low_pass of 'pad' count steps of"));
+  EXPECT_THAT(other.err, HasSubstr("delay, low_pass and hysteresis of 'pad' count steps of"));
   const Outcome gradient = run(folder, words + Words{"--gradients", "tactile"});
   EXPECT_EQ(gradient.exit_code, 2);
-  EXPECT_THAT(gradient.err, HasSubstr("derivatives of sensor 'pad', which has low_pass or delay"));
+  EXPECT_THAT(gradient.err,
+              HasSubstr("derivatives of sensor 'pad', which has low_pass, hysteresis or delay"));
   EXPECT_EQ(run(folder, words + Words{"--gradients", "final"}).exit_code, 0);
 }
 
@@ -278,8 +515,8 @@ TEST(Record, UnknownNamesAreRefused) {
     EXPECT_THAT(wrong.err, HasSubstr("did you mean 'pad.pressure'?")) << command[0];
   }
   EXPECT_THAT(
-      run(folder, {"generate", ball, "-o", "x", "--episodes", "1", "--record", "bodies"}).err,
-      HasSubstr("unknown observation 'bodies'"));
+      run(folder, {"generate", ball, "-o", "x", "--episodes", "1", "--record", "bodies.bal"}).err,
+      HasSubstr("did you mean 'bodies.ball'?"));
   EXPECT_THAT(run(folder, {"simulate", ball, "-o", "x.h5", "--record", "variables"}).err,
               HasSubstr("the scene has no end effectors"));
   const Outcome compact =

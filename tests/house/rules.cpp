@@ -345,7 +345,7 @@ std::vector<Violation> check_own_headers(const Tree& tree) {
       {"apps/accuracy.cpp", "a subcommand: apps/command.hpp"},
       {"apps/skin.cpp", "a subcommand: apps/command.hpp"},
       {"apps/stress.cpp", "a subcommand: apps/command.hpp"},
-      {"apps/identify_ball.cpp", "a program"},
+      {"apps/identify.cpp", "a subcommand: apps/command.hpp"},
       {"apps/import.cpp", "a subcommand: apps/command.hpp"},
       {"apps/info.cpp", "a subcommand: apps/command.hpp"},
       {"apps/inspect.cpp", "a subcommand: apps/command.hpp"},

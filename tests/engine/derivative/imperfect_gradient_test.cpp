@@ -170,8 +170,8 @@ TEST(ImperfectGradient, SensorsWithMemoryAreRefused) {
     ADD_FAILURE();
   } catch (const InputError& error) {
     EXPECT_EQ(std::string(error.what()),
-              "x.xml:3: derivatives of sensor 'skin', which has low_pass or delay; expected a "
-              "sensor without them");
+              "x.xml:3: derivatives of sensor 'skin', which has low_pass, hysteresis or delay; "
+              "expected a sensor without them");
   }
 }
 

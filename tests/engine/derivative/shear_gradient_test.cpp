@@ -140,7 +140,7 @@ TEST_P(ShearGradient, CutStepsMatchDifferences) {
   const Integrator scheme = GetParam();
   if (scheme.scheme().estimate.empty()) GTEST_SKIP() << "has no estimate of its error";
   int compared = 0;
-  for (unsigned seed = 1; seed <= 3; ++seed) {
+  for (unsigned seed = 1; seed <= 2; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     const Scene scene = elastic_contacts(seed, 2, ContactLaw::clamped);
     if (testing::splits(scene, scheme, seed, kShearSteps)) continue;

@@ -261,13 +261,13 @@ TEST(MeshGrid, ThinWallsAreNotLostInSilence) {
 /// Edges between triangles are kinks, which no grid follows: the error falls with the triangles.
 TEST(MeshGrid, TheFitOfARoundBodyIsItsError) {
   double before = 1;
-  for (int times = 3; times <= 5; ++times) {
+  for (int times = 2; times <= 4; ++times) {
     const MeshFit fit = fit_of(ellipsoid_mesh(times, {0.02, 0.02, 0.02}), 4 << times);
     EXPECT_EQ(fit.unresolved, 0) << times;
     EXPECT_LT(fit.error, before / 3) << times;
     before = fit.error;
   }
-  EXPECT_LT(before, 1e-4 * 0.02);
+  EXPECT_LT(before, 4e-4 * 0.02);
 }
 
 TEST(MeshGrid, EqualMeshesShareAGrid) {

@@ -7,11 +7,13 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <numbers>
 #include <set>
 
 #include "engine/model/effects.hpp"
 #include "engine/model/random_run.hpp"
 #include "engine/sense/readout.hpp"
+#include "engine/step/stepper.hpp"
 #include "tests/engine/pad_scene.hpp"
 
 namespace tangere {
@@ -526,6 +528,12 @@ TEST(Imperfections, ValuesOutOfRangeAreRefused) {
   refused([](auto& i) { i.crosstalk = 0.3; }, Pad::flat, "0 to 0.25");
   refused([](auto& i) { i.crosstalk = 0.1; }, Pad::curved, "crosstalk on a list of points");
   refused([](auto& i) { i.spread = 0.1; }, Pad::curved, "spread on a list of points");
+  refused([](auto& i) { i.hysteresis = 0.1; }, Pad::flat,
+          "hysteresis=\"0.1\" with hysteresis_time=\"0\" s; expected both above 0, or neither");
+  refused([](auto& i) { i.hysteresis_time = 0.1; }, Pad::flat, "expected both above 0");
+  refused([](auto& i) { i.hysteresis = 1.5, i.hysteresis_time = 0.1; }, Pad::flat, "from 0 to 1");
+  refused([](auto& i) { i.hysteresis = 0.5, i.hysteresis_time = 100; }, Pad::flat,
+          "steps of 0.005 s back");
   refused([](auto& i) { i.delay = 100; }, Pad::flat, "steps of 0.005 s back; expected less than");
 }
 

@@ -35,9 +35,12 @@ std::string refusal(const std::string& text) {
 
 TEST(SensorImperfectionsElement, GivesEveryCoefficient) {
   const SensorImperfections i = read(
-      inside("<imperfections low_pass=\"0.01\" delay=\"0.02\" spread=\"0.003\" "
+      inside("<imperfections hysteresis=\"0.2\" hysteresis_time=\"0.3\" low_pass=\"0.01\" "
+             "delay=\"0.02\" spread=\"0.003\" "
              "crosstalk=\"0.1\" gain=\"0.05\" sensor_gain=\"0.02\" bias=\"0.004\" "
              "noise=\"0.002 0.001\" dead=\"0.01\" saturation=\"3 1\" quantisation=\"0.01\"/>"));
+  EXPECT_EQ(i.hysteresis, 0.2);
+  EXPECT_EQ(i.hysteresis_time, 0.3);
   EXPECT_EQ(i.low_pass, 0.01);
   EXPECT_EQ(i.delay, 0.02);
   EXPECT_EQ(i.spread, 0.003);
@@ -51,9 +54,22 @@ TEST(SensorImperfectionsElement, GivesEveryCoefficient) {
   EXPECT_EQ(i.quantisation, (NormalAndShear{0.01, 0.01}));
   EXPECT_EQ(i.source.line, 25);
   EXPECT_EQ(text_of(i),
-            "low_pass 0.01 s, delay 0.02 s, spread 0.003 m, crosstalk 0.1, gain 0.05, sensor_gain "
+            "hysteresis 0.2, hysteresis_time 0.3 s, low_pass 0.01 s, delay 0.02 s, spread 0.003 m, "
+            "crosstalk 0.1, gain 0.05, sensor_gain "
             "0.02, bias 0.004 N, noise 0.002 0.001 N, dead 0.01, saturation 3 1 N, quantisation "
             "0.01 N");
+}
+
+TEST(MarkersElement, FollowsTheUnitsOfTheScene) {
+  const std::string element =
+      "<markers stiffness=\"2000\" thickness=\"0.3\" spread=\"0.1\"/><imperfections/>";
+  const Scene scene =
+      parse_scene(with("unit=\"m-kg\"", "unit=\"cm-g\"", inside(element)), "s.xml").scene;
+  const std::optional<MarkersDescription>& m = scene.sensors.at(0).markers;
+  ASSERT_TRUE(m);
+  EXPECT_DOUBLE_EQ(m->stiffness, 2);  // 2000 dyn/cm
+  EXPECT_DOUBLE_EQ(m->thickness, 0.003);
+  EXPECT_DOUBLE_EQ(m->spread, 0.001);
 }
 
 TEST(SensorImperfectionsElement, NoneAndEmptyAreIdeal) {
@@ -91,6 +107,10 @@ TEST(SensorImperfectionsElement, MistakesNameLineValueAndWhatWasExpected) {
   expect("<imperfections bias=\"x\"/>", "25", {"bias=\"x\": expected finite numbers"});
   expect("<imperfections bias=\"\"/>", "25", {"bias", "empty"});
   expect("<imperfections/>\n<imperfections/>", "26", {"a second time", "expected one"});
+  expect("<imperfections hysteresis=\"0.2\"/>", "25", {"expected both above 0, or neither"});
+  expect("<markers stifness=\"1\"/>", "25", {"unknown attribute", "did you mean 'stiffness'"});
+  expect("<markers stiffness=\"0\"/>", "25", {"stiffness"});
+  expect("<markers stiffness=\"1\"/>\n<markers stiffness=\"1\"/>", "26", {"a second time"});
   expect("<imperfections crosstalk=\"0.26\"/>", "25", {"expected a number from 0 to 0.25"});
 }
 

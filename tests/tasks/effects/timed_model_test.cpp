@@ -124,6 +124,21 @@ TEST(TimedModel, ALooserToleranceTakesFewerPasses) {
   EXPECT_GT(passes, 1);
 }
 
+/// Steps that are taken again because they create energy would count against an effect that keeps
+/// them from it.
+TEST(EffectCosts, ComparesStepsThatAreTakenOnce) {
+  Scene checked = short_run(), free = checked;
+  free.solver.bounded_energy = false;
+  const EffectCosts one = measure_effects(Model(checked), {8, 2, 1e-3, 0}),
+                    two = measure_effects(Model(free), {8, 2, 1e-3, 0});
+  ASSERT_EQ(one.effects.size(), two.effects.size());
+  for (std::size_t k = 0; k < one.effects.size(); ++k)
+    if (one.effects[k].measured && one.effects[k].effect.on) {
+      EXPECT_EQ(one.effects[k].passes_without, two.effects[k].passes_without)
+          << one.effects[k].effect.name;
+    }
+}
+
 /// Structure alone: what is timed differs from run to run.
 TEST(EffectCosts, HasARowPerEffectOfTheModel) {
   const Model model(short_run());

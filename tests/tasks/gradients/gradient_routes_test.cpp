@@ -110,6 +110,16 @@ TEST(PublishedFaults, TactileLossUnderBdf2IsNotZero) {
   expect_right(check(scene, LossKind::tactile, 120, 6), 1e-6);
 }
 
+/// Markers of a gel move linearly with the field, so their gradient is the field's.
+TEST(Markers, ThreeRoutesAgree) {
+  for (const Integrator scheme : {Integrator::bdf1, Integrator::bdf2}) {
+    Scene scene = shipped("rolling_ball_small");
+    scene.integrator = scheme;
+    scene.sensors[0].markers = MarkersDescription{0.01, 2e-3, 1e-3, {}};
+    expect_right(check(scene, LossKind::markers, 120, 6), 1e-6);
+  }
+}
+
 /// The published gradient is 5 to 107 % off: the contact point of a sphere moves over it.
 TEST(PublishedFaults, RollingBallGradientIsRight) {
   for (const Integrator scheme : {Integrator::bdf1, Integrator::bdf2}) {

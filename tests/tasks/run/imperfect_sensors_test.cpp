@@ -131,7 +131,7 @@ TEST(ImperfectSensors, AMemoryKeepsToTheStepsOfItsScene) {
     run_rollout(batch, stepper, controls, o, nothing, {});
     ADD_FAILURE();
   } catch (const InputError& error) {
-    EXPECT_THAT(error.what(), ::testing::HasSubstr("s.xml:3: delay and low_pass"));
+    EXPECT_THAT(error.what(), ::testing::HasSubstr("s.xml:3: delay, low_pass and hysteresis"));
   }
 }
 

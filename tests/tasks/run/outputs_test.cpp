@@ -13,6 +13,7 @@ namespace {
 
 using namespace testing;
 using kernels::KernelTable;
+using ::testing::ElementsAre;
 
 std::atomic<int> whole_calls{0}, pressure_calls{0};
 const KernelTable* counted = nullptr;
@@ -98,6 +99,119 @@ TEST(Outputs, ARolloutReadsNeitherFieldsNorBodiesThatNobodyAskedFor) {
   EXPECT_EQ(sizes.bodies + sizes.fields, 0U);
   EXPECT_EQ(whole_calls + pressure_calls, 0);
   EXPECT_LT(rollout_bytes(model, 1, o.outputs), rollout_bytes(model, 1) / 2);
+}
+
+/// What a rollout of 12 steps hands on.
+struct Handed : RowSink {
+  int states = 0, poses = 0, steps = 0, fields = 0;
+  std::vector<std::int64_t> state_steps, field_steps;
+  std::vector<std::vector<double>> q, pose, numbers;
+  void write(const StateRow& row) override {
+    if (!row.q.empty()) state_steps.push_back(row.step), q.emplace_back(row.q.begin(), row.q.end());
+    if (!row.body_pose.empty()) pose.emplace_back(row.body_pose.begin(), row.body_pose.end());
+    states += row.q.empty() ? 0 : 1, poses += row.body_pose.empty() ? 0 : 1;
+  }
+  void write(const StepRow& row) override { steps += row.u.empty() ? 0 : 1; }
+  void write(const TactileRow& row) override {
+    ++fields, field_steps.push_back(row.step);
+    numbers.emplace_back(row.numbers.begin(), row.numbers.end());
+    EXPECT_EQ(row.frame, fields - 1);
+  }
+};
+Handed handed(const Model& model, const RolloutOutputs& outputs) {
+  Handed sink;
+  Batch batch(model, 3);
+  Stepper stepper(model);
+  const ControlProgram controls(model, stepper.timestep(), 0);
+  RolloutOptions o{12, 1};
+  o.outputs = outputs;
+  run_rollout(batch, stepper, controls, o, sink);
+  return sink;
+}
+
+TEST(Outputs, WhatIsTakenAtTimesOfItsOwnIsReadThenAndNeverElse) {
+  const Model model(small_scene());
+  const Counting counting;
+  const Handed all = handed(model, {});
+  const int of_all = whole_calls;
+  ASSERT_GT(of_all, 0);
+  RolloutOutputs some;
+  some.fields = {{0, FieldForm::field, {4}}};
+  some.states = {0, true};
+  some.of_bodies = {6};
+  some.chosen_bodies = {model.nb() - 1};
+  whole_calls = 0;
+  const Handed few = handed(model, some);
+  EXPECT_EQ(12 * whole_calls, 3 * of_all);
+  EXPECT_THAT(few.field_steps, ElementsAre(4, 8, 12));
+  for (std::size_t k = 0; k < 3; ++k) EXPECT_EQ(few.numbers[k], all.numbers[4 * k + 3]);
+  EXPECT_THAT(few.state_steps, ElementsAre(12));
+  EXPECT_EQ(few.q[0], all.q[12]);
+  EXPECT_EQ(few.steps, 0) << "controls leave with every state alone";
+  ASSERT_EQ(few.poses, 3);
+  const std::size_t nb = std::size_t(model.nb());
+  for (std::size_t k = 0; k < 3; ++k)
+    for (std::size_t e = 0; e < 3; ++e)
+      for (std::size_t i = 0; i < 7; ++i)
+        EXPECT_EQ(few.pose[k][7 * e + i], all.pose[6 * k][7 * (nb * e + nb - 1) + i]);
+  some.fields = {{0, FieldForm::field, {0, true}}};
+  whole_calls = 0;
+  EXPECT_THAT(handed(model, some).field_steps, ElementsAre(12));
+  EXPECT_EQ(12 * whole_calls, of_all);
+  EXPECT_LT(rollout_bytes(model, 1, some), rollout_bytes(model, 1));
+}
+
+/// Episodes of 8 steps and rows of 2, in pieces of every size.
+TEST(Outputs, EpisodesHoldWhatIsTakenAndComputeNothingElse) {
+  const Model model(small_scene());
+  const ControlProgram controls(model, model.timestep(), 0);
+  EpisodeOptions o;
+  o.episodes = 17;
+  o.steps = 8;
+  o.every = 2;
+  const auto played = [&](const EpisodeOptions& options) {
+    Recorder recorder(4);
+    run_episodes(model, {}, controls, options, recorder);
+    return recorder.episodes;
+  };
+  const auto row = [](const std::string& bytes, std::size_t rows, std::size_t k) {
+    return bytes.substr(bytes.size() / rows * k, bytes.size() / rows);
+  };
+  const Counting counting;
+  const auto all = played(o);
+  const int of_all = whole_calls;
+  o.q.times = {4}, o.v.wanted = false;
+  o.bodies = {{{1}, {0, true}}, {{}, {}}};
+  o.fields = {{0, FieldForm::field, {8}}};
+  for (const std::size_t piece : {std::size_t(1), std::size_t(30000), std::size_t(1) << 25}) {
+    o.piece_bytes = piece;
+    whole_calls = 0;
+    const auto some = played(o);
+    EXPECT_EQ(5 * whole_calls, 2 * of_all) << "rows 0 and 4 of 5";
+    const std::size_t bodies = model.end_effectors().empty() ? 2 : 3;
+    for (const auto& [number, episode] : some) {
+      const RecordedEpisode& whole = all.at(number);
+      EXPECT_EQ(episode.actions, whole.actions);
+      for (std::size_t k = 0; k < 3; ++k)
+        EXPECT_EQ(row(episode.observations[0], 3, k), row(whole.observations[0], 5, 2 * k));
+      EXPECT_EQ(episode.observations[1], "");
+      const std::size_t motion = 13 * sizeof(double);
+      ASSERT_EQ(episode.observations[bodies].size(), motion);
+      EXPECT_EQ(episode.observations[bodies],
+                row(episode.observations[bodies + 1], 5, 4).substr(motion, motion));
+      for (std::size_t k = 0; k < 2; ++k)
+        EXPECT_EQ(row(episode.observations[bodies + 2], 2, k),
+                  row(whole.observations[bodies], 5, 4 * k));
+    }
+  }
+  o.fields = {{0, FieldForm::field, {3}}};
+  EXPECT_THROW(played(o), InputError) << "a row is two steps";
+  o.fields.reset();
+  o.bodies = {{{model.nb()}, {}}};
+  EXPECT_THROW(played(o), InputError);
+  RolloutOutputs nobody;
+  nobody.chosen_bodies = {-1};
+  EXPECT_THROW(handed(model, nobody), InputError);
 }
 
 }  // namespace

@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+// The stiffness of a marker's gel is that of the skin's spring unless another is given.
+#include "engine/model/compile_markers.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "engine/model/lateral_spread.hpp"
+
+namespace tangere {
+
+CompiledMarkers compile_markers(const TactileDescription& d, int pressure_sign) {
+  const MarkersDescription& of = *d.markers;
+  const std::string where = fmt::format("{}markers of '{}': ", of.source.prefix(), d.name);
+  const auto check = [&](const char* name, double x, const char* unit) {
+    if (!(x >= 0) || !std::isfinite(x))
+      throw InputError(
+          fmt::format("{}{}=\"{}\"; expected a number from 0 on {}", where, name, x, unit));
+  };
+  check("stiffness", of.stiffness, "N/m");
+  check("thickness", of.thickness, "m");
+  check("spread", of.spread, "m");
+  const double stiffness = of.stiffness > 0 ? of.stiffness : d.coefficients.ks;
+  if (!(stiffness > 0))
+    throw InputError(
+        where +
+        "no stiffness, and the sensor has no ks; expected stiffness=\"…\" [N/m], which "
+        "'tangere skin' prints as ks");
+  const bool grid = has_grid(d);
+  const char* const needs = of.thickness > 0 ? "thickness" : of.spread > 0 ? "spread" : nullptr;
+  if (needs != nullptr && !grid)
+    throw InputError(where + needs +
+                     " on a list of points, which have no neighbours; expected it on type "
+                     "rect_array");
+  CompiledMarkers markers;
+  markers.pressure_sign = pressure_sign;
+  markers.compliance = 1 / stiffness;
+  markers.rows = grid ? d.array.rows : 1;
+  markers.cols = grid ? d.array.cols : static_cast<int>(d.points.size());
+  if (!grid) return markers;
+  markers.pitch = pitches(d.array);
+  markers.bulge = of.thickness / (2 * stiffness);
+  if (of.spread > 0) markers.spread = lateral_spread(d.array, of.spread, where);
+  return markers;
+}
+
+}  // namespace tangere

@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a camera behind a gel sees of markers that are printed on its surface: where each of them is
+// pushed. With the ideal field f of the sensor, its shear f_s (along axis0 and axis1) and the force
+// p with which it is pressed, a marker at point i moves along axis0 and axis1 by
+//
+//   u_i = Σ_j S_ij (f_s,j - t/2 ∇p_j) / k_s [m]          (docs/sensors.md)
+//
+// k_s = G 𝒜/t is the shear stiffness of the gel under one point, t its thickness, S its lateral
+// spread. The relation is linear, so its derivative is itself, and its transpose pulls cotangents
+// back to those of the field.
+#pragma once
+
+#include <memory>
+#include <span>
+
+#include "engine/model/model.hpp"
+
+namespace tangere {
+
+/// Owns the scratch of one thread. Allocates only when made.
+class MarkerMap {
+ public:
+  /// Throws InputError where the sensor has no markers.
+  MarkerMap(const Model& model, int sensor);
+  ~MarkerMap();
+  MarkerMap(MarkerMap&&) noexcept;
+  MarkerMap& operator=(MarkerMap&&) noexcept;
+
+  /// Computes displacements, (points, 2) [m], from the ideal field, (points, 3) [N].
+  void displace(std::span<const double> field, std::span<double> displacement);
+  /// Adds to the cotangent of the field, (points, 3), what that of the displacements, (points, 2),
+  /// makes of it.
+  void pull_back(std::span<const double> of_displacement, std::span<double> of_field);
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace tangere

@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: Apache-2.0
+// inspect --effects: what it prints, draws and follows. Times are never compared.
+#include <gmock/gmock.h>
+
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "tests/apps/program.hpp"
+#include "tests/files.hpp"
+
+namespace tangere::apps {
+namespace {
+
+using nlohmann::json;
+using ::testing::HasSubstr;
+
+TEST(InspectEffects, DrawsWhereTheTimeGoesAndFollowsOutputs) {
+  const Folder folder;
+  std::string text = file_bytes(scene("rolling_ball_small.xml"));
+  text.insert(text.find("</tangere>"), "<outputs record=\"pad.sum/20,q/10\"/>\n");
+  folder.write("ball.xml", text);
+  const Outcome outcome =
+      run(folder, {"inspect", "ball.xml", "--effects", "--svg", "effects.svg", "--json"});
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  const json answer = json::parse(outcome.out);
+  EXPECT_EQ(answer.at("svg"), "effects.svg");
+  const std::string svg = file_bytes(folder.path("effects.svg"));
+  for (const char* part : {">contact pad ball<", ">tactile pad<", ">audit<", "Newton passes"})
+    EXPECT_THAT(svg, HasSubstr(part));
+  EXPECT_EQ(answer.at("effect_costs").at("tactile pad").at("bytes"), 6 * 8 + 8)
+      << "a sum, and kt that varies";
+  const json& runs = answer.at("run_costs");
+  EXPECT_THAT(runs[0].at("asked_by").get<std::string>(), HasSubstr("'q/10'"));
+  EXPECT_EQ(runs[1].at("on"), false) << "<outputs> leaves bodies out";
+  EXPECT_EQ(run(folder, {"inspect", "ball.xml", "--effects", "--svg", "effects.svg"}).exit_code, 3)
+      << "it exists";
+  const Outcome alone = run(folder, {"inspect", "ball.xml", "--svg", "x.svg"});
+  EXPECT_EQ(alone.exit_code, 2);
+  EXPECT_THAT(alone.err, HasSubstr("--svg without --effects; expected both"));
+}
+
+/// Times are never compared here, only that they are there.
+TEST(InspectEffects, MeasuresWhatEffectsCost) {
+  const Folder folder;
+  const std::string file = scene("rolling_ball_small.xml");
+  const Outcome outcome = run(folder, {"inspect", file, "--effects", "--json"});
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+  const json answer = json::parse(outcome.out);
+  for (const char* key :
+       {"environments", "failed", "instants", "rounds", "run_steps", "step_seconds",
+        "field_seconds", "newton", "share_of_nothing", "spread_of_nothing"})
+    EXPECT_TRUE(answer.at("effect_measurement").at(key).is_number()) << key;
+  const json& costs = answer.at("effect_costs");
+  std::istringstream text(file_bytes(file));
+  std::vector<std::string> lines;
+  for (std::string line; std::getline(text, line);) lines.push_back(line);
+  for (const auto& [name, effect] : costs.items()) {
+    SCOPED_TRACE(name);
+    for (const char* key : {"kind", "on", "why", "lines", "variant", "bytes", "share", "spread",
+                            "step_seconds_without", "newton_without", "note"})
+      EXPECT_TRUE(effect.contains(key)) << key;
+    EXPECT_FALSE(effect.at("why").get<std::string>().empty());
+    EXPECT_EQ(effect.at("share").is_null(), !effect.at("note").get<std::string>().empty());
+    EXPECT_EQ(effect.at("lines").empty(), !effect.at("on").get<bool>());
+    if (!effect.at("on").get<bool>()) {
+      EXPECT_EQ(effect.at("share"), 0);
+      EXPECT_EQ(effect.at("bytes"), 0);
+    }
+    for (const std::string line : effect.at("lines")) EXPECT_THAT(line, HasSubstr(file + ":"));
+  }
+  const auto called_for_by = [&](const char* name) {
+    const std::string line = costs.at(name).at("lines").at(0);
+    return lines.at(std::stoul(line.substr(line.rfind(':') + 1)) - 1);
+  };
+  EXPECT_THAT(called_for_by("gravity"), HasSubstr("<option"));
+  EXPECT_THAT(called_for_by("joint damping"), HasSubstr("<joint name=\"pad_joint\""));
+  EXPECT_THAT(called_for_by("force motors"), HasSubstr("<motor"));
+  EXPECT_THAT(called_for_by("contact pad ball friction"), HasSubstr("<general_primitive_contact"));
+  EXPECT_THAT(called_for_by("ground ball"), HasSubstr("<ground_contact"));
+  EXPECT_THAT(called_for_by("tactile pad"), HasSubstr("<tactile"));
+  EXPECT_EQ(costs.at("joint springs").at("on"), false);
+  EXPECT_TRUE(costs.at("velocity products").at("share").is_null());
+  EXPECT_GT(costs.at("tactile pad").at("bytes"), 0);
+  // A kind with one element is that element.
+  EXPECT_EQ(costs.at("tactile").at("share"), costs.at("tactile pad").at("share"));
+  for (const char* words : {"called for by", "contact pad ball friction", "tactile pad shear",
+                            "off, at no cost: joint springs (0 joints)", "kernel: "})
+    EXPECT_THAT(outcome.err, HasSubstr(words));
+  EXPECT_TRUE(answer.at("svg").is_null());
+  std::vector<std::string> names;
+  for (const json& cost : answer.at("run_costs")) {
+    names.push_back(cost.at("name"));
+    EXPECT_GT(cost.at("seconds"), 0) << names.back();
+    EXPECT_GT(cost.at("bytes"), 0) << names.back();
+  }
+  EXPECT_EQ(names, (std::vector<std::string>{"rows of q and v", "rows of bodies", "audit",
+                                             "gradients of a loss"}));
+}
+
+}  // namespace
+}  // namespace tangere::apps
