@@ -234,4 +234,9 @@ void add_accuracy_option(CLI::App& app, std::optional<double>& accuracy) {
                       "[default: the scene's, or steps are not cut]");
 }
 
+void add_sleep_option(CLI::App& app, bool& sleep) {
+  add_flag(app, "--sleep", sleep,
+           "Let bodies sleep that have come to rest, until something touches or moves them");
+}
+
 }  // namespace tangere::apps

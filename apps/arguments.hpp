@@ -106,5 +106,7 @@ void check_not_same_file(const std::string& output, const std::string& input);
 
 /// Adds --accuracy, which every command that plays a scene or a task has.
 void add_accuracy_option(CLI::App& app, std::optional<double>& accuracy);
+/// Adds --sleep, which commands have that step and take no derivatives.
+void add_sleep_option(CLI::App& app, bool& sleep);
 
 }  // namespace tangere::apps

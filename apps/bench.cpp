@@ -38,7 +38,7 @@ struct BenchArguments {
   std::optional<int> environments, every, repeat;
   std::optional<std::uint64_t> seed;
   std::optional<double> accuracy;
-  bool error = false, overwrite = false, allow_unknown = false;
+  bool sleep = false, error = false, overwrite = false, allow_unknown = false;
 };
 
 constexpr int kErrorEnvironments = 32;
@@ -90,6 +90,7 @@ int report(const BenchArguments& options, const Console& console, const BenchSet
               {"integrator", to_string(model.integrator())},
               {"tolerance", Stepper(model).tolerance()},
               {"accuracy", Stepper(model).accuracy()},
+              {"sleep", model.solver().sleep},
               {"svg", options.svg.empty() ? Json() : Json(options.svg)},
               {"csv", options.csv.empty() ? Json() : Json(options.csv)},
               {"runs", entries}};
@@ -132,6 +133,8 @@ BenchSetting setting_of(const BenchArguments& options, const Model& model,
   BenchSetting setting;
   setting.scene = options.scene;
   setting.model = model.scene().name;
+  setting.sleep = model.solver().sleep;
+  setting.moving_bodies = model.moving_bodies();
   setting.machine = processor_name();
   setting.isa = kernels::active_isa_name();
   setting.options.precision = precision_named(options.precision);
@@ -172,7 +175,7 @@ int measure(const BenchArguments& options, const Console& console, BenchSetting&
     console.print(bench_row(runs.back(), runs.front()));
     tell_passes(console, runs.back());
   }
-  console.print(bench_footing(runs.front()));
+  console.print(bench_footing(setting, runs.front()));
   list_failures(console, "environment", failures_of(runs.front()), "--json names all");
   Json more = of_task;
   if (error) {
@@ -203,6 +206,8 @@ int bench_task(const BenchArguments& options, const Console& console, const Task
   BenchSetting setting;
   setting.scene = options.scene;
   setting.model = "task " + task.spec().name;
+  setting.sleep = task.model().solver().sleep;
+  setting.moving_bodies = task.model().moving_bodies();
   setting.machine = processor_name();
   setting.isa = kernels::active_isa_name();
   setting.environments = options.environments.value_or(kDefaultEnvironments);
@@ -233,11 +238,15 @@ int bench(const BenchArguments& options, const Console& console) {
   precision_named(options.precision);
   if (options.frames == "none" && !options.record.empty())
     throw InputError("--frames none with --record; expected one of them");
-  const SolverOptions asked{.accuracy = options.accuracy};
+  const SolverOptions asked{.accuracy = options.accuracy, .sleep = options.sleep ? kUsualSleep : 0};
   if (const std::unique_ptr<Task> task = find_task(options.scene, console, asked))
     return bench_task(options, console, *task);
   refuse_with_scene(options.scene, {{"--policy", !options.policy.empty()}});
   const Model model(read_scene_for(options.scene, options.allow_unknown, console, asked));
+  if (options.error && model.solver().sleep > 0)
+    throw InputError(model.solver().sleep_source.prefix() +
+                     "--error where bodies may sleep; expected no sleep: errors are those of the "
+                     "scheme (docs/sleeping.md says what sleep adds)");
   const std::uint64_t seed = options.seed.value_or(0);
   const ControlProgram controls(model, model.timestep(), seed);
   if (!model.scene().control && model.nu() > 0)
@@ -306,6 +315,7 @@ Command add_bench(CLI::App& program) {
   add_whole_number<std::uint64_t>(app, "--seed", o.seed, 0, UINT64_MAX,
                                   "Seed of all that varies between environments [default: 0]");
   add_accuracy_option(app, o.accuracy);
+  add_sleep_option(app, o.sleep);
   add_flag(
       app, "--error", o.error,
       "Say beside the speed how far the setting is from a reference, in up to 32 environments");

@@ -31,6 +31,7 @@ std::string frames_text(const BenchSetting& setting) {
 }
 
 std::string csv_field(const Json& value) {
+  if (value.is_null()) return "";
   if (value.is_array()) return std::to_string(value.size());
   if (!value.is_string()) return value.dump();
   std::string text = "\"";
@@ -78,10 +79,14 @@ std::string bench_row(const BenchRun& run, const BenchRun& first) {
       rate(r.tactile_points, best.seconds));
 }
 
-std::string bench_footing(const BenchRun& run) {
-  return fmt::format(
-      "\nNewton iterations per simulation step: {:.2f}, environments failed: {}, checksum: {}",
-      newton_per_step(run.result), run.result.failures.size(), hexadecimal(run.result.checksum()));
+std::string bench_footing(const BenchSetting& setting, const BenchRun& run) {
+  return "\n" +
+         sleep_text(setting.sleep, setting.moving_bodies, run.result.bodies_asleep,
+                    run.result.simulation_steps) +
+         fmt::format(
+             "Newton iterations per simulation step: {:.2f}, environments failed: {}, checksum: {}",
+             newton_per_step(run.result), run.result.failures.size(),
+             hexadecimal(run.result.checksum()));
 }
 
 Json bench_entry(const BenchSetting& setting, const BenchRun& run) {
@@ -107,6 +112,7 @@ Json bench_entry(const BenchSetting& setting, const BenchRun& run) {
           {"median_env_steps_per_cpu_second", rate(r.environment_steps, median.cpu_seconds)},
           {"median_tactile_points_per_second", rate(r.tactile_points, median.seconds)},
           {"newton_iterations", newton_per_step(r)},
+          {"mean_asleep", mean_asleep(setting.sleep, r.bodies_asleep, r.simulation_steps)},
           {"failed", failures_json("environment", failures_of(run))},
           {"checksum", hexadecimal(r.checksum())}};
 }

@@ -20,6 +20,8 @@ struct BenchSetting {
   BenchmarkOptions options;  ///< its threads have no meaning here
   int every = 0;             ///< steps between fields; 0: none, or sensors differ
   std::string record;        ///< names of the readings; empty: none
+  double sleep = 0;          ///< as of a stepper
+  int moving_bodies = 0;
 };
 
 struct BenchRun {
@@ -38,7 +40,7 @@ std::string bench_heading(const BenchSetting& setting);
 /// One line of the table. The speed-up refers to the run `first`.
 std::string bench_row(const BenchRun& run, const BenchRun& first);
 /// The line below the table, with what does not depend on threads.
-std::string bench_footing(const BenchRun& run);
+std::string bench_footing(const BenchSetting& setting, const BenchRun& run);
 
 /// One entry of "runs".
 Json bench_entry(const BenchSetting& setting, const BenchRun& run);

@@ -115,6 +115,7 @@ std::string command_of(const GenerateOptions& options, const EpisodeOptions& run
   if (!options.program.empty()) command += " --program " + quoted(options.program);
   if (!options.controls.empty()) command += " --controls " + options.controls;
   if (options.accuracy) command += fmt::format(" --accuracy {}", *options.accuracy);
+  if (options.sleep) command += " --sleep";
   if (options.compress != "none") command += " --compress " + options.compress;
   if (options.tactile != "dense") command += " --tactile " + options.tactile;
   if (!options.record.empty()) command += " --record " + options.record;
@@ -229,13 +230,16 @@ int report(const GenerateOptions& options, const Console& console, const Job& jo
   console.print(fmt::format(
       "episodes: {}, rows: {}, time: {:.2f} s, {:.0f} env-steps/s with output, "
       "threads: {}\nlimited by {}: simulation {:.2f} s and {} {:.2f} s of all threads, writing "
-      "{:.2f} s of one\n{}\n{}, episodes failed: {}\n{}wrote {}: {} ({} bytes){}",
+      "{:.2f} s of one\n{}\n{}, episodes failed: {}\n{}{}wrote {}: {} ({} bytes){}",
       summary.episodes, summary.rows, summary.seconds, rate, run.threads, limit_of(summary, job),
       summary.simulation_seconds, preparation_of(job), summary.encoding_seconds,
       summary.writing_seconds, done.task.line,
       split_text(summary.split_steps, summary.coarse_steps, summary.passed_steps,
                  summary.damped_steps),
-      summary.failures.size(), kept, options.output,
+      summary.failures.size(),
+      sleep_text(job.layout.sleep, job.moving_bodies, summary.bodies_asleep,
+                 summary.simulation_steps),
+      kept, options.output,
       shards.size() == 1 ? "1 shard" : fmt::format("{} shards", shards.size()), bytes,
       merged.line));
   const Json costly =
@@ -258,6 +262,7 @@ int report(const GenerateOptions& options, const Console& console, const Job& jo
               {"integrator", job.layout.integrator},
               {"tolerance", job.layout.tolerance},
               {"accuracy", job.layout.accuracy},
+              {"sleep", job.layout.sleep},
               {"precision", options.precision},
               {"instruction_set", kernels::active_isa_name()},
               {"threads", run.threads},
@@ -277,6 +282,8 @@ int report(const GenerateOptions& options, const Console& console, const Job& jo
               {"coarse_steps", summary.coarse_steps},
               {"passed_steps", summary.passed_steps},
               {"damped_steps", summary.damped_steps},
+              {"mean_asleep",
+               mean_asleep(job.layout.sleep, summary.bodies_asleep, summary.simulation_steps)},
               {"costly", costly},
               {"failed", failures_json("episode", failures_of(summary))}};
   result.update(done.task.keys);
@@ -409,6 +416,7 @@ int generate_task(const GenerateOptions& options, const Console& console, const 
   check_memory(job.memory_bytes, fmt::format("--threads {}", job.run.threads));
   job.unit = "action";
   job.effects = effect_names(task.model());
+  job.moving_bodies = task.model().moving_bodies();
   job.layout =
       make_layout(options, task.model(), Stepper(task.model()), job.run, {}, info, plan, &task,
                   {to_string(kind), policy.players(), variation.noise, variation.random_share});
@@ -452,7 +460,7 @@ int generate(GenerateOptions options, const Console& console, const ProgramInfo&
     options.shards = shard.count;
   }
   // The same for the episodes and their gradients, which play them again.
-  SolverOptions asked{.accuracy = options.accuracy};
+  SolverOptions asked{.accuracy = options.accuracy, .sleep = options.sleep ? kUsualSleep : 0};
   if (options.gradients != "none") asked.tolerance = kGradientTolerance;
   if (const std::unique_ptr<Task> task = find_task(options.scene, console, asked))
     return generate_task(options, console, info, *task);
@@ -483,6 +491,7 @@ int generate(GenerateOptions options, const Console& console, const ProgramInfo&
   check_memory(job.memory_bytes, fmt::format("--threads {}", job.run.threads));
   job.unit = "environment step";
   job.effects = effect_names(model);
+  job.moving_bodies = model.moving_bodies();
   job.layout = make_layout(options, model, stepper, job.run, record, info, plan);
   job.simulate = [&](const EpisodeOptions& run, EpisodeSink& sink, const EpisodeProgress& progress,
                      const StopRequest& stop) -> JobResult {
@@ -539,6 +548,7 @@ Command add_generate(CLI::App& program) {
   add_whole_number<std::uint64_t>(app, "--seed", o.seed, 0, UINT64_MAX,
                                   "Seed of all that varies between episodes [default: 0]");
   add_accuracy_option(app, o.accuracy);
+  add_sleep_option(app, o.sleep);
   add_text(
       app, "--compress", o.compress, "NAME",
       "Compression of large observations: none, deflate, or lz4, which needs a plug-in to read "

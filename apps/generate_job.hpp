@@ -26,6 +26,7 @@ struct GenerateOptions {
   std::optional<int> every, threads;
   std::optional<std::uint64_t> seed;
   std::optional<double> accuracy, tape_memory, noise, program_timeout;
+  bool sleep = false;
   bool overwrite = false, resume = false, dry_run = false, no_merge = false, allow_unknown = false;
 };
 
@@ -46,6 +47,7 @@ struct Job {
   double memory_bytes = 0;           ///< of the simulation, without the program itself
   std::string unit;                  ///< what progress counts: "environment step", "action"
   std::vector<std::string> effects;  ///< that are switched on
+  int moving_bodies = 0;
   std::function<JobResult(const EpisodeOptions&, EpisodeSink&, const EpisodeProgress&,
                           const StopRequest&)>
       simulate;

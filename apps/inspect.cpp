@@ -112,6 +112,7 @@ Json as_json(const Model& model) {
           {"timestep", model.timestep()},
           {"tolerance", Stepper(model).tolerance()},
           {"accuracy", Stepper(model).accuracy()},
+          {"sleep", model.solver().sleep},
           {"gravity", scene.gravity},
           {"bodies", bodies},
           {"q_names", model.q_names()},
@@ -188,6 +189,7 @@ std::string as_text(const Model& model) {
       fmt::format("scene {} ({}): {}, h = {} s, tolerance {}", scene.name, scene.path,
                   to_string(stepper.integrator()), stepper.timestep(), stepper.tolerance());
   if (stepper.accuracy() > 0) text += fmt::format(", steps cut to accuracy {}", stepper.accuracy());
+  if (stepper.sleep() > 0) text += fmt::format(", bodies sleep at rest ({})", stepper.sleep());
   text += "\n\n";
   text += bodies_text(model) + '\n';
   text += names_line("coordinates", model.q_names());

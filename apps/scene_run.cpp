@@ -48,9 +48,22 @@ std::string split_text(std::int64_t split, std::int64_t coarse, std::int64_t pas
   return text;
 }
 
+Json mean_asleep(double sleep, std::int64_t bodies_asleep, std::int64_t steps) {
+  if (sleep == 0) return nullptr;
+  return static_cast<double>(bodies_asleep) / static_cast<double>(std::max<std::int64_t>(1, steps));
+}
+
+std::string sleep_text(double sleep, int moving_bodies, std::int64_t bodies_asleep,
+                       std::int64_t steps) {
+  const Json mean = mean_asleep(sleep, bodies_asleep, steps);
+  if (mean.is_null()) return "";
+  return fmt::format("bodies asleep: {:.2f} of {} on average\n", mean.get<double>(), moving_bodies);
+}
+
 void ask_of_solver(SolverOptions& of_scene, const SolverOptions& asked) {
   if (asked.accuracy) of_scene.accuracy = asked.accuracy;
   if (!of_scene.tolerance) of_scene.tolerance = asked.tolerance;
+  if (of_scene.sleep == 0) of_scene.sleep = asked.sleep;
 }
 
 Scene read_scene_for(const std::string& path, bool allow_unknown, const Console& console,

@@ -36,12 +36,19 @@ LossKind loss_named(const std::string& name);
 std::string split_text(std::int64_t split, std::int64_t coarse, std::int64_t passed,
                        std::int64_t damped);
 
+/// Says how many of the scene's bodies slept, on average over all steps of environments; empty if
+/// none may sleep. The text ends in a line break.
+std::string sleep_text(double sleep, int moving_bodies, std::int64_t bodies_asleep,
+                       std::int64_t steps);
+/// The same mean; null if no body may sleep. `sleep`: Stepper::sleep().
+Json mean_asleep(double sleep, std::int64_t bodies_asleep, std::int64_t steps);
+
 /// Reads a scene; its warnings go to the console. `asked`: as in ask_of_solver().
 Scene read_scene_for(const std::string& path, bool allow_unknown, const Console& console,
                      const SolverOptions& asked = {});
 
-/// What the command line asks of the solver: an accuracy in place of the scene's, a tolerance where
-/// the scene names none.
+/// What the command line asks of the solver: an accuracy in place of the scene's, a tolerance, and
+/// whether bodies sleep, where the scene names none.
 void ask_of_solver(SolverOptions& of_scene, const SolverOptions& asked);
 
 /// The controls of the table at `path`, or the scene's own if `path` is empty.

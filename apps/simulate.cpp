@@ -37,7 +37,8 @@ struct SimulateArguments {
   std::optional<int> environments, every;
   std::optional<double> timestep, tolerance, accuracy, tape_memory;
   std::optional<std::uint64_t> seed;
-  bool audit = false, point_gradients = false, overwrite = false, allow_unknown = false;
+  bool audit = false, sleep = false, point_gradients = false, overwrite = false,
+       allow_unknown = false;
 };
 
 void check_arguments(const SimulateArguments& options) {
@@ -132,14 +133,17 @@ int report(const SimulateArguments& options, const Console& console, const Batch
   const double per_step = static_cast<double>(summary.newton_iterations) /
                           static_cast<double>(std::max<std::int64_t>(1, summary.environment_steps));
   list_failures(console, "environment", failures_of(summary), "--json and the file name all");
-  console.print(fmt::format(
-      "environments: {}, steps: {}, time: {:.2f} s, {:.0f} env-steps/s with output\n"
-      "Newton iterations per step: {:.2f}, {}, environments failed: {}\n{}{}\n"
-      "wrote {} ({} bytes)",
-      batch.environments(), summary.steps, summary.seconds, rate, per_step,
-      split_text(summary.split_steps, summary.coarse_steps, summary.passed_steps,
-                 summary.damped_steps),
-      summary.failures.size(), audit_text(summary.audit), of_task.line, options.output, bytes));
+  console.print(
+      fmt::format("environments: {}, steps: {}, time: {:.2f} s, {:.0f} env-steps/s with output\n"
+                  "Newton iterations per step: {:.2f}, {}, environments failed: {}\n{}{}{}\n"
+                  "wrote {} ({} bytes)",
+                  batch.environments(), summary.steps, summary.seconds, rate, per_step,
+                  split_text(summary.split_steps, summary.coarse_steps, summary.passed_steps,
+                             summary.damped_steps),
+                  summary.failures.size(),
+                  sleep_text(stepper.sleep(), batch.model().moving_bodies(), summary.bodies_asleep,
+                             summary.environment_steps),
+                  audit_text(summary.audit), of_task.line, options.output, bytes));
   Json sensors = Json::array();
   for (const FieldOutput of : fields_of(batch.model(), rollout.outputs)) {
     const SensorInfo& sensor = batch.model().sensors()[static_cast<std::size_t>(of.sensor)];
@@ -165,6 +169,7 @@ int report(const SimulateArguments& options, const Console& console, const Batch
               {"integrator", to_string(stepper.integrator())},
               {"tolerance", stepper.tolerance()},
               {"accuracy", stepper.accuracy()},
+              {"sleep", stepper.sleep()},
               {"precision", options.precision},
               {"instruction_set", kernels::active_isa_name()},
               {"sensors", sensors},
@@ -177,6 +182,8 @@ int report(const SimulateArguments& options, const Console& console, const Batch
               {"coarse_steps", summary.coarse_steps},
               {"passed_steps", summary.passed_steps},
               {"damped_steps", summary.damped_steps},
+              {"mean_asleep",
+               mean_asleep(stepper.sleep(), summary.bodies_asleep, summary.environment_steps)},
               {"costly", costly},
               {"audit", audit_json(summary.audit)},
               {"failed", failures_json("environment", failures_of(summary))}};
@@ -225,6 +232,11 @@ struct Start {
           "{} was made with accuracy {:g}, this run has {:g} (0: steps are not cut): it goes on, "
           "but not with the bits of one long run; --accuracy sets it",
           saved->path, saved->accuracy, stepper.accuracy()));
+    else if (saved->sleep > 0 || stepper.sleep() > 0)
+      console.note(
+          fmt::format("{} does not hold which bodies slept: the run goes on with all of "
+                      "them awake, and not with the bits of one long run",
+                      saved->path));
     else if (saved->previous_q.empty() && saved->step > 0)
       console.note(
           fmt::format("row {} of {} has no row before it: a scheme of two steps starts anew there",
@@ -388,7 +400,9 @@ int simulate_task(const SimulateArguments& options, const Console& console, cons
       });
 }
 
-SolverOptions asked_of(const SimulateArguments& options) { return {.accuracy = options.accuracy}; }
+SolverOptions asked_of(const SimulateArguments& options) {
+  return {.accuracy = options.accuracy, .sleep = options.sleep ? kUsualSleep : 0};
+}
 
 int simulate(const SimulateArguments& options, const Console& console, const ProgramInfo& info) {
   check_arguments(options);
@@ -484,6 +498,7 @@ Command add_simulate(CLI::App& program) {
       app, "--tol", o.tolerance,
       "Largest scaled residual of a step [default: the scene's, or what follows scheme and step]");
   add_accuracy_option(app, o.accuracy);
+  add_sleep_option(app, o.sleep);
   add_text(
       app, "--gradients", o.gradients, "LOSS",
       "Also write derivatives of a loss by controls, start and the scene's numbers: final, path, "

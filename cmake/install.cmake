@@ -64,6 +64,7 @@ set(public_headers
   engine/step/control.hpp
   engine/step/displacement.hpp
   engine/step/shear_memory.hpp
+  engine/step/sleep_state.hpp
   engine/step/stepper.hpp
   engine/step/tape.hpp
   io/dataset/dataset_export.hpp

@@ -240,7 +240,9 @@ std::span<double> BlockCotangent::points_of(const Model& model, int sensor, int 
 }
 
 Adjoint::Adjoint(const Model& model, const StepperOptions& options, const AdjointOptions& wanted)
-    : impl_(std::make_unique<Impl>(model, step_settings(model, options), wanted)) {}
+    : impl_(std::make_unique<Impl>(model, step_settings(model, options), wanted)) {
+  refuse_sleep(model, impl_->settings);
+}
 Adjoint::~Adjoint() = default;
 Adjoint::Adjoint(Adjoint&&) noexcept = default;
 Adjoint& Adjoint::operator=(Adjoint&&) noexcept = default;

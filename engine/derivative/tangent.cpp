@@ -287,7 +287,9 @@ struct Tangent::Impl {
 };
 
 Tangent::Tangent(const Model& model, const StepperOptions& options)
-    : impl_(std::make_unique<Impl>(model, step_settings(model, options))) {}
+    : impl_(std::make_unique<Impl>(model, step_settings(model, options))) {
+  refuse_sleep(model, impl_->settings);
+}
 Tangent::~Tangent() = default;
 
 void Tangent::step(const Batch& batch, int block, int lane, const BlockTape& tape,

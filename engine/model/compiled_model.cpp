@@ -455,44 +455,50 @@ class Compiler {
 
 }  // namespace
 
+void point_view(CompiledModel& m) {
+  kernels::ModelView& v = m.view;
+  v.n_links = static_cast<int>(m.links.size());
+  v.nq = m.nq;
+  v.nv = m.nv;
+  v.links = m.links.data();
+  v.effects = m.dof_effects.data();
+  v.n_pairs = static_cast<int>(m.pairs.size());
+  v.n_grounds = static_cast<int>(m.grounds.size());
+  v.pairs = m.pairs.data();
+  v.faced = std::any_of(m.pairs.begin(), m.pairs.end(), [](const auto& p) { return p.faced; });
+  v.grounds = m.grounds.data();
+  v.n_link_pairs = static_cast<int>(m.link_pairs.size());
+  v.n_grounded = static_cast<int>(m.grounded.size());
+  v.link_pairs = m.link_pairs.data();
+  v.grounded = m.grounded.data();
+  v.pair_order = m.pair_order.data();
+  v.ground_order = m.ground_order.data();
+  v.n_solids = static_cast<int>(m.solids.size());
+  v.solids = m.solids.data();
+  v.n_memories = static_cast<int>(m.memories.size());
+  v.memories = m.memories.data();
+  v.pattern = m.pattern.view();
+}
+
 /// Everything in a model, views included. It must not be copied: its view points into its own
 /// vectors.
 std::shared_ptr<const CompiledModel> compile(const Scene& scene) {
   auto m = std::make_shared<CompiledModel>(Compiler(scene).run());
   decide_effects(*m);
   list_stages(*m);
-  const Vector3& g = m->scene.gravity;
   kernels::ModelView& v = m->view;
-  v.n_links = static_cast<int>(m->links.size());
-  v.nq = m->nq;
-  v.nv = m->nv;
-  v.links = m->links.data();
-  v.gravity = vec3_of(g);
+  v.gravity = vec3_of(m->scene.gravity);
   const GroundDescription ground = m->scene.ground.value_or(GroundDescription{});
   v.ground_point = vec3_of(ground.position);
   if (m->moved) v.ground_point = v.ground_point - m->origin;
   v.ground_normal = vec3_of(ground.normal);
-  v.effects = m->dof_effects.data();
-  v.n_pairs = static_cast<int>(m->pairs.size());
-  v.n_grounds = static_cast<int>(m->grounds.size());
-  v.pairs = m->pairs.data();
-  v.faced = std::any_of(m->pairs.begin(), m->pairs.end(), [](const auto& p) { return p.faced; });
-  v.grounds = m->grounds.data();
-  v.n_link_pairs = static_cast<int>(m->link_pairs.size());
-  v.n_grounded = static_cast<int>(m->grounded.size());
-  v.link_pairs = m->link_pairs.data();
-  v.grounded = m->grounded.data();
-  v.pair_order = m->pair_order.data();
-  v.ground_order = m->ground_order.data();
+  v.ground = ground_frame(v.ground_point, v.ground_normal);
   for (std::size_t k = 0; k < m->bodies.size(); ++k)
     m->solids.push_back(solid_of(m->scene.links[k].body.shape, m->bodies[k]));
-  v.n_solids = static_cast<int>(m->solids.size());
-  v.solids = m->solids.data();
+  point_view(*m);
   compile_memories(*m);
   v.n_memories = static_cast<int>(m->memories.size());
   v.memories = m->memories.data();
-  v.ground = ground_frame(v.ground_point, v.ground_normal);
-  v.pattern = m->pattern.view();
   return m;
 }
 

@@ -283,6 +283,9 @@ inline constexpr double kFarAway = 1e6;
 /// Turns names into indices and joints into elementary links. Throws InputError.
 std::shared_ptr<const CompiledModel> compile(const Scene& scene);
 
+/// Points the view at the model's own arrays. Gravity and the ground are left as they are.
+void point_view(CompiledModel& m);
+
 /// Returns the arrays behind a model.
 const CompiledModel& compiled(const Model& model);
 

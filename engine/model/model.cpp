@@ -25,6 +25,10 @@ int Model::nq() const { return compiled_->nq; }
 int Model::nv() const { return compiled_->nv; }
 int Model::nu() const { return compiled_->nu; }
 int Model::nb() const { return static_cast<int>(compiled_->bodies.size()); }
+int Model::moving_bodies() const {
+  return static_cast<int>(std::ranges::count_if(
+      compiled_->bodies, [](const CompiledBody& body) { return body.link >= 0; }));
+}
 double Model::mass(int body) const { return compiled_->bodies[std::size_t(body)].mass; }
 double Model::timestep() const { return compiled_->scene.timestep; }
 Integrator Model::integrator() const {

@@ -67,10 +67,11 @@ class Model {
   explicit Model(const Scene& scene);
 
   [[nodiscard]] const Scene& scene() const;
-  [[nodiscard]] int nq() const;  ///< configuration coordinates (quaternions count 4)
-  [[nodiscard]] int nv() const;  ///< velocity dofs
-  [[nodiscard]] int nu() const;  ///< controls: motors in file order, one control per dof
-  [[nodiscard]] int nb() const;  ///< bodies of the scene, folded or not, in file order
+  [[nodiscard]] int nq() const;             ///< configuration coordinates (quaternions count 4)
+  [[nodiscard]] int nv() const;             ///< velocity dofs
+  [[nodiscard]] int nu() const;             ///< controls: motors in file order, one control per dof
+  [[nodiscard]] int nb() const;             ///< bodies of the scene, folded or not, in file order
+  [[nodiscard]] int moving_bodies() const;  ///< bodies that are not fixed in the world
   [[nodiscard]] double mass(int body) const;  ///< [kg]
   [[nodiscard]] double timestep() const;      ///< [s]
   /// The scene's scheme, or SDIRK3 where its accuracy asks for one (keeping_accuracy()).

@@ -280,6 +280,9 @@ struct OutputsDescription {
   Source source;
 };
 
+/// SolverOptions::sleep where bodies shall sleep and nobody says how still they must be.
+inline constexpr double kUsualSleep = 1e-3;
+
 struct SolverOptions {
   /// Of the scaled residual, dimensionless. None: the one that follows scheme and step
   /// (docs/solver.md).
@@ -289,6 +292,10 @@ struct SolverOptions {
   std::optional<double> accuracy{};
   /// Steps that would create energy are taken again by BDF1 or in parts (docs/solver.md).
   bool bounded_energy = true;
+  /// Share of its size that a body may move and still rest, until it sleeps (docs/sleeping.md). 0:
+  /// none sleeps.
+  double sleep = 0;
+  Source sleep_source{};
 };
 
 struct Scene {

@@ -66,6 +66,7 @@ Batch::Batch(const Model& model, int environments, std::uint64_t seed, std::int6
     episode_.resize(lanes);
     steps_.assign(lanes, 0);
     memory_.resize(lanes);
+    sleep_.resize(lanes);
   } catch (const std::exception&) {
     throw InputError(
         "no memory for " + std::to_string(environments) + " environments (" +
@@ -113,6 +114,7 @@ void Batch::reset(int environment, std::int64_t episode) {
   held_[lane] = 0;
   steps_[lane] = 0;
   memory_[lane].clear();
+  sleep_[lane] = {};
 }
 
 void Batch::displace_state(int environment, std::span<const double> q, std::span<const double> v) {
@@ -120,6 +122,7 @@ void Batch::displace_state(int environment, std::span<const double> q, std::span
   double* const own = column(std::size_t(environment));
   for (int i = 0; i < m.nq; ++i) own[(m.layout.q + i) * kBlock] = q[std::size_t(i)];
   for (int i = 0; i < m.nv; ++i) own[(m.layout.v + i) * kBlock] = v[std::size_t(i)];
+  sleep_[std::size_t(environment)].wake();
 }
 
 void Batch::write_state(std::size_t lane, std::span<const double> q, std::span<const double> v) {
@@ -232,7 +235,8 @@ BlockState Batch::save_block(int block) const {
           {status_.begin() + lane, status_.begin() + lane + kBlock},
           {has_history_.begin() + lane, has_history_.begin() + lane + kBlock},
           {steps_.begin() + lane, steps_.begin() + lane + kBlock},
-          {memory_.begin() + lane, memory_.begin() + lane + kBlock}};
+          {memory_.begin() + lane, memory_.begin() + lane + kBlock},
+          {sleep_.begin() + lane, sleep_.begin() + lane + kBlock}};
 }
 
 void Batch::restore_block(int block, const BlockState& state) {
@@ -242,6 +246,7 @@ void Batch::restore_block(int block, const BlockState& state) {
   std::copy(state.has_history.begin(), state.has_history.end(), has_history_.begin() + lane);
   std::copy(state.steps.begin(), state.steps.end(), steps_.begin() + lane);
   std::copy(state.memory.begin(), state.memory.end(), memory_.begin() + lane);
+  std::copy(state.sleep.begin(), state.sleep.end(), sleep_.begin() + lane);
 }
 
 bool Batch::is_parameter(int k) const {
@@ -267,6 +272,7 @@ void Batch::set_randomized_value(int environment, int k, double value) {
                      "' is of the starting state; expected a parameter");
   column(std::size_t(environment))[std::size_t(row) * kBlock] = value;
   update_derived_rows(m, column(std::size_t(environment)));
+  sleep_[std::size_t(environment)].wake();
 }
 
 }  // namespace tangere

@@ -10,6 +10,7 @@
 #include "engine/base/aligned.hpp"
 #include "engine/model/model.hpp"
 #include "engine/step/shear_memory.hpp"
+#include "engine/step/sleep_state.hpp"
 
 namespace tangere {
 
@@ -36,6 +37,7 @@ struct BlockState {
   std::vector<std::uint8_t> has_history;
   std::vector<std::int64_t> steps;
   std::vector<ShearMemory> memory;
+  std::vector<SleepState> sleep;
 };
 
 /// Environments stepped together. A failed environment keeps its last good state and is not stepped
@@ -89,6 +91,12 @@ class Batch {
   /// Sets it, for a run that goes on from a stored state. Throws InputError unless the points rise
   /// and the scene has them.
   void set_memory(int environment, std::span<const ShearEntry> memory);
+
+  /// Who sleeps in an environment (docs/sleeping.md): nobody, where no stepper with sleep stepped
+  /// it. reset() and every set_ function wake all bodies.
+  [[nodiscard]] const SleepState& sleep(int environment) const {
+    return sleep_[std::size_t(environment)];
+  }
 
   /// Sets the newest state alone, for differences. Quaternions are taken as they are; history,
   /// status and what friction remembers are kept.
@@ -162,6 +170,7 @@ class Batch {
   std::vector<std::uint8_t> held_;
   std::vector<std::int64_t> episode_, steps_;
   std::vector<ShearMemory> memory_;
+  std::vector<SleepState> sleep_;
 };
 
 }  // namespace tangere

@@ -24,6 +24,7 @@ struct StepSettings {
   /// Steps that create energy are taken by BDF1 or in parts, and those in which bodies turn too far
   /// by SDIRK2 or in parts.
   bool bounded_energy = true;
+  double sleep = 0;  ///< share of its size that a body may move and still rest; 0: none sleeps
 };
 
 /// What a tape needs to know about a step besides its result.

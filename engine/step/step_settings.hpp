@@ -7,7 +7,11 @@
 
 namespace tangere {
 
-/// Throws InputError if the timestep or the tolerance is not a positive number.
+/// Throws InputError if the timestep or the tolerance is not a positive number, if the accuracy or
+/// sleep is none, or if the scene does not allow bodies to sleep.
 StepSettings step_settings(const Model& model, const StepperOptions& options);
+
+/// Throws InputError if bodies may sleep, for what takes derivatives of steps.
+void refuse_sleep(const Model& model, const StepSettings& settings);
 
 }  // namespace tangere

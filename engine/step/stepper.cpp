@@ -4,9 +4,13 @@
 #include "engine/step/stepper.hpp"
 
 #include <algorithm>
-#include <cmath>
+#include <bit>
+#include <numeric>
 
+#include "engine/base/as_size.hpp"
+#include "engine/step/awake_parts.hpp"
 #include "engine/step/motor_force.hpp"
+#include "engine/step/sleep.hpp"
 #include "engine/step/step_settings.hpp"
 #include "engine/step/tape.hpp"
 
@@ -14,59 +18,7 @@ namespace tangere {
 
 using kernels::kBlock;
 using kernels::kGroup;
-
-namespace {
-
-/// Parts that keep an accuracy are solved to this share of it, so that what is measured is the
-/// error of the scheme. What solves leave adds up over the steps, and no estimate sees it. So they
-/// are at most `kLooser` times as loose as those of plain steps.
-constexpr double kShareOfAccuracy = 0.01, kTightest = 1e-9, kLoosest = 1e-4, kLooser = 10;
-
-void check_accuracy(const StepperOptions& o, double accuracy) {
-  if (!(accuracy >= 0 && accuracy < 1))
-    throw InputError("accuracy " + std::to_string(accuracy) +
-                     "; expected a share below 1 (0.01 is one percent), or 0 for plain steps");
-  if (accuracy > 0 && o.integrator && o.integrator->scheme().estimate.empty())
-    throw InputError(std::string(to_string(*o.integrator)) +
-                     " has no estimate of its error, so it cannot keep an accuracy; expected "
-                     "another scheme, or none");
-}
-
-}  // namespace
-
-StepSettings step_settings(const Model& model, const StepperOptions& o) {
-  const double accuracy = o.accuracy.value_or(model.solver().accuracy.value_or(0));
-  check_accuracy(o, accuracy);
-  StepSettings s = {
-      .integrator = o.integrator.value_or(keeping_accuracy(model.scene().integrator, accuracy)),
-      .timestep = o.timestep.value_or(model.timestep()),
-      .tolerance = 0,
-      .max_iterations = model.solver().max_iterations,
-      .accuracy = accuracy,
-      .spare = false,
-      .bounded_energy = model.solver().bounded_energy};
-  if (!(s.timestep > 0) || !std::isfinite(s.timestep))
-    throw InputError("timestep " + std::to_string(s.timestep) + " s; expected a positive number");
-  double following = model.following_tolerance(s.integrator, s.timestep);
-  if (accuracy > 0)
-    following =
-        std::min(kLooser * following, std::clamp(kShareOfAccuracy * accuracy, kTightest, kLoosest));
-  s.tolerance = o.tolerance.value_or(model.solver().tolerance.value_or(following));
-  s.spare = !o.tolerance && !model.solver().tolerance;
-  if (!(s.tolerance > 0) || !std::isfinite(s.tolerance))
-    throw InputError("solver tolerance " + std::to_string(s.tolerance) +
-                     "; expected a positive number");
-  return s;
-}
-
-Integrator integrator_in_force(const Model& model, const StepperOptions& options) {
-  return step_settings(model, options).integrator;
-}
-
-StepperOptions for_gradients(const Model& model, StepperOptions options) {
-  if (!options.tolerance && !model.solver().tolerance) options.tolerance = kGradientTolerance;
-  return options;
-}
+using kernels::Row;
 
 /// Keeps a lane's state, which a step is about to replace, for sensors with memory.
 static void remember(const BlockLayout& layout, double* column, std::int64_t steps) {
@@ -82,33 +34,93 @@ struct GroupOfBlock {
   LaneBits live = 0, history = 0;
 };
 
+/// What steps a group: the whole model, or the part of it that is awake.
+struct SteppedModel {
+  const CompiledModel& model;
+  const GroupStep& step;
+  SingleWorkspace& alone;     ///< for splits of its steps
+  std::span<const int> q, v;  ///< number of its coordinates and dofs in the whole model
+};
+
+/// What a stepper has besides, if bodies may sleep.
+struct Sleeping {
+  Sleep rules;
+  AwakeParts parts;
+  AlignedVector<kernels::LaneRow> moved;  // (trees) in a group
+  std::vector<Row<1>> moved_alone;        // (trees) in one lane
+  std::vector<double> q_in_lane;          // (nq)
+
+  Sleeping(const CompiledModel& m, const StepSettings& s)
+      : rules(m, s.sleep, s.timestep),
+        parts(m, s),
+        moved(as_size(rules.trees())),
+        moved_alone(as_size(rules.trees())),
+        q_in_lane(as_size(m.nq)) {}
+
+  template <int L>
+  Row<L>* moved_rows() {
+    if constexpr (L == 1) {
+      return moved_alone.data();
+    } else {
+      return moved.data();
+    }
+  }
+};
+
 struct Stepper::Impl {
   Model model;
   StepSettings settings;
   GroupStep step;
   Workspace work;
   SingleWorkspace single;
+  std::vector<int> all_q, all_v;  ///< 0, 1, …
+  std::unique_ptr<Sleeping> sleeping;
 
   Impl(const Model& m, const StepSettings& s)
       : model(m),
         settings(s),
         step(compiled(model), settings),
         work(compiled(model), s.integrator.scheme().most_inner_stages()),
-        single(compiled(model), s.integrator.scheme().most_inner_stages()) {}
+        single(compiled(model), s.integrator.scheme().most_inner_stages()),
+        all_q(as_size(m.nq())),
+        all_v(as_size(m.nv())) {
+    std::iota(all_q.begin(), all_q.end(), 0);
+    std::iota(all_v.begin(), all_v.end(), 0);
+    if (s.sleep > 0) sleeping = std::make_unique<Sleeping>(compiled(model), s);
+  }
+
+  SteppedModel whole() { return {compiled(model), step, single, all_q, all_v}; }
+
+  /// Sets what the motors of the live lanes do; takes out lanes with controls that are not finite.
+  template <int L>
+  void drive(Batch& batch, BasicWorkspace<L>& w, GroupOfBlock& g, int lane,
+             std::span<const double> controls) {
+    const CompiledModel& m = compiled(model);
+    const std::size_t nu = as_size(m.nu);
+    for (int l = 0; l < L; ++l) {
+      if (!has(g.live, lane + l)) continue;
+      const std::size_t e = std::size_t(g.first + lane + l);
+      if (set_motors(m, w, l, g.rows + lane + l, controls.subspan(e * nu, nu))) continue;
+      batch.status_[e] = StepStatus::non_finite;
+      batch.iterations_[e] = 0;
+      g.live &= ~(1U << (lane + l));
+    }
+  }
 
   /// Steps the live lanes of a group. `lane`: the one that is in lane 0 of a workspace of one.
+  /// Returns lanes that must be stepped again, because an awake body touches one that slept.
   template <int L>
-  void step_lanes(Batch& batch, BasicWorkspace<L>& w, const GroupOfBlock& g, int lane,
-                  BlockTape* tape) {
+  LaneBits step_lanes(Batch& batch, const SteppedModel& stepped, BasicWorkspace<L>& w,
+                      const GroupOfBlock& g, int lane, BlockTape* tape) {
     const CompiledModel& m = compiled(model);
-    const auto gather = [&](kernels::Row<L>* to, int row, int count) {
-      for (int i = 0; i < count; ++i)
-        for (int l = 0; l < L; ++l) to[i][l] = g.rows[(row + i) * kBlock + lane + l];
+    const auto gather = [&](Row<L>* to, int row, std::span<const int> of) {
+      for (std::size_t i = 0; i < of.size(); ++i)
+        for (int l = 0; l < L; ++l) to[i][l] = g.rows[(row + of[i]) * kBlock + lane + l];
     };
-    gather(w.q0, m.layout.q, m.nq);
-    gather(w.v0, m.layout.v, m.nv);
-    gather(w.q_before, m.layout.previous_q, m.nq);
-    gather(w.v_before, m.layout.previous_v, m.nv);
+    gather(w.q0, m.layout.q, stepped.q);
+    gather(w.v0, m.layout.v, stepped.v);
+    gather(w.q_before, m.layout.previous_q, stepped.q);
+    gather(w.v_before, m.layout.previous_v, stepped.v);
     if (!m.memories.empty())
       for (int l = 0; l < L; ++l)
         w.remembered.now[std::size_t(l)] = batch.memory_[std::size_t(g.first + lane + l)];
@@ -119,13 +131,15 @@ struct Stepper::Impl {
     SolveLog log;
     const int of_block = g.first % kBlock + lane;
     if (tape != nullptr && tape->next_inner() != nullptr) log.inner = tape->next_inner() + of_block;
-    step.advance(kernels::active_kernels(), w, single, live, g.history >> lane, report,
-                 tape == nullptr ? nullptr : &log);
+    stepped.step.advance(kernels::active_kernels(), w, stepped.alone, live, g.history >> lane,
+                         report, tape == nullptr ? nullptr : &log);
     for (int l = 0; l < L; ++l)
       if (std::vector<TapedSolve>& solves = log.special[std::size_t(l)]; !solves.empty())
         tape->add({tape->steps(), of_block + l, std::move(solves)});
+    LaneBits again = 0;
+    if (sleeping) again = wake_touched(batch, stepped, w, g, lane, live, report);
     for (int l = 0; l < L; ++l) {
-      if (!has(live, l)) continue;
+      if (!has(live & ~again, l)) continue;
       const std::size_t e = std::size_t(g.first + lane + l);
       batch.status_[e] = report.status[l];
       batch.iterations_[e] = report.iterations[l];
@@ -136,15 +150,117 @@ struct Stepper::Impl {
       if (!m.memories.empty()) batch.memory_[e] = w.remembered.now[std::size_t(l)];
       // One step back is too long for BDF2's history where a step had to be cut.
       batch.has_history_[e] = settings.accuracy > 0 ? 0 : 1;
-      const auto shift = [&](int now, int before, const kernels::Row<L>* from, int count) {
-        for (int i = 0; i < count; ++i) {
-          double* row = g.rows + i * kBlock + lane + l;
+      const auto shift = [&](int now, int before, const Row<L>* from, std::span<const int> of) {
+        for (std::size_t i = 0; i < of.size(); ++i) {
+          double* row = g.rows + of[i] * kBlock + lane + l;
           row[before * kBlock] = row[now * kBlock];
           row[now * kBlock] = from[i][l];
         }
       };
-      shift(m.layout.q, m.layout.previous_q, w.q0, m.nq);
-      shift(m.layout.v, m.layout.previous_v, w.v0, m.nv);
+      shift(m.layout.q, m.layout.previous_q, w.q0, stepped.q);
+      shift(m.layout.v, m.layout.previous_v, w.v0, stepped.v);
+    }
+    if (sleeping) settle<L>(batch, g, lane, live & ~again);
+    return again << lane;
+  }
+
+  /// Steps the live lanes of a group whose bodies may sleep: those with the same bodies asleep
+  /// together.
+  void step_sleepers(Batch& batch, const GroupOfBlock& g, std::span<const double> controls) {
+    const std::size_t nu = as_size(compiled(model).nu);
+    const auto state = [&](int l) -> SleepState& { return batch.sleep_[as_size(g.first + l)]; };
+    for (int l = 0; l < kGroup; ++l)
+      if (has(g.live, l))
+        sleeping->rules.heed_controls(state(l), controls.subspan(as_size(g.first + l) * nu, nu));
+    const auto same = [](const SleepState& a, const SleepState& b) {
+      return a.bodies == b.bodies && (a.bodies == 0 || a.asleep == b.asleep);
+    };
+    for (LaneBits left = g.live; left != 0;) {
+      const int first = __builtin_ctz(left);
+      GroupOfBlock alike = g;
+      for (int l = 0; l < kGroup; ++l)
+        if (!has(left, l) || !same(state(l), state(first))) alike.live &= ~(1U << l);
+      // Two lanes one after the other take no longer than a group.
+      if (state(first).bodies > 0 && std::popcount(alike.live) <= 2) alike.live = 1U << first;
+      left &= ~alike.live;
+      const bool alone = (alike.live & (alike.live - 1)) == 0;
+      left |= alone ? step_alike(batch, single, alike, first, controls)
+                    : step_alike(batch, work, alike, 0, controls);
+    }
+  }
+
+  template <int L>
+  LaneBits step_alike(Batch& batch, BasicWorkspace<L>& w, GroupOfBlock& g, int lane,
+                      std::span<const double> controls) {
+    const SleepState& one = batch.sleep_[as_size(g.first + __builtin_ctz(g.live))];
+    drive(batch, w, g, lane, controls);
+    if (g.live == 0) return kNoLane;
+    if (one.bodies == 0) return step_lanes(batch, whole(), w, g, lane, nullptr);
+    if (std::ranges::count(one.asleep, 0) == 0) return rest(batch, g);
+    AwakePart& part = sleeping->parts.without(one.asleep, sleeping->rules.tree_of_link());
+    BasicWorkspace<L>& p = part.workspace<L>();
+    const ModelPart& of = *part.part;
+    for (std::size_t i = 0; i < of.v.size(); ++i) {
+      p.stage.tau[i] = w.stage.tau[of.v[i]];
+      p.stage.target[i] = w.stage.target[of.v[i]];
+    }
+    return step_lanes(batch, {of.model, part.step, part.single, of.q, of.v}, p, g, lane, nullptr);
+  }
+
+  /// Takes a step of the live lanes in which every body sleeps.
+  LaneBits rest(Batch& batch, const GroupOfBlock& g) const {
+    const BlockLayout& layout = compiled(model).layout;
+    for (int l = 0; l < kGroup; ++l) {
+      if (!has(g.live, l)) continue;
+      const std::size_t e = as_size(g.first + l);
+      batch.status_[e] = StepStatus::converged;
+      batch.iterations_[e] = 0;
+      batch.residual_[e] = 0;
+      if (layout.past_states > 0) remember(layout, g.rows + l, batch.steps_[e]);
+      ++batch.steps_[e];
+      batch.sleep_[e].slept += batch.sleep_[e].bodies;
+    }
+    return kNoLane;
+  }
+
+  /// Wakes what awake bodies of these lanes come near to. Returns the lanes in which one of them is
+  /// touched already.
+  template <int L>
+  LaneBits wake_touched(Batch& batch, const SteppedModel& stepped, const BasicWorkspace<L>& w,
+                        const GroupOfBlock& g, int lane, LaneBits lanes,
+                        const NewtonReport& report) {
+    Row<L>* const moved = sleeping->moved_rows<L>();
+    sleeping->rules.movements(g.rows + lane, w, stepped.q, moved);
+    LaneBits touched = 0;
+    for (int l = 0; l < L; ++l) {
+      if (!has(lanes, l) || failed(report.status[l])) continue;
+      SleepState& state = batch.sleep_[as_size(g.first + lane + l)];
+      if (state.bodies == 0) continue;
+      double most = 0;
+      for (int t = 0; t < sleeping->rules.trees(); ++t) most = std::max(most, moved[t][l]);
+      if (sleeping->rules.is_clear(state, most)) continue;
+      double* const column = g.rows + lane + l;
+      const CompiledModel& m = compiled(model);
+      std::vector<double>& q = sleeping->q_in_lane;
+      for (int i = 0; i < m.nq; ++i) q[as_size(i)] = column[(m.layout.q + i) * kBlock];
+      for (std::size_t i = 0; i < stepped.q.size(); ++i) q[as_size(stepped.q[i])] = w.q0[i][l];
+      if (sleeping->rules.wake_touched(kernels::active_kernels(), {column, state}, q, most, single))
+        touched |= 1U << l;
+    }
+    return touched;
+  }
+
+  /// Lets bodies of lanes that have stepped fall asleep.
+  template <int L>
+  void settle(Batch& batch, const GroupOfBlock& g, int lane, LaneBits lanes) {
+    const double* const moved = sleeping->moved_rows<L>()->lane;
+    for (int l = 0; l < L; ++l) {
+      const std::size_t e = as_size(g.first + lane + l);
+      if (!has(lanes, l) || failed(batch.status_[e])) continue;
+      SleepState& state = batch.sleep_[e];
+      if (sleeping->rules.count_rest(state, moved + l, L,
+                                     batch.status_[e] == StepStatus::converged))
+        sleeping->rules.settle(kernels::active_kernels(), {g.rows + lane + l, state}, single);
     }
   }
 };
@@ -159,6 +275,7 @@ double Stepper::timestep() const { return impl_->settings.timestep; }
 Integrator Stepper::integrator() const { return impl_->settings.integrator; }
 double Stepper::tolerance() const { return impl_->settings.tolerance; }
 double Stepper::accuracy() const { return impl_->settings.accuracy; }
+double Stepper::sleep() const { return impl_->settings.sleep; }
 
 void Stepper::step(Batch& batch, std::span<const double> controls) {
   for (int b = 0; b < batch.blocks(); ++b) step_block(batch, b, controls);
@@ -166,8 +283,8 @@ void Stepper::step(Batch& batch, std::span<const double> controls) {
 
 void Stepper::step_block(Batch& batch, int block, std::span<const double> controls,
                          BlockTape* tape) {
-  const CompiledModel& model = compiled(impl_->model);
-  const std::size_t nu = std::size_t(model.nu);
+  Impl& i = *impl_;
+  if (tape != nullptr) refuse_sleep(i.model, i.settings);
   for (int group = 0; group < kBlock / kGroup; ++group) {
     GroupOfBlock g{batch.block(block) + group * kGroup, block * kBlock + group * kGroup};
     for (int l = 0; l < kGroup; ++l) {
@@ -176,26 +293,21 @@ void Stepper::step_block(Batch& batch, int block, std::span<const double> contro
         continue;
       g.live |= 1U << l;
       if (batch.has_history_[e] != 0) g.history |= 1U << l;
+      if (!i.sleeping && !batch.sleep_[e].asleep.empty()) batch.sleep_[e].wake();
+    }
+    if (i.sleeping) {
+      i.step_sleepers(batch, g, controls);
+      continue;
     }
     // A lone environment goes through kernels of one lane: the same bits, a third of the time.
     const bool alone = g.live != 0 && (g.live & (g.live - 1)) == 0;
-    for (int l = 0; l < kGroup; ++l) {
-      if (!has(g.live, l)) continue;
-      const std::size_t e = std::size_t(g.first + l);
-      const std::span<const double> u = controls.subspan(e * nu, nu);
-      const double* state = g.rows + l;
-      if (alone ? set_motors(model, impl_->single, 0, state, u)
-                : set_motors(model, impl_->work, l, state, u))
-        continue;
-      batch.status_[e] = StepStatus::non_finite;
-      batch.iterations_[e] = 0;
-      g.live &= ~(1U << l);
-    }
-    if (g.live == 0) continue;
+    const int lane = alone ? __builtin_ctz(g.live) : 0;
     if (alone) {
-      impl_->step_lanes(batch, impl_->single, g, __builtin_ctz(g.live), tape);
+      i.drive(batch, i.single, g, lane, controls);
+      if (g.live != 0) i.step_lanes(batch, i.whole(), i.single, g, lane, tape);
     } else {
-      impl_->step_lanes(batch, impl_->work, g, 0, tape);
+      i.drive(batch, i.work, g, lane, controls);
+      if (g.live != 0) i.step_lanes(batch, i.whole(), i.work, g, lane, tape);
     }
   }
   if (tape != nullptr) tape->append(batch, block);

@@ -21,6 +21,9 @@ struct StepperOptions {
   /// Steps are cut into parts that keep this accuracy (docs/accuracy.md), relative, below 1. 0:
   /// every step is one part.
   std::optional<double> accuracy{};
+  /// Bodies sleep that have moved by less than this share of their size for a while
+  /// (docs/sleeping.md), below 1. 0: none does.
+  std::optional<double> sleep{};
 };
 
 /// Returns the scheme that a stepper of these options takes. Throws like its constructor.
@@ -29,7 +32,8 @@ Integrator integrator_in_force(const Model& model, const StepperOptions& options
 /// Tolerance of runs that gradients are taken of, where neither caller nor scene names one. A
 /// gradient is exact for states that solve their equations, so it is off by about as much.
 inline constexpr double kGradientTolerance = 1e-9;
-/// Returns the options with that tolerance, where none is named.
+/// Returns the options with that tolerance, where none is named. Throws InputError if bodies may
+/// sleep.
 StepperOptions for_gradients(const Model& model, StepperOptions options);
 
 /// Owns the scratch of one thread. Steps any batch of its model. Results do not depend on which
@@ -45,13 +49,14 @@ class Stepper {
   [[nodiscard]] Integrator integrator() const;  ///< the one in force
   [[nodiscard]] double tolerance() const;
   [[nodiscard]] double accuracy() const;  ///< 0: every step is one part
+  [[nodiscard]] double sleep() const;     ///< 0: no body sleeps
 
   /// Advances every environment that has not failed by one step. `controls`: (E, nu), clipped to
   /// the motors' range.
   void step(Batch& batch, std::span<const double> controls);
 
   /// The same for one block of 16. `controls`: (E, nu) of the whole batch. The resulting states are
-  /// added to `tape`.
+  /// added to `tape`. Throws InputError if there is a tape and bodies may sleep.
   void step_block(Batch& batch, int block, std::span<const double> controls,
                   BlockTape* tape = nullptr);
 

@@ -69,6 +69,7 @@ void describe_run(const h5::Id& scene, const DatasetLayout& layout) {
   h5::write_attribute(scene, "integrator", layout.integrator);
   h5::write_scalar<double>(scene, "tolerance", layout.tolerance);
   h5::write_scalar<double>(scene, "accuracy", layout.accuracy);
+  if (layout.sleep > 0) h5::write_scalar<double>(scene, "sleep", layout.sleep);
   h5::write_attribute(scene, "precision", layout.precision);
   h5::write_attribute(scene, "compression", layout.compression);
   h5::write_attribute(scene, "tactile", layout.sparse ? "sparse" : "dense");

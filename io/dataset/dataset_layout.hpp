@@ -72,6 +72,7 @@ struct DatasetLayout {
   double timestep = 0;   ///< [s]
   double tolerance = 0;  ///< of the scaled residual, dimensionless
   double accuracy = 0;   ///< of the parts of a step, relative; 0: every step is one part
+  double sleep = 0;      ///< share of its size that a body may move and still rest; 0: none sleeps
   std::string precision, version, instruction_set;
   std::string controls = "of the scene";  ///< or a table, named by its content
   std::string command;  ///< makes this data set again; without threads, folder and the like

@@ -104,6 +104,7 @@ TrajectoryLayout layout_from(const Batch& batch, const Stepper& stepper,
   layout.timestep = stepper.timestep();
   layout.tolerance = stepper.tolerance();
   layout.accuracy = stepper.accuracy();
+  layout.sleep = stepper.sleep();
   layout.every = run.every;
   layout.seed = batch.seed();
   layout.first_episode = batch.episode(0);
@@ -140,6 +141,7 @@ DatasetLayout dataset_layout_from(const Model& model, const Stepper& stepper,
   layout.timestep = stepper.timestep();
   layout.tolerance = stepper.tolerance();
   layout.accuracy = stepper.accuracy();
+  layout.sleep = stepper.sleep();
   layout.precision = run.precision;
   layout.version = run.version;
   layout.instruction_set = run.instruction_set;

@@ -185,13 +185,21 @@ void read_option(Scene& scene, const SceneNode& node) {
 }
 
 void read_solver(Scene& scene, const SceneNode& node) {
-  node.check_attributes({"tol", "max_iter", "accuracy", "energy"}, {}, {"max_ls"});
+  node.check_attributes({"tol", "max_iter", "accuracy", "energy", "sleep"}, {}, {"max_ls"});
   if (node.has("tol")) scene.solver.tolerance = node.positive("tol");
   if (node.has("accuracy")) {
     scene.solver.accuracy = node.positive("accuracy");
     if (!(*scene.solver.accuracy < 1))
       throw InputError(node.source().prefix() + "accuracy " + node.text("accuracy") +
                        "; expected a share below 1: 0.01 is one percent");
+  }
+  if (node.has("sleep")) {
+    scene.solver.sleep = node.positive("sleep");
+    scene.solver.sleep_source = node.source();
+    if (!(scene.solver.sleep < 1))
+      throw InputError(node.source().prefix() + "sleep " + node.text("sleep") +
+                       "; expected the share of its size that a body may move and still rest, "
+                       "below 1: 0.001 is usual");
   }
   if (node.has("energy"))
     scene.solver.bounded_energy = node.choice("energy", {"bounded", "free"}, 0) == 0;

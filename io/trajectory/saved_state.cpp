@@ -130,6 +130,7 @@ SavedState read_state(const std::string& path, std::optional<std::int64_t> row) 
   state.tolerance = h5::read_number<double>(file, "tolerance");
   if (H5Aexists(file.get(), "accuracy") > 0)
     state.accuracy = h5::read_number<double>(file, "accuracy");
+  if (H5Aexists(file.get(), "sleep") > 0) state.sleep = h5::read_number<double>(file, "sleep");
   state.integrator = h5::read_text(file, "integrator");
   state.scene_text = h5::read_text(file, "scene_text");
   const h5::Id q = h5::open_dataset(file, "q"), v = h5::open_dataset(file, "v");

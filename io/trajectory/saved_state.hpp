@@ -22,6 +22,7 @@ struct SavedState {
   double timestep = 0;  ///< [s]
   double tolerance = 0;
   double accuracy = 0;  ///< 0: steps were not cut, or the file does not say
+  double sleep = 0;     ///< 0: no body slept
   std::string integrator, scene_text;
   std::vector<std::string> q_names;            ///< (nq)
   std::vector<std::string> v_names;            ///< (nv)

@@ -126,6 +126,7 @@ struct TrajectoryFile::Impl {
     h5::write_attribute(file, "timestep_unit", "s");
     h5::write_scalar<double>(file, "tolerance", layout.tolerance);
     h5::write_scalar<double>(file, "accuracy", layout.accuracy);
+    if (layout.sleep > 0) h5::write_scalar<double>(file, "sleep", layout.sleep);
     h5::write_scalar<std::int64_t>(file, "every", layout.every);
     h5::write_scalar<std::uint64_t>(file, "seed", layout.seed);
     h5::write_scalar<std::int64_t>(file, "first_episode", layout.first_episode);

@@ -69,6 +69,7 @@ struct TrajectoryLayout {
   double timestep = 0;   ///< [s]
   double tolerance = 0;  ///< of the scaled residual, dimensionless
   double accuracy = 0;   ///< of the parts of a step, relative; 0: every step is one part
+  double sleep = 0;      ///< share of its size that a body may move and still rest; 0: none sleeps
   int every = 0;         ///< the option as given; 0: each sensor's own interval
   std::uint64_t seed = 0;
   std::int64_t first_episode = 0;

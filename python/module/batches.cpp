@@ -302,22 +302,26 @@ void add_batches(nb::module_& m) {
           [](PythonBatch* self, const Model& model, int envs, std::uint64_t seed,
              std::int64_t first_episode, const std::optional<int>& threads,
              const std::string& precision, const std::optional<double>& timestep,
-             const std::optional<double>& tolerance, const std::optional<double>& accuracy) {
+             const std::optional<double>& tolerance, const std::optional<double>& accuracy,
+             const std::optional<double>& sleep) {
             BatchOptions options{seed, first_episode, threads, precision_named(precision), {}};
             options.stepper.timestep = timestep;
             options.stepper.tolerance = tolerance;
             options.stepper.accuracy = accuracy;
+            options.stepper.sleep = sleep;
             new (self) PythonBatch(model, envs, options);
           },
           "model"_a, "envs"_a = 1, "seed"_a = 0, "first_episode"_a = 0, "threads"_a = nb::none(),
           "precision"_a = "mixed", "timestep"_a = nb::none(), "tolerance"_a = nb::none(),
-          "accuracy"_a = nb::none(),
+          "accuracy"_a = nb::none(), "sleep"_a = nb::none(),
           "Draws `envs` starting states: environment e is episode first_episode + e of `seed`.\n"
           "`threads`: None for all cores. `precision`: of tactile fields; 'mixed' returns "
           "float32,\n"
-          "'double' float64. `timestep` [s], `tolerance` (of a solve, dimensionless) and\n"
-          "`accuracy` (of the parts that steps are cut into, relative; 0: they are not cut): None\n"
-          "for the scene's. InputError: a number is out of range.")
+          "'double' float64. `timestep` [s], `tolerance` (of a solve, dimensionless),\n"
+          "`accuracy` (of the parts that steps are cut into, relative; 0: they are not cut) and\n"
+          "`sleep` (share of its size that a body may move and still rest until it sleeps; 0: "
+          "none\n"
+          "sleeps): None for the scene's. InputError: a number is out of range.")
       .def_prop_ro("model", &PythonBatch::model)
       .def_prop_ro("envs", &PythonBatch::environments, "E")
       .def_prop_ro("threads", &PythonBatch::threads)

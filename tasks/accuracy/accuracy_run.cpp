@@ -163,7 +163,8 @@ struct AccuracyRun::Impl {
                                             StepperOptions{.integrator = setting.integrator,
                                                            .timestep = interval / setting.parts,
                                                            .tolerance = tolerance,
-                                                           .accuracy = setting.accuracy});
+                                                           .accuracy = setting.accuracy,
+                                                           .sleep = 0});
     for (std::vector<double>& s : sum) s.assign(environments(), 0);
     Batch batch = episodes.start;
     std::vector<BlockOutcome> blocks(as_size(batch.blocks()));

@@ -72,6 +72,7 @@ Vibration strongest_vibration(const FixedEpisodes& episodes, int environment, In
   options.integrator = integrator;
   options.timestep = episodes.interval() / parts;
   options.tolerance = tolerance;
+  options.sleep = 0;
   Series series = net_forces(episodes, environment, options, parts, go_on);
   for (auto& forces : series)
     for (std::vector<double>& x : forces)

@@ -49,6 +49,7 @@ StepperOptions uncut(const Model& model) {
   StepperOptions options;
   options.integrator = model.integrator();  // the one that can keep an accuracy
   options.accuracy = 0;
+  options.sleep = 0;  // as in recorded_states.cpp
   options.tolerance = Stepper(model, options).tolerance();
   return options;
 }

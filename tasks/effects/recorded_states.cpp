@@ -26,7 +26,9 @@ void copy_states(const Batch& batch, std::vector<double>& q, std::vector<double>
 RecordedStates record_states(const Model& model, int environments, int instants,
                              std::uint64_t seed) {
   Batch batch(model, environments, seed);
-  Stepper stepper(model);
+  StepperOptions awake;  // every instant shows the whole scene
+  awake.sleep = 0;
+  Stepper stepper(model, awake);
   const ControlProgram program(model, model.timestep(), seed);
   const std::int64_t planned = program.steps();
   const std::int64_t steps = planned < 0 ? kOpenRunSteps : std::min(planned, kMostRunSteps);

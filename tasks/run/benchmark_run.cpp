@@ -51,7 +51,7 @@ struct Worker {
 
 /// What one block did in one pass.
 struct BlockTally {
-  std::int64_t environment_steps = 0, newton_iterations = 0, tactile_points = 0;
+  std::int64_t environment_steps = 0, newton_iterations = 0, tactile_points = 0, bodies_asleep = 0;
   std::vector<FailedEnvironment> failures;
 };
 
@@ -115,6 +115,7 @@ class Benchmark {
       result.environment_steps += tally.environment_steps;
       result.newton_iterations += tally.newton_iterations;
       result.tactile_points += tally.tactile_points;
+      result.bodies_asleep += tally.bodies_asleep;
       result.failures.insert(result.failures.end(), tally.failures.begin(), tally.failures.end());
     }
     result.simulation_steps = result.environment_steps;
@@ -123,6 +124,7 @@ class Benchmark {
         result.environment_steps += task->counts().environment_steps;
         result.simulation_steps += task->counts().simulation_steps;
         result.newton_iterations += task->counts().newton_iterations;
+        result.bodies_asleep += task->counts().bodies_asleep;
       }
     std::stable_sort(result.failures.begin(), result.failures.end(),
                      [](const auto& a, const auto& b) { return a.step < b.step; });
@@ -171,6 +173,7 @@ class Benchmark {
     if (data_ == nullptr) {
       tally.environment_steps = steps.environment_steps;
       tally.newton_iterations = steps.newton_iterations;
+      tally.bodies_asleep = steps.bodies_asleep;
       tally.failures = std::move(steps.failures);
       if (checked) chain_states(first, last);
     }

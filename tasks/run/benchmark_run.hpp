@@ -46,6 +46,7 @@ struct BenchmarkResult {
       0;  ///< the same for a scene; for a task the steps of its actions and resets
   std::int64_t newton_iterations = 0;       ///< of one pass, over simulation_steps
   std::int64_t tactile_points = 0;          ///< read in one pass
+  std::int64_t bodies_asleep = 0;           ///< of one pass, summed over simulation_steps
   std::vector<FailedEnvironment> failures;  ///< in the order of their steps
   /// One checksum per environment. It chains the bits of every field in the order of time, then of
   /// the final state; for a task those of observations, rewards and flags. It depends on the

@@ -148,6 +148,7 @@ void BlockWorker::look_after(const Batch& batch, int block, int step, VectorCoun
     counts.coarse_steps += batch.status(e) == StepStatus::coarse ? 1 : 0;
     counts.passed_steps += batch.status(e) == StepStatus::passed ? 1 : 0;
     counts.damped_steps += batch.status(e) == StepStatus::damped ? 1 : 0;
+    counts.bodies_asleep += batch.sleep(e).bodies;
   }
   const std::vector<int>& moments = task_.spec().moments;
   const auto moment = std::lower_bound(moments.begin(), moments.end(), step + 1);

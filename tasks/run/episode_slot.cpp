@@ -420,6 +420,7 @@ void EpisodeSlot<T>::add_to(EpisodeSummary& run) const {
   run.coarse_steps += task != nullptr ? task->counts().coarse_steps : tally_->coarse_steps;
   run.passed_steps += task != nullptr ? task->counts().passed_steps : tally_->passed_steps;
   run.damped_steps += task != nullptr ? task->counts().damped_steps : tally_->damped_steps;
+  run.bodies_asleep += task != nullptr ? task->counts().bodies_asleep : tally_->bodies_asleep;
   run.failures.insert(run.failures.end(), failures_.begin(), failures_.end());
   auto failure = failures_.begin();
   for (int e = 0; e < batch_->environments(); ++e) {

@@ -66,6 +66,7 @@ struct EpisodeSummary {
   std::int64_t coarse_steps = 0;        ///< with parts that missed the accuracy that was asked for
   std::int64_t passed_steps = 0;        ///< in which a body came through another
   std::int64_t damped_steps = 0;        ///< that would have created energy
+  std::int64_t bodies_asleep = 0;       ///< summed over simulation_steps
   std::int64_t successes = 0;           ///< of a task's episodes that did not fail
   double mean_return = 0;               ///< over the same episodes
   std::vector<FailedEpisode> failures;  ///< in ascending order

@@ -259,6 +259,7 @@ RolloutSummary run_rollout(Batch& batch, Stepper& stepper, EpisodeProgram& progr
   summary.coarse_steps = tally.coarse_steps;
   summary.passed_steps = tally.passed_steps;
   summary.damped_steps = tally.damped_steps;
+  summary.bodies_asleep = tally.bodies_asleep;
   if (audit) summary.audit = audit->summary();
   summary.failures = std::move(tally.failures);
   summary.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();

@@ -28,9 +28,10 @@ struct StepTally {
   std::int64_t environment_steps = 0;  ///< tried, failing ones included
   std::int64_t newton_iterations = 0;
   std::int64_t split_steps = 0;
-  std::int64_t coarse_steps = 0;  ///< with parts that missed the accuracy that was asked for
-  std::int64_t passed_steps = 0;  ///< in which a body came through another
-  std::int64_t damped_steps = 0;  ///< that would have created energy
+  std::int64_t coarse_steps = 0;   ///< with parts that missed the accuracy that was asked for
+  std::int64_t passed_steps = 0;   ///< in which a body came through another
+  std::int64_t damped_steps = 0;   ///< that would have created energy
+  std::int64_t bodies_asleep = 0;  ///< summed over environment_steps
   std::vector<FailedEnvironment> failures;  ///< in the order in which they failed
 
   /// Counts `environments` environments from number `first` on. Construct it before the first step.
@@ -59,6 +60,7 @@ struct StepTally {
       coarse_steps += status == StepStatus::coarse ? 1 : 0;
       passed_steps += status == StepStatus::passed ? 1 : 0;
       damped_steps += status == StepStatus::damped ? 1 : 0;
+      bodies_asleep += batch.sleep(e).bodies;
       if (!failed(status)) continue;
       failures.push_back({e, step, status});
       live_[lane(e)] = false;

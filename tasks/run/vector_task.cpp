@@ -148,6 +148,7 @@ VectorCounts VectorTask::counts() const {
     sum.coarse_steps += tally.coarse_steps;
     sum.passed_steps += tally.passed_steps;
     sum.damped_steps += tally.damped_steps;
+    sum.bodies_asleep += tally.bodies_asleep;
   }
   return sum;
 }

@@ -30,6 +30,7 @@ struct VectorCounts {
   std::int64_t simulation_steps = 0;
   std::int64_t newton_iterations = 0, split_steps = 0, coarse_steps = 0, passed_steps = 0,
                damped_steps = 0;
+  std::int64_t bodies_asleep = 0;  ///< summed over simulation_steps
 };
 
 /// Environment e plays episodes first + e, first + e + E, first + e + 2 E … An episode depends only

@@ -110,7 +110,8 @@ TEST(ShippedScenes, AreAllRunHere) {
   const std::set<std::string> run = {
       "box_pushing",   "box_pushing_elastic", "cap_opening",  "cap_opening_elastic",
       "identify_ball", "insertion",           "mug",          "insertion_elastic",
-      "rolling_ball",  "rolling_ball_small",  "stable_grasp", "stable_grasp_elastic"};
+      "rolling_ball",  "rolling_ball_small",  "stable_grasp", "stable_grasp_elastic",
+      "ten_boxes"};
   EXPECT_EQ(found, run) << "a scene without a test of what it does, or a test without a scene";
 }
 
@@ -127,6 +128,27 @@ TEST(ShippedScenes, RollingBallRolls) {
       EXPECT_GT(r.q(r.at(0.8), e, "ball_joint.x") - r.q(0, e, "ball_joint.x"), 2e-3);
     }
   }
+}
+
+TEST(ShippedScenes, TheFingerPushesOneBoxOfTen) {
+  const SceneRun r("ten_boxes");
+  EXPECT_EQ(r.steps, 400);
+  EXPECT_EQ(r.failed, 0);
+  for (int e = 0; e < kEnvironments; ++e)
+    for (const char* row : {"a", "b"})
+      for (int k = 0; k < 5; ++k) {
+        const std::string box = row + std::to_string(k) + ".";
+        const auto moved = [&](int step) {
+          return std::hypot(r.q(step, e, box + "x") - r.q(0, e, box + "x"),
+                            r.q(step, e, box + "y") - r.q(0, e, box + "y"));
+        };
+        EXPECT_LT(moved(r.at(1.6)), 1e-4) << box;
+        if (box == "a4.") {
+          EXPECT_GT(moved(r.steps - 1), 0.02);
+        } else {
+          EXPECT_LT(moved(r.steps - 1), 1e-4) << box;
+        }
+      }
 }
 
 /// With the paper's friction and with friction that remembers.

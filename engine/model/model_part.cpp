@@ -1,0 +1,136 @@
+// SPDX-License-Identifier: Apache-2.0
+// Filters the arrays of a model and numbers anew what refers to links, dofs and contacts.
+#include "engine/model/model_part.hpp"
+
+#include <algorithm>
+#include <utility>
+
+namespace tangere {
+
+namespace {
+
+constexpr int kGone = -2;  // -1 is the world
+
+class Filter {
+ public:
+  Filter(const CompiledModel& whole, std::span<const int> tree,
+         std::span<const std::uint8_t> left_out)
+      : whole_(whole), part_(std::make_unique<ModelPart>()), m_(part_->model) {
+    links(tree, left_out);
+    dofs();
+    pairs();
+    grounds();
+    m_.solids = whole.solids;
+    for (const CompiledSensor& s : whole.sensors) {  // only their links matter for a step
+      m_.sensors.emplace_back();
+      m_.sensors.back().link = s.link < 0 ? s.link : link_[std::size_t(s.link)];
+    }
+    std::erase_if(m_.sensors, [](const CompiledSensor& s) { return s.link == kGone; });
+    m_.origin = whole.origin;
+    m_.moved = whole.moved;
+    m_.fall_time = whole.fall_time;
+    m_.pattern = analyse_pattern(m_.links, m_.nv, touching_);
+    m_.view = whole.view;
+    point_view(m_);
+  }
+
+  std::unique_ptr<ModelPart> part() { return std::move(part_); }
+
+ private:
+  [[nodiscard]] int link(int of_whole) const {
+    return of_whole < 0 ? of_whole : link_[std::size_t(of_whole)];
+  }
+
+  void links(std::span<const int> tree, std::span<const std::uint8_t> left_out) {
+    link_.assign(whole_.links.size(), kGone);
+    for (std::size_t i = 0; i < whole_.links.size(); ++i) {
+      if (left_out[std::size_t(tree[i])] != 0) continue;
+      kernels::Link l = whole_.links[i];
+      for (int k = 0; k < kernels::coordinates(l.kind); ++k) part_->q.push_back(l.q + k);
+      for (int k = 0; k < kernels::dofs(l.kind); ++k) part_->v.push_back(l.v + k);
+      l.q = std::exchange(m_.nq, m_.nq + kernels::coordinates(l.kind));
+      l.v = std::exchange(m_.nv, m_.nv + kernels::dofs(l.kind));
+      l.parent = link(l.parent);
+      link_[i] = static_cast<int>(m_.links.size());
+      m_.links.push_back(l);
+    }
+  }
+
+  void dofs() {
+    std::vector<int> of_part(std::size_t(whole_.nv), kGone);
+    for (std::size_t i = 0; i < part_->v.size(); ++i) {
+      const std::size_t dof = std::size_t(part_->v[i]);
+      of_part[dof] = static_cast<int>(i);
+      m_.dof_effects.push_back(whole_.dof_effects[dof]);
+      m_.unknown_scale.push_back(whole_.unknown_scale[dof]);
+    }
+    m_.component_begin = {0};
+    for (int c = 0; c < whole_.components(); ++c) {
+      for (int k = whole_.component_begin[std::size_t(c)];
+           k < whole_.component_begin[std::size_t(c) + 1]; ++k)
+        if (const int dof = of_part[std::size_t(whole_.component_dofs[std::size_t(k)])]; dof >= 0)
+          m_.component_dofs.push_back(dof);
+      const int end = static_cast<int>(m_.component_dofs.size());
+      if (end > m_.component_begin.back()) m_.component_begin.push_back(end);
+    }
+  }
+
+  void pairs() {
+    for (kernels::LinkPair links : whole_.link_pairs) {
+      const int first = links.first;
+      links.link1 = link(links.link1);
+      links.link2 = link(links.link2);
+      if (links.link1 == kGone || links.link2 == kGone) continue;
+      links.first = static_cast<int>(m_.pair_order.size());
+      for (int i = first; i < first + links.count; ++i) {
+        kernels::PairContact pair = whole_.pairs[std::size_t(whole_.pair_order[std::size_t(i)])];
+        pair.link1 = links.link1;
+        pair.link2 = links.link2;
+        m_.pair_order.push_back(static_cast<int>(m_.pairs.size()));
+        m_.pairs.push_back(pair);
+      }
+      m_.link_pairs.push_back(links);
+      touching_.emplace_back(links.link1, links.link2);
+    }
+  }
+
+  void grounds() {
+    for (kernels::GroundedLink grounded : whole_.grounded) {
+      const int first = grounded.first;
+      grounded.link = link(grounded.link);
+      if (grounded.link == kGone) continue;
+      grounded.first = static_cast<int>(m_.ground_order.size());
+      for (int i = first; i < first + grounded.count; ++i) {
+        kernels::GroundContact ground =
+            whole_.grounds[std::size_t(whole_.ground_order[std::size_t(i)])];
+        ground.link = grounded.link;
+        m_.ground_order.push_back(static_cast<int>(m_.grounds.size()));
+        m_.grounds.push_back(ground);
+      }
+      m_.grounded.push_back(grounded);
+    }
+  }
+
+  const CompiledModel& whole_;
+  std::unique_ptr<ModelPart> part_;
+  CompiledModel& m_;
+  std::vector<int> link_;  // of each link of the whole: its number in the part
+  std::vector<std::pair<int, int>> touching_;
+};
+
+}  // namespace
+
+std::vector<int> trees_of(const std::vector<kernels::Link>& links) {
+  std::vector<int> tree;
+  int trees = 0;
+  for (const kernels::Link& l : links)
+    tree.push_back(l.parent < 0 ? trees++ : tree[std::size_t(l.parent)]);
+  return tree;
+}
+
+std::unique_ptr<ModelPart> part_of(const CompiledModel& whole, std::span<const int> tree,
+                                   std::span<const std::uint8_t> left_out) {
+  return Filter(whole, tree, left_out).part();
+}
+
+}  // namespace tangere

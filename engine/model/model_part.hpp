@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: Apache-2.0
+// Some kinematic trees of a model as a model of their own, for steps in which the others sleep.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "engine/model/compiled_model.hpp"
+
+namespace tangere {
+
+/// Returns the tree of each link. Joints make a tree; the world connects nothing.
+std::vector<int> trees_of(const std::vector<kernels::Link>& links);
+
+/// Trees of a model. Rows of the batch's blocks that parameters name are those of the whole model,
+/// which must outlive its parts.
+struct ModelPart {
+  CompiledModel model;  ///< what a step reads: links, dofs and contacts of these trees
+  std::vector<int> q,
+      v;  ///< (nq), (nv) coordinates and dofs of the part: their number in the whole
+};
+
+/// Returns the trees that are not left out. Contacts with those that are go, too. `tree`: of each
+/// link. `left_out`: (trees) 1: is left out; not all of them. Friction must not remember.
+std::unique_ptr<ModelPart> part_of(const CompiledModel& whole, std::span<const int> tree,
+                                   std::span<const std::uint8_t> left_out);
+
+}  // namespace tangere
