@@ -91,6 +91,9 @@ FieldSequence read_recording(const IdentifyArguments& a, const Model& model, dou
   if (std::abs(file.timestep() - timestep) > 1e-9 * timestep)
     throw InputError(fmt::format("{} has steps of {:g} s; expected {:g} s, as in the scene",
                                  a.recording, file.timestep(), timestep));
+  if (!model.scene().randomizations.empty())
+    throw InputError(model.scene().path +
+                     ": <randomize> with a recording; expected a scene whose numbers do not vary");
   FieldSequence out{interval_of(model), {}};
   for (const SensorInfo& sensor : model.sensors()) {
     const std::size_t s = file.find_sensor(sensor.name);

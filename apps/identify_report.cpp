@@ -14,13 +14,14 @@
 namespace tangere::apps {
 namespace {
 
-/// Returns the unit of a number of the scene.
-std::string unit_named(const Scene& scene, const std::string& name) {
-  const NumberGradients numbers{Model(scene)};
+/// Returns the units of the sought numbers.
+std::vector<std::string> units_of(const IdentifyReport& r) {
+  const NumberGradients numbers{Model(r.scene)};
   const auto infos = numbers.infos();
-  return std::find_if(infos.begin(), infos.end(),
-                      [&](const NumberInfo& i) { return i.name == name; })
-      ->unit;
+  std::vector<std::string> units;
+  for (const std::string& name : r.names)
+    units.push_back(std::ranges::find(infos, name, &NumberInfo::name)->unit);
+  return units;
 }
 
 /// The value to which a number is compared: the true one of a trial, else the scene's.
@@ -81,11 +82,11 @@ double noise_percent(const IdentifyReport& r) {
   return r.peak > 0 ? 100 * r.fit.noise / r.peak : 0;
 }
 
-Json json_of(const IdentifyReport& r) {
+Json json_of(const IdentifyReport& r, const std::vector<std::string>& units) {
   Json numbers = Json::array(), points = Json::array();
   for (std::size_t k = 0; k < r.names.size(); ++k) {
     numbers.push_back({{"name", r.names[k]},
-                       {"unit", unit_named(r.scene, r.names[k])},
+                       {"unit", units[k]},
                        {"start", r.fit.points.front().values[k]},
                        {"found", r.fit.values()[k]},
                        {"deviation", finite(r.fit.deviation[k])}});
@@ -109,6 +110,7 @@ Json json_of(const IdentifyReport& r) {
 
 void print(const Console& console, const IdentifyReport& r) {
   const std::vector<double>&start = r.fit.points.front().values, &found = r.fit.values();
+  const std::vector<std::string> units = units_of(r);
   std::size_t width = 6;
   for (const std::string& name : r.names) width = std::max(width, name.size());
   const bool trial = !r.truth.empty();
@@ -118,7 +120,7 @@ void print(const Console& console, const IdentifyReport& r) {
   for (std::size_t k = 0; k < r.names.size(); ++k)
     console.print(fmt::format("{:<{}} {:>12.6g}{} {:>12.6g} {:>14.3g}  {}", r.names[k], width,
                               start[k], trial ? fmt::format(" {:>12.6g}", r.truth[k]) : "",
-                              found[k], 100 * r.fit.deviation[k], unit_named(r.scene, r.names[k])));
+                              found[k], 100 * r.fit.deviation[k], units[k]));
   console.print(
       fmt::format("{} after {} steps; what is left of a number of the fields: {:.3g} N, {:.2g} % "
                   "of their peak; condition {:.1f}",
@@ -128,7 +130,7 @@ void print(const Console& console, const IdentifyReport& r) {
       fmt::format("adjoint gradient against differences at the start: {:.1e} of its "
                   "norm",
                   r.fit.gradient_difference));
-  console.result(json_of(r));
+  console.result(json_of(r, units));
 }
 
 std::string draw(const IdentifyReport& r, const FieldSequence& fitted, double timestep) {

@@ -41,12 +41,12 @@ class Sleep {
   void movements(const double* rows, const BasicWorkspace<L>& w, std::span<const int> q,
                  kernels::Row<L>* out) const;
 
-  /// Notes how far awake bodies moved in this step, at most [m], where some sleep. Returns true where none of them can
-  /// come within reach of a sleeping one in the next step, by the last look.
+  /// Notes how far awake bodies moved in this step, at most [m], where some sleep. Returns true where
+  /// none of them can come within reach of a sleeping one in the next step, by the last look.
   bool is_clear(SleepState& state, double moved) const;
-  /// Looks, and wakes the bodies that awake ones may reach in the next step. `q`: (nq) coordinates at the end
-  /// of this step. `moved`: the largest m in this step [m]. Returns true if one of them is touched
-  /// already: the step must then be taken again, with it awake. Overwrites q0 of `single`.
+  /// Looks, and wakes the bodies that awake ones may reach in the next step. `q`: (nq) coordinates at
+  /// the end of this step. `moved`: the largest m in this step [m]. Returns true if one of them is
+  /// touched already: the step must then be taken again, with it awake. Overwrites q0 of `single`.
   bool wake_touched(const kernels::KernelTable& table, const SleeperAt& at,
                     std::span<const double> q, double moved, SingleWorkspace& single);
 

@@ -88,6 +88,10 @@ TEST_F(Recorded, ARecordingThatDoesNotFitIsRefused) {
   refused("every=\"2\"", "every=\"4\"", "every 2 steps; expected every 4");
   refused("timestep=\"2e-3\"", "timestep=\"1e-3\"", "steps of 0.002 s; expected 0.001 s");
   refused("tactile name=\"pad\"", "tactile name=\"skin\"", "no sensor is named 'skin'");
+  refused(
+      "<actuator>",
+      "<randomize><tactile name=\"pad\" field=\"mu\" uniform=\"0.4 0.6\"/></randomize><actuator>",
+      "<randomize> with a recording");
   guess("kn=\"6\"", "kn=\"5\"");
   EXPECT_THAT(identify(Words{"--env", "2"} + kn).err, HasSubstr("environments 0 to 1"));
   EXPECT_THAT(identify(Words{"--noise", "0.1"} + kn).err, HasSubstr("with a recording"));
@@ -104,26 +108,19 @@ TEST_F(Recorded, ARecordingOfALaterPartIsRefused) {
   EXPECT_THAT(r.err, HasSubstr("expected a recording that begins where the scene does"));
 }
 
-TEST_F(Recorded, TheLastFieldAloneIsRefused) {
-  ASSERT_EQ(run(folder,
-                {"simulate", scene("identify_ball.xml"), "-o", "final.h5", "--record", "pad/final"})
-                .exit_code,
-            0);
-  const Outcome r = run(
-      folder, {"identify", scene("identify_ball.xml"), "final.h5", "--number", "tactile pad kn"});
-  EXPECT_EQ(r.exit_code, 2);
-  EXPECT_THAT(r.err, HasSubstr("sensor 'pad'"));
-}
-
-TEST_F(Recorded, PressureAloneIsRefused) {
-  ASSERT_EQ(run(folder, {"simulate", scene("identify_ball.xml"), "-o", "pressure.h5", "--record",
-                         "pad.pressure"})
-                .exit_code,
-            0);
-  const Outcome r = run(folder, {"identify", scene("identify_ball.xml"), "pressure.h5", "--number",
-                                 "tactile pad kn"});
-  EXPECT_EQ(r.exit_code, 2);
-  EXPECT_THAT(r.err, HasSubstr("expected whole fields"));
+TEST_F(Recorded, PartsOfFieldsAreRefused) {
+  const auto refused = [&](const char* record, const char* words) {
+    ASSERT_EQ(run(folder, {"simulate", scene("identify_ball.xml"), "-o", "part.h5", "--overwrite",
+                           "--record", record})
+                  .exit_code,
+              0);
+    const Outcome r = run(
+        folder, {"identify", scene("identify_ball.xml"), "part.h5", "--number", "tactile pad kn"});
+    EXPECT_EQ(r.exit_code, 2);
+    EXPECT_THAT(r.err, HasSubstr(words));
+  };
+  refused("pad/final", "sensor 'pad'");
+  refused("pad.pressure", "expected whole fields");
 }
 
 TEST(Identify, SaysWhatIsWrong) {
