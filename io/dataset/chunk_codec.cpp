@@ -138,10 +138,12 @@ std::vector<ChunkPlan> chunk_plans(const DatasetLayout& layout) {
   const std::size_t width = layout.single ? sizeof(float) : sizeof(double);
   double together = 0;
   for (const auto& shape : shapes) together += static_cast<double>(numbers_of(shape) * width);
+  const std::vector<DatasetSample> samples = layout.samples();
   std::vector<ChunkPlan> plans;
+  plans.reserve(shapes.size() + samples.size());
   for (const auto& shape : shapes)
     plans.push_back(chunk_plan(layout, shape, numbers_of(shape) * width, together));
-  for (const DatasetSample& sample : layout.samples())
+  for (const DatasetSample& sample : samples)
     plans.push_back(chunk_plan(layout, sample.shape, numbers_of(sample.shape) * width, 1));
   return plans;
 }

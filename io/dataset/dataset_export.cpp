@@ -77,7 +77,7 @@ class CsvExport {
   void write_header(const h5::Id& demo, const h5::Id& scene) {
     std::string line = "episode,row";
     const auto add_names = [&](const std::string& prefix, const std::vector<std::string>& names) {
-      for (const std::string& name : names) line += "," + prefix + name;
+      for (const std::string& name : names) line += fmt::format(",{}{}", prefix, name);
     };
     add_names("actions/", h5::read_texts(scene, "action_names"));
     line += ",rewards,dones";

@@ -62,6 +62,7 @@ void check_set_name(const std::string& name) {
 template <class T>
 std::vector<T> chosen(const std::vector<T>& all, const std::vector<std::size_t>& places) {
   std::vector<T> some;
+  some.reserve(places.size());
   for (const std::size_t k : places) some.push_back(all[k]);
   return some;
 }
@@ -166,14 +167,15 @@ double DatasetLayout::episode_bytes() const {
   double of_gradients = 0;
   for (const GradientArray& array : gradients)
     of_gradients += sizeof(double) * static_cast<double>(array.width()) * (array.by_row ? r : 1);
-  return ((r + 1) * numbers + of_samples) * (single ? sizeof(float) : sizeof(double)) +
-         r * (of_actions + kRewardAndDone) + of_gradients;
+  const auto width = static_cast<double>(single ? sizeof(float) : sizeof(double));
+  return ((r + 1) * numbers + of_samples) * width + r * (of_actions + kRewardAndDone) +
+         of_gradients;
 }
 
 std::int64_t DatasetLayout::episodes_per_shard() const {
   const double blocks = shard_bytes / (episode_bytes() * kBlockEpisodes);
-  constexpr double kMostBlocks = kMostEpisodes / kBlockEpisodes;
-  return static_cast<std::int64_t>(std::clamp(blocks, 1.0, kMostBlocks)) * kBlockEpisodes;
+  constexpr std::int64_t kMostBlocks = kMostEpisodes / kBlockEpisodes;
+  return static_cast<std::int64_t>(std::clamp(blocks, 1.0, double{kMostBlocks})) * kBlockEpisodes;
 }
 
 std::int64_t DatasetLayout::shard_count() const {

@@ -43,15 +43,11 @@ class ShownObservations {
   /// `skipped`: rows of obs to leave out before final_obs follows. Appends the contents.
   ShownObservations(Bytes& out, std::uint64_t base, std::span<const DemoArray> arrays,
                     std::string_view file, std::span<const LinkedDemo> demos, std::uint64_t skipped)
-      : out_(out), base_(base), arrays_(arrays), skipped_(skipped) {
-    std::vector<std::string> texts;
-    for (const LinkedDemo& demo : demos)
-      for (const DemoArray& array : arrays)
-        if (has_numbers(array)) texts.push_back(text(file, demo, array));
-    out.align();
-    texts_ = base + out.size();
-    h5::add_texts(out, std::vector<std::string_view>(texts.begin(), texts.end()));
-  }
+      : out_(out),
+        base_(base),
+        arrays_(arrays),
+        skipped_(skipped),
+        texts_(add_texts(file, demos)) {}
 
   /// Appends the datasets of the next demo. Returns links to them.
   std::vector<h5::FileLink> add(const DemoFacts& facts) {
@@ -73,6 +69,17 @@ class ShownObservations {
   }
 
  private:
+  /// Returns the address of the texts.
+  std::uint64_t add_texts(std::string_view file, std::span<const LinkedDemo> demos) {
+    std::vector<std::string> texts;
+    for (const LinkedDemo& demo : demos)
+      for (const DemoArray& array : arrays_)
+        if (has_numbers(array)) texts.push_back(text(file, demo, array));
+    out_.align();
+    const std::uint64_t address = base_ + out_.size();
+    h5::add_texts(out_, std::vector<std::string_view>(texts.begin(), texts.end()));
+    return address;
+  }
   [[nodiscard]] std::uint64_t rows(const DemoFacts& facts) const {
     return static_cast<std::uint64_t>(facts.rows) + 1 - skipped_;
   }
@@ -88,9 +95,9 @@ class ShownObservations {
   }
 
   Bytes& out_;
-  std::uint64_t base_, texts_ = 0;
+  std::uint64_t base_;
   std::span<const DemoArray> arrays_;
-  std::uint64_t skipped_;
+  std::uint64_t skipped_, texts_;
   std::uint32_t next_ = 0;
 };
 

@@ -19,6 +19,7 @@ std::vector<std::string> copy(std::span<const std::string> texts) {
 std::vector<std::string> chosen_names(const Model& model, const std::vector<int>& chosen) {
   if (chosen.empty()) return copy(model.body_names());
   std::vector<std::string> names;
+  names.reserve(chosen.size());
   for (const int body : chosen) names.push_back(model.body_names()[static_cast<std::size_t>(body)]);
   return names;
 }

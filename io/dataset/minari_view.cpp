@@ -30,7 +30,7 @@ constexpr std::uint64_t kMostNumbers = std::uint64_t{1} << 18;
 /// written: tangere/NAME-v0 or tangere/TASK/NAME-v0.
 std::string id_said(const std::string& folder, const h5::Id& scene) {
   constexpr std::string_view kBegin = "tangere/", kEnd = "-v0", kPlain = "-_";
-  const std::string id = h5::read_text(scene, "dataset_id");
+  std::string id = h5::read_text(scene, "dataset_id");
   const bool plain = std::all_of(id.begin(), id.end(), [&](char c) {
     return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '/' ||
            kPlain.find(c) != std::string_view::npos;

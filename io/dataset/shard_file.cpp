@@ -40,11 +40,6 @@ ShardFile::ShardFile(const std::string& path, const DatasetLayout& layout, const
       dones_(no_rewards_.size(), 0) {
   dones_.back() = 1;
   describe();
-  texts_ = h5::aligned(part_.size());
-  const h5::Bytes texts = format_.texts();
-  placed_.add(texts_, texts.all(), {"texts of demos"});
-  placed_.flush();
-  begin_ = free_ = texts_ + texts.size();
 }
 
 void ShardFile::describe() {
@@ -53,6 +48,11 @@ void ShardFile::describe() {
   h5::write_scalar<std::int64_t>(file_, "first_episode", first_episode_);
   h5::write_scalar<std::int64_t>(file_, "episodes", end_ - first_episode_);
   h5::close_file(file_, part_.path());
+  texts_ = h5::aligned(part_.size());
+  const h5::Bytes texts = format_.texts();
+  placed_.add(texts_, texts.all(), {"texts of demos"});
+  placed_.flush();
+  begin_ = free_ = texts_ + texts.size();
 }
 
 ShardFile::Block& ShardFile::block_of(const EpisodeRows& rows) {

@@ -168,9 +168,11 @@ void PartFile::write(std::string_view bytes) {
 void PartFile::write_at(std::uint64_t offset, std::span<const NamedBytes> pieces) {
   constexpr std::size_t kMostPieces = 1024;  // IOV_MAX of Linux
   std::vector<iovec> left;
+  left.reserve(pieces.size());
   for (std::uint64_t at = offset; const NamedBytes& piece : pieces) {
     written_->add(at, piece.bytes, piece.what);
     at += piece.bytes.size();
+    // NOLINTNEXTLINE(cppcoreguidelines-pro-type-const-cast): iovec is also for reads
     left.push_back({const_cast<unsigned char*>(piece.bytes.data()), piece.bytes.size()});
   }
   for (std::span<iovec> next = left; !next.empty();) {

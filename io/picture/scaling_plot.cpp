@@ -29,17 +29,23 @@ std::string short_number(double x) {
   return fmt::format("{:.3g}", x);
 }
 
+std::vector<ScalingPoint> by_threads(std::vector<ScalingPoint> points) {
+  std::sort(points.begin(), points.end(),
+            [](const auto& a, const auto& b) { return a.threads < b.threads; });
+  return points;
+}
+
 class Picture {
  public:
-  explicit Picture(const ScalingCurve& curve) : curve_(curve), points_(curve.points) {
-    std::sort(points_.begin(), points_.end(),
-              [](const auto& a, const auto& b) { return a.threads < b.threads; });
-    slope_ = points_.front().best / points_.front().threads;
-    most_threads_ = points_.back().threads;
-    highest_ = slope_ * most_threads_;
+  explicit Picture(const ScalingCurve& curve)
+      : curve_(curve),
+        points_(by_threads(curve.points)),
+        slope_(points_.front().best / points_.front().threads),
+        most_threads_(points_.back().threads),
+        highest_(slope_ * most_threads_),
+        top_(svg::kHead + svg::kLine * static_cast<double>(curve.captions.size()) + 12) {
     for (const ScalingPoint& p : points_) highest_ = std::max(highest_, p.best);
     highest_ *= 1.06;  // so that the frame does not cut the highest dot
-    top_ = svg::kHead + svg::kLine * static_cast<double>(curve.captions.size()) + 12;
   }
 
   std::string draw() {
@@ -112,8 +118,8 @@ class Picture {
 
   const ScalingCurve& curve_;
   std::vector<ScalingPoint> points_;  // sorted by threads
-  double slope_ = 0;                  // of the ideal line [1/s per thread]
-  double most_threads_ = 1, highest_ = 1, top_ = 0;
+  double slope_;                      // of the ideal line [1/s per thread]
+  double most_threads_, highest_, top_;
   std::string out_;
 };
 

@@ -25,14 +25,15 @@ constexpr const char* kSmall = "font-size=\"11\"";
 
 class SharePicture {
  public:
-  explicit SharePicture(const ShareBars& shares) : shares_(shares) {
+  explicit SharePicture(const ShareBars& shares)
+      : shares_(shares),
+        top_(svg::kHead + svg::kLine * static_cast<double>(shares.captions.size()) + 12),
+        bottom_(top_ + kRow * static_cast<double>(shares.bars.size())) {
     for (const ShareBar& bar : shares.bars) {
       low_ = std::min(low_, bar.share - bar.spread);
       high_ = std::max(high_, bar.share + bar.spread);
     }
     high_ = std::max(high_, 0.01);
-    top_ = svg::kHead + svg::kLine * static_cast<double>(shares.captions.size()) + 12;
-    bottom_ = top_ + kRow * static_cast<double>(shares.bars.size());
   }
 
   std::string draw() {
@@ -89,7 +90,7 @@ class SharePicture {
   }
 
   const ShareBars& shares_;
-  double low_ = 0, high_ = 0, top_ = 0, bottom_ = 0;
+  double low_ = 0, high_ = 0, top_, bottom_;
   std::string out_;
 };
 

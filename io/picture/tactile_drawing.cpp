@@ -30,7 +30,7 @@ Vector3 direction(const std::vector<TactilePoint>& points, std::size_t which) {
 }
 
 double extent(const std::vector<TactilePoint>& points, const Vector3& along) {
-  double low = INFINITY, high = -INFINITY;
+  double low = HUGE_VAL, high = -HUGE_VAL;
   for (const TactilePoint& p : points)
     if (has_pixel(p))
       low = std::min(low, dot(p.position, along)), high = std::max(high, dot(p.position, along));

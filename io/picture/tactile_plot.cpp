@@ -107,9 +107,9 @@ class Picture {
         with_shear_(file.has_shear(sensor)),
         drawing_(drawing_of(s_)),
         panels_(std::move(panels)),
-        environment_(environment) {
-    height_m_ = drawing_.height;
-    width_m_ = drawing_.width;
+        environment_(environment),
+        width_m_(drawing_.width),
+        height_m_(drawing_.height) {
     if (!(height_m_ > 0)) height_m_ = width_m_ > 0 ? width_m_ : 1e-3;
     if (!(width_m_ > 0)) width_m_ = height_m_;
     const double scale = kPanel / std::max(width_m_, height_m_);
@@ -271,7 +271,7 @@ class Picture {
   TactileDrawing drawing_;
   std::vector<Panel> panels_;
   std::int64_t environment_;
-  double width_m_ = 0, height_m_ = 0, width_ = 0, height_ = 0;
+  double width_m_, height_m_, width_ = 0, height_ = 0;
   double low_ = 0, high_ = 0, longest_ = 0;
   std::string out_;
 };

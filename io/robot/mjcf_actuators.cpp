@@ -81,7 +81,7 @@ class Actuators {
         return "";
       }
     const char* const attribute = node.has("jointinparent") ? "jointinparent" : "joint";
-    const std::string name = node.text(attribute);
+    std::string name = node.text(attribute);
     std::vector<std::string> names;
     for (const auto& [known, joint] : file_.joints) names.push_back(known);
     if (!file_.joints.contains(name))

@@ -262,7 +262,7 @@ RobotNode MjcfFile::with_class(const RobotNode& node, const std::string& inherit
 }
 
 std::string MjcfFile::known_class(const RobotNode& node, const char* attribute) {
-  const std::string name = node.text(attribute);
+  std::string name = node.text(attribute);
   if (name == "main" || classes_.contains(name)) return name;
   std::vector<std::string> all;
   for (const auto& [known, context] : classes_) all.push_back(known);

@@ -29,7 +29,7 @@ bool same_file(const std::string& a, const std::string& b) {
 void refuse_rings(const SceneNode& include, const std::string& path) {
   std::string way = path;
   for (const SceneContext* c = &include.context(); c != nullptr; c = c->includer) {
-    way = c->file + " includes " + way;
+    way = fmt::format("{} includes {}", c->file, way);
     if (same_file(c->file, path)) include.fail("files that include each other: " + way);
   }
 }

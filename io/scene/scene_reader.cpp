@@ -216,6 +216,7 @@ void read_defaults(const SceneNode& node) {
       {"motor", {"P", "D", "ctrl_range", "timing"}},
       {"endeffector", {"radius", "rgba"}}};
   std::vector<std::string> names;
+  names.reserve(known.size());
   for (const auto& [name, attributes] : known) names.push_back(name);
   for (const SceneNode& child : node.children(names)) {
     const std::vector<std::string>& attributes = known.at(child.name());

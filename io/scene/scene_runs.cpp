@@ -240,6 +240,7 @@ void read_coefficient_variation(const Scene& scene, const SceneNode& node,
   }
   node.check_attributes(attributes);
   std::vector<std::string> fields;
+  fields.reserve(kCoefficients);
   for (int k = 0; k < kCoefficients; ++k)
     fields.emplace_back(number_kind(n.owner, coefficient_field(k)).name);
   n.field = coefficient_field(int(node.choice("field", fields)));

@@ -101,7 +101,7 @@ std::vector<TactilePoint> read_spec(const SceneNode& node, double length) {
 std::vector<TactilePoint> read_surface(const SceneNode& node, double length) {
   const MeshShape mesh = read_mesh(node, length);
   const double pitch = node.positive("pitch") * length;
-  const std::vector<TactilePoint> points = mesh_points(mesh, pitch, kMostPoints);
+  std::vector<TactilePoint> points = mesh_points(mesh, pitch, kMostPoints);
   if (points.empty())
     node.fail(fmt::format("pitch of {} m: more than {} points; expected a larger one", pitch,
                           kMostPoints));

@@ -198,9 +198,9 @@ class TrajectoryView {
     ViewTrace trace{"solver status", "status", "1", {}};
     std::int64_t next = 0;
     for (const std::int64_t row : frames_of(std::ssize(state_steps_), data_.stride)) {
-      int worst = 0;
+      std::int8_t worst = 0;
       for (; next < row + (listed_ ? 1 : 0); ++next) {  // listed: of the step that ends at a row
-        const int value = values[static_cast<std::size_t>(next)];
+        const std::int8_t value = values[static_cast<std::size_t>(next)];
         if (value < 0 ? worst >= 0 || value < worst : worst >= 0 && value > worst) worst = value;
       }
       trace.values.push_back(static_cast<float>(worst));
