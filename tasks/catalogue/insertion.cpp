@@ -293,8 +293,8 @@ void Insertion::scripted(const TaskView& view, std::span<const double> o,
                  : -1;  // rows of the left pad go up, those of the right pad down; columns to -y
     for (std::size_t p = 0; p < kPoints; ++p) {
       const double fz = sign * o[2 * pad * kPoints + p], fy = -o[(2 * pad + 1) * kPoints + p];
-      const double z = sign * (static_cast<double>(p / kCols) - 6),
-                   y = 4.5 - static_cast<double>(p % kCols);
+      const std::size_t row = p / kCols, col = p % kCols;
+      const double z = sign * (static_cast<double>(row) - 6), y = 4.5 - static_cast<double>(col);
       up[pad] += fz;
       moment += y * fz - z * fy;
       square += y * y + z * z;

@@ -20,7 +20,6 @@ namespace {
 
 constexpr int kBlocks = 11, kRows = 13, kCols = 10, kPads = 2;
 constexpr int kSteps = 180, kLook = 60, kGrasps = 10;
-constexpr double kBlock = 0.025;                   // edge of a block [m]
 constexpr double kReach = 0.05, kFarthest = 0.11;  // reach of an action and of the hand [m]
 constexpr double kLevel = 0.02, kLifted = 5e-3;    // [rad], [m]
 constexpr double kSuccess = 100, kTilt = 10;       // of the reward

@@ -38,6 +38,7 @@ double lower_quartile(std::vector<double> times) {
 
 double lower_quartile(const std::vector<double>& times, const std::vector<std::size_t>& which) {
   std::vector<double> drawn;
+  drawn.reserve(which.size());
   for (const std::size_t k : which) drawn.push_back(times[k]);
   return lower_quartile(std::move(drawn));
 }

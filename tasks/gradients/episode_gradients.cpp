@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <memory>
+#include <numeric>
 
 #include "engine/base/as_size.hpp"
 #include "engine/derivative/number_gradients.hpp"
@@ -244,8 +245,8 @@ EpisodeGradients task_jacobians(const Task& task, const TaskActions& actions,
               ActionRecord(task)});
   return [&task, &actions, &run, s](std::int64_t first, int episodes, auto& out) {
     const std::int64_t rows = task.spec().horizon;
-    std::vector<std::int64_t> numbers;
-    for (int e = 0; e < episodes; ++e) numbers.push_back(first + e);
+    std::vector<std::int64_t> numbers(as_size(episodes));
+    std::iota(numbers.begin(), numbers.end(), first);
     s->rollout.start(run.seed, numbers);
     for (std::int64_t a = 0; a < rows && s->rollout.running(); ++a) {
       s->rollout.choose(actions, s->record);

@@ -290,6 +290,7 @@ class LossChecker : public GradientChecker {
     const std::span<const double> all =
         std::span(g_.points).first(std::size_t(tactile_points(model_) * kPointNumbers));
     std::vector<double> gradient;
+    gradient.reserve(changes.size());
     for (const PointChange& c : changes)
       gradient.push_back(std::inner_product(
           c.own.begin(), c.own.end(),

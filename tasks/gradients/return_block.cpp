@@ -4,6 +4,7 @@
 #include "tasks/gradients/return_block.hpp"
 
 #include <algorithm>
+#include <numeric>
 
 #include "engine/base/as_size.hpp"
 
@@ -32,8 +33,8 @@ double ReturnBlock::bytes(const Task& task, const TaskGradientOptions& options) 
 
 void ReturnBlock::run(std::int64_t first, int count, const TaskActions& actions, std::int64_t to,
                       TaskGradients& out, std::vector<FailedEnvironment>& failures) {
-  std::vector<std::int64_t> episodes;
-  for (int e = 0; e < count; ++e) episodes.push_back(first + e);
+  std::vector<std::int64_t> episodes(as_size(count));
+  std::iota(episodes.begin(), episodes.end(), first);
   start(options_.seed, episodes);
   choose_ = &actions;
   lost_.clear();

@@ -3,6 +3,7 @@
 #include "tasks/gradients/tape_block.hpp"
 
 #include <algorithm>
+#include <numeric>
 
 #include "engine/base/as_size.hpp"
 #include "tasks/run/number_row.hpp"
@@ -38,8 +39,8 @@ TapeBlock::TapeBlock(const ActionTapes& tapes, Precision precision, bool paramet
 }
 
 void TapeBlock::start(std::uint64_t seed, std::int64_t first) {
-  std::vector<std::int64_t> episodes;
-  for (int l = 0; l < lanes_; ++l) episodes.push_back(first + l);
+  std::vector<std::int64_t> episodes(as_size(lanes_));
+  std::iota(episodes.begin(), episodes.end(), first);
   ActionBlock::start(seed, episodes);
   start_forward();
   took_.fill(false);

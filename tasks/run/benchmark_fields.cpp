@@ -57,9 +57,9 @@ double bytes_of(const SensorInfo& sensor, FieldForm form, FrameKind kind) {
   if (form == FieldForm::sum) return sizeof(FieldSum);
   if (kind == FrameKind::dense)
     return static_cast<double>(numbers_of(sensor.points, form) * sizeof(T));
-  const double tiles = double((sensor.rows + kTileSide - 1) / kTileSide) *
-                       ((sensor.cols + kTileSide - 1) / kTileSide);
-  return tiles * (3.0 * kTileSide * kTileSide * sizeof(T) + sizeof(int));
+  const auto tiles_along = [](int points) { return (points + kTileSide - 1) / kTileSide; };
+  return double(tiles_along(sensor.rows)) * tiles_along(sensor.cols) *
+         (3.0 * kTileSide * kTileSide * sizeof(T) + sizeof(int));
 }
 
 }  // namespace
