@@ -184,18 +184,19 @@ struct DualStage::Impl {
     const kernels::Frame<D> second = relative(one.world, two.world),
                             shape = compose(second, kernels::broadcast<D>(of.contact.frame2));
     const kernels::Vec6<D> twist = motion_to_parent(second, two.V) - one.V;
-    const auto loaded = [&](const kernels::ContactParameters& p) -> Coefficients<D> {
+    const auto loaded = [&](const kernels::ContactParameters& p) {
       return kernels::load_law<D>(p, of.contact.law, of.contact.ramp, block.data(), 0);
     };
-    const Coefficients<D> law = of.pair >= 0 ? loaded(pairs[std::size_t(of.pair)].parameters)
-                                : of.ground  ? loaded(grounds[ground_of(of)].parameters)
-                                             : sensor_laws[std::size_t(of.sensor)];
+    const kernels::LawParameters<D> law =
+        of.pair >= 0 ? loaded(pairs[std::size_t(of.pair)].parameters)
+        : of.ground  ? loaded(grounds[ground_of(of)].parameters)
+                    : kernels::LawParameters<D>{sensor_laws[std::size_t(of.sensor)], of.contact.law,
+                                                of.contact.ramp};
     // Tangents of sizes are not carried: no gradient is taken by sizes where friction remembers.
     D radius(0.0);
     if (of.ground)
       radius = D(kernels::ground_radius<D>(grounds[ground_of(of)], block.data(), 0).value);
-    return {shape.R, shape.p,  twist.a, twist.l, {law, of.contact.law, of.contact.ramp},
-            radius,  of.ground};
+    return {shape.R, shape.p, twist.a, twist.l, law, radius, of.ground};
   }
 
   /// Calls f with the shape that a contact touches.

@@ -39,7 +39,6 @@ AdjointWorkspace<L>::AdjointWorkspace(const CompiledModel& model, int loss_count
   for (Row** p : {&rhs, &lambda, &nu, &mass_lambda, &target, &difference, &q_centre, &v_centre})
     take(*p, nv);
   for (Row** p : {&q_older, &v_older}) take(*p, (1 + inner) * nv);
-  numbers = nullptr;
   for (LossRows<L>& l : losses) l.parameters = nullptr;
   if (!parameters) return;
   take(numbers, count);

@@ -22,7 +22,7 @@ struct AdjointWorkspace {
   // One stage: the system, and what it hands on in all lanes before some are picked.
   Row *rhs, *lambda, *nu, *mass_lambda, *target, *difference, *q_centre, *v_centre;
   Row *q_older, *v_older;  ///< (nv) for each state that a stage may depend on, one after another
-  Row* numbers;            ///< (parameter_numbers), or null
+  Row* numbers = nullptr;  ///< (parameter_numbers), or null
   Row sound;
   MemoryAdjoint<L> memory_adjoint;
   AlignedVector<Row> q_stage;  ///< (nq) coordinates of the stage in hand

@@ -4,6 +4,7 @@
 #include "engine/model/frames.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <iterator>
 
@@ -81,8 +82,9 @@ kernels::DofEffects dof_effects(const JointEffects& e, double rest) {
   out.limit_stiffness = {e.limit_stiffness, -1};
   out.P = out.D = {0, -1};
   out.rest = rest;
-  out.low = e.limits ? (*e.limits)[0] : -kNone;
-  out.high = e.limits ? (*e.limits)[1] : kNone;
+  const auto [low, high] = e.limits.value_or(std::array{-kNone, kNone});
+  out.low = low;
+  out.high = high;
   out.force_low = -kNone;
   out.force_high = kNone;
   return out;

@@ -16,7 +16,7 @@ void split(const std::vector<double>& points, std::vector<int>& order, std::size
            std::size_t end, int tile) {
   if (end - begin <= std::size_t(tile)) return;
   double low[3], high[3];
-  for (int a = 0; a < 3; ++a) low[a] = INFINITY, high[a] = -INFINITY;
+  for (int a = 0; a < 3; ++a) low[a] = HUGE_VAL, high[a] = -HUGE_VAL;
   for (std::size_t k = begin; k < end; ++k)
     for (int a = 0; a < 3; ++a) {
       low[a] = std::min(low[a], points[3 * order[k] + a]);
@@ -50,7 +50,7 @@ std::vector<double> sort_into_tiles(std::vector<double>& points, int tile,
   for (std::size_t begin = 0; begin < n; begin += std::size_t(tile)) {
     const std::size_t end = std::min(n, begin + std::size_t(tile));
     double low[3], high[3], centre[3];
-    for (int a = 0; a < 3; ++a) low[a] = INFINITY, high[a] = -INFINITY;
+    for (int a = 0; a < 3; ++a) low[a] = HUGE_VAL, high[a] = -HUGE_VAL;
     for (std::size_t k = begin; k < end; ++k)
       for (int a = 0; a < 3; ++a)
         low[a] = std::min(low[a], points[3 * k + a]),

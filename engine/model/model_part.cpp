@@ -122,6 +122,7 @@ class Filter {
 
 std::vector<int> trees_of(const std::vector<kernels::Link>& links) {
   std::vector<int> tree;
+  tree.reserve(links.size());
   int trees = 0;
   for (const kernels::Link& l : links)
     tree.push_back(l.parent < 0 ? trees++ : tree[std::size_t(l.parent)]);

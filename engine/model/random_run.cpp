@@ -23,8 +23,11 @@ inline float logarithm(float x) {
   return e * std::numbers::ln2_v<float> + 2 * s * sum;
 }
 
-/// Fills cosine and sine of 2π word/2³².
-inline void cosine_and_sine(std::uint32_t word, float& cosine, float& sine) {
+struct CosineAndSine {
+  float cosine, sine;
+};
+/// Returns those of 2π word/2³².
+inline CosineAndSine cosine_and_sine(std::uint32_t word) {
   const std::uint32_t quarter = (word + 0x20000000U) >> 30;
   const auto rest = static_cast<float>(static_cast<std::int32_t>(word - (quarter << 30)));
   const float x = rest * (2 * std::numbers::pi_v<float> * 0x1p-32F), z = x * x;
@@ -34,8 +37,7 @@ inline void cosine_and_sine(std::uint32_t word, float& cosine, float& sine) {
   s *= x;
   const bool odd = (quarter & 1U) != 0;
   const float a = odd ? s : c, b = odd ? c : s;
-  cosine = ((quarter + 1) & 2U) != 0 ? -a : a;
-  sine = (quarter & 2U) != 0 ? -b : b;
+  return {((quarter + 1) & 2U) != 0 ? -a : a, (quarter & 2U) != 0 ? -b : b};
 }
 
 }  // namespace
@@ -65,8 +67,7 @@ void normal_run(const RandomWords& words, RandomNormals& normals) {
     for (int l = 0; l < kRandomRun; ++l) {
       const auto a = static_cast<float>(static_cast<std::int32_t>(words[pair][l] >> 1));
       const float radius = std::sqrt(-2 * logarithm((a + 0.5F) * 0x1p-31F));
-      float cosine, sine;
-      cosine_and_sine(words[pair + 1][l], cosine, sine);
+      const auto [cosine, sine] = cosine_and_sine(words[pair + 1][l]);
       normals[pair][l] = radius * cosine;
       normals[pair + 1][l] = radius * sine;
     }

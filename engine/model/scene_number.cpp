@@ -82,7 +82,8 @@ bool with_law(const Scene& scene, const SceneNumber& n, const Function& f) {
 const double* of_body(const BodyDescription& body, const SceneNumber& n) {
   if (n.field == Field::density) return &body.density;
   if (n.field != Field::mass)
-    return size_number(const_cast<Shape&>(body.shape), size_index(n));  // returned as const
+    // NOLINTNEXTLINE(cppcoreguidelines-pro-type-const-cast): returned as const
+    return size_number(const_cast<Shape&>(body.shape), size_index(n));
   const auto* const abstract = std::get_if<AbstractShape>(&body.shape);
   return abstract == nullptr ? nullptr : &abstract->mass;
 }
@@ -136,6 +137,11 @@ const double* find_number(const Scene& scene, const SceneNumber& n) {
 [[noreturn]] void fail_to_find(const Scene& scene, const SceneNumber& number) {
   throw InputError((scene.path.empty() ? "" : scene.path + ": ") + "the scene has no number '" +
                    name_of(number) + "'");
+}
+const double& found_number(const Scene& scene, const SceneNumber& number) {
+  const double* const found = find_number(scene, number);
+  if (found == nullptr) fail_to_find(scene, number);
+  return *found;
 }
 
 }  // namespace
@@ -195,13 +201,12 @@ std::string unit_of(const Scene& scene, const SceneNumber& n) {
 }
 
 double& number_in(Scene& scene, const SceneNumber& number) {
-  const double* const found = find_number(scene, number);
-  if (found == nullptr) fail_to_find(scene, number);
-  return const_cast<double&>(*found);  // the scene is not const
+  // NOLINTNEXTLINE(cppcoreguidelines-pro-type-const-cast): the scene is not const
+  return const_cast<double&>(found_number(scene, number));
 }
 
 double number_in(const Scene& scene, const SceneNumber& number) {
-  return number_in(const_cast<Scene&>(scene), number);  // only read
+  return found_number(scene, number);
 }
 
 int randomization_of(const Scene& scene, const SceneNumber& number) {

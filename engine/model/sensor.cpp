@@ -56,8 +56,9 @@ void place_tiles(CompiledSensor& s, const Lattice& lattice) {
     s.tile_kind.push_back(kind);
     double square = 0;
     for (int k = 0; k < kernels::kTactileTile; ++k) {
-      if (k / kSide >= rows || k % kSide >= cols) continue;
-      const double di = k / kSide - 0.5 * (rows - 1), dj = k % kSide - 0.5 * (cols - 1);
+      const int row = k / kSide, col = k % kSide;
+      if (row >= rows || col >= cols) continue;
+      const double di = row - 0.5 * (rows - 1), dj = col - 0.5 * (cols - 1);
       const double at[2] = {di * lattice.row_x + dj * lattice.col_x,
                             di * lattice.row_y + dj * lattice.col_y};
       for (int c = 0; c < 2; ++c) {

@@ -379,7 +379,8 @@ std::vector<double> contact_points(const Shape& shape) {
 kernels::Vec3<double> kernels_size(const Shape& shape) {
   kernels::Vec3<double> size{};
   for (const SizeNumber& s : row_of(shape).sizes)
-    (&size.x)[s.component] = s.scale * *s.at(const_cast<Shape&>(shape));  // only read
+    // NOLINTNEXTLINE(cppcoreguidelines-pro-type-const-cast): only read
+    (&size.x)[s.component] = s.scale * *s.at(const_cast<Shape&>(shape));
   return size;
 }
 

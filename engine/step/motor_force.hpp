@@ -24,17 +24,16 @@ inline double force_at_start(const CompiledModel& m, const CompiledMotor& motor,
   const auto number = [&](const kernels::Parameter& p) { return p.row < 0 ? p.value : row(p.row); };
   const kernels::Link& link = m.links[std::size_t(motor.link)];
   const int q = m.layout.q + link.q;
-  double error;
-  if (link.kind == kernels::JointKind::spherical) {  // from q to the target, in body axes
+  const auto to_target = [&] {
+    if (link.kind != kernels::JointKind::spherical)
+      return u[motor.component] - row(q + motor.component);
     const kernels::Quat<double> here = {row(q), row(q + 1), row(q + 2), row(q + 3)};
     const kernels::Quat<double> there =
         kernels::quaternion_exp(kernels::Vec3<double>{u[0], u[1], u[2]});
-    const kernels::Vec3<double> way = rotation_log(conjugate(here) * there);
-    error = motor.component == 0 ? way.x : motor.component == 1 ? way.y : way.z;
-  } else {
-    error = u[motor.component] - row(q + motor.component);
-  }
-  return std::clamp(number(motor.P) * error - number(motor.D) * row(m.layout.v + motor.dof),
+    const kernels::Vec3<double> way = rotation_log(conjugate(here) * there);  // in body axes
+    return motor.component == 0 ? way.x : motor.component == 1 ? way.y : way.z;
+  };
+  return std::clamp(number(motor.P) * to_target() - number(motor.D) * row(m.layout.v + motor.dof),
                     motor.low, motor.high);
 }
 

@@ -15,15 +15,12 @@ inline kernels::Vec3<double> rotation_log(kernels::Quat<double> q) {
   if (q.w < 0) q = {-q.w, -q.x, -q.y, -q.z};
   const kernels::Vec3<double> u = {q.x, q.y, q.z};
   const double square = dot(u, u);
-  double factor;
   if (square < 1e-4) {
     const double r = square / (q.w * q.w);
-    factor = 2 / q.w * (1 - r * (1.0 / 3 - r * (1.0 / 5 - r * (1.0 / 7 - r / 9))));
-  } else {
-    const double length = std::sqrt(square);
-    factor = 2 * std::atan2(length, q.w) / length;
+    return (2 / q.w * (1 - r * (1.0 / 3 - r * (1.0 / 5 - r * (1.0 / 7 - r / 9))))) * u;
   }
-  return factor * u;
+  const double length = std::sqrt(square);
+  return (2 * std::atan2(length, q.w) / length) * u;
 }
 
 }  // namespace tangere

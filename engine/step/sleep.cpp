@@ -61,11 +61,12 @@ Sleep::Sleep(const CompiledModel& model, double share, double h)
     if (body.extent > 0) size[t] = std::min(size[t], body.extent);
   }
   const double gravity = length(model.view.gravity);
+  constexpr int kMost = std::numeric_limits<int>::max() / 2;
   for (const double s : size) {
     const bool known = std::isfinite(s);
     const double falls = known && gravity > 0 ? kFallTimes * std::sqrt(s / gravity) / h : 0;
-    const double most = std::numeric_limits<int>::max() / 2;
-    steps_.push_back(static_cast<int>(std::clamp(std::ceil(falls), double(kFewestSteps), most)));
+    steps_.push_back(
+        static_cast<int>(std::clamp(std::ceil(falls), double(kFewestSteps), double(kMost))));
     limit_.push_back(known ? share * s / steps_.back() : 0);
   }
   for (const CompiledMotor& motor : model.motors)
