@@ -174,11 +174,8 @@ Command add_accuracy(CLI::App& program) {
   add_whole_number<std::int64_t>(app, "--steps", o.steps, 1, kMostSteps,
                                  "Length in steps of the scene [default: as many as the controls "
                                  "last]");
-  add_text(app, "--controls", o.controls, "U.csv",
-           "Table of controls, one row per step of the scene; for a task, of actions");
-  add_text(
-      app, "--policy", o.policy, "NAME",
-      "Policy of a task: random, hold, csv (needs --controls) or scripted [default: scripted]");
+  add_controls_option(app, o.controls);
+  add_policy_option(app, o.policy);
   add_positive_number(app, "--tol", o.tolerance,
                       "Tolerance of every setting [default: the one that follows the step]");
   add_whole_number<int>(app, "--threads", o.threads, 1, kMostThreads,
@@ -188,8 +185,7 @@ Command add_accuracy(CLI::App& program) {
   add_text(app, "--svg", o.svg, "F.svg", "Write a picture of cost against error");
   add_text(app, "--csv", o.csv, "F.csv", "Write a table of all figures");
   add_flag(app, "--overwrite", o.overwrite, "Replace the outputs if they exist");
-  add_flag(app, "--allow-unknown", o.allow_unknown,
-           "Unknown elements and attributes of the scene are warnings, not errors");
+  add_allow_unknown_option(app, o.allow_unknown);
   add_console_options(app, *console);
   return {&app, [=](const ProgramInfo&) { return accuracy(*options, *console); }};
 }

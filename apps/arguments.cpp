@@ -239,4 +239,21 @@ void add_sleep_option(CLI::App& app, bool& sleep) {
            "Let bodies sleep that have come to rest, until something touches or moves them");
 }
 
+void add_allow_unknown_option(CLI::App& app, bool& allow) {
+  add_flag(app, "--allow-unknown", allow,
+           "Unknown elements and attributes of the scene are warnings, not errors");
+}
+
+void add_controls_option(CLI::App& app, std::string& controls) {
+  add_text(app, "--controls", controls, "U.csv",
+           "Table of controls, one row per step, in place of the scene's <control>; for a task, of "
+           "actions");
+}
+
+void add_policy_option(CLI::App& app, std::string& policy) {
+  add_text(
+      app, "--policy", policy, "NAME",
+      "Policy of a task: random, hold, csv (needs --controls) or scripted [default: scripted]");
+}
+
 }  // namespace tangere::apps

@@ -108,5 +108,11 @@ void check_not_same_file(const std::string& output, const std::string& input);
 void add_accuracy_option(CLI::App& app, std::optional<double>& accuracy);
 /// Adds --sleep, which commands have that step and take no derivatives.
 void add_sleep_option(CLI::App& app, bool& sleep);
+/// Adds --allow-unknown, which every command that reads a scene has.
+void add_allow_unknown_option(CLI::App& app, bool& allow);
+/// Adds --controls, a table that drives a scene or a task.
+void add_controls_option(CLI::App& app, std::string& controls);
+/// Adds --policy of commands that ask no program and play the script otherwise.
+void add_policy_option(CLI::App& app, std::string& policy);
 
 }  // namespace tangere::apps

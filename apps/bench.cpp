@@ -322,8 +322,7 @@ Command add_bench(CLI::App& program) {
   add_text(app, "--svg", o.svg, "F.svg", "Write a picture of speed against threads");
   add_text(app, "--csv", o.csv, "F.csv", "Write a table of all figures");
   add_flag(app, "--overwrite", o.overwrite, "Replace the outputs if they exist");
-  add_flag(app, "--allow-unknown", o.allow_unknown,
-           "Unknown elements and attributes of the scene are warnings, not errors");
+  add_allow_unknown_option(app, o.allow_unknown);
   add_console_options(app, *console);
   return {&app, [=](const ProgramInfo&) { return bench(*options, *console); }};
 }

@@ -518,9 +518,7 @@ Command add_generate(CLI::App& program) {
   add_whole_number<std::int64_t>(app, "--episodes", o.episodes, 1, kMostEpisodes,
                                  "Episodes to simulate")
       .required();
-  add_text(app, "--controls", o.controls, "U.csv",
-           "Table of controls, one row per step, in place of the scene's <control>; for a task, of "
-           "actions");
+  add_controls_option(app, o.controls);
   add_text(app, "--policy", o.policy, "NAME",
            "Policy of a task: random, hold, csv (needs --controls), program (needs --program) or "
            "scripted [default: scripted]");
@@ -584,8 +582,7 @@ Command add_generate(CLI::App& program) {
   add_flag(app, "--no-merge", o.no_merge, "Do not merge the shards when all are there");
   add_flag(app, "--dry-run", o.dry_run, "Say what would be made, and how long it may take");
   add_flag(app, "--overwrite", o.overwrite, "Replace the shards in the folder");
-  add_flag(app, "--allow-unknown", o.allow_unknown,
-           "Unknown elements and attributes of the scene are warnings, not errors");
+  add_allow_unknown_option(app, o.allow_unknown);
   add_console_options(app, *console);
   return {&app, [=](const ProgramInfo& info) { return generate(*options, *console, info); },
           [options] { return meets_other_shards(*options); }};

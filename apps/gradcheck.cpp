@@ -228,22 +228,17 @@ Command add_gradcheck(CLI::App& program) {
   add_whole_number<std::int64_t>(
       app, "--actions", o.actions, 1, kMostSteps,
       "For a task: most actions of the episode [default: as many as take 100 steps]");
-  add_text(
-      app, "--policy", o.policy, "NAME",
-      "Policy of a task: random, hold, csv (needs --controls) or scripted [default: scripted]");
+  add_policy_option(app, o.policy);
   add_whole_number<int>(app, "--every", o.every, 1, std::numeric_limits<int>::max(),
                         "Read tactile fields every N steps [default: the scene's, or 1]");
   add_whole_number<int>(
       app, "--entries", o.entries, 0, std::numeric_limits<int>::max(),
       "Derivatives of each input to compare with differences; 0: all [default: 24]");
-  add_text(app, "--controls", o.controls, "F.csv",
-           "Table of controls, one row per step, in place of the scene's <control>; for a task, of "
-           "actions");
+  add_controls_option(app, o.controls);
   add_whole_number<std::uint64_t>(
       app, "--seed", o.seed, 0, std::numeric_limits<std::uint64_t>::max(),
       "Seed of the environment or episode, of the draw and of the directions [default: 0]");
-  add_flag(app, "--allow-unknown", o.allow_unknown,
-           "Unknown elements and attributes of the scene are warnings, not errors");
+  add_allow_unknown_option(app, o.allow_unknown);
   add_console_options(app, *console);
   return {&app, [=](const ProgramInfo&) { return run(*options, *console); }};
 }

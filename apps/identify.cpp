@@ -190,7 +190,7 @@ Command add_identify(CLI::App& program) {
                                   "Of a trial: seed of the noise and of the start [default: 1]");
   add_text(app, "--svg", a.svg, "F.svg", "Write a picture of the fit");
   add_flag(app, "--overwrite", a.overwrite, "Replace the picture if it exists");
-  add_flag(app, "--allow-unknown", a.allow_unknown, "Ignore what the scene reader does not know");
+  add_allow_unknown_option(app, a.allow_unknown);
   add_console_options(app, *console);
   return {&app, [=](const ProgramInfo&) { return identify_numbers(*arguments, *console); },
           [arguments] { return !arguments->recording.empty(); }};

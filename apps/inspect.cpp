@@ -267,8 +267,7 @@ Command add_inspect(CLI::App& program) {
       add_command(program, "inspect", "Show what a scene compiles to, and what a task declares",
                   "tangere inspect scenes/rolling_ball.xml --json");
   add_text(app, "SCENE", options->scene, "", "Scene file (XML), or the name of a task").required();
-  add_flag(app, "--allow-unknown", options->allow_unknown,
-           "Unknown elements and attributes are warnings, not errors");
+  add_allow_unknown_option(app, options->allow_unknown);
   add_flag(app, "--effects", options->effects,
            "Measure what each effect of the scene costs, and print that instead");
   add_text(app, "--svg", options->svg, "F.svg", "With --effects: write a picture of it");

@@ -465,12 +465,8 @@ Command add_simulate(CLI::App& program) {
       "tangere simulate scenes/rolling_ball.xml --output ball.h5 --envs 4 --every 5 --seed 1");
   add_text(app, "SCENE", o.scene, "", "Scene file (XML), or the name of a task").required();
   add_text(app, "-o,--output", o.output, "F.h5", "HDF5 file to write").required();
-  add_text(app, "--controls", o.controls, "U.csv",
-           "Table of controls, one row per step, in place of the scene's <control>; for a task, of "
-           "actions");
-  add_text(
-      app, "--policy", o.policy, "NAME",
-      "Policy of a task: random, hold, csv (needs --controls) or scripted [default: scripted]");
+  add_controls_option(app, o.controls);
+  add_policy_option(app, o.policy);
   add_whole_number<std::int64_t>(app, "--steps", o.steps, 1, kMostSteps,
                                  "Steps to take [default: as many as the controls last]");
   add_whole_number<int>(app, "--envs", o.environments, 1, kMostEnvironments,
@@ -514,8 +510,7 @@ Command add_simulate(CLI::App& program) {
       app, "--seed", o.seed, 0, UINT64_MAX,
       "Seed of all that varies between environments [default: 0, or that of --state-from]");
   add_flag(app, "--overwrite", o.overwrite, "Replace the output if it exists");
-  add_flag(app, "--allow-unknown", o.allow_unknown,
-           "Unknown elements and attributes of the scene are warnings, not errors");
+  add_allow_unknown_option(app, o.allow_unknown);
   add_console_options(app, *console);
   return {&app, [=](const ProgramInfo& info) { return simulate(*options, *console, info); },
           [=] { return !options->state_from.empty(); }};
