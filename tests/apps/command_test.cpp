@@ -454,8 +454,8 @@ TEST(Command, InspectListsJointEffectsAndMotors) {
   EXPECT_EQ(motors[3].at("control"), "force");
   EXPECT_EQ(answer.at("u_units"), json({"rad", "rad", "rad", "rad", "m", "1", "1"}));
   for (const char* line :
-       {"  shoulder: damping 1e-06, armature 5e-05, stiffness 0.01 about 0.25, limits -1.5 1.5 of "
-        "stiffness 0.2\n",
+       {("  shoulder: damping 1e-06, armature 5e-05, stiffness 0.01 about 0.25, limits -1.5 1.5 of "
+         "stiffness 0.2\n"),
         "  puck (sliding): damping 0.007\n", "  puck (turning): damping 7e-07\n",
         "  carriage: position, P 200, D 10, range -10 10, from the start of the step\n",
         "  wrist: position, P 0.01, D 0.0001, no range, from the end of the step\n",

@@ -2,8 +2,6 @@
 // Tests what validate, info, merge and export say of a complete data set and of a damaged one.
 #include <gmock/gmock.h>
 
-#include <sys/resource.h>
-
 #include <algorithm>
 #include <functional>
 #include <limits>
@@ -24,13 +22,6 @@ using testing::ElementsAre;
 using ::testing::HasSubstr;
 using testing::IsEmpty;
 
-/// Largest memory of any program that this one has started [bytes].
-double peak_memory() {
-  struct rusage usage {};
-  getrusage(RUSAGE_CHILDREN, &usage);
-  return 1024.0 * static_cast<double>(usage.ru_maxrss);
-}
-
 /// 40 episodes of four rows in three shards.
 class DatasetCommand : public testing::Test {
  protected:
@@ -44,7 +35,7 @@ class DatasetCommand : public testing::Test {
     words.emplace_back("--json");
     const Outcome outcome = run(folder_, words);
     EXPECT_EQ(outcome.exit_code, exit_code) << outcome.err;
-    const json object = json::parse(outcome.out);
+    json object = json::parse(outcome.out);
     EXPECT_EQ(object.at("command"), words[0]);
     json known = object;
     known.erase("settings");  // names of attributes and datasets, described in docs/datasets.md

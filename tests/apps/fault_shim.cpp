@@ -232,6 +232,7 @@ FAULTY_MEMORY(realloc, (void* pointer, std::size_t size), (pointer, size))
 /// The C library's own calls malloc, which then returns into that library.
 extern "C" char* strdup(const char* text) {
   const std::size_t size = std::strlen(text) + 1;
+  // NOLINTNEXTLINE(cppcoreguidelines-no-malloc): the malloc above
   void* const copy = of_hdf5(__builtin_return_address(0)) ? __libc_malloc(size) : std::malloc(size);
   return copy == nullptr ? nullptr : static_cast<char*>(std::memcpy(copy, text, size));
 }

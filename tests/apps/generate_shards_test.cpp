@@ -46,7 +46,7 @@ std::map<std::string, std::string> bytes(const Folder& folder, const std::string
 }
 
 json answer_of(const Outcome& outcome) {
-  const json answer = json::parse(outcome.out);
+  json answer = json::parse(outcome.out);
   EXPECT_THAT(undocumented_keys(answer), IsEmpty());
   return answer;
 }

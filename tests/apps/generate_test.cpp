@@ -2,7 +2,6 @@
 // Tests `tangere generate` as users see it: its keys, its shards, its refusals, and the same bytes
 // on any number of threads.
 #include <gmock/gmock.h>
-#include <sys/resource.h>
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
@@ -251,13 +250,6 @@ INSTANTIATE_TEST_SUITE_P(
         Refusal{"disk", {"--episodes", "1000000000"}, 3, "needs at least"},
         Refusal{"no_controls", {"--controls", "nowhere.csv"}, 3, "nowhere.csv"}),
     [](const auto& test) { return test.param.name; });
-
-/// Largest memory of any program that this one has started [bytes].
-double peak_memory() {
-  struct rusage usage {};
-  getrusage(RUSAGE_CHILDREN, &usage);
-  return 1024.0 * static_cast<double>(usage.ru_maxrss);
-}
 
 TEST(Generate, MemoryDoesNotGrowWithTheNumberOfEpisodes) {
   if (kSanitized) GTEST_SKIP() << "sanitizers keep memory that was given back";

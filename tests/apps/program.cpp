@@ -4,6 +4,7 @@
 
 #include <fcntl.h>
 #include <gmock/gmock.h>
+#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -34,21 +35,30 @@ void redirect(const std::string& path, int descriptor) {
 }
 
 /// Runs in the child, between fork and exec.
-[[noreturn]] void become_program(const std::string& folder, const std::vector<std::string>& words,
-                                 const std::vector<std::string>& environment,
-                                 const std::string& out, const std::string& err) {
+[[noreturn]] void become_program(const std::string& folder, std::vector<std::string> words,
+                                 std::vector<std::string> environment, const std::string& out,
+                                 const std::string& err) {
   // A test runner in the background may ignore them, and the program would inherit that.
   std::signal(SIGINT, SIG_DFL);
   std::signal(SIGTERM, SIG_DFL);
   if (chdir(folder.c_str()) != 0) _exit(126);
   redirect(out, STDOUT_FILENO);
   redirect(err, STDERR_FILENO);
-  for (const std::string& variable : environment) putenv(const_cast<char*>(variable.c_str()));
+  for (std::string& variable : environment) putenv(variable.data());
   std::vector<char*> argv;
-  for (const std::string& word : words) argv.push_back(const_cast<char*>(word.c_str()));
+  for (std::string& word : words) argv.push_back(word.data());
   argv.push_back(nullptr);
   execv(TANGERE_PROGRAM, argv.data());
   _exit(126);
+}
+
+pid_t start(const std::string& folder, const std::vector<std::string>& words,
+            const std::vector<std::string>& environment, const std::string& out,
+            const std::string& err) {
+  const pid_t process = fork();
+  if (process == 0) become_program(folder, words, environment, out, err);
+  if (process < 0) throw std::system_error(errno, std::generic_category(), "fork");
+  return process;
 }
 
 }  // namespace
@@ -71,16 +81,12 @@ std::string Folder::write(const std::string& name, const std::string& text) cons
 
 std::string Folder::read(const std::string& name) const { return file_bytes(root_ / name); }
 
-Program::Program(const Folder& folder, std::vector<std::string> arguments,
+Program::Program(const Folder& folder, const Words& arguments,
                  const std::vector<std::string>& environment, const Streams& streams)
-    : scratch_(new_folder()) {
-  arguments.insert(arguments.begin(), "tangere");
-  const std::string out = streams.out.empty() ? (scratch_ / "out").string() : streams.out;
-  const std::string err = streams.err.empty() ? (scratch_ / "err").string() : streams.err;
-  process_ = fork();
-  if (process_ == 0) become_program(folder.path(), arguments, environment, out, err);
-  if (process_ < 0) throw std::system_error(errno, std::generic_category(), "fork");
-}
+    : scratch_(new_folder()),
+      process_(start(folder.path(), Words{"tangere"} + arguments, environment,
+                     streams.out.empty() ? (scratch_ / "out").string() : streams.out,
+                     streams.err.empty() ? (scratch_ / "err").string() : streams.err)) {}
 
 Program::~Program() {
   if (process_ > 0) {
@@ -105,9 +111,9 @@ Outcome Program::wait() {
   return outcome;
 }
 
-Outcome run(const Folder& folder, std::vector<std::string> arguments,
+Outcome run(const Folder& folder, const Words& arguments,
             const std::vector<std::string>& environment, const Streams& streams) {
-  return Program(folder, std::move(arguments), environment, streams).wait();
+  return Program(folder, arguments, environment, streams).wait();
 }
 
 std::vector<std::string> undocumented_keys(const nlohmann::json& object) {
@@ -131,6 +137,13 @@ nlohmann::json run_json(const Folder& folder, const Words& words, int exit_code)
   EXPECT_EQ(answer.at("command"), words.at(0)) << what;
   EXPECT_THAT(undocumented_keys(answer), testing::IsEmpty()) << what;
   return answer;
+}
+
+double peak_memory() {
+  struct rusage usage {};
+  getrusage(RUSAGE_CHILDREN, &usage);
+  // NOLINTNEXTLINE(cppcoreguidelines-pro-type-union-access): the member's name stands for a union
+  return 1024.0 * static_cast<double>(usage.ru_maxrss);
 }
 
 std::string scene(const std::string& name) { return TANGERE_SOURCE_DIR "/scenes/" + name; }

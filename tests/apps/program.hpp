@@ -51,7 +51,7 @@ struct Streams {
 class Program {
  public:
   /// Starts it. `environment`: "NAME=value", added to this process's own.
-  Program(const Folder& folder, std::vector<std::string> arguments,
+  Program(const Folder& folder, const Words& arguments,
           const std::vector<std::string>& environment = {}, const Streams& streams = {});
   ~Program();
   Program(const Program&) = delete;
@@ -66,7 +66,7 @@ class Program {
 };
 
 /// Runs it to its end.
-Outcome run(const Folder& folder, std::vector<std::string> arguments,
+Outcome run(const Folder& folder, const Words& arguments,
             const std::vector<std::string>& environment = {}, const Streams& streams = {});
 
 /// Names of an object's keys that docs/command.md does not mention, nested ones included.
@@ -75,6 +75,9 @@ std::vector<std::string> undocumented_keys(const nlohmann::json& object);
 /// Runs `tangere WORDS --json` and returns the object that it prints. Expects it to name the
 /// subcommand and the exit code, and to have only documented keys.
 nlohmann::json run_json(const Folder& folder, const Words& words, int exit_code = 0);
+
+/// Largest memory of any program that this one has started [bytes].
+double peak_memory();
 
 /// Path of a scene of the project.
 std::string scene(const std::string& name);

@@ -83,7 +83,7 @@ TEST(Progress, RewritesOneLineOfATerminal) {
   std::string shown;
   char buffer[256];
   bool stopped = false;
-  for (ssize_t n; (n = read(terminal, buffer, sizeof buffer)) > 0;) {
+  for (ssize_t n = 0; (n = read(terminal, buffer, sizeof buffer)) > 0;) {
     shown.append(buffer, static_cast<std::size_t>(n));
     if (!stopped && std::count(shown.begin(), shown.end(), '\r') >= 3) {
       program.send(SIGINT);

@@ -79,12 +79,12 @@ inline Scene random_machine_on_a_base(unsigned seed, int links) {
   std::erase_if(s.motors,
                 [&](const MotorDescription& m) { return m.joint == s.links[1].joint.name; });
   for (LinkDescription& l : s.links) l.body.density = std::max(l.body.density, 100.0);
-  std::vector<char> stands = {1};  // moves with the world
+  std::vector<bool> stands = {true};  // moves with the world
   for (std::size_t i = 1; i < s.links.size(); ++i) {
     const LinkDescription& l = s.links[i];
     stands.push_back(l.joint.type == JointType::fixed &&
-                     (l.parent < 0 || stands[std::size_t(l.parent)] != 0));
-    if (stands[i] != 0) continue;
+                     (l.parent < 0 || stands[std::size_t(l.parent)]));
+    if (stands[i]) continue;
     const ContactCoefficients c = {random.uniform(50, 500), random.uniform(0.1, 2),
                                    random.uniform(0.2, 1.2), 1};
     s.pair_contacts.push_back(

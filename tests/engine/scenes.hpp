@@ -2,6 +2,7 @@
 // Scenes of the engine tests, built in code.
 #pragma once
 
+#include <utility>
 #include <vector>
 
 #include "engine/model/scene.hpp"
@@ -16,7 +17,7 @@ inline LinkDescription link(const std::string& name, JointType type, Vector3 at,
   l.joint.type = type;
   l.joint.pose.position = at;
   l.body.name = name;
-  l.body.shape = shape;
+  l.body.shape = std::move(shape);
   l.body.density = density;
   return l;
 }

@@ -72,6 +72,7 @@ void catch_crashes() {
 long peak_kilobytes() {
   rusage usage{};
   getrusage(RUSAGE_SELF, &usage);
+  // NOLINTNEXTLINE(cppcoreguidelines-pro-type-union-access): the member's name stands for a union
   return usage.ru_maxrss;
 }
 

@@ -103,7 +103,7 @@ std::vector<Include> includes_of(const std::string& text) {
 std::string top_of(std::string_view path) { return std::string(path.substr(0, path.find('/'))); }
 /// The row of folders() that a file belongs to: "engine/model", "apps"; "" if there is none.
 std::string folder_of(std::string_view path) {
-  const std::string top = top_of(path);
+  std::string top = top_of(path);
   if (folders().contains(top)) return top;
   const std::string folder(path.substr(0, path.find('/', std::min(top.size() + 1, path.size()))));
   return folders().contains(folder) ? folder : "";

@@ -24,7 +24,7 @@ kernels::Link link_of(int parent, kernels::JointKind kind, int v) {
 Matrix structure_of(const PatternStorage& p) {
   Matrix s(p.n, std::vector<char>(p.n, 0));
   for (int i = 0; i < p.n; ++i)
-    for (int j = 0; j < p.n; ++j) s[i][j] = p.slot[i * p.n + j] >= 0;
+    for (int j = 0; j < p.n; ++j) s[i][j] = p.slot[i * p.n + j] >= 0 ? 1 : 0;
   return s;
 }
 

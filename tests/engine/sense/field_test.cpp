@@ -64,7 +64,8 @@ struct Field {
   }
   [[nodiscard]] static Vec3<double> at(int p) {
     const double step = kEdge / (kSide - 1);
-    return {-kEdge / 2 + p / kSide * step, kEdge / 2 - p % kSide * step, -kThickness / 2};
+    const int row = p / kSide, col = p % kSide;
+    return {-kEdge / 2 + row * step, kEdge / 2 - col * step, -kThickness / 2};
   }
   [[nodiscard]] bool touched(int p) const { return numbers[std::size_t(3 * p + 2)] != 0; }
   [[nodiscard]] Vec3<double> sum() const {

@@ -196,8 +196,9 @@ TEST(Physics, FirstTouchesOffCentreAllConverge) {
   Batch batch(model, 1024);
   for (int e = 0; e < 1024; ++e) {
     std::vector<double> q = q_of(batch, e);
-    q[3] = 9e-3 * ((e % 32) / 15.5 - 1);
-    q[4] = 9e-3 * ((e / 32) / 15.5 - 1);
+    const int row = e / 32, col = e % 32;
+    q[3] = 9e-3 * (col / 15.5 - 1);
+    q[4] = 9e-3 * (row / 15.5 - 1);
     batch.set_state(e, q, v_of(batch, e));
   }
   int most = 0;

@@ -23,7 +23,7 @@ std::string picture(const Folder& folder, const PlotOptions& options, double for
     testing::write_run(file, l, force);
     file.commit();
   }
-  const std::string svg = render_tactile_svg(TrajectoryReader(folder / "run.h5"), options);
+  std::string svg = render_tactile_svg(TrajectoryReader(folder / "run.h5"), options);
   tinyxml2::XMLDocument document;
   EXPECT_EQ(document.Parse(svg.c_str()), tinyxml2::XML_SUCCESS);
   EXPECT_STREQ(document.RootElement()->Name(), "svg");
@@ -61,7 +61,7 @@ TEST(TactilePlot, ShearAlongAxis1PointsToTheRight) {
   const std::string svg = picture(folder, one);
   const std::size_t at = svg.find("<path d=\"M");
   ASSERT_NE(at, std::string::npos);
-  double x0, y0, x1, y1;
+  double x0 = 0, y0 = 0, x1 = 0, y1 = 0;
   ASSERT_EQ(std::sscanf(svg.c_str() + at, "<path d=\"M%lf %lfL%lf %lf", &x0, &y0, &x1, &y1), 4);
   EXPECT_GT(x1 - x0, 10);
   EXPECT_NEAR(y1, y0, 1e-6);
@@ -107,9 +107,10 @@ TEST(TactilePlot, AnImageHasItsPointsAtTheirPixelsAndShearAlongRowsAndColumns) {
   s.rows = s.cols = 0;
   for (int k = 0; k < 5; ++k) {
     TactilePoint p;
-    p.position = {0.001, 0.004 * (k % 2), -0.002 * (k / 2)};
+    const int row = k / 2, col = k % 2;
+    p.position = {0.001, 0.004 * col, -0.002 * row};
     p.normal = {1, 0, 0}, p.axis0 = {0, 0, 1}, p.axis1 = {0, -1, 0};
-    p.pixel = k == 4 ? std::array{-1, -1} : std::array{k / 2, k % 2};
+    p.pixel = k == 4 ? std::array{-1, -1} : std::array{row, col};
     s.list.push_back(p);
   }
   s.points = 5;
@@ -145,7 +146,7 @@ TEST(TactilePlot, WhatIsNotThereIsNamed) {
   const Folder folder;
   picture(folder, {});
   const TrajectoryReader file(folder / "run.h5");
-  const auto message = [&](PlotOptions o) -> std::string {
+  const auto message = [&](const PlotOptions& o) -> std::string {
     try {
       (void)render_tactile_svg(file, o);
     } catch (const InputError& e) {

@@ -509,7 +509,8 @@ TEST_F(TouchedMesh, NumbersOfPointsAndCellsAreChecked) {
                                      {"count=\"5\" pitch=\"0.1\"", "both 'count' and 'pitch'"},
                                      {"pitch=\"1e-6\"", "points; expected 1 to 4096"},
                                      {"resolution=\"300\"", "resolution"}})
-    EXPECT_THAT(error_of([&] { with_contact(bad, "b", "a"); }), HasSubstr(message)) << bad;
+    EXPECT_THAT(error_of([&, text = bad] { with_contact(text, "b", "a"); }), HasSubstr(message))
+        << bad;
   EXPECT_EQ(compile(with_contact("count=\"50\"", "a", "b").scene)->pairs[0].n_points, 50);
 }
 

@@ -24,7 +24,7 @@ using testing::layout;
 using testing::number;
 
 std::string write_file(const Folder& folder, const TrajectoryLayout& l = layout()) {
-  const std::string path = folder / "run.h5";
+  std::string path = folder / "run.h5";
   TrajectoryFile file(path, l, false);
   testing::write_run(file, l);
   EXPECT_FALSE(std::filesystem::exists(path)) << "named before it was complete";

@@ -35,7 +35,7 @@ TEST(Distance, CuboidIsExactInsideAndOutside) {
   const CuboidDistance<double> box{half};
   for (int k = 0; k < 2000; ++k) {
     const Vec3<double> y = random.vector(0.4);
-    double unused;
+    double unused = 0;
     const Distance<double> at = box.evaluate(y, unused);
     EXPECT_DOUBLE_EQ(at.d, box_distance(y, half));
     EXPECT_NEAR(dot(at.n, at.n), 1, 1e-14);
@@ -72,7 +72,7 @@ TEST(Distance, GradientAndHessianMatchDualNumbers) {
 }
 
 TEST(Distance, KinksHaveADefinedUnitNormal) {
-  double k;
+  double k = 1;
   const Distance<double> centre = SphereDistance<double>{0.1}.evaluate({0, 0, 0}, k);
   EXPECT_EQ(centre.d, -0.1);
   EXPECT_EQ(centre.n.z, 1);

@@ -122,7 +122,7 @@ TEST(Ellipsoid, ABallIsASphere) {
   for (int k = 0; k < 500; ++k) {
     const double r = random.uniform(0.01, 1);
     const V y = random.uniform(0.2, 2) * r * random.direction();
-    double curvature;
+    double curvature = 0;
     const Distance<double> sphere = SphereDistance<double>{r}.evaluate(y, curvature),
                            at = Ellipsoid{{r, r, r}}.evaluate(y);
     EXPECT_NEAR(at.d, sphere.d, 1e-15 * r);

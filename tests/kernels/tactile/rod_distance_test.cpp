@@ -166,7 +166,7 @@ TEST_P(RodDistance, BendingIsTheHessianInside) {
     const Vec3<double> y = random.vector(0.3);
     with_distance<double>(GetParam(), kSize, [&]<class S>(const S& s) {
       if constexpr (S::kBending == Bending::rod) {
-        double curvature, straight;
+        double curvature = 0, straight = 0;
         const Distance<double> at = s.evaluate(y, curvature, straight);
         if (at.d >= 0) return;
         ++inside;

@@ -133,7 +133,8 @@ Vortex vortex_of(std::span<const double> flow) {
   constexpr int kPoints = 130;
   for (int pad = 0; pad < 2; ++pad)
     for (int p = 0; p < kPoints; ++p) {
-      const double up = pad == 0 ? 1 : -1, z = up * (p / 10 - 6), y = 4.5 - p % 10;
+      const int row = p / 10, col = p % 10;
+      const double up = pad == 0 ? 1 : -1, z = up * (row - 6), y = 4.5 - col;
       const double a = up * flow[std::size_t(2 * pad * kPoints + p)],
                    b = -flow[std::size_t((2 * pad + 1) * kPoints + p)];
       fz += a, fy += b, moment += y * a - z * b, square += y * y + z * z, all += a * a + b * b;
@@ -174,10 +175,11 @@ TEST(StableGrasp, TiltGrowsWithTheOffsetAndShearIsARotation) {
   }
   std::sort(by_offset.begin(), by_offset.end());
   double before = -1;
+  constexpr int kQuarter = kEnvironments / 4;
   for (std::size_t part = 0; part < 4; ++part) {
     double mean = 0;
-    for (std::size_t i = 0; i < kEnvironments / 4; ++i)
-      mean += by_offset[part * kEnvironments / 4 + i].second / (kEnvironments / 4);
+    for (std::size_t i = 0; i < kQuarter; ++i)
+      mean += by_offset[part * kQuarter + i].second / kQuarter;
     EXPECT_GT(mean, before) << "quarter " << part;
     before = mean;
   }

@@ -78,7 +78,6 @@ class ClosedLoop {
         seen_(task.spec().observation_size()),
         nv_(std::size_t(task.model().nv())) {
     record_base();
-    plain_ = 0;
     for (const LinkDescription& link : task.model().scene().links) {
       if (link.joint.type == JointType::free || link.joint.type == JointType::spherical) break;
       plain_ += std::size_t(position_count(link.joint.type));
@@ -262,9 +261,9 @@ TEST_P(EveryLoop, GradientsAgreeByThreeRoutes) {
     const double slope = times(g.*part, d.*part), size = length(g.*part) * length(d.*part);
     double best = HUGE_VAL, best_step = 0;
     for (const double h : {1e-4, 1e-5, 1e-6, 1e-7, 1e-8}) {
-      const auto moved = [&](double by) {
+      const auto moved = [&, of = part](double by) {
         LoopInputs x = at;
-        for (std::size_t k = 0; k < (x.*part).size(); ++k) (x.*part)[k] += by * (d.*part)[k];
+        for (std::size_t k = 0; k < (x.*of).size(); ++k) (x.*of)[k] += by * (d.*of)[k];
         return loop.play(x);
       };
       const double error = std::abs((moved(h) - moved(-h)) / (2 * h) - slope);

@@ -123,8 +123,10 @@ TEST(Descent, FiftyAdamStepsHalveTheDistanceOfAPushedBox) {
       std::size_t(std::find(names.begin(), names.end(), "box_slide.x") - names.begin());
   ASSERT_LT(box, names.size());
   std::array<Goal, kEnvironments> goals;  // 60 to 120 mm ahead, up to 20 mm aside
-  for (std::size_t e = 0; e < kEnvironments; ++e)
-    goals[e] = {0.06 + 0.02 * double(e / 4), -0.02 + 0.04 / 3 * double(e % 4)};
+  for (std::size_t e = 0; e < kEnvironments; ++e) {
+    const std::size_t row = e / 4, col = e % 4;
+    goals[e] = {0.06 + 0.02 * double(row), -0.02 + 0.04 / 3 * double(col)};
+  }
   const ReachGoal loss(box, goals);
   const RolloutLoss* const losses[] = {&loss};
   GradientOptions options;
