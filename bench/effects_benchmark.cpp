@@ -25,19 +25,29 @@ namespace {
 
 constexpr int kEnvironments = 32, kInstants = 12, kRounds = 15;
 
-/// A shipped scene, and the coordinates by which its bodies are moved out of each other's reach.
+/// A coordinate by which bodies are moved, how far [m or rad], and the control that is its target,
+/// if any: it moves along, or the motor would throw what it drives.
+struct Move {
+  std::string coordinate;
+  double by;
+  std::string target;
+};
+/// A shipped scene, and how its bodies are moved out of each other's reach.
 struct Case {
   const char* scene;
-  std::vector<std::pair<std::string, double>> away;  // coordinate, displacement [m or rad]
-  bool lifted = false;                               // off the ground too
+  std::vector<Move> away;
+  bool lifted = false;  // off the ground too
 };
 const std::vector<Case>& cases() {
   static const std::vector<Case> all = {
-      {"rolling_ball", {{"pad_joint.z", 1}}},
-      {"box_pushing", {{"hand_slide.axis0", -1}}},
-      {"cap_opening", {{"upper_1.angle", -1}, {"upper_2.angle", -1}, {"upper_3.angle", -1}}},
-      {"insertion", {{"hand_slide.z", 2}, {"box.z", 1}}},
-      {"stable_grasp", {{"hand_slide.z", 1}, {"bar.z", 2}}, true}};
+      {"rolling_ball", {{"pad_joint.z", 1, ""}}},
+      {"box_pushing", {{"hand_slide.axis0", -1, ""}}},
+      {"cap_opening",
+       {{"upper_1.angle", -1, "upper_1.rate"},
+        {"upper_2.angle", -1, "upper_2.rate"},
+        {"upper_3.angle", -1, "upper_3.rate"}}},
+      {"insertion", {{"hand_slide.z", 2, "hand_slide.vz"}, {"box.z", 1, ""}}},
+      {"stable_grasp", {{"hand_slide.z", 1, "hand_slide.vz"}, {"bar.z", 2, ""}}, true}};
   return all;
 }
 
@@ -51,13 +61,17 @@ Scene scene_of(const Case& of) {
 
 RecordedStates states_of(const Model& model, const Case& of, bool moved) {
   RecordedStates states = record_states(model, kEnvironments, kInstants, 0);
-  const auto names = model.q_names();
-  for (const auto& [name, by] : of.away)
-    for (std::size_t k = 0; k < names.size(); ++k) {
-      if (!moved || names[k] != name) continue;
-      for (RecordedInstant& at : states.instants)
-        for (std::vector<double>* q : {&at.q, &at.previous_q})
-          for (std::size_t i = k; i < q->size(); i += names.size()) (*q)[i] += by;
+  if (!moved) return states;
+  const auto add = [](const auto& names, const std::string& name, double by,
+                      std::vector<double>& rows) {
+    for (std::size_t k = 0; k < names.size(); ++k)
+      for (std::size_t i = k; names[k] == name && i < rows.size(); i += names.size()) rows[i] += by;
+  };
+  for (const Move& move : of.away)
+    for (RecordedInstant& at : states.instants) {
+      add(model.q_names(), move.coordinate, move.by, at.q);
+      add(model.q_names(), move.coordinate, move.by, at.previous_q);
+      add(model.u_names(), move.target, move.by, at.controls);
     }
   return states;
 }
