@@ -66,7 +66,7 @@ double radius_of(const kernels::PairContact& pair) {
       const double most = std::max(std::abs(pair.grid->low[i]), std::abs(pair.grid->high[i]));
       square += most * most;
     }
-    return std::sqrt(square);
+    return pair.size.x * std::sqrt(square);  // the grid is that of scale 1
   }
   CompiledBody body;
   body.shape = pair.shape;
@@ -75,7 +75,7 @@ double radius_of(const kernels::PairContact& pair) {
 }
 
 /// Puts balls around all contact points and all shapes of two links.
-void bound_links(const CompiledModel& m, kernels::LinkPair& links) {
+void bound_pair(const CompiledModel& m, kernels::LinkPair& links) {
   std::vector<double> points;
   kernels::Vec3<double> low{INFINITY, INFINITY, INFINITY}, high = -low;
   const auto members =
@@ -100,6 +100,10 @@ void bound_links(const CompiledModel& m, kernels::LinkPair& links) {
 
 }  // namespace
 
+void bound_links(CompiledModel& m) {
+  for (kernels::LinkPair& links : m.link_pairs) bound_pair(m, links);
+}
+
 void group_contacts(CompiledModel& m) {
   for (kernels::PairContact& p : m.pairs) bound(p.points, p.n_points, p.middle, p.extent);
   for (kernels::GroundContact& g : m.grounds) {
@@ -114,7 +118,7 @@ void group_contacts(CompiledModel& m) {
     const kernels::PairContact& first = m.pairs[std::size_t(m.pair_order[std::size_t(pairs[g])])];
     kernels::LinkPair links = {first.link1, first.link2, pairs[g], pairs[g + 1] - pairs[g],
                                0,           0,           false,    first.frame2.p,
-                               false,       {},          {},       0};
+                               false,       {},          {},       INFINITY};
     links.ball = links.count == 1 && kernels::is_ball(first.shape);
     double pitch = INFINITY;
     for (int i = pairs[g]; i < pairs[g + 1]; ++i) {
@@ -129,7 +133,6 @@ void group_contacts(CompiledModel& m) {
     // How far a lane may move before it is searched again. Where points are far apart, a wide
     // margin lists few more of them.
     links.margin = std::max(links.reach / 200, pitch / 16);
-    bound_links(m, links);
     m.link_pairs.push_back(links);
   }
   const std::vector<int> grounds = gather(

@@ -238,6 +238,30 @@ TEST(Candidates, LinksThatAreApartDoNotTouch) {
   }
 }
 
+/// No ball holds a plane, a shape whose size differs between environments, or the far side of chosen
+/// faces.
+TEST(Candidates, LinksWithoutABallAreNeverApart) {
+  const auto apart = [](const Scene& scene) { return compile(scene)->link_pairs.at(0).apart; };
+  Scene scene = testing::rolling_ball(false, 8);
+  EXPECT_LT(apart(scene), 1);
+  scene.randomizations.push_back({{NumberOwner::body, NumberField::radius, "ball"},
+                                  {Distribution::Kind::uniform, 0.5, 1, {}},
+                                  {}});
+  EXPECT_EQ(apart(scene), INFINITY);
+  scene.randomizations.clear();
+  scene.links[1].body.shape = PlaneShape{};
+  scene.links[1].joint.type = JointType::fixed;
+  scene.ground_contacts.clear();
+  EXPECT_EQ(apart(scene), INFINITY);
+  Scene faced = bar_above_shapes();
+  faced.links[1] = faced.links[3];
+  faced.links.resize(2);
+  std::get<CuboidShape>(faced.links[0].body.shape).contact_resolution = {2, 2, 2};
+  faced.pair_contacts = {{"middle", "table", {5e3, 5, 1, 20}, ContactLaw::clamped, 1e-5, {}}};
+  EXPECT_TRUE(compile(faced)->view.faced);
+  EXPECT_EQ(apart(faced), INFINITY);
+}
+
 TEST(Candidates, ALaneThatOutrunsItsListSaysSo) {
   const auto m = compile(testing::rolling_ball(false, 8));
   Workspace w(*m);
