@@ -10,6 +10,7 @@
 #include "engine/step/group_step.hpp"
 #include "engine/step/workspace.hpp"
 #include "kernels/contact/distance.hpp"
+#include "tests/engine/meshes.hpp"
 #include "tests/engine/scenes.hpp"
 #include "tests/kernels/random_numbers.hpp"
 
@@ -260,6 +261,22 @@ TEST(Candidates, LinksWithoutABallAreNeverApart) {
   faced.pair_contacts = {{"middle", "table", {5e3, 5, 1, 20}, ContactLaw::clamped, 1e-5, {}}};
   EXPECT_TRUE(compile(faced)->view.faced);
   EXPECT_EQ(apart(faced), INFINITY);
+}
+
+/// The grid of a mesh is that of scale 1.
+TEST(Candidates, TheBallAroundAMeshHasItsScale) {
+  Scene scene = testing::rolling_ball(false, 8);
+  scene.ground_contacts.clear();
+  MeshShape cube = testing::cuboid_mesh({0.01, 0.01, 0.01});
+  cube.resolution = 8;
+  const auto apart = [&](double scale) {
+    cube.scale = scale;
+    scene.links[1].body.shape = cube;
+    return compile(scene)->link_pairs.at(0).apart;
+  };
+  const double corner = 0.01 * std::sqrt(3.0), radius = (apart(3) - apart(1)) / 2;
+  EXPECT_GE(radius, corner);
+  EXPECT_LT(radius, 2 * corner);
 }
 
 TEST(Candidates, ALaneThatOutrunsItsListSaysSo) {
