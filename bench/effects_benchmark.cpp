@@ -6,6 +6,7 @@
 // alternates between two models: only ratios of one run mean something on a busy machine.
 #include <benchmark/benchmark.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <map>
@@ -24,31 +25,53 @@ namespace {
 
 constexpr int kEnvironments = 32, kInstants = 12, kRounds = 15;
 
-/// A shipped scene, and the coordinates by which its bodies are moved out of each other's reach.
+/// A coordinate by which bodies are moved, how far [m or rad], and the control that is its target,
+/// if any: it moves along, or the motor would throw what it drives.
+struct Move {
+  std::string coordinate;
+  double by;
+  std::string target;
+};
+/// A shipped scene, and how its bodies are moved out of each other's reach.
 struct Case {
   const char* scene;
-  std::vector<std::pair<std::string, double>> away;  // coordinate, displacement [m or rad]
-  bool lifted = false;                               // off the ground too
+  std::vector<Move> away;
+  bool lifted = false;  // off the ground too
 };
 const std::vector<Case>& cases() {
   static const std::vector<Case> all = {
-      {"rolling_ball", {{"pad_joint.z", 1}}},
-      {"box_pushing", {{"hand_slide.axis0", -1}}},
-      {"cap_opening", {{"upper_1.angle", -1}, {"upper_2.angle", -1}, {"upper_3.angle", -1}}},
-      {"insertion", {{"hand_slide.z", 2}, {"box.z", 1}}},
-      {"stable_grasp", {{"hand_slide.z", 1}, {"bar.z", 2}}, true}};
+      {"rolling_ball", {{"pad_joint.z", 1, ""}}},
+      {"box_pushing", {{"hand_slide.axis0", -1, ""}}},
+      {"cap_opening",
+       {{"upper_1.angle", -1, "upper_1.rate"},
+        {"upper_2.angle", -1, "upper_2.rate"},
+        {"upper_3.angle", -1, "upper_3.rate"}}},
+      {"insertion", {{"hand_slide.z", 2, "hand_slide.vz"}, {"box.z", 1, ""}}},
+      {"stable_grasp", {{"hand_slide.z", 1, "hand_slide.vz"}, {"bar.z", 2, ""}}, true}};
   return all;
+}
+
+/// Steps that create energy are not taken again, as in tasks/effects: from states that are not its
+/// own, a model without an effect does that far more often.
+Scene scene_of(const Case& of) {
+  Scene scene = read_scene(TANGERE_SOURCE_DIR "/scenes/" + std::string(of.scene) + ".xml").scene;
+  scene.solver.bounded_energy = false;
+  return scene;
 }
 
 RecordedStates states_of(const Model& model, const Case& of, bool moved) {
   RecordedStates states = record_states(model, kEnvironments, kInstants, 0);
-  const auto names = model.q_names();
-  for (const auto& [name, by] : of.away)
-    for (std::size_t k = 0; k < names.size(); ++k) {
-      if (!moved || names[k] != name) continue;
-      for (RecordedInstant& at : states.instants)
-        for (std::vector<double>* q : {&at.q, &at.previous_q})
-          for (std::size_t i = k; i < q->size(); i += names.size()) (*q)[i] += by;
+  if (!moved) return states;
+  const auto add = [](const auto& names, const std::string& name, double by,
+                      std::vector<double>& rows) {
+    for (std::size_t k = 0; k < names.size(); ++k)
+      for (std::size_t i = k; names[k] == name && i < rows.size(); i += names.size()) rows[i] += by;
+  };
+  for (const Move& move : of.away)
+    for (RecordedInstant& at : states.instants) {
+      add(model.q_names(), move.coordinate, move.by, at.q);
+      add(model.q_names(), move.coordinate, move.by, at.previous_q);
+      add(model.u_names(), move.target, move.by, at.controls);
     }
   return states;
 }
@@ -62,7 +85,7 @@ struct Recorded {
   StepTimes times;
 
   Recorded(const Case& of, bool moved)
-      : model(read_scene(TANGERE_SOURCE_DIR "/scenes/" + std::string(of.scene) + ".xml").scene),
+      : model(scene_of(of)),
         states(states_of(model, of, moved)),
         options{{}, {}, Stepper(model).tolerance()},
         timed(model, states, options),
@@ -181,6 +204,68 @@ void fields(benchmark::State& state, const Case& of) {
   }
 }
 
+/// Something of sensors that a scene may have besides their fields.
+struct Extra {
+  const char* name;
+  bool asked;  ///< false: declared, but idle
+  void (*add)(TactileDescription& sensor, double timestep);
+  const char* form;  ///< what is read instead of the field; null: the field
+};
+constexpr double kHysteresisSteps = 4;  ///< its time constant: a reading looks at 28 states
+const Extra kExtras[] = {
+    {"markers", true,
+     [](TactileDescription& s, double) {
+       s.markers = MarkersDescription{100, 0.002, 0, {}};
+     },
+     "markers"},
+    {"markers not read", false,
+     [](TactileDescription& s, double) {
+       s.markers = MarkersDescription{100, 0.002, 0, {}};
+     },
+     nullptr},
+    {"hysteresis", true,
+     [](TactileDescription& s, double h) {
+       s.imperfections.hysteresis = 0.5;
+       s.imperfections.hysteresis_time = kHysteresisSteps * h;
+     },
+     nullptr},
+    {"hysteresis of coefficient 0", false,
+     [](TactileDescription& s, double) { s.imperfections.source.line = 1; }, nullptr}};
+
+/// Readings and steps of a scene whose sensors have something more, over those without it. Lists of
+/// points have no neighbours, so their gel does not bulge.
+void sensor_extra(benchmark::State& state, const Case& of, const Extra& extra) {
+  Recorded& r = recorded(of, false);
+  Scene scene = r.model.scene();
+  scene.outputs = OutputsDescription{};
+  for (TactileDescription& sensor : scene.sensors) {
+    extra.add(sensor, scene.timestep);
+    if (!sensor.points.empty() && sensor.markers) sensor.markers->thickness = 0;
+    scene.outputs->record.push_back(sensor.name +
+                                    (extra.form == nullptr ? "" : "." + std::string(extra.form)));
+  }
+  TimedModel other(Model(scene), r.states, r.options);
+  for (auto _ : state) {
+    double with = 0, without = 0;
+    for (int instant = 0; instant < kInstants; instant += 3)
+      for (std::size_t k = 0; k < other.readings().size(); ++k) {
+        std::vector<double> own, plain;
+        for (int round = 0; round < kRounds; ++round) {
+          own.push_back(other.time_reading(k, instant));
+          plain.push_back(r.timed.time_reading(k, instant));
+        }
+        with += *std::min_element(own.begin(), own.end());
+        without += *std::min_element(plain.begin(), plain.end());
+      }
+    const ModelComparison steps =
+        compare(other, r.timed, r.times, {true, false, 1}, *r.options.tolerance, kRounds);
+    count(state, r, with / without);
+    state.counters["reading_us"] = 1e6 * with / 4;
+    state.counters["plain_us"] = 1e6 * without / 4;
+    state.counters["step_ratio"] = ratio(steps);
+  }
+}
+
 /// A scene without contacts, over the scene as it is.
 void contact_free(benchmark::State& state, const Case& of) {
   Recorded& r = recorded(of, false);
@@ -211,6 +296,9 @@ void add_all() {
     add(scene + "/itself", itself, of);
     add(scene + "/contact_free", contact_free, of);
     add(scene + "/fields_away", fields, of);
+    for (const Extra& extra : kExtras)
+      add(scene + (extra.asked ? "/reading/" : "/idle_reading/") + extra.name, sensor_extra, of,
+          extra);
     for (const EffectInfo& info : effects_of(read)) {
       const EffectKind kind = info.effect.kind;
       if (!info.on || info.effect.element >= 0 || !has_way(kind, Way::removed)) continue;

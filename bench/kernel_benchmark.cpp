@@ -54,7 +54,7 @@ class Group {
     work_.stage.group = 0;
     table().group.kinematics(view(), work_.stage);
     find_candidates(m, table(), work_, kAllLanes);
-    lists_to_rows(table(), work_, kAllLanes);
+    lists_to_rows(m, table(), work_, kAllLanes);
     table().group.evaluate(view(), work_.stage, -1);
     table().group.factor(view(), work_.stage, nullptr);
   }
@@ -94,7 +94,7 @@ void BM_FindCandidates(benchmark::State& s) {
 void BM_ListsToRows(benchmark::State& s) {
   run(s, kGroup, [](Group& g) {
     g.work().in_rows = 0;
-    lists_to_rows(g.table(), g.work(), kAllLanes);
+    lists_to_rows(g.of_model(), g.table(), g.work(), kAllLanes);
   });
 }
 void BM_Residual(benchmark::State& s) {

@@ -69,7 +69,7 @@ void GroupAdjoint::assemble(const StageInHand<L>& s) const {
   clear_candidates(w);
   find_candidates(model_, s.table, w, s.lanes);
   if constexpr (L > 1)
-    if (s.lone() < 0) lists_to_rows(s.table, w, s.lanes);
+    if (s.lone() < 0) lists_to_rows(model_, s.table, w, s.lanes);
   kernel.evaluate(model_.view, w.stage, s.lone());
   kernel.factor(model_.view, w.stage, nullptr);
 }

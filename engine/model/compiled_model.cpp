@@ -52,6 +52,7 @@ class Compiler {
     sensors();
     end_effectors();
     randomizations();
+    bound_links(m_);
     symbolic();
     return std::move(m_);
   }

@@ -365,6 +365,21 @@ void drop_varying(Scene& scene, int /*element*/, Way way) {
       d.distribution = {Distribution::Kind::list, 0, 0, {number_in(scene, d.number)}};
 }
 
+// --- sleeping ---
+
+EffectInfo find_sleeping(const Scene& scene, int /*element*/) {
+  EffectInfo info;
+  info.on = scene.solver.sleep > 0;
+  info.reason = info.on ? fmt::format("sleep {}", scene.solver.sleep) : "solver_option sleep is 0";
+  if (info.on) add_source(info, scene.solver.sleep_source);
+  return info;
+}
+
+void drop_sleeping(Scene& scene, int /*element*/, Way /*way*/) {
+  scene.solver.sleep = 0;
+  scene.solver.sleep_source = {};
+}
+
 // --- the table ---
 
 struct Row {
@@ -414,6 +429,7 @@ constexpr Row kTable[] = {
     {Kind::sensor_imperfections, "sensor imperfections", " imperfections", true, false,
      find_imperfections, drop_all_imperfections, Owner::tactile},
     {Kind::varying_parameters, "varying parameters", "", true, false, find_varying, drop_varying},
+    {Kind::sleeping, "sleeping", "", false, false, find_sleeping, drop_sleeping},
 };
 
 constexpr bool table_is_in_order() {

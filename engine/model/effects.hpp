@@ -35,8 +35,9 @@ enum class EffectKind : std::uint8_t {
   tactile_damping,
   sensor_imperfections,
   varying_parameters,
+  sleeping,
 };
-inline constexpr int kEffectKinds = 19;
+inline constexpr int kEffectKinds = 20;
 
 /// An effect of a scene.
 struct Effect {

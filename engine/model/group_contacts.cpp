@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
 
 #include "engine/model/compiled_model.hpp"
 #include "kernels/contact/distance.hpp"
@@ -53,6 +54,56 @@ void bound(const double* points, int n, kernels::Vec3<double>& middle, double& e
   extent = std::sqrt(square) * (1 + 1e-9) + 1e-9;
 }
 
+namespace {
+
+/// Returns the radius of a ball around a pair's shape frame outside of which nothing touches; none
+/// where there is no such ball, or where it depends on the environment.
+double radius_of(const kernels::PairContact& pair) {
+  if (pair.shape == PrimitiveShape::plane || pair.size_row >= 0 || pair.faced) return INFINITY;
+  if (pair.shape == PrimitiveShape::mesh) {
+    double square = 0;
+    for (int i = 0; i < 3; ++i) {
+      const double most = std::max(std::abs(pair.grid->low[i]), std::abs(pair.grid->high[i]));
+      square += most * most;
+    }
+    return pair.size.x * std::sqrt(square);  // the grid is that of scale 1
+  }
+  CompiledBody body;
+  body.shape = pair.shape;
+  body.size = pair.size;
+  return hull_of(body).radius;
+}
+
+/// Puts balls around all contact points and all shapes of two links.
+void bound_pair(const CompiledModel& m, kernels::LinkPair& links) {
+  std::vector<double> points;
+  kernels::Vec3<double> low{INFINITY, INFINITY, INFINITY}, high = -low;
+  const auto members =
+      std::span(m.pair_order).subspan(std::size_t(links.first), std::size_t(links.count));
+  for (const int k : members) {
+    const kernels::PairContact& pair = m.pairs[std::size_t(k)];
+    points.insert(points.end(), pair.points, pair.points + 3 * pair.n_points);
+    const kernels::Vec3<double>& at = pair.frame2.p;
+    low = {std::min(low.x, at.x), std::min(low.y, at.y), std::min(low.z, at.z)};
+    high = {std::max(high.x, at.x), std::max(high.y, at.y), std::max(high.z, at.z)};
+  }
+  double of_points = 0, of_shapes = 0;
+  bound(points.data(), static_cast<int>(points.size() / 3), links.points_middle, of_points);
+  links.shapes_middle = 0.5 * (low + high);
+  for (const int k : members) {
+    const kernels::PairContact& pair = m.pairs[std::size_t(k)];
+    const kernels::Vec3<double> arm = pair.frame2.p - links.shapes_middle;
+    of_shapes = std::max(of_shapes, std::sqrt(dot(arm, arm)) + radius_of(pair));
+  }
+  links.apart = of_points + of_shapes * (1 + 1e-9) + 1e-9;  // rounded up as in bound()
+}
+
+}  // namespace
+
+void bound_links(CompiledModel& m) {
+  for (kernels::LinkPair& links : m.link_pairs) bound_pair(m, links);
+}
+
 void group_contacts(CompiledModel& m) {
   for (kernels::PairContact& p : m.pairs) bound(p.points, p.n_points, p.middle, p.extent);
   for (kernels::GroundContact& g : m.grounds) {
@@ -65,8 +116,9 @@ void group_contacts(CompiledModel& m) {
       m.pair_order);
   for (std::size_t g = 0; g + 1 < pairs.size(); ++g) {
     const kernels::PairContact& first = m.pairs[std::size_t(m.pair_order[std::size_t(pairs[g])])];
-    kernels::LinkPair links = {first.link1, first.link2,    pairs[g], pairs[g + 1] - pairs[g], 0, 0,
-                               false,       first.frame2.p, false};
+    kernels::LinkPair links = {first.link1, first.link2, pairs[g], pairs[g + 1] - pairs[g],
+                               0,           0,           false,    first.frame2.p,
+                               false,       {},          {},       INFINITY};
     links.ball = links.count == 1 && kernels::is_ball(first.shape);
     double pitch = INFINITY;
     for (int i = pairs[g]; i < pairs[g + 1]; ++i) {

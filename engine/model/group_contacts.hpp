@@ -14,4 +14,8 @@ void bound(const double* points, int n, kernels::Vec3<double>& middle, double& e
 /// Finds the contacts that share their links. Fills link_pairs, grounded and the orders.
 void group_contacts(CompiledModel& m);
 
+/// Puts balls around the contact points and the shapes of the links that share contacts. Call it
+/// when it is known which sizes vary.
+void bound_links(CompiledModel& m);
+
 }  // namespace tangere

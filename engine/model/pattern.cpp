@@ -47,10 +47,10 @@ class Graph {
   /// Entries that eliminating dof p would create, on one side of the diagonal.
   [[nodiscard]] long fill(int p) const { return fill_[p]; }
 
-  /// Connects all neighbours of p with each other and takes p out. Returns the neighbours,
-  /// ascending. Counts are changed, not counted anew: that would be cubic.
-  std::vector<int> eliminate(int p) {
-    std::vector<int> around = neighbours(p);
+  /// Connects all neighbours of p with each other and takes p out. Counts are changed, not counted
+  /// anew: that would be cubic.
+  void eliminate(int p) {
+    const std::vector<int> around = neighbours(p);
     for (std::size_t k = 0; k < around.size() && fill_[p] > 0; ++k)
       for (std::size_t l = k + 1; l < around.size(); ++l)
         if (!has(around[k], around[l])) connect(around[k], around[l]);
@@ -58,7 +58,6 @@ class Graph {
       fill_[i] -= beyond(i, p) - 1;
       row(i)[p / 64] &= ~(std::uint64_t{1} << (p % 64));
     }
-    return around;
   }
 
  private:
@@ -99,25 +98,21 @@ class Graph {
   std::vector<long> fill_;
 };
 
-struct Elimination {
-  std::vector<int> order;
-  std::vector<std::vector<int>> left;  ///< of each step, the neighbours that the dof still had
-};
-
 /// Eliminates at every step the dof that creates fewest new entries; the lowest index on ties.
-Elimination minimum_fill(const Structure& s) {
+/// Returns the order.
+std::vector<int> minimum_fill(const Structure& s) {
   Graph graph(s);
-  Elimination done;
+  std::vector<int> order;
   std::vector<int> waiting(s.size());
   std::iota(waiting.begin(), waiting.end(), 0);
   while (!waiting.empty()) {
     const auto best = std::min_element(waiting.begin(), waiting.end(),
                                        [&](int i, int j) { return graph.fill(i) < graph.fill(j); });
-    done.order.push_back(*best);
-    done.left.push_back(graph.eliminate(*best));
+    order.push_back(*best);
+    graph.eliminate(*best);
     waiting.erase(best);
   }
-  return done;
+  return order;
 }
 
 /// Columns of a row that follow each other.
@@ -136,12 +131,81 @@ std::vector<Stretch> stretches(const std::vector<char>& row, int k) {
   return list;
 }
 
+/// Where an entry of a matrix over n dofs is stored; -1 where it is not.
+using Slots = std::vector<int>;
+
+/// Returns the rows and columns of a structure in elimination order.
+Structure permuted(const Structure& s, const std::vector<int>& order) {
+  Structure f(s.size(), std::vector<char>(s.size(), 0));
+  for (std::size_t i = 0; i < s.size(); ++i)
+    for (std::size_t j = 0; j < s.size(); ++j)
+      f[i][j] = s[std::size_t(order[i])][std::size_t(order[j])];
+  return f;
+}
+
+/// Adds what elimination from the first row to the last fills in.
+void fill_in(Structure& f) {
+  for (std::size_t k = 0; k < f.size(); ++k)
+    for (std::size_t i = k + 1; i < f.size(); ++i)
+      for (std::size_t j = k + 1; f[i][k] != 0 && j < f.size(); ++j)
+        if (f[k][j] != 0) f[i][j] = 1;
+}
+
+/// Appends the slots between which row i of a structure lies: its first, and one past its last. A
+/// row has at least its diagonal.
+void add_extent(const Structure& s, int i, const Slots& at, std::vector<int>& first,
+                std::vector<int>& end) {
+  const int n = static_cast<int>(s.size());
+  int low = -1, high = -1;
+  for (int j = 0; j < n; ++j) {
+    if (!s[i][j]) continue;
+    high = at[std::size_t(i) * n + j];
+    if (low < 0) low = high;
+  }
+  first.push_back(low);
+  end.push_back(high + 1);
+}
+
+/// Returns the part of a pattern that holds a structure, in dof order, and its fill, in elimination
+/// order. `at`: the slots of the whole pattern's factor.
+PatternPartStorage part_of(const Structure& s, const Structure& f, const PatternStorage& p,
+                           const Slots& at) {
+  PatternPartStorage part;
+  for (int i = 0; i < p.n; ++i) {
+    add_extent(s, i, p.slot, part.entry_first, part.entry_end);
+    add_extent(f, i, at, part.factor_first, part.factor_end);
+    part.factor_first.back() -= (part.factor_first.back() - p.row_begin[i]) % 2;
+  }
+  const auto slot = [&](int i, int j) { return at[std::size_t(i) * p.n + j]; };
+  for (int k = 0; k < p.n; ++k) {
+    part.lower_begin.push_back(static_cast<int>(part.lower_slot.size()));
+    // Row i has every column that row k has: what is one stretch of k is one of i.
+    const std::vector<Stretch> columns = stretches(f[k], k);
+    for (int i = k + 1; i < p.n; ++i) {
+      if (!f[i][k]) continue;
+      part.lower_slot.push_back(slot(i, k));
+      part.run_begin.push_back(static_cast<int>(part.runs.size()));
+      bool open = false;
+      for (const Stretch& c : columns) {
+        open = open && slot(i, c.begin) == part.runs.back().target + part.runs.back().length;
+        if (!open) part.runs.push_back({slot(k, c.begin), slot(i, c.begin), 0});
+        open = true;
+        part.runs.back().length += c.length;
+      }
+    }
+  }
+  part.lower_begin.push_back(static_cast<int>(part.lower_slot.size()));
+  part.run_begin.push_back(static_cast<int>(part.runs.size()));
+  return part;
+}
+
 }  // namespace
 
 PatternStorage analyse_pattern(const std::vector<kernels::Link>& links, int nv,
                                const std::vector<std::pair<int, int>>& touching) {
-  Structure s(nv, std::vector<char>(nv, 0));
-  for (int i = 0; i < static_cast<int>(links.size()); ++i) couple(s, support(links, i));
+  Structure alone(nv, std::vector<char>(nv, 0));
+  for (int i = 0; i < static_cast<int>(links.size()); ++i) couple(alone, support(links, i));
+  Structure s = alone;
   for (const auto& [first, second] : touching) {
     std::vector<int> both = support(links, first);
     const std::vector<int> other = support(links, second);
@@ -152,27 +216,18 @@ PatternStorage analyse_pattern(const std::vector<kernels::Link>& links, int nv,
   PatternStorage p;
   p.n = nv;
   p.slot.assign(std::size_t(nv) * nv, -1);
-  for (int i = 0; i < nv; ++i) {
-    p.entry_begin.push_back(p.entries);
+  for (int i = 0; i < nv; ++i)
     for (int j = 0; j < nv; ++j) {
       if (!s[i][j]) continue;
       p.slot[std::size_t(i) * nv + j] = p.entries++;
       p.entry_column.push_back(j);
     }
-  }
-  p.entry_begin.push_back(p.entries);
 
-  const Elimination done = minimum_fill(s);
-  p.permutation = done.order;
-  std::vector<int> step_of(nv);
-  for (int k = 0; k < nv; ++k) step_of[p.permutation[k]] = k;
-  // Structure in elimination order, with fill.
-  Structure f(nv, std::vector<char>(nv, 0));
-  for (int k = 0; k < nv; ++k) {
-    f[k][k] = 1;
-    for (const int j : done.left[k]) f[k][step_of[j]] = f[step_of[j]][k] = 1;
-  }
-  std::vector<int> at(std::size_t(nv) * nv, -1);
+  p.permutation = minimum_fill(s);
+  Structure f = permuted(s, p.permutation), fill_alone = permuted(alone, p.permutation);
+  fill_in(f);
+  fill_in(fill_alone);
+  Slots at(std::size_t(nv) * nv, -1);
   for (int i = 0; i < nv; ++i) {
     p.row_begin.push_back(p.factor_entries);
     for (int j = 0; j < nv; ++j) {
@@ -182,39 +237,26 @@ PatternStorage analyse_pattern(const std::vector<kernels::Link>& links, int nv,
     }
     p.diagonal.push_back(at[std::size_t(i) * nv + i]);
   }
-  p.row_begin.push_back(p.factor_entries);
   p.scatter.resize(p.entries);
   for (int i = 0; i < nv; ++i)
-    for (int e = p.entry_begin[i]; e < p.entry_begin[i + 1]; ++e)
-      p.scatter[e] = at[std::size_t(step_of[i]) * nv + step_of[p.entry_column[e]]];
-  const auto slot = [&](int i, int j) { return at[std::size_t(i) * nv + j]; };
-  for (int k = 0; k < nv; ++k) {
-    p.lower_begin.push_back(static_cast<int>(p.lower_slot.size()));
-    // Row i has every column that row k has: what is one stretch of k is one of i.
-    const std::vector<Stretch> columns = stretches(f[k], k);
-    for (int i = k + 1; i < nv; ++i) {
-      if (!f[i][k]) continue;
-      p.lower_slot.push_back(slot(i, k));
-      p.run_begin.push_back(static_cast<int>(p.runs.size()));
-      bool open = false;
-      for (const Stretch& c : columns) {
-        open = open && slot(i, c.begin) == p.runs.back().target + p.runs.back().length;
-        if (!open) p.runs.push_back({slot(k, c.begin), slot(i, c.begin), 0});
-        open = true;
-        p.runs.back().length += c.length;
-      }
+    for (int j = 0; j < nv; ++j) {
+      const int entry = p.slot[std::size_t(p.permutation[i]) * nv + p.permutation[j]];
+      if (entry >= 0) p.scatter[entry] = at[std::size_t(i) * nv + j];
     }
-  }
-  p.lower_begin.push_back(static_cast<int>(p.lower_slot.size()));
-  p.run_begin.push_back(static_cast<int>(p.runs.size()));
+  p.whole = part_of(s, f, p, at);
+  p.apart = part_of(alone, fill_alone, p, at);
   return p;
+}
+
+kernels::PatternPart PatternPartStorage::view() const {
+  return {entry_first.data(), entry_end.data(),  factor_first.data(), factor_end.data(),
+          lower_begin.data(), lower_slot.data(), run_begin.data(),    runs.data()};
 }
 
 kernels::Pattern PatternStorage::view() const {
   return {n,
           entries,
           slot.data(),
-          entry_begin.data(),
           entry_column.data(),
           factor_entries,
           permutation.data(),
@@ -222,10 +264,8 @@ kernels::Pattern PatternStorage::view() const {
           row_begin.data(),
           diagonal.data(),
           factor_column.data(),
-          lower_begin.data(),
-          lower_slot.data(),
-          run_begin.data(),
-          runs.data()};
+          whole.view(),
+          apart.view()};
 }
 
 }  // namespace tangere

@@ -10,12 +10,20 @@
 
 namespace tangere {
 
+/// The storage behind kernels::PatternPart.
+struct PatternPartStorage {
+  std::vector<int> entry_first, entry_end, factor_first, factor_end;
+  std::vector<int> lower_begin, lower_slot, run_begin;
+  std::vector<kernels::EliminationRun> runs;
+  [[nodiscard]] kernels::PatternPart view() const;
+};
+
 /// The storage behind kernels::Pattern.
 struct PatternStorage {
   int n = 0, entries = 0, factor_entries = 0;
-  std::vector<int> slot, entry_begin, entry_column, permutation, scatter, diagonal;
-  std::vector<int> row_begin, factor_column, lower_begin, lower_slot, run_begin;
-  std::vector<kernels::EliminationRun> runs;
+  std::vector<int> slot, entry_column, permutation, scatter, diagonal;
+  std::vector<int> row_begin, factor_column;
+  PatternPartStorage whole, apart;
   [[nodiscard]] kernels::Pattern view() const;
 };
 

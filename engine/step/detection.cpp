@@ -2,13 +2,16 @@
 // Runs the search kernel for one lane after another.
 #include "engine/step/detection.hpp"
 
+#include <algorithm>
+
 #include "engine/step/remember.hpp"
 
 namespace tangere {
 
 template <int L>
 void clear_candidates(BasicWorkspace<L>& w) {
-  w.in_rows = 0;
+  w.in_rows = w.asked = 0;
+  std::fill(w.apart.begin(), w.apart.end(), 1);
   for (auto& list : w.lists) {
     list.count = 0;
     for (int& count : list.own_count) count = 0;
@@ -40,38 +43,57 @@ void choose_faces(const CompiledModel& model, const kernels::KernelTable& table,
     table.stage<L>().choose_faces_at(model.view, w.stage, w.q0, w.zero, w.stage.faces);
 }
 
+/// Searches the points of pair k in the lanes where they may be near.
 template <int L>
-void find_candidates(const CompiledModel& model, const kernels::KernelTable& table,
-                     BasicWorkspace<L>& w, LaneBits lanes) {
-  w.in_rows &= ~lanes;
-  table.stage<L>().near_pairs(model.view, w.stage, w.near);
-  for (std::size_t g = 0; g < model.link_pairs.size(); ++g) {
-    kernels::Row<L>* reference = w.references + 12 * g;
-    for (int i = 0; i < 12; ++i)
-      for (int l = 0; l < L; ++l)
-        if (has(lanes, l)) reference[i][l] = w.near.link_poses[12 * g + std::size_t(i)][l];
-  }
-  for (std::size_t k = 0; k < model.pairs.size(); ++k) {
-    auto& list = w.lists[k];
-    const kernels::Row<L>* row = w.near.shape_poses + 12 * k;
-    for (int l = 0; l < L; ++l) {
-      if (!has(lanes, l)) continue;
-      list.own_count[l] = 0;
-      if (!has(w.near.lanes[k], l)) continue;
-      double pose[12];
-      for (int i = 0; i < 12; ++i) pose[i] = row[i][l];
-      list.own_count[l] = table.find_candidates(
-          {&model.pairs[k], size_of<L>(model.pairs[k], w.stage, l), pose, list.margin,
-           list.own + 3 * list.stride * l, list.stride, faces_of<L>(w.stage, k, l),
-           list.own_index == nullptr ? nullptr : list.own_index + list.stride * l});
-      if (list.own_index != nullptr) recall_list(model, table, w, static_cast<int>(k), l);
-    }
+static void search_pair(const CompiledModel& model, const kernels::KernelTable& table,
+                        BasicWorkspace<L>& w, std::size_t k, LaneBits lanes) {
+  auto& list = w.lists[k];
+  const kernels::Row<L>* row = w.near.shape_poses + 12 * k;
+  for (int l = 0; l < L; ++l) {
+    if (!has(lanes, l)) continue;
+    list.own_count[l] = 0;
+    if (!has(w.near.lanes[k], l)) continue;
+    double pose[12];
+    for (int i = 0; i < 12; ++i) pose[i] = row[i][l];
+    list.own_count[l] = table.find_candidates(
+        {&model.pairs[k], size_of<L>(model.pairs[k], w.stage, l), pose, list.margin,
+         list.own + 3 * list.stride * l, list.stride, faces_of<L>(w.stage, k, l),
+         list.own_index == nullptr ? nullptr : list.own_index + list.stride * l});
+    if (list.own_index != nullptr) recall_list(model, table, w, static_cast<int>(k), l);
   }
 }
 
-void lists_to_rows(const kernels::KernelTable& table, Workspace& w, LaneBits lanes) {
+template <int L>
+void find_candidates(const CompiledModel& model, const kernels::KernelTable& table,
+                     BasicWorkspace<L>& w, LaneBits lanes) {
+  w.asked |= lanes;
+  w.in_rows &= ~lanes;
+  w.apart_before = w.apart;
+  table.stage<L>().near_pairs(model.view, w.stage, w.near);
+  for (std::size_t g = 0; g < model.link_pairs.size(); ++g) {
+    if (w.apart[g] != 0) continue;
+    // Where no lane had a list, every lane needs one from now on.
+    const LaneBits searched = w.apart_before[g] != 0 ? w.asked : lanes;
+    w.in_rows &= ~searched;
+    kernels::Row<L>* reference = w.references + 12 * g;
+    for (int i = 0; i < 12; ++i)
+      for (int l = 0; l < L; ++l)
+        if (has(searched, l)) reference[i][l] = w.near.link_poses[12 * g + std::size_t(i)][l];
+    const kernels::LinkPair& links = model.link_pairs[g];
+    for (int i = links.first; i < links.first + links.count; ++i)
+      search_pair(model, table, w, std::size_t(model.pair_order[std::size_t(i)]), searched);
+  }
+}
+
+void lists_to_rows(const CompiledModel& model, const kernels::KernelTable& table, Workspace& w,
+                   LaneBits lanes) {
   if ((lanes & ~w.in_rows) == 0) return;
-  for (kernels::GroupStage::List& list : w.lists) table.transpose_list(list);
+  for (std::size_t g = 0; g < model.link_pairs.size(); ++g) {
+    if (w.apart[g] != 0) continue;
+    const kernels::LinkPair& links = model.link_pairs[g];
+    for (int i = links.first; i < links.first + links.count; ++i)
+      table.transpose_list(w.lists[std::size_t(model.pair_order[std::size_t(i)])]);
+  }
   w.in_rows = kAllLanes;
 }
 

@@ -21,7 +21,8 @@ void choose_faces(const CompiledModel& model, const kernels::KernelTable& kernel
                   BasicWorkspace<L>& w);
 
 /// Copies the lists of `lanes` into rows, for evaluations of more than one lane.
-void lists_to_rows(const kernels::KernelTable& kernels, Workspace& w, LaneBits lanes);
+void lists_to_rows(const CompiledModel& model, const kernels::KernelTable& kernels, Workspace& w,
+                   LaneBits lanes);
 
 /// Empties every list. Call before the first stage of a group.
 template <int L>

@@ -103,16 +103,19 @@ void GroupStep::watch_faces(const kernels::KernelTable& table, BasicWorkspace<L>
 template <int L>
 void GroupStep::finish(BasicWorkspace<L>& w, LaneBits lanes, const Row<L>& h, LaneBits& resolved,
                        NewtonReport& report) const {
-  for (int l = 0; l < L; ++l) {
-    if (!has(lanes, l)) continue;
-    for (int i = 0; i < model_.nv; ++i) w.v1[i][l] = w.stage.v[i][l];
-    for (const kernels::Link& link : model_.links) {
-      const Row<L>* x = w.stage.x + link.v;
-      if (link.kind != JointKind::spherical) {
-        for (int k = 0; k < kernels::dofs(link.kind); ++k)
-          w.q1[link.q + k][l] = w.stage.centre[link.q + k][l] + x[k][l];
-        continue;
+  for (int i = 0; i < model_.nv; ++i) put_lanes<L>(w.stage.v[i].lane, lanes, w.v1[i].lane);
+  for (const kernels::Link& link : model_.links) {
+    const Row<L>* x = w.stage.x + link.v;
+    if (link.kind != JointKind::spherical) {
+      for (int k = 0; k < kernels::dofs(link.kind); ++k) {
+        Row<L> q;
+        for (int l = 0; l < L; ++l) q[l] = w.stage.centre[link.q + k][l] + x[k][l];
+        put_lanes<L>(q.lane, lanes, w.q1[link.q + k].lane);
       }
+      continue;
+    }
+    for (int l = 0; l < L; ++l) {
+      if (!has(lanes, l)) continue;
       const Vec3<double> turn = {x[0][l], x[1][l], x[2][l]};
       const Row<L>* v = w.stage.v + link.v;
       const Vec3<double> rate = {v[0][l], v[1][l], v[2][l]};
@@ -130,12 +133,10 @@ void GroupStep::finish(BasicWorkspace<L>& w, LaneBits lanes, const Row<L>& h, La
 /// Makes the result of the present solve the state.
 template <int L>
 void GroupStep::commit(BasicWorkspace<L>& w, LaneBits lanes) const {
-  for (int l = 0; l < L; ++l) {
-    if (!has(lanes, l)) continue;
-    for (int i = 0; i < model_.nq; ++i) w.q0[i][l] = w.q1[i][l];
-    for (int i = 0; i < model_.nv; ++i) w.v0[i][l] = w.v1[i][l];
-    w.remembered.now[std::size_t(l)].swap(w.remembered.after[std::size_t(l)]);
-  }
+  for (int i = 0; i < model_.nq; ++i) put_lanes<L>(w.q1[i].lane, lanes, w.q0[i].lane);
+  for (int i = 0; i < model_.nv; ++i) put_lanes<L>(w.v1[i].lane, lanes, w.v0[i].lane);
+  for (int l = 0; l < L; ++l)
+    if (has(lanes, l)) w.remembered.now[std::size_t(l)].swap(w.remembered.after[std::size_t(l)]);
 }
 
 /// Adds the solve that ended in q0, v0 to the log.

@@ -208,6 +208,9 @@ struct LaneAt {
   void add_contacts(const kernels::KernelTable& table, double* found) {
     for (const kernels::LinkPair& links : model.link_pairs) {
       const Frame<double> link2_in_1 = relative(world(links.link1), world(links.link2));
+      const Vec3<double> arm =
+          link2_in_1.R * links.shapes_middle + link2_in_1.p - links.points_middle;
+      if (dot(arm, arm) >= links.apart * links.apart) continue;
       for (int i = 0; i < links.count; ++i)
         add_pair(table, std::size_t(model.pair_order[std::size_t(links.first + i)]), link2_in_1,
                  found);

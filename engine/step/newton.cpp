@@ -101,7 +101,7 @@ struct Search {
       if (has(searching, l) && w.stage.excess[0][l] > 0) stale |= 1U << l;
     if (stale != 0) find_candidates(model, table, w, stale);
     if constexpr (L > 1)
-      if (lone(searching) < 0) lists_to_rows(table, w, searching);
+      if (lone(searching) < 0) lists_to_rows(model, table, w, searching);
   }
 
   /// Lanes that have a factor of the stage before take chord steps by it from the start.

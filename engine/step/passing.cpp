@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "engine/step/lane_energy.hpp"
 
@@ -37,17 +38,67 @@ void Passing::add(int link, const Frame<double>& at, PrimitiveShape shape, const
   int axis = 0;
   for (const int k : {1, 2})
     if (component(half, k) < component(half, axis)) axis = k;
-  walls_.push_back({link, other, at, half, axis, middle});
   const double thin = component(half, axis);
   const auto same = [&](const Gate& g) {
     return std::minmax(g.link, g.other) == std::minmax(link, other);
   };
   const auto gate = std::find_if(gates_.begin(), gates_.end(), same);
+  walls_.push_back({link, other, at, half, axis, middle, std::size_t(gate - gates_.begin())});
   if (gate == gates_.end()) {
     gates_.push_back({link, other, thin});
   } else {
     gate->half = std::min(gate->half, thin);
   }
+}
+
+/// Puts balls around the walls and middles of every gate: their centres are means, so that a gate of
+/// two bodies has the bodies' own.
+void Passing::bound_gates() {
+  const auto for_sides = [&](const auto& f) {
+    for (const Wall& wall : walls_) {
+      Gate& gate = gates_[wall.gate];
+      const bool own = wall.link == gate.link;
+      f(own ? gate.of_link : gate.of_other, wall.at.p, std::sqrt(dot(wall.half, wall.half)));
+      f(own ? gate.of_other : gate.of_link, wall.middle, 0.0);
+    }
+  };
+  std::vector<double> count(gates_.size(), 0.0);
+  for (const Wall& wall : walls_) ++count[wall.gate];
+  for_sides([](Ball& ball, const Vec3<double>& at, double) { ball.centre += at; });
+  for (std::size_t k = 0; k < gates_.size(); ++k)
+    for (Ball* ball : {&gates_[k].of_link, &gates_[k].of_other})
+      ball->centre = (1 / count[k]) * ball->centre;
+  for_sides([](Ball& ball, const Vec3<double>& at, double radius) {
+    const Vec3<double> arm = at - ball.centre;
+    ball.radius = std::max(ball.radius, std::sqrt(dot(arm, arm)) + radius);
+  });
+}
+
+/// Whether the balls of two links were farther apart than any point of one can have moved in the
+/// axes of the other.
+template <int L>
+bool Passing::stay_apart(const Gate& gate, const AlignedVector<LinkPose<Row<L>>>& before,
+                         const AlignedVector<LinkPose<Row<L>>>& after, int lane) {
+  const auto other_in_link = [&](const AlignedVector<LinkPose<Row<L>>>& poses) {
+    const auto world = [&](int link) {
+      return link < 0 ? Frame<double>{kernels::diagonal(1.0), {0, 0, 0}}
+                      : frame_in_lane<L>(poses[std::size_t(link)], lane);
+    };
+    return relative(world(gate.link), world(gate.other));
+  };
+  const auto length = [](const Vec3<double>& a) { return std::sqrt(dot(a, a)); };
+  const Frame<double> from = other_in_link(before), to = other_in_link(after);
+  const Vec3<double>&a = gate.of_link.centre, &b = gate.of_other.centre;
+  double square = 0;
+  for (int i = 0; i < 9; ++i) {
+    const double turn = to.R.m[i / 3][i % 3] - from.R.m[i / 3][i % 3];
+    square += turn * turn;
+  }
+  const Vec3<double> start = from.R * b + from.p, end = to.R * b + to.p;
+  const double own = length(end - start), back = length(transposed_times(to.R, a - to.p) -
+                                                        transposed_times(from.R, a - from.p));
+  const double radius = gate.of_link.radius + gate.of_other.radius;
+  return length(start - a) > radius + std::max(own, back) + std::sqrt(square) * radius;
 }
 
 Passing::Passing(const CompiledModel& m) : model_(m), arm_(m.links.size(), 0.0) {
@@ -58,6 +109,10 @@ Passing::Passing(const CompiledModel& m) : model_(m), arm_(m.links.size(), 0.0) 
     // Bodies with points of their own need not be convex.
     if (solid.stretches) add(p.link1, solid.frame, solid.shape, solid.size, p.link2, p.frame2.p);
   }
+  bound_gates();
+  // passed() looks at a gate once.
+  std::stable_sort(walls_.begin(), walls_.end(),
+                   [](const Wall& a, const Wall& b) { return a.gate < b.gate; });
   for (const Wall& wall : walls_)
     for (const auto& [link, place] : {std::pair{wall.link, wall.at.p}, {wall.other, wall.middle}}) {
       double arm = std::sqrt(dot(place, place));
@@ -101,7 +156,12 @@ bool Passing::passed(const AlignedVector<LinkPose<Row<L>>>& before,
     const Frame<double> middle = {kernels::diagonal(1.0), wall.middle};
     return relative(world(wall.link, wall.at), world(wall.other, middle)).p;
   };
+  std::size_t gate = gates_.size();
+  bool apart = false;
   return std::any_of(walls_.begin(), walls_.end(), [&](const Wall& wall) {
+    if (std::exchange(gate, wall.gate) != wall.gate)
+      apart = stay_apart<L>(gates_[wall.gate], before, after, lane);
+    if (apart) return false;
     const Vec3<double> from = place(wall, before), to = place(wall, after);
     const double a = component(from, wall.axis), b = component(to, wall.axis);
     if (!(a * b < 0)) return false;

@@ -33,15 +33,27 @@ class Passing {
     kernels::Vec3<double> half;
     int axis;                      ///< along which it is thinnest: 0, 1, 2
     kernels::Vec3<double> middle;  ///< of the other body, in its link
+    std::size_t gate;
   };
   void add(int link, const kernels::Frame<double>& at, PrimitiveShape shape,
            const kernels::Vec3<double>& size, int other, const kernels::Vec3<double>& middle);
 
-  /// Two links, and half of what is thinnest between them [m].
+  /// A ball around all walls and middles of one link, in its axes.
+  struct Ball {
+    kernels::Vec3<double> centre{};
+    double radius = 0;
+  };
+  /// Two links, half of what is thinnest between them [m], and the balls of both.
   struct Gate {
     int link, other;
     double half;
+    Ball of_link{}, of_other{};
   };
+  void bound_gates();
+  template <int L>
+  [[nodiscard]] static bool stay_apart(
+      const Gate& gate, const AlignedVector<kernels::LinkPose<kernels::Row<L>>>& before,
+      const AlignedVector<kernels::LinkPose<kernels::Row<L>>>& after, int lane);
 
   const CompiledModel& model_;
   std::vector<Wall> walls_;

@@ -138,6 +138,7 @@ struct Stepper::Impl {
         tape->add({tape->steps(), of_block + l, std::move(solves)});
     LaneBits again = 0;
     if (sleeping) again = wake_touched(batch, stepped, w, g, lane, live, report);
+    LaneBits moved = 0;
     for (int l = 0; l < L; ++l) {
       if (!has(live & ~again, l)) continue;
       const std::size_t e = std::size_t(g.first + lane + l);
@@ -150,16 +151,17 @@ struct Stepper::Impl {
       if (!m.memories.empty()) batch.memory_[e] = w.remembered.now[std::size_t(l)];
       // One step back is too long for BDF2's history where a step had to be cut.
       batch.has_history_[e] = settings.accuracy > 0 ? 0 : 1;
-      const auto shift = [&](int now, int before, const Row<L>* from, std::span<const int> of) {
-        for (std::size_t i = 0; i < of.size(); ++i) {
-          double* row = g.rows + of[i] * kBlock + lane + l;
-          row[before * kBlock] = row[now * kBlock];
-          row[now * kBlock] = from[i][l];
-        }
-      };
-      shift(m.layout.q, m.layout.previous_q, w.q0, stepped.q);
-      shift(m.layout.v, m.layout.previous_v, w.v0, stepped.v);
+      moved |= 1U << l;
     }
+    const auto shift = [&](int now, int before, const Row<L>* from, std::span<const int> of) {
+      for (std::size_t i = 0; i < of.size(); ++i) {
+        double* const row = g.rows + of[i] * kBlock + lane;
+        put_lanes<L>(row + now * kBlock, moved, row + before * kBlock);
+        put_lanes<L>(from[i].lane, moved, row + now * kBlock);
+      }
+    };
+    shift(m.layout.q, m.layout.previous_q, w.q0, stepped.q);
+    shift(m.layout.v, m.layout.previous_v, w.v0, stepped.v);
     if (sleeping) settle<L>(batch, g, lane, live & ~again);
     return again << lane;
   }

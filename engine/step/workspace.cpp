@@ -113,6 +113,9 @@ template <int L>
 BasicWorkspace<L>::BasicWorkspace(const CompiledModel& m, int inner)
     : lists(m.pairs.size()),
       near_lanes(m.pairs.size()),
+      apart(m.link_pairs.size(), 0),
+      apart_before(apart),
+      coupled(1, 1),
       near{},
       stage{},
       inner_stages(inner),
@@ -153,6 +156,8 @@ BasicWorkspace<L>::BasicWorkspace(const CompiledModel& m, int inner)
     }
   }
   stage.lists = lists.data();
+  stage.apart = apart.data();
+  stage.coupled = coupled.data();
   stage.scratch = scratch.data();
 }
 

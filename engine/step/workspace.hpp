@@ -5,6 +5,7 @@
 
 #include <array>
 #include <cstdint>
+#include <cstring>
 #include <vector>
 
 #include "engine/base/aligned.hpp"
@@ -21,6 +22,17 @@ using LaneBits = unsigned;
 inline constexpr LaneBits kNoLane = 0;
 inline constexpr LaneBits kAllLanes = (1U << kernels::kGroup) - 1;
 inline bool has(LaneBits bits, int lane) { return ((bits >> lane) & 1U) != 0; }
+
+/// Copies the numbers of some lanes of a row. All of them are one vector.
+template <int L>
+inline void put_lanes(const double* from, LaneBits lanes, double* to) {
+  if (lanes == (1U << L) - 1) {
+    std::memcpy(to, from, L * sizeof(double));
+    return;
+  }
+  for (int l = 0; l < L; ++l)
+    if (has(lanes, l)) to[l] = from[l];
+}
 
 /// The largest number of inner stages of a scheme in the table.
 inline constexpr int kInnerStages = 1;
@@ -58,6 +70,10 @@ struct BasicWorkspace {
   LaneBits in_rows = 0;  ///< lanes whose lists are also in the rows
   LaneRow* references;   ///< (n_link_pairs, 12) memory of the lists' references
   std::vector<unsigned> near_lanes;
+  std::vector<unsigned char> apart;         ///< (n_link_pairs) memory of stage.apart
+  std::vector<unsigned char> apart_before;  ///< the same before the last search
+  std::vector<unsigned char> coupled;       ///< (1) memory of stage.coupled
+  LaneBits asked = 0;  ///< lanes that were searched since the lists were cleared
   kernels::NearPairs<L> near;
   kernels::Stage<L> stage;
 

@@ -35,7 +35,12 @@ struct Stage {
     double* own_anchors;  ///< (L, kAnchorNumbers, stride)
     Row<L>* anchors;      ///< (stride, kAnchorNumbers)
   };
-  List* lists;             ///< (n_pairs)
+  List* lists;  ///< (n_pairs)
+  /// (n_link_pairs) 1: when it was looked at last, nothing of the links could touch in any lane.
+  /// Their lists are not read.
+  unsigned char* apart;
+  /// 0: the last Jacobian has zeros in all lanes wherever contacts alone couple dofs.
+  unsigned char* coupled;
   Row<L>* ground_anchors;  ///< (points that remember, kAnchorNumbers)
   Row<L>* faces;           ///< (n_pairs, 3) faces that count in this solve (kernels/step/faces.hpp)
   std::byte* scratch;      ///< scratch_bytes(model)
@@ -95,7 +100,8 @@ struct StageAdjoint {
   StageHistory<Row<L>> history;
 };
 
-/// Which pairs are near enough to search, and the poses that the search needs.
+/// Which pairs are near enough to search, and the poses that the search needs. Nothing is set for
+/// pairs of links that are apart.
 template <int L>
 struct NearPairs {
   Row<L>* link_poses;   ///< (n_link_pairs, 12) link 2 in link 1: R row-major, then p

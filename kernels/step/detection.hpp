@@ -30,12 +30,17 @@ void store_frame(const Frame<N>& x, N* rows) {
 }
 
 /// Finds the pairs whose points may be near: tests the ball that holds all points against the
-/// shape.
+/// shape, unless the balls around all points and all shapes of the links tell already.
 template <class N, int L>
 void near_pairs(const ModelView& model, const StageArgs<N>& a, NearPairs<L>& out) {
   const auto view = [](Row<L>* p) { return reinterpret_cast<N*>(p); };
   for (int g = 0; g < model.n_link_pairs; ++g) {
     const LinkPair& links = model.link_pairs[g];
+    const bool was_apart = is_apart(a, g);
+    const double margin = a.candidates[model.pair_order[links.first]].margin;
+    a.apart[g] = lane_bits(balls_overlap(links, a, margin) > N(0.0)) == 0 ? 1 : 0;
+    if (a.apart[g] != 0) continue;
+    if (was_apart) pair_motion(links, a, a.contacts[g]);
     const Frame<N>& x = a.contacts[g].link2_in_1;
     store_frame(x, view(out.link_poses + 12 * g));
     for (int i = 0; i < links.count; ++i) {
@@ -44,7 +49,7 @@ void near_pairs(const ModelView& model, const StageArgs<N>& a, NearPairs<L>& out
       const Vec3<N> in_2 = transposed_times(x.R, broadcast<N>(pair.middle) - x.p);
       const Vec3<N> y =
           transposed_times(broadcast<N>(pair.frame2.R), in_2 - broadcast<N>(pair.frame2.p));
-      const N reach(pair.extent + a.candidates[k].margin);
+      const N reach(pair.extent + margin);
       const Vec3<N> size = load_vector<N>(pair.size, pair.size_row, a.block, a.group);
       out.lanes[k] = with_touched<N>(pair, size, faces_of(a, pair, k), [&](const auto& shape) {
         return lane_bits(nearer_than(shape, y, reach));

@@ -152,12 +152,15 @@ void jacobian(const ModelView& model, const StageArgs<N>& a) {
   composite_sweep(model, a);
   for (int i = 0; i < model.n_links; ++i)
     with_kind(model.links[i].kind, [&]<JointKind K>() { joint_jacobian<K>(model, a, i); });
+  bool coupled = false;
   for (int k = 0; k < model.n_link_pairs; ++k) {
     const LinkPair& pair = model.link_pairs[k];
     if (!a.contacts[k].near) continue;
+    coupled = coupled || (pair.link1 >= 0 && pair.link2 >= 0);
     contact_jacobian(model, a, pair.link1, pair.link2, a.contacts[k],
                      pair.link2 < 0 ? nullptr : &a.contacts[k].Z);
   }
+  if (a.coupled != nullptr) *a.coupled = coupled ? 1 : 0;
   for (int k = 0; k < model.n_grounded; ++k) {
     const ContactScratch<N>& o = a.contacts[model.n_link_pairs + k];
     if (o.near) contact_jacobian<N>(model, a, model.grounded[k].link, -1, o, nullptr);

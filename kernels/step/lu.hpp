@@ -15,15 +15,15 @@ namespace tangere::kernels {
 
 /// Factors in place, with unit lower factor. U's diagonal is stored as its reciprocal.
 template <class N>
-void eliminate(const Pattern& p, N* work) {
+void eliminate(const Pattern& p, const PatternPart& part, N* work) {
   for (int k = 0; k < p.n; ++k) {
     const N inverse = 1.0 / work[p.diagonal[k]];
     work[p.diagonal[k]] = inverse;
-    for (int c = p.lower_begin[k]; c < p.lower_begin[k + 1]; ++c) {
-      const N l = work[p.lower_slot[c]] * inverse;
-      work[p.lower_slot[c]] = l;
-      for (int run = p.run_begin[c]; run < p.run_begin[c + 1]; ++run) {
-        const EliminationRun& e = p.runs[run];
+    for (int c = part.lower_begin[k]; c < part.lower_begin[k + 1]; ++c) {
+      const N l = work[part.lower_slot[c]] * inverse;
+      work[part.lower_slot[c]] = l;
+      for (int run = part.run_begin[c]; run < part.run_begin[c + 1]; ++run) {
+        const EliminationRun& e = part.runs[run];
         const N* from = work + e.source;
         N* to = work + e.target;
         for (int r = 0; r < e.length; ++r) to[r] = mul_sub_from(l, from[r], to[r]);
@@ -32,15 +32,16 @@ void eliminate(const Pattern& p, N* work) {
   }
 }
 
-/// Factors A into LU, (factor_entries): in all lanes if `accept` is null, else in those where it is
+/// Factors A, whose numbers lie in `part`, into LU, (factor_entries): in all lanes if `accept` is null, else in those where it is
 /// 1; the other lanes keep their LU. `work`: (factor_entries).
 template <class N>
-void factor(const Pattern& p, const N* A, const N* accept, N* LU, N* work) {
+void factor(const Pattern& p, const PatternPart& part, const N* A, const N* accept, N* LU,
+            N* work) {
   N* to = accept == nullptr ? LU : work;
   if (p.factor_entries != p.entries)
     for (int e = 0; e < p.factor_entries; ++e) to[e] = N(0.0);
   for (int e = 0; e < p.entries; ++e) to[p.scatter[e]] = A[e];
-  eliminate(p, to);
+  eliminate(p, part, to);
   if (accept == nullptr) return;
   const auto mask = *accept > N(0.0);
   for (int e = 0; e < p.factor_entries; ++e) LU[e] = select(mask, work[e], LU[e]);
@@ -59,21 +60,23 @@ N reduced(const Pattern& p, const N* LU, int begin, int end, const N& b, const N
   return even + odd;
 }
 
-/// Solves x = A⁻¹ b from the factor. b and x are in dof order. `work`: (n).
+/// Solves x = A⁻¹ b from the factor, whose numbers lie in `part`. b and x are in dof order. `work`:
+/// (n).
 template <class N>
-void solve(const Pattern& p, const N* LU, const N* b, N* x, N* work) {
+void solve(const Pattern& p, const PatternPart& part, const N* LU, const N* b, N* x, N* work) {
   for (int k = 0; k < p.n; ++k)
-    work[k] = reduced(p, LU, p.row_begin[k], p.diagonal[k], b[p.permutation[k]], work);
+    work[k] = reduced(p, LU, part.factor_first[k], p.diagonal[k], b[p.permutation[k]], work);
   for (int k = p.n - 1; k >= 0; --k) {
     work[k] =
-        reduced(p, LU, p.diagonal[k] + 1, p.row_begin[k + 1], work[k], work) * LU[p.diagonal[k]];
+        reduced(p, LU, p.diagonal[k] + 1, part.factor_end[k], work[k], work) * LU[p.diagonal[k]];
     x[p.permutation[k]] = work[k];
   }
 }
 
 /// Solves x = A⁻ᵀ b from the same factor: Uᵀ, then Lᵀ, row by row of the factor.
 template <class N>
-void solve_transposed(const Pattern& p, const N* LU, const N* b, N* x, N* work) {
+void solve_transposed(const Pattern& p, const PatternPart& part, const N* LU, const N* b, N* x,
+                      N* work) {
   const auto take = [&](int begin, int end, const N& y) {
     for (int s = begin; s < end; ++s)
       work[p.factor_column[s]] = mul_sub_from(LU[s], y, work[p.factor_column[s]]);
@@ -81,27 +84,27 @@ void solve_transposed(const Pattern& p, const N* LU, const N* b, N* x, N* work) 
   for (int k = 0; k < p.n; ++k) work[k] = b[p.permutation[k]];
   for (int k = 0; k < p.n; ++k) {
     work[k] = work[k] * LU[p.diagonal[k]];
-    take(p.diagonal[k] + 1, p.row_begin[k + 1], work[k]);
+    take(p.diagonal[k] + 1, part.factor_end[k], work[k]);
   }
   for (int k = p.n - 1; k >= 0; --k) {
-    take(p.row_begin[k], p.diagonal[k], work[k]);
+    take(part.factor_first[k], p.diagonal[k], work[k]);
     x[p.permutation[k]] = work[k];
   }
 }
 
 /// Computes b - A x, or b - Aᵀ x.
 template <bool Transposed, class N>
-void defect(const Pattern& p, const N* A, const N* x, const N* b, N* out) {
+void defect(const Pattern& p, const PatternPart& part, const N* A, const N* x, const N* b, N* out) {
   if constexpr (Transposed) {
     for (int i = 0; i < p.n; ++i) out[i] = b[i];
     for (int i = 0; i < p.n; ++i)
-      for (int e = p.entry_begin[i]; e < p.entry_begin[i + 1]; ++e)
+      for (int e = part.entry_first[i]; e < part.entry_end[i]; ++e)
         out[p.entry_column[e]] = mul_sub_from(A[e], x[i], out[p.entry_column[e]]);
     return;
   }
   for (int i = 0; i < p.n; ++i) {
     N sum = b[i];
-    for (int e = p.entry_begin[i]; e < p.entry_begin[i + 1]; ++e)
+    for (int e = part.entry_first[i]; e < part.entry_end[i]; ++e)
       sum = mul_sub_from(A[e], x[p.entry_column[e]], sum);
     out[i] = sum;
   }
@@ -109,11 +112,11 @@ void defect(const Pattern& p, const N* A, const N* x, const N* b, N* out) {
 
 /// Returns the largest row sum of |S A S|; the largest column sum if transposed.
 template <bool Transposed, class N>
-N scaled_norm(const Pattern& p, const N* A, const N* scale, N* sums) {
+N scaled_norm(const Pattern& p, const PatternPart& part, const N* A, const N* scale, N* sums) {
   N norm(0.0);
   for (int i = 0; i < p.n; ++i) sums[i] = N(0.0);
   for (int i = 0; i < p.n; ++i)
-    for (int e = p.entry_begin[i]; e < p.entry_begin[i + 1]; ++e) {
+    for (int e = part.entry_first[i]; e < part.entry_end[i]; ++e) {
       N& sum = sums[Transposed ? p.entry_column[e] : i];
       sum = mul_add(abs(A[e]), scale[Transposed ? i : p.entry_column[e]], sum);
     }
@@ -121,29 +124,32 @@ N scaled_norm(const Pattern& p, const N* A, const N* scale, N* sums) {
   return norm;
 }
 
-/// Solves x = A⁻¹ b or A⁻ᵀ b, refined once. `sound` is 1 where the result passed the test above.
+/// Solves x = A⁻¹ b or A⁻ᵀ b, refined once, in lanes whose factor is that of A, both with
+/// their numbers in `part`. `sound` is 1 where the result passed the test above.
 /// `work`: (5 n).
 template <bool Transposed, class N>
-void solve_watched(const Pattern& p, const N* A, const N* LU, const N* b, N* x, N* sound, N* work) {
+void solve_watched(const Pattern& p, const PatternPart& part, const N* A, const N* LU, const N* b,
+                   N* x, N* sound, N* work) {
   const int n = p.n;
   N *residual = work, *correction = work + n, *scale = work + 2 * n, *inverse_scale = work + 3 * n,
     *scratch = work + 4 * n;
   const N zero(0.0), one(1.0);
   const auto solve_for = [&](const N* from, N* to) {
-    Transposed ? solve_transposed(p, LU, from, to, scratch) : solve(p, LU, from, to, scratch);
+    Transposed ? solve_transposed(p, part, LU, from, to, scratch)
+               : solve(p, part, LU, from, to, scratch);
   };
   solve_for(b, x);
-  defect<Transposed>(p, A, x, b, residual);
+  defect<Transposed>(p, part, A, x, b, residual);
   solve_for(residual, correction);
   for (int i = 0; i < n; ++i) x[i] = x[i] + correction[i];
-  defect<Transposed>(p, A, x, b, residual);
+  defect<Transposed>(p, part, A, x, b, residual);
   for (int i = 0; i < n; ++i) {
     const N diagonal = abs(A[p.slot[i * n + i]]);
     const N safe = select(diagonal > zero, diagonal, one);
     scale[i] = inverse_sqrt(safe);
     inverse_scale[i] = safe * scale[i];
   }
-  const N norm_a = scaled_norm<Transposed>(p, A, scale, scratch);
+  const N norm_a = scaled_norm<Transposed>(p, part, A, scale, scratch);
   N norm_r = zero, norm_b = zero, norm_x = zero, norm_d = zero;
   for (int i = 0; i < n; ++i) {
     norm_r = max(abs(residual[i]) * scale[i], norm_r);

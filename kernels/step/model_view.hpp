@@ -126,6 +126,11 @@ struct LinkPair {
               ///< changes nothing
   Vec3<double> centre;
   bool faced;  ///< some member is
+  /// Centres of a ball that holds all contact points, link 1's axes, and of one that holds all
+  /// shapes, link 2's axes. Where they are `apart` from each other or more, nothing touches [m].
+  /// Infinite: no ball holds the shapes, or their faces.
+  Vec3<double> points_middle, shapes_middle;
+  double apart;
 };
 
 /// A body against the half-space below the ground: points of the body, or a sphere's lowest point.
@@ -178,14 +183,24 @@ struct GroundedLink {
   int first, count;  ///< members: grounds ground_order[first] … ground_order[first + count - 1]
 };
 
+/// The part of a pattern that may hold other numbers than zero. What lies outside of it is left
+/// out: subtracting zeros changes no bit.
+struct PatternPart {
+  // Of each row (n): its first such entry and one past the last; the same of factor slots, where
+  // the first is an even number of slots after the row's (lu.hpp adds them in pairs).
+  const int *entry_first, *entry_end, *factor_first, *factor_end;
+  const int* lower_begin;  ///< (n + 1) into lower_slot: the entries below pivot k
+  const int* lower_slot;   ///< slot of L(i, k)
+  const int* run_begin;    ///< (lower entries + 1) into runs: what row i subtracts of row k
+  const struct EliminationRun* runs;
+};
+
 /// Structure of matrices over dofs, shared by all environments and steps.
 struct Pattern {
-  int n;            ///< dofs
-  int entries;      ///< stored entries of G_q, C and A
-  const int* slot;  ///< (n, n): index of entry (i, j), -1 where always zero
-  const int*
-      entry_begin;  ///< (n + 1): entries of row i are entry_begin[i] … entry_begin[i + 1] - 1
-  const int* entry_column;  ///< (entries)
+  int n;                    ///< dofs
+  int entries;              ///< stored entries of G_q, C and A
+  const int* slot;          ///< (n, n): index of entry (i, j), -1 where always zero
+  const int* entry_column;  ///< (entries) row by row
   // LU: entries of A are scattered to factor slots, then eliminated by interpreting these lists.
   // Factor slots go row by row in elimination order: L(i, ·), U(i, i), U(i, ·). The entries to the
   // right of a pivot are thus adjacent.
@@ -195,10 +210,8 @@ struct Pattern {
   const int* row_begin;      ///< (n + 1) first factor slot of row i
   const int* diagonal;       ///< (n) slot of U(i, i)
   const int* factor_column;  ///< (factor_entries) elimination step j of each slot
-  const int* lower_begin;    ///< (n + 1) into lower_slot: the entries below pivot k
-  const int* lower_slot;     ///< slot of L(i, k)
-  const int* run_begin;      ///< (lower entries + 1) into runs: what row i subtracts of row k
-  const struct EliminationRun* runs;
+  PatternPart whole;
+  PatternPart apart;  ///< what is left where no contact couples dofs
 };
 
 /// work[target + r] -= L(i, k) work[source + r] for r < length.

@@ -171,6 +171,25 @@ N list_excess(const LinkPair& pair, const CandidateList<N>& list, const Frame<N>
   return moved - list.margin;
 }
 
+template <class N>
+bool is_apart(const StageArgs<N>& a, int link_pair) {
+  return a.apart != nullptr && a.apart[link_pair] != 0;
+}
+
+/// Returns a positive number where the balls around the points and the shapes of two links are
+/// nearer to each other than `margin`.
+template <class N>
+N balls_overlap(const LinkPair& pair, const StageArgs<N>& a, double margin) {
+  const auto in_world = [&](int link, const Vec3<double>& middle) {
+    const Vec3<N> at = broadcast<N>(middle);
+    return link < 0 ? at : a.links[link].world.R * at + a.links[link].world.p;
+  };
+  const Vec3<N> arm =
+      in_world(pair.link2, pair.shapes_middle) - in_world(pair.link1, pair.points_middle);
+  const double reach = pair.apart + margin;
+  return N(reach * reach) - dot(arm, arm);
+}
+
 /// Adds the points of a capsule one candidate after the other: its ends bend in two directions.
 template <bool Derivatives, class Shape, class N>
 void add_candidates(const Shape& shape, const LawParameters<N>& law, const CandidateList<N>& list,
@@ -331,8 +350,11 @@ void without_negative_zeros(N* x, int count) {
   for (int i = 0; i < count; ++i) x[i] = x[i] + N(0.0);
 }
 
+/// Whether some lane has a candidate of the shapes of link pair k.
 template <class N>
-bool near(const ModelView& model, const LinkPair& links, const StageArgs<N>& a) {
+bool near(const ModelView& model, int k, const StageArgs<N>& a) {
+  if (is_apart(a, k)) return false;
+  const LinkPair& links = model.link_pairs[k];
   for (int i = 0; i < links.count; ++i)
     if (has_candidates(a.candidates[model.pair_order[links.first + i]], a.lone)) return true;
   return false;
@@ -345,7 +367,7 @@ void contact_sweep(const ModelView& model, const StageArgs<N>& a) {
   for (int k = 0; k < model.n_link_pairs; ++k) {
     const LinkPair& pair = model.link_pairs[k];
     ContactScratch<N>& o = a.contacts[k];
-    o.near = near(model, pair, a);
+    o.near = near(model, k, a);
     if (!o.near) continue;
     sum_link_pair<Derivatives>(model, pair, a, o);
     if (pair.link1 >= 0) a.links[pair.link1].F -= o.sums.wrench;
@@ -398,6 +420,10 @@ void kinematics(const ModelView& model, const StageArgs<N>& a) {
   a.excess[0] = N(0.0);
   for (int k = 0; k < model.n_link_pairs; ++k) {
     const LinkPair& pair = model.link_pairs[k];
+    if (is_apart(a, k)) {
+      a.excess[0] = max(a.excess[0], balls_overlap(pair, a, 0));
+      continue;
+    }
     const CandidateList<N>& list = a.candidates[model.pair_order[pair.first]];
     pair_motion(pair, a, a.contacts[k]);
     a.excess[0] = max(a.excess[0], list_excess(pair, list, a.contacts[k].link2_in_1));

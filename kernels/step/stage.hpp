@@ -79,7 +79,10 @@ struct StageArgs {
   N friction_tangent = N(1.0);         ///< for derivatives; see kernels/contact/contact_law.hpp
   const double* block;                 ///< of the batch, for parameters that vary
   int group;                           ///< 0 or 1: which half of the block
-  const CandidateList<N>* candidates;  ///< (n_pairs)
+  const CandidateList<N>* candidates;  ///< (n_pairs) those of links that are apart are not
+                                       ///< set, but the margin of the first
+  unsigned char* apart;                ///< (n_link_pairs) as in Stage; null: none is
+  unsigned char* coupled;              ///< as in Stage; null: nobody asks
   const N* ground_anchors;             ///< (points that remember, kAnchorNumbers)
   const N* faces;  ///< (n_pairs, 3) faces that count in this solve (kernels/step/faces.hpp)
   int lone;  ///< the only lane whose result matters; its contacts are summed across points. -1: all

@@ -44,6 +44,34 @@ struct StageView {
     return a;
   }
 
+  /// Presents the lists of links that are not apart: copying all would take longer than what is
+  /// left to do where nothing touches.
+  static const CandidateList<N>* lists_of(const ModelView& m, const StageOf& s, int lone,
+                                          Scratch& scratch) {
+    auto* lists = scratch.template take<CandidateList<N>>(m.n_pairs);
+    const int lane = lone < 0 ? 0 : lone;
+    for (int g = 0; g < m.n_link_pairs; ++g) {
+      const int first = m.pair_order[m.link_pairs[g].first];
+      lists[first].margin = s.lists[first].margin;
+      if (s.apart[g] != 0) continue;
+      for (int i = 0; i < m.link_pairs[g].count; ++i) {
+        const int k = m.pair_order[m.link_pairs[g].first + i];
+        const typename StageOf::List& l = s.lists[k];
+        lists[k] = {
+            view(l.points),
+            l.count,
+            view(l.reference),
+            l.margin,
+            l.own + 3 * l.stride * lane,
+            l.own_count[lane],
+            l.stride,
+            view(l.anchors),
+            l.own_anchors == nullptr ? nullptr : l.own_anchors + kAnchorNumbers * l.stride * lane};
+      }
+    }
+    return lists;
+  }
+
   static StageArgs<N> arguments(const ModelView& m, const StageOf& s, int lone) {
     Scratch scratch{s.scratch};
     return arguments(m, s, lone, scratch);
@@ -54,22 +82,9 @@ struct StageView {
     a.links = scratch.template take<LinkScratch<N>>(m.n_links);
     a.contacts = scratch.template take<ContactScratch<N>>(m.n_link_pairs + m.n_grounded);
     a.columns = scratch.template take<JointColumns<N>>(2 * m.n_links);
-    auto* lists = scratch.template take<CandidateList<N>>(m.n_pairs);
-    for (int k = 0; k < m.n_pairs; ++k) {
-      const typename StageOf::List& l = s.lists[k];
-      const int lane = lone < 0 ? 0 : lone;
-      lists[k] = {
-          view(l.points),
-          l.count,
-          view(l.reference),
-          l.margin,
-          l.own + 3 * l.stride * lane,
-          l.own_count[lane],
-          l.stride,
-          view(l.anchors),
-          l.own_anchors == nullptr ? nullptr : l.own_anchors + kAnchorNumbers * l.stride * lane};
-    }
-    a.candidates = lists;
+    a.candidates = lists_of(m, s, lone, scratch);
+    a.apart = s.apart;
+    a.coupled = s.coupled;
     a.ground_anchors = view(s.ground_anchors);
     a.faces = view(s.faces);
     a.lone = lone;

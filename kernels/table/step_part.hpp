@@ -104,33 +104,42 @@ void StepPart<N, L>::weighted_norm(const ModelView& m, const Stage<L>& s, const 
   *View::view(&out) = kernels::weighted_norm(m.nv, View::view(s.weight), View::view(a));
 }
 
+/// Returns the part of the pattern that the last Jacobian filled.
+template <int L>
+const PatternPart& part_of(const ModelView& m, const Stage<L>& s) {
+  return *s.coupled != 0 ? m.pattern.whole : m.pattern.apart;
+}
+
 template <class N, int L>
 void StepPart<N, L>::factor(const ModelView& m, const Stage<L>& s, const Row<L>* accept) {
   using View = StageView<N, L>;
-  kernels::factor(m.pattern, View::view(s.A), View::view(accept), View::view(s.LU),
+  kernels::factor(m.pattern, part_of(m, s), View::view(s.A), View::view(accept), View::view(s.LU),
                   View::view(s.work));
 }
 
 template <class N, int L>
 void StepPart<N, L>::solve(const ModelView& m, const Stage<L>& s, const Row<L>* b, Row<L>* out) {
   using View = StageView<N, L>;
-  kernels::solve(m.pattern, View::view(s.LU), View::view(b), View::view(out), View::view(s.work));
+  kernels::solve(m.pattern, m.pattern.whole, View::view(s.LU), View::view(b), View::view(out),
+                 View::view(s.work));
 }
 
 template <class N, int L>
 void StepPart<N, L>::solve_watched(const ModelView& m, const Stage<L>& s, const Row<L>* b,
                                    Row<L>* out, Row<L>* sound) {
   using View = StageView<N, L>;
-  kernels::solve_watched<false>(m.pattern, View::view(s.A), View::view(s.LU), View::view(b),
-                                View::view(out), View::view(sound), View::view(s.work));
+  kernels::solve_watched<false>(m.pattern, part_of(m, s), View::view(s.A), View::view(s.LU),
+                                View::view(b), View::view(out), View::view(sound),
+                                View::view(s.work));
 }
 
 template <class N, int L>
 void StepPart<N, L>::solve_transposed(const ModelView& m, const Stage<L>& s, const Row<L>* b,
                                       Row<L>* out, Row<L>* sound) {
   using View = StageView<N, L>;
-  kernels::solve_watched<true>(m.pattern, View::view(s.A), View::view(s.LU), View::view(b),
-                               View::view(out), View::view(sound), View::view(s.work));
+  kernels::solve_watched<true>(m.pattern, part_of(m, s), View::view(s.A), View::view(s.LU),
+                               View::view(b), View::view(out), View::view(sound),
+                               View::view(s.work));
 }
 
 template <class Arch>

@@ -7,6 +7,7 @@
 #include <algorithm>
 
 #include "engine/base/as_size.hpp"
+#include "tasks/effects/sleep_gain.hpp"
 
 namespace tangere {
 namespace {
@@ -83,7 +84,10 @@ struct Measurement {
   [[nodiscard]] int rounds_of(const EffectCostOptions& options) const {
     int effects = 1;
     for (const EffectInfo& info : model.effects())
-      effects += info.on && reason_not_to_time(model, info.effect).empty() ? 1 : 0;
+      effects += info.on && info.effect.kind != EffectKind::sleeping &&
+                         reason_not_to_time(model, info.effect).empty()
+                     ? 1
+                     : 0;
     const double pair = 2 * times.step * options.environments * options.instants;
     return static_cast<int>(
         std::clamp(options.seconds / (pair * effects), double(kLeastRounds), double(kMostRounds)));
@@ -94,7 +98,20 @@ struct Measurement {
   }
 };
 
-EffectCost measure(Measurement& m, const EffectInfo& info) {
+/// What is on only over a run, and acts on whole runs. `cost`: of the effect, not measured yet.
+void measure_sleep(const Measurement& m, const EffectCostOptions& options, EffectCost& cost) {
+  const SleepGain gain =
+      measure_sleep_gain(m.model, options.environments, options.seed, kLeastRounds);
+  const double of_step = m.times.whole() > 0 ? m.times.step / m.times.whole() : 0;
+  cost.bytes = static_cast<std::int64_t>(gain.bytes);
+  cost.measured = MeasuredShare{of_step * gain.added.share, of_step * gain.added.spread};
+  cost.note = fmt::format(
+      "of the steps of a run, in which {:.1f} bodies sleep on average; the head's "
+      "step is without it",
+      gain.mean_asleep);
+}
+
+EffectCost measure(Measurement& m, const EffectInfo& info, const EffectCostOptions& options) {
   EffectCost cost{info};
   cost.seconds_without = m.times.whole();
   cost.passes_without = m.times.passes;
@@ -104,6 +121,10 @@ EffectCost measure(Measurement& m, const EffectInfo& info) {
   }
   cost.note = reason_not_to_time(m.model, info.effect);
   if (!has_way(info.effect.kind, Way::removed)) return cost;
+  if (info.effect.kind == EffectKind::sleeping) {
+    measure_sleep(m, options, cost);
+    return cost;
+  }
   const Model trimmed(without(m.model.scene(), info.effect));
   cost.bytes =
       static_cast<std::int64_t>(bytes_of(m.model)) - static_cast<std::int64_t>(bytes_of(trimmed));
@@ -144,7 +165,7 @@ EffectCosts measure_effects(const Model& model, const EffectCostOptions& options
       cost.effect = info;
       costs.effects.push_back(std::move(cost));
     } else {
-      costs.effects.push_back(measure(m, info));
+      costs.effects.push_back(measure(m, info, options));
     }
   }
   costs.of_runs = measure_run_costs(m.timed, m.times, kLeastRounds);

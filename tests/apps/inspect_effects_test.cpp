@@ -79,6 +79,7 @@ TEST(InspectEffects, MeasuresWhatEffectsCost) {
   EXPECT_THAT(called_for_by("ground ball"), HasSubstr("<ground_contact"));
   EXPECT_THAT(called_for_by("tactile pad"), HasSubstr("<tactile"));
   EXPECT_EQ(costs.at("joint springs").at("on"), false);
+  EXPECT_EQ(costs.at("sleeping").at("why"), "solver_option sleep is 0");
   EXPECT_TRUE(costs.at("velocity products").at("share").is_null());
   EXPECT_GT(costs.at("tactile pad").at("bytes"), 0);
   // A kind with one element is that element.
@@ -95,6 +96,24 @@ TEST(InspectEffects, MeasuresWhatEffectsCost) {
   }
   EXPECT_EQ(names, (std::vector<std::string>{"rows of q and v", "rows of bodies", "audit",
                                              "gradients of a loss"}));
+}
+
+/// Boxes that rest on the ground fall asleep along the run.
+TEST(InspectEffects, MeasuresWhatSleepSaves) {
+  const Folder folder;
+  std::string text = file_bytes(scene("ten_boxes.xml"));
+  text.insert(text.find("</tangere>"), "<solver_option sleep=\"0.001\"/>\n");
+  folder.write("boxes.xml", text);
+  const Outcome outcome = run(folder, {"inspect", "boxes.xml", "--effects", "--json"});
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  const json sleeping = json::parse(outcome.out).at("effect_costs").at("sleeping");
+  EXPECT_EQ(sleeping.at("on"), true);
+  EXPECT_EQ(sleeping.at("why"), "sleep 0.001");
+  EXPECT_THAT(sleeping.at("lines").at(0).get<std::string>(), HasSubstr("boxes.xml:"));
+  EXPECT_LT(sleeping.at("share"), 0) << "it saves time";
+  EXPECT_GE(sleeping.at("bytes"), 11 * (1 + 4 + 4)) << "eleven trees";
+  EXPECT_THAT(sleeping.at("note").get<std::string>(), HasSubstr("bodies sleep on average"));
+  EXPECT_THAT(outcome.err, HasSubstr("  sleeping "));
 }
 
 }  // namespace

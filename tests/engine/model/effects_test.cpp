@@ -55,6 +55,7 @@ Scene scene_of_all_effects() {
   s.randomizations.push_back(
       varied({NumberOwner::joint, NumberField::damping, "arm_joint"}, 1e-3, 2e-3));
   s.control = ConstantControl{{0.1, -0.05, 0.1, 0.004}};
+  s.solver.sleep = kUsualSleep;
   return s;
 }
 
@@ -130,7 +131,10 @@ TEST(Effects, TheSceneOfThisTestHasEveryKind) {
     EXPECT_EQ(info.effect.kind, static_cast<EffectKind>(kinds++));
     EXPECT_EQ(info.name, to_string(info.effect.kind));
     EXPECT_TRUE(info.on) << info.name << ": " << info.reason;
-    if (has_way(info.effect.kind, Way::removed)) {
+    if (info.effect.kind == EffectKind::sleeping) {
+      EXPECT_EQ(info.reason, "sleep 0.001");
+      EXPECT_EQ(distance(all, play(without(scene, info.effect))), 0) << "all bodies move";
+    } else if (has_way(info.effect.kind, Way::removed)) {
       EXPECT_GT(distance(all, play(without(scene, info.effect))), 1e-9) << info.name;
     }
   }

@@ -7,6 +7,8 @@
 
 #include <random>
 
+#include "kernels/step/lu.hpp"
+
 namespace tangere {
 namespace {
 
@@ -57,15 +59,47 @@ std::vector<int> order_of(Matrix& s) {
 /// Carries out the lists of the pattern on symbols: every factor slot that a run changes has to be
 /// the one of the row and the column that the elimination means.
 void expect_runs_lead_to_their_columns(const PatternStorage& p) {
+  const PatternPartStorage& all = p.whole;
   for (int k = 0; k < p.n; ++k)
-    for (int c = p.lower_begin[k]; c < p.lower_begin[k + 1]; ++c) {
-      EXPECT_EQ(p.factor_column[p.lower_slot[c]], k);
+    for (int c = all.lower_begin[k]; c < all.lower_begin[k + 1]; ++c) {
+      EXPECT_EQ(p.factor_column[all.lower_slot[c]], k);
       int covered = 0;
-      for (int r = p.run_begin[c]; r < p.run_begin[c + 1]; ++r)
-        for (int e = 0; e < p.runs[r].length; ++e, ++covered)
-          EXPECT_EQ(p.factor_column[p.runs[r].source + e], p.factor_column[p.runs[r].target + e]);
+      for (int r = all.run_begin[c]; r < all.run_begin[c + 1]; ++r)
+        for (int e = 0; e < all.runs[r].length; ++e, ++covered)
+          EXPECT_EQ(p.factor_column[all.runs[r].source + e],
+                    p.factor_column[all.runs[r].target + e]);
       EXPECT_EQ(covered, p.row_begin[k + 1] - p.diagonal[k] - 1);
     }
+}
+
+/// Where no contact couples dofs, the part without contacts gives the bits of the whole pattern, and
+/// does less. Numbers are in the entries that `alone` has, too.
+void expect_the_same_bits_apart(const PatternStorage& p, const PatternStorage& alone,
+                                std::mt19937& random) {
+  std::uniform_real_distribution<double> number(-1, 1);
+  const auto n = std::size_t(p.n);
+  std::vector<double> A(std::size_t(p.entries), 0.0), b(n);
+  for (int i = 0; i < p.n; ++i)
+    for (int j = 0; j < p.n; ++j)
+      if (alone.slot[i * p.n + j] >= 0)
+        A[std::size_t(p.slot[i * p.n + j])] = number(random) + (i == j ? p.n : 0);
+  for (double& x : b) x = number(random);
+  const kernels::Pattern view = p.view();
+  std::vector<std::vector<double>> results;
+  for (const kernels::PatternPart& part : {view.whole, view.apart}) {
+    std::vector<double> LU(std::size_t(p.factor_entries)), x(n), back(n), sound(1);
+    std::vector<double> work(std::max(LU.size(), 5 * n));
+    kernels::factor<double>(view, part, A.data(), nullptr, LU.data(), work.data());
+    kernels::solve_watched<false>(view, part, A.data(), LU.data(), b.data(), x.data(), sound.data(),
+                                  work.data());
+    kernels::solve_watched<true>(view, part, A.data(), LU.data(), b.data(), back.data(),
+                                 sound.data(), work.data());
+    EXPECT_EQ(sound[0], 1);
+    x.insert(x.end(), back.begin(), back.end());
+    results.push_back(x);
+  }
+  EXPECT_EQ(results[0], results[1]);
+  EXPECT_LE(p.apart.lower_slot.size(), p.whole.lower_slot.size());
 }
 
 TEST(Pattern, EliminatesWhatCreatesFewestEntriesFirst) {
@@ -92,6 +126,7 @@ TEST(Pattern, EliminatesWhatCreatesFewestEntriesFirst) {
       entries += int(row.size() - std::count(row.begin(), row.end(), 0));
     EXPECT_EQ(p.factor_entries, entries) << "round " << round;
     expect_runs_lead_to_their_columns(p);
+    expect_the_same_bits_apart(p, analyse_pattern(links, nv, {}), random);
   }
 }
 

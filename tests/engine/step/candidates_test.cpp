@@ -3,10 +3,16 @@
 // lane that outruns its list is noticed.
 #include <gtest/gtest.h>
 
+#include <array>
+#include <cmath>
+
 #include "engine/step/detection.hpp"
 #include "engine/step/group_step.hpp"
 #include "engine/step/workspace.hpp"
+#include "kernels/contact/distance.hpp"
+#include "tests/engine/meshes.hpp"
 #include "tests/engine/scenes.hpp"
+#include "tests/kernels/random_numbers.hpp"
 
 namespace tangere {
 namespace {
@@ -134,6 +140,143 @@ TEST(Candidates, BoundsThatSkipPairsOfShapesChangeNoBits) {
     EXPECT_EQ(own.states, everything.states);
     EXPECT_EQ(tight.states, everything.states);
   }
+}
+
+/// One long step of bars that rest 2 cm out of reach of what is below them. In lane 0 nothing acts;
+/// in the others a force that no prediction knows pushes ever harder: the last one arrives in the
+/// same step. `margin` 0: the model's own. `poisoned`: a lane that does not live and holds no
+/// numbers, or -1.
+struct Arrival {
+  std::vector<double> states;
+  bool apart = false;  // nothing could touch at the end in any lane
+  std::array<int, kGroup> listed{}, passes{};
+};
+Arrival arrive(double margin, LaneBits lanes, int poisoned, const kernels::KernelTable& table) {
+  const auto m = compile(bar_above_shapes());
+  Workspace w(*m);
+  SingleWorkspace alone(*m);
+  if (margin > 0)
+    for (auto& list : w.lists) list.margin = margin;
+  const double h = 2e-2;
+  const GroupStep step(*m, {Integrator::bdf1, h, 1e-9, 20});
+  double mass = 0;
+  for (const kernels::Link& link : m->links) mass += link.mass;
+  const kernels::LinkPair& links = m->link_pairs[0];
+  constexpr double kDeep = 0.025;  // less what it falls: 4 mm in the table, whose top is nearest
+  const double out_of_reach = links.shapes_middle.z + links.apart + links.margin + 0.02;
+  for (int l = 0; l < kGroup; ++l) {
+    for (int i = 0; i < m->nq; ++i) w.q0[i][l] = m->initial_q[std::size_t(i)];
+    w.q0[2][l] += out_of_reach - 0.03;  // the scene starts 3 cm up
+    w.stage.tau[2][l] = -mass * l / 7 * (out_of_reach - kDeep) / (h * h);
+  }
+  if (poisoned >= 0)
+    for (int i = 0; i < m->nv; ++i)
+      w.q0[i][poisoned] = w.v0[i][poisoned] = w.stage.tau[i][poisoned] = NAN;
+  NewtonReport report;
+  step.advance(table, w, alone, lanes, kNoLane, report);
+  Arrival r;
+  r.apart = w.apart[0] != 0;
+  for (int l = 0; l < kGroup; ++l) {
+    for (int i = 0; i < m->nq; ++i) r.states.push_back(has(lanes, l) ? w.q0[i][l] : 0);
+    for (const auto& list : w.lists) r.listed[std::size_t(l)] += list.own_count[l];
+    r.passes[std::size_t(l)] = report.iterations[std::size_t(l)];
+    EXPECT_TRUE(!has(lanes, l) || !failed(report.status[std::size_t(l)])) << "lane " << l;
+  }
+  return r;
+}
+
+TEST(Candidates, BodiesThatComeWithinReachDuringAStepAreNotMissed) {
+  for (const kernels::KernelTable* table : kernels::available_kernels()) {
+    SCOPED_TRACE(table->name);
+    const Arrival everything = arrive(1, kAllLanes, -1, *table),
+                  own = arrive(0, kAllLanes, -1, *table);
+    EXPECT_EQ(own.states, everything.states);
+    EXPECT_EQ(own.passes, everything.passes);
+    EXPECT_FALSE(own.apart);
+    EXPECT_EQ(own.listed[0], 0);
+    EXPECT_GT(own.listed[7], 0) << "it arrived";
+    EXPECT_NE(own.passes[7], own.passes[0]) << "and was pushed back";
+    const Arrival without = arrive(0, kAllLanes & ~8U, 3, *table);
+    for (int l = 0; l < kGroup; ++l)
+      for (std::size_t i = 0; i < own.states.size() / kGroup && l != 3; ++i)
+        EXPECT_EQ(without.states[std::size_t(l) * own.states.size() / kGroup + i],
+                  own.states[std::size_t(l) * own.states.size() / kGroup + i])
+            << "lane " << l << " beside one without numbers";
+    const Arrival still = arrive(0, 1, -1, *table);
+    EXPECT_TRUE(still.apart);
+    for (std::size_t i = 0; i < own.states.size() / kGroup; ++i)
+      EXPECT_EQ(still.states[i], own.states[i]);
+  }
+}
+
+/// The balls around points and shapes hold them, wherever the bodies are.
+TEST(Candidates, LinksThatAreApartDoNotTouch) {
+  const auto m = compile(bar_above_shapes());
+  const kernels::LinkPair& links = m->link_pairs[0];
+  EXPECT_LT(links.apart, 0.25) << "a ball of this scene's size";
+  for (int i = links.first; i < links.first + links.count; ++i) {
+    const kernels::PairContact& pair = m->pairs[std::size_t(m->pair_order[std::size_t(i)])];
+    double of_points = 0;
+    for (int k = 0; k < pair.n_points; ++k) {
+      const kernels::Vec3<double> arm =
+          kernels::Vec3<double>{pair.points[3 * k], pair.points[3 * k + 1],
+                                pair.points[3 * k + 2]} -
+          links.points_middle;
+      of_points = std::max(of_points, std::sqrt(dot(arm, arm)));
+    }
+    // From outside the ball that is left for the shapes, no point of the surface is within.
+    const double of_shapes = links.apart - of_points;
+    testing::Random random(7);
+    for (int k = 0; k < 1000; ++k) {
+      const kernels::Vec3<double> to{random.normal(), random.normal(), random.normal()};
+      const kernels::Vec3<double> at =
+          links.shapes_middle + (of_shapes / std::sqrt(dot(to, to))) * to;
+      kernels::with_distance<double>(pair.shape, pair.size, [&](const auto& shape) {
+        EXPECT_GE(
+            kernels::distance_at(shape, transposed_times(pair.frame2.R, at - pair.frame2.p)).d, 0);
+      });
+    }
+  }
+}
+
+/// No ball holds a plane, a shape whose size differs between environments, or the far side of chosen
+/// faces.
+TEST(Candidates, LinksWithoutABallAreNeverApart) {
+  const auto apart = [](const Scene& scene) { return compile(scene)->link_pairs.at(0).apart; };
+  Scene scene = testing::rolling_ball(false, 8);
+  EXPECT_LT(apart(scene), 1);
+  scene.randomizations.push_back({{NumberOwner::body, NumberField::radius, "ball"},
+                                  {Distribution::Kind::uniform, 0.5, 1, {}},
+                                  {}});
+  EXPECT_EQ(apart(scene), INFINITY);
+  scene.randomizations.clear();
+  scene.links[1].body.shape = PlaneShape{};
+  scene.links[1].joint.type = JointType::fixed;
+  scene.ground_contacts.clear();
+  EXPECT_EQ(apart(scene), INFINITY);
+  Scene faced = bar_above_shapes();
+  faced.links[1] = faced.links[3];
+  faced.links.resize(2);
+  std::get<CuboidShape>(faced.links[0].body.shape).contact_resolution = {2, 2, 2};
+  faced.pair_contacts = {{"middle", "table", {5e3, 5, 1, 20}, ContactLaw::clamped, 1e-5, {}}};
+  EXPECT_TRUE(compile(faced)->view.faced);
+  EXPECT_EQ(apart(faced), INFINITY);
+}
+
+/// The grid of a mesh is that of scale 1.
+TEST(Candidates, TheBallAroundAMeshHasItsScale) {
+  Scene scene = testing::rolling_ball(false, 8);
+  scene.ground_contacts.clear();
+  MeshShape cube = testing::cuboid_mesh({0.01, 0.01, 0.01});
+  cube.resolution = 8;
+  const auto apart = [&](double scale) {
+    cube.scale = scale;
+    scene.links[1].body.shape = cube;
+    return compile(scene)->link_pairs.at(0).apart;
+  };
+  const double corner = 0.01 * std::sqrt(3.0), radius = (apart(3) - apart(1)) / 2;
+  EXPECT_GE(radius, corner);
+  EXPECT_LT(radius, 2 * corner);
 }
 
 TEST(Candidates, ALaneThatOutrunsItsListSaysSo) {
