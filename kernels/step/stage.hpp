@@ -76,11 +76,12 @@ struct StageArgs {
   const N* tau;     ///< (nv) actuator force
   const N* target;  ///< (nv) targets of position motors
   N c0_over_h, inverse_h;
-  N friction_tangent = N(1.0);         ///< for derivatives; see kernels/contact/contact_law.hpp
-  const double* block;                 ///< of the batch, for parameters that vary
-  int group;                           ///< 0 or 1: which half of the block
-  const CandidateList<N>* candidates;  ///< (n_pairs)
-  const N* ground_anchors;             ///< (points that remember, kAnchorNumbers)
+  N friction_tangent = N(1.0);  ///< for derivatives; see kernels/contact/contact_law.hpp
+  N normal_share = N(1.0), friction_share = N(1.0);  ///< as in Stage
+  const double* block;                               ///< of the batch, for parameters that vary
+  int group;                                         ///< 0 or 1: which half of the block
+  const CandidateList<N>* candidates;                ///< (n_pairs)
+  const N* ground_anchors;                           ///< (points that remember, kAnchorNumbers)
   const N* faces;  ///< (n_pairs, 3) faces that count in this solve (kernels/step/faces.hpp)
   int lone;  ///< the only lane whose result matters; its contacts are summed across points. -1: all
              ///< lanes matter
