@@ -9,6 +9,7 @@
 #include "engine/step/detection.hpp"
 #include "engine/step/remember.hpp"
 #include "engine/step/scheme_stage.hpp"
+#include "engine/step/softened.hpp"
 
 namespace tangere {
 
@@ -58,13 +59,19 @@ LaneBits GroupStep::run(const Scheme& scheme, const kernels::KernelTable& table,
                                inside_split ? kSplitIterations : settings_.max_iterations,
                                inside_split ? kSplitHalvings : kHalvings,
                                inside_split ? kSplitPatience : kPatience, settings_.spare};
+  // Where an accuracy is asked for, shorter parts are the better way to a root.
+  const bool softens = inside_split || settings_.accuracy == 0;
   factors = {};
   choose_faces(model_, table, w);
   begin_memory(model_, table, w);
   for (int k = 0; k <= scheme.inner_stages(); ++k) {
     set_stage(model_, scheme, k, h, w);
     guess_stage(model_, scheme, k, h, w);
-    lanes = solve_stage(model_, table, w, lanes, limits, factors, report);
+    std::copy_n(w.stage.x, n, w.x_guess);
+    const LaneBits found = solve_stage(model_, table, w, lanes, limits, factors, report);
+    const LaneBits lost = softens ? lanes & ~found : kNoLane;
+    lanes = found;
+    if (lost != 0) lanes |= solve_from_softer(model_, table, w, lost, limits, factors, report);
     if (k == scheme.inner_stages()) break;
     // Who names a tolerance gets what Newton steps come to, which is far below it.
     if (!settings_.spare) factors.begin_anew();

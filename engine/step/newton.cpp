@@ -120,12 +120,11 @@ struct Search {
     LaneBits open = 0;
     for (int l = 0; l < L; ++l)
       if (has(searching, l) && !(expected[l] <= limits.tolerance)) open |= 1U << l;
-    with_jacobian = !factors.weighted || (open != 0 && (lone(open) < 0 || open == searching));
+    with_jacobian = !factors.weighted || !factors.floored ||
+                    (open != 0 && (lone(open) < 0 || open == searching));
     (with_jacobian ? kernel().evaluate : kernel().residual)(model.view, w.stage, lone(searching));
-    if (!std::exchange(factors.weighted, true)) {
-      kernel().set_weights(model.view, w.stage);
-      set_floor(searching);
-    }
+    if (!std::exchange(factors.weighted, true)) kernel().set_weights(model.view, w.stage);
+    if (!std::exchange(factors.floored, true)) set_floor(searching);
   }
 
   void set_floor(LaneBits lanes) {

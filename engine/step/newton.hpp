@@ -21,7 +21,8 @@ struct NewtonLimits {
 /// What the stages of one step hand on to each other.
 template <int L>
 struct StageFactors {
-  bool weighted = false;          ///< the norm's weights and floor are those of this step
+  bool weighted = false;          ///< the norm's weights are those of this step
+  bool floored = false;           ///< and its floor
   LaneBits lanes = kNoLane;       ///< lanes with a factor at hand
   LaneBits any = kNoLane;         ///< lanes that were factored in this step
   LaneBits pivoted = kNoLane;     ///< lanes in which that is the pivoted one
@@ -30,7 +31,7 @@ struct StageFactors {
 
   /// The next stage begins as if it were the first. Factors that were made stay known.
   void begin_anew() {
-    weighted = false;
+    weighted = floored = false;
     lanes = kNoLane;
   }
 };
@@ -41,9 +42,10 @@ struct NewtonReport {
   std::array<int, kernels::kGroup> iterations{};  ///< evaluations of the residual, accumulated
   /// Scaled residual at the last accepted point; the expected one where its evaluation was spared.
   std::array<double, kernels::kGroup> residual{};
-  LaneBits passed = 0;   ///< lanes in which a body came through another that it touches
-  LaneBits created = 0;  ///< lanes in which a part created energy, however short it was
-  LaneBits turned = 0;   ///< lanes in which a part turned too far, however short it was
+  LaneBits softened = 0;  ///< lanes whose root was approached from softer contacts
+  LaneBits passed = 0;    ///< lanes in which a body came through another that it touches
+  LaneBits created = 0;   ///< lanes in which a part created energy, however short it was
+  LaneBits turned = 0;    ///< lanes in which a part turned too far, however short it was
 };
 
 /// Solves g(x) = 0 for the lanes in `lanes`, from the x in the stage. On return the stage's x and v

@@ -146,7 +146,12 @@ Solved GroupStep::solve_and_watch(const Scheme& scheme, const kernels::KernelTab
   Solved solved;
   const LaneBits of_other_parts = std::exchange(report.passed, kNoLane);
   StageFactors<L> unused;
+  report.softened = 0;
   solved.found = run(scheme, table, w, lanes, Row<L>::all(h), inside_split, report, unused);
+  // Forces that no search could follow from the first guess and that throw bodies about are not
+  // smooth, which a scheme of higher order relies on. Parts of the step resolve them.
+  if (scheme.order > 1 && !inside_split && report.softened != 0)
+    solved.found &= ~jumping(w, solved.found & report.softened, h);
   solved.passed = std::exchange(report.passed, of_other_parts) & solved.found;
   solved.created = creating(table, w, solved.found & ~solved.passed, h);
   solved.turned = turning(scheme, table, w, solved.found & ~(solved.passed | solved.created), h);

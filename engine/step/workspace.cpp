@@ -38,7 +38,9 @@ std::size_t lay_out(const CompiledModel& m, BasicWorkspace<L>& w, Row<L>* base) 
   rows(w.zero, m.nv);
   rows(w.floors, m.components());
   for (LaneRow** p : {&w.q0, &w.q_before, &w.q1}) rows(*p, m.nq);
-  for (LaneRow** p : {&w.v0, &w.v_before, &w.v1, &w.delta, &w.base, &w.test}) rows(*p, m.nv);
+  for (LaneRow** p :
+       {&w.v0, &w.v_before, &w.v1, &w.delta, &w.base, &w.test, &w.x_guess, &w.x_softened})
+    rows(*p, m.nv);
   for (LaneRow** p : {&w.x_inner, &w.v_inner}) rows(*p, w.inner_stages * m.nv);
   const int link_pairs = static_cast<int>(m.link_pairs.size());
   rows(w.references, 12 * link_pairs);

@@ -48,6 +48,9 @@ struct Stage {
   Row<L>*weight, *inverse_weight;  ///< (nv) D^½ and D^-½, D the mass diagonal
   /// 1: the Jacobian is that of g. 0: it takes friction of slipping points by its secant.
   Row<L> friction_tangent = Row<L>::all(1);
+  /// Factors of contacts' kn and damping, and of their kt and ks, while a root is approached from
+  /// softer contacts; else 1.
+  Row<L> normal_share = Row<L>::all(1), friction_share = Row<L>::all(1);
   Row<L> floor;  ///< smallest ‖D^-½ g‖² that the rounding of x can resolve
 };
 using GroupStage = Stage<kGroup>;

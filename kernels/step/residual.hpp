@@ -232,6 +232,16 @@ bool has_candidates(const CandidateList<N>& list, int lone) {
   return (lone < 0 ? list.count : list.own_count) > 0;
 }
 
+/// Takes the law as the stage asks for it.
+template <class N>
+void soften(const StageArgs<N>& a, LawParameters<N>& law) {
+  law.kn = law.kn * a.normal_share;
+  law.damping = law.damping * a.normal_share;
+  law.kt = law.kt * a.friction_share;
+  law.ks = law.ks * a.friction_share;
+  law.friction_tangent = a.friction_tangent;
+}
+
 /// Adds the points around a sphere.
 template <bool Derivatives, template <class> class Sums, class Motion, class N>
 [[gnu::noinline]] void add_sphere(const Motion& motion, const LawParameters<N>& law,
@@ -268,7 +278,7 @@ void sum_link_pair(const ModelView& model, const LinkPair& links, const StageArg
     const CandidateList<N>& list = a.candidates[k];
     if (!has_candidates(list, a.lone)) continue;
     LawParameters<N> law = load_law<N>(pair.parameters, pair.law, pair.ramp, a.block, a.group);
-    law.friction_tangent = a.friction_tangent;
+    soften(a, law);
     const auto frame = [&] { return compose(o.link2_in_1, broadcast<N>(pair.frame2)); };
     const Vec3<N> size = load_vector<N>(pair.size, pair.size_row, a.block, a.group);
     const Vec3<N> side = faces_of(a, pair, k);
@@ -326,7 +336,7 @@ bool sum_grounded(const ModelView& model, const GroundedLink& grounded, const St
     started = true;
     LawParameters<N> law =
         load_law<N>(ground.parameters, ground.law, ground.ramp, a.block, a.group);
-    law.friction_tangent = a.friction_tangent;
+    soften(a, law);
     if (ground.memory >= 0) {
       const Frame<N> in_body = relative(link.world, broadcast<N>(model.ground));
       const N* anchors = a.ground_anchors + kAnchorNumbers * ground.first_anchor;

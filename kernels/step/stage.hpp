@@ -76,9 +76,10 @@ struct StageArgs {
   const N* tau;     ///< (nv) actuator force
   const N* target;  ///< (nv) targets of position motors
   N c0_over_h, inverse_h;
-  N friction_tangent = N(1.0);         ///< for derivatives; see kernels/contact/contact_law.hpp
-  const double* block;                 ///< of the batch, for parameters that vary
-  int group;                           ///< 0 or 1: which half of the block
+  N friction_tangent = N(1.0);  ///< for derivatives; see kernels/contact/contact_law.hpp
+  N normal_share = N(1.0), friction_share = N(1.0);  ///< as in Stage
+  const double* block;                               ///< of the batch, for parameters that vary
+  int group;                                         ///< 0 or 1: which half of the block
   const CandidateList<N>* candidates;  ///< (n_pairs) those of links that are apart are not
                                        ///< set, but the margin of the first
   unsigned char* apart;                ///< (n_link_pairs) as in Stage; null: none is

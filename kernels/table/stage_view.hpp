@@ -97,6 +97,8 @@ struct StageView {
     a.c0_over_h = *view(&s.c0_over_h);
     a.inverse_h = *view(&s.inverse_h);
     a.friction_tangent = *view(&s.friction_tangent);
+    a.normal_share = *view(&s.normal_share);
+    a.friction_share = *view(&s.friction_share);
     a.block = s.block;
     a.group = s.group;
     a.v = view(s.v);

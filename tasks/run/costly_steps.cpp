@@ -8,7 +8,7 @@ namespace tangere {
 
 std::string costly_steps(Integrator integrator, std::int64_t steps, std::int64_t evaluations,
                          std::int64_t split_steps) {
-  constexpr double kMany = 8, kOften = 0.05;
+  constexpr double kMany = 5, kOften = 0.05;
   constexpr std::int64_t kFewest = 20;
   if (steps < kFewest) return "";
   const double each = double(evaluations) / double(steps),

@@ -47,6 +47,8 @@ class StageBuffers {
     a.c0_over_h = N(c0_over_h);
     a.inverse_h = N(inverse_h);
     a.friction_tangent = N(friction_tangent);
+    a.normal_share = N(normal_share);
+    a.friction_share = N(friction_share);
     a.block = block;
     a.group = 0;
     a.candidates = lists_.data();
@@ -87,8 +89,9 @@ class StageBuffers {
   }
 
   std::vector<N> centre, x, r, s, tau, target, v_out, g, force_scale, mass, A;
-  std::vector<N> faces;         ///< (pairs, 3) 0: nearest face, point by point
-  double friction_tangent = 1;  ///< 0: the Jacobian takes friction by its secant
+  std::vector<N> faces;                         ///< (pairs, 3) 0: nearest face, point by point
+  double friction_tangent = 1;                  ///< 0: the Jacobian takes friction by its secant
+  double normal_share = 1, friction_share = 1;  ///< as in kernels::Stage
 
  private:
   const CompiledModel& model_;

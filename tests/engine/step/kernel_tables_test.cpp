@@ -90,13 +90,28 @@ void expect_close(const std::vector<double>& a, const std::vector<double>& b, do
 
 class KernelTables : public ::testing::TestWithParam<unsigned> {};
 
-/// `friction_tangent`: for the lane under test; its neighbours have the other value.
-void compare_tables(const Scene& scene, unsigned seed, double friction_tangent = 1) {
+/// How the lane under test takes its contacts. Its neighbours have other values.
+struct TakenContacts {
+  double friction_tangent = 1, normal_share = 1, friction_share = 1;
+};
+
+template <int L>
+void take_contacts(const TakenContacts& by, kernels::Stage<L>& stage, int lane) {
+  for (int l = 0; l < L; ++l) {
+    const bool own = l == lane;
+    stage.friction_tangent[l] = own ? by.friction_tangent : 1 - by.friction_tangent;
+    stage.normal_share[l] = own ? by.normal_share : 0.5 * by.normal_share;
+    stage.friction_share[l] = own ? by.friction_share : 0.5 * by.friction_share;
+  }
+}
+
+void compare_tables(const Scene& scene, unsigned seed, const TakenContacts& by = {}) {
   const auto m = compile(scene);
   StageBuffers<double> b(*m);
   Random random(seed);
   testing::randomise(b, *m, random, kStep);
-  b.friction_tangent = friction_tangent;
+  b.friction_tangent = by.friction_tangent;
+  b.normal_share = by.normal_share, b.friction_share = by.friction_share;
   b.residual_and_jacobian(kC0 / kStep, 1 / kStep);
   Outputs fused;
   for (const kernels::KernelTable* table : kernels::available_kernels()) {
@@ -107,8 +122,7 @@ void compare_tables(const Scene& scene, unsigned seed, double friction_tangent =
         Workspace w(*m);
         list_everything(*m, w);
         set_constants(w);
-        for (int l = 0; l < kGroup; ++l)
-          w.stage.friction_tangent[l] = l == lane ? friction_tangent : 1 - friction_tangent;
+        take_contacts(by, w.stage, lane);
         for (int l = 0; l < kGroup; ++l) fill_lane(w, *m, b, l);
         for (int l = 0; l < kGroup; ++l) {
           if (l == lane) continue;
@@ -144,7 +158,7 @@ void compare_tables(const Scene& scene, unsigned seed, double friction_tangent =
     SingleWorkspace single(*m);
     list_everything(*m, single);
     set_constants(single);
-    single.stage.friction_tangent[0] = friction_tangent;
+    take_contacts(by, single.stage, 0);
     fill_lane(single, *m, b, 0);
     table->single.kinematics(m->view, single.stage);
     table->single.evaluate(m->view, single.stage, 0);
@@ -177,7 +191,38 @@ TEST_P(KernelTables, EvaluateMatchesTheScalarReferenceWhateverTheNeighboursHold)
 TEST_P(KernelTables, FrictionBySecantMatchesTheScalarReferenceWhateverTheNeighboursTake) {
   const unsigned seed = GetParam();
   compare_tables(
-      testing::random_contacts(seed, 2 + static_cast<int>(seed % 5), ContactLaw::clamped), seed, 0);
+      testing::random_contacts(seed, 2 + static_cast<int>(seed % 5), ContactLaw::clamped), seed,
+      {.friction_tangent = 0});
+}
+
+TEST_P(KernelTables, SofterContactsMatchTheScalarReferenceWhateverTheNeighboursTake) {
+  const unsigned seed = GetParam();
+  compare_tables(
+      testing::random_contacts(seed, 2 + static_cast<int>(seed % 5), ContactLaw::clamped), seed,
+      {.normal_share = 0.3, .friction_share = 0.01});
+}
+
+TEST_P(KernelTables, SofterContactsAreThoseOfASofterScene) {
+  const unsigned seed = GetParam();
+  constexpr double kNormal = 0.3, kFriction = 0.01;
+  Scene scene = testing::random_contacts(seed, 4, ContactLaw::clamped);
+  const auto evaluated = [&](double normal_share, double friction_share) {
+    const auto m = compile(scene);
+    StageBuffers<double> b(*m);
+    Random random(seed);
+    testing::randomise(b, *m, random, kStep);
+    b.normal_share = normal_share, b.friction_share = friction_share;
+    b.residual_and_jacobian(kC0 / kStep, 1 / kStep);
+    return std::pair(b.g, b.A);
+  };
+  const auto softened = evaluated(kNormal, kFriction);
+  const auto soften = [&](ContactCoefficients& c) {
+    c.kn *= kNormal, c.damping *= kNormal;
+    c.kt *= kFriction, c.ks *= kFriction;
+  };
+  for (auto& contact : scene.pair_contacts) soften(contact.coefficients);
+  for (auto& contact : scene.ground_contacts) soften(contact.coefficients);
+  EXPECT_EQ(softened, evaluated(1, 1));
 }
 
 TEST_P(KernelTables, JointEffectsMatchTheScalarReferenceWhateverTheNeighboursHold) {
