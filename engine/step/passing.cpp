@@ -51,8 +51,8 @@ void Passing::add(int link, const Frame<double>& at, PrimitiveShape shape, const
   }
 }
 
-/// Puts balls around the walls and middles of every gate: their centres are means, so that a gate of
-/// two bodies has the bodies' own.
+/// Puts balls around the walls and middles of every gate: their centres are means, so that a gate
+/// of two bodies has the bodies' own.
 void Passing::bound_gates() {
   const auto for_sides = [&](const auto& f) {
     for (const Wall& wall : walls_) {

@@ -30,9 +30,9 @@ constexpr int kFewestSteps = 20;
 /// Of √(size/|gravity|), the time in which a body falls by half its size: what rests for so long is
 /// not at the top of a flight.
 constexpr double kFallTimes = 2;
-/// At most a third of the dofs may be awake where others sleep. If eight lanes of a group have eight
-/// different parts that are awake, they are stepped one after the other. With more than a third each
-/// that takes longer than all of the model in all lanes at once.
+/// At most a third of the dofs may be awake where others sleep. If eight lanes of a group have
+/// eight different parts that are awake, they are stepped one after the other. With more than a
+/// third each that takes longer than all of the model in all lanes at once.
 constexpr int kFewestPerAwake = 3;
 /// A look tells up to this many times the distance that is needed now, by factors of kFiner.
 constexpr double kFarLook = 64, kFiner = 4;

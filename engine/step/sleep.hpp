@@ -3,9 +3,9 @@
 // (docs/sleeping.md). With w_i the greatest distance of a tree's points from the axis of
 // coordinate i, or 1 where the joint slides, no point of the tree moves further in a step than
 //   m = Σ w_i |Δq_i|
-// A tree rests where m ≤ share · size / n, n = max(20, 2 √(size/|gravity|) / h) steps, and may sleep
-// when it rested for n steps. It does when all trees that it could touch may, too, and at most a third
-// of the dofs of the environment stays awake.
+// A tree rests where m ≤ share · size / n, n = max(20, 2 √(size/|gravity|) / h) steps, and may
+// sleep when it rested for n steps. It does when all trees that it could touch may, too, and at
+// most a third of the dofs of the environment stays awake.
 #pragma once
 
 #include <span>
@@ -41,19 +41,20 @@ class Sleep {
   void movements(const double* rows, const BasicWorkspace<L>& w, std::span<const int> q,
                  kernels::Row<L>* out) const;
 
-  /// Notes how far awake bodies moved in this step, at most [m], where some sleep. Returns true where
-  /// none of them can come within reach of a sleeping one in the next step, by the last look.
+  /// Notes how far awake bodies moved in this step, at most [m], where some sleep. Returns true
+  /// where none of them can come within reach of a sleeping one in the next step, by the last look.
   bool is_clear(SleepState& state, double moved) const;
-  /// Looks, and wakes the bodies that awake ones may reach in the next step. `q`: (nq) coordinates at
-  /// the end of this step. `moved`: the largest m in this step [m]. Returns true if one of them is
-  /// touched already: the step must then be taken again, with it awake. Overwrites q0 of `single`.
+  /// Looks, and wakes the bodies that awake ones may reach in the next step. `q`: (nq) coordinates
+  /// at the end of this step. `moved`: the largest m in this step [m]. Returns true if one of them
+  /// is touched already: the step must then be taken again, with it awake. Overwrites q0 of
+  /// `single`.
   bool wake_touched(const kernels::KernelTable& table, const SleeperAt& at,
                     std::span<const double> q, double moved, SingleWorkspace& single);
 
-  /// Counts the steps of rest after one that is in the block. `moved`: m of tree t at t · stride, of
-  /// those that are awake. `plainly`: the step was neither split nor taken again. Returns whether
-  /// settle() may let some tree fall asleep; while its neighbours keep it awake, it is asked again
-  /// after as many steps.
+  /// Counts the steps of rest after one that is in the block. `moved`: m of tree t at t · stride,
+  /// of those that are awake. `plainly`: the step was neither split nor taken again. Returns
+  /// whether settle() may let some tree fall asleep; while its neighbours keep it awake, it is
+  /// asked again after as many steps.
   bool count_rest(SleepState& state, const double* moved, int stride, bool plainly) const;
   /// Lets trees fall asleep. Overwrites q0 of `single`.
   void settle(const kernels::KernelTable& table, const SleeperAt& at, SingleWorkspace& single);

@@ -32,8 +32,8 @@ void eliminate(const Pattern& p, const PatternPart& part, N* work) {
   }
 }
 
-/// Factors A, whose numbers lie in `part`, into LU, (factor_entries): in all lanes if `accept` is null, else in those where it is
-/// 1; the other lanes keep their LU. `work`: (factor_entries).
+/// Factors A, whose numbers lie in `part`, into LU, (factor_entries): in all lanes if `accept` is
+/// null, else in those where it is 1; the other lanes keep their LU. `work`: (factor_entries).
 template <class N>
 void factor(const Pattern& p, const PatternPart& part, const N* A, const N* accept, N* LU,
             N* work) {

@@ -72,8 +72,8 @@ void expect_runs_lead_to_their_columns(const PatternStorage& p) {
     }
 }
 
-/// Where no contact couples dofs, the part without contacts gives the bits of the whole pattern, and
-/// does less. Numbers are in the entries that `alone` has, too.
+/// Where no contact couples dofs, the part without contacts gives the bits of the whole pattern,
+/// and does less. Numbers are in the entries that `alone` has, too.
 void expect_the_same_bits_apart(const PatternStorage& p, const PatternStorage& alone,
                                 std::mt19937& random) {
   std::uniform_real_distribution<double> number(-1, 1);

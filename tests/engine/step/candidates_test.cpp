@@ -239,8 +239,8 @@ TEST(Candidates, LinksThatAreApartDoNotTouch) {
   }
 }
 
-/// No ball holds a plane, a shape whose size differs between environments, or the far side of chosen
-/// faces.
+/// No ball holds a plane, a shape whose size differs between environments, or the far side of
+/// chosen faces.
 TEST(Candidates, LinksWithoutABallAreNeverApart) {
   const auto apart = [](const Scene& scene) { return compile(scene)->link_pairs.at(0).apart; };
   Scene scene = testing::rolling_ball(false, 8);

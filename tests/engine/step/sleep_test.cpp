@@ -153,8 +153,8 @@ TEST(Sleep, AFastBodyWakesWhatItHits) {
   EXPECT_LT(distance(q, expected), 1e-3);
 }
 
-/// The finger sleeps 3 mm from a box, and then is driven so hard that it gets there in one step: the
-/// step is taken again, with the box awake.
+/// The finger sleeps 3 mm from a box, and then is driven so hard that it gets there in one step:
+/// the step is taken again, with the box awake.
 TEST(Sleep, ATouchWithinOneStepIsNotMissed) {
   const double gap = 3e-3, near = 0.08 - kEdge / 2 - 0.01 - gap;
   const Model model(finger_and_boxes(1));
