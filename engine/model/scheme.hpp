@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Time-stepping schemes as values. A scheme is a row of numbers that the step, the tape, the
-// adjoint and the tangent read. None of them knows a scheme by name.
+// adjoint and the tangent read. BDF1 alone is named elsewhere: it takes steps that others cannot.
 //
 // A step of length h from (q₀, v₀) has one implicit solve per stage, for the displacement x from
 // q₀:

@@ -29,11 +29,12 @@ struct Softening {
   int halvings, patience;
 };
 constexpr Softening kSoftenings[] = {{false, 1e-3, 1e-3, 3, 2}, {true, 1e-6, 1e-8, 5, 4}};
-constexpr double kLess = 1e-2;        ///< from one share to begin with to the next
-constexpr double kGrowth = 10;        ///< from one share to the next
-constexpr double kLeastGrowth = 1.2;  ///< a path that grows more slowly is given up
-constexpr int kMostSearches = 30;     ///< of a path
-constexpr double kLoose = 1e-3;       ///< tolerance on the way
+constexpr double kLess = 1e-2;          ///< from one share to begin with to the next
+constexpr double kGrowth = 10;          ///< from one share to the next
+constexpr double kLeastGrowth = 1.2;    ///< a path that grows more slowly is given up
+constexpr double kNearlyWhole = 0.999;  ///< from here on the share is 1
+constexpr int kMostSearches = 30;       ///< of a path
+constexpr double kLoose = 1e-3;         ///< tolerance on the way
 
 /// Where a lane is on its path.
 struct SharePath {
@@ -45,7 +46,8 @@ struct SharePath {
   bool go_on(bool found, double least) {
     if (found) {
       reached = next;
-      next = std::min(1.0, next * growth);
+      next *= growth;
+      if (next > kNearlyWhole) next = 1;
     } else if (reached == 0) {
       next *= kLess;
       if (next < least) return false;
@@ -59,8 +61,8 @@ struct SharePath {
 };
 
 template <int L>
-void copy_lane(const kernels::Row<L>* from, kernels::Row<L>* to, int count, int lane) {
-  for (int i = 0; i < count; ++i) to[i][lane] = from[i][lane];
+void copy_lanes(const kernels::Row<L>* from, LaneBits lanes, kernels::Row<L>* to, int count) {
+  for (int i = 0; i < count; ++i) put_lanes<L>(from[i].lane, lanes, to[i].lane);
 }
 
 /// Follows one way to soften. Returns the lanes that arrived.
@@ -75,12 +77,13 @@ LaneBits follow(const Softening& by, const CompiledModel& model, const kernels::
   loose.tolerance = std::max(limits.tolerance, kLoose);
   std::array<SharePath, L> path{};
   for (SharePath& p : path) p.next = by.first;
+  copy_lanes(w.x_guess, lanes, w.x_softened, model.nv);
   LaneBits open = lanes, arrived = 0;
   while (open != 0) {
+    copy_lanes(w.x_softened, open, w.stage.x, model.nv);
     LaneBits last = 0;
     for (int l = 0; l < L; ++l) {
       if (!has(open, l)) continue;
-      copy_lane(path[l].reached == 0 ? w.x_guess : w.x_softened, w.stage.x, model.nv, l);
       w.stage.friction_share[l] = path[l].next;
       if (by.normal) w.stage.normal_share[l] = path[l].next;
       if (path[l].next == 1) last |= 1U << l;
@@ -97,11 +100,9 @@ LaneBits follow(const Softening& by, const CompiledModel& model, const kernels::
     solve(last, exact);
     arrived |= found & last;
     open &= ~(found & last);
-    for (int l = 0; l < L; ++l) {
-      if (!has(open, l)) continue;
-      if (has(found, l)) copy_lane(w.stage.x, w.x_softened, model.nv, l);
-      if (!path[l].go_on(has(found, l), by.least)) open &= ~(1U << l);
-    }
+    copy_lanes(w.stage.x, found, w.x_softened, model.nv);
+    for (int l = 0; l < L; ++l)
+      if (has(open, l) && !path[l].go_on(has(found, l), by.least)) open &= ~(1U << l);
   }
   return arrived;
 }

@@ -10,11 +10,13 @@ using Schemes = std::vector<Integrator>;
 using Steps = std::vector<double>;
 
 // Functions, because Integrator's own constants may not be there yet when a constant here is made.
-Schemes all() {
-  return {Integrator::bdf1, Integrator::bdf2, Integrator::sdirk2, Integrator::sdirk3};
-}
+Schemes all() { return {integrators().begin(), integrators().end()}; }
 Schemes bdf1() { return {Integrator::bdf1}; }
-Schemes higher() { return {Integrator::bdf2, Integrator::sdirk2, Integrator::sdirk3}; }
+Schemes higher() {
+  Schemes schemes = all();
+  std::erase(schemes, Integrator::bdf1);
+  return schemes;
+}
 Steps usual() { return {5e-3, 1e-3, 20e-3}; }
 
 constexpr double kNoGain = 1 + 1e-9;  // of energy, for BDF1
