@@ -81,6 +81,20 @@ def table(head: str, beginnings: tuple[str, ...], row) -> str:
     return "\n".join(lines) + "\n" if len(lines) > 2 else ""
 
 
+def turned(text: str) -> str:
+    """The same table with rows and columns exchanged."""
+    rows = [line.strip("| ").split(" | ") for line in text.splitlines() if "---" not in line]
+    lines = ["| " + " | ".join(column) + " |" for column in zip(*rows)]
+    return "\n".join([*lines[:1], "|" + "---|" * len(rows), *lines[1:]]) + "\n" if rows else ""
+
+
+def published(beginnings: tuple[str, ...]) -> str:
+    """A list of the paper's numbers for the experiments that table() shows; "" without any."""
+    shown = [e for e in EXPERIMENTS if e.name.startswith(beginnings) and e.paper and stored(e)]
+    lines = [f"- {e.row}: {e.paper}" for e in shown]
+    return "\n".join(["Place and yaw in the paper:", "", *lines, ""]) if shown else ""
+
+
 def missing() -> str:
     """A sentence with the runs that are still to be made; "" if there are none."""
     names = [f"`{e.name}` ({e.seeds - len(stored(e))})" for e in EXPERIMENTS
@@ -99,9 +113,9 @@ def wrapped(text: str, width: int = 100) -> str:
 
 def tables() -> str:
     """What stands in the README between the two marks."""
+    of_pushing = ("gd-", "ppo-box")
     pushed = table(
-        "| box pushing | place | yaw [rad] | success | actions | CPU | runs | paper |",
-        ("gd-", "ppo-box"),
+        "| box pushing | place | yaw [rad] | success | actions | CPU | runs |", of_pushing,
         lambda runs: [mean(tested(runs, "position_m"), " m"), mean(tested(runs, "yaw_rad")),
                       rate(runs), steps(runs), cost(runs)],
     )  # fmt: skip
@@ -119,13 +133,14 @@ def tables() -> str:
         "| mixed data | score | success | CPU | runs |", ("offline-",),
         lambda runs: [mean(tested(runs, "score"), "", 1), rate(runs), cost(runs)],
     )  # fmt: skip
-    matched = table(
-        "| derivatives | " + " | ".join(str(n) for n in MATCHED) + " | CPU | runs |", ("match-",),
+    matched = turned(table(
+        "| episodes | " + " | ".join(str(n) for n in MATCHED) + " | CPU | runs |", ("match-",),
         lambda runs: [*(mean([dict(map(tuple, run["curve"]))[n] for run in runs])
                         for n in MATCHED), cost(runs)],
-    )  # fmt: skip
+    ))  # fmt: skip
     picture = "![Return against actions of training](results/box_pushing.svg)\n" if figure() else ""
-    parts = (pushed, picture, reinforced, cloned, offline, matched, missing())
+    parts = (pushed, published(of_pushing), picture, reinforced, cloned, offline, matched,
+             missing())  # fmt: skip
     return "\n" + "\n".join(filter(None, parts)) + "\n"
 
 

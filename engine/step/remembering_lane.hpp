@@ -76,9 +76,9 @@ kernels::RememberingTouch touch_of(const CompiledModel& m, const BasicWorkspace<
   return t;
 }
 
-/// Writes (3, stride) numbers of points, up to the end of the last vector: those of the entries that
-/// they have in a memory, else zeros. `index`: number of each point in its contact, rising; null:
-/// all points in order. `number`(entry, c): component c of an entry. `next`: any place in the
+/// Writes (3, stride) numbers of points, up to the end of the last vector: those of the entries
+/// that they have in a memory, else zeros. `index`: number of each point in its contact, rising;
+/// null: all points in order. `number`(entry, c): component c of an entry. `next`: any place in the
 /// memory; contacts are found soonest one after the other. It moves on to the end of this one.
 template <class Number>
 void look_up(std::span<const ShearEntry> memory, const kernels::RememberingContact& of,

@@ -2,8 +2,8 @@
 // Looks at solved steps that a scheme does not promise to be right: bodies that came through each
 // other, energy from nowhere, and bodies that turn too far for it (turn_defect.hpp).
 //
-// A scheme of order two or three takes the forces of a step for smooth. Across a touch, a release or
-// the limit of a joint they are not, and the bodies can leave with more than they came with. The
+// A scheme of order two or three takes the forces of a step for smooth. Across a touch, a release
+// or the limit of a joint they are not, and the bodies can leave with more than they came with. The
 // energy of a step (lane_energy.hpp) is compared with that of its start where some component's
 // velocities changed by a fair share:
 //   ‖D^½ (v₁ - v₀)‖ > kJump max(‖D^½ v₀‖, ‖D^½ v₁‖)   and   > h |gravity| √(3 mass)

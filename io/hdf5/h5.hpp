@@ -69,7 +69,8 @@ using Dims = std::vector<hsize_t>;
 /// Creates a file, replacing what is at `path`. Readable by HDF5 1.8 and later; two runs that write
 /// the same numbers write the same bytes. Descriptions of objects are put together in blocks of
 /// `description_block` bytes: large ones suit files of many objects. With `views` the file may have
-/// virtual datasets, and reading it needs HDF5 1.10. `written` learns what is written; null: nobody.
+/// virtual datasets, and reading it needs HDF5 1.10. `written` learns what is written; null:
+/// nobody.
 Id create_file(const std::string& path, WrittenBytes* written = nullptr,
                hsize_t description_block = 2048, bool views = false);
 /// A file that is never on disk.

@@ -14,10 +14,10 @@ struct IncludedFile {
   std::unique_ptr<SceneContext> context;  ///< its own units and defaults
 };
 
-/// Reads the file that `include`, a child of `parent`, names beside the file in which it stands. The
-/// file's root has the name of `parent`. Throws InputError at the <include> for a ring of files,
-/// for too many of them, and for attributes with numbers where the two files differ in their unit;
-/// IoError if the file cannot be read. The file lives as long as the outermost context.
+/// Reads the file that `include`, a child of `parent`, names beside the file in which it stands.
+/// The file's root has the name of `parent`. Throws InputError at the <include> for a ring of
+/// files, for too many of them, and for attributes with numbers where the two files differ in their
+/// unit; IoError if the file cannot be read. The file lives as long as the outermost context.
 const IncludedFile& include_file(const SceneNode& include, const SceneNode& parent);
 
 }  // namespace tangere

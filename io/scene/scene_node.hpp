@@ -38,7 +38,8 @@ struct SceneContext {
   void use_centimetres_and_grams();
   /// The file whose <include> names this one; nullptr for the file that the user names.
   SceneContext* includer = nullptr;
-  /// Files that <include> has brought in, in the context of the user's file. Elements refer to them.
+  /// Files that <include> has brought in, in the context of the user's file. Elements refer to
+  /// them.
   std::vector<std::shared_ptr<IncludedFile>> included = {};
   /// The context of the file that the user names.
   [[nodiscard]] SceneContext& outermost() {
@@ -51,8 +52,8 @@ struct SceneContext {
 
 class SceneNode {
  public:
-  /// `include`: of an element that an <include> brings in, this <include>, whose attributes take the
-  /// place of the element's own; nullptr if it gives none.
+  /// `include`: of an element that an <include> brings in, this <include>, whose attributes take
+  /// the place of the element's own; nullptr if it gives none.
   SceneNode(const tinyxml2::XMLElement& element, SceneContext& context,
             const tinyxml2::XMLElement* include = nullptr)
       : element_(&element), context_(&context), include_(include) {}

@@ -8,15 +8,15 @@
 
 namespace tangere {
 
-/// Reads positions and faces of an OBJ file, or of an STL or PLY file where the path ends in .stl or
-/// .ply, in its own unit. Faces become fans of triangles, and equal positions become one vertex.
+/// Reads positions and faces of an OBJ file, or of an STL or PLY file where the path ends in .stl
+/// or .ply, in its own unit. Faces become fans of triangles, and equal positions become one vertex.
 /// Vertices that no face uses are left out. Texture, normals, groups and materials are skipped.
 /// Throws IoError if the file cannot be read, InputError with file:line if it is not of its format,
 /// and InputError without a line if the surface is open, encloses no volume, or faces inwards.
 MeshShape read_surface(const std::string& path);
 
-/// Returns `count` of the points, (n, 3): the first, then always the one that is farthest from those
-/// before it, the first of equals. `count` is at most n.
+/// Returns `count` of the points, (n, 3): the first, then always the one that is farthest from
+/// those before it, the first of equals. `count` is at most n.
 std::vector<double> spread_points(const std::vector<double>& points, int count);
 
 /// Returns the area of a surface, in the square of its vertices' unit.

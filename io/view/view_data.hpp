@@ -13,8 +13,8 @@
 
 namespace tangere {
 
-/// Places of a sensor's map and of its arrows. An array of many points is pooled: a cell is the mean
-/// of its points.
+/// Places of a sensor's map and of its arrows. An array of many points is pooled: a cell is the
+/// mean of its points.
 struct ViewSensor {
   std::string name;
   int body = 0;                      ///< index in the scene's order

@@ -340,10 +340,13 @@ TEST(Command, AMeshThatItsGridLosesIsWarnedOf) {
                                   "f 4 1 5 8\n");
   };
   folder.write("plate.xml", R"(<tangere><option unit="m-kg"/><robot><link name="box">
-<joint name="box" type="free3d" pos="0 0 2"/><body name="box" type="cuboid" size="0.2 0.2 0.2" density="1"/></link></robot>
+<joint name="box" type="free3d" pos="0 0 2"/><body name="box" type="cuboid" )"
+                            R"(size="0.2 0.2 0.2" density="1"/></link></robot>
 <robot><link name="plate"><joint name="plate" type="fixed"/>
-<body name="plate" type="mesh" filename="plate.obj" transform_type="OBJ_TO_JOINT" resolution="16" density="1"/>
-</link></robot><contact><general_primitive_contact general_body="box" primitive_body="plate"/></contact>
+<body name="plate" type="mesh" filename="plate.obj" transform_type="OBJ_TO_JOINT" )"
+                            R"(resolution="16" density="1"/>
+</link></robot><contact><general_primitive_contact general_body="box" primitive_body="plate"/>)"
+                            R"(</contact>
 </tangere>)");
   plate("0.03");
   for (const Words& words :

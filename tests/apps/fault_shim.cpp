@@ -4,10 +4,10 @@
 // TANGERE_FAULT=kind:n fails the n-th call of a kind, counted from 1, with EIO (writes: ENOSPC,
 // threads: EAGAIN, and all later ones too, memory: ENOMEM). TANGERE_FAULT_COUNT=file writes there,
 // when the program ends, how many calls of that kind there were. Kinds: write, sync, rename, close,
-// truncate, open, read, thread, memory. Allocations by HDF5 itself are not among memory: it uses about
-// one in thirty without asking whether it got it (docs/failures.md). Two more kinds are those of a
-// disk that lies: the n-th write or truncation (lost) does nothing, or the n-th write puts zeros in
-// place of the bytes (zeros), and says that it succeeded.
+// truncate, open, read, thread, memory. Allocations by HDF5 itself are not among memory: it uses
+// about one in thirty without asking whether it got it (docs/failures.md). Two more kinds are those
+// of a disk that lies: the n-th write or truncation (lost) does nothing, or the n-th write puts
+// zeros in place of the bytes (zeros), and says that it succeeded.
 #include <dlfcn.h>
 #include <fcntl.h>
 #include <link.h>

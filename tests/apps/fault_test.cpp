@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // One call of the operating system fails, whichever it is, or says that it succeeded and did not. A
 // file under its final name holds exactly what an undisturbed run writes, or is absent, and the
-// exit code tells which: 0 only if all is there. Where a run replaces a file, the name may hold what
-// it held before. TANGERE_FAULTS=all tries every call, TANGERE_FAULTS=N some N calls of each kind;
-// without it, a few calls spread over all of them.
+// exit code tells which: 0 only if all is there. Where a run replaces a file, the name may hold
+// what it held before. TANGERE_FAULTS=all tries every call, TANGERE_FAULTS=N some N calls of each
+// kind; without it, a few calls spread over all of them.
 #include <gmock/gmock.h>
 
 #include <algorithm>

@@ -324,8 +324,8 @@ TEST(GeneratePolicy, AProgramThatGoesWrongLeavesWholeShards) {
         EXPECT_FALSE(fs::exists(folder.path("set")));
         continue;
       }
-      // A block of 16 episodes takes 100 questions and is a shard here. The fourth block begins when
-      // the first one is written.
+      // A block of 16 episodes takes 100 questions and is a shard here. The fourth block begins
+      // when the first one is written.
       EXPECT_TRUE(fs::exists(folder.path("set/shard-00000.h5")));
       for (const auto& entry : fs::directory_iterator(folder.path("set"))) {
         const std::string name = entry.path().filename();

@@ -98,7 +98,8 @@ import glob, h5py, numpy as np
 with h5py.File("set/robomimic.hdf5", swmr=True, libver="latest") as f:  # as robomimic opens it
     said = f["scene/gradients"]
     assert f["scene"].attrs["gradients"] == "jacobians"
-    assert sorted(said) == ["grad_state_by_action", "grad_state_by_previous", "grad_state_by_state"], sorted(said)
+    derived = ["grad_state_by_action", "grad_state_by_previous", "grad_state_by_state"]
+    assert sorted(said) == derived, sorted(said)
     na, states = len(f["scene"].attrs["action_names"]), 2 * len(f["scene"].attrs["v_names"])
     shapes = {"grad_state_by_action": (6, states, na)}
     for i in range(20):
@@ -109,8 +110,9 @@ with h5py.File("set/robomimic.hdf5", swmr=True, libver="latest") as f:  # as rob
             d = demo[name]
             assert d.dtype == "<f8" and d.shape == shapes.get(name, (6, states, states)), (name, d)
             assert len(d.attrs) == 1 and isinstance(d.attrs["meaning"], str), dict(d.attrs)
-            assert d.attrs["meaning"] == said[name].attrs["meaning"] and len(d.attrs["meaning"]) > 20
-            assert len(said[name].attrs["by_names"]) == len(said[name].attrs["by_units"]) == d.shape[-1]
+            here = said[name].attrs
+            assert d.attrs["meaning"] == here["meaning"] and len(d.attrs["meaning"]) > 20
+            assert len(here["by_names"]) == len(here["by_units"]) == d.shape[-1]
             assert np.isfinite(d[:]).all() and d.is_virtual is False
         assert sorted(demo["next_obs"]) == sorted(demo["obs"]) == ["pad", "q", "v"]
         for name, d in demo["next_obs"].items():
@@ -122,11 +124,13 @@ for path in glob.glob("set/minari/*/*/data/main_data.hdf5"):
     with h5py.File(path) as f:
         assert len(f.attrs) == 2 and f.attrs["total_episodes"] == len(f) == 20
         episode = f["episode_19"]
-        assert len(episode.attrs) == 4 and episode.attrs["id"] == 19 and episode.attrs["seed"] == 2**64 - 1
-        assert sorted(episode["infos"]) == ["grad_state_by_action", "grad_state_by_previous", "grad_state_by_state"]
-        assert episode["infos/grad_state_by_action"].shape[0] == 6 and np.isfinite(episode["infos/grad_state_by_action"][:]).all()
-        assert episode["observations/pad"].shape == (7, 32, 32, 3) and episode["terminations"].dtype == bool
-        assert not episode["terminations"][:].any() and list(episode["truncations"][:]) == [False] * 5 + [True]
+        assert len(episode.attrs) == 4 and episode.attrs["id"] == 19
+        assert episode.attrs["seed"] == 2**64 - 1 and sorted(episode["infos"]) == derived
+        by_action = episode["infos/grad_state_by_action"]
+        assert by_action.shape[0] == 6 and np.isfinite(by_action[:]).all()
+        assert episode["observations/pad"].shape == (7, 32, 32, 3)
+        assert episode["terminations"].dtype == bool and not episode["terminations"][:].any()
+        assert list(episode["truncations"][:]) == [False] * 5 + [True]
         print("read")
 )"),
             "read\n");

@@ -178,9 +178,9 @@ inline std::vector<double> difference_steps(double start) {
 }
 
 /// The central difference of least error; NaN if none settles (a kink). `values`: of the function,
-/// four for each of the steps. A difference's error is estimated as its change from the step before,
-/// plus the effect of rounding. At the smallest steps, which serve runs with a kink or a split step
-/// close by, two differences can agree by chance.
+/// four for each of the steps. A difference's error is estimated as its change from the step
+/// before, plus the effect of rounding. At the smallest steps, which serve runs with a kink or a
+/// split step close by, two differences can agree by chance.
 inline double best_of_differences(const std::vector<double>& steps, const double* values) {
   constexpr double kRounding = 1e-14;  // of a run's loss, relative
   double best = NAN, least = HUGE_VAL, before = NAN;

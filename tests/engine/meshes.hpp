@@ -67,8 +67,8 @@ inline MeshShape cuboid_mesh(const Vector3& half) {
   return mesh;
 }
 
-/// A closed strip of `around` × `along` quadrilaterals, whose corner (i, j) is at place(u, v), u and
-/// v from 0 to 1. Both ways round it comes back to its start.
+/// A closed strip of `around` × `along` quadrilaterals, whose corner (i, j) is at place(u, v), u
+/// and v from 0 to 1. Both ways round it comes back to its start.
 inline MeshShape torus_mesh(double ring, double tube, int around, int along) {
   MeshShape mesh;
   for (int i = 0; i < around; ++i)

@@ -17,8 +17,9 @@ class Mutator {
   /// One of the texts with one to four changes: bytes, lines, numbers such as 1e15 or nan, pieces
   /// of another text.
   std::string text(const std::vector<std::string>& corpus);
-  /// One of the HDF5 files with one to six changes: bits, fields of eight bytes, runs, a truncation.
-  /// Half of them lie behind one of the format's signatures, where the descriptions are.
+  /// One of the HDF5 files with one to six changes: bits, fields of eight bytes, runs, a
+  /// truncation. Half of them lie behind one of the format's signatures, where the descriptions
+  /// are.
   std::string hdf5(const std::vector<std::string>& corpus);
 
  private:

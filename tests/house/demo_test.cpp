@@ -41,7 +41,8 @@ TEST(House, DemoTellsTheTruthAboutItsFile) {
   ASSERT_TRUE(promised.contains("data/demo_0/obs/q") && promised.contains("data/demo_0/obs/pad"));
 
   static const std::regex command(
-      R"(\n\$tangere (generate scenes/rolling_ball\.xml --episodes ([0-9]+) .*--steps 350.*) --output)");
+      R"(\n\$tangere (generate scenes/rolling_ball\.xml --episodes ([0-9]+) .*--steps )"
+      R"(350.*) --output)");
   std::smatch match;
   const std::string text = demo_text();
   ASSERT_TRUE(std::regex_search(text, match, command));

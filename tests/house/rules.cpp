@@ -389,15 +389,28 @@ std::vector<Violation> check_own_headers(const Tree& tree) {
   return found;
 }
 
-/// Characters of a line: bytes of UTF-8 that begin one.
+constexpr std::ptrdiff_t kMostColumns = 100;
+
+/// Characters of a line: bytes of UTF-8 that begin one. Marks above letters (U+0300 to U+036F) take
+/// no column; their first byte is 0xCC or 0xCD.
 static std::ptrdiff_t columns_of(const std::string& line) {
-  return std::count_if(line.begin(), line.end(),
-                       [](char c) { return (static_cast<unsigned char>(c) & 0xC0U) != 0x80U; });
+  return std::count_if(line.begin(), line.end(), [](char c) {
+    const auto byte = static_cast<unsigned char>(c);
+    return (byte & 0xC0U) != 0x80U && byte != 0xCCU && byte != 0xCDU;
+  });
+}
+
+/// Complains about a line that has too many columns.
+static void check_columns(const std::string& path, int number, const std::string& line,
+                          std::vector<Violation>& found) {
+  if (const std::ptrdiff_t columns = columns_of(line); columns > kMostColumns)
+    found.push_back(
+        {path, number,
+         std::to_string(columns) + " columns, at most " + std::to_string(kMostColumns)});
 }
 
 std::vector<Violation> check_sources(const Tree& tree) {
   constexpr std::size_t kMostLines = 600;
-  constexpr std::ptrdiff_t kMostColumns = 100;  // clang-format sees to those of C++
   std::vector<Violation> found;
   for (const auto& [path, text] : tree) {
     if (!is_cpp(path) && !is_script(path)) continue;
@@ -415,16 +428,24 @@ std::vector<Violation> check_sources(const Tree& tree) {
                      });
     if (spdx == lines.begin() + std::ptrdiff_t(std::min(head, lines.size())))
       found.push_back({path, 1, "has no line 'SPDX-License-Identifier: Apache-2.0' at its head"});
-    if (ends_with_any(path, {".js", ".py"}))
+    if (is_cpp(path) || ends_with_any(path, {".js", ".py"}))
       for (std::size_t i = 0; i < lines.size(); ++i)
-        if (const std::ptrdiff_t columns = columns_of(lines[i]); columns > kMostColumns)
-          found.push_back(
-              {path, static_cast<int>(i) + 1,
-               std::to_string(columns) + " columns, at most " + std::to_string(kMostColumns)});
+        check_columns(path, static_cast<int>(i) + 1, lines[i], found);
     if (is_cpp(path) && (lines.size() < 2 || !lines[1].starts_with("//")))
       found.push_back({path, 2, "expected a comment that says why the file exists"});
   }
   return found;
+}
+
+/// The folder whose README.md speaks of a source: its own. The folders of an area of the tests
+/// mirror those of the sources, and each example is one project. So the page of the area speaks for
+/// the former, and that of `examples` for the latter.
+static std::string documented_by(const std::string& path) {
+  const std::string top = top_of(path);
+  if (top == "examples") return top;
+  const std::size_t end =
+      top == "tests" ? path.find('/', std::min(top.size() + 1, path.size())) : path.rfind('/');
+  return path.substr(0, end == std::string::npos ? top.size() : end);
 }
 
 std::vector<Violation> check_documents(const Tree& tree) {
@@ -433,7 +454,7 @@ std::vector<Violation> check_documents(const Tree& tree) {
   for (const auto& [path, text] : tree)
     if (path.find('/') != std::string::npos && !path.starts_with('.')) {
       top.insert(top_of(path));
-      if (const std::string own = folder_of(path); !own.empty()) top.insert(own);
+      if (is_cpp(path) || ends_with_any(path, {".py", ".js"})) top.insert(documented_by(path));
     }
   for (const std::string& folder : top) {
     const auto readme = tree.find(folder + "/README.md");
@@ -448,6 +469,7 @@ std::vector<Violation> check_documents(const Tree& tree) {
     int number = 0;
     for (const std::string& line : lines_of(text)) {
       ++number;
+      if (line.starts_with('|')) check_columns(path, number, line, found);
       for (std::sregex_iterator match(line.begin(), line.end(), link), end; match != end; ++match) {
         const std::string target = (*match)[1];
         if (target.find("://") != std::string::npos || target.starts_with("mailto:")) continue;

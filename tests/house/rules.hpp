@@ -51,10 +51,12 @@ std::vector<Violation> check_heavy_headers(const Tree& tree);
 /// A source of the libraries and the command has a header of its own name or a listed reason.
 std::vector<Violation> check_own_headers(const Tree& tree);
 
-/// SPDX line first, then a comment that says why the file exists; at most 600 lines.
+/// SPDX line first, then a comment that says why the file exists; at most 600 lines. In C++, Python
+/// and JavaScript, at most 100 columns.
 std::vector<Violation> check_sources(const Tree& tree);
 
-/// Every folder at the top has a README.md, and links in Markdown files lead to files that exist.
+/// Every folder with sources has a README.md, its own or, below tests and examples, that of the
+/// folder above. Links in Markdown files lead to files that exist. Tables have at most 100 columns.
 std::vector<Violation> check_documents(const Tree& tree);
 
 }  // namespace tangere::house

@@ -162,6 +162,7 @@ TEST(HouseRules, SeeAHeadlessOrOverlongSource) {
       {"engine/longest.cpp", longest},
       {"engine/mute.cpp", "// SPDX-License-Identifier: Apache-2.0\n#include <vector>\n"},
       {"engine/too_long.cpp", too_long},
+      {"engine/wide.cpp", head + "// " + marks + "\n// e\u0304" + std::string(96, 'x') + "\n"},
       {"io/page/wide.js",
        "// SPDX-License-Identifier: Apache-2.0\n" + std::string(101, 'x') + "\n"},
       {"python/fits.py", "# SPDX-License-Identifier: Apache-2.0\n#" + marks + "\n"},
@@ -172,6 +173,7 @@ TEST(HouseRules, SeeAHeadlessOrOverlongSource) {
       ElementsAre(Says("engine/bare.hpp", 1, "SPDX"), Says("engine/bare.hpp", 2, "why"),
                   Says("engine/empty.cpp", 1, "SPDX"), Says("engine/empty.cpp", 2, "why"),
                   Says("engine/mute.cpp", 2, "why"), Says("engine/too_long.cpp", 0, "601 lines"),
+                  Says("engine/wide.cpp", 3, "102 columns"),
                   Says("io/page/wide.js", 2, "101 columns"),
                   Says("tests/CMakeLists.txt", 1, "SPDX")));
 }
@@ -186,6 +188,23 @@ TEST(HouseRules, SeeAnUndocumentedFolderAndADeadLink) {
   EXPECT_THAT(check_documents(tree),
               ElementsAre(Says("io/README.md", 0, "nothing"), Says("tasks", 0, "no README.md"),
                           Says("engine/README.md", 3, "gone.md")));
+}
+
+TEST(HouseRules, SeeAFolderInAFolderWithoutItsPage) {
+  const Tree tree{{"engine/README.md", "# A\n\nB\n"},   {"engine/step/inner/a.hpp", ""},
+                  {"examples/README.md", "# A\n\nB\n"}, {"examples/own/a.cpp", ""},
+                  {"python/README.md", "# A\n\nB\n"},   {"python/tangere/a.py", ""},
+                  {"tests/README.md", "# A\n\nB\n"},    {"tests/main.cpp", ""},
+                  {"tests/io/scene/a_test.cpp", ""}};
+  EXPECT_THAT(check_documents(tree), ElementsAre(Says("engine/step/inner", 0, "no README.md"),
+                                                 Says("python/tangere", 0, "no README.md"),
+                                                 Says("tests/io", 0, "no README.md")));
+}
+
+TEST(HouseRules, SeeATableThatIsTooWide) {
+  const std::string dots(97, '.');
+  const Tree tree{{"docs/README.md", "# A\n\n| " + dots + "|\n| ×" + dots + "|\n| a |\n"}};
+  EXPECT_THAT(check_documents(tree), ElementsAre(Says("docs/README.md", 4, "101 columns")));
 }
 
 }  // namespace

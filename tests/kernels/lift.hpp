@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Numbers with a tangent where the number type has one: lift<Dual<double>>(x, ẋ), lift<double>(x, ẋ).
+// Numbers with a tangent where the number type has one: lift<Dual<double>>(x, ẋ) and
+// lift<double>(x, ẋ).
 #pragma once
 
 #include <type_traits>

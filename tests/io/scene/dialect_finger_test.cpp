@@ -69,8 +69,8 @@ TEST(DialectFinger, AbstractBodiesTakeContactsAsAttribute) {
   ASSERT_EQ(palm.contact_points.size(), 9U);
   EXPECT_NEAR(palm.contact_points[0], 2e-4, 1e-18) << "0.02 cm, in the frame of the body";
   EXPECT_NEAR(palm.contact_points[4], 1.7e-4, 1e-18);
-  const std::string both =
-      R"(type="abstract" mass="1" inertia="1 1 1" contacts="tripod.txt"><collision radius="1" count="4"/></body></link>)";
+  const std::string both = R"(type="abstract" mass="1" inertia="1 1 1" contacts="tripod.txt">)"
+                           R"(<collision radius="1" count="4"/></body></link>)";
   EXPECT_THAT(refusal(scene("<link name=\"a\"><joint name=\"a\" type=\"fixed\"/>\n<body " + both)),
               HasSubstr("<collision>: the body has the attribute 'contacts' too; expected one"));
   EXPECT_THAT(
@@ -156,7 +156,8 @@ TEST(DialectFinger, OneRangeOfAPlaneJointIsForcesAndTorques) {
   EXPECT_FALSE(s.motors[1].turning);
   // Alone, a cube of 600 g with 1 cm edges: a = F/m, α = T/I.
   const std::string cube = R"(<redmax><option gravity="0 0 0" timestep="1e-3"/><robot>
-<link name="a"><joint name="a" type="free2d"/><body type="cuboid" size="1 1 1" density="600"/></link>
+<link name="a"><joint name="a" type="free2d"/><body type="cuboid" size="1 1 1" density="600"/>)"
+                           R"(</link>
 </robot><actuator><motor joint="a" ctrl="force" ctrl_range="-1e5 2e5"/></actuator></redmax>)";
   const Model model(parse_scene(cube, "s.xml").scene);
   EXPECT_EQ(model.u_names()[2], "a.rate");

@@ -25,7 +25,8 @@ const std::string kTable = R"(<tangere model="table">
 <robot>
 <link name="table">
 <joint name="table" type="fixed" pos="0 0 0" quat="1 0 0 0"/>
-<body name="table" type="cuboid" size="0.04 0.04 0.02" pos="0 0 -0.01" quat="1 0 0 0" density="1000"/>
+<body name="table" type="cuboid" size="0.04 0.04 0.02" pos="0 0 -0.01" quat="1 0 0 0" )"
+                           R"(density="1000"/>
 </link>
 </robot>
 <robot>
@@ -54,7 +55,8 @@ std::string feedback_refusal(const std::string& text) {
   return "";
 }
 
-/// Force of the field on the sensor's body in world axes [N]; the pad's axes are those of the world.
+/// Force of the field on the sensor's body in world axes [N]; the pad's axes are those of the
+/// world.
 std::array<double, 3> sum_of(Readout& readout, const Batch& batch, std::vector<double>& field) {
   readout.tactile(batch, 0, 0, field);
   std::array<double, 3> sum{};

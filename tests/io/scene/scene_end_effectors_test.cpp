@@ -22,7 +22,8 @@ Scene with_end_effectors(const std::string& end_effectors, const std::string& un
 
 TEST(SceneEndEffectors, KeepJointAndPlace) {
   const Scene s = with_end_effectors(R"(<variable>
-    <endeffector name="nose" joint="ball_joint" pos="0.01 -0.02 0.03" radius="0.004" rgba="0.5 0.25 0"/>
+    <endeffector name="nose" joint="ball_joint" pos="0.01 -0.02 0.03" radius="0.004" )"
+                                     R"(rgba="0.5 0.25 0"/>
     <endeffector name="heel" joint="pad_joint" pos="0 0 -0.005"/></variable>)");
   ASSERT_EQ(s.end_effectors.size(), 2U);
   EXPECT_EQ(s.end_effectors[0].name, "nose");

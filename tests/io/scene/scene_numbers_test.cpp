@@ -27,11 +27,14 @@ std::string scene_with(const std::string& lines) {
 <ground pos="0 0 0" normal="0 0 1"/>
 <robot>
 <link name="skin">
-<joint name="skin" type="revolute" axis="0 0 1" damping="0.2" armature="0.1" stiffness="3" lim="-1 1" lim_stiffness="5"/>
-<body name="skin" type="cuboid" size="0.05 0.05 0.01" density="1000" general_contact_resolution="4 4 2"/>
+<joint name="skin" type="revolute" axis="0 0 1" damping="0.2" armature="0.1" stiffness="3" )"
+         R"(lim="-1 1" lim_stiffness="5"/>
+<body name="skin" type="cuboid" size="0.05 0.05 0.01" density="1000" )"
+         R"(general_contact_resolution="4 4 2"/>
 </link>
 <link name="slide">
-<joint name="slide" type="prismatic" axis="1 0 0" pos="0 0 0.1" damping="0.3" stiffness="4" lim="-1 1" lim_stiffness="6"/>
+<joint name="slide" type="prismatic" axis="1 0 0" pos="0 0 0.1" damping="0.3" stiffness="4" )"
+         R"(lim="-1 1" lim_stiffness="6"/>
 <body name="can" type="cylinder" length="0.04" radius="0.02" density="400"/>
 </link>
 <link name="ball">
@@ -49,16 +52,21 @@ std::string scene_with(const std::string& lines) {
 <link name="wedge">
 <joint name="wedge" type="translational" pos="0.9 0 0.2"/>
 <body name="wedge" type="mesh" filename=")" TANGERE_TEST_DATA
-         R"(/scenes/wedge.obj" transform_type="OBJ_TO_JOINT" scale="0.01 0.01 0.01" resolution="0" density="300"/>
+         R"(/scenes/wedge.obj" transform_type="OBJ_TO_JOINT" scale="0.01 0.01 0.01" )"
+         R"(resolution="0" density="300"/>
 </link>
 </robot>
-<actuator><motor joint="skin" ctrl="position" P="7" D="0.8"/><motor joint="slide" ctrl="position" P="9" D="0.6"/></actuator>
+<actuator><motor joint="skin" ctrl="position" P="7" D="0.8"/>)"
+         R"(<motor joint="slide" ctrl="position" P="9" D="0.6"/></actuator>
 <contact>
 <ground_contact body="ball" kn="5e3" kt="1" mu="0.8" damping="0.03"/>
-<general_primitive_contact general_body="skin" primitive_body="ball" kn="5" kt="2" mu="0.7" damping="1"/>
+<general_primitive_contact general_body="skin" primitive_body="ball" kn="5" kt="2" mu="0.7" )"
+         R"(damping="1"/>
 </contact>
 <sensor>
-<tactile name="skin" body="skin" type="rect_array" rect_pos0="-0.02 0.02 -0.005" rect_pos1="0.02 -0.02 -0.005" axis0="0 -1 0" axis1="1 0 0" resolution="5 7" kn="11" kt="0.01" mu="2" damping="0.003"/>
+<tactile name="skin" body="skin" type="rect_array" rect_pos0="-0.02 0.02 -0.005" )"
+         R"(rect_pos1="0.02 -0.02 -0.005" axis0="0 -1 0" axis1="1 0 0" resolution="5 7" )"
+         R"(kn="11" kt="0.01" mu="2" damping="0.003"/>
 </sensor>
 <randomize>
 )" + lines +

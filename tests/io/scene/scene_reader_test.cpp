@@ -179,8 +179,8 @@ TEST(SceneReader, RodsAndPlanesInEitherUnit) {
   EXPECT_EQ(capsule.contact_angles, 7);
   EXPECT_NEAR(Model(cm.scene).mass(0), 2000 * M_PI * 0.015 * 0.015 * 0.04, 1e-15);
 
-  const std::string floor =
-      R"(<link name="f"><joint name="f" type="fixed" quat="1 0 1 0"/><body name="f" type="plane" radius="3"/></link>)";
+  const std::string floor = R"(<link name="f"><joint name="f" type="fixed" quat="1 0 1 0"/>)"
+                            R"(<body name="f" type="plane" radius="3"/></link>)";
   const std::string rings =
       R"( general_contact_angle_resolution="12" general_contact_radius_resolution="1")";
   const std::string file = body("a", R"("cylinder" length="0.04" radius="0.015")" + rings) + floor;
@@ -230,8 +230,10 @@ TEST(SceneReader, APlaneAloneCannotMove) {
 
 TEST(SceneReader, WorldFramesAreResolvedAgainstTheParent) {
   const std::string text = R"(<tangere><option unit="m-kg"/><robot>
-<link name="a"><joint name="a" type="free3d" pos="1 2 3" quat="1 0 0 1"/><body name="a" type="sphere" radius="0.1"/>
-<link name="b"><joint name="b" type="revolute" axis="0 0 2" pos="1 3 3" quat="1 0 0 1" frame="WORLD"/>
+<link name="a"><joint name="a" type="free3d" pos="1 2 3" quat="1 0 0 1"/>)"
+                           R"(<body name="a" type="sphere" radius="0.1"/>
+<link name="b"><joint name="b" type="revolute" axis="0 0 2" pos="1 3 3" quat="1 0 0 1" )"
+                           R"(frame="WORLD"/>
 <body name="b" type="sphere" radius="0.1"/></link></link></robot></tangere>)";
   const Scene s = parse_scene(text, "s.xml").scene;
   // The parent is turned by 90° about z, so the world's +y is its +x.

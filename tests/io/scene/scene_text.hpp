@@ -8,7 +8,8 @@
 namespace tangere::testing {
 
 // One element a line, so that messages can be checked for theirs.
-inline const std::string kScene = R"(<tangere model="small">
+inline const std::string kScene =
+    R"(<tangere model="small">
 <option unit="m-kg" gravity="0 0 -9.8" timestep="5e-3" integrator="BDF2"/>
 <solver_option tol="1e-9" max_iter="20"/>
 <ground pos="0 0 0" normal="0 0 1"/>
@@ -16,7 +17,8 @@ inline const std::string kScene = R"(<tangere model="small">
 <robot>
 <link name="pad">
 <joint name="pad_joint" type="translational" pos="0 0 0.06" damping="1"/>
-<body name="pad" type="cuboid" size="0.05 0.05 0.01" density="1000" general_contact_resolution="4 4 2"/>
+<body name="pad" type="cuboid" size="0.05 0.05 0.01" density="1000" )"
+    R"(general_contact_resolution="4 4 2"/>
 </link>
 <link name="ball">
 <joint name="ball_joint" type="free3d" pos="0 0 0.02"/>
@@ -28,10 +30,13 @@ inline const std::string kScene = R"(<tangere model="small">
 </actuator>
 <contact>
 <ground_contact body="ball" kn="5e3" kt="1" mu="0.8" damping="0.03"/>
-<general_primitive_contact general_body="pad" primitive_body="ball" kn="5" kt="1" mu="1" damping="1"/>
+<general_primitive_contact general_body="pad" primitive_body="ball" kn="5" kt="1" mu="1" )"
+    R"(damping="1"/>
 </contact>
 <sensor>
-<tactile name="skin" body="pad" type="rect_array" rect_pos0="-0.02 0.02 -0.005" rect_pos1="0.02 -0.02 -0.005" axis0="0 -1 0" axis1="1 0 0" resolution="5 7" damping="0.003"/>
+<tactile name="skin" body="pad" type="rect_array" rect_pos0="-0.02 0.02 -0.005" )"
+    R"(rect_pos1="0.02 -0.02 -0.005" axis0="0 -1 0" axis1="1 0 0" resolution="5 7" )"
+    R"(damping="0.003"/>
 </sensor>
 <initial>
 <joint name="ball_joint" q="0.001 0 0 1 0 0 0" v="0.1 0 0 0 2 0"/>

@@ -265,7 +265,8 @@ TEST_F(SurfaceFiles, PlyFilesAreTheSameSurfaceInTextAndInBytes) {
 TEST_F(SurfaceFiles, AMeshMayTouchWithFewerPoints) {
   write("box.obj", kBox);
   const auto body = [](const std::string& count) {
-    return R"(<body name="a" type="mesh" filename="box.obj" transform_type="OBJ_TO_JOINT" scale="2 1 1")" +
+    return R"(<body name="a" type="mesh" filename="box.obj" transform_type="OBJ_TO_JOINT" )"
+           R"(scale="2 1 1")" +
            count + "/>";
   };
   const Scene all = scene(body("")).scene,
@@ -335,7 +336,8 @@ TEST_F(SurfaceFiles, ContactPointsFollowTheirCount) {
 TEST_F(SurfaceFiles, ACompiledMeshIsTheCuboidInItsPlace) {
   write("box.obj", kBox);
   const std::string mesh =
-      R"(<body name="a" type="mesh" filename="box.obj" density="2" quat="1 0 1 0" pos="1 2 3" transform_type=)";
+      R"(<body name="a" type="mesh" filename="box.obj" density="2" quat="1 0 1 0" pos="1 2 3" )"
+      R"(transform_type=)";
   const Scene placed = scene(mesh + "\"OBJ_TO_JOINT\" scale=\"2 1 1\"/>").scene;
   const Scene cuboid =
       scene(
@@ -351,8 +353,8 @@ TEST_F(SurfaceFiles, ACompiledMeshIsTheCuboidInItsPlace) {
     for (int j = 0; j < 3; ++j) EXPECT_NEAR(x.inertia.m[i][j], y.inertia.m[i][j], 1e-16);
   // In the world: the joint stands at (1 0 0) cm, turned by 90° about z.
   const Scene world =
-      scene(
-          R"(<body name="a" type="mesh" filename="box.obj" quat="1 0 0 1" pos="1 5 0" transform_type="OBJ_TO_WORLD"/>)")
+      scene(R"(<body name="a" type="mesh" filename="box.obj" quat="1 0 0 1" pos="1 5 0" )"
+            R"(transform_type="OBJ_TO_WORLD"/>)")
           .scene;
   const Pose& pose = world.links[0].body.pose;
   EXPECT_NEAR(pose.position[0], 0.05, 1e-16);
@@ -426,10 +428,9 @@ TEST_F(SurfaceFiles, ScenesSayWhatIsWrongWithTheirBodies) {
       HasSubstr("did you mean 'OBJ_TO_JOINT'"));
   EXPECT_THAT(scene_error(R"(<body name="a" type="mesh" transform_type="OBJ_TO_JOINT"/>)"),
               HasSubstr("'filename' is missing"));
-  EXPECT_THAT(
-      scene_error(
-          R"(<body name="a" type="mesh" filename="box.obj" scale="1 0 1" transform_type="OBJ_TO_JOINT"/>)"),
-      HasSubstr("scale has 0"));
+  EXPECT_THAT(scene_error(R"(<body name="a" type="mesh" filename="box.obj" scale="1 0 1" )"
+                          R"(transform_type="OBJ_TO_JOINT"/>)"),
+              HasSubstr("scale has 0"));
   EXPECT_THAT(scene_error(R"(<body name="a" type="abstract" inertia="1 1 1"/>)"),
               HasSubstr("'mass' is missing"));
   EXPECT_THAT(scene_error(R"(<body name="a" type="abstract" mass="1" inertia="1 1"/>)"),
@@ -453,8 +454,10 @@ class TouchedMesh : public SurfaceFiles {
     return parse_scene(
         R"(<tangere><robot><link name="a"><joint name="a" type="free3d"/>
 <body name="a" type="mesh" filename="box.obj" transform_type="OBJ_TO_JOINT" )" +
-            resolution + R"(/></link>
-<link name="b"><joint name="b" type="free3d"/><body name="b" type="cuboid" size="1 1 1"/></link></robot>)" +
+            resolution +
+            R"(/></link>
+<link name="b"><joint name="b" type="free3d"/><body name="b" type="cuboid" size="1 1 1"/>)"
+            R"(</link></robot>)" +
             contact + R"(<sensor><tactile name="skin" body="b" type="rect_array" rect_pos0="0 0 0.5"
 rect_pos1="0.1 0.1 0.5" axis0="1 0 0" axis1="0 1 0" resolution="2 2"/></sensor></tangere>)",
         folder_ + "s.xml");

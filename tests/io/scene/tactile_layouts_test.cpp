@@ -194,7 +194,8 @@ TEST(TactileLayouts, ScenesPutThemOnBodiesInTheirUnit) {
       R"(<redmax><option unit="cm-g"/><robot><link name="a"><joint name="a" type="free3d"/>
 <body name="a" type="sphere" radius="2"/></link></robot><sensor>
 <tactile name="h" body="a" type="hemisphere" radius="2" count="100" resolution="10 12" pos="0 0 1"/>
-<tactile name="c" body="a" type="cylinder" radius="1" length="3" resolution="5 8" quat="0.7071067811865476 0 0.7071067811865476 0"/>
+<tactile name="c" body="a" type="cylinder" radius="1" length="3" resolution="5 8" )"
+      R"(quat="0.7071067811865476 0 0.7071067811865476 0"/>
 </sensor></redmax>)";
   const Scene s = parse_scene(scene, "s.xml").scene;
   ASSERT_EQ(s.sensors.size(), 2U);

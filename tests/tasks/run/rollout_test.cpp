@@ -42,7 +42,8 @@ Model pad_on_ball() {
              rect_pos0="-0.02 0.02 -0.005" rect_pos1="0.02 -0.02 -0.005"
              axis0="0 -1 0" axis1="1 0 0" kn="1" kt="0.01" mu="2" damping="0"/>
   </sensor>
-  <variable><endeffector joint="pad" pos="0.01 0 0"/><endeffector joint="ball" pos="0 0 0.02"/></variable>
+  <variable><endeffector joint="pad" pos="0.01 0 0"/><endeffector joint="ball" )"
+                           R"(pos="0 0 0.02"/></variable>
 </tangere>)",
                            "pad.xml")
                    .scene);
