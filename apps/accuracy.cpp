@@ -42,7 +42,9 @@ int environments_of(const AccuracyArguments& o) {
 AccuracyQuantity quantity_named(const std::string& name, const Model& model) {
   if (name.empty())
     return model.sensors().empty() ? AccuracyQuantity::state : AccuracyQuantity::tactile;
-  return named_value("quantity", name, {AccuracyQuantity::tactile, AccuracyQuantity::state});
+  return named_value(
+      "quantity", name,
+      {AccuracyQuantity::tactile, AccuracyQuantity::state, AccuracyQuantity::gradient});
 }
 
 void check_arguments(const AccuracyArguments& o) {
@@ -166,7 +168,8 @@ Command add_accuracy(CLI::App& program) {
       "tangere accuracy scenes/rolling_ball_small.xml --target 1e-2 --svg cost.svg");
   add_text(app, "SCENE", o.scene, "", "Scene file (XML), or the name of a task").required();
   add_text(app, "--quantity", o.quantity, "NAME",
-           "What is compared: tactile, or state [default: tactile, or state without a sensor]");
+           "What is compared: tactile, state or gradient [default: tactile, or state without a "
+           "sensor]");
   add_positive_number(app, "--target", o.target,
                       "Relative error that is good enough [default: 0.01]");
   add_whole_number<int>(app, "--envs", o.environments, 1, kMostEnvironments,

@@ -41,7 +41,7 @@ Json point_json(const AccuracyPoint& p) {
           {"within_share", finite(p.within)},
           {"simulated_seconds_per_cpu_second", finite(p.rate)},
           {"evaluations_per_step", p.evaluations},
-          {"split_share", p.split},
+          {"split_share", finite(p.split)},
           {"blurred", p.blurred},
           {"failed", p.failed},
           {"status", p.status}};
@@ -233,9 +233,8 @@ std::string accuracy_svg(const AccuracySubject& subject, const AccuracyReport& r
       fmt::format("reference {}, its own error {:.1e} (line); hollow: at most ten times it",
                   setting_text(report.reference.setting, report.reference.step),
                   report.reference.error)};
-  plot.x_label =
-      fmt::format("relative error of the {}, not exceeded in 95 % of the environments",
-                  subject.quantity == AccuracyQuantity::tactile ? "tactile fields" : "state");
+  plot.x_label = fmt::format("relative error of the {}, not exceeded in 95 % of the environments",
+                             accuracy_meaning(subject.quantity));
   plot.y_label = "CPU seconds per simulated second [1]";
   plot.floor = report.reference.error;
   plot.target = subject.target;

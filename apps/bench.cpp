@@ -32,12 +32,12 @@ constexpr int kMostPasses = 1'000'000;
 constexpr int kDefaultEnvironments = 256;  // 16 blocks: several per thread on usual machines
 
 struct BenchArguments {
-  std::string scene, frames, policy, precision = "mixed", record, svg, csv;
+  std::string scene, frames, policy, integrator, precision = "mixed", record, svg, csv;
   std::vector<int> threads;
   std::optional<std::int64_t> steps;
   std::optional<int> environments, every, repeat;
   std::optional<std::uint64_t> seed;
-  std::optional<double> accuracy;
+  std::optional<double> timestep, tolerance, accuracy;
   bool sleep = false, error = false, overwrite = false, allow_unknown = false;
 };
 
@@ -118,14 +118,14 @@ BenchError error_of(const BenchArguments& options, const Model& model,
             {"resolved", report.resolved},
             {"error", report.resolved ? finite(report.own.error) : Json()},
             {"median_error", report.resolved ? finite(report.own.median) : Json()}};
-  const char* const what = of.quantity == AccuracyQuantity::tactile ? "tactile fields" : "state";
   if (!report.resolved)
     return {fmt::format("error: not resolved; two references differ by {:.2g} %",
                         100 * reference.error),
             json};
-  return {fmt::format("error of the {}: {:.2g} %, not exceeded in 95 % of {} environments", what,
-                      100 * report.own.error, reference.environments),
-          json};
+  return {
+      fmt::format("error of the {}: {:.2g} %, not exceeded in 95 % of {} environments",
+                  accuracy_meaning(of.quantity), 100 * report.own.error, reference.environments),
+      json};
 }
 
 BenchSetting setting_of(const BenchArguments& options, const Model& model,
@@ -190,6 +190,15 @@ int measure(const BenchArguments& options, const Console& console, BenchSetting&
   return report(options, console, setting, model, more, entries);
 }
 
+/// The scene with the scheme, step and tolerance that are asked for.
+Scene scene_of(const BenchArguments& options, const Console& console, const SolverOptions& asked) {
+  Scene scene = read_scene_for(options.scene, options.allow_unknown, console, asked);
+  if (!options.integrator.empty()) scene.integrator = integrator_named(options.integrator);
+  if (options.timestep) scene.timestep = *options.timestep;
+  if (options.tolerance) scene.solver.tolerance = options.tolerance;
+  return scene;
+}
+
 /// The requested thread counts, or the default ones.
 std::vector<int> thread_counts(const BenchArguments& options) {
   return options.threads.empty() ? default_thread_counts() : options.threads;
@@ -199,6 +208,9 @@ int bench_task(const BenchArguments& options, const Console& console, const Task
   refuse_with_task(task, {{"--every", options.every.has_value()},
                           {"--frames", !options.frames.empty()},
                           {"--record", !options.record.empty()},
+                          {"--integrator", !options.integrator.empty()},
+                          {"--timestep", options.timestep.has_value()},
+                          {"--tol", options.tolerance.has_value()},
                           {"--error", options.error}});
   note_outputs_of(console, task, "is timed with what it observes");
   const PolicyKind kind = policy_named(options.policy, "", PolicyKind::random);
@@ -236,13 +248,14 @@ int bench(const BenchArguments& options, const Console& console) {
   // Reports a wrong word before a scene is read.
   frames_named(options.frames);
   precision_named(options.precision);
+  if (!options.integrator.empty()) integrator_named(options.integrator);
   if (options.frames == "none" && !options.record.empty())
     throw InputError("--frames none with --record; expected one of them");
   const SolverOptions asked{.accuracy = options.accuracy, .sleep = options.sleep ? kUsualSleep : 0};
   if (const std::unique_ptr<Task> task = find_task(options.scene, console, asked))
     return bench_task(options, console, *task);
   refuse_with_scene(options.scene, {{"--policy", !options.policy.empty()}});
-  const Model model(read_scene_for(options.scene, options.allow_unknown, console, asked));
+  const Model model(scene_of(options, console, asked));
   if (options.error && model.solver().sleep > 0)
     throw InputError(model.solver().sleep_source.prefix() +
                      "--error where bodies may sleep; expected no sleep: errors are those of the "
@@ -314,6 +327,12 @@ Command add_bench(CLI::App& program) {
                         "Timed passes over the episode; the best counts [default: 3]");
   add_whole_number<std::uint64_t>(app, "--seed", o.seed, 0, UINT64_MAX,
                                   "Seed of all that varies between environments [default: 0]");
+  add_positive_number(app, "--timestep", o.timestep, "Step size in s [default: the scene's]");
+  add_text(app, "--integrator", o.integrator, "NAME",
+           fmt::format("{} [default: the scene's]", fmt::join(integrator_names(), ", ")));
+  add_positive_number(app, "--tol", o.tolerance,
+                      "Largest scaled residual of a step [default: the scene's, or what follows "
+                      "scheme and step]");
   add_accuracy_option(app, o.accuracy);
   add_sleep_option(app, o.sleep);
   add_flag(

@@ -2,10 +2,10 @@
 # The suites that run longest, longest first: a fresh ctest starts them first, so that all cores end together. Afterwards it
 # goes by the times that it has measured.
 set(long engine_test.All/AdjointScheme tasks_test.Scenes/EveryScene apps_fault_test.Calls/Fault tasks_test.Scripted
-  apps_memory_test.Command apps_memory_threads_test.GenerateGradients apps_memory_threads_test.Tasks
-  apps_memory_test.DatasetCommand io_memory_test.ChunkCodec apps_memory_threads_test.GenerateShards
-  tasks_memory_threads_test.Tasks/EveryTask tasks_memory_threads_test.BenchmarkRun apps_memory_threads_test.GeneratePolicy
-  apps_memory_test.DamagedFile apps_memory_test.Files/DamagedShard apps_memory_threads_test.GenerateCompress
+  apps_test.Command apps_threads_test.GenerateGradients apps_threads_test.Tasks
+  apps_memory_test.DatasetCommand io_memory_test.ChunkCodec apps_threads_test.GenerateShards
+  tasks_memory_threads_test.Tasks/EveryTask tasks_memory_threads_test.BenchmarkRun apps_threads_test.GeneratePolicy
+  apps_memory_test.DamagedFile apps_memory_test.Files/DamagedShard apps_threads_test.GenerateCompress
   fuzz_test.Files/Fuzz apps_test.Accuracy apps_test.GenerateStop engine_test.All/Touching
   tasks_threads_test.Tasks/TaskReturn tasks_test.Scenes/VaryingNumbers)
 list(LENGTH long count)

@@ -5,13 +5,14 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
-#include <ctime>
 #include <limits>
 
 #include "engine/base/as_size.hpp"
 #include "engine/step/stepper.hpp"
+#include "tasks/accuracy/gradient_run.hpp"
 #include "tasks/run/block_reader.hpp"
 #include "tasks/run/block_threads.hpp"
+#include "tasks/run/thread_time.hpp"
 
 namespace tangere {
 namespace {
@@ -19,12 +20,6 @@ namespace {
 using kernels::kBlock;
 
 constexpr double kStill = 1e-6;  // of the widest range
-
-double thread_seconds() {
-  timespec now{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-}
 
 /// Numbers of one sample that are not zero.
 struct SparseSample {
@@ -73,13 +68,39 @@ struct BlockOutcome {
   std::vector<FailedEnvironment> failures;
 };
 
-}  // namespace
+/// Of fields and states, sample by sample.
+class SampleRun : public AccuracyRun {
+ public:
+  SampleRun(const FixedEpisodes& fixed, AccuracyQuantity what, int thread_count)
+      : episodes(fixed),
+        quantity(what),
+        width(width_of(fixed.start.model(), what)),
+        threads(thread_count) {
+    const Model& model = episodes.start.model();
+    if (width == 0) throw InputError("the scene has no tactile sensor; compare its state instead");
+    for (int i = 0; i < thread_count; ++i)
+      workers.push_back({Readout(model), Readout(model, Precision::mixed),
+                         std::vector<double>(kBlock * width), std::vector<float>(kBlock * width)});
+    reference.resize(environments() * as_size(episodes.samples));
+  }
 
-const char* to_string(AccuracyQuantity value) {
-  return value == AccuracyQuantity::tactile ? "tactile" : "state";
-}
+  AccuracyOutcome make_reference(const AccuracySetting& setting,
+                                 const AccuracyGoOn& go_on) override {
+    AccuracyOutcome out = play(setting, go_on, true);
+    if (!out.stopped) weigh(out);
+    return out;
+  }
 
-struct AccuracyRun::Impl {
+  AccuracyOutcome compare(const AccuracySetting& setting, const AccuracyGoOn& go_on) override {
+    AccuracyOutcome out = play(setting, go_on, false);
+    if (out.stopped) return out;
+    for (std::size_t p = 0; p < kPrecisions.size(); ++p)
+      out.error[p] = relative_errors(sum[quantity == AccuracyQuantity::state ? 0 : p], norm,
+                                     no_reference, out.failures);
+    return out;
+  }
+
+ private:
   /// Scratch of one thread.
   struct Worker {
     Readout exact, mixed;
@@ -98,19 +119,6 @@ struct AccuracyRun::Impl {
   std::vector<double> weight;                               // (width) of the state
   std::vector<char> no_reference;                           // (E) the reference failed
   std::array<std::vector<double>, kPrecisions.size()> sum;  // (E) squared distance so far
-
-  Impl(const FixedEpisodes& fixed, AccuracyQuantity what, int thread_count)
-      : episodes(fixed),
-        quantity(what),
-        width(width_of(fixed.start.model(), what)),
-        threads(thread_count) {
-    const Model& model = episodes.start.model();
-    if (width == 0) throw InputError("the scene has no tactile sensor; compare its state instead");
-    for (int i = 0; i < thread_count; ++i)
-      workers.push_back({Readout(model), Readout(model, Precision::mixed),
-                         std::vector<double>(kBlock * width), std::vector<float>(kBlock * width)});
-    reference.resize(environments() * as_size(episodes.samples));
-  }
 
   [[nodiscard]] std::size_t environments() const { return as_size(episodes.start.environments()); }
   [[nodiscard]] SparseSample& kept(int environment, int sample) {
@@ -255,40 +263,51 @@ struct AccuracyRun::Impl {
     for (std::size_t i = 0; i < width; ++i)
       weight[i] = high[i] - low[i] > kStill * widest ? 1 / (high[i] - low[i]) : 0;
   }
-
-  void errors(AccuracyOutcome& out) const {
-    for (std::size_t p = 0; p < kPrecisions.size(); ++p) {
-      const std::vector<double>& of = sum[quantity == AccuracyQuantity::state ? 0 : p];
-      out.error[p].resize(environments());
-      for (std::size_t e = 0; e < environments(); ++e)
-        out.error[p][e] = no_reference[e] != 0 || !(norm[e] > 0)
-                              ? std::numeric_limits<double>::quiet_NaN()
-                              : std::sqrt(of[e] / norm[e]);
-      for (const FailedEnvironment& f : out.failures)
-        if (no_reference[as_size(f.environment)] == 0)
-          out.error[p][as_size(f.environment)] = HUGE_VAL;
-    }
-  }
 };
 
-AccuracyRun::AccuracyRun(const FixedEpisodes& episodes, AccuracyQuantity quantity, int threads)
-    : impl_(std::make_unique<Impl>(episodes, quantity, threads)) {}
-AccuracyRun::~AccuracyRun() = default;
+}  // namespace
 
-AccuracyOutcome AccuracyRun::make_reference(const AccuracySetting& setting,
-                                            const AccuracyGoOn& go_on) {
-  AccuracyOutcome out = impl_->play(setting, go_on, true);
-  if (!out.stopped) impl_->weigh(out);
-  return out;
+const char* to_string(AccuracyQuantity value) {
+  switch (value) {
+    case AccuracyQuantity::tactile: return "tactile";
+    case AccuracyQuantity::state: return "state";
+    case AccuracyQuantity::gradient: break;
+  }
+  return "gradient";
 }
 
-AccuracyOutcome AccuracyRun::compare(const AccuracySetting& setting, const AccuracyGoOn& go_on) {
-  AccuracyOutcome out = impl_->play(setting, go_on, false);
-  if (!out.stopped) impl_->errors(out);
-  return out;
+const char* accuracy_meaning(AccuracyQuantity value) {
+  switch (value) {
+    case AccuracyQuantity::tactile: return "tactile fields";
+    case AccuracyQuantity::state: return "state";
+    case AccuracyQuantity::gradient: break;
+  }
+  return "gradient";
+}
+
+std::vector<double> relative_errors(std::span<const double> squared_distance,
+                                    std::span<const double> squared_norm,
+                                    std::span<const char> no_reference,
+                                    std::span<const FailedEnvironment> failures) {
+  std::vector<double> errors(squared_norm.size());
+  for (std::size_t e = 0; e < errors.size(); ++e)
+    errors[e] = no_reference[e] != 0 || !(squared_norm[e] > 0)
+                    ? std::numeric_limits<double>::quiet_NaN()
+                    : std::sqrt(squared_distance[e] / squared_norm[e]);
+  for (const FailedEnvironment& f : failures)
+    if (no_reference[as_size(f.environment)] == 0) errors[as_size(f.environment)] = HUGE_VAL;
+  return errors;
+}
+
+std::unique_ptr<AccuracyRun> make_accuracy_run(const FixedEpisodes& episodes,
+                                               AccuracyQuantity quantity, int threads) {
+  if (quantity == AccuracyQuantity::gradient)
+    return std::make_unique<GradientRun>(episodes, threads);
+  return std::make_unique<SampleRun>(episodes, quantity, threads);
 }
 
 double accuracy_bytes(const FixedEpisodes& episodes, AccuracyQuantity quantity) {
+  if (quantity == AccuracyQuantity::gradient) return GradientRun::bytes(episodes);
   const std::size_t width = width_of(episodes.start.model(), quantity);
   const double share = quantity == AccuracyQuantity::state ? 1 : 0.1;
   return static_cast<double>(as_size(episodes.start.environments()) * as_size(episodes.samples)) *

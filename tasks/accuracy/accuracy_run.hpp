@@ -6,6 +6,7 @@
 #include <array>
 #include <functional>
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "engine/base/precision.hpp"
@@ -18,8 +19,14 @@ namespace tangere {
 enum class AccuracyQuantity {
   tactile,  ///< the fields of all sensors; error relative to the norm of the reference's
   state,    ///< q; error relative to the range that each coordinate covers
+  /// Derivatives of ½ Σ |T|² of all sensors (without a sensor, of ½ Σ |v|²) over the samples, by the
+  /// controls between samples; without motors, by the start. Error relative to the largest
+  /// derivative by each motor or dof.
+  gradient,
 };
 const char* to_string(AccuracyQuantity value);
+/// The same in words.
+const char* accuracy_meaning(AccuracyQuantity value);
 
 struct AccuracySetting {
   Integrator integrator = Integrator::bdf1;
@@ -51,22 +58,27 @@ using AccuracyGoOn = std::function<bool()>;
 
 class AccuracyRun {
  public:
-  /// `episodes` must outlive this object. Throws InputError for tactile without a sensor, and when
-  /// the system refuses so many threads.
-  AccuracyRun(const FixedEpisodes& episodes, AccuracyQuantity quantity, int threads);
-  ~AccuracyRun();
-
+  virtual ~AccuracyRun() = default;
   /// Plays with a setting and keeps its samples as the reference. Errors are left empty.
-  AccuracyOutcome make_reference(const AccuracySetting& setting, const AccuracyGoOn& go_on);
+  virtual AccuracyOutcome make_reference(const AccuracySetting& setting,
+                                         const AccuracyGoOn& go_on) = 0;
   /// Plays with a setting and compares with the reference, which must have been made.
-  AccuracyOutcome compare(const AccuracySetting& setting, const AccuracyGoOn& go_on);
-
- private:
-  struct Impl;
-  std::unique_ptr<Impl> impl_;
+  virtual AccuracyOutcome compare(const AccuracySetting& setting, const AccuracyGoOn& go_on) = 0;
 };
 
-/// Memory of the reference, if a tenth of the points is touched [bytes].
+/// `episodes` must outlive what is returned. Throws InputError for tactile without a sensor, for
+/// gradients of fields that remember, and when the system refuses so many threads.
+std::unique_ptr<AccuracyRun> make_accuracy_run(const FixedEpisodes& episodes,
+                                               AccuracyQuantity quantity, int threads);
+
+/// (E) √(squared_distance/squared_norm); NaN where there is no reference or the norm is 0, infinite
+/// where an environment failed.
+std::vector<double> relative_errors(std::span<const double> squared_distance,
+                                    std::span<const double> squared_norm,
+                                    std::span<const char> no_reference,
+                                    std::span<const FailedEnvironment> failures);
+
+/// Memory of the reference, if a tenth of the points is touched, and of tapes [bytes].
 double accuracy_bytes(const FixedEpisodes& episodes, AccuracyQuantity quantity);
 
 }  // namespace tangere

@@ -57,7 +57,7 @@ class Sweep {
       : episodes_(episodes),
         options_(options),
         listener_(listener),
-        run_(episodes, options.quantity, options.threads) {}
+        run_(make_accuracy_run(episodes, options.quantity, options.threads)) {}
 
   AccuracyReport run_own() {
     report_.stopped = !find_reference() || !measure_own();
@@ -85,18 +85,20 @@ class Sweep {
     double last = HUGE_VAL;
     for (const int per_step : kReferenceParts) {
       AccuracySetting setting{Integrator::sdirk4, episodes_.every * per_step, kReferenceTolerance};
-      const AccuracyOutcome made = run_.make_reference(setting, listener_.go_on);
+      const AccuracyOutcome made = run_->make_reference(setting, listener_.go_on);
       // An unfinished reference is worth nothing. What came before was judged too coarse.
       if (made.stopped) return false;
       setting.integrator = Integrator::sdirk2;
-      const AccuracyOutcome other = run_.compare(setting, listener_.go_on);
+      const AccuracyOutcome other = run_->compare(setting, listener_.go_on);
       if (other.stopped) return false;
       setting.integrator = Integrator::sdirk4;
       describe_reference(setting, made, other);
       if (report_.reference.environments == 0 && made.failures.empty())
         throw InputError(options_.quantity == AccuracyQuantity::tactile
                              ? "nothing to compare: every field stays zero in every environment"
-                             : "nothing to compare: no coordinate moves in any environment");
+                         : options_.quantity == AccuracyQuantity::state
+                             ? "nothing to compare: no coordinate moves in any environment"
+                             : "nothing to compare: every derivative is zero in every environment");
       if (listener_.reference) listener_.reference(report_.reference);
       const double error = report_.reference.error;
       if (error <= options_.target / kFineEnough || error > 0.5 * last) break;
@@ -131,24 +133,33 @@ class Sweep {
         episodes_.every * kReferenceParts[0], kReferenceTolerance, listener_.go_on);
   }
 
-  [[nodiscard]] double tolerance_of(const AccuracySetting& setting) const {
-    return options_.tolerance.value_or(episodes_.start.model().following_tolerance(
-        setting.integrator, episodes_.interval() / setting.parts));
+  /// Gradients have a tolerance of their own.
+  [[nodiscard]] StepperOptions as_played(const StepperOptions& options) const {
+    return of_gradients() ? for_gradients(episodes_.start.model(), options) : options;
+  }
+  [[nodiscard]] bool of_gradients() const {
+    return options_.quantity == AccuracyQuantity::gradient;
   }
 
-  /// Whether settings are played with the tolerance that the engine chooses.
-  [[nodiscard]] bool tolerance_follows() const {
-    return !options_.tolerance && !episodes_.start.model().solver().tolerance;
+  /// Fills in the tolerance of a setting whose steps and accuracy are known.
+  void give_tolerance(AccuracySetting& setting) const {
+    const StepperOptions options{.integrator = setting.integrator,
+                                 .timestep = episodes_.interval() / setting.parts,
+                                 .tolerance = options_.tolerance,
+                                 .accuracy = setting.accuracy};
+    setting.tolerance = Stepper(episodes_.start.model(), as_played(options)).tolerance();
+    setting.follows =
+        !of_gradients() && !options_.tolerance && !episodes_.start.model().solver().tolerance;
   }
 
   /// Plays a setting up to kPasses times; the least times count. Returns false when stopped.
   bool measure(const AccuracySetting& setting, std::vector<AccuracyPoint>& points) {
-    AccuracyOutcome best = run_.compare(setting, listener_.go_on);
+    AccuracyOutcome best = run_->compare(setting, listener_.go_on);
     if (best.stopped) return false;
     double spent = best.step_seconds;
     bool stopped = false;  // what the first pass measured is kept
     for (int pass = 1; pass < kPasses && spent < kEnoughSeconds && !stopped; ++pass) {
-      const AccuracyOutcome again = run_.compare(setting, listener_.go_on);
+      const AccuracyOutcome again = run_->compare(setting, listener_.go_on);
       stopped = again.stopped;
       if (stopped) break;
       spent += again.step_seconds;
@@ -156,8 +167,9 @@ class Sweep {
       for (std::size_t p = 0; p < kPrecisions.size(); ++p)
         best.read_seconds[p] = std::min(best.read_seconds[p], again.read_seconds[p]);
     }
-    // A state has one precision, whatever fields are read in.
-    const std::size_t count = options_.quantity == AccuracyQuantity::state ? 1 : kPrecisions.size();
+    // States and derivatives have one precision, whatever fields are read in.
+    const std::size_t count =
+        options_.quantity == AccuracyQuantity::tactile ? kPrecisions.size() : 1;
     for (std::size_t p = 0; p < count; ++p) points.push_back(point_of(setting, best, p));
     if (listener_.setting) listener_.setting(std::span(points).last(count));
     return !stopped;
@@ -175,7 +187,7 @@ class Sweep {
     point.within = share_near(setting.accuracy, outcome.error[p]);
     const auto steps = static_cast<double>(std::max<std::int64_t>(1, outcome.environment_steps));
     point.evaluations = static_cast<double>(outcome.evaluations) / steps;
-    point.split = static_cast<double>(outcome.split_steps) / steps;
+    point.split = of_gradients() ? std::nan("") : static_cast<double>(outcome.split_steps) / steps;
     point.rate = outcome.simulated_seconds / (outcome.step_seconds + outcome.read_seconds[p]);
     point.blurred = point.error < kBlur * report_.reference.error;
     point.failed = static_cast<int>(outcome.failures.size());
@@ -192,8 +204,7 @@ class Sweep {
       if (!episodes_.can_cut(parts) || 2 * parts > report_.reference.setting.parts) continue;
       for (const Integrator integrator : integrators()) {
         AccuracySetting setting{integrator, parts, 0};
-        setting.tolerance = tolerance_of(setting);
-        setting.follows = tolerance_follows();
+        give_tolerance(setting);
         if (!measure(setting, report_.points)) return false;
       }
     }
@@ -202,17 +213,11 @@ class Sweep {
 
   /// Steps as long as the controls allow, cut into parts that keep an accuracy.
   bool measure_cut_steps() {
-    const Model& model = episodes_.start.model();
     const auto parts = std::ranges::find_if(kParts, [&](int n) { return episodes_.can_cut(n); });
     AccuracySetting setting{Integrator::sdirk3, parts == kParts.end() ? episodes_.every : *parts};
     for (const double accuracy : kAccuracies) {
       setting.accuracy = accuracy;
-      const Stepper as_set(model, {.integrator = setting.integrator,
-                                   .timestep = episodes_.interval() / setting.parts,
-                                   .tolerance = options_.tolerance,
-                                   .accuracy = accuracy});
-      setting.tolerance = as_set.tolerance();
-      setting.follows = tolerance_follows();
+      give_tolerance(setting);
       if (!measure(setting, report_.points)) return false;
     }
     return true;
@@ -221,9 +226,9 @@ class Sweep {
   bool measure_own() {
     const Model& model = episodes_.start.model();
     std::vector<AccuracyPoint> own;
-    const Stepper as_set(model);
+    const Stepper as_set(model, as_played({}));
     if (!measure({model.integrator(), episodes_.every, as_set.tolerance(), as_set.accuracy(),
-                  !model.solver().tolerance},
+                  !of_gradients() && !model.solver().tolerance},
                  own))
       return false;
     report_.own = own.front();
@@ -253,7 +258,7 @@ class Sweep {
   const FixedEpisodes& episodes_;
   const AccuracyOptions& options_;
   const AccuracyListener& listener_;
-  AccuracyRun run_;
+  std::unique_ptr<AccuracyRun> run_;
   AccuracyReport report_;
   std::vector<double> errors_of_environments_;
 };

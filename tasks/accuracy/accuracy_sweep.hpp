@@ -34,7 +34,7 @@ struct AccuracyPoint {
   /// Of cut steps: share of the environments whose error is 0.3 to 3 times the accuracy; else NaN.
   double within = 0;
   double evaluations = 0;  ///< of the residual, per step
-  double split = 0;        ///< share of steps
+  double split = 0;        ///< share of steps; NaN for gradients, which do not count them
   double rate = 0;         ///< simulated seconds per CPU second, over all environments
   bool blurred = false;    ///< error at most ten times the reference's own
   int failed = 0;          ///< environments

@@ -13,7 +13,7 @@
 #include "engine/sense/audit.hpp"
 #include "engine/sense/readout.hpp"
 #include "engine/step/tape.hpp"
-#include "tasks/effects/thread_time.hpp"
+#include "tasks/run/thread_time.hpp"
 
 namespace tangere {
 namespace {

@@ -11,7 +11,7 @@
 #include "engine/base/as_size.hpp"
 #include "engine/step/control.hpp"
 #include "engine/step/stepper.hpp"
-#include "tasks/effects/thread_time.hpp"
+#include "tasks/run/thread_time.hpp"
 
 namespace tangere {
 namespace {

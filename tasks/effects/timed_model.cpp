@@ -9,7 +9,7 @@
 #include "engine/base/as_size.hpp"
 #include "engine/base/error.hpp"
 #include "kernels/numbers/block.hpp"
-#include "tasks/effects/thread_time.hpp"
+#include "tasks/run/thread_time.hpp"
 
 namespace tangere {
 namespace {

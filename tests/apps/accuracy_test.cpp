@@ -64,6 +64,20 @@ TEST(Accuracy, ComparesTheStateWhereItIsAskedFor) {
   }
 }
 
+TEST(Accuracy, ComparesGradientsWhereTheyAreAskedFor) {
+  const Folder folder;
+  const json answer =
+      run_json(folder, {"accuracy", kSmall, "--steps", "120", "--envs", "2", "--quantity",
+                        "gradient", "--target", "0.3", "--csv", "cost.csv"});
+  EXPECT_EQ(answer.at("quantity"), "gradient");
+  EXPECT_LT(answer.at("reference").at("error"), 0.1);
+  const json &points = answer.at("points"), &first = points.front();
+  EXPECT_GT(first.at("evaluations_per_step"), 1);
+  EXPECT_TRUE(first.at("split_share").is_null()) << "is not counted";
+  for (const json& point : points) EXPECT_EQ(point.at("precision"), "double");
+  EXPECT_THAT(file_bytes(folder.path("cost.csv")), HasSubstr(",gradient,"));
+}
+
 TEST(Accuracy, TakesATask) {
   const Folder folder;
   const Outcome outcome = run(folder, {"accuracy", "insertion", "--envs", "2", "--quantity",

@@ -12,6 +12,7 @@
 #include <thread>
 
 #include "tests/apps/program.hpp"
+#include "tests/files.hpp"
 
 namespace tangere::apps {
 namespace {
@@ -89,6 +90,29 @@ TEST(Bench, WithoutFramesThereAreNoTactilePoints) {
           .at("runs")[0];
   EXPECT_EQ(entry.at("tactile_points_per_second"), 0);
   EXPECT_EQ(entry.at("frames"), "none");
+}
+
+/// Scheme, step and tolerance of the command line are those of a scene that has them.
+TEST(Bench, SchemeStepAndToleranceTakeTheScenesPlace) {
+  const Folder folder;
+  std::string text = file_bytes(kSmall);
+  const std::string options = "timestep=\"5e-3\" integrator=\"BDF2\"/>";
+  const std::size_t at = text.find(options);
+  ASSERT_NE(at, std::string::npos);
+  text.replace(at, options.size(),
+               "timestep=\"0.0125\" integrator=\"SDIRK2\"/><solver_option tol=\"1e-7\"/>");
+  folder.write("own.xml", text);
+  const Words same{"--envs", "3", "--steps", "40", "--threads", "1"};
+  const json own = bench_json(folder, same, 0, "own.xml");
+  const json asked = bench_json(
+      folder, same + Words{"--integrator", "SDIRK2", "--timestep", "0.0125", "--tol", "1e-7"});
+  for (const char* key : {"timestep", "integrator", "tolerance"})
+    EXPECT_EQ(own.at(key), asked.at(key)) << key;
+  EXPECT_EQ(own.at("runs")[0].at("checksum"), asked.at("runs")[0].at("checksum"));
+  EXPECT_EQ(asked.at("integrator"), "SDIRK2");
+  EXPECT_THAT(run(folder, bench({"--integrator", "RK4"})).err, HasSubstr("RK4"));
+  EXPECT_THAT(run(folder, bench({"--timestep", "0.01"}, "box_pushing")).err,
+              HasSubstr("--timestep"));
 }
 
 TEST(Bench, StepsAndThreadsHaveDefaults) {

@@ -76,10 +76,10 @@ std::vector<Job> jobs() {
   };
 }
 
-/// Calls of each kind that are tried; none given: about six, one of every `calls` / 6.
+/// Calls of each kind that are tried; none given: about three, one of every `calls` / 3.
 long tries_of(long calls) {
   const char* const given = std::getenv("TANGERE_FAULTS");
-  if (given == nullptr) return std::min(calls, 6L);
+  if (given == nullptr) return std::min(calls, 3L);
   return std::string(given) == "all" ? calls : std::stol(given);
 }
 

@@ -35,43 +35,43 @@ class AdjointScheme : public ::testing::TestWithParam<Integrator> {};
 
 TEST_P(AdjointScheme, TreesMatchDifferences) {
   int compared = 0;
-  for (unsigned seed = 1; seed <= 8; ++seed) {
+  for (unsigned seed = 1; seed <= 4; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     compared += testing::check_gradient(testing::random_tree(seed, 2 + static_cast<int>(seed % 5)),
                                         GetParam(), seed, kSteps, 1e-7);
   }
-  EXPECT_GT(compared, 150);
+  EXPECT_GT(compared, 70);
 }
 
 TEST_P(AdjointScheme, MachinesMatchDifferences) {
   int compared = 0;
-  for (unsigned seed = 1; seed <= 8; ++seed) {
+  for (unsigned seed = 1; seed <= 4; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     compared +=
         testing::check_gradient(testing::random_machine(seed, 2 + static_cast<int>(seed % 5)),
                                 GetParam(), seed, kSteps, 1e-7);
   }
-  EXPECT_GT(compared, 350);
+  EXPECT_GT(compared, 150);
 }
 
 /// Runs that split are left out: the run jumps where that decision changes, and these contacts are
 /// deep enough for it.
 TEST_P(AdjointScheme, ContactsMatchDifferences) {
   int compared = 0;
-  for (unsigned seed = 1; seed <= 8; ++seed) {
+  for (unsigned seed = 1; seed <= 4; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     const Scene scene =
         testing::random_contacts(seed, 2 + static_cast<int>(seed % 2), ContactLaw(seed % 3));
     if (!testing::splits(scene, GetParam(), seed, kSteps))
       compared += testing::check_gradient(scene, GetParam(), seed, kSteps, 1e-6);
   }
-  EXPECT_GT(compared, 130);
+  EXPECT_GT(compared, 60);
 }
 
 /// Position motors use the state at the start of the step; one of them drives a ball joint.
 TEST_P(AdjointScheme, MotorsTimedAtTheStartMatchDifferences) {
   int motors = 0, compared = 0;
-  for (unsigned seed = 1; seed <= 20; ++seed) {
+  for (unsigned seed = 1; seed <= 6; ++seed) {
     Scene s = testing::random_machine(seed, 3 + static_cast<int>(seed % 3));
     for (MotorDescription& m : s.motors)
       m.timing = MotorTiming::start, motors += m.control == MotorControl::position;
@@ -79,8 +79,8 @@ TEST_P(AdjointScheme, MotorsTimedAtTheStartMatchDifferences) {
     if (!testing::splits(s, GetParam(), seed, kSteps))
       compared += testing::check_gradient(s, GetParam(), seed, kSteps, 1e-7);
   }
-  EXPECT_GT(motors, 10);
-  EXPECT_GT(compared, 500);
+  EXPECT_GT(motors, 3);
+  EXPECT_GT(compared, 150);
 }
 
 /// Steps of which some are cut. Differences hold where both runs cut alike.

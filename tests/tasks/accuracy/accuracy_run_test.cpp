@@ -17,8 +17,10 @@
 namespace tangere {
 namespace {
 
+using ::testing::DoubleNear;
 using ::testing::Each;
 using ::testing::Gt;
+using ::testing::Lt;
 
 const Model& pressed_ball() {
   static const Model model(read_scene(TANGERE_SOURCE_DIR "/scenes/rolling_ball_small.xml").scene);
@@ -126,13 +128,15 @@ TEST(FixedEpisodes, StopAndRefuseWhatIsTooLong) {
 
 TEST(AccuracyRun, AReferenceIsAtNoDistanceFromItself) {
   const FixedEpisodes episodes = ball_episodes(3, 150);
-  for (const AccuracyQuantity what : {AccuracyQuantity::tactile, AccuracyQuantity::state}) {
-    AccuracyRun run(episodes, what, 1);
+  for (const AccuracyQuantity what :
+       {AccuracyQuantity::tactile, AccuracyQuantity::state, AccuracyQuantity::gradient}) {
+    SCOPED_TRACE(to_string(what));
+    const auto run = make_accuracy_run(episodes, what, 1);
     const AccuracySetting setting{Integrator::sdirk2, 10, 1e-10};
-    const AccuracyOutcome made = run.make_reference(setting, {});
+    const AccuracyOutcome made = run->make_reference(setting, {});
     EXPECT_NEAR(made.simulated_seconds, 3 * 0.75, 1e-12);
     EXPECT_EQ(made.environment_steps, 3 * 300);
-    EXPECT_THAT(run.compare(setting, {}).error[0], Each(0.0));
+    EXPECT_THAT(run->compare(setting, {}).error[0], Each(0.0));
   }
 }
 
@@ -141,17 +145,50 @@ TEST(AccuracyRun, ErrorsFallWithTheOrder) {
   const Model model = swinging(13);
   const FixedEpisodes episodes =
       scene_episodes(Batch(model, 1, 0), ControlProgram(model, model.timestep(), 0), 10, 5);
-  AccuracyRun run(episodes, AccuracyQuantity::state, 1);
-  run.make_reference({Integrator::sdirk4, 200, 1e-13}, {});
-  const auto error = [&](Integrator integrator, int parts) {
-    return run.compare({integrator, parts, 1e-12}, {}).error[0][0];
-  };
-  const auto order = [&](Integrator integrator, int parts) {
-    return std::log2(error(integrator, parts) / error(integrator, 2 * parts));
-  };
-  EXPECT_NEAR(order(Integrator::bdf1, 200), 1, 0.1);
-  EXPECT_NEAR(order(Integrator::sdirk2, 20), 2, 0.15);
-  EXPECT_NEAR(order(Integrator::sdirk3, 20), 3, 0.25);
+  for (const AccuracyQuantity what : {AccuracyQuantity::state, AccuracyQuantity::gradient}) {
+    SCOPED_TRACE(to_string(what));
+    const auto run = make_accuracy_run(episodes, what, 1);
+    run->make_reference({Integrator::sdirk4, 200, 1e-13}, {});
+    const auto error = [&](Integrator integrator, int parts) {
+      return run->compare({integrator, parts, 1e-12}, {}).error[0][0];
+    };
+    const auto order = [&](Integrator integrator, int parts) {
+      return std::log2(error(integrator, parts) / error(integrator, 2 * parts));
+    };
+    EXPECT_NEAR(order(Integrator::bdf1, 200), 1, 0.1);
+    EXPECT_NEAR(order(Integrator::sdirk2, 20), 2, 0.15);
+    EXPECT_NEAR(order(Integrator::sdirk3, 20), 3, 0.25);
+  }
+}
+
+/// A pad without sensors that nothing but its motor pushes.
+TEST(AccuracyRun, DerivativesAreByTheControlsBetweenSamples) {
+  const Model model(parse_scene(R"(<tangere model="pushed">
+  <option unit="m-kg" gravity="0 0 0" timestep="5e-3" integrator="SDIRK2"/>
+  <robot>
+    <link name="pad">
+      <joint name="pad" type="prismatic" axis="0 0 1"/>
+      <body name="pad" type="cuboid" size="0.1 0.1 0.1" density="1000"/>
+    </link>
+  </robot>
+  <actuator><motor joint="pad" ctrl="force" ctrl_range="-1 1"/></actuator>
+  <control><piecewise end="0.1"><at time="0" value="0.5"/></piecewise></control>
+</tangere>)",
+                                "pushed.xml")
+                        .scene);
+  FixedEpisodes episodes =
+      scene_episodes(Batch(model, 2, 0), ControlProgram(model, model.timestep(), 0), 20, 5);
+  const auto run = make_accuracy_run(episodes, AccuracyQuantity::gradient, 1);
+  run->make_reference({Integrator::sdirk4, 40, 1e-12}, {});
+  // A scheme of one step integrates a constant force exactly, whatever the step is. The memory of
+  // BDF2 spans changes of the control, by which derivatives are taken.
+  for (const Integrator integrator : {Integrator::bdf1, Integrator::sdirk2, Integrator::sdirk3})
+    for (const int parts : {1, 5, 10})
+      EXPECT_THAT(run->compare({integrator, parts, 1e-12}, {}).error[0], Each(Lt(1e-9)))
+          << to_string(integrator) << " " << parts;
+  // The loss is a square, so twice the force is twice the derivative: as far off as it is long.
+  for (double& u : episodes.controls) u *= 2;
+  EXPECT_THAT(run->compare({Integrator::sdirk2, 5, 1e-12}, {}).error[0], Each(DoubleNear(1, 1e-9)));
 }
 
 /// Whole steps of 25 ms are off by 2 % on the ball and by 10 % in box pushing, whose box bounces on
@@ -162,13 +199,13 @@ TEST(AccuracyRun, CutStepsRealiseWhatIsAsked) {
     const Model model(read_scene(std::string(TANGERE_SOURCE_DIR "/scenes/") + name + ".xml").scene);
     const FixedEpisodes episodes =
         scene_episodes(Batch(model, 16, 5), ControlProgram(model, model.timestep(), 5), 300, 5);
-    AccuracyRun run(episodes, AccuracyQuantity::tactile, 1);
-    run.make_reference({Integrator::sdirk4, 20, 1e-10}, {});
-    const AccuracyOutcome cut = run.compare({Integrator::sdirk3, 1, 0, 1e-2, true}, {});
+    const auto run = make_accuracy_run(episodes, AccuracyQuantity::tactile, 1);
+    run->make_reference({Integrator::sdirk4, 20, 1e-10}, {});
+    const AccuracyOutcome cut = run->compare({Integrator::sdirk3, 1, 0, 1e-2, true}, {});
     const auto kept = std::ranges::count_if(
         cut.error[0], [](double error) { return error > 0.3e-2 && error < 3e-2; });
     EXPECT_GE(kept, 14) << "of 16: " << ::testing::PrintToString(cut.error[0]);
-    const AccuracyOutcome whole = run.compare({Integrator::sdirk3, 1, 0, 0, true}, {});
+    const AccuracyOutcome whole = run->compare({Integrator::sdirk3, 1, 0, 0, true}, {});
     EXPECT_GT(whole.error[0][0], cut.error[0][0]);
   }
 }
@@ -177,9 +214,9 @@ TEST(AccuracyRun, ErrorsAreTheSameBitsOnAnyNumberOfThreads) {
   const FixedEpisodes episodes = ball_episodes(40, 120);
   std::vector<double> first;
   for (const int threads : {1, 3}) {
-    AccuracyRun run(episodes, AccuracyQuantity::tactile, threads);
-    run.make_reference({Integrator::sdirk2, 20, 1e-10}, {});
-    const AccuracyOutcome out = run.compare({Integrator::bdf2, 5, 1e-6}, {});
+    const auto run = make_accuracy_run(episodes, AccuracyQuantity::tactile, threads);
+    run->make_reference({Integrator::sdirk2, 20, 1e-10}, {});
+    const AccuracyOutcome out = run->compare({Integrator::bdf2, 5, 1e-6}, {});
     if (first.empty()) first = out.error[0];
     EXPECT_EQ(out.error[0], first);
     EXPECT_GT(first[0], 1e-4);
@@ -190,9 +227,10 @@ TEST(AccuracyRun, ErrorsAreTheSameBitsOnAnyNumberOfThreads) {
 
 TEST(AccuracyRun, StopsWhereItIsTold) {
   const FixedEpisodes episodes = ball_episodes(2);
-  AccuracyRun run(episodes, AccuracyQuantity::tactile, 1);
+  const auto run = make_accuracy_run(episodes, AccuracyQuantity::tactile, 1);
   int asked = 0;
-  EXPECT_TRUE(run.make_reference({Integrator::bdf1, 5, 1e-6}, [&] { return ++asked < 4; }).stopped);
+  EXPECT_TRUE(
+      run->make_reference({Integrator::bdf1, 5, 1e-6}, [&] { return ++asked < 4; }).stopped);
   EXPECT_EQ(asked, 4);
 }
 
