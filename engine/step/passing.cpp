@@ -22,6 +22,8 @@ namespace {
 
 /// Of the wall's half edges: what crosses its plane farther out may go past it.
 constexpr double kWithin = 0.7;
+/// Of ways, for the bound of out_of_reach().
+constexpr double kEnlarged = 1.01;
 
 double component(const Vec3<double>& a, int k) { return k == 0 ? a.x : k == 1 ? a.y : a.z; }
 
@@ -74,6 +76,37 @@ void Passing::bound_gates() {
   });
 }
 
+/// Says for every pair of links that has a wall how much room its walls and middles take.
+void Passing::bound_link_pairs() {
+  const auto length = [](const Vec3<double>& a) { return std::sqrt(dot(a, a)); };
+  for (std::size_t g = 0; g < model_.link_pairs.size(); ++g) {
+    const kernels::LinkPair& links = model_.link_pairs[g];
+    Bound bound{g, -1};
+    for (const Wall& wall : walls_) {
+      const bool of_shapes = wall.link == links.link2 && wall.other == links.link1;
+      if (!of_shapes && (wall.link != links.link1 || wall.other != links.link2)) continue;
+      const Vec3<double>& at = of_shapes ? links.shapes_middle : links.points_middle;
+      const Vec3<double>& other = of_shapes ? links.points_middle : links.shapes_middle;
+      bound.room = std::max(
+          bound.room, length(wall.at.p - at) + length(wall.middle - other) + length(wall.half));
+    }
+    if (bound.room >= 0) bounds_.push_back(bound);
+  }
+  const std::vector<kernels::Link>& links = model_.links;
+  // Where the place of a joint varies, its arms are not known here.
+  bounded_ = std::none_of(links.begin(), links.end(), [](const kernels::Link& link) {
+    return link.parent >= 0 && link.place_row >= 0;
+  });
+  const auto turned = [&](const kernels::Link& link) {
+    for (int i = link.parent; i >= 0; i = links[std::size_t(i)].parent)
+      if (!kernels::slides(links[std::size_t(i)].kind)) return true;
+    return false;
+  };
+  for (const kernels::Link& link : links)
+    for (int k = 0; kernels::slides(link.kind) && turned(link) && k < kernels::dofs(link.kind); ++k)
+      sliders_.push_back(link.q + k);
+}
+
 /// Whether the balls of two links were farther apart than any point of one can have moved in the
 /// axes of the other.
 template <int L>
@@ -122,6 +155,7 @@ Passing::Passing(const CompiledModel& m) : model_(m), arm_(m.links.size(), 0.0) 
         arm += std::sqrt(dot(p, p));
       }
     }
+  bound_link_pairs();
 }
 
 template <int L>
@@ -144,6 +178,45 @@ LaneBits Passing::far_movers(const Row<L>* x, Row<L>* way) const {
       if (sum > gate.half) far |= 1U << l;
     }
   return far;
+}
+
+// With d the vector from a wall to a middle, d moves in the wall's axes by no more than the ways of
+// both and |d| times the angle by which the wall turned. A line of this length that ends |d| away
+// comes within the wall only if |d| is no longer than both together. A way is a sum over joints of
+// what they slide, and of their angle times an arm: taken back from the root on, every joint turns
+// the rest as it is where the solve ended. Here it is over all joints of the scene. The last
+// evaluation may have been spared, so |d| is taken a correction before the end, which is less than
+// the ways are enlarged by.
+template <int L>
+LaneBits Passing::out_of_reach(const BasicWorkspace<L>& w, LaneBits lanes) const {
+  if (!bounded_ || std::any_of(bounds_.begin(), bounds_.end(),
+                               [&](const Bound& bound) { return w.apart[bound.link_pair] == 0; }))
+    return kNoLane;
+  Row<L> slid{}, way{}, angle{};
+  for (const int q : sliders_)
+    for (int l = 0; l < L; ++l) slid[l] += std::abs(w.q1[q][l]);
+  for (std::size_t i = 0; i < model_.links.size(); ++i) {
+    const kernels::Link& link = model_.links[i];
+    const bool slides = kernels::slides(link.kind);
+    for (int k = 0; k < kernels::dofs(link.kind); ++k) {
+      const Row<L>& x = w.stage.x[link.v + k];
+      if (slides) {
+        for (int l = 0; l < L; ++l) way[l] += std::abs(x[l]);
+      } else {
+        for (int l = 0; l < L; ++l) {
+          way[l] += std::abs(x[l]) * (arm_[i] + slid[l]);
+          angle[l] += std::abs(x[l]);
+        }
+      }
+    }
+  }
+  for (const Bound& bound : bounds_)
+    for (int l = 0; l < L; ++l) {
+      const double nearer = 1 - angle[l], reach = bound.room + kEnlarged * way[l];
+      if (!(nearer > 0 && w.stage.between[bound.link_pair][l] * nearer * nearer > reach * reach))
+        lanes &= ~(1U << l);
+    }
+  return lanes;
 }
 
 template <int L>
@@ -174,9 +247,10 @@ bool Passing::passed(const AlignedVector<LinkPose<Row<L>>>& before,
   });
 }
 
-#define TANGERE_FOR_LANES(L)                                               \
-  template LaneBits Passing::far_movers<L>(const Row<L>*, Row<L>*) const;  \
-  template bool Passing::passed<L>(const AlignedVector<LinkPose<Row<L>>>&, \
+#define TANGERE_FOR_LANES(L)                                                            \
+  template LaneBits Passing::far_movers<L>(const Row<L>*, Row<L>*) const;               \
+  template LaneBits Passing::out_of_reach<L>(const BasicWorkspace<L>&, LaneBits) const; \
+  template bool Passing::passed<L>(const AlignedVector<LinkPose<Row<L>>>&,              \
                                    const AlignedVector<LinkPose<Row<L>>>&, int) const;
 TANGERE_FOR_LANES(kernels::kGroup)
 TANGERE_FOR_LANES(1)

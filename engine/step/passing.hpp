@@ -18,6 +18,12 @@ class Passing {
   template <int L>
   [[nodiscard]] LaneBits far_movers(const kernels::Row<L>* x, kernels::Row<L>* way) const;
 
+  /// Returns those of `lanes` in which nothing came near enough to come through: where the solve
+  /// ended, the links of every pair are farther apart than what moved could have bridged. Looks at
+  /// what kinematics() left there.
+  template <int L>
+  [[nodiscard]] LaneBits out_of_reach(const BasicWorkspace<L>& w, LaneBits lanes) const;
+
   /// Whether in one lane the middle of a body came through the middle plane of another that it
   /// touches, between these poses of the links.
   template <int L>
@@ -50,13 +56,24 @@ class Passing {
     Ball of_link{}, of_other{};
   };
   void bound_gates();
+  void bound_link_pairs();
   template <int L>
   [[nodiscard]] static bool stay_apart(
       const Gate& gate, const AlignedVector<kernels::LinkPose<kernels::Row<L>>>& before,
       const AlignedVector<kernels::LinkPose<kernels::Row<L>>>& after, int lane);
 
+  /// A pair of links, and the largest sum of a wall's half diagonal and of the distances of wall and
+  /// middle from the balls' centres (LinkPair) [m].
+  struct Bound {
+    std::size_t link_pair;
+    double room;
+  };
+
   const CompiledModel& model_;
   std::vector<Wall> walls_;
+  std::vector<Bound> bounds_;  ///< of every pair of links with a wall
+  bool bounded_ = true;        ///< whether the arms of all links are known
+  std::vector<int> sliders_;   ///< in q: the sliding dofs of links that others turn
   std::vector<Gate> gates_;
   std::vector<double> arm_;  ///< (links) from a link's origin to any middle that it moves [m]
 };

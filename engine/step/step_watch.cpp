@@ -58,7 +58,9 @@ void GroupStep::find_poses(const kernels::KernelTable& table, BasicWorkspace<L>&
 template <int L>
 void GroupStep::watch_passing(const kernels::KernelTable& table, BasicWorkspace<L>& w,
                               LaneBits lanes, NewtonReport& report) const {
-  const LaneBits far = lanes & passing_.far_movers<L>(w.stage.x, w.test);
+  const LaneBits near = lanes & ~passing_.out_of_reach<L>(w, lanes);
+  if (near == 0) return;
+  const LaneBits far = near & passing_.far_movers<L>(w.stage.x, w.test);
   if (far == 0) return;
   find_poses(table, w);
   for (int l = 0; l < L; ++l)

@@ -43,6 +43,7 @@ std::size_t lay_out(const CompiledModel& m, BasicWorkspace<L>& w, Row<L>* base) 
     rows(*p, m.nv);
   for (LaneRow** p : {&w.x_inner, &w.v_inner}) rows(*p, w.inner_stages * m.nv);
   const int link_pairs = static_cast<int>(m.link_pairs.size());
+  rows(s.between, link_pairs);
   rows(w.references, 12 * link_pairs);
   rows(w.near.link_poses, 12 * link_pairs);
   rows(w.near.shape_poses, 12 * static_cast<int>(m.pairs.size()));

@@ -44,6 +44,9 @@ struct Stage {
   Row<L>* ground_anchors;  ///< (points that remember, kAnchorNumbers)
   Row<L>* faces;           ///< (n_pairs, 3) faces that count in this solve (kernels/step/faces.hpp)
   std::byte* scratch;      ///< scratch_bytes(model)
+  /// (n_link_pairs) square of the distance from LinkPair::points_middle to shapes_middle [m²], of
+  /// links that are apart.
+  Row<L>* between;
   Row<L>*v, *g, *force_scale, *mass_diagonal, *A, *LU, *work, *excess;
   Row<L>*weight, *inverse_weight;  ///< (nv) D^½ and D^-½, D the mass diagonal
   /// 1: the Jacobian is that of g. 0: it takes friction of slipping points by its secant.

@@ -38,7 +38,7 @@ void near_pairs(const ModelView& model, const StageArgs<N>& a, NearPairs<L>& out
     const LinkPair& links = model.link_pairs[g];
     const bool was_apart = is_apart(a, g);
     const double margin = a.candidates[model.pair_order[links.first]].margin;
-    a.apart[g] = lane_bits(balls_overlap(links, a, margin) > N(0.0)) == 0 ? 1 : 0;
+    a.apart[g] = lane_bits(balls_overlap(links, g, a, margin) > N(0.0)) == 0 ? 1 : 0;
     if (a.apart[g] != 0) continue;
     if (was_apart) pair_motion(links, a, a.contacts[g]);
     const Frame<N>& x = a.contacts[g].link2_in_1;

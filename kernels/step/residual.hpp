@@ -177,9 +177,9 @@ bool is_apart(const StageArgs<N>& a, int link_pair) {
 }
 
 /// Returns a positive number where the balls around the points and the shapes of two links are
-/// nearer to each other than `margin`.
+/// nearer to each other than `margin`. Keeps how far apart they are.
 template <class N>
-N balls_overlap(const LinkPair& pair, const StageArgs<N>& a, double margin) {
+N balls_overlap(const LinkPair& pair, int link_pair, const StageArgs<N>& a, double margin) {
   const auto in_world = [&](int link, const Vec3<double>& middle) {
     const Vec3<N> at = broadcast<N>(middle);
     return link < 0 ? at : a.links[link].world.R * at + a.links[link].world.p;
@@ -187,7 +187,8 @@ N balls_overlap(const LinkPair& pair, const StageArgs<N>& a, double margin) {
   const Vec3<N> arm =
       in_world(pair.link2, pair.shapes_middle) - in_world(pair.link1, pair.points_middle);
   const double reach = pair.apart + margin;
-  return N(reach * reach) - dot(arm, arm);
+  a.between[link_pair] = dot(arm, arm);
+  return N(reach * reach) - a.between[link_pair];
 }
 
 /// Adds the points of a capsule one candidate after the other: its ends bend in two directions.
@@ -431,7 +432,7 @@ void kinematics(const ModelView& model, const StageArgs<N>& a) {
   for (int k = 0; k < model.n_link_pairs; ++k) {
     const LinkPair& pair = model.link_pairs[k];
     if (is_apart(a, k)) {
-      a.excess[0] = max(a.excess[0], balls_overlap(pair, a, 0));
+      a.excess[0] = max(a.excess[0], balls_overlap(pair, k, a, 0));
       continue;
     }
     const CandidateList<N>& list = a.candidates[model.pair_order[pair.first]];

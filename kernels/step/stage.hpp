@@ -100,6 +100,7 @@ struct StageArgs {
   N* A;              ///< (entries)
   N* excess;         ///< (1) how far some pair moved beyond its list's margin [m]; > 0: rebuild the
                      ///< list and evaluate again
+  N* between;        ///< (n_link_pairs) as in Stage
 };
 
 /// Calls `f` with the kind of a joint as a template argument, so that asking for the kind costs

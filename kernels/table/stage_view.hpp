@@ -107,6 +107,7 @@ struct StageView {
     a.mass_diagonal = view(s.mass_diagonal);
     a.A = view(s.A);
     a.excess = view(s.excess);
+    a.between = view(s.between);
     return a;
   }
 };
