@@ -62,8 +62,8 @@ class Passing {
       const Gate& gate, const AlignedVector<kernels::LinkPose<kernels::Row<L>>>& before,
       const AlignedVector<kernels::LinkPose<kernels::Row<L>>>& after, int lane);
 
-  /// A pair of links, and the largest sum of a wall's half diagonal and of the distances of wall and
-  /// middle from the balls' centres (LinkPair) [m].
+  /// A pair of links, and the largest sum of a wall's half diagonal and of the distances of wall
+  /// and middle from the balls' centres (LinkPair) [m].
   struct Bound {
     std::size_t link_pair;
     double room;

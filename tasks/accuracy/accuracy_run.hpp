@@ -19,9 +19,9 @@ namespace tangere {
 enum class AccuracyQuantity {
   tactile,  ///< the fields of all sensors; error relative to the norm of the reference's
   state,    ///< q; error relative to the range that each coordinate covers
-  /// Derivatives of ½ Σ |T|² of all sensors (without a sensor, of ½ Σ |v|²) over the samples, by the
-  /// controls between samples; without motors, by the start. Error relative to the largest
-  /// derivative by each motor or dof.
+  /// Derivatives of ½ Σ |T|² of all sensors (without a sensor, of ½ Σ |v|²) over the samples, by
+  /// the controls between samples; without motors, by the start. Error relative to the norm, where
+  /// each motor's or dof's derivatives are divided by the largest of them.
   gradient,
 };
 const char* to_string(AccuracyQuantity value);
