@@ -22,8 +22,6 @@ namespace {
 
 /// Of the wall's half edges: what crosses its plane farther out may go past it.
 constexpr double kWithin = 0.7;
-/// Of ways, for the bound of out_of_reach().
-constexpr double kEnlarged = 1.01;
 
 double component(const Vec3<double>& a, int k) { return k == 0 ? a.x : k == 1 ? a.y : a.z; }
 
@@ -184,9 +182,8 @@ LaneBits Passing::far_movers(const Row<L>* x, Row<L>* way) const {
 // both and |d| times the angle by which the wall turned. A line of this length that ends |d| away
 // comes within the wall only if |d| is no longer than both together. A way is a sum over joints of
 // what they slide, and of their angle times an arm: taken back from the root on, every joint turns
-// the rest as it is where the solve ended. Here it is over all joints of the scene. The last
-// evaluation may have been spared, so |d| is taken a correction before the end, which is less than
-// the ways are enlarged by.
+// the rest as it is where the solve ended. Here it is over all joints of the scene. Where the last
+// evaluation was spared, kinematics ran once more, so |d| is that of the end.
 template <int L>
 LaneBits Passing::out_of_reach(const BasicWorkspace<L>& w, LaneBits lanes) const {
   if (!bounded_ || std::any_of(bounds_.begin(), bounds_.end(),
@@ -212,7 +209,7 @@ LaneBits Passing::out_of_reach(const BasicWorkspace<L>& w, LaneBits lanes) const
   }
   for (const Bound& bound : bounds_)
     for (int l = 0; l < L; ++l) {
-      const double nearer = 1 - angle[l], reach = bound.room + kEnlarged * way[l];
+      const double nearer = 1 - angle[l], reach = bound.room + way[l];
       if (!(nearer > 0 && w.stage.between[bound.link_pair][l] * nearer * nearer > reach * reach))
         lanes &= ~(1U << l);
     }
