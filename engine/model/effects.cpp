@@ -297,8 +297,11 @@ void still_element(Scene& scene, Element& d, Way way) {
   if (P == Part::damping) fields = {Field::damping};
   if (P == Part::tangential) fields = {Field::kt, Field::ks};
   if (P == Part::tangential && way == Way::removed) fields.push_back(Field::mu);
-  if constexpr (std::is_same_v<Element, TactileDescription>)
+  if constexpr (std::is_same_v<Element, TactileDescription>) {
     if (P == Part::whole) drop_imperfections(d, way);
+    // The gel moves as before where it no longer remembers.
+    if (d.markers && d.markers->stiffness == 0) d.markers->stiffness = d.coefficients.ks;
+  }
   for (const Field field : fields) d.coefficients[coefficient_index(field)] = 0;
   keep_constant(scene, number_of(d), fields);
 }

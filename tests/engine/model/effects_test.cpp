@@ -174,6 +174,23 @@ TEST(Effects, PartsGoWithoutTheirElements) {
   EXPECT_FALSE(is_part(EffectKind::varying_parameters));
 }
 
+/// Markers whose gel is as stiff as what remembers stay where that is taken away.
+TEST(Effects, MarkersKeepTheirStiffness) {
+  Scene scene = testing::rolling_ball(false, 12);
+  TactileDescription& pad = scene.sensors.front();
+  pad.coefficients.ks = 0.5;
+  pad.markers = MarkersDescription{};
+  for (const EffectInfo& info : effects_of(scene)) {
+    if (info.effect.kind != EffectKind::tactile_shear) continue;
+    for (const Way way : {Way::removed, Way::zero}) {
+      const Scene rest = without(scene, info.effect, way);
+      EXPECT_EQ(rest.sensors.front().coefficients.ks, 0);
+      EXPECT_EQ(rest.sensors.front().markers->stiffness, 0.5);
+      EXPECT_NO_THROW(Model{rest});
+    }
+  }
+}
+
 TEST(Effects, RemovedIsOffAndLeavesTheOthersOn) {
   const Scene scene = scene_of_all_effects();
   for (const EffectInfo& info : effects_of(scene)) {
