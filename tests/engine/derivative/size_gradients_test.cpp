@@ -16,7 +16,7 @@ namespace {
 using testing::Random;
 using testing::RunInput;
 
-constexpr int kSteps = 2, kTrials = 8;
+constexpr int kSteps = 2, kTrials = 12;
 
 Shape cuboid() { return CuboidShape{{0.05, 0.04, 0.03}, {4, 3, 3}}; }
 Shape cylinder() { return CylinderShape{0.05, 0.02, 7, 2}; }
