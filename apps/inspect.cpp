@@ -62,7 +62,7 @@ std::int64_t steps_of(const Model& model) {
 Json as_json(const Model& model) {
   const Scene& scene = model.scene();
   Json bodies = Json::array(), contacts = Json::array(), sensors = Json::array();
-  Json meshes = Json::array(), effects = Json::array();
+  Json meshes = Json::array();
   for (std::size_t b = 0; b < scene.links.size(); ++b) {
     const LinkDescription& link = scene.links[b];
     bodies.push_back({{"name", link.body.name},
@@ -96,10 +96,6 @@ Json as_json(const Model& model) {
   Json end_effectors = Json::array();
   for (const EndEffectorInfo& v : model.end_effectors())
     end_effectors.push_back({{"name", v.name}, {"joint", v.joint}});
-  for (const EffectInfo& e : model.effects())
-    if (e.effect.element < 0)
-      effects.push_back(
-          {{"name", e.name}, {"on", e.on}, {"reason", e.reason}, {"lines", lines_of(e)}});
   Json stages = Json::array();
   for (const StageInfo& s : model.stages())
     stages.push_back({{"name", s.name}, {"of", s.of}, {"variant", s.variant}});
@@ -130,7 +126,7 @@ Json as_json(const Model& model) {
           {"steps", steps < 0 ? Json() : Json(steps)},
           {"randomized", randomized_names(scene)},
           {"randomized_units", randomized_units(scene)},
-          {"effects", effects},
+          {"effects", effects_json(model.effects())},
           {"stages", stages},
           {"state_bytes_per_environment", model.state_bytes_per_environment()},
           {"workspace_bytes", Stepper::workspace_bytes(model)},
@@ -233,7 +229,7 @@ int report(const Model& model, const TaskSpec* task, const InspectArguments& opt
                            fmt::format("{}, {}", processor_name(), kernels::active_isa_name())),
           console);
     console.print(effect_costs_text(costs, kernels::active_isa_name()));
-    result["effect_costs"] = effect_costs_json(costs);
+    result["effects"] = effect_costs_json(costs);
     result["run_costs"] = run_costs_json(costs);
     result["effect_measurement"] = effect_measurement_json(costs);
     result["svg"] = options.svg.empty() ? Json() : Json(options.svg);

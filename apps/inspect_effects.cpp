@@ -92,28 +92,43 @@ std::string run_costs_text(const EffectCosts& costs) {
   return text;
 }
 
+Json effect_json(const EffectInfo& effect) {
+  Json lines = Json::array();
+  for (const Source& source : effect.sources)
+    lines.push_back(fmt::format("{}:{}", source.file, source.line));
+  return {{"kind", to_string(effect.effect.kind)},
+          {"on", effect.on},
+          {"why", effect.reason},
+          {"lines", lines},
+          {"variant", effect.variant.empty() ? Json() : Json(effect.variant)}};
+}
+
+/// The name, or with stars behind it if there is such a key: a sensor may be called "shear".
+std::string free_key(const Json& taken, std::string name) {
+  while (taken.contains(name)) name += "*";
+  return name;
+}
+
 }  // namespace
+
+Json effects_json(std::span<const EffectInfo> effects) {
+  Json out = Json::object();
+  for (const EffectInfo& effect : effects) out[free_key(out, effect.name)] = effect_json(effect);
+  return out;
+}
 
 Json effect_costs_json(const EffectCosts& costs) {
   Json out = Json::object();
   for (const EffectCost& c : costs.effects) {
-    Json lines = Json::array();
-    for (const Source& source : c.effect.sources)
-      lines.push_back(fmt::format("{}:{}", source.file, source.line));
     const bool m = c.measured.has_value();
-    std::string key = c.effect.name;
-    while (out.contains(key)) key += "*";  // a sensor may be called "shear"
-    out[key] = {{"kind", to_string(c.effect.effect.kind)},
-                {"on", c.effect.on},
-                {"why", c.effect.reason},
-                {"lines", lines},
-                {"variant", c.effect.variant.empty() ? Json() : Json(c.effect.variant)},
-                {"bytes", c.bytes},
-                {"share", m ? Json(c.measured->share) : Json()},
-                {"spread", m ? Json(c.measured->spread) : Json()},
-                {"step_seconds_without", m ? Json(c.seconds_without) : Json()},
-                {"newton_without", m ? Json(c.passes_without) : Json()},
-                {"note", c.note}};
+    Json effect = effect_json(c.effect);
+    effect.update(Json{{"bytes", c.bytes},
+                       {"share", m ? Json(c.measured->share) : Json()},
+                       {"spread", m ? Json(c.measured->spread) : Json()},
+                       {"step_seconds_without", m ? Json(c.seconds_without) : Json()},
+                       {"newton_without", m ? Json(c.passes_without) : Json()},
+                       {"note", c.note}});
+    out[free_key(out, c.effect.name)] = std::move(effect);
   }
   return out;
 }

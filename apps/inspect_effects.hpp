@@ -2,6 +2,7 @@
 // Reports what the effects of a scene cost, for `tangere inspect --effects`.
 #pragma once
 
+#include <span>
 #include <string>
 
 #include "apps/console.hpp"
@@ -9,7 +10,9 @@
 
 namespace tangere::apps {
 
-/// One key per effect, kinds and their elements.
+/// One key per effect, kinds and their elements: whether it is on, and why.
+Json effects_json(std::span<const EffectInfo> effects);
+/// The same with what each costs.
 Json effect_costs_json(const EffectCosts& costs);
 /// How it was measured.
 Json effect_measurement_json(const EffectCosts& costs);

@@ -401,9 +401,11 @@ TEST(Command, InspectTellsPeopleAndProgramsTheSame) {
   EXPECT_EQ(answer.at("randomized").size(), 4U);
   EXPECT_GT(answer.at("state_bytes_per_environment"), 0);
   EXPECT_GT(answer.at("workspace_bytes"), 0);
-  for (const json& effect : answer.at("effects")) {
-    EXPECT_FALSE(effect.at("reason").get<std::string>().empty());
-    EXPECT_THAT(text.out, HasSubstr(effect.at("name").get<std::string>()));
+  for (const auto& [name, effect] : answer.at("effects").items()) {
+    EXPECT_FALSE(effect.at("why").get<std::string>().empty()) << name;
+    if (effect.at("kind") == name) {
+      EXPECT_THAT(text.out, HasSubstr(name));
+    }
   }
   for (const json& name : answer.at("v_names"))
     EXPECT_THAT(text.out, HasSubstr(name.get<std::string>()));

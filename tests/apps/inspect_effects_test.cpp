@@ -27,7 +27,7 @@ TEST(InspectEffects, DrawsWhereTheTimeGoesAndFollowsOutputs) {
   const std::string svg = file_bytes(folder.path("effects.svg"));
   for (const char* part : {">contact pad ball<", ">tactile pad<", ">audit<", "Newton passes"})
     EXPECT_THAT(svg, HasSubstr(part));
-  EXPECT_EQ(answer.at("effect_costs").at("tactile pad").at("bytes"), 6 * 8 + 8)
+  EXPECT_EQ(answer.at("effects").at("tactile pad").at("bytes"), 6 * 8 + 8)
       << "a sum, and kt that varies";
   const json& runs = answer.at("run_costs");
   EXPECT_THAT(runs[0].at("asked_by").get<std::string>(), HasSubstr("'q/10'"));
@@ -50,7 +50,7 @@ TEST(InspectEffects, MeasuresWhatEffectsCost) {
        {"environments", "failed", "instants", "rounds", "run_steps", "step_seconds",
         "field_seconds", "newton", "share_of_nothing", "spread_of_nothing"})
     EXPECT_TRUE(answer.at("effect_measurement").at(key).is_number()) << key;
-  const json& costs = answer.at("effect_costs");
+  const json& costs = answer.at("effects");
   std::istringstream text(file_bytes(file));
   std::vector<std::string> lines;
   for (std::string line; std::getline(text, line);) lines.push_back(line);
@@ -106,7 +106,7 @@ TEST(InspectEffects, MeasuresWhatSleepSaves) {
   folder.write("boxes.xml", text);
   const Outcome outcome = run(folder, {"inspect", "boxes.xml", "--effects", "--json"});
   ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
-  const json sleeping = json::parse(outcome.out).at("effect_costs").at("sleeping");
+  const json sleeping = json::parse(outcome.out).at("effects").at("sleeping");
   EXPECT_EQ(sleeping.at("on"), true);
   EXPECT_EQ(sleeping.at("why"), "sleep 0.001");
   EXPECT_THAT(sleeping.at("lines").at(0).get<std::string>(), HasSubstr("boxes.xml:"));

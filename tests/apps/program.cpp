@@ -120,6 +120,11 @@ std::vector<std::string> undocumented_keys(const nlohmann::json& object) {
   static const std::string page = file_bytes(TANGERE_SOURCE_DIR "/docs/command.md");
   std::vector<std::string> missing;
   for (const auto& [key, value] : object.items()) {
+    if (key == "effects" && value.is_object()) {  // whose keys are names of the scene's
+      for (const nlohmann::json& effect : value)
+        for (std::string& deeper : undocumented_keys(effect)) missing.push_back(std::move(deeper));
+      continue;
+    }
     if (object.is_object() && page.find("`" + key + "`") == std::string::npos)
       missing.push_back(key);
     if (!value.is_structured()) continue;
