@@ -98,7 +98,7 @@ int run_sweep(const AccuracyArguments& o, const Console& console, const Model& m
   const std::optional<FixedEpisodes> episodes = make(listener.go_on);
   if (!episodes)
     return report_stop(console, "accuracy", signals.received(), "in the first episode");
-  check_memory(accuracy_bytes(*episodes, options.quantity),
+  check_memory(accuracy_bytes(*episodes, options.quantity, options.threads),
                fmt::format("--envs {}", environments_of(o)));
   const AccuracySubject subject{o.scene,
                                 name,

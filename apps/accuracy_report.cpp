@@ -154,11 +154,13 @@ std::string advice_text(const AccuracySubject& subject, const AccuracyReport& re
       percent(best.bound) == percent(best.error)
           ? std::string()
           : fmt::format(" 95 of 100 other environments should stay below {}.", percent(best.bound));
-  return fmt::format(
-      "{}For {} use {}, {} fields: {} at {:.4g} simulated seconds per CPU second.{}{}",
-      report.stopped ? "Stopped: of the settings so far: " : "", percent(subject.target),
-      setting_text(best.setting, best.step), to_string(best.precision), percent(best.error),
-      best.rate, others, own);
+  const std::string fields = subject.quantity == AccuracyQuantity::tactile
+                                 ? fmt::format(", {} fields", to_string(best.precision))
+                                 : std::string();
+  return fmt::format("{}For {} use {}{}: {} at {:.4g} simulated seconds per CPU second.{}{}",
+                     report.stopped ? "Stopped: of the settings so far: " : "",
+                     percent(subject.target), setting_text(best.setting, best.step), fields,
+                     percent(best.error), best.rate, others, own);
 }
 
 Json accuracy_json(const AccuracySubject& subject, const AccuracyReport& report,

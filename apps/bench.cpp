@@ -109,7 +109,7 @@ BenchError error_of(const BenchArguments& options, const Model& model,
   AccuracyOptions of;
   of.quantity = model.sensors().empty() ? AccuracyQuantity::state : AccuracyQuantity::tactile;
   of.threads = 1;
-  check_memory(accuracy_bytes(episodes, of.quantity), "--error");
+  check_memory(accuracy_bytes(episodes, of.quantity, of.threads), "--error");
   const AccuracyReport report = own_accuracy(episodes, of, {go_on, {}, {}});
   const AccuracyReference& reference = report.reference;
   Json json{{"quantity", to_string(of.quantity)},

@@ -277,12 +277,7 @@ const char* to_string(AccuracyQuantity value) {
 }
 
 const char* accuracy_meaning(AccuracyQuantity value) {
-  switch (value) {
-    case AccuracyQuantity::tactile: return "tactile fields";
-    case AccuracyQuantity::state: return "state";
-    case AccuracyQuantity::gradient: break;
-  }
-  return "gradient";
+  return value == AccuracyQuantity::tactile ? "tactile fields" : to_string(value);
 }
 
 std::vector<double> relative_errors(std::span<const double> squared_distance,
@@ -306,8 +301,8 @@ std::unique_ptr<AccuracyRun> make_accuracy_run(const FixedEpisodes& episodes,
   return std::make_unique<SampleRun>(episodes, quantity, threads);
 }
 
-double accuracy_bytes(const FixedEpisodes& episodes, AccuracyQuantity quantity) {
-  if (quantity == AccuracyQuantity::gradient) return GradientRun::bytes(episodes);
+double accuracy_bytes(const FixedEpisodes& episodes, AccuracyQuantity quantity, int threads) {
+  if (quantity == AccuracyQuantity::gradient) return GradientRun::bytes(episodes, threads);
   const std::size_t width = width_of(episodes.start.model(), quantity);
   const double share = quantity == AccuracyQuantity::state ? 1 : 0.1;
   return static_cast<double>(as_size(episodes.start.environments()) * as_size(episodes.samples)) *

@@ -66,8 +66,8 @@ class AccuracyRun {
   virtual AccuracyOutcome compare(const AccuracySetting& setting, const AccuracyGoOn& go_on) = 0;
 };
 
-/// `episodes` must outlive what is returned. Throws InputError for tactile without a sensor, for
-/// gradients of fields that remember, and when the system refuses so many threads.
+/// `episodes` must outlive what is returned. Throws InputError for tactile without a sensor, and
+/// when the system refuses so many threads. Runs with gradients throw what GradientRollouts throws.
 std::unique_ptr<AccuracyRun> make_accuracy_run(const FixedEpisodes& episodes,
                                                AccuracyQuantity quantity, int threads);
 
@@ -78,7 +78,11 @@ std::vector<double> relative_errors(std::span<const double> squared_distance,
                                     std::span<const char> no_reference,
                                     std::span<const FailedEnvironment> failures);
 
-/// Memory of the reference, if a tenth of the points is touched, and of tapes [bytes].
-double accuracy_bytes(const FixedEpisodes& episodes, AccuracyQuantity quantity);
+/// Steps of the finest reference in a timestep of the scene.
+inline constexpr int kFinestParts = 128;
+
+/// Memory of the reference, if a tenth of the points is touched; of gradients also that of tapes
+/// [bytes].
+double accuracy_bytes(const FixedEpisodes& episodes, AccuracyQuantity quantity, int threads);
 
 }  // namespace tangere

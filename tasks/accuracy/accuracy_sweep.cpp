@@ -16,7 +16,7 @@ namespace {
 
 constexpr double kReferenceTolerance = 1e-12;
 /// Steps of the reference in a timestep of the scene.
-constexpr std::array kReferenceParts = {8, 32, 128};
+constexpr std::array kReferenceParts = {8, 32, kFinestParts};
 constexpr std::array kParts = {1, 2, 5, 10, 20, 50, 100};
 constexpr std::array kAccuracies = {1e-1, 3e-2, 1e-2, 3e-3, 1e-3, 3e-4, 1e-4};
 constexpr std::array kTolerances = {1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9};
@@ -133,21 +133,27 @@ class Sweep {
         episodes_.every * kReferenceParts[0], kReferenceTolerance, listener_.go_on);
   }
 
-  /// Gradients have a tolerance of their own.
-  [[nodiscard]] StepperOptions as_played(const StepperOptions& options) const {
-    return of_gradients() ? for_gradients(episodes_.start.model(), options) : options;
+  /// Gradients have a tolerance of their own. Nothing sleeps in a comparison.
+  [[nodiscard]] double tolerance_in_force(StepperOptions options) const {
+    const Model& model = episodes_.start.model();
+    options.sleep = 0;
+    return Stepper(model, of_gradients() ? for_gradients(model, options) : options).tolerance();
   }
   [[nodiscard]] bool of_gradients() const {
     return options_.quantity == AccuracyQuantity::gradient;
   }
 
-  /// Fills in the tolerance of a setting whose steps and accuracy are known.
+  /// Fills in the tolerance of a setting whose steps and accuracy are known. Whole steps take the
+  /// one that follows them, also where the scene names another.
   void give_tolerance(AccuracySetting& setting) const {
-    const StepperOptions options{.integrator = setting.integrator,
-                                 .timestep = episodes_.interval() / setting.parts,
-                                 .tolerance = options_.tolerance,
-                                 .accuracy = setting.accuracy};
-    setting.tolerance = Stepper(episodes_.start.model(), as_played(options)).tolerance();
+    const double step = episodes_.interval() / setting.parts;
+    std::optional<double> tolerance = options_.tolerance;
+    if (!tolerance && !of_gradients() && setting.accuracy == 0)
+      tolerance = episodes_.start.model().following_tolerance(setting.integrator, step);
+    setting.tolerance = tolerance_in_force({.integrator = setting.integrator,
+                                            .timestep = step,
+                                            .tolerance = tolerance,
+                                            .accuracy = setting.accuracy});
     setting.follows =
         !of_gradients() && !options_.tolerance && !episodes_.start.model().solver().tolerance;
   }
@@ -226,9 +232,8 @@ class Sweep {
   bool measure_own() {
     const Model& model = episodes_.start.model();
     std::vector<AccuracyPoint> own;
-    const Stepper as_set(model, as_played({}));
-    if (!measure({model.integrator(), episodes_.every, as_set.tolerance(), as_set.accuracy(),
-                  !of_gradients() && !model.solver().tolerance},
+    if (!measure({model.integrator(), episodes_.every, tolerance_in_force({}),
+                  Stepper(model).accuracy(), !of_gradients() && !model.solver().tolerance},
                  own))
       return false;
     report_.own = own.front();

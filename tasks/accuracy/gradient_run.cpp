@@ -15,7 +15,6 @@ namespace tangere {
 namespace {
 
 constexpr double kTapeBytes = 2.5e8;  // of a thread; longer episodes are played from checkpoints
-constexpr int kMostParts = 128;       // of a timestep, in the finest reference
 
 /// A loss over the samples of each episode alone.
 class SampledLoss : public RolloutLoss {
@@ -149,10 +148,10 @@ AccuracyOutcome GradientRun::compare(const AccuracySetting& setting, const Accur
   return out;
 }
 
-double GradientRun::bytes(const FixedEpisodes& episodes) {
-  const AccuracySetting finest{Integrator::sdirk4, episodes.every * kMostParts};
+double GradientRun::bytes(const FixedEpisodes& episodes, int threads) {
+  const AccuracySetting finest{Integrator::sdirk4, episodes.every * kFinestParts};
   return gradient_bytes(episodes.start.model(), episodes.start.environments(),
-                        options_of(episodes, finest, 2), 1);
+                        options_of(episodes, finest, threads), 1);
 }
 
 }  // namespace tangere

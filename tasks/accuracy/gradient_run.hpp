@@ -14,9 +14,8 @@ class GradientRun : public AccuracyRun {
                                  const AccuracyGoOn& go_on) override;
   AccuracyOutcome compare(const AccuracySetting& setting, const AccuracyGoOn& go_on) override;
 
-  /// Memory of two threads' tapes and of the derivatives by every step of the finest reference
-  /// [bytes].
-  static double bytes(const FixedEpisodes& episodes);
+  /// Memory of tapes and of the derivatives by every step of the finest reference [bytes].
+  static double bytes(const FixedEpisodes& episodes, int threads);
 
  private:
   AccuracyOutcome play(const AccuracySetting& setting, const AccuracyGoOn& go_on,

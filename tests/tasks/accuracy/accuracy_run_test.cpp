@@ -294,6 +294,30 @@ TEST(AccuracySweep, KeepsWhatThereIsWhenItIsStopped) {
   EXPECT_GT(report.reference.step, 0);
 }
 
+/// Whole steps have the tolerance that follows them, although the scene has its own and lets bodies
+/// sleep. Gradients have the scene's.
+TEST(AccuracySweep, WholeStepsHaveTheToleranceThatFollowsThem) {
+  Scene scene = swinging(13).scene();
+  scene.solver.tolerance = 1e-7;
+  scene.solver.sleep = kUsualSleep;
+  const Model model(scene);
+  const FixedEpisodes episodes =
+      scene_episodes(Batch(model, 1, 0), ControlProgram(model, model.timestep(), 0), 10, 5);
+  for (const AccuracyQuantity what : {AccuracyQuantity::state, AccuracyQuantity::gradient}) {
+    SCOPED_TRACE(to_string(what));
+    AccuracyOptions options;
+    options.quantity = what;
+    const AccuracyReport report = accuracy_sweep(episodes, options, {});
+    ASSERT_FALSE(report.points.empty());
+    for (const AccuracyPoint& p : report.points) {
+      if (p.setting.accuracy > 0) continue;
+      const double following = model.following_tolerance(p.setting.integrator, p.step);
+      EXPECT_EQ(p.setting.tolerance, what == AccuracyQuantity::state ? following : 1e-7);
+    }
+    EXPECT_EQ(report.own.setting.tolerance, 1e-7);
+  }
+}
+
 TEST(AccuracySweep, SaysThatNothingTouches) {
   const Batch start(pressed_ball(), 2, 3);
   // The pad is above the ball for the first 25 ms.
