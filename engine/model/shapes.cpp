@@ -343,7 +343,24 @@ std::string slenderness_fault(const Shape& shape) {
   return slenderness_fault(row, least, most);
 }
 
-// --- what the rest of the engine asks of a shape ---
+// --- what others ask of a shape ---
+
+std::vector<NamedSize> named_sizes(const Shape& shape) {
+  Shape copy = shape;
+  std::vector<NamedSize> out;
+  if (std::holds_alternative<MeshShape>(shape)) return out;
+  const ShapeRow& row = row_of(shape);
+  for (int which = 0; which < kScaleIndex; ++which) {
+    const SizeNumber* const n = row.size(which);
+    if (n == nullptr) continue;
+    const char* const name = number_kind(NumberOwner::body, size_of_body("", which).field).name;
+    if (out.empty() || std::string_view(out.back().name) != name) out.push_back({name, {}});
+    out.back().values.push_back(*n->at(copy));
+  }
+  return out;
+}
+
+double volume_of(const Shape& shape) { return mass_properties(shape, 1).mass; }
 
 const char* shape_name(const Shape& shape) { return row_of(shape).name; }
 bool has_distance(const Shape& shape) {

@@ -57,6 +57,16 @@ const ShapeRow& row_of(const Shape& shape);
 /// The row of a shape with a distance.
 const ShapeRow& row_of(PrimitiveShape shape);
 
+/// Numbers of a size as scene files name them [m]: radius, length, or the three edges of size.
+struct NamedSize {
+  const char* name;
+  std::vector<double> values;
+};
+/// Returns the size of a shape by names, radius first. A mesh has none, its scale is no length.
+std::vector<NamedSize> named_sizes(const Shape& shape);
+/// Returns the volume of a solid [m³]; 0 for a plane.
+double volume_of(const Shape& shape);
+
 /// Returns the full widths of a shape with distance and size along its axes [m]; else zeros.
 std::array<double, 3> widths(const Shape& shape);
 

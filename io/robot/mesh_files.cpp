@@ -17,7 +17,7 @@ namespace tangere {
 namespace fs = std::filesystem;
 
 std::string find_mesh(const RobotNode& node, const std::string& name, const std::string& folder) {
-  const fs::path robot = fs::path(node.context().file).parent_path();
+  const fs::path robot = fs::path(node.robot().scene.path).parent_path();
   std::vector<std::string> tried;
   constexpr std::string_view kPackage = "package://", kFile = "file://";
   std::string plain = name;

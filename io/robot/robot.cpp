@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <variant>
 
 namespace tangere {
@@ -29,6 +30,12 @@ std::vector<std::string> Remarks::lines() const {
   return out;
 }
 
+std::string place_in(const Robot& robot, const Source& source) {
+  if (source.file == robot.scene.path) return fmt::format("line {}", source.line);
+  return fmt::format("line {} of {}", source.line,
+                     std::filesystem::path(source.file).filename().string());
+}
+
 std::string RobotNames::free_name(const std::string& wanted) {
   if (names_.insert(wanted).second) return wanted;
   for (int k = 2;; ++k)
@@ -44,7 +51,7 @@ int add_link(Robot& robot, RobotNames& names, const std::string& name, int paren
   link.parent = parent;
   link.joint = std::move(joint);
   link.body = {name, AbstractShape{}, {}, 0, {0.7, 0.7, 0.7, 1}, source};
-  robot.origins[name] = fmt::format("line {}: {}", source.line, origin);
+  robot.origins[name] = fmt::format("{}: {}", place_in(robot, source), origin);
   robot.scene.links.push_back(link);
   for (std::size_t k = 0; k < pieces.size(); ++k) {
     const RobotPiece& piece = pieces[k];
@@ -58,10 +65,10 @@ int add_link(Robot& robot, RobotNames& names, const std::string& name, int paren
       more.joint.name = body.name;
       more.joint.source = piece.source;
       robot.scene.links.push_back(more);
-      robot.origins[body.name] = fmt::format("line {}: {}", piece.source.line, piece.origin);
+      robot.origins[body.name] = fmt::format("{}: {}", place_in(robot, piece.source), piece.origin);
       robot.pieces.insert(body.name);
     } else {
-      robot.origins[name] += fmt::format(", {} of line {}", piece.origin, piece.source.line);
+      robot.origins[name] += fmt::format(", {} of {}", piece.origin, place_in(robot, piece.source));
     }
     if (std::holds_alternative<MeshShape>(piece.shape)) robot.meshes[body.name] = piece.mesh;
     robot.scene.links.back().body = std::move(body);
@@ -83,36 +90,6 @@ RobotPiece inertial_piece(double mass, const std::array<double, 6>& inertia, con
   piece.origin = origin;
   piece.source = source;
   return piece;
-}
-
-double volume_of(const Shape& shape) {
-  const auto of = [](const auto& s) -> double {
-    using S = std::decay_t<decltype(s)>;
-    if constexpr (std::is_same_v<S, SphereShape>) {
-      return 4.0 / 3 * M_PI * s.radius * s.radius * s.radius;
-    } else if constexpr (std::is_same_v<S, CuboidShape>) {
-      return s.size[0] * s.size[1] * s.size[2];
-    } else if constexpr (std::is_same_v<S, CylinderShape>) {
-      return M_PI * s.radius * s.radius * s.length;
-    } else if constexpr (std::is_same_v<S, CapsuleShape>) {
-      return M_PI * s.radius * s.radius * (s.length + 4.0 / 3 * s.radius);
-    } else if constexpr (std::is_same_v<S, EllipsoidShape>) {
-      return M_PI / 6 * s.size[0] * s.size[1] * s.size[2];
-    } else if constexpr (std::is_same_v<S, MeshShape>) {
-      double six = 0;  // six times the volume, by tetrahedra from the first vertex
-      const auto at = [&](int k, std::size_t c) {
-        return s.vertices[3 * std::size_t(k) + c] - s.vertices[c];
-      };
-      for (const auto& [a, b, c] : s.triangles)
-        for (std::size_t k = 0; k < 3; ++k)
-          six += at(a, k) * (at(b, (k + 1) % 3) * at(c, (k + 2) % 3) -
-                             at(b, (k + 2) % 3) * at(c, (k + 1) % 3));
-      return six / 6;
-    } else {
-      return 0;
-    }
-  };
-  return std::visit(of, shape);
 }
 
 }  // namespace tangere

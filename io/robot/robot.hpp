@@ -3,6 +3,7 @@
 #pragma once
 
 #include <map>
+#include <memory>
 #include <set>
 #include <string>
 #include <vector>
@@ -30,11 +31,15 @@ struct MeshFile {
   Vector3 scale{1, 1, 1};
 };
 
+struct RobotFile;  // io/robot/mjcf_include.hpp
+
 struct Robot {
   std::string format;  ///< "URDF" or "MJCF"
-  /// In SI. Every source is a line of the robot's file, so errors of a model name it.
+  /// In SI. Every source is a line of the robot's file, so errors of a model name it. Its path is
+  /// the file that the user names.
   Scene scene;
-  std::map<std::string, MeshFile> meshes;      ///< by body
+  std::vector<std::shared_ptr<RobotFile>> included;  ///< files that <include> has brought in
+  std::map<std::string, MeshFile> meshes;            ///< by body
   std::map<std::string, std::string> origins;  ///< by link: what of the file it was, for a comment
   std::set<std::string> pieces;  ///< links made for further shapes of the link that they hang on
   std::map<std::string, double> efforts;  ///< by joint: largest force or torque [N or N m]
@@ -42,6 +47,9 @@ struct Robot {
   Remarks changed;                        ///< said in another way
   Remarks lost;                           ///< left out although it changes the motion
 };
+
+/// "line 7", or "line 7 of hand.xml" in a file that <include> has brought in.
+std::string place_in(const Robot& robot, const Source& source);
 
 /// Gives new links, joints and bodies names that no other has.
 class RobotNames {
@@ -77,8 +85,5 @@ int add_link(Robot& robot, RobotNames& names, const std::string& name, int paren
 /// mass. Throws InputError at `source` if no body has these numbers.
 RobotPiece inertial_piece(double mass, const std::array<double, 6>& inertia, const Pose& pose,
                           const std::string& origin, const Source& source);
-
-/// Volume of a solid [m³]; 0 for a plane.
-double volume_of(const Shape& shape);
 
 }  // namespace tangere

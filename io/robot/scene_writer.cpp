@@ -98,7 +98,7 @@ class Writer {
   void write_body(const BodyDescription& body, const std::string& space) {
     out_ += fmt::format("{}<body name=\"{}\" type=\"{}\"{}", space, attribute_text(body.name),
                         shape_name(body.shape), pose_text(body.pose));
-    std::visit([&](const auto& shape) { write_size(shape, body.name); }, body.shape);
+    write_size(body);
     if (!std::holds_alternative<AbstractShape>(body.shape) &&
         !std::holds_alternative<PlaneShape>(body.shape))
       out_ += body.density > 0 ? fmt::format(" density=\"{}\"", number_text(body.density))
@@ -110,25 +110,17 @@ class Writer {
     out_ += "/>\n";
   }
 
-  void write_size(const SphereShape& s, const std::string&) {
-    out_ += fmt::format(" radius=\"{}\"", number_text(s.radius));
+  void write_size(const BodyDescription& body) {
+    if (const auto* const mass = std::get_if<AbstractShape>(&body.shape)) return write_mass(*mass);
+    if (std::holds_alternative<MeshShape>(body.shape)) return write_mesh(body.name);
+    for (const NamedSize& size : named_sizes(body.shape)) {
+      out_ += fmt::format(" {}=\"", size.name);
+      for (std::size_t k = 0; k < size.values.size(); ++k)
+        out_ += (k > 0 ? " " : "") + number_text(size.values[k]);
+      out_ += "\"";
+    }
   }
-  void write_size(const CuboidShape& s, const std::string&) {
-    out_ += fmt::format(" size=\"{}\"", vector_text(s.size));
-  }
-  void write_size(const CylinderShape& s, const std::string&) {
-    out_ +=
-        fmt::format(" radius=\"{}\" length=\"{}\"", number_text(s.radius), number_text(s.length));
-  }
-  void write_size(const CapsuleShape& s, const std::string&) {
-    out_ +=
-        fmt::format(" radius=\"{}\" length=\"{}\"", number_text(s.radius), number_text(s.length));
-  }
-  void write_size(const EllipsoidShape& s, const std::string&) {
-    out_ += fmt::format(" size=\"{}\"", vector_text(s.size));
-  }
-  void write_size(const PlaneShape&, const std::string&) {}
-  void write_size(const MeshShape&, const std::string& body) {
+  void write_mesh(const std::string& body) {
     const MeshFile& file = robot_.meshes.at(body);
     namespace fs = std::filesystem;
     std::error_code none;
@@ -140,7 +132,7 @@ class Writer {
     if (file.scale != Vector3{1, 1, 1})
       out_ += fmt::format(" scale=\"{}\"", vector_text(file.scale));
   }
-  void write_size(const AbstractShape& s, const std::string&) {
+  void write_mass(const AbstractShape& s) {
     const auto& [xx, xy, xz, yy, yz, zz] = s.inertia;
     out_ += fmt::format(" mass=\"{}\" inertia=\"", number_text(s.mass));
     if (xy == 0 && xz == 0 && yz == 0)
@@ -159,7 +151,9 @@ class Writer {
       if (std::isfinite(m.low) || std::isfinite(m.high))
         out_ += fmt::format(" ctrl_range=\"{} {}\"", number_text(bounded(m.low)),
                             number_text(bounded(m.high)));
-      out_ += m.source.line > 0 ? fmt::format("/>  <!-- line {} -->\n", m.source.line) : "/>\n";
+      out_ += m.source.line > 0
+                  ? fmt::format("/>  <!-- {} -->\n", comment_text(place_in(robot_, m.source)))
+                  : "/>\n";
     }
     out_ += "  </actuator>\n";
   }

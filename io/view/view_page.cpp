@@ -7,6 +7,7 @@
 #include <type_traits>
 #include <variant>
 
+#include "engine/model/shapes.hpp"
 #include "io/view/page_files.hpp"
 
 namespace tangere {
@@ -42,37 +43,29 @@ Json packed(const std::vector<T>& values) {
 
 std::vector<float> single(std::span<const double> values) { return {values.begin(), values.end()}; }
 
-struct ShapeOf {
-  Json operator()(const SphereShape& s) const { return {{"kind", "sphere"}, {"radius", s.radius}}; }
-  Json operator()(const CuboidShape& s) const { return {{"kind", "cuboid"}, {"size", s.size}}; }
-  Json operator()(const CylinderShape& s) const {
-    return {{"kind", "cylinder"}, {"length", s.length}, {"radius", s.radius}};
-  }
-  Json operator()(const CapsuleShape& s) const {
-    return {{"kind", "capsule"}, {"length", s.length}, {"radius", s.radius}};
-  }
-  Json operator()(const EllipsoidShape& s) const {
-    return {{"kind", "ellipsoid"}, {"size", s.size}};
-  }
-  Json operator()(const PlaneShape&) const { return {{"kind", "plane"}}; }
-  Json operator()(const MeshShape& s) const {
-    std::vector<std::int32_t> corners;
-    for (const auto& triangle : s.triangles)
-      corners.insert(corners.end(), triangle.begin(), triangle.end());
-    std::vector<double> vertices = s.vertices;
-    for (double& x : vertices) x *= s.scale;
-    return {
-        {"kind", "mesh"}, {"vertices", packed(single(vertices))}, {"triangles", packed(corners)}};
-  }
-  Json operator()(const AbstractShape& s) const {
-    return {{"kind", "abstract"}, {"points", packed(single(s.contact_points))}};
-  }
-};
+Json surface_of(const MeshShape& s) {
+  std::vector<std::int32_t> corners;
+  for (const auto& triangle : s.triangles)
+    corners.insert(corners.end(), triangle.begin(), triangle.end());
+  std::vector<double> vertices = s.vertices;
+  for (double& x : vertices) x *= s.scale;
+  return {{"vertices", packed(single(vertices))}, {"triangles", packed(corners)}};
+}
+
+Json shape_of(const Shape& shape) {
+  Json out = {{"kind", shape_name(shape)}};
+  for (const NamedSize& size : named_sizes(shape))
+    out[size.name] = size.values.size() == 1 ? Json(size.values[0]) : Json(size.values);
+  if (const auto* const mesh = std::get_if<MeshShape>(&shape)) out.update(surface_of(*mesh));
+  if (const auto* const body = std::get_if<AbstractShape>(&shape))
+    out["points"] = packed(single(body->contact_points));
+  return out;
+}
 
 Json bodies_of(const std::vector<LinkDescription>& links) {
   Json bodies = Json::array();
   for (const LinkDescription& link : links) {
-    Json body = std::visit(ShapeOf{}, link.body.shape);
+    Json body = shape_of(link.body.shape);
     body["name"] = link.body.name;
     body["rgba"] = link.body.rgba;
     bodies.push_back(std::move(body));
