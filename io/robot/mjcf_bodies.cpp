@@ -128,9 +128,9 @@ class Bodies {
 
   std::string unique_body(const RobotNode& node) {
     std::string name = node.text("name");
-    const auto [first, is_new] = bodies_.try_emplace(name, node.source().line);
+    const auto [first, is_new] = bodies_.try_emplace(name, place_in(robot_, node.source()));
     if (!is_new)
-      node.fail(fmt::format("body name '{}' is used twice, first in line {}", name, first->second));
+      node.fail(fmt::format("body name '{}' is used twice, first in {}", name, first->second));
     return name;
   }
 
@@ -192,10 +192,9 @@ class Bodies {
   std::string joint_name(const RobotNode& node, const std::string& body) {
     if (!node.given("name")) return file_.names.free_name(body + "_joint");
     std::string name = node.text("name");
-    const auto [first, is_new] = joints_.try_emplace(name, node.source().line);
+    const auto [first, is_new] = joints_.try_emplace(name, place_in(robot_, node.source()));
     if (!is_new)
-      node.fail(
-          fmt::format("joint name '{}' is used twice, first in line {}", name, first->second));
+      node.fail(fmt::format("joint name '{}' is used twice, first in {}", name, first->second));
     return name;
   }
 
@@ -444,7 +443,7 @@ class Bodies {
 
   MjcfFile& file_;
   Robot& robot_;
-  std::map<std::string, int> bodies_, joints_;  // name, line
+  std::map<std::string, std::string> bodies_, joints_;  // name, place
 };
 
 }  // namespace

@@ -19,7 +19,7 @@ struct MjcfMesh {
   MeshFile file;
   MeshShape shape;
   bool shell = false;  ///< inertia="shell"
-  int line = 0;
+  std::string place;   ///< "line 7"
 };
 
 /// A joint of the file, for actuators: those of hinges and slides can be driven.
@@ -36,7 +36,7 @@ inline const std::vector<std::string> kActuators = {"general", "motor", "positio
 
 class MjcfFile {
  public:
-  explicit MjcfFile(const RobotNode& root) : robot(root.robot()), root_(root) {}
+  explicit MjcfFile(const RobotNode& root) : robot(root.robot()) {}
 
   Robot& robot;
   bool degrees = true;
@@ -60,8 +60,8 @@ class MjcfFile {
   /// The node with the defaults of its own class, or of `inherited` if it names none.
   [[nodiscard]] RobotNode with_class(const RobotNode& node, const std::string& inherited);
   [[nodiscard]] std::string known_class(const RobotNode& node, const char* attribute);
-  /// Warnings of all classes, moved out.
-  std::vector<std::string> take_warnings();
+  /// Moves the warnings of all classes and included files to `out`.
+  void take_warnings(std::vector<std::string>& out);
 
   /// Reads pos and one of quat, axisangle, euler, xyaxes, zaxis.
   [[nodiscard]] Pose read_pose(const RobotNode& node) const;
@@ -69,8 +69,8 @@ class MjcfFile {
  private:
   [[nodiscard]] Quaternion read_orientation(const RobotNode& node) const;
 
-  const RobotNode& root_;
-  std::map<std::string, SceneContext> classes_;
+  std::map<std::string, SceneContext> classes_;                           // their defaults
+  std::map<std::pair<std::string, std::string>, SceneContext> contexts_;  // of a file, a class
 };
 
 /// Reads <worldbody> and all bodies in it.

@@ -10,6 +10,7 @@
 #include <filesystem>
 
 #include "io/robot/mjcf_file.hpp"
+#include "io/robot/mjcf_include.hpp"
 #include "io/robot/mjcf_words.hpp"
 
 namespace tangere {
@@ -162,10 +163,9 @@ void read_mesh(MjcfFile& file, const RobotNode& node) {
   if (file.strip_path) given = std::filesystem::path(given).filename().string();
   const std::string name = node.text("name", std::filesystem::path(given).stem().string());
   MjcfMesh mesh;
-  mesh.line = node.source().line;
+  mesh.place = place_in(node.robot(), node.source());
   if (const auto first = file.meshes.find(name); first != file.meshes.end())
-    node.fail(
-        fmt::format("mesh name '{}' is used twice, first in line {}", name, first->second.line));
+    node.fail(fmt::format("mesh name '{}' is used twice, first in {}", name, first->second.place));
   mesh.file = {find_mesh(node, given, file.mesh_folder), node.vector("scale", Vector3{1, 1, 1})};
   mesh.shell = node.has("inertia") && node.text("inertia") == "shell";
   if (node.has("inertia"))
@@ -253,12 +253,15 @@ void MjcfFile::read_defaults(const RobotNode& node, const std::string& parent) {
 RobotNode MjcfFile::with_class(const RobotNode& node, const std::string& inherited) {
   std::string name = inherited.empty() ? "main" : inherited;
   if (node.given("class")) name = known_class(node, "class");
-  SceneContext& context = classes_[name];
-  if (context.file.empty()) {
-    context.file = root_.context().file;
-    context.allow_unknown = root_.context().allow_unknown;
+  const std::string& file = node.context().file;
+  const auto [at, is_new] = contexts_.try_emplace({file, name});
+  if (is_new) {
+    at->second = classes_[name];
+    at->second.file = file;
+    at->second.allow_unknown = node.context().allow_unknown;
+    at->second.warnings.clear();
   }
-  return node.in(context);
+  return node.in(at->second);
 }
 
 std::string MjcfFile::known_class(const RobotNode& node, const char* attribute) {
@@ -270,13 +273,13 @@ std::string MjcfFile::known_class(const RobotNode& node, const char* attribute) 
                         suggestion(name, all)));
 }
 
-std::vector<std::string> MjcfFile::take_warnings() {
-  std::vector<std::string> all;
-  for (auto& [name, context] : classes_) {
-    all.insert(all.end(), context.warnings.begin(), context.warnings.end());
+void MjcfFile::take_warnings(std::vector<std::string>& out) {
+  const auto take = [&](SceneContext& context) {
+    for (std::string& warning : context.warnings) out.push_back(std::move(warning));
     context.warnings.clear();
-  }
-  return all;
+  };
+  for (const auto& included : robot.included) take(included->context);
+  for (auto& [key, context] : contexts_) take(context);
 }
 
 Quaternion MjcfFile::read_orientation(const RobotNode& node) const {
@@ -324,12 +327,7 @@ void read_mjcf(const RobotNode& root) {
   Scene& scene = robot.scene;
   scene.name = root.text("model", "robot");
   scene.timestep = 0.002;  // MuJoCo's
-  Words known = kSections;
-  known.push_back({"include"});
-  const std::vector<RobotNode> sections = root.parts(known);
-  for (const RobotNode& s : sections)
-    if (s.name() == "include")
-      s.fail("files inside a file are not read; import the file that it names, or one whole file");
+  const std::vector<RobotNode> sections = root.parts(kSections);
   MjcfFile file(root);
   const auto each = [&](const char* name, auto&& read) {
     for (const RobotNode& s : sections)
@@ -346,8 +344,7 @@ void read_mjcf(const RobotNode& root) {
         {{"pair", Fate::lost, "a contact with coefficients of MuJoCo's; --contact A=B adds one"},
          {"exclude", Fate::idle, "a scene has only the contacts that it names"}}));
   });
-  for (std::string& warning : file.take_warnings())
-    root.context().warnings.push_back(std::move(warning));
+  file.take_warnings(root.context().warnings);
 }
 
 }  // namespace tangere

@@ -8,6 +8,8 @@
 #include <algorithm>
 #include <cctype>
 
+#include "io/robot/mjcf_include.hpp"
+
 namespace tangere {
 namespace {
 
@@ -57,6 +59,11 @@ void RobotNode::check(const Words& attributes) const {
 
 std::vector<RobotNode> RobotNode::parts(const Words& known) const {
   std::vector<RobotNode> out;
+  add_parts(known, out);
+  return out;
+}
+
+void RobotNode::add_parts(const Words& known, std::vector<RobotNode>& out) const {
   for (const tinyxml2::XMLNode* n = element().FirstChild(); n != nullptr; n = n->NextSibling()) {
     if (const tinyxml2::XMLText* t = n->ToText()) {
       const std::string text = t->Value();
@@ -68,6 +75,10 @@ std::vector<RobotNode> RobotNode::parts(const Words& known) const {
     const tinyxml2::XMLElement* const e = n->ToElement();
     if (e == nullptr) continue;
     const RobotNode child(*e, context(), *robot_);
+    if (child.name() == "include" && robot_->format == "MJCF") {
+      included_root(child).add_parts(known, out);
+      continue;
+    }
     if (child.name().starts_with("xacro:"))
       child.fail("a macro of xacro; expected plain XML, which 'xacro FILE' writes");
     const Word* const word = word_in(known, child.name());
@@ -83,7 +94,6 @@ std::vector<RobotNode> RobotNode::parts(const Words& known) const {
       word->fate == Fate::idle ? child.idle(text) : child.lost(text);
     }
   }
-  return out;
 }
 
 bool RobotNode::flag(const char* attribute, bool fallback) const {

@@ -38,7 +38,8 @@ class RobotNode : public SceneNode {
   /// Checks the element's own attributes against the table and lists those that are left out. An
   /// unknown one is an error, or a warning with --allow-unknown.
   void check(const Words& attributes) const;
-  /// Returns the children that are read, in order, and lists the others likewise.
+  /// Returns the children that are read, in order, and lists the others likewise. In MJCF the
+  /// children of a file that an <include> names stand in its place.
   [[nodiscard]] std::vector<RobotNode> parts(const Words& known) const;
   /// The same in another context, which has defaults of its own.
   [[nodiscard]] RobotNode in(SceneContext& context) const { return {element(), context, *robot_}; }
@@ -51,6 +52,8 @@ class RobotNode : public SceneNode {
   [[nodiscard]] bool flag(const char* attribute, bool fallback) const;
 
  private:
+  void add_parts(const Words& known, std::vector<RobotNode>& out) const;
+
   Robot* robot_;
 };
 

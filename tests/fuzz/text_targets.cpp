@@ -78,11 +78,12 @@ void run_robot(const std::string& folder) {
   static_cast<void>(import_robot(folder + "/mutant", folder + "/scene.xml"));
 }
 
-/// The robots of a format, with the meshes that they name beside them.
+/// The robots of a format, with the files that they name beside them.
 auto robots(std::initializer_list<const char*> names) {
   return [names = std::vector<std::string>(names.begin(), names.end())](const std::string& folder) {
-    fs::copy(std::string(kRobots) + "meshes", fs::path(folder) / "meshes",
-             fs::copy_options::recursive);
+    for (const char* beside : {"meshes", "part.xml"})
+      fs::copy(std::string(kRobots) + beside, fs::path(folder) / beside,
+               fs::copy_options::recursive);
     std::vector<std::string> corpus;
     for (const std::string& name : names) {
       std::string text = file_bytes(kRobots + name);
@@ -186,7 +187,7 @@ std::vector<Target> text_targets() {
   };
   return {{"scene", false, "mutant", scenes, [=](const auto& f) { run_scene(in(f)); }},
           {"urdf", false, "mutant", robots({"hand.urdf", "gripper.urdf"}), run_robot},
-          {"mjcf", false, "mutant", robots({"machine.xml", "arm.xml"}), run_robot},
+          {"mjcf", false, "mutant", robots({"machine.xml", "arm.xml", "including.xml"}), run_robot},
           {"table", false, "mutant", tables,
            [=](const auto& f) { static_cast<void>(read_csv(in(f), 3, names)); }},
           surface("obj", meshes),

@@ -115,9 +115,63 @@ TEST(RobotImport, MjcfMistakesNameTheLine) {
               HasSubstr("mesh=\"m\": no mesh has this name"));
   EXPECT_THAT(fault_of(mjcf("<joint/><geom size=\"0.1\" quat=\"1 0 0 0\" euler=\"0 0 0\"/>")),
               HasSubstr("both 'quat' and 'euler'"));
-  EXPECT_THAT(fault_of("<mujoco><include file=\"a.xml\"/></mujoco>"),
-              HasSubstr("files inside a file are not read"));
   EXPECT_THAT(fault_of("<tangere/>"), HasSubstr("This is a scene already"));
+}
+
+/// Three files: defaults and an asset folder, a finger that hangs on a body of the main file, and
+/// the main file.
+ImportedScene import_parts(const testing::Folder& folder, const std::string& finger) {
+  std::filesystem::create_directory(folder / "parts");
+  std::ofstream(folder / "parts/common.xml")
+      << "<mujocoinclude>\n<default><geom rgba=\"0.1 0.2 0.3 1\"/>\n"
+         "<default class=\"stiff\"><joint damping=\"7\"/></default></default>\n"
+         "</mujocoinclude>\n";
+  std::ofstream(folder / "parts/finger.xml") << finger;
+  std::ofstream(folder / "robot.xml")
+      << "<mujoco>\n<include file=\"parts/common.xml\"/>\n<worldbody><body name=\"palm\">\n"
+         "<geom size=\"0.1\"/>\n<include "
+         "file=\"parts/finger.xml\"/>\n</body></worldbody></mujoco>\n";
+  return import_robot(folder / "robot.xml", folder / "scene.xml", {});
+}
+const std::string kFingerPart =
+    "<mujoco>\n<body name=\"finger\" pos=\"0 0 0.2\">\n<site/>\n"
+    "<joint name=\"j\" class=\"stiff\"/>\n<geom size=\"0.05\"/></body></mujoco>\n";
+
+TEST(RobotImport, MjcfFilesStandWhereTheyAreIncluded) {
+  const testing::Folder folder;
+  const ImportedScene out = import_parts(folder, kFingerPart);
+  EXPECT_EQ(out.links, 2);
+  EXPECT_THAT(out.text, HasSubstr("line 2 of finger.xml: <body>"));
+  EXPECT_THAT(out.text, HasSubstr("<!-- line 3: <body>"));
+  EXPECT_THAT(out.text, HasSubstr("damping=\"7\""));
+  EXPECT_THAT(out.text, HasSubstr("rgba=\"0.1 0.2 0.3 1\""));
+  EXPECT_THAT(out.idle, Contains(HasSubstr("finger.xml: <site>")));
+}
+
+TEST(RobotImport, MistakesOfIncludedMjcfFilesNameTheirFileAndLine) {
+  const auto fault = [](const std::string& finger) -> std::string {
+    const testing::Folder folder;
+    try {
+      import_parts(folder, finger);
+    } catch (const std::exception& error) {
+      return error.what();
+    }
+    return "";
+  };
+  EXPECT_EQ(fault(kFingerPart), "");
+  EXPECT_THAT(fault("<mujoco>\n<body name=\"palm\"/></mujoco>"),
+              HasSubstr("parts/finger.xml:2: <body>: body name 'palm' is used twice, first in "
+                        "line 3"));
+  EXPECT_THAT(fault("<mujoco>\n\n<boddy/></mujoco>"), HasSubstr("parts/finger.xml:3: <boddy>"));
+  EXPECT_THAT(fault("<mujoco>\n<body"), HasSubstr("parts/finger.xml:2"));
+  EXPECT_THAT(fault("<robot/>"), HasSubstr("finger.xml:1: <robot>: no part of a MJCF file"));
+  for (const char* again : {"parts/common.xml", "parts/finger.xml", "robot.xml"})
+    EXPECT_THAT(fault("<mujoco>\n<include file=\"" + std::string(again) + "\"/></mujoco>"),
+                HasSubstr("parts/finger.xml:2: <include>: "))
+        << again;
+  EXPECT_THAT(fault("<mujoco><include file=\"none.xml\"/></mujoco>"),
+              HasSubstr("parts/finger.xml:1: <include>: "));
+  EXPECT_THAT(fault("<mujoco><include/></mujoco>"), HasSubstr("parts/finger.xml:1: <include>"));
 }
 
 TEST(RobotImport, ListsWhatChangesTheMotion) {
