@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Measures the parts of a step: kernels of one group of eight environments, the rolling ball in
 // contact. Time is that of the whole group. ns/env divides it by eight, or by one if a lane is
-// evaluated alone.
+// evaluated alone. ns/candidate divides once more, by the contact points near the touched body.
 #include <benchmark/benchmark.h>
 
 #include <vector>
@@ -20,12 +20,29 @@ namespace {
 using kernels::kGroup;
 using kernels::LaneRow;
 
+/// The rolling ball, or another object in its place.
+Model model_of(const Shape& object) {
+  Scene scene = read_scene(TANGERE_SOURCE_DIR "/scenes/rolling_ball.xml").scene;
+  for (LinkDescription& link : scene.links)
+    if (link.body.name == "ball") link.body.shape = object;
+  return Model(scene);
+}
+
+constexpr double kHalf = 0.02;  ///< radius of the ball, half an edge of a cube [m]
+
+MeshShape cube_of_triangles() {
+  MeshShape mesh;
+  for (int k = 0; k < 8; ++k)
+    for (int c = 0; c < 3; ++c) mesh.vertices.push_back((k >> c & 1) != 0 ? kHalf : -kHalf);
+  mesh.triangles = {{0, 4, 6}, {0, 6, 2}, {1, 3, 7}, {1, 7, 5}, {0, 1, 5}, {0, 5, 4},
+                    {2, 6, 7}, {2, 7, 3}, {0, 2, 3}, {0, 3, 1}, {4, 5, 7}, {4, 7, 6}};
+  return mesh;
+}
+
 /// A group in the middle of the run, at the predicted pose of its next step.
 class Group {
  public:
-  Group()
-      : model_(read_scene(TANGERE_SOURCE_DIR "/scenes/rolling_ball.xml").scene),
-        work_(compiled(model_)) {
+  explicit Group(const Model& model) : model_(model), work_(compiled(model_)) {
     Batch batch(model_, kGroup, 1);
     Stepper stepper(model_);
     const ControlProgram program(model_, model_.timestep(), 1);
@@ -71,8 +88,9 @@ class Group {
 };
 
 template <class F>
-void run(benchmark::State& state, double environments, const F& f) {
-  Group group;
+void run(benchmark::State& state, double environments, const F& f,
+         const Model& model = model_of(SphereShape{kHalf})) {
+  Group group(model);
   for (auto _ : state) {
     f(group);
     benchmark::ClobberMemory();
@@ -81,7 +99,11 @@ void run(benchmark::State& state, double environments, const F& f) {
   state.counters["ns/env"] =
       benchmark::Counter(double(state.iterations()) * environments * 1e-9,
                          benchmark::Counter::kIsRate | benchmark::Counter::kInvert);
-  state.counters["candidates"] = environments == 1 ? list.own_count[0] : list.count;
+  const int candidates = environments == 1 ? list.own_count[0] : list.count;
+  state.counters["candidates"] = candidates;
+  state.counters["ns/candidate"] =
+      benchmark::Counter(double(state.iterations()) * environments * candidates * 1e-9,
+                         benchmark::Counter::kIsRate | benchmark::Counter::kInvert);
   state.SetLabel(kernels::active_isa_name());
 }
 
@@ -116,6 +138,17 @@ void BM_EvaluateWithoutCandidates(benchmark::State& s) {
     g.table().group.evaluate(g.view(), g.work().stage, -1);
   });
 }
+/// The pad's contact points on a cube, and on the same cube as a mesh of 64 cells.
+void BM_EvaluateOnCuboid(benchmark::State& s) {
+  run(
+      s, kGroup, [](Group& g) { g.table().group.evaluate(g.view(), g.work().stage, -1); },
+      model_of(CuboidShape{{2 * kHalf, 2 * kHalf, 2 * kHalf}, {2, 2, 2}}));
+}
+void BM_EvaluateOnMesh(benchmark::State& s) {
+  static const Model model = model_of(cube_of_triangles());
+  run(
+      s, kGroup, [](Group& g) { g.table().group.evaluate(g.view(), g.work().stage, -1); }, model);
+}
 void BM_Factor(benchmark::State& s) {
   run(s, kGroup, [](Group& g) { g.table().group.factor(g.view(), g.work().stage, nullptr); });
 }
@@ -138,6 +171,8 @@ BENCHMARK(BM_ResidualOfOneLane);
 BENCHMARK(BM_Evaluate);
 BENCHMARK(BM_EvaluateOneLane);
 BENCHMARK(BM_EvaluateWithoutCandidates);
+BENCHMARK(BM_EvaluateOnCuboid);
+BENCHMARK(BM_EvaluateOnMesh);
 BENCHMARK(BM_Factor);
 BENCHMARK(BM_Solve);
 BENCHMARK(BM_SolveWatched);

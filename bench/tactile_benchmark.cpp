@@ -15,6 +15,7 @@
 #endif
 
 #include "engine/model/compiled_model.hpp"
+#include "engine/model/mesh_grid.hpp"
 #include "engine/sense/readout.hpp"
 #include "engine/step/control.hpp"
 #include "engine/step/stepper.hpp"
@@ -279,6 +280,12 @@ void curved(benchmark::State& state) {
   count(state, pad.rows);
   state.counters["tiles"] = tiles;
 }
+/// Makes the distance to a ball of 2024 triangles on 64 cells.
+void BM_MakeMeshGrid(benchmark::State& state) {
+  const MeshShape mesh = ball_of_triangles(0.02, 46);
+  for (auto _ : state) benchmark::DoNotOptimize(make_mesh_grid(mesh));
+  state.counters["triangles"] = double(mesh.triangles.size());
+}
 void BM_CurvedDouble(benchmark::State& s) { curved<double>(s); }
 void BM_CurvedMixed(benchmark::State& s) { curved<float>(s); }
 void BM_DenseDouble(benchmark::State& s) { field<double>(s, kEverywhere, 200, true); }
@@ -349,6 +356,7 @@ BENCHMARK(BM_CulledDouble);
 BENCHMARK(BM_CulledMixed);
 BENCHMARK(BM_CulledMeshDouble);
 BENCHMARK(BM_CulledMeshMixed);
+BENCHMARK(BM_MakeMeshGrid)->Unit(benchmark::kMillisecond);
 BENCHMARK(BM_SmallPadDouble);
 BENCHMARK(BM_SmallPadMixed);
 BENCHMARK(BM_SmallPadAcrossEnvironmentsDouble);

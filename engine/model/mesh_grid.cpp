@@ -122,11 +122,10 @@ std::vector<double> distances(const MeshShape& mesh, const Nodes& nodes) {
   const TriangleTree tree(mesh.vertices, mesh.triangles);
   Crossings crossings(mesh, nodes);
   std::vector<double> d(nodes.all());
-  double before = HUGE_VAL;  // no node is farther than its neighbour by more than a cell
+  int of_line = 0;  // the triangle nearest to the first node of the line before
   for (int i = 0; i < nodes.count[0]; ++i)
     for (int j = 0; j < nodes.count[1]; ++j) {
-      before = HUGE_VAL;
-      if (j > 0) before = std::abs(d[nodes.at(i, j - 1, nodes.count[2] - 1)]);
+      int nearest = of_line;
       crossings.for_each(i, j, [&](int k, int winding) {
         const Vec3<double> at = {nodes.place(0, i), nodes.place(1, j), nodes.place(2, k)};
         if (winding != 0 && winding != 1)
@@ -134,9 +133,9 @@ std::vector<double> distances(const MeshShape& mesh, const Nodes& nodes) {
               "the surface encloses the place ({:g} {:g} {:g}) m {} times; expected a surface that "
               "does not overlap itself, or resolution=\"0\" for a mesh that nothing touches",
               at.x, at.y, at.z, winding));
-        const double bound = (before + nodes.cell) * (1 + 1e-9);
-        before = std::sqrt(tree.squared_distance(at, bound * bound));
-        d[nodes.at(i, j, k)] = winding == 1 ? -before : before;
+        const double far = std::sqrt(tree.squared_distance(at, nearest));
+        if (k + 1 == nodes.count[2]) of_line = nearest;
+        d[nodes.at(i, j, k)] = winding == 1 ? -far : far;
       });
     }
   return d;
@@ -183,6 +182,20 @@ std::vector<double> coefficients_along(const std::vector<double>& values, int (&
   return out;
 }
 
+/// Turns coefficients (x, y, z) into the order of DistanceGrid: (y, cells along z, x, 4).
+std::vector<float> quads_along_z(const std::vector<double>& values, const int (&count)[3],
+                                 int cells) {
+  const auto nx = std::size_t(count[0]), ny = std::size_t(count[1]), nz = std::size_t(count[2]);
+  std::vector<float> out(ny * std::size_t(cells) * nx * kernels::kQuad);
+  float* to = out.data();
+  for (std::size_t j = 0; j < ny; ++j)
+    for (std::size_t k = 0; k < std::size_t(cells); ++k)
+      for (std::size_t i = 0; i < nx; ++i)
+        for (std::size_t z = k; z < k + kernels::kQuad; ++z)
+          *to++ = static_cast<float>(values[(i * ny + j) * nz + z]);
+  return out;
+}
+
 /// Control points of φ in a cell, (4, 4, 4).
 using Cell = std::array<double, 64>;
 constexpr int kStride[3] = {16, 4, 1};
@@ -193,8 +206,8 @@ double steepest_in(const Cell& c, double factor) {
   double square = 0;
   for (const int stride : kStride) {
     double most = 0;
-    for (int k = 0; k < 64; ++k)
-      if (k / stride % 4 < 3)
+    for (int line = 0; line < 64; line += 4 * stride)
+      for (int k = line; k < line + 3 * stride; ++k)
         most = std::max(most, std::abs(c[std::size_t(k + stride)] - c[std::size_t(k)]));
     square += most * most;
   }
@@ -205,34 +218,41 @@ double steepest_in(const Cell& c, double factor) {
 /// lie far closer to it: (c₀ + 4 c₁ + c₂)/6, (2 c₁ + c₂)/3, (c₁ + 2 c₂)/3, (c₁ + 4 c₂ + c₃)/6.
 Cell bezier(Cell c) {
   for (const int stride : kStride)
-    for (int k = 0; k < 64; ++k) {
-      if (k / stride % 4 != 0) continue;
-      double* const at[4] = {&c[std::size_t(k)], &c[std::size_t(k + stride)],
-                             &c[std::size_t(k + 2 * stride)], &c[std::size_t(k + 3 * stride)]};
-      const double c0 = *at[0], c1 = *at[1], c2 = *at[2], c3 = *at[3];
-      *at[0] = (c0 + 4 * c1 + c2) / 6, *at[1] = (2 * c1 + c2) / 3;
-      *at[2] = (c1 + 2 * c2) / 3, *at[3] = (c1 + 4 * c2 + c3) / 6;
-    }
+    for (int line = 0; line < 64; line += 4 * stride)
+      for (int k = line; k < line + stride; ++k) {
+        double* const at = &c[std::size_t(k)];
+        const double c0 = at[0], c1 = at[stride], c2 = at[2 * stride], c3 = at[3 * stride];
+        at[0] = (c0 + 4 * c1 + c2) * (1.0 / 6), at[stride] = (2 * c1 + c2) * (1.0 / 3);
+        at[2 * stride] = (c1 + 2 * c2) * (1.0 / 3), at[3 * stride] = (c1 + 4 * c2 + c3) * (1.0 / 6);
+      }
   return c;
 }
 
-/// Returns a bound of |∇φ| where φ > 0. What is deep inside, where the nearest place jumps, is left
-/// out: on the way to a place that touches, φ falls from its value to zero outside.
-double steepest(const kernels::DistanceGrid& g) {
+/// Fills `floors` and `slope` of a grid: the least control point of a Bézier form is no more than
+/// φ in its cell, and the steepest cell with φ > 0 bounds |∇φ|. What is deep inside, where the
+/// nearest place jumps, has no part in the slope: on the way to a place that touches, φ falls from
+/// its value to zero outside.
+void bound_cells(MeshGrid& grid) {
+  constexpr double kRounding = 4e-6;  // of sums of 64 products in single precision
+  kernels::DistanceGrid& g = grid.view;
+  grid.floors.assign(grid.coefficients.size() / kernels::kQuad, 0.0F);
+  g.floors = grid.floors.data();
   double most = 0;
-  for (int i = 0; i < g.cells[0]; ++i)
-    for (int j = 0; j < g.cells[1]; ++j)
-      for (int k = 0; k < g.cells[2]; ++k) {
-        const float* from =
-            g.coefficients + std::ptrdiff_t(i) * g.plane + std::ptrdiff_t(j) * g.row + k;
+  for (int j = 0; j < g.cells[1]; ++j)
+    for (int k = 0; k < g.cells[2]; ++k)
+      for (int i = 0; i < g.cells[0]; ++i) {
+        const auto at = kernels::first_coefficient(g, i, j, k);
         Cell c;
         for (int n = 0; n < 64; ++n)
-          c[std::size_t(n)] = from[n / 16 * g.plane + n / 4 % 4 * g.row + n % 4];
-        if (*std::max_element(c.begin(), c.end()) <= 0 || steepest_in(c, 1) <= most) continue;
-        c = bezier(c);
-        if (*std::max_element(c.begin(), c.end()) > 0) most = std::max(most, steepest_in(c, 3));
+          c[std::size_t(n)] = g.coefficients[at + n / 4 % 4 * g.plane + n / 16 * 4 + n % 4];
+        const Cell close = bezier(c);
+        double low = close[0], high = close[0];
+        for (const double x : close) low = std::min(low, x), high = std::max(high, x);
+        const double size = std::max(-low, high) + g.cell;
+        grid.floors[std::size_t(at / kernels::kQuad)] = static_cast<float>(low - kRounding * size);
+        if (high > 0 && steepest_in(c, 1) > most) most = std::max(most, steepest_in(close, 3));
       }
-  return most / g.cell * (1 + 1e-6);
+  g.slope = most / g.cell * (1 + 1e-6);
 }
 
 }  // namespace
@@ -258,11 +278,11 @@ std::shared_ptr<const MeshGrid> make_mesh_grid(const MeshShape& mesh) {
   std::vector<double> values = distances(mesh, nodes);
   int count[3] = {nodes.count[0], nodes.count[1], nodes.count[2]};
   for (int axis = 2; axis >= 0; --axis) values = coefficients_along(values, count, axis);
-  out->coefficients.assign(values.begin(), values.end());
+  g.row = kernels::kQuad * count[0];
+  g.plane = g.cells[2] * g.row;
+  out->coefficients = quads_along_z(values, count, g.cells[2]);
   g.coefficients = out->coefficients.data();
-  g.row = count[2];
-  g.plane = count[1] * count[2];
-  g.slope = steepest(g);
+  bound_cells(*out);
   out->fit = mesh_fit(mesh, g);
   return out;
 }

@@ -14,14 +14,16 @@ namespace tangere {
 
 struct MeshGrid {
   kernels::DistanceGrid view{};
-  std::vector<float> coefficients;
+  std::vector<float> coefficients, floors;
   MeshFit fit;
 
   MeshGrid() = default;
   MeshGrid(const MeshGrid&) = delete;  // the view points into the coefficients
   MeshGrid& operator=(const MeshGrid&) = delete;
 
-  [[nodiscard]] std::size_t bytes() const { return coefficients.size() * sizeof(float); }
+  [[nodiscard]] std::size_t bytes() const {
+    return (coefficients.size() + floors.size()) * sizeof(float);
+  }
 };
 
 /// Returns the distance to a closed mesh with `mesh.resolution` cells along its longest side.

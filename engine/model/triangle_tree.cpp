@@ -92,7 +92,7 @@ void TriangleTree::split(int node, std::span<Corners> all, int first) {
   split(left + 1, all.subspan(half), first + static_cast<int>(half));
 }
 
-double TriangleTree::squared_distance(const Vec3<double>& at, double bound) const {
+double TriangleTree::squared_distance(const Vec3<double>& at, int& nearest) const {
   const auto to_box = [&](const Box& box) {
     double square = 0;
     for (int k = 0; k < 3; ++k) {
@@ -108,15 +108,20 @@ double TriangleTree::squared_distance(const Vec3<double>& at, double bound) cons
   std::array<Waiting, 64> stack;  // halves of halves: less than 64 levels
   int waiting = 0;
   stack[0] = {to_box(nodes_[0].box), 0};
-  double best = bound;
+  const auto to = [&](int k) {
+    const Vec3<double> way = to_triangle(at, triangles_[std::size_t(k)]);
+    return dot(way, way);
+  };
+  double best = to(nearest);
+  if (!(best >= 0)) best = HUGE_VAL;  // a triangle without area may have no nearest place
   for (waiting = 1; waiting > 0;) {
     const Waiting next = stack[std::size_t(--waiting)];
-    if (next.square > best) continue;
+    if (next.square >= best) continue;
     const Node& node = nodes_[std::size_t(next.node)];
     if (node.count > 0) {
       for (int k = node.first; k < node.first + node.count; ++k) {
-        const Vec3<double> way = to_triangle(at, triangles_[std::size_t(k)]);
-        best = std::min(best, dot(way, way));
+        const double square = to(k);
+        if (square < best) best = square, nearest = k;
       }
       continue;
     }

@@ -16,8 +16,9 @@ class TriangleTree {
   /// vertices: (n, 3). Both are copied.
   TriangleTree(std::span<const double> vertices, std::span<const std::array<int, 3>> triangles);
 
-  /// Returns the squared distance from a place to the nearest triangle. `bound` is at least that.
-  [[nodiscard]] double squared_distance(const kernels::Vec3<double>& at, double bound) const;
+  /// Returns the squared distance from a place to the nearest triangle, and leaves that triangle in
+  /// `nearest`. A search that begins at the triangle nearest to a neighbour is short. 0: any.
+  [[nodiscard]] double squared_distance(const kernels::Vec3<double>& at, int& nearest) const;
 
  private:
   struct Box {

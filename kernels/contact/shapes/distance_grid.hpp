@@ -5,12 +5,18 @@
 
 namespace tangere::kernels {
 
+inline constexpr int kQuad = 4;  ///< coefficients along z that lie side by side
+
 /// Coefficients of a spline and its place in the shape's axes.
 struct DistanceGrid {
-  /// (cells[0] + 3, cells[1] + 3, cells[2] + 3) [m]
+  /// (cells[1] + 3, cells[2], cells[0] + 3, 4) for y, z, x: the coefficients at z … z + 3 [m]. The
+  /// sixteen of a place at one y are neighbours in memory, x by x.
   const float* coefficients;
+  /// (cells[1], cells[2], cells[0] + 3) for y, z, x: φ is nowhere less in the cell, by however
+  /// much single precision rounds [m]
+  const float* floors;
   int cells[3];
-  int row, plane;          ///< distance in memory from one y and one x to the next
+  int row, plane;          ///< distance in memory from one z and one y to the next
   double origin[3];        ///< lowest corner of the first cell [m]
   double cell;             ///< its edge [m]
   double slope;            ///< no smaller than any |∇φ| where φ > 0

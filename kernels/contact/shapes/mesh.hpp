@@ -58,9 +58,13 @@ auto near_mesh(const DistanceGrid& g, const Vec3<N>& y, const N& m) {
   Vec3<N> clamped;
   const GridPlace<N> at = place_in_grid(g, U, clamped);
   const Vec3<N> away = U - clamped;
+  const auto beyond = dot(away, away) > zero;
+  const N fall = N(g.slope) * m;
+  near = near & (beyond | (floor_at(g, at) < fall));
+  if (!any(near)) return near;
   SplineValue<N, 0> phi;
   spline_at(g, at, phi);
-  near = near & ((dot(away, away) > zero) | (phi.value < N(g.slope) * m));
+  near = near & (beyond | (phi.value < fall));
   return near;
 }
 
@@ -191,7 +195,7 @@ struct MeshPad {
       inside = select((cell >= zero) & (cell < most + half), inside, zero);
     }
     SplineValue<N, 1> phi;
-    spline_at(*grid, at, phi);
+    spline_inside(*grid, at, phi);
     d = select(inside > half, N(scale) * phi.value, one);
     n = Q * (slope * Vec3<N>{phi.gradient[0], phi.gradient[1], phi.gradient[2]});
     return d < zero;

@@ -5,8 +5,8 @@
 //   φ(y) = Σ c[i + a, j + b, k + c] w_a(t_x) w_b(t_y) w_c(t_z),  a, b, c = 0 … 3
 //   w = ((1 - t)³, 3t³ - 6t² + 4, …, t³)/6
 // φ, ∇φ and ∇∇φ are continuous. Derivatives take w' and w'' in place of w, divided by the cell.
-// Sums run over y first, then x, then z. Rows along z are four neighbours in memory, so a vector
-// holds several of them. The order of sums is the same for every number type.
+// Sums run over y first, then x, then z. The four rows along z of a place at one y are neighbours
+// in memory, so one load fills a vector.
 #pragma once
 
 #include <type_traits>
@@ -110,7 +110,7 @@ inline constexpr double kNowhere = -1;
 
 /// The number of a cell's first coefficient.
 inline long first_coefficient(const DistanceGrid& g, double x, double y, double z) {
-  return long(x) * g.plane + long(y) * g.row + long(z);
+  return long(x) * kQuad + long(y) * g.plane + long(z) * g.row;
 }
 
 template <class N>
@@ -138,10 +138,10 @@ void spline_at(const DistanceGrid& g, const GridPlace<N>& at, SplineValue<N, Ord
     N of_y[Order + 1][4];
     for (int i = 0; i < 4; ++i)
       for (int o = 0; o <= Order; ++o) {
-        const float* at_row = c + i * g.plane + k;
+        const float* at_row = c + i * kQuad + k;
         of_y[o][i] = y.w[o][0] * N(double(at_row[0]));
         for (int j = 1; j < 4; ++j)
-          of_y[o][i] = mul_add(y.w[o][j], N(double(at_row[j * g.row])), of_y[o][i]);
+          of_y[o][i] = mul_add(y.w[o][j], N(double(at_row[j * g.plane])), of_y[o][i]);
       }
     for (int s = 0; s < kSplineSums<Order>; ++s) {
       const N(&w)[4] = x.w[kSplineX[s]];
@@ -152,19 +152,39 @@ void spline_at(const DistanceGrid& g, const GridPlace<N>& at, SplineValue<N, Ord
   sum_over_z<Order>(sums, z, out);
 }
 
+/// No more than φ in the cell of a place.
+inline double floor_in_cell(const DistanceGrid& g, double x, double y, double z) {
+  return x < 0 ? 0.0 : double(g.floors[first_coefficient(g, x, y, z) / kQuad]);
+}
+template <class N>
+N floor_at(const DistanceGrid& g, const GridPlace<N>& at) {
+  return N(floor_in_cell(g, plain_value(at.whole[0]), plain_value(at.whole[1]),
+                         plain_value(at.whole[2])));
+}
+template <class A>
+OneLane<A> floor_at(const DistanceGrid& g, const GridPlace<OneLane<A>>& at) {
+  return {floor_in_cell(g, at.whole[0].x, at.whole[1].x, at.whole[2].x)};
+}
+template <class A>
+Lanes<A> floor_at(const DistanceGrid& g, const GridPlace<Lanes<A>>& at) {
+  alignas(64) double whole[3][kGroup], out[kGroup];
+  for (int c = 0; c < 3; ++c) store_lanes(at.whole[c], whole[c]);
+  for (int l = 0; l < kGroup; ++l) out[l] = floor_in_cell(g, whole[0][l], whole[1][l], whole[2][l]);
+  return load_lanes<A>(out);
+}
+
 /// Loads two rows of four coefficients.
 template <class A>
-[[gnu::always_inline]] inline Lanes<A> load_two_rows(const float* a, const float* b) {
+[[gnu::always_inline]] inline Lanes<A> load_two_rows(const float* from) {
 #if defined(__AVX512F__)
   if constexpr (std::is_same_v<A, xsimd::avx512bw>) {
     Lanes<A> out;
-    out.r[0] = _mm512_cvtps_pd(
-        _mm256_insertf128_ps(_mm256_castps128_ps256(_mm_loadu_ps(a)), _mm_loadu_ps(b), 1));
+    out.r[0] = _mm512_cvtps_pd(_mm256_loadu_ps(from));
     return out;
   }
 #endif
   alignas(64) double both[kGroup];
-  for (int k = 0; k < 4; ++k) both[k] = double(a[k]), both[4 + k] = double(b[k]);
+  for (int k = 0; k < kGroup; ++k) both[k] = double(from[k]);
   return load_lanes<A>(both);
 }
 /// Returns a in the first four lanes and b in the others.
@@ -229,10 +249,9 @@ template <int Order, class A>
                                             const double* y, int stride, double (*out)[4]) {
   Lanes<A> of_y[Order + 1][2];
   for (int j = 0; j < 4; ++j) {
-    const float* from = c + j * g.row;
+    const float* from = c + j * g.plane;
     // Rows 0 and 1, then 2 and 3: each vector has two neighbours along x.
-    const Lanes<A> rows[2] = {load_two_rows<A>(from, from + g.plane),
-                              load_two_rows<A>(from + 2 * g.plane, from + 3 * g.plane)};
+    const Lanes<A> rows[2] = {load_two_rows<A>(from), load_two_rows<A>(from + 2 * kQuad)};
     for (int o = 0; o <= Order; ++o) {
       const Lanes<A> w(y[stride * (4 * o + j)]);
       for (int half = 0; half < 2; ++half)
@@ -298,16 +317,26 @@ void spline_at(const DistanceGrid& g, const GridPlace<Lanes<A>>& at,
   sum_over_z<Order>(sums, SplineWeights<N, Order>(at.rest[2]), out);
 }
 
+/// φ and ∇φ where φ < 0; elsewhere some φ ≥ 0. Where no lane's cell reaches inside, nothing else is
+/// read.
+template <class A>
+void spline_inside(const DistanceGrid& g, const GridPlace<Lanes<A>>& at,
+                   SplineValue<Lanes<A>, 1>& out) {
+  using N = Lanes<A>;
+  if (any(floor_at(g, at) < N(0.0))) return spline_at(g, at, out);
+  out = {N(1.0), {N(0.0), N(0.0), N(0.0)}, {}};
+}
+
 /// Two vectors side by side (kernels/tactile/vector_pair.hpp).
 template <int Order, template <class> class Pair, class M>
 requires requires { &Pair<M>::a; }
-void spline_at(const DistanceGrid& g, const GridPlace<Pair<M>>& at,
-               SplineValue<Pair<M>, Order>& out) {
+void spline_inside(const DistanceGrid& g, const GridPlace<Pair<M>>& at,
+                   SplineValue<Pair<M>, Order>& out) {
   const auto part = [&](M Pair<M>::*of) {
     GridPlace<M> one;
     for (int c = 0; c < 3; ++c) one.whole[c] = at.whole[c].*of, one.rest[c] = at.rest[c].*of;
     SplineValue<M, Order> value;
-    spline_at(g, one, value);
+    spline_inside(g, one, value);
     return value;
   };
   const SplineValue<M, Order> a = part(&Pair<M>::a), b = part(&Pair<M>::b);

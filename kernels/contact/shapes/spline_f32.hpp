@@ -9,87 +9,84 @@
 
 namespace tangere::kernels {
 
-/// Returns four coefficients from each of four rows.
+/// Returns four coefficients from each of four rows, which are neighbours in memory.
 template <class A>
-[[gnu::always_inline]] inline LanesF<A> load_four_rows(const float* from, int plane) {
+[[gnu::always_inline]] inline LanesF<A> load_four_rows(const float* from) {
   [[maybe_unused]] LanesF<A> out;
 #if defined(__AVX512F__)
   if constexpr (std::is_same_v<A, xsimd::avx512bw>) {
-    __m512 all = _mm512_castps128_ps512(_mm_loadu_ps(from));
-    all = _mm512_insertf32x4(all, _mm_loadu_ps(from + plane), 1);
-    all = _mm512_insertf32x4(all, _mm_loadu_ps(from + 2 * plane), 2);
-    out.r[0] = _mm512_insertf32x4(all, _mm_loadu_ps(from + 3 * plane), 3);
+    __m512 all = _mm512_loadu_ps(from);
+    asm("" : "+v"(all));  // it has two uses, and GCC would load it twice
+    out.r[0] = all;
     return out;
   }
 #endif
 #if defined(__AVX2__)
   if constexpr (std::is_same_v<A, xsimd::avx2>) {
-    out.r[0] = _mm256_loadu2_m128(from + plane, from);
-    out.r[1] = _mm256_loadu2_m128(from + 3 * plane, from + 2 * plane);
+    out.r[0] = _mm256_loadu_ps(from);
+    out.r[1] = _mm256_loadu_ps(from + 8);
     return out;
   }
 #endif
   alignas(64) float all[kLanesF];
-  for (int a = 0; a < 4; ++a) __builtin_memcpy(all + 4 * a, from + a * plane, 4 * sizeof(float));
+  __builtin_memcpy(all, from, sizeof all);
   return load_lanes_f<A>(all);
 }
 
-/// Returns blocks that have w[0], w[1], w[2] and w[3] four times.
+/// Returns number j of each block four times.
 template <class A>
-[[gnu::always_inline]] inline LanesF<A> block_weights(const float* w) {
+[[gnu::always_inline]] inline LanesF<A> spread_in_blocks(const LanesF<A>& x, int j) {
   [[maybe_unused]] LanesF<A> out;
 #if defined(__AVX512F__)
   if constexpr (std::is_same_v<A, xsimd::avx512bw>) {
-    const __m512i which = _mm512_set_epi32(3, 3, 3, 3, 2, 2, 2, 2, 1, 1, 1, 1, 0, 0, 0, 0);
-    out.r[0] = _mm512_permutevar_ps(_mm512_broadcast_f32x4(_mm_load_ps(w)), which);
+    out.r[0] = _mm512_permutevar_ps(x.r[0], _mm512_set1_epi32(j));
     return out;
   }
 #endif
 #if defined(__AVX2__)
   if constexpr (std::is_same_v<A, xsimd::avx2>) {
-    const __m256 all = _mm256_broadcast_ps(reinterpret_cast<const __m128*>(w));
-    out.r[0] = _mm256_permutevar_ps(all, _mm256_set_epi32(1, 1, 1, 1, 0, 0, 0, 0));
-    out.r[1] = _mm256_permutevar_ps(all, _mm256_set_epi32(3, 3, 3, 3, 2, 2, 2, 2));
-    return out;
-  }
-#endif
-  alignas(64) float all[kLanesF];
-  for (int l = 0; l < kLanesF; ++l) all[l] = w[l / 4];
-  return load_lanes_f<A>(all);
-}
-
-/// Adds up the blocks of each of four vectors, (0 + 2) + (1 + 3). Sum p becomes block p.
-template <class A>
-[[gnu::always_inline]] inline LanesF<A> block_sums(const LanesF<A> (&x)[4]) {
-  [[maybe_unused]] LanesF<A> out;
-#if defined(__AVX512F__)
-  if constexpr (std::is_same_v<A, xsimd::avx512bw>) {
-    const auto pair = [](__m512 a, __m512 b) {  // a's 0 + 2, 1 + 3, then b's
-      return _mm512_add_ps(_mm512_shuffle_f32x4(a, b, 0x44), _mm512_shuffle_f32x4(a, b, 0xEE));
-    };
-    const __m512 ab = pair(x[0].r[0], x[1].r[0]), cd = pair(x[2].r[0], x[3].r[0]);
-    out.r[0] =
-        _mm512_add_ps(_mm512_shuffle_f32x4(ab, cd, 0x88), _mm512_shuffle_f32x4(ab, cd, 0xDD));
-    return out;
-  }
-#endif
-#if defined(__AVX2__)
-  if constexpr (std::is_same_v<A, xsimd::avx2>) {
-    for (int k = 0; k < 2; ++k) {
-      const __m256 a = _mm256_add_ps(x[2 * k].r[0], x[2 * k].r[1]),
-                   b = _mm256_add_ps(x[2 * k + 1].r[0], x[2 * k + 1].r[1]);
-      out.r[k] =
-          _mm256_add_ps(_mm256_permute2f128_ps(a, b, 0x20), _mm256_permute2f128_ps(a, b, 0x31));
-    }
+    for (int k = 0; k < 2; ++k) out.r[k] = _mm256_permutevar_ps(x.r[k], _mm256_set1_epi32(j));
     return out;
   }
 #endif
   alignas(64) float in[kLanesF], all[kLanesF];
-  for (int p = 0; p < 4; ++p) {
-    store_lanes_f(x[p], in);
-    for (int k = 0; k < 4; ++k) all[4 * p + k] = (in[k] + in[8 + k]) + (in[4 + k] + in[12 + k]);
-  }
+  store_lanes_f(x, in);
+  for (int l = 0; l < kLanesF; ++l) all[l] = in[l - l % 4 + j];
   return load_lanes_f<A>(all);
+}
+
+/// Exchanges whole blocks: block q of vector p becomes block p of vector q.
+template <class A>
+[[gnu::always_inline]] inline void exchange_blocks(LanesF<A> (&x)[4]) {
+#if defined(__AVX512F__)
+  if constexpr (std::is_same_v<A, xsimd::avx512bw>) {
+    const __m512 a = x[0].r[0], b = x[1].r[0], c = x[2].r[0], d = x[3].r[0];
+    const __m512 ab0 = _mm512_shuffle_f32x4(a, b, 0x44), ab1 = _mm512_shuffle_f32x4(a, b, 0xEE),
+                 cd0 = _mm512_shuffle_f32x4(c, d, 0x44), cd1 = _mm512_shuffle_f32x4(c, d, 0xEE);
+    x[0].r[0] = _mm512_shuffle_f32x4(ab0, cd0, 0x88);
+    x[1].r[0] = _mm512_shuffle_f32x4(ab0, cd0, 0xDD);
+    x[2].r[0] = _mm512_shuffle_f32x4(ab1, cd1, 0x88);
+    x[3].r[0] = _mm512_shuffle_f32x4(ab1, cd1, 0xDD);
+    return;
+  }
+#endif
+#if defined(__AVX2__)
+  if constexpr (std::is_same_v<A, xsimd::avx2>) {
+    const LanesF<A> from[4] = {x[0], x[1], x[2], x[3]};
+    for (int k = 0; k < 2; ++k)
+      for (int half = 0; half < 2; ++half) {
+        const __m256 a = from[2 * half].r[k], b = from[2 * half + 1].r[k];
+        x[2 * k].r[half] = _mm256_permute2f128_ps(a, b, 0x20);
+        x[2 * k + 1].r[half] = _mm256_permute2f128_ps(a, b, 0x31);
+      }
+    return;
+  }
+#endif
+  alignas(64) float in[4][kLanesF], out[4][kLanesF];
+  for (int p = 0; p < 4; ++p) store_lanes_f(x[p], in[p]);
+  for (int p = 0; p < 4; ++p)
+    for (int l = 0; l < kLanesF; ++l) out[l / 4][4 * p + l % 4] = in[p][l];
+  for (int p = 0; p < 4; ++p) x[p] = load_lanes_f<A>(out[p]);
 }
 
 /// Transposes block by block: number k of block q of vector j becomes number j of block q of vector
@@ -133,40 +130,59 @@ template <class A>
   for (int k = 0; k < 4; ++k) x[k] = load_lanes_f<A>(out[k]);
 }
 
-/// Sums over y and x at sixteen places, one after the other. first: their first coefficients.
+/// Whether φ may be negative in one of the cells.
 template <class A>
-void sum_places_f(const DistanceGrid& g, const float* const* first,
+[[gnu::always_inline]] inline bool any_inside(const float* floors, const int (&cell)[kLanesF]) {
+#if defined(__AVX512F__)
+  if constexpr (std::is_same_v<A, xsimd::avx512bw>) {
+    const __m512 x = _mm512_i32gather_ps(_mm512_load_si512(cell), floors, 4);
+    return _mm512_cmp_ps_mask(x, _mm512_setzero_ps(), _CMP_LT_OQ) != 0;
+  }
+#endif
+  bool inside = false;
+  for (const int c : cell) inside |= floors[c] < 0;
+  return inside;
+}
+
+/// Returns the sum over x of one derivative, from sums over y.
+template <class N>
+[[gnu::always_inline]] inline N sum_over_x(const N (&w)[4], const N (&r)[4]) {
+  N sum = w[0] * r[0];
+  for (int i = 1; i < 4; ++i) sum = mul_add(w[i], r[i], sum);
+  return sum;
+}
+
+/// Sums over y and x at sixteen places: over y one after the other, over x four at once, which are
+/// the blocks of a vector.
+template <class A>
+void sum_places_f(const DistanceGrid& g, const int (&cell)[kLanesF],
                   const SplineWeights<LanesF<A>, 1>& x, const SplineWeights<LanesF<A>, 1>& y,
                   LanesF<A> (*out)[4]) {
   using N = LanesF<A>;
-  alignas(64) float of_x[2][4][kLanesF];  // the four weights of place 4 q + j at [j][4 q]
   alignas(64) float of_y[2][4][kLanesF];
-  for (int o = 0; o < 2; ++o) {
-    N rows[4] = {x.w[o][0], x.w[o][1], x.w[o][2], x.w[o][3]};
-    transpose_blocks(rows);
-    for (int j = 0; j < 4; ++j) store_lanes_f(rows[j], of_x[o][j]);
+  for (int o = 0; o < 2; ++o)
     for (int b = 0; b < 4; ++b) store_lanes_f(y.w[o][b], of_y[o][b]);
-  }
 #pragma GCC unroll 1
   for (int j = 0; j < 4; ++j) {
-    N part[3][4];
+    N sum[2][4];
 #pragma GCC unroll 4
     for (int q = 0; q < 4; ++q) {
       const int place = 4 * q + j;
-      const float* const c = first[place];
-      N sum[2];
+      const float* const c = g.coefficients + std::ptrdiff_t(kQuad) * cell[place];
       for (int b = 0; b < 4; ++b) {
-        const N rows = load_four_rows<A>(c + b * g.row, g.plane);
+        const N rows = load_four_rows<A>(c + b * g.plane);
         for (int o = 0; o < 2; ++o) {
           const N w(double{of_y[o][b][place]});
-          sum[o] = b == 0 ? w * rows : mul_add(w, rows, sum[o]);
+          sum[o][q] = b == 0 ? w * rows : mul_add(w, rows, sum[o][q]);
         }
       }
-      const N weight[2] = {block_weights<A>(of_x[0][j] + 4 * q),
-                           block_weights<A>(of_x[1][j] + 4 * q)};
-      for (int s = 0; s < 3; ++s) part[s][q] = weight[kSplineX[s]] * sum[kSplineY[s]];
     }
-    for (int s = 0; s < 3; ++s) out[s][j] = block_sums(part[s]);
+    N weight[2][4];
+    for (int o = 0; o < 2; ++o) {
+      for (int i = 0; i < 4; ++i) weight[o][i] = spread_in_blocks(x.w[o][i], j);
+      exchange_blocks(sum[o]);
+    }
+    for (int s = 0; s < 3; ++s) out[s][j] = sum_over_x(weight[kSplineX[s]], sum[kSplineY[s]]);
   }
   for (int s = 0; s < 3; ++s) transpose_blocks(out[s]);
 }
@@ -182,30 +198,30 @@ template <class A>
     N of_y[2][4];
     for (int i = 0; i < 4; ++i)
       for (int j = 0; j < 4; ++j) {
-        const N at(double{c[i * g.plane + j * g.row + k]});
+        const N at(double{c[i * kQuad + j * g.plane + k]});
         for (int o = 0; o < 2; ++o)
           of_y[o][i] = j == 0 ? y.w[o][0] * at : mul_add(y.w[o][j], at, of_y[o][i]);
       }
-    for (int s = 0; s < 3; ++s) {
-      const N(&w)[4] = x.w[kSplineX[s]];
-      const N(&r)[4] = of_y[kSplineY[s]];
-      out[s][k] = (w[0] * r[0] + w[2] * r[2]) + (w[1] * r[1] + w[3] * r[3]);
-    }
+    for (int s = 0; s < 3; ++s) out[s][k] = sum_over_x(x.w[kSplineX[s]], of_y[kSplineY[s]]);
   }
 }
 
-/// Sixteen points in single precision. On a dense pad all of them are often in one cell. Then its
-/// coefficients are read once, for the same sums.
+/// Sixteen points in single precision: φ and ∇φ where φ < 0, elsewhere some φ ≥ 0. On a dense pad
+/// all of them are often in one cell. Then its coefficients are read once, for the same sums.
 template <class A>
-void spline_at(const DistanceGrid& g, const GridPlace<LanesF<A>>& at,
-               SplineValue<LanesF<A>, 1>& out) {
+void spline_inside(const DistanceGrid& g, const GridPlace<LanesF<A>>& at,
+                   SplineValue<LanesF<A>, 1>& out) {
   using N = LanesF<A>;
   alignas(64) float whole[3][kLanesF];
-  const float* first[kLanesF];
+  alignas(64) int cell[kLanesF];
   for (int c = 0; c < 3; ++c) store_lanes_f(at.whole[c], whole[c]);
+  const int row = g.row / kQuad, plane = g.plane / kQuad;
   for (int l = 0; l < kLanesF; ++l)
-    first[l] =
-        g.coefficients + (int(whole[0][l]) * g.plane + int(whole[1][l]) * g.row + int(whole[2][l]));
+    cell[l] = int(whole[0][l]) + int(whole[1][l]) * plane + int(whole[2][l]) * row;
+  if (!any_inside<A>(g.floors, cell)) {
+    out = {N(1.0), {N(0.0), N(0.0), N(0.0)}, {}};
+    return;
+  }
   bool several = false;
   for (int c = 0; c < 3; ++c) {
     const N one(double{whole[c][0]});
@@ -214,9 +230,9 @@ void spline_at(const DistanceGrid& g, const GridPlace<LanesF<A>>& at,
   const SplineWeights<N, 1> x(at.rest[0]), y(at.rest[1]);
   N sums[3][4];
   if (several) {
-    sum_places_f<A>(g, first, x, y, sums);
+    sum_places_f<A>(g, cell, x, y, sums);
   } else {
-    sum_cell_f<A>(first[0], g, x, y, sums);
+    sum_cell_f<A>(g.coefficients + std::ptrdiff_t(kQuad) * cell[0], g, x, y, sums);
   }
   sum_over_z<1>(sums, SplineWeights<N, 1>(at.rest[2]), out);
 }

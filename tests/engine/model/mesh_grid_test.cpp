@@ -219,6 +219,24 @@ TEST(MeshGrid, WhatIsNotNearCannotTouchAfterAsFarAWay) {
   EXPECT_GT(far, 2000);
 }
 
+/// The floor of a cell is below the spline everywhere in it, and not far below.
+TEST(MeshGrid, NoCellReachesBelowItsFloor) {
+  const auto grid = grid_of(torus_mesh(0.02, 0.006, 24, 12), 20);
+  const Spline spline = Spline::of({1, 1, 1}, &grid->view);
+  Draw draw;
+  int skipped = 0;
+  for (int k = 0; k < 20000; ++k) {
+    const Vec3<double> y = {draw(-0.03, 0.03), draw(-0.03, 0.03), draw(-0.01, 0.01)};
+    Vec3<double> clamped;
+    const auto place = place_in_grid(grid->view, in_cells(grid->view, y), clamped);
+    const double floor = floor_at(grid->view, place), d = spline.evaluate(y).d;
+    EXPECT_LT(floor, d);
+    EXPECT_GT(floor, d - 3 * grid->view.cell);
+    skipped += floor > 0;
+  }
+  EXPECT_GT(skipped, 5000);
+}
+
 TEST(MeshGrid, BeyondTheGridNothingTouches) {
   const auto grid = grid_of(cuboid_mesh({0.02, 0.02, 0.02}), 16);
   const Spline spline = Spline::of({1, 1, 1}, &grid->view);

@@ -3,8 +3,13 @@
 // the same bits alone and in a group.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
+#include "engine/model/compiled_model.hpp"
+#include "engine/model/mesh_grid.hpp"
 #include "engine/sense/start_overlaps.hpp"
 #include "kernels/numbers/dual.hpp"
+#include "kernels/numbers/so3.hpp"
 #include "kernels/table/kernel_table.hpp"
 #include "tests/engine/gradient_differences.hpp"
 #include "tests/engine/meshes.hpp"
@@ -73,7 +78,7 @@ TEST(MeshContact, GradientsMatchDifferences) {
 }
 
 /// A pad of 400 contact points and 32 × 32 tactile points sinks onto a ball that dampers hold.
-Scene pressed_ball(const Shape& ball) {
+Scene pressed_ball(const Shape& ball, double ks = 0) {
   Scene s = testing::rolling_ball(false, 32);
   s.ground.reset();
   s.ground_contacts.clear();
@@ -83,14 +88,16 @@ Scene pressed_ball(const Shape& ball) {
   s.links[1].joint.pose.position = {0.003, 0.002, 0.035};
   s.links[1].joint.damping = 2;
   s.links[1].body.shape = ball;
+  for (auto& c : s.pair_contacts) c.coefficients.ks = ks;
+  for (auto& t : s.sensors) t.coefficients.ks = ks;
   return s;
 }
 
 struct PressedRun {
   std::vector<std::vector<double>> states, fields;
 };
-PressedRun press(const Shape& ball, int environments, int wanted) {
-  const Model model(pressed_ball(ball));
+PressedRun press(const Shape& ball, int environments, int wanted, double ks = 0) {
+  const Model model(pressed_ball(ball, ks));
   Batch batch(model, environments);
   Stepper stepper(model);
   Readout readout(model);
@@ -113,9 +120,9 @@ PressedRun press(const Shape& ball, int environments, int wanted) {
   return run;
 }
 
-TEST(MeshContact, ABallOfTrianglesIsPressedAndFeltLikeABall) {
-  MeshShape mesh = testing::ellipsoid_mesh(5, {0.02, 0.02, 0.02});
-  const PressedRun is = press(mesh, 1, 0), was = press(SphereShape{0.02}, 1, 0);
+void expect_felt_like_a_ball(double ks) {
+  const MeshShape mesh = testing::ellipsoid_mesh(5, {0.02, 0.02, 0.02});
+  const PressedRun is = press(mesh, 1, 0, ks), was = press(SphereShape{0.02}, 1, 0, ks);
   double peak = 0, error = 0, way = 0, apart = 0;
   for (std::size_t t = 0; t < is.fields.size(); ++t) {
     for (std::size_t k = 0; k < is.fields[t].size(); ++k) {
@@ -131,6 +138,10 @@ TEST(MeshContact, ABallOfTrianglesIsPressedAndFeltLikeABall) {
   EXPECT_GT(way, 1e-3);
   EXPECT_LT(error, 0.01 * peak) << error / peak;
   EXPECT_LT(apart, 0.01 * way) << apart / way;
+}
+TEST(MeshContact, ABallOfTrianglesIsPressedAndFeltLikeABall) { expect_felt_like_a_ball(0); }
+TEST(MeshContact, ABallOfTrianglesIsFeltLikeABallByFrictionThatRemembers) {
+  expect_felt_like_a_ball(0.5);
 }
 
 /// The scalar build is the reference.
@@ -167,54 +178,64 @@ TEST(MeshContact, NeighboursChangeNoBit) {
   }
 }
 
-/// A peg falls into a hole with half a millimetre to spare and a floor: a mesh, or four cuboids.
-Scene peg_over_hole(bool mesh) {
-  constexpr double kWidth = 0.021, kOuter = 0.05, kHeight = 0.02, kWall = (kOuter - kWidth) / 2;
-  Scene s;
-  s.gravity = {0, 0, -9.8};
-  s.timestep = 2e-3;
-  s.links = {testing::link("peg", JointType::free, {0.0002, -0.0003, 0.0255},
-                           CuboidShape{{0.02, 0.02, 0.03}, {6, 6, 9}}, 2000)};
-  s.links[0].joint.damping = 0.2;
-  s.links[0].joint.turning.emplace().damping = 1e-4;
-  const auto touch = [&](const std::string& wall, const Vector3& at, const Shape& shape) {
-    s.links.push_back(testing::link(wall, JointType::fixed, at, shape, 1000));
-    s.pair_contacts.push_back({"peg", wall, {500, 2, 0.2, 200}, ContactLaw::clamped, 1e-5, {}});
-  };
-  touch("floor", {0, 0, -0.02}, CuboidShape{{kOuter, kOuter, 0.02}, {2, 2, 2}});
-  if (mesh) {
-    touch("hole", {0, 0, 0}, testing::frame_mesh(kOuter / 2, kWidth / 2, kHeight / 2));
-    std::get<MeshShape>(s.links.back().body.shape).resolution = 64;
-  } else {
-    const double off = (kWidth + kWall) / 2;
-    const CuboidShape along_y{{kWall, kOuter, kHeight}, {2, 2, 2}},
-        along_x{{kWidth, kWall, kHeight}, {2, 2, 2}};
-    touch("right", {off, 0, 0}, along_y), touch("left", {-off, 0, 0}, along_y);
-    touch("back", {0, off, 0}, along_x), touch("front", {0, -off, 0}, along_x);
-  }
-  return s;
+/// The field of a pad that presses on a shape of this scale, by one instruction set.
+template <class Real, class Run>
+std::vector<Real> pressed_field(const kernels::TouchShape& shape, double scale, const Run& run) {
+  static const Model model(pressed_ball(SphereShape{0.02}));
+  const kernels::PadTiles pad = compiled(model).sensors[0].tiles();
+  kernels::Touch<double> touch;
+  touch.Q = kernels::to_matrix(kernels::quaternion_exp(kernels::Vec3<double>{0.36, 0.48, 0.8}));
+  touch.c = {0.001, -0.002, 0.019 * scale};
+  touch.omega = {0.3, -0.2, 0.1};
+  touch.v = {0.01, 0.02, -0.005};
+  touch.law = {1, 0.01, 2, 0.003};
+  std::vector<int> active(std::size_t(pad.tiles()));
+  std::vector<Real> field(std::size_t(3 * pad.rows * pad.cols));
+  run({&pad, ContactLaw::clamped, 1, &shape, &touch, active.data(), nullptr, field.data()});
+  return field;
 }
 
-TEST(MeshContact, APegSlidesIntoAHoleOfAMeshAsIntoOneOfCuboids) {
-  std::vector<std::vector<double>> ends;
-  for (const bool mesh : {true, false}) {
-    const Model model(peg_over_hole(mesh));
-    Batch batch(model, 1);
-    Stepper stepper(model);
-    std::vector<double> v = v_of(batch);
-    v[0] = 0.02, v[5] = 0.3;  // towards a wall, and turning about the hole's axis
-    batch.set_state(0, q_of(batch), v);
-    for (int t = 0; t < 400; ++t) stepper.step(batch, {});
-    EXPECT_FALSE(failed(batch.status(0)));
-    ends.push_back(q_of(batch));
+kernels::TouchShape scaled(const kernels::DistanceGrid& grid, double scale) {
+  return {PrimitiveShape::mesh, {scale, 0, 0}, &grid};
+}
+
+/// Triangles and cells are halved together.
+TEST(MeshContact, FieldErrorsFallWithTheSquareOfTheCell) {
+  const auto run = kernels::active_kernels().tactile;
+  const auto was = pressed_field<double>({PrimitiveShape::sphere, {0.02, 0, 0}}, 1, run);
+  double peak = 0;
+  for (const double f : was) peak = std::max(peak, std::abs(f));
+  std::vector<double> errors;  // at 16, 32 and 64 cells
+  for (int times = 3; times <= 5; ++times) {
+    MeshShape mesh = testing::ellipsoid_mesh(times, {0.02, 0.02, 0.02});
+    mesh.resolution = 2 << times;
+    const auto grid = make_mesh_grid(mesh);
+    const auto is = pressed_field<double>(scaled(grid->view, 1), 1, run);
+    errors.push_back(0);
+    for (std::size_t k = 0; k < is.size(); ++k)
+      errors.back() = std::max(errors.back(), std::abs(is[k] - was[k]) / peak);
   }
-  for (const std::vector<double>& q : ends) {
-    EXPECT_NEAR(q[2], 0.005 - 0.0255, 1e-4) << "the peg stands on the floor";
-    EXPECT_LT(std::abs(q[0] + 0.0002), 6e-4);
-    EXPECT_LT(std::abs(q[1] - 0.0003), 6e-4);
-    EXPECT_GT(std::abs(q[3]), 0.999) << "upright";
-  }
-  for (std::size_t i = 0; i < 7; ++i) EXPECT_NEAR(ends[0][i], ends[1][i], 2e-3 * (i < 3 ? 0.1 : 1));
+  EXPECT_LT(errors[1], errors[0] / 3) << errors[0];
+  EXPECT_LT(errors[2], errors[0] / 15) << errors[0];
+  EXPECT_LT(errors[2], 0.01);
+}
+
+/// With floors that are nowhere above zero, every point is evaluated.
+TEST(MeshContact, CellsThatPadsSkipChangeNoBit) {
+  const auto grid = make_mesh_grid(testing::ellipsoid_mesh(3, {0.02, 0.02, 0.02}));
+  kernels::DistanceGrid all = grid->view;
+  const std::vector<float> low(grid->floors.size(), -1.0F);
+  all.floors = low.data();
+  for (const kernels::KernelTable* table : kernels::available_kernels())
+    for (const double scale : {0.7, 1.0}) {
+      SCOPED_TRACE(table->name);
+      const auto is = pressed_field<double>(scaled(grid->view, scale), scale, table->tactile),
+                 was = pressed_field<double>(scaled(all, scale), scale, table->tactile);
+      EXPECT_EQ(is, was);
+      EXPECT_GT(std::count_if(is.begin(), is.end(), [](double f) { return f != 0; }), 30);
+      EXPECT_EQ(pressed_field<float>(scaled(grid->view, scale), scale, table->tactile_mixed),
+                pressed_field<float>(scaled(all, scale), scale, table->tactile_mixed));
+    }
 }
 
 TEST(MeshContact, BodiesThatStartInsideOneAnotherAreNamed) {
