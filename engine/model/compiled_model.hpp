@@ -76,6 +76,8 @@ struct CompiledSensor {
   std::vector<int> index;                 ///< (n_tiles, 64) curved, empty: flat
   AlignedVector<double> frames, factors;  ///< (n_tiles, 9, 64), (n_tiles, 4, 64) or empty
   AlignedVector<float> frames_f, factors_f;
+  /// Spheres around eight tiles each, pad axes [m]: (n_tiles / 8, padded to 8).
+  AlignedVector<double> eight_x, eight_y, eight_z, eight_radius;
   double middle[3] = {}, reach = 0;  ///< a sphere around all points, pad axes [m]
   bool skewed = false;
   double axes[9] = {};  ///< rows axis0, axis1, -(axis0 × axis1), pad axes

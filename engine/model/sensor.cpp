@@ -114,18 +114,41 @@ CompiledSensor compile_array(const TactileDescription& d, const CompiledBody& bo
   return s;
 }
 
-/// Puts a sphere around all tiles. Their radii have margins of their own.
-void bound_pad(CompiledSensor& s) {
-  const AlignedVector<double>* const centres[] = {&s.tile_x, &s.tile_y, &s.tile_z};
-  for (std::size_t c = 0; c < 3; ++c) {
-    const auto [low, high] =
-        std::minmax_element(centres[c]->begin(), centres[c]->begin() + s.n_tiles());
-    s.middle[c] = 0.5 * (*low + *high);
+struct Sphere {
+  Vec3<double> middle;
+  double radius;
+};
+
+/// Returns a sphere around some tiles. Their radii have margins of their own.
+Sphere sphere_around(const CompiledSensor& s, int first, int end) {
+  const auto middle = [&](const AlignedVector<double>& centres) {
+    const auto [low, high] = std::minmax_element(centres.begin() + first, centres.begin() + end);
+    return 0.5 * (*low + *high);
+  };
+  Sphere out{{middle(s.tile_x), middle(s.tile_y), middle(s.tile_z)}, 0};
+  for (auto t = std::size_t(first); t < std::size_t(end); ++t) {
+    const Vec3<double> away = Vec3<double>{s.tile_x[t], s.tile_y[t], s.tile_z[t]} - out.middle;
+    out.radius = std::max(out.radius, (std::sqrt(dot(away, away)) + s.tile_radius[t]) * (1 + 1e-5));
   }
-  for (std::size_t t = 0; t < std::size_t(s.n_tiles()); ++t) {
-    const Vec3<double> away = {s.tile_x[t] - s.middle[0], s.tile_y[t] - s.middle[1],
-                               s.tile_z[t] - s.middle[2]};
-    s.reach = std::max(s.reach, (std::sqrt(dot(away, away)) + s.tile_radius[t]) * (1 + 1e-5));
+  return out;
+}
+
+/// Puts spheres around all tiles, and around eight at a time.
+void bound_pad(CompiledSensor& s) {
+  constexpr int kEight = kernels::kGroup;
+  const Sphere whole = sphere_around(s, 0, s.n_tiles());
+  s.middle[0] = whole.middle.x, s.middle[1] = whole.middle.y, s.middle[2] = whole.middle.z;
+  s.reach = whole.radius;
+  const auto padded = std::size_t((s.n_tiles() + kEight * kEight - 1) / (kEight * kEight) * kEight);
+  s.eight_x.assign(padded, kFarAway);
+  s.eight_y.assign(padded, kFarAway);
+  s.eight_z.assign(padded, 0.0);
+  s.eight_radius.assign(padded, 0.0);
+  for (int first = 0; first < s.n_tiles(); first += kEight) {
+    const Sphere eight = sphere_around(s, first, std::min(first + kEight, s.n_tiles()));
+    const auto at = std::size_t(first / kEight);
+    s.eight_x[at] = eight.middle.x, s.eight_y[at] = eight.middle.y, s.eight_z[at] = eight.middle.z;
+    s.eight_radius[at] = eight.radius;
   }
 }
 
@@ -161,6 +184,8 @@ kernels::PadTiles CompiledSensor::tiles() const {
   p.rows = rows, p.cols = cols;
   p.tile_rows = tile_rows, p.tile_cols = tile_cols;
   p.x = tile_x.data(), p.y = tile_y.data(), p.z = tile_z.data(), p.radius = tile_radius.data();
+  p.eight_x = eight_x.data(), p.eight_y = eight_y.data(), p.eight_z = eight_z.data();
+  p.eight_radius = eight_radius.data();
   p.kind = tile_kind.data();
   p.offsets = offsets.data(), p.offsets_f = offsets_f.data();
   if (!index.empty()) {

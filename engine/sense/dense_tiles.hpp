@@ -46,14 +46,15 @@ void clear_tiles_between(const kernels::PadTiles& pad, std::span<const int> tile
   }
 }
 
-/// Writes the first `Components` of a tile's (…, 64) to its rows, converted to T.
-template <int Components, class Real, class T>
-void expand_tile(const kernels::PadTiles& pad, int tile, const Real* from, T* dense) {
+/// Calls put(to, number) for the first `Components` of a tile's (…, 64), `to` being a number of its
+/// rows in `dense`.
+template <int Components, class Real, class T, class Put>
+void put_tile(const kernels::PadTiles& pad, int tile, const Real* from, T* dense, const Put& put) {
   if (pad.curved()) {
     const int* index = pad.index + kernels::kTactileTile * tile;
     for (int k = 0; k < pad.points_of(tile); ++k)
       for (int c = 0; c < Components; ++c)
-        dense[Components * index[k] + c] = static_cast<T>(from[c * kernels::kTactileTile + k]);
+        put(dense[Components * index[k] + c], from[c * kernels::kTactileTile + k]);
     return;
   }
   const int rows = pad.rows_of(tile), cols = pad.cols_of(tile);
@@ -61,7 +62,13 @@ void expand_tile(const kernels::PadTiles& pad, int tile, const Real* from, T* de
   for (int i = 0; i < rows; ++i, row += Components * pad.cols, from += kernels::kTileSide)
     for (int j = 0; j < cols; ++j)
       for (int c = 0; c < Components; ++c)
-        row[Components * j + c] = static_cast<T>(from[c * kernels::kTactileTile + j]);
+        put(row[Components * j + c], from[c * kernels::kTactileTile + j]);
+}
+
+/// Writes the same numbers, converted to T.
+template <int Components, class Real, class T>
+void expand_tile(const kernels::PadTiles& pad, int tile, const Real* from, T* dense) {
+  put_tile<Components>(pad, tile, from, dense, [](T& to, Real x) { to = static_cast<T>(x); });
 }
 
 /// Calls f(slot in the tile, point of the array) for all points of a tile.

@@ -141,6 +141,13 @@ void ImperfectField::share(const CompiledSensor& s, int components, std::span<do
 
 namespace {
 
+/// Whether something happens to each point by itself. Memory, spread and crosstalk do not.
+bool spoils_points(const SensorImperfections& of) {
+  constexpr NormalAndShear kNone{};
+  return of.gain != 0 || of.sensor_gain != 0 || of.dead != 0 || !(of.bias == kNone) ||
+         !(of.noise == kNone) || !(of.saturation == kNone) || !(of.quantisation == kNone);
+}
+
 /// Does what happens to each point by itself. A field has `Components` numbers for each.
 template <int Components>
 void spoil_points(const CompiledSensor& s, const ReadingKey& key, int first_component,
@@ -171,6 +178,7 @@ void ImperfectField::apply(const CompiledSensor& s, const ReadingKey& key, Field
   if (!s.imperfect) return;
   spread(s, part.count, false, field);
   share(s, part.count, field);
+  if (!spoils_points(s.imperfections)) return;
   switch (part.count) {
     case 1: return spoil_points<1>(s, key, part.first, field.data());
     case 2: return spoil_points<2>(s, key, part.first, field.data());

@@ -18,6 +18,7 @@
 #include "engine/sense/marker_map.hpp"
 #include "engine/sense/motion_reading.hpp"
 #include "engine/sense/pad_reader.hpp"
+#include "engine/sense/past_states.hpp"
 
 namespace tangere {
 
@@ -44,9 +45,8 @@ struct Readout::Impl {
   std::vector<double> displacement;               // (points, 2)
   std::vector<double> elastic_field;              // (points, 3)
   std::vector<double> one_reading, block_readings, of_tiles;
-  // Of sensors with memory: a field of an earlier state, and a block that holds such states.
-  std::vector<double> earlier;
-  std::optional<Batch> past;
+  std::vector<double> earlier;     // fields of small pads in the states of `past`
+  std::optional<PastStates> past;  // of sensors with memory
 
   Impl(const Model& m, Precision p)
       : model(m), precision(p), reader(m), imperfections(m), elastic(m) {
@@ -72,8 +72,8 @@ struct Readout::Impl {
             std::max(block_readings.size(), std::size_t(kBlock * 3 * s.points())));
     }
     if (compiled(m).layout.past_states > 0) {
-      earlier.resize(one_reading.size());
-      past.emplace(m, kBlock);
+      earlier.resize(block_readings.size());
+      past.emplace(m);
     }
     (p == Precision::f64 ? wide.resize(room) : single.resize(room));
   }
@@ -116,33 +116,47 @@ struct Readout::Impl {
   /// Components that the kernel computes for a form: a shear is two of three.
   static int computed(FieldForm form) { return form == FieldForm::pressure ? 1 : 3; }
 
+  template <class Real>
+  kernels::TactileArgs<Real> arguments(int environment, FieldOutput of) {
+    auto a = reader.arguments<Real>(of.sensor, environment % kBlock / kGroup, environment % kGroup);
+    a.pressure = of.form == FieldForm::pressure;
+    return a;
+  }
+
+  /// Calls put(to, number) for the numbers of touched tiles and their places in `dense`. Returns
+  /// how many tiles there are and lists them in reader.active.
+  template <class Real, class T, class Put>
+  int put_touched(int environment, FieldOutput of, T* dense, const Put& put) {
+    auto a = arguments<Real>(environment, of);
+    a.values = scratch<Real>();
+    const int count = run(a), numbers = computed(of.form) * kTactileTile;
+    const auto expand = [&]<int Components>() {
+      for (int k = 0; k < count; ++k)
+        put_tile<Components>(*a.pad, a.active[k], a.values + numbers * k, dense, put);
+    };
+    switch (components_of(of.form)) {
+      case 1: expand.template operator()<1>(); break;
+      case 2: expand.template operator()<2>(); break;
+      default: expand.template operator()<3>(); break;
+    }
+    return count;
+  }
+
   /// Writes the touched tiles of an environment whose touches were found. Returns their number and
   /// lists them in reader.active.
   template <class T>
   int write_touched(int environment, FieldOutput of, T* dense) {
     return in_precision([&](auto zero) {
       using Real = decltype(zero);
-      auto a =
-          reader.arguments<Real>(of.sensor, environment % kBlock / kGroup, environment % kGroup);
-      a.pressure = of.form == FieldForm::pressure;
       if constexpr (std::is_same_v<Real, T>) {
         if (of.form != FieldForm::shear) {
+          auto a = arguments<Real>(environment, of);
           a.dense = dense;
           return run(a);
         }
       }
-      a.values = scratch<Real>();
-      const int count = run(a), numbers = computed(of.form) * kTactileTile;
-      const auto expand = [&]<int Components>() {
-        for (int k = 0; k < count; ++k)
-          expand_tile<Components>(*a.pad, a.active[k], a.values + numbers * k, dense);
-      };
-      switch (components_of(of.form)) {
-        case 1: expand.template operator()<1>(); break;
-        case 2: expand.template operator()<2>(); break;
-        default: expand.template operator()<3>(); break;
-      }
-      return count;
+      return put_touched<Real>(environment, of, dense,
+                               [](T& to, Real x) { to = static_cast<T>(x); });
     });
   }
 
@@ -182,29 +196,38 @@ struct Readout::Impl {
   /// weights. It depends on states alone, so it does not matter who reads when.
   void read_past(const Batch& batch, int environment, FieldOutput of, std::span<double> field) {
     const CompiledSensor& s = sensor_of(of.sensor);
-    const std::span<double> one = std::span(earlier).first(field.size());
     std::fill(field.begin(), field.end(), 0.0);
-    for (std::size_t k = 0; k < s.weights.size(); ++k) {
-      recall(batch, environment, s.delay + static_cast<int>(k));
-      place(*past, environment % kBlock, of.sensor);
-      fill(environment, of, one.data());
-      for (std::size_t i = 0; i < field.size(); ++i) field[i] += s.weights[k] * one[i];
+    for (std::size_t first = 0; first < s.weights.size(); first += kBlock) {
+      const auto weights = std::span(s.weights).subspan(
+          first, std::min(std::size_t(kBlock), s.weights.size() - first));
+      past->recall(batch, environment, s.delay + static_cast<int>(first),
+                   static_cast<int>(weights.size()));
+      place_block(past->lanes(), 0, of.sensor, static_cast<int>(weights.size()));
+      if (in_lanes(of.sensor, static_cast<int>(weights.size())))
+        add_lanes(of, weights, field);
+      else
+        for (std::size_t k = 0; k < weights.size(); ++k)
+          add_touched(static_cast<int>(k), of, weights[k], field);
     }
   }
 
-  /// Copies an environment, as it was `lag` steps ago, to its lane of `past`.
-  void recall(const Batch& batch, int environment, int lag) {
-    const BlockLayout& layout = compiled(model).layout;
-    const double* const from = batch.block(environment / kBlock) + environment % kBlock;
-    double* const to = past->block(0) + environment % kBlock;
-    for (int row = 0; row < layout.past; ++row) to[row * kBlock] = from[row * kBlock];
-    if (lag == 0) return;
-    const int numbers = layout.previous_q - layout.q;
-    const std::int64_t states = layout.past_states;
-    const auto slot =
-        static_cast<int>(((batch.steps(environment) - lag) % states + states) % states);
-    for (int row = 0; row < numbers; ++row)
-      to[(layout.q + row) * kBlock] = from[(layout.past + slot * numbers + row) * kBlock];
+  /// Adds the field of a lane of `past`, times its weight.
+  void add_touched(int lane, FieldOutput of, double weight, std::span<double> field) {
+    in_precision([&](auto zero) {
+      using Real = decltype(zero);
+      return put_touched<Real>(lane, of, field.data(), [weight](double& to, Real x) {
+        to += weight * static_cast<double>(x);
+      });
+    });
+  }
+
+  /// Adds the fields of the first lanes of `past`, each times its weight. They are of a small pad.
+  void add_lanes(FieldOutput of, std::span<const double> weights, std::span<double> field) {
+    std::array<double*, kBlock> each{};
+    for (std::size_t k = 0; k < weights.size(); ++k) each[k] = earlier.data() + field.size() * k;
+    fill_block(of, static_cast<int>(weights.size()), each);
+    for (std::size_t k = 0; k < weights.size(); ++k)
+      for (std::size_t i = 0; i < field.size(); ++i) field[i] += weights[k] * each[k][i];
   }
 
   /// Fills in the reading of an imperfect sensor in an environment whose touches were found.
@@ -392,10 +415,11 @@ struct Readout::Impl {
     });
   }
 
-  /// Finds the touches of both groups of a block, also of an empty second one: a vector of floats
-  /// reads both.
-  void place_block(const Batch& batch, int number, int sensor) {
-    for (int g = 0; g < kBlock / kGroup; ++g) {
+  /// Finds the touches of the groups of a block that hold its first `environments`, at least. A
+  /// vector of floats reads both groups, so those of an empty second one are found too.
+  void place_block(const Batch& batch, int number, int sensor, int environments = kBlock) {
+    const bool both = precision != Precision::f64 || environments > kGroup;
+    for (int g = 0; g < (both ? kBlock / kGroup : 1); ++g) {
       reader.move(batch, number, g);
       reader.find_touches(batch, number, g, sensor);
     }
@@ -404,9 +428,11 @@ struct Readout::Impl {
   /// Small pads are read in all environments of a block at once, unless most lanes would be idle or
   /// shapes differ in size between lanes.
   [[nodiscard]] bool together(const Batch& batch, int number, int sensor) const {
-    return small(sensor_of(sensor)) && !sensor_of(sensor).sizes_vary &&
-           sensor_of(sensor).past_states() == 0 && !sensor_of(sensor).elastic &&
-           environments_of(batch, number) >= kFewest;
+    return sensor_of(sensor).past_states() == 0 && !sensor_of(sensor).elastic &&
+           in_lanes(sensor, environments_of(batch, number));
+  }
+  [[nodiscard]] bool in_lanes(int sensor, int environments) const {
+    return small(sensor_of(sensor)) && !sensor_of(sensor).sizes_vary && environments >= kFewest;
   }
   static int environments_of(const Batch& batch, int number) {
     return std::min(kBlock, batch.environments() - number * kBlock);

@@ -212,6 +212,20 @@ bool near_pad(const PadTiles& pad, const TouchShape& shape, const Touch<D>& at) 
   return any(Shape::bracket(shape, at, middle, D(pad.reach), row) < D(0.0));
 }
 
+/// Returns which of eight spheres around eight tiles each, from sphere `first` on, a shape comes
+/// near to.
+template <class P, class Shape>
+unsigned near_eights(const PadTiles& pad, int first, const TouchShape& shape,
+                     const Touch<double>& at) {
+  using Arch = typename P::Architecture;
+  using D = Lanes<Arch>;
+  const Vec3<D> t = {load_lanes<Arch>(pad.eight_x + first), load_lanes<Arch>(pad.eight_y + first),
+                     load_lanes<Arch>(pad.eight_z + first)};
+  D row[kBracketRows];
+  const D radius = load_lanes<Arch>(pad.eight_radius + first);
+  return lane_bits(Shape::bracket(shape, broadcast_touch<D>(at), t, radius, row) < D(0.0));
+}
+
 /// Bit k: shape k may touch the pad. From shape 64 on, all may.
 using NearShapes = std::uint64_t;
 inline bool may_touch(NearShapes near, int k) { return k >= 64 || ((near >> k) & 1U) != 0; }
@@ -229,6 +243,35 @@ NearShapes near_shapes(const TactileArgs<typename P::Real>& a) {
   return near;
 }
 
+/// Tells which shapes may touch eight tiles, for 64 tiles at a time.
+template <class P>
+class NearEights {
+ public:
+  NearEights(const TactileArgs<typename P::Real>& a, NearShapes near) : a_(a), near_(near) {}
+
+  /// Goes on to the eight tiles from `first` on, a multiple of eight.
+  void move(int first) {
+    static constexpr auto kNear = by_shape<P>([]<class Shape>() { return &near_eights<P, Shape>; });
+    const int eight = first / kGroup;
+    bit_ = 1U << (eight % kGroup);
+    if (!many_ || eight % kGroup != 0) return;
+    for (int k = 0; k < a_.n_touches && k < 64; ++k)
+      if (may_touch(near_, k))
+        eights_[k] =
+            kNear[std::size_t(a_.shapes[k].shape)](*a_.pad, eight, a_.shapes[k], a_.touches[k]);
+  }
+  [[nodiscard]] bool has(int k) const {
+    return may_touch(near_, k) && (!many_ || k >= 64 || (eights_[k] & bit_) != 0);
+  }
+
+ private:
+  const TactileArgs<typename P::Real>& a_;
+  NearShapes near_;
+  bool many_ = a_.pad->tiles() > 2 * kGroup;  // else looking costs as much as it saves
+  unsigned bit_ = 0;
+  unsigned eights_[64];
+};
+
 template <class P, ContactLaw Law>
 int tactile_field(const TactileArgs<typename P::Real>& a) {
   using Real = typename P::Real;
@@ -236,13 +279,15 @@ int tactile_field(const TactileArgs<typename P::Real>& a) {
       by_shape<P>([]<class Shape>() { return &chunk_force<P, Law, Shape>; });
   const NearShapes near = near_shapes<P>(a);
   if (near == 0 && a.n_touches <= 64) return 0;
+  NearEights<P> eights(a, near);
   constexpr int kNumbers = P::kComponents * kTactileTile;  // of a tile
   alignas(64) Real buffer[kGroup * kNumbers];
   int count = 0;
   for (int first = 0; first < a.pad->tiles(); first += kGroup) {
     unsigned written = 0;
+    eights.move(first);
     for (int k = 0; k < a.n_touches; ++k)
-      if (may_touch(near, k))
+      if (eights.has(k))
         written = kForce[std::size_t(a.shapes[k].shape)](a, k, first, written, buffer);
     for (int l = 0; written != 0; ++l, written >>= 1) {
       if ((written & 1U) == 0) continue;

@@ -31,6 +31,9 @@ struct PadTiles {
   const float* frames_f;
   const double* factors;  ///< (n_tiles, 4, 64) factors of the coefficients; nullptr: all 1
   const float* factors_f;
+  /// (n_tiles / 8, padded to 8 with far spheres) centres and radii of spheres around eight tiles
+  /// each, with a margin for rounding, pad axes [m]
+  const double *eight_x, *eight_y, *eight_z, *eight_radius;
   double middle[3];  ///< of a sphere around all points, pad axes [m]
   double reach;      ///< its radius, with a margin for rounding [m]
   bool skewed;       ///< axis0 and axis1 are not exactly unit and perpendicular: forces need `axes`

@@ -332,7 +332,7 @@ TEST_P(EveryWay, GivesTheSameBits) {
   const Model model(imperfect_scene(
       [pad = pad, memory = memory](auto& i) {
         set_all(i, pad != Pad::curved);
-        if (memory) i.delay = 0.012, i.low_pass = 0.006;
+        if (memory) i.delay = 0.012, i.low_pass = 0.02;  // more states than lanes
       },
       pad, side));
   Batch batch(model, 20, 3, 100);
@@ -455,22 +455,26 @@ TEST(Imperfections, StepsCountWhatAnEpisodeHasTaken) {
   EXPECT_EQ(batch.steps(1), 3);
 }
 
-/// What a sensor with memory should say: the mean of ideal fields kept by hand.
+/// What a sensor with memory should say: the mean of ideal fields kept by hand. One state, few or
+/// more than a block has lanes; pads whose lanes are environments or points.
 TEST(Imperfections, MemoryIsAMeanOfEarlierFields) {
   const double h = 0.005;
   struct Case {
     double delay, low_pass;
+    int side = 0;
   };
-  for (const Case c : {Case{0.01, 0}, Case{0.0125, 0}, Case{0, 0.008}, Case{0.011, 0.004}}) {
+  for (const Case c : {Case{0.01, 0}, Case{0.0125, 0}, Case{0, 0.008}, Case{0.011, 0.004},
+                       Case{0.0125, 0.02}, Case{0.0125, 0.02, 30}}) {
     SCOPED_TRACE(std::to_string(c.delay) + " " + std::to_string(c.low_pass));
-    Scene scene = imperfect_scene([&](auto& i) { i.delay = c.delay, i.low_pass = c.low_pass; });
+    Scene scene = imperfect_scene([&](auto& i) { i.delay = c.delay, i.low_pass = c.low_pass; },
+                                  Pad::flat, c.side);
     scene.timestep = h;
     const Model model(scene);
     Batch batch(model, 18, 3);
     touch(batch);
     Stepper stepper(model);
     const Numbers u(18 * std::size_t(model.nu()));
-    const int steps = 30;
+    const int steps = 49;
     const auto peak = [&](int e) {
       double most = 0;
       for (const double x : field_of(batch, e, FieldForm::ideal))

@@ -28,14 +28,22 @@ using kernels::TouchShape;
 using kernels::Vec3;
 using testing::Random;
 
+Model pad_model(int rows, int cols) {
+  Scene scene = testing::rolling_ball();
+  scene.sensors[0].array.rows = rows;
+  scene.sensors[0].array.cols = cols;
+  return Model(scene);
+}
+
 /// 21 × 19 points: edge tiles in both directions and a corner tile.
 const CompiledSensor& pad_sensor() {
-  static const Model model([] {
-    Scene scene = testing::rolling_ball();
-    scene.sensors[0].array.rows = 21;
-    scene.sensors[0].array.cols = 19;
-    return scene;
-  }());
+  static const Model model = pad_model(21, 19);
+  return compiled(model).sensors[0];
+}
+
+/// 19 × 17 tiles, so that spheres around eight of them are looked at first.
+const CompiledSensor& large_pad_sensor() {
+  static const Model model = pad_model(150, 130);
   return compiled(model).sensors[0];
 }
 
@@ -212,6 +220,48 @@ void check_kernel(const Case& c, double tolerance) {
 
 TEST_P(TactileKernel, DoubleMatchesOnePointAtATime) { check_kernel<double>(GetParam(), 1e-12); }
 TEST_P(TactileKernel, MixedIsAMillionthOfThePeakAway) { check_kernel<float>(GetParam(), 1e-6); }
+
+/// With a shape that sinks in, one beside the pad, and more shapes than have a bit.
+template <class Real>
+void check_eights(const Case& c) {
+  PadTiles pad = large_pad_sensor().tiles(), all = pad;
+  const AlignedVector<double> far_reach(large_pad_sensor().eight_radius.size(), 1e9);
+  all.eight_radius = far_reach.data();
+  for (unsigned seed = 1; seed <= 4; ++seed) {
+    Random random(seed);
+    const std::size_t count = seed == 4 ? 66 : 2;
+    const std::vector<TouchShape> shapes(count, shape_of(c.shape));
+    std::vector<Touch<double>> touches(count, random_touch(random, shapes[0]));
+    touches[1].c = {0.05, 0.01, 0};
+    touches.back() = random_touch(random, shapes[0]);
+    for (const KernelTable* table : kernels::available_kernels()) {
+      SCOPED_TRACE(std::string(table->name) + ", seed " + std::to_string(seed));
+      for (const bool pressure : {false, true}) {
+        const auto got = field<Real>(*table, pad, c.law, shapes, touches, pressure);
+        const auto expected = field<Real>(*table, all, c.law, shapes, touches, pressure);
+        EXPECT_EQ(got.active, expected.active);
+        EXPECT_EQ(got.values, expected.values);
+        EXPECT_EQ(got.dense, expected.dense);
+        EXPECT_GT(got.active.size(), 0U);
+      }
+    }
+  }
+}
+TEST_P(TactileKernel, SpheresAroundEightTilesLoseNone) {
+  check_eights<double>(GetParam());
+  check_eights<float>(GetParam());
+}
+
+/// Every point of a tile lies within the sphere around its eight.
+TEST(TactileKernels, EightTilesLieWithinTheirSphere) {
+  const PadTiles pad = large_pad_sensor().tiles();
+  for (int t = 0; t < pad.tiles(); ++t) {
+    const int eight = t / kernels::kGroup;
+    const double x = pad.x[t] - pad.eight_x[eight], y = pad.y[t] - pad.eight_y[eight];
+    EXPECT_LT(std::hypot(x, y) + pad.radius[t], pad.eight_radius[eight]) << t;
+    EXPECT_LT(pad.eight_radius[eight], pad.reach);
+  }
+}
 
 template <class Real>
 void check_sum(const Case& c) {
