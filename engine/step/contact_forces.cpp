@@ -127,16 +127,39 @@ double ContactForces::change(const Row<L>* start, const Row<L>* end, const Row<L
 template <int L>
 LaneBits ContactForces::touching(const Row<L>* wrenches) const {
   LaneBits lanes = 0;
-  for (std::size_t i = 0; i < 6 * contacts_.size(); ++i)
+  for (std::size_t i = 0; i < rows(); ++i)
     for (int l = 0; l < L; ++l)
       if (wrenches[i][l] != 0) lanes |= 1U << l;
   return lanes;
 }
 
+template <int L>
+LaneBits ContactForces::parted(const Row<L>* a, const Row<L>* b) const {
+  LaneBits lanes = 0;
+  for (std::size_t k = 0; k < contacts_.size(); ++k) {
+    LaneBits in_a = 0, in_b = 0;
+    for (std::size_t i = 6 * k; i < 6 * k + 6; ++i)
+      for (int l = 0; l < L; ++l) {
+        if (a[i][l] != 0) in_a |= 1U << l;
+        if (b[i][l] != 0) in_b |= 1U << l;
+      }
+    lanes |= in_a & ~in_b;
+  }
+  return lanes;
+}
+
+template <int L>
+void ContactForces::add_sizes(const Row<L>* wrenches, Row<L>* sum) const {
+  for (std::size_t i = 0; i < rows(); ++i)
+    for (int l = 0; l < L; ++l) sum[i][l] += std::abs(wrenches[i][l]);
+}
+
 #define TANGERE_FOR_LANES(L)                                                         \
   template double ContactForces::change(const Row<L>*, const Row<L>*, const Row<L>*, \
                                         const Row<L>*, int) const;                   \
-  template LaneBits ContactForces::touching(const Row<L>*) const;
+  template LaneBits ContactForces::touching(const Row<L>*) const;                    \
+  template LaneBits ContactForces::parted(const Row<L>*, const Row<L>*) const;       \
+  template void ContactForces::add_sizes(const Row<L>*, Row<L>*) const;
 TANGERE_FOR_LANES(kernels::kGroup)
 TANGERE_FOR_LANES(1)
 #undef TANGERE_FOR_LANES

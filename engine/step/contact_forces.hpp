@@ -13,6 +13,8 @@ class ContactForces {
   explicit ContactForces(const CompiledModel& model);
 
   [[nodiscard]] bool none() const { return contacts_.empty(); }
+  /// Rows of all wrenches, six for each contact.
+  [[nodiscard]] std::size_t rows() const { return 6 * contacts_.size(); }
 
   /// Returns the largest share, of all groups, in which the forces of one lane change:
   ///   √Σ (‖a - end‖² + ‖b - end‖²) / (max(‖start‖, ‖end‖) + a small share of the bodies' weight)
@@ -26,6 +28,14 @@ class ContactForces {
   /// The lanes in which something touches.
   template <int L>
   [[nodiscard]] LaneBits touching(const kernels::Row<L>* wrenches) const;
+
+  /// The lanes in which some contact has a wrench in `a` and none in `b`.
+  template <int L>
+  [[nodiscard]] LaneBits parted(const kernels::Row<L>* a, const kernels::Row<L>* b) const;
+
+  /// Adds the sizes of all numbers of wrenches to `sum`.
+  template <int L>
+  void add_sizes(const kernels::Row<L>* wrenches, kernels::Row<L>* sum) const;
 
  private:
   struct Contact {

@@ -66,6 +66,7 @@ static void search_pair(const CompiledModel& model, const kernels::KernelTable& 
 template <int L>
 void find_candidates(const CompiledModel& model, const kernels::KernelTable& table,
                      BasicWorkspace<L>& w, LaneBits lanes) {
+  if (model.link_pairs.empty()) return;
   w.asked |= lanes;
   w.in_rows &= ~lanes;
   w.apart_before = w.apart;

@@ -66,6 +66,11 @@ class GroupStep {
   void weigh_velocity(const kernels::KernelTable& table, BasicWorkspace<L>& w, LaneBits lanes,
                       const kernels::Row<L>& h, NewtonReport& report) const;
   template <int L>
+  LaneBits left_limits(const BasicWorkspace<L>& w, LaneBits lanes) const;
+  template <int L>
+  LaneBits unfelt_contacts(const kernels::KernelTable& table, BasicWorkspace<L>& w, LaneBits parted,
+                           const kernels::Row<L>& h, NewtonReport& report) const;
+  template <int L>
   kernels::Row<L> estimated_error(const kernels::KernelTable& table, BasicWorkspace<L>& w,
                                   LaneBits lanes, const kernels::Row<L>& h,
                                   const StageFactors<L>& factors, NewtonReport& report) const;

@@ -12,6 +12,9 @@
 //       (contact_forces.hpp)
 //   M (c₀/h)² e, in the scale of the solver's tolerance: the share of all acting forces that would
 //       displace by e in a stage
+// A contact or a limit that acts at the start and at no stage is seen by none of these: δ_v moves
+// the end further away from it. There M e_v counts, in the same scale: the share of the momentum
+// that its push would change.
 // A step begins with a part of its whole length whatever was before it, so it depends on its state
 // alone. Lanes have parts of their own lengths and are solved side by side, until the last has
 // arrived.
@@ -72,7 +75,51 @@ void GroupStep::weigh_velocity(const kernels::KernelTable& table, BasicWorkspace
   evaluate_elsewhere(model_, table, w, lanes, report);
 }
 
-/// Returns the larger of the two shares at the head of this file, of parts that were just solved.
+/// Returns the lanes in which a limit acts at the start and at no stage. Limits of ball joints are
+/// not looked at. `base`: the end, as displacements.
+template <int L>
+LaneBits GroupStep::left_limits(const BasicWorkspace<L>& w, LaneBits lanes) const {
+  const int n = model_.nv, inner = settings_.integrator.scheme().inner_stages();
+  LaneBits left = 0;
+  for (const kernels::Link& link : model_.links) {
+    if ((link.effects & kernels::kLimited) == 0 || link.kind == kernels::JointKind::spherical)
+      continue;
+    for (int k = 0; k < kernels::dofs(link.kind); ++k) {
+      const int i = link.v + k;
+      const kernels::DofEffects& e = model_.dof_effects[std::size_t(i)];
+      for (int l = 0; l < L; ++l) {
+        const double start = w.q0[link.q + k][l];
+        const auto beyond = [&](double x) { return start + x < e.low || start + x > e.high; };
+        bool felt = beyond(w.base[i][l]);
+        for (int j = 0; j < inner; ++j) felt |= beyond(w.x_inner[j * n + i][l]);
+        if (beyond(0) && !felt) left |= 1U << l;
+      }
+    }
+  }
+  return left & lanes;
+}
+
+/// Returns the lanes of `parted`, in which some contact acts at the start and not at the end, where
+/// it acts at no inner stage either. Overwrites the second half of the workspace's wrenches.
+template <int L>
+LaneBits GroupStep::unfelt_contacts(const kernels::KernelTable& table, BasicWorkspace<L>& w,
+                                    LaneBits parted, const Row<L>& h, NewtonReport& report) const {
+  const Scheme& scheme = settings_.integrator.scheme();
+  const auto [start, end, here, felt] = w.wrenches;
+  std::fill_n(felt, contact_forces_.rows(), Row<L>{});
+  contact_forces_.add_sizes<L>(end, felt);
+  for (int k = 0; k < scheme.inner_stages() && parted != 0; ++k) {
+    set_stage(model_, scheme, k, h, w);
+    std::copy_n(w.x_inner + k * model_.nv, model_.nv, w.stage.x);
+    evaluate_elsewhere(model_, table, w, parted, report);
+    table.stage<L>().contact_wrenches(model_.view, w.stage, here);
+    contact_forces_.add_sizes<L>(here, felt);
+    parted &= contact_forces_.parted<L>(start, felt);
+  }
+  return parted;
+}
+
+/// Returns the largest of the shares at the head of this file, of parts that were just solved.
 template <int L>
 Row<L> GroupStep::estimated_error(const kernels::KernelTable& table, BasicWorkspace<L>& w,
                                   LaneBits lanes, const Row<L>& h, const StageFactors<L>& factors,
@@ -89,24 +136,25 @@ Row<L> GroupStep::estimated_error(const kernels::KernelTable& table, BasicWorksp
   scaled_residual(model_, table, w, error);
   // Where the first guess of every stage was a root there is no factor. The stages then felt no
   // change of the forces, but did not see the start, and what changed since then is the error.
-  const LaneBits guessed = lanes & ~factors.any;
-  if (contact_forces_.none() && guessed == 0) return error;
+  const LaneBits guessed = lanes & ~factors.any, left = left_limits(w, lanes & factors.any);
+  if (contact_forces_.none() && (guessed | left) == 0) return error;
   solve_by_factor(model_, table, w, factors, w.delta);
   weigh_velocity(table, w, lanes, h, report);
   kernel.contact_wrenches(model_.view, s, start);
   const LaneBits touched =
       lanes & (contact_forces_.touching<L>(start) | contact_forces_.touching<L>(end));
-  if (guessed != 0) {
-    Row<L> missed{};
-    scaled_residual(model_, table, w, missed);
-    for (int l = 0; l < L; ++l) {
-      if (!has(guessed, l)) continue;
-      const double change =
-          has(touched, l) ? contact_forces_.change<L>(start, end, end, start, l) : missed[l];
-      if (!(change <= error[l])) error[l] = change;
-    }
-  }
+  const LaneBits parted = lanes & factors.any & contact_forces_.parted<L>(start, end);
+  Row<L> missed{};
+  if ((guessed | left | parted) != 0) scaled_residual(model_, table, w, missed);
   solve_by_factor(model_, table, w, factors, w.test);
+  const LaneBits unfelt = guessed | left | unfelt_contacts(table, w, parted, h, report);
+  for (int l = 0; l < L; ++l) {
+    if (!has(unfelt, l)) continue;
+    const double change = has(guessed & touched, l)
+                              ? contact_forces_.change<L>(start, end, end, start, l)
+                              : missed[l];
+    if (!(change <= error[l])) error[l] = change;
+  }
   const LaneBits touching = touched & factors.any;
   if (touching == 0) return error;
   set_stage(model_, scheme, scheme.inner_stages(), h, w);
