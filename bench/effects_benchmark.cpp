@@ -36,11 +36,14 @@ struct Move {
 struct Case {
   const char* scene;
   std::vector<Move> away;
-  bool lifted = false;  // off the ground too
+  bool lifted = false;         // off the ground too
+  std::vector<Move> beside{};  // near the pad, but not on it; empty: not looked at
 };
+/// Where bodies are: along the scene's own run, or moved from there.
+enum class Place { run, away, beside };
 const std::vector<Case>& cases() {
   static const std::vector<Case> all = {
-      {"rolling_ball", {{"pad_joint.z", 1, ""}}},
+      {"rolling_ball", {{"pad_joint.z", 1, ""}}, false, {{"pad_joint.x", 0.05, ""}}},
       {"box_pushing", {{"hand_slide.axis0", -1, ""}}},
       {"cap_opening",
        {{"upper_1.angle", -1, "upper_1.rate"},
@@ -59,15 +62,15 @@ Scene scene_of(const Case& of) {
   return scene;
 }
 
-RecordedStates states_of(const Model& model, const Case& of, bool moved) {
+RecordedStates states_of(const Model& model, const Case& of, Place place) {
   RecordedStates states = record_states(model, kEnvironments, kInstants, 0);
-  if (!moved) return states;
+  if (place == Place::run) return states;
   const auto add = [](const auto& names, const std::string& name, double by,
                       std::vector<double>& rows) {
     for (std::size_t k = 0; k < names.size(); ++k)
       for (std::size_t i = k; names[k] == name && i < rows.size(); i += names.size()) rows[i] += by;
   };
-  for (const Move& move : of.away)
+  for (const Move& move : place == Place::away ? of.away : of.beside)
     for (RecordedInstant& at : states.instants) {
       add(model.q_names(), move.coordinate, move.by, at.q);
       add(model.q_names(), move.coordinate, move.by, at.previous_q);
@@ -84,9 +87,9 @@ struct Recorded {
   TimedModel timed;
   StepTimes times;
 
-  Recorded(const Case& of, bool moved)
+  Recorded(const Case& of, Place place)
       : model(scene_of(of)),
-        states(states_of(model, of, moved)),
+        states(states_of(model, of, place)),
         options{{}, {}, Stepper(model).tolerance()},
         timed(model, states, options),
         times(measure_times(timed, *options.tolerance, kRounds)) {
@@ -100,10 +103,10 @@ struct Recorded {
   }
 };
 
-Recorded& recorded(const Case& of, bool moved) {
-  static std::map<std::pair<std::string, bool>, std::unique_ptr<Recorded>> all;
-  std::unique_ptr<Recorded>& found = all[{of.scene, moved}];
-  if (found == nullptr) found = std::make_unique<Recorded>(of, moved);
+Recorded& recorded(const Case& of, Place place) {
+  static std::map<std::pair<std::string, Place>, std::unique_ptr<Recorded>> all;
+  std::unique_ptr<Recorded>& found = all[{of.scene, place}];
+  if (found == nullptr) found = std::make_unique<Recorded>(of, place);
   return *found;
 }
 
@@ -121,14 +124,14 @@ void count(benchmark::State& state, const Recorded& r, double with_over_without)
 
 /// As the scene has it, over removed.
 void effect_on(benchmark::State& state, const Case& of, Effect effect) {
-  Recorded& r = recorded(of, false);
+  Recorded& r = recorded(of, Place::run);
   for (auto _ : state)
     count(state, r, ratio(r.saved_by(without(r.model.scene(), effect), passes_of(effect.kind))));
 }
 
 /// With its coefficient at zero, or limits never met, over removed.
 void effect_idle(benchmark::State& state, const Case& of, Effect effect, Way way) {
-  Recorded& r = recorded(of, false);
+  Recorded& r = recorded(of, Place::run);
   const Scene& scene = r.model.scene();
   for (auto _ : state) {
     const int passes = passes_of(effect.kind);
@@ -141,7 +144,7 @@ void effect_idle(benchmark::State& state, const Case& of, Effect effect, Way way
 /// Out of reach, over removed. `first_pass`: without factor and solve, so what is left is the
 /// search.
 void contacts_away(benchmark::State& state, const Case& of, Effect effect) {
-  Recorded& r = recorded(of, true);
+  Recorded& r = recorded(of, Place::away);
   const Scene removed = without(r.model.scene(), effect);
   for (auto _ : state) {
     count(state, r, ratio(r.saved_by(removed, passes_of(effect.kind))));
@@ -191,16 +194,17 @@ class FieldReader {
 
 /// Readings of all sensors of an environment that touch nothing, over those in the middle of the
 /// run.
-void fields(benchmark::State& state, const Case& of) {
-  FieldReader touching(recorded(of, false)), away(recorded(of, true));
+void fields(benchmark::State& state, const Case& of, Place place) {
+  FieldReader touching(recorded(of, Place::run)), away(recorded(of, place));
   for (auto _ : state) {
     const double dense = touching.dense(), compact = touching.compact();
     const double dense_away = away.dense(), compact_away = away.compact();
-    count(state, recorded(of, false), dense_away / dense);
+    count(state, recorded(of, Place::run), dense_away / dense);
     state.counters["dense_us"] = 1e6 * dense;
     state.counters["dense_away_us"] = 1e6 * dense_away;
     state.counters["compact_us"] = 1e6 * compact;
     state.counters["compact_away_us"] = 1e6 * compact_away;
+    state.counters["away_step_us"] = 1e6 * recorded(of, place).times.step;
   }
 }
 
@@ -211,7 +215,9 @@ struct Extra {
   void (*add)(TactileDescription& sensor, double timestep);
   const char* form;  ///< what is read instead of the field; null: the field
 };
-constexpr double kHysteresisSteps = 4;  ///< its time constant: a reading looks at 28 states
+/// Time constant of hysteresis and low-pass: a reading looks at 28 states. A delay of 2.5 steps
+/// looks at two.
+constexpr double kHysteresisSteps = 4;
 const Extra kExtras[] = {
     {"markers", true,
      [](TactileDescription& s, double) {
@@ -229,13 +235,18 @@ const Extra kExtras[] = {
        s.imperfections.hysteresis_time = kHysteresisSteps * h;
      },
      nullptr},
+    {"delay", true, [](TactileDescription& s, double h) { s.imperfections.delay = 2.5 * h; },
+     nullptr},
+    {"low-pass", true,
+     [](TactileDescription& s, double h) { s.imperfections.low_pass = kHysteresisSteps * h; },
+     nullptr},
     {"hysteresis of coefficient 0", false,
      [](TactileDescription& s, double) { s.imperfections.source.line = 1; }, nullptr}};
 
 /// Readings and steps of a scene whose sensors have something more, over those without it. Lists of
 /// points have no neighbours, so their gel does not bulge.
 void sensor_extra(benchmark::State& state, const Case& of, const Extra& extra) {
-  Recorded& r = recorded(of, false);
+  Recorded& r = recorded(of, Place::run);
   Scene scene = r.model.scene();
   scene.outputs = OutputsDescription{};
   for (TactileDescription& sensor : scene.sensors) {
@@ -268,7 +279,7 @@ void sensor_extra(benchmark::State& state, const Case& of, const Extra& extra) {
 
 /// A scene without contacts, over the scene as it is.
 void contact_free(benchmark::State& state, const Case& of) {
-  Recorded& r = recorded(of, false);
+  Recorded& r = recorded(of, Place::run);
   Scene bare = without(r.model.scene(), {EffectKind::pair_contact});
   bare = without(bare, {EffectKind::ground_contact});
   bare = without(bare, {EffectKind::tactile});
@@ -277,7 +288,7 @@ void contact_free(benchmark::State& state, const Case& of) {
 
 /// The scene against itself: what chance shows.
 void itself(benchmark::State& state, const Case& of) {
-  Recorded& r = recorded(of, false);
+  Recorded& r = recorded(of, Place::run);
   for (auto _ : state) count(state, r, ratio(r.saved_by(r.model.scene(), 1)));
 }
 
@@ -295,7 +306,8 @@ void add_all() {
     const Scene read = read_scene(TANGERE_SOURCE_DIR "/scenes/" + scene + ".xml").scene;
     add(scene + "/itself", itself, of);
     add(scene + "/contact_free", contact_free, of);
-    add(scene + "/fields_away", fields, of);
+    add(scene + "/fields_away", fields, of, Place::away);
+    if (!of.beside.empty()) add(scene + "/fields_beside", fields, of, Place::beside);
     for (const Extra& extra : kExtras)
       add(scene + (extra.asked ? "/reading/" : "/idle_reading/") + extra.name, sensor_extra, of,
           extra);

@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "engine/model/field_form.hpp"
+#include "engine/model/sensor_effects.hpp"
 
 namespace tangere {
 namespace {
@@ -204,7 +205,7 @@ void drop_motors(Scene& scene, int /*element*/, Way way) {
 // --- contacts and sensors ---
 
 /// The effects of a contact or a sensor.
-enum class Part { whole, tangential, damping };
+enum class Part { whole, tangential, damping, memory };
 
 template <Owner Of, class AnyScene>
 auto& elements(AnyScene& scene) {
@@ -245,6 +246,7 @@ template <Part Of, class Element>
 bool element_on(const Scene& scene, const Element& d) {
   if (Of == Part::tangential)
     return (acts(scene, d, Field::kt) || acts(scene, d, Field::ks)) && acts(scene, d, Field::mu);
+  if (Of == Part::memory) return acts(scene, d, Field::ks);
   return Of == Part::whole || acts(scene, d, Field::damping);
 }
 
@@ -255,7 +257,7 @@ std::string element_reason(const Scene& scene, const Element& d) {
   if (Of == Part::tangential)
     return text(Field::kt) + (acts(scene, d, Field::ks) ? ", " + text(Field::ks) : "") + ", " +
            text(Field::mu);
-  return text(Field::damping);
+  return text(Of == Part::memory ? Field::ks : Field::damping);
 }
 
 template <Owner Of>
@@ -285,20 +287,14 @@ EffectInfo find_elements(const Scene& scene, int element) {
   return info;
 }
 
-void drop_imperfections(TactileDescription& d, Way way) {
-  const Source source = d.imperfections.source;
-  d.imperfections = {};
-  if (way == Way::zero) d.imperfections.source = source;
-}
-
 template <Part P, class Element>
 void still_element(Scene& scene, Element& d, Way way) {
   Fields fields{Field::kn, Field::kt, Field::mu, Field::damping, Field::ks};
   if (P == Part::damping) fields = {Field::damping};
+  if (P == Part::memory) fields = {Field::ks};
   if (P == Part::tangential) fields = {Field::kt, Field::ks};
   if (P == Part::tangential && way == Way::removed) fields.push_back(Field::mu);
   if constexpr (std::is_same_v<Element, TactileDescription>) {
-    if (P == Part::whole) drop_imperfections(d, way);
     // The gel moves as before where it no longer remembers.
     if (d.markers && d.markers->stiffness == 0) d.markers->stiffness = d.coefficients.ks;
   }
@@ -311,37 +307,12 @@ void drop_elements(Scene& scene, int element, Way way) {
   auto& all = elements<Of>(scene);
   for (std::size_t k = 0; k < all.size(); ++k)
     if (element < 0 || std::size_t(element) == k) still_element<P>(scene, all[k], way);
+  if (Of == Owner::tactile && P == Part::whole) drop_imperfections(scene, element, way);
   if (P != Part::whole || way != Way::removed) return;
   if (element < 0)
     all.clear();
   else
     all.erase(all.begin() + element);
-}
-
-// --- imperfections of sensors ---
-
-EffectInfo find_imperfections(const Scene& scene, int element) {
-  EffectInfo info;
-  std::size_t on = 0;
-  for (std::size_t k = 0; k < scene.sensors.size(); ++k) {
-    const SensorImperfections& of = scene.sensors[k].imperfections;
-    if ((element >= 0 && std::size_t(element) != k) || !is_imperfect(of)) continue;
-    ++on;
-    add_source(info, of.source);
-  }
-  info.on = on > 0;
-  if (element < 0)
-    info.reason =
-        fmt::format("{} of {}", on, number_of_elements<Owner::tactile>(scene.sensors.size()));
-  else
-    info.reason = info.on ? text_of(scene.sensors[std::size_t(element)].imperfections)
-                          : "every coefficient is 0 or not given";
-  return info;
-}
-
-void drop_all_imperfections(Scene& scene, int element, Way way) {
-  for (std::size_t k = 0; k < scene.sensors.size(); ++k)
-    if (element < 0 || std::size_t(element) == k) drop_imperfections(scene.sensors[k], way);
 }
 
 // --- numbers that vary ---
@@ -421,16 +392,22 @@ constexpr Row kTable[] = {
     element_row<Owner::contact, Part::tangential>(Kind::pair_friction, "pair friction",
                                                   " friction"),
     element_row<Owner::contact, Part::damping>(Kind::pair_damping, "pair damping", " damping"),
+    element_row<Owner::contact, Part::memory>(Kind::pair_memory, "pair memory", " memory"),
     element_row<Owner::ground, Part::whole>(Kind::ground_contact, "ground contact", ""),
     element_row<Owner::ground, Part::tangential>(Kind::ground_friction, "ground friction",
                                                  " friction"),
     element_row<Owner::ground, Part::damping>(Kind::ground_damping, "ground damping", " damping"),
+    element_row<Owner::ground, Part::memory>(Kind::ground_memory, "ground memory", " memory"),
     element_row<Owner::tactile, Part::whole>(Kind::tactile, "tactile", ""),
     element_row<Owner::tactile, Part::tangential>(Kind::tactile_shear, "tactile shear", " shear"),
     element_row<Owner::tactile, Part::damping>(Kind::tactile_damping, "tactile damping",
                                                " damping"),
+    element_row<Owner::tactile, Part::memory>(Kind::tactile_memory, "tactile memory", " memory"),
     {Kind::sensor_imperfections, "sensor imperfections", " imperfections", true, false,
-     find_imperfections, drop_all_imperfections, Owner::tactile},
+     find_imperfections, drop_imperfections, Owner::tactile},
+    {Kind::markers, "markers", " markers", true, false, find_markers, drop_markers, Owner::tactile},
+    {Kind::feedback, "feedback", " feedback", true, false, find_feedback, drop_feedback,
+     Owner::tactile},
     {Kind::varying_parameters, "varying parameters", "", true, false, find_varying, drop_varying},
     {Kind::sleeping, "sleeping", "", false, false, find_sleeping, drop_sleeping},
 };
@@ -484,11 +461,15 @@ bool has_way(EffectKind kind, Way way) {
   return way == Way::zero ? row.zero : row.idle;
 }
 
-/// Readings of sensors that are gone are no outputs.
+/// Readings of sensors and markers that are gone are no outputs.
 static void keep_known_outputs(Scene& scene) {
   if (!scene.outputs) return;
-  std::erase_if(scene.outputs->record,
-                [&](const std::string& word) { return !has_output(scene, word); });
+  const std::vector<std::string> sensors = sensor_names(scene);
+  std::erase_if(scene.outputs->record, [&](const std::string& word) {
+    if (!has_output(scene, word)) return true;
+    const std::optional<FieldOutput> of = find_output(sensors, split_times(word).name);
+    return of && !reason_against(scene, *of).empty();
+  });
 }
 
 Scene without(Scene scene, const Effect& effect, Way way) {

@@ -27,17 +27,22 @@ enum class EffectKind : std::uint8_t {
   pair_contact,
   pair_friction,
   pair_damping,
+  pair_memory,
   ground_contact,
   ground_friction,
   ground_damping,
+  ground_memory,
   tactile,
   tactile_shear,
   tactile_damping,
+  tactile_memory,
   sensor_imperfections,
+  markers,
+  feedback,
   varying_parameters,
   sleeping,
 };
-inline constexpr int kEffectKinds = 20;
+inline constexpr int kEffectKinds = 25;
 
 /// An effect of a scene.
 struct Effect {
@@ -71,7 +76,8 @@ std::vector<EffectInfo> effects_of(const Scene& scene);
 /// What the elements of a kind are: pair contacts, ground contacts or sensors; none where it has no
 /// elements.
 std::optional<NumberOwner> element_owner(EffectKind kind);
-/// Whether a kind is a part of its elements, such as friction. They stay when it goes.
+/// Whether a kind is a part of its elements, such as friction. They stay when it goes, as the
+/// contacts of feedback do when their sensor goes.
 bool is_part(EffectKind kind);
 
 /// Whether a kind has this way. Velocity products have none: they follow from joints that turn.

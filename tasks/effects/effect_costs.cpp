@@ -16,10 +16,37 @@ constexpr int kMostRounds = 41;
 
 bool is_of_sensors(EffectKind kind) { return element_owner(kind) == NumberOwner::tactile; }
 
-TimedParts parts_of(EffectKind kind) {
-  if (kind == EffectKind::varying_parameters) return {true, true, 1, false};
-  return {!is_of_sensors(kind), is_of_sensors(kind), kind == EffectKind::pair_contact ? 2 : 1,
-          kind == EffectKind::force_motors};
+bool is_memory(EffectKind kind) {
+  return kind == EffectKind::pair_memory || kind == EffectKind::ground_memory ||
+         kind == EffectKind::tactile_memory;
+}
+
+/// Whether memory of friction goes with an effect: with a contact or sensor, its friction or its
+/// memory.
+bool takes_memory(const Model& model, const Effect& effect) {
+  const EffectKind kind = effect.kind;
+  const bool friction = kind == EffectKind::pair_friction || kind == EffectKind::ground_friction ||
+                        kind == EffectKind::tactile_shear;
+  if (is_part(kind) && !friction && !is_memory(kind)) return false;
+  return std::any_of(model.effects().begin(), model.effects().end(), [&](const EffectInfo& e) {
+    return e.on && is_memory(e.effect.kind) && e.effect.element == effect.element &&
+           element_owner(e.effect.kind) == element_owner(kind);
+  });
+}
+
+/// Memory moves on once per step, that of sensors too, and is felt in every pass, so models with
+/// and without it are compared in as many passes as both need. What feedback does is a contact.
+TimedParts parts_of(const Model& model, const Effect& effect) {
+  constexpr int kAllPasses = 1000;
+  const bool reads = is_of_sensors(effect.kind);
+  if (takes_memory(model, effect)) return {true, reads, kAllPasses, false};
+  switch (effect.kind) {
+    case EffectKind::varying_parameters: return {true, true, 1, false};
+    case EffectKind::force_motors: return {true, false, 1, true};
+    case EffectKind::pair_contact:
+    case EffectKind::feedback: return {true, false, 2, false};
+    default: return {!reads, reads, 1, false};
+  }
 }
 
 /// Returns the bytes of one environment's state and readings.
@@ -131,7 +158,7 @@ EffectCost measure(Measurement& m, const EffectInfo& info, const EffectCostOptio
   if (m.times.passes == 0) cost.note = "every environment fails before the first instant";
   if (!cost.note.empty()) return cost;
   const ModelComparison c =
-      m.against(Model(taken_once(trimmed.scene())), parts_of(info.effect.kind));
+      m.against(Model(taken_once(trimmed.scene())), parts_of(m.model, info.effect));
   cost.measured = c.saved;
   cost.seconds_without = m.times.whole() * (1 - c.saved.share);
   cost.passes_without = c.passes;

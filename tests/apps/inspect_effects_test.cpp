@@ -98,6 +98,36 @@ TEST(InspectEffects, MeasuresWhatEffectsCost) {
                                              "gradients of a loss"}));
 }
 
+/// Friction that remembers, markers and points that touch have rows, lines and bytes of their own.
+TEST(InspectEffects, ShowsMemoryMarkersAndFeedback) {
+  const Folder folder;
+  std::string text = file_bytes(scene("rolling_ball_small.xml"));
+  const auto replace = [&](const std::string& from, const std::string& to, std::size_t after = 0) {
+    text.replace(text.find(from, after), from.size(), to);
+  };
+  replace("<tactile name=\"pad\" field=\"kt\" uniform=\"0.008 0.012\"/>", "");
+  replace("every=\"5\"/>",
+          "every=\"5\" feedback=\"true\">\n<markers stiffness=\"20\"/>\n</tactile>");
+  replace("mu=\"1\" damping=\"1\"/>", "mu=\"1\" damping=\"1\" ks=\"5\"/>");
+  folder.write("ball.xml", text);
+  const Outcome outcome = run(folder, {"inspect", "ball.xml", "--effects", "--json"});
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  const json effects = json::parse(outcome.out).at("effects");
+  for (const auto& [name, why] : {std::pair("contact pad ball memory", "ks 5 N/m"),
+                                  std::pair("tactile pad markers", "stiffness 20 N/m"),
+                                  std::pair("tactile pad feedback", "its points touch 1 body")}) {
+    const json& effect = effects.at(name);
+    EXPECT_EQ(effect.at("on"), true) << name;
+    EXPECT_EQ(effect.at("why"), why);
+    EXPECT_TRUE(effect.at("share").is_number()) << name;
+    EXPECT_EQ(effect.at("lines").size(), 1U) << name;
+    EXPECT_THAT(outcome.err, HasSubstr(name));
+  }
+  EXPECT_GT(effects.at("contact pad ball memory").at("bytes"), 0);
+  EXPECT_EQ(effects.at("ground ball memory").at("why"), "ks 0 N/m");
+  EXPECT_EQ(effects.at("tactile pad memory").at("on"), false);
+}
+
 /// Boxes that rest on the ground fall asleep along the run.
 TEST(InspectEffects, MeasuresWhatSleepSaves) {
   const Folder folder;

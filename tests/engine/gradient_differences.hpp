@@ -36,13 +36,9 @@ inline Model without_second_looks(Scene scene) {
 }
 
 /// Returns how many derivatives were compared; 0 if a step of the run finds no solution.
-inline int check_gradient(const Scene& scene, Integrator scheme, unsigned seed, int steps,
-                          double tolerance, double accuracy = 0) {
-  const Model model = without_second_looks(scene);
-  StepperOptions o = options(scheme, scene.timestep, 1e-13);
-  o.accuracy = accuracy;
-  const RunInput in = random_input(model, seed, steps);
-  const StateLoss loss(model, steps, seed + 1);
+inline int check_gradient(const Model& model, const StepperOptions& o, const RunInput& in,
+                          unsigned seed, double tolerance) {
+  const StateLoss loss(model, static_cast<int>(in.u.size()), seed);
   if (!std::isfinite(loss_of_run(model, o, in, loss))) return 0;
   const RunGradient adjoint = adjoint_of_run(model, o, {in}, loss, 0);
   const RunGradient difference = differences_of_run(model, o, in, loss);
@@ -63,6 +59,13 @@ inline int check_gradient(const Scene& scene, Integrator scheme, unsigned seed, 
     ++compared;
   }
   return compared;
+}
+inline int check_gradient(const Scene& scene, Integrator scheme, unsigned seed, int steps,
+                          double tolerance, double accuracy = 0) {
+  const Model model = without_second_looks(scene);
+  StepperOptions o = options(scheme, scene.timestep, 1e-13);
+  o.accuracy = accuracy;
+  return check_gradient(model, o, random_input(model, seed, steps), seed + 1, tolerance);
 }
 
 /// Expects the gradient of a run of six steps from velocities v against differences. Some of the

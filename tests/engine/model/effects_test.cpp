@@ -1,63 +1,22 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests the table of effects over a scene that has them all: an effect that is removed leaves what
+// Tests the table of effects over scenes that have them all: an effect that is removed leaves what
 // its coefficient at zero leaves, and takes its bytes with it.
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <set>
 
 #include "engine/model/effects.hpp"
 #include "engine/step/control.hpp"
+#include "tests/engine/effect_scenes.hpp"
 #include "tests/engine/runs.hpp"
-#include "tests/engine/scenes.hpp"
 
 namespace tangere {
 namespace {
 
-using testing::link;
-
-RandomizationDescription varied(const SceneNumber& number, double low, double high) {
-  return {number, {Distribution::Kind::uniform, low, high, {}}, {}};
-}
-
-/// A pad that presses a ball onto the ground beside a box, and an arm with all that joints can
-/// have. Every kind of effect is on and acts within 40 steps.
-Scene scene_of_all_effects() {
-  Scene s = testing::rolling_ball(false, 12);
-  s.links.push_back(link("box", JointType::free, {0.2, 0, 0.0149},
-                         CuboidShape{{0.03, 0.03, 0.03}, {2, 2, 2}}, 300));
-  s.links.push_back(link("arm", JointType::revolute, {0.5, 0, 0.3},
-                         CuboidShape{{0.02, 0.02, 0.1}, {2, 2, 2}}, 500));
-  s.links.push_back(link("slider", JointType::prismatic, {0, 0, 0.05},
-                         CuboidShape{{0.02, 0.02, 0.02}, {2, 2, 2}}, 800));
-  JointDescription& arm = s.links[3].joint;
-  arm.axis0 = {0, 1, 0};
-  arm.damping = 1e-3;
-  arm.armature = 1e-4;
-  arm.stiffness = 0.3;
-  arm.rest = {0.4};
-  arm.limits = {-0.02, 0.02};
-  arm.limit_stiffness = 50;
-  s.links[4].parent = 3;
-  s.motors.push_back({"slider_joint", -20, 20, {}, MotorControl::position, 30, 0.2});
-  s.pair_contacts.push_back({"box", "ball", {100, 1, 0.5, 1}, ContactLaw::clamped, 1e-5, {}});
-  s.ground_contacts.push_back({"box", {500, 2, 0.5, 0.2}, ContactLaw::linear, 1e-5, {}});
-  s.sensors.push_back(s.sensors.front());
-  s.sensors.back().name = "second";
-  for (TactileDescription& d : s.sensors) d.imperfections.noise = {1e-4, 1e-4};
-  s.initial.push_back({"pad_joint", {0.002, 0.001, -0.0152}, {0.05, -0.02, -0.01}, {}});
-  s.initial.push_back({"box_joint", {}, {0.3, 0.1, 0, 1, 0, 2}, {}});
-  s.initial.push_back({"arm_joint", {0.01}, {1}, {}});
-  s.randomizations.push_back(
-      varied({NumberOwner::contact, NumberField::kn, "pad", 0, "ball"}, 4, 6));
-  s.randomizations.push_back(varied({NumberOwner::tactile, NumberField::kt, "pad"}, 0.008, 0.02));
-  s.randomizations.push_back(
-      varied({NumberOwner::joint, NumberField::damping, "arm_joint"}, 1e-3, 2e-3));
-  s.control = ConstantControl{{0.1, -0.05, 0.1, 0.004}};
-  s.solver.sleep = kUsualSleep;
-  return s;
-}
+using testing::scenes_of_all_effects;
 
 /// States, then fields by sensor name, after steps of a batch with the scene's own controls.
 struct Result {
@@ -85,6 +44,12 @@ Result play(const Scene& scene, int steps = 40) {
       readout.tactile(batch, e, int(s), field);
       std::vector<double>& all = result.fields[model.sensors()[s].name];
       all.insert(all.end(), field.begin(), field.end());
+      if (!scene.sensors[s].markers) continue;
+      DenseFrame<double> frame(model, int(s), FieldForm::markers);
+      readout.read(batch, e, frame);
+      std::vector<double>& moved =
+          result.fields[output_name(model.sensors()[s].name, frame.form())];
+      moved.insert(moved.end(), frame.values().begin(), frame.values().end());
     }
   }
   return result;
@@ -120,53 +85,64 @@ const EffectInfo* find(const std::vector<EffectInfo>& effects, const std::string
 /// Adding zeros changes no bit, so most ways agree to the bit. A contact that is gone leaves a
 /// sparser matrix, whose elimination rounds otherwise, and bodies that no longer share a norm, so
 /// that Newton's method stops elsewhere.
-double allowed(EffectKind kind) { return kind == EffectKind::pair_contact ? 1e-11 : 0; }
+/// Markers of zero compliance have a huge stiffness.
+double allowed(EffectKind kind) {
+  if (kind == EffectKind::markers) return 1e-290;
+  return kind == EffectKind::pair_contact || kind == EffectKind::feedback ? 1e-11 : 0;
+}
 
-TEST(Effects, TheSceneOfThisTestHasEveryKind) {
-  const Scene scene = scene_of_all_effects();
-  const Result all = play(scene);
-  int kinds = 0;
-  for (const EffectInfo& info : effects_of(scene)) {
-    if (info.effect.element >= 0) continue;
-    EXPECT_EQ(info.effect.kind, static_cast<EffectKind>(kinds++));
-    EXPECT_EQ(info.name, to_string(info.effect.kind));
-    EXPECT_TRUE(info.on) << info.name << ": " << info.reason;
-    if (info.effect.kind == EffectKind::sleeping) {
-      EXPECT_EQ(info.reason, "sleep 0.001");
-      EXPECT_EQ(distance(all, play(without(scene, info.effect))), 0) << "all bodies move";
-    } else if (has_way(info.effect.kind, Way::removed)) {
-      EXPECT_GT(distance(all, play(without(scene, info.effect))), 1e-9) << info.name;
+TEST(Effects, TheScenesOfThisTestHaveEveryKind) {
+  std::set<EffectKind> acting;
+  for (const Scene& scene : scenes_of_all_effects()) {
+    const Result all = play(scene);
+    int kinds = 0;
+    for (const EffectInfo& info : effects_of(scene)) {
+      const EffectKind kind = info.effect.kind;
+      if (info.effect.element >= 0) continue;
+      EXPECT_EQ(kind, static_cast<EffectKind>(kinds++));
+      EXPECT_EQ(info.name, to_string(kind));
+      if (!info.on) continue;
+      acting.insert(kind);
+      if (kind == EffectKind::sleeping) {
+        EXPECT_EQ(info.reason, "sleep 0.001");
+        EXPECT_EQ(distance(all, play(without(scene, info.effect))), 0) << "all bodies move";
+      } else if (has_way(kind, Way::removed)) {
+        EXPECT_GT(distance(all, play(without(scene, info.effect))), 1e-9) << info.name;
+      }
     }
+    EXPECT_EQ(kinds, kEffectKinds);
   }
-  EXPECT_EQ(kinds, kEffectKinds);
+  EXPECT_EQ(acting.size(), std::size_t(kEffectKinds));
 }
 
 TEST(Effects, RemovedEqualsZeroCoefficients) {
-  const Scene scene = scene_of_all_effects();
-  for (const EffectInfo& info : effects_of(scene)) {
-    SCOPED_TRACE(info.name);
-    if (!has_way(info.effect.kind, Way::removed)) continue;
-    const Result removed = play(without(scene, info.effect));
-    for (const Way way : {Way::zero, Way::idle})
-      if (has_way(info.effect.kind, way)) {
-        EXPECT_LE(distance(removed, play(without(scene, info.effect, way))),
-                  allowed(info.effect.kind))
-            << "way " << int(way);
-      }
-  }
+  for (const Scene& scene : scenes_of_all_effects())
+    for (const EffectInfo& info : effects_of(scene)) {
+      SCOPED_TRACE(info.name);
+      if (!info.on || !has_way(info.effect.kind, Way::removed)) continue;
+      const Result removed = play(without(scene, info.effect));
+      for (const Way way : {Way::zero, Way::idle})
+        if (has_way(info.effect.kind, way)) {
+          EXPECT_LE(distance(removed, play(without(scene, info.effect, way))),
+                    allowed(info.effect.kind))
+              << "way " << int(way);
+        }
+    }
 }
 
 TEST(Effects, PartsGoWithoutTheirElements) {
   const auto elements = [](const Scene& s) {
     return s.pair_contacts.size() + s.ground_contacts.size() + s.sensors.size();
   };
-  const Scene scene = scene_of_all_effects();
+  const Scene& scene = scenes_of_all_effects().front();
   for (const EffectInfo& info : effects_of(scene)) {
     SCOPED_TRACE(info.name);
     const EffectKind kind = info.effect.kind;
     if (info.effect.element < 0) continue;
     EXPECT_TRUE(element_owner(kind).has_value());
-    EXPECT_EQ(elements(without(scene, info.effect)), elements(scene) - (is_part(kind) ? 0U : 1U));
+    // What a sensor's feedback does is a contact.
+    const bool takes_one = kind == EffectKind::feedback ? info.on : !is_part(kind);
+    EXPECT_EQ(elements(without(scene, info.effect)), elements(scene) - (takes_one ? 1U : 0U));
   }
   EXPECT_EQ(element_owner(EffectKind::ground_damping), NumberOwner::ground);
   EXPECT_EQ(element_owner(EffectKind::sensor_imperfections), NumberOwner::tactile);
@@ -181,7 +157,9 @@ TEST(Effects, MarkersKeepTheirStiffness) {
   pad.coefficients.ks = 0.5;
   pad.markers = MarkersDescription{};
   for (const EffectInfo& info : effects_of(scene)) {
-    if (info.effect.kind != EffectKind::tactile_shear) continue;
+    if (info.effect.kind != EffectKind::tactile_shear &&
+        info.effect.kind != EffectKind::tactile_memory)
+      continue;
     for (const Way way : {Way::removed, Way::zero}) {
       const Scene rest = without(scene, info.effect, way);
       EXPECT_EQ(rest.sensors.front().coefficients.ks, 0);
@@ -191,34 +169,69 @@ TEST(Effects, MarkersKeepTheirStiffness) {
   }
 }
 
+/// Whether an effect may end another: an element takes its parts along, friction its memory, both
+/// contacts and sensors the numbers of theirs that vary, and contacts those that feedback makes.
+bool may_end(const EffectInfo& removed, const EffectInfo& other) {
+  const EffectKind kind = removed.effect.kind, ended = other.effect.kind;
+  const bool same = removed.effect.element < 0 || removed.effect.element == other.effect.element ||
+                    other.effect.element < 0;
+  if (ended == EffectKind::varying_parameters) return true;
+  if (kind == EffectKind::pair_contact && ended == EffectKind::feedback) return true;
+  if (kind == EffectKind::feedback && element_owner(ended) == NumberOwner::contact) return true;
+  if (!same || element_owner(kind) != element_owner(ended)) return false;
+  if (!is_part(kind)) return true;
+  const bool memory = ended == EffectKind::pair_memory || ended == EffectKind::ground_memory ||
+                      ended == EffectKind::tactile_memory;
+  const bool friction = kind == EffectKind::pair_friction || kind == EffectKind::ground_friction ||
+                        kind == EffectKind::tactile_shear;
+  return kind == ended || (friction && memory);
+}
+
+TEST(Effects, MarkersThatGoAreNoOutputs) {
+  Scene scene = scenes_of_all_effects().front();
+  scene.outputs = OutputsDescription{{"pad.markers/5", "pad", "second.markers"}, {}};
+  const auto left = [&](int element) {
+    return without(scene, {EffectKind::markers, element}).outputs->record;
+  };
+  EXPECT_EQ(left(0), (std::vector<std::string>{"pad", "second.markers"}));
+  EXPECT_EQ(left(-1), std::vector<std::string>{"pad"});
+  EXPECT_NO_THROW(Model{without(scene, {EffectKind::markers})});
+}
+
+TEST(Effects, PartsOfSensorsSayWhatTheyAre) {
+  const std::vector<EffectInfo> all = effects_of(scenes_of_all_effects().back());
+  const auto reason = [&](const char* name) { return find(all, name)->reason; };
+  EXPECT_EQ(reason("tactile pad markers"), "stiffness 100 N/m, thickness 0.002 m");
+  EXPECT_EQ(reason("tactile pad feedback"), "feedback is false");
+  EXPECT_EQ(reason("tactile second feedback"), "its points touch 1 body");
+  EXPECT_EQ(reason("feedback"), "1 of 2 sensors declared");
+  EXPECT_EQ(reason("tactile pad memory"), "ks 0.5 N/m");
+  EXPECT_EQ(reason("ground memory"), "2 of 2 bodies declared");
+}
+
 TEST(Effects, RemovedIsOffAndLeavesTheOthersOn) {
-  const Scene scene = scene_of_all_effects();
-  for (const EffectInfo& info : effects_of(scene)) {
-    SCOPED_TRACE(info.name);
-    if (!has_way(info.effect.kind, Way::removed)) continue;
-    const std::vector<EffectInfo> left = effects_of(without(scene, info.effect));
-    const EffectInfo* const same = find(left, info.name);
-    EXPECT_TRUE(same == nullptr || !same->on);
-    for (const EffectInfo& other : left) {
-      const EffectInfo* const before = find(effects_of(scene), other.name);
-      ASSERT_NE(before, nullptr) << other.name;
-      EXPECT_LE(other.on, before->on) << other.name;
-      // Its own friction and damping, and numbers of it that vary, may go with an effect.
-      const bool own = other.name.find(info.name) == 0 ||
-                       other.effect.kind == EffectKind::varying_parameters ||
-                       (info.effect.kind == EffectKind::tactile &&
-                        other.effect.kind == EffectKind::sensor_imperfections) ||
-                       (int(other.effect.kind) - int(info.effect.kind) <= 2 &&
-                        int(other.effect.kind) >= int(info.effect.kind));
-      if (before->on && !own) {
-        EXPECT_TRUE(other.on) << other.name;
+  for (const Scene& scene : scenes_of_all_effects()) {
+    const std::vector<EffectInfo> all = effects_of(scene);
+    for (const EffectInfo& info : all) {
+      SCOPED_TRACE(info.name);
+      if (!has_way(info.effect.kind, Way::removed)) continue;
+      const std::vector<EffectInfo> left = effects_of(without(scene, info.effect));
+      const EffectInfo* const same = find(left, info.name);
+      EXPECT_TRUE(same == nullptr || !same->on);
+      for (const EffectInfo& other : left) {
+        const EffectInfo* const before = find(all, other.name);
+        ASSERT_NE(before, nullptr) << other.name;
+        EXPECT_LE(other.on, before->on) << other.name;
+        if (before->on && !may_end(info, *before)) {
+          EXPECT_TRUE(other.on) << other.name;
+        }
       }
     }
   }
 }
 
 TEST(Effects, VelocityProductsFollowFromTheJoints) {
-  const Scene scene = scene_of_all_effects();
+  const Scene& scene = scenes_of_all_effects().front();
   const Effect products{EffectKind::velocity_products};
   for (const Way way : {Way::removed, Way::zero, Way::idle})
     EXPECT_FALSE(has_way(products.kind, way));
@@ -226,26 +239,48 @@ TEST(Effects, VelocityProductsFollowFromTheJoints) {
   EXPECT_THROW(without(scene, {EffectKind::tactile, 2}), InputError);
 }
 
+/// State and workspace of a scene [bytes].
+std::pair<std::size_t, std::size_t> bytes_of(const Scene& scene) {
+  const Model model(scene);
+  return {model.state_bytes_per_environment(), Stepper::workspace_bytes(model)};
+}
+
 TEST(Effects, ASceneAllocatesNothingForWhatItDoesNotName) {
-  const Scene scene = scene_of_all_effects();
-  const Model all(scene);
-  const auto bytes = [&](EffectKind kind) {
-    const Model model(without(scene, {kind}));
-    return std::pair(model.state_bytes_per_environment(), Stepper::workspace_bytes(model));
-  };
-  const auto [state, workspace] =
-      std::pair(all.state_bytes_per_environment(), Stepper::workspace_bytes(all));
-  // Three numbers vary: that of a contact, of a sensor and of a joint.
-  EXPECT_EQ(bytes(EffectKind::varying_parameters).first, state - 3 * sizeof(double));
-  EXPECT_EQ(bytes(EffectKind::pair_contact).first, state - sizeof(double));
-  EXPECT_EQ(bytes(EffectKind::tactile).first, state - sizeof(double));
-  EXPECT_EQ(bytes(EffectKind::joint_damping).first, state - sizeof(double));
-  EXPECT_LT(bytes(EffectKind::pair_contact).second, workspace);
-  for (int k = 0; k < kEffectKinds; ++k) {
-    if (!has_way(static_cast<EffectKind>(k), Way::removed)) continue;
-    EXPECT_LE(bytes(static_cast<EffectKind>(k)).first, state) << k;
-    EXPECT_LE(bytes(static_cast<EffectKind>(k)).second, workspace) << k;
+  for (const Scene& scene : scenes_of_all_effects()) {
+    const auto [state, workspace] = bytes_of(scene);
+    for (int k = 0; k < kEffectKinds; ++k) {
+      const Effect effect{static_cast<EffectKind>(k)};
+      if (!has_way(effect.kind, Way::removed)) continue;
+      const auto [less_state, less_workspace] = bytes_of(without(scene, effect));
+      EXPECT_LE(less_state, state) << k;
+      EXPECT_LE(less_workspace, workspace) << k;
+    }
   }
+}
+
+TEST(Effects, BytesGoWithTheEffect) {
+  const Scene& scene = scenes_of_all_effects().front();
+  const auto [state, workspace] = bytes_of(scene);
+  const auto state_without = [&](EffectKind kind) {
+    return bytes_of(without(scene, {kind})).first;
+  };
+  // Three numbers vary: that of a contact, of a sensor and of a joint.
+  EXPECT_EQ(state_without(EffectKind::varying_parameters), state - 3 * sizeof(double));
+  EXPECT_EQ(state_without(EffectKind::pair_contact), state - sizeof(double));
+  EXPECT_EQ(state_without(EffectKind::tactile), state - sizeof(double));
+  EXPECT_EQ(state_without(EffectKind::joint_damping), state - sizeof(double));
+  EXPECT_LT(bytes_of(without(scene, {EffectKind::pair_contact})).second, workspace);
+  EXPECT_LT(bytes_of(without(scene, {EffectKind::feedback})).second, workspace);
+  // What friction remembers takes nothing where none does.
+  Scene forgetful = scenes_of_all_effects().back(), plain = scene;
+  for (const EffectKind kind :
+       {EffectKind::pair_memory, EffectKind::ground_memory, EffectKind::tactile_memory}) {
+    const std::size_t before = bytes_of(forgetful).first;
+    forgetful = without(forgetful, {kind});
+    EXPECT_LT(bytes_of(forgetful).first, before) << to_string(kind);
+  }
+  plain = without(plain, {EffectKind::sleeping});
+  EXPECT_EQ(bytes_of(forgetful), bytes_of(plain));
 }
 
 TEST(Effects, RemovedEqualsASceneThatNeverNamedIt) {
@@ -267,7 +302,7 @@ TEST(Effects, RemovedEqualsASceneThatNeverNamedIt) {
 }
 
 TEST(Effects, MotorsTakeTheirControlsWithThem) {
-  Scene scene = scene_of_all_effects();
+  Scene scene = scenes_of_all_effects().front();
   scene.control = PiecewiseControl{{0, 0.1}, {{1, 2, 3, 4}, {5, 6, 7, 8}}, 1};
   const Scene no_force = without(scene, {EffectKind::force_motors});
   EXPECT_EQ(std::get<PiecewiseControl>(*no_force.control).values,

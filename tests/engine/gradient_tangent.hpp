@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: Apache-2.0
+// The adjoint of a short run against derivatives forward in dual numbers.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include "engine/derivative/tangent.hpp"
+#include "tests/engine/gradient_run.hpp"
+
+namespace tangere::testing {
+
+/// Expects the change of a loss along random directions, of start, controls and numbers of the
+/// scene, to be that by the adjoint. Returns how many were compared; 0 if a step of the run finds
+/// no solution.
+inline int check_tangent(const Model& model, const StepperOptions& options, const RunInput& in,
+                         unsigned seed) {
+  const auto steps = static_cast<int>(in.u.size());
+  const StateLoss loss(model, steps, seed + 1);
+  if (!std::isfinite(loss_of_run(model, options, in, loss))) return 0;
+  const RunGradient adjoint = adjoint_of_run(model, options, {in}, loss, 0);
+  Random random(seed + 70);
+  const auto draw = [&](std::size_t count) {
+    std::vector<double> x(count);
+    for (double& a : x) a = random.normal();
+    return x;
+  };
+  const std::size_t nv = std::size_t(model.nv()), nu = std::size_t(model.nu());
+  StateTangent state{draw(nv), draw(nv), std::vector<double>(nv), std::vector<double>(nv)};
+  const NumberGradients numbers(model);
+  std::vector<double> change = draw(std::size_t(numbers.count()));
+  for (std::size_t k = 0; k < change.size(); ++k) change[k] *= numbers.infos()[k].value;
+  double reverse = 0, forward = 0;
+  for (std::size_t i = 0; i < nv; ++i)
+    reverse += adjoint.q[i] * state.q[i] + adjoint.v[i] * state.v[i];
+  for (std::size_t k = 0; k < change.size(); ++k) reverse += adjoint.parameters[k] * change[k];
+  Batch batch(model, 1);
+  batch.set_state(0, in.q, in.v);
+  std::vector<double> rows(std::size_t(parameter_rows(model)));
+  numbers.spread(change, batch, 0, rows);
+  Stepper stepper(model, options);
+  BlockTape tape(model, stepper.integrator(), steps);
+  tape.start(batch, 0);
+  for (const auto& u : in.u) stepper.step_block(batch, 0, u, &tape);
+  Tangent tangent(model, options);
+  Adjoint cotangents(model, options);  // of the loss by each state
+  for (int t = 0; t <= steps; ++t) {
+    cotangents.clear();
+    std::vector<double> q(std::size_t(model.nq()));
+    for (std::size_t i = 0; i < q.size(); ++i) q[i] = tape.state(t)[kBlock * i];
+    loss.add(t, q, cotangents.loss(0), 0);
+    for (std::size_t i = 0; i < nv; ++i)
+      forward += cotangents.loss(0).q[kBlock * i] * state.q[i] +
+                 cotangents.loss(0).v[kBlock * i] * state.v[i];
+    if (t == steps) break;
+    const std::vector<double> u_dot = draw(nu);
+    for (std::size_t k = 0; k < nu; ++k) reverse += adjoint.u[std::size_t(t) * nu + k] * u_dot[k];
+    tangent.step(batch, 0, 0, tape, t, in.u[std::size_t(t)], u_dot, rows, state);
+  }
+  EXPECT_NEAR(reverse, forward, 1e-9 * (std::abs(forward) + adjoint.norm()));
+  return 1;
+}
+
+}  // namespace tangere::testing
