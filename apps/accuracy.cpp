@@ -12,6 +12,7 @@
 #include "apps/machine.hpp"
 #include "apps/memory.hpp"
 #include "apps/named_value.hpp"
+#include "apps/pitch_report.hpp"
 #include "apps/scene_run.hpp"
 #include "apps/stop_signals.hpp"
 #include "apps/task_run.hpp"
@@ -69,7 +70,7 @@ using MakeEpisodes = std::function<std::optional<FixedEpisodes>(const AccuracyGo
 /// Ends with the report of a sweep.
 int report_sweep(const AccuracySubject& subject, const Console& console, const Model& model,
                  const AccuracyReport& report, int signal, TextOutput& svg, TextOutput& csv) {
-  console.print("\n" + advice_text(subject, report, model));
+  console.print(pitch_table(report.pitches, model) + "\n" + advice_text(subject, report, model));
   if (svg.wanted() && can_draw(report))
     svg.write(accuracy_svg(subject, report), console);
   else if (svg.wanted())

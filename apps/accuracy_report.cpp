@@ -9,17 +9,13 @@
 #include <functional>
 #include <nlohmann/json.hpp>
 
+#include "apps/pitch_report.hpp"
 #include "io/picture/precision_plot.hpp"
 
 namespace tangere::apps {
 namespace {
 
 constexpr double kNotable = 0.01;  // share of a force's energy that is worth a sentence
-
-std::string percent(double error) {
-  if (!std::isfinite(error)) return "-";
-  return error < 0.1 ? fmt::format("{:.2g} %", 100 * error) : fmt::format("{:.0f} %", 100 * error);
-}
 
 std::string setting_text(const AccuracySetting& setting, double step) {
   if (setting.accuracy > 0)
@@ -98,6 +94,11 @@ void add_curve(PrecisionPlot& plot, const AccuracyReport& report, const std::str
 
 }  // namespace
 
+std::string percent(double error) {
+  if (!std::isfinite(error)) return "-";
+  return error < 0.1 ? fmt::format("{:.2g} %", 100 * error) : fmt::format("{:.0f} %", 100 * error);
+}
+
 std::string accuracy_heading(const AccuracySubject& subject, const FixedEpisodes& episodes) {
   return fmt::format(
       "{}: {} of {} environments over {:g} s, sampled every {:g} ms, against a reference; {}; {}\n"
@@ -157,10 +158,11 @@ std::string advice_text(const AccuracySubject& subject, const AccuracyReport& re
   const std::string fields = subject.quantity == AccuracyQuantity::tactile
                                  ? fmt::format(", {} fields", to_string(best.precision))
                                  : std::string();
-  return fmt::format("{}For {} use {}{}: {} at {:.4g} simulated seconds per CPU second.{}{}",
+  return fmt::format("{}For {} use {}{}: {} at {:.4g} simulated seconds per CPU second.{}{}{}",
                      report.stopped ? "Stopped: of the settings so far: " : "",
                      percent(subject.target), setting_text(best.setting, best.step), fields,
-                     percent(best.error), best.rate, others, own);
+                     percent(best.error), best.rate, others, own,
+                     pitch_advice(report.pitches, model, subject.target));
 }
 
 Json accuracy_json(const AccuracySubject& subject, const AccuracyReport& report,
@@ -193,6 +195,7 @@ Json accuracy_json(const AccuracySubject& subject, const AccuracyReport& report,
             {"envs", report.reference.environments}}},
           {"points", points_json(report.points)},
           {"tolerances", points_json(report.tolerances)},
+          {"pitches", pitches_json(report.pitches, model)},
           {"own", report.own.rate > 0 ? point_json(report.own) : Json()},
           {"vibration", vibration},
           {"advice", advice}};

@@ -6,10 +6,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <functional>
 
 #include "engine/base/as_size.hpp"
 #include "engine/step/stepper.hpp"
+#include "tasks/accuracy/quantiles.hpp"
 
 namespace tangere {
 namespace {
@@ -23,15 +23,6 @@ constexpr std::array kTolerances = {1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e
 constexpr int kPasses = 3;
 constexpr double kEnoughSeconds = 0.3;  // of CPU time, after which a pass is not repeated
 constexpr double kBlur = 10, kFineEnough = 40;
-
-/// The value that `share` of the numbers do not exceed. NaN entries do not count.
-double quantile(std::vector<double> numbers, double share) {
-  std::erase_if(numbers, [](double x) { return std::isnan(x); });
-  if (numbers.empty()) return std::nan("");
-  std::sort(numbers.begin(), numbers.end());
-  const double rank = std::ceil(share * static_cast<double>(numbers.size()));
-  return numbers[as_size(std::max(0, static_cast<int>(rank) - 1))];
-}
 
 /// Share of the errors that are 0.3 to 3 times `wanted`. NaN entries do not count.
 double share_near(double wanted, const std::vector<double>& errors) {
@@ -70,7 +61,7 @@ class Sweep {
     if (report_.reference.environments == 0) return std::move(report_);  // the reference failed
     if (!measure_points()) return stop();
     choose();
-    if (!measure_own() || !measure_tolerances()) return stop();
+    if (!measure_own() || !measure_tolerances() || !measure_pitches()) return stop();
     return std::move(report_);
   }
 
@@ -260,6 +251,12 @@ class Sweep {
     return true;
   }
 
+  bool measure_pitches() {
+    if (options_.quantity != AccuracyQuantity::tactile) return true;
+    report_.pitches = sweep_pitches(episodes_, options_.target, listener_.go_on);
+    return !report_.pitches.empty();
+  }
+
   const FixedEpisodes& episodes_;
   const AccuracyOptions& options_;
   const AccuracyListener& listener_;
@@ -269,26 +266,6 @@ class Sweep {
 };
 
 }  // namespace
-
-double sure_quantile(std::vector<double> numbers, double share) {
-  std::erase_if(numbers, [](double x) { return std::isnan(x); });
-  if (numbers.empty()) return std::nan("");
-  std::sort(numbers.begin(), numbers.end(), std::greater<>());
-  const double beyond = 1 - share, n = static_cast<double>(numbers.size());
-  // Chances of k larger ones, by logarithms: shareⁿ is no number for many environments.
-  const auto chance = [&](double k) {
-    return std::exp(std::lgamma(n + 1) - std::lgamma(k + 1) - std::lgamma(n - k + 1) +
-                    k * std::log(beyond) + (n - k) * std::log(share));
-  };
-  double sum = chance(0);
-  std::size_t larger = 0;
-  while (larger + 1 < numbers.size()) {
-    sum += chance(static_cast<double>(larger + 1));
-    if (sum > beyond) break;
-    ++larger;
-  }
-  return numbers[larger];
-}
 
 AccuracyReport accuracy_sweep(const FixedEpisodes& episodes, const AccuracyOptions& options,
                               const AccuracyListener& listener) {

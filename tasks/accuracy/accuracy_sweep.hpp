@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "tasks/accuracy/accuracy_run.hpp"
+#include "tasks/accuracy/pitch_sweep.hpp"
 #include "tasks/accuracy/vibration.hpp"
 
 namespace tangere {
@@ -55,6 +56,7 @@ struct AccuracyReport {
   /// Scheme by step by precision, then steps that are cut to keep an accuracy.
   std::vector<AccuracyPoint> points;
   std::vector<AccuracyPoint> tolerances;  ///< tolerances alone, at the setting of the advice
+  std::vector<PitchSweep> pitches;        ///< of tactile fields: every sensor
   AccuracyPoint own;                      ///< the scene's setting: its scheme, step and tolerance
   int advice = -1;  ///< index of the cheapest point whose bound meets the target; -1: none does
   bool resolved = false;  ///< the reference is accurate enough to judge by
@@ -68,11 +70,6 @@ struct AccuracyListener {
   std::function<void(const AccuracyReference&)> reference;      ///< each attempt, ever finer
   std::function<void(std::span<const AccuracyPoint>)> setting;  ///< in every precision
 };
-
-/// The value below which `share` of the population lies with that confidence, from which the
-/// numbers were drawn. Of n numbers k are larger, the most for which P(Binomial(n, 1 - share) ≤ k)
-/// is at most 1 - share. The largest number where there is no such k. NaN entries do not count.
-double sure_quantile(std::vector<double> numbers, double share);
 
 /// A stop leaves what there is by then. Throws InputError when nothing touches in any environment,
 /// or nothing moves.

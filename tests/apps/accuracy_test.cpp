@@ -46,6 +46,13 @@ TEST(Accuracy, NamesTheCheapestSettingAndDrawsTheOthers) {
                 advice.at("simulated_seconds_per_cpu_second"));
     }
   }
+  const json& pitches = answer.at("pitches").at(0);
+  EXPECT_EQ(pitches.at("sensor"), "pad");
+  EXPECT_EQ(pitches.at("points").size(), 5);
+  EXPECT_EQ(pitches.at("points").at(3).at("own"), true);
+  EXPECT_EQ(pitches.at("reference").at("rows"), 128);
+  EXPECT_THAT(advice.at("text").get<std::string>(),
+              HasSubstr("keeps the force on 'pad' within 3 %"));
   tinyxml2::XMLDocument picture;
   EXPECT_EQ(picture.LoadFile(folder.path("cost.svg").c_str()), tinyxml2::XML_SUCCESS);
   EXPECT_THAT(file_bytes(folder.path("cost.csv")),

@@ -11,6 +11,7 @@
 
 #include "io/scene/scene_reader.hpp"
 #include "tasks/accuracy/accuracy_sweep.hpp"
+#include "tasks/accuracy/quantiles.hpp"
 #include "tasks/run/episode_program.hpp"
 #include "tests/tasks/task_check.hpp"
 
