@@ -55,7 +55,7 @@ CAPPED = "bc.py out/learning/caps --epochs 20 --before 3 --width 512"
 EXPERIMENTS = [
     Experiment("gd-touch", "gd.py box_pushing --touch 0.05 --limit 30 --envs 64 --updates 600", 5,
                310, "GD, goal and touch", "0.058 m, 0.074"),
-    Experiment("ppo-box", "ppo.py box_pushing", 5, 190, "PPO, goal and touch", "0.123 m, 0.241"),
+    Experiment("ppo-box", "ppo.py box_pushing", 5, 1800, "PPO, goal and touch", "0.123 m, 0.241"),
     Experiment("gd-privileged", "gd.py box_pushing_privileged", 5, 60,
                "GD, goal and box", "0.037 m, 0.043"),
     Experiment("gd-reduced", "gd.py box_pushing_reduced", 5, 60, "GD, goal", "0.126 m, 0.255"),
