@@ -85,13 +85,22 @@ def signature(node: ast.FunctionDef, owner: str, prefix: str) -> list[str]:
     one = f"{prefix}{name}({', '.join(words)}{ends}"
     if len(one) <= WIDTH - 4:
         return [one]
-    lines, line = [f"{prefix}{name}("], "   "
+    lines = [f"{prefix}{name}(", *lines_of(words), ends] if words else [f"{prefix}{name}({ends}"]
+    if len(lines[-1]) > WIDTH:  # a long tuple
+        start, _, parts = lines.pop().partition("[")
+        lines += [f"{start}[", *lines_of(split_at_commas(parts[:-1])), "]"]
+    return lines
+
+
+def lines_of(words: list[str]) -> list[str]:
+    """Indented lines of words, a comma between two."""
+    lines, line = [], "   "
     for word in words:
         if len(line) + len(word) + 2 > WIDTH - 4:
             lines.append(line)
             line = "   "
-        line += f" {word},"
-    return [*lines, line.rstrip(","), ends]
+        line += f" {word.strip()},"
+    return [*lines, line.rstrip(",")]
 
 
 def split_at_commas(text: str) -> list[str]:

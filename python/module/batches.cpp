@@ -355,8 +355,8 @@ void add_batches(nb::module_& m) {
            "to fill instead of a new one.")
       .def("set_state", &PythonBatch::set_state, "q"_a, "v"_a, "envs"_a = nb::none(),
            "Sets states: `q` (n, nq) or (nq), `v` (n, nv) or (nv), of the environments listed in\n"
-           "`envs` (indices, or a mask (E)), or of all. Releases a failed environment; forgets the "
-           "state one step before.")
+           "`envs` (indices, or a mask (E)), or of all. Releases a failed environment and forgets\n"
+           "the state one step before.")
       .def("reset", &PythonBatch::reset, "envs"_a = nb::none(), "episodes"_a = nb::none(),
            "Draws the starting states again, or those of other `episodes`.")
       .def("scene_controls", &PythonBatch::scene_controls, "steps"_a,
