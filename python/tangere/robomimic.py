@@ -39,8 +39,8 @@ class EnvTangere(EnvBase):  # type: ignore[misc]
     env_name: the Gymnasium id of the task, such as "tangere/BoxPushing-v0".
     task: its name, as `env_kwargs` of a file have it. None: the one that env_name names.
     seed, first_episode: of the first episode. None: a seed from the system.
-    render, render_offscreen, use_image_obs, use_depth_obs: must be False, because there are no
-        pictures.
+    render, render_offscreen, use_image_obs, use_depth_obs: must be False, because there are
+        no pictures.
     postprocess_visual_obs, lang: have no meaning here.
     """
 
