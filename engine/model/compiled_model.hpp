@@ -73,8 +73,9 @@ struct CompiledSensor {
   std::vector<int> tile_kind;                                 ///< (n_tiles)
   AlignedVector<double> offsets;  ///< (4, 2, 64) flat, (n_tiles, 3, 64) curved
   AlignedVector<float> offsets_f;
-  std::vector<int> index;                 ///< (n_tiles, 64) curved, empty: flat
-  AlignedVector<double> frames, factors;  ///< (n_tiles, 9, 64), (n_tiles, 4, 64) or empty
+  std::vector<int> index;  ///< (n_tiles, 64) curved, empty: flat
+  AlignedVector<double> frames,
+      factors;  ///< (n_tiles, 9 and kPointCoefficients, 64); no factors: all 1
   AlignedVector<float> frames_f, factors_f;
   /// Spheres around eight tiles each, pad axes [m]: (n_tiles / 8, padded to 8).
   AlignedVector<double> eight_x, eight_y, eight_z, eight_radius;
@@ -100,7 +101,7 @@ struct CompiledSensor {
   /// Points of an elastic sensor in the order of the tiles of its contacts.
   std::vector<int> in_field;          ///< (n) number in the field
   std::vector<double> point_axes;     ///< (n, 9) rows axis0, axis1, -normal; axes of the link
-  std::vector<double> point_factors;  ///< (n, 4) or empty: all 1
+  std::vector<double> point_factors;  ///< (n, kPointCoefficients) or empty: all 1
 
   /// Earlier states on which a reading depends.
   [[nodiscard]] int past_states() const {

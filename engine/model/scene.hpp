@@ -50,7 +50,21 @@ struct JointEffects {
   double stiffness = 0;        ///< force = -stiffness (q - rest) [N/m or N m/rad]
   double limit_stiffness = 0;  ///< force per distance of q outside the limits [N/m or N m/rad]
   std::optional<std::array<double, 2>> limits;  ///< low, high [m or rad]
+
+  /// The four numbers, in the order of effect_field().
+  double& operator[](std::size_t k) { return this->*kOrder[k]; }
+  const double& operator[](std::size_t k) const { return this->*kOrder[k]; }
+  /// Whether number k acts. A stiffness of limits acts where there are limits.
+  [[nodiscard]] bool acts(std::size_t k) const {
+    return (*this)[k] != 0 && (kOrder[k] != &JointEffects::limit_stiffness || limits);
+  }
+
+ private:
+  static constexpr double JointEffects::*kOrder[] = {
+      &JointEffects::damping, &JointEffects::armature, &JointEffects::stiffness,
+      &JointEffects::limit_stiffness};
 };
+inline constexpr std::size_t kJointEffects = 4;
 
 struct JointDescription : JointEffects {
   std::string name;
@@ -156,10 +170,11 @@ struct RectArray {
 
 /// A tactile point with its own position and axes, in the body frame.
 struct TactilePoint {
-  Vector3 position{};                         ///< [m]
-  Vector3 normal{}, axis0{}, axis1{};         ///< unit
-  std::array<int, 2> pixel{-1, -1};           ///< row and column in an image; -1: none
-  std::array<double, 4> factors{1, 1, 1, 1};  ///< multiply the sensor's kn, kt, mu, damping
+  Vector3 position{};                  ///< [m]
+  Vector3 normal{}, axis0{}, axis1{};  ///< unit
+  std::array<int, 2> pixel{-1, -1};    ///< row and column in an image; -1: none
+  /// Multiply the sensor's coefficients (factor_index()).
+  std::array<double, kPointCoefficients> factors{1, 1, 1, 1};
 };
 
 /// Markers that are printed on a gel, one at every point: what a camera behind it sees

@@ -3,8 +3,11 @@
 // <randomize>, gradients, identification and every file.
 #pragma once
 
+#include <cstddef>
 #include <span>
 #include <string>
+
+#include "kernels/contact/contact_types.hpp"
 
 namespace tangere {
 
@@ -39,7 +42,7 @@ enum class NumberField {
   scale
 };
 /// Returns how far a field is from the first of its kind.
-constexpr int from(NumberField first, NumberField field) {
+constexpr int offset_from(NumberField first, NumberField field) {
   return static_cast<int>(field) - static_cast<int>(first);
 }
 
@@ -72,10 +75,15 @@ const NumberKind& number_kind(NumberOwner owner, NumberField field);
 
 /// Returns the field of coefficient k of a contact or a sensor. coefficient_index() is the inverse.
 constexpr NumberField coefficient_field(int k) {
-  return k < 4 ? static_cast<NumberField>(k) : NumberField::ks;
+  return k < kPointCoefficients ? static_cast<NumberField>(k) : NumberField::ks;
 }
 constexpr std::size_t coefficient_index(NumberField field) {
-  return field == NumberField::ks ? 4 : static_cast<std::size_t>(from(NumberField::kn, field));
+  return field == NumberField::ks ? kCoefficients - 1
+                                  : static_cast<std::size_t>(offset_from(NumberField::kn, field));
+}
+/// Returns the field of number k of JointEffects.
+constexpr NumberField effect_field(std::size_t k) {
+  return static_cast<NumberField>(offset_from(NumberField::kn, NumberField::damping) + int(k));
 }
 inline constexpr int kScaleIndex = 5;  ///< of the scale of a mesh in size_number()
 /// Returns number `which` of a body's size (size_number). size_index() is the inverse.
@@ -83,7 +91,7 @@ SceneNumber size_of_body(const std::string& body, int which);
 inline int size_index(const SceneNumber& number) {
   return number.field == NumberField::scale
              ? kScaleIndex
-             : from(NumberField::radius, number.field) + number.component;
+             : offset_from(NumberField::radius, number.field) + number.component;
 }
 /// Whether it is a number of the starting state.
 inline bool is_of_start(const SceneNumber& number) {

@@ -88,10 +88,7 @@ TrajectoryLayout layout_from(const Batch& batch, const Stepper& stepper,
     layout.sensors.push_back(
         sensor_layout(model.sensors()[i], scene.sensors[i], run.tactile_intervals[i]));
   layout.fields = run.fields ? *run.fields : whole_fields(model);
-  for (const StepStatus status :
-       {StepStatus::converged, StepStatus::split, StepStatus::coarse, StepStatus::passed,
-        StepStatus::damped, StepStatus::not_converged, StepStatus::non_finite, StepStatus::rotation,
-        StepStatus::singular})
+  for (const StepStatus status : step_statuses())
     layout.statuses.push_back({static_cast<std::int8_t>(status), to_string(status)});
   describe_randomized(scene, layout);
   const int varied = static_cast<int>(layout.randomized_names.size());

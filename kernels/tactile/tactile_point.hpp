@@ -131,7 +131,8 @@ bool point_force(const Shape& shape, const PointLaw<N>& law, const typename P::O
   return true;
 }
 
-/// Returns the coefficients of points that have factors of their own. `factors`: (4, 64).
+/// Returns the coefficients of points that have factors of their own. `factors`:
+/// (kPointCoefficients, 64).
 template <class P, class N = typename P::N>
 PointLaw<N> scaled_law(const PointLaw<N>& law, const typename P::Real* factors) {
   const auto factor = [&](int k) { return P::load(factors + k * kTactileTile); };
