@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "engine/model/compiled_model.hpp"
+#include "engine/model/frames.hpp"
 #include "kernels/contact/distance.hpp"
 #include "kernels/numbers/dual.hpp"
 
@@ -183,6 +184,14 @@ std::vector<double> points_on(const Shape& shape) {
   return points_of(std::get<S>(shape));
 }
 
+// --- widths ---
+
+HalfWidths ball_widths(const Vector3& s) { return {{}, {s[0], s[0], s[0]}}; }
+HalfWidths cuboid_widths(const Vector3& s) { return {s, {}}; }
+HalfWidths cylinder_widths(const Vector3& s) { return {{0, 0, s[1]}, {s[0], s[0], 0}}; }
+HalfWidths capsule_widths(const Vector3& s) { return {{0, 0, s[1]}, {s[0], s[0], s[0]}}; }
+HalfWidths ellipsoid_widths(const Vector3& s) { return {{}, s}; }
+
 // --- the table ---
 
 template <class S>
@@ -229,7 +238,8 @@ const std::vector<ShapeRow>& table() {
        .distance = PrimitiveShape::sphere,
        .sizes = {{0, 0, 1, radius<SphereShape>}},
        .mass = mass_of<BallMass>,
-       .mass_by_size = mass_slope<BallMass>},
+       .mass_by_size = mass_slope<BallMass>,
+       .half_widths = ball_widths},
       {.name = "cuboid",
        .make = make<CuboidShape>,
        .distance = PrimitiveShape::cuboid,
@@ -239,7 +249,8 @@ const std::vector<ShapeRow>& table() {
                    {cuboid_nodes<0>, cuboid_nodes<1>, cuboid_nodes<2>}}},
        .mass = mass_of<CuboidMass>,
        .mass_by_size = mass_slope<CuboidMass>,
-       .points = points_on<CuboidShape>},
+       .points = points_on<CuboidShape>,
+       .half_widths = cuboid_widths},
       {.name = "cylinder",
        .make = make<CylinderShape>,
        .distance = PrimitiveShape::cylinder,
@@ -252,7 +263,8 @@ const std::vector<ShapeRow>& table() {
                    {count<CylinderShape, &CylinderShape::contact_rings>}}},
        .mass = mass_of<CylinderMass>,
        .mass_by_size = mass_slope<CylinderMass>,
-       .points = points_on<CylinderShape>},
+       .points = points_on<CylinderShape>,
+       .half_widths = cylinder_widths},
       {.name = "capsule",
        .make = make<CapsuleShape>,
        .distance = PrimitiveShape::capsule,
@@ -263,7 +275,8 @@ const std::vector<ShapeRow>& table() {
                     count<CapsuleShape, &CapsuleShape::contact_angles>}}},
        .mass = mass_of<CapsuleMass>,
        .mass_by_size = mass_slope<CapsuleMass>,
-       .points = points_on<CapsuleShape>},
+       .points = points_on<CapsuleShape>,
+       .half_widths = capsule_widths},
       {.name = "ellipsoid",
        .make = make<EllipsoidShape>,
        .distance = PrimitiveShape::ellipsoid,
@@ -274,8 +287,12 @@ const std::vector<ShapeRow>& table() {
        .mass = mass_of<EllipsoidMass>,
        .mass_by_size = mass_slope<EllipsoidMass>,
        .points = points_on<EllipsoidShape>,
+       .half_widths = ellipsoid_widths,
        .slenderness = 100},
-      {.name = "plane", .make = make<PlaneShape>, .distance = PrimitiveShape::plane},
+      {.name = "plane",
+       .make = make<PlaneShape>,
+       .distance = PrimitiveShape::plane,
+       .bounded = false},
       {.name = "mesh",
        .make = make<MeshShape>,
        .distance = PrimitiveShape::mesh,
@@ -384,6 +401,13 @@ MassProperties mass_properties(const Shape& shape, double density) {
   const ShapeRow& row = row_of(shape);
   return row.mass != nullptr ? row.mass(shape, density) : centred({0, 0, 0, 0});
 }
+std::array<double, 6> solid_inertia(const Shape& shape, double mass) {
+  const MassProperties dense = mass_properties(shape, 1);
+  const double density = row_of(shape).sizes.empty() ? 1 : mass / dense.mass;
+  const auto& i = dense.inertia.m;
+  return {density * i[0][0], density * i[0][1], density * i[0][2],
+          density * i[1][1], density * i[1][2], density * i[2][2]};
+}
 MassProperties mass_properties_by_size(const Shape& shape, double density, int which) {
   return row_of(shape).mass_by_size(shape, density, which);
 }
@@ -425,22 +449,12 @@ bool is_convex(const Shape& shape) {
 }
 
 kernels::Hull hull_of(const CompiledBody& body) {
-  const kernels::Vec3<double>& s = body.size;
-  const auto hull = [&](const kernels::Vec3<double>& straight, const kernels::Vec3<double>& round) {
-    const double most = std::max({round.x, round.y, round.z});
-    return kernels::Hull{body.frame, straight, round, most > 0,
-                         std::sqrt(dot(straight, straight)) + most};
-  };
-  switch (body.shape) {
-    case PrimitiveShape::cuboid: return hull(s, {});
-    case PrimitiveShape::cylinder: return hull({0, 0, s.y}, {s.x, s.x, 0});
-    case PrimitiveShape::capsule: return hull({0, 0, s.y}, {s.x, s.x, s.x});
-    case PrimitiveShape::ellipsoid: return hull({}, s);
-    case PrimitiveShape::sphere: return hull({}, {s.x, s.x, s.x});
-    case PrimitiveShape::plane:
-    case PrimitiveShape::mesh: break;
-  }
-  return hull({}, {});
+  const ShapeRow& row = row_of(body.shape);
+  if (row.half_widths == nullptr) return {body.frame, {}, {}, false, 0};
+  const HalfWidths half = row.half_widths({body.size.x, body.size.y, body.size.z});
+  const kernels::Vec3<double> straight = vec3_of(half.straight), round = vec3_of(half.round);
+  const double most = std::max({round.x, round.y, round.z});
+  return {body.frame, straight, round, most > 0, std::sqrt(dot(straight, straight)) + most};
 }
 
 std::array<double, 3> widths(const Shape& shape) {
@@ -450,6 +464,18 @@ std::array<double, 3> widths(const Shape& shape) {
   const kernels::Hull hull = hull_of(body);
   const kernels::Vec3<double> half = hull.straight + hull.round;
   return {2 * half.x, 2 * half.y, 2 * half.z};
+}
+
+SurfaceDistance distance_from(const Shape& shape, const Vector3& point) {
+  CompiledBody body;
+  place_shape(shape, body);
+  if (!body.touchable)
+    throw InputError("the distance from " + with_article(shape_name(shape)) +
+                     "; expected a shape whose distance is a formula");
+  return kernels::with_distance<double>(body.shape, body.size, [&](const auto& solid) {
+    const kernels::Distance<double> at = kernels::distance_at(solid, vec3_of(point));
+    return SurfaceDistance{at.d, {at.n.x, at.n.y, at.n.z}};
+  });
 }
 
 }  // namespace tangere
