@@ -200,8 +200,9 @@ bool GroupStep::take_part(const kernels::KernelTable& table, SingleWorkspace& w,
   };
   // Where one scheme finds no root of a shortest part, the equations of another may have one.
   const bool lost = one.found == 0 && depth == kDeepestSplit;
-  if ((one.created != 0 || lost) && scheme->order > 1) {
-    try_by(Integrator::bdf1.scheme());
+  if (const Scheme* const of_gains = scheme->of_gains();
+      of_gains != nullptr && (one.created != 0 || lost)) {
+    try_by(*of_gains);
   } else if (one.turned != 0 || lost) {
     try_by(scheme->of_turns());
   }
@@ -301,8 +302,11 @@ void GroupStep::advance_plainly(const kernels::KernelTable& table, BasicWorkspac
       if (has(done, l)) note(w, l, by, h, solves_of(l));
   };
   if (starting != 0) take_by(*scheme.start, starting);
-  if (scheme.order > 1 && created != 0) take_by(Integrator::bdf1.scheme(), created);
-  if (scheme.order == 1 && turned != 0) take_by(scheme.of_turns(), turned);
+  if (const Scheme* const of_gains = scheme.of_gains(); of_gains != nullptr) {
+    if (created != 0) take_by(*of_gains, created);
+  } else if (turned != 0) {
+    take_by(scheme.of_turns(), turned);
+  }
   for (int l = 0; l < L; ++l) {
     if (!has(lanes & ~resolved, l)) continue;
     const bool has_root = has(passed | created | turned, l);
