@@ -6,12 +6,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include "engine/model/compile_effects.hpp"
 #include "engine/model/compile_imperfections.hpp"
 #include "engine/model/compile_joints.hpp"
 #include "engine/model/compile_markers.hpp"
 #include "engine/model/compile_memories.hpp"
 #include "engine/model/compile_variations.hpp"
-#include "engine/model/effects_and_stages.hpp"
 #include "engine/model/frames.hpp"
 #include "engine/model/group_contacts.hpp"
 #include "engine/model/shapes.hpp"
