@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "engine/model/compiled_model.hpp"
+#include "engine/model/model.hpp"
 #include "engine/step/control.hpp"
 #include "engine/step/detection.hpp"
 #include "engine/step/group_step.hpp"

@@ -230,15 +230,6 @@ struct Adjoint::Impl {
   }
 };
 
-std::span<double> BlockCotangent::points_of(const Model& model, int sensor, int lane) {
-  if (points.empty()) return {};
-  const auto size = [](int n) { return std::size_t(n) * std::size_t(kPointNumbers); };
-  return std::span(points)
-      .subspan(points.size() / kBlock * std::size_t(lane))
-      .subspan(size(first_tactile_point(model, sensor)),
-               size(model.sensors()[std::size_t(sensor)].points));
-}
-
 Adjoint::Adjoint(const Model& model, const StepperOptions& options, const AdjointOptions& wanted)
     : impl_(std::make_unique<Impl>(model, step_settings(model, options), wanted)) {
   refuse_sleep(model, impl_->settings);

@@ -12,7 +12,7 @@
 namespace tangere {
 
 using kernels::kBlock;
-using D = DualNumber;
+using D = kernels::Dual<double>;
 
 namespace {
 

@@ -1,14 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // Joints become chains of elementary links, with coordinates, effects, motors and a starting state.
 #include "engine/model/compile_joints.hpp"
-#include "engine/model/frames.hpp"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <iterator>
 
-#include "engine/model/compile_variations.hpp"
+#include "engine/model/frames.hpp"
 
 namespace tangere {
 
@@ -267,7 +265,6 @@ void compile_initial_state(CompiledModel& m, const NameIndex& joints) {
 
 void vary_joint(CompiledModel& m, int joint, const RandomizationDescription& d, int row) {
   const NumberField field = d.number.field;
-  if (field == NumberField::pos) return vary_place(m, joint, d, row);
   const CompiledJoint& compiled = m.joints[std::size_t(joint)];
   const JointDescription& of = m.scene.links[std::size_t(joint)].joint;
   const auto fail = [&](const std::string& why) {

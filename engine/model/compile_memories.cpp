@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "engine/model/compiled_model.hpp"
+#include "engine/model/contact_tiles.hpp"
 #include "engine/model/frames.hpp"
 #include "engine/model/group_contacts.hpp"
 #include "kernels/step/arguments.hpp"

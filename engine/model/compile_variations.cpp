@@ -9,6 +9,7 @@
 
 #include "engine/model/compile_joints.hpp"
 #include "engine/model/frames.hpp"
+#include "engine/model/mass_properties.hpp"
 #include "engine/model/shapes.hpp"
 
 namespace tangere {
@@ -198,7 +199,7 @@ void update_derived_rows(const CompiledModel& m, double* column) {
     Shape shape = m.scene.links[std::size_t(size.body)].body.shape;
     for (const VaryingNumber& n : size.numbers)
       *size_number(shape, n.which) = column[n.row * kBlock];
-    put(size.row, kernels_size(shape));
+    put(size.row, vec3_of(size_in_kernels(shape)));
   }
   for (const VaryingPlace& place : m.varying_places) {
     Pose pose = m.scene.links[std::size_t(place.joint)].joint.pose;

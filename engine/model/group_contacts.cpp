@@ -6,6 +6,7 @@
 #include <cmath>
 #include <span>
 
+#include "engine/model/body_shape.hpp"
 #include "engine/model/compiled_model.hpp"
 #include "engine/model/shapes.hpp"
 #include "kernels/contact/distance.hpp"

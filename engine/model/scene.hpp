@@ -12,32 +12,19 @@
 
 #include "engine/base/error.hpp"
 #include "engine/base/vector3.hpp"
-#include "engine/model/scene_number.hpp"
+#include "engine/model/number_address.hpp"
+#include "engine/model/outer_pose.hpp"
 #include "engine/model/scheme.hpp"
 #include "engine/model/sensor_imperfections.hpp"
 #include "kernels/contact/contact_types.hpp"
 
 namespace tangere {
 
-using Quaternion = std::array<double, 4>;  ///< w x y z, unit length
-
 enum class JointType { fixed, revolute, prismatic, planar, translational, free2d, spherical, free };
 enum class MotorControl { force, position };
 /// When a position motor's force is computed. end: implicit, stable for any gain. start: the
 /// published explicit law, unstable once h D/I exceeds 2.
 enum class MotorTiming { end, start };
-
-/// A frame relative to another: x_outer = R(orientation) x_inner + position [m].
-struct Pose {
-  Vector3 position{0, 0, 0};
-  Quaternion orientation{1, 0, 0, 0};
-};
-/// Return a point and a direction of the inner frame, expressed in the outer frame.
-Vector3 outer_point(const Pose& pose, const Vector3& point);
-Vector3 outer_direction(const Pose& pose, const Vector3& direction);
-/// Returns `pose` expressed in the last frame of `way`. Each frame of `way` is given in the one
-/// before. `pose` is given in the same frame as the first.
-Pose pose_at_end(std::span<const Pose> way, const Pose& pose);
 
 /// Coefficients of one penalty contact or tactile point.
 using ContactCoefficients = Coefficients<double>;

@@ -4,8 +4,6 @@
 
 #include <algorithm>
 
-#include "engine/model/scene.hpp"
-
 namespace tangere {
 namespace {
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Time-stepping schemes as values. A scheme is a row of numbers that the step, the tape, the
-// adjoint and the tangent read. Which scheme takes a step that another cannot take is said here too.
+// adjoint and the tangent read. Which scheme takes a step that another cannot take is said here
+// too.
 //
 // A step of length h from (q₀, v₀) has one implicit solve per stage, for the displacement x from
 // q₀:

@@ -6,8 +6,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "engine/model/compiled_model.hpp"
+#include "engine/base/vector3.hpp"
 #include "engine/model/frames.hpp"
+#include "engine/model/mass_properties.hpp"
 #include "kernels/contact/distance.hpp"
 #include "kernels/numbers/dual.hpp"
 
@@ -417,62 +418,28 @@ std::vector<double> contact_points(const Shape& shape) {
   return row.points != nullptr ? row.points(shape) : std::vector<double>{};
 }
 
-kernels::Vec3<double> kernels_size(const Shape& shape) {
-  kernels::Vec3<double> size{};
+Vector3 size_in_kernels(const Shape& shape) {
+  Vector3 size{0, 0, 0};
   for (const SizeNumber& s : row_of(shape).sizes)
     // NOLINTNEXTLINE(cppcoreguidelines-pro-type-const-cast): only read
-    (&size.x)[s.component] = s.scale * *s.at(const_cast<Shape&>(shape));
+    size[std::size_t(s.component)] = s.scale * *s.at(const_cast<Shape&>(shape));
   return size;
 }
 
-void place_shape(const Shape& shape, CompiledBody& body) {
-  const ShapeRow& row = row_of(shape);
-  body.touchable = row.distance.has_value() && row.distance != PrimitiveShape::mesh;
-  if (row.distance.has_value()) body.shape = *row.distance;
-  body.size = kernels_size(shape);
-  if (body.touchable) {
-    body.extent = std::sqrt(dot(body.size, body.size));
-    return;
-  }
-  const std::vector<double> p = contact_points(shape);
-  for (std::size_t k = 0; k < p.size(); k += 3)
-    body.extent = std::max(body.extent, std::hypot(p[k], p[k + 1], p[k + 2]));
-}
-
-kernels::Solid solid_of(const Shape& shape, const CompiledBody& body) {
-  return {body.frame, row_of(shape).stretches(), body.shape, body.size};
-}
-
-bool is_convex(const Shape& shape) {
-  return row_of(shape).stretches() && row_of(shape).distance.has_value() &&
-         !std::holds_alternative<MeshShape>(shape);
-}
-
-kernels::Hull hull_of(const CompiledBody& body) {
-  const ShapeRow& row = row_of(body.shape);
-  if (row.half_widths == nullptr) return {body.frame, {}, {}, false, 0};
-  const HalfWidths half = row.half_widths({body.size.x, body.size.y, body.size.z});
-  const kernels::Vec3<double> straight = vec3_of(half.straight), round = vec3_of(half.round);
-  const double most = std::max({round.x, round.y, round.z});
-  return {body.frame, straight, round, most > 0, std::sqrt(dot(straight, straight)) + most};
-}
-
 std::array<double, 3> widths(const Shape& shape) {
-  CompiledBody body;
-  place_shape(shape, body);
-  if (!body.touchable) return {0, 0, 0};
-  const kernels::Hull hull = hull_of(body);
-  const kernels::Vec3<double> half = hull.straight + hull.round;
-  return {2 * half.x, 2 * half.y, 2 * half.z};
+  const ShapeRow& row = row_of(shape);
+  if (row.half_widths == nullptr) return {0, 0, 0};
+  const HalfWidths half = row.half_widths(size_in_kernels(shape));
+  return 2.0 * (half.straight + half.round);
 }
 
 SurfaceDistance distance_from(const Shape& shape, const Vector3& point) {
-  CompiledBody body;
-  place_shape(shape, body);
-  if (!body.touchable)
+  const std::optional<PrimitiveShape> kind = row_of(shape).distance;
+  if (!kind || kind == PrimitiveShape::mesh)
     throw InputError("the distance from " + with_article(shape_name(shape)) +
                      "; expected a shape whose distance is a formula");
-  return kernels::with_distance<double>(body.shape, body.size, [&](const auto& solid) {
+  const kernels::Vec3<double> size = vec3_of(size_in_kernels(shape));
+  return kernels::with_distance<double>(*kind, size, [&](const auto& solid) {
     const kernels::Distance<double> at = kernels::distance_at(solid, vec3_of(point));
     return SurfaceDistance{at.d, {at.n.x, at.n.y, at.n.z}};
   });

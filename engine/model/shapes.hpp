@@ -73,6 +73,15 @@ struct NamedSize {
 };
 /// Returns the size of a shape by names, radius first. A mesh has none, its scale is no length.
 std::vector<NamedSize> named_sizes(const Shape& shape);
+/// Returns the three numbers that kernels keep of a size [m].
+Vector3 size_in_kernels(const Shape& shape);
+/// Returns the points that meet other bodies, (n, 3) in the body frame [m]; may be empty.
+std::vector<double> contact_points(const Shape& shape);
+
+MassProperties mass_properties(const Shape& shape, double density);
+/// Derivative of the mass properties by a number of the shape's size (size_number). The shape must
+/// have that number.
+MassProperties mass_properties_by_size(const Shape& shape, double density, int which);
 /// Returns the volume of a solid [m³]; 0 for a plane.
 double volume_of(const Shape& shape);
 

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // Cuts a list of tactile points into tiles of 64 neighbours each, in the body's axes.
+#include "engine/model/tactile_points.hpp"
+
 #include <algorithm>
 #include <cmath>
 #include <numeric>
 
-#include "engine/model/compiled_model.hpp"
+#include "engine/model/body_shape.hpp"
 #include "engine/model/frames.hpp"
 #include "kernels/table/kernel_table.hpp"
 

@@ -10,6 +10,7 @@
 #include <cstring>
 #include <limits>
 
+#include "engine/model/body_shape.hpp"
 #include "engine/model/model_part.hpp"
 #include "engine/model/shapes.hpp"
 #include "engine/step/lane_energy.hpp"

@@ -87,7 +87,7 @@ TrajectoryLayout layout_from(const Batch& batch, const Stepper& stepper,
   for (std::size_t i = 0; i < model.sensors().size(); ++i)
     layout.sensors.push_back(
         sensor_layout(model.sensors()[i], scene.sensors[i], run.tactile_intervals[i]));
-  layout.fields = run.fields ? *run.fields : whole_fields(model);
+  layout.fields = run.fields ? *run.fields : whole_fields(model.scene());
   for (const StepStatus status : step_statuses())
     layout.statuses.push_back({static_cast<std::int8_t>(status), to_string(status)});
   describe_randomized(scene, layout);
@@ -157,7 +157,7 @@ DatasetLayout dataset_layout_from(const Model& model, const Stepper& stepper,
   layout.record = run.record;
   layout.record_times = run.record_times;
   layout.bodies = run.bodies;
-  layout.fields = run.fields ? *run.fields : whole_fields(model);
+  layout.fields = run.fields ? *run.fields : whole_fields(model.scene());
   return layout;
 }
 

@@ -78,8 +78,8 @@ struct StageHistory {
 
 /// Numbers of a scene that have a derivative, in the order of parameter_products(): the
 /// coefficients of each pair and ground contact; mass, moment and inertia (xx xy xz yy yz zz) of
-/// each link; those of DofNumber of each dof; the size of each solid as contacts see it, with masses
-/// held fixed.
+/// each link; those of DofNumber of each dof; the size of each solid as contacts see it, with
+/// masses held fixed.
 inline constexpr int kInertiaNumbers = 10, kSizeNumbers = 3;
 enum DofNumber : int { kDofDamping, kDofStiffness, kDofP, kDofD, kDofNumbers };
 /// Where a dof's effects keep these numbers.

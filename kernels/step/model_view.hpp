@@ -89,8 +89,8 @@ struct PairContact {
   int link1, link2;      ///< -1: fixed in the world; then frame1/frame2 are world frames
   Frame<double> frame2;  ///< shape frame in link2 (or the world)
   PrimitiveShape shape;
-  /// As the shape's of() takes it (kernels/contact/shapes), such as a sphere's radius in x. Not read
-  /// for planes and meshes.
+  /// As the shape's of() takes it (kernels/contact/shapes), such as a sphere's radius in x. Not
+  /// read for planes and meshes.
   Vec3<double> size;
   ContactLaw law;
   double ramp;

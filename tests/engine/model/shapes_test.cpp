@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "engine/model/compiled_model.hpp"
+#include "engine/model/mass_properties.hpp"
 #include "engine/model/shapes.hpp"
 #include "kernels/contact/distance.hpp"
 #include "tests/engine/meshes.hpp"
