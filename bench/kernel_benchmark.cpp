@@ -79,7 +79,7 @@ class Group {
 
   static const kernels::KernelTable& table() { return kernels::active_kernels(); }
   [[nodiscard]] const kernels::ModelView& view() const { return compiled(model_).view; }
-  [[nodiscard]] const CompiledModel& of_model() const { return tangere::compiled(model_); }
+  [[nodiscard]] const CompiledModel& of_model() const { return compiled(model_); }
   Workspace& work() { return work_; }
 
  private:
