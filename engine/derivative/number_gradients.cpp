@@ -8,6 +8,7 @@
 #include "engine/model/compiled_model.hpp"
 #include "engine/model/mass_properties.hpp"
 #include "engine/model/model.hpp"
+#include "engine/model/scene_number.hpp"
 #include "engine/model/shapes.hpp"
 #include "kernels/table/kernel_table.hpp"
 

@@ -18,6 +18,7 @@
 #include "engine/model/frames.hpp"
 #include "engine/model/group_contacts.hpp"
 #include "engine/model/mass_properties.hpp"
+#include "engine/model/scene_number.hpp"
 #include "engine/model/shapes.hpp"
 
 namespace tangere {

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "engine/model/frames.hpp"
+#include "engine/model/scene_number.hpp"
 
 namespace tangere {
 

@@ -10,6 +10,7 @@
 #include "engine/model/compile_joints.hpp"
 #include "engine/model/frames.hpp"
 #include "engine/model/mass_properties.hpp"
+#include "engine/model/scene_number.hpp"
 #include "engine/model/shapes.hpp"
 
 namespace tangere {

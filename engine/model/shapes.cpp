@@ -9,6 +9,7 @@
 #include "engine/base/vector3.hpp"
 #include "engine/model/frames.hpp"
 #include "engine/model/mass_properties.hpp"
+#include "engine/model/scene_number.hpp"
 #include "kernels/contact/distance.hpp"
 #include "kernels/numbers/dual.hpp"
 

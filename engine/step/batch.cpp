@@ -8,6 +8,7 @@
 
 #include "engine/model/compile_variations.hpp"
 #include "engine/model/random.hpp"
+#include "engine/model/scene_number.hpp"
 
 namespace tangere {
 

@@ -4,6 +4,7 @@
 
 #include <stdexcept>
 
+#include "engine/model/scene_number.hpp"
 #include "io/dataset/dataset_layout.hpp"
 #include "io/scene/scene_tables.hpp"
 #include "io/trajectory/trajectory_layout.hpp"

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "engine/model/scene_number.hpp"
 #include "io/scene/scene_sections.hpp"
 
 namespace tangere {

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <filesystem>
 
+#include "engine/model/scene_number.hpp"
 #include "engine/model/shapes.hpp"
 #include "io/files/csv.hpp"
 #include "io/scene/scene_sections.hpp"

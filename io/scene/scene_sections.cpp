@@ -8,6 +8,7 @@
 #include <array>
 #include <cmath>
 
+#include "engine/model/scene_number.hpp"
 #include "engine/model/shapes.hpp"
 
 namespace tangere {
