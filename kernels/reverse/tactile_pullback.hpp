@@ -5,7 +5,7 @@
 #pragma once
 
 #include "kernels/reverse/point_pullback.hpp"
-#include "kernels/tactile/tactile_point.hpp"
+#include "kernels/tactile/tactile_types.hpp"
 
 namespace tangere::kernels {
 
