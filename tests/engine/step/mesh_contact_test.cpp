@@ -5,6 +5,7 @@
 
 #include <algorithm>
 
+#include "engine/model/compile.hpp"
 #include "engine/model/compiled_model.hpp"
 #include "engine/model/mesh_grid.hpp"
 #include "engine/model/model.hpp"

@@ -7,6 +7,7 @@
 #include <map>
 #include <sstream>
 
+#include "engine/model/compile.hpp"
 #include "engine/model/mass_properties.hpp"
 #include "engine/model/shapes.hpp"
 #include "engine/sense/readout.hpp"

@@ -10,6 +10,7 @@
 #include <filesystem>
 #include <fstream>
 
+#include "engine/model/compile.hpp"
 #include "engine/model/compiled_model.hpp"
 #include "engine/model/mass_properties.hpp"
 #include "engine/model/shapes.hpp"
