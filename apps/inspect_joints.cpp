@@ -18,8 +18,9 @@ struct Named {
 };
 
 bool any(const JointEffects& e) {
-  return e.damping != 0 || e.armature != 0 || e.stiffness != 0 ||
-         (e.limits && e.limit_stiffness != 0);
+  for (std::size_t k = 0; k < kJointEffects; ++k)
+    if (e.acts(k)) return true;
+  return false;
 }
 
 /// Joints that have effects. Dofs that turn get their own line if their effects differ.

@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "apps/accuracy_report.hpp"
+#include "engine/model/scene_number.hpp"
 
 namespace tangere::apps {
 namespace {

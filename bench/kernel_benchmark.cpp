@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "engine/model/compiled_model.hpp"
+#include "engine/model/model.hpp"
 #include "engine/step/control.hpp"
 #include "engine/step/detection.hpp"
 #include "engine/step/group_step.hpp"
@@ -78,7 +79,7 @@ class Group {
 
   static const kernels::KernelTable& table() { return kernels::active_kernels(); }
   [[nodiscard]] const kernels::ModelView& view() const { return compiled(model_).view; }
-  [[nodiscard]] const CompiledModel& of_model() const { return tangere::compiled(model_); }
+  [[nodiscard]] const CompiledModel& of_model() const { return compiled(model_); }
   Workspace& work() { return work_; }
 
  private:

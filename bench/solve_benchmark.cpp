@@ -7,6 +7,7 @@
 
 #include <string>
 
+#include "engine/model/compile.hpp"
 #include "engine/model/compiled_model.hpp"
 #include "engine/model/random.hpp"
 #include "engine/step/workspace.hpp"

@@ -16,6 +16,7 @@
 
 #include "engine/model/compiled_model.hpp"
 #include "engine/model/mesh_grid.hpp"
+#include "engine/model/model.hpp"
 #include "engine/sense/readout.hpp"
 #include "engine/step/control.hpp"
 #include "engine/step/stepper.hpp"

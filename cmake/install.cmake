@@ -33,6 +33,7 @@ set(public_headers
   engine/base/precision.hpp
   engine/base/vector3.hpp
   engine/derivative/adjoint.hpp
+  engine/derivative/block_cotangent.hpp
   engine/derivative/field_tangent.hpp
   engine/derivative/loss.hpp
   engine/derivative/number_gradients.hpp
@@ -43,7 +44,11 @@ set(public_headers
   engine/model/effects.hpp
   engine/model/field_form.hpp
   engine/model/model.hpp
+  engine/model/model_info.hpp
+  engine/model/number_address.hpp
+  engine/model/outer_pose.hpp
   engine/model/output_times.hpp
+  engine/model/pose.hpp
   engine/model/random.hpp
   engine/model/scene.hpp
   engine/model/scene_number.hpp
@@ -66,6 +71,7 @@ set(public_headers
   engine/step/shear_memory.hpp
   engine/step/sleep_state.hpp
   engine/step/stepper.hpp
+  engine/step/stepper_options.hpp
   engine/step/tape.hpp
   io/dataset/dataset_export.hpp
   io/dataset/dataset_files.hpp

@@ -29,7 +29,7 @@ struct Lanes {
 };
 
 /// The step of one group. Environment `first` + l of the block is in lane l.
-struct GroupStepInHand {
+struct GroupStepContext {
   const BlockTape& tape;
   std::int64_t step;
   int first;
@@ -94,7 +94,7 @@ struct Adjoint::Impl {
   }
 
   template <int L>
-  void load(Lanes<L>& x, const GroupStepInHand& g) {
+  void load(Lanes<L>& x, const GroupStepContext& g) {
     const CompiledModel& m = compiled(model);
     BasicWorkspace<L>& w = x.work;
     gather(w.q0, &rows[std::size_t(m.layout.q * kBlock)], m.nq, g.first);
@@ -135,7 +135,7 @@ struct Adjoint::Impl {
   /// Reverses the solves of one lane's special step, last first. Cotangents of its inner states
   /// stay in the lane.
   template <int L>
-  void reverse_special(Lanes<L>& x, const TapedStep& special, int lane, const GroupStepInHand& g) {
+  void reverse_special(Lanes<L>& x, const TapedStep& special, int lane, const GroupStepContext& g) {
     BasicWorkspace<L>& w = x.work;
     const auto set = [lane](Row<L>* to, const std::vector<double>& from) {
       for (std::size_t i = 0; i < from.size(); ++i) to[i][lane] = from[i];
@@ -172,7 +172,7 @@ struct Adjoint::Impl {
   }
 
   template <int L>
-  void reverse(const GroupStepInHand& g, std::span<const double> controls) {
+  void reverse(const GroupStepContext& g, std::span<const double> controls) {
     const CompiledModel& m = compiled(model);
     Lanes<L>& x = lanes<L>();
     load(x, g);
@@ -230,15 +230,6 @@ struct Adjoint::Impl {
   }
 };
 
-std::span<double> BlockCotangent::points_of(const Model& model, int sensor, int lane) {
-  if (points.empty()) return {};
-  const auto size = [](int n) { return std::size_t(n) * std::size_t(kPointNumbers); };
-  return std::span(points)
-      .subspan(points.size() / kBlock * std::size_t(lane))
-      .subspan(size(first_tactile_point(model, sensor)),
-               size(model.sensors()[std::size_t(sensor)].points));
-}
-
 Adjoint::Adjoint(const Model& model, const StepperOptions& options, const AdjointOptions& wanted)
     : impl_(std::make_unique<Impl>(model, step_settings(model, options), wanted)) {
   refuse_sleep(model, impl_->settings);
@@ -266,7 +257,7 @@ void Adjoint::reverse_step(const Batch& batch, int block, const BlockTape& tape,
   const std::size_t nu = std::size_t(batch.model().nu());
   const std::span<const double> of_block = controls.subspan(std::size_t(block * kBlock) * nu);
   for (int first = 0; first < kBlock; first += kGroup) {
-    GroupStepInHand g{tape, step, first};
+    GroupStepContext g{tape, step, first};
     for (int l = 0; l < kGroup; ++l) {
       if (tape.took(step, first + l)) {
         g.live |= 1U << l;

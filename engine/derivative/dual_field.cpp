@@ -12,7 +12,7 @@
 namespace tangere {
 
 using kernels::kBlock;
-using D = DualNumber;
+using D = kernels::Dual<double>;
 
 namespace {
 
@@ -20,7 +20,7 @@ namespace {
 struct PadPoint {
   kernels::Vec3<double> at;
   double rows[9];
-  double factors[4];
+  double factors[kPointCoefficients];
   int index;  ///< in the field; -1: filler
 };
 PadPoint pad_point(const kernels::PadTiles& pad, int tile, int k) {
@@ -36,8 +36,8 @@ PadPoint pad_point(const kernels::PadTiles& pad, int tile, int k) {
       const double row = pad.frames[(9 * tile + i) * kTactileTile + k];
       p.rows[i] = i % 3 == 2 ? -row : row;
     }
-    for (int i = 0; i < 4 && pad.factors != nullptr; ++i)
-      p.factors[i] = pad.factors[(4 * tile + i) * kTactileTile + k];
+    for (int i = 0; i < kPointCoefficients && pad.factors != nullptr; ++i)
+      p.factors[i] = pad.factors[(kPointCoefficients * tile + i) * kTactileTile + k];
     return p;
   }
   if (pad.skewed) std::copy(pad.axes, pad.axes + 9, p.rows);
@@ -89,15 +89,10 @@ void read_dual_field(const CompiledModel& m, int sensor,
           return points.empty() ? 0.0 : points[std::size_t(p.index * kernels::kPointNumbers + n)];
         };
         const kernels::Vec3<double> moves = turn * kernels::Vec3<double>{own(0), own(1), own(2)};
-        int n = 0;
-        const auto of_point = [&](const D& of_sensor) {
-          const bool is_ks = n == kPointCoefficients;
-          const D scaled =
-              D(p.factors[is_ks ? 1 : n]) * of_sensor + D(0.0, is_ks ? 0.0 : own(3 + n));
-          ++n;
-          return scaled;
-        };
-        const kernels::LawParameters<D> law = {transformed(coefficients, of_point), felt.law, 0.0};
+        kernels::LawParameters<D> law = {coefficients, felt.law, 0.0};
+        for (std::size_t n = 0; n < kCoefficients; ++n)
+          law[n] = D(p.factors[factor_index(n)]) * law[n] +
+                   D(0.0, n < kPointCoefficients ? own(3 + int(n)) : 0.0);
         const kernels::Vec3<D> xi = {{p.at.x, moves.x}, {p.at.y, moves.y}, {p.at.z, moves.z}};
         const auto at = kernels::point_contact(shape, law, t.Q, t.c, t.omega, t.v, xi);
         const D f[3] = {at.force.x, at.force.y, at.force.z};

@@ -68,7 +68,7 @@ struct DualStage::Impl {
     for (auto& g : grounds) contact(g.parameters);
     next += kernels::kInertiaNumbers * view.n_links;
     for (auto& e : effects) {
-      for (Parameter* p : {&e.damping, &e.stiffness, &e.P, &e.D}) row(*p, next++);
+      for (const auto member : kernels::kDofParameters) row(e.*member, next++);
       row(e.armature, -1);
       row(e.limit_stiffness, -1);
     }
@@ -226,8 +226,7 @@ struct DualStage::Impl {
     const std::vector<double>& factors = m.sensors[std::size_t(of.sensor)].point_factors;
     if (factors.empty()) return law;
     const double* own = &factors[std::size_t(kPointCoefficients * i)];
-    for (std::size_t k = 0; k < kPointCoefficients; ++k) law[k] = D(own[k]) * law[k];
-    law.ks = D(own[1]) * law.ks;
+    for (std::size_t k = 0; k < kCoefficients; ++k) law[k] = D(own[factor_index(k)]) * law[k];
     return law;
   }
 

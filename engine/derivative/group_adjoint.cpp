@@ -62,7 +62,7 @@ void add_lanes(Row<L>* to, const Row<L>* from, int count, LaneBits lanes) {
 
 /// Computes A and its factor at the stage's x. Everything else of the stage must be set.
 template <int L>
-void GroupAdjoint::assemble(const StageInHand<L>& s) const {
+void GroupAdjoint::assemble(const StageContext<L>& s) const {
   BasicWorkspace<L>& w = s.w;
   const kernels::StageKernels<L>& kernel = s.table.template stage<L>();
   kernel.kinematics(model_.view, w.stage);
@@ -76,7 +76,7 @@ void GroupAdjoint::assemble(const StageInHand<L>& s) const {
 
 /// Computes λ from the right-hand side. Lanes whose factor is useless get a pivoted one.
 template <int L>
-void GroupAdjoint::solve(const StageInHand<L>& s) const {
+void GroupAdjoint::solve(const StageContext<L>& s) const {
   BasicWorkspace<L>& w = s.w;
   AdjointWorkspace<L>& a = s.a;
   s.table.template stage<L>().solve_transposed(model_.view, w.stage, a.rhs, a.lambda, &a.sound);
@@ -90,7 +90,7 @@ void GroupAdjoint::solve(const StageInHand<L>& s) const {
 /// Returns what a stage depends on besides its centre: the state one step before, then the earlier
 /// stages.
 template <int L>
-kernels::StageHistory<Row<L>> GroupAdjoint::history_of(const StageInHand<L>& s,
+kernels::StageHistory<Row<L>> GroupAdjoint::history_of(const StageContext<L>& s,
                                                        const Scheme& scheme, int stage) const {
   AdjointWorkspace<L>& a = s.a;
   const SchemeStage& row = scheme.stages[std::size_t(stage)];
@@ -113,7 +113,7 @@ kernels::StageHistory<Row<L>> GroupAdjoint::history_of(const StageInHand<L>& s,
 
 /// Passes one loss back through the present stage.
 template <int L>
-void GroupAdjoint::hand_on(const StageInHand<L>& s, const Scheme& scheme, int stage,
+void GroupAdjoint::hand_on(const StageContext<L>& s, const Scheme& scheme, int stage,
                            const LossRows<L>& loss) const {
   AdjointWorkspace<L>& a = s.a;
   const int n = model_.nv;
@@ -154,7 +154,7 @@ void GroupAdjoint::hand_on(const StageInHand<L>& s, const Scheme& scheme, int st
 
 /// Computes v_inner from x_inner, by the stages' kinematics.
 template <int L>
-void GroupAdjoint::find_inner_velocities(const StageInHand<L>& s, const Scheme& scheme,
+void GroupAdjoint::find_inner_velocities(const StageContext<L>& s, const Scheme& scheme,
                                          double h) const {
   BasicWorkspace<L>& w = s.w;
   for (int k = 0; k < scheme.inner_stages(); ++k) {
@@ -170,7 +170,7 @@ void GroupAdjoint::find_inner_velocities(const StageInHand<L>& s, const Scheme& 
 
 /// Computes the coordinates of the stage in hand.
 template <int L>
-void GroupAdjoint::find_stage(const StageInHand<L>& s) const {
+void GroupAdjoint::find_stage(const StageContext<L>& s) const {
   const kernels::Stage<L>& stage = s.w.stage;
   for (const kernels::Link& link : model_.links) {
     const Row<L>*centre = stage.centre + link.q, *x = stage.x + link.v;
@@ -188,7 +188,7 @@ void GroupAdjoint::find_stage(const StageInHand<L>& s) const {
 }
 
 template <int L>
-void GroupAdjoint::reverse_stages(const StageInHand<L>& s, const Scheme& scheme, double h) const {
+void GroupAdjoint::reverse_stages(const StageContext<L>& s, const Scheme& scheme, double h) const {
   BasicWorkspace<L>& w = s.w;
   const int last = scheme.inner_stages();
   for (const LossRows<L>& o : s.a.losses)
@@ -223,7 +223,7 @@ void GroupAdjoint::reverse_stages(const StageInHand<L>& s, const Scheme& scheme,
 template <int L>
 void GroupAdjoint::reverse(const Scheme& scheme, double h, const kernels::KernelTable& table,
                            BasicWorkspace<L>& w, AdjointWorkspace<L>& a, LaneBits lanes) const {
-  const StageInHand<L> s = {table, w, a, lanes};
+  const StageContext<L> s = {table, w, a, lanes};
   reverse_stages(s, scheme, h);
 }
 

@@ -43,7 +43,7 @@ class GroupAdjoint {
 
  private:
   template <int L>
-  struct StageInHand {
+  struct StageContext {
     const kernels::KernelTable& table;
     BasicWorkspace<L>& w;
     AdjointWorkspace<L>& a;
@@ -53,21 +53,21 @@ class GroupAdjoint {
     }
   };
   template <int L>
-  void assemble(const StageInHand<L>& s) const;
+  void assemble(const StageContext<L>& s) const;
   template <int L>
-  void solve(const StageInHand<L>& s) const;
+  void solve(const StageContext<L>& s) const;
   template <int L>
-  kernels::StageHistory<kernels::Row<L>> history_of(const StageInHand<L>& s, const Scheme& scheme,
+  kernels::StageHistory<kernels::Row<L>> history_of(const StageContext<L>& s, const Scheme& scheme,
                                                     int stage) const;
   template <int L>
-  void hand_on(const StageInHand<L>& s, const Scheme& scheme, int stage,
+  void hand_on(const StageContext<L>& s, const Scheme& scheme, int stage,
                const LossRows<L>& loss) const;
   template <int L>
-  void find_inner_velocities(const StageInHand<L>& s, const Scheme& scheme, double h) const;
+  void find_inner_velocities(const StageContext<L>& s, const Scheme& scheme, double h) const;
   template <int L>
-  void find_stage(const StageInHand<L>& s) const;
+  void find_stage(const StageContext<L>& s) const;
   template <int L>
-  void reverse_stages(const StageInHand<L>& s, const Scheme& scheme, double h) const;
+  void reverse_stages(const StageContext<L>& s, const Scheme& scheme, double h) const;
 
   const CompiledModel& model_;
 };

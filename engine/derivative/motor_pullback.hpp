@@ -76,10 +76,11 @@ struct MotorPullback {
   void by_gains(const CompiledMotor& motor, int k, double lambda, LossRows<L>& o) const {
     CompiledMotor unit = motor;  // P = 1, D = 0: the error alone
     unit.P = {1, -1}, unit.D = {0, -1}, unit.low = -HUGE_VAL, unit.high = HUGE_VAL;
-    kernels::Row<L>* numbers =
-        o.parameters + kernels::first_dof_number(m.view) + kernels::kDofNumbers * motor.dof;
-    numbers[2][lane] += lambda * force_at_start(m, unit, state, u.data() + (k - motor.component));
-    numbers[3][lane] -= lambda * row(m.layout.v + motor.dof);
+    const auto by = [&](kernels::DofNumber which) -> double& {
+      return o.parameters[kernels::dof_number(m.view, motor.dof, which)][lane];
+    };
+    by(kernels::kDofP) += lambda * force_at_start(m, unit, state, u.data() + (k - motor.component));
+    by(kernels::kDofD) -= lambda * row(m.layout.v + motor.dof);
   }
 
   [[nodiscard]] kernels::RotationVector<double> way(const kernels::Link& link,

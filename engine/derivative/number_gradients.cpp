@@ -6,6 +6,9 @@
 #include <optional>
 
 #include "engine/model/compiled_model.hpp"
+#include "engine/model/mass_properties.hpp"
+#include "engine/model/model.hpp"
+#include "engine/model/scene_number.hpp"
 #include "engine/model/shapes.hpp"
 #include "kernels/table/kernel_table.hpp"
 
@@ -175,25 +178,25 @@ NumberGradients::Terms NumberGradients::of_dofs(std::size_t joint, int which, in
   const CompiledModel& m = compiled(model_);
   Terms terms;
   for (int k = first; k < end; ++k)
-    terms.push_back(
-        {kernels::first_dof_number(m.view) + kernels::kDofNumbers * (m.joints[joint].v + k) + which,
-         1});
+    terms.push_back({kernels::dof_number(m.view, m.joints[joint].v + k, which), 1});
   return terms;
 }
 
-/// Dofs have damping, stiffness, P and D (kernels/step/arguments.hpp).
 void NumberGradients::add_joints() {
   for (std::size_t i = 0; i < model_.scene().links.size(); ++i) {
     const JointDescription& d = model_.scene().links[i].joint;
     const int n = dof_count(d.type),
               slides = d.turning ? n - (d.type == JointType::free ? 3 : 1) : n;
     if (n == 0) continue;
-    add({Owner::joint, Field::damping, d.name}, of_dofs(i, 0, 0, slides));
-    if (d.stiffness > 0) add({Owner::joint, Field::stiffness, d.name}, of_dofs(i, 1, 0, slides));
+    add({Owner::joint, Field::damping, d.name}, of_dofs(i, kernels::kDofDamping, 0, slides));
+    if (d.stiffness > 0)
+      add({Owner::joint, Field::stiffness, d.name}, of_dofs(i, kernels::kDofStiffness, 0, slides));
     if (!d.turning) continue;
-    add({Owner::joint, Field::turning_damping, d.name}, of_dofs(i, 0, slides, n));
+    add({Owner::joint, Field::turning_damping, d.name},
+        of_dofs(i, kernels::kDofDamping, slides, n));
     if (d.turning->stiffness > 0)
-      add({Owner::joint, Field::turning_stiffness, d.name}, of_dofs(i, 1, slides, n));
+      add({Owner::joint, Field::turning_stiffness, d.name},
+          of_dofs(i, kernels::kDofStiffness, slides, n));
   }
 }
 
@@ -204,8 +207,8 @@ void NumberGradients::add_motors() {
     std::size_t joint = 0;
     while (scene.links[joint].joint.name != d.joint) ++joint;
     const int n = dof_count(scene.links[joint].joint.type);
-    add({Owner::motor, Field::P, d.joint}, of_dofs(joint, 2, 0, n));
-    add({Owner::motor, Field::D, d.joint}, of_dofs(joint, 3, 0, n));
+    add({Owner::motor, Field::P, d.joint}, of_dofs(joint, kernels::kDofP, 0, n));
+    add({Owner::motor, Field::D, d.joint}, of_dofs(joint, kernels::kDofD, 0, n));
   }
 }
 

@@ -8,7 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "engine/derivative/adjoint.hpp"
+#include "engine/derivative/block_cotangent.hpp"
+#include "engine/step/batch.hpp"
 
 namespace tangere {
 

@@ -4,6 +4,8 @@
 
 #include "engine/model/compiled_model.hpp"
 #include "engine/model/frames.hpp"
+#include "engine/model/model.hpp"
+#include "engine/model/scene_number.hpp"
 #include "engine/step/batch.hpp"
 
 namespace tangere {

@@ -244,7 +244,6 @@ struct Tangent::Impl {
   /// Sets the motors as set_motors() does.
   void set_motors(const DualState& at, std::span<const double> u, std::span<const double> u_dot,
                   std::span<const double> numbers_dot, const double* column) {
-    const int first_dof = kernels::first_dof_number(m().view);
     for (std::size_t i = 0; i < stage.tau.size(); ++i) stage.tau[i] = stage.target[i] = D(0.0);
     for (std::size_t k = 0; k < std::size_t(m().nu); ++k) {
       const CompiledMotor& motor = m().motors[k];
@@ -259,13 +258,13 @@ struct Tangent::Impl {
         stage.target[dof] = D(u[k], u_dot[k]);
         continue;
       }
-      const auto gain = [&](const kernels::Parameter& p, int field) {
+      const auto gain = [&](const kernels::Parameter& p, kernels::DofNumber which) {
         const double value = p.row < 0 ? p.value : column[p.row * kBlock];
-        const int row = first_dof + kernels::kDofNumbers * motor.dof + field;
+        const int row = kernels::dof_number(m().view, motor.dof, which);
         return D(value, numbers_dot.empty() ? 0 : numbers_dot[std::size_t(row)]);
       };
-      const D force =
-          gain(motor.P, 2) * error_of(motor, k, at, u, u_dot) - gain(motor.D, 3) * at.v[dof];
+      const D force = gain(motor.P, kernels::kDofP) * error_of(motor, k, at, u, u_dot) -
+                      gain(motor.D, kernels::kDofD) * at.v[dof];
       stage.tau[dof] = force.value < motor.low    ? D(motor.low)
                        : force.value > motor.high ? D(motor.high)
                                                   : force;

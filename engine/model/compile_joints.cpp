@@ -1,14 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // Joints become chains of elementary links, with coordinates, effects, motors and a starting state.
 #include "engine/model/compile_joints.hpp"
-#include "engine/model/frames.hpp"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <iterator>
 
-#include "engine/model/compile_variations.hpp"
+#include "engine/model/frames.hpp"
+#include "engine/model/scene_number.hpp"
 
 namespace tangere {
 
@@ -60,26 +59,30 @@ const JointEffects& joint_effects_of_dof(const JointDescription& d, int k) {
 
 void check_effects(const JointDescription& d, const JointEffects& e) {
   const std::string of = d.source.prefix() + "joint '" + d.name + "': ";
-  const std::pair<const char*, double> numbers[] = {{"damping", e.damping},
-                                                    {"armature", e.armature},
-                                                    {"stiffness", e.stiffness},
-                                                    {"lim_stiffness", e.limit_stiffness}};
-  for (const auto& [name, value] : numbers)
-    if (!(value >= 0) || !std::isfinite(value))
-      throw InputError(of + name + " is " + std::to_string(value) +
-                       "; expected a finite number, zero or more");
+  for (std::size_t k = 0; k < kJointEffects; ++k)
+    if (!(e[k] >= 0) || !std::isfinite(e[k]))
+      throw InputError(of + number_kind(NumberOwner::joint, effect_field(k)).name + " is " +
+                       std::to_string(e[k]) + "; expected a finite number, zero or more");
   if (e.limits && !((*e.limits)[0] <= (*e.limits)[1]))
     throw InputError(of + "limits " + std::to_string((*e.limits)[0]) + " and " +
                      std::to_string((*e.limits)[1]) + "; expected low, then high");
 }
 
+/// How kernels keep an effect and know of it, in the order of effect_field().
+struct EffectOfDof {
+  kernels::Parameter kernels::DofEffects::*number;
+  kernels::JointEffect flag;
+};
+constexpr EffectOfDof kEffectsOfDof[kJointEffects] = {
+    {&kernels::DofEffects::damping, kernels::kDamped},
+    {&kernels::DofEffects::armature, kernels::kArmoured},
+    {&kernels::DofEffects::stiffness, kernels::kSprung},
+    {&kernels::DofEffects::limit_stiffness, kernels::kLimited}};
+
 kernels::DofEffects dof_effects(const JointEffects& e, double rest) {
   constexpr double kNone = HUGE_VAL;
   kernels::DofEffects out{};
-  out.damping = {e.damping, -1};
-  out.armature = {e.armature, -1};
-  out.stiffness = {e.stiffness, -1};
-  out.limit_stiffness = {e.limit_stiffness, -1};
+  for (std::size_t k = 0; k < kJointEffects; ++k) out.*kEffectsOfDof[k].number = {e[k], -1};
   out.P = out.D = {0, -1};
   out.rest = rest;
   const auto [low, high] = e.limits.value_or(std::array{-kNone, kNone});
@@ -92,10 +95,8 @@ kernels::DofEffects dof_effects(const JointEffects& e, double rest) {
 
 std::uint8_t flags_of(const JointEffects& e) {
   int flags = 0;
-  if (e.damping != 0) flags |= kernels::kDamped;
-  if (e.armature != 0) flags |= kernels::kArmoured;
-  if (e.stiffness != 0) flags |= kernels::kSprung;
-  if (e.limits && e.limit_stiffness != 0) flags |= kernels::kLimited;
+  for (std::size_t k = 0; k < kJointEffects; ++k)
+    if (e.acts(k)) flags |= kEffectsOfDof[k].flag;
   return static_cast<std::uint8_t>(flags);
 }
 
@@ -265,7 +266,6 @@ void compile_initial_state(CompiledModel& m, const NameIndex& joints) {
 
 void vary_joint(CompiledModel& m, int joint, const RandomizationDescription& d, int row) {
   const NumberField field = d.number.field;
-  if (field == NumberField::pos) return vary_place(m, joint, d, row);
   const CompiledJoint& compiled = m.joints[std::size_t(joint)];
   const JointDescription& of = m.scene.links[std::size_t(joint)].joint;
   const auto fail = [&](const std::string& why) {
@@ -288,16 +288,12 @@ void vary_joint(CompiledModel& m, int joint, const RandomizationDescription& d, 
   if (dof_count(of.type) == 0) fail("the joint is fixed");
   if (of.turning) fail("its dofs do not share one number");
   if (field == NumberField::lim_stiffness && !of.limits) fail("the joint has no limits");
-  constexpr std::uint8_t kFlags[] = {kernels::kDamped, kernels::kArmoured, kernels::kSprung,
-                                     kernels::kLimited};
-  const auto effect = static_cast<std::size_t>(from(NumberField::damping, field));
-  if (effect >= std::size(kFlags)) fail("no dof of the joint turns by a number of its own");
+  const auto effect = static_cast<std::size_t>(offset_from(NumberField::damping, field));
+  if (effect >= kJointEffects) fail("no dof of the joint turns by a number of its own");
   for (int k = 0; k < dof_count(of.type); ++k) {
     const int dof = compiled.v + k;
-    kernels::DofEffects& e = m.dof_effects[std::size_t(dof)];
-    kernels::Parameter* parameters[] = {&e.damping, &e.armature, &e.stiffness, &e.limit_stiffness};
-    parameters[effect]->row = row;
-    m.links[std::size_t(link_of_dof(m, dof))].effects |= kFlags[effect];
+    (m.dof_effects[std::size_t(dof)].*kEffectsOfDof[effect].number).row = row;
+    m.links[std::size_t(link_of_dof(m, dof))].effects |= kEffectsOfDof[effect].flag;
   }
 }
 

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "engine/model/compiled_model.hpp"
+#include "engine/model/contact_tiles.hpp"
 #include "engine/model/frames.hpp"
 #include "engine/model/group_contacts.hpp"
 #include "kernels/step/arguments.hpp"
@@ -65,7 +66,8 @@ void add_grounds(CompiledModel& m) {
   }
 }
 
-/// Points of a sensor in field order, link axes (n, 3), with their axes (n, 9) and factors (n, 4).
+/// Points of a sensor in field order, link axes (n, 3), with their axes (n, 9) and factors
+/// (n, kPointCoefficients).
 struct PadPoints {
   std::vector<double> places, axes, factors;
 };
@@ -93,7 +95,7 @@ std::vector<double> order_points(CompiledSensor& s, PadPoints& points) {
       to.insert(to.end(), all.begin() + width * from, all.begin() + width * (from + 1));
     };
     copy(points.axes, 9, s.point_axes);
-    copy(points.factors, 4, s.point_factors);
+    copy(points.factors, kPointCoefficients, s.point_factors);
   }
   for (const double factor : s.point_factors) own = own || factor != 1;
   if (!own) s.point_factors.clear();

@@ -9,6 +9,8 @@
 
 #include "engine/model/compile_joints.hpp"
 #include "engine/model/frames.hpp"
+#include "engine/model/mass_properties.hpp"
+#include "engine/model/scene_number.hpp"
 #include "engine/model/shapes.hpp"
 
 namespace tangere {
@@ -198,7 +200,7 @@ void update_derived_rows(const CompiledModel& m, double* column) {
     Shape shape = m.scene.links[std::size_t(size.body)].body.shape;
     for (const VaryingNumber& n : size.numbers)
       *size_number(shape, n.which) = column[n.row * kBlock];
-    put(size.row, kernels_size(shape));
+    put(size.row, vec3_of(size_in_kernels(shape)));
   }
   for (const VaryingPlace& place : m.varying_places) {
     Pose pose = m.scene.links[std::size_t(place.joint)].joint.pose;

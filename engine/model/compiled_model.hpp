@@ -9,7 +9,7 @@
 
 #include "engine/base/aligned.hpp"
 #include "engine/model/mesh_grid.hpp"
-#include "engine/model/model.hpp"
+#include "engine/model/model_info.hpp"
 #include "engine/model/pattern.hpp"
 #include "kernels/numbers/so3.hpp"
 #include "kernels/step/model_view.hpp"
@@ -73,8 +73,9 @@ struct CompiledSensor {
   std::vector<int> tile_kind;                                 ///< (n_tiles)
   AlignedVector<double> offsets;  ///< (4, 2, 64) flat, (n_tiles, 3, 64) curved
   AlignedVector<float> offsets_f;
-  std::vector<int> index;                 ///< (n_tiles, 64) curved, empty: flat
-  AlignedVector<double> frames, factors;  ///< (n_tiles, 9, 64), (n_tiles, 4, 64) or empty
+  std::vector<int> index;  ///< (n_tiles, 64) curved, empty: flat
+  AlignedVector<double> frames,
+      factors;  ///< (n_tiles, 9 and kPointCoefficients, 64); no factors: all 1
   AlignedVector<float> frames_f, factors_f;
   /// Spheres around eight tiles each, pad axes [m]: (n_tiles / 8, padded to 8).
   AlignedVector<double> eight_x, eight_y, eight_z, eight_radius;
@@ -100,7 +101,7 @@ struct CompiledSensor {
   /// Points of an elastic sensor in the order of the tiles of its contacts.
   std::vector<int> in_field;          ///< (n) number in the field
   std::vector<double> point_axes;     ///< (n, 9) rows axis0, axis1, -normal; axes of the link
-  std::vector<double> point_factors;  ///< (n, 4) or empty: all 1
+  std::vector<double> point_factors;  ///< (n, kPointCoefficients) or empty: all 1
 
   /// Earlier states on which a reading depends.
   [[nodiscard]] int past_states() const {
@@ -223,72 +224,11 @@ struct CompiledModel {
   std::vector<std::string> q_names, v_names, u_names, q_units, v_units, u_units, body_names;
 };
 
-/// Mass properties of a body, in its own axes. Inertia is about its centre of mass.
-struct MassProperties {
-  double mass;                    ///< [kg]
-  kernels::Vec3<double> centre;   ///< centre of mass, body frame [m]
-  kernels::Mat3<double> inertia;  ///< [kg m²]
-};
-MassProperties mass_properties(const Shape& shape, double density);
-MassProperties mesh_mass(const MeshShape& mesh, double density);
-/// Derivative of the mass properties by a number of the shape's size (size_number). The shape must
-/// have that number.
-MassProperties mass_properties_by_size(const Shape& shape, double density, int which);
-/// Returns what a body with these properties adds to its link.
-InertiaRows inertia_rows(const CompiledBody& body, const MassProperties& properties);
-/// Returns the derivative of that for a change `by` of the properties.
-InertiaRows inertia_slopes(const CompiledBody& body, const MassProperties& properties,
-                           const MassProperties& by);
-/// Returns the rows of a link's own inertia.
-InertiaRows inertia_rows(const kernels::Link& link);
-/// Adds a body to its link.
-void add_inertia(kernels::Link& link, const CompiledBody& body, const MassProperties& properties);
-/// Sets shape and size of a body, and whether it can be touched. Meshes get their distance later.
-void place_shape(const Shape& shape, CompiledBody& body);
-/// Returns the size as in kernels::PairContact.
-kernels::Vec3<double> kernels_size(const Shape& shape);
-
-/// Returns the points of the body that meet other bodies, (n, 3) in its body frame; may be empty.
-std::vector<double> contact_points(const Shape& shape);
-/// Returns the solid of a body that has these contact points.
-kernels::Solid solid_of(const Shape& shape, const CompiledBody& body);
-/// Whether a shape is convex and its own contact points lie on its surface.
-bool is_convex(const Shape& shape);
-/// Returns the widths of a convex body. It must have a distance, and be bounded.
-kernels::Hull hull_of(const CompiledBody& body);
-
-/// Reorders (n, 3) points so that every `tile` consecutive ones are neighbours. Returns the tiles'
-/// bounds, (tiles, 4).
-/// `order`: out, if not null, where each point was before.
-std::vector<double> sort_into_tiles(std::vector<double>& points, int tile,
-                                    std::vector<int>* order = nullptr);
-/// Stores points and bounds of a contact's tiles in the order in which vectors read them, padded to
-/// whole tiles and whole vectors. `pair` already has its points.
-void lay_out_tiles(CompiledModel& model, kernels::PairContact& pair,
-                   const std::vector<double>& tiles);
-
-/// Computes tiles, bounds, axes and pressure sign of a sensor. Throws InputError for degenerate
-/// arrays.
-CompiledSensor compile_sensor(const TactileDescription& description, const CompiledBody& body,
-                              SensorInfo& info);
-/// The same for a list of points.
-CompiledSensor compile_points(const TactileDescription& description, const CompiledBody& body,
-                              SensorInfo& info);
-/// Returns a positive number where a direction points out of a body near a place on its surface,
-/// body frame.
-double points_outward(const CompiledBody& body, const kernels::Vec3<double>& at,
-                      const kernels::Vec3<double>& direction);
 /// Where missing points and tiles are put [m]: beyond any shape, but finite, so that nothing
 /// overflows.
 inline constexpr double kFarAway = 1e6;
 
-/// Turns names into indices and joints into elementary links. Throws InputError.
-std::shared_ptr<const CompiledModel> compile(const Scene& scene);
-
 /// Points the view at the model's own arrays. Gravity and the ground are left as they are.
 void point_view(CompiledModel& m);
-
-/// Returns the arrays behind a model.
-const CompiledModel& compiled(const Model& model);
 
 }  // namespace tangere

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // Orders contact points so that neighbours share a tile.
+#include "engine/model/contact_tiles.hpp"
+
 #include <algorithm>
 #include <cmath>
 #include <numeric>
-
-#include "engine/model/compiled_model.hpp"
 
 namespace tangere {
 

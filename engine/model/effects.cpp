@@ -288,8 +288,9 @@ EffectInfo find_elements(const Scene& scene, int element) {
 }
 
 template <Part P, class Element>
-void still_element(Scene& scene, Element& d, Way way) {
-  Fields fields{Field::kn, Field::kt, Field::mu, Field::damping, Field::ks};
+void silence_element(Scene& scene, Element& d, Way way) {
+  Fields fields;
+  for (int k = 0; k < kCoefficients; ++k) fields.push_back(coefficient_field(k));
   if (P == Part::damping) fields = {Field::damping};
   if (P == Part::memory) fields = {Field::ks};
   if (P == Part::tangential) fields = {Field::kt, Field::ks};
@@ -306,7 +307,7 @@ template <Owner Of, Part P>
 void drop_elements(Scene& scene, int element, Way way) {
   auto& all = elements<Of>(scene);
   for (std::size_t k = 0; k < all.size(); ++k)
-    if (element < 0 || std::size_t(element) == k) still_element<P>(scene, all[k], way);
+    if (element < 0 || std::size_t(element) == k) silence_element<P>(scene, all[k], way);
   if (Of == Owner::tactile && P == Part::whole) drop_imperfections(scene, element, way);
   if (P != Part::whole || way != Way::removed) return;
   if (element < 0)

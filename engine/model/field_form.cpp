@@ -106,18 +106,18 @@ void check_outputs(std::span<const FieldOutput> outputs, std::size_t sensors) {
   }
 }
 
-std::vector<FieldOutput> whole_fields(const Model& model) {
+std::vector<FieldOutput> whole_fields(const Scene& scene) {
   std::vector<FieldOutput> outputs;
-  for (std::size_t s = 0; s < model.sensors().size(); ++s)
+  for (std::size_t s = 0; s < scene.sensors.size(); ++s)
     outputs.push_back({static_cast<int>(s), FieldForm::field});
   return outputs;
 }
 
-std::vector<FieldOutput> asked_fields(const Model& model) {
-  if (!model.scene().outputs) return whole_fields(model);
-  const std::vector<std::string> sensors = sensor_names(model.scene());
+std::vector<FieldOutput> asked_fields(const Scene& scene) {
+  if (!scene.outputs) return whole_fields(scene);
+  const std::vector<std::string> sensors = sensor_names(scene);
   std::vector<FieldOutput> outputs;
-  for (const std::string& word : model.scene().outputs->record) {
+  for (const std::string& word : scene.outputs->record) {
     const TimedName timed = split_times(word);
     if (std::optional<FieldOutput> of = find_output(sensors, timed.name)) {
       of->times = timed.times;

@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
-#include "engine/model/model.hpp"
 #include "engine/model/output_times.hpp"
+#include "engine/model/scene.hpp"
 
 namespace tangere {
 
@@ -68,10 +68,10 @@ std::string reason_against(const Scene& scene, const FieldOutput& output);
 /// Throws InputError for a sensor that is not there and for an output that is listed twice.
 void check_outputs(std::span<const FieldOutput> outputs, std::size_t sensors);
 /// Returns the field of every sensor: what a scene gives where nothing else is asked for.
-std::vector<FieldOutput> whole_fields(const Model& model);
+std::vector<FieldOutput> whole_fields(const Scene& scene);
 /// Returns what the scene's <outputs> ask of its sensors, with their times; without <outputs>, the
 /// field of every sensor.
-std::vector<FieldOutput> asked_fields(const Model& model);
+std::vector<FieldOutput> asked_fields(const Scene& scene);
 /// Returns all names of outputs, the plain ones included.
 std::vector<std::string> output_names(std::span<const std::string> sensors);
 /// The same with the names of single bodies.

@@ -2,7 +2,7 @@
 // Converts vectors and poses of a scene to the kernels' vectors and frames, and back.
 #pragma once
 
-#include "engine/model/scene.hpp"
+#include "engine/model/pose.hpp"
 #include "kernels/numbers/so3.hpp"
 
 namespace tangere {

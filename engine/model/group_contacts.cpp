@@ -6,7 +6,9 @@
 #include <cmath>
 #include <span>
 
+#include "engine/model/body_shape.hpp"
 #include "engine/model/compiled_model.hpp"
+#include "engine/model/shapes.hpp"
 #include "kernels/contact/distance.hpp"
 
 namespace tangere {
@@ -59,7 +61,7 @@ namespace {
 /// Returns the radius of a ball around a pair's shape frame outside of which nothing touches; none
 /// where there is no such ball, or where it depends on the environment.
 double radius_of(const kernels::PairContact& pair) {
-  if (pair.shape == PrimitiveShape::plane || pair.size_row >= 0 || pair.faced) return INFINITY;
+  if (!row_of(pair.shape).bounded || pair.size_row >= 0 || pair.faced) return INFINITY;
   if (pair.shape == PrimitiveShape::mesh) {
     double square = 0;
     for (int i = 0; i < 3; ++i) {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Mass and inertia of a body on its link, and volume integrals of meshes. Other shapes have closed
 // forms in shapes.cpp.
-#include "engine/model/compiled_model.hpp"
+#include "engine/model/mass_properties.hpp"
 
 namespace tangere {
 

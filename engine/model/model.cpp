@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // The public face of a compiled scene.
+#include "engine/model/model.hpp"
+
 #include <algorithm>
 
 #include "engine/base/error.hpp"
-#include "engine/model/compiled_model.hpp"
+#include "engine/model/compile.hpp"
 #include "kernels/table/isa.hpp"
 
 namespace tangere {

@@ -3,7 +3,6 @@
 // batches and threads share it.
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <memory>
 #include <span>
@@ -11,54 +10,12 @@
 #include <vector>
 
 #include "engine/model/effects.hpp"
+#include "engine/model/model_info.hpp"
 #include "engine/model/scene.hpp"
 
 namespace tangere {
 
 struct CompiledModel;  // private to the engine
-
-/// A tactile sensor after compilation.
-struct SensorInfo {
-  std::string name;
-  std::string body;
-  int rows = 0, cols = 0;  ///< of a rectangular array; points = rows * cols, row-major
-  int points = 0;
-  int every = 0;           ///< as in the scene; 0: the caller chooses
-  int pressure_sign = 1;   ///< +1: the third component is positive under pressure; -1: negative
-  bool imperfect = false;  ///< its readings differ from the ideal field (docs/sensors.md)
-  int past_states = 0;     ///< earlier states on which a reading depends
-};
-
-/// An end effector after compilation.
-struct EndEffectorInfo {
-  std::string name;
-  std::string joint;
-};
-
-/// One contact declared in the scene, after compilation.
-struct ContactInfo {
-  std::string first, second;  ///< bodies; second is "ground" for a ground contact
-  int points = 0;             ///< candidate points (1 for a sphere on the ground)
-  std::string law;
-};
-
-/// A mesh that can be touched, after compilation.
-struct MeshInfo {
-  std::string body;
-  std::array<int, 3> cells{};  ///< of its grid, x y z
-  double cell = 0;             ///< edge of a cell [m]
-  std::size_t bytes = 0;       ///< memory of the grid; bodies with the same mesh share one
-  /// Of the distance on the surface [m], and the share of the area where the grid is too coarse
-  /// for it (engine/model/mesh_fit.hpp says by what).
-  double error = 0, unresolved = 0;
-  /// The share from which on programs warn. Edges alone stay below it.
-  static constexpr double kMostUnresolved = 0.1;
-};
-
-/// A stage of the step that the scene calls for, what it works on and the variant of its kernel.
-struct StageInfo {
-  std::string name, of, variant;
-};
 
 class Model {
  public:
@@ -105,6 +62,7 @@ class Model {
   friend bool operator==(const Model& a, const Model& b) { return a.compiled_ == b.compiled_; }
 
  private:
+  /// Returns the arrays behind it.
   friend const CompiledModel& compiled(const Model& model);
   std::shared_ptr<const CompiledModel> compiled_;
 };

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Names and sizes of a scene's enumerations, and its poses. Those of shapes are in shapes.cpp.
+// Names and sizes of a scene's enumerations. Those of shapes are in shapes.cpp.
 #include "engine/model/scene.hpp"
 
 #include <iterator>
@@ -7,25 +7,6 @@
 #include "engine/model/frames.hpp"
 
 namespace tangere {
-
-Vector3 outer_point(const Pose& pose, const Vector3& point) {
-  const kernels::Frame<double> at = to_frame(pose);
-  const kernels::Vec3<double> p = at.R * vec3_of(point) + at.p;
-  return {p.x, p.y, p.z};
-}
-
-Vector3 outer_direction(const Pose& pose, const Vector3& direction) {
-  const kernels::Vec3<double> d = to_frame(pose).R * vec3_of(direction);
-  return {d.x, d.y, d.z};
-}
-
-Pose pose_at_end(std::span<const Pose> way, const Pose& pose) {
-  kernels::Frame<double> end = to_frame(way.front());
-  for (const Pose& next : way.subspan(1)) end = compose(end, to_frame(next));
-  const kernels::Frame<double> local = relative(end, to_frame(pose));
-  const kernels::Quat<double> q = quaternion_of(local.R);
-  return {{local.p.x, local.p.y, local.p.z}, {q.w, q.x, q.y, q.z}};
-}
 
 std::vector<TactilePoint> tactile_points(const TactileDescription& sensor) {
   if (!sensor.points.empty()) return sensor.points;

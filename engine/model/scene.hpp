@@ -12,32 +12,19 @@
 
 #include "engine/base/error.hpp"
 #include "engine/base/vector3.hpp"
-#include "engine/model/scene_number.hpp"
+#include "engine/model/number_address.hpp"
+#include "engine/model/outer_pose.hpp"
 #include "engine/model/scheme.hpp"
 #include "engine/model/sensor_imperfections.hpp"
 #include "kernels/contact/contact_types.hpp"
 
 namespace tangere {
 
-using Quaternion = std::array<double, 4>;  ///< w x y z, unit length
-
 enum class JointType { fixed, revolute, prismatic, planar, translational, free2d, spherical, free };
 enum class MotorControl { force, position };
 /// When a position motor's force is computed. end: implicit, stable for any gain. start: the
 /// published explicit law, unstable once h D/I exceeds 2.
 enum class MotorTiming { end, start };
-
-/// A frame relative to another: x_outer = R(orientation) x_inner + position [m].
-struct Pose {
-  Vector3 position{0, 0, 0};
-  Quaternion orientation{1, 0, 0, 0};
-};
-/// Return a point and a direction of the inner frame, expressed in the outer frame.
-Vector3 outer_point(const Pose& pose, const Vector3& point);
-Vector3 outer_direction(const Pose& pose, const Vector3& direction);
-/// Returns `pose` expressed in the last frame of `way`. Each frame of `way` is given in the one
-/// before. `pose` is given in the same frame as the first.
-Pose pose_at_end(std::span<const Pose> way, const Pose& pose);
 
 /// Coefficients of one penalty contact or tactile point.
 using ContactCoefficients = Coefficients<double>;
@@ -50,7 +37,21 @@ struct JointEffects {
   double stiffness = 0;        ///< force = -stiffness (q - rest) [N/m or N m/rad]
   double limit_stiffness = 0;  ///< force per distance of q outside the limits [N/m or N m/rad]
   std::optional<std::array<double, 2>> limits;  ///< low, high [m or rad]
+
+  /// The four numbers, in the order of effect_field().
+  double& operator[](std::size_t k) { return this->*kOrder[k]; }
+  const double& operator[](std::size_t k) const { return this->*kOrder[k]; }
+  /// Whether number k acts. A stiffness of limits acts where there are limits.
+  [[nodiscard]] bool acts(std::size_t k) const {
+    return (*this)[k] != 0 && (kOrder[k] != &JointEffects::limit_stiffness || limits);
+  }
+
+ private:
+  static constexpr double JointEffects::*kOrder[] = {
+      &JointEffects::damping, &JointEffects::armature, &JointEffects::stiffness,
+      &JointEffects::limit_stiffness};
 };
+inline constexpr std::size_t kJointEffects = 4;
 
 struct JointDescription : JointEffects {
   std::string name;
@@ -156,10 +157,11 @@ struct RectArray {
 
 /// A tactile point with its own position and axes, in the body frame.
 struct TactilePoint {
-  Vector3 position{};                         ///< [m]
-  Vector3 normal{}, axis0{}, axis1{};         ///< unit
-  std::array<int, 2> pixel{-1, -1};           ///< row and column in an image; -1: none
-  std::array<double, 4> factors{1, 1, 1, 1};  ///< multiply the sensor's kn, kt, mu, damping
+  Vector3 position{};                  ///< [m]
+  Vector3 normal{}, axis0{}, axis1{};  ///< unit
+  std::array<int, 2> pixel{-1, -1};    ///< row and column in an image; -1: none
+  /// Multiply the sensor's coefficients (factor_index()).
+  std::array<double, kPointCoefficients> factors{1, 1, 1, 1};
 };
 
 /// Markers that are printed on a gel, one at every point: what a camera behind it sees
@@ -304,7 +306,7 @@ struct Scene {
   std::string text;  ///< the file as read, stored with every dataset
   Vector3 gravity{0, 0, -9.8};
   double timestep = 5e-3;  ///< [s]
-  Integrator integrator = Integrator::bdf1;
+  Integrator integrator = Integrator::usual;
   SolverOptions solver;
   std::optional<GroundDescription> ground;
   std::vector<LinkDescription> links;

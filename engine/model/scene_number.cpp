@@ -4,8 +4,6 @@
 
 #include <algorithm>
 
-#include "engine/model/scene.hpp"
-
 namespace tangere {
 namespace {
 
@@ -160,7 +158,7 @@ const NumberKind& number_kind(NumberOwner owner, NumberField field) {
 
 SceneNumber size_of_body(const std::string& body, int which) {
   if (which == kScaleIndex) return {Owner::body, Field::scale, body};
-  const int edge = std::max(0, which - from(Field::radius, Field::size));
+  const int edge = std::max(0, which - offset_from(Field::radius, Field::size));
   return {Owner::body, static_cast<Field>(static_cast<int>(Field::radius) + which - edge), body,
           edge};
 }

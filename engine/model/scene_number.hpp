@@ -1,57 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0
-// The address of a number in a scene. One table gives its name, its unit and its place to
-// <randomize>, gradients, identification and every file.
+// The numbers of a scene. One table gives their names, units and places to <randomize>, gradients,
+// identification and every file.
 #pragma once
 
+#include <cstddef>
 #include <span>
 #include <string>
 
+#include "engine/model/number_address.hpp"
+#include "engine/model/scene.hpp"
+
 namespace tangere {
 
-struct Scene;
-
-/// The owner of a number. The number's name begins with this word.
-enum class NumberOwner { contact, ground, tactile, body, joint, motor };
-
-/// Some fields are counted from the first of their kind: effects of a joint from damping on,
-/// numbers of a size from radius on, but for the scale of a mesh.
-enum class NumberField {
-  kn,
-  kt,
-  mu,
-  damping,
-  armature,
-  stiffness,
-  lim_stiffness,
-  turning_damping,
-  turning_stiffness,
-  P,
-  D,
-  density,
-  mass,
-  radius,
-  length,
-  size,
-  pos,
-  q,
-  v,
-  ks,
-  scale
-};
 /// Returns how far a field is from the first of its kind.
-constexpr int from(NumberField first, NumberField field) {
+constexpr int offset_from(NumberField first, NumberField field) {
   return static_cast<int>(field) - static_cast<int>(first);
 }
-
-/// Names a number of a scene. A number of a joint applies to all of its dofs.
-struct SceneNumber {
-  NumberOwner owner = NumberOwner::joint;
-  NumberField field = NumberField::q;
-  std::string name;   ///< of the owner; for a motor its joint, for a contact its general body
-  int component = 0;  ///< of size, pos, q and v
-  std::string second_name{};  ///< for a contact: its primitive body
-  bool operator==(const SceneNumber&) const = default;
-};
 
 /// A row of the table of kinds.
 struct NumberKind {
@@ -72,10 +36,15 @@ const NumberKind& number_kind(NumberOwner owner, NumberField field);
 
 /// Returns the field of coefficient k of a contact or a sensor. coefficient_index() is the inverse.
 constexpr NumberField coefficient_field(int k) {
-  return k < 4 ? static_cast<NumberField>(k) : NumberField::ks;
+  return k < kPointCoefficients ? static_cast<NumberField>(k) : NumberField::ks;
 }
 constexpr std::size_t coefficient_index(NumberField field) {
-  return field == NumberField::ks ? 4 : static_cast<std::size_t>(from(NumberField::kn, field));
+  return field == NumberField::ks ? kCoefficients - 1
+                                  : static_cast<std::size_t>(offset_from(NumberField::kn, field));
+}
+/// Returns the field of number k of JointEffects.
+constexpr NumberField effect_field(std::size_t k) {
+  return static_cast<NumberField>(offset_from(NumberField::kn, NumberField::damping) + int(k));
 }
 inline constexpr int kScaleIndex = 5;  ///< of the scale of a mesh in size_number()
 /// Returns number `which` of a body's size (size_number). size_index() is the inverse.
@@ -83,7 +52,7 @@ SceneNumber size_of_body(const std::string& body, int which);
 inline int size_index(const SceneNumber& number) {
   return number.field == NumberField::scale
              ? kScaleIndex
-             : from(NumberField::radius, number.field) + number.component;
+             : offset_from(NumberField::radius, number.field) + number.component;
 }
 /// Whether it is a number of the starting state.
 inline bool is_of_start(const SceneNumber& number) {

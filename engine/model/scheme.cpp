@@ -19,6 +19,8 @@
 
 namespace tangere {
 
+const Scheme* Scheme::of_gains() const { return order > 1 ? &Integrator::bdf1.scheme() : nullptr; }
+
 const Scheme& Scheme::of_turns() const {
   return order > 1 ? of_parts() : Integrator::sdirk2.scheme();
 }
@@ -166,6 +168,9 @@ constinit const Integrator Integrator::bdf2{kBdf2};
 constinit const Integrator Integrator::sdirk2{kSdirk2};
 constinit const Integrator Integrator::sdirk3{kSdirk3};
 constinit const Integrator Integrator::sdirk4{kSdirk4};
+constinit const Integrator Integrator::usual{kBdf1};
+constinit const Integrator Integrator::reference{kSdirk4};
+constinit const Integrator Integrator::second_reference{kSdirk2};
 
 Integrator keeping_accuracy(Integrator of_scene, double accuracy) {
   const bool keeps = !of_scene.scheme().estimate.empty() && of_scene.scheme().order > 1;

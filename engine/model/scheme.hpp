@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Time-stepping schemes as values. A scheme is a row of numbers that the step, the tape, the
-// adjoint and the tangent read. BDF1 alone is named elsewhere: it takes steps that others cannot.
+// adjoint and the tangent read. Which scheme takes a step that another cannot take is said here
+// too.
 //
 // A step of length h from (q₀, v₀) has one implicit solve per stage, for the displacement x from
 // q₀:
@@ -54,6 +55,8 @@ struct Scheme {
   [[nodiscard]] int inner_stages() const { return static_cast<int>(stages.size()) - 1; }
   [[nodiscard]] bool needs_history() const { return start != nullptr; }
   [[nodiscard]] const Scheme& of_parts() const { return parts == nullptr ? *this : *parts; }
+  /// The scheme of steps to which this one would add energy; null: it adds none.
+  [[nodiscard]] const Scheme* of_gains() const;
   /// The scheme of steps in which bodies turn too far for this one.
   [[nodiscard]] const Scheme& of_turns() const;
   /// The largest number of inner stages of this scheme, its start, its parts and its turns.
@@ -70,7 +73,10 @@ class Integrator {
  public:
   explicit constexpr Integrator(const Scheme& scheme) : scheme_(&scheme) {}
   static const Integrator bdf1, bdf2, sdirk2, sdirk3;
-  static const Integrator sdirk4;  ///< not in the table: what others are compared with
+  static const Integrator sdirk4;  ///< not in the table
+  static const Integrator usual;   ///< of scenes that name none
+  /// What others are compared with, and what tells how far that is wrong.
+  static const Integrator reference, second_reference;
 
   [[nodiscard]] const Scheme& scheme() const { return *scheme_; }
   friend bool operator==(Integrator, Integrator) = default;

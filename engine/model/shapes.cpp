@@ -6,7 +6,10 @@
 #include <algorithm>
 #include <cmath>
 
-#include "engine/model/compiled_model.hpp"
+#include "engine/base/vector3.hpp"
+#include "engine/model/frames.hpp"
+#include "engine/model/mass_properties.hpp"
+#include "engine/model/scene_number.hpp"
 #include "kernels/contact/distance.hpp"
 #include "kernels/numbers/dual.hpp"
 
@@ -183,6 +186,14 @@ std::vector<double> points_on(const Shape& shape) {
   return points_of(std::get<S>(shape));
 }
 
+// --- widths ---
+
+HalfWidths ball_widths(const Vector3& s) { return {{}, {s[0], s[0], s[0]}}; }
+HalfWidths cuboid_widths(const Vector3& s) { return {s, {}}; }
+HalfWidths cylinder_widths(const Vector3& s) { return {{0, 0, s[1]}, {s[0], s[0], 0}}; }
+HalfWidths capsule_widths(const Vector3& s) { return {{0, 0, s[1]}, {s[0], s[0], s[0]}}; }
+HalfWidths ellipsoid_widths(const Vector3& s) { return {{}, s}; }
+
 // --- the table ---
 
 template <class S>
@@ -229,7 +240,8 @@ const std::vector<ShapeRow>& table() {
        .distance = PrimitiveShape::sphere,
        .sizes = {{0, 0, 1, radius<SphereShape>}},
        .mass = mass_of<BallMass>,
-       .mass_by_size = mass_slope<BallMass>},
+       .mass_by_size = mass_slope<BallMass>,
+       .half_widths = ball_widths},
       {.name = "cuboid",
        .make = make<CuboidShape>,
        .distance = PrimitiveShape::cuboid,
@@ -239,7 +251,8 @@ const std::vector<ShapeRow>& table() {
                    {cuboid_nodes<0>, cuboid_nodes<1>, cuboid_nodes<2>}}},
        .mass = mass_of<CuboidMass>,
        .mass_by_size = mass_slope<CuboidMass>,
-       .points = points_on<CuboidShape>},
+       .points = points_on<CuboidShape>,
+       .half_widths = cuboid_widths},
       {.name = "cylinder",
        .make = make<CylinderShape>,
        .distance = PrimitiveShape::cylinder,
@@ -252,7 +265,8 @@ const std::vector<ShapeRow>& table() {
                    {count<CylinderShape, &CylinderShape::contact_rings>}}},
        .mass = mass_of<CylinderMass>,
        .mass_by_size = mass_slope<CylinderMass>,
-       .points = points_on<CylinderShape>},
+       .points = points_on<CylinderShape>,
+       .half_widths = cylinder_widths},
       {.name = "capsule",
        .make = make<CapsuleShape>,
        .distance = PrimitiveShape::capsule,
@@ -263,7 +277,8 @@ const std::vector<ShapeRow>& table() {
                     count<CapsuleShape, &CapsuleShape::contact_angles>}}},
        .mass = mass_of<CapsuleMass>,
        .mass_by_size = mass_slope<CapsuleMass>,
-       .points = points_on<CapsuleShape>},
+       .points = points_on<CapsuleShape>,
+       .half_widths = capsule_widths},
       {.name = "ellipsoid",
        .make = make<EllipsoidShape>,
        .distance = PrimitiveShape::ellipsoid,
@@ -274,8 +289,12 @@ const std::vector<ShapeRow>& table() {
        .mass = mass_of<EllipsoidMass>,
        .mass_by_size = mass_slope<EllipsoidMass>,
        .points = points_on<EllipsoidShape>,
+       .half_widths = ellipsoid_widths,
        .slenderness = 100},
-      {.name = "plane", .make = make<PlaneShape>, .distance = PrimitiveShape::plane},
+      {.name = "plane",
+       .make = make<PlaneShape>,
+       .distance = PrimitiveShape::plane,
+       .bounded = false},
       {.name = "mesh",
        .make = make<MeshShape>,
        .distance = PrimitiveShape::mesh,
@@ -384,6 +403,13 @@ MassProperties mass_properties(const Shape& shape, double density) {
   const ShapeRow& row = row_of(shape);
   return row.mass != nullptr ? row.mass(shape, density) : centred({0, 0, 0, 0});
 }
+std::array<double, 6> solid_inertia(const Shape& shape, double mass) {
+  const MassProperties dense = mass_properties(shape, 1);
+  const double density = row_of(shape).sizes.empty() ? 1 : mass / dense.mass;
+  const auto& i = dense.inertia.m;
+  return {density * i[0][0], density * i[0][1], density * i[0][2],
+          density * i[1][1], density * i[1][2], density * i[2][2]};
+}
 MassProperties mass_properties_by_size(const Shape& shape, double density, int which) {
   return row_of(shape).mass_by_size(shape, density, which);
 }
@@ -393,63 +419,31 @@ std::vector<double> contact_points(const Shape& shape) {
   return row.points != nullptr ? row.points(shape) : std::vector<double>{};
 }
 
-kernels::Vec3<double> kernels_size(const Shape& shape) {
-  kernels::Vec3<double> size{};
+Vector3 size_in_kernels(const Shape& shape) {
+  Vector3 size{0, 0, 0};
   for (const SizeNumber& s : row_of(shape).sizes)
     // NOLINTNEXTLINE(cppcoreguidelines-pro-type-const-cast): only read
-    (&size.x)[s.component] = s.scale * *s.at(const_cast<Shape&>(shape));
+    size[std::size_t(s.component)] = s.scale * *s.at(const_cast<Shape&>(shape));
   return size;
 }
 
-void place_shape(const Shape& shape, CompiledBody& body) {
-  const ShapeRow& row = row_of(shape);
-  body.touchable = row.distance.has_value() && row.distance != PrimitiveShape::mesh;
-  if (row.distance.has_value()) body.shape = *row.distance;
-  body.size = kernels_size(shape);
-  if (body.touchable) {
-    body.extent = std::sqrt(dot(body.size, body.size));
-    return;
-  }
-  const std::vector<double> p = contact_points(shape);
-  for (std::size_t k = 0; k < p.size(); k += 3)
-    body.extent = std::max(body.extent, std::hypot(p[k], p[k + 1], p[k + 2]));
-}
-
-kernels::Solid solid_of(const Shape& shape, const CompiledBody& body) {
-  return {body.frame, row_of(shape).stretches(), body.shape, body.size};
-}
-
-bool is_convex(const Shape& shape) {
-  return row_of(shape).stretches() && row_of(shape).distance.has_value() &&
-         !std::holds_alternative<MeshShape>(shape);
-}
-
-kernels::Hull hull_of(const CompiledBody& body) {
-  const kernels::Vec3<double>& s = body.size;
-  const auto hull = [&](const kernels::Vec3<double>& straight, const kernels::Vec3<double>& round) {
-    const double most = std::max({round.x, round.y, round.z});
-    return kernels::Hull{body.frame, straight, round, most > 0,
-                         std::sqrt(dot(straight, straight)) + most};
-  };
-  switch (body.shape) {
-    case PrimitiveShape::cuboid: return hull(s, {});
-    case PrimitiveShape::cylinder: return hull({0, 0, s.y}, {s.x, s.x, 0});
-    case PrimitiveShape::capsule: return hull({0, 0, s.y}, {s.x, s.x, s.x});
-    case PrimitiveShape::ellipsoid: return hull({}, s);
-    case PrimitiveShape::sphere: return hull({}, {s.x, s.x, s.x});
-    case PrimitiveShape::plane:
-    case PrimitiveShape::mesh: break;
-  }
-  return hull({}, {});
-}
-
 std::array<double, 3> widths(const Shape& shape) {
-  CompiledBody body;
-  place_shape(shape, body);
-  if (!body.touchable) return {0, 0, 0};
-  const kernels::Hull hull = hull_of(body);
-  const kernels::Vec3<double> half = hull.straight + hull.round;
-  return {2 * half.x, 2 * half.y, 2 * half.z};
+  const ShapeRow& row = row_of(shape);
+  if (row.half_widths == nullptr) return {0, 0, 0};
+  const HalfWidths half = row.half_widths(size_in_kernels(shape));
+  return 2.0 * (half.straight + half.round);
+}
+
+SurfaceDistance distance_from(const Shape& shape, const Vector3& point) {
+  const std::optional<PrimitiveShape> kind = row_of(shape).distance;
+  if (!kind || kind == PrimitiveShape::mesh)
+    throw InputError("the distance from " + with_article(shape_name(shape)) +
+                     "; expected a shape whose distance is a formula");
+  const kernels::Vec3<double> size = vec3_of(size_in_kernels(shape));
+  return kernels::with_distance<double>(*kind, size, [&](const auto& solid) {
+    const kernels::Distance<double> at = kernels::distance_at(solid, vec3_of(point));
+    return SurfaceDistance{at.d, {at.n.x, at.n.y, at.n.z}};
+  });
 }
 
 }  // namespace tangere

@@ -14,7 +14,7 @@
 
 namespace tangere {
 
-struct MassProperties;  // engine/model/compiled_model.hpp
+struct MassProperties;  // engine/model/mass_properties.hpp
 
 /// A number of a shape's size: its index in size_number(), the index among the three numbers that
 /// kernels keep (kernels::PairContact), and the factor between the two.
@@ -31,6 +31,12 @@ struct PointCounts {
   std::vector<int* (*)(Shape& shape)> at;
 };
 
+/// Half the width of a convex shape along a unit vector e is Σ straight_i |e_i| + √Σ (round_i e_i)²
+/// [m].
+struct HalfWidths {
+  Vector3 straight, round;
+};
+
 struct ShapeRow {
   const char* name;
   Shape (*make)();  ///< with default counts and no size
@@ -43,6 +49,9 @@ struct ShapeRow {
   MassProperties (*mass_by_size)(const Shape& shape, double density, int which) = nullptr;
   /// Contact points, body frame, (n, 3); nullptr: it has none.
   std::vector<double> (*points)(const Shape& shape) = nullptr;
+  /// Widths for the three numbers that kernels keep; nullptr: it is not convex, or has no end.
+  HalfWidths (*half_widths)(const Vector3& size) = nullptr;
+  bool bounded = true;  ///< some ball holds it
   /// Largest ratio of the longest to the shortest number of its size; 0: no limit.
   double slenderness = 0;
 
@@ -64,11 +73,33 @@ struct NamedSize {
 };
 /// Returns the size of a shape by names, radius first. A mesh has none, its scale is no length.
 std::vector<NamedSize> named_sizes(const Shape& shape);
+/// Returns the three numbers that kernels keep of a size [m].
+Vector3 size_in_kernels(const Shape& shape);
+/// Returns the points that meet other bodies, (n, 3) in the body frame [m]; may be empty.
+std::vector<double> contact_points(const Shape& shape);
+
+MassProperties mass_properties(const Shape& shape, double density);
+/// Derivative of the mass properties by a number of the shape's size (size_number). The shape must
+/// have that number.
+MassProperties mass_properties_by_size(const Shape& shape, double density, int which);
 /// Returns the volume of a solid [m³]; 0 for a plane.
 double volume_of(const Shape& shape);
 
+/// Returns the inertia of a body of this mass [kg] about its centre: xx xy xz yy yz zz, body axes
+/// [kg m²]. An abstract body keeps its own.
+std::array<double, 6> solid_inertia(const Shape& shape, double mass);
+
 /// Returns the full widths of a shape with distance and size along its axes [m]; else zeros.
 std::array<double, 3> widths(const Shape& shape);
+
+/// The distance of a point from a surface, negative inside [m], and the unit normal.
+struct SurfaceDistance {
+  double distance;
+  Vector3 normal;
+};
+/// Returns the distance of a point in the body frame from a shape that has one. Throws InputError
+/// for others and for meshes.
+SurfaceDistance distance_from(const Shape& shape, const Vector3& point);
 
 /// Lists the shapes that satisfy `has`: "a sphere, cuboid or plane".
 std::string shapes_with(const std::function<bool(const ShapeRow&)>& has);

@@ -8,6 +8,7 @@
 #include <numbers>
 
 #include "engine/model/compiled_model.hpp"
+#include "engine/model/model.hpp"
 
 namespace tangere {
 namespace {

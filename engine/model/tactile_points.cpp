@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // Cuts a list of tactile points into tiles of 64 neighbours each, in the body's axes.
+#include "engine/model/tactile_points.hpp"
+
 #include <algorithm>
 #include <cmath>
 #include <numeric>
 
-#include "engine/model/compiled_model.hpp"
+#include "engine/model/body_shape.hpp"
 #include "engine/model/frames.hpp"
 #include "kernels/table/kernel_table.hpp"
 
@@ -74,7 +76,8 @@ void place_point(const TactilePoint& p, std::size_t tile, std::size_t k, Compile
     entry(s.frames, 9, tile, 6 + c, k) = -sign * p.normal[c];
   }
   if (!s.factors.empty())
-    for (std::size_t c = 0; c < 4; ++c) entry(s.factors, 4, tile, c, k) = p.factors[c];
+    for (std::size_t c = 0; c < kPointCoefficients; ++c)
+      entry(s.factors, kPointCoefficients, tile, c, k) = p.factors[c];
   s.tile_radius[tile] =
       std::max(s.tile_radius[tile], std::sqrt(dot(offset, offset)) * (1 + 1e-5) + 1e-12);
 }
@@ -116,10 +119,9 @@ CompiledSensor compile_points(const TactileDescription& d, const CompiledBody& b
   std::iota(s.tile_kind.begin(), s.tile_kind.end(), 0);
   s.offsets.assign(3 * slots, kFarAway);
   s.frames.assign(9 * slots, 0.0);
-  const auto plain = [](const TactilePoint& p) {
-    return p.factors == std::array<double, 4>{1, 1, 1, 1};
-  };
-  if (!std::all_of(points.begin(), points.end(), plain)) s.factors.assign(4 * slots, 1.0);
+  const auto plain = [](const TactilePoint& p) { return p.factors == TactilePoint{}.factors; };
+  if (!std::all_of(points.begin(), points.end(), plain))
+    s.factors.assign(kPointCoefficients * slots, 1.0);
   s.index.assign(slots, 0);
   const std::span<int> order(s.index.data(), points.size());
   std::iota(order.begin(), order.end(), 0);

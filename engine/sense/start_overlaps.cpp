@@ -9,6 +9,7 @@
 #include <limits>
 
 #include "engine/model/compiled_model.hpp"
+#include "engine/model/model.hpp"
 #include "engine/sense/pad_reader.hpp"
 #include "engine/step/batch.hpp"
 #include "kernels/contact/distance.hpp"

@@ -7,6 +7,7 @@
 
 #include "engine/base/error.hpp"
 #include "engine/model/compiled_model.hpp"
+#include "engine/model/model.hpp"
 #include "engine/sense/dense_tiles.hpp"
 
 namespace tangere {

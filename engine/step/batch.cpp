@@ -8,6 +8,7 @@
 
 #include "engine/model/compile_variations.hpp"
 #include "engine/model/random.hpp"
+#include "engine/model/scene_number.hpp"
 
 namespace tangere {
 
@@ -30,6 +31,13 @@ Purpose purpose_of(const SceneNumber& number) {
 }
 
 }  // namespace
+
+std::span<const StepStatus> step_statuses() {
+  using enum StepStatus;
+  static constexpr StepStatus kAll[] = {converged,     split,      coarse,   passed,  damped,
+                                        not_converged, non_finite, rotation, singular};
+  return kAll;
+}
 
 const char* to_string(StepStatus value) {
   switch (value) {

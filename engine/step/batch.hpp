@@ -28,6 +28,8 @@ enum class StepStatus : std::int8_t {
   singular = -4,       ///< the Jacobian could not be factored, pivoting included
 };
 const char* to_string(StepStatus value);
+/// Returns all of them.
+std::span<const StepStatus> step_statuses();
 inline bool failed(StepStatus s) { return static_cast<std::int8_t>(s) < 0; }
 
 /// Everything in one block that a step may change.

@@ -3,6 +3,7 @@
 #include "engine/step/displacement.hpp"
 
 #include "engine/model/compiled_model.hpp"
+#include "engine/model/model.hpp"
 
 namespace tangere {
 

@@ -49,6 +49,9 @@ void set_state(const LaneState& s, BasicWorkspace<L>& w, int lane) {
 
 }  // namespace
 
+GroupStep::GroupStep(const CompiledModel& model, const StepSettings& settings)
+    : model_(model), settings_(settings), watch_(model, settings), contact_forces_(model) {}
+
 /// Solves the stages of a step, each for the lanes that found the one before.
 template <int L>
 LaneBits GroupStep::run(const Scheme& scheme, const kernels::KernelTable& table,
@@ -81,7 +84,7 @@ LaneBits GroupStep::run(const Scheme& scheme, const kernels::KernelTable& table,
   LaneBits resolved = lanes;
   finish(w, lanes, h, resolved, report);
   watch_faces(table, w, resolved, report);
-  watch_passing(table, w, resolved, report);
+  watch_.look_for_passing(table, w, resolved, report);
   advance_memory(model_, table, w, resolved);
   return resolved;
 }
@@ -170,6 +173,27 @@ void GroupStep::log_inner(const BasicWorkspace<L>& w, int lane, const Scheme& sc
 }
 
 /// Takes two half steps from q0, v0, split again where needed.
+/// Solves a step of length h, and looks at what it came to.
+template <int L>
+Solved GroupStep::solve_and_watch(const Scheme& scheme, const kernels::KernelTable& table,
+                                  BasicWorkspace<L>& w, LaneBits lanes, double h, bool inside_split,
+                                  NewtonReport& report) const {
+  Solved solved;
+  const LaneBits of_other_parts = std::exchange(report.passed, kNoLane);
+  StageFactors<L> unused;
+  report.softened = 0;
+  solved.found = run(scheme, table, w, lanes, Row<L>::all(h), inside_split, report, unused);
+  // Forces that no search could follow from the first guess and that throw bodies about are not
+  // smooth, which a scheme of higher order relies on. Parts of the step resolve them.
+  if (scheme.order > 1 && !inside_split && report.softened != 0)
+    solved.found &= ~watch_.jumping(w, solved.found & report.softened, h);
+  solved.passed = std::exchange(report.passed, of_other_parts) & solved.found;
+  solved.created = watch_.creating(table, w, solved.found & ~solved.passed, h);
+  solved.turned =
+      watch_.turning(scheme, table, w, solved.found & ~(solved.passed | solved.created), h);
+  return solved;
+}
+
 bool GroupStep::split(const kernels::KernelTable& table, SingleWorkspace& w, double h, int depth,
                       NewtonReport& report, std::vector<TapedSolve>* solves) const {
   return depth <= kDeepestSplit && take_part(table, w, 0.5 * h, depth, report, solves) &&
@@ -200,8 +224,9 @@ bool GroupStep::take_part(const kernels::KernelTable& table, SingleWorkspace& w,
   };
   // Where one scheme finds no root of a shortest part, the equations of another may have one.
   const bool lost = one.found == 0 && depth == kDeepestSplit;
-  if ((one.created != 0 || lost) && scheme->order > 1) {
-    try_by(Integrator::bdf1.scheme());
+  if (const Scheme* const of_gains = scheme->of_gains();
+      of_gains != nullptr && (one.created != 0 || lost)) {
+    try_by(*of_gains);
   } else if (one.turned != 0 || lost) {
     try_by(scheme->of_turns());
   }
@@ -301,8 +326,11 @@ void GroupStep::advance_plainly(const kernels::KernelTable& table, BasicWorkspac
       if (has(done, l)) note(w, l, by, h, solves_of(l));
   };
   if (starting != 0) take_by(*scheme.start, starting);
-  if (scheme.order > 1 && created != 0) take_by(Integrator::bdf1.scheme(), created);
-  if (scheme.order == 1 && turned != 0) take_by(scheme.of_turns(), turned);
+  if (const Scheme* const of_gains = scheme.of_gains(); of_gains != nullptr) {
+    if (created != 0) take_by(*of_gains, created);
+  } else if (turned != 0) {
+    take_by(scheme.of_turns(), turned);
+  }
   for (int l = 0; l < L; ++l) {
     if (!has(lanes & ~resolved, l)) continue;
     const bool has_root = has(passed | created | turned, l);

@@ -6,26 +6,11 @@
 
 #include "engine/step/contact_forces.hpp"
 #include "engine/step/newton.hpp"
-#include "engine/step/passing.hpp"
+#include "engine/step/step_settings.hpp"
 #include "engine/step/step_watch.hpp"
 #include "engine/step/tape.hpp"
 
 namespace tangere {
-
-struct StepSettings {
-  Integrator integrator;
-  double timestep;
-  double tolerance;
-  int max_iterations;
-  double accuracy = 0;  ///< relative, of the parts of a step; 0: every step is one part
-  /// Solves may end unchecked where they promise to meet the tolerance, and stages share factors.
-  /// False where the tolerance was named.
-  bool spare = false;
-  /// Steps that create energy are taken by BDF1 or in parts, and those in which bodies turn too far
-  /// by SDIRK2 or in parts.
-  bool bounded_energy = true;
-  double sleep = 0;  ///< share of its size that a body may move and still rest; 0: none sleeps
-};
 
 /// What a tape needs to know about a step besides its result.
 struct SolveLog {
@@ -95,19 +80,6 @@ class GroupStep {
   void watch_faces(const kernels::KernelTable& table, BasicWorkspace<L>& w, LaneBits lanes,
                    NewtonReport& report) const;
   template <int L>
-  void watch_passing(const kernels::KernelTable& table, BasicWorkspace<L>& w, LaneBits lanes,
-                     NewtonReport& report) const;
-  template <int L>
-  void find_poses(const kernels::KernelTable& table, BasicWorkspace<L>& w) const;
-  template <int L>
-  LaneBits jumping(const BasicWorkspace<L>& w, LaneBits lanes, double h) const;
-  template <int L>
-  LaneBits creating(const kernels::KernelTable& table, BasicWorkspace<L>& w, LaneBits lanes,
-                    double h) const;
-  template <int L>
-  LaneBits turning(const Scheme& scheme, const kernels::KernelTable& table, BasicWorkspace<L>& w,
-                   LaneBits lanes, double h) const;
-  template <int L>
   Solved solve_and_watch(const Scheme& scheme, const kernels::KernelTable& table,
                          BasicWorkspace<L>& w, LaneBits lanes, double h, bool inside_split,
                          NewtonReport& report) const;
@@ -119,9 +91,8 @@ class GroupStep {
 
   const CompiledModel& model_;
   StepSettings settings_;
-  Passing passing_;
+  StepWatch watch_;
   ContactForces contact_forces_;
-  std::vector<double> component_mass_;  ///< [kg] without densities that vary
 };
 
 }  // namespace tangere

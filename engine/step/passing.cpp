@@ -9,6 +9,7 @@
 #include <cmath>
 #include <utility>
 
+#include "engine/model/body_shape.hpp"
 #include "engine/step/lane_energy.hpp"
 
 namespace tangere {

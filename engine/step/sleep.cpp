@@ -10,7 +10,9 @@
 #include <cstring>
 #include <limits>
 
+#include "engine/model/body_shape.hpp"
 #include "engine/model/model_part.hpp"
+#include "engine/model/shapes.hpp"
 #include "engine/step/lane_energy.hpp"
 #include "kernels/contact/pair_contact.hpp"
 #include "kernels/step/faces.hpp"
@@ -88,7 +90,7 @@ void Sleep::measure() {
     if (body.link < 0) continue;
     double radius = body.extent;
     if (body.touchable) radius = std::max(radius, hull_of(body).radius);
-    if (body.touchable && body.shape == PrimitiveShape::plane) bounded_ = false;
+    if (body.touchable && !row_of(body.shape).bounded) bounded_ = false;
     reach(body.link, length(body.frame.p) + radius);
   }
   for (const kernels::PairContact& pair : model_.pairs) reach(pair.link1, pair.reach);

@@ -189,7 +189,7 @@ void GroupStep::advance_in_parts(const kernels::KernelTable& table, BasicWorkspa
     const LaneBits through = std::exchange(report.passed, kNoLane);
     LaneBits turned = 0;
     for (int l = 0; l < L; ++l)
-      if (has(solved, l)) turned |= turning(scheme, table, w, 1U << l, h[l]);
+      if (has(solved, l)) turned |= watch_.turning(scheme, table, w, 1U << l, h[l]);
     Row<L> error{};
     if (solved != 0) error = estimated_error(table, w, solved, h, factors, report);
     for (int l = 0; l < L; ++l) {

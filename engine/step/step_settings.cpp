@@ -66,21 +66,11 @@ StepSettings step_settings(const Model& model, const StepperOptions& o) {
   return s;
 }
 
-Integrator integrator_in_force(const Model& model, const StepperOptions& options) {
-  return step_settings(model, options).integrator;
-}
-
 void refuse_sleep(const Model& model, const StepSettings& settings) {
   if (settings.sleep > 0)
     throw InputError(model.solver().sleep_source.prefix() +
                      "a body that sleeps has no derivatives; expected gradients without --sleep, "
                      "and a <solver_option> without sleep");
-}
-
-StepperOptions for_gradients(const Model& model, StepperOptions options) {
-  refuse_sleep(model, step_settings(model, options));
-  if (!options.tolerance && !model.solver().tolerance) options.tolerance = kGradientTolerance;
-  return options;
 }
 
 }  // namespace tangere

@@ -2,10 +2,25 @@
 // The settings in force: the caller's if given, else the scene's.
 #pragma once
 
-#include "engine/step/group_step.hpp"
-#include "engine/step/stepper.hpp"
+#include "engine/model/model.hpp"
+#include "engine/step/stepper_options.hpp"
 
 namespace tangere {
+
+struct StepSettings {
+  Integrator integrator;
+  double timestep;
+  double tolerance;
+  int max_iterations;
+  double accuracy = 0;  ///< relative, of the parts of a step; 0: every step is one part
+  /// Solves may end unchecked where they promise to meet the tolerance, and stages share factors.
+  /// False where the tolerance was named.
+  bool spare = false;
+  /// Steps that create energy are taken by BDF1 or in parts, and those in which bodies turn too far
+  /// by SDIRK2 or in parts.
+  bool bounded_energy = true;
+  double sleep = 0;  ///< share of its size that a body may move and still rest; 0: none sleeps
+};
 
 /// Throws InputError if the timestep or the tolerance is not a positive number, if the accuracy or
 /// sleep is none, or if the scene does not allow bodies to sleep.

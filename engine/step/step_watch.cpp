@@ -13,9 +13,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <utility>
 
-#include "engine/step/group_step.hpp"
 #include "engine/step/lane_energy.hpp"
 #include "engine/step/turn_defect.hpp"
 
@@ -31,8 +29,11 @@ constexpr double kMayCreate = 1e-3;
 
 }  // namespace
 
-GroupStep::GroupStep(const CompiledModel& model, const StepSettings& settings)
-    : model_(model), settings_(settings), passing_(model), contact_forces_(model) {
+StepWatch::StepWatch(const CompiledModel& model, const StepSettings& settings)
+    : model_(model),
+      bounded_energy_(settings.bounded_energy),
+      cut_(settings.accuracy > 0),
+      passing_(model) {
   std::vector<double> of_dof(std::size_t(model.nv));  // a link's mass counts at its first dof
   for (const kernels::Link& link : model.links) of_dof[std::size_t(link.v)] = link.mass;
   for (int c = 0; c < model.components(); ++c) {
@@ -46,7 +47,7 @@ GroupStep::GroupStep(const CompiledModel& model, const StepSettings& settings)
 
 /// Computes the poses of links where the present solve began and ended.
 template <int L>
-void GroupStep::find_poses(const kernels::KernelTable& table, BasicWorkspace<L>& w) const {
+void StepWatch::find_poses(const kernels::KernelTable& table, BasicWorkspace<L>& w) const {
   const auto at = [&](const Row<L>* q, const Row<L>* v, auto& poses) {
     table.stage<L>().poses_at(model_.view, w.stage, q, v, w.zero, poses.data());
   };
@@ -54,10 +55,9 @@ void GroupStep::find_poses(const kernels::KernelTable& table, BasicWorkspace<L>&
   at(w.q1, w.v1, w.poses_after);
 }
 
-/// Notes lanes in which a body came through another that it touches.
 template <int L>
-void GroupStep::watch_passing(const kernels::KernelTable& table, BasicWorkspace<L>& w,
-                              LaneBits lanes, NewtonReport& report) const {
+void StepWatch::look_for_passing(const kernels::KernelTable& table, BasicWorkspace<L>& w,
+                                 LaneBits lanes, NewtonReport& report) const {
   const LaneBits near = lanes & ~passing_.out_of_reach<L>(w, lanes);
   if (near == 0) return;
   const LaneBits far = near & passing_.far_movers<L>(w.stage.x, w.test);
@@ -68,9 +68,8 @@ void GroupStep::watch_passing(const kernels::KernelTable& table, BasicWorkspace<
       report.passed |= 1U << l;
 }
 
-/// Returns the lanes whose velocities jumped.
 template <int L>
-LaneBits GroupStep::jumping(const BasicWorkspace<L>& w, LaneBits lanes, double h) const {
+LaneBits StepWatch::jumping(const BasicWorkspace<L>& w, LaneBits lanes, double h) const {
   const double fall = dot(model_.view.gravity, model_.view.gravity) * h * h;
   LaneBits found = 0;
   for (int c = 0; c < model_.components(); ++c) {
@@ -95,14 +94,13 @@ LaneBits GroupStep::jumping(const BasicWorkspace<L>& w, LaneBits lanes, double h
   return found & lanes;
 }
 
-/// Returns the lanes whose solve, which ended in q1, v1, created energy.
 template <int L>
-LaneBits GroupStep::creating(const kernels::KernelTable& table, BasicWorkspace<L>& w,
+LaneBits StepWatch::creating(const kernels::KernelTable& table, BasicWorkspace<L>& w,
                              LaneBits lanes, double h) const {
   // What a spring of friction holds is not counted. A sensor's holds nothing.
   const bool elastic = std::any_of(model_.memories.begin(), model_.memories.end(),
                                    [](const auto& of) { return of.sensor < 0; });
-  if (!settings_.bounded_energy || elastic || settings_.accuracy > 0) return kNoLane;
+  if (!bounded_energy_ || elastic || cut_) return kNoLane;
   const LaneBits looked_at = jumping(w, lanes, h);
   if (looked_at == 0) return kNoLane;
   find_poses(table, w);
@@ -121,12 +119,10 @@ LaneBits GroupStep::creating(const kernels::KernelTable& table, BasicWorkspace<L
   return found;
 }
 
-/// Returns the lanes in which a body turned too far for the scheme of the solve. Where something
-/// touches, the scheme is left to damp what it meets.
 template <int L>
-LaneBits GroupStep::turning(const Scheme& scheme, const kernels::KernelTable& table,
+LaneBits StepWatch::turning(const Scheme& scheme, const kernels::KernelTable& table,
                             BasicWorkspace<L>& w, LaneBits lanes, double h) const {
-  if (!settings_.bounded_energy) return kNoLane;
+  if (!bounded_energy_) return kNoLane;
   const LaneBits far = far_turners(model_, scheme, w, lanes, h);
   LaneBits found = 0;
   for (int l = 0; l < L; ++l)
@@ -140,34 +136,14 @@ LaneBits GroupStep::turning(const Scheme& scheme, const kernels::KernelTable& ta
   return found;
 }
 
-/// Solves a step of length h, and looks at what it came to.
-template <int L>
-Solved GroupStep::solve_and_watch(const Scheme& scheme, const kernels::KernelTable& table,
-                                  BasicWorkspace<L>& w, LaneBits lanes, double h, bool inside_split,
-                                  NewtonReport& report) const {
-  Solved solved;
-  const LaneBits of_other_parts = std::exchange(report.passed, kNoLane);
-  StageFactors<L> unused;
-  report.softened = 0;
-  solved.found = run(scheme, table, w, lanes, Row<L>::all(h), inside_split, report, unused);
-  // Forces that no search could follow from the first guess and that throw bodies about are not
-  // smooth, which a scheme of higher order relies on. Parts of the step resolve them.
-  if (scheme.order > 1 && !inside_split && report.softened != 0)
-    solved.found &= ~jumping(w, solved.found & report.softened, h);
-  solved.passed = std::exchange(report.passed, of_other_parts) & solved.found;
-  solved.created = creating(table, w, solved.found & ~solved.passed, h);
-  solved.turned = turning(scheme, table, w, solved.found & ~(solved.passed | solved.created), h);
-  return solved;
-}
-
-#define TANGERE_FOR_LANES(L)                                                              \
-  template void GroupStep::watch_passing(const kernels::KernelTable&, BasicWorkspace<L>&, \
-                                         LaneBits, NewtonReport&) const;                  \
-  template LaneBits GroupStep::turning(const Scheme&, const kernels::KernelTable&,        \
-                                       BasicWorkspace<L>&, LaneBits, double) const;       \
-  template Solved GroupStep::solve_and_watch(const Scheme&, const kernels::KernelTable&,  \
-                                             BasicWorkspace<L>&, LaneBits, double, bool,  \
-                                             NewtonReport&) const;
+#define TANGERE_FOR_LANES(L)                                                                       \
+  template void StepWatch::look_for_passing(const kernels::KernelTable&, BasicWorkspace<L>&,       \
+                                            LaneBits, NewtonReport&) const;                        \
+  template LaneBits StepWatch::jumping(const BasicWorkspace<L>&, LaneBits, double) const;          \
+  template LaneBits StepWatch::creating(const kernels::KernelTable&, BasicWorkspace<L>&, LaneBits, \
+                                        double) const;                                             \
+  template LaneBits StepWatch::turning(const Scheme&, const kernels::KernelTable&,                 \
+                                       BasicWorkspace<L>&, LaneBits, double) const;
 TANGERE_FOR_LANES(kernels::kGroup)
 TANGERE_FOR_LANES(1)
 #undef TANGERE_FOR_LANES

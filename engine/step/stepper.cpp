@@ -319,4 +319,14 @@ std::size_t Stepper::workspace_bytes(const Model& model) {
   return Workspace::bytes(compiled(model));
 }
 
+Integrator integrator_in_force(const Model& model, const StepperOptions& options) {
+  return step_settings(model, options).integrator;
+}
+
+StepperOptions for_gradients(const Model& model, StepperOptions options) {
+  refuse_sleep(model, step_settings(model, options));
+  if (!options.tolerance && !model.solver().tolerance) options.tolerance = kGradientTolerance;
+  return options;
+}
+
 }  // namespace tangere

@@ -4,27 +4,14 @@
 #pragma once
 
 #include <memory>
-#include <optional>
 #include <span>
 
 #include "engine/step/batch.hpp"
+#include "engine/step/stepper_options.hpp"
 
 namespace tangere {
 
 class BlockTape;
-
-/// What a caller may change about the solve. Defaults come from the scene.
-struct StepperOptions {
-  std::optional<Integrator> integrator;
-  std::optional<double> timestep;   ///< [s]
-  std::optional<double> tolerance;  ///< scaled residual, dimensionless
-  /// Steps are cut into parts that keep this accuracy (docs/accuracy.md), relative, below 1. 0:
-  /// every step is one part.
-  std::optional<double> accuracy{};
-  /// Bodies sleep that have moved by less than this share of their size for a while
-  /// (docs/sleeping.md), below 1. 0: none does.
-  std::optional<double> sleep{};
-};
 
 /// Returns the scheme that a stepper of these options takes. Throws like its constructor.
 Integrator integrator_in_force(const Model& model, const StepperOptions& options);

@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "engine/model/compiled_model.hpp"
+#include "engine/model/model.hpp"
 #include "engine/step/batch.hpp"
 
 namespace tangere {

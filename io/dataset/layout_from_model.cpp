@@ -4,6 +4,7 @@
 
 #include <stdexcept>
 
+#include "engine/model/scene_number.hpp"
 #include "io/dataset/dataset_layout.hpp"
 #include "io/scene/scene_tables.hpp"
 #include "io/trajectory/trajectory_layout.hpp"
@@ -87,11 +88,8 @@ TrajectoryLayout layout_from(const Batch& batch, const Stepper& stepper,
   for (std::size_t i = 0; i < model.sensors().size(); ++i)
     layout.sensors.push_back(
         sensor_layout(model.sensors()[i], scene.sensors[i], run.tactile_intervals[i]));
-  layout.fields = run.fields ? *run.fields : whole_fields(model);
-  for (const StepStatus status :
-       {StepStatus::converged, StepStatus::split, StepStatus::coarse, StepStatus::passed,
-        StepStatus::damped, StepStatus::not_converged, StepStatus::non_finite, StepStatus::rotation,
-        StepStatus::singular})
+  layout.fields = run.fields ? *run.fields : whole_fields(model.scene());
+  for (const StepStatus status : step_statuses())
     layout.statuses.push_back({static_cast<std::int8_t>(status), to_string(status)});
   describe_randomized(scene, layout);
   const int varied = static_cast<int>(layout.randomized_names.size());
@@ -160,7 +158,7 @@ DatasetLayout dataset_layout_from(const Model& model, const Stepper& stepper,
   layout.record = run.record;
   layout.record_times = run.record_times;
   layout.bodies = run.bodies;
-  layout.fields = run.fields ? *run.fields : whole_fields(model);
+  layout.fields = run.fields ? *run.fields : whole_fields(model.scene());
   return layout;
 }
 

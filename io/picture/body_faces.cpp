@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Round shapes are rings of quadrilaterals around z. A large mesh is thinned: vertices in one cell
+// Round shapes are rings of quadrilaterals around z. The surface of a shape that has no form of its
+// own is where rays from its middle leave it. A large mesh is thinned: vertices in one cell
 // of a grid become one, their mean, and triangles that lose a corner are left out.
 #include "io/picture/body_faces.hpp"
 
@@ -7,6 +8,9 @@
 #include <array>
 #include <cmath>
 #include <map>
+
+#include "engine/base/vector3.hpp"
+#include "engine/model/shapes.hpp"
 
 namespace tangere {
 namespace {
@@ -110,6 +114,19 @@ Surface thinned(const Surface& s, int cells) {
   return out;
 }
 
+/// Returns where a ray from the middle of a shape leaves it. `way`: on the unit ball, which is
+/// stretched by the shape's widths.
+Vector3 exit_of(const Shape& shape, const Vector3& way) {
+  const Vector3 width = widths(shape);
+  const Vector3 ray = {width[0] / 2 * way[0], width[1] / 2 * way[1], width[2] / 2 * way[2]};
+  double inside = 0, outside = 2;  // the widths' corner is √3 away
+  for (int k = 0; k < 60; ++k) {
+    const double middle = (inside + outside) / 2;
+    (distance_from(shape, middle * ray).distance < 0 ? inside : outside) = middle;
+  }
+  return outside * ray;
+}
+
 struct FacesOf {
   double half_space;
   std::size_t most;
@@ -120,11 +137,10 @@ struct FacesOf {
     return lathe({{-s.length / 2, s.radius}, {s.length / 2, s.radius}});
   }
   std::vector<Face> operator()(const CapsuleShape& s) const { return ball(s.radius, s.length / 2); }
-  std::vector<Face> operator()(const EllipsoidShape& s) const {
+  std::vector<Face> operator()(const auto& s) const {
     std::vector<Face> faces = ball(1, 0);
     for (Face& face : faces)
-      for (Vector3& corner : face)
-        for (std::size_t c = 0; c < 3; ++c) corner[c] *= s.size[c] / 2;
+      for (Vector3& corner : face) corner = exit_of(s, corner);
     return faces;
   }
   std::vector<Face> operator()(const PlaneShape&) const {
@@ -152,6 +168,24 @@ struct FacesOf {
 
 std::vector<Face> faces_of(const Shape& shape, double half_space, std::size_t most) {
   return std::visit(FacesOf{half_space, most}, shape);
+}
+
+RoundSurface round_surface_of(const Shape& shape) {
+  constexpr int kSides = 48, kBands = 32;
+  RoundSurface out;
+  for (int k = 0; k <= kBands; ++k)
+    for (int s = 0; s < kSides; ++s) {
+      const double lift = M_PI * k / kBands, turn = 2 * M_PI * s / kSides;
+      const Vector3 at = exit_of(shape, {std::sin(lift) * std::cos(turn),
+                                         std::sin(lift) * std::sin(turn), -std::cos(lift)});
+      out.vertices.push_back(at);
+      out.normals.push_back(distance_from(shape, at).normal);
+      if (k == kBands) continue;
+      const int a = k * kSides + s, b = k * kSides + (s + 1) % kSides;
+      out.triangles.push_back({a, b, a + kSides});
+      out.triangles.push_back({a + kSides, b, b + kSides});
+    }
+  return out;
 }
 
 }  // namespace tangere

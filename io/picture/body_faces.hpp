@@ -2,6 +2,7 @@
 // The surface of a body as flat faces, for pictures.
 #pragma once
 
+#include <array>
 #include <vector>
 
 #include "engine/model/scene.hpp"
@@ -15,5 +16,14 @@ using Face = std::vector<Vector3>;
 /// [m]. A mesh of more than `most` triangles is thinned until it has no more. An abstract body has
 /// none.
 std::vector<Face> faces_of(const Shape& shape, double half_space, std::size_t most = 12000);
+
+/// Triangles whose corners, anticlockwise seen from outside, have the normals of the surface [m].
+struct RoundSurface {
+  std::vector<Vector3> vertices, normals;
+  std::vector<std::array<int, 3>> triangles;
+};
+/// Returns the surface of a shape that has a distance and widths, seen from its middle. Throws
+/// InputError for others.
+RoundSurface round_surface_of(const Shape& shape);
 
 }  // namespace tangere

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "engine/model/scene_number.hpp"
 #include "engine/model/shapes.hpp"
 #include "io/scene/scene_sections.hpp"
 #include "io/scene/surface_files.hpp"

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "engine/model/scene_number.hpp"
 #include "io/scene/scene_sections.hpp"
 
 namespace tangere {
@@ -14,15 +15,11 @@ namespace {
 /// Reads the effects of the dofs that turn, or of those that slide, in SI.
 JointEffects effects_in_si(const SceneNode& node, bool turns) {
   const SceneContext& c = node.context();
-  const auto number = [&](NumberField field) {
-    const NumberKind& kind = number_kind(NumberOwner::joint, field);
-    return node.not_negative(kind.name, 0.0) * c.factor(kind.unit_of(turns));
-  };
   JointEffects e;
-  e.damping = number(NumberField::damping);
-  e.armature = number(NumberField::armature);
-  e.stiffness = number(NumberField::stiffness);
-  e.limit_stiffness = number(NumberField::lim_stiffness);
+  for (std::size_t k = 0; k < kJointEffects; ++k) {
+    const NumberKind& kind = number_kind(NumberOwner::joint, effect_field(k));
+    e[k] = node.not_negative(kind.name, 0.0) * c.factor(kind.unit_of(turns));
+  }
   if (node.has("lim")) {
     const std::vector<double> x = node.numbers("lim", 2);
     if (!(x[0] <= x[1]))
@@ -57,7 +54,9 @@ std::vector<double> read_rest(const SceneNode& node, JointType type) {
 }
 
 bool has_effect(const JointEffects& e) {
-  return e.damping != 0 || e.armature != 0 || e.stiffness != 0 || e.limit_stiffness != 0;
+  for (std::size_t k = 0; k < kJointEffects; ++k)
+    if (e[k] != 0) return true;
+  return false;
 }
 
 /// Reads range and gains of a motor. Its dofs all slide or all turn, except those of a force motor

@@ -210,9 +210,9 @@ void read_defaults(const SceneNode& node) {
   const std::map<std::string, std::vector<std::string>> known = {
       {"joint", {"damping", "lim_stiffness", "stiffness", "armature"}},
       {"body", {"density", "scale", "rgba"}},
-      {"general_primitive_contact", {"kn", "kt", "mu", "ks", "damping", "render", "law", "ramp"}},
-      {"ground_contact", {"kn", "kt", "mu", "ks", "damping", "render", "law", "ramp"}},
-      {"tactile", {"kn", "kt", "mu", "ks", "damping", "render", "law", "every"}},
+      {"general_primitive_contact", with_coefficients({"render", "law", "ramp"})},
+      {"ground_contact", with_coefficients({"render", "law", "ramp"})},
+      {"tactile", with_coefficients({"render", "law", "every"})},
       {"motor", {"P", "D", "ctrl_range", "timing"}},
       {"endeffector", {"radius", "rgba"}}};
   std::vector<std::string> names;
@@ -265,7 +265,7 @@ void read_root(const SceneNode& root, Scene& scene) {
   });
   if (!metres) c.use_centimetres_and_grams();
   scene.timestep = 0.02;
-  scene.integrator = Integrator::bdf1;
+  scene.integrator = Integrator::usual;
   scene.gravity = {0, 0, -9.8};
   once("option", [&](const SceneNode& s) { read_option(scene, s); });
   once("solver_option", [&](const SceneNode& s) { read_solver(scene, s); });

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <filesystem>
 
+#include "engine/model/scene_number.hpp"
 #include "engine/model/shapes.hpp"
 #include "io/files/csv.hpp"
 #include "io/scene/scene_sections.hpp"
@@ -92,7 +93,7 @@ void check_coefficient(const SceneNode& node, const Distribution& d) {
 NumberField read_field(const SceneNode& node, NumberOwner owner, NumberField first,
                        NumberField last) {
   std::vector<std::string> names;
-  for (int k = 0; k <= from(first, last); ++k)
+  for (int k = 0; k <= offset_from(first, last); ++k)
     names.emplace_back(number_kind(owner, NumberField(int(first) + k)).name);
   return static_cast<NumberField>(static_cast<int>(first) + int(node.choice("field", names)));
 }
@@ -178,11 +179,14 @@ void read_body_variation(const Scene& scene, const SceneNode& node, Randomizatio
     node.fail("expected exactly one of field and size (the index of an edge)");
   constexpr NumberField kFields[] = {NumberField::radius, NumberField::length, NumberField::density,
                                      NumberField::scale};
+  std::vector<std::string> fields;
+  for (const NumberField field : kFields)
+    fields.emplace_back(number_kind(NumberOwner::body, field).name);
   d.number = {NumberOwner::body, NumberField::size, body.name};
   if (node.has("size")) {
     d.number.component = node.integer("size", 0, 2);
   } else {
-    d.number.field = kFields[node.choice("field", {"radius", "length", "density", "scale"})];
+    d.number.field = kFields[node.choice("field", fields)];
   }
   if (d.number.field != NumberField::density) {
     Shape shape = body.shape;
@@ -239,11 +243,7 @@ void read_coefficient_variation(const Scene& scene, const SceneNode& node,
                   "between environments");
   }
   node.check_attributes(attributes);
-  std::vector<std::string> fields;
-  fields.reserve(kCoefficients);
-  for (int k = 0; k < kCoefficients; ++k)
-    fields.emplace_back(number_kind(n.owner, coefficient_field(k)).name);
-  n.field = coefficient_field(int(node.choice("field", fields)));
+  n.field = coefficient_field(node.choice("field", with_coefficients({})));
   d.distribution = read_distribution(scene, node, n);
   check_coefficient(node, d.distribution);
 }

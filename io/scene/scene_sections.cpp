@@ -8,6 +8,7 @@
 #include <array>
 #include <cmath>
 
+#include "engine/model/scene_number.hpp"
 #include "engine/model/shapes.hpp"
 
 namespace tangere {
@@ -48,6 +49,12 @@ void read_law(const SceneNode& node, int fallback, Contact& contact) {
 }
 
 }  // namespace
+
+std::vector<std::string> with_coefficients(std::vector<std::string> attributes) {
+  for (int k = 0; k < kCoefficients; ++k)
+    attributes.emplace_back(number_kind(NumberOwner::contact, coefficient_field(k)).name);
+  return attributes;
+}
 
 ContactCoefficients read_coefficients(const SceneNode& node, ContactLaw law) {
   ContactCoefficients c{};
@@ -180,8 +187,7 @@ void read_contacts(Scene& scene, const SceneNode& section) {
   section.check_attributes({});
   for (const SceneNode& node : section.children({"ground_contact", "general_primitive_contact"})) {
     if (node.name() == "ground_contact") {
-      node.check_attributes({"body", "kn", "kt", "mu", "ks", "damping", "law", "ramp"},
-                            {"render", "scale"});
+      node.check_attributes(with_coefficients({"body", "law", "ramp"}), {"render", "scale"});
       if (!scene.ground) node.fail("the scene has no <ground> to touch");
       GroundContactDescription d;
       d.source = node.source();
@@ -194,9 +200,8 @@ void read_contacts(Scene& scene, const SceneNode& section) {
       read_law(node, kLinear, d);
       scene.ground_contacts.push_back(std::move(d));
     } else {
-      node.check_attributes(
-          {"general_body", "primitive_body", "kn", "kt", "mu", "ks", "damping", "law", "ramp"},
-          {"render", "scale"});
+      node.check_attributes(with_coefficients({"general_body", "primitive_body", "law", "ramp"}),
+                            {"render", "scale"});
       PairContactDescription d;
       d.source = node.source();
       const int general = find_body(scene, node, "general_body");

@@ -59,6 +59,8 @@ auto read_beside(const SceneNode& node, const char* attribute, Read&& read) {
 /// Reads the closed surface of `filename`, scaled by `scale` and to metres.
 MeshShape read_mesh(const SceneNode& node, double length);
 
+/// Returns `attributes`, then the names of coefficients.
+std::vector<std::string> with_coefficients(std::vector<std::string> attributes);
 /// Reads k_n, k_t, μ and the damping that a law uses, in SI; all 0 by default.
 ContactCoefficients read_coefficients(const SceneNode& node, ContactLaw law);
 

@@ -32,8 +32,8 @@ Names attributes_of(int type) {
 }
 
 void check_attributes(const SceneNode& node, int type) {
-  Names used = {"name", "body",  "type",          "kn",      "kt", "mu", "ks", "damping",
-                "law",  "every", "pressure_sign", "feedback"},
+  Names used = with_coefficients(
+            {"name", "body", "type", "law", "every", "pressure_sign", "feedback"}),
         idle;
   const Names own = attributes_of(type);
   used.insert(used.end(), own.begin(), own.end());

@@ -8,6 +8,7 @@
 #include <variant>
 
 #include "engine/model/shapes.hpp"
+#include "io/picture/body_faces.hpp"
 #include "io/view/page_files.hpp"
 
 namespace tangere {
@@ -43,22 +44,49 @@ Json packed(const std::vector<T>& values) {
 
 std::vector<float> single(std::span<const double> values) { return {values.begin(), values.end()}; }
 
-Json surface_of(const MeshShape& s) {
-  std::vector<std::int32_t> corners;
-  for (const auto& triangle : s.triangles)
-    corners.insert(corners.end(), triangle.begin(), triangle.end());
-  std::vector<double> vertices = s.vertices;
-  for (double& x : vertices) x *= s.scale;
-  return {{"vertices", packed(single(vertices))}, {"triangles", packed(corners)}};
+std::vector<float> single(std::span<const Vector3> points) {
+  std::vector<float> numbers;
+  for (const Vector3& p : points)
+    for (const double x : p) numbers.push_back(static_cast<float>(x));
+  return numbers;
 }
+
+Json packed_triangles(std::span<const std::array<int, 3>> triangles) {
+  std::vector<std::int32_t> corners;
+  for (const auto& triangle : triangles)
+    corners.insert(corners.end(), triangle.begin(), triangle.end());
+  return packed(corners);
+}
+
+/// What page/solids.js draws a shape from. It knows the shapes that are listed here; others are
+/// sent as triangles.
+struct DrawnFrom {
+  Json operator()(const SphereShape&) const { return Json::object(); }
+  Json operator()(const CuboidShape&) const { return Json::object(); }
+  Json operator()(const CylinderShape&) const { return Json::object(); }
+  Json operator()(const CapsuleShape&) const { return Json::object(); }
+  Json operator()(const PlaneShape&) const { return Json::object(); }
+  Json operator()(const AbstractShape& s) const {
+    return {{"points", packed(single(s.contact_points))}};
+  }
+  Json operator()(const MeshShape& s) const {
+    std::vector<double> vertices = s.vertices;
+    for (double& x : vertices) x *= s.scale;
+    return {{"vertices", packed(single(vertices))}, {"triangles", packed_triangles(s.triangles)}};
+  }
+  Json operator()(const auto& s) const {
+    const RoundSurface surface = round_surface_of(s);
+    return {{"vertices", packed(single(surface.vertices))},
+            {"normals", packed(single(surface.normals))},
+            {"triangles", packed_triangles(surface.triangles)}};
+  }
+};
 
 Json shape_of(const Shape& shape) {
   Json out = {{"kind", shape_name(shape)}};
   for (const NamedSize& size : named_sizes(shape))
     out[size.name] = size.values.size() == 1 ? Json(size.values[0]) : Json(size.values);
-  if (const auto* const mesh = std::get_if<MeshShape>(&shape)) out.update(surface_of(*mesh));
-  if (const auto* const body = std::get_if<AbstractShape>(&shape))
-    out["points"] = packed(single(body->contact_points));
+  out.update(std::visit(DrawnFrom{}, shape));
   return out;
 }
 

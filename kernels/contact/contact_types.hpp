@@ -37,9 +37,10 @@ struct Coefficients {
                                                 &Coefficients::ks};
 };
 inline constexpr int kCoefficients = 5;
-/// The first of them, of which tactile points have factors. A point's factor of kt scales its ks
-/// too.
+/// The first of them, of which tactile points have factors.
 inline constexpr int kPointCoefficients = 4;
+/// The factor of a point that scales coefficient k. That of kt scales ks too.
+constexpr std::size_t factor_index(std::size_t k) { return k < kPointCoefficients ? k : 1; }
 
 /// Applies f to each coefficient, in order.
 template <class N, class F>

@@ -12,10 +12,8 @@ LawParameters<Lanes<A>> law_at(const LoadedTouch<Lanes<A>>& t, const Remembering
                                int k) {
   LawParameters<Lanes<A>> law = t.law;
   if (points.factors == nullptr) return law;
-  const auto factor = [&](int i) { return load_lanes<A>(points.factors + i * points.stride + k); };
-  for (int i = 0; i < kPointCoefficients; ++i)
-    law[std::size_t(i)] = law[std::size_t(i)] * factor(i);
-  law.ks = law.ks * factor(1);
+  for (std::size_t i = 0; i < kCoefficients; ++i)
+    law[i] = law[i] * load_lanes<A>(points.factors + int(factor_index(i)) * points.stride + k);
   return law;
 }
 

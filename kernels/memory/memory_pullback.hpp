@@ -81,7 +81,7 @@ Anchor<N> pull_back_elastic(const LoadedTouch<N>& t, const LawParameters<N>& law
   out.twist.l -= u;
   out.displacement.l -= of.r;
   out.displacement.a -= cross(p.x2 - p.arm, of.r);
-  pull_back_meeting<Shape>(t, p, xi, d, n, cross(t.omega, u) + x_bar, out.displacement);
+  pull_back_touch_point<Shape>(t, p, xi, d, n, cross(t.omega, u) + x_bar, out.displacement);
   return of.anchor;
 }
 

@@ -23,7 +23,7 @@ struct RememberingTouch {
 struct RememberingPoints {
   const double* places;  ///< (3, stride) body 1's axes; padding is far away
   double* anchors;       ///< (kAnchorNumbers, stride)
-  /// (4, stride) factors of kn, kt, mu, damping; null: all 1. That of kt is of ks, too.
+  /// (kPointCoefficients, stride) factors of coefficients (factor_index()); null: all 1.
   const double* factors;
   int count, stride;
 };

@@ -75,8 +75,8 @@ template <class Shape, class N>
 
 /// Adds what cotangents of d, n and x come to, by (θ; ρ) of body 2.
 template <class Shape, class N>
-void pull_back_meeting(const LoadedTouch<N>& t, const PointContact<N>& p, const Vec3<N>& xi, N d,
-                       Vec3<N> n, const Vec3<N>& x, Vec6<N>& out) {
+void pull_back_touch_point(const LoadedTouch<N>& t, const PointContact<N>& p, const Vec3<N>& xi,
+                           N d, Vec3<N> n, const Vec3<N>& x, Vec6<N>& out) {
   if (t.ground) {
     n -= t.radius * x;
     const Vec3<N> rho = -d * p.n;
@@ -120,7 +120,8 @@ Vec3<N> pull_back_recall(const Shape& shape, const LoadedTouch<N>& t, const Vec3
   const Vec3<N> y = t.Q * bar.a, at = p.x2 - s_of(p, remembered);
   out.l -= y;
   out.a -= cross(at, y);
-  pull_back_meeting<Shape>(t, p, xi, select(p.d > zero, bar.gap, zero), zero3<N>(), bar.b + y, out);
+  pull_back_touch_point<Shape>(t, p, xi, select(p.d > zero, bar.gap, zero), zero3<N>(), bar.b + y,
+                               out);
   return select(p.d < zero, -y, zero3<N>());
 }
 

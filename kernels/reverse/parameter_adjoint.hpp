@@ -211,15 +211,16 @@ void joint_parameters(const ModelView& model, const StageArgs<N>& a, const Link&
     N inside;
     const N& v = a.v[link.v + k];
     motor_force(e[k], load_parameter(a, e[k].P), load_parameter(a, e[k].D), error, v, inside);
-    out[kDofNumbers * k + 2] += inside * lambda[link.v + k] * error;
-    out[kDofNumbers * k + 3] -= inside * lambda[link.v + k] * v;
+    out[kDofNumbers * k + kDofP] += inside * lambda[link.v + k] * error;
+    out[kDofNumbers * k + kDofD] -= inside * lambda[link.v + k] * v;
   };
-  for (int k = 0; k < dofs(K); ++k) out[kDofNumbers * k] -= lambda[link.v + k] * a.v[link.v + k];
+  for (int k = 0; k < dofs(K); ++k)
+    out[kDofNumbers * k + kDofDamping] -= lambda[link.v + k] * a.v[link.v + k];
   if constexpr (K != JointKind::spherical) {
     for (int k = 0; k < dofs(K); ++k) {
       const N q = c[k] + x[k];
       if (link.effects & kSprung)
-        out[kDofNumbers * k + 1] += lambda[link.v + k] * (N(e[k].rest) - q);
+        out[kDofNumbers * k + kDofStiffness] += lambda[link.v + k] * (N(e[k].rest) - q);
       if (link.effects & kDriven) motor(k, u[k] - q);
     }
   } else {
@@ -227,7 +228,8 @@ void joint_parameters(const ModelView& model, const StageArgs<N>& a, const Link&
     if (link.effects & kSprung) {
       const Quat<N> rest = quaternion_exp(Vec3<N>{N(e[0].rest), N(e[1].rest), N(e[2].rest)});
       const Vec3<N> phi = rotation_vector<false>(conjugate(rest) * q).phi;
-      out[1] -= dot(phi, Vec3<N>{lambda[link.v], lambda[link.v + 1], lambda[link.v + 2]});
+      out[kDofStiffness] -=
+          dot(phi, Vec3<N>{lambda[link.v], lambda[link.v + 1], lambda[link.v + 2]});
     }
     if (link.effects & kDriven) {
       const Vec3<N> psi =

@@ -5,7 +5,7 @@
 #pragma once
 
 #include "kernels/reverse/point_pullback.hpp"
-#include "kernels/tactile/tactile_point.hpp"
+#include "kernels/tactile/tactile_types.hpp"
 
 namespace tangere::kernels {
 
@@ -75,6 +75,13 @@ void store_anywhere(const N& x, double* p) {
   __builtin_memcpy(p, &x, sizeof x);
 }
 
+/// Returns the factors of coefficient c of eight points. The pad must have factors.
+template <class A>
+Lanes<A> point_factors(const PadTiles& pad, int tile, int k, std::size_t c) {
+  const int row = kPointCoefficients * tile + static_cast<int>(factor_index(c));
+  return load_lanes<A>(pad.factors + row * kTactileTile + k);
+}
+
 /// Returns the coefficients of eight points: the sensor's, or the sensor's times each point's
 /// factors.
 template <class A>
@@ -82,11 +89,8 @@ LawParameters<Lanes<A>> law_of_points(const PadTiles& pad, int tile, int k,
                                       const LawParameters<Lanes<A>>& of_sensor) {
   LawParameters<Lanes<A>> law = of_sensor;
   if (pad.factors == nullptr) return law;
-  const auto factor = [&](int i) {
-    return load_lanes<A>(pad.factors + (4 * tile + i) * kTactileTile + k);
-  };
-  for (int c = 0; c < kPointCoefficients; ++c)
-    law[std::size_t(c)] = law[std::size_t(c)] * factor(c);
+  for (std::size_t c = 0; c < kPointCoefficients; ++c)
+    law[c] = law[c] * point_factors<A>(pad, tile, k, c);
   return law;
 }
 
@@ -127,12 +131,10 @@ void pull_back_points(const PadTiles& pad, int tile, int k, const double* field,
   Coefficients<N> of_law = {N(0.0), N(0.0), N(0.0), N(0.0)};
   pull_back_law(law, p, f_bar, of_law);
   if (own != nullptr) add_to_points<A>(place, of_law, own + k);
-  const auto factor = [&](int i) {
-    return pad.factors == nullptr ? N(1.0)
-                                  : load_lanes<A>(pad.factors + (4 * tile + i) * kTactileTile + k);
-  };
-  for (std::size_t c = 0; c < kPointCoefficients; ++c)
-    sums.law[c] = mul_add(factor(static_cast<int>(c)), of_law[c], sums.law[c]);
+  for (std::size_t c = 0; c < kPointCoefficients; ++c) {
+    const N factor = pad.factors == nullptr ? N(1.0) : point_factors<A>(pad, tile, k, c);
+    sums.law[c] = mul_add(factor, of_law[c], sums.law[c]);
+  }
 }
 
 /// Sums over the lanes, in order.

@@ -5,6 +5,7 @@
 #pragma once
 
 #include "kernels/reverse/tactile_pullback.hpp"
+#include "kernels/tactile/tactile_numbers.hpp"
 
 namespace tangere::kernels {
 

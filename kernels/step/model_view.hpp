@@ -76,7 +76,7 @@ using ContactParameters = Coefficients<Parameter>;
 inline bool remembers(const ContactParameters& p) { return p.ks.value != 0 || p.ks.row >= 0; }
 
 /// A convex body for finding where it is widest: half its width along a unit vector e is
-/// Σ straight_i |e_i| + √Σ (round_i e_i)². A cuboid is straight, an ellipsoid round, a rod both.
+/// Σ straight_i |e_i| + √Σ (round_i e_i)².
 struct Hull {
   Frame<double> frame;  ///< in its link (or the world)
   Vec3<double> straight, round;
@@ -89,7 +89,7 @@ struct PairContact {
   int link1, link2;      ///< -1: fixed in the world; then frame1/frame2 are world frames
   Frame<double> frame2;  ///< shape frame in link2 (or the world)
   PrimitiveShape shape;
-  /// Sphere: radius in x; cuboid: half edges; rods: radius, half axis; ellipsoid: semi-axes. Not
+  /// As the shape's of() takes it (kernels/contact/shapes), such as a sphere's radius in x. Not
   /// read for planes and meshes.
   Vec3<double> size;
   ContactLaw law;

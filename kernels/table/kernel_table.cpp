@@ -52,7 +52,8 @@ constexpr StageKernels<L> stage_kernels() {
 template <class Arch>
 constexpr KernelTable table_of(const char* name) {
   using Group = GroupPart<Arch>;
-  using Tactile = TactilePart<Arch>;
+  using Tactile = TactilePart<Arch, double>;
+  using MixedTactile = TactilePart<Arch, float>;
   using Pullback = ReadingPullbackPart<Arch>;
   using Memory = MemoryPart<Arch>;
   return {name,
@@ -63,9 +64,9 @@ constexpr KernelTable table_of(const char* name) {
           Group::link_poses,
           Group::pad_touch,
           Tactile::tactile,
-          Tactile::tactile_mixed,
+          MixedTactile::tactile,
           Tactile::tactile_block,
-          Tactile::tactile_block_mixed,
+          MixedTactile::tactile_block,
           Pullback::pull_back_links,
           Pullback::pullback_bytes,
           Pullback::pull_back_field,

@@ -60,13 +60,11 @@ struct GroupPart {
                         Touch<LaneRow>* out);
 };
 
-/// Tactile fields.
-template <class Arch>
+/// Tactile fields, with points in numbers of type Real.
+template <class Arch, class Real>
 struct TactilePart {
-  static int tactile(const TactileArgs<double>&);
-  static int tactile_mixed(const TactileArgs<float>&);
-  static void tactile_block(const TactileBlockArgs<double>&);
-  static void tactile_block_mixed(const TactileBlockArgs<float>&);
+  static int tactile(const TactileArgs<Real>&);
+  static void tactile_block(const TactileBlockArgs<Real>&);
 };
 
 /// What friction remembers.

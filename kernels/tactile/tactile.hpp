@@ -75,7 +75,9 @@ bool stored_force(const PadTiles& pad, int tile, int k, const Shape& shape, cons
       load_offset<P>(P::offsets(pad) + kWidth * kTactileTile * pad.kind[tile], k);
   if constexpr (P::kCurved) {
     const bool own = pad.factors != nullptr;
-    const auto at = own ? scaled_law<P>(law, P::factors(pad) + 4 * kTactileTile * tile + k) : law;
+    const auto at =
+        own ? scaled_law<P>(law, P::factors(pad) + kPointCoefficients * kTactileTile * tile + k)
+            : law;
     if (!point_force<P, Law>(shape, at, s, f)) return false;
     f = in_point_axes<P>(P::frames(pad) + 9 * kTactileTile * tile + k, f);
   } else {

@@ -29,7 +29,7 @@ struct PadTiles {
   const double* frames;    ///< curved: (n_tiles, 9, 64) rows axis0, axis1, -normal of (f·x, f·y,
                            ///< -f·z), pad axes
   const float* frames_f;
-  const double* factors;  ///< (n_tiles, 4, 64) factors of the coefficients; nullptr: all 1
+  const double* factors;  ///< (n_tiles, kPointCoefficients, 64) factors; nullptr: all 1
   const float* factors_f;
   /// (n_tiles / 8, padded to 8 with far spheres) centres and radii of spheres around eight tiles
   /// each, with a margin for rounding, pad axes [m]

@@ -75,14 +75,15 @@ class Sweep {
   bool find_reference() {
     double last = HUGE_VAL;
     for (const int per_step : kReferenceParts) {
-      AccuracySetting setting{Integrator::sdirk4, episodes_.every * per_step, kReferenceTolerance};
+      AccuracySetting setting{Integrator::reference, episodes_.every * per_step,
+                              kReferenceTolerance};
       const AccuracyOutcome made = run_->make_reference(setting, listener_.go_on);
       // An unfinished reference is worth nothing. What came before was judged too coarse.
       if (made.stopped) return false;
-      setting.integrator = Integrator::sdirk2;
+      setting.integrator = Integrator::second_reference;
       const AccuracyOutcome other = run_->compare(setting, listener_.go_on);
       if (other.stopped) return false;
-      setting.integrator = Integrator::sdirk4;
+      setting.integrator = Integrator::reference;
       describe_reference(setting, made, other);
       if (report_.reference.environments == 0 && made.failures.empty())
         throw InputError(options_.quantity == AccuracyQuantity::tactile
@@ -119,9 +120,10 @@ class Sweep {
     if (episodes_.start.model().sensors().empty() || report_.reference.environments == 0) return;
     const double middle = quantile(errors_of_environments_, 0.5);
     const auto at = std::ranges::find(errors_of_environments_, middle);
-    report_.vibration = strongest_vibration(
-        episodes_, static_cast<int>(at - errors_of_environments_.begin()), Integrator::sdirk2,
-        episodes_.every * kReferenceParts[0], kReferenceTolerance, listener_.go_on);
+    report_.vibration =
+        strongest_vibration(episodes_, static_cast<int>(at - errors_of_environments_.begin()),
+                            Integrator::second_reference, episodes_.every * kReferenceParts[0],
+                            kReferenceTolerance, listener_.go_on);
   }
 
   /// Gradients have a tolerance of their own. Nothing sleeps in a comparison.
@@ -211,7 +213,8 @@ class Sweep {
   /// Steps as long as the controls allow, cut into parts that keep an accuracy.
   bool measure_cut_steps() {
     const auto parts = std::ranges::find_if(kParts, [&](int n) { return episodes_.can_cut(n); });
-    AccuracySetting setting{Integrator::sdirk3, parts == kParts.end() ? episodes_.every : *parts};
+    AccuracySetting setting{keeping_accuracy(Integrator::usual, kAccuracies[0]),
+                            parts == kParts.end() ? episodes_.every : *parts};
     for (const double accuracy : kAccuracies) {
       setting.accuracy = accuracy;
       give_tolerance(setting);

@@ -149,7 +149,7 @@ AccuracyOutcome GradientRun::compare(const AccuracySetting& setting, const Accur
 }
 
 double GradientRun::bytes(const FixedEpisodes& episodes, int threads) {
-  const AccuracySetting finest{Integrator::sdirk4, episodes.every * kFinestParts};
+  const AccuracySetting finest{Integrator::reference, episodes.every * kFinestParts};
   return gradient_bytes(episodes.start.model(), episodes.start.environments(),
                         options_of(episodes, finest, threads), 1);
 }

@@ -9,6 +9,7 @@
 
 #include "engine/derivative/tangent.hpp"
 #include "engine/model/random.hpp"
+#include "engine/model/scene_number.hpp"
 #include "engine/step/displacement.hpp"
 
 namespace tangere {

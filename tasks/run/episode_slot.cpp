@@ -99,7 +99,7 @@ EpisodeSource shape_of(const Model& model, const EpisodeOptions& options) {
         some.times);
   }
   s.first_field = s.widths.size();
-  s.fields = options.fields ? *options.fields : whole_fields(model);
+  s.fields = options.fields ? *options.fields : whole_fields(model.scene());
   check_outputs(s.fields, model.sensors().size());
   for (const FieldOutput output : s.fields) {
     const SensorInfo& sensor = model.sensors()[as_size(output.sensor)];

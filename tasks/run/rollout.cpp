@@ -155,7 +155,7 @@ void write_action(EpisodeProgram& program, std::int64_t step, RowSink& sink) {
 }  // namespace
 
 std::vector<FieldOutput> fields_of(const Model& model, const RolloutOutputs& outputs) {
-  if (!outputs.fields) return whole_fields(model);
+  if (!outputs.fields) return whole_fields(model.scene());
   check_outputs(*outputs.fields, model.sensors().size());
   return *outputs.fields;
 }

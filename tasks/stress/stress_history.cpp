@@ -4,50 +4,10 @@
 #include "tasks/stress/stress_history.hpp"
 
 #include "engine/base/as_size.hpp"
+#include "engine/model/shapes.hpp"
 
 namespace tangere {
 namespace {
-
-std::array<double, 6> diagonal(double xx, double yy, double zz) { return {xx, 0, 0, yy, 0, zz}; }
-
-/// Two half balls and a cylinder between them. The centre of a half ball is 3/8 r from its flat
-/// side.
-std::array<double, 6> capsule_inertia(const CapsuleShape& c, double mass) {
-  const double r2 = c.radius * c.radius, l2 = c.length * c.length;
-  const double tube = c.length, balls = 4.0 / 3 * c.radius;  // volumes over π r²
-  const double m_tube = mass * tube / (tube + balls), m_balls = mass * balls / (tube + balls);
-  const double across =
-      m_tube * (l2 / 12 + r2 / 4) + m_balls * (0.4 * r2 + l2 / 4 + 3.0 / 8 * c.length * c.radius);
-  return diagonal(across, across, m_tube * r2 / 2 + m_balls * 0.4 * r2);
-}
-
-struct InertiaOf {
-  double mass;
-  std::array<double, 6> operator()(const SphereShape& s) const {
-    const double i = 0.4 * mass * s.radius * s.radius;
-    return diagonal(i, i, i);
-  }
-  [[nodiscard]] std::array<double, 6> of_lengths(const Vector3& size, double share) const {
-    const double x = size[0] * size[0], y = size[1] * size[1], z = size[2] * size[2];
-    return diagonal(share * mass * (y + z), share * mass * (x + z), share * mass * (x + y));
-  }
-  std::array<double, 6> operator()(const CuboidShape& s) const {
-    return of_lengths(s.size, 1.0 / 12);
-  }
-  std::array<double, 6> operator()(const EllipsoidShape& s) const {
-    return of_lengths(s.size, 1.0 / 20);
-  }
-  std::array<double, 6> operator()(const CylinderShape& s) const {
-    const double r2 = s.radius * s.radius, across = mass * (s.length * s.length / 12 + r2 / 4);
-    return diagonal(across, across, mass * r2 / 2);
-  }
-  std::array<double, 6> operator()(const CapsuleShape& s) const { return capsule_inertia(s, mass); }
-  std::array<double, 6> operator()(const AbstractShape& s) const { return s.inertia; }
-  std::array<double, 6> operator()(const PlaneShape&) const { return {}; }
-  std::array<double, 6> operator()(const MeshShape&) const {
-    throw InputError("a hard case with a mesh; expected shapes whose centre is their origin");
-  }
-};
 
 /// Rotates by the quaternion w x y z, or back: x + 2 w (u × x) + 2 u × (u × x).
 Vector3 turned(const Quaternion& q, const Vector3& x, double sense) {
@@ -62,13 +22,13 @@ Vector3 product(const std::array<double, 6>& i, const Vector3& w) {
 
 }  // namespace
 
-std::array<double, 6> solid_inertia(const Shape& shape, double mass) {
-  return std::visit(InertiaOf{mass}, shape);
-}
-
 StressHistory::StressHistory(const Model& model, double step) : model_(model), step_(step) {
-  for (int b = 0; b < bodies(); ++b)
-    inertia_.push_back(solid_inertia(scene().links[as_size(b)].body.shape, mass(b)));
+  for (int b = 0; b < bodies(); ++b) {
+    const Shape& shape = scene().links[as_size(b)].body.shape;
+    if (std::holds_alternative<MeshShape>(shape))
+      throw InputError("a hard case with a mesh; expected shapes whose centre is their origin");
+    inertia_.push_back(solid_inertia(shape, mass(b)));
+  }
 }
 
 void StressHistory::add(Readout& readout, const Batch& batch, int environment) {

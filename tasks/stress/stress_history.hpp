@@ -49,8 +49,4 @@ class StressHistory {
   std::vector<double> poses_, twists_;          // (frames, nb, 7) and (frames, nb, 6)
 };
 
-/// Inertia of a solid body about its centre, xx xy xz yy yz zz in body axes [kg m²]. Throws
-/// InputError for a mesh, whose centre need not be its frame's origin.
-std::array<double, 6> solid_inertia(const Shape& shape, double mass);
-
 }  // namespace tangere

@@ -332,6 +332,25 @@ TEST(View, NumbersThatVaryAreThoseOfTheEnvironment) {
   EXPECT_NE(data.at("shapes")[0][1].at("radius"), data.at("shapes")[1][1].at("radius"));
 }
 
+/// An ellipsoid's corners satisfy Σ (2x/size)² = 1, and its normals are along the gradient of that.
+void expect_round(const json& body) {
+  const std::vector<float> at = unpacked<float>(body.at("vertices")),
+                           normals = unpacked<float>(body.at("normals"));
+  const std::vector<std::int32_t> triangles = unpacked<std::int32_t>(body.at("triangles"));
+  ASSERT_EQ(at.size(), normals.size());
+  ASSERT_THAT(at, Not(IsEmpty()));
+  for (std::size_t k = 0; k < at.size(); k += 3) {
+    double sum = 0, length = 0, along = 0;
+    for (std::size_t c = 0; c < 3; ++c) {
+      const double size = body.at("size")[c], slope = at[k + c] / (size * size);
+      sum += 4 * at[k + c] * slope, length += slope * slope, along += slope * normals[k + c];
+    }
+    EXPECT_NEAR(sum, 1, 1e-6);
+    EXPECT_NEAR(along / std::sqrt(length), 1, 1e-6);
+  }
+  EXPECT_EQ(triangles.size(), at.size() / 3 / 33 * 32 * 6);  // 32 bands of 33 rings
+}
+
 TEST(View, EveryShapeIsShown) {
   const Folder folder;
   simulate(folder, {TANGERE_SOURCE_DIR "/tests/data/scenes/shapes.xml", "--steps", "10"});
@@ -342,6 +361,7 @@ TEST(View, EveryShapeIsShown) {
     if (kinds.back() == "mesh") {
       EXPECT_THAT(unpacked<std::int32_t>(body.at("triangles")), Not(IsEmpty()));
     }
+    if (kinds.back() == "ellipsoid") expect_round(body);
   }
   EXPECT_THAT(kinds, ::testing::IsSupersetOf({"cuboid", "cylinder", "capsule", "ellipsoid", "plane",
                                               "mesh", "abstract"}));

@@ -356,10 +356,6 @@ std::vector<Violation> check_own_headers(const Tree& tree) {
       {"apps/simulate.cpp", "a subcommand: apps/command.hpp"},
       {"apps/validate.cpp", "a subcommand: apps/command.hpp"},
       {"apps/view.cpp", "a subcommand: apps/command.hpp"},
-      {"engine/model/contact_tiles.cpp", "a part of compiled_model.hpp"},
-      {"engine/model/mass_properties.cpp", "a part of compiled_model.hpp"},
-      {"engine/model/sensor.cpp", "a part of compiled_model.hpp"},
-      {"engine/model/tactile_points.cpp", "a part of compiled_model.hpp"},
       {"io/dataset/layout_from_model.cpp", "a part of dataset_layout.hpp"},
       {"io/view/view_dataset.cpp", "a part of view_source.hpp"},
       {"io/view/view_trajectory.cpp", "a part of view_source.hpp"},
@@ -388,6 +384,102 @@ std::vector<Violation> check_own_headers(const Tree& tree) {
            "has no header " + header + "; expected one, or a reason in tests/house/rules.cpp"});
   }
   return found;
+}
+
+namespace {
+
+/// A source and its header are one room: "engine/model/shapes". Values: rooms that it includes.
+using Rooms = std::map<std::string, Names, std::less<>>;
+Rooms rooms_of(const Tree& tree) {
+  static const Names tops{"kernels", "engine", "tasks", "io", "apps", "python"};
+  Rooms rooms;
+  for (const auto& [path, text] : tree) {
+    if (!is_cpp(path) || !tops.contains(top_of(path))) continue;
+    const std::string room = path.substr(0, path.rfind('.'));
+    rooms[room];
+    for (const Include& include : includes_of(text)) {
+      const std::string target = include.quoted ? resolve(tree, path, include.name) : "";
+      const std::string other = target.substr(0, target.rfind('.'));
+      if (!target.empty() && other != room) rooms[room].insert(other);
+    }
+  }
+  return rooms;
+}
+
+/// Finds the rooms that reach each other, by Tarjan's algorithm.
+class Circles {
+ public:
+  explicit Circles(const Rooms& rooms) : rooms_(rooms) {
+    for (const auto& [room, others] : rooms)
+      if (!seen_.contains(room)) visit(room);
+  }
+  std::set<Names> found;
+
+ private:
+  int visit(const std::string& room) {  // NOLINT(misc-no-recursion)
+    const int own = seen_[room] = static_cast<int>(seen_.size());
+    int lowest = own;
+    waiting_.push_back(room);
+    if (const auto at = rooms_.find(room); at != rooms_.end())
+      for (const std::string& other : at->second) {
+        if (!seen_.contains(other)) {
+          lowest = std::min(lowest, visit(other));
+        } else if (std::find(waiting_.begin(), waiting_.end(), other) != waiting_.end()) {
+          lowest = std::min(lowest, seen_[other]);
+        }
+      }
+    if (lowest < own) return lowest;
+    const auto first = std::find(waiting_.begin(), waiting_.end(), room);
+    if (waiting_.end() - first > 1) found.emplace(first, waiting_.end());
+    waiting_.erase(first, waiting_.end());
+    return lowest;
+  }
+  const Rooms& rooms_;
+  std::map<std::string, int, std::less<>> seen_;
+  std::vector<std::string> waiting_;
+};
+
+std::string listed(const Names& rooms) {
+  std::string text;
+  for (const std::string& room : rooms) text += (text.empty() ? "" : ", ") + room;
+  return text;
+}
+
+}  // namespace
+
+std::vector<Violation> check_circles(const Tree& tree) {
+  // The second is a part of the first that has a file of its own, and takes the first's options.
+  static const std::set<Names> allowed{
+      {"apps/accuracy_report", "apps/pitch_report"},
+      {"engine/model/effects", "engine/model/sensor_effects"},
+      {"io/picture/scene_plot", "io/picture/projection"},
+      {"io/robot/robot_import", "io/robot/robot_pads"},
+      {"io/robot/robot_node", "io/robot/mjcf_include"},
+      {"io/scene/scene_node", "io/scene/included_file"},
+      {"tasks/accuracy/accuracy_run", "tasks/accuracy/gradient_run"},
+      {"tasks/gradients/gradients", "tasks/gradients/gradient_block", "tasks/gradients/loss_block"},
+      {"tasks/gradients/task_gradients", "tasks/gradients/return_block"},
+      {"tasks/gradients/task_tape", "tasks/gradients/tape_block"},
+      {"tasks/run/benchmark_run", "tasks/run/benchmark_fields"},
+      {"tasks/run/episodes", "tasks/run/episode_slot"},
+      {"tasks/run/rollout", "tasks/run/audit_recorder"},
+      {"tasks/run/vector_task", "tasks/run/block_worker"}};
+  const Rooms rooms = rooms_of(tree);
+  const std::set<Names> found = Circles(rooms).found;
+  std::vector<Violation> violations;
+  for (const Names& circle : found)
+    if (!allowed.contains(circle))
+      violations.push_back({*circle.begin(), 0,
+                            "includes in a circle: " + listed(circle) +
+                                "; give what they share a header of its own"});
+  for (const Names& circle : allowed)
+    if (!found.contains(circle) && std::all_of(circle.begin(), circle.end(), [&](const auto& room) {
+          return rooms.contains(room);
+        }))
+      violations.push_back({*circle.begin(), 0,
+                            "is listed as a circle, but is none: " + listed(circle) +
+                                "; take it off the list in tests/house/rules.cpp"});
+  return violations;
 }
 
 constexpr std::ptrdiff_t kMostColumns = 100;

@@ -51,6 +51,10 @@ std::vector<Violation> check_heavy_headers(const Tree& tree);
 /// A source of the libraries and the command has a header of its own name or a listed reason.
 std::vector<Violation> check_own_headers(const Tree& tree);
 
+/// A source with its header is a room. Rooms do not include each other in a circle, but for listed
+/// ones.
+std::vector<Violation> check_circles(const Tree& tree);
+
 /// SPDX line first, then a comment that says why the file exists; at most 600 lines. In C++, Python
 /// and JavaScript, at most 100 columns.
 std::vector<Violation> check_sources(const Tree& tree);

@@ -48,6 +48,9 @@ TEST(House, HeavyHeadersStayWhereTheyAre) {
   EXPECT_THAT(check_heavy_headers(project()), IsEmpty());
 }
 TEST(House, SourcesHaveTheirHeaders) { EXPECT_THAT(check_own_headers(project()), IsEmpty()); }
+TEST(House, RoomsDoNotIncludeEachOtherInACircle) {
+  EXPECT_THAT(check_circles(project()), IsEmpty());
+}
 TEST(House, SourcesAreShortAndSayWhy) { EXPECT_THAT(check_sources(project()), IsEmpty()); }
 TEST(House, FoldersAndLinksAreDocumented) { EXPECT_THAT(check_documents(project()), IsEmpty()); }
 
@@ -149,6 +152,21 @@ TEST(HouseRules, SeeASourceWithoutItsHeader) {
                   {"tests/io/a_test.cpp", ""}};
   EXPECT_THAT(check_own_headers(tree),
               ElementsAre(Says("engine/step/a.cpp", 0, "engine/step/a.hpp")));
+}
+
+TEST(HouseRules, SeeACircleOfRooms) {
+  const Tree tree{{"engine/step/a.hpp", "#include \"engine/step/b.hpp\"\n"},
+                  {"engine/step/b.hpp", ""},
+                  {"engine/step/b.cpp", "#include \"engine/step/c.hpp\"\n"},
+                  {"engine/step/c.hpp", "#include \"engine/step/a.hpp\"\n"},
+                  {"engine/step/d.hpp", "#include \"engine/step/a.hpp\"\n"},
+                  {"engine/model/effects.hpp", ""},
+                  {"engine/model/sensor_effects.hpp", ""},
+                  {"tests/a.hpp", "#include \"tests/b.hpp\"\n"},
+                  {"tests/b.hpp", "#include \"tests/a.hpp\"\n"}};
+  EXPECT_THAT(check_circles(tree),
+              ElementsAre(Says("engine/step/a", 0, "engine/step/a, engine/step/b, engine/step/c"),
+                          Says("engine/model/effects", 0, "is listed as a circle")));
 }
 
 TEST(HouseRules, SeeAHeadlessOrOverlongSource) {

@@ -35,14 +35,6 @@ class Solid {
     return this.turn(rings);
   }
 
-  stretched(size) {
-    for (let i = 0; i < this.positions.length; i += 3) {
-      const n = unit([0, 1, 2].map((k) => this.normals[i + k] / size[k]));
-      for (let k = 0; k < 3; ++k) { this.positions[i + k] *= size[k]; this.normals[i + k] = n[k]; }
-    }
-    return this;
-  }
-
   // The farthest corner from the origin.
   radius() {
     let most = 0;
@@ -96,6 +88,15 @@ function mesh(vertices, triangles) {
   return solid;
 }
 
+// Triangles whose corners have normals.
+function smooth(vertices, normals, triangles) {
+  const solid = new Solid();
+  solid.positions.push(...vertices);
+  solid.normals.push(...normals);
+  solid.indices.push(...triangles);
+  return solid;
+}
+
 // A body that has points alone: a small ball at each.
 function dots(points) {
   let reach = 0;
@@ -118,11 +119,10 @@ function solidOf(body) {
     case "cuboid": return cuboid(body.size);
     case "cylinder": return cylinder(body.length, body.radius);
     case "capsule": return capsule(body.length, body.radius);
-    case "ellipsoid": return ball(0.5).stretched(body.size);
     case "mesh": return mesh(body.vertices, body.triangles);
     case "abstract": return dots(body.points);
     case "plane": return null;
-    default: throw new Error(`no body is a ${body.kind}`);
+    default: return smooth(body.vertices, body.normals, body.triangles);
   }
 }
 

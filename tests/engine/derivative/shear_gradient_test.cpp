@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "engine/derivative/readout_pullback.hpp"
+#include "engine/model/scene_number.hpp"
 #include "tests/engine/gradient_differences.hpp"
 #include "tests/engine/gradient_tangent.hpp"
 #include "tests/engine/meshes.hpp"

@@ -7,6 +7,7 @@
 #include "engine/derivative/step_jacobian.hpp"
 #include "engine/derivative/tangent.hpp"
 #include "engine/model/compiled_model.hpp"
+#include "engine/model/model.hpp"
 #include "engine/sense/readout.hpp"
 #include "tests/engine/gradient_run.hpp"
 #include "tests/engine/random_machine.hpp"

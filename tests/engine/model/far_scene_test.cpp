@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "engine/model/compiled_model.hpp"
+#include "engine/model/model.hpp"
 #include "engine/model/short_touches.hpp"
 #include "engine/sense/readout.hpp"
 #include "engine/sense/start_overlaps.hpp"

@@ -76,6 +76,20 @@ TEST(Schemes, HaveNamesOfTheirOwn) {
   for (const Integrator a : integrators()) EXPECT_NE(a, Integrator::sdirk4);
 }
 
+TEST(Schemes, OfHigherOrderLeaveGainsToOneOfOrderOne) {
+  for (const Integrator integrator : integrators()) {
+    const Scheme& scheme = integrator.scheme();
+    const Scheme* const of_gains = scheme.of_gains();
+    EXPECT_EQ(of_gains == nullptr, scheme.order == 1) << scheme.name;
+    if (of_gains != nullptr) {
+      EXPECT_EQ(of_gains->order, 1) << scheme.name;
+    }
+    EXPECT_NE(&scheme, &Integrator::reference.scheme());
+  }
+  EXPECT_NE(Integrator::reference, Integrator::second_reference);
+  EXPECT_EQ(Scene{}.integrator, Integrator::usual);
+}
+
 TEST(Schemes, RefuseWhatNoStageSolves) {
   EXPECT_THROW((runge_kutta("none", 1, {})), InputError);
   EXPECT_THROW((runge_kutta("explicit", 2, {{0}, {0.5, 0.5}})), InputError);

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "engine/model/compiled_model.hpp"
+#include "engine/model/mass_properties.hpp"
 #include "engine/model/shapes.hpp"
 #include "kernels/contact/distance.hpp"
 #include "tests/engine/meshes.hpp"
@@ -107,6 +108,37 @@ Shape off_centre_mesh() {
   for (double& x : mesh.vertices) x += 0.04;
   mesh.scale = 1.3;
   return mesh;
+}
+
+TEST(Shapes, InertiaIsThatOfTheMass) {
+  const double r = 0.02, l = 0.05, m = 3;
+  using Six = std::array<double, 6>;
+  const auto expect = [](const Shape& shape, double mass, const Six& inertia) {
+    const Six has = solid_inertia(shape, mass);
+    for (std::size_t k = 0; k < 6; ++k)
+      EXPECT_NEAR(has[k], inertia[k], 1e-15) << shape_name(shape) << " " << k;
+  };
+  expect(SphereShape{r}, m, {0.4 * m * r * r, 0, 0, 0.4 * m * r * r, 0, 0.4 * m * r * r});
+  expect(CuboidShape{{0.1, 0.2, 0.3}}, m, {m * 0.13 / 12, 0, 0, m * 0.1 / 12, 0, m * 0.05 / 12});
+  // Volumes over pi r²: of the cylinder l, of both half balls 4 r/3.
+  const double tube = m * l / (l + 4 * r / 3), balls = m - tube;
+  const double across = tube * (l * l / 12 + r * r / 4) +
+                        balls * (0.4 * r * r + l * l / 4 + 0.375 * l * r),
+               along = tube * r * r / 2 + 0.4 * balls * r * r;
+  expect(CapsuleShape{l, r}, m, {across, 0, 0, across, 0, along});
+  expect(AbstractShape{2, {1, 2, 3, 4, 5, 6}, {}}, 2, {1, 2, 3, 4, 5, 6});
+  expect(PlaneShape{}, 0, {});
+}
+
+TEST(Shapes, DistancesAreForPicturesToo) {
+  const SurfaceDistance at = distance_from(CuboidShape{{0.1, 0.2, 0.3}}, {0.01, 0.02, 0.25});
+  EXPECT_NEAR(at.distance, 0.1, 1e-15);
+  for (std::size_t k = 0; k < 3; ++k) EXPECT_NEAR(at.normal[k], k == 2 ? 1 : 0, 1e-15);
+  EXPECT_NEAR(distance_from(EllipsoidShape{{0.1, 0.2, 0.3}}, {0, 0, 0.15}).distance, 0, 1e-15);
+  EXPECT_THROW(static_cast<void>(distance_from(AbstractShape{}, {})), InputError);
+  EXPECT_THROW(static_cast<void>(distance_from(MeshShape{}, {})), InputError);
+  EXPECT_EQ(widths(CapsuleShape{0.3, 0.1}), (std::array<double, 3>{0.2, 0.2, 0.5}));
+  EXPECT_EQ(widths(PlaneShape{}), (std::array<double, 3>{0, 0, 0}));
 }
 
 TEST(Shapes, MassesFollowSizes) {

@@ -7,6 +7,8 @@
 #include <limits>
 
 #include "engine/model/compiled_model.hpp"
+#include "engine/model/model.hpp"
+#include "engine/model/scene_number.hpp"
 #include "engine/sense/readout.hpp"
 #include "engine/step/control.hpp"
 #include "engine/step/stepper.hpp"

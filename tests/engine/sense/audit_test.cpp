@@ -10,6 +10,7 @@
 
 #include "engine/base/vector3.hpp"
 #include "engine/model/compiled_model.hpp"
+#include "engine/model/model.hpp"
 #include "engine/step/stepper.hpp"
 #include "tests/engine/gradient_run.hpp"
 #include "tests/engine/random_machine.hpp"

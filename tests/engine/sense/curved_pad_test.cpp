@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "engine/model/compiled_model.hpp"
+#include "engine/model/model.hpp"
 #include "engine/sense/readout.hpp"
 #include "kernels/contact/pair_contact.hpp"
 #include "kernels/table/kernel_table.hpp"

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "engine/model/compiled_model.hpp"
+#include "engine/model/model.hpp"
 #include "tests/engine/random_scene.hpp"
 #include "tests/engine/runs.hpp"
 #include "tests/engine/scenes.hpp"

@@ -10,6 +10,7 @@
 #include <cmath>
 
 #include "engine/model/compiled_model.hpp"
+#include "engine/model/model.hpp"
 #include "tests/engine/runs.hpp"
 #include "tests/engine/scenes.hpp"
 #include "tests/engine/stage_buffers.hpp"

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "engine/model/compiled_model.hpp"
+#include "engine/model/model.hpp"
 #include "kernels/contact/pair_contact.hpp"
 #include "kernels/table/kernel_table.hpp"
 #include "tests/engine/scenes.hpp"

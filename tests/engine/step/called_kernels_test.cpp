@@ -5,6 +5,7 @@
 
 #include "engine/model/compiled_model.hpp"
 #include "engine/model/effects.hpp"
+#include "engine/model/model.hpp"
 #include "kernels/table/kernel_table.hpp"
 #include "tests/engine/effect_scenes.hpp"
 #include "tests/engine/gradient_run.hpp"

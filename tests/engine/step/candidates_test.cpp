@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 
+#include "engine/model/compile.hpp"
 #include "engine/step/detection.hpp"
 #include "engine/step/group_step.hpp"
 #include "engine/step/workspace.hpp"

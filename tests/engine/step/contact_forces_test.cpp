@@ -7,6 +7,7 @@
 
 #include <cmath>
 
+#include "engine/model/compile.hpp"
 #include "tests/engine/scenes.hpp"
 #include "tests/engine/stage_buffers.hpp"
 

@@ -3,6 +3,7 @@
 // axes, on random trees.
 #include <gtest/gtest.h>
 
+#include "engine/model/compile.hpp"
 #include "tests/engine/dense_dynamics.hpp"
 #include "tests/engine/random_machine.hpp"
 #include "tests/engine/stage_buffers.hpp"

@@ -3,6 +3,7 @@
 // contact, with every joint kind.
 #include <gtest/gtest.h>
 
+#include "engine/model/compile.hpp"
 #include "kernels/numbers/dual.hpp"
 #include "tests/engine/random_machine.hpp"
 #include "tests/engine/stage_buffers.hpp"

@@ -7,6 +7,7 @@
 #include <limits>
 #include <string>
 
+#include "engine/model/compile.hpp"
 #include "engine/step/workspace.hpp"
 #include "tests/engine/random_machine.hpp"
 #include "tests/engine/stage_buffers.hpp"

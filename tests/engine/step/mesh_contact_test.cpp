@@ -5,8 +5,10 @@
 
 #include <algorithm>
 
+#include "engine/model/compile.hpp"
 #include "engine/model/compiled_model.hpp"
 #include "engine/model/mesh_grid.hpp"
+#include "engine/model/model.hpp"
 #include "engine/sense/start_overlaps.hpp"
 #include "kernels/numbers/dual.hpp"
 #include "kernels/numbers/so3.hpp"

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "engine/model/compiled_model.hpp"
+#include "engine/model/scene_number.hpp"
 #include "engine/step/rotation_log.hpp"
 #include "tests/engine/runs.hpp"
 #include "tests/engine/scenes.hpp"

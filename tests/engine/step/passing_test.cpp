@@ -5,6 +5,7 @@
 
 #include <gtest/gtest.h>
 
+#include "engine/model/compile.hpp"
 #include "engine/step/detection.hpp"
 #include "engine/step/state_difference.hpp"
 #include "tests/engine/random_scene.hpp"

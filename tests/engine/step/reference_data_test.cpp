@@ -8,6 +8,7 @@
 #include <sstream>
 
 #include "engine/model/compiled_model.hpp"
+#include "engine/model/model.hpp"
 #include "engine/sense/readout.hpp"
 #include "engine/step/rotation_log.hpp"
 #include "engine/step/stepper.hpp"

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "engine/model/compiled_model.hpp"
+#include "engine/model/model.hpp"
 #include "tests/engine/gradient_differences.hpp"
 #include "tests/engine/runs.hpp"
 #include "tests/engine/scenes.hpp"

@@ -7,6 +7,9 @@
 #include <map>
 #include <sstream>
 
+#include "engine/model/compile.hpp"
+#include "engine/model/mass_properties.hpp"
+#include "engine/model/shapes.hpp"
 #include "engine/sense/readout.hpp"
 #include "io/robot/robot_import.hpp"
 #include "io/robot/rotations.hpp"

@@ -9,6 +9,8 @@
 
 #include "engine/derivative/number_gradients.hpp"
 #include "engine/model/compiled_model.hpp"
+#include "engine/model/model.hpp"
+#include "engine/model/scene_number.hpp"
 #include "io/dataset/dataset_layout.hpp"
 #include "io/scene/scene_reader.hpp"
 #include "io/trajectory/trajectory_layout.hpp"

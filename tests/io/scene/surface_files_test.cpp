@@ -10,7 +10,10 @@
 #include <filesystem>
 #include <fstream>
 
+#include "engine/model/compile.hpp"
 #include "engine/model/compiled_model.hpp"
+#include "engine/model/mass_properties.hpp"
+#include "engine/model/shapes.hpp"
 #include "io/scene/scene_reader.hpp"
 #include "io/scene/tactile_layouts.hpp"
 #include "tests/kernels/random_numbers.hpp"

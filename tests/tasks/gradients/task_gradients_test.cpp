@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "engine/model/compiled_model.hpp"
+#include "engine/model/model.hpp"
 #include "engine/step/displacement.hpp"
 #include "io/scene/scene_reader.hpp"
 #include "tasks/catalogue/task_list.hpp"

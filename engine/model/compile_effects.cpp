@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The texts that `inspect` prints.
-#include "engine/model/effects_and_stages.hpp"
+#include "engine/model/compile_effects.hpp"
 
 #include <algorithm>
 #include <cstdio>

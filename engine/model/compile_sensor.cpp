@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 // Cuts a rectangular array of tactile points into 8×8 tiles and moves it into its pad's axes.
 // tactile_points.cpp does this for lists.
+#include "engine/model/compile_sensor.hpp"
+
 #include <algorithm>
 #include <cmath>
 
-#include "engine/model/compiled_model.hpp"
+#include "engine/model/body_shape.hpp"
 #include "engine/model/frames.hpp"
-#include "kernels/contact/distance.hpp"
+#include "engine/model/tactile_points.hpp"
 #include "kernels/table/kernel_table.hpp"
 
 namespace tangere {
@@ -154,15 +156,6 @@ void bound_pad(CompiledSensor& s) {
 
 }  // namespace
 
-double points_outward(const CompiledBody& body, const Vec3<double>& at,
-                      const Vec3<double>& direction) {
-  if (!body.touchable) return dot(direction, at - body.centre);
-  return dot(direction,
-             kernels::with_distance<double>(
-                 body.shape, body.size,
-                 [&](const auto& shape) { return kernels::distance_at(shape, at).n; }, body.grid));
-}
-
 CompiledSensor compile_sensor(const TactileDescription& d, const CompiledBody& body,
                               SensorInfo& info) {
   if (d.law == ContactLaw::linear)
@@ -177,27 +170,6 @@ CompiledSensor compile_sensor(const TactileDescription& d, const CompiledBody& b
   info.points = s.points();
   info.every = d.every;
   return s;
-}
-
-kernels::PadTiles CompiledSensor::tiles() const {
-  kernels::PadTiles p{};
-  p.rows = rows, p.cols = cols;
-  p.tile_rows = tile_rows, p.tile_cols = tile_cols;
-  p.x = tile_x.data(), p.y = tile_y.data(), p.z = tile_z.data(), p.radius = tile_radius.data();
-  p.eight_x = eight_x.data(), p.eight_y = eight_y.data(), p.eight_z = eight_z.data();
-  p.eight_radius = eight_radius.data();
-  p.kind = tile_kind.data();
-  p.offsets = offsets.data(), p.offsets_f = offsets_f.data();
-  if (!index.empty()) {
-    p.index = index.data();
-    p.frames = frames.data(), p.frames_f = frames_f.data();
-  }
-  if (!factors.empty()) p.factors = factors.data(), p.factors_f = factors_f.data();
-  std::copy(middle, middle + 3, p.middle);
-  p.reach = reach;
-  p.skewed = skewed;
-  std::copy(axes, axes + 9, p.axes);
-  return p;
 }
 
 }  // namespace tangere

@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: Apache-2.0
+// What losses think of the state of a block.
+#pragma once
+
+#include <array>
+#include <span>
+#include <vector>
+
+#include "engine/base/aligned.hpp"
+#include "engine/model/model.hpp"
+
+namespace tangere {
+
+/// Cotangents of one loss in one block, in rows of 16 lanes: dof i of lane l is at [i * 16 + l].
+/// Positions are by their right tangent (docs/gradients.md).
+struct BlockCotangent {
+  AlignedVector<double> q, v;                    ///< (nv, 16) of the newest state
+  AlignedVector<double> previous_q, previous_v;  ///< (nv, 16) of the state one step before it
+  AlignedVector<double> u;  ///< (nu, 16) of the controls of the step reversed last
+  /// Of what friction remembers at the newest state: of each lane, three numbers for each of its
+  /// entries (engine/step/shear_memory.hpp); or empty, zeros.
+  std::array<std::vector<double>, 16> memory;
+  /// (parameter_rows, 16), summed over steps (engine/derivative/number_gradients.hpp); or empty
+  AlignedVector<double> parameters;
+  /// (16, tactile points, kPointNumbers), summed over steps
+  /// (engine/derivative/tactile_point_numbers.hpp); or empty
+  AlignedVector<double> points;
+
+  /// One lane's part of `points` for one sensor; empty if there are none.
+  [[nodiscard]] std::span<double> points_of(const Model& model, int sensor, int lane);
+};
+
+}  // namespace tangere

@@ -1,0 +1,488 @@
+// SPDX-License-Identifier: Apache-2.0
+// compile(scene): names become indices, fixed joints fold into what they are attached to, joints
+// become elementary links.
+#include "engine/model/compile.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "engine/model/body_shape.hpp"
+#include "engine/model/compile_effects.hpp"
+#include "engine/model/compile_imperfections.hpp"
+#include "engine/model/compile_joints.hpp"
+#include "engine/model/compile_markers.hpp"
+#include "engine/model/compile_memories.hpp"
+#include "engine/model/compile_sensor.hpp"
+#include "engine/model/compile_variations.hpp"
+#include "engine/model/contact_tiles.hpp"
+#include "engine/model/frames.hpp"
+#include "engine/model/group_contacts.hpp"
+#include "engine/model/mass_properties.hpp"
+#include "engine/model/scene_number.hpp"
+#include "engine/model/shapes.hpp"
+
+namespace tangere {
+
+using kernels::Frame;
+using kernels::JointKind;
+using kernels::Link;
+using kernels::Mat3;
+using kernels::Vec3;
+
+namespace {
+
+constexpr std::size_t kMostContactPoints = std::size_t{1} << 20;  // of one contact
+// A step may have to factor a full matrix of them, and the pattern has a table of all pairs.
+constexpr int kMostDofs = 3072;
+
+class Compiler {
+ public:
+  explicit Compiler(const Scene& scene) { m_.scene = scene; }
+
+  CompiledModel run() {
+    for (int i = 0; i < static_cast<int>(m_.scene.links.size()); ++i) add_link(i);
+    move_near();
+    if (m_.nv == 0)
+      throw InputError(where() + "nothing in the scene can move: every joint is fixed");
+    check_masses(m_);
+    compile_joint_effects(m_);
+    compile_motors(m_, joints_);
+    compile_initial_state(m_, joints_);
+    unknown_scales();
+    mesh_distances();
+    pair_contacts();
+    ground_contacts();
+    group_contacts(m_);
+    find_components();
+    sensors();
+    end_effectors();
+    randomizations();
+    bound_links(m_);
+    symbolic();
+    return std::move(m_);
+  }
+
+ private:
+  [[nodiscard]] std::string where() const {
+    return m_.scene.path.empty() ? "" : m_.scene.path + ": ";
+  }
+
+  // --- tree ---
+
+  void add_link(int i) {
+    const LinkDescription& d = m_.scene.links[i];
+    links_.add("link", d.name, i, d.joint.source);
+    joints_.add("joint", d.joint.name, i, d.joint.source);
+    bodies_.add("body", d.body.name, i, d.body.source);
+    if (d.parent >= i || d.parent < -1)
+      throw InputError(d.joint.source.prefix() + "link '" + d.name + "': parents must come first");
+    const int parent = d.parent < 0 ? -1 : m_.joints[d.parent].link;
+    const Frame<double> base = d.parent < 0 ? kIdentityFrame : m_.joints[d.parent].frame;
+    m_.joints.push_back(add_joint(m_, d.joint, parent, compose(base, to_frame(d.joint.pose))));
+    if (m_.nv > kMostDofs)
+      throw InputError(d.joint.source.prefix() + "joint '" + d.joint.name +
+                       "' is one too many: with it the scene has " + std::to_string(m_.nv) +
+                       " degrees of freedom; expected at most " + std::to_string(kMostDofs));
+    add_body(d, m_.joints.back());
+  }
+
+  void add_body(const LinkDescription& d, const CompiledJoint& joint) {
+    CompiledBody body;
+    body.link = joint.link;
+    body.frame = compose(joint.frame, to_frame(d.body.pose));
+    if (const std::string fault = slenderness_fault(d.body.shape); !fault.empty())
+      throw InputError(d.body.source.prefix() + "body '" + d.body.name + "' is " + fault);
+    place_shape(d.body.shape, body);
+    const MassProperties properties = mass_properties(d.body.shape, d.body.density);
+    body.mass = properties.mass;
+    body.centre = properties.centre;
+    if (!(body.mass >= 0) || !std::isfinite(body.mass))
+      throw InputError(d.body.source.prefix() + "body '" + d.body.name + "' has mass " +
+                       std::to_string(body.mass) + " kg; expected a finite one, zero or more");
+    if (body.link >= 0 && body.mass > 0) add_inertia(m_.links[body.link], body, properties);
+    m_.bodies.push_back(body);
+    m_.body_names.push_back(d.body.name);
+  }
+
+  /// Whether something in the scene asks for the distance to a body.
+  [[nodiscard]] bool is_touched(std::size_t body) const {
+    const std::string& name = m_.scene.links[body].body.name;
+    const auto of_contact = [&](const PairContactDescription& d) {
+      return d.primitive_body == name;
+    };
+    // A sensor feels what moves against it, and its signs are those of its own body's surface.
+    const auto of_sensor = [&](const TactileDescription& d) {
+      const int b = bodies_.find("body", d.body, d.source);
+      return b == int(body) || m_.bodies[std::size_t(b)].link != m_.bodies[body].link;
+    };
+    const Scene& s = m_.scene;
+    return std::any_of(s.pair_contacts.begin(), s.pair_contacts.end(), of_contact) ||
+           std::any_of(s.sensors.begin(), s.sensors.end(), of_sensor);
+  }
+
+  /// Makes the distances to meshes. Bodies with the same mesh share one.
+  void mesh_distances() {
+    for (std::size_t b = 0; b < m_.bodies.size(); ++b) {
+      const BodyDescription& d = m_.scene.links[b].body;
+      const auto* const mesh = std::get_if<MeshShape>(&d.shape);
+      if (mesh == nullptr || mesh->resolution == 0 || !is_touched(b)) continue;
+      std::shared_ptr<const MeshGrid> grid;
+      try {
+        grid = shared_mesh_grid(*mesh);
+      } catch (const InputError& error) {
+        throw InputError(d.source.prefix() + "body '" + d.name + "': " + error.what());
+      }
+      const kernels::DistanceGrid& view = grid->view;
+      m_.mesh_info.push_back({d.name,
+                              {view.cells[0], view.cells[1], view.cells[2]},
+                              mesh->scale * view.cell,
+                              grid->bytes(),
+                              mesh->scale * grid->fit.error,
+                              grid->fit.unresolved});
+      m_.bodies[b].touchable = true;
+      m_.bodies[b].grid = &view;
+      m_.mesh_grids.push_back(std::move(grid));
+    }
+  }
+
+  // --- contacts ---
+
+  static kernels::ContactParameters constants(const ContactCoefficients& c) {
+    return transformed(c, [](double value) { return kernels::Parameter{value, -1}; });
+  }
+
+  /// Returns `points` (n, 3) unless they are too many for one contact.
+  static std::vector<double> points_in_contact(std::vector<double> points, const std::string& of,
+                                               const Source& source) {
+    if (points.size() / 3 > kMostContactPoints)
+      throw InputError(source.prefix() + "'" + of + "' touches with " +
+                       std::to_string(points.size() / 3) + " points; expected at most " +
+                       std::to_string(kMostContactPoints));
+    return points;
+  }
+
+  const double* keep(std::vector<std::vector<double>>& storage, std::vector<double> values) {
+    storage.push_back(std::move(values));
+    return storage.back().data();  // moving a vector keeps its buffer
+  }
+
+  void pair_contacts() {
+    for (const PairContactDescription& d : m_.scene.pair_contacts) {
+      const int b1 = bodies_.find("body", d.general_body, d.source);
+      const int b2 = bodies_.find("body", d.primitive_body, d.source);
+      const CompiledBody &first = m_.bodies[b1], &second = m_.bodies[b2];
+      const Shape &general = m_.scene.links[b1].body.shape,
+                  &primitive = m_.scene.links[b2].body.shape;
+      if (d.points.empty() && !has_contact_points(general))
+        throw InputError(d.source.prefix() + "general_body '" + d.general_body + "' (" +
+                         shape_name(general) + ") has no contact points; expected " +
+                         shapes_with([](const ShapeRow& row) { return row.stretches(); }) +
+                         " (swap the two bodies)");
+      if (!has_distance(primitive))
+        throw InputError(d.source.prefix() + "primitive_body '" + d.primitive_body + "' (" +
+                         shape_name(primitive) + ") has no distance; expected " +
+                         shapes_with([](const ShapeRow& row) { return row.distance.has_value(); }));
+      if (b1 == b2 || first.link == second.link)
+        throw InputError(d.source.prefix() + "bodies '" + d.general_body + "' and '" +
+                         d.primitive_body + "' cannot move against each other");
+      std::vector<double> points = points_in_contact(
+          d.points.empty() ? contact_points(general) : d.points, d.first_name(), d.source);
+      double reach = 0;
+      for (std::size_t k = 0; k < points.size(); k += 3) {
+        const Vec3<double> p =
+            first.frame.R * Vec3<double>{points[k], points[k + 1], points[k + 2]} + first.frame.p;
+        points[k] = p.x, points[k + 1] = p.y, points[k + 2] = p.z;
+        reach = std::max(reach, std::sqrt(dot(p, p)));
+      }
+      std::vector<double> tiles = sort_into_tiles(points, kernels::kContactTile);
+      kernels::PairContact pair{};
+      pair.link1 = first.link;
+      pair.link2 = second.link;
+      pair.frame2 = second.frame;
+      pair.shape = second.shape;
+      pair.size = second.size;
+      pair.grid = second.grid;
+      pair.law = d.law;
+      pair.ramp = d.ramp;
+      pair.parameters = constants(d.coefficients);
+      pair.n_points = static_cast<int>(points.size() / 3);
+      pair.n_tiles = static_cast<int>(tiles.size() / 4);
+      pair.reach = reach;
+      pair.body1 = b1;
+      pair.body2 = b2;
+      if (pair.shape == PrimitiveShape::cuboid && d.points.empty() && is_convex(general) &&
+          pair.n_points <= kCorners)
+        meet_faces(pair, first);
+      pair.points = keep(m_.point_storage, std::move(points));
+      lay_out_tiles(m_, pair, tiles);
+      contacts_.add("contact", d.first_name() + " " + d.primitive_body,
+                    static_cast<int>(m_.pairs.size()), d.source);
+      m_.pairs.push_back(pair);
+      m_.contact_info.push_back(
+          {d.first_name(), d.primitive_body, pair.n_points, law_name(d.law, d.ramp)});
+      touching_.emplace_back(pair.link1, pair.link2);
+    }
+  }
+
+  /// Bodies with more points have some inside the face that they touch, so the nearest face serves
+  /// them, and a point that slides over the edge of a chosen face loses its force at once.
+  static constexpr int kCorners = 8;
+
+  /// Lets a convex body meet a cuboid face by face. Points just beyond the face's edges still touch
+  /// it: where equal boxes stand flush, rounding would otherwise decide about each corner. A
+  /// thousandth of the smaller body is far above rounding and what stacks sway, and far below what
+  /// contact points resolve.
+  static void meet_faces(kernels::PairContact& pair, const CompiledBody& body) {
+    constexpr double kOverhang = 1e-3;
+    pair.faced = true;
+    pair.hull = hull_of(body);
+    const Vec3<double>&a = pair.size, &b = pair.hull.straight, &c = pair.hull.round;
+    pair.overhang = kOverhang * std::min({a.x, a.y, a.z, b.x + c.x, b.y + c.y, b.z + c.z});
+  }
+
+  void ground_contacts() {
+    for (const GroundContactDescription& d : m_.scene.ground_contacts) {
+      if (!m_.scene.ground)
+        throw InputError(d.source.prefix() + "ground_contact of '" + d.body +
+                         "', but the scene has no <ground>");
+      const int b = bodies_.find("body", d.body, d.source);
+      const CompiledBody& body = m_.bodies[b];
+      if (body.link < 0)
+        throw InputError(d.source.prefix() + "body '" + d.body + "' is fixed in the world");
+      kernels::GroundContact ground{};
+      const Shape& shape = m_.scene.links[b].body.shape;
+      std::vector<double> points = points_in_contact(contact_points(shape), d.body, d.source);
+      if (is_ball(shape)) {
+        points = {0, 0, 0};
+        ground.radius = body.size.x;
+      }
+      if (points.empty())
+        throw InputError(d.source.prefix() + "body '" + d.body + "' (" + shape_name(shape) +
+                         ") has no contact points");
+      for (std::size_t k = 0; k < points.size(); k += 3) {
+        const Vec3<double> p =
+            body.frame.R * Vec3<double>{points[k], points[k + 1], points[k + 2]} + body.frame.p;
+        points[k] = p.x, points[k + 1] = p.y, points[k + 2] = p.z;
+      }
+      ground.link = body.link;
+      ground.body = b;
+      ground.law = d.law;
+      ground.ramp = d.ramp;
+      ground.parameters = constants(d.coefficients);
+      ground.n_points = static_cast<int>(points.size() / 3);
+      ground.points = keep(m_.point_storage, std::move(points));
+      grounds_.add("ground contact", d.body, static_cast<int>(m_.grounds.size()), d.source);
+      m_.grounds.push_back(ground);
+      m_.contact_info.push_back({d.body, "ground", ground.n_points, law_name(d.law, d.ramp)});
+    }
+  }
+
+  void sensors() {
+    for (std::size_t i = 0; i < m_.scene.sensors.size(); ++i) {
+      const TactileDescription& d = m_.scene.sensors[i];
+      sensors_.add("tactile sensor", d.name, static_cast<int>(i), d.source);
+      const int b = bodies_.find("body", d.body, d.source);
+      SensorInfo info;
+      CompiledSensor sensor = compile_sensor(d, m_.bodies[b], info);
+      sensor.body = b;
+      sensor.number = static_cast<int>(i);
+      compile_imperfections(d, m_.scene.timestep, sensor, info);
+      if (d.markers) static_cast<void>(compile_markers(d, info.pressure_sign));  // checks them
+      m_.layout.past_states = std::max(m_.layout.past_states, info.past_states);
+      sensor.parameters = constants(d.coefficients);
+      for (int t = 0; t < static_cast<int>(m_.bodies.size()); ++t)
+        if (m_.bodies[t].link != sensor.link && m_.bodies[t].touchable) sensor.targets.push_back(t);
+      m_.sensors.push_back(std::move(sensor));
+      m_.sensor_info.push_back(std::move(info));
+    }
+  }
+
+  void end_effectors() {
+    NameIndex names;
+    for (const EndEffectorDescription& d : m_.scene.end_effectors) {
+      names.add("endeffector", d.name, static_cast<int>(m_.end_effectors.size()), d.source);
+      const CompiledJoint& joint = m_.joints[joints_.find("joint", d.joint, d.source)];
+      m_.end_effectors.push_back({joint.link, joint.frame.R * vec3_of(d.position) + joint.frame.p});
+      m_.end_effector_info.push_back({d.name, d.joint});
+    }
+  }
+
+  // --- state and what varies ---
+
+  /// Returns where bodies are at rest, then where links are.
+  [[nodiscard]] std::vector<Vec3<double>> places() const {
+    std::vector<Frame<double>> world;
+    std::vector<Vec3<double>> found;
+    for (const Link& l : m_.links)
+      world.push_back(l.parent < 0 ? l.frame : compose(world[std::size_t(l.parent)], l.frame));
+    for (const CompiledBody& b : m_.bodies)
+      found.push_back((b.link < 0 ? b.frame : compose(world[std::size_t(b.link)], b.frame)).p);
+    for (const Frame<double>& link : world) found.push_back(link.p);
+    return found;
+  }
+
+  /// Returns the greatest distance of any body's point from a place at rest.
+  [[nodiscard]] double extent_about(const Vec3<double>& middle) const {
+    const std::vector<Vec3<double>> all = places();
+    double extent = 0;
+    for (std::size_t b = 0; b < m_.bodies.size(); ++b) {
+      const Vec3<double> arm = all[b] - middle;
+      extent = std::max(extent, std::sqrt(dot(arm, arm)) + m_.bodies[b].extent);
+    }
+    return extent;
+  }
+
+  /// Returns how far a scene reaches from a place: its bodies, its links and the ground below.
+  [[nodiscard]] double reach_about(const Vec3<double>& middle) const {
+    double reach = extent_about(middle);
+    for (const Vec3<double>& p : places()) {
+      const Vec3<double> arm = p - middle;
+      reach = std::max(reach, std::sqrt(dot(arm, arm)));
+    }
+    if (m_.scene.ground)
+      reach = std::max(reach, std::abs(dot(vec3_of(m_.scene.ground->normal),
+                                           middle - vec3_of(m_.scene.ground->position))));
+    return reach;
+  }
+
+  /// Measures a scene that is far from the world's origin from its own middle.
+  void move_near() {
+    constexpr double kFar = 1000;  // times its reach
+    Vec3<double> middle = {0, 0, 0};
+    const std::vector<Vec3<double>> all = places();
+    for (const Vec3<double>& p : all) middle = middle + (1.0 / double(all.size())) * p;
+    const double away = std::sqrt(dot(middle, middle)), reach = reach_about(middle);
+    if (!(reach > 0 && away > kFar * reach) || !std::isfinite(away)) return;
+    m_.moved = true;
+    m_.origin = middle;
+    reach_of_moved_ = reach;
+    for (Link& l : m_.links)
+      if (l.parent < 0) l.frame.p = l.frame.p - middle;
+    for (CompiledBody& b : m_.bodies)
+      if (b.link < 0) b.frame.p = b.frame.p - middle;
+    for (CompiledJoint& j : m_.joints)
+      if (j.link < 0) j.frame.p = j.frame.p - middle;
+  }
+
+  /// Sets the scales of unknowns. Lengths are rounded relative to the greatest distance of any
+  /// body's point from the model's origin at rest; a scene that was moved reaches as far as it
+  /// does.
+  void unknown_scales() {
+    const double extent = m_.moved ? reach_of_moved_ : extent_about({0, 0, 0});
+    m_.fall_time =
+        std::sqrt(extent / std::sqrt(dot(vec3_of(m_.scene.gravity), vec3_of(m_.scene.gravity))));
+    for (const Link& l : m_.links) {
+      const bool turns = l.kind == JointKind::revolute || l.kind == JointKind::spherical;
+      m_.unknown_scale.insert(m_.unknown_scale.end(), std::size_t(kernels::dofs(l.kind)),
+                              turns ? 1.0 : extent);
+    }
+  }
+
+  /// Sorts dofs by what they are connected with. The world connects nothing.
+  void find_components() {
+    std::vector<int> of(m_.links.size());
+    for (std::size_t i = 0; i < of.size(); ++i) {
+      const int parent = m_.links[i].parent;
+      of[i] = parent < 0 ? static_cast<int>(i) : of[std::size_t(parent)];
+    }
+    for (const auto& [a, b] : touching_) {
+      if (a < 0 || b < 0) continue;
+      const int first = of[std::size_t(a)], second = of[std::size_t(b)];
+      for (int& component : of)
+        if (component == std::max(first, second)) component = std::min(first, second);
+    }
+    m_.component_begin = {0};
+    for (int c = 0; c < static_cast<int>(of.size()); ++c) {
+      for (std::size_t i = 0; i < of.size(); ++i)
+        for (int k = 0; of[i] == c && k < kernels::dofs(m_.links[i].kind); ++k)
+          m_.component_dofs.push_back(m_.links[i].v + k);
+      const int end = static_cast<int>(m_.component_dofs.size());
+      if (end > m_.component_begin.back()) m_.component_begin.push_back(end);
+    }
+  }
+
+  void randomizations() {
+    const int past = m_.layout.past_states;
+    m_.layout = {0, m_.nq, m_.nq + m_.nv, 2 * m_.nq + m_.nv, 2 * (m_.nq + m_.nv), 0, 0, past};
+    int next = m_.layout.parameters;
+    for (const RandomizationDescription& d : m_.scene.randomizations) {
+      name_of(d.number);  // throws if there is no such number
+      if (!is_of_start(d.number)) vary(d, next);
+      m_.randomized_row.push_back(is_of_start(d.number) ? state_row(d) : next++);
+    }
+    m_.layout.past = add_derived_rows(m_, next);
+    m_.layout.rows = m_.layout.past + past * (m_.nq + m_.nv);
+  }
+
+  int state_row(const RandomizationDescription& d) const {
+    const int i = joints_.find("joint", d.number.name, d.source), k = d.number.component;
+    const JointType type = m_.scene.links[i].joint.type;
+    const bool position = d.number.field == NumberField::q;
+    const int count = position ? position_count(type) : dof_count(type);
+    if (k < 0 || k >= count)
+      throw InputError(d.source.prefix() + "joint '" + d.number.name + "' has " +
+                       std::to_string(count) + (position ? " coordinates" : " velocities") +
+                       "; index " + std::to_string(k) + " is not one of them");
+    return position ? m_.layout.q + m_.joints[i].q + k : m_.layout.v + m_.joints[i].v + k;
+  }
+
+  /// Makes a row of the block the source of a number.
+  void vary(const RandomizationDescription& d, int row) {
+    const SceneNumber& n = d.number;
+    const auto coefficient = [&](kernels::ContactParameters& of) {
+      of[coefficient_index(n.field)].row = row;
+    };
+    const auto at = [&](const NameIndex& names, const char* kind, const std::string& name) {
+      return std::size_t(names.find(kind, name, d.source));
+    };
+    switch (n.owner) {
+      case NumberOwner::contact:
+        coefficient(m_.pairs[at(contacts_, "contact", n.name + " " + n.second_name)].parameters);
+        break;
+      case NumberOwner::ground:
+        coefficient(m_.grounds[at(grounds_, "ground contact", n.name)].parameters);
+        break;
+      case NumberOwner::tactile:
+        coefficient(m_.sensors[at(sensors_, "tactile sensor", n.name)].parameters);
+        break;
+      case NumberOwner::body: vary_body(m_, int(at(bodies_, "body", n.name)), d, row); break;
+      case NumberOwner::joint:
+      case NumberOwner::motor: {
+        const int joint = int(at(joints_, "joint", n.name));
+        n.field == NumberField::pos ? vary_place(m_, joint, d, row) : vary_joint(m_, joint, d, row);
+        break;
+      }
+    }
+  }
+
+  void symbolic() { m_.pattern = analyse_pattern(m_.links, m_.nv, touching_); }
+
+  CompiledModel m_;
+  NameIndex links_, joints_, bodies_, sensors_, contacts_, grounds_;
+  std::vector<std::pair<int, int>> touching_;
+  double reach_of_moved_ = 0;  ///< of a scene that is far away [m]
+};
+
+}  // namespace
+
+std::shared_ptr<const CompiledModel> compile(const Scene& scene) {
+  auto m = std::make_shared<CompiledModel>(Compiler(scene).run());
+  decide_effects(*m);
+  list_stages(*m);
+  kernels::ModelView& v = m->view;
+  v.gravity = vec3_of(m->scene.gravity);
+  const GroundDescription ground = m->scene.ground.value_or(GroundDescription{});
+  v.ground_point = vec3_of(ground.position);
+  if (m->moved) v.ground_point = v.ground_point - m->origin;
+  v.ground_normal = vec3_of(ground.normal);
+  v.ground = ground_frame(v.ground_point, v.ground_normal);
+  for (std::size_t k = 0; k < m->bodies.size(); ++k)
+    m->solids.push_back(solid_of(m->scene.links[k].body.shape, m->bodies[k]));
+  point_view(*m);
+  compile_memories(*m);
+  v.n_memories = static_cast<int>(m->memories.size());
+  v.memories = m->memories.data();
+  return m;
+}
+
+}  // namespace tangere
