@@ -184,7 +184,7 @@ TaskReport report_of(const Task& task, PolicyKind kind, const std::string& playe
                                                     static_cast<double>(played))
                                              : Json()},
                  {"mean_return", played > 0 ? Json(summary.mean_return) : Json()},
-                 {"simulation_steps", summary.simulation_steps}};
+                 {"simulation_steps", summary.counts.simulation_steps}};
   report.line =
       fmt::format("task {}, policy {}: {} of {} episodes solved, mean return {:.4g}",
                   task.spec().name, player, summary.successes, played, summary.mean_return);
@@ -233,18 +233,12 @@ int report(const GenerateOptions& options, const Console& console, const Job& jo
       "{:.2f} s of one\n{}\n{}, episodes failed: {}\n{}{}wrote {}: {} ({} bytes){}",
       summary.episodes, summary.rows, summary.seconds, rate, run.threads, limit_of(summary, job),
       summary.simulation_seconds, preparation_of(job), summary.encoding_seconds,
-      summary.writing_seconds, done.task.line,
-      split_text(summary.split_steps, summary.coarse_steps, summary.passed_steps,
-                 summary.damped_steps),
-      summary.failures.size(),
-      sleep_text(job.layout.sleep, job.moving_bodies, summary.bodies_asleep,
-                 summary.simulation_steps),
-      kept, options.output,
+      summary.writing_seconds, done.task.line, split_text(summary.counts), summary.failures.size(),
+      sleep_text(job.layout.sleep, job.moving_bodies, summary.counts), kept, options.output,
       shards.size() == 1 ? "1 shard" : fmt::format("{} shards", shards.size()), bytes,
       merged.line));
-  const Json costly =
-      note_costly_steps(console, integrator_named(job.layout.integrator), job.layout.accuracy,
-                        summary.simulation_steps, summary.newton_iterations, summary.split_steps);
+  const Json costly = note_costly_steps(console, integrator_named(job.layout.integrator),
+                                        job.layout.accuracy, summary.counts);
   Json result{{"command", "generate"},
               {"exit_code", static_cast<int>(code)},
               {"scene", options.scene},
@@ -277,15 +271,11 @@ int report(const GenerateOptions& options, const Console& console, const Job& jo
               {"writing_seconds", summary.writing_seconds},
               {"environment_steps", summary.environment_steps},
               {"environment_steps_per_second", rate},
-              {"newton_iterations", summary.newton_iterations},
-              {"split_steps", summary.split_steps},
-              {"coarse_steps", summary.coarse_steps},
-              {"passed_steps", summary.passed_steps},
-              {"damped_steps", summary.damped_steps},
-              {"mean_asleep",
-               mean_asleep(job.layout.sleep, summary.bodies_asleep, summary.simulation_steps)},
-              {"costly", costly},
-              {"failed", failures_json("episode", failures_of(summary))}};
+              {"newton_iterations", summary.counts.newton_iterations}};
+  result.update(split_json(summary.counts));
+  result.update({{"mean_asleep", mean_asleep(job.layout.sleep, summary.counts)},
+                 {"costly", costly},
+                 {"failed", failures_json("episode", failures_of(summary))}});
   result.update(done.task.keys);
   result.update(merged.keys);
   console.result(result);

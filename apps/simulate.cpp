@@ -129,20 +129,18 @@ int report(const SimulateArguments& options, const Console& console, const Batch
            const TaskReport& of_task = {}) {
   const ExitCode code = summary.failures.empty() ? kDone : kSomeFailed;
   const auto bytes = std::filesystem::file_size(options.output);
-  const double rate = static_cast<double>(summary.environment_steps) / summary.seconds;
-  const double per_step = static_cast<double>(summary.newton_iterations) /
-                          static_cast<double>(std::max<std::int64_t>(1, summary.environment_steps));
+  const std::int64_t environment_steps = summary.counts.simulation_steps;
+  const double rate = static_cast<double>(environment_steps) / summary.seconds;
+  const double per_step = static_cast<double>(summary.counts.newton_iterations) /
+                          static_cast<double>(std::max<std::int64_t>(1, environment_steps));
   list_failures(console, "environment", failures_of(summary), "--json and the file name all");
   console.print(
       fmt::format("environments: {}, steps: {}, time: {:.2f} s, {:.0f} env-steps/s with output\n"
                   "Newton iterations per step: {:.2f}, {}, environments failed: {}\n{}{}{}\n"
                   "wrote {} ({} bytes)",
                   batch.environments(), summary.steps, summary.seconds, rate, per_step,
-                  split_text(summary.split_steps, summary.coarse_steps, summary.passed_steps,
-                             summary.damped_steps),
-                  summary.failures.size(),
-                  sleep_text(stepper.sleep(), batch.model().moving_bodies(), summary.bodies_asleep,
-                             summary.environment_steps),
+                  split_text(summary.counts), summary.failures.size(),
+                  sleep_text(stepper.sleep(), batch.model().moving_bodies(), summary.counts),
                   audit_text(summary.audit), of_task.line, options.output, bytes));
   Json sensors = Json::array();
   for (const FieldOutput of : fields_of(batch.model(), rollout.outputs)) {
@@ -153,8 +151,7 @@ int report(const SimulateArguments& options, const Console& console, const Batch
                        {"frames", tactile_frames(batch.model(), of, rollout)}});
   }
   const Json costly =
-      note_costly_steps(console, stepper.integrator(), stepper.accuracy(),
-                        summary.environment_steps, summary.newton_iterations, summary.split_steps);
+      note_costly_steps(console, stepper.integrator(), stepper.accuracy(), summary.counts);
   Json result{{"command", "simulate"},
               {"exit_code", static_cast<int>(code)},
               {"scene", options.scene},
@@ -174,19 +171,15 @@ int report(const SimulateArguments& options, const Console& console, const Batch
               {"instruction_set", kernels::active_isa_name()},
               {"sensors", sensors},
               {"seconds", summary.seconds},
-              {"environment_steps", summary.environment_steps},
+              {"environment_steps", environment_steps},
               {"environment_steps_per_second", rate},
-              {"newton_iterations", summary.newton_iterations},
-              {"newton_iterations_per_step", per_step},
-              {"split_steps", summary.split_steps},
-              {"coarse_steps", summary.coarse_steps},
-              {"passed_steps", summary.passed_steps},
-              {"damped_steps", summary.damped_steps},
-              {"mean_asleep",
-               mean_asleep(stepper.sleep(), summary.bodies_asleep, summary.environment_steps)},
-              {"costly", costly},
-              {"audit", audit_json(summary.audit)},
-              {"failed", failures_json("environment", failures_of(summary))}};
+              {"newton_iterations", summary.counts.newton_iterations},
+              {"newton_iterations_per_step", per_step}};
+  result.update(split_json(summary.counts));
+  result.update({{"mean_asleep", mean_asleep(stepper.sleep(), summary.counts)},
+                 {"costly", costly},
+                 {"audit", audit_json(summary.audit)},
+                 {"failed", failures_json("environment", failures_of(summary))}});
   result.update(of_task.keys);
   console.result(result);
   return code;

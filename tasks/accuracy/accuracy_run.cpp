@@ -64,7 +64,8 @@ std::size_t width_of(const Model& model, AccuracyQuantity quantity) {
 struct BlockOutcome {
   double step_seconds = 0;
   std::array<double, kPrecisions.size()> read_seconds{};
-  std::int64_t environment_steps = 0, evaluations = 0, split_steps = 0, samples = 0;
+  StepCounts counts;
+  std::int64_t samples = 0;
   std::vector<FailedEnvironment> failures;
 };
 
@@ -185,9 +186,7 @@ class SampleRun : public AccuracyRun {
       out.step_seconds += block.step_seconds;
       for (std::size_t p = 0; p < kPrecisions.size(); ++p)
         out.read_seconds[p] += block.read_seconds[p];
-      out.environment_steps += block.environment_steps;
-      out.evaluations += block.evaluations;
-      out.split_steps += block.split_steps;
+      out.counts += block.counts;
       out.simulated_seconds += static_cast<double>(block.samples) * interval;
       out.failures.insert(out.failures.end(), block.failures.begin(), block.failures.end());
     }
@@ -222,9 +221,7 @@ class SampleRun : public AccuracyRun {
           compare_sample(w, e, k);
       }
     }
-    out.environment_steps = tally.environment_steps;
-    out.evaluations = tally.newton_iterations;
-    out.split_steps = tally.split_steps;
+    out.counts = tally.counts;
     out.failures = std::move(tally.failures);
   }
 

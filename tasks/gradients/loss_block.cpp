@@ -91,7 +91,7 @@ void LossBlock::run(Batch& batch, int block, const StepControls& controls, std::
   InHand h{batch, block, first, first + lanes, controls, u, out, StepTally(batch, first, lanes)};
   hand_ = &h;
   GradientBlock::run(batch, block);
-  newton_iterations_ += h.tally.newton_iterations;
+  newton_iterations_ += h.tally.counts.newton_iterations;
   failures.insert(failures.end(), h.tally.failures.begin(), h.tally.failures.end());
   if (!stopped()) finish();
   hand_ = nullptr;

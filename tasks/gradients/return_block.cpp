@@ -40,7 +40,7 @@ void ReturnBlock::run(std::int64_t first, int count, const TaskActions& actions,
   lost_.clear();
   note(-1);
   GradientBlock::run(rollout_.batch(), 0);
-  newton_iterations_ += rollout_.counts().newton_iterations;
+  newton_iterations_ += rollout_.counts().steps.newton_iterations;
   for (const FailedEnvironment& f : lost_)
     failures.push_back({static_cast<int>(to) + f.environment, f.step, f.status});
   if (!stopped()) finish(to, out);

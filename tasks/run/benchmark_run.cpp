@@ -51,7 +51,8 @@ struct Worker {
 
 /// What one block did in one pass.
 struct BlockTally {
-  std::int64_t environment_steps = 0, newton_iterations = 0, tactile_points = 0, bodies_asleep = 0;
+  StepCounts counts;  ///< of a scene; a task's program counts itself
+  std::int64_t tactile_points = 0;
   std::vector<FailedEnvironment> failures;
 };
 
@@ -112,19 +113,15 @@ class Benchmark {
   /// Reports the pass before.
   void report(BenchmarkResult& result) const {
     for (const BlockTally& tally : tallies_) {
-      result.environment_steps += tally.environment_steps;
-      result.newton_iterations += tally.newton_iterations;
+      result.counts += tally.counts;
       result.tactile_points += tally.tactile_points;
-      result.bodies_asleep += tally.bodies_asleep;
       result.failures.insert(result.failures.end(), tally.failures.begin(), tally.failures.end());
     }
-    result.simulation_steps = result.environment_steps;
+    result.environment_steps = result.counts.simulation_steps;
     for (const Worker& worker : workers_)
       if (const TaskProgram* const task = worker.program->judged()) {
         result.environment_steps += task->counts().environment_steps;
-        result.simulation_steps += task->counts().simulation_steps;
-        result.newton_iterations += task->counts().newton_iterations;
-        result.bodies_asleep += task->counts().bodies_asleep;
+        result.counts += task->counts().steps;
       }
     std::stable_sort(result.failures.begin(), result.failures.end(),
                      [](const auto& a, const auto& b) { return a.step < b.step; });
@@ -171,9 +168,7 @@ class Benchmark {
       if (checked) chain_action(first, last, row, tally);
     }
     if (data_ == nullptr) {
-      tally.environment_steps = steps.environment_steps;
-      tally.newton_iterations = steps.newton_iterations;
-      tally.bodies_asleep = steps.bodies_asleep;
+      tally.counts = steps.counts;
       tally.failures = std::move(steps.failures);
       if (checked) chain_states(first, last);
     }

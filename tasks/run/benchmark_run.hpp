@@ -40,13 +40,11 @@ struct BenchmarkTime {
 
 struct BenchmarkResult {
   std::vector<BenchmarkTime> times;  ///< one per timed pass, in their order
-  std::int64_t environment_steps =
-      0;  ///< tried in one pass, failing ones included; of a task: actions
-  std::int64_t simulation_steps =
-      0;  ///< the same for a scene; for a task the steps of its actions and resets
-  std::int64_t newton_iterations = 0;       ///< of one pass, over simulation_steps
+  /// Steps tried in one pass, failing ones included; of a task: actions.
+  std::int64_t environment_steps = 0;
+  /// Of one pass. Of a scene: of environment_steps; of a task: of its actions and resets.
+  StepCounts counts;
   std::int64_t tactile_points = 0;          ///< read in one pass
-  std::int64_t bodies_asleep = 0;           ///< of one pass, summed over simulation_steps
   std::vector<FailedEnvironment> failures;  ///< in the order of their steps
   /// One checksum per environment. It chains the bits of every field in the order of time, then of
   /// the final state; for a task those of observations, rewards and flags. It depends on the

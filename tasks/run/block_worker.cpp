@@ -140,16 +140,8 @@ void BlockWorker::ask_for_controls(const Batch& batch, EnvironmentData& data, in
 
 void BlockWorker::look_after(const Batch& batch, int block, int step, VectorCounts& counts) {
   const int first = block * kBlock, last = std::min(first + kBlock, batch.environments());
-  for (int e = first; e < last; ++e) {
-    if (batch.held(e) || failed(batch.status(e))) continue;
-    ++counts.simulation_steps;
-    counts.newton_iterations += batch.iterations(e);
-    counts.split_steps += batch.status(e) == StepStatus::split ? 1 : 0;
-    counts.coarse_steps += batch.status(e) == StepStatus::coarse ? 1 : 0;
-    counts.passed_steps += batch.status(e) == StepStatus::passed ? 1 : 0;
-    counts.damped_steps += batch.status(e) == StepStatus::damped ? 1 : 0;
-    counts.bodies_asleep += batch.sleep(e).bodies;
-  }
+  for (int e = first; e < last; ++e)
+    if (!batch.held(e) && !failed(batch.status(e))) counts.steps.count(batch, e);
   const std::vector<int>& moments = task_.spec().moments;
   const auto moment = std::lower_bound(moments.begin(), moments.end(), step + 1);
   if (*moment == step + 1) look(batch, block, as_size(static_cast<int>(moment - moments.begin())));

@@ -11,6 +11,10 @@ namespace tangere {
 
 using kernels::kBlock;
 
+VectorCounts EpisodeProgram::counts(const StepTally& tally) const {
+  return {tally.counts.simulation_steps, tally.counts};
+}
+
 void SceneProgram::controls(std::int64_t step, Batch& batch, int block, std::span<double> u) {
   if (step % steps_per_row_ != 0) return;
   const auto nu = static_cast<std::size_t>(batch.model().nu());

@@ -211,9 +211,9 @@ bool EpisodeSlot<T>::simulate(const StopRequest& stop,
   for (int row = 0; row < rows_; ++row) {
     observe(row);
     if (row == action_rows_ || std::count(playing_.begin(), playing_.end(), true) == 0) break;
-    const std::int64_t before = environment_steps();
+    const std::int64_t before = program_->counts(*tally_).environment_steps;
     if (!act(row, stop)) return false;
-    told(environment_steps() - before);
+    told(program_->counts(*tally_).environment_steps - before);
   }
   next_row_ += rows_;
   if (last()) collect();
@@ -252,12 +252,6 @@ template <class T>
 void EpisodeSlot<T>::put(std::size_t name, int episode, int row, std::span<const double> from) {
   std::transform(from.begin(), from.end(), numbers(name, episode, row).begin(),
                  [](double x) { return static_cast<T>(x); });
-}
-
-template <class T>
-std::int64_t EpisodeSlot<T>::environment_steps() const {
-  const TaskProgram* const task = program_->judged();
-  return task != nullptr ? task->counts().environment_steps : tally_->environment_steps;
 }
 
 /// Skips episodes that are over.
@@ -412,15 +406,9 @@ template <class T>
 void EpisodeSlot<T>::add_to(EpisodeSummary& run) const {
   const TaskProgram* const task = program_->judged();
   run.episodes += batch_->environments();
-  run.environment_steps += environment_steps();
-  run.simulation_steps += task != nullptr ? task->counts().simulation_steps : environment_steps();
-  run.newton_iterations +=
-      task != nullptr ? task->counts().newton_iterations : tally_->newton_iterations;
-  run.split_steps += task != nullptr ? task->counts().split_steps : tally_->split_steps;
-  run.coarse_steps += task != nullptr ? task->counts().coarse_steps : tally_->coarse_steps;
-  run.passed_steps += task != nullptr ? task->counts().passed_steps : tally_->passed_steps;
-  run.damped_steps += task != nullptr ? task->counts().damped_steps : tally_->damped_steps;
-  run.bodies_asleep += task != nullptr ? task->counts().bodies_asleep : tally_->bodies_asleep;
+  const VectorCounts counts = program_->counts(*tally_);
+  run.environment_steps += counts.environment_steps;
+  run.counts += counts.steps;
   run.failures.insert(run.failures.end(), failures_.begin(), failures_.end());
   auto failure = failures_.begin();
   for (int e = 0; e < batch_->environments(); ++e) {

@@ -86,7 +86,6 @@ class EpisodeSlot {
   [[nodiscard]] std::size_t taken_rows(std::size_t name, int rows) const;
   [[nodiscard]] bool takes(std::size_t name, int row) const;
   void observe_bodies(int row);
-  [[nodiscard]] std::int64_t environment_steps() const;
   void put(std::size_t name, int episode, int row, std::span<const double> from);
   void observe(int row);
   void observe_scene(int row);

@@ -48,15 +48,9 @@ struct RolloutOptions {
 };
 
 struct RolloutSummary {
-  std::int64_t steps = 0;              ///< done; fewer than requested if the caller stopped it
-  std::int64_t environment_steps = 0;  ///< tried, failing ones included
-  std::int64_t newton_iterations = 0;
-  std::int64_t split_steps = 0;
-  std::int64_t coarse_steps = 0;      ///< with parts that missed the accuracy that was asked for
-  std::int64_t passed_steps = 0;      ///< in which a body came through another
-  std::int64_t damped_steps = 0;      ///< that would have created energy
-  std::int64_t bodies_asleep = 0;     ///< summed over environment_steps
-  std::optional<AuditSummary> audit;  ///< if it was asked for
+  std::int64_t steps = 0;                   ///< done; fewer than requested if the caller stopped it
+  StepCounts counts;                        ///< of environments' steps, failing ones included
+  std::optional<AuditSummary> audit;        ///< if it was asked for
   std::vector<FailedEnvironment> failures;  ///< in the order in which they failed
   bool stopped = false;                     ///< progress returned false
   double seconds = 0;                       ///< wall clock of the whole rollout, sink included
