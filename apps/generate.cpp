@@ -18,6 +18,7 @@
 #include "apps/stop_signals.hpp"
 #include "apps/task_run.hpp"
 #include "apps/workers.hpp"
+#include "io/dataset/dataset_from_model.hpp"
 #include "io/files/name_list.hpp"
 #include "io/files/nearest_name.hpp"
 #include "io/files/text_file.hpp"

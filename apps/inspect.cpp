@@ -17,7 +17,6 @@
 #include "engine/model/model.hpp"
 #include "engine/step/control.hpp"
 #include "engine/step/stepper.hpp"
-#include "io/trajectory/trajectory_layout.hpp"
 #include "kernels/table/isa.hpp"
 
 namespace tangere::apps {

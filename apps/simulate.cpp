@@ -20,6 +20,7 @@
 #include "engine/derivative/number_gradients.hpp"
 #include "io/files/nearest_name.hpp"
 #include "io/hdf5/reading_note.hpp"
+#include "io/trajectory/layout_from_model.hpp"
 #include "io/trajectory/saved_state.hpp"
 #include "io/trajectory/trajectory_file.hpp"
 #include "kernels/table/isa.hpp"

@@ -69,12 +69,15 @@ set(public_headers
   engine/step/tape.hpp
   io/dataset/dataset_export.hpp
   io/dataset/dataset_files.hpp
+  io/dataset/dataset_from_model.hpp
   io/dataset/dataset_layout.hpp
   io/dataset/dataset_merge.hpp
   io/dataset/dataset_writer.hpp
   io/dataset/shard_check.hpp
   io/robot/robot_import.hpp
   io/scene/scene_reader.hpp
+  io/trajectory/layout_from_model.hpp
+  io/trajectory/run_facts.hpp
   io/trajectory/trajectory_file.hpp
   io/trajectory/trajectory_layout.hpp
   kernels/contact/contact_types.hpp

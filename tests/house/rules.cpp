@@ -360,7 +360,6 @@ std::vector<Violation> check_own_headers(const Tree& tree) {
       {"engine/model/mass_properties.cpp", "a part of compiled_model.hpp"},
       {"engine/model/sensor.cpp", "a part of compiled_model.hpp"},
       {"engine/model/tactile_points.cpp", "a part of compiled_model.hpp"},
-      {"io/dataset/layout_from_model.cpp", "a part of dataset_layout.hpp"},
       {"io/view/view_dataset.cpp", "a part of view_source.hpp"},
       {"io/view/view_trajectory.cpp", "a part of view_source.hpp"},
       {"io/robot/mjcf_actuators.cpp", "a part of mjcf_file.hpp"},
