@@ -8,8 +8,6 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "apps/accuracy_report.hpp"
-
 namespace tangere::apps {
 namespace {
 

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-# The install tree: `cmake --install build/release --prefix DIR`, then find_package(tangere CONFIG) from another project.
+# The install tree: `cmake --install build/release --prefix DIR`, then find_package(tangere CONFIG) from another
+# project.
 include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
 
@@ -88,17 +89,22 @@ set(public_headers
   tasks/gradients/gradients.hpp
   tasks/gradients/identification.hpp
   tasks/gradients/losses.hpp
+  tasks/gradients/task_gradient_options.hpp
   tasks/gradients/task_gradients.hpp
   tasks/gradients/task_rollout.hpp
   tasks/gradients/task_tape.hpp
+  tasks/gradients/task_tape_options.hpp
   tasks/gradients/gradient_check.hpp
   tasks/gradients/gradient_compare.hpp
+  tasks/run/audit_summary.hpp
+  tasks/run/benchmark_options.hpp
   tasks/run/benchmark_run.hpp
   tasks/run/block_worker.hpp
   tasks/run/episode_program.hpp
   tasks/run/episodes.hpp
   tasks/run/policy.hpp
   tasks/run/rollout.hpp
+  tasks/run/step_counts.hpp
   tasks/run/step_tally.hpp
   tasks/run/vector_task.hpp)
 foreach(header ${public_headers})

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "tasks/gradients/action_block.hpp"
-#include "tasks/gradients/task_gradients.hpp"
+#include "tasks/gradients/task_gradient_options.hpp"
 
 namespace tangere {
 

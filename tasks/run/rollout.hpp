@@ -12,6 +12,7 @@
 #include "engine/rows/row_sink.hpp"
 #include "engine/step/batch.hpp"
 #include "engine/step/stepper.hpp"
+#include "tasks/run/audit_summary.hpp"
 #include "tasks/run/episode_program.hpp"
 #include "tasks/run/step_tally.hpp"
 
@@ -26,15 +27,6 @@ struct RolloutOutputs {
   /// are given, controls leave no longer, and of steps those alone that end at a row of q.
   OutputTimes states = {}, of_bodies = {}, of_end_effectors = {};
   std::vector<int> chosen_bodies = {};  ///< ascending; none: every body
-};
-
-/// What the books of a run come to.
-struct AuditSummary {
-  double motors = 0, taken = 0, made = 0;  ///< sums over environments and steps [J]
-  /// The largest |sum of what the scheme made| of an environment, as a share of what it had: the
-  /// largest energy of motion and held, what motors did, or what was taken, whichever is most.
-  double worst_share = 0;
-  int worst_environment = 0;
 };
 
 struct RolloutOptions {

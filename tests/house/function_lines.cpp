@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Reads braces: one that follows a list of parameters, in a namespace or a class, begins a function.
+// Reads braces: one that follows a list of parameters, in a namespace or a type, begins a function.
 #include "tests/house/function_lines.hpp"
 
 #include <algorithm>

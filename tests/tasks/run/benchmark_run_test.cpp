@@ -10,6 +10,7 @@
 #include <string>
 
 #include "io/scene/scene_reader.hpp"
+#include "tasks/run/checksum.hpp"
 #include "tests/tasks/task_check.hpp"
 
 namespace tangere {
