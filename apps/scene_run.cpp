@@ -128,6 +128,17 @@ Json note_costly_steps(const Console& console, Integrator integrator, double acc
   return line;
 }
 
+Json settings_json(const RunFacts& facts) {
+  return {{"seed", facts.seed},
+          {"timestep", facts.timestep},
+          {"integrator", facts.integrator},
+          {"tolerance", facts.tolerance},
+          {"accuracy", facts.accuracy},
+          {"sleep", facts.sleep},
+          {"precision", facts.precision},
+          {"instruction_set", facts.instruction_set}};
+}
+
 void note_empty_sensors(const Console& console, const Model& model, const RolloutOptions& rollout) {
   for (const FieldOutput of : fields_of(model, rollout.outputs)) {
     const SensorInfo& sensor = model.sensors()[static_cast<std::size_t>(of.sensor)];

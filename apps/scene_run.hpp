@@ -12,14 +12,11 @@
 #include "engine/base/precision.hpp"
 #include "engine/step/control.hpp"
 #include "engine/step/stepper.hpp"
+#include "io/trajectory/run_facts.hpp"
 #include "tasks/gradients/losses.hpp"
 #include "tasks/run/rollout.hpp"
 
 namespace tangere::apps {
-
-/// Largest --envs and --steps: beyond any machine, but safe to multiply.
-constexpr int kMostEnvironments = 1'000'000'000;
-constexpr std::int64_t kMostSteps = 1'000'000'000'000;
 
 /// Throws InputError for an unknown --precision.
 Precision precision_named(const std::string& name);
@@ -67,6 +64,10 @@ void warn_of_touches(const Console& console, const Model& model, const Stepper& 
 /// were cut to keep an accuracy.
 Json note_costly_steps(const Console& console, Integrator integrator, double accuracy,
                        const StepCounts& counts);
+
+/// What the JSON object of a command that writes a file says of its run: "seed", the solver's
+/// settings, "precision" and "instruction_set".
+Json settings_json(const RunFacts& facts);
 
 /// Prints notes on sensors that are not read after every step.
 void note_empty_sensors(const Console& console, const Model& model, const RolloutOptions& rollout);
