@@ -236,15 +236,8 @@ void BlockWorker::look(const Batch& batch, int block, std::size_t moment) {
   read_states(batch, block, place(q_), place(v_));
   if (task_.end_effectors_size() > 0)
     read_end_effectors(readout_, batch, block, place(end_effectors_));
-  if (!task_.spec().looks_at_tactile) return;
-  std::size_t offset = 0;
-  for (std::size_t s = 0; s < task_.model().sensors().size(); ++s) {
-    const std::size_t numbers = 3 * as_size(task_.model().sensors()[s].points);
-    read_field<double>(readout_, batch, block, {static_cast<int>(s)}, [&](int e) {
-      return part(tactile_, moment, e - first).subspan(offset, numbers);
-    });
-    offset += numbers;
-  }
+  if (task_.spec().looks_at_tactile)
+    read_all_fields<double>(readout_, batch, block, FieldForm::field, place(tactile_));
 }
 
 void BlockWorker::conclude_one(Batch& batch, EnvironmentData& data, int environment,

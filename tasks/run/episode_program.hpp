@@ -44,6 +44,13 @@ class EpisodeProgram {
   [[nodiscard]] virtual VectorCounts counts(const StepTally& tally) const;
 };
 
+/// Writes the controls of a step of a scene into u, (E, nu), for the environments of a block.
+void write_controls(const ControlProgram& controls, std::int64_t step, const Batch& batch,
+                    int block, std::span<double> u);
+/// Does the same for all blocks.
+void write_controls(const ControlProgram& controls, std::int64_t step, const Batch& batch,
+                    std::span<double> u);
+
 /// The program of a scene, driven by its controls or a table.
 class SceneProgram : public EpisodeProgram {
  public:

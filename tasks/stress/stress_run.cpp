@@ -15,6 +15,7 @@
 #include "engine/step/stepper.hpp"
 #include "tasks/run/block_threads.hpp"
 #include "tasks/run/costly_steps.hpp"
+#include "tasks/run/episode_program.hpp"
 #include "tasks/run/step_tally.hpp"
 
 namespace tangere {
@@ -70,14 +71,12 @@ struct Play {
     record();
     // Those whose steps missed the accuracy, let a body through or were damped.
     std::vector<bool> flagged(as_size(lanes));
-    const std::size_t nu = as_size(model().nu());
     for (std::int64_t k = 0; k < steps; ++k) {
       if (stopped || (go_on && !go_on())) {
         stopped = true;
         return;
       }
-      for (int e = first; e < first + lanes; ++e)
-        controls.evaluate(k, batch.episode(e), u.subspan(as_size(e) * nu, nu));
+      write_controls(controls, k, batch, b, u);
       w.stepper.step_block(batch, b, u);
       for (int e = first; e < first + lanes; ++e) {
         if (!tally.live(e)) continue;
