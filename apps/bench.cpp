@@ -72,7 +72,7 @@ void note_idle_threads(const Console& console, int environments, int most_thread
                              processor_count() == 1 ? "" : "s"));
 }
 
-void tell_passes(const Console& console, const BenchRun& run) {
+void print_passes(const Console& console, const BenchRun& run) {
   for (const BenchmarkTime& time : run.result.times)
     console.detail(fmt::format("threads {}: {:.4f} s, CPU {:.4f} s", run.threads, time.seconds,
                                time.cpu_seconds));
@@ -174,7 +174,7 @@ int measure(const BenchArguments& options, const Console& console, BenchSetting&
                          fmt::format("while measuring {} thread{}", n, n == 1 ? "" : "s"));
     entries.push_back(bench_entry(setting, runs.back()));
     console.print(bench_row(runs.back(), runs.front()));
-    tell_passes(console, runs.back());
+    print_passes(console, runs.back());
   }
   console.print(bench_footing(setting, runs.front()));
   list_failures(console, "environment", failures_of(runs.front()), "--json names all");
