@@ -311,7 +311,7 @@ std::vector<Violation> check_heavy_headers(const Tree& tree) {
   static const std::map<std::string, std::map<std::string, int>> allowed{
       {"CLI/", {{"apps", 1}}},
       {"Eigen/", {{"engine/derivative", 1}, {"engine/step", 1}, {"tasks/gradients", 1}}},
-      {"hdf5.h", {{"io/hdf5", 5}, {"io/dataset", 10}, {"io/trajectory", 4}, {"io/view", 4}}},
+      {"hdf5.h", {{"io/hdf5", 8}, {"io/dataset", 10}, {"io/trajectory", 4}, {"io/view", 4}}},
       {"nlohmann/json.hpp", {{"apps", 31}, {"io/dataset", 2}, {"io/view", 1}}},
       {"tbb/flow_graph.h", {{"tasks/run", 1}}},
       {"regex", {}},
@@ -360,6 +360,7 @@ std::vector<Violation> check_own_headers(const Tree& tree) {
       {"engine/model/mass_properties.cpp", "a part of compiled_model.hpp"},
       {"engine/model/sensor.cpp", "a part of compiled_model.hpp"},
       {"engine/model/tactile_points.cpp", "a part of compiled_model.hpp"},
+      {"io/hdf5/h5_values.cpp", "a part of h5.hpp"},
       {"io/view/view_dataset.cpp", "a part of view_source.hpp"},
       {"io/view/view_trajectory.cpp", "a part of view_source.hpp"},
       {"io/robot/mjcf_actuators.cpp", "a part of mjcf_file.hpp"},
