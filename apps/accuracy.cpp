@@ -13,6 +13,7 @@
 #include "apps/memory.hpp"
 #include "apps/named_value.hpp"
 #include "apps/pitch_report.hpp"
+#include "apps/run_options.hpp"
 #include "apps/scene_run.hpp"
 #include "apps/stop_signals.hpp"
 #include "apps/task_run.hpp"
@@ -173,22 +174,19 @@ Command add_accuracy(CLI::App& program) {
            "sensor]");
   add_positive_number(app, "--target", o.target,
                       "Relative error that is good enough [default: 0.01]");
-  add_whole_number<int>(app, "--envs", o.environments, 1, kMostEnvironments,
-                        "Environments, each with its own random numbers [default: 64]");
-  add_whole_number<std::int64_t>(app, "--steps", o.steps, 1, kMostSteps,
-                                 "Length in steps of the scene [default: as many as the controls "
-                                 "last]");
+  add_envs_option(app, o.environments,
+                  "Environments, each with its own random numbers [default: 64]");
+  add_steps_option(app, o.steps,
+                   "Length in steps of the scene [default: as many as the controls last]");
   add_controls_option(app, o.controls);
   add_policy_option(app, o.policy);
   add_positive_number(app, "--tol", o.tolerance,
                       "Tolerance of every setting [default: the one that follows the step]");
-  add_whole_number<int>(app, "--threads", o.threads, 1, kMostThreads,
-                        "Threads [default: the processors here]");
-  add_whole_number<std::uint64_t>(app, "--seed", o.seed, 0, UINT64_MAX,
-                                  "Seed of all that varies between environments [default: 0]");
+  add_threads_option(app, o.threads);
+  add_seed_option(app, o.seed);
   add_text(app, "--svg", o.svg, "F.svg", "Write a picture of cost against error");
   add_text(app, "--csv", o.csv, "F.csv", "Write a table of all figures");
-  add_flag(app, "--overwrite", o.overwrite, "Replace the outputs if they exist");
+  add_overwrite_option(app, o.overwrite, "Replace the outputs if they exist");
   add_allow_unknown_option(app, o.allow_unknown);
   add_console_options(app, *console);
   return {&app, [=](const ProgramInfo&) { return accuracy(*options, *console); }};

@@ -94,11 +94,6 @@ void add_curve(PrecisionPlot& plot, const AccuracyReport& report, const std::str
 
 }  // namespace
 
-std::string percent(double error) {
-  if (!std::isfinite(error)) return "-";
-  return error < 0.1 ? fmt::format("{:.2g} %", 100 * error) : fmt::format("{:.0f} %", 100 * error);
-}
-
 std::string accuracy_heading(const AccuracySubject& subject, const FixedEpisodes& episodes) {
   return fmt::format(
       "{}: {} of {} environments over {:g} s, sampled every {:g} ms, against a reference; {}; {}\n"

@@ -22,8 +22,6 @@ struct AccuracySubject {
   double target = 0;
 };
 
-/// A relative error for people; "-" where it is infinite or unknown.
-std::string percent(double error);
 std::string accuracy_heading(const AccuracySubject& subject, const FixedEpisodes& episodes);
 std::string reference_row(const AccuracyReference& reference, int environments);
 std::string accuracy_head();

@@ -228,32 +228,4 @@ void check_not_same_file(const std::string& output, const std::string& input) {
         fmt::format("the output '{}' is the input '{}'; expected another file", output, input));
 }
 
-void add_accuracy_option(CLI::App& app, std::optional<double>& accuracy) {
-  add_positive_number(app, "--accuracy", accuracy,
-                      "Cut steps into parts that keep this relative accuracy, such as 0.01 "
-                      "[default: the scene's, or steps are not cut]");
-}
-
-void add_sleep_option(CLI::App& app, bool& sleep) {
-  add_flag(app, "--sleep", sleep,
-           "Let bodies sleep that have come to rest, until something touches or moves them");
-}
-
-void add_allow_unknown_option(CLI::App& app, bool& allow) {
-  add_flag(app, "--allow-unknown", allow,
-           "Unknown elements and attributes of the scene are warnings, not errors");
-}
-
-void add_controls_option(CLI::App& app, std::string& controls) {
-  add_text(app, "--controls", controls, "U.csv",
-           "Table of controls, one row per step, in place of the scene's <control>; for a task, of "
-           "actions");
-}
-
-void add_policy_option(CLI::App& app, std::string& policy) {
-  add_text(
-      app, "--policy", policy, "NAME",
-      "Policy of a task: random, hold, csv (needs --controls) or scripted [default: scripted]");
-}
-
 }  // namespace tangere::apps

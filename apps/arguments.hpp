@@ -104,15 +104,4 @@ void add_console_options(CLI::App& command, Console& console);
 /// Throws InputError if writing `output` would replace `input`, even with --overwrite.
 void check_not_same_file(const std::string& output, const std::string& input);
 
-/// Adds --accuracy, which every command that plays a scene or a task has.
-void add_accuracy_option(CLI::App& app, std::optional<double>& accuracy);
-/// Adds --sleep, which commands have that step and take no derivatives.
-void add_sleep_option(CLI::App& app, bool& sleep);
-/// Adds --allow-unknown, which every command that reads a scene has.
-void add_allow_unknown_option(CLI::App& app, bool& allow);
-/// Adds --controls, a table that drives a scene or a task.
-void add_controls_option(CLI::App& app, std::string& controls);
-/// Adds --policy of commands that ask no program and play the script otherwise.
-void add_policy_option(CLI::App& app, std::string& policy);
-
 }  // namespace tangere::apps

@@ -15,6 +15,7 @@
 #include "apps/memory.hpp"
 #include "apps/named_value.hpp"
 #include "apps/record.hpp"
+#include "apps/run_options.hpp"
 #include "apps/scene_run.hpp"
 #include "apps/stop_signals.hpp"
 #include "apps/task_run.hpp"
@@ -32,13 +33,13 @@ constexpr int kMostPasses = 1'000'000;
 constexpr int kDefaultEnvironments = 256;  // 16 blocks: several per thread on usual machines
 
 struct BenchArguments {
-  std::string scene, frames, policy, integrator, precision = "mixed", record, svg, csv;
+  std::string scene, frames, policy, precision = "mixed", record, svg, csv;
   std::vector<int> threads;
   std::optional<std::int64_t> steps;
   std::optional<int> environments, every, repeat;
   std::optional<std::uint64_t> seed;
-  std::optional<double> timestep, tolerance, accuracy;
-  bool sleep = false, error = false, overwrite = false, allow_unknown = false;
+  SolverArguments solver;
+  bool error = false, overwrite = false, allow_unknown = false;
 };
 
 constexpr int kErrorEnvironments = 32;
@@ -71,7 +72,7 @@ void note_idle_threads(const Console& console, int environments, int most_thread
                              processor_count() == 1 ? "" : "s"));
 }
 
-void tell_passes(const Console& console, const BenchRun& run) {
+void print_passes(const Console& console, const BenchRun& run) {
   for (const BenchmarkTime& time : run.result.times)
     console.detail(fmt::format("threads {}: {:.4f} s, CPU {:.4f} s", run.threads, time.seconds,
                                time.cpu_seconds));
@@ -173,7 +174,7 @@ int measure(const BenchArguments& options, const Console& console, BenchSetting&
                          fmt::format("while measuring {} thread{}", n, n == 1 ? "" : "s"));
     entries.push_back(bench_entry(setting, runs.back()));
     console.print(bench_row(runs.back(), runs.front()));
-    tell_passes(console, runs.back());
+    print_passes(console, runs.back());
   }
   console.print(bench_footing(setting, runs.front()));
   list_failures(console, "environment", failures_of(runs.front()), "--json names all");
@@ -193,9 +194,10 @@ int measure(const BenchArguments& options, const Console& console, BenchSetting&
 /// The scene with the scheme, step and tolerance that are asked for.
 Scene scene_of(const BenchArguments& options, const Console& console, const SolverOptions& asked) {
   Scene scene = read_scene_for(options.scene, options.allow_unknown, console, asked);
-  if (!options.integrator.empty()) scene.integrator = integrator_named(options.integrator);
-  if (options.timestep) scene.timestep = *options.timestep;
-  if (options.tolerance) scene.solver.tolerance = options.tolerance;
+  if (!options.solver.integrator.empty())
+    scene.integrator = integrator_named(options.solver.integrator);
+  if (options.solver.timestep) scene.timestep = *options.solver.timestep;
+  if (options.solver.tolerance) scene.solver.tolerance = options.solver.tolerance;
   return scene;
 }
 
@@ -208,9 +210,9 @@ int bench_task(const BenchArguments& options, const Console& console, const Task
   refuse_with_task(task, {{"--every", options.every.has_value()},
                           {"--frames", !options.frames.empty()},
                           {"--record", !options.record.empty()},
-                          {"--integrator", !options.integrator.empty()},
-                          {"--timestep", options.timestep.has_value()},
-                          {"--tol", options.tolerance.has_value()},
+                          {"--integrator", !options.solver.integrator.empty()},
+                          {"--timestep", options.solver.timestep.has_value()},
+                          {"--tol", options.solver.tolerance.has_value()},
                           {"--error", options.error}});
   note_outputs_of(console, task, "is timed with what it observes");
   const PolicyKind kind = policy_named(options.policy, "", PolicyKind::random);
@@ -248,10 +250,10 @@ int bench(const BenchArguments& options, const Console& console) {
   // Reports a wrong word before a scene is read.
   frames_named(options.frames);
   precision_named(options.precision);
-  if (!options.integrator.empty()) integrator_named(options.integrator);
+  if (!options.solver.integrator.empty()) integrator_named(options.solver.integrator);
   if (options.frames == "none" && !options.record.empty())
     throw InputError("--frames none with --record; expected one of them");
-  const SolverOptions asked{.accuracy = options.accuracy, .sleep = options.sleep ? kUsualSleep : 0};
+  const SolverOptions asked = options.solver.asked();
   if (const std::unique_ptr<Task> task = find_task(options.scene, console, asked))
     return bench_task(options, console, *task);
   refuse_with_scene(options.scene, {{"--policy", !options.policy.empty()}});
@@ -302,19 +304,16 @@ Command add_bench(CLI::App& program) {
                   "tangere bench scenes/rolling_ball_small.xml --envs 32 --steps 50 --threads 1,2 "
                   "--svg speed.svg");
   add_text(app, "SCENE", o.scene, "", "Scene file (XML), or the name of a task").required();
-  add_whole_number<int>(app, "--envs", o.environments, 1, kMostEnvironments,
-                        "Environments, in blocks of 16 [default: 256]");
-  add_whole_number<std::int64_t>(
-      app, "--steps", o.steps, 1, kMostSteps,
+  add_envs_option(app, o.environments, "Environments, in blocks of 16 [default: 256]");
+  add_steps_option(
+      app, o.steps,
       "Steps of the episode; for a task, actions [default: as many as the controls last]");
   add_text(app, "--policy", o.policy, "NAME",
            "Policy of a task: random, hold or scripted [default: random]");
   add_whole_numbers(app, "--threads", o.threads, 1, kMostThreads,
                     "Thread counts to measure [default: 1,2,4,... up to the processors here]");
-  add_text(app, "--precision", o.precision, "NAME",
-           "Precision of tactile fields: double, or mixed with points in float [default: mixed]");
-  add_whole_number<int>(app, "--every", o.every, 1, kMostEnvironments,
-                        "Read tactile fields every N steps [default: the scene's, or 1]");
+  add_precision_option(app, o.precision, " with points in float [default: mixed]");
+  add_every_option(app, o.every);
   add_text(app, "--frames", o.frames, "NAME",
            "Fields to read: dense (every point), compact (touched tiles) or none [default: dense]");
   add_text(
@@ -325,22 +324,14 @@ Command add_bench(CLI::App& program) {
       "<outputs>, or all fields]");
   add_whole_number<int>(app, "--repeat", o.repeat, 1, kMostPasses,
                         "Timed passes over the episode; the best counts [default: 3]");
-  add_whole_number<std::uint64_t>(app, "--seed", o.seed, 0, UINT64_MAX,
-                                  "Seed of all that varies between environments [default: 0]");
-  add_positive_number(app, "--timestep", o.timestep, "Step size in s [default: the scene's]");
-  add_text(app, "--integrator", o.integrator, "NAME",
-           fmt::format("{} [default: the scene's]", fmt::join(integrator_names(), ", ")));
-  add_positive_number(app, "--tol", o.tolerance,
-                      "Largest scaled residual of a step [default: the scene's, or what follows "
-                      "scheme and step]");
-  add_accuracy_option(app, o.accuracy);
-  add_sleep_option(app, o.sleep);
+  add_seed_option(app, o.seed);
+  o.solver.add(app);
   add_flag(
       app, "--error", o.error,
       "Say beside the speed how far the setting is from a reference, in up to 32 environments");
   add_text(app, "--svg", o.svg, "F.svg", "Write a picture of speed against threads");
   add_text(app, "--csv", o.csv, "F.csv", "Write a table of all figures");
-  add_flag(app, "--overwrite", o.overwrite, "Replace the outputs if they exist");
+  add_overwrite_option(app, o.overwrite, "Replace the outputs if they exist");
   add_allow_unknown_option(app, o.allow_unknown);
   add_console_options(app, *console);
   return {&app, [=](const ProgramInfo&) { return bench(*options, *console); }};

@@ -15,7 +15,7 @@ namespace {
 double rate(std::int64_t count, double seconds) { return static_cast<double>(count) / seconds; }
 
 double newton_per_step(const BenchmarkResult& result) {
-  return rate(result.newton_iterations, static_cast<double>(result.simulation_steps));
+  return rate(result.counts.newton_iterations, static_cast<double>(result.counts.simulation_steps));
 }
 
 /// Writes a checksum as text, because many JSON readers keep only 53 bits of a number.
@@ -80,9 +80,7 @@ std::string bench_row(const BenchRun& run, const BenchRun& first) {
 }
 
 std::string bench_footing(const BenchSetting& setting, const BenchRun& run) {
-  return "\n" +
-         sleep_text(setting.sleep, setting.moving_bodies, run.result.bodies_asleep,
-                    run.result.simulation_steps) +
+  return "\n" + sleep_text(setting.sleep, setting.moving_bodies, run.result.counts) +
          fmt::format(
              "Newton iterations per simulation step: {:.2f}, environments failed: {}, checksum: {}",
              newton_per_step(run.result), run.result.failures.size(),
@@ -112,7 +110,7 @@ Json bench_entry(const BenchSetting& setting, const BenchRun& run) {
           {"median_env_steps_per_cpu_second", rate(r.environment_steps, median.cpu_seconds)},
           {"median_tactile_points_per_second", rate(r.tactile_points, median.seconds)},
           {"newton_iterations", newton_per_step(r)},
-          {"mean_asleep", mean_asleep(setting.sleep, r.bodies_asleep, r.simulation_steps)},
+          {"mean_asleep", mean_asleep(setting.sleep, r.counts)},
           {"failed", failures_json("environment", failures_of(run))},
           {"checksum", hexadecimal(r.checksum())}};
 }

@@ -2,6 +2,8 @@
 // Writes lines to streams. main notices a stream that cannot be written when it flushes stdout.
 #include "apps/console.hpp"
 
+#include <fmt/format.h>
+
 #include <cmath>
 #include <cstdio>
 #include <nlohmann/json.hpp>
@@ -16,6 +18,11 @@ void write_line(std::FILE* stream, const std::string& text) {
 }  // namespace
 
 Json finite(double x) { return std::isfinite(x) ? Json(x) : Json(); }
+
+std::string percent(double error) {
+  if (!std::isfinite(error)) return "-";
+  return error < 0.1 ? fmt::format("{:.2g} %", 100 * error) : fmt::format("{:.0f} %", 100 * error);
+}
 
 void Console::fail(const std::string& text) const { write_line(stderr, text); }
 

@@ -22,6 +22,8 @@ using Json = nlohmann::ordered_json;
 
 /// Returns a number, or null if it is infinite, because JSON has no infinity.
 Json finite(double x);
+/// A relative error for people; "-" where it is infinite or unknown.
+std::string percent(double error);
 
 struct Console {
   bool json = false, quiet = false, verbose = false;

@@ -7,6 +7,7 @@
 
 #include "apps/arguments.hpp"
 #include "apps/command.hpp"
+#include "apps/run_options.hpp"
 #include "io/dataset/dataset_export.hpp"
 
 namespace tangere::apps {
@@ -47,7 +48,7 @@ Command add_export(CLI::App& program) {
   add_text(app, "--csv", o.output, "F.csv", "Table to write").required();
   add_whole_number<std::int64_t>(app, "--episode", o.what.episode, 0, 1'000'000'000,
                                  "Write only this episode");
-  add_flag(app, "--overwrite", o.what.overwrite, "Replace the output if it exists");
+  add_overwrite_option(app, o.what.overwrite);
   add_console_options(app, *console);
   return {&app, [=](const ProgramInfo&) { return export_table(*options, *console); },
           [] { return true; }};

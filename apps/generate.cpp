@@ -2,27 +2,25 @@
 // tangere generate: plays many episodes of a scene or a task on all cores and writes a folder of
 // shards. Everything is checked before the first step.
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include <algorithm>
-#include <filesystem>
 
 #include "apps/arguments.hpp"
 #include "apps/command.hpp"
 #include "apps/generate_job.hpp"
+#include "apps/generate_layout.hpp"
+#include "apps/generate_report.hpp"
 #include "apps/memory.hpp"
 #include "apps/policy_program.hpp"
 #include "apps/progress.hpp"
 #include "apps/record.hpp"
+#include "apps/run_options.hpp"
 #include "apps/scene_run.hpp"
 #include "apps/stop_signals.hpp"
 #include "apps/task_run.hpp"
 #include "apps/workers.hpp"
-#include "io/files/name_list.hpp"
 #include "io/files/nearest_name.hpp"
-#include "io/files/text_file.hpp"
 #include "io/hdf5/reading_note.hpp"
-#include "kernels/table/isa.hpp"
 #include "tasks/gradients/episode_gradients.hpp"
 #include "tasks/gradients/losses.hpp"
 #include "tasks/run/episodes.hpp"
@@ -31,7 +29,6 @@ namespace tangere::apps {
 namespace {
 
 constexpr std::int64_t kMostEpisodes = 1'000'000'000;
-constexpr int kMostInterval = 1'000'000'000;
 constexpr double kProgramTimeout = 120;  // [s], enough to load a large network
 
 EpisodeOptions episode_options(const GenerateOptions& options, const Model& model,
@@ -49,115 +46,6 @@ EpisodeOptions episode_options(const GenerateOptions& options, const Model& mode
   return run;
 }
 
-/// Names a table by its content, because a path may lead elsewhere on another machine.
-std::string controls_named(const std::string& path) {
-  if (path.empty()) return "of the scene";
-  constexpr std::size_t kLargestTable = std::size_t{1} << 32;
-  std::uint64_t hash = 0xCBF29CE484222325ULL;  // FNV-1a
-  for (const char c : read_text_file(path, kLargestTable, "a csv file"))
-    hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001B3ULL;
-  return fmt::format("a table of checksum {:016x}", hash);
-}
-
-/// What of an episode's rows is computed: what the record asks for, or everything.
-void take(const Record& record, const Model& model, EpisodeOptions& run) {
-  const auto rows_of = [&](const char* name) -> RowOutput {
-    const AskedOutput* const asked = record.find(name);
-    return {record.asked.empty() || asked != nullptr, asked ? asked->times : OutputTimes{}};
-  };
-  run.fields = record.outputs.fields;
-  run.q = rows_of("q"), run.v = rows_of("v"), run.end_effectors = rows_of("variables");
-  if (const AskedOutput* const all = record.find("bodies")) run.bodies.push_back({{}, all->times});
-  for (int b = 0; b < model.nb(); ++b)  // in the order of the scene, whatever that of the words
-    if (const AskedOutput* const one =
-            record.find(body_output(model.body_names()[static_cast<std::size_t>(b)])))
-      run.bodies.push_back({{b}, one->times});
-}
-
-/// The same for the files.
-void describe(const Record& record, const Model& model, const EpisodeOptions& run,
-              DatasetDescription& description) {
-  for (const AskedOutput& asked : record.asked) {
-    description.record.push_back(asked.name);
-    description.record_times.push_back(asked.times);
-  }
-  const std::vector<std::string> names(model.body_names().begin(), model.body_names().end());
-  for (const BodyRows& rows : run.bodies) {
-    const bool all = rows.bodies.empty();
-    const std::string one = all ? "" : names[static_cast<std::size_t>(rows.bodies.front())];
-    description.bodies.push_back(
-        {all ? "bodies" : body_output(one), all ? names : std::vector{one}});
-  }
-}
-
-std::vector<std::string> split_if_any(const std::string& list) {
-  return list.empty() ? std::vector<std::string>{} : split_names("--record", list);
-}
-
-/// For a shell that reads the command again.
-std::string quoted(const std::string& word) {
-  std::string text = "'";
-  for (const char c : word) text += c == '\'' ? std::string("'\\''") : std::string(1, c);
-  return text + "'";
-}
-
-/// Returns the command that makes the same data set again, in any folder and on any number of
-/// threads. With --program, this holds if the program is found from there and answers the same.
-std::string command_of(const GenerateOptions& options, const EpisodeOptions& run,
-                       const std::string& policy) {
-  std::string command = fmt::format("tangere generate {} --episodes {} --seed {} --precision {}",
-                                    options.scene, run.episodes, run.seed, options.precision);
-  if (policy.empty()) command += fmt::format(" --steps {} --every {}", run.steps, run.every);
-  if (!policy.empty()) command += " --policy " + policy;
-  if (options.noise) command += fmt::format(" --noise {}", *options.noise);
-  if (!options.mix.empty()) command += " --mix " + options.mix;
-  if (!options.name.empty()) command += " --name " + options.name;
-  if (!options.program.empty()) command += " --program " + quoted(options.program);
-  if (!options.controls.empty()) command += " --controls " + options.controls;
-  if (options.accuracy) command += fmt::format(" --accuracy {}", *options.accuracy);
-  if (options.sleep) command += " --sleep";
-  if (options.compress != "none") command += " --compress " + options.compress;
-  if (options.tactile != "dense") command += " --tactile " + options.tactile;
-  if (!options.record.empty()) command += " --record " + options.record;
-  if (options.shards) command += fmt::format(" --shards {}", *options.shards);
-  if (options.gradients != "none") command += " --gradients " + options.gradients;
-  if (!options.loss.empty()) command += " --loss " + options.loss;
-  return command;
-}
-
-/// `task`: null for a scene alone.
-DatasetLayout make_layout(const GenerateOptions& options, const Model& model,
-                          const Stepper& stepper, const EpisodeOptions& run, const Record& record,
-                          const ProgramInfo& info, const GradientPlan& gradients,
-                          const Task* task = nullptr, const PlayedBy& played_by = {}) {
-  DatasetDescription description;
-  if (task != nullptr) description.task = task->spec();
-  description.played_by = played_by;
-  description.set_name = options.name;
-  description.controls = controls_named(options.controls);
-  description.command = command_of(options, run, played_by.policy);
-  description.shards = options.shards.value_or(0);
-  description.compression = options.compress;
-  if (task == nullptr)
-    describe(record, model, run, description);
-  else
-    description.record = split_if_any(options.record);
-  description.fields = record.outputs.fields;
-  description.sparse = options.tactile == "sparse";
-  description.gradients_of =
-      options.loss.empty() ? options.gradients : options.gradients + " " + options.loss;
-  description.gradients = gradients.arrays;
-  description.episodes = run.episodes;
-  description.steps = run.steps;
-  description.every = run.every;
-  description.seed = run.seed;
-  description.precision = to_string(run.precision);
-  description.single = run.precision == Precision::mixed;
-  description.version = info.version;
-  description.instruction_set = kernels::active_isa_name();
-  return dataset_layout_from(model, stepper, description);
-}
-
 /// Names of the kinds of effects that the model has on.
 std::vector<std::string> effect_names(const Model& model) {
   std::vector<std::string> names;
@@ -167,137 +55,14 @@ std::vector<std::string> effect_names(const Model& model) {
   return names;
 }
 
-std::vector<Failure> failures_of(const EpisodeSummary& summary) {
-  std::vector<Failure> failures;
-  for (const FailedEpisode& f : summary.failures) failures.push_back({f.episode, f.step, f.status});
-  return failures;
-}
-
+/// The task's report, with the steps of the simulation.
 TaskReport report_of(const Task& task, PolicyKind kind, const std::string& player,
                      const EpisodeSummary& summary) {
   const auto played = summary.episodes - static_cast<std::int64_t>(summary.failures.size());
-  TaskReport report;
-  report.keys = {{"task", task.spec().name},
-                 {"policy", to_string(kind)},
-                 {"successes", summary.successes},
-                 {"success_rate", played > 0 ? Json(static_cast<double>(summary.successes) /
-                                                    static_cast<double>(played))
-                                             : Json()},
-                 {"mean_return", played > 0 ? Json(summary.mean_return) : Json()},
-                 {"simulation_steps", summary.simulation_steps}};
-  report.line =
-      fmt::format("task {}, policy {}: {} of {} episodes solved, mean return {:.4g}",
-                  task.spec().name, player, summary.successes, played, summary.mean_return);
+  TaskReport report =
+      report_of(task, kind, player, TaskResult{played, summary.successes, summary.mean_return});
+  report.keys["simulation_steps"] = summary.counts.simulation_steps;
   return report;
-}
-
-/// Names the work of many threads on finished blocks. Gradients are computed there, too. Checksums
-/// always are, but take the least time.
-std::string preparation_of(const Job& job) {
-  std::vector<std::string> kinds;
-  if (!job.layout.gradients.empty()) kinds.emplace_back("gradients");
-  if (job.layout.sparse) kinds.emplace_back("tiles");
-  if (job.layout.compression != "none") kinds.emplace_back("compression");
-  return kinds.empty() ? "checksums" : fmt::format("{}", fmt::join(kinds, " and "));
-}
-
-/// Names the kind of work that kept the two others waiting.
-std::string limit_of(const EpisodeSummary& summary, const Job& job) {
-  const EpisodeOptions& run = job.run;
-  const double simulation = summary.simulation_seconds / run.threads,
-               encoding = summary.encoding_seconds / run.threads;
-  if (summary.writing_seconds >= std::max(simulation, encoding)) return "writing";
-  return simulation >= encoding ? "simulation" : preparation_of(job);
-}
-
-int report(const GenerateOptions& options, const Console& console, const Job& job,
-           const JobResult& done, DatasetWriter& output) {
-  const EpisodeSummary& summary = done.summary;
-  const EpisodeOptions& run = job.run;
-  const std::vector<std::string> shards = output.shards();
-  const ExitCode code = summary.failures.empty() && output.kept_failed() == 0 ? kDone : kSomeFailed;
-  std::uintmax_t bytes = 0;
-  for (const std::string& shard : shards) bytes += std::filesystem::file_size(shard);
-  const Merged merged =
-      merge_if_complete(options, output);  // from now on others may replace the shards
-  const double rate =
-      summary.seconds > 0 ? static_cast<double>(summary.environment_steps) / summary.seconds : 0;
-  list_failures(console, "episode", failures_of(summary), "--json and the shards name all");
-  const std::string kept = output.kept() == 0
-                               ? ""
-                               : fmt::format("kept: {} of them, episodes failed in these: {}\n",
-                                             output.kept(), output.kept_failed());
-  console.print(fmt::format(
-      "episodes: {}, rows: {}, time: {:.2f} s, {:.0f} env-steps/s with output, "
-      "threads: {}\nlimited by {}: simulation {:.2f} s and {} {:.2f} s of all threads, writing "
-      "{:.2f} s of one\n{}\n{}, episodes failed: {}\n{}{}wrote {}: {} ({} bytes){}",
-      summary.episodes, summary.rows, summary.seconds, rate, run.threads, limit_of(summary, job),
-      summary.simulation_seconds, preparation_of(job), summary.encoding_seconds,
-      summary.writing_seconds, done.task.line,
-      split_text(summary.split_steps, summary.coarse_steps, summary.passed_steps,
-                 summary.damped_steps),
-      summary.failures.size(),
-      sleep_text(job.layout.sleep, job.moving_bodies, summary.bodies_asleep,
-                 summary.simulation_steps),
-      kept, options.output,
-      shards.size() == 1 ? "1 shard" : fmt::format("{} shards", shards.size()), bytes,
-      merged.line));
-  const Json costly =
-      note_costly_steps(console, integrator_named(job.layout.integrator), job.layout.accuracy,
-                        summary.simulation_steps, summary.newton_iterations, summary.split_steps);
-  Json result{{"command", "generate"},
-              {"exit_code", static_cast<int>(code)},
-              {"scene", options.scene},
-              {"output", options.output},
-              {"shards", shards},
-              {"bytes", bytes},
-              {"kept", output.kept()},
-              {"kept_failed", output.kept_failed()},
-              {"episodes", summary.episodes},
-              {"rows", summary.rows},
-              {"steps", run.steps},
-              {"every", run.every},
-              {"seed", run.seed},
-              {"timestep", job.layout.timestep},
-              {"integrator", job.layout.integrator},
-              {"tolerance", job.layout.tolerance},
-              {"accuracy", job.layout.accuracy},
-              {"sleep", job.layout.sleep},
-              {"precision", options.precision},
-              {"instruction_set", kernels::active_isa_name()},
-              {"threads", run.threads},
-              {"peak_blocks_in_flight", summary.peak_blocks_in_flight},
-              {"seconds", summary.seconds},
-              {"compress", options.compress},
-              {"tactile", options.tactile},
-              {"gradients", job.layout.gradients.empty() ? Json() : Json(job.layout.gradients_of)},
-              {"limited_by", limit_of(summary, job)},
-              {"simulation_seconds", summary.simulation_seconds},
-              {"encoding_seconds", summary.encoding_seconds},
-              {"writing_seconds", summary.writing_seconds},
-              {"environment_steps", summary.environment_steps},
-              {"environment_steps_per_second", rate},
-              {"newton_iterations", summary.newton_iterations},
-              {"split_steps", summary.split_steps},
-              {"coarse_steps", summary.coarse_steps},
-              {"passed_steps", summary.passed_steps},
-              {"damped_steps", summary.damped_steps},
-              {"mean_asleep",
-               mean_asleep(job.layout.sleep, summary.bodies_asleep, summary.simulation_steps)},
-              {"costly", costly},
-              {"failed", failures_json("episode", failures_of(summary))}};
-  result.update(done.task.keys);
-  result.update(merged.keys);
-  console.result(result);
-  return code;
-}
-
-int stopped(const GenerateOptions& options, const Console& console, int signal,
-            std::int64_t episodes, std::int64_t asked, const DatasetWriter& output) {
-  return report_stop(
-      console, "generate", signal, fmt::format("after {} of {} episodes", episodes, asked),
-      fmt::format("complete shards in '{}': {}", options.output, output.shards().size()),
-      {{"shards", output.shards()}});
 }
 
 /// Throws if the tapes are too small, before anything is made.
@@ -337,8 +102,9 @@ int make(const GenerateOptions& options, const Console& console, const Job& job,
         [&] { return signals.received() != 0; });
   }
   if (done.summary.stopped)
-    return stopped(options, console, signals.received(), done.summary.episodes, episodes, output);
-  return report(options, console, job, done, output);
+    return report_stopped(options, console, signals.received(), done.summary.episodes, episodes,
+                          output);
+  return report_shards(options, console, job, done, output);
 }
 
 PolicyVariation variation_of(const GenerateOptions& options, PolicyKind kind) {
@@ -371,6 +137,20 @@ PolicyKind policy_kind(const GenerateOptions& options) {
   return PolicyKind::program;
 }
 
+/// A task's episodes as they are asked for.
+EpisodeOptions episode_options(const GenerateOptions& options, const Task& task) {
+  EpisodeOptions run;
+  run.episodes = options.episodes.value_or(0);
+  run.every = task.spec().steps_per_action;
+  run.steps = static_cast<std::int64_t>(task.spec().horizon) * run.every;
+  run.seed = options.seed.value_or(0);
+  run.precision = precision_named(options.precision);
+  run.threads = options.threads.value_or(available_threads());
+  // Includes blocks that wait until an earlier one is written, because episodes differ in length.
+  run.blocks_in_flight = 2 * run.threads + 1;
+  return run;
+}
+
 int generate_task(const GenerateOptions& options, const Console& console, const ProgramInfo& info,
                   const Task& task) {
   refuse_with_task(
@@ -395,14 +175,7 @@ int generate_task(const GenerateOptions& options, const Console& console, const 
                     variation)
               : make_policy(task, kind, options.controls, variation);
   Job job;
-  job.run.episodes = options.episodes.value_or(0);
-  job.run.every = task.spec().steps_per_action;
-  job.run.steps = static_cast<std::int64_t>(task.spec().horizon) * job.run.every;
-  job.run.seed = options.seed.value_or(0);
-  job.run.precision = precision_named(options.precision);
-  job.run.threads = options.threads.value_or(available_threads());
-  // Includes blocks that wait until an earlier one is written, because episodes differ in length.
-  job.run.blocks_in_flight = 2 * job.run.threads + 1;
+  job.run = episode_options(options, task);
   const GradientKind gradients = gradients_wanted(options, true);
   const TaskActions actions = [&](const TaskView& view, std::span<const double> observation,
                                   std::span<double> action) {
@@ -440,9 +213,10 @@ void check_word(const char* what, const std::string& word, const std::vector<std
     throw InputError(fmt::format("unknown {} '{}'{}", what, word, suggestion(word, known)));
 }
 
-int generate(GenerateOptions options, const Console& console, const ProgramInfo& info) {
-  static_cast<void>(
-      precision_named(options.precision));  // reports a wrong word before a scene is read
+/// Reports wrong words and options that do not go together before a scene is read. --shard sets the
+/// number of shards.
+void check(GenerateOptions& options, const Console& console) {
+  static_cast<void>(precision_named(options.precision));
   check_word("compression", options.compress, {"none", "deflate", "lz4"});
   check_word("kind of tactile fields", options.tactile, {"dense", "sparse"});
   if (options.compress == "lz4")
@@ -459,6 +233,10 @@ int generate(GenerateOptions options, const Console& console, const ProgramInfo&
                       options.shard, *options.shards));
     options.shards = shard.count;
   }
+}
+
+int generate(GenerateOptions options, const Console& console, const ProgramInfo& info) {
+  check(options, console);
   // The same for the episodes and their gradients, which play them again.
   SolverOptions asked{.accuracy = options.accuracy, .sleep = options.sleep ? kUsualSleep : 0};
   if (options.gradients != "none") asked.tolerance = kGradientTolerance;
@@ -504,20 +282,8 @@ int generate(GenerateOptions options, const Console& console, const ProgramInfo&
   return make(options, console, job, StopSignals());
 }
 
-}  // namespace
-
-Command add_generate(CLI::App& program) {
-  const auto options = std::make_shared<GenerateOptions>();
-  const auto console = std::make_shared<Console>();
-  GenerateOptions& o = *options;
-  CLI::App& app = add_command(
-      program, "generate", "Run many episodes of a scene or a task and write a data set",
-      "tangere generate scenes/rolling_ball_small.xml --output balls --episodes 32 --seed 1");
-  add_text(app, "SCENE", o.scene, "", "Scene file (XML), or the name of a task").required();
-  add_text(app, "-o,--output", o.output, "DIR", "Folder to write shards into").required();
-  add_whole_number<std::int64_t>(app, "--episodes", o.episodes, 1, kMostEpisodes,
-                                 "Episodes to simulate")
-      .required();
+/// Options of a task's policy.
+void add_playing_options(CLI::App& app, GenerateOptions& o) {
   add_controls_option(app, o.controls);
   add_text(app, "--policy", o.policy, "NAME",
            "Policy of a task: random, hold, csv (needs --controls), program (needs --program) or "
@@ -534,19 +300,10 @@ Command add_generate(CLI::App& program) {
       "program, in its unit [default: none]");
   add_text(app, "--mix", o.mix, "random=SHARE",
            "Share of the episodes that random actions play instead [default: none]");
-  add_whole_number<std::int64_t>(app, "--steps", o.steps, 1, kMostSteps,
-                                 "Steps of an episode [default: as many as the controls last]");
-  add_whole_number<int>(
-      app, "--every", o.every, 1, kMostInterval,
-      "Store a row every N steps and hold its action [default: the sensors', or 1]");
-  add_whole_number<int>(app, "--threads", o.threads, 1, kMostThreads,
-                        "Threads to run on [default: one per core]");
-  add_text(app, "--precision", o.precision, "NAME",
-           "Precision of tactile fields: double, or mixed, which stores float32 [default: mixed]");
-  add_whole_number<std::uint64_t>(app, "--seed", o.seed, 0, UINT64_MAX,
-                                  "Seed of all that varies between episodes [default: 0]");
-  add_accuracy_option(app, o.accuracy);
-  add_sleep_option(app, o.sleep);
+}
+
+/// Options of what is stored, and how.
+void add_storage_options(CLI::App& app, GenerateOptions& o) {
   add_text(
       app, "--compress", o.compress, "NAME",
       "Compression of large observations: none, deflate, or lz4, which needs a plug-in to read "
@@ -570,6 +327,10 @@ Command add_generate(CLI::App& program) {
   add_memory_size(
       app, "--tape-memory", o.tape_memory,
       "With --gradients return: memory for the states that all threads keep [default: 1GB each]");
+}
+
+/// Options of the folder of shards.
+void add_shard_options(CLI::App& app, GenerateOptions& o) {
   add_text(app, "--name", o.name, "NAME",
            "Last part of the data set's id for Minari [default: the policy; of a scene, none]");
   add_whole_number<std::int64_t>(
@@ -581,7 +342,34 @@ Command add_generate(CLI::App& program) {
            "Keep the shards in the folder if their settings are the same, and make the rest");
   add_flag(app, "--no-merge", o.no_merge, "Do not merge the shards when all are there");
   add_flag(app, "--dry-run", o.dry_run, "Say what would be made, and how long it may take");
-  add_flag(app, "--overwrite", o.overwrite, "Replace the shards in the folder");
+  add_overwrite_option(app, o.overwrite, "Replace the shards in the folder");
+}
+
+}  // namespace
+
+Command add_generate(CLI::App& program) {
+  const auto options = std::make_shared<GenerateOptions>();
+  const auto console = std::make_shared<Console>();
+  GenerateOptions& o = *options;
+  CLI::App& app = add_command(
+      program, "generate", "Run many episodes of a scene or a task and write a data set",
+      "tangere generate scenes/rolling_ball_small.xml --output balls --episodes 32 --seed 1");
+  add_text(app, "SCENE", o.scene, "", "Scene file (XML), or the name of a task").required();
+  add_text(app, "-o,--output", o.output, "DIR", "Folder to write shards into").required();
+  add_whole_number<std::int64_t>(app, "--episodes", o.episodes, 1, kMostEpisodes,
+                                 "Episodes to simulate")
+      .required();
+  add_playing_options(app, o);
+  add_steps_option(app, o.steps, "Steps of an episode [default: as many as the controls last]");
+  add_every_option(app, o.every,
+                   "Store a row every N steps and hold its action [default: the sensors', or 1]");
+  add_threads_option(app, o.threads, "Threads to run on [default: one per core]");
+  add_precision_option(app, o.precision, ", which stores float32 [default: mixed]");
+  add_seed_option(app, o.seed, "Seed of all that varies between episodes [default: 0]");
+  add_accuracy_option(app, o.accuracy);
+  add_sleep_option(app, o.sleep);
+  add_storage_options(app, o);
+  add_shard_options(app, o);
   add_allow_unknown_option(app, o.allow_unknown);
   add_console_options(app, *console);
   return {&app, [=](const ProgramInfo& info) { return generate(*options, *console, info); },

@@ -4,37 +4,17 @@
 #pragma once
 
 #include <functional>
-#include <nlohmann/json.hpp>
-#include <optional>
 #include <string>
 #include <vector>
 
-#include "apps/command.hpp"
-#include "apps/console.hpp"
+#include "apps/generate_options.hpp"
 #include "apps/stop_signals.hpp"
+#include "apps/task_report.hpp"
 #include "io/dataset/dataset_writer.hpp"
 #include "tasks/gradients/episode_gradients.hpp"
 #include "tasks/run/episodes.hpp"
 
 namespace tangere::apps {
-
-struct GenerateOptions {
-  std::string scene, output, controls, policy, shard, precision = "mixed", compress = "none",
-                                                      tactile = "dense", record;
-  std::string gradients = "none", loss, mix, name, program;
-  std::optional<std::int64_t> episodes, steps, shards;
-  std::optional<int> every, threads;
-  std::optional<std::uint64_t> seed;
-  std::optional<double> accuracy, tape_memory, noise, program_timeout;
-  bool sleep = false;
-  bool overwrite = false, resume = false, dry_run = false, no_merge = false, allow_unknown = false;
-};
-
-/// What a run of a task adds: keys of the JSON object and a line for people.
-struct TaskReport {
-  Json keys{{"task", nullptr}};
-  std::string line = "no task: every reward is 0";
-};
 
 struct JobResult {
   EpisodeSummary summary;

@@ -11,6 +11,7 @@
 
 #include "apps/arguments.hpp"
 #include "apps/command.hpp"
+#include "apps/run_options.hpp"
 #include "apps/scene_run.hpp"
 #include "apps/task_run.hpp"
 #include "tasks/catalogue/task_list.hpp"
@@ -222,9 +223,8 @@ Command add_gradcheck(CLI::App& program) {
            "variables (end effectors), markers (of gels) "
            "[default: tactile, or final "
            "where there is no sensor]");
-  add_whole_number<std::int64_t>(
-      app, "--steps", o.steps, 1, kMostSteps,
-      "Steps of the rollout [default: as many as the controls last, 100 at most]");
+  add_steps_option(app, o.steps,
+                   "Steps of the rollout [default: as many as the controls last, 100 at most]");
   add_whole_number<std::int64_t>(
       app, "--actions", o.actions, 1, kMostSteps,
       "For a task: most actions of the episode [default: as many as take 100 steps]");

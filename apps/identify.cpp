@@ -13,6 +13,7 @@
 #include "apps/arguments.hpp"
 #include "apps/command.hpp"
 #include "apps/identify_report.hpp"
+#include "apps/run_options.hpp"
 #include "apps/scene_run.hpp"
 #include "apps/text_output.hpp"
 #include "engine/base/error.hpp"
@@ -182,14 +183,13 @@ Command add_identify(CLI::App& program) {
                                  "Environment of the recording, counted from 0 [default: 0]");
   add_text(app, "--controls", a.controls, "U.csv",
            "Controls of the recorded run in place of the scene's");
-  add_whole_number<std::int64_t>(app, "--steps", a.steps, 1, kMostSteps,
-                                 "Steps of a trial [default: as long as the controls]");
+  add_steps_option(app, a.steps, "Steps of a trial [default: as long as the controls]");
   add_positive_number(app, "--noise", a.noise,
                       "Of a trial: deviation of the noise over the fields' peak [default: 0.01]");
   add_whole_number<std::uint64_t>(app, "--seed", a.seed, 0, 1000000,
                                   "Of a trial: seed of the noise and of the start [default: 1]");
   add_text(app, "--svg", a.svg, "F.svg", "Write a picture of the fit");
-  add_flag(app, "--overwrite", a.overwrite, "Replace the picture if it exists");
+  add_overwrite_option(app, a.overwrite, "Replace the picture if it exists");
   add_allow_unknown_option(app, a.allow_unknown);
   add_console_options(app, *console);
   return {&app, [=](const ProgramInfo&) { return identify_numbers(*arguments, *console); },

@@ -8,6 +8,7 @@
 
 #include "apps/arguments.hpp"
 #include "apps/command.hpp"
+#include "apps/run_options.hpp"
 #include "apps/task_run.hpp"
 #include "io/files/nearest_name.hpp"
 #include "io/files/part_file.hpp"
@@ -175,7 +176,7 @@ Command add_import(CLI::App& program) {
   add_flag(app, "--drop", o.drop, "Leave out what changes the motion and scenes cannot say");
   add_flag(app, "--allow-unknown", o.allow_unknown,
            "Ignore unknown elements and attributes, with a warning for each");
-  add_flag(app, "--overwrite", o.overwrite, "Replace the output if it exists");
+  add_overwrite_option(app, o.overwrite);
   add_console_options(app, *console);
   return {&app, [=](const ProgramInfo&) { return run_import(*options, *console); }};
 }

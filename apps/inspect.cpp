@@ -11,6 +11,7 @@
 #include "apps/inspect_joints.hpp"
 #include "apps/inspect_task.hpp"
 #include "apps/machine.hpp"
+#include "apps/run_options.hpp"
 #include "apps/scene_run.hpp"
 #include "apps/task_run.hpp"
 #include "apps/text_output.hpp"
@@ -18,7 +19,6 @@
 #include "engine/model/scene_number.hpp"
 #include "engine/step/control.hpp"
 #include "engine/step/stepper.hpp"
-#include "io/trajectory/trajectory_layout.hpp"
 #include "kernels/table/isa.hpp"
 
 namespace tangere::apps {
@@ -268,7 +268,7 @@ Command add_inspect(CLI::App& program) {
   add_flag(app, "--effects", options->effects,
            "Measure what each effect of the scene costs, and print that instead");
   add_text(app, "--svg", options->svg, "F.svg", "With --effects: write a picture of it");
-  add_flag(app, "--overwrite", options->overwrite, "Replace the picture if it exists");
+  add_overwrite_option(app, options->overwrite, "Replace the picture if it exists");
   add_console_options(app, *console);
   return {&app, [=](const ProgramInfo&) { return inspect(*options, *console); }};
 }

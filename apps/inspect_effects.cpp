@@ -17,7 +17,7 @@ namespace {
 
 std::string microseconds(double seconds) { return fmt::format("{:.3g} µs", 1e6 * seconds); }
 
-std::string percent(const MeasuredShare& m) {
+std::string share_text(const MeasuredShare& m) {
   return fmt::format("{:.1f} % ± {:.1f}", 100 * m.share + 0.0, 100 * m.spread);
 }
 
@@ -69,7 +69,7 @@ std::string row(const EffectCost& c, std::size_t width) {
   if (!c.effect.variant.empty()) why += "; kernel: " + c.effect.variant;
   if (!c.note.empty()) why += "; " + c.note;
   return fmt::format("  {} {} {} {} {:>7}  {}\n", padded(c.effect.name, width),
-                     padded(c.measured ? percent(*c.measured) : "-", 14, true),
+                     padded(c.measured ? share_text(*c.measured) : "-", 14, true),
                      padded(c.measured ? microseconds(c.seconds_without) : "-", 9, true),
                      padded(c.measured ? fmt::format("{:.2f}", c.passes_without) : "-", 6, true),
                      c.bytes, why);
@@ -163,7 +163,7 @@ std::string effect_costs_text(const EffectCosts& costs, const std::string& instr
       costs.times.reading > 0 ? ", of it " + microseconds(costs.times.reading) + " to read fields"
                               : "",
       costs.times.passes, instruction_set, costs.environments, costs.instants, steps_text(costs),
-      costs.rounds, percent(costs.itself));
+      costs.rounds, share_text(costs.itself));
   if (costs.uncut)
     text += "  the scene's accuracy cuts steps; the times are those of whole ones\n\n";
   if (costs.failed > 0)
@@ -210,7 +210,7 @@ std::string effect_costs_svg(const EffectCosts& costs, const std::string& scene,
                       : "",
                   costs.times.passes),
       fmt::format("{}; {} environments, {} instants of {}; chance alone shows {}", machine,
-                  costs.environments, costs.instants, steps_text(costs), percent(costs.itself))};
+                  costs.environments, costs.instants, steps_text(costs), share_text(costs.itself))};
   shares.groups = {"effects of the scene, as shares of a step",
                    "part of a contact or sensor above it",
                    "what a run adds to a step because it is asked to"};

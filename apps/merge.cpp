@@ -9,6 +9,7 @@
 
 #include "apps/arguments.hpp"
 #include "apps/command.hpp"
+#include "apps/run_options.hpp"
 #include "apps/scene_run.hpp"
 #include "apps/stop_signals.hpp"
 #include "engine/base/error.hpp"
@@ -69,7 +70,7 @@ Command add_merge(CLI::App& program) {
   add_text(app, "DIR", *input, "", "Folder with all shards of a data set").required();
   add_flag(app, "--copy", options->copy,
            "Copy all numbers, so that the file needs no shards beside it");
-  add_flag(app, "--overwrite", options->overwrite, "Replace what an earlier merge wrote");
+  add_overwrite_option(app, options->overwrite, "Replace what an earlier merge wrote");
   add_console_options(app, *console);
   return {&app, [=](const ProgramInfo&) { return merge(*input, *options, *console); },
           [] { return true; }};

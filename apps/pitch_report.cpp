@@ -8,7 +8,6 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "apps/accuracy_report.hpp"
 #include "engine/model/scene_number.hpp"
 
 namespace tangere::apps {

@@ -9,6 +9,7 @@
 
 #include "apps/arguments.hpp"
 #include "apps/command.hpp"
+#include "apps/run_options.hpp"
 #include "apps/scene_run.hpp"
 #include "io/files/part_file.hpp"
 #include "io/picture/scene_plot.hpp"
@@ -115,7 +116,7 @@ Command add_plot(CLI::App& program) {
                         "Of a scene: degrees about z from which it is seen [default: 30]");
   add_whole_number<int>(app, "--lift", o.lift, -90, 90,
                         "Of a scene: degrees above the horizon [default: 25]");
-  add_flag(app, "--overwrite", o.overwrite, "Replace the output if it exists");
+  add_overwrite_option(app, o.overwrite);
   add_console_options(app, *console);
   return {&app, [=](const ProgramInfo&) { return plot(*options, *console); }, [] { return true; }};
 }

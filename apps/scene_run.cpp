@@ -39,23 +39,32 @@ LossKind loss_named(const std::string& name) {
   return named_value("loss", name, std::span<const LossKind>(loss_kinds()));
 }
 
-std::string split_text(std::int64_t split, std::int64_t coarse, std::int64_t passed,
-                       std::int64_t damped) {
-  std::string text = fmt::format("steps split: {}", split);
-  if (coarse > 0) text += fmt::format(", less accurate than asked: {}", coarse);
-  if (passed > 0) text += fmt::format(", a body came through another: {}", passed);
-  if (damped > 0) text += fmt::format(", damped because they created energy: {}", damped);
+std::string split_text(const StepCounts& counts) {
+  std::string text = fmt::format("steps split: {}", counts.split_steps);
+  const auto add = [&](const char* what, std::int64_t count) {
+    if (count > 0) text += fmt::format(", {}: {}", what, count);
+  };
+  add("less accurate than asked", counts.coarse_steps);
+  add("a body came through another", counts.passed_steps);
+  add("damped because they created energy", counts.damped_steps);
   return text;
 }
 
-Json mean_asleep(double sleep, std::int64_t bodies_asleep, std::int64_t steps) {
-  if (sleep == 0) return nullptr;
-  return static_cast<double>(bodies_asleep) / static_cast<double>(std::max<std::int64_t>(1, steps));
+Json split_json(const StepCounts& counts) {
+  return {{"split_steps", counts.split_steps},
+          {"coarse_steps", counts.coarse_steps},
+          {"passed_steps", counts.passed_steps},
+          {"damped_steps", counts.damped_steps}};
 }
 
-std::string sleep_text(double sleep, int moving_bodies, std::int64_t bodies_asleep,
-                       std::int64_t steps) {
-  const Json mean = mean_asleep(sleep, bodies_asleep, steps);
+Json mean_asleep(double sleep, const StepCounts& counts) {
+  if (sleep == 0) return nullptr;
+  return static_cast<double>(counts.bodies_asleep) /
+         static_cast<double>(std::max<std::int64_t>(1, counts.simulation_steps));
+}
+
+std::string sleep_text(double sleep, int moving_bodies, const StepCounts& counts) {
+  const Json mean = mean_asleep(sleep, counts);
   if (mean.is_null()) return "";
   return fmt::format("bodies asleep: {:.2f} of {} on average\n", mean.get<double>(), moving_bodies);
 }
@@ -112,11 +121,22 @@ void warn_of_touches(const Console& console, const Model& model, const Stepper& 
 }
 
 Json note_costly_steps(const Console& console, Integrator integrator, double accuracy,
-                       std::int64_t steps, std::int64_t evaluations, std::int64_t split_steps) {
-  const std::string line = costly_steps(integrator, steps, evaluations, split_steps);
+                       const StepCounts& counts) {
+  const std::string line = costly_steps(integrator, counts);
   if (line.empty() || accuracy > 0) return nullptr;
   console.note("warning: " + line);
   return line;
+}
+
+Json settings_json(const RunFacts& facts) {
+  return {{"seed", facts.seed},
+          {"timestep", facts.timestep},
+          {"integrator", facts.integrator},
+          {"tolerance", facts.tolerance},
+          {"accuracy", facts.accuracy},
+          {"sleep", facts.sleep},
+          {"precision", facts.precision},
+          {"instruction_set", facts.instruction_set}};
 }
 
 void note_empty_sensors(const Console& console, const Model& model, const RolloutOptions& rollout) {

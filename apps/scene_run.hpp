@@ -12,14 +12,11 @@
 #include "engine/base/precision.hpp"
 #include "engine/step/control.hpp"
 #include "engine/step/stepper.hpp"
+#include "io/trajectory/run_facts.hpp"
 #include "tasks/gradients/losses.hpp"
 #include "tasks/run/rollout.hpp"
 
 namespace tangere::apps {
-
-/// Largest --envs and --steps: beyond any machine, but safe to multiply.
-constexpr int kMostEnvironments = 1'000'000'000;
-constexpr std::int64_t kMostSteps = 1'000'000'000'000;
 
 /// Throws InputError for an unknown --precision.
 Precision precision_named(const std::string& name);
@@ -33,15 +30,15 @@ LossKind loss_named(const std::string& name);
 
 /// Says how many steps were split, and how many missed the accuracy, let a body through or were
 /// damped, if any were.
-std::string split_text(std::int64_t split, std::int64_t coarse, std::int64_t passed,
-                       std::int64_t damped);
+std::string split_text(const StepCounts& counts);
+/// The same four numbers, as "split_steps", "coarse_steps", "passed_steps" and "damped_steps".
+Json split_json(const StepCounts& counts);
 
 /// Says how many of the scene's bodies slept, on average over all steps of environments; empty if
 /// none may sleep. The text ends in a line break.
-std::string sleep_text(double sleep, int moving_bodies, std::int64_t bodies_asleep,
-                       std::int64_t steps);
+std::string sleep_text(double sleep, int moving_bodies, const StepCounts& counts);
 /// The same mean; null if no body may sleep. `sleep`: Stepper::sleep().
-Json mean_asleep(double sleep, std::int64_t bodies_asleep, std::int64_t steps);
+Json mean_asleep(double sleep, const StepCounts& counts);
 
 /// Reads a scene; its warnings go to the console. `asked`: as in ask_of_solver().
 Scene read_scene_for(const std::string& path, bool allow_unknown, const Console& console,
@@ -66,7 +63,11 @@ void warn_of_touches(const Console& console, const Model& model, const Stepper& 
 /// Says on stderr that steps were costly, if they were, and returns it; null if not, or if steps
 /// were cut to keep an accuracy.
 Json note_costly_steps(const Console& console, Integrator integrator, double accuracy,
-                       std::int64_t steps, std::int64_t evaluations, std::int64_t split_steps);
+                       const StepCounts& counts);
+
+/// What the JSON object of a command that writes a file says of its run: "seed", the solver's
+/// settings, "precision" and "instruction_set".
+Json settings_json(const RunFacts& facts);
 
 /// Prints notes on sensors that are not read after every step.
 void note_empty_sensors(const Console& console, const Model& model, const RolloutOptions& rollout);

@@ -14,12 +14,15 @@
 #include "apps/memory.hpp"
 #include "apps/progress.hpp"
 #include "apps/record.hpp"
+#include "apps/run_gradients.hpp"
+#include "apps/run_options.hpp"
 #include "apps/scene_run.hpp"
 #include "apps/stop_signals.hpp"
+#include "apps/task_report.hpp"
 #include "apps/task_run.hpp"
-#include "engine/derivative/number_gradients.hpp"
 #include "io/files/nearest_name.hpp"
 #include "io/hdf5/reading_note.hpp"
+#include "io/trajectory/layout_from_model.hpp"
 #include "io/trajectory/saved_state.hpp"
 #include "io/trajectory/trajectory_file.hpp"
 #include "kernels/table/isa.hpp"
@@ -31,24 +34,20 @@ namespace tangere::apps {
 namespace {
 
 struct SimulateArguments {
-  std::string scene, output, controls, policy, integrator, precision = "double", state_from,
-                                                           gradients, record;
+  std::string scene, output, controls, policy, precision = "double", state_from, record;
+  GradientArguments gradients;
   std::optional<std::int64_t> steps, row;
   std::optional<int> environments, every;
-  std::optional<double> timestep, tolerance, accuracy, tape_memory;
+  SolverArguments solver;
   std::optional<std::uint64_t> seed;
-  bool audit = false, sleep = false, point_gradients = false, overwrite = false,
-       allow_unknown = false;
+  bool audit = false, overwrite = false, allow_unknown = false;
 };
 
 void check_arguments(const SimulateArguments& options) {
   check_not_same_file(options.output, options.scene);
   for (const std::string& input : {options.controls, options.state_from})
     if (!input.empty()) check_not_same_file(options.output, input);
-  if (options.tape_memory && options.gradients.empty())
-    throw InputError("--tape-memory without --gradients; expected both");
-  if (options.point_gradients && options.gradients.empty())
-    throw InputError("--point-gradients without --gradients; expected both");
+  options.gradients.check();
   if (options.row && options.state_from.empty())
     throw InputError("--row without --state-from; expected both");
 }
@@ -101,12 +100,6 @@ std::vector<Failure> failures_of(const RolloutSummary& summary) {
   return failures;
 }
 
-/// What a run of a task adds: keys of the JSON object and a line for people.
-struct TaskReport {
-  Json keys{{"task", nullptr}};
-  std::string line = "no task: every reward is 0";
-};
-
 /// What `--audit` adds to the report: a line for people, which ends in a line break, and keys.
 std::string audit_text(const std::optional<AuditSummary>& audit) {
   if (!audit) return "";
@@ -124,37 +117,36 @@ Json audit_json(const std::optional<AuditSummary>& audit) {
           {"worst_environment", audit->worst_environment}};
 }
 
+Json sensors_json(const Model& model, const RolloutOptions& rollout) {
+  Json sensors = Json::array();
+  for (const FieldOutput of : fields_of(model, rollout.outputs))
+    sensors.push_back({{"name", model.sensors()[static_cast<std::size_t>(of.sensor)].name},
+                       {"form", to_string(of.form)},
+                       {"every", reading_times(model, of, rollout).every},
+                       {"frames", tactile_frames(model, of, rollout)}});
+  return sensors;
+}
+
 int report(const SimulateArguments& options, const Console& console, const Batch& batch,
-           const Stepper& stepper, const RolloutOptions& rollout, const RolloutSummary& summary,
-           const TaskReport& of_task = {}) {
+           const RunFacts& facts, const RolloutOptions& rollout, const RolloutSummary& summary,
+           const TaskReport& of_task) {
   const ExitCode code = summary.failures.empty() ? kDone : kSomeFailed;
   const auto bytes = std::filesystem::file_size(options.output);
-  const double rate = static_cast<double>(summary.environment_steps) / summary.seconds;
-  const double per_step = static_cast<double>(summary.newton_iterations) /
-                          static_cast<double>(std::max<std::int64_t>(1, summary.environment_steps));
+  const std::int64_t environment_steps = summary.counts.simulation_steps;
+  const double rate = static_cast<double>(environment_steps) / summary.seconds;
+  const double per_step = static_cast<double>(summary.counts.newton_iterations) /
+                          static_cast<double>(std::max<std::int64_t>(1, environment_steps));
   list_failures(console, "environment", failures_of(summary), "--json and the file name all");
   console.print(
       fmt::format("environments: {}, steps: {}, time: {:.2f} s, {:.0f} env-steps/s with output\n"
                   "Newton iterations per step: {:.2f}, {}, environments failed: {}\n{}{}{}\n"
                   "wrote {} ({} bytes)",
                   batch.environments(), summary.steps, summary.seconds, rate, per_step,
-                  split_text(summary.split_steps, summary.coarse_steps, summary.passed_steps,
-                             summary.damped_steps),
-                  summary.failures.size(),
-                  sleep_text(stepper.sleep(), batch.model().moving_bodies(), summary.bodies_asleep,
-                             summary.environment_steps),
+                  split_text(summary.counts), summary.failures.size(),
+                  sleep_text(facts.sleep, batch.model().moving_bodies(), summary.counts),
                   audit_text(summary.audit), of_task.line, options.output, bytes));
-  Json sensors = Json::array();
-  for (const FieldOutput of : fields_of(batch.model(), rollout.outputs)) {
-    const SensorInfo& sensor = batch.model().sensors()[static_cast<std::size_t>(of.sensor)];
-    sensors.push_back({{"name", sensor.name},
-                       {"form", to_string(of.form)},
-                       {"every", reading_times(batch.model(), of, rollout).every},
-                       {"frames", tactile_frames(batch.model(), of, rollout)}});
-  }
-  const Json costly =
-      note_costly_steps(console, stepper.integrator(), stepper.accuracy(),
-                        summary.environment_steps, summary.newton_iterations, summary.split_steps);
+  const Json costly = note_costly_steps(console, integrator_named(facts.integrator), facts.accuracy,
+                                        summary.counts);
   Json result{{"command", "simulate"},
               {"exit_code", static_cast<int>(code)},
               {"scene", options.scene},
@@ -163,30 +155,19 @@ int report(const SimulateArguments& options, const Console& console, const Batch
               {"steps", summary.steps},
               {"first_step", rollout.first_step},
               {"state_from", options.state_from.empty() ? Json() : Json(options.state_from)},
-              {"environments", batch.environments()},
-              {"seed", batch.seed()},
-              {"timestep", stepper.timestep()},
-              {"integrator", to_string(stepper.integrator())},
-              {"tolerance", stepper.tolerance()},
-              {"accuracy", stepper.accuracy()},
-              {"sleep", stepper.sleep()},
-              {"precision", options.precision},
-              {"instruction_set", kernels::active_isa_name()},
-              {"sensors", sensors},
-              {"seconds", summary.seconds},
-              {"environment_steps", summary.environment_steps},
-              {"environment_steps_per_second", rate},
-              {"newton_iterations", summary.newton_iterations},
-              {"newton_iterations_per_step", per_step},
-              {"split_steps", summary.split_steps},
-              {"coarse_steps", summary.coarse_steps},
-              {"passed_steps", summary.passed_steps},
-              {"damped_steps", summary.damped_steps},
-              {"mean_asleep",
-               mean_asleep(stepper.sleep(), summary.bodies_asleep, summary.environment_steps)},
-              {"costly", costly},
-              {"audit", audit_json(summary.audit)},
-              {"failed", failures_json("environment", failures_of(summary))}};
+              {"environments", batch.environments()}};
+  result.update(settings_json(facts));
+  result.update({{"sensors", sensors_json(batch.model(), rollout)},
+                 {"seconds", summary.seconds},
+                 {"environment_steps", environment_steps},
+                 {"environment_steps_per_second", rate},
+                 {"newton_iterations", summary.counts.newton_iterations},
+                 {"newton_iterations_per_step", per_step}});
+  result.update(split_json(summary.counts));
+  result.update({{"mean_asleep", mean_asleep(facts.sleep, summary.counts)},
+                 {"costly", costly},
+                 {"audit", audit_json(summary.audit)},
+                 {"failed", failures_json("environment", failures_of(summary))}});
   result.update(of_task.keys);
   console.result(result);
   return code;
@@ -209,8 +190,8 @@ struct Start {
     if (continues) first_step = saved->step;
   }
 
-  void tell(const Console& console, const Model& model, const Scene& scene,
-            const Stepper& stepper) const {
+  void print(const Console& console, const Model& model, const Scene& scene,
+             const Stepper& stepper) const {
     if (!saved) return;
     if (model.remembers())
       console.note(saved->path +
@@ -262,82 +243,14 @@ std::int64_t steps_left(const SimulateArguments& options, const ControlProgram& 
   return left;
 }
 
-/// --gradients: derivatives of the loss over the run that has just been made.
-struct Gradients {
-  std::optional<Batch> start;
-  std::unique_ptr<RolloutLoss> loss;
-  std::optional<GradientRollouts> rollouts;
-  std::string name;
-  std::vector<double> value;
-  std::int64_t recomputed_steps = 0;
-
-  Gradients(const SimulateArguments& arguments, const Batch& batch, const Stepper& stepper,
-            const RolloutOptions& rollout)
-      : name(arguments.gradients) {
-    if (name.empty()) return;
-    const Model& model = batch.model();
-    const int every = model.sensors().empty() ? 1 : tactile_interval(model.sensors()[0], rollout);
-    const LossKind kind = loss_named(name);
-    if (arguments.point_gradients && kind != LossKind::tactile && kind != LossKind::shear)
-      throw InputError("--point-gradients with --gradients " + name +
-                       "; expected a loss that reads fields, tactile or shear");
-    loss = make_loss(kind, model, every);
-    GradientOptions options;
-    options.steps = rollout.steps;
-    options.stepper = {stepper.integrator(), stepper.timestep(), stepper.tolerance(),
-                       stepper.accuracy()};
-    options.precision = rollout.precision;
-    options.parameters = true;
-    options.points = arguments.point_gradients;
-    if (arguments.tape_memory) options.tape_bytes = *arguments.tape_memory;
-    check_memory(gradient_bytes(model, batch.environments(), options, 1),
-                 fmt::format("--gradients of {} environments and {} steps", batch.environments(),
-                             rollout.steps));
-    const RolloutLoss* const losses[] = {loss.get()};
-    rollouts.emplace(model, options, losses);
-    start = batch;
-  }
-  [[nodiscard]] bool wanted() const { return start.has_value(); }
-
-  /// Returns false if a signal stopped it.
-  bool write(const ControlProgram& controls, const RolloutOptions& rollout,
-             const StopSignals& signals, TrajectoryFile& output) {
-    const GradientSummary summary = rollouts->run(
-        *start,
-        [&](std::int64_t step, int e, std::span<double> u) {
-          controls.evaluate(rollout.first_step + step, start->episode(e), u);
-        },
-        [&] { return signals.received() == 0; });
-    if (summary.stopped) return false;
-    const LossGradient& g = summary.losses[0];
-    std::vector<std::string> names, units;
-    const NumberGradients parameters(start->model());
-    for (const NumberInfo& info : parameters.infos())
-      names.push_back(info.name), units.push_back(info.unit);
-    output.write({name, loss_meaning(loss_named(name)), g.value, g.u, g.q, g.v, g.parameters, names,
-                  units, g.points});
-    value = g.value;
-    recomputed_steps = summary.recomputed_steps;
-    return true;
-  }
-
-  [[nodiscard]] Json json() const {
-    if (!wanted()) return nullptr;
-    const double sum = std::accumulate(value.begin(), value.end(), 0.0);
-    return {{"loss_name", name},
-            {"mean_loss", sum / static_cast<double>(value.size())},
-            {"recomputed_steps", recomputed_steps}};
-  }
-};
-
 /// Steps and writes. `run`: the rollout into the file; it receives a progress function.
 template <class Run>
 int write_run(const SimulateArguments& options, const Console& console, const Batch& batch,
-              const Stepper& stepper, const RolloutOptions& rollout, TrajectoryFile& output,
+              const RunFacts& facts, const RolloutOptions& rollout, TrajectoryFile& output,
               const StopSignals& signals, const Run& run,
               const std::function<TaskReport()>& of_task) {
   console.detail(fmt::format("environments: {}, steps: {}, {}, h = {} s", batch.environments(),
-                             rollout.steps, to_string(stepper.integrator()), stepper.timestep()));
+                             rollout.steps, facts.integrator, facts.timestep));
   RolloutSummary summary;
   {
     const h5::NotReading computing;
@@ -351,17 +264,17 @@ int write_run(const SimulateArguments& options, const Console& console, const Ba
     return report_stop(console, "simulate", signals.received(),
                        fmt::format("after {} of {} steps", summary.steps, rollout.steps));
   output.commit();
-  return report(options, console, batch, stepper, rollout, summary, of_task());
+  return report(options, console, batch, facts, rollout, summary, of_task());
 }
 
 int simulate_task(const SimulateArguments& options, const Console& console, const ProgramInfo& info,
                   const Task& task, Precision precision) {
-  refuse_with_task(task, {{"--gradients", !options.gradients.empty()},
+  refuse_with_task(task, {{"--gradients", options.gradients.wanted()},
                           {"--steps", options.steps.has_value()},
                           {"--state-from", !options.state_from.empty()},
-                          {"--timestep", options.timestep.has_value()},
-                          {"--integrator", !options.integrator.empty()},
-                          {"--tol", options.tolerance.has_value()}});
+                          {"--timestep", options.solver.timestep.has_value()},
+                          {"--integrator", !options.solver.integrator.empty()},
+                          {"--tol", options.solver.tolerance.has_value()}});
   const PolicyKind kind = policy_named(options.policy, options.controls, PolicyKind::scripted);
   const Policy policy = make_policy(task, kind, options.controls);
   const Model& model = task.model();
@@ -377,11 +290,11 @@ int simulate_task(const SimulateArguments& options, const Console& console, cons
   for (int b = 0; b < batch.blocks(); ++b) program.start(batch, b);
 
   const StopSignals signals;
-  TrajectoryFile output(options.output,
-                        make_layout(batch, stepper, rollout, info, &task, to_string(kind)),
-                        options.overwrite);
+  const TrajectoryLayout layout =
+      make_layout(batch, stepper, rollout, info, &task, to_string(kind));
+  TrajectoryFile output(options.output, layout, options.overwrite);
   return write_run(
-      options, console, batch, stepper, rollout, output, signals,
+      options, console, batch, layout, rollout, output, signals,
       [&](const RolloutProgress& progress) {
         return run_rollout(batch, stepper, program, rollout, output, progress);
       },
@@ -389,39 +302,29 @@ int simulate_task(const SimulateArguments& options, const Console& console, cons
         const auto solved = std::count(data->success.begin(), data->success.end(), 1);
         const double mean =
             std::accumulate(data->returns.begin(), data->returns.end(), 0.0) / batch.environments();
-        return TaskReport{
-            {{"task", task.spec().name},
-             {"policy", to_string(kind)},
-             {"successes", solved},
-             {"success_rate", static_cast<double>(solved) / batch.environments()},
-             {"mean_return", mean}},
-            fmt::format("task {}, policy {}: {} of {} episodes solved, mean return {:.4g}",
-                        task.spec().name, to_string(kind), solved, batch.environments(), mean)};
+        return report_of(task, kind, to_string(kind), {batch.environments(), solved, mean});
       });
-}
-
-SolverOptions asked_of(const SimulateArguments& options) {
-  return {.accuracy = options.accuracy, .sleep = options.sleep ? kUsualSleep : 0};
 }
 
 int simulate(const SimulateArguments& options, const Console& console, const ProgramInfo& info) {
   check_arguments(options);
   const Precision precision = precision_named(options.precision);
-  if (const std::unique_ptr<Task> task = find_task(options.scene, console, asked_of(options)))
+  if (const std::unique_ptr<Task> task = find_task(options.scene, console, options.solver.asked()))
     return simulate_task(options, console, info, *task, precision);
   refuse_with_scene(options.scene, {{"--policy", !options.policy.empty()}});
   StepperOptions solver{
-      .integrator = {}, .timestep = options.timestep, .tolerance = options.tolerance};
-  if (!options.integrator.empty()) solver.integrator = integrator_named(options.integrator);
+      .integrator = {}, .timestep = options.solver.timestep, .tolerance = options.solver.tolerance};
+  if (!options.solver.integrator.empty())
+    solver.integrator = integrator_named(options.solver.integrator);
 
   const Model model(
-      read_scene_for(options.scene, options.allow_unknown, console, asked_of(options)));
+      read_scene_for(options.scene, options.allow_unknown, console, options.solver.asked()));
   warn_of_geometry(console, model);
-  if (!options.gradients.empty()) solver = for_gradients(model, solver);
+  if (options.gradients.wanted()) solver = for_gradients(model, solver);
   Stepper stepper(model, solver);
   warn_of_touches(console, model, stepper);
   const Start start(options, stepper);
-  start.tell(console, model, model.scene(), stepper);
+  start.print(console, model, model.scene(), stepper);
   const ControlProgram controls =
       make_controls(options.controls, start.seed, model, stepper, console);
   const RolloutOptions rollout{steps_left(options, controls, start.first_step),
@@ -432,15 +335,15 @@ int simulate(const SimulateArguments& options, const Console& console, const Pro
   check_size(model, start.environments, rollout);
   Batch batch(model, start.environments, start.seed, start.saved ? start.saved->first_episode : 0);
   if (start.saved) restore_state(*start.saved, start.continues, batch);
-  Gradients gradients(options, batch, stepper, rollout);
+  RunGradients gradients(options.gradients, batch, stepper, rollout);
 
   // Lives from before the file is created until it is gone or complete, so nothing half-written
   // stays.
   const StopSignals signals;
-  TrajectoryFile output(options.output, make_layout(batch, stepper, rollout, info),
-                        options.overwrite);
+  const TrajectoryLayout layout = make_layout(batch, stepper, rollout, info);
+  TrajectoryFile output(options.output, layout, options.overwrite);
   return write_run(
-      options, console, batch, stepper, rollout, output, signals,
+      options, console, batch, layout, rollout, output, signals,
       [&](const RolloutProgress& progress) {
         RolloutSummary summary = run_rollout(batch, stepper, controls, rollout, output, progress);
         if (gradients.wanted() && !summary.stopped)
@@ -467,10 +370,9 @@ Command add_simulate(CLI::App& program) {
   add_text(app, "-o,--output", o.output, "F.h5", "HDF5 file to write").required();
   add_controls_option(app, o.controls);
   add_policy_option(app, o.policy);
-  add_whole_number<std::int64_t>(app, "--steps", o.steps, 1, kMostSteps,
-                                 "Steps to take [default: as many as the controls last]");
-  add_whole_number<int>(app, "--envs", o.environments, 1, kMostEnvironments,
-                        "Environments stepped together [default: 1, or those of --state-from]");
+  add_steps_option(app, o.steps, "Steps to take [default: as many as the controls last]");
+  add_envs_option(app, o.environments,
+                  "Environments stepped together [default: 1, or those of --state-from]");
   add_text(
       app, "--record", o.record, "LIST",
       "What to compute and store besides q and v, separated by commas: bodies or bodies.NAME, "
@@ -481,35 +383,18 @@ Command add_simulate(CLI::App& program) {
   add_flag(app, "--audit", o.audit,
            "Also compute and store energy and momentum, what motors, damping and friction did, and "
            "what the scheme made");
-  add_whole_number<int>(app, "--every", o.every, 1, kMostEnvironments,
-                        "Read tactile fields every N steps [default: the scene's, or 1]");
+  add_every_option(app, o.every);
   add_text(app, "--state-from", o.state_from, "F.h5",
            "Start from a row of another run, environment e from its e");
   add_whole_number<std::int64_t>(app, "--row", o.row, 0, kMostSteps,
                                  "Row of --state-from [default: the last]");
-  add_positive_number(app, "--timestep", o.timestep, "Step size in s [default: the scene's]");
-  add_text(app, "--integrator", o.integrator, "NAME",
-           fmt::format("{} [default: the scene's]", fmt::join(integrator_names(), ", ")));
-  add_positive_number(
-      app, "--tol", o.tolerance,
-      "Largest scaled residual of a step [default: the scene's, or what follows scheme and step]");
-  add_accuracy_option(app, o.accuracy);
-  add_sleep_option(app, o.sleep);
-  add_text(
-      app, "--gradients", o.gradients, "LOSS",
-      "Also write derivatives of a loss by controls, start and the scene's numbers: final, path, "
-      "tactile, shear, variables or markers");
-  add_flag(app, "--point-gradients", o.point_gradients,
-           "With --gradients: also by place and coefficients of every tactile point");
-  add_memory_size(app, "--tape-memory", o.tape_memory,
-                  "With --gradients: memory for the states kept; a longer run repeats steps from "
-                  "checkpoints [default: 1GB]");
-  add_text(app, "--precision", o.precision, "NAME",
-           "Precision of tactile fields: double, or mixed with points in float [default: double]");
-  add_whole_number<std::uint64_t>(
-      app, "--seed", o.seed, 0, UINT64_MAX,
+  o.solver.add(app);
+  o.gradients.add(app);
+  add_precision_option(app, o.precision, " with points in float [default: double]");
+  add_seed_option(
+      app, o.seed,
       "Seed of all that varies between environments [default: 0, or that of --state-from]");
-  add_flag(app, "--overwrite", o.overwrite, "Replace the output if it exists");
+  add_overwrite_option(app, o.overwrite);
   add_allow_unknown_option(app, o.allow_unknown);
   add_console_options(app, *console);
   return {&app, [=](const ProgramInfo& info) { return simulate(*options, *console, info); },

@@ -9,6 +9,7 @@
 #include "apps/arguments.hpp"
 #include "apps/command.hpp"
 #include "apps/machine.hpp"
+#include "apps/run_options.hpp"
 #include "apps/scene_run.hpp"
 #include "apps/stop_signals.hpp"
 #include "apps/stress_report.hpp"
@@ -83,14 +84,12 @@ Command add_stress(CLI::App& program) {
       add_command(program, "stress", "Play cases that are hard to simulate, and judge each",
                   "tangere stress --case stack_equal --integrator BDF1");
   add_text(app, "--case", o.name, "NAME", "That case alone [default: all]");
-  add_text(app, "--integrator", o.integrator, "NAME",
-           fmt::format("{} [default: those of each case]", fmt::join(integrator_names(), ", ")));
+  add_integrator_option(app, o.integrator, "those of each case");
   add_positive_number(app, "--timestep", o.step, "Step size in s [default: those of each case]");
   add_positive_number(app, "--accuracy", o.accuracy,
                       "Cut steps into parts that keep this relative accuracy [default: not cut]");
   add_flag(app, "--quick", o.quick, "Short cases alone, each with one step: some seconds");
-  add_whole_number<int>(app, "--threads", o.threads, 1, kMostThreads,
-                        "Threads [default: the processors here]");
+  add_threads_option(app, o.threads);
   add_console_options(app, *console);
   return {&app, [=](const ProgramInfo&) { return stress(*options, *console); }};
 }

@@ -23,27 +23,25 @@ std::string verdict_text(const StressRow& row) {
 }
 
 /// Whether it came to a step. A refused scene has neither scheme nor step.
-bool played(const StressRow& row) { return row.steps > 0; }
+bool played(const StressRow& row) { return row.counts.simulation_steps > 0; }
 
 Json row_json(const StressRow& row) {
-  return {{"case", row.of->name},
-          {"scene", row.of->scene},
-          {"scheme", played(row) ? Json(to_string(row.integrator)) : Json()},
-          {"step", played(row) ? Json(row.step) : Json()},
-          {"criterion", row.of->criterion},
-          {"bound", row.of->bound},
-          {"value", finite(row.value)},
-          {"evaluations_per_step", row.evaluations},
-          {"most_evaluations", row.most_evaluations},
-          {"environment_steps", row.steps},
-          {"split_steps", row.split_steps},
-          {"coarse_steps", row.coarse_steps},
-          {"passed_steps", row.passed_steps},
-          {"damped_steps", row.damped_steps},
-          {"envs", row.environments},
-          {"failed", row.failed},
-          {"verdict", to_string(row.verdict)},
-          {"reason", row.reason}};
+  Json json{{"case", row.of->name},
+            {"scene", row.of->scene},
+            {"scheme", played(row) ? Json(to_string(row.integrator)) : Json()},
+            {"step", played(row) ? Json(row.step) : Json()},
+            {"criterion", row.of->criterion},
+            {"bound", row.of->bound},
+            {"value", finite(row.value)},
+            {"evaluations_per_step", row.evaluations},
+            {"most_evaluations", row.most_evaluations},
+            {"environment_steps", row.counts.simulation_steps}};
+  json.update(split_json(row.counts));
+  json.update({{"envs", row.environments},
+               {"failed", row.failed},
+               {"verdict", to_string(row.verdict)},
+               {"reason", row.reason}});
+  return json;
 }
 
 }  // namespace
@@ -60,7 +58,7 @@ std::string stress_row(const StressRow& row) {
                      played(row) ? fmt::format("{:g}", 1e3 * row.step) : "-", row.of->criterion,
                      std::isnan(row.value) ? "-" : fmt::format("{:.3g}", row.value),
                      fmt::format("{:.4g}", row.of->bound), fmt::format("{:.2f}", row.evaluations),
-                     row.split_steps, fmt::format("{} of {}", row.failed, row.environments),
+                     row.counts.split_steps, fmt::format("{} of {}", row.failed, row.environments),
                      verdict_text(row));
 }
 

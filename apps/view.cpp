@@ -6,6 +6,7 @@
 
 #include "apps/arguments.hpp"
 #include "apps/command.hpp"
+#include "apps/run_options.hpp"
 #include "io/files/part_file.hpp"
 #include "io/view/view_page.hpp"
 #include "io/view/view_reader.hpp"
@@ -78,7 +79,7 @@ Command add_view(CLI::App& program) {
                         "Most frames of an episode [default: 1000]");
   add_text(app, "--scene", o.what.scene, "SCENE.xml",
            "Look for files that the stored scene names beside this one");
-  add_flag(app, "--overwrite", o.overwrite, "Replace the output if it exists");
+  add_overwrite_option(app, o.overwrite);
   add_console_options(app, *console);
   return {&app, [=](const ProgramInfo&) { return view(*options, *console); }, [] { return true; }};
 }

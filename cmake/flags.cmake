@@ -7,7 +7,8 @@ target_compile_options(tangere_flags INTERFACE
   -Wno-sign-conversion   # indices are int in loops over dofs and std::size_t in containers
   $<$<CXX_COMPILER_ID:GNU>:-Wno-restrict>  # GCC 12 sees an overlap in "text" + std::string() where there is none
   $<$<CXX_COMPILER_ID:GNU>:-fno-semantic-interposition>  # the libraries are -fPIC and inline as other code does
-  -ffp-contract=off      # a product and a sum are fused where the source says mul_add, nowhere else: same bits everywhere
+  # A product and a sum are fused where the source says mul_add, nowhere else: same bits everywhere.
+  -ffp-contract=off
   # Not -O0: after fmt's pragmas in a precompiled header GCC 12 keeps __OPTIMIZE__ defined, and Eigen does not compile.
   $<$<CONFIG:Debug>:-Og>
   -fno-math-errno        # sqrt is one instruction
@@ -38,9 +39,9 @@ if(TANGERE_SANITIZE)
   target_compile_options(tangere_flags INTERFACE
     -fsanitize=${TANGERE_SANITIZE} -fno-omit-frame-pointer -fno-sanitize-recover=all -fno-sanitize=vptr)
   target_link_options(tangere_flags INTERFACE -fsanitize=${TANGERE_SANITIZE})
-  # Every access of a pointer or a reference is also checked for null and for alignment where TANGERE_CASTS is set: in the
-  # kernels, which read numbers as lanes by casts. Elsewhere casts go to bytes, which have no alignment, and the address
-  # sanitizer stops at a null pointer, so the checks would only cost compile time: a sixth of it in io.
+  # Every access of a pointer or a reference is also checked for null and for alignment where TANGERE_CASTS is set: in
+  # the kernels, which read numbers as lanes by casts. Elsewhere casts go to bytes, which have no alignment, and the
+  # address sanitizer stops at a null pointer, so the checks would only cost compile time: a sixth of it in io.
   if(TANGERE_SANITIZE MATCHES "undefined" AND TANGERE_SANITIZE MATCHES "address")
     target_compile_options(tangere_flags INTERFACE
       $<$<NOT:$<BOOL:$<TARGET_PROPERTY:TANGERE_CASTS>>>:-fno-sanitize=null,alignment>)

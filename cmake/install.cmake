@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-# The install tree: `cmake --install build/release --prefix DIR`, then find_package(tangere CONFIG) from another project.
+# The install tree: `cmake --install build/release --prefix DIR`, then find_package(tangere CONFIG) from another
+# project.
 include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
 
@@ -75,12 +76,15 @@ set(public_headers
   engine/step/tape.hpp
   io/dataset/dataset_export.hpp
   io/dataset/dataset_files.hpp
+  io/dataset/dataset_from_model.hpp
   io/dataset/dataset_layout.hpp
   io/dataset/dataset_merge.hpp
   io/dataset/dataset_writer.hpp
   io/dataset/shard_check.hpp
   io/robot/robot_import.hpp
   io/scene/scene_reader.hpp
+  io/trajectory/layout_from_model.hpp
+  io/trajectory/run_facts.hpp
   io/trajectory/trajectory_file.hpp
   io/trajectory/trajectory_layout.hpp
   kernels/contact/contact_types.hpp
@@ -91,17 +95,22 @@ set(public_headers
   tasks/gradients/gradients.hpp
   tasks/gradients/identification.hpp
   tasks/gradients/losses.hpp
+  tasks/gradients/task_gradient_options.hpp
   tasks/gradients/task_gradients.hpp
   tasks/gradients/task_rollout.hpp
   tasks/gradients/task_tape.hpp
+  tasks/gradients/task_tape_options.hpp
   tasks/gradients/gradient_check.hpp
   tasks/gradients/gradient_compare.hpp
+  tasks/run/audit_summary.hpp
+  tasks/run/benchmark_options.hpp
   tasks/run/benchmark_run.hpp
   tasks/run/block_worker.hpp
   tasks/run/episode_program.hpp
   tasks/run/episodes.hpp
   tasks/run/policy.hpp
   tasks/run/rollout.hpp
+  tasks/run/step_counts.hpp
   tasks/run/step_tally.hpp
   tasks/run/vector_task.hpp)
 foreach(header ${public_headers})

@@ -16,7 +16,8 @@ package_list() { sed -e 's/#.*//' -e '/^[[:space:]]*$/d' "${package_files[@]}"; 
 missing_packages() {
   local package
   for package in $(package_list); do
-    dpkg-query --show --showformat='${db:Status-Status}\n' "$package" 2>/dev/null | grep -qx installed || echo "$package"
+    dpkg-query --show --showformat='${db:Status-Status}\n' "$package" 2>/dev/null | grep -qx installed ||
+      echo "$package"
   done
 }
 
@@ -82,8 +83,8 @@ python_program() {
   hash -r  # or type prints only one path of a program that this shell has run
   type -aP python3 | grep -x /usr/bin/python3 || type -P python3
 }
-# Makes build/venv with what python/requirements.txt lists, and $python_options for the build. Where PyPI is out of reach the
-# module is left out.
+# Makes build/venv with what python/requirements.txt lists, and $python_options for the build. Where PyPI is out of
+# reach the module is left out.
 python_options=(-DTANGERE_PYTHON=OFF)
 install_python() {
   local python stamp=build/venv/requirements.txt wanted
@@ -93,7 +94,8 @@ install_python() {
     if [ -z "$python" ] || ! { "$python" -m venv --clear --system-site-packages build/venv &&
       build/venv/bin/pip install -q --disable-pip-version-check -r python/requirements.txt &&
       printf '%s\n' "$wanted" >"$stamp"; } </dev/null; then
-      say "There is no Python with venv and headers here, or PyPI is out of reach: the Python module is neither built nor tested."
+      say "There is no Python with venv and headers here, or PyPI is out of reach:" \
+        "the Python module is neither built nor tested."
       return
     fi
   fi
@@ -104,7 +106,8 @@ check_cmake() {
   local version
   version=$(cmake --version | sed -n 's/^cmake version \([0-9]*\.[0-9]*\).*/\1/p')
   [ "$(printf '3.25\n%s\n' "$version" | sort -V | head -n 1)" = 3.25 ] ||
-    fail "CMake 3.25 or newer is needed, this machine has $version." "Debian 12, Ubuntu 23.04 and all later ones have it."
+    fail "CMake 3.25 or newer is needed, this machine has $version." \
+      "Debian 12, Ubuntu 23.04 and all later ones have it."
 }
 
 # One compiler per core, but no more than memory allows: the largest files take about 1 GiB each.
@@ -116,14 +119,16 @@ jobs() {
   if [ "$cores" -lt "$memory" ]; then echo "$cores"; else echo "$memory"; fi
 }
 
-# build PRESET ISAS [TARGET…]: configures and builds into build/PRESET. ISAS: of the option TANGERE_ISAS. With unity=ON it
-# compiles several sources as one (cmake/flags.cmake).
+# build PRESET ISAS [TARGET…]: configures and builds into build/PRESET. ISAS: of the option TANGERE_ISAS. With unity=ON
+# it compiles several sources as one (cmake/flags.cmake).
 build() {
   local preset=$1 isas=$2
   shift 2
   check_cmake
-  cmake --preset "$preset" "-DTANGERE_ISAS=$isas" "-DCMAKE_UNITY_BUILD=${unity:-OFF}" ${cmake_options[@]+"${cmake_options[@]}"} </dev/null || fail "cmake could not configure the build (its reason is above)." \
-    "If build/$preset is left from another place or compiler, remove it: rm -r build/$preset"
+  cmake --preset "$preset" "-DTANGERE_ISAS=$isas" "-DCMAKE_UNITY_BUILD=${unity:-OFF}" \
+    ${cmake_options[@]+"${cmake_options[@]}"} </dev/null ||
+    fail "cmake could not configure the build (its reason is above)." \
+      "If build/$preset is left from another place or compiler, remove it: rm -r build/$preset"
   cmake --build "build/$preset" --parallel "$(jobs)" ${1:+--target "$@"} </dev/null ||
     fail "the build of build/$preset failed (the compiler's reason is above)." \
       "If the compiler was killed, memory ran out: cmake --build build/$preset --parallel 1"

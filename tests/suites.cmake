@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-# The suites that run longest, longest first: a fresh ctest starts them first, so that all cores end together. Afterwards it
-# goes by the times that it has measured.
+# The suites that run longest, longest first: a fresh ctest starts them first, so that all cores end together.
+# Afterwards it goes by the times that it has measured.
 set(long engine_test.All/AdjointScheme tasks_test.Scenes/EveryScene apps_fault_test.Calls/Fault tasks_test.Scripted
   apps_test.Command apps_threads_test.GenerateGradients apps_threads_test.Tasks
   apps_memory_test.DatasetCommand io_memory_test.ChunkCodec apps_threads_test.GenerateShards
@@ -10,7 +10,8 @@ set(long engine_test.All/AdjointScheme tasks_test.Scenes/EveryScene apps_fault_t
   tasks_threads_test.Tasks/TaskReturn tasks_test.Scenes/VaryingNumbers)
 list(LENGTH long count)
 
-# Writes OUTPUT, one ctest test NAME.Suite for each suite of the GoogleTest program PROGRAM; run whenever that was linked.
+# Writes OUTPUT, one ctest test NAME.Suite for each suite of the GoogleTest program PROGRAM; run whenever that was
+# linked.
 execute_process(COMMAND ${PROGRAM} --gtest_list_tests --gtest_filter=*${LEFT_OUT}
   OUTPUT_VARIABLE listing RESULT_VARIABLE status TIMEOUT 60)
 if(NOT status EQUAL 0)
@@ -28,7 +29,8 @@ foreach(suite ${suites})
     set(cost " COST ${cost}")
   endif()
   string(APPEND text "add_test([=[${NAME}.${suite}]=] [=[${PROGRAM}]=] [=[--gtest_filter=${suite}.*${LEFT_OUT}]=])
-set_tests_properties([=[${NAME}.${suite}]=] PROPERTIES TIMEOUT 1800 LABELS [=[${LABELS}]=] ENVIRONMENT [=[${ENVIRONMENT}]=]${cost})
+set_tests_properties([=[${NAME}.${suite}]=] PROPERTIES TIMEOUT 1800
+  LABELS [=[${LABELS}]=] ENVIRONMENT [=[${ENVIRONMENT}]=]${cost})
 ")
 endforeach()
 file(WRITE ${OUTPUT} "${text}")

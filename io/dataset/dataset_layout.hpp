@@ -10,7 +10,6 @@
 #include <vector>
 
 #include "engine/rows/episode_sink.hpp"
-#include "engine/rows/task_spec.hpp"
 #include "io/trajectory/trajectory_layout.hpp"
 
 namespace tangere {
@@ -49,31 +48,17 @@ struct DatasetSample {
   std::int64_t rows = 0;             ///< of an episode
 };
 
-struct DatasetLayout {
+struct DatasetLayout : RunFacts {
   std::int64_t episodes = 0;  ///< N, of all shards
   std::int64_t steps = 0;     ///< of an episode
   int every = 1;              ///< K: row j is the state after j K steps
-  std::uint64_t seed = 0;
-  bool single = false;                          ///< observations are float32, else float64
-  std::vector<std::string> q_names, q_units;    ///< (nq)
-  std::vector<std::string> v_names, v_units;    ///< (nv)
-  std::vector<std::string> u_names;             ///< (nu)
-  std::vector<std::string> end_effector_names;  ///< (n) end effectors, empty when there are none
+  bool single = false;        ///< observations are float32, else float64
   std::vector<SensorLayout> sensors;
   std::vector<BodyObservation> bodies;  ///< of a scene
   std::vector<FieldOutput> fields;      ///< what a scene's episodes hold of them
-  std::vector<std::string> randomized_names, randomized_units;  ///< what varies between episodes
-  std::optional<TaskSpec> task;  ///< defines actions, observations and rewards; none: only a scene
-  PlayedBy played_by;            ///< of a task
-  std::string set_name;          ///< the part of dataset_id() that is asked for; none: as below
-  std::string scene_name, scene_text;
+  PlayedBy played_by;                   ///< of a task
+  std::string set_name;         ///< the part of dataset_id() that is asked for; none: as below
   std::string tables = "none";  ///< checksum of the files that the text refers to
-  std::string integrator;
-  double timestep = 0;   ///< [s]
-  double tolerance = 0;  ///< of the scaled residual, dimensionless
-  double accuracy = 0;   ///< of the parts of a step, relative; 0: every step is one part
-  double sleep = 0;      ///< share of its size that a body may move and still rest; 0: none sleeps
-  std::string precision, version, instruction_set;
   std::string controls = "of the scene";  ///< or a table, named by its content
   std::string command;  ///< makes this data set again; without threads, folder and the like
   double shard_bytes = 1 << 30;  ///< upper limit of a shard, unless 16 episodes are more
@@ -125,29 +110,5 @@ struct DatasetLayout {
   /// When an observation is stored, in steps; none: not at all.
   [[nodiscard]] std::optional<OutputTimes> times_of(const std::string& name) const;
 };
-
-/// What the model does not know about a data set.
-struct DatasetDescription {
-  std::int64_t episodes = 0, steps = 0;
-  int every = 1;
-  std::uint64_t seed = 0;
-  bool single = false;  ///< observations are float32
-  std::string precision, version, instruction_set;
-  std::optional<TaskSpec> task;
-  PlayedBy played_by;
-  std::string set_name, controls, command;
-  std::int64_t shards = 0;
-  std::string compression = "none";
-  std::string gradients_of;
-  std::vector<GradientArray> gradients;
-  bool sparse = false;
-  std::vector<std::string> record = {};
-  std::vector<OutputTimes> record_times = {};
-  std::vector<BodyObservation> bodies = {};
-  std::optional<std::vector<FieldOutput>> fields = {};  ///< none: the field of every sensor
-};
-
-DatasetLayout dataset_layout_from(const Model& model, const Stepper& stepper,
-                                  const DatasetDescription& run);
 
 }  // namespace tangere

@@ -28,7 +28,7 @@ constexpr const char* kMinariVersion = "0.5.3";  // the layout that is written h
 constexpr std::uint64_t kMostNumbers = std::uint64_t{1} << 18;
 /// Returns the id that the file gives the data set. It becomes a path, so it must be one that is
 /// written: tangere/NAME-v0 or tangere/TASK/NAME-v0.
-std::string id_said(const std::string& folder, const h5::Id& scene) {
+std::string stored_id(const std::string& folder, const h5::Id& scene) {
   constexpr std::string_view kBegin = "tangere/", kEnd = "-v0", kPlain = "-_";
   std::string id = h5::read_text(scene, "dataset_id");
   const bool plain = std::all_of(id.begin(), id.end(), [&](char c) {
@@ -87,7 +87,7 @@ MinariView::MinariView(const std::string& folder, const h5::Id& shard, const Dem
   const h5::Id scene = h5::open_group(shard, "/scene");
   command_ = h5::read_text(h5::open_group(shard, "/"), "command");
   version_ = h5::read_text(scene, "tangere_version");
-  id_ = id_said(folder, scene);
+  id_ = stored_id(folder, scene);
   for (auto parts = std::count(id_.begin(), id_.end(), '/') + 3; parts > 0; --parts)
     to_folder_ += "../";
   seed_ = h5::read_number<std::uint64_t>(scene, "seed");

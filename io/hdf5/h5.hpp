@@ -5,8 +5,6 @@
 // Every function throws IoError: "cannot <operation> '<object>' in '<file>': <reason>".
 #pragma once
 
-#include <hdf5.h>
-
 #include <cstdint>
 #include <span>
 #include <string>
@@ -14,55 +12,20 @@
 #include <vector>
 
 #include "io/files/written_bytes.hpp"
+#include "io/hdf5/h5_id.hpp"
 
 namespace tangere::h5 {
-
-/// An identifier of the library (file, group, dataset, attribute, type …). The destructor closes
-/// it.
-class Id {
- public:
-  Id() = default;
-  explicit Id(hid_t id) : id_(id) {}
-  Id(Id&& other) noexcept : id_(other.id_) { other.id_ = -1; }
-  Id& operator=(Id&& other) noexcept {
-    if (this != &other) {
-      reset();
-      id_ = other.id_;
-      other.id_ = -1;
-    }
-    return *this;
-  }
-  ~Id() { reset(); }
-
-  [[nodiscard]] hid_t get() const { return id_; }
-  /// Closes without a report. close_file reports what could not be written.
-  void reset() noexcept;
-  /// Forgets an identifier that was closed elsewhere.
-  void release() noexcept { id_ = -1; }
-
- private:
-  hid_t id_ = -1;
-};
 
 /// "'/scene' in 'balls/shard-00000.h5'", for messages.
 [[nodiscard]] std::string place_of(const Id& object);
 
-/// While this object lives, the library does not print its errors.
-class Quiet {
- public:
-  Quiet();
-  ~Quiet();
-  Quiet(const Quiet&) = delete;
-  Quiet& operator=(const Quiet&) = delete;
-
- private:
-  H5E_auto2_t function_ = nullptr;
-  void* data_ = nullptr;
-};
-
 /// Properties of H5P_GROUP_ACCESS, H5P_DATASET_ACCESS or H5P_LINK_ACCESS with which links are
 /// followed only to files of the same folder. The caller does not close them.
 hid_t link_access(hid_t kind);
+
+/// Properties of H5P_FILE_CREATE, H5P_GROUP_CREATE or H5P_DATASET_CREATE with which objects carry no
+/// times, so that the same numbers give the same bytes.
+Id without_times(hid_t kind);
 
 using Dims = std::vector<hsize_t>;
 

@@ -10,7 +10,6 @@
 #include <filesystem>
 
 #include "io/robot/mjcf_file.hpp"
-#include "io/robot/mjcf_include.hpp"
 #include "io/robot/mjcf_words.hpp"
 
 namespace tangere {

@@ -31,7 +31,7 @@ struct MeshFile {
   Vector3 scale{1, 1, 1};
 };
 
-struct RobotFile;  // io/robot/mjcf_include.hpp
+struct RobotFile;  // io/robot/robot_node.hpp
 
 struct Robot {
   std::string format;  ///< "URDF" or "MJCF"

@@ -7,11 +7,16 @@
 
 #include <algorithm>
 #include <cctype>
+#include <filesystem>
 
-#include "io/robot/mjcf_include.hpp"
+#include "io/files/text_file.hpp"
+#include "io/scene/included_file.hpp"
+#include "io/scene/xml_document.hpp"
 
 namespace tangere {
 namespace {
+
+namespace fs = std::filesystem;
 
 std::vector<std::string> names_of(const Words& words) {
   std::vector<std::string> names;
@@ -23,6 +28,36 @@ const Word* word_in(const Words& words, std::string_view name) {
   const auto at =
       std::find_if(words.begin(), words.end(), [&](const Word& w) { return name == w.name; });
   return at == words.end() ? nullptr : &*at;
+}
+
+/// Reads the file that an <include> names and returns its root. The robot keeps it. MuJoCo takes a
+/// file once, from the folder of the file that the user names. So does this, and rings cannot be.
+/// Throws what reading and parsing a file throws, each with the line of the <include>.
+RobotNode included_root(const RobotNode& include) {
+  include.check({{"file"}});
+  Robot& robot = include.robot();
+  const std::string& main = robot.scene.path;
+  const std::string path =
+      (fs::path(main).parent_path() / include.text("file")).lexically_normal().string();
+  bool known = same_file(path, main);
+  for (const auto& other : robot.included) known |= same_file(path, other->context.file);
+  if (known) include.fail(fmt::format("{} is there already; MuJoCo includes a file once", path));
+  const auto file = std::make_shared<RobotFile>();
+  robot.included.push_back(file);
+  file->context.file = path;
+  file->context.allow_unknown = include.context().allow_unknown;
+  try {
+    const std::string text = read_text_file(path, kLargestInclude, "a MJCF file");
+    const RobotNode root(
+        parse_xml(file->document, text, path, "the root <mujoco>", file->context.warnings),
+        file->context, robot);
+    if (root.name() != "mujoco" && root.name() != "mujocoinclude")
+      root.fail("no part of a MJCF file; expected the root <mujoco> or <mujocoinclude>");
+    root.check({{"model"}});
+    return root;
+  } catch (const IoError& e) {
+    throw IoError(include.source().prefix() + "<include>: " + e.what());
+  }
 }
 
 }  // namespace

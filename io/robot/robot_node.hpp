@@ -3,6 +3,8 @@
 // out without an effect, or left out although it matters; nothing else passes.
 #pragma once
 
+#include <tinyxml2.h>
+
 #include <string>
 #include <vector>
 
@@ -10,6 +12,12 @@
 #include "io/scene/scene_node.hpp"
 
 namespace tangere {
+
+/// A file that an <include> has brought in. Its elements refer to both.
+struct RobotFile {
+  tinyxml2::XMLDocument document;
+  SceneContext context;
+};
 
 /// What becomes of an attribute or a child element.
 enum class Fate {

@@ -15,16 +15,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t kLargestInclude = std::size_t{64} << 20;
 constexpr std::size_t kMostFiles = 1000;  // a few files that each name two others would never end
 
 bool is_scene(const std::string& root) { return root == "redmax" || root == "tangere"; }
-
-bool same_file(const std::string& a, const std::string& b) {
-  std::error_code not_both_there;
-  return fs::equivalent(a, b, not_both_there) ||
-         fs::path(a).lexically_normal() == fs::path(b).lexically_normal();
-}
 
 void refuse_rings(const SceneNode& include, const std::string& path) {
   std::string way = path;
@@ -63,6 +56,12 @@ void check_units(const SceneNode& include, const tinyxml2::XMLElement& element,
 }
 
 }  // namespace
+
+bool same_file(const std::string& a, const std::string& b) {
+  std::error_code not_both_there;
+  return fs::equivalent(a, b, not_both_there) ||
+         fs::path(a).lexically_normal() == fs::path(b).lexically_normal();
+}
 
 const IncludedFile& include_file(const SceneNode& include, const SceneNode& parent) {
   SceneContext& outer = include.context();

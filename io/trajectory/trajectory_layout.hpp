@@ -4,14 +4,12 @@
 
 #include <array>
 #include <cstdint>
-#include <optional>
-#include <span>
 #include <string>
 #include <vector>
 
 #include "engine/model/field_form.hpp"
-#include "engine/rows/task_spec.hpp"
-#include "engine/step/stepper.hpp"
+#include "engine/model/scene.hpp"
+#include "io/trajectory/run_facts.hpp"
 
 namespace tangere {
 
@@ -45,15 +43,12 @@ struct StatusMeaning {
   std::string meaning;
 };
 
-struct TrajectoryLayout {
-  std::int64_t steps = 0;       ///< T
-  std::int64_t first_step = 0;  ///< steps before row 0, from runs that this one continues
-  int environments = 1;         ///< E
-  std::vector<std::string> q_names, q_units;    ///< (nq)
-  std::vector<std::string> v_names, v_units;    ///< (nv)
-  std::vector<std::string> u_names, u_units;    ///< (nu)
-  std::vector<std::string> body_names;          ///< (nb) recorded, empty when no poses are
-  std::vector<std::string> end_effector_names;  ///< (n) end effectors, empty when there are none
+/// A trajectory has no names of end effectors where it does not record them.
+struct TrajectoryLayout : RunFacts {
+  std::int64_t steps = 0;               ///< T
+  std::int64_t first_step = 0;          ///< steps before row 0, from runs that this one continues
+  int environments = 1;                 ///< E
+  std::vector<std::string> body_names;  ///< (nb) recorded, empty when no poses are
   /// At which rows q and v, bodies and end effectors are recorded; none: at all. Where `states` are
   /// given, there are no controls, and of the solver's numbers the status alone.
   OutputTimes states = {}, of_bodies = {}, of_end_effectors = {};
@@ -61,21 +56,12 @@ struct TrajectoryLayout {
   std::vector<FieldOutput> fields;  ///< what is recorded of them; without times: every K steps
   bool audit = false;               ///< the books are recorded
   std::vector<StatusMeaning> statuses;
-  std::vector<std::string> randomized_names, randomized_units;  ///< (k), empty when nothing varies
-  std::vector<double> randomized_values;                        ///< (E, k)
+  std::vector<double> randomized_values;  ///< (E, k)
 
-  std::string scene_name, scene_path, scene_text;
-  std::string integrator;
-  double timestep = 0;   ///< [s]
-  double tolerance = 0;  ///< of the scaled residual, dimensionless
-  double accuracy = 0;   ///< of the parts of a step, relative; 0: every step is one part
-  double sleep = 0;      ///< share of its size that a body may move and still rest; 0: none sleeps
-  int every = 0;         ///< the option as given; 0: each sensor's own interval
-  std::uint64_t seed = 0;
+  std::string scene_path, command_line;
+  int every = 0;  ///< the option as given; 0: each sensor's own interval
   std::int64_t first_episode = 0;
-  std::string precision, command_line, version, instruction_set;
-  std::optional<TaskSpec> task;  ///< the task that a policy plays; none: only a scene
-  std::string policy;            ///< of a task
+  std::string policy;  ///< of a task
 
   /// Rows of q, bodies or end effectors that are taken at these times.
   [[nodiscard]] std::int64_t rows(const OutputTimes& times) const {
@@ -92,27 +78,5 @@ struct TrajectoryLayout {
   [[nodiscard]] std::uint64_t bytes_without_tactile() const;
   [[nodiscard]] std::uint64_t bytes() const;
 };
-
-/// What the model and the batch do not know about a run.
-struct RunDescription {
-  std::int64_t steps = 0, first_step = 0;
-  int every = 0;                       ///< the option as given; 0: each sensor's own interval
-  std::vector<int> tactile_intervals;  ///< K in force, one per sensor
-  /// Recorded; none: the field of every sensor.
-  std::optional<std::vector<FieldOutput>> fields;
-  bool bodies = true, end_effectors = true, audit = false;         ///< recorded
-  OutputTimes states = {}, of_bodies = {}, of_end_effectors = {};  ///< as in TrajectoryLayout
-  std::vector<int> chosen_bodies = {};                             ///< none: every body
-  std::string precision, command_line, version, instruction_set;
-  std::optional<TaskSpec> task;
-  std::string policy;
-};
-
-/// Describes a sensor of a model. `every`: SensorLayout::every.
-SensorLayout sensor_layout(const SensorInfo& info, const TactileDescription& description,
-                           int every);
-
-/// The layout of a rollout of `batch` by `stepper`.
-TrajectoryLayout layout_from(const Batch& batch, const Stepper& stepper, const RunDescription& run);
 
 }  // namespace tangere

@@ -15,7 +15,7 @@
 #include "engine/sense/readout.hpp"
 #include "io/picture/tactile_drawing.hpp"
 #include "io/scene/scene_reader.hpp"
-#include "io/trajectory/trajectory_layout.hpp"
+#include "io/trajectory/layout_from_model.hpp"
 
 namespace tangere {
 namespace {

@@ -12,7 +12,6 @@
 #include <algorithm>
 #include <atomic>
 #include <memory>
-#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -22,7 +21,6 @@
 
 #include "engine/base/as_size.hpp"
 #include "engine/base/error.hpp"
-#include "engine/base/precision.hpp"
 
 namespace tangere::python {
 
@@ -94,12 +92,6 @@ std::vector<T> rows_of(const Argument<T>& array, std::size_t rows, std::size_t w
   return all;
 }
 
-/// Threads of a `threads` argument: as many as the process may use, for None.
-int threads_of(const std::optional<int>& asked);
-
-/// The precision of that name. Throws InputError for another name than "mixed" and "double".
-Precision precision_named(const std::string& name);
-
 /// An object that one Python thread uses at a time. The GIL is free while it works, so another
 /// thread could come in. It is refused with InputError.
 class InUse {
@@ -121,13 +113,6 @@ class InUse {
  private:
   std::atomic_flag taken_;
 };
-
-// One function for each file of this folder: it adds its classes to the module.
-void add_scenes(nb::module_& m);
-void add_batches(nb::module_& m);
-void add_tasks(nb::module_& m);
-void add_environments(nb::module_& m);
-void add_tapes(nb::module_& m);
 
 }  // namespace tangere::python
 

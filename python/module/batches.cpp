@@ -12,6 +12,8 @@
 
 #include "engine/step/control.hpp"
 #include "kernels/numbers/block.hpp"
+#include "python/module/module.hpp"
+#include "python/module/options.hpp"
 #include "tasks/run/block_reader.hpp"
 
 namespace tangere::python {

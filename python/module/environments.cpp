@@ -5,7 +5,9 @@
 #include <nanobind/stl/vector.h>
 
 #include "python/module/arrays.hpp"
+#include "python/module/module.hpp"
 #include "python/module/observations.hpp"
+#include "python/module/options.hpp"
 #include "tasks/catalogue/task_list.hpp"
 #include "tasks/run/policy.hpp"
 
@@ -86,9 +88,9 @@ class Environments {
     const VectorCounts c = vector_.counts();
     nb::dict d;
     d["environment_steps"] = c.environment_steps;
-    d["simulation_steps"] = c.simulation_steps;
-    d["newton_iterations"] = c.newton_iterations;
-    d["split_steps"] = c.split_steps;
+    d["simulation_steps"] = c.steps.simulation_steps;
+    d["newton_iterations"] = c.steps.newton_iterations;
+    d["split_steps"] = c.steps.split_steps;
     return d;
   }
 

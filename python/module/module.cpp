@@ -1,26 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // The module tangere._core: the classes of the libraries with arrays for arguments and results.
 // The package around it is python/tangere.
-#include <tbb/info.h>
+#include "python/module/module.hpp"
 
+#include "engine/base/error.hpp"
 #include "kernels/table/isa.hpp"
-#include "python/module/arrays.hpp"
-
-namespace tangere::python {
-
-int threads_of(const std::optional<int>& asked) {
-  if (asked && *asked < 1)
-    throw InputError(fmt::format("{} threads; expected at least 1, or None", *asked));
-  return asked ? *asked : tbb::info::default_concurrency();
-}
-
-Precision precision_named(const std::string& name) {
-  if (name != "mixed" && name != "double")
-    throw InputError(fmt::format("precision '{}'; expected 'mixed' or 'double'", name));
-  return name == "mixed" ? Precision::mixed : Precision::f64;
-}
-
-}  // namespace tangere::python
 
 NB_MODULE(_core, m) {
   namespace nb = nanobind;

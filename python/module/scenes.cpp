@@ -8,6 +8,7 @@
 #include "engine/model/scheme.hpp"
 #include "io/scene/scene_reader.hpp"
 #include "python/module/arrays.hpp"
+#include "python/module/module.hpp"
 
 namespace tangere::python {
 namespace {

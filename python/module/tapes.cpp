@@ -5,7 +5,9 @@
 #include <nanobind/stl/vector.h>
 
 #include "python/module/arrays.hpp"
+#include "python/module/module.hpp"
 #include "python/module/observations.hpp"
+#include "python/module/options.hpp"
 #include "tasks/catalogue/task_list.hpp"
 #include "tasks/gradients/task_tape.hpp"
 

@@ -4,6 +4,7 @@
 #include <nanobind/stl/vector.h>
 
 #include "python/module/arrays.hpp"
+#include "python/module/module.hpp"
 #include "tasks/catalogue/task_list.hpp"
 
 namespace tangere::python {

@@ -64,7 +64,8 @@ std::size_t width_of(const Model& model, AccuracyQuantity quantity) {
 struct BlockOutcome {
   double step_seconds = 0;
   std::array<double, kPrecisions.size()> read_seconds{};
-  std::int64_t environment_steps = 0, evaluations = 0, split_steps = 0, samples = 0;
+  StepCounts counts;
+  std::int64_t samples = 0;
   std::vector<FailedEnvironment> failures;
 };
 
@@ -131,13 +132,7 @@ class SampleRun : public AccuracyRun {
 
   template <class T>
   void read_fields(Readout& readout, const Batch& batch, int block, std::vector<T>& to) const {
-    std::size_t offset = 0;
-    for (std::size_t s = 0; s < batch.model().sensors().size(); ++s) {
-      const std::size_t count = 3 * as_size(batch.model().sensors()[s].points);
-      read_field<T>(readout, batch, block, {static_cast<int>(s), FieldForm::ideal},
-                    [&](int e) { return lane(to, e).subspan(offset, count); });
-      offset += count;
-    }
+    read_all_fields<T>(readout, batch, block, FieldForm::ideal, [&](int e) { return lane(to, e); });
   }
 
   void read(Worker& w, const Batch& batch, int block, bool both, BlockOutcome& out) const {
@@ -185,9 +180,7 @@ class SampleRun : public AccuracyRun {
       out.step_seconds += block.step_seconds;
       for (std::size_t p = 0; p < kPrecisions.size(); ++p)
         out.read_seconds[p] += block.read_seconds[p];
-      out.environment_steps += block.environment_steps;
-      out.evaluations += block.evaluations;
-      out.split_steps += block.split_steps;
+      out.counts += block.counts;
       out.simulated_seconds += static_cast<double>(block.samples) * interval;
       out.failures.insert(out.failures.end(), block.failures.begin(), block.failures.end());
     }
@@ -199,19 +192,9 @@ class SampleRun : public AccuracyRun {
                   Batch& batch, int b, BlockOutcome& out, std::atomic<bool>& stopped) {
     const int first = b * kBlock, lanes = lanes_of(batch, b);
     StepTally tally(batch, first, lanes);
-    for (int k = 0; k < episodes.samples; ++k) {
-      if (stopped || (go_on && !go_on())) {
-        stopped = true;
-        return;
-      }
-      for (int e = first; e < first + lanes; ++e)
-        if (k >= episodes.samples_of[as_size(e)]) batch.hold(e);
-      const double begin = thread_seconds();
-      for (int part = 0; part < setting.parts; ++part) {
-        w.stepper->step_block(batch, b, episodes.controls_of(k, setting.parts, part));
-        tally.count(batch, std::int64_t{k} * setting.parts + part);
-      }
-      out.step_seconds += thread_seconds() - begin;
+    const auto may_go_on = [&] { return !stopped && (!go_on || go_on()); };
+    const auto after_step = [&](std::int64_t step) { tally.count(batch, step); };
+    const auto after_sample = [&](int k) {
       read(w, batch, b, !keep, out);
       for (int e = first; e < first + lanes; ++e) {
         if (batch.held(e) || !tally.live(e)) continue;
@@ -221,10 +204,13 @@ class SampleRun : public AccuracyRun {
         else
           compare_sample(w, e, k);
       }
+    };
+    if (!episodes.play(*w.stepper, setting.parts, batch, b, out.step_seconds, may_go_on, after_step,
+                       after_sample)) {
+      stopped = true;
+      return;
     }
-    out.environment_steps = tally.environment_steps;
-    out.evaluations = tally.newton_iterations;
-    out.split_steps = tally.split_steps;
+    out.counts = tally.counts;
     out.failures = std::move(tally.failures);
   }
 

@@ -47,7 +47,7 @@ struct AccuracyOutcome {
   std::array<std::vector<double>, kPrecisions.size()> error;
   double step_seconds = 0;                                ///< CPU time of all steps
   std::array<double, kPrecisions.size()> read_seconds{};  ///< CPU time of reading fields
-  std::int64_t environment_steps = 0, evaluations = 0, split_steps = 0;
+  StepCounts counts;                        ///< of gradients: steps and evaluations alone
   double simulated_seconds = 0;             ///< over all environments
   std::vector<FailedEnvironment> failures;  ///< steps count from the start of the episode
   bool stopped = false;

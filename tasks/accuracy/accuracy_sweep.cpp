@@ -184,9 +184,11 @@ class Sweep {
     point.bound = sure_quantile(outcome.error[p], 0.95);
     point.median = quantile(outcome.error[p], 0.5);
     point.within = share_near(setting.accuracy, outcome.error[p]);
-    const auto steps = static_cast<double>(std::max<std::int64_t>(1, outcome.environment_steps));
-    point.evaluations = static_cast<double>(outcome.evaluations) / steps;
-    point.split = of_gradients() ? std::nan("") : static_cast<double>(outcome.split_steps) / steps;
+    const auto steps =
+        static_cast<double>(std::max<std::int64_t>(1, outcome.counts.simulation_steps));
+    point.evaluations = static_cast<double>(outcome.counts.newton_iterations) / steps;
+    point.split =
+        of_gradients() ? std::nan("") : static_cast<double>(outcome.counts.split_steps) / steps;
     point.rate = outcome.simulated_seconds / (outcome.step_seconds + outcome.read_seconds[p]);
     point.blurred = point.error < kBlur * report_.reference.error;
     point.failed = static_cast<int>(outcome.failures.size());

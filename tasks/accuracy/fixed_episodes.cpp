@@ -61,13 +61,10 @@ FixedEpisodes scene_episodes(const Batch& start, const ControlProgram& controls,
                              int every) {
   controls.check_covers(steps);
   FixedEpisodes episodes = with_room(start, steps, every);
-  const std::size_t nu = as_size(start.model().nu());
+  const std::size_t width = as_size(start.environments()) * as_size(start.model().nu());
   for (int k = 0; k < episodes.samples * every; ++k)
-    for (int e = 0; e < start.environments(); ++e)
-      controls.evaluate(
-          k, start.episode(e),
-          std::span(episodes.controls)
-              .subspan((as_size(k) * as_size(start.environments()) + as_size(e)) * nu, nu));
+    write_controls(controls, k, start,
+                   std::span(episodes.controls).subspan(as_size(k) * width, width));
   return episodes;
 }
 

@@ -10,7 +10,10 @@
 
 #include "engine/step/batch.hpp"
 #include "engine/step/control.hpp"
+#include "engine/step/stepper.hpp"
 #include "tasks/run/policy.hpp"
+#include "tasks/run/step_tally.hpp"
+#include "tasks/run/thread_time.hpp"
 
 namespace tangere {
 
@@ -30,6 +33,29 @@ struct FixedEpisodes {
   [[nodiscard]] bool can_cut(int parts) const;
   /// Controls (E, nu) of one of the steps into which the time before sample `sample` is cut.
   [[nodiscard]] std::span<const double> controls_of(int sample, int parts, int part) const;
+
+  /// Plays a block of `batch`, which begins as `start`, with `parts` steps between samples. Holds
+  /// environments whose episode is over. Calls after_step(step) after every step, and
+  /// after_sample(sample) after every sample; only steps and after_step() add to `seconds` (CPU
+  /// time). go_on() is called before every sample; false stops, and play() returns false.
+  template <class GoOn, class AfterStep, class AfterSample>
+  bool play(Stepper& stepper, int parts, Batch& batch, int block, double& seconds,
+            const GoOn& go_on, const AfterStep& after_step, const AfterSample& after_sample) const {
+    const int first = block * kernels::kBlock, last = first + lanes_of(batch, block);
+    for (int sample = 0; sample < samples; ++sample) {
+      if (!go_on()) return false;
+      for (int e = first; e < last; ++e)
+        if (sample >= samples_of[static_cast<std::size_t>(e)]) batch.hold(e);
+      const double begin = thread_seconds();
+      for (int part = 0; part < parts; ++part) {
+        stepper.step_block(batch, block, controls_of(sample, parts, part));
+        after_step(std::int64_t{sample} * parts + part);
+      }
+      seconds += thread_seconds() - begin;
+      after_sample(sample);
+    }
+    return true;
+  }
 };
 
 /// Episodes of a scene from the states of `start`. Throws InputError when the controls are too

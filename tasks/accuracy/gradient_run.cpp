@@ -82,13 +82,13 @@ AccuracyOutcome GradientRun::play(const AccuracySetting& setting, const Accuracy
   AccuracyOutcome out;
   out.step_seconds = process_seconds() - begin;
   out.failures = found.failures;
-  out.evaluations = found.newton_iterations;
+  out.counts.newton_iterations = found.newton_iterations;
   out.stopped = found.stopped;
-  out.environment_steps = options.steps * start.environments();
+  out.counts.simulation_steps = options.steps * start.environments();
   for (const FailedEnvironment& f : out.failures)
-    out.environment_steps -= options.steps - std::max<std::int64_t>(0, f.step);
+    out.counts.simulation_steps -= options.steps - std::max<std::int64_t>(0, f.step);
   out.simulated_seconds =
-      static_cast<double>(out.environment_steps) * episodes_.interval() / setting.parts;
+      static_cast<double>(out.counts.simulation_steps) * episodes_.interval() / setting.parts;
   const LossGradient& g = found.losses.front();
   const std::size_t environments = as_size(start.environments());
   derivatives.assign(environments * rows_ * width_, 0);

@@ -243,14 +243,7 @@ class Pitches {
 
   bool play_block(Stepper& stepper, Batch& batch, int b, const std::function<bool()>& go_on) {
     const int first = b * kBlock, lanes = lanes_of(batch, b);
-    for (int k = 0; k < episodes_.samples; ++k) {
-      if (go_on && !go_on()) return false;
-      for (int e = first; e < first + lanes; ++e)
-        if (k >= episodes_.samples_of[as_size(e)]) batch.hold(e);
-      const double begin = thread_seconds();
-      for (int step = 0; step < episodes_.every; ++step)
-        stepper.step_block(batch, b, episodes_.controls_of(k, episodes_.every, step));
-      step_seconds_ += thread_seconds() - begin;
+    const auto after_sample = [&](int) {
       for (const auto& rung : rungs_)
         for (const std::size_t s : swept_) rung->feel(batch, b, s);
       reads_ += lanes;
@@ -260,8 +253,10 @@ class Pitches {
         for (const auto& rung : rungs_)
           for (const std::size_t s : swept_) rung->compare(*rungs_.back(), s, e);
       }
-    }
-    return true;
+    };
+    return episodes_.play(
+        stepper, episodes_.every, batch, b, step_seconds_, [&] { return !go_on || go_on(); },
+        [](std::int64_t) {}, after_sample);
   }
 
   [[nodiscard]] PitchPoint point_of(const Rung& rung, std::size_t s) const {

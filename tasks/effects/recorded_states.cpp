@@ -7,6 +7,7 @@
 #include "engine/base/as_size.hpp"
 #include "engine/step/control.hpp"
 #include "engine/step/stepper.hpp"
+#include "tasks/run/episode_program.hpp"
 
 namespace tangere {
 namespace {
@@ -33,17 +34,15 @@ RecordedStates record_states(const Model& model, int environments, int instants,
   const std::int64_t planned = program.steps();
   const std::int64_t steps = planned < 0 ? kOpenRunSteps : std::min(planned, kMostRunSteps);
   const std::int64_t wanted = std::min<std::int64_t>(instants, steps);
-  const std::size_t nu = as_size(model.nu());
   RecordedStates recorded{model, environments, planned, steps, {}, 0, {}};
   for (std::size_t k = 0; k < model.scene().randomizations.size(); ++k) {
     recorded.numbers.emplace_back();
     for (int e = 0; e < environments; ++e)
       recorded.numbers.back().push_back(batch.randomized_value(e, static_cast<int>(k)));
   }
-  std::vector<double> u(nu * as_size(environments)), before_q, before_v;
+  std::vector<double> u(as_size(model.nu()) * as_size(environments)), before_q, before_v;
   for (std::int64_t step = 0; step < steps; ++step) {
-    for (int e = 0; e < environments; ++e)
-      program.evaluate(step, batch.episode(e), std::span(u).subspan(as_size(e) * nu, nu));
+    write_controls(program, step, batch, u);
     const auto next = static_cast<std::int64_t>(recorded.instants.size());
     if (next < wanted && step == (2 * next + 1) * steps / (2 * wanted)) {
       RecordedInstant now;

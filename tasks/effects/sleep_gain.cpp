@@ -11,6 +11,7 @@
 #include "engine/base/as_size.hpp"
 #include "engine/step/control.hpp"
 #include "engine/step/stepper.hpp"
+#include "tasks/run/episode_program.hpp"
 #include "tasks/run/thread_time.hpp"
 
 namespace tangere {
@@ -22,12 +23,10 @@ double play(Stepper& stepper, Batch& batch, std::uint64_t seed) {
   const ControlProgram program(model, model.timestep(), seed);
   const std::int64_t steps =
       program.steps() < 0 ? kOpenRunSteps : std::min(program.steps(), kMostRunSteps);
-  const std::size_t nu = as_size(model.nu());
-  std::vector<double> u(nu * as_size(batch.environments()));
+  std::vector<double> u(as_size(model.nu()) * as_size(batch.environments()));
   double seconds = 0;
   for (std::int64_t step = 0; step < steps; ++step) {
-    for (int e = 0; e < batch.environments(); ++e)
-      program.evaluate(step, batch.episode(e), std::span(u).subspan(as_size(e) * nu, nu));
+    write_controls(program, step, batch, u);
     const double start = thread_seconds();
     stepper.step(batch, u);
     seconds += thread_seconds() - start;

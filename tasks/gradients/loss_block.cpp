@@ -88,13 +88,13 @@ LossBlock::LossBlock(const Model& model, const GradientOptions& options,
 void LossBlock::run(Batch& batch, int block, const StepControls& controls, std::span<double> u,
                     GradientSummary& out, std::vector<FailedEnvironment>& failures) {
   const int first = block * kBlock, lanes = lanes_of(batch, block);
-  InHand h{batch, block, first, first + lanes, controls, u, out, StepTally(batch, first, lanes)};
-  hand_ = &h;
+  Context h{batch, block, first, first + lanes, controls, u, out, StepTally(batch, first, lanes)};
+  context_ = &h;
   GradientBlock::run(batch, block);
-  newton_iterations_ += h.tally.newton_iterations;
+  newton_iterations_ += h.tally.counts.newton_iterations;
   failures.insert(failures.end(), h.tally.failures.begin(), h.tally.failures.end());
   if (!stopped()) finish();
-  hand_ = nullptr;
+  context_ = nullptr;
 }
 
 std::int64_t LossBlock::end_of(std::int64_t stretch) const {
@@ -104,12 +104,12 @@ std::int64_t LossBlock::end_of(std::int64_t stretch) const {
 /// Fills the controls of a step of all lanes into u.
 void LossBlock::ask(std::int64_t step) {
   const std::size_t nu = count(model_.nu());
-  for (int e = hand_->first; e < hand_->last; ++e)
-    hand_->controls(step, e, hand_->u.subspan(count(e) * nu, nu));
+  for (int e = context_->first; e < context_->last; ++e)
+    context_->controls(step, e, context_->u.subspan(count(e) * nu, nu));
 }
 
 void LossBlock::take_steps(std::int64_t stretch, BlockTape* tape) {
-  InHand& h = *hand_;
+  Context& h = *context_;
   if (tape != nullptr) tape->start(h.batch, h.block);
   for (std::int64_t t = stretch * plan_.steps; t < end_of(stretch) && may_go_on(); ++t) {
     ask(t);
@@ -119,16 +119,16 @@ void LossBlock::take_steps(std::int64_t stretch, BlockTape* tape) {
 }
 
 void LossBlock::retake_steps(std::int64_t stretch, bool /*from_checkpoint*/, BlockTape& tape) {
-  tape.start(hand_->batch, hand_->block);
+  tape.start(context_->batch, context_->block);
   for (std::int64_t t = stretch * plan_.steps; t < end_of(stretch); ++t) {
     ask(t);
-    stepper_.step_block(hand_->batch, hand_->block, hand_->u, &tape);
+    stepper_.step_block(context_->batch, context_->block, context_->u, &tape);
   }
 }
 
 /// The losses look at the state before a stretch only where the rollout begins.
 void LossBlock::reverse(std::int64_t stretch, const BlockTape& tape) {
-  const InHand& h = *hand_;
+  const Context& h = *context_;
   const std::size_t nu = count(model_.nu()), steps = count(options_.steps);
   const std::int64_t begin = stretch * plan_.steps;
   for (std::int64_t t = end_of(stretch); t > begin && may_go_on(); --t) {
@@ -151,7 +151,7 @@ void LossBlock::reverse(std::int64_t stretch, const BlockTape& tape) {
 
 /// Reads the fields that some loss needs after `step` steps.
 void LossBlock::read(std::int64_t step) {
-  const InHand& h = *hand_;
+  const Context& h = *context_;
   if (std::none_of(losses_.begin(), losses_.end(),
                    [&](const RolloutLoss* l) { return l->reads_fields(step); }))
     return;
@@ -161,7 +161,7 @@ void LossBlock::read(std::int64_t step) {
 
 /// Evaluates every loss at the state in the batch. Adds the cotangents to the adjoint.
 void LossBlock::look(std::int64_t step) {
-  const InHand& h = *hand_;
+  const Context& h = *context_;
   read(step);
   bool placed = false;
   for (std::size_t k = 0; k < losses_.size(); ++k) {
@@ -179,7 +179,7 @@ void LossBlock::look(std::int64_t step) {
 
 /// Evaluates one loss at one environment's state.
 void LossBlock::judge(std::int64_t step, std::size_t loss, int e) {
-  const InHand& h = *hand_;
+  const Context& h = *context_;
   const RolloutLoss& l = *losses_[loss];
   const int lane = e - h.first;
   const std::size_t nu = count(model_.nu()), steps = count(options_.steps);
@@ -212,13 +212,13 @@ void LossBlock::judge(std::int64_t step, std::size_t loss, int e) {
 /// Writes gradients by the initial state and by the scene's numbers.
 void LossBlock::finish() {
   for (std::size_t k = 0; k < losses_.size(); ++k) {
-    LossGradient& g = hand_->out.losses[k];
+    LossGradient& g = context_->out.losses[k];
     const auto part = [&](std::vector<double>& all, int e) {
-      const std::size_t width = all.size() / count(hand_->batch.environments());
+      const std::size_t width = all.size() / count(context_->batch.environments());
       return std::span(all).subspan(count(e) * width, width);
     };
-    for (int e = hand_->first; e < hand_->last; ++e)
-      get_start(static_cast<int>(k), hand_->batch, e, part(g.q, e), part(g.v, e),
+    for (int e = context_->first; e < context_->last; ++e)
+      get_start(static_cast<int>(k), context_->batch, e, part(g.q, e), part(g.v, e),
                 part(g.parameters, e), part(g.points, e));
   }
 }

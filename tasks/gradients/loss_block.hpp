@@ -56,7 +56,7 @@ class LossBlock : public GradientBlock {
            GradientSummary& out, std::vector<FailedEnvironment>& failures);
 
  private:
-  struct InHand {
+  struct Context {
     Batch& batch;
     int block, first, last;
     const StepControls& controls;
@@ -81,7 +81,7 @@ class LossBlock : public GradientBlock {
   Readout readout_;
   std::vector<std::vector<CompactFrame<double>>> frames_;  // (sensors, 16)
   LossReading reading_;
-  InHand* hand_ = nullptr;  // set during run()
+  Context* context_ = nullptr;  // set during run()
 };
 
 }  // namespace tangere

@@ -25,7 +25,7 @@ ReturnBlock::ReturnBlock(const Task& task, const TaskGradientOptions& options)
       options_(options),
       by_actions_(as_size(options.actions), by_action_),
       ones_(kBlock, 1.0),
-      sound_(kBlock) {}
+      solved_(kBlock) {}
 
 double ReturnBlock::bytes(const Task& task, const TaskGradientOptions& options) {
   return bytes_of(tapes_of(task, options)) + workspace_bytes(task);
@@ -37,11 +37,11 @@ void ReturnBlock::run(std::int64_t first, int count, const TaskActions& actions,
   std::iota(episodes.begin(), episodes.end(), first);
   start(options_.seed, episodes);
   choose_ = &actions;
-  lost_.clear();
+  failures_.clear();
   note(-1);
   GradientBlock::run(rollout_.batch(), 0);
-  newton_iterations_ += rollout_.counts().newton_iterations;
-  for (const FailedEnvironment& f : lost_)
+  newton_iterations_ += rollout_.counts().steps.newton_iterations;
+  for (const FailedEnvironment& f : failures_)
     failures.push_back({static_cast<int>(to) + f.environment, f.step, f.status});
   if (!stopped()) finish(to, out);
 }
@@ -50,9 +50,9 @@ void ReturnBlock::run(std::int64_t first, int count, const TaskActions& actions,
 void ReturnBlock::note(std::int64_t action) {
   for (int l = 0; l < rollout_.lanes(); ++l) {
     const bool now = !failed(rollout_.batch().status(l));
-    if (!now && (action < 0 || sound_[as_size(l)]))
-      lost_.push_back({l, action, rollout_.batch().status(l)});
-    sound_[as_size(l)] = now;
+    if (!now && (action < 0 || solved_[as_size(l)]))
+      failures_.push_back({l, action, rollout_.batch().status(l)});
+    solved_[as_size(l)] = now;
   }
 }
 

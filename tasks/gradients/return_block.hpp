@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "tasks/gradients/action_block.hpp"
-#include "tasks/gradients/task_gradients.hpp"
+#include "tasks/gradients/task_gradient_options.hpp"
 
 namespace tangere {
 
@@ -32,8 +32,8 @@ class ReturnBlock : public ActionBlock {
   std::vector<std::vector<double>> by_actions_;  // (actions) of (16, action)
   std::vector<double> ones_;                     // (16) derivatives by rewards
   const TaskActions* choose_ = nullptr;          // set during run()
-  std::vector<FailedEnvironment> lost_;          // by lane
-  std::vector<bool> sound_;                      // (16)
+  std::vector<FailedEnvironment> failures_;      // by lane
+  std::vector<bool> solved_;                     // (16) in the last action
 };
 
 }  // namespace tangere

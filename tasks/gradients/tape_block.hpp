@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "tasks/gradients/action_block.hpp"
-#include "tasks/gradients/task_tape.hpp"
+#include "tasks/gradients/task_tape_options.hpp"
 
 namespace tangere {
 

@@ -6,7 +6,7 @@
 
 #include "engine/rows/row_sink.hpp"
 #include "engine/sense/audit.hpp"
-#include "tasks/run/rollout.hpp"
+#include "tasks/run/audit_summary.hpp"
 #include "tasks/run/step_tally.hpp"
 
 namespace tangere {

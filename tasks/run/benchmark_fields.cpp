@@ -8,6 +8,7 @@
 #include "engine/base/as_size.hpp"
 #include "kernels/numbers/block.hpp"
 #include "tasks/run/block_reader.hpp"
+#include "tasks/run/checksum.hpp"
 
 namespace tangere {
 namespace {

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "engine/sense/readout.hpp"
-#include "tasks/run/benchmark_run.hpp"
+#include "tasks/run/benchmark_options.hpp"
 
 namespace tangere {
 

@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
-#include <bit>
 #include <chrono>
 #include <ctime>
 #include <string>
@@ -16,25 +15,12 @@
 #include "kernels/numbers/block.hpp"
 #include "tasks/run/benchmark_fields.hpp"
 #include "tasks/run/block_threads.hpp"
+#include "tasks/run/checksum.hpp"
 
 namespace tangere {
 namespace {
 
 using kernels::kBlock;
-
-std::uint64_t mix(std::uint64_t hash, std::uint64_t bits) {
-  return std::rotl(hash ^ bits, 29) * 0x9e3779b97f4a7c15U + 0x632be59bd9b4e019U;
-}
-
-template <class Bits, class T>
-std::uint64_t chain(std::uint64_t checksum, std::span<const T> numbers) {
-  // Four independent chains: in a single one each product would wait for the one before.
-  std::array<std::uint64_t, 4> chains{checksum, checksum + 1, checksum + 2, checksum + 3};
-  for (std::size_t i = 0; i < numbers.size(); ++i)
-    chains[i % 4] = mix(chains[i % 4], std::bit_cast<Bits>(numbers[i]));
-  for (const std::uint64_t chain : chains) checksum = mix(checksum, chain);
-  return checksum;
-}
 
 double cpu_seconds() {
   timespec now{};
@@ -51,7 +37,8 @@ struct Worker {
 
 /// What one block did in one pass.
 struct BlockTally {
-  std::int64_t environment_steps = 0, newton_iterations = 0, tactile_points = 0, bodies_asleep = 0;
+  StepCounts counts;  ///< of a scene; a task's program counts itself
+  std::int64_t tactile_points = 0;
   std::vector<FailedEnvironment> failures;
 };
 
@@ -112,19 +99,15 @@ class Benchmark {
   /// Reports the pass before.
   void report(BenchmarkResult& result) const {
     for (const BlockTally& tally : tallies_) {
-      result.environment_steps += tally.environment_steps;
-      result.newton_iterations += tally.newton_iterations;
+      result.counts += tally.counts;
       result.tactile_points += tally.tactile_points;
-      result.bodies_asleep += tally.bodies_asleep;
       result.failures.insert(result.failures.end(), tally.failures.begin(), tally.failures.end());
     }
-    result.simulation_steps = result.environment_steps;
+    result.environment_steps = result.counts.simulation_steps;
     for (const Worker& worker : workers_)
       if (const TaskProgram* const task = worker.program->judged()) {
         result.environment_steps += task->counts().environment_steps;
-        result.simulation_steps += task->counts().simulation_steps;
-        result.newton_iterations += task->counts().newton_iterations;
-        result.bodies_asleep += task->counts().bodies_asleep;
+        result.counts += task->counts().steps;
       }
     std::stable_sort(result.failures.begin(), result.failures.end(),
                      [](const auto& a, const auto& b) { return a.step < b.step; });
@@ -171,9 +154,7 @@ class Benchmark {
       if (checked) chain_action(first, last, row, tally);
     }
     if (data_ == nullptr) {
-      tally.environment_steps = steps.environment_steps;
-      tally.newton_iterations = steps.newton_iterations;
-      tally.bodies_asleep = steps.bodies_asleep;
+      tally.counts = steps.counts;
       tally.failures = std::move(steps.failures);
       if (checked) chain_states(first, last);
     }
@@ -257,22 +238,6 @@ double median_of(std::vector<double> values) {
 }
 
 }  // namespace
-
-const char* to_string(FrameKind value) {
-  switch (value) {
-    case FrameKind::none: return "none";
-    case FrameKind::dense: return "dense";
-    case FrameKind::compact: return "compact";
-  }
-  return "unknown";
-}
-
-std::uint64_t chain_bits(std::uint64_t checksum, std::span<const double> numbers) {
-  return chain<std::uint64_t>(checksum, numbers);
-}
-std::uint64_t chain_bits(std::uint64_t checksum, std::span<const float> numbers) {
-  return chain<std::uint32_t>(checksum, numbers);
-}
 
 std::uint64_t BenchmarkResult::checksum() const {
   std::uint64_t sum = 0;

@@ -6,31 +6,13 @@
 
 #include <cstdint>
 #include <functional>
-#include <span>
 #include <vector>
 
-#include "engine/base/precision.hpp"
 #include "engine/step/batch.hpp"
 #include "engine/step/control.hpp"
-#include "tasks/run/rollout.hpp"
+#include "tasks/run/benchmark_options.hpp"
 
 namespace tangere {
-
-/// How tactile fields are read.
-enum class FrameKind {
-  none,     ///< not at all
-  dense,    ///< every point of a sensor, (points, 3) [N], in memory of each environment
-  compact,  ///< only the 8×8 tiles that something touches
-};
-const char* to_string(FrameKind value);
-
-struct BenchmarkOptions {
-  RolloutOptions rollout;  ///< steps (of a task: actions); for a scene also the interval of fields
-  FrameKind frames = FrameKind::dense;   ///< for a scene
-  Precision precision = Precision::f64;  ///< of the fields; a scene's mixed fields are float
-  int threads = 1;
-  int repeat = 3;  ///< timed passes over the whole episode
-};
 
 /// Times of one pass over the whole episode.
 struct BenchmarkTime {
@@ -40,13 +22,11 @@ struct BenchmarkTime {
 
 struct BenchmarkResult {
   std::vector<BenchmarkTime> times;  ///< one per timed pass, in their order
-  std::int64_t environment_steps =
-      0;  ///< tried in one pass, failing ones included; of a task: actions
-  std::int64_t simulation_steps =
-      0;  ///< the same for a scene; for a task the steps of its actions and resets
-  std::int64_t newton_iterations = 0;       ///< of one pass, over simulation_steps
+  /// Steps tried in one pass, failing ones included; of a task: actions.
+  std::int64_t environment_steps = 0;
+  /// Of one pass. Of a scene: of environment_steps; of a task: of its actions and resets.
+  StepCounts counts;
   std::int64_t tactile_points = 0;          ///< read in one pass
-  std::int64_t bodies_asleep = 0;           ///< of one pass, summed over simulation_steps
   std::vector<FailedEnvironment> failures;  ///< in the order of their steps
   /// One checksum per environment. It chains the bits of every field in the order of time, then of
   /// the final state; for a task those of observations, rewards and flags. It depends on the
@@ -61,11 +41,6 @@ struct BenchmarkResult {
   /// Returns the medians of wall clock and CPU time, each on its own. There must be a pass.
   [[nodiscard]] BenchmarkTime median() const;
 };
-
-/// Continues a checksum with the bits of numbers, so +0 and -0 differ. The checksum of an
-/// environment begins with the number of its episode.
-std::uint64_t chain_bits(std::uint64_t checksum, std::span<const double> numbers);
-std::uint64_t chain_bits(std::uint64_t checksum, std::span<const float> numbers);
 
 /// Is called before each step of each block, from any thread. False stops the run there.
 using BenchmarkGoOn = std::function<bool()>;

@@ -140,16 +140,8 @@ void BlockWorker::ask_for_controls(const Batch& batch, EnvironmentData& data, in
 
 void BlockWorker::look_after(const Batch& batch, int block, int step, VectorCounts& counts) {
   const int first = block * kBlock, last = std::min(first + kBlock, batch.environments());
-  for (int e = first; e < last; ++e) {
-    if (batch.held(e) || failed(batch.status(e))) continue;
-    ++counts.simulation_steps;
-    counts.newton_iterations += batch.iterations(e);
-    counts.split_steps += batch.status(e) == StepStatus::split ? 1 : 0;
-    counts.coarse_steps += batch.status(e) == StepStatus::coarse ? 1 : 0;
-    counts.passed_steps += batch.status(e) == StepStatus::passed ? 1 : 0;
-    counts.damped_steps += batch.status(e) == StepStatus::damped ? 1 : 0;
-    counts.bodies_asleep += batch.sleep(e).bodies;
-  }
+  for (int e = first; e < last; ++e)
+    if (!batch.held(e) && !failed(batch.status(e))) counts.steps.count(batch, e);
   const std::vector<int>& moments = task_.spec().moments;
   const auto moment = std::lower_bound(moments.begin(), moments.end(), step + 1);
   if (*moment == step + 1) look(batch, block, as_size(static_cast<int>(moment - moments.begin())));
@@ -244,15 +236,8 @@ void BlockWorker::look(const Batch& batch, int block, std::size_t moment) {
   read_states(batch, block, place(q_), place(v_));
   if (task_.end_effectors_size() > 0)
     read_end_effectors(readout_, batch, block, place(end_effectors_));
-  if (!task_.spec().looks_at_tactile) return;
-  std::size_t offset = 0;
-  for (std::size_t s = 0; s < task_.model().sensors().size(); ++s) {
-    const std::size_t numbers = 3 * as_size(task_.model().sensors()[s].points);
-    read_field<double>(readout_, batch, block, {static_cast<int>(s)}, [&](int e) {
-      return part(tactile_, moment, e - first).subspan(offset, numbers);
-    });
-    offset += numbers;
-  }
+  if (task_.spec().looks_at_tactile)
+    read_all_fields<double>(readout_, batch, block, FieldForm::field, place(tactile_));
 }
 
 void BlockWorker::conclude_one(Batch& batch, EnvironmentData& data, int environment,

@@ -6,13 +6,13 @@
 
 namespace tangere {
 
-std::string costly_steps(Integrator integrator, std::int64_t steps, std::int64_t evaluations,
-                         std::int64_t split_steps) {
+std::string costly_steps(Integrator integrator, const StepCounts& counts) {
   constexpr double kMany = 5, kOften = 0.05;
   constexpr std::int64_t kFewest = 20;
-  if (steps < kFewest) return "";
-  const double each = double(evaluations) / double(steps),
-               split = double(split_steps) / double(steps);
+  if (counts.simulation_steps < kFewest) return "";
+  const double steps = double(counts.simulation_steps),
+               each = double(counts.newton_iterations) / steps,
+               split = double(counts.split_steps) / steps;
   const int stages = 1 + integrator.scheme().inner_stages();
   if (each <= kMany * stages && split <= kOften) return "";
   return fmt::format(

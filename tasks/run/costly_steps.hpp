@@ -2,16 +2,15 @@
 // Says of a run that its steps took far more work than steps usually take.
 #pragma once
 
-#include <cstdint>
 #include <string>
 
 #include "engine/model/scheme.hpp"
+#include "tasks/run/step_counts.hpp"
 
 namespace tangere {
 
 /// Returns a sentence where steps took more than 8 evaluations of the residual a stage, or more
 /// than a twentieth of them were split; "" where they did not, and for fewer than 20 steps.
-std::string costly_steps(Integrator integrator, std::int64_t steps, std::int64_t evaluations,
-                         std::int64_t split_steps);
+std::string costly_steps(Integrator integrator, const StepCounts& counts);
 
 }  // namespace tangere

@@ -11,13 +11,25 @@ namespace tangere {
 
 using kernels::kBlock;
 
-void SceneProgram::controls(std::int64_t step, Batch& batch, int block, std::span<double> u) {
-  if (step % steps_per_row_ != 0) return;
+VectorCounts EpisodeProgram::counts(const StepTally& tally) const {
+  return {tally.counts.simulation_steps, tally.counts};
+}
+
+void write_controls(const ControlProgram& controls, std::int64_t step, const Batch& batch,
+                    int block, std::span<double> u) {
   const auto nu = static_cast<std::size_t>(batch.model().nu());
   const int first = block * kBlock;
   for (int e = first; e < first + lanes_of(batch, block); ++e)
-    controls_.evaluate(first_step_ + step, batch.episode(e),
-                       u.subspan(static_cast<std::size_t>(e) * nu, nu));
+    controls.evaluate(step, batch.episode(e), u.subspan(static_cast<std::size_t>(e) * nu, nu));
+}
+
+void write_controls(const ControlProgram& controls, std::int64_t step, const Batch& batch,
+                    std::span<double> u) {
+  for (int b = 0; b < batch.blocks(); ++b) write_controls(controls, step, batch, b, u);
+}
+
+void SceneProgram::controls(std::int64_t step, Batch& batch, int block, std::span<double> u) {
+  if (step % steps_per_row_ == 0) write_controls(controls_, first_step_ + step, batch, block, u);
 }
 
 TaskProgram::TaskProgram(const Task& task, const Policy& policy,

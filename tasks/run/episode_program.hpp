@@ -16,6 +16,7 @@
 namespace tangere {
 
 class TaskProgram;
+struct StepTally;
 
 /// Steps count from the start of the episodes, including their opening. Every step calls
 /// controls(), steps, and calls look(). After the last step of the opening and of each row, judge()
@@ -38,7 +39,17 @@ class EpisodeProgram {
   /// Returns the task program whose rows have actions, rewards and an end. Null for a scene: its
   /// controls are its actions, its reward is 0, and its episodes last as long as requested.
   [[nodiscard]] virtual TaskProgram* judged() { return nullptr; }
+  /// Returns the counts of all steps so far. A task counts itself, and leaves out steps that fail.
+  /// A scene's are those of the player's tally: each step is an action.
+  [[nodiscard]] virtual VectorCounts counts(const StepTally& tally) const;
 };
+
+/// Writes the controls of a step of a scene into u, (E, nu), for the environments of a block.
+void write_controls(const ControlProgram& controls, std::int64_t step, const Batch& batch,
+                    int block, std::span<double> u);
+/// Does the same for all blocks.
+void write_controls(const ControlProgram& controls, std::int64_t step, const Batch& batch,
+                    std::span<double> u);
 
 /// The program of a scene, driven by its controls or a table.
 class SceneProgram : public EpisodeProgram {
@@ -86,6 +97,7 @@ class TaskProgram : public EpisodeProgram {
   [[nodiscard]] const EnvironmentData& data() const { return *data_; }
   /// Counts over all blocks so far.
   [[nodiscard]] const VectorCounts& counts() const { return counts_; }
+  [[nodiscard]] VectorCounts counts(const StepTally& /*tally*/) const override { return counts_; }
   void clear_counts() { counts_ = {}; }
 
   /// Simulation steps of a whole episode, opening included.

@@ -3,8 +3,6 @@
 // steps. The row after the last action has observations only.
 #include "tasks/run/episode_slot.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 
 #include "engine/base/as_size.hpp"
@@ -14,154 +12,9 @@ namespace tangere {
 namespace {
 
 constexpr std::size_t kQ = 0, kV = 1, kThird = 2;  // names of observations
-constexpr std::size_t kPose = 7, kMotion = 13;     // numbers of a body: its pose, and twist
-
-std::size_t number_bytes(const EpisodeOptions& options) {
-  return options.precision == Precision::mixed ? sizeof(float) : sizeof(double);
-}
-
-/// Bytes of one row of one episode in a slot's buffers.
-double row_bytes(const EpisodeSource& source, const EpisodeOptions& options) {
-  double bytes = static_cast<double>(source.action + (source.whole ? 1 : 0)) * sizeof(float);
-  for (std::size_t name = 0; name < source.widths.size(); ++name)
-    if (source.taken[name].wanted && !source.taken[name].times.final)
-      bytes += static_cast<double>(source.widths[name] * number_bytes(options)) /
-               static_cast<double>(std::max<std::int64_t>(1, source.taken[name].times.every));
-  return bytes;
-}
-
-/// Rounds down to a multiple of 64, below 64 to a power of two. Chunks of such sizes are then
-/// whole.
-int whole_rows(int most) {
-  constexpr int kRows = 64;
-  if (most >= kRows) return most / kRows * kRows;
-  int rows = 1;
-  while (2 * rows <= most) rows *= 2;
-  return rows;
-}
-
-/// Every action is held for K steps, so the controls must not change within them. Each kind of
-/// control changes at the same steps in every episode, so checking one episode is enough.
-void check_held(const ControlProgram& controls, const EpisodeOptions& options, int nu) {
-  std::vector<double> action(as_size(nu)), u(as_size(nu));
-  for (std::int64_t t = 0; options.every > 1 && t < options.steps; ++t) {
-    std::vector<double>& now = t % options.every == 0 ? action : u;
-    controls.evaluate(t, 0, now);
-    for (double& x : now) x = std::clamp(x, -1.0, 1.0);
-    if (t % options.every != 0 && u != action)
-      throw InputError(fmt::format(
-          "the controls change at step {}, but an action is held for {} steps; expected "
-          "changes at multiples of {} steps, or another --every",
-          t, options.every, options.every));
-  }
-}
+constexpr std::size_t kPose = 7;                   // numbers of a body
 
 }  // namespace
-
-/// Times in rows of those in steps.
-static OutputTimes in_rows(const std::string& what, const OutputTimes& times, int every) {
-  if (times.every % every != 0)
-    throw InputError(fmt::format("'{}{}', and a row is every {} steps; expected a multiple of {}",
-                                 what, to_string(times), every, every));
-  return {times.every / every, times.final};
-}
-
-bool is_taken(const EpisodeSource& source, std::size_t name, std::int64_t row) {
-  return source.taken[name].wanted && source.taken[name].times.at(row, source.rows);
-}
-std::size_t taken_before(const EpisodeSource& source, std::size_t name, std::int64_t row) {
-  if (!source.taken[name].wanted) return 0;
-  return static_cast<std::size_t>(source.taken[name].times.before(row, source.rows));
-}
-
-EpisodeSource shape_of(const Model& model, const EpisodeOptions& options) {
-  EpisodeSource s;
-  s.model = &model;
-  s.rows = action_rows(options);
-  s.action = as_size(model.nu());
-  const auto add = [&](const std::string& what, std::size_t width, bool wanted,
-                       const OutputTimes& times) {
-    s.widths.push_back(width);
-    s.taken.push_back({wanted, in_rows(what, times, options.every)});
-  };
-  add("q", as_size(model.nq()), options.q.wanted, options.q.times);
-  add("v", as_size(model.nv()), options.v.wanted, options.v.times);
-  if (!model.end_effectors().empty())
-    add("variables", 3 * model.end_effectors().size(), options.end_effectors.wanted,
-        options.end_effectors.times);
-  s.first_body = s.widths.size();
-  s.bodies = options.bodies;
-  for (const BodyRows& some : s.bodies) {
-    for (const int body : some.bodies)
-      if (body < 0 || body >= model.nb())
-        throw InputError(fmt::format("rows of body {}; the scene has {} bodies", body, model.nb()));
-    add("bodies", kMotion * (some.bodies.empty() ? as_size(model.nb()) : some.bodies.size()), true,
-        some.times);
-  }
-  s.first_field = s.widths.size();
-  s.fields = options.fields ? *options.fields : whole_fields(model.scene());
-  check_outputs(s.fields, model.sensors().size());
-  for (const FieldOutput output : s.fields) {
-    const SensorInfo& sensor = model.sensors()[as_size(output.sensor)];
-    add(output_name(sensor.name, output.form), numbers_of(sensor.points, output.form), true,
-        output.times);
-  }
-  return s;
-}
-
-EpisodeSource shape_of(const Task& task) {
-  EpisodeSource s;
-  s.model = &task.model();
-  s.rows = task.spec().horizon;
-  s.action = task.spec().action.size();
-  s.widths = {as_size(task.model().nq()), as_size(task.model().nv())};
-  for (const TensorSpec& tensor : task.spec().observations) s.widths.push_back(tensor.size());
-  s.first_body = s.first_field = s.widths.size();
-  s.taken.resize(s.widths.size());
-  s.whole = true;
-  return s;
-}
-
-EpisodeSource source_of(const Model& model, const StepperOptions& solver,
-                        const ControlProgram& controls, const EpisodeOptions& options) {
-  EpisodeSource s = shape_of(model, options);
-  s.solver = solver;
-  const double timestep = Stepper(model, solver).timestep();
-  if (controls.timestep() != timestep)
-    throw InputError(fmt::format("controls laid out for a timestep of {} s; the stepper's is {} s",
-                                 controls.timestep(), timestep));
-  check_sensor_memory(model, timestep);
-  controls.check_covers(options.steps);
-  check_held(controls, options, model.nu());
-  s.program = [&controls, every = options.every](const Batch&) {
-    return std::make_unique<SceneProgram>(controls, every);
-  };
-  return s;
-}
-
-EpisodeSource source_of(const Task& task, const Policy& policy, const EpisodeOptions& options) {
-  EpisodeSource s = shape_of(task);
-  s.program = [&task, &policy, precision = options.precision](const Batch& batch) {
-    const auto data = std::make_shared<EnvironmentData>(task, batch.environments());
-    data->restart(batch);
-    return std::make_unique<TaskProgram>(task, policy, data, precision);
-  };
-  return s;
-}
-
-int piece_rows(const EpisodeSource& source, const EpisodeOptions& options) {
-  if (source.whole) return static_cast<int>(source.rows) + 1;
-  const double fitting =
-      static_cast<double>(options.piece_bytes) / (kBlockEpisodes * row_bytes(source, options));
-  constexpr std::int64_t kMostRows = 1 << 20;  // an int counts rows even if they hold no numbers
-  const auto rows = static_cast<int>(
-      std::clamp(fitting, 1.0, static_cast<double>(std::min(source.rows + 1, kMostRows))));
-  return rows <= source.rows ? whole_rows(rows) : rows;
-}
-
-double piece_bytes(const EpisodeSource& source, const EpisodeOptions& options) {
-  return row_bytes(source, options) * kBlockEpisodes * piece_rows(source, options);
-}
 
 template <class T>
 EpisodeSlot<T>::EpisodeSlot(const EpisodeSource& source, const EpisodeOptions& options)
@@ -204,16 +57,16 @@ void EpisodeSlot<T>::begin(EpisodeRange range) {
 
 template <class T>
 bool EpisodeSlot<T>::simulate(const StopRequest& stop,
-                              const std::function<void(std::int64_t)>& told) {
+                              const std::function<void(std::int64_t)>& on_steps) {
   first_row_ = next_row_;
   rows_ = static_cast<int>(std::min<std::int64_t>(piece_rows_, source_.rows + 1 - first_row_));
   action_rows_ = static_cast<int>(std::min<std::int64_t>(rows_, source_.rows - first_row_));
   for (int row = 0; row < rows_; ++row) {
     observe(row);
     if (row == action_rows_ || std::count(playing_.begin(), playing_.end(), true) == 0) break;
-    const std::int64_t before = environment_steps();
+    const std::int64_t before = program_->counts(*tally_).environment_steps;
     if (!act(row, stop)) return false;
-    told(environment_steps() - before);
+    on_steps(program_->counts(*tally_).environment_steps - before);
   }
   next_row_ += rows_;
   if (last()) collect();
@@ -252,12 +105,6 @@ template <class T>
 void EpisodeSlot<T>::put(std::size_t name, int episode, int row, std::span<const double> from) {
   std::transform(from.begin(), from.end(), numbers(name, episode, row).begin(),
                  [](double x) { return static_cast<T>(x); });
-}
-
-template <class T>
-std::int64_t EpisodeSlot<T>::environment_steps() const {
-  const TaskProgram* const task = program_->judged();
-  return task != nullptr ? task->counts().environment_steps : tally_->environment_steps;
 }
 
 /// Skips episodes that are over.
@@ -412,15 +259,9 @@ template <class T>
 void EpisodeSlot<T>::add_to(EpisodeSummary& run) const {
   const TaskProgram* const task = program_->judged();
   run.episodes += batch_->environments();
-  run.environment_steps += environment_steps();
-  run.simulation_steps += task != nullptr ? task->counts().simulation_steps : environment_steps();
-  run.newton_iterations +=
-      task != nullptr ? task->counts().newton_iterations : tally_->newton_iterations;
-  run.split_steps += task != nullptr ? task->counts().split_steps : tally_->split_steps;
-  run.coarse_steps += task != nullptr ? task->counts().coarse_steps : tally_->coarse_steps;
-  run.passed_steps += task != nullptr ? task->counts().passed_steps : tally_->passed_steps;
-  run.damped_steps += task != nullptr ? task->counts().damped_steps : tally_->damped_steps;
-  run.bodies_asleep += task != nullptr ? task->counts().bodies_asleep : tally_->bodies_asleep;
+  const VectorCounts counts = program_->counts(*tally_);
+  run.environment_steps += counts.environment_steps;
+  run.counts += counts.steps;
   run.failures.insert(run.failures.end(), failures_.begin(), failures_.end());
   auto failure = failures_.begin();
   for (int e = 0; e < batch_->environments(); ++e) {

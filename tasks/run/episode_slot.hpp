@@ -10,55 +10,10 @@
 #include <vector>
 
 #include "engine/sense/readout.hpp"
-#include "tasks/run/episode_program.hpp"
-#include "tasks/run/episodes.hpp"
+#include "tasks/run/episode_source.hpp"
 #include "tasks/run/step_tally.hpp"
 
 namespace tangere {
-
-inline constexpr int kBlockEpisodes = 16;  // lanes of a block of a Batch: one stepper's work
-
-/// What is played: the program of a scene or a task, and what its rows hold. The objects that it
-/// was made from must outlive it.
-struct EpisodeSource {
-  const Model* model = nullptr;
-  StepperOptions solver;
-  std::int64_t rows = 0;                        ///< R, actions of an episode, at most
-  std::size_t action = 0;                       ///< numbers in one action
-  std::vector<FieldOutput> fields;              ///< of a scene
-  std::vector<BodyRows> bodies;                 ///< of a scene
-  std::size_t first_body = 0, first_field = 0;  ///< indices of the first of each in widths
-  /// Numbers in a row of q and of v. Then, for a scene, of the end effectors if there are any, of
-  /// each of `bodies` and of each of `fields`; for a task, of each observation.
-  std::vector<std::size_t> widths;
-  /// Of each of these, at which rows it is taken: times in rows.
-  std::vector<RowOutput> taken;
-  /// Episodes may end at any time. Their length is then known only at the end, so their blocks
-  /// leave whole and in ascending order.
-  bool whole = false;
-  /// Makes the program for one block of a batch.
-  std::function<std::unique_ptr<EpisodeProgram>(const Batch&)> program;
-};
-
-/// Throws InputError when steps is no multiple of every, and when the controls are too short, were
-/// laid out for another timestep, or change while an action is held.
-EpisodeSource source_of(const Model& model, const StepperOptions& solver,
-                        const ControlProgram& controls, const EpisodeOptions& options);
-EpisodeSource source_of(const Task& task, const Policy& policy, const EpisodeOptions& options);
-
-/// Returns the same without a program, to compute memory sizes.
-EpisodeSource shape_of(const Model& model, const EpisodeOptions& options);
-EpisodeSource shape_of(const Task& task);
-
-/// Whether a row of an episode has the numbers of a name, and how many rows below it have.
-bool is_taken(const EpisodeSource& source, std::size_t name, std::int64_t row);
-std::size_t taken_before(const EpisodeSource& source, std::size_t name, std::int64_t row);
-
-/// Rows of a piece: as many as fit, at least one; all of them if blocks leave whole. The last piece
-/// may have fewer.
-int piece_rows(const EpisodeSource& source, const EpisodeOptions& options);
-/// Buffers of one slot [bytes].
-double piece_bytes(const EpisodeSource& source, const EpisodeOptions& options);
 
 /// T: type of the numbers in pieces, double or float.
 template <class T>
@@ -68,10 +23,10 @@ class EpisodeSlot {
 
   /// Starts a block with the episodes of `range`, at most 16.
   void begin(EpisodeRange range);
-  /// Steps through the rows of the next piece. `told` gets the environment steps of each. Returns
+  /// Steps through the rows of the next piece. `on_steps` gets the environment steps of each. Returns
   /// false if `stop` ended it; the piece is then void.
   [[nodiscard]] bool simulate(const StopRequest& stop,
-                              const std::function<void(std::int64_t)>& told);
+                              const std::function<void(std::int64_t)>& on_steps);
 
   [[nodiscard]] EpisodeRows piece() const;  ///< valid until the next simulate()
   [[nodiscard]] bool last() const { return next_row_ > source_.rows; }  ///< of the block's pieces
@@ -86,7 +41,6 @@ class EpisodeSlot {
   [[nodiscard]] std::size_t taken_rows(std::size_t name, int rows) const;
   [[nodiscard]] bool takes(std::size_t name, int row) const;
   void observe_bodies(int row);
-  [[nodiscard]] std::int64_t environment_steps() const;
   void put(std::size_t name, int episode, int row, std::span<const double> from);
   void observe(int row);
   void observe_scene(int row);

@@ -20,6 +20,7 @@
 #include "engine/step/control.hpp"
 #include "engine/step/stepper.hpp"
 #include "tasks/run/policy.hpp"
+#include "tasks/run/step_counts.hpp"
 
 namespace tangere {
 
@@ -57,16 +58,11 @@ struct EpisodeOptions {
 };
 
 struct EpisodeSummary {
-  std::int64_t episodes = 0;           ///< finished, failed ones included
-  std::int64_t rows = 0;               ///< of episodes that did not fail
-  std::int64_t environment_steps = 0;  ///< tried, failing ones included; for a task: actions
-  std::int64_t simulation_steps = 0;   ///< the same for a scene
-  std::int64_t newton_iterations = 0;
-  std::int64_t split_steps = 0;
-  std::int64_t coarse_steps = 0;        ///< with parts that missed the accuracy that was asked for
-  std::int64_t passed_steps = 0;        ///< in which a body came through another
-  std::int64_t damped_steps = 0;        ///< that would have created energy
-  std::int64_t bodies_asleep = 0;       ///< summed over simulation_steps
+  std::int64_t episodes = 0;  ///< finished, failed ones included
+  std::int64_t rows = 0;      ///< of episodes that did not fail
+  /// Of a scene: steps tried, failing ones included. Of a task: actions.
+  std::int64_t environment_steps = 0;
+  StepCounts counts;                    ///< of a scene: of environment_steps
   std::int64_t successes = 0;           ///< of a task's episodes that did not fail
   double mean_return = 0;               ///< over the same episodes
   std::vector<FailedEpisode> failures;  ///< in ascending order

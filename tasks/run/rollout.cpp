@@ -253,13 +253,7 @@ RolloutSummary run_rollout(Batch& batch, Stepper& stepper, EpisodeProgram& progr
     summary.stopped = progress && !progress(t + 1);
     if (summary.stopped) break;
   }
-  summary.environment_steps = tally.environment_steps;
-  summary.newton_iterations = tally.newton_iterations;
-  summary.split_steps = tally.split_steps;
-  summary.coarse_steps = tally.coarse_steps;
-  summary.passed_steps = tally.passed_steps;
-  summary.damped_steps = tally.damped_steps;
-  summary.bodies_asleep = tally.bodies_asleep;
+  summary.counts = tally.counts;
   if (audit) summary.audit = audit->summary();
   summary.failures = std::move(tally.failures);
   summary.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();

@@ -12,6 +12,7 @@
 #include "engine/rows/row_sink.hpp"
 #include "engine/step/batch.hpp"
 #include "engine/step/stepper.hpp"
+#include "tasks/run/audit_summary.hpp"
 #include "tasks/run/episode_program.hpp"
 #include "tasks/run/step_tally.hpp"
 
@@ -28,15 +29,6 @@ struct RolloutOutputs {
   std::vector<int> chosen_bodies = {};  ///< ascending; none: every body
 };
 
-/// What the books of a run come to.
-struct AuditSummary {
-  double motors = 0, taken = 0, made = 0;  ///< sums over environments and steps [J]
-  /// The largest |sum of what the scheme made| of an environment, as a share of what it had: the
-  /// largest energy of motion and held, what motors did, or what was taken, whichever is most.
-  double worst_share = 0;
-  int worst_environment = 0;
-};
-
 struct RolloutOptions {
   std::int64_t steps = 0;
   int every = 0;  ///< steps between fields; 0: the scene's `every`, or 1 if it has none
@@ -48,15 +40,9 @@ struct RolloutOptions {
 };
 
 struct RolloutSummary {
-  std::int64_t steps = 0;              ///< done; fewer than requested if the caller stopped it
-  std::int64_t environment_steps = 0;  ///< tried, failing ones included
-  std::int64_t newton_iterations = 0;
-  std::int64_t split_steps = 0;
-  std::int64_t coarse_steps = 0;      ///< with parts that missed the accuracy that was asked for
-  std::int64_t passed_steps = 0;      ///< in which a body came through another
-  std::int64_t damped_steps = 0;      ///< that would have created energy
-  std::int64_t bodies_asleep = 0;     ///< summed over environment_steps
-  std::optional<AuditSummary> audit;  ///< if it was asked for
+  std::int64_t steps = 0;                   ///< done; fewer than requested if the caller stopped it
+  StepCounts counts;                        ///< of environments' steps, failing ones included
+  std::optional<AuditSummary> audit;        ///< if it was asked for
   std::vector<FailedEnvironment> failures;  ///< in the order in which they failed
   bool stopped = false;                     ///< progress returned false
   double seconds = 0;                       ///< wall clock of the whole rollout, sink included

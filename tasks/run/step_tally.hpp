@@ -9,6 +9,7 @@
 
 #include "engine/step/batch.hpp"
 #include "kernels/numbers/block.hpp"
+#include "tasks/run/step_counts.hpp"
 
 namespace tangere {
 
@@ -25,13 +26,7 @@ inline int lanes_of(const Batch& batch, int block) {
 }
 
 struct StepTally {
-  std::int64_t environment_steps = 0;  ///< tried, failing ones included
-  std::int64_t newton_iterations = 0;
-  std::int64_t split_steps = 0;
-  std::int64_t coarse_steps = 0;   ///< with parts that missed the accuracy that was asked for
-  std::int64_t passed_steps = 0;   ///< in which a body came through another
-  std::int64_t damped_steps = 0;   ///< that would have created energy
-  std::int64_t bodies_asleep = 0;  ///< summed over environment_steps
+  StepCounts counts;                        ///< of steps tried, failing ones included
   std::vector<FailedEnvironment> failures;  ///< in the order in which they failed
 
   /// Counts `environments` environments from number `first` on. Construct it before the first step.
@@ -53,16 +48,9 @@ struct StepTally {
   void count(const Batch& batch, std::int64_t step) {
     for (int e = first_; e < first_ + static_cast<int>(live_.size()); ++e) {
       if (!steps(batch, e)) continue;
-      const StepStatus status = batch.status(e);
-      ++environment_steps;
-      newton_iterations += batch.iterations(e);
-      split_steps += status == StepStatus::split ? 1 : 0;
-      coarse_steps += status == StepStatus::coarse ? 1 : 0;
-      passed_steps += status == StepStatus::passed ? 1 : 0;
-      damped_steps += status == StepStatus::damped ? 1 : 0;
-      bodies_asleep += batch.sleep(e).bodies;
-      if (!failed(status)) continue;
-      failures.push_back({e, step, status});
+      counts.count(batch, e);
+      if (!failed(batch.status(e))) continue;
+      failures.push_back({e, step, batch.status(e)});
       live_[lane(e)] = false;
     }
   }

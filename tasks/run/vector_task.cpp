@@ -140,16 +140,7 @@ const Batch& VectorTask::batch() const { return impl_->batch; }
 
 VectorCounts VectorTask::counts() const {
   VectorCounts sum;
-  for (const VectorCounts& tally : impl_->tallies) {
-    sum.environment_steps += tally.environment_steps;
-    sum.simulation_steps += tally.simulation_steps;
-    sum.newton_iterations += tally.newton_iterations;
-    sum.split_steps += tally.split_steps;
-    sum.coarse_steps += tally.coarse_steps;
-    sum.passed_steps += tally.passed_steps;
-    sum.damped_steps += tally.damped_steps;
-    sum.bodies_asleep += tally.bodies_asleep;
-  }
+  for (const VectorCounts& tally : impl_->tallies) sum += tally;
   return sum;
 }
 

@@ -11,6 +11,7 @@
 #include "engine/base/precision.hpp"
 #include "engine/step/stepper.hpp"
 #include "tasks/catalogue/task.hpp"
+#include "tasks/run/step_counts.hpp"
 
 namespace tangere {
 
@@ -27,10 +28,13 @@ struct VectorOptions {
 /// Counts of the steps taken since the last reset(seed), over all environments.
 struct VectorCounts {
   std::int64_t environment_steps = 0;  ///< actions taken, without those of openings
-  std::int64_t simulation_steps = 0;
-  std::int64_t newton_iterations = 0, split_steps = 0, coarse_steps = 0, passed_steps = 0,
-               damped_steps = 0;
-  std::int64_t bodies_asleep = 0;  ///< summed over simulation_steps
+  StepCounts steps;                    ///< of the simulation, without those that failed
+
+  VectorCounts& operator+=(const VectorCounts& other) {
+    environment_steps += other.environment_steps;
+    steps += other.steps;
+    return *this;
+  }
 };
 
 /// Environment e plays episodes first + e, first + e + E, first + e + 2 E … An episode depends only

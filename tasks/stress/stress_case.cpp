@@ -27,348 +27,141 @@ constexpr double kNoGain = 1 + 1e-9;  // of energy, for BDF1
 constexpr double kSlightGain = 1.01;  // for the other schemes
 constexpr double kRelaxation = 5e-3;  // kt over ks of a contact that is given ks [s]
 
+/// What the cases of a family share.
+struct Family {
+  std::string criterion;
+  Criterion measure;
+  double bound;
+  double seconds;
+  Steps steps = usual();
+  Schemes schemes = all();
+};
+
+/// What a case has of its own.
+struct Row {
+  std::string name;
+  std::string scene{};  ///< file below scenes/hard/ without ".xml"; "": the name
+  StressVariant variant{};
+  int environments = 1;
+  double may_fail = 0;
+  bool quick = true;
+};
+
+void add(Cases& cases, const Family& family, const std::vector<Row>& rows) {
+  for (const Row& row : rows)
+    cases.push_back({row.name, "hard/" + (row.scene.empty() ? row.name : row.scene) + ".xml",
+                     family.criterion, family.measure, family.bound, family.seconds, family.steps,
+                     family.schemes, row.variant, row.environments, row.may_fail, row.quick});
+}
+
 /// The same case for BDF1 and for the others, whose bounds on energy differ.
-void add_energy_case(Cases& cases, StressCase of) {
-  of.criterion = "energy over the start's";
-  of.measure = energy_ratio;
-  const auto add = [&](const char* suffix, const Schemes& schemes, double bound) {
-    cases.push_back(of);
-    StressCase& added = cases.back();
-    added.name += suffix;
-    added.schemes = schemes;
-    added.bound = bound;
+void add_energy_case(Cases& cases, const std::string& name, double seconds, bool quick) {
+  const auto add_schemes = [&](const char* suffix, const Schemes& schemes, double bound) {
+    add(cases, {"energy over the start's", energy_ratio, bound, seconds, usual(), schemes},
+        {{.name = name + suffix, .scene = name, .quick = quick}});
   };
-  add("", first_order(), kNoGain);
-  add("_higher", higher(), kSlightGain);
+  add_schemes("", first_order(), kNoGain);
+  add_schemes("_higher", higher(), kSlightGain);
 }
 
 Cases geometry() {
-  return {
-      {.name = "stack_equal",
-       .scene = "hard/stack_equal.xml",
-       .criterion = "largest sink of a box [m]",
-       .measure = largest_sink,
-       .bound = 5e-3,
-       .seconds = 3,
-       .steps = usual(),
-       .schemes = all(),
-       .quick = true},
-      {.name = "stack_shifted",
-       .scene = "hard/stack_shifted.xml",
-       .criterion = "largest sink of a box [m]",
-       .measure = largest_sink,
-       .bound = 5e-3,
-       .seconds = 3,
-       .steps = usual(),
-       .schemes = all(),
-       .environments = 16,
-       .quick = true},
-      {.name = "stack_unequal",
-       .scene = "hard/stack_unequal.xml",
-       .criterion = "largest sink of a box [m]",
-       .measure = largest_sink,
-       .bound = 5e-3,
-       .seconds = 3,
-       .steps = usual(),
-       .schemes = all(),
-       .environments = 16,
-       .quick = true},
-      {.name = "post_between_points",
-       .scene = "hard/post_between_points.xml",
-       .criterion = "largest sink of the box [m]",
-       .measure = largest_sink,
-       .bound = 5e-3,
-       .seconds = 0.5,
-       .steps = usual(),
-       .schemes = all(),
-       .quick = true},
-      {.name = "card_house",
-       .scene = "hard/card_house.xml",
-       .criterion = "largest sink of a card [m]",
-       .measure = largest_sink,
-       .bound = 5e-3,
-       .seconds = 2,
-       .steps = usual(),
-       .schemes = all()},
-      {.name = "box_through_plate",
-       .scene = "hard/box_through_plate.xml",
-       .criterion = "depth of the box's middle below the plate's [m]",
-       .measure = sinks_below(1, 0),
-       .bound = 0,
-       .seconds = 0.3,
-       .steps = usual(),
-       .schemes = all(),
-       .quick = true},
-      {.name = "box_through_plate_fast",
-       .scene = "hard/box_through_plate.xml",
-       .criterion = "depth of the box's middle below the plate's [m]",
-       .measure = sinks_below(1, 0),
-       .bound = 0,
-       .seconds = 0.3,
-       .steps = usual(),
-       .schemes = all(),
-       .variant = {.speed = 5 / 1.5},
-       .quick = true},
-      {.name = "ball_through_pad",
-       .scene = "hard/ball_through_pad.xml",
-       .criterion = "depth of the ball's middle below the pad's [m]",
-       .measure = sinks_below(1, 0),
-       .bound = 0,
-       .seconds = 0.05,
-       .steps = usual(),
-       .schemes = all(),
-       .quick = true},
-      {.name = "edge_drop",
-       .scene = "hard/edge_drop.xml",
-       .criterion = "depth of the box's middle below the ground [m]",
-       .measure = sinks_below_ground(0),
-       .bound = 0,
-       .seconds = 1,
-       .steps = usual(),
-       .schemes = all(),
-       .quick = true},
-  };
+  Cases cases;
+  add(cases, {"largest sink of a box [m]", largest_sink, 5e-3, 3},
+      {{.name = "stack_equal"},
+       {.name = "stack_shifted", .environments = 16},
+       {.name = "stack_unequal", .environments = 16}});
+  add(cases, {"largest sink of the box [m]", largest_sink, 5e-3, 0.5},
+      {{.name = "post_between_points"}});
+  add(cases, {"largest sink of a card [m]", largest_sink, 5e-3, 2},
+      {{.name = "card_house", .quick = false}});
+  add(cases, {"depth of the box's middle below the plate's [m]", sinks_below(1, 0), 0, 0.3},
+      {{.name = "box_through_plate"},
+       {.name = "box_through_plate_fast",
+        .scene = "box_through_plate",
+        .variant = {.speed = 5 / 1.5}}});
+  add(cases, {"depth of the ball's middle below the pad's [m]", sinks_below(1, 0), 0, 0.05},
+      {{.name = "ball_through_pad"}});
+  add(cases, {"depth of the box's middle below the ground [m]", sinks_below_ground(0), 0, 1},
+      {{.name = "edge_drop"}});
+  return cases;
 }
 
 Cases impacts() {
   Cases cases;
-  add_energy_case(cases, {.name = "ball_impact",
-                          .scene = "hard/ball_impact.xml",
-                          .seconds = 0.1,
-                          .steps = usual(),
-                          .quick = true});
-  add_energy_case(cases, {.name = "joint_limit",
-                          .scene = "hard/joint_limit.xml",
-                          .seconds = 0.2,
-                          .steps = usual(),
-                          .quick = true});
-  add_energy_case(cases, {.name = "cradle",
-                          .scene = "hard/cradle.xml",
-                          .seconds = 0.4,
-                          .steps = usual(),
-                          .quick = true});
-  add_energy_case(
-      cases,
-      {.name = "toss", .scene = "hard/toss.xml", .seconds = 1, .steps = usual(), .quick = true});
-  add_energy_case(
-      cases,
-      {.name = "painleve_rod", .scene = "hard/painleve_rod.xml", .seconds = 1, .steps = usual()});
-  cases.push_back({.name = "rebound",
-                   .scene = "hard/rebound.xml",
-                   .criterion = "error of the speed after the touch",
-                   .measure = speed_error(0, 1),
-                   .bound = 0.05,
-                   .seconds = 0.05,
-                   .steps = {1e-4, 1e-3, 5e-3},
-                   .schemes = all(),
-                   .quick = true});
-  cases.push_back({.name = "pull_off",
-                   .scene = "hard/pull_off.xml",
-                   .criterion = "speed lost",
-                   .measure = speed_error(1, 1),
-                   .bound = 1e-6,
-                   .seconds = 0.05,
-                   .steps = usual(),
-                   .schemes = all(),
-                   .quick = true});
-  cases.push_back({.name = "deep_overlap",
-                   .scene = "hard/deep_overlap.xml",
-                   .criterion = "speed over sqrt(kn/m) depth",
-                   .measure = release_speed(0, 9e-3),
-                   .bound = kSlightGain,
-                   .seconds = 0.1,
-                   .steps = usual(),
-                   .schemes = all(),
-                   .quick = true});
+  add_energy_case(cases, "ball_impact", 0.1, true);
+  add_energy_case(cases, "joint_limit", 0.2, true);
+  add_energy_case(cases, "cradle", 0.4, true);
+  add_energy_case(cases, "toss", 1, true);
+  add_energy_case(cases, "painleve_rod", 1, false);
+  add(cases,
+      {"error of the speed after the touch", speed_error(0, 1), 0.05, 0.05, {1e-4, 1e-3, 5e-3}},
+      {{.name = "rebound"}});
+  add(cases, {"speed lost", speed_error(1, 1), 1e-6, 0.05}, {{.name = "pull_off"}});
+  add(cases, {"speed over sqrt(kn/m) depth", release_speed(0, 9e-3), kSlightGain, 0.1},
+      {{.name = "deep_overlap"}});
   return cases;
 }
 
 Cases masses() {
-  return {
-      {.name = "light_beside_heavy",
-       .scene = "hard/light_beside_heavy.xml",
-       .criterion = "error of the way that the ball falls",
-       .measure = fall_error(0),
-       .bound = 0.02,
-       .seconds = 0.5,
-       .steps = {5e-3, 1e-3},
-       .schemes = all(),
-       .quick = true},
-      {.name = "heavy_on_light",
-       .scene = "hard/heavy_on_light.xml",
-       .criterion = "error of the light box's depth",
-       .measure = rest_depth_error(0, 0.05, 4, 1e6 + 1),
-       .bound = 0.01,
-       .seconds = 2,
-       .steps = usual(),
-       .schemes = all(),
-       .quick = true},
-      {.name = "cube_pair",
-       .scene = "hard/cube_pair.xml",
-       .criterion = "largest shift of a cube [m]",
-       .measure = largest_shift,
-       .bound = 1e-3,
-       .seconds = 1,
-       .steps = {1e-3, 5e-3},
-       .schemes = all(),
-       .quick = true},
-      {.name = "hard_batch",
-       .scene = "hard/hard_batch.xml",
-       .criterion = "depth of a box's middle below the ground [m]",
-       .measure = sinks_below_ground(0),
-       .bound = 0,
-       .seconds = 0.5,
-       .steps = {5e-3, 20e-3},
-       .schemes = all(),
-       .environments = 1024,
-       .may_fail = 1e-4},
-  };
+  Cases cases;
+  add(cases, {"error of the way that the ball falls", fall_error(0), 0.02, 0.5, {5e-3, 1e-3}},
+      {{.name = "light_beside_heavy"}});
+  add(cases, {"error of the light box's depth", rest_depth_error(0, 0.05, 4, 1e6 + 1), 0.01, 2},
+      {{.name = "heavy_on_light"}});
+  add(cases, {"largest shift of a cube [m]", largest_shift, 1e-3, 1, {1e-3, 5e-3}},
+      {{.name = "cube_pair"}});
+  add(cases,
+      {"depth of a box's middle below the ground [m]",
+       sinks_below_ground(0),
+       0,
+       0.5,
+       {5e-3, 20e-3}},
+      {{.name = "hard_batch", .environments = 1024, .may_fail = 1e-4, .quick = false}});
+  return cases;
 }
 
 Cases rotations() {
-  Cases cases{
-      {.name = "fast_spin",
-       .scene = "hard/fast_spin.xml",
-       .criterion = "error of the angle [turns]",
-       .measure = turn_error(0),
-       .bound = 1e-6,
-       .seconds = 1,
-       .steps = usual(),
-       .schemes = all(),
-       .quick = true},
-      {.name = "tumbling_momentum",
-       .scene = "hard/tumbling.xml",
-       .criterion = "change of angular momentum",
-       .measure = momentum_change,
-       .bound = 0.02,
-       .seconds = 1,
-       .steps = {5e-3, 1e-3},
-       .schemes = all(),
-       .quick = true},
-      {.name = "tumbling_energy",
-       .scene = "hard/tumbling.xml",
-       .criterion = "change of energy",
-       .measure = energy_change,
-       .bound = 0.02,
-       .seconds = 1,
-       .steps = {5e-3, 1e-3},
-       .schemes = all(),
-       .quick = true},
-      {.name = "heavy_top",
-       .scene = "hard/heavy_top.xml",
-       .criterion = "error of the rate around the vertical",
-       .measure = precession_error(0),
-       .bound = 0.01,
-       .seconds = 5,
-       .steps = {1e-3, 5e-3},
-       .schemes = all()},
-  };
-  add_energy_case(
-      cases,
-      {.name = "chain_whipped", .scene = "hard/chain_whipped.xml", .seconds = 1, .steps = usual()});
-  add_energy_case(
-      cases, {.name = "chain_20", .scene = "hard/chain_20.xml", .seconds = 2, .steps = usual()});
-  add_energy_case(cases, {.name = "chain_100",
-                          .scene = "hard/chain_100.xml",
-                          .seconds = 1,
-                          .steps = usual(),
-                          .quick = true});
+  Cases cases;
+  add(cases, {"error of the angle [turns]", turn_error(0), 1e-6, 1}, {{.name = "fast_spin"}});
+  add(cases, {"change of angular momentum", momentum_change, 0.02, 1, {5e-3, 1e-3}},
+      {{.name = "tumbling_momentum", .scene = "tumbling"}});
+  add(cases, {"change of energy", energy_change, 0.02, 1, {5e-3, 1e-3}},
+      {{.name = "tumbling_energy", .scene = "tumbling"}});
+  add(cases, {"error of the rate around the vertical", precession_error(0), 0.01, 5, {1e-3, 5e-3}},
+      {{.name = "heavy_top", .quick = false}});
+  add_energy_case(cases, "chain_whipped", 1, false);
+  add_energy_case(cases, "chain_20", 2, false);
+  add_energy_case(cases, "chain_100", 1, true);
   return cases;
 }
 
 Cases closed_forms() {
-  Cases cases{
-      {.name = "far_away",
-       .scene = "hard/far_away.xml",
-       .criterion = "error of the depth",
-       .measure = rest_depth_error(0, 0.01, 1),
-       .bound = 1e-9,
-       .seconds = 2,
-       .steps = usual(),
-       .schemes = all(),
-       .quick = true},
-      {.name = "rolling",
-       .scene = "hard/rolling.xml",
-       .criterion = "error of the rolling speed",
-       .measure = speed_error(0, 5.0 / 7),
-       .bound = 1e-3,
-       .seconds = 1,
-       .steps = usual(),
-       .schemes = all(),
-       .quick = true},
-      {.name = "motor_gain",
-       .scene = "hard/motor_gain.xml",
-       .criterion = "distance from the target [rad]",
-       .measure = angle_error(0, 0.5),
-       .bound = 1e-9,
-       .seconds = 0.5,
-       .steps = usual(),
-       .schemes = all(),
-       .quick = true},
-      {.name = "slope_below",
-       .scene = "hard/slope_below.xml",
-       .criterion = "error of the creeping speed",
-       .measure = creep_error(0, 4),
-       .bound = 1e-6,
-       .seconds = 1,
-       .steps = usual(),
-       .schemes = all(),
-       .quick = true},
-      {.name = "slope_above",
-       .scene = "hard/slope_above.xml",
-       .criterion = "error of the acceleration",
-       .measure = slide_error(0),
-       .bound = 1e-3,
-       .seconds = 2,
-       .steps = usual(),
-       .schemes = all(),
-       .quick = true},
-      {.name = "sliding_cube",
-       .scene = "hard/sliding_cube.xml",
-       .criterion = "error of the way until it stops",
-       .measure = stop_error(0, 4),
-       .bound = 0.02,
-       .seconds = 1,
-       .steps = {5e-3, 1e-3},
-       .schemes = all(),
-       .quick = true},
-  };
-  for (const auto& [name, factor] :
-       {std::pair{"ball_at_rest_1e2", 1.0}, std::pair{"ball_at_rest_1e5", 1e3},
-        std::pair{"ball_at_rest_1e8", 1e6}})
-    cases.push_back({.name = name,
-                     .scene = "hard/ball_at_rest.xml",
-                     .criterion = "error of the depth",
-                     .measure = rest_depth_error(0, 0.01, 1),
-                     .bound = 0.01,
-                     .seconds = 2,
-                     .steps = usual(),
-                     .schemes = all(),
-                     .variant = {.kn = factor},
-                     .quick = true});
+  Cases cases;
+  add(cases, {"error of the depth", rest_depth_error(0, 0.01, 1), 1e-9, 2}, {{.name = "far_away"}});
+  add(cases, {"error of the rolling speed", speed_error(0, 5.0 / 7), 1e-3, 1},
+      {{.name = "rolling"}});
+  add(cases, {"distance from the target [rad]", angle_error(0, 0.5), 1e-9, 0.5},
+      {{.name = "motor_gain"}});
+  add(cases, {"error of the creeping speed", creep_error(0, 4), 1e-6, 1},
+      {{.name = "slope_below"}});
+  add(cases, {"error of the acceleration", slide_error(0), 1e-3, 2}, {{.name = "slope_above"}});
+  add(cases, {"error of the way until it stops", stop_error(0, 4), 0.02, 1, {5e-3, 1e-3}},
+      {{.name = "sliding_cube"}});
+  add(cases, {"error of the depth", rest_depth_error(0, 0.01, 1), 0.01, 2},
+      {{.name = "ball_at_rest_1e2", .scene = "ball_at_rest"},
+       {.name = "ball_at_rest_1e5", .scene = "ball_at_rest", .variant = {.kn = 1e3}},
+       {.name = "ball_at_rest_1e8", .scene = "ball_at_rest", .variant = {.kn = 1e6}}});
   return cases;
 }
 
 /// Friction that remembers holds what dampers let creep.
 Cases held() {
   Cases cases;
-  const auto add = [&](const char* name, const char* scene, const StressVariant& variant,
-                       bool quick) {
-    cases.push_back({.name = name,
-                     .scene = scene,
-                     .criterion = "way after the first second [m]",
-                     .measure = creep_after(1, 5e-3),
-                     .bound = 1e-6,
-                     .seconds = 10,
-                     .steps = usual(),
-                     .schemes = all(),
-                     .variant = variant,
-                     .quick = quick});
-  };
-  add("slope_kept", "hard/slope_below.xml", {.ks = 0.25}, true);
-  add("grasp_kept", "hard/held_box.xml", {}, true);
-  add("card_house_kept", "hard/card_house.xml", {.ks = 0.25}, false);
-  add("arch_kept", "hard/arch.xml", {}, true);
+  add(cases, {"way after the first second [m]", creep_after(1, 5e-3), 1e-6, 10},
+      {{.name = "slope_kept", .scene = "slope_below", .variant = {.ks = 0.25}},
+       {.name = "grasp_kept", .scene = "held_box"},
+       {.name = "card_house_kept", .scene = "card_house", .variant = {.ks = 0.25}, .quick = false},
+       {.name = "arch_kept", .scene = "arch"}});
   return cases;
 }
 

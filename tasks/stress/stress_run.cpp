@@ -15,6 +15,7 @@
 #include "engine/step/stepper.hpp"
 #include "tasks/run/block_threads.hpp"
 #include "tasks/run/costly_steps.hpp"
+#include "tasks/run/episode_program.hpp"
 #include "tasks/run/step_tally.hpp"
 
 namespace tangere {
@@ -32,8 +33,7 @@ struct Setting {
 /// What one block came to.
 struct BlockOutcome {
   double worst = -HUGE_VAL;  ///< of the environments that did not fail; NaN where one has no number
-  std::int64_t steps = 0, evaluations = 0, split_steps = 0, coarse_steps = 0, passed_steps = 0,
-               damped_steps = 0;
+  StepCounts counts{};
   int most_evaluations = 0;
   bool silent = false;  ///< an environment misses the bound and no status of it says anything
   std::vector<FailedEnvironment> failures{};
@@ -69,16 +69,14 @@ struct Play {
           histories[l].add(w.readout, batch, e);
     };
     record();
-    std::vector<bool> said(
-        as_size(lanes));  // whose steps missed the accuracy, let a body through or were damped
-    const std::size_t nu = as_size(model().nu());
+    // Those whose steps missed the accuracy, let a body through or were damped.
+    std::vector<bool> flagged(as_size(lanes));
     for (std::int64_t k = 0; k < steps; ++k) {
       if (stopped || (go_on && !go_on())) {
         stopped = true;
         return;
       }
-      for (int e = first; e < first + lanes; ++e)
-        controls.evaluate(k, batch.episode(e), u.subspan(as_size(e) * nu, nu));
+      write_controls(controls, k, batch, b, u);
       w.stepper.step_block(batch, b, u);
       for (int e = first; e < first + lanes; ++e) {
         if (!tally.live(e)) continue;
@@ -86,26 +84,21 @@ struct Play {
         const StepStatus status = batch.status(e);
         if (status == StepStatus::coarse || status == StepStatus::passed ||
             status == StepStatus::damped)
-          said[as_size(e - first)] = true;
+          flagged[as_size(e - first)] = true;
       }
       tally.count(batch, k);
       record();
     }
     for (std::size_t l = 0; l < histories.size(); ++l)
-      if (tally.live(first + static_cast<int>(l))) judge(histories[l], said[l], out);
-    out.steps = tally.environment_steps;
-    out.evaluations = tally.newton_iterations;
-    out.split_steps = tally.split_steps;
-    out.coarse_steps = tally.coarse_steps;
-    out.passed_steps = tally.passed_steps;
-    out.damped_steps = tally.damped_steps;
+      if (tally.live(first + static_cast<int>(l))) judge(histories[l], flagged[l], out);
+    out.counts = tally.counts;
     out.failures = std::move(tally.failures);
   }
 
-  void judge(const StressHistory& history, bool said, BlockOutcome& out) const {
+  void judge(const StressHistory& history, bool flagged, BlockOutcome& out) const {
     const double value = measure(history);
     if (!(value <= out.worst)) out.worst = std::isnan(out.worst) ? out.worst : value;
-    if (!(value <= bound) && !said) out.silent = true;
+    if (!(value <= bound) && !flagged) out.silent = true;
   }
 };
 
@@ -141,13 +134,8 @@ std::optional<BlockOutcome> play(const Scene& scene, const StressCase& of, const
   BlockOutcome sum;
   for (const BlockOutcome& b : blocks) {
     if (!(b.worst <= sum.worst)) sum.worst = std::isnan(sum.worst) ? sum.worst : b.worst;
-    sum.steps += b.steps;
-    sum.evaluations += b.evaluations;
+    sum.counts += b.counts;
     sum.silent = sum.silent || b.silent;
-    sum.split_steps += b.split_steps;
-    sum.coarse_steps += b.coarse_steps;
-    sum.passed_steps += b.passed_steps;
-    sum.damped_steps += b.damped_steps;
     sum.most_evaluations = std::max(sum.most_evaluations, b.most_evaluations);
     sum.failures.insert(sum.failures.end(), b.failures.begin(), b.failures.end());
   }
@@ -156,17 +144,14 @@ std::optional<BlockOutcome> play(const Scene& scene, const StressCase& of, const
 }
 
 double passes(const BlockOutcome& out) {
-  return static_cast<double>(out.evaluations) / static_cast<double>(out.steps);
+  return static_cast<double>(out.counts.newton_iterations) /
+         static_cast<double>(out.counts.simulation_steps);
 }
 
 void judge(const BlockOutcome& out, StressRow& row) {
   row.evaluations = passes(out);
   row.most_evaluations = out.most_evaluations;
-  row.steps = out.steps;
-  row.split_steps = out.split_steps;
-  row.coarse_steps = out.coarse_steps;
-  row.passed_steps = out.passed_steps;
-  row.damped_steps = out.damped_steps;
+  row.counts = out.counts;
   row.failed = static_cast<int>(out.failures.size());
   const bool nobody_left = row.of->measure && row.failed == row.environments;
   const bool met = nobody_left || row.value <= row.of->bound;  // false for NaN
@@ -181,20 +166,18 @@ void judge(const BlockOutcome& out, StressRow& row) {
   if (row.verdict != StressVerdict::flagged) return;
   if (row.failed > 0)
     row.reason = to_string(out.failures.front().status);
-  else if (row.passed_steps > 0)
+  else if (row.counts.passed_steps > 0)
     row.reason = to_string(StepStatus::passed);
-  else if (row.coarse_steps > 0)
+  else if (row.counts.coarse_steps > 0)
     row.reason = to_string(StepStatus::coarse);
-  else if (row.damped_steps > 0)
+  else if (row.counts.damped_steps > 0)
     row.reason = to_string(StepStatus::damped);
 }
 
 /// What a run of the same steps warns of; "" if of nothing.
 std::string warning_of(const Scene& scene, const StressRow& row) {
   if (row.accuracy > 0) return "";
-  if (!row.of->measure)
-    return costly_steps(row.integrator, row.steps,
-                        std::llround(row.evaluations * double(row.steps)), row.split_steps);
+  if (!row.of->measure) return costly_steps(row.integrator, row.counts);
   const auto lines = short_touches(Model(scene), row.integrator, row.step);
   return lines.empty() ? "" : lines.front();
 }

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "tasks/run/step_counts.hpp"
 #include "tasks/stress/stress_case.hpp"
 
 namespace tangere {
@@ -29,11 +30,7 @@ struct StressRow {
   double value = 0;          ///< measured, in the worst environment that did not fail; NaN: none
   double evaluations = 0;    ///< of the residual, per step
   int most_evaluations = 0;  ///< in one step of one environment
-  std::int64_t steps = 0;    ///< of all environments
-  std::int64_t split_steps = 0;
-  std::int64_t coarse_steps = 0;  ///< with parts that missed the accuracy
-  std::int64_t passed_steps = 0;  ///< in which a body came through another
-  std::int64_t damped_steps = 0;  ///< that would have created energy
+  StepCounts counts;         ///< of all environments
   int environments = 0, failed = 0;
   StressVerdict verdict = StressVerdict::fails;
   std::string reason;  ///< why it is flagged; "" otherwise

@@ -224,14 +224,6 @@ TEST(Bench, FailedEnvironmentsAreListed) {
   EXPECT_THAT(people.err, HasSubstr("not listed: 5; --json names all"));
 }
 
-struct Refusal {
-  const char* name;
-  Words words;
-  int exit_code;
-  const char* message;
-};
-void PrintTo(const Refusal& refusal, std::ostream* out) { *out << refusal.name; }
-
 class BenchRefuses : public testing::TestWithParam<Refusal> {};
 
 TEST_P(BenchRefuses, AndLeavesNothing) {

@@ -203,14 +203,6 @@ TEST(Generate, ShardsThatExistAreKeptUnlessOverwritten) {
   EXPECT_EQ(folder.read("set/notes.txt"), "mine");
 }
 
-struct Refusal {
-  const char* name;
-  Words words;
-  int exit_code;
-  const char* message;
-};
-void PrintTo(const Refusal& refusal, std::ostream* out) { *out << refusal.name; }
-
 class GenerateRefuses : public testing::TestWithParam<Refusal> {};
 
 TEST_P(GenerateRefuses, AndLeavesNothing) {

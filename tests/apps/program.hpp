@@ -7,6 +7,7 @@
 
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <ostream>
 #include <string>
 #include <vector>
 
@@ -17,6 +18,15 @@ inline Words operator+(Words first, const Words& second) {
   first.insert(first.end(), second.begin(), second.end());
   return first;
 }
+
+/// Words that a subcommand refuses, with what it ends and says.
+struct Refusal {
+  const char* name;
+  Words words;
+  int exit_code;
+  const char* message;
+};
+inline void PrintTo(const Refusal& refusal, std::ostream* out) { *out << refusal.name; }
 
 /// A folder for one test, deleted at its end. `path("a.h5")` is the path of a file in it.
 class Folder {

@@ -311,8 +311,8 @@ std::vector<Violation> check_heavy_headers(const Tree& tree) {
   static const std::map<std::string, std::map<std::string, int>> allowed{
       {"CLI/", {{"apps", 1}}},
       {"Eigen/", {{"engine/derivative", 1}, {"engine/step", 1}, {"tasks/gradients", 1}}},
-      {"hdf5.h", {{"io/hdf5", 5}, {"io/dataset", 10}, {"io/trajectory", 4}, {"io/view", 4}}},
-      {"nlohmann/json.hpp", {{"apps", 28}, {"io/dataset", 2}, {"io/view", 1}}},
+      {"hdf5.h", {{"io/hdf5", 8}, {"io/dataset", 10}, {"io/trajectory", 4}, {"io/view", 4}}},
+      {"nlohmann/json.hpp", {{"apps", 31}, {"io/dataset", 2}, {"io/view", 1}}},
       {"tbb/flow_graph.h", {{"tasks/run", 1}}},
       {"regex", {}},
       {"iostream", {}}};
@@ -356,7 +356,7 @@ std::vector<Violation> check_own_headers(const Tree& tree) {
       {"apps/simulate.cpp", "a subcommand: apps/command.hpp"},
       {"apps/validate.cpp", "a subcommand: apps/command.hpp"},
       {"apps/view.cpp", "a subcommand: apps/command.hpp"},
-      {"io/dataset/layout_from_model.cpp", "a part of dataset_layout.hpp"},
+      {"io/hdf5/h5_values.cpp", "a part of h5.hpp"},
       {"io/view/view_dataset.cpp", "a part of view_source.hpp"},
       {"io/view/view_trajectory.cpp", "a part of view_source.hpp"},
       {"io/robot/mjcf_actuators.cpp", "a part of mjcf_file.hpp"},
@@ -483,6 +483,7 @@ std::vector<Violation> check_circles(const Tree& tree) {
 }
 
 constexpr std::ptrdiff_t kMostColumns = 100;
+constexpr std::ptrdiff_t kMostScriptColumns = 120;  // shell and CMake
 
 /// Characters of a line: bytes of UTF-8 that begin one. Marks above letters (U+0300 to U+036F) take
 /// no column; their first byte is 0xCC or 0xCD.
@@ -495,11 +496,10 @@ static std::ptrdiff_t columns_of(const std::string& line) {
 
 /// Complains about a line that has too many columns.
 static void check_columns(const std::string& path, int number, const std::string& line,
-                          std::vector<Violation>& found) {
-  if (const std::ptrdiff_t columns = columns_of(line); columns > kMostColumns)
+                          std::ptrdiff_t most, std::vector<Violation>& found) {
+  if (const std::ptrdiff_t columns = columns_of(line); columns > most)
     found.push_back(
-        {path, number,
-         std::to_string(columns) + " columns, at most " + std::to_string(kMostColumns)});
+        {path, number, std::to_string(columns) + " columns, at most " + std::to_string(most)});
 }
 
 std::vector<Violation> check_sources(const Tree& tree) {
@@ -521,9 +521,10 @@ std::vector<Violation> check_sources(const Tree& tree) {
                      });
     if (spdx == lines.begin() + std::ptrdiff_t(std::min(head, lines.size())))
       found.push_back({path, 1, "has no line 'SPDX-License-Identifier: Apache-2.0' at its head"});
-    if (is_cpp(path) || ends_with_any(path, {".js", ".py"}))
-      for (std::size_t i = 0; i < lines.size(); ++i)
-        check_columns(path, static_cast<int>(i) + 1, lines[i], found);
+    const bool narrow = is_cpp(path) || ends_with_any(path, {".js", ".py"});
+    for (std::size_t i = 0; i < lines.size(); ++i)
+      check_columns(path, static_cast<int>(i) + 1, lines[i],
+                    narrow ? kMostColumns : kMostScriptColumns, found);
     if (is_cpp(path) && (lines.size() < 2 || !lines[1].starts_with("//")))
       found.push_back({path, 2, "expected a comment that says why the file exists"});
   }
@@ -562,7 +563,7 @@ std::vector<Violation> check_documents(const Tree& tree) {
     int number = 0;
     for (const std::string& line : lines_of(text)) {
       ++number;
-      if (line.starts_with('|')) check_columns(path, number, line, found);
+      if (line.starts_with('|')) check_columns(path, number, line, kMostColumns, found);
       for (std::sregex_iterator match(line.begin(), line.end(), link), end; match != end; ++match) {
         const std::string target = (*match)[1];
         if (target.find("://") != std::string::npos || target.starts_with("mailto:")) continue;

@@ -174,7 +174,10 @@ TEST(HouseRules, SeeAHeadlessOrOverlongSource) {
   std::string longest = head, too_long = head + "\n", marks;
   for (int i = 2; i < 600; ++i) longest += "\n", too_long += "\n";
   for (int i = 0; i < 99; ++i) marks += "µ";
+  const std::string script = "# SPDX-License-Identifier: Apache-2.0\n# " + std::string(118, 'x');
   const Tree tree{
+      {"cmake/fits.sh", script + "\n"},
+      {"cmake/wide.sh", script + "x\n"},
       {"engine/bare.hpp", "#pragma once\n"},
       {"engine/empty.cpp", ""},
       {"engine/longest.cpp", longest},
@@ -188,12 +191,12 @@ TEST(HouseRules, SeeAHeadlessOrOverlongSource) {
       {"tests/CMakeLists.txt", "add_test()\n"}};
   EXPECT_THAT(
       check_sources(tree),
-      ElementsAre(Says("engine/bare.hpp", 1, "SPDX"), Says("engine/bare.hpp", 2, "why"),
-                  Says("engine/empty.cpp", 1, "SPDX"), Says("engine/empty.cpp", 2, "why"),
-                  Says("engine/mute.cpp", 2, "why"), Says("engine/too_long.cpp", 0, "601 lines"),
-                  Says("engine/wide.cpp", 3, "102 columns"),
-                  Says("io/page/wide.js", 2, "101 columns"),
-                  Says("tests/CMakeLists.txt", 1, "SPDX")));
+      ElementsAre(
+          Says("cmake/wide.sh", 2, "121 columns"), Says("engine/bare.hpp", 1, "SPDX"),
+          Says("engine/bare.hpp", 2, "why"), Says("engine/empty.cpp", 1, "SPDX"),
+          Says("engine/empty.cpp", 2, "why"), Says("engine/mute.cpp", 2, "why"),
+          Says("engine/too_long.cpp", 0, "601 lines"), Says("engine/wide.cpp", 3, "102 columns"),
+          Says("io/page/wide.js", 2, "101 columns"), Says("tests/CMakeLists.txt", 1, "SPDX")));
 }
 
 TEST(HouseRules, SeeAnUndocumentedFolderAndADeadLink) {

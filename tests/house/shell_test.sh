@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # shellcheck disable=SC2016  # fakes expand their own variables
 # SPDX-License-Identifier: Apache-2.0
-# run-demo, run-tests and run-learning on machines that lack things: a PATH of fakes stands for each machine, nothing here is touched.
-# Usage: shell_test.sh PROJECT_ROOT
+# run-demo, run-tests and run-learning on machines that lack things: a PATH of fakes stands for each machine, nothing
+# here is touched. Usage: shell_test.sh PROJECT_ROOT
 set -euo pipefail
 project=$1
 temporary=$(mktemp -d)
@@ -18,7 +18,7 @@ machine() {
   mkdir -p "$bin" "$home/project/cmake"
   : >"$log"
   cp "$project"/run-demo "$project"/run-tests "$project"/run-learning "$project"/CMakePresets.json "$home/project"
-  cp "$project"/cmake/shell.sh "$project"/cmake/packages.txt "$project"/cmake/test-packages.txt "$project"/cmake/python-packages.txt "$project"/cmake/python.txt "$home/project/cmake"
+  cp "$project"/cmake/{shell.sh,packages.txt,test-packages.txt,python-packages.txt,python.txt} "$home/project/cmake"
   local tool
   for tool in bash sed grep tr sort head awk env nproc dirname readlink cat mkdir rm ls ctest sleep; do
     ln -s "$(type -P "$tool")" "$bin/$tool"
@@ -32,7 +32,7 @@ machine() {
       [ -n "${FAKE_LIE:-}" ] || for last; do echo "$last"; done >>"$FAKE_HOME/installed" ;;
     esac'
   fake cmake 'if [ "$1" = --version ]; then echo "cmake version ${FAKE_CMAKE:-3.25.1}"; fi'
-  sed -e 's/#.*//' "$project/cmake/packages.txt" "$project/cmake/test-packages.txt" "$project/cmake/python-packages.txt" >"$home/installed"
+  sed -e 's/#.*//' "$project"/cmake/{packages,test-packages,python-packages}.txt >"$home/installed"
 }
 fake() {
   printf '#!/usr/bin/env bash\necho "%s $*" >>"$FAKE_HOME/log"\n%s\n' "$1" "$2" >"$bin/$1"
@@ -44,15 +44,16 @@ lacks() { sed -i "/^$1\$/d" "$home/installed"; }
 run() {
   local script=${*: -1}
   status=0
-  output=$(cd / && env -i PATH="$bin" FAKE_HOME="$home" CI=true "${@:1:$#-1}" "$home/project/$script" </dev/null 2>&1) ||
-    status=$?
+  output=$(cd / && env -i PATH="$bin" FAKE_HOME="$home" CI=true "${@:1:$#-1}" \
+    "$home/project/$script" </dev/null 2>&1) || status=$?
 }
 expect() {
   local what=$1
   shift
   if ! "$@"; then
     failures=$((failures + 1))
-    printf 'FAILED: %s: %s\nstatus %s, output:\n%s\ncalls:\n%s\n\n' "$name" "$what" "$status" "$output" "$(grep -v ^dpkg-query "$log")"
+    printf 'FAILED: %s: %s\nstatus %s, output:\n%s\ncalls:\n%s\n\n' "$name" "$what" "$status" "$output" \
+      "$(grep -v ^dpkg-query "$log")"
   fi
 }
 passes() { [ "$status" -eq 0 ]; }
@@ -155,7 +156,8 @@ test_in release true
 test_in asan true
 run run-tests
 expect "passes" passes
-expect "ends with ctest's closing lines and what was run" grep -q "^Total Test time" <<<"$(tail -n 2 <<<"$output" | head -n 1)"
+expect "ends with ctest's closing lines and what was run" \
+  grep -q "^Total Test time" <<<"$(tail -n 2 <<<"$output" | head -n 1)"
 ends_with() { grep -qF -- "$1" <<<"$(tail -n 4 <<<"$output")"; }
 expect "says what was run" ends_with "Every test of build/release passed"
 expect "counts" prints "100% tests passed, 0 tests failed out of 1"
@@ -165,7 +167,8 @@ expect "fails when a sanitizer finds something" fails
 expect "runs the others all the same" prints "100% tests passed, 0 tests failed out of 1"
 expect "names it at the end" ends_with "asan: one"
 test_in asan true
-fake skipping_program 'printf "[ RUN      ] A.Skips\na_test.cpp:1: Skipped\nmpirun is not installed\n\n[  SKIPPED ] A.Skips (0 ms)\n"'
+fake skipping_program 'printf "[ RUN      ] A.Skips\na_test.cpp:1: Skipped\nmpirun is not installed\n\n"
+  printf "[  SKIPPED ] A.Skips (0 ms)\n"'
 test_in release "$bin/skipping_program"
 run run-tests
 expect "passes with what was skipped" passes
@@ -200,8 +203,8 @@ machine two-pythons
 fake python3 ''
 if [ -x /usr/bin/python3 ]; then
   status=0
-  output=$(cd "$home/project" && env -i PATH="$bin:/usr/bin" FAKE_HOME="$home" bash -c '. cmake/shell.sh; python3; python_program' 2>&1) ||
-    status=$?
+  output=$(cd "$home/project" && env -i PATH="$bin:/usr/bin" FAKE_HOME="$home" \
+    bash -c '. cmake/shell.sh; python3; python_program' 2>&1) || status=$?
   expect "takes the distribution's Python although another one was run" prints "/usr/bin/python3"
 fi
 

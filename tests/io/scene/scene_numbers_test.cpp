@@ -11,9 +11,9 @@
 #include "engine/model/compiled_model.hpp"
 #include "engine/model/model.hpp"
 #include "engine/model/scene_number.hpp"
-#include "io/dataset/dataset_layout.hpp"
+#include "io/dataset/dataset_from_model.hpp"
 #include "io/scene/scene_reader.hpp"
-#include "io/trajectory/trajectory_layout.hpp"
+#include "io/trajectory/layout_from_model.hpp"
 
 namespace tangere {
 namespace {

@@ -136,7 +136,7 @@ TEST(AccuracyRun, AReferenceIsAtNoDistanceFromItself) {
     const AccuracySetting setting{Integrator::sdirk2, 10, 1e-10};
     const AccuracyOutcome made = run->make_reference(setting, {});
     EXPECT_NEAR(made.simulated_seconds, 3 * 0.75, 1e-12);
-    EXPECT_EQ(made.environment_steps, 3 * 300);
+    EXPECT_EQ(made.counts.simulation_steps, 3 * 300);
     EXPECT_THAT(run->compare(setting, {}).error[0], Each(0.0));
   }
 }

@@ -10,6 +10,7 @@
 #include <string>
 
 #include "io/scene/scene_reader.hpp"
+#include "tasks/run/checksum.hpp"
 #include "tests/tasks/task_check.hpp"
 
 namespace tangere {
@@ -51,7 +52,7 @@ TEST(BenchmarkRun, ChecksumsDoNotDependOnThreads) {
     const BenchmarkResult more = result_of(70, options(threads));
     EXPECT_EQ(more.checksum(), one.checksum()) << threads << " threads";
     EXPECT_THAT(more.checksums, ElementsAreArray(one.checksums)) << threads << " threads";
-    EXPECT_EQ(more.newton_iterations, one.newton_iterations);
+    EXPECT_EQ(more.counts.newton_iterations, one.counts.newton_iterations);
   }
 }
 
@@ -128,8 +129,8 @@ TEST(BenchmarkRun, StepsAndReadsWhatARolloutDoes) {
   const ControlProgram controls(model, model.timestep(), kSeed);
   const RolloutSummary summary = run_rollout(batch, stepper, controls, {kSteps, kEvery}, sink);
   const BenchmarkResult result = result_of(kEnvironments, options(1));
-  EXPECT_EQ(result.environment_steps, summary.environment_steps);
-  EXPECT_EQ(result.newton_iterations, summary.newton_iterations);
+  EXPECT_EQ(result.environment_steps, summary.counts.simulation_steps);
+  EXPECT_EQ(result.counts.newton_iterations, summary.counts.newton_iterations);
   EXPECT_EQ(result.tactile_points, kSteps / kEvery * std::int64_t{kEnvironments} * 32 * 32);
 
   ASSERT_THAT(sink.fields, SizeIs(kSteps / kEvery));
@@ -230,8 +231,8 @@ TEST(BenchmarkRun, ATaskIsPlayedAsAVectorTaskPlaysIt) {
           run_benchmark(Batch(task->model(), kEnvironments, kSeed), *task, policy, o);
       EXPECT_THAT(result.checksums, ElementsAreArray(expected)) << name;
       EXPECT_EQ(result.environment_steps, vector.counts().environment_steps);
-      EXPECT_EQ(result.simulation_steps, vector.counts().simulation_steps);
-      EXPECT_EQ(result.newton_iterations, vector.counts().newton_iterations);
+      EXPECT_EQ(result.counts.simulation_steps, vector.counts().steps.simulation_steps);
+      EXPECT_EQ(result.counts.newton_iterations, vector.counts().steps.newton_iterations);
     }
   }
 }

@@ -76,7 +76,7 @@ TEST(Episodes, AreThoseSteppedByHand) {
   EXPECT_EQ(summary.episodes, kEpisodes);
   EXPECT_EQ(summary.rows, kEpisodes * kRows);
   EXPECT_EQ(summary.environment_steps, kEpisodes * kSteps);
-  EXPECT_GE(summary.newton_iterations, summary.environment_steps);
+  EXPECT_GE(summary.counts.newton_iterations, summary.environment_steps);
   EXPECT_FALSE(summary.stopped);
   EXPECT_THAT(summary.failures, ::testing::IsEmpty());
 }

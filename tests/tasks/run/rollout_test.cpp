@@ -116,14 +116,14 @@ TEST_F(Rollout, GivesEveryRowInOrder) {
   EXPECT_EQ(memory_.order,
             "q0 u0 q1 t1[0]1 u1 q2 t0[0]2 t1[1]2 u2 q3 t1[2]3 u3 q4 t0[1]4 t1[3]4 u4 q5 t1[4]5 ");
   EXPECT_EQ(summary.steps, 5);
-  EXPECT_EQ(summary.environment_steps, 10);
+  EXPECT_EQ(summary.counts.simulation_steps, 10);
   EXPECT_FALSE(summary.stopped);
   EXPECT_TRUE(summary.failures.empty());
   EXPECT_GT(summary.seconds, 0);
   std::int64_t iterations = 0;
   for (const StoredStep& step : memory_.steps)
     for (std::int32_t i : step.iterations) iterations += i;
-  EXPECT_EQ(summary.newton_iterations, iterations);
+  EXPECT_EQ(summary.counts.newton_iterations, iterations);
   EXPECT_GT(iterations, 0);
 }
 
@@ -195,7 +195,7 @@ TEST_F(Rollout, AFailedEnvironmentIsARecordAndDisturbsNobody) {
   EXPECT_EQ(summary.failures[0].status, batch.status(1));
   EXPECT_TRUE(failed(batch.status(1)));
   EXPECT_EQ(summary.steps, 5);
-  EXPECT_EQ(summary.environment_steps, 2 * 5 + 1);
+  EXPECT_EQ(summary.counts.simulation_steps, 2 * 5 + 1);
   EXPECT_GT(memory_.steps[0].iterations[1], 0) << "it was given up without a try";
   for (std::size_t t = 1; t < 5; ++t) EXPECT_EQ(memory_.steps[t].iterations[1], 0) << t;
   for (std::size_t t = 0; t < 5; ++t) {

@@ -53,7 +53,7 @@ TEST(StressRun, HoldsWhereTheCriterionIsMet) {
   EXPECT_EQ(row.verdict, StressVerdict::holds);
   EXPECT_EQ(row.integrator, Integrator::bdf1);
   EXPECT_EQ(row.step, 5e-3);
-  EXPECT_EQ(row.steps, 2 * 20);
+  EXPECT_EQ(row.counts.simulation_steps, 2 * 20);
   EXPECT_GE(row.evaluations, 1);
   EXPECT_GE(row.most_evaluations, row.evaluations);
   EXPECT_GT(row.value, 0.009);

@@ -1,0 +1,125 @@
+// SPDX-License-Identifier: Apache-2.0
+// The command that makes a data set again is written from the options, without what changes no
+// byte.
+#include "apps/generate_layout.hpp"
+
+#include <fmt/format.h>
+
+#include "io/dataset/dataset_from_model.hpp"
+#include "io/files/name_list.hpp"
+#include "io/files/text_file.hpp"
+#include "kernels/table/isa.hpp"
+
+namespace tangere::apps {
+namespace {
+
+/// Names a table by its content, because a path may lead elsewhere on another machine.
+std::string controls_named(const std::string& path) {
+  if (path.empty()) return "of the scene";
+  constexpr std::size_t kLargestTable = std::size_t{1} << 32;
+  std::uint64_t hash = 0xCBF29CE484222325ULL;  // FNV-1a
+  for (const char c : read_text_file(path, kLargestTable, "a csv file"))
+    hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001B3ULL;
+  return fmt::format("a table of checksum {:016x}", hash);
+}
+
+/// Names what is recorded, for the files.
+void describe(const Record& record, const Model& model, const EpisodeOptions& run,
+              DatasetDescription& description) {
+  for (const AskedOutput& asked : record.asked) {
+    description.record.push_back(asked.name);
+    description.record_times.push_back(asked.times);
+  }
+  const std::vector<std::string> names(model.body_names().begin(), model.body_names().end());
+  for (const BodyRows& rows : run.bodies) {
+    const bool all = rows.bodies.empty();
+    const std::string one = all ? "" : names[static_cast<std::size_t>(rows.bodies.front())];
+    description.bodies.push_back(
+        {all ? "bodies" : body_output(one), all ? names : std::vector{one}});
+  }
+}
+
+std::vector<std::string> split_if_any(const std::string& list) {
+  return list.empty() ? std::vector<std::string>{} : split_names("--record", list);
+}
+
+/// For a shell that reads the command again.
+std::string quoted(const std::string& word) {
+  std::string text = "'";
+  for (const char c : word) text += c == '\'' ? std::string("'\\''") : std::string(1, c);
+  return text + "'";
+}
+
+/// Returns the command that makes the same data set again, in any folder and on any number of
+/// threads. With --program, this holds if the program is found from there and answers the same.
+std::string command_of(const GenerateOptions& options, const EpisodeOptions& run,
+                       const std::string& policy) {
+  std::string command = fmt::format("tangere generate {} --episodes {} --seed {} --precision {}",
+                                    options.scene, run.episodes, run.seed, options.precision);
+  if (policy.empty()) command += fmt::format(" --steps {} --every {}", run.steps, run.every);
+  if (!policy.empty()) command += " --policy " + policy;
+  if (options.noise) command += fmt::format(" --noise {}", *options.noise);
+  if (!options.mix.empty()) command += " --mix " + options.mix;
+  if (!options.name.empty()) command += " --name " + options.name;
+  if (!options.program.empty()) command += " --program " + quoted(options.program);
+  if (!options.controls.empty()) command += " --controls " + options.controls;
+  if (options.accuracy) command += fmt::format(" --accuracy {}", *options.accuracy);
+  if (options.sleep) command += " --sleep";
+  if (options.compress != "none") command += " --compress " + options.compress;
+  if (options.tactile != "dense") command += " --tactile " + options.tactile;
+  if (!options.record.empty()) command += " --record " + options.record;
+  if (options.shards) command += fmt::format(" --shards {}", *options.shards);
+  if (options.gradients != "none") command += " --gradients " + options.gradients;
+  if (!options.loss.empty()) command += " --loss " + options.loss;
+  return command;
+}
+
+}  // namespace
+
+void take(const Record& record, const Model& model, EpisodeOptions& run) {
+  const auto rows_of = [&](const char* name) -> RowOutput {
+    const AskedOutput* const asked = record.find(name);
+    return {record.asked.empty() || asked != nullptr, asked ? asked->times : OutputTimes{}};
+  };
+  run.fields = record.outputs.fields;
+  run.q = rows_of("q"), run.v = rows_of("v"), run.end_effectors = rows_of("variables");
+  if (const AskedOutput* const all = record.find("bodies")) run.bodies.push_back({{}, all->times});
+  for (int b = 0; b < model.nb(); ++b)  // in the order of the scene, whatever that of the words
+    if (const AskedOutput* const one =
+            record.find(body_output(model.body_names()[static_cast<std::size_t>(b)])))
+      run.bodies.push_back({{b}, one->times});
+}
+
+DatasetLayout make_layout(const GenerateOptions& options, const Model& model,
+                          const Stepper& stepper, const EpisodeOptions& run, const Record& record,
+                          const ProgramInfo& info, const GradientPlan& gradients, const Task* task,
+                          const PlayedBy& played_by) {
+  DatasetDescription description;
+  if (task != nullptr) description.task = task->spec();
+  description.played_by = played_by;
+  description.set_name = options.name;
+  description.controls = controls_named(options.controls);
+  description.command = command_of(options, run, played_by.policy);
+  description.shards = options.shards.value_or(0);
+  description.compression = options.compress;
+  if (task == nullptr)
+    describe(record, model, run, description);
+  else
+    description.record = split_if_any(options.record);
+  description.fields = record.outputs.fields;
+  description.sparse = options.tactile == "sparse";
+  description.gradients_of =
+      options.loss.empty() ? options.gradients : options.gradients + " " + options.loss;
+  description.gradients = gradients.arrays;
+  description.episodes = run.episodes;
+  description.steps = run.steps;
+  description.every = run.every;
+  description.seed = run.seed;
+  description.precision = to_string(run.precision);
+  description.single = run.precision == Precision::mixed;
+  description.version = info.version;
+  description.instruction_set = kernels::active_isa_name();
+  return dataset_layout_from(model, stepper, description);
+}
+
+}  // namespace tangere::apps

@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the files of a data set say, and which rows are computed for them.
+#pragma once
+
+#include "apps/command.hpp"
+#include "apps/generate_options.hpp"
+#include "apps/record.hpp"
+#include "engine/step/stepper.hpp"
+#include "io/dataset/dataset_layout.hpp"
+#include "tasks/gradients/episode_gradients.hpp"
+#include "tasks/run/episodes.hpp"
+
+namespace tangere::apps {
+
+/// What of an episode's rows is computed: what the record asks for, or everything.
+void take(const Record& record, const Model& model, EpisodeOptions& run);
+
+/// `task`: null for a scene alone.
+DatasetLayout make_layout(const GenerateOptions& options, const Model& model,
+                          const Stepper& stepper, const EpisodeOptions& run, const Record& record,
+                          const ProgramInfo& info, const GradientPlan& gradients,
+                          const Task* task = nullptr, const PlayedBy& played_by = {});
+
+}  // namespace tangere::apps

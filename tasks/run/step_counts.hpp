@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: Apache-2.0
+// What steps took, in the same numbers for rollouts, episodes, benchmarks, cases and tasks.
+#pragma once
+
+#include <cstdint>
+
+#include "engine/step/batch.hpp"
+
+namespace tangere {
+
+/// Sums over steps of single environments.
+struct StepCounts {
+  std::int64_t simulation_steps = 0;
+  std::int64_t newton_iterations = 0;
+  std::int64_t split_steps = 0;
+  std::int64_t coarse_steps = 0;   ///< with parts that missed the accuracy that was asked for
+  std::int64_t passed_steps = 0;   ///< in which a body came through another
+  std::int64_t damped_steps = 0;   ///< that would have created energy
+  std::int64_t bodies_asleep = 0;  ///< summed over simulation_steps
+
+  /// Counts the step that an environment has just taken.
+  void count(const Batch& batch, int environment) {
+    const StepStatus status = batch.status(environment);
+    ++simulation_steps;
+    newton_iterations += batch.iterations(environment);
+    split_steps += status == StepStatus::split ? 1 : 0;
+    coarse_steps += status == StepStatus::coarse ? 1 : 0;
+    passed_steps += status == StepStatus::passed ? 1 : 0;
+    damped_steps += status == StepStatus::damped ? 1 : 0;
+    bodies_asleep += batch.sleep(environment).bodies;
+  }
+
+  StepCounts& operator+=(const StepCounts& other) {
+    simulation_steps += other.simulation_steps;
+    newton_iterations += other.newton_iterations;
+    split_steps += other.split_steps;
+    coarse_steps += other.coarse_steps;
+    passed_steps += other.passed_steps;
+    damped_steps += other.damped_steps;
+    bodies_asleep += other.bodies_asleep;
+    return *this;
+  }
+};
+
+}  // namespace tangere
