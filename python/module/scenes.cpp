@@ -5,6 +5,7 @@
 #include <nanobind/stl/vector.h>
 
 #include "engine/model/field_form.hpp"
+#include "engine/model/model.hpp"
 #include "engine/model/scheme.hpp"
 #include "io/scene/scene_reader.hpp"
 #include "python/module/arrays.hpp"
