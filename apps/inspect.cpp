@@ -60,29 +60,30 @@ std::int64_t steps_of(const Model& model) {
   return ControlProgram(model, model.timestep(), 0).steps();
 }
 
-Json as_json(const Model& model) {
-  const Scene& scene = model.scene();
-  Json bodies = Json::array(), contacts = Json::array(), sensors = Json::array();
-  Json meshes = Json::array();
-  for (std::size_t b = 0; b < scene.links.size(); ++b) {
-    const LinkDescription& link = scene.links[b];
+/// A list with an entry for each value.
+template <class Values, class Entry>
+Json list_of(const Values& values, const Entry& entry) {
+  Json list = Json::array();
+  for (const auto& value : values) list.push_back(entry(value));
+  return list;
+}
+
+Json bodies_json(const Model& model) {
+  Json bodies = Json::array();
+  for (std::size_t b = 0; b < model.scene().links.size(); ++b) {
+    const LinkDescription& link = model.scene().links[b];
     bodies.push_back({{"name", link.body.name},
                       {"shape", shape_name(link.body.shape)},
                       {"mass", model.mass(static_cast<int>(b))},
                       {"joint", link.joint.name},
                       {"joint_type", to_string(link.joint.type)},
-                      {"parent", parent_name(scene, link)}});
+                      {"parent", parent_name(model.scene(), link)}});
   }
-  for (const ContactInfo& c : model.contacts())
-    contacts.push_back(
-        {{"first", c.first}, {"second", c.second}, {"points", c.points}, {"law", c.law}});
-  for (const MeshInfo& m : model.meshes())
-    meshes.push_back({{"body", m.body},
-                      {"cells", m.cells},
-                      {"cell", m.cell},
-                      {"bytes", m.bytes},
-                      {"error", m.error},
-                      {"unresolved", m.unresolved}});
+  return bodies;
+}
+
+Json sensors_json(const Model& model) {
+  Json sensors = Json::array();
   for (std::size_t k = 0; k < model.sensors().size(); ++k) {
     const SensorInfo& s = model.sensors()[k];
     sensors.push_back({{"name", s.name},
@@ -92,14 +93,28 @@ Json as_json(const Model& model) {
                        {"points", s.points},
                        {"every", s.every},
                        {"pressure_sign", s.pressure_sign},
-                       {"markers", scene.sensors[k].markers.has_value()}});
+                       {"markers", model.scene().sensors[k].markers.has_value()}});
   }
-  Json end_effectors = Json::array();
-  for (const EndEffectorInfo& v : model.end_effectors())
-    end_effectors.push_back({{"name", v.name}, {"joint", v.joint}});
-  Json stages = Json::array();
-  for (const StageInfo& s : model.stages())
-    stages.push_back({{"name", s.name}, {"of", s.of}, {"variant", s.variant}});
+  return sensors;
+}
+
+Json contact_json(const ContactInfo& c) {
+  return {{"first", c.first}, {"second", c.second}, {"points", c.points}, {"law", c.law}};
+}
+
+Json mesh_json(const MeshInfo& m) {
+  return {{"body", m.body},   {"cells", m.cells}, {"cell", m.cell},
+          {"bytes", m.bytes}, {"error", m.error}, {"unresolved", m.unresolved}};
+}
+
+Json end_effector_json(const EndEffectorInfo& v) { return {{"name", v.name}, {"joint", v.joint}}; }
+
+Json stage_json(const StageInfo& s) {
+  return {{"name", s.name}, {"of", s.of}, {"variant", s.variant}};
+}
+
+Json as_json(const Model& model) {
+  const Scene& scene = model.scene();
   const std::int64_t steps = steps_of(model);
   return {{"command", "inspect"},
           {"exit_code", 0},
@@ -111,24 +126,24 @@ Json as_json(const Model& model) {
           {"accuracy", Stepper(model).accuracy()},
           {"sleep", model.solver().sleep},
           {"gravity", scene.gravity},
-          {"bodies", bodies},
+          {"bodies", bodies_json(model)},
           {"q_names", model.q_names()},
           {"v_names", model.v_names()},
           {"u_names", model.u_names()},
           {"u_units", model.u_units()},
           {"joint_effects", joint_effects_json(scene)},
           {"motors", motors_json(scene)},
-          {"contacts", contacts},
-          {"meshes", meshes},
-          {"sensors", sensors},
-          {"variables", end_effectors},
+          {"contacts", list_of(model.contacts(), contact_json)},
+          {"meshes", list_of(model.meshes(), mesh_json)},
+          {"sensors", sensors_json(model)},
+          {"variables", list_of(model.end_effectors(), end_effector_json)},
           {"outputs", scene.outputs ? Json(scene.outputs->record) : Json()},
           {"control", control_name(scene)},
           {"steps", steps < 0 ? Json() : Json(steps)},
           {"randomized", randomized_names(scene)},
           {"randomized_units", randomized_units(scene)},
           {"effects", effects_json(model.effects())},
-          {"stages", stages},
+          {"stages", list_of(model.stages(), stage_json)},
           {"state_bytes_per_environment", model.state_bytes_per_environment()},
           {"workspace_bytes", Stepper::workspace_bytes(model)},
           {"instruction_set", kernels::active_isa_name()}};

@@ -92,6 +92,7 @@ set(public_headers
   kernels/table/isa.hpp
   tasks/catalogue/task.hpp
   tasks/catalogue/task_list.hpp
+  tasks/gradients/gradient_options.hpp
   tasks/gradients/gradients.hpp
   tasks/gradients/identification.hpp
   tasks/gradients/losses.hpp
@@ -107,6 +108,7 @@ set(public_headers
   tasks/run/benchmark_run.hpp
   tasks/run/block_worker.hpp
   tasks/run/episode_program.hpp
+  tasks/run/episode_options.hpp
   tasks/run/episodes.hpp
   tasks/run/policy.hpp
   tasks/run/rollout.hpp

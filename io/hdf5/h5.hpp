@@ -23,8 +23,8 @@ namespace tangere::h5 {
 /// followed only to files of the same folder. The caller does not close them.
 hid_t link_access(hid_t kind);
 
-/// Properties of H5P_FILE_CREATE, H5P_GROUP_CREATE or H5P_DATASET_CREATE with which objects carry no
-/// times, so that the same numbers give the same bytes.
+/// Properties of H5P_FILE_CREATE, H5P_GROUP_CREATE or H5P_DATASET_CREATE with which objects carry
+/// no times, so that the same numbers give the same bytes.
 Id without_times(hid_t kind);
 
 using Dims = std::vector<hsize_t>;

@@ -15,6 +15,7 @@
 #include "python/module/module.hpp"
 #include "python/module/options.hpp"
 #include "tasks/run/block_reader.hpp"
+#include "tasks/run/episode_program.hpp"
 
 namespace tangere::python {
 
@@ -273,13 +274,11 @@ Array<double> PythonBatch::scene_controls(std::int64_t steps) {
   std::span<double> numbers;
   auto array = new_array<double>({as_size(steps), count(), nu}, numbers);
   for (std::int64_t t = 0; t < steps; ++t)
-    for (int e = 0; e < environments(); ++e)
-      program.evaluate(t, batch_.episode(e),
-                       numbers.subspan((as_size(t) * count() + as_size(e)) * nu, nu));
+    write_controls(program, t, batch_, numbers.subspan(as_size(t) * count() * nu, count() * nu));
   return array;
 }
 
-void add_batches(nb::module_& m) {
+static void add_run(nb::module_& m) {
   nb::class_<Run>(m, "Run", "What Batch.run() leaves: F = steps / every frames.")
       .def_prop_ro(
           "q", [](const Run& r) { return r.q; }, nb::rv_policy::automatic,
@@ -293,7 +292,10 @@ void add_batches(nb::module_& m) {
       .def_prop_ro(
           "status", [](const Run& r) { return r.status; }, nb::rv_policy::automatic,
           "(E) int8: of the last step; negative where an environment failed.");
+}
 
+void add_batches(nb::module_& m) {
+  add_run(m);
   nb::class_<PythonBatch>(
       m, "Batch",
       "Many environments of one model, stepped together on all cores. Results are new arrays.\n"

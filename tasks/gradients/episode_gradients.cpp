@@ -8,6 +8,7 @@
 
 #include "engine/base/as_size.hpp"
 #include "engine/derivative/number_gradients.hpp"
+#include "tasks/gradients/gradients.hpp"
 #include "tasks/gradients/loss_block.hpp"
 #include "tasks/gradients/return_block.hpp"
 #include "tasks/gradients/row_jacobians.hpp"

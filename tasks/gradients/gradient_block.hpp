@@ -10,7 +10,7 @@
 
 #include "engine/derivative/number_gradients.hpp"
 #include "engine/derivative/readout_pullback.hpp"
-#include "tasks/gradients/gradients.hpp"
+#include "tasks/gradients/gradient_options.hpp"
 #include "tasks/run/block_threads.hpp"
 
 namespace tangere {

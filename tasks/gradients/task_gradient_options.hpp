@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "tasks/gradients/gradients.hpp"
+#include "tasks/gradients/gradient_options.hpp"
 
 namespace tangere {
 

@@ -7,8 +7,11 @@
 #include <span>
 #include <vector>
 
+#include "engine/base/precision.hpp"
 #include "engine/sense/readout.hpp"
-#include "tasks/run/vector_task.hpp"
+#include "engine/step/stepper.hpp"
+#include "tasks/catalogue/task.hpp"
+#include "tasks/run/step_counts.hpp"
 
 namespace tangere {
 

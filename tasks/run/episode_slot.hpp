@@ -23,8 +23,8 @@ class EpisodeSlot {
 
   /// Starts a block with the episodes of `range`, at most 16.
   void begin(EpisodeRange range);
-  /// Steps through the rows of the next piece. `on_steps` gets the environment steps of each. Returns
-  /// false if `stop` ended it; the piece is then void.
+  /// Steps through the rows of the next piece. `on_steps` gets the environment steps of each.
+  /// Returns false if `stop` ended it; the piece is then void.
   [[nodiscard]] bool simulate(const StopRequest& stop,
                               const std::function<void(std::int64_t)>& on_steps);
 

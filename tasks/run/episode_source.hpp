@@ -7,8 +7,10 @@
 #include <memory>
 #include <vector>
 
+#include "engine/step/control.hpp"
+#include "engine/step/stepper.hpp"
+#include "tasks/run/episode_options.hpp"
 #include "tasks/run/episode_program.hpp"
-#include "tasks/run/episodes.hpp"
 
 namespace tangere {
 

@@ -27,10 +27,6 @@ namespace {
 
 namespace flow = tbb::flow;
 
-void check_at_least_one(const char* what, std::int64_t value) {
-  if (value < 1) throw InputError(fmt::format("{} {}; expected at least 1", value, what));
-}
-
 void check(const EpisodeOptions& options) {
   check_at_least_one("episodes", options.episodes);
   check_at_least_one("threads", options.threads);
@@ -283,16 +279,6 @@ std::vector<EpisodeRange> checked_ranges(const std::vector<EpisodeRange>& ranges
       throw InputError(fmt::format("episodes {} to {} of {}; expected whole blocks of {}",
                                    range.first, range.end, episodes, kBlockEpisodes));
   return ranges;
-}
-
-std::int64_t action_rows(const EpisodeOptions& options) {
-  check_at_least_one("steps", options.steps);
-  check_at_least_one("steps per action", options.every);
-  if (options.steps % options.every != 0)
-    throw InputError(
-        fmt::format("{} steps, and an action is held for {}; expected a multiple of {} steps",
-                    options.steps, options.every, options.every));
-  return options.steps / options.every;
 }
 
 int action_interval(const Model& model, int every) {

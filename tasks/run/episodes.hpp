@@ -10,76 +10,15 @@
 #pragma once
 
 #include <cstdint>
-#include <functional>
-#include <optional>
 #include <vector>
 
-#include "engine/base/precision.hpp"
-#include "engine/model/field_form.hpp"
 #include "engine/rows/episode_sink.hpp"
 #include "engine/step/control.hpp"
 #include "engine/step/stepper.hpp"
+#include "tasks/run/episode_options.hpp"
 #include "tasks/run/policy.hpp"
-#include "tasks/run/step_counts.hpp"
 
 namespace tangere {
-
-/// Whether a scene's rows hold something, and when.
-struct RowOutput {
-  bool wanted = true;
-  OutputTimes times = {};  ///< in steps, a multiple of EpisodeOptions::every; none: in every row
-};
-/// Poses and twists of bodies in a scene's rows: (bodies, 13), each x y z qw qx qy qz, then angular
-/// and linear velocity, as Readout::bodies() gives them.
-struct BodyRows {
-  std::vector<int> bodies = {};  ///< none: every body
-  OutputTimes times = {};        ///< as in RowOutput
-};
-
-struct EpisodeOptions {
-  std::int64_t episodes = 0;
-  std::vector<EpisodeRange> ranges = {};  ///< episodes to simulate, ascending; none: all
-  std::int64_t steps = 0;                 ///< of a scene's episode, a multiple of `every`
-  int every = 1;  ///< K: steps for which a scene's action is held, and between observations
-  std::uint64_t seed = 0;
-  /// What is read of a scene's tactile fields; none: the field of every sensor.
-  std::optional<std::vector<FieldOutput>> fields = {};
-  RowOutput q = {}, v = {}, end_effectors = {};  ///< of a scene
-  std::vector<BodyRows> bodies = {};             ///< of a scene, one observation each
-  Precision precision =
-      Precision::f64;  ///< mixed: fields are computed in it, observations leave as float32
-  int threads = 1;
-  /// Limit of blocks of 16 episodes in memory. For a task this includes blocks that wait until an
-  /// earlier one is written, because episodes differ in length.
-  int blocks_in_flight = 2;
-  /// Row buffers of one block in flight [bytes]. A piece has as many rows as fit, at least one. A
-  /// block of a task is always one piece.
-  std::size_t piece_bytes = std::size_t{32} << 20;
-};
-
-struct EpisodeSummary {
-  std::int64_t episodes = 0;  ///< finished, failed ones included
-  std::int64_t rows = 0;      ///< of episodes that did not fail
-  /// Of a scene: steps tried, failing ones included. Of a task: actions.
-  std::int64_t environment_steps = 0;
-  StepCounts counts;                    ///< of a scene: of environment_steps
-  std::int64_t successes = 0;           ///< of a task's episodes that did not fail
-  double mean_return = 0;               ///< over the same episodes
-  std::vector<FailedEpisode> failures;  ///< in ascending order
-  int peak_blocks_in_flight = 0;
-  bool stopped = false;  ///< by StopRequest; unfinished blocks are lost
-  double seconds = 0;    ///< wall clock of the whole run, sink included
-  /// Sums over threads: time for stepping, for turning rows into the stored form (compression
-  /// included), and for the one thread that writes.
-  double simulation_seconds = 0, encoding_seconds = 0, writing_seconds = 0;
-};
-
-/// Is called after each row of each block, by one thread at a time, with the environment steps
-/// done.
-using EpisodeProgress = std::function<void(std::int64_t environment_steps)>;
-/// Is called before every step, by all threads at once. True ends the run without finishing a
-/// block.
-using StopRequest = std::function<bool()>;
 
 /// Simulates episodes 0 … episodes - 1, or those of `ranges`, and hands them to the sink. Draws for
 /// an episode are keyed by (seed, episode), so neither `threads` nor `blocks_in_flight` changes a
@@ -101,9 +40,6 @@ EpisodeSummary run_episodes(const Task& task, const Policy& policy, const Episod
 /// outside.
 std::vector<EpisodeRange> checked_ranges(const std::vector<EpisodeRange>& ranges,
                                          std::int64_t episodes);
-
-/// Actions of an episode, R = steps / every. Throws InputError when R is not whole.
-std::int64_t action_rows(const EpisodeOptions& options);
 
 /// Returns K: `every` if positive, else the interval of the scene's sensors, else 1. Throws
 /// InputError when the sensors disagree.

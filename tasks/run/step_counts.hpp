@@ -42,4 +42,16 @@ struct StepCounts {
   }
 };
 
+/// What the environments of a task did, in actions and in steps.
+struct VectorCounts {
+  std::int64_t environment_steps = 0;  ///< actions taken, without those of openings
+  StepCounts steps;                    ///< of the simulation, without those that failed
+
+  VectorCounts& operator+=(const VectorCounts& other) {
+    environment_steps += other.environment_steps;
+    steps += other.steps;
+    return *this;
+  }
+};
+
 }  // namespace tangere

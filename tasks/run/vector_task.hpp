@@ -25,18 +25,6 @@ struct VectorOptions {
   bool autoreset = true;
 };
 
-/// Counts of the steps taken since the last reset(seed), over all environments.
-struct VectorCounts {
-  std::int64_t environment_steps = 0;  ///< actions taken, without those of openings
-  StepCounts steps;                    ///< of the simulation, without those that failed
-
-  VectorCounts& operator+=(const VectorCounts& other) {
-    environment_steps += other.environment_steps;
-    steps += other.steps;
-    return *this;
-  }
-};
-
 /// Environment e plays episodes first + e, first + e + E, first + e + 2 E … An episode depends only
 /// on the task, the seed, its number and the actions, not on E, threads, or the other environments.
 class VectorTask {
@@ -84,6 +72,7 @@ class VectorTask {
   [[nodiscard]] StepStatus status(int environment) const;
   /// What a policy with access to the state looks at: the current q, v and memory of the task.
   [[nodiscard]] TaskView view(int environment) const;
+  /// Of the steps since the last reset(seed), over all environments.
   [[nodiscard]] VectorCounts counts() const;
   /// The states themselves.
   [[nodiscard]] const Batch& batch() const;

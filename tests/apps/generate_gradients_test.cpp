@@ -14,6 +14,7 @@
 #include "io/hdf5/h5_listing.hpp"
 #include "io/scene/scene_reader.hpp"
 #include "tasks/catalogue/task_list.hpp"
+#include "tasks/gradients/gradients.hpp"
 #include "tasks/gradients/losses.hpp"
 #include "tasks/gradients/task_gradients.hpp"
 #include "tasks/run/policy.hpp"
