@@ -18,6 +18,7 @@
 
 #include "engine/base/error.hpp"
 #include "engine/model/triangle_tree.hpp"
+#include "kernels/contact/shapes/spline.hpp"
 
 namespace tangere {
 

@@ -9,6 +9,7 @@
 #include <cmath>
 #include <utility>
 
+#include "engine/model/model_part.hpp"
 #include "engine/step/lane_energy.hpp"
 
 namespace tangere {
@@ -134,6 +135,7 @@ bool Passing::stay_apart(const Gate& gate, const AlignedVector<LinkPose<Row<L>>>
 
 Passing::Passing(const CompiledModel& m) : model_(m), arm_(m.links.size(), 0.0) {
   for (const kernels::PairContact& p : m.pairs) {
+    if (!pushes(p.parameters)) continue;  // it holds nothing back
     add(p.link2, p.frame2, p.shape, p.size, p.link1, p.middle);
     if (p.body1 < 0) continue;
     const kernels::Solid& solid = m.solids[std::size_t(p.body1)];
