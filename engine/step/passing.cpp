@@ -188,6 +188,7 @@ LaneBits Passing::far_movers(const Row<L>* x, Row<L>* way) const {
 // evaluation was spared, kinematics ran once more, so |d| is that of the end.
 template <int L>
 LaneBits Passing::out_of_reach(const BasicWorkspace<L>& w, LaneBits lanes) const {
+  if (walls_.empty()) return lanes;
   if (!bounded_ || std::any_of(bounds_.begin(), bounds_.end(),
                                [&](const Bound& bound) { return w.apart[bound.link_pair] == 0; }))
     return kNoLane;
