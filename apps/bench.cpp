@@ -319,9 +319,8 @@ Command add_bench(CLI::App& program) {
   add_text(
       app, "--record", o.record, "LIST",
       "Readings to take, separated by commas: a sensor's field (pad), pad.pressure, pad.shear, "
-      "pad.sum, pad.ideal or pad.markers; pad/10 every 10th step, pad/final at the end [default: "
-      "the scene's "
-      "<outputs>, or all fields]");
+      "pad.sum, pad.ideal, pad.markers or pad.flow; pad/10 every 10th step, pad/final at the end "
+      "[default: the scene's <outputs>, or all fields]");
   add_whole_number<int>(app, "--repeat", o.repeat, 1, kMostPasses,
                         "Timed passes over the episode; the best counts [default: 3]");
   add_seed_option(app, o.seed);

@@ -314,10 +314,9 @@ void add_storage_options(CLI::App& app, GenerateOptions& o) {
   add_text(
       app, "--record", o.record, "LIST",
       "Observations to store, separated by commas: q, v, variables, bodies or bodies.NAME, a "
-      "sensor's field (pad), pad.pressure, pad.shear, pad.sum, pad.ideal or pad.markers; NAME/10 "
-      "every 10th "
-      "step, NAME/final at the end; the rest is not computed [default: the scene's <outputs>, or "
-      "all but bodies]");
+      "sensor's field (pad), pad.pressure, pad.shear, pad.sum, pad.ideal, pad.markers or pad.flow; "
+      "NAME/10 every 10th step, NAME/final at the end; the rest is not computed [default: the "
+      "scene's <outputs>, or all but bodies]");
   add_text(app, "--gradients", o.gradients, "KIND",
            "Derivatives to store: none, return (for a scene with --loss), or jacobians of each row "
            "[default: none]");

@@ -376,10 +376,9 @@ Command add_simulate(CLI::App& program) {
   add_text(
       app, "--record", o.record, "LIST",
       "What to compute and store besides q and v, separated by commas: bodies or bodies.NAME, "
-      "variables, a sensor's field (pad), pad.pressure, pad.shear, pad.sum, pad.ideal or "
-      "pad.markers; NAME/10 "
-      "every 10th step, NAME/final at the end, of q and v too [default: the scene's <outputs>, or "
-      "all]");
+      "variables, a sensor's field (pad), pad.pressure, pad.shear, pad.sum, pad.ideal, "
+      "pad.markers or pad.flow; NAME/10 every 10th step, NAME/final at the end, of q and v too "
+      "[default: the scene's <outputs>, or all]");
   add_flag(app, "--audit", o.audit,
            "Also compute and store energy and momentum, what motors, damping and friction did, and "
            "what the scheme made");

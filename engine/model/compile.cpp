@@ -14,6 +14,7 @@
 #include "engine/model/compile_memories.hpp"
 #include "engine/model/compile_sensor.hpp"
 #include "engine/model/compile_variations.hpp"
+#include "engine/model/components.hpp"
 #include "engine/model/contact_tiles.hpp"
 #include "engine/model/frames.hpp"
 #include "engine/model/group_contacts.hpp"
@@ -53,7 +54,7 @@ class Compiler {
     pair_contacts();
     ground_contacts();
     group_contacts(m_);
-    find_components();
+    components();
     sensors();
     end_effectors();
     randomizations();
@@ -378,27 +379,10 @@ class Compiler {
     }
   }
 
-  /// Sorts dofs by what they are connected with. The world connects nothing.
-  void find_components() {
-    std::vector<int> of(m_.links.size());
-    for (std::size_t i = 0; i < of.size(); ++i) {
-      const int parent = m_.links[i].parent;
-      of[i] = parent < 0 ? static_cast<int>(i) : of[std::size_t(parent)];
-    }
-    for (const auto& [a, b] : touching_) {
-      if (a < 0 || b < 0) continue;
-      const int first = of[std::size_t(a)], second = of[std::size_t(b)];
-      for (int& component : of)
-        if (component == std::max(first, second)) component = std::min(first, second);
-    }
-    m_.component_begin = {0};
-    for (int c = 0; c < static_cast<int>(of.size()); ++c) {
-      for (std::size_t i = 0; i < of.size(); ++i)
-        for (int k = 0; of[i] == c && k < kernels::dofs(m_.links[i].kind); ++k)
-          m_.component_dofs.push_back(m_.links[i].v + k);
-      const int end = static_cast<int>(m_.component_dofs.size());
-      if (end > m_.component_begin.back()) m_.component_begin.push_back(end);
-    }
+  void components() {
+    auto [dofs, begin] = find_components(m_.links, touching_);
+    m_.component_dofs = std::move(dofs);
+    m_.component_begin = std::move(begin);
   }
 
   void randomizations() {

@@ -5,6 +5,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
+#include <vector>
 
 #include "engine/model/body_shape.hpp"
 #include "engine/model/frames.hpp"
@@ -122,32 +124,73 @@ struct Sphere {
 };
 
 /// Returns a sphere around some tiles. Their radii have margins of their own.
-Sphere sphere_around(const CompiledSensor& s, int first, int end) {
+Sphere sphere_around(const CompiledSensor& s, const std::vector<int>& tiles) {
   const auto middle = [&](const AlignedVector<double>& centres) {
-    const auto [low, high] = std::minmax_element(centres.begin() + first, centres.begin() + end);
-    return 0.5 * (*low + *high);
+    double low = HUGE_VAL, high = -HUGE_VAL;
+    for (const int t : tiles) {
+      low = std::min(low, centres[std::size_t(t)]);
+      high = std::max(high, centres[std::size_t(t)]);
+    }
+    return 0.5 * (low + high);
   };
   Sphere out{{middle(s.tile_x), middle(s.tile_y), middle(s.tile_z)}, 0};
-  for (auto t = std::size_t(first); t < std::size_t(end); ++t) {
+  for (const int tile : tiles) {
+    const auto t = std::size_t(tile);
     const Vec3<double> away = Vec3<double>{s.tile_x[t], s.tile_y[t], s.tile_z[t]} - out.middle;
     out.radius = std::max(out.radius, (std::sqrt(dot(away, away)) + s.tile_radius[t]) * (1 + 1e-5));
   }
   return out;
 }
 
-/// Puts spheres around all tiles, and around eight at a time.
+/// Cuts the tiles into so many rows and columns of blocks. Returns a sphere around each.
+std::vector<Sphere> blocks_of(const CompiledSensor& s, int rows, int cols) {
+  std::vector<std::vector<int>> blocks(std::size_t(rows * cols));
+  for (int t = 0; t < s.n_tiles(); ++t) {
+    const int row = t / s.tile_cols * rows / s.tile_rows,
+              col = t % s.tile_cols * cols / s.tile_cols;
+    blocks[std::size_t(row * cols + col)].push_back(t);
+  }
+  std::vector<Sphere> spheres;
+  for (const std::vector<int>& block : blocks)
+    if (!block.empty()) spheres.push_back(sphere_around(s, block));
+  return spheres;
+}
+
+/// Puts up to eight spheres around all tiles: those of the cut whose largest is smallest.
+void bound_parts(CompiledSensor& s) {
+  constexpr int kParts = kernels::kGroup;
+  const auto largest = [](const std::vector<Sphere>& all) {
+    return std::ranges::max(all, {}, &Sphere::radius).radius;
+  };
+  std::vector<Sphere> best = blocks_of(s, kParts, 1);
+  for (int rows = kParts / 2; rows >= 1; rows /= 2)
+    if (std::vector<Sphere> cut = blocks_of(s, rows, kParts / rows); largest(cut) < largest(best))
+      best = std::move(cut);
+  best.resize(kParts, best.front());  // twice is no harm
+  for (const auto component : {0, 1, 2, 3})
+    for (const Sphere& part : best)
+      s.parts.push_back(component == 0   ? part.middle.x
+                        : component == 1 ? part.middle.y
+                        : component == 2 ? part.middle.z
+                                         : part.radius);
+}
+
+/// Puts spheres around all tiles, around the parts of the pad, and around eight tiles at a time.
 void bound_pad(CompiledSensor& s) {
   constexpr int kEight = kernels::kGroup;
-  const Sphere whole = sphere_around(s, 0, s.n_tiles());
+  const Sphere whole = blocks_of(s, 1, 1).front();
   s.middle[0] = whole.middle.x, s.middle[1] = whole.middle.y, s.middle[2] = whole.middle.z;
   s.reach = whole.radius;
+  bound_parts(s);
   const auto padded = std::size_t((s.n_tiles() + kEight * kEight - 1) / (kEight * kEight) * kEight);
   s.eight_x.assign(padded, kFarAway);
   s.eight_y.assign(padded, kFarAway);
   s.eight_z.assign(padded, 0.0);
   s.eight_radius.assign(padded, 0.0);
   for (int first = 0; first < s.n_tiles(); first += kEight) {
-    const Sphere eight = sphere_around(s, first, std::min(first + kEight, s.n_tiles()));
+    std::vector<int> tiles(std::size_t(std::min(kEight, s.n_tiles() - first)));
+    std::iota(tiles.begin(), tiles.end(), first);
+    const Sphere eight = sphere_around(s, tiles);
     const auto at = std::size_t(first / kEight);
     s.eight_x[at] = eight.middle.x, s.eight_y[at] = eight.middle.y, s.eight_z[at] = eight.middle.z;
     s.eight_radius[at] = eight.radius;

@@ -20,6 +20,7 @@ kernels::PadTiles CompiledSensor::tiles() const {
     p.frames = frames.data(), p.frames_f = frames_f.data();
   }
   if (!factors.empty()) p.factors = factors.data(), p.factors_f = factors_f.data();
+  p.parts = parts.data();
   std::copy(middle, middle + 3, p.middle);
   p.reach = reach;
   p.skewed = skewed;

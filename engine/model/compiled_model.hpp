@@ -80,6 +80,7 @@ struct CompiledSensor {
   /// Spheres around eight tiles each, pad axes [m]: (n_tiles / 8, padded to 8).
   AlignedVector<double> eight_x, eight_y, eight_z, eight_radius;
   double middle[3] = {}, reach = 0;  ///< a sphere around all points, pad axes [m]
+  AlignedVector<double> parts;       ///< (4, 8) spheres around eighths of the pad (PadTiles::parts)
   bool skewed = false;
   double axes[9] = {};  ///< rows axis0, axis1, -(axis0 × axis1), pad axes
   kernels::ContactParameters parameters{};

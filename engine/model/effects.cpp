@@ -253,7 +253,10 @@ bool element_on(const Scene& scene, const Element& d) {
 template <Part Of, class Element>
 std::string element_reason(const Scene& scene, const Element& d) {
   const auto text = [&](Field field) { return coefficient_text(scene, d, field); };
-  if (Of == Part::whole) return "declared, " + text(Field::kn);
+  const bool idle = !std::is_same_v<Element, TactileDescription> && !acts(scene, d, Field::kn) &&
+                    !acts(scene, d, Field::damping);
+  if (Of == Part::whole)
+    return "declared, " + text(Field::kn) + (idle ? ", no damping: it never pushes" : "");
   if (Of == Part::tangential)
     return text(Field::kt) + (acts(scene, d, Field::ks) ? ", " + text(Field::ks) : "") + ", " +
            text(Field::mu);

@@ -12,7 +12,8 @@ namespace tangere {
 
 namespace {
 constexpr FieldForm kForms[] = {FieldForm::field, FieldForm::pressure, FieldForm::shear,
-                                FieldForm::sum,   FieldForm::ideal,    FieldForm::markers};
+                                FieldForm::sum,   FieldForm::ideal,    FieldForm::markers,
+                                FieldForm::flow};
 constexpr const char* kPlain[] = {"q", "v", "variables", "bodies"};
 constexpr const char* kBody = "bodies.";  // followed by the name of one
 }  // namespace
@@ -25,6 +26,7 @@ const char* to_string(FieldForm form) {
     case FieldForm::sum: return "sum";
     case FieldForm::ideal: return "ideal";
     case FieldForm::markers: return "markers";
+    case FieldForm::flow: return "flow";
   }
   return "unknown";
 }
@@ -35,6 +37,7 @@ int components_of(FieldForm form) {
     case FieldForm::ideal: return 3;
     case FieldForm::pressure: return 1;
     case FieldForm::shear:
+    case FieldForm::flow:
     case FieldForm::markers: return 2;
     case FieldForm::sum: break;
   }

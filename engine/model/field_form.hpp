@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What is read of a tactile field: all of it, its pressure, its shear, its sum, or how it moves
-// markers. What nobody asks for is neither computed nor stored.
+// What is read of a tactile field: all of it, its pressure, its shear, its flow, its sum, or how it
+// moves markers. What nobody asks for is neither computed nor stored.
 #pragma once
 
 #include <array>
@@ -21,6 +21,7 @@ enum class FieldForm {
   sum,       ///< (6): force on the body [N], then where it presses [m], body axes
   ideal,     ///< the field without the sensor's imperfections
   markers,   ///< (points, 2) [m]: where the ideal field pushes them, along axis0 and axis1
+  flow,      ///< (points, 2): the shear over its largest length on this sensor; 0 without shear
 };
 
 /// Force x y z on the body [N], then its centre x y z [m]: the mean of the points' places, each
@@ -28,10 +29,10 @@ enum class FieldForm {
 /// nothing presses.
 using FieldSum = std::array<double, 6>;
 
-/// The words of files and options: "field", "pressure", "shear", "sum", "ideal", "markers".
+/// The words of files and options: "field", "pressure", "shear", "sum", "ideal", "markers", "flow".
 const char* to_string(FieldForm form);
 
-/// Numbers of a point: 3, 1, 2, 3, 2; 0 for a sum.
+/// Numbers of a point: 3, 1, 2, 3, 2, 2; 0 for a sum.
 int components_of(FieldForm form);
 /// Numbers of a whole reading.
 std::size_t numbers_of(int points, FieldForm form);
@@ -44,8 +45,14 @@ struct FieldOutput {
   friend bool operator==(const FieldOutput&, const FieldOutput&) = default;
 };
 
-/// Returns "pad" for a field, else "pad.pressure", "pad.shear", "pad.sum", "pad.ideal" or
-/// "pad.markers".
+/// Returns what a reading is computed from: a flow is a shear that is divided.
+inline FieldOutput undivided(FieldOutput of) {
+  if (of.form == FieldForm::flow) of.form = FieldForm::shear;
+  return of;
+}
+
+/// Returns "pad" for a field, else "pad.pressure", "pad.shear", "pad.sum", "pad.ideal",
+/// "pad.markers" or "pad.flow".
 std::string output_name(const std::string& sensor, FieldForm form);
 /// Returns the names of a scene's sensors, in file order.
 std::vector<std::string> sensor_names(const Scene& scene);

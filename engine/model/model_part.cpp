@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "engine/model/components.hpp"
+
 namespace tangere {
 
 namespace {
@@ -14,12 +16,16 @@ constexpr int kGone = -2;  // -1 is the world
 class Filter {
  public:
   Filter(const CompiledModel& whole, std::span<const int> tree,
-         std::span<const std::uint8_t> left_out)
-      : whole_(whole), part_(std::make_unique<ModelPart>()), m_(part_->model) {
+         std::span<const std::uint8_t> left_out, bool pushing_alone)
+      : whole_(whole),
+        part_(std::make_unique<ModelPart>()),
+        m_(part_->model),
+        pushing_alone_(pushing_alone) {
     links(tree, left_out);
     dofs();
     pairs();
     grounds();
+    components();
     m_.solids = whole.solids;
     for (const CompiledSensor& s : whole.sensors) {  // only their links matter for a step
       m_.sensors.emplace_back();
@@ -41,6 +47,10 @@ class Filter {
     return of_whole < 0 ? of_whole : link_[std::size_t(of_whole)];
   }
 
+  [[nodiscard]] bool stays(const kernels::ContactParameters& contact) const {
+    return !pushing_alone_ || pushes(contact);
+  }
+
   void links(std::span<const int> tree, std::span<const std::uint8_t> left_out) {
     link_.assign(whole_.links.size(), kGone);
     for (std::size_t i = 0; i < whole_.links.size(); ++i) {
@@ -57,18 +67,29 @@ class Filter {
   }
 
   void dofs() {
-    std::vector<int> of_part(std::size_t(whole_.nv), kGone);
+    dof_.assign(std::size_t(whole_.nv), kGone);
     for (std::size_t i = 0; i < part_->v.size(); ++i) {
       const std::size_t dof = std::size_t(part_->v[i]);
-      of_part[dof] = static_cast<int>(i);
+      dof_[dof] = static_cast<int>(i);
       m_.dof_effects.push_back(whole_.dof_effects[dof]);
       m_.unknown_scale.push_back(whole_.unknown_scale[dof]);
+    }
+  }
+
+  /// Bodies that only a sleeping one connects keep their common norm, so that their steps have the
+  /// bits that they have where all are awake.
+  void components() {
+    if (pushing_alone_) {
+      auto [dofs, begin] = find_components(m_.links, touching_);
+      m_.component_dofs = std::move(dofs);
+      m_.component_begin = std::move(begin);
+      return;
     }
     m_.component_begin = {0};
     for (int c = 0; c < whole_.components(); ++c) {
       for (int k = whole_.component_begin[std::size_t(c)];
            k < whole_.component_begin[std::size_t(c) + 1]; ++k)
-        if (const int dof = of_part[std::size_t(whole_.component_dofs[std::size_t(k)])]; dof >= 0)
+        if (const int dof = dof_[std::size_t(whole_.component_dofs[std::size_t(k)])]; dof >= 0)
           m_.component_dofs.push_back(dof);
       const int end = static_cast<int>(m_.component_dofs.size());
       if (end > m_.component_begin.back()) m_.component_begin.push_back(end);
@@ -84,11 +105,14 @@ class Filter {
       links.first = static_cast<int>(m_.pair_order.size());
       for (int i = first; i < first + links.count; ++i) {
         kernels::PairContact pair = whole_.pairs[std::size_t(whole_.pair_order[std::size_t(i)])];
+        if (!stays(pair.parameters)) continue;
         pair.link1 = links.link1;
         pair.link2 = links.link2;
         m_.pair_order.push_back(static_cast<int>(m_.pairs.size()));
         m_.pairs.push_back(pair);
       }
+      links.count = static_cast<int>(m_.pair_order.size()) - links.first;
+      if (links.count == 0) continue;
       m_.link_pairs.push_back(links);
       touching_.emplace_back(links.link1, links.link2);
     }
@@ -103,18 +127,21 @@ class Filter {
       for (int i = first; i < first + grounded.count; ++i) {
         kernels::GroundContact ground =
             whole_.grounds[std::size_t(whole_.ground_order[std::size_t(i)])];
+        if (!stays(ground.parameters)) continue;
         ground.link = grounded.link;
         m_.ground_order.push_back(static_cast<int>(m_.grounds.size()));
         m_.grounds.push_back(ground);
       }
-      m_.grounded.push_back(grounded);
+      grounded.count = static_cast<int>(m_.ground_order.size()) - grounded.first;
+      if (grounded.count > 0) m_.grounded.push_back(grounded);
     }
   }
 
   const CompiledModel& whole_;
   std::unique_ptr<ModelPart> part_;
   CompiledModel& m_;
-  std::vector<int> link_;  // of each link of the whole: its number in the part
+  bool pushing_alone_;           // contacts that never push are left out
+  std::vector<int> link_, dof_;  // of each link and dof of the whole: its number in the part
   std::vector<std::pair<int, int>> touching_;
 };
 
@@ -131,7 +158,17 @@ std::vector<int> trees_of(const std::vector<kernels::Link>& links) {
 
 std::unique_ptr<ModelPart> part_of(const CompiledModel& whole, std::span<const int> tree,
                                    std::span<const std::uint8_t> left_out) {
-  return Filter(whole, tree, left_out).part();
+  return Filter(whole, tree, left_out, false).part();
+}
+
+std::unique_ptr<ModelPart> pushing_part(const CompiledModel& whole) {
+  const auto all_push = [](const auto& contacts) {
+    return std::ranges::all_of(contacts, [](const auto& c) { return pushes(c.parameters); });
+  };
+  if (!whole.memories.empty() || (all_push(whole.pairs) && all_push(whole.grounds))) return nullptr;
+  const std::vector<int> one_tree(whole.links.size(), 0);
+  const std::uint8_t stays = 0;
+  return Filter(whole, one_tree, {&stays, 1}, true).part();
 }
 
 }  // namespace tangere

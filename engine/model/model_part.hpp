@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Some kinematic trees of a model as a model of their own, for steps in which the others sleep.
+// A part of a model as a model of its own: some kinematic trees, for steps in which the others
+// sleep, or all of them without the contacts that never push.
 #pragma once
 
 #include <cstdint>
@@ -14,10 +15,15 @@ namespace tangere {
 /// Returns the tree of each link. Joints make a tree; the world connects nothing.
 std::vector<int> trees_of(const std::vector<kernels::Link>& links);
 
-/// Trees of a model. Rows of the batch's blocks that parameters name are those of the whole model,
+/// Whether a contact with these coefficients can ever have a force: friction is bounded by μ|N|.
+inline bool pushes(const kernels::ContactParameters& p) {
+  return p.kn.value != 0 || p.kn.row >= 0 || p.damping.value != 0 || p.damping.row >= 0;
+}
+
+/// A part of a model. Rows of the batch's blocks that parameters name are those of the whole model,
 /// which must outlive its parts.
 struct ModelPart {
-  CompiledModel model;  ///< what a step reads: links, dofs and contacts of these trees
+  CompiledModel model;  ///< what a step reads: links, dofs and contacts of the part
   std::vector<int> q,
       v;  ///< (nq), (nv) coordinates and dofs of the part: their number in the whole
 };
@@ -26,5 +32,9 @@ struct ModelPart {
 /// link. `left_out`: (trees) 1: is left out; not all of them. Friction must not remember.
 std::unique_ptr<ModelPart> part_of(const CompiledModel& whole, std::span<const int> tree,
                                    std::span<const std::uint8_t> left_out);
+
+/// Returns the model without the contacts that never push (pushes), which is the model of
+/// a scene that does not name them. Null where all push, and where friction remembers.
+std::unique_ptr<ModelPart> pushing_part(const CompiledModel& whole);
 
 }  // namespace tangere

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tiles of a (points, components) array: zeroes them, fills them from (components, 64), or reads
-// them into it.
+// Tiles of a (points, components) array: zeroes them, fills them from (components, 64), reads them
+// into it, or normalises their shear.
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <span>
 
 #include "kernels/tactile/tactile_types.hpp"
@@ -81,6 +82,24 @@ void for_points_of_tile(const kernels::PadTiles& pad, int tile, const F& f) {
   const int rows = pad.rows_of(tile), cols = pad.cols_of(tile), first = pad.first_of(tile);
   for (int i = 0; i < rows; ++i)
     for (int j = 0; j < cols; ++j) f(i * kernels::kTileSide + j, first + i * pad.cols + j);
+}
+
+/// Divides the shear of some tiles, (points, 2), by its largest length among them
+/// (engine/sense/flow_map.hpp). Where all is zero it stays so.
+template <class T>
+void normalise_shear(const kernels::PadTiles& pad, std::span<const int> tiles, T* shear) {
+  const auto for_points = [&](const auto& f) {
+    for (const int tile : tiles)
+      for_points_of_tile(pad, tile, [&](int, int point) { f(shear + 2 * point); });
+  };
+  double longest = 0;
+  for_points([&](const T* s) {
+    longest = std::max(longest, std::hypot(static_cast<double>(s[0]), static_cast<double>(s[1])));
+  });
+  if (!(longest > 0)) return;
+  for_points([&](T* s) {
+    for (int k = 0; k < 2; ++k) s[k] = static_cast<T>(static_cast<double>(s[k]) / longest);
+  });
 }
 
 /// Reads a tile into (3, 64), with zeros where it has no point. Returns false where all of it is

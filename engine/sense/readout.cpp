@@ -161,11 +161,13 @@ struct Readout::Impl {
     });
   }
 
+  /// Returns the tiles that may hold other numbers than zero.
   template <class T>
-  void fill(int environment, FieldOutput of, T* dense) {
-    const int count = write_touched(environment, of, dense);
-    clear_tiles_between<T>(sensor_of(of.sensor).tiles(), {reader.active.data(), std::size_t(count)},
+  std::span<const int> fill(int environment, FieldOutput of, T* dense) {
+    const auto count = std::size_t(write_touched(environment, of, dense));
+    clear_tiles_between<T>(sensor_of(of.sensor).tiles(), {reader.active.data(), count},
                            components_of(of.form), dense);
+    return {reader.active.data(), count};
   }
 
   /// Whether memory of friction is part of a reading. Pressure is that of a skin without friction.
@@ -334,14 +336,16 @@ struct Readout::Impl {
   /// Writes the tiles touched now and zeroes those that no longer are.
   template <class T>
   void refresh(const Batch& batch, int environment, DenseFrame<T>& frame) {
-    if (const FieldOutput of{frame.sensor_, frame.form_}; imperfect(of)) {
-      write_imperfect(batch, environment, of, frame.values_.data());
+    const FieldOutput of{frame.sensor_, frame.form_}, computed = undivided(of);
+    if (imperfect(computed)) {
+      write(batch, environment, of, frame.values_.data());
       frame.mark_all();
       return;
     }
     const kernels::PadTiles pad = sensor_of(frame.sensor_).tiles();
-    const int count =
-        write_touched(environment, {frame.sensor_, frame.form_}, frame.values_.data());
+    const int count = write_touched(environment, computed, frame.values_.data());
+    if (of.form == FieldForm::flow)
+      normalise_shear(pad, {reader.active.data(), std::size_t(count)}, frame.values_.data());
     for (int old = 0, now = 0; old < frame.count_; ++old) {
       const int tile = frame.written_[std::size_t(old)];
       while (now < count && reader.active[std::size_t(now)] < tile) ++now;
@@ -447,8 +451,11 @@ struct Readout::Impl {
     place_block(batch, number, of.sensor);
     const bool derived = of.form == FieldForm::sum || of.form == FieldForm::markers;
     if (!derived && together(batch, number, of.sensor)) {
-      if (imperfect(of)) return fill_imperfect_block(batch, number, of, dense);
-      fill_block(of, environments, dense);
+      const FieldOutput computed = undivided(of);
+      imperfect(computed) ? fill_imperfect_block(batch, number, computed, dense)
+                          : fill_block(computed, environments, dense);
+      for (int e = 0; e < environments && of.form == FieldForm::flow; ++e)
+        normalise_shear(sensor_of(of.sensor).tiles(), all_tiles(of.sensor), dense[std::size_t(e)]);
     } else {
       for (int e = 0; e < environments; ++e) one(e);
     }
@@ -485,12 +492,15 @@ struct Readout::Impl {
   /// Writes a reading of an environment whose touches were found.
   template <class T>
   void write(const Batch& batch, int environment, FieldOutput of, T* to) {
-    if (imperfect(of)) {
-      write_imperfect(batch, environment, of, to);
+    if (imperfect(undivided(of))) {
+      write_imperfect(batch, environment, undivided(of), to);
+      if (of.form == FieldForm::flow)
+        normalise_shear(sensor_of(of.sensor).tiles(), all_tiles(of.sensor), to);
     } else if (of.form == FieldForm::sum) {
       add_up(environment, of.sensor, to);
     } else {
-      fill(environment, of, to);
+      const std::span<const int> tiles = fill(environment, undivided(of), to);
+      if (of.form == FieldForm::flow) normalise_shear(sensor_of(of.sensor).tiles(), tiles, to);
     }
   }
 };

@@ -54,13 +54,15 @@ void worst_scaled_residuals(const CompiledModel& m, const BasicWorkspace<L>& w, 
         force[l] += f * f;
       }
     }
-    for (int l = 0; l < L; ++l) {
-      if (residual[l] <= w.floors[c][l]) continue;
+    Row scaled;
+    for (int l = 0; l < L; ++l) {  // without branches: a vector
       const double scale = std::sqrt(motion[l]) * s.c0_over_h[l] + gravity * std::sqrt(mass[l]) +
                            std::sqrt(force[l]);
-      const double scaled = std::sqrt(residual[l]) / scale;
-      if (!(scaled <= out[l])) out[l] = std::isnan(out[l]) ? out[l] : scaled;
+      scaled[l] = std::sqrt(residual[l]) / scale;
     }
+    for (int l = 0; l < L; ++l)
+      if (!(residual[l] <= w.floors[c][l]) && !(scaled[l] <= out[l]))
+        out[l] = std::isnan(out[l]) ? out[l] : scaled[l];
   }
 }
 

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <utility>
 
+#include "engine/model/model_part.hpp"
 #include "engine/step/detection.hpp"
 #include "engine/step/remember.hpp"
 #include "engine/step/scheme_stage.hpp"
@@ -96,10 +97,10 @@ void GroupStep::watch_faces(const kernels::KernelTable& table, BasicWorkspace<L>
                             NewtonReport& report) const {
   if (!model_.view.faced) return;
   table.stage<L>().choose_faces(model_.view, w.stage, w.faces_after);
-  for (std::size_t k = 0; k < 3 * model_.pairs.size(); k += 3)
-    for (int l = 0; l < L; ++l) {
+  for (std::size_t k = 0; k < model_.pairs.size(); ++k)
+    for (int l = 0; l < L && pushes(model_.pairs[k].parameters); ++l) {
       double along = 0, all = 0;
-      for (std::size_t i = k; i < k + 3; ++i) {
+      for (std::size_t i = 3 * k; i < 3 * k + 3; ++i) {
         const double before = w.stage.faces[i][l], after = w.faces_after[i][l];
         along += before * after;
         all += std::abs(before) + std::abs(after);

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "engine/model/body_shape.hpp"
+#include "engine/model/model_part.hpp"
 #include "engine/step/lane_energy.hpp"
 
 namespace tangere {
@@ -135,6 +136,7 @@ bool Passing::stay_apart(const Gate& gate, const AlignedVector<LinkPose<Row<L>>>
 
 Passing::Passing(const CompiledModel& m) : model_(m), arm_(m.links.size(), 0.0) {
   for (const kernels::PairContact& p : m.pairs) {
+    if (!pushes(p.parameters)) continue;  // it holds nothing back
     add(p.link2, p.frame2, p.shape, p.size, p.link1, p.middle);
     if (p.body1 < 0) continue;
     const kernels::Solid& solid = m.solids[std::size_t(p.body1)];
@@ -187,6 +189,7 @@ LaneBits Passing::far_movers(const Row<L>* x, Row<L>* way) const {
 // evaluation was spared, kinematics ran once more, so |d| is that of the end.
 template <int L>
 LaneBits Passing::out_of_reach(const BasicWorkspace<L>& w, LaneBits lanes) const {
+  if (walls_.empty()) return lanes;
   if (!bounded_ || std::any_of(bounds_.begin(), bounds_.end(),
                                [&](const Bound& bound) { return w.apart[bound.link_pair] == 0; }))
     return kNoLane;

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <cstring>
 #include <numeric>
 
 #include "engine/base/as_size.hpp"
@@ -26,6 +27,18 @@ static void remember(const BlockLayout& layout, double* column, std::int64_t ste
   const int place = layout.past + numbers * static_cast<int>(steps % layout.past_states);
   for (int k = 0; k < numbers; ++k) column[(place + k) * kBlock] = column[(layout.q + k) * kBlock];
 }
+
+/// A step of a model, and its scratch.
+struct Machine {
+  GroupStep step;
+  Workspace work;
+  SingleWorkspace single;
+
+  Machine(const CompiledModel& m, const StepSettings& s)
+      : step(m, s),
+        work(m, s.integrator.scheme().most_inner_stages()),
+        single(m, s.integrator.scheme().most_inner_stages()) {}
+};
 
 /// Lanes of one group of a block. Environment `first` + l is in lane l.
 struct GroupOfBlock {
@@ -70,18 +83,20 @@ struct Sleeping {
 struct Stepper::Impl {
   Model model;
   StepSettings settings;
-  GroupStep step;
-  Workspace work;
-  SingleWorkspace single;
+  /// Without the contacts that never push; null where nothing is to be left out. Sleep looks at
+  /// all contacts.
+  std::unique_ptr<ModelPart> pushing;
+  Machine machine;
+  /// With all of them, for derivatives by their numbers: made when a tape first asks for it.
+  std::unique_ptr<Machine> of_all;
   std::vector<int> all_q, all_v;  ///< 0, 1, …
   std::unique_ptr<Sleeping> sleeping;
 
   Impl(const Model& m, const StepSettings& s)
       : model(m),
         settings(s),
-        step(compiled(model), settings),
-        work(compiled(model), s.integrator.scheme().most_inner_stages()),
-        single(compiled(model), s.integrator.scheme().most_inner_stages()),
+        pushing(s.sleep > 0 ? nullptr : pushing_part(compiled(model))),
+        machine(pushing ? pushing->model : compiled(model), s),
         all_q(as_size(m.nq())),
         all_v(as_size(m.nv())) {
     std::iota(all_q.begin(), all_q.end(), 0);
@@ -89,7 +104,16 @@ struct Stepper::Impl {
     if (s.sleep > 0) sleeping = std::make_unique<Sleeping>(compiled(model), s);
   }
 
-  SteppedModel whole() { return {compiled(model), step, single, all_q, all_v}; }
+  Machine& machine_for(const BlockTape* tape) {
+    if (tape == nullptr || !pushing) return machine;
+    if (!of_all) of_all = std::make_unique<Machine>(compiled(model), settings);
+    return *of_all;
+  }
+  /// All bodies, by a machine of this stepper.
+  SteppedModel whole(Machine& by) {
+    return {pushing && &by == &machine ? pushing->model : compiled(model), by.step, by.single,
+            all_q, all_v};
+  }
 
   /// Sets what the motors of the live lanes do; takes out lanes with controls that are not finite.
   template <int L>
@@ -115,7 +139,7 @@ struct Stepper::Impl {
     const CompiledModel& m = compiled(model);
     const auto gather = [&](Row<L>* to, int row, std::span<const int> of) {
       for (std::size_t i = 0; i < of.size(); ++i)
-        for (int l = 0; l < L; ++l) to[i][l] = g.rows[(row + of[i]) * kBlock + lane + l];
+        std::memcpy(to[i].lane, g.rows + (row + of[i]) * kBlock + lane, sizeof to[i].lane);
     };
     gather(w.q0, m.layout.q, stepped.q);
     gather(w.v0, m.layout.v, stepped.v);
@@ -186,8 +210,8 @@ struct Stepper::Impl {
       if (state(first).bodies > 0 && std::popcount(alike.live) <= 2) alike.live = 1U << first;
       left &= ~alike.live;
       const bool alone = (alike.live & (alike.live - 1)) == 0;
-      left |= alone ? step_alike(batch, single, alike, first, controls)
-                    : step_alike(batch, work, alike, 0, controls);
+      left |= alone ? step_alike(batch, machine.single, alike, first, controls)
+                    : step_alike(batch, machine.work, alike, 0, controls);
     }
   }
 
@@ -197,7 +221,7 @@ struct Stepper::Impl {
     const SleepState& one = batch.sleep_[as_size(g.first + __builtin_ctz(g.live))];
     drive(batch, w, g, lane, controls);
     if (g.live == 0) return kNoLane;
-    if (one.bodies == 0) return step_lanes(batch, whole(), w, g, lane, nullptr);
+    if (one.bodies == 0) return step_lanes(batch, whole(machine), w, g, lane, nullptr);
     if (std::ranges::count(one.asleep, 0) == 0) return rest(batch, g);
     AwakePart& part = sleeping->parts.without(one.asleep, sleeping->rules.tree_of_link());
     BasicWorkspace<L>& p = part.workspace<L>();
@@ -246,7 +270,8 @@ struct Stepper::Impl {
       std::vector<double>& q = sleeping->q_in_lane;
       for (int i = 0; i < m.nq; ++i) q[as_size(i)] = column[(m.layout.q + i) * kBlock];
       for (std::size_t i = 0; i < stepped.q.size(); ++i) q[as_size(stepped.q[i])] = w.q0[i][l];
-      if (sleeping->rules.wake_touched(kernels::active_kernels(), {column, state}, q, most, single))
+      if (sleeping->rules.wake_touched(kernels::active_kernels(), {column, state}, q, most,
+                                       machine.single))
         touched |= 1U << l;
     }
     return touched;
@@ -262,7 +287,8 @@ struct Stepper::Impl {
       SleepState& state = batch.sleep_[e];
       if (sleeping->rules.count_rest(state, moved + l, L,
                                      batch.status_[e] == StepStatus::converged))
-        sleeping->rules.settle(kernels::active_kernels(), {g.rows + lane + l, state}, single);
+        sleeping->rules.settle(kernels::active_kernels(), {g.rows + lane + l, state},
+                               machine.single);
     }
   }
 };
@@ -287,6 +313,7 @@ void Stepper::step_block(Batch& batch, int block, std::span<const double> contro
                          BlockTape* tape) {
   Impl& i = *impl_;
   if (tape != nullptr) refuse_sleep(i.model, i.settings);
+  Machine& machine = i.machine_for(tape);
   for (int group = 0; group < kBlock / kGroup; ++group) {
     GroupOfBlock g{batch.block(block) + group * kGroup, block * kBlock + group * kGroup};
     for (int l = 0; l < kGroup; ++l) {
@@ -305,11 +332,11 @@ void Stepper::step_block(Batch& batch, int block, std::span<const double> contro
     const bool alone = g.live != 0 && (g.live & (g.live - 1)) == 0;
     const int lane = alone ? __builtin_ctz(g.live) : 0;
     if (alone) {
-      i.drive(batch, i.single, g, lane, controls);
-      if (g.live != 0) i.step_lanes(batch, i.whole(), i.single, g, lane, tape);
+      i.drive(batch, machine.single, g, lane, controls);
+      if (g.live != 0) i.step_lanes(batch, i.whole(machine), machine.single, g, lane, tape);
     } else {
-      i.drive(batch, i.work, g, lane, controls);
-      if (g.live != 0) i.step_lanes(batch, i.whole(), i.work, g, lane, tape);
+      i.drive(batch, machine.work, g, lane, controls);
+      if (g.live != 0) i.step_lanes(batch, i.whole(machine), machine.work, g, lane, tape);
     }
   }
   if (tape != nullptr) tape->append(batch, block);

@@ -60,6 +60,7 @@ std::string components_text(const SensorLayout& sensor, FieldForm form) {
     case FieldForm::pressure: return along + "; f is the force on the body without friction";
     case FieldForm::shear: return across + "; f is the force on the body";
     case FieldForm::markers: return "displacement of each marker along axis0, axis1";
+    case FieldForm::flow: return across + ", over their largest length in this reading";
     case FieldForm::sum: break;
   }
   return "force x y z on the body [N], then x y z of its centre of pressure [m]; body axes";
@@ -69,6 +70,7 @@ void describe_reading(const h5::Id& object, const SensorLayout& sensor, FieldFor
   h5::write_attribute(object, "units",
                       form == FieldForm::sum       ? "N, N, N, m, m, m"
                       : form == FieldForm::markers ? "m"
+                      : form == FieldForm::flow    ? "1"
                                                    : "N");
   h5::write_attribute(object, "body", sensor.body);
   h5::write_scalar<std::int64_t>(object, "pressure_sign", sensor.pressure_sign);

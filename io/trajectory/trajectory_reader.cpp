@@ -52,16 +52,17 @@ struct TrajectoryReader::Impl {
     }
   }
 
-  /// Takes a field, or where there is none the ideal one, or pressure, shear or both. A sum
-  /// has no points.
+  /// Takes a field, or where there is none the ideal one, or pressure, shear or both. Of other
+  /// readings there is no picture.
   void add_readings(const h5::Id& group, const std::string& name) {
     std::vector<FieldForm> found;
     for (const FieldForm form :
          {FieldForm::field, FieldForm::ideal, FieldForm::pressure, FieldForm::shear})
       if (h5::has_link(group, dataset_of(form))) found.push_back(form);
     if (found.empty()) {
-      if (!h5::has_link(group, dataset_of(FieldForm::sum)) &&
-          !h5::has_link(group, dataset_of(FieldForm::markers)))
+      constexpr FieldForm kWithoutPicture[] = {FieldForm::sum, FieldForm::markers, FieldForm::flow};
+      if (std::none_of(std::begin(kWithoutPicture), std::end(kWithoutPicture),
+                       [&](FieldForm form) { return h5::has_link(group, dataset_of(form)); }))
         throw IoError(
             fmt::format("{}: sensor '{}' has no reading: the file is damaged", path, name));
       sums.push_back(name);
@@ -198,7 +199,7 @@ std::size_t TrajectoryReader::find_sensor(const std::string& name) const {
   }
   if (std::find(impl_->sums.begin(), impl_->sums.end(), name) != impl_->sums.end())
     throw InputError(impl_->path + ": of sensor '" + name +
-                     "' the run recorded only the sum or markers");
+                     "' the run recorded only the sum, markers or flow");
   if (names.empty())
     throw InputError(impl_->path + ": the run recorded no tactile field, pressure or shear");
   throw InputError(impl_->path + ": no sensor is named '" + name + "'" + suggestion(name, names));

@@ -206,6 +206,18 @@ constexpr auto by_shape(const F& f) {
   return by_pad<P>(f, Shapes{});
 }
 
+/// Returns which of eight spheres a shape comes near to.
+template <class P, class Shape>
+unsigned near_spheres(const double* x, const double* y, const double* z, const double* radius,
+                      const TouchShape& shape, const Touch<double>& at) {
+  using Arch = typename P::Architecture;
+  using D = Lanes<Arch>;
+  const Vec3<D> t = {load_lanes<Arch>(x), load_lanes<Arch>(y), load_lanes<Arch>(z)};
+  D row[kBracketRows];
+  return lane_bits(Shape::bracket(shape, broadcast_touch<D>(at), t, load_lanes<Arch>(radius), row) <
+                   D(0.0));
+}
+
 /// Whether a shape comes near the sphere around a pad in any lane.
 template <class P, class Shape, class D>
 bool near_pad(const PadTiles& pad, const TouchShape& shape, const Touch<D>& at) {
@@ -214,18 +226,20 @@ bool near_pad(const PadTiles& pad, const TouchShape& shape, const Touch<D>& at) 
   return any(Shape::bracket(shape, at, middle, D(pad.reach), row) < D(0.0));
 }
 
+/// Whether a shape comes near the spheres around the parts of a pad, which takes as long.
+template <class P, class Shape>
+bool near_parts(const PadTiles& pad, const TouchShape& shape, const Touch<double>& at) {
+  const double* const x = pad.parts;
+  return near_spheres<P, Shape>(x, x + kGroup, x + 2 * kGroup, x + 3 * kGroup, shape, at) != 0;
+}
+
 /// Returns which of eight spheres around eight tiles each, from sphere `first` on, a shape comes
 /// near to.
 template <class P, class Shape>
 unsigned near_eights(const PadTiles& pad, int first, const TouchShape& shape,
                      const Touch<double>& at) {
-  using Arch = typename P::Architecture;
-  using D = Lanes<Arch>;
-  const Vec3<D> t = {load_lanes<Arch>(pad.eight_x + first), load_lanes<Arch>(pad.eight_y + first),
-                     load_lanes<Arch>(pad.eight_z + first)};
-  D row[kBracketRows];
-  const D radius = load_lanes<Arch>(pad.eight_radius + first);
-  return lane_bits(Shape::bracket(shape, broadcast_touch<D>(at), t, radius, row) < D(0.0));
+  return near_spheres<P, Shape>(pad.eight_x + first, pad.eight_y + first, pad.eight_z + first,
+                                pad.eight_radius + first, shape, at);
 }
 
 /// Bit k: shape k may touch the pad. From shape 64 on, all may.
@@ -234,12 +248,10 @@ inline bool may_touch(NearShapes near, int k) { return k >= 64 || ((near >> k) &
 
 template <class P>
 NearShapes near_shapes(const TactileArgs<typename P::Real>& a) {
-  using D = Lanes<typename P::Architecture>;
-  static constexpr auto kNear = by_shape<P>([]<class Shape>() { return &near_pad<P, Shape, D>; });
+  static constexpr auto kNear = by_shape<P>([]<class Shape>() { return &near_parts<P, Shape>; });
   NearShapes near = 0;
   for (int k = 0; k < a.n_touches && k < 64; ++k) {
-    const bool here = kNear[std::size_t(a.shapes[k].shape)](*a.pad, a.shapes[k],
-                                                            broadcast_touch<D>(a.touches[k]));
+    const bool here = kNear[std::size_t(a.shapes[k].shape)](*a.pad, a.shapes[k], a.touches[k]);
     near |= NearShapes(here) << k;
   }
   return near;
@@ -251,16 +263,19 @@ class NearEights {
  public:
   NearEights(const TactileArgs<typename P::Real>& a, NearShapes near) : a_(a), near_(near) {}
 
-  /// Goes on to the eight tiles from `first` on, a multiple of eight.
-  void move(int first) {
+  /// Goes on to the eight tiles from `first` on, a multiple of eight. Returns false where nothing
+  /// may touch the 64 tiles that begin there.
+  bool move(int first) {
     static constexpr auto kNear = by_shape<P>([]<class Shape>() { return &near_eights<P, Shape>; });
     const int eight = first / kGroup;
     bit_ = 1U << (eight % kGroup);
-    if (!many_ || eight % kGroup != 0) return;
+    if (!many_ || eight % kGroup != 0) return true;
+    unsigned any = a_.n_touches > 64 ? 1 : 0;
     for (int k = 0; k < a_.n_touches && k < 64; ++k)
       if (may_touch(near_, k))
-        eights_[k] =
+        any |= eights_[k] =
             kNear[std::size_t(a_.shapes[k].shape)](*a_.pad, eight, a_.shapes[k], a_.touches[k]);
+    return any != 0;
   }
   [[nodiscard]] bool has(int k) const {
     return may_touch(near_, k) && (!many_ || k >= 64 || (eights_[k] & bit_) != 0);
@@ -287,7 +302,10 @@ int tactile_field(const TactileArgs<typename P::Real>& a) {
   int count = 0;
   for (int first = 0; first < a.pad->tiles(); first += kGroup) {
     unsigned written = 0;
-    eights.move(first);
+    if (!eights.move(first)) {
+      first += (kGroup - 1) * kGroup;
+      continue;
+    }
     for (int k = 0; k < a.n_touches; ++k)
       if (eights.has(k))
         written = kForce[std::size_t(a.shapes[k].shape)](a, k, first, written, buffer);

@@ -34,7 +34,10 @@ struct PadTiles {
   /// (n_tiles / 8, padded to 8 with far spheres) centres and radii of spheres around eight tiles
   /// each, with a margin for rounding, pad axes [m]
   const double *eight_x, *eight_y, *eight_z, *eight_radius;
-  double middle[3];  ///< of a sphere around all points, pad axes [m]
+  /// (4, 8) x, y, z and radii of eight spheres that hold all points between them, with a margin for
+  /// rounding, pad axes [m]; some may be the same
+  const double* parts;
+  double middle[3];  ///< of one sphere around all points, pad axes [m]
   double reach;      ///< its radius, with a margin for rounding [m]
   bool skewed;       ///< axis0 and axis1 are not exactly unit and perpendicular: forces need `axes`
   double axes[9];    ///< rows: axis0, axis1, -(axis0 × axis1), pad axes

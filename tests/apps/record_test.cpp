@@ -87,7 +87,7 @@ TEST(Record, AnythingElseOfATrajectoryStillWorks) {
   EXPECT_EQ(none.exit_code, 2);
   EXPECT_THAT(none.err, HasSubstr("the run recorded no tactile field, pressure or shear"));
   EXPECT_THAT(run(folder, {"plot", "sum.h5", "-o", "sum.svg", "--sensor", "pad"}).err,
-              HasSubstr("of sensor 'pad' the run recorded only the sum or markers"));
+              HasSubstr("of sensor 'pad' the run recorded only the sum, markers or flow"));
   run_json(folder, {"simulate", "stable_grasp", "-o", "task.h5", "--record", "left_pad.sum"});
   EXPECT_EQ(shape(folder, "task.h5", "tactile/left_pad/sum").back(), 6U);
 }
@@ -357,6 +357,34 @@ TEST(Record, ADataSetSamplesWhatIsNotWantedInEveryRow) {
   EXPECT_EQ(run(folder, {"validate", "some"}).exit_code, 3);
 }
 
+TEST(Record, FlowIsShearOverItsLargestLength) {
+  const Folder folder;
+  const std::string ball = scene("rolling_ball_small.xml");
+  const Words what{"--steps", "120", "--every", "40", "--seed", "3", "--record", "pad,pad.flow"};
+  run_json(folder, Words{"simulate", ball, "-o", "run.h5", "--envs", "2"} + what);
+  EXPECT_EQ(shape(folder, "run.h5", "tactile/pad/flow"), (h5::Dims{3, 2, 32, 32, 2}));
+  const std::vector<double> force = numbers(folder, "run.h5", "tactile/pad/force"),
+                            flow = numbers(folder, "run.h5", "tactile/pad/flow");
+  const std::size_t points = 32 * 32;
+  for (std::size_t first = 0; first < flow.size() / 2; first += points) {
+    double longest = 0;
+    for (std::size_t p = first; p < first + points; ++p)
+      longest = std::max(longest, std::hypot(force[3 * p], force[3 * p + 1]));
+    EXPECT_GT(longest, 0);
+    for (std::size_t k = 2 * first; k < 2 * (first + points); ++k)
+      ASSERT_EQ(flow[k], force[k / 2 * 3 + k % 2] / longest);
+  }
+  EXPECT_EQ(
+      h5::attribute_text(h5::open_dataset(h5::open_file(folder.path("run.h5")), "tactile/pad/flow"),
+                         "units"),
+      "1");
+  run_json(folder,
+           Words{"generate", ball, "-o", "set", "--episodes", "2", "--precision", "double"} + what);
+  EXPECT_EQ(shape(folder, "set/shard-00000.h5", "data/demo_1/obs/pad.flow"),
+            (h5::Dims{3, 32, 32, 2}));
+  EXPECT_EQ(run(folder, {"plot", "run.h5", "-o", "pad.svg"}).exit_code, 0);
+}
+
 TEST(Record, MarkersAreRecordedWhereASensorHasThem) {
   const Folder folder;
   const std::string ball = scene("rolling_ball_small.xml");
@@ -403,7 +431,7 @@ TEST(Record, MarkersAreRecordedWhereASensorHasThem) {
            {"simulate", "gel.xml", "-o", "only.h5", "--steps", "20", "--record", "pad.markers"});
   EXPECT_EQ(run(folder, {"view", "only.h5", "-o", "only.html"}).exit_code, 0);
   EXPECT_THAT(run(folder, {"plot", "only.h5", "-o", "only.svg", "--sensor", "pad"}).err,
-              HasSubstr("recorded only the sum or markers"));
+              HasSubstr("recorded only the sum, markers or flow"));
   const Outcome check = run(folder, {"gradcheck", ball, "--loss", "markers"});
   EXPECT_EQ(check.exit_code, 2);
   EXPECT_THAT(check.err, HasSubstr("no sensor of the scene has <markers>"));

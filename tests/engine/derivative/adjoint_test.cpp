@@ -5,6 +5,7 @@
 
 #include "tests/engine/gradient_differences.hpp"
 #include "tests/engine/random_machine.hpp"
+#include "tests/engine/scenes.hpp"
 #include "tests/sanitized.hpp"
 
 namespace tangere {
@@ -118,6 +119,36 @@ TEST_P(AdjointScheme, CompanyChangesNothing) {
       EXPECT_EQ(alone.parameters, among.parameters);
     }
   }
+}
+
+/// A contact of stiffness zero is left out of steps without a tape, but has a derivative by it.
+TEST_P(AdjointScheme, AContactThatNeverPushesHasADerivativeByItsStiffness) {
+  Scene scene = testing::rolling_ball(false, 12);
+  PairContactDescription& contact = scene.pair_contacts.front();
+  contact.coefficients = {0, 1, 1, 0};
+  contact.law = ContactLaw::paper;
+  scene.initial.push_back({"pad_joint", {0, 0, -0.0155}, {0.1, 0, -0.05}, {}});
+  const Model model(scene);
+  const StepperOptions options = testing::options(GetParam(), scene.timestep, 1e-13);
+  const Batch start(model, 1);
+  const RunInput in{testing::q_of(start), testing::v_of(start),
+                    std::vector<std::vector<double>>(3, {0.1, 0, 0.1})};
+  const StateLoss loss(model, 3, 1);
+  const double base = testing::loss_of_run(model, options, in, loss);
+  const auto difference = [&](double kn) {
+    Scene stiff = scene;
+    stiff.pair_contacts.front().coefficients.kn = kn;
+    return (testing::loss_of_run(Model(stiff), options, in, loss) - base) / kn;
+  };
+  const double expected = 2 * difference(5e-6) - difference(1e-5);
+  const NumberGradients numbers(model);
+  const auto found = std::ranges::find_if(numbers.infos(), [](const NumberInfo& info) {
+    return info.number.owner == NumberOwner::contact && info.number.field == NumberField::kn;
+  });
+  const auto at = std::size_t(found - numbers.infos().begin());
+  const double derivative = testing::adjoint_of_run(model, options, {in}, loss, 0).parameters[at];
+  EXPECT_GT(std::abs(expected), 1e-3);
+  EXPECT_NEAR(derivative, expected, 1e-5 * std::abs(expected));
 }
 
 INSTANTIATE_TEST_SUITE_P(All, AdjointScheme, ::testing::ValuesIn(integrators()));

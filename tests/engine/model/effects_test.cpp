@@ -130,6 +130,26 @@ TEST(Effects, RemovedEqualsZeroCoefficients) {
     }
 }
 
+/// Steps leave out what never pushes, so they have the bits of a scene that does not name it.
+TEST(Effects, ContactsThatNeverPushAreLeftOut) {
+  const Scene scene = without(testing::scene_that_sleeps(), {EffectKind::sleeping});
+  int contacts = 0;
+  for (const EffectInfo& info : effects_of(scene)) {
+    const EffectKind kind = info.effect.kind;
+    if (kind != EffectKind::pair_contact && kind != EffectKind::ground_contact) continue;
+    SCOPED_TRACE(info.name);
+    ++contacts;
+    EXPECT_EQ(
+        distance(play(without(scene, info.effect)), play(without(scene, info.effect, Way::zero))),
+        0);
+  }
+  EXPECT_EQ(contacts, 7);
+  const std::vector<EffectInfo> all =
+      effects_of(without(scene, {EffectKind::pair_contact}, Way::zero));
+  EXPECT_EQ(find(all, "contact box ball")->reason,
+            "declared, kn 0 N/m, no damping: it never pushes");
+}
+
 TEST(Effects, PartsGoWithoutTheirElements) {
   const auto elements = [](const Scene& s) {
     return s.pair_contacts.size() + s.ground_contacts.size() + s.sensors.size();

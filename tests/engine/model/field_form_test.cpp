@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Tests the forms of a field: pressure is the field without friction, shear its first components,
-// a sum what plain loops add up to. What nobody asks for calls no kernel.
+// flow that over its largest length, a sum what plain loops add up to. What nobody asks for calls no kernel.
 #include "engine/model/field_form.hpp"
 
 #include <gtest/gtest.h>
@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "engine/base/error.hpp"
+#include "engine/sense/flow_map.hpp"
 #include "engine/sense/readout.hpp"
 #include "kernels/numbers/block.hpp"
 #include "kernels/table/kernel_table.hpp"
@@ -95,6 +96,29 @@ TEST_P(FieldForms, ShearIsTheFirstTwoComponents) {
   for (std::size_t e = 0; e < wide.size(); ++e)
     for (std::size_t k = 0; k < narrow[e].size(); ++k)
       ASSERT_EQ(narrow[e][k], wide[e][k / 2 * 3 + k % 2]);
+}
+
+/// Read by blocks and by frames that held another reading.
+template <class T>
+void check_flow(const Model& model, const Batch& batch, Precision precision) {
+  const auto field = read_form<T>(model, batch, FieldForm::field, precision);
+  const auto flow = read_form<T>(model, batch, FieldForm::flow, precision);
+  EXPECT_GT(largest_of(flow, 0, 1), 0.5) << "the longest has length 1";
+  Readout readout(model, precision);
+  DenseFrame<T> frame(model, 0, FieldForm::flow);
+  std::vector<T> expected(flow[0].size());
+  for (std::size_t e = 0; e < field.size(); ++e) {
+    const ShearField<T> one{field[e]};
+    normalised_flow(std::span(&one, 1), std::span(expected));
+    ASSERT_EQ(flow[e], expected) << "environment " << e;
+    readout.read(batch, static_cast<int>(e), frame);
+    ASSERT_TRUE(std::ranges::equal(frame.values(), expected)) << "environment " << e;
+  }
+}
+
+TEST_P(FieldForms, FlowIsShearOverItsLargestLength) {
+  check_flow<double>(model_, batch_, precision_);
+  check_flow<float>(model_, batch_, precision_);
 }
 
 TEST_P(FieldForms, PressureIsTheThirdComponentWithoutFriction) {

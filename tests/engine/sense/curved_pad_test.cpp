@@ -155,6 +155,9 @@ void check(const Case& c, double tolerance) {
   const AlignedVector<double> far_reach(compiled(model).sensors[0].tile_radius.size(), 1e9);
   PadTiles unculled = pad;
   unculled.radius = far_reach.data();
+  AlignedVector<double> far_parts(4 * kernels::kGroup, 1e9);
+  std::fill_n(far_parts.begin(), 3 * kernels::kGroup, 0.0);
+  unculled.parts = far_parts.data();
   unculled.reach = 1e9;
   for (unsigned seed = 1; seed <= 8; ++seed) {
     Random random(seed);

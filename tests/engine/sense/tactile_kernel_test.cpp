@@ -53,7 +53,7 @@ struct PoisonedPad {
   PadTiles tiles = pad_sensor().tiles();
   AlignedVector<double> offsets = pad_sensor().offsets;
   AlignedVector<float> offsets_f = pad_sensor().offsets_f;
-  AlignedVector<double> far_reach;
+  AlignedVector<double> far_reach, far_parts;
 
   PoisonedPad() {
     for (std::size_t k = 0; k < offsets.size(); ++k)
@@ -67,6 +67,9 @@ struct PoisonedPad {
   void stop_culling() {
     far_reach.assign(pad_sensor().tile_radius.size(), 1e9);
     tiles.radius = far_reach.data();
+    far_parts.assign(4 * kernels::kGroup, 1e9);
+    std::fill_n(far_parts.begin(), 3 * kernels::kGroup, 0.0);
+    tiles.parts = far_parts.data();
     tiles.reach = 1e9;
   }
   [[nodiscard]] std::size_t numbers() const { return std::size_t(3 * tiles.rows * tiles.cols); }
@@ -262,6 +265,26 @@ TEST(TactileKernels, EightTilesLieWithinTheirSphere) {
     EXPECT_LT(std::hypot(x, y) + pad.radius[t], pad.eight_radius[eight]) << t;
     EXPECT_LT(pad.eight_radius[eight], pad.reach);
   }
+}
+
+/// Every point lies within the sphere around some part, and the parts are small: a pad is not one
+/// sphere.
+TEST(TactileKernels, TilesLieWithinSpheresAroundParts) {
+  const PadTiles pad = large_pad_sensor().tiles();
+  double largest = 0;
+  for (int t = 0; t < pad.tiles(); ++t) {
+    bool within = false;
+    for (int k = 0; k < kernels::kGroup; ++k) {
+      const double* const part = pad.parts + k;
+      const double radius = part[3 * kernels::kGroup];
+      within =
+          within ||
+          std::hypot(pad.x[t] - part[0], pad.y[t] - part[kernels::kGroup]) + pad.radius[t] < radius;
+      largest = std::max(largest, radius);
+    }
+    EXPECT_TRUE(within) << t;
+  }
+  EXPECT_LT(largest, 0.5 * pad.reach);
 }
 
 template <class Real>

@@ -132,6 +132,23 @@ TEST(CalledKernels, WithoutPairsNobodySearches) {
   EXPECT_GT(OfFields::calls(), 0);
 }
 
+TEST(CalledKernels, ContactsThatNeverPushAreSteppedForGradientsAlone) {
+  Scene scene = without(testing::scene_that_sleeps(), {EffectKind::sleeping});
+  scene = without(scene, {EffectKind::feedback});
+  scene = without(scene, {EffectKind::pair_contact}, Way::zero);
+  const Model model(scene);
+  const Counting counting;
+  run_briefly(model, false);
+  EXPECT_EQ(OfPairs::calls(), 0);
+  Batch batch(model, kBriefEnvironments, 5);
+  Stepper stepper(model);
+  BlockTape tape(model, stepper.integrator(), 1);
+  tape.start(batch, 0);
+  stepper.step_block(batch, 0, std::vector<double>(std::size_t(kBriefEnvironments * model.nu())),
+                     &tape);
+  EXPECT_GT(OfPairs::calls(), 0);
+}
+
 TEST(CalledKernels, FacesAreChosenOfWhatHasThem) {
   const Counting counting;
   run_briefly(Model(testing::scene_that_remembers()), true);
