@@ -401,6 +401,14 @@ kernels::Vec3<double> kernels_size(const Shape& shape) {
   return size;
 }
 
+std::optional<double> distance_to(const Shape& shape, const Vector3& place) {
+  const std::optional<PrimitiveShape> kind = row_of(shape).distance;
+  if (!kind || *kind == PrimitiveShape::mesh) return std::nullopt;
+  return kernels::with_distance<double>(*kind, kernels_size(shape), [&](const auto& of) {
+    return distance_at(of, kernels::Vec3<double>{place[0], place[1], place[2]}).d;
+  });
+}
+
 void place_shape(const Shape& shape, CompiledBody& body) {
   const ShapeRow& row = row_of(shape);
   body.touchable = row.distance.has_value() && row.distance != PrimitiveShape::mesh;

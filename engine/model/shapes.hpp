@@ -70,6 +70,10 @@ double volume_of(const Shape& shape);
 /// Returns the full widths of a shape with distance and size along its axes [m]; else zeros.
 std::array<double, 3> widths(const Shape& shape);
 
+/// Returns the distance of a place in the body's frame to the shape [m], negative inside. No value
+/// for a shape without a distance in closed form: abstract bodies and meshes.
+std::optional<double> distance_to(const Shape& shape, const Vector3& place);
+
 /// Lists the shapes that satisfy `has`: "a sphere, cuboid or plane".
 std::string shapes_with(const std::function<bool(const ShapeRow&)>& has);
 /// Returns the name with its article: "a cuboid", "an abstract".

@@ -93,7 +93,7 @@ class Keyframe {
   void read_controls() const {
     std::vector<double> given(file_.controls.size(), 0.0);  // MuJoCo's, without an attribute
     if (node_.has("ctrl")) given = of_size("ctrl", given.size(), "the actuators");
-    std::vector<double>& controls = file_.robot.controls;
+    std::vector<double>& controls = file_.robot.controls.emplace();
     controls.assign(file_.robot.scene.motors.size(), 0.0);
     for (std::size_t k = 0; k < given.size(); ++k) {
       const MjcfControl& c = file_.controls[k];

@@ -4,6 +4,7 @@
 
 #include <map>
 #include <memory>
+#include <optional>
 #include <set>
 #include <string>
 #include <vector>
@@ -51,8 +52,8 @@ struct Robot {
   std::set<std::string> pieces;  ///< links made for further shapes of the link that they hang on
   std::map<std::string, double> efforts;  ///< by joint: largest force or torque [N or N m]
   std::map<std::string, RobotSite> sites;
-  /// By motor of the scene: the control that a keyframe gives it. Empty without a keyframe.
-  std::vector<double> controls;
+  /// By motor of the scene: the control that a keyframe gives it. No value without a keyframe.
+  std::optional<std::vector<double>> controls;
   Remarks idle;     ///< left out, and of no effect on the motion
   Remarks changed;  ///< said in another way
   Remarks lost;     ///< left out although it changes the motion

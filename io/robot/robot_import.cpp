@@ -113,7 +113,7 @@ void add_motors(Robot& robot, const std::vector<MotorRequest>& requests, const s
       motor.D = request.D;
     }
     robot.scene.motors.push_back(motor);
-    if (!robot.controls.empty()) robot.controls.push_back(resting_control(robot.scene, motor));
+    if (robot.controls) robot.controls->push_back(resting_control(robot.scene, motor));
   }
 }
 

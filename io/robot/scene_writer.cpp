@@ -173,9 +173,9 @@ class Writer {
       states += "/>\n";
     }
     section("initial", states);
-    if (!robot_.controls.empty())
+    if (robot_.controls && !robot_.controls->empty())
       section("control",
-              fmt::format("    <constant value=\"{}\"/>\n", numbers_text(robot_.controls)));
+              fmt::format("    <constant value=\"{}\"/>\n", numbers_text(*robot_.controls)));
   }
 
   /// A range that is open on one side only: this far beyond any force, the bound is never met.

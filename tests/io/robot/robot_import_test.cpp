@@ -255,6 +255,15 @@ TEST(RobotImport, AKeyframeIsTheStart) {
                   parse_scene(import(arm, options).text, "scene.xml").scene.control.value())
                   .values,
               ElementsAre(0.0, 0.2));
+  EXPECT_THAT(std::get<ConstantControl>(
+                  parse_scene(import(mjcf("<joint name=\"wrist\"/><geom size=\"0.1\"/>",
+                                          "<keyframe><key qpos=\"0.3\"/></keyframe>"),
+                                     options)
+                                  .text,
+                              "scene.xml")
+                      .scene.control.value())
+                  .values,
+              ElementsAre(0.3));
   options.motors.clear();
   EXPECT_THAT(
       fault_of(with_key("<key qpos=\"0.1\"/>"), options),
