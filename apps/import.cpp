@@ -22,8 +22,8 @@ namespace {
 constexpr std::size_t kLargestLayout = std::size_t{16} << 20;
 
 struct ImportArguments {
-  std::string robot, output, base;
-  std::vector<std::string> pads, motors, contacts;
+  std::string robot, output, base, keyframe;
+  std::vector<std::string> pads, motors, contacts, end_effectors;
   bool drop = false, allow_unknown = false, overwrite = false;
 };
 
@@ -111,6 +111,8 @@ RobotOptions options_of(const ImportArguments& given) {
     const auto [first, second] = split("--contact", text, "LINK=LINK or LINK=ground");
     options.touches.push_back({first, second});
   }
+  options.end_effectors = given.end_effectors;
+  options.keyframe = given.keyframe;
   return options;
 }
 
@@ -134,8 +136,10 @@ int run_import(const ImportArguments& given, const Console& console) {
   if (!scene.changed.empty()) console.note("said in another way:" + listed(scene.changed));
   if (!scene.idle.empty())
     console.note("left out, and of no effect on the motion:" + listed(scene.idle));
-  console.print(fmt::format("wrote {}: {} links, {} joints that move, {} motors, {} skins",
-                            given.output, scene.links, scene.joints, scene.motors, scene.sensors));
+  console.print(fmt::format(
+      "wrote {}: {} links, {} joints that move, {} motors, {} skins{}", given.output, scene.links,
+      scene.joints, scene.motors, scene.sensors,
+      scene.end_effectors == 0 ? "" : fmt::format(", {} end effectors", scene.end_effectors)));
   console.result({{"command", "import"},
                   {"exit_code", static_cast<int>(kDone)},
                   {"input", given.robot},
@@ -145,6 +149,7 @@ int run_import(const ImportArguments& given, const Console& console) {
                   {"joints", scene.joints},
                   {"motors", scene.motors},
                   {"sensors", scene.sensors},
+                  {"end_effectors", scene.end_effectors},
                   {"lost", scene.lost},
                   {"changed", scene.changed},
                   {"idle", scene.idle},
@@ -165,12 +170,18 @@ Command add_import(CLI::App& program) {
       .required();
   add_text(app, "-o,--output", o.output, "SCENE.xml", "Scene to write").required();
   add_texts(app, "--pad", o.pads, "LINK=LAYOUT",
-            "Put a skin on a link: a layout of the program or a file, at the link's frame; with "
+            "Put a skin on a link, or at a site of MJCF: a layout of the program or a file, at its "
+            "frame; with "
             "@+x to @-z on a face of its box, with @x,y,z[,roll,pitch,yaw] there");
   add_texts(app, "--motor", o.motors, "JOINT=force|P,D",
             "Drive a joint by force within the file's effort, or towards targets with gains P, D");
   add_texts(app, "--contact", o.contacts, "LINK=LINK|ground",
             "Let the shapes of two links touch, or those of one the ground");
+  add_texts(app, "--end-effector", o.end_effectors, "LINK",
+            "Store where a link, or a site of MJCF, is");
+  add_text(app, "--keyframe", o.keyframe, "NAME",
+           "Of MJCF: start from this keyframe, with its controls; one without a name has its "
+           "number from 0");
   add_text(app, "--base", o.base, "fixed|free",
            "Of URDF: whether the root link stands in the world or moves freely [default: fixed]");
   add_flag(app, "--drop", o.drop, "Leave out what changes the motion and scenes cannot say");

@@ -434,11 +434,9 @@ std::array<double, 3> widths(const Shape& shape) {
   return 2.0 * (half.straight + half.round);
 }
 
-SurfaceDistance distance_from(const Shape& shape, const Vector3& point) {
+std::optional<SurfaceDistance> distance_from(const Shape& shape, const Vector3& point) {
   const std::optional<PrimitiveShape> kind = row_of(shape).distance;
-  if (!kind || kind == PrimitiveShape::mesh)
-    throw InputError("the distance from " + with_article(shape_name(shape)) +
-                     "; expected a shape whose distance is a formula");
+  if (!kind || kind == PrimitiveShape::mesh) return std::nullopt;
   const kernels::Vec3<double> size = vec3_of(size_in_kernels(shape));
   return kernels::with_distance<double>(*kind, size, [&](const auto& solid) {
     const kernels::Distance<double> at = kernels::distance_at(solid, vec3_of(point));

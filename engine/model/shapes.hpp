@@ -97,9 +97,9 @@ struct SurfaceDistance {
   double distance;
   Vector3 normal;
 };
-/// Returns the distance of a point in the body frame from a shape that has one. Throws InputError
-/// for others and for meshes.
-SurfaceDistance distance_from(const Shape& shape, const Vector3& point);
+/// Returns the distance of a point in the body frame from a shape. No value for shapes whose
+/// distance is no formula: abstract bodies and meshes.
+std::optional<SurfaceDistance> distance_from(const Shape& shape, const Vector3& point);
 
 /// Lists the shapes that satisfy `has`: "a sphere, cuboid or plane".
 std::string shapes_with(const std::function<bool(const ShapeRow&)>& has);

@@ -122,7 +122,7 @@ Vector3 exit_of(const Shape& shape, const Vector3& way) {
   double inside = 0, outside = 2;  // the widths' corner is √3 away
   for (int k = 0; k < 60; ++k) {
     const double middle = (inside + outside) / 2;
-    (distance_from(shape, middle * ray).distance < 0 ? inside : outside) = middle;
+    (distance_from(shape, middle * ray).value().distance < 0 ? inside : outside) = middle;
   }
   return outside * ray;
 }
@@ -179,7 +179,7 @@ RoundSurface round_surface_of(const Shape& shape) {
       const Vector3 at = exit_of(shape, {std::sin(lift) * std::cos(turn),
                                          std::sin(lift) * std::sin(turn), -std::cos(lift)});
       out.vertices.push_back(at);
-      out.normals.push_back(distance_from(shape, at).normal);
+      out.normals.push_back(distance_from(shape, at).value().normal);
       if (k == kBands) continue;
       const int a = k * kSides + s, b = k * kSides + (s + 1) % kSides;
       out.triangles.push_back({a, b, a + kSides});

@@ -28,6 +28,9 @@ class Actuators {
   explicit Actuators(MjcfFile& file) : file_(file), scene_(file.robot.scene) {}
 
   void read(const RobotNode& node) {
+    file_.controls.emplace_back();
+    if (std::find(kActuators.begin(), kActuators.end(), node.name()) == kActuators.end())
+      return node.lost("<" + node.name() + ">: an actuator that scenes do not have");
     node.check(mjcf_words(node.name()));
     Law law;
     if (!read_law(node, law)) return;
@@ -51,10 +54,20 @@ class Actuators {
       force = {std::max(force[0], (*end.actuator_range)[0]),
                std::min(force[1], (*end.actuator_range)[1])};
     if (!(force[0] < force[1])) node.fail("its ranges leave no force");
-    if (law.kp > 0)
+    MjcfControl& use = file_.controls.back();
+    use.motor = static_cast<int>(scene_.motors.size());
+    use.range = control;
+    if (law.kp > 0) {
       set_position(node, law, gear, end, control, force, motor);
-    else
+      use.scale = 1 / gear;
+      use.shift = 0 - end.ref;
+    } else {
       set_force(node, law, gear, control, force, link.joint, motor);
+      use.scale = 2 * gear * law.gain / (motor.high - motor.low);
+      use.shift = -(motor.high + motor.low) / (motor.high - motor.low);
+      use.least = -1;
+      use.most = 1;
+    }
     scene_.motors.push_back(motor);
   }
 
@@ -185,7 +198,7 @@ void read_mjcf_actuators(MjcfFile& file, const RobotNode& section) {
   for (const std::string& name : kActuators) known.push_back({name.c_str()});
   for (const char* other :
        {"intvelocity", "damper", "cylinder", "muscle", "adhesion", "plugin", "dcmotor"})
-    known.push_back({other, Fate::lost, "an actuator that scenes do not have"});
+    known.push_back({other});
   Actuators actuators(file);
   for (const RobotNode& part : section.parts(known)) actuators.read(file.with_class(part, "main"));
 }

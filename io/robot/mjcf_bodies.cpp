@@ -16,12 +16,10 @@ namespace {
 
 constexpr int kDeepestBodies = 90;  // bodies in bodies; a scene's limit is 200 links
 
-const char* const kSite = "sites are not read";
-
 const Words kWorldParts = {{"body"},
                            {"geom"},
                            {"frame"},
-                           {"site", Fate::idle, kSite},
+                           {"site"},
                            {"camera", Fate::idle, kSight},
                            {"light", Fate::idle, kSight},
                            {"composite", Fate::lost, "bodies made by MuJoCo; write them out"},
@@ -60,8 +58,10 @@ class Bodies {
       for (RobotPiece& piece : fixed) piece.density = 0;
       add_link(robot_, file_.names, joint.name, -1, joint, fixed, "<worldbody>", world.source());
     }
-    for (const Placed& part : parts)
+    for (const Placed& part : parts) {
       if (part.node.name() == "body") read_body(part, -1, {}, 0);
+      if (part.node.name() == "site") read_site(part, -1, {});
+    }
   }
 
   /// Keeps all names that the file gives, so that made-up ones differ from them.
@@ -122,8 +122,25 @@ class Bodies {
     gather(node, {}, defaults, known, parts, 0);
     Pose offset;  // of the body's frame in that of its link
     const int index = add_chain(node, name, parent, place, parts, offset);
-    for (const Placed& part : parts)
+    for (const Placed& part : parts) {
       if (part.node.name() == "body") read_body(part, index, offset, depth + 1);
+      if (part.node.name() == "site") read_site(part, index, offset);
+    }
+  }
+
+  /// Keeps the place of a site. `offset`: of its body's frame in that of the link.
+  void read_site(const Placed& part, int link, const Pose& offset) {
+    const RobotNode node = file_.with_class(part.node, part.defaults);
+    node.check(mjcf_words("site"));
+    const Pose own = node.has("fromto") ? read_ends(node).pose : file_.read_pose(node);
+    if (!node.given("name")) return node.idle("<site> without a name: " + std::string(kSight));
+    if (link < 0) return node.idle("<site> of the world: a place that does not move");
+    const std::string name = node.text("name");
+    const RobotSite site{link, compose(offset, compose(part.frame, own)), node.source()};
+    const auto [first, is_new] = robot_.sites.try_emplace(name, site);
+    if (!is_new)
+      node.fail(fmt::format("site name '{}' is used twice, first in {}", name,
+                            place_in(robot_, first->second.source)));
   }
 
   std::string unique_body(const RobotNode& node) {
@@ -370,6 +387,19 @@ class Bodies {
     return x;
   }
 
+  struct Ends {
+    Pose pose;    ///< in the middle, z along them
+    double half;  ///< of the length between them
+  };
+  static Ends read_ends(const RobotNode& node) {
+    const std::vector<double> x = node.numbers("fromto", 6);
+    const Vector3 back = {x[0] - x[3], x[1] - x[4], x[2] - x[5]};
+    const double half = 0.5 * std::sqrt(dot(back, back));
+    if (!(half > 0) || !std::isfinite(half))
+      node.fail("fromto has two equal ends; expected a length");
+    return {{{0.5 * (x[0] + x[3]), 0.5 * (x[1] + x[4]), 0.5 * (x[2] + x[5])}, from_z(back)}, half};
+  }
+
   /// Reads type, size and place. Returns false for a shape that scenes do not have.
   bool read_shape(const RobotNode& node, RobotPiece& piece) {
     static const std::vector<std::string> types = {
@@ -385,12 +415,9 @@ class Bodies {
                                                   type == "box" || type == "ellipsoid");
     double half = 0;  // of the length along z, where two ends give it
     if (stretched) {
-      const std::vector<double> x = node.numbers("fromto", 6);
-      const Vector3 back = {x[0] - x[3], x[1] - x[4], x[2] - x[5]};
-      half = 0.5 * std::sqrt(dot(back, back));
-      if (!(half > 0) || !std::isfinite(half))
-        node.fail("fromto has two equal ends; expected a length");
-      piece.pose = {{0.5 * (x[0] + x[3]), 0.5 * (x[1] + x[4]), 0.5 * (x[2] + x[5])}, from_z(back)};
+      const Ends ends = read_ends(node);
+      half = ends.half;
+      piece.pose = ends.pose;
     }
     if (type == "mesh") return read_mesh(node, piece);
     if (node.has("mesh")) {

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <array>
+#include <limits>
 #include <map>
 #include <optional>
 #include <string>
@@ -29,6 +30,16 @@ struct MjcfJoint {
   std::optional<std::array<double, 2>> actuator_range;  ///< [N or N m]
 };
 
+/// An actuator of the file, in its order, and how its control becomes one of the scene:
+/// scale · c + shift, with c and the result within bounds.
+struct MjcfControl {
+  static constexpr double kNone = std::numeric_limits<double>::infinity();
+  int motor = -1;  ///< of the scene; -1: the actuator is left out
+  double scale = 1, shift = 0;
+  std::array<double, 2> range{-kNone, kNone};
+  double least = -kNone, most = kNone;
+};
+
 enum class InertiaFrom { automatic, geoms, inertials };
 
 /// In defaults all actuators share the attributes of <general>.
@@ -49,6 +60,7 @@ class MjcfFile {
   std::map<std::string, MjcfMesh> meshes;
   std::map<std::string, std::array<double, 4>> materials;
   std::map<std::string, MjcfJoint> joints;
+  std::vector<MjcfControl> controls;
   RobotNames names;
 
   [[nodiscard]] double angle(double x) const {
@@ -77,5 +89,9 @@ class MjcfFile {
 void read_mjcf_bodies(MjcfFile& file, const RobotNode& world);
 /// Reads an <actuator> section.
 void read_mjcf_actuators(MjcfFile& file, const RobotNode& section);
+/// Reads the <keyframe> sections, after all bodies and actuators. The key `wanted`, by its name or,
+/// without one, its number from 0, gives the scene its start; "" for none.
+void read_mjcf_keyframes(MjcfFile& file, const std::vector<RobotNode>& sections,
+                         const std::string& wanted);
 
 }  // namespace tangere

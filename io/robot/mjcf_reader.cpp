@@ -15,8 +15,6 @@
 namespace tangere {
 namespace {
 
-const char* const kState = "stored states; <initial> gives a scene its own";
-
 const Words kSections = {
     {"compiler"},
     {"option"},
@@ -30,7 +28,7 @@ const Words kSections = {
     {"statistic", Fate::idle, kSight},
     {"custom", Fate::idle, "numbers for other programs"},
     {"sensor", Fate::idle, "readings of MuJoCo; --pad LINK=LAYOUT adds a skin"},
-    {"keyframe", Fate::idle, kState},
+    {"keyframe"},
     {"equality", Fate::lost, "constraints between bodies or joints; scenes have none"},
     {"tendon", Fate::lost, "tendons; scenes have none"},
     {"deformable", Fate::lost, "bodies that bend; scenes have none"},
@@ -215,7 +213,7 @@ void MjcfFile::read_defaults(const RobotNode& node, const std::string& parent) {
                  {"joint"},
                  {"mesh"},
                  {"material"},
-                 {"site", Fate::idle, "sites are not read"},
+                 {"site"},
                  {"camera", Fate::idle, kSight},
                  {"light", Fate::idle, kSight},
                  {"pair", Fate::idle, "of pairs of geoms, which --contact names"},
@@ -319,7 +317,7 @@ Pose MjcfFile::read_pose(const RobotNode& node) const {
   return {node.vector("pos", Vector3{0, 0, 0}), read_orientation(node)};
 }
 
-void read_mjcf(const RobotNode& root) {
+void read_mjcf(const RobotNode& root, const std::string& keyframe) {
   Robot& robot = root.robot();
   robot.format = "MJCF";
   root.check({{"model"}});
@@ -343,6 +341,9 @@ void read_mjcf(const RobotNode& root) {
         {{"pair", Fate::lost, "a contact with coefficients of MuJoCo's; --contact A=B adds one"},
          {"exclude", Fate::idle, "a scene has only the contacts that it names"}}));
   });
+  std::vector<RobotNode> keyframes;
+  each("keyframe", [&](const RobotNode& s) { keyframes.push_back(s); });
+  read_mjcf_keyframes(file, keyframes, keyframe);
   file.take_warnings(root.context().warnings);
 }
 

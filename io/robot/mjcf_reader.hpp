@@ -6,8 +6,8 @@
 
 namespace tangere {
 
-/// Reads the root <mujoco>. Throws InputError ("file:line: …") for what is outside the subset and
-/// cannot be left out.
-void read_mjcf(const RobotNode& root);
+/// Reads the root <mujoco>. `keyframe` names the keyframe in which the scene starts, "" for none.
+/// Throws InputError ("file:line: …") for what is outside the subset and cannot be left out.
+void read_mjcf(const RobotNode& root, const std::string& keyframe);
 
 }  // namespace tangere

@@ -94,6 +94,15 @@ std::map<std::string, Words> all_words() {
                                 {"fluidshape", Fate::lost, "forces of a fluid"},
                                 {"fluidcoef", Fate::idle, "of a fluid"},
                                 {"user", Fate::idle, kUser}});
+  all["site"] = with_rotations({{"name"},
+                                {"class"},
+                                {"fromto"},
+                                {"type", Fate::idle, kSight},
+                                {"size", Fate::idle, kSight},
+                                {"material", Fate::idle, kSight},
+                                {"rgba", Fate::idle, kSight},
+                                {"group", Fate::idle, kSight},
+                                {"user", Fate::idle, kUser}});
   all["mesh"] = {{"name"},
                  {"class"},
                  {"file"},

@@ -13,7 +13,7 @@ namespace tangere {
 inline constexpr const char* kSight = "for pictures only";
 inline constexpr const char* kSolver = "a setting of MuJoCo's solver";
 
-/// The attributes of <joint>, <geom>, <mesh>, <material>, <general>, <motor>, <position> or
+/// The attributes of <joint>, <geom>, <site>, <mesh>, <material>, <general>, <motor>, <position> or
 /// <velocity>.
 const Words& mjcf_words(const std::string& element);
 

@@ -11,6 +11,8 @@
 #include <filesystem>
 #include <variant>
 
+#include "io/files/nearest_name.hpp"
+
 namespace tangere {
 
 void Remarks::add(const Source& at, const std::string& text) {
@@ -34,6 +36,21 @@ std::string place_in(const Robot& robot, const Source& source) {
   if (source.file == robot.scene.path) return fmt::format("line {}", source.line);
   return fmt::format("line {} of {}", source.line,
                      std::filesystem::path(source.file).filename().string());
+}
+
+RobotPlace find_place(const Robot& robot, const std::string& name, const std::string& what,
+                      const std::string& file) {
+  std::vector<std::string> names;
+  for (const LinkDescription& link : robot.scene.links) {
+    if (link.name == name) return {&link, nullptr, {}};
+    names.push_back(link.name);
+  }
+  for (const auto& [known, site] : robot.sites) {
+    if (known == name) return {&robot.scene.links[std::size_t(site.link)], &site, site.pose};
+    names.push_back(known);
+  }
+  throw InputError(fmt::format("{}: {} has no link{} of this name{}", what, file,
+                               robot.sites.empty() ? "" : " or site", suggestion(name, names)));
 }
 
 std::string RobotNames::free_name(const std::string& wanted) {

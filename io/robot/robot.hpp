@@ -4,6 +4,7 @@
 
 #include <map>
 #include <memory>
+#include <optional>
 #include <set>
 #include <string>
 #include <vector>
@@ -31,6 +32,13 @@ struct MeshFile {
   Vector3 scale{1, 1, 1};
 };
 
+/// A named place on a link.
+struct RobotSite {
+  int link = -1;
+  Pose pose;  ///< in the link's frame
+  Source source;
+};
+
 struct RobotFile;  // io/robot/robot_node.hpp
 
 struct Robot {
@@ -43,13 +51,27 @@ struct Robot {
   std::map<std::string, std::string> origins;  ///< by link: what of the file it was, for a comment
   std::set<std::string> pieces;  ///< links made for further shapes of the link that they hang on
   std::map<std::string, double> efforts;  ///< by joint: largest force or torque [N or N m]
-  Remarks idle;                           ///< left out, and of no effect on the motion
-  Remarks changed;                        ///< said in another way
-  Remarks lost;                           ///< left out although it changes the motion
+  std::map<std::string, RobotSite> sites;
+  /// By motor of the scene: the control that a keyframe gives it. No value without a keyframe.
+  std::optional<std::vector<double>> controls;
+  Remarks idle;     ///< left out, and of no effect on the motion
+  Remarks changed;  ///< said in another way
+  Remarks lost;     ///< left out although it changes the motion
 };
 
 /// "line 7", or "line 7 of hand.xml" in a file that <include> has brought in.
 std::string place_in(const Robot& robot, const Source& source);
+
+/// A link, or a place on one, that an option names.
+struct RobotPlace {
+  const LinkDescription* link;
+  const RobotSite* site;  ///< null: the link itself
+  Pose pose;              ///< in the link's frame
+};
+/// Finds a link or else a site. `what` is the option and `file` the robot, for the InputError of a
+/// name that is neither.
+RobotPlace find_place(const Robot& robot, const std::string& name, const std::string& what,
+                      const std::string& file);
 
 /// Gives new links, joints and bodies names that no other has.
 class RobotNames {

@@ -74,6 +74,14 @@ void stiffen_limits(Robot& robot) {
   }
 }
 
+/// A control with which a motor that no keyframe knows leaves its joint where it starts.
+double resting_control(const Scene& scene, const MotorDescription& motor) {
+  if (motor.control != MotorControl::position) return 0;
+  for (const InitialState& s : scene.initial)
+    if (s.joint == motor.joint && s.q.size() == 1) return s.q[0];
+  return 0;
+}
+
 void add_motors(Robot& robot, const std::vector<MotorRequest>& requests, const std::string& file) {
   for (const MotorRequest& request : requests) {
     std::vector<std::string> names;
@@ -105,6 +113,7 @@ void add_motors(Robot& robot, const std::vector<MotorRequest>& requests, const s
       motor.D = request.D;
     }
     robot.scene.motors.push_back(motor);
+    if (robot.controls) robot.controls->push_back(resting_control(robot.scene, motor));
   }
 }
 
@@ -179,6 +188,34 @@ std::string contacts_text(Robot& robot, const std::vector<TouchRequest>& request
   return text;
 }
 
+std::string end_effectors_text(const Robot& robot, const std::vector<std::string>& names,
+                               const std::string& file) {
+  std::string text;
+  for (const std::string& name : names) {
+    const RobotPlace place = find_place(robot, name, "--end-effector " + name, file);
+    const Vector3& p = place.pose.position;
+    text += fmt::format("    <endeffector name=\"{}\" joint=\"{}\" pos=\"{} {} {}\"/>\n",
+                        attribute_text(name), attribute_text(place.link->joint.name),
+                        number_text(p[0]), number_text(p[1]), number_text(p[2]));
+  }
+  return text;
+}
+
+/// Lists the sites that no option has used.
+void list_sites(Robot& robot, const RobotOptions& options) {
+  const auto used = [&](const std::string& name) {
+    return std::find(options.end_effectors.begin(), options.end_effectors.end(), name) !=
+               options.end_effectors.end() ||
+           std::any_of(options.pads.begin(), options.pads.end(),
+                       [&](const PadRequest& pad) { return pad.link == name; });
+  };
+  for (const auto& [name, site] : robot.sites)
+    if (!used(name))
+      robot.idle.add(
+          site.source,
+          "<site>: a place with a name; --end-effector SITE and --pad SITE=LAYOUT use it");
+}
+
 std::string list_text(const char* title, const std::vector<std::string>& lines) {
   if (lines.empty()) return "";
   std::string text = fmt::format("\n     {}\n", title);
@@ -210,11 +247,13 @@ Robot read_robot(const std::string& text, const std::string& name, const RobotOp
   const tinyxml2::XMLElement& element = parse_xml(document, text, name, kRoots, context.warnings);
   const RobotNode root(element, context, robot);
   if (root.name() == "robot") {
+    if (!options.keyframe.empty())
+      throw InputError("--keyframe with " + name + ": a URDF file has no keyframes");
     read_urdf(root, options.free_base);
   } else if (root.name() == "mujoco") {
     if (options.free_base)
       throw InputError("--base free with " + name + ": a MJCF file says itself what moves freely");
-    read_mjcf(root);
+    read_mjcf(root, options.keyframe);
   } else {
     root.fail(
         std::string("no robot; expected ") + kRoots +
@@ -244,13 +283,14 @@ ImportedScene import_robot(const fs::path& path, const fs::path& output,
         "    <general_primitive_contact kn=\"500\" kt=\"5\" mu=\"1\" damping=\"1\"/>\n"
         "    <ground_contact kn=\"500\" kt=\"5\" mu=\"1\" damping=\"1\"/>\n";
   sections.sensors = pads_text(robot, options.pads, name);
+  sections.places = end_effectors_text(robot, options.end_effectors, name);
+  list_sites(robot, options);
   out.idle = robot.idle.lines();
   out.changed = robot.changed.lines();
   out.lost = robot.lost.lines();
   sections.head = fmt::format(
       "Made by 'tangere import' from {} ({}). All numbers are in SI units; line numbers are those "
-      "of "
-      "that file.\n",
+      "of that file.\n",
       path.filename().string(), robot.format);
   sections.head += list_text("Left out, and the motion differs by it:", out.lost) +
                    list_text("Said in another way:", out.changed) +
@@ -264,6 +304,7 @@ ImportedScene import_robot(const fs::path& path, const fs::path& output,
     if (link.joint.type != JointType::fixed) ++out.joints;
   out.motors = scene.scene.motors.size();
   out.sensors = scene.scene.sensors.size();
+  out.end_effectors = scene.scene.end_effectors.size();
   static_cast<void>(
       Model(scene.scene));  // whatever it would refuse is refused before it is written
   return out;

@@ -14,10 +14,10 @@ namespace tangere {
 /// A tactile skin on a link. `layout`: the text of a file with the root <sensor>, whose sensors get
 /// the link's body and a place.
 struct PadRequest {
-  std::string link;
+  std::string link;         ///< or a site of MJCF
   std::string layout_name;  ///< for messages and comments
   std::string layout;
-  /// Where the layout's frame lies in the link's. Its z points out of the skin.
+  /// Where the layout's frame lies in the link's, or in the site's. Its z points out of the skin.
   Pose pose;
   /// Instead: the middle of a face of the link's box, "+x", "-z" …; "" for none.
   std::string face;
@@ -41,12 +41,16 @@ struct RobotOptions {
   std::vector<PadRequest> pads{};
   std::vector<MotorRequest> motors{};
   std::vector<TouchRequest> touches{};
+  /// Links, or sites of MJCF, whose places a run stores.
+  std::vector<std::string> end_effectors{};
+  std::string keyframe;  ///< MJCF: the keyframe in which the scene starts; "": none
 };
 
 struct ImportedScene {
   std::string text;                                            ///< of the scene file
   std::string format;                                          ///< "URDF" or "MJCF"
   std::size_t links = 0, joints = 0, motors = 0, sensors = 0;  ///< joints: those that move
+  std::size_t end_effectors = 0;
   std::vector<std::string> idle;     ///< left out, and of no effect on the motion
   std::vector<std::string> changed;  ///< said in another way
   std::vector<std::string> lost;     ///< left out although it changes the motion

@@ -25,8 +25,14 @@ constexpr Face kFaces[] = {{"+x", {0, 1, 0}, {0, 0, 1}},  {"-x", {0, -1, 0}, {0,
                            {"+z", {1, 0, 0}, {0, 1, 0}},  {"-z", {-1, 0, 0}, {0, 1, 0}}};
 
 /// The frame in the body's own frame in which the layout lies.
-Pose place_of(const PadRequest& pad, const LinkDescription& link, const std::string& what) {
-  if (pad.face.empty()) return compose(inverse(link.body.pose), pad.pose);
+Pose place_of(const PadRequest& pad, const RobotPlace& place, const std::string& what) {
+  const LinkDescription& link = *place.link;
+  if (pad.face.empty()) return compose(inverse(link.body.pose), compose(place.pose, pad.pose));
+  if (place.site != nullptr)
+    throw InputError(
+        fmt::format("{}: '{}' is a site and has no face {}; expected @x,y,z or "
+                    "@x,y,z,roll,pitch,yaw in the site's frame",
+                    what, pad.link, pad.face));
   const auto* const box = std::get_if<CuboidShape>(&link.body.shape);
   if (box == nullptr)
     throw InputError(
@@ -81,22 +87,17 @@ std::string pads_text(const Robot& robot, const std::vector<PadRequest>& pads,
   std::set<std::string> names;
   for (const PadRequest& pad : pads) {
     const std::string what = fmt::format("--pad {}={}", pad.link, pad.layout_name);
-    std::vector<std::string> links;
-    for (const LinkDescription& l : robot.scene.links) links.push_back(l.name);
-    const auto at = std::find(links.begin(), links.end(), pad.link);
-    if (at == links.end())
-      throw InputError(fmt::format("{}: {} has no link of this name{}", what, file,
-                                   suggestion(pad.link, links)));
-    const LinkDescription& link = robot.scene.links[std::size_t(at - links.begin())];
-    const Pose place = place_of(pad, link, what);
+    const RobotPlace found = find_place(robot, pad.link, what, file);
+    const LinkDescription& link = *found.link;
+    const Pose place = place_of(pad, found, what);
     tinyxml2::XMLDocument document;
     SceneContext context;
     context.file = pad.layout_name;
     const tinyxml2::XMLElement& root =
         parse_xml(document, pad.layout, pad.layout_name, "the root <sensor>", context.warnings);
     check_metres(root, context);
-    text += fmt::format("    <!-- {} on link '{}' -->\n", comment_text(pad.layout_name),
-                        comment_text(pad.link));
+    text += fmt::format("    <!-- {} on {} '{}' -->\n", comment_text(pad.layout_name),
+                        found.site == nullptr ? "link" : "site", comment_text(pad.link));
     for (const SceneNode& sensor : SceneNode(root, context).children({"tactile"})) {
       refuse_files(sensor);
       std::string name = pad.link + "_" + sensor.text("name", "skin");

@@ -18,6 +18,12 @@ std::string vector_text(const Vector3& v) {
   return fmt::format("{} {} {}", number_text(v[0]), number_text(v[1]), number_text(v[2]));
 }
 
+std::string numbers_text(const std::vector<double>& numbers) {
+  std::string text;
+  for (const double x : numbers) text += (text.empty() ? "" : " ") + number_text(x);
+  return text;
+}
+
 std::string attribute(const char* name, double x, double usual) {
   return x == usual ? "" : fmt::format(" {}=\"{}\"", name, number_text(x));
 }
@@ -51,6 +57,8 @@ class Writer {
     if (!scene_.motors.empty()) write_motors();
     section("contact", sections.contacts);
     section("sensor", sections.sensors);
+    section("variable", sections.places);
+    write_start();
     return out_ + "</tangere>\n";
   }
 
@@ -113,12 +121,9 @@ class Writer {
   void write_size(const BodyDescription& body) {
     if (const auto* const mass = std::get_if<AbstractShape>(&body.shape)) return write_mass(*mass);
     if (std::holds_alternative<MeshShape>(body.shape)) return write_mesh(body.name);
-    for (const NamedSize& size : named_sizes(body.shape)) {
-      out_ += fmt::format(" {}=\"", size.name);
-      for (std::size_t k = 0; k < size.values.size(); ++k)
-        out_ += (k > 0 ? " " : "") + number_text(size.values[k]);
-      out_ += "\"";
-    }
+    for (const NamedSize& size : named_sizes(body.shape))
+      out_ += fmt::format(" {}=\"{}\"", size.name,
+                          numbers_text({size.values.begin(), size.values.end()}));
   }
   void write_mesh(const std::string& body) {
     const MeshFile& file = robot_.meshes.at(body);
@@ -156,6 +161,21 @@ class Writer {
                   : "/>\n";
     }
     out_ += "  </actuator>\n";
+  }
+
+  /// The start and the controls of a keyframe.
+  void write_start() {
+    std::string states;
+    for (const InitialState& s : scene_.initial) {
+      states += fmt::format("    <joint name=\"{}\"", attribute_text(s.joint));
+      if (!s.q.empty()) states += fmt::format(" q=\"{}\"", numbers_text(s.q));
+      if (!s.v.empty()) states += fmt::format(" v=\"{}\"", numbers_text(s.v));
+      states += "/>\n";
+    }
+    section("initial", states);
+    if (robot_.controls && !robot_.controls->empty())
+      section("control",
+              fmt::format("    <constant value=\"{}\"/>\n", numbers_text(*robot_.controls)));
   }
 
   /// A range that is open on one side only: this far beyond any force, the bound is never met.

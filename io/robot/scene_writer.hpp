@@ -16,6 +16,7 @@ struct SceneSections {
   std::string defaults;  ///< inside <default>; "" for none
   std::string contacts;  ///< inside <contact>; "" for none
   std::string sensors;   ///< inside <sensor>; "" for none
+  std::string places;    ///< inside <variable>; "" for none
 };
 
 /// Returns the text of the scene. `folder`: where it will lie; meshes are named relative to it.

@@ -13,6 +13,7 @@
 #include "io/files/text_file.hpp"
 #include "io/scene/scene_sections.hpp"
 #include "io/scene/scene_warnings.hpp"
+#include "io/scene/unlike_skins.hpp"
 #include "io/scene/xml_document.hpp"
 
 namespace tangere {
@@ -292,7 +293,7 @@ void read_root(const SceneNode& root, Scene& scene) {
   once("control", [&](const SceneNode& s) { read_control(scene, s); });
   once("randomize", [&](const SceneNode& s) { read_randomize(scene, s); });
   once("outputs", [&](const SceneNode& s) { read_outputs(scene, s); });
-  warn_of_idle_sensors(scene, root);
+  warn_of_sensors(scene, root);
 }
 
 }  // namespace

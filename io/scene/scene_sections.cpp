@@ -131,58 +131,6 @@ void warn_of_coarse_points(const Scene& scene, const SceneNode& root) {
   }
 }
 
-/// Points per area of the face of a pad's body that a tactile array lies on, or 0 where that is not
-/// known: the sides of cuboids with axes along theirs, and caps of cylinders.
-double contact_points_per_area(const Shape& shape, const RectArray& array) {
-  constexpr double kAlong = 0.99;
-  std::array<bool, 3> in_face{};  // axes of the body that the array lies along
-  for (const Vector3& axis : {array.axis0, array.axis1})
-    for (std::size_t k = 0; k < 3; ++k) in_face[k] = in_face[k] || std::abs(axis[k]) > kAlong;
-  if (std::count(in_face.begin(), in_face.end(), true) != 2) return 0;
-  if (const auto* const cuboid = std::get_if<CuboidShape>(&shape)) {
-    double points = 1, area = 1;
-    for (std::size_t k = 0; k < 3; ++k) {
-      if (!in_face[k]) continue;
-      points *= cuboid->contact_resolution[k] - 1;
-      area *= cuboid->size[k];
-    }
-    return points / area;
-  }
-  if (const auto* const cylinder = std::get_if<CylinderShape>(&shape)) {
-    if (in_face[2]) return 0;
-    const double points = 1 + double(cylinder->contact_rings) * cylinder->contact_angles;
-    return points / (M_PI * cylinder->radius * cylinder->radius);
-  }
-  return 0;
-}
-
-void warn_of_unlike_skins(const Scene& scene, const SceneNode& root) {
-  constexpr double kUnlike = 30;
-  for (const TactileDescription& d : scene.sensors) {
-    const RectArray& a = d.array;
-    if (!d.points.empty() || a.rows < 2 || a.cols < 2 || d.coefficients.kn == 0) continue;
-    const Vector3 way = a.corner1 - a.corner0;
-    const double area = std::abs(dot(way, a.axis0) * dot(way, a.axis1));
-    const auto link = std::find_if(scene.links.begin(), scene.links.end(),
-                                   [&](const auto& l) { return l.body.name == d.body; });
-    if (link == scene.links.end() || !(area > 0)) continue;
-    const double density = contact_points_per_area(link->body.shape, a),
-                 felt = d.coefficients.kn * (a.rows - 1) * (a.cols - 1) / area;
-    for (const PairContactDescription& c : scene.pair_contacts) {
-      if (c.general_body != d.body || !c.points.empty() || density == 0 || c.coefficients.kn == 0)
-        continue;
-      const double pressed = c.coefficients.kn * density, share = felt / pressed;
-      if (share < kUnlike && share > 1 / kUnlike) continue;
-      root.context().warnings.push_back(fmt::format(
-          "{}<tactile>: kn of '{}' is {:.3g} N/m per mm² of skin, that of its contact with '{}' is "
-          "{:.3g}, so the field shows {:.2g} times the force; expected about the same of both, as "
-          "'tangere skin' gives them",
-          d.source.prefix(), d.name, felt * 1e-6, c.primitive_body, pressed * 1e-6, share));
-      break;
-    }
-  }
-}
-
 void read_contacts(Scene& scene, const SceneNode& section) {
   section.check_attributes({});
   for (const SceneNode& node : section.children({"ground_contact", "general_primitive_contact"})) {

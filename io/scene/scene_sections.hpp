@@ -30,9 +30,6 @@ void warn_of_dense_meshes(const Scene& scene, const SceneNode& root);
 /// Warns of pairs in which a cuboid's contact points are as far apart as the touched body is
 /// across, or farther, and the touched body has no points on the cuboid.
 void warn_of_coarse_points(const Scene& scene, const SceneNode& root);
-/// Warns of flat sensors whose stiffness per area is 30 times or a 30th of that of the contact
-/// points of their own body.
-void warn_of_unlike_skins(const Scene& scene, const SceneNode& root);
 
 void read_sensors(Scene& scene, const SceneNode& section);
 void read_end_effectors(Scene& scene, const SceneNode& section);

@@ -1,16 +1,22 @@
 // SPDX-License-Identifier: Apache-2.0
-// Warns of sensors that read zero for ever, or forces that nothing exerts.
+// Warns of sensors that read zero for ever, or forces that nothing exerts, and of those that do not
+// feel what touches their body.
 #include "io/scene/scene_warnings.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <limits>
+#include <optional>
 #include <set>
 
+#include "engine/model/shapes.hpp"
 #include "io/scene/scene_sections.hpp"
 
 namespace tangere {
 namespace {
+
+constexpr double kBelow = 0.1;  // share of a body's thickness
 
 std::string listed(const std::set<std::string>& names) {
   std::string text;
@@ -18,42 +24,134 @@ std::string listed(const std::set<std::string>& names) {
   return text;
 }
 
+class SensorWarnings {
+ public:
+  SensorWarnings(const Scene& scene, const TactileDescription& sensor, const SceneNode& root)
+      : scene_(scene), sensor_(sensor), root_(root), own_(group_of(sensor.body)) {}
+
+  void warn() {
+    std::set<std::string> without;  // distance, and free to move against the sensor
+    for (std::size_t k = 0; k < scene_.links.size(); ++k) {
+      if (moving_link(scene_, static_cast<int>(k)) == own_) continue;
+      const BodyDescription& body = scene_.links[k].body;
+      if (has_distance(body.shape))
+        felt_.insert(moving_link(scene_, static_cast<int>(k)));
+      else
+        without.insert(body.name);
+    }
+    if (felt_.empty())
+      return add(without.empty()
+                     ? "can feel nothing: no other body moves against it" + of_the_ground()
+                     : "can feel nothing: a sensor feels shapes with a distance, and " +
+                           listed(without) + " has none");
+    const bool touched = std::any_of(scene_.pair_contacts.begin(), scene_.pair_contacts.end(),
+                                     [&](const auto& c) { return !other_of(c).empty(); });
+    if (!touched)
+      return add(
+          "reads forces that nothing exerts: no contact is declared between that body, or one "
+          "that is rigidly joined to it, and another, so bodies pass through it" +
+          of_the_ground());
+    if (on_the_ground())
+      add("does not feel the ground, which touches that body; expected a body of type plane in its "
+          "place, where it should");
+    warn_of_unfelt();
+    warn_of_place();
+  }
+
+ private:
+  [[nodiscard]] int group_of(const std::string& body) const {
+    for (std::size_t k = 0; k < scene_.links.size(); ++k)
+      if (scene_.links[k].body.name == body) return moving_link(scene_, static_cast<int>(k));
+    return -1;
+  }
+
+  /// The body that a contact lets touch the sensor's; "" for none.
+  [[nodiscard]] std::string other_of(const PairContactDescription& c) const {
+    const bool first = group_of(c.general_body) == own_,
+               second = group_of(c.primitive_body) == own_;
+    if (first == second) return "";
+    return first ? c.primitive_body : c.general_body;
+  }
+
+  [[nodiscard]] bool on_the_ground() const {
+    return std::any_of(scene_.ground_contacts.begin(), scene_.ground_contacts.end(),
+                       [&](const auto& c) { return c.body == sensor_.body; });
+  }
+  [[nodiscard]] std::string of_the_ground() const {
+    return on_the_ground() ? ". No sensor feels the ground; expected a body of type plane in its "
+                             "place, where it should"
+                           : "";
+  }
+
+  void warn_of_unfelt() {
+    std::set<std::string> unfelt;
+    for (const PairContactDescription& c : scene_.pair_contacts) {
+      const std::string other = other_of(c);
+      if (!other.empty() && !felt_.contains(group_of(other))) unfelt.insert(other);
+    }
+    if (unfelt.empty()) return;
+    add(
+        fmt::format("does not feel {}, which touches that body: a sensor feels shapes with a "
+                    "distance, and {} none",
+                    listed(unfelt), unfelt.size() == 1 ? "it has" : "they have"));
+  }
+
+  /// Bodies stop at the surface of the sensor's own body, so points well below it feel nothing, and
+  /// points far above it feel what nothing stops.
+  void warn_of_place() {
+    const auto link = std::find_if(scene_.links.begin(), scene_.links.end(),
+                                   [&](const auto& l) { return l.body.name == sensor_.body; });
+    if (link == scene_.links.end()) return;
+    const Shape& shape = link->body.shape;
+    const std::array<double, 3> across = widths(shape);
+    const double thin = *std::min_element(across.begin(), across.end()),
+                 wide = *std::max_element(across.begin(), across.end());
+    double least = std::numeric_limits<double>::infinity(), most = -least;
+    for (const TactilePoint& p : some_points()) {
+      const std::optional<SurfaceDistance> d = distance_from(shape, p.position);
+      if (!d) return;
+      least = std::min(least, d->distance);
+      most = std::max(most, d->distance);
+    }
+    if (!(thin > 0)) return;
+    if (most < -kBelow * thin)
+      add(
+          fmt::format("lies at least {:.3g} m below the surface of that body, so what touches the "
+                      "body does not come as deep; expected points on its surface",
+                      -most));
+    if (least > wide)
+      add(
+          fmt::format("lies at least {:.3g} m off that body, which is {:.3g} m across; expected "
+                      "points on its surface, in the body's frame and the scene's unit",
+                      least, wide));
+  }
+
+  /// Of an array its corners, which say where all points are at most, and what is between them.
+  [[nodiscard]] std::vector<TactilePoint> some_points() const {
+    if (!sensor_.points.empty()) return sensor_.points;
+    TactileDescription coarse = sensor_;
+    coarse.array.rows = std::min(coarse.array.rows, 3);
+    coarse.array.cols = std::min(coarse.array.cols, 3);
+    return tactile_points(coarse);
+  }
+
+  void add(const std::string& text) {
+    root_.context().warnings.push_back(fmt::format("{}<tactile>: sensor '{}' on body '{}' {}",
+                                                   sensor_.source.prefix(), sensor_.name,
+                                                   sensor_.body, text));
+  }
+
+  const Scene& scene_;
+  const TactileDescription& sensor_;
+  const SceneNode& root_;
+  int own_;
+  std::set<int> felt_;  // groups that have a distance and move against the sensor
+};
+
 }  // namespace
 
-void warn_of_idle_sensors(const Scene& scene, const SceneNode& root) {
-  const auto group_of = [&](const std::string& body) {
-    for (std::size_t k = 0; k < scene.links.size(); ++k)
-      if (scene.links[k].body.name == body) return moving_link(scene, static_cast<int>(k));
-    return -1;
-  };
-  for (const TactileDescription& sensor : scene.sensors) {
-    const int own = group_of(sensor.body);
-    std::set<std::string> without;  // distance, and free to move against the sensor
-    bool feels = false;
-    for (std::size_t k = 0; k < scene.links.size(); ++k) {
-      if (moving_link(scene, static_cast<int>(k)) == own) continue;
-      const BodyDescription& body = scene.links[k].body;
-      feels = feels || has_distance(body.shape);
-      if (!has_distance(body.shape)) without.insert(body.name);
-    }
-    const std::string of = fmt::format("{}<tactile>: sensor '{}' on body '{}' ",
-                                       sensor.source.prefix(), sensor.name, sensor.body);
-    if (!feels) {
-      root.context().warnings.push_back(
-          of + (without.empty() ? "can feel nothing: no other body moves against it"
-                                : "can feel nothing: a sensor feels shapes with a distance, and " +
-                                      listed(without) + " has none"));
-      continue;
-    }
-    const auto touches = [&](const PairContactDescription& c) {
-      return (group_of(c.general_body) == own) != (group_of(c.primitive_body) == own);
-    };
-    if (std::none_of(scene.pair_contacts.begin(), scene.pair_contacts.end(), touches))
-      root.context().warnings.push_back(
-          of +
-          "reads forces that nothing exerts: no contact is declared between that body, or one "
-          "that is rigidly joined to it, and another, so bodies pass through it");
-  }
+void warn_of_sensors(const Scene& scene, const SceneNode& root) {
+  for (const TactileDescription& sensor : scene.sensors) SensorWarnings(scene, sensor, root).warn();
 }
 
 }  // namespace tangere

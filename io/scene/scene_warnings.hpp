@@ -7,7 +7,8 @@
 
 namespace tangere {
 
-/// Warns of tactile sensors that nothing can touch, or whose body has no contact with another.
-void warn_of_idle_sensors(const Scene& scene, const SceneNode& root);
+/// Warns of tactile sensors that nothing can touch, whose body has no contact with another, or that
+/// do not feel what touches their body.
+void warn_of_sensors(const Scene& scene, const SceneNode& root);
 
 }  // namespace tangere

@@ -19,7 +19,7 @@ struct Target {
   std::function<void(const std::string& folder)> read;
 };
 
-/// scene, urdf, mjcf, table, obj, stl, ply, contact_points, layout.
+/// scene, urdf, mjcf, mjcf_includes, scene_includes, table, obj, stl, ply, contact_points, layout.
 std::vector<Target> text_targets();
 /// shard, merged (links to shards), copied (all numbers in it), trajectory.
 std::vector<Target> hdf5_targets();

@@ -3,6 +3,8 @@
 // later.
 #include <algorithm>
 #include <filesystem>
+#include <fstream>
+#include <memory>
 #include <span>
 
 #include "engine/sense/readout.hpp"
@@ -94,6 +96,87 @@ auto robots(std::initializer_list<const char*> names) {
     }
     return corpus;
   };
+}
+
+/// Names that an <include> should not have, and files that lead nowhere: rings, a chain of 300, a
+/// folder, files of other kinds and programs.
+void hostile_files(const fs::path& folder, const char* root, const char* inside) {
+  const auto write = [&](const std::string& name, const std::string& file) {
+    std::ofstream(folder / name) << "<" << root << ">" << inside << "<include file=\"" << file
+                                 << "\"/></" << root << ">";
+  };
+  write("itself.xml", "itself.xml");
+  write("ring_a.xml", "ring_b.xml");
+  write("ring_b.xml", "../folder/ring_a.xml");
+  write("back.xml", "mutant");
+  for (int k = 0; k < 300; ++k)
+    write("deep_" + std::to_string(k) + ".xml", "deep_" + std::to_string(k + 1) + ".xml");
+  std::ofstream(folder / "deep_300.xml") << "<" << root << "/>";
+  std::ofstream(folder / "empty.xml");
+  std::ofstream(folder / "cut.xml") << "<" << root << "><link";
+  fs::create_directory(folder / "folder.xml");
+  fs::create_symlink("loop.xml", folder / "loop.xml");
+}
+const std::vector<std::string> kHostileNames = {"mutant",
+                                                "./mutant",
+                                                "itself.xml",
+                                                "ring_a.xml",
+                                                "back.xml",
+                                                "deep_0.xml",
+                                                "deep_250.xml",
+                                                "empty.xml",
+                                                "cut.xml",
+                                                "folder.xml",
+                                                "loop.xml",
+                                                "meshes/wedge.obj",
+                                                "none.xml",
+                                                "..",
+                                                ".",
+                                                "/",
+                                                "",
+                                                "/etc/passwd",
+                                                "/dev/zero",
+                                                "/proc/self/mem",
+                                                "../../../../../../../../etc/hosts",
+                                                std::string(5000, 'a'),
+                                                "a/" + std::string(300, '/') + "b",
+                                                "part.xml/",
+                                                "part.xml&#10;x",
+                                                "mesh\xff"};
+
+/// A file that is no whole one of the corpus gets hostile names in its <include>s, and one more, as
+/// its own bytes say.
+void make_hostile(const std::string& path, const std::vector<std::string>& corpus) {
+  std::string text = file_bytes(path);
+  if (std::find(corpus.begin(), corpus.end(), text) != corpus.end()) return;
+  std::size_t choice = std::hash<std::string>{}(text);
+  const auto include = [&] {
+    const std::string& name = kHostileNames[choice % kHostileNames.size()];
+    choice = choice * 6364136223846793005 + 1442695040888963407;
+    return "<include file=\"" + name + "\"";
+  };
+  for (std::size_t at = 0; (at = text.find("<include file=\"", at)) != std::string::npos; ++at)
+    if (const std::size_t end = text.find('"', at + 15); end != std::string::npos && choice % 4 > 0)
+      text.replace(at, end + 1 - at, include());
+  if (const std::size_t at = text.find('>', choice % (text.size() + 1)); at != std::string::npos)
+    text.insert(at + 1, include() + "/>");
+  std::ofstream(path, std::ios::binary) << text;
+}
+
+/// Files that include others, with hostile names. `read` gets the file.
+Target hostile(const std::string& name, const char* root, const char* inside,
+               const std::function<std::vector<std::string>(const std::string&)>& prepare,
+               const std::function<void(const std::string&)>& read) {
+  const auto corpus = std::make_shared<std::vector<std::string>>();
+  return {name, false, "mutant",
+          [=](const std::string& folder) {
+            hostile_files(folder, root, inside);
+            return *corpus = prepare(folder);
+          },
+          [=](const std::string& folder) {
+            make_hostile(folder + "/mutant", *corpus);
+            read(folder);
+          }};
 }
 
 std::vector<std::string> tables(const std::string&) {
@@ -188,6 +271,10 @@ std::vector<Target> text_targets() {
   return {{"scene", false, "mutant", scenes, [=](const auto& f) { run_scene(in(f)); }},
           {"urdf", false, "mutant", robots({"hand.urdf", "gripper.urdf"}), run_robot},
           {"mjcf", false, "mutant", robots({"machine.xml", "arm.xml", "including.xml"}), run_robot},
+          hostile("mjcf_includes", "mujoco", "<body name=\"x\"/>",
+                  robots({"including.xml", "machine.xml"}), run_robot),
+          hostile("scene_includes", "tangere", "<robot/>", scenes,
+                  [=](const auto& f) { run_scene(in(f)); }),
           {"table", false, "mutant", tables,
            [=](const auto& f) { static_cast<void>(read_csv(in(f), 3, names)); }},
           surface("obj", meshes),

@@ -7,7 +7,8 @@
 
 For every robot a file NAME_reference.txt of lines: "mass BODY kg" once, then for each random state
 "state", and "q", "v", "u", "bias", "acceleration" with a joint and its numbers, "pose" with a body,
-the place of its last joint (or of the body, if it has none) and its quaternion w x y z. Coordinates
+the place of its last joint (or of the body, if it has none) and its quaternion w x y z, "site" with
+a site and its place. The last state of a file with keyframes is that of its last one. Coordinates
 are those of Tangere: those of a free joint are seen from where it starts, and ref is taken away.
 Accelerations are those that MuJoCo calls smooth: without contacts and limits.
 """
@@ -47,17 +48,34 @@ def line(kind, name, numbers):
     return " ".join([kind, name] + [repr(float(x)) for x in np.atleast_1d(numbers)]) + "\n"
 
 
-def control(model, i, rng):
-    """A control of actuator i, and the same for a motor of Tangere."""
+def is_servo(model, i):
+    return model.actuator_biasprm[i, 1] != 0
+
+
+def our_control(model, i, value):
+    """The control of actuator i for a motor of Tangere."""
     joint = model.actuator_trnid[i, 0]
-    gear = model.actuator_gear[i, 0]
-    gain, bias = model.actuator_gainprm[i, 0], model.actuator_biasprm[i]
-    if bias[1] != 0:  # a position servo: the target
-        target = rng.uniform(-0.3, 0.3)
-        return target, target / gear - model.qpos0[model.jnt_qposadr[joint]]
+    if is_servo(model, i):  # the target
+        return value / model.actuator_gear[i, 0] - model.qpos0[model.jnt_qposadr[joint]]
     low, high = model.actuator_ctrlrange[i]
-    value = rng.uniform(low, high)
-    return value, 2 * (value - low) / (high - low) - 1
+    return 2 * (value - low) / (high - low) - 1
+
+
+def draw_state(model, data, rng):
+    data.qvel[:] = rng.normal(size=model.nv)
+    for j in range(model.njnt):
+        at, kind = model.jnt_qposadr[j], model.jnt_type[j]
+        numbers = rng.normal(size=7)
+        if kind in (HINGE, SLIDE):
+            data.qpos[at] = model.qpos0[at] + (0.6 if kind == HINGE else 0.03) * numbers[0]
+        else:
+            if kind == FREE:
+                data.qpos[at : at + 3] = numbers[4:]
+                at += 3
+            data.qpos[at : at + 4] = numbers[:4]
+    for i in range(model.nu):
+        low, high = (-0.3, 0.3) if is_servo(model, i) else model.actuator_ctrlrange[i]
+        data.ctrl[i] = rng.uniform(low, high)
 
 
 def write(path):
@@ -68,27 +86,18 @@ def write(path):
     text = f"# Made by make_reference.py with MuJoCo {mujoco.__version__}.\n"
     for b in range(1, model.nbody):
         text += line("mass", model.body(b).name, model.body_mass[b])
-    for _ in range(STATES):
+    for k in range(STATES + (model.nkey > 0)):
         text += "state\n"
-        q, v = np.zeros(model.nq), rng.normal(size=model.nv)
-        u, found = [], {}
-        for j in range(model.njnt):
-            at, kind = model.jnt_qposadr[j], model.jnt_type[j]
-            numbers = rng.normal(size=7)
-            if kind in (HINGE, SLIDE):
-                q[at] = model.qpos0[at] + (0.6 if kind == HINGE else 0.03) * numbers[0]
-            else:
-                if kind == FREE:
-                    q[at : at + 3] = numbers[4:]
-                    at += 3
-                q[at : at + 4] = numbers[:4] / np.linalg.norm(numbers[:4])
-        for i in range(model.nu):
-            data.ctrl[i], ours = control(model, i, rng)
-            u.append((model.joint(model.actuator_trnid[i, 0]).name, ours))
-        data.qpos[:], data.qvel[:] = q, v
+        if k < STATES:
+            draw_state(model, data, rng)
+        else:
+            mujoco.mj_resetDataKeyframe(model, data, model.nkey - 1)
+        mujoco.mj_normalizeQuat(model, data.qpos)
         mujoco.mj_forward(model, data)
-        for name, ours in u:
-            text += line("u", name, ours)
+        q, v, found = data.qpos.copy(), data.qvel.copy(), {}
+        for i in range(model.nu):
+            name = model.joint(model.actuator_trnid[i, 0]).name
+            text += line("u", name, our_control(model, i, data.ctrl[i]))
         for j in range(model.njnt):
             name, kind = model.joint(j).name, model.jnt_type[j]
             a, d = model.jnt_qposadr[j], model.jnt_dofadr[j]
@@ -121,6 +130,8 @@ def write(path):
                 if model.jnt_type[last] != FREE:
                     place = place + rotation(data.xquat[b]) @ model.jnt_pos[last]
             text += line("pose", model.body(b).name, np.concatenate([place, data.xquat[b]]))
+        for s in range(model.nsite):
+            text += line("site", model.site(s).name, data.site_xpos[s])
     (HERE / f"{path.stem}_reference.txt").write_text(text)
 
 

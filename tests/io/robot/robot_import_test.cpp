@@ -183,11 +183,11 @@ TEST(RobotImport, ListsWhatChangesTheMotion) {
                                  "none (line 20)",
                           file + "<flag> contact: switches forces (line 5)",
                           file + "<joint> frictionloss: dry friction of a joint (line 9)",
-                          file + "<muscle>: an actuator that scenes do not have (line 27)",
                           file + "<motor> on a tendon: scenes drive joints (line 24)",
-                          file + "<position>: a second actuator of joint 'elbow' (line 26)"));
+                          file + "<position>: a second actuator of joint 'elbow' (line 26)",
+                          file + "<muscle>: an actuator that scenes do not have (line 27)"));
   EXPECT_THAT(arm.idle, Contains(HasSubstr("<geom> friction: coefficients of MuJoCo's contacts")));
-  EXPECT_THAT(arm.idle, Contains(HasSubstr("<keyframe>: stored states")));
+  EXPECT_THAT(arm.idle, Contains(HasSubstr("<key>: stored states")));
   EXPECT_THAT(arm.changed, Contains(HasSubstr("<motor> without ctrlrange")));
   EXPECT_THAT(arm.text, HasSubstr("Left out, and the motion differs by it:"));
   const ImportedScene gripper = import_robot(kRobots + "gripper.urdf", kRobots + "scene.xml");
@@ -224,6 +224,90 @@ TEST(RobotImport, AddsSkinsMotorsAndContacts) {
   EXPECT_EQ(scene.links[2].joint.limit_stiffness, 40 / 1e-3);  // the effort, a millimetre deep
   options.motors = {{"left_slid"}};
   EXPECT_THROW(import_robot(kRobots + "gripper.urdf", kRobots + "scene.xml", options), InputError);
+}
+
+TEST(RobotImport, AKeyframeIsTheStart) {
+  RobotOptions options;
+  options.keyframe = "0";
+  // Of four actuators the second is the motor that is read: 0.6 of -1 to 1 times the gear.
+  const std::string arm = file_bytes(kRobots + "arm.xml");
+  const auto with_key = [&](const std::string& key) {
+    std::string text = arm;
+    const std::string old = "<key qpos=\"0.1 0.2\"/>";
+    return text.replace(text.find(old), old.size(), key);
+  };
+  const Scene scene =
+      parse_scene(
+          import(with_key("<key qpos=\"0.1 0.2\" qvel=\"0 -3\" ctrl=\"5 0.6 7 8\"/>"), options)
+              .text,
+          "scene.xml")
+          .scene;
+  ASSERT_EQ(scene.initial.size(), 2U);
+  EXPECT_THAT(scene.initial[0].q, ElementsAre(0.1));
+  EXPECT_THAT(scene.initial[0].v, IsEmpty());
+  EXPECT_THAT(scene.initial[1].q, ElementsAre(0.2));
+  EXPECT_THAT(scene.initial[1].v, ElementsAre(-3.0));
+  EXPECT_THAT(std::get<ConstantControl>(scene.control.value()).values,
+              ElementsAre(::testing::DoubleNear(0.6, 1e-15)));
+  // A motor of our own holds its joint where it starts.
+  options.motors = {{"wrist", 4.0, 1.0}};
+  EXPECT_THAT(std::get<ConstantControl>(
+                  parse_scene(import(arm, options).text, "scene.xml").scene.control.value())
+                  .values,
+              ElementsAre(0.0, 0.2));
+  EXPECT_THAT(std::get<ConstantControl>(
+                  parse_scene(import(mjcf("<joint name=\"wrist\"/><geom size=\"0.1\"/>",
+                                          "<keyframe><key qpos=\"0.3\"/></keyframe>"),
+                                     options)
+                                  .text,
+                              "scene.xml")
+                      .scene.control.value())
+                  .values,
+              ElementsAre(0.3));
+  options.motors.clear();
+  EXPECT_THAT(
+      fault_of(with_key("<key qpos=\"0.1\"/>"), options),
+      HasSubstr("robot.xml:30: <key>: qpos has 1 numbers; the joints that are read have 2"));
+  EXPECT_THAT(fault_of(with_key("<key ctrl=\"0.1\"/>"), options),
+              HasSubstr(":30: <key>: ctrl has 1 numbers; the actuators have 4"));
+  EXPECT_THAT(fault_of(with_key("<key qpso=\"0.1\"/>"), options), HasSubstr("did you mean 'qpos'"));
+  options.keyframe = "hom";
+  EXPECT_THAT(fault_of(with_key("<key name=\"home\"/>"), options),
+              HasSubstr("has no keyframe of this name; did you mean 'home'"));
+  EXPECT_THROW(import(urdf(""), options), InputError);
+}
+
+TEST(RobotImport, SitesAreNamedPlaces) {
+  const std::string text = mjcf(
+      "<joint name=\"j\" pos=\"0 0 1\"/><geom size=\"0.1\"/>\n"
+      "<site name=\"tip\" pos=\"0 0.5 0\" euler=\"0 0 90\"/>\n"
+      "<site name=\"other\"/>");
+  RobotOptions options;
+  options.end_effectors = {"tip", "b"};
+  options.pads = {{"tip",
+                   "grid_16x16",
+                   file_bytes(TANGERE_SOURCE_DIR "/scenes/sensors/grid_16x16.xml"),
+                   {{0.1, 0, 0}, {1, 0, 0, 0}},
+                   ""}};
+  const ImportedScene made = import(text, options);
+  const Scene scene = parse_scene(made.text, "scene.xml").scene;
+  ASSERT_EQ(scene.end_effectors.size(), 2U);
+  EXPECT_EQ(scene.end_effectors[0].name, "tip");
+  EXPECT_EQ(scene.end_effectors[0].position, (Vector3{0, 0.5, -1}));
+  EXPECT_EQ(scene.end_effectors[1].position, (Vector3{0, 0, 0}));
+  // The site's x is the body's y, and the array's middle lies 0.1 m along it.
+  const RectArray& array = scene.sensors.at(0).array;
+  EXPECT_NEAR(0.5 * (array.corner0[0] + array.corner1[0]), 0, 1e-15);
+  EXPECT_NEAR(0.5 * (array.corner0[1] + array.corner1[1]), 0.6, 1e-15);
+  EXPECT_THAT(made.idle, ElementsAre(HasSubstr("<site>: a place with a name")));
+  options.pads[0].face = "+x";
+  EXPECT_THROW(import(text, options), InputError);
+  EXPECT_THAT(fault_of(mjcf(kBall + "<site name=\"a\"/>\n<site name=\"a\"/>")),
+              HasSubstr(":4: <site>: site name 'a' is used twice, first in line 3"));
+  options.pads.clear();
+  options.end_effectors = {"tap"};
+  EXPECT_THAT(fault_of(text, options),
+              HasSubstr("no link or site of this name; did you mean 'tip'"));
 }
 
 TEST(RobotImport, AFreeBaseFalls) {

@@ -27,7 +27,8 @@ const std::string kRobots = TANGERE_TEST_DATA "/robots/";
 constexpr double kClose = 1e-9;
 
 struct ReferenceState {
-  std::map<std::string, Numbers> q, v, u, bias, acceleration, pose;  // by joint; pose by body
+  std::map<std::string, Numbers> q, v, u, bias, acceleration;  // by joint
+  std::map<std::string, Numbers> pose, site;                   // by body, by site
 };
 struct RobotReference {
   std::map<std::string, double> mass;
@@ -55,7 +56,8 @@ RobotReference read_reference(const std::string& path) {
        : kind == "u"            ? s.u
        : kind == "bias"         ? s.bias
        : kind == "acceleration" ? s.acceleration
-                                : s.pose)[name] = numbers;
+       : kind == "pose"         ? s.pose
+                                : s.site)[name] = numbers;
     }
   }
   return out;
@@ -113,13 +115,28 @@ Vector kernel_acceleration(const Scene& scene, const Vector& q, const Vector& v,
   return a - mass.ldlt().solve(residual(a));
 }
 
-void compare(const std::string& robot, const std::string& name) {
-  const ImportedScene imported = import_robot(kRobots + robot, kRobots + "scene.xml");
+/// The scene starts as the reference's state does, and its motors get the same controls.
+void expect_start(const Scene& scene, const Batch& batch, const Vector& q, const Vector& v,
+                  const std::vector<double>& u) {
+  const auto vector = [](const std::vector<double>& x) {
+    return Vector(Eigen::Map<const Vector>(x.data(), static_cast<int>(x.size())));
+  };
+  std::vector<double> start_q(std::size_t(q.size())), start_v(std::size_t(v.size()));
+  batch.get_q(0, start_q);
+  batch.get_v(0, start_v);
+  expect_close(vector(start_q), q, "start");
+  expect_close(vector(start_v), v, "rates at the start");
+  expect_close(vector(std::get<ConstantControl>(scene.control.value()).values), vector(u),
+               "controls");
+}
+
+void compare(const std::string& robot, const std::string& name, const RobotOptions& options = {}) {
+  const ImportedScene imported = import_robot(kRobots + robot, kRobots + "scene.xml", options);
   EXPECT_EQ(imported.lost, std::vector<std::string>());
   Scene scene = parse_scene(imported.text, kRobots + "scene.xml").scene;
   for (LinkDescription& link : scene.links) link.joint.limits.reset();
   const RobotReference reference = read_reference(kRobots + name);
-  ASSERT_EQ(reference.states.size(), 5U);
+  ASSERT_EQ(reference.states.size(), options.keyframe.empty() ? 5U : 6U);
   const Model model(scene);
   std::map<std::string, int> index;
   for (std::size_t i = 0; i < scene.links.size(); ++i)
@@ -152,6 +169,8 @@ void compare(const std::string& robot, const std::string& name) {
     ASSERT_EQ(q.size(), model.nq());
     std::vector<double> u;
     for (const MotorDescription& motor : scene.motors) u.push_back(state.u.at(motor.joint).at(0));
+    if (!options.keyframe.empty() && &state == &reference.states.back())
+      expect_start(scene, Batch(model, 1, 1), q, v, u);
     expect_close(dense.terms(q, v, u).bias, in_order(scene, state.bias, dof_count), "bias");
     const Vector theirs = in_order(scene, state.acceleration, dof_count);
     expect_close(dense.acceleration(q, v, u), theirs, "acceleration");
@@ -171,11 +190,22 @@ void compare(const std::string& robot, const std::string& name) {
       for (std::size_t k = 0; k < 3; ++k) EXPECT_NEAR(at.position[k], pose[k], kClose) << body;
       for (std::size_t k = 0; k < 4; ++k) EXPECT_NEAR(sign * turn[k], pose[3 + k], kClose) << body;
     }
+    Numbers ends(3 * scene.end_effectors.size());
+    readout.end_effectors(batch, 0, ends, {});
+    for (std::size_t e = 0; e < scene.end_effectors.size(); ++e)
+      for (std::size_t k = 0; k < 3; ++k)
+        EXPECT_NEAR(ends[3 * e + k], state.site.at(scene.end_effectors[e].name).at(k), kClose)
+            << scene.end_effectors[e].name;
   }
 }
 
 TEST(RobotPhysics, UrdfMovesAsInMujoco) { compare("hand.urdf", "hand_reference.txt"); }
-TEST(RobotPhysics, MjcfMovesAsInMujoco) { compare("machine.xml", "machine_reference.txt"); }
+TEST(RobotPhysics, MjcfMovesAsInMujoco) {
+  RobotOptions options;
+  options.end_effectors = {"marker", "edge"};
+  options.keyframe = "ready";
+  compare("machine.xml", "machine_reference.txt", options);
+}
 
 }  // namespace
 }  // namespace tangere

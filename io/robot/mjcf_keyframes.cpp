@@ -1,0 +1,140 @@
+// SPDX-License-Identifier: Apache-2.0
+// A keyframe has the coordinates of all joints, their velocities and the controls of all actuators,
+// in the order of the file. A free joint's are those of the body in the world, and ours are seen
+// from where the body starts.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "io/robot/mjcf_file.hpp"
+
+namespace tangere {
+namespace {
+
+const char* const kUse = "stored states; --keyframe NAME starts from one";
+
+class Keyframe {
+ public:
+  Keyframe(const MjcfFile& file, const RobotNode& node) : file_(file), node_(node) {}
+
+  void read() {
+    Scene& scene = file_.robot.scene;
+    std::vector<double> q = numbers("qpos", position_count), v = numbers("qvel", dof_count);
+    std::size_t iq = 0, iv = 0;
+    for (const LinkDescription& link : scene.links) {
+      const auto nq = std::size_t(position_count(link.joint.type)),
+                 nv = std::size_t(dof_count(link.joint.type));
+      if (nv == 0) continue;
+      InitialState state;
+      state.joint = link.joint.name;
+      state.source = node_.source();
+      if (!q.empty()) state.q = coordinates(link.joint, {&q[iq], nq});
+      if (!v.empty()) state.v = rates(link.joint, {&v[iv], nv});
+      iq += nq;
+      iv += nv;
+      const auto zero = [](const std::vector<double>& x) {
+        return std::all_of(x.begin(), x.end(), [](double n) { return n == 0; });
+      };
+      if (zero(state.v)) state.v.clear();
+      if (nq == 1 && zero(state.q)) state.q.clear();
+      if (!state.q.empty() || !state.v.empty()) scene.initial.push_back(std::move(state));
+    }
+    read_controls();
+  }
+
+ private:
+  /// One number for each coordinate or dof of the scene; none if the attribute is not there.
+  [[nodiscard]] std::vector<double> numbers(const char* attribute, int (*count)(JointType)) const {
+    if (!node_.has(attribute)) return {};
+    std::size_t n = 0;
+    for (const LinkDescription& link : file_.robot.scene.links)
+      n += std::size_t(count(link.joint.type));
+    return of_size(attribute, n, "the joints that are read");
+  }
+
+  [[nodiscard]] std::vector<double> of_size(const char* attribute, std::size_t n,
+                                            const char* of) const {
+    std::vector<double> x = node_.numbers(attribute);
+    if (x.size() != n)
+      node_.fail(fmt::format("{} has {} numbers; {} have {}", attribute, x.size(), of, n));
+    return x;
+  }
+
+  [[nodiscard]] Quaternion unit(std::span<const double> x) const {
+    const double length = std::sqrt(x[0] * x[0] + x[1] * x[1] + x[2] * x[2] + x[3] * x[3]);
+    if (!(length > 1e-100) || !std::isfinite(length))
+      node_.fail("qpos has a quaternion without a length");
+    return {x[0] / length, x[1] / length, x[2] / length, x[3] / length};
+  }
+
+  [[nodiscard]] std::vector<double> coordinates(const JointDescription& joint,
+                                                std::span<const double> q) const {
+    if (q.size() == 1) return {q[0] - file_.joints.at(joint.name).ref};
+    if (joint.type == JointType::spherical) {
+      const Quaternion turn = unit(q);
+      return {turn.begin(), turn.end()};
+    }
+    const Pose seen = compose(inverse(joint.pose), {{q[0], q[1], q[2]}, unit(q.subspan(3))});
+    std::vector<double> out(seen.position.begin(), seen.position.end());
+    out.insert(out.end(), seen.orientation.begin(), seen.orientation.end());
+    return out;
+  }
+
+  [[nodiscard]] static std::vector<double> rates(const JointDescription& joint,
+                                                 std::span<const double> v) {
+    std::vector<double> out(v.begin(), v.end());
+    if (joint.type != JointType::free) return out;
+    const Vector3 seen = outer_direction(inverse(joint.pose), {v[0], v[1], v[2]});
+    std::copy(seen.begin(), seen.end(), out.begin());
+    return out;
+  }
+
+  void read_controls() const {
+    std::vector<double> given(file_.controls.size(), 0.0);  // MuJoCo's, without an attribute
+    if (node_.has("ctrl")) given = of_size("ctrl", given.size(), "the actuators");
+    std::vector<double>& controls = file_.robot.controls.emplace();
+    controls.assign(file_.robot.scene.motors.size(), 0.0);
+    for (std::size_t k = 0; k < given.size(); ++k) {
+      const MjcfControl& c = file_.controls[k];
+      if (c.motor < 0) continue;
+      const double x = c.scale * std::clamp(given[k], c.range[0], c.range[1]) + c.shift;
+      controls[std::size_t(c.motor)] = std::clamp(x, c.least, c.most);
+    }
+  }
+
+  const MjcfFile& file_;
+  const RobotNode& node_;
+};
+
+}  // namespace
+
+void read_mjcf_keyframes(MjcfFile& file, const std::vector<RobotNode>& sections,
+                         const std::string& wanted) {
+  std::vector<std::string> names;
+  std::vector<RobotNode> keys;
+  for (const RobotNode& section : sections)
+    for (const RobotNode& key : section.parts({{"key"}})) {
+      key.check({{"name"},
+                 {"qpos"},
+                 {"qvel"},
+                 {"ctrl"},
+                 {"time", Fate::idle, "a scene starts at time 0"},
+                 {"act", Fate::idle, "of actuators with a state, which are not read"},
+                 {"mpos", Fate::idle, "of bodies that another program moves"},
+                 {"mquat", Fate::idle, "of bodies that another program moves"}});
+      names.push_back(key.text("name", fmt::format("{}", keys.size())));
+      keys.push_back(key);
+    }
+  const auto at = std::find(names.begin(), names.end(), wanted);
+  for (const RobotNode& key : keys)
+    if (wanted.empty() || at == names.end() || &key != &keys[std::size_t(at - names.begin())])
+      key.idle(std::string("<key>: ") + kUse);
+  if (wanted.empty()) return;
+  if (at == names.end())
+    throw InputError(fmt::format("--keyframe {}: {} has no keyframe of this name{}", wanted,
+                                 file.robot.scene.path, suggestion(wanted, names)));
+  Keyframe(file, keys[std::size_t(at - names.begin())]).read();
+}
+
+}  // namespace tangere

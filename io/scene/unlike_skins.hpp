@@ -1,0 +1,14 @@
+// SPDX-License-Identifier: Apache-2.0
+// Skins that are far from as stiff as what touches.
+#pragma once
+
+#include "engine/model/scene.hpp"
+#include "io/scene/scene_node.hpp"
+
+namespace tangere {
+
+/// Warns of tactile sensors whose stiffness per area differs by orders from that of a contact of
+/// their body, with both stiffnesses.
+void warn_of_unlike_skins(const Scene& scene, const SceneNode& root);
+
+}  // namespace tangere

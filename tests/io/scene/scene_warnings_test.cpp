@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: Apache-2.0
+// Every way in which a sensor stays silent, or tells of forces that are not there, is told when the
+// scene is read.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "io/scene/scene_reader.hpp"
+
+namespace tangere {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+/// A finger of 20 × 20 × 20 mm with a skin, another one, and an object between them.
+struct Grasp {
+  std::string object = "type=\"cuboid\" size=\"0.02 0.02 0.02\"", inside_object;
+  std::string contact =
+      "<general_primitive_contact general_body=\"object\" primitive_body=\"finger\" kn=\"100\"/>";
+  std::string corner0 = "-0.008 -0.008 0.01", corner1 = "0.008 0.008 0.01";
+  std::string kn = "20";
+
+  [[nodiscard]] std::vector<std::string> warnings() const {
+    const auto body = [](const std::string& name, const std::string& shape, const char* at,
+                         const std::string& inside = "") {
+      return "<robot><link name=\"" + name + "\"><joint name=\"" + name +
+             "\" type=\"free3d\" pos=\"0 0 " + at + "\"/><body name=\"" + name + "\" " + shape +
+             ">" + inside + "</body></link></robot>\n";
+    };
+    const std::string finger = "type=\"cuboid\" size=\"0.02 0.02 0.02\"";
+    return parse_scene("<tangere><option unit=\"m-kg\"/><ground/>\n" + body("finger", finger, "0") +
+                           body("thumb", finger, "0.05") +
+                           body("object", object, "0.025", inside_object) + "<contact>" + contact +
+                           "</contact>\n<sensor><tactile name=\"skin\" body=\"finger\" "
+                           "type=\"rect_array\" rect_pos0=\"" +
+                           corner0 + "\" rect_pos1=\"" + corner1 +
+                           "\" axis0=\"1 0 0\" axis1=\"0 1 0\" resolution=\"5 5\" kn=\"" + kn +
+                           "\"/></sensor></tangere>",
+                       "s.xml")
+        .warnings;
+  }
+};
+
+const std::string kOnGround = "<ground_contact body=\"finger\" kn=\"100\"/>";
+
+TEST(SceneWarnings, ASkinThatFeelsWhatTouchesIsWell) { EXPECT_THAT(Grasp{}.warnings(), IsEmpty()); }
+
+/// It could feel the thumb, which no contact names, and cannot feel the object, which touches.
+TEST(SceneWarnings, WhatTouchesAndIsNotFeltIsTold) {
+  Grasp g;
+  g.object = "type=\"abstract\" mass=\"0.1\" inertia=\"1e-5 1e-5 1e-5\"";
+  g.inside_object = "<collision radius=\"0.01\" count=\"25\"/>";
+  EXPECT_THAT(g.warnings(), ElementsAre(HasSubstr("sensor 'skin' on body 'finger' does not feel "
+                                                  "'object', which touches that body")));
+  g.contact =
+      "<general_primitive_contact general_body=\"finger\" primitive_body=\"thumb\" kn=\"100\"/>";
+  EXPECT_THAT(g.warnings(), IsEmpty());
+}
+
+TEST(SceneWarnings, TheGroundIsNotFelt) {
+  Grasp g;
+  g.contact += kOnGround;
+  EXPECT_THAT(g.warnings(), ElementsAre(HasSubstr("does not feel the ground, which touches")));
+  g.contact = kOnGround;
+  EXPECT_THAT(g.warnings(), ElementsAre(::testing::AllOf(HasSubstr("reads forces that nothing"),
+                                                         HasSubstr("No sensor feels the ground"))));
+}
+
+TEST(SceneWarnings, PointsBelowOrOffTheSurfaceAreTold) {
+  Grasp g;
+  g.corner0 = "-0.005 -0.005 0.006";
+  g.corner1 = "0.005 0.005 0.006";
+  EXPECT_THAT(g.warnings(), ElementsAre(HasSubstr("lies at least 0.004 m below the surface")));
+  g.corner0 = "-0.005 -0.005 0.009";
+  g.corner1 = "0.005 0.005 0.009";
+  EXPECT_THAT(g.warnings(), IsEmpty());  // a millimetre of 20
+  g.corner0 = "-0.008 -0.008 1";
+  g.corner1 = "0.008 0.008 1";
+  EXPECT_THAT(g.warnings(), ElementsAre(HasSubstr("lies at least 0.99 m off that body, which is "
+                                                  "0.02 m across")));
+}
+
+/// Points of the object are 4 mm apart, those of the skin too.
+TEST(SceneWarnings, SkinsUnlikeThePointsOfWhatTouchesThemAreTold) {
+  Grasp g;
+  g.kn = "2";
+  EXPECT_THAT(g.warnings(), IsEmpty());
+  g.kn = "0.5";
+  EXPECT_THAT(g.warnings(),
+              ElementsAre(HasSubstr("kn of 'skin' is 0.0312 N/m per mm² of skin, that "
+                                    "of its contact with 'object' is about 6.25, so "
+                                    "the field shows about 0.005 times")));
+  g.kn = "50000";
+  EXPECT_THAT(g.warnings(), ElementsAre(HasSubstr("shows about 5e+02 times")));
+}
+
+}  // namespace
+}  // namespace tangere
