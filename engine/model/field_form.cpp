@@ -13,7 +13,7 @@ namespace tangere {
 namespace {
 constexpr FieldForm kForms[] = {FieldForm::field, FieldForm::pressure, FieldForm::shear,
                                 FieldForm::sum,   FieldForm::ideal,    FieldForm::markers};
-constexpr const char* kPlain[] = {"q", "v", "variables", "bodies"};
+constexpr const char* kPlain[] = {"q", "v", "variables", "bodies", "memory"};
 constexpr const char* kBody = "bodies.";  // followed by the name of one
 }  // namespace
 

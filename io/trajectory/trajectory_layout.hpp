@@ -11,6 +11,7 @@
 
 #include "engine/model/field_form.hpp"
 #include "engine/rows/task_spec.hpp"
+#include "engine/step/memory_arrays.hpp"
 #include "engine/step/stepper.hpp"
 
 namespace tangere {
@@ -54,9 +55,10 @@ struct TrajectoryLayout {
   std::vector<std::string> u_names, u_units;    ///< (nu)
   std::vector<std::string> body_names;          ///< (nb) recorded, empty when no poses are
   std::vector<std::string> end_effector_names;  ///< (n) end effectors, empty when there are none
-  /// At which rows q and v, bodies and end effectors are recorded; none: at all. Where `states` are
-  /// given, there are no controls, and of the solver's numbers the status alone.
-  OutputTimes states = {}, of_bodies = {}, of_end_effectors = {};
+  MemoryPoints memory;  ///< what friction remembers; no points: it is not recorded
+  /// At which rows q and v, bodies, end effectors and memory are recorded; none: at all. Where
+  /// `states` are given, there are no controls, and of the solver's numbers the status alone.
+  OutputTimes states = {}, of_bodies = {}, of_end_effectors = {}, of_memory = {};
   std::vector<SensorLayout> sensors;
   std::vector<FieldOutput> fields;  ///< what is recorded of them; without times: every K steps
   bool audit = false;               ///< the books are recorded
@@ -100,9 +102,10 @@ struct RunDescription {
   std::vector<int> tactile_intervals;  ///< K in force, one per sensor
   /// Recorded; none: the field of every sensor.
   std::optional<std::vector<FieldOutput>> fields;
-  bool bodies = true, end_effectors = true, audit = false;         ///< recorded
-  OutputTimes states = {}, of_bodies = {}, of_end_effectors = {};  ///< as in TrajectoryLayout
-  std::vector<int> chosen_bodies = {};                             ///< none: every body
+  bool bodies = true, end_effectors = true, audit = false, memory = false;  ///< recorded
+  /// As in TrajectoryLayout.
+  OutputTimes states = {}, of_bodies = {}, of_end_effectors = {}, of_memory = {};
+  std::vector<int> chosen_bodies = {};  ///< none: every body
   std::string precision, command_line, version, instruction_set;
   std::optional<TaskSpec> task;
   std::string policy;
