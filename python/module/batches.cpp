@@ -382,10 +382,11 @@ void add_batches(nb::module_& m) {
            "shear, shear, normal force of each point [N]; 'pad.pressure' and 'pad.shear' parts of\n"
            "it; 'pad.sum' (E, 6): force [N] and where it presses [m], body axes. `out`: an array\n"
            "to fill instead of a new one.")
-      .def("set_state", &PythonBatch::set_state, "q"_a, "v"_a, "envs"_a = nb::none(),
-           "Sets states: `q` (n, nq) or (nq), `v` (n, nv) or (nv), of the environments listed in\n"
-           "`envs` (indices, or a mask (E)), or of all. Releases a failed environment; forgets the "
-           "state one step before and what friction remembers.")
+      .def(
+          "set_state", &PythonBatch::set_state, "q"_a, "v"_a, "envs"_a = nb::none(),
+          "Sets states: `q` (n, nq) or (nq), `v` (n, nv) or (nv), of the environments listed in\n"
+          "`envs` (indices, or a mask (E)), or of all. Releases a failed environment; forgets the\n"
+          "state one step before and what friction remembers.")
       .def_prop_ro("memory", &PythonBatch::memory, nb::rv_policy::automatic,
                    "(E, points, 3) what friction with ks remembers: the elastic displacement of\n"
                    "every point of Model.memory_points [m], in the axes of the moving frame that\n"

@@ -227,7 +227,9 @@ def test_what_friction_remembers_goes_on():
         "tactile pad box": (130, 3),
     }
     pad = points["tactile pad box"].reshape(13, 10, 3)  # in the order of the field
-    np.testing.assert_allclose(np.diff(pad[..., 0], axis=0), pad[1, 0, 0] - pad[0, 0, 0])
+    down = pad[1, 0] - pad[0, 0]  # rows go up the finger, 1.5 mm apart
+    np.testing.assert_allclose(down, [0, 0, 0.0015], atol=1e-12)
+    np.testing.assert_allclose(np.diff(pad, axis=0), np.full((12, 10, 3), down), atol=1e-12)
     batch = tangere.Batch(model, envs=19, seed=3, precision="double")
     assert batch.memory.shape == (19, 464, 3) and not batch.memory.any()
     u = batch.scene_controls(120)

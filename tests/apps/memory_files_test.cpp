@@ -139,13 +139,13 @@ void put_first(hid_t file, const char* name, double number) {
 }
 
 TEST(MemoryFiles, DamageAndPointsOfAnotherSceneAreRefused) {
-  struct Damage {
+  struct Harm {
     int exit_code;
     std::string said;
     std::function<void(hid_t)> edit;
   };
   const double nan = std::numeric_limits<double>::quiet_NaN();
-  const Damage damages[] = {
+  const Harm harms[] = {
       {3, "row 10 has a number that is not finite: the file is damaged",
        [&](hid_t f) { put_first(f, "memory/s", nan); }},
       {3, "expected 1 rows of 464 points",
@@ -174,7 +174,7 @@ TEST(MemoryFiles, DamageAndPointsOfAnotherSceneAreRefused) {
        [&](hid_t f) { put_first(f, "memory/place", nan); }},
   };
   const Folder folder;
-  for (const Damage& damage : damages) {
+  for (const Harm& damage : harms) {
     SCOPED_TRACE(damage.said);
     simulate(folder, "run.h5", {"--steps", "10", "--envs", "2"});
     const hid_t file = H5Fopen(folder.path("run.h5").c_str(), H5F_ACC_RDWR, H5P_DEFAULT);
