@@ -171,6 +171,17 @@ struct Adjoint::Impl {
     }
   }
 
+  /// Reverses what the step did to memories that were due at its end.
+  template <int L>
+  void reverse_readings(Lanes<L>& x, const GroupStepInHand& g) {
+    gather(x.work.v1, g.tape.state(g.step + 1) + model.nq() * kBlock, model.nv(), g.first);
+    std::array<std::int64_t, L> steps;
+    for (int l = 0; l < L; ++l)
+      steps[std::size_t(l)] = has(g.live, l) ? g.tape.episode_step(g.step + 1, g.first + l) : -1;
+    x.adjoint.memory_adjoint.reverse_readings(compiled(model), kernels::active_kernels(), x.work,
+                                              steps, x.adjoint.losses);
+  }
+
   template <int L>
   void reverse(const GroupStepInHand& g, std::span<const double> controls) {
     const CompiledModel& m = compiled(model);
@@ -183,6 +194,7 @@ struct Adjoint::Impl {
                  controls.subspan(std::size_t((g.first + l) * m.nu), std::size_t(m.nu)));
       if (g.tape.special(g.step, g.first + l) == nullptr) plain |= 1U << l;
     }
+    if (m.keeps_anchors) reverse_readings(x, g);
     if (plain != 0)
       group.reverse(settings.integrator.scheme(), settings.timestep, kernels::active_kernels(),
                     x.work, x.adjoint, plain);

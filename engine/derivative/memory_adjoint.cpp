@@ -3,7 +3,7 @@
 #include "engine/derivative/memory_adjoint.hpp"
 
 #include "engine/derivative/link_cotangents.hpp"
-#include "engine/step/remembering_lane.hpp"
+#include "engine/step/kept_anchors.hpp"
 
 namespace tangere {
 
@@ -53,7 +53,7 @@ MemoryAdjoint<L>::MemoryAdjoint(const CompiledModel& m, int losses) {
   scratch_.resize(bytes);
   for (const RememberingContact& of : m.memories)
     stride = std::max(stride, std::size_t(of.contact.n_points + 2 * kGroup));
-  numbers_.resize(9 * stride);
+  numbers_.resize(18 * stride);
 }
 
 template <int L>
@@ -117,7 +117,14 @@ void MemoryAdjoint<L>::pull_back(const CompiledModel& m, const kernels::KernelTa
       add_to_entries(now, of, index, points, s_out, before);
     };
     for_each_contact(m, w, l, one);
-    if (!of_forces) for_each_felt(m, table, w, at_touches_, l, one);
+    if (of_forces) continue;
+    for_each_felt(m, table, w, at_touches_, l, one, [&](const RememberingContact& of) {
+      // A solve hands these on as they are.
+      const auto from = entries_of(after, m, of), to = entries_of(now, m, of);
+      const auto at = 3 * (from.data() - after.data()), in = 3 * (to.data() - now.data());
+      for (std::size_t k = 0; k < 3 * to.size(); ++k)
+        before[std::size_t(in) + k] += bar[std::size_t(at) + k];
+    });
   }
 }
 
@@ -131,6 +138,89 @@ void MemoryAdjoint<L>::reverse_end(const CompiledModel& m, const kernels::Kernel
   table.stage<L>().touches_at(m.view, at_.data(), at_touches_.data());
   pull_back(m, table, w, lanes, false, loss, number);
   add_to_state(m, table, w, lanes, w.q1, w.stage.v, end_, loss.q, loss.v);
+}
+
+/// Pulls one contact of one lane back: cotangents of its anchors after an advance, aligned with
+/// w.remembered.after, to those before it, aligned with w.remembered.now.
+template <int L>
+void MemoryAdjoint<L>::pull_back_reading(const CompiledModel& m, const kernels::KernelTable& table,
+                                         BasicWorkspace<L>& w, const RememberingContact& of,
+                                         int lane, std::span<const double> bar,
+                                         std::span<double> before, LossRows<L>& loss) {
+  const ShearMemory &now = w.remembered.now[std::size_t(lane)],
+                    &after = w.remembered.after[std::size_t(lane)];
+  FeltPoints& felt = w.remembered.felt;
+  const RememberingTouch touch = touch_of(m, w, of, at_touches_, lane);
+  const RememberingPoints points = felt.find(m.sensors[std::size_t(of.sensor)], table, touch);
+  if (points.count == 0) return;
+  set_anchors(table, touch, now, felt.index(), points, felt.scratch());
+  const std::size_t rows = 3 * std::size_t(points.stride);
+  double *const none = numbers_.data(), *const s_out = none + rows,
+                *const anchor_bar = s_out + rows, *const anchor_out = anchor_bar + 2 * rows;
+  std::fill_n(none, 6 * rows, 0.0);
+  look_up_anchors(
+      after, of, felt.index(), points,
+      [&](std::size_t entry, int c) { return bar[3 * entry + std::size_t(c)]; }, anchor_bar);
+  kernels::MemoryCotangent sums{};
+  kernels::MemoryPullback pullback = {&touch,  &touch,  points, none, nullptr,
+                                      nullptr, nullptr, s_out,  &sums};
+  pullback.anchor_bar = anchor_bar;
+  pullback.kept = felt.scratch() + 6 * points.stride;
+  pullback.anchor_out = anchor_out;
+  table.pull_back_memory(pullback);
+  sums.end.displacement += sums.start;
+  hand_on<L>(of, at_, sums.end.displacement, sums.end.twist, lane, end_);
+  if (loss.parameters != nullptr)
+    for (std::size_t k = 0; k < kCoefficients; ++k)
+      loss.parameters[std::size_t(of.number) + k][lane] += sums.end.law[k];
+  add_to_anchors(now, of, felt.index(), points, anchor_out, before);
+}
+
+template <int L>
+void MemoryAdjoint<L>::reverse_readings(const CompiledModel& m, const kernels::KernelTable& table,
+                                        BasicWorkspace<L>& w,
+                                        const std::array<std::int64_t, L>& steps,
+                                        std::vector<LossRows<L>>& losses) {
+  const auto due = [&](int lane, const RememberingContact& of) {
+    return is_due(m, of, steps[std::size_t(lane)]);
+  };
+  LaneBits lanes = 0;
+  std::array<ShearMemory, L> left;  // what the last solve left
+  for (int l = 0; l < L; ++l)
+    for (const RememberingContact& of : m.memories) {
+      const bool is_due_here = due(l, of);
+      if (is_due_here) lanes |= 1U << l;
+      const auto kept = entries_of(
+          is_due_here ? w.remembered.now[std::size_t(l)] : w.remembered.after[std::size_t(l)], m,
+          of);
+      left[std::size_t(l)].insert(left[std::size_t(l)].end(), kept.begin(), kept.end());
+    }
+  if (lanes == 0) return;
+  table.stage<L>().poses_at(m.view, w.stage, w.q1, w.v1, w.zero, at_.data());
+  table.stage<L>().touches_at(m.view, at_.data(), at_touches_.data());
+  for (LossRows<L>& loss : losses) {
+    std::fill(end_.begin(), end_.end(), MotionCotangent<Row<L>>{});
+    for (int l = 0; l < L; ++l) {
+      std::vector<double>& bar = loss.memory[std::size_t(l)];
+      if (!has(lanes, l) || bar.empty()) continue;
+      const ShearMemory &now = w.remembered.now[std::size_t(l)],
+                        &after = w.remembered.after[std::size_t(l)];
+      std::vector<double> to, of_now(3 * now.size());
+      for (const RememberingContact& of : m.memories) {
+        const bool is_due_here = due(l, of);
+        const ShearMemory& memory = is_due_here ? now : after;
+        const auto entries = entries_of(memory, m, of);
+        const auto at = 3 * (entries.data() - memory.data());
+        if (is_due_here) pull_back_reading(m, table, w, of, l, bar, of_now, loss);
+        const auto from = (is_due_here ? of_now : bar).begin() + at;
+        to.insert(to.end(), from, from + std::ptrdiff_t(3 * entries.size()));
+      }
+      bar = std::move(to);
+    }
+    add_to_state(m, table, w, lanes, w.q1, w.v1, end_, loss.q, loss.v);
+  }
+  for (int l = 0; l < L; ++l)
+    if (has(lanes, l)) w.remembered.after[std::size_t(l)] = std::move(left[std::size_t(l)]);
 }
 
 template <int L>

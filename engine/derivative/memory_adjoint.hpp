@@ -8,6 +8,7 @@
 #pragma once
 
 #include <array>
+#include <span>
 #include <vector>
 
 #include "engine/step/workspace.hpp"
@@ -44,6 +45,12 @@ class MemoryAdjoint {
   void reverse_forces(const CompiledModel& model, const kernels::KernelTable& table,
                       BasicWorkspace<L>& w, LaneBits lanes, const kernels::Row<L>* q,
                       const kernels::Row<L>* lambda, LossRows<L>& loss, int number);
+  /// Reverses the advance of sensors whose memory is due after steps[l] ≥ 0 steps of lane l's
+  /// episode, at q1, v1, with the memory before the step in w.remembered.now and that after it in
+  /// w.remembered.after. Leaves there what the last solve of the step left, with its cotangents.
+  void reverse_readings(const CompiledModel& model, const kernels::KernelTable& table,
+                        BasicWorkspace<L>& w, const std::array<std::int64_t, L>& steps,
+                        std::vector<LossRows<L>>& losses);
   /// Adds to the cotangents of the state where the solve began.
   void finish(const CompiledModel& model, const kernels::KernelTable& table, BasicWorkspace<L>& w,
               LaneBits lanes, LossRows<L>& loss, int number);
@@ -54,6 +61,9 @@ class MemoryAdjoint {
   void pull_back(const CompiledModel& model, const kernels::KernelTable& table,
                  BasicWorkspace<L>& w, LaneBits lanes, bool of_forces, LossRows<L>& loss,
                  int number);
+  void pull_back_reading(const CompiledModel& model, const kernels::KernelTable& table,
+                         BasicWorkspace<L>& w, const kernels::RememberingContact& of, int lane,
+                         std::span<const double> bar, std::span<double> before, LossRows<L>& loss);
   void add_to_state(const CompiledModel& model, const kernels::KernelTable& table,
                     BasicWorkspace<L>& w, LaneBits lanes, const kernels::Row<L>* q,
                     const kernels::Row<L>* v, Cotangents& links, kernels::Row<L>* q_bar,
@@ -65,7 +75,7 @@ class MemoryAdjoint {
   Poses at_touches_, slip_touches_;      ///< (n_memories), see StageKernels::touches_at
   AlignedVector<kernels::Row<L>> rows_;  ///< (nv) twice
   AlignedVector<std::byte> scratch_;
-  AlignedVector<double> numbers_;  ///< (9, largest stride)
+  AlignedVector<double> numbers_;  ///< (18, largest stride)
 };
 
 }  // namespace tangere

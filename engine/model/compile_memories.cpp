@@ -31,7 +31,7 @@ void keep_places(CompiledModel& m, kernels::RememberingContact& of) {
 int add(CompiledModel& m, kernels::RememberingContact of) {
   of.first = m.remembering_points;
   if (of.sensor < 0) m.taped_points += of.contact.n_points;
-  m.remembering_points += of.contact.n_points;
+  m.remembering_points += m.remembering(of);
   m.memories.push_back(of);
   return static_cast<int>(m.memories.size()) - 1;
 }
@@ -109,6 +109,7 @@ void add_sensors(CompiledModel& m) {
                        "' has ks and low_pass or delay; expected one of them: friction does not "
                        "remember further back than the last state");
     s.elastic = true;
+    if (d.remembers_readings) s.memory_every = d.every, m.keeps_anchors = true;
     PadPoints points = points_of(d, m.bodies[std::size_t(s.body)].frame);
     const std::vector<double> tiles = order_points(s, points);
     m.point_storage.push_back(std::move(points.places));
@@ -122,7 +123,7 @@ void add_sensors(CompiledModel& m) {
     contact.body1 = s.body;
     bound(contact.points, contact.n_points, contact.middle, contact.extent);
     lay_out_tiles(m, contact, tiles);
-    m.taped_points += s.points();
+    m.taped_points += s.points() * (s.memory_every > 0 ? 2 : 1);
     for (const int target : s.targets) {
       const CompiledBody& body = m.bodies[std::size_t(target)];
       kernels::RememberingContact of;

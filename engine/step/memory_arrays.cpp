@@ -44,14 +44,19 @@ MemoryPoints memory_points(const Model& model) {
   MemoryPoints out;
   for (const kernels::RememberingContact& of : m.memories) {
     const auto n = std::size_t(of.contact.n_points);
-    MemoryContact contact{name_of_contact(m, of), std::vector<Vector3>(n)};
-    for (std::size_t k = 0; k < n; ++k) {
-      const std::size_t at =
-          of.sensor < 0 ? k : std::size_t(m.sensors[std::size_t(of.sensor)].in_field[k]);
-      std::copy_n(of.contact.points + 3 * k, 3, contact.places[at].begin());
-      out.row_of.push_back(of.first + static_cast<int>(at));
+    const bool anchors = m.memory_every(of) > 0;
+    for (const char* part : {anchors ? " b" : "", " a"}) {
+      MemoryContact contact{name_of_contact(m, of) + part, std::vector<Vector3>(n)};
+      const auto first = static_cast<int>(out.row_of.size());
+      for (std::size_t k = 0; k < n; ++k) {
+        const std::size_t at =
+            of.sensor < 0 ? k : std::size_t(m.sensors[std::size_t(of.sensor)].in_field[k]);
+        std::copy_n(of.contact.points + 3 * k, 3, contact.places[at].begin());
+        out.row_of.push_back(first + static_cast<int>(at));
+      }
+      out.contacts.push_back(std::move(contact));
+      if (!anchors) break;
     }
-    out.contacts.push_back(std::move(contact));
   }
   return out;
 }

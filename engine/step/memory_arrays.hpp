@@ -15,13 +15,16 @@ namespace tangere {
 
 /// The points of a contact that remembers.
 struct MemoryContact {
-  std::string name;             ///< "contact pad box", "ground box"; of a sensor "tactile pad box"
+  /// "contact pad box", "ground box", of a sensor "tactile pad box"; of one with memory="read"
+  /// "tactile pad box b" and "tactile pad box a", its anchors.
+  std::string name;
   std::vector<Vector3> places;  ///< of its points, axes of the moving frame that carries them [m]
 };
 
 /// The points of a model that remember. Row r of an array (points, 3) is the elastic displacement
-/// of point r [m], in the axes of the moving frame that carries it. Zeros: it has not moved, or
-/// does not touch.
+/// of point r [m], in the axes of the moving frame that carries it; of a sensor with memory="read"
+/// its anchor b in these axes, or a in those of the touched shape. Zeros: it has not moved, or does
+/// not touch.
 struct MemoryPoints {
   std::vector<MemoryContact> contacts;
   std::vector<int> row_of;  ///< (points) row of ShearEntry::point

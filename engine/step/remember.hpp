@@ -3,6 +3,8 @@
 // made, the memory after it when it has found its root.
 #pragma once
 
+#include <span>
+
 #include "engine/step/workspace.hpp"
 
 namespace tangere {
@@ -21,5 +23,11 @@ void recall_list(const CompiledModel& model, const kernels::KernelTable& table,
 template <int L>
 void advance_memory(const CompiledModel& model, const kernels::KernelTable& table,
                     BasicWorkspace<L>& w, LaneBits lanes);
+
+/// Advances w.remembered.now of sensors whose memory is due, where lanes have steps[l] ≥ 0 steps of
+/// their episodes behind them and are at q0, v0.
+template <int L>
+void advance_readings(const CompiledModel& model, const kernels::KernelTable& table,
+                      BasicWorkspace<L>& w, std::span<const std::int64_t> steps);
 
 }  // namespace tangere

@@ -10,6 +10,7 @@
 #include "engine/base/as_size.hpp"
 #include "engine/step/awake_parts.hpp"
 #include "engine/step/motor_force.hpp"
+#include "engine/step/remember.hpp"
 #include "engine/step/sleep.hpp"
 #include "engine/step/step_settings.hpp"
 #include "engine/step/tape.hpp"
@@ -136,6 +137,14 @@ struct Stepper::Impl {
     for (int l = 0; l < L; ++l)
       if (std::vector<TapedSolve>& solves = log.special[std::size_t(l)]; !solves.empty())
         tape->add({tape->steps(), of_block + l, std::move(solves)});
+    if (m.keeps_anchors) {
+      std::array<std::int64_t, L> steps;
+      for (int l = 0; l < L; ++l)
+        steps[std::size_t(l)] = has(live, l) && !failed(report.status[l])
+                                    ? batch.steps_[std::size_t(g.first + lane + l)] + 1
+                                    : -1;
+      advance_readings(m, kernels::active_kernels(), w, steps);
+    }
     LaneBits again = 0;
     if (sleeping) again = wake_touched(batch, stepped, w, g, lane, live, report);
     LaneBits moved = 0;

@@ -212,7 +212,7 @@ void read_defaults(const SceneNode& node) {
       {"body", {"density", "scale", "rgba"}},
       {"general_primitive_contact", {"kn", "kt", "mu", "ks", "damping", "render", "law", "ramp"}},
       {"ground_contact", {"kn", "kt", "mu", "ks", "damping", "render", "law", "ramp"}},
-      {"tactile", {"kn", "kt", "mu", "ks", "damping", "render", "law", "every"}},
+      {"tactile", {"kn", "kt", "mu", "ks", "damping", "render", "law", "every", "memory"}},
       {"motor", {"P", "D", "ctrl_range", "timing"}},
       {"endeffector", {"radius", "rgba"}}};
   std::vector<std::string> names;

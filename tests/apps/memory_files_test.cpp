@@ -33,7 +33,7 @@ std::string simulate(const Folder& folder, const std::string& out, const Words& 
   return outcome.err;
 }
 
-/// The last 30 of 120 steps in `one` are the last rows of `other`.
+/// All rows of `other` are the last ones of `one`.
 void expect_same_rows(const Folder& folder, const std::string& one, const std::string& other,
                       std::size_t environments) {
   for (const std::string name : {"q", "v", "tactile/pad/force", "memory/s"}) {
@@ -82,6 +82,26 @@ TEST_P(MemoryGoesOn, FromARowOfAFileToTheBit) {
 INSTANTIATE_TEST_SUITE_P(Schemes, MemoryGoesOn,
                          ::testing::Values("BDF1", "BDF2", "SDIRK2", "SDIRK3"),
                          [](const auto& scheme) { return scheme.param; });
+
+/// A skin whose memory waits for its readings, every 5 steps, keeps it in rows between them, too.
+TEST(MemoryFiles, HoldWhatWaitsForAReading) {
+  const Folder folder;
+  std::string text = file_bytes(kElastic);
+  const std::string at = "resolution=\"13 10\" every=\"5\"";
+  ASSERT_NE(text.find(at), std::string::npos);
+  text.insert(text.find(at), "memory=\"read\" ");
+  folder.write("waits.xml", text);
+  const auto go = [&](const std::string& out, const Words& words) {
+    const Outcome outcome = run(folder, Words{"simulate", "waits.xml", "-o", out} + words);
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+  };
+  go("whole.h5", {"--steps", "120", "--envs", "19", "--seed", "3"});
+  EXPECT_THAT(array_of(folder.path("whole.h5"), "memory/s").dims,
+              ElementsAre(1, 19, 66 + 8 + 3 * 130 * 2, 3));
+  go("first.h5", {"--steps", "93", "--envs", "19", "--seed", "3"});
+  go("on.h5", {"--state-from", "first.h5", "--steps", "27"});
+  expect_same_rows(folder, "whole.h5", "on.h5", 19);
+}
 
 TEST(MemoryFiles, SayWhatARowLacks) {
   const Folder folder;
