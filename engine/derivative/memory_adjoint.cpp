@@ -117,14 +117,7 @@ void MemoryAdjoint<L>::pull_back(const CompiledModel& m, const kernels::KernelTa
       add_to_entries(now, of, index, points, s_out, before);
     };
     for_each_contact(m, w, l, one);
-    if (of_forces) continue;
-    for_each_felt(m, table, w, at_touches_, l, one, [&](const RememberingContact& of) {
-      // A solve hands these on as they are.
-      const auto from = entries_of(after, m, of), to = entries_of(now, m, of);
-      const auto at = 3 * (from.data() - after.data()), in = 3 * (to.data() - now.data());
-      for (std::size_t k = 0; k < 3 * to.size(); ++k)
-        before[std::size_t(in) + k] += bar[std::size_t(at) + k];
-    });
+    if (!of_forces) for_each_felt(m, table, w, at_touches_, l, one);
   }
 }
 
@@ -140,26 +133,23 @@ void MemoryAdjoint<L>::reverse_end(const CompiledModel& m, const kernels::Kernel
   add_to_state(m, table, w, lanes, w.q1, w.stage.v, end_, loss.q, loss.v);
 }
 
-/// Pulls one contact of one lane back: cotangents of its anchors after an advance, aligned with
-/// w.remembered.after, to those before it, aligned with w.remembered.now.
+/// Pulls one contact of one lane back.
 template <int L>
 void MemoryAdjoint<L>::pull_back_reading(const CompiledModel& m, const kernels::KernelTable& table,
                                          BasicWorkspace<L>& w, const RememberingContact& of,
-                                         int lane, std::span<const double> bar,
-                                         std::span<double> before, LossRows<L>& loss) {
-  const ShearMemory &now = w.remembered.now[std::size_t(lane)],
-                    &after = w.remembered.after[std::size_t(lane)];
+                                         int lane, const TapedReading& reading, LossRows<L>& loss) {
   FeltPoints& felt = w.remembered.felt;
   const RememberingTouch touch = touch_of(m, w, of, at_touches_, lane);
   const RememberingPoints points = felt.find(m.sensors[std::size_t(of.sensor)], table, touch);
   if (points.count == 0) return;
-  set_anchors(table, touch, now, felt.index(), points, felt.scratch());
+  set_anchors(table, touch, reading.before, felt.index(), points, felt.scratch());
   const std::size_t rows = 3 * std::size_t(points.stride);
   double *const none = numbers_.data(), *const s_out = none + rows,
                 *const anchor_bar = s_out + rows, *const anchor_out = anchor_bar + 2 * rows;
   std::fill_n(none, 6 * rows, 0.0);
+  const std::vector<double>& bar = loss.kept[std::size_t(lane)];
   look_up_anchors(
-      after, of, felt.index(), points,
+      reading.after, of, felt.index(), points,
       [&](std::size_t entry, int c) { return bar[3 * entry + std::size_t(c)]; }, anchor_bar);
   kernels::MemoryCotangent sums{};
   kernels::MemoryPullback pullback = {&touch,  &touch,  points, none, nullptr,
@@ -173,54 +163,42 @@ void MemoryAdjoint<L>::pull_back_reading(const CompiledModel& m, const kernels::
   if (loss.parameters != nullptr)
     for (std::size_t k = 0; k < kCoefficients; ++k)
       loss.parameters[std::size_t(of.number) + k][lane] += sums.end.law[k];
-  add_to_anchors(now, of, felt.index(), points, anchor_out, before);
+  add_to_anchors(reading.before, of, felt.index(), points, anchor_out, kept_before_);
 }
 
 template <int L>
 void MemoryAdjoint<L>::reverse_readings(const CompiledModel& m, const kernels::KernelTable& table,
                                         BasicWorkspace<L>& w,
-                                        const std::array<std::int64_t, L>& steps,
+                                        const std::array<TapedReading, L>& readings,
                                         std::vector<LossRows<L>>& losses) {
-  const auto due = [&](int lane, const RememberingContact& of) {
-    return is_due(m, of, steps[std::size_t(lane)]);
-  };
   LaneBits lanes = 0;
-  std::array<ShearMemory, L> left;  // what the last solve left
   for (int l = 0; l < L; ++l)
-    for (const RememberingContact& of : m.memories) {
-      const bool is_due_here = due(l, of);
-      if (is_due_here) lanes |= 1U << l;
-      const auto kept = entries_of(
-          is_due_here ? w.remembered.now[std::size_t(l)] : w.remembered.after[std::size_t(l)], m,
-          of);
-      left[std::size_t(l)].insert(left[std::size_t(l)].end(), kept.begin(), kept.end());
-    }
+    for (const RememberingContact& of : m.memories)
+      if (is_due(m, of, readings[std::size_t(l)].steps)) lanes |= 1U << l;
   if (lanes == 0) return;
   table.stage<L>().poses_at(m.view, w.stage, w.q1, w.v1, w.zero, at_.data());
   table.stage<L>().touches_at(m.view, at_.data(), at_touches_.data());
   for (LossRows<L>& loss : losses) {
     std::fill(end_.begin(), end_.end(), MotionCotangent<Row<L>>{});
     for (int l = 0; l < L; ++l) {
-      std::vector<double>& bar = loss.memory[std::size_t(l)];
+      const TapedReading& reading = readings[std::size_t(l)];
+      std::vector<double>& bar = loss.kept[std::size_t(l)];
       if (!has(lanes, l) || bar.empty()) continue;
-      const ShearMemory &now = w.remembered.now[std::size_t(l)],
-                        &after = w.remembered.after[std::size_t(l)];
-      std::vector<double> to, of_now(3 * now.size());
+      kept_before_.assign(3 * reading.before.size(), 0.0);
       for (const RememberingContact& of : m.memories) {
-        const bool is_due_here = due(l, of);
-        const ShearMemory& memory = is_due_here ? now : after;
-        const auto entries = entries_of(memory, m, of);
-        const auto at = 3 * (entries.data() - memory.data());
-        if (is_due_here) pull_back_reading(m, table, w, of, l, bar, of_now, loss);
-        const auto from = (is_due_here ? of_now : bar).begin() + at;
-        to.insert(to.end(), from, from + std::ptrdiff_t(3 * entries.size()));
+        if (m.memory_every(of) == 0) break;  // those that keep anchors come first
+        if (is_due(m, of, reading.steps)) {
+          pull_back_reading(m, table, w, of, l, reading, loss);
+          continue;
+        }
+        const auto from = entries_of(reading.after, m, of), to = entries_of(reading.before, m, of);
+        std::copy_n(bar.begin() + 3 * (from.data() - reading.after.data()), 3 * from.size(),
+                    kept_before_.begin() + 3 * (to.data() - reading.before.data()));
       }
-      bar = std::move(to);
+      bar = kept_before_;
     }
     add_to_state(m, table, w, lanes, w.q1, w.v1, end_, loss.q, loss.v);
   }
-  for (int l = 0; l < L; ++l)
-    if (has(lanes, l)) w.remembered.after[std::size_t(l)] = std::move(left[std::size_t(l)]);
 }
 
 template <int L>

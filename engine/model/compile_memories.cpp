@@ -100,16 +100,17 @@ std::vector<double> order_points(CompiledSensor& s, PadPoints& points) {
   return tiles;
 }
 
-void add_sensors(CompiledModel& m) {
+/// Adds the sensors that keep anchors, or the others.
+void add_sensors(CompiledModel& m, bool keep_anchors) {
   for (CompiledSensor& s : m.sensors) {
     const TactileDescription& d = m.scene.sensors[std::size_t(s.number)];
-    if (!remembers(s.parameters)) continue;
+    if (!remembers(s.parameters) || d.remembers_readings != keep_anchors) continue;
     if (s.past_states() > 0)
       throw InputError(d.source.prefix() + "tactile sensor '" + d.name +
                        "' has ks and low_pass or delay; expected one of them: friction does not "
                        "remember further back than the last state");
     s.elastic = true;
-    if (d.remembers_readings) s.memory_every = d.every, m.keeps_anchors = true;
+    if (keep_anchors) s.memory_every = d.every;
     PadPoints points = points_of(d, m.bodies[std::size_t(s.body)].frame);
     const std::vector<double> tiles = order_points(s, points);
     m.point_storage.push_back(std::move(points.places));
@@ -154,6 +155,8 @@ kernels::Frame<double> ground_frame(const Vec3<double>& point, const Vec3<double
 }
 
 void compile_memories(CompiledModel& m) {
+  add_sensors(m, true);
+  m.kept_points = m.remembering_points;
   for (std::size_t k = 0; k < m.pairs.size(); ++k) {
     kernels::PairContact& pair = m.pairs[k];
     if (!remembers(pair.parameters)) continue;
@@ -164,7 +167,7 @@ void compile_memories(CompiledModel& m) {
     pair.memory = add(m, of);
   }
   add_grounds(m);
-  add_sensors(m);
+  add_sensors(m, false);
 }
 
 }  // namespace tangere

@@ -192,8 +192,10 @@ struct CompiledModel {
   int remembering_points = 0;  ///< of all `memories`
   /// The same with the points of a sensor counted once, not for every body that it feels.
   int taped_points = 0;
-  int ground_anchors = 0;      ///< points of those on the ground
-  bool keeps_anchors = false;  ///< some sensor's memory does not advance at every step
+  int ground_anchors = 0;  ///< points of those on the ground
+  /// The first of remembering_points are those of sensors whose memory does not advance at every
+  /// step. Steps do not touch their entries.
+  int kept_points = 0;
   /// Steps between advances of a contact's memory; 0: one at every step.
   [[nodiscard]] int memory_every(const kernels::RememberingContact& of) const {
     return of.sensor < 0 ? 0 : sensors[std::size_t(of.sensor)].memory_every;

@@ -21,7 +21,7 @@ ElasticField::ElasticField(const Model& model) : model_(model), felt_(compiled(m
   remembered_.resize(3 * most);
   s_.resize(4 * most);
   force_.resize(3 * most);
-  if (compiled(model).keeps_anchors) anchors_.resize(6 * most);
+  if (compiled(model).kept_points > 0) anchors_.resize(6 * most);
   if (most > 0) shares_.reserve(compiled(model).bodies.size());
 }
 
@@ -46,7 +46,6 @@ void ElasticField::for_each_touched(const PadReader& reader, const Batch& batch,
     if (points.count == 0) continue;
     if (m.memory_every(of) > 0) {
       set_anchors(table, touch, memory, felt_.index(), points, felt_.scratch());
-      std::fill_n(remembered_.data(), 3 * points.stride, 0.0);
     } else {
       look_up(memory, of, felt_.index(), points.count, points.stride, remembered_.data(), next);
       std::copy_n(remembered_.data(), 3 * points.stride, points.anchors + 3 * points.stride);
@@ -102,6 +101,7 @@ std::span<const ElasticField::Share> ElasticField::pull_back(const PadReader& re
                                             &sums};
         const bool keeps = compiled(model_).memory_every(of) > 0;
         if (keeps) {
+          std::fill(remembered_.begin(), remembered_.end(), 0.0);
           std::fill(anchors_.begin(), anchors_.end(), 0.0);
           pullback.kept = felt_.scratch() + 6 * points.stride;
           pullback.anchor_out = anchors_.data();

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Sensors whose memory advances only at steps at which they are due to be read (docs/shear.md). They
-// keep the anchors b and a of each point from one of these steps to the next, so no earlier state
-// is needed. A point without anchors begins unsheared where it is found.
+// Sensors whose memory advances only at steps at which they are due to be read (docs/shear.md).
+// They keep the anchors b and a of each point from one of these steps to the next, so no earlier
+// state is needed. A point without anchors begins unsheared where it is found.
 #pragma once
 
 #include "engine/step/remembering_lane.hpp"
@@ -24,6 +24,13 @@ inline std::span<const ShearEntry> entries_of(std::span<const ShearEntry> memory
                             [](const ShearEntry& e, int value) { return e.point < value; });
   };
   return {from(of.first), from(of.first + m.remembering(of))};
+}
+
+/// How many entries, the first ones, are of sensors that keep anchors.
+inline std::ptrdiff_t kept_entries(const CompiledModel& m, std::span<const ShearEntry> memory) {
+  return std::lower_bound(memory.begin(), memory.end(), m.kept_points,
+                          [](const ShearEntry& e, int value) { return e.point < value; }) -
+         memory.begin();
 }
 
 /// The points among all that remember of which b, and of which a, of a contact is kept.
@@ -52,19 +59,18 @@ inline void add_to_anchors(std::span<const ShearEntry> memory,
   add_to_entries(memory, a_range(of), index, points, numbers + 3 * points.stride, to);
 }
 
-/// Sets the anchors of points: those that are kept, else those of an unsheared spring at this touch.
-/// `kept`: (kKeptNumbers, stride) scratch; its last row is 1 where an anchor is kept, else 0.
+/// Sets the anchors of points: those that are kept, else those of an unsheared spring. `kept`: (kKeptNumbers, stride) scratch; its last row is 1 where an anchor is kept, else 0.
 inline void set_anchors(const kernels::KernelTable& table, const kernels::RememberingTouch& touch,
                         std::span<const ShearEntry> memory, const int* index,
                         const kernels::RememberingPoints& points, double* kept) {
-  const int stride = points.stride;
-  std::fill_n(points.anchors + 3 * stride, 3 * stride, 0.0);
+  const int stride = points.stride,
+            end = (points.count + kernels::kGroup - 1) / kernels::kGroup * kernels::kGroup;
+  for (int c = 3; c < 6; ++c) std::fill_n(points.anchors + c * stride, end, 0.0);
   table.recall(touch, points);
   look_up_anchors(
       memory, *touch.of, index, points,
       [&](std::size_t entry, int c) { return memory[entry].s[c]; }, kept);
   double* const is_kept = kept + 6 * stride;
-  const int end = (points.count + kernels::kGroup - 1) / kernels::kGroup * kernels::kGroup;
   for (int k = 0; k < end; ++k) {
     bool any = false;
     for (int i = 0; i < 6; ++i) any = any || kept[i * stride + k] != 0;
@@ -88,7 +94,8 @@ inline void advance_anchors(const CompiledModel& m, const kernels::KernelTable& 
   set_anchors(table, touch, before, felt.index(), points, felt.scratch());
   double* const s = felt.scratch();
   table.advance(touch, points, s, nullptr);
-  std::copy_n(s, 3 * stride, points.anchors + 3 * stride);
+  for (int c = 0; c < 3; ++c)
+    std::copy_n(s + c * stride, points.count, points.anchors + (3 + c) * stride);
   table.recall(touch, points);
   for (int part = 0; part < 2; ++part)
     for (int k = 0; k < points.count; ++k) {

@@ -124,37 +124,35 @@ void advance_memory(const CompiledModel& m, const kernels::KernelTable& table, B
       const Row<L>* kept = &of_lanes.ground[4 * std::size_t(k)];
       if (kept[3][l] > 0) after.push_back({first + k, {kept[0][l], kept[1][l], kept[2][l]}});
     }
-    for_each_felt(m, table, w, of_lanes.end_touches, l, advance, [&](const RememberingContact& of) {
-      const auto kept = entries_of(of_lanes.now[std::size_t(l)], m, of);
-      after.insert(after.end(), kept.begin(), kept.end());
-    });
+    for_each_felt(m, table, w, of_lanes.end_touches, l, advance);
   }
 }
 
 template <int L>
 void advance_readings(const CompiledModel& m, const kernels::KernelTable& table,
-                      BasicWorkspace<L>& w, std::span<const std::int64_t> steps) {
-  const auto due = [&](int lane, const RememberingContact& of) {
-    return is_due(m, of, steps[std::size_t(lane)]);
-  };
-  MemoryLanes<L>& lanes = w.remembered;
+                      BasicWorkspace<L>& w, std::span<const ReadingLane> lanes) {
+  MemoryLanes<L>& of_lanes = w.remembered;
   bool found = false;
   for (int l = 0; l < L; ++l) {
-    const auto is_due_here = [&](const RememberingContact& of) { return due(l, of); };
-    if (std::none_of(m.memories.begin(), m.memories.end(), is_due_here)) continue;
-    if (!found) find_touches(m, table, w, w.q0, w.v0, lanes.end, lanes.end_touches);
+    const ReadingLane& lane = lanes[std::size_t(l)];
+    const auto due = [&](const RememberingContact& of) { return is_due(m, of, lane.steps); };
+    if (std::none_of(m.memories.begin(), m.memories.end(), due)) continue;
+    if (!found) find_touches(m, table, w, w.q0, w.v0, of_lanes.end, of_lanes.end_touches);
     found = true;
-    ShearMemory &now = lanes.now[std::size_t(l)], &after = lanes.after[std::size_t(l)];
+    ShearMemory &now = *lane.memory, &after = of_lanes.after[std::size_t(l)];
     after.clear();
     for (const RememberingContact& of : m.memories) {
-      if (due(l, of)) {
-        advance_anchors(m, table, touch_of(m, w, of, lanes.end_touches, l), now, lanes.felt, after);
+      if (m.memory_every(of) == 0) break;  // those that keep anchors come first
+      if (due(of)) {
+        advance_anchors(m, table, touch_of(m, w, of, of_lanes.end_touches, l), now, of_lanes.felt,
+                        after);
       } else {
         const auto kept = entries_of(now, m, of);
         after.insert(after.end(), kept.begin(), kept.end());
       }
     }
-    now.swap(after);
+    after.insert(after.end(), now.begin() + kept_entries(m, now), now.end());
+    now = after;
   }
 }
 
@@ -168,8 +166,8 @@ template void advance_memory(const CompiledModel&, const kernels::KernelTable&, 
 template void advance_memory(const CompiledModel&, const kernels::KernelTable&, SingleWorkspace&,
                              LaneBits);
 template void advance_readings(const CompiledModel&, const kernels::KernelTable&, Workspace&,
-                               std::span<const std::int64_t>);
+                               std::span<const ReadingLane>);
 template void advance_readings(const CompiledModel&, const kernels::KernelTable&, SingleWorkspace&,
-                               std::span<const std::int64_t>);
+                               std::span<const ReadingLane>);
 
 }  // namespace tangere

@@ -24,10 +24,14 @@ template <int L>
 void advance_memory(const CompiledModel& model, const kernels::KernelTable& table,
                     BasicWorkspace<L>& w, LaneBits lanes);
 
-/// Advances w.remembered.now of sensors whose memory is due, where lanes have steps[l] ≥ 0 steps of
-/// their episodes behind them and are at q0, v0.
+/// A lane whose step is done, at q0, v0.
+struct ReadingLane {
+  std::int64_t steps = -1;        ///< of its episode until then; -1: it took none
+  ShearMemory* memory = nullptr;  ///< all that it remembers
+};
+/// Advances the memory of sensors that are due to be read. `lanes`: (L).
 template <int L>
 void advance_readings(const CompiledModel& model, const kernels::KernelTable& table,
-                      BasicWorkspace<L>& w, std::span<const std::int64_t> steps);
+                      BasicWorkspace<L>& w, std::span<const ReadingLane> lanes);
 
 }  // namespace tangere

@@ -144,7 +144,7 @@ kernels::RememberingPoints listed(const typename kernels::Stage<L>::List& list, 
 template <int L, class F>
 void for_each_pair(const CompiledModel& m, BasicWorkspace<L>& w, int lane, const F& f) {
   for (const kernels::RememberingContact& of : m.memories) {
-    if (of.pair < 0) return;  // pairs come first
+    if (of.pair < 0) continue;
     const auto& list = w.lists[std::size_t(of.pair)];
     if (list.own_count[lane] > 0) f(of, list.own_index + list.stride * lane, listed<L>(list, lane));
   }
@@ -167,19 +167,14 @@ void for_each_contact(const CompiledModel& m, BasicWorkspace<L>& w, int lane, co
 }
 
 /// Calls f as for_each_contact() does for the points of elastic sensors that touch where `end`
-/// says. The anchors are those of w.remembered.now. Calls waiting(contact) instead where memory
-/// does not advance at every step.
-template <int L, class F, class W>
+/// says. The anchors are those of w.remembered.now. Sensors that keep anchors are left out.
+template <int L, class F>
 void for_each_felt(const CompiledModel& m, const kernels::KernelTable& table, BasicWorkspace<L>& w,
                    const AlignedVector<kernels::LinkPose<kernels::Row<L>>>& end, int lane,
-                   const F& f, const W& waiting) {
+                   const F& f) {
   FeltPoints& felt = w.remembered.felt;
   for (const kernels::RememberingContact& of : m.memories) {
-    if (of.sensor < 0) continue;
-    if (m.memory_every(of) > 0) {
-      waiting(of);
-      continue;
-    }
+    if (of.sensor < 0 || m.memory_every(of) > 0) continue;
     const kernels::RememberingPoints points =
         felt.find(m.sensors[std::size_t(of.sensor)], table, touch_of(m, w, of, end, lane));
     if (points.count == 0) continue;
