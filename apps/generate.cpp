@@ -255,6 +255,7 @@ int generate(GenerateOptions options, const Console& console, const ProgramInfo&
   Job job;
   job.run = episode_options(options, model, controls);
   const Record record = record_of(options.record, model);
+  refuse_memory(record, "a data set");
   take(record, model, job.run);
   const GradientKind gradients = gradients_wanted(options, false);
   std::unique_ptr<RolloutLoss> loss;

@@ -76,6 +76,8 @@ Record record_of(const std::string& option, const Model& model) {
   const AskedOutput* const v = record.find("v");
   if (q != nullptr) outputs.states = q->times;
   if (v != nullptr) outputs.states = v->times;
+  if (record.find("memory") != nullptr && !model.remembers())
+    throw InputError(record.where + ": 'memory', but no contact or sensor of the scene has ks");
   outputs.fields.emplace();
   const std::vector<std::string> sensors = sensor_names(model.scene());
   for (const AskedOutput& asked : record.asked)
@@ -89,6 +91,21 @@ Record record_of(const std::string& option, const Model& model) {
               return std::pair(a.sensor, a.form) < std::pair(b.sensor, b.form);
             });
   return record;
+}
+
+void take_memory(Record& record, const Model& model) {
+  RolloutOutputs& outputs = record.outputs;
+  outputs.memory = model.remembers();
+  outputs.of_memory = outputs.states.given() ? outputs.states : OutputTimes{.final = true};
+  if (const AskedOutput* const asked = record.find("memory")) outputs.of_memory = asked->times;
+}
+
+void refuse_memory(const Record& record, const std::string& who) {
+  if (record.find("memory") != nullptr)
+    throw InputError(
+        fmt::format("{}: 'memory', but {} does not hold it; expected other names: a "
+                    "trajectory of simulate holds it",
+                    record.where, who));
 }
 
 void take_bodies(Record& record, const Model& model) {

@@ -27,6 +27,13 @@ struct Record {
 /// a name that the scene does not have. Single bodies are left to the caller, see take_bodies().
 Record record_of(const std::string& option, const Model& model);
 
+/// Takes what friction remembers: at the rows that are asked for, else where a run can be continued
+/// from: at its last row, or where rows of q are thinned at each of them.
+void take_memory(Record& record, const Model& model);
+
+/// Throws InputError where memory is asked for. `who`: what does not store it, "a data set".
+void refuse_memory(const Record& record, const std::string& who);
+
 /// Makes the bodies that are asked for one output. Throws InputError where their times differ.
 void take_bodies(Record& record, const Model& model);
 

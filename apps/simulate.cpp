@@ -62,6 +62,7 @@ void check_size(const Model& model, int environments, const RolloutOptions& roll
 RolloutOutputs outputs_of(const SimulateArguments& options, const Model& model) {
   Record record = record_of(options.record, model);
   take_bodies(record, model);
+  take_memory(record, model);
   record.outputs.audit = options.audit;
   return record.outputs;
 }
@@ -81,6 +82,8 @@ TrajectoryLayout make_layout(const Batch& batch, const Stepper& stepper,
   run.of_end_effectors = rollout.outputs.of_end_effectors;
   run.chosen_bodies = rollout.outputs.chosen_bodies;
   run.audit = rollout.outputs.audit;
+  run.memory = rollout.outputs.memory;
+  run.of_memory = rollout.outputs.of_memory;
   run.steps = rollout.steps;
   run.first_step = rollout.first_step;
   run.every = rollout.every;
@@ -173,6 +176,17 @@ int report(const SimulateArguments& options, const Console& console, const Batch
   return code;
 }
 
+/// Rows of a file that hold what friction remembers, for a message: " (row 60 does)".
+std::string rows_with_memory(const SavedState& saved) {
+  constexpr std::size_t kListed = 5;
+  const std::vector<std::int64_t>& rows = saved.memory_rows;
+  if (rows.empty()) return "";
+  const bool one = rows.size() == 1;
+  return fmt::format(" (row{} {}{} do{})", one ? "" : "s",
+                     fmt::join(std::span(rows).first(std::min(rows.size(), kListed)), ", "),
+                     rows.size() > kListed ? " …" : "", one ? "es" : "");
+}
+
 /// The start of the run: the scene's own, or a row of another run.
 struct Start {
   std::optional<SavedState> saved;
@@ -193,9 +207,11 @@ struct Start {
   void print(const Console& console, const Model& model, const Scene& scene,
              const Stepper& stepper) const {
     if (!saved) return;
-    if (model.remembers())
-      console.note(saved->path +
-                   " does not hold what friction remembers: contacts with ks begin unsheared");
+    if (model.remembers() && !saved->memory)
+      console.note(fmt::format(
+          "row {} of {} does not hold what friction remembers{}: contacts with ks begin unsheared; "
+          "simulate stores it at its last row, and with --record memory at every row",
+          saved->row, saved->path, rows_with_memory(*saved)));
     if (!continues)
       console.note(
           fmt::format("{} was made by {} with steps of {} s, this run takes {} with {} s: it "
@@ -376,8 +392,9 @@ Command add_simulate(CLI::App& program) {
   add_text(
       app, "--record", o.record, "LIST",
       "What to compute and store besides q and v, separated by commas: bodies or bodies.NAME, "
-      "variables, a sensor's field (pad), pad.pressure, pad.shear, pad.sum, pad.ideal, "
-      "pad.markers or pad.flow; NAME/10 every 10th step, NAME/final at the end, of q and v too "
+      "variables, memory (of friction), a sensor's field (pad), pad.pressure, pad.shear, pad.sum, "
+      "pad.ideal, pad.markers or pad.flow; NAME/10 every 10th step, NAME/final at the end, of q "
+      "and v too "
       "[default: the scene's <outputs>, or all]");
   add_flag(app, "--audit", o.audit,
            "Also compute and store energy and momentum, what motors, damping and friction did, and "

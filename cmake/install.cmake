@@ -69,6 +69,7 @@ set(public_headers
   engine/step/batch.hpp
   engine/step/control.hpp
   engine/step/displacement.hpp
+  engine/step/memory_arrays.hpp
   engine/step/shear_memory.hpp
   engine/step/sleep_state.hpp
   engine/step/stepper.hpp

@@ -9,6 +9,7 @@
 #include "engine/derivative/motor_pullback.hpp"
 #include "engine/derivative/number_gradients.hpp"
 #include "engine/derivative/tactile_point_numbers.hpp"
+#include "engine/step/kept_anchors.hpp"
 #include "engine/step/step_settings.hpp"
 
 namespace tangere {
@@ -105,9 +106,14 @@ struct Adjoint::Impl {
     gather(w.x_inner, g.tape.inner(g.step), settings.integrator.scheme().inner_stages() * m.nv,
            g.first);
     for (int l = 0; l < L && !m.memories.empty(); ++l) {
-      set_memory(x, l, g.tape.memory(g.step, g.first + l), g.tape.memory(g.step + 1, g.first + l));
-      for (std::size_t k = 0; k < losses.size(); ++k)
-        x.adjoint.losses[k].memory[std::size_t(l)] = losses[k].memory[std::size_t(g.first + l)];
+      const auto after = g.tape.memory(g.step + 1, g.first + l);
+      set_memory(x, l, without_kept(g.tape.memory(g.step, g.first + l)), without_kept(after));
+      for (std::size_t k = 0; k < losses.size(); ++k) {
+        const std::vector<double>& bar = losses[k].memory[std::size_t(g.first + l)];
+        const auto rest = bar.begin() + (bar.empty() ? 0 : 3 * kept_entries(m, after));
+        x.adjoint.losses[k].kept[std::size_t(l)].assign(bar.begin(), rest);
+        x.adjoint.losses[k].memory[std::size_t(l)].assign(rest, bar.end());
+      }
     }
     w.stage.block = rows.data() + g.first;
     w.stage.group = 0;
@@ -120,6 +126,11 @@ struct Adjoint::Impl {
       if (o.parameters != nullptr)
         std::fill(o.parameters, o.parameters + parameter_rows(model), Row<L>{});
     }
+  }
+
+  /// What solves change of a memory.
+  [[nodiscard]] std::span<const ShearEntry> without_kept(std::span<const ShearEntry> memory) const {
+    return memory.subspan(std::size_t(kept_entries(compiled(model), memory)));
   }
 
   /// Sets what a lane remembers where a solve begins and at its end.
@@ -147,7 +158,7 @@ struct Adjoint::Impl {
       if (!compiled(model).memories.empty())
         set_memory(x, lane,
                    k > 0 ? std::span<const ShearEntry>(special.solves[k - 1].memory)
-                         : g.tape.memory(g.step, g.first + lane),
+                         : without_kept(g.tape.memory(g.step, g.first + lane)),
                    solve.memory);
       if (k > 0) {
         set(w.q0, special.solves[k - 1].q);
@@ -171,6 +182,24 @@ struct Adjoint::Impl {
     }
   }
 
+  /// Reverses what the step did to memories that were due at its end.
+  template <int L>
+  void reverse_readings(Lanes<L>& x, const GroupStepInHand& g) {
+    gather(x.work.v1, g.tape.state(g.step + 1) + model.nq() * kBlock, model.nv(), g.first);
+    std::array<TapedReading, L> readings;
+    for (int l = 0; l < L; ++l) {
+      if (!has(g.live, l)) continue;
+      const auto kept = [&](std::int64_t step) {
+        const auto memory = g.tape.memory(step, g.first + l);
+        return memory.first(std::size_t(kept_entries(compiled(model), memory)));
+      };
+      readings[std::size_t(l)] = {g.tape.episode_step(g.step + 1, g.first + l), kept(g.step),
+                                  kept(g.step + 1)};
+    }
+    x.adjoint.memory_adjoint.reverse_readings(compiled(model), kernels::active_kernels(), x.work,
+                                              readings, x.adjoint.losses);
+  }
+
   template <int L>
   void reverse(const GroupStepContext& g, std::span<const double> controls) {
     const CompiledModel& m = compiled(model);
@@ -183,6 +212,7 @@ struct Adjoint::Impl {
                  controls.subspan(std::size_t((g.first + l) * m.nu), std::size_t(m.nu)));
       if (g.tape.special(g.step, g.first + l) == nullptr) plain |= 1U << l;
     }
+    if (m.kept_points > 0) reverse_readings(x, g);
     if (plain != 0)
       group.reverse(settings.integrator.scheme(), settings.timestep, kernels::active_kernels(),
                     x.work, x.adjoint, plain);
@@ -190,14 +220,16 @@ struct Adjoint::Impl {
       if (has(g.live & ~plain, l)) reverse_special(x, *g.tape.special(g.step, g.first + l), l, g);
     for (std::size_t k = 0; k < losses.size(); ++k)
       for (int l = 0; l < L; ++l)
-        if (has(g.live, l)) scatter(x.adjoint.losses[k], losses[k], l, g.first + l, controls);
+        if (has(g.live, l))
+          scatter(x.adjoint.losses[k], losses[k], l, g.first + l, controls,
+                  kept_entries(m, g.tape.memory(g.step, g.first + l)));
   }
 
   /// Writes one lane's results to its column. Forces that are known at the start depend on the
-  /// state there and on the controls.
+  /// state there and on the controls. `kept`: entries of sensors that keep anchors before the step.
   template <int L>
   void scatter(LossRows<L>& o, BlockCotangent& c, int lane, int column,
-               std::span<const double> controls) {
+               std::span<const double> controls, std::ptrdiff_t kept) {
     const CompiledModel& m = compiled(model);
     const std::span<const double> u =
         controls.subspan(std::size_t(column * m.nu), std::size_t(m.nu));
@@ -211,7 +243,13 @@ struct Adjoint::Impl {
       c.previous_q[at] = o.q_before[i][lane];
       c.previous_v[at] = o.v_before[i][lane];
     }
-    if (!m.memories.empty()) c.memory[std::size_t(column)] = o.memory_before[std::size_t(lane)];
+    if (!m.memories.empty()) {
+      std::vector<double>& memory = c.memory[std::size_t(column)];
+      const std::vector<double>& rest = o.memory_before[std::size_t(lane)];
+      memory = o.kept[std::size_t(lane)];
+      memory.resize(3 * std::size_t(kept), 0.0);  // nothing reached them: zeros
+      memory.insert(memory.end(), rest.begin(), rest.end());
+    }
     if (o.parameters == nullptr) return;
     for (int i = 0; i < parameter_rows(model); ++i)
       c.parameters[std::size_t(i * kBlock + column)] += o.parameters[i][lane];

@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "engine/derivative/dual_field.hpp"
+#include "engine/step/kept_anchors.hpp"
 #include "kernels/memory/advance.hpp"
 #include "kernels/step/link_poses.hpp"
 #include "kernels/step/residual.hpp"
@@ -230,6 +231,23 @@ struct DualStage::Impl {
     return law;
   }
 
+  /// Returns the anchor of point k of a sensor at this touch (engine/step/kept_anchors.hpp).
+  template <class Shape>
+  [[nodiscard]] kernels::Anchor<D> felt_anchor(const Shape& shape, const kernels::LoadedTouch<D>& t,
+                                               const kernels::RememberingContact& of, int k,
+                                               const std::vector<D>& remembered) const {
+    const D* const b = &remembered[3 * std::size_t(of.first + k)];
+    const kernels::Vec3<D> xi = place(of, k);
+    if (m.memory_every(of) == 0)
+      return kernels::recalled(shape, t, xi, kernels::Vec3<D>{b[0], b[1], b[2]});
+    const D* const a = b + 3 * of.contact.n_points;
+    const auto is_zero = [](const D* x) {
+      return x[0].value == 0 && x[1].value == 0 && x[2].value == 0;
+    };
+    if (is_zero(b) && is_zero(a)) return kernels::recalled(shape, t, xi, kernels::zero3<D>());
+    return {{b[0], b[1], b[2]}, {a[0], a[1], a[2]}, D(0.0)};
+  }
+
   [[nodiscard]] std::vector<kernels::LinkPose<D>> poses_at(const std::vector<D>& q,
                                                            const std::vector<D>& v) const {
     std::vector<D> zero(v.size(), D(0.0)), rates(v.size());
@@ -404,6 +422,7 @@ void DualStage::recall() {
   const std::vector<D> still(v.size(), D(0.0));
   const std::vector<kernels::LinkPose<D>> poses = i.poses_at(centre, still);
   for (const kernels::RememberingContact& of : i.m.memories) {
+    if (i.m.memory_every(of) > 0) continue;
     const kernels::LoadedTouch<D> t = i.touch(of, poses);
     i.with_touched_shape(of, [&](const auto& shape) {
       for (int k = 0; k < of.contact.n_points; ++k) {
@@ -420,6 +439,7 @@ void DualStage::advance(const std::vector<D>& q, const std::vector<D>& twist) {
   if (i.m.memories.empty()) return;
   const std::vector<kernels::LinkPose<D>> poses = i.poses_at(q, twist);
   for (const kernels::RememberingContact& of : i.m.memories) {
+    if (i.m.memory_every(of) > 0) continue;
     const kernels::LoadedTouch<D> t = i.touch(of, poses);
     i.with_touched_shape(of, [&](const auto& shape) {
       for (int k = 0; k < of.contact.n_points; ++k) {
@@ -428,6 +448,29 @@ void DualStage::advance(const std::vector<D>& q, const std::vector<D>& twist) {
         D* kept = &remembered[3 * std::size_t(of.first + k)];
         const kernels::Vec3<D> next = p.d < D(0.0) ? p.hold * p.s : kernels::zero3<D>();
         kept[0] = next.x, kept[1] = next.y, kept[2] = next.z;
+      }
+    });
+  }
+}
+
+void DualStage::advance_readings(const std::vector<D>& q, const std::vector<D>& twist,
+                                 std::int64_t steps) {
+  Impl& i = *impl_;
+  const std::vector<kernels::LinkPose<D>> poses = i.poses_at(q, twist);
+  for (const kernels::RememberingContact& of : i.m.memories) {
+    if (!is_due(i.m, of, steps)) continue;
+    const kernels::LoadedTouch<D> t = i.touch(of, poses);
+    i.with_touched_shape(of, [&](const auto& shape) {
+      for (int k = 0; k < of.contact.n_points; ++k) {
+        const kernels::Vec3<D> xi = Impl::place(of, k);
+        const auto p = kernels::meet_elastic(shape, t, i.law_of(of, k, t), xi,
+                                             i.felt_anchor(shape, t, of, k, remembered));
+        kernels::Anchor<D> after = {kernels::zero3<D>(), kernels::zero3<D>(), D(0.0)};
+        if (p.d < D(0.0)) after = kernels::recalled(shape, t, xi, p.hold * p.s);
+        D *const b = &remembered[3 * std::size_t(of.first + k)], *const a =
+                                                                     b + 3 * of.contact.n_points;
+        b[0] = after.b.x, b[1] = after.b.y, b[2] = after.b.z;
+        a[0] = after.a.x, a[1] = after.a.y, a[2] = after.a.z;
       }
     });
   }
@@ -491,11 +534,9 @@ void DualStage::elastic_field(int sensor, const Coefficients<D>& law, std::span<
     const kernels::LoadedTouch<D> t = i.touch(of, poses);
     i.with_touched_shape(of, [&](const auto& shape) {
       for (int k = 0; k < of.contact.n_points; ++k) {
-        const D* kept = &remembered[3 * std::size_t(of.first + k)];
         const kernels::Vec3<D> xi = Impl::place(of, k);
-        const auto p = kernels::meet_elastic(
-            shape, t, i.law_of(of, k, t), xi,
-            kernels::recalled(shape, t, xi, kernels::Vec3<D>{kept[0], kept[1], kept[2]}));
+        const auto p = kernels::meet_elastic(shape, t, i.law_of(of, k, t), xi,
+                                             i.felt_anchor(shape, t, of, k, remembered));
         const D f[3] = {p.force.x, p.force.y, p.force.z};
         const double* axes = &felt.point_axes[9 * std::size_t(k)];
         const auto to = 3 * std::size_t(felt.in_field[std::size_t(k)]);

@@ -42,6 +42,10 @@ class DualStage {
   /// Replaces what is remembered by that at the end of such a solve, at q and v.
   void advance(const std::vector<DualNumber>& q, const std::vector<DualNumber>& v);
 
+  /// The same for sensors that keep anchors, where they are due after `steps` steps of an episode.
+  void advance_readings(const std::vector<DualNumber>& q, const std::vector<DualNumber>& v,
+                        std::int64_t steps);
+
   /// Computes v and g, with the tangents of masses included.
   void residual();
   /// Computes v alone.

@@ -3,7 +3,7 @@
 #include "engine/derivative/memory_adjoint.hpp"
 
 #include "engine/derivative/link_cotangents.hpp"
-#include "engine/step/remembering_lane.hpp"
+#include "engine/step/kept_anchors.hpp"
 
 namespace tangere {
 
@@ -53,7 +53,7 @@ MemoryAdjoint<L>::MemoryAdjoint(const CompiledModel& m, int losses) {
   scratch_.resize(bytes);
   for (const RememberingContact& of : m.memories)
     stride = std::max(stride, std::size_t(of.contact.n_points + 2 * kGroup));
-  numbers_.resize(9 * stride);
+  numbers_.resize(18 * stride);
 }
 
 template <int L>
@@ -131,6 +131,74 @@ void MemoryAdjoint<L>::reverse_end(const CompiledModel& m, const kernels::Kernel
   table.stage<L>().touches_at(m.view, at_.data(), at_touches_.data());
   pull_back(m, table, w, lanes, false, loss, number);
   add_to_state(m, table, w, lanes, w.q1, w.stage.v, end_, loss.q, loss.v);
+}
+
+/// Pulls one contact of one lane back.
+template <int L>
+void MemoryAdjoint<L>::pull_back_reading(const CompiledModel& m, const kernels::KernelTable& table,
+                                         BasicWorkspace<L>& w, const RememberingContact& of,
+                                         int lane, const TapedReading& reading, LossRows<L>& loss) {
+  FeltPoints& felt = w.remembered.felt;
+  const RememberingTouch touch = touch_of(m, w, of, at_touches_, lane);
+  const RememberingPoints points = felt.find(m.sensors[std::size_t(of.sensor)], table, touch);
+  if (points.count == 0) return;
+  set_anchors(table, touch, reading.before, felt.index(), points, felt.scratch());
+  const std::size_t rows = 3 * std::size_t(points.stride);
+  double *const none = numbers_.data(), *const s_out = none + rows,
+                *const anchor_bar = s_out + rows, *const anchor_out = anchor_bar + 2 * rows;
+  std::fill_n(none, 6 * rows, 0.0);
+  const std::vector<double>& bar = loss.kept[std::size_t(lane)];
+  look_up_anchors(
+      reading.after, of, felt.index(), points,
+      [&](std::size_t entry, int c) { return bar[3 * entry + std::size_t(c)]; }, anchor_bar);
+  kernels::MemoryCotangent sums{};
+  kernels::MemoryPullback pullback = {&touch,  &touch,  points, none, nullptr,
+                                      nullptr, nullptr, s_out,  &sums};
+  pullback.anchor_bar = anchor_bar;
+  pullback.kept = felt.scratch() + 6 * points.stride;
+  pullback.anchor_out = anchor_out;
+  table.pull_back_memory(pullback);
+  sums.end.displacement += sums.start;
+  hand_on<L>(of, at_, sums.end.displacement, sums.end.twist, lane, end_);
+  if (loss.parameters != nullptr)
+    for (std::size_t k = 0; k < kCoefficients; ++k)
+      loss.parameters[std::size_t(of.number) + k][lane] += sums.end.law[k];
+  add_to_anchors(reading.before, of, felt.index(), points, anchor_out, kept_before_);
+}
+
+template <int L>
+void MemoryAdjoint<L>::reverse_readings(const CompiledModel& m, const kernels::KernelTable& table,
+                                        BasicWorkspace<L>& w,
+                                        const std::array<TapedReading, L>& readings,
+                                        std::vector<LossRows<L>>& losses) {
+  LaneBits lanes = 0;
+  for (int l = 0; l < L; ++l)
+    for (const RememberingContact& of : m.memories)
+      if (is_due(m, of, readings[std::size_t(l)].steps)) lanes |= 1U << l;
+  if (lanes == 0) return;
+  table.stage<L>().poses_at(m.view, w.stage, w.q1, w.v1, w.zero, at_.data());
+  table.stage<L>().touches_at(m.view, at_.data(), at_touches_.data());
+  for (LossRows<L>& loss : losses) {
+    std::fill(end_.begin(), end_.end(), MotionCotangent<Row<L>>{});
+    for (int l = 0; l < L; ++l) {
+      const TapedReading& reading = readings[std::size_t(l)];
+      std::vector<double>& bar = loss.kept[std::size_t(l)];
+      if (!has(lanes, l) || bar.empty()) continue;
+      kept_before_.assign(3 * reading.before.size(), 0.0);
+      for (const RememberingContact& of : m.memories) {
+        if (m.memory_every(of) == 0) break;  // those that keep anchors come first
+        if (is_due(m, of, reading.steps)) {
+          pull_back_reading(m, table, w, of, l, reading, loss);
+          continue;
+        }
+        const auto from = entries_of(reading.after, m, of), to = entries_of(reading.before, m, of);
+        std::copy_n(bar.begin() + 3 * (from.data() - reading.after.data()), 3 * from.size(),
+                    kept_before_.begin() + 3 * (to.data() - reading.before.data()));
+      }
+      bar = kept_before_;
+    }
+    add_to_state(m, table, w, lanes, w.q1, w.v1, end_, loss.q, loss.v);
+  }
 }
 
 template <int L>

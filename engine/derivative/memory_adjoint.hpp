@@ -8,6 +8,7 @@
 #pragma once
 
 #include <array>
+#include <span>
 #include <vector>
 
 #include "engine/step/workspace.hpp"
@@ -26,6 +27,15 @@ struct LossRows {
   Rows parameters;          ///< out: (parameter_rows), or null
   /// Of what friction remembers, three numbers for each entry: in, after the solve; out, before it.
   std::array<std::vector<double>, L> memory, memory_before;
+  /// The same of sensors that keep anchors, for whole steps: solves do not change them.
+  std::array<std::vector<double>, L> kept;
+};
+
+/// What a lane's sensors that keep anchors remembered before and after a step. `steps`: of its
+/// episode until its end; -1: it took none.
+struct TapedReading {
+  std::int64_t steps = -1;
+  std::span<const ShearEntry> before, after;
 };
 
 /// Scratch of one thread, all losses.
@@ -44,6 +54,11 @@ class MemoryAdjoint {
   void reverse_forces(const CompiledModel& model, const kernels::KernelTable& table,
                       BasicWorkspace<L>& w, LaneBits lanes, const kernels::Row<L>* q,
                       const kernels::Row<L>* lambda, LossRows<L>& loss, int number);
+  /// Reverses what the end of a step, at q1, v1, did to the memory of sensors that keep anchors:
+  /// LossRows::kept becomes that before the step.
+  void reverse_readings(const CompiledModel& model, const kernels::KernelTable& table,
+                        BasicWorkspace<L>& w, const std::array<TapedReading, L>& readings,
+                        std::vector<LossRows<L>>& losses);
   /// Adds to the cotangents of the state where the solve began.
   void finish(const CompiledModel& model, const kernels::KernelTable& table, BasicWorkspace<L>& w,
               LaneBits lanes, LossRows<L>& loss, int number);
@@ -54,6 +69,9 @@ class MemoryAdjoint {
   void pull_back(const CompiledModel& model, const kernels::KernelTable& table,
                  BasicWorkspace<L>& w, LaneBits lanes, bool of_forces, LossRows<L>& loss,
                  int number);
+  void pull_back_reading(const CompiledModel& model, const kernels::KernelTable& table,
+                         BasicWorkspace<L>& w, const kernels::RememberingContact& of, int lane,
+                         const TapedReading& reading, LossRows<L>& loss);
   void add_to_state(const CompiledModel& model, const kernels::KernelTable& table,
                     BasicWorkspace<L>& w, LaneBits lanes, const kernels::Row<L>* q,
                     const kernels::Row<L>* v, Cotangents& links, kernels::Row<L>* q_bar,
@@ -65,7 +83,8 @@ class MemoryAdjoint {
   Poses at_touches_, slip_touches_;      ///< (n_memories), see StageKernels::touches_at
   AlignedVector<kernels::Row<L>> rows_;  ///< (nv) twice
   AlignedVector<std::byte> scratch_;
-  AlignedVector<double> numbers_;  ///< (9, largest stride)
+  AlignedVector<double> numbers_;    ///< (18, largest stride)
+  std::vector<double> kept_before_;  ///< of one lane
 };
 
 }  // namespace tangere

@@ -316,6 +316,8 @@ void Tangent::step(const Batch& batch, int block, int lane, const BlockTape& tap
     end = i.solve_step(i.settings.integrator.scheme(), i.settings.timestep, start, before,
                        rows(step + 1), tape.inner(step) + lane, kBlock);
   }
+  if (m.kept_points > 0 && tape.took(step, lane))
+    i.stage.advance_readings(end.q, end.v, tape.episode_step(step + 1, lane));
   state.memory = i.memory_dot(tape.memory(step + 1, lane));
   state.previous_q = std::move(state.q);
   state.previous_v = std::move(state.v);

@@ -32,7 +32,7 @@ void keep_places(CompiledModel& m, kernels::RememberingContact& of) {
 int add(CompiledModel& m, kernels::RememberingContact of) {
   of.first = m.remembering_points;
   if (of.sensor < 0) m.taped_points += of.contact.n_points;
-  m.remembering_points += of.contact.n_points;
+  m.remembering_points += m.remembering(of);
   m.memories.push_back(of);
   return static_cast<int>(m.memories.size()) - 1;
 }
@@ -102,15 +102,17 @@ std::vector<double> order_points(CompiledSensor& s, PadPoints& points) {
   return tiles;
 }
 
-void add_sensors(CompiledModel& m) {
+/// Adds the sensors that keep anchors, or the others.
+void add_sensors(CompiledModel& m, bool keep_anchors) {
   for (CompiledSensor& s : m.sensors) {
     const TactileDescription& d = m.scene.sensors[std::size_t(s.number)];
-    if (!remembers(s.parameters)) continue;
+    if (!remembers(s.parameters) || d.remembers_readings != keep_anchors) continue;
     if (s.past_states() > 0)
       throw InputError(d.source.prefix() + "tactile sensor '" + d.name +
                        "' has ks and low_pass or delay; expected one of them: friction does not "
                        "remember further back than the last state");
     s.elastic = true;
+    if (keep_anchors) s.memory_every = d.every;
     PadPoints points = points_of(d, m.bodies[std::size_t(s.body)].frame);
     const std::vector<double> tiles = order_points(s, points);
     m.point_storage.push_back(std::move(points.places));
@@ -124,7 +126,7 @@ void add_sensors(CompiledModel& m) {
     contact.body1 = s.body;
     bound(contact.points, contact.n_points, contact.middle, contact.extent);
     lay_out_tiles(m, contact, tiles);
-    m.taped_points += s.points();
+    m.taped_points += s.points() * (s.memory_every > 0 ? 2 : 1);
     for (const int target : s.targets) {
       const CompiledBody& body = m.bodies[std::size_t(target)];
       kernels::RememberingContact of;
@@ -155,6 +157,8 @@ kernels::Frame<double> ground_frame(const Vec3<double>& point, const Vec3<double
 }
 
 void compile_memories(CompiledModel& m) {
+  add_sensors(m, true);
+  m.kept_points = m.remembering_points;
   for (std::size_t k = 0; k < m.pairs.size(); ++k) {
     kernels::PairContact& pair = m.pairs[k];
     if (!remembers(pair.parameters)) continue;
@@ -165,7 +169,7 @@ void compile_memories(CompiledModel& m) {
     pair.memory = add(m, of);
   }
   add_grounds(m);
-  add_sensors(m);
+  add_sensors(m, false);
 }
 
 }  // namespace tangere

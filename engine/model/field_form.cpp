@@ -14,7 +14,7 @@ namespace {
 constexpr FieldForm kForms[] = {FieldForm::field, FieldForm::pressure, FieldForm::shear,
                                 FieldForm::sum,   FieldForm::ideal,    FieldForm::markers,
                                 FieldForm::flow};
-constexpr const char* kPlain[] = {"q", "v", "variables", "bodies"};
+constexpr const char* kPlain[] = {"q", "v", "variables", "bodies", "memory"};
 constexpr const char* kBody = "bodies.";  // followed by the name of one
 }  // namespace
 

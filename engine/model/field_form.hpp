@@ -57,7 +57,7 @@ std::string output_name(const std::string& sensor, FieldForm form);
 /// Returns the names of a scene's sensors, in file order.
 std::vector<std::string> sensor_names(const Scene& scene);
 /// Whether a name is that of an output which is not read of a sensor: q, v, variables (places of
-/// end effectors) or bodies (their poses and twists).
+/// end effectors), bodies (their poses and twists) or memory (what friction remembers).
 bool is_plain_output(const std::string& name);
 /// Returns the reading of this name; none where no sensor has it.
 std::optional<FieldOutput> find_output(std::span<const std::string> sensors,

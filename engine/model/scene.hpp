@@ -181,6 +181,9 @@ struct TactileDescription {
   RectArray array;
   std::vector<TactilePoint> points;  ///< a curved pad, in field order; empty: `array` is used
   int every = 0;                     ///< read every k-th step; 0: not given, the caller chooses
+  /// Whether what its friction remembers advances at steps that are multiples of `every` alone,
+  /// which is given then, and not at every step.
+  bool remembers_readings = false;
   std::optional<int> pressure_sign;  ///< +1 or -1; found from the geometry when not given
   Source source;
   SensorImperfections imperfections{};          ///< of its readings; none to begin with

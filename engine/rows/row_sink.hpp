@@ -7,6 +7,7 @@
 #include <span>
 
 #include "engine/model/field_form.hpp"
+#include "engine/step/shear_memory.hpp"
 
 namespace tangere {
 
@@ -64,6 +65,12 @@ struct AuditRow {
   std::span<const double> passed;
 };
 
+/// What friction remembers at row t of a trajectory, for all environments.
+struct MemoryRow {
+  std::int64_t step;                    ///< t
+  std::span<const ShearMemory> memory;  ///< (E)
+};
+
 /// Receives rows in ascending order. A sink that cannot store throws IoError; the rollout stops and
 /// passes it on.
 class RowSink {
@@ -74,6 +81,7 @@ class RowSink {
   virtual void write(const TactileRow& row) = 0;
   virtual void write(const ActionRow&) {}  ///< tasks only
   virtual void write(const AuditRow&) {}   ///< only if it was asked for
+  virtual void write(const MemoryRow&) {}  ///< only if it was asked for
 };
 
 }  // namespace tangere

@@ -3,7 +3,7 @@
 // taken at that state.
 #include "engine/sense/elastic_field.hpp"
 
-#include "engine/step/remembering_lane.hpp"
+#include "engine/step/kept_anchors.hpp"
 
 namespace tangere {
 
@@ -21,6 +21,7 @@ ElasticField::ElasticField(const Model& model) : model_(model), felt_(compiled(m
   remembered_.resize(3 * most);
   s_.resize(4 * most);
   force_.resize(3 * most);
+  if (compiled(model).kept_points > 0) anchors_.resize(6 * most);
   if (most > 0) shares_.reserve(compiled(model).bodies.size());
 }
 
@@ -43,9 +44,13 @@ void ElasticField::for_each_touched(const PadReader& reader, const Batch& batch,
         });
     const RememberingPoints points = felt_.find(m.sensors[std::size_t(sensor)], table, touch);
     if (points.count == 0) continue;
-    look_up(memory, of, felt_.index(), points.count, points.stride, remembered_.data(), next);
-    std::copy_n(remembered_.data(), 3 * points.stride, points.anchors + 3 * points.stride);
-    table.recall(touch, points);
+    if (m.memory_every(of) > 0) {
+      set_anchors(table, touch, memory, felt_.index(), points, felt_.scratch());
+    } else {
+      look_up(memory, of, felt_.index(), points.count, points.stride, remembered_.data(), next);
+      std::copy_n(remembered_.data(), 3 * points.stride, points.anchors + 3 * points.stride);
+      table.recall(touch, points);
+    }
     f(of, touch, points);
   }
 }
@@ -91,12 +96,25 @@ std::span<const ElasticField::Share> ElasticField::pull_back(const PadReader& re
               force_[std::size_t(i * points.stride + k)] += axes[3 * c + i] * from[c];
         }
         kernels::MemoryCotangent sums{};
-        kernels::active_kernels().pull_back_memory({&touch, &touch, points, remembered_.data(),
-                                                    nullptr, force_.data(), nullptr, s_.data(),
-                                                    &sums});
+        kernels::MemoryPullback pullback = {&touch,  &touch,        points,  remembered_.data(),
+                                            nullptr, force_.data(), nullptr, s_.data(),
+                                            &sums};
+        const bool keeps = compiled(model_).memory_every(of) > 0;
+        if (keeps) {
+          std::fill(remembered_.begin(), remembered_.end(), 0.0);
+          std::fill(anchors_.begin(), anchors_.end(), 0.0);
+          pullback.kept = felt_.scratch() + 6 * points.stride;
+          pullback.anchor_out = anchors_.data();
+        }
+        kernels::active_kernels().pull_back_memory(pullback);
         sums.end.displacement += sums.start;
         shares_.push_back({&of, sums.end});
-        add_to_entries(batch.memory(environment), of, felt_.index(), points, s_.data(), memory);
+        if (keeps) {
+          add_to_anchors(batch.memory(environment), of, felt_.index(), points, anchors_.data(),
+                         memory);
+        } else {
+          add_to_entries(batch.memory(environment), of, felt_.index(), points, s_.data(), memory);
+        }
       });
   return shares_;
 }

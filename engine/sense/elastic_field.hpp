@@ -39,6 +39,7 @@ class ElasticField {
   FeltPoints felt_;
   std::vector<Share> shares_;
   AlignedVector<double> remembered_, s_, force_;  // (3, stride), (4, stride), (3, stride)
+  AlignedVector<double> anchors_;                 // (6, stride)
 };
 
 }  // namespace tangere

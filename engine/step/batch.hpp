@@ -90,6 +90,9 @@ class Batch {
   [[nodiscard]] const ShearMemory& memory(int environment) const {
     return memory_[std::size_t(environment)];
   }
+  [[nodiscard]] std::span<const ShearMemory> memories() const {
+    return {memory_.data(), std::size_t(environments_)};
+  }
   /// Sets it, for a run that goes on from a stored state. Throws InputError unless the points rise
   /// and the scene has them.
   void set_memory(int environment, std::span<const ShearEntry> memory);

@@ -30,6 +30,7 @@ FeltPoints::FeltPoints(const CompiledModel& m) {
   anchors_.resize(kAnchorNumbers * stride);
   factors_.resize(kPointCoefficients * stride);
   index_.resize(stride);
+  scratch_.resize(kKeptNumbers * stride);
 }
 
 kernels::RememberingPoints FeltPoints::find(const CompiledSensor& sensor,

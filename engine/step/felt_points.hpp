@@ -21,9 +21,12 @@ class FeltPoints {
                                   const kernels::RememberingTouch& touch);
   /// Numbers of the points in their contact, rising.
   [[nodiscard]] const int* index() const { return index_.data(); }
+  /// Scratch of kKeptNumbers rows as long as those of the list.
+  [[nodiscard]] double* scratch() { return scratch_.data(); }
+  static constexpr int kKeptNumbers = 7;
 
  private:
-  AlignedVector<double> places_, anchors_, factors_;
+  AlignedVector<double> places_, anchors_, factors_, scratch_;
   std::vector<int> index_;
 };
 

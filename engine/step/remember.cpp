@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "engine/step/remembering_lane.hpp"
+#include "engine/step/kept_anchors.hpp"
 
 namespace tangere {
 
@@ -128,6 +128,34 @@ void advance_memory(const CompiledModel& m, const kernels::KernelTable& table, B
   }
 }
 
+template <int L>
+void advance_readings(const CompiledModel& m, const kernels::KernelTable& table,
+                      BasicWorkspace<L>& w, std::span<const ReadingLane> lanes) {
+  MemoryLanes<L>& of_lanes = w.remembered;
+  bool found = false;
+  for (int l = 0; l < L; ++l) {
+    const ReadingLane& lane = lanes[std::size_t(l)];
+    const auto due = [&](const RememberingContact& of) { return is_due(m, of, lane.steps); };
+    if (std::none_of(m.memories.begin(), m.memories.end(), due)) continue;
+    if (!found) find_touches(m, table, w, w.q0, w.v0, of_lanes.end, of_lanes.end_touches);
+    found = true;
+    ShearMemory &now = *lane.memory, &after = of_lanes.after[std::size_t(l)];
+    after.clear();
+    for (const RememberingContact& of : m.memories) {
+      if (m.memory_every(of) == 0) break;  // those that keep anchors come first
+      if (due(of)) {
+        advance_anchors(m, table, touch_of(m, w, of, of_lanes.end_touches, l), now, of_lanes.felt,
+                        after);
+      } else {
+        const auto kept = entries_of(now, m, of);
+        after.insert(after.end(), kept.begin(), kept.end());
+      }
+    }
+    after.insert(after.end(), now.begin() + kept_entries(m, now), now.end());
+    now = after;
+  }
+}
+
 template void begin_memory(const CompiledModel&, const kernels::KernelTable&, Workspace&);
 template void begin_memory(const CompiledModel&, const kernels::KernelTable&, SingleWorkspace&);
 template void recall_list(const CompiledModel&, const kernels::KernelTable&, Workspace&, int, int);
@@ -137,5 +165,9 @@ template void advance_memory(const CompiledModel&, const kernels::KernelTable&, 
                              LaneBits);
 template void advance_memory(const CompiledModel&, const kernels::KernelTable&, SingleWorkspace&,
                              LaneBits);
+template void advance_readings(const CompiledModel&, const kernels::KernelTable&, Workspace&,
+                               std::span<const ReadingLane>);
+template void advance_readings(const CompiledModel&, const kernels::KernelTable&, SingleWorkspace&,
+                               std::span<const ReadingLane>);
 
 }  // namespace tangere

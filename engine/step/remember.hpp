@@ -3,6 +3,8 @@
 // made, the memory after it when it has found its root.
 #pragma once
 
+#include <span>
+
 #include "engine/step/workspace.hpp"
 
 namespace tangere {
@@ -21,5 +23,15 @@ void recall_list(const CompiledModel& model, const kernels::KernelTable& table,
 template <int L>
 void advance_memory(const CompiledModel& model, const kernels::KernelTable& table,
                     BasicWorkspace<L>& w, LaneBits lanes);
+
+/// A lane whose step is done, at q0, v0.
+struct ReadingLane {
+  std::int64_t steps = -1;        ///< of its episode until then; -1: it took none
+  ShearMemory* memory = nullptr;  ///< all that it remembers
+};
+/// Advances the memory of sensors that are due to be read. `lanes`: (L).
+template <int L>
+void advance_readings(const CompiledModel& model, const kernels::KernelTable& table,
+                      BasicWorkspace<L>& w, std::span<const ReadingLane> lanes);
 
 }  // namespace tangere

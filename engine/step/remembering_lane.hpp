@@ -76,14 +76,21 @@ kernels::RememberingTouch touch_of(const CompiledModel& m, const BasicWorkspace<
   return t;
 }
 
+/// Points among all that remember.
+struct PointRange {
+  int first, count;
+  PointRange(int begin, int number) : first(begin), count(number) {}
+  PointRange(const kernels::RememberingContact& of)  // NOLINT: a contact's own
+      : first(of.first), count(of.contact.n_points) {}
+};
+
 /// Writes (3, stride) numbers of points, up to the end of the last vector: those of the entries
 /// that they have in a memory, else zeros. `index`: number of each point in its contact, rising;
 /// null: all points in order. `number`(entry, c): component c of an entry. `next`: any place in the
 /// memory; contacts are found soonest one after the other. It moves on to the end of this one.
 template <class Number>
-void look_up(std::span<const ShearEntry> memory, const kernels::RememberingContact& of,
-             const int* index, int count, int stride, const Number& number, double* out,
-             std::size_t& next) {
+void look_up(std::span<const ShearEntry> memory, const PointRange& of, const int* index, int count,
+             int stride, const Number& number, double* out, std::size_t& next) {
   const std::size_t end =
       std::size_t((count + kernels::kGroup - 1) / kernels::kGroup) * std::size_t(kernels::kGroup);
   for (int c = 0; c < 3; ++c) std::fill_n(out + c * stride, end, 0.0);
@@ -91,7 +98,7 @@ void look_up(std::span<const ShearEntry> memory, const kernels::RememberingConta
   while (next < memory.size() && memory[next].point < of.first) ++next;
   for (int k = 0; next < memory.size(); ++next) {
     const int point = memory[next].point - of.first;
-    if (point >= of.contact.n_points) return;
+    if (point >= of.count) return;
     if (index == nullptr) {
       k = point;
     } else {
@@ -102,8 +109,8 @@ void look_up(std::span<const ShearEntry> memory, const kernels::RememberingConta
   }
 }
 /// Writes what is remembered of points.
-inline void look_up(std::span<const ShearEntry> memory, const kernels::RememberingContact& of,
-                    const int* index, int count, int stride, double* out, std::size_t& next) {
+inline void look_up(std::span<const ShearEntry> memory, const PointRange& of, const int* index,
+                    int count, int stride, double* out, std::size_t& next) {
   look_up(
       memory, of, index, count, stride,
       [&](std::size_t entry, int c) { return memory[entry].s[c]; }, out, next);
@@ -111,10 +118,9 @@ inline void look_up(std::span<const ShearEntry> memory, const kernels::Rememberi
 
 /// Adds (3, stride) numbers of points to those of their entries, three each. Points without an
 /// entry are left out.
-inline void add_to_entries(std::span<const ShearEntry> memory,
-                           const kernels::RememberingContact& of, const int* index,
-                           const kernels::RememberingPoints& points, const double* numbers,
-                           std::span<double> to) {
+inline void add_to_entries(std::span<const ShearEntry> memory, const PointRange& of,
+                           const int* index, const kernels::RememberingPoints& points,
+                           const double* numbers, std::span<double> to) {
   std::size_t at = 0;
   for (int k = 0; k < points.count; ++k) {
     const int point = of.first + (index == nullptr ? k : index[k]);
@@ -138,7 +144,7 @@ kernels::RememberingPoints listed(const typename kernels::Stage<L>::List& list, 
 template <int L, class F>
 void for_each_pair(const CompiledModel& m, BasicWorkspace<L>& w, int lane, const F& f) {
   for (const kernels::RememberingContact& of : m.memories) {
-    if (of.pair < 0) return;  // pairs come first
+    if (of.pair < 0) continue;
     const auto& list = w.lists[std::size_t(of.pair)];
     if (list.own_count[lane] > 0) f(of, list.own_index + list.stride * lane, listed<L>(list, lane));
   }
@@ -161,14 +167,14 @@ void for_each_contact(const CompiledModel& m, BasicWorkspace<L>& w, int lane, co
 }
 
 /// Calls f as for_each_contact() does for the points of elastic sensors that touch where `end`
-/// says. The anchors are those of w.remembered.now.
+/// says. The anchors are those of w.remembered.now. Sensors that keep anchors are left out.
 template <int L, class F>
 void for_each_felt(const CompiledModel& m, const kernels::KernelTable& table, BasicWorkspace<L>& w,
                    const AlignedVector<kernels::LinkPose<kernels::Row<L>>>& end, int lane,
                    const F& f) {
   FeltPoints& felt = w.remembered.felt;
   for (const kernels::RememberingContact& of : m.memories) {
-    if (of.sensor < 0) continue;
+    if (of.sensor < 0 || m.memory_every(of) > 0) continue;
     const kernels::RememberingPoints points =
         felt.find(m.sensors[std::size_t(of.sensor)], table, touch_of(m, w, of, end, lane));
     if (points.count == 0) continue;

@@ -10,7 +10,9 @@
 
 #include "engine/base/as_size.hpp"
 #include "engine/step/awake_parts.hpp"
+#include "engine/step/kept_anchors.hpp"
 #include "engine/step/motor_force.hpp"
+#include "engine/step/remember.hpp"
 #include "engine/step/sleep.hpp"
 #include "engine/step/step_settings.hpp"
 #include "engine/step/tape.hpp"
@@ -146,8 +148,11 @@ struct Stepper::Impl {
     gather(w.q_before, m.layout.previous_q, stepped.q);
     gather(w.v_before, m.layout.previous_v, stepped.v);
     if (!m.memories.empty())
-      for (int l = 0; l < L; ++l)
-        w.remembered.now[std::size_t(l)] = batch.memory_[std::size_t(g.first + lane + l)];
+      for (int l = 0; l < L; ++l) {
+        const ShearMemory& memory = batch.memory_[std::size_t(g.first + lane + l)];
+        w.remembered.now[std::size_t(l)].assign(memory.begin() + kept_entries(m, memory),
+                                                memory.end());
+      }
     w.stage.block = g.rows + lane;
     w.stage.group = 0;
     const LaneBits live = g.live >> lane;
@@ -163,6 +168,7 @@ struct Stepper::Impl {
     LaneBits again = 0;
     if (sleeping) again = wake_touched(batch, stepped, w, g, lane, live, report);
     LaneBits moved = 0;
+    std::array<ReadingLane, L> reading;
     for (int l = 0; l < L; ++l) {
       if (!has(live & ~again, l)) continue;
       const std::size_t e = std::size_t(g.first + lane + l);
@@ -172,11 +178,18 @@ struct Stepper::Impl {
       if (failed(report.status[l])) continue;
       if (m.layout.past_states > 0) remember(m.layout, g.rows + lane + l, batch.steps_[e]);
       ++batch.steps_[e];
-      if (!m.memories.empty()) batch.memory_[e] = w.remembered.now[std::size_t(l)];
+      if (!m.memories.empty()) {
+        ShearMemory& memory = batch.memory_[e];
+        const ShearMemory& now = w.remembered.now[std::size_t(l)];
+        memory.resize(std::size_t(kept_entries(m, memory)));
+        memory.insert(memory.end(), now.begin(), now.end());
+        reading[std::size_t(l)] = {batch.steps_[e], &memory};
+      }
       // One step back is too long for BDF2's history where a step had to be cut.
       batch.has_history_[e] = settings.accuracy > 0 ? 0 : 1;
       moved |= 1U << l;
     }
+    if (m.kept_points > 0) advance_readings(m, kernels::active_kernels(), w, reading);
     const auto shift = [&](int now, int before, const Row<L>* from, std::span<const int> of) {
       for (std::size_t i = 0; i < of.size(); ++i) {
         double* const row = g.rows + of[i] * kBlock + lane;

@@ -213,7 +213,7 @@ void read_defaults(const SceneNode& node) {
       {"body", {"density", "scale", "rgba"}},
       {"general_primitive_contact", with_coefficients({"render", "law", "ramp"})},
       {"ground_contact", with_coefficients({"render", "law", "ramp"})},
-      {"tactile", with_coefficients({"render", "law", "every"})},
+      {"tactile", with_coefficients({"render", "law", "every", "memory"})},
       {"motor", {"P", "D", "ctrl_range", "timing"}},
       {"endeffector", {"radius", "rgba"}}};
   std::vector<std::string> names;

@@ -33,7 +33,7 @@ Names attributes_of(int type) {
 
 void check_attributes(const SceneNode& node, int type) {
   Names used = with_coefficients(
-            {"name", "body", "type", "law", "every", "pressure_sign", "feedback"}),
+            {"name", "body", "type", "law", "every", "pressure_sign", "feedback", "memory"}),
         idle;
   const Names own = attributes_of(type);
   used.insert(used.end(), own.begin(), own.end());
@@ -261,6 +261,10 @@ void read_sensors(Scene& scene, const SceneNode& section) {
     d.law = kTactileLaws[node.choice("law", {"clamped", "paper"}, 0)];
     d.coefficients = read_coefficients(node, d.law);
     d.every = node.integer("every", 1, 1000000000, 0);
+    d.remembers_readings = node.choice("memory", {"step", "read"}, 0) == 1;
+    if (d.remembers_readings && d.every == 0)
+      node.fail(
+          "memory=\"read\" without every; expected both: memory advances every so many steps");
     if (node.has("pressure_sign")) {
       const double sign = node.number("pressure_sign");
       if (sign != 1 && sign != -1)

@@ -95,6 +95,8 @@ TrajectoryLayout layout_from(const Batch& batch, const Stepper& stepper,
   layout.of_end_effectors = run.of_end_effectors;
   if (!run.end_effectors) layout.end_effector_names.clear();
   layout.audit = run.audit;
+  if (run.memory) layout.memory = memory_points(model);
+  layout.of_memory = run.of_memory;
   for (std::size_t i = 0; i < model.sensors().size(); ++i)
     layout.sensors.push_back(
         sensor_layout(model.sensors()[i], scene.sensors[i], run.tactile_intervals[i]));

@@ -19,9 +19,10 @@ struct RunDescription : RunOrigin {
   std::vector<int> tactile_intervals;  ///< K in force, one per sensor
   /// Recorded; none: the field of every sensor.
   std::optional<std::vector<FieldOutput>> fields;
-  bool bodies = true, end_effectors = true, audit = false;         ///< recorded
-  OutputTimes states = {}, of_bodies = {}, of_end_effectors = {};  ///< as in TrajectoryLayout
-  std::vector<int> chosen_bodies = {};                             ///< none: every body
+  bool bodies = true, end_effectors = true, audit = false, memory = false;  ///< recorded
+  /// As in TrajectoryLayout.
+  OutputTimes states = {}, of_bodies = {}, of_end_effectors = {}, of_memory = {};
+  std::vector<int> chosen_bodies = {};  ///< none: every body
   std::string command_line;
   std::string policy;
 };

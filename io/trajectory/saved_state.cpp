@@ -6,7 +6,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <functional>
+#include <cmath>
 #include <limits>
 #include <numeric>
 #include <span>
@@ -14,6 +14,7 @@
 
 #include "engine/base/error.hpp"
 #include "io/hdf5/h5.hpp"
+#include "io/trajectory/memory_rows.hpp"
 
 namespace tangere {
 namespace {
@@ -66,6 +67,27 @@ void check_names(const SavedState& from, const char* what, const std::vector<std
                                    from.path, i, what, names[i], expected[i]));
 }
 
+/// Throws InputError unless the points of a file are those of the scene.
+void check_points(const SavedState& from, const MemoryPoints& points) {
+  constexpr double kSamePlace = 1e-9;  // [m]
+  const std::vector<MemoryContact>& saved = from.memory->contacts;
+  if (saved.size() != points.contacts.size())
+    throw InputError(fmt::format("{}: {} contacts remember; in the scene {} do", from.path,
+                                 saved.size(), points.contacts.size()));
+  for (std::size_t c = 0; c < saved.size(); ++c) {
+    const MemoryContact &one = saved[c], &other = points.contacts[c];
+    if (one.name != other.name || one.places.size() != other.places.size())
+      throw InputError(fmt::format("{}: '{}' remembers, with {} points; in the scene '{}', with {}",
+                                   from.path, one.name, one.places.size(), other.name,
+                                   other.places.size()));
+    for (std::size_t k = 0; k < one.places.size(); ++k)
+      for (std::size_t i = 0; i < 3; ++i)
+        if (!(std::abs(one.places[k][i] - other.places[k][i]) <= kSamePlace))
+          throw InputError(fmt::format("{}: point {} of '{}' lies elsewhere than in the scene",
+                                       from.path, k, one.name));
+  }
+}
+
 /// Those of an open file of `steps` steps.
 std::vector<std::int64_t> steps_of_states(const h5::Id& file, std::int64_t steps) {
   std::vector<std::int64_t> list;
@@ -78,17 +100,7 @@ std::vector<std::int64_t> steps_of_states(const h5::Id& file, std::int64_t steps
     std::iota(list.begin(), list.end(), std::int64_t{0});
     return list;
   }
-  const h5::Id dataset = h5::open_dataset(file, "step");
-  const h5::Dims dims = h5::dimensions(dataset);
-  const bool fits = dims.size() == 1 && dims[0] <= static_cast<hsize_t>(steps) + 1;
-  if (fits) list.resize(dims[0]);
-  if (!list.empty()) h5::read_box<std::int64_t>(dataset, {0}, {dims[0]}, list.data());
-  const bool ascends =
-      std::adjacent_find(list.begin(), list.end(), std::greater_equal<>()) == list.end();
-  if (!fits || !ascends || (!list.empty() && (list.front() < 0 || list.back() > steps)))
-    throw IoError(fmt::format("{}: expected ascending steps from 0 to {}: the file is damaged",
-                              h5::place_of(dataset), steps));
-  return list;
+  return read_steps(h5::open_dataset(file, "step"), steps);
 }
 
 }  // namespace
@@ -151,6 +163,10 @@ SavedState read_state(const std::string& path, std::optional<std::int64_t> row) 
     state.previous_q = read_row(q, at - 1);
     state.previous_v = read_row(v, at - 1);
   }
+  state.memory = read_memory(file, steps, state.row, state.memory_rows);
+  if (state.memory && state.memory->environments.size() != environments)
+    throw IoError(fmt::format("{}: memory of {} environments, states of {}: the file is damaged",
+                              path, state.memory->environments.size(), environments));
   return state;
 }
 
@@ -162,6 +178,10 @@ void restore_state(const SavedState& from, bool continues, Batch& batch) {
     throw InputError(fmt::format("{} environments; {} has {}", batch.environments(), from.path,
                                  from.environments));
   const auto nq = static_cast<std::size_t>(model.nq()), nv = static_cast<std::size_t>(model.nv());
+  const MemoryPoints points = memory_points(model);
+  const bool remembers = model.remembers() && from.memory;
+  if (remembers) check_points(from, points);
+  std::vector<double> displacements(3 * points.count());
   for (int e = 0; e < batch.environments(); ++e) {
     const auto part = [e](const std::vector<double>& all, std::size_t width) {
       return std::span(all).subspan(static_cast<std::size_t>(e) * width, width);
@@ -173,6 +193,12 @@ void restore_state(const SavedState& from, bool continues, Batch& batch) {
       batch.set_state(e, part(from.q, nq), part(from.v, nv));
     }
     if (continues) batch.set_steps(e, from.step);  // the noise of sensors goes on
+    if (remembers) {
+      std::fill(displacements.begin(), displacements.end(), 0.0);
+      for (const ShearEntry& entry : from.memory->environments[static_cast<std::size_t>(e)])
+        std::copy_n(entry.s, 3, &displacements[3 * static_cast<std::size_t>(entry.point)]);
+      batch.set_memory(e, points.read(displacements));
+    }
     const StepStatus status = from.status[static_cast<std::size_t>(e)];
     if (failed(status)) batch.set_failed(e, status);
   }

@@ -8,8 +8,15 @@
 #include <vector>
 
 #include "engine/step/batch.hpp"
+#include "engine/step/memory_arrays.hpp"
 
 namespace tangere {
+
+/// What friction remembered at a row, as the file holds it.
+struct SavedMemory {
+  std::vector<MemoryContact> contacts;
+  std::vector<ShearMemory> environments;  ///< (E); points are rows of the file's arrays
+};
 
 /// Row K of a file: everything on which the following steps depend.
 struct SavedState {
@@ -28,6 +35,8 @@ struct SavedState {
   std::vector<std::string> v_names;            ///< (nv)
   std::vector<double> q, v;                    ///< (E, nq), (E, nv)
   std::vector<double> previous_q, previous_v;  ///< of row K - 1; empty if the file lacks it
+  std::optional<SavedMemory> memory;           ///< none: the file does not hold it at row K
+  std::vector<std::int64_t> memory_rows;       ///< those at which the file holds it
   std::vector<StepStatus> status;              ///< (E) of the step to this row; converged for row 0
 };
 
@@ -42,9 +51,9 @@ SavedState read_state(const std::string& path, std::optional<std::int64_t> row);
 
 /// Copies environment e of a saved state to environment e of a batch. With `continues` it also sets
 /// the row before, so that the next step continues BDF2, and the step, with which the noise of
-/// sensors goes on. An environment that had failed stays
-/// failed. Throws InputError when the coordinates do not match the model or the batch is larger
-/// than the file's.
+/// sensors goes on. What friction remembers is set where the file holds it. An environment that had
+/// failed stays failed. Throws InputError when the coordinates or the points that remember do not
+/// match the model, or the batch is larger than the file's.
 void restore_state(const SavedState& from, bool continues, Batch& batch);
 
 }  // namespace tangere

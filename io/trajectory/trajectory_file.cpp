@@ -6,18 +6,20 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <optional>
 #include <vector>
 
 #include "engine/derivative/tactile_point_numbers.hpp"
 #include "io/files/part_file.hpp"
 #include "io/hdf5/h5.hpp"
+#include "io/trajectory/memory_rows.hpp"
 #include "io/trajectory/sensor_description.hpp"
 
 namespace tangere {
 
 namespace {
 
-constexpr std::int64_t kFormatVersion = 3;
+constexpr std::int64_t kFormatVersion = 4;
 constexpr hsize_t kChunkBytes = 1U << 20;
 
 /// A chunk has whole rows, about a megabyte.
@@ -65,6 +67,7 @@ struct TrajectoryFile::Impl {
     h5::Id energy, momentum, step;
     std::int64_t written = 0;
   } audit;
+  std::optional<MemoryRows> memory;
   std::int64_t states = 0, steps = 0, actions = 0, poses = 0, positions = 0;
 
   Impl(const std::string& output, const TrajectoryLayout& l, bool overwrite)
@@ -77,6 +80,7 @@ struct TrajectoryFile::Impl {
     describe_run();
     create_trajectory();
     for (const FieldOutput of : layout.fields) create_reading(of);
+    if (layout.memory.count() > 0) memory.emplace(file, layout);
     create_randomized();
     create_task();
   }
@@ -448,6 +452,10 @@ void TrajectoryFile::write(const AuditRow& row) {
   ++f.audit.written;
 }
 
+void TrajectoryFile::write(const MemoryRow& row) {
+  if (impl_->memory) impl_->memory->write(row);
+}
+
 void TrajectoryFile::write(const GradientArrays& g) {
   const TrajectoryLayout& l = impl_->layout;
   const hsize_t E = static_cast<hsize_t>(l.environments), T = static_cast<hsize_t>(l.steps),
@@ -492,6 +500,7 @@ void TrajectoryFile::commit() {
   const bool at_start = l.states.given() && l.states.at(0, l.steps, l.first_step);
   expect("steps", f.steps, l.states.given() ? l.rows(l.states) - (at_start ? 1 : 0) : l.steps);
   expect("actions", f.actions, f.layout.task ? f.layout.task->horizon : 0);
+  expect("memories", f.memory ? f.memory->written() : 0, f.memory ? l.rows(l.of_memory) : 0);
   expect("audits", f.audit.written, f.layout.audit ? f.layout.steps + 1 : 0);
   for (std::size_t i = 0; i < f.readings.size(); ++i) {
     const SensorLayout& sensor = f.layout.sensors[std::size_t(f.layout.fields[i].sensor)];
@@ -503,6 +512,7 @@ void TrajectoryFile::commit() {
   f.readings.clear();
   f.task = {};
   f.audit = {};
+  f.memory.reset();
   h5::close_file(f.file, f.part.path());
   f.part.commit();
 }

@@ -37,6 +37,7 @@ class TrajectoryFile : public RowSink {
   void write(const TactileRow& row) override;
   void write(const ActionRow& row) override;
   void write(const AuditRow& row) override;
+  void write(const MemoryRow& row) override;
   /// Called at most once. Sizes are those of the layout.
   void write(const GradientArrays& gradients);
 

@@ -60,6 +60,7 @@ void add_small(const TrajectoryLayout& layout, Bytes& bytes) {
   }
   bytes.add({e, count_of(layout.randomized_names), 8});
   for (const FieldOutput& of : layout.fields) bytes.add({layout.frames(of), 8});
+  if (layout.memory.count() > 0) bytes.add({layout.rows(layout.of_memory), 8});
 }
 
 void check_sensor(const SensorLayout& sensor, std::set<std::string>& names) {
@@ -142,6 +143,7 @@ std::uint64_t TrajectoryLayout::bytes_without_tactile() const {
 std::uint64_t TrajectoryLayout::bytes() const {
   Bytes sum;
   add_small(*this, sum);
+  sum.add({rows(of_memory), environments, count_of(memory.row_of), 3 * 8});
   for (const FieldOutput of : fields) {
     const SensorLayout& sensor = sensors[static_cast<std::size_t>(of.sensor)];
     sum.add({frames(of), environments,

@@ -9,6 +9,7 @@
 
 #include "engine/model/field_form.hpp"
 #include "engine/model/scene.hpp"
+#include "engine/step/memory_arrays.hpp"
 #include "io/trajectory/run_facts.hpp"
 
 namespace tangere {
@@ -49,9 +50,10 @@ struct TrajectoryLayout : RunFacts {
   std::int64_t first_step = 0;          ///< steps before row 0, from runs that this one continues
   int environments = 1;                 ///< E
   std::vector<std::string> body_names;  ///< (nb) recorded, empty when no poses are
-  /// At which rows q and v, bodies and end effectors are recorded; none: at all. Where `states` are
-  /// given, there are no controls, and of the solver's numbers the status alone.
-  OutputTimes states = {}, of_bodies = {}, of_end_effectors = {};
+  MemoryPoints memory;                  ///< what friction remembers; no points: it is not recorded
+  /// At which rows q and v, bodies, end effectors and memory are recorded; none: at all. Where
+  /// `states` are given, there are no controls, and of the solver's numbers the status alone.
+  OutputTimes states = {}, of_bodies = {}, of_end_effectors = {}, of_memory = {};
   std::vector<SensorLayout> sensors;
   std::vector<FieldOutput> fields;  ///< what is recorded of them; without times: every K steps
   bool audit = false;               ///< the books are recorded

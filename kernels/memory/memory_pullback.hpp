@@ -109,12 +109,23 @@ void pull_back_memory(const MemoryPullback& m) {
       Vec3<N> f_bar = zero3<N>(), x_bar = zero3<N>(), s_bar = zero3<N>();
       if (m.s_bar != nullptr) s_bar = gate * load3<A>(m.s_bar, stride, k);
       if (m.f_bar != nullptr) f_bar = gate * load3<A>(m.f_bar, stride, k);
+      if (m.anchor_bar != nullptr) {
+        const Anchor<N> after = {gate * load3<A>(m.anchor_bar, stride, k),
+                                 gate * load3<A>(m.anchor_bar + 3 * stride, stride, k), zero};
+        s_bar += pull_back_recall(shape, end, xi, p.hold * p.s, after, of_end.displacement);
+      }
       if (m.slip != nullptr) {
         f_bar = (-gate) * (y.l + cross(y.a, p.x2));
         x_bar = cross(y.a, p.force);
       }
-      const Anchor<N> bar =
+      Anchor<N> bar =
           pull_back_elastic<Shape>(end, law, p, xi, anchor, f_bar, x_bar, s_bar, of_end);
+      if (m.kept != nullptr) {
+        const N kept = load_lanes<A>(m.kept + k), found = one - kept;
+        store3(kept * bar.b, m.anchor_out, stride, k);
+        store3(kept * bar.a, m.anchor_out + 3 * stride, stride, k);
+        bar = {found * bar.b, found * bar.a, found * bar.gap};
+      }
       const Vec3<N> s =
           pull_back_recall(shape, start, xi, load3<A>(m.remembered, stride, k), bar, of_start);
       store3(load3<A>(m.s_out, stride, k) + s, m.s_out, stride, k);

@@ -46,6 +46,10 @@ struct MemoryPullback {
   const Vec6<double>* slip;
   double* s_out;  ///< (3, stride) added to: of s where the step began
   MemoryCotangent* out;
+  // Of sensors that keep anchors from reading to reading; null elsewhere.
+  const double* anchor_bar = nullptr;  ///< (6, stride) of b and a that follow at the end
+  const double* kept = nullptr;  ///< (stride) 1: its anchor was kept, not found at `start`; else 0
+  double* anchor_out = nullptr;  ///< (6, stride) of b and a of kept anchors, at points that touch
 };
 
 }  // namespace tangere::kernels

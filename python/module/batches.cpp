@@ -23,6 +23,7 @@ using nb::literals::operator""_a;
 
 PythonBatch::PythonBatch(const Model& model, int environments, const BatchOptions& options)
     : batch_(model, environments, options.seed, options.first_episode),
+      memory_points_(memory_points(model)),
       precision_(options.precision),
       threads_(threads_of(options.threads)) {
   for (int i = 0; i < threads_of(options.threads); ++i)
@@ -254,6 +255,34 @@ void PythonBatch::set_state(const Argument<double>& q, const Argument<double>& v
     batch_.set_state(list[k], std::span(qs).subspan(k * nq, nq), std::span(vs).subspan(k * nv, nv));
 }
 
+Array<double> PythonBatch::memory() {
+  const InUse::Turn turn(in_use_);
+  const std::size_t n = memory_points_.count();
+  std::span<double> numbers;
+  auto array = new_array<double>({count(), n, 3}, numbers);
+  for (int e = 0; e < environments(); ++e)
+    memory_points_.write(batch_.memory(e), numbers.subspan(as_size(e) * 3 * n, 3 * n));
+  return array;
+}
+
+void PythonBatch::set_memory(const Argument<double>& memory, const nb::object& environments) {
+  const std::vector<int> list = listed(environments);
+  const std::size_t n = memory_points_.count();
+  std::vector<double> all;
+  if (memory.ndim() == 2) {
+    const std::span<const double> one = numbers_of(memory, {n, 3}, "memory");
+    for (std::size_t k = 0; k < list.size(); ++k) all.insert(all.end(), one.begin(), one.end());
+  } else {
+    const std::span<const double> each = numbers_of(memory, {list.size(), n, 3}, "memory");
+    all.assign(each.begin(), each.end());
+  }
+  if (!std::all_of(all.begin(), all.end(), [](double x) { return std::isfinite(x); }))
+    throw InputError("a memory that is not finite; expected numbers");
+  const InUse::Turn turn(in_use_);
+  for (std::size_t k = 0; k < list.size(); ++k)
+    batch_.set_memory(list[k], memory_points_.read(std::span(all).subspan(k * 3 * n, 3 * n)));
+}
+
 void PythonBatch::reset(const nb::object& environments,
                         const std::optional<std::vector<std::int64_t>>& episodes) {
   const std::vector<int> list = listed(environments);
@@ -357,10 +386,19 @@ void add_batches(nb::module_& m) {
            "shear, shear, normal force of each point [N]; 'pad.pressure' and 'pad.shear' parts of\n"
            "it; 'pad.sum' (E, 6): force [N] and where it presses [m], body axes. `out`: an array\n"
            "to fill instead of a new one.")
-      .def("set_state", &PythonBatch::set_state, "q"_a, "v"_a, "envs"_a = nb::none(),
-           "Sets states: `q` (n, nq) or (nq), `v` (n, nv) or (nv), of the environments listed in\n"
-           "`envs` (indices, or a mask (E)), or of all. Releases a failed environment and forgets\n"
-           "the state one step before.")
+      .def(
+          "set_state", &PythonBatch::set_state, "q"_a, "v"_a, "envs"_a = nb::none(),
+          "Sets states: `q` (n, nq) or (nq), `v` (n, nv) or (nv), of the environments listed in\n"
+          "`envs` (indices, or a mask (E)), or of all. Releases a failed environment; forgets the\n"
+          "state one step before and what friction remembers.")
+      .def_prop_ro("memory", &PythonBatch::memory, nb::rv_policy::automatic,
+                   "(E, points, 3) what friction with ks remembers: the elastic displacement of\n"
+                   "every point of Model.memory_points [m], in the axes of the moving frame that\n"
+                   "carries it; 0 where it has not moved or does not touch.")
+      .def("set_memory", &PythonBatch::set_memory, "memory"_a, "envs"_a = nb::none(),
+           "Sets what friction remembers, (n, points, 3) or (points, 3) as in `memory`, of the\n"
+           "environments listed in `envs` (indices, or a mask (E)), or of all. To go on from a\n"
+           "state, set it after set_state(). InputError: another shape, or not finite.")
       .def("reset", &PythonBatch::reset, "envs"_a = nb::none(), "episodes"_a = nb::none(),
            "Draws the starting states again, or those of other `episodes`.")
       .def("scene_controls", &PythonBatch::scene_controls, "steps"_a,

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "engine/sense/readout.hpp"
+#include "engine/step/memory_arrays.hpp"
 #include "engine/step/stepper.hpp"
 #include "python/module/arrays.hpp"
 #include "tasks/run/block_threads.hpp"
@@ -43,6 +44,8 @@ class PythonBatch {
   [[nodiscard]] Array<std::int8_t> status();
   void set_state(const Argument<double>& q, const Argument<double>& v,
                  const nb::object& environments);
+  [[nodiscard]] Array<double> memory();
+  void set_memory(const Argument<double>& memory, const nb::object& environments);
   void reset(const nb::object& environments,
              const std::optional<std::vector<std::int64_t>>& episodes);
   Array<double> scene_controls(std::int64_t steps);
@@ -73,6 +76,7 @@ class PythonBatch {
              const std::vector<std::string>& readings);
 
   Batch batch_;
+  MemoryPoints memory_points_;
   Precision precision_;
   std::vector<Worker> workers_;  // by the thread's index in the arena
   BlockThreads threads_;

@@ -7,6 +7,7 @@
 #include "engine/model/field_form.hpp"
 #include "engine/model/model.hpp"
 #include "engine/model/scheme.hpp"
+#include "engine/step/memory_arrays.hpp"
 #include "io/scene/scene_reader.hpp"
 #include "python/module/arrays.hpp"
 #include "python/module/module.hpp"
@@ -99,6 +100,7 @@ void add_model(nb::module_& m) {
           [](const Model& s) {
             const std::vector<std::string> sensors = sensor_names(s.scene());
             std::vector<std::string> names = output_names(sensors);
+            if (!s.remembers()) std::erase(names, "memory");
             std::erase_if(names, [&](const std::string& name) {
               const auto output = find_output(sensors, name);
               return output && !reason_against(s.scene(), *output).empty();
@@ -106,6 +108,24 @@ void add_model(nb::module_& m) {
             return names;
           },
           "Names of everything that can be read: q, v, …, pad, pad.pressure, pad.sum.")
+      .def_prop_ro(
+          "memory_points",
+          [](const Model& s) {
+            nb::dict contacts;
+            for (const MemoryContact& c : memory_points(s).contacts) {
+              std::span<double> numbers;
+              auto array = new_array<double>({c.places.size(), 3}, numbers);
+              for (std::size_t k = 0; k < c.places.size(); ++k)
+                std::copy_n(c.places[k].begin(), 3, &numbers[3 * k]);
+              contacts[c.name.c_str()] = array;
+            }
+            return contacts;
+          },
+          nb::for_getter(nb::sig("def memory_points(self) -> "
+                                 "dict[str, numpy.typing.NDArray[numpy.float64]]")),
+          "Points of every contact and sensor with ks, by name, in the order of Batch.memory:\n"
+          "(n, 3) their places [m], in the axes of the moving frame that carries them. Points of\n"
+          "a sensor have the order of its field, once for every body that it feels.")
       .def_prop_ro(
           "initial_q",
           [](const Model& s) { return array_of<double>({as_size(s.nq())}, s.initial_q()); },

@@ -214,3 +214,55 @@ def test_steps_are_cut_to_keep_an_accuracy(model):
     assert np.abs(cut.q - fine.q).max() < 0.05 * np.abs(whole.q - fine.q).max()
     with pytest.raises(tangere.InputError, match="below 1"):
         tangere.Batch(model, accuracy=2)
+
+
+def test_what_friction_remembers_goes_on():
+    model = tangere.Model(tangere.Scene(tangere.scenes()["box_pushing_elastic"]))
+    points = model.memory_points
+    assert {name: places.shape for name, places in points.items()} == {
+        "contact pad box": (66, 3),
+        "ground box": (8, 3),
+        "tactile pad turntable": (130, 3),
+        "tactile pad box_carriage": (130, 3),
+        "tactile pad box": (130, 3),
+    }
+    pad = points["tactile pad box"].reshape(13, 10, 3)  # in the order of the field
+    down = pad[1, 0] - pad[0, 0]  # rows go up the finger, 1.5 mm apart
+    np.testing.assert_allclose(down, [0, 0, 0.0015], atol=1e-12)
+    np.testing.assert_allclose(np.diff(pad, axis=0), np.full((12, 10, 3), down), atol=1e-12)
+    batch = tangere.Batch(model, envs=19, seed=3, precision="double")
+    assert batch.memory.shape == (19, 464, 3) and not batch.memory.any()
+    u = batch.scene_controls(120)
+    batch.run(u[:90])
+    middle = batch.q, batch.v, batch.memory
+    touched = middle[2][:, -130:].any(axis=-1)
+    assert touched.any(axis=1).all() and not touched.all()
+    felt = np.linalg.norm(batch.tactile("pad"), axis=-1).reshape(19, 130)
+    assert (felt[touched] > 0).all()
+    whole = batch.run(u[90:], fields=["pad"])
+    end = batch.memory
+    other = tangere.Batch(model, envs=19, seed=3, precision="double")
+    q, v, memory = middle
+    other.set_state(q, v)
+    other.set_memory(memory)
+    np.testing.assert_array_equal(other.memory, memory)
+    again = other.run(u[90:], fields=["pad"])  # BDF1 has no state before
+    np.testing.assert_array_equal(again.q, whole.q)
+    np.testing.assert_array_equal(again.fields["pad"], whole.fields["pad"])
+    np.testing.assert_array_equal(other.memory, end)
+    other.set_memory(memory[4], envs=[1, 2])
+    np.testing.assert_array_equal(other.memory, end[:1].tolist() + [memory[4]] * 2 + [*end[3:]])
+    other.reset(envs=[1])
+    assert not other.memory[1].any() and other.memory[2].any()
+    for wrong, message in [
+        (memory[:, :-1], r"memory of shape \(19, 463, 3\); expected \(19, 464, 3\)"),
+        (memory[0, :, :2], r"memory of shape \(464, 2\); expected \(464, 3\)"),
+        (np.full((464, 3), np.inf), "not finite"),
+    ]:
+        with pytest.raises(tangere.InputError, match=message):
+            other.set_memory(wrong)
+
+
+def test_a_scene_without_springs_has_no_memory(model):
+    assert model.memory_points == {} and "memory" not in model.readings
+    assert tangere.Batch(model, envs=2).memory.shape == (2, 0, 3)

@@ -85,6 +85,11 @@ class Recorder {
     sink_.write(row);
   }
 
+  void write_memory(std::int64_t step) {
+    if (options_.outputs.memory && is_due(options_.outputs.of_memory, step))
+      sink_.write(MemoryRow{step, batch_.memories()});
+  }
+
   /// Writes step `step`, which has been taken but not counted yet.
   void write_step(std::int64_t step, std::span<const double> u, const StepTally& tally) {
     const bool thinned = options_.outputs.states.given();
@@ -232,6 +237,7 @@ RolloutSummary run_rollout(Batch& batch, Stepper& stepper, EpisodeProgram& progr
     return static_cast<double>(options.first_step + row) * stepper.timestep();
   };
   recorder.write_state(0, time(0));
+  recorder.write_memory(0);
   if (audit) audit->start();
   for (std::int64_t t = 0; t < options.steps; ++t) {
     each_block([&](int b) { program.controls(t, batch, b, u); });
@@ -246,6 +252,7 @@ RolloutSummary run_rollout(Batch& batch, Stepper& stepper, EpisodeProgram& progr
       write_action(program, t, sink);
     }
     recorder.write_state(t + 1, time(t + 1));
+    recorder.write_memory(t + 1);
     for (Reading& reading : readings)
       if (reading.times.at(t + 1, options.steps, options.first_step))
         recorder.write_field(reading.output, reading.frame++, t + 1);

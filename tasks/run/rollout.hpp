@@ -22,10 +22,11 @@ namespace tangere {
 struct RolloutOutputs {
   std::optional<std::vector<FieldOutput>> fields;  ///< none: the field of every sensor
   bool bodies = true, end_effectors = true;
-  bool audit = false;  ///< the books of energy and momentum
-  /// When q and v, bodies and end effectors are taken; none: at every row. Where those of `states`
-  /// are given, controls leave no longer, and of steps those alone that end at a row of q.
-  OutputTimes states = {}, of_bodies = {}, of_end_effectors = {};
+  bool audit = false;   ///< the books of energy and momentum
+  bool memory = false;  ///< what friction remembers
+  /// When q and v, bodies, end effectors and memory are taken; none: at every row. Where those of
+  /// `states` are given, controls leave no longer, and of steps those alone that end at a row of q.
+  OutputTimes states = {}, of_bodies = {}, of_end_effectors = {}, of_memory = {};
   std::vector<int> chosen_bodies = {};  ///< ascending; none: every body
 };
 
@@ -52,12 +53,12 @@ struct RolloutSummary {
 using RolloutProgress = std::function<bool(std::int64_t done)>;
 
 /// Steps the batch and hands every row to the sink: row 0 of the state, then for each step its
-/// StepRow, the ActionRow if it ends a task's action, the StateRow after it, and the tactile rows
-/// due. A row of which nothing is wanted does not leave. A tactile sensor is read after steps K,
-/// 2K, …, so field k comes from row (k + 1) K of q. In a StepRow, an environment that failed
-/// earlier has 0 iterations and its last status and residual. `program` must have started every
-/// block; it takes all of them through a step in turn. Throws InputError when steps < 1, every < 0
-/// or first_step < 0. Passes on what the sink throws.
+/// StepRow, the ActionRow if it ends a task's action, the StateRow after it, the MemoryRow and the
+/// tactile rows due. A row of which nothing is wanted does not leave. A tactile sensor is read after
+/// steps K, 2K, …, so field k comes from row (k + 1) K of q. In a StepRow, an environment that
+/// failed earlier has 0 iterations and its last status and residual. `program` must have started
+/// every block; it takes all of them through a step in turn. Throws InputError when steps < 1,
+/// every < 0 or first_step < 0. Passes on what the sink throws.
 RolloutSummary run_rollout(Batch& batch, Stepper& stepper, EpisodeProgram& program,
                            const RolloutOptions& options, RowSink& sink,
                            const RolloutProgress& progress = {});

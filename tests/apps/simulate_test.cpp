@@ -7,8 +7,8 @@
 #include <nlohmann/json.hpp>
 
 #include "engine/model/model.hpp"
-#include "io/hdf5/h5.hpp"
 #include "io/scene/scene_reader.hpp"
+#include "tests/apps/arrays.hpp"
 #include "tests/apps/program.hpp"
 #include "tests/files.hpp"
 
@@ -29,20 +29,8 @@ json simulate(const Folder& folder, const std::string& scene_file, const Words& 
 
 const std::string kSmall = scene("rolling_ball_small.xml");
 
-struct Array {
-  h5::Dims dims;
-  std::vector<double> values;
-};
-
 Array read_array(const Folder& folder, const std::string& name) {
-  const h5::Id file = h5::open_file(folder.path("out.h5"));
-  const h5::Id dataset = h5::open_dataset(file, name);
-  Array array{h5::dimensions(dataset), {}};
-  std::size_t size = 1;
-  for (const hsize_t n : array.dims) size *= n;
-  array.values.resize(size);
-  h5::read_box(dataset, h5::Dims(array.dims.size(), 0), array.dims, array.values.data());
-  return array;
+  return array_of(folder.path("out.h5"), name);
 }
 
 /// The small scene without its <control>.
@@ -362,12 +350,6 @@ TEST(Simulate, FailedEnvironmentsAreListedAndTheFileIsWhole) {
   EXPECT_EQ(text.exit_code, 1);
   EXPECT_THAT(text.err, HasSubstr("environment 0 failed in step 0: "));
   EXPECT_THAT(text.err, HasSubstr("not listed: 5"));
-}
-
-/// Rows from `first` on of a dataset.
-std::vector<double> rows_from(const Array& array, std::size_t first) {
-  const std::size_t width = array.values.size() / array.dims[0];
-  return {array.values.begin() + static_cast<std::ptrdiff_t>(first * width), array.values.end()};
 }
 
 class Continued : public ::testing::TestWithParam<std::string> {};

@@ -165,19 +165,25 @@ TEST_P(ShearGradient, ContactsMatchTangents) {
   EXPECT_GE(compared, 3);
 }
 
+/// The plate of elastic_skin() is pressed about a millimetre into both balls, and moves.
+RunInput pressed_input(const Model& model) {
+  RunInput in;
+  in.q = testing::q_of(Batch(model, 1));
+  testing::Random random(3);
+  for (int i = 0; i < model.nv(); ++i) in.v.push_back(0.02 * random.normal());
+  for (int t = 0; t < kShearSteps; ++t) in.u.push_back({0.3, -0.2, 0.4});
+  in.q[2] -= 7.7e-3;
+  // Exactly on the ground, where they start, there is a kink.
+  in.q[5] -= 2e-4, in.q[12] -= 3e-4;
+  return in;
+}
+
 void expect_fields_match(const Scene& scene, Integrator scheme) {
   const Model model(scene);
   const StepperOptions options = testing::options(scheme, scene.timestep, 1e-13);
-  RunInput in;
-  {
-    Batch batch(model, 1);
-    in.q = testing::q_of(batch);
-    testing::Random random(3);
-    for (int i = 0; i < model.nv(); ++i) in.v.push_back(0.02 * random.normal());
-    for (int t = 0; t < kShearSteps; ++t) in.u.push_back({0.3, -0.2, 0.4});
-  }
-  in.q[2] -= 3e-4;  // the plate presses on both balls
+  const RunInput in = pressed_input(model);
   const FieldLoss loss(model, kShearSteps, 7);
+  EXPECT_GT(std::abs(field_loss_of_run(model, options, in, loss)), 1e-3) << "the skin touches";
   const RunGradient adjoint = adjoint_of_fields(model, options, in, loss);
   const auto along = [&](const std::function<void(RunInput&, double)>& change) {
     return testing::best_difference(
@@ -223,6 +229,70 @@ void expect_fields_match(const Scene& scene, Integrator scheme) {
 }
 
 TEST_P(ShearGradient, FieldsMatchDifferences) { expect_fields_match(elastic_skin(), GetParam()); }
+
+/// The same skin, whose memory advances after two, four and six steps, while the loss reads it after
+/// every step.
+Scene skin_that_waits() {
+  Scene s = elastic_skin();
+  for (auto& t : s.sensors) {
+    t.array.rows = 13, t.array.cols = 21;
+    t.every = 2, t.remembers_readings = true;
+  }
+  return s;
+}
+
+TEST_P(ShearGradient, WaitingSkinsMatchDifferences) {
+  expect_fields_match(skin_that_waits(), GetParam());
+}
+
+/// The change of all fields along random directions is that by the adjoint.
+TEST_P(ShearGradient, WaitingSkinsMatchTangents) {
+  const Model model(skin_that_waits());
+  const StepperOptions options = testing::options(GetParam(), model.timestep(), 1e-13);
+  const RunInput in = pressed_input(model);
+  const FieldLoss loss(model, kShearSteps, 7);
+  const RunGradient adjoint = adjoint_of_fields(model, options, in, loss);
+  testing::Random random(11);
+  const auto draw = [&](std::size_t count) {
+    std::vector<double> x(count);
+    for (double& a : x) a = random.normal();
+    return x;
+  };
+  const std::size_t nv = std::size_t(model.nv()), nu = std::size_t(model.nu());
+  StateTangent state{draw(nv), draw(nv), std::vector<double>(nv), std::vector<double>(nv)};
+  const NumberGradients numbers(model);
+  std::vector<double> change = draw(std::size_t(numbers.count()));
+  for (std::size_t k = 0; k < change.size(); ++k) change[k] *= numbers.infos()[k].value;
+  double reverse = 0, forward = 0;
+  for (std::size_t i = 0; i < nv; ++i)
+    reverse += adjoint.q[i] * state.q[i] + adjoint.v[i] * state.v[i];
+  for (std::size_t k = 0; k < change.size(); ++k) reverse += adjoint.parameters[k] * change[k];
+  Batch batch(model, 1);
+  batch.set_state(0, in.q, in.v);
+  std::vector<double> rows(std::size_t(parameter_rows(model)));
+  numbers.spread(change, batch, 0, rows);
+  Stepper stepper(model, options);
+  BlockTape tape(model, stepper.integrator(), kShearSteps);
+  tape.start(batch, 0);
+  for (const auto& u : in.u) stepper.step_block(batch, 0, u, &tape);
+  Tangent tangent(model, options);
+  for (int t = 0; t <= kShearSteps; ++t) {
+    for (std::size_t s = 0; s < model.sensors().size(); ++s) {
+      const std::span<const double> w = loss.of(std::size_t(t), s);
+      std::vector<double> field_dot(w.size());
+      tangent.field(batch, 0, 0, tape, t, static_cast<int>(s), rows, {}, state, field_dot);
+      for (std::size_t k = 0; k < w.size(); ++k) forward += w[k] * field_dot[k];
+    }
+    if (t == kShearSteps) break;
+    const std::vector<double> u_dot = draw(nu);
+    for (std::size_t k = 0; k < nu; ++k) reverse += adjoint.u[std::size_t(t) * nu + k] * u_dot[k];
+    tangent.step(batch, 0, 0, tape, t, in.u[std::size_t(t)], u_dot, rows, state);
+  }
+  std::size_t remembered = 0;
+  for (int t = 0; t <= kShearSteps; ++t) remembered += tape.memory(t, 0).size() / 2;
+  EXPECT_GT(remembered, 30U);
+  EXPECT_NEAR(reverse, forward, 1e-9 * (std::abs(forward) + adjoint.norm()));
+}
 
 INSTANTIATE_TEST_SUITE_P(Schemes, ShearGradient, ::testing::ValuesIn(testing::all_integrators()),
                          [](const auto& scheme) { return std::string(to_string(scheme.param)); });

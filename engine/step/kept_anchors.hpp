@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: Apache-2.0
+// Sensors whose memory advances only at steps at which they are due to be read (docs/shear.md).
+// They keep the anchors b and a of each point from one of these steps to the next, so no earlier
+// state is needed. A point without anchors begins unsheared where it is found.
+#pragma once
+
+#include "engine/step/remembering_lane.hpp"
+
+namespace tangere {
+
+/// Whether the memory of a contact advances after `steps` ≥ 0 steps of an episode.
+inline bool is_due(const CompiledModel& m, const kernels::RememberingContact& of,
+                   std::int64_t steps) {
+  const int every = m.memory_every(of);
+  return every > 0 && steps >= 0 && steps % every == 0;
+}
+
+/// Returns what is remembered of a contact's points.
+inline std::span<const ShearEntry> entries_of(std::span<const ShearEntry> memory,
+                                              const CompiledModel& m,
+                                              const kernels::RememberingContact& of) {
+  const auto from = [&](int point) {
+    return std::lower_bound(memory.begin(), memory.end(), point,
+                            [](const ShearEntry& e, int value) { return e.point < value; });
+  };
+  return {from(of.first), from(of.first + m.remembering(of))};
+}
+
+/// How many entries, the first ones, are of sensors that keep anchors.
+inline std::ptrdiff_t kept_entries(const CompiledModel& m, std::span<const ShearEntry> memory) {
+  return std::lower_bound(memory.begin(), memory.end(), m.kept_points,
+                          [](const ShearEntry& e, int value) { return e.point < value; }) -
+         memory.begin();
+}
+
+/// The points among all that remember of which b, and of which a, of a contact is kept.
+inline PointRange b_range(const kernels::RememberingContact& of) { return of; }
+inline PointRange a_range(const kernels::RememberingContact& of) {
+  return {of.first + of.contact.n_points, of.contact.n_points};
+}
+
+/// Writes two sets of three numbers of points, (6, stride): those of the entries of b, then of a.
+template <class Number>
+void look_up_anchors(std::span<const ShearEntry> memory, const kernels::RememberingContact& of,
+                     const int* index, const kernels::RememberingPoints& points,
+                     const Number& number, double* out) {
+  std::size_t next = 0;
+  look_up(memory, b_range(of), index, points.count, points.stride, number, out, next);
+  look_up(memory, a_range(of), index, points.count, points.stride, number, out + 3 * points.stride,
+          next);
+}
+
+/// Adds (6, stride) numbers of points to those of their entries of b and a.
+inline void add_to_anchors(std::span<const ShearEntry> memory,
+                           const kernels::RememberingContact& of, const int* index,
+                           const kernels::RememberingPoints& points, const double* numbers,
+                           std::span<double> to) {
+  add_to_entries(memory, b_range(of), index, points, numbers, to);
+  add_to_entries(memory, a_range(of), index, points, numbers + 3 * points.stride, to);
+}
+
+/// Sets the anchors of points: those that are kept, else those of an unsheared spring. `kept`: (kKeptNumbers, stride) scratch; its last row is 1 where an anchor is kept, else 0.
+inline void set_anchors(const kernels::KernelTable& table, const kernels::RememberingTouch& touch,
+                        std::span<const ShearEntry> memory, const int* index,
+                        const kernels::RememberingPoints& points, double* kept) {
+  const int stride = points.stride,
+            end = (points.count + kernels::kGroup - 1) / kernels::kGroup * kernels::kGroup;
+  for (int c = 3; c < 6; ++c) std::fill_n(points.anchors + c * stride, end, 0.0);
+  table.recall(touch, points);
+  look_up_anchors(
+      memory, *touch.of, index, points,
+      [&](std::size_t entry, int c) { return memory[entry].s[c]; }, kept);
+  double* const is_kept = kept + 6 * stride;
+  for (int k = 0; k < end; ++k) {
+    bool any = false;
+    for (int i = 0; i < 6; ++i) any = any || kept[i * stride + k] != 0;
+    is_kept[k] = any ? 1 : 0;
+    if (!any) continue;
+    for (int i = 0; i < 6; ++i) points.anchors[i * stride + k] = kept[i * stride + k];
+    points.anchors[6 * stride + k] = 0;
+  }
+}
+
+/// Appends the anchors after a step that ends at `touch`, from those before it.
+inline void advance_anchors(const CompiledModel& m, const kernels::KernelTable& table,
+                            const kernels::RememberingTouch& touch,
+                            std::span<const ShearEntry> before, FeltPoints& felt,
+                            ShearMemory& after) {
+  const kernels::RememberingContact& of = *touch.of;
+  const kernels::RememberingPoints points =
+      felt.find(m.sensors[std::size_t(of.sensor)], table, touch);
+  if (points.count == 0) return;
+  const int stride = points.stride;
+  set_anchors(table, touch, before, felt.index(), points, felt.scratch());
+  double* const s = felt.scratch();
+  table.advance(touch, points, s, nullptr);
+  for (int c = 0; c < 3; ++c)
+    std::copy_n(s + c * stride, points.count, points.anchors + (3 + c) * stride);
+  table.recall(touch, points);
+  for (int part = 0; part < 2; ++part)
+    for (int k = 0; k < points.count; ++k) {
+      if (!(s[3 * stride + k] > 0)) continue;
+      const double* anchor = points.anchors + 3 * part * stride + k;
+      after.push_back({of.first + part * of.contact.n_points + felt.index()[k],
+                       {anchor[0], anchor[stride], anchor[2 * stride]}});
+    }
+}
+
+}  // namespace tangere
