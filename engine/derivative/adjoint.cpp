@@ -184,7 +184,7 @@ struct Adjoint::Impl {
 
   /// Reverses what the step did to memories that were due at its end.
   template <int L>
-  void reverse_readings(Lanes<L>& x, const GroupStepInHand& g) {
+  void reverse_readings(Lanes<L>& x, const GroupStepContext& g) {
     gather(x.work.v1, g.tape.state(g.step + 1) + model.nq() * kBlock, model.nv(), g.first);
     std::array<TapedReading, L> readings;
     for (int l = 0; l < L; ++l) {
