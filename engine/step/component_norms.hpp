@@ -54,15 +54,13 @@ void worst_scaled_residuals(const CompiledModel& m, const BasicWorkspace<L>& w, 
         force[l] += f * f;
       }
     }
-    Row scaled;
-    for (int l = 0; l < L; ++l) {  // without branches: a vector
+    for (int l = 0; l < L; ++l) {
+      if (residual[l] <= w.floors[c][l]) continue;
       const double scale = std::sqrt(motion[l]) * s.c0_over_h[l] + gravity * std::sqrt(mass[l]) +
                            std::sqrt(force[l]);
-      scaled[l] = std::sqrt(residual[l]) / scale;
+      const double scaled = std::sqrt(residual[l]) / scale;
+      if (!(scaled <= out[l])) out[l] = std::isnan(out[l]) ? out[l] : scaled;
     }
-    for (int l = 0; l < L; ++l)
-      if (!(residual[l] <= w.floors[c][l]) && !(scaled[l] <= out[l]))
-        out[l] = std::isnan(out[l]) ? out[l] : scaled[l];
   }
 }
 

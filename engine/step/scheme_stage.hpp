@@ -22,24 +22,19 @@ void set_stage(const CompiledModel& m, const Scheme& scheme, int k, const kernel
   }
   for (int i = 0; i < m.nq; ++i) s.centre[i] = w.q0[i];
   if (row.r_before != 0) state_difference(m, w.q_before, w.q0, s.r);
-  for (int i = 0; i < m.nv; ++i) {  // lanes innermost and without branches: these are vectors
-    kernels::Row<L> by_x{}, by_v, v0 = w.v0[i];
-    if (row.r_before != 0)
-      for (int l = 0; l < L; ++l) by_x[l] = row.r_before * s.r[i][l];
-    for (int l = 0; l < L; ++l) by_v[l] = row.s_centre * v0[l];
-    if (row.s_before != 0)
-      for (int l = 0; l < L; ++l) by_v[l] += row.s_before * w.v_before[i][l];
-    for (int j = 0; j < k; ++j) {
-      const InnerWeight& inner = row.inner[std::size_t(j)];
-      for (int l = 0; l < L; ++l) {
-        by_x[l] += inner.r * w.x_inner[j * m.nv + i][l];
-        by_v[l] += inner.s * (w.v_inner[j * m.nv + i][l] - v0[l]);
+  for (int i = 0; i < m.nv; ++i)
+    for (int l = 0; l < L; ++l) {
+      double by_x = row.r_before == 0 ? 0 : row.r_before * s.r[i][l];
+      double by_v = row.s_centre * w.v0[i][l];
+      if (row.s_before != 0) by_v += row.s_before * w.v_before[i][l];
+      for (int j = 0; j < k; ++j) {
+        const InnerWeight& inner = row.inner[std::size_t(j)];
+        by_x += inner.r * w.x_inner[j * m.nv + i][l];
+        by_v += inner.s * (w.v_inner[j * m.nv + i][l] - w.v0[i][l]);
       }
+      s.r[i][l] = by_x;
+      s.s[i][l] = by_v / row.s_divisor;
     }
-    for (int l = 0; l < L; ++l) by_v[l] /= row.s_divisor;
-    s.r[i] = by_x;
-    s.s[i] = by_v;
-  }
 }
 
 /// Sets the first guess of x: from the stage before, moved with its velocity; for the first stage,
@@ -50,20 +45,17 @@ void guess_stage(const CompiledModel& m, const Scheme& scheme, int k, const kern
   kernels::Stage<L>& s = w.stage;
   const double end = scheme.stages[std::size_t(k)].end, more = scheme.extrapolation;
   const double share = k == 0 ? end : end - scheme.stages[std::size_t(k) - 1].end;
-  kernels::Row<L> way;
-  for (int l = 0; l < L; ++l) way[l] = share * h[l];
-  for (int i = 0; i < m.nv; ++i) {
-    kernels::Row<L> x = s.x[i];
-    if (k > 0) {
-      for (int l = 0; l < L; ++l) x[l] += way[l] * s.v[i][l];
-    } else if (more == 0) {
-      for (int l = 0; l < L; ++l) x[l] = way[l] * w.v0[i][l];
-    } else {
-      for (int l = 0; l < L; ++l)
-        x[l] = way[l] * ((1 + more) * w.v0[i][l] - more * w.v_before[i][l]);
+  for (int i = 0; i < m.nv; ++i)
+    for (int l = 0; l < L; ++l) {
+      const double way = share * h[l];
+      if (k > 0) {
+        s.x[i][l] += way * s.v[i][l];
+      } else if (more == 0) {
+        s.x[i][l] = way * w.v0[i][l];
+      } else {
+        s.x[i][l] = way * ((1 + more) * w.v0[i][l] - more * w.v_before[i][l]);
+      }
     }
-    s.x[i] = x;
-  }
 }
 
 }  // namespace tangere

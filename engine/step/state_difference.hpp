@@ -17,18 +17,15 @@ template <int L>
 void state_difference(const CompiledModel& m, const kernels::Row<L>* to,
                       const kernels::Row<L>* from, kernels::Row<L>* out) {
   for (const kernels::Link& link : m.links) {
-    if (link.kind != kernels::JointKind::spherical) {
-      for (int k = 0; k < kernels::dofs(link.kind); ++k) {
-        kernels::Row<L> x;
-        for (int l = 0; l < L; ++l) x[l] = to[link.q + k][l] - from[link.q + k][l];
-        out[link.v + k] = x;
-      }
-      continue;
-    }
     for (int l = 0; l < L; ++l) {
-      const kernels::Vec3<double> x =
-          rotation_log(conjugate(quat_at(from + link.q, l)) * quat_at(to + link.q, l));
-      out[link.v][l] = x.x, out[link.v + 1][l] = x.y, out[link.v + 2][l] = x.z;
+      if (link.kind == kernels::JointKind::spherical) {
+        const kernels::Vec3<double> x =
+            rotation_log(conjugate(quat_at(from + link.q, l)) * quat_at(to + link.q, l));
+        out[link.v][l] = x.x, out[link.v + 1][l] = x.y, out[link.v + 2][l] = x.z;
+      } else {
+        for (int k = 0; k < kernels::dofs(link.kind); ++k)
+          out[link.v + k][l] = to[link.q + k][l] - from[link.q + k][l];
+      }
     }
   }
 }

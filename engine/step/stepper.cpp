@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <bit>
-#include <cstring>
 #include <numeric>
 
 #include "engine/base/as_size.hpp"
@@ -141,7 +140,7 @@ struct Stepper::Impl {
     const CompiledModel& m = compiled(model);
     const auto gather = [&](Row<L>* to, int row, std::span<const int> of) {
       for (std::size_t i = 0; i < of.size(); ++i)
-        std::memcpy(to[i].lane, g.rows + (row + of[i]) * kBlock + lane, sizeof to[i].lane);
+        for (int l = 0; l < L; ++l) to[i][l] = g.rows[(row + of[i]) * kBlock + lane + l];
     };
     gather(w.q0, m.layout.q, stepped.q);
     gather(w.v0, m.layout.v, stepped.v);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Tests the forms of a field: pressure is the field without friction, shear its first components,
-// flow that over its largest length, a sum what plain loops add up to. What nobody asks for calls no kernel.
+// flow that over its largest length, a sum what plain loops add up to. What nobody asks for calls
+// no kernel.
 #include "engine/model/field_form.hpp"
 
 #include <gtest/gtest.h>
