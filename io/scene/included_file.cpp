@@ -16,14 +16,20 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::size_t kMostFiles = 1000;  // a few files that each name two others would never end
+constexpr int kDeepestFiles = 50;         // files in files
 
 bool is_scene(const std::string& root) { return root == "redmax" || root == "tangere"; }
 
 void refuse_rings(const SceneNode& include, const std::string& path) {
-  std::string way = path;
+  int depth = 0;
   for (const SceneContext* c = &include.context(); c != nullptr; c = c->includer) {
-    way = fmt::format("{} includes {}", c->file, way);
-    if (same_file(c->file, path)) include.fail("files that include each other: " + way);
+    if (++depth > kDeepestFiles)
+      include.fail(fmt::format("files in files, deeper than {}", kDeepestFiles));
+    if (!same_file(c->file, path)) continue;
+    std::string way = path;
+    for (const SceneContext* w = &include.context(); w != c->includer; w = w->includer)
+      way = fmt::format("{} includes {}", w->file, way);
+    include.fail("files that include each other: " + way);
   }
 }
 

@@ -113,6 +113,11 @@ TEST(SceneInclude, RingsAndFloodsAreRefused) {
   }
   flood.add("12.xml", metric_scene(""));
   EXPECT_THAT(flood.fault(), HasSubstr("more than 1000 files in one scene"));
+  SceneFiles chain;
+  for (int k = 0; k < 60; ++k)
+    chain.add(std::to_string(k) + ".xml",
+              metric_scene("<include file=\"" + std::to_string(k + 1) + ".xml\"/>"));
+  EXPECT_THAT(chain.fault(), HasSubstr("50.xml:3: <include>: files in files, deeper than 50"));
 }
 
 TEST(SceneInclude, AttributesGoToWhatIsIncluded) {
