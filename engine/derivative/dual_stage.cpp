@@ -248,6 +248,20 @@ struct DualStage::Impl {
     return {{b[0], b[1], b[2]}, {a[0], a[1], a[2]}, D(0.0)};
   }
 
+  /// Calls f(shape, touch, k, point) for every point of a sensor against one body.
+  template <class F>
+  void meet_felt(const kernels::RememberingContact& of,
+                 const std::vector<kernels::LinkPose<D>>& poses, const std::vector<D>& remembered,
+                 const F& f) const {
+    const kernels::LoadedTouch<D> t = touch(of, poses);
+    with_touched_shape(of, [&](const auto& shape) {
+      for (int k = 0; k < of.contact.n_points; ++k)
+        f(shape, t, k,
+          kernels::meet_elastic(shape, t, law_of(of, k, t), place(of, k),
+                                felt_anchor(shape, t, of, k, remembered)));
+    });
+  }
+
   [[nodiscard]] std::vector<kernels::LinkPose<D>> poses_at(const std::vector<D>& q,
                                                            const std::vector<D>& v) const {
     std::vector<D> zero(v.size(), D(0.0)), rates(v.size());
@@ -459,19 +473,13 @@ void DualStage::advance_readings(const std::vector<D>& q, const std::vector<D>& 
   const std::vector<kernels::LinkPose<D>> poses = i.poses_at(q, twist);
   for (const kernels::RememberingContact& of : i.m.memories) {
     if (!is_due(i.m, of, steps)) continue;
-    const kernels::LoadedTouch<D> t = i.touch(of, poses);
-    i.with_touched_shape(of, [&](const auto& shape) {
-      for (int k = 0; k < of.contact.n_points; ++k) {
-        const kernels::Vec3<D> xi = Impl::place(of, k);
-        const auto p = kernels::meet_elastic(shape, t, i.law_of(of, k, t), xi,
-                                             i.felt_anchor(shape, t, of, k, remembered));
-        kernels::Anchor<D> after = {kernels::zero3<D>(), kernels::zero3<D>(), D(0.0)};
-        if (p.d < D(0.0)) after = kernels::recalled(shape, t, xi, p.hold * p.s);
-        D *const b = &remembered[3 * std::size_t(of.first + k)], *const a =
-                                                                     b + 3 * of.contact.n_points;
-        b[0] = after.b.x, b[1] = after.b.y, b[2] = after.b.z;
-        a[0] = after.a.x, a[1] = after.a.y, a[2] = after.a.z;
-      }
+    i.meet_felt(of, poses, remembered, [&](const auto& shape, const auto& t, int k, const auto& p) {
+      kernels::Anchor<D> after = {kernels::zero3<D>(), kernels::zero3<D>(), D(0.0)};
+      if (p.d < D(0.0)) after = kernels::recalled(shape, t, Impl::place(of, k), p.hold * p.s);
+      D* const b = &remembered[3 * std::size_t(of.first + k)];
+      D* const a = b + 3 * of.contact.n_points;
+      b[0] = after.b.x, b[1] = after.b.y, b[2] = after.b.z;
+      a[0] = after.a.x, a[1] = after.a.y, a[2] = after.a.z;
     });
   }
 }
@@ -531,21 +539,15 @@ void DualStage::elastic_field(int sensor, const Coefficients<D>& law, std::span<
   const std::vector<kernels::LinkPose<D>> poses = i.poses_at(centre, r);
   for (const kernels::RememberingContact& of : i.m.memories) {
     if (of.sensor != sensor) continue;
-    const kernels::LoadedTouch<D> t = i.touch(of, poses);
-    i.with_touched_shape(of, [&](const auto& shape) {
-      for (int k = 0; k < of.contact.n_points; ++k) {
-        const kernels::Vec3<D> xi = Impl::place(of, k);
-        const auto p = kernels::meet_elastic(shape, t, i.law_of(of, k, t), xi,
-                                             i.felt_anchor(shape, t, of, k, remembered));
-        const D f[3] = {p.force.x, p.force.y, p.force.z};
-        const double* axes = &felt.point_axes[9 * std::size_t(k)];
-        const auto to = 3 * std::size_t(felt.in_field[std::size_t(k)]);
-        for (std::size_t c = 0; c < 3; ++c)
-          for (std::size_t e = 0; e < 3; ++e) {
-            if (!field.empty()) field[to + c] += axes[3 * c + e] * f[e].value;
-            field_dot[to + c] += axes[3 * c + e] * f[e].epsilon;
-          }
-      }
+    i.meet_felt(of, poses, remembered, [&](const auto&, const auto&, int k, const auto& p) {
+      const D f[3] = {p.force.x, p.force.y, p.force.z};
+      const double* axes = &felt.point_axes[9 * std::size_t(k)];
+      const auto to = 3 * std::size_t(felt.in_field[std::size_t(k)]);
+      for (std::size_t c = 0; c < 3; ++c)
+        for (std::size_t e = 0; e < 3; ++e) {
+          if (!field.empty()) field[to + c] += axes[3 * c + e] * f[e].value;
+          field_dot[to + c] += axes[3 * c + e] * f[e].epsilon;
+        }
     });
   }
 }

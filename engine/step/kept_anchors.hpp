@@ -59,7 +59,8 @@ inline void add_to_anchors(std::span<const ShearEntry> memory,
   add_to_entries(memory, a_range(of), index, points, numbers + 3 * points.stride, to);
 }
 
-/// Sets the anchors of points: those that are kept, else those of an unsheared spring. `kept`: (kKeptNumbers, stride) scratch; its last row is 1 where an anchor is kept, else 0.
+/// Sets the anchors of points: those that are kept, else those of an unsheared spring. `kept`:
+/// (kKeptNumbers, stride) scratch; its last row is 1 where an anchor is kept, else 0.
 inline void set_anchors(const kernels::KernelTable& table, const kernels::RememberingTouch& touch,
                         std::span<const ShearEntry> memory, const int* index,
                         const kernels::RememberingPoints& points, double* kept) {

@@ -54,11 +54,11 @@ using RolloutProgress = std::function<bool(std::int64_t done)>;
 
 /// Steps the batch and hands every row to the sink: row 0 of the state, then for each step its
 /// StepRow, the ActionRow if it ends a task's action, the StateRow after it, the MemoryRow and the
-/// tactile rows due. A row of which nothing is wanted does not leave. A tactile sensor is read after
-/// steps K, 2K, …, so field k comes from row (k + 1) K of q. In a StepRow, an environment that
-/// failed earlier has 0 iterations and its last status and residual. `program` must have started
-/// every block; it takes all of them through a step in turn. Throws InputError when steps < 1,
-/// every < 0 or first_step < 0. Passes on what the sink throws.
+/// tactile rows due. A row of which nothing is wanted does not leave. A tactile sensor is read
+/// after steps K, 2K, …, so field k comes from row (k + 1) K of q. In a StepRow, an environment
+/// that failed earlier has 0 iterations and its last status and residual. `program` must have
+/// started every block; it takes all of them through a step in turn. Throws InputError when steps <
+/// 1, every < 0 or first_step < 0. Passes on what the sink throws.
 RolloutSummary run_rollout(Batch& batch, Stepper& stepper, EpisodeProgram& program,
                            const RolloutOptions& options, RowSink& sink,
                            const RolloutProgress& progress = {});

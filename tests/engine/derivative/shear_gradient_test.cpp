@@ -230,7 +230,7 @@ void expect_fields_match(const Scene& scene, Integrator scheme) {
 
 TEST_P(ShearGradient, FieldsMatchDifferences) { expect_fields_match(elastic_skin(), GetParam()); }
 
-/// The same skin, whose memory advances after two, four and six steps, while the loss reads it after
+/// The same skin, whose memory advances after two, four and six steps. The loss reads it after
 /// every step.
 Scene skin_that_waits() {
   Scene s = elastic_skin();

@@ -108,6 +108,16 @@ TEST(Feedback, TouchesEveryBodyThatMovesAgainstTheSensor) {
   EXPECT_EQ(model.contacts()[0].points, 441);
 }
 
+TEST(Sensors, ThatRememberReadingsSayHowOftenTheyAreRead) {
+  const std::string waits = with("feedback=\"true\"", "ks=\"90\" memory=\"read\"", kTable);
+  EXPECT_THAT(feedback_refusal(waits),
+              AllOf(HasSubstr("s.xml:17:"), HasSubstr("memory=\"read\" without every")));
+  const Scene scene = feedback_scene(with("memory=\"read\"", "memory=\"read\" every=\"5\"", waits));
+  EXPECT_TRUE(scene.sensors[0].remembers_readings);
+  EXPECT_THAT(feedback_refusal(with("memory=\"read\"", "memory=\"reed\"", waits)),
+              HasSubstr("did you mean 'read'"));
+}
+
 TEST(Feedback, RefusesAndWarns) {
   EXPECT_THAT(
       feedback_refusal(with(
