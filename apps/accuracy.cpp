@@ -127,11 +127,12 @@ int run_sweep(const AccuracyArguments& o, const Console& console, const Model& m
   listener.second_look = [&] {
     console.print(fmt::format("\nwith {} more environments, settings that may be cheaper:", more));
   };
-  const AccuracyReport report = accuracy_sweep(*episodes, options, listener, [&] {
-    check_memory((1 + kMoreEnvironments) * bytes,
-                 fmt::format("a second look at {} environments", more));
-    return make(more, seed ^ kOtherSeed, listener.go_on);
-  });
+  FreshEpisodes fresh;
+  if ((1 + kMoreEnvironments) * bytes < available_memory())
+    fresh = [&] { return make(more, seed ^ kOtherSeed, listener.go_on); };
+  else
+    console.note(fmt::format("no second look: memory does not suffice for {} environments", more));
+  const AccuracyReport report = accuracy_sweep(*episodes, options, listener, fresh);
   if (report.stopped && report.points.empty())
     return report_stop(console, "accuracy", signals.received(), "before the first setting");
   return report_sweep(subject, console, model, report, signals.received(), svg, csv);
