@@ -26,6 +26,8 @@ namespace tangere::apps {
 namespace {
 
 constexpr int kComparedEnvironments = 64;  // the fewest full blocks that bound 95 % of all
+constexpr int kMoreEnvironments = 2;       // times as many for a second look
+constexpr std::uint64_t kOtherSeed = 0x5ec0'11d1'00c0'0000;
 
 struct AccuracyArguments {
   std::string scene, quantity, controls, policy, svg, csv;
@@ -65,8 +67,9 @@ void check_size(const AccuracyArguments& o, const Model& model, std::int64_t ste
                fmt::format("--envs {} of {} steps", environments, steps));
 }
 
-/// Makes the episodes; none when a signal came.
-using MakeEpisodes = std::function<std::optional<FixedEpisodes>(const AccuracyGoOn&)>;
+/// Makes the episodes of so many environments with a seed; none when a signal came.
+using MakeEpisodes =
+    std::function<std::optional<FixedEpisodes>(int, std::uint64_t, const AccuracyGoOn&)>;
 
 /// Ends with the report of a sweep.
 int report_sweep(const AccuracySubject& subject, const Console& console, const Model& model,
@@ -97,11 +100,12 @@ int run_sweep(const AccuracyArguments& o, const Console& console, const Model& m
   TextOutput svg(o.svg, o.overwrite), csv(o.csv, o.overwrite);
   AccuracyListener listener;
   listener.go_on = [&] { return signals.received() == 0; };
-  const std::optional<FixedEpisodes> episodes = make(listener.go_on);
+  const std::uint64_t seed = o.seed.value_or(0);
+  const std::optional<FixedEpisodes> episodes = make(environments_of(o), seed, listener.go_on);
   if (!episodes)
     return report_stop(console, "accuracy", signals.received(), "in the first episode");
-  check_memory(accuracy_bytes(*episodes, options.quantity, options.threads),
-               fmt::format("--envs {}", environments_of(o)));
+  const double bytes = accuracy_bytes(*episodes, options.quantity, options.threads);
+  check_memory(bytes, fmt::format("--envs {}", environments_of(o)));
   const AccuracySubject subject{o.scene,
                                 name,
                                 processor_name(),
@@ -120,7 +124,16 @@ int run_sweep(const AccuracyArguments& o, const Console& console, const Model& m
     head = true;
     console.print(accuracy_row(points));
   };
-  const AccuracyReport report = accuracy_sweep(*episodes, options, listener);
+  const int more = std::min(kMoreEnvironments * environments_of(o), kMostEnvironments);
+  listener.second_look = [&] {
+    console.print(fmt::format("\nwith {} more environments, settings that may be cheaper:", more));
+  };
+  FreshEpisodes fresh;
+  if ((1 + kMoreEnvironments) * bytes < available_memory())
+    fresh = [&] { return make(more, seed ^ kOtherSeed, listener.go_on); };
+  else
+    console.note(fmt::format("no second look: memory does not suffice for {} environments", more));
+  const AccuracyReport report = accuracy_sweep(*episodes, options, listener, fresh);
   if (report.stopped && report.points.empty())
     return report_stop(console, "accuracy", signals.received(), "before the first setting");
   return report_sweep(subject, console, model, report, signals.received(), svg, csv);
@@ -131,16 +144,17 @@ int accuracy_of_task(const AccuracyArguments& o, const Console& console, const T
   const PolicyKind kind = policy_named(o.policy, o.controls, PolicyKind::scripted);
   const Policy policy = make_policy(task, kind, o.controls);
   check_size(o, task.model(), TaskProgram::steps(task.spec()));
-  const Batch start(task.model(), environments_of(o), o.seed.value_or(0));
   if (task.spec().restarts && task.spec().opening)
     console.note(
         "every action of this task restarts: an episode is its opening, without the policy");
   else
     console.note("controls are those that the policy asks for at the scene's own scheme and step");
   const int every = std::min(sample_interval(task.model()), task.spec().steps_per_action);
-  return run_sweep(
-      o, console, task.model(), "task " + task.spec().name,
-      [&](const AccuracyGoOn& go_on) { return task_episodes(start, task, policy, every, go_on); });
+  return run_sweep(o, console, task.model(), "task " + task.spec().name,
+                   [&](int environments, std::uint64_t seed, const AccuracyGoOn& go_on) {
+                     return task_episodes(Batch(task.model(), environments, seed), task, policy,
+                                          every, go_on);
+                   });
 }
 
 int accuracy(const AccuracyArguments& o, const Console& console) {
@@ -153,10 +167,13 @@ int accuracy(const AccuracyArguments& o, const Console& console) {
       make_controls(o.controls, o.seed.value_or(0), model, Stepper(model), console);
   const std::int64_t steps = step_count(o.steps, controls);
   check_size(o, model, steps);
-  const Batch start(model, environments_of(o), o.seed.value_or(0));
-  return run_sweep(o, console, model, model.scene().name, [&](const AccuracyGoOn&) {
-    return scene_episodes(start, controls, steps, sample_interval(model));
-  });
+  const auto make = [&](int environments, std::uint64_t seed, const AccuracyGoOn&) {
+    // A table has no random numbers.
+    const ControlProgram own =
+        o.controls.empty() ? ControlProgram(model, controls.timestep(), seed) : controls;
+    return scene_episodes(Batch(model, environments, seed), own, steps, sample_interval(model));
+  };
+  return run_sweep(o, console, model, model.scene().name, make);
 }
 
 }  // namespace

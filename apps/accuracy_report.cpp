@@ -39,6 +39,7 @@ Json point_json(const AccuracyPoint& p) {
           {"evaluations_per_step", p.evaluations},
           {"split_share", finite(p.split)},
           {"blurred", p.blurred},
+          {"envs", p.errors.size()},
           {"failed", p.failed},
           {"status", p.status}};
 }

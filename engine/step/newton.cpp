@@ -35,6 +35,10 @@
 // is evaluated where every lane should be done or take a chord step, and the Jacobian afterwards if
 // one was not. The Jacobian of one lane costs its contacts a third of a group's. Where a single
 // lane needs one, it therefore also comes after g.
+//
+// A Jacobian of the group costs as much as six residuals. A lane that turns out to need one after g
+// alone therefore waits at its point. The next evaluation includes the Jacobian if another lane
+// needs or should need one, too. Else the lane waits on, until no other lane searches.
 #include "engine/step/newton.hpp"
 
 #include <cmath>
@@ -73,6 +77,7 @@ struct Search {
   NewtonReport& report;
   LaneBits searching;
   LaneBits on_trial = 0;   ///< lanes whose x is a trial along delta
+  LaneBits waiting = 0;    ///< lanes whose x is accepted and that wait for a Jacobian
   LaneBits spared = 0;     ///< lanes that ended without the last evaluation
   LaneBits by_secant = 0;  ///< lanes whose factor takes friction by its secant
   std::array<double, L> alpha{}, delta_norm{};
@@ -119,7 +124,8 @@ struct Search {
     locate(first);
     LaneBits open = 0;
     for (int l = 0; l < L; ++l)
-      if (has(searching, l) && !(expected[l] <= limits.tolerance)) open |= 1U << l;
+      if (has(searching, l) && (has(waiting, l) || !(expected[l] <= limits.tolerance)))
+        open |= 1U << l;
     with_jacobian = !factors.weighted || !factors.floored ||
                     (open != 0 && (lone(open) < 0 || open == searching));
     (with_jacobian ? kernel().evaluate : kernel().residual)(model.view, w.stage, lone(searching));
@@ -148,9 +154,9 @@ struct Search {
     on_trial &= ~(1U << l);
   }
 
-  /// Judges the trials at the present x. Returns the lanes that hold an accepted, unconverged
-  /// point.
-  LaneBits judge() {
+  /// Judges the trials at the present x. Lanes that hold an accepted, unconverged point wait from
+  /// then on.
+  void judge() {
     LaneRow residual, test_norm{};
     scaled_residual(model, table, w, residual);
     if ((factors.lanes & searching) != 0) {
@@ -159,9 +165,8 @@ struct Search {
         if (has(factors.pivoted & searching, l)) w.pivoted.solve(l, w.stage.g, w.test);
       weighted_norms(w.test, test_norm);
     }
-    LaneBits accepted = 0;
     for (int l = 0; l < L; ++l) {
-      if (!has(searching, l)) continue;
+      if (!has(searching & ~waiting, l)) continue;
       ++report.iterations[l];
       const double ratio = residual[l] / last[l];
       if (has(on_trial, l) && alpha[l] == 1) factors.share[l] = has(chord, l) ? ratio : 2 * ratio;
@@ -178,7 +183,7 @@ struct Search {
           on_trial |= 1U << l;
           take_chord(l, test_norm[l]);
         } else {
-          accepted |= 1U << l;
+          waiting |= 1U << l;
           expected[l] = 0;
         }
       } else if (descends(l, test_norm[l], residual[l])) {
@@ -189,7 +194,7 @@ struct Search {
         } else if (stalls(l, residual[l])) {
           stop(l, StepStatus::not_converged);
         } else {
-          accepted |= 1U << l;
+          waiting |= 1U << l;
           const double next = ratio * ratio, share = 2 * next;  // a Newton step squares the ratio
           expected[l] = residual[l] * next * share * share * share;
         }
@@ -204,7 +209,6 @@ struct Search {
         for (int i = 0; i < n(); ++i) w.stage.x[i][l] = w.base[i][l] - alpha[l] * w.delta[i][l];
       }
     }
-    return accepted;
   }
 
   /// Chord steps pass by the natural test alone: what their factor leaves decides about the next.
@@ -262,8 +266,10 @@ struct Search {
     for (int i = 0; i < n(); ++i) w.stage.x[i][l] = w.base[i][l];
   }
 
-  /// Computes new directions at the accepted points. The full step along each is the next trial.
-  void new_directions(LaneBits accepted) {
+  /// Computes new directions at the points that wait for one. The full step along each is the next
+  /// trial.
+  void new_directions() {
+    const LaneBits accepted = std::exchange(waiting, 0);
     if (!with_jacobian) kernel().evaluate(model.view, w.stage, lone(accepted));
     set_floor(accepted);
     const LaneRow accept = row_of(accepted);
@@ -319,8 +325,8 @@ LaneBits solve_stage(const CompiledModel& model, const kernels::KernelTable& tab
   while (s.searching != 0) {
     s.evaluate(first);
     first = false;
-    const LaneBits accepted = s.judge();
-    if (accepted != 0) s.new_directions(accepted);
+    s.judge();
+    if (s.waiting != 0 && (s.with_jacobian || s.waiting == s.searching)) s.new_directions();
   }
   if (s.spared != 0) {  // v and candidates where they ended
     s.searching = s.spared;

@@ -38,8 +38,10 @@ struct AccuracyPoint {
   double split = 0;        ///< share of steps; NaN for gradients, which do not count them
   double rate = 0;         ///< simulated seconds per CPU second, over all environments
   bool blurred = false;    ///< error at most ten times the reference's own
-  int failed = 0;          ///< environments
-  std::string status;      ///< "ok", or why environments failed
+  /// Of every environment, then of those of the second look; as in AccuracyOutcome.
+  std::vector<double> errors{};
+  int failed = 0;      ///< environments
+  std::string status;  ///< "ok", or why environments failed
 };
 
 struct AccuracyReference {
@@ -69,12 +71,18 @@ struct AccuracyListener {
   AccuracyGoOn go_on;
   std::function<void(const AccuracyReference&)> reference;      ///< each attempt, ever finer
   std::function<void(std::span<const AccuracyPoint>)> setting;  ///< in every precision
+  std::function<void()> second_look{};                          ///< settings are told once more
 };
 
-/// A stop leaves what there is by then. Throws InputError when nothing touches in any environment,
-/// or nothing moves.
+/// Makes episodes of the same kind with random numbers that no others have; none when stopped.
+using FreshEpisodes = std::function<std::optional<FixedEpisodes>()>;
+
+/// A stop leaves what there is by then. Settings that meet the target, are not sure to do so, and
+/// are faster than those that are sure are played again in `fresh` episodes, at most three of them;
+/// all their environments together then judge them. Throws InputError when nothing touches in any
+/// environment, or nothing moves.
 AccuracyReport accuracy_sweep(const FixedEpisodes& episodes, const AccuracyOptions& options,
-                              const AccuracyListener& listener);
+                              const AccuracyListener& listener, const FreshEpisodes& fresh = {});
 
 /// Makes the reference and compares the scene's own setting with it: `reference`, `own` and
 /// `resolved` of a report. Throws like accuracy_sweep.

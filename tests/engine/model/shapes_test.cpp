@@ -135,7 +135,8 @@ TEST(Shapes, DistancesAreForPicturesToo) {
       distance_from(CuboidShape{{0.1, 0.2, 0.3}}, {0.01, 0.02, 0.25}).value();
   EXPECT_NEAR(at.distance, 0.1, 1e-15);
   for (std::size_t k = 0; k < 3; ++k) EXPECT_NEAR(at.normal[k], k == 2 ? 1 : 0, 1e-15);
-  EXPECT_NEAR(distance_from(EllipsoidShape{{0.1, 0.2, 0.3}}, {0, 0, 0.15}).value().distance, 0, 1e-15);
+  EXPECT_NEAR(distance_from(EllipsoidShape{{0.1, 0.2, 0.3}}, {0, 0, 0.15}).value().distance, 0,
+              1e-15);
   EXPECT_FALSE(distance_from(AbstractShape{}, {}));
   EXPECT_FALSE(distance_from(MeshShape{}, {}));
   EXPECT_EQ(widths(CapsuleShape{0.3, 0.1}), (std::array<double, 3>{0.2, 0.2, 0.5}));

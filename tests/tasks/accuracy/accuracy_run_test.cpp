@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <numbers>
 
 #include "io/scene/scene_reader.hpp"
@@ -281,6 +282,53 @@ TEST(AccuracySweep, NamesTheFastestSettingThatIsAccurateEnough) {
       std::min_element(report.tolerances.begin(), report.tolerances.end(),
                        [](const auto& a, const auto& b) { return a.evaluations < b.evaluations; });
   EXPECT_LT(fewest->evaluations, report.tolerances.back().evaluations);
+}
+
+/// In 21 environments the bound is the largest error, and 20 of them stay below the second largest.
+/// A target between the two asks for a second look. All 63 environments then judge.
+TEST(AccuracySweep, LooksAgainAtWhatMayBeCheaper) {
+  const FixedEpisodes episodes = ball_episodes(21, 100);
+  int settings = 0;
+  AccuracyListener listener;
+  listener.setting = [&](std::span<const AccuracyPoint>) { ++settings; };
+  listener.go_on = [&] { return settings < 3; };
+  const auto longest_sdirk2 = [](const AccuracyReport& report) {
+    return *std::ranges::find_if(report.points, [](const AccuracyPoint& p) {
+      return p.setting.integrator == Integrator::sdirk2 && p.setting.parts == 1;
+    });
+  };
+  AccuracyOptions options = quick();
+  const AccuracyPoint once = longest_sdirk2(accuracy_sweep(episodes, options, listener));
+  ASSERT_LT(once.error, once.bound);
+
+  options.target = 0.5 * (once.error + once.bound);
+  const Batch start(pressed_ball(), 42, 8);
+  const ControlProgram controls(pressed_ball(), pressed_ball().timestep(), 8);
+  int looks = 0;
+  bool seen = false;  // what comes after the second look takes long
+  listener.go_on = [&] { return !seen; };
+  listener.second_look = [&] { ++looks; };
+  listener.setting = [&](std::span<const AccuracyPoint> points) {
+    seen = points[0].errors.size() == 63 && points[0].setting.integrator == Integrator::sdirk2 &&
+           points[0].setting.parts == 1;
+  };
+  const auto fresh = [&] { return scene_episodes(start, controls, 100, 5); };
+  const AccuracyReport report = accuracy_sweep(episodes, options, listener, fresh);
+  EXPECT_EQ(looks, 1);
+  const AccuracyPoint twice = longest_sdirk2(report);
+
+  const FixedEpisodes others = fresh();
+  const auto run = make_accuracy_run(others, options.quantity, 1);
+  run->make_reference(report.reference.setting, {});
+  std::vector<double> errors = once.errors;
+  std::ranges::copy(run->compare(twice.setting, {}).error[0], std::back_inserter(errors));
+  EXPECT_EQ(twice.errors, errors);
+  EXPECT_EQ(twice.error, quantile(errors, 0.95));
+  EXPECT_EQ(twice.bound, sure_quantile(errors, 0.95));
+  const auto seen_again = std::ranges::count_if(
+      report.points, [](const AccuracyPoint& p) { return p.errors.size() == 63; });
+  EXPECT_GE(seen_again, 2) << "one setting in two precisions";
+  EXPECT_LE(seen_again, 6) << "three settings in two precisions";
 }
 
 TEST(AccuracySweep, KeepsWhatThereIsWhenItIsStopped) {
