@@ -2,14 +2,15 @@
 // Curves over an episode, a panel for each unit, with a line at the frame that is shown.
 const kInks = ["#3b82d6", "#e0702f", "#2f9e68", "#b85bc2", "#c9a227", "#d84a5f", "#3aa6b5",
   "#8a7a6a"];
-const kMostNamed = 8;
+const kMostNamed = 8, kMostLines = 4, kLine = 15;  // names, their lines, height of one
+const kWidest = "-8.88e-8";  // a value
 const kStatus = ["converged", "split", "coarse", "passed"];  // what is negative failed
 
 class TracePanel {
   constructor(group, canvas, seek) {
     Object.assign(this, { group, canvas });
     const left = 52, right = 10;
-    this.margin = { left, right, top: 40, bottom: 22 };
+    this.margin = { left, right, top: 40, bottom: 22 };  // top grows with the lines of names
     const go = (event) => {
       const box = canvas.getBoundingClientRect();
       seek((event.clientX - box.left - left) / (box.width - left - right));
@@ -37,7 +38,9 @@ class TracePanel {
     if (high - low < 1e-9 * Math.max(1, Math.abs(high))) { low -= 0.5; high += 0.5; }
     const room = 0.06 * (high - low);
     low -= room; high += room;
-    const { left, right, top, bottom } = this.margin;
+    const names = this.places(g, traces, width);
+    const { left, right, bottom } = this.margin;
+    const top = Math.max(this.margin.top, (names.at(-1)?.line ?? 0) + 13);
     const w = width - left - right, h = height - top - bottom;
     const begin = time[0], end = Math.max(time[time.length - 1], begin + 1e-9);
     const x = (t) => left + (t - begin) / (end - begin) * w;
@@ -69,7 +72,7 @@ class TracePanel {
     });
     g.strokeStyle = ink; g.lineWidth = 1; g.beginPath();
     g.moveTo(x(time[frame]), top); g.lineTo(x(time[frame]), top + h); g.stroke();
-    this.title(g, traces, frame, width, ink, soft);
+    this.title(g, traces, frame, names, ink, soft);
   }
 
   // What stands for a value beside its name.
@@ -80,20 +83,32 @@ class TracePanel {
     return `${size > 0 && size < 1e-3 ? x.toExponential(1) : Number(x.toPrecision(3))}`;
   }
 
-  title(g, traces, frame, width, ink, soft) {
-    g.textAlign = "left"; g.fillStyle = ink; g.font = "600 12px system-ui, sans-serif";
-    g.fillText(this.group, 6, 11);
+  // Where names stand. Every value has room for the widest, so that nothing moves with the frame.
+  places(g, traces, width) {
+    g.font = "600 12px system-ui, sans-serif";
+    const places = [];
     let at = 14 + g.measureText(this.group).width, line = 12;
     g.font = "11px system-ui, sans-serif";
-    traces.forEach(({ name, values }, k) => {
-      const value = this.textOf(values[frame]);
-      const text = traces.length === 1 ? value : `${name} ${value}`;
-      const long = g.measureText(text).width;
-      if (at + 14 + long > width && line === 12) { line = 27; at = 6; }
-      if (k >= kMostNamed || at + 14 + long > width) return;
+    for (const { name } of traces.slice(0, kMostNamed)) {
+      const text = traces.length === 1 ? kWidest : `${name} ${kWidest}`;
+      const long = 14 + g.measureText(text).width;
+      if (at + long > width && at > 6) { line += kLine; at = 6; }
+      if (line > 12 + (kMostLines - 1) * kLine) break;
+      places.push({ at, line });
+      at += 8 + long;
+    }
+    return places;
+  }
+
+  title(g, traces, frame, places, ink, soft) {
+    g.textAlign = "left"; g.fillStyle = ink; g.font = "600 12px system-ui, sans-serif";
+    g.fillText(this.group, 6, 11);
+    g.font = "11px system-ui, sans-serif";
+    places.forEach(({ at, line }, k) => {
+      const { name, values } = traces[k], value = this.textOf(values[frame]);
       g.fillStyle = kInks[k % kInks.length]; g.fillRect(at, line - 5, 9, 9);
-      g.fillStyle = soft; g.fillText(text, at + 12, line);
-      at += 22 + long;
+      g.fillStyle = soft;
+      g.fillText(traces.length === 1 ? value : `${name} ${value}`, at + 12, line);
     });
   }
 }
