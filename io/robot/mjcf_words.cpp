@@ -41,32 +41,36 @@ Words actuator_words(std::initializer_list<const char*> own) {
   return words;
 }
 
+Words joint_words() {
+  return {{"name"},
+          {"class"},
+          {"type"},
+          {"pos"},
+          {"axis"},
+          {"range"},
+          {"limited"},
+          {"stiffness"},
+          {"springref"},
+          {"damping"},
+          {"armature"},
+          {"ref"},
+          {"actuatorfrcrange"},
+          {"actuatorfrclimited"},
+          {"frictionloss", Fate::zero, "dry friction of a joint"},
+          {"springdamper", Fate::zero, "chooses stiffness and damping from a frequency"},
+          {"actuatorgravcomp", Fate::idle, "of bodies without weight"},
+          {"group", Fate::idle, kSight},
+          {"user", Fate::idle, kUser},
+          {"margin", Fate::idle, "of MuJoCo's limits; here limits are springs"},
+          {"solreflimit", Fate::idle, "of MuJoCo's limits; here limits are springs"},
+          {"solimplimit", Fate::idle, "of MuJoCo's limits; here limits are springs"},
+          {"solreffriction", Fate::idle, kSolver},
+          {"solimpfriction", Fate::idle, kSolver}};
+}
+
 std::map<std::string, Words> all_words() {
   std::map<std::string, Words> all;
-  all["joint"] = {{"name"},
-                  {"class"},
-                  {"type"},
-                  {"pos"},
-                  {"axis"},
-                  {"range"},
-                  {"limited"},
-                  {"stiffness"},
-                  {"springref"},
-                  {"damping"},
-                  {"armature"},
-                  {"ref"},
-                  {"actuatorfrcrange"},
-                  {"actuatorfrclimited"},
-                  {"frictionloss", Fate::zero, "dry friction of a joint"},
-                  {"springdamper", Fate::zero, "chooses stiffness and damping from a frequency"},
-                  {"actuatorgravcomp", Fate::idle, "of bodies without weight"},
-                  {"group", Fate::idle, kSight},
-                  {"user", Fate::idle, kUser},
-                  {"margin", Fate::idle, "of MuJoCo's limits; here limits are springs"},
-                  {"solreflimit", Fate::idle, "of MuJoCo's limits; here limits are springs"},
-                  {"solimplimit", Fate::idle, "of MuJoCo's limits; here limits are springs"},
-                  {"solreffriction", Fate::idle, kSolver},
-                  {"solimpfriction", Fate::idle, kSolver}};
+  all["joint"] = joint_words();
   all["geom"] = with_rotations({{"name"},
                                 {"class"},
                                 {"type"},

@@ -6,7 +6,7 @@
 
 #include "engine/rows/row_sink.hpp"
 #include "io/hdf5/h5.hpp"
-#include "io/trajectory/saved_state.hpp"
+#include "io/trajectory/saved_memory.hpp"
 #include "io/trajectory/trajectory_layout.hpp"
 
 namespace tangere {

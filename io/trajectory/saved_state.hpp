@@ -8,15 +8,9 @@
 #include <vector>
 
 #include "engine/step/batch.hpp"
-#include "engine/step/memory_arrays.hpp"
+#include "io/trajectory/saved_memory.hpp"
 
 namespace tangere {
-
-/// What friction remembered at a row, as the file holds it.
-struct SavedMemory {
-  std::vector<MemoryContact> contacts;
-  std::vector<ShearMemory> environments;  ///< (E); points are rows of the file's arrays
-};
 
 /// Row K of a file: everything on which the following steps depend.
 struct SavedState {
