@@ -54,12 +54,14 @@ class Played:
         return means
 
 
-def play(env: tangere.gym.VectorTaskEnv, seed: int, choose: Choose) -> Played:
-    """Plays the first episodes of a seed to their ends. `env` has autoreset="disabled".
+def play(
+    env: tangere.gym.VectorTaskEnv, seed: int, choose: Choose, first_episode: int = 0
+) -> Played:
+    """Plays episodes of a seed to their ends. `env` has autoreset="disabled".
 
     `choose(env, obs, t)` returns action t of every environment, (E, na).
     """
-    obs, _ = env.reset(seed=seed)
+    obs, _ = env.reset(seed=seed, options={"first_episode": first_episode})
     over = np.zeros(env.num_envs, bool)
     solved = np.zeros(env.num_envs, bool)
     returns = np.zeros(env.num_envs)
