@@ -256,6 +256,15 @@ def test_box_errors_are_distances_between_poses():
     assert np.all(memory[:, 0] > 0.19) and np.all(played.position < 0.1)
 
 
+def test_the_best_policy_solves_most():
+    poor, good = {"success": 0.4, "return": -30.0}, {"success": 0.9, "return": -130.0}
+    assert protocol.merit(good) > protocol.merit(poor) > (-np.inf,)
+    assert protocol.merit(good | {"return": -100.0}) > protocol.merit(good)
+    near, far = ({"position_m": place, "yaw_rad": 0.1} for place in (0.1, 0.2))
+    assert protocol.merit(near) > protocol.merit(far) > (-np.inf,)
+    assert not protocol.merit(near | {"yaw_rad": float("nan")}) > (-np.inf,)
+
+
 def test_intervals_are_those_of_tables():
     low, high = protocol.wilson(0.9, 100)
     assert low == pytest.approx(0.8256, abs=1e-4) and high == pytest.approx(0.9448, abs=1e-4)
