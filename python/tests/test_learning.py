@@ -20,6 +20,7 @@ torch = pytest.importorskip("torch", reason="PyTorch is not installed")
 LEARNING = Path(__file__).parents[2] / "learning"
 sys.path.insert(0, str(LEARNING))
 
+import bc  # noqa: E402
 import dagger  # noqa: E402
 import experiments  # noqa: E402
 import gd  # noqa: E402
@@ -88,6 +89,26 @@ def test_clones_learn_from_a_data_set(generate):
     found = run("bc.py", str(data), "--epochs", "20", "--episodes", "200")
     assert found["test"]["success"] > 0.5, found  # random actions: 0.35
     assert found["data"]["command"].startswith("tangere generate insertion_translation")
+
+
+def test_a_clone_may_see_the_state(generate, monkeypatch):
+    data = generate("box_pushing", "--episodes", "4", "--seed", "1")
+    monkeypatch.setattr(sys, "argv", ["bc.py", str(data), "--state", "--episodes", "3"])
+    asked = bc.settings()
+    windows = bc.Windows(str(data), ["goal", "q"], split=None)
+    shown = []
+
+    def clone(seen):
+        shown.append(seen)
+        return torch.zeros(3, 3)
+
+    bc.closed_loop(windows, clone, asked)
+    env = tangere.make_vec("box_pushing", 3)
+    obs, _ = env.reset(seed=protocol.TEST_SEED)
+    start = np.concatenate([obs["goal"], env.state()[0] / bc.STATE_UNIT], axis=1)
+    np.testing.assert_allclose(shown[0], start, rtol=1e-5, atol=1e-6)
+    row = windows[0]["obs"]
+    assert row["q"].shape == (1, len(env.model.q_names)) and shown[0].shape == (3, 3 + 7)
 
 
 def test_a_clone_with_memory_learns_from_its_visits(generate):
