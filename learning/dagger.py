@@ -160,7 +160,7 @@ def settings() -> argparse.Namespace:
 
 
 def trained(asked: argparse.Namespace, episodes: Episodes, keys: list[str]):
-    """The clone, the rows of the data set, and for each round its loss and the visits' successes."""
+    """The clone, the rows of the data set; of each round its loss and what its visits solved."""
     task = tangere.task_spec(episodes.task)
     stored = stored_rows(episodes, keys, task)
     inputs, actions = stored.seen.shape[2], stored.wanted.shape[2]
