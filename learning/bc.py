@@ -23,6 +23,9 @@ import tangere
 from tangere.data import Episodes, Windows
 
 
+STATE_UNIT = 0.1  # [m, rad]: what q is divided by with --state
+
+
 class Clone(nn.Module):
     """Observations, flattened and stacked over rows, to an action within its bounds."""
 
@@ -40,7 +43,7 @@ class Clone(nn.Module):
 
 def flat(obs: dict[str, np.ndarray], past: np.ndarray) -> torch.Tensor:
     """(n, rows, …) of every key, and the actions between them, (n, rows - 1, na) → (n, inputs)."""
-    parts = [*obs.values(), past]
+    parts = [*(v / STATE_UNIT if k == "q" else v for k, v in obs.items()), past]
     return torch.from_numpy(np.concatenate([v.reshape(len(v), -1) for v in parts], axis=1))
 
 
@@ -65,13 +68,15 @@ def closed_loop(windows: Windows, clone: Clone, asked: argparse.Namespace) -> Pl
     """The clone in the test episodes of its task."""
     episodes = asked.episodes
     env = tangere.make_vec(
-        windows.episodes.task, episodes, autoreset="disabled", keys=windows.keys,
-        threads=asked.threads,
+        windows.episodes.task, episodes, autoreset="disabled",
+        keys=[key for key in windows.keys if key != "q"], threads=asked.threads,
     )  # fmt: skip
     history: list[dict[str, np.ndarray]] = []
     past: list[np.ndarray] = []
 
     def choose(env, obs, t):
+        if asked.state:
+            obs = obs | {"q": env.state()[0].astype(np.float32)}
         if t == 0:
             history[:] = [obs] * (windows.before + 1)
             past[:] = [np.zeros((episodes, *env.task.action.shape), np.float32)] * windows.before
@@ -98,6 +103,7 @@ def settings() -> argparse.Namespace:
     parser.add_argument("--before", type=int, default=0, help="rows of history")
     parser.add_argument("--recall", action="store_true", help="the actions between them, too")
     parser.add_argument("--without", nargs="*", default=[], help="observations to leave out")
+    parser.add_argument("--state", action="store_true", help="show q, which no robot sees")
     parser.add_argument("--all", action="store_true", help="learn from failed episodes too")
     parser.add_argument("--episodes", type=int, default=1000, help="to play")
     parser.add_argument("--threads", type=int, default=None, help="of the simulation")
@@ -116,6 +122,7 @@ def main() -> None:
     keys = [key for key in shown if key not in asked.without]
     if not keys or len(keys) + len(asked.without) != len(shown):
         raise SystemExit(f"--without {asked.without}; the data set shows {shown}")
+    keys += ["q"] if asked.state else []
     windows = Windows(episodes, keys, before=asked.before, only_success=not asked.all)
     task = tangere.task_spec(windows.episodes.task)
     begin, clock = time.process_time(), time.perf_counter()

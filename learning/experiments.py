@@ -48,7 +48,7 @@ DERIVED = "box_pushing --episodes 150 --seed 1 --noise 0.3 --gradients jacobians
 CAPS = "cap_opening --episodes 300 --seed 1"
 GRASPS = "stable_grasp --episodes 1000 --seed 1"
 INSERTIONS = "insertion --episodes 5000 --seed 1"
-CLONED = "bc.py out/learning/pushes --epochs 20 --batch 1024 --before 7 --width 512"
+CLONED = "dagger.py out/learning/pushes"
 CAPPED = "bc.py out/learning/caps --epochs 20 --before 3 --width 512"
 
 # In the order in which they are made: what is worth most and costs least comes first.
@@ -67,8 +67,9 @@ EXPERIMENTS = [
     Experiment("ppo-grasp", "ppo.py stable_grasp", 3, 250, "stable grasp, flow", "98.5 %, 2.1"),
     Experiment("ppo-cap-blind", "ppo.py cap_opening_blind", 3, 470, "cap, blind", "59.7 %"),
     Experiment("ppo-cap", "ppo.py cap_opening", 3, 300, "cap, touch", "87.3 %"),
-    Experiment("bc-push", CLONED, 3, 250, "box pushing, goal and touch", data=f"pushes {PUSHES}"),
-    Experiment("bc-push-blind", f"{CLONED} --without tactile", 3, 60, "box pushing, goal",
+    Experiment("bc-push", CLONED, 3, 190, "box pushing, goal and touch, visits",
+               data=f"pushes {PUSHES}"),
+    Experiment("bc-push-blind", f"{CLONED} --without tactile", 3, 120, "box pushing, goal, visits",
                data=f"pushes {PUSHES}"),
     Experiment("bc-grasp", "bc.py out/learning/grasps", 3, 10, "stable grasp, flow",
                data=f"grasps {GRASPS}"),

@@ -139,7 +139,7 @@ def main() -> None:
     )
     still = {"flatten": True, "autoreset": "disabled", "threads": asked.threads}
     choice = tangere.make_vec(asked.task, CHOICE_EPISODES, **still)
-    best, kept, curve, chosen = -np.inf, None, [], []
+    best, kept, curve, chosen = (-np.inf,), None, [], []
     for k in range(asked.updates):
         curve.append(update(tape, policy, gains, asked.limit, 1 + asked.seed, k * asked.envs))
         norm = nn.utils.clip_grad_norm_(policy.parameters(), 1.0)

@@ -54,12 +54,14 @@ class Played:
         return means
 
 
-def play(env: tangere.gym.VectorTaskEnv, seed: int, choose: Choose) -> Played:
-    """Plays the first episodes of a seed to their ends. `env` has autoreset="disabled".
+def play(
+    env: tangere.gym.VectorTaskEnv, seed: int, choose: Choose, first_episode: int = 0
+) -> Played:
+    """Plays episodes of a seed to their ends. `env` has autoreset="disabled".
 
     `choose(env, obs, t)` returns action t of every environment, (E, na).
     """
-    obs, _ = env.reset(seed=seed)
+    obs, _ = env.reset(seed=seed, options={"first_episode": first_episode})
     over = np.zeros(env.num_envs, bool)
     solved = np.zeros(env.num_envs, bool)
     returns = np.zeros(env.num_envs)
@@ -76,15 +78,16 @@ def play(env: tangere.gym.VectorTaskEnv, seed: int, choose: Choose) -> Played:
     return Played(solved, returns, actions, position, yaw)
 
 
-def merit(played: dict[str, float]) -> float:
-    """By which the best policy of a run is chosen, from a summary.
+def merit(played: dict[str, float]) -> tuple[float, ...]:
+    """By which the best policy of a run is chosen, from a summary; the larger one is better.
 
-    It is the mean return. In box pushing it is minus the mean errors, in the reward's proportion:
-    the reward is quadratic in the gap between hand and box, so a few lost boxes decide a mean.
+    It is the rate of successes, and between equal rates the mean return: a few lost episodes decide
+    a mean of rewards that are quadratic in the error, and more so if episodes go on until they are
+    solved. In box pushing it is minus the mean errors, in the reward's proportion.
     """
     if "position_m" not in played:
-        return played["return"]
-    return -(played["position_m"] / PLACE_UNIT + played["yaw_rad"] / YAW_UNIT)
+        return played["success"], played["return"]
+    return (-(played["position_m"] / PLACE_UNIT + played["yaw_rad"] / YAW_UNIT),)
 
 
 def box_errors(env: tangere.gym.VectorTaskEnv) -> tuple[np.ndarray, np.ndarray]:

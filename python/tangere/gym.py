@@ -34,8 +34,10 @@ def gym_id(task: str) -> str:
     return f"tangere/{''.join(word.capitalize() for word in task.split('_'))}-v0"
 
 
-def task_scene(task: str) -> _core.Scene:
-    """The scene of a task, from the package."""
+def task_scene(task: str, other: _core.Scene | str | Path | None = None) -> _core.Scene:
+    """The scene of a task, from the package, or in its place `other`: a scene or its file."""
+    if other is not None:
+        return other if isinstance(other, _core.Scene) else _core.Scene(other)
     return _core.Scene(Path(__file__).parent / "scenes" / _core.task_spec(task).scene)
 
 
@@ -108,7 +110,7 @@ class VectorTaskEnv(VectorEnv):
         ones of the episode.
         "disabled": the environment stands still until `reset(options={"reset_mask": m})`.
     keys: the observations to show; None for all that the task declares.
-    scene: another scene than the one of the task.
+    scene: another scene than the one of the task, or the path of its file.
     """
 
     def __init__(
@@ -123,12 +125,14 @@ class VectorTaskEnv(VectorEnv):
         flatten: bool = False,
         autoreset: Autoreset = "next_step",
         keys: Sequence[str] | None = None,
-        scene: _core.Scene | None = None,
+        scene: _core.Scene | str | Path | None = None,
         render_mode: None = None,
     ) -> None:
         if isinstance(keys, str):
             raise _core.InputError(f"keys {keys!r}; expected a list, such as [{keys!r}]")
         seed = _system_seed() if seed is None else _checked(seed)
+        if not isinstance(num_envs, (int, np.integer)) or num_envs < 1:
+            raise _core.InputError(f"num_envs {num_envs!r}; expected a whole number from 1 on")
         if autoreset not in _MODES:
             raise _core.InputError(f"autoreset {autoreset!r}; expected one of {sorted(_MODES)}")
         if render_mode is not None:
@@ -145,7 +149,7 @@ class VectorTaskEnv(VectorEnv):
         self._mode = autoreset
         self._env = _core.Environments(
             task,
-            scene or task_scene(task),
+            task_scene(task, scene),
             num_envs,
             seed=seed,
             first_episode=first_episode,
@@ -199,13 +203,17 @@ class VectorTaskEnv(VectorEnv):
     def step(
         self, actions: Any
     ) -> tuple[Observation, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
-        """Takes one action (E, na) of every environment, clipped to its bounds.
+        """Takes one action of every environment, (E, na) or (na) for all, clipped to its bounds.
 
         Returns observations, rewards (E) float64, terminated, truncated (E) bool, info. Everything
         is new at every step.
         """
         self._fresh = False
-        self._env.step(np.asarray(actions))
+        actions = np.asarray(actions)
+        if actions.shape != self.action_space.shape and actions.shape != self.task.action.shape:
+            expected = f"{self.action_space.shape} or {self.task.action.shape}"
+            raise _core.InputError(f"actions of shape {actions.shape}; expected {expected}")
+        self._env.step(actions)
         reward, terminated, truncated = (
             self._env.rewards(),
             self._env.terminated(),
@@ -271,7 +279,7 @@ class TaskEnv(gymnasium.Env):
         normalise: bool = True,
         flatten: bool = False,
         keys: Sequence[str] | None = None,
-        scene: _core.Scene | None = None,
+        scene: _core.Scene | str | Path | None = None,
         render_mode: None = None,
     ):
         self._vector = VectorTaskEnv(
@@ -305,7 +313,12 @@ class TaskEnv(gymnasium.Env):
         """Takes one action (na). Raises InputError after the end of an episode."""
         if self._over:
             raise _core.InputError("step() without an episode; call reset() first")
-        obs, reward, terminated, truncated, info = self._vector.step(np.asarray(action)[None])
+        action = np.asarray(action)
+        if action.shape != self.action_space.shape and action.size != 1:
+            raise _core.InputError(
+                f"an action of shape {action.shape}; expected {self.action_space.shape}"
+            )
+        obs, reward, terminated, truncated, info = self._vector.step(action.reshape(1, -1))
         self._over = bool(terminated[0] or truncated[0])
         return (
             self._one(obs),
@@ -319,6 +332,11 @@ class TaskEnv(gymnasium.Env):
     def observation_scale(self) -> dict[str, float | list[float]]:
         """KEY → what its observations are divided by, in SI units."""
         return self._vector.observation_scale
+
+    @property
+    def model(self) -> _core.Model:
+        """The compiled scene."""
+        return self._vector.model
 
     def scripted_action(self) -> np.ndarray:
         """(na): what the task's own script does here. It may look at the whole state."""

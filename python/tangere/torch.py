@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import copy
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -57,12 +58,12 @@ class Tape:
         precision: str = "mixed",
         tape_bytes: float = 1e9,
         dtype: torch.dtype = torch.float32,
-        scene: _core.Scene | None = None,
+        scene: _core.Scene | str | Path | None = None,
     ):
         self.num_envs, self.flatten, self.dtype = num_envs, flatten, dtype
         self.tape = _core.TaskTape(
             task,
-            scene or task_scene(task),
+            task_scene(task, scene),
             num_envs,
             actions or 0,
             threads=threads,
@@ -192,6 +193,7 @@ def rollout(
     dtype: torch.dtype = torch.float32,
 ) -> Rollout:
     """Plays E episodes with the actions (E, A, na) and returns all that they show."""
+    actions = torch.as_tensor(actions)
     if actions.ndim != 3 or actions.shape[1] == 0:
         raise _core.InputError(f"actions of shape {tuple(actions.shape)}; expected (E, A, na)")
     envs, count, _ = actions.shape

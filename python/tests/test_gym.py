@@ -198,6 +198,20 @@ def test_nothing_is_handed_out_twice():
     np.testing.assert_array_equal(after[1], reward)
 
 
+def test_a_scene_may_be_named_by_its_file():
+    path = tangere.gym.task_scene("box_pushing").path
+    for scene in (path, tangere.Scene(path)):
+        env = tangere.make_env("box_pushing", scene=scene)
+        assert env.model.q_names == tangere.make_vec("box_pushing", 1).model.q_names
+        same(env.reset(seed=1)[0], tangere.make_env("box_pushing").reset(seed=1)[0])
+
+
+def test_one_action_may_be_for_all():
+    first, second = (tangere.make_vec("box_pushing", 2, threads=1) for _ in range(2))
+    first.reset(seed=1), second.reset(seed=1)
+    same(first.step([0.1, 0.2, 0.3])[0], second.step(np.tile([0.1, 0.2, 0.3], (2, 1)))[0])
+
+
 def test_a_failed_simulation_truncates():
     env = tangere.make_vec("box_pushing", 3, threads=1)
     env.reset(seed=0)
@@ -214,15 +228,22 @@ def test_mistakes_are_told():
         ({"keys": []}, "keys"),
         ({"keys": "goal"}, r"keys 'goal'; expected a list"),
         ({"autoreset": "never"}, "autoreset 'never'"),
-        ({"num_envs": 0}, "0 environments"),
+        ({"num_envs": 0}, "num_envs 0; expected a whole number from 1 on"),
+        ({"num_envs": -1}, "num_envs -1"),
+        ({"num_envs": "8"}, "num_envs '8'"),
     ]:
         with pytest.raises(tangere.InputError, match=message):
             tangere.make_vec("box_pushing", **{"num_envs": 2, **arguments})
     env = tangere.make_env("box_pushing")
     with pytest.raises(tangere.InputError, match="reset"):
         env.step(np.zeros(3))
+    env.reset(seed=0)
+    with pytest.raises(tangere.InputError, match=r"an action of shape \(4,\); expected \(3,\)"):
+        env.step(np.zeros(4))
     vector = tangere.make_vec("box_pushing", 2)
     with pytest.raises(tangere.InputError, match=r"options \['speed'\]"):
         vector.reset(options={"speed": 1})
     with pytest.raises(tangere.InputError, match=r"actions of shape \(3, 3\); expected \(2, 3\)"):
         vector.step(np.zeros((3, 3)))
+    with pytest.raises(tangere.InputError, match=r"shape \(2,\); expected \(2, 3\) or \(3,\)"):
+        vector.step(np.zeros(2))

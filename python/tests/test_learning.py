@@ -20,6 +20,8 @@ torch = pytest.importorskip("torch", reason="PyTorch is not installed")
 LEARNING = Path(__file__).parents[2] / "learning"
 sys.path.insert(0, str(LEARNING))
 
+import bc  # noqa: E402
+import dagger  # noqa: E402
 import experiments  # noqa: E402
 import gd  # noqa: E402
 import matching  # noqa: E402
@@ -87,6 +89,54 @@ def test_clones_learn_from_a_data_set(generate):
     found = run("bc.py", str(data), "--epochs", "20", "--episodes", "200")
     assert found["test"]["success"] > 0.5, found  # random actions: 0.35
     assert found["data"]["command"].startswith("tangere generate insertion_translation")
+
+
+def test_a_clone_may_see_the_state(generate, monkeypatch):
+    data = generate("box_pushing", "--episodes", "4", "--seed", "1")
+    monkeypatch.setattr(sys, "argv", ["bc.py", str(data), "--state", "--episodes", "3"])
+    asked = bc.settings()
+    windows = bc.Windows(str(data), ["goal", "q"], split=None)
+    shown = []
+
+    def clone(seen):
+        shown.append(seen)
+        return torch.zeros(3, 3)
+
+    bc.closed_loop(windows, clone, asked)
+    env = tangere.make_vec("box_pushing", 3)
+    obs, _ = env.reset(seed=protocol.TEST_SEED)
+    start = np.concatenate([obs["goal"], env.state()[0] / bc.STATE_UNIT], axis=1)
+    np.testing.assert_allclose(shown[0], start, rtol=1e-5, atol=1e-6)
+    row = windows[0]["obs"]
+    assert row["q"].shape == (1, len(env.model.q_names)) and shown[0].shape == (3, 3 + 7)
+
+
+def test_a_clone_with_memory_learns_from_its_visits(generate):
+    data = generate("insertion_translation", "--episodes", "100", "--seed", "1")
+    words = (str(data), "--updates", "30", "--episodes", "200", "--threads", "1", "--alone", "1")
+    found = run("dagger.py", *words, "--rounds", "8", "--visits", "32")
+    assert found["test"]["success"] > 0.5, found  # random actions: 0.35
+    assert [row[2] is None for row in found["curve"]] == [True] + [False] * 7
+    assert found["rows"] < 300  # the episodes of the data set alone
+
+
+def test_visits_are_what_the_clone_saw_and_the_script_would_have_done():
+    task = tangere.task_spec("insertion_rotation")
+    env = tangere.make_vec("insertion_rotation", 8, autoreset="disabled", threads=1)
+    torch.manual_seed(0)
+    clone = dagger.Recurrent(int(np.prod(task.observations[0].shape)), task.action)
+    rows = dagger.Rows(10, task.horizon, int(np.prod(task.observations[0].shape)), 1)
+    played = dagger.visit(env, clone, ["flow"], 16, rows)
+    assert rows.count == 8 and not rows.there[8:].any()
+    np.testing.assert_array_equal(rows.there[:8].sum(1), played.actions)
+    one = tangere.make_env("insertion_rotation", seed=dagger.VISIT_SEED, first_episode=16 + 3)
+    obs, _ = one.reset()
+    for t in range(played.actions[3]):
+        seen = dagger.flat({"flow": obs["flow"][None]}, ["flow"])[0]
+        np.testing.assert_allclose(rows.seen[3, t], seen, atol=1e-6)
+        np.testing.assert_allclose(rows.wanted[3, t], one.scripted_action(), atol=1e-6)
+        action = clone(rows.seen[3:4, : t + 1])[0][0, -1].detach().numpy()  # from the first row on
+        obs, *_ = one.step(action)
 
 
 @pytest.mark.parametrize("method", ["bc", "td3", "iql"])
@@ -225,6 +275,15 @@ def test_box_errors_are_distances_between_poses():
         played.solved, (played.position < 0.03) & (played.yaw < 0.1)
     )  # the task's own criterion, in the world
     assert np.all(memory[:, 0] > 0.19) and np.all(played.position < 0.1)
+
+
+def test_the_best_policy_solves_most():
+    poor, good = {"success": 0.4, "return": -30.0}, {"success": 0.9, "return": -130.0}
+    assert protocol.merit(good) > protocol.merit(poor) > (-np.inf,)
+    assert protocol.merit(good | {"return": -100.0}) > protocol.merit(good)
+    near, far = ({"position_m": place, "yaw_rad": 0.1} for place in (0.1, 0.2))
+    assert protocol.merit(near) > protocol.merit(far) > (-np.inf,)
+    assert not protocol.merit(near | {"yaw_rad": float("nan")}) > (-np.inf,)
 
 
 def test_intervals_are_those_of_tables():

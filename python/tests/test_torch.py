@@ -183,6 +183,7 @@ def test_mistakes_are_told():
     for shape in ((2, 3), (2, 0, 1)):
         with pytest.raises(tangere.InputError, match=r"expected \(E, A, na\)"):
             tt.rollout("dummy", torch.zeros(shape))
+    assert tt.rollout("dummy", np.zeros((1, 2, 1))).rewards.shape == (1, 2)  # arrays, too
     tape = tt.Tape("dummy", 1, 2)
     tape.reset()
     with pytest.raises(tangere.InputError):
