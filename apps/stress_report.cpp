@@ -8,6 +8,8 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "apps/scene_run.hpp"
+
 namespace tangere::apps {
 namespace {
 
