@@ -240,6 +240,7 @@ int generate(GenerateOptions options, const Console& console, const ProgramInfo&
   // The same for the episodes and their gradients, which play them again.
   SolverOptions asked{.accuracy = options.accuracy, .sleep = options.sleep ? kUsualSleep : 0};
   if (options.gradients != "none") asked.tolerance = kGradientTolerance;
+  asked.all_contacts = options.gradients != "none";
   if (const std::unique_ptr<Task> task = find_task(options.scene, console, asked))
     return generate_task(options, console, info, *task);
   refuse_with_scene(options.scene, {{"--policy", !options.policy.empty()},

@@ -73,6 +73,7 @@ void ask_of_solver(SolverOptions& of_scene, const SolverOptions& asked) {
   if (asked.accuracy) of_scene.accuracy = asked.accuracy;
   if (!of_scene.tolerance) of_scene.tolerance = asked.tolerance;
   if (of_scene.sleep == 0) of_scene.sleep = asked.sleep;
+  of_scene.all_contacts |= asked.all_contacts;
 }
 
 Scene read_scene_for(const std::string& path, bool allow_unknown, const Console& console,
@@ -108,7 +109,8 @@ void warn_of_geometry(const Console& console, const Model& model) {
     if (mesh.unresolved > MeshInfo::kMostUnresolved)
       console.note(fmt::format(
           "warning: body '{}': cells of {:.3g} m do not resolve {:.0f} % of the mesh's surface, "
-          "where walls or details are thinner than about 1.5 cells; expected a larger 'resolution'",
+          "where walls or details are thinner than about 1.5 cells; expected a larger 'resolution' "
+          "or a smaller 'error'",
           mesh.body, mesh.cell, 100 * mesh.unresolved));
   for (const auto& lines : {start_overlaps(model), rounded_places(model)})
     for (const std::string& line : lines) console.note("warning: " + line);

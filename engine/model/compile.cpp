@@ -129,7 +129,7 @@ class Compiler {
       if (mesh == nullptr || mesh->resolution == 0 || !is_touched(b)) continue;
       std::shared_ptr<const MeshGrid> grid;
       try {
-        grid = shared_mesh_grid(*mesh);
+        grid = fitting_mesh_grid(*mesh);
       } catch (const InputError& error) {
         throw InputError(d.source.prefix() + "body '" + d.name + "': " + error.what());
       }

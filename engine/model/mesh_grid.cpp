@@ -308,4 +308,21 @@ std::shared_ptr<const MeshGrid> shared_mesh_grid(const MeshShape& mesh) {
   return grid;
 }
 
+std::shared_ptr<const MeshGrid> fitting_mesh_grid(const MeshShape& mesh) {
+  if (!(mesh.error > 0)) return shared_mesh_grid(mesh);
+  MeshShape tried = mesh;
+  double found = 0;
+  for (const int cells : {16, 24, 32, 48, 64, 96, MeshShape::kMostCells}) {
+    tried.resolution = cells;
+    auto grid = shared_mesh_grid(tried);
+    found = mesh.scale * grid->fit.error;
+    if (found <= mesh.error) return grid;
+  }
+  throw InputError(
+      fmt::format("with {} cells along its longest side, the most, the distance to the mesh is off "
+                  "by {:.3g} m; "
+                  "expected an error of that or more, not {:g} m",
+                  MeshShape::kMostCells, found, mesh.error));
+}
+
 }  // namespace tangere

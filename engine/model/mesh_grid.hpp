@@ -35,4 +35,8 @@ std::shared_ptr<const MeshGrid> make_mesh_grid(const MeshShape& mesh);
 /// called from any thread; one grid is made at a time.
 std::shared_ptr<const MeshGrid> shared_mesh_grid(const MeshShape& mesh);
 
+/// Returns the coarsest of some grids whose error keeps to `mesh.error`, or that of
+/// `mesh.resolution` where the mesh has none. Throws InputError where the finest grid does not.
+std::shared_ptr<const MeshGrid> fitting_mesh_grid(const MeshShape& mesh);
+
 }  // namespace tangere

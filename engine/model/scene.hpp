@@ -100,8 +100,12 @@ struct MeshShape {
   std::vector<double> vertices;  ///< (n, 3), body frame [m]
   std::vector<std::array<int, 3>> triangles;
   std::vector<double> contact_points = {};  ///< (n, 3), body frame [m]; empty: all vertices
+  static constexpr int kMostCells = 128;    ///< along the longest side
   /// Cells of its distance along the longest side. 0: it has no distance, and nothing touches it.
   int resolution = 64;
+  /// Instead of `resolution`: how far the distance may be off on the surface, as MeshFit::error at
+  /// the mesh's scale [m]; 0: `resolution` counts.
+  double error = 0;
   double scale = 1;  ///< of all lengths above; what is above is at scale 1
 };
 /// A body given by its mass, inertia and contact points alone. It has no distance. Its centre of
@@ -301,6 +305,7 @@ struct SolverOptions {
   /// none sleeps.
   double sleep = 0;
   Source sleep_source{};
+  bool all_contacts = false;  ///< StepperOptions::all_contacts
 };
 
 struct Scene {

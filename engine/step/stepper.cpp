@@ -96,7 +96,7 @@ struct Stepper::Impl {
   Impl(const Model& m, const StepSettings& s)
       : model(m),
         settings(s),
-        pushing(s.sleep > 0 ? nullptr : pushing_part(compiled(model))),
+        pushing(s.sleep > 0 || s.all_contacts ? nullptr : pushing_part(compiled(model))),
         machine(pushing ? pushing->model : compiled(model), s),
         all_q(as_size(m.nq())),
         all_v(as_size(m.nv())) {
@@ -365,6 +365,7 @@ Integrator integrator_in_force(const Model& model, const StepperOptions& options
 StepperOptions for_gradients(const Model& model, StepperOptions options) {
   refuse_sleep(model, step_settings(model, options));
   if (!options.tolerance && !model.solver().tolerance) options.tolerance = kGradientTolerance;
+  options.all_contacts = true;
   return options;
 }
 

@@ -19,6 +19,9 @@ struct StepperOptions {
   /// Bodies sleep that have moved by less than this share of their size for a while
   /// (docs/sleeping.md), below 1. 0: none does.
   std::optional<double> sleep{};
+  /// Steps without a tape take contacts that can never push, too. So they have the bits of steps
+  /// with one.
+  bool all_contacts = false;
 };
 
 }  // namespace tangere

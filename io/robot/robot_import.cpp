@@ -102,9 +102,11 @@ void add_motors(Robot& robot, const std::vector<MotorRequest>& requests, const s
     const auto effort = robot.efforts.find(request.joint);
     const bool bounded = effort != robot.efforts.end();
     if (!request.P && !bounded)
-      throw InputError(fmt::format(
-          "--motor {}=force: {}the joint has no <limit effort>; expected one, or {}=P,D",
-          request.joint, link->joint.source.prefix(), request.joint));
+      throw InputError(
+          fmt::format("--motor {}=force: {}the joint has no bound of its force (<limit effort> of "
+                      "URDF, actuatorfrcrange of MJCF); "
+                      "expected one, or {}=P,D",
+                      request.joint, link->joint.source.prefix(), request.joint));
     motor.high = bounded ? effort->second : std::numeric_limits<double>::infinity();
     motor.low = -motor.high;
     if (request.P) {

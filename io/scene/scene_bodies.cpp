@@ -16,7 +16,6 @@ namespace tangere {
 namespace {
 
 constexpr int kLargestResolution = 1000;  // contact points along one edge or around one ring
-constexpr int kMostCells = 128;           // of a mesh's distance along its longest side
 constexpr int kMostSpread = 4096;         // contact points spread over a mesh
 
 using Names = std::vector<std::string>;
@@ -50,6 +49,7 @@ class Attributes {
                 "inertia",
                 "mesh",
                 "resolution",
+                "error",
                 "count",
                 "pitch"};
 };
@@ -195,9 +195,14 @@ Shape read_shape(const SceneNode& node, Attributes& attributes) {
   Shape shape = row.make();
   if (std::holds_alternative<MeshShape>(shape)) {
     attributes.use({"filename", "scale", "transform_type", "general_contact_resolution",
-                    "resolution", "count", "pitch"});
+                    "resolution", "error", "count", "pitch"});
     MeshShape mesh = read_mesh(node, length);
-    mesh.resolution = node.integer("resolution", 0, kMostCells, mesh.resolution);
+    mesh.resolution = node.integer("resolution", 0, MeshShape::kMostCells, mesh.resolution);
+    if (node.has("error")) {
+      if (node.has("resolution"))
+        node.fail("error chooses the cells; expected error or resolution, not both");
+      mesh.error = node.positive("error", 1.0) * length;
+    }
     read_contact_count(node, length, mesh);
     return mesh;
   }

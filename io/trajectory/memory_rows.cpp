@@ -104,8 +104,8 @@ std::vector<std::int64_t> read_steps(const h5::Id& dataset, std::int64_t steps) 
   return list;
 }
 
-std::optional<SavedMemory> read_memory(const h5::Id& file, std::int64_t steps, std::int64_t row,
-                                       std::vector<std::int64_t>& rows) {
+std::optional<SavedMemory> read_memory(const h5::Id& file, std::int64_t steps, int environments,
+                                       std::int64_t row, std::vector<std::int64_t>& rows) {
   if (!h5::has_link(file, "memory")) return {};
   const h5::Id group = h5::open_group(file, "memory");
   rows = read_steps(h5::open_dataset(group, "step"), steps);
@@ -118,10 +118,12 @@ std::optional<SavedMemory> read_memory(const h5::Id& file, std::int64_t steps, s
   const h5::Id dataset = h5::open_dataset(group, "s");
   const h5::Dims dims = h5::dimensions(dataset);
   const hsize_t P = in_order.count();
-  if (dims.size() != 4 || dims[0] != rows.size() || dims[2] != P || dims[3] != 3)
-    damaged(dataset, fmt::format("expected {} rows of {} points", rows.size(), P));
+  const auto E = static_cast<hsize_t>(environments);
+  if (dims != h5::Dims{rows.size(), E, P, 3})
+    damaged(dataset,
+            fmt::format("expected {} rows of {} points of {} environments", rows.size(), P, E));
   std::vector<double> numbers(P * 3);
-  for (hsize_t e = 0; e < dims[1]; ++e) {
+  for (hsize_t e = 0; e < E; ++e) {
     h5::read_box<double>(dataset, {static_cast<hsize_t>(found - rows.begin()), e, 0, 0},
                          {1, 1, P, 3}, numbers.data());
     if (!std::all_of(numbers.begin(), numbers.end(), [](double x) { return std::isfinite(x); }))

@@ -26,10 +26,11 @@ class MemoryRows {
   std::int64_t written_ = 0;
 };
 
-/// Returns what a file of `steps` steps remembers at `row`; none: it does not hold that row.
+/// Returns what a file of `steps` steps remembers of its environments at `row`; none: it does not
+/// hold that row.
 /// `rows`: set to those that it holds. Throws IoError where it is damaged.
-std::optional<SavedMemory> read_memory(const h5::Id& file, std::int64_t steps, std::int64_t row,
-                                       std::vector<std::int64_t>& rows);
+std::optional<SavedMemory> read_memory(const h5::Id& file, std::int64_t steps, int environments,
+                                       std::int64_t row, std::vector<std::int64_t>& rows);
 
 /// Reads steps of a run of `steps` steps, (n). Throws IoError unless they ascend.
 std::vector<std::int64_t> read_steps(const h5::Id& dataset, std::int64_t steps);

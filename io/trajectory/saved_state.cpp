@@ -163,10 +163,7 @@ SavedState read_state(const std::string& path, std::optional<std::int64_t> row) 
     state.previous_q = read_row(q, at - 1);
     state.previous_v = read_row(v, at - 1);
   }
-  state.memory = read_memory(file, steps, state.row, state.memory_rows);
-  if (state.memory && state.memory->environments.size() != environments)
-    throw IoError(fmt::format("{}: memory of {} environments, states of {}: the file is damaged",
-                              path, state.memory->environments.size(), environments));
+  state.memory = read_memory(file, steps, state.environments, state.row, state.memory_rows);
   return state;
 }
 

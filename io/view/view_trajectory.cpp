@@ -85,7 +85,8 @@ class TrajectoryView {
       const auto found = std::find_if(recorded.begin(), recorded.end(),
                                       [&](const SensorLayout& s) { return s.name == sensor.name; });
       if (found == recorded.end()) {
-        data_.notes.push_back(fmt::format("Sensor '{}' was not recorded.", sensor.name));
+        data_.notes.push_back(
+            fmt::format("The field of sensor '{}' was not recorded.", sensor.name));
         continue;
       }
       const auto index = static_cast<std::size_t>(found - recorded.begin());

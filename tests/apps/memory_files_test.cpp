@@ -176,7 +176,7 @@ TEST(MemoryFiles, DamageAndPointsOfAnotherSceneAreRefused) {
        [](hid_t f) {
          replace(f, "memory/s", {1, 464, 3});
        }},
-      {3, "memory of 1 environments, states of 2",
+      {3, "points of 2 environments",
        [](hid_t f) {
          replace(f, "memory/s", {1, 1, 464, 3});
        }},

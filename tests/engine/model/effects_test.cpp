@@ -10,6 +10,8 @@
 
 #include "engine/model/effects.hpp"
 #include "engine/step/control.hpp"
+#include "engine/step/stepper.hpp"
+#include "engine/step/tape.hpp"
 #include "tests/engine/effect_scenes.hpp"
 #include "tests/engine/runs.hpp"
 
@@ -148,6 +150,28 @@ TEST(Effects, ContactsThatNeverPushAreLeftOut) {
       effects_of(without(scene, {EffectKind::pair_contact}, Way::zero));
   EXPECT_EQ(find(all, "contact box ball")->reason,
             "declared, kn 0 N/m, no damping: it never pushes");
+}
+
+/// Runs with gradients step with and without a tape, and their bits must not differ.
+TEST(Effects, StepsForGradientsTakeAllContacts) {
+  const Scene scene = without(without(testing::scene_that_sleeps(), {EffectKind::sleeping}),
+                              {EffectKind::pair_contact}, Way::zero);
+  const Model model(scene);
+  const StepperOptions options = for_gradients(model, {});
+  constexpr int kTaken = 40;
+  Batch stepped(model, 3), taped(model, 3);
+  Stepper a(model, options), b(model, options);
+  BlockTape tape(model, b.integrator(), kTaken);
+  tape.start(taped, 0);
+  const std::vector<double> u(std::size_t(3 * model.nu()));
+  for (int t = 0; t < kTaken; ++t) {
+    a.step_block(stepped, 0, u);
+    b.step_block(taped, 0, u, &tape);
+  }
+  for (int e = 0; e < 3; ++e) {
+    EXPECT_EQ(testing::q_of(stepped, e), testing::q_of(taped, e));
+    EXPECT_EQ(testing::v_of(stepped, e), testing::v_of(taped, e));
+  }
 }
 
 TEST(Effects, PartsGoWithoutTheirElements) {

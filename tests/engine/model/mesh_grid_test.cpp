@@ -288,6 +288,37 @@ TEST(MeshGrid, TheFitOfARoundBodyIsItsError) {
   EXPECT_LT(before, 4e-4 * 0.02);
 }
 
+/// An error counts at the scale of the mesh.
+TEST(MeshGrid, AnErrorChoosesTheCells) {
+  MeshShape mesh = ellipsoid_mesh(4, {0.02, 0.02, 0.02});
+  mesh.resolution = 16;
+  const auto first = shared_mesh_grid(mesh);
+  const double coarse = first->fit.error;
+  const int cells = first->view.cells[0];
+  mesh.error = 0.5 * coarse;
+  const auto chosen = fitting_mesh_grid(mesh);
+  EXPECT_LE(chosen->fit.error, mesh.error);
+  EXPECT_GT(chosen->view.cells[0], cells);
+  mesh.error = coarse;
+  EXPECT_EQ(fitting_mesh_grid(mesh)->view.cells[0], cells);
+  mesh.scale = 2;
+  EXPECT_LT(fitting_mesh_grid(mesh)->fit.error, coarse);
+  mesh.scale = 1;
+  mesh.error = 0;
+  EXPECT_EQ(fitting_mesh_grid(mesh), shared_mesh_grid(mesh));
+  mesh = cuboid_mesh({0.01, 0.02, 0.01});
+  mesh.error = 1e-12;
+  const auto fault = [&] {
+    try {
+      static_cast<void>(fitting_mesh_grid(mesh));
+    } catch (const InputError& error) {
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  EXPECT_THAT(fault(), ::testing::HasSubstr("with 128 cells along its longest side, the most"));
+}
+
 TEST(MeshGrid, EqualMeshesShareAGrid) {
   MeshShape mesh = cuboid_mesh({0.01, 0.02, 0.01});
   mesh.resolution = 8;

@@ -487,6 +487,16 @@ TEST_F(TouchedMesh, NothingTouchesAMeshWithoutCells) {
               HasSubstr("primitive_body 'a' (mesh) has no distance"));
 }
 
+TEST_F(TouchedMesh, AnErrorTakesThePlaceOfItsResolution) {
+  const SceneFile file = with_contact("error=\"0.05\"", "b", "a");
+  const auto& mesh = std::get<MeshShape>(file.scene.links[0].body.shape);
+  EXPECT_GT(mesh.error, 0);
+  EXPECT_LE(compile(file.scene)->mesh_info.at(0).error, mesh.error);
+  EXPECT_THAT(error_of([&] { with_contact("error=\"0.05\" resolution=\"9\"", "b", "a"); }),
+              HasSubstr("expected error or resolution, not both"));
+  EXPECT_THAT(error_of([&] { with_contact("error=\"0\"", "b", "a"); }), HasSubstr("error"));
+}
+
 TEST_F(TouchedMesh, ItsDistanceIsMadeWhereSomethingAsksForIt) {
   const SceneFile file = with_contact("resolution=\"20\"", "b", "a");
   EXPECT_TRUE(file.warnings.empty());
