@@ -64,7 +64,8 @@ TEST(Import, WhatIsNoRequestIsSaid) {
   EXPECT_THAT(fault({"--pad", "tip=digit@1,2"}), HasSubstr("2 numbers behind '@'"));
   EXPECT_THAT(fault({"--motor", "slid=force"}), HasSubstr("did you mean 'slide'"));
   EXPECT_THAT(fault({"--motor", "slide=-1"}), HasSubstr("a gain P above 0"));
-  EXPECT_THAT(fault({"--motor", "loose=force"}), HasSubstr("no <limit effort>"));
+  EXPECT_THAT(fault({"--motor", "loose=force"}),
+              HasSubstr("no bound of its force (<limit effort> of URDF"));
   EXPECT_THAT(fault({"--contact", "finger=groun"}), HasSubstr("has no link 'groun'"));
   EXPECT_THAT(fault({"--base", "afloat"}), HasSubstr("expected fixed or free"));
   const Outcome same = run(folder, {"import", kHand, "-o", kHand, "--overwrite"});
