@@ -9,6 +9,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
+#include <string>
 
 #include "engine/model/shapes.hpp"
 
@@ -81,16 +83,30 @@ const Shape* shape_of(const Scene& scene, const std::string& body) {
   return link == scene.links.end() ? nullptr : &link->body.shape;
 }
 
+/// Estimates for the contact points of bodies, made once for each body.
+class Densities {
+ public:
+  /// Returns how many points lie on an area [1/m²]; 0: not known.
+  double of(const std::string& body, const Shape& shape) {
+    const auto [at, made] = found_.try_emplace(body, 0);
+    if (const auto points = row_of(shape).points; made && points != nullptr)
+      at->second = points_by_distance(points(shape));
+    return at->second;
+  }
+
+ private:
+  std::map<std::string, double> found_;
+};
+
 /// The warning of a sensor and a contact of its body, or "".
 std::string unlike(const Scene& scene, const TactileDescription& d, double felt,
-                   const PairContactDescription& c) {
+                   const PairContactDescription& c, Densities& estimates) {
   const bool own = c.general_body == d.body;
   const Shape* const shape = shape_of(scene, c.general_body);
   if ((!own && c.primitive_body != d.body) || !c.points.empty() || shape == nullptr) return "";
   double density = own && d.points.empty() ? points_on_face(*shape, d.array) : 0;
   const bool known = density > 0;
-  if (const auto points = row_of(*shape).points; !known && points != nullptr)
-    density = points_by_distance(points(*shape));
+  if (!known) density = estimates.of(c.general_body, *shape);
   const double pressed = c.coefficients.kn * density;
   if (!(pressed > 0)) return "";
   const double share = felt / pressed, most = known ? kUnlike : kUnlikeByEstimate;
@@ -106,11 +122,12 @@ std::string unlike(const Scene& scene, const TactileDescription& d, double felt,
 }  // namespace
 
 void warn_of_unlike_skins(const Scene& scene, const SceneNode& root) {
+  Densities estimates;
   for (const TactileDescription& d : scene.sensors) {
     const double felt = d.coefficients.kn * points_of_sensor(d);
     if (!(felt > 0)) continue;
     for (const PairContactDescription& c : scene.pair_contacts)
-      if (const std::string text = unlike(scene, d, felt, c); !text.empty()) {
+      if (const std::string text = unlike(scene, d, felt, c, estimates); !text.empty()) {
         root.context().warnings.push_back(text);
         break;
       }

@@ -67,7 +67,11 @@ MemoryRows::MemoryRows(const h5::Id& file, const TrajectoryLayout& layout) : lay
   h5::write_box<double>(place, {0, 0}, {P, 3}, places.data());
   together_ = std::clamp<hsize_t>(kMemoryChunk / (P * 3 * sizeof(double)), 1, E);
   numbers_.resize(together_ * P * 3);
-  const h5::Storage storage = M > 0 ? h5::Storage{{1, together_, P, 3}, true} : h5::Storage{};
+  const h5::Storage storage =
+      M > 0 ? h5::Storage{{1, together_, std::min<hsize_t>(P, kMemoryChunk / (3 * sizeof(double))),
+                           3},
+                          true}
+            : h5::Storage{};
   s_ = h5::create_dataset<double>(group, "s", {M, E, P, 3}, storage);
   h5::write_attribute(s_, "units", "m");
   h5::write_attribute(s_, "meaning", "elastic displacement of each point; 0: none, or no touch");

@@ -255,6 +255,28 @@ void PythonBatch::set_state(const Argument<double>& q, const Argument<double>& v
     batch_.set_state(list[k], std::span(qs).subspan(k * nq, nq), std::span(vs).subspan(k * nv, nv));
 }
 
+Array<std::int64_t> PythonBatch::steps() {
+  const InUse::Turn turn(in_use_);
+  std::span<std::int64_t> numbers;
+  auto array = new_array<std::int64_t>({count()}, numbers);
+  for (int e = 0; e < environments(); ++e) numbers[as_size(e)] = batch_.steps(e);
+  return array;
+}
+
+void PythonBatch::set_steps(const std::vector<std::int64_t>& steps,
+                            const nb::object& environments) {
+  constexpr std::int64_t kEnd = std::int64_t{1} << 48;
+  const std::vector<int> list = listed(environments);
+  if (steps.size() != list.size())
+    throw InputError(fmt::format("{} numbers of steps for {} environments; expected one for each",
+                                 steps.size(), list.size()));
+  for (const std::int64_t s : steps)
+    if (s < 0 || s >= kEnd)
+      throw InputError(fmt::format("{} steps; expected 0 or more, below 2^48", s));
+  const InUse::Turn turn(in_use_);
+  for (std::size_t k = 0; k < list.size(); ++k) batch_.set_steps(list[k], steps[k]);
+}
+
 Array<double> PythonBatch::memory() {
   const InUse::Turn turn(in_use_);
   const std::size_t n = memory_points_.count();
@@ -401,6 +423,13 @@ void add_batches(nb::module_& m) {
            "Sets what friction remembers, (n, points, 3) or (points, 3) as in `memory`, of the\n"
            "environments listed in `envs` (indices, or a mask (E)), or of all. To go on from a\n"
            "state, set it after set_state(). InputError: another shape, or not finite.")
+      .def_prop_ro("steps", &PythonBatch::steps, nb::rv_policy::automatic,
+                   "(E) int64: steps since the start of each episode. The noise of sensors and\n"
+                   "skins with memory=\"read\" go by it.")
+      .def("set_steps", &PythonBatch::set_steps, "steps"_a, "envs"_a = nb::none(),
+           "Sets these counts, one for each of the environments listed in `envs` (indices, or a\n"
+           "mask (E)), or of all. set_state() keeps them, so set them to go on from a state of\n"
+           "another batch. InputError: another length, or a negative number.")
       .def("reset", &PythonBatch::reset, "envs"_a = nb::none(), "episodes"_a = nb::none(),
            "Draws the starting states again, or those of other `episodes`.")
       .def("scene_controls", &PythonBatch::scene_controls, "steps"_a,

@@ -44,6 +44,8 @@ class PythonBatch {
   [[nodiscard]] Array<std::int8_t> status();
   void set_state(const Argument<double>& q, const Argument<double>& v,
                  const nb::object& environments);
+  [[nodiscard]] Array<std::int64_t> steps();
+  void set_steps(const std::vector<std::int64_t>& steps, const nb::object& environments);
   [[nodiscard]] Array<double> memory();
   void set_memory(const Argument<double>& memory, const nb::object& environments);
   void reset(const nb::object& environments,

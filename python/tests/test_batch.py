@@ -254,6 +254,14 @@ def test_what_friction_remembers_goes_on():
     np.testing.assert_array_equal(other.memory, end[:1].tolist() + [memory[4]] * 2 + [*end[3:]])
     other.reset(envs=[1])
     assert not other.memory[1].any() and other.memory[2].any()
+    assert other.steps[1] == 0 and other.steps[2] == 30 and other.steps.dtype == np.int64
+    other.set_steps(batch.steps)
+    np.testing.assert_array_equal(other.steps, 19 * [120])
+    other.set_steps([7], envs=[3])
+    assert other.steps[3] == 7 and other.steps[4] == 120
+    for steps, message in [([1, 2], "2 numbers of steps for 19"), ([-1] * 19, "-1 steps")]:
+        with pytest.raises(tangere.InputError, match=message):
+            other.set_steps(steps)
     for wrong, message in [
         (memory[:, :-1], r"memory of shape \(19, 463, 3\); expected \(19, 464, 3\)"),
         (memory[0, :, :2], r"memory of shape \(464, 2\); expected \(464, 3\)"),

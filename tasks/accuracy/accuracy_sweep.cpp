@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
+#include <utility>
 
 #include "engine/base/as_size.hpp"
 #include "engine/step/stepper.hpp"
@@ -242,14 +244,17 @@ class Sweep {
     std::vector<std::size_t> found;
     for (std::size_t i = 0; i < report_.points.size(); ++i)
       if (suffices(report_.points[i])) sure = std::max(sure, report_.points[i].rate);
+    // Of a setting's precisions the fastest that may do counts.
+    std::vector<std::pair<double, std::size_t>> by_rate;
     for (std::size_t i = 0; i < report_.points.size(); i += precisions()) {
-      const AccuracyPoint& p = report_.points[i];
-      if (p.error <= options_.target && p.bound > options_.target && p.rate > kWorthALook * sure)
-        found.push_back(i);
+      double fastest = 0;
+      for (const AccuracyPoint& p : std::span(report_.points).subspan(i, precisions()))
+        if (p.error <= options_.target && p.bound > options_.target)
+          fastest = std::max(fastest, p.rate);
+      if (fastest > kWorthALook * sure) by_rate.emplace_back(fastest, i);
     }
-    std::ranges::sort(found, [&](std::size_t i, std::size_t j) {
-      return report_.points[i].rate > report_.points[j].rate;
-    });
+    std::ranges::sort(by_rate, std::greater<>());
+    for (const auto& [rate, i] : by_rate) found.push_back(i);
     if (found.size() > kMostLooks) found.resize(kMostLooks);
     return found;
   }
