@@ -167,12 +167,13 @@ void bound_parts(CompiledSensor& s) {
     if (std::vector<Sphere> cut = blocks_of(s, rows, kParts / rows); largest(cut) < largest(best))
       best = std::move(cut);
   best.resize(kParts, best.front());  // twice is no harm
-  for (const auto component : {0, 1, 2, 3})
-    for (const Sphere& part : best)
-      s.parts.push_back(component == 0   ? part.middle.x
-                        : component == 1 ? part.middle.y
-                        : component == 2 ? part.middle.z
-                                         : part.radius);
+  s.parts.resize(std::size_t{4} * kParts);
+  for (std::size_t k = 0; k < best.size(); ++k) {
+    s.parts[k] = best[k].middle.x;
+    s.parts[kParts + k] = best[k].middle.y;
+    s.parts[2 * kParts + k] = best[k].middle.z;
+    s.parts[3 * kParts + k] = best[k].radius;
+  }
 }
 
 /// Puts spheres around all tiles, around the parts of the pad, and around eight tiles at a time.

@@ -97,8 +97,9 @@ void GroupStep::watch_faces(const kernels::KernelTable& table, BasicWorkspace<L>
                             NewtonReport& report) const {
   if (!model_.view.faced) return;
   table.stage<L>().choose_faces(model_.view, w.stage, w.faces_after);
-  for (std::size_t k = 0; k < model_.pairs.size(); ++k)
-    for (int l = 0; l < L && pushes(model_.pairs[k].parameters); ++l) {
+  for (std::size_t k = 0; k < model_.pairs.size(); ++k) {
+    if (!pushes(model_.pairs[k].parameters)) continue;
+    for (int l = 0; l < L; ++l) {
       double along = 0, all = 0;
       for (std::size_t i = 3 * k; i < 3 * k + 3; ++i) {
         const double before = w.stage.faces[i][l], after = w.faces_after[i][l];
@@ -107,6 +108,7 @@ void GroupStep::watch_faces(const kernels::KernelTable& table, BasicWorkspace<L>
       }
       if (along == -1 && all == 2) report.passed |= lanes & (1U << l);
     }
+  }
 }
 
 /// Computes q1 = centre ⊕ x, v1 = v. A joint that turned by π or more is not resolved: its chart
@@ -173,7 +175,6 @@ void GroupStep::log_inner(const BasicWorkspace<L>& w, int lane, const Scheme& sc
     log.inner[i * kernels::kBlock + lane] = w.x_inner[i][lane];
 }
 
-/// Takes two half steps from q0, v0, split again where needed.
 /// Solves a step of length h, and looks at what it came to.
 template <int L>
 Solved GroupStep::solve_and_watch(const Scheme& scheme, const kernels::KernelTable& table,
@@ -195,6 +196,7 @@ Solved GroupStep::solve_and_watch(const Scheme& scheme, const kernels::KernelTab
   return solved;
 }
 
+/// Takes two half steps from q0, v0, split again where needed.
 bool GroupStep::split(const kernels::KernelTable& table, SingleWorkspace& w, double h, int depth,
                       NewtonReport& report, std::vector<TapedSolve>* solves) const {
   return depth <= kDeepestSplit && take_part(table, w, 0.5 * h, depth, report, solves) &&
