@@ -148,18 +148,11 @@ LaneBits ContactForces::parted(const Row<L>* a, const Row<L>* b) const {
   return lanes;
 }
 
-template <int L>
-void ContactForces::add_sizes(const Row<L>* wrenches, Row<L>* sum) const {
-  for (std::size_t i = 0; i < rows(); ++i)
-    for (int l = 0; l < L; ++l) sum[i][l] += std::abs(wrenches[i][l]);
-}
-
 #define TANGERE_FOR_LANES(L)                                                         \
   template double ContactForces::change(const Row<L>*, const Row<L>*, const Row<L>*, \
                                         const Row<L>*, int) const;                   \
   template LaneBits ContactForces::touching(const Row<L>*) const;                    \
-  template LaneBits ContactForces::parted(const Row<L>*, const Row<L>*) const;       \
-  template void ContactForces::add_sizes(const Row<L>*, Row<L>*) const;
+  template LaneBits ContactForces::parted(const Row<L>*, const Row<L>*) const;
 TANGERE_FOR_LANES(kernels::kGroup)
 TANGERE_FOR_LANES(1)
 #undef TANGERE_FOR_LANES

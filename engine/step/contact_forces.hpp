@@ -33,10 +33,6 @@ class ContactForces {
   template <int L>
   [[nodiscard]] LaneBits parted(const kernels::Row<L>* a, const kernels::Row<L>* b) const;
 
-  /// Adds the sizes of all numbers of wrenches to `sum`.
-  template <int L>
-  void add_sizes(const kernels::Row<L>* wrenches, kernels::Row<L>* sum) const;
-
  private:
   struct Contact {
     int group = 0;

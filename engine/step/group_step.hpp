@@ -53,8 +53,9 @@ class GroupStep {
   template <int L>
   LaneBits left_limits(const BasicWorkspace<L>& w, LaneBits lanes) const;
   template <int L>
-  LaneBits unfelt_contacts(const kernels::KernelTable& table, BasicWorkspace<L>& w, LaneBits parted,
-                           const kernels::Row<L>& h, NewtonReport& report) const;
+  kernels::Row<L> share_of_velocity(const BasicWorkspace<L>& w, const kernels::Row<L>& h,
+                                    const kernels::Row<L>* way,
+                                    const kernels::Row<L>& factor) const;
   template <int L>
   kernels::Row<L> estimated_error(const kernels::KernelTable& table, BasicWorkspace<L>& w,
                                   LaneBits lanes, const kernels::Row<L>& h,

@@ -12,15 +12,17 @@
 //       (contact_forces.hpp)
 //   M (c₀/h)² e, in the scale of the solver's tolerance: the share of all acting forces that would
 //       displace by e in a stage
-// A contact or a limit that acts at the start and at no stage is seen by none of these: δ_v moves
-// the end further away from it. There M e_v counts, in the same scale: the share of the momentum
-// that its push would change.
+// A contact or a limit that acts at the start and not at the end is seen by none of these: no force
+// changes where the end is. There the momentum that it gave counts. The error of the velocity is
+// (c₀/h) δ_v, and its share is that of the velocity at the start or at the end, or of what gravity
+// changes in the part, whichever is largest.
 // A step begins with a part of its whole length whatever was before it, so it depends on its state
 // alone. Lanes have parts of their own lengths and are solved side by side, until the last has
 // arrived.
 #include "engine/step/step_parts.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "engine/step/group_step.hpp"
@@ -75,11 +77,10 @@ void GroupStep::weigh_velocity(const kernels::KernelTable& table, BasicWorkspace
   evaluate_elsewhere(model_, table, w, lanes, report);
 }
 
-/// Returns the lanes in which a limit acts at the start and at no stage. Limits of ball joints are
-/// not looked at. `base`: the end, as displacements.
+/// Returns the lanes in which a limit acts at the start and not at the end. Limits of ball joints
+/// are not looked at. `base`: the end, as displacements.
 template <int L>
 LaneBits GroupStep::left_limits(const BasicWorkspace<L>& w, LaneBits lanes) const {
-  const int n = model_.nv, inner = settings_.integrator.scheme().inner_stages();
   LaneBits left = 0;
   for (const kernels::Link& link : model_.links) {
     if ((link.effects & kernels::kLimited) == 0 || link.kind == kernels::JointKind::spherical)
@@ -90,33 +91,42 @@ LaneBits GroupStep::left_limits(const BasicWorkspace<L>& w, LaneBits lanes) cons
       for (int l = 0; l < L; ++l) {
         const double start = w.q0[link.q + k][l];
         const auto beyond = [&](double x) { return start + x < e.low || start + x > e.high; };
-        bool felt = beyond(w.base[i][l]);
-        for (int j = 0; j < inner; ++j) felt |= beyond(w.x_inner[j * n + i][l]);
-        if (beyond(0) && !felt) left |= 1U << l;
+        if (beyond(0) && !beyond(w.base[i][l])) left |= 1U << l;
       }
     }
   }
   return left & lanes;
 }
 
-/// Returns the lanes of `parted`, in which some contact acts at the start and not at the end, where
-/// it acts at no inner stage either. Overwrites the second half of the workspace's wrenches.
+/// Returns ‖D^½ δ‖ over the largest of ‖D^½ v‖ at the start and at the end and h |gravity| ‖D^½‖, in
+/// the component where that is worst. D is the diagonal of the mass matrix, δ = `factor` `way`.
 template <int L>
-LaneBits GroupStep::unfelt_contacts(const kernels::KernelTable& table, BasicWorkspace<L>& w,
-                                    LaneBits parted, const Row<L>& h, NewtonReport& report) const {
-  const Scheme& scheme = settings_.integrator.scheme();
-  const auto [start, end, here, felt] = w.wrenches;
-  std::fill_n(felt, contact_forces_.rows(), Row<L>{});
-  contact_forces_.add_sizes<L>(end, felt);
-  for (int k = 0; k < scheme.inner_stages() && parted != 0; ++k) {
-    set_stage(model_, scheme, k, h, w);
-    std::copy_n(w.x_inner + k * model_.nv, model_.nv, w.stage.x);
-    evaluate_elsewhere(model_, table, w, parted, report);
-    table.stage<L>().contact_wrenches(model_.view, w.stage, here);
-    contact_forces_.add_sizes<L>(here, felt);
-    parted &= contact_forces_.parted<L>(start, felt);
+Row<L> GroupStep::share_of_velocity(const BasicWorkspace<L>& w, const Row<L>& h, const Row<L>* way,
+                                    const Row<L>& factor) const {
+  const double gravity = std::sqrt(dot(model_.view.gravity, model_.view.gravity));
+  Row<L> worst{};
+  for (int c = 0; c < model_.components(); ++c) {
+    Row<L> off{}, before{}, after{}, mass{};
+    for (int k = model_.component_begin[std::size_t(c)];
+         k < model_.component_begin[std::size_t(c) + 1]; ++k) {
+      const int i = model_.component_dofs[std::size_t(k)];
+      for (int l = 0; l < L; ++l) {
+        const double d = w.stage.weight[i][l] * w.stage.weight[i][l];
+        off[l] += d * way[i][l] * way[i][l];
+        before[l] += d * w.v0[i][l] * w.v0[i][l];
+        after[l] += d * w.v1[i][l] * w.v1[i][l];
+        mass[l] += d;
+      }
+    }
+    for (int l = 0; l < L; ++l) {
+      if (off[l] == 0) continue;
+      const double fall = h[l] * gravity;
+      const double scale = std::max({before[l], after[l], fall * fall * mass[l]});
+      const double share = std::abs(factor[l]) * std::sqrt(off[l] / scale);
+      if (!(share <= worst[l])) worst[l] = share;
+    }
   }
-  return parted;
+  return worst;
 }
 
 /// Returns the largest of the shares at the head of this file, of parts that were just solved.
@@ -144,16 +154,25 @@ Row<L> GroupStep::estimated_error(const kernels::KernelTable& table, BasicWorksp
   const LaneBits touched =
       lanes & (contact_forces_.touching<L>(start) | contact_forces_.touching<L>(end));
   const LaneBits parted = lanes & factors.any & contact_forces_.parted<L>(start, end);
-  Row<L> missed{};
-  if ((guessed | left | parted) != 0) scaled_residual(model_, table, w, missed);
+  const auto raise = [&](int l, double share) {
+    if (!(share <= error[l])) error[l] = share;
+  };
+  if (guessed != 0) {
+    Row<L> missed{};
+    scaled_residual(model_, table, w, missed);
+    for (int l = 0; l < L; ++l)
+      if (has(guessed, l))
+        raise(l,
+              has(touched, l) ? contact_forces_.change<L>(start, end, end, start, l) : missed[l]);
+  }
   solve_by_factor(model_, table, w, factors, w.test);
-  const LaneBits unfelt = guessed | left | unfelt_contacts(table, w, parted, h, report);
-  for (int l = 0; l < L; ++l) {
-    if (!has(unfelt, l)) continue;
-    const double change = has(guessed & touched, l)
-                              ? contact_forces_.change<L>(start, end, end, start, l)
-                              : missed[l];
-    if (!(change <= error[l])) error[l] = change;
+  const double c0 = scheme.stages.back().c0, by_test = -c0 * scheme.estimate.front();
+  if ((left | parted) != 0) {
+    Row<L> factor;
+    for (int l = 0; l < L; ++l) factor[l] = c0 / h[l] * by_test;
+    const Row<L> share = share_of_velocity(w, h, w.test, factor);
+    for (int l = 0; l < L; ++l)
+      if (has(left | parted, l)) raise(l, share[l]);
   }
   const LaneBits touching = touched & factors.any;
   if (touching == 0) return error;
@@ -165,12 +184,10 @@ Row<L> GroupStep::estimated_error(const kernels::KernelTable& table, BasicWorksp
     kernel.contact_wrenches(model_.view, s, wrenches);
   };
   move(w.delta, 1, by_displacement);
-  move(w.test, -scheme.stages.back().c0 * scheme.estimate.front(), by_velocity);
-  for (int l = 0; l < L; ++l) {
-    if (!has(touching, l)) continue;
-    const double change = contact_forces_.change<L>(start, end, by_displacement, by_velocity, l);
-    if (!(change <= error[l])) error[l] = change;
-  }
+  move(w.test, by_test, by_velocity);
+  for (int l = 0; l < L; ++l)
+    if (has(touching, l))
+      raise(l, contact_forces_.change<L>(start, end, by_displacement, by_velocity, l));
   return error;
 }
 

@@ -177,6 +177,48 @@ TEST(StepParts, NoticeAReleaseThatNoStageSees) {
   EXPECT_NEAR(speed_thrown_back(slide, 0), 1, 1e-3);
 }
 
+enum class Push { ground, limit };
+
+/// The error of the velocity with which a ball leaves the ground or the limit of its joint, which
+/// lets it go `after` into a step of 5 ms. Its stages see some of the push.
+double error_of_release(Push push, const Integrator& scheme, double accuracy, double after) {
+  constexpr double kMass = 0.01, kRadius = 0.01, kStiffness = 400, kGravity = 9.8, kStep = 5e-3;
+  Scene scene;
+  scene.integrator = scheme;
+  const double density = kMass / (4.0 / 3 * M_PI * 1e-6);
+  scene.links = {
+      testing::link("ball", JointType::prismatic, {0, 0, kRadius}, SphereShape{kRadius}, density)};
+  scene.links[0].joint.axis0 = {0, 0, 1};
+  if (push == Push::ground) {
+    scene.ground = GroundDescription{};
+    scene.ground_contacts.push_back({"ball", {kStiffness, 0, 0, 0}, ContactLaw::linear, 1e-5, {}});
+  } else {
+    scene.links[0].joint.limits = {0, 1};
+    scene.links[0].joint.limit_stiffness = kStiffness;
+  }
+  const Model model(scene);
+  Stepper stepper(model, keeping(accuracy, kStep));
+  Batch batch(model, 1);
+  // z = -rest + a sin ωt + rest cos ωt is zero with the velocity `speed` at t = 0, where it leaves.
+  constexpr double kSpeed = 0.3, kRest = kMass * kGravity / kStiffness;
+  const double rate = std::sqrt(kStiffness / kMass), a = kSpeed / rate, angle = rate * -after;
+  const double z = -kRest + a * std::sin(angle) + kRest * std::cos(angle);
+  const double v = rate * (a * std::cos(angle) - kRest * std::sin(angle));
+  batch.set_state(0, std::vector<double>{z}, std::vector<double>{v});
+  stepper.step(batch, {});
+  EXPECT_EQ(batch.status(0), StepStatus::converged);
+  return std::abs(v_of(batch)[0] - (kSpeed - kGravity * (kStep - after))) / kSpeed;
+}
+
+TEST(StepParts, KeepTheMomentumOfAReleaseThatStagesSee) {
+  for (const Push push : {Push::ground, Push::limit})
+    for (const Integrator scheme : {Integrator::sdirk2, Integrator::sdirk3})
+      for (const double accuracy : {1e-2, 1e-3})
+        for (int k = 1; k < 20; ++k)
+          EXPECT_LT(error_of_release(push, scheme, accuracy, k * 0.25e-3), 2 * accuracy)
+              << static_cast<int>(push) << ", " << accuracy << ", after " << k << " twentieths";
+}
+
 TEST(StepParts, NoticeThemWithAFactorToo) {
   // With gravity the first guess of a stage is no root, so there is a factor. It says that what was
   // left behind is far away.
