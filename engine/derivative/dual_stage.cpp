@@ -291,7 +291,9 @@ struct DualStage::Impl {
       const kernels::LinkPair& link_pair = view.link_pairs[k];
       for (int member = link_pair.first; member < link_pair.first + link_pair.count; ++member) {
         const int at = view.pair_order[member];
-        const kernels::PairContact& pair = pairs[std::size_t(at)];
+        kernels::PairContact& pair = pairs[std::size_t(at)];
+        if (pair.ball_radius > 0)
+          pair.ball_tangent = frozen ? 0 : stretch[std::size_t(kernels::kSizeNumbers * pair.body1)];
         kernels::Frame<double> in_1;
         const kernels::Frame<D>& dual = contacts[std::size_t(k)].link2_in_1;
         for (int e = 0; e < 9; ++e) in_1.R.m[e / 3][e % 3] = dual.R.m[e / 3][e % 3].value;

@@ -174,7 +174,8 @@ class Compiler {
       const CompiledBody &first = m_.bodies[b1], &second = m_.bodies[b2];
       const Shape &general = m_.scene.links[b1].body.shape,
                   &primitive = m_.scene.links[b2].body.shape;
-      if (d.points.empty() && !has_contact_points(general))
+      const bool ball = d.points.empty() && is_ball(general);
+      if (d.points.empty() && !ball && !has_contact_points(general))
         throw InputError(d.source.prefix() + "general_body '" + d.general_body + "' (" +
                          shape_name(general) + ") has no contact points; expected " +
                          shapes_with([](const ShapeRow& row) { return row.stretches(); }) +
@@ -183,11 +184,19 @@ class Compiler {
         throw InputError(d.source.prefix() + "primitive_body '" + d.primitive_body + "' (" +
                          shape_name(primitive) + ") has no distance; expected " +
                          shapes_with([](const ShapeRow& row) { return row.distance.has_value(); }));
+      if (ball && !can_touch(general, primitive))
+        throw InputError(d.source.prefix() + "general_body '" + d.general_body +
+                         "' is a sphere, and primitive_body '" + d.primitive_body +
+                         "' a mesh, whose distance is known only near its surface; swap the two "
+                         "bodies");
       if (b1 == b2 || first.link == second.link)
         throw InputError(d.source.prefix() + "bodies '" + d.general_body + "' and '" +
                          d.primitive_body + "' cannot move against each other");
-      std::vector<double> points = points_in_contact(
-          d.points.empty() ? contact_points(general) : d.points, d.first_name(), d.source);
+      const std::vector<double> centre = {0, 0, 0};
+      std::vector<double> points = points_in_contact(ball               ? centre
+                                                     : d.points.empty() ? contact_points(general)
+                                                                        : d.points,
+                                                     d.first_name(), d.source);
       double reach = 0;
       for (std::size_t k = 0; k < points.size(); k += 3) {
         const Vec3<double> p =
@@ -211,6 +220,7 @@ class Compiler {
       pair.reach = reach;
       pair.body1 = b1;
       pair.body2 = b2;
+      if (ball) pair.ball_radius = first.size.x;
       if (pair.shape == PrimitiveShape::cuboid && d.points.empty() && is_convex(general) &&
           pair.n_points <= kCorners)
         meet_faces(pair, first);

@@ -44,15 +44,21 @@ bool remembers(const CompiledModel& m) {
 /// Returns "cuboid: products, flat faces; …" with each shape once, and once more where only some of
 /// its contacts remember, then how many bodies move.
 std::string pair_variant(const CompiledModel& m, const kernels::LinkPair& links) {
-  std::vector<std::pair<PrimitiveShape, bool>> kinds;
+  struct Kind {
+    PrimitiveShape shape;
+    bool remembers, ball;
+    bool operator==(const Kind&) const = default;
+  };
+  std::vector<Kind> kinds;
   for (int i = links.first; i < links.first + links.count; ++i) {
     const kernels::PairContact& pair = m.pairs[std::size_t(m.pair_order[std::size_t(i)])];
-    const std::pair kind = {pair.shape, kernels::remembers(pair.parameters)};
+    const Kind kind = {pair.shape, kernels::remembers(pair.parameters), pair.ball_radius > 0};
     if (std::find(kinds.begin(), kinds.end(), kind) == kinds.end()) kinds.push_back(kind);
   }
   std::string text;
-  for (const auto& [shape, remembers] : kinds)
-    text += std::string(row_of(shape).name) + ": " + sums_of(shape) +
+  for (const auto& [shape, remembers, ball] : kinds)
+    text += std::string(row_of(shape).name) + ": " +
+            (ball ? "one point of a sphere's surface" : sums_of(shape)) +
             (remembers ? ", remembers; " : "; ");
   if (links.link1 < 0 || links.link2 < 0) return text + "one body moves";
   return text + "both bodies move";

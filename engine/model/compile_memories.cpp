@@ -162,6 +162,13 @@ void compile_memories(CompiledModel& m) {
   for (std::size_t k = 0; k < m.pairs.size(); ++k) {
     kernels::PairContact& pair = m.pairs[k];
     if (!remembers(pair.parameters)) continue;
+    if (pair.ball_radius > 0) {
+      const PairContactDescription& d = m.scene.pair_contacts[k];
+      throw InputError(d.source.prefix() + "ks of the sphere '" + d.general_body + "' against '" +
+                       d.primitive_body +
+                       "': a sphere that touches with its surface does not remember; expected 0, "
+                       "or the two bodies swapped");
+    }
     kernels::RememberingContact of;
     of.contact = pair;
     of.pair = static_cast<int>(k);

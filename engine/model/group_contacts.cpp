@@ -89,15 +89,16 @@ void bound_pair(const CompiledModel& m, kernels::LinkPair& links) {
     low = {std::min(low.x, at.x), std::min(low.y, at.y), std::min(low.z, at.z)};
     high = {std::max(high.x, at.x), std::max(high.y, at.y), std::max(high.z, at.z)};
   }
-  double of_points = 0, of_shapes = 0;
+  double of_points = 0, of_shapes = 0, of_balls = 0;
   bound(points.data(), static_cast<int>(points.size() / 3), links.points_middle, of_points);
   links.shapes_middle = 0.5 * (low + high);
   for (const int k : members) {
     const kernels::PairContact& pair = m.pairs[std::size_t(k)];
     const kernels::Vec3<double> arm = pair.frame2.p - links.shapes_middle;
     of_shapes = std::max(of_shapes, std::sqrt(dot(arm, arm)) + radius_of(pair));
+    of_balls = std::max(of_balls, pair.ball_radius);
   }
-  links.apart = of_points + of_shapes * (1 + 1e-9) + 1e-9;  // rounded up as in bound()
+  links.apart = of_points + (of_balls + of_shapes) * (1 + 1e-9) + 1e-9;  // rounded up as in bound()
 }
 
 }  // namespace
@@ -107,7 +108,10 @@ void bound_links(CompiledModel& m) {
 }
 
 void group_contacts(CompiledModel& m) {
-  for (kernels::PairContact& p : m.pairs) bound(p.points, p.n_points, p.middle, p.extent);
+  for (kernels::PairContact& p : m.pairs) {
+    bound(p.points, p.n_points, p.middle, p.extent);
+    p.extent += p.ball_radius;
+  }
   for (kernels::GroundContact& g : m.grounds) {
     bound(g.points, g.n_points, g.middle, g.extent);
     g.extent += g.radius;

@@ -349,6 +349,10 @@ bool has_distance(const Shape& shape);
 bool has_contact_points(const Shape& shape);
 /// Whether the shape looks the same from every side. The ground then touches its lowest point.
 bool is_ball(const Shape& shape);
+/// Whether a body of the first shape can touch one of the second: with its contact points, or a
+/// sphere with its surface. A mesh knows its distance only near its own surface, so it touches
+/// spheres and is not touched by them.
+bool can_touch(const Shape& general, const Shape& primitive);
 /// Whether xx xy xz yy yz zz can be the inertia of a body with volume: principal moments are
 /// positive, and none is as large as the sum of the other two.
 bool is_inertia(const std::array<double, 6>& inertia);

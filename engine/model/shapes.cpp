@@ -393,6 +393,11 @@ bool has_contact_points(const Shape& shape) {
   const ShapeRow& row = row_of(shape);
   return row.stretches() || !contact_points(shape).empty();
 }
+bool can_touch(const Shape& general, const Shape& primitive) {
+  return has_distance(primitive) &&
+         (has_contact_points(general) ||
+          (is_ball(general) && !std::holds_alternative<MeshShape>(primitive)));
+}
 
 double* size_number(Shape& shape, int which) {
   const SizeNumber* s = row_of(shape).size(which);

@@ -34,7 +34,7 @@ double deepest(const kernels::PairContact& pair, const Vec3<double>& size,
           const double* p = pair.points + 3 * k;
           const Vec3<double> at =
               transposed_times(shape.R, Vec3<double>{p[0], p[1], p[2]} - shape.p);
-          most = std::max(most, -distance_at(of, at).d);
+          most = std::max(most, pair.ball_radius - distance_at(of, at).d);
         }
         return most;
       },

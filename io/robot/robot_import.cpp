@@ -174,14 +174,15 @@ std::string contacts_text(Robot& robot, const std::vector<TouchRequest>& request
     for (const std::string& a : first)
       for (const std::string& b : shapes_of(robot, request.second, what, file)) {
         const auto fits = [&](const std::string& points, const std::string& touched) {
-          return has_contact_points(shape_of(points)) && has_distance(shape_of(touched));
+          return can_touch(shape_of(points), shape_of(touched));
         };
         if (!fits(a, b) && !fits(b, a))
           throw InputError(
               fmt::format("{}: neither of '{}' and '{}' has points that could touch "
                           "the other",
                           what, a, b));
-        const bool straight = fits(a, b);
+        // A sphere touches with its whole surface, the other body only with some points.
+        const bool straight = fits(a, b) && !(is_ball(shape_of(b)) && fits(b, a));
         text += fmt::format(
             "    <general_primitive_contact general_body=\"{}\" primitive_body=\"{}\"/>\n",
             attribute_text(straight ? a : b), attribute_text(straight ? b : a));

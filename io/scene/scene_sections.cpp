@@ -159,7 +159,7 @@ void read_contacts(Scene& scene, const SceneNode& section) {
       if (general == primitive)
         node.fail("body '" + d.general_body + "' against itself; expected two bodies");
       const Shape& points = scene.links[std::size_t(general)].body.shape;
-      if (!has_contact_points(points))
+      if (!has_contact_points(points) && !is_ball(points))
         node.fail(fmt::format(
             "general_body '{}' is {} body, which has no contact points; {}", d.general_body,
             with_article(shape_name(points)),
@@ -175,6 +175,11 @@ void read_contacts(Scene& scene, const SceneNode& section) {
             "primitive_body '{}' is {} body, which has no distance function; expected {}",
             d.primitive_body, with_article(shape_name(touched)),
             shapes_with([](const ShapeRow& row) { return row.distance.has_value(); })));
+      if (!can_touch(points, touched))
+        node.fail(fmt::format(
+            "general_body '{}' is a sphere, and primitive_body '{}' a mesh, whose distance is "
+            "known only near its surface; swap the two bodies",
+            d.general_body, d.primitive_body));
       read_law(node, kClamped, d);
       scene.pair_contacts.push_back(std::move(d));
     }

@@ -25,6 +25,7 @@ namespace tangere::kernels {
 template <class N>
 struct PointContact {
   N d, rate;  ///< d, ḋ
+  N gap;      ///< distance from ξ to x₂: d, or d + r of a ball around ξ (ball_contact.hpp)
   Vec3<N> n, x2, u, vt;
   NormalForce<N> normal;
   Friction<N> tangential;
@@ -62,7 +63,9 @@ template <class Shape, class N>
     p.d = at.d;
     p.n = at.n;
   }
-  p.x2 = xi - p.d * p.n;
+  p.gap = p.d;
+  if constexpr (requires { shape.grown; }) p.gap = p.d + shape.grown;
+  p.x2 = xi - p.gap * p.n;
 }
 
 /// Computes velocities and normal force at a place that is found. `omega`, `v`: W.
@@ -145,14 +148,14 @@ void differentiate_normal(const PointContact<N>& p, const Mat3<N>& P, Mat3<N>& n
     // number type and not in the other, whatever -ffp-contract says.
     const Mat3<N> turned = times_skew(p.hessian, n), turn = skew(n);
     for (int i = 0; i < 3; ++i)
-      for (int j = 0; j < 3; ++j) n_theta.m[i][j] = mul_add(p.d, turned.m[i][j], -turn.m[i][j]);
+      for (int j = 0; j < 3; ++j) n_theta.m[i][j] = mul_add(p.gap, turned.m[i][j], -turn.m[i][j]);
   } else {
     n_rho = kFlat ? zero33<N>() : (-p.curvature) * P;
-    const N flatten = kFlat ? one : mul_sub_from(p.d, p.curvature, one);
+    const N flatten = kFlat ? one : mul_sub_from(p.gap, p.curvature, one);
     n_theta = skew(-(flatten * n));
     if constexpr (Shape::kBending == Bending::rod) {
       n_rho += outer(p.curvature * p.axis, p.axis);
-      n_theta = n_theta - outer((p.d * p.curvature) * p.axis, cross(p.axis, n));
+      n_theta = n_theta - outer((p.gap * p.curvature) * p.axis, cross(p.axis, n));
     }
   }
 }
@@ -167,8 +170,8 @@ PointDerivative<N> differentiate(const LawParameters<N>& law, const PointContact
   Mat3<N> n_rho, n_theta;
   differentiate_normal<Shape>(p, diagonal(N(1.0)) - nn, n_rho, n_theta);
   // δx₂ = nnᵀ ρ₂ - d δn.
-  r.x_rho = kFlat ? nn : nn - p.d * n_rho;
-  r.x_theta = (-p.d) * n_theta;
+  r.x_rho = kFlat ? nn : nn - p.gap * n_rho;
+  r.x_theta = (-p.gap) * n_theta;
   const ForceDerivative<N> f = differentiate_force(law, p);
   r.f_u = f.by_u;
   // δu = -ω × δx₂.

@@ -64,7 +64,11 @@ void add_point(const Shape& shape, const Frame<N>& at, const Vec6<N>& W,
   const PlaceCotangent<N> of_arm = pull_back_place<Shape>(p, cross(p.force, slip.a));
   const Vec3<N> rho = of_force.rho + of_arm.rho;
   sum.size += pull_back_size(shape, p, at.R, at.p, xi, rho, of_force.d + of_arm.d);
-  sum.stretch += gate * stretch_share(body, xi, of_force.x + of_arm.x - rho);
+  if constexpr (requires { shape.grown; }) {
+    sum.stretch.x -= pull_back_force(law, p, f_bar).d;  // at fixed ξ, d falls as the ball grows
+  } else {
+    sum.stretch += gate * stretch_share(body, xi, of_force.x + of_arm.x - rho);
+  }
 }
 
 template <class Shape, class N>

@@ -82,12 +82,12 @@ PlaceCotangent<N> pull_back_motion(const LawParameters<N>& law, const PointConta
   const Vec3<N> x_bar = cross(omega, bar.u);
   const N minus_d_bar = dot(p.n, x_bar) - bar.d;
   const Vec3<N> n_bar = mul_add(
-      p.normal.force, f_bar, mul_add(-p.rate, bar.slide, mul_add(bar.rate, p.u, (-p.d) * x_bar)));
+      p.normal.force, f_bar, mul_add(-p.rate, bar.slide, mul_add(bar.rate, p.u, (-p.gap) * x_bar)));
   Vec3<N> rho = minus_d_bar * p.n, turned = n_bar;
   if constexpr (Shape::kBending != Bending::flat) {
     const Vec3<N> bent = bend<Shape>(p, n_bar);
     rho -= bent;
-    turned = mul_add(-p.d, bent, turned);
+    turned = mul_add(-p.gap, bent, turned);
   }
   out.displacement.a += cross(p.x2, rho) + cross(p.n, turned);
   out.displacement.l += rho;
@@ -100,7 +100,7 @@ template <class Shape, class N>
 PlaceCotangent<N> pull_back_place(const PointContact<N>& p, const Vec3<N>& x_bar) {
   const N along = dot(p.n, x_bar);
   Vec3<N> rho = along * p.n;
-  if constexpr (Shape::kBending != Bending::flat) rho += p.d * bend<Shape>(p, x_bar);
+  if constexpr (Shape::kBending != Bending::flat) rho += p.gap * bend<Shape>(p, x_bar);
   return {x_bar, rho, -along};
 }
 

@@ -11,7 +11,7 @@
 // cuboid meets a face of the body, and points are measured one by one.
 #pragma once
 
-#include "kernels/contact/distance.hpp"
+#include "kernels/contact/ball_contact.hpp"
 #include "kernels/contact/shapes/cuboid_face.hpp"
 #include "kernels/step/stage.hpp"
 
@@ -29,10 +29,19 @@ Vec3<N> faces_of(const StageArgs<N>& a, const PairContact& pair, int k) {
   return {a.faces[3 * k], a.faces[3 * k + 1], a.faces[3 * k + 2]};
 }
 
+template <class N>
+GrownShape<N> grown_shape(const PairContact& pair, const Vec3<N>& size) {
+  if constexpr (std::is_same_v<N, Dual<double>>)
+    return {pair.shape, size, {pair.ball_radius, pair.ball_tangent}};
+  else
+    return {pair.shape, size, N(pair.ball_radius)};
+}
+
 /// Calls f with the distance of a pair's touched shape.
 template <class N, class F>
 auto with_touched(const PairContact& pair, const Vec3<N>& size, const Vec3<N>& faces, const F& f) {
   if (pair.faced) return f(CuboidFace<N>::of(size, faces, pair.overhang));
+  if (pair.ball_radius > 0) return f(grown_shape(pair, size));
   return with_distance<N>(pair.shape, size, f, pair.grid);
 }
 

@@ -111,6 +111,9 @@ struct PairContact {
   double overhang = 0;  ///< how far beyond a chosen face's edges a point still touches it [m]
   int memory = -1;      ///< ≥ 0: index of what its friction remembers (ModelView::memories)
   const DistanceGrid* grid = nullptr;  ///< of a mesh
+  /// > 0: body 1 is a ball of this radius, and `points` is its centre (ball_contact.hpp) [m].
+  double ball_radius = 0;
+  double ball_tangent = 0;  ///< tangent of `ball_radius`, used by dual numbers alone
 };
 inline constexpr int kContactTile = 32;
 inline constexpr double kFarAway =

@@ -58,7 +58,7 @@ inline Scene random_tree(unsigned seed, int links) {
   return s;
 }
 
-/// The same, but every body with contact points touches every other body that can move relative to
+/// The same, but every body touches every other body that can move relative to
 /// it, and the ground is in reach. A half-space is fixed in the world or to the first link.
 inline Scene random_contacts(unsigned seed, int links, ContactLaw law) {
   Scene s = random_tree(seed, links);
@@ -84,7 +84,6 @@ inline Scene random_contacts(unsigned seed, int links, ContactLaw law) {
     const BodyDescription& first = s.links[a].body;
     if (moves_with[a] >= 0)
       s.ground_contacts.push_back({first.name, coefficients(), law, 1e-5, {}});
-    if (std::holds_alternative<SphereShape>(first.shape)) continue;
     if (moves_with[a] != (wall.parent < 0 ? -1 : moves_with[std::size_t(wall.parent)]))
       s.pair_contacts.push_back({first.name, wall.body.name, coefficients(), law, 1e-5, {}});
     for (std::size_t b = 0; b < s.links.size(); ++b)

@@ -60,10 +60,14 @@ struct CuboidDistance {
              select(x_first, zero, select(y_first, zero, sign.z))}};
   }
 
-  /// Inside: cotangents of the half edges, from a cotangent ρ of the shape's place. A face moves
-  /// along its normal.
+  /// Cotangents of the half edges, from a cotangent ρ of the shape's place. A face moves along its
+  /// normal, and an edge with both of its faces.
   Vec3<N> size_share(const Vec3<N>&, const Vec3<N>& n, const Vec3<N>& rho) const {
-    return {n.x * rho.x, n.y * rho.y, n.z * rho.z};
+    const N zero(0.0);
+    const auto share = [&](const N& to, const N& by) {
+      return select(to > zero, by, select(to < zero, -by, zero));
+    };
+    return {share(n.x, rho.x), share(n.y, rho.y), share(n.z, rho.z)};
   }
 
   static Vec3<N> stretched(const Vec3<N>& to, const Vec3<double>& from, const Vec3<double>& y) {

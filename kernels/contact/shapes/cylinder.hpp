@@ -77,10 +77,14 @@ struct CylinderDistance {
              select(side, zero, select(y.z < zero, -one, one))}};
   }
 
-  /// Inside: cotangents of radius and half length, from a cotangent ρ of the shape's place (n is
-  /// radial or axial).
-  Vec3<N> size_share(const Vec3<N>&, const Vec3<N>& n, const Vec3<N>& rho) const {
-    return {mul_add(n.x, rho.x, n.y * rho.y), n.z * rho.z, N(0.0)};
+  /// Cotangents of radius and half length, from a cotangent ρ of the shape's place. The rim moves
+  /// with both.
+  Vec3<N> size_share(const Vec3<N>& y, const Vec3<N>& n, const Vec3<N>& rho) const {
+    const N zero(0.0);
+    const AxisDistance<N> axis(y);
+    const auto beside = mul_add(n.x, n.x, n.y * n.y) > zero;
+    return {select(beside, mul_add(axis.x, rho.x, axis.y * rho.y), zero),
+            select(n.z > zero, rho.z, select(n.z < zero, -rho.z, zero)), zero};
   }
 
   static Vec3<N> stretched(const Vec3<N>& to, const Vec3<double>& from, const Vec3<double>& y) {

@@ -33,6 +33,12 @@ struct SphereDistance {
              select(regular, inverse * y.z, N(1.0))}};
   }
 
+  Mat3<N> hessian(const Vec3<N>& y) const {
+    N curvature;
+    const Distance<N> at = evaluate(y, curvature);
+    return curvature * (diagonal(N(1.0)) - outer(at.n, at.n));
+  }
+
   /// Cotangent of the radius, from a cotangent ρ of the sphere's place, in any axes.
   Vec3<N> size_share(const Vec3<N>&, const Vec3<N>& n, const Vec3<N>& rho) const {
     return {dot(n, rho), N(0.0), N(0.0)};

@@ -5,6 +5,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "engine/model/compile.hpp"
 #include "engine/step/detection.hpp"
 #include "engine/step/state_difference.hpp"
@@ -75,7 +77,7 @@ TEST(Passing, WhatIsOutOfReachDidNotPass) {
           out_of_reach += has(spared, l) ? 1 : 0;
           of_these_far += has(spared & far, l) ? 1 : 0;
         }
-        w.apart[0] = 0;
+        std::ranges::fill(w.apart, 0);
         EXPECT_EQ(passing.out_of_reach<kGroup>(w, kAllLanes), kNoLane) << "near in some lane";
       }
     EXPECT_GT(passed, 20);
