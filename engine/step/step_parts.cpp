@@ -98,8 +98,9 @@ LaneBits GroupStep::left_limits(const BasicWorkspace<L>& w, LaneBits lanes) cons
   return left & lanes;
 }
 
-/// Returns ‖D^½ δ‖ over the largest of ‖D^½ v‖ at the start and at the end and h |gravity| ‖D^½‖, in
-/// the component where that is worst. D is the diagonal of the mass matrix, δ = `factor` `way`.
+/// Returns ‖D^½ δ‖ over the largest of ‖D^½ v‖ at the start, the same at the end, and h |gravity|
+/// ‖D^½‖, in the component where that is worst. D is the diagonal of the mass matrix, and
+/// δ = `factor` `way`.
 template <int L>
 Row<L> GroupStep::share_of_velocity(const BasicWorkspace<L>& w, const Row<L>& h, const Row<L>* way,
                                     const Row<L>& factor) const {

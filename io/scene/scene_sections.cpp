@@ -125,9 +125,10 @@ void warn_of_coarse_points(const Scene& scene, const SceneNode& root) {
     root.context().warnings.push_back(fmt::format(
         "{}<general_primitive_contact>: contact points of '{}' are up to {:.3g} m apart, and '{}' "
         "is {:.3g} m across, so it can come between them, or out from under them, unnoticed; "
-        "expected a finer "
-        "general_contact_resolution, or the same contact the other way round as well",
-        c.source.prefix(), c.general_body, pitch, c.primitive_body, across[1]));
+        "expected a finer general_contact_resolution, or {}",
+        c.source.prefix(), c.general_body, pitch, c.primitive_body, across[1],
+        is_ball(shape_of(c.primitive_body)) ? "the two bodies swapped"
+                                            : "the same contact the other way round as well"));
   }
 }
 

@@ -35,6 +35,8 @@ struct AccuracySetting {
   double accuracy = 0;  ///< of the parts of a step; 0: every step is one part
   /// The tolerance is left to the engine, which then spares evaluations; `tolerance` says which.
   bool follows = false;
+
+  bool operator==(const AccuracySetting&) const = default;
 };
 
 /// The two precisions in which fields are read, as indices below.

@@ -292,11 +292,16 @@ class Sweep {
 
   bool measure_own() {
     const Model& model = episodes_.start.model();
+    const AccuracySetting setting = {model.integrator(), episodes_.every, tolerance_in_force({}),
+                                     Stepper(model).accuracy(),
+                                     !of_gradients() && !model.solver().tolerance};
+    const auto swept = std::ranges::find(report_.points, setting, &AccuracyPoint::setting);
+    if (swept != report_.points.end()) {
+      report_.own = *swept;
+      return true;
+    }
     std::vector<AccuracyPoint> own;
-    if (!measure({model.integrator(), episodes_.every, tolerance_in_force({}),
-                  Stepper(model).accuracy(), !of_gradients() && !model.solver().tolerance},
-                 own))
-      return false;
+    if (!measure(setting, own)) return false;
     report_.own = own.front();
     return true;
   }
