@@ -53,7 +53,7 @@ TASKS: dict[str, dict[str, Any]] = {
                           "deviation": 0.5},
     "insertion": INSERTION | {"steps": 102_400, "deviation": 0.5, "imitate": 0.0},
     "insertion_translation": INSERTION,
-    "insertion_rotation": INSERTION | {"steps": 61_440, "deviation": 0.5, "imitate": 0.3},
+    "insertion_rotation": INSERTION | {"steps": 122_880, "deviation": 0.5, "imitate": 0.3},
     "box_pushing": {"squash": True, "passes": 10, "minibatch": 1024, "rate": 1e-3,
                     "deviation": 0.5},
 }  # fmt: skip
