@@ -28,6 +28,7 @@
 #include "kernels/table/isa.hpp"
 #include "tasks/gradients/gradients.hpp"
 #include "tasks/gradients/losses.hpp"
+#include "tasks/run/episodes.hpp"
 #include "tasks/run/rollout.hpp"
 
 namespace tangere::apps {
@@ -37,7 +38,7 @@ struct SimulateArguments {
   std::string scene, output, controls, policy, precision = "double", state_from, record;
   GradientArguments gradients;
   std::optional<std::int64_t> steps, row;
-  std::optional<int> environments, every;
+  std::optional<int> environments, every, threads;
   SolverArguments solver;
   std::optional<std::uint64_t> seed;
   bool audit = false, overwrite = false, allow_unknown = false;
@@ -52,11 +53,22 @@ void check_arguments(const SimulateArguments& options) {
     throw InputError("--row without --state-from; expected both");
 }
 
-void check_size(const Model& model, int environments, const RolloutOptions& rollout) {
+void check_size(const Model& model, int environments, int threads, const RolloutOptions& rollout) {
   const double state = static_cast<double>(model.state_bytes_per_environment());
   check_memory(state * environments + rollout_bytes(model, environments, rollout.outputs) +
-                   static_cast<double>(Stepper::workspace_bytes(model)),
+                   threads * static_cast<double>(Stepper::workspace_bytes(model)),
                fmt::format("--envs {}", environments));
+}
+
+/// A thread steps whole blocks, so more threads than blocks would be idle.
+int threads_of(const SimulateArguments& options, int environments) {
+  return std::min(options.threads.value_or(available_threads()),
+                  (environments + kernels::kBlock - 1) / kernels::kBlock);
+}
+std::vector<Stepper> steppers_of(const Model& model, const StepperOptions& solver, int threads) {
+  std::vector<Stepper> steppers;
+  for (int k = 0; k < threads; ++k) steppers.emplace_back(model, solver);
+  return steppers;
 }
 
 RolloutOutputs outputs_of(const SimulateArguments& options, const Model& model) {
@@ -294,12 +306,14 @@ int simulate_task(const SimulateArguments& options, const Console& console, cons
   const PolicyKind kind = policy_named(options.policy, options.controls, PolicyKind::scripted);
   const Policy policy = make_policy(task, kind, options.controls);
   const Model& model = task.model();
-  Stepper stepper(model);
+  const int environments = options.environments.value_or(1),
+            threads = threads_of(options, environments);
   const RolloutOptions rollout{TaskProgram::steps(task.spec()), options.every.value_or(0),
                                precision, 0, outputs_of(options, model)};
   note_empty_sensors(console, model, rollout);
-  check_size(model, options.environments.value_or(1), rollout);
-  Batch batch(model, options.environments.value_or(1), options.seed.value_or(0));
+  check_size(model, environments, threads, rollout);
+  std::vector<Stepper> steppers = steppers_of(model, {}, threads);
+  Batch batch(model, environments, options.seed.value_or(0));
   const auto data = std::make_shared<EnvironmentData>(task, batch.environments());
   data->restart(batch);
   TaskProgram program(task, policy, data, precision, batch.blocks());
@@ -307,12 +321,12 @@ int simulate_task(const SimulateArguments& options, const Console& console, cons
 
   const StopSignals signals;
   const TrajectoryLayout layout =
-      make_layout(batch, stepper, rollout, info, &task, to_string(kind));
+      make_layout(batch, steppers.front(), rollout, info, &task, to_string(kind));
   TrajectoryFile output(options.output, layout, options.overwrite);
   return write_run(
       options, console, batch, layout, rollout, output, signals,
       [&](const RolloutProgress& progress) {
-        return run_rollout(batch, stepper, program, rollout, output, progress);
+        return run_rollout(batch, steppers, program, rollout, output, progress);
       },
       [&] {
         const auto solved = std::count(data->success.begin(), data->success.end(), 1);
@@ -348,7 +362,9 @@ int simulate(const SimulateArguments& options, const Console& console, const Pro
                                outputs_of(options, model)};
   controls.check_covers(rollout.first_step + rollout.steps);
   note_empty_sensors(console, model, rollout);
-  check_size(model, start.environments, rollout);
+  const int threads = threads_of(options, start.environments);
+  check_size(model, start.environments, threads, rollout);
+  std::vector<Stepper> steppers = steppers_of(model, solver, threads);
   Batch batch(model, start.environments, start.seed, start.saved ? start.saved->first_episode : 0);
   if (start.saved) restore_state(*start.saved, start.continues, batch);
   RunGradients gradients(options.gradients, batch, stepper, rollout);
@@ -361,7 +377,7 @@ int simulate(const SimulateArguments& options, const Console& console, const Pro
   return write_run(
       options, console, batch, layout, rollout, output, signals,
       [&](const RolloutProgress& progress) {
-        RolloutSummary summary = run_rollout(batch, stepper, controls, rollout, output, progress);
+        RolloutSummary summary = run_rollout(batch, steppers, controls, rollout, output, progress);
         if (gradients.wanted() && !summary.stopped)
           summary.stopped = !gradients.write(controls, rollout, signals, output);
         return summary;
@@ -406,6 +422,7 @@ Command add_simulate(CLI::App& program) {
                                  "Row of --state-from [default: the last]");
   o.solver.add(app);
   o.gradients.add(app);
+  add_threads_option(app, o.threads, "Threads to run on [default: one per core]");
   add_precision_option(app, o.precision, " with points in float [default: double]");
   add_seed_option(
       app, o.seed,

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The serial rollout. Buffers are made once; rows leave in ascending order.
+// Blocks are stepped and read on several threads; rows leave from one, in ascending order. Buffers
+// are made once.
 #include "tasks/run/rollout.hpp"
 
 #include <algorithm>
@@ -9,6 +10,7 @@
 #include "kernels/numbers/block.hpp"
 #include "tasks/run/audit_recorder.hpp"
 #include "tasks/run/block_reader.hpp"
+#include "tasks/run/block_threads.hpp"
 
 namespace tangere {
 namespace {
@@ -45,13 +47,15 @@ class Recorder {
   }
 
  public:
-  Recorder(const Batch& batch, const RolloutOptions& options, RowSink& sink)
+  Recorder(const Batch& batch, const RolloutOptions& options, BlockThreads& threads, int workers,
+           RowSink& sink)
       : batch_(batch),
         sink_(sink),
-        readout_(batch.model(), options.precision),
+        threads_(threads),
         environments_(batch.environments()),
         options_(options) {
     const Model& model = batch.model();
+    for (int k = 0; k < workers; ++k) readouts_.emplace_back(model, options.precision);
     const RolloutOutputs& outputs = options.outputs;
     const auto e = static_cast<std::size_t>(environments_);
     q_.resize(e * static_cast<std::size_t>(model.nq()));
@@ -74,10 +78,10 @@ class Recorder {
     if (!states && !bodies && !end_effectors) return;
     for (int block = 0; block < batch_.blocks(); ++block) {
       if (states) read_states(batch_, block, place(q_), place(v_));
-      if (end_effectors) read_end_effectors(readout_, batch_, block, place(end_effectors_));
+      if (end_effectors) read_end_effectors(readouts_[0], batch_, block, place(end_effectors_));
     }
     for (int e = 0; e < environments_ && bodies; ++e)
-      readout_.bodies(batch_, e, part(pose_, e), part(twist_, e), outputs.chosen_bodies);
+      readouts_[0].bodies(batch_, e, part(pose_, e), part(twist_, e), outputs.chosen_bodies);
     StateRow row{step, time, {}, {}, {}, {}, {}};
     if (states) row.q = q_, row.v = v_;
     if (bodies) row.body_pose = pose_, row.body_twist = twist_;
@@ -106,8 +110,9 @@ class Recorder {
   void write_field(FieldOutput output, std::int64_t frame, std::int64_t step) {
     const std::span<double> numbers = std::span(reading_).first(
         static_cast<std::size_t>(environments_) * numbers_in(batch_.model(), output));
-    for (int block = 0; block < batch_.blocks(); ++block)
-      read_field<double>(readout_, batch_, block, output, place(numbers));
+    threads_.for_each(batch_.blocks(), readouts_, [&](Readout& readout, int block) {
+      read_field<double>(readout, batch_, block, output, place(numbers));
+    });
     sink_.write(TactileRow{output, frame, step, numbers});
   }
 
@@ -118,7 +123,8 @@ class Recorder {
 
   const Batch& batch_;
   RowSink& sink_;
-  Readout readout_;
+  BlockThreads& threads_;
+  std::vector<Readout> readouts_;  // one for each thread
   int environments_;
   const RolloutOptions& options_;
   std::vector<double> q_, v_, pose_, twist_, end_effectors_;  // as in StateRow
@@ -135,7 +141,9 @@ void check_bodies(const Model& model, const std::vector<int>& bodies) {
                        std::to_string(model.nb()));
 }
 
-void check(const RolloutOptions& options) {
+void check(std::span<const Stepper> steppers, const RolloutOptions& options) {
+  if (steppers.empty())
+    throw InputError("a rollout without a stepper; expected one for each thread");
   if (options.steps < 1)
     throw InputError("a rollout of " + std::to_string(options.steps) +
                      " steps; expected at least 1");
@@ -194,28 +202,31 @@ double rollout_bytes(const Model& model, int environments, const RolloutOutputs&
          (outputs.audit ? AuditRecorder::bytes(environments) : 0);
 }
 
-RolloutSummary run_rollout(Batch& batch, Stepper& stepper, const ControlProgram& controls,
-                           const RolloutOptions& options, RowSink& sink,
-                           const RolloutProgress& progress) {
-  check(options);
-  if (controls.timestep() != stepper.timestep())
+RolloutSummary run_rollout(Batch& batch, std::span<Stepper> steppers,
+                           const ControlProgram& controls, const RolloutOptions& options,
+                           RowSink& sink, const RolloutProgress& progress) {
+  check(steppers, options);
+  if (const double step = steppers.front().timestep(); controls.timestep() != step)
     throw InputError("controls laid out for a timestep of " + std::to_string(controls.timestep()) +
-                     " s; the stepper's is " + std::to_string(stepper.timestep()) + " s");
+                     " s; the stepper's is " + std::to_string(step) + " s");
   controls.check_covers(options.first_step + options.steps);
   SceneProgram program(controls, 1, options.first_step);
-  return run_rollout(batch, stepper, program, options, sink, progress);
+  return run_rollout(batch, steppers, program, options, sink, progress);
 }
 
-RolloutSummary run_rollout(Batch& batch, Stepper& stepper, EpisodeProgram& program,
+RolloutSummary run_rollout(Batch& batch, std::span<Stepper> steppers, EpisodeProgram& program,
                            const RolloutOptions& options, RowSink& sink,
                            const RolloutProgress& progress) {
-  check(options);
+  check(steppers, options);
+  const double timestep = steppers.front().timestep();
   check_bodies(batch.model(), options.outputs.chosen_bodies);
-  check_sensor_memory(batch.model(), stepper.timestep());
+  check_sensor_memory(batch.model(), timestep);
   const auto start = std::chrono::steady_clock::now();
-  Recorder recorder(batch, options, sink);
+  const int workers = static_cast<int>(steppers.size());
+  BlockThreads threads(workers);
+  Recorder recorder(batch, options, threads, workers, sink);
   std::optional<AuditRecorder> audit;
-  if (options.outputs.audit) audit.emplace(batch, stepper.timestep(), sink);
+  if (options.outputs.audit) audit.emplace(batch, timestep, sink);
   struct Reading {
     FieldOutput output;
     OutputTimes times;
@@ -234,7 +245,7 @@ RolloutSummary run_rollout(Batch& batch, Stepper& stepper, EpisodeProgram& progr
 
   // Times come from the step counter, so they do not drift.
   const auto time = [&](std::int64_t row) {
-    return static_cast<double>(options.first_step + row) * stepper.timestep();
+    return static_cast<double>(options.first_step + row) * timestep;
   };
   recorder.write_state(0, time(0));
   recorder.write_memory(0);
@@ -242,7 +253,8 @@ RolloutSummary run_rollout(Batch& batch, Stepper& stepper, EpisodeProgram& progr
   for (std::int64_t t = 0; t < options.steps; ++t) {
     each_block([&](int b) { program.controls(t, batch, b, u); });
     if (audit) audit->before(u);
-    stepper.step(batch, u);
+    threads.for_each(batch.blocks(), steppers,
+                     [&](Stepper& stepper, int b) { stepper.step_block(batch, b, u); });
     recorder.write_step(t, u, tally);
     if (audit) audit->after(t, u, tally);
     tally.count(batch, t);

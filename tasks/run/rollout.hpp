@@ -57,16 +57,18 @@ using RolloutProgress = std::function<bool(std::int64_t done)>;
 /// tactile rows due. A row of which nothing is wanted does not leave. A tactile sensor is read
 /// after steps K, 2K, …, so field k comes from row (k + 1) K of q. In a StepRow, an environment
 /// that failed earlier has 0 iterations and its last status and residual. `program` must have
-/// started every block; it takes all of them through a step in turn. Throws InputError when steps <
-/// 1, every < 0 or first_step < 0. Passes on what the sink throws.
-RolloutSummary run_rollout(Batch& batch, Stepper& stepper, EpisodeProgram& program,
+/// started every block; it takes all of them through a step in turn. `steppers`: one for each thread
+/// that steps and reads blocks, all of the same options; rows are the same for any number of them.
+/// Throws InputError without a stepper and when steps < 1, every < 0 or first_step < 0. Passes on
+/// what the sink throws.
+RolloutSummary run_rollout(Batch& batch, std::span<Stepper> steppers, EpisodeProgram& program,
                            const RolloutOptions& options, RowSink& sink,
                            const RolloutProgress& progress = {});
 /// Does the same for a scene. Also throws InputError when a table of controls is too short or was
 /// laid out for another timestep.
-RolloutSummary run_rollout(Batch& batch, Stepper& stepper, const ControlProgram& controls,
-                           const RolloutOptions& options, RowSink& sink,
-                           const RolloutProgress& progress = {});
+RolloutSummary run_rollout(Batch& batch, std::span<Stepper> steppers,
+                           const ControlProgram& controls, const RolloutOptions& options,
+                           RowSink& sink, const RolloutProgress& progress = {});
 
 /// Returns what is read of tactile fields. Throws InputError as check_outputs() does.
 std::vector<FieldOutput> fields_of(const Model& model, const RolloutOutputs& outputs);

@@ -69,7 +69,7 @@ std::vector<std::string> viewed_trajectories(const std::string& folder) {
   run.instruction_set = "scalar";
   const std::string path = folder + "/run.h5";
   TrajectoryFile file(path, layout_from(batch, stepper, run), true);
-  run_rollout(batch, stepper, viewed_controls(), rollout, file);
+  run_rollout(batch, std::span(&stepper, 1), viewed_controls(), rollout, file);
   file.commit();
   return {file_bytes(path)};
 }
@@ -110,7 +110,7 @@ void go_on(const std::string& path) {
       void write(const TactileRow&) override {}
       void write(const ActionRow&) override {}
     } nowhere;
-    run_rollout(batch, stepper, viewed_controls(), rollout, nowhere);
+    run_rollout(batch, std::span(&stepper, 1), viewed_controls(), rollout, nowhere);
   } catch (const InputError&) {
     refused = true;
   } catch (const IoError&) {

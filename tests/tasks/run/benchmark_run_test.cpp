@@ -127,7 +127,8 @@ TEST(BenchmarkRun, StepsAndReadsWhatARolloutDoes) {
   Batch batch(model, kEnvironments, kSeed);
   Stepper stepper(model);
   const ControlProgram controls(model, model.timestep(), kSeed);
-  const RolloutSummary summary = run_rollout(batch, stepper, controls, {kSteps, kEvery}, sink);
+  const RolloutSummary summary =
+      run_rollout(batch, std::span(&stepper, 1), controls, {kSteps, kEvery}, sink);
   const BenchmarkResult result = result_of(kEnvironments, options(1));
   EXPECT_EQ(result.environment_steps, summary.counts.simulation_steps);
   EXPECT_EQ(result.counts.newton_iterations, summary.counts.newton_iterations);

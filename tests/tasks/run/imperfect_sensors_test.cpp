@@ -88,7 +88,8 @@ TEST_P(ImperfectSensors, ARolloutReadsWhatADataSetStores) {
   RolloutOptions o;
   o.steps = testing::kSteps;
   o.every = testing::kEvery;
-  run_rollout(batch, stepper, ControlProgram(model, model.timestep(), kSeed), o, rows, {});
+  run_rollout(batch, std::span(&stepper, 1), ControlProgram(model, model.timestep(), kSeed), o,
+              rows, {});
   for (int e = 0; e < 20; ++e) {
     const std::string& all = stored.at(e).observations.back();  // from row 0 on
     const std::string& here = rows.fields[std::size_t(e)];
@@ -128,7 +129,7 @@ TEST(ImperfectSensors, AMemoryKeepsToTheStepsOfItsScene) {
   o.steps = 2;
   const ControlProgram controls(model, *half.timestep, 0);
   try {
-    run_rollout(batch, stepper, controls, o, nothing, {});
+    run_rollout(batch, std::span(&stepper, 1), controls, o, nothing, {});
     ADD_FAILURE();
   } catch (const InputError& error) {
     EXPECT_THAT(error.what(), ::testing::HasSubstr("s.xml:3: delay, low_pass and hysteresis"));

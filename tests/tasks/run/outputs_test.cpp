@@ -95,7 +95,7 @@ TEST(Outputs, ARolloutReadsNeitherFieldsNorBodiesThatNobodyAskedFor) {
   RolloutOptions o{3, 1};
   o.outputs = {std::vector<FieldOutput>{}, false, false};
   const Counting counting;
-  run_rollout(batch, stepper, controls, o, sizes);
+  run_rollout(batch, std::span(&stepper, 1), controls, o, sizes);
   EXPECT_EQ(sizes.bodies + sizes.fields, 0U);
   EXPECT_EQ(whole_calls + pressure_calls, 0);
   EXPECT_LT(rollout_bytes(model, 1, o.outputs), rollout_bytes(model, 1) / 2);
@@ -125,7 +125,7 @@ Handed handed(const Model& model, const RolloutOutputs& outputs) {
   const ControlProgram controls(model, stepper.timestep(), 0);
   RolloutOptions o{12, 1};
   o.outputs = outputs;
-  run_rollout(batch, stepper, controls, o, sink);
+  run_rollout(batch, std::span(&stepper, 1), controls, o, sink);
   return sink;
 }
 

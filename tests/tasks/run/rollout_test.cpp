@@ -102,13 +102,35 @@ class Rollout : public testing::Test {
                      const RolloutProgress& progress = {}) {
     Stepper stepper(model_);
     const ControlProgram controls(model_, stepper.timestep(), 0, control_);
-    return run_rollout(batch, stepper, controls, options, sink, progress);
+    return run_rollout(batch, std::span(&stepper, 1), controls, options, sink, progress);
   }
 
   Model model_ = pad_on_ball();
   ControlDescription control_ = CsvControl{{{0.1}, {0.2}, {0.3}, {0.4}, {0.5}}, "u.csv"};
   Memory memory_;
 };
+
+TEST_F(Rollout, RowsDoNotDependOnThreads) {
+  Memory alone, shared;
+  for (const int threads : {1, 3}) {
+    Memory& to = threads == 1 ? alone : shared;
+    Batch batch(model_, 70);
+    std::vector<Stepper> steppers;
+    for (int k = 0; k < threads; ++k) steppers.emplace_back(model_);
+    const ControlProgram controls(model_, steppers[0].timestep(), 0, control_);
+    const RolloutSummary summary = run_rollout(batch, steppers, controls, {5, 0}, to);
+    EXPECT_EQ(summary.counts.simulation_steps, 350);
+  }
+  EXPECT_EQ(shared.order, alone.order);
+  ASSERT_EQ(shared.states.size(), alone.states.size());
+  for (std::size_t k = 0; k < alone.states.size(); ++k) {
+    EXPECT_EQ(shared.states[k].q, alone.states[k].q);
+    EXPECT_EQ(shared.states[k].body_pose, alone.states[k].body_pose);
+  }
+  ASSERT_EQ(shared.fields.size(), alone.fields.size());
+  for (std::size_t k = 0; k < alone.fields.size(); ++k)
+    EXPECT_EQ(shared.fields[k].force, alone.fields[k].force);
+}
 
 TEST_F(Rollout, GivesEveryRowInOrder) {
   Batch batch(model_, 2);
@@ -251,7 +273,8 @@ TEST_F(Rollout, RefusesBeforeTheFirstRow) {
   Batch batch(model_, 1);
   Stepper stepper(model_);
   const ControlProgram controls(model_, 1e-3, 0, control_);
-  EXPECT_THROW(run_rollout(batch, stepper, controls, {5, 0}, memory_), InputError);
+  EXPECT_THROW(run_rollout(batch, std::span(&stepper, 1), controls, {5, 0}, memory_), InputError);
+  EXPECT_THROW(run_rollout(batch, {}, controls, {5, 0}, memory_), InputError);
   EXPECT_EQ(memory_.order, "");
 }
 
