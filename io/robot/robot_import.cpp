@@ -235,6 +235,17 @@ void refuse_deep(const Scene& scene) {
   }
 }
 
+void refuse_still(const Robot& robot, const RobotOptions& options, const std::string& name) {
+  for (const LinkDescription& link : robot.scene.links)
+    if (link.joint.type != JointType::fixed) return;
+  throw InputError(fmt::format(
+      "{}: it stands in the world and has no joint that moves, so there is nothing to simulate{}",
+      name,
+      options.free_base        ? ""
+      : robot.format == "URDF" ? "; --base free lets it move freely"
+                               : "; --base free lets bodies of the world move freely"));
+}
+
 Robot read_robot(const std::string& text, const std::string& name, const RobotOptions& options,
                  std::vector<std::string>& warnings) {
   Robot robot;
@@ -253,9 +264,7 @@ Robot read_robot(const std::string& text, const std::string& name, const RobotOp
       throw InputError("--keyframe with " + name + ": a URDF file has no keyframes");
     read_urdf(root, options.free_base);
   } else if (root.name() == "mujoco") {
-    if (options.free_base)
-      throw InputError("--base free with " + name + ": a MJCF file says itself what moves freely");
-    read_mjcf(root, options.keyframe);
+    read_mjcf(root, options.keyframe, options.free_base);
   } else {
     root.fail(
         std::string("no robot; expected ") + kRoots +
@@ -275,6 +284,7 @@ ImportedScene import_robot(const fs::path& path, const fs::path& output,
   Robot robot = read_robot(read_text_file(name, kLargestRobot, "a robot's file"), name, options,
                            out.warnings);
   refuse_deep(robot.scene);
+  refuse_still(robot, options, name);
   add_motors(robot, options.motors, name);
   stiffen_limits(robot);
   SceneSections sections;
