@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// The volume and its centre are sums of pyramids on the middle of the faces, weighted by area; the
-// inertia is a sum of pyramids on that centre:
-//   volume  V = Σ |(c - m)·n| A / 3        c, n, A: centre, normal and area of a face
-//   centre  p = Σ V (3 c + m) / 4 / V      m = Σ A c / Σ A
-//   second moments  Σ |v| (s sᵀ + Σ r rᵀ) / 20  over pyramids with corners r seen from p, s = Σ r
+// The centre of mass is that of pyramids on the middle of the faces, weighted by area. Volume and
+// inertia are sums of pyramids on that centre:
+//   middle  m = Σ A c / Σ A                     c, A: centre and area of a face
+//   centre  p = Σ V(m) (3 c + m) / 4 / Σ V(m)   V(x): volume of the pyramid between x and a face
+//   volume  Σ V(p)
+//   second moments  Σ V(p) (s sᵀ + Σ r rᵀ) / 20   r: corners of a face seen from p, s = Σ r
 #include "io/robot/mesh_solid.hpp"
 
 #include <cmath>
@@ -52,18 +53,20 @@ MeshSolid solid_of(const MeshShape& faces) {
   }
   if (!(area > 0)) return out;
   for (double& x : middle) x /= area;
+  double volume = 0;
   for (const std::array<int, 3>& t : faces.triangles) {
     const FaceCorners face(faces, t, middle);
     const Vector3 sum = face.sum();
-    out.volume += face.volume();
+    volume += face.volume();
     for (std::size_t c = 0; c < 3; ++c) moment[c] += face.volume() * sum[c] / 4;
   }
-  if (!(out.volume > 0)) return out;
-  for (std::size_t c = 0; c < 3; ++c) out.centre[c] = middle[c] + moment[c] / out.volume;
+  if (!(volume > 0)) return out;
+  for (std::size_t c = 0; c < 3; ++c) out.centre[c] = middle[c] + moment[c] / volume;
   double second[3][3] = {};
   for (const std::array<int, 3>& t : faces.triangles) {
     const FaceCorners face(faces, t, out.centre);
     const Vector3 sum = face.sum();
+    out.volume += face.volume();
     for (std::size_t i = 0; i < 3; ++i)
       for (std::size_t j = 0; j < 3; ++j) {
         double squares = sum[i] * sum[j];

@@ -135,6 +135,7 @@ class UrdfReader {
       if (!joint.used)
         joint.node.fail("joint '" + joint.joint.name + "' is part of a ring of links, or of " +
                         "nothing that hangs on a root; expected a tree");
+    hold_weightless();
   }
 
  private:
@@ -232,6 +233,26 @@ class UrdfReader {
                                     joint.child, other.joint.name, joint.joint.name));
   }
 
+  /// Holds the joints that move nothing that has mass: no force could say how they move.
+  void hold_weightless() {
+    std::vector<LinkDescription>& links = robot_.scene.links;
+    std::vector<char> heavy(links.size());
+    for (std::size_t i = links.size(); i-- > 0;) {
+      const auto* const mass = std::get_if<AbstractShape>(&links[i].body.shape);
+      heavy[i] |= mass != nullptr && mass->mass > 0;
+      if (links[i].parent >= 0) heavy[std::size_t(links[i].parent)] |= heavy[i];
+      JointDescription& joint = links[i].joint;
+      if (heavy[i] || joint.type == JointType::fixed) continue;
+      robot_.lost.add(joint.source,
+                      "joint '" + joint.name + "' moves nothing that has a mass: it is held");
+      JointDescription held;
+      held.name = joint.name;
+      held.pose = joint.pose;
+      held.source = joint.source;
+      joint = held;
+    }
+  }
+
   /// Adds link `i` and all that hang on it.
   void add(const std::vector<RobotNode>& links, std::size_t i, int parent, JointDescription joint,
            const std::string& how, int depth) {
@@ -312,7 +333,7 @@ class UrdfReader {
     piece.origin = "<collision>";
     piece.source = node.source();
     const RobotNode geometry = required(node, parts, "geometry");
-    geometry.check({});
+    geometry.check({{"name", Fate::read}});
     const std::vector<RobotNode> shapes =
         geometry.parts({{"box"}, {"sphere"}, {"cylinder"}, {"capsule"}, {"mesh"}});
     if (shapes.size() != 1)
