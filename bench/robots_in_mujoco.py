@@ -21,7 +21,7 @@ TYPES = {FREE: "free3d", BALL: "spherical", SLIDE: "prismatic", HINGE: "revolute
 Q_COUNT = {FREE: 7, BALL: 4, SLIDE: 1, HINGE: 1}
 V_COUNT = {FREE: 6, BALL: 3, SLIDE: 1, HINGE: 1}
 STATES = 3
-STEPS = (1e-4, 1e-5, 1e-6, 1e-7)  # s; an acceleration is the change of speed in a step
+STEPS = (1e-4, 1e-5, 1e-6, 1e-7, 1e-8)  # s; an acceleration is the change of speed in a step
 CLOSE = 1e-4  # of the largest acceleration
 CLOSE_MASS = 1e-5  # MuJoCo keeps vertices in single precision
 
