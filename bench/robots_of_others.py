@@ -4,9 +4,10 @@
     python3 bench/robots_of_others.py FOLDER [--skip NAME] [--json out.json]
 
 Every URDF and MJCF file below FOLDER is imported by `tangere import --drop`, and its scene takes 20
-steps. What has no joint that moves is imported with `--base free`. No file is changed. The table
-has files that import whole, those that import with something left out, those that are refused, and
-those whose scenes stop; then it counts each reason and names a file that has it. Where the modules
+steps. What has no joint that moves is imported with `--base free`, and takes no steps if it has no
+mass either. No file is changed. The table has files that import whole, those that import with
+something left out, those of both that stand still, those that are refused, and those whose scenes
+stop; then it counts each reason and names a file that has it. Where the modules
 `mujoco` and `tangere` are there, MuJoCo reads each file too (robots_in_mujoco.py): files that it
 refuses as well are counted apart, and masses and accelerations are compared.
 
@@ -27,7 +28,6 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 KINDS = ("whole", "dropped", "refused", "by both", "stopped", "crashed")
-STILL = "has no joint that moves"
 try:
     import robots_in_mujoco as peer
 except ImportError as missing:
@@ -66,20 +66,25 @@ def tried(path: Path, tangere: Path, folder: Path) -> dict:
     scene = folder / "robot.xml"
     words = ["import", path, "-o", scene, "--drop", "--overwrite"]
     code, result = call(tangere, *words)
-    free = code == 2 and STILL in result.get("error", "")
-    if free:
-        code, result = call(tangere, *words, "--base", "free")
-    out = {"file": str(path), "lost": result.get("lost", []), "free": free}
+    still, free = code == 0 and result["joints"] == 0, False
+    if still:
+        _, other = call(tangere, *words, "--base", "free")
+        free = other.get("joints", 0) > 0
+        if free:
+            result, still = other, False
+    out = {"file": str(path), "lost": result.get("lost", []), "still": still}
     if code != 0:
         both = peer is not None and peer.refusal(path) != ""
         kind = "crashed" if code not in (2, 3) else "by both" if both else "refused"
         return out | {"result": kind, "reason": result.get("error", "")}
+    out["result"] = "dropped" if out["lost"] else "whole"
+    if still:
+        return out
     code, result = call(
         tangere, "simulate", scene, "-o", folder / "run.h5", "--steps", 20, "--overwrite"
     )
     if code != 0:
         return out | {"result": "stopped", "reason": str(result.get("error", result))}
-    out["result"] = "dropped" if out["lost"] else "whole"
     if peer and not free:
         out["peer"] = peer.compare(path, scene.read_text(), str(scene))
     return out
@@ -108,14 +113,15 @@ def print_counts(title: str, rows: list[dict], reasons: Callable[[dict], list[st
 
 
 def print_table(folder: Path, rows: list[dict]) -> None:
-    print(f"{'':26} files" + "".join(f"{k:>9}" for k in KINDS) + "     same")
+    print(f"{'':26} files" + "".join(f"{k:>9}" for k in KINDS) + "    still     same")
     groups = sorted({Path(r["file"]).relative_to(folder).parts[0] for r in rows})
     for group in [*groups, ""]:
         mine = [r for r in rows if Path(r["file"]).is_relative_to(folder / group)]
         counts = Counter(r["result"] for r in mine)
         same = sum(r.get("peer") == ["the same"] for r in mine)
         numbers = "".join(f"{counts[k]:9}" for k in KINDS)
-        print(f"{group or 'all':26} {len(mine):5}{numbers}{same:9}")
+        still = sum(r["still"] for r in mine)
+        print(f"{group or 'all':26} {len(mine):5}{numbers}{still:9}{same:9}")
     for kind in KINDS[2:]:
         some = [r for r in rows if r["result"] == kind]
         print_counts(f"{kind}:", some, lambda r: [r["reason"]])

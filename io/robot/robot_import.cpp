@@ -235,15 +235,10 @@ void refuse_deep(const Scene& scene) {
   }
 }
 
-void refuse_still(const Robot& robot, const RobotOptions& options, const std::string& name) {
-  for (const LinkDescription& link : robot.scene.links)
-    if (link.joint.type != JointType::fixed) return;
-  throw InputError(fmt::format(
-      "{}: it stands in the world and has no joint that moves, so there is nothing to simulate{}",
-      name,
-      options.free_base        ? ""
-      : robot.format == "URDF" ? "; --base free lets it move freely"
-                               : "; --base free lets bodies of the world move freely"));
+bool stands_still(const Scene& scene) {
+  return std::all_of(scene.links.begin(), scene.links.end(), [](const LinkDescription& link) {
+    return link.joint.type == JointType::fixed;
+  });
 }
 
 Robot read_robot(const std::string& text, const std::string& name, const RobotOptions& options,
@@ -284,9 +279,9 @@ ImportedScene import_robot(const fs::path& path, const fs::path& output,
   Robot robot = read_robot(read_text_file(name, kLargestRobot, "a robot's file"), name, options,
                            out.warnings);
   refuse_deep(robot.scene);
-  refuse_still(robot, options, name);
   add_motors(robot, options.motors, name);
-  stiffen_limits(robot);
+  const bool still = stands_still(robot.scene);
+  if (!still) stiffen_limits(robot);
   SceneSections sections;
   sections.contacts = contacts_text(robot, options.touches, name);
   if (!sections.contacts.empty())
@@ -317,8 +312,14 @@ ImportedScene import_robot(const fs::path& path, const fs::path& output,
   out.motors = scene.scene.motors.size();
   out.sensors = scene.scene.sensors.size();
   out.end_effectors = scene.scene.end_effectors.size();
-  static_cast<void>(
-      Model(scene.scene));  // whatever it would refuse is refused before it is written
+  if (still)
+    out.warnings.push_back(
+        fmt::format("{}: nothing in it moves, so it cannot be simulated alone; <include> the scene "
+                    "in another{}",
+                    name, options.free_base ? "" : ", or let it move with --base free"));
+  else
+    static_cast<void>(
+        Model(scene.scene));  // whatever it would refuse is refused before it is written
   return out;
 }
 

@@ -407,9 +407,15 @@ TEST(RobotImport, AFreeBaseFalls) {
   const Scene two = parse_scene(import(still, options).text, "scene.xml").scene;
   EXPECT_EQ(two.links[0].joint.type, JointType::free);
   EXPECT_EQ(two.links[1].joint.type, JointType::fixed);
-  EXPECT_THAT(fault_of(still), HasSubstr("nothing to simulate; --base free lets bodies of the"));
-  EXPECT_THAT(fault_of("<robot name=\"r\"><link name=\"a\"/></robot>"),
-              HasSubstr("nothing to simulate; --base free lets it"));
+  EXPECT_THAT(
+      import(still).warnings,
+      ElementsAre(HasSubstr("nothing in it moves, so it cannot be simulated alone; <include> "
+                            "the scene in another, or let it move with --base free")));
+  EXPECT_EQ(import(still).joints, 0);
+  const ImportedScene weightless = import("<robot name=\"r\"><link name=\"a\"/></robot>", options);
+  EXPECT_THAT(weightless.lost,
+              ElementsAre(HasSubstr("joint 'a_base' moves nothing that has a mass")));
+  EXPECT_THAT(weightless.warnings, ElementsAre(HasSubstr("nothing in it moves")));
 }
 
 TEST(RobotImport, RotationsAreThoseOfTheFormats) {
