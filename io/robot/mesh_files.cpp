@@ -25,14 +25,14 @@ std::string find_mesh(const RobotNode& node, const std::string& name, const std:
   constexpr std::string_view kPackage = "package://", kFile = "file://";
   std::string plain = name;
   if (name.starts_with(kPackage)) {
-    plain = name.substr(kPackage.size());
+    plain = name.substr(std::min(name.find_first_not_of('/', kPackage.size()), name.size()));
     const fs::path inside(plain);
     fs::path below;  // without the name of the package
     for (auto part = inside.begin(); part != inside.end(); ++part)
       if (part != inside.begin()) below /= *part;
     std::error_code ignored;
     fs::path up = fs::absolute(robot, ignored).lexically_normal();
-    for (int level = 0; level < 10; ++level, up = up.parent_path()) {
+    for (int level = 0; level < 10 && !plain.empty(); ++level, up = up.parent_path()) {
       tried.push_back((up / inside).string());
       if (up.filename() == *inside.begin()) tried.push_back((up / below).string());
       if (up == up.root_path()) break;

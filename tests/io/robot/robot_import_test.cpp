@@ -281,6 +281,24 @@ TEST(RobotImport, MeshesAreReadWhereAGeomNeedsThem) {
   EXPECT_THAT(made(geom, folder / "mesh.dae").lost, ElementsAre(HasSubstr("no OBJ, STL or PLY")));
 }
 
+TEST(RobotImport, PackagesAreFoldersAboveTheRobot) {
+  const testing::Folder folder;
+  std::filesystem::create_directories(folder / "pack/urdf");
+  std::filesystem::copy_file(kRobots + "meshes/cup.obj", folder / "pack/cup.obj");
+  const auto imported = [&](const std::string& mesh) {
+    std::ofstream(folder / "pack/urdf/robot.urdf")
+        << urdf("<link name=\"c\"><collision><geometry><mesh filename=\"" + mesh +
+                "\"/></geometry></collision></link><joint name=\"k\" type=\"fixed\"><parent "
+                "link=\"b\"/><child link=\"c\"/></joint>");
+    return import_robot(folder / "pack/urdf/robot.urdf", folder / "scene.xml", {}).text;
+  };
+  for (const char* prefix : {"package://", "package:///"})
+    EXPECT_THAT(imported(prefix + std::string("pack/cup.obj")),
+                HasSubstr("filename=\"pack/cup.obj\" hull=\"true\""));
+  EXPECT_THROW(imported("package://"), InputError);
+  EXPECT_THROW(imported("package://pock/cup.obj"), InputError);
+}
+
 TEST(RobotImport, AddsSkinsMotorsAndContacts) {
   RobotOptions options;
   options.pads = {{"left_finger",
