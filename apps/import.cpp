@@ -183,7 +183,8 @@ Command add_import(CLI::App& program) {
            "Of MJCF: start from this keyframe, with its controls; one without a name has its "
            "number from 0");
   add_text(app, "--base", o.base, "fixed|free",
-           "Of URDF: whether the root link stands in the world or moves freely [default: fixed]");
+           "Whether the root link of URDF, or bodies of MJCF's world without joints, stand in the "
+           "world or move freely [default: fixed]");
   add_flag(app, "--drop", o.drop, "Leave out what changes the motion and scenes cannot say");
   add_flag(app, "--allow-unknown", o.allow_unknown,
            "Ignore unknown elements and attributes, with a warning for each");

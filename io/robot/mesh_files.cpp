@@ -10,11 +10,14 @@
 #include <cctype>
 #include <filesystem>
 
+#include "io/scene/convex_hull.hpp"
 #include "io/scene/surface_files.hpp"
 
 namespace tangere {
 
 namespace fs = std::filesystem;
+
+namespace {
 
 std::string find_mesh(const RobotNode& node, const std::string& name, const std::string& folder) {
   const fs::path robot = fs::path(node.robot().scene.path).parent_path();
@@ -22,14 +25,14 @@ std::string find_mesh(const RobotNode& node, const std::string& name, const std:
   constexpr std::string_view kPackage = "package://", kFile = "file://";
   std::string plain = name;
   if (name.starts_with(kPackage)) {
-    plain = name.substr(kPackage.size());
+    plain = name.substr(std::min(name.find_first_not_of('/', kPackage.size()), name.size()));
     const fs::path inside(plain);
     fs::path below;  // without the name of the package
     for (auto part = inside.begin(); part != inside.end(); ++part)
       if (part != inside.begin()) below /= *part;
     std::error_code ignored;
     fs::path up = fs::absolute(robot, ignored).lexically_normal();
-    for (int level = 0; level < 10; ++level, up = up.parent_path()) {
+    for (int level = 0; level < 10 && !plain.empty(); ++level, up = up.parent_path()) {
       tried.push_back((up / inside).string());
       if (up.filename() == *inside.begin()) tried.push_back((up / below).string());
       if (up == up.root_path()) break;
@@ -45,26 +48,52 @@ std::string find_mesh(const RobotNode& node, const std::string& name, const std:
   if (found == tried.end())
     node.fail(
         fmt::format("the file \"{}\" is not there; looked for {}", name, fmt::join(tried, ", ")));
-  std::string ending = fs::path(*found).extension().string();
-  std::transform(ending.begin(), ending.end(), ending.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  if (ending != ".obj" && ending != ".stl" && ending != ".ply")
-    node.fail(fmt::format("\"{}\" is no OBJ, STL or PLY file; convert it to one of these", name));
   return *found;
 }
 
-MeshShape read_robot_mesh(const RobotNode& node, const MeshFile& file) {
-  for (const double s : file.scale)
-    if (!(s > 0)) node.fail(fmt::format("scale has {}; expected positive factors", s));
+bool is_surface_file(const std::string& path) {
+  std::string ending = fs::path(path).extension().string();
+  std::transform(ending.begin(), ending.end(), ending.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return ending == ".obj" || ending == ".stl" || ending == ".ply";
+}
+
+}  // namespace
+
+std::optional<RobotMesh> read_robot_mesh(const RobotNode& node, const std::string& name,
+                                         const std::string& folder, const Vector3& scale) {
+  for (const double s : scale)
+    if (s == 0) node.fail("scale has 0; expected factors other than 0");
+  RobotMesh mesh;
+  mesh.file = {find_mesh(node, name, folder), scale};
+  if (!is_surface_file(mesh.file.path)) {
+    node.lost(
+        fmt::format("<{}>: the shape of \"{}\", which is no OBJ, STL or PLY file; convert it "
+                    "to one of these",
+                    node.name(), name));
+    return std::nullopt;
+  }
   try {
-    MeshShape mesh = read_surface(file.path);
-    for (std::size_t k = 0; k < mesh.vertices.size(); ++k) mesh.vertices[k] *= file.scale[k % 3];
-    return mesh;
+    mesh.faces = read_faces(mesh.file.path);
   } catch (const IoError& e) {
     throw IoError(node.source().prefix() + "<" + node.name() + ">: " + e.what());
   } catch (const InputError& e) {
     throw InputError(node.source().prefix() + "<" + node.name() + ">: " + e.what());
   }
+  mesh.shape = mesh.faces;
+  if (!surface_fault(mesh.shape).empty()) {
+    mesh.file.hull = true;
+    mesh.shape = convex_hull(mesh.faces.vertices);
+    if (mesh.shape.triangles.empty()) {
+      node.lost(fmt::format("<{}>: the flat surface of \"{}\"", node.name(), name));
+      return std::nullopt;
+    }
+    node.changed(
+        fmt::format("<{}> of an open surface: its convex hull takes its place", node.name()));
+  }
+  scale_surface(mesh.shape, scale);
+  scale_surface(mesh.faces, scale);
+  return mesh;
 }
 
 }  // namespace tangere

@@ -6,12 +6,18 @@
 
 namespace tangere {
 
-/// Where the file is that a robot file names: relative to `folder`, absolute, file://, or
-/// package://NAME/…, whose NAME is looked for as a folder above the robot's file. Fails at the
-/// node, naming the places that were tried.
-std::string find_mesh(const RobotNode& node, const std::string& name, const std::string& folder);
+/// A surface file that a robot file names.
+struct RobotMesh {
+  MeshFile file;
+  MeshShape shape;  ///< what the scene has: the file's surface, or its hull if that is open
+  MeshShape faces;  ///< what the file has: closed or open
+};
 
-/// Reads the surface and scales it. Errors name the node and the file.
-MeshShape read_robot_mesh(const RobotNode& node, const MeshFile& file);
+/// Finds, reads and scales the file `name`: relative to `folder`, absolute, file://, or
+/// package://NAME/…, whose NAME is looked for as a folder above the robot's file. Returns nothing,
+/// and lists it, if scenes cannot have such a shape. Fails at the node if the file is not there or
+/// broken.
+std::optional<RobotMesh> read_robot_mesh(const RobotNode& node, const std::string& name,
+                                         const std::string& folder, const Vector3& scale);
 
 }  // namespace tangere

@@ -8,8 +8,10 @@
 #include <limits>
 
 #include "engine/model/shapes.hpp"
+#include "io/robot/mesh_solid.hpp"
 #include "io/robot/mjcf_file.hpp"
 #include "io/robot/mjcf_words.hpp"
+#include "io/scene/convex_hull.hpp"
 
 namespace tangere {
 namespace {
@@ -91,14 +93,16 @@ class Bodies {
 
   void read_world_geom(const Placed& part, std::vector<RobotPiece>& out) {
     const RobotNode geom = file_.with_class(part.node, part.defaults);
-    const std::optional<RobotPiece> piece = read_geom(geom, part.frame, false);
-    if (!piece) return;
+    std::vector<RobotPiece> pieces;
+    read_geom(geom, part.frame, false, pieces);
+    if (pieces.empty()) return;
+    const RobotPiece& piece = pieces.front();
     Scene& scene = robot_.scene;
-    if (!std::holds_alternative<PlaneShape>(piece->shape) || scene.ground) {
-      out.push_back(*piece);
+    if (!std::holds_alternative<PlaneShape>(piece.shape) || scene.ground) {
+      out.push_back(piece);
       return;
     }
-    scene.ground = GroundDescription{piece->pose.position, outer_direction(piece->pose, {0, 0, 1})};
+    scene.ground = GroundDescription{piece.pose.position, outer_direction(piece.pose, {0, 0, 1})};
     geom.changed("<geom> type=\"plane\" of the world: it is the scene's <ground>");
   }
 
@@ -180,8 +184,10 @@ class Bodies {
     }
     offset.position = {0 - anchor[0], 0 - anchor[1], 0 - anchor[2]};
     if (chain.empty()) {
+      const bool moves = file_.free_base && parent < 0;
       JointDescription fixed;
-      fixed.name = file_.names.free_name(name + "_fixed");
+      fixed.type = moves ? JointType::free : JointType::fixed;
+      fixed.name = file_.names.free_name(name + (moves ? "_free" : "_fixed"));
       fixed.pose = place;
       fixed.source = node.source();
       chain.push_back(fixed);
@@ -240,9 +246,9 @@ class Bodies {
     const auto measure = [&](double x) { return turns ? file_.angle(x) : x; };
     anchor = outer_point(frame, node.vector("pos", Vector3{0, 0, 0}));
     if (single) joint.axis0 = outer_direction(frame, node.direction("axis", Vector3{0, 0, 1}));
-    joint.damping = node.not_negative("damping", 0.0);
+    joint.damping = file_.has_dampers ? node.not_negative("damping", 0.0) : 0;
     joint.armature = node.not_negative("armature", 0.0);
-    joint.stiffness = node.not_negative("stiffness", 0.0);
+    joint.stiffness = file_.has_springs ? node.not_negative("stiffness", 0.0) : 0;
     if (single) {
       end.ref = measure(node.number("ref", 0.0));
       const double rest = measure(node.number("springref", 0.0)) - end.ref;
@@ -279,6 +285,7 @@ class Bodies {
       return;
     }
     const std::vector<double> x = node.numbers("range", 2);
+    if (!file_.has_limits) return;
     if (!on) return node.idle("<joint> range of a joint that is not limited");
     if (joint.type == JointType::spherical)
       return node.lost("<joint> range of a ball joint: the angle of a cone");
@@ -292,31 +299,32 @@ class Bodies {
   std::vector<RobotPiece> read_pieces(const RobotNode& node, const std::vector<Placed>& parts,
                                       const Pose& offset) {
     std::optional<RobotPiece> inertial;
+    bool has_inertial = false;
     for (const Placed& part : parts) {
       if (part.node.name() != "inertial") continue;
-      if (inertial) part.node.fail("given twice; expected once");
+      if (has_inertial) part.node.fail("given twice; expected once");
+      has_inertial = true;
       inertial = read_inertial(part.node);
-      inertial->pose = compose(offset, compose(part.frame, inertial->pose));
+      if (inertial) inertial->pose = compose(offset, compose(part.frame, inertial->pose));
     }
-    if (inertial && file_.inertia_from == InertiaFrom::geoms) {
+    if (has_inertial && file_.inertia_from == InertiaFrom::geoms) {
       node.changed("<inertial>: left out, because inertiafromgeom=\"true\"");
       inertial.reset();
+      has_inertial = false;
     }
-    const bool massive = !inertial && file_.inertia_from != InertiaFrom::inertials;
+    const bool massive = !has_inertial && file_.inertia_from != InertiaFrom::inertials;
     std::vector<RobotPiece> pieces;
     for (const Placed& part : parts) {
       if (part.node.name() != "geom") continue;
       const RobotNode geom = file_.with_class(part.node, part.defaults);
-      if (auto piece = read_geom(geom, part.frame, massive)) {
-        piece->pose = compose(offset, piece->pose);
-        pieces.push_back(std::move(*piece));
-      }
+      read_geom(geom, part.frame, massive, pieces);
     }
-    if (inertial && std::get<AbstractShape>(inertial->shape).mass > 0) pieces.push_back(*inertial);
+    for (RobotPiece& piece : pieces) piece.pose = compose(offset, piece.pose);
+    if (inertial) pieces.push_back(*inertial);
     return pieces;
   }
 
-  RobotPiece read_inertial(const RobotNode& node) {
+  std::optional<RobotPiece> read_inertial(const RobotNode& node) {
     node.check(with_rotations({{"mass"}, {"diaginertia"}, {"fullinertia"}}));
     const double mass = node.not_negative("mass");
     if (node.has("fullinertia") == node.has("diaginertia"))
@@ -329,11 +337,19 @@ class Bodies {
       const std::vector<double> x = node.numbers("fullinertia", 6);  // xx yy zz xy xz yz
       inertia = {x[0], x[3], x[4], x[1], x[5], x[2]};
     }
-    return inertial_piece(mass, inertia, file_.read_pose(node), "<inertial>", node.source());
+    if (file_.balance_inertia && !is_inertia(inertia)) {
+      const double mean = (inertia[0] + inertia[3] + inertia[5]) / 3;
+      inertia = {mean, 0, 0, mean, 0, mean};
+      node.changed("<inertial>: all moments are their mean, as balanceinertia says");
+    }
+    return inertial_piece(robot_, mass, inertia, file_.read_pose(node), "<inertial>",
+                          node.source());
   }
 
-  /// Reads a geom; none if it is for pictures only. `massive`: it may have a mass of its own.
-  std::optional<RobotPiece> read_geom(const RobotNode& node, const Pose& frame, bool massive) {
+  /// Appends a geom, unless it is for pictures only, and its mass where that stands apart.
+  /// `massive`: it may have a mass of its own.
+  void read_geom(const RobotNode& node, const Pose& frame, bool massive,
+                 std::vector<RobotPiece>& out) {
     node.check(mjcf_words("geom"));
     static_cast<void>(node.parts({{"plugin", Fate::lost, "plug-ins of MuJoCo"}}));
     RobotPiece piece;
@@ -349,22 +365,49 @@ class Bodies {
     const double density = node.not_negative("density", 1000.0);
     const double mass = node.not_negative("mass", 0.0);
     const bool heavy = counts && (node.has("mass") ? mass > 0 : density > 0);
-    if (!touches && !heavy) {
-      node.idle("<geom> that touches nothing: " + std::string(kSight));
-      return std::nullopt;
-    }
-    if (!read_shape(node, piece)) return std::nullopt;
+    if (!touches && !heavy) return node.idle("<geom> that touches nothing: " + std::string(kSight));
+    const MjcfMesh* mesh = nullptr;
+    if (!read_shape(node, piece, mesh)) return;
     piece.pose = compose(frame, piece.pose);
-    const bool plane = std::holds_alternative<PlaneShape>(piece.shape);
-    if (heavy && !plane) {
+    read_colour(node, piece);
+    std::optional<RobotPiece> apart;
+    if (heavy && !std::holds_alternative<PlaneShape>(piece.shape)) {
       if (node.flag("shellinertia", false))
         node.lost("<geom> shellinertia: the mass of a thin shell; it is that of a solid here");
-      piece.density = node.has("mass") ? mass / volume_of(piece.shape) : density;
+      const double volume = volume_of(piece.shape);
+      piece.density = node.has("mass") ? mass / volume : density;
       if (!std::isfinite(piece.density))
         node.fail(fmt::format("mass=\"{}\" of a geom without volume", mass));
+      if (mesh != nullptr) apart = mass_apart(node, *mesh, density, piece);
     }
-    read_colour(node, piece);
-    return piece;
+    out.push_back(std::move(piece));
+    if (apart) out.push_back(std::move(*apart));
+  }
+
+  /// The mass of a mesh where MuJoCo's is not that of the scene's shape, which then has none.
+  std::optional<RobotPiece> mass_apart(const RobotNode& node, const MjcfMesh& mesh, double density,
+                                       RobotPiece& piece) {
+    if (mesh.inertia == MeshInertia::shell) {
+      node.lost("<mesh> inertia=\"shell\": the mass is that of a solid here");
+      return std::nullopt;
+    }
+    if (mesh.inertia == MeshInertia::exact) return std::nullopt;
+    const MeshShape& shape = std::get<MeshShape>(piece.shape);
+    const MeshShape& faces = mesh.mesh->faces;
+    const MeshSolid solid =
+        solid_of(mesh.inertia == MeshInertia::legacy ? faces : convex_hull(faces.vertices));
+    if (std::abs(solid.volume / volume_of(shape) - 1) < 1e-9 || !(solid.volume > 0))
+      return std::nullopt;
+    if (node.has("mass")) density = node.number("mass") / solid.volume;
+    std::array<double, 6> inertia = solid.inertia;
+    for (double& x : inertia) x *= density;
+    piece.density = 0;
+    node.changed(
+        "<geom> of a mesh: its mass apart from its shape, because MuJoCo does not count "
+        "the volume (<mesh inertia=\"exact\"/> does)");
+    return inertial_piece(robot_, density * solid.volume, inertia,
+                          compose(piece.pose, {solid.centre, {1, 0, 0, 0}}), piece.origin,
+                          node.source());
   }
 
   void read_colour(const RobotNode& node, RobotPiece& piece) const {
@@ -401,7 +444,7 @@ class Bodies {
   }
 
   /// Reads type, size and place. Returns false for a shape that scenes do not have.
-  bool read_shape(const RobotNode& node, RobotPiece& piece) {
+  bool read_shape(const RobotNode& node, RobotPiece& piece, const MjcfMesh*& mesh) {
     static const std::vector<std::string> types = {
         "sphere", "capsule", "cylinder", "box", "ellipsoid", "plane", "mesh", "hfield", "sdf"};
     const std::string type = types[std::size_t(
@@ -419,7 +462,13 @@ class Bodies {
       half = ends.half;
       piece.pose = ends.pose;
     }
-    if (type == "mesh") return read_mesh(node, piece);
+    if (type == "mesh") {
+      mesh = &file_.mesh_named(node, node.text("mesh"));
+      if (!mesh->mesh) return false;
+      piece.shape = mesh->mesh->shape;
+      piece.mesh = mesh->mesh->file;
+      return true;
+    }
     if (node.has("mesh")) {
       node.lost("<geom> mesh: a primitive fitted to a mesh");
       return false;
@@ -451,20 +500,6 @@ class Bodies {
           node.fail(fault);
       }
     }
-    return true;
-  }
-
-  bool read_mesh(const RobotNode& node, RobotPiece& piece) {
-    const std::string name = node.text("mesh");
-    const auto mesh = file_.meshes.find(name);
-    if (mesh == file_.meshes.end()) {
-      std::vector<std::string> names;
-      for (const auto& [known, m] : file_.meshes) names.push_back(known);
-      node.fail(fmt::format("mesh=\"{}\": no mesh has this name{}", name, suggestion(name, names)));
-    }
-    piece.shape = mesh->second.shape;
-    piece.mesh = mesh->second.file;
-    if (mesh->second.shell) node.lost("<mesh> inertia=\"shell\": the mass is that of a solid here");
     return true;
   }
 

@@ -16,11 +16,16 @@
 
 namespace tangere {
 
+/// How MuJoCo finds the mass of a mesh. `legacy`, its default, counts what lies between its middle
+/// and each face, so that a hollow may count several times.
+enum class MeshInertia { legacy, exact, convex, shell };
+
+/// A mesh of <asset>. Its file is read when a geom needs it, because most are for pictures.
 struct MjcfMesh {
-  MeshFile file;
-  MeshShape shape;
-  bool shell = false;  ///< inertia="shell"
-  std::string place;   ///< "line 7"
+  RobotNode node;
+  MeshInertia inertia = MeshInertia::legacy;
+  bool is_read = false;
+  std::optional<RobotMesh> mesh = {};  ///< once it is read; none if scenes cannot have it
 };
 
 /// A joint of the file, for actuators: those of hinges and slides can be driven.
@@ -56,6 +61,10 @@ class MjcfFile {
   bool strip_path = false;
   bool auto_limits = true;
   InertiaFrom inertia_from = InertiaFrom::automatic;
+  bool balance_inertia = false;
+  double total_mass = 0;  ///< to which all masses are scaled [kg]; 0: they are not
+  bool has_limits = true, has_springs = true, has_dampers = true;  ///< as <flag> says
+  bool free_base = false;  ///< bodies of the world without joints move freely
   std::array<int, 2> inertia_groups{0, 5};
   std::map<std::string, MjcfMesh> meshes;
   std::map<std::string, std::array<double, 4>> materials;
@@ -72,6 +81,8 @@ class MjcfFile {
   /// The node with the defaults of its own class, or of `inherited` if it names none.
   [[nodiscard]] RobotNode with_class(const RobotNode& node, const std::string& inherited);
   [[nodiscard]] std::string known_class(const RobotNode& node, const char* attribute);
+  /// The mesh of this name with its file read. Fails at the node that names it if there is none.
+  [[nodiscard]] const MjcfMesh& mesh_named(const RobotNode& node, const std::string& name);
   /// Moves the warnings of all classes and included files to `out`.
   void take_warnings(std::vector<std::string>& out);
 

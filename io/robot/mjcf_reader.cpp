@@ -9,6 +9,7 @@
 #include <cmath>
 #include <filesystem>
 
+#include "engine/model/shapes.hpp"
 #include "io/robot/mjcf_file.hpp"
 #include "io/robot/mjcf_words.hpp"
 
@@ -102,10 +103,8 @@ void read_compiler(MjcfFile& file, const RobotNode& node) {
   file.strip_path = node.flag("strippath", file.strip_path);
   file.auto_limits = node.flag("autolimits", file.auto_limits);
   if (node.has("coordinate")) static_cast<void>(node.choice("coordinate", {"local"}));
-  if (node.flag("balanceinertia", false))
-    node.lost("<compiler> balanceinertia: changes inertias that no body has");
-  if (node.has("settotalmass") && node.number("settotalmass") > 0)
-    node.lost("<compiler> settotalmass: scales all masses");
+  file.balance_inertia = node.flag("balanceinertia", file.balance_inertia);
+  if (node.has("settotalmass")) file.total_mass = std::max(node.number("settotalmass"), 0.0);
   if (node.flag("alignfree", false))
     node.changed("<compiler> alignfree: free bodies keep the frame that the file gives");
   if (node.has("eulerseq")) {
@@ -126,6 +125,26 @@ void read_compiler(MjcfFile& file, const RobotNode& node) {
   }
 }
 
+void read_flag(MjcfFile& file, const RobotNode& flag, const std::string& name,
+               const std::string& value) {
+  const auto is = [&](std::initializer_list<std::string_view> names) {
+    return std::find(names.begin(), names.end(), name) != names.end();
+  };
+  const std::string text = "<flag> " + name + ": ";
+  if (!is({"gravity", "spring", "damper", "passive", "actuation", "limit", "contact", "constraint",
+           "equality", "clampctrl", "frictionloss"}) ||
+      value == "enable")
+    return flag.idle(text + kSolver);
+  if (is({"contact", "equality", "frictionloss"}))
+    return flag.idle(text + "a scene has none but those that it names");
+  if (is({"actuation", "clampctrl"})) return flag.lost(text + "switches forces");
+  if (name == "gravity") file.robot.scene.gravity = {0, 0, 0};
+  if (is({"limit", "constraint"})) file.has_limits = false;
+  if (is({"spring", "passive"})) file.has_springs = false;
+  if (is({"damper", "passive"})) file.has_dampers = false;
+  flag.changed(text + "the scene is without what it switches off");
+}
+
 void read_option(MjcfFile& file, const RobotNode& node) {
   static const Words words = solver_words();
   node.check(words);
@@ -136,18 +155,8 @@ void read_option(MjcfFile& file, const RobotNode& node) {
     node.changed("<option> integrator: the scene steps by BDF2, with an implicit solver");
   for (const RobotNode& flag : node.parts({{"flag"}}))
     for (const tinyxml2::XMLAttribute* a = flag.element().FirstAttribute(); a != nullptr;
-         a = a->Next()) {
-      const std::string name = a->Name();
-      static const std::vector<std::string> forces = {
-          "gravity", "spring",     "damper",   "passive",   "actuation",   "limit",
-          "contact", "constraint", "equality", "clampctrl", "frictionloss"};
-      const bool matters = std::find(forces.begin(), forces.end(), name) != forces.end();
-      const std::string text = "<flag> " + name + ": " + (matters ? "switches forces" : kSolver);
-      if (matters && std::string(a->Value()) != "enable")
-        flag.lost(text);
-      else
-        flag.idle(text);
-    }
+         a = a->Next())
+      read_flag(file, flag, a->Name(), a->Value());
 }
 
 void read_mesh(MjcfFile& file, const RobotNode& node) {
@@ -156,21 +165,15 @@ void read_mesh(MjcfFile& file, const RobotNode& node) {
     node.fail("a mesh without a file; expected file=\"….obj\", .stl or .ply");
   if (node.has("refquat") && node.numbers("refquat", 4) != std::vector<double>{1, 0, 0, 0})
     node.lost("<mesh> refquat: turns the mesh");
-  std::string given = node.text("file");
-  if (file.strip_path) given = std::filesystem::path(given).filename().string();
-  const std::string name = node.text("name", std::filesystem::path(given).stem().string());
-  MjcfMesh mesh;
-  mesh.place = place_in(node.robot(), node.source());
+  const std::string name =
+      node.text("name", std::filesystem::path(node.text("file")).stem().string());
   if (const auto first = file.meshes.find(name); first != file.meshes.end())
-    node.fail(fmt::format("mesh name '{}' is used twice, first in {}", name, first->second.place));
-  mesh.file = {find_mesh(node, given, file.mesh_folder), node.vector("scale", Vector3{1, 1, 1})};
-  mesh.shell = node.has("inertia") && node.text("inertia") == "shell";
-  if (node.has("inertia"))
-    static_cast<void>(node.choice("inertia", {"exact", "legacy", "convex", "shell"}));
-  if (node.has("inertia") && node.text("inertia") == "convex")
-    node.changed("<mesh> inertia: the mass is that of the mesh, not of its hull");
-  mesh.shape = read_robot_mesh(node, mesh.file);
-  file.meshes.emplace(name, std::move(mesh));
+    node.fail(fmt::format("mesh name '{}' is used twice, first in {}", name,
+                          place_in(node.robot(), first->second.node.source())));
+  constexpr MeshInertia kInertias[] = {MeshInertia::legacy, MeshInertia::exact, MeshInertia::convex,
+                                       MeshInertia::shell};
+  const int inertia = node.choice("inertia", {"legacy", "exact", "convex", "shell"}, 0);
+  file.meshes.emplace(name, MjcfMesh{node, kInertias[inertia]});
 }
 
 void read_asset(MjcfFile& file, const RobotNode& section) {
@@ -191,6 +194,26 @@ void read_asset(MjcfFile& file, const RobotNode& section) {
     if (!node.has("rgba")) continue;
     const std::vector<double> x = node.numbers("rgba", 4);
     file.materials[node.text("name")] = {x[0], x[1], x[2], x[3]};
+  }
+}
+
+/// Scales all masses so that they add up to `total` [kg].
+void scale_masses(Scene& scene, double total) {
+  double sum = 0;
+  for (const LinkDescription& link : scene.links) {
+    if (const auto* const mass = std::get_if<AbstractShape>(&link.body.shape))
+      sum += mass->mass;
+    else if (link.body.density > 0)
+      sum += link.body.density * volume_of(link.body.shape);
+  }
+  if (!(sum > 0)) return;
+  const double factor = total / sum;
+  for (LinkDescription& link : scene.links) {
+    link.body.density *= factor;
+    if (auto* const mass = std::get_if<AbstractShape>(&link.body.shape)) {
+      mass->mass *= factor;
+      for (double& x : mass->inertia) x *= factor;
+    }
   }
 }
 
@@ -270,6 +293,23 @@ std::string MjcfFile::known_class(const RobotNode& node, const char* attribute) 
                         suggestion(name, all)));
 }
 
+const MjcfMesh& MjcfFile::mesh_named(const RobotNode& node, const std::string& name) {
+  const auto found = meshes.find(name);
+  if (found == meshes.end()) {
+    std::vector<std::string> all;
+    for (const auto& [known, m] : meshes) all.push_back(known);
+    node.fail(fmt::format("mesh=\"{}\": no mesh has this name{}", name, suggestion(name, all)));
+  }
+  MjcfMesh& mesh = found->second;
+  if (mesh.is_read) return mesh;
+  mesh.is_read = true;
+  std::string given = mesh.node.text("file");
+  if (strip_path) given = std::filesystem::path(given).filename().string();
+  mesh.mesh =
+      read_robot_mesh(mesh.node, given, mesh_folder, mesh.node.vector("scale", Vector3{1, 1, 1}));
+  return mesh;
+}
+
 void MjcfFile::take_warnings(std::vector<std::string>& out) {
   const auto take = [&](SceneContext& context) {
     for (std::string& warning : context.warnings) out.push_back(std::move(warning));
@@ -317,7 +357,7 @@ Pose MjcfFile::read_pose(const RobotNode& node) const {
   return {node.vector("pos", Vector3{0, 0, 0}), read_orientation(node)};
 }
 
-void read_mjcf(const RobotNode& root, const std::string& keyframe) {
+void read_mjcf(const RobotNode& root, const std::string& keyframe, bool free_base) {
   Robot& robot = root.robot();
   robot.format = "MJCF";
   root.check({{"model"}});
@@ -326,6 +366,7 @@ void read_mjcf(const RobotNode& root, const std::string& keyframe) {
   scene.timestep = 0.002;  // MuJoCo's
   const std::vector<RobotNode> sections = root.parts(kSections);
   MjcfFile file(root);
+  file.free_base = free_base;
   const auto each = [&](const char* name, auto&& read) {
     for (const RobotNode& s : sections)
       if (s.name() == name) read(s);
@@ -335,6 +376,7 @@ void read_mjcf(const RobotNode& root, const std::string& keyframe) {
   each("default", [&](const RobotNode& s) { file.read_defaults(s, ""); });
   each("asset", [&](const RobotNode& s) { read_asset(file, s); });
   each("worldbody", [&](const RobotNode& s) { read_mjcf_bodies(file, s); });
+  if (file.total_mass > 0) scale_masses(scene, file.total_mass);
   each("actuator", [&](const RobotNode& s) { read_mjcf_actuators(file, s); });
   each("contact", [&](const RobotNode& s) {
     static_cast<void>(s.parts(

@@ -7,7 +7,8 @@
 namespace tangere {
 
 /// Reads the root <mujoco>. `keyframe` names the keyframe in which the scene starts, "" for none.
-/// Throws InputError ("file:line: …") for what is outside the subset and cannot be left out.
-void read_mjcf(const RobotNode& root, const std::string& keyframe);
+/// With `free_base`, bodies of the world without joints move freely. Throws InputError ("file:line:
+/// …") for what is outside the subset and cannot be left out.
+void read_mjcf(const RobotNode& root, const std::string& keyframe, bool free_base);
 
 }  // namespace tangere

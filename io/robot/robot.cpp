@@ -93,14 +93,57 @@ int add_link(Robot& robot, RobotNames& names, const std::string& name, int paren
   return index;
 }
 
-RobotPiece inertial_piece(double mass, const std::array<double, 6>& inertia, const Pose& pose,
-                          const std::string& origin, const Source& source) {
+namespace {
+
+constexpr double kNearly = 1e-6;     // of the moments: that much is rounding
+constexpr double kWeight = 1000;     // of a ball in place of a point [kg/m³]
+constexpr double kBallMoment = 0.4;  // of a ball, in mass times its radius squared
+
+/// Adds the same to all moments, as little as gives those of a solid. Returns how much of them.
+double make_possible(std::array<double, 6>& inertia) {
+  const double whole = std::abs(inertia[0]) + std::abs(inertia[3]) + std::abs(inertia[5]) +
+                       2 * (std::abs(inertia[1]) + std::abs(inertia[2]) + std::abs(inertia[4]));
+  const auto with = [&](double share) {
+    std::array<double, 6> more = inertia;
+    for (const std::size_t k : {0U, 3U, 5U}) more[k] += share * whole;
+    return more;
+  };
+  double no = 0, yes = 2;
+  for (int k = 0; k < 40; ++k) {
+    const double middle = 0.5 * (no + yes);
+    (is_inertia(with(middle)) ? yes : no) = middle;
+  }
+  inertia = with(yes + kNearly);
+  return yes;
+}
+
+}  // namespace
+
+std::optional<RobotPiece> inertial_piece(Robot& robot, double mass, std::array<double, 6> inertia,
+                                         const Pose& pose, const std::string& origin,
+                                         const Source& source) {
+  if (!(mass >= 0))
+    throw InputError(
+        fmt::format("{}{}: mass {} kg; expected 0 or more", source.prefix(), origin, mass));
   const bool none = std::all_of(inertia.begin(), inertia.end(), [](double x) { return x == 0; });
-  if (!(mass >= 0) || (mass == 0 ? !none : !is_inertia(inertia)))
-    throw InputError(fmt::format(
-        "{}{}: no solid body of mass {} kg has the inertia xx xy xz yy yz zz = {} kg m^2; expected "
-        "positive principal moments, each less than the sum of the other two, or zeros with mass 0",
-        source.prefix(), origin, mass, fmt::join(inertia, " ")));
+  if (mass == 0) {
+    if (!none) robot.lost.add(source, origin + ": an inertia without a mass; it is left out");
+    return std::nullopt;
+  }
+  if (none) {
+    const double radius = std::cbrt(3 * mass / (4 * 3.14159265358979323846 * kWeight));
+    const double moment = kBallMoment * mass * radius * radius;
+    inertia = {moment, 0, 0, moment, 0, moment};
+    robot.lost.add(source, origin + ": a mass without an inertia; it is that of a ball of water");
+  } else if (!is_inertia(inertia)) {
+    if (make_possible(inertia) > kNearly)
+      robot.lost.add(source, origin +
+                                 ": no solid has this inertia (a principal moment is above the sum "
+                                 "of the others, or not above 0); all moments are raised until one "
+                                 "has");
+    else
+      robot.changed.add(source, origin + ": the inertia of a thin plate or rod, raised by 1e-6");
+  }
   RobotPiece piece;
   piece.shape = AbstractShape{mass, inertia, {}};
   piece.pose = pose;

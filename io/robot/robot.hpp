@@ -30,6 +30,7 @@ class Remarks {
 struct MeshFile {
   std::string path;
   Vector3 scale{1, 1, 1};
+  bool hull = false;  ///< the body is the convex hull of the file's points
 };
 
 /// A named place on a link.
@@ -104,8 +105,10 @@ int add_link(Robot& robot, RobotNames& names, const std::string& name, int paren
              const std::string& origin, const Source& source);
 
 /// A piece that is a mass alone. `inertia`: xx xy xz yy yz zz in the frame `pose` at the centre of
-/// mass. Throws InputError at `source` if no body has these numbers.
-RobotPiece inertial_piece(double mass, const std::array<double, 6>& inertia, const Pose& pose,
-                          const std::string& origin, const Source& source);
+/// mass. Where no solid has it, another takes its place, and the robot lists that. Without a mass
+/// there is no piece. Throws InputError at `source` if the mass is negative.
+std::optional<RobotPiece> inertial_piece(Robot& robot, double mass, std::array<double, 6> inertia,
+                                         const Pose& pose, const std::string& origin,
+                                         const Source& source);
 
 }  // namespace tangere

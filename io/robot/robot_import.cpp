@@ -236,6 +236,12 @@ void refuse_deep(const Scene& scene) {
   }
 }
 
+bool stands_still(const Scene& scene) {
+  return std::all_of(scene.links.begin(), scene.links.end(), [](const LinkDescription& link) {
+    return link.joint.type == JointType::fixed;
+  });
+}
+
 Robot read_robot(const std::string& text, const std::string& name, const RobotOptions& options,
                  std::vector<std::string>& warnings) {
   Robot robot;
@@ -254,9 +260,7 @@ Robot read_robot(const std::string& text, const std::string& name, const RobotOp
       throw InputError("--keyframe with " + name + ": a URDF file has no keyframes");
     read_urdf(root, options.free_base);
   } else if (root.name() == "mujoco") {
-    if (options.free_base)
-      throw InputError("--base free with " + name + ": a MJCF file says itself what moves freely");
-    read_mjcf(root, options.keyframe);
+    read_mjcf(root, options.keyframe, options.free_base);
   } else {
     root.fail(
         std::string("no robot; expected ") + kRoots +
@@ -277,7 +281,8 @@ ImportedScene import_robot(const fs::path& path, const fs::path& output,
                            out.warnings);
   refuse_deep(robot.scene);
   add_motors(robot, options.motors, name);
-  stiffen_limits(robot);
+  const bool still = stands_still(robot.scene);
+  if (!still) stiffen_limits(robot);
   SceneSections sections;
   sections.contacts = contacts_text(robot, options.touches, name);
   if (!sections.contacts.empty())
@@ -308,8 +313,14 @@ ImportedScene import_robot(const fs::path& path, const fs::path& output,
   out.motors = scene.scene.motors.size();
   out.sensors = scene.scene.sensors.size();
   out.end_effectors = scene.scene.end_effectors.size();
-  static_cast<void>(
-      Model(scene.scene));  // whatever it would refuse is refused before it is written
+  if (still)
+    out.warnings.push_back(
+        fmt::format("{}: nothing in it moves, so it cannot be simulated alone; <include> the scene "
+                    "in another{}",
+                    name, options.free_base ? "" : ", or let it move with --base free"));
+  else
+    static_cast<void>(
+        Model(scene.scene));  // whatever it would refuse is refused before it is written
   return out;
 }
 

@@ -37,7 +37,7 @@ struct TouchRequest {
 
 struct RobotOptions {
   bool allow_unknown = false;  ///< unknown elements and attributes become warnings
-  bool free_base = false;      ///< URDF: the root link moves freely
+  bool free_base = false;      ///< the root link, or bodies of the world without joints, move
   std::vector<PadRequest> pads{};
   std::vector<MotorRequest> motors{};
   std::vector<TouchRequest> touches{};

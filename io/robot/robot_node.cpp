@@ -18,6 +18,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr const char* kOtherSoftware = "a setting of other software";
+
 std::vector<std::string> names_of(const Words& words) {
   std::vector<std::string> names;
   for (const Word& w : words) names.emplace_back(w.name);
@@ -72,6 +74,10 @@ void RobotNode::check(const Words& attributes) const {
     if (name.starts_with("xmlns")) continue;
     const Word* const word = word_in(attributes, name);
     if (word == nullptr) {
+      if (is_of_other_software(name)) {
+        idle(fmt::format("<{}> {}: {}", this->name(), name, kOtherSoftware));
+        continue;
+      }
       if (!context().allow_unknown)
         fail(fmt::format("unknown attribute '{}'{} (--allow-unknown ignores it)", name,
                          suggestion(name, names_of(attributes))));
@@ -117,7 +123,9 @@ void RobotNode::add_parts(const Words& known, std::vector<RobotNode>& out) const
     if (child.name().starts_with("xacro:"))
       child.fail("a macro of xacro; expected plain XML, which 'xacro FILE' writes");
     const Word* const word = word_in(known, child.name());
-    if (word == nullptr) {
+    if (word == nullptr && is_of_other_software(child.name())) {
+      child.idle(fmt::format("<{}>: {}", child.name(), kOtherSoftware));
+    } else if (word == nullptr) {
       if (!context().allow_unknown)
         child.fail(fmt::format("unknown element inside <{}>{} (--allow-unknown ignores it)", name(),
                                suggestion(child.name(), names_of(known))));
@@ -129,6 +137,10 @@ void RobotNode::add_parts(const Words& known, std::vector<RobotNode>& out) const
       word->fate == Fate::idle ? child.idle(text) : child.lost(text);
     }
   }
+}
+
+bool RobotNode::is_of_other_software(std::string_view name) const {
+  return robot_->format == "URDF" && name.find(':') != std::string_view::npos;
 }
 
 bool RobotNode::flag(const char* attribute, bool fallback) const {

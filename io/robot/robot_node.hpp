@@ -6,6 +6,7 @@
 #include <tinyxml2.h>
 
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "io/robot/robot.hpp"
@@ -60,6 +61,8 @@ class RobotNode : public SceneNode {
   [[nodiscard]] bool flag(const char* attribute, bool fallback) const;
 
  private:
+  /// Whether a name of URDF has a prefix, as drake:acceleration: other software adds such words.
+  [[nodiscard]] bool is_of_other_software(std::string_view name) const;
   void add_parts(const Words& known, std::vector<RobotNode>& out) const;
 
   Robot* robot_;

@@ -134,6 +134,7 @@ class Writer {
     const fs::path relative = path.lexically_relative(from);
     out_ += fmt::format(" transform_type=\"OBJ_TO_JOINT\" filename=\"{}\"",
                         attribute_text((relative.empty() ? path : relative).generic_string()));
+    if (file.hull) out_ += " hull=\"true\"";
     if (file.scale != Vector3{1, 1, 1})
       out_ += fmt::format(" scale=\"{}\"", vector_text(file.scale));
   }

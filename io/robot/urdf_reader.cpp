@@ -19,6 +19,7 @@ constexpr int kDeepestChain = 150;  // links of a chain; a scene's limit is 200,
 
 const char* const kPictures = "for pictures only";
 const char* const kSoftware = "a setting of other software";
+const char* const kLaw = "coefficients of another contact law";
 
 const Words kRobotChildren = {
     {"link"},
@@ -31,11 +32,18 @@ const Words kRobotChildren = {
     {"ros2_control", Fate::idle, kSoftware},
     {"sensor", Fate::idle, "no sensor of touch; --pad LINK=LAYOUT adds one"},
     {"group", Fate::idle, kSoftware},
-    {"disable_collisions", Fate::idle, kSoftware}};
+    {"disable_collisions", Fate::idle, kSoftware},
+    {"deformable", Fate::lost, "a body that bends; scenes have none"}};
 const Words kLinkChildren = {{"inertial"},
                              {"collision"},
                              {"visual", Fate::idle, kPictures},
-                             {"contact", Fate::idle, "coefficients of another contact law"},
+                             {"contact", Fate::idle, kLaw},
+                             {"surface", Fate::idle, kLaw},
+                             {"origin", Fate::idle, "a link is where its joint puts it"},
+                             {"gravity", Fate::idle, kSoftware},
+                             {"kinematic", Fate::idle, kSoftware},
+                             {"self_filter", Fate::idle, kSoftware},
+                             {"collision_checking", Fate::idle, kSoftware},
                              {"self_collision_checking", Fate::idle, kSoftware}};
 const Words kJointChildren = {{"origin"},
                               {"parent"},
@@ -45,6 +53,7 @@ const Words kJointChildren = {{"origin"},
                               {"dynamics"},
                               {"mimic", Fate::lost, "ties a joint to another; scenes cannot"},
                               {"calibration", Fate::idle, kSoftware},
+                              {"joint_properties", Fate::idle, kSoftware},
                               {"safety_controller", Fate::idle, kSoftware}};
 
 /// The only child of this name; none if it is missing.
@@ -94,7 +103,7 @@ class UrdfReader {
     std::vector<RobotNode> links;
     for (const RobotNode& node : root_.parts(kRobotChildren)) {
       if (node.name() == "link") {
-        node.check({{"name"}, {"type", Fate::idle, kSoftware}});
+        node.check({{"name"}, {"type", Fate::idle, kSoftware}, {"concave", Fate::idle, kSoftware}});
         const std::string name = node.text("name");
         if (std::find(link_names_.begin(), link_names_.end(), name) != link_names_.end())
           node.fail("link name '" + name + "' is used twice");
@@ -126,15 +135,16 @@ class UrdfReader {
       if (!joint.used)
         joint.node.fail("joint '" + joint.joint.name + "' is part of a ring of links, or of " +
                         "nothing that hangs on a root; expected a tree");
+    hold_weightless();
   }
 
  private:
   void read_joint(const RobotNode& node) {
-    node.check({{"name"}, {"type"}});
+    node.check({{"name"}, {"type"}, {"dont_collapse", Fate::idle, kSoftware}});
     Joint out{{}, "", "", "", node};
     const std::vector<RobotNode> parts = node.parts(kJointChildren);
-    static const std::vector<std::string> types = {"fixed",     "revolute", "continuous",
-                                                   "prismatic", "floating", "planar"};
+    static const std::vector<std::string> types = {
+        "fixed", "revolute", "continuous", "prismatic", "floating", "planar", "spherical"};
     out.type = types[std::size_t(node.choice("type", types))];
     JointDescription& joint = out.joint;
     joint.name = node.text("name");
@@ -155,7 +165,7 @@ class UrdfReader {
                           out.type == "prismatic" || out.type == "planar";
     joint.axis0 = {1, 0, 0};
     if (const auto axis = only(parts, "axis")) {
-      axis->check({{"xyz"}});
+      axis->check({{"xyz"}, {"rpy", Fate::idle, "an axis has a direction only"}});
       if (has_axis)
         joint.axis0 = axis->direction("xyz", joint.axis0);
       else
@@ -165,9 +175,13 @@ class UrdfReader {
     if (out.type == "prismatic") joint.type = JointType::prismatic;
     if (out.type == "planar") joint.type = JointType::free2d;
     if (out.type == "floating") joint.type = JointType::free;
+    if (out.type == "spherical") joint.type = JointType::spherical;
     read_limit(node, parts, out);
     if (const auto dynamics = only(parts, "dynamics")) {
-      dynamics->check({{"damping"}, {"friction", Fate::zero, "dry friction of a joint"}});
+      Words words = {{"damping"}, {"friction", Fate::zero, "dry friction of a joint"}};
+      for (const char* other : {"D", "K", "mu_coulomb", "mu_viscous"})
+        words.push_back({other, Fate::idle, kSoftware});
+      dynamics->check(words);
       joint.damping = dynamics->not_negative("damping", 0.0);
       if (joint.type == JointType::fixed && joint.damping != 0) {
         joint.damping = 0;
@@ -184,12 +198,14 @@ class UrdfReader {
       if (needed) node.fail("a " + out.type + " joint has no <limit>; expected one");
       return;
     }
-    limit->check({{"lower"},
-                  {"upper"},
-                  {"effort"},
-                  {"velocity", Fate::idle, "the largest speed, which the controller keeps"},
-                  {"acceleration", Fate::idle, kSoftware},
-                  {"jerk", Fate::idle, kSoftware}});
+    Words words = {{"lower"},
+                   {"upper"},
+                   {"effort"},
+                   {"twist", Fate::lost, "the range of a spherical joint"},
+                   {"velocity", Fate::idle, "the largest speed, which the controller keeps"}};
+    for (const char* other : {"acceleration", "jerk", "command_effort", "current", "gear_velocity"})
+      words.push_back({other, Fate::idle, kSoftware});
+    limit->check(words);
     if (const double effort = limit->not_negative("effort", 0.0); effort > 0)
       robot_.efforts[out.joint.name] = effort;
     const bool bounded = limit->given("lower") || limit->given("upper");
@@ -198,9 +214,9 @@ class UrdfReader {
       return;
     }
     const double low = limit->number("lower", 0.0), high = limit->number("upper", 0.0);
-    if (!(low <= high))
-      limit->fail(fmt::format("lower=\"{}\" upper=\"{}\": expected low, then high", low, high));
-    if (low < high)
+    if (low > high)
+      limit->changed("<limit> lower above upper: the joint is without limits, as in PyBullet");
+    else if (low < high)
       out.joint.limits = {low, high};
     else
       limit->changed("<limit> lower and upper are equal, so the joint is without limits");
@@ -215,6 +231,26 @@ class UrdfReader {
       if (&other != &joint && other.child == joint.child)
         joint.node.fail(fmt::format("link '{}' is the child of two joints, '{}' and '{}'",
                                     joint.child, other.joint.name, joint.joint.name));
+  }
+
+  /// Holds the joints that move nothing that has mass: no force could say how they move.
+  void hold_weightless() {
+    std::vector<LinkDescription>& links = robot_.scene.links;
+    std::vector<char> heavy(links.size());
+    for (std::size_t i = links.size(); i-- > 0;) {
+      const auto* const mass = std::get_if<AbstractShape>(&links[i].body.shape);
+      heavy[i] |= mass != nullptr && mass->mass > 0;
+      if (links[i].parent >= 0) heavy[std::size_t(links[i].parent)] |= heavy[i];
+      JointDescription& joint = links[i].joint;
+      if (heavy[i] || joint.type == JointType::fixed) continue;
+      robot_.lost.add(joint.source,
+                      "joint '" + joint.name + "' moves nothing that has a mass: it is held");
+      JointDescription held;
+      held.name = joint.name;
+      held.pose = joint.pose;
+      held.source = joint.source;
+      joint = held;
+    }
   }
 
   /// Adds link `i` and all that hang on it.
@@ -254,52 +290,59 @@ class UrdfReader {
   [[nodiscard]] std::vector<RobotPiece> pieces_of(const RobotNode& node) const {
     std::vector<RobotPiece> pieces;
     const std::vector<RobotNode> parts = node.parts(kLinkChildren);
-    for (const RobotNode& part : parts)
-      if (part.name() == "collision") pieces.push_back(read_collision(part));
+    for (const RobotNode& part : parts) {
+      if (part.name() != "collision") continue;
+      if (auto piece = read_collision(part)) pieces.push_back(std::move(*piece));
+    }
     const auto inertial = only(parts, "inertial");
     if (!inertial) return pieces;
     inertial->check({});
     const std::vector<RobotNode> inside = inertial->parts({{"origin"}, {"mass"}, {"inertia"}});
     const RobotNode mass = required(*inertial, inside, "mass");
-    const RobotNode inertia = required(*inertial, inside, "inertia");
     mass.check({{"value"}});
-    Words six;
     std::array<double, 6> I{};
-    for (const char* name : {"ixx", "ixy", "ixz", "iyy", "iyz", "izz"}) {
-      I[six.size()] = inertia.number(name, 0.0);
-      six.push_back({name});
+    if (const auto inertia = only(inside, "inertia")) {
+      Words six;
+      for (const char* name : {"ixx", "ixy", "ixz", "iyy", "iyz", "izz"}) {
+        I[six.size()] = inertia->number(name, 0.0);
+        six.push_back({name});
+      }
+      inertia->check(six);
     }
-    inertia.check(six);
-    const double kg = mass.number("value");
-    const Pose at = read_origin(only(inside, "origin"));
-    if (kg != 0 || std::any_of(I.begin(), I.end(), [](double x) { return x != 0; }))
-      pieces.push_back(inertial_piece(kg, I, at, "<inertial>", inertial->source()));
+    if (auto piece =
+            inertial_piece(robot_, mass.number("value"), I, read_origin(only(inside, "origin")),
+                           "<inertial>", inertial->source()))
+      pieces.push_back(std::move(*piece));
     return pieces;
   }
 
-  [[nodiscard]] RobotPiece read_collision(const RobotNode& node) const {
-    node.check({{"name", Fate::read}, {"group", Fate::idle, kSoftware}});
-    const std::vector<RobotNode> parts =
-        node.parts({{"origin"},
-                    {"geometry"},
-                    {"verbose", Fate::idle, kSoftware},
-                    {"material", Fate::idle, kPictures},
-                    {"contact_coefficients", Fate::idle, "coefficients of another contact law"}});
+  /// None if scenes cannot have its shape.
+  [[nodiscard]] std::optional<RobotPiece> read_collision(const RobotNode& node) const {
+    node.check({{"name", Fate::read},
+                {"group", Fate::idle, kSoftware},
+                {"mask", Fate::idle, kSoftware},
+                {"concave", Fate::idle, kSoftware}});
+    const std::vector<RobotNode> parts = node.parts({{"origin"},
+                                                     {"geometry"},
+                                                     {"verbose", Fate::idle, kSoftware},
+                                                     {"material", Fate::idle, kPictures},
+                                                     {"surface", Fate::idle, kLaw},
+                                                     {"contact_coefficients", Fate::idle, kLaw}});
     RobotPiece piece;
     piece.pose = read_origin(only(parts, "origin"));
     piece.origin = "<collision>";
     piece.source = node.source();
     const RobotNode geometry = required(node, parts, "geometry");
-    geometry.check({});
+    geometry.check({{"name", Fate::read}});
     const std::vector<RobotNode> shapes =
         geometry.parts({{"box"}, {"sphere"}, {"cylinder"}, {"capsule"}, {"mesh"}});
     if (shapes.size() != 1)
       geometry.fail(fmt::format("has {} shapes; expected one", shapes.size()));
-    read_shape(shapes[0], piece);
+    if (!read_shape(shapes[0], piece)) return std::nullopt;
     return piece;
   }
 
-  void read_shape(const RobotNode& node, RobotPiece& piece) const {
+  [[nodiscard]] bool read_shape(const RobotNode& node, RobotPiece& piece) const {
     const std::string type = node.name();
     if (type == "box") {
       node.check({{"size"}});
@@ -313,17 +356,20 @@ class UrdfReader {
       piece.shape = SphereShape{node.positive("radius")};
     } else if (type == "mesh") {
       node.check({{"filename"}, {"scale"}});
-      piece.mesh = {find_mesh(node, node.text("filename"), ""),
-                    node.vector("scale", Vector3{1, 1, 1})};
-      piece.shape = read_robot_mesh(node, piece.mesh);
+      auto mesh =
+          read_robot_mesh(node, node.text("filename"), "", node.vector("scale", Vector3{1, 1, 1}));
+      if (!mesh) return false;
+      piece.mesh = mesh->file;
+      piece.shape = std::move(mesh->shape);
     } else {
-      node.check({{"radius"}, {"length"}});
+      node.check({{"radius"}, {"length"}, {"name", Fate::read}});
       const double radius = node.positive("radius"), length = node.positive("length");
       if (type == "cylinder")
         piece.shape = CylinderShape{length, radius};
       else
         piece.shape = CapsuleShape{length, radius};
     }
+    return true;
   }
 
   const RobotNode& root_;

@@ -45,6 +45,7 @@ class Attributes {
                 "radius",
                 "length",
                 "filename",
+                "hull",
                 "transform_type",
                 "inertia",
                 "mesh",
@@ -194,7 +195,7 @@ Shape read_shape(const SceneNode& node, Attributes& attributes) {
   const ShapeRow& row = shape_rows()[std::size_t(node.choice("type", names))];
   Shape shape = row.make();
   if (std::holds_alternative<MeshShape>(shape)) {
-    attributes.use({"filename", "scale", "transform_type", "general_contact_resolution",
+    attributes.use({"filename", "scale", "hull", "transform_type", "general_contact_resolution",
                     "resolution", "error", "count", "pitch"});
     MeshShape mesh = read_mesh(node, length);
     mesh.resolution = node.integer("resolution", 0, MeshShape::kMostCells, mesh.resolution);
@@ -219,11 +220,11 @@ Shape read_shape(const SceneNode& node, Attributes& attributes) {
 
 MeshShape read_mesh(const SceneNode& node, double length) {
   const Vector3 scale = node.vector("scale", Vector3{1, 1, 1});
-  for (double s : scale)
-    if (!(s > 0)) node.fail(fmt::format("scale has {}; expected positive factors", s));
-  MeshShape shape = read_beside(node, "filename", read_surface);
-  for (std::size_t k = 0; k < shape.vertices.size(); ++k)
-    shape.vertices[k] *= scale[k % 3] * length;
+  for (const double s : scale)
+    if (s == 0) node.fail("scale has 0; expected factors other than 0");
+  const bool hull = node.has("hull") && node.choice("hull", {"true", "false"}) == 0;
+  MeshShape shape = read_beside(node, "filename", hull ? read_hull : read_surface);
+  scale_surface(shape, scaled(scale, length));
   return shape;
 }
 

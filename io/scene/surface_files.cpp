@@ -14,6 +14,7 @@
 
 #include "engine/base/error.hpp"
 #include "io/files/word_reader.hpp"
+#include "io/scene/convex_hull.hpp"
 #include "io/scene/triangle_files.hpp"
 
 namespace tangere {
@@ -74,7 +75,8 @@ MeshShape weld(const RawMesh& raw) {
   return mesh;
 }
 
-void check_closed(const MeshShape& mesh, const std::string& path) {
+/// Where the surface is open, or "".
+std::string open_edge(const MeshShape& mesh) {
   std::map<std::pair<int, int>, int> surplus;  // of an edge's one direction over the other
   for (const std::array<int, 3>& t : mesh.triangles)
     for (std::size_t k = 0; k < 3; ++k) {
@@ -87,10 +89,11 @@ void check_closed(const MeshShape& mesh, const std::string& path) {
   };
   for (const auto& [edge, count] : surplus)
     if (count != 0)
-      throw InputError(fmt::format(
-          "{}: the surface is open, or its faces disagree on what is outside, at the edge from {} "
-          "to {}; expected a closed surface",
-          path, place(edge.first), place(edge.second)));
+      return fmt::format(
+          "the surface is open, or its faces disagree on what is outside, at the edge from {} to "
+          "{}; expected a closed surface",
+          place(edge.first), place(edge.second));
+  return "";
 }
 
 /// Reads a file of the format that its name says: .stl, .ply, or an OBJ file.
@@ -119,16 +122,38 @@ double six_volumes(const MeshShape& mesh) {
 
 }  // namespace
 
-MeshShape read_surface(const std::string& path) {
+MeshShape read_faces(const std::string& path) {
   MeshShape mesh = weld(read_triangles(path));
   if (mesh.triangles.empty()) throw InputError(path + ": no faces; expected a closed surface");
-  check_closed(mesh, path);
+  return mesh;
+}
+
+std::string surface_fault(const MeshShape& mesh) {
+  if (std::string fault = open_edge(mesh); !fault.empty()) return fault;
   const double volume = six_volumes(mesh) / 6;
   if (volume < 0)
-    throw InputError(path +
-                     ": the faces point inwards; expected anticlockwise corners seen from outside");
-  if (!(volume > 0)) throw InputError(path + ": the surface encloses no volume");
+    return "the faces point inwards; expected anticlockwise corners seen from outside";
+  return volume > 0 ? "" : "the surface encloses no volume";
+}
+
+MeshShape read_surface(const std::string& path) {
+  MeshShape mesh = read_faces(path);
+  if (const std::string fault = surface_fault(mesh); !fault.empty())
+    throw InputError(path + ": " + fault);
   return mesh;
+}
+
+MeshShape read_hull(const std::string& path) {
+  MeshShape hull = convex_hull(read_faces(path).vertices);
+  if (hull.triangles.empty())
+    throw InputError(path + ": all points lie in a plane; expected a hull with a volume");
+  return hull;
+}
+
+void scale_surface(MeshShape& mesh, const Vector3& scale) {
+  for (std::size_t k = 0; k < mesh.vertices.size(); ++k) mesh.vertices[k] *= scale[k % 3];
+  if (scale[0] * scale[1] * scale[2] < 0)
+    for (std::array<int, 3>& t : mesh.triangles) std::swap(t[1], t[2]);
 }
 
 std::vector<double> spread_points(const std::vector<double>& points, int count) {

@@ -15,6 +15,20 @@ namespace tangere {
 /// and InputError without a line if the surface is open, encloses no volume, or faces inwards.
 MeshShape read_surface(const std::string& path);
 
+/// The same for faces of any kind: the surface may be open. Throws like read_surface where the
+/// file is not of its format.
+MeshShape read_faces(const std::string& path);
+
+/// Returns why faces are no closed surface with a volume, or "".
+std::string surface_fault(const MeshShape& mesh);
+
+/// Reads faces and returns the convex hull of their corners. Throws like read_faces, and InputError
+/// if all corners lie in a plane.
+MeshShape read_hull(const std::string& path);
+
+/// Scales a surface along each axis. Negative factors mirror it, and its outside stays outside.
+void scale_surface(MeshShape& mesh, const Vector3& scale);
+
 /// Returns `count` of the points, (n, 3): the first, then always the one that is farthest from
 /// those before it, the first of equals. `count` is at most n.
 std::vector<double> spread_points(const std::vector<double>& points, int count);

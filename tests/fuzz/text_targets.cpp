@@ -12,6 +12,7 @@
 #include "engine/step/stepper.hpp"
 #include "io/files/csv.hpp"
 #include "io/robot/robot_import.hpp"
+#include "io/scene/convex_hull.hpp"
 #include "io/scene/scene_reader.hpp"
 #include "io/scene/surface_files.hpp"
 #include "io/scene/tactile_layouts.hpp"
@@ -265,12 +266,17 @@ std::vector<Target> text_targets() {
   const auto surface = [](const std::string& name, const auto& corpus) {
     const std::string file = "mutant." + name;
     return Target{name, false, file, corpus, [=](const std::string& folder) {
+                    const MeshShape faces = read_faces(folder + "/" + file);
+                    const MeshShape hull = convex_hull(faces.vertices);
+                    if (!hull.triangles.empty() && !surface_fault(hull).empty())
+                      throw std::logic_error("a hull is open: " + surface_fault(hull));
                     static_cast<void>(mesh_points(read_surface(folder + "/" + file), 0.1, 10'000));
                   }};
   };
   return {{"scene", false, "mutant", scenes, [=](const auto& f) { run_scene(in(f)); }},
           {"urdf", false, "mutant", robots({"hand.urdf", "gripper.urdf"}), run_robot},
-          {"mjcf", false, "mutant", robots({"machine.xml", "arm.xml", "including.xml"}), run_robot},
+          {"mjcf", false, "mutant",
+           robots({"machine.xml", "meshes.xml", "arm.xml", "including.xml"}), run_robot},
           hostile("mjcf_includes", "mujoco", "<body name=\"x\"/>",
                   robots({"including.xml", "machine.xml"}), run_robot),
           hostile("scene_includes", "tangere", "<robot/>", scenes,

@@ -135,5 +135,5 @@ def write(path):
     (HERE / f"{path.stem}_reference.txt").write_text(text)
 
 
-for robot in ("hand.urdf", "machine.xml"):
+for robot in ("hand.urdf", "machine.xml", "meshes.xml"):
     write(HERE / robot)

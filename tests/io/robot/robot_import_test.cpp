@@ -14,10 +14,12 @@
 namespace tangere {
 namespace {
 
+using ::testing::AllOf;
 using ::testing::Contains;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
+using ::testing::Not;
 
 const std::string kRobots = TANGERE_TEST_DATA "/robots/";
 
@@ -68,13 +70,9 @@ TEST(RobotImport, UrdfMistakesNameTheLine) {
   EXPECT_THAT(fault_of(joint("revolt", "")),
               HasSubstr(":6: <joint>: type=\"revolt\" is not known"));
   EXPECT_THAT(fault_of(joint("revolute", "")), HasSubstr("has no <limit>"));
-  EXPECT_THAT(fault_of(joint("prismatic", "<limit lower=\"1\" upper=\"0\"/>")),
-              HasSubstr("expected low, then high"));
   EXPECT_THAT(fault_of(joint("fixed", "<origin xyz=\"0 0\"/>")),
               HasSubstr(":6: <origin>: xyz=\"0 0\" has 2 numbers; expected 3"));
   EXPECT_THAT(fault_of(joint("continuous", "<axis xyz=\"0 0 0\"/>")), HasSubstr("no direction"));
-  EXPECT_THAT(fault_of(joint("continuous", "")),
-              HasSubstr(":6: joint 'k' moves nothing that has mass"));
   EXPECT_THAT(fault_of(urdf("<joint name=\"k\" type=\"fixed\"><parent link=\"a\"/>"
                             "<child link=\"bb\"/></joint>")),
               HasSubstr("no link is named 'bb'; did you mean 'b'"));
@@ -84,11 +82,10 @@ TEST(RobotImport, UrdfMistakesNameTheLine) {
                             "<joint name=\"l\" type=\"fixed\"><parent link=\"d\"/>"
                             "<child link=\"c\"/></joint>")),
               HasSubstr(":6: <joint>: joint 'k' is part of a ring"));
-  EXPECT_THAT(fault_of(urdf("<link name=\"c\"><inertial><mass value=\"1\"/>"
-                            "<inertia ixx=\"1\" iyy=\"1\" izz=\"5\"/></inertial></link>"
+  EXPECT_THAT(fault_of(urdf("<link name=\"c\"><inertial><mass value=\"-1\"/></inertial></link>"
                             "<joint name=\"k\" type=\"fixed\"><parent link=\"a\"/>"
                             "<child link=\"c\"/></joint>")),
-              HasSubstr("no solid body of mass 1 kg has the inertia"));
+              HasSubstr(":5: <inertial>: mass -1 kg; expected 0 or more"));
   EXPECT_THAT(fault_of(urdf("<xacro:macro/>")), HasSubstr("a macro of xacro"));
   const std::string mesh = "<link name=\"c\"><collision><geometry>\n<mesh filename=\"";
   EXPECT_THAT(fault_of(urdf(mesh + "none.obj\"/></geometry></collision></link>"
@@ -181,7 +178,6 @@ TEST(RobotImport, ListsWhatChangesTheMotion) {
               ElementsAre(file + "<tendon>: tendons; scenes have none (line 17)",
                           file + "<equality>: constraints between bodies or joints; scenes have "
                                  "none (line 20)",
-                          file + "<flag> contact: switches forces (line 5)",
                           file + "<joint> frictionloss: dry friction of a joint (line 9)",
                           file + "<motor> on a tendon: scenes drive joints (line 24)",
                           file + "<position>: a second actuator of joint 'elbow' (line 26)",
@@ -192,6 +188,115 @@ TEST(RobotImport, ListsWhatChangesTheMotion) {
   EXPECT_THAT(arm.text, HasSubstr("Left out, and the motion differs by it:"));
   const ImportedScene gripper = import_robot(kRobots + "gripper.urdf", kRobots + "scene.xml");
   EXPECT_THAT(gripper.lost, ElementsAre(HasSubstr("<mimic>")));
+}
+
+/// A link on a joint of its own, with `inertial` inside.
+ImportedScene import_link(const std::string& inertial, const std::string& joint = "") {
+  return import(urdf("<link name=\"c\">\n" + inertial +
+                     "</link>\n<joint name=\"k\" type=\"prismatic\"><parent link=\"b\"/>"
+                     "<child link=\"c\"/><limit lower=\"1\" upper=\"-1\"/>" +
+                     joint + "</joint>"));
+}
+std::array<double, 6> inertia_of(const ImportedScene& scene) {
+  return std::get<AbstractShape>(parse_scene(scene.text, "scene.xml").scene.links[2].body.shape)
+      .inertia;
+}
+
+TEST(RobotImport, InertiasThatNoSolidHasAreMendedAndListed) {
+  const auto inertial = [](const std::string& numbers) {
+    return import_link("<inertial><mass value=\"1\"/><inertia " + numbers + "/></inertial>");
+  };
+  EXPECT_THAT(inertial("ixx=\"1\" iyy=\"1\" izz=\"1.9\"").lost, IsEmpty());
+  const ImportedScene bad = inertial("ixx=\"1\" iyy=\"1\" izz=\"5\"");
+  EXPECT_THAT(bad.lost, ElementsAre(HasSubstr("<inertial>: no solid has this inertia")));
+  // 1 + x + 1 + x = 5 + x
+  EXPECT_NEAR(inertia_of(bad)[0], 4, 1e-4);
+  EXPECT_NEAR(inertia_of(bad)[5], 8, 1e-4);
+  const ImportedScene plate = inertial("ixx=\"1\" iyy=\"1\" izz=\"2\"");
+  EXPECT_THAT(plate.lost, IsEmpty());
+  EXPECT_THAT(plate.changed, Contains(HasSubstr("the inertia of a thin plate")));
+  EXPECT_NEAR(inertia_of(plate)[5], 2, 1e-4);
+  const ImportedScene point =
+      import_link("<inertial><mass value=\"4.18879020478639\"/></inertial>");
+  EXPECT_THAT(point.lost, ElementsAre(HasSubstr("a mass without an inertia")));
+  EXPECT_NEAR(inertia_of(point)[0], 0.4 * 4.18879020478639 * 0.01, 1e-12);  // a radius of 0.1 m
+  const ImportedScene none = import_link(
+      "<inertial><mass value=\"0\"/><inertia ixx=\"1\" iyy=\"1\" "
+      "izz=\"1\"/></inertial>");
+  EXPECT_THAT(none.lost, ElementsAre(HasSubstr("an inertia without a mass"),
+                                     HasSubstr("joint 'k' moves nothing that has a mass: it is "
+                                               "held (line 7)")));
+  EXPECT_EQ(none.joints, 1);
+}
+
+TEST(RobotImport, WordsOfOtherSoftwareHaveNoEffect) {
+  const ImportedScene made = import_link(
+      "<inertial><mass value=\"1\"/><inertia ixx=\"1\" iyy=\"1\" izz=\"1\"/></inertial>"
+      "<gravity/><drake:proximity x=\"1\"/>",
+      "<joint_properties/><dynamics D=\"1\" K=\"2\" drake:rotor=\"3\"/>");
+  EXPECT_THAT(made.lost, IsEmpty());
+  EXPECT_THAT(made.idle, Contains(HasSubstr("<drake:proximity>: a setting of other software")));
+  EXPECT_THAT(made.idle, Contains(HasSubstr("<dynamics> drake:rotor: a setting of other")));
+  EXPECT_THAT(made.changed, Contains(HasSubstr("<limit> lower above upper")));
+  EXPECT_THAT(fault_of(urdf("<link name=\"c\" drake=\"1\"/>")), HasSubstr("unknown attribute"));
+}
+
+TEST(RobotImport, FlagsOfMujocoAreObeyed) {
+  const auto made = [](const std::string& flags) {
+    return import("<mujoco><option><flag " + flags +
+                  "/></option><worldbody><body><joint range=\"-9 9\" stiffness=\"2\" "
+                  "damping=\"3\"/><geom size=\"0.1\"/></body></worldbody></mujoco>");
+  };
+  EXPECT_THAT(made("gravity=\"enable\"").text,
+              AllOf(HasSubstr("-9.81"), HasSubstr("lim="), HasSubstr("stiffness=\"2\""),
+                    HasSubstr("damping=\"3\"")));
+  EXPECT_THAT(made("gravity=\"disable\"").text, HasSubstr("gravity=\"0 0 0\""));
+  EXPECT_THAT(made("constraint=\"disable\"").text, Not(HasSubstr("lim=")));
+  EXPECT_THAT(made("limit=\"disable\"").text, Not(HasSubstr("lim=")));
+  const std::string passive = made("passive=\"disable\"").text;
+  EXPECT_THAT(passive, Not(HasSubstr("stiffness=\"2\"")));
+  EXPECT_THAT(passive, Not(HasSubstr("damping=\"3\"")));
+  EXPECT_THAT(made("contact=\"disable\"").lost, IsEmpty());
+  EXPECT_THAT(made("actuation=\"disable\"").lost, ElementsAre(HasSubstr("switches forces")));
+}
+
+TEST(RobotImport, MeshesAreReadWhereAGeomNeedsThem) {
+  const std::string path = kRobots + "meshes/";
+  const auto made = [&](const std::string& geom, const std::string& file) {
+    return import("<mujoco><asset><mesh name=\"m\" file=\"" + file +
+                  "\"/></asset><worldbody><body>" + kBall + geom + "</body></worldbody></mujoco>");
+  };
+  const std::string picture = "<geom type=\"mesh\" mesh=\"m\" contype=\"0\" conaffinity=\"0\"";
+  EXPECT_EQ(made(picture + " mass=\"0\"/>", "none.obj").links, 1);
+  EXPECT_THROW(made(picture + " mass=\"1\"/>", "none.obj"), InputError);
+  const std::string geom = "<geom type=\"mesh\" mesh=\"m\"/>";
+  const ImportedScene open = made(geom, path + "cup.obj");
+  EXPECT_THAT(open.text, HasSubstr("cup.obj\" hull=\"true\" mass=\"0\""));
+  EXPECT_THAT(open.changed, Contains(HasSubstr("its convex hull takes its place")));
+  EXPECT_THAT(open.lost, IsEmpty());
+  const testing::Folder folder;
+  std::ofstream(folder / "flat.obj") << "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+  EXPECT_THAT(made(geom, folder / "flat.obj").lost, ElementsAre(HasSubstr("the flat surface of")));
+  std::ofstream(folder / "mesh.dae") << "<COLLADA/>";
+  EXPECT_THAT(made(geom, folder / "mesh.dae").lost, ElementsAre(HasSubstr("no OBJ, STL or PLY")));
+}
+
+TEST(RobotImport, PackagesAreFoldersAboveTheRobot) {
+  const testing::Folder folder;
+  std::filesystem::create_directories(folder / "pack/urdf");
+  std::filesystem::copy_file(kRobots + "meshes/cup.obj", folder / "pack/cup.obj");
+  const auto imported = [&](const std::string& mesh) {
+    std::ofstream(folder / "pack/urdf/robot.urdf")
+        << urdf("<link name=\"c\"><collision><geometry><mesh filename=\"" + mesh +
+                "\"/></geometry></collision></link><joint name=\"k\" type=\"fixed\"><parent "
+                "link=\"b\"/><child link=\"c\"/></joint>");
+    return import_robot(folder / "pack/urdf/robot.urdf", folder / "scene.xml", {}).text;
+  };
+  for (const char* prefix : {"package://", "package:///"})
+    EXPECT_THAT(imported(prefix + std::string("pack/cup.obj")),
+                HasSubstr("filename=\"pack/cup.obj\" hull=\"true\""));
+  EXPECT_THROW(imported("package://"), InputError);
+  EXPECT_THROW(imported("package://pock/cup.obj"), InputError);
 }
 
 TEST(RobotImport, AddsSkinsMotorsAndContacts) {
@@ -316,8 +421,19 @@ TEST(RobotImport, AFreeBaseFalls) {
   const ImportedScene made = import_robot(kRobots + "gripper.urdf", kRobots + "scene.xml", options);
   const Scene scene = parse_scene(made.text, "scene.xml").scene;
   EXPECT_EQ(scene.links[0].joint.type, JointType::free);
-  EXPECT_THAT(fault_of("<mujoco/>", options),
-              HasSubstr("a MJCF file says itself what moves freely"));
+  const std::string still = mjcf("<geom size=\"0.1\"/>\n<body><geom size=\"0.1\"/></body>");
+  const Scene two = parse_scene(import(still, options).text, "scene.xml").scene;
+  EXPECT_EQ(two.links[0].joint.type, JointType::free);
+  EXPECT_EQ(two.links[1].joint.type, JointType::fixed);
+  EXPECT_THAT(
+      import(still).warnings,
+      ElementsAre(HasSubstr("nothing in it moves, so it cannot be simulated alone; <include> "
+                            "the scene in another, or let it move with --base free")));
+  EXPECT_EQ(import(still).joints, 0);
+  const ImportedScene weightless = import("<robot name=\"r\"><link name=\"a\"/></robot>", options);
+  EXPECT_THAT(weightless.lost,
+              ElementsAre(HasSubstr("joint 'a_base' moves nothing that has a mass")));
+  EXPECT_THAT(weightless.warnings, ElementsAre(HasSubstr("nothing in it moves")));
 }
 
 TEST(RobotImport, RotationsAreThoseOfTheFormats) {

@@ -200,6 +200,9 @@ void compare(const std::string& robot, const std::string& name, const RobotOptio
 }
 
 TEST(RobotPhysics, UrdfMovesAsInMujoco) { compare("hand.urdf", "hand_reference.txt"); }
+TEST(RobotPhysics, MassesOfMeshesAreThoseOfMujoco) {
+  compare("meshes.xml", "meshes_reference.txt");
+}
 TEST(RobotPhysics, MjcfMovesAsInMujoco) {
   RobotOptions options;
   options.end_effectors = {"marker", "edge"};

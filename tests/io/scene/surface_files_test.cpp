@@ -321,6 +321,30 @@ TEST_F(SurfaceFiles, WhatIsNoClosedSurfaceIsRefusedWithItsPlace) {
   EXPECT_THROW(read_surface(folder_), IoError);
 }
 
+TEST_F(SurfaceFiles, AHullClosesAnOpenSurface) {
+  std::string open = kBox;
+  open.erase(open.find("f 4 1 5 8"));
+  write("open.obj", open);
+  const auto text = [](const std::string& more) {
+    return "<redmax><robot><link name=\"l\"><joint name=\"j\" type=\"prismatic\" axis=\"0 0 1\"/>"
+           "<body name=\"b\" type=\"mesh\" filename=\"open.obj\" "
+           "transform_type=\"OBJ_TO_JOINT\" density=\"1\" " +
+           more + "/></link></robot></redmax>";
+  };
+  const auto volume = [&](const std::string& more) {
+    return volume_of(parse_scene(text(more), folder_ + "s.xml").scene.links[0].body.shape);
+  };
+  const double unit = volume("hull=\"true\"");
+  EXPECT_THROW(volume(""), InputError);
+  EXPECT_THROW(volume("hull=\"false\""), InputError);
+  EXPECT_THROW(volume("hull=\"yes\""), InputError);
+  EXPECT_THROW(volume("hull=\"true\" scale=\"1 0 1\""), InputError);
+  EXPECT_NEAR(volume("hull=\"true\" scale=\"-1 2 1\""), 2 * unit, 1e-12 * unit);
+  write("flat.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+  EXPECT_THROW(read_hull(folder_ + "flat.obj"), InputError);
+  EXPECT_NEAR(volume_of(read_hull(folder_ + "open.obj")), 6, 1e-12);
+}
+
 TEST_F(SurfaceFiles, ContactPointsFollowTheirCount) {
   EXPECT_THAT(read_contact_points(write("p.txt", "2\n1 +2 3\n\n-1e-3 0 5\n")),
               ::testing::ElementsAre(1, 2, 3, -1e-3, 0, 5));

@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: Apache-2.0
+// The smallest convex surface around points: what stands for a mesh whose own surface is open.
+#pragma once
+
+#include <vector>
+
+#include "engine/model/scene.hpp"
+
+namespace tangere {
+
+/// Returns the convex hull of `points` (n, 3): a closed surface of triangles, with corners
+/// anticlockwise seen from outside. Points closer than a millionth of the longest side count as
+/// one. The same points have the same hull everywhere. Returns no triangles if all points lie in a
+/// plane.
+MeshShape convex_hull(const std::vector<double>& points);
+
+}  // namespace tangere
