@@ -229,16 +229,132 @@ Cell bezier(Cell c) {
   return c;
 }
 
-/// Fills `floors` and `slope` of a grid: the least control point of a Bézier form is no more than
-/// φ in its cell, and the steepest cell with φ > 0 bounds |∇φ|. What is deep inside, where the
-/// nearest place jumps, has no part in the slope: on the way to a place that touches, φ falls from
-/// its value to zero outside.
+/// Second derivatives of a cell's polynomial by its axes: control points of a form of degree 3 along
+/// each axis. Every one of them is a matrix, and ∇∇φ at a place is a mean of them.
+struct SecondDerivatives {
+  Cell entry[3][3];  ///< those of a ≤ b
+
+  /// `c`: control points of the Bézier form.
+  explicit SecondDerivatives(const Cell& c) {
+    for (std::size_t a = 0; a < 3; ++a)
+      for (std::size_t b = a; b < 3; ++b) {
+        Cell& out = entry[a][b];
+        out = differences(differences(c, kStride[a], 3), kStride[b], a == b ? 2 : 3);
+        if (a == b) raise_degree(out, kStride[a], 1);
+        raise_degree(out, kStride[a], 2);
+        if (a != b) raise_degree(out, kStride[b], 2);
+      }
+  }
+
+ private:
+  /// Returns the derivative along an axis, of a form that has this degree along it.
+  static Cell differences(const Cell& c, int stride, int degree) {
+    Cell out{};
+    for (int k = 0; k < 64; ++k)
+      if (k / stride % 4 < degree)
+        out[std::size_t(k)] = degree * (c[std::size_t(k + stride)] - c[std::size_t(k)]);
+    return out;
+  }
+  /// Writes the same polynomial as a form of one degree more than this.
+  static void raise_degree(Cell& c, int stride, int degree) {
+    for (int k = 63; k >= 0; --k) {
+      const int at = k / stride % 4;
+      if (at > degree + 1) continue;
+      const double before = at > 0 ? c[std::size_t(k - stride)] : 0,
+                   here = at <= degree ? c[std::size_t(k)] : 0;
+      c[std::size_t(k)] = (at * before + (degree + 1 - at) * here) / (degree + 1);
+    }
+  }
+};
+
+/// Returns the least eigenvalue of a symmetric matrix (xx, yy, zz, xy, xz, yz), or a little less.
+double least_eigenvalue(double xx, double yy, double zz, double xy, double xz, double yz) {
+  const double mean = (xx + yy + zz) / 3, a = xx - mean, b = yy - mean, c = zz - mean;
+  const double size = std::sqrt((a * a + b * b + c * c + 2 * (xy * xy + xz * xz + yz * yz)) / 6);
+  if (!(size > 0)) return mean;
+  const double det =
+      a * (b * c - yz * yz) - xy * (xy * c - yz * xz) + xz * (xy * yz - b * xz);
+  const double third = std::acos(std::clamp(det / (2 * size * size * size), -1.0, 1.0)) / 3;
+  return mean + 2 * size * (std::cos(third + 2 * M_PI / 3) - 1e-6);
+}
+
+/// Returns how far φ bends downwards in a cell, or `known` where that is more: no less than -vᵀ∇∇φ v
+/// for any unit vector v. The least eigenvalue of a mean of matrices is no less than the least of
+/// theirs. `close`: control points of the Bézier form.
+double sag_in(const Cell& close, double known) {
+  const SecondDerivatives d(close);
+  double sag = known;
+  for (std::size_t k = 0; k < 64; ++k) {
+    const double xx = d.entry[0][0][k], yy = d.entry[1][1][k], zz = d.entry[2][2][k],
+                 xy = d.entry[0][1][k], xz = d.entry[0][2][k], yz = d.entry[1][2][k];
+    // Nothing to do where the matrix plus `sag` has no negative eigenvalue.
+    const double a = xx + sag, b = yy + sag, c = zz + sag, minor = a * b - xy * xy;
+    const double det = a * (b * c - yz * yz) - xy * (xy * c - yz * xz) + xz * (xy * yz - b * xz);
+    if (a > 0 && minor > 0 && det > 0) continue;
+    sag = std::max(sag, -least_eigenvalue(xx, yy, zz, xy, xz, yz));
+  }
+  return sag;
+}
+
+/// The largest numbers of blocks of cells, by their place.
+struct Blocks {
+  int count[3];
+  std::vector<double> most;
+
+  Blocks(const int (&cells)[3], int edge) {
+    for (int c = 0; c < 3; ++c) count[c] = (cells[c] + edge - 1) / edge;
+    most.assign(std::size_t(count[0]) * std::size_t(count[1]) * std::size_t(count[2]), 0.0);
+  }
+  double& at(int i, int j, int k) {
+    return most[(std::size_t(i) * std::size_t(count[1]) + std::size_t(j)) * std::size_t(count[2]) +
+                std::size_t(k)];
+  }
+  void raise(int i, int j, int k, double to) { at(i, j, k) = std::max(at(i, j, k), to); }
+  template <class F>
+  void for_each(const F& f) {
+    for (int i = 0; i < count[0]; ++i)
+      for (int j = 0; j < count[1]; ++j)
+        for (int k = 0; k < count[2]; ++k) f(i, j, k);
+  }
+  /// Returns the largest of a block and its neighbours.
+  double around(int i, int j, int k) {
+    double all = 0;
+    const auto last = [&](int x, int axis) { return std::min(x + 1, count[axis] - 1); };
+    for (int a = std::max(i - 1, 0); a <= last(i, 0); ++a)
+      for (int b = std::max(j - 1, 0); b <= last(j, 1); ++b)
+        for (int c = std::max(k - 1, 0); c <= last(k, 2); ++c) all = std::max(all, at(a, b, c));
+    return all;
+  }
+};
+
+/// Fills the tables of how far φ bends downwards, from its blocks of the first level.
+void spread_sags(MeshGrid& grid, Blocks blocks) {
+  kernels::DistanceGrid& g = grid.view;
+  for (int level = 0; level < kernels::kSagLevels; ++level) {
+    grid.sags[level].clear();
+    blocks.for_each([&](int i, int j, int k) {
+      grid.sags[level].push_back(static_cast<float>(blocks.around(i, j, k) * (1 + 1e-6)));
+    });
+    g.sags[level] = grid.sags[level].data();
+    Blocks larger(g.cells, kernels::kSagBlock << (level + 1));
+    blocks.for_each([&](int i, int j, int k) {
+      larger.raise(i / 2, j / 2, k / 2, blocks.at(i, j, k));
+    });
+    blocks = std::move(larger);
+  }
+}
+
+/// Fills `floors`, `slope` and `sags` of a grid: the least control point of a Bézier form is no more
+/// than φ in its cell, and the steepest cell with φ > 0 bounds |∇φ|. What is deep inside, where the
+/// nearest place jumps, has no part in slope and sags: on the way to a place that touches, φ falls
+/// from its value to zero outside.
 void bound_cells(MeshGrid& grid) {
   constexpr double kRounding = 4e-6;  // of sums of 64 products in single precision
   kernels::DistanceGrid& g = grid.view;
   grid.floors.assign(grid.coefficients.size() / kernels::kQuad, 0.0F);
   g.floors = grid.floors.data();
   double most = 0;
+  Blocks sags(g.cells, kernels::kSagBlock);
   for (int j = 0; j < g.cells[1]; ++j)
     for (int k = 0; k < g.cells[2]; ++k)
       for (int i = 0; i < g.cells[0]; ++i) {
@@ -251,9 +367,13 @@ void bound_cells(MeshGrid& grid) {
         for (const double x : close) low = std::min(low, x), high = std::max(high, x);
         const double size = std::max(-low, high) + g.cell;
         grid.floors[std::size_t(at / kernels::kQuad)] = static_cast<float>(low - kRounding * size);
-        if (high > 0 && steepest_in(c, 1) > most) most = std::max(most, steepest_in(close, 3));
+        if (high <= 0) continue;
+        if (steepest_in(c, 1) > most) most = std::max(most, steepest_in(close, 3));
+        double& sag = sags.at(i / kernels::kSagBlock, j / kernels::kSagBlock, k / kernels::kSagBlock);
+        sag = sag_in(close, sag);
       }
   g.slope = most / g.cell * (1 + 1e-6);
+  spread_sags(grid, std::move(sags));
 }
 
 }  // namespace

@@ -14,7 +14,7 @@ namespace tangere {
 
 struct MeshGrid {
   kernels::DistanceGrid view{};
-  std::vector<float> coefficients, floors;
+  std::vector<float> coefficients, floors, sags[kernels::kSagLevels];
   MeshFit fit;
 
   MeshGrid() = default;

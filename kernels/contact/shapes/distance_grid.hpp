@@ -6,6 +6,11 @@
 namespace tangere::kernels {
 
 inline constexpr int kQuad = 4;  ///< coefficients along z that lie side by side
+/// Blocks of cells are cubes with edges of kSagBlock cells, and in each level twice those of the
+/// level before.
+inline constexpr int kSagLevels = 2, kSagBlock = 4;
+/// How far from a place the tables reach, in cells.
+inline constexpr double kSagReach = kSagBlock << (kSagLevels - 1);
 
 /// Coefficients of a spline and its place in the shape's axes.
 struct DistanceGrid {
@@ -20,6 +25,9 @@ struct DistanceGrid {
   double origin[3];        ///< lowest corner of the first cell [m]
   double cell;             ///< its edge [m]
   double slope;            ///< no smaller than any |∇φ| where φ > 0
+  /// For each level a table of blocks, x by x, z fastest: no less than -vᵀ∇∇φ v for any unit vector
+  /// v, wherever φ > 0 in the block and its neighbours; U is in cells [m]
+  const float* sags[kSagLevels];
   double low[3], high[3];  ///< a box outside of which nothing touches, inside the grid [m]
 };
 

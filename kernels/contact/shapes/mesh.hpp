@@ -40,31 +40,77 @@ Vec3<N> in_cells(const DistanceGrid& g, const Vec3<N>& y) {
           (y.z - N(g.origin[2])) * inverse};
 }
 
+/// Where a place is in a grid.
+template <class N>
+struct GridPoint {
+  GridPlace<N> at;
+  N beyond;  ///< squared distance from the grid, in cells
+
+  GridPoint(const DistanceGrid& g, const Vec3<N>& y) {
+    const Vec3<N> U = in_cells(g, y);
+    Vec3<N> clamped;
+    at = place_in_grid(g, U, clamped);
+    const Vec3<N> away = U - clamped;
+    beyond = dot(away, away);
+  }
+};
+
+/// Whether a place is nearer than m to the box of what touches.
+template <class N>
+auto near_box(const DistanceGrid& g, const Vec3<N>& y, const N& m) {
+  const N* p = &y.x;
+  N square(0.0);
+  for (int k = 0; k < 3; ++k) {
+    const N beyond = max(max(N(g.low[k]) - p[k], p[k] - N(g.high[k])), N(0.0));
+    square = mul_add(beyond, beyond, square);
+  }
+  return square < m * m;
+}
+
 /// Whether a place may be nearer than m to a mesh of scale 1: not beyond m of the box of what
 /// touches, and not where φ is more than it can fall on the way. Also true for slightly larger
 /// distances.
 template <class N>
 auto near_mesh(const DistanceGrid& g, const Vec3<N>& y, const N& m) {
   const N zero(0.0);
-  const N* p = &y.x;
-  N square(0.0);
-  for (int k = 0; k < 3; ++k) {
-    const N beyond = max(max(N(g.low[k]) - p[k], p[k] - N(g.high[k])), zero);
-    square = mul_add(beyond, beyond, square);
-  }
-  auto near = square < m * m;
+  auto near = near_box(g, y, m);
   if (!any(near)) return near;
-  const Vec3<N> U = in_cells(g, y);
-  Vec3<N> clamped;
-  const GridPlace<N> at = place_in_grid(g, U, clamped);
-  const Vec3<N> away = U - clamped;
-  const auto beyond = dot(away, away) > zero;
+  const GridPoint<N> point(g, y);
   const N fall = N(g.slope) * m;
-  near = near & (beyond | (floor_at(g, at) < fall));
+  near = near & ((point.beyond > zero) | (floor_at(g, point.at) < fall));
   if (!any(near)) return near;
   SplineValue<N, 0> phi;
-  spline_at(g, at, phi);
-  near = near & (beyond | (phi.value < fall));
+  spline_at(g, point.at, phi);
+  near = near & ((point.beyond > zero) | (phi.value < fall));
+  return near;
+}
+
+/// The same for a disc of radius m about the place: `normal` is the unit normal of its plane, or
+/// zero for a ball. On a way s from the place, as long as φ > 0,
+///   φ(y + s) = φ(y) + ∇φ·s + ∫(1 - τ) sᵀ∇∇φ(y + τ s) s dτ ≥ φ(y) - |∇φ - (n·∇φ) n| |s| - sag |s|²/2
+/// A first place on the way where φ = 0 would break this where the right side is positive at |s| =
+/// m, so nothing touches there. This is far sharper than the slope alone: where a pad presses, it
+/// lies almost along the surface. Large discs are tested by the floor of a cell alone.
+template <class N>
+auto disc_near_mesh(const DistanceGrid& g, const Vec3<N>& y, const N& m, const Vec3<N>& normal) {
+  const N zero(0.0), reach = N(1 / g.cell) * m, most(kSagReach);
+  auto near = near_box(g, y, m);
+  if (!any(near)) return near;
+  GridPoint<N> point(g, y);
+  const N fall = N(g.slope) * m;
+  near = near & ((point.beyond > zero) | (floor_at(g, point.at) < fall));
+  const auto small = near & (reach <= most) & (point.beyond <= zero);
+  if (!any(small)) return near;
+  point.at.whole[0] = select(small, point.at.whole[0], N(kNowhere));  // nothing is read there
+  SplineValue<N, 1> phi;
+  spline_at(g, point.at, phi);
+  const Vec3<N> slope = {phi.gradient[0], phi.gradient[1], phi.gradient[2]};
+  const N across = dot(normal, slope);
+  const N square = max(dot(slope, slope) - across * across, zero);
+  const N along = root_of(square, inverse_sqrt(square)), sag = sag_at(g, point.at, reach);
+  constexpr double kRounding = 1e-4;  // cells: far above that of φ at a point, in single precision
+  const N curved = mul_add(reach, mul_add(N(0.5) * reach, sag, along), N(kRounding * g.cell));
+  near = near & ((point.beyond > zero) | (reach > most) | (phi.value < min(fall, curved)));
   return near;
 }
 
@@ -171,7 +217,9 @@ struct MeshPad {
       row[k] = round_nearest(from[k]);
       row[3 + k] = from[k] - row[k];
     }
-    return select(near_mesh(*s.grid, x, inverse * reach), D(-1.0), D(1.0));
+    const D flat(P::kCurved ? 0.0 : 1.0);  // a flat pad lies in its plane z = 0
+    const Vec3<D> normal = {flat * at.Q.m[2][0], flat * at.Q.m[2][1], flat * at.Q.m[2][2]};
+    return select(disc_near_mesh(*s.grid, x, inverse * reach, normal), D(-1.0), D(1.0));
   }
 
   void set(const N* row) {

@@ -9,6 +9,7 @@
 // in memory, so one load fills a vector.
 #pragma once
 
+#include <cmath>
 #include <type_traits>
 
 #include "kernels/contact/shapes/distance_grid.hpp"
@@ -152,24 +153,58 @@ void spline_at(const DistanceGrid& g, const GridPlace<N>& at, SplineValue<N, Ord
   sum_over_z<Order>(sums, z, out);
 }
 
-/// No more than φ in the cell of a place.
-inline double floor_in_cell(const DistanceGrid& g, double x, double y, double z) {
-  return x < 0 ? 0.0 : double(g.floors[first_coefficient(g, x, y, z) / kQuad]);
+/// The number of a place's cell in `floors`, or kNowhere.
+template <class N>
+N cell_number(const DistanceGrid& g, const GridPlace<N>& at) {
+  const N cell = mul_add(at.whole[2], N(double(g.row / kQuad)),
+                         mul_add(at.whole[1], N(double(g.plane / kQuad)), at.whole[0]));
+  return select(at.whole[0] < N(0.0), N(kNowhere), cell);
+}
+/// No more than φ in the cell of this number.
+inline double floor_in_cell(const DistanceGrid& g, double cell) {
+  return cell < 0 ? 0.0 : double(g.floors[int(cell)]);
 }
 template <class N>
 N floor_at(const DistanceGrid& g, const GridPlace<N>& at) {
-  return N(floor_in_cell(g, plain_value(at.whole[0]), plain_value(at.whole[1]),
-                         plain_value(at.whole[2])));
+  return N(floor_in_cell(g, plain_value(cell_number(g, at))));
 }
 template <class A>
 OneLane<A> floor_at(const DistanceGrid& g, const GridPlace<OneLane<A>>& at) {
-  return {floor_in_cell(g, at.whole[0].x, at.whole[1].x, at.whole[2].x)};
+  return {floor_in_cell(g, cell_number(g, at).x)};
 }
 template <class A>
 Lanes<A> floor_at(const DistanceGrid& g, const GridPlace<Lanes<A>>& at) {
-  alignas(64) double whole[3][kGroup], out[kGroup];
+  alignas(64) double cell[kGroup], out[kGroup];
+  store_lanes(cell_number(g, at), cell);
+  for (int l = 0; l < kGroup; ++l) out[l] = floor_in_cell(g, cell[l]);
+  return load_lanes<A>(out);
+}
+
+/// No less than how φ bends downwards at places not farther than `reach` from one in this cell, where
+/// φ > 0. Lengths are in cells.
+inline double sag_around(const DistanceGrid& g, double x, double y, double z, double reach) {
+  if (x < 0) return HUGE_VAL;
+  for (int level = 0; level < kSagLevels; ++level) {
+    const int edge = kSagBlock << level;
+    if (!(reach <= edge)) continue;
+    const auto blocks = [&](int axis) { return (g.cells[axis] + edge - 1) / edge; };
+    return double(g.sags[level][(int(x) / edge * blocks(1) + int(y) / edge) * blocks(2) +
+                                int(z) / edge]);
+  }
+  return HUGE_VAL;
+}
+template <class N>
+N sag_at(const DistanceGrid& g, const GridPlace<N>& at, const N& reach) {
+  return N(sag_around(g, plain_value(at.whole[0]), plain_value(at.whole[1]),
+                      plain_value(at.whole[2]), plain_value(reach)));
+}
+template <class A>
+Lanes<A> sag_at(const DistanceGrid& g, const GridPlace<Lanes<A>>& at, const Lanes<A>& reach) {
+  alignas(64) double whole[3][kGroup], far[kGroup], out[kGroup];
   for (int c = 0; c < 3; ++c) store_lanes(at.whole[c], whole[c]);
-  for (int l = 0; l < kGroup; ++l) out[l] = floor_in_cell(g, whole[0][l], whole[1][l], whole[2][l]);
+  store_lanes(reach, far);
+  for (int l = 0; l < kGroup; ++l)
+    out[l] = sag_around(g, whole[0][l], whole[1][l], whole[2][l], far[l]);
   return load_lanes<A>(out);
 }
 
