@@ -85,33 +85,46 @@ auto near_mesh(const DistanceGrid& g, const Vec3<N>& y, const N& m) {
   return near;
 }
 
-/// The same for a disc of radius m about the place: `normal` is the unit normal of its plane, or
-/// zero for a ball. On a way s from the place, as long as φ > 0,
-///   φ(y + s) = φ(y) + ∇φ·s + ∫(1 - τ) sᵀ∇∇φ(y + τ s) s dτ ≥ φ(y) - |∇φ - (n·∇φ) n| |s| - sag |s|²/2
-/// A first place on the way where φ = 0 would break this where the right side is positive at |s| =
-/// m, so nothing touches there. This is far sharper than the slope alone: where a pad presses, it
-/// lies almost along the surface. Large discs are tested by the floor of a cell alone.
+/// A bound of φ around a place, after a way s:
+///   φ(y + s) = φ(y) + ∇φ·s + ∫(1 - τ) sᵀ∇∇φ(y + τ s) s dτ ≥ value + gradient·s - sag |s|²/2
+/// as long as φ > 0 on the way. A first place on the way where φ = 0 would break this where the right
+/// side is positive at s and, because it is concave, before s. So nothing touches there.
 template <class N>
-auto disc_near_mesh(const DistanceGrid& g, const Vec3<N>& y, const N& m, const Vec3<N>& normal) {
-  const N zero(0.0), reach = N(1 / g.cell) * m, most(kSagReach);
+struct FallBound {
+  N value;  ///< [m], less than φ by far more than φ is rounded in single precision
+  Vec3<N> gradient;
+  N sag;
+};
+
+/// The same for a disc of radius m about the place: `normal` is the unit normal of its plane, or
+/// zero for a ball. Where a pad presses, it lies almost along the surface, and φ falls far less than
+/// its slope allows. `bound`: at the place, for ways up to m. Large discs are tested by the floor of
+/// a cell alone, and their bound is -1 m.
+template <class N>
+auto disc_near_mesh(const DistanceGrid& g, const Vec3<N>& y, const N& m, const Vec3<N>& normal,
+                    FallBound<N>& bound) {
+  const N zero(0.0), one(1.0), per_cell(1 / g.cell), reach = per_cell * m, most(kSagReach);
+  bound = {one, zero3<N>(), zero};
   auto near = near_box(g, y, m);
   if (!any(near)) return near;
   GridPoint<N> point(g, y);
   const N fall = N(g.slope) * m;
   near = near & ((point.beyond > zero) | (floor_at(g, point.at) < fall));
+  bound.value = select(near, zero - one, one);
   const auto small = near & (reach <= most) & (point.beyond <= zero);
   if (!any(small)) return near;
   point.at.whole[0] = select(small, point.at.whole[0], N(kNowhere));  // nothing is read there
   SplineValue<N, 1> phi;
   spline_at(g, point.at, phi);
-  const Vec3<N> slope = {phi.gradient[0], phi.gradient[1], phi.gradient[2]};
-  const N across = dot(normal, slope);
-  const N square = max(dot(slope, slope) - across * across, zero);
-  const N along = root_of(square, inverse_sqrt(square)), sag = sag_at(g, point.at, reach);
-  constexpr double kRounding = 1e-4;  // cells: far above that of φ at a point, in single precision
-  const N curved = mul_add(reach, mul_add(N(0.5) * reach, sag, along), N(kRounding * g.cell));
-  near = near & ((point.beyond > zero) | (reach > most) | (phi.value < min(fall, curved)));
-  return near;
+  constexpr double kRounding = 1e-4;  // cells
+  bound.value = select(small, phi.value - N(kRounding * g.cell), bound.value);
+  bound.gradient =
+      per_cell * Vec3<N>{phi.gradient[0], phi.gradient[1], phi.gradient[2]};
+  bound.sag = select(small, per_cell * per_cell * sag_at(g, point.at, reach), zero);
+  const N across = dot(normal, bound.gradient);
+  const N square = max(dot(bound.gradient, bound.gradient) - across * across, zero);
+  const N along = root_of(square, inverse_sqrt(square));
+  return near & (bound.value < min(fall, m * mul_add(N(0.5) * m, bound.sag, along)));
 }
 
 template <class P>
@@ -197,12 +210,14 @@ struct MeshPad {
   using N = typename P::N;
   using Offset = typename P::Offset;
   static constexpr bool kTurns = true;
-  static constexpr int kRows = 9;  // whole cells, what is left, u
+  static constexpr int kRows = 14;  // whole cells, what is left, a bound of φ, u
 
   const DistanceGrid* grid;
   double scale;
   Mat3<N> Q;
   Vec3<N> whole, rest;
+  N low, half_sag;  ///< after the offset s, φ ≥ low + fall·s - half_sag |s|² as long as φ > 0
+  Vec3<N> fall;
   Vec3<N> u;
 
   MeshPad(const TouchShape& s, const Mat3<N>& pose) : grid(s.grid), scale(s.size[0]), Q(pose) {}
@@ -219,16 +234,28 @@ struct MeshPad {
     }
     const D flat(P::kCurved ? 0.0 : 1.0);  // a flat pad lies in its plane z = 0
     const Vec3<D> normal = {flat * at.Q.m[2][0], flat * at.Q.m[2][1], flat * at.Q.m[2][2]};
-    return select(disc_near_mesh(*s.grid, x, inverse * reach, normal), D(-1.0), D(1.0));
+    FallBound<D> bound;
+    const auto near = disc_near_mesh(*s.grid, x, inverse * reach, normal, bound);
+    const Vec3<D> fall = inverse * (at.Q * bound.gradient);
+    row[6] = bound.value, row[7] = D(0.5) * inverse * inverse * bound.sag;
+    row[8] = fall.x, row[9] = fall.y, row[10] = fall.z;
+    return select(near, D(-1.0), D(1.0));
   }
 
   void set(const N* row) {
     whole = {row[0], row[1], row[2]};
     rest = {row[3], row[4], row[5]};
+    low = row[6], half_sag = row[7];
+    fall = {row[8], row[9], row[10]};
   }
 
   auto distance(const Offset& s, N& d, Vec3<N>& n) const {
     const N zero(0.0), one(1.0), half(0.5), slope(1 / grid->cell), cells(1 / (grid->cell * scale));
+    const N above = low + along(fall.x, fall.y, fall.z, s) - half_sag * square_of(s);
+    if (!any(above < zero)) {
+      d = one, n = zero3<N>();
+      return d < zero;
+    }
     const N e[3] = {along(Q.m[0][0], Q.m[1][0], Q.m[2][0], s),
                     along(Q.m[0][1], Q.m[1][1], Q.m[2][1], s),
                     along(Q.m[0][2], Q.m[1][2], Q.m[2][2], s)};
@@ -243,7 +270,7 @@ struct MeshPad {
       inside = select((cell >= zero) & (cell < most + half), inside, zero);
     }
     SplineValue<N, 1> phi;
-    spline_inside(*grid, at, phi);
+    spline_inside(*grid, at, above, phi);
     d = select(inside > half, N(scale) * phi.value, one);
     n = Q * (slope * Vec3<N>{phi.gradient[0], phi.gradient[1], phi.gradient[2]});
     return d < zero;

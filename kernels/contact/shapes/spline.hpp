@@ -352,26 +352,29 @@ void spline_at(const DistanceGrid& g, const GridPlace<Lanes<A>>& at,
   sum_over_z<Order>(sums, SplineWeights<N, Order>(at.rest[2]), out);
 }
 
-/// φ and ∇φ where φ < 0; elsewhere some φ ≥ 0. Where no lane's cell reaches inside, nothing else is
-/// read.
+/// φ and ∇φ where φ < 0; elsewhere some φ ≥ 0. Where `above` is not negative, or the cell does not
+/// reach inside, nothing else is read.
 template <class A>
-void spline_inside(const DistanceGrid& g, const GridPlace<Lanes<A>>& at,
+void spline_inside(const DistanceGrid& g, const GridPlace<Lanes<A>>& at, const Lanes<A>& above,
                    SplineValue<Lanes<A>, 1>& out) {
-  using N = Lanes<A>;
-  if (any(floor_at(g, at) < N(0.0))) return spline_at(g, at, out);
-  out = {N(1.0), {N(0.0), N(0.0), N(0.0)}, {}};
+  const Lanes<A> zero(0.0);
+  GridPlace<Lanes<A>> wanted = at;
+  wanted.whole[0] = select((above < zero) & (floor_at(g, at) < zero), at.whole[0],
+                           Lanes<A>(kNowhere));
+  if (any(wanted.whole[0] >= zero)) return spline_at(g, wanted, out);
+  out = {Lanes<A>(1.0), {zero, zero, zero}, {}};
 }
 
 /// Two vectors side by side (kernels/tactile/vector_pair.hpp).
 template <int Order, template <class> class Pair, class M>
 requires requires { &Pair<M>::a; }
-void spline_inside(const DistanceGrid& g, const GridPlace<Pair<M>>& at,
+void spline_inside(const DistanceGrid& g, const GridPlace<Pair<M>>& at, const Pair<M>& above,
                    SplineValue<Pair<M>, Order>& out) {
   const auto part = [&](M Pair<M>::*of) {
     GridPlace<M> one;
     for (int c = 0; c < 3; ++c) one.whole[c] = at.whole[c].*of, one.rest[c] = at.rest[c].*of;
     SplineValue<M, Order> value;
-    spline_inside(g, one, value);
+    spline_inside(g, one, above.*of, value);
     return value;
   };
   const SplineValue<M, Order> a = part(&Pair<M>::a), b = part(&Pair<M>::b);

@@ -206,12 +206,17 @@ template <class A>
   }
 }
 
-/// Sixteen points in single precision: φ and ∇φ where φ < 0, elsewhere some φ ≥ 0. On a dense pad
+/// Sixteen points in single precision: φ and ∇φ where φ < 0, elsewhere some φ ≥ 0. Nothing is read
+/// where `above` is nowhere negative. On a dense pad
 /// all of them are often in one cell. Then its coefficients are read once, for the same sums.
 template <class A>
-void spline_inside(const DistanceGrid& g, const GridPlace<LanesF<A>>& at,
+void spline_inside(const DistanceGrid& g, const GridPlace<LanesF<A>>& at, const LanesF<A>& above,
                    SplineValue<LanesF<A>, 1>& out) {
   using N = LanesF<A>;
+  if (!any(above < N(0.0))) {
+    out = {N(1.0), {N(0.0), N(0.0), N(0.0)}, {}};
+    return;
+  }
   alignas(64) float whole[3][kLanesF];
   alignas(64) int cell[kLanesF];
   for (int c = 0; c < 3; ++c) store_lanes_f(at.whole[c], whole[c]);
