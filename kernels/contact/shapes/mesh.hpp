@@ -110,7 +110,7 @@ auto disc_near_mesh(const DistanceGrid& g, const Vec3<N>& y, const N& m, const V
   GridPoint<N> point(g, y);
   const N fall = N(g.slope) * m;
   near = near & ((point.beyond > zero) | (floor_at(g, point.at) < fall));
-  bound.value = select(near, zero - one, one);
+  bound.value = select(near, N(kNoBound), one);
   const auto small = near & (reach <= most) & (point.beyond <= zero);
   if (!any(small)) return near;
   point.at.whole[0] = select(small, point.at.whole[0], N(kNowhere));  // nothing is read there

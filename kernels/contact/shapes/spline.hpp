@@ -352,6 +352,9 @@ void spline_at(const DistanceGrid& g, const GridPlace<Lanes<A>>& at,
   sum_over_z<Order>(sums, SplineWeights<N, Order>(at.rest[2]), out);
 }
 
+/// Stands for a bound of φ that nothing is known about [m].
+inline constexpr double kNoBound = -1;
+
 /// φ and ∇φ where φ < 0; elsewhere some φ ≥ 0. Where `above` is not negative, or the cell does not
 /// reach inside, nothing else is read.
 template <class A>
