@@ -26,7 +26,8 @@ using kernels::Vec3;
 
 namespace {
 
-constexpr int kPadding = 4, kBeyond = 2;  // cells: of the grid, of the box of what touches
+constexpr int kBeyond = 2;                            // cells: of the box of what touches
+constexpr int kPadding = kBeyond + kernels::kRim;  // of the grid
 
 /// The nodes of a grid, z fastest.
 struct Nodes {

@@ -6,6 +6,7 @@
 namespace tangere::kernels {
 
 inline constexpr int kQuad = 4;  ///< coefficients along z that lie side by side
+inline constexpr int kRim = 2;   ///< cells along every side of a grid in which nothing touches
 /// Blocks of cells are cubes with edges of kSagBlock cells, and in each level twice those of the
 /// level before.
 inline constexpr int kSagLevels = 2, kSagBlock = 4;

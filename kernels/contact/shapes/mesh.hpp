@@ -46,8 +46,7 @@ struct GridPoint {
   GridPlace<N> at;
   N beyond;  ///< squared distance from the grid, in cells
 
-  GridPoint(const DistanceGrid& g, const Vec3<N>& y) {
-    const Vec3<N> U = in_cells(g, y);
+  GridPoint(const DistanceGrid& g, const Vec3<N>& U) {
     Vec3<N> clamped;
     at = place_in_grid(g, U, clamped);
     const Vec3<N> away = U - clamped;
@@ -75,7 +74,7 @@ auto near_mesh(const DistanceGrid& g, const Vec3<N>& y, const N& m) {
   const N zero(0.0);
   auto near = near_box(g, y, m);
   if (!any(near)) return near;
-  const GridPoint<N> point(g, y);
+  const GridPoint<N> point(g, in_cells(g, y));
   const N fall = N(g.slope) * m;
   near = near & ((point.beyond > zero) | (floor_at(g, point.at) < fall));
   if (!any(near)) return near;
@@ -85,10 +84,10 @@ auto near_mesh(const DistanceGrid& g, const Vec3<N>& y, const N& m) {
   return near;
 }
 
-/// A bound of φ around a place, after a way s:
-///   φ(y + s) = φ(y) + ∇φ·s + ∫(1 - τ) sᵀ∇∇φ(y + τ s) s dτ ≥ value + gradient·s - sag |s|²/2
-/// as long as φ > 0 on the way. A first place on the way where φ = 0 would break this where the right
-/// side is positive at s and, because it is concave, before s. So nothing touches there.
+/// A bound of φ around a place, in cells. After a way s, as long as φ > 0 on it,
+///   φ(U + s) = φ(U) + ∇φ·s + ∫(1 - τ) sᵀ∇∇φ(U + τ s) s dτ ≥ value + gradient·s - sag |s|²/2
+/// The right side is concave along a way from a place where it is positive. So if it is positive at
+/// s, it is positive all the way, there is no first place on it where φ = 0, and φ > 0 at s.
 template <class N>
 struct FallBound {
   N value;  ///< [m], less than φ by far more than φ is rounded in single precision
@@ -96,31 +95,30 @@ struct FallBound {
   N sag;
 };
 
-/// The same for a disc of radius m about the place: `normal` is the unit normal of its plane, or
-/// zero for a ball. Where a pad presses, it lies almost along the surface, and φ falls far less than
-/// its slope allows. `bound`: at the place, for ways up to m. Large discs are tested by the floor of
-/// a cell alone, and their bound is -1 m.
+/// Whether a disc about U of radius m, in cells, may touch a mesh. `normal` is the unit normal of its
+/// plane, or zero for a ball. Where a pad presses, it lies almost along the surface, and φ falls far
+/// less than its slope allows. `bound`: at U, for ways up to m, where something may touch. Large
+/// discs are tested by the floor of a cell alone, and their bound is kNoBound.
 template <class N>
-auto disc_near_mesh(const DistanceGrid& g, const Vec3<N>& y, const N& m, const Vec3<N>& normal,
+auto disc_near_mesh(const DistanceGrid& g, const Vec3<N>& U, const N& m, const Vec3<N>& normal,
                     FallBound<N>& bound) {
-  const N zero(0.0), one(1.0), per_cell(1 / g.cell), reach = per_cell * m, most(kSagReach);
-  bound = {one, zero3<N>(), zero};
-  auto near = near_box(g, y, m);
+  const N zero(0.0), most(kSagReach);
+  GridPoint<N> point(g, U);
+  const N fall = N(g.slope * g.cell) * m;
+  const auto outside = point.beyond > zero;  // the way to what touches leads through the rim as well
+  auto near = select(outside, point.beyond + N(kRim * kRim), zero) < m * m;
   if (!any(near)) return near;
-  GridPoint<N> point(g, y);
-  const N fall = N(g.slope) * m;
-  near = near & ((point.beyond > zero) | (floor_at(g, point.at) < fall));
-  bound.value = select(near, N(kNoBound), one);
-  const auto small = near & (reach <= most) & (point.beyond <= zero);
+  near = near & (outside | (floor_at(g, point.at) < fall));
+  bound = {select(near, N(kNoBound), N(1.0)), zero3<N>(), zero};
+  const auto small = near & (m <= most) & (point.beyond <= zero);
   if (!any(small)) return near;
   point.at.whole[0] = select(small, point.at.whole[0], N(kNowhere));  // nothing is read there
   SplineValue<N, 1> phi;
   spline_at(g, point.at, phi);
   constexpr double kRounding = 1e-4;  // cells
   bound.value = select(small, phi.value - N(kRounding * g.cell), bound.value);
-  bound.gradient =
-      per_cell * Vec3<N>{phi.gradient[0], phi.gradient[1], phi.gradient[2]};
-  bound.sag = select(small, per_cell * per_cell * sag_at(g, point.at, reach), zero);
+  bound.gradient = {phi.gradient[0], phi.gradient[1], phi.gradient[2]};
+  bound.sag = select(small, sag_at(g, point.at, m), zero);
   const N across = dot(normal, bound.gradient);
   const N square = max(dot(bound.gradient, bound.gradient) - across * across, zero);
   const N along = root_of(square, inverse_sqrt(square));
@@ -225,19 +223,20 @@ struct MeshPad {
   template <class D>
   static D bracket(const TouchShape& s, const Touch<D>& at, const Vec3<D>& t, const D& reach,
                    D* row) {
-    const D inverse(1 / s.size[0]);
-    const Vec3<D> x = inverse * transposed_times(at.Q, t - at.c), U = in_cells(*s.grid, x);
+    const D scale(1 / s.size[0]), cells(1 / (s.size[0] * s.grid->cell));
+    const Vec3<D> U = in_cells(*s.grid, scale * transposed_times(at.Q, t - at.c));
+    const D flat(P::kCurved ? 0.0 : 1.0);  // a flat pad lies in its plane z = 0
+    const Vec3<D> normal = {flat * at.Q.m[2][0], flat * at.Q.m[2][1], flat * at.Q.m[2][2]};
+    FallBound<D> bound;
+    const auto near = disc_near_mesh(*s.grid, U, cells * reach, normal, bound);
+    if (!any(near)) return D(1.0);
     const D* from = &U.x;
     for (int k = 0; k < 3; ++k) {
       row[k] = round_nearest(from[k]);
       row[3 + k] = from[k] - row[k];
     }
-    const D flat(P::kCurved ? 0.0 : 1.0);  // a flat pad lies in its plane z = 0
-    const Vec3<D> normal = {flat * at.Q.m[2][0], flat * at.Q.m[2][1], flat * at.Q.m[2][2]};
-    FallBound<D> bound;
-    const auto near = disc_near_mesh(*s.grid, x, inverse * reach, normal, bound);
-    const Vec3<D> fall = inverse * (at.Q * bound.gradient);
-    row[6] = bound.value, row[7] = D(0.5) * inverse * inverse * bound.sag;
+    const Vec3<D> fall = cells * (at.Q * bound.gradient);
+    row[6] = bound.value, row[7] = D(0.5) * cells * cells * bound.sag;
     row[8] = fall.x, row[9] = fall.y, row[10] = fall.z;
     return select(near, D(-1.0), D(1.0));
   }
