@@ -43,12 +43,11 @@ Vec3<N> in_cells(const DistanceGrid& g, const Vec3<N>& y) {
 /// Where a place is in a grid.
 template <class N>
 struct GridPoint {
+  Vec3<N> clamped;
   GridPlace<N> at;
   N beyond;  ///< squared distance from the grid, in cells
 
-  GridPoint(const DistanceGrid& g, const Vec3<N>& U) {
-    Vec3<N> clamped;
-    at = place_in_grid(g, U, clamped);
+  GridPoint(const DistanceGrid& g, const Vec3<N>& U) : at(place_in_grid(g, U, clamped)) {
     const Vec3<N> away = U - clamped;
     beyond = dot(away, away);
   }
@@ -109,7 +108,9 @@ auto disc_near_mesh(const DistanceGrid& g, const Vec3<N>& U, const N& m, const V
   auto near = select(outside, point.beyond + N(kRim * kRim), zero) < m * m;
   if (!any(near)) return near;
   near = near & (outside | (floor_at(g, point.at) < fall));
-  bound = {select(near, N(kNoBound), N(1.0)), zero3<N>(), zero};
+  bound.value = select(near, N(kNoBound), N(1.0));
+  bound.gradient = zero3<N>();
+  bound.sag = zero;
   const auto small = near & (m <= most) & (point.beyond <= zero);
   if (!any(small)) return near;
   point.at.whole[0] = select(small, point.at.whole[0], N(kNowhere));  // nothing is read there
@@ -117,7 +118,7 @@ auto disc_near_mesh(const DistanceGrid& g, const Vec3<N>& U, const N& m, const V
   spline_at(g, point.at, phi);
   constexpr double kRounding = 1e-4;  // cells
   bound.value = select(small, phi.value - N(kRounding * g.cell), bound.value);
-  bound.gradient = {phi.gradient[0], phi.gradient[1], phi.gradient[2]};
+  for (int k = 0; k < 3; ++k) (&bound.gradient.x)[k] = phi.gradient[k];
   bound.sag = select(small, sag_at(g, point.at, m), zero);
   const N across = dot(normal, bound.gradient);
   const N square = max(dot(bound.gradient, bound.gradient) - across * across, zero);
