@@ -248,23 +248,28 @@ struct SecondDerivatives {
   }
 
  private:
+  /// Calls f with the first of four control points of every line along an axis.
+  template <class F>
+  static void for_each_line(Cell& c, int stride, const F& f) {
+    for (int line = 0; line < 64; line += 4 * stride)
+      for (int k = line; k < line + stride; ++k) f(&c[std::size_t(k)]);
+  }
   /// Returns the derivative along an axis, of a form that has this degree along it.
-  static Cell differences(const Cell& c, int stride, int degree) {
-    Cell out{};
-    for (int k = 0; k < 64; ++k)
-      if (k / stride % 4 < degree)
-        out[std::size_t(k)] = degree * (c[std::size_t(k + stride)] - c[std::size_t(k)]);
-    return out;
+  static Cell differences(Cell c, int stride, int degree) {
+    for_each_line(c, stride, [&](double* at) {
+      for (int i = 0; i < degree; ++i)
+        at[i * stride] = degree * (at[(i + 1) * stride] - at[i * stride]);
+    });
+    return c;
   }
   /// Writes the same polynomial as a form of one degree more than this.
   static void raise_degree(Cell& c, int stride, int degree) {
-    for (int k = 63; k >= 0; --k) {
-      const int at = k / stride % 4;
-      if (at > degree + 1) continue;
-      const double before = at > 0 ? c[std::size_t(k - stride)] : 0,
-                   here = at <= degree ? c[std::size_t(k)] : 0;
-      c[std::size_t(k)] = (at * before + (degree + 1 - at) * here) / (degree + 1);
-    }
+    const double part = 1.0 / (degree + 1);
+    for_each_line(c, stride, [&](double* at) {
+      at[(degree + 1) * stride] = at[degree * stride];
+      for (int i = degree; i > 0; --i)
+        at[i * stride] = part * (i * at[(i - 1) * stride] + (degree + 1 - i) * at[i * stride]);
+    });
   }
 };
 
@@ -297,84 +302,74 @@ double sag_in(const Cell& close, double known) {
   return sag;
 }
 
-/// The largest numbers of blocks of cells, by their place.
-struct Blocks {
-  int count[3];
-  std::vector<double> most;
-
-  Blocks(const int (&cells)[3], int edge) {
-    for (int c = 0; c < 3; ++c) count[c] = (cells[c] + edge - 1) / edge;
-    most.assign(std::size_t(count[0]) * std::size_t(count[1]) * std::size_t(count[2]), 0.0);
-  }
-  double& at(int i, int j, int k) {
-    return most[(std::size_t(i) * std::size_t(count[1]) + std::size_t(j)) * std::size_t(count[2]) +
-                std::size_t(k)];
-  }
-  void raise(int i, int j, int k, double to) { at(i, j, k) = std::max(at(i, j, k), to); }
-  template <class F>
-  void for_each(const F& f) {
-    for (int i = 0; i < count[0]; ++i)
-      for (int j = 0; j < count[1]; ++j)
-        for (int k = 0; k < count[2]; ++k) f(i, j, k);
-  }
-  /// Returns the largest of a block and its neighbours.
-  double around(int i, int j, int k) {
-    double all = 0;
-    const auto last = [&](int x, int axis) { return std::min(x + 1, count[axis] - 1); };
-    for (int a = std::max(i - 1, 0); a <= last(i, 0); ++a)
-      for (int b = std::max(j - 1, 0); b <= last(j, 1); ++b)
-        for (int c = std::max(k - 1, 0); c <= last(k, 2); ++c) all = std::max(all, at(a, b, c));
-    return all;
-  }
-};
-
-/// Fills the tables of how far φ bends downwards, from its blocks of the first level.
-void spread_sags(MeshGrid& grid, Blocks blocks) {
-  kernels::DistanceGrid& g = grid.view;
-  for (int level = 0; level < kernels::kSagLevels; ++level) {
-    grid.sags[level].clear();
-    blocks.for_each([&](int i, int j, int k) {
-      grid.sags[level].push_back(static_cast<float>(blocks.around(i, j, k) * (1 + 1e-6)));
-    });
-    g.sags[level] = grid.sags[level].data();
-    Blocks larger(g.cells, kernels::kSagBlock << (level + 1));
-    blocks.for_each([&](int i, int j, int k) {
-      larger.raise(i / 2, j / 2, k / 2, blocks.at(i, j, k));
-    });
-    blocks = std::move(larger);
-  }
+/// Control points of the spline in a cell.
+Cell cell_of(const kernels::DistanceGrid& g, std::ptrdiff_t first) {
+  Cell c;
+  for (int n = 0; n < 64; ++n)
+    c[std::size_t(n)] = g.coefficients[first + n / 4 % 4 * g.plane + n / 16 * 4 + n % 4];
+  return c;
 }
 
-/// Fills `floors`, `slope` and `sags` of a grid: the least control point of a Bézier form is no more
-/// than φ in its cell, and the steepest cell with φ > 0 bounds |∇φ|. What is deep inside, where the
-/// nearest place jumps, has no part in slope and sags: on the way to a place that touches, φ falls
-/// from its value to zero outside.
+/// Calls f with the place of every cell and its first coefficient.
+template <class F>
+void for_each_cell(const kernels::DistanceGrid& g, const F& f) {
+  for (int j = 0; j < g.cells[1]; ++j)
+    for (int k = 0; k < g.cells[2]; ++k)
+      for (int i = 0; i < g.cells[0]; ++i) f(i, j, k, kernels::first_coefficient(g, i, j, k));
+}
+
+/// Fills `floors` and `slope` of a grid: the least control point of a Bézier form is no more than
+/// φ in its cell, and the steepest cell with φ > 0 bounds |∇φ|. What is deep inside, where the
+/// nearest place jumps, has no part in the slope: on the way to a place that touches, φ falls from
+/// its value to zero outside.
 void bound_cells(MeshGrid& grid) {
   constexpr double kRounding = 4e-6;  // of sums of 64 products in single precision
   kernels::DistanceGrid& g = grid.view;
   grid.floors.assign(grid.coefficients.size() / kernels::kQuad, 0.0F);
   g.floors = grid.floors.data();
   double most = 0;
-  Blocks sags(g.cells, kernels::kSagBlock);
-  for (int j = 0; j < g.cells[1]; ++j)
-    for (int k = 0; k < g.cells[2]; ++k)
-      for (int i = 0; i < g.cells[0]; ++i) {
-        const auto at = kernels::first_coefficient(g, i, j, k);
-        Cell c;
-        for (int n = 0; n < 64; ++n)
-          c[std::size_t(n)] = g.coefficients[at + n / 4 % 4 * g.plane + n / 16 * 4 + n % 4];
-        const Cell close = bezier(c);
-        double low = close[0], high = close[0];
-        for (const double x : close) low = std::min(low, x), high = std::max(high, x);
-        const double size = std::max(-low, high) + g.cell;
-        grid.floors[std::size_t(at / kernels::kQuad)] = static_cast<float>(low - kRounding * size);
-        if (high <= 0) continue;
-        if (steepest_in(c, 1) > most) most = std::max(most, steepest_in(close, 3));
-        double& sag = sags.at(i / kernels::kSagBlock, j / kernels::kSagBlock, k / kernels::kSagBlock);
-        sag = sag_in(close, sag);
-      }
+  for_each_cell(g, [&](int, int, int, std::ptrdiff_t at) {
+    const Cell c = cell_of(g, at), close = bezier(c);
+    double low = close[0], high = close[0];
+    for (const double x : close) low = std::min(low, x), high = std::max(high, x);
+    const double size = std::max(-low, high) + g.cell;
+    grid.floors[std::size_t(at / kernels::kQuad)] = static_cast<float>(low - kRounding * size);
+    if (high > 0 && steepest_in(c, 1) > most) most = std::max(most, steepest_in(close, 3));
+  });
   g.slope = most / g.cell * (1 + 1e-6);
-  spread_sags(grid, std::move(sags));
+}
+
+/// Fills `sags`. A cell has no part in them where φ < 0 everywhere, and where φ is more than it can
+/// fall on a way of kSagBlock cells.
+void bound_bending(MeshGrid& grid) {
+  constexpr int kBlock = kernels::kSagBlock;
+  kernels::DistanceGrid& g = grid.view;
+  int count[3];
+  for (int c = 0; c < 3; ++c) count[c] = (g.cells[c] + kBlock - 1) / kBlock;
+  const auto block = [&](int i, int j, int k) {
+    return (std::size_t(i) * std::size_t(count[1]) + std::size_t(j)) * std::size_t(count[2]) +
+           std::size_t(k);
+  };
+  std::vector<double> own(std::size_t(count[0]) * std::size_t(count[1]) * std::size_t(count[2]));
+  for_each_cell(g, [&](int i, int j, int k, std::ptrdiff_t at) {
+    if (grid.floors[std::size_t(at / kernels::kQuad)] > g.slope * g.cell * kBlock) return;
+    const Cell close = bezier(cell_of(g, at));
+    if (*std::max_element(close.begin(), close.end()) <= 0) return;
+    double& sag = own[block(i / kBlock, j / kBlock, k / kBlock)];
+    sag = sag_in(close, sag);
+  });
+  grid.sags.assign(own.size(), 0.0F);
+  for (int i = 0; i < count[0]; ++i)
+    for (int j = 0; j < count[1]; ++j)
+      for (int k = 0; k < count[2]; ++k) {
+        double most = 0;
+        for (int a = std::max(i - 1, 0); a < std::min(i + 2, count[0]); ++a)
+          for (int b = std::max(j - 1, 0); b < std::min(j + 2, count[1]); ++b)
+            for (int c = std::max(k - 1, 0); c < std::min(k + 2, count[2]); ++c)
+              most = std::max(most, own[block(a, b, c)]);
+        grid.sags[block(i, j, k)] = static_cast<float>(most * (1 + 1e-6));
+      }
+  g.sags = grid.sags.data();
 }
 
 }  // namespace
@@ -405,6 +400,7 @@ std::shared_ptr<const MeshGrid> make_mesh_grid(const MeshShape& mesh) {
   out->coefficients = quads_along_z(values, count, g.cells[2]);
   g.coefficients = out->coefficients.data();
   bound_cells(*out);
+  bound_bending(*out);
   out->fit = mesh_fit(mesh, g);
   return out;
 }

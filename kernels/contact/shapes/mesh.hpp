@@ -96,21 +96,22 @@ struct FallBound {
 
 /// Whether a disc about U of radius m, in cells, may touch a mesh. `normal` is the unit normal of its
 /// plane, or zero for a ball. Where a pad presses, it lies almost along the surface, and φ falls far
-/// less than its slope allows. `bound`: at U, for ways up to m, where something may touch. Large
-/// discs are tested by the floor of a cell alone, and their bound is kNoBound.
+/// less than its slope allows. `bound`: at U, for ways up to m, where something may touch. Discs
+/// larger than kSagBlock are tested by the floor of a cell alone, and their bound is kNoBound.
 template <class N>
 auto disc_near_mesh(const DistanceGrid& g, const Vec3<N>& U, const N& m, const Vec3<N>& normal,
                     FallBound<N>& bound) {
-  const N zero(0.0), most(kSagReach);
+  const N zero(0.0), one(1.0), most(double{kSagBlock});
   GridPoint<N> point(g, U);
   const N fall = N(g.slope * g.cell) * m;
   const auto outside = point.beyond > zero;  // the way to what touches leads through the rim as well
   auto near = select(outside, point.beyond + N(kRim * kRim), zero) < m * m;
-  if (!any(near)) return near;
-  near = near & (outside | (floor_at(g, point.at) < fall));
-  bound.value = select(near, N(kNoBound), N(1.0));
+  bound.value = one;
   bound.gradient = zero3<N>();
   bound.sag = zero;
+  if (!any(near)) return near;
+  near = near & (outside | (floor_at(g, point.at) < fall));
+  bound.value = select(near, N(kNoBound), one);
   const auto small = near & (m <= most) & (point.beyond <= zero);
   if (!any(small)) return near;
   point.at.whole[0] = select(small, point.at.whole[0], N(kNowhere));  // nothing is read there
@@ -119,7 +120,7 @@ auto disc_near_mesh(const DistanceGrid& g, const Vec3<N>& U, const N& m, const V
   constexpr double kRounding = 1e-4;  // cells
   bound.value = select(small, phi.value - N(kRounding * g.cell), bound.value);
   for (int k = 0; k < 3; ++k) (&bound.gradient.x)[k] = phi.gradient[k];
-  bound.sag = select(small, sag_at(g, point.at, m), zero);
+  bound.sag = sag_at(g, point.at);
   const N across = dot(normal, bound.gradient);
   const N square = max(dot(bound.gradient, bound.gradient) - across * across, zero);
   const N along = root_of(square, inverse_sqrt(square));

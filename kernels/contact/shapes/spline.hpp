@@ -9,7 +9,6 @@
 // in memory, so one load fills a vector.
 #pragma once
 
-#include <cmath>
 #include <type_traits>
 
 #include "kernels/contact/shapes/distance_grid.hpp"
@@ -180,32 +179,22 @@ Lanes<A> floor_at(const DistanceGrid& g, const GridPlace<Lanes<A>>& at) {
   return load_lanes<A>(out);
 }
 
-/// No less than how φ bends downwards at places not farther than `reach` from one in this cell, where
-/// φ > 0. Lengths are in cells.
-inline double sag_around(const DistanceGrid& g, double x, double y, double z, double reach) {
-  if (x < 0) return HUGE_VAL;
-  for (int level = 0; level < kSagLevels; ++level) {
-    const int edge = kSagBlock << level;
-    if (!(reach <= edge)) continue;
-    const auto blocks = [&](int axis) { return (g.cells[axis] + edge - 1) / edge; };
-    return double(g.sags[level][(int(x) / edge * blocks(1) + int(y) / edge) * blocks(2) +
-                                int(z) / edge]);
-  }
-  return HUGE_VAL;
-}
-template <class N>
-N sag_at(const DistanceGrid& g, const GridPlace<N>& at, const N& reach) {
-  return N(sag_around(g, plain_value(at.whole[0]), plain_value(at.whole[1]),
-                      plain_value(at.whole[2]), plain_value(reach)));
+/// How far φ bends downwards within kSagBlock cells of places in a cell.
+inline double sag_around(const DistanceGrid& g, double x, double y, double z) {
+  if (x < 0) return 0;
+  const auto blocks = [&](int axis) { return (g.cells[axis] + kSagBlock - 1) / kSagBlock; };
+  return double(g.sags[(int(x) / kSagBlock * blocks(1) + int(y) / kSagBlock) * blocks(2) +
+                       int(z) / kSagBlock]);
 }
 template <class A>
-Lanes<A> sag_at(const DistanceGrid& g, const GridPlace<Lanes<A>>& at, const Lanes<A>& reach) {
-  alignas(64) double whole[3][kGroup], far[kGroup], out[kGroup];
+Lanes<A> sag_at(const DistanceGrid& g, const GridPlace<Lanes<A>>& at) {
+  alignas(64) double whole[3][kGroup], out[kGroup];
   for (int c = 0; c < 3; ++c) store_lanes(at.whole[c], whole[c]);
-  store_lanes(reach, far);
-  for (int l = 0; l < kGroup; ++l)
-    out[l] = sag_around(g, whole[0][l], whole[1][l], whole[2][l], far[l]);
+  for (int l = 0; l < kGroup; ++l) out[l] = sag_around(g, whole[0][l], whole[1][l], whole[2][l]);
   return load_lanes<A>(out);
+}
+inline double sag_at(const DistanceGrid& g, const GridPlace<double>& at) {
+  return sag_around(g, at.whole[0], at.whole[1], at.whole[2]);
 }
 
 /// Loads two rows of four coefficients.
