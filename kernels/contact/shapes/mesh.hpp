@@ -124,7 +124,8 @@ auto disc_near_mesh(const DistanceGrid& g, const Vec3<N>& U, const N& m, const V
   const N across = dot(normal, bound.gradient);
   const N square = max(dot(bound.gradient, bound.gradient) - across * across, zero);
   const N along = root_of(square, inverse_sqrt(square));
-  return near & (bound.value < min(fall, m * mul_add(N(0.5) * m, bound.sag, along)));
+  near = near & (bound.value < min(fall, m * mul_add(N(0.5) * m, bound.sag, along)));
+  return near;
 }
 
 template <class P>
