@@ -26,7 +26,7 @@ using kernels::Vec3;
 
 namespace {
 
-constexpr int kBeyond = 2;                            // cells: of the box of what touches
+constexpr int kBeyond = 2;                         // cells: of the box of what touches
 constexpr int kPadding = kBeyond + kernels::kRim;  // of the grid
 
 /// The nodes of a grid, z fastest.
@@ -278,8 +278,7 @@ double least_eigenvalue(double xx, double yy, double zz, double xy, double xz, d
   const double mean = (xx + yy + zz) / 3, a = xx - mean, b = yy - mean, c = zz - mean;
   const double size = std::sqrt((a * a + b * b + c * c + 2 * (xy * xy + xz * xz + yz * yz)) / 6);
   if (!(size > 0)) return mean;
-  const double det =
-      a * (b * c - yz * yz) - xy * (xy * c - yz * xz) + xz * (xy * yz - b * xz);
+  const double det = a * (b * c - yz * yz) - xy * (xy * c - yz * xz) + xz * (xy * yz - b * xz);
   const double third = std::acos(std::clamp(det / (2 * size * size * size), -1.0, 1.0)) / 3;
   return mean + 2 * size * (std::cos(third + 2 * M_PI / 3) - 1e-6);
 }

@@ -5,8 +5,8 @@
 
 namespace tangere::kernels {
 
-inline constexpr int kQuad = 4;  ///< coefficients along z that lie side by side
-inline constexpr int kRim = 2;   ///< cells along every side of a grid in which nothing touches
+inline constexpr int kQuad = 4;      ///< coefficients along z that lie side by side
+inline constexpr int kRim = 2;       ///< cells along every side of a grid in which nothing touches
 inline constexpr int kSagBlock = 4;  ///< edge of a block of cells
 
 /// Coefficients of a spline and its place in the shape's axes.

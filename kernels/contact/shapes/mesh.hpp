@@ -83,10 +83,12 @@ auto near_mesh(const DistanceGrid& g, const Vec3<N>& y, const N& m) {
   return near;
 }
 
-/// A bound of φ around a place, in cells. After a way s, as long as φ > 0 on it,
+/// A bound of φ around a place, in cells. After a way s from a place where `value` is positive, as
+/// long as φ > 0 on the way,
 ///   φ(U + s) = φ(U) + ∇φ·s + ∫(1 - τ) sᵀ∇∇φ(U + τ s) s dτ ≥ value + gradient·s - sag |s|²/2
-/// The right side is concave along a way from a place where it is positive. So if it is positive at
-/// s, it is positive all the way, there is no first place on it where φ = 0, and φ > 0 at s.
+/// The right side is concave along the way. So if it is positive at s, it is positive all the way,
+/// there is no first place on it where φ = 0, and φ > 0 at s. Where `value` is not positive,
+/// `gradient` and `sag` are zero.
 template <class N>
 struct FallBound {
   N value;  ///< [m], less than φ by far more than φ is rounded in single precision
@@ -94,9 +96,9 @@ struct FallBound {
   N sag;
 };
 
-/// Whether a disc about U of radius m, in cells, may touch a mesh. `normal` is the unit normal of its
-/// plane, or zero for a ball. Where a pad presses, it lies almost along the surface, and φ falls far
-/// less than its slope allows. `bound`: at U, for ways up to m, where something may touch. Discs
+/// Whether a disc about U of radius m, in cells, may touch a mesh. `normal` is the unit normal of
+/// its plane, or zero for a ball. Where a pad presses, it lies almost along the surface, and φ falls
+/// far less than its slope allows. `bound`: at U, for ways up to m, where something may touch. Discs
 /// larger than kSagBlock are tested by the floor of a cell alone, and their bound is kNoBound.
 template <class N>
 auto disc_near_mesh(const DistanceGrid& g, const Vec3<N>& U, const N& m, const Vec3<N>& normal,
@@ -104,7 +106,8 @@ auto disc_near_mesh(const DistanceGrid& g, const Vec3<N>& U, const N& m, const V
   const N zero(0.0), one(1.0), most(double{kSagBlock});
   GridPoint<N> point(g, U);
   const N fall = N(g.slope * g.cell) * m;
-  const auto outside = point.beyond > zero;  // the way to what touches leads through the rim as well
+  // From beyond the grid, the way to what touches leads through the rim as well.
+  const auto outside = point.beyond > zero;
   auto near = select(outside, point.beyond + N(kRim * kRim), zero) < m * m;
   bound.value = one;
   bound.gradient = zero3<N>();
@@ -119,8 +122,9 @@ auto disc_near_mesh(const DistanceGrid& g, const Vec3<N>& U, const N& m, const V
   spline_at(g, point.at, phi);
   constexpr double kRounding = 1e-4;  // cells
   bound.value = select(small, phi.value - N(kRounding * g.cell), bound.value);
-  for (int k = 0; k < 3; ++k) (&bound.gradient.x)[k] = phi.gradient[k];
-  bound.sag = sag_at(g, point.at);
+  const auto bounded = small & (bound.value > zero);
+  for (int k = 0; k < 3; ++k) (&bound.gradient.x)[k] = select(bounded, phi.gradient[k], zero);
+  bound.sag = select(bounded, sag_at(g, point.at), zero);
   const N across = dot(normal, bound.gradient);
   const N square = max(dot(bound.gradient, bound.gradient) - across * across, zero);
   const N along = root_of(square, inverse_sqrt(square));

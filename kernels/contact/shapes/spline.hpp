@@ -351,8 +351,8 @@ void spline_inside(const DistanceGrid& g, const GridPlace<Lanes<A>>& at, const L
                    SplineValue<Lanes<A>, 1>& out) {
   const Lanes<A> zero(0.0);
   GridPlace<Lanes<A>> wanted = at;
-  wanted.whole[0] = select((above < zero) & (floor_at(g, at) < zero), at.whole[0],
-                           Lanes<A>(kNowhere));
+  wanted.whole[0] =
+      select((above < zero) & (floor_at(g, at) < zero), at.whole[0], Lanes<A>(kNowhere));
   if (any(wanted.whole[0] >= zero)) return spline_at(g, wanted, out);
   out = {Lanes<A>(1.0), {zero, zero, zero}, {}};
 }

@@ -44,6 +44,7 @@ N along(const N& a, const N& b, const N& c, const PointOffset<N, true>& s) {
   return mul_add(a, s.x, mul_add(b, s.y, c * s.z));
 }
 
+/// Returns the square of its length.
 template <class N>
 N square_of(const PointOffset<N, false>& s) {
   return mul_add(s.x, s.x, s.y * s.y);
