@@ -230,8 +230,8 @@ Cell bezier(Cell c) {
   return c;
 }
 
-/// Second derivatives of a cell's polynomial by its axes: control points of a form of degree 3 along
-/// each axis. Every one of them is a matrix, and ∇∇φ at a place is a mean of them.
+/// Second derivatives of a cell's polynomial by its axes: control points of a form of degree 3
+/// along each axis. Every one of them is a matrix, and ∇∇φ at a place is a mean of them.
 struct SecondDerivatives {
   Cell entry[3][3];  ///< those of a ≤ b
 
@@ -283,8 +283,8 @@ double least_eigenvalue(double xx, double yy, double zz, double xy, double xz, d
   return mean + 2 * size * (std::cos(third + 2 * M_PI / 3) - 1e-6);
 }
 
-/// Returns how far φ bends downwards in a cell, or `known` where that is more: no less than -vᵀ∇∇φ v
-/// for any unit vector v. The least eigenvalue of a mean of matrices is no less than the least of
+/// Returns how far φ bends downwards in a cell, or `known` where that is more: no less than
+/// -vᵀ∇∇φ v for any unit vector v. The least eigenvalue of a mean of matrices is no less than the least of
 /// theirs. `close`: control points of the Bézier form.
 double sag_in(const Cell& close, double known) {
   const SecondDerivatives d(close);

@@ -17,9 +17,9 @@ struct DistanceGrid {
   /// (cells[1], cells[2], cells[0] + 3) for y, z, x: φ is nowhere less in the cell, by however
   /// much single precision rounds [m]
   const float* floors;
-  /// (blocks along x, y, z) how far φ bends downwards: no less than -vᵀ∇∇φ v for any unit vector v,
-  /// at all places of the block and its neighbours from which a way of kSagBlock cells through φ > 0
-  /// may lead to φ = 0; U is in cells [m]
+  /// (blocks along x, y, z) how far φ bends downwards in a block and its neighbours: no less than
+  /// -vᵀ∇∇φ v for any unit vector v, lengths in cells [m]. Only places with φ > 0 have a part in it,
+  /// from which φ can fall to 0 within kSagBlock cells.
   const float* sags;
   int cells[3];
   int row, plane;          ///< distance in memory from one z and one y to the next
