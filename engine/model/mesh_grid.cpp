@@ -284,8 +284,8 @@ double least_eigenvalue(double xx, double yy, double zz, double xy, double xz, d
 }
 
 /// Returns how far φ bends downwards in a cell, or `known` where that is more: no less than
-/// -vᵀ∇∇φ v for any unit vector v. The least eigenvalue of a mean of matrices is no less than the least of
-/// theirs. `close`: control points of the Bézier form.
+/// -vᵀ∇∇φ v for any unit vector v. The least eigenvalue of a mean of matrices is no less than the
+/// least of theirs. `close`: control points of the Bézier form.
 double sag_in(const Cell& close, double known) {
   const SecondDerivatives d(close);
   double sag = known;

@@ -18,8 +18,8 @@ struct DistanceGrid {
   /// much single precision rounds [m]
   const float* floors;
   /// (blocks along x, y, z) how far φ bends downwards in a block and its neighbours: no less than
-  /// -vᵀ∇∇φ v for any unit vector v, lengths in cells [m]. Only places with φ > 0 have a part in it,
-  /// from which φ can fall to 0 within kSagBlock cells.
+  /// -vᵀ∇∇φ v for any unit vector v, lengths in cells [m]. Only places with φ > 0 have a part in
+  /// it, from which φ can fall to 0 within kSagBlock cells.
   const float* sags;
   int cells[3];
   int row, plane;          ///< distance in memory from one z and one y to the next

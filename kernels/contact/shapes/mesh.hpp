@@ -98,8 +98,8 @@ struct FallBound {
 
 /// Whether a disc about U of radius m, in cells, may touch a mesh. `normal` is the unit normal of
 /// its plane, or zero for a ball. Where a pad presses, it lies almost along the surface. There φ
-/// falls far less than its slope allows. `bound`: at U, for ways up to m, where something may touch.
-/// Discs larger than kSagBlock are tested by the floor of a cell, and their bound is kNoBound.
+/// falls far less than its slope allows. `bound`: at U, for ways up to m, where something may
+/// touch. Discs larger than kSagBlock are tested by the floor of a cell; their bound is kNoBound.
 template <class N>
 auto disc_near_mesh(const DistanceGrid& g, const Vec3<N>& U, const N& m, const Vec3<N>& normal,
                     FallBound<N>& bound) {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Tests fields of pads on meshes: what the search of tiles and points leaves out does not touch.
-// The readings have the bits of those whose tiles seem too large for any of these bounds, and the tiles
-// that touch are those of which a point does.
+// The readings have the bits of those whose tiles seem too large for any of these bounds, and the
+// tiles that touch are those of which a point does.
 #include <gtest/gtest.h>
 
 #include <algorithm>
