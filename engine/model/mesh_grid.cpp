@@ -349,7 +349,8 @@ void bound_bending(MeshGrid& grid) {
     return (std::size_t(i) * std::size_t(count[1]) + std::size_t(j)) * std::size_t(count[2]) +
            std::size_t(k);
   };
-  std::vector<double> own(std::size_t(count[0]) * std::size_t(count[1]) * std::size_t(count[2]));
+  const std::size_t blocks = std::size_t(count[0]) * std::size_t(count[1]) * std::size_t(count[2]);
+  std::vector<double> own(blocks);
   for_each_cell(g, [&](int i, int j, int k, std::ptrdiff_t at) {
     if (grid.floors[std::size_t(at / kernels::kQuad)] > g.slope * g.cell * kBlock) return;
     const Cell close = bezier(cell_of(g, at));
