@@ -26,7 +26,8 @@ using kernels::Vec3;
 
 namespace {
 
-constexpr int kPadding = 4, kBeyond = 2;  // cells: of the grid, of the box of what touches
+constexpr int kBeyond = 2;                         // cells: of the box of what touches
+constexpr int kPadding = kBeyond + kernels::kRim;  // of the grid
 
 /// The nodes of a grid, z fastest.
 struct Nodes {
@@ -229,6 +230,93 @@ Cell bezier(Cell c) {
   return c;
 }
 
+/// Second derivatives of a cell's polynomial by its axes: control points of a form of degree 3
+/// along each axis. Every one of them is a matrix, and ∇∇φ at a place is a mean of them.
+struct SecondDerivatives {
+  Cell entry[3][3];  ///< those of a ≤ b
+
+  /// `c`: control points of the Bézier form.
+  explicit SecondDerivatives(const Cell& c) {
+    for (std::size_t a = 0; a < 3; ++a)
+      for (std::size_t b = a; b < 3; ++b) {
+        Cell& out = entry[a][b];
+        out = differences(differences(c, kStride[a], 3), kStride[b], a == b ? 2 : 3);
+        if (a == b) raise_degree(out, kStride[a], 1);
+        raise_degree(out, kStride[a], 2);
+        if (a != b) raise_degree(out, kStride[b], 2);
+      }
+  }
+
+ private:
+  /// Calls f with the first of four control points of every line along an axis.
+  template <class F>
+  static void for_each_line(Cell& c, int stride, const F& f) {
+    for (int line = 0; line < 64; line += 4 * stride)
+      for (int k = line; k < line + stride; ++k) f(&c[std::size_t(k)]);
+  }
+  /// Returns the derivative along an axis, of a form that has this degree along it.
+  static Cell differences(Cell c, int stride, int degree) {
+    for_each_line(c, stride, [&](double* at) {
+      for (int i = 0; i < degree; ++i)
+        at[i * stride] = degree * (at[(i + 1) * stride] - at[i * stride]);
+    });
+    return c;
+  }
+  /// Writes the same polynomial as a form of one degree more than this.
+  static void raise_degree(Cell& c, int stride, int degree) {
+    const double part = 1.0 / (degree + 1);
+    for_each_line(c, stride, [&](double* at) {
+      at[(degree + 1) * stride] = at[degree * stride];
+      for (int i = degree; i > 0; --i)
+        at[i * stride] = part * (i * at[(i - 1) * stride] + (degree + 1 - i) * at[i * stride]);
+    });
+  }
+};
+
+/// Returns the least eigenvalue of a symmetric matrix (xx, yy, zz, xy, xz, yz), or a little less.
+double least_eigenvalue(double xx, double yy, double zz, double xy, double xz, double yz) {
+  const double mean = (xx + yy + zz) / 3, a = xx - mean, b = yy - mean, c = zz - mean;
+  const double size = std::sqrt((a * a + b * b + c * c + 2 * (xy * xy + xz * xz + yz * yz)) / 6);
+  if (!(size > 0)) return mean;
+  const double det = a * (b * c - yz * yz) - xy * (xy * c - yz * xz) + xz * (xy * yz - b * xz);
+  const double third = std::acos(std::clamp(det / (2 * size * size * size), -1.0, 1.0)) / 3;
+  return mean + 2 * size * (std::cos(third + 2 * M_PI / 3) - 1e-6);
+}
+
+/// Returns how far φ bends downwards in a cell, or `known` where that is more: no less than
+/// -vᵀ∇∇φ v for any unit vector v. The least eigenvalue of a mean of matrices is no less than the
+/// least of theirs. `close`: control points of the Bézier form.
+double sag_in(const Cell& close, double known) {
+  const SecondDerivatives d(close);
+  double sag = known;
+  for (std::size_t k = 0; k < 64; ++k) {
+    const double xx = d.entry[0][0][k], yy = d.entry[1][1][k], zz = d.entry[2][2][k],
+                 xy = d.entry[0][1][k], xz = d.entry[0][2][k], yz = d.entry[1][2][k];
+    // Nothing to do where the matrix plus `sag` has no negative eigenvalue.
+    const double a = xx + sag, b = yy + sag, c = zz + sag, minor = a * b - xy * xy;
+    const double det = a * (b * c - yz * yz) - xy * (xy * c - yz * xz) + xz * (xy * yz - b * xz);
+    if (a > 0 && minor > 0 && det > 0) continue;
+    sag = std::max(sag, -least_eigenvalue(xx, yy, zz, xy, xz, yz));
+  }
+  return sag;
+}
+
+/// Control points of the spline in a cell.
+Cell cell_of(const kernels::DistanceGrid& g, std::ptrdiff_t first) {
+  Cell c;
+  for (int n = 0; n < 64; ++n)
+    c[std::size_t(n)] = g.coefficients[first + n / 4 % 4 * g.plane + n / 16 * 4 + n % 4];
+  return c;
+}
+
+/// Calls f with the place of every cell and its first coefficient.
+template <class F>
+void for_each_cell(const kernels::DistanceGrid& g, const F& f) {
+  for (int j = 0; j < g.cells[1]; ++j)
+    for (int k = 0; k < g.cells[2]; ++k)
+      for (int i = 0; i < g.cells[0]; ++i) f(i, j, k, kernels::first_coefficient(g, i, j, k));
+}
+
 /// Fills `floors` and `slope` of a grid: the least control point of a Bézier form is no more than
 /// φ in its cell, and the steepest cell with φ > 0 bounds |∇φ|. What is deep inside, where the
 /// nearest place jumps, has no part in the slope: on the way to a place that touches, φ falls from
@@ -239,21 +327,49 @@ void bound_cells(MeshGrid& grid) {
   grid.floors.assign(grid.coefficients.size() / kernels::kQuad, 0.0F);
   g.floors = grid.floors.data();
   double most = 0;
-  for (int j = 0; j < g.cells[1]; ++j)
-    for (int k = 0; k < g.cells[2]; ++k)
-      for (int i = 0; i < g.cells[0]; ++i) {
-        const auto at = kernels::first_coefficient(g, i, j, k);
-        Cell c;
-        for (int n = 0; n < 64; ++n)
-          c[std::size_t(n)] = g.coefficients[at + n / 4 % 4 * g.plane + n / 16 * 4 + n % 4];
-        const Cell close = bezier(c);
-        double low = close[0], high = close[0];
-        for (const double x : close) low = std::min(low, x), high = std::max(high, x);
-        const double size = std::max(-low, high) + g.cell;
-        grid.floors[std::size_t(at / kernels::kQuad)] = static_cast<float>(low - kRounding * size);
-        if (high > 0 && steepest_in(c, 1) > most) most = std::max(most, steepest_in(close, 3));
-      }
+  for_each_cell(g, [&](int, int, int, std::ptrdiff_t at) {
+    const Cell c = cell_of(g, at), close = bezier(c);
+    double low = close[0], high = close[0];
+    for (const double x : close) low = std::min(low, x), high = std::max(high, x);
+    const double size = std::max(-low, high) + g.cell;
+    grid.floors[std::size_t(at / kernels::kQuad)] = static_cast<float>(low - kRounding * size);
+    if (high > 0 && steepest_in(c, 1) > most) most = std::max(most, steepest_in(close, 3));
+  });
   g.slope = most / g.cell * (1 + 1e-6);
+}
+
+/// Fills `sags`. A cell has no part in them where φ < 0 everywhere, and where φ is more than it can
+/// fall on a way of kSagBlock cells.
+void bound_bending(MeshGrid& grid) {
+  constexpr int kBlock = kernels::kSagBlock;
+  kernels::DistanceGrid& g = grid.view;
+  int count[3];
+  for (int c = 0; c < 3; ++c) count[c] = (g.cells[c] + kBlock - 1) / kBlock;
+  const auto block = [&](int i, int j, int k) {
+    return (std::size_t(i) * std::size_t(count[1]) + std::size_t(j)) * std::size_t(count[2]) +
+           std::size_t(k);
+  };
+  const std::size_t blocks = std::size_t(count[0]) * std::size_t(count[1]) * std::size_t(count[2]);
+  std::vector<double> own(blocks);
+  for_each_cell(g, [&](int i, int j, int k, std::ptrdiff_t at) {
+    if (grid.floors[std::size_t(at / kernels::kQuad)] > g.slope * g.cell * kBlock) return;
+    const Cell close = bezier(cell_of(g, at));
+    if (*std::max_element(close.begin(), close.end()) <= 0) return;
+    double& sag = own[block(i / kBlock, j / kBlock, k / kBlock)];
+    sag = sag_in(close, sag);
+  });
+  grid.sags.assign(own.size(), 0.0F);
+  for (int i = 0; i < count[0]; ++i)
+    for (int j = 0; j < count[1]; ++j)
+      for (int k = 0; k < count[2]; ++k) {
+        double most = 0;
+        for (int a = std::max(i - 1, 0); a < std::min(i + 2, count[0]); ++a)
+          for (int b = std::max(j - 1, 0); b < std::min(j + 2, count[1]); ++b)
+            for (int c = std::max(k - 1, 0); c < std::min(k + 2, count[2]); ++c)
+              most = std::max(most, own[block(a, b, c)]);
+        grid.sags[block(i, j, k)] = static_cast<float>(most * (1 + 1e-6));
+      }
+  g.sags = grid.sags.data();
 }
 
 }  // namespace
@@ -284,6 +400,7 @@ std::shared_ptr<const MeshGrid> make_mesh_grid(const MeshShape& mesh) {
   out->coefficients = quads_along_z(values, count, g.cells[2]);
   g.coefficients = out->coefficients.data();
   bound_cells(*out);
+  bound_bending(*out);
   out->fit = mesh_fit(mesh, g);
   return out;
 }

@@ -14,7 +14,7 @@ namespace tangere {
 
 struct MeshGrid {
   kernels::DistanceGrid view{};
-  std::vector<float> coefficients, floors;
+  std::vector<float> coefficients, floors, sags;
   MeshFit fit;
 
   MeshGrid() = default;
@@ -22,7 +22,7 @@ struct MeshGrid {
   MeshGrid& operator=(const MeshGrid&) = delete;
 
   [[nodiscard]] std::size_t bytes() const {
-    return (coefficients.size() + floors.size()) * sizeof(float);
+    return (coefficients.size() + floors.size() + sags.size()) * sizeof(float);
   }
 };
 

@@ -5,7 +5,9 @@
 
 namespace tangere::kernels {
 
-inline constexpr int kQuad = 4;  ///< coefficients along z that lie side by side
+inline constexpr int kQuad = 4;      ///< coefficients along z that lie side by side
+inline constexpr int kRim = 2;       ///< cells along every side of a grid in which nothing touches
+inline constexpr int kSagBlock = 4;  ///< edge of a block of cells
 
 /// Coefficients of a spline and its place in the shape's axes.
 struct DistanceGrid {
@@ -15,6 +17,10 @@ struct DistanceGrid {
   /// (cells[1], cells[2], cells[0] + 3) for y, z, x: φ is nowhere less in the cell, by however
   /// much single precision rounds [m]
   const float* floors;
+  /// (blocks along x, y, z) how far φ bends downwards in a block and its neighbours: no less than
+  /// -vᵀ∇∇φ v for any unit vector v, lengths in cells [m]. Only places with φ > 0 have a part in
+  /// it, from which φ can fall to 0 within kSagBlock cells.
+  const float* sags;
   int cells[3];
   int row, plane;          ///< distance in memory from one z and one y to the next
   double origin[3];        ///< lowest corner of the first cell [m]

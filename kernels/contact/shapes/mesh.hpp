@@ -40,31 +40,95 @@ Vec3<N> in_cells(const DistanceGrid& g, const Vec3<N>& y) {
           (y.z - N(g.origin[2])) * inverse};
 }
 
+/// Where a place is in a grid.
+template <class N>
+struct GridPoint {
+  Vec3<N> clamped;
+  GridPlace<N> at;
+  N beyond;  ///< squared distance from the grid, in cells
+
+  GridPoint(const DistanceGrid& g, const Vec3<N>& U) : at(place_in_grid(g, U, clamped)) {
+    const Vec3<N> away = U - clamped;
+    beyond = dot(away, away);
+  }
+};
+
+/// Whether a place is nearer than m to the box of what touches.
+template <class N>
+auto near_box(const DistanceGrid& g, const Vec3<N>& y, const N& m) {
+  const N* p = &y.x;
+  N square(0.0);
+  for (int k = 0; k < 3; ++k) {
+    const N beyond = max(max(N(g.low[k]) - p[k], p[k] - N(g.high[k])), N(0.0));
+    square = mul_add(beyond, beyond, square);
+  }
+  return square < m * m;
+}
+
 /// Whether a place may be nearer than m to a mesh of scale 1: not beyond m of the box of what
 /// touches, and not where φ is more than it can fall on the way. Also true for slightly larger
 /// distances.
 template <class N>
 auto near_mesh(const DistanceGrid& g, const Vec3<N>& y, const N& m) {
   const N zero(0.0);
-  const N* p = &y.x;
-  N square(0.0);
-  for (int k = 0; k < 3; ++k) {
-    const N beyond = max(max(N(g.low[k]) - p[k], p[k] - N(g.high[k])), zero);
-    square = mul_add(beyond, beyond, square);
-  }
-  auto near = square < m * m;
+  auto near = near_box(g, y, m);
   if (!any(near)) return near;
-  const Vec3<N> U = in_cells(g, y);
-  Vec3<N> clamped;
-  const GridPlace<N> at = place_in_grid(g, U, clamped);
-  const Vec3<N> away = U - clamped;
-  const auto beyond = dot(away, away) > zero;
+  const GridPoint<N> point(g, in_cells(g, y));
   const N fall = N(g.slope) * m;
-  near = near & (beyond | (floor_at(g, at) < fall));
+  near = near & ((point.beyond > zero) | (floor_at(g, point.at) < fall));
   if (!any(near)) return near;
   SplineValue<N, 0> phi;
-  spline_at(g, at, phi);
-  near = near & (beyond | (phi.value < fall));
+  spline_at(g, point.at, phi);
+  near = near & ((point.beyond > zero) | (phi.value < fall));
+  return near;
+}
+
+/// A bound of φ around a place, in cells. After a way s from a place where `value` is positive, as
+/// long as φ > 0 on the way,
+///   φ(U + s) = φ(U) + ∇φ·s + ∫(1 - τ) sᵀ∇∇φ(U + τ s) s dτ ≥ value + gradient·s - sag |s|²/2
+/// The right side is concave along the way. So if it is positive at s, it is positive all the way,
+/// there is no first place on it where φ = 0, and φ > 0 at s. Where `value` is not positive,
+/// `gradient` and `sag` are zero.
+template <class N>
+struct FallBound {
+  N value;  ///< [m], less than φ by far more than φ is rounded in single precision
+  Vec3<N> gradient;
+  N sag;
+};
+
+/// Whether a disc about U of radius m, in cells, may touch a mesh. `normal` is the unit normal of
+/// its plane, or zero for a ball. Where a pad presses, it lies almost along the surface. There φ
+/// falls far less than its slope allows. `bound`: at U, for ways up to m, where something may
+/// touch. Discs larger than kSagBlock are tested by the floor of a cell; their bound is kNoBound.
+template <class N>
+auto disc_near_mesh(const DistanceGrid& g, const Vec3<N>& U, const N& m, const Vec3<N>& normal,
+                    FallBound<N>& bound) {
+  const N zero(0.0), one(1.0), most(double{kSagBlock});
+  GridPoint<N> point(g, U);
+  const N fall = N(g.slope * g.cell) * m;
+  // From beyond the grid, the way to what touches leads through the rim as well.
+  const auto outside = point.beyond > zero;
+  auto near = select(outside, point.beyond + N(kRim * kRim), zero) < m * m;
+  bound.value = one;
+  bound.gradient = zero3<N>();
+  bound.sag = zero;
+  if (!any(near)) return near;
+  near = near & (outside | (floor_at(g, point.at) < fall));
+  bound.value = select(near, N(kNoBound), one);
+  const auto small = near & (m <= most) & (point.beyond <= zero);
+  if (!any(small)) return near;
+  point.at.whole[0] = select(small, point.at.whole[0], N(kNowhere));  // nothing is read there
+  SplineValue<N, 1> phi;
+  spline_at(g, point.at, phi);
+  constexpr double kRounding = 1e-4;  // cells
+  bound.value = select(small, phi.value - N(kRounding * g.cell), bound.value);
+  const auto bounded = small & (bound.value > zero);
+  for (int k = 0; k < 3; ++k) (&bound.gradient.x)[k] = select(bounded, phi.gradient[k], zero);
+  bound.sag = select(bounded, sag_at(g, point.at), zero);
+  const N across = dot(normal, bound.gradient);
+  const N square = max(dot(bound.gradient, bound.gradient) - across * across, zero);
+  const N along = root_of(square, inverse_sqrt(square));
+  near = near & (bound.value < min(fall, m * mul_add(N(0.5) * m, bound.sag, along)));
   return near;
 }
 
@@ -151,12 +215,14 @@ struct MeshPad {
   using N = typename P::N;
   using Offset = typename P::Offset;
   static constexpr bool kTurns = true;
-  static constexpr int kRows = 9;  // whole cells, what is left, u
+  static constexpr int kRows = 14;  // whole cells, what is left, a bound of φ, u
 
   const DistanceGrid* grid;
   double scale;
   Mat3<N> Q;
   Vec3<N> whole, rest;
+  N low, half_sag;  ///< after the offset s, φ ≥ low + fall·s - half_sag |s|² as long as φ > 0
+  Vec3<N> fall;
   Vec3<N> u;
 
   MeshPad(const TouchShape& s, const Mat3<N>& pose) : grid(s.grid), scale(s.size[0]), Q(pose) {}
@@ -164,23 +230,38 @@ struct MeshPad {
   template <class D>
   static D bracket(const TouchShape& s, const Touch<D>& at, const Vec3<D>& t, const D& reach,
                    D* row) {
-    const D inverse(1 / s.size[0]);
-    const Vec3<D> x = inverse * transposed_times(at.Q, t - at.c), U = in_cells(*s.grid, x);
+    const D scale(1 / s.size[0]), cells(1 / (s.size[0] * s.grid->cell));
+    const Vec3<D> U = in_cells(*s.grid, scale * transposed_times(at.Q, t - at.c));
+    const D flat(P::kCurved ? 0.0 : 1.0);  // a flat pad lies in its plane z = 0
+    const Vec3<D> normal = {flat * at.Q.m[2][0], flat * at.Q.m[2][1], flat * at.Q.m[2][2]};
+    FallBound<D> bound;
+    const auto near = disc_near_mesh(*s.grid, U, cells * reach, normal, bound);
+    if (!any(near)) return D(1.0);
     const D* from = &U.x;
     for (int k = 0; k < 3; ++k) {
       row[k] = round_nearest(from[k]);
       row[3 + k] = from[k] - row[k];
     }
-    return select(near_mesh(*s.grid, x, inverse * reach), D(-1.0), D(1.0));
+    const Vec3<D> fall = cells * (at.Q * bound.gradient);
+    row[6] = bound.value, row[7] = D(0.5) * cells * cells * bound.sag;
+    row[8] = fall.x, row[9] = fall.y, row[10] = fall.z;
+    return select(near, D(-1.0), D(1.0));
   }
 
   void set(const N* row) {
     whole = {row[0], row[1], row[2]};
     rest = {row[3], row[4], row[5]};
+    low = row[6], half_sag = row[7];
+    fall = {row[8], row[9], row[10]};
   }
 
   auto distance(const Offset& s, N& d, Vec3<N>& n) const {
     const N zero(0.0), one(1.0), half(0.5), slope(1 / grid->cell), cells(1 / (grid->cell * scale));
+    const N above = low + along(fall.x, fall.y, fall.z, s) - half_sag * square_of(s);
+    if (!any(above < zero)) {
+      d = one, n = zero3<N>();
+      return d < zero;
+    }
     const N e[3] = {along(Q.m[0][0], Q.m[1][0], Q.m[2][0], s),
                     along(Q.m[0][1], Q.m[1][1], Q.m[2][1], s),
                     along(Q.m[0][2], Q.m[1][2], Q.m[2][2], s)};
@@ -195,7 +276,7 @@ struct MeshPad {
       inside = select((cell >= zero) & (cell < most + half), inside, zero);
     }
     SplineValue<N, 1> phi;
-    spline_inside(*grid, at, phi);
+    spline_inside(*grid, at, above, phi);
     d = select(inside > half, N(scale) * phi.value, one);
     n = Q * (slope * Vec3<N>{phi.gradient[0], phi.gradient[1], phi.gradient[2]});
     return d < zero;

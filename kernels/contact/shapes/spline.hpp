@@ -152,25 +152,49 @@ void spline_at(const DistanceGrid& g, const GridPlace<N>& at, SplineValue<N, Ord
   sum_over_z<Order>(sums, z, out);
 }
 
-/// No more than φ in the cell of a place.
-inline double floor_in_cell(const DistanceGrid& g, double x, double y, double z) {
-  return x < 0 ? 0.0 : double(g.floors[first_coefficient(g, x, y, z) / kQuad]);
+/// The number of a place's cell in `floors`, or kNowhere.
+template <class N>
+N cell_number(const DistanceGrid& g, const GridPlace<N>& at) {
+  const N cell = mul_add(at.whole[2], N(double(g.row / kQuad)),
+                         mul_add(at.whole[1], N(double(g.plane / kQuad)), at.whole[0]));
+  return select(at.whole[0] < N(0.0), N(kNowhere), cell);
+}
+/// No more than φ in the cell of this number.
+inline double floor_in_cell(const DistanceGrid& g, double cell) {
+  return cell < 0 ? 0.0 : double(g.floors[int(cell)]);
 }
 template <class N>
 N floor_at(const DistanceGrid& g, const GridPlace<N>& at) {
-  return N(floor_in_cell(g, plain_value(at.whole[0]), plain_value(at.whole[1]),
-                         plain_value(at.whole[2])));
+  return N(floor_in_cell(g, plain_value(cell_number(g, at))));
 }
 template <class A>
 OneLane<A> floor_at(const DistanceGrid& g, const GridPlace<OneLane<A>>& at) {
-  return {floor_in_cell(g, at.whole[0].x, at.whole[1].x, at.whole[2].x)};
+  return {floor_in_cell(g, cell_number(g, at).x)};
 }
 template <class A>
 Lanes<A> floor_at(const DistanceGrid& g, const GridPlace<Lanes<A>>& at) {
+  alignas(64) double cell[kGroup], out[kGroup];
+  store_lanes(cell_number(g, at), cell);
+  for (int l = 0; l < kGroup; ++l) out[l] = floor_in_cell(g, cell[l]);
+  return load_lanes<A>(out);
+}
+
+/// How far φ bends downwards within kSagBlock cells of places in a cell.
+inline double sag_around(const DistanceGrid& g, double x, double y, double z) {
+  if (x < 0) return 0;
+  const auto blocks = [&](int axis) { return (g.cells[axis] + kSagBlock - 1) / kSagBlock; };
+  return double(g.sags[(int(x) / kSagBlock * blocks(1) + int(y) / kSagBlock) * blocks(2) +
+                       int(z) / kSagBlock]);
+}
+template <class A>
+Lanes<A> sag_at(const DistanceGrid& g, const GridPlace<Lanes<A>>& at) {
   alignas(64) double whole[3][kGroup], out[kGroup];
   for (int c = 0; c < 3; ++c) store_lanes(at.whole[c], whole[c]);
-  for (int l = 0; l < kGroup; ++l) out[l] = floor_in_cell(g, whole[0][l], whole[1][l], whole[2][l]);
+  for (int l = 0; l < kGroup; ++l) out[l] = sag_around(g, whole[0][l], whole[1][l], whole[2][l]);
   return load_lanes<A>(out);
+}
+inline double sag_at(const DistanceGrid& g, const GridPlace<double>& at) {
+  return sag_around(g, at.whole[0], at.whole[1], at.whole[2]);
 }
 
 /// Loads two rows of four coefficients.
@@ -317,26 +341,32 @@ void spline_at(const DistanceGrid& g, const GridPlace<Lanes<A>>& at,
   sum_over_z<Order>(sums, SplineWeights<N, Order>(at.rest[2]), out);
 }
 
-/// φ and ∇φ where φ < 0; elsewhere some φ ≥ 0. Where no lane's cell reaches inside, nothing else is
-/// read.
+/// Stands for a bound of φ that nothing is known about [m].
+inline constexpr double kNoBound = -1;
+
+/// φ and ∇φ where φ < 0; elsewhere some φ ≥ 0. Where `above` is not negative, or the cell does not
+/// reach inside, nothing else is read.
 template <class A>
-void spline_inside(const DistanceGrid& g, const GridPlace<Lanes<A>>& at,
+void spline_inside(const DistanceGrid& g, const GridPlace<Lanes<A>>& at, const Lanes<A>& above,
                    SplineValue<Lanes<A>, 1>& out) {
-  using N = Lanes<A>;
-  if (any(floor_at(g, at) < N(0.0))) return spline_at(g, at, out);
-  out = {N(1.0), {N(0.0), N(0.0), N(0.0)}, {}};
+  const Lanes<A> zero(0.0);
+  GridPlace<Lanes<A>> wanted = at;
+  wanted.whole[0] =
+      select((above < zero) & (floor_at(g, at) < zero), at.whole[0], Lanes<A>(kNowhere));
+  if (any(wanted.whole[0] >= zero)) return spline_at(g, wanted, out);
+  out = {Lanes<A>(1.0), {zero, zero, zero}, {}};
 }
 
 /// Two vectors side by side (kernels/tactile/vector_pair.hpp).
 template <int Order, template <class> class Pair, class M>
 requires requires { &Pair<M>::a; }
-void spline_inside(const DistanceGrid& g, const GridPlace<Pair<M>>& at,
+void spline_inside(const DistanceGrid& g, const GridPlace<Pair<M>>& at, const Pair<M>& above,
                    SplineValue<Pair<M>, Order>& out) {
   const auto part = [&](M Pair<M>::*of) {
     GridPlace<M> one;
     for (int c = 0; c < 3; ++c) one.whole[c] = at.whole[c].*of, one.rest[c] = at.rest[c].*of;
     SplineValue<M, Order> value;
-    spline_inside(g, one, value);
+    spline_inside(g, one, above.*of, value);
     return value;
   };
   const SplineValue<M, Order> a = part(&Pair<M>::a), b = part(&Pair<M>::b);

@@ -206,30 +206,46 @@ template <class A>
   }
 }
 
-/// Sixteen points in single precision: φ and ∇φ where φ < 0, elsewhere some φ ≥ 0. On a dense pad
-/// all of them are often in one cell. Then its coefficients are read once, for the same sums.
+/// Stores whole numbers as integers.
 template <class A>
-void spline_inside(const DistanceGrid& g, const GridPlace<LanesF<A>>& at,
-                   SplineValue<LanesF<A>, 1>& out) {
-  using N = LanesF<A>;
-  alignas(64) float whole[3][kLanesF];
-  alignas(64) int cell[kLanesF];
-  for (int c = 0; c < 3; ++c) store_lanes_f(at.whole[c], whole[c]);
-  const int row = g.row / kQuad, plane = g.plane / kQuad;
-  for (int l = 0; l < kLanesF; ++l)
-    cell[l] = int(whole[0][l]) + int(whole[1][l]) * plane + int(whole[2][l]) * row;
-  if (!any_inside<A>(g.floors, cell)) {
-    out = {N(1.0), {N(0.0), N(0.0), N(0.0)}, {}};
+[[gnu::always_inline]] inline void store_whole(const LanesF<A>& x, int (&out)[kLanesF]) {
+#if defined(__AVX512F__)
+  if constexpr (std::is_same_v<A, xsimd::avx512bw>) {
+    _mm512_store_si512(out, _mm512_cvttps_epi32(x.r[0]));
     return;
   }
-  bool several = false;
-  for (int c = 0; c < 3; ++c) {
-    const N one(double{whole[c][0]});
-    several = several || any(at.whole[c] < one) || any(at.whole[c] > one);
+#endif
+#if defined(__AVX2__)
+  if constexpr (std::is_same_v<A, xsimd::avx2>) {
+    for (int k = 0; k < 2; ++k)
+      _mm256_store_si256(reinterpret_cast<__m256i*>(out + 8 * k), _mm256_cvttps_epi32(x.r[k]));
+    return;
   }
+#endif
+  alignas(64) float all[kLanesF];
+  store_lanes_f(x, all);
+  for (int l = 0; l < kLanesF; ++l) out[l] = int(all[l]);
+}
+
+/// Sixteen points in single precision: φ and ∇φ where φ < 0, elsewhere some φ ≥ 0. Nothing is read
+/// where `above` is nowhere negative. On a dense pad all of them are often in one cell. Then its
+/// coefficients are read once, for the same sums.
+template <class A>
+void spline_inside(const DistanceGrid& g, const GridPlace<LanesF<A>>& at, const LanesF<A>& above,
+                   SplineValue<LanesF<A>, 1>& out) {
+  using N = LanesF<A>;
+  const N zero(0.0);
+  const auto nothing = [&] { out = {N(1.0), {zero, zero, zero}, {}}; };
+  if (!any(above < zero)) return nothing();
+  const N number = mul_add(at.whole[2], N(double(g.row / kQuad)),
+                           mul_add(at.whole[1], N(double(g.plane / kQuad)), at.whole[0]));
+  alignas(64) int cell[kLanesF];
+  store_whole(number, cell);
+  if (any(above < N(kNoBound / 2)) && !any_inside<A>(g.floors, cell)) return nothing();
+  const N first(double{float(cell[0])});
   const SplineWeights<N, 1> x(at.rest[0]), y(at.rest[1]);
   N sums[3][4];
-  if (several) {
+  if (any(number < first) || any(number > first)) {
     sum_places_f<A>(g, cell, x, y, sums);
   } else {
     sum_cell_f<A>(g.coefficients + std::ptrdiff_t(kQuad) * cell[0], g, x, y, sums);

@@ -44,6 +44,16 @@ N along(const N& a, const N& b, const N& c, const PointOffset<N, true>& s) {
   return mul_add(a, s.x, mul_add(b, s.y, c * s.z));
 }
 
-inline constexpr int kBracketRows = 10;  ///< largest number that a shape has
+/// Returns the square of its length.
+template <class N>
+N square_of(const PointOffset<N, false>& s) {
+  return mul_add(s.x, s.x, s.y * s.y);
+}
+template <class N>
+N square_of(const PointOffset<N, true>& s) {
+  return mul_add(s.x, s.x, mul_add(s.y, s.y, s.z * s.z));
+}
+
+inline constexpr int kBracketRows = 14;  ///< largest number that a shape has
 
 }  // namespace tangere::kernels

@@ -237,6 +237,54 @@ TEST(MeshGrid, NoCellReachesBelowItsFloor) {
   EXPECT_GT(skipped, 5000);
 }
 
+/// Where a disc or a ball is left out, φ > 0 in all of it; where a bound is positive, so is φ.
+TEST(MeshGrid, WhereABoundOfTheFallIsPositiveNothingTouches) {
+  Draw draw;
+  for (const MeshShape& mesh :
+       {torus_mesh(0.02, 0.006, 24, 12), testing::frame_mesh(0.02, 0.01, 0.006),
+        cuboid_mesh({0.02, 0.01, 0.015})}) {
+    const auto grid = grid_of(mesh, 32);
+    const kernels::DistanceGrid& g = grid->view;
+    const auto value = [&](const Vec3<double>& U) {
+      Vec3<double> clamped;
+      kernels::SplineValue<double, 0> phi;
+      kernels::spline_at(g, place_in_grid(g, U, clamped), phi);
+      return phi.value;
+    };
+    const auto inside = [&](const Vec3<double>& U) {
+      const double* u = &U.x;
+      return u[0] > 0 && u[1] > 0 && u[2] > 0 && u[0] < g.cells[0] && u[1] < g.cells[1] &&
+             u[2] < g.cells[2];
+    };
+    int left_out = 0, bounded = 0, sharper = 0;
+    for (int k = 0; k < 20000; ++k) {
+      const Vec3<double> U = {draw(0, g.cells[0]), draw(0, g.cells[1]), draw(0, g.cells[2])};
+      const double m = draw(0.1, kernels::kSagBlock);
+      const bool flat = draw(-1, 1) > 0;
+      const Vec3<double> normal = flat ? draw.direction() : Vec3<double>{0, 0, 0};
+      kernels::FallBound<double> bound;
+      const bool near = disc_near_mesh(g, U, m, normal, bound);
+      left_out += near ? 0 : 1;
+      sharper += !near && value(U) < g.slope * g.cell * m ? 1 : 0;
+      for (int way = 0; way < 10; ++way) {
+        Vec3<double> along = draw.direction();
+        along = along - dot(normal, along) * normal;
+        const Vec3<double> s = draw(0, m) * along;
+        if (!inside(U + s)) continue;
+        if (!near) {
+          EXPECT_GT(value(U + s), 0);
+        } else if (bound.value + dot(bound.gradient, s) - 0.5 * bound.sag * dot(s, s) > 0) {
+          ++bounded;
+          EXPECT_GT(value(U + s), 0);
+        }
+      }
+    }
+    EXPECT_GT(left_out, 2000);
+    EXPECT_GT(sharper, 200);
+    EXPECT_GT(bounded, 1000);
+  }
+}
+
 TEST(MeshGrid, BeyondTheGridNothingTouches) {
   const auto grid = grid_of(cuboid_mesh({0.02, 0.02, 0.02}), 16);
   const Spline spline = Spline::of({1, 1, 1}, &grid->view);
