@@ -125,7 +125,7 @@ TEST_F(Rollout, RowsDoNotDependOnThreads) {
   ASSERT_EQ(shared.states.size(), alone.states.size());
   for (std::size_t k = 0; k < alone.states.size(); ++k) {
     EXPECT_EQ(shared.states[k].q, alone.states[k].q);
-    EXPECT_EQ(shared.states[k].body_pose, alone.states[k].body_pose);
+    EXPECT_EQ(shared.states[k].pose, alone.states[k].pose);
   }
   ASSERT_EQ(shared.fields.size(), alone.fields.size());
   for (std::size_t k = 0; k < alone.fields.size(); ++k)
