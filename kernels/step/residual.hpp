@@ -296,11 +296,11 @@ void sum_link_pair(const ModelView& model, const LinkPair& links, const StageArg
           add_sphere<Derivatives, SphereSums>(motion, law, list, a.lone, o.W, o.sums);
         }
       } else if constexpr (Shape<N>::kSums == PointSumForm::points) {
-        if (elastic) {
-          add_elastic<Derivatives>(shape, law, list, a.lone, frame(), o.W, o.sums);
-        } else {
-          add_candidates<Derivatives>(shape, law, list, a.lone, frame(), o.W, o.sums);
-        }
+        constexpr bool kBall = std::is_same_v<Shape<N>, GrownShape<N>>;  // never remembers
+        if constexpr (!kBall)
+          if (elastic)
+            return add_elastic<Derivatives>(shape, law, list, a.lone, frame(), o.W, o.sums);
+        add_candidates<Derivatives>(shape, law, list, a.lone, frame(), o.W, o.sums);
       } else {
         const FaceMotion<Shape, N> motion = {frame(), o.W, shape};
         if (elastic) {

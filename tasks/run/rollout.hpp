@@ -57,8 +57,9 @@ using RolloutProgress = std::function<bool(std::int64_t done)>;
 /// tactile rows due. A row of which nothing is wanted does not leave. A tactile sensor is read
 /// after steps K, 2K, …, so field k comes from row (k + 1) K of q. In a StepRow, an environment
 /// that failed earlier has 0 iterations and its last status and residual. `program` must have
-/// started every block; it takes all of them through a step in turn. `steppers`: one for each thread
-/// that steps and reads blocks, all of the same options; rows are the same for any number of them.
+/// started every block; it takes all of them through a step in turn. `steppers`: one for each
+/// thread that steps and reads blocks, all of the same options; rows are the same for any number of
+/// them.
 /// Throws InputError without a stepper and when steps < 1, every < 0 or first_step < 0. Passes on
 /// what the sink throws.
 RolloutSummary run_rollout(Batch& batch, std::span<Stepper> steppers, EpisodeProgram& program,
