@@ -106,11 +106,14 @@ void vary_size(CompiledModel& m, int body, const RandomizationDescription& d, in
     fail(d, "not all that may be drawn is positive");
   if (const std::string fault = drawn_slenderness_fault(m.scene, b); !fault.empty())
     fail(d, "that allows " + fault);
-  for (const PairContactDescription& c : m.scene.pair_contacts)
-    if (c.general_body == d.number.name)
-      fail(
-          d,
-          "its contact points do not; expected a body that touches nothing with points of its own");
+  for (const PairContactDescription& c : m.scene.pair_contacts) {
+    if (c.general_body != d.number.name) continue;
+    if (c.points.empty() && is_ball(b.shape))
+      fail(d, "not where the sphere touches '" + c.primitive_body +
+                  "' with its surface; expected it as primitive_body there");
+    fail(d,
+         "its contact points do not; expected a body that touches nothing with points of its own");
+  }
   for (const TactileDescription& t : m.scene.sensors)
     if (t.body == d.number.name)
       fail(d,

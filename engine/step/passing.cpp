@@ -140,8 +140,9 @@ Passing::Passing(const CompiledModel& m) : model_(m), arm_(m.links.size(), 0.0) 
     add(p.link2, p.frame2, p.shape, p.size, p.link1, p.middle);
     if (p.body1 < 0) continue;
     const kernels::Solid& solid = m.solids[std::size_t(p.body1)];
-    // Bodies with points of their own need not be convex.
-    if (solid.stretches) add(p.link1, solid.frame, solid.shape, solid.size, p.link2, p.frame2.p);
+    // Bodies with points of their own need not be convex. A ball has none.
+    if (solid.stretches || p.ball_radius > 0)
+      add(p.link1, solid.frame, solid.shape, solid.size, p.link2, p.frame2.p);
   }
   bound_gates();
   // passed() looks at a gate once.

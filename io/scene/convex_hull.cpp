@@ -81,7 +81,7 @@ class HullBuilder {
     for (std::size_t k = 0; side > 0 && k < points_.size(); k += 3) {
       GridPlace at{};
       for (std::size_t c = 0; c < 3; ++c)
-        at[c] = static_cast<Whole>(std::round((points_[k + c] - low[c]) * (kCells / side)));
+        at[c] = static_cast<Whole>(std::round((points_[k + c] - low[c]) / side * kCells));
       if (!known.emplace(at, 0).second) continue;
       places_.push_back(at);
       source_.push_back(static_cast<int>(k / 3));

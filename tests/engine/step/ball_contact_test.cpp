@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "engine/model/scene_number.hpp"
 #include "engine/sense/start_overlaps.hpp"
 #include "tests/engine/meshes.hpp"
 #include "tests/engine/runs.hpp"
@@ -185,6 +186,31 @@ TEST(BallContact, BallsRollOnABoxThatIsPushed) {
   EXPECT_NEAR(v[1], 0.5 * share * box, 1e-4 * box);
 }
 
+TEST(BallContact, AFastOneDoesNotPassUnnoticed) {
+  // The small ball is far beside the middle of the large one, whichever of them is the general one.
+  for (const bool swapped : {false, true}) {
+    Scene s;
+    s.timestep = 5e-3;
+    s.gravity = {0, 0, 0};
+    s.links.push_back(testing::link("large", JointType::fixed, {0, 0, 0}, SphereShape{0.5}, 1000));
+    s.links.push_back(
+        testing::link("small", JointType::free, {-1, 0.2, 0}, SphereShape{0.01}, 1000));
+    s.pair_contacts.push_back({swapped ? "small" : "large",
+                               swapped ? "large" : "small",
+                               {100, 0, 0, 0},
+                               ContactLaw::linear,
+                               1e-5,
+                               {}});
+    const Model model(s);
+    Stepper stepper(model, testing::options(Integrator::bdf1, s.timestep, 1e-9));
+    Batch batch(model, 1);
+    batch.set_state(0, q_of(batch), std::vector<double>{400, 0, 0, 0, 0, 0});
+    stepper.step(batch, {});
+    EXPECT_TRUE(batch.status(0) == StepStatus::passed || q_of(batch)[0] < 0)
+        << swapped << ", " << static_cast<int>(batch.status(0)) << ", " << q_of(batch)[0];
+  }
+}
+
 TEST(BallContact, SaysWhatItCannotDo) {
   const auto message = [](const Scene& scene) {
     try {
@@ -198,6 +224,14 @@ TEST(BallContact, SaysWhatItCannotDo) {
   touched.resolution = 8;
   const Scene mesh = ball_at({0, 0, 0.2}, touched);
   EXPECT_NE(message(mesh).find("swap the two bodies"), std::string::npos) << message(mesh);
+  Scene varying = ball_at({0, 0, 0.2}, PlaneShape{});
+  RandomizationDescription radius;
+  radius.number = size_of_body("ball", 0);
+  radius.distribution.a = 0.02, radius.distribution.b = 0.03;
+  varying.randomizations.push_back(radius);
+  EXPECT_NE(message(varying).find("not where the sphere touches 'touched' with its surface"),
+            std::string::npos)
+      << message(varying);
   Scene elastic = ball_at({0, 0, 0.2}, PlaneShape{});
   elastic.pair_contacts[0].coefficients.ks = 10;
   EXPECT_NE(message(elastic).find("ks of the sphere 'ball'"), std::string::npos)
