@@ -134,11 +134,12 @@ LaneBits ContactForces::touching(const Row<L>* wrenches) const {
 }
 
 template <int L>
-LaneBits ContactForces::parted(const Row<L>* a, const Row<L>* b) const {
+LaneBits ContactForces::parted(const Row<L>* a, const Row<L>* b, int component) const {
   LaneBits lanes = 0;
-  for (std::size_t k = 0; k < contacts_.size(); ++k) {
+  for (std::size_t k = begin_[2 * std::size_t(component)];
+       k < begin_[2 * std::size_t(component) + 2]; ++k) {
     LaneBits in_a = 0, in_b = 0;
-    for (std::size_t i = 6 * k; i < 6 * k + 6; ++i)
+    for (std::size_t i = contacts_[k].row; i < contacts_[k].row + 6; ++i)
       for (int l = 0; l < L; ++l) {
         if (a[i][l] != 0) in_a |= 1U << l;
         if (b[i][l] != 0) in_b |= 1U << l;
@@ -152,7 +153,7 @@ LaneBits ContactForces::parted(const Row<L>* a, const Row<L>* b) const {
   template double ContactForces::change(const Row<L>*, const Row<L>*, const Row<L>*, \
                                         const Row<L>*, int) const;                   \
   template LaneBits ContactForces::touching(const Row<L>*) const;                    \
-  template LaneBits ContactForces::parted(const Row<L>*, const Row<L>*) const;
+  template LaneBits ContactForces::parted(const Row<L>*, const Row<L>*, int) const;
 TANGERE_FOR_LANES(kernels::kGroup)
 TANGERE_FOR_LANES(1)
 #undef TANGERE_FOR_LANES

@@ -29,9 +29,10 @@ class ContactForces {
   template <int L>
   [[nodiscard]] LaneBits touching(const kernels::Row<L>* wrenches) const;
 
-  /// The lanes in which some contact has a wrench in `a` and none in `b`.
+  /// The lanes in which some contact of a component has a wrench in `a` and none in `b`.
   template <int L>
-  [[nodiscard]] LaneBits parted(const kernels::Row<L>* a, const kernels::Row<L>* b) const;
+  [[nodiscard]] LaneBits parted(const kernels::Row<L>* a, const kernels::Row<L>* b,
+                                int component) const;
 
  private:
   struct Contact {

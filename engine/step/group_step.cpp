@@ -51,7 +51,16 @@ void set_state(const LaneState& s, BasicWorkspace<L>& w, int lane) {
 }  // namespace
 
 GroupStep::GroupStep(const CompiledModel& model, const StepSettings& settings)
-    : model_(model), settings_(settings), watch_(model, settings), contact_forces_(model) {}
+    : model_(model),
+      settings_(settings),
+      watch_(model, settings),
+      contact_forces_(model),
+      component_of_(std::size_t(model.nv)) {
+  for (int c = 0; c < model.components(); ++c)
+    for (int k = model.component_begin[std::size_t(c)];
+         k < model.component_begin[std::size_t(c) + 1]; ++k)
+      component_of_[std::size_t(model.component_dofs[std::size_t(k)])] = c;
+}
 
 /// Solves the stages of a step, each for the lanes that found the one before.
 template <int L>

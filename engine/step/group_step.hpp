@@ -51,10 +51,10 @@ class GroupStep {
   void weigh_velocity(const kernels::KernelTable& table, BasicWorkspace<L>& w, LaneBits lanes,
                       const kernels::Row<L>& h, NewtonReport& report) const;
   template <int L>
-  LaneBits left_limits(const BasicWorkspace<L>& w, LaneBits lanes) const;
+  LaneBits left_limits(const BasicWorkspace<L>& w, LaneBits lanes, int component) const;
   template <int L>
-  kernels::Row<L> share_of_velocity(const BasicWorkspace<L>& w, const kernels::Row<L>& h,
-                                    const kernels::Row<L>* way,
+  kernels::Row<L> share_of_velocity(const BasicWorkspace<L>& w, int component,
+                                    const kernels::Row<L>& h, const kernels::Row<L>* way,
                                     const kernels::Row<L>& factor) const;
   template <int L>
   kernels::Row<L> estimated_error(const kernels::KernelTable& table, BasicWorkspace<L>& w,
@@ -94,6 +94,7 @@ class GroupStep {
   StepSettings settings_;
   StepWatch watch_;
   ContactForces contact_forces_;
+  std::vector<int> component_of_;  ///< (nv)
 };
 
 }  // namespace tangere

@@ -77,14 +77,15 @@ void GroupStep::weigh_velocity(const kernels::KernelTable& table, BasicWorkspace
   evaluate_elsewhere(model_, table, w, lanes, report);
 }
 
-/// Returns the lanes in which a limit acts at the start and not at the end. Limits of ball joints
-/// are not looked at. `base`: the end, as displacements.
+/// Returns the lanes in which a limit of a component acts at the start and not at the end. Limits of
+/// ball joints are not looked at. `base`: the end, as displacements. component < 0: any of them.
 template <int L>
-LaneBits GroupStep::left_limits(const BasicWorkspace<L>& w, LaneBits lanes) const {
+LaneBits GroupStep::left_limits(const BasicWorkspace<L>& w, LaneBits lanes, int component) const {
   LaneBits left = 0;
   for (const kernels::Link& link : model_.links) {
     if ((link.effects & kernels::kLimited) == 0 || link.kind == kernels::JointKind::spherical)
       continue;
+    if (component >= 0 && component_of_[std::size_t(link.v)] != component) continue;
     for (int k = 0; k < kernels::dofs(link.kind); ++k) {
       const int i = link.v + k;
       const kernels::DofEffects& e = model_.dof_effects[std::size_t(i)];
@@ -98,36 +99,30 @@ LaneBits GroupStep::left_limits(const BasicWorkspace<L>& w, LaneBits lanes) cons
   return left & lanes;
 }
 
-/// Returns ‖D^½ δ‖ over the largest of ‖D^½ v‖ at the start, the same at the end, and h |gravity|
-/// ‖D^½‖, in the component where that is worst. D is the diagonal of the mass matrix, and
-/// δ = `factor` `way`.
+/// Returns ‖D^½ δ‖ of a component over the largest of ‖D^½ v‖ at the start, the same at the end, and
+/// h |gravity| ‖D^½‖. D is the diagonal of the mass matrix, and δ = `factor` `way`.
 template <int L>
-Row<L> GroupStep::share_of_velocity(const BasicWorkspace<L>& w, const Row<L>& h, const Row<L>* way,
-                                    const Row<L>& factor) const {
+Row<L> GroupStep::share_of_velocity(const BasicWorkspace<L>& w, int component, const Row<L>& h,
+                                    const Row<L>* way, const Row<L>& factor) const {
   const double gravity = std::sqrt(dot(model_.view.gravity, model_.view.gravity));
-  Row<L> worst{};
-  for (int c = 0; c < model_.components(); ++c) {
-    Row<L> off{}, before{}, after{}, mass{};
-    for (int k = model_.component_begin[std::size_t(c)];
-         k < model_.component_begin[std::size_t(c) + 1]; ++k) {
-      const int i = model_.component_dofs[std::size_t(k)];
-      for (int l = 0; l < L; ++l) {
-        const double d = w.stage.weight[i][l] * w.stage.weight[i][l];
-        off[l] += d * way[i][l] * way[i][l];
-        before[l] += d * w.v0[i][l] * w.v0[i][l];
-        after[l] += d * w.v1[i][l] * w.v1[i][l];
-        mass[l] += d;
-      }
-    }
+  Row<L> off{}, before{}, after{}, mass{}, share{};
+  for (int k = model_.component_begin[std::size_t(component)];
+       k < model_.component_begin[std::size_t(component) + 1]; ++k) {
+    const int i = model_.component_dofs[std::size_t(k)];
     for (int l = 0; l < L; ++l) {
-      if (off[l] == 0) continue;
-      const double fall = h[l] * gravity;
-      const double scale = std::max({before[l], after[l], fall * fall * mass[l]});
-      const double share = std::abs(factor[l]) * std::sqrt(off[l] / scale);
-      if (!(share <= worst[l])) worst[l] = share;
+      const double d = w.stage.weight[i][l] * w.stage.weight[i][l];
+      off[l] += d * way[i][l] * way[i][l];
+      before[l] += d * w.v0[i][l] * w.v0[i][l];
+      after[l] += d * w.v1[i][l] * w.v1[i][l];
+      mass[l] += d;
     }
   }
-  return worst;
+  for (int l = 0; l < L; ++l) {
+    const double fall = h[l] * gravity;
+    const double scale = std::max({before[l], after[l], fall * fall * mass[l]});
+    if (off[l] != 0) share[l] = std::abs(factor[l]) * std::sqrt(off[l] / scale);
+  }
+  return share;
 }
 
 /// Returns the largest of the shares at the head of this file, of parts that were just solved.
@@ -147,14 +142,13 @@ Row<L> GroupStep::estimated_error(const kernels::KernelTable& table, BasicWorksp
   scaled_residual(model_, table, w, error);
   // Where the first guess of every stage was a root there is no factor. The stages then felt no
   // change of the forces, but did not see the start, and what changed since then is the error.
-  const LaneBits guessed = lanes & ~factors.any, left = left_limits(w, lanes & factors.any);
+  const LaneBits guessed = lanes & ~factors.any, left = left_limits(w, lanes & factors.any, -1);
   if (contact_forces_.none() && (guessed | left) == 0) return error;
   solve_by_factor(model_, table, w, factors, w.delta);
   weigh_velocity(table, w, lanes, h, report);
   kernel.contact_wrenches(model_.view, s, start);
   const LaneBits touched =
       lanes & (contact_forces_.touching<L>(start) | contact_forces_.touching<L>(end));
-  const LaneBits parted = lanes & factors.any & contact_forces_.parted<L>(start, end);
   const auto raise = [&](int l, double share) {
     if (!(share <= error[l])) error[l] = share;
   };
@@ -168,12 +162,15 @@ Row<L> GroupStep::estimated_error(const kernels::KernelTable& table, BasicWorksp
   }
   solve_by_factor(model_, table, w, factors, w.test);
   const double c0 = scheme.stages.back().c0, by_test = -c0 * scheme.estimate.front();
-  if ((left | parted) != 0) {
-    Row<L> factor;
-    for (int l = 0; l < L; ++l) factor[l] = c0 / h[l] * by_test;
-    const Row<L> share = share_of_velocity(w, h, w.test, factor);
+  Row<L> factor;
+  for (int l = 0; l < L; ++l) factor[l] = c0 / h[l] * by_test;
+  for (int c = 0; c < model_.components(); ++c) {
+    LaneBits gone = contact_forces_.parted<L>(start, end, c);
+    if (left != 0) gone |= left_limits(w, left, c);
+    if ((gone & lanes & factors.any) == 0) continue;
+    const Row<L> share = share_of_velocity(w, c, h, w.test, factor);
     for (int l = 0; l < L; ++l)
-      if (has(left | parted, l)) raise(l, share[l]);
+      if (has(gone & lanes & factors.any, l)) raise(l, share[l]);
   }
   const LaneBits touching = touched & factors.any;
   if (touching == 0) return error;
