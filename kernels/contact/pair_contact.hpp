@@ -13,6 +13,8 @@
 //   δḋ = δn·u + n·δu,  δv_t = δu - δḋ n - ḋ δn,  δN = N_d δd + N_ḋ δḋ
 //   δf = δN n + N δn + δf_t,  δf_t = -s (δv_t - t (t·δv_t)) - μ t δB
 //       (t = 0 and no δB when sticking)
+// Where ξ is the centre of a ball (ball_contact.hpp), x₂ = ξ - (d + r) n, and d + r takes the place
+// of d in δn and δx₂.
 // Wrench on body 1 about its origin: w₁ = Σ (x₂ × f; f),  δw₁ = K ε + D δW.
 #pragma once
 
