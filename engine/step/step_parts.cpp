@@ -77,8 +77,8 @@ void GroupStep::weigh_velocity(const kernels::KernelTable& table, BasicWorkspace
   evaluate_elsewhere(model_, table, w, lanes, report);
 }
 
-/// Returns the lanes in which a limit of a component acts at the start and not at the end. Limits of
-/// ball joints are not looked at. `base`: the end, as displacements. component < 0: any of them.
+/// Returns the lanes in which a limit of a component acts at the start and not at the end. Limits
+/// of ball joints are not looked at. `base`: the end, as displacements. component < 0: any of them.
 template <int L>
 LaneBits GroupStep::left_limits(const BasicWorkspace<L>& w, LaneBits lanes, int component) const {
   LaneBits left = 0;
@@ -99,8 +99,8 @@ LaneBits GroupStep::left_limits(const BasicWorkspace<L>& w, LaneBits lanes, int 
   return left & lanes;
 }
 
-/// Returns ‖D^½ δ‖ of a component over the largest of ‖D^½ v‖ at the start, the same at the end, and
-/// h |gravity| ‖D^½‖. D is the diagonal of the mass matrix, and δ = `factor` `way`.
+/// Returns ‖D^½ δ‖ of a component over the largest of ‖D^½ v‖ at the start, the same at the end,
+/// and h |gravity| ‖D^½‖. D is the diagonal of the mass matrix, and δ = `factor` `way`.
 template <int L>
 Row<L> GroupStep::share_of_velocity(const BasicWorkspace<L>& w, int component, const Row<L>& h,
                                     const Row<L>* way, const Row<L>& factor) const {
