@@ -8,6 +8,7 @@
 #include <functional>
 #include <nlohmann/json.hpp>
 #include <numeric>
+#include <utility>
 
 #include "apps/arguments.hpp"
 #include "apps/command.hpp"
@@ -65,9 +66,12 @@ int threads_of(const SimulateArguments& options, int environments) {
   return std::min(options.threads.value_or(available_threads()),
                   (environments + kernels::kBlock - 1) / kernels::kBlock);
 }
-std::vector<Stepper> steppers_of(const Model& model, const StepperOptions& solver, int threads) {
+/// Adds steppers of the same options to the first one.
+std::vector<Stepper> steppers_of(Stepper first, const Model& model, const StepperOptions& solver,
+                                 int threads) {
   std::vector<Stepper> steppers;
-  for (int k = 0; k < threads; ++k) steppers.emplace_back(model, solver);
+  steppers.push_back(std::move(first));
+  while (std::ssize(steppers) < threads) steppers.emplace_back(model, solver);
   return steppers;
 }
 
@@ -312,7 +316,7 @@ int simulate_task(const SimulateArguments& options, const Console& console, cons
                                precision, 0, outputs_of(options, model)};
   note_empty_sensors(console, model, rollout);
   check_size(model, environments, threads, rollout);
-  std::vector<Stepper> steppers = steppers_of(model, {}, threads);
+  std::vector<Stepper> steppers = steppers_of(Stepper(model), model, {}, threads);
   Batch batch(model, environments, options.seed.value_or(0));
   const auto data = std::make_shared<EnvironmentData>(task, batch.environments());
   data->restart(batch);
@@ -364,15 +368,15 @@ int simulate(const SimulateArguments& options, const Console& console, const Pro
   note_empty_sensors(console, model, rollout);
   const int threads = threads_of(options, start.environments);
   check_size(model, start.environments, threads, rollout);
-  std::vector<Stepper> steppers = steppers_of(model, solver, threads);
+  std::vector<Stepper> steppers = steppers_of(std::move(stepper), model, solver, threads);
   Batch batch(model, start.environments, start.seed, start.saved ? start.saved->first_episode : 0);
   if (start.saved) restore_state(*start.saved, start.continues, batch);
-  RunGradients gradients(options.gradients, batch, stepper, rollout);
+  RunGradients gradients(options.gradients, batch, steppers.front(), rollout);
 
   // Lives from before the file is created until it is gone or complete, so nothing half-written
   // stays.
   const StopSignals signals;
-  const TrajectoryLayout layout = make_layout(batch, stepper, rollout, info);
+  const TrajectoryLayout layout = make_layout(batch, steppers.front(), rollout, info);
   TrajectoryFile output(options.output, layout, options.overwrite);
   return write_run(
       options, console, batch, layout, rollout, output, signals,

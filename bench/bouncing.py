@@ -11,9 +11,9 @@ data/bouncing/sample.csv, measured by its authors on their machine.
 """
 
 import argparse
-import time
 
 import numpy as np
+from simbenchmark import line, published, setting, timed
 
 import tangere
 
@@ -59,14 +59,7 @@ def play(scheme: str, step: float, accuracy: float, kn: float) -> tuple[float, f
                         density=density, kn=kn)
     model = tangere.Model(tangere.Scene.from_text(text, "bouncing"))
     steps = round(SECONDS / step)
-    controls = np.zeros((steps, BALLS, 0))
-    seconds = np.inf
-    for _ in range(3):
-        batch = tangere.Batch(model, BALLS, threads=1, accuracy=accuracy)
-        begin = time.process_time()
-        run = batch.run(controls)
-        seconds = min(seconds, time.process_time() - begin)
-    assert (run.status >= 0).all()
+    run, seconds = timed(model, BALLS, np.zeros((steps, BALLS, 0)), accuracy)
     return float(np.mean((energy(run, kn) - BALLS * MASS * GRAVITY * HEIGHT) ** 2)), seconds
 
 
@@ -74,18 +67,16 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--kn", type=float, default=1e7, help="stiffness of the ground [N/m]")
     args = parser.parse_args()
-    print(f"{'':<34}{'error [J^2]':>12}{'time [s]':>10}")
+    print(f"{'':<34}{'error [J^2]':>13}{'time [s]':>13}")
     for scheme, step, accuracy in [
         ("BDF1", 1e-3, 0), ("SDIRK2", 1e-3, 0), ("SDIRK2", 1e-4, 0), ("SDIRK3", 1e-3, 0),
         ("SDIRK3", 1e-4, 0), ("SDIRK2", 1e-2, 1e-3), ("SDIRK2", 1e-2, 1e-5),
         ("SDIRK3", 1e-2, 1e-3), ("SDIRK3", 1e-2, 1e-5), ("SDIRK3", 4e-3, 1e-5),
         ("SDIRK3", 2e-3, 1e-6),
     ]:  # fmt: skip
-        error, seconds = play(scheme, step, accuracy, args.kn)
-        name = f"{scheme}, {1e3 * step:g} ms" + (f", accuracy {accuracy:g}" if accuracy else "")
-        print(f"{name:<34}{error:12.3g}{seconds:10.3g}", flush=True)
+        line(setting(scheme, step, accuracy), *play(scheme, step, accuracy, args.kn))
     for engine, step, error, seconds in PUBLISHED:
-        print(f"{engine + f', {1e3 * step:g} ms (published)':<34}{error:12.3g}{seconds:10.3g}")
+        line(published(engine, step), error, seconds)
 
 
 if __name__ == "__main__":

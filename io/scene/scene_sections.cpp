@@ -109,13 +109,18 @@ void warn_of_coarse_points(const Scene& scene, const SceneNode& root) {
         ->body.shape;
   };
   for (const PairContactDescription& c : scene.pair_contacts) {
-    const auto* const cuboid = std::get_if<CuboidShape>(&shape_of(c.general_body));
-    if (cuboid == nullptr) continue;
     const bool both_ways =
         std::any_of(scene.pair_contacts.begin(), scene.pair_contacts.end(), [&](const auto& other) {
           return other.general_body == c.primitive_body && other.primitive_body == c.general_body;
         });
-    if (both_ways) continue;
+    if (both_ways && is_ball(shape_of(c.general_body)))
+      root.context().warnings.push_back(
+          fmt::format("{}<general_primitive_contact>: '{}' touches '{}' with its whole surface, "
+                      "and '{}' touches "
+                      "it as well, so the forces of both contacts add up; expected one of them",
+                      c.source.prefix(), c.general_body, c.primitive_body, c.primitive_body));
+    const auto* const cuboid = std::get_if<CuboidShape>(&shape_of(c.general_body));
+    if (cuboid == nullptr || both_ways) continue;
     double pitch = 0;
     for (std::size_t k = 0; k < 3; ++k)
       pitch = std::max(pitch, cuboid->size[k] / (cuboid->contact_resolution[k] - 1));

@@ -47,8 +47,15 @@ TEST(CoarsePoints, ABodyThatFitsBetweenThemIsTold) {
                        "<general_primitive_contact general_body=\"below\" primitive_body=\"box\" "
                        "kn=\"1e3\"/>"),
               IsEmpty());
-  EXPECT_THAT(warnings("2 2 2", "type=\"sphere\" radius=\"0.02\""),
-              ElementsAre(HasSubstr("'below' is 0.04 m across")));
+  const std::string sphere = "type=\"sphere\" radius=\"0.02\"";
+  EXPECT_THAT(warnings("2 2 2", sphere),
+              ElementsAre(AllOf(HasSubstr("'below' is 0.04 m across"),
+                                HasSubstr("or the two bodies swapped"))));
+  // With its surface it would need no points of the box, whose forces add to its own.
+  EXPECT_THAT(warnings("2 2 2", sphere,
+                       "<general_primitive_contact general_body=\"below\" primitive_body=\"box\" "
+                       "kn=\"1e3\"/>"),
+              ElementsAre(HasSubstr("the forces of both contacts add up; expected one of them")));
 }
 
 /// A shift leaves the corners of a box without the box below.
