@@ -137,6 +137,10 @@ Merged merge_if_complete(const GenerateOptions& options, DatasetWriter& output) 
   const MergeResult result = merge_dataset(find_dataset(options.output), replace);
   merged.keys["merged"] = result.file;
   merged.line = fmt::format("\nmerged: {}", result.file);
+  if (result.touching) {
+    merged.keys["touching"] = *result.touching;
+    merged.line += fmt::format(", {} of {} demos feel something", *result.touching, result.demos);
+  }
   if (result.minari_id.empty()) return merged;
   merged.keys["minari_id"] = result.minari_id;
   merged.keys["minari_left_out"] = result.minari_left_out;

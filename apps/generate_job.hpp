@@ -47,7 +47,8 @@ DatasetOutput output_for(const GenerateOptions& options, const DatasetLayout& la
 /// The merged files of a complete data set: paths for the JSON object, null if the set is not
 /// complete or merging was not requested, and the reason if all shards seem to exist.
 struct Merged {
-  Json keys{{"merged", nullptr}, {"minari_id", nullptr}, {"not_merged", nullptr}};
+  Json keys{
+      {"merged", nullptr}, {"minari_id", nullptr}, {"not_merged", nullptr}, {"touching", nullptr}};
   std::string line;
 };
 Merged merge_if_complete(const GenerateOptions& options, DatasetWriter& output);

@@ -12,9 +12,9 @@ namespace tangere::apps {
 namespace {
 
 Json tensor_json(const TensorSpec& t) {
-  return {{"name", t.name},       {"shape", t.shape},          {"unit", t.unit},
-          {"meaning", t.meaning}, {"low", finite(t.low)},      {"high", finite(t.high)},
-          {"scale", t.scale},     {"privileged", t.privileged}};
+  return {{"name", t.name},       {"shape", t.shape},           {"unit", t.unit},
+          {"meaning", t.meaning}, {"low", finite(t.low)},       {"high", finite(t.high)},
+          {"scale", t.scale},     {"privileged", t.privileged}, {"touch", t.touch}};
 }
 
 std::string tensor_text(const TensorSpec& t) {
@@ -22,7 +22,10 @@ std::string tensor_text(const TensorSpec& t) {
   return fmt::format("{} ({}) [{}], {}{}{}: {}", t.name, fmt::join(t.shape, ", "), t.unit,
                      free ? "no bounds" : fmt::format("{:g} to {:g}", t.low, t.high),
                      t.scale.empty() ? "" : fmt::format(", scale {:g}", fmt::join(t.scale, " ")),
-                     t.privileged ? ", privileged" : "", t.meaning);
+                     t.privileged ? ", privileged"
+                     : t.touch    ? ", touch"
+                                  : "",
+                     t.meaning);
 }
 
 /// What belongs to a reset before the first action.

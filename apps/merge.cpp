@@ -34,9 +34,11 @@ int merge(const std::string& path, MergeOptions options, const Console& console)
   const MergeResult result = merge_dataset(find_dataset(path), options);
   if (result.stopped) return report_stop(console, "merge", signals.received(), "while it merged");
   console.print(fmt::format(
-      "wrote {} ({} bytes, {}): {} demos, {} to train on and {} to validate; failed episodes: {}",
+      "wrote {} ({} bytes, {}): {} demos, {} to train on and {} to validate{}; failed episodes: {}",
       result.file, result.bytes, options.copy ? "a copy of all numbers" : "links to the shards",
-      result.demos, result.train, result.valid, result.failed));
+      result.demos, result.train, result.valid,
+      result.touching ? fmt::format(", {} of all feel something", *result.touching) : "",
+      result.failed));
   if (!result.minari.empty())
     console.print(fmt::format("wrote {}: {} for Minari", result.minari, result.minari_id));
   if (!result.minari_left_out.empty())
@@ -54,6 +56,7 @@ int merge(const std::string& path, MergeOptions options, const Console& console)
                   {"train", result.train},
                   {"valid", result.valid},
                   {"successes", result.successes ? Json(*result.successes) : Json()},
+                  {"touching", result.touching ? Json(*result.touching) : Json()},
                   {"failed_episodes", result.failed}});
   return kDone;
 }

@@ -24,6 +24,7 @@ struct TensorSpec {
   std::vector<double> scale = {};
   double low = -kUnbounded, high = kUnbounded;  ///< bounds of every number
   bool privileged = false;                      ///< a robot could not measure it
+  bool touch = false;  ///< what pads feel: all numbers are 0 where nothing is felt
 
   [[nodiscard]] std::size_t size() const;
 };

@@ -112,6 +112,7 @@ void describe_numbers(const h5::Id& scene, const DatasetLayout& layout) {
   }
   h5::write_attribute(scene, "observation_scale", observation_scale(layout));
   h5::write_attribute(scene, "privileged", privileged_observations(layout));
+  h5::write_attribute(scene, "touch", touch_observations(layout));
   describe_task(scene, layout);
   if (!layout.task && !layout.end_effector_names.empty()) {
     texts("variable_names", layout.end_effector_names);
@@ -230,6 +231,10 @@ std::vector<std::string> differences(const std::vector<Setting>& there,
     if (value_in(here, setting.name) == nullptr)
       lines.push_back(fmt::format("{}: missing here", setting.name));
   return lines;
+}
+
+std::vector<std::string> touch_said(const h5::Id& scene) {
+  return names_in(h5::read_text(scene, "touch"));
 }
 
 std::vector<SampleSaid> samples_said(const h5::Id& scene, std::int64_t every, std::int64_t rows) {

@@ -13,7 +13,7 @@
 namespace tangere {
 
 /// `format_version` of shards: written, and required in checks and merges.
-inline constexpr std::int64_t kDatasetFormat = 4;
+inline constexpr std::int64_t kDatasetFormat = 5;
 /// `format` of all of them.
 inline constexpr const char* kFormatName = "tangere dataset";
 
@@ -47,6 +47,9 @@ struct SampleSaid {
 /// Returns them in the order of the file; most have none. `every`: steps of a row; `rows`: R.
 /// Throws IoError for times that contradict them.
 std::vector<SampleSaid> samples_said(const h5::Id& scene, std::int64_t every, std::int64_t rows);
+
+/// Returns the stored observations that are touch. Throws IoError if /scene has no such list.
+std::vector<std::string> touch_said(const h5::Id& scene);
 
 /// Returns the numbers of the demos in an open /data, ascending.
 std::vector<std::int64_t> demo_numbers(const h5::Id& data);

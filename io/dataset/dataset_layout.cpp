@@ -133,6 +133,24 @@ std::vector<std::string> DatasetLayout::all_observation_names() const {
   return names;
 }
 
+std::vector<std::size_t> DatasetLayout::touch() const {
+  const auto perfect = [](const SensorLayout& sensor) { return sensor.imperfections.empty(); };
+  std::vector<std::string> names;
+  if (task && std::all_of(sensors.begin(), sensors.end(), perfect))
+    for (const TensorSpec& tensor : task->observations)
+      if (tensor.touch) names.push_back(tensor.name);
+  for (const FieldOutput of : fields) {
+    const SensorLayout& sensor = sensors[static_cast<std::size_t>(of.sensor)];
+    if (perfect(sensor) || of.form == FieldForm::ideal || of.form == FieldForm::markers)
+      names.push_back(output_name(sensor.name, of.form));
+  }
+  const std::vector<std::string> stored = observation_names();
+  std::vector<std::size_t> places;
+  for (std::size_t k = 0; k < stored.size(); ++k)
+    if (std::find(names.begin(), names.end(), stored[k]) != names.end()) places.push_back(k);
+  return places;
+}
+
 std::vector<std::vector<std::uint64_t>> DatasetLayout::observation_shapes() const {
   return chosen(all_shapes(), recorded());
 }

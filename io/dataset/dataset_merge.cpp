@@ -39,7 +39,7 @@ std::uint64_t scramble(std::uint64_t x) {
 struct MaskedDemo {
   std::int64_t number = 0;
   std::optional<EpisodeEnd> end;  // of a task
-  bool valid = false;
+  bool touches = false, valid = false;
 };
 
 /// Writes both; numbers stay where they are unless they are to be copied.
@@ -104,6 +104,7 @@ class Merger {
     if (!h5::read_text(scene, "task").starts_with("none"))
       policies_ = h5::read_texts(scene, "policies");
     env_args_ = h5::read_text(h5::open_group(from, "data"), "env_args");
+    feels_ = !touch_said(scene).empty();
     h5::copy_group(from, "scene", file_.file(), "scene");
   }
 
@@ -128,7 +129,8 @@ class Merger {
     for (const std::int64_t number : demo_numbers(data)) {
       check_stop();
       batch.push_back(described(shard, data, number));
-      demos_.push_back({number, batch.back().facts.end});
+      const DemoFacts& facts = batch.back().facts;
+      demos_.push_back({number, facts.end, facts.touching.value_or(0) > 0});
       if (batch.size() == kBatch) put(data, name, batch);
     }
     put(data, name, batch);
@@ -209,8 +211,8 @@ class Merger {
     result_.failed = std::ssize(failed_);
   }
 
-  /// Filter keys of robomimic: demos to train on and to validate, those that solved the task,
-  /// and, if several policies played, the demos of each.
+  /// Filter keys of robomimic: demos to train on and to validate, those that feel something, those
+  /// that solved the task, and, if several policies played, the demos of each.
   void write_masks() {
     std::vector<std::pair<std::uint64_t, std::size_t>> order;
     for (std::size_t i = 0; i < demos_.size(); ++i)
@@ -227,13 +229,19 @@ class Merger {
       h5::write_names(masks, name, "demo_", list);
       return std::ssize(list);
     };
-    const auto solved = [](const MaskedDemo& demo) { return demo.end->success; };
+    const auto write_parts = [&](const std::string& name, const auto& has) {
+      write("train_" + name, [&](const MaskedDemo& demo) { return !demo.valid && has(demo); });
+      write("valid_" + name, [&](const MaskedDemo& demo) { return demo.valid && has(demo); });
+      return write(name, has);
+    };
     result_.train = write("train", [](const MaskedDemo& demo) { return !demo.valid; });
     result_.valid = write("valid", [](const MaskedDemo& demo) { return demo.valid; });
+    if (feels_)
+      result_.touching =
+          write_parts("touching", [](const MaskedDemo& demo) { return demo.touches; });
     if (policies_.empty()) return;
-    result_.successes = write("success", solved);
-    write("train_success", [&](const MaskedDemo& demo) { return !demo.valid && solved(demo); });
-    write("valid_success", [&](const MaskedDemo& demo) { return demo.valid && solved(demo); });
+    result_.successes =
+        write_parts("success", [](const MaskedDemo& demo) { return demo.end->success; });
     for (std::size_t k = 0; k < policies_.size() && policies_.size() > 1; ++k)
       write(policies_[k], [k](const MaskedDemo& demo) {
         return static_cast<std::size_t>(demo.end->policy) == k;
@@ -246,6 +254,7 @@ class Merger {
   h5::Id copied_;  // group of demos
   std::string env_args_;
   bool few_each_ = false;  // episodes in a shard
+  bool feels_ = false;     // touch is stored
   std::optional<DemoMembers> members_;
   std::optional<MinariView> view_;
   std::vector<MaskedDemo> demos_;                            // ascending

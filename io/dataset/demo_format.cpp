@@ -24,6 +24,7 @@ DemoAttributes::DemoAttributes(const DemoFacts& facts) : samples_(bytes_of_numbe
   terminated_ = bytes_of_number<std::int8_t>(end.terminated ? 1 : 0);
   success_ = bytes_of_number<std::int8_t>(end.success ? 1 : 0);
   policy_ = bytes_of_number<std::int64_t>(end.policy);
+  touching_ = bytes_of_number<std::int64_t>(facts.touching.value_or(0));
   all_.push_back({"num_samples", h5::NumberType::int64, false, samples_});
   if (facts.end) {
     all_.push_back({"return", h5::NumberType::float64, false, total_});
@@ -31,6 +32,7 @@ DemoAttributes::DemoAttributes(const DemoFacts& facts) : samples_(bytes_of_numbe
     all_.push_back({"success", h5::NumberType::int8, false, success_});
     all_.push_back({"policy", h5::NumberType::int64, false, policy_});
   }
+  if (facts.touching) all_.push_back({"touching", h5::NumberType::int64, false, touching_});
   const std::span randomized(reinterpret_cast<const unsigned char*>(facts.randomized.data()),
                              facts.randomized.size() * sizeof(double));
   if (!randomized.empty())
@@ -39,8 +41,10 @@ DemoAttributes::DemoAttributes(const DemoFacts& facts) : samples_(bytes_of_numbe
 
 DemoFormat::DemoFormat(const DatasetLayout& layout)
     : of_task_(layout.task.has_value()),
+      single_(layout.single),
       randomized_(layout.randomized_names.size()),
       names_(layout.observation_names()),
+      touch_(layout.touch()),
       sources_(layout.recorded()),
       samples_(layout.samples()),
       plans_(chunk_plans(layout)) {
@@ -80,8 +84,9 @@ DemoFormat::DemoFormat(const DatasetLayout& layout)
                                          h5::bytes_of(types_[k]), std::multiplies<>()));
   filters_ = file_filters(layout.compression, h5::bytes_of(number));
   h5::Bytes of_one;
-  DemoFacts facts{1, std::nullopt, std::vector<double>(randomized_)};
+  DemoFacts facts{1, std::nullopt, std::vector<double>(randomized_), std::nullopt};
   if (of_task_) facts.end.emplace();
+  if (!touch_.empty()) facts.touching = 0;
   static_cast<void>(describe(of_one, 0, facts, std::vector<std::uint64_t>(datasets()), 0));
   header_bytes_ = of_one.size();
 }

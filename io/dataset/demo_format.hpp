@@ -18,9 +18,10 @@ namespace tangere {
 
 /// What the attributes of a demo's group say.
 struct DemoFacts {
-  std::int64_t rows = 0;           ///< R
-  std::optional<EpisodeEnd> end;   ///< of a task
-  std::vector<double> randomized;  ///< as many as the layout has names
+  std::int64_t rows = 0;                 ///< R
+  std::optional<EpisodeEnd> end;         ///< of a task
+  std::vector<double> randomized;        ///< as many as the layout has names
+  std::optional<std::int64_t> touching;  ///< rows of obs in which something is felt; none: untold
 };
 
 /// The same facts as attributes of the group. all() refers to the given facts and to this object.
@@ -32,7 +33,7 @@ class DemoAttributes {
   [[nodiscard]] std::span<const h5::FileAttribute> all() const { return all_; }
 
  private:
-  std::array<unsigned char, 8> samples_, total_, policy_;
+  std::array<unsigned char, 8> samples_, total_, policy_, touching_;
   std::array<unsigned char, 1> terminated_, success_;
   std::vector<h5::FileAttribute> all_;
 };
@@ -63,11 +64,15 @@ class DemoFormat {
   [[nodiscard]] std::int64_t rows_of(std::size_t dataset, std::int64_t rows) const;
   /// Rows of a chunk in a demo of `rows`; 0: contiguous.
   [[nodiscard]] std::int64_t chunk_rows(std::size_t dataset, std::int64_t rows) const;
+  /// Whether observations are float32, else float64.
+  [[nodiscard]] bool single() const { return single_; }
   /// How an observation is cut into chunks.
   [[nodiscard]] const ChunkPlan& plan(std::size_t dataset) const {
     if (dataset >= sample(0)) return plans_[names_.size() + dataset - sample(0)];
     return plans_[(dataset - kFirst) % names_.size()];
   }
+  /// The observations that are touch, ascending.
+  [[nodiscard]] const std::vector<std::size_t>& touch() const { return touch_; }
   /// Index of an observation in pieces of episodes.
   [[nodiscard]] std::size_t source(std::size_t name) const { return sources_[name]; }
   [[nodiscard]] std::size_t source_of_gradient(std::size_t k) const { return gradient_sources_[k]; }
@@ -96,10 +101,10 @@ class DemoFormat {
   void describe_dataset(h5::Bytes& out, std::size_t dataset, std::int64_t rows,
                         std::uint64_t address, std::span<const h5::FileText> texts = {}) const;
 
-  bool of_task_;
+  bool of_task_, single_;
   std::size_t randomized_;
   std::vector<std::string> names_, titles_;  // of observations; of datasets
-  std::vector<std::size_t> sources_, gradient_sources_;
+  std::vector<std::size_t> touch_, sources_, gradient_sources_;
   std::vector<GradientArray> gradients_;  // by name
   std::vector<DatasetSample> samples_;
   std::vector<ChunkPlan> plans_;                    // per observation, then per sample

@@ -140,6 +140,7 @@ DemoMembers members_of(const h5::Id& demo) {
   if (members.of_task)
     members.policies = std::ssize(h5::read_texts(h5::open_group(demo, "/scene"), "policies"));
   members.varies = std::binary_search(said.begin(), said.end(), "randomized");
+  members.feels = std::binary_search(said.begin(), said.end(), "touching");
   return members;
 }
 
@@ -161,6 +162,10 @@ DemoFacts facts_of(const h5::Id& demo, const DemoMembers& members) {
                            static_cast<int>(policy)};
   }
   if (members.varies) facts.randomized = h5::read_numbers<double>(demo, "randomized");
+  if (members.feels) facts.touching = h5::read_number<std::int64_t>(demo, "touching");
+  if (const std::int64_t felt = facts.touching.value_or(0); felt < 0 || felt > facts.rows)
+    throw IoError(
+        fmt::format("something is felt in {} of its rows; expected 0 to {}", felt, facts.rows));
   return facts;
 }
 

@@ -2,8 +2,12 @@
 // The names are those of the Python package, tangere.gym.
 #include "io/dataset/learner_notes.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <nlohmann/json.hpp>
+
+#include "engine/base/error.hpp"
 
 namespace tangere {
 namespace {
@@ -76,6 +80,21 @@ std::string privileged_observations(const DatasetLayout& layout) {
   for (const std::string& name : layout.observation_names())
     if (std::find(hidden.begin(), hidden.end(), name) != hidden.end()) names.push_back(name);
   return text_of(names);
+}
+
+std::string touch_observations(const DatasetLayout& layout) {
+  const std::vector<std::string> stored = layout.observation_names();
+  Json names = Json::array();
+  for (const std::size_t k : layout.touch()) names.push_back(stored[k]);
+  return text_of(names);
+}
+
+std::vector<std::string> names_in(const std::string& list) {
+  const Json names = Json::parse(list, nullptr, false);
+  const bool strings = names.is_array() && std::all_of(names.begin(), names.end(),
+                                                       [](const Json& n) { return n.is_string(); });
+  if (!strings) throw IoError(fmt::format("{} is no list of names", list));
+  return names.get<std::vector<std::string>>();
 }
 
 }  // namespace tangere

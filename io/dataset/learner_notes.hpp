@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // What a learner is told besides numbers: the environment that a data set was played in, sizes to
-// divide observations by, and what a robot could not measure. All of it is JSON text, which
-// robomimic and Minari store as it is.
+// divide observations by, what a robot could not measure, and what it feels. All of it is JSON
+// text, which robomimic and Minari store as it is.
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "io/dataset/dataset_layout.hpp"
 
@@ -28,5 +29,11 @@ std::string observation_scale(const DatasetLayout& layout);
 /// [KEY, …] of the stored observations that a robot could not measure: q, v and what a task
 /// declares as privileged.
 std::string privileged_observations(const DatasetLayout& layout);
+
+/// [KEY, …] of the stored observations that are touch, DatasetLayout::touch().
+std::string touch_observations(const DatasetLayout& layout);
+
+/// The names in such a list. Throws IoError for another text.
+std::vector<std::string> names_in(const std::string& list);
 
 }  // namespace tangere

@@ -142,6 +142,29 @@ class Cutter {
   std::vector<unsigned char> tile_;
 };
 
+/// Whether one of the numbers is not 0.
+template <class T>
+bool any(const unsigned char* bytes, std::size_t count) {
+  const auto* const numbers = reinterpret_cast<const T*>(bytes);
+  return std::any_of(numbers, numbers + count / sizeof(T), [](T x) { return x != T{0}; });
+}
+
+/// Rows of obs in which an observation that is touch is not all zero.
+std::int64_t touching_rows(const DemoFormat& format, const std::vector<PieceSlice>& slices) {
+  if (format.touch().empty()) return 0;
+  const auto felt = [&](std::int64_t row, std::size_t name) {
+    const PieceSlice& slice = slices[format.obs(name)];
+    const std::size_t bytes = slice.rows.row_bytes;
+    const unsigned char* const at = slice.data + as_size(row) * bytes;
+    return format.single() ? any<float>(at, bytes) : any<double>(at, bytes);
+  };
+  std::int64_t count = 0;
+  for (std::int64_t row = 0; row < slices[format.obs(format.touch()[0])].rows.rows; ++row)
+    count += std::any_of(format.touch().begin(), format.touch().end(),
+                         [&](std::size_t name) { return felt(row, name); });
+  return count;
+}
+
 }  // namespace
 
 std::int64_t rows_of_episode(const DatasetLayout& layout, const EpisodeRows& piece, int episode) {
@@ -183,6 +206,7 @@ PreparedPiece prepare_piece(const DatasetLayout& layout, const DemoFormat& forma
   for (int e = 0; e < piece.episodes; ++e) {
     const std::int64_t rows = rows_of_episode(layout, piece, e);
     const std::vector<PieceSlice> slices = slices_of(format, piece, e, rows);
+    prepared.touching.push_back(touching_rows(format, slices));
     for (std::size_t dataset = 0; dataset < slices.size(); ++dataset) {
       const PlacedRows& r = slices[dataset].rows;
       if (r.rows == 0) continue;

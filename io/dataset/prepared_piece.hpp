@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Work on a piece of episodes that any thread can do before the single writing thread gets it:
-// checksums and compressed chunks.
+// checksums, compressed chunks, and the rows in which something is felt.
 #pragma once
 
 #include <array>
@@ -50,7 +50,8 @@ struct PreparedChunk {
 };
 
 struct PreparedPiece {
-  std::vector<ContentSum> sums;  ///< per episode
+  std::vector<ContentSum> sums;        ///< per episode
+  std::vector<std::int64_t> touching;  ///< per episode: rows of obs in which something is felt
   std::vector<PreparedChunk> chunks;
 };
 

@@ -92,6 +92,7 @@ class ShardChecker {
     content_.first_episode = within(file_, "first_episode", 0);
     end_ = content_.first_episode + within(file_, "episodes", 0);
     names_ = h5::read_texts(scene_, "observations");
+    touch_ = touch_said(scene_);
     single_ = h5::read_text(scene_, "observation_type") == "float32";
     const std::int64_t steps = within(scene_, "steps", 1), every = within(scene_, "every", 1);
     if (steps < every)
@@ -164,15 +165,18 @@ class ShardChecker {
     check_list<std::int8_t>(demo, "dones", episode, rows, 1);
     add<float>(demo, "actions", episode, 0, 0, rows);
     const h5::Id obs = h5::open_group(demo, "obs"), final_obs = h5::open_group(demo, "final_obs");
+    felt_.assign(touch_.empty() ? 0 : static_cast<std::size_t>(rows), 0);
     for (std::size_t k = 0; k < names_.size(); ++k) {
+      const bool touch = std::find(touch_.begin(), touch_.end(), names_[k]) != touch_.end();
       if (single_) {
-        add<float>(obs, names_[k], episode, k + 1, 0, rows);
+        add<float>(obs, names_[k], episode, k + 1, 0, rows, touch);
         add<float>(final_obs, names_[k], episode, k + 1, rows, 1);
       } else {
-        add<double>(obs, names_[k], episode, k + 1, 0, rows);
+        add<double>(obs, names_[k], episode, k + 1, 0, rows, touch);
         add<double>(final_obs, names_[k], episode, k + 1, rows, 1);
       }
     }
+    if (!touch_.empty()) check_felt(demo, episode);
     for (std::size_t k = 0; k < gradients_.size(); ++k)
       add_gradient(demo, gradients_[k], episode, names_.size() + 2 + k, rows);
     for (std::size_t k = 0; k < samples_.size(); ++k)
@@ -184,6 +188,14 @@ class ShardChecker {
                 : check_next<double>(demo, name, episode, rows);
     content_.rows += rows;
     ++content_.demos;
+  }
+
+  void check_felt(const h5::Id& demo, std::int64_t episode) {
+    const std::int64_t said = number(demo, "touching"),
+                       there = std::count(felt_.begin(), felt_.end(), 1);
+    if (said != there)
+      fail(fmt::format("demo_{}: 'touching' is {}; something is felt in {} of its rows", episode,
+                       said, there));
   }
 
   void add_sample(const h5::Id& samples, const SampleSaid& said, std::int64_t episode,
@@ -281,10 +293,11 @@ class ShardChecker {
                                       name, first + static_cast<std::int64_t>(at / width), *bad));
   }
 
-  /// Adds a dataset whose row 0 is row `first` of the episode.
+  /// Adds a dataset whose row 0 is row `first` of the episode. If it is `touch`, marks the rows
+  /// that are not all zero.
   template <class T>
   void add(const h5::Id& group, const std::string& name, std::int64_t episode, std::size_t index,
-           std::int64_t first, std::int64_t rows) {
+           std::int64_t first, std::int64_t rows, bool touch = false) {
     const h5::Id dataset = h5::open_dataset(group, name);
     const std::string full = fmt::format("demo_{}: {}", episode, name);
     if (!has_rows(dataset, full, rows)) return;
@@ -301,6 +314,8 @@ class ShardChecker {
       buffer.resize(count[0] * width);
       h5::read_box(dataset, offset, count, buffer.data());
       check_finite(buffer, full, first + row, width);
+      for (std::size_t i = 0; touch && i < buffer.size(); ++i)
+        if (buffer[i] != T{0}) felt_[static_cast<std::size_t>(row) + i / width] = 1;
       sum_.add(episode, index, first + row, static_cast<std::int64_t>(count[0]), width * sizeof(T),
                buffer.data());
     }
@@ -309,7 +324,8 @@ class ShardChecker {
   bool finite_;
   std::vector<std::string> problems_, not_finite_;
   h5::Id file_, scene_;
-  std::vector<std::string> names_;
+  std::vector<std::string> names_, touch_;  // of observations; of those that are touch
+  std::vector<char> felt_;                  // per row of the demo at hand
   std::vector<GradientSaid> gradients_;
   std::vector<SampleSaid> samples_;
   bool single_ = false, of_task_ = false;

@@ -70,6 +70,7 @@ ShardFile::Block& ShardFile::block_of(const EpisodeRows& rows) {
     if (!rows.randomized.empty())
       std::copy_n(rows.randomized.begin() + static_cast<std::ptrdiff_t>(i * varied), varied,
                   demo.facts.randomized.begin());
+    if (!format_.touch().empty()) demo.facts.touching = 0;
     demo.addresses.resize(format_.datasets(), h5::kNowhere);
     demo.held.resize(format_.datasets());
     demo.chunks.resize(format_.datasets());
@@ -97,8 +98,9 @@ void ShardFile::give_place(Block& block, std::int64_t first_episode) {
 void ShardFile::write(const EpisodeRows& rows, PreparedPiece prepared) {
   Block& block = block_of(rows);
   for (int e = 0; e < rows.episodes; ++e) {
-    const ContentSum& sum = prepared.sums[static_cast<std::size_t>(e)];
-    block.demos[static_cast<std::size_t>(e)].sum.add(sum);
+    const auto i = static_cast<std::size_t>(e);
+    block.demos[i].sum.add(prepared.sums[i]);
+    if (block.demos[i].facts.touching) *block.demos[i].facts.touching += prepared.touching[i];
     write_slices(block, rows, e);
   }
   placed_.flush();

@@ -24,6 +24,8 @@ void add_tasks(nb::module_& m) {
       .def_ro("scale", &TensorSpec::scale,
               "Typical sizes in `unit`: one, or one per place on the last axis. Empty: 1.")
       .def_ro("privileged", &TensorSpec::privileged, "A robot could not measure it.")
+      .def_ro("touch", &TensorSpec::touch,
+              "What pads feel: all numbers are 0 where nothing is felt.")
       .def("__repr__", [](const TensorSpec& t) {
         return fmt::format("TensorSpec('{}', ({}), '{}')", t.name, fmt::join(t.shape, ", "),
                            t.unit);

@@ -90,9 +90,11 @@ class Episodes:
             self.task = ""
         self.scale: dict[str, Any] = {key: 1.0 for key in self.keys}
         self.privileged = [key for key in ("q", "v") if key in self.keys]
+        self.touch: list[str] = []
         if "observation_scale" in scene:  # format version 4 on
             self.scale.update(json.loads(scene["observation_scale"]))
             self.privileged = json.loads(scene["privileged"])
+            self.touch = json.loads(scene.get("touch", "[]"))  # format version 5 on
         elif self.task:
             raise _core.InputError(
                 f"{self.path}: a data set of an older version, without scales of observations; "
@@ -121,6 +123,18 @@ class Episodes:
     def succeeded(self) -> list[int]:
         """The episodes that ended in success."""
         return [i for i in range(len(self)) if self._demo(i).attrs.get("success", 0) == 1]
+
+    def felt(self) -> np.ndarray:
+        """Rows of each episode in which something is felt, (episodes) int64.
+
+        Raises InputError if the data set has no observation that is touch.
+        """
+        if not self.touch:
+            raise _core.InputError(
+                f"{self.path} does not say where something is felt; expected a data set of format "
+                "version 5 that stores touch"
+            )
+        return np.array([int(self._demo(i).attrs["touching"]) for i in range(len(self))])
 
     def terminated(self, episode: int) -> bool:
         """Whether the task ended the episode; False if it ran out of time, and for a scene."""

@@ -203,3 +203,21 @@ def test_mistakes_are_told(pushes, tmp_path):
         Windows(tmp_path)
     with pytest.raises(tangere.InputError, match="no 'grad_actions'"):
         Windows(pushes, gradients=["grad_actions"])[0]
+
+
+def test_rows_in_which_something_is_felt(pushes, generate):
+    episodes = Episodes(pushes)
+    assert episodes.touch == ["tactile"]
+    expected = [int(np.any(episodes[i]["tactile"] != 0, axis=(1, 2, 3)).sum()) for i in range(20)]
+    np.testing.assert_array_equal(episodes.felt(), expected)
+    assert 0 < min(expected) and max(expected) < 100
+    random = Episodes(generate("box_pushing", "--episodes", "20", "--policy", "random"))
+    felt = random.felt()
+    assert 0 < (felt > 0).sum() < 20
+    assert random.mask("touching") == list(np.flatnonzero(felt))
+    both = set(random.mask("train_touching")) | set(random.mask("valid_touching"))
+    assert both == set(random.mask("touching"))
+    blind = Episodes(generate("box_pushing_reduced", "--episodes", "4"))
+    assert blind.touch == []
+    with pytest.raises(tangere.InputError, match="does not say where something is felt"):
+        blind.felt()

@@ -229,6 +229,7 @@ TaskSpec declare_box_pushing(PushObservation observation, Friction friction) {
   spec.looks_at_end_effectors = true;
   if (observation == PushObservation::tactile) {
     spec.observations.push_back({"tactile", {13, 10, 3}, "N", "field of the pad", tactile_scale});
+    spec.observations.back().touch = true;
     spec.looks_at_tactile = true;
   } else if (observation == PushObservation::privileged) {
     spec.name = "box_pushing_privileged";

@@ -251,6 +251,7 @@ TaskSpec declare_cap_opening(CapObservation observation, Friction friction) {
          "N",
          "fields of the tips: rows up, columns to the left, zero where no point is",
          {0.1, 0.1, 0.4}});
+    spec.observations.back().touch = true;
   } else {
     spec.name = "cap_opening_blind";
     spec.summary = "The same; angles and fingertips alone are observed.";

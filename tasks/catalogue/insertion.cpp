@@ -352,6 +352,7 @@ TaskSpec declare_insertion(InsertionMotion motion, Friction friction) {
                         {},
                         -1,
                         1}};
+  spec.observations.back().touch = true;
   spec.steps_per_action = kSteps;
   spec.control_every = 1;
   spec.moments = {6, 44, kSteps};

@@ -244,6 +244,7 @@ TaskSpec declare_stable_grasp(Friction friction) {
        {},
        -1,
        1}};
+  spec.observations.back().touch = true;
   spec.steps_per_action = kSteps;
   spec.control_every = 1;
   spec.moments = {kLook, kSteps};

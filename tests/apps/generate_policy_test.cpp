@@ -130,7 +130,8 @@ TEST(GeneratePolicy, MasksNameTheDemosThatSolvedTheTask) {
                 .exit_code,
             0);
   const h5::Id balls = h5::open_file(folder.path("balls/robomimic.hdf5"));
-  EXPECT_THAT(h5::link_names(h5::open_group(balls, "mask")), ElementsAre("train", "valid"))
+  EXPECT_THAT(h5::link_names(h5::open_group(balls, "mask")),
+              ElementsAre("touching", "train", "train_touching", "valid", "valid_touching"))
       << "a scene alone has no success";
 }
 

@@ -104,8 +104,10 @@ with h5py.File("set/robomimic.hdf5", swmr=True, libver="latest") as f:  # as rob
     shapes = {"grad_state_by_action": (6, states, na)}
     for i in range(20):
         demo = f["data/demo_%d" % i]
-        assert len(demo.attrs) == 2 and demo.attrs["num_samples"] == 6, dict(demo.attrs)
+        assert len(demo.attrs) == 3 and demo.attrs["num_samples"] == 6, dict(demo.attrs)
         assert len(demo.attrs["randomized"]) == len(f["scene"].attrs["randomized_names"])
+        felt = np.any(demo["obs/pad"][:] != 0, axis=(1, 2, 3))
+        assert demo.attrs["touching"] == felt.sum(), (i, felt)
         for name in said:
             d = demo[name]
             assert d.dtype == "<f8" and d.shape == shapes.get(name, (6, states, states)), (name, d)

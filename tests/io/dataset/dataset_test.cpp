@@ -132,7 +132,7 @@ TEST(Dataset, SaysWhatItsNumbersAre) {
     return h5::read_numbers<std::int64_t>(object, name).at(0);
   };
   EXPECT_EQ(h5::read_text(file, "format"), "tangere dataset");
-  EXPECT_EQ(whole(file, "format_version"), 4);
+  EXPECT_EQ(whole(file, "format_version"), 5);
   EXPECT_EQ(whole(file, "first_episode"), 0);
   EXPECT_EQ(whole(file, "episodes"), 20);
   EXPECT_EQ(whole(file, "dataset_episodes"), 20);
@@ -145,6 +145,7 @@ TEST(Dataset, SaysWhatItsNumbersAre) {
   EXPECT_EQ(h5::read_text(scene, "dataset_id"), "tangere/syn--thetic--v0");
   EXPECT_EQ(h5::read_text(scene, "observation_scale"), "{}");
   EXPECT_EQ(h5::read_text(scene, "privileged"), R"(["q","v"])");
+  EXPECT_EQ(h5::read_text(scene, "touch"), R"(["skin"])");
   EXPECT_EQ(h5::read_numbers<std::uint64_t>(scene, "seed").at(0), 18446744073709551615ULL);
   EXPECT_EQ(whole(scene, "steps"), 6);
   EXPECT_EQ(whole(scene, "every"), 2);

@@ -78,10 +78,10 @@ TEST_F(ShardCheck, FindsNothingInAWholeOne) { EXPECT_EQ(complaint(), ""); }
 
 /// Earlier formats have other names and units for the scene's numbers, or another checksum.
 TEST_F(ShardCheck, RefusesEarlierFormats) {
-  for (const std::int64_t version : {1, 2, 3}) {
+  for (const std::int64_t version : {1, 2, 3, 4}) {
     change([&](hid_t file) { set(file, "/", "format_version", version); });
     EXPECT_THAT(complaint(), HasSubstr("its format_version is " + std::to_string(version) +
-                                       "; expected 4 (generate the data set again)"));
+                                       "; expected 5 (generate the data set again)"));
   }
 }
 
