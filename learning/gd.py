@@ -15,7 +15,10 @@ sees how large an episode's G_e is: the loop may amplify derivatives, and then o
 update.
 
 Every 10 updates the policy plays 300 goals of another seed. The one with the least mean error,
-|Δp|/0.1 m + |Δθ|/0.276 rad in the reward's own proportion, is kept and tested on fresh goals.
+|Δp|/0.1 m + |Δθ|/0.276 rad in the reward's own proportion, is kept and tested on fresh goals. A few
+updates can spoil a policy so far that the run never recovers. With `--back k`, a policy with more
+than k times the least error is given up: the run goes on from the best one, with a forgetful
+optimiser and SLOWER times its rate.
 Prints the mean errors in place [m] and yaw [rad].
 """
 
@@ -36,6 +39,7 @@ import tangere
 import tangere.torch
 
 CHOICE_EVERY = 10  # updates
+SLOWER = 0.7  # of the rate, each time a run goes back to its best policy
 
 
 def small_policy(inputs: int, actions: int) -> nn.Module:
@@ -51,7 +55,7 @@ def act(policy: nn.Module, obs: torch.Tensor, gains: torch.Tensor) -> torch.Tens
 def touch_gains(spec: tangere.TaskSpec, gain: float) -> torch.Tensor:
     """(n): `gain` where an observation is touch, else 1."""
     parts = [
-        torch.full((int(np.prod(t.shape)),), gain if t.name == "tactile" else 1.0)
+        torch.full((int(np.prod(t.shape)),), gain if t.touch else 1.0)
         for t in spec.observations
     ]
     return torch.cat(parts)
@@ -115,6 +119,8 @@ def settings() -> argparse.Namespace:
     parser.add_argument("--touch", type=float, default=1.0, help="factor of what is felt")
     limit = "most that an episode counts, in medians of the update's episodes; 0: no limit"
     parser.add_argument("--limit", type=float, default=0.0, help=limit)
+    back = "errors, in those of the best policy, from which the run goes back to it; 0: never"
+    parser.add_argument("--back", type=float, default=0.0, help=back)
     average = "decay of the average of weights that is played; 0: the last weights"
     parser.add_argument("--average", type=float, default=0.0, help=average)
     parser.add_argument("--goals", type=int, default=1000, help="to test on")
@@ -134,8 +140,10 @@ def main() -> None:
     policy = small_policy(len(gains), tape.spec.action.shape[0])
     shown = copy.deepcopy(policy)
     optimiser = torch.optim.Adam(policy.parameters(), lr=asked.rate, betas=(0.7, 0.95))
+    went_back: list[int] = []  # after which updates
     schedule = torch.optim.lr_scheduler.LambdaLR(
-        optimiser, lambda k: 1 - (1 - 1e-5 / asked.rate) * k / asked.updates
+        optimiser,
+        lambda k: SLOWER ** len(went_back) * (1 - (1 - 1e-5 / asked.rate) * k / asked.updates),
     )
     still = {"flatten": True, "autoreset": "disabled", "threads": asked.threads}
     choice = tangere.make_vec(asked.task, CHOICE_EPISODES, **still)
@@ -156,6 +164,11 @@ def main() -> None:
         chosen.append([k + 1, played["return"], played["position_m"], played["yaw_rad"]])
         if merit(played) > best:
             best, kept = merit(played), copy.deepcopy(shown)
+        elif asked.back and kept is not None and not merit(played)[0] > asked.back * best[0]:
+            went_back.append(k + 1)
+            policy.load_state_dict(kept.state_dict())
+            shown.load_state_dict(kept.state_dict())
+            optimiser.state.clear()
         errors = f"{played['position_m']:.3f} m, {played['yaw_rad']:.3f} rad"
         print(f"update {k + 1}: return {played['return']:.1f}, {errors}, "
               f"gradient norm {float(norm):.3g}", file=sys.stderr, flush=True)  # fmt: skip
@@ -168,7 +181,8 @@ def main() -> None:
     if asked.json:
         print(json.dumps({"program": "gd", "settings": vars(asked), **provenance(), **trained,
                           "steps": asked.updates * asked.envs * tape.actions,
-                          "curve": curve, "choice": chosen, "test": result}))  # fmt: skip
+                          "curve": curve, "choice": chosen, "went_back": went_back,
+                          "test": result}))  # fmt: skip
         return
     print(
         f"{asked.task}, seed {asked.seed}: {result['position_m']:.3f} m, "
