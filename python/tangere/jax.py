@@ -83,8 +83,8 @@ class Tape:
         dtype: Any = jnp.float32,
         scene: _core.Scene | str | Path | None = None,
     ):
-        self.num_envs, self.flatten, self.dtype = num_envs, flatten, np.dtype(dtype)
-        if self.dtype == np.float64 and _real() != np.float64:
+        self.num_envs, self.flatten = num_envs, flatten
+        if np.dtype(dtype) == np.float64 and _real() != np.float64:
             raise _core.InputError("observations of float64 need jax_enable_x64")
         self.tape = _core.TaskTape(
             task,
@@ -98,7 +98,7 @@ class Tape:
         )
         self.spec = self.tape.spec
         self.actions = actions or self.spec.horizon
-        self._host = _Host(self.tape, self.dtype)
+        self._host = _Host(self.tape, dtype)
 
     def reset(self, seed: Any = 0, first_episode: Any = 0) -> tuple[State, Observations]:
         """Starts the episodes; returns the first observations, which have no derivative.
@@ -107,9 +107,8 @@ class Tape:
         again.
         """
         given = [_integer(seed, "seed"), _integer(first_episode, "first_episode")]
-        token, rows, _, alive, success = _call(
-            self._host.reset, self._host.shown(), *given, effect=True
-        )
+        host = self._host
+        token, rows, _, alive, success = _call(host.reset, host.shown, *given, effect=True)
         return State(token, alive, success), self._split(rows)
 
     def step(self, state: State, actions: jax.Array) -> tuple[State, Observations, jax.Array]:
@@ -120,13 +119,11 @@ class Tape:
         serves one step. InputError: another shape. RuntimeError: an action that is not finite, one
         too many, or a state that is not the last one of the tape.
         """
-        actions = jnp.asarray(actions)
-        expected = (self.num_envs, *self.spec.action.shape)
-        if actions.shape != expected:
-            raise _core.InputError(f"actions of shape {actions.shape}; expected {expected}")
-        token, rows, reward, alive, success = _step(
-            self._host, state.token, actions.astype(_real())
-        )
+        actions, expected = jnp.asarray(actions), self._host.actions
+        if actions.shape != expected.shape:
+            raise _core.InputError(f"actions of shape {actions.shape}; expected {expected.shape}")
+        actions = actions.astype(expected.dtype)
+        token, rows, reward, alive, success = _step(self._host, state.token, actions)
         return State(token, alive, success), self._split(rows), reward
 
     def play(
@@ -192,11 +189,12 @@ def _real() -> Any:
 
 
 def _integer(value: Any, name: str) -> jax.Array:
-    if not isinstance(value, jax.Array):
-        value = jnp.asarray(operator.index(value))  # OverflowError: it needs jax_enable_x64
-    if value.shape != () or not jnp.issubdtype(value.dtype, jnp.integer):
-        raise _core.InputError(f"{name} of {value.dtype} {value.shape}; expected an integer")
-    return value
+    if isinstance(value, jax.Array) and value.shape == () and value.dtype.kind in "iu":
+        return value
+    largest = np.iinfo(jnp.zeros((), int).dtype).max
+    if not 0 <= operator.index(value) <= largest:
+        raise _core.InputError(f"{name} {value}; expected 0 to {largest} (see jax_enable_x64)")
+    return jnp.asarray(operator.index(value))
 
 
 def _call(callback: Any, results: Any, *arguments: Any, effect: bool = False) -> Any:
@@ -220,7 +218,9 @@ def _call(callback: Any, results: Any, *arguments: Any, effect: bool = False) ->
 
     @smooth.defjvp  # type: ignore[untyped-decorator]
     def refuse_jvp(*_: Any) -> Any:
-        raise _core.InputError("a tape has first derivatives in reverse mode; others are asked for")
+        raise _core.InputError(
+            "forward-mode or second derivatives through a tape; it has first ones in reverse mode"
+        )
 
     return smooth(*arguments)
 
@@ -228,25 +228,21 @@ def _call(callback: Any, results: Any, *arguments: Any, effect: bool = False) ->
 class _Host:
     """The side of the simulator. XLA may call it from any thread, so a lock guards each call.
 
-    A token (run, action) of float32 passes from step to step, which makes XLA take them in order.
-    On the way back its derivative has the number of the pass, 0 where a pass begins. So whatever
-    does not follow the order of one run is found.
+    A token (run, action) of float32 passes from step to step, so that XLA takes them in order. On
+    the way back its derivative has the number of the pass, 0 where a pass begins. What does not
+    follow the order of one run is found by these two.
     """
 
     def __init__(self, tape: _core.TaskTape, dtype: Any):
-        self.tape, self.dtype, self.lock = tape, dtype, threading.Lock()
-        self.run = self.passing = 0
-        self.left: int | None = None  # the step reversed last; None: nothing is reversed
-
-    def shown(self) -> list[jax.ShapeDtypeStruct]:
-        """token, observations, rewards, alive, success."""
-        envs = self.tape.envs
-        n = sum(int(np.prod(t.shape)) for t in self.tape.spec.observations)
-        shapes = [(2,), (envs, n), (envs,), (envs,), (envs,)]
-        return [
-            jax.ShapeDtypeStruct(shape, dtype)
-            for shape, dtype in zip(shapes, [np.float32, self.dtype, _real(), np.bool_, np.bool_])
-        ]
+        self.tape, self.lock = tape, threading.Lock()
+        self.run = self.passing = 0  # up to 2**24, which float32 has
+        self.left: int | None = None  # actions not yet reversed; None: nothing is reversed
+        real = _real()
+        n = sum(int(np.prod(t.shape)) for t in tape.spec.observations)
+        envs, shape = tape.envs, jax.ShapeDtypeStruct
+        self.token, flags = shape((2,), np.float32), [shape((envs,), bool)] * 2
+        self.shown = [self.token, shape((envs, n), dtype), shape((envs,), real), *flags]
+        self.actions = shape((envs, *tape.spec.action.shape), real)
 
     def show(self, out: Any) -> None:
         tape = self.tape
@@ -255,11 +251,13 @@ class _Host:
         for to, value in zip(out, found):
             np.asarray(to)[...] = value
 
-    def reset(self, _: Any, out: Any, seed: Any, first_episode: Any) -> None:
+    def reset(self, _: Any, out: Any, *given: Any) -> None:
         with self.lock:
-            self.run = self.run % (1 << 24) + 1  # all of them are numbers of float32
-            self.left = None
-            self.tape.reset(int(np.asarray(seed)), int(np.asarray(first_episode)))
+            self.run, self.left = self.run % (1 << 24) + 1, None
+            seed, first_episode = (int(np.asarray(number)) for number in given)
+            if seed < 0:
+                raise _core.InputError(f"seed {seed}; expected at least 0")
+            self.tape.reset(seed, first_episode)
             self.show(out)
 
     def step(self, _: Any, out: Any, token: Any, actions: Any) -> None:
@@ -267,50 +265,47 @@ class _Host:
             if tuple(np.asarray(token)) != (self.run, self.tape.taken):
                 raise _core.InputError(
                     "a step from a state that is not the last one of its tape; take one step from "
-                    "each state, and one tape for each of the runs of a computation"
+                    "each state, and one tape for each run of a computation"
                 )
             self.tape.step(np.asarray(actions))
             self.show(out)
 
-    def reverse(self, _: Any, out: Any, token: Any, by_token: Any, by_rows: Any, by_reward: Any):
+    def reverse(self, _: Any, out: Any, token: Any, *by: Any) -> None:
+        by_token, by_rows, by_reward = (np.asarray(array) for array in by)
         with self.lock:
-            run, step = (int(number) for number in np.asarray(token))
-            passing = int(np.asarray(by_token)[0])
-            by_rows, by_reward = np.asarray(by_rows), np.asarray(by_reward)
+            (run, taken), passing = np.asarray(token), by_token[0]
             if run != self.run:
                 raise _core.InputError(
                     "derivatives of a run whose tape has begun another one; take one tape for each "
-                    "of the runs of a computation"
+                    "run of a computation"
                 )
             if passing == 0:
                 if self.left is not None:
                     self.tape.begin_reverse()
-                self.passing, self.left = self.passing % (1 << 24) + 1, self.tape.taken
-                passing = self.passing
-                while self.left > step + 1:  # later steps on which the loss does not hang
+                passing = self.passing = self.passing % (1 << 24) + 1
+                self.left = self.tape.taken
+                while self.left > taken:  # later steps on which the loss does not hang
                     self.tape.reverse(np.zeros_like(by_rows), np.zeros_like(by_reward))
                     self.left -= 1
-            if passing != self.passing or self.left != step + 1:
+            if passing != self.passing or self.left != taken:
                 raise _core.InputError("two ways back over one tape at the same time")
             np.asarray(out[1])[...] = self.tape.reverse(by_rows, by_reward)
             np.asarray(out[0])[...] = (passing, 0)
-            self.left = step
+            self.left -= 1
 
 
 @partial(jax.custom_vjp, nondiff_argnums=(0,))
 def _step(host: _Host, token: Any, actions: Any) -> Any:
-    return _call(host.step, host.shown(), token, actions)
+    return _call(host.step, host.shown, token, actions)
 
 
 def _forward(host: _Host, token: Any, actions: Any) -> Any:
-    return _step(host, token, actions), token
+    shown = _step(host, token, actions)
+    return shown, shown[0]  # the token after the step, so that the way back cannot come before it
 
 
 def _backward(host: _Host, token: Any, by: Any) -> Any:
-    by_token, by_rows, by_reward, _, _ = by
-    shape = (host.tape.envs, *host.tape.spec.action.shape)
-    results = [jax.ShapeDtypeStruct((2,), np.float32), jax.ShapeDtypeStruct(shape, by_reward.dtype)]
-    return tuple(_call(host.reverse, results, token, by_token, by_rows, by_reward))
+    return tuple(_call(host.reverse, [host.token, host.actions], token, *by[:3]))
 
 
 _step.defvjp(_forward, _backward)
