@@ -291,7 +291,7 @@ class _Host:
                 raise _core.InputError("two ways back over one tape at the same time")
             np.asarray(out[1])[...] = self.tape.reverse(by_rows, by_reward)
             np.asarray(out[0])[...] = (passing, 0)
-            self.left -= 1
+            self.left = int(taken) - 1
 
 
 @partial(jax.custom_vjp, nondiff_argnums=(0,))
