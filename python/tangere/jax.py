@@ -53,8 +53,9 @@ class Rollout(NamedTuple):
 class Tape:
     """A batch of episodes of one task, recorded for the way back.
 
-    It holds one run at a time, with as many gradients of it as wanted. A computation with two runs
-    needs two tapes; with one, it raises RuntimeError.
+    It holds one run at a time. A computation with two runs needs two tapes; with one tape, it ends
+    with an error. Mistakes that only show while XLA computes raise an error of JAX, which ends with
+    the InputError that the simulator has raised.
 
     Parameters
     ----------
@@ -115,9 +116,10 @@ class Tape:
         """Takes one action (E, na) of every environment; one call for the whole batch.
 
         Returns the next state, observations and rewards (E), 0 where the episode had ended.
-        Observations and rewards are differentiable by this and all earlier actions. Each state
-        serves one step. InputError: another shape. RuntimeError: an action that is not finite, one
-        too many, or a state that is not the last one of the tape.
+        Observations and rewards are differentiable by this and all earlier actions. InputError:
+        another shape, an action that is not finite, one too many, or a state that is not the last
+        one of the tape. Where steps are not in a `jax.lax.scan`, a loss under jit must depend on
+        the last one, or XLA may begin the way back too early, which is an InputError, too.
         """
         actions, expected = jnp.asarray(actions), self._host.actions
         if actions.shape != expected.shape:
