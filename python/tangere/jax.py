@@ -85,8 +85,8 @@ class Tape:
         scene: _core.Scene | str | Path | None = None,
     ):
         self.num_envs, self.flatten = num_envs, flatten
-        if np.dtype(dtype) == np.float64 and _real() != np.float64:
-            raise _core.InputError("observations of float64 need jax_enable_x64")
+        if np.dtype(dtype) not in (np.float32, _real()):
+            raise _core.InputError(f"{dtype}; expected float32, or float64 with jax_enable_x64")
         self.tape = _core.TaskTape(
             task,
             task_scene(task, scene),

@@ -323,6 +323,7 @@ def test_mistakes_are_told():
     for seed in (1.5, jnp.zeros(2, int), jnp.ones(())):
         with pytest.raises(TypeError):
             tape.reset(seed)
-    with pytest.raises(tangere.InputError, match="jax_enable_x64"):
-        tj.Tape("dummy", 1, dtype=jnp.float64)
+    for dtype in (jnp.float64, jnp.float16, int):
+        with pytest.raises(tangere.InputError, match="jax_enable_x64"):
+            tj.Tape("dummy", 1, dtype=dtype)
     assert tj.rollout("dummy", np.zeros((1, 2, 1), int)).rewards.shape == (1, 2)  # arrays, too
