@@ -265,6 +265,19 @@ assert all((end == ends[0]).all() for end in jax.device_get(ends))
     assert done.returncode == 0, done.stderr
 
 
+def test_a_program_ends_in_silence():
+    program = """
+import jax, jax.numpy as jnp, tangere.jax
+tape = tangere.jax.Tape("dummy", 1, 2)
+def loss(w):
+    return tape.play(lambda obs, t: w * obs["error"]).rewards.sum()
+compiled = jax.jit(jax.grad(loss)).lower(jnp.ones(())).compile()
+compiled(jnp.ones(()))
+"""
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+
+
 def test_what_a_tape_cannot_do_is_told():
     loss, _ = closed_loop()
     two = jax.tree_util.tree_map(lambda w: np.stack([w, w]), PARAMS)
