@@ -9,6 +9,8 @@
 NB_MODULE(_core, m) {
   namespace nb = nanobind;
   using namespace tangere::python;
+  // Compiled functions of JAX and graphs of PyTorch may hold tapes until the process ends.
+  nb::set_leak_warnings(false);
   m.doc() = "Batched differentiable tactile simulation on CPUs: the compiled part.";
   m.attr("__version__") = TANGERE_VERSION;
   m.attr("instruction_set") = tangere::kernels::active_isa_name();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// TaskTape in Python. tangere/torch.py makes an autograd function of it.
+// TaskTape in Python. tangere/torch.py and tangere/jax.py make differentiable functions of it.
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
@@ -106,7 +106,7 @@ void add_tapes(nb::module_& m) {
   nb::class_<Tape>(
       m, "TaskTape",
       "Episodes of a task on tape, for back-propagation through time. Environment e plays episode\n"
-      "first_episode + e, once. tangere.torch.Tape joins it to PyTorch.")
+      "first_episode + e, once. tangere.torch.Tape joins it to PyTorch, tangere.jax.Tape to JAX.")
       .def(
           "__init__",
           [](Tape* self, const std::string& task, const Scene& scene, int envs,

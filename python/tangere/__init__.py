@@ -8,10 +8,10 @@
 
     env = tangere.make_vec("box_pushing", num_envs=256)      # Gymnasium's vector interface
 
-`tangere.gym` has the environments, `tangere.torch` gradients through PyTorch, `tangere.data` data
-sets for learning, `tangere.policy` policies that the command asks. `tangere.lerobot`,
-`tangere.robomimic` and `tangere.sb3` connect to the libraries of these names. All but
-`tangere.gym` and `tangere.policy` need packages that `import tangere` does not import.
+`tangere.gym` has the environments, `tangere.torch` and `tangere.jax` gradients through PyTorch and
+JAX, `tangere.data` data sets for learning, `tangere.policy` policies that the command asks.
+`tangere.lerobot`, `tangere.robomimic` and `tangere.sb3` connect to the libraries of these names.
+All but `tangere.gym` and `tangere.policy` need packages that `import tangere` does not import.
 """
 
 from __future__ import annotations

@@ -30,6 +30,7 @@ def run_blocks(page: str, names: dict[str, str]) -> int:
 
 def test_every_block_of_the_page_runs(command, tmp_path):
     pytest.importorskip("torch", reason="PyTorch is not installed")
+    pytest.importorskip("jax", reason="JAX is not installed")
     names = {"TANGERE": str(command), "DATA": str(tmp_path / "data")}
     assert run_blocks("docs/python.md", names) >= 5
 
