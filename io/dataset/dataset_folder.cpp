@@ -57,7 +57,10 @@ DatasetFolder::DatasetFolder(std::string path, ExistingShards existing, bool sha
   std::error_code error;
   created_ = fs::create_directory(path_, error);
   if (error && error != std::errc::file_exists)
-    throw IoError(fmt::format("cannot create the folder '{}': {}", path_, error.message()));
+    throw IoError(fmt::format("cannot create the folder '{}': {}{}", path_, error.message(),
+                              error == std::errc::no_such_file_or_directory
+                                  ? "; expected its parent folder to be there"
+                                  : ""));
   if (!fs::is_directory(path_))
     throw IoError(
         fmt::format("'{}' exists and is not a folder; expected a folder for shards", path_));
