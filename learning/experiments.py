@@ -49,7 +49,7 @@ CAPS = "cap_opening --episodes 300 --seed 1"
 GRASPS = "stable_grasp --episodes 1000 --seed 1"
 INSERTIONS = "insertion --episodes 5000 --seed 1"
 THROUGH_TIME = "gd.py box_pushing --touch 0.05 --limit 30"
-CLONED = "dagger.py out/learning/pushes"
+CLONED = "dagger.py out/learning/pushes --rounds 60 --updates 100"
 CAPPED = "bc.py out/learning/caps --epochs 20 --before 3 --width 512"
 
 # In the order in which they are made: what is worth most and costs least comes first.
@@ -68,9 +68,9 @@ EXPERIMENTS = [
     Experiment("ppo-grasp", "ppo.py stable_grasp", 5, 90, "stable grasp, flow", "98.5 %, 2.1"),
     Experiment("ppo-cap-blind", "ppo.py cap_opening_blind", 3, 470, "cap, blind", "59.7 %"),
     Experiment("ppo-cap", "ppo.py cap_opening", 5, 300, "cap, touch", "87.3 %"),
-    Experiment("bc-push", CLONED, 3, 190, "box pushing, goal and touch, visits",
+    Experiment("bc-push", CLONED, 3, 450, "box pushing, goal and touch, visits",
                data=f"pushes {PUSHES}"),
-    Experiment("bc-push-blind", f"{CLONED} --without tactile", 3, 120, "box pushing, goal, visits",
+    Experiment("bc-push-blind", f"{CLONED} --without tactile", 3, 350, "box pushing, goal, visits",
                data=f"pushes {PUSHES}"),
     Experiment("bc-grasp", "bc.py out/learning/grasps", 3, 10, "stable grasp, flow",
                data=f"grasps {GRASPS}"),
