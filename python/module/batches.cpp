@@ -433,11 +433,7 @@ void add_batches(nb::module_& m) {
       .def("reset", &PythonBatch::reset, "envs"_a = nb::none(), "episodes"_a = nb::none(),
            "Draws the starting states again, or those of other `episodes`.")
       .def("scene_controls", &PythonBatch::scene_controls, "steps"_a,
-           "(T, E, nu): what the scene's <control> gives for the first T steps.")
-      .def("__repr__", [](const PythonBatch& b) {
-        return fmt::format("Batch('{}', envs={}, seed={}, threads={})", b.model().scene().name,
-                           b.environments(), b.seed(), b.threads());
-      });
+           "(T, E, nu): what the scene's <control> gives for the first T steps.");
 }
 
 }  // namespace tangere::python

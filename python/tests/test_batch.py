@@ -274,9 +274,3 @@ def test_what_friction_remembers_goes_on():
 def test_a_scene_without_springs_has_no_memory(model):
     assert model.memory_points == {} and "memory" not in model.readings
     assert tangere.Batch(model, envs=2).memory.shape == (2, 0, 3)
-
-
-def test_a_batch_says_what_it_is():
-    model = tangere.Model(tangere.Scene(tangere.scenes()["rolling_ball_small"]))
-    batch = tangere.Batch(model, 3, seed=7, threads=1)
-    assert repr(batch) == "Batch('rolling_ball_small', envs=3, seed=7, threads=1)"
