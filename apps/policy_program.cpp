@@ -35,8 +35,9 @@ constexpr const char* kProtocol = "tangere policy 1";
 constexpr std::size_t kLongestLine = 4096, kLongestName = 64;
 constexpr int kLookForStop = 100;  // [ms]
 constexpr double kTimeToEnd = 5;   // [s]
-constexpr const char* kTaken[] = {"train",    "valid",  "success", "train_success", "valid_success",
-                                  "touching", "random", "hold",    "csv",           "scripted"};
+constexpr const char* kTaken[] = {
+    "train",          "valid",          "success", "train_success", "valid_success", "touching",
+    "train_touching", "valid_touching", "random",  "hold",          "csv",           "scripted"};
 
 double now() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();

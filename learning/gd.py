@@ -17,8 +17,8 @@ update.
 Every 10 updates the policy plays 300 goals of another seed. The one with the least mean error,
 |Δp|/0.1 m + |Δθ|/0.276 rad in the reward's own proportion, is kept and tested on fresh goals. A few
 updates can spoil a policy so far that the run never recovers. With `--back k`, a policy with more
-than k times the least error is given up: the run goes on from the best one, with a forgetful
-optimiser and SLOWER times its rate.
+than k times the least error is given up: the run goes on from the best one. The optimiser starts
+anew, and from the second update on the rate is SLOWER times what it was.
 Prints the mean errors in place [m] and yaw [rad].
 """
 

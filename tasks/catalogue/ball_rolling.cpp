@@ -114,6 +114,7 @@ TaskSpec declare_ball_rolling(BallPad pad) {
   spec.observations = {{"pad", {3}, "m", "position of the pad from its start", {0.01}},
                        {"goal", {2}, "m", "from the ball's centre to the goal, x y", {0.005}},
                        {"tactile", {side, side, 3}, "N", "field of the pad", tactile_scale}};
+  spec.observations.back().touch = true;
   spec.steps_per_action = 5;
   spec.moments = {5};
   spec.horizon = kActions;

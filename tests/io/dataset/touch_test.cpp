@@ -44,10 +44,12 @@ TEST(Touch, IsWhatATaskDeclares) {
   DatasetLayout l = dataset_layout(20);
   TaskSpec task;
   task.action = {"u", {2}, "1", "controls", {}};
-  task.observations = {{"goal", {3}, "m m rad", "goal", {}}, {"flow", {2}, "1", "flow", {}}};
+  // A place may have the name of a sensor.
+  task.observations = {{"skin", {3}, "m", "where it is", {}},
+                       {"goal", {3}, "m m rad", "goal", {}},
+                       {"flow", {2}, "1", "flow", {}}};
   task.observations.back().touch = true;
   l.task = task;
-  l.fields.clear();
   EXPECT_EQ(touch_of(l), json({"flow"}));
   l.record = {"goal"};
   EXPECT_EQ(touch_of(l), json::array());
