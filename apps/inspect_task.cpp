@@ -19,13 +19,10 @@ Json tensor_json(const TensorSpec& t) {
 
 std::string tensor_text(const TensorSpec& t) {
   const bool free = std::isinf(t.low) && std::isinf(t.high);
-  return fmt::format("{} ({}) [{}], {}{}{}: {}", t.name, fmt::join(t.shape, ", "), t.unit,
+  return fmt::format("{} ({}) [{}], {}{}{}{}: {}", t.name, fmt::join(t.shape, ", "), t.unit,
                      free ? "no bounds" : fmt::format("{:g} to {:g}", t.low, t.high),
                      t.scale.empty() ? "" : fmt::format(", scale {:g}", fmt::join(t.scale, " ")),
-                     t.privileged ? ", privileged"
-                     : t.touch    ? ", touch"
-                                  : "",
-                     t.meaning);
+                     t.privileged ? ", privileged" : "", t.touch ? ", touch" : "", t.meaning);
 }
 
 /// What belongs to a reset before the first action.

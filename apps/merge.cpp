@@ -37,7 +37,7 @@ int merge(const std::string& path, MergeOptions options, const Console& console)
       "wrote {} ({} bytes, {}): {} demos, {} to train on and {} to validate{}; failed episodes: {}",
       result.file, result.bytes, options.copy ? "a copy of all numbers" : "links to the shards",
       result.demos, result.train, result.valid,
-      result.touching ? fmt::format(", {} of all feel something", *result.touching) : "",
+      result.touching ? fmt::format(", {} that feel something", *result.touching) : "",
       result.failed));
   if (!result.minari.empty())
     console.print(fmt::format("wrote {}: {} for Minari", result.minari, result.minari_id));

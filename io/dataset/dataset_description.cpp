@@ -234,7 +234,9 @@ std::vector<std::string> differences(const std::vector<Setting>& there,
 }
 
 std::vector<std::string> touch_said(const h5::Id& scene) {
-  return names_in(h5::read_text(scene, "touch"));
+  const std::string text = h5::read_text(scene, "touch");
+  if (const std::optional<std::vector<std::string>> names = names_in(text)) return *names;
+  throw IoError(fmt::format("'touch' of /scene is {}; expected a JSON list of names", text));
 }
 
 std::vector<SampleSaid> samples_said(const h5::Id& scene, std::int64_t every, std::int64_t rows) {

@@ -136,14 +136,15 @@ std::vector<std::string> DatasetLayout::all_observation_names() const {
 std::vector<std::size_t> DatasetLayout::touch() const {
   const auto perfect = [](const SensorLayout& sensor) { return sensor.imperfections.empty(); };
   std::vector<std::string> names;
-  if (task && std::all_of(sensors.begin(), sensors.end(), perfect))
+  if (!task) {
+    for (const FieldOutput of : fields) {
+      const SensorLayout& sensor = sensors[static_cast<std::size_t>(of.sensor)];
+      if (perfect(sensor) || of.form == FieldForm::ideal || of.form == FieldForm::markers)
+        names.push_back(output_name(sensor.name, of.form));
+    }
+  } else if (std::all_of(sensors.begin(), sensors.end(), perfect)) {
     for (const TensorSpec& tensor : task->observations)
       if (tensor.touch) names.push_back(tensor.name);
-  const bool scene = !task;  // fields of a task's scene are no observations
-  for (const FieldOutput of : fields) {
-    const SensorLayout& sensor = sensors[static_cast<std::size_t>(of.sensor)];
-    if (scene && (perfect(sensor) || of.form == FieldForm::ideal || of.form == FieldForm::markers))
-      names.push_back(output_name(sensor.name, of.form));
   }
   const std::vector<std::string> stored = observation_names();
   std::vector<std::size_t> places;

@@ -89,8 +89,9 @@ struct DatasetLayout : RunFacts {
   [[nodiscard]] std::vector<DatasetSample> samples() const;
   /// Names of the stored observations below obs.
   [[nodiscard]] std::vector<std::string> observation_names() const;
-  /// Those of them that are touch, as indices: all numbers of a row are 0 where nothing is felt. No
-  /// reading is one whose sensor has imperfections, but for the ideal field and markers.
+  /// Those of them that are touch, as indices: all numbers of a row are 0 where nothing is felt. Of
+  /// a sensor with imperfections only the ideal field and the markers are, and a task with such a
+  /// sensor has none.
   [[nodiscard]] std::vector<std::size_t> touch() const;
   /// Shapes of one row of each stored observation: {nq}, {nv}, {n, 3}, {rows, cols, 3} …
   [[nodiscard]] std::vector<std::vector<std::uint64_t>> observation_shapes() const;

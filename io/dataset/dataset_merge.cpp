@@ -104,7 +104,6 @@ class Merger {
     if (!h5::read_text(scene, "task").starts_with("none"))
       policies_ = h5::read_texts(scene, "policies");
     env_args_ = h5::read_text(h5::open_group(from, "data"), "env_args");
-    feels_ = !touch_said(scene).empty();
     h5::copy_group(from, "scene", file_.file(), "scene");
   }
 
@@ -236,7 +235,7 @@ class Merger {
     };
     result_.train = write("train", [](const MaskedDemo& demo) { return !demo.valid; });
     result_.valid = write("valid", [](const MaskedDemo& demo) { return demo.valid; });
-    if (feels_)
+    if (!touch_said(h5::open_group(file_.file(), "scene")).empty())
       result_.touching =
           write_parts("touching", [](const MaskedDemo& demo) { return demo.touches; });
     if (policies_.empty()) return;
@@ -254,7 +253,6 @@ class Merger {
   h5::Id copied_;  // group of demos
   std::string env_args_;
   bool few_each_ = false;  // episodes in a shard
-  bool feels_ = false;     // touch is stored
   std::optional<DemoMembers> members_;
   std::optional<MinariView> view_;
   std::vector<MaskedDemo> demos_;                            // ascending

@@ -10,6 +10,7 @@
 #include <bit>
 
 #include "engine/base/error.hpp"
+#include "io/dataset/dataset_description.hpp"
 #include "io/hdf5/h5_listing.hpp"
 #include "io/hdf5/h5_views.hpp"
 
@@ -140,7 +141,7 @@ DemoMembers members_of(const h5::Id& demo) {
   if (members.of_task)
     members.policies = std::ssize(h5::read_texts(h5::open_group(demo, "/scene"), "policies"));
   members.varies = std::binary_search(said.begin(), said.end(), "randomized");
-  members.feels = std::binary_search(said.begin(), said.end(), "touching");
+  members.feels = !touch_said(h5::open_group(demo, "/scene")).empty();
   return members;
 }
 

@@ -2,12 +2,8 @@
 // The names are those of the Python package, tangere.gym.
 #include "io/dataset/learner_notes.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <nlohmann/json.hpp>
-
-#include "engine/base/error.hpp"
 
 namespace tangere {
 namespace {
@@ -89,11 +85,11 @@ std::string touch_observations(const DatasetLayout& layout) {
   return text_of(names);
 }
 
-std::vector<std::string> names_in(const std::string& list) {
+std::optional<std::vector<std::string>> names_in(const std::string& list) {
   const Json names = Json::parse(list, nullptr, false);
   const bool strings = names.is_array() && std::all_of(names.begin(), names.end(),
                                                        [](const Json& n) { return n.is_string(); });
-  if (!strings) throw IoError(fmt::format("{} is no list of names", list));
+  if (!strings) return std::nullopt;
   return names.get<std::vector<std::string>>();
 }
 

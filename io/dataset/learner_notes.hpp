@@ -4,6 +4,7 @@
 // text, which robomimic and Minari store as it is.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -33,7 +34,7 @@ std::string privileged_observations(const DatasetLayout& layout);
 /// [KEY, …] of the stored observations that are touch, DatasetLayout::touch().
 std::string touch_observations(const DatasetLayout& layout);
 
-/// The names in such a list. Throws IoError for another text.
-std::vector<std::string> names_in(const std::string& list);
+/// Returns the names in such a list; nothing for another text.
+std::optional<std::vector<std::string>> names_in(const std::string& list);
 
 }  // namespace tangere

@@ -51,8 +51,8 @@ class ShardChecker {
 
   /// Checks the first and the last episode, except sums. Only counts the others.
   ShardReport sample() {
+    if (!is_of_this_format() || !is_described()) return {content_, problems_};
     const h5::Id data = h5::open_group(file_, "data"), failed = h5::open_group(file_, "failed");
-    read_description();
     for (const std::int64_t episode : {content_.first_episode, end_ - 1})
       add_episode(data, failed, episode);
     static_cast<void>(count_episodes(data, failed));
@@ -60,16 +60,7 @@ class ShardChecker {
   }
 
   ShardReport check() {
-    if (h5::read_text(file_, "format") != kFormatName) {
-      fail("it is not a tangere data set");
-      return {content_, problems_};
-    }
-    if (const std::int64_t version = number(file_, "format_version"); version != kDatasetFormat) {
-      fail(fmt::format("its format_version is {}; expected {} (generate the data set again)",
-                       version, kDatasetFormat));
-      return {content_, problems_};
-    }
-    read_description();
+    if (!is_of_this_format() || !is_described()) return {content_, problems_};
     const h5::Id data = h5::open_group(file_, "data"), failed = h5::open_group(file_, "failed");
     if (end_ - content_.first_episode > kMostLooks && !count_episodes(data, failed))
       return {content_, problems_};
@@ -88,11 +79,35 @@ class ShardChecker {
   }
 
  private:
+  [[nodiscard]] bool is_of_this_format() {
+    if (h5::read_text(file_, "format") != kFormatName) {
+      fail("it is not a tangere data set");
+    } else if (const std::int64_t version = number(file_, "format_version");
+               version != kDatasetFormat) {
+      fail(fmt::format("its format_version is {}; expected {} (generate the data set again)",
+                       version, kDatasetFormat));
+    }
+    return problems_.empty();
+  }
+  /// Whether /scene and the root say what the episodes have.
+  [[nodiscard]] bool is_described() {
+    try {
+      read_description();
+    } catch (const IoError& error) {
+      fail(error.what());
+    }
+    return problems_.empty();
+  }
   void read_description() {
     content_.first_episode = within(file_, "first_episode", 0);
     end_ = content_.first_episode + within(file_, "episodes", 0);
     names_ = h5::read_texts(scene_, "observations");
     touch_ = touch_said(scene_);
+    for (const std::string& name : touch_)
+      if (std::count(touch_.begin(), touch_.end(), name) > 1 ||
+          std::find(names_.begin(), names_.end(), name) == names_.end())
+        throw IoError(fmt::format(
+            "'touch' of /scene names '{}'; expected stored observations, each once", name));
     single_ = h5::read_text(scene_, "observation_type") == "float32";
     const std::int64_t steps = within(scene_, "steps", 1), every = within(scene_, "every", 1);
     if (steps < every)
@@ -176,7 +191,10 @@ class ShardChecker {
         add<double>(final_obs, names_[k], episode, k + 1, rows, 1);
       }
     }
-    if (!touch_.empty()) check_felt(demo, episode);
+    if (!touch_.empty())
+      check_felt(demo, episode);
+    else if (H5Aexists(demo.get(), "touching") > 0)
+      fail(fmt::format("demo_{}: 'touching' is there; /scene names no touch", episode));
     for (std::size_t k = 0; k < gradients_.size(); ++k)
       add_gradient(demo, gradients_[k], episode, names_.size() + 2 + k, rows);
     for (std::size_t k = 0; k < samples_.size(); ++k)

@@ -132,6 +132,7 @@ def export(
             "demos": [episodes.names[i] for i in chosen],
             "observation_scale": episodes.scale,
             "privileged": episodes.privileged,
+            "touch": episodes.touch,
         }
         write_json(folder / "meta/stats.json", statistics)
         write_json(folder / "meta/tangere.json", origin)

@@ -84,6 +84,18 @@ def test_gd_learns_to_push():
     assert found["steps"] == 20 * 16 * 100 and len(found["choice"]) == 2
 
 
+def test_gd_goes_back_from_a_spoiled_policy():
+    found = run("gd.py", "box_pushing_privileged", "--updates", "60", "--envs", "4", "--rate", "0.02",
+                "--back", "1", "--goals", "20", "--threads", "1")  # fmt: skip
+    least, expected = np.inf, []
+    for update, _, place, yaw in found["choice"]:
+        errors = place / protocol.PLACE_UNIT + yaw / protocol.YAW_UNIT
+        if not errors < least:
+            expected.append(update)
+        least = min(least, errors)
+    assert found["went_back"] == expected and expected
+
+
 def test_clones_learn_from_a_data_set(generate):
     data = generate("insertion_translation", "--episodes", "300", "--seed", "1")
     found = run("bc.py", str(data), "--epochs", "20", "--episodes", "200")

@@ -42,6 +42,15 @@ class ShardCheck : public ::testing::Test {
     return "";
   }
 
+  [[nodiscard]] std::string complaint_of_sample() const {
+    try {
+      sample_shard(path_);
+    } catch (const IoError& error) {
+      return error.what();
+    }
+    return "";
+  }
+
   [[nodiscard]] std::string read() const { return file_bytes(path_); }
   void write(const std::string& bytes) const {
     std::ofstream(path_, std::ios::binary | std::ios::trunc) << bytes;
@@ -82,6 +91,7 @@ TEST_F(ShardCheck, RefusesEarlierFormats) {
     change([&](hid_t file) { set(file, "/", "format_version", version); });
     EXPECT_THAT(complaint(), HasSubstr("its format_version is " + std::to_string(version) +
                                        "; expected 5 (generate the data set again)"));
+    EXPECT_THAT(complaint_of_sample(), HasSubstr("its format_version is ")) << "merge calls it";
   }
 }
 
