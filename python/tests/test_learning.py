@@ -85,8 +85,8 @@ def test_gd_learns_to_push():
 
 
 def test_gd_goes_back_from_a_spoiled_policy():
-    found = run("gd.py", "box_pushing_privileged", "--updates", "60", "--envs", "4", "--rate", "0.02",
-                "--back", "1", "--goals", "20", "--threads", "1")  # fmt: skip
+    found = run("gd.py", "box_pushing_privileged", "--updates", "60", "--envs", "4", "--rate",
+                "0.02", "--back", "1", "--goals", "20", "--threads", "1")  # fmt: skip
     least, expected = np.inf, []
     for update, _, place, yaw in found["choice"]:
         errors = place / protocol.PLACE_UNIT + yaw / protocol.YAW_UNIT
