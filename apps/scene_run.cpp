@@ -47,6 +47,7 @@ std::string split_text(const StepCounts& counts) {
   add("less accurate than asked", counts.coarse_steps);
   add("a body came through another", counts.passed_steps);
   add("damped because they created energy", counts.damped_steps);
+  add("bodies overlap", counts.overlapping_steps);
   return text;
 }
 
@@ -54,7 +55,8 @@ Json split_json(const StepCounts& counts) {
   return {{"split_steps", counts.split_steps},
           {"coarse_steps", counts.coarse_steps},
           {"passed_steps", counts.passed_steps},
-          {"damped_steps", counts.damped_steps}};
+          {"damped_steps", counts.damped_steps},
+          {"overlapping_steps", counts.overlapping_steps}};
 }
 
 Json mean_asleep(double sleep, const StepCounts& counts) {
@@ -128,6 +130,17 @@ Json note_costly_steps(const Console& console, Integrator integrator, double acc
   if (line.empty() || accuracy > 0) return nullptr;
   console.note("warning: " + line);
   return line;
+}
+
+ExitCode exit_code(const Console& console, bool failed, const StepCounts& counts) {
+  if (counts.missed_contacts() == 0) return failed ? kSomeFailed : kDone;
+  console.note(fmt::format(
+      "error: contacts missed bodies in {} of {} steps: in {} a body came through another, and after "
+      "{} bodies overlap by more than a quarter of their thickness while hardly any contact point "
+      "is inside; expected more contact points, stiffer contacts or shorter steps",
+      counts.missed_contacts(), counts.simulation_steps, counts.passed_steps,
+      counts.overlapping_steps));
+  return kSomeFailed;
 }
 
 Json settings_json(const RunFacts& facts) {

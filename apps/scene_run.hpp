@@ -28,10 +28,11 @@ Integrator integrator_named(const std::string& name);
 /// Throws InputError for an unknown loss.
 LossKind loss_named(const std::string& name);
 
-/// Says how many steps were split, and how many missed the accuracy, let a body through or were
-/// damped, if any were.
+/// Says how many steps were split, and how many missed the accuracy, let a body through, were
+/// damped or let bodies overlap, if any did.
 std::string split_text(const StepCounts& counts);
-/// The same four numbers, as "split_steps", "coarse_steps", "passed_steps" and "damped_steps".
+/// The same five numbers, as "split_steps", "coarse_steps", "passed_steps", "damped_steps" and
+/// "overlapping_steps".
 Json split_json(const StepCounts& counts);
 
 /// Says how many of the scene's bodies slept, on average over all steps of environments; empty if
@@ -64,6 +65,10 @@ void warn_of_touches(const Console& console, const Model& model, const Stepper& 
 /// were cut to keep an accuracy.
 Json note_costly_steps(const Console& console, Integrator integrator, double accuracy,
                        const StepCounts& counts);
+
+/// Returns the exit code of a run: kSomeFailed where environments failed, or where contacts missed
+/// bodies, which it says on stderr with the counts.
+ExitCode exit_code(const Console& console, bool failed, const StepCounts& counts);
 
 /// What the JSON object of a command that writes a file says of its run: "seed", the solver's
 /// settings, "precision" and "instruction_set".

@@ -149,7 +149,7 @@ Json sensors_json(const Model& model, const RolloutOptions& rollout) {
 int report(const SimulateArguments& options, const Console& console, const Batch& batch,
            const RunFacts& facts, const RolloutOptions& rollout, const RolloutSummary& summary,
            const TaskReport& of_task) {
-  const ExitCode code = summary.failures.empty() ? kDone : kSomeFailed;
+  const ExitCode code = exit_code(console, !summary.failures.empty(), summary.counts);
   const auto bytes = std::filesystem::file_size(options.output);
   const std::int64_t environment_steps = summary.counts.simulation_steps;
   const double rate = static_cast<double>(environment_steps) / summary.seconds;

@@ -15,6 +15,7 @@
 #include "engine/model/compile_sensor.hpp"
 #include "engine/model/compile_variations.hpp"
 #include "engine/model/components.hpp"
+#include "engine/model/contact_resolution.hpp"
 #include "engine/model/contact_tiles.hpp"
 #include "engine/model/frames.hpp"
 #include "engine/model/group_contacts.hpp"
@@ -50,6 +51,7 @@ class Compiler {
     compile_motors(m_, joints_);
     compile_initial_state(m_, joints_);
     unknown_scales();
+    coarse_pairs();
     mesh_distances();
     pair_contacts();
     ground_contacts();
@@ -121,28 +123,48 @@ class Compiler {
            std::any_of(s.sensors.begin(), s.sensors.end(), of_sensor);
   }
 
+  /// Finds the bodies whose contact points are far apart for each other.
+  void coarse_pairs() {
+    for (const CoarseContact& coarse : coarse_contacts(m_.scene)) {
+      const PairContactDescription& d = m_.scene.pair_contacts[coarse.contact];
+      const int one = bodies_.find("body", d.general_body, d.source),
+                two = bodies_.find("body", d.primitive_body, d.source);
+      const std::array<int, 2> pair = {std::min(one, two), std::max(one, two)};
+      if (std::ranges::find(m_.coarse_pairs, pair) == m_.coarse_pairs.end())
+        m_.coarse_pairs.push_back(pair);
+    }
+  }
+
   /// Makes the distances to meshes. Bodies with the same mesh share one.
   void mesh_distances() {
     for (std::size_t b = 0; b < m_.bodies.size(); ++b) {
       const BodyDescription& d = m_.scene.links[b].body;
       const auto* const mesh = std::get_if<MeshShape>(&d.shape);
-      if (mesh == nullptr || mesh->resolution == 0 || !is_touched(b)) continue;
+      if (mesh == nullptr) continue;
+      const bool touched = mesh->resolution > 0 && is_touched(b);
+      if (!touched && std::ranges::none_of(m_.coarse_pairs, [&](const auto& pair) {
+            return pair[0] == int(b) || pair[1] == int(b);
+          }))
+        continue;
       std::shared_ptr<const MeshGrid> grid;
       try {
-        grid = fitting_mesh_grid(*mesh);
+        grid = touched ? fitting_mesh_grid(*mesh) : coarse_mesh_grid(*mesh);
       } catch (const InputError& error) {
+        if (!touched) continue;
         throw InputError(d.source.prefix() + "body '" + d.name + "': " + error.what());
       }
       const kernels::DistanceGrid& view = grid->view;
+      m_.bodies[b].inscribed = -*std::ranges::min_element(grid->coefficients);
+      m_.bodies[b].grid = &view;
+      m_.mesh_grids.push_back(std::move(grid));
+      if (!touched) continue;
       m_.mesh_info.push_back({d.name,
                               {view.cells[0], view.cells[1], view.cells[2]},
                               mesh->scale * view.cell,
-                              grid->bytes(),
-                              mesh->scale * grid->fit.error,
-                              grid->fit.unresolved});
+                              m_.mesh_grids.back()->bytes(),
+                              mesh->scale * m_.mesh_grids.back()->fit.error,
+                              m_.mesh_grids.back()->fit.unresolved});
       m_.bodies[b].touchable = true;
-      m_.bodies[b].grid = &view;
-      m_.mesh_grids.push_back(std::move(grid));
     }
   }
 
@@ -187,8 +209,9 @@ class Compiler {
       if (ball && !can_touch(general, primitive))
         throw InputError(d.source.prefix() + "general_body '" + d.general_body +
                          "' is a sphere, and primitive_body '" + d.primitive_body +
-                         "' a mesh, whose distance is known only near its surface; swap the two "
-                         "bodies");
+                         "' a mesh, whose distance is known only near its surface; expected the mesh "
+                         "as general_body, with contact points nearer to each other than the "
+                         "sphere is wide");
       if (b1 == b2 || first.link == second.link)
         throw InputError(d.source.prefix() + "bodies '" + d.general_body + "' and '" +
                          d.primitive_body + "' cannot move against each other");

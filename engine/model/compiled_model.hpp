@@ -30,7 +30,9 @@ struct CompiledBody {
   kernels::Vec3<double> centre{};  ///< centre of mass, body frame [m]
   double mass = 0;                 ///< [kg]
   int size_row = -1;               ///< ≥ 0: size is read from three rows of the block instead
-  const kernels::DistanceGrid* grid = nullptr;  ///< of a mesh that can be touched
+  /// Of a mesh that can be touched, or whose contact points are far apart.
+  const kernels::DistanceGrid* grid = nullptr;
+  double inscribed = 0;  ///< of a mesh with a grid: radius of the largest ball in it at scale 1 [m]
 };
 
 /// A joint of the scene: its elementary links and its coordinates.
@@ -191,6 +193,8 @@ struct CompiledModel {
   std::vector<kernels::GroundContact> grounds;
   std::vector<kernels::Solid> solids;  ///< parallel to bodies
   std::vector<kernels::RememberingContact> memories;
+  /// Bodies whose contact points are far apart for each other (contact_resolution.hpp).
+  std::vector<std::array<int, 2>> coarse_pairs;
   int remembering_points = 0;  ///< of all `memories`
   /// The same with the points of a sensor counted once, not for every body that it feels.
   int taped_points = 0;

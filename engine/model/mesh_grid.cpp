@@ -442,4 +442,11 @@ std::shared_ptr<const MeshGrid> fitting_mesh_grid(const MeshShape& mesh) {
                   MeshShape::kMostCells, found, mesh.error));
 }
 
+std::shared_ptr<const MeshGrid> coarse_mesh_grid(const MeshShape& mesh) {
+  constexpr int kCells = 16;
+  MeshShape coarse = mesh;
+  coarse.resolution = mesh.resolution > 0 ? std::min(mesh.resolution, kCells) : kCells;
+  return shared_mesh_grid(coarse);
+}
+
 }  // namespace tangere

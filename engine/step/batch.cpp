@@ -34,8 +34,8 @@ Purpose purpose_of(const SceneNumber& number) {
 
 std::span<const StepStatus> step_statuses() {
   using enum StepStatus;
-  static constexpr StepStatus kAll[] = {converged,     split,      coarse,   passed,  damped,
-                                        not_converged, non_finite, rotation, singular};
+  static constexpr StepStatus kAll[] = {converged,   split,         coarse,     passed,   damped,
+                                        overlapping, not_converged, non_finite, rotation, singular};
   return kAll;
 }
 
@@ -47,6 +47,8 @@ const char* to_string(StepStatus value) {
       return "converged, but its shortest parts missed the accuracy or created energy";
     case StepStatus::passed: return "converged, but a body came through one that it touches";
     case StepStatus::damped: return "converged, but damped, because the scheme created energy";
+    case StepStatus::overlapping:
+      return "converged, but bodies overlap where hardly any contact point is inside";
     case StepStatus::not_converged: return "no solution found, step split down to h/256";
     case StepStatus::non_finite: return "a control or state was not finite";
     case StepStatus::rotation: return "a joint turned by pi or more in one step";
@@ -75,6 +77,7 @@ Batch::Batch(const Model& model, int environments, std::uint64_t seed, std::int6
     steps_.assign(lanes, 0);
     memory_.resize(lanes);
     sleep_.resize(lanes);
+    clearance_.assign(lanes, 0.0);
   } catch (const std::exception&) {
     throw InputError(
         "no memory for " + std::to_string(environments) + " environments (" +
@@ -123,6 +126,7 @@ void Batch::reset(int environment, std::int64_t episode) {
   steps_[lane] = 0;
   memory_[lane].clear();
   sleep_[lane] = {};
+  clearance_[lane] = 0;
 }
 
 void Batch::displace_state(int environment, std::span<const double> q, std::span<const double> v) {
@@ -131,6 +135,7 @@ void Batch::displace_state(int environment, std::span<const double> q, std::span
   for (int i = 0; i < m.nq; ++i) own[(m.layout.q + i) * kBlock] = q[std::size_t(i)];
   for (int i = 0; i < m.nv; ++i) own[(m.layout.v + i) * kBlock] = v[std::size_t(i)];
   sleep_[std::size_t(environment)].wake();
+  clearance_[std::size_t(environment)] = 0;
 }
 
 void Batch::write_state(std::size_t lane, std::span<const double> q, std::span<const double> v) {
@@ -255,6 +260,7 @@ void Batch::restore_block(int block, const BlockState& state) {
   std::copy(state.steps.begin(), state.steps.end(), steps_.begin() + lane);
   std::copy(state.memory.begin(), state.memory.end(), memory_.begin() + lane);
   std::copy(state.sleep.begin(), state.sleep.end(), sleep_.begin() + lane);
+  std::fill_n(clearance_.begin() + lane, kBlock, 0.0);
 }
 
 bool Batch::is_parameter(int k) const {
@@ -281,6 +287,7 @@ void Batch::set_randomized_value(int environment, int k, double value) {
   column(std::size_t(environment))[std::size_t(row) * kBlock] = value;
   update_derived_rows(m, column(std::size_t(environment)));
   sleep_[std::size_t(environment)].wake();
+  clearance_[std::size_t(environment)] = 0;
 }
 
 }  // namespace tangere

@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 
+#include "engine/step/remembering_lane.hpp"
 #include "engine/step/rotation_log.hpp"
 #include "engine/step/state_difference.hpp"
 #include "kernels/contact/pair_contact.hpp"
@@ -254,6 +255,22 @@ double energy_of_contacts(const CompiledModel& model, const kernels::KernelTable
   return at.sum.moving;
 }
 
+template <int L>
+double energy_of_friction(const CompiledModel& model, const BasicWorkspace<L>& w,
+                          const ShearMemory& memory, int lane) {
+  double sum = 0;
+  std::size_t e = 0;
+  for (const kernels::RememberingContact& contact : model.memories) {  // by rising point
+    double square = 0;
+    const int end = contact.first + model.remembering(contact);
+    for (; e < memory.size() && memory[e].point < end; ++e)
+      for (const double s : memory[e].s) square += s * s;
+    if (contact.sensor < 0 && square > 0)
+      sum += 0.5 * number_of<L>(contact.contact.parameters.ks, w.stage, lane) * square;
+  }
+  return sum;
+}
+
 LaneBooks lane_books(const CompiledModel& model, const kernels::KernelTable& table,
                      SingleWorkspace& w) {
   LaneBooks books;
@@ -274,7 +291,9 @@ LaneBooks lane_books(const CompiledModel& model, const kernels::KernelTable& tab
                                        const Row<L>*, int);                                      \
   template double energy_of_contacts(const CompiledModel&, const kernels::KernelTable&,          \
                                      BasicWorkspace<L>&, const AlignedVector<LinkPose<Row<L>>>&, \
-                                     int);
+                                     int);                                                       \
+  template double energy_of_friction(const CompiledModel&, const BasicWorkspace<L>&,             \
+                                     const ShearMemory&, int);
 TANGERE_FOR_LANES(kernels::kGroup)
 TANGERE_FOR_LANES(1)
 #undef TANGERE_FOR_LANES

@@ -3,7 +3,8 @@
 //
 //   E = Σ (m v² + 2 ω·(c × v) + ω·Jω)/2 + I_a v²/2 - Σ gravity·(m p + R c)
 //       + Σ k (q - rest)²/2 + Σ k_l (q beyond a limit)²/2 + Σ f (e - f/2P) + Σ k_n d²/2
-// with c the moment and J the inertia of a link about its origin, e the distance of a position
+//       + Σ k_s |s|²/2
+// with s the elastic displacement of a contact point whose friction has a spring, c the moment and J the inertia of a link about its origin, e the distance of a position
 // motor from its target, and f = clip(P e, range). Damping and friction only take energy away, and
 // gravity, springs, limits, motors whose target stays and contacts whose faces stay give back what
 // they hold. So E can only rise by the work of forces that are known at the start of the step.
@@ -31,6 +32,12 @@ template <int L>
 double energy_of_contacts(const CompiledModel& model, const kernels::KernelTable& table,
                           BasicWorkspace<L>& w,
                           const AlignedVector<kernels::LinkPose<kernels::Row<L>>>& poses, int lane);
+
+/// Computes what the tangential springs of contacts hold in one lane [J]: Σ k_s |s|²/2 over the
+/// points of `memory`. Sensors act on no body, so their springs are left out.
+template <int L>
+double energy_of_friction(const CompiledModel& model, const BasicWorkspace<L>& w,
+                          const ShearMemory& memory, int lane);
 
 /// The books of one environment: what it holds, and what passes through motors and damping.
 struct LaneBooks {

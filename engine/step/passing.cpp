@@ -11,6 +11,7 @@
 
 #include "engine/model/body_shape.hpp"
 #include "engine/model/model_part.hpp"
+#include "engine/model/shapes.hpp"
 #include "engine/step/lane_energy.hpp"
 
 namespace tangere {
@@ -30,7 +31,7 @@ double component(const Vec3<double>& a, int k) { return k == 0 ? a.x : k == 1 ? 
 }  // namespace
 
 void Passing::add(int link, const Frame<double>& at, PrimitiveShape shape, const Vec3<double>& size,
-                  int other, const Vec3<double>& middle) {
+                  int other, const Vec3<double>& middle, bool other_convex) {
   CompiledBody body;
   body.shape = shape;
   body.size = size;
@@ -45,7 +46,8 @@ void Passing::add(int link, const Frame<double>& at, PrimitiveShape shape, const
     return std::minmax(g.link, g.other) == std::minmax(link, other);
   };
   const auto gate = std::find_if(gates_.begin(), gates_.end(), same);
-  walls_.push_back({link, other, at, half, axis, middle, std::size_t(gate - gates_.begin())});
+  walls_.push_back(
+      {link, other, at, half, axis, middle, other_convex, std::size_t(gate - gates_.begin())});
   if (gate == gates_.end()) {
     gates_.push_back({link, other, thin});
   } else {
@@ -137,12 +139,16 @@ bool Passing::stay_apart(const Gate& gate, const AlignedVector<LinkPose<Row<L>>>
 Passing::Passing(const CompiledModel& m) : model_(m), arm_(m.links.size(), 0.0) {
   for (const kernels::PairContact& p : m.pairs) {
     if (!pushes(p.parameters)) continue;  // it holds nothing back
-    add(p.link2, p.frame2, p.shape, p.size, p.link1, p.middle);
-    if (p.body1 < 0) continue;
+    if (p.body1 < 0) {
+      add(p.link2, p.frame2, p.shape, p.size, p.link1, p.middle, false);
+      continue;
+    }
     const kernels::Solid& solid = m.solids[std::size_t(p.body1)];
+    const auto convex = [](PrimitiveShape shape) { return row_of(shape).half_widths != nullptr; };
+    add(p.link2, p.frame2, p.shape, p.size, p.link1, p.middle, convex(solid.shape));
     // Bodies with points of their own need not be convex. A ball has none.
     if (solid.stretches || p.ball_radius > 0)
-      add(p.link1, solid.frame, solid.shape, solid.size, p.link2, p.frame2.p);
+      add(p.link1, solid.frame, solid.shape, solid.size, p.link2, p.frame2.p, convex(p.shape));
   }
   bound_gates();
   // passed() looks at a gate once.
@@ -221,32 +227,63 @@ LaneBits Passing::out_of_reach(const BasicWorkspace<L>& w, LaneBits lanes) const
   return lanes;
 }
 
+/// Returns the place of the other body's middle in a wall's axes.
+template <int L>
+Vec3<double> Passing::middle_in(const Wall& wall, const AlignedVector<LinkPose<Row<L>>>& poses,
+                                int lane) {
+  const auto world = [&](int link, const Frame<double>& x) {
+    return link < 0 ? x : compose(frame_in_lane<L>(poses[std::size_t(link)], lane), x);
+  };
+  const Frame<double> middle = {kernels::diagonal(1.0), wall.middle};
+  return relative(world(wall.link, wall.at), world(wall.other, middle)).p;
+}
+
+bool Passing::came_through(const Wall& wall, const Vec3<double>& from, const Vec3<double>& to) {
+  const double a = component(from, wall.axis), b = component(to, wall.axis);
+  if (!(a * b < 0)) return false;
+  const double share = a / (a - b);
+  for (int k = 0; k < 3; ++k) {
+    const double at = component(from, k) + share * (component(to, k) - component(from, k));
+    if (k != wall.axis && !(std::abs(at) < kWithin * component(wall.half, k))) return false;
+  }
+  return true;
+}
+
 template <int L>
 bool Passing::passed(const AlignedVector<LinkPose<Row<L>>>& before,
                      const AlignedVector<LinkPose<Row<L>>>& after, int lane) const {
-  const auto place = [&](const Wall& wall, const AlignedVector<LinkPose<Row<L>>>& poses) {
-    const auto world = [&](int link, const Frame<double>& x) {
-      return link < 0 ? x : compose(frame_in_lane<L>(poses[std::size_t(link)], lane), x);
-    };
-    const Frame<double> middle = {kernels::diagonal(1.0), wall.middle};
-    return relative(world(wall.link, wall.at), world(wall.other, middle)).p;
-  };
   std::size_t gate = gates_.size();
   bool apart = false;
   return std::any_of(walls_.begin(), walls_.end(), [&](const Wall& wall) {
     if (std::exchange(gate, wall.gate) != wall.gate)
       apart = stay_apart<L>(gates_[wall.gate], before, after, lane);
-    if (apart) return false;
-    const Vec3<double> from = place(wall, before), to = place(wall, after);
-    const double a = component(from, wall.axis), b = component(to, wall.axis);
-    if (!(a * b < 0)) return false;
-    const double share = a / (a - b);
-    for (int k = 0; k < 3; ++k) {
-      const double at = component(from, k) + share * (component(to, k) - component(from, k));
-      if (k != wall.axis && !(std::abs(at) < kWithin * component(wall.half, k))) return false;
-    }
-    return true;
+    return !apart &&
+           came_through(wall, middle_in<L>(wall, before, lane), middle_in<L>(wall, after, lane));
   });
+}
+
+bool Passing::changed_sides(const AlignedVector<LinkPose<Row<1>>>& before,
+                            const AlignedVector<LinkPose<Row<1>>>& after) const {
+  return std::any_of(walls_.begin(), walls_.end(), [&](const Wall& wall) {
+    return wall.other_convex &&
+           came_through(wall, middle_in<1>(wall, before, 0), middle_in<1>(wall, after, 0));
+  });
+}
+
+double Passing::clearance(const AlignedVector<LinkPose<Row<1>>>& poses) const {
+  double least = HUGE_VAL;
+  for (const Wall& wall : walls_) {
+    if (!wall.other_convex) continue;
+    const Vec3<double> at = middle_in<1>(wall, poses, 0);
+    double square = 0;
+    for (int k = 0; k < 3; ++k) {
+      const double edge = k == wall.axis ? 0 : kWithin * component(wall.half, k),
+                   beyond = std::max(std::abs(component(at, k)) - edge, 0.0);
+      square += beyond * beyond;
+    }
+    least = std::min(least, square);
+  }
+  return std::sqrt(least);
 }
 
 #define TANGERE_FOR_LANES(L)                                                            \

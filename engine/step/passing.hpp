@@ -31,6 +31,16 @@ class Passing {
                             const AlignedVector<kernels::LinkPose<kernels::Row<L>>>& after,
                             int lane) const;
 
+  /// Whether between two states, however far apart, the middle of a convex body came through the
+  /// middle plane of another.
+  [[nodiscard]] bool changed_sides(
+      const AlignedVector<kernels::LinkPose<kernels::Row<1>>>& before,
+      const AlignedVector<kernels::LinkPose<kernels::Row<1>>>& after) const;
+  /// Returns how far bodies may move against each other until one can change sides [m]: the least
+  /// distance of a middle from the part of a middle plane that it would have to come through.
+  [[nodiscard]] double clearance(
+      const AlignedVector<kernels::LinkPose<kernels::Row<1>>>& poses) const;
+
  private:
   /// A convex body of a pair, and the middle of the other one.
   struct Wall {
@@ -39,10 +49,17 @@ class Passing {
     kernels::Vec3<double> half;
     int axis;                      ///< along which it is thinnest: 0, 1, 2
     kernels::Vec3<double> middle;  ///< of the other body, in its link
+    bool other_convex;             ///< so that its middle lies in it
     std::size_t gate;
   };
   void add(int link, const kernels::Frame<double>& at, PrimitiveShape shape,
-           const kernels::Vec3<double>& size, int other, const kernels::Vec3<double>& middle);
+           const kernels::Vec3<double>& size, int other, const kernels::Vec3<double>& middle,
+           bool other_convex);
+  template <int L>
+  [[nodiscard]] static kernels::Vec3<double> middle_in(
+      const Wall& wall, const AlignedVector<kernels::LinkPose<kernels::Row<L>>>& poses, int lane);
+  [[nodiscard]] static bool came_through(const Wall& wall, const kernels::Vec3<double>& from,
+                                         const kernels::Vec3<double>& to);
 
   /// A ball around all walls and middles of one link, in its axes.
   struct Ball {

@@ -97,10 +97,7 @@ LaneBits StepWatch::jumping(const BasicWorkspace<L>& w, LaneBits lanes, double h
 template <int L>
 LaneBits StepWatch::creating(const kernels::KernelTable& table, BasicWorkspace<L>& w,
                              LaneBits lanes, double h) const {
-  // What a spring of friction holds is not counted. A sensor's holds nothing.
-  const bool elastic = std::any_of(model_.memories.begin(), model_.memories.end(),
-                                   [](const auto& of) { return of.sensor < 0; });
-  if (!bounded_energy_ || elastic || cut_) return kNoLane;
+  if (!bounded_energy_ || cut_) return kNoLane;
   const LaneBits looked_at = jumping(w, lanes, h);
   if (looked_at == 0) return kNoLane;
   find_poses(table, w);
@@ -111,8 +108,11 @@ LaneBits StepWatch::creating(const kernels::KernelTable& table, BasicWorkspace<L
                      after = energy_of_bodies(model_, w, w.poses_after, w.q1, w.v1, l);
     double gain = after.total - before.total;
     for (int i = 0; i < model_.nv; ++i) gain -= w.stage.tau[i][l] * w.stage.x[i][l];
-    const double held = energy_of_contacts(model_, table, w, w.poses_before, l),
-                 holds = energy_of_contacts(model_, table, w, w.poses_after, l);
+    const MemoryLanes<L>& memory = w.remembered;
+    const double held = energy_of_contacts(model_, table, w, w.poses_before, l) +
+                        energy_of_friction(model_, w, memory.now[std::size_t(l)], l),
+                 holds = energy_of_contacts(model_, table, w, w.poses_after, l) +
+                         energy_of_friction(model_, w, memory.after[std::size_t(l)], l);
     if (gain + holds - held > kMayCreate * std::max(before.moving + held, after.moving + holds))
       found |= 1U << l;
   }

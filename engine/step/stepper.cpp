@@ -9,6 +9,7 @@
 
 #include "engine/base/as_size.hpp"
 #include "engine/step/awake_parts.hpp"
+#include "engine/step/interpenetration.hpp"
 #include "engine/step/kept_anchors.hpp"
 #include "engine/step/motor_force.hpp"
 #include "engine/step/remember.hpp"
@@ -92,6 +93,7 @@ struct Stepper::Impl {
   std::unique_ptr<Machine> of_all;
   std::vector<int> all_q, all_v;  ///< 0, 1, …
   std::unique_ptr<Sleeping> sleeping;
+  Interpenetration overlaps;
 
   Impl(const Model& m, const StepSettings& s)
       : model(m),
@@ -99,7 +101,8 @@ struct Stepper::Impl {
         pushing(s.sleep > 0 || s.all_contacts ? nullptr : pushing_part(compiled(model))),
         machine(pushing ? pushing->model : compiled(model), s),
         all_q(as_size(m.nq())),
-        all_v(as_size(m.nv())) {
+        all_v(as_size(m.nv())),
+        overlaps(compiled(model)) {
     std::iota(all_q.begin(), all_q.end(), 0);
     std::iota(all_v.begin(), all_v.end(), 0);
     if (s.sleep > 0) sleeping = std::make_unique<Sleeping>(compiled(model), s);
@@ -200,6 +203,27 @@ struct Stepper::Impl {
     shift(m.layout.v, m.layout.previous_v, w.v0, stepped.v);
     if (sleeping) settle<L>(batch, g, lane, live & ~again);
     return again << lane;
+  }
+
+  /// Checks the states that the lanes of a group have stepped to for bodies that came through each
+  /// other or overlap, where they have moved far enough to do so since the last check.
+  void check_overlaps(Batch& batch, const GroupOfBlock& g, LaneBits stepped, SingleWorkspace& w) {
+    if (!overlaps.has_pairs() || stepped == 0) return;
+    const Row<kGroup> motion = overlaps.motions(g.rows);
+    for (int l = 0; l < kGroup; ++l) {
+      const std::size_t e = as_size(g.first + l);
+      if (!has(stepped, l) || failed(batch.status_[e])) continue;
+      double& clearance = batch.clearance_[e];
+      clearance -= motion[l];
+      if (clearance > 0) continue;
+      const Interpenetration::Finding found =
+          overlaps.check(kernels::active_kernels(), w, g.rows + l);
+      clearance = found.clearance;
+      if (found.passed)
+        batch.status_[e] = StepStatus::passed;
+      else if (found.overlapping && batch.status_[e] != StepStatus::passed)
+        batch.status_[e] = StepStatus::overlapping;
+    }
   }
 
   /// Steps the live lanes of a group whose bodies may sleep: those with the same bodies asleep
@@ -336,20 +360,20 @@ void Stepper::step_block(Batch& batch, int block, std::span<const double> contro
       if (batch.has_history_[e] != 0) g.history |= 1U << l;
       if (!i.sleeping && !batch.sleep_[e].asleep.empty()) batch.sleep_[e].wake();
     }
-    if (i.sleeping) {
-      i.step_sleepers(batch, g, controls);
-      continue;
-    }
+    const LaneBits stepped = g.live;
     // A lone environment goes through kernels of one lane: the same bits, a third of the time.
     const bool alone = g.live != 0 && (g.live & (g.live - 1)) == 0;
     const int lane = alone ? __builtin_ctz(g.live) : 0;
-    if (alone) {
+    if (i.sleeping) {
+      i.step_sleepers(batch, g, controls);
+    } else if (alone) {
       i.drive(batch, machine.single, g, lane, controls);
       if (g.live != 0) i.step_lanes(batch, i.whole(machine), machine.single, g, lane, tape);
     } else {
       i.drive(batch, machine.work, g, lane, controls);
       if (g.live != 0) i.step_lanes(batch, i.whole(machine), machine.work, g, lane, tape);
     }
+    i.check_overlaps(batch, g, stepped, machine.single);
   }
   if (tape != nullptr) tape->append(batch, block);
 }

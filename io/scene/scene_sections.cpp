@@ -8,6 +8,7 @@
 #include <array>
 #include <cmath>
 
+#include "engine/model/contact_resolution.hpp"
 #include "engine/model/scene_number.hpp"
 #include "engine/model/shapes.hpp"
 
@@ -18,8 +19,6 @@ namespace {
 const std::vector<std::string> kLaws = {"clamped", "paper", "linear", "published"};
 constexpr ContactLaw kLawOf[] = {ContactLaw::clamped, ContactLaw::paper, ContactLaw::linear,
                                  ContactLaw::linear};
-constexpr double kAsWide =
-    1e-3;  // share by which a body may be wider than a pitch and count as such
 constexpr std::size_t kPublishedShare = 50;  // vertices of a mesh for each that touches there
 constexpr int kClamped = 0, kLinear = 2, kPublished = 3;  // indices into them
 
@@ -119,22 +118,9 @@ void warn_of_coarse_points(const Scene& scene, const SceneNode& root) {
                       "and '{}' touches "
                       "it as well, so the forces of both contacts add up; expected one of them",
                       c.source.prefix(), c.general_body, c.primitive_body, c.primitive_body));
-    const auto* const cuboid = std::get_if<CuboidShape>(&shape_of(c.general_body));
-    if (cuboid == nullptr || both_ways) continue;
-    double pitch = 0;
-    for (std::size_t k = 0; k < 3; ++k)
-      pitch = std::max(pitch, cuboid->size[k] / (cuboid->contact_resolution[k] - 1));
-    std::array<double, 3> across = widths(shape_of(c.primitive_body));
-    std::sort(across.begin(), across.end());  // a post's second width is its thickness
-    if (across[1] == 0 || pitch < across[1] * (1 - kAsWide)) continue;
-    root.context().warnings.push_back(fmt::format(
-        "{}<general_primitive_contact>: contact points of '{}' are up to {:.3g} m apart, and '{}' "
-        "is {:.3g} m across, so it can come between them, or out from under them, unnoticed; "
-        "expected a finer general_contact_resolution, or {}",
-        c.source.prefix(), c.general_body, pitch, c.primitive_body, across[1],
-        is_ball(shape_of(c.primitive_body)) ? "the two bodies swapped"
-                                            : "the same contact the other way round as well"));
   }
+  for (const auto& lines : {coarse_contact_lines(scene), polygonal_rolling_lines(scene)})
+    for (const std::string& line : lines) root.context().warnings.push_back(line);
 }
 
 void read_contacts(Scene& scene, const SceneNode& section) {
@@ -184,7 +170,8 @@ void read_contacts(Scene& scene, const SceneNode& section) {
       if (!can_touch(points, touched))
         node.fail(fmt::format(
             "general_body '{}' is a sphere, and primitive_body '{}' a mesh, whose distance is "
-            "known only near its surface; swap the two bodies",
+            "known only near its surface; expected the mesh as general_body, with contact points "
+            "nearer to each other than the sphere is wide ('pitch' or 'count')",
             d.general_body, d.primitive_body));
       read_law(node, kClamped, d);
       scene.pair_contacts.push_back(std::move(d));

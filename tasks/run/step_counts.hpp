@@ -16,7 +16,8 @@ struct StepCounts {
   std::int64_t coarse_steps = 0;   ///< with parts that missed the accuracy that was asked for
   std::int64_t passed_steps = 0;   ///< in which a body came through another
   std::int64_t damped_steps = 0;   ///< that would have created energy
-  std::int64_t bodies_asleep = 0;  ///< summed over simulation_steps
+  std::int64_t overlapping_steps = 0;  ///< after which bodies of a contact overlap unnoticed
+  std::int64_t bodies_asleep = 0;      ///< summed over simulation_steps
 
   /// Counts the step that an environment has just taken.
   void count(const Batch& batch, int environment) {
@@ -27,8 +28,12 @@ struct StepCounts {
     coarse_steps += status == StepStatus::coarse ? 1 : 0;
     passed_steps += status == StepStatus::passed ? 1 : 0;
     damped_steps += status == StepStatus::damped ? 1 : 0;
+    overlapping_steps += status == StepStatus::overlapping ? 1 : 0;
     bodies_asleep += batch.sleep(environment).bodies;
   }
+
+  /// Steps whose motion is not that of the bodies in the scene, because contacts missed each other.
+  [[nodiscard]] std::int64_t missed_contacts() const { return passed_steps + overlapping_steps; }
 
   StepCounts& operator+=(const StepCounts& other) {
     simulation_steps += other.simulation_steps;
@@ -37,6 +42,7 @@ struct StepCounts {
     coarse_steps += other.coarse_steps;
     passed_steps += other.passed_steps;
     damped_steps += other.damped_steps;
+    overlapping_steps += other.overlapping_steps;
     bodies_asleep += other.bodies_asleep;
     return *this;
   }

@@ -10,6 +10,7 @@
 #include <memory>
 
 #include "engine/base/as_size.hpp"
+#include "engine/model/contact_resolution.hpp"
 #include "engine/model/short_touches.hpp"
 #include "engine/step/control.hpp"
 #include "engine/step/stepper.hpp"
@@ -69,7 +70,7 @@ struct Play {
           histories[l].add(w.readout, batch, e);
     };
     record();
-    // Those whose steps missed the accuracy, let a body through or were damped.
+    // Those with a step that says that it may be wrong.
     std::vector<bool> flagged(as_size(lanes));
     for (std::int64_t k = 0; k < steps; ++k) {
       if (stopped || (go_on && !go_on())) {
@@ -82,8 +83,7 @@ struct Play {
         if (!tally.live(e)) continue;
         out.most_evaluations = std::max(out.most_evaluations, batch.iterations(e));
         const StepStatus status = batch.status(e);
-        if (status == StepStatus::coarse || status == StepStatus::passed ||
-            status == StepStatus::damped)
+        if (status != StepStatus::converged && status != StepStatus::split && !failed(status))
           flagged[as_size(e - first)] = true;
       }
       tally.count(batch, k);
@@ -168,6 +168,8 @@ void judge(const BlockOutcome& out, StressRow& row) {
     row.reason = to_string(out.failures.front().status);
   else if (row.counts.passed_steps > 0)
     row.reason = to_string(StepStatus::passed);
+  else if (row.counts.overlapping_steps > 0)
+    row.reason = to_string(StepStatus::overlapping);
   else if (row.counts.coarse_steps > 0)
     row.reason = to_string(StepStatus::coarse);
   else if (row.counts.damped_steps > 0)
@@ -178,8 +180,11 @@ void judge(const BlockOutcome& out, StressRow& row) {
 std::string warning_of(const Scene& scene, const StressRow& row) {
   if (row.accuracy > 0) return "";
   if (!row.of->measure) return costly_steps(row.integrator, row.counts);
-  const auto lines = short_touches(Model(scene), row.integrator, row.step);
-  return lines.empty() ? "" : lines.front();
+  for (const auto& lines :
+       {short_touches(Model(scene), row.integrator, row.step), coarse_contact_lines(scene),
+        polygonal_rolling_lines(scene)})
+    if (!lines.empty()) return lines.front();
+  return "";
 }
 
 /// Fills in what a setting came to. False when it was stopped.

@@ -73,6 +73,55 @@ TEST(BoundedEnergy, IsAChoiceOfTheScene) {
   EXPECT_EQ(free.damped, 0);
 }
 
+/// The same where friction has a spring: at the ball's own contact, or at one of a box 5 m away that
+/// rests in the ground and shares nothing with the ball but the environment.
+TEST(BoundedEnergy, NoSchemeCreatesEnergyBesideSpringsOfFriction) {
+  for (const Integrator scheme : integrators())
+    for (const double kn : {1e4, 1e6, 1e8})
+      for (const double h : {1e-3, 5e-3, 2e-2})
+        for (const double speed : {0.77, 3.1}) {
+          Scene own = impact(kn), other = impact(kn);
+          own.ground_contacts[0].coefficients.ks = kn / 4;
+          other.links.push_back(
+              link("box", JointType::free, {5, 0, 0.05}, CuboidShape{{0.1, 0.1, 0.1}}, 100));
+          other.ground_contacts.push_back({"box", {100, 1, 0.5, 1}, ContactLaw::linear, 1e-5, {}});
+          other.ground_contacts[1].coefficients.ks = 1;
+          EXPECT_LE(bounce(own, scheme, h, speed).energy, 1.03)
+              << to_string(scheme) << " " << kn << " N/m " << h << " s " << speed << " m/s";
+          EXPECT_LE(bounce(other, scheme, h, speed).energy, 1.03)
+              << to_string(scheme) << " " << kn << " N/m " << h << " s " << speed << " m/s, box";
+        }
+}
+
+/// A block that slides along the ground and sticks on the spring of its friction swings about the
+/// place where the spring holds nothing. That energy comes from motion, so no step is damped, and
+/// the schemes of higher order keep it.
+TEST(BoundedEnergy, CountsWhatASpringOfFrictionHolds) {
+  constexpr double kMass = 0.1, kKs = 40, kSpeed = 0.02;
+  for (const Integrator scheme : {Integrator::sdirk2, Integrator::sdirk3}) {
+    Scene s;
+    s.ground = GroundDescription{};
+    s.links = {link("block", JointType::prismatic, {0, 0, 0}, CuboidShape{{0.1, 0.1, 0.1}, {2, 2, 2}},
+                    kMass / 1e-3)};
+    s.links[0].joint.axis0 = {1, 0, 0};
+    s.links[0].joint.pose.p = {0, 0, 0.04};  // pressed 10 mm into the ground
+    s.ground_contacts.push_back({"block", {1000, 0, 5, 0}, ContactLaw::clamped, 1e-5, {}});
+    s.ground_contacts[0].coefficients.ks = kKs;
+    const double omega = std::sqrt(4 * kKs / kMass), h = 0.02 / omega;  // four corners touch
+    const Model model(s);
+    Batch batch(model, 1);
+    batch.set_state(0, std::vector<double>{0}, std::vector<double>{kSpeed});
+    Stepper stepper(model, testing::options(scheme, h, 1e-10));
+    double most = 0;
+    for (int t = 0; t < 1000; ++t) {
+      stepper.step(batch, {});
+      ASSERT_EQ(batch.status(0), StepStatus::converged) << to_string(scheme) << " step " << t;
+      most = std::max(most, std::abs(q_of(batch)[0]));
+    }
+    EXPECT_NEAR(most, kSpeed / omega, 1e-3 * kSpeed / omega) << to_string(scheme);
+  }
+}
+
 /// A bar that hits the limits of its joint, again and again.
 TEST(BoundedEnergy, NoSchemeCreatesEnergyAtALimit) {
   Scene s;

@@ -1,0 +1,250 @@
+// SPDX-License-Identifier: Apache-2.0
+// Compares distances between contact points with the widths of the bodies that they touch.
+//
+// A round body of radius r that touches with n points around rolls over a polygon. Its corners stand
+// s = r (1 - cos(π/n)) above the middles of its edges. It rolls smoothly where s is no more than the
+// depth d = m |g|/(2 k_n) at which two points carry its weight:  n ≥ π/acos(1 - d/r). Of an ellipsoid
+// with points a gap e apart and the longest semi-axis a, s = e²/(8 a).
+#include "engine/model/contact_resolution.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <map>
+#include <numbers>
+
+#include "engine/model/mass_properties.hpp"
+#include "engine/model/shapes.hpp"
+
+namespace tangere {
+
+namespace {
+
+constexpr int kPlaces = 2000;
+/// Share by which a body may be wider than the gap and still fit.
+constexpr double kAsWide = 1e-3;
+
+/// Returns the link with a body; null where there is none of that name.
+const LinkDescription* link_with(const Scene& scene, const std::string& body) {
+  const auto found = std::ranges::find_if(
+      scene.links, [&](const LinkDescription& l) { return l.body.name == body; });
+  return found == scene.links.end() ? nullptr : &*found;
+}
+
+/// Returns the place of a convex shape's surface in a direction from its centre.
+Vector3 surface_along(const Shape& shape, const Vector3& direction) {
+  double inside = 0, outside = 2;  // the direction leads to the box around the shape, or beyond
+  const auto at = [&](double t) {
+    return Vector3{t * direction[0], t * direction[1], t * direction[2]};
+  };
+  for (int k = 0; k < 40; ++k) {
+    const double middle = 0.5 * (inside + outside);
+    (distance_from(shape, at(middle))->distance < 0 ? inside : outside) = middle;
+  }
+  return at(inside);
+}
+
+/// Returns about kPlaces places of a surface, evenly spread on a ball that is stretched with it.
+std::vector<Vector3> convex_places(const Shape& shape) {
+  const std::array<double, 3> width = widths(shape);
+  constexpr double kTurn = std::numbers::pi * (3 - 2.23606797749978969);  // golden angle [rad]
+  std::vector<Vector3> places;
+  for (int k = 0; k < kPlaces; ++k) {
+    const double z = 1 - (2 * k + 1.0) / kPlaces, rho = std::sqrt(1 - z * z), angle = k * kTurn;
+    places.push_back(surface_along(
+        shape, {width[0] * rho * std::cos(angle), width[1] * rho * std::sin(angle), width[2] * z}));
+  }
+  return places;
+}
+
+/// Returns the middles of the triangles' parts, so that the area is covered by about kPlaces.
+std::vector<Vector3> mesh_places(const MeshShape& mesh) {
+  const auto corner = [&](int v, std::size_t c) {
+    return mesh.scale * mesh.vertices[3 * std::size_t(v) + c];
+  };
+  const auto place = [&](const std::array<int, 3>& t, double u, double v) {
+    Vector3 p{};
+    for (std::size_t c = 0; c < 3; ++c)
+      p[c] = corner(t[0], c) + u * (corner(t[1], c) - corner(t[0], c)) +
+             v * (corner(t[2], c) - corner(t[0], c));
+    return p;
+  };
+  const auto area = [&](const std::array<int, 3>& t) {
+    const Vector3 a = place(t, 0, 0), b = place(t, 1, 0), c = place(t, 0, 1);
+    const Vector3 across = cross(b - a, c - a);
+    return 0.5 * std::sqrt(dot(across, across));
+  };
+  double whole = 0;
+  for (const auto& t : mesh.triangles) whole += area(t);
+  const std::size_t skip = std::max<std::size_t>(1, mesh.triangles.size() / kPlaces);
+  std::vector<Vector3> places;
+  for (std::size_t k = 0; k < mesh.triangles.size(); k += skip) {
+    const auto& t = mesh.triangles[k];
+    const int n = std::clamp(int(std::ceil(std::sqrt(kPlaces * area(t) / whole))), 1, 64);
+    for (int i = 0; i < n; ++i)
+      for (int j = 0; j < n - i; ++j)
+        places.push_back(place(t, (i + 1.0 / 3) / n, (j + 1.0 / 3) / n));
+  }
+  return places;
+}
+
+/// Returns the full widths of a shape along its axes [m]; zeros where it has no end.
+std::array<double, 3> box_around(const Shape& shape) {
+  const auto* const mesh = std::get_if<MeshShape>(&shape);
+  if (mesh == nullptr) return widths(shape);
+  std::array<double, 3> low{}, high{};
+  for (std::size_t k = 0; k < mesh->vertices.size(); ++k) {
+    const double x = mesh->scale * mesh->vertices[k];
+    low[k % 3] = k < 3 ? x : std::min(low[k % 3], x);
+    high[k % 3] = k < 3 ? x : std::max(high[k % 3], x);
+  }
+  return {high[0] - low[0], high[1] - low[1], high[2] - low[2]};
+}
+
+/// A post's second width is its thickness.
+double second_width(const Shape& shape) {
+  std::array<double, 3> width = box_around(shape);
+  std::ranges::sort(width);
+  return width[1];
+}
+
+/// Whether two equal cuboids that lie on each other may touch with fewer than two rows of points.
+bool rims_alone(const Shape& points, const Shape& touched) {
+  const auto* const one = std::get_if<CuboidShape>(&points);
+  const auto* const two = std::get_if<CuboidShape>(&touched);
+  if (one == nullptr || two == nullptr) return false;
+  const std::array<int, 3>& n = one->contact_resolution;
+  // Corners alone meet a cuboid face by face (kernels/step/faces.hpp).
+  if (std::ranges::max(n) == 2) return false;
+  for (std::size_t k = 0; k < 3; ++k)
+    if (std::abs(one->size[k] - two->size[k]) > 2e-3 * one->size[k]) return false;
+  return std::ranges::min(n) < 4;
+}
+
+}  // namespace
+
+double contact_point_gap(const Shape& shape) {
+  if (is_ball(shape) || !has_contact_points(shape)) return 0;
+  if (const auto* const cuboid = std::get_if<CuboidShape>(&shape)) {
+    double pitch = 0;
+    for (std::size_t k = 0; k < 3; ++k)
+      pitch = std::max(pitch, cuboid->size[k] / (cuboid->contact_resolution[k] - 1));
+    return pitch;
+  }
+  const auto* const mesh = std::get_if<MeshShape>(&shape);
+  if (mesh == nullptr && !has_distance(shape)) return 0;  // an abstract body has no surface
+  const std::vector<double> points = contact_points(shape);
+  double most = 0;
+  for (const Vector3& place : mesh != nullptr ? mesh_places(*mesh) : convex_places(shape)) {
+    double nearest = HUGE_VAL;
+    for (std::size_t k = 0; k < points.size() && nearest > most; k += 3) {
+      const double x = points[k] - place[0], y = points[k + 1] - place[1],
+                   z = points[k + 2] - place[2];
+      nearest = std::min(nearest, x * x + y * y + z * z);
+    }
+    most = std::max(most, nearest);
+  }
+  return 2 * std::sqrt(most);
+}
+
+std::vector<CoarseContact> coarse_contacts(const Scene& scene) {
+  std::vector<CoarseContact> found;
+  std::map<const LinkDescription*, double> gaps;
+  for (std::size_t k = 0; k < scene.pair_contacts.size(); ++k) {
+    const PairContactDescription& c = scene.pair_contacts[k];
+    const LinkDescription *const one = link_with(scene, c.general_body),
+                          *const two = link_with(scene, c.primitive_body);
+    if (one == nullptr || two == nullptr || !c.points.empty()) continue;
+    const Shape &points = one->body.shape, &touched = two->body.shape;
+    const double width = second_width(touched);
+    if (width == 0) continue;
+    const auto [place, is_new] = gaps.try_emplace(one, 0.0);
+    if (is_new) place->second = contact_point_gap(points);
+    const double gap = place->second;
+    if (gap == 0) continue;
+    if (gap >= width * (1 - kAsWide) || rims_alone(points, touched))
+      found.push_back({k, gap, width});
+  }
+  const auto other_way_is_fine = [&](const CoarseContact& coarse) {
+    const PairContactDescription& c = scene.pair_contacts[coarse.contact];
+    for (std::size_t k = 0; k < scene.pair_contacts.size(); ++k) {
+      const PairContactDescription& other = scene.pair_contacts[k];
+      if (other.general_body == c.primitive_body && other.primitive_body == c.general_body &&
+          std::ranges::none_of(found, [&](const CoarseContact& f) { return f.contact == k; }))
+        return true;
+    }
+    return false;
+  };
+  std::vector<CoarseContact> both;
+  std::ranges::remove_copy_if(found, std::back_inserter(both), other_way_is_fine);
+  return both;
+}
+
+std::vector<std::string> coarse_contact_lines(const Scene& scene) {
+  std::vector<std::string> lines;
+  for (const CoarseContact& coarse : coarse_contacts(scene)) {
+    const PairContactDescription& c = scene.pair_contacts[coarse.contact];
+    const Shape& points = link_with(scene, c.general_body)->body.shape;
+    const bool ball = is_ball(link_with(scene, c.primitive_body)->body.shape),
+               mesh = std::holds_alternative<MeshShape>(points);
+    const std::string finer =
+        mesh ? "a smaller 'pitch' or larger 'count'"
+        : row_of(points).counts.empty()
+            ? "points that are nearer to each other"
+            : fmt::format("a finer {}", row_of(points).counts.front().attribute);
+    lines.push_back(fmt::format(
+        "{}<general_primitive_contact>: contact points of '{}' are up to {:.3g} m apart, and '{}' "
+        "is {:.3g} m across, so it can come between them, or out from under them, unnoticed; "
+        "expected {}, or {}",
+        c.source.prefix(), c.general_body, coarse.gap, c.primitive_body, coarse.width, finer,
+        ball && !mesh ? "the two bodies swapped"
+                      : "the same contact the other way round as well, with near enough points"));
+  }
+  return lines;
+}
+
+std::vector<std::string> polygonal_rolling_lines(const Scene& scene) {
+  std::vector<std::string> lines;
+  const double gravity = std::sqrt(dot(scene.gravity, scene.gravity));
+  for (const GroundContactDescription& c : scene.ground_contacts) {
+    const LinkDescription* const link = link_with(scene, c.body);
+    if (link == nullptr) continue;
+    const Shape& shape = link->body.shape;
+    double corners = 0, radius = 0;
+    int around = 0;
+    const char* attribute = nullptr;
+    if (const auto* const cylinder = std::get_if<CylinderShape>(&shape)) {
+      radius = cylinder->radius, around = cylinder->contact_angles;
+      attribute = "general_contact_angle_resolution";
+    } else if (const auto* const capsule = std::get_if<CapsuleShape>(&shape)) {
+      radius = capsule->radius, around = capsule->contact_angles;
+      attribute = "second number of general_contact_resolution";
+    }
+    const bool rod = around > 0;
+    if (rod) {
+      corners = radius * (1 - std::cos(std::numbers::pi / around));
+    } else if (const auto* const ellipsoid = std::get_if<EllipsoidShape>(&shape)) {
+      const double gap = contact_point_gap(shape);
+      corners = gap * gap / (4 * std::ranges::max(ellipsoid->size));
+      around = ellipsoid->contact_count;
+      attribute = "general_contact_resolution";
+    }
+    if (around == 0 || !(c.coefficients.kn > 0) || !(gravity > 0)) continue;
+    const double mass = mass_properties(shape, link->body.density).mass,
+                 depth = mass * gravity / (2 * c.coefficients.kn);
+    if (corners <= depth) continue;
+    const double enough =
+        rod ? std::numbers::pi / std::acos(1 - std::min(depth / radius, 1.0))
+            : around * corners / depth;
+    lines.push_back(fmt::format(
+        "{}<ground_contact>: '{}' touches the ground with {} points{}, so it rolls over a "
+        "polygon whose corners stand out by {:.2g} m, and it sinks in by {:.2g} m; to roll as a "
+        "round body it needs a {} of {:.0f} or more",
+        c.source.prefix(), c.body, around, rod ? " around" : "", corners, depth, attribute, std::ceil(enough)));
+  }
+  return lines;
+}
+
+}  // namespace tangere

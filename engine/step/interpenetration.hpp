@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: Apache-2.0
+// Checks of the state at the end of whole steps: bodies of a contact that came through each other,
+// at whatever speed, and bodies that overlap where hardly any contact point is inside.
+#pragma once
+
+#include <vector>
+
+#include "engine/step/batch.hpp"
+#include "engine/step/passing.hpp"
+#include "engine/step/workspace.hpp"
+
+namespace tangere {
+
+/// The share of the smaller body's inscribed radius that the radius of the largest ball in both
+/// bodies must exceed for them to count as overlapping: they are then a quarter of its thickness
+/// inside each other.
+inline constexpr double kOverlapShare = 0.25;
+
+/// Checks of one thread. A state is checked only if bodies have moved, since the last check, by
+/// what was then missing to an overlap or to a change of sides (Batch: clearance).
+class Interpenetration {
+ public:
+  explicit Interpenetration(const CompiledModel& model);
+
+  /// Whether the model has a pair of bodies to check.
+  [[nodiscard]] bool has_pairs() const { return has_pairs_; }
+
+  /// Returns for the lanes of a group no less than what any point of a checked body moved relative
+  /// to another in the last step [m]. `rows`: the group's in its block, which hold the states
+  /// before and after that step.
+  [[nodiscard]] kernels::Row<kernels::kGroup> motions(const double* rows);
+
+  /// What a check found, and how far bodies may move until the next one must be made [m].
+  struct Finding {
+    bool passed = false, overlapping = false;
+    double clearance = 0;
+  };
+  /// Checks one lane. `column`: its numbers in the block. Overwrites states, poses and block of the
+  /// workspace.
+  [[nodiscard]] Finding check(const kernels::KernelTable& table, SingleWorkspace& w,
+                              const double* column) const;
+
+ private:
+  /// Two bodies whose contact points are far apart (engine/model/contact_resolution.hpp).
+  struct CoarsePair {
+    int body1, body2;
+    std::vector<int> contacts;  ///< of these bodies, in either direction: indices of pairs
+  };
+  class Lane;
+
+  void bound_arms();
+
+  const CompiledModel& model_;
+  Passing passing_;
+  std::vector<CoarsePair> coarse_;
+  bool has_pairs_ = false;
+  std::vector<double> arm_;           ///< (links) from its origin to any point that it moves [m]
+  std::vector<std::uint8_t> checked_;  ///< (links) 1: carries a body that is checked
+  std::vector<int> sliders_;          ///< in q: sliding dofs of links that others turn
+  AlignedVector<kernels::Row<kernels::kGroup>> way_;  ///< (links) scratch
+};
+
+}  // namespace tangere
