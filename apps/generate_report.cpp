@@ -92,8 +92,8 @@ int report_shards(const GenerateOptions& options, const Console& console, const 
                   const JobResult& done, DatasetWriter& output) {
   const EpisodeSummary& summary = done.summary;
   const EpisodeOptions& run = job.run;
-  const ExitCode code = exit_code(
-      console, !summary.failures.empty() || output.kept_failed() > 0, summary.counts);
+  const ExitCode code =
+      exit_code(console, !summary.failures.empty() || output.kept_failed() > 0, summary.counts);
   const Shards shards(output);
   const Merged merged = merge_if_complete(options, output);
   list_failures(console, "episode", failures_of(summary), "--json and the shards name all");

@@ -135,7 +135,8 @@ Json note_costly_steps(const Console& console, Integrator integrator, double acc
 ExitCode exit_code(const Console& console, bool failed, const StepCounts& counts) {
   if (counts.missed_contacts() == 0) return failed ? kSomeFailed : kDone;
   console.note(fmt::format(
-      "error: contacts missed bodies in {} of {} steps: in {} a body came through another, and after "
+      "error: contacts missed bodies in {} of {} steps: in {} a body came through another, and "
+      "after "
       "{} bodies overlap by more than a quarter of their thickness while hardly any contact point "
       "is inside; expected more contact points, stiffer contacts or shorter steps",
       counts.missed_contacts(), counts.simulation_steps, counts.passed_steps,

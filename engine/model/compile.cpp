@@ -207,11 +207,12 @@ class Compiler {
                          shape_name(primitive) + ") has no distance; expected " +
                          shapes_with([](const ShapeRow& row) { return row.distance.has_value(); }));
       if (ball && !can_touch(general, primitive))
-        throw InputError(d.source.prefix() + "general_body '" + d.general_body +
-                         "' is a sphere, and primitive_body '" + d.primitive_body +
-                         "' a mesh, whose distance is known only near its surface; expected the mesh "
-                         "as general_body, with contact points nearer to each other than the "
-                         "sphere is wide");
+        throw InputError(
+            d.source.prefix() + "general_body '" + d.general_body +
+            "' is a sphere, and primitive_body '" + d.primitive_body +
+            "' a mesh, whose distance is known only near its surface; expected the mesh "
+            "as general_body, with contact points nearer to each other than the "
+            "sphere is wide");
       if (b1 == b2 || first.link == second.link)
         throw InputError(d.source.prefix() + "bodies '" + d.general_body + "' and '" +
                          d.primitive_body + "' cannot move against each other");

@@ -154,8 +154,9 @@ std::vector<CoarseContact> coarse_contacts(const Scene& scene) {
   std::map<const LinkDescription*, double> gaps;
   for (std::size_t k = 0; k < scene.pair_contacts.size(); ++k) {
     const PairContactDescription& c = scene.pair_contacts[k];
-    const LinkDescription *const one = link_with(scene, c.general_body),
-                          *const two = link_with(scene, c.primitive_body);
+    const LinkDescription *const one = link_with(scene, c.general_body), *const two = link_with(
+                                                                             scene,
+                                                                             c.primitive_body);
     if (one == nullptr || two == nullptr || !c.points.empty()) continue;
     const Shape &points = one->body.shape, &touched = two->body.shape;
     const double width = second_width(touched);
@@ -235,14 +236,14 @@ std::vector<std::string> polygonal_rolling_lines(const Scene& scene) {
     const double mass = mass_properties(shape, link->body.density).mass,
                  depth = mass * gravity / (2 * c.coefficients.kn);
     if (corners <= depth) continue;
-    const double enough =
-        rod ? std::numbers::pi / std::acos(1 - std::min(depth / radius, 1.0))
-            : around * corners / depth;
+    const double enough = rod ? std::numbers::pi / std::acos(1 - std::min(depth / radius, 1.0))
+                              : around * corners / depth;
     lines.push_back(fmt::format(
         "{}<ground_contact>: '{}' touches the ground with {} points{}, so it rolls over a "
         "polygon whose corners stand out by {:.2g} m, and it sinks in by {:.2g} m; to roll as a "
         "round body it needs a {} of {:.0f} or more",
-        c.source.prefix(), c.body, around, rod ? " around" : "", corners, depth, attribute, std::ceil(enough)));
+        c.source.prefix(), c.body, around, rod ? " around" : "", corners, depth, attribute,
+        std::ceil(enough)));
   }
   return lines;
 }

@@ -55,8 +55,7 @@ Ball ball_around(const CompiledBody& body, const Vec3<double>& size) {
   const double* const low = body.grid->low;
   const double* const high = body.grid->high;
   ball.centre = 0.5 * size.x * Vec3<double>{low[0] + high[0], low[1] + high[1], low[2] + high[2]};
-  ball.radius =
-      0.5 * size.x * norm({high[0] - low[0], high[1] - low[1], high[2] - low[2]});
+  ball.radius = 0.5 * size.x * norm({high[0] - low[0], high[1] - low[1], high[2] - low[2]});
   return ball;
 }
 
@@ -176,7 +175,7 @@ Interpenetration::Interpenetration(const CompiledModel& m)
       passing_(m),
       arm_(m.links.size(), 0.0),
       checked_(m.links.size(), 0),
-      way_(m.links.size()) {
+      way_(m.links.size() * kGroup) {
   for (const auto& [body1, body2] : m.coarse_pairs) {
     CoarsePair pair{body1, body2, {}};
     for (std::size_t k = 0; k < m.pairs.size(); ++k) {
@@ -200,7 +199,9 @@ void Interpenetration::bound_arms() {
       has_pairs_ = true;
       const Ball ball = ball_around(body, body.size);
       const Vec3<double> centre = body.frame.R * ball.centre + body.frame.p;
-      double arm = norm(centre) + std::max(ball.radius, body.extent);
+      // A sphere is where its centre is, however it turns.
+      double arm = norm(centre);
+      if (body.shape != PrimitiveShape::sphere) arm += std::max(ball.radius, body.extent);
       for (int i = body.link; i >= 0; i = links[std::size_t(i)].parent) {
         arm_[std::size_t(i)] = std::max(arm_[std::size_t(i)], arm);
         arm += norm(links[std::size_t(i)].frame.p);
@@ -219,61 +220,64 @@ void Interpenetration::bound_arms() {
 
 // A joint that turns by θ moves a point at distance a by no more than θ a. Of unit quaternions,
 // |q - q'| = 2 sin(θ/4) ≥ θ/π for θ ≤ π.
-Row<kGroup> Interpenetration::motions(const double* rows) {
+template <int L>
+Row<L> Interpenetration::motions(const double* rows) {
   const BlockLayout& layout = model_.layout;
   const auto now = [&](int i) { return rows + (layout.q + i) * kBlock; };
   const auto before = [&](int i) { return rows + (layout.previous_q + i) * kBlock; };
-  Row<kGroup> slid{}, first{}, second{};
+  Row<L> slid{}, first{}, second{};
   for (const int q : sliders_)
-    for (int l = 0; l < kGroup; ++l) slid[l] += std::abs(now(q)[l]);
+    for (int l = 0; l < L; ++l) slid[l] += std::abs(now(q)[l]);
   for (std::size_t i = 0; i < model_.links.size(); ++i) {
     const kernels::Link& link = model_.links[i];
-    Row<kGroup>& way = way_[i];
-    way = link.parent < 0 ? Row<kGroup>{} : way_[std::size_t(link.parent)];
+    double* const way = &way_[i * kGroup];
+    for (int l = 0; l < L; ++l)
+      way[l] = link.parent < 0 ? 0 : way_[std::size_t(link.parent) * kGroup + std::size_t(l)];
     if (link.kind == kernels::JointKind::spherical) {
-      Row<kGroup> minus{}, plus{};  // q and -q are the same rotation
+      Row<L> minus{}, plus{};  // q and -q are the same rotation
       for (int k = 0; k < 4; ++k)
-        for (int l = 0; l < kGroup; ++l) {
+        for (int l = 0; l < L; ++l) {
           const double a = now(link.q + k)[l], b = before(link.q + k)[l];
           minus[l] += (a - b) * (a - b);
           plus[l] += (a + b) * (a + b);
         }
-      for (int l = 0; l < kGroup; ++l)
+      for (int l = 0; l < L; ++l)
         way[l] += std::numbers::pi * std::sqrt(std::min(minus[l], plus[l])) * (arm_[i] + slid[l]);
     } else {
       const bool slides = kernels::slides(link.kind);
       for (int k = 0; k < kernels::dofs(link.kind); ++k)
-        for (int l = 0; l < kGroup; ++l)
+        for (int l = 0; l < L; ++l)
           way[l] += std::abs(now(link.q + k)[l] - before(link.q + k)[l]) *
                     (slides ? 1 : arm_[i] + slid[l]);
     }
     if (checked_[i] == 0) continue;
-    for (int l = 0; l < kGroup; ++l) {
+    for (int l = 0; l < L; ++l) {
       second[l] = std::max(second[l], std::min(first[l], way[l]));
       first[l] = std::max(first[l], way[l]);
     }
   }
-  for (int l = 0; l < kGroup; ++l) first[l] += second[l];
+  for (int l = 0; l < L; ++l) first[l] += second[l];
   return first;
 }
+template Row<kGroup> Interpenetration::motions(const double*);
+template Row<1> Interpenetration::motions(const double*);
 
 Interpenetration::Finding Interpenetration::check(const kernels::KernelTable& table,
-                                                  SingleWorkspace& w, const double* column) const {
-  const BlockLayout& layout = model_.layout;
-  for (int i = 0; i < model_.nq; ++i) {
-    w.q0[i][0] = column[(layout.previous_q + i) * kBlock];
-    w.q1[i][0] = column[(layout.q + i) * kBlock];
-  }
+                                                  SingleWorkspace& w, const double* column,
+                                                  double motion) const {
   w.stage.block = column;
   w.stage.group = 0;
-  const auto poses_at = [&](const Row<1>* q, auto& poses) {
+  const auto find_poses = [&](int first, Row<1>* q, auto& poses) {
+    for (int i = 0; i < model_.nq; ++i) q[i][0] = column[(first + i) * kBlock];
     table.stage<1>().poses_at(model_.view, w.stage, q, w.zero, w.zero, poses.data());
   };
-  poses_at(w.q0, w.poses_before);
-  poses_at(w.q1, w.poses_after);
   Finding found;
-  found.passed = passing_.changed_sides(w.poses_before, w.poses_after);
+  find_poses(model_.layout.q, w.q1, w.poses_after);
   found.clearance = passing_.clearance(w.poses_after);
+  if (found.clearance <= motion) {  // else nothing can have come from the other side
+    find_poses(model_.layout.previous_q, w.q0, w.poses_before);
+    found.passed = passing_.changed_sides(w.poses_before, w.poses_after);
+  }
   const Lane lane(model_, w.poses_after, column);
   for (const CoarsePair& pair : coarse_) {
     const double threshold = lane.threshold(pair);

@@ -25,20 +25,21 @@ class Interpenetration {
   /// Whether the model has a pair of bodies to check.
   [[nodiscard]] bool has_pairs() const { return has_pairs_; }
 
-  /// Returns for the lanes of a group no less than what any point of a checked body moved relative
-  /// to another in the last step [m]. `rows`: the group's in its block, which hold the states
-  /// before and after that step.
-  [[nodiscard]] kernels::Row<kernels::kGroup> motions(const double* rows);
+  /// Returns for L lanes no less than what any point of a checked body moved relative to another in
+  /// the last step [m]. `rows`: number r of lane l at [r * kBlock + l]. They hold the states before
+  /// and after that step.
+  template <int L>
+  [[nodiscard]] kernels::Row<L> motions(const double* rows);
 
   /// What a check found, and how far bodies may move until the next one must be made [m].
   struct Finding {
     bool passed = false, overlapping = false;
     double clearance = 0;
   };
-  /// Checks one lane. `column`: its numbers in the block. Overwrites states, poses and block of the
-  /// workspace.
+  /// Checks one lane. `column`: its numbers in the block. `motion`: its number of motions().
+  /// Overwrites states, poses and block of the workspace.
   [[nodiscard]] Finding check(const kernels::KernelTable& table, SingleWorkspace& w,
-                              const double* column) const;
+                              const double* column, double motion) const;
 
  private:
   /// Two bodies whose contact points are far apart (engine/model/contact_resolution.hpp).
@@ -54,10 +55,10 @@ class Interpenetration {
   Passing passing_;
   std::vector<CoarsePair> coarse_;
   bool has_pairs_ = false;
-  std::vector<double> arm_;           ///< (links) from its origin to any point that it moves [m]
+  std::vector<double> arm_;            ///< (links) from its origin to any point that it moves [m]
   std::vector<std::uint8_t> checked_;  ///< (links) 1: carries a body that is checked
-  std::vector<int> sliders_;          ///< in q: sliding dofs of links that others turn
-  AlignedVector<kernels::Row<kernels::kGroup>> way_;  ///< (links) scratch
+  std::vector<int> sliders_;           ///< in q: sliding dofs of links that others turn
+  AlignedVector<double> way_;          ///< (links, kGroup) scratch
 };
 
 }  // namespace tangere

@@ -46,8 +46,8 @@ void Passing::add(int link, const Frame<double>& at, PrimitiveShape shape, const
     return std::minmax(g.link, g.other) == std::minmax(link, other);
   };
   const auto gate = std::find_if(gates_.begin(), gates_.end(), same);
-  walls_.push_back(
-      {link, other, at, half, axis, middle, other_convex, std::size_t(gate - gates_.begin())});
+  walls_.push_back({link, other, at, half, axis, middle, other_convex,
+                    kWithin * std::sqrt(dot(half, half)), std::size_t(gate - gates_.begin())});
   if (gate == gates_.end()) {
     gates_.push_back({link, other, thin});
   } else {
@@ -271,9 +271,17 @@ bool Passing::changed_sides(const AlignedVector<LinkPose<Row<1>>>& before,
 }
 
 double Passing::clearance(const AlignedVector<LinkPose<Row<1>>>& poses) const {
+  const auto in_world = [&](int link, const Vec3<double>& p) {
+    if (link < 0) return p;
+    const Frame<double> at = frame_in_lane<1>(poses[std::size_t(link)], 0);
+    return at.R * p + at.p;
+  };
   double least = HUGE_VAL;
   for (const Wall& wall : walls_) {
     if (!wall.other_convex) continue;
+    const Vec3<double> arm = in_world(wall.other, wall.middle) - in_world(wall.link, wall.at.p);
+    const double far = least + wall.reach;
+    if (dot(arm, arm) >= far * far) continue;
     const Vec3<double> at = middle_in<1>(wall, poses, 0);
     double square = 0;
     for (int k = 0; k < 3; ++k) {
@@ -281,9 +289,9 @@ double Passing::clearance(const AlignedVector<LinkPose<Row<1>>>& poses) const {
                    beyond = std::max(std::abs(component(at, k)) - edge, 0.0);
       square += beyond * beyond;
     }
-    least = std::min(least, square);
+    least = std::min(least, std::sqrt(square));
   }
-  return std::sqrt(least);
+  return least;
 }
 
 #define TANGERE_FOR_LANES(L)                                                            \

@@ -50,6 +50,7 @@ class Passing {
     int axis;                      ///< along which it is thinnest: 0, 1, 2
     kernels::Vec3<double> middle;  ///< of the other body, in its link
     bool other_convex;             ///< so that its middle lies in it
+    double reach;  ///< no place of the plane that it must come through is farther from `at` [m]
     std::size_t gate;
   };
   void add(int link, const kernels::Frame<double>& at, PrimitiveShape shape,

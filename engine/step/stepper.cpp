@@ -205,19 +205,22 @@ struct Stepper::Impl {
     return again << lane;
   }
 
-  /// Checks the states that the lanes of a group have stepped to for bodies that came through each
-  /// other or overlap, where they have moved far enough to do so since the last check.
-  void check_overlaps(Batch& batch, const GroupOfBlock& g, LaneBits stepped, SingleWorkspace& w) {
-    if (!overlaps.has_pairs() || stepped == 0) return;
-    const Row<kGroup> motion = overlaps.motions(g.rows);
-    for (int l = 0; l < kGroup; ++l) {
-      const std::size_t e = as_size(g.first + l);
-      if (!has(stepped, l) || failed(batch.status_[e])) continue;
+  /// Checks the states that lanes have stepped to for bodies that came through each other or
+  /// overlap, where bodies have moved far enough to do so since the last check. `first`: the lane
+  /// of the group that is lane 0 of the L.
+  template <int L>
+  void check_overlaps(Batch& batch, const GroupOfBlock& g, int first, LaneBits stepped,
+                      SingleWorkspace& w) {
+    if (!overlaps.has_pairs()) return;
+    const Row<L> motion = overlaps.motions<L>(g.rows + first);
+    for (int l = 0; l < L; ++l) {
+      const std::size_t e = as_size(g.first + first + l);
+      if (!has(stepped, first + l) || failed(batch.status_[e])) continue;
       double& clearance = batch.clearance_[e];
       clearance -= motion[l];
       if (clearance > 0) continue;
       const Interpenetration::Finding found =
-          overlaps.check(kernels::active_kernels(), w, g.rows + l);
+          overlaps.check(kernels::active_kernels(), w, g.rows + first + l, motion[l]);
       clearance = found.clearance;
       if (found.passed)
         batch.status_[e] = StepStatus::passed;
@@ -373,7 +376,10 @@ void Stepper::step_block(Batch& batch, int block, std::span<const double> contro
       i.drive(batch, machine.work, g, lane, controls);
       if (g.live != 0) i.step_lanes(batch, i.whole(machine), machine.work, g, lane, tape);
     }
-    i.check_overlaps(batch, g, stepped, machine.single);
+    if (alone)
+      i.check_overlaps<1>(batch, g, lane, stepped, machine.single);
+    else if (stepped != 0)
+      i.check_overlaps<kGroup>(batch, g, 0, stepped, machine.single);
   }
   if (tape != nullptr) tape->append(batch, block);
 }

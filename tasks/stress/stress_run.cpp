@@ -180,9 +180,8 @@ void judge(const BlockOutcome& out, StressRow& row) {
 std::string warning_of(const Scene& scene, const StressRow& row) {
   if (row.accuracy > 0) return "";
   if (!row.of->measure) return costly_steps(row.integrator, row.counts);
-  for (const auto& lines :
-       {short_touches(Model(scene), row.integrator, row.step), coarse_contact_lines(scene),
-        polygonal_rolling_lines(scene)})
+  for (const auto& lines : {short_touches(Model(scene), row.integrator, row.step),
+                            coarse_contact_lines(scene), polygonal_rolling_lines(scene)})
     if (!lines.empty()) return lines.front();
   return "";
 }

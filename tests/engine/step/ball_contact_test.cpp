@@ -8,6 +8,7 @@
 
 #include "engine/model/scene_number.hpp"
 #include "engine/sense/start_overlaps.hpp"
+#include "kernels/numbers/linalg.hpp"
 #include "tests/engine/meshes.hpp"
 #include "tests/engine/runs.hpp"
 #include "tests/engine/scenes.hpp"
@@ -206,7 +207,8 @@ TEST(BallContact, AFastOneDoesNotPassUnnoticed) {
     Batch batch(model, 1);
     batch.set_state(0, q_of(batch), std::vector<double>{400, 0, 0, 0, 0, 0});
     stepper.step(batch, {});
-    EXPECT_EQ(batch.status(0), StepStatus::split) << "its parts feel the contact, " << swapped;
+    EXPECT_GT(q_of(batch)[0], 0.9) << "its parts feel the contact, which is too soft";
+    EXPECT_EQ(batch.status(0), StepStatus::passed) << swapped;
   }
 }
 
@@ -222,7 +224,8 @@ TEST(BallContact, SaysWhatItCannotDo) {
   MeshShape touched = testing::ellipsoid_mesh(1, {0.1, 0.1, 0.1});
   touched.resolution = 8;
   const Scene mesh = ball_at({0, 0, 0.2}, touched);
-  EXPECT_NE(message(mesh).find("expected the mesh as general_body"), std::string::npos) << message(mesh);
+  EXPECT_NE(message(mesh).find("expected the mesh as general_body"), std::string::npos)
+      << message(mesh);
   Scene varying = ball_at({0, 0, 0.2}, PlaneShape{});
   RandomizationDescription radius;
   radius.number = size_of_body("ball", 0);
