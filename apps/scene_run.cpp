@@ -114,7 +114,7 @@ void warn_of_geometry(const Console& console, const Model& model) {
           "where walls or details are thinner than about 1.5 cells; expected a larger 'resolution' "
           "or a smaller 'error'",
           mesh.body, mesh.cell, 100 * mesh.unresolved));
-  for (const auto& lines : {start_overlaps(model), rounded_places(model)})
+  for (const auto& lines : {start_overlaps(model), sensors_inside(model), rounded_places(model)})
     for (const std::string& line : lines) console.note("warning: " + line);
 }
 

@@ -17,6 +17,7 @@
 #include "engine/model/components.hpp"
 #include "engine/model/contact_resolution.hpp"
 #include "engine/model/contact_tiles.hpp"
+#include "engine/model/felt_bodies.hpp"
 #include "engine/model/frames.hpp"
 #include "engine/model/group_contacts.hpp"
 #include "engine/model/mass_properties.hpp"
@@ -113,10 +114,9 @@ class Compiler {
     const auto of_contact = [&](const PairContactDescription& d) {
       return d.primitive_body == name;
     };
-    // A sensor feels what moves against it, and its signs are those of its own body's surface.
+    // A sensor's signs are those of its own body's surface.
     const auto of_sensor = [&](const TactileDescription& d) {
-      const int b = bodies_.find("body", d.body, d.source);
-      return b == int(body) || m_.bodies[std::size_t(b)].link != m_.bodies[body].link;
+      return d.body == name || std::ranges::binary_search(felt_bodies(m_.scene, d), int(body));
     };
     const Scene& s = m_.scene;
     return std::any_of(s.pair_contacts.begin(), s.pair_contacts.end(), of_contact) ||
@@ -172,6 +172,12 @@ class Compiler {
 
   static kernels::ContactParameters constants(const ContactCoefficients& c) {
     return transformed(c, [](double value) { return kernels::Parameter{value, -1}; });
+  }
+
+  /// A body so small that it rests less deep than the usual ramp would hardly be damped.
+  static double ramp_of(const std::optional<double>& ramp, const CompiledBody& body) {
+    if (ramp) return *ramp;
+    return body.extent > 0 ? std::min(kUsualRamp, kUsualRampShare * body.extent) : kUsualRamp;
   }
 
   /// Returns `points` (n, 3) unless they are too many for one contact.
@@ -237,7 +243,7 @@ class Compiler {
       pair.size = second.size;
       pair.grid = second.grid;
       pair.law = d.law;
-      pair.ramp = d.ramp;
+      pair.ramp = ramp_of(d.ramp, first);
       pair.parameters = constants(d.coefficients);
       pair.n_points = static_cast<int>(points.size() / 3);
       pair.n_tiles = static_cast<int>(tiles.size() / 4);
@@ -302,7 +308,7 @@ class Compiler {
       ground.link = body.link;
       ground.body = b;
       ground.law = d.law;
-      ground.ramp = d.ramp;
+      ground.ramp = ramp_of(d.ramp, body);
       ground.parameters = constants(d.coefficients);
       ground.n_points = static_cast<int>(points.size() / 3);
       ground.points = keep(m_.point_storage, std::move(points));
@@ -325,8 +331,8 @@ class Compiler {
       if (d.markers) static_cast<void>(compile_markers(d, info.pressure_sign));  // checks them
       m_.layout.past_states = std::max(m_.layout.past_states, info.past_states);
       sensor.parameters = constants(d.coefficients);
-      for (int t = 0; t < static_cast<int>(m_.bodies.size()); ++t)
-        if (m_.bodies[t].link != sensor.link && m_.bodies[t].touchable) sensor.targets.push_back(t);
+      for (const int t : felt_bodies(m_.scene, d))
+        if (m_.bodies[t].touchable) sensor.targets.push_back(t);
       m_.sensors.push_back(std::move(sensor));
       m_.sensor_info.push_back(std::move(info));
     }

@@ -22,7 +22,7 @@ namespace tangere {
 
 namespace {
 
-constexpr int kPlaces = 2000;
+constexpr int kPlaces = 500;
 /// Share by which a body may be wider than the gap and still fit.
 constexpr double kAsWide = 1e-3;
 
@@ -33,34 +33,51 @@ const LinkDescription* link_with(const Scene& scene, const std::string& body) {
   return found == scene.links.end() ? nullptr : &*found;
 }
 
-/// Returns the place of a convex shape's surface in a direction from its centre.
-Vector3 surface_along(const Shape& shape, const Vector3& direction) {
-  double inside = 0, outside = 2;  // the direction leads to the box around the shape, or beyond
-  const auto at = [&](double t) {
-    return Vector3{t * direction[0], t * direction[1], t * direction[2]};
-  };
-  for (int k = 0; k < 40; ++k) {
-    const double middle = 0.5 * (inside + outside);
-    (distance_from(shape, at(middle))->distance < 0 ? inside : outside) = middle;
-  }
-  return at(inside);
+using Places = std::vector<Vector3>;
+
+Vector3 around_z(double radius, double angle, double z) {
+  return {radius * std::cos(angle), radius * std::sin(angle), z};
 }
 
-/// Returns about kPlaces places of a surface, evenly spread on a ball that is stretched with it.
-std::vector<Vector3> convex_places(const Shape& shape) {
-  const std::array<double, 3> width = widths(shape);
+/// Returns the places between rings of points, and half way between the points of a ring: on the side
+/// and on an end face.
+Places places_of(const CylinderShape& shape) {
+  const double half = std::numbers::pi / shape.contact_angles;
+  Places places = {around_z(shape.radius, half, 0)};
+  for (int k = 1; k <= shape.contact_rings; ++k)
+    for (const double between : {0.0, 0.5})
+      places.push_back(
+          around_z(shape.radius * (k - between) / shape.contact_rings, half, shape.length / 2));
+  return places;
+}
+/// The same on the straight part and on a cap.
+Places places_of(const CapsuleShape& shape) {
+  constexpr int kPolar = 8;
+  const double half = std::numbers::pi / shape.contact_angles,
+               pitch = shape.length / std::max(1, shape.contact_rings - 1);
+  Places places = {around_z(shape.radius, half, (shape.length - pitch) / 2)};
+  for (int k = 0; k <= kPolar; ++k) {
+    const double polar = std::numbers::pi / 2 * k / kPolar;
+    places.push_back(around_z(shape.radius * std::sin(polar), half,
+                              shape.length / 2 + shape.radius * std::cos(polar)));
+  }
+  return places;
+}
+/// Returns places that are spread as the points are, by another spiral.
+Places places_of(const EllipsoidShape& shape) {
   constexpr double kTurn = std::numbers::pi * (3 - 2.23606797749978969);  // golden angle [rad]
-  std::vector<Vector3> places;
+  Places places;
   for (int k = 0; k < kPlaces; ++k) {
-    const double z = 1 - (2 * k + 1.0) / kPlaces, rho = std::sqrt(1 - z * z), angle = k * kTurn;
-    places.push_back(surface_along(
-        shape, {width[0] * rho * std::cos(angle), width[1] * rho * std::sin(angle), width[2] * z}));
+    const double z = 1 - (2 * k + 1.0) / kPlaces;
+    const Vector3 on_ball = around_z(std::sqrt(1 - z * z), k * kTurn, z);
+    places.push_back({0.5 * shape.size[0] * on_ball[0], 0.5 * shape.size[1] * on_ball[1],
+                      0.5 * shape.size[2] * on_ball[2]});
   }
   return places;
 }
 
 /// Returns the middles of the triangles' parts, so that the area is covered by about kPlaces.
-std::vector<Vector3> mesh_places(const MeshShape& mesh) {
+Places places_of(const MeshShape& mesh) {
   const auto corner = [&](int v, std::size_t c) {
     return mesh.scale * mesh.vertices[3 * std::size_t(v) + c];
   };
@@ -79,7 +96,7 @@ std::vector<Vector3> mesh_places(const MeshShape& mesh) {
   double whole = 0;
   for (const auto& t : mesh.triangles) whole += area(t);
   const std::size_t skip = std::max<std::size_t>(1, mesh.triangles.size() / kPlaces);
-  std::vector<Vector3> places;
+  Places places;
   for (std::size_t k = 0; k < mesh.triangles.size(); k += skip) {
     const auto& t = mesh.triangles[k];
     const int n = std::clamp(int(std::ceil(std::sqrt(kPlaces * area(t) / whole))), 1, 64);
@@ -126,18 +143,24 @@ bool rims_alone(const Shape& points, const Shape& touched) {
 }  // namespace
 
 double contact_point_gap(const Shape& shape) {
-  if (is_ball(shape) || !has_contact_points(shape)) return 0;
   if (const auto* const cuboid = std::get_if<CuboidShape>(&shape)) {
     double pitch = 0;
     for (std::size_t k = 0; k < 3; ++k)
       pitch = std::max(pitch, cuboid->size[k] / (cuboid->contact_resolution[k] - 1));
     return pitch;
   }
-  const auto* const mesh = std::get_if<MeshShape>(&shape);
-  if (mesh == nullptr && !has_distance(shape)) return 0;  // an abstract body has no surface
+  const Places places = std::visit(
+      [](const auto& s) {
+        if constexpr (requires { places_of(s); })
+          return places_of(s);
+        else
+          return Places{};
+      },
+      shape);
+  if (places.empty()) return 0;
   const std::vector<double> points = contact_points(shape);
   double most = 0;
-  for (const Vector3& place : mesh != nullptr ? mesh_places(*mesh) : convex_places(shape)) {
+  for (const Vector3& place : places) {
     double nearest = HUGE_VAL;
     for (std::size_t k = 0; k < points.size() && nearest > most; k += 3) {
       const double x = points[k] - place[0], y = points[k + 1] - place[1],
@@ -184,21 +207,30 @@ std::vector<CoarseContact> coarse_contacts(const Scene& scene) {
 }
 
 std::vector<std::string> coarse_contact_lines(const Scene& scene) {
+  constexpr std::size_t kMostLines = 5;
+  const std::vector<CoarseContact> found = coarse_contacts(scene);
   std::vector<std::string> lines;
-  for (const CoarseContact& coarse : coarse_contacts(scene)) {
+  for (const CoarseContact& coarse : found) {
+    if (lines.size() == kMostLines) {
+      lines.push_back(fmt::format("{}{} more contacts have such points",
+                                  scene.path.empty() ? "" : scene.path + ": ",
+                                  found.size() - kMostLines));
+      break;
+    }
     const PairContactDescription& c = scene.pair_contacts[coarse.contact];
     const Shape& points = link_with(scene, c.general_body)->body.shape;
     const bool ball = is_ball(link_with(scene, c.primitive_body)->body.shape),
                mesh = std::holds_alternative<MeshShape>(points);
+    // A cylinder has no points on its side, however many there are on its ends.
     const std::string finer =
-        mesh ? "a smaller 'pitch' or larger 'count'"
-        : row_of(points).counts.empty()
-            ? "points that are nearer to each other"
-            : fmt::format("a finer {}", row_of(points).counts.front().attribute);
+        mesh ? "a smaller 'pitch' or larger 'count', or "
+        : std::holds_alternative<CylinderShape>(points)
+            ? ""
+            : fmt::format("a finer {}, or ", row_of(points).counts.front().attribute);
     lines.push_back(fmt::format(
         "{}<general_primitive_contact>: contact points of '{}' are up to {:.3g} m apart, and '{}' "
         "is {:.3g} m across, so it can come between them, or out from under them, unnoticed; "
-        "expected {}, or {}",
+        "expected {}{}",
         c.source.prefix(), c.general_body, coarse.gap, c.primitive_body, coarse.width, finer,
         ball && !mesh ? "the two bodies swapped"
                       : "the same contact the other way round as well, with near enough points"));

@@ -13,8 +13,8 @@ namespace tangere {
 
 /// Returns the diameter of the largest ball that is centred on a shape's surface and holds none of
 /// its contact points [m]; of a cuboid, whose points are a grid, the largest distance between
-/// neighbours in the grid. 0: a shape without contact points, or a sphere, which touches with its
-/// surface. Where it is estimated, 2 000 places of the surface are tried.
+/// neighbours in the grid. 0: a shape without contact points or without a surface, or a sphere, which
+/// touches with its surface. Of ellipsoids and meshes about 500 places of the surface are tried.
 double contact_point_gap(const Shape& shape);
 
 /// A contact whose other body can come between the contact points.

@@ -15,6 +15,9 @@ namespace {
 
 constexpr double kPlaces = 10000;
 constexpr int kMostParts = 64;  // of an edge
+// Beyond the middle of a wall the distance falls no further: at this depth, in cells, its gradient
+// along the normal has then turned. Beside the edges of thick bodies it is about 0.
+constexpr double kUnder = 0.9, kTurned = -0.2;
 
 struct Triangle {
   Vec3<double> a, ab, ac, normal;
@@ -51,9 +54,12 @@ MeshFit mesh_fit(const MeshShape& mesh, const kernels::DistanceGrid& grid) {
         const bool turned = j % 2 == 1;
         const double u = (i + (turned ? 1.0 / 3 : 2.0 / 3)) / n,
                      v = (place + (turned ? 2.0 / 3 : 1.0 / 3)) / n;
-        const auto here = distance.evaluate(of.a + (u - v) * of.ab + v * of.ac);
+        const Vec3<double> at = of.a + (u - v) * of.ab + v * of.ac;
+        const auto here = distance.evaluate(at),
+                   under = distance.evaluate(at - (kUnder * grid.cell) * of.normal);
         square += weight * here.d * here.d;
-        if (std::abs(here.d) > 0.1 * grid.cell || dot(here.n, of.normal) < 0.5)
+        if (std::abs(here.d) > 0.1 * grid.cell || dot(here.n, of.normal) < 0.5 ||
+            dot(under.n, of.normal) < kTurned)
           unresolved += weight;
       }
   }

@@ -54,7 +54,7 @@ const char* to_string(ContactLaw value) {
   return "unknown";
 }
 
-const char* law_name(ContactLaw law, double ramp) {
+const char* law_name(ContactLaw law, std::optional<double> ramp) {
   return law == ContactLaw::linear && ramp == 0 ? "published" : to_string(law);
 }
 

@@ -190,6 +190,8 @@ struct TactileDescription {
   bool remembers_readings = false;
   std::optional<int> pressure_sign;  ///< +1 or -1; found from the geometry when not given
   Source source;
+  /// Bodies that it feels, or does not feel, by name (felt_bodies.hpp); one of the two at most.
+  std::vector<std::string> feels{}, ignores{};
   SensorImperfections imperfections{};          ///< of its readings; none to begin with
   std::optional<MarkersDescription> markers{};  ///< none: it has none
 };
@@ -214,12 +216,16 @@ struct GroundDescription {
   Vector3 normal{0, 0, 1};  ///< unit, pointing out of the half-space
 };
 
+inline constexpr double kUsualRamp = 1e-5;       ///< [m]
+inline constexpr double kUsualRampShare = 1e-3;  ///< of a body's extent
+
 struct GroundContactDescription {
   std::string body;
   ContactCoefficients coefficients{};
   ContactLaw law = ContactLaw::linear;
-  /// Depth [m] over which the linear law's damper fades in; 0: the published law, which pulls.
-  double ramp = 1e-5;
+  /// Depth over which the linear law's damper fades in [m]; 0: the published law, which pulls. None:
+  /// kUsualRamp, or kUsualRampShare of the body's extent if that is less.
+  std::optional<double> ramp{};
   Source source;
 };
 
@@ -228,7 +234,7 @@ struct PairContactDescription {
   std::string general_body, primitive_body;
   ContactCoefficients coefficients{};
   ContactLaw law = ContactLaw::clamped;
-  double ramp = 1e-5;  ///< [m]; law linear only
+  std::optional<double> ramp{};  ///< as in GroundContactDescription, of general_body
   Source source;
   /// A tactile sensor of general_body whose points touch instead of the body's own; empty: none.
   std::string sensor = {};
@@ -334,7 +340,7 @@ struct Scene {
 const char* to_string(JointType value);
 const char* to_string(ContactLaw value);
 /// The same, but "published" for law linear with ramp 0.
-const char* law_name(ContactLaw law, double ramp);
+const char* law_name(ContactLaw law, std::optional<double> ramp);
 /// Returns "sphere", "cuboid" …
 const char* shape_name(const Shape& shape);
 

@@ -79,6 +79,14 @@ void check_imperfections(const SensorImperfections& imperfections, const std::st
     throw InputError(fmt::format(
         "{}hysteresis=\"{}\" with hysteresis_time=\"{}\" s; expected both above 0, or neither",
         where, imperfections.hysteresis, imperfections.hysteresis_time));
+  for (const auto& [limit, step] :
+       {std::pair{imperfections.saturation.normal, imperfections.quantisation.normal},
+        {imperfections.saturation.shear, imperfections.quantisation.shear}})
+    if (limit != 0 && step > limit)
+      throw InputError(fmt::format(
+          "{}quantisation=\"{}\" with saturation=\"{}\" N: every reading is 0; expected "
+          "a quantisation of no more than the saturation",
+          where, step, limit));
   const char* const needs = imperfections.crosstalk != 0 ? "crosstalk"
                             : imperfections.spread != 0  ? "spread"
                                                          : nullptr;

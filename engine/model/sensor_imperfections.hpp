@@ -8,7 +8,8 @@
 //   x₄ = (1 + G + g) x₃ + b + e         G ~ N(0, sensor_gain²) of the sensor; g ~ N(0, gain²) and
 //                                       b ~ N(0, bias²) of the point, all three of the episode;
 //                                       e ~ N(0, noise²), new in every step
-//   y  = 0 where the point is dead, else Q round(clamp(x₄, ±saturation) / Q), Q: quantisation
+//   y  = 0 where the point is dead, else Q round(clamp(x₄, ±s) / Q), Q: quantisation, s: the
+//       largest multiple of Q up to the saturation
 #pragma once
 
 #include <array>

@@ -13,8 +13,27 @@
 namespace tangere {
 namespace {
 
-/// Steps of a touch with which a scheme loses less than a twentieth of the speed.
+/// Share of the speed that a touch loses.
+constexpr double kLost = 0.05;
+/// Steps of a touch with which a scheme loses less than that.
 double steps_needed(Integrator integrator) { return integrator.scheme().order > 1 ? 20 : 100; }
+
+/// Returns the speed of a body that has fallen through half of the scene's extent, or 1 m/s without
+/// gravity [m/s].
+double impact_speed(const CompiledModel& m) {
+  const double gravity = std::sqrt(dot(m.view.gravity, m.view.gravity));
+  return gravity > 0 ? gravity * m.fall_time : 1;
+}
+
+/// Returns the share of its speed that a body loses by the damping of a touch, where one point
+/// touches. Law linear: 1 - exp(-π ζ/√(1 - ζ²)), ζ = c/(2 √(k_n m)). The others: 2/3 (k_d/k_n) v to
+/// first order in the speed v.
+double lost_share(ContactLaw law, double kn, double damping, double inverse_mass, double speed) {
+  if (law != ContactLaw::linear) return 2.0 / 3 * damping / kn * speed;
+  const double ratio = damping / 2 * std::sqrt(inverse_mass / kn);
+  if (ratio >= 1) return 1;
+  return 1 - std::exp(-std::numbers::pi * ratio / std::sqrt(1 - ratio * ratio));
+}
 
 double inverse_mass(const CompiledModel& m, int link) {
   const double mass = link < 0 ? 0 : m.links[std::size_t(link)].mass;
@@ -26,25 +45,31 @@ double inverse_mass(const CompiledModel& m, int link) {
 std::vector<std::string> short_touches(const Model& model, Integrator integrator, double h) {
   const CompiledModel& m = compiled(model);
   std::vector<std::string> found;
-  const auto look = [&](const ContactInfo& contact, const kernels::ContactParameters& of,
-                        double inverse) {
-    const bool damped = of.damping.value > 0 || of.damping.row >= 0;
-    if (damped || !(of.kn.value > 0) || !(inverse > 0)) return;
-    const double touch = std::numbers::pi / std::sqrt(of.kn.value * inverse);
-    if (touch >= steps_needed(integrator) * h) return;
-    found.push_back(
-        fmt::format("the contact of '{}' with '{}' has no damping, and a touch lasts {:.2g} s: "
-                    "how fast bodies leave it depends on the step of {:.2g} s; expected damping, "
-                    "or steps of {:.2g} s at most with {}",
-                    contact.first, contact.second, touch, h, touch / steps_needed(integrator),
-                    to_string(integrator)));
+  const double speed = impact_speed(m);
+  const auto add = [&](const ContactInfo& contact, const kernels::ContactParameters& of,
+                       ContactLaw law, double inverse) {
+    if (of.damping.row >= 0 || !(of.kn.value > 0) || !(inverse > 0)) return;
+    const double touch = std::numbers::pi / std::sqrt(of.kn.value * inverse),
+                 lost = lost_share(law, of.kn.value, of.damping.value, inverse, speed);
+    if (lost >= kLost || touch >= steps_needed(integrator) * h) return;
+    const std::string damping =
+        of.damping.value > 0
+            ? fmt::format("has a damping that takes {:.2g} % of a speed of {:.2g} m/s", 100 * lost,
+                          speed)
+            : "has no damping";
+    found.push_back(fmt::format(
+        "the contact of '{}' with '{}' {}, and a touch lasts {:.2g} s: "
+        "how fast bodies leave it depends on the step of {:.2g} s; expected {}damping, "
+        "or steps of {:.2g} s at most with {}",
+        contact.first, contact.second, damping, touch, h, of.damping.value > 0 ? "more " : "",
+        touch / steps_needed(integrator), to_string(integrator)));
   };
   for (std::size_t k = 0; k < m.pairs.size(); ++k)
-    look(model.contacts()[k], m.pairs[k].parameters,
-         inverse_mass(m, m.pairs[k].link1) + inverse_mass(m, m.pairs[k].link2));
+    add(model.contacts()[k], m.pairs[k].parameters, m.pairs[k].law,
+        inverse_mass(m, m.pairs[k].link1) + inverse_mass(m, m.pairs[k].link2));
   for (std::size_t g = 0; g < m.grounds.size(); ++g)
-    look(model.contacts()[m.pairs.size() + g], m.grounds[g].parameters,
-         inverse_mass(m, m.grounds[g].link));
+    add(model.contacts()[m.pairs.size() + g], m.grounds[g].parameters, m.grounds[g].law,
+        inverse_mass(m, m.grounds[g].link));
   return found;
 }
 

@@ -85,6 +85,14 @@ double rounded(double x) {
   return std::abs(x) < 0x1p51 ? whole : x;
 }
 
+/// Returns the largest magnitude that a component can read [N]; 0: there is none. Of readings that
+/// are rounded, it is the largest multiple that saturation allows.
+double largest_reading(const SensorImperfections& of, int component) {
+  const double limit = of_component(of.saturation, component),
+               step = of_component(of.quantisation, component);
+  return step == 0 ? limit : step * std::floor(limit / step * (1 + 1e-12));
+}
+
 /// Limits and rounds the 64 points.
 void digitise(double limit, double step, const Run& alive, Run& x) {
   if (limit != 0)
@@ -163,7 +171,7 @@ void spoil_points(const CompiledSensor& s, const ReadingKey& key, int first_comp
     for (int c = 0; c < Components; ++c) {
       const int component = first_component + c;
       draws.add_to(component, x[c]);
-      digitise(of_component(of.saturation, component), of_component(of.quantisation, component),
+      digitise(largest_reading(of, component), of_component(of.quantisation, component),
                draws.alive(), x[c]);
     }
     for (int l = 0; l < end - first; ++l)
@@ -219,7 +227,7 @@ void ImperfectField::scale_by_slope(const CompiledSensor& s, const ReadingKey& k
     draws.draw(first);
     for (int c = 0; c < 3; ++c) {
       const auto k = std::size_t(3 * first + c);
-      const double limit = of_component(of.saturation, c);
+      const double limit = largest_reading(of, c);
       for (int l = 0; l < end - first && limit != 0; ++l) x[l] = shared[k + std::size_t(3 * l)];
       if (limit != 0) draws.add_to(c, x);
       for (int l = 0; l < end - first; ++l) {

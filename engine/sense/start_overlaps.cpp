@@ -9,10 +9,13 @@
 #include <limits>
 
 #include "engine/model/compiled_model.hpp"
+#include "engine/model/frames.hpp"
 #include "engine/model/model.hpp"
+#include "engine/model/model_part.hpp"
 #include "engine/sense/pad_reader.hpp"
 #include "engine/step/batch.hpp"
 #include "kernels/contact/distance.hpp"
+#include "kernels/step/stage.hpp"
 
 namespace tangere {
 
@@ -78,6 +81,52 @@ std::vector<std::string> start_overlaps(const Model& model) {
     const double extent = ground.radius > 0 ? ground.radius : ground.extent;
     if (depth > kDeep * extent && extent > 0)
       found.push_back(message(model.contacts()[m.pairs.size() + g], depth));
+  }
+  return found;
+}
+
+std::vector<std::string> sensors_inside(const Model& model) {
+  const CompiledModel& m = compiled(model);
+  const Batch batch(model, 1, 0);
+  PadReader reader(model);
+  reader.move(batch, 0, 0);
+  const auto pose = [&](const CompiledBody& body) {
+    return compose(reader.link(body.link, 0, 0).world, body.frame);
+  };
+  const std::vector<int> tree = trees_of(m.links);
+  std::vector<std::string> found;
+  for (const CompiledSensor& sensor : m.sensors) {
+    const TactileDescription& d = m.scene.sensors[std::size_t(sensor.number)];
+    const std::vector<TactilePoint> points = tactile_points(d);
+    const Frame<double> own = pose(m.bodies[std::size_t(sensor.body)]);
+    for (const int target : sensor.targets) {
+      const CompiledBody& body = m.bodies[std::size_t(target)];
+      const Frame<double> shape = relative(pose(body), own);
+      const Vec3<double> size =
+          kernels::load_vector<double>(body.size, body.size_row, batch.block(0), 0);
+      std::size_t inside = 0;
+      double depth = 0, sum = 0;
+      kernels::with_distance<double>(
+          body.shape, size,
+          [&](const auto& of) {
+            for (const TactilePoint& p : points) {
+              const double at = distance_at(of, shape.R * vec3_of(p.position) + shape.p).d;
+              if (!(at < 0)) continue;
+              ++inside;
+              depth = std::max(depth, -at);
+              sum -= at * p.factors[0];
+            }
+          },
+          body.grid);
+      const bool one_tree = sensor.link >= 0 && body.link >= 0 &&
+                            tree[std::size_t(sensor.link)] == tree[std::size_t(body.link)];
+      if (inside == 0 || (!one_tree && depth <= kDeep * sensor.reach)) continue;
+      const std::string& name = model.body_names()[std::size_t(target)];
+      found.push_back(fmt::format(
+          "sensor '{}' starts with {} of {} points inside '{}', up to {:.3g} m deep, where they "
+          "read {:.3g} N; expected a sensor that starts outside, or ignores=\"{}\"",
+          d.name, inside, points.size(), name, depth, d.coefficients.kn * sum, name));
+    }
   }
   return found;
 }

@@ -24,7 +24,9 @@ void set_floors(const CompiledModel& m, BasicWorkspace<L>& w, LaneBits lanes) {
           4 * std::numeric_limits<double>::epsilon() * m.unknown_scale[std::size_t(i)];
       const kernels::Row<L>& diagonal = w.stage.A[p.slot[i * p.n + i]];
       for (int l = 0; l < L; ++l) {
-        const double e = scale * diagonal[l] * w.stage.inverse_weight[i][l];
+        const double ratio = w.stage.c0_over_h[l],
+                     e = scale * (diagonal[l] * w.stage.inverse_weight[i][l] -
+                                  ratio * ratio * w.stage.weight[i][l]);
         sum[l] += e * e;
       }
     }

@@ -40,7 +40,7 @@ template <class Contact>
 void read_law(const SceneNode& node, int fallback, Contact& contact) {
   const int law = node.choice("law", kLaws, fallback);
   contact.law = kLawOf[law];
-  contact.ramp = node.has("ramp") ? node.not_negative("ramp") * node.context().length : 1e-5;
+  if (node.has("ramp")) contact.ramp = node.not_negative("ramp") * node.context().length;
   if (node.has("ramp") && law != kLinear)
     node.warn("'ramp' has no effect with law=\"" + kLaws[std::size_t(law)] + "\"");
   if (law == kPublished) contact.ramp = 0;
@@ -72,12 +72,6 @@ int find_joint(const Scene& scene, const SceneNode& node, const char* attribute)
 int find_body(const Scene& scene, const SceneNode& node, const char* attribute) {
   return find_named(scene, node, attribute, "body",
                     [](const LinkDescription& l) { return l.body.name; });
-}
-
-int moving_link(const Scene& scene, int link) {
-  while (link >= 0 && scene.links[std::size_t(link)].joint.type == JointType::fixed)
-    link = scene.links[std::size_t(link)].parent;
-  return link;
 }
 
 void warn_of_dense_meshes(const Scene& scene, const SceneNode& root) {

@@ -71,9 +71,6 @@ void read_colour(const SceneNode& node, std::array<double, 4>& rgba);
 /// with the nearest name.
 int find_joint(const Scene& scene, const SceneNode& node, const char* attribute);
 int find_body(const Scene& scene, const SceneNode& node, const char* attribute);
-/// Returns the link that moves with `link` and has the joint by which it does: the first one up the
-/// tree whose joint is not fixed. -1: the world.
-int moving_link(const Scene& scene, int link);
 
 /// Factor to SI of coordinate `index` of a joint type, and of velocity `index`. Both have lengths
 /// at the same indices.

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "engine/model/felt_bodies.hpp"
 #include "engine/model/field_form.hpp"
 #include "io/files/name_list.hpp"
 #include "io/files/nearest_name.hpp"
@@ -32,8 +33,8 @@ Names attributes_of(int type) {
 }
 
 void check_attributes(const SceneNode& node, int type) {
-  Names used = with_coefficients(
-            {"name", "body", "type", "law", "every", "pressure_sign", "feedback", "memory"}),
+  Names used = with_coefficients({"name", "body", "type", "law", "every", "pressure_sign",
+                                  "feedback", "memory", "feels", "ignores"}),
         idle;
   const Names own = attributes_of(type);
   used.insert(used.end(), own.begin(), own.end());
@@ -198,9 +199,8 @@ void read_parts(const SceneNode& node, TactileDescription& sensor) {
   }
 }
 
-/// Lets the points of a sensor touch what they feel: a pair with every body that has a distance and
-/// moves against the sensor's.
-void add_feedback(Scene& scene, const SceneNode& node, const TactileDescription& d, int body) {
+/// Lets the points of a sensor touch what they feel: a pair with every body that it feels.
+void add_feedback(Scene& scene, const SceneNode& node, const TactileDescription& d) {
   if (d.coefficients.ks != 0)
     node.fail(
         "feedback and ks: a contact and the reading of its skin would each remember a touch "
@@ -218,11 +218,9 @@ void add_feedback(Scene& scene, const SceneNode& node, const TactileDescription&
   pair.coefficients = d.coefficients;
   pair.law = d.law;
   pair.source = d.source;
-  bool felt = false;
-  for (int other = 0; other < static_cast<int>(scene.links.size()); ++other) {
+  const std::vector<int> felt = felt_bodies(scene, d);
+  for (const int other : felt) {
     const BodyDescription& touched = scene.links[std::size_t(other)].body;
-    if (!has_distance(touched.shape) || moving_link(scene, other) == moving_link(scene, body))
-      continue;
     for (const PairContactDescription& c : scene.pair_contacts)
       if (c.points.empty() && c.general_body == d.body && c.primitive_body == touched.name)
         node.context().warnings.push_back(fmt::format(
@@ -232,9 +230,8 @@ void add_feedback(Scene& scene, const SceneNode& node, const TactileDescription&
             c.source.prefix(), d.body, touched.name, d.name));
     pair.primitive_body = touched.name;
     scene.pair_contacts.push_back(pair);
-    felt = true;
   }
-  if (!felt)
+  if (felt.empty())
     node.fail(
         fmt::format("feedback of '{}' would touch nothing; expected a body with a distance "
                     "that moves against '{}'",
@@ -248,7 +245,7 @@ void read_sensors(Scene& scene, const SceneNode& section) {
   for (const SceneNode& node : section.children({"tactile"})) {
     TactileDescription d;
     d.source = node.source();
-    const int body = find_body(scene, node, "body");
+    find_body(scene, node, "body");
     d.body = node.text("body");
     d.name = node.text("name", d.body);
     if (d.name.find('/') != std::string::npos)
@@ -277,7 +274,11 @@ void read_sensors(Scene& scene, const SceneNode& section) {
       d.points = read_points(node, type);
     }
     read_parts(node, d);
-    if (node.choice("feedback", {"false", "true"}, 0) == 1) add_feedback(scene, node, d, body);
+    for (const auto& [name, list] : {std::pair{"feels", &d.feels}, {"ignores", &d.ignores}})
+      if (node.has(name))
+        *list = split_names(d.source.prefix() + "<tactile>: " + name, node.text(name));
+    static_cast<void>(felt_bodies(scene, d));  // checks the names
+    if (node.choice("feedback", {"false", "true"}, 0) == 1) add_feedback(scene, node, d);
     scene.sensors.push_back(std::move(d));
   }
 }

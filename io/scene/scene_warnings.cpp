@@ -10,6 +10,7 @@
 #include <optional>
 #include <set>
 
+#include "engine/model/felt_bodies.hpp"
 #include "engine/model/shapes.hpp"
 #include "io/scene/scene_sections.hpp"
 
@@ -34,14 +35,14 @@ class SensorWarnings {
     for (std::size_t k = 0; k < scene_.links.size(); ++k) {
       if (moving_link(scene_, static_cast<int>(k)) == own_) continue;
       const BodyDescription& body = scene_.links[k].body;
-      if (has_distance(body.shape))
-        felt_.insert(moving_link(scene_, static_cast<int>(k)));
-      else
-        without.insert(body.name);
+      if (!has_distance(body.shape)) without.insert(body.name);
     }
+    for (const int k : felt_bodies(scene_, sensor_)) felt_.insert(moving_link(scene_, k));
     if (felt_.empty())
       return add(without.empty()
-                     ? "can feel nothing: no other body moves against it" + of_the_ground()
+                     ? "can feel nothing: no body that it feels moves against it; bodies that a "
+                       "joint connects with it are felt if 'feels' names them" +
+                           of_the_ground()
                      : "can feel nothing: a sensor feels shapes with a distance, and " +
                            listed(without) + " has none");
     const bool touched = std::any_of(scene_.pair_contacts.begin(), scene_.pair_contacts.end(),
@@ -145,7 +146,7 @@ class SensorWarnings {
   const TactileDescription& sensor_;
   const SceneNode& root_;
   int own_;
-  std::set<int> felt_;  // groups that have a distance and move against the sensor
+  std::set<int> felt_;  // groups of bodies that it feels
 };
 
 }  // namespace

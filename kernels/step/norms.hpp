@@ -3,7 +3,9 @@
 //   ‖D^-½ g‖ / (‖D^½ v‖ c₀/h + ‖D^½‖ |gravity| + ‖D^-½ f‖),
 //       f the magnitudes of contact, motor and damping forces
 // is free of units. A residual cannot be smaller than the effect of rounding a position once. It
-// counts as zero below the floor ‖D^-½ φ‖², φ_i = 4 ε |A_ii| (extent of the scene, or 1 rad).
+// counts as zero below the floor ‖D^-½ φ‖², φ_i = 4 ε |A_ii - D_i (c₀/h)²| (extent of the scene, or
+// 1 rad). Inertia is left out, because it acts on the displacement x, which is not rounded to
+// positions. In steps of nanoseconds it would hide every force.
 #pragma once
 
 #include <limits>
@@ -22,12 +24,13 @@ void set_weights(int n, const N* mass_diagonal, N* weight, N* inverse_weight) {
 }
 
 template <class N>
-N rounding_floor(const Pattern& p, const N* A, const N* inverse_weight,
-                 const double* unknown_scale) {
+N rounding_floor(const Pattern& p, const N* A, const N* weight, const N* inverse_weight,
+                 const N& c0_over_h, const double* unknown_scale) {
   N sum(0.0);
+  const N inertia = c0_over_h * c0_over_h;
   for (int i = 0; i < p.n; ++i) {
     const N e = N(4 * std::numeric_limits<double>::epsilon() * unknown_scale[i]) *
-                A[p.slot[i * p.n + i]] * inverse_weight[i];
+                (A[p.slot[i * p.n + i]] * inverse_weight[i] - inertia * weight[i]);
     sum = mul_add(e, e, sum);
   }
   return sum;

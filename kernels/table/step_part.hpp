@@ -82,7 +82,8 @@ void StepPart<N, L>::set_floor(const ModelView& m, Stage<L>& s, const double* un
                                const Row<L>& accept) {
   using View = StageView<N, L>;
   const N floor =
-      rounding_floor(m.pattern, View::view(s.A), View::view(s.inverse_weight), unknown_scale);
+      rounding_floor(m.pattern, View::view(s.A), View::view(s.weight), View::view(s.inverse_weight),
+                     *View::view(&s.c0_over_h), unknown_scale);
   *View::view(&s.floor) = select(*View::view(&accept) > N(0.0), floor, *View::view(&s.floor));
 }
 

@@ -69,7 +69,8 @@ Cases geometry() {
   add(cases, {"largest sink of a box [m]", largest_sink, 5e-3, 3},
       {{.name = "stack_equal"},
        {.name = "stack_shifted", .environments = 16},
-       {.name = "stack_unequal", .environments = 16}});
+       {.name = "stack_unequal", .environments = 16},
+       {.name = "stack_three_points"}});
   add(cases, {"largest sink of the box [m]", largest_sink, 5e-3, 0.5},
       {{.name = "post_between_points"}});
   add(cases, {"largest sink of a card [m]", largest_sink, 5e-3, 2},
@@ -78,17 +79,22 @@ Cases geometry() {
       {{.name = "box_through_plate"},
        {.name = "box_through_plate_fast",
         .scene = "box_through_plate",
-        .variant = {.speed = 5 / 1.5}}});
+        .variant = {.speed = 5 / 1.5}},
+       {.name = "soft_plate"},
+       {.name = "soft_plate_slow", .scene = "soft_plate", .variant = {.speed = 0.1}}});
   add(cases, {"depth of the ball's middle below the pad's [m]", sinks_below(1, 0), 0, 0.05},
       {{.name = "ball_through_pad"}});
   add(cases, {"depth of the box's middle below the ground [m]", sinks_below_ground(0), 0, 1},
       {{.name = "edge_drop"}});
+  add(cases, {"largest shift of a finger or the rod [m]", largest_shift, 0.01, 0.2},
+      {{.name = "rod_between_fingers"}});
   return cases;
 }
 
 Cases impacts() {
   Cases cases;
   add_energy_case(cases, "ball_impact", 0.1, true);
+  add_energy_case(cases, "impact_beside_spring", 0.1, true);
   add_energy_case(cases, "joint_limit", 0.2, true);
   add_energy_case(cases, "cradle", 0.4, true);
   add_energy_case(cases, "toss", 1, true);
@@ -138,6 +144,8 @@ Cases rotations() {
 Cases closed_forms() {
   Cases cases;
   add(cases, {"error of the depth", rest_depth_error(0, 0.01, 1), 1e-9, 2}, {{.name = "far_away"}});
+  add(cases, {"error of the depth", rest_depth_error(0, 1e-6, 1), 0.01, 0.02, {1e-6, 1e-5}},
+      {{.name = "tiny_ball"}});
   add(cases, {"error of the rolling speed", speed_error(0, 5.0 / 7), 1e-3, 1},
       {{.name = "rolling"}});
   add(cases, {"distance from the target [rad]", angle_error(0, 0.5), 1e-9, 0.5},

@@ -320,7 +320,8 @@ TEST(MeshGrid, ThinWallsAreNotLostInSilence) {
   const auto plate = [&](double cells) {
     return fit_of(cuboid_mesh({0.05, 0.05, 0.05 * cells / kCells}), kCells).unresolved;
   };
-  for (double cells : {0.2, 0.4, 0.7}) EXPECT_GT(plate(cells), 0.4) << cells;
+  for (double cells : {0.2, 0.4, 0.7, 0.8, 0.85, 0.9, 0.95, 1.0, 1.05, 1.1, 1.2, 1.3})
+    EXPECT_GT(plate(cells), 0.4) << cells;
   for (double cells : {2.0, 3.0, 4.3, 6.0, 48.0}) EXPECT_LT(plate(cells), 0.05) << cells;
 }
 

@@ -259,6 +259,23 @@ TEST(Imperfections, SaturationAndQuantisationAreExact) {
   EXPECT_GT(clipped, 100);
 }
 
+/// A converter whose range is no multiple of its step never reads beyond its range.
+TEST(Imperfections, RoundedReadingsStayBelowSaturation) {
+  for (const double limit : {0.0585, 0.0615, 0.0599999}) {
+    const Model model(imperfect_scene([&](auto& i) {
+      i.noise = {0.05, 0.05};
+      i.saturation = {limit, limit};
+      i.quantisation = {0.004, 0.004};
+    }));
+    Batch batch(model, 4, 3);
+    touch(batch);
+    double most = 0;
+    for (int e = 0; e < 4; ++e)
+      for (const double x : field_of(batch, e)) most = std::max(most, std::abs(x));
+    EXPECT_EQ(most, 0.004 * std::floor(limit / 0.004)) << limit;
+  }
+}
+
 /// Against plain loops over pairs of points.
 TEST(Imperfections, CrosstalkAndSpreadKeepTheSum) {
   const double c = 0.08, width = 0.006;

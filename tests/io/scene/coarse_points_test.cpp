@@ -62,7 +62,71 @@ TEST(CoarsePoints, ABodyThatFitsBetweenThemIsTold) {
 TEST(CoarsePoints, ABoxOnItsEqualIsTold) {
   const std::string equal = "type=\"cuboid\" size=\"0.05 0.05 0.05\"";
   EXPECT_THAT(warnings("2 2 2", equal), ElementsAre(HasSubstr("or out from under them")));
-  EXPECT_THAT(warnings("3 3 3", equal), IsEmpty());
+  EXPECT_THAT(warnings("3 3 3", equal), ElementsAre(HasSubstr("or out from under them")));
+  EXPECT_THAT(warnings("4 4 4", equal), IsEmpty());
+}
+
+/// Whatever the shapes are. In both directions, both must be fine enough or one of them.
+TEST(CoarsePoints, OtherShapesAreTold) {
+  const std::string rod = "type=\"cylinder\" radius=\"0.01\" length=\"0.2\"",
+                    other_way =
+                        "<general_primitive_contact general_body=\"below\" primitive_body=\"box\" "
+                        "kn=\"1e3\"/>";
+  EXPECT_THAT(warnings("2 2 2", rod), ElementsAre(HasSubstr("'below' is 0.02 m across")));
+  EXPECT_THAT(warnings("2 2 2", rod, other_way),
+              ElementsAre(HasSubstr("contact points of 'box' are up to 0.05 m apart"),
+                          AllOf(HasSubstr("contact points of 'below' are up to 0.2 m apart"),
+                                HasSubstr("expected the same contact the other way round"))));
+  EXPECT_THAT(warnings("8 8 8", rod, other_way), IsEmpty());
+}
+
+/// A pile has many such contacts. Five lines say it, and one how many there are.
+TEST(CoarsePoints, ManyContactsAreCounted) {
+  std::string bodies, contacts;
+  for (int k = 0; k < 9; ++k) {
+    const std::string name = "b" + std::to_string(k);
+    bodies +=
+        "<robot><link name=\"" + name + "\"><joint name=\"" + name +
+        "\" type=\"free3d\"/><body name=\"" + name +
+        "\" type=\"cuboid\" size=\"1 1 1\" general_contact_resolution=\"2 2 2\"/></link></robot>";
+    if (k > 0)
+      contacts += "<general_primitive_contact general_body=\"" + name + "\" primitive_body=\"b" +
+                  std::to_string(k - 1) + "\" kn=\"1\"/>";
+  }
+  const auto lines = parse_scene("<tangere model=\"m\">" + bodies + "<contact>" + contacts +
+                                     "</contact></tangere>",
+                                 "s.xml")
+                         .warnings;
+  ASSERT_EQ(lines.size(), 6U);
+  EXPECT_THAT(lines[4], HasSubstr("contact points of 'b5'"));
+  EXPECT_THAT(lines[5], HasSubstr("3 more contacts have such points"));
+}
+
+TEST(CoarsePoints, ARoundBodyOnTheGroundIsToldToHaveCorners) {
+  const auto rolls = [](const std::string& shape) {
+    return parse_scene(
+               "<tangere model=\"m\"><option unit=\"m-kg\" gravity=\"0 0 -9.8\"/>\n"
+               "<ground pos=\"0 0 0\" normal=\"0 0 1\"/>\n"
+               "<robot><link name=\"roll\"><joint name=\"roll\" type=\"free3d\"/>\n"
+               "<body name=\"roll\" density=\"500\" " +
+                   shape +
+                   "/></link></robot>\n"
+                   "<contact><ground_contact body=\"roll\" kn=\"2e3\"/></contact></tangere>",
+               "s.xml")
+        .warnings;
+  };
+  EXPECT_THAT(rolls("type=\"cylinder\" radius=\"0.05\" length=\"0.1\""),
+              ElementsAre(AllOf(HasSubstr("s.xml:5: <ground_contact>: 'roll'"),
+                                HasSubstr("8 points around"),
+                                HasSubstr("a general_contact_angle_resolution of 23 or more"))));
+  EXPECT_THAT(rolls("type=\"cylinder\" radius=\"0.05\" length=\"0.1\" "
+                    "general_contact_angle_resolution=\"23\""),
+              IsEmpty());
+  EXPECT_THAT(rolls("type=\"capsule\" radius=\"0.05\" length=\"0.1\""),
+              ElementsAre(HasSubstr("second number of general_contact_resolution")));
+  EXPECT_THAT(rolls("type=\"ellipsoid\" size=\"0.1 0.1 0.2\""),
+              ElementsAre(HasSubstr("with 100 points, so it rolls over a polygon")));
+  EXPECT_THAT(rolls("type=\"sphere\" radius=\"0.05\""), IsEmpty());
 }
 
 TEST(CoarsePoints, BoxesOnPlatesAreNot) {
