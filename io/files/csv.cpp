@@ -21,7 +21,6 @@ namespace {
 // Longer lines do not occur in tables of controls. The limit also keeps a device that never ends a
 // line from filling the memory.
 constexpr std::streamsize kLongestLine = 1 << 20;
-constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";  // spreadsheets write it first
 
 std::string_view trim(std::string_view text) {
   constexpr std::string_view kBlank = " \t\r";
@@ -101,6 +100,7 @@ std::vector<std::vector<double>> read_csv(const std::string& path, std::size_t c
     if (!file.eof()) line.remove_suffix(1);  // the newline counts as read
     if (source.line == 1 && line.starts_with(kByteOrderMark))
       line.remove_prefix(kByteOrderMark.size());
+    if (source.line == 1) refuse_pointer(line, path, "a csv file");
     line = trim(line);
     if (line.empty() || line.front() == '#') continue;
     const std::vector<std::string_view> fields = split(line);

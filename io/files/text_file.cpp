@@ -54,7 +54,16 @@ std::string read_text_file(const std::string& path, std::size_t most, const char
   if (text.size() > most)
     throw InputError(
         fmt::format("{}: larger than {} MiB; expected {}", path, most >> 20, expected));
+  refuse_pointer(text, path, expected);
   return text;
+}
+
+void refuse_pointer(std::string_view head, const std::string& path, const char* expected) {
+  if (head.starts_with(kPointerStart))
+    throw InputError(
+        fmt::format("{}:1: a pointer of Git LFS to a file that was not fetched; expected {} "
+                    "(`git lfs pull` fetches it)",
+                    path, expected));
 }
 
 std::size_t find_invalid_utf8(std::string_view text) {

@@ -73,23 +73,29 @@ std::optional<RobotMesh> read_robot_mesh(const RobotNode& node, const std::strin
                     node.name(), name));
     return std::nullopt;
   }
-  try {
-    mesh.faces = read_faces(mesh.file.path);
-  } catch (const IoError& e) {
-    throw IoError(node.source().prefix() + "<" + node.name() + ">: " + e.what());
-  } catch (const InputError& e) {
-    throw InputError(node.source().prefix() + "<" + node.name() + ">: " + e.what());
-  }
-  mesh.shape = mesh.faces;
-  if (!surface_fault(mesh.shape).empty()) {
+  const FileSurface file = [&] {
+    try {
+      return read_faces(mesh.file.path);
+    } catch (const IoError& e) {
+      throw IoError(node.source().prefix() + "<" + node.name() + ">: " + e.what());
+    } catch (const InputError& e) {
+      throw InputError(node.source().prefix() + "<" + node.name() + ">: " + e.what());
+    }
+  }();
+  mesh.faces = file.faces;
+  mesh.shape = file.closed;
+  if (!file.fault.empty()) {
     mesh.file.hull = true;
-    mesh.shape = convex_hull(mesh.faces.vertices);
+    mesh.shape = convex_hull(file.points);
     if (mesh.shape.triangles.empty()) {
       node.lost(fmt::format("<{}>: the flat surface of \"{}\"", node.name(), name));
       return std::nullopt;
     }
-    node.changed(
-        fmt::format("<{}> of an open surface: its convex hull takes its place", node.name()));
+    if (mesh.faces.triangles.empty())
+      mesh.faces = mesh.shape;  // points alone
+    else
+      node.changed(fmt::format("<{}>: its convex hull takes its place, because {}", node.name(),
+                               file.fault));
   }
   scale_surface(mesh.shape, scale);
   scale_surface(mesh.faces, scale);
