@@ -20,4 +20,8 @@ struct RobotMesh {
 std::optional<RobotMesh> read_robot_mesh(const RobotNode& node, const std::string& name,
                                          const std::string& folder, const Vector3& scale);
 
+/// The same for a mesh of MJCF without a file: its `vertex` and `face`, or `vertex` alone for the
+/// convex hull.
+std::optional<RobotMesh> read_written_mesh(const RobotNode& node, const Vector3& scale);
+
 }  // namespace tangere

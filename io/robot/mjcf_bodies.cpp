@@ -337,7 +337,8 @@ class Bodies {
     };
     const auto first = std::find_if(pieces.begin(), pieces.end(), heavy);
     if (massive && std::count_if(pieces.begin(), pieces.end(), heavy) == 1 &&
-        first->mesh.path.empty() && !std::holds_alternative<AbstractShape>(first->shape))
+        !std::holds_alternative<MeshShape>(first->shape) &&
+        !std::holds_alternative<AbstractShape>(first->shape))
       principal = first->pose;
     for (RobotPiece& piece : pieces) piece.pose = compose(offset, piece.pose);
     if (inertial) pieces.push_back(*inertial);

@@ -149,7 +149,7 @@ void read_option(MjcfFile& file, const RobotNode& node) {
 void read_mesh(MjcfFile& file, const RobotNode& node) {
   node.check(mjcf_words("mesh"));
   if (!node.has("file") && !node.has("vertex") && !node.has("builtin"))
-    node.fail("a mesh without a file; expected file=\"….obj\", .stl or .ply");
+    node.fail("a mesh without a file; expected file=\"….obj\", .stl or .ply, or vertex");
   const std::string name = node.has("name")
                                ? node.text("name")
                                : std::filesystem::path(node.text("file")).stem().string();
@@ -288,15 +288,18 @@ const MjcfMesh& MjcfFile::mesh_named(const RobotNode& node, const std::string& n
   MjcfMesh& mesh = found->second;
   if (mesh.is_read) return mesh;
   mesh.is_read = true;
-  if (!mesh.node.has("file")) {
-    mesh.node.lost(
-        fmt::format("<mesh> '{}': a shape without a file; write it to an OBJ file", name));
+  if (mesh.node.has("builtin")) {
+    mesh.node.lost("<mesh> builtin: a shape made by MuJoCo; write it to an OBJ file");
     return mesh;
   }
-  std::string given = mesh.node.text("file");
-  if (strip_path) given = std::filesystem::path(given).filename().string();
   const Vector3 scale = mesh.node.vector("scale", Vector3{1, 1, 1});
-  mesh.mesh = read_robot_mesh(mesh.node, given, mesh_folder, scale);
+  if (mesh.node.has("vertex")) {
+    mesh.mesh = read_written_mesh(mesh.node, scale);
+  } else {
+    std::string given = mesh.node.text("file");
+    if (strip_path) given = std::filesystem::path(given).filename().string();
+    mesh.mesh = read_robot_mesh(mesh.node, given, mesh_folder, scale);
+  }
   read_origin(mesh, scale);
   return mesh;
 }

@@ -125,7 +125,7 @@ std::map<std::string, Words> all_words() {
                  {"builtin"},
                  {"params"},
                  {"content_type", Fate::idle, kSolver},
-                 {"face", Fate::idle, kSight},
+                 {"face"},
                  {"normal", Fate::idle, kSight},
                  {"texcoord", Fate::idle, kSight},
                  {"smoothnormal", Fate::idle, kSight},

@@ -26,11 +26,14 @@ class Remarks {
   std::map<std::string, std::vector<int>> places_;  // text with its file, lines
 };
 
-/// The surface file of a mesh body.
+/// The surface of a mesh body: a file, or numbers.
 struct MeshFile {
   std::string path;
   Vector3 scale{1, 1, 1};
-  bool hull = false;  ///< the body is the convex hull of the file's points
+  bool hull = false;  ///< the body is the convex hull of the points
+  /// Without a path: x y z of all vertices, and three vertices, from 0, of all triangles.
+  std::vector<double> vertices = {};
+  std::vector<int> triangles = {};
 };
 
 /// A named place on a link.

@@ -16,7 +16,6 @@
 #include "io/scene/closed_surface.hpp"
 #include "io/scene/convex_hull.hpp"
 #include "io/scene/obj_file.hpp"
-#include "io/scene/triangle_files.hpp"
 
 namespace tangere {
 namespace {
@@ -56,19 +55,23 @@ std::string surface_fault(const MeshShape& mesh) {
   return volume > 0 ? "" : "the surface encloses no volume";
 }
 
-FileSurface read_faces(const std::string& path) {
-  const RawMesh raw = read_triangles(path);
+FileSurface surface_of(const RawMesh& raw, const std::string& name) {
   FileSurface out{weld(raw), {}, {}, raw.fault};
   for (const Vector3& p : raw.positions) out.points.insert(out.points.end(), p.begin(), p.end());
-  if (out.points.empty()) throw InputError(path + ": no faces or vertices; expected a surface");
-  out.closed = out.faces;
   if (out.fault.empty())
     if (const std::string fault = surface_fault(out.faces); !fault.empty())
-      out.fault = path + ": " + fault;
+      out.fault = name + ": " + fault;
   if (!out.fault.empty()) return out;
+  out.closed = out.faces;
   if (const std::string fault = remove_walls(out.closed); !fault.empty())
-    out.fault = path + ": " + fault;
+    out.fault = name + ": " + fault;
   return out;
+}
+
+FileSurface read_faces(const std::string& path) {
+  const RawMesh raw = read_triangles(path);
+  if (raw.positions.empty()) throw InputError(path + ": no faces or vertices; expected a surface");
+  return surface_of(raw, path);
 }
 
 MeshShape read_surface(const std::string& path) {

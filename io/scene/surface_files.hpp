@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "engine/model/scene.hpp"
+#include "io/scene/triangle_files.hpp"
 
 namespace tangere {
 
@@ -22,6 +23,9 @@ struct FileSurface {
 /// lie flush on each other are taken away. Throws IoError if the file cannot be read, InputError
 /// with file:line if it is not of its format or has no vertices.
 FileSurface read_faces(const std::string& path);
+
+/// Does the same with triangles that are read already. `name` stands in front of the fault.
+FileSurface surface_of(const RawMesh& raw, const std::string& name);
 
 /// Returns why triangles are no closed surface with a volume, or "".
 std::string surface_fault(const MeshShape& mesh);
