@@ -38,10 +38,9 @@ WordReader::WordReader(const std::string& path, LineEnd line_end)
   if (!file_) throw IoError(path + ": cannot be opened for reading");
   if (std::filesystem::file_size(path, error) > kLargestFile && !error)
     throw InputError(path + ": larger than 256 MiB; expected " + kExpected);
-  std::string head(kPointerStart.size(), '\0');
+  std::string head(kByteOrderMark.size(), '\0');
   file_.read(head.data(), static_cast<std::streamsize>(head.size()));
   head.resize(static_cast<std::size_t>(file_.gcount()));
-  refuse_pointer(head, path, kExpected);
   if (head.starts_with("\xFF\xFE") || head.starts_with("\xFE\xFF"))
     throw InputError(path + ":1: text in UTF-16; expected UTF-8");
   file_.clear();

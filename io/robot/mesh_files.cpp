@@ -20,7 +20,8 @@ namespace fs = std::filesystem;
 
 namespace {
 
-std::string find_mesh(const RobotNode& node, const std::string& name, const std::string& folder) {
+std::string find_mesh(const RobotNode& node, const std::string& name, const std::string& folder,
+                      const std::optional<std::string>& other_folder) {
   const fs::path robot = fs::path(node.robot().scene.path).parent_path();
   std::vector<std::string> tried;
   constexpr std::string_view kPackage = "package://", kFile = "file://";
@@ -42,6 +43,9 @@ std::string find_mesh(const RobotNode& node, const std::string& name, const std:
     if (name.starts_with(kFile)) plain = name.substr(kFile.size());
     tried.push_back((robot / folder / plain).lexically_normal().string());
   }
+  if (other_folder)
+    for (const fs::path& end : {fs::path(plain), fs::path(plain).filename()})
+      tried.push_back((robot / *other_folder / end).lexically_normal().string());
   const auto found = std::find_if(tried.begin(), tried.end(), [](const std::string& path) {
     std::error_code none;
     return fs::is_regular_file(path, none);
@@ -89,9 +93,10 @@ void check_scale(const RobotNode& node, const Vector3& scale) {
 }  // namespace
 
 std::optional<RobotMesh> read_robot_mesh(const RobotNode& node, const std::string& name,
-                                         const std::string& folder, const Vector3& scale) {
+                                         const std::string& folder, const Vector3& scale,
+                                         const std::optional<std::string>& other_folder) {
   check_scale(node, scale);
-  const MeshFile file{find_mesh(node, name, folder), scale};
+  const MeshFile file{find_mesh(node, name, folder, other_folder), scale};
   if (!is_surface_file(file.path)) {
     node.lost(
         fmt::format("<{}>: the shape of \"{}\", which is no OBJ, STL or PLY file; convert it "

@@ -358,11 +358,8 @@ class Bodies {
       const std::vector<double> x = node.numbers("fullinertia", 6);  // xx yy zz xy xz yz
       inertia = {x[0], x[3], x[4], x[1], x[5], x[2]};
     }
-    if (file_.balance_inertia && !is_inertia(inertia)) {
-      const double mean = (inertia[0] + inertia[3] + inertia[5]) / 3;
-      inertia = {mean, 0, 0, mean, 0, mean};
+    if (file_.balance_inertia && balance_inertia(inertia))
       node.changed("<inertial>: all moments are their mean, as balanceinertia says");
-    }
     return inertial_piece(robot_, mass, inertia, file_.read_pose(node), "<inertial>",
                           node.source());
   }

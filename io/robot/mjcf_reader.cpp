@@ -9,7 +9,6 @@
 #include <cmath>
 #include <filesystem>
 
-#include "engine/model/shapes.hpp"
 #include "io/robot/mjcf_file.hpp"
 #include "io/robot/mjcf_words.hpp"
 
@@ -180,26 +179,6 @@ void read_asset(MjcfFile& file, const RobotNode& section) {
     if (!node.has("rgba")) continue;
     const std::vector<double> x = node.numbers("rgba", 4);
     file.materials[node.text("name")] = {x[0], x[1], x[2], x[3]};
-  }
-}
-
-/// Scales all masses so that they add up to `total` [kg].
-void scale_masses(Scene& scene, double total) {
-  double sum = 0;
-  for (const LinkDescription& link : scene.links) {
-    if (const auto* const mass = std::get_if<AbstractShape>(&link.body.shape))
-      sum += mass->mass;
-    else if (link.body.density > 0)
-      sum += link.body.density * volume_of(link.body.shape);
-  }
-  if (!(sum > 0)) return;
-  const double factor = total / sum;
-  for (LinkDescription& link : scene.links) {
-    link.body.density *= factor;
-    if (auto* const mass = std::get_if<AbstractShape>(&link.body.shape)) {
-      mass->mass *= factor;
-      for (double& x : mass->inertia) x *= factor;
-    }
   }
 }
 

@@ -114,4 +114,11 @@ std::optional<RobotPiece> inertial_piece(Robot& robot, double mass, std::array<d
                                          const Pose& pose, const std::string& origin,
                                          const Source& source);
 
+/// Scales all masses so that they add up to `total` [kg].
+void scale_masses(Scene& scene, double total);
+
+/// Where no solid has these moments (xx xy xz yy yz zz), puts their mean in place of all, as
+/// balanceinertia of MuJoCo. Returns whether it did.
+bool balance_inertia(std::array<double, 6>& inertia);
+
 }  // namespace tangere

@@ -15,6 +15,7 @@
 #include "engine/base/error.hpp"
 #include "engine/model/shapes.hpp"
 #include "io/files/csv.hpp"
+#include "io/hdf5/h5.hpp"
 #include "io/scene/polygons.hpp"
 #include "io/scene/scene_reader.hpp"
 #include "io/scene/surface_files.hpp"
@@ -328,6 +329,7 @@ TEST_F(SurfaceKinds, APointerOfGitLfsIsNamed) {
   EXPECT_THAT(error_of([&] { read_tactile_points(folder_ + "a.txt"); }), HasSubstr(named));
   EXPECT_THAT(error_of([&] { read_csv(folder_ + "a.txt", 2); }), HasSubstr(named));
   EXPECT_THAT(error_of([&] { read_scene(folder_ + "a.txt"); }), HasSubstr(named));
+  EXPECT_THAT(error_of([&] { h5::open_file(folder_ + "a.txt"); }), HasSubstr(named));
 }
 
 }  // namespace
