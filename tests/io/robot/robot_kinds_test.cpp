@@ -97,12 +97,12 @@ TEST_F(RobotKinds, MotorsExertTheForceOfTheFile) {
 TEST_F(RobotKinds, ARangeFromHighToLowTurnsTheForceRound) {
   const auto last = [&](const std::string& range, double u) {
     const Model model(
-        parse_scene(
-            "<tangere><robot><link name=\"a\"><joint name=\"a\" type=\"revolute\" axis=\"0 0 1\"/>"
-            "<body name=\"a\" type=\"cuboid\" size=\"1 2 3\" density=\"1000\"/>"
-            "</link></robot><actuator><motor joint=\"a\" ctrl=\"force\" ctrl_range=\"" +
-                range + "\"/></actuator></tangere>",
-            "s.xml")
+        parse_scene("<tangere><option unit=\"m-kg\"/><robot><link name=\"a\"><joint name=\"a\" "
+                    "type=\"revolute\" axis=\"0 0 1\"/>"
+                    "<body name=\"a\" type=\"cuboid\" size=\"1 2 3\" density=\"1000\"/>"
+                    "</link></robot><actuator><motor joint=\"a\" ctrl=\"force\" ctrl_range=\"" +
+                        range + "\"/></actuator></tangere>",
+                    "s.xml")
             .scene);
     Batch batch(model, 1, 1);
     Stepper stepper(model);
