@@ -110,7 +110,7 @@ void check_motor(const MotorDescription& d) {
   bool finite = std::isfinite(d.P) && std::isfinite(d.D);
   const std::array<double, 2> sliding = {d.low, d.high};
   for (const auto& [low, high] : {sliding, d.turning.value_or(sliding)}) {
-    if (!(low <= high))
+    if (d.control == MotorControl::position && !(low <= high))
       throw InputError(d.source.prefix() + "motor of joint '" + d.joint + "': range " +
                        std::to_string(low) + " " + std::to_string(high) +
                        "; expected low, then high");

@@ -21,7 +21,6 @@ namespace {
 // Longer lines do not occur in tables of controls. The limit also keeps a device that never ends a
 // line from filling the memory.
 constexpr std::streamsize kLongestLine = 1 << 20;
-constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";  // spreadsheets write it first
 
 std::string_view trim(std::string_view text) {
   constexpr std::string_view kBlank = " \t\r";

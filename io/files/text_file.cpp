@@ -11,6 +11,7 @@
 #include <cerrno>
 #include <cstdint>
 #include <cstring>
+#include <fstream>
 
 #include "engine/base/error.hpp"
 
@@ -32,6 +33,14 @@ void require_regular_file(const std::string& path, const char* expected) {
     throw IoError(fmt::format("{}: cannot be opened for reading: {}", path, std::strerror(errno)));
   if (!S_ISREG(info.st_mode))
     throw IoError(fmt::format("{}: is {}; expected {}", path, kind_of(info.st_mode), expected));
+  constexpr std::string_view kPointer = "version https://git-lfs.github.com/spec/";
+  std::array<char, kPointer.size()> head{};
+  std::ifstream(path, std::ios::binary).read(head.data(), head.size());
+  if (std::string_view(head.data(), head.size()) == kPointer)
+    throw InputError(
+        fmt::format("{}:1: a pointer of Git LFS to a file that was not fetched; expected {} "
+                    "('git lfs pull' fetches it)",
+                    path, expected));
 }
 
 std::string read_text_file(const std::string& path, std::size_t most, const char* expected) {

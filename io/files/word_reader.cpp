@@ -17,6 +17,7 @@ namespace {
 
 constexpr std::uintmax_t kLargestFile = 256U << 20;
 constexpr double kLargestPosition = 1e6;  // [file's unit]
+constexpr const char* kExpected = "a surface or a list of points";
 
 /// Returns NaN if the word is not a number.
 double parse(std::string_view word) {
@@ -29,18 +30,41 @@ double parse(std::string_view word) {
 
 }  // namespace
 
-WordReader::WordReader(const std::string& path) : path_(path) {
+WordReader::WordReader(const std::string& path, LineEnd line_end)
+    : path_(path), line_end_(line_end) {
   std::error_code error;
-  require_regular_file(path, "a surface or a list of points");
+  require_regular_file(path, kExpected);
   file_.open(path, std::ios::binary);
   if (!file_) throw IoError(path + ": cannot be opened for reading");
   if (std::filesystem::file_size(path, error) > kLargestFile && !error)
-    throw InputError(path + ": larger than 256 MiB; expected a surface or a list of points");
+    throw InputError(path + ": larger than 256 MiB; expected " + kExpected);
+  std::string head(kByteOrderMark.size(), '\0');
+  file_.read(head.data(), static_cast<std::streamsize>(head.size()));
+  head.resize(static_cast<std::size_t>(file_.gcount()));
+  if (head.starts_with("\xFF\xFE") || head.starts_with("\xFE\xFF"))
+    throw InputError(path + ":1: text in UTF-16; expected UTF-8");
+  file_.clear();
+  file_.seekg(head.starts_with(kByteOrderMark) ? std::streamoff(kByteOrderMark.size()) : 0);
+}
+
+bool WordReader::read_line() {
+  if (!std::getline(file_, line_)) return false;
+  ++number_;
+  if (line_end_ == LineEnd::plain) return true;
+  for (std::string next;;) {
+    const std::size_t last = line_.find_last_not_of(" \t\r");
+    const bool goes_on = last != std::string::npos && line_[last] == '\\' &&
+                         line_.find('#') == std::string::npos;  // not in a remark
+    if (!goes_on) return true;
+    line_[last] = ' ';
+    if (!std::getline(file_, next)) return true;
+    ++number_;
+    line_ += next;
+  }
 }
 
 bool WordReader::next() {
-  while (std::getline(file_, line_)) {
-    ++number_;
+  while (read_line()) {
     std::replace(line_.begin(), line_.end(), '"', ' ');
     words.clear();
     std::string_view rest = line_;
@@ -57,8 +81,10 @@ bool WordReader::next() {
   return false;
 }
 
+std::string WordReader::place() const { return fmt::format("{}:{}:", path_, number_); }
+
 void WordReader::fail(const std::string& message) const {
-  throw InputError(Source{path_, number_}.prefix() + message);
+  throw InputError(place() + " " + message);
 }
 
 double WordReader::number(std::size_t k) const {

@@ -9,15 +9,23 @@
 
 namespace tangere {
 
-/// Lines of a text file, cut into words at spaces and quotes.
+/// What a backslash at the end of a line means.
+enum class LineEnd { plain, joined };
+
+/// Lines of a text file, cut into words at spaces and quotes. A byte order mark of UTF-8 before the
+/// first line is no part of it.
 class WordReader {
  public:
-  /// Throws IoError if the file cannot be opened, InputError if it is larger than 256 MiB.
-  explicit WordReader(const std::string& path);
+  /// `line_end`: with `joined`, a line that ends with a backslash goes on in the next one, and
+  /// messages name the last of them. Throws IoError if the file cannot be opened. Throws InputError
+  /// if it is larger than 256 MiB, UTF-16, or a pointer of Git LFS.
+  explicit WordReader(const std::string& path, LineEnd line_end = LineEnd::plain);
 
   /// Moves to the next line that has words. Returns false at the end. A word that starts with #
   /// ends its line.
   bool next();
+  /// "file:line:" of the line.
+  [[nodiscard]] std::string place() const;
   /// Throws InputError with file and line.
   [[noreturn]] void fail(const std::string& message) const;
 
@@ -31,8 +39,11 @@ class WordReader {
   std::vector<std::string_view> words;  ///< of the line, valid until next()
 
  private:
+  bool read_line();
+
   std::string path_, line_;
   std::ifstream file_;
+  LineEnd line_end_;
   int number_ = 0;
 };
 

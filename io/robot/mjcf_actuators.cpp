@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Actuators on hinges and slides. With the gear G the length of the transmission is G q, and the
 // force f of the actuator acts on the joint as G f:
-//   motor     f = c                        a force motor from G c_low to G c_high
+//   motor     f = c                        a force motor from G c_low to G c_high, of any sign
 //   position  f = kp (c - G q) - kv G v    P = kp G², D = kv G², target c/G - ref
 //   velocity  f = kv (c - G v)             a force motor from G kv c_low on, and damping kv G²
 #include <fmt/format.h>
@@ -32,6 +32,11 @@ class Actuators {
     if (std::find(kActuators.begin(), kActuators.end(), node.name()) == kActuators.end())
       return node.lost("<" + node.name() + ">: an actuator that scenes do not have");
     node.check(mjcf_words(node.name()));
+    const int group = node.integer("group", 0, std::numeric_limits<int>::max(), 0);
+    if (std::find(file_.disabled_groups.begin(), file_.disabled_groups.end(), group) !=
+        file_.disabled_groups.end())
+      return node.changed("<" + node.name() +
+                          "> of a group that <option actuatorgroupdisable> switches off: no motor");
     Law law;
     if (!read_law(node, law)) return;
     const std::string name = joint_of(node);
@@ -48,7 +53,7 @@ class Actuators {
     MotorDescription motor;
     motor.joint = name;
     motor.source = node.source();
-    const Range control = range(node, "ctrlrange", "ctrllimited");
+    const Range control = control_range(node, end);
     Range force = scaled(range(node, "forcerange", "forcelimited"), gear);
     if (end.actuator_range)
       force = {std::max(force[0], (*end.actuator_range)[0]),
@@ -62,9 +67,7 @@ class Actuators {
       use.scale = 1 / gear;
       use.shift = 0 - end.ref;
     } else {
-      set_force(node, law, gear, control, force, link.joint, motor);
-      use.scale = 2 * gear * law.gain / (motor.high - motor.low);
-      use.shift = -(motor.high + motor.low) / (motor.high - motor.low);
+      set_force(node, law, gear, force, link.joint, motor, use);
       use.least = -1;
       use.most = 1;
     }
@@ -84,6 +87,16 @@ class Actuators {
     if (!(x[0] < x[1]))
       node.fail(fmt::format("{}=\"{} {}\": expected low, then high", name, x[0], x[1]));
     return {x[0], x[1]};
+  }
+
+  /// The range of the control: ctrlrange, or a part of the joint's range about its middle.
+  [[nodiscard]] Range control_range(const RobotNode& node, const MjcfJoint& end) const {
+    const double part = node.has("inheritrange") ? node.not_negative("inheritrange") : 0;
+    if (part == 0 || node.has("ctrlrange")) return range(node, "ctrlrange", "ctrllimited");
+    if (!end.range) node.fail("inheritrange of a joint without a range; expected one");
+    const auto& [low, high] = *end.range;
+    const double middle = 0.5 * (low + high), half = 0.5 * part * (high - low);
+    return {middle - half, middle + half};
   }
 
   /// The joint that the actuator drives; "" if it drives something else, which is listed.
@@ -162,29 +175,49 @@ class Actuators {
                                motor.joint));
   }
 
-  void set_force(const RobotNode& node, const Law& law, double gear, const Range& control,
-                 const Range& force, JointDescription& joint, MotorDescription& motor) const {
+  /// The scene's control is -1 where the file's is lowest. Where force per control is negative, the
+  /// motor's range therefore runs from high to low.
+  void set_force(const RobotNode& node, const Law& law, double gear, const Range& force,
+                 JointDescription& joint, MotorDescription& motor, MjcfControl& use) const {
     motor.control = MotorControl::force;
-    const bool bounded = control[0] > -kNone && control[1] < kNone;
-    const Range asked = scaled(bounded ? control : Range{-1, 1}, gear * law.gain);
-    motor.low = std::max(asked[0], force[0]);
-    motor.high = std::min(asked[1], force[1]);
-    if (!bounded && force[0] > -kNone && force[1] < kNone) {
-      motor.low = force[0];
-      motor.high = force[1];
-    } else if (!bounded) {
-      node.changed(
-          fmt::format("<{}> without ctrlrange: the control of '{}' is that of the file "
-                      "from -1 to 1",
-                      node.name(), motor.joint));
+    const double slope = gear * law.gain;
+    const bool bounded = use.range[0] > -kNone && use.range[1] < kNone,
+               by_force = !bounded && force[0] > -kNone && force[1] < kNone;
+    if (by_force) {
+      motor.low = force[slope < 0 ? 1 : 0];
+      motor.high = force[slope < 0 ? 0 : 1];
+    } else {
+      const double most = bounded ? 1 : most_control();
+      const Range control = bounded ? use.range : Range{-most, most};
+      motor.low = std::clamp(slope * control[0], force[0], force[1]);
+      motor.high = std::clamp(slope * control[1], force[0], force[1]);
     }
-    if (!(motor.low < motor.high)) node.fail("its ranges leave no force");
+    if (slope == 0 || motor.low == motor.high) node.fail("its ranges leave no force");
+    use.scale = 2 * slope / (motor.high - motor.low);
+    use.shift = 0 - (motor.high + motor.low) / (motor.high - motor.low);
+    const std::string factor =
+        std::abs(use.scale - 1) > 1e-12 ? fmt::format(" times {:g}", use.scale) : "";
+    if (!bounded && !by_force)
+      node.changed(
+          fmt::format("<{}> without ctrlrange: the control of '{}' is that of the file{} "
+                      "from -1 to 1",
+                      node.name(), motor.joint, factor));
+    else if (!factor.empty() || std::abs(use.shift) > 1e-12)
+      node.changed(fmt::format("<{}>: the control of '{}' is that of the file{}{}", node.name(),
+                               motor.joint, factor,
+                               use.shift == 0 ? "" : fmt::format(" {:+g}", use.shift)));
     if (law.kv == 0) return;
     joint.damping += law.kv * gear * gear;
     node.changed(fmt::format("<{}>: a motor for the control, and damping of joint '{}'",
                              node.name(), motor.joint));
     if (force[0] > -kNone || force[1] < kNone)
       node.lost("<" + node.name() + "> forcerange: the damping is not clipped");
+  }
+
+  /// The control that the actuator being read must be able to have: 1, or more in a keyframe.
+  [[nodiscard]] double most_control() const {
+    const std::size_t at = file_.controls.size() - 1;
+    return at < file_.keyframe_ctrl.size() ? std::max(1.0, std::abs(file_.keyframe_ctrl[at])) : 1.0;
   }
 
   MjcfFile& file_;
@@ -196,9 +229,7 @@ class Actuators {
 void read_mjcf_actuators(MjcfFile& file, const RobotNode& section) {
   Words known;
   for (const std::string& name : kActuators) known.push_back({name.c_str()});
-  for (const char* other :
-       {"intvelocity", "damper", "cylinder", "muscle", "adhesion", "plugin", "dcmotor"})
-    known.push_back({other});
+  for (const char* other : kOtherActuators) known.push_back({other});
   Actuators actuators(file);
   for (const RobotNode& part : section.parts(known)) actuators.read(file.with_class(part, "main"));
 }

@@ -167,7 +167,7 @@ class Bodies {
       const RobotNode joint_node = file_.with_class(part.node, part.defaults);
       MjcfJoint end;
       Vector3 at{};
-      JointDescription joint = free_joint ? read_free_joint(part.node, name)
+      JointDescription joint = free_joint ? read_free_joint(part.node, name, end)
                                           : read_joint(joint_node, part.frame, name, at, end);
       if (joint.type == JointType::free && (parent >= 0 || !chain.empty()))
         part.node.fail(
@@ -191,9 +191,14 @@ class Bodies {
       fixed.pose = place;
       fixed.source = node.source();
       chain.push_back(fixed);
-      ends.push_back({-2, 0, {}});
+      ends.push_back({-2});
     }
-    const std::vector<RobotPiece> pieces = read_pieces(node, parts, offset);
+    std::optional<Pose> inertia;
+    const std::vector<RobotPiece> pieces = read_pieces(node, parts, offset, inertia);
+    const bool has_bodies = std::any_of(
+        parts.begin(), parts.end(), [](const Placed& part) { return part.node.name() == "body"; });
+    ends.back().is_aligned &= !has_bodies;
+    ends.back().inertia = inertia;
     for (std::size_t k = 0; k + 1 < chain.size(); ++k) {
       const std::string link = file_.names.free_name(name + "_" + chain[k].name);
       parent = add_link(robot_, file_.names, link, parent, chain[k], {},
@@ -221,12 +226,12 @@ class Bodies {
     return name;
   }
 
-  JointDescription read_free_joint(const RobotNode& node, const std::string& body) {
-    node.check({{"name"},
-                {"group", Fate::idle, kSight},
-                {"align", Fate::idle, "the body keeps the frame that the file gives"}});
+  JointDescription read_free_joint(const RobotNode& node, const std::string& body, MjcfJoint& end) {
+    node.check({{"name"}, {"group", Fate::idle, kSight}, {"align"}});
     JointDescription joint;
     joint.type = JointType::free;
+    const int align = node.choice("align", {"auto", "true", "false"}, 0);
+    end.is_aligned = align == 1 || (align == 0 && file_.align_free);
     joint.name = joint_name(node, body);
     joint.source = node.source();
     return joint;
@@ -257,11 +262,12 @@ class Bodies {
         node.changed(fmt::format("<joint> ref: the coordinate of '{}' is that of the file minus {}",
                                  joint.name, end.ref));
     }
+    end.is_aligned = joint.type == JointType::free && file_.align_free;
     if (joint.type == JointType::free && joint.stiffness != 0) {
       node.lost("<joint> stiffness: a spring of a free joint to its place in the world");
       joint.stiffness = 0;
     }
-    read_range(node, single, measure, end.ref, joint);
+    read_range(node, measure, end, joint);
     if (node.has("actuatorfrcrange") && limited(node, "actuatorfrclimited")) {
       const std::vector<double> x = node.numbers("actuatorfrcrange", 2);
       if (!(x[0] < x[1])) node.fail("actuatorfrcrange: expected low, then high");
@@ -276,8 +282,12 @@ class Bodies {
   }
 
   template <class Measure>
-  void read_range(const RobotNode& node, bool single, Measure&& measure, double ref,
+  void read_range(const RobotNode& node, Measure&& measure, MjcfJoint& end,
                   JointDescription& joint) const {
+    if (joint.type == JointType::free) {  // has no limits, whatever its class says
+      if (node.has("range")) node.idle("<joint> range of a free joint");
+      return;
+    }
     const bool on = limited(node, "limited");
     if (!node.has("range")) {
       if (node.has("limited") && on && node.text("limited") == "true")
@@ -289,15 +299,16 @@ class Bodies {
     if (!on) return node.idle("<joint> range of a joint that is not limited");
     if (joint.type == JointType::spherical)
       return node.lost("<joint> range of a ball joint: the angle of a cone");
-    if (!single) return node.idle("<joint> range of a free joint");
     if (!(x[0] < x[1]))
       node.fail(fmt::format("range=\"{} {}\": expected low, then high", x[0], x[1]));
-    joint.limits = {measure(x[0]) - ref, measure(x[1]) - ref};
+    end.range = {measure(x[0]), measure(x[1])};
+    joint.limits = {measure(x[0]) - end.ref, measure(x[1]) - end.ref};
   }
 
-  /// The geoms of a body and its mass, in the frame of its link.
+  /// The geoms of a body and its mass, in the frame of its link. `principal`: the frame of its
+  /// inertia in that of the body, where the file gives it: by diaginertia or one primitive.
   std::vector<RobotPiece> read_pieces(const RobotNode& node, const std::vector<Placed>& parts,
-                                      const Pose& offset) {
+                                      const Pose& offset, std::optional<Pose>& principal) {
     std::optional<RobotPiece> inertial;
     bool has_inertial = false;
     for (const Placed& part : parts) {
@@ -305,11 +316,13 @@ class Bodies {
       if (has_inertial) part.node.fail("given twice; expected once");
       has_inertial = true;
       inertial = read_inertial(part.node);
+      if (part.node.has("diaginertia")) principal = compose(part.frame, file_.read_pose(part.node));
       if (inertial) inertial->pose = compose(offset, compose(part.frame, inertial->pose));
     }
     if (has_inertial && file_.inertia_from == InertiaFrom::geoms) {
       node.changed("<inertial>: left out, because inertiafromgeom=\"true\"");
       inertial.reset();
+      principal.reset();
       has_inertial = false;
     }
     const bool massive = !has_inertial && file_.inertia_from != InertiaFrom::inertials;
@@ -319,6 +332,14 @@ class Bodies {
       const RobotNode geom = file_.with_class(part.node, part.defaults);
       read_geom(geom, part.frame, massive, pieces);
     }
+    const auto heavy = [](const RobotPiece& piece) {
+      return piece.density > 0 || std::holds_alternative<AbstractShape>(piece.shape);
+    };
+    const auto first = std::find_if(pieces.begin(), pieces.end(), heavy);
+    if (massive && std::count_if(pieces.begin(), pieces.end(), heavy) == 1 &&
+        !std::holds_alternative<MeshShape>(first->shape) &&
+        !std::holds_alternative<AbstractShape>(first->shape))
+      principal = first->pose;
     for (RobotPiece& piece : pieces) piece.pose = compose(offset, piece.pose);
     if (inertial) pieces.push_back(*inertial);
     return pieces;
@@ -337,11 +358,8 @@ class Bodies {
       const std::vector<double> x = node.numbers("fullinertia", 6);  // xx yy zz xy xz yz
       inertia = {x[0], x[3], x[4], x[1], x[5], x[2]};
     }
-    if (file_.balance_inertia && !is_inertia(inertia)) {
-      const double mean = (inertia[0] + inertia[3] + inertia[5]) / 3;
-      inertia = {mean, 0, 0, mean, 0, mean};
+    if (file_.balance_inertia && balance_inertia(inertia))
       node.changed("<inertial>: all moments are their mean, as balanceinertia says");
-    }
     return inertial_piece(robot_, mass, inertia, file_.read_pose(node), "<inertial>",
                           node.source());
   }
@@ -465,6 +483,7 @@ class Bodies {
     if (type == "mesh") {
       mesh = &file_.mesh_named(node, node.text("mesh"));
       if (!mesh->mesh) return false;
+      piece.pose = compose(piece.pose, mesh->origin);
       piece.shape = mesh->mesh->shape;
       piece.mesh = mesh->mesh->file;
       return true;

@@ -25,6 +25,7 @@ struct MjcfMesh {
   RobotNode node;
   MeshInertia inertia = MeshInertia::legacy;
   bool is_read = false;
+  Pose origin = {};  ///< of the file's frame in that of the geom's mesh, once it is read
   std::optional<RobotMesh> mesh = {};  ///< once it is read; none if scenes cannot have it
 };
 
@@ -32,7 +33,12 @@ struct MjcfMesh {
 struct MjcfJoint {
   int link = -1;   ///< of the scene
   double ref = 0;  ///< the file's coordinate where ours is zero [m or rad]
-  std::optional<std::array<double, 2>> actuator_range;  ///< [N or N m]
+  std::optional<std::array<double, 2>> actuator_range = {};  ///< [N or N m]
+  std::optional<std::array<double, 2>> range = {};  ///< in the file's coordinate [m or rad]
+  /// A free joint whose frame MuJoCo aligns with the inertia of its body, which keyframes refer to.
+  bool is_aligned = false;
+  /// Of such a joint: the frame of the inertia in that of the body, if the file gives it.
+  std::optional<Pose> inertia = {};
 };
 
 /// An actuator of the file, in its order, and how its control becomes one of the scene:
@@ -49,6 +55,9 @@ enum class InertiaFrom { automatic, geoms, inertials };
 
 /// In defaults all actuators share the attributes of <general>.
 inline const std::vector<std::string> kActuators = {"general", "motor", "position", "velocity"};
+inline constexpr const char* kOtherActuators[] = {"intvelocity", "damper",      "cylinder",
+                                                  "muscle",      "adhesion",    "plugin",
+                                                  "dcmotor",     "orientation", "pid"};
 
 class MjcfFile {
  public:
@@ -64,8 +73,11 @@ class MjcfFile {
   bool balance_inertia = false;
   double total_mass = 0;  ///< to which all masses are scaled [kg]; 0: they are not
   bool has_limits = true, has_springs = true, has_dampers = true;  ///< as <flag> says
-  bool free_base = false;  ///< bodies of the world without joints move freely
+  bool free_base = false;   ///< bodies of the world without joints move freely
+  bool align_free = false;  ///< free joints are aligned with the inertia of their bodies
   std::array<int, 2> inertia_groups{0, 5};
+  std::vector<int> disabled_groups;   ///< of actuators
+  std::vector<double> keyframe_ctrl;  ///< of the wanted keyframe, by actuator; may be short
   std::map<std::string, MjcfMesh> meshes;
   std::map<std::string, std::array<double, 4>> materials;
   std::map<std::string, MjcfJoint> joints;
@@ -90,6 +102,7 @@ class MjcfFile {
   [[nodiscard]] Pose read_pose(const RobotNode& node) const;
 
  private:
+  static void read_origin(MjcfMesh& mesh, const Vector3& scale);
   [[nodiscard]] Quaternion read_orientation(const RobotNode& node) const;
 
   std::map<std::string, SceneContext> classes_;                           // their defaults
@@ -100,9 +113,11 @@ class MjcfFile {
 void read_mjcf_bodies(MjcfFile& file, const RobotNode& world);
 /// Reads an <actuator> section.
 void read_mjcf_actuators(MjcfFile& file, const RobotNode& section);
-/// Reads the <keyframe> sections, after all bodies and actuators. The key `wanted`, by its name or,
-/// without one, its number from 0, gives the scene its start; "" for none.
-void read_mjcf_keyframes(MjcfFile& file, const std::vector<RobotNode>& sections,
-                         const std::string& wanted);
+/// Returns the key `wanted` of the <keyframe> sections, by its name or, without one, its number from
+/// 0; none for "". Lists the others, and keeps its controls for the actuators.
+std::optional<RobotNode> find_mjcf_keyframe(MjcfFile& file, const std::vector<RobotNode>& sections,
+                                            const std::string& wanted);
+/// Gives the scene the start of a key, after all bodies and actuators.
+void read_mjcf_keyframe(MjcfFile& file, const RobotNode& key);
 
 }  // namespace tangere

@@ -29,8 +29,10 @@ class Keyframe {
       InitialState state;
       state.joint = link.joint.name;
       state.source = node_.source();
-      if (!q.empty()) state.q = coordinates(link.joint, {&q[iq], nq});
-      if (!v.empty()) state.v = rates(link.joint, {&v[iv], nv});
+      const std::span<const double> at =
+          q.empty() ? std::span<const double>() : std::span{&q[iq], nq};
+      if (!q.empty()) state.q = coordinates(link.joint, at);
+      if (!v.empty()) state.v = rates(link.joint, at, {&v[iv], nv});
       iq += nq;
       iv += nv;
       const auto zero = [](const std::vector<double>& x) {
@@ -75,18 +77,43 @@ class Keyframe {
       const Quaternion turn = unit(q);
       return {turn.begin(), turn.end()};
     }
-    const Pose seen = compose(inverse(joint.pose), {{q[0], q[1], q[2]}, unit(q.subspan(3))});
+    const Pose seen = compose(inverse(joint.pose), free_pose(joint, q));
     std::vector<double> out(seen.position.begin(), seen.position.end());
     out.insert(out.end(), seen.orientation.begin(), seen.orientation.end());
     return out;
   }
 
-  [[nodiscard]] static std::vector<double> rates(const JointDescription& joint,
-                                                 std::span<const double> v) {
+  /// Where a body with a free joint is in the world. `q`: of the key; empty: where the file puts it.
+  [[nodiscard]] Pose free_pose(const JointDescription& joint, std::span<const double> q) const {
+    if (q.empty()) return joint.pose;
+    return compose({{q[0], q[1], q[2]}, unit(q.subspan(3))}, inverse(key_frame(joint)));
+  }
+
+  /// The frame of a body whose place and velocity a key gives, in that of the body: its own, or
+  /// that of its inertia.
+  [[nodiscard]] Pose key_frame(const JointDescription& joint) const {
+    const auto known = file_.joints.find(joint.name);  // none: a joint of --base free
+    if (known == file_.joints.end() || !known->second.is_aligned) return {};
+    if (!known->second.inertia)
+      node_.fail(fmt::format(
+          "the free joint '{}' is aligned with the inertia of its body (align, alignfree), whose "
+          "axes MuJoCo chooses; expected an <inertial> with diaginertia, one geom with a mass that "
+          "is no mesh, or align=\"false\"",
+          joint.name));
+    return *known->second.inertia;
+  }
+
+  [[nodiscard]] std::vector<double> rates(const JointDescription& joint, std::span<const double> q,
+                                          std::span<const double> v) const {
     std::vector<double> out(v.begin(), v.end());
     if (joint.type != JointType::free) return out;
-    const Vector3 seen = outer_direction(inverse(joint.pose), {v[0], v[1], v[2]});
+    const Pose frame = key_frame(joint), body = free_pose(joint, q);
+    const Vector3 turn = outer_direction(frame, {v[3], v[4], v[5]});
+    const Vector3 speed =
+        Vector3{v[0], v[1], v[2]} - outer_direction(body, cross(turn, frame.position));
+    const Vector3 seen = outer_direction(inverse(joint.pose), speed);
     std::copy(seen.begin(), seen.end(), out.begin());
+    std::copy(turn.begin(), turn.end(), out.begin() + 3);
     return out;
   }
 
@@ -109,8 +136,8 @@ class Keyframe {
 
 }  // namespace
 
-void read_mjcf_keyframes(MjcfFile& file, const std::vector<RobotNode>& sections,
-                         const std::string& wanted) {
+std::optional<RobotNode> find_mjcf_keyframe(MjcfFile& file, const std::vector<RobotNode>& sections,
+                                            const std::string& wanted) {
   std::vector<std::string> names;
   std::vector<RobotNode> keys;
   for (const RobotNode& section : sections)
@@ -130,11 +157,15 @@ void read_mjcf_keyframes(MjcfFile& file, const std::vector<RobotNode>& sections,
   for (const RobotNode& key : keys)
     if (wanted.empty() || at == names.end() || &key != &keys[std::size_t(at - names.begin())])
       key.idle(std::string("<key>: ") + kUse);
-  if (wanted.empty()) return;
+  if (wanted.empty()) return std::nullopt;
   if (at == names.end())
     throw InputError(fmt::format("--keyframe {}: {} has no keyframe of this name{}", wanted,
                                  file.robot.scene.path, suggestion(wanted, names)));
-  Keyframe(file, keys[std::size_t(at - names.begin())]).read();
+  const RobotNode& key = keys[std::size_t(at - names.begin())];
+  if (key.has("ctrl")) file.keyframe_ctrl = key.numbers("ctrl");
+  return key;
 }
+
+void read_mjcf_keyframe(MjcfFile& file, const RobotNode& key) { Keyframe(file, key).read(); }
 
 }  // namespace tangere

@@ -9,7 +9,6 @@
 #include <cmath>
 #include <filesystem>
 
-#include "engine/model/shapes.hpp"
 #include "io/robot/mjcf_file.hpp"
 #include "io/robot/mjcf_words.hpp"
 
@@ -63,33 +62,18 @@ Words solver_words() {
   Words words = {{"timestep"},
                  {"gravity"},
                  {"integrator"},
+                 {"actuatorgroupdisable"},
                  {"density", Fate::zero, "the air's or the water's"},
                  {"viscosity", Fate::zero, "the air's or the water's"},
                  {"wind", Fate::zero, "moves the air"},
                  {"magnetic", Fate::idle, "for a sensor of MuJoCo"}};
-  for (const char* name : {"impratio",
-                           "tolerance",
-                           "ls_tolerance",
-                           "noslip_tolerance",
-                           "ccd_tolerance",
-                           "o_margin",
-                           "o_solref",
-                           "o_solimp",
-                           "o_friction",
-                           "cone",
-                           "jacobian",
-                           "solver",
-                           "iterations",
-                           "ls_iterations",
-                           "noslip_iterations",
-                           "ccd_iterations",
-                           "sdf_iterations",
-                           "sdf_initpoints",
-                           "actuatorgroupdisable",
-                           "apirate",
-                           "sleep_tolerance",
-                           "mpr_tolerance",
-                           "mpr_iterations"})
+  for (const char* name :
+       {"impratio",       "tolerance",      "ls_tolerance",      "noslip_tolerance",
+        "ccd_tolerance",  "o_margin",       "o_solref",          "o_solimp",
+        "o_friction",     "cone",           "jacobian",          "solver",
+        "iterations",     "ls_iterations",  "noslip_iterations", "ccd_iterations",
+        "sdf_iterations", "sdf_initpoints", "apirate",           "sleep_tolerance",
+        "mpr_tolerance",  "mpr_iterations"})
     words.push_back({name, Fate::idle, kSolver});
   return words;
 }
@@ -105,8 +89,7 @@ void read_compiler(MjcfFile& file, const RobotNode& node) {
   if (node.has("coordinate")) static_cast<void>(node.choice("coordinate", {"local"}));
   file.balance_inertia = node.flag("balanceinertia", file.balance_inertia);
   if (node.has("settotalmass")) file.total_mass = std::max(node.number("settotalmass"), 0.0);
-  if (node.flag("alignfree", false))
-    node.changed("<compiler> alignfree: free bodies keep the frame that the file gives");
+  file.align_free = node.flag("alignfree", file.align_free);
   if (node.has("eulerseq")) {
     file.euler_sequence = node.text("eulerseq");
     const bool axes = file.euler_sequence.size() == 3 &&
@@ -151,6 +134,9 @@ void read_option(MjcfFile& file, const RobotNode& node) {
   Scene& scene = file.robot.scene;
   scene.timestep = node.positive("timestep", scene.timestep);
   scene.gravity = node.vector("gravity", scene.gravity);
+  if (node.has("actuatorgroupdisable"))
+    for (const double group : node.numbers("actuatorgroupdisable"))
+      file.disabled_groups.push_back(static_cast<int>(group));
   if (node.given("integrator"))
     node.changed("<option> integrator: the scene steps by BDF2, with an implicit solver");
   for (const RobotNode& flag : node.parts({{"flag"}}))
@@ -161,12 +147,11 @@ void read_option(MjcfFile& file, const RobotNode& node) {
 
 void read_mesh(MjcfFile& file, const RobotNode& node) {
   node.check(mjcf_words("mesh"));
-  if (!node.has("file") || node.has("vertex") || node.has("builtin"))
-    node.fail("a mesh without a file; expected file=\"….obj\", .stl or .ply");
-  if (node.has("refquat") && node.numbers("refquat", 4) != std::vector<double>{1, 0, 0, 0})
-    node.lost("<mesh> refquat: turns the mesh");
-  const std::string name =
-      node.text("name", std::filesystem::path(node.text("file")).stem().string());
+  if (!node.has("file") && !node.has("vertex") && !node.has("builtin"))
+    node.fail("a mesh without a file; expected file=\"….obj\", .stl or .ply, or vertex");
+  const std::string name = node.has("name")
+                               ? node.text("name")
+                               : std::filesystem::path(node.text("file")).stem().string();
   if (const auto first = file.meshes.find(name); first != file.meshes.end())
     node.fail(fmt::format("mesh name '{}' is used twice, first in {}", name,
                           place_in(node.robot(), first->second.node.source())));
@@ -197,26 +182,6 @@ void read_asset(MjcfFile& file, const RobotNode& section) {
   }
 }
 
-/// Scales all masses so that they add up to `total` [kg].
-void scale_masses(Scene& scene, double total) {
-  double sum = 0;
-  for (const LinkDescription& link : scene.links) {
-    if (const auto* const mass = std::get_if<AbstractShape>(&link.body.shape))
-      sum += mass->mass;
-    else if (link.body.density > 0)
-      sum += link.body.density * volume_of(link.body.shape);
-  }
-  if (!(sum > 0)) return;
-  const double factor = total / sum;
-  for (LinkDescription& link : scene.links) {
-    link.body.density *= factor;
-    if (auto* const mass = std::get_if<AbstractShape>(&link.body.shape)) {
-      mass->mass *= factor;
-      for (double& x : mass->inertia) x *= factor;
-    }
-  }
-}
-
 }  // namespace
 
 void MjcfFile::read_defaults(const RobotNode& node, const std::string& parent) {
@@ -242,8 +207,7 @@ void MjcfFile::read_defaults(const RobotNode& node, const std::string& parent) {
                  {"pair", Fate::idle, "of pairs of geoms, which --contact names"},
                  {"equality", Fate::idle, "of constraints"},
                  {"tendon", Fate::idle, "of tendons"}};
-  for (const char* other :
-       {"intvelocity", "damper", "cylinder", "muscle", "adhesion", "plugin", "dcmotor"})
+  for (const char* other : kOtherActuators)
     known.push_back({other, Fate::idle, "of actuators that are not read"});
   for (const std::string& actuator : kActuators) known.push_back({actuator.c_str()});
   for (const RobotNode& part : node.parts(known)) {
@@ -303,11 +267,37 @@ const MjcfMesh& MjcfFile::mesh_named(const RobotNode& node, const std::string& n
   MjcfMesh& mesh = found->second;
   if (mesh.is_read) return mesh;
   mesh.is_read = true;
-  std::string given = mesh.node.text("file");
-  if (strip_path) given = std::filesystem::path(given).filename().string();
-  mesh.mesh =
-      read_robot_mesh(mesh.node, given, mesh_folder, mesh.node.vector("scale", Vector3{1, 1, 1}));
+  if (mesh.node.has("builtin")) {
+    mesh.node.lost("<mesh> builtin: a shape made by MuJoCo; write it to an OBJ file");
+    return mesh;
+  }
+  const Vector3 scale = mesh.node.vector("scale", Vector3{1, 1, 1});
+  if (mesh.node.has("vertex")) {
+    mesh.mesh = read_written_mesh(mesh.node, scale);
+  } else {
+    std::string given = mesh.node.text("file");
+    if (strip_path) given = std::filesystem::path(given).filename().string();
+    mesh.mesh = read_robot_mesh(mesh.node, given, mesh_folder, scale);
+  }
+  read_origin(mesh, scale);
   return mesh;
+}
+
+/// MuJoCo takes refpos p from the vertices v, turns them back by refquat R, then scales:
+/// S Rᵀ (v - p). A pose says it where S and Rᵀ can change places.
+void MjcfFile::read_origin(MjcfMesh& mesh, const Vector3& scale) {
+  const Vector3 p = mesh.node.vector("refpos", Vector3{0, 0, 0});
+  Pose back;
+  if (mesh.node.has("refquat")) back = inverse({{0, 0, 0}, mesh.node.quaternion("refquat")});
+  const bool turned = std::abs(back.orientation[0]) != 1;
+  if (turned && (scale[0] != scale[1] || scale[1] != scale[2])) {
+    mesh.node.lost("<mesh> refquat with a scale that differs by axis: the mesh is stretched askew");
+    mesh.mesh.reset();
+    return;
+  }
+  back.position =
+      outer_direction(back, {0 - scale[0] * p[0], 0 - scale[1] * p[1], 0 - scale[2] * p[2]});
+  mesh.origin = back;
 }
 
 void MjcfFile::take_warnings(std::vector<std::string>& out) {
@@ -377,15 +367,16 @@ void read_mjcf(const RobotNode& root, const std::string& keyframe, bool free_bas
   each("asset", [&](const RobotNode& s) { read_asset(file, s); });
   each("worldbody", [&](const RobotNode& s) { read_mjcf_bodies(file, s); });
   if (file.total_mass > 0) scale_masses(scene, file.total_mass);
+  std::vector<RobotNode> keyframes;
+  each("keyframe", [&](const RobotNode& s) { keyframes.push_back(s); });
+  const std::optional<RobotNode> key = find_mjcf_keyframe(file, keyframes, keyframe);
   each("actuator", [&](const RobotNode& s) { read_mjcf_actuators(file, s); });
   each("contact", [&](const RobotNode& s) {
     static_cast<void>(s.parts(
         {{"pair", Fate::lost, "a contact with coefficients of MuJoCo's; --contact A=B adds one"},
          {"exclude", Fate::idle, "a scene has only the contacts that it names"}}));
   });
-  std::vector<RobotNode> keyframes;
-  each("keyframe", [&](const RobotNode& s) { keyframes.push_back(s); });
-  read_mjcf_keyframes(file, keyframes, keyframe);
+  if (key) read_mjcf_keyframe(file, *key);
   file.take_warnings(root.context().warnings);
 }
 

@@ -27,8 +27,11 @@ Words actuator_words(std::initializer_list<const char*> own) {
                  {"slidersite"},
                  {"refsite"},
                  {"cranklength", Fate::zero, "of a slider-crank"},
-                 {"group", Fate::idle, kSight},
+                 {"group"},
                  {"user", Fate::idle, kUser},
+                 {"damping", Fate::zero, "damping that the actuator adds to its joint"},
+                 {"armature", Fate::zero, "armature that the actuator adds to its joint"},
+                 {"input", Fate::lost, "what the control is"},
                  {"lengthrange", Fate::idle, "for muscles"},
                  {"actlimited", Fate::idle, "for actuators with a state"},
                  {"actrange", Fate::idle, "for actuators with a state"},
@@ -58,6 +61,7 @@ Words joint_words() {
           {"actuatorfrclimited"},
           {"frictionloss", Fate::zero, "dry friction of a joint"},
           {"springdamper", Fate::zero, "chooses stiffness and damping from a frequency"},
+          {"springyield", Fate::zero, "bounds the force of the spring"},
           {"actuatorgravcomp", Fate::idle, "of bodies without weight"},
           {"group", Fate::idle, kSight},
           {"user", Fate::idle, kUser},
@@ -94,6 +98,9 @@ std::map<std::string, Words> all_words() {
                                 {"priority", Fate::idle, kLaw},
                                 {"margin", Fate::idle, kLaw},
                                 {"gap", Fate::idle, kLaw},
+                                {"adhesion", Fate::zero, "pulls what touches"},
+                                {"surfacevel", Fate::zero, "moves the surface of a geom"},
+                                {"castshadow", Fate::idle, kSight},
                                 {"fitscale", Fate::idle, "no primitive is fitted to a mesh"},
                                 {"fluidshape", Fate::lost, "forces of a fluid"},
                                 {"fluidcoef", Fate::idle, "of a fluid"},
@@ -112,12 +119,13 @@ std::map<std::string, Words> all_words() {
                  {"file"},
                  {"scale"},
                  {"inertia"},
-                 {"refpos", Fate::zero, "shifts the mesh"},
+                 {"refpos"},
                  {"refquat"},
                  {"vertex"},
                  {"builtin"},
+                 {"params"},
                  {"content_type", Fate::idle, kSolver},
-                 {"face", Fate::idle, kSight},
+                 {"face"},
                  {"normal", Fate::idle, kSight},
                  {"texcoord", Fate::idle, kSight},
                  {"smoothnormal", Fate::idle, kSight},
@@ -128,13 +136,14 @@ std::map<std::string, Words> all_words() {
   for (const char* name : {"texture", "texrepeat", "texuniform", "emission", "specular",
                            "shininess", "reflectance", "metallic", "roughness"})
     all["material"].push_back({name, Fate::idle, kSight});
-  all["general"] = actuator_words({"dyntype", "gaintype", "biastype", "gainprm", "biasprm"});
+  all["general"] =
+      actuator_words({"dyntype", "gaintype", "biastype", "gainprm", "biasprm", "inheritrange"});
+  all["general"].push_back({"ffrange", Fate::lost, "a force beside the control"});
   all["general"].push_back({"dynprm", Fate::idle, "for actuators with a state"});
   all["motor"] = actuator_words({});
-  all["position"] = actuator_words({"kp", "kv"});
+  all["position"] = actuator_words({"kp", "kv", "inheritrange"});
   all["position"].push_back({"dampratio", Fate::zero, "chooses the damping from the inertia"});
   all["position"].push_back({"timeconst", Fate::zero, "filters the control"});
-  all["position"].push_back({"inheritrange", Fate::idle, "bounds controls"});
   all["velocity"] = actuator_words({"kv"});
   return all;
 }

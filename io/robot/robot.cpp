@@ -11,6 +11,7 @@
 #include <filesystem>
 #include <variant>
 
+#include "engine/model/shapes.hpp"
 #include "io/files/nearest_name.hpp"
 
 namespace tangere {
@@ -150,6 +151,32 @@ std::optional<RobotPiece> inertial_piece(Robot& robot, double mass, std::array<d
   piece.origin = origin;
   piece.source = source;
   return piece;
+}
+
+void scale_masses(Scene& scene, double total) {
+  double sum = 0;
+  for (const LinkDescription& link : scene.links) {
+    if (const auto* const mass = std::get_if<AbstractShape>(&link.body.shape))
+      sum += mass->mass;
+    else if (link.body.density > 0)
+      sum += link.body.density * volume_of(link.body.shape);
+  }
+  if (!(sum > 0)) return;
+  const double factor = total / sum;
+  for (LinkDescription& link : scene.links) {
+    link.body.density *= factor;
+    if (auto* const mass = std::get_if<AbstractShape>(&link.body.shape)) {
+      mass->mass *= factor;
+      for (double& x : mass->inertia) x *= factor;
+    }
+  }
+}
+
+bool balance_inertia(std::array<double, 6>& inertia) {
+  if (is_inertia(inertia)) return false;
+  const double mean = (inertia[0] + inertia[3] + inertia[5]) / 3;
+  inertia = {mean, 0, 0, mean, 0, mean};
+  return true;
 }
 
 }  // namespace tangere

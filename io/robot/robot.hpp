@@ -26,11 +26,14 @@ class Remarks {
   std::map<std::string, std::vector<int>> places_;  // text with its file, lines
 };
 
-/// The surface file of a mesh body.
+/// The surface of a mesh body: a file, or numbers.
 struct MeshFile {
   std::string path;
   Vector3 scale{1, 1, 1};
-  bool hull = false;  ///< the body is the convex hull of the file's points
+  bool hull = false;  ///< the body is the convex hull of the points
+  /// Without a path: x y z of all vertices, and three vertices, from 0, of all triangles.
+  std::vector<double> vertices = {};
+  std::vector<int> triangles = {};
 };
 
 /// A named place on a link.
@@ -110,5 +113,12 @@ int add_link(Robot& robot, RobotNames& names, const std::string& name, int paren
 std::optional<RobotPiece> inertial_piece(Robot& robot, double mass, std::array<double, 6> inertia,
                                          const Pose& pose, const std::string& origin,
                                          const Source& source);
+
+/// Scales all masses so that they add up to `total` [kg].
+void scale_masses(Scene& scene, double total);
+
+/// Where no solid has these moments (xx xy xz yy yz zz), puts their mean in place of all, as
+/// balanceinertia of MuJoCo. Returns whether it did.
+bool balance_inertia(std::array<double, 6>& inertia);
 
 }  // namespace tangere

@@ -68,8 +68,8 @@ void stiffen_limits(Robot& robot) {
       load = std::max(load, effort->second);
     for (const MotorDescription& m : scene.motors)
       if (m.joint == joint.name)
-        for (const double f : {-m.low, m.high})
-          if (std::isfinite(f)) load = std::max(load, f);
+        for (const double f : {m.low, m.high})
+          if (std::isfinite(f)) load = std::max(load, std::abs(f));
     joint.limit_stiffness = two_digits(load / (turns ? kYieldAngle : kYieldLength));
   }
 }

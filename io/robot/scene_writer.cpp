@@ -127,16 +127,26 @@ class Writer {
   }
   void write_mesh(const std::string& body) {
     const MeshFile& file = robot_.meshes.at(body);
-    namespace fs = std::filesystem;
-    std::error_code none;
-    const fs::path path = fs::absolute(file.path, none).lexically_normal();
-    const fs::path from = fs::absolute(folder_.empty() ? "." : folder_, none).lexically_normal();
-    const fs::path relative = path.lexically_relative(from);
-    out_ += fmt::format(" transform_type=\"OBJ_TO_JOINT\" filename=\"{}\"",
-                        attribute_text((relative.empty() ? path : relative).generic_string()));
+    out_ += " transform_type=\"OBJ_TO_JOINT\"";
+    if (file.path.empty()) {
+      out_ += fmt::format(" vertices=\"{}\"", numbers_text(file.vertices));
+      if (!file.triangles.empty())
+        out_ += fmt::format(" triangles=\"{}\"", fmt::join(file.triangles, " "));
+    } else {
+      out_ += fmt::format(" filename=\"{}\"", attribute_text(path_from_folder(file.path)));
+    }
     if (file.hull) out_ += " hull=\"true\"";
     if (file.scale != Vector3{1, 1, 1})
       out_ += fmt::format(" scale=\"{}\"", vector_text(file.scale));
+  }
+  /// The path of a file from the folder of the scene.
+  [[nodiscard]] std::string path_from_folder(const std::string& file) const {
+    namespace fs = std::filesystem;
+    std::error_code none;
+    const fs::path path = fs::absolute(file, none).lexically_normal();
+    const fs::path from = fs::absolute(folder_.empty() ? "." : folder_, none).lexically_normal();
+    const fs::path relative = path.lexically_relative(from);
+    return (relative.empty() ? path : relative).generic_string();
   }
   void write_mass(const AbstractShape& s) {
     const auto& [xx, xy, xz, yy, yz, zz] = s.inertia;

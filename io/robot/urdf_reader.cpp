@@ -10,6 +10,7 @@
 #include <optional>
 
 #include "io/robot/mesh_files.hpp"
+#include "io/robot/mjcf_words.hpp"
 #include "io/robot/rotations.hpp"
 
 namespace tangere {
@@ -27,7 +28,7 @@ const Words kRobotChildren = {
     {"material", Fate::idle, kPictures},
     {"transmission", Fate::idle, "a setting of other software; --motor JOINT=… drives a joint"},
     {"gazebo", Fate::idle, kSoftware},
-    {"mujoco", Fate::idle, kSoftware},
+    {"mujoco"},
     {"drake", Fate::idle, kSoftware},
     {"ros2_control", Fate::idle, kSoftware},
     {"sensor", Fate::idle, "no sensor of touch; --pad LINK=LAYOUT adds one"},
@@ -56,13 +57,58 @@ const Words kJointChildren = {{"origin"},
                               {"joint_properties", Fate::idle, kSoftware},
                               {"safety_controller", Fate::idle, kSoftware}};
 
-/// The only child of this name; none if it is missing.
-std::optional<RobotNode> only(const std::vector<RobotNode>& parts, const std::string& name) {
+/// What MuJoCo reads in the <mujoco> of a URDF file.
+const Words kExtension = {{"compiler"},
+                          {"option"},
+                          {"size", Fate::idle, "sizes of MuJoCo's memory"},
+                          {"visual", Fate::idle, kPictures},
+                          {"statistic", Fate::idle, kPictures},
+                          {"custom", Fate::idle, "numbers for other programs"},
+                          {"asset", Fate::idle, kPictures},
+                          {"sensor", Fate::idle, "readings of MuJoCo"},
+                          {"keyframe", Fate::idle, "stored states"},
+                          {"default", Fate::lost, "what elements of MuJoCo inherit"},
+                          {"worldbody", Fate::lost, "bodies beside the robot"},
+                          {"actuator", Fate::lost, "actuators; --motor JOINT=… drives a joint"},
+                          {"contact", Fate::lost, "contacts; --contact A=B adds one"},
+                          {"equality", Fate::lost, "constraints; scenes have none"},
+                          {"tendon", Fate::lost, "tendons; scenes have none"},
+                          {"deformable", Fate::lost, "bodies that bend; scenes have none"},
+                          {"extension", Fate::lost, "plug-ins of MuJoCo"}};
+const Words kCompiler = {{"meshdir"},
+                         {"assetdir"},
+                         {"balanceinertia"},
+                         {"settotalmass"},
+                         {"inertiafromgeom"},
+                         {"boundmass", Fate::zero, "raises masses"},
+                         {"boundinertia", Fate::zero, "raises inertias"},
+                         {"strippath", Fate::idle, "meshes are looked for with and without"},
+                         {"angle", Fate::idle, "angles of URDF are radians"},
+                         {"eulerseq", Fate::idle, "angles of URDF are roll, pitch, yaw"},
+                         {"autolimits", Fate::idle, "joints of URDF say what limits them"},
+                         {"alignfree", Fate::idle, "bodies keep the frames that the file gives"},
+                         {"coordinate", Fate::idle, kSoftware},
+                         {"inertiagrouprange", Fate::idle, "URDF has no groups"},
+                         {"texturedir", Fate::idle, kPictures},
+                         {"discardvisual", Fate::idle, kPictures},
+                         {"fusestatic", Fate::idle, "fixed joints cost nothing here"},
+                         {"convexhull", Fate::idle, "meshes are not replaced by hulls"},
+                         {"exactmeshinertia", Fate::idle, "meshes of URDF have no mass"},
+                         {"fitaabb", Fate::idle, "no primitive is fitted to a mesh"},
+                         {"usethread", Fate::idle, kSolver},
+                         {"saveinertial", Fate::idle, kSolver},
+                         {"conflict", Fate::idle, kSolver}};
+
+/// The child of this name, the last if there are several; none if it is missing.
+std::optional<RobotNode> last_of(const std::vector<RobotNode>& parts, const std::string& name) {
   std::optional<RobotNode> found;
   for (const RobotNode& part : parts) {
     if (part.name() != name) continue;
     if (found)
-      part.fail(fmt::format("given twice, first in line {}; expected once", found->source().line));
+      part.warn(
+          fmt::format("given twice, first in line {}; the last counts (other readers take the "
+                      "first, or refuse the file)",
+                      found->source().line));
     found.emplace(part);
   }
   return found;
@@ -70,7 +116,7 @@ std::optional<RobotNode> only(const std::vector<RobotNode>& parts, const std::st
 
 RobotNode required(const RobotNode& node, const std::vector<RobotNode>& parts,
                    const std::string& name) {
-  const std::optional<RobotNode> found = only(parts, name);
+  const std::optional<RobotNode> found = last_of(parts, name);
   if (!found) node.fail("has no <" + name + ">");
   return *found;
 }
@@ -101,7 +147,11 @@ class UrdfReader {
     root_.check({{"name"}, {"version", Fate::read}});
     robot_.scene.name = root_.text("name", "robot");
     std::vector<RobotNode> links;
-    for (const RobotNode& node : root_.parts(kRobotChildren)) {
+    const std::vector<RobotNode> parts = root_.parts(kRobotChildren);
+    for (const RobotNode& node : parts)
+      if (node.name() == "mujoco") read_extension(node);
+    for (const RobotNode& node : parts) {
+      if (node.name() == "mujoco") continue;
       if (node.name() == "link") {
         node.check({{"name"}, {"type", Fate::idle, kSoftware}, {"concave", Fate::idle, kSoftware}});
         const std::string name = node.text("name");
@@ -136,9 +186,47 @@ class UrdfReader {
         joint.node.fail("joint '" + joint.joint.name + "' is part of a ring of links, or of " +
                         "nothing that hangs on a root; expected a tree");
     hold_weightless();
+    if (total_mass_ > 0) scale_masses(robot_.scene, total_mass_);
   }
 
  private:
+  /// Reads the settings with which MuJoCo reads this file.
+  void read_extension(const RobotNode& node) {
+    node.check({{"model", Fate::idle, kSoftware}});
+    mesh_folder_ = ".";
+    for (const RobotNode& part : node.parts(kExtension))
+      part.name() == "compiler" ? read_compiler(part) : read_option(part);
+  }
+
+  void read_compiler(const RobotNode& node) {
+    node.check(kCompiler);
+    static_cast<void>(node.parts({{"lengthrange", Fate::idle, kSolver}}));
+    mesh_folder_ = node.text("meshdir", node.text("assetdir", "."));
+    balances_ = node.flag("balanceinertia", false);
+    total_mass_ = std::max(node.number("settotalmass", 0.0), 0.0);
+    if (total_mass_ > 0) node.changed("<compiler> settotalmass: all masses are scaled to it");
+    if (node.choice("inertiafromgeom", {"auto", "false", "true"}, 0) == 2)
+      node.lost("<compiler> inertiafromgeom: masses of the shapes take the place of the file's");
+  }
+
+  void read_option(const RobotNode& node) {
+    Words words = {{"gravity"},
+                   {"timestep"},
+                   {"density", Fate::zero, "the air's or the water's"},
+                   {"viscosity", Fate::zero, "the air's or the water's"},
+                   {"wind", Fate::zero, "moves the air"}};
+    for (const char* name : {"integrator", "solver", "cone", "jacobian", "iterations", "tolerance",
+                             "impratio", "noslip_iterations", "ls_iterations"})
+      words.push_back({name, Fate::idle, kSolver});
+    node.check(words);
+    static_cast<void>(node.parts({{"flag", Fate::lost, "switches forces or contacts"}}));
+    Scene& scene = robot_.scene;
+    scene.gravity = node.vector("gravity", scene.gravity);
+    scene.timestep = node.positive("timestep", scene.timestep);
+    if (node.has("gravity") || node.has("timestep"))
+      node.changed("<option> of <mujoco>: its gravity and timestep are the scene's");
+  }
+
   void read_joint(const RobotNode& node) {
     node.check({{"name"}, {"type"}, {"dont_collapse", Fate::idle, kSoftware}});
     Joint out{{}, "", "", "", node};
@@ -160,11 +248,11 @@ class UrdfReader {
     };
     out.parent = end_of("parent");
     out.child = end_of("child");
-    joint.pose = read_origin(only(parts, "origin"));
+    joint.pose = read_origin(last_of(parts, "origin"));
     const bool has_axis = out.type == "revolute" || out.type == "continuous" ||
                           out.type == "prismatic" || out.type == "planar";
     joint.axis0 = {1, 0, 0};
-    if (const auto axis = only(parts, "axis")) {
+    if (const auto axis = last_of(parts, "axis")) {
       axis->check({{"xyz"}, {"rpy", Fate::idle, "an axis has a direction only"}});
       if (has_axis)
         joint.axis0 = axis->direction("xyz", joint.axis0);
@@ -177,7 +265,7 @@ class UrdfReader {
     if (out.type == "floating") joint.type = JointType::free;
     if (out.type == "spherical") joint.type = JointType::spherical;
     read_limit(node, parts, out);
-    if (const auto dynamics = only(parts, "dynamics")) {
+    if (const auto dynamics = last_of(parts, "dynamics")) {
       Words words = {{"damping"}, {"friction", Fate::zero, "dry friction of a joint"}};
       for (const char* other : {"D", "K", "mu_coulomb", "mu_viscous"})
         words.push_back({other, Fate::idle, kSoftware});
@@ -192,7 +280,7 @@ class UrdfReader {
   }
 
   void read_limit(const RobotNode& node, const std::vector<RobotNode>& parts, Joint& out) const {
-    const auto limit = only(parts, "limit");
+    const auto limit = last_of(parts, "limit");
     const bool needed = out.type == "revolute" || out.type == "prismatic";
     if (!limit) {
       if (needed) node.fail("a " + out.type + " joint has no <limit>; expected one");
@@ -294,14 +382,14 @@ class UrdfReader {
       if (part.name() != "collision") continue;
       if (auto piece = read_collision(part)) pieces.push_back(std::move(*piece));
     }
-    const auto inertial = only(parts, "inertial");
+    const auto inertial = last_of(parts, "inertial");
     if (!inertial) return pieces;
     inertial->check({});
     const std::vector<RobotNode> inside = inertial->parts({{"origin"}, {"mass"}, {"inertia"}});
     const RobotNode mass = required(*inertial, inside, "mass");
     mass.check({{"value"}});
     std::array<double, 6> I{};
-    if (const auto inertia = only(inside, "inertia")) {
+    if (const auto inertia = last_of(inside, "inertia")) {
       Words six;
       for (const char* name : {"ixx", "ixy", "ixz", "iyy", "iyz", "izz"}) {
         I[six.size()] = inertia->number(name, 0.0);
@@ -309,8 +397,10 @@ class UrdfReader {
       }
       inertia->check(six);
     }
+    if (balances_ && balance_inertia(I))
+      inertial->changed("<inertial>: all moments are their mean, as balanceinertia says");
     if (auto piece =
-            inertial_piece(robot_, mass.number("value"), I, read_origin(only(inside, "origin")),
+            inertial_piece(robot_, mass.number("value"), I, read_origin(last_of(inside, "origin")),
                            "<inertial>", inertial->source()))
       pieces.push_back(std::move(*piece));
     return pieces;
@@ -329,7 +419,7 @@ class UrdfReader {
                                                      {"surface", Fate::idle, kLaw},
                                                      {"contact_coefficients", Fate::idle, kLaw}});
     RobotPiece piece;
-    piece.pose = read_origin(only(parts, "origin"));
+    piece.pose = read_origin(last_of(parts, "origin"));
     piece.origin = "<collision>";
     piece.source = node.source();
     const RobotNode geometry = required(node, parts, "geometry");
@@ -356,8 +446,8 @@ class UrdfReader {
       piece.shape = SphereShape{node.positive("radius")};
     } else if (type == "mesh") {
       node.check({{"filename"}, {"scale"}});
-      auto mesh =
-          read_robot_mesh(node, node.text("filename"), "", node.vector("scale", Vector3{1, 1, 1}));
+      auto mesh = read_robot_mesh(node, node.text("filename"), "",
+                                  node.vector("scale", Vector3{1, 1, 1}), mesh_folder_);
       if (!mesh) return false;
       piece.mesh = mesh->file;
       piece.shape = std::move(mesh->shape);
@@ -375,6 +465,11 @@ class UrdfReader {
   const RobotNode& root_;
   Robot& robot_;
   bool free_base_;
+  // As the <compiler> of MuJoCo says: where meshes may lie, whether moments that no solid has are
+  // balanced, and the sum of all masses [kg] (0: the file's).
+  std::optional<std::string> mesh_folder_;
+  bool balances_ = false;
+  double total_mass_ = 0;
   RobotNames names_;
   std::vector<std::string> link_names_;
   std::vector<Joint> joints_;

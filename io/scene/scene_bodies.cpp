@@ -7,6 +7,7 @@
 
 #include "engine/model/scene_number.hpp"
 #include "engine/model/shapes.hpp"
+#include "io/scene/convex_hull.hpp"
 #include "io/scene/scene_sections.hpp"
 #include "io/scene/surface_files.hpp"
 #include "io/scene/tactile_layouts.hpp"
@@ -188,6 +189,36 @@ void read_contact_count(const SceneNode& node, double length, MeshShape& mesh) {
   mesh.contact_points = spread_points(mesh.vertices, count);
 }
 
+/// Reads a mesh that the scene itself gives: x y z of each vertex, and three of them, from 0, for
+/// each triangle.
+MeshShape read_written_mesh(const SceneNode& node, bool hull) {
+  if (node.has("filename")) node.fail("both 'filename' and 'vertices'; expected one of them");
+  RawMesh raw;
+  const std::vector<double> at = node.numbers("vertices");
+  if (at.size() % 3 != 0)
+    node.fail(fmt::format("vertices has {} numbers; expected x y z for each", at.size()));
+  for (std::size_t k = 0; k < at.size(); k += 3)
+    raw.positions.push_back({at[k], at[k + 1], at[k + 2]});
+  const std::vector<double> corners =
+      node.has("triangles") ? node.numbers("triangles") : std::vector<double>{};
+  if (corners.size() % 3 != 0)
+    node.fail(fmt::format("triangles has {} numbers; expected three for each", corners.size()));
+  for (std::size_t k = 0; k < corners.size(); ++k) {
+    const auto vertex = static_cast<int>(std::clamp(corners[k], -1.0, 1e9));
+    if (vertex != corners[k] || vertex < 0 || std::size_t(vertex) >= raw.positions.size())
+      node.fail(fmt::format("triangles has the vertex {}; expected one of 0 to {}", corners[k],
+                            raw.positions.size() - 1));
+    if (k % 3 == 0) raw.triangles.emplace_back();
+    raw.triangles.back()[k % 3] = vertex;
+  }
+  const FileSurface surface = surface_of(raw, "vertices");
+  if (!hull && !surface.fault.empty()) node.fail(surface.fault);
+  MeshShape out = hull ? convex_hull(surface.points) : surface.closed;
+  if (out.triangles.empty())
+    node.fail("all vertices lie in a plane; expected a hull with a volume");
+  return out;
+}
+
 Shape read_shape(const SceneNode& node, Attributes& attributes) {
   const double length = node.context().length;
   Names names;
@@ -195,8 +226,8 @@ Shape read_shape(const SceneNode& node, Attributes& attributes) {
   const ShapeRow& row = shape_rows()[std::size_t(node.choice("type", names))];
   Shape shape = row.make();
   if (std::holds_alternative<MeshShape>(shape)) {
-    attributes.use({"filename", "scale", "hull", "transform_type", "general_contact_resolution",
-                    "resolution", "error", "count", "pitch"});
+    attributes.use({"filename", "vertices", "triangles", "scale", "hull", "transform_type",
+                    "general_contact_resolution", "resolution", "error", "count", "pitch"});
     MeshShape mesh = read_mesh(node, length);
     mesh.resolution = node.integer("resolution", 0, MeshShape::kMostCells, mesh.resolution);
     if (node.has("error")) {
@@ -223,7 +254,9 @@ MeshShape read_mesh(const SceneNode& node, double length) {
   for (const double s : scale)
     if (s == 0) node.fail("scale has 0; expected factors other than 0");
   const bool hull = node.has("hull") && node.choice("hull", {"true", "false"}) == 0;
-  MeshShape shape = read_beside(node, "filename", hull ? read_hull : read_surface);
+  MeshShape shape = node.has("vertices")
+                        ? read_written_mesh(node, hull)
+                        : read_beside(node, "filename", hull ? read_hull : read_surface);
   scale_surface(shape, scaled(scale, length));
   return shape;
 }

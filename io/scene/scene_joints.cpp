@@ -81,7 +81,7 @@ void read_motor(const SceneNode& node, JointType type, MotorDescription& motor) 
     if (!node.has("ctrl_range")) return;
   }
   const std::vector<double> range = node.numbers("ctrl_range", 2);
-  if (!(range[0] <= range[1]))
+  if (position && !(range[0] <= range[1]))
     node.fail(fmt::format("ctrl_range=\"{} {}\": expected low, then high", range[0], range[1]));
   motor.low = range[0] * (turns ? c.torque : c.force);
   motor.high = range[1] * (turns ? c.torque : c.force);

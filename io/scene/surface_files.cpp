@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A surface is closed, and its volume defined, if every directed edge has as many partners in the
-// opposite direction.
+// A mesh body is a closed surface, or the convex hull of a file's points. Its contact points are
+// spread over the surface.
 #include "io/scene/surface_files.hpp"
 
 #include <fmt/format.h>
@@ -9,92 +9,16 @@
 #include <cctype>
 #include <cmath>
 #include <filesystem>
-#include <map>
-#include <string_view>
+#include <utility>
 
 #include "engine/base/error.hpp"
 #include "io/files/word_reader.hpp"
+#include "io/scene/closed_surface.hpp"
 #include "io/scene/convex_hull.hpp"
-#include "io/scene/triangle_files.hpp"
+#include "io/scene/obj_file.hpp"
 
 namespace tangere {
 namespace {
-
-/// Returns the index of a face's corner "7", "7/1", "7//2" or "-1". Files count from 1, or
-/// backwards from the latest vertex.
-int corner(const WordReader& file, std::string_view word, std::size_t vertices) {
-  const long n = file.integer(word.substr(0, word.find('/')), "the number of a vertex");
-  const long index = n > 0 ? n - 1 : static_cast<long>(vertices) + n;
-  if (n == 0 || index < 0 || index >= static_cast<long>(vertices))
-    file.fail(fmt::format("vertex {}; expected one of the {} before this line", n, vertices));
-  return static_cast<int>(index);
-}
-
-RawMesh read_obj(const std::string& path) {
-  static const std::vector<std::string_view> kSkipped = {"vt", "vn",     "vp",     "o", "g",
-                                                         "s",  "usemtl", "mtllib", "l", "p"};
-  WordReader file(path);
-  RawMesh mesh;
-  while (file.next()) {
-    const std::vector<std::string_view>& words = file.words;
-    if (words[0] == "v") {
-      if (words.size() < 4)
-        file.fail(fmt::format("a vertex of {} numbers; expected x y z", words.size() - 1));
-      mesh.positions.push_back({file.position(1), file.position(2), file.position(3)});
-    } else if (words[0] == "f") {
-      if (words.size() < 4)
-        file.fail(fmt::format("a face of {} vertices; expected three or more", words.size() - 1));
-      const auto at = [&](std::size_t k) { return corner(file, words[k], mesh.positions.size()); };
-      for (std::size_t k = 2; k + 1 < words.size(); ++k)
-        mesh.triangles.push_back({at(1), at(k), at(k + 1)});
-    } else if (std::find(kSkipped.begin(), kSkipped.end(), words[0]) == kSkipped.end()) {
-      file.fail(fmt::format("'{}'; expected v, f or another element of an OBJ file",
-                            words[0].substr(0, 40)));
-    }
-  }
-  return mesh;
-}
-
-/// Makes one vertex per position that a face uses, in order of use. Drops faces that
-/// have equal corners and so no area.
-MeshShape weld(const RawMesh& raw) {
-  MeshShape mesh;
-  std::map<Vector3, int> index;
-  for (const std::array<int, 3>& t : raw.triangles) {
-    std::array<int, 3> welded{};
-    for (std::size_t k = 0; k < 3; ++k) {
-      Vector3 at = raw.positions[std::size_t(t[k])];
-      for (double& x : at) x += 0.0;  // -0 and +0 are the same position
-      const auto [found, fresh] = index.emplace(at, static_cast<int>(index.size()));
-      if (fresh) mesh.vertices.insert(mesh.vertices.end(), at.begin(), at.end());
-      welded[k] = found->second;
-    }
-    if (welded[0] != welded[1] && welded[1] != welded[2] && welded[2] != welded[0])
-      mesh.triangles.push_back(welded);
-  }
-  return mesh;
-}
-
-/// Where the surface is open, or "".
-std::string open_edge(const MeshShape& mesh) {
-  std::map<std::pair<int, int>, int> surplus;  // of an edge's one direction over the other
-  for (const std::array<int, 3>& t : mesh.triangles)
-    for (std::size_t k = 0; k < 3; ++k) {
-      const int a = t[k], b = t[(k + 1) % 3];
-      surplus[std::minmax(a, b)] += a < b ? 1 : -1;
-    }
-  const auto place = [&](int v) {
-    const double* p = &mesh.vertices[3 * std::size_t(v)];
-    return fmt::format("({:g} {:g} {:g})", p[0], p[1], p[2]);
-  };
-  for (const auto& [edge, count] : surplus)
-    if (count != 0)
-      return fmt::format(
-          "the surface is open, or its faces disagree on what is outside, at the edge from {} to "
-          "{}; expected a closed surface",
-          place(edge.first), place(edge.second));
-  return "";
-}
 
 /// Reads a file of the format that its name says: .stl, .ply, or an OBJ file.
 RawMesh read_triangles(const std::string& path) {
@@ -122,13 +46,8 @@ double six_volumes(const MeshShape& mesh) {
 
 }  // namespace
 
-MeshShape read_faces(const std::string& path) {
-  MeshShape mesh = weld(read_triangles(path));
-  if (mesh.triangles.empty()) throw InputError(path + ": no faces; expected a closed surface");
-  return mesh;
-}
-
 std::string surface_fault(const MeshShape& mesh) {
+  if (mesh.triangles.empty()) return "no faces; expected a closed surface";
   if (std::string fault = open_edge(mesh); !fault.empty()) return fault;
   const double volume = six_volumes(mesh) / 6;
   if (volume < 0)
@@ -136,15 +55,33 @@ std::string surface_fault(const MeshShape& mesh) {
   return volume > 0 ? "" : "the surface encloses no volume";
 }
 
+FileSurface surface_of(const RawMesh& raw, const std::string& name) {
+  FileSurface out{weld(raw), {}, {}, raw.fault};
+  for (const Vector3& p : raw.positions) out.points.insert(out.points.end(), p.begin(), p.end());
+  if (out.fault.empty())
+    if (const std::string fault = surface_fault(out.faces); !fault.empty())
+      out.fault = name + ": " + fault;
+  if (!out.fault.empty()) return out;
+  out.closed = out.faces;
+  if (const std::string fault = remove_walls(out.closed); !fault.empty())
+    out.fault = name + ": " + fault;
+  return out;
+}
+
+FileSurface read_faces(const std::string& path) {
+  const RawMesh raw = read_triangles(path);
+  if (raw.positions.empty()) throw InputError(path + ": no faces or vertices; expected a surface");
+  return surface_of(raw, path);
+}
+
 MeshShape read_surface(const std::string& path) {
-  MeshShape mesh = read_faces(path);
-  if (const std::string fault = surface_fault(mesh); !fault.empty())
-    throw InputError(path + ": " + fault);
-  return mesh;
+  FileSurface file = read_faces(path);
+  if (!file.fault.empty()) throw InputError(file.fault);
+  return std::move(file.closed);
 }
 
 MeshShape read_hull(const std::string& path) {
-  MeshShape hull = convex_hull(read_faces(path).vertices);
+  MeshShape hull = convex_hull(read_faces(path).points);
   if (hull.triangles.empty())
     throw InputError(path + ": all points lie in a plane; expected a hull with a volume");
   return hull;

@@ -3,27 +3,38 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "engine/model/scene.hpp"
+#include "io/scene/triangle_files.hpp"
 
 namespace tangere {
 
-/// Reads positions and faces of an OBJ file, or of an STL or PLY file where the path ends in .stl
-/// or .ply, in its own unit. Faces become fans of triangles, and equal positions become one vertex.
-/// Vertices that no face uses are left out. Texture, normals, groups and materials are skipped.
-/// Throws IoError if the file cannot be read, InputError with file:line if it is not of its format,
-/// and InputError without a line if the surface is open, encloses no volume, or faces inwards.
-MeshShape read_surface(const std::string& path);
+/// What a surface file has.
+struct FileSurface {
+  MeshShape faces;             ///< cut into triangles, equal corners welded; closed or open
+  std::vector<double> points;  ///< (n, 3) all positions, of faces or not
+  MeshShape closed;            ///< the faces without walls inside, if `fault` is ""
+  std::string fault;           ///< why the faces are no closed surface with a volume, with the file
+};
 
-/// The same for faces of any kind: the surface may be open. Throws like read_surface where the
-/// file is not of its format.
-MeshShape read_faces(const std::string& path);
+/// Reads an OBJ file, or an STL or PLY file where the path ends in .stl or .ply, in its own unit.
+/// Corners that differ by rounding become one where that closes the surface, and walls inside that
+/// lie flush on each other are taken away. Throws IoError if the file cannot be read, InputError
+/// with file:line if it is not of its format or has no vertices.
+FileSurface read_faces(const std::string& path);
 
-/// Returns why faces are no closed surface with a volume, or "".
+/// Does the same with triangles that are read already. `name` stands in front of the fault.
+FileSurface surface_of(const RawMesh& raw, const std::string& name);
+
+/// Returns why triangles are no closed surface with a volume, or "".
 std::string surface_fault(const MeshShape& mesh);
 
-/// Reads faces and returns the convex hull of their corners. Throws like read_faces, and InputError
-/// if all corners lie in a plane.
+/// Returns the closed surface of a file. Throws like read_faces, and InputError with its fault.
+MeshShape read_surface(const std::string& path);
+
+/// Returns the convex hull of all points of a file. Throws like read_faces, and InputError if they
+/// lie in a plane.
 MeshShape read_hull(const std::string& path);
 
 /// Scales a surface along each axis. Negative factors mirror it, and its outside stays outside.

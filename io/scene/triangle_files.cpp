@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <cctype>
 #include <charconv>
 #include <cmath>
 #include <cstdint>
@@ -16,13 +17,13 @@
 #include "engine/base/error.hpp"
 #include "io/files/text_file.hpp"
 #include "io/files/word_reader.hpp"
+#include "io/scene/polygons.hpp"
 
 namespace tangere {
 namespace {
 
 constexpr std::size_t kLargestSurface = std::size_t{256} << 20;
-constexpr double kFarthest = 1e6;        // as in lists of points
-constexpr double kMostInList = 1 << 16;  // corners of a face: more would need their memory first
+constexpr double kFarthest = 1e6;  // as in lists of points
 constexpr std::size_t kMostHeaderLines = 1000;
 constexpr std::size_t kStlHeader = 80, kStlTriangle = 50;
 
@@ -66,21 +67,30 @@ RawMesh stl_in_bytes(std::string_view bytes, const std::string& path) {
   return mesh;
 }
 
+/// Returns the word in small letters, because some programs write capitals.
+std::string small(std::string_view word) {
+  std::string out(word.substr(0, 40));
+  for (char& c : out) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  return out;
+}
+
 RawMesh stl_in_text(const std::string& path) {
-  static const std::vector<std::string_view> kSkipped = {"solid", "facet", "endfacet", "endsolid"};
+  // Some programs write `end solid`, `end facet`, `end loop`.
+  static const std::vector<std::string> kSkipped = {"solid", "facet", "endfacet", "endsolid"};
   WordReader file(path);
   RawMesh mesh;
   while (file.next()) {
     const std::vector<std::string_view>& words = file.words;
-    if (words[0] == "vertex") {
+    const std::string word = small(words[0]);
+    if (word == "vertex") {
       if (words.size() != 4)
         file.fail(fmt::format("a vertex of {} numbers; expected x y z", words.size() - 1));
       add_corner(mesh, {file.position(1), file.position(2), file.position(3)});
-    } else if (words[0] == "outer" || words[0] == "endloop") {
+    } else if (word == "outer" || word == "endloop" || word == "end") {
       if (mesh.positions.size() % 3 != 0)
         file.fail(fmt::format("a facet of {} vertices too few or too many; expected three",
                               mesh.positions.size() % 3));
-    } else if (std::find(kSkipped.begin(), kSkipped.end(), words[0]) == kSkipped.end()) {
+    } else if (std::find(kSkipped.begin(), kSkipped.end(), word) == kSkipped.end()) {
       file.fail(fmt::format("'{}'; expected vertex or another element of an STL file",
                             words[0].substr(0, 40)));
     }
@@ -88,6 +98,13 @@ RawMesh stl_in_text(const std::string& path) {
   if (mesh.positions.size() % 3 != 0)
     file.fail("the file ends within a facet; expected three vertices");
   return mesh;
+}
+
+/// Whether the first word is `solid`, behind a byte order mark and blanks.
+bool is_stl_in_text(std::string_view bytes) {
+  if (bytes.starts_with(kByteOrderMark)) bytes.remove_prefix(kByteOrderMark.size());
+  bytes.remove_prefix(std::min(bytes.find_first_not_of(" \t\r\n"), bytes.size()));
+  return small(bytes.substr(0, 5)) == "solid";
 }
 
 // --- PLY ---
@@ -123,13 +140,19 @@ class PlyFile {
   std::vector<PlyElement> read_header();
   /// Returns the next number of the body.
   double take(PlyType type);
-  [[noreturn]] void fail(const std::string& message) const {
-    if (format_ != PlyFormat::text)
-      throw InputError(fmt::format("{}: byte {}: {}", path_, at_, message));
+  [[noreturn]] void fail(const std::string& message) const { throw InputError(place() + message); }
+  /// "file:line: ", or "file: byte n: " where it is not text.
+  [[nodiscard]] std::string place() const {
+    if (format_ != PlyFormat::text) return fmt::format("{}: byte {}: ", path_, at_);
     const auto end = bytes_.begin() + static_cast<std::ptrdiff_t>(std::min(at_, bytes_.size()));
-    throw InputError(
-        Source{path_, static_cast<int>(1 + std::count(bytes_.begin(), end, '\n'))}.prefix() +
-        message);
+    return fmt::format("{}:{}: ", path_, 1 + std::count(bytes_.begin(), end, '\n'));
+  }
+  /// Where the next number is read, and a way back there for messages.
+  [[nodiscard]] std::size_t at() const { return at_; }
+  void go_to(std::size_t at) { at_ = at; }
+  /// Of the bytes that are left.
+  [[nodiscard]] double most_numbers() const {
+    return static_cast<double>(bytes_.size() - std::min(at_, bytes_.size()));
   }
 
  private:
@@ -177,6 +200,7 @@ PlyType PlyFile::type_named(const std::string& name) const {
 std::vector<PlyElement> PlyFile::read_header() {
   static const std::vector<std::string> kFormats = {"ascii", "binary_little_endian",
                                                     "binary_big_endian"};
+  if (bytes_.starts_with(kByteOrderMark)) at_ = kByteOrderMark.size();
   if (header_line()[0] != "ply") fail("expected 'ply', the first line of a PLY file");
   PlyFormat body = PlyFormat::text;
   std::vector<PlyElement> elements;
@@ -245,23 +269,52 @@ void take_element(PlyFile& file, const PlyElement& kind, std::vector<std::vector
   for (std::size_t k = 0; k < kind.properties.size(); ++k) {
     const PlyProperty& p = kind.properties[k];
     const double count = p.list ? file.take(p.count) : 1;
-    if (!(count >= 0 && count <= kMostInList))
-      file.fail(fmt::format("a list of {} numbers; expected 0 to {}", count, kMostInList));
+    if (!(count >= 0 && count <= file.most_numbers()))
+      file.fail(
+          fmt::format("a list of {} numbers; expected 0 to the {} that the rest of the file "
+                      "can hold",
+                      count, file.most_numbers()));
     out[k].clear();
     for (double i = 0; i < count; ++i) out[k].push_back(file.take(p.type));
   }
 }
 
-void add_face(const PlyFile& file, const std::vector<double>& corners, RawMesh& mesh) {
+/// A list of vertices of a face or of strips of triangles, and where it ends in the file.
+struct VertexList {
+  std::vector<double> vertices;
+  std::size_t end;
+  bool strips;
+};
+
+/// Adds the triangles of a strip: each vertex after the second makes one with the two before it,
+/// every other one turned round. A strip ends at -1.
+void add_strips(const std::vector<int>& vertices, RawMesh& mesh) {
+  std::size_t first = 0;
+  for (std::size_t k = 0; k < vertices.size(); ++k) {
+    if (vertices[k] < 0) first = k + 1;
+    if (vertices[k] < 0 || k < first + 2) continue;
+    const bool turned = (k - first) % 2 == 1;
+    mesh.triangles.push_back(
+        {vertices[k - (turned ? 1 : 2)], vertices[k - (turned ? 2 : 1)], vertices[k]});
+  }
+}
+
+/// Adds the triangles of a list, after all vertices are known.
+void add_list(PlyFile& file, const VertexList& list, RawMesh& mesh) {
+  file.go_to(list.end);
   const auto all = static_cast<double>(mesh.positions.size());
-  if (corners.size() < 3)
-    file.fail(fmt::format("a face of {} vertices; expected three or more", corners.size()));
-  for (const double v : corners)
-    if (!(v >= 0 && v < all && v == std::floor(v)))
+  std::vector<int> vertices;
+  for (const double v : list.vertices) {
+    const bool end_of_strip = list.strips && v == -1;
+    if (!end_of_strip && !(v >= 0 && v < all && v == std::floor(v)))
       file.fail(fmt::format("vertex {}; expected one of 0 to {}", v, all - 1));
-  for (std::size_t k = 1; k + 1 < corners.size(); ++k)
-    mesh.triangles.push_back({static_cast<int>(corners[0]), static_cast<int>(corners[k]),
-                              static_cast<int>(corners[k + 1])});
+    vertices.push_back(static_cast<int>(v));
+  }
+  if (list.strips) return add_strips(vertices, mesh);
+  const std::string fault = cut_polygon(mesh.positions, vertices, mesh.triangles);
+  if (!fault.empty() && mesh.fault.empty())
+    mesh.fault = fmt::format("{}a face of {} corners has {}; expected a polygon", file.place(),
+                             vertices.size(), fault);
 }
 
 }  // namespace
@@ -269,7 +322,7 @@ void add_face(const PlyFile& file, const std::vector<double>& corners, RawMesh& 
 RawMesh read_stl(const std::string& path) {
   const std::string bytes = read_text_file(path, kLargestSurface, "a surface");
   if (is_stl_in_bytes(bytes)) return stl_in_bytes(bytes, path);
-  if (bytes.rfind("solid", 0) != 0)
+  if (!is_stl_in_text(bytes))
     throw InputError(path +
                      ": neither starts with 'solid' nor has as many bytes as its number of "
                      "triangles takes; expected an STL file");
@@ -279,17 +332,25 @@ RawMesh read_stl(const std::string& path) {
 RawMesh read_ply(const std::string& path) {
   PlyFile file(path);
   RawMesh mesh;
+  std::vector<VertexList> lists;  // faces may come before vertices
   std::vector<std::vector<double>> numbers;
   for (const PlyElement& kind : file.read_header()) {
     const int x = kind.find({"x"}), y = kind.find({"y"}), z = kind.find({"z"}),
               corners = kind.find({"vertex_indices", "vertex_index"});
-    const bool vertices = kind.name == "vertex", faces = kind.name == "face";
+    const bool vertices = kind.name == "vertex", strips = kind.name == "tristrips",
+               faces = kind.name == "face" || strips;
     if (vertices && (x < 0 || y < 0 || z < 0)) file.fail("a vertex without x, y or z");
-    if (faces && corners < 0) file.fail("a face without a list of vertex_indices");
+    if (faces && corners < 0)
+      file.fail("element " + kind.name + " without a list of vertex_indices");
     if (kind.properties.empty()) continue;
     for (long k = 0; k < kind.count; ++k) {
       take_element(file, kind, numbers);
-      if (faces) add_face(file, numbers[std::size_t(corners)], mesh);
+      if (faces) {
+        const std::vector<double>& list = numbers[std::size_t(corners)];
+        if (!strips && list.size() < 3)
+          file.fail(fmt::format("a face of {} vertices; expected three or more", list.size()));
+        lists.push_back({list, file.at(), strips});
+      }
       if (!vertices) continue;
       Vector3 at{};
       for (std::size_t c = 0; c < 3; ++c) {
@@ -302,6 +363,7 @@ RawMesh read_ply(const std::string& path) {
       mesh.positions.push_back(at);
     }
   }
+  for (const VertexList& list : lists) add_list(file, list, mesh);
   return mesh;
 }
 

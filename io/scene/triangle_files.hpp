@@ -15,6 +15,7 @@ namespace tangere {
 struct RawMesh {
   std::vector<Vector3> positions;             ///< [file's unit], at most a million each
   std::vector<std::array<int, 3>> triangles;  ///< indices of positions
+  std::string fault;  ///< "", or a face that is no polygon, with its place in the file
 };
 
 /// Reads an STL file. Its normals are ignored: corners are anticlockwise seen from outside. Throws
@@ -22,8 +23,9 @@ struct RawMesh {
 /// it is text.
 RawMesh read_stl(const std::string& path);
 
-/// Reads the elements `vertex` (x y z) and `face` (a list of vertex_indices) of a PLY file. Faces
-/// become fans of triangles. Other elements and properties are skipped. Throws like read_stl.
+/// Reads the elements `vertex` (x y z), `face` and `tristrips` (lists of vertex_indices) of a PLY
+/// file, in any order. Faces are cut into triangles. Other elements and properties are skipped.
+/// Throws like read_stl.
 RawMesh read_ply(const std::string& path);
 
 }  // namespace tangere

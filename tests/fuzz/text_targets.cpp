@@ -266,8 +266,10 @@ std::vector<Target> text_targets() {
   const auto surface = [](const std::string& name, const auto& corpus) {
     const std::string file = "mutant." + name;
     return Target{name, false, file, corpus, [=](const std::string& folder) {
-                    const MeshShape faces = read_faces(folder + "/" + file);
-                    const MeshShape hull = convex_hull(faces.vertices);
+                    const FileSurface read = read_faces(folder + "/" + file);
+                    const MeshShape hull = convex_hull(read.points);
+                    if (read.fault.empty() && !surface_fault(read.closed).empty())
+                      throw std::logic_error("a surface is open: " + surface_fault(read.closed));
                     if (!hull.triangles.empty() && !surface_fault(hull).empty())
                       throw std::logic_error("a hull is open: " + surface_fault(hull));
                     static_cast<void>(mesh_points(read_surface(folder + "/" + file), 0.1, 10'000));

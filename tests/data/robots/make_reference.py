@@ -9,7 +9,9 @@ For every robot a file NAME_reference.txt of lines: "mass BODY kg" once, then fo
 "state", and "q", "v", "u", "bias", "acceleration" with a joint and its numbers, "pose" with a body,
 the place of its last joint (or of the body, if it has none) and its quaternion w x y z, "site" with
 a site and its place. The last state of a file with keyframes is that of its last one. Coordinates
-are those of Tangere: those of a free joint are seen from where it starts, and ref is taken away.
+are those of Tangere: those of a free joint are seen from where it starts, and ref is taken away. Bodies keep the frames
+that their file gives: where MuJoCo aligns a free joint with an inertia, the site BODY_origin says
+where that frame is in the keyframe. A motor without a range has the range of the keyframe's control.
 Accelerations are those that MuJoCo calls smooth: without contacts and limits.
 """
 
@@ -38,10 +40,33 @@ def relative(quat, other):
     return out
 
 
-def load(path):
+def load(path, aligned=False):
     assets = {p.name: p.read_bytes() for p in (HERE / "meshes").iterdir()}
     text = path.read_text().replace("package://robots/meshes/", "").replace('meshdir="meshes"', "")
+    if not aligned:
+        text = text.replace('align="true"', "").replace('alignfree="true"', "")
     return mujoco.MjModel.from_xml_string(text, assets)
+
+
+def load_keyframe(path, model, data):
+    """Sets the last keyframe, in the frames of `model`."""
+    other = load(path, aligned=True)
+    key = mujoco.MjData(other)
+    mujoco.mj_resetDataKeyframe(other, key, other.nkey - 1)
+    mujoco.mj_normalizeQuat(other, key.qpos)
+    mujoco.mj_forward(other, key)
+    data.qpos[:], data.qvel[:], data.ctrl[:] = key.qpos, key.qvel, key.ctrl
+    for j in range(model.njnt):
+        site = model.body(model.jnt_bodyid[j]).name + "_origin"
+        if model.jnt_type[j] != FREE or site not in [model.site(s).name for s in range(model.nsite)]:
+            continue
+        s, a, d = model.site(site).id, model.jnt_qposadr[j], model.jnt_dofadr[j]
+        twist = np.zeros(6)
+        mujoco.mj_objectVelocity(other, key, mujoco.mjtObj.mjOBJ_SITE, s, twist, 0)
+        data.qpos[a : a + 3] = key.site_xpos[s]
+        mujoco.mju_mat2Quat(data.qpos[a + 3 : a + 7], key.site_xmat[s])
+        data.qvel[d : d + 3] = twist[3:]
+        data.qvel[d + 3 : d + 6] = key.site_xmat[s].reshape(3, 3).T @ twist[:3]
 
 
 def line(kind, name, numbers):
@@ -55,10 +80,34 @@ def is_servo(model, i):
 def our_control(model, i, value):
     """The control of actuator i for a motor of Tangere."""
     joint = model.actuator_trnid[i, 0]
+    low, high = control_range(model, i)
     if is_servo(model, i):  # the target
+        if model.actuator_ctrllimited[i]:
+            value = min(max(value, low), high)
         return value / model.actuator_gear[i, 0] - model.qpos0[model.jnt_qposadr[joint]]
-    low, high = model.actuator_ctrlrange[i]
-    return 2 * (value - low) / (high - low) - 1
+    return our_force_control(model, i, 2 * (value - low) / (high - low) - 1)
+
+
+def our_force_control(model, i, value):
+    """A range of forces takes the place of what the range of controls reaches beyond it."""
+    if not model.actuator_forcelimited[i]:
+        return value
+    gain = model.actuator_gainprm[i, 0]
+    ends = gain * np.array(control_range(model, i))
+    force = ends[0] + (value + 1) / 2 * (ends[1] - ends[0])
+    ends = np.clip(ends, *model.actuator_forcerange[i])
+    return np.clip(2 * (force - ends[0]) / (ends[1] - ends[0]) - 1, -1, 1)
+
+
+def control_range(model, i):
+    if model.actuator_ctrllimited[i]:
+        return model.actuator_ctrlrange[i]
+    most = max([1.0] + [abs(x) for x in model.key_ctrl[-1:, i]])
+    return -most, most
+
+
+def is_off(model, i):
+    return model.opt.disableactuator >> model.actuator_group[i] & 1
 
 
 def draw_state(model, data, rng):
@@ -74,7 +123,7 @@ def draw_state(model, data, rng):
                 at += 3
             data.qpos[at : at + 4] = numbers[:4]
     for i in range(model.nu):
-        low, high = (-0.3, 0.3) if is_servo(model, i) else model.actuator_ctrlrange[i]
+        low, high = (-0.3, 0.3) if is_servo(model, i) else control_range(model, i)
         data.ctrl[i] = rng.uniform(low, high)
 
 
@@ -91,13 +140,14 @@ def write(path):
         if k < STATES:
             draw_state(model, data, rng)
         else:
-            mujoco.mj_resetDataKeyframe(model, data, model.nkey - 1)
+            load_keyframe(path, model, data)
         mujoco.mj_normalizeQuat(model, data.qpos)
         mujoco.mj_forward(model, data)
         q, v, found = data.qpos.copy(), data.qvel.copy(), {}
         for i in range(model.nu):
             name = model.joint(model.actuator_trnid[i, 0]).name
-            text += line("u", name, our_control(model, i, data.ctrl[i]))
+            if not is_off(model, i):
+                text += line("u", name, our_control(model, i, data.ctrl[i]))
         for j in range(model.njnt):
             name, kind = model.joint(j).name, model.jnt_type[j]
             a, d = model.jnt_qposadr[j], model.jnt_dofadr[j]
@@ -135,5 +185,5 @@ def write(path):
     (HERE / f"{path.stem}_reference.txt").write_text(text)
 
 
-for robot in ("hand.urdf", "machine.xml", "meshes.xml"):
+for robot in ("hand.urdf", "machine.xml", "meshes.xml", "kinds.xml"):
     write(HERE / robot)

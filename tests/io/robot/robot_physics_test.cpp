@@ -209,6 +209,11 @@ TEST(RobotPhysics, MjcfMovesAsInMujoco) {
   options.keyframe = "ready";
   compare("machine.xml", "machine_reference.txt", options);
 }
+TEST(RobotPhysics, OtherKindsOfMjcfMoveAsInMujoco) {
+  RobotOptions options;
+  options.keyframe = "thrown";
+  compare("kinds.xml", "kinds_reference.txt", options);
+}
 
 }  // namespace
 }  // namespace tangere

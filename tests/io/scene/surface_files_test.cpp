@@ -256,7 +256,7 @@ TEST_F(SurfaceFiles, PlyFilesAreTheSameSurfaceInTextAndInBytes) {
   EXPECT_THAT(changed("3 0 1 2", "3 0 1 8"), HasSubstr("vertex 8; expected one of 0 to 7"));
   EXPECT_THAT(changed("3 0 1 2", "2 0 1 2"), HasSubstr("c.ply:22: a face of 2 vertices"));
   EXPECT_THAT(changed("3 0 1 2", "70000 0 1 2"),
-              HasSubstr("c.ply:22: a list of 70000 numbers; expected 0 to 65536"));
+              HasSubstr("c.ply:22: a list of 70000 numbers; expected 0 to the 107 that the rest"));
   std::string remarks;
   for (int k = 0; k < 1001; ++k) remarks += "comment\n";
   EXPECT_THAT(changed("comment by hand\n", remarks), HasSubstr("a header of more than 1000 lines"));
@@ -324,6 +324,7 @@ TEST_F(SurfaceFiles, WhatIsNoClosedSurfaceIsRefusedWithItsPlace) {
 TEST_F(SurfaceFiles, AHullClosesAnOpenSurface) {
   std::string open = kBox;
   open.erase(open.find("f 4 1 5 8"));
+  open.erase(open.find("v 9 9 9\n"), 8);
   write("open.obj", open);
   const auto text = [](const std::string& more) {
     return "<redmax><robot><link name=\"l\"><joint name=\"j\" type=\"prismatic\" axis=\"0 0 1\"/>"

@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: Apache-2.0
+// Makes one closed surface of the triangles of a file.
+#pragma once
+
+#include <string>
+
+#include "engine/model/scene.hpp"
+#include "io/scene/triangle_files.hpp"
+
+namespace tangere {
+
+/// Makes one vertex per position that a triangle uses, in order of use. Drops triangles that have
+/// equal corners and so no area. Where the surface stays open, corners at its open edges that
+/// differ by rounding (1e-8 of the mesh's longest side or less) become one, if that closes it.
+MeshShape weld(const RawMesh& raw);
+
+/// Returns where a surface is open, and how far apart corners are that nearly meet there, or "".
+std::string open_edge(const MeshShape& mesh);
+
+/// Takes away walls inside of a closed surface: triangles in the same place that face each other,
+/// as where two closed blocks share a side. They enclose nothing, but the distance to them would be
+/// zero. A wall goes if its two sides cover the same place, however each is cut into triangles.
+/// Returns "", or what is left: how much of the area, and a place.
+std::string remove_walls(MeshShape& mesh);
+
+}  // namespace tangere

@@ -1,0 +1,259 @@
+// SPDX-License-Identifier: Apache-2.0
+// What import makes of robots that say things in less common ways: what it takes over, what it
+// lists, and what it refuses. tests/data/robots/kinds.xml compares the motion with MuJoCo's.
+#include <gmock/gmock.h>
+
+#include <filesystem>
+#include <fstream>
+
+#include "engine/model/model.hpp"
+#include "engine/model/shapes.hpp"
+#include "engine/step/stepper.hpp"
+#include "io/robot/robot_import.hpp"
+#include "io/scene/scene_reader.hpp"
+#include "tests/io/synthetic_run.hpp"
+
+namespace tangere {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::Contains;
+using ::testing::DoubleNear;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::Not;
+
+class RobotKinds : public ::testing::Test {
+ protected:
+  ImportedScene import(const std::string& text, const std::string& keyframe = "") {
+    std::ofstream(folder_ / "robot.xml") << text;
+    RobotOptions options;
+    options.keyframe = keyframe;
+    return import_robot(folder_ / "robot.xml", folder_ / "scene.xml", options);
+  }
+  Scene scene(const std::string& text, const std::string& keyframe = "") {
+    return parse_scene(import(text, keyframe).text, folder_ / "scene.xml").scene;
+  }
+  std::string fault_of(const std::string& text, const std::string& keyframe = "") {
+    try {
+      import(text, keyframe);
+    } catch (const InputError& error) {
+      return error.what();
+    }
+    return "";
+  }
+  void write(const std::string& name, const std::string& text) {
+    std::filesystem::create_directories((std::filesystem::path(folder_ / name)).parent_path());
+    std::ofstream(folder_ / name) << text;
+  }
+
+  testing::Folder folder_;
+};
+
+/// A model with a hinge `j` of the range -1 to 2 rad, an <option>, a motor and a keyframe.
+std::string driven(const std::string& motor, const std::string& ctrl = "0",
+                   const std::string& option = "") {
+  return "<mujoco><compiler angle=\"radian\"/><option " + option +
+         "/><worldbody><body name=\"b\"><joint name=\"j\" range=\"-1 2\"/><geom size=\"0.1\"/>"
+         "</body></worldbody><actuator>" +
+         motor + "</actuator><keyframe><key name=\"k\" ctrl=\"" + ctrl + "\"/></keyframe></mujoco>";
+}
+
+/// The force of the imported motor under a control of the file: the reference is the law of the
+/// actuator.
+TEST_F(RobotKinds, MotorsExertTheForceOfTheFile) {
+  struct Case {
+    const char* motor;
+    double control, force;
+  };
+  for (const Case& c : {Case{"<motor joint=\"j\" gear=\"-3\" ctrlrange=\"-1 1\"/>", 0.5, -1.5},
+                        Case{"<motor joint=\"j\" gear=\"-3\" ctrlrange=\"0 4\"/>", 3, -9},
+                        Case{"<motor joint=\"j\" gear=\"-3\"/>", -5, 15},
+                        Case{"<motor joint=\"j\" gear=\"2\"/>", 0.25, 0.5},
+                        Case{"<motor joint=\"j\" gear=\"2\" ctrlrange=\"-1 1\"/>", 7, 2},
+                        Case{"<motor joint=\"j\" gear=\"2\" forcerange=\"-1 1\"/>", -3, -2},
+                        Case{"<motor joint=\"j\" gear=\"-2\" forcerange=\"-1 4\"/>", 3, -6},
+                        Case{"<motor joint=\"j\" gear=\"10\" ctrlrange=\"-1 1\" "
+                             "forcerange=\"-0.5 0.5\"/>",
+                             0.03, 0.3},
+                        Case{"<general joint=\"j\" gainprm=\"-4\" ctrlrange=\"-2 2\"/>", 1, -4}}) {
+    const Scene made = scene(driven(c.motor, std::to_string(c.control)), "k");
+    const MotorDescription& motor = made.motors.at(0);
+    const double u = std::get<ConstantControl>(made.control.value()).values.at(0);
+    EXPECT_GE(u, -1) << c.motor;
+    EXPECT_LE(u, 1) << c.motor;
+    EXPECT_NEAR(motor.low + 0.5 * (u + 1) * (motor.high - motor.low), c.force, 1e-12) << c.motor;
+  }
+  EXPECT_THAT(import(driven("<motor joint=\"j\"/>", "5"), "k").changed,
+              Contains(HasSubstr("the control of 'j' is that of the file times 0.2 from -1 to 1")));
+  EXPECT_THAT(import(driven("<motor joint=\"j\" ctrlrange=\"0 4\"/>")).changed,
+              Contains(HasSubstr("the control of 'j' is that of the file times 0.5 -1")));
+  EXPECT_THAT(import(driven("<motor joint=\"j\" gear=\"-3\" ctrlrange=\"-1 1\"/>")).changed,
+              IsEmpty());
+}
+
+/// A range from high to low is the same motor under the opposite control.
+TEST_F(RobotKinds, ARangeFromHighToLowTurnsTheForceRound) {
+  const auto last = [&](const std::string& range, double u) {
+    const Model model(
+        parse_scene("<tangere><option unit=\"m-kg\"/><robot><link name=\"a\"><joint name=\"a\" "
+                    "type=\"revolute\" axis=\"0 0 1\"/>"
+                    "<body name=\"a\" type=\"cuboid\" size=\"1 2 3\" density=\"1000\"/>"
+                    "</link></robot><actuator><motor joint=\"a\" ctrl=\"force\" ctrl_range=\"" +
+                        range + "\"/></actuator></tangere>",
+                    "s.xml")
+            .scene);
+    Batch batch(model, 1, 1);
+    Stepper stepper(model);
+    for (int k = 0; k < 20; ++k) stepper.step(batch, std::array{u});
+    std::array<double, 1> q{};
+    batch.get_q(0, q);
+    return q[0];
+  };
+  EXPECT_NE(last("3 -2", 0.5), 0);
+  EXPECT_EQ(last("3 -2", 0.5), last("-2 3", -0.5));
+}
+
+TEST_F(RobotKinds, WordsThatChangeAForceAreNotIdle) {
+  const auto idle = [&](const std::string& motor, const std::string& option = "") {
+    std::string all;
+    for (const std::string& line : import(driven(motor, "0 0", option)).idle) all += line + "\n";
+    return all;
+  };
+  const std::string second = "<motor joint=\"j\"/>";
+  for (const char* more : {"damping=\"1\"", "armature=\"1\"", "delay=\"0.1\"", "cranklength=\"1\""})
+    EXPECT_THAT(import(driven("<motor joint=\"j\" " + std::string(more) + "/>")).lost,
+                ElementsAre(HasSubstr("<motor> ")))
+        << more;
+  for (const char* more : {"dampratio=\"1\"", "timeconst=\"0.1\""})
+    EXPECT_THAT(import(driven("<position joint=\"j\" " + std::string(more) + "/>")).lost,
+                ElementsAre(HasSubstr("<position> ")))
+        << more;
+  EXPECT_THAT(import(driven("<pid joint=\"j\" kp=\"1\"/>")).lost,
+              ElementsAre(HasSubstr("<pid>: an actuator that scenes do not have")));
+  const ImportedScene off = import(
+      driven("<motor joint=\"j\" group=\"3\"/>" + second, "0 0", "actuatorgroupdisable=\"1 3\""));
+  EXPECT_EQ(off.motors, 1U);
+  EXPECT_THAT(off.lost, IsEmpty());
+  EXPECT_THAT(off.changed, Contains(HasSubstr("a group that <option actuatorgroupdisable>")));
+  EXPECT_THAT(idle("<motor joint=\"j\" group=\"3\"/>" + second, "actuatorgroupdisable=\"1 3\""),
+              Not(HasSubstr("group")));
+}
+
+/// Half of the range -1 to 2 about its middle is -0.25 to 1.25.
+TEST_F(RobotKinds, TargetsOfAKeyframeKeepToAnInheritedRange) {
+  const std::string motor = "<position joint=\"j\" kp=\"9\" inheritrange=\"0.5\"/>";
+  for (const auto& [ctrl, target] : {std::pair{"-3", -0.25}, {"0.5", 0.5}, {"2", 1.25}})
+    EXPECT_THAT(std::get<ConstantControl>(scene(driven(motor, ctrl), "k").control.value()).values,
+                ElementsAre(DoubleNear(target, 1e-15)));
+  EXPECT_THAT(import(driven(motor)).changed, Contains(HasSubstr("targets of position motors")));
+}
+
+TEST_F(RobotKinds, AFreeJointHasNoLimitsOfItsClass) {
+  const auto text = [](const std::string& joint) {
+    return "<mujoco><default><joint limited=\"true\"/></default><worldbody><body name=\"b\">"
+           "<joint name=\"j\" " +
+           joint + "/><geom size=\"0.1\"/></body></worldbody></mujoco>";
+  };
+  const ImportedScene free = import(text("type=\"free\""));
+  EXPECT_THAT(free.lost, IsEmpty());
+  EXPECT_EQ(free.joints, 1U);
+  EXPECT_THAT(fault_of(text("type=\"hinge\"")), HasSubstr("limited=\"true\" without a range"));
+}
+
+TEST_F(RobotKinds, AKeyframeOfAnAlignedBodyNeedsItsAxes) {
+  const auto text = [](const std::string& geoms) {
+    return "<mujoco><compiler alignfree=\"true\"/><worldbody><body name=\"b\">"
+           "<freejoint name=\"j\"/>" +
+           geoms + "</body></worldbody><keyframe><key qpos=\"0 0 1 1 0 0 0\"/></keyframe></mujoco>";
+  };
+  const std::string block = "<geom type=\"box\" size=\"0.05 0.02 0.01\" pos=\"0.1 0 0\"/>";
+  EXPECT_THAT(scene(text(block), "0").initial.at(0).q, ElementsAre(-0.1, 0, 1, 1, 0, 0, 0));
+  EXPECT_EQ(fault_of(text(block + block)), "");  // without the keyframe its frame is its own
+  EXPECT_THAT(fault_of(text(block + block), "0"),
+              AllOf(HasSubstr("the free joint 'j' is aligned with the inertia of its body"),
+                    HasSubstr("or align=\"false\"")));
+  const std::string child = "<body><joint/><geom size=\"0.1\"/></body>";  // then nothing is aligned
+  EXPECT_THAT(fault_of(text(block + child), "0"), HasSubstr("qpos has 7 numbers"));
+}
+
+TEST_F(RobotKinds, MeshesNeedNoFile) {
+  const auto text = [](const std::string& mesh) {
+    return "<mujoco><asset><mesh name=\"m\" " + mesh +
+           "/></asset><worldbody><body name=\"b\"><joint/><geom size=\"0.1\"/>"
+           "<geom type=\"mesh\" mesh=\"m\"/></body></worldbody></mujoco>";
+  };
+  const std::string corners = "vertex=\"0 0 0 1 0 0 0 1 0 0 0 1\" ";
+  const auto volume = [&](const std::string& mesh) {
+    return volume_of(scene(text(mesh)).links.at(1).body.shape);
+  };
+  EXPECT_NEAR(volume(corners), 1.0 / 6, 1e-15);
+  EXPECT_NEAR(volume(corners + "face=\"0 2 1 0 1 3 1 2 3 0 3 2\" scale=\"2 1 -1\""), 2.0 / 6,
+              1e-15);
+  EXPECT_THAT(fault_of(text(corners + "face=\"0 2 1 0 1 4\"")),
+              HasSubstr("face has the vertex 4; expected one of 0 to 3"));
+  EXPECT_THAT(fault_of(text("vertex=\"0 0\"")), HasSubstr("vertex has 2 numbers"));
+  const ImportedScene made = import(text("builtin=\"sphere\" params=\"2\""));
+  EXPECT_THAT(made.lost, ElementsAre(HasSubstr("<mesh> builtin: a shape made by MuJoCo")));
+  EXPECT_EQ(made.links, 1U);
+}
+
+// --- URDF ---
+
+std::string urdf(const std::string& more, const std::string& inside = "") {
+  return "<robot name=\"r\">\n<link name=\"a\"/>\n"
+         "<link name=\"b\"><inertial><mass value=\"1\"/>"
+         "<inertia ixx=\"1\" iyy=\"1\" izz=\"1\"/></inertial>" +
+         inside +
+         "</link>\n"
+         "<joint name=\"j\" type=\"continuous\"><parent link=\"a\"/><child link=\"b\"/></joint>\n" +
+         more + "</robot>\n";
+}
+
+TEST_F(RobotKinds, OfElementsGivenTwiceTheLastCounts) {
+  const ImportedScene made = import(urdf(
+      "", "\n<inertial><mass value=\"3\"/><inertia ixx=\"2\" iyy=\"2\" izz=\"2\"/></inertial>"));
+  EXPECT_THAT(made.warnings, Contains(HasSubstr(":4: <inertial>: given twice, first in line 3; the "
+                                                "last counts")));
+  const Scene scene = parse_scene(made.text, "s.xml").scene;
+  EXPECT_EQ(std::get<AbstractShape>(scene.links.at(1).body.shape).mass, 3);
+}
+
+TEST_F(RobotKinds, TheExtensionOfMujocoIsReadInUrdf) {
+  write("meshes/t.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n");
+  const std::string mesh =
+      "<collision><geometry><mesh filename=\"package://x/y/t.obj\"/></geometry></collision>";
+  EXPECT_THAT(fault_of(urdf("", mesh)), HasSubstr("\"package://x/y/t.obj\" is not there"));
+  const std::string settings =
+      "<mujoco><compiler meshdir=\"meshes\" settotalmass=\"5\" strippath=\"true\"/>"
+      "<option gravity=\"0 0 1\" timestep=\"0.01\"/></mujoco>";
+  const ImportedScene made = import(urdf(settings, mesh));
+  EXPECT_THAT(made.lost, IsEmpty());
+  EXPECT_THAT(made.changed, Contains(HasSubstr("<compiler> settotalmass")));
+  const Scene scene = parse_scene(made.text, folder_ / "scene.xml").scene;
+  EXPECT_THAT(scene.gravity, ElementsAre(0, 0, 1));
+  EXPECT_EQ(scene.timestep, 0.01);
+  const Model model(scene);
+  double mass = 0;
+  for (int i = 0; i < int(scene.links.size()); ++i) mass += model.mass(i);
+  EXPECT_NEAR(mass, 5, 1e-12);
+  for (const char* lost : {"<compiler inertiafromgeom=\"true\"/>", "<compiler boundmass=\"2\"/>",
+                           "<actuator><motor joint=\"j\"/></actuator>"})
+    EXPECT_EQ(import(urdf("<mujoco>" + std::string(lost) + "</mujoco>")).lost.size(), 1U) << lost;
+  EXPECT_THAT(fault_of(urdf("<mujoco><compiler meshdr=\"m\"/></mujoco>")),
+              HasSubstr("unknown attribute 'meshdr'; did you mean 'meshdir'"));
+}
+
+TEST_F(RobotKinds, APointerOfGitLfsIsNamed) {
+  const std::string pointer = "version https://git-lfs.github.com/spec/v1\noid sha256:4d7a\n";
+  EXPECT_THAT(fault_of(pointer), HasSubstr("robot.xml:1: a pointer of Git LFS"));
+  write("t.stl", pointer);
+  EXPECT_THAT(fault_of(urdf("",
+                            "<collision><geometry><mesh filename=\"t.stl\"/></geometry>"
+                            "</collision>")),
+              HasSubstr("t.stl:1: a pointer of Git LFS"));
+}
+
+}  // namespace
+}  // namespace tangere
