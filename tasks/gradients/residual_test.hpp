@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: Apache-2.0
+// Whether what a fit leaves of recorded fields can be noise. A model that is wrong leaves forces
+// that neighbouring points and readings have in common.
+#pragma once
+
+#include <string>
+
+#include "engine/model/model.hpp"
+#include "tasks/gradients/field_sequence.hpp"
+
+namespace tangere {
+
+/// With r the residuals of the points of a sensor that the fitted field touches, in one component
+/// of one reading: z = Σ r/√(Σ r²). Independent errors with symmetric distributions give z mean 0
+/// and mean square 1, whatever their sizes are.
+struct ResidualTest {
+  /// False: what is left is below kLeast of the recorded fields, which are not known better, or
+  /// there are too few sums.
+  bool tested = false;
+  double spread = 1;       ///< mean of z²
+  double persistence = 0;  ///< mean of z times z of the next reading
+  double mean = 0;         ///< of z, of that sensor and component in which it is largest
+  std::string sensor;      ///< of that mean
+  double excess = 0;       ///< Σ (z² - 1), at least 0: what the model misses, in variances of noise
+  double score = 0;        ///< the largest of the four, in standard deviations of independent noise
+  /// Mean square of all residuals over the stated variance of the noise; 0 where none is stated.
+  double chi_square = 0;
+
+  static constexpr double kLeast = 1e-4, kMostScore = 5;
+  [[nodiscard]] bool is_noise() const { return !tested || score < kMostScore; }
+};
+
+/// `noise`: stated standard deviation of a recorded number [N]; 0: not stated.
+ResidualTest test_residuals(const Model& model, const FieldSequence& fitted,
+                            const FieldSequence& recorded, double noise);
+
+}  // namespace tangere
