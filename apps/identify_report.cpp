@@ -127,6 +127,9 @@ std::string residual_text(const IdentifyReport& r) {
       t.spread, t.persistence / t.spread);
   if (!t.sensor.empty())
     text += fmt::format(", and a mean of {:.2g} on sensor '{}'", t.mean, t.sensor);
+  if (!t.suspect.empty())
+    text += fmt::format("; another '{}' ({:+.2g} %) would fit best, by {:.3g} standard deviations",
+                        t.suspect, 100 * t.suspect_change, std::abs(t.suspect_score));
   return text +
          fmt::format(
              "; the model, its other numbers or its controls are not those of the recording, or "
@@ -149,7 +152,10 @@ Json residual_json(const ResidualTest& t) {
           {"spread", t.spread},
           {"persistence", t.persistence},
           {"mean", t.mean},
-          {"excess", t.excess}};
+          {"excess", t.excess},
+          {"suspect", t.suspect.empty() ? Json() : Json(t.suspect)},
+          {"suspect_score", t.suspect_score},
+          {"suspect_change", t.suspect_change}};
 }
 
 Json fits_json(const Identification& fit) {

@@ -29,6 +29,7 @@ constexpr double kLongest = 1.5;    // of logarithms in one step, because the mo
 constexpr double kFarthest = 4;     // factor of other starts
 /// Of the squared change of normalised fields along the weakest direction: differences err by 1e-4.
 constexpr double kWeakest = 1e-8;
+constexpr double kNew = 1e-3;   // share of a column that the sought numbers must not have
 constexpr double kShare = 0.1;  // of a number in that direction
 
 std::size_t numbers_of_fields(const Model& model) {
@@ -123,6 +124,28 @@ class Problem {
             scene_.path, names_[std::size_t(k)]));
     }
     return J;
+  }
+  /// Returns ∂ fields / ∂ log of another number of the scene; none where a rollout fails.
+  [[nodiscard]] std::optional<Vector> column(const Vector& x, const NumberInfo& number) const {
+    const Scene scene = at(x);
+    const auto moved = [&](double change) {
+      const double value = number.value * std::exp(change);
+      return flat(simulate_fields(with_numbers(scene, {&number.name, 1}, {&value, 1}), run_));
+    };
+    try {
+      return (moved(kDifference) - moved(-kDifference)) / (2 * kDifference);
+    } catch (const InputError&) {
+      return std::nullopt;
+    }
+  }
+  /// The numbers of the scene that are not sought and not 0.
+  [[nodiscard]] std::vector<NumberInfo> others() const {
+    const NumberGradients parameters{Model(scene_)};
+    std::vector<NumberInfo> out;
+    for (const NumberInfo& info : parameters.infos())
+      if (info.value != 0 && std::ranges::find(names_, info.name) == names_.end())
+        out.push_back(info);
+    return out;
   }
   [[nodiscard]] Vector residuals(const Vector& x) const { return fields(x) - flat(recorded_); }
   [[nodiscard]] ResidualTest test(const Vector& x, double noise) const {
@@ -243,8 +266,7 @@ void judge_information(const Matrix& F, const Matrix& J, Identification& out) {
   const Matrix V = modes.eigenvectors();
   const Matrix W = V * known.cwiseInverse().asDiagonal();
   const Matrix C = W.lazyProduct(V.transpose());
-  const double inflation = out.residual.is_noise() ? 1 : std::sqrt(1 + out.residual.excess);
-  for (Eigen::Index k = 0; k < n; ++k) out.deviation.push_back(inflation * std::sqrt(C(k, k)));
+  for (Eigen::Index k = 0; k < n; ++k) out.deviation.push_back(std::sqrt(C(k, k)));
   for (Eigen::Index k = 0; k < n; ++k)
     for (Eigen::Index j = 0; j < n; ++j)
       out.correlation.push_back(C(k, j) / std::sqrt(C(k, k) * C(j, j)));
@@ -277,6 +299,33 @@ void judge(const Problem& problem, const Fit& fit, double stated_noise, Identifi
   const Matrix F = scale * information(J);
   out.information.assign(F.data(), F.data() + F.size());
   judge_information(F, J, out);
+}
+
+/// Finds the number that was not sought and whose change would make up best for what is left.
+void find_suspect(const Problem& problem, Identification& out) {
+  ResidualTest& test = out.residual;
+  if (!test.tested) return;
+  const Vector x = Eigen::Map<const Vector>(out.values().data(), problem.count()).array().log();
+  const Matrix J = problem.jacobian(x);
+  const Vector r = problem.residuals(x);
+  const Eigen::LDLT<Matrix> F = information(J).ldlt();
+  double missed = 0;
+  for (const NumberInfo& number : problem.others()) {
+    const std::optional<Vector> column = problem.column(x, number);
+    if (!column) continue;
+    const Vector along = F.solve(J.transpose().lazyProduct(*column));
+    const Vector across = *column - J.lazyProduct(along);
+    const double size = across.norm();
+    if (!(size > kNew * column->norm())) continue;
+    const double score = -across.dot(r) / (out.noise * size);
+    if (std::abs(score) <= std::abs(test.suspect_score)) continue;
+    test.suspect = number.name;
+    test.suspect_score = score;
+    test.suspect_change = score * out.noise / size;
+    missed = score * column->norm() / size;
+  }
+  test.excess = std::max(test.excess, missed * missed);
+  test.score = std::max(test.score, std::abs(test.suspect_score));
 }
 
 }  // namespace
@@ -423,6 +472,9 @@ Identification identify(const Scene& scene, const RecordedRun& run, const FieldS
     judge(problem, *fit, options.noise, best);
     if (best.passed()) break;
   }
+  find_suspect(problem, best);
+  if (!best.residual.is_noise())
+    for (double& deviation : best.deviation) deviation *= std::sqrt(1 + best.residual.excess);
   best.gradient_difference = (value.gradient - by_differences).norm() / by_differences.norm();
   best.fits = std::move(fits);
   return best;

@@ -21,12 +21,19 @@ struct ResidualTest {
   double persistence = 0;  ///< mean of z times z of the next reading
   double mean = 0;         ///< of z, of that sensor and component in which it is largest
   std::string sensor;      ///< of that mean
-  double excess = 0;       ///< Σ (z² - 1), at least 0: what the model misses, in variances of noise
-  double score = 0;        ///< the largest of the four, in standard deviations of independent noise
+  /// Squared size of what the model misses, in variances of noise: Σ (z² - 1), at least 0; or what
+  /// the suspect's change makes, if it is larger.
+  double excess = 0;
+  double score = 0;  ///< the largest of all, in standard deviations of independent noise
   /// Mean square of all residuals over the stated variance of the noise; 0 where none is stated.
   double chi_square = 0;
+  /// The number that was not sought and whose change would fit best, and that relative change. With
+  /// J its column of the Jacobian less its projection on those of the sought ones, and σ the noise,
+  /// J·r/(σ |J|) is its score.
+  std::string suspect;
+  double suspect_score = 0, suspect_change = 0;
 
-  static constexpr double kLeast = 1e-4, kMostScore = 5;
+  static constexpr double kLeast = 1e-4, kMostScore = 4.5;
   [[nodiscard]] bool is_noise() const { return !tested || score < kMostScore; }
 };
 
