@@ -229,9 +229,9 @@ Fit fit_from(const Problem& problem, const Vector& start, Problem::Value now, Ma
   return fit;
 }
 
-/// The same from a start that may be anywhere; none where a rollout fails or shows nothing.
-std::optional<Fit> fit_from_anywhere(const Problem& problem, const Vector& start,
-                                     const IdentificationOptions& options) {
+/// The same; none where a rollout fails, or one on the way does not depend on a number.
+std::optional<Fit> try_from(const Problem& problem, const Vector& start,
+                            const IdentificationOptions& options) {
   try {
     const Problem::Value value = problem.evaluate(start);
     if (!std::isfinite(value.misfit)) return std::nullopt;
@@ -457,8 +457,7 @@ Identification identify(const Scene& scene, const RecordedRun& run, const FieldS
   std::vector<FitEnds> fits;
   for (int k = 0; k < options.starts; ++k) {
     const Vector from = start_of(problem, k, options.seed);
-    const std::optional<Fit> fit = k == 0 ? fit_from(problem, x, value, J, options)
-                                          : fit_from_anywhere(problem, from, options);
+    const std::optional<Fit> fit = try_from(problem, from, options);
     const Vector values = from.array().exp();
     FitEnds& ends = fits.emplace_back();
     ends.start.assign(values.begin(), values.end());
@@ -472,6 +471,10 @@ Identification identify(const Scene& scene, const RecordedRun& run, const FieldS
     judge(problem, *fit, options.noise, best);
     if (best.passed()) break;
   }
+  if (best.points.empty())
+    throw InputError(fmt::format("{}: none of {} starts leads to an end, because rollouts fail on "
+                                 "the way or show nothing; expected a better guess",
+                                 scene.path, fits.size()));
   find_suspect(problem, best);
   if (!best.residual.is_noise())
     for (double& deviation : best.deviation) deviation *= std::sqrt(1 + best.residual.excess);
