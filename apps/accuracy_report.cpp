@@ -16,9 +16,13 @@
 namespace tangere::apps {
 namespace {
 
-constexpr double kFirstOrder = 1.7;  // the order of a reference below which shared laws are named
 constexpr double kKept = 3;  // times the accuracy that was asked for, which an error may reach
 constexpr double kNotable = 0.01;  // share of a force's energy that is worth a sentence
+
+/// "1.9", or "at most 0.5" where it may be less.
+std::string order_words(double order) {
+  return (order > RichardsonEstimate::kLeastOrder ? "" : "at most ") + fmt::format("{:.2g}", order);
+}
 
 std::string setting_text(const AccuracySetting& setting, double step) {
   if (setting.accuracy > 0)
@@ -84,7 +88,7 @@ std::string first_order_text(const AccuracyReport& report, const Model& model) {
   std::string laws;
   for (const std::string& law : first_order_laws(model.scene()))
     laws += (laws.empty() ? "" : ", ") + law;
-  if (laws.empty() || report.reference.order > kFirstOrder) return {};
+  if (laws.empty() || !report.reference.shares_errors()) return {};
   return " With every scheme, these are of first order in the step: " + laws + ".";
 }
 
@@ -97,9 +101,9 @@ std::string unresolved_text(const AccuracySubject& subject, const AccuracyReport
                        1e3 * r.step, r.status);
   std::string text = fmt::format(
       "Not resolved: even at {:g} ms the reference is off by {} (SDIRK2 differs by {}, twice the "
-      "step by {}, order {:.2g}), so no error below {} can be told, and no setting is known to "
+      "step by {}, order {}), so no error below {} can be told, and no setting is known to "
       "reach {}.",
-      1e3 * r.step, percent(r.error), percent(r.scheme_distance), percent(r.step_distance), r.order,
+      1e3 * r.step, percent(r.error), percent(r.scheme_distance), percent(r.step_distance), order_words(r.order),
       percent(3 * r.error), percent(subject.target));
   text += first_order_text(report, model);
   if (report.vibration.sensor >= 0 && report.vibration.share > kNotable)
@@ -150,9 +154,9 @@ std::string accuracy_heading(const AccuracySubject& subject, const FixedEpisodes
 std::string reference_row(const AccuracyReference& reference, int environments) {
   std::string row =
       fmt::format("reference {}: SDIRK2 at the same step differs by {:.1e}, its own twice the step "
-                  "by {:.1e} (order {:.2g}); off by {:.1e}",
+                  "by {:.1e} (order {}); off by {:.1e}",
                   setting_text(reference.setting, reference.step), reference.scheme_distance,
-                  reference.step_distance, reference.order, reference.error);
+                  reference.step_distance, order_words(reference.order), reference.error);
   // An error of a few environments must not pass for one of all.
   if (reference.environments < environments)
     row += fmt::format("; only {} of {} environments have something to compare",

@@ -246,7 +246,9 @@ class Sweep {
     for (const Integrator integrator : integrators()) {
       const AccuracyPoint *coarse = nullptr, *fine = nullptr;
       for (const AccuracyPoint& p : report_.points) {  // ever finer
-        if (p.setting.integrator != integrator || p.setting.accuracy > 0 || p.blurred ||
+        // Errors near the reference's own say nothing, unless coarser steps share the most of them.
+        const bool clear = !p.blurred || report_.reference.shares_errors();
+        if (p.setting.integrator != integrator || p.setting.accuracy > 0 || !clear ||
             p.precision != Precision::f64 || !std::isfinite(p.median) || !(p.median > 0))
           continue;
         coarse = std::exchange(fine, &p);

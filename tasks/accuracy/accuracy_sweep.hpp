@@ -51,14 +51,18 @@ struct AccuracyReference {
   /// and of what its distances to itself with twice and four times the step say (richardson()).
   double error = 0;
   double scheme_distance = 0, step_distance = 0;  ///< to SDIRK2, and to itself with twice the step
-  double order = 0;                               ///< that its own steps have on these episodes
+  /// That its own steps have on these episodes (richardson()).
+  double order = 0;
   int environments = 0;  ///< of which the reference says something
   int failed = 0;        ///< environments in which the reference or SDIRK2 failed
   std::string status;    ///< "ok", or why
+
+  /// Whether its order is so far below its scheme's that other schemes have the same errors.
+  [[nodiscard]] bool shares_errors() const { return order < 1.7; }
 };
 
-/// The order that a scheme has on these episodes between its two finest steps that are off by more
-/// than ten times the reference.
+/// The order that a scheme has on these episodes between its two finest steps, without those that
+/// are off by less than ten times the reference; with them where the reference shares their errors.
 struct SchemeOrder {
   Integrator integrator = Integrator::usual;
   double coarse = 0, fine = 0;  ///< those steps [s]
