@@ -83,13 +83,16 @@ std::string nearest_text(const AccuracyReport& report) {
                      percent(nearest->bound));
 }
 
-/// What of the scene keeps schemes from their order, if the reference does not have its own.
+/// What of the scene keeps schemes from their order, if they share errors.
 std::string first_order_text(const AccuracyReport& report, const Model& model) {
   std::string laws;
   for (const std::string& law : first_order_laws(model.scene()))
     laws += (laws.empty() ? "" : ", ") + law;
-  if (laws.empty() || !report.reference.shares_errors()) return {};
-  return " With every scheme, these are of first order in the step: " + laws + ".";
+  if (!report.reference.shares_errors()) return {};
+  const std::string shared = " All schemes share most of the error";
+  return laws.empty() ? shared + "."
+                      : shared + ": these can be of first order in the step with each of them: " +
+                            laws + ".";
 }
 
 /// Why the reference cannot judge, and what helps.

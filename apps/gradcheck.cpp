@@ -101,7 +101,7 @@ void print(const Console& console, const GradientCheck& check, const char* what,
   for (const CheckedInput& c : check.inputs)
     if (!c.influence)
       console.note(fmt::format("{} do not act on this loss; nothing is compared", c.name));
-  for (const std::string& reason : check.reasons) console.note(reason);
+  for (const std::string& reason : check.reasons) console.print(reason);
   if (check.entries() == 0) {
     console.fail(nothing_compared(check, what, try_instead));
     return;

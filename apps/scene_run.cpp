@@ -124,9 +124,9 @@ void warn_of_steps(const Console& console, const Model& model, const Stepper& st
       laws += (laws.empty() ? "" : ", ") + law;
     if (!laws.empty())
       console.note(fmt::format(
-          "warning: accuracy {:g} is not kept by {}: their errors are of first order in a part (ks) "
-          "or in the whole step of {:g} ms (timing), and no estimate sees them; 'tangere accuracy' "
-          "measures what is reached",
+          "warning: accuracy {:g} may not be kept by {}: their errors can be of first order in a "
+          "part (ks, where points slip or land) or in the whole step of {:g} ms (timing), and no "
+          "estimate sees them; 'tangere accuracy' measures what is reached",
           stepper.accuracy(), laws, 1e3 * stepper.timestep()));
     return;
   }

@@ -57,8 +57,9 @@ struct AccuracyReference {
   int failed = 0;        ///< environments in which the reference or SDIRK2 failed
   std::string status;    ///< "ok", or why
 
-  /// Whether its order is so far below its scheme's that other schemes have the same errors.
-  [[nodiscard]] bool shares_errors() const { return order < 1.7; }
+  /// Whether all schemes share most of the error: another scheme at the same step is nearer than the
+  /// same one with twice the step.
+  [[nodiscard]] bool shares_errors() const { return step_distance > 2 * scheme_distance; }
 };
 
 /// The order that a scheme has on these episodes between its two finest steps, without those that
