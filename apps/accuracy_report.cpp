@@ -90,9 +90,10 @@ std::string first_order_text(const AccuracyReport& report, const Model& model) {
     laws += (laws.empty() ? "" : ", ") + law;
   if (!report.reference.shares_errors()) return {};
   const std::string shared = " All schemes share most of the error";
-  return laws.empty() ? shared + "."
-                      : shared + ": these can be of first order in the step with each of them: " +
-                            laws + ".";
+  return laws.empty()
+             ? shared + "."
+             : shared + ": these can be of first order in the step with each of them: " + laws +
+                   ".";
 }
 
 /// Why the reference cannot judge, and what helps.
@@ -106,8 +107,8 @@ std::string unresolved_text(const AccuracySubject& subject, const AccuracyReport
       "Not resolved: even at {:g} ms the reference is off by {} (SDIRK2 differs by {}, twice the "
       "step by {}, order {}), so no error below {} can be told, and no setting is known to "
       "reach {}.",
-      1e3 * r.step, percent(r.error), percent(r.scheme_distance), percent(r.step_distance), order_words(r.order),
-      percent(3 * r.error), percent(subject.target));
+      1e3 * r.step, percent(r.error), percent(r.scheme_distance), percent(r.step_distance),
+      order_words(r.order), percent(3 * r.error), percent(subject.target));
   text += first_order_text(report, model);
   if (report.vibration.sensor >= 0 && report.vibration.share > kNotable)
     text += fmt::format(
@@ -155,11 +156,11 @@ std::string accuracy_heading(const AccuracySubject& subject, const FixedEpisodes
 }
 
 std::string reference_row(const AccuracyReference& reference, int environments) {
-  std::string row =
-      fmt::format("reference {}: SDIRK2 at the same step differs by {:.1e}, its own twice the step "
-                  "by {:.1e} (order {}); off by {:.1e}",
-                  setting_text(reference.setting, reference.step), reference.scheme_distance,
-                  reference.step_distance, order_words(reference.order), reference.error);
+  std::string row = fmt::format(
+      "reference {}: SDIRK2 at the same step differs by {:.1e}, its own twice the step "
+      "by {:.1e} (order {}); off by {:.1e}",
+      setting_text(reference.setting, reference.step), reference.scheme_distance,
+      reference.step_distance, order_words(reference.order), reference.error);
   // An error of a few environments must not pass for one of all.
   if (reference.environments < environments)
     row += fmt::format("; only {} of {} environments have something to compare",

@@ -187,9 +187,10 @@ Command add_identify(CLI::App& program) {
   add_text(app, "--controls", a.controls, "U.csv",
            "Controls of the recorded run in place of the scene's");
   add_steps_option(app, a.steps, "Steps of a trial [default: as long as the controls]");
-  add_positive_number(app, "--noise", a.noise,
-                      "Deviation of the noise over the fields' peak [default: of a trial 0.01; of a "
-                      "recording not known]");
+  add_positive_number(
+      app, "--noise", a.noise,
+      "Deviation of the noise over the fields' peak [default: of a trial 0.01; of a "
+      "recording not known]");
   add_whole_number<int>(app, "--starts", a.starts, 1, 1000,
                         "Most starts, tried while a fit is not sure [default: 6]");
   add_whole_number<std::uint64_t>(app, "--seed", a.seed, 0, 1000000,

@@ -117,8 +117,8 @@ std::string inseparable_text(const IdentifyReport& r) {
 /// What is left, and what independent noise would leave.
 std::string residual_text(const IdentifyReport& r) {
   const ResidualTest& t = r.fit.residual;
-  std::string text = fmt::format(
-      "what is left is not independent noise ({:.3g} standard deviations): ", t.score);
+  std::string text =
+      fmt::format("what is left is not independent noise ({:.3g} standard deviations): ", t.score);
   if (t.chi_square > 0)
     text += fmt::format("its variance is {:.3g} times that of the stated noise; ", t.chi_square);
   text += fmt::format(
@@ -139,8 +139,9 @@ std::string residual_text(const IdentifyReport& r) {
 
 /// How many fits ended where the best did, of how many that were tried.
 std::string starts_text(const Identification& fit) {
-  const auto same = std::ranges::count_if(
-      fit.fits, [&](const FitEnds& e) { return e.misfit <= kSameMisfit * fit.points.back().misfit; });
+  const auto same = std::ranges::count_if(fit.fits, [&](const FitEnds& e) {
+    return e.misfit <= kSameMisfit * fit.points.back().misfit;
+  });
   return fmt::format("{} of {} starts end at the smallest misfit", same, fit.fits.size());
 }
 

@@ -82,7 +82,8 @@ std::vector<ContactState> ContactStateReader::read(const Batch& batch, int block
     if (lane == 0) reader_.move(batch, block, group);
     ContactState& state = states.emplace_back();
     for (const kernels::PairContact& pair : m.pairs)
-      state.touching.push_back(pair_depths(pair, reader_, group, lane, batch.block(block)).touching);
+      state.touching.push_back(
+          pair_depths(pair, reader_, group, lane, batch.block(block)).touching);
     for (const kernels::GroundContact& ground : m.grounds)
       state.touching.push_back(ground_depths(ground, m.view, reader_, group, lane).touching);
     state.beyond = beyond_limits(m, batch.block(block) + l);

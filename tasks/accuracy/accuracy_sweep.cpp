@@ -284,8 +284,7 @@ class Sweep {
     for (std::size_t i = 0; i < report_.points.size(); i += precisions()) {
       double fastest = 0;
       for (const AccuracyPoint& p : std::span(report_.points).subspan(i, precisions()))
-        if (meets_target(p.error) && !meets_target(p.bound))
-          fastest = std::max(fastest, p.rate);
+        if (meets_target(p.error) && !meets_target(p.bound)) fastest = std::max(fastest, p.rate);
       if (fastest > kWorthALook * sure) by_rate.emplace_back(fastest, i);
     }
     std::ranges::sort(by_rate, std::greater<>());

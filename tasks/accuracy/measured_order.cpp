@@ -22,7 +22,8 @@ RichardsonEstimate richardson(double to_twice, double to_four_times) {
   if (!std::isfinite(to_twice)) return {RichardsonEstimate::kLeastOrder, HUGE_VAL};
   const double power = to_four_times / to_twice - 1;
   const double order = power > 0 ? std::log2(power) : 0;
-  const double q = std::clamp(order, RichardsonEstimate::kLeastOrder, RichardsonEstimate::kMostOrder);
+  const double q =
+      std::clamp(order, RichardsonEstimate::kLeastOrder, RichardsonEstimate::kMostOrder);
   return {q, to_twice / (std::exp2(q) - 1)};
 }
 
@@ -40,8 +41,7 @@ std::vector<std::string> first_order_laws(const Scene& scene) {
     add("the contact of '" + d.body + "' with the ground",
         {NumberOwner::ground, NumberField::ks, d.body}, d.coefficients);
   for (const TactileDescription& d : scene.sensors)
-    add("sensor '" + d.name + "'", {NumberOwner::tactile, NumberField::ks, d.name},
-        d.coefficients);
+    add("sensor '" + d.name + "'", {NumberOwner::tactile, NumberField::ks, d.name}, d.coefficients);
   for (const MotorDescription& d : scene.motors)
     if (d.control == MotorControl::position && d.timing == MotorTiming::start)
       laws.push_back("timing=\"start\" of the motor of '" + d.joint + "'");

@@ -17,7 +17,7 @@
 namespace tangere {
 namespace {
 
-constexpr double kLargest = 1e-3;  // step size, times the input's scale
+constexpr double kLargest = 1e-3;      // step size, times the input's scale
 constexpr std::size_t kExplained = 2;  // kinks of an input
 constexpr double kNoInfluence =
     1e-10;  // of the loss: an input has no influence if all its derivatives are smaller
@@ -44,7 +44,8 @@ std::vector<std::size_t> chosen(std::vector<std::size_t> all, std::size_t wanted
 
 /// Says at which change of an input two runs differ.
 std::vector<std::string> with_change(std::vector<std::string> texts, double change) {
-  for (std::string& text : texts) text = fmt::format("changed by {:.1e} to both sides, {}", change, text);
+  for (std::string& text : texts)
+    text = fmt::format("changed by {:.1e} to both sides, {}", change, text);
   return texts;
 }
 
@@ -196,9 +197,7 @@ void GradientChecker::add(const Comparison& c, std::uint32_t purpose,
 }
 
 void GradientChecker::check_controls() {
-  const auto move = [](std::size_t i) {
-    return [i](CheckInputs& x, double e) { x.u[i] += e; };
-  };
+  const auto move = [](std::size_t i) { return [i](CheckInputs& x, double e) { x.u[i] += e; }; };
   add({u_name_, by_u_, all_of(by_u_.size()),
        [&](std::size_t i) { return difference(kControlScale, move(i)); },
        [&](std::size_t i) { return control_name(i); },
@@ -221,9 +220,7 @@ void GradientChecker::check_positions() {
 }
 
 void GradientChecker::check_velocities() {
-  const auto move = [](std::size_t i) {
-    return [i](CheckInputs& x, double e) { x.v[i] += e; };
-  };
+  const auto move = [](std::size_t i) { return [i](CheckInputs& x, double e) { x.v[i] += e; }; };
   add({"v", by_v_, all_of(by_v_.size()),
        [&](std::size_t i) { return difference(kVelocityScale, move(i)); },
        [&](std::size_t i) { return std::string(model_.v_names()[i]); },
@@ -243,8 +240,7 @@ void GradientChecker::check_numbers() {
       (random < 0 ? number_in(scene, number) : varying[std::size_t(random)]) *= 1 + e;
     };
   };
-  add({"numbers", r.gradient, r.given,
-       [&](std::size_t k) { return difference_of_scene(move(k)); },
+  add({"numbers", r.gradient, r.given, [&](std::size_t k) { return difference_of_scene(move(k)); },
        [&](std::size_t k) { return parameters_.infos()[k].name; },
        [&](std::size_t k) { return decisions_of_scene(move(k)); }},
       3, [&](const std::vector<double>& d) {

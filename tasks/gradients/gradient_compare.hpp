@@ -27,10 +27,10 @@ struct CheckedInput {
   double scale =
       0;  ///< reference of the errors: that norm, or the norm of the differences if larger
   bool influence = true;  ///< false: all derivatives and differences are negligible, none compared
-  double difference_error = 0;  ///< largest among the compared entries
-  std::string worst;            ///< the entry of that error
+  double difference_error = 0;          ///< largest among the compared entries
+  std::string worst;                    ///< the entry of that error
   std::vector<std::size_t> to_explain;  ///< the first entries at kinks; that error's if too large
-  double tangent_error = 0;     ///< |g·d - tangent|/(|g| |d|) along a random direction
+  double tangent_error = 0;             ///< |g·d - tangent|/(|g| |d|) along a random direction
 };
 
 /// Number of step sizes of a sweep. Each is a quarter of the one before and is taken in both

@@ -472,9 +472,10 @@ Identification identify(const Scene& scene, const RecordedRun& run, const FieldS
     if (best.passed()) break;
   }
   if (best.points.empty())
-    throw InputError(fmt::format("{}: none of {} starts leads to an end, because rollouts fail on "
-                                 "the way or show nothing; expected a better guess",
-                                 scene.path, fits.size()));
+    throw InputError(
+        fmt::format("{}: none of {} starts leads to an end, because rollouts fail on "
+                    "the way or show nothing; expected a better guess",
+                    scene.path, fits.size()));
   find_suspect(problem, best);
   if (!best.residual.is_noise())
     for (double& deviation : best.deviation) deviation *= std::sqrt(1 + best.residual.excess);

@@ -12,12 +12,15 @@ namespace tangere {
 namespace {
 
 std::string range_text(const NormalAndShear& x) {
-  return x.normal == x.shear ? fmt::format("{:g} N", x.normal)
-                             : fmt::format("{:g} N (pressure) and {:g} N (shear)", x.normal, x.shear);
+  return x.normal == x.shear
+             ? fmt::format("{:g} N", x.normal)
+             : fmt::format("{:g} N (pressure) and {:g} N (shear)", x.normal, x.shear);
 }
 
 const char* limit_text(int beyond) {
-  return beyond < 0 ? "below its lower limit" : beyond > 0 ? "above its upper limit" : "within its limits";
+  return beyond < 0   ? "below its lower limit"
+         : beyond > 0 ? "above its upper limit"
+                      : "within its limits";
 }
 
 }  // namespace
@@ -62,9 +65,10 @@ void RunTrace::compare(std::size_t state, const Decisions& a, const Decisions& b
   for (std::size_t k = 0; k < model_.contacts().size(); ++k)
     say(a.contact.touching[k] != b.contact.touching[k], [&] {
       const ContactInfo& c = model_.contacts()[k];
-      return fmt::format("{} points of the contact of '{}' with '{}' touch in one run and {} in the "
-                         "other",
-                         a.contact.touching[k], c.first, c.second, b.contact.touching[k]);
+      return fmt::format(
+          "{} points of the contact of '{}' with '{}' touch in one run and {} in the "
+          "other",
+          a.contact.touching[k], c.first, c.second, b.contact.touching[k]);
     });
   for (std::size_t i = 0; i < a.contact.beyond.size(); ++i)
     say(a.contact.beyond[i] != b.contact.beyond[i], [&] {
@@ -94,10 +98,11 @@ std::vector<std::string> sensors_without_derivative(const Model& model) {
   for (const TactileDescription& sensor : model.scene().sensors) {
     const SensorImperfections& flaws = sensor.imperfections;
     if (flaws.quantisation != NormalAndShear{})
-      texts.push_back(fmt::format(
-          "readings of sensor '{}' are multiples of {} (quantisation): their derivative is 0 almost "
-          "everywhere, and the gradient is that of the reading before it is rounded",
-          sensor.name, range_text(flaws.quantisation)));
+      texts.push_back(
+          fmt::format("readings of sensor '{}' are multiples of {} (quantisation): their "
+                      "derivative is 0 almost "
+                      "everywhere, and the gradient is that of the reading before it is rounded",
+                      sensor.name, range_text(flaws.quantisation)));
     if (flaws.saturation != NormalAndShear{})
       texts.push_back(fmt::format(
           "readings of sensor '{}' end at {} (saturation): there is a kink where one gets there, "

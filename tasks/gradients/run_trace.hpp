@@ -34,7 +34,7 @@ class RunTrace {
   void compare(std::size_t state, const Decisions& a, const Decisions& b, std::vector<bool>& said,
                std::vector<std::string>& to) const;
 
-  Model model_;  // for names
+  Model model_;                                 // for names
   std::vector<std::vector<Decisions>> states_;  // (states, environments)
 };
 

@@ -73,11 +73,17 @@ TEST(Accuracy, ComparesTheStateWhereItIsAskedFor) {
 
 TEST(Accuracy, ComparesGradientsWhereTheyAreAskedFor) {
   const Folder folder;
-  const json answer =
-      run_json(folder, {"accuracy", kSmall, "--steps", "120", "--envs", "2", "--quantity",
-                        "gradient", "--target", "0.3", "--csv", "cost.csv"});
+  // The gradient by a touch that begins is not resolved, which SDIRK2 at the same step hides.
+  const json answer = run_json(folder,
+                               {"accuracy", kSmall, "--steps", "120", "--envs", "2", "--quantity",
+                                "gradient", "--target", "0.3", "--csv", "cost.csv"},
+                               1);
   EXPECT_EQ(answer.at("quantity"), "gradient");
-  EXPECT_LT(answer.at("reference").at("error"), 0.1);
+  const json& reference = answer.at("reference");
+  EXPECT_LT(reference.at("scheme_distance"), 0.1);
+  EXPECT_GT(reference.at("step_distance"), 0.1);
+  EXPECT_GT(reference.at("error"), 0.1);
+  EXPECT_EQ(answer.at("advice").at("resolved"), false);
   const json &points = answer.at("points"), &first = points.front();
   EXPECT_GT(first.at("evaluations_per_step"), 1);
   EXPECT_TRUE(first.at("split_share").is_null()) << "is not counted";
@@ -130,7 +136,8 @@ TEST(Accuracy, NamesLawsOfFirstOrderAndGivesNoAdviceBelowTheirError) {
   EXPECT_THAT(answer.at("first_order_laws").at(0).get<std::string>(),
               HasSubstr("timing=\"start\" of the motor of 'rail'"));
   for (const json& order : answer.at("orders")) EXPECT_NEAR(order.at("order"), 1, 0.3) << order;
-  EXPECT_THAT(coarse.err, AllOf(HasSubstr("All schemes share most of the error"), HasSubstr(": timing=")));
+  EXPECT_THAT(coarse.err,
+              AllOf(HasSubstr("All schemes share most of the error"), HasSubstr(": timing=")));
   const Outcome fine = run(folder, words + Words{"--target", "1e-5"});
   EXPECT_EQ(fine.exit_code, 1);
   EXPECT_EQ(json::parse(fine.out).at("advice").at("resolved"), false);

@@ -440,8 +440,9 @@ TEST(Command, GradcheckFailsWhereReadingsAreRounded) {
   const std::string end = "resolution=\"40 40\" every=\"2\"/>";
   const std::size_t at = text.find(end);
   ASSERT_NE(at, std::string::npos);
-  text.replace(at, end.size(), "resolution=\"8 8\" every=\"2\"><imperfections quantisation=\"1e-3\"/>"
-                               "</tactile>");
+  text.replace(at, end.size(),
+               "resolution=\"8 8\" every=\"2\"><imperfections quantisation=\"1e-3\"/>"
+               "</tactile>");
   folder.write("rounded.xml", text);
   const Words words{"gradcheck", "rounded.xml", "--steps", "20", "--entries", "2", "--json"};
   const Outcome failed = run(folder, words);
@@ -455,8 +456,8 @@ TEST(Command, GradcheckFailsWhereReadingsAreRounded) {
   EXPECT_EQ(answer.at("tolerance"), 1e-4);
   EXPECT_GT(answer.at("max_relative_error"), 0.1);
   EXPECT_FALSE(answer.at("reasons").empty());
-  const json passed = run_json(folder, {"gradcheck", "rounded.xml", "--steps", "20", "--entries", "2",
-                                        "--tolerance", "2"});
+  const json passed = run_json(
+      folder, {"gradcheck", "rounded.xml", "--steps", "20", "--entries", "2", "--tolerance", "2"});
   EXPECT_EQ(passed.at("passed"), true);
   EXPECT_EQ(passed.at("tolerance"), 2);
 }

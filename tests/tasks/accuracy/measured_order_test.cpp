@@ -21,8 +21,7 @@ using ::testing::IsEmpty;
 TEST(Richardson, FindsOrderAndErrorOfAPowerOfTheStep) {
   for (const double q : {1.0, 2.0, 3.5}) {
     const double c = 0.01;  // C h^q
-    const RichardsonEstimate found =
-        richardson(c * (std::exp2(q) - 1), c * (std::exp2(2 * q) - 1));
+    const RichardsonEstimate found = richardson(c * (std::exp2(q) - 1), c * (std::exp2(2 * q) - 1));
     EXPECT_NEAR(found.order, q, 1e-12);
     EXPECT_NEAR(found.error, c, 1e-14);
   }

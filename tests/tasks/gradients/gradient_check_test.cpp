@@ -64,8 +64,9 @@ GradientCheck check(const Model& model, const RolloutLoss& loss, std::int64_t st
   options.stepper.tolerance = 1e-12;
   const ControlProgram controls(model, model.timestep(), 0);
   return check_gradient(
-      Batch(model, 1), [&](std::int64_t t, int e, std::span<double> u) { controls.evaluate(t, e, u); },
-      loss, options);
+      Batch(model, 1),
+      [&](std::int64_t t, int e, std::span<double> u) { controls.evaluate(t, e, u); }, loss,
+      options);
 }
 
 TEST(GradientCheck, FailsWhereALossHasAWrongDerivative) {
