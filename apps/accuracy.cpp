@@ -74,7 +74,8 @@ using MakeEpisodes =
 /// Ends with the report of a sweep.
 int report_sweep(const AccuracySubject& subject, const Console& console, const Model& model,
                  const AccuracyReport& report, int signal, TextOutput& svg, TextOutput& csv) {
-  console.print(pitch_table(report.pitches, model) + "\n" + advice_text(subject, report, model));
+  console.print(pitch_table(report.pitches, model) + order_text(report, model) + "\n" +
+                advice_text(subject, report, model));
   if (svg.wanted() && can_draw(report))
     svg.write(accuracy_svg(subject, report), console);
   else if (svg.wanted())

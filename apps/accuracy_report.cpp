@@ -11,11 +11,18 @@
 
 #include "apps/pitch_report.hpp"
 #include "io/picture/precision_plot.hpp"
+#include "tasks/accuracy/measured_order.hpp"
 
 namespace tangere::apps {
 namespace {
 
+constexpr double kKept = 3;  // times the accuracy that was asked for, which an error may reach
 constexpr double kNotable = 0.01;  // share of a force's energy that is worth a sentence
+
+/// "1.9", or "at most 0.5" where it may be less.
+std::string order_words(double order) {
+  return (order > RichardsonEstimate::kLeastOrder ? "" : "at most ") + fmt::format("{:.2g}", order);
+}
 
 std::string setting_text(const AccuracySetting& setting, double step) {
   if (setting.accuracy > 0)
@@ -23,6 +30,11 @@ std::string setting_text(const AccuracySetting& setting, double step) {
                        setting.accuracy, 1e3 * step);
   return fmt::format("{}, {:g} ms, tol {:.0e}", to_string(setting.integrator), 1e3 * step,
                      setting.tolerance);
+}
+
+/// Whether an error is at most kKept times the accuracy that was asked for, if one was.
+bool kept(const AccuracyPoint& p) {
+  return p.setting.accuracy == 0 || p.error <= kKept * p.setting.accuracy;
 }
 
 Json point_json(const AccuracyPoint& p) {
@@ -35,6 +47,7 @@ Json point_json(const AccuracyPoint& p) {
           {"error_bound", finite(p.bound)},
           {"median_error", finite(p.median)},
           {"within_share", finite(p.within)},
+          {"kept", p.setting.accuracy > 0 ? Json(kept(p)) : Json()},
           {"simulated_seconds_per_cpu_second", finite(p.rate)},
           {"evaluations_per_step", p.evaluations},
           {"split_share", finite(p.split)},
@@ -50,6 +63,17 @@ Json points_json(const std::vector<AccuracyPoint>& points) {
   return all;
 }
 
+Json orders_json(const std::vector<SchemeOrder>& orders) {
+  Json all = Json::array();
+  for (const SchemeOrder& o : orders)
+    all.push_back({{"scheme", to_string(o.integrator)},
+                   {"order", o.order},
+                   {"order_of_scheme", o.integrator.scheme().order},
+                   {"coarse_step", o.coarse},
+                   {"fine_step", o.fine}});
+  return all;
+}
+
 /// The setting that comes nearest to a target that none meets.
 std::string nearest_text(const AccuracyReport& report) {
   const auto nearest = std::ranges::min_element(report.points, {}, &AccuracyPoint::bound);
@@ -57,6 +81,19 @@ std::string nearest_text(const AccuracyReport& report) {
   return fmt::format(" {} comes nearest: {}, and {} in the worst environments.",
                      setting_text(nearest->setting, nearest->step), percent(nearest->error),
                      percent(nearest->bound));
+}
+
+/// What of the scene keeps schemes from their order, if they share errors.
+std::string first_order_text(const AccuracyReport& report, const Model& model) {
+  std::string laws;
+  for (const std::string& law : first_order_laws(model.scene()))
+    laws += (laws.empty() ? "" : ", ") + law;
+  if (!report.reference.shares_errors()) return {};
+  const std::string shared = " All schemes share most of the error";
+  return laws.empty()
+             ? shared + "."
+             : shared + ": these can be of first order in the step with each of them: " + laws +
+                   ".";
 }
 
 /// Why the reference cannot judge, and what helps.
@@ -67,9 +104,12 @@ std::string unresolved_text(const AccuracySubject& subject, const AccuracyReport
     return fmt::format("Not resolved: at {:g} ms there is nothing to compare with, because {}.",
                        1e3 * r.step, r.status);
   std::string text = fmt::format(
-      "Not resolved: even at {:g} ms SDIRK4 and SDIRK2 differ by {}, so no error below {} can be "
-      "told, and no setting is known to reach {}.",
-      1e3 * r.step, percent(r.error), percent(3 * r.error), percent(subject.target));
+      "Not resolved: even at {:g} ms the reference is off by {} (SDIRK2 differs by {}, twice the "
+      "step by {}, order {}), so no error below {} can be told, and no setting is known to "
+      "reach {}.",
+      1e3 * r.step, percent(r.error), percent(r.scheme_distance), percent(r.step_distance),
+      order_words(r.order), percent(3 * r.error), percent(subject.target));
+  text += first_order_text(report, model);
   if (report.vibration.sensor >= 0 && report.vibration.share > kNotable)
     text += fmt::format(
         " {:.2g} % of the energy of the force on '{}' is too fast for the samples to show; the "
@@ -79,6 +119,17 @@ std::string unresolved_text(const AccuracySubject& subject, const AccuracyReport
         model.sensors()[static_cast<std::size_t>(report.vibration.sensor)].name,
         report.vibration.frequency);
   return text;
+}
+
+/// Says where cut steps miss the accuracy that was asked for.
+std::string unkept_text(const AccuracyReport& report) {
+  std::string missed;
+  for (const AccuracyPoint& p : report.points)
+    if (p.precision == Precision::f64 && !kept(p))
+      missed += fmt::format("{}{:g} reaches {}", missed.empty() ? "" : ", ", p.setting.accuracy,
+                            percent(p.error));
+  if (missed.empty()) return {};
+  return " Cut steps miss the accuracy that is asked for: " + missed + ".";
 }
 
 /// Adds a curve of the points whose settings belong to it: labelled by step in ms, or by accuracy.
@@ -105,8 +156,11 @@ std::string accuracy_heading(const AccuracySubject& subject, const FixedEpisodes
 }
 
 std::string reference_row(const AccuracyReference& reference, int environments) {
-  std::string row = fmt::format("reference {}: SDIRK2 at the same step differs by {:.1e}",
-                                setting_text(reference.setting, reference.step), reference.error);
+  std::string row = fmt::format(
+      "reference {}: SDIRK2 at the same step differs by {:.1e}, its own twice the step "
+      "by {:.1e} (order {}); off by {:.1e}",
+      setting_text(reference.setting, reference.step), reference.scheme_distance,
+      reference.step_distance, order_words(reference.order), reference.error);
   // An error of a few environments must not pass for one of all.
   if (reference.environments < environments)
     row += fmt::format("; only {} of {} environments have something to compare",
@@ -132,6 +186,16 @@ std::string accuracy_row(std::span<const AccuracyPoint> points) {
                        points.size() == 1 ? "" : fmt::format(" {}  ", to_string(q.precision)));
   if (p.failed > 0) row += p.status;
   return row;
+}
+
+std::string order_text(const AccuracyReport& report, const Model& model) {
+  if (report.orders.empty()) return {};
+  std::string text;
+  for (const SchemeOrder& o : report.orders)
+    text += fmt::format("{}{} {:.2g} ({})", text.empty() ? "" : ", ", to_string(o.integrator),
+                        o.order, o.integrator.scheme().order);
+  return "\norder of the errors here (on smooth motion): " + text + "." +
+         first_order_text(report, model) + unkept_text(report) + "\n";
 }
 
 std::string advice_text(const AccuracySubject& subject, const AccuracyReport& report,
@@ -188,7 +252,12 @@ Json accuracy_json(const AccuracySubject& subject, const AccuracyReport& report,
            {{"method", setting_text(report.reference.setting, report.reference.step)},
             {"step", report.reference.step},
             {"error", finite(report.reference.error)},
+            {"scheme_distance", finite(report.reference.scheme_distance)},
+            {"step_distance", finite(report.reference.step_distance)},
+            {"order", report.reference.order},
             {"envs", report.reference.environments}}},
+          {"orders", orders_json(report.orders)},
+          {"first_order_laws", first_order_laws(model.scene())},
           {"points", points_json(report.points)},
           {"tolerances", points_json(report.tolerances)},
           {"pitches", pitches_json(report.pitches, model)},

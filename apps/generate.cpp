@@ -250,7 +250,7 @@ int generate(GenerateOptions options, const Console& console, const ProgramInfo&
   const Model model(read_scene_for(options.scene, options.allow_unknown, console, asked));
   warn_of_geometry(console, model);
   const Stepper stepper(model);
-  warn_of_touches(console, model, stepper);
+  warn_of_steps(console, model, stepper);
   const ControlProgram controls =
       make_controls(options.controls, options.seed.value_or(0), model, stepper, console);
   Job job;

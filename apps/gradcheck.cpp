@@ -31,6 +31,7 @@ struct GradcheckArguments {
   std::optional<std::int64_t> steps, actions;
   std::optional<int> every, entries;
   std::optional<std::uint64_t> seed;
+  std::optional<double> tolerance;
   bool allow_unknown = false;
 };
 
@@ -50,9 +51,12 @@ std::int64_t steps_of(const GradcheckArguments& o, const ControlProgram& control
   return own < 0 ? kDefaultSteps : std::min(own, kDefaultSteps);
 }
 
-/// A check that compares nothing has failed.
-ExitCode exit_code(const GradientCheck& check) {
-  return check.entries() == 0 ? kSomeFailed : kDone;
+ExitCode exit_code(const GradientCheck& check) { return check.passed() ? kDone : kSomeFailed; }
+
+void set_comparison(const GradcheckArguments& o, CompareOptions& options) {
+  options.entries = o.entries.value_or(kDefaultEntries);
+  options.seed = o.seed.value_or(0);
+  options.tolerance = o.tolerance.value_or(options.tolerance);
 }
 
 /// Explains why nothing was compared, and what may help. `what`: the loss.
@@ -72,6 +76,18 @@ std::string nothing_compared(const GradientCheck& check, const char* what,
   return fmt::format("nothing could be compared with differences: {}; try {}", why, try_instead);
 }
 
+/// The input with the largest error, and what disagrees there.
+std::string worst_text(const GradientCheck& check) {
+  const auto error = [](const CheckedInput& c) {
+    return std::max(c.difference_error, c.tangent_error);
+  };
+  const CheckedInput& worst = *std::ranges::max_element(check.inputs, {}, error);
+  if (worst.tangent_error > worst.difference_error)
+    return fmt::format("the gradient by {} and the tangent along a direction disagree", worst.name);
+  return fmt::format("the gradient by {} and the difference at '{}' disagree", worst.name,
+                     worst.worst);
+}
+
 /// `what`: the loss. `try_instead`: advice if nothing can be compared.
 void print(const Console& console, const GradientCheck& check, const char* what,
            const char* try_instead) {
@@ -85,6 +101,7 @@ void print(const Console& console, const GradientCheck& check, const char* what,
   for (const CheckedInput& c : check.inputs)
     if (!c.influence)
       console.note(fmt::format("{} do not act on this loss; nothing is compared", c.name));
+  for (const std::string& reason : check.reasons) console.print(reason);
   if (check.entries() == 0) {
     console.fail(nothing_compared(check, what, try_instead));
     return;
@@ -93,6 +110,10 @@ void print(const Console& console, const GradientCheck& check, const char* what,
       fmt::format("largest error {:.1e} of a gradient's norm, {} derivatives compared with "
                   "differences, {} kinks",
                   check.max_relative_error(), check.entries(), check.kinks()));
+  if (!check.passed())
+    console.fail(fmt::format(
+        "the largest error, {:.1e} of a gradient's norm, exceeds {:g} (--tolerance): {}",
+        check.max_relative_error(), check.tolerance, worst_text(check)));
 }
 
 Json json_of(const GradientCheck& check) {
@@ -104,9 +125,9 @@ Json json_of(const GradientCheck& check) {
                       {"kinks", c.kinks},
                       {"influence", c.influence},
                       {"norm", c.norm},
-                      {"difference_error", c.difference_error},
+                      {"difference_error", finite(c.difference_error)},
                       {"worst", c.worst},
-                      {"tangent_error", c.tangent_error}});
+                      {"tangent_error", finite(c.tangent_error)}});
   return inputs;
 }
 
@@ -117,9 +138,12 @@ Json json_of_check(const GradientCheck& check, std::uint64_t seed, const Stepper
           {"loss", check.loss},
           {"seed", seed},
           {"integrator", to_string(stepper.integrator())},
-          {"max_relative_error", check.max_relative_error()},
+          {"passed", check.passed()},
+          {"tolerance", check.tolerance},
+          {"max_relative_error", finite(check.max_relative_error())},
           {"entries", check.entries()},
           {"kinks", check.kinks()},
+          {"reasons", check.reasons},
           {"inputs", json_of(check)}};
 }
 
@@ -142,8 +166,7 @@ int run_task(const GradcheckArguments& o, const Console& console, const Task& ta
   const TaskSpec& spec = task.spec();
   TaskCheckOptions options;
   options.actions = actions_of(o, spec);
-  options.entries = o.entries.value_or(kDefaultEntries);
-  options.seed = o.seed.value_or(0);
+  set_comparison(o, options);
   const Stepper stepper(task.model());
   options.stepper.tolerance = std::min(stepper.tolerance(), kTolerance);
   console.print(fmt::format("task {}: at most {} actions of {} steps of {:g} s, {}, policy {}",
@@ -178,8 +201,7 @@ int run(const GradcheckArguments& o, const Console& console) {
       make_controls(o.controls, o.seed.value_or(0), model, stepper, console);
   CheckOptions options;
   options.steps = steps_of(o, controls);
-  options.entries = o.entries.value_or(kDefaultEntries);
-  options.seed = o.seed.value_or(0);
+  set_comparison(o, options);
   options.stepper.tolerance = std::min(stepper.tolerance(), kTolerance);
   const LossKind kind = loss_of(o.loss, model);
   RolloutOptions rollout;
@@ -234,6 +256,8 @@ Command add_gradcheck(CLI::App& program) {
   add_whole_number<int>(
       app, "--entries", o.entries, 0, std::numeric_limits<int>::max(),
       "Derivatives of each input to compare with differences; 0: all [default: 24]");
+  add_positive_number(app, "--tolerance", o.tolerance,
+                      "Largest error of a check that passes, of a gradient's norm [default: 1e-4]");
   add_controls_option(app, o.controls);
   add_whole_number<std::uint64_t>(
       app, "--seed", o.seed, 0, std::numeric_limits<std::uint64_t>::max(),

@@ -31,6 +31,7 @@ struct IdentifyArguments {
   std::optional<std::int64_t> environment, steps;
   std::optional<double> noise;
   std::optional<std::uint64_t> seed;
+  std::optional<int> starts;
   bool overwrite = false, allow_unknown = false;
 };
 
@@ -38,8 +39,8 @@ void check_arguments(const IdentifyArguments& a) {
   if (a.numbers.empty())
     throw InputError("--number is missing; expected the name of a number, as often as wanted");
   const bool trial = a.recording.empty();
-  if (!trial && (a.noise || a.seed || a.steps))
-    throw InputError("--noise, --seed or --steps with a recording; expected them without one");
+  if (!trial && (a.seed || a.steps))
+    throw InputError("--seed or --steps with a recording; expected them without one");
   if (trial && a.environment) throw InputError("--env without a recording");
   check_outputs(a.svg, "", {a.scene, a.recording});
 }
@@ -134,6 +135,7 @@ int identify_numbers(const IdentifyArguments& a, const Console& console) {
                   0, interval_of(model)};
   IdentificationOptions options;
   options.numbers = a.numbers;
+  options.starts = a.starts.value_or(options.starts);
   IdentifyReport report{scene, a.numbers, {}, {}, 0, {}};
   Scene start = scene;
   if (a.recording.empty()) {
@@ -149,6 +151,7 @@ int identify_numbers(const IdentifyArguments& a, const Console& console) {
     controls.check_covers(run.steps);
   }
   report.peak = peak_of(report.recorded);
+  options.noise = a.noise.value_or(a.recording.empty() ? kNoise : 0) * report.peak;
   TextOutput picture(a.svg, a.overwrite);
   report.fit = identify(start, run, report.recorded, options);
   console.print(
@@ -160,7 +163,7 @@ int identify_numbers(const IdentifyArguments& a, const Console& console) {
     const Scene found = with_numbers(scene, a.numbers, report.fit.values());
     picture.write(draw(report, simulate_fields(found, run), model.timestep()), console);
   }
-  return report.fit.converged ? kDone : kSomeFailed;
+  return exit_code(report);
 }
 
 }  // namespace
@@ -184,8 +187,12 @@ Command add_identify(CLI::App& program) {
   add_text(app, "--controls", a.controls, "U.csv",
            "Controls of the recorded run in place of the scene's");
   add_steps_option(app, a.steps, "Steps of a trial [default: as long as the controls]");
-  add_positive_number(app, "--noise", a.noise,
-                      "Of a trial: deviation of the noise over the fields' peak [default: 0.01]");
+  add_positive_number(
+      app, "--noise", a.noise,
+      "Deviation of the noise over the fields' peak [default: of a trial 0.01; of a "
+      "recording not known]");
+  add_whole_number<int>(app, "--starts", a.starts, 1, 1000,
+                        "Most starts, tried while a fit is not sure [default: 6]");
   add_whole_number<std::uint64_t>(app, "--seed", a.seed, 0, 1000000,
                                   "Of a trial: seed of the noise and of the start [default: 1]");
   add_text(app, "--svg", a.svg, "F.svg", "Write a picture of the fit");

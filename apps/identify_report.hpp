@@ -22,6 +22,10 @@ struct IdentifyReport {
   Identification fit;
 };
 
+/// A fit that has not come to an end, whose numbers cannot be told apart or that leaves more than
+/// noise has failed.
+ExitCode exit_code(const IdentifyReport& report);
+
 /// Prints the numbers, their deviations and what is left of the fields, and the JSON object.
 void print(const Console& console, const IdentifyReport& report);
 

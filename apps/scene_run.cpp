@@ -12,6 +12,7 @@
 #include "engine/sense/start_overlaps.hpp"
 #include "io/files/csv.hpp"
 #include "io/scene/scene_reader.hpp"
+#include "tasks/accuracy/measured_order.hpp"
 #include "tasks/run/costly_steps.hpp"
 
 namespace tangere::apps {
@@ -118,8 +119,19 @@ void warn_of_geometry(const Console& console, const Model& model) {
     for (const std::string& line : lines) console.note("warning: " + line);
 }
 
-void warn_of_touches(const Console& console, const Model& model, const Stepper& stepper) {
-  if (stepper.accuracy() > 0) return;
+void warn_of_steps(const Console& console, const Model& model, const Stepper& stepper) {
+  if (stepper.accuracy() > 0) {
+    std::string laws;
+    for (const std::string& law : first_order_laws(model.scene()))
+      laws += (laws.empty() ? "" : ", ") + law;
+    if (!laws.empty())
+      console.note(fmt::format(
+          "warning: accuracy {:g} may not be kept by {}: their errors can be of first order in a "
+          "part (ks, where points slip or land) or in the whole step of {:g} ms (timing), and no "
+          "estimate sees them; 'tangere accuracy' measures what is reached",
+          stepper.accuracy(), laws, 1e3 * stepper.timestep()));
+    return;
+  }
   for (const std::string& line : short_touches(model, stepper.integrator(), stepper.timestep()))
     console.note("warning: " + line);
 }

@@ -59,8 +59,9 @@ std::int64_t step_count(const std::optional<std::int64_t>& asked, const ControlP
 /// Warns of meshes whose grids are too coarse, and of bodies that start deep inside one another or
 /// too far away.
 void warn_of_geometry(const Console& console, const Model& model);
-/// Warns of contacts whose touches are too short for the steps.
-void warn_of_touches(const Console& console, const Model& model, const Stepper& stepper);
+/// Warns of contacts whose touches are too short for the steps; where steps are cut to keep an
+/// accuracy, of laws whose errors their estimate does not see.
+void warn_of_steps(const Console& console, const Model& model, const Stepper& stepper);
 /// Says on stderr that steps were costly, if they were, and returns it; null if not, or if steps
 /// were cut to keep an accuracy.
 Json note_costly_steps(const Console& console, Integrator integrator, double accuracy,

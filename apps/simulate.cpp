@@ -356,7 +356,7 @@ int simulate(const SimulateArguments& options, const Console& console, const Pro
   warn_of_geometry(console, model);
   if (options.gradients.wanted()) solver = for_gradients(model, solver);
   Stepper stepper(model, solver);
-  warn_of_touches(console, model, stepper);
+  warn_of_steps(console, model, stepper);
   const Start start(options, stepper);
   start.print(console, model, model.scene(), stepper);
   const ControlProgram controls =

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // The reference is SDIRK4, which is not among the schemes that are measured. Its step shrinks until
-// SDIRK2 agrees with it to a fortieth of the target, or until finer steps bring them no closer.
+// it is off by at most a fortieth of the target, or until finer steps make it no better. How far it
+// is off follows from SDIRK2 at the same step and from its own coarser steps: what all schemes share
+// at one step shows in the second alone.
 #include "tasks/accuracy/accuracy_sweep.hpp"
 
 #include <algorithm>
@@ -11,6 +13,7 @@
 
 #include "engine/base/as_size.hpp"
 #include "engine/step/stepper.hpp"
+#include "tasks/accuracy/measured_order.hpp"
 #include "tasks/accuracy/quantiles.hpp"
 
 namespace tangere {
@@ -67,6 +70,7 @@ class Sweep {
     if (!report_.resolved) look_for_vibration();
     if (report_.reference.environments == 0) return std::move(report_);  // the reference failed
     if (!measure_points() || !look_again()) return stop();
+    measure_orders();
     choose();
     if (!measure_own() || !measure_tolerances() || !measure_pitches()) return stop();
     return std::move(report_);
@@ -87,11 +91,15 @@ class Sweep {
       const AccuracyOutcome made = run_->make_reference(setting, listener_.go_on);
       // An unfinished reference is worth nothing. What came before was judged too coarse.
       if (made.stopped) return false;
-      setting.integrator = Integrator::second_reference;
-      const AccuracyOutcome other = run_->compare(setting, listener_.go_on);
-      if (other.stopped) return false;
-      setting.integrator = Integrator::reference;
-      describe_reference(setting, made, other);
+      std::array<AccuracyOutcome, 3> others;  // SDIRK2; itself with twice and four times the step
+      for (std::size_t k = 0; k < others.size(); ++k) {
+        const int divisor = k == 0 ? 1 : 1 << k;
+        others[k] = run_->compare({k == 0 ? Integrator::second_reference : Integrator::reference,
+                                   setting.parts / divisor, kReferenceTolerance},
+                                  listener_.go_on);
+        if (others[k].stopped) return false;
+      }
+      describe_reference(setting, made, others);
       if (report_.reference.environments == 0 && made.failures.empty())
         throw InputError(options_.quantity == AccuracyQuantity::tactile
                              ? "nothing to compare: every field stays zero in every environment"
@@ -108,18 +116,27 @@ class Sweep {
   }
 
   void describe_reference(const AccuracySetting& setting, const AccuracyOutcome& made,
-                          const AccuracyOutcome& other) {
-    errors_of_environments_ = other.error[0];
+                          const std::array<AccuracyOutcome, 3>& others) {
+    errors_of_environments_ = others[0].error[0];
     const auto compared =
         std::ranges::count_if(errors_of_environments_, [](double x) { return !std::isnan(x); });
-    const AccuracyOutcome& worse = made.failures.size() >= other.failures.size() ? made : other;
-    const double error = quantile(errors_of_environments_, 0.95);
-    report_.reference = {setting,
-                         episodes_.interval() / setting.parts,
-                         std::isnan(error) ? HUGE_VAL : error,
-                         static_cast<int>(compared),
-                         static_cast<int>(worse.failures.size()),
-                         status_of(worse, episodes_.start.environments())};
+    const AccuracyOutcome& worse =
+        made.failures.size() >= others[0].failures.size() ? made : others[0];
+    const auto distance = [](const AccuracyOutcome& other) {
+      const double found = quantile(other.error[0], 0.95);
+      return std::isnan(found) ? HUGE_VAL : found;
+    };
+    AccuracyReference& r = report_.reference;
+    r.setting = setting;
+    r.step = episodes_.interval() / setting.parts;
+    r.scheme_distance = distance(others[0]);
+    r.step_distance = distance(others[1]);
+    const RichardsonEstimate itself = richardson(r.step_distance, distance(others[2]));
+    r.order = itself.order;
+    r.error = std::max(r.scheme_distance, itself.error);
+    r.environments = static_cast<int>(compared);
+    r.failed = static_cast<int>(worse.failures.size());
+    r.status = status_of(worse, episodes_.start.environments());
   }
 
   /// Looks where the reference is as wrong as in the middle of the environments.
@@ -225,6 +242,24 @@ class Sweep {
     return measure_cut_steps();
   }
 
+  void measure_orders() {
+    for (const Integrator integrator : integrators()) {
+      const AccuracyPoint *coarse = nullptr, *fine = nullptr;
+      for (const AccuracyPoint& p : report_.points) {  // ever finer
+        // Errors near the reference's own say nothing, unless coarser steps share the most of them.
+        const bool clear = !p.blurred || report_.reference.shares_errors();
+        if (p.setting.integrator != integrator || p.setting.accuracy > 0 || !clear ||
+            p.precision != Precision::f64 || !std::isfinite(p.median) || !(p.median > 0))
+          continue;
+        coarse = std::exchange(fine, &p);
+      }
+      if (coarse == nullptr) continue;
+      report_.orders.push_back(
+          {integrator, coarse->step, fine->step,
+           std::log(coarse->median / fine->median) / std::log(coarse->step / fine->step)});
+    }
+  }
+
   /// Steps as long as the controls allow, cut into parts that keep an accuracy.
   bool measure_cut_steps() {
     const auto parts = std::ranges::find_if(kParts, [&](int n) { return episodes_.can_cut(n); });
@@ -249,8 +284,7 @@ class Sweep {
     for (std::size_t i = 0; i < report_.points.size(); i += precisions()) {
       double fastest = 0;
       for (const AccuracyPoint& p : std::span(report_.points).subspan(i, precisions()))
-        if (p.error <= options_.target && p.bound > options_.target)
-          fastest = std::max(fastest, p.rate);
+        if (meets_target(p.error) && !meets_target(p.bound)) fastest = std::max(fastest, p.rate);
       if (fastest > kWorthALook * sure) by_rate.emplace_back(fastest, i);
     }
     std::ranges::sort(by_rate, std::greater<>());
@@ -306,10 +340,15 @@ class Sweep {
     return true;
   }
 
+  /// Whether an error does, however the reference's own adds to it.
+  [[nodiscard]] bool meets_target(double error) const {
+    return error + report_.reference.error <= options_.target;
+  }
+
   /// Whether it is sure to meet the target, and fails nowhere but where the reference does.
   [[nodiscard]] bool suffices(const AccuracyPoint& p) const {
     const bool again = p.errors.size() > as_size(episodes_.start.environments());
-    return p.bound <= options_.target &&
+    return meets_target(p.bound) &&
            p.failed <= report_.reference.failed + (again ? failed_again_ : 0);
   }
 

@@ -46,21 +46,41 @@ struct AccuracyPoint {
 
 struct AccuracyReference {
   AccuracySetting setting;
-  double step = 0;       ///< [s]
-  double error = 0;      ///< distance to SDIRK2 at the same step, in 95 % of the environments
+  double step = 0;  ///< [s]
+  /// Not exceeded in 95 % of the environments: the larger of the distance to SDIRK2 at the same step
+  /// and of what its distances to itself with twice and four times the step say (richardson()).
+  double error = 0;
+  double scheme_distance = 0, step_distance = 0;  ///< to SDIRK2, and to itself with twice the step
+  /// That its own steps have on these episodes (richardson()).
+  double order = 0;
   int environments = 0;  ///< of which the reference says something
   int failed = 0;        ///< environments in which the reference or SDIRK2 failed
   std::string status;    ///< "ok", or why
+
+  /// Whether all schemes share most of the error: another scheme at the same step is nearer than the
+  /// same one with twice the step.
+  [[nodiscard]] bool shares_errors() const { return step_distance > 2 * scheme_distance; }
+};
+
+/// The order that a scheme has on these episodes between its two finest steps, without those that
+/// are off by less than ten times the reference; with them where the reference shares their errors.
+struct SchemeOrder {
+  Integrator integrator = Integrator::usual;
+  double coarse = 0, fine = 0;  ///< those steps [s]
+  double order = 0;             ///< of the medians of the errors
 };
 
 struct AccuracyReport {
   AccuracyReference reference;
+  std::vector<SchemeOrder> orders;  ///< of the schemes that have two such steps
   /// Scheme by step by precision, then steps that are cut to keep an accuracy.
   std::vector<AccuracyPoint> points;
   std::vector<AccuracyPoint> tolerances;  ///< tolerances alone, at the setting of the advice
   std::vector<PitchSweep> pitches;        ///< of tactile fields: every sensor
   AccuracyPoint own;                      ///< the scene's setting: its scheme, step and tolerance
-  int advice = -1;  ///< index of the cheapest point whose bound meets the target; -1: none does
+  /// Index of the cheapest point whose bound and the reference's error together meet the target; -1:
+  /// none does.
+  int advice = -1;
   bool resolved = false;  ///< the reference is accurate enough to judge by
   Vibration vibration;    ///< where it is not
   bool stopped = false;

@@ -3,6 +3,8 @@
 // kink.
 #include "tasks/gradients/gradient_compare.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <numeric>
@@ -15,7 +17,8 @@
 namespace tangere {
 namespace {
 
-constexpr double kLargest = 1e-3;  // step size, times the input's scale
+constexpr double kLargest = 1e-3;      // step size, times the input's scale
+constexpr std::size_t kExplained = 2;  // kinks of an input
 constexpr double kNoInfluence =
     1e-10;  // of the loss: an input has no influence if all its derivatives are smaller
 
@@ -37,6 +40,13 @@ std::vector<std::size_t> chosen(std::vector<std::size_t> all, std::size_t wanted
   all.resize(wanted);
   std::sort(all.begin(), all.end());
   return all;
+}
+
+/// Says at which change of an input two runs differ.
+std::vector<std::string> with_change(std::vector<std::string> texts, double change) {
+  for (std::string& text : texts)
+    text = fmt::format("changed by {:.1e} to both sides, {}", change, text);
+  return texts;
 }
 
 }  // namespace
@@ -87,17 +97,19 @@ CheckedInput compare(const Comparison& of, double loss, const CompareOptions& o,
   c.scale = std::max(c.norm, std::sqrt(square));
   if (!std::isfinite(c.norm)) c.difference_error = HUGE_VAL;
   c.influence = !(c.scale <= kNoInfluence * std::abs(loss));
+  std::size_t worst = 0;
   for (std::size_t k = 0; k < entries.size() && c.influence; ++k) {
     if (!(differences[k].doubt <= o.settled * c.scale)) {
-      ++c.kinks;
+      if (++c.kinks <= kExplained) c.to_explain.push_back(entries[k]);
       continue;
     }
     ++c.compared;
     const double error =
         finite_error(std::abs(differences[k].value - of.gradient[entries[k]]) / c.scale);
     if (error >= c.difference_error)
-      c.difference_error = error, c.worst = of.entry_name(entries[k]);
+      c.difference_error = error, c.worst = of.entry_name(entries[k]), worst = entries[k];
   }
+  if (c.compared > 0 && c.difference_error > o.tolerance) c.to_explain.push_back(worst);
   return c;
 }
 
@@ -153,7 +165,14 @@ std::size_t GradientCheck::kinks() const {
                          [](std::size_t n, const auto& c) { return n + c.kinks; });
 }
 
+void GradientChecker::explain() {
+  if (!reads_fields() || (out_.kinks() == 0 && out_.passed())) return;
+  const std::vector<std::string> flaws = sensors_without_derivative(model_);
+  out_.reasons.insert(out_.reasons.begin(), flaws.begin(), flaws.end());
+}
+
 void GradientChecker::check() {
+  out_.tolerance = options_.tolerance;
   if (!at_.u.empty()) check_controls();
   check_positions();
   check_velocities();
@@ -163,16 +182,26 @@ void GradientChecker::check() {
 void GradientChecker::add(const Comparison& c, std::uint32_t purpose,
                           const std::function<double(const std::vector<double>&)>& along) {
   out_.inputs.push_back(compare(c, out_.loss, options_, purpose));
+  for (const std::size_t entry : out_.inputs.back().to_explain) {
+    const std::vector<std::string> texts = c.decisions(entry);
+    for (const std::string& text : texts)
+      out_.reasons.push_back(fmt::format("{}, {}: {}", c.name, c.entry_name(entry), text));
+    if (texts.empty())
+      out_.reasons.push_back(
+          fmt::format("{}, {}: runs on both sides have the same contacts, limits and statuses; a "
+                      "point that begins to slip, a clip or a wrong derivative is left",
+                      c.name, c.entry_name(entry)));
+  }
   const std::vector<double> d = random_direction(c.gradient.size(), options_.seed, purpose);
   compare_along(out_.inputs.back(), c.gradient, d, along(d));
 }
 
 void GradientChecker::check_controls() {
+  const auto move = [](std::size_t i) { return [i](CheckInputs& x, double e) { x.u[i] += e; }; };
   add({u_name_, by_u_, all_of(by_u_.size()),
-       [&](std::size_t i) {
-         return difference(kControlScale, [i](CheckInputs& x, double e) { x.u[i] += e; });
-       },
-       [&](std::size_t i) { return control_name(i); }},
+       [&](std::size_t i) { return difference(kControlScale, move(i)); },
+       [&](std::size_t i) { return control_name(i); },
+       [&](std::size_t i) { return decisions(kControlScale, move(i)); }},
       0, [&](const std::vector<double>& d) {
         return along({d, {}, {}, {}});
       });
@@ -183,18 +212,19 @@ void GradientChecker::check_positions() {
     return [this, i](CheckInputs& x, double e) { displace(model_, x.q, static_cast<int>(i), e); };
   };
   add({"q", by_q_, all_of(by_q_.size()), [&](std::size_t i) { return difference(1, move(i)); },
-       [&](std::size_t i) { return std::string(model_.v_names()[i]); }},
+       [&](std::size_t i) { return std::string(model_.v_names()[i]); },
+       [&](std::size_t i) { return decisions(1, move(i)); }},
       1, [&](const std::vector<double>& d) {
         return along({{}, d, {}, {}});
       });
 }
 
 void GradientChecker::check_velocities() {
+  const auto move = [](std::size_t i) { return [i](CheckInputs& x, double e) { x.v[i] += e; }; };
   add({"v", by_v_, all_of(by_v_.size()),
-       [&](std::size_t i) {
-         return difference(kVelocityScale, [i](CheckInputs& x, double e) { x.v[i] += e; });
-       },
-       [&](std::size_t i) { return std::string(model_.v_names()[i]); }},
+       [&](std::size_t i) { return difference(kVelocityScale, move(i)); },
+       [&](std::size_t i) { return std::string(model_.v_names()[i]); },
+       [&](std::size_t i) { return decisions(kVelocityScale, move(i)); }},
       2, [&](const std::vector<double>& d) {
         return along({{}, {}, d, {}});
       });
@@ -203,15 +233,16 @@ void GradientChecker::check_velocities() {
 /// Takes relative changes of the environment's own values, because units differ.
 void GradientChecker::check_numbers() {
   const RelativeGradient r(parameters_, model_.scene(), varying_, by_numbers_);
-  const auto of_number = [&](std::size_t k) {
-    return difference_of_scene([&, k](Scene& scene, std::vector<double>& varying, double e) {
+  const auto move = [this](std::size_t k) {
+    return [this, k](Scene& scene, std::vector<double>& varying, double e) {
       const SceneNumber& number = parameters_.infos()[k].number;
       const int random = randomization_of(scene, number);
       (random < 0 ? number_in(scene, number) : varying[std::size_t(random)]) *= 1 + e;
-    });
+    };
   };
-  add({"numbers", r.gradient, r.given, of_number,
-       [&](std::size_t k) { return parameters_.infos()[k].name; }},
+  add({"numbers", r.gradient, r.given, [&](std::size_t k) { return difference_of_scene(move(k)); },
+       [&](std::size_t k) { return parameters_.infos()[k].name; },
+       [&](std::size_t k) { return decisions_of_scene(move(k)); }},
       3, [&](const std::vector<double>& d) {
         std::vector<double> rows(std::size_t(parameter_rows(model_)));
         parameters_.spread(r.change(d), batch(), 0, rows);
@@ -219,26 +250,53 @@ void GradientChecker::check_numbers() {
       });
 }
 
-Difference GradientChecker::difference(
-    double scale, const std::function<void(CheckInputs&, double)>& change) const {
+Difference GradientChecker::difference(double scale, const MoveInput& move) const {
+  return best_difference(values(nullptr, moved(scale, move), varying_, nullptr), scale);
+}
+
+std::vector<CheckInputs> GradientChecker::moved(double scale, const MoveInput& move) const {
   std::vector<CheckInputs> all;
   for (const double e : sweep(scale)) {
     all.push_back(at_);
-    change(all.back(), e);
+    move(all.back(), e);
   }
-  return best_difference(values(nullptr, all, varying_), scale);
+  return all;
 }
 
-Difference GradientChecker::difference_of_scene(
-    const std::function<void(Scene&, std::vector<double>&, double)>& change) const {
+Difference GradientChecker::difference_of_scene(const MoveScene& move) const {
   std::vector<double> found;
-  for (const double e : sweep(1)) {
-    Scene scene = model_.scene();
-    std::vector<double> varying = varying_;
-    change(scene, varying, e);
-    found.push_back(values(&scene, {at_}, varying)[0]);
-  }
+  for (const double e : sweep(1)) found.push_back(value_of_scene(move, e, nullptr));
   return best_difference(found, 1);
+}
+
+double GradientChecker::value_of_scene(const MoveScene& move, double e, RunTrace* trace) const {
+  Scene scene = model_.scene();
+  std::vector<double> varying = varying_;
+  move(scene, varying, e);
+  return values(&scene, {at_}, varying, trace)[0];
+}
+
+std::vector<std::string> GradientChecker::decisions(double scale, const MoveInput& move) const {
+  RunTrace trace(model_);
+  const auto changes = sweep(scale);
+  static_cast<void>(values(nullptr, moved(scale, move), varying_, &trace));
+  for (std::size_t k = changes.size(); k > 0; k -= 2)
+    if (std::vector<std::string> texts = trace.differences(int(k) - 2, trace, int(k) - 1);
+        !texts.empty())
+      return with_change(std::move(texts), changes[k - 2]);
+  return {};
+}
+
+std::vector<std::string> GradientChecker::decisions_of_scene(const MoveScene& move) const {
+  const auto changes = sweep(1);
+  for (std::size_t k = changes.size(); k > 0; k -= 2) {
+    RunTrace above(model_), below(model_);
+    static_cast<void>(value_of_scene(move, changes[k - 2], &above));
+    static_cast<void>(value_of_scene(move, changes[k - 1], &below));
+    if (std::vector<std::string> texts = above.differences(0, below, 0); !texts.empty())
+      return with_change(std::move(texts), changes[k - 2]);
+  }
+  return {};
 }
 
 }  // namespace tangere

@@ -11,6 +11,7 @@
 
 #include "engine/derivative/number_gradients.hpp"
 #include "engine/step/batch.hpp"
+#include "tasks/gradients/run_trace.hpp"
 
 namespace tangere {
 
@@ -26,9 +27,10 @@ struct CheckedInput {
   double scale =
       0;  ///< reference of the errors: that norm, or the norm of the differences if larger
   bool influence = true;  ///< false: all derivatives and differences are negligible, none compared
-  double difference_error = 0;  ///< largest among the compared entries
-  std::string worst;            ///< the entry of that error
-  double tangent_error = 0;     ///< |g·d - tangent|/(|g| |d|) along a random direction
+  double difference_error = 0;          ///< largest among the compared entries
+  std::string worst;                    ///< the entry of that error
+  std::vector<std::size_t> to_explain;  ///< the first entries at kinks; that error's if too large
+  double tangent_error = 0;             ///< |g·d - tangent|/(|g| |d|) along a random direction
 };
 
 /// Number of step sizes of a sweep. Each is a quarter of the one before and is taken in both
@@ -52,6 +54,7 @@ struct CompareOptions {
   std::uint64_t seed = 0;  ///< for that draw and the directions
   double settled =
       3e-6;  ///< agreement of neighbouring step sizes, of the gradient's norm; else a kink
+  double tolerance = 1e-4;  ///< largest error of a check that passes, of a gradient's norm
 };
 
 /// One input to compare.
@@ -61,6 +64,8 @@ struct Comparison {
   std::vector<std::size_t> among;                     ///< entries that can be moved
   std::function<Difference(std::size_t)> difference;  ///< by entry
   std::function<std::string(std::size_t)> entry_name;
+  /// What runs on both sides of the input decide differently, in sentences.
+  std::function<std::vector<std::string>(std::size_t)> decisions;
 };
 /// `loss`: reference for the influence of the input. `purpose`: key for the draw of entries.
 CheckedInput compare(const Comparison& c, double loss, const CompareOptions& options,
@@ -84,6 +89,11 @@ struct RelativeGradient {
 struct GradientCheck {
   double loss = 0;
   std::vector<CheckedInput> inputs;
+  double tolerance = 0;  ///< that of the options
+  /// Sentences on why derivatives may not exist: at kinks, and where an error exceeds the tolerance.
+  std::vector<std::string> reasons;
+  /// Whether something was compared, and no error exceeds the tolerance.
+  [[nodiscard]] bool passed() const { return entries() > 0 && max_relative_error() <= tolerance; }
   [[nodiscard]] double max_relative_error() const;
   [[nodiscard]] std::size_t entries() const;  ///< that are compared
   [[nodiscard]] std::size_t kinks() const;
@@ -112,6 +122,8 @@ class GradientChecker {
   /// Checks by controls or actions, if there are any, by the first state and by the scene's
   /// numbers.
   void check();
+  /// Adds the flaws of sensors to the reasons, where there is something to explain.
+  void explain();
   [[nodiscard]] const GradientCheck& result() const { return out_; }
 
  protected:
@@ -120,14 +132,17 @@ class GradientChecker {
 
   /// Returns the function's value for each of `inputs`, all in one batch; NaN where a step finds no
   /// solution. Uses the scene `other`, or the unchanged scene if that is null. `varying`: values of
-  /// what the scene randomises, in its order.
+  /// what the scene randomises, in its order. Adds the states of the runs to `trace`, if any.
   [[nodiscard]] virtual std::vector<double> values(const Scene* other,
                                                    const std::vector<CheckInputs>& inputs,
-                                                   const std::vector<double>& varying) const = 0;
+                                                   const std::vector<double>& varying,
+                                                   RunTrace* trace) const = 0;
   [[nodiscard]] virtual double along(const InputDirection& direction) = 0;
   /// The batch whose environment 0 has the scene's numbers to change.
   [[nodiscard]] virtual const Batch& batch() const = 0;
   [[nodiscard]] virtual std::string control_name(std::size_t entry) const = 0;
+  /// Whether the function reads tactile fields.
+  [[nodiscard]] virtual bool reads_fields() const = 0;
 
   /// `along`: the derivative along a direction, computed another way.
   void add(const Comparison& c, std::uint32_t purpose,
@@ -136,12 +151,15 @@ class GradientChecker {
   void check_positions();
   void check_velocities();
   void check_numbers();
-  /// change(inputs, e) moves one entry of the inputs by e.
-  [[nodiscard]] Difference difference(
-      double scale, const std::function<void(CheckInputs&, double)>& change) const;
-  /// change(scene, varying, e) changes numbers of the scene by the relative amount e.
-  [[nodiscard]] Difference difference_of_scene(
-      const std::function<void(Scene&, std::vector<double>&, double)>& change) const;
+  /// Moves one entry of the inputs by e.
+  using MoveInput = std::function<void(CheckInputs&, double e)>;
+  /// Changes numbers of the scene by the relative amount e.
+  using MoveScene = std::function<void(Scene&, std::vector<double>& varying, double e)>;
+  [[nodiscard]] Difference difference(double scale, const MoveInput& move) const;
+  [[nodiscard]] Difference difference_of_scene(const MoveScene& move) const;
+  /// What the runs on both sides decide differently at the smallest change at which they do.
+  [[nodiscard]] std::vector<std::string> decisions(double scale, const MoveInput& move) const;
+  [[nodiscard]] std::vector<std::string> decisions_of_scene(const MoveScene& move) const;
 
   const Model model_;
   const CompareOptions options_;
@@ -151,6 +169,11 @@ class GradientChecker {
   std::vector<double> by_u_, by_q_, by_v_, by_numbers_;  // the gradient
   const char* u_name_ = "u";
   GradientCheck out_;
+
+ private:
+  /// The inputs after each change of sweep(scale).
+  [[nodiscard]] std::vector<CheckInputs> moved(double scale, const MoveInput& move) const;
+  [[nodiscard]] double value_of_scene(const MoveScene& move, double e, RunTrace* trace) const;
 };
 
 std::vector<std::size_t> all_of(std::size_t count);

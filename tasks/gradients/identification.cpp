@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 
 #include "engine/derivative/number_gradients.hpp"
 #include "engine/model/random.hpp"
@@ -25,6 +26,11 @@ constexpr double kDifference =
     1e-6;  // of logarithms; small, so that few points start to touch or slip within it
 constexpr double kRounding = 1e-8;  // of logarithms
 constexpr double kLongest = 1.5;    // of logarithms in one step, because the model is linear
+constexpr double kFarthest = 4;     // factor of other starts
+/// Of the squared change of normalised fields along the weakest direction: differences err by 1e-4.
+constexpr double kWeakest = 1e-8;
+constexpr double kNew = 1e-3;   // share of a column that the sought numbers must not have
+constexpr double kShare = 0.1;  // of a number in that direction
 
 std::size_t numbers_of_fields(const Model& model) {
   std::size_t n = 0;
@@ -119,7 +125,33 @@ class Problem {
     }
     return J;
   }
+  /// Returns ∂ fields / ∂ log of another number of the scene; none where a rollout fails.
+  [[nodiscard]] std::optional<Vector> column(const Vector& x, const NumberInfo& number) const {
+    const Scene scene = at(x);
+    const auto moved = [&](double change) {
+      const double value = number.value * std::exp(change);
+      return flat(simulate_fields(with_numbers(scene, {&number.name, 1}, {&value, 1}), run_));
+    };
+    try {
+      return (moved(kDifference) - moved(-kDifference)) / (2 * kDifference);
+    } catch (const InputError&) {
+      return std::nullopt;
+    }
+  }
+  /// The numbers of the scene that are not sought and not 0.
+  [[nodiscard]] std::vector<NumberInfo> others() const {
+    const NumberGradients parameters{Model(scene_)};
+    std::vector<NumberInfo> out;
+    for (const NumberInfo& info : parameters.infos())
+      if (info.value != 0 && std::ranges::find(names_, info.name) == names_.end())
+        out.push_back(info);
+    return out;
+  }
   [[nodiscard]] Vector residuals(const Vector& x) const { return fields(x) - flat(recorded_); }
+  [[nodiscard]] ResidualTest test(const Vector& x, double noise) const {
+    const Scene scene = at(x);
+    return test_residuals(Model(scene), simulate_fields(scene, run_), recorded_, noise);
+  }
 
  private:
   [[nodiscard]] Scene at(const Vector& x) const {
@@ -164,20 +196,136 @@ FitPoint fit_point(const Vector& x, const Problem::Value& value) {
   return p;
 }
 
-/// How well the numbers are known at the end of a fit.
-void judge(const Problem& problem, double misfit, const Matrix& J, Identification& out) {
-  const Eigen::Index n = problem.count();
-  out.noise = std::sqrt(2 * misfit / static_cast<double>(J.rows() - n));
+/// A fit from one start.
+struct Fit {
+  Vector x;
+  Matrix J;
+  std::vector<FitPoint> points;
+  bool converged = false;
+};
+
+Fit fit_from(const Problem& problem, const Vector& start, Problem::Value now, Matrix J,
+             const IdentificationOptions& options) {
+  Fit fit{start, std::move(J), {fit_point(start, now)}};
+  double damping = 1e-2;
+  for (int iteration = 0; iteration < options.max_iterations && !fit.converged; ++iteration) {
+    Matrix H = information(fit.J);
+    H.diagonal() *= 1 + damping;
+    Vector step = H.ldlt().solve(-now.gradient);
+    step *= std::min(1.0, kLongest / step.lpNorm<Eigen::Infinity>());
+    const Problem::Value next = problem.evaluate(fit.x + step);
+    fit.converged =
+        is_end(now.misfit - next.misfit, now.misfit, fit.J.rows(), options.tolerance, step);
+    if (!(next.misfit < now.misfit)) {
+      damping *= 8;
+      continue;
+    }
+    damping /= 8;
+    fit.x += step;
+    now = next;
+    fit.points.push_back(fit_point(fit.x, now));
+    fit.J = problem.jacobian(fit.x);
+  }
+  return fit;
+}
+
+/// The same; none where a rollout fails, or one on the way does not depend on a number.
+std::optional<Fit> try_from(const Problem& problem, const Vector& start,
+                            const IdentificationOptions& options) {
+  try {
+    const Problem::Value value = problem.evaluate(start);
+    if (!std::isfinite(value.misfit)) return std::nullopt;
+    return fit_from(problem, start, value, problem.jacobian(start), options);
+  } catch (const InputError&) {
+    return std::nullopt;
+  }
+}
+
+Vector start_of(const Problem& problem, int fit, std::uint64_t seed) {
+  Vector x = problem.start();
+  for (Eigen::Index k = 0; k < x.size() && fit > 0; ++k)
+    x[k] += std::log(log_uniform({seed, 1, fit, Purpose::tactile, static_cast<std::uint32_t>(k)},
+                                 1 / kFarthest, kFarthest));
+  return x;
+}
+
+/// Appends the numbers with a share in the first of `modes`, the weakest direction.
+void add_weakest(const Eigen::SelfAdjointEigenSolver<Matrix>& modes, std::vector<int>& to) {
+  for (Eigen::Index k = 0; k < modes.eigenvalues().size(); ++k)
+    if (std::abs(modes.eigenvectors()(k, 0)) > kShare) to.push_back(static_cast<int>(k));
+}
+
+/// Fills in what follows from the information F: how well the numbers are known.
+void judge_information(const Matrix& F, const Matrix& J, Identification& out) {
+  const Eigen::Index n = F.cols();
+  const Eigen::SelfAdjointEigenSolver<Matrix> modes(F);
+  // Smaller eigenvalues are rounding errors of the largest.
+  const double least = std::numeric_limits<double>::epsilon() * modes.eigenvalues()[n - 1];
+  const Vector known = modes.eigenvalues().cwiseMax(least);
+  out.condition = known[n - 1] / known[0];
+  const Matrix V = modes.eigenvectors();
+  const Matrix W = V * known.cwiseInverse().asDiagonal();
+  const Matrix C = W.lazyProduct(V.transpose());
+  for (Eigen::Index k = 0; k < n; ++k) out.deviation.push_back(std::sqrt(C(k, k)));
+  for (Eigen::Index k = 0; k < n; ++k)
+    for (Eigen::Index j = 0; j < n; ++j)
+      out.correlation.push_back(C(k, j) / std::sqrt(C(k, k) * C(j, j)));
+  if (modes.eigenvalues()[0] <= least) {
+    add_weakest(modes, out.inseparable);
+    for (const int k : out.inseparable) out.deviation[std::size_t(k)] = HUGE_VAL;
+  }
+  Matrix scaled = J;
+  scaled.colwise().normalize();
+  const Eigen::SelfAdjointEigenSolver<Matrix> scaled_modes(information(scaled));
+  if (scaled_modes.eigenvalues()[0] < kWeakest) add_weakest(scaled_modes, out.inseparable);
+  for (Eigen::Index k = 0; k < n; ++k)
+    if (!(out.deviation[std::size_t(k)] <= Identification::kMostDeviation))
+      out.inseparable.push_back(static_cast<int>(k));
+  std::sort(out.inseparable.begin(), out.inseparable.end());
+  out.inseparable.erase(std::unique(out.inseparable.begin(), out.inseparable.end()),
+                        out.inseparable.end());
+}
+
+/// Judges the end of a fit.
+void judge(const Problem& problem, const Fit& fit, double stated_noise, Identification& out) {
+  const Matrix& J = fit.J;
+  out.points = fit.points;
+  out.converged = fit.converged;
+  out.noise =
+      std::sqrt(2 * fit.points.back().misfit / static_cast<double>(J.rows() - problem.count()));
+  out.residual = problem.test(fit.x, stated_noise);
   // A perfect fit has no scale: the information is then that of unit noise.
   const double scale = out.noise > 0 ? 1 / (out.noise * out.noise) : 1;
   const Matrix F = scale * information(J);
-  const Eigen::SelfAdjointEigenSolver<Matrix> modes(F);
-  out.condition = modes.eigenvalues().maxCoeff() / modes.eigenvalues().minCoeff();
-  for (Eigen::Index k = 0; k < n; ++k)  // diagonal of F⁻¹
-    out.deviation.push_back(std::sqrt(
-        (modes.eigenvectors().row(k).transpose().array().square() / modes.eigenvalues().array())
-            .sum()));
   out.information.assign(F.data(), F.data() + F.size());
+  judge_information(F, J, out);
+}
+
+/// Finds the number that was not sought and whose change would make up best for what is left.
+void find_suspect(const Problem& problem, Identification& out) {
+  ResidualTest& test = out.residual;
+  if (!test.tested) return;
+  const Vector x = Eigen::Map<const Vector>(out.values().data(), problem.count()).array().log();
+  const Matrix J = problem.jacobian(x);
+  const Vector r = problem.residuals(x);
+  const Eigen::LDLT<Matrix> F = information(J).ldlt();
+  double missed = 0;
+  for (const NumberInfo& number : problem.others()) {
+    const std::optional<Vector> column = problem.column(x, number);
+    if (!column) continue;
+    const Vector along = F.solve(J.transpose().lazyProduct(*column));
+    const Vector across = *column - J.lazyProduct(along);
+    const double size = across.norm();
+    if (!(size > kNew * column->norm())) continue;
+    const double score = -across.dot(r) / (out.noise * size);
+    if (std::abs(score) <= std::abs(test.suspect_score)) continue;
+    test.suspect = number.name;
+    test.suspect_score = score;
+    test.suspect_change = score * out.noise / size;
+    missed = score * column->norm() / size;
+  }
+  test.excess = std::max(test.excess, missed * missed);
+  test.score = std::max(test.score, std::abs(test.suspect_score));
 }
 
 }  // namespace
@@ -299,35 +447,41 @@ Identification identify(const Scene& scene, const RecordedRun& run, const FieldS
         fmt::format("a recording of {} readings, one every {} steps; expected {}, one every {}",
                     recorded.readings.size(), recorded.every, run.steps / run.every, run.every));
   const Problem problem(scene, run, recorded, options.numbers);
-  Vector x = problem.start();
-  Problem::Value now = problem.evaluate(x);
-  if (!std::isfinite(now.misfit))
+  const Vector x = problem.start();
+  const Problem::Value value = problem.evaluate(x);
+  if (!std::isfinite(value.misfit))
     throw InputError(scene.path + ": the rollout fails at the start of the fit");
-  Matrix J = problem.jacobian(x);
-  Identification out;
-  out.points.push_back(fit_point(x, now));
+  const Matrix J = problem.jacobian(x);
   const Vector by_differences = J.transpose().lazyProduct(problem.residuals(x));
-  out.gradient_difference = (now.gradient - by_differences).norm() / by_differences.norm();
-  double damping = 1e-2;
-  for (int iteration = 0; iteration < options.max_iterations && !out.converged; ++iteration) {
-    Matrix H = information(J);
-    H.diagonal() *= 1 + damping;
-    Vector step = H.ldlt().solve(-now.gradient);
-    step *= std::min(1.0, kLongest / step.lpNorm<Eigen::Infinity>());
-    const Problem::Value next = problem.evaluate(x + step);
-    out.converged = is_end(now.misfit - next.misfit, now.misfit, J.rows(), options.tolerance, step);
-    if (!(next.misfit < now.misfit)) {
-      damping *= 8;
-      continue;
-    }
-    damping /= 8;
-    x += step;
-    now = next;
-    out.points.push_back(fit_point(x, now));
-    J = problem.jacobian(x);
+  Identification best;
+  std::vector<FitEnds> fits;
+  for (int k = 0; k < options.starts; ++k) {
+    const Vector from = start_of(problem, k, options.seed);
+    const std::optional<Fit> fit = try_from(problem, from, options);
+    const Vector values = from.array().exp();
+    FitEnds& ends = fits.emplace_back();
+    ends.start.assign(values.begin(), values.end());
+    ends.misfit = HUGE_VAL;
+    if (!fit) continue;
+    ends.end = fit->points.back().values;
+    ends.misfit = fit->points.back().misfit;
+    ends.converged = fit->converged;
+    if (!best.points.empty() && !(ends.misfit < best.points.back().misfit)) continue;
+    best = {};
+    judge(problem, *fit, options.noise, best);
+    if (best.passed()) break;
   }
-  judge(problem, now.misfit, J, out);
-  return out;
+  if (best.points.empty())
+    throw InputError(
+        fmt::format("{}: none of {} starts leads to an end, because rollouts fail on "
+                    "the way or show nothing; expected a better guess",
+                    scene.path, fits.size()));
+  find_suspect(problem, best);
+  if (!best.residual.is_noise())
+    for (double& deviation : best.deviation) deviation *= std::sqrt(1 + best.residual.excess);
+  best.gradient_difference = (value.gradient - by_differences).norm() / by_differences.norm();
+  best.fits = std::move(fits);
+  return best;
 }
 
 }  // namespace tangere

@@ -9,16 +9,11 @@
 #include <vector>
 
 #include "engine/model/model.hpp"
+#include "tasks/gradients/field_sequence.hpp"
 #include "tasks/gradients/gradients.hpp"
+#include "tasks/gradients/residual_test.hpp"
 
 namespace tangere {
-
-/// Fields of every sensor in turn, each (points, 3) [N]. readings[k] follows step
-/// (k + 1) `every`.
-struct FieldSequence {
-  std::int64_t every = 1;
-  std::vector<std::vector<double>> readings;
-};
 
 /// Returns the values of a scene's numbers by their names ("tactile pad kn"), and the scene with
 /// other values. Both throw InputError for a name that the scene does not have.
@@ -63,6 +58,11 @@ struct IdentificationOptions {
       numbers;              ///< sought numbers by name_of(); positive, fitted as logarithms
   int max_iterations = 60;  ///< rollouts with gradients, rejected steps included
   double tolerance = 1e-2;  ///< ends at a step worth this many standard deviations
+  /// Most fits. One begins at the scene's values. Others begin at these times random factors of ¼
+  /// to 4, until what a fit leaves is noise and its numbers can be told apart.
+  int starts = 6;
+  std::uint64_t seed = 1;  ///< of the factors
+  double noise = 0;        ///< stated standard deviation of a recorded number [N]; 0: not stated
 };
 
 /// One accepted point of the fit.
@@ -72,21 +72,43 @@ struct FitPoint {
   double gradient = 0;  ///< |∂ misfit / ∂ logarithms| [N²]
 };
 
+/// Where a fit began and ended.
+struct FitEnds {
+  std::vector<double> start, end;  ///< values of the numbers
+  double misfit = 0;               ///< at the end [N²]; infinite where a rollout failed
+  bool converged = false;
+};
+
+/// The fit with the smallest misfit.
 struct Identification {
   std::vector<FitPoint> points;  ///< the start first
   bool converged = false;
-  double noise = 0;                 ///< standard deviation of a residual at the end [N]
-  std::vector<double> deviation;    ///< of the logarithms, from the inverse of the information
+  double noise = 0;  ///< standard deviation of a residual at the end [N]
+  /// Of the logarithms, from the inverse of the information. Where what is left is not noise, times
+  /// √(1 + residual.excess): as far as numbers are off if the part of the model's error that they
+  /// have taken up is as large as the part that is left. Infinite where nothing bounds it.
+  std::vector<double> deviation;
   std::vector<double> information;  ///< (n, n) Fisher: JᵀJ / noise², J by logarithms
-  double condition = 0;             ///< its largest eigenvalue over its smallest
+  std::vector<double> correlation;  ///< (n, n) of the estimates
+  double condition = 0;  ///< largest eigenvalue of the information over the smallest, at most 1/ε
+  /// Indices of numbers that the fields do not tell apart, or do not show: those of the weakest
+  /// direction if it is no direction at all, and those whose deviation exceeds kMostDeviation.
+  std::vector<int> inseparable;
   double gradient_difference =
       0;  ///< at the start, |adjoint − Jᵀr| / |Jᵀr|; J from central differences
+  ResidualTest residual;
+  std::vector<FitEnds> fits;  ///< all of them, in their order
 
+  static constexpr double kMostDeviation = 0.5;
   [[nodiscard]] const std::vector<double>& values() const { return points.back().values; }
+  /// Whether it came to an end, with numbers that can be told apart, and left noise.
+  [[nodiscard]] bool passed() const {
+    return converged && inseparable.empty() && residual.is_noise();
+  }
 };
 
-/// Fits by Levenberg-Marquardt in logarithms, from the values in `scene`. The gradient comes from
-/// rollout_gradients, JᵀJ from one central difference of the whole sequence per number. Throws
+/// Fits by Levenberg-Marquardt in logarithms. The gradient comes from rollout_gradients, JᵀJ from
+/// one central difference of the whole sequence per number. Throws
 /// InputError for a name that is not a number of the scene, a value that is not positive, a number
 /// that no field depends on, a recording that does not fit the run, and a start whose rollout
 /// fails.

@@ -64,7 +64,7 @@ class Look {
 /// solution.
 std::vector<double> losses_of(const Setting& s, const Model& model,
                               const std::vector<CheckInputs>& inputs,
-                              const std::vector<double>& varying) {
+                              const std::vector<double>& varying, RunTrace* trace) {
   const auto nu = std::size_t(model.nu());
   Batch batch(model, static_cast<int>(inputs.size()), s.start.seed(), s.start.episode(0));
   for (int e = 0; e < batch.environments(); ++e) {
@@ -85,6 +85,7 @@ std::vector<double> losses_of(const Setting& s, const Model& model,
       sums[e] += look.at(s, batch, static_cast<int>(e), t, own);
       std::copy(own.begin(), own.end(), u.begin() + std::ptrdiff_t(e * nu));
     }
+    if (trace != nullptr) trace->add(batch);
     if (t < s.options.steps) stepper.step(batch, u);
   }
   for (std::size_t e = 0; e < inputs.size(); ++e)
@@ -296,12 +297,14 @@ class LossChecker : public GradientChecker {
       gradient.push_back(std::inner_product(
           c.own.begin(), c.own.end(),
           all.begin() + first_tactile_point(model_, c.sensor) * kPointNumbers, 0.0));
+    const auto move = [&](std::size_t k) { return move_points(changes[k], coefficients); };
     add({"points", gradient, all_of(gradient.size()),
-         [&](std::size_t k) { return difference_of_points(changes[k], coefficients); },
+         [&](std::size_t k) { return difference_of_scene(move(k)); },
          [&](std::size_t k) {
            return model_.sensors()[std::size_t(changes[k].sensor)].name + " " +
                   point_number_name(changes[k].number);
-         }},
+         },
+         [&](std::size_t k) { return decisions_of_scene(move(k)); }},
         4, [&](const std::vector<double>& d) {
           return tangents_.along({}, together(model_, changes, d));
         });
@@ -310,8 +313,13 @@ class LossChecker : public GradientChecker {
  private:
   [[nodiscard]] std::vector<double> values(const Scene* other,
                                            const std::vector<CheckInputs>& inputs,
-                                           const std::vector<double>& varying) const override {
-    return losses_of(s_, other != nullptr ? Model(*other) : s_.start.model(), inputs, varying);
+                                           const std::vector<double>& varying,
+                                           RunTrace* trace) const override {
+    return losses_of(s_, other != nullptr ? Model(*other) : s_.start.model(), inputs, varying,
+                     trace);
+  }
+  [[nodiscard]] bool reads_fields() const override {
+    return tangere::reads_fields(s_.loss, s_.options);
   }
   [[nodiscard]] double along(const InputDirection& d) override { return tangents_.along(d); }
   [[nodiscard]] const Batch& batch() const override { return s_.start; }
@@ -321,16 +329,15 @@ class LossChecker : public GradientChecker {
   }
 
   /// `coefficients`: those of this environment's sensors, (sensors, 4); points have parts of them.
-  [[nodiscard]] Difference difference_of_points(const PointChange& change,
-                                                std::span<const double> coefficients) const {
-    return difference_of_scene([&](Scene& scene, std::vector<double>&, double e) {
+  static MoveScene move_points(const PointChange& change, std::span<const double> coefficients) {
+    return [&change, coefficients](Scene& scene, std::vector<double>&, double e) {
       std::vector<double> moved = change.own;
       for (double& x : moved) x *= e;
       TactileDescription& sensor = scene.sensors[std::size_t(change.sensor)];
       const double* has = &coefficients[std::size_t(4 * change.sensor)];
       sensor.coefficients = {has[0], has[1], has[2], has[3]};
       add_to_points(sensor, moved);
-    });
+    };
   }
   static std::vector<std::vector<double>> together(const Model& model,
                                                    const std::vector<PointChange>& changes,
@@ -357,6 +364,7 @@ GradientCheck check_gradient(const Batch& start, const StepControls& controls,
   LossChecker checker(s, g);
   checker.check();
   if (checks_points(start.model(), loss, options)) checker.points();
+  checker.explain();
   return checker.result();
 }
 

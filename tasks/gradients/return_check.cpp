@@ -72,7 +72,8 @@ class ReturnChecker : public GradientChecker {
 
   [[nodiscard]] std::vector<double> values(const Scene* other,
                                            const std::vector<CheckInputs>& inputs,
-                                           const std::vector<double>& varying) const override {
+                                           const std::vector<double>& varying,
+                                           RunTrace* trace) const override {
     const std::unique_ptr<Task> made = other != nullptr ? make_(*other) : nullptr;
     const Task& task = made ? *made : task_;
     TaskRollout rollout(task, task_options_.stepper, Precision::f64);
@@ -92,6 +93,7 @@ class ReturnChecker : public GradientChecker {
       rollout.begin(record);
       rollout.take_steps(nullptr);
       rollout.conclude();
+      if (trace != nullptr) trace->add(rollout.batch());
     }
     std::vector<double> sums = rollout.data().returns;
     for (int l = 0; l < rollout.lanes(); ++l)
@@ -100,6 +102,7 @@ class ReturnChecker : public GradientChecker {
   }
 
   [[nodiscard]] double along(const InputDirection& d) override { return tangent_->along(d); }
+  [[nodiscard]] bool reads_fields() const override { return true; }
   [[nodiscard]] const Batch& batch() const override { return rollout_->batch(); }
   [[nodiscard]] std::string control_name(std::size_t i) const override {
     const TensorSpec& action = task_.spec().action;
@@ -120,6 +123,7 @@ TaskGradientCheck check_task_gradient(const Task& task, const TaskMaker& make,
                                       const TaskActions& actions, const TaskCheckOptions& options) {
   ReturnChecker checker(task, make, actions, options);
   checker.check();
+  checker.explain();
   return {checker.result(), checker.length()};
 }
 

@@ -434,6 +434,34 @@ TEST(Command, GradcheckTellsPeopleAndProgramsTheSame) {
     EXPECT_THAT(text.out, HasSubstr(input.at("input").get<std::string>()));
 }
 
+TEST(Command, GradcheckFailsWhereReadingsAreRounded) {
+  const Folder folder;
+  std::string text = folder.read(scene("identify_ball.xml"));
+  const std::string end = "resolution=\"40 40\" every=\"2\"/>";
+  const std::size_t at = text.find(end);
+  ASSERT_NE(at, std::string::npos);
+  text.replace(at, end.size(),
+               "resolution=\"8 8\" every=\"2\"><imperfections quantisation=\"1e-3\"/>"
+               "</tactile>");
+  folder.write("rounded.xml", text);
+  const Words words{"gradcheck", "rounded.xml", "--steps", "20", "--entries", "2", "--json"};
+  const Outcome failed = run(folder, words);
+  EXPECT_EQ(failed.exit_code, 1);
+  EXPECT_THAT(failed.err, AllOf(HasSubstr("exceeds 0.0001 (--tolerance)"),
+                                HasSubstr("readings of sensor 'pad' are multiples of 0.001 N")));
+  const json answer = json::parse(failed.out);
+  EXPECT_THAT(undocumented_keys(answer), IsEmpty());
+  EXPECT_EQ(answer.at("exit_code"), 1);
+  EXPECT_EQ(answer.at("passed"), false);
+  EXPECT_EQ(answer.at("tolerance"), 1e-4);
+  EXPECT_GT(answer.at("max_relative_error"), 0.1);
+  EXPECT_FALSE(answer.at("reasons").empty());
+  const json passed = run_json(
+      folder, {"gradcheck", "rounded.xml", "--steps", "20", "--entries", "2", "--tolerance", "2"});
+  EXPECT_EQ(passed.at("passed"), true);
+  EXPECT_EQ(passed.at("tolerance"), 2);
+}
+
 TEST(Command, GradcheckRefusesLossesThatThereAreNot) {
   const Folder folder;
   const Outcome typo =

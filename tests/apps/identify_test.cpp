@@ -12,6 +12,7 @@
 namespace tangere::apps {
 namespace {
 
+using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
@@ -76,6 +77,22 @@ TEST_F(Recorded, NumbersAreFoundFromAnotherStart) {
   EXPECT_LT(found["noise"].get<double>(), 1e-4 * found["peak"].get<double>());
 }
 
+TEST_F(Recorded, AnotherModelFailsAndIsNamed) {
+  guess("<joint name=\"pad_joint\" type=\"translational\" pos=\"0 0 0.0452\" damping=\"0.3\"",
+        "<joint name=\"pad_joint\" type=\"translational\" pos=\"0 0 0.0452\" damping=\"0.27\"");
+  const Outcome r = identify({"--number", "tactile pad kn", "--starts", "1", "--json"});
+  EXPECT_EQ(r.exit_code, 1);
+  EXPECT_THAT(r.err, AllOf(HasSubstr("what is left is not independent noise"),
+                           HasSubstr("another 'joint pad_joint damping'")));
+  const nlohmann::json found = nlohmann::json::parse(r.out);
+  EXPECT_THAT(undocumented_keys(found), ::testing::IsEmpty());
+  EXPECT_EQ(found["passed"], false);
+  EXPECT_EQ(found["converged"], true);
+  EXPECT_EQ(found["residual"]["suspect"], "joint pad_joint damping");
+  EXPECT_EQ(found["starts"].size(), 1U);
+  EXPECT_EQ(found["correlations"].size(), 1U);
+}
+
 TEST_F(Recorded, ARecordingThatDoesNotFitIsRefused) {
   const Words kn = {"--number", "tactile pad kn"};
   const auto refused = [&](const char* old, const char* replacement, const char* words) {
@@ -94,7 +111,7 @@ TEST_F(Recorded, ARecordingThatDoesNotFitIsRefused) {
       "<randomize> with a recording");
   guess("kn=\"6\"", "kn=\"5\"");
   EXPECT_THAT(identify(Words{"--env", "2"} + kn).err, HasSubstr("environments 0 to 1"));
-  EXPECT_THAT(identify(Words{"--noise", "0.1"} + kn).err, HasSubstr("with a recording"));
+  EXPECT_THAT(identify(Words{"--seed", "2"} + kn).err, HasSubstr("with a recording"));
 }
 
 TEST_F(Recorded, ARecordingOfALaterPartIsRefused) {
