@@ -11,6 +11,7 @@
 
 #include "apps/arguments.hpp"
 #include "apps/command.hpp"
+#include "apps/memory.hpp"
 #include "apps/run_options.hpp"
 #include "apps/scene_run.hpp"
 #include "apps/task_run.hpp"
@@ -181,6 +182,9 @@ int run(const GradcheckArguments& o, const Console& console) {
   options.entries = o.entries.value_or(kDefaultEntries);
   options.seed = o.seed.value_or(0);
   options.stepper.tolerance = std::min(stepper.tolerance(), kTolerance);
+  check_memory(
+      gradient_bytes(model, 1, {.steps = options.steps, .stepper = {}, .parameters = true}, 1),
+      fmt::format("gradients of {} steps", options.steps));
   const LossKind kind = loss_of(o.loss, model);
   RolloutOptions rollout;
   rollout.every = o.every.value_or(0);

@@ -8,7 +8,8 @@
 
 namespace tangere {
 
-/// Throws IoError unless `path` leads to a regular file; `expected` names what it should be.
+/// Throws IoError unless `path` leads to a regular file, which then counts as an input
+/// (io/files/input_files.hpp); `expected` names what it should be.
 void require_regular_file(const std::string& path, const char* expected);
 
 /// All bytes of a regular file. Throws IoError; InputError when it has more than `most` bytes.
