@@ -52,7 +52,7 @@ AccuracyQuantity quantity_named(const std::string& name, const Model& model) {
 }
 
 void check_arguments(const AccuracyArguments& o) {
-  check_outputs(o.svg, o.csv, {o.scene, o.controls});
+  check_outputs(o.svg, o.csv);
   if (o.target.value_or(0.5) >= 1)
     throw InputError(
         fmt::format("--target {:g}; expected a share below 1: 0.01 is one percent", *o.target));

@@ -221,11 +221,4 @@ void add_console_options(CLI::App& command, Console& console) {
       .excludes(quiet);
 }
 
-void check_not_same_file(const std::string& output, const std::string& input) {
-  std::error_code not_both_there;
-  if (std::filesystem::equivalent(output, input, not_both_there))
-    throw InputError(
-        fmt::format("the output '{}' is the input '{}'; expected another file", output, input));
-}
-
 }  // namespace tangere::apps

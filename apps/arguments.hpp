@@ -101,7 +101,4 @@ AddedOption add_flag(CLI::App& command, const std::string& flags, bool& value,
 /// Adds --json, -q and -v, which all subcommands share.
 void add_console_options(CLI::App& command, Console& console);
 
-/// Throws InputError if writing `output` would replace `input`, even with --overwrite.
-void check_not_same_file(const std::string& output, const std::string& input);
-
 }  // namespace tangere::apps

@@ -246,7 +246,7 @@ int bench_task(const BenchArguments& options, const Console& console, const Task
 }
 
 int bench(const BenchArguments& options, const Console& console) {
-  check_outputs(options.svg, options.csv, {options.scene});
+  check_outputs(options.svg, options.csv);
   // Reports a wrong word before a scene is read.
   frames_named(options.frames);
   precision_named(options.precision);

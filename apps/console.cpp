@@ -8,11 +8,14 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
+#include "io/files/printable_text.hpp"
+
 namespace tangere::apps {
 namespace {
 
 void write_line(std::FILE* stream, const std::string& text) {
-  std::fputs((text + '\n').c_str(), stream);
+  // In JSON such a character stands within a string, where its escape means the same.
+  std::fputs((printable(text) + '\n').c_str(), stream);
 }
 
 }  // namespace

@@ -19,7 +19,6 @@ struct ExportArguments {
 };
 
 int export_table(const ExportArguments& options, const Console& console) {
-  check_not_same_file(options.output, options.input);
   const ExportResult result = export_csv(find_dataset(options.input), options.output, options.what);
   console.print(
       fmt::format("wrote {}: {} rows of {} columns", options.output, result.rows, result.columns));

@@ -11,6 +11,7 @@
 
 #include "apps/arguments.hpp"
 #include "apps/command.hpp"
+#include "apps/memory.hpp"
 #include "apps/run_options.hpp"
 #include "apps/scene_run.hpp"
 #include "apps/task_run.hpp"
@@ -203,6 +204,9 @@ int run(const GradcheckArguments& o, const Console& console) {
   options.steps = steps_of(o, controls);
   set_comparison(o, options);
   options.stepper.tolerance = std::min(stepper.tolerance(), kTolerance);
+  check_memory(
+      gradient_bytes(model, 1, {.steps = options.steps, .stepper = {}, .parameters = true}, 1),
+      fmt::format("gradients of {} steps", options.steps));
   const LossKind kind = loss_of(o.loss, model);
   RolloutOptions rollout;
   rollout.every = o.every.value_or(0);

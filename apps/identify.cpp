@@ -13,6 +13,7 @@
 #include "apps/arguments.hpp"
 #include "apps/command.hpp"
 #include "apps/identify_report.hpp"
+#include "apps/memory.hpp"
 #include "apps/run_options.hpp"
 #include "apps/scene_run.hpp"
 #include "apps/text_output.hpp"
@@ -42,7 +43,6 @@ void check_arguments(const IdentifyArguments& a) {
   if (!trial && (a.seed || a.steps))
     throw InputError("--seed or --steps with a recording; expected them without one");
   if (trial && a.environment) throw InputError("--env without a recording");
-  check_outputs(a.svg, "", {a.scene, a.recording});
 }
 
 /// The interval of all sensors. A fit takes the fields of all of them after the same steps.
@@ -141,6 +141,8 @@ int identify_numbers(const IdentifyArguments& a, const Console& console) {
   if (a.recording.empty()) {
     const std::uint64_t seed = a.seed.value_or(1);
     run.steps = step_count(a.steps, controls);
+    check_memory(identification_bytes(model, run, a.numbers.size()),
+                 fmt::format("a fit of {} steps", run.steps));
     report.truth = numbers_of(scene, a.numbers);
     start = with_numbers(scene, a.numbers, wrong_start(report.truth, seed));
     report.recorded = simulate_fields(scene, run);

@@ -123,7 +123,6 @@ std::string listed(const std::vector<std::string>& lines) {
 }
 
 int run_import(const ImportArguments& given, const Console& console) {
-  check_not_same_file(given.output, given.robot);
   const ImportedScene scene = import_robot(given.robot, given.output, options_of(given));
   if (!scene.lost.empty() && !given.drop)
     throw InputError(fmt::format(

@@ -260,7 +260,6 @@ int report(const Model& model, const TaskSpec* task, const InspectArguments& opt
 int inspect(const InspectArguments& options, const Console& console) {
   if (!options.svg.empty() && !options.effects)
     throw InputError("--svg without --effects; expected both");
-  check_outputs(options.svg, "", {options.scene});
   if (const std::unique_ptr<Task> task = find_task(options.scene, console)) {
     refuse_with_task(*task, {{"--allow-unknown", options.allow_unknown}});
     return report(task->model(), &task->spec(), options, console);

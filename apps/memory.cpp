@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// Reads /proc/meminfo and the files of control groups, version 2.
+// Reads /proc/meminfo, the files of control groups, version 2, and limits of the process.
 #include "apps/memory.hpp"
 
 #include <fmt/format.h>
+#include <sys/resource.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <fstream>
@@ -32,9 +34,21 @@ double container_memory() {
   return std::max(0.0, limit - used);
 }
 
+/// Of the address space that this process may have.
+double process_memory() {
+  rlimit limit{};
+  if (getrlimit(RLIMIT_AS, &limit) != 0 || limit.rlim_cur == RLIM_INFINITY) return kUnknown;
+  double pages = 0;
+  if (!(std::ifstream("/proc/self/statm") >> pages)) return kUnknown;
+  return std::max(0.0, static_cast<double>(limit.rlim_cur) -
+                           pages * static_cast<double>(sysconf(_SC_PAGESIZE)));
+}
+
 }  // namespace
 
-double available_memory() { return std::min(machine_memory(), container_memory()); }
+double available_memory() {
+  return std::min({machine_memory(), container_memory(), process_memory()});
+}
 
 void check_memory(double bytes, const std::string& request) {
   const double available = available_memory();

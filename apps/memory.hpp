@@ -8,8 +8,8 @@
 namespace tangere::apps {
 
 /// Returns the memory that this process can still take without pushing others out [bytes]: that of
-/// the machine or of the container (control group), whichever is less. Infinite if the system does
-/// not say.
+/// the machine, of the container (control group) or of the process (ulimit -v), whichever is least.
+/// Infinite if the system does not say.
 double available_memory();
 
 /// Throws InputError naming both numbers when a request needs more bytes than are available.

@@ -31,7 +31,6 @@ bool is_scene(const std::string& path) { return std::filesystem::path(path).exte
 
 /// Refuses options of the other kind of picture.
 void check_arguments(const PlotArguments& options) {
-  check_not_same_file(options.output, options.input);
   const bool of_fields =
                  !options.sensor.empty() || options.environment || options.frame || options.strip,
              of_scene = options.turn || options.lift;

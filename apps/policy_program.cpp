@@ -53,6 +53,14 @@ void check_name(const std::string& who, const std::string& name) {
         who, name.substr(0, kLongestName), kLongestName));
 }
 
+/// Whether the shell has nothing to do but to start one program.
+bool is_one_command(const std::string& command) {
+  const std::string first = command.substr(0, command.find(' '));
+  return command.front() != ' ' && first != "exec" && first != "exit" &&
+         command.find_first_of(";&|<>()$`*?[]#~!{}\\\n") == std::string::npos &&
+         first.find('=') == std::string::npos;
+}
+
 Json described(const TensorSpec& tensor) {
   return {{"name", tensor.name},
           {"shape", tensor.shape},
@@ -102,6 +110,8 @@ void PolicyProgram::start() {
   socket_.open(pair[0]);
   Socket other;
   other.open(pair[1]);
+  // The program's parent is then this process, not a shell that waits for it.
+  const std::string line = is_one_command(command_) ? "exec " + command_ : command_;
   process_ = fork();
   if (process_ < 0)
     throw IoError(fmt::format("{} cannot be started: {}", who(), std::strerror(errno)));
@@ -114,7 +124,7 @@ void PolicyProgram::start() {
   for (const int signal : {SIGINT, SIGTERM, SIGXFSZ}) std::signal(signal, SIG_DFL);
   dup2(pair[1], STDIN_FILENO);
   dup2(pair[1], STDOUT_FILENO);
-  execl("/bin/sh", "sh", "-c", command_.c_str(), static_cast<char*>(nullptr));
+  execl("/bin/sh", "sh", "-c", line.c_str(), static_cast<char*>(nullptr));
   _exit(127);
 }
 
@@ -167,6 +177,8 @@ void PolicyProgram::answer(const PolicyQuestion& question, std::span<double> act
 void PolicyProgram::ask(const PolicyQuestion& question, std::span<double> actions) {
   if (stopping()) stopped_ = true;
   if (stopped_) return std::fill(actions.begin(), actions.end(), 0.0);
+  // Without its shell, for example, what it has started may still answer.
+  if (siginfo_t how; has_ended(how)) fail_ended();
   const auto n = static_cast<std::int64_t>(question.episodes.size());
   char* at = put(bytes_.data(), std::span(&n, 1));
   at = put(at, question.episodes);
@@ -206,9 +218,12 @@ void PolicyProgram::wait_for(short events, double deadline) {
     if (ready > 0 && now() <= deadline) return;  // what comes bit by bit comes to an end, too
     if (ready < 0 && errno != EINTR)
       throw IoError(fmt::format("cannot wait for {}: {}", who(), std::strerror(errno)));
-    if (now() > deadline)
+    late_ = now() > deadline;
+    if (late_)
       throw IoError(
           fmt::format("{} has not answered within {} s (--program-timeout)", who(), timeout_));
+    // Its children may keep the socket open.
+    if (siginfo_t how; ready == 0 && has_ended(how)) fail_ended();
   }
   stopped_ = true;
 }
@@ -261,35 +276,37 @@ std::string PolicyProgram::read_line(double deadline) {
   return line;
 }
 
-/// It has closed its output, so its end is near.
-void PolicyProgram::fail_ended() {
-  int status = 0;
-  const double deadline = now() + 1;
-  pid_t ended = 0;
-  while ((ended = waitpid(process_, &status, WNOHANG)) == 0 && now() < deadline)
-    std::this_thread::sleep_for(std::chrono::milliseconds(5));
-  if (ended <= 0) throw IoError(fmt::format("{} has closed its standard output", who()));
-  process_ = -1;
-  throw IoError(fmt::format(
-      "{} has ended {} while an answer was awaited; its standard error may say why", who(),
-      WIFSIGNALED(status) ? fmt::format("by a signal ({})", strsignal(WTERMSIG(status)))
-                          : fmt::format("with exit code {}", WEXITSTATUS(status))));
+/// Whether it has ended, and how. It stays a zombie, so that its group keeps its number.
+bool PolicyProgram::has_ended(siginfo_t& how) const {
+  how = {};
+  return waitid(P_PID, static_cast<id_t>(process_), &how, WEXITED | WNOHANG | WNOWAIT) == 0 &&
+         how.si_pid == process_;
 }
 
+/// It has closed its output, so its end is near.
+void PolicyProgram::fail_ended() {
+  siginfo_t how;
+  const double deadline = now() + 1;
+  bool ended = false;
+  while (!(ended = has_ended(how)) && now() < deadline)
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  if (!ended) throw IoError(fmt::format("{} has closed its standard output", who()));
+  throw IoError(fmt::format(
+      "{} has ended {} while an answer was awaited; its standard error may say why", who(),
+      how.si_code == CLD_EXITED ? fmt::format("with exit code {}", how.si_status)
+                                : fmt::format("by a signal ({})", strsignal(how.si_status))));
+}
+
+/// What it has started ends with it: it would keep the streams of this process open.
 void PolicyProgram::end() {
-  const pid_t process = std::exchange(process_, -1);
   socket_.close();
-  if (process < 0) return;
+  if (process_ < 0) return;
   const double deadline = now() + kTimeToEnd;
-  int status = 0;
-  while (waitpid(process, &status, WNOHANG) == 0) {
-    if (now() > deadline || stopping()) {
-      kill(-process, SIGKILL);
-      waitpid(process, &status, 0);
-      return;
-    }
+  for (siginfo_t how; !has_ended(how) && now() <= deadline && !late_ && !stopping();)
     std::this_thread::sleep_for(std::chrono::milliseconds(2));
-  }
+  kill(-process_, SIGKILL);
+  waitpid(process_, nullptr, 0);
+  process_ = -1;
 }
 
 }  // namespace tangere::apps

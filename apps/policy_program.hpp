@@ -3,6 +3,7 @@
 // and asked through its standard input and output; docs/policies.md describes the bytes.
 #pragma once
 
+#include <signal.h>
 #include <sys/types.h>
 
 #include <cstdint>
@@ -24,7 +25,8 @@ class PolicyProgram {
   /// ends, or does not answer in time, InputError if it says something else than a name.
   PolicyProgram(const Task& task, std::uint64_t seed, const std::string& version,
                 const std::string& command, double timeout, std::function<bool()> stop);
-  /// Closes its input. A program that does not end by itself within some seconds is killed.
+  /// Closes its input. A program that does not end by itself within some seconds is killed, and in
+  /// any case what it has started in its process group.
   ~PolicyProgram();
   PolicyProgram(const PolicyProgram&) = delete;
   PolicyProgram& operator=(const PolicyProgram&) = delete;
@@ -58,6 +60,7 @@ class PolicyProgram {
   [[nodiscard]] std::string read_line(double deadline);
   void wait_for(short events, double deadline);
   [[nodiscard]] bool stopping() const { return stopped_ || stop_(); }
+  [[nodiscard]] bool has_ended(siginfo_t& how) const;
   [[noreturn]] void fail_ended();
   [[nodiscard]] std::string who() const;
   void end();
@@ -69,7 +72,7 @@ class PolicyProgram {
   pid_t process_ = -1;
   Socket socket_;
   std::function<bool()> stop_;
-  bool stopped_ = false;
+  bool stopped_ = false, late_ = false;
   std::mutex mutex_;             // of the conversation
   std::exception_ptr failure_;   // what ended it
   std::vector<double> factors_;  // (observation) that an observation is multiplied by

@@ -16,7 +16,9 @@
 #include "apps/command.hpp"
 #include "apps/program.hpp"
 #include "apps/reader_process.hpp"
+#include "apps/stop_signals.hpp"
 #include "engine/base/error.hpp"
+#include "io/files/input_files.hpp"
 #include "kernels/table/isa.hpp"
 
 namespace tangere::apps {
@@ -64,18 +66,26 @@ const Command& chosen_command(const Program& program) {
   return *command;
 }
 
-int run(const Command& command, int argc, char** argv) {
+bool asks_for_json(int argc, char** argv) {
+  return std::any_of(argv, argv + argc, [](const std::string& a) { return a == "--json"; });
+}
+
+int run(const Command& command, const std::string& name, int argc, char** argv) {
+  keep_inputs();
+  end_by_signals(name, asks_for_json(argc, argv), command.reads_files && command.reads_files());
   if (*kernels::isa_error() != '\0') throw InputError(kernels::isa_error());
   ProgramInfo info{TANGERE_VERSION, {}};
   for (int i = 0; i < argc; ++i) info.command_line += (i > 0 ? " " : "") + std::string(argv[i]);
-  return command.run(info);
+  const int code = command.run(info);
+  ignore_signals();
+  return code;
 }
 
 /// The message for people on stderr and, where JSON was asked for, the object that a program waits
 /// for: the parser may have stopped before it came to --json.
 int report(const Program& program, int argc, char** argv, ExitCode code, const std::string& what) {
   Console console;
-  console.json = std::any_of(argv, argv + argc, [](const std::string& a) { return a == "--json"; });
+  console.json = asks_for_json(argc, argv);
   console.fail("tangere: " + what);
   const std::string command = program.parser.chosen_name();
   console.result({{"command", command.empty() ? Json() : Json(command)},
@@ -146,7 +156,8 @@ int start(int argc, char** argv) {
     if (!program.parser.parse(argc, argv)) return kDone;
     const Command& command = chosen_command(program);
     const auto body = [&] {
-      return guarded(program, argc, argv, [&] { return run(command, argc, argv); });
+      return guarded(program, argc, argv,
+                     [&] { return run(command, program.parser.chosen_name(), argc, argv); });
     };
     return command.reads_files && command.reads_files() ? run_in_child(body) : body();
   });

@@ -46,9 +46,6 @@ struct SimulateArguments {
 };
 
 void check_arguments(const SimulateArguments& options) {
-  check_not_same_file(options.output, options.scene);
-  for (const std::string& input : {options.controls, options.state_from})
-    if (!input.empty()) check_not_same_file(options.output, input);
   options.gradients.check();
   if (options.row && options.state_from.empty())
     throw InputError("--row without --state-from; expected both");
@@ -245,7 +242,12 @@ struct Start {
           "{} was made with accuracy {:g}, this run has {:g} (0: steps are not cut): it goes on, "
           "but not with the bits of one long run; --accuracy sets it",
           saved->path, saved->accuracy, stepper.accuracy()));
-    else if (saved->sleep > 0 || stepper.sleep() > 0)
+    else if (saved->sleep != stepper.sleep())
+      console.note(fmt::format(
+          "{} was made with sleep {:g}, this run has {:g} (0: no body sleeps): it goes on, but not "
+          "with the bits of one long run",
+          saved->path, saved->sleep, stepper.sleep()));
+    else if (saved->sleep > 0 && !saved->sleepers)
       console.note(
           fmt::format("{} does not hold which bodies slept: the run goes on with all of "
                       "them awake, and not with the bits of one long run",

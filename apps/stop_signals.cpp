@@ -1,33 +1,105 @@
 // SPDX-License-Identifier: Apache-2.0
-// A handler may do little more than set a flag. Code that works in steps checks the flag.
+// A handler may do little more than set a flag, or remove files and end. Code that works in steps
+// checks the flag.
 #include "apps/stop_signals.hpp"
 
+#include <unistd.h>
+
 #include <atomic>
+#include <nlohmann/json.hpp>
+
+#include "apps/console.hpp"
+#include "io/files/part_file.hpp"
 
 namespace tangere::apps {
 namespace {
 
-constexpr std::array kSignals{SIGINT, SIGTERM, SIGXFSZ};
+constexpr std::array kSignals{SIGINT, SIGTERM};
 
 std::atomic<int> first_signal{0};
 static_assert(std::atomic<int>::is_always_lock_free, "the handler may not wait");
+
+/// What the process ends with, made beforehand: a handler may not allocate.
+struct LastWords {
+  int signal;
+  ExitCode code;
+  const char* reason;
+  std::string text = {}, object = {};
+};
+std::array<LastWords, 5> last_words{{
+    {SIGINT, kInterrupted, "stopped by SIGINT; no half-written file is left"},
+    {SIGTERM, kTerminated, "stopped by SIGTERM; no half-written file is left"},
+    {SIGSEGV, kUsage, "memory ran out in a library, or this is a mistake in tangere (SIGSEGV)"},
+    {SIGBUS, kUsage, "memory ran out in a library, or this is a mistake in tangere (SIGBUS)"},
+    {SIGABRT, kUsage, "memory ran out in a library, or this is a mistake in tangere (SIGABRT)"},
+}};
 
 void remember(int signal) {
   int none = 0;
   first_signal.compare_exchange_strong(none, signal);
 }
 
+void end(int signal) {
+  remove_parts();
+  for (const LastWords& words : last_words) {
+    if (words.signal != signal) continue;
+    // A stream that nobody reads changes nothing any more.
+    static_cast<void>(!write(STDERR_FILENO, words.text.data(), words.text.size()));
+    static_cast<void>(!write(STDOUT_FILENO, words.object.data(), words.object.size()));
+    _exit(words.code);
+  }
+}
+
+/// Ends as the signal would, without the .parts.
+void end_by_itself(int signal) {
+  remove_parts();
+  std::signal(signal, SIG_DFL);
+  raise(signal);
+}
+
+/// Returns what was there before.
+struct sigaction handle(int signal, void (*handler)(int), int flags) {
+  struct sigaction action {
+  }, previous{};
+  action.sa_handler = handler;
+  action.sa_flags = flags;
+  for (const int other : kSignals) sigaddset(&action.sa_mask, other);
+  sigaction(signal, nullptr, &previous);
+  if (previous.sa_handler != SIG_IGN) sigaction(signal, &action, nullptr);
+  return previous;
+}
+
+bool is_crash(int signal) { return signal != SIGINT && signal != SIGTERM; }
+
 }  // namespace
+
+void end_by_signals(const std::string& command, bool json, bool child) {
+  std::signal(SIGXFSZ, SIG_IGN);
+  for (LastWords& words : last_words) {
+    words.text = std::string("tangere: ") + words.reason + "\n";
+    if (json)
+      words.object =
+          Json{{"command", command}, {"exit_code", int{words.code}}, {"error", words.reason}}.dump(
+              2) +
+          "\n";
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+    if (is_crash(words.signal)) continue;  // the sanitizer explains it
+#endif
+    handle(words.signal, child && is_crash(words.signal) ? end_by_itself : end, SA_ONSTACK);
+  }
+  static std::array<char, 1 << 14> stack;  // where the thread's own is used up
+  const stack_t other{stack.data(), 0, stack.size()};
+  sigaltstack(&other, nullptr);
+}
+
+void ignore_signals() {
+  for (const int signal : kSignals) std::signal(signal, SIG_IGN);
+}
 
 StopSignals::StopSignals() {
   first_signal = 0;
-  for (std::size_t i = 0; i < kSignals.size(); ++i) {
-    struct sigaction action {};
-    action.sa_handler = kSignals[i] == SIGXFSZ ? SIG_IGN : remember;
-    action.sa_flags = SA_RESTART;
-    sigaction(kSignals[i], nullptr, &previous_[i]);
-    if (previous_[i].sa_handler != SIG_IGN) sigaction(kSignals[i], &action, nullptr);
-  }
+  for (std::size_t i = 0; i < kSignals.size(); ++i)
+    previous_[i] = handle(kSignals[i], remember, SA_RESTART);
 }
 
 StopSignals::~StopSignals() {

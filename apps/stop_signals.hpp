@@ -1,15 +1,25 @@
 // SPDX-License-Identifier: Apache-2.0
-// Lets Ctrl-C and a scheduler's SIGTERM end a run between two steps, where nothing is half-written.
+// Lets Ctrl-C and a scheduler's SIGTERM end a run between two steps, where nothing is half-written,
+// and every other work at once, with its half-written files removed.
 #pragma once
 
 #include <array>
 #include <csignal>
+#include <string>
 
 namespace tangere::apps {
 
+/// From now on SIGINT and SIGTERM (unless the parent ignored them) remove the .part of every output
+/// and end the process with kInterrupted or kTerminated and a message; with `json` also with the
+/// object of an error of `command`. So do crashes, with kUsage: HDF5 uses some memory without
+/// checking that it got it. In a `child` whose parent explains crashes they only remove the .parts.
+/// Exceeding a file-size limit fails the write instead of raising SIGXFSZ.
+void end_by_signals(const std::string& command, bool json, bool child);
+/// From now on SIGINT and SIGTERM change nothing any more: the result has been told.
+void ignore_signals();
+
 /// While an object lives, SIGINT and SIGTERM are remembered instead of ending the program (unless
-/// the parent ignored them), and exceeding a file-size limit fails the write instead of raising
-/// SIGXFSZ.
+/// the parent ignored them).
 class StopSignals {
  public:
   StopSignals();
@@ -21,7 +31,7 @@ class StopSignals {
   [[nodiscard]] int received() const;
 
  private:
-  std::array<struct sigaction, 3> previous_{};
+  std::array<struct sigaction, 2> previous_{};
 };
 
 }  // namespace tangere::apps

@@ -4,7 +4,6 @@
 
 #include <fmt/format.h>
 
-#include "apps/arguments.hpp"
 #include "engine/base/error.hpp"
 
 namespace tangere::apps {
@@ -20,11 +19,7 @@ void TextOutput::write(const std::string& text, const Console& console) {
   console.print(fmt::format("wrote {} ({} bytes)", file_->output(), text.size()));
 }
 
-void check_outputs(const std::string& svg, const std::string& csv,
-                   const std::vector<std::string>& inputs) {
-  for (const std::string& output : {svg, csv})
-    for (const std::string& input : inputs)
-      if (!output.empty() && !input.empty()) check_not_same_file(output, input);
+void check_outputs(const std::string& svg, const std::string& csv) {
   if (!svg.empty() && svg == csv)
     throw InputError(fmt::format("--svg and --csv are both '{}'; expected two files", svg));
 }

@@ -5,7 +5,6 @@
 
 #include <optional>
 #include <string>
-#include <vector>
 
 #include "apps/console.hpp"
 #include "io/files/part_file.hpp"
@@ -25,9 +24,8 @@ class TextOutput {
   std::optional<PartFile> file_;
 };
 
-/// Throws InputError if --svg and --csv are one file, or either would replace one of the inputs.
-/// Empty names stand for options that were not given.
-void check_outputs(const std::string& svg, const std::string& csv,
-                   const std::vector<std::string>& inputs);
+/// Throws InputError if --svg and --csv are one file. An empty name stands for an option that was
+/// not given.
+void check_outputs(const std::string& svg, const std::string& csv);
 
 }  // namespace tangere::apps

@@ -24,7 +24,6 @@ struct ViewArguments {
 };
 
 int view(const ViewArguments& options, const Console& console) {
-  check_not_same_file(options.output, options.input);
   ViewOptions what = options.what;
   what.episodes = options.episodes.value_or(what.episodes);
   what.frames = options.frames.value_or(what.frames);

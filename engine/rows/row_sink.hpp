@@ -8,6 +8,7 @@
 
 #include "engine/model/field_form.hpp"
 #include "engine/step/shear_memory.hpp"
+#include "engine/step/sleep_state.hpp"
 
 namespace tangere {
 
@@ -71,6 +72,12 @@ struct MemoryRow {
   std::span<const ShearMemory> memory;  ///< (E)
 };
 
+/// Which bodies sleep at row t of a trajectory, for all environments. It follows the StateRow.
+struct SleepRow {
+  std::int64_t step;                  ///< t
+  std::span<const SleepState> sleep;  ///< (E)
+};
+
 /// Receives rows in ascending order. A sink that cannot store throws IoError; the rollout stops and
 /// passes it on.
 class RowSink {
@@ -82,6 +89,7 @@ class RowSink {
   virtual void write(const ActionRow&) {}  ///< tasks only
   virtual void write(const AuditRow&) {}   ///< only if it was asked for
   virtual void write(const MemoryRow&) {}  ///< only if it was asked for
+  virtual void write(const SleepRow&) {}   ///< only with q and v
 };
 
 }  // namespace tangere

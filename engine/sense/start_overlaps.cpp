@@ -20,6 +20,7 @@
 
 namespace tangere {
 
+using kernels::Frame;
 using kernels::Vec3;
 
 namespace {

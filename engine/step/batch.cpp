@@ -4,9 +4,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <new>
 
 #include "engine/model/compile_variations.hpp"
+#include "engine/model/model_part.hpp"
 #include "engine/model/random.hpp"
 #include "engine/model/scene_number.hpp"
 
@@ -226,6 +228,42 @@ void Batch::set_memory(int environment, std::span<const ShearEntry> memory) {
     last = e.point;
   }
   memory_[std::size_t(environment)].assign(memory.begin(), memory.end());
+}
+
+void Batch::set_sleep(int environment, const SleepState& state) {
+  const CompiledModel& m = compiled(model_);
+  const std::vector<int> tree = trees_of(m.links);
+  const int trees = tree.empty() ? 0 : std::ranges::max(tree) + 1;
+  const auto is_island = [&](int t) { return t >= -1 && t < trees; };
+  if (!state.asleep.empty() &&
+      (std::ssize(state.asleep) != trees || std::ssize(state.island) != trees ||
+       std::ssize(state.rested) != trees || std::ssize(state.u) != m.nu ||
+       !std::ranges::all_of(state.island, is_island) || std::ranges::min(state.rested) < 0 ||
+       std::ranges::max(state.rested) == std::numeric_limits<int>::max() ||
+       std::isnan(state.clearance) ||
+       !std::ranges::all_of(state.u, [](double x) { return std::isfinite(x); })))
+    throw InputError("who sleeps in environment " + std::to_string(environment) +
+                     "; expected islands and steps of rest of " + std::to_string(trees) +
+                     " trees and " + std::to_string(m.nu) + " finite controls");
+  SleepState& own = sleep_[std::size_t(environment)];
+  own = state;
+  own.bodies = 0;
+  if (state.asleep.empty()) return;
+  const auto sleeps = [&](int link) {
+    return link >= 0 && own.asleep[std::size_t(tree[std::size_t(link)])] != 0;
+  };
+  for (std::size_t t = 0; t < own.asleep.size(); ++t) own.asleep[t] = own.island[t] >= 0 ? 1 : 0;
+  for (const CompiledBody& body : m.bodies) own.bodies += sleeps(body.link) ? 1 : 0;
+  double* const column = this->column(std::size_t(environment));
+  const auto row = [&](int r) -> double& { return column[r * kBlock]; };
+  for (std::size_t i = 0; i < m.links.size(); ++i) {
+    if (!sleeps(static_cast<int>(i))) continue;
+    const kernels::Link& link = m.links[i];
+    for (int k = link.q; k < link.q + kernels::coordinates(link.kind); ++k)
+      row(m.layout.previous_q + k) = row(m.layout.q + k);
+    for (int k = link.v; k < link.v + kernels::dofs(link.kind); ++k)
+      row(m.layout.previous_v + k) = row(m.layout.v + k) = 0;
+  }
 }
 
 void Batch::set_failed(int environment, StepStatus status) {

@@ -104,6 +104,12 @@ class Batch {
   [[nodiscard]] const SleepState& sleep(int environment) const {
     return sleep_[std::size_t(environment)];
   }
+  [[nodiscard]] std::span<const SleepState> sleeps() const {
+    return {sleep_.data(), std::size_t(environments_)};
+  }
+  /// Sets it, for a run that goes on from a stored state; an empty one wakes all. The earlier state
+  /// of trees that sleep becomes that of now. Throws InputError unless it is one of this scene.
+  void set_sleep(int environment, const SleepState& state);
 
   /// Sets the newest state alone, for differences. Quaternions are taken as they are; history,
   /// status and what friction remembers are kept.

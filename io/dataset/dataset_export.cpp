@@ -141,6 +141,7 @@ class CsvExport {
 
 ExportResult export_csv(const DatasetFiles& dataset, const std::string& path,
                         const ExportOptions& options) {
+  add_merged_inputs(dataset);
   if (!dataset.folder.empty() && !options.episode) check_complete(dataset);
   return CsvExport(path, options).run(dataset);
 }

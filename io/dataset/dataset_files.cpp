@@ -13,6 +13,7 @@
 #include "engine/base/error.hpp"
 #include "io/dataset/dataset_description.hpp"
 #include "io/dataset/shard_check.hpp"
+#include "io/files/input_files.hpp"
 #include "io/hdf5/h5_listing.hpp"
 
 namespace tangere {
@@ -44,6 +45,16 @@ std::vector<std::string> shards_in(const std::string& folder) {
     if (is_shard(entry.path().filename().string())) files.push_back(entry.path().string());
   std::sort(files.begin(), files.end(), before);
   return files;
+}
+
+/// Empty if the folder cannot be read.
+std::vector<std::string> shards_beside(const std::string& path) {
+  const fs::path folder = fs::path(path).parent_path();
+  try {
+    return shards_in(folder.empty() ? "." : folder.string());
+  } catch (const fs::filesystem_error&) {
+    return {};
+  }
 }
 
 /// Compares the files with the number of shards in the settings.
@@ -140,6 +151,9 @@ DatasetFiles find_dataset(const std::string& path) {
   } else {
     dataset.files = {path};
   }
+  // Shards beside a single file, too: a merged file leads to them.
+  for (const std::string& file : dataset.folder.empty() ? shards_beside(path) : dataset.files)
+    add_input(file);
   std::string reason;
   for (const std::string& file : dataset.files) {
     try {
@@ -157,6 +171,15 @@ DatasetFiles find_dataset(const std::string& path) {
     throw IoError(fmt::format("'{}' is not a data set: {}", path, reason));
   if (!dataset.folder.empty()) count_shards(dataset);
   return dataset;
+}
+
+void add_merged_inputs(const DatasetFiles& dataset) {
+  if (dataset.folder.empty()) return;
+  add_input((fs::path(dataset.folder) / "robomimic.hdf5").string());
+  std::error_code none_there;
+  for (const fs::directory_entry& entry :
+       fs::recursive_directory_iterator(fs::path(dataset.folder) / "minari", none_there))
+    if (entry.is_regular_file(none_there)) add_input(entry.path().string());
 }
 
 void check_complete(const DatasetFiles& dataset) {

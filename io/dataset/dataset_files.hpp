@@ -23,8 +23,12 @@ struct DatasetFiles {
 /// Returns the value of a setting; empty if there is none of this name.
 std::string value_of(const std::vector<Setting>& settings, const std::string& name);
 
-/// Finds the shards of a folder, or a single file. Throws IoError if there are none.
+/// Finds the shards of a folder, or a single file. They count as inputs, and so do shards beside a
+/// single file. Throws IoError if there are none.
 DatasetFiles find_dataset(const std::string& path);
+
+/// Files that a merge made of the folder count as inputs, too (io/files/input_files.hpp).
+void add_merged_inputs(const DatasetFiles& dataset);
 
 /// Throws IoError when shards are missing, when shards differ in their settings, or when a file has
 /// a shard's name but is no shard. The message names the first such file.

@@ -12,6 +12,7 @@
 #include <set>
 
 #include "engine/base/error.hpp"
+#include "io/files/input_files.hpp"
 #include "io/files/part_file.hpp"
 
 namespace tangere {
@@ -71,6 +72,9 @@ DatasetFolder::DatasetFolder(std::string path, ExistingShards existing, bool sha
         fmt::format("'{}' has shards already; give --overwrite to replace them, or --resume to "
                     "keep them and make the rest",
                     path_));
+  if (existing == ExistingShards::replace)
+    for (const std::vector<std::string>& replaced : {shards(), merged_files()})
+      std::for_each(replaced.begin(), replaced.end(), refuse_input);
   clean();
 }
 

@@ -25,7 +25,7 @@ class DatasetFolder {
   /// only those that want the folder alone. Removes what a killed run or merge left unfinished,
   /// except shards of others that share the folder. Throws IoError if the path is no folder, cannot
   /// be written, is held by another process, or is not shared and has shards that it should not
-  /// have.
+  /// have; InputError if a file that it is to replace is an input (io/files/input_files.hpp).
   DatasetFolder(std::string path, ExistingShards existing, bool shared = false,
                 FolderPatience patience = {});
   /// Removes the folder if it was created here and is empty.

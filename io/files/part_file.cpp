@@ -4,6 +4,7 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <pthread.h>
 #include <stdio.h>
 #include <sys/stat.h>
 #include <sys/statvfs.h>
@@ -11,13 +12,17 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
+#include <atomic>
 #include <cerrno>
+#include <csignal>
 #include <cstring>
 #include <filesystem>
 #include <utility>
 #include <vector>
 
 #include "engine/base/error.hpp"
+#include "io/files/input_files.hpp"
 
 namespace tangere {
 namespace {
@@ -85,6 +90,37 @@ void sync_folder(const std::string& folder) {
   if (error != 0 && error != EINVAL) fail("flush the folder", folder, error);
 }
 
+// Paths of the .parts that this process holds, for a handler of signals.
+std::array<std::atomic<const char*>, 64> parts_held{};
+static_assert(std::atomic<const char*>::is_always_lock_free, "the handler may not wait");
+
+/// While it lives, no signal that may be handled interrupts this thread: a .part is in the list
+/// exactly while it is there.
+class NoSignals {
+ public:
+  NoSignals() {
+    sigset_t all;
+    sigfillset(&all);
+    pthread_sigmask(SIG_BLOCK, &all, &before_);
+  }
+  ~NoSignals() { pthread_sigmask(SIG_SETMASK, &before_, nullptr); }
+  NoSignals(const NoSignals&) = delete;
+  NoSignals& operator=(const NoSignals&) = delete;
+
+ private:
+  sigset_t before_{};
+};
+
+void hold_part(const std::string& path) {
+  for (std::atomic<const char*>& place : parts_held)
+    if (const char* none = nullptr; place.compare_exchange_strong(none, path.c_str())) return;
+}
+
+void let_part_go(const std::string& path) noexcept {
+  for (std::atomic<const char*>& place : parts_held)
+    if (const char* it = path.c_str(); place.compare_exchange_strong(it, nullptr)) return;
+}
+
 /// 0 or the error; EEXIST when `to` exists and must not be replaced.
 int rename_to(const std::string& from, const std::string& to, bool overwrite) {
   if (!overwrite) {
@@ -104,7 +140,10 @@ PartFile::PartFile(std::string output, bool overwrite)
   if (output_.find('\0') != std::string::npos)
     throw IoError("the name of the output contains a NUL character");
   check_folder(output_);
+  refuse_input(output_);
+  refuse_input(path_);
   check_output(output_, overwrite_);
+  const NoSignals until_it_is_held;
   for (int attempt = 0;; ++attempt) {
     const int flags = O_RDWR | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK | O_CREAT;
     bool is_new = true;
@@ -113,11 +152,17 @@ PartFile::PartFile(std::string output, bool overwrite)
       is_new = false;
       descriptor = open(path_.c_str(), flags, 0666);
     }
-    if (descriptor < 0) fail("create", path_, errno);
+    if (descriptor < 0 && errno != ELOOP) fail("create", path_, errno);
     struct stat info {};
-    if (fstat(descriptor, &info) != 0 || !S_ISREG(info.st_mode)) {
+    if (descriptor < 0 || fstat(descriptor, &info) != 0 || !S_ISREG(info.st_mode)) {
       close(descriptor);
       throw IoError(fmt::format("cannot create '{}': it exists and is not a regular file", path_));
+    }
+    if (info.st_nlink > 1) {
+      close(descriptor);
+      throw IoError(fmt::format(
+          "cannot create '{}': it exists and is a file with {} names; remove this name of it",
+          path_, info.st_nlink));
     }
     const int error = lock(descriptor);
     if (error == EAGAIN || error == EACCES) {
@@ -132,6 +177,7 @@ PartFile::PartFile(std::string output, bool overwrite)
     }
     if (is_at(descriptor, path_)) {
       descriptor_ = descriptor;
+      hold_part(path_);
       break;
     }
     close(descriptor);
@@ -140,6 +186,7 @@ PartFile::PartFile(std::string output, bool overwrite)
   }
   if (ftruncate(descriptor_, 0) != 0) {
     const int error = errno;
+    let_part_go(path_);
     unlink(path_.c_str());
     close(descriptor_);
     fail("create", path_, error);
@@ -149,8 +196,15 @@ PartFile::PartFile(std::string output, bool overwrite)
 
 PartFile::~PartFile() {
   if (descriptor_ < 0) return;
+  const NoSignals until_it_is_gone;
+  let_part_go(path_);
   unlink(path_.c_str());  // before the lock goes
   close(descriptor_);
+}
+
+void remove_parts() noexcept {
+  for (const std::atomic<const char*>& place : parts_held)
+    if (const char* const path = place; path != nullptr) unlink(path);
 }
 
 std::uint64_t PartFile::free_bytes() const {
@@ -209,13 +263,16 @@ void PartFile::read_at(std::uint64_t offset, std::span<unsigned char> bytes) con
 }
 
 void PartFile::commit() {
+  refuse_input(output_);  // it may have been read, or linked, meanwhile
   compare();
   if (fsync(descriptor_) != 0) fail("flush", path_, errno);
+  const NoSignals until_it_is_gone;
   const int error = rename_to(path_, output_, overwrite_);
   if (error == EEXIST)
     throw IoError(fmt::format("'{}' appeared while '{}' was being written; it was left as it is",
                               output_, path_));
   if (error != 0) fail(fmt::format("rename '{}' to", path_), output_, error);
+  let_part_go(path_);
   close(descriptor_);
   descriptor_ = -1;
   sync_folder(folder_of(output_));

@@ -22,8 +22,10 @@ struct NamedBytes {
 class PartFile {
  public:
   /// Creates the .part, empty. Throws IoError, having created nothing, when the output exists and
-  /// `overwrite` is false, is a folder or a device, when its folder is missing or not writable, or
-  /// when another process is writing the same output.
+  /// `overwrite` is false, is a folder or a device, when its folder is missing or not writable,
+  /// when the .part is a file with a second name, or when another process is writing the same
+  /// output. Throws InputError when the output or the .part is a kept input
+  /// (io/files/input_files.hpp).
   PartFile(std::string output, bool overwrite);
   /// Removes the .part unless it was committed.
   ~PartFile();
@@ -46,7 +48,8 @@ class PartFile {
   [[nodiscard]] WrittenBytes* written() { return &*written_; }
   /// Reads the file back. Throws IoError that says where it is not what was written.
   void compare() { written_->compare_all(); }
-  /// Compares, forces the bytes to the disk and renames the .part to the output. Throws IoError.
+  /// Compares, forces the bytes to the disk and renames the .part to the output. Throws IoError;
+  /// InputError when the output has become an input.
   void commit();
 
  private:
@@ -55,6 +58,10 @@ class PartFile {
   int descriptor_ = -1;
   std::optional<WrittenBytes> written_;
 };
+
+/// Removes the .part of every PartFile that lives, of 64 at most. A handler of signals that ends the
+/// process may call it.
+void remove_parts() noexcept;
 
 /// Writes a whole text file, or leaves what was there.
 void write_text_atomically(const std::string& path, std::string_view text, bool overwrite);

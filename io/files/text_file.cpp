@@ -9,11 +9,12 @@
 
 #include <array>
 #include <cerrno>
-#include <cstdint>
 #include <cstring>
 #include <fstream>
 
 #include "engine/base/error.hpp"
+#include "io/files/input_files.hpp"
+#include "io/files/printable_text.hpp"
 
 namespace tangere {
 namespace {
@@ -41,6 +42,7 @@ void require_regular_file(const std::string& path, const char* expected) {
         fmt::format("{}:1: a pointer of Git LFS to a file that was not fetched; expected {} "
                     "('git lfs pull' fetches it)",
                     path, expected));
+  add_input(path, info);
 }
 
 std::string read_text_file(const std::string& path, std::size_t most, const char* expected) {
@@ -67,25 +69,10 @@ std::string read_text_file(const std::string& path, std::size_t most, const char
 }
 
 std::size_t find_invalid_utf8(std::string_view text) {
-  const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(text[i]); };
   for (std::size_t i = 0; i < text.size();) {
-    const unsigned char first = byte(i);
-    std::size_t more = 0;
-    std::uint32_t code = first;
-    if (first >= 0xF0 && first < 0xF8)
-      more = 3, code = first & 0x07U;
-    else if (first >= 0xE0)
-      more = 2, code = first & 0x0FU;
-    else if (first >= 0xC0)
-      more = 1, code = first & 0x1FU;
-    if ((first >= 0x80 && more == 0) || first >= 0xF8 || i + more >= text.size()) return i;
-    for (std::size_t k = 1; k <= more; ++k) {
-      if ((byte(i + k) & 0xC0U) != 0x80) return i;
-      code = code << 6 | (byte(i + k) & 0x3FU);
-    }
-    constexpr std::uint32_t kLeast[] = {0, 0x80, 0x800, 0x10000};
-    if (code < kLeast[more] || code > 0x10FFFF || (code >= 0xD800 && code < 0xE000)) return i;
-    i += more + 1;
+    const std::size_t bytes = utf8_at(text, i).bytes;
+    if (bytes == 0) return i;
+    i += bytes;
   }
   return std::string_view::npos;
 }

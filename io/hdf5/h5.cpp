@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "engine/base/error.hpp"
+#include "io/files/input_files.hpp"
 #include "io/files/text_file.hpp"
 #include "io/hdf5/h5_driver.hpp"
 #include "io/hdf5/h5_failure.hpp"
@@ -43,8 +44,12 @@ bool may_lead_to(const std::filesystem::path& from, const std::filesystem::path&
 
 /// What the library asks before it follows a link to another file; a negative answer refuses.
 herr_t allow_link(const char* from, const char*, const char* to, const char*, unsigned*, hid_t,
-                  void*) {
-  return may_lead_to(from, to) ? 0 : -1;
+                  void*) noexcept try {
+  if (!may_lead_to(from, to)) return -1;
+  add_input(std::filesystem::path(from).replace_filename(to));
+  return 0;
+} catch (const std::exception&) {  // no memory
+  return -1;
 }
 
 /// Whether a description has a message of type 7: a list of external files. Much faster than to ask
@@ -82,6 +87,7 @@ void check_source(const Id& dataset, const Id& parent, const std::string& name) 
     const std::string file = text(H5Pget_virtual_filename);
     if (!may_lead_to(file_name(dataset.get()), file))
       fail("open dataset", parent, name, fmt::format("it shows '{}', in another folder", file));
+    add_input(std::filesystem::path(file_name(dataset.get())).replace_filename(file));
     if (file == "." && text(H5Pget_virtual_dsetname) == own)
       fail("open dataset", parent, name, "it shows itself");
   }

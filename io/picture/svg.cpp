@@ -6,11 +6,13 @@
 
 #include <cmath>
 
+#include "io/files/printable_text.hpp"
+
 namespace tangere::svg {
 
 std::string escape(const std::string& text) {
   std::string out;
-  for (char c : text) {
+  for (const char c : printable(text)) {
     switch (c) {
       case '<': out += "&lt;"; break;
       case '>': out += "&gt;"; break;

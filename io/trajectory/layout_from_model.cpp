@@ -5,6 +5,7 @@
 #include <stdexcept>
 
 #include "engine/model/scene_number.hpp"
+#include "engine/step/sleeping_trees.hpp"
 
 namespace tangere {
 namespace {
@@ -97,6 +98,7 @@ TrajectoryLayout layout_from(const Batch& batch, const Stepper& stepper,
   layout.audit = run.audit;
   if (run.memory) layout.memory = memory_points(model);
   layout.of_memory = run.of_memory;
+  if (layout.sleep > 0) layout.trees = sleeping_trees(model);
   for (std::size_t i = 0; i < model.sensors().size(); ++i)
     layout.sensors.push_back(
         sensor_layout(model.sensors()[i], scene.sensors[i], run.tactile_intervals[i]));

@@ -13,8 +13,10 @@
 #include <string_view>
 
 #include "engine/base/error.hpp"
+#include "engine/step/sleeping_trees.hpp"
 #include "io/hdf5/h5.hpp"
 #include "io/trajectory/memory_rows.hpp"
+#include "io/trajectory/sleep_rows.hpp"
 
 namespace tangere {
 namespace {
@@ -163,6 +165,7 @@ SavedState read_state(const std::string& path, std::optional<std::int64_t> row) 
     state.previous_q = read_row(q, at - 1);
     state.previous_v = read_row(v, at - 1);
   }
+  if (state.sleep > 0) state.sleepers = read_sleep(file, at, rows.size(), state.environments);
   state.memory = read_memory(file, steps, state.environments, state.row, state.memory_rows);
   return state;
 }
@@ -178,6 +181,9 @@ void restore_state(const SavedState& from, bool continues, Batch& batch) {
   const MemoryPoints points = memory_points(model);
   const bool remembers = model.remembers() && from.memory;
   if (remembers) check_points(from, points);
+  const bool sleeps = continues && from.sleepers;
+  if (sleeps)
+    check_names(from, "trees that may sleep", from.sleepers->trees, sleeping_trees(model));
   std::vector<double> displacements(3 * points.count());
   for (int e = 0; e < batch.environments(); ++e) {
     const auto part = [e](const std::vector<double>& all, std::size_t width) {
@@ -196,6 +202,7 @@ void restore_state(const SavedState& from, bool continues, Batch& batch) {
         std::copy_n(entry.s, 3, &displacements[3 * static_cast<std::size_t>(entry.point)]);
       batch.set_memory(e, points.read(displacements));
     }
+    if (sleeps) batch.set_sleep(e, from.sleepers->environments[static_cast<std::size_t>(e)]);
     const StepStatus status = from.status[static_cast<std::size_t>(e)];
     if (failed(status)) batch.set_failed(e, status);
   }

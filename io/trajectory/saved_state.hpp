@@ -9,6 +9,7 @@
 
 #include "engine/step/batch.hpp"
 #include "io/trajectory/saved_memory.hpp"
+#include "io/trajectory/saved_sleep.hpp"
 
 namespace tangere {
 
@@ -23,7 +24,7 @@ struct SavedState {
   double timestep = 0;  ///< [s]
   double tolerance = 0;
   double accuracy = 0;  ///< 0: steps were not cut, or the file does not say
-  double sleep = 0;     ///< 0: no body slept
+  double sleep = 0;     ///< as in RunFacts; 0: no body slept
   std::string integrator, scene_text;
   std::vector<std::string> q_names;            ///< (nq)
   std::vector<std::string> v_names;            ///< (nv)
@@ -31,6 +32,7 @@ struct SavedState {
   std::vector<double> previous_q, previous_v;  ///< of row K - 1; empty if the file lacks it
   std::optional<SavedMemory> memory;           ///< none: the file does not hold it at row K
   std::vector<std::int64_t> memory_rows;       ///< those at which the file holds it
+  std::optional<SavedSleep> sleepers;          ///< none: the file does not hold who sleeps
   std::vector<StepStatus> status;              ///< (E) of the step to this row; converged for row 0
 };
 
@@ -45,9 +47,10 @@ SavedState read_state(const std::string& path, std::optional<std::int64_t> row);
 
 /// Copies environment e of a saved state to environment e of a batch. With `continues` it also sets
 /// the row before, so that the next step continues BDF2, and the step, with which the noise of
-/// sensors goes on. What friction remembers is set where the file holds it. An environment that had
-/// failed stays failed. Throws InputError when the coordinates or the points that remember do not
-/// match the model, or the batch is larger than the file's.
+/// sensors goes on. What friction remembers is set where the file holds it, and with `continues` who
+/// sleeps. An environment that had failed stays failed. Throws InputError when the coordinates, the
+/// points that remember or the trees that sleep do not match the model, or the batch is larger than
+/// the file's.
 void restore_state(const SavedState& from, bool continues, Batch& batch);
 
 }  // namespace tangere

@@ -14,12 +14,13 @@
 #include "io/hdf5/h5.hpp"
 #include "io/trajectory/memory_rows.hpp"
 #include "io/trajectory/sensor_description.hpp"
+#include "io/trajectory/sleep_rows.hpp"
 
 namespace tangere {
 
 namespace {
 
-constexpr std::int64_t kFormatVersion = 4;
+constexpr std::int64_t kFormatVersion = 5;
 constexpr hsize_t kChunkBytes = 1U << 20;
 
 /// A chunk has whole rows, about a megabyte.
@@ -68,6 +69,7 @@ struct TrajectoryFile::Impl {
     std::int64_t written = 0;
   } audit;
   std::optional<MemoryRows> memory;
+  std::optional<SleepRows> sleep;
   std::int64_t states = 0, steps = 0, actions = 0, poses = 0, positions = 0;
 
   Impl(const std::string& output, const TrajectoryLayout& l, bool overwrite)
@@ -81,6 +83,7 @@ struct TrajectoryFile::Impl {
     create_trajectory();
     for (const FieldOutput of : layout.fields) create_reading(of);
     if (layout.memory.count() > 0) memory.emplace(file, layout);
+    if (!layout.trees.empty()) sleep.emplace(file, layout);
     create_randomized();
     create_task();
   }
@@ -456,6 +459,11 @@ void TrajectoryFile::write(const MemoryRow& row) {
   if (impl_->memory) impl_->memory->write(row);
 }
 
+void TrajectoryFile::write(const SleepRow& row) {
+  const TrajectoryLayout& l = impl_->layout;
+  if (impl_->sleep) impl_->sleep->write(l.states.before(row.step, l.steps, l.first_step), row);
+}
+
 void TrajectoryFile::write(const GradientArrays& g) {
   const TrajectoryLayout& l = impl_->layout;
   const hsize_t E = static_cast<hsize_t>(l.environments), T = static_cast<hsize_t>(l.steps),
@@ -513,6 +521,7 @@ void TrajectoryFile::commit() {
   f.task = {};
   f.audit = {};
   f.memory.reset();
+  f.sleep.reset();
   h5::close_file(f.file, f.part.path());
   f.part.commit();
 }

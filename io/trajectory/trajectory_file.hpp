@@ -38,6 +38,7 @@ class TrajectoryFile : public RowSink {
   void write(const ActionRow& row) override;
   void write(const AuditRow& row) override;
   void write(const MemoryRow& row) override;
+  void write(const SleepRow& row) override;
   /// Called at most once. Sizes are those of the layout.
   void write(const GradientArrays& gradients);
 

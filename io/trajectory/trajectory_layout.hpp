@@ -51,6 +51,7 @@ struct TrajectoryLayout : RunFacts {
   int environments = 1;                 ///< E
   std::vector<std::string> body_names;  ///< (nb) recorded, empty when no poses are
   MemoryPoints memory;                  ///< what friction remembers; no points: it is not recorded
+  std::vector<std::string> trees;       ///< that may sleep, each by its first body; none: no sleep
   /// At which rows q and v, bodies, end effectors and memory are recorded; none: at all. Where
   /// `states` are given, there are no controls, and of the solver's numbers the status alone.
   OutputTimes states = {}, of_bodies = {}, of_end_effectors = {}, of_memory = {};

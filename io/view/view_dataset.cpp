@@ -24,7 +24,9 @@ struct Demo {
 class DatasetView {
  public:
   DatasetView(const std::string& path, const ViewOptions& options)
-      : options_(options), path_(path), dataset_(find_dataset(path)) {}
+      : options_(options), path_(path), dataset_(find_dataset(path)) {
+    add_merged_inputs(dataset_);
+  }
 
   ViewData read() {
     choose_demos();

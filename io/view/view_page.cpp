@@ -8,6 +8,7 @@
 #include <variant>
 
 #include "engine/model/shapes.hpp"
+#include "io/files/printable_text.hpp"
 #include "io/picture/body_faces.hpp"
 #include "io/view/page_files.hpp"
 
@@ -150,8 +151,10 @@ std::string view_json(const ViewData& data) {
         {{"name", end.name}, {"radius", end.radius}, {"rgba", end.rgba}});
   page["episodes"] = Json::array();
   for (const ViewEpisode& episode : data.episodes) page["episodes"].push_back(episode_of(episode));
-  // Names come from files: bytes that are no UTF-8 are replaced, and no name ends the block.
-  const std::string text = page.dump(-1, ' ', false, Json::error_handler_t::replace);
+  // Names come from files: bytes that are no UTF-8 are replaced, characters that the page should
+  // not obey are spelt out, and no name ends the block.
+  const std::string text =
+      printable(page.dump(-1, ' ', false, Json::error_handler_t::replace), "\\\\u");
   std::string safe;
   safe.reserve(text.size());
   for (const char c : text) {

@@ -374,6 +374,17 @@ FieldSequence simulate_fields(const Scene& scene, const RecordedRun& run) {
   return out;
 }
 
+double identification_bytes(const Model& model, const RecordedRun& run, std::size_t numbers) {
+  GradientOptions options;
+  options.steps = run.steps;
+  options.parameters = true;
+  // The recording, its residuals, two runs of a difference, and columns of the Jacobian.
+  const double sequences = 4 + static_cast<double>(numbers);
+  return sequences * static_cast<double>(run.steps / run.every) *
+             static_cast<double>(numbers_of_fields(model) * sizeof(double)) +
+         gradient_bytes(model, 1, options, 1);
+}
+
 void add_noise(FieldSequence& sequence, double deviation, std::uint64_t seed) {
   for (std::size_t k = 0; k < sequence.readings.size(); ++k)
     for (std::size_t i = 0; i < sequence.readings[k].size(); ++i)

@@ -32,6 +32,9 @@ struct RecordedRun {
 /// fails.
 FieldSequence simulate_fields(const Scene& scene, const RecordedRun& run);
 
+/// Memory of a fit of `numbers` numbers to such a run [bytes].
+double identification_bytes(const Model& model, const RecordedRun& run, std::size_t numbers);
+
 /// Adds independent normal noise to every number of every field.
 void add_noise(FieldSequence& sequence, double deviation, std::uint64_t seed);
 

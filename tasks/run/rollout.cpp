@@ -87,6 +87,7 @@ class Recorder {
     if (bodies) row.body_pose = pose_, row.body_twist = twist_;
     if (end_effectors) row.end_effectors = end_effectors_;
     sink_.write(row);
+    if (states) sink_.write(SleepRow{step, batch_.sleeps()});
   }
 
   void write_memory(std::int64_t step) {

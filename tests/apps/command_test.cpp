@@ -215,6 +215,15 @@ INSTANTIATE_TEST_SUITE_P(
     Size, Mistakes,
     testing::Values(
         Mistake{"memory", simulate({"--envs", "1000000000"}), 2, "--envs 1000000000 needs "},
+        Mistake{"fit",
+                {"identify", scene("identify_ball.xml"), "--number", "tactile pad kn", "--steps",
+                 "1000000000000"},
+                2,
+                "a fit of 1000000000000 steps needs "},
+        Mistake{"gradients",
+                {"gradcheck", scene("rolling_ball_small.xml"), "--steps", "1000000000000"},
+                2,
+                "gradients of 1000000000000 steps needs "},
         Mistake{"disk", simulate({"--steps", "1000000000000"}), 3, "bytes"},
         Mistake{"beyond_any_disk", simulate({"--timestep", "1e-300"}), 2, "2^63 bytes"}),
     [](const auto& test) { return test.param.name; });

@@ -281,6 +281,30 @@ TEST(GeneratePolicy, ManyThreadsWaitOnceForAProgramThatIsMute) {
   EXPECT_EQ(heard.size() - first, 8 + 16 * (8 + 8 + 4 * width));
 }
 
+/// The child keeps the socket and the streams of the command, on whose end the test waits.
+TEST(GeneratePolicy, ChildrenOfAProgramThatHasEndedAreNotWaitedFor) {
+  const Folder folder;
+  const auto start = std::chrono::steady_clock::now();
+  for (const std::string& program :
+       {std::string(TANGERE_POLICY_PROGRAM " leaves_child 2"),
+        std::string("sh -c '" TANGERE_POLICY_PROGRAM " leaves_child 2'")}) {
+    const Outcome outcome =
+        run(folder, pushes("set", {"--program", program, "--program-timeout", "300", "--quiet"}));
+    EXPECT_EQ(outcome.exit_code, 3);
+    EXPECT_THAT(outcome.err, HasSubstr("has ended with exit code 7"));
+    EXPECT_THAT(folder.files(), ::testing::IsEmpty());
+  }
+  EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(300));
+}
+
+TEST(GeneratePolicy, AProgramMayStopTheRun) {
+  const Folder folder;
+  const Outcome outcome = run(
+      folder, pushes("set", {"--program", TANGERE_POLICY_PROGRAM " stops_parent 3", "--quiet"}));
+  EXPECT_EQ(outcome.exit_code, 75) << outcome.err;
+  EXPECT_THAT(outcome.err, HasSubstr("stopped by SIGTERM"));
+}
+
 /// Goes wrong at the question whose number is given; shards that were complete then stay.
 TEST(GeneratePolicy, AProgramThatGoesWrongLeavesWholeShards) {
   const Folder folder;

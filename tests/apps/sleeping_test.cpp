@@ -3,6 +3,9 @@
 // without it.
 #include <gmock/gmock.h>
 
+#include <algorithm>
+#include <cstring>
+
 #include "io/hdf5/h5.hpp"
 #include "tests/apps/program.hpp"
 #include "tests/files.hpp"
@@ -99,14 +102,80 @@ TEST(Sleeping, WhatDoesNotGoTogetherIsRefused) {
   EXPECT_FALSE(std::filesystem::exists(folder.path("x.h5")));
 }
 
-TEST(Sleeping, ARunThatGoesOnStartsAwakeAndSaysSo) {
+/// Numbers of a dataset of any shape, as f64.
+std::vector<double> numbers_of(const h5::Id& file, const std::string& name) {
+  const h5::Id dataset = h5::open_dataset(file, name);
+  const h5::Dims dims = h5::dimensions(dataset);
+  std::size_t count = 1;
+  for (const hsize_t n : dims) count *= n;
+  std::vector<double> numbers(count);
+  h5::read_box<double>(dataset, h5::Dims(dims.size(), 0), dims, numbers.data());
+  return numbers;
+}
+
+/// Whether the last rows of one dataset are all rows of another, to the bit.
+bool ends_with(const std::vector<double>& whole, const std::vector<double>& end) {
+  return end.size() <= whole.size() && std::memcmp(whole.data() + (whole.size() - end.size()),
+                                                   end.data(), end.size() * sizeof(double)) == 0;
+}
+
+TEST(Sleeping, ARunThatGoesOnHasTheBitsOfOneLongRun) {
+  const Folder folder;
+  for (const char* const name : {"ten_boxes", "rolling_ball_small", "insertion"}) {
+    const Words base{"simulate", scene(std::string(name) + ".xml"), "--sleep"};
+    run_json(folder,
+             base + Words{"-o", "whole.h5", "--overwrite", "--steps", "120", "--envs", "3"});
+    const h5::Id whole = h5::open_file(folder.path("whole.h5"));
+    const std::vector<double> rested = numbers_of(whole, "sleep/rested");
+    EXPECT_GT(*std::max_element(rested.begin(), rested.end()), 0) << name << ": nothing rests";
+    for (const int row : {0, 20, 37, 80}) {
+      SCOPED_TRACE(name + (" from row " + std::to_string(row)));
+      const Outcome outcome =
+          run(folder,
+              base + Words{"-o", "end.h5", "--overwrite", "--state-from", "whole.h5", "--row",
+                           std::to_string(row), "--steps", std::to_string(120 - row), "--quiet"});
+      ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+      const h5::Id end = h5::open_file(folder.path("end.h5"));
+      for (const char* const of : {"q", "v", "sleep/island", "sleep/rested", "sleep/resting"})
+        EXPECT_TRUE(ends_with(numbers_of(whole, of), numbers_of(end, of))) << of;
+    }
+  }
+}
+
+TEST(Sleeping, ARunThatGoesOnSaysWhatItLacks) {
   const Folder folder;
   simulate_boxes(folder, "first.h5", kShort + Words{"--sleep"});
+  simulate_boxes(folder, "awake.h5", kShort);
+  const auto said = [&](const std::string& from) {
+    const Outcome outcome = run(folder, Words{"simulate", kBoxes, "-o", "second.h5", "--overwrite",
+                                              "--state-from", from, "--sleep"} +
+                                            kShort);
+    EXPECT_EQ(outcome.exit_code, 0);
+    return outcome.err;
+  };
+  EXPECT_THAT(said("first.h5"), ::testing::Not(HasSubstr("one long run")));
+  EXPECT_THAT(said("awake.h5"), HasSubstr("made with sleep 0, this run has 0.001"));
+  {  // as older versions wrote it
+    const h5::Id file(H5Fopen(folder.path("first.h5").c_str(), H5F_ACC_RDWR, H5P_DEFAULT));
+    ASSERT_GE(H5Ldelete(file.get(), "sleep", H5P_DEFAULT), 0);
+  }
+  EXPECT_THAT(said("first.h5"), HasSubstr("does not hold which bodies slept"));
+}
+
+TEST(Sleeping, ADamagedRecordOfSleepStartsNoRun) {
+  const Folder folder;
+  simulate_boxes(folder, "first.h5", kShort + Words{"--sleep"});
+  {
+    const h5::Id file(H5Fopen(folder.path("first.h5").c_str(), H5F_ACC_RDWR, H5P_DEFAULT));
+    const h5::Id island(H5Dopen2(file.get(), "sleep/island", H5P_DEFAULT));
+    const std::int32_t wrong = 1'000'000;
+    h5::write_box<std::int32_t>(island, {120, 0, 3}, {1, 1, 1}, &wrong);
+  }
   const Outcome outcome = run(
       folder,
       Words{"simulate", kBoxes, "-o", "second.h5", "--state-from", "first.h5", "--sleep"} + kShort);
-  EXPECT_EQ(outcome.exit_code, 0);
-  EXPECT_THAT(outcome.err, HasSubstr("does not hold which bodies slept"));
+  EXPECT_EQ(outcome.exit_code, 2);
+  EXPECT_THAT(outcome.err, HasSubstr("who sleeps in environment 0; expected islands"));
 }
 
 }  // namespace

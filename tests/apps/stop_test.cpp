@@ -3,6 +3,7 @@
 // partial.
 #include <fcntl.h>
 #include <gmock/gmock.h>
+#include <sys/resource.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -69,6 +70,37 @@ TEST_P(Stop, KeepsTheFileThatWasToBeReplaced) {
   EXPECT_EQ(folder.read("out.h5"), "older");
 }
 
+/// A short command is stopped now and then between any two of its instructions.
+TEST_P(Stop, LeavesNoPartOfAShortCommand) {
+  const auto [signal, exit_code] = GetParam();
+  const Folder folder;
+  ASSERT_EQ(run(folder, {"generate", scene("rolling_ball_small.xml"), "-o", "set", "--episodes",
+                         "64", "--steps", "40", "--every", "1", "--no-merge", "--quiet"})
+                .exit_code,
+            0);
+  for (const Words& words : {Words{"export", "set", "--csv", "out"},
+                             Words{"view", "set", "-o", "out", "--episodes", "64"}}) {
+    int stopped = 0;
+    for (int attempt = 0; attempt < 60 && stopped < 2; ++attempt) {
+      Program program(folder, words + Words{"--overwrite", "--json"});
+      const auto start = std::chrono::steady_clock::now();
+      while (!std::filesystem::exists(folder.path("out.part")) &&
+             std::chrono::steady_clock::now() - start < std::chrono::seconds(2))
+        std::this_thread::yield();
+      program.send(signal);
+      const Outcome outcome = program.wait();
+      EXPECT_EQ(outcome.signal, 0);
+      EXPECT_FALSE(std::filesystem::exists(folder.path("out.part")));
+      if (outcome.exit_code == 0) continue;
+      ++stopped;
+      EXPECT_EQ(outcome.exit_code, exit_code) << outcome.err;
+      EXPECT_THAT(outcome.err, HasSubstr("no half-written file is left"));
+      EXPECT_EQ(nlohmann::json::parse(outcome.out).at("exit_code"), exit_code);
+    }
+    EXPECT_GT(stopped, 0) << words.front();
+  }
+}
+
 INSTANTIATE_TEST_SUITE_P(Signals, Stop,
                          testing::Values(std::pair{SIGINT, 130}, std::pair{SIGTERM, 75}));
 
@@ -126,6 +158,65 @@ TEST(TwoRuns, OfOneOutputDoNotMeet) {
   first.send(SIGTERM);
   EXPECT_EQ(first.wait().exit_code, 75);
   EXPECT_THAT(folder.files(), IsEmpty());
+}
+
+/// What programs that start from now on may use.
+class Limit {
+ public:
+  Limit(int what, rlim_t most) : what_(what) {
+    getrlimit(what_, &before_);
+    const rlimit limit{most, before_.rlim_max};
+    setrlimit(what_, &limit);
+  }
+  ~Limit() { setrlimit(what_, &before_); }
+  Limit(const Limit&) = delete;
+  Limit& operator=(const Limit&) = delete;
+
+ private:
+  int what_;
+  rlimit before_{};
+};
+
+TEST(FileSizeLimit, FailsTheWriteOfEveryCommand) {
+  const Folder folder;
+  std::filesystem::copy_file(scene("rolling_ball_small.xml"), folder.path("s.xml"));
+  ASSERT_EQ(run(folder, {"generate", "s.xml", "-o", "set", "--episodes", "8", "--steps", "20",
+                         "--every", "5", "--no-merge", "--quiet"})
+                .exit_code,
+            0);
+  ASSERT_EQ(run(folder, {"simulate", "s.xml", "-o", "run.h5", "--steps", "10"}).exit_code, 0);
+  const std::vector<std::string> before = folder.files();
+  const Words fit{"identify", scene("identify_ball.xml"), "--number", "tactile pad kn", "--steps",
+                  "10"};
+  for (const Words& words :
+       {Words{"simulate", "s.xml", "-o", "out", "--steps", "10"}, Words{"view", "set", "-o", "out"},
+        Words{"export", "set", "--csv", "out"}, Words{"plot", "run.h5", "-o", "out"},
+        Words{"plot", "s.xml", "-o", "out"}, fit + Words{"--svg", "out"}, Words{"merge", "set"}}) {
+    const Limit small(RLIMIT_FSIZE, 2000);
+    const Outcome outcome = run(folder, words + Words{"--quiet"});
+    EXPECT_EQ(outcome.exit_code, 3) << words.front() << outcome.err;
+    EXPECT_THAT(outcome.err, HasSubstr("File too large")) << words.front();
+    if (words.front() != "merge") {
+      EXPECT_EQ(folder.files(), before) << words.front();
+    }
+  }
+}
+
+/// HDF5 uses some memory without checking that it got it.
+TEST(AddressSpaceLimit, EndsWithACodeAndAMessage) {
+  const Folder folder;
+  const Words words{"generate",   scene("rolling_ball_small.xml"),
+                    "-o",         "set",
+                    "--episodes", "32",
+                    "--steps",    "20",
+                    "--every",    "5",
+                    "--quiet",    "--overwrite"};
+  for (rlim_t kilobytes = 44'000; kilobytes <= 64'000; kilobytes += 1000) {
+    const Limit small(RLIMIT_AS, kilobytes * 1024);
+    const Outcome outcome = run(folder, words);
+    EXPECT_EQ(outcome.signal, 0) << kilobytes << " kB";
+    EXPECT_TRUE(outcome.exit_code == 0 || !outcome.err.empty()) << kilobytes << " kB";
+  }
 }
 
 }  // namespace

@@ -67,6 +67,9 @@ int main(int argc, char** argv) {
       if (wrong == "dies") _exit(7);
       if (wrong == "crashes") raise(SIGKILL);
       if (wrong == "hangs") pause();
+      if (wrong == "leaves_child" && fork() > 0) _exit(7);
+      if (wrong == "leaves_child") pause();
+      if (wrong == "stops_parent") kill(getppid(), SIGTERM);
       if (wrong == "nan") answer.back() = std::numeric_limits<double>::quiet_NaN();
       if (wrong == "negative") count = -1;
       if (wrong == "endless") count = std::numeric_limits<std::int64_t>::max();
