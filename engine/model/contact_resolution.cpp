@@ -22,7 +22,7 @@ namespace tangere {
 
 namespace {
 
-constexpr int kPlaces = 500;
+constexpr int kTriedPlaces = 500;
 /// Share by which a body may be wider than the gap and still fit.
 constexpr double kAsWide = 1e-3;
 
@@ -67,8 +67,8 @@ Places places_of(const CapsuleShape& shape) {
 Places places_of(const EllipsoidShape& shape) {
   constexpr double kTurn = std::numbers::pi * (3 - 2.23606797749978969);  // golden angle [rad]
   Places places;
-  for (int k = 0; k < kPlaces; ++k) {
-    const double z = 1 - (2 * k + 1.0) / kPlaces;
+  for (int k = 0; k < kTriedPlaces; ++k) {
+    const double z = 1 - (2 * k + 1.0) / kTriedPlaces;
     const Vector3 on_ball = around_z(std::sqrt(1 - z * z), k * kTurn, z);
     places.push_back({0.5 * shape.size[0] * on_ball[0], 0.5 * shape.size[1] * on_ball[1],
                       0.5 * shape.size[2] * on_ball[2]});
@@ -76,7 +76,7 @@ Places places_of(const EllipsoidShape& shape) {
   return places;
 }
 
-/// Returns the middles of the triangles' parts, so that the area is covered by about kPlaces.
+/// Returns the middles of the triangles' parts, so that the area is covered by about kTriedPlaces.
 Places places_of(const MeshShape& mesh) {
   const auto corner = [&](int v, std::size_t c) {
     return mesh.scale * mesh.vertices[3 * std::size_t(v) + c];
@@ -95,11 +95,11 @@ Places places_of(const MeshShape& mesh) {
   };
   double whole = 0;
   for (const auto& t : mesh.triangles) whole += area(t);
-  const std::size_t skip = std::max<std::size_t>(1, mesh.triangles.size() / kPlaces);
+  const std::size_t skip = std::max<std::size_t>(1, mesh.triangles.size() / kTriedPlaces);
   Places places;
   for (std::size_t k = 0; k < mesh.triangles.size(); k += skip) {
     const auto& t = mesh.triangles[k];
-    const int n = std::clamp(int(std::ceil(std::sqrt(kPlaces * area(t) / whole))), 1, 64);
+    const int n = std::clamp(int(std::ceil(std::sqrt(kTriedPlaces * area(t) / whole))), 1, 64);
     for (int i = 0; i < n; ++i)
       for (int j = 0; j < n - i; ++j)
         places.push_back(place(t, (i + 1.0 / 3) / n, (j + 1.0 / 3) / n));

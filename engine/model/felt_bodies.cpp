@@ -15,7 +15,10 @@ namespace {
 class Feeling {
  public:
   Feeling(const Scene& scene, const TactileDescription& sensor)
-      : scene_(scene), sensor_(sensor), own_(moving_link(scene, find(sensor.body, "body"))) {
+      : scene_(scene),
+        sensor_(sensor),
+        body_(find(sensor.body, "body")),
+        own_(moving_link(scene, body_)) {
     if (!sensor.feels.empty() && !sensor.ignores.empty())
       fail("has both feels and ignores; expected one of them");
     for (const std::string& name : sensor.feels) {
@@ -36,7 +39,7 @@ class Feeling {
     const std::string& name = scene_.links[std::size_t(k)].body.name;
     if (link == own_ || !has_distance(shape(k))) return false;
     if (!sensor_.feels.empty()) return has(sensor_.feels, name);
-    return !has(sensor_.ignores, name) && (!jointed(link) || in_contact(link));
+    return !has(sensor_.ignores, name) && (!jointed(k) || in_contact(link));
   }
 
  private:
@@ -55,13 +58,22 @@ class Feeling {
         fmt::format("{}<tactile>: sensor '{}' {}", sensor_.source.prefix(), sensor_.name, what));
   }
 
-  /// Whether a joint connects a link with the sensor's.
+  /// Returns the first link up the tree whose joint is not fixed, or the root.
+  [[nodiscard]] int rigid_root(int link) const {
+    while (scene_.links[std::size_t(link)].joint.type == JointType::fixed &&
+           scene_.links[std::size_t(link)].parent >= 0)
+      link = scene_.links[std::size_t(link)].parent;
+    return link;
+  }
+  /// Whether a joint connects a link, with all that is rigidly joined to it, with the sensor's. So a
+  /// palm that is fixed in the world is a neighbour of its fingers, and a table is not.
   [[nodiscard]] bool jointed(int link) const {
     const auto hangs_on = [&](int child, int parent) {
-      return child >= 0 && parent >= 0 &&
-             moving_link(scene_, scene_.links[std::size_t(child)].parent) == parent;
+      const int carrier = scene_.links[std::size_t(child)].parent;
+      return carrier >= 0 && rigid_root(carrier) == parent;
     };
-    return hangs_on(link, own_) || hangs_on(own_, link);
+    const int one = rigid_root(link), two = rigid_root(body_);
+    return hangs_on(one, two) || hangs_on(two, one);
   }
 
   /// Whether a contact of bodies of a link and the sensor's is declared.
@@ -81,7 +93,7 @@ class Feeling {
 
   const Scene& scene_;
   const TactileDescription& sensor_;
-  int own_;
+  int body_, own_;
 };
 
 }  // namespace

@@ -16,7 +16,7 @@ int moving_link(const Scene& scene, int link);
 ///  - that it names in `feels`, or
 ///  - without `feels`: that it does not name in `ignores`, and that no joint connects with its body
 ///    unless a contact of the two is declared. Links that a joint connects overlap there in most
-///    robots, and the world connects nothing.
+///    robots. Bodies that are rigidly joined to a neighbour are neighbours, and the world is none.
 /// Throws InputError, which names sensor and body, for names that no body has, for bodies that the
 /// sensor cannot feel, and if both lists are given.
 std::vector<int> felt_bodies(const Scene& scene, const TactileDescription& sensor);

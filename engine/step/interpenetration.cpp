@@ -32,16 +32,16 @@ namespace {
 
 constexpr int kMostCuts = 120;
 
-double norm(const Vec3<double>& a) { return std::sqrt(dot(a, a)); }
+double euclidean(const Vec3<double>& a) { return std::sqrt(dot(a, a)); }
 
 /// A ball around a body, body frame.
-struct Ball {
+struct BoundingBall {
   Vec3<double> centre{};
   double radius = 0;  ///< [m]
 };
 
 /// Returns half the widths of a shape of this size along its axes [m]; zeros of a mesh or a plane.
-Vec3<double> half_widths(PrimitiveShape shape, const Vec3<double>& size) {
+Vec3<double> half_extents(PrimitiveShape shape, const Vec3<double>& size) {
   const ShapeRow& row = row_of(shape);
   if (row.half_widths == nullptr) return {0, 0, 0};
   const HalfWidths half = row.half_widths({size.x, size.y, size.z});
@@ -49,13 +49,13 @@ Vec3<double> half_widths(PrimitiveShape shape, const Vec3<double>& size) {
           half.straight[2] + half.round[2]};
 }
 
-Ball ball_around(const CompiledBody& body, const Vec3<double>& size) {
-  if (body.grid == nullptr) return {{0, 0, 0}, norm(half_widths(body.shape, size))};
-  Ball ball;
+BoundingBall ball_around(const CompiledBody& body, const Vec3<double>& size) {
+  if (body.grid == nullptr) return {{0, 0, 0}, euclidean(half_extents(body.shape, size))};
+  BoundingBall ball;
   const double* const low = body.grid->low;
   const double* const high = body.grid->high;
   ball.centre = 0.5 * size.x * Vec3<double>{low[0] + high[0], low[1] + high[1], low[2] + high[2]};
-  ball.radius = 0.5 * size.x * norm({high[0] - low[0], high[1] - low[1], high[2] - low[2]});
+  ball.radius = 0.5 * size.x * euclidean({high[0] - low[0], high[1] - low[1], high[2] - low[2]});
   return ball;
 }
 
@@ -82,7 +82,7 @@ class Interpenetration::Lane {
   /// Bounds the overlap until it is clear whether it exceeds `threshold`, to a quarter of it.
   [[nodiscard]] Overlap overlap(const CoarsePair& pair, double threshold) const {
     const Solid one = solid(pair.body1), two = solid(pair.body2);
-    const double apart = norm(two.centre - one.centre) - one.ball.radius - two.ball.radius;
+    const double apart = euclidean(two.centre - one.centre) - one.ball.radius - two.ball.radius;
     if (apart > 0) return {-HUGE_VAL, -apart};
     const Solid& smaller = one.ball.radius < two.ball.radius ? one : two;
     Vec3<double> x = smaller.centre;
@@ -128,7 +128,7 @@ class Interpenetration::Lane {
     const CompiledBody& body;
     Frame<double> frame;  ///< in the world
     Vec3<double> size;
-    Ball ball;
+    BoundingBall ball;
     Vec3<double> centre;  ///< of the ball, in the world
     bool mesh;
   };
@@ -161,7 +161,7 @@ class Interpenetration::Lane {
     const CompiledBody& body = m_.bodies[std::size_t(b)];
     const Vec3<double> size = this->size(body);
     if (body.grid != nullptr) return size.x * body.inscribed;
-    const Vec3<double> half = half_widths(body.shape, size);
+    const Vec3<double> half = half_extents(body.shape, size);
     return std::min({half.x, half.y, half.z});
   }
 
@@ -197,14 +197,14 @@ void Interpenetration::bound_arms() {
       const CompiledBody& body = model_.bodies[std::size_t(b)];
       if (body.link >= 0) checked_[std::size_t(body.link)] = 1;
       has_pairs_ = true;
-      const Ball ball = ball_around(body, body.size);
+      const BoundingBall ball = ball_around(body, body.size);
       const Vec3<double> centre = body.frame.R * ball.centre + body.frame.p;
       // A sphere is where its centre is, however it turns.
-      double arm = norm(centre);
+      double arm = euclidean(centre);
       if (body.shape != PrimitiveShape::sphere) arm += std::max(ball.radius, body.extent);
       for (int i = body.link; i >= 0; i = links[std::size_t(i)].parent) {
         arm_[std::size_t(i)] = std::max(arm_[std::size_t(i)], arm);
-        arm += norm(links[std::size_t(i)].frame.p);
+        arm += euclidean(links[std::size_t(i)].frame.p);
       }
     }
   std::vector<std::uint8_t> turned(links.size(), 0);  // by a link that carries it

@@ -384,6 +384,7 @@ class Bodies {
     const double mass = node.not_negative("mass", 0.0);
     const bool heavy = counts && (node.has("mass") ? mass > 0 : density > 0);
     if (!touches && !heavy) return node.idle("<geom> that touches nothing: " + std::string(kSight));
+    piece.touches = touches;
     const MjcfMesh* mesh = nullptr;
     if (!read_shape(node, piece, mesh)) return;
     piece.pose = compose(frame, piece.pose);

@@ -372,9 +372,14 @@ void read_mjcf(const RobotNode& root, const std::string& keyframe, bool free_bas
   const std::optional<RobotNode> key = find_mjcf_keyframe(file, keyframes, keyframe);
   each("actuator", [&](const RobotNode& s) { read_mjcf_actuators(file, s); });
   each("contact", [&](const RobotNode& s) {
-    static_cast<void>(s.parts(
-        {{"pair", Fate::lost, "a contact with coefficients of MuJoCo's; --contact A=B adds one"},
-         {"exclude", Fate::idle, "a scene has only the contacts that it names"}}));
+    for (const RobotNode& exclude :
+         s.parts({{"pair", Fate::lost,
+                   "a contact with coefficients of MuJoCo's; --contact A=B adds one"},
+                  {"exclude"}})) {
+      exclude.check({{"name", Fate::idle, kSight}, {"body1"}, {"body2"}});
+      file.robot.excluded.push_back({exclude.text("body1"), exclude.text("body2")});
+      exclude.idle("<exclude>: a scene has only the contacts that it names");
+    }
   });
   if (key) read_mjcf_keyframe(file, *key);
   file.take_warnings(root.context().warnings);

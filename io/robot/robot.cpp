@@ -89,6 +89,7 @@ int add_link(Robot& robot, RobotNames& names, const std::string& name, int paren
       robot.origins[name] += fmt::format(", {} of {}", piece.origin, place_in(robot, piece.source));
     }
     if (std::holds_alternative<MeshShape>(piece.shape)) robot.meshes[body.name] = piece.mesh;
+    if (!piece.touches && !only_mass) robot.untouched.push_back(body.name);
     robot.scene.links.back().body = std::move(body);
   }
   return index;

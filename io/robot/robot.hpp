@@ -2,6 +2,7 @@
 // What a robot file becomes before it is written as a scene.
 #pragma once
 
+#include <array>
 #include <map>
 #include <memory>
 #include <optional>
@@ -54,6 +55,9 @@ struct Robot {
   std::map<std::string, MeshFile> meshes;            ///< by body
   std::map<std::string, std::string> origins;  ///< by link: what of the file it was, for a comment
   std::set<std::string> pieces;  ///< links made for further shapes of the link that they hang on
+  std::vector<std::string> untouched;  ///< bodies that touch nothing in the file, in its order
+  std::vector<std::array<std::string, 2>>
+      excluded;                           ///< pairs of links that do not touch each other
   std::map<std::string, double> efforts;  ///< by joint: largest force or torque [N or N m]
   std::map<std::string, RobotSite> sites;
   /// By motor of the scene: the control that a keyframe gives it. No value without a keyframe.
@@ -95,8 +99,9 @@ struct RobotPiece {
   Pose pose;
   double density = 0;  ///< [kg/m³]; 0: it has no mass of its own
   std::array<double, 4> rgba{0.7, 0.7, 0.7, 1};
-  MeshFile mesh;       ///< of mesh shapes
-  std::string origin;  ///< "<collision>", "<geom>"
+  bool touches = true;  ///< false: it has a mass, and nothing touches it
+  MeshFile mesh;        ///< of mesh shapes
+  std::string origin;   ///< "<collision>", "<geom>"
   Source source;
 };
 

@@ -79,6 +79,29 @@ std::string children_text(const tinyxml2::XMLElement& sensor) {
   return text;
 }
 
+/// Returns the bodies that a skin on `link` must not feel, as an attribute: those that touch nothing
+/// in the file, and those of links that the file excludes from contact with this one.
+std::string ignores_text(const Robot& robot, const LinkDescription& link) {
+  std::vector<std::string> names = robot.untouched;
+  const auto add_link = [&](const std::string& name) {
+    for (const LinkDescription& other : robot.scene.links) {
+      const bool piece = robot.pieces.contains(other.name) && other.parent >= 0 &&
+                         robot.scene.links[std::size_t(other.parent)].name == name;
+      if ((other.name == name || piece) && has_distance(other.body.shape) &&
+          std::ranges::find(names, other.body.name) == names.end())
+        names.push_back(other.body.name);
+    }
+  };
+  for (const auto& [one, two] : robot.excluded) {
+    if (one == link.name) add_link(two);
+    if (two == link.name) add_link(one);
+  }
+  std::erase_if(names, [&](const std::string& name) { return name == link.body.name; });
+  return names.empty() ? ""
+                       : fmt::format(" ignores=\"{}\"",
+                                     attribute_text(fmt::to_string(fmt::join(names, ","))));
+}
+
 }  // namespace
 
 std::string pads_text(const Robot& robot, const std::vector<PadRequest>& pads,
@@ -112,6 +135,7 @@ std::string pads_text(const Robot& robot, const std::vector<PadRequest>& pads,
         if (known != "name" && known != "body" && known != "pos" && known != "quat")
           text += fmt::format(" {}=\"{}\"", known, attribute_text(a->Value()));
       }
+      if (!sensor.has("feels") && !sensor.has("ignores")) text += ignores_text(robot, link);
       const std::string inside = children_text(sensor.element());
       text += inside.empty() ? "/>\n" : ">\n" + inside + "    </tactile>\n";
     }

@@ -59,6 +59,11 @@ TEST(FeltBodies, NeighboursAreLeftOutUnlessTheyTouch) {
   // The world is nobody's neighbour: a skin on the palm feels a table that is fixed in it.
   s.sensors[0].body = "palm";
   EXPECT_THAT(felt(s), ElementsAre("distal", "nail", "egg", "table"));
+  // Nor does a palm that is fixed in the world make the table one.
+  s.links[0].joint.type = JointType::fixed;
+  EXPECT_THAT(felt(s), ElementsAre("distal", "nail", "egg"));
+  s.sensors[0].body = "thumb";
+  EXPECT_THAT(felt(s), ElementsAre("proximal", "distal", "nail", "egg", "table"));
 }
 
 TEST(FeltBodies, ListsChoose) {

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <fstream>
 
+#include "engine/model/felt_bodies.hpp"
 #include "engine/model/model.hpp"
 #include "engine/model/shapes.hpp"
 #include "engine/step/stepper.hpp"
@@ -253,6 +254,40 @@ TEST_F(RobotKinds, APointerOfGitLfsIsNamed) {
                             "<collision><geometry><mesh filename=\"t.stl\"/></geometry>"
                             "</collision>")),
               HasSubstr("t.stl:1: a pointer of Git LFS"));
+}
+
+/// A skin does not feel what the file keeps from touching its link: geoms without contact, and links
+/// of an <exclude>, with all their shapes.
+TEST_F(RobotKinds, SkinsIgnoreWhatTouchesNothing) {
+  const std::string text =
+      "<mujoco><worldbody><body name=\"palm\"><joint name=\"p\" type=\"slide\"/>"
+      "<geom type=\"box\" size=\"0.02 0.02 0.02\"/>"
+      "<body name=\"tip\" pos=\"0.1 0 0\"><joint name=\"t\"/>"
+      "<geom type=\"box\" size=\"0.01 0.01 0.01\"/></body>"
+      "<body name=\"thumb\" pos=\"0 0.1 0\"><joint name=\"h\"/>"
+      "<geom type=\"box\" size=\"0.01 0.01 0.01\"/><geom type=\"sphere\" size=\"0.01\" pos=\"0 0 "
+      "0.02\"/>"
+      "</body>"
+      "<body name=\"cover\" pos=\"0 0 0.1\"><joint name=\"c\"/>"
+      "<geom type=\"box\" size=\"0.01 0.01 0.01\" contype=\"0\" conaffinity=\"0\"/></body>"
+      "<body name=\"finger\" pos=\"0 0 0.2\"><joint name=\"f\"/>"
+      "<geom type=\"box\" size=\"0.01 0.01 0.01\"/></body>"
+      "</body></worldbody><contact><exclude body1=\"thumb\" body2=\"tip\"/></contact></mujoco>";
+  std::ofstream(folder_ / "robot.xml") << text;
+  const std::string layout =
+      "<sensor unit=\"m-kg\"><tactile name=\"skin\" type=\"rect_array\" rect_pos0=\"-0.01 -0.01 "
+      "0\" "
+      "rect_pos1=\"0.01 0.01 0\" axis0=\"1 0 0\" axis1=\"0 1 0\" resolution=\"2 2\" "
+      "kn=\"1\"/></sensor>";
+  RobotOptions options;
+  options.pads = {{"tip", "skin.xml", layout, {}, "+x"}};
+  const ImportedScene made = import_robot(folder_ / "robot.xml", folder_ / "scene.xml", options);
+  const Scene scene = parse_scene(made.text, folder_ / "scene.xml").scene;
+  EXPECT_THAT(scene.sensors.at(0).ignores, ElementsAre("cover", "thumb", "thumb_shape"));
+  std::vector<std::string> felt;
+  for (const int k : felt_bodies(scene, scene.sensors[0]))
+    felt.push_back(scene.links[std::size_t(k)].body.name);
+  EXPECT_THAT(felt, ElementsAre("finger")) << "the palm is a neighbour";
 }
 
 }  // namespace
