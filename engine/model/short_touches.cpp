@@ -13,9 +13,9 @@
 namespace tangere {
 namespace {
 
-/// Share of the speed that a touch loses.
-constexpr double kLost = 0.05;
-/// Steps of a touch with which a scheme loses less than that.
+/// Share of the speed that a touch loses by damping that counts as none.
+constexpr double kUndamped = 1e-4;
+/// Steps of a touch with which a scheme loses less than a twentieth of the speed.
 double steps_needed(Integrator integrator) { return integrator.scheme().order > 1 ? 20 : 100; }
 
 /// Returns the speed of a body that has fallen through half of the scene's extent, or 1 m/s without
@@ -51,7 +51,7 @@ std::vector<std::string> short_touches(const Model& model, Integrator integrator
     if (of.damping.row >= 0 || !(of.kn.value > 0) || !(inverse > 0)) return;
     const double touch = std::numbers::pi / std::sqrt(of.kn.value * inverse),
                  lost = lost_share(law, of.kn.value, of.damping.value, inverse, speed);
-    if (lost >= kLost || touch >= steps_needed(integrator) * h) return;
+    if (lost >= kUndamped || touch >= steps_needed(integrator) * h) return;
     const std::string damping =
         of.damping.value > 0
             ? fmt::format("has a damping that takes {:.2g} % of a speed of {:.2g} m/s", 100 * lost,
