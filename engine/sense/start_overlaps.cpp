@@ -10,8 +10,8 @@
 
 #include "engine/model/compiled_model.hpp"
 #include "engine/model/model.hpp"
-#include "engine/sense/contact_state.hpp"
 #include "engine/sense/pad_reader.hpp"
+#include "engine/sense/point_depths.hpp"
 #include "engine/step/batch.hpp"
 
 namespace tangere {
