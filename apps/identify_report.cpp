@@ -185,7 +185,7 @@ Json json_of(const IdentifyReport& r, const std::vector<std::string>& units) {
   for (std::size_t k = 0; k < r.names.size(); ++k) {
     numbers.push_back({{"name", r.names[k]},
                        {"unit", units[k]},
-                       {"start", r.fit.points.front().values[k]},
+                       {"start", r.fit.fits.front().start[k]},
                        {"found", r.fit.values()[k]},
                        {"deviation", finite(r.fit.deviation[k])}});
     if (!r.truth.empty()) numbers.back()["true"] = r.truth[k];
@@ -216,7 +216,7 @@ ExitCode exit_code(const IdentifyReport& report) {
 }
 
 void print(const Console& console, const IdentifyReport& r) {
-  const std::vector<double>&start = r.fit.points.front().values, &found = r.fit.values();
+  const std::vector<double>&start = r.fit.fits.front().start, &found = r.fit.values();
   const std::vector<std::string> units = units_of(r);
   std::size_t width = 6;
   for (const std::string& name : r.names) width = std::max(width, name.size());
