@@ -235,6 +235,14 @@ void print(const Console& console, const IdentifyReport& r) {
                   r.fit.noise, noise_percent(r), r.fit.condition, starts_text(r.fit)));
   if (const std::string pairs = correlated_text(r); !pairs.empty())
     console.print("estimates that go together (correlation): " + pairs);
+  if (r.fit.residual.is_noise())
+    console.print(
+        r.fit.residual.tested
+            ? fmt::format("what is left can be noise: the largest test is {:.2g} standard "
+                          "deviations, below {:g}",
+                          r.fit.residual.score, ResidualTest::kMostScore)
+            : "what is left was not tested: it is below 1e-4 of the fields, or there are "
+              "too few readings");
   if (!r.fit.converged) console.fail("the fit has not come to an end");
   if (!r.fit.inseparable.empty()) console.fail(inseparable_text(r));
   if (!r.fit.residual.is_noise()) console.fail(residual_text(r));
