@@ -120,9 +120,9 @@ BenchError error_of(const BenchArguments& options, const Model& model,
             {"error", report.resolved ? finite(report.own.error) : Json()},
             {"median_error", report.resolved ? finite(report.own.median) : Json()}};
   if (!report.resolved)
-    return {fmt::format("error: not resolved; two references differ by {:.2g} %",
-                        100 * reference.error),
-            json};
+    return {
+        fmt::format("error: not resolved; the reference is off by {:.2g} %", 100 * reference.error),
+        json};
   return {
       fmt::format("error of the {}: {:.2g} %, not exceeded in 95 % of {} environments",
                   accuracy_meaning(of.quantity), 100 * report.own.error, reference.environments),

@@ -185,7 +185,7 @@ Json json_of(const IdentifyReport& r, const std::vector<std::string>& units) {
   for (std::size_t k = 0; k < r.names.size(); ++k) {
     numbers.push_back({{"name", r.names[k]},
                        {"unit", units[k]},
-                       {"start", r.fit.points.front().values[k]},
+                       {"start", r.fit.fits.front().start[k]},
                        {"found", r.fit.values()[k]},
                        {"deviation", finite(r.fit.deviation[k])}});
     if (!r.truth.empty()) numbers.back()["true"] = r.truth[k];
@@ -216,7 +216,7 @@ ExitCode exit_code(const IdentifyReport& report) {
 }
 
 void print(const Console& console, const IdentifyReport& r) {
-  const std::vector<double>&start = r.fit.points.front().values, &found = r.fit.values();
+  const std::vector<double>&start = r.fit.fits.front().start, &found = r.fit.values();
   const std::vector<std::string> units = units_of(r);
   std::size_t width = 6;
   for (const std::string& name : r.names) width = std::max(width, name.size());
@@ -235,6 +235,14 @@ void print(const Console& console, const IdentifyReport& r) {
                   r.fit.noise, noise_percent(r), r.fit.condition, starts_text(r.fit)));
   if (const std::string pairs = correlated_text(r); !pairs.empty())
     console.print("estimates that go together (correlation): " + pairs);
+  if (r.fit.residual.is_noise())
+    console.print(
+        r.fit.residual.tested
+            ? fmt::format("what is left can be noise: the largest test is {:.2g} standard "
+                          "deviations, below {:g}",
+                          r.fit.residual.score, ResidualTest::kMostScore)
+            : "what is left was not tested: it is below 1e-4 of the fields, or there are "
+              "too few readings");
   if (!r.fit.converged) console.fail("the fit has not come to an end");
   if (!r.fit.inseparable.empty()) console.fail(inseparable_text(r));
   if (!r.fit.residual.is_noise()) console.fail(residual_text(r));

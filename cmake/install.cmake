@@ -61,6 +61,7 @@ set(public_headers
   engine/rows/row_sink.hpp
   engine/rows/task_spec.hpp
   engine/sense/audit.hpp
+  engine/sense/contact_state.hpp
   engine/sense/flow_map.hpp
   engine/sense/marker_map.hpp
   engine/sense/readout.hpp
@@ -93,10 +94,12 @@ set(public_headers
   kernels/table/isa.hpp
   tasks/catalogue/task.hpp
   tasks/catalogue/task_list.hpp
+  tasks/gradients/field_sequence.hpp
   tasks/gradients/gradient_options.hpp
   tasks/gradients/gradients.hpp
   tasks/gradients/identification.hpp
   tasks/gradients/losses.hpp
+  tasks/gradients/residual_test.hpp
   tasks/gradients/task_gradient_options.hpp
   tasks/gradients/task_gradients.hpp
   tasks/gradients/task_rollout.hpp

@@ -1,25 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
-// Goes through every contact point by the plain distance of the shape that it may touch.
+// Counts are those of the state alone, whatever the last step decided.
 #include "engine/sense/contact_state.hpp"
 
 #include <algorithm>
 
-#include "kernels/contact/distance.hpp"
+#include "engine/sense/pad_reader.hpp"
+#include "engine/sense/point_depths.hpp"
 
 namespace tangere {
 
-using kernels::Frame;
 using kernels::kBlock;
 using kernels::kGroup;
-using kernels::Vec3;
 
 namespace {
-
-void add(PointDepths& depths, double depth) {
-  if (!(depth > 0)) return;
-  depths.deepest = std::max(depths.deepest, depth);
-  ++depths.touching;
-}
 
 /// -1, 0 or 1 for each dof of a lane.
 std::vector<int> beyond_limits(const CompiledModel& m, const double* column) {
@@ -38,54 +31,30 @@ std::vector<int> beyond_limits(const CompiledModel& m, const double* column) {
 
 }  // namespace
 
-PointDepths pair_depths(const kernels::PairContact& pair, const PadReader& reader, int group,
-                        int lane, const double* block) {
-  const Frame<double> shape = compose(relative(reader.link(pair.link1, group, lane).world,
-                                               reader.link(pair.link2, group, lane).world),
-                                      pair.frame2);
-  Vec3<double> size = pair.size;
-  for (int c = 0; c < 3 && pair.size_row >= 0; ++c)
-    (&size.x)[c] = kernels::row_of(block, pair.size_row + c, group)[lane];
-  return kernels::with_distance<double>(
-      pair.shape, size,
-      [&](const auto& of) {
-        PointDepths depths;
-        for (int k = 0; k < pair.n_points; ++k) {
-          const double* p = pair.points + 3 * k;
-          const Vec3<double> at =
-              transposed_times(shape.R, Vec3<double>{p[0], p[1], p[2]} - shape.p);
-          add(depths, pair.ball_radius - distance_at(of, at).d);
-        }
-        return depths;
-      },
-      pair.grid);
-}
+struct ContactStateReader::Impl {
+  Model model;
+  PadReader reader;
+};
 
-PointDepths ground_depths(const kernels::GroundContact& ground, const kernels::ModelView& view,
-                          const PadReader& reader, int group, int lane) {
-  const Frame<double> body = reader.link(ground.link, group, lane).world;
-  PointDepths depths;
-  for (int k = 0; k < ground.n_points; ++k) {
-    const double* p = ground.points + 3 * k;
-    const Vec3<double> at = body.R * Vec3<double>{p[0], p[1], p[2]} + body.p;
-    add(depths, ground.radius - dot(view.ground_normal, at - view.ground_point));
-  }
-  return depths;
-}
+ContactStateReader::ContactStateReader(const Model& model)
+    : impl_(new Impl{model, PadReader(model)}) {}
+ContactStateReader::~ContactStateReader() = default;
+ContactStateReader::ContactStateReader(ContactStateReader&&) noexcept = default;
+ContactStateReader& ContactStateReader::operator=(ContactStateReader&&) noexcept = default;
 
 std::vector<ContactState> ContactStateReader::read(const Batch& batch, int block) {
-  const CompiledModel& m = compiled(model_);
+  const CompiledModel& m = compiled(impl_->model);
+  PadReader& reader = impl_->reader;
   const int lanes = std::min(kBlock, batch.environments() - block * kBlock);
   std::vector<ContactState> states;
   for (int l = 0; l < lanes; ++l) {
     const int group = l / kGroup, lane = l % kGroup;
-    if (lane == 0) reader_.move(batch, block, group);
+    if (lane == 0) reader.move(batch, block, group);
     ContactState& state = states.emplace_back();
     for (const kernels::PairContact& pair : m.pairs)
-      state.touching.push_back(
-          pair_depths(pair, reader_, group, lane, batch.block(block)).touching);
+      state.touching.push_back(pair_depths(pair, reader, group, lane, batch.block(block)).touching);
     for (const kernels::GroundContact& ground : m.grounds)
-      state.touching.push_back(ground_depths(ground, m.view, reader_, group, lane).touching);
+      state.touching.push_back(ground_depths(ground, m.view, reader, group, lane).touching);
     state.beyond = beyond_limits(m, batch.block(block) + l);
   }
   return states;

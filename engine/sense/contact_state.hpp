@@ -3,9 +3,10 @@
 // small change of its inputs may turn round.
 #pragma once
 
+#include <memory>
 #include <vector>
 
-#include "engine/sense/pad_reader.hpp"
+#include "engine/step/batch.hpp"
 
 namespace tangere {
 
@@ -20,27 +21,17 @@ struct ContactState {
 /// Owns the scratch of one thread.
 class ContactStateReader {
  public:
-  explicit ContactStateReader(const Model& model) : model_(model), reader_(model) {}
+  explicit ContactStateReader(const Model& model);
+  ~ContactStateReader();
+  ContactStateReader(ContactStateReader&&) noexcept;
+  ContactStateReader& operator=(ContactStateReader&&) noexcept;
 
   /// Reads the environments of a block, in their order.
   [[nodiscard]] std::vector<ContactState> read(const Batch& batch, int block);
 
  private:
-  Model model_;
-  PadReader reader_;
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
 };
-
-/// Of the points of one contact.
-struct PointDepths {
-  double deepest = 0;  ///< [m]; 0: none touches
-  int touching = 0;
-};
-/// Returns those of a pair in one lane of a group that `reader` moved last. `block`: the numbers of
-/// its block (rows, 16).
-PointDepths pair_depths(const kernels::PairContact& pair, const PadReader& reader, int group,
-                        int lane, const double* block);
-/// The same for the points of a link above the ground of `view`.
-PointDepths ground_depths(const kernels::GroundContact& ground, const kernels::ModelView& view,
-                          const PadReader& reader, int group, int lane);
 
 }  // namespace tangere

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // The reference is SDIRK4, which is not among the schemes that are measured. Its step shrinks until
 // it is off by at most a fortieth of the target, or until finer steps make it no better. How far it
-// is off follows from SDIRK2 at the same step and from its own coarser steps: what all schemes share
-// at one step shows in the second alone.
+// is off follows from SDIRK2 at the same step and from its own coarser steps: errors that all
+// schemes share at one step show in the second alone.
 #include "tasks/accuracy/accuracy_sweep.hpp"
 
 #include <algorithm>

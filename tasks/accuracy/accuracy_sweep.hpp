@@ -47,8 +47,9 @@ struct AccuracyPoint {
 struct AccuracyReference {
   AccuracySetting setting;
   double step = 0;  ///< [s]
-  /// Not exceeded in 95 % of the environments: the larger of the distance to SDIRK2 at the same step
-  /// and of what its distances to itself with twice and four times the step say (richardson()).
+  /// Not exceeded in 95 % of the environments: the larger of the distance to SDIRK2 at the same
+  /// step and of what its distances to itself with twice and four times the step say
+  /// (richardson()).
   double error = 0;
   double scheme_distance = 0, step_distance = 0;  ///< to SDIRK2, and to itself with twice the step
   /// That its own steps have on these episodes (richardson()).
@@ -57,9 +58,9 @@ struct AccuracyReference {
   int failed = 0;        ///< environments in which the reference or SDIRK2 failed
   std::string status;    ///< "ok", or why
 
-  /// Whether all schemes share most of the error: another scheme at the same step is nearer than the
-  /// same one with twice the step.
-  [[nodiscard]] bool shares_errors() const { return step_distance > 2 * scheme_distance; }
+  /// Whether all schemes share most of the error: another one at the same step is nearer than the
+  /// motion itself.
+  [[nodiscard]] bool shares_errors() const { return error > 2 * scheme_distance; }
 };
 
 /// The order that a scheme has on these episodes between its two finest steps, without those that
@@ -78,8 +79,8 @@ struct AccuracyReport {
   std::vector<AccuracyPoint> tolerances;  ///< tolerances alone, at the setting of the advice
   std::vector<PitchSweep> pitches;        ///< of tactile fields: every sensor
   AccuracyPoint own;                      ///< the scene's setting: its scheme, step and tolerance
-  /// Index of the cheapest point whose bound and the reference's error together meet the target; -1:
-  /// none does.
+  /// Index of the cheapest point whose bound and the reference's error together meet the target;
+  /// -1: none does.
   int advice = -1;
   bool resolved = false;  ///< the reference is accurate enough to judge by
   Vibration vibration;    ///< where it is not

@@ -13,6 +13,7 @@
 #include "engine/model/random.hpp"
 #include "engine/model/scene_number.hpp"
 #include "engine/step/displacement.hpp"
+#include "tasks/gradients/run_trace.hpp"
 
 namespace tangere {
 namespace {

@@ -11,9 +11,10 @@
 
 #include "engine/derivative/number_gradients.hpp"
 #include "engine/step/batch.hpp"
-#include "tasks/gradients/run_trace.hpp"
 
 namespace tangere {
+
+class RunTrace;
 
 /// One kind of input. Errors are relative to the norm of the gradient by it; for numbers of the
 /// scene, by their relative changes.
@@ -90,7 +91,7 @@ struct GradientCheck {
   double loss = 0;
   std::vector<CheckedInput> inputs;
   double tolerance = 0;  ///< that of the options
-  /// Sentences on why derivatives may not exist: at kinks, and where an error exceeds the tolerance.
+  /// Sentences on why derivatives may not exist: at kinks, and where an error is too large.
   std::vector<std::string> reasons;
   /// Whether something was compared, and no error exceeds the tolerance.
   [[nodiscard]] bool passed() const { return entries() > 0 && max_relative_error() <= tolerance; }

@@ -29,8 +29,9 @@ constexpr double kLongest = 1.5;    // of logarithms in one step, because the mo
 constexpr double kFarthest = 4;     // factor of other starts
 /// Of the squared change of normalised fields along the weakest direction: differences err by 1e-4.
 constexpr double kWeakest = 1e-8;
-constexpr double kNew = 1e-3;   // share of a column that the sought numbers must not have
-constexpr double kShare = 0.1;  // of a number in that direction
+constexpr double kNew = 1e-3;    // share of a column that the sought numbers must not have
+constexpr double kAlike = 1e-3;  // of two misfits
+constexpr double kShare = 0.1;   // of a number in that direction
 
 std::size_t numbers_of_fields(const Model& model) {
   std::size_t n = 0;
@@ -301,6 +302,15 @@ void judge(const Problem& problem, const Fit& fit, double stated_noise, Identifi
   judge_information(F, J, out);
 }
 
+/// Whether a fit is to take the place of the best one so far. Of fits that end alike the first that
+/// has come to an end stays.
+bool is_better(const FitEnds& fit, const Identification& best) {
+  if (best.points.empty()) return true;
+  const double misfit = best.points.back().misfit;
+  return fit.misfit < (1 - kAlike) * misfit ||
+         (fit.converged && !best.converged && fit.misfit <= (1 + kAlike) * misfit);
+}
+
 /// Finds the number that was not sought and whose change would make up best for what is left.
 void find_suspect(const Problem& problem, Identification& out) {
   ResidualTest& test = out.residual;
@@ -477,7 +487,7 @@ Identification identify(const Scene& scene, const RecordedRun& run, const FieldS
     ends.end = fit->points.back().values;
     ends.misfit = fit->points.back().misfit;
     ends.converged = fit->converged;
-    if (!best.points.empty() && !(ends.misfit < best.points.back().misfit)) continue;
+    if (!is_better(ends, best)) continue;
     best = {};
     judge(problem, *fit, options.noise, best);
     if (best.passed()) break;

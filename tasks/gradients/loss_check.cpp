@@ -14,6 +14,7 @@
 #include "engine/model/scene_number.hpp"
 #include "engine/sense/readout.hpp"
 #include "tasks/gradients/loss_block.hpp"
+#include "tasks/gradients/run_trace.hpp"
 
 namespace tangere {
 namespace {

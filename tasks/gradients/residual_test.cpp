@@ -13,7 +13,7 @@ constexpr int kFewestPoints = 4;  // of a sum; that of one point is always ±1
 constexpr int kFewestSums = 20;
 constexpr double kMostChiSquare = 1.1;  // the noise of a sensor is hardly known better
 
-/// z of one component of a sensor in one reading; NaN where the fitted field touches too few points.
+/// z of one component of a sensor in one reading; NaN where the fit touches too few points.
 double normalised_sum(const double* fitted, const double* recorded, int points, int component) {
   double sum = 0, squares = 0;
   int touched = 0;

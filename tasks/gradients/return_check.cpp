@@ -10,6 +10,7 @@
 #include <optional>
 
 #include "engine/base/as_size.hpp"
+#include "tasks/gradients/run_trace.hpp"
 #include "tasks/gradients/task_tangent.hpp"
 
 namespace tangere {

@@ -154,8 +154,8 @@ Scene rolling(double along, double across) {
       .scene;
 }
 
-/// A ball that slips until it rolls: SDIRK2 and SDIRK4 at one step agree a hundred times better than
-/// SDIRK4 at two steps. One that sticks has no such error.
+/// A ball that slips until it rolls: SDIRK2 and SDIRK4 at one step agree much better than SDIRK4 at
+/// two steps. One that sticks has no such error.
 TEST(MeasuredOrder, SpringsOfSlippingPointsShareTheirErrorWithEveryScheme) {
   const auto reference = [](const Model& model) {
     FixedEpisodes episodes{Batch(model, 1), model.timestep(), 12, 12, {12}};
