@@ -17,10 +17,4 @@ MeshShape weld(const RawMesh& raw);
 /// Returns where a surface is open, and how far apart corners are that nearly meet there, or "".
 std::string open_edge(const MeshShape& mesh);
 
-/// Takes away walls inside of a closed surface: triangles in the same place that face each other,
-/// as where two closed blocks share a side. They enclose nothing, but the distance to them would be
-/// zero. A wall goes if its two sides cover the same place, however each is cut into triangles.
-/// Returns "", or what is left: how much of the area, and a place.
-std::string remove_walls(MeshShape& mesh);
-
 }  // namespace tangere

@@ -15,6 +15,7 @@
 #include "io/files/word_reader.hpp"
 #include "io/scene/closed_surface.hpp"
 #include "io/scene/convex_hull.hpp"
+#include "io/scene/inner_walls.hpp"
 #include "io/scene/obj_file.hpp"
 
 namespace tangere {
