@@ -32,7 +32,7 @@ namespace {
 
 constexpr std::size_t kNoteBytes = 4096;
 // Of computing, for one call of HDF5, unless TANGERE_READ_SECONDS says otherwise. The longest call
-// reads one dataset of one episode.
+// reads one dataset of one episode; others have a fifth of it.
 constexpr std::chrono::seconds kEndless{10}, kLongest{86'400};
 
 std::chrono::seconds endless() {
@@ -152,9 +152,9 @@ int run_in_child(const std::function<int()>& command) {
   if (signal == SIGTERM) return kTerminated;
   if (signal == SIGPROF)
     throw IoError(fmt::format(
-        "the HDF5 library did not come back within {} s of computing; it had last read {}; a file "
-        "over which the library loops is damaged",
-        limit.count(), reading));
+        "the HDF5 library did not come back within {} s of computing ({:g} s where it reads no "
+        "numbers); it had last read {}; a file over which the library loops is damaged",
+        limit.count(), static_cast<double>(limit.count()) / h5::kTicksOfNumbers, reading));
   if (!is_crash(signal) || reading.empty()) {  // a closed pipe, a limit: end as the child did
     signals.restore();
     std::signal(signal, SIG_DFL);

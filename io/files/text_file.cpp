@@ -4,7 +4,9 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <linux/magic.h>
 #include <sys/stat.h>
+#include <sys/statfs.h>
 #include <unistd.h>
 
 #include <array>
@@ -26,6 +28,14 @@ const char* kind_of(mode_t mode) {
   return "a device";
 }
 
+/// Whether the file system is the kernel's own: its files count as regular, and may never end.
+bool is_of_kernel(const std::string& path) {
+  struct statfs system {};
+  if (statfs(path.c_str(), &system) != 0) return false;
+  return system.f_type == PROC_SUPER_MAGIC || system.f_type == SYSFS_MAGIC ||
+         system.f_type == DEBUGFS_MAGIC || system.f_type == TRACEFS_MAGIC;
+}
+
 }  // namespace
 
 void require_regular_file(const std::string& path, const char* expected) {
@@ -34,6 +44,8 @@ void require_regular_file(const std::string& path, const char* expected) {
     throw IoError(fmt::format("{}: cannot be opened for reading: {}", path, std::strerror(errno)));
   if (!S_ISREG(info.st_mode))
     throw IoError(fmt::format("{}: is {}; expected {}", path, kind_of(info.st_mode), expected));
+  if (is_of_kernel(path))
+    throw IoError(fmt::format("{}: is a file of the kernel; expected {}", path, expected));
   constexpr std::string_view kPointer = "version https://git-lfs.github.com/spec/";
   std::array<char, kPointer.size()> head{};
   std::ifstream(path, std::ios::binary).read(head.data(), head.size());

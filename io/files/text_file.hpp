@@ -8,7 +8,7 @@
 
 namespace tangere {
 
-/// Throws IoError unless `path` leads to a regular file, which then counts as an input
+/// Throws IoError unless `path` leads to a regular file on a disk, which then counts as an input
 /// (io/files/input_files.hpp); `expected` names what it should be. Throws InputError if the file is a
 /// pointer of Git LFS, which stands in a checkout where large files were not fetched.
 void require_regular_file(const std::string& path, const char* expected);

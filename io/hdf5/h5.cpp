@@ -188,6 +188,7 @@ void link_object(const Id& parent, const std::string& name, std::uint64_t addres
 
 void close_file(Id& file, const std::string& path) {
   const Quiet quiet;
+  const LongCall writes_numbers;
   const auto failure = write_failure(file.get());
   std::string reason;
   if (H5Fflush(file.get(), H5F_SCOPE_GLOBAL) < 0) reason = last_reason();

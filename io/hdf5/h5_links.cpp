@@ -11,6 +11,7 @@
 #include "io/hdf5/h5_driver.hpp"
 #include "io/hdf5/h5_listing.hpp"
 #include "io/hdf5/h5_views.hpp"
+#include "io/hdf5/reading_note.hpp"
 
 namespace tangere::h5 {
 namespace {
@@ -60,6 +61,7 @@ void copy_group(const Id& from, const std::string& name, const Id& to, const std
     }
     const Quiet quiet;
     const NumbersOf numbers(copy.get(), child.c_str());
+    const LongCall copies_numbers;
     check(H5Ocopy(source.get(), child.c_str(), copy.get(), child.c_str(), H5P_DEFAULT,
                   H5P_DEFAULT) >= 0,
           "copy", child);

@@ -164,6 +164,7 @@ void create_flags(const Id& parent, const std::string& name, std::span<const std
 template <class T>
 void write_box(const Id& dataset, const Dims& offset, const Dims& count, const T* data) {
   const Quiet quiet;
+  const LongCall writes_numbers;
   const Box box(dataset, offset, count);
   const NumbersOf numbers(dataset.get());
   if (H5Dwrite(dataset.get(), Types<T>::memory(), box.memory.get(), box.disk.get(), H5P_DEFAULT,
@@ -177,6 +178,7 @@ void read_box(const Id& dataset, const Dims& offset, const Dims& count, T* data)
   const Quiet quiet;
   const Box box(dataset, offset, count);
   const ExpectedChunk chunk(chunk_bytes(dataset));
+  const LongCall reads_numbers;
   if (H5Dread(dataset.get(), Types<T>::memory(), box.memory.get(), box.disk.get(), H5P_DEFAULT,
               data) < 0)
     fail("read", dataset);

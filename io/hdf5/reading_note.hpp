@@ -23,8 +23,21 @@ void note_object(std::string_view name) noexcept;
 void note_call_begins() noexcept;
 void note_call_ends() noexcept;
 
-/// From now on one call that computes for so long, at most twice as long, ends the process by
-/// SIGPROF: the library loops for ever over some damaged files.
+/// While this lives, calls read or write numbers of datasets, which may take long.
+class LongCall {
+ public:
+  LongCall() noexcept;
+  ~LongCall();
+  LongCall(const LongCall&) = delete;
+  LongCall& operator=(const LongCall&) = delete;
+};
+
+/// Other calls have this part of the time of those.
+constexpr int kTicksOfNumbers = 5;
+
+/// From now on one call that computes for so long, if it reads numbers, or for a fifth of it, ends
+/// the process by SIGPROF, a fifth later at most: the library loops for ever over some damaged
+/// files.
 void end_endless_calls(std::chrono::milliseconds computing) noexcept;
 
 /// While this lives, nothing is noted and no call is ended: the process computes in threads, whose

@@ -12,6 +12,7 @@
 #include <algorithm>
 #include <atomic>
 #include <memory>
+#include <new>
 #include <span>
 #include <string>
 #include <string_view>
@@ -40,12 +41,19 @@ struct Argument : nb::ndarray<const T, nb::c_contig, nb::device::cpu> {
 template <class T>
 using Array = nb::ndarray<nb::numpy, T>;
 
-/// Returns a new array, and the place where C++ fills it. Its numbers are not set.
+/// Returns a new array, and the place where C++ fills it. Its numbers are not set. Throws InputError
+/// where there is no memory for it.
 template <class T>
 Array<T> new_array(const Shape& shape, std::span<T>& numbers) {
   std::size_t size = 1;
-  for (const std::size_t n : shape) size *= n;
-  auto held = std::make_unique_for_overwrite<T[]>(std::max<std::size_t>(size, 1));
+  double bytes = sizeof(T);
+  for (const std::size_t n : shape) size *= n, bytes *= static_cast<double>(n);
+  constexpr double kMost = 0x1p62;
+  std::unique_ptr<T[]> held;
+  if (bytes < kMost) held.reset(new (std::nothrow) T[std::max<std::size_t>(size, 1)]);
+  if (held == nullptr)
+    throw InputError(
+        fmt::format("no memory for an array ({}) of {:.0f} bytes", fmt::join(shape, ", "), bytes));
   numbers = {held.get(), size};
   nb::capsule owner(held.get(), [](void* p) noexcept { delete[] static_cast<T*>(p); });
   return Array<T>(held.release(), shape.size(), shape.data(), owner);

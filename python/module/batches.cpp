@@ -25,8 +25,8 @@ PythonBatch::PythonBatch(const Model& model, int environments, const BatchOption
     : batch_(model, environments, options.seed, options.first_episode),
       memory_points_(memory_points(model)),
       precision_(options.precision),
-      threads_(threads_of(options.threads)) {
-  for (int i = 0; i < threads_of(options.threads); ++i)
+      threads_(options.threads) {
+  for (int i = 0; i < options.threads; ++i)
     workers_.push_back({Stepper(model, options.stepper), Readout(model, options.precision)});
 }
 
@@ -98,11 +98,12 @@ nb::object PythonBatch::tactile(const std::string& reading, const nb::object& ou
   return precision_ == Precision::f64 ? read<double>(output, out) : read<float>(output, out);
 }
 
-Run PythonBatch::run(const Argument<double>& u, int every,
+Run PythonBatch::run(const Argument<double>& u, const Whole<int>& interval,
                      const std::vector<std::string>& readings) {
   if (u.ndim() == 0 || u.shape(0) == 0)
     throw InputError("controls without a step; expected (T, E, nu)");
   const std::size_t steps = u.shape(0), nu = as_size(model().nu());
+  const int every = interval.value("every");
   if (every < 1 || steps % as_size(every) != 0)
     throw InputError(
         fmt::format("{} steps with a frame every {}; expected a multiple of it", steps, every));
@@ -211,11 +212,17 @@ std::vector<int> PythonBatch::listed(const nb::object& environments) const {
     return list;
   }
   const nb::object array = nb::module_::import_("numpy").attr("asarray")(environments);
+  const auto shape = nb::cast<std::vector<std::size_t>>(array.attr("shape"));
+  if (shape.size() != 1)
+    throw InputError(fmt::format("envs of shape ({}); expected a list of indices, or a mask ({})",
+                                 fmt::join(shape, ", "), count()));
   const auto kind = nb::cast<std::string>(array.attr("dtype").attr("kind"));
   const bool is_mask = kind == "b";
   if (!is_mask && kind != "i" && kind != "u" && nb::len(array) > 0)
     throw InputError("envs of another kind; expected indices of environments, or a mask of bool");
-  const auto given = nb::cast<std::vector<int>>(array.attr("tolist")());
+  std::vector<int> given;
+  for (const auto& whole : nb::cast<std::vector<Whole<int>>>(array.attr("tolist")()))
+    given.push_back(whole.value("environment"));
   if (is_mask && given.size() != count())
     throw InputError(fmt::format("a mask of {} environments; expected {}", given.size(), count()));
   for (std::size_t k = 0; k < given.size(); ++k)
@@ -263,18 +270,21 @@ Array<std::int64_t> PythonBatch::steps() {
   return array;
 }
 
-void PythonBatch::set_steps(const std::vector<std::int64_t>& steps,
+void PythonBatch::set_steps(const std::vector<Whole<std::int64_t>>& steps,
                             const nb::object& environments) {
   constexpr std::int64_t kEnd = std::int64_t{1} << 48;
   const std::vector<int> list = listed(environments);
   if (steps.size() != list.size())
     throw InputError(fmt::format("{} numbers of steps for {} environments; expected one for each",
                                  steps.size(), list.size()));
-  for (const std::int64_t s : steps)
-    if (s < 0 || s >= kEnd)
-      throw InputError(fmt::format("{} steps; expected 0 or more, below 2^48", s));
+  std::vector<std::int64_t> counts;
+  for (const Whole<std::int64_t>& s : steps) {
+    counts.push_back(s.value("steps"));
+    if (counts.back() < 0 || counts.back() >= kEnd)
+      throw InputError(fmt::format("{} steps; expected 0 or more, below 2^48", counts.back()));
+  }
   const InUse::Turn turn(in_use_);
-  for (std::size_t k = 0; k < list.size(); ++k) batch_.set_steps(list[k], steps[k]);
+  for (std::size_t k = 0; k < list.size(); ++k) batch_.set_steps(list[k], counts[k]);
 }
 
 Array<double> PythonBatch::memory() {
@@ -306,17 +316,20 @@ void PythonBatch::set_memory(const Argument<double>& memory, const nb::object& e
 }
 
 void PythonBatch::reset(const nb::object& environments,
-                        const std::optional<std::vector<std::int64_t>>& episodes) {
+                        const std::optional<std::vector<Whole<std::int64_t>>>& episodes) {
   const std::vector<int> list = listed(environments);
   if (episodes && episodes->size() != list.size())
     throw InputError(fmt::format("{} episodes for {} environments; expected one for each",
                                  episodes->size(), list.size()));
   const InUse::Turn turn(in_use_);
+  std::vector<std::int64_t> numbers;
   for (std::size_t k = 0; k < list.size(); ++k)
-    batch_.reset(list[k], episodes ? (*episodes)[k] : batch_.episode(list[k]));
+    numbers.push_back(episodes ? (*episodes)[k].value("episode") : batch_.episode(list[k]));
+  for (std::size_t k = 0; k < list.size(); ++k) batch_.reset(list[k], numbers[k]);
 }
 
-Array<double> PythonBatch::scene_controls(std::int64_t steps) {
+Array<double> PythonBatch::scene_controls(const Whole<std::int64_t>& count_of_steps) {
+  const std::int64_t steps = count_of_steps.value("steps");
   if (steps < 1) throw InputError(fmt::format("{} steps; expected at least 1", steps));
   const InUse::Turn turn(in_use_);
   const ControlProgram program(model(), workers_[0].stepper.timestep(), batch_.seed());
@@ -354,17 +367,21 @@ void add_batches(nb::module_& m) {
       "thread uses a batch at a time.")
       .def(
           "__init__",
-          [](PythonBatch* self, const Model& model, int envs, std::uint64_t seed,
-             std::int64_t first_episode, const std::optional<int>& threads,
-             const std::string& precision, const std::optional<double>& timestep,
-             const std::optional<double>& tolerance, const std::optional<double>& accuracy,
-             const std::optional<double>& sleep) {
-            BatchOptions options{seed, first_episode, threads, precision_named(precision), {}};
+          [](PythonBatch* self, const Model& model, const Whole<int>& envs,
+             const Whole<std::uint64_t>& seed, const Whole<std::int64_t>& first_episode,
+             const std::optional<Whole<int>>& threads, const std::string& precision,
+             const std::optional<double>& timestep, const std::optional<double>& tolerance,
+             const std::optional<double>& accuracy, const std::optional<double>& sleep) {
+            BatchOptions options{seed.value("seed"),
+                                 first_episode.value("first_episode"),
+                                 threads_of(threads),
+                                 precision_named(precision),
+                                 {}};
             options.stepper.timestep = timestep;
             options.stepper.tolerance = tolerance;
             options.stepper.accuracy = accuracy;
             options.stepper.sleep = sleep;
-            new (self) PythonBatch(model, envs, options);
+            new (self) PythonBatch(model, envs.value("envs"), options);
           },
           "model"_a, "envs"_a = 1, "seed"_a = 0, "first_episode"_a = 0, "threads"_a = nb::none(),
           "precision"_a = "mixed", "timestep"_a = nb::none(), "tolerance"_a = nb::none(),

@@ -11,6 +11,7 @@
 #include "engine/step/memory_arrays.hpp"
 #include "engine/step/stepper.hpp"
 #include "python/module/arrays.hpp"
+#include "python/module/whole_number.hpp"
 #include "tasks/run/block_threads.hpp"
 
 namespace tangere::python {
@@ -18,7 +19,7 @@ namespace tangere::python {
 struct BatchOptions {
   std::uint64_t seed = 0;
   std::int64_t first_episode = 0;
-  std::optional<int> threads;
+  int threads = 1;
   Precision precision = Precision::mixed;
   StepperOptions stepper;
 };
@@ -35,7 +36,8 @@ class PythonBatch {
   PythonBatch(const Model& model, int environments, const BatchOptions& options);
 
   void step(const Argument<double>& u);
-  Run run(const Argument<double>& u, int every, const std::vector<std::string>& readings);
+  Run run(const Argument<double>& u, const Whole<int>& interval,
+          const std::vector<std::string>& readings);
   nb::object tactile(const std::string& reading, const nb::object& out);
   [[nodiscard]] Array<double> q();
   [[nodiscard]] Array<double> v();
@@ -45,12 +47,12 @@ class PythonBatch {
   void set_state(const Argument<double>& q, const Argument<double>& v,
                  const nb::object& environments);
   [[nodiscard]] Array<std::int64_t> steps();
-  void set_steps(const std::vector<std::int64_t>& steps, const nb::object& environments);
+  void set_steps(const std::vector<Whole<std::int64_t>>& steps, const nb::object& environments);
   [[nodiscard]] Array<double> memory();
   void set_memory(const Argument<double>& memory, const nb::object& environments);
   void reset(const nb::object& environments,
-             const std::optional<std::vector<std::int64_t>>& episodes);
-  Array<double> scene_controls(std::int64_t steps);
+             const std::optional<std::vector<Whole<std::int64_t>>>& episodes);
+  Array<double> scene_controls(const Whole<std::int64_t>& count_of_steps);
 
   [[nodiscard]] const Model& model() const { return batch_.model(); }
   [[nodiscard]] int environments() const { return batch_.environments(); }

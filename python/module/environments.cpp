@@ -25,10 +25,12 @@ class Environments {
         vector_(*task_, environments, options),
         policies_{Policy(*task_, PolicyKind::scripted), Policy(*task_, PolicyKind::random)} {}
 
-  void reset(std::uint64_t seed, std::int64_t first_episode) {
+  void reset(const Whole<std::uint64_t>& seed, const Whole<std::int64_t>& first_episode) {
+    const std::uint64_t draw = seed.value("seed");
+    const std::int64_t first = first_episode.value("first_episode");
     const InUse::Turn turn(in_use_);
     const nb::gil_scoped_release free;
-    vector_.reset(seed, first_episode);
+    vector_.reset(draw, first);
   }
   void restart(const Argument<bool>& which) {
     const auto marks = numbers_of(which, {count()}, "a mask");
@@ -119,12 +121,14 @@ void add_environments(nb::module_& m) {
       "first + e + E, … of a seed. tangere.make_vec() wraps it for Gymnasium.")
       .def(
           "__init__",
-          [](Environments* self, const std::string& task, const Scene& scene, int envs,
-             std::uint64_t seed, std::int64_t first_episode, const std::optional<int>& threads,
+          [](Environments* self, const std::string& task, const Scene& scene,
+             const Whole<int>& envs, const Whole<std::uint64_t>& seed,
+             const Whole<std::int64_t>& first_episode, const std::optional<Whole<int>>& threads,
              bool autoreset) {
-            VectorOptions options{seed, first_episode, threads_of(threads)};
+            VectorOptions options{seed.value("seed"), first_episode.value("first_episode"),
+                                  threads_of(threads)};
             options.autoreset = autoreset;
-            new (self) Environments(task, scene, envs, options);
+            new (self) Environments(task, scene, envs.value("envs"), options);
           },
           "task"_a, "scene"_a, "envs"_a, "seed"_a = 0, "first_episode"_a = 0,
           "threads"_a = nb::none(), "autoreset"_a = true,

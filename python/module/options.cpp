@@ -9,10 +9,12 @@
 
 namespace tangere::python {
 
-int threads_of(const std::optional<int>& asked) {
-  if (asked && *asked < 1)
-    throw InputError(fmt::format("{} threads; expected at least 1, or None", *asked));
-  return asked ? *asked : tbb::info::default_concurrency();
+int threads_of(const std::optional<Whole<int>>& asked) {
+  if (!asked) return tbb::info::default_concurrency();
+  const int threads = asked->value("threads");
+  if (threads < 1)
+    throw InputError(fmt::format("{} threads; expected at least 1, or None", threads));
+  return threads;
 }
 
 Precision precision_named(const std::string& name) {

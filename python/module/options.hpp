@@ -6,11 +6,12 @@
 #include <string>
 
 #include "engine/base/precision.hpp"
+#include "python/module/whole_number.hpp"
 
 namespace tangere::python {
 
 /// Threads of a `threads` argument: as many as the process may use, for None.
-int threads_of(const std::optional<int>& asked);
+int threads_of(const std::optional<Whole<int>>& asked);
 
 /// The precision of that name. Throws InputError for another name than "mixed" and "double".
 Precision precision_named(const std::string& name);

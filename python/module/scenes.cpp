@@ -11,6 +11,7 @@
 #include "io/scene/scene_reader.hpp"
 #include "python/module/arrays.hpp"
 #include "python/module/module.hpp"
+#include "python/module/whole_number.hpp"
 
 namespace tangere::python {
 namespace {
@@ -132,7 +133,8 @@ void add_model(nb::module_& m) {
           nb::rv_policy::automatic, "(nq) where the scene starts.")
       .def(
           "mass",
-          [](const Model& s, int body) {
+          [](const Model& s, const Whole<int>& index) {
+            const int body = index.value("body");
             if (body < 0 || body >= s.nb())
               throw InputError(fmt::format("body {}; expected 0 to {}", body, s.nb() - 1));
             return s.mass(body);

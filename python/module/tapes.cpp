@@ -29,16 +29,23 @@ class Tape {
         factor_.push_back(scaled ? 1 / scale_of(tensor, i) : 1);
   }
 
-  void reset(std::uint64_t seed, std::int64_t first_episode) {
+  void reset(const Whole<std::uint64_t>& seed, const Whole<std::int64_t>& first_episode) {
+    const std::uint64_t draw = seed.value("seed");
+    const std::int64_t first = first_episode.value("first_episode");
     const InUse::Turn turn(in_use_);
     const nb::gil_scoped_release free;
-    tape_.reset(seed, first_episode);
+    tape_.reset(draw, first);
   }
   void step(const Argument<double>& actions) {
     const std::vector<double> rows = rows_of(actions, count(), spec().action.size(), "actions");
     const InUse::Turn turn(in_use_);
     const nb::gil_scoped_release free;
     tape_.step(rows);
+  }
+  void check_step(const Argument<double>& actions) {
+    const std::vector<double> rows = rows_of(actions, count(), spec().action.size(), "actions");
+    const InUse::Turn turn(in_use_);
+    tape_.check_step(rows);
   }
   Array<double> observations() {
     const InUse::Turn turn(in_use_);
@@ -109,18 +116,18 @@ void add_tapes(nb::module_& m) {
       "first_episode + e, once. tangere.torch.Tape joins it to PyTorch, tangere.jax.Tape to JAX.")
       .def(
           "__init__",
-          [](Tape* self, const std::string& task, const Scene& scene, int envs,
-             std::int64_t actions, std::uint64_t seed, std::int64_t first_episode,
-             const std::optional<int>& threads, bool scaled, const std::string& precision,
-             double tape_bytes) {
+          [](Tape* self, const std::string& task, const Scene& scene, const Whole<int>& envs,
+             const Whole<std::int64_t>& actions, const Whole<std::uint64_t>& seed,
+             const Whole<std::int64_t>& first_episode, const std::optional<Whole<int>>& threads,
+             bool scaled, const std::string& precision, double tape_bytes) {
             TaskTapeOptions options;
             options.precision = precision_named(precision);
-            options.seed = seed;
-            options.first_episode = first_episode;
-            options.actions = actions;
+            options.seed = seed.value("seed");
+            options.first_episode = first_episode.value("first_episode");
+            options.actions = actions.value("actions");
             options.threads = threads_of(threads);
             options.tape_bytes = tape_bytes;
-            new (self) Tape(task, scene, envs, options, scaled);
+            new (self) Tape(task, scene, envs.value("envs"), options, scaled);
           },
           "task"_a, "scene"_a, "envs"_a, "actions"_a = 0, "seed"_a = 0, "first_episode"_a = 0,
           "threads"_a = nb::none(), "scaled"_a = true, "precision"_a = "mixed",
@@ -134,6 +141,8 @@ void add_tapes(nb::module_& m) {
       .def("step", &Tape::step, "actions"_a,
            "Takes one action (E, action) of every environment whose episode goes on. InputError:\n"
            "another shape, an action that is not finite, or one too many.")
+      .def("check_step", &Tape::check_step, "actions"_a,
+           "Raises the InputError that step() would raise for these actions, and takes none.")
       .def("observations", &Tape::observations, "(E, n) float64: all keys, one after the other.")
       .def(
           "rewards", [](Tape& t) { return t.per_environment<double>(&TaskTape::rewards, 0); },

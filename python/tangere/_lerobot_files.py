@@ -297,7 +297,7 @@ def new_folder(output: Path, overwrite: bool) -> Iterator[Path]:
     """A folder OUTPUT.part, which gets its name at the end and is removed if anything fails.
 
     What was called OUTPUT is OUTPUT.old.part while the names change. A run that was killed then
-    left it so: it gets its name back first.
+    left it so: it gets its name back first, unless that run had begun to remove it.
 
     Throws InputError if `output` is there and is not to be replaced, or is no LeRobot data set, and
     if another process writes it.
@@ -312,8 +312,8 @@ def new_folder(output: Path, overwrite: bool) -> Iterator[Path]:
             raise _core.InputError(f"{part} is being written by another process") from None
         try:
             _empty(part)  # what a run that was killed has left
-            if old.exists() and output.exists():
-                shutil.rmtree(old)
+            if old.exists() and (output.exists() or not _is_data_set(old)):
+                _remove(old)
             elif old.exists():
                 old.rename(output)
                 _check_free(output, overwrite)
@@ -328,14 +328,24 @@ def new_folder(output: Path, overwrite: bool) -> Iterator[Path]:
                 old.rename(output)
             raise
     if old.exists():
-        shutil.rmtree(old)
+        _remove(old)
+
+
+def _is_data_set(folder: Path) -> bool:
+    return (folder / "meta/info.json").is_file()
+
+
+def _remove(folder: Path) -> None:
+    """Removes a data set so that what a killed process leaves of it is none."""
+    (folder / "meta/info.json").unlink(missing_ok=True)
+    shutil.rmtree(folder)
 
 
 def _check_free(output: Path, overwrite: bool) -> None:
     if output.exists() or output.is_symlink():
         if not overwrite:
             raise _core.InputError(f"{output} exists; expected a new folder, or overwrite")
-        if not (output / "meta/info.json").is_file():
+        if not _is_data_set(output):
             raise _core.InputError(f"{output} is no LeRobot data set; it is not overwritten")
 
 

@@ -18,6 +18,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
 from . import _core
+from ._arrays import numbers
 
 # KEY → array, or with `flatten` one array.
 Observation = Any
@@ -209,7 +210,7 @@ class VectorTaskEnv(VectorEnv):
         is new at every step.
         """
         self._fresh = False
-        actions = np.asarray(actions)
+        actions = numbers(actions)
         if actions.shape != self.action_space.shape and actions.shape != self.task.action.shape:
             expected = f"{self.action_space.shape} or {self.task.action.shape}"
             raise _core.InputError(f"actions of shape {actions.shape}; expected {expected}")
@@ -313,7 +314,7 @@ class TaskEnv(gymnasium.Env):
         """Takes one action (na). Raises InputError after the end of an episode."""
         if self._over:
             raise _core.InputError("step() without an episode; call reset() first")
-        action = np.asarray(action)
+        action = numbers(action)
         if action.shape != self.action_space.shape and action.size != 1:
             raise _core.InputError(
                 f"an action of shape {action.shape}; expected {self.action_space.shape}"

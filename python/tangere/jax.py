@@ -54,8 +54,8 @@ class Tape:
     """A batch of episodes of one task, recorded for the way back.
 
     It holds one run at a time. A computation with two runs needs two tapes; with one tape, it ends
-    with an error. Mistakes that only show while XLA computes raise an error of JAX, which ends with
-    the InputError that the simulator has raised.
+    with an error. A mistake is an InputError. Under jit it shows only while XLA computes, and is an
+    error of JAX, whose last line is that InputError.
 
     Parameters
     ----------
@@ -125,6 +125,10 @@ class Tape:
         if actions.shape != expected.shape:
             raise _core.InputError(f"actions of shape {actions.shape}; expected {expected.shape}")
         actions = actions.astype(expected.dtype)
+        token, given = _known(state.token), _known(actions)
+        if token is not None and given is not None:
+            with self._host.lock:
+                self._host.check(token, given)
         token, rows, reward, alive, success = _step(self._host, state.token, actions)
         return State(token, alive, success), self._split(rows), reward
 
@@ -145,9 +149,16 @@ class Tape:
             return (state, after), (seen, reward, state.alive)
 
         start = self.reset(seed, first_episode)
-        (state, last), (seen, rewards, alive) = jax.lax.scan(
-            take, start, jnp.arange(self.actions, dtype=jnp.int32)
-        )
+        self._host.failure = None
+        try:
+            (state, last), (seen, rewards, alive) = jax.lax.scan(
+                take, start, jnp.arange(self.actions, dtype=jnp.int32)
+            )
+            _known(state.token)  # waits for the end, where nothing traces
+        except RuntimeError:
+            if self._host.failure is None:
+                raise
+            raise self._host.failure from None
         observations = jax.tree_util.tree_map(
             lambda rows, row: jnp.swapaxes(jnp.concatenate([rows, row[None]]), 0, 1), seen, last
         )
@@ -190,8 +201,15 @@ def _real() -> Any:
     return jnp.zeros((), float).dtype
 
 
+def _known(value: Any) -> np.ndarray | None:
+    """The numbers of an array, also where derivatives are taken; None where jit traces it."""
+    while isinstance(value, jax.core.Tracer) and hasattr(value, "primal"):
+        value = value.primal
+    return None if isinstance(value, jax.core.Tracer) else np.asarray(value)
+
+
 def _integer(value: Any, name: str) -> jax.Array:
-    if isinstance(value, jax.Array) and value.shape == () and value.dtype.kind in "iu":
+    if isinstance(value, jax.core.Tracer) and value.shape == () and value.dtype.kind in "iu":
         return value
     largest = np.iinfo(jnp.zeros((), int).dtype).max
     if not 0 <= operator.index(value) <= largest:
@@ -238,6 +256,7 @@ class _Host:
     def __init__(self, tape: _core.TaskTape, dtype: Any):
         self.tape, self.lock = tape, threading.Lock()
         self.run = self.passing = 0  # up to 2**24, which float32 has
+        self.failure: _core.InputError | None = None  # of a step
         self.left: int | None = None  # actions not yet reversed; None: nothing is reversed
         real = _real()
         n = sum(int(np.prod(t.shape)) for t in tape.spec.observations)
@@ -262,14 +281,24 @@ class _Host:
             self.tape.reset(seed, first_episode)
             self.show(out)
 
+    def check(self, token: Any, actions: Any) -> None:
+        """Raises InputError for a step that cannot follow."""
+        if tuple(token) != (self.run, self.tape.taken):
+            raise _core.InputError(
+                "a step from a state that is not the last one of its tape; take one step from "
+                "each state, and one tape for each run of a computation"
+            )
+        self.tape.check_step(actions)
+
     def step(self, _: Any, out: Any, token: Any, actions: Any) -> None:
         with self.lock:
-            if tuple(np.asarray(token)) != (self.run, self.tape.taken):
-                raise _core.InputError(
-                    "a step from a state that is not the last one of its tape; take one step from "
-                    "each state, and one tape for each run of a computation"
-                )
-            self.tape.step(np.asarray(actions))
+            given = np.asarray(actions)
+            try:
+                self.check(np.asarray(token), given)
+                self.tape.step(given)
+            except _core.InputError as error:
+                self.failure = error
+                raise
             self.show(out)
 
     def reverse(self, _: Any, out: Any, token: Any, *by: Any) -> None:

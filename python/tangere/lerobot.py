@@ -96,6 +96,8 @@ def export(
     features = _features(episodes, chosen[0], privileged)
     text = task if task is not None else _task_text(episodes)
     output = Path(output)
+    if Path(episodes.path).resolve().is_relative_to(output.resolve()):
+        raise _core.InputError(f"{output} holds the input {episodes.path}; expected another folder")
     frames = int(episodes.lengths[chosen].sum())
     with new_folder(output, overwrite) as folder:
         writer = FrameWriter(folder, features, frames, fps, file_megabytes, text)

@@ -25,7 +25,7 @@ from typing import Any, BinaryIO, Callable, Mapping
 
 import numpy as np
 
-from . import _core
+from . import _arrays, _core
 
 PROTOCOL = "tangere policy 1"
 ADDRESS = "TANGERE_POLICY_SOCKET"  # where `tangere.data.generate` waits for the conversation
@@ -44,7 +44,8 @@ def serve(
 
     Parameters
     ----------
-    choose: `choose(obs, episodes, actions)` returns the next actions of n environments, (n, na).
+    choose: `choose(obs, episodes, actions)` returns the next actions of n environments, (n, na);
+        a tensor of PyTorch is taken without its gradients.
         `obs` is KEY → (n, …) float32 as environments show it. `episodes` (n) are numbers of
         episodes, `actions` (n) how many actions were taken in each so far: 0 at its start. A policy
         with memory keeps it by episode. Questions about an episode come in order, those of
@@ -98,7 +99,8 @@ def converse(
             key: part.reshape(n, *shape).copy()
             for (key, shape), part in zip(tensors, parts, strict=True)
         }
-        actions = np.asarray(choose(obs, numbers[0].copy(), numbers[1].copy()), "<f8")
+        chosen = choose(obs, numbers[0].copy(), numbers[1].copy())
+        actions = np.asarray(_arrays.numbers(chosen), "<f8")
         if actions.shape[:1] != (n,) or actions.size != n * width:
             raise _core.InputError(f"actions of shape {actions.shape}; expected ({n}, {width})")
         output.write(np.asarray(n * width, "<i8").tobytes() + actions.tobytes())

@@ -159,6 +159,7 @@ class _Step(torch.autograd.Function):  # type: ignore[misc]
     def forward(ctx: Any, actions: Any, token: Any, run: Any, dtype: Any) -> Any:
         run.tape.step(actions.detach().to("cpu", torch.float64).numpy())
         ctx.run, ctx.step, ctx.dtype = run, run.taken, actions.dtype
+        ctx.save_for_backward(token)  # PyTorch frees it after a backward() that keeps no graph
         run.taken += 1
         rows = torch.from_numpy(run.tape.observations()).to(dtype)
         return rows, torch.from_numpy(run.tape.rewards()), token.clone()
@@ -166,6 +167,12 @@ class _Step(torch.autograd.Function):  # type: ignore[misc]
     @staticmethod
     @torch.autograd.function.once_differentiable  # type: ignore[untyped-decorator]
     def backward(ctx: Any, by_rows: Any, by_reward: Any, by_token: Any) -> Any:
+        try:
+            _ = ctx.saved_tensors
+        except RuntimeError:
+            raise _core.InputError(
+                "a second backward() through the same steps; give the first one retain_graph=True"
+            ) from None
         by_action = ctx.run.reverse(
             ctx.step, by_rows.to(torch.float64).numpy(), by_reward.to(torch.float64).numpy()
         )

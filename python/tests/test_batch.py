@@ -274,3 +274,36 @@ def test_what_friction_remembers_goes_on():
 def test_a_scene_without_springs_has_no_memory(model):
     assert model.memory_points == {} and "memory" not in model.readings
     assert tangere.Batch(model, envs=2).memory.shape == (2, 0, 3)
+
+
+@pytest.mark.parametrize(
+    "call, said",
+    [
+        (lambda b, m: b.reset(1), r"envs of shape \(\); expected a list of .*, or a mask \(3\)"),
+        (lambda b, m: b.reset(np.array(1)), r"envs of shape \(\)"),
+        (lambda b, m: b.set_state(b.q, b.v, [[0, 1]]), r"envs of shape \(1, 2\)"),
+        (lambda b, m: b.set_state(b.q, b.v, np.int64(2)), r"envs of shape \(\)"),
+        (lambda b, m: b.reset([2**31]), "environment 2147483648; expected a whole number from"),
+        (lambda b, m: b.reset([0], [2**64]), "episode 18446744073709551616; expected"),
+        (lambda b, m: b.set_steps([2**70, 0, 0]), "steps 1180591620717411303424; expected"),
+        (lambda b, m: b.run(np.zeros((4, 3, m.nu)), every=2**40), "every 1099511627776; expected"),
+        (lambda b, m: b.scene_controls(10**12), r"no memory for an array \(1000000000000, 3, 3\)"),
+        (lambda b, m: b.scene_controls(10**30), "steps 10{30}; expected"),
+        (lambda b, m: m.mass(2**40), "body 1099511627776; expected"),
+        (lambda b, m: tangere.Batch(m, envs=2**31), "envs 2147483648; expected"),
+        (lambda b, m: tangere.Batch(m, seed=-1), "seed -1; expected a whole number from 0 to"),
+        (lambda b, m: tangere.Batch(m, threads=2**33), "threads 8589934592; expected"),
+        (lambda b, m: tangere.make_vec("box_pushing", 2**40), "envs 1099511627776; expected"),
+    ],
+)
+def test_numbers_that_do_not_fit_are_told_in_one_line(model, call, said):
+    with pytest.raises(tangere.InputError, match=said) as error:
+        call(tangere.Batch(model, envs=3), model)
+    assert "\n" not in str(error.value)
+
+
+def test_whole_numbers_of_numpy_count(model):
+    batch = tangere.Batch(model, envs=np.int32(2), seed=np.uint64(2**64 - 1), threads=np.int8(1))
+    assert (batch.envs, batch.seed) == (2, 2**64 - 1)
+    with pytest.raises(TypeError):
+        tangere.Batch(model, envs=2.0)

@@ -214,6 +214,17 @@ def test_nothing_half_written_gets_the_name(pushes, tmp_path, monkeypatch):
     with pytest.raises(tangere.InputError, match="exists"):
         lerobot.export(pushes, out)
     assert (out / "meta/info.json").is_file()
+    half = tmp_path / "out.old.part"  # a run that was killed while it removed the old one
+    shutil.copytree(out, half)
+    (half / "meta/info.json").unlink()
+    shutil.rmtree(out)
+    lerobot.export(pushes, out)
+    assert (out / "meta/info.json").is_file() and not half.exists()
+    inside = out / "shards"
+    shutil.copytree(pushes, inside)
+    with pytest.raises(tangere.InputError, match="holds the input"):
+        lerobot.export(inside, out, overwrite=True)
+    assert inside.is_dir()
     mine = tmp_path / "mine"
     mine.mkdir()
     with pytest.raises(tangere.InputError, match="no LeRobot data set"):

@@ -34,6 +34,24 @@ def follow(obs, episodes, actions):
     return 0.3 * obs["goal"] + 0.01 * actions[:, None] - 0.001 * episodes[:, None]
 
 
+def test_a_tensor_with_gradients_is_an_action(tmp_path):
+    torch = pytest.importorskip("torch")
+    weight = torch.full((3,), 0.25, requires_grad=True)
+
+    def choose(obs, episodes, actions):
+        return weight * torch.ones(len(episodes), 3)
+
+    assert generate("box_pushing", tmp_path / "set", 2, policy=choose, name="weights")["rows"] > 0
+    np.testing.assert_array_equal(Episodes(tmp_path / "set")[0]["actions"], np.float32(0.25))
+    env = tangere.make_vec("box_pushing", 2)
+    env.reset(seed=1)
+    other = tangere.make_vec("box_pushing", 2)
+    other.reset(seed=1)
+    np.testing.assert_array_equal(
+        env.step(choose({}, np.arange(2), None))[1], other.step(np.full((2, 3), 0.25))[1]
+    )
+
+
 @pytest.fixture(scope="module")
 def followed(tmp_path_factory):
     folder = tmp_path_factory.mktemp("policy") / "followed"

@@ -100,6 +100,8 @@ def test_a_second_backward_begins_anew():
     (one,) = torch.autograd.grad(total, action, retain_graph=True)
     (two,) = torch.autograd.grad(total, action)
     assert torch.equal(one, two)
+    with pytest.raises(tangere.InputError, match="second backward.* retain_graph=True"):
+        torch.autograd.grad(total, action)
 
 
 def recorded(steps: int = 6, seed: int = 0):

@@ -198,6 +198,8 @@ void TaskTape::displace(int environment, std::span<const double> q, std::span<co
   i.show(block, environment / kBlock);
 }
 
+void TaskTape::check_step(std::span<const double> actions) const { impl_->check_actions(actions); }
+
 void TaskTape::step(std::span<const double> actions) {
   Impl& i = *impl_;
   i.check_actions(actions);

@@ -38,6 +38,8 @@ class TaskTape {
   /// bounds, and records it. Actions of the other environments are ignored. Throws InputError for
   /// an action of theirs that is not finite, for one more than `actions`, and after reverse().
   void step(std::span<const double> actions);
+  /// Throws what step() would throw for these actions, and takes none.
+  void check_step(std::span<const double> actions) const;
 
   [[nodiscard]] const Task& task() const;
   [[nodiscard]] int environments() const;

@@ -252,6 +252,8 @@ INSTANTIATE_TEST_SUITE_P(
         Mistake{"controls_missing", simulate({"--controls", "nowhere.csv"}), 3, "nowhere.csv"},
         Mistake{"controls_endless", simulate({"--controls", "/dev/zero"}), 3,
                 "/dev/zero: is a device; expected a csv file"},
+        Mistake{"controls_of_the_kernel", simulate({"--controls", "/proc/kmsg"}), 3,
+                "/proc/kmsg: is a file of the kernel; expected a csv file"},
         Mistake{"plot_missing", {"plot", "nowhere.h5", "-o", "x.svg"}, 3, "nowhere.h5"},
         Mistake{"plot_no_trajectory", {"plot", scene("README.md"), "-o", "x.svg"}, 3, "README.md"},
         Mistake{"plot_scene_of_a_sensor",
