@@ -273,10 +273,10 @@ Interpenetration::Finding Interpenetration::check(const kernels::KernelTable& ta
   };
   Finding found;
   find_poses(model_.layout.q, w.q1, w.poses_after);
-  found.clearance = passing_.clearance(w.poses_after);
+  found.clearance = passing_.clearance(w.poses_after, column);
   if (found.clearance <= motion) {  // else nothing can have come from the other side
     find_poses(model_.layout.previous_q, w.q0, w.poses_before);
-    found.passed = passing_.changed_sides(w.poses_before, w.poses_after);
+    found.passed = passing_.changed_sides(w.poses_before, w.poses_after, column);
   }
   const Lane lane(model_, w.poses_after, column);
   for (const CoarsePair& pair : coarse_) {

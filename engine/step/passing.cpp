@@ -13,6 +13,7 @@
 #include "engine/model/model_part.hpp"
 #include "engine/model/shapes.hpp"
 #include "engine/step/lane_energy.hpp"
+#include "kernels/step/stage.hpp"
 
 namespace tangere {
 
@@ -30,24 +31,37 @@ double component(const Vec3<double>& a, int k) { return k == 0 ? a.x : k == 1 ? 
 
 }  // namespace
 
-void Passing::add(int link, const Frame<double>& at, PrimitiveShape shape, const Vec3<double>& size,
-                  int other, const Vec3<double>& middle, bool other_convex) {
+double Passing::Extent::reach() const { return kWithin * std::sqrt(dot(half, half)); }
+
+Passing::Extent Passing::extent_of(PrimitiveShape shape, const Vec3<double>& size) {
   CompiledBody body;
   body.shape = shape;
   body.size = size;
   const kernels::Hull hull = hull_of(body);
-  const Vec3<double> half = hull.straight + hull.round;
-  if (!(half.x > 0 && half.y > 0 && half.z > 0)) return;  // a plane has one side
-  int axis = 0;
+  Extent extent{hull.straight + hull.round, 0};
   for (const int k : {1, 2})
-    if (component(half, k) < component(half, axis)) axis = k;
-  const double thin = component(half, axis);
+    if (component(extent.half, k) < component(extent.half, extent.axis)) extent.axis = k;
+  return extent;
+}
+
+/// Returns the extent of a wall in an environment.
+Passing::Extent Passing::extent_in(const Wall& wall, const double* column) {
+  if (wall.size_row < 0) return wall.extent;
+  return extent_of(wall.shape, kernels::load_vector<double>({}, wall.size_row, column, 0));
+}
+
+void Passing::add(int link, const Frame<double>& at, PrimitiveShape shape, const Vec3<double>& size,
+                  int size_row, int other, const Vec3<double>& middle, bool other_convex) {
+  const Extent extent = extent_of(shape, size);
+  const Vec3<double>& half = extent.half;
+  if (!(half.x > 0 && half.y > 0 && half.z > 0)) return;  // a plane has one side
+  const double thin = component(half, extent.axis);
   const auto same = [&](const Gate& g) {
     return std::minmax(g.link, g.other) == std::minmax(link, other);
   };
   const auto gate = std::find_if(gates_.begin(), gates_.end(), same);
-  walls_.push_back({link, other, at, half, axis, middle, other_convex,
-                    kWithin * std::sqrt(dot(half, half)), std::size_t(gate - gates_.begin())});
+  walls_.push_back({link, other, at, extent, shape, size_row, middle, other_convex,
+                    std::size_t(gate - gates_.begin())});
   if (gate == gates_.end()) {
     gates_.push_back({link, other, thin});
   } else {
@@ -62,7 +76,8 @@ void Passing::bound_gates() {
     for (const Wall& wall : walls_) {
       Gate& gate = gates_[wall.gate];
       const bool own = wall.link == gate.link;
-      f(own ? gate.of_link : gate.of_other, wall.at.p, std::sqrt(dot(wall.half, wall.half)));
+      f(own ? gate.of_link : gate.of_other, wall.at.p,
+        std::sqrt(dot(wall.extent.half, wall.extent.half)));
       f(own ? gate.of_other : gate.of_link, wall.middle, 0.0);
     }
   };
@@ -89,8 +104,8 @@ void Passing::bound_link_pairs() {
       if (!of_shapes && (wall.link != links.link1 || wall.other != links.link2)) continue;
       const Vec3<double>& at = of_shapes ? links.shapes_middle : links.points_middle;
       const Vec3<double>& other = of_shapes ? links.points_middle : links.shapes_middle;
-      bound.room = std::max(
-          bound.room, length(wall.at.p - at) + length(wall.middle - other) + length(wall.half));
+      bound.room = std::max(bound.room, length(wall.at.p - at) + length(wall.middle - other) +
+                                            length(wall.extent.half));
     }
     if (bound.room >= 0) bounds_.push_back(bound);
   }
@@ -140,15 +155,18 @@ Passing::Passing(const CompiledModel& m) : model_(m), arm_(m.links.size(), 0.0) 
   for (const kernels::PairContact& p : m.pairs) {
     if (!pushes(p.parameters)) continue;  // it holds nothing back
     if (p.body1 < 0) {
-      add(p.link2, p.frame2, p.shape, p.size, p.link1, p.middle, false);
+      add(p.link2, p.frame2, p.shape, p.size, p.size_row, p.link1, p.middle, false);
       continue;
     }
     const kernels::Solid& solid = m.solids[std::size_t(p.body1)];
     const auto convex = [](PrimitiveShape shape) { return row_of(shape).half_widths != nullptr; };
-    add(p.link2, p.frame2, p.shape, p.size, p.link1, p.middle, convex(solid.shape));
+    add(p.link2, p.frame2, p.shape, p.size, p.size_row, p.link1, p.middle, convex(solid.shape));
     // Bodies with points of their own need not be convex. A ball has none.
+    // Sizes of a part of a model that vary are taken as in the scene; only whole models are checked
+    // with those of an environment.
+    const int row = m.bodies.empty() ? -1 : m.bodies[std::size_t(p.body1)].size_row;
     if (solid.stretches || p.ball_radius > 0)
-      add(p.link1, solid.frame, solid.shape, solid.size, p.link2, p.frame2.p, convex(p.shape));
+      add(p.link1, solid.frame, solid.shape, solid.size, row, p.link2, p.frame2.p, convex(p.shape));
   }
   bound_gates();
   // passed() looks at a gate once.
@@ -238,7 +256,7 @@ Vec3<double> Passing::middle_in(const Wall& wall, const AlignedVector<LinkPose<R
   return relative(world(wall.link, wall.at), world(wall.other, middle)).p;
 }
 
-bool Passing::came_through(const Wall& wall, const Vec3<double>& from, const Vec3<double>& to) {
+bool Passing::came_through(const Extent& wall, const Vec3<double>& from, const Vec3<double>& to) {
   const double a = component(from, wall.axis), b = component(to, wall.axis);
   if (!(a * b < 0)) return false;
   const double share = a / (a - b);
@@ -257,20 +275,22 @@ bool Passing::passed(const AlignedVector<LinkPose<Row<L>>>& before,
   return std::any_of(walls_.begin(), walls_.end(), [&](const Wall& wall) {
     if (std::exchange(gate, wall.gate) != wall.gate)
       apart = stay_apart<L>(gates_[wall.gate], before, after, lane);
-    return !apart &&
-           came_through(wall, middle_in<L>(wall, before, lane), middle_in<L>(wall, after, lane));
+    return !apart && came_through(wall.extent, middle_in<L>(wall, before, lane),
+                                  middle_in<L>(wall, after, lane));
   });
 }
 
 bool Passing::changed_sides(const AlignedVector<LinkPose<Row<1>>>& before,
-                            const AlignedVector<LinkPose<Row<1>>>& after) const {
+                            const AlignedVector<LinkPose<Row<1>>>& after,
+                            const double* column) const {
   return std::any_of(walls_.begin(), walls_.end(), [&](const Wall& wall) {
-    return wall.other_convex &&
-           came_through(wall, middle_in<1>(wall, before, 0), middle_in<1>(wall, after, 0));
+    return wall.other_convex && came_through(extent_in(wall, column), middle_in<1>(wall, before, 0),
+                                             middle_in<1>(wall, after, 0));
   });
 }
 
-double Passing::clearance(const AlignedVector<LinkPose<Row<1>>>& poses) const {
+double Passing::clearance(const AlignedVector<LinkPose<Row<1>>>& poses,
+                          const double* column) const {
   const auto in_world = [&](int link, const Vec3<double>& p) {
     if (link < 0) return p;
     const Frame<double> at = frame_in_lane<1>(poses[std::size_t(link)], 0);
@@ -280,12 +300,13 @@ double Passing::clearance(const AlignedVector<LinkPose<Row<1>>>& poses) const {
   for (const Wall& wall : walls_) {
     if (!wall.other_convex) continue;
     const Vec3<double> arm = in_world(wall.other, wall.middle) - in_world(wall.link, wall.at.p);
-    const double far = least + wall.reach;
+    const Extent extent = extent_in(wall, column);
+    const double far = least + extent.reach();
     if (dot(arm, arm) >= far * far) continue;
     const Vec3<double> at = middle_in<1>(wall, poses, 0);
     double square = 0;
     for (int k = 0; k < 3; ++k) {
-      const double edge = k == wall.axis ? 0 : kWithin * component(wall.half, k),
+      const double edge = k == extent.axis ? 0 : kWithin * component(extent.half, k),
                    beyond = std::max(std::abs(component(at, k)) - edge, 0.0);
       square += beyond * beyond;
     }

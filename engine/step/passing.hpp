@@ -31,35 +31,45 @@ class Passing {
                             const AlignedVector<kernels::LinkPose<kernels::Row<L>>>& after,
                             int lane) const;
 
-  /// Whether between two states, however far apart, the middle of a convex body came through the
-  /// middle plane of another.
-  [[nodiscard]] bool changed_sides(
-      const AlignedVector<kernels::LinkPose<kernels::Row<1>>>& before,
-      const AlignedVector<kernels::LinkPose<kernels::Row<1>>>& after) const;
+  /// Whether between two states of an environment, however far apart, the middle of a convex body
+  /// came through the middle plane of another. `column`: its numbers in the block, for sizes that
+  /// vary.
+  [[nodiscard]] bool changed_sides(const AlignedVector<kernels::LinkPose<kernels::Row<1>>>& before,
+                                   const AlignedVector<kernels::LinkPose<kernels::Row<1>>>& after,
+                                   const double* column) const;
   /// Returns how far bodies may move against each other until one can change sides [m]: the least
   /// distance of a middle from the part of a middle plane that it would have to come through.
-  [[nodiscard]] double clearance(
-      const AlignedVector<kernels::LinkPose<kernels::Row<1>>>& poses) const;
+  [[nodiscard]] double clearance(const AlignedVector<kernels::LinkPose<kernels::Row<1>>>& poses,
+                                 const double* column) const;
 
  private:
+  /// Half the widths of a wall along its axes, and the axis along which it is thinnest: 0, 1, 2.
+  struct Extent {
+    kernels::Vec3<double> half;  ///< [m]
+    int axis;
+    /// Distance beyond which no place is in the part of the middle plane that counts [m].
+    [[nodiscard]] double reach() const;
+  };
+  static Extent extent_of(PrimitiveShape shape, const kernels::Vec3<double>& size);
   /// A convex body of a pair, and the middle of the other one.
   struct Wall {
     int link, other;            ///< -1: the world
     kernels::Frame<double> at;  ///< the body in its link
-    kernels::Vec3<double> half;
-    int axis;                      ///< along which it is thinnest: 0, 1, 2
+    Extent extent;              ///< of the size in the scene
+    PrimitiveShape shape;
+    int size_row;                  ///< as in kernels::PairContact
     kernels::Vec3<double> middle;  ///< of the other body, in its link
     bool other_convex;             ///< so that its middle lies in it
-    double reach;  ///< no place of the plane that it must come through is farther from `at` [m]
     std::size_t gate;
   };
   void add(int link, const kernels::Frame<double>& at, PrimitiveShape shape,
-           const kernels::Vec3<double>& size, int other, const kernels::Vec3<double>& middle,
-           bool other_convex);
+           const kernels::Vec3<double>& size, int size_row, int other,
+           const kernels::Vec3<double>& middle, bool other_convex);
+  [[nodiscard]] static Extent extent_in(const Wall& wall, const double* column);
   template <int L>
   [[nodiscard]] static kernels::Vec3<double> middle_in(
       const Wall& wall, const AlignedVector<kernels::LinkPose<kernels::Row<L>>>& poses, int lane);
-  [[nodiscard]] static bool came_through(const Wall& wall, const kernels::Vec3<double>& from,
+  [[nodiscard]] static bool came_through(const Extent& extent, const kernels::Vec3<double>& from,
                                          const kernels::Vec3<double>& to);
 
   /// A ball around all walls and middles of one link, in its axes.
