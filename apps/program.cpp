@@ -70,9 +70,20 @@ bool asks_for_json(int argc, char** argv) {
   return std::any_of(argv, argv + argc, [](const std::string& a) { return a == "--json"; });
 }
 
+Json error_object(const std::string& command, ExitCode code, const std::string& what) {
+  return {{"command", command.empty() ? Json() : Json(command)},
+          {"exit_code", static_cast<int>(code)},
+          {"error", what}};
+}
+
 int run(const Command& command, const std::string& name, int argc, char** argv) {
   keep_inputs();
-  end_by_signals(name, asks_for_json(argc, argv), command.reads_files && command.reads_files());
+  const bool json = asks_for_json(argc, argv);
+  end_by_signals(
+      [&](ExitCode code, const std::string& what) {
+        return json ? error_object(name, code, what).dump(2) + "\n" : std::string();
+      },
+      command.reads_files && command.reads_files());
   if (*kernels::isa_error() != '\0') throw InputError(kernels::isa_error());
   ProgramInfo info{TANGERE_VERSION, {}};
   for (int i = 0; i < argc; ++i) info.command_line += (i > 0 ? " " : "") + std::string(argv[i]);
@@ -87,10 +98,7 @@ int report(const Program& program, int argc, char** argv, ExitCode code, const s
   Console console;
   console.json = asks_for_json(argc, argv);
   console.fail("tangere: " + what);
-  const std::string command = program.parser.chosen_name();
-  console.result({{"command", command.empty() ? Json() : Json(command)},
-                  {"exit_code", static_cast<int>(code)},
-                  {"error", what}});
+  console.result(error_object(program.parser.chosen_name(), code, what));
   return code;
 }
 

@@ -6,9 +6,7 @@
 #include <unistd.h>
 
 #include <atomic>
-#include <nlohmann/json.hpp>
 
-#include "apps/console.hpp"
 #include "io/files/part_file.hpp"
 
 namespace tangere::apps {
@@ -73,15 +71,11 @@ bool is_crash(int signal) { return signal != SIGINT && signal != SIGTERM; }
 
 }  // namespace
 
-void end_by_signals(const std::string& command, bool json, bool child) {
+void end_by_signals(const ObjectOfError& object, bool child) {
   std::signal(SIGXFSZ, SIG_IGN);
   for (LastWords& words : last_words) {
     words.text = std::string("tangere: ") + words.reason + "\n";
-    if (json)
-      words.object =
-          Json{{"command", command}, {"exit_code", int{words.code}}, {"error", words.reason}}.dump(
-              2) +
-          "\n";
+    words.object = object(words.code, words.reason);
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
     if (is_crash(words.signal)) continue;  // the sanitizer explains it
 #endif

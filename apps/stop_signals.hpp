@@ -5,16 +5,22 @@
 
 #include <array>
 #include <csignal>
+#include <functional>
 #include <string>
+
+#include "apps/console.hpp"
 
 namespace tangere::apps {
 
+/// The line for programs that goes with a code and a message; empty without --json.
+using ObjectOfError = std::function<std::string(ExitCode code, const std::string& what)>;
+
 /// From now on SIGINT and SIGTERM (unless the parent ignored them) remove the .part of every output
-/// and end the process with kInterrupted or kTerminated and a message; with `json` also with the
-/// object of an error of `command`. So do crashes, with kUsage: HDF5 uses some memory without
-/// checking that it got it. In a `child` whose parent explains crashes they only remove the .parts.
-/// Exceeding a file-size limit fails the write instead of raising SIGXFSZ.
-void end_by_signals(const std::string& command, bool json, bool child);
+/// and end the process with kInterrupted or kTerminated, a message and what `object` gives for
+/// them. So do crashes, with kUsage: HDF5 uses some memory without checking that it got it. In a
+/// `child` whose parent explains crashes they only remove the .parts. Exceeding a file-size limit
+/// fails the write instead of raising SIGXFSZ.
+void end_by_signals(const ObjectOfError& object, bool child);
 /// From now on SIGINT and SIGTERM change nothing any more: the result has been told.
 void ignore_signals();
 

@@ -71,6 +71,7 @@ set(public_headers
   engine/step/control.hpp
   engine/step/displacement.hpp
   engine/step/memory_arrays.hpp
+  engine/step/sleeping_trees.hpp
   engine/step/shear_memory.hpp
   engine/step/sleep_state.hpp
   engine/step/stepper.hpp

@@ -171,6 +171,33 @@ std::string line_of_difference(const std::string& there, const std::string& here
   }
 }
 
+/// FNV-1a.
+std::uint64_t hash_text(std::uint64_t hash, const std::string& text) {
+  for (const char c : text + '\0') hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001B3ULL;
+  return hash;
+}
+
+std::uint64_t hash_attributes(std::uint64_t hash, const h5::Id& object, const std::string& path) {
+  for (const std::string& name : h5::attribute_names(object))
+    hash = hash_text(hash_text(hash_text(hash, path), name), h5::attribute_text(object, name));
+  return hash;
+}
+
+std::uint64_t hash_group(std::uint64_t hash, const h5::Id& group, const std::string& path,
+                         int depth) {
+  constexpr int kDeepest = 4;
+  if (depth > kDeepest)
+    throw IoError(fmt::format("{}: groups are nested deeper than {}", path, kDeepest));
+  hash = hash_attributes(hash, group, path);
+  for (const std::string& name : h5::link_names(group)) {
+    const std::string inner = path + "/" + name;
+    hash = h5::is_dataset(group, name)
+               ? hash_attributes(hash, h5::open_dataset(group, name), inner)
+               : hash_group(hash, h5::open_group(group, name), inner, depth + 1);
+  }
+  return hash;
+}
+
 }  // namespace
 
 void describe_dataset(const h5::Id& file, const DatasetLayout& layout) {
@@ -183,6 +210,12 @@ void describe_dataset(const h5::Id& file, const DatasetLayout& layout) {
   describe_run(scene, layout);
   describe_numbers(scene, layout);
   describe_gradients(scene, layout);
+}
+
+std::uint64_t description_sum(const h5::Id& file) {
+  const std::uint64_t scene =
+      hash_group(0xCBF29CE484222325ULL, h5::open_group(file, "scene"), "/scene", 1);
+  return hash_text(scene, h5::read_text(h5::open_group(file, "data"), "env_args"));
 }
 
 std::vector<Setting> settings_of(const DatasetLayout& layout) {

@@ -20,6 +20,10 @@ inline constexpr const char* kFormatName = "tangere dataset";
 /// Writes the attributes of the root that belong to the whole data set, and the group /scene.
 void describe_dataset(const h5::Id& file, const DatasetLayout& layout);
 
+/// Checksum of every attribute of /scene and all below it, and of env_args of /data. Throws IoError
+/// for attributes that are damaged.
+std::uint64_t description_sum(const h5::Id& file);
+
 /// Returns all settings that decide which numbers a data set holds, in a fixed order, from a layout
 /// or from a file.
 std::vector<Setting> settings_of(const DatasetLayout& layout);

@@ -103,6 +103,8 @@ class Merger {
     const h5::Id scene = h5::open_group(from, "scene");
     if (!h5::read_text(scene, "task").starts_with("none"))
       policies_ = h5::read_texts(scene, "policies");
+    if (H5Aexists(from.get(), "description_sum") > 0)
+      description_ = h5::read_number<std::uint64_t>(from, "description_sum");
     env_args_ = h5::read_text(h5::open_group(from, "data"), "env_args");
     h5::copy_group(from, "scene", file_.file(), "scene");
   }
@@ -206,6 +208,8 @@ class Merger {
     }
     write_masks();
     h5::write_scalar<std::uint64_t>(file_.file(), "content_sum", sum_);
+    if (description_)
+      h5::write_scalar<std::uint64_t>(file_.file(), "description_sum", *description_);
     result_.demos = std::ssize(demos_);
     result_.failed = std::ssize(failed_);
   }
@@ -252,7 +256,8 @@ class Merger {
   GrownFile file_;
   h5::Id copied_;  // group of demos
   std::string env_args_;
-  bool few_each_ = false;  // episodes in a shard
+  std::optional<std::uint64_t> description_;  // description_sum of the shards
+  bool few_each_ = false;                     // episodes in a shard
   std::optional<DemoMembers> members_;
   std::optional<MinariView> view_;
   std::vector<MaskedDemo> demos_;                            // ascending

@@ -62,6 +62,8 @@ class ShardChecker {
   ShardReport check() {
     if (!is_of_this_format() || !is_described()) return {content_, problems_};
     const h5::Id data = h5::open_group(file_, "data"), failed = h5::open_group(file_, "failed");
+    check_attributes(file_);
+    check_attributes(data);
     if (end_ - content_.first_episode > kMostLooks && !count_episodes(data, failed))
       return {content_, problems_};
     for (std::int64_t episode = content_.first_episode; episode < end_; ++episode)
@@ -74,6 +76,7 @@ class ShardChecker {
     if (problems_.empty() && sum_.value() != expected)
       fail(fmt::format("the checksum of its numbers is {:016x}; expected {:016x}", sum_.value(),
                        expected));
+    check_description_sum();
     problems_.insert(problems_.end(), not_finite_.begin(), not_finite_.end());
     return {content_, problems_};
   }
@@ -119,6 +122,25 @@ class ShardChecker {
     gradients_ = gradients_said(scene_);
     samples_ = samples_said(scene_, every, rows_);
   }
+  /// Reads every attribute, also those that nothing else here needs.
+  static void check_attributes(const h5::Id& object) {
+    for (const std::string& name : h5::attribute_names(object))
+      static_cast<void>(h5::attribute_text(object, name));
+  }
+  /// Files of older versions have no such sum.
+  void check_description_sum() {
+    if (!problems_.empty()) return;
+    try {
+      const std::uint64_t found = description_sum(file_);
+      if (H5Aexists(file_.get(), "description_sum") <= 0) return;
+      const auto expected = h5::read_number<std::uint64_t>(file_, "description_sum");
+      if (found != expected)
+        fail(fmt::format("the checksum of its description is {:016x}; expected {:016x}", found,
+                         expected));
+    } catch (const IoError& error) {
+      fail(error.what());
+    }
+  }
   /// Whether there are as many as the file says: a claim alone must not become a loop.
   [[nodiscard]] bool count_episodes(const h5::Id& data, const h5::Id& failed) {
     const auto demos = static_cast<std::int64_t>(h5::link_count(data));
@@ -143,7 +165,9 @@ class ShardChecker {
   }
   void try_demo(const h5::Id& data, const std::string& demo, std::int64_t episode) {
     try {
-      add_demo(h5::open_group(data, demo), episode);
+      const h5::Id group = h5::open_group(data, demo);
+      check_attributes(group);
+      add_demo(group, episode);
     } catch (const IoError& error) {
       fail(fmt::format("{}: {}", demo, error.what()));
     }

@@ -300,6 +300,12 @@ void ShardFile::complete_description(std::uint64_t data) {
   h5::write_scalar<std::int64_t>(group, "total", rows_);
   record_failures();
   h5::write_scalar<std::uint64_t>(file_, "content_sum", sum_.value());
+  try {
+    h5::write_scalar<std::uint64_t>(file_, "description_sum", description_sum(file_));
+  } catch (const IoError&) {
+    part_.compare();  // says more if the disk has lost what was written
+    throw;
+  }
 }
 
 void ShardFile::commit() {

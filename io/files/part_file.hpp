@@ -59,8 +59,8 @@ class PartFile {
   std::optional<WrittenBytes> written_;
 };
 
-/// Removes the .part of every PartFile that lives, of 64 at most. A handler of signals that ends the
-/// process may call it.
+/// Removes the .part of every PartFile that lives, of 64 at most. A handler of signals may call it
+/// before it ends the process.
 void remove_parts() noexcept;
 
 /// Writes a whole text file, or leaves what was there.

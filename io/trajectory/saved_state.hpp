@@ -47,10 +47,10 @@ SavedState read_state(const std::string& path, std::optional<std::int64_t> row);
 
 /// Copies environment e of a saved state to environment e of a batch. With `continues` it also sets
 /// the row before, so that the next step continues BDF2, and the step, with which the noise of
-/// sensors goes on. What friction remembers is set where the file holds it, and with `continues` who
-/// sleeps. An environment that had failed stays failed. Throws InputError when the coordinates, the
-/// points that remember or the trees that sleep do not match the model, or the batch is larger than
-/// the file's.
+/// sensors goes on. What friction remembers is set where the file holds it, with `continues` also
+/// who sleeps. An environment that had failed stays failed. Throws InputError when the coordinates,
+/// the points that remember or the trees that sleep do not match the model, or the batch is larger
+/// than the file's.
 void restore_state(const SavedState& from, bool continues, Batch& batch);
 
 }  // namespace tangere

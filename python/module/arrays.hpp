@@ -41,8 +41,8 @@ struct Argument : nb::ndarray<const T, nb::c_contig, nb::device::cpu> {
 template <class T>
 using Array = nb::ndarray<nb::numpy, T>;
 
-/// Returns a new array, and the place where C++ fills it. Its numbers are not set. Throws InputError
-/// where there is no memory for it.
+/// Returns a new array, and the place where C++ fills it. Its numbers are not set. Throws
+/// InputError where there is no memory for it.
 template <class T>
 Array<T> new_array(const Shape& shape, std::span<T>& numbers) {
   std::size_t size = 1;

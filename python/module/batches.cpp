@@ -358,6 +358,24 @@ static void add_run(nb::module_& m) {
           "(E) int8: of the last step; negative where an environment failed.");
 }
 
+static void make_batch(PythonBatch* self, const Model& model, const Whole<int>& envs,
+                       const Whole<std::uint64_t>& seed, const Whole<std::int64_t>& first_episode,
+                       const std::optional<Whole<int>>& threads, const std::string& precision,
+                       const std::optional<double>& timestep,
+                       const std::optional<double>& tolerance,
+                       const std::optional<double>& accuracy, const std::optional<double>& sleep) {
+  BatchOptions options;
+  options.seed = seed.value("seed");
+  options.first_episode = first_episode.value("first_episode");
+  options.threads = threads_of(threads);
+  options.precision = precision_named(precision);
+  options.stepper.timestep = timestep;
+  options.stepper.tolerance = tolerance;
+  options.stepper.accuracy = accuracy;
+  options.stepper.sleep = sleep;
+  new (self) PythonBatch(model, envs.value("envs"), options);
+}
+
 void add_batches(nb::module_& m) {
   add_run(m);
   nb::class_<PythonBatch>(
@@ -365,35 +383,17 @@ void add_batches(nb::module_& m) {
       "Many environments of one model, stepped together on all cores. Results are new arrays.\n"
       "The same seed gives the same bits for any number of environments and threads. One Python\n"
       "thread uses a batch at a time.")
-      .def(
-          "__init__",
-          [](PythonBatch* self, const Model& model, const Whole<int>& envs,
-             const Whole<std::uint64_t>& seed, const Whole<std::int64_t>& first_episode,
-             const std::optional<Whole<int>>& threads, const std::string& precision,
-             const std::optional<double>& timestep, const std::optional<double>& tolerance,
-             const std::optional<double>& accuracy, const std::optional<double>& sleep) {
-            BatchOptions options{seed.value("seed"),
-                                 first_episode.value("first_episode"),
-                                 threads_of(threads),
-                                 precision_named(precision),
-                                 {}};
-            options.stepper.timestep = timestep;
-            options.stepper.tolerance = tolerance;
-            options.stepper.accuracy = accuracy;
-            options.stepper.sleep = sleep;
-            new (self) PythonBatch(model, envs.value("envs"), options);
-          },
-          "model"_a, "envs"_a = 1, "seed"_a = 0, "first_episode"_a = 0, "threads"_a = nb::none(),
-          "precision"_a = "mixed", "timestep"_a = nb::none(), "tolerance"_a = nb::none(),
-          "accuracy"_a = nb::none(), "sleep"_a = nb::none(),
-          "Draws `envs` starting states: environment e is episode first_episode + e of `seed`.\n"
-          "`threads`: None for all cores. `precision`: of tactile fields; 'mixed' returns "
-          "float32,\n"
-          "'double' float64. `timestep` [s], `tolerance` (of a solve, dimensionless),\n"
-          "`accuracy` (of the parts that steps are cut into, relative; 0: they are not cut) and\n"
-          "`sleep` (share of its size that a body may move and still rest until it sleeps; 0: "
-          "none\n"
-          "sleeps): None for the scene's. InputError: a number is out of range.")
+      .def("__init__", &make_batch, "model"_a, "envs"_a = 1, "seed"_a = 0, "first_episode"_a = 0,
+           "threads"_a = nb::none(), "precision"_a = "mixed", "timestep"_a = nb::none(),
+           "tolerance"_a = nb::none(), "accuracy"_a = nb::none(), "sleep"_a = nb::none(),
+           "Draws `envs` starting states: environment e is episode first_episode + e of `seed`.\n"
+           "`threads`: None for all cores. `precision`: of tactile fields; 'mixed' returns "
+           "float32,\n"
+           "'double' float64. `timestep` [s], `tolerance` (of a solve, dimensionless),\n"
+           "`accuracy` (of the parts that steps are cut into, relative; 0: they are not cut) and\n"
+           "`sleep` (share of its size that a body may move and still rest until it sleeps; 0: "
+           "none\n"
+           "sleeps): None for the scene's. InputError: a number is out of range.")
       .def_prop_ro("model", &PythonBatch::model)
       .def_prop_ro("envs", &PythonBatch::environments, "E")
       .def_prop_ro("threads", &PythonBatch::threads)

@@ -266,6 +266,33 @@ INSTANTIATE_TEST_SUITE_P(
                 "expected a scene, F.xml"}),
     [](const auto& test) { return test.param.name; });
 
+/// A name that would clear a terminal, turn a line around and make a picture that is no XML.
+TEST(Command, NamesReachNoTerminalAndNoPictureAsTheyAre) {
+  const Folder folder;
+  std::string text = file_bytes(scene("rolling_ball_small.xml"));
+  const std::string name = "\"pad\"", hostile = "\"pad&#27;[2J&#x202E;&#xFFFE;\"";
+  for (std::size_t at = text.find(name); at != std::string::npos;
+       at = text.find(name, at + hostile.size()))
+    text.replace(at, name.size(), hostile);
+  folder.write("s.xml", text);
+  for (const Words& words :
+       {Words{"inspect", "s.xml"}, Words{"inspect", "s.xml", "--json"},
+        Words{"simulate", "s.xml", "-o", "run.h5", "--steps", "10", "--json"},
+        Words{"plot", "run.h5", "-o", "run.svg", "--json"},
+        Words{"view", "run.h5", "-o", "run.html"},
+        Words{"generate", "s.xml", "-o", "set", "--episodes", "1", "--steps", "5", "--every", "5"},
+        Words{"info", "set"}}) {
+    const Outcome outcome = run(folder, words);
+    EXPECT_EQ(outcome.exit_code, 0) << words.front() << outcome.err;
+    for (const char* const character : {"\x1b", "\u202e", "\uFFFE"})
+      EXPECT_EQ((outcome.out + outcome.err).find(character), std::string::npos) << words.front();
+  }
+  EXPECT_THAT(run(folder, {"info", "set"}).out, HasSubstr("pad\\u001b[2J\\u202e\\ufffe"));
+  for (const char* const file : {"run.svg", "run.html"})
+    for (const char* const character : {"\x1b", "\u202e", "\uFFFE"})
+      EXPECT_EQ(folder.read(file).find(character), std::string::npos) << file;
+}
+
 TEST(Command, ASceneIsDrawnAtItsStart) {
   const Folder folder;
   const Outcome drawn =

@@ -10,6 +10,7 @@
 #include <functional>
 
 #include "io/dataset/dataset_writer.hpp"
+#include "io/hdf5/h5.hpp"
 #include "io/trajectory/trajectory_file.hpp"
 #include "tests/files.hpp"
 #include "tests/io/synthetic_episodes.hpp"
@@ -193,6 +194,22 @@ TEST_F(ShardCheck, FindsCountsThatAreWrong) {
   EXPECT_THAT(with(".", "first_episode", 1), HasSubstr("episode 20 is not in exactly one"));
   EXPECT_THAT(with("scene", "steps", 8), HasSubstr("demo_0 has 3 rows, expected 4"));
   EXPECT_THAT(with(".", "content_sum", 1), HasSubstr("expected 0000000000000001"));
+}
+
+TEST_F(ShardCheck, FindsADescriptionThatHasChanged) {
+  const std::string whole = read();
+  for (const char* const name : {"name", "tangere_version", "text"}) {
+    write(whole);
+    change([&](hid_t file) {
+      const h5::Id scene(H5Gopen2(file, "scene", H5P_DEFAULT));
+      H5Adelete(scene.get(), name);
+      h5::write_attribute(scene, name, "something else");
+    });
+    EXPECT_THAT(complaint(), HasSubstr("the checksum of its description is ")) << name;
+  }
+  write(whole);
+  change([](hid_t file) { H5Adelete(file, "description_sum"); });
+  EXPECT_EQ(complaint(), "") << "files of older versions have none";
 }
 
 TEST_F(ShardCheck, FindsDatasetsThatAreMissingOrShort) {
