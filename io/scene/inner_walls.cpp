@@ -54,9 +54,9 @@ class Walls {
     find();
   }
 
-  /// Takes walls away.
-  void remove() {
-    if (facing_.empty()) return;
+  /// Takes walls away. Returns whether there were any.
+  bool remove() {
+    if (facing_.empty()) return false;
     std::vector<int> ends;
     for (const Facing& f : facing_)
       for (const int face : {f.first, f.second})
@@ -76,15 +76,13 @@ class Walls {
           corner_of[std::size_t(v)] = same[std::size_t(v)];
       }
     }
-    const auto is_gone = [&](const Facing& f) { return gone[std::size_t(f.first)] != 0; };
-    facing_.erase(std::remove_if(facing_.begin(), facing_.end(), is_gone), facing_.end());
-    if (std::find(gone.begin(), gone.end(), 1) == gone.end()) return;
     for (std::size_t f = 0; f < faces_.size(); ++f)
       if (gone[f] == 0) made.push_back(faces_[f].corners);
     mesh_.triangles = std::move(made);
     for (std::size_t v = corner_of.size(); v < mesh_.vertices.size() / 3; ++v)
       corner_of.push_back(static_cast<int>(v));
     mesh_ = with_corners(mesh_, corner_of);
+    return true;
   }
 
   [[nodiscard]] std::string fault() const {
@@ -96,7 +94,7 @@ class Walls {
                           [](const Facing& a, const Facing& b) { return a.area < b.area; });
     return fmt::format(
         "{:.2g} % of the area are walls inside the solid, as at {}, where closed parts lie flush "
-        "on each other in part; expected one surface around all parts (unite them), or "
+        "on each other and overlap; expected one surface around all parts (unite them), or "
         "hull=\"true\" for their convex hull",
         100 * area / whole_, place_text(largest.place));
   }
@@ -229,9 +227,10 @@ class Walls {
 }  // namespace
 
 std::string remove_walls(MeshShape& mesh) {
-  Walls walls(mesh);
-  walls.remove();
-  return walls.fault();
+  constexpr int kPasses = 4;  // parts that overlap may leave walls among the pieces
+  for (int pass = 0; pass < kPasses; ++pass)
+    if (!Walls(mesh).remove()) return "";
+  return Walls(mesh).fault();
 }
 
 }  // namespace tangere
