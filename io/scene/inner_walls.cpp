@@ -16,11 +16,12 @@
 namespace tangere {
 namespace {
 
-constexpr double kParallel = 1e-4;   // between the normals of a wall's two sides
-constexpr double kCell = 1e-3;       // of the table of planes
-constexpr double kWide = 1e-6;       // of the longest side: the widest gap that is still a wall
-constexpr double kDeep = 2.5e-7;     // of the longest side: how far its sides may overlap
-constexpr double kShare = 1e-6;      // of an area: less is rounding
+constexpr double kParallel = 1e-4;  // between the normals of a wall's two sides
+constexpr double kCell = 1e-3;      // of the table of planes
+constexpr double kWide = 1e-6;      // of the longest side: the widest gap that is still a wall
+constexpr double kDeep = 2.5e-7;    // of the longest side: how far its sides may overlap
+constexpr double kShare = 1e-6;     // of an area: less is rounding
+constexpr std::size_t kMostPairs = 300000;
 constexpr double kLeastWall = 1e-4;  // of the area of all: less is no fault
 
 struct Face {
@@ -53,6 +54,8 @@ class Walls {
     }
     find();
   }
+
+  [[nodiscard]] bool has_too_many() const { return facing_.size() >= kMostPairs; }
 
   /// Takes walls away. Returns whether there were any.
   bool remove() {
@@ -166,6 +169,7 @@ class Walls {
   }
 
   void add_pair(int f, int other) {
+    if (has_too_many()) return;
     const Face &a = faces_[std::size_t(f)], &b = faces_[std::size_t(other)];
     if (dot(a.normal, b.normal) > -1 + kParallel * kParallel) return;
     const Face &small = a.area < b.area ? a : b, &large = a.area < b.area ? b : a;
@@ -228,8 +232,15 @@ class Walls {
 
 std::string remove_walls(MeshShape& mesh) {
   constexpr int kPasses = 4;  // parts that overlap may leave walls among the pieces
-  for (int pass = 0; pass < kPasses; ++pass)
-    if (!Walls(mesh).remove()) return "";
+  for (int pass = 0; pass < kPasses; ++pass) {
+    Walls walls(mesh);
+    if (walls.has_too_many())
+      return fmt::format(
+          "{} or more pairs of triangles face each other in one place; expected a "
+          "surface around a solid",
+          kMostPairs);
+    if (!walls.remove()) return "";
+  }
   return Walls(mesh).fault();
 }
 
