@@ -83,7 +83,7 @@ class Keyframe {
     return out;
   }
 
-  /// Where a body with a free joint is in the world. `q`: of the key; empty: where the file puts it.
+  /// Where a body with a free joint is in the world. `q`: of the key; empty: as the file puts it.
   [[nodiscard]] Pose free_pose(const JointDescription& joint, std::span<const double> q) const {
     if (q.empty()) return joint.pose;
     return compose({{q[0], q[1], q[2]}, unit(q.subspan(3))}, inverse(key_frame(joint)));

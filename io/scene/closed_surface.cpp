@@ -84,9 +84,7 @@ MeshShape weld(const RawMesh& raw) {
   }
   const std::vector<Edge> open = open_edges(mesh);
   if (open.empty()) return mesh;
-  MeshShape closed =
-      with_corners(mesh, first_within(mesh, ends_of(open), kRounding * longest_side(mesh)));
-  return open_edges(closed).empty() ? closed : mesh;
+  return with_corners(mesh, first_within(mesh, ends_of(open), kRounding * longest_side(mesh)));
 }
 
 std::string open_edge(const MeshShape& mesh) {

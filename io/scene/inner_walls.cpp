@@ -16,11 +16,12 @@
 namespace tangere {
 namespace {
 
-constexpr double kParallel = 1e-4;   // between the normals of a wall's two sides
-constexpr double kCell = 1e-3;       // of the table of planes
-constexpr double kWide = 1e-6;       // of the longest side: the widest gap that is still a wall
-constexpr double kDeep = 2.5e-7;     // of the longest side: how far its sides may overlap
-constexpr double kShare = 1e-6;      // of an area: less is rounding
+constexpr double kParallel = 1e-4;  // between the normals of a wall's two sides
+constexpr double kCell = 1e-3;      // of the table of planes
+constexpr double kWide = 1e-6;      // of the longest side: the widest gap that is still a wall
+constexpr double kDeep = 2.5e-7;    // of the longest side: how far its sides may overlap
+constexpr double kShare = 1e-6;     // of an area: less is rounding
+constexpr std::size_t kMostPairs = 300000;
 constexpr double kLeastWall = 1e-4;  // of the area of all: less is no fault
 
 struct Face {
@@ -54,9 +55,11 @@ class Walls {
     find();
   }
 
-  /// Takes walls away.
-  void remove() {
-    if (facing_.empty()) return;
+  [[nodiscard]] bool has_too_many() const { return facing_.size() >= kMostPairs; }
+
+  /// Takes walls away. Returns whether there were any.
+  bool remove() {
+    if (facing_.empty()) return false;
     std::vector<int> ends;
     for (const Facing& f : facing_)
       for (const int face : {f.first, f.second})
@@ -76,15 +79,13 @@ class Walls {
           corner_of[std::size_t(v)] = same[std::size_t(v)];
       }
     }
-    const auto is_gone = [&](const Facing& f) { return gone[std::size_t(f.first)] != 0; };
-    facing_.erase(std::remove_if(facing_.begin(), facing_.end(), is_gone), facing_.end());
-    if (std::find(gone.begin(), gone.end(), 1) == gone.end()) return;
     for (std::size_t f = 0; f < faces_.size(); ++f)
       if (gone[f] == 0) made.push_back(faces_[f].corners);
     mesh_.triangles = std::move(made);
     for (std::size_t v = corner_of.size(); v < mesh_.vertices.size() / 3; ++v)
       corner_of.push_back(static_cast<int>(v));
     mesh_ = with_corners(mesh_, corner_of);
+    return true;
   }
 
   [[nodiscard]] std::string fault() const {
@@ -96,7 +97,7 @@ class Walls {
                           [](const Facing& a, const Facing& b) { return a.area < b.area; });
     return fmt::format(
         "{:.2g} % of the area are walls inside the solid, as at {}, where closed parts lie flush "
-        "on each other in part; expected one surface around all parts (unite them), or "
+        "on each other and overlap; expected one surface around all parts (unite them), or "
         "hull=\"true\" for their convex hull",
         100 * area / whole_, place_text(largest.place));
   }
@@ -168,6 +169,7 @@ class Walls {
   }
 
   void add_pair(int f, int other) {
+    if (has_too_many()) return;
     const Face &a = faces_[std::size_t(f)], &b = faces_[std::size_t(other)];
     if (dot(a.normal, b.normal) > -1 + kParallel * kParallel) return;
     const Face &small = a.area < b.area ? a : b, &large = a.area < b.area ? b : a;
@@ -229,9 +231,17 @@ class Walls {
 }  // namespace
 
 std::string remove_walls(MeshShape& mesh) {
-  Walls walls(mesh);
-  walls.remove();
-  return walls.fault();
+  constexpr int kPasses = 4;  // parts that overlap may leave walls among the pieces
+  for (int pass = 0; pass < kPasses; ++pass) {
+    Walls walls(mesh);
+    if (walls.has_too_many())
+      return fmt::format(
+          "{} or more pairs of triangles face each other in one place; expected a "
+          "surface around a solid",
+          kMostPairs);
+    if (!walls.remove()) return "";
+  }
+  return Walls(mesh).fault();
 }
 
 }  // namespace tangere

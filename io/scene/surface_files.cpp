@@ -64,8 +64,10 @@ FileSurface surface_of(const RawMesh& raw, const std::string& name) {
       out.fault = name + ": " + fault;
   if (!out.fault.empty()) return out;
   out.closed = out.faces;
-  if (const std::string fault = remove_walls(out.closed); !fault.empty())
-    out.fault = name + ": " + fault;
+  std::string fault = remove_walls(out.closed);
+  if (fault.empty() && !surface_fault(out.closed).empty())
+    fault = "the surface encloses no volume but for walls without thickness";
+  if (!fault.empty()) out.fault = name + ": " + fault;
   return out;
 }
 

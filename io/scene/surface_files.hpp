@@ -19,9 +19,9 @@ struct FileSurface {
 };
 
 /// Reads an OBJ file, or an STL or PLY file where the path ends in .stl or .ply, in its own unit.
-/// Corners that differ by rounding become one where that closes the surface, and walls inside that
-/// lie flush on each other are taken away. Throws IoError if the file cannot be read, InputError
-/// with file:line if it is not of its format or has no vertices.
+/// Corners that differ by rounding become one where the surface would be open, and walls inside
+/// where parts lie flush on each other are taken away. Throws IoError if the file cannot be read,
+/// InputError with file:line if it is not of its format or has no vertices.
 FileSurface read_faces(const std::string& path);
 
 /// Does the same with triangles that are read already. `name` stands in front of the fault.

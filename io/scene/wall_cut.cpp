@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // A convex polygon without a triangle is up to three convex polygons: to the right of its first
-// edge, then to the right of the second of what is to the left of the first, and so on. Edges of the
-// old and of the new triangles cancel in space, but corners of some lie on edges of others. A
+// edge, then to the right of the second of what is to the left of the first, and so on. Edges of
+// the old and of the new triangles cancel in space, but corners of some lie on edges of others. A
 // triangle without area between such an edge and corner takes the edge in two.
 #include "io/scene/wall_cut.hpp"
 
@@ -15,10 +15,9 @@
 namespace tangere {
 namespace {
 
-constexpr double kTiny = 1e-12;      // of size²: a polygon without area
-constexpr double kSnap = 1e-6;       // of size: new corners nearer than this are one
-constexpr double kOnEdge = 2e-6;     // of size: corners nearer to an edge than this lie on it
-constexpr double kSmallGaps = 1e-6;  // of size²: area of what is filled
+constexpr double kTiny = 1e-12;   // of size²: a polygon without area
+constexpr double kSnap = 1e-6;    // of size: new corners nearer than this are one
+constexpr double kOnEdge = 2e-6;  // of size: corners nearer to an edge than this lie on it
 constexpr std::size_t kMostPieces = 20000;  // of a wall
 
 using Point = std::array<double, 2>;
@@ -190,7 +189,7 @@ class WallCutter {
 
   /// Adds triangles without area until every edge of the old faces is one of the new.
   bool close_edges(std::vector<std::array<int, 3>>& made) {
-    while (!surplus_.empty()) {
+    while (!surplus_.empty() && made.size() <= kMostPieces) {
       bool changed = false;
       const std::map<Edge, int> open = surplus_;
       for (const auto& [edge, count] : open) {
@@ -206,21 +205,20 @@ class WallCutter {
       }
       if (!changed) return fill_gaps(made);
     }
-    return true;
+    return surplus_.empty();
   }
 
-  /// Fills what is still open, if it is small: where faces of one side overlap, too.
+  /// Fills what is still open, as where faces of one side overlap. A sum of faces in a plane whose
+  /// edges cancel is none, so that new and old faces then enclose the same.
   bool fill_gaps(std::vector<std::array<int, 3>>& made) {
-    double area = 0;
-    while (!surplus_.empty() && area <= kSmallGaps * size_ * size_) {
+    while (!surplus_.empty()) {
       const auto& [edge, count] = *surplus_.begin();
       const int first = count > 0 ? edge.first : edge.second,
                 second = count > 0 ? edge.second : edge.first, third = next_after(second);
-      if (third < 0 || third == first) return false;
-      area += std::abs(area_of({known_.at(first), known_.at(second), known_.at(third)}));
+      if (third < 0) return false;
       add({first, second, third}, made);
     }
-    return surplus_.empty();
+    return true;
   }
   /// The end of an open edge that starts at a corner.
   [[nodiscard]] int next_after(int corner) const {
@@ -247,6 +245,8 @@ class WallCutter {
                      off = std::abs(way[0] * along[1] - way[1] * along[0]) / length;
         if (v == edge.first || v == edge.second || s <= 0 || s >= length || off > kOnEdge * size_)
           continue;
+        // Parts are shorter than the edge, so that this ends.
+        if (std::hypot(s, off) >= length || std::hypot(length - s, off) >= length) continue;
         if (s < least) least = s, found = v;
       }
     return found;

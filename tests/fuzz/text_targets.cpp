@@ -185,8 +185,18 @@ std::vector<std::string> tables(const std::string&) {
           file_bytes(TANGERE_TEST_DATA "/rolling_ball/u.csv").substr(0, 600)};
 }
 
+/// Blocks that lie flush on each other in part, one with reentrant faces.
+const char* const kFlushBlocks =
+    "v 0 0 0\nv 4 0 0\nv 4 4 0\nv 3 4 0\nv 3 1 0\nv 0 1 0\n"
+    "v 0 0 2\nv 4 0 2\nv 4 4 2\nv 3 4 2\nv 3 1 2\nv 0 1 2\n"
+    "f 6 5 4 3 2 1\nf 7 8 9 10 11 12\nf 1 2 8 7\nf 2 3 9 8\nf 3 4 10 9\nf 4 5 11 10\n"
+    "f 5 6 12 11\nf 6 1 7 12\n"
+    "v 3 1 0\nv 3 3 0\nv 1 3 0\nv 1 1 0\nv 3 1 1\nv 3 3 1\nv 1 3 1\nv 1 1 1\n"
+    "f 16 15 14 13\nf 17 18 19 20\nf 13 14 18 17\nf 14 15 19 18\nf 15 16 20 19\n"
+    "f 16 13 17 20\n";
+
 std::vector<std::string> meshes(const std::string&) {
-  return {file_bytes(TANGERE_TEST_DATA "/scenes/wedge.obj"),
+  return {kFlushBlocks, file_bytes(TANGERE_TEST_DATA "/scenes/wedge.obj"),
           file_bytes(TANGERE_TEST_DATA "/scenes/meshes/tetrahedron.obj")};
 }
 

@@ -9,9 +9,10 @@ For every robot a file NAME_reference.txt of lines: "mass BODY kg" once, then fo
 "state", and "q", "v", "u", "bias", "acceleration" with a joint and its numbers, "pose" with a body,
 the place of its last joint (or of the body, if it has none) and its quaternion w x y z, "site" with
 a site and its place. The last state of a file with keyframes is that of its last one. Coordinates
-are those of Tangere: those of a free joint are seen from where it starts, and ref is taken away. Bodies keep the frames
-that their file gives: where MuJoCo aligns a free joint with an inertia, the site BODY_origin says
-where that frame is in the keyframe. A motor without a range has the range of the keyframe's control.
+are those of Tangere: those of a free joint are seen from where it starts, and ref is taken away.
+Bodies keep the frames that their file gives: where MuJoCo aligns a free joint with an inertia, the
+site BODY_origin says where that frame is in the keyframe. A motor without a range has the range of
+the keyframe's control.
 Accelerations are those that MuJoCo calls smooth: without contacts and limits.
 """
 
@@ -56,9 +57,10 @@ def load_keyframe(path, model, data):
     mujoco.mj_normalizeQuat(other, key.qpos)
     mujoco.mj_forward(other, key)
     data.qpos[:], data.qvel[:], data.ctrl[:] = key.qpos, key.qvel, key.ctrl
+    sites = [model.site(s).name for s in range(model.nsite)]
     for j in range(model.njnt):
         site = model.body(model.jnt_bodyid[j]).name + "_origin"
-        if model.jnt_type[j] != FREE or site not in [model.site(s).name for s in range(model.nsite)]:
+        if model.jnt_type[j] != FREE or site not in sites:
             continue
         s, a, d = model.site(site).id, model.jnt_qposadr[j], model.jnt_dofadr[j]
         twist = np.zeros(6)

@@ -219,7 +219,10 @@ TEST(Limits, MistakesInScenesBuiltInCodeAreErrors) {
             std::string::npos);
   EXPECT_NE(message([](Scene& s) { s.motors[0].high = HUGE_VAL; }).find("finite range"),
             std::string::npos);
-  EXPECT_NE(message([](Scene& s) { s.motors[0].low = 2; }).find("low, then high"),
+  EXPECT_NE(message([](Scene& s) {
+              s.motors[0].control = MotorControl::position;
+              s.motors[0].low = 2;
+            }).find("low, then high"),
             std::string::npos);
   EXPECT_NE(message([](Scene& s) { s.links[0].body.density = 0; }).find("nothing that has mass"),
             std::string::npos);
