@@ -18,8 +18,8 @@ namespace {
 constexpr double kTiny = 1e-12;   // of size²: a polygon without area
 constexpr double kSnap = 1e-6;    // of size: new corners nearer than this are one
 constexpr double kOnEdge = 2e-6;  // of size: corners nearer to an edge than this lie on it
-// Pieces of a wall: more come of parts that overlap.
 constexpr std::size_t kMostWork = 20'000'000;  // comparisons of a corner with an edge
+// Pieces of a wall: more come of parts that overlap.
 constexpr std::size_t kMostPieces = 2000, kPiecesPerFace = 10, kSomePieces = 200;
 
 using Point = std::array<double, 2>;
