@@ -88,10 +88,15 @@ class Walls {
     return true;
   }
 
+  /// Of both sides of all walls.
+  [[nodiscard]] double area() const {
+    double sum = 0;
+    for (const Facing& f : facing_) sum += 2 * f.area;
+    return sum;
+  }
+
   [[nodiscard]] std::string fault() const {
-    double area = 0;
-    for (const Facing& f : facing_) area += 2 * f.area;
-    if (!(area > kLeastWall * whole_)) return "";
+    if (!(area() > kLeastWall * whole_)) return "";
     const Facing& largest =
         *std::max_element(facing_.begin(), facing_.end(),
                           [](const Facing& a, const Facing& b) { return a.area < b.area; });
@@ -99,7 +104,7 @@ class Walls {
         "{:.2g} % of the area are walls inside the solid, as at {}, where closed parts lie flush "
         "on each other and overlap; expected one surface around all parts (unite them), or "
         "hull=\"true\" for their convex hull",
-        100 * area / whole_, place_text(largest.place));
+        100 * area() / whole_, place_text(largest.place));
   }
 
  private:
@@ -231,17 +236,19 @@ class Walls {
 }  // namespace
 
 std::string remove_walls(MeshShape& mesh) {
-  constexpr int kPasses = 4;  // parts that overlap may leave walls among the pieces
-  for (int pass = 0; pass < kPasses; ++pass) {
+  // Parts that overlap may leave walls among the pieces: cut again as long as that helps.
+  for (double before = HUGE_VAL;;) {
     Walls walls(mesh);
     if (walls.has_too_many())
       return fmt::format(
           "{} or more pairs of triangles face each other in one place; expected a "
           "surface around a solid",
           kMostPairs);
+    const double area = walls.area();
+    if (area > 0.9 * before) return walls.fault();
     if (!walls.remove()) return "";
+    before = area;
   }
-  return Walls(mesh).fault();
 }
 
 }  // namespace tangere

@@ -18,7 +18,9 @@ namespace {
 constexpr double kTiny = 1e-12;   // of size²: a polygon without area
 constexpr double kSnap = 1e-6;    // of size: new corners nearer than this are one
 constexpr double kOnEdge = 2e-6;  // of size: corners nearer to an edge than this lie on it
-constexpr std::size_t kMostPieces = 20000;  // of a wall
+constexpr std::size_t kMostWork = 20'000'000;  // comparisons of a corner with an edge
+// Pieces of a wall: more come of parts that overlap.
+constexpr std::size_t kMostPieces = 2000, kPiecesPerFace = 10, kSomePieces = 200;
 
 using Point = std::array<double, 2>;
 using Planar = std::vector<Point>;  // anticlockwise, convex
@@ -80,7 +82,12 @@ struct PlaneFrame {
 class WallCutter {
  public:
   WallCutter(MeshShape& mesh, const Wall& wall, const std::vector<int>& same, double size)
-      : mesh_(mesh), wall_(wall), same_(same), size_(size), frame_(mesh, largest()) {}
+      : mesh_(mesh),
+        wall_(wall),
+        same_(same),
+        size_(size),
+        most_(std::min(kMostPieces, kSomePieces + kPiecesPerFace * wall.faces.size())),
+        frame_(mesh, largest()) {}
 
   bool cut(std::vector<std::array<int, 3>>& out) {
     const std::size_t before = mesh_.vertices.size();
@@ -99,10 +106,10 @@ class WallCutter {
       std::vector<Planar> left = {flat[f]};
       for (const int other : wall_.opposite[f]) left = without(left, flat[std::size_t(other)]);
       pieces += left.size();
-      if (pieces > kMostPieces) break;
+      if (pieces > most_) break;
       for (const Planar& p : left) add_piece(p, turned[f] != 0, made);
     }
-    if (pieces > kMostPieces || !close_edges(made)) {
+    if (pieces > most_ || !close_edges(made)) {
       mesh_.vertices.resize(before);
       return false;
     }
@@ -189,12 +196,14 @@ class WallCutter {
 
   /// Adds triangles without area until every edge of the old faces is one of the new.
   bool close_edges(std::vector<std::array<int, 3>>& made) {
-    while (!surplus_.empty() && made.size() <= kMostPieces) {
+    std::size_t work = 0;
+    while (!surplus_.empty() && made.size() <= 5 * most_) {
       bool changed = false;
       const std::map<Edge, int> open = surplus_;
       for (const auto& [edge, count] : open) {
         const auto now = surplus_.find(edge);
         if (now == surplus_.end()) continue;
+        if ((work += open.size()) > kMostWork) return false;
         const int between = corner_on(edge, open);
         if (between < 0) continue;
         const bool forward = now->second > 0;
@@ -256,6 +265,7 @@ class WallCutter {
   const Wall& wall_;
   const std::vector<int>& same_;
   double size_;
+  std::size_t most_;
   PlaneFrame frame_;
   std::map<int, Point> known_;   // vertices of the wall
   std::vector<int> order_;       // in which they came
