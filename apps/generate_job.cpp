@@ -23,7 +23,7 @@ namespace fs = std::filesystem;
 class NoSink : public EpisodeSink {
  public:
   void write(const EpisodeRows&) override {}
-  void finish(std::int64_t, std::span<const FailedEpisode>) override {}
+  void finish(std::int64_t, std::span<const FailedEpisode>, const EpisodeSteps&) override {}
 };
 
 struct Extent {

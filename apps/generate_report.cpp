@@ -55,10 +55,11 @@ double rate_of(const EpisodeSummary& summary) {
 std::string text_of(const GenerateOptions& options, const Job& job, const JobResult& done,
                     const Shards& shards, const DatasetWriter& output) {
   const EpisodeSummary& summary = done.summary;
-  const std::string kept = output.kept() == 0
-                               ? ""
-                               : fmt::format("kept: {} of them, episodes failed in these: {}\n",
-                                             output.kept(), output.kept_failed());
+  const std::string kept =
+      output.kept() == 0
+          ? ""
+          : fmt::format("kept: {} of them, episodes failed in these: {}{}\n", output.kept(),
+                        output.kept_failed(), missed_text(output.kept_steps()));
   return fmt::format(
       "episodes: {}, rows: {}, time: {:.2f} s, {:.0f} env-steps/s with output, "
       "threads: {}\nlimited by {}: simulation {:.2f} s and {} {:.2f} s of all threads, writing "
@@ -92,20 +93,32 @@ int report_shards(const GenerateOptions& options, const Console& console, const 
                   const JobResult& done, DatasetWriter& output) {
   const EpisodeSummary& summary = done.summary;
   const EpisodeOptions& run = job.run;
+  StepCounts of_all = summary.counts;
+  of_all.simulation_steps += output.kept_steps().taken;
+  of_all.passed_steps += output.kept_steps().passed;
+  of_all.overlapping_steps += output.kept_steps().overlapping;
   const ExitCode code =
-      exit_code(console, !summary.failures.empty() || output.kept_failed() > 0, summary.counts);
+      exit_code(console, !summary.failures.empty() || output.kept_failed() > 0, of_all);
   const Shards shards(output);
   const Merged merged = merge_if_complete(options, output);
   list_failures(console, "episode", failures_of(summary), "--json and the shards name all");
   console.print(text_of(options, job, done, shards, output) + merged.line);
   const Json costly = note_costly_steps(console, integrator_named(job.layout.integrator),
                                         job.layout.accuracy, summary.counts);
-  Json result{{"command", "generate"},        {"exit_code", static_cast<int>(code)},
-              {"scene", options.scene},       {"output", options.output},
-              {"shards", shards.paths},       {"bytes", shards.bytes},
-              {"kept", output.kept()},        {"kept_failed", output.kept_failed()},
-              {"episodes", summary.episodes}, {"rows", summary.rows},
-              {"steps", run.steps},           {"every", run.every}};
+  Json result{{"command", "generate"},
+              {"exit_code", static_cast<int>(code)},
+              {"scene", options.scene},
+              {"output", options.output},
+              {"shards", shards.paths},
+              {"bytes", shards.bytes},
+              {"kept", output.kept()},
+              {"kept_failed", output.kept_failed()},
+              {"kept_passed_steps", output.kept_steps().passed},
+              {"kept_overlapping_steps", output.kept_steps().overlapping},
+              {"episodes", summary.episodes},
+              {"rows", summary.rows},
+              {"steps", run.steps},
+              {"every", run.every}};
   result.update(settings_json(job.layout));
   result.update(
       {{"threads", run.threads},

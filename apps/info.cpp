@@ -6,6 +6,7 @@
 
 #include "apps/arguments.hpp"
 #include "apps/command.hpp"
+#include "apps/scene_run.hpp"
 #include "io/dataset/dataset_files.hpp"
 
 namespace tangere::apps {
@@ -32,20 +33,22 @@ int info(const std::string& path, const Console& console) {
       fmt::format("files: {}, demos: {}, failed episodes: {}, rows: {}, {} bytes",
                   dataset.files.size(), summary.demos, summary.failed, summary.rows, summary.bytes);
   if (summary.has_success) text += fmt::format(", episodes solved: {}", summary.successes);
+  text += missed_text(summary.steps);
   console.print("settings\n" + text);
   for (const std::string& file : dataset.missing) console.note("missing: " + file);
-  console.result({{"command", "info"},
-                  {"exit_code", static_cast<int>(kDone)},
-                  {"input", path},
-                  {"files", dataset.files},
-                  {"missing", dataset.missing},
-                  {"demos", summary.demos},
-                  {"failed_episodes", summary.failed},
-                  {"rows", summary.rows},
-                  {"bytes", summary.bytes},
-                  {"successes", summary.has_success ? Json(summary.successes) : Json()},
-                  {"settings", settings},
-                  {"datasets", shapes}});
+  Json result{{"command", "info"},
+              {"exit_code", static_cast<int>(kDone)},
+              {"input", path},
+              {"files", dataset.files},
+              {"missing", dataset.missing},
+              {"demos", summary.demos},
+              {"failed_episodes", summary.failed},
+              {"rows", summary.rows},
+              {"bytes", summary.bytes},
+              {"successes", summary.has_success ? Json(summary.successes) : Json()}};
+  result.update(steps_json(summary.steps));
+  result.update({{"settings", settings}, {"datasets", shapes}});
+  console.result(result);
   return kDone;
 }
 

@@ -34,30 +34,33 @@ int merge(const std::string& path, MergeOptions options, const Console& console)
   const MergeResult result = merge_dataset(find_dataset(path), options);
   if (result.stopped) return report_stop(console, "merge", signals.received(), "while it merged");
   console.print(fmt::format(
-      "wrote {} ({} bytes, {}): {} demos, {} to train on and {} to validate{}; failed episodes: {}",
+      "wrote {} ({} bytes, {}): {} demos, {} to train on and {} to validate{}; failed episodes: "
+      "{}{}",
       result.file, result.bytes, options.copy ? "a copy of all numbers" : "links to the shards",
       result.demos, result.train, result.valid,
       result.touching ? fmt::format(", {} that feel something", *result.touching) : "",
-      result.failed));
+      result.failed, missed_text(result.steps)));
   if (!result.minari.empty())
     console.print(fmt::format("wrote {}: {} for Minari", result.minari, result.minari_id));
   if (!result.minari_left_out.empty())
     console.note(fmt::format("too large for Minari, which does not show them: {}",
                              fmt::join(result.minari_left_out, ", ")));
-  console.result({{"command", "merge"},
-                  {"exit_code", static_cast<int>(kDone)},
-                  {"input", path},
-                  {"output", result.file},
-                  {"bytes", result.bytes},
-                  {"copy", options.copy},
-                  {"minari", result.minari.empty() ? Json() : Json(result.minari)},
-                  {"minari_id", result.minari.empty() ? Json() : Json(result.minari_id)},
-                  {"demos", result.demos},
-                  {"train", result.train},
-                  {"valid", result.valid},
-                  {"successes", result.successes ? Json(*result.successes) : Json()},
-                  {"touching", result.touching ? Json(*result.touching) : Json()},
-                  {"failed_episodes", result.failed}});
+  Json keys{{"command", "merge"},
+            {"exit_code", static_cast<int>(kDone)},
+            {"input", path},
+            {"output", result.file},
+            {"bytes", result.bytes},
+            {"copy", options.copy},
+            {"minari", result.minari.empty() ? Json() : Json(result.minari)},
+            {"minari_id", result.minari.empty() ? Json() : Json(result.minari_id)},
+            {"demos", result.demos},
+            {"train", result.train},
+            {"valid", result.valid},
+            {"successes", result.successes ? Json(*result.successes) : Json()},
+            {"touching", result.touching ? Json(*result.touching) : Json()},
+            {"failed_episodes", result.failed}};
+  keys.update(steps_json(result.steps));
+  console.result(keys);
   return kDone;
 }
 

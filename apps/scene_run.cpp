@@ -60,6 +60,18 @@ Json split_json(const StepCounts& counts) {
           {"overlapping_steps", counts.overlapping_steps}};
 }
 
+Json steps_json(const std::optional<EpisodeSteps>& steps) {
+  return {{"simulation_steps", steps ? Json(steps->taken) : Json()},
+          {"passed_steps", steps ? Json(steps->passed) : Json()},
+          {"overlapping_steps", steps ? Json(steps->overlapping) : Json()}};
+}
+
+std::string missed_text(const std::optional<EpisodeSteps>& steps) {
+  if (!steps || steps->passed + steps->overlapping == 0) return "";
+  return fmt::format(", steps in which a body came through another: {}, bodies overlap: {}, of {}",
+                     steps->passed, steps->overlapping, steps->taken);
+}
+
 Json mean_asleep(double sleep, const StepCounts& counts) {
   if (sleep == 0) return nullptr;
   return static_cast<double>(counts.bodies_asleep) /

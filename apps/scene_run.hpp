@@ -10,6 +10,7 @@
 
 #include "apps/console.hpp"
 #include "engine/base/precision.hpp"
+#include "engine/rows/episode_sink.hpp"
 #include "engine/step/control.hpp"
 #include "engine/step/stepper.hpp"
 #include "io/trajectory/run_facts.hpp"
@@ -34,6 +35,12 @@ std::string split_text(const StepCounts& counts);
 /// The same five numbers, as "split_steps", "coarse_steps", "passed_steps", "damped_steps" and
 /// "overlapping_steps".
 Json split_json(const StepCounts& counts);
+
+/// Steps of all episodes of a data set, as "simulation_steps", "passed_steps" and
+/// "overlapping_steps"; null where a file does not store them. The text is empty if none of the
+/// last two is stored or more than 0; else it begins with a comma.
+Json steps_json(const std::optional<EpisodeSteps>& steps);
+std::string missed_text(const std::optional<EpisodeSteps>& steps);
 
 /// Says how many of the scene's bodies slept, on average over all steps of environments; empty if
 /// none may sleep. The text ends in a line break.

@@ -6,6 +6,7 @@
 
 #include "apps/arguments.hpp"
 #include "apps/command.hpp"
+#include "apps/scene_run.hpp"
 #include "io/dataset/dataset_files.hpp"
 
 namespace tangere::apps {
@@ -16,8 +17,8 @@ int validate(const std::string& path, const Console& console) {
   const ExitCode code = report.problems.empty() ? kDone : kInputOutput;
   for (const std::string& problem : report.problems) console.fail("tangere: " + problem);
   console.print(fmt::format(
-      "shards: {}, demos: {}, failed episodes: {}, rows: {}, {} bytes: {}", report.shards,
-      report.demos, report.failed, report.rows, report.bytes,
+      "shards: {}, demos: {}, failed episodes: {}, rows: {}{}, {} bytes: {}", report.shards,
+      report.demos, report.failed, report.rows, missed_text(report.steps), report.bytes,
       report.problems.empty() ? "whole" : fmt::format("{} problems", report.problems.size())));
   Json result{{"command", "validate"},
               {"exit_code", static_cast<int>(code)},
@@ -28,6 +29,7 @@ int validate(const std::string& path, const Console& console) {
               {"failed_episodes", report.failed},
               {"rows", report.rows},
               {"bytes", report.bytes}};
+  result.update(steps_json(report.steps));
   if (code != kDone) result["error"] = report.problems.front();
   console.result(result);
   return code;

@@ -76,6 +76,22 @@ struct FailedEpisode {
   std::vector<double> q, v;  ///< the state before that step: (nq), (nv)
 };
 
+/// Sums over episodes. Motion with steps of the last two kinds is not that of the bodies in the
+/// scene.
+struct EpisodeSteps {
+  std::int64_t taken = 0;        ///< of the simulation, without those that failed
+  std::int64_t passed = 0;       ///< in which a body came through another (StepStatus::passed)
+  std::int64_t overlapping = 0;  ///< after which bodies overlap (StepStatus::overlapping)
+
+  EpisodeSteps& operator+=(const EpisodeSteps& other) {
+    taken += other.taken;
+    passed += other.passed;
+    overlapping += other.overlapping;
+    return *this;
+  }
+  bool operator==(const EpisodeSteps&) const = default;
+};
+
 /// Receives episodes in pieces. Pieces of one block of 16 come in ascending rows; blocks come in
 /// any order and may interleave. One thread at a time calls it, except prepare(). What is stored
 /// must depend on the pieces alone, not on the order of blocks. A sink that cannot store throws
@@ -88,7 +104,9 @@ class EpisodeSink {
   virtual void prepare(const EpisodeRows&) {}
   virtual void write(const EpisodeRows& rows) = 0;
   /// Called when the last row of the block that begins with this episode has been written.
-  virtual void finish(std::int64_t first_episode, std::span<const FailedEpisode> failures) = 0;
+  /// `steps`: of all its episodes.
+  virtual void finish(std::int64_t first_episode, std::span<const FailedEpisode> failures,
+                      const EpisodeSteps& steps) = 0;
 };
 
 }  // namespace tangere

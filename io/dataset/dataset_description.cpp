@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <limits>
 #include <sstream>
 
 #include "engine/base/error.hpp"
@@ -198,6 +199,18 @@ std::uint64_t hash_group(std::uint64_t hash, const h5::Id& group, const std::str
   return hash;
 }
 
+constexpr const char *kTaken = "simulation_steps", *kPassed = "passed_steps",
+                     *kOverlapping = "overlapping_steps";
+
+/// A count that a file may claim: sums over as many shards as there may be do not overflow.
+std::int64_t step_count_said(const h5::Id& file, const char* name, std::int64_t most) {
+  const auto value = h5::read_number<std::int64_t>(file, name);
+  if (value < 0 || value > most)
+    throw IoError(
+        fmt::format("'{}' of {} is {}; expected 0 to {}", name, h5::place_of(file), value, most));
+  return value;
+}
+
 }  // namespace
 
 void describe_dataset(const h5::Id& file, const DatasetLayout& layout) {
@@ -299,6 +312,29 @@ std::vector<GradientSaid> gradients_said(const h5::Id& scene) {
     list.push_back({name, h5::read_text(one, "meaning"), h5::read_text(one, "rows") == kByRow});
   }
   return list;
+}
+
+void write_steps(const h5::Id& file, const EpisodeSteps& steps) {
+  h5::write_scalar<std::int64_t>(file, kTaken, steps.taken);
+  h5::write_scalar<std::int64_t>(file, kPassed, steps.passed);
+  h5::write_scalar<std::int64_t>(file, kOverlapping, steps.overlapping);
+}
+
+std::optional<EpisodeSteps> steps_said(const h5::Id& file) {
+  if (H5Aexists(file.get(), kTaken) <= 0) return {};
+  EpisodeSteps steps;
+  steps.taken =
+      step_count_said(file, kTaken, std::numeric_limits<std::int64_t>::max() / kMostShards);
+  steps.passed = step_count_said(file, kPassed, steps.taken);
+  steps.overlapping = step_count_said(file, kOverlapping, steps.taken - steps.passed);
+  return steps;
+}
+
+void add_steps(std::optional<EpisodeSteps>& sum, const std::optional<EpisodeSteps>& more) {
+  if (sum && more)
+    *sum += *more;
+  else
+    sum.reset();
 }
 
 std::vector<std::int64_t> demo_numbers(const h5::Id& data) {

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // The settings that all shards of a data set share. They are written into each shard and compared
-// before shards are put together.
+// before shards are put together. Counts of steps are those of a shard alone.
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -54,6 +55,15 @@ std::vector<SampleSaid> samples_said(const h5::Id& scene, std::int64_t every, st
 
 /// Returns the stored observations that are touch. Throws IoError if /scene has no such list.
 std::vector<std::string> touch_said(const h5::Id& scene);
+
+/// Writes the sums over the episodes of one file as attributes of the root: "simulation_steps",
+/// "passed_steps", "overlapping_steps".
+void write_steps(const h5::Id& file, const EpisodeSteps& steps);
+/// Reads them; none: an older version wrote the file. Throws IoError for counts that contradict
+/// each other.
+std::optional<EpisodeSteps> steps_said(const h5::Id& file);
+/// Adds those of another file. None if one of the two has none.
+void add_steps(std::optional<EpisodeSteps>& sum, const std::optional<EpisodeSteps>& more);
 
 /// Returns the numbers of the demos in an open /data, ascending.
 std::vector<std::int64_t> demo_numbers(const h5::Id& data);

@@ -128,6 +128,7 @@ void summarise_file(const std::string& path, DatasetSummary& summary) {
   }
   summary.failed +=
       static_cast<std::int64_t>(h5::link_names(h5::open_group(file, "failed")).size());
+  add_steps(summary.steps, steps_said(file));
   summary.bytes += fs::file_size(path);
 }
 
@@ -216,6 +217,7 @@ DatasetReport examine_dataset(const DatasetFiles& dataset) {
     report.demos += shard.content.demos;
     report.failed += shard.content.failed;
     report.rows += shard.content.rows;
+    add_steps(report.steps, shard.content.steps);
     report.bytes += fs::file_size(file);
   }
   return report;

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -39,6 +40,7 @@ void check_complete(const DatasetFiles& dataset);
 struct DatasetReport {
   std::vector<std::string> problems;
   std::int64_t shards = 0, demos = 0, failed = 0, rows = 0;
+  std::optional<EpisodeSteps> steps = EpisodeSteps();  ///< none: an older version wrote a shard
   std::uint64_t bytes = 0;
 };
 DatasetReport examine_dataset(const DatasetFiles& dataset);
@@ -47,6 +49,7 @@ DatasetReport examine_dataset(const DatasetFiles& dataset);
 struct DatasetSummary {
   std::int64_t demos = 0, failed = 0, rows = 0, successes = 0;
   bool has_success = false;
+  std::optional<EpisodeSteps> steps = EpisodeSteps();  ///< none: an older version wrote a file
   std::uint64_t bytes = 0;
   std::vector<std::pair<std::string, std::string>>
       shapes;  ///< in the first demo: dataset, "(35, 3) float32"

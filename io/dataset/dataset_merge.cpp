@@ -137,6 +137,7 @@ class Merger {
     put(data, name, batch);
     for (const std::string& episode : h5::link_names(failed)) failed_.push_back({name, episode});
     rows_ += h5::read_number<std::int64_t>(data, "total");
+    add_steps(steps_, steps_said(from));
     sum_ += h5::read_number<std::uint64_t>(from, "content_sum");  // modulo 2⁶⁴, as within a shard
   }
 
@@ -207,11 +208,13 @@ class Merger {
       h5::copy_group(h5::open_group(shard, "failed"), episode, failed, episode);
     }
     write_masks();
+    if (steps_) write_steps(file_.file(), *steps_);
     h5::write_scalar<std::uint64_t>(file_.file(), "content_sum", sum_);
     if (description_)
       h5::write_scalar<std::uint64_t>(file_.file(), "description_sum", *description_);
     result_.demos = std::ssize(demos_);
     result_.failed = std::ssize(failed_);
+    result_.steps = steps_;
   }
 
   /// Filter keys of robomimic: demos to train on and to validate, those that feel something, those
@@ -264,6 +267,7 @@ class Merger {
   std::vector<std::string> policies_;                        // of a task
   std::vector<h5::FileMember> linked_;                       // groups of demos
   std::vector<std::pair<std::string, std::string>> failed_;  // shard, episode
+  std::optional<EpisodeSteps> steps_ = EpisodeSteps();
   std::int64_t rows_ = 0;
   std::uint64_t sum_ = 0, shard_bytes_ = 0;
   MergeResult result_;

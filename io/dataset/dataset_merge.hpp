@@ -27,6 +27,7 @@ struct MergeResult {
   std::int64_t demos = 0, failed = 0, train = 0, valid = 0;
   std::optional<std::int64_t> successes;  ///< demos that solved their task; none for a scene alone
   std::optional<std::int64_t> touching;   ///< demos that feel something; none: no touch is stored
+  std::optional<EpisodeSteps> steps;      ///< of all episodes; none: an older version made a shard
   std::uint64_t bytes = 0;                ///< of the file
   bool stopped = false;                   ///< nothing was written, all else is empty
 };

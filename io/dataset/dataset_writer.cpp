@@ -43,6 +43,7 @@ struct DatasetWriter::Impl {
   std::mutex prepared_mutex;
   std::map<std::pair<std::int64_t, std::int64_t>, PreparedPiece> prepared;  // by episode and row
   std::int64_t kept = 0, kept_failed = 0;
+  EpisodeSteps kept_steps;
   bool started = false;
   std::string obstacle;
 
@@ -110,7 +111,15 @@ struct DatasetWriter::Impl {
     if (there.first != range.first || there.end != range.end)
       throw InputError(fmt::format("'{}' holds episodes {} to {}; expected {} to {}", path,
                                    there.first, there.end - 1, range.first, range.end - 1));
+    const std::optional<EpisodeSteps> steps = steps_said(file);
+    if (!steps)
+      throw InputError(fmt::format(
+          "'{}' does not store in how many steps contacts missed bodies, as older versions did "
+          "not, "
+          "so the exit code of a run that keeps it is unknown; use another folder, or --overwrite",
+          path));
     ++kept;
+    kept_steps += *steps;
     kept_failed += static_cast<std::int64_t>(h5::link_names(h5::open_group(file, "failed")).size());
     complete.insert(shard);
   }
@@ -171,6 +180,7 @@ DatasetWriter::~DatasetWriter() = default;
 const std::vector<EpisodeRange>& DatasetWriter::missing() const { return impl_->missing; }
 std::int64_t DatasetWriter::kept() const { return impl_->kept; }
 std::int64_t DatasetWriter::kept_failed() const { return impl_->kept_failed; }
+const EpisodeSteps& DatasetWriter::kept_steps() const { return impl_->kept_steps; }
 
 void DatasetWriter::prepare(const EpisodeRows& rows) {
   PreparedPiece piece = prepare_piece(impl_->layout, impl_->format, rows);
@@ -189,9 +199,10 @@ void DatasetWriter::write(const EpisodeRows& rows) {
                                     : std::move(prepared.mapped()));
 }
 
-void DatasetWriter::finish(std::int64_t first_episode, std::span<const FailedEpisode> failures) {
+void DatasetWriter::finish(std::int64_t first_episode, std::span<const FailedEpisode> failures,
+                           const EpisodeSteps& steps) {
   ShardFile& shard = impl_->shard_of(first_episode);
-  shard.finish(first_episode, failures);
+  shard.finish(first_episode, failures, steps);
   if (!shard.complete()) return;
   shard.commit();
   const std::int64_t number = impl_->layout.shard_of(first_episode);

@@ -33,15 +33,17 @@ class DatasetWriter : public EpisodeSink {
 
   /// Episodes to write, in whole shards; none if all shards exist.
   [[nodiscard]] const std::vector<EpisodeRange>& missing() const;
-  /// Shards kept from an earlier run, and the failed episodes in them.
+  /// Shards kept from an earlier run, the failed episodes in them, and the steps of all theirs.
   [[nodiscard]] std::int64_t kept() const;
   [[nodiscard]] std::int64_t kept_failed() const;
+  [[nodiscard]] const EpisodeSteps& kept_steps() const;
 
   /// Compresses the piece if the layout says so.
   void prepare(const EpisodeRows& rows) override;
   /// The first piece of a run removes the shards of an earlier run, if those are to be replaced.
   void write(const EpisodeRows& rows) override;
-  void finish(std::int64_t first_episode, std::span<const FailedEpisode> failures) override;
+  void finish(std::int64_t first_episode, std::span<const FailedEpisode> failures,
+              const EpisodeSteps& steps) override;
 
   /// Paths of the complete shards, kept ones among them, in ascending order.
   [[nodiscard]] std::vector<std::string> shards() const;

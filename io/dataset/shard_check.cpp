@@ -104,6 +104,7 @@ class ShardChecker {
   void read_description() {
     content_.first_episode = within(file_, "first_episode", 0);
     end_ = content_.first_episode + within(file_, "episodes", 0);
+    content_.steps = steps_said(file_);
     names_ = h5::read_texts(scene_, "observations");
     touch_ = touch_said(scene_);
     for (const std::string& name : touch_)

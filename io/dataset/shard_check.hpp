@@ -5,8 +5,11 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
+
+#include "engine/rows/episode_sink.hpp"
 
 namespace tangere {
 
@@ -28,6 +31,7 @@ struct ShardContent {
   std::int64_t first_episode = 0;
   std::int64_t demos = 0, failed = 0;  ///< episodes below /data and below /failed
   std::int64_t rows = 0;               ///< of all demos
+  std::optional<EpisodeSteps> steps;   ///< of all episodes; none: an older version wrote the shard
 };
 
 struct ShardReport {

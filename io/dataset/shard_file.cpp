@@ -179,7 +179,9 @@ void ShardFile::hold(Demo& demo, std::size_t dataset, const PieceSlice& slice,
   placed_.flush();
 }
 
-void ShardFile::finish(std::int64_t first_episode, std::span<const FailedEpisode> failures) {
+void ShardFile::finish(std::int64_t first_episode, std::span<const FailedEpisode> failures,
+                       const EpisodeSteps& steps) {
+  steps_ += steps;
   Block& block = blocks_.at(first_episode);
   for (const FailedEpisode& failure : failures) {
     Demo& demo = block.demos[static_cast<std::size_t>(failure.episode - first_episode)];
@@ -299,6 +301,7 @@ void ShardFile::complete_description(std::uint64_t data) {
   h5::write_attribute(group, "env_args", robomimic_environment(layout_));
   h5::write_scalar<std::int64_t>(group, "total", rows_);
   record_failures();
+  write_steps(file_, steps_);
   h5::write_scalar<std::uint64_t>(file_, "content_sum", sum_.value());
   try {
     h5::write_scalar<std::uint64_t>(file_, "description_sum", description_sum(file_));

@@ -31,7 +31,8 @@ class ShardFile {
 
   /// `prepared` belongs to the same piece.
   void write(const EpisodeRows& rows, PreparedPiece prepared);
-  void finish(std::int64_t first_episode, std::span<const FailedEpisode> failures);
+  void finish(std::int64_t first_episode, std::span<const FailedEpisode> failures,
+              const EpisodeSteps& steps);
   /// Whether every block has finished.
   [[nodiscard]] bool complete() const { return unfinished_ == 0; }
   /// Names the demos that did not fail, reads everything back, syncs and renames.
@@ -98,6 +99,7 @@ class ShardFile {
   std::map<std::int64_t, DemoFacts> facts_of_failures_;  // by episode
   std::int64_t rows_ = 0;                                // in demos, without failed ones
   ContentSum sum_;
+  EpisodeSteps steps_;
 };
 
 }  // namespace tangere

@@ -351,12 +351,13 @@ void GradientSink::prepare(const EpisodeRows& rows) {
 
 void GradientSink::write(const EpisodeRows& rows) { next_.write(with_gradients(rows)); }
 
-void GradientSink::finish(std::int64_t first_episode, std::span<const FailedEpisode> failures) {
+void GradientSink::finish(std::int64_t first_episode, std::span<const FailedEpisode> failures,
+                          const EpisodeSteps& steps) {
   {
     const std::lock_guard lock(mutex_);
     blocks_.erase(first_episode);
   }
-  next_.finish(first_episode, failures);
+  next_.finish(first_episode, failures, steps);
 }
 
 EpisodeRows GradientSink::with_gradients(const EpisodeRows& rows) {

@@ -52,7 +52,8 @@ class GradientSink : public EpisodeSink {
 
   void prepare(const EpisodeRows& rows) override;
   void write(const EpisodeRows& rows) override;
-  void finish(std::int64_t first_episode, std::span<const FailedEpisode> failures) override;
+  void finish(std::int64_t first_episode, std::span<const FailedEpisode> failures,
+              const EpisodeSteps& steps) override;
 
  private:
   struct Block {

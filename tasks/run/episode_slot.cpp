@@ -277,6 +277,12 @@ void EpisodeSlot<T>::add_to(EpisodeSummary& run) const {
 }
 
 template <class T>
+EpisodeSteps EpisodeSlot<T>::steps() const {
+  const StepCounts counts = program_->counts(*tally_).steps;
+  return {counts.simulation_steps, counts.passed_steps, counts.overlapping_steps};
+}
+
+template <class T>
 EpisodeRows EpisodeSlot<T>::piece() const {
   const std::size_t actions = as_size(batch_->environments()) * as_size(action_rows_);
   EpisodeRows piece{batch_->episode(0), batch_->environments(),

@@ -33,6 +33,8 @@ class EpisodeSlot {
   /// Adds the results of the whole block to the run's summary, with returns as a sum. Call it after
   /// the last piece.
   void add_to(EpisodeSummary& summary) const;
+  /// Of the whole block, as add_to().
+  [[nodiscard]] EpisodeSteps steps() const;
   /// In ascending order.
   [[nodiscard]] const std::vector<FailedEpisode>& failures() const { return failures_; }
 

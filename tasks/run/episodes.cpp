@@ -202,7 +202,7 @@ class EpisodeGraph {
     const EpisodeRows piece = t.slot->piece();
     sink_.write(piece);
     if (!t.slot->last()) return false;
-    sink_.finish(piece.first_episode, t.slot->failures());
+    sink_.finish(piece.first_episode, t.slot->failures(), t.slot->steps());
     t.slot->add_to(summary_);
     slots_.give_back(t.slot);  // before the limiter lets the next block in
     return true;

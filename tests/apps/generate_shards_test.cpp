@@ -157,6 +157,51 @@ TEST(GenerateShards, ResumeKeepsWhatIsThereAndMakesTheRest) {
   EXPECT_TRUE(bytes(folder, "task") == of_task);
 }
 
+/// Crossed planks of 10 mm that overlap by 5 mm. The contact points are their corners, which are
+/// outside, so nothing drives them apart.
+const char* const kPlanks = R"(<tangere model="planks">
+  <option unit="m-kg" gravity="0 0 0" timestep="1e-3" integrator="BDF1"/>
+  <robot><link name="low"><joint name="low" type="fixed"/>
+    <body name="low" type="cuboid" size="0.4 0.02 0.01" density="1000"/></link></robot>
+  <robot><link name="high"><joint name="high" type="free3d" pos="0 0 0.005"/>
+    <body name="high" type="cuboid" size="0.02 0.4 0.01" density="1000"/></link></robot>
+  <contact>
+    <general_primitive_contact general_body="high" primitive_body="low" kn="1000" kt="1" mu="0.5"/>
+  </contact>
+</tangere>
+)";
+
+TEST(GenerateShards, KeptShardsWhoseContactsMissedEndWithTheSameCode) {
+  const Folder folder;
+  folder.write("planks.xml", kPlanks);
+  const Words words{"generate", "planks.xml", "--output", "set", "--episodes", "32",
+                    "--steps",  "4",          "--shards", "2",   "--json",     "--no-merge"};
+  const auto expect = [](const Outcome& outcome, int made, int kept) {
+    EXPECT_EQ(outcome.exit_code, 1);
+    EXPECT_THAT(outcome.err, HasSubstr("contacts missed bodies in 128 of 128 steps"));
+    const json answer = answer_of(outcome);
+    EXPECT_EQ(answer.at("overlapping_steps"), made);
+    EXPECT_EQ(answer.at("kept_overlapping_steps"), kept);
+    EXPECT_EQ(answer.at("kept_passed_steps"), 0);
+  };
+  expect(run(folder, words), 128, 0);
+  const auto whole = bytes(folder, "set");
+  fs::remove(folder.path("set/shard-00001.h5"));
+  expect(run(folder, words + Words{"--resume"}), 64, 64);
+  expect(run(folder, words + Words{"--resume"}), 0, 128);
+  EXPECT_TRUE(bytes(folder, "set") == whole);
+  run_json(folder, {"merge", "set"});
+  for (const char* const name : {"set", "set/robomimic.hdf5"})
+    for (const char* const command : {"info", "validate"}) {
+      const json answer = json::parse(run(folder, {command, name, "--json"}).out);
+      EXPECT_EQ(answer.at("simulation_steps"), 128) << command << " " << name;
+      EXPECT_EQ(answer.at("passed_steps"), 0) << command << " " << name;
+      EXPECT_EQ(answer.at("overlapping_steps"), 128) << command << " " << name;
+    }
+  EXPECT_THAT(run(folder, {"info", "set"}).out,
+              HasSubstr("a body came through another: 0, bodies overlap: 128, of 128"));
+}
+
 TEST(GenerateShards, ResumeNamesEverySettingThatDiffers) {
   const Folder folder;
   ASSERT_EQ(run(folder, generate()).exit_code, 0);

@@ -95,11 +95,16 @@ inline FailedEpisode failure(std::int64_t episode) {
   return {episode, 3, StepStatus::rotation, {1.5, static_cast<double>(episode), 0.1}, {-2, 0.3}};
 }
 
+/// What the steps of a block did, other numbers for each block.
+inline EpisodeSteps block_steps(std::int64_t first_episode) {
+  return {96, 1 + first_episode / 16 % 16, 10 + first_episode % 64};
+}
+
 /// Writes a block as one piece, and its end.
 inline void write_block(EpisodeSink& sink, const DatasetLayout& l, std::int64_t first_episode,
                         const std::vector<FailedEpisode>& failures = {}) {
   write_piece(sink, l, first_episode, 0, static_cast<int>(l.rows()) + 1);
-  sink.finish(first_episode, failures);
+  sink.finish(first_episode, failures, block_steps(first_episode));
 }
 
 }  // namespace tangere::testing

@@ -59,8 +59,10 @@ class Recorder : public EpisodeSink {
       EXPECT_EQ(std::holds_alternative<std::span<const float>>(values), single);
   }
 
-  void finish(std::int64_t first_episode, std::span<const FailedEpisode> of_block) override {
+  void finish(std::int64_t first_episode, std::span<const FailedEpisode> of_block,
+              const EpisodeSteps& of_all) override {
     const Turn turn(*this);
+    steps += of_all;
     EXPECT_EQ(next_row_.at(first_episode), rows_ + 1) << "finished early";
     EXPECT_TRUE(finished.insert(first_episode).second) << first_episode << " finished twice";
     for (const FailedEpisode& failure : of_block) {
@@ -72,6 +74,7 @@ class Recorder : public EpisodeSink {
   std::map<std::int64_t, RecordedEpisode> episodes;
   std::map<std::int64_t, FailedEpisode> failures;
   std::set<std::int64_t> finished;  // first episodes of blocks
+  EpisodeSteps steps;
   int pieces = 0, most_rows = 0;
   bool single = false;  // observations came as float32
 

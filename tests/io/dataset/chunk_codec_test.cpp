@@ -114,7 +114,7 @@ std::string write(const Folder& folder, const std::string& name, const DatasetLa
     const auto all = static_cast<int>(l.rows()) + 1;
     for (int row = 0; row < all; row += pieces ? 16 : all)
       writer.write(Piece<T>(l, first, row, std::min(pieces ? 16 : all, all - row)).rows());
-    writer.finish(first, {});
+    writer.finish(first, {}, {});
   }
   return writer.shards().at(0);
 }
@@ -175,7 +175,7 @@ TEST(ChunkCodec, BlocksThatWaitTakeBoundedMemoryAndLoseNothing) {
   for (const std::int64_t first : {96, 80, 64, 48, 32, 16, 0}) {
     writer.write(
         Piece<float>(l, first, 0, all, true).rows());  // 20 MB each, none of which goes away
-    writer.finish(first, {});
+    writer.finish(first, {}, {});
   }
   EXPECT_EQ(check_shard(writer.shards().at(0)).demos, 112);
 }
@@ -213,11 +213,11 @@ TEST(ChunkCodec, RowsThatWaitBesideChunksAreBoundedAsWell) {
       writer.write(rows);
     }
     if (first == 0) break;
-    writer.finish(first, {});
+    writer.finish(first, {}, {});
     waiting += block;
     EXPECT_GT(part() + (64 << 20), waiting) << "no more than 64 MiB are kept in memory";
   }
-  writer.finish(0, {});
+  writer.finish(0, {}, {});
   EXPECT_EQ(check_shard(writer.shards().at(0)).demos, 112);
   const h5::Id file = h5::open_file(writer.shards().at(0));
   for (const int demo : {0, 20, 99}) {

@@ -10,6 +10,7 @@
 #include <numeric>
 
 #include "engine/base/error.hpp"
+#include "io/dataset/dataset_description.hpp"
 #include "io/dataset/dataset_writer.hpp"
 #include "io/dataset/shard_check.hpp"
 #include "io/hdf5/h5.hpp"
@@ -97,6 +98,10 @@ TEST(DatasetMerge, LeavesOutWhatFailedAndNumbersEpisodesForMinari) {
       const MergeResult result = merge_dataset(dataset, {copy, false});
       EXPECT_EQ(result.demos, 22);
       EXPECT_EQ(result.failed, 18);
+      EXPECT_EQ(result.steps, (EpisodeSteps{288, 1 + 2 + 3, 10 + 26 + 42}));
+      EXPECT_EQ(steps_said(h5::open_file(result.file)), result.steps);
+      EXPECT_EQ(summarise(dataset).steps, result.steps);
+      EXPECT_EQ(examine_dataset(dataset).steps, result.steps);
       EXPECT_EQ(result.train + result.valid, 22);
       EXPECT_THAT(examine_shard(result.file).problems, IsEmpty());
       const h5::Id merged = h5::open_file(result.file), data = h5::open_group(merged, "data");
@@ -121,6 +126,20 @@ TEST(DatasetMerge, LeavesOutWhatFailedAndNumbersEpisodesForMinari) {
       EXPECT_THAT(demos, ElementsAre(1, 2, 3, 4, 5, 6, 8, 9, 10, 11, 12, 13, 14, 15, 32, 33, 34, 35,
                                      36, 37, 38, 39));
     }
+}
+
+/// Unknown is not 0.
+TEST(DatasetMerge, HasNoCountsOfStepsWhereAShardHasNone) {
+  const Folder folder;
+  const DatasetFiles dataset = write_with_gaps(folder, true, "none");
+  change(dataset.files[1], [](hid_t file) { H5Adelete(file, "simulation_steps"); });
+  const MergeResult result = merge_dataset(dataset, {});
+  EXPECT_EQ(result.steps, std::nullopt);
+  EXPECT_EQ(steps_said(h5::open_file(result.file)), std::nullopt);
+  EXPECT_EQ(summarise(dataset).steps, std::nullopt);
+  const DatasetReport report = examine_dataset(dataset);
+  EXPECT_EQ(report.steps, std::nullopt);
+  EXPECT_THAT(report.problems, IsEmpty());
 }
 
 /// The view of a data set with a name of its own is one folder deeper.

@@ -16,6 +16,7 @@
 namespace tangere {
 namespace {
 
+using testing::block_steps;
 using testing::dataset_layout;
 using testing::dataset_number;
 using ::testing::ElementsAre;
@@ -199,11 +200,11 @@ TEST(Dataset, BytesDoNotDependOnTheOrderOfBlocksNorOnPieces) {
     write_piece(writer, l, 32, 0, 2);
     write_block(writer, l, 64);
     write_piece(writer, l, 32, 2, 2);
-    writer.finish(32, std::vector{failure(33), failure(40)});
+    writer.finish(32, std::vector{failure(33), failure(40)}, block_steps(32));
     write_piece(writer, l, 48, 1, 2);
     write_block(writer, l, 0);
     write_piece(writer, l, 48, 3, 1);  // no action
-    writer.finish(48, {});
+    writer.finish(48, {}, block_steps(48));
     write_block(writer, l, 16);
   }
   EXPECT_TRUE(file_bytes(ascending / "set/shard-00000.h5") ==
@@ -235,6 +236,33 @@ TEST(Dataset, LongOnesAreSeveralShards) {
     EXPECT_TRUE(file_bytes(one / shard(s)) == file_bytes(other / shard(s))) << shard(s);
   }
   expect_demo<float>(h5::open_file(one / shard(2)), 69);
+}
+
+/// Steps whose contacts missed bodies decide exit codes, so a run that keeps shards knows theirs.
+TEST(Dataset, KeptShardsBringTheCountsOfTheirSteps) {
+  const Folder folder;
+  DatasetLayout l = dataset_layout(48);
+  l.shards = 3;
+  {
+    DatasetWriter writer({folder / "set"}, l);
+    for (const std::int64_t block : {0, 32}) write_block(writer, l, block);
+    EXPECT_EQ(writer.kept_steps(), EpisodeSteps());
+  }
+  const DatasetOutput resumed{folder / "set", ExistingShards::keep};
+  EXPECT_EQ(DatasetWriter(resumed, l).kept_steps(), (EpisodeSteps{192, 1 + 3, 10 + 42}));
+  const std::string shard = folder / "set/shard-00002.h5";
+  EXPECT_EQ(check_shard(shard).steps, block_steps(32));
+  {  // as older versions wrote it
+    const h5::Id file(H5Fopen(shard.c_str(), H5F_ACC_RDWR, H5P_DEFAULT));
+    ASSERT_GE(H5Adelete(file.get(), "simulation_steps"), 0);
+  }
+  EXPECT_EQ(check_shard(shard).steps, std::nullopt);
+  try {
+    const DatasetWriter writer(resumed, l);
+    ADD_FAILURE() << "kept without knowing whether its contacts missed";
+  } catch (const InputError& error) {
+    EXPECT_THAT(error.what(), ::testing::AllOf(HasSubstr(shard), HasSubstr("--overwrite")));
+  }
 }
 
 TEST(Dataset, ShardsHaveRoomForAtLeastABlockAndAtMost4096Episodes) {
@@ -396,7 +424,7 @@ TEST(Dataset, AShardThatAppearsMeanwhileIsLeftAsItIs) {
     DatasetWriter writer({folder / "set"}, l);
     write_piece(writer, l, 0, 0, 4);
     std::ofstream(folder / "set/shard-00000.h5") << "somebody's";
-    EXPECT_THROW(writer.finish(0, {}), IoError);
+    EXPECT_THROW(writer.finish(0, {}, {}), IoError);
   }
   EXPECT_EQ(file_bytes(folder / "set/shard-00000.h5"), "somebody's");
   EXPECT_FALSE(std::filesystem::exists(folder / "set/shard-00000.h5.part"));

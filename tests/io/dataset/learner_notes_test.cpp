@@ -107,7 +107,7 @@ TEST(LearnerNotes, SayWhoPlayedEachEpisodeAndWhichSolvedIt) {
     rows.rewards = rewards;
     rows.ends = ends;
     writer.write(rows);
-    writer.finish(0, std::vector{tangere::testing::failure(3), tangere::testing::failure(4)});
+    writer.finish(0, std::vector{tangere::testing::failure(3), tangere::testing::failure(4)}, {});
   }
   const MergeResult merged = merge_dataset(find_dataset(folder / "set"), {});
   EXPECT_EQ(merged.successes, 7) << "the even ones without 4";

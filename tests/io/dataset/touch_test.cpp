@@ -104,8 +104,9 @@ void write_set(const std::string& folder, const DatasetLayout& l) {
         write_rows<float>(writer, l, block, first, count);
       else
         write_rows<double>(writer, l, block, first, count);
-    writer.finish(block, block == 0 ? std::vector{tangere::testing::failure(2)}
-                                    : std::vector<FailedEpisode>{});
+    writer.finish(
+        block,
+        block == 0 ? std::vector{tangere::testing::failure(2)} : std::vector<FailedEpisode>{}, {});
   }
 }
 

@@ -32,7 +32,7 @@ class SlowSink : public EpisodeSink {
     std::this_thread::sleep_for(std::chrono::milliseconds(50));  // for a block too many
     seen = asked_;
   }
-  void finish(std::int64_t, std::span<const FailedEpisode>) override {}
+  void finish(std::int64_t, std::span<const FailedEpisode>, const EpisodeSteps&) override {}
   std::int64_t seen = 0;
 
  private:
@@ -74,7 +74,9 @@ class FailingSink : public EpisodeSink {
  public:
   explicit FailingSink(int call) : call_(call) {}
   void write(const EpisodeRows&) override { count(); }
-  void finish(std::int64_t, std::span<const FailedEpisode>) override { count(); }
+  void finish(std::int64_t, std::span<const FailedEpisode>, const EpisodeSteps&) override {
+    count();
+  }
   int calls = 0;
 
  private:

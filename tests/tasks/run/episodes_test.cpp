@@ -77,6 +77,7 @@ TEST(Episodes, AreThoseSteppedByHand) {
   EXPECT_EQ(summary.rows, kEpisodes * kRows);
   EXPECT_EQ(summary.environment_steps, kEpisodes * kSteps);
   EXPECT_GE(summary.counts.newton_iterations, summary.environment_steps);
+  EXPECT_EQ(recorder.steps, (EpisodeSteps{kEpisodes * kSteps, 0, 0}));
   EXPECT_FALSE(summary.stopped);
   EXPECT_THAT(summary.failures, ::testing::IsEmpty());
 }

@@ -55,7 +55,7 @@ class Keeper : public EpisodeSink {
     ++written;
     --callers_;
   }
-  void finish(std::int64_t first, std::span<const FailedEpisode>) override {
+  void finish(std::int64_t first, std::span<const FailedEpisode>, const EpisodeSteps&) override {
     EXPECT_EQ(first, last_);
   }
 
