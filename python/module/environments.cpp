@@ -93,6 +93,10 @@ class Environments {
     d["simulation_steps"] = c.steps.simulation_steps;
     d["newton_iterations"] = c.steps.newton_iterations;
     d["split_steps"] = c.steps.split_steps;
+    d["coarse_steps"] = c.steps.coarse_steps;
+    d["passed_steps"] = c.steps.passed_steps;
+    d["damped_steps"] = c.steps.damped_steps;
+    d["overlapping_steps"] = c.steps.overlapping_steps;
     return d;
   }
 
@@ -167,7 +171,10 @@ void add_environments(nb::module_& m) {
                    "numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]"),
            "q (E, nq), v (E, nv) and the task's memory (E, memory): what a robot cannot see.")
       .def("counts", &Environments::counts, nb::sig("def counts(self) -> dict[str, int]"),
-           "Steps and Newton passes since the last reset.")
+           "Since the last reset: environment_steps, simulation_steps, newton_iterations, and "
+           "steps\n"
+           "by their status: split_steps, coarse_steps, passed_steps, damped_steps and\n"
+           "overlapping_steps.")
       .def_prop_ro("spec", &Environments::spec)
       .def_prop_ro("model", &Environments::model)
       .def_prop_ro("envs", &Environments::count);

@@ -243,7 +243,7 @@ class VectorTaskEnv(VectorEnv):
         return self._env.state()
 
     def counts(self) -> dict[str, int]:
-        """Environment steps, simulation steps and Newton passes since the last reset by seed."""
+        """As Environments.counts(), since the last reset by seed."""
         return self._env.counts()
 
     def _observe(self) -> Observation:

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import warnings
+from pathlib import Path
 
 import gymnasium
 import numpy as np
@@ -220,6 +221,36 @@ def test_a_failed_simulation_truncates():
     _, reward, terminated, truncated, info = env.step(actions)
     assert truncated.tolist() == [False, True, False] and not terminated.any()
     assert info["status"].tolist() == [0, -2, 0] and np.isfinite(reward).all()
+
+
+# Crossed planks of 10 mm that overlap by 5 mm; their contact points, the corners, are outside.
+PLANKS = """
+<robot><link name="low"><joint name="low" type="fixed" pos="1 0 1"/>
+  <body name="low" type="cuboid" size="0.4 0.02 0.01" density="1000"/></link></robot>
+<robot><link name="high"><joint name="high" type="prismatic" axis="1 0 0" pos="1 0 1.005"/>
+  <body name="high" type="cuboid" size="0.02 0.4 0.01" density="1000"/></link></robot>
+<contact><general_primitive_contact general_body="high" primitive_body="low"/></contact>
+</tangere>"""
+
+
+def test_counts_say_how_many_steps_had_which_status(tmp_path):
+    text = Path(tangere.gym.task_scene("dummy").path).read_text(encoding="utf-8")
+    path = tmp_path / "planks.xml"
+    path.write_text(text.replace("</tangere>", PLANKS), encoding="utf-8")
+    with pytest.warns(UserWarning, match="contact points of 'high' are up to 0.08 m apart"):
+        planks = tangere.Scene(path)
+    for scene, overlapping in [(None, 0), (planks, 30)]:
+        env = tangere.make_vec("dummy", 3, scene=scene)
+        env.reset(seed=0)
+        for _ in range(2):
+            _, _, _, _, info = env.step(np.zeros((3, 1)))
+        assert info["status"].tolist() == [5 if overlapping else 0] * 3
+        counts = env.counts()
+        assert counts.pop("newton_iterations") >= 30
+        assert counts == {
+            "environment_steps": 6, "simulation_steps": 30, "split_steps": 0, "coarse_steps": 0,
+            "passed_steps": 0, "damped_steps": 0, "overlapping_steps": overlapping,
+        }  # fmt: skip
 
 
 def test_mistakes_are_told():
