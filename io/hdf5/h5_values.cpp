@@ -132,7 +132,8 @@ Id create_dataset(const Id& parent, const std::string& name, const Dims& dims,
     if (H5Pset_chunk(creation.get(), static_cast<int>(storage.chunk.size()), storage.chunk.data()) <
         0)
       fail("lay out the chunks of", parent, name);
-    // Only whole chunks are written, so a cache would only delay errors until the file is closed.
+    // Compressed chunks are written whole, so a cache would only delay errors until the file is
+    // closed. A chunk that is written in parts would be inflated and deflated for each of them.
     H5Pset_chunk_cache(access.get(), 0, 0, 1);
     if (storage.compress &&
         (H5Pset_shuffle(creation.get()) < 0 || H5Pset_deflate(creation.get(), 1) < 0))

@@ -5,8 +5,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
+#include <functional>
 #include <limits>
+#include <numeric>
 
 #include "engine/base/error.hpp"
 
@@ -22,22 +23,6 @@ h5::Storage storage_of(h5::Dims dims, std::size_t element) {
   dims[1] = std::clamp<hsize_t>(kChunk / environment, 1, dims[1]);
   dims[0] = std::clamp<hsize_t>(kChunk / (environment * dims[1]), 1, dims[0]);
   return {dims, true};
-}
-
-template <class T>
-h5::Id create(const h5::Id& group, const char* name, const h5::Dims& dims, const char* meaning) {
-  h5::Id dataset = h5::create_dataset<T>(group, name, dims, storage_of(dims, sizeof(T)));
-  h5::write_attribute(dataset, "meaning", meaning);
-  return dataset;
-}
-
-template <class T>
-void put(const h5::Id& dataset, std::int64_t at, h5::Dims row, const std::vector<T>& numbers) {
-  if (numbers.empty()) return;
-  h5::Dims offset(row.size() + 1, 0);
-  offset[0] = static_cast<hsize_t>(at);
-  row.insert(row.begin(), 1);
-  h5::write_box<T>(dataset, offset, row, numbers.data());
 }
 
 /// Row `at` of a dataset (rows, E, …): the numbers of all environments.
@@ -61,6 +46,35 @@ std::vector<T> get(const h5::Id& group, const char* name, std::int64_t at, std::
 
 }  // namespace
 
+template <class T>
+RowsInChunks<T>::RowsInChunks(const h5::Id& group, const char* name, const h5::Dims& dims,
+                              const char* meaning)
+    : dims_(dims) {
+  const h5::Storage storage = storage_of(dims, sizeof(T));
+  dataset_ = h5::create_dataset<T>(group, name, dims, storage);
+  h5::write_attribute(dataset_, "meaning", meaning);
+  if (!storage.chunk.empty()) chunk_rows_ = storage.chunk[0];
+  numbers_.resize(std::accumulate(dims.begin() + 1, dims.end(), chunk_rows_, std::multiplies<>()));
+}
+
+template <class T>
+std::span<T> RowsInChunks<T>::next_row() {
+  const std::size_t width = numbers_.size() / chunk_rows_;
+  return std::span(numbers_).subspan(held_ * width, width);
+}
+
+template <class T>
+void RowsInChunks<T>::add_row() {
+  ++held_;
+  if (held_ < chunk_rows_ && first_ + held_ < dims_[0]) return;
+  h5::Dims offset(dims_.size(), 0), count = dims_;
+  offset[0] = first_;
+  count[0] = held_;
+  if (!numbers_.empty()) h5::write_box<T>(dataset_, offset, count, numbers_.data());
+  first_ += held_;
+  held_ = 0;
+}
+
 SleepRows::SleepRows(const h5::Id& file, const TrajectoryLayout& layout) : layout_(layout) {
   const auto R = static_cast<hsize_t>(layout.rows(layout.states)),
              E = static_cast<hsize_t>(layout.environments);
@@ -70,47 +84,45 @@ SleepRows::SleepRows(const h5::Id& file, const TrajectoryLayout& layout) : layou
   h5::write_attribute(group, "meaning",
                       "at each row of /q; a tree is a body, named, with all that joints connect "
                       "it with");
-  island_ = create<std::int32_t>(group, "island", {R, E, trees},
-                                 "-1: awake; else the lowest tree of those that fell asleep "
-                                 "together");
-  rested_ = create<std::int32_t>(group, "rested", {R, E, trees},
-                                 "steps in a row in which the tree hardly moved");
-  controls_ = create<double>(group, "u", {R, E, nu},
-                             "controls of the last step before which some tree rested; NaN: none");
-  clearance_ = create<double>(group, "clearance", {R, E},
-                              "what awake bodies may move before one may reach a sleeping one [m]");
-  resting_ = create<std::int8_t>(group, "resting", {R, E},
-                                 "1: a tree that is awake rested in the last step; -1: nothing is "
-                                 "known yet of this environment");
-  islands_.resize(E * trees);
-  rests_.resize(E * trees);
-  u_.resize(E * nu);
-  clearances_.resize(E);
-  flags_.resize(E);
+  island_ = {group,
+             "island",
+             {R, E, trees},
+             "-1: awake; else the lowest tree of those that fell asleep together"};
+  rested_ = {group, "rested", {R, E, trees}, "steps in a row in which the tree hardly moved"};
+  u_ = {
+      group, "u", {R, E, nu}, "controls of the last step before which some tree rested; NaN: none"};
+  clearance_ = {group,
+                "clearance",
+                {R, E},
+                "what awake bodies may move before one may reach a sleeping one [m]"};
+  resting_ = {group,
+              "resting",
+              {R, E},
+              "1: a tree that is awake rested in the last step; -1: nothing is known yet of this "
+              "environment"};
 }
 
-void SleepRows::write(std::int64_t at, const SleepRow& row) {
+void SleepRows::write(const SleepRow& row) {
   const std::size_t trees = layout_.trees.size(), nu = layout_.u_names.size();
-  std::fill(islands_.begin(), islands_.end(), -1);
-  std::fill(rests_.begin(), rests_.end(), 0);
-  std::fill(u_.begin(), u_.end(), std::numeric_limits<double>::quiet_NaN());
+  const std::span<std::int32_t> islands = island_.next_row(), rested = rested_.next_row();
+  const std::span<double> u = u_.next_row(), clearance = clearance_.next_row();
+  const std::span<std::int8_t> resting = resting_.next_row();
+  std::fill(islands.begin(), islands.end(), -1);
+  std::fill(rested.begin(), rested.end(), 0);
+  std::fill(u.begin(), u.end(), std::numeric_limits<double>::quiet_NaN());
   for (std::size_t e = 0; e < row.sleep.size(); ++e) {
     const SleepState& s = row.sleep[e];
-    flags_[e] = s.asleep.empty() ? std::int8_t{-1} : static_cast<std::int8_t>(s.resting);
-    clearances_[e] = s.clearance;
-    const auto place = [e](auto& all, std::size_t width) {
+    resting[e] = s.asleep.empty() ? std::int8_t{-1} : static_cast<std::int8_t>(s.resting);
+    clearance[e] = s.clearance;
+    const auto place = [e](const auto& all, std::size_t width) {
       return all.begin() + static_cast<std::ptrdiff_t>(e * width);
     };
-    std::copy(s.island.begin(), s.island.end(), place(islands_, trees));
-    std::copy(s.rested.begin(), s.rested.end(), place(rests_, trees));
-    std::copy(s.u.begin(), s.u.end(), place(u_, nu));
+    std::copy(s.island.begin(), s.island.end(), place(islands, trees));
+    std::copy(s.rested.begin(), s.rested.end(), place(rested, trees));
+    std::copy(s.u.begin(), s.u.end(), place(u, nu));
   }
-  const hsize_t E = row.sleep.size();
-  put(island_, at, {E, trees}, islands_);
-  put(rested_, at, {E, trees}, rests_);
-  put(controls_, at, {E, nu}, u_);
-  put(clearance_, at, {E}, clearances_);
-  put(resting_, at, {E}, flags_);
+  island_.add_row(), rested_.add_row(), u_.add_row(), clearance_.add_row(), resting_.add_row();
+  ++written_;
 }
 
 std::optional<SavedSleep> read_sleep(const h5::Id& file, std::int64_t at, std::size_t rows,

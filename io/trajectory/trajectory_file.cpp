@@ -460,8 +460,7 @@ void TrajectoryFile::write(const MemoryRow& row) {
 }
 
 void TrajectoryFile::write(const SleepRow& row) {
-  const TrajectoryLayout& l = impl_->layout;
-  if (impl_->sleep) impl_->sleep->write(l.states.before(row.step, l.steps, l.first_step), row);
+  if (impl_->sleep) impl_->sleep->write(row);
 }
 
 void TrajectoryFile::write(const GradientArrays& g) {
@@ -509,6 +508,7 @@ void TrajectoryFile::commit() {
   expect("steps", f.steps, l.states.given() ? l.rows(l.states) - (at_start ? 1 : 0) : l.steps);
   expect("actions", f.actions, f.layout.task ? f.layout.task->horizon : 0);
   expect("memories", f.memory ? f.memory->written() : 0, f.memory ? l.rows(l.of_memory) : 0);
+  expect("rows of sleep", f.sleep ? f.sleep->written() : 0, f.sleep ? l.rows(l.states) : 0);
   expect("audits", f.audit.written, f.layout.audit ? f.layout.steps + 1 : 0);
   for (std::size_t i = 0; i < f.readings.size(); ++i) {
     const SensorLayout& sensor = f.layout.sensors[std::size_t(f.layout.fields[i].sensor)];

@@ -163,6 +163,16 @@ TEST(TrajectoryFile, IncompleteRunsAreNotCommitted) {
     } catch (const IoError& e) {
       EXPECT_THAT(e.what(), ::testing::HasSubstr("5 states of 6"));
     }
+    TrajectoryLayout sleeps = layout();
+    sleeps.trees = {"box"};
+    TrajectoryFile without(folder / "sleep.h5", sleeps, false);
+    testing::write_run(without, sleeps);  // without its rows of sleep
+    try {
+      without.commit();
+      ADD_FAILURE() << "a file without its rows of sleep was committed";
+    } catch (const IoError& e) {
+      EXPECT_THAT(e.what(), ::testing::HasSubstr("0 rows of sleep of 6"));
+    }
   }
   EXPECT_EQ(folder.entries(), 0U);
 }
