@@ -128,12 +128,26 @@ double width_of(const Shape& shape, ComparedWidth compared) {
   return width[compared == ComparedWidth::second ? 1 : 0];
 }
 
-/// Whether two equal cuboids whose largest faces lie on each other may touch with fewer than two
-/// rows of points.
-bool rims_alone(const Shape& points, const Shape& touched) {
-  const auto* const one = std::get_if<CuboidShape>(&points);
-  const auto* const two = std::get_if<CuboidShape>(&touched);
+/// Returns where the middle of a link's body is at rest, in the world.
+Vector3 rest_place(const Scene& scene, const LinkDescription& link) {
+  Vector3 place = link.body.pose.position;
+  for (const LinkDescription* l = &link;; l = &scene.links[std::size_t(l->parent)]) {
+    place = outer_point(l->joint.pose, place);
+    if (l->parent < 0) return place;
+  }
+}
+
+/// Whether two equal cuboids, one above the other at rest, whose largest faces lie on each other
+/// may touch with fewer than two rows of points.
+bool rims_alone(const Scene& scene, const LinkDescription& points, const LinkDescription& touched) {
+  constexpr double kAbove = 0.9;  // |cos| of the angle between their middles and gravity
+  const auto* const one = std::get_if<CuboidShape>(&points.body.shape);
+  const auto* const two = std::get_if<CuboidShape>(&touched.body.shape);
   if (one == nullptr || two == nullptr) return false;
+  const Vector3 apart = rest_place(scene, points) - rest_place(scene, touched);
+  if (!(std::abs(dot(apart, scene.gravity)) >
+        kAbove * std::sqrt(dot(apart, apart) * dot(scene.gravity, scene.gravity))))
+    return false;
   const std::array<int, 3>& n = one->contact_resolution;
   // Corners alone meet a cuboid face by face (kernels/step/faces.hpp).
   if (std::ranges::max(n) == 2) return false;
@@ -205,7 +219,7 @@ std::vector<CoarseContact> coarse_contacts(const Scene& scene, ComparedWidth com
     const double gap = place->second;
     if (gap == 0) continue;
     const bool fits = gap >= width * (1 - kAsWide);
-    if (fits || rims_alone(points, touched)) found.push_back({k, gap, width, !fits});
+    if (fits || rims_alone(scene, *one, *two)) found.push_back({k, gap, width, !fits});
   }
   const auto other_way_is_fine = [&](const CoarseContact& coarse) {
     const PairContactDescription& c = scene.pair_contacts[coarse.contact];

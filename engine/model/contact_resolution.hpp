@@ -32,9 +32,9 @@ enum class ComparedWidth { smallest, second };
 
 /// Returns the contacts whose primitive_body fits between the points of general_body, unless a
 /// contact of the same bodies the other way round has points that are near enough. Where the bodies
-/// are equal cuboids, fewer than four points along the edges of their largest faces count as well
-/// (`rims`). Contacts that never push, and points of sensors that act as contact points, are left
-/// out. A mesh counts as its box.
+/// are equal cuboids, one above the other, fewer than four points along the edges of their largest
+/// faces count as well (`rims`). Contacts that never push, and points of sensors that act as
+/// contact points, are left out. A mesh counts as its box.
 std::vector<CoarseContact> coarse_contacts(const Scene& scene, ComparedWidth compared);
 
 /// Returns lines for the contacts whose second width fits, with both lengths and what helps: five
