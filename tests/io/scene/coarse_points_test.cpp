@@ -120,9 +120,9 @@ TEST(CoarsePoints, ARoundBodyOnTheGroundIsToldToHaveCorners) {
   EXPECT_THAT(rolls("type=\"cylinder\" radius=\"0.05\" length=\"0.1\""),
               ElementsAre(AllOf(HasSubstr("s.xml:5: <ground_contact>: 'roll'"),
                                 HasSubstr("8 points around"),
-                                HasSubstr("a general_contact_angle_resolution of 23 or more"))));
+                                HasSubstr("a general_contact_angle_resolution of 16 or more"))));
   EXPECT_THAT(rolls("type=\"cylinder\" radius=\"0.05\" length=\"0.1\" "
-                    "general_contact_angle_resolution=\"23\""),
+                    "general_contact_angle_resolution=\"16\""),
               IsEmpty());
   EXPECT_THAT(rolls("type=\"capsule\" radius=\"0.05\" length=\"0.1\""),
               ElementsAre(HasSubstr("second number of general_contact_resolution")));
