@@ -127,7 +127,8 @@ void warn_of_geometry(const Console& console, const Model& model) {
           "where walls or details are thinner than about 1.5 cells; expected a larger 'resolution' "
           "or a smaller 'error'",
           mesh.body, mesh.cell, 100 * mesh.unresolved));
-  for (const auto& lines : {start_overlaps(model), sensors_inside(model), rounded_places(model)})
+  for (const auto& lines : {start_overlaps(model), sensors_inside(model), unchecked_overlaps(model),
+                            rounded_places(model)})
     for (const std::string& line : lines) console.note("warning: " + line);
 }
 
@@ -158,13 +159,18 @@ Json note_costly_steps(const Console& console, Integrator integrator, double acc
 
 ExitCode exit_code(const Console& console, bool failed, const StepCounts& counts) {
   if (counts.missed_contacts() == 0) return failed ? kSomeFailed : kDone;
+  std::string what;
+  if (counts.passed_steps > 0)
+    what = fmt::format("in {} a body came through another", counts.passed_steps);
+  if (counts.overlapping_steps > 0)
+    what += fmt::format(
+        "{}after {} bodies overlap by more than a quarter of their thickness, and no "
+        "contact point is as deep",
+        what.empty() ? "" : ", ", counts.overlapping_steps);
   console.note(fmt::format(
-      "error: contacts missed bodies in {} of {} steps: in {} a body came through another, and "
-      "after "
-      "{} bodies overlap by more than a quarter of their thickness while hardly any contact point "
-      "is inside; expected more contact points, stiffer contacts or shorter steps",
-      counts.missed_contacts(), counts.simulation_steps, counts.passed_steps,
-      counts.overlapping_steps));
+      "error: contacts missed bodies in {} of {} steps: {}; expected more contact points where "
+      "bodies overlap, and stiffer contacts or shorter steps where one comes through",
+      counts.missed_contacts(), counts.simulation_steps, what));
   return kSomeFailed;
 }
 

@@ -42,7 +42,9 @@ set(public_headers
   engine/derivative/readout_pullback.hpp
   engine/derivative/step_jacobian.hpp
   engine/derivative/tangent.hpp
+  engine/model/contact_resolution.hpp
   engine/model/effects.hpp
+  engine/model/felt_bodies.hpp
   engine/model/field_form.hpp
   engine/model/model.hpp
   engine/model/model_info.hpp

@@ -54,6 +54,7 @@ class Compiler {
     unknown_scales();
     coarse_pairs();
     mesh_distances();
+    thin_walls();
     pair_contacts();
     ground_contacts();
     group_contacts(m_);
@@ -125,13 +126,25 @@ class Compiler {
 
   /// Finds the bodies whose contact points are far apart for each other.
   void coarse_pairs() {
-    for (const CoarseContact& coarse : coarse_contacts(m_.scene)) {
-      const PairContactDescription& d = m_.scene.pair_contacts[coarse.contact];
-      const int one = bodies_.find("body", d.general_body, d.source),
-                two = bodies_.find("body", d.primitive_body, d.source);
-      const std::array<int, 2> pair = {std::min(one, two), std::max(one, two)};
-      if (std::ranges::find(m_.coarse_pairs, pair) == m_.coarse_pairs.end())
-        m_.coarse_pairs.push_back(pair);
+    for (const CoarseContact& coarse : coarse_contacts(m_.scene, ComparedWidth::smallest))
+      add_coarse_pair(m_.scene.pair_contacts[coarse.contact]);
+  }
+  void add_coarse_pair(const PairContactDescription& d) {
+    const int one = bodies_.find("body", d.general_body, d.source),
+              two = bodies_.find("body", d.primitive_body, d.source);
+    const std::array<int, 2> pair = {std::min(one, two), std::max(one, two)};
+    if (std::ranges::find(m_.coarse_pairs, pair) == m_.coarse_pairs.end())
+      m_.coarse_pairs.push_back(pair);
+  }
+  /// Adds the pairs with a mesh whose walls are thinner than the other's points are apart.
+  void thin_walls() {
+    for (const PairContactDescription& d : m_.scene.pair_contacts) {
+      const CompiledBody& touched =
+          m_.bodies[std::size_t(bodies_.find("body", d.primitive_body, d.source))];
+      if (touched.grid == nullptr || !d.points.empty()) continue;
+      const int general = bodies_.find("body", d.general_body, d.source);
+      const double gap = contact_point_gap(m_.scene.links[std::size_t(general)].body.shape);
+      if (gap >= 2 * touched.inscribed * touched.size.x) add_coarse_pair(d);
     }
   }
 

@@ -65,8 +65,8 @@ class Feeling {
       link = scene_.links[std::size_t(link)].parent;
     return link;
   }
-  /// Whether a joint connects a link, with all that is rigidly joined to it, with the sensor's. So a
-  /// palm that is fixed in the world is a neighbour of its fingers, and a table is not.
+  /// Whether a joint connects a link, with all that is rigidly joined to it, with the sensor's. So
+  /// a palm that is fixed in the world is a neighbour of its fingers, and a table is not.
   [[nodiscard]] bool jointed(int link) const {
     const auto hangs_on = [&](int child, int parent) {
       const int carrier = scene_.links[std::size_t(child)].parent;

@@ -443,9 +443,19 @@ std::shared_ptr<const MeshGrid> fitting_mesh_grid(const MeshShape& mesh) {
 }
 
 std::shared_ptr<const MeshGrid> coarse_mesh_grid(const MeshShape& mesh) {
-  constexpr int kCells = 16;
+  constexpr double kAcross = 3;  // cells of the smallest width
+  constexpr int kLeast = 16, kMost = 64;
+  double low[3], high[3];
+  for (std::size_t k = 0; k < mesh.vertices.size(); ++k) {
+    const double x = mesh.vertices[k];
+    low[k % 3] = k < 3 ? x : std::min(low[k % 3], x);
+    high[k % 3] = k < 3 ? x : std::max(high[k % 3], x);
+  }
+  const auto [least, most] = std::minmax({high[0] - low[0], high[1] - low[1], high[2] - low[2]});
   MeshShape coarse = mesh;
-  coarse.resolution = mesh.resolution > 0 ? std::min(mesh.resolution, kCells) : kCells;
+  coarse.error = 0;
+  coarse.resolution =
+      static_cast<int>(std::clamp<double>(std::ceil(kAcross * most / least), kLeast, kMost));
   return shared_mesh_grid(coarse);
 }
 

@@ -223,8 +223,8 @@ struct GroundContactDescription {
   std::string body;
   ContactCoefficients coefficients{};
   ContactLaw law = ContactLaw::linear;
-  /// Depth over which the linear law's damper fades in [m]; 0: the published law, which pulls. None:
-  /// kUsualRamp, or kUsualRampShare of the body's extent if that is less.
+  /// Depth over which the linear law's damper fades in [m]; 0: the published law, which pulls.
+  /// None: kUsualRamp, or kUsualRampShare of the body's extent if that is less.
   std::optional<double> ramp{};
   Source source;
 };

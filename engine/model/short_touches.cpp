@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -35,6 +36,20 @@ double lost_share(ContactLaw law, double kn, double damping, double inverse_mass
   return 1 - std::exp(-std::numbers::pi * ratio / std::sqrt(1 - ratio * ratio));
 }
 
+/// Returns the largest value of a number that may vary; of a normal one, its mean and three
+/// deviations.
+double largest(const CompiledModel& m, const kernels::Parameter& p) {
+  const auto row = std::ranges::find(m.randomized_row, p.row);
+  if (p.row < 0 || row == m.randomized_row.end()) return p.value;
+  const Distribution& d =
+      m.scene.randomizations[std::size_t(row - m.randomized_row.begin())].distribution;
+  switch (d.kind) {
+    case Distribution::Kind::normal: return d.a + 3 * d.b;
+    case Distribution::Kind::list: return std::ranges::max(d.values);
+    default: return d.b;
+  }
+}
+
 double inverse_mass(const CompiledModel& m, int link) {
   const double mass = link < 0 ? 0 : m.links[std::size_t(link)].mass;
   return mass > 0 ? 1 / mass : 0;
@@ -48,20 +63,20 @@ std::vector<std::string> short_touches(const Model& model, Integrator integrator
   const double speed = impact_speed(m);
   const auto add = [&](const ContactInfo& contact, const kernels::ContactParameters& of,
                        ContactLaw law, double inverse) {
-    if (of.damping.row >= 0 || !(of.kn.value > 0) || !(inverse > 0)) return;
+    if (!(of.kn.value > 0) || !(inverse > 0)) return;
     const double touch = std::numbers::pi / std::sqrt(of.kn.value * inverse),
-                 lost = lost_share(law, of.kn.value, of.damping.value, inverse, speed);
+                 damping = largest(m, of.damping),
+                 lost = lost_share(law, of.kn.value, damping, inverse, speed);
     if (lost >= kUndamped || touch >= steps_needed(integrator) * h) return;
-    const std::string damping =
-        of.damping.value > 0
-            ? fmt::format("has a damping that takes {:.2g} % of a speed of {:.2g} m/s", 100 * lost,
-                          speed)
-            : "has no damping";
+    const std::string what =
+        damping > 0 ? fmt::format("has a damping that takes {:.2g} % of a speed of {:.2g} m/s",
+                                  100 * lost, speed)
+                    : "has no damping";
     found.push_back(fmt::format(
         "the contact of '{}' with '{}' {}, and a touch lasts {:.2g} s: "
         "how fast bodies leave it depends on the step of {:.2g} s; expected {}damping, "
         "or steps of {:.2g} s at most with {}",
-        contact.first, contact.second, damping, touch, h, of.damping.value > 0 ? "more " : "",
+        contact.first, contact.second, what, touch, h, of.damping.value > 0 ? "more " : "",
         touch / steps_needed(integrator), to_string(integrator)));
   };
   for (std::size_t k = 0; k < m.pairs.size(); ++k)

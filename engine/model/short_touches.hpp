@@ -10,9 +10,9 @@
 namespace tangere {
 
 /// Returns a line for each contact whose damping takes less than 1e-4 of the speed of a body
-/// that falls through half of the scene's extent, and whose touches are too short for steps of length
-/// h [s] by a scheme. How fast bodies leave is then a matter of the step. A touch lasts
-/// π √(m/kn) where one point touches, m the reduced mass of both bodies, and less where more do.
+/// that falls through half of the scene's extent, and whose touches are too short for steps of
+/// length h [s] by a scheme. How fast bodies leave is then a matter of the step. A touch lasts π
+/// √(m/kn) where one point touches, m the reduced mass of both bodies, and less where more do.
 std::vector<std::string> short_touches(const Model& model, Integrator integrator, double h);
 
 }  // namespace tangere

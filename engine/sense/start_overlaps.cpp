@@ -11,7 +11,6 @@
 #include "engine/model/compiled_model.hpp"
 #include "engine/model/frames.hpp"
 #include "engine/model/model.hpp"
-#include "engine/model/model_part.hpp"
 #include "engine/sense/pad_reader.hpp"
 #include "engine/sense/point_depths.hpp"
 #include "engine/step/batch.hpp"
@@ -65,7 +64,11 @@ std::vector<std::string> sensors_inside(const Model& model) {
   const auto pose = [&](const CompiledBody& body) {
     return compose(reader.link(body.link, 0, 0).world, body.frame);
   };
-  const std::vector<int> tree = trees_of(m.links);
+  const auto root = [&](int body) {
+    while (m.scene.links[std::size_t(body)].parent >= 0)
+      body = m.scene.links[std::size_t(body)].parent;
+    return body;
+  };
   std::vector<std::string> found;
   for (const CompiledSensor& sensor : m.sensors) {
     const TactileDescription& d = m.scene.sensors[std::size_t(sensor.number)];
@@ -90,8 +93,7 @@ std::vector<std::string> sensors_inside(const Model& model) {
             }
           },
           body.grid);
-      const bool one_tree = sensor.link >= 0 && body.link >= 0 &&
-                            tree[std::size_t(sensor.link)] == tree[std::size_t(body.link)];
+      const bool one_tree = root(sensor.body) == root(target);
       if (inside == 0 || (!one_tree && depth <= kDeep * sensor.reach)) continue;
       const std::string& name = model.body_names()[std::size_t(target)];
       found.push_back(fmt::format(
@@ -100,6 +102,24 @@ std::vector<std::string> sensors_inside(const Model& model) {
           d.name, inside, points.size(), name, depth, d.coefficients.kn * sum, name));
     }
   }
+  return found;
+}
+
+std::vector<std::string> unchecked_overlaps(const Model& model) {
+  const CompiledModel& m = compiled(model);
+  std::vector<std::string> found;
+  for (const auto& [one, two] : m.coarse_pairs)
+    for (const int b : {one, two}) {
+      const Shape& shape = m.scene.links[std::size_t(b)].body.shape;
+      const bool mesh = std::holds_alternative<MeshShape>(shape);
+      if (mesh ? m.bodies[std::size_t(b)].inscribed > 0 : has_distance(shape)) continue;
+      found.push_back(
+          fmt::format("'{}' and '{}' are not checked for overlaps between their contact points, "
+                      "because '{}' {}",
+                      model.body_names()[std::size_t(one)], model.body_names()[std::size_t(two)],
+                      model.body_names()[std::size_t(b)],
+                      mesh ? "is thinner than a cell of its distance" : "has no distance"));
+    }
   return found;
 }
 

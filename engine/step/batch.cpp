@@ -50,7 +50,7 @@ const char* to_string(StepStatus value) {
     case StepStatus::passed: return "converged, but a body came through one that it touches";
     case StepStatus::damped: return "converged, but damped, because the scheme created energy";
     case StepStatus::overlapping:
-      return "converged, but bodies overlap where hardly any contact point is inside";
+      return "converged, but bodies overlap where no contact point is as deep";
     case StepStatus::not_converged: return "no solution found, step split down to h/256";
     case StepStatus::non_finite: return "a control or state was not finite";
     case StepStatus::rotation: return "a joint turned by pi or more in one step";

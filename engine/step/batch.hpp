@@ -22,8 +22,8 @@ enum class StepStatus : std::int8_t {
                        ///< created energy or turned a body too far
   passed = 3,          ///< converged, but a body came through another that it touches
   damped = 4,          ///< converged by BDF1 or in parts: the scheme would have created energy
-  overlapping = 5,     ///< converged, but bodies of a contact overlap and hardly any of its points
-                       ///< is inside (engine/step/interpenetration.hpp)
+  overlapping = 5,     ///< converged, but bodies of a contact overlap and none of its points is as
+                       ///< deep (engine/step/interpenetration.hpp)
   not_converged = -1,  ///< no root found down to h/256
   non_finite = -2,     ///< a control or state was NaN or infinite
   rotation = -3,       ///< a joint turned by π or more in one step

@@ -4,10 +4,11 @@
 //   E = Σ (m v² + 2 ω·(c × v) + ω·Jω)/2 + I_a v²/2 - Σ gravity·(m p + R c)
 //       + Σ k (q - rest)²/2 + Σ k_l (q beyond a limit)²/2 + Σ f (e - f/2P) + Σ k_n d²/2
 //       + Σ k_s |s|²/2
-// with s the elastic displacement of a contact point whose friction has a spring, c the moment and J the inertia of a link about its origin, e the distance of a position
-// motor from its target, and f = clip(P e, range). Damping and friction only take energy away, and
-// gravity, springs, limits, motors whose target stays and contacts whose faces stay give back what
-// they hold. So E can only rise by the work of forces that are known at the start of the step.
+// with c the moment and J the inertia of a link about its origin, e the distance of a position
+// motor from its target, f = clip(P e, range), and s the elastic displacement of a contact point
+// whose friction has a spring. Damping and slip only take energy away, and gravity, springs,
+// limits, motors whose target stays and contacts whose faces stay give back what they hold. So E
+// can only rise by the work of forces that are known at the start of the step.
 #pragma once
 
 #include "engine/step/workspace.hpp"

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// A wall is a body of a pair. The other body has come through it when its middle changes sides of
-// the plane that halves the wall where it is thinnest, well within the wall's edges. Contacts at
-// rest are far less deep. Only steps in which links move against each other by more than half the
-// wall's thickness are looked at.
+// A wall is a body of a pair. The other body has come through it when its middle changes sides of a
+// plane that halves the wall along one of its axes, well within the wall's other widths: deep in a
+// convex wall, where contacts at rest never are. In parts of a step only those are compared in
+// which links move against each other by more than half of what is thinnest.
 #include "engine/step/passing.hpp"
 
 #include <algorithm>
@@ -31,36 +31,30 @@ double component(const Vec3<double>& a, int k) { return k == 0 ? a.x : k == 1 ? 
 
 }  // namespace
 
-double Passing::Extent::reach() const { return kWithin * std::sqrt(dot(half, half)); }
-
-Passing::Extent Passing::extent_of(PrimitiveShape shape, const Vec3<double>& size) {
+Vec3<double> Passing::half_of(PrimitiveShape shape, const Vec3<double>& size) {
   CompiledBody body;
   body.shape = shape;
   body.size = size;
   const kernels::Hull hull = hull_of(body);
-  Extent extent{hull.straight + hull.round, 0};
-  for (const int k : {1, 2})
-    if (component(extent.half, k) < component(extent.half, extent.axis)) extent.axis = k;
-  return extent;
+  return hull.straight + hull.round;
 }
 
-/// Returns the extent of a wall in an environment.
-Passing::Extent Passing::extent_in(const Wall& wall, const double* column) {
-  if (wall.size_row < 0) return wall.extent;
-  return extent_of(wall.shape, kernels::load_vector<double>({}, wall.size_row, column, 0));
+/// Returns half the widths of a wall in an environment.
+Vec3<double> Passing::half_in(const Wall& wall, const double* column) {
+  if (wall.size_row < 0) return wall.half;
+  return half_of(wall.shape, kernels::load_vector<double>({}, wall.size_row, column, 0));
 }
 
 void Passing::add(int link, const Frame<double>& at, PrimitiveShape shape, const Vec3<double>& size,
                   int size_row, int other, const Vec3<double>& middle, bool other_convex) {
-  const Extent extent = extent_of(shape, size);
-  const Vec3<double>& half = extent.half;
+  const Vec3<double> half = half_of(shape, size);
   if (!(half.x > 0 && half.y > 0 && half.z > 0)) return;  // a plane has one side
-  const double thin = component(half, extent.axis);
+  const double thin = std::min({half.x, half.y, half.z});
   const auto same = [&](const Gate& g) {
     return std::minmax(g.link, g.other) == std::minmax(link, other);
   };
   const auto gate = std::find_if(gates_.begin(), gates_.end(), same);
-  walls_.push_back({link, other, at, extent, shape, size_row, middle, other_convex,
+  walls_.push_back({link, other, at, half, shape, size_row, middle, other_convex,
                     std::size_t(gate - gates_.begin())});
   if (gate == gates_.end()) {
     gates_.push_back({link, other, thin});
@@ -76,8 +70,7 @@ void Passing::bound_gates() {
     for (const Wall& wall : walls_) {
       Gate& gate = gates_[wall.gate];
       const bool own = wall.link == gate.link;
-      f(own ? gate.of_link : gate.of_other, wall.at.p,
-        std::sqrt(dot(wall.extent.half, wall.extent.half)));
+      f(own ? gate.of_link : gate.of_other, wall.at.p, std::sqrt(dot(wall.half, wall.half)));
       f(own ? gate.of_other : gate.of_link, wall.middle, 0.0);
     }
   };
@@ -104,8 +97,8 @@ void Passing::bound_link_pairs() {
       if (!of_shapes && (wall.link != links.link1 || wall.other != links.link2)) continue;
       const Vec3<double>& at = of_shapes ? links.shapes_middle : links.points_middle;
       const Vec3<double>& other = of_shapes ? links.points_middle : links.shapes_middle;
-      bound.room = std::max(bound.room, length(wall.at.p - at) + length(wall.middle - other) +
-                                            length(wall.extent.half));
+      bound.room = std::max(
+          bound.room, length(wall.at.p - at) + length(wall.middle - other) + length(wall.half));
     }
     if (bound.room >= 0) bounds_.push_back(bound);
   }
@@ -160,7 +153,9 @@ Passing::Passing(const CompiledModel& m) : model_(m), arm_(m.links.size(), 0.0) 
     }
     const kernels::Solid& solid = m.solids[std::size_t(p.body1)];
     const auto convex = [](PrimitiveShape shape) { return row_of(shape).half_widths != nullptr; };
-    add(p.link2, p.frame2, p.shape, p.size, p.size_row, p.link1, p.middle, convex(solid.shape));
+    const bool is_convex = convex(solid.shape);  // then its middle is not that of a skin on it
+    add(p.link2, p.frame2, p.shape, p.size, p.size_row, p.link1,
+        is_convex ? solid.frame.p : p.middle, is_convex);
     // Bodies with points of their own need not be convex. A ball has none.
     // Sizes of a part of a model that vary are taken as in the scene; only whole models are checked
     // with those of an environment.
@@ -256,15 +251,23 @@ Vec3<double> Passing::middle_in(const Wall& wall, const AlignedVector<LinkPose<R
   return relative(world(wall.link, wall.at), world(wall.other, middle)).p;
 }
 
-bool Passing::came_through(const Extent& wall, const Vec3<double>& from, const Vec3<double>& to) {
-  const double a = component(from, wall.axis), b = component(to, wall.axis);
-  if (!(a * b < 0)) return false;
-  const double share = a / (a - b);
-  for (int k = 0; k < 3; ++k) {
-    const double at = component(from, k) + share * (component(to, k) - component(from, k));
-    if (k != wall.axis && !(std::abs(at) < kWithin * component(wall.half, k))) return false;
+bool Passing::came_through(const Wall& wall, const Vec3<double>& half, const Vec3<double>& from,
+                           const Vec3<double>& to) {
+  const double thin = std::min({half.x, half.y, half.z});
+  for (int axis = 0; axis < 3; ++axis) {
+    // The middle of a hollow body may be beside what it is made of.
+    if (!wall.other_convex && component(half, axis) > thin) continue;
+    const double a = component(from, axis), b = component(to, axis);
+    if (!(a * b < 0)) continue;
+    const double share = a / (a - b);
+    bool within = true;
+    for (int k = 0; k < 3; ++k) {
+      const double at = component(from, k) + share * (component(to, k) - component(from, k));
+      within = within && (k == axis || std::abs(at) < kWithin * component(half, k));
+    }
+    if (within) return true;
   }
-  return true;
+  return false;
 }
 
 template <int L>
@@ -275,7 +278,7 @@ bool Passing::passed(const AlignedVector<LinkPose<Row<L>>>& before,
   return std::any_of(walls_.begin(), walls_.end(), [&](const Wall& wall) {
     if (std::exchange(gate, wall.gate) != wall.gate)
       apart = stay_apart<L>(gates_[wall.gate], before, after, lane);
-    return !apart && came_through(wall.extent, middle_in<L>(wall, before, lane),
+    return !apart && came_through(wall, wall.half, middle_in<L>(wall, before, lane),
                                   middle_in<L>(wall, after, lane));
   });
 }
@@ -284,8 +287,9 @@ bool Passing::changed_sides(const AlignedVector<LinkPose<Row<1>>>& before,
                             const AlignedVector<LinkPose<Row<1>>>& after,
                             const double* column) const {
   return std::any_of(walls_.begin(), walls_.end(), [&](const Wall& wall) {
-    return wall.other_convex && came_through(extent_in(wall, column), middle_in<1>(wall, before, 0),
-                                             middle_in<1>(wall, after, 0));
+    return wall.other_convex &&
+           came_through(wall, half_in(wall, column), middle_in<1>(wall, before, 0),
+                        middle_in<1>(wall, after, 0));
   });
 }
 
@@ -300,17 +304,21 @@ double Passing::clearance(const AlignedVector<LinkPose<Row<1>>>& poses,
   for (const Wall& wall : walls_) {
     if (!wall.other_convex) continue;
     const Vec3<double> arm = in_world(wall.other, wall.middle) - in_world(wall.link, wall.at.p);
-    const Extent extent = extent_in(wall, column);
-    const double far = least + extent.reach();
+    const Vec3<double> half = half_in(wall, column);
+    const double far = least + kWithin * std::sqrt(dot(half, half));
     if (dot(arm, arm) >= far * far) continue;
     const Vec3<double> at = middle_in<1>(wall, poses, 0);
-    double square = 0;
-    for (int k = 0; k < 3; ++k) {
-      const double edge = k == extent.axis ? 0 : kWithin * component(extent.half, k),
-                   beyond = std::max(std::abs(component(at, k)) - edge, 0.0);
-      square += beyond * beyond;
+    double nearest = HUGE_VAL;
+    for (int axis = 0; axis < 3; ++axis) {
+      double square = 0;
+      for (int k = 0; k < 3; ++k) {
+        const double edge = k == axis ? 0 : kWithin * component(half, k),
+                     beyond = std::max(std::abs(component(at, k)) - edge, 0.0);
+        square += beyond * beyond;
+      }
+      nearest = std::min(nearest, square);
     }
-    least = std::min(least, std::sqrt(square));
+    least = std::min(least, std::sqrt(nearest));
   }
   return least;
 }

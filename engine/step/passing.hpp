@@ -43,19 +43,14 @@ class Passing {
                                  const double* column) const;
 
  private:
-  /// Half the widths of a wall along its axes, and the axis along which it is thinnest: 0, 1, 2.
-  struct Extent {
-    kernels::Vec3<double> half;  ///< [m]
-    int axis;
-    /// Distance beyond which no place is in the part of the middle plane that counts [m].
-    [[nodiscard]] double reach() const;
-  };
-  static Extent extent_of(PrimitiveShape shape, const kernels::Vec3<double>& size);
+  /// Returns half the widths of a shape of this size along its axes [m]; zeros of a plane or a
+  /// mesh.
+  static kernels::Vec3<double> half_of(PrimitiveShape shape, const kernels::Vec3<double>& size);
   /// A convex body of a pair, and the middle of the other one.
   struct Wall {
-    int link, other;            ///< -1: the world
-    kernels::Frame<double> at;  ///< the body in its link
-    Extent extent;              ///< of the size in the scene
+    int link, other;             ///< -1: the world
+    kernels::Frame<double> at;   ///< the body in its link
+    kernels::Vec3<double> half;  ///< of the size in the scene
     PrimitiveShape shape;
     int size_row;                  ///< as in kernels::PairContact
     kernels::Vec3<double> middle;  ///< of the other body, in its link
@@ -65,11 +60,12 @@ class Passing {
   void add(int link, const kernels::Frame<double>& at, PrimitiveShape shape,
            const kernels::Vec3<double>& size, int size_row, int other,
            const kernels::Vec3<double>& middle, bool other_convex);
-  [[nodiscard]] static Extent extent_in(const Wall& wall, const double* column);
+  [[nodiscard]] static kernels::Vec3<double> half_in(const Wall& wall, const double* column);
   template <int L>
   [[nodiscard]] static kernels::Vec3<double> middle_in(
       const Wall& wall, const AlignedVector<kernels::LinkPose<kernels::Row<L>>>& poses, int lane);
-  [[nodiscard]] static bool came_through(const Extent& extent, const kernels::Vec3<double>& from,
+  [[nodiscard]] static bool came_through(const Wall& wall, const kernels::Vec3<double>& half,
+                                         const kernels::Vec3<double>& from,
                                          const kernels::Vec3<double>& to);
 
   /// A ball around all walls and middles of one link, in its axes.

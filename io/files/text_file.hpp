@@ -9,8 +9,8 @@
 namespace tangere {
 
 /// Throws IoError unless `path` leads to a regular file on a disk, which then counts as an input
-/// (io/files/input_files.hpp); `expected` names what it should be. Throws InputError if the file is a
-/// pointer of Git LFS, which stands in a checkout where large files were not fetched.
+/// (io/files/input_files.hpp); `expected` names what it should be. Throws InputError if the file is
+/// a pointer of Git LFS, which stands in a checkout where large files were not fetched.
 void require_regular_file(const std::string& path, const char* expected);
 
 /// All bytes of a regular file. Throws like require_regular_file, and InputError when it has more

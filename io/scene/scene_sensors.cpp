@@ -238,6 +238,17 @@ void add_feedback(Scene& scene, const SceneNode& node, const TactileDescription&
                     d.name, d.body));
 }
 
+/// Reads names between commas; blanks beside a comma do not count.
+Names body_names(const SceneNode& node, const char* attribute) {
+  Names names =
+      split_names(node.source().prefix() + "<tactile>: " + attribute, node.text(attribute));
+  for (std::string& name : names) {
+    name.erase(0, std::min(name.find_first_not_of(' '), name.size()));
+    name.erase(name.find_last_not_of(' ') + 1);
+  }
+  return names;
+}
+
 }  // namespace
 
 void read_sensors(Scene& scene, const SceneNode& section) {
@@ -275,8 +286,7 @@ void read_sensors(Scene& scene, const SceneNode& section) {
     }
     read_parts(node, d);
     for (const auto& [name, list] : {std::pair{"feels", &d.feels}, {"ignores", &d.ignores}})
-      if (node.has(name))
-        *list = split_names(d.source.prefix() + "<tactile>: " + name, node.text(name));
+      if (node.has(name)) *list = body_names(node, name);
     static_cast<void>(felt_bodies(scene, d));  // checks the names
     if (node.choice("feedback", {"false", "true"}, 0) == 1) add_feedback(scene, node, d);
     scene.sensors.push_back(std::move(d));

@@ -404,8 +404,8 @@ void add_batches(nb::module_& m) {
                    "(E, nv) velocities: m/s, rad/s.")
       .def_prop_ro("status", &PythonBatch::status, nb::rv_policy::automatic,
                    "(E) int8: 0 for a step that converged, 1 after a split, 2 coarse, 3 passed\n"
-                   "through, 4 damped, 5 overlapping; negative where an environment has failed and\n"
-                   "stands still.")
+                   "through, 4 damped, 5 overlapping; negative where an environment has failed\n"
+                   "and stands still.")
       .def("end_effectors", &PythonBatch::end_effectors, "(E, n, 3) places in the world [m].")
       .def("bodies", &PythonBatch::bodies,
            nb::sig("def bodies(self) -> tuple[numpy.typing.NDArray[numpy.float64], "

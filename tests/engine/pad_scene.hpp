@@ -62,6 +62,7 @@ inline Scene pad_scene(PrimitiveShape shape, ContactLaw law, Pad pad) {
     t.array = {{-0.025, -0.025, 0.01}, {0.025, 0.025, 0.01}, {1, 0, 0}, {0, 1, 0}, 11, 13};
     if (pad == Pad::skewed) t.array.axis0 = {1, 4e-4, 0}, t.array.axis1 = {-3e-4, 1, 0};
   }
+  t.feels = {"arm", "thing"};  // the arm is its neighbour
   s.sensors.push_back(t);
   s.end_effectors.push_back({"tip", "hand_joint", {0.01, 0.02, 0.03}, 2e-3, {1, 0, 0, 1}, {}});
   s.end_effectors.push_back({"elbow", "arm_joint", {0.01, 0, 0.05}, 2e-3, {1, 0, 0, 1}, {}});

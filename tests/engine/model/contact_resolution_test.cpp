@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests which contacts count as having too few points, against distances and polygons in closed form.
+// Tests which contacts count as having too few points, against distances and polygons in closed
+// form.
 #include "engine/model/contact_resolution.hpp"
 
 #include <gmock/gmock.h>
@@ -44,7 +45,7 @@ TEST(ContactResolution, GapsAreTheLargestEmptyBallsOfTheSurface) {
                gap = 2 * std::hypot(kLength / 2, beside);
   EXPECT_NEAR(contact_point_gap(CylinderShape{kLength, kRadius, 8, 3}), gap, 0.03 * gap);
   // In the middle of a face of a mesh of eight corners.
-  EXPECT_NEAR(contact_point_gap(box_mesh(0.03)), 2 * 0.03 * std::sqrt(2), 0.003);
+  EXPECT_NEAR(contact_point_gap(box_mesh(0.03)), 2 * 0.03 * std::sqrt(2), 0.005);
   EXPECT_NEAR(contact_point_gap(CuboidShape{{0.1, 0.2, 0.3}, {3, 3, 4}}), 0.1, 1e-15);
   EXPECT_EQ(contact_point_gap(SphereShape{0.1}), 0);
   // Points of an ellipsoid are evenly spread: four times as many are half as far apart.
@@ -55,7 +56,9 @@ TEST(ContactResolution, GapsAreTheLargestEmptyBallsOfTheSurface) {
 
 TEST(ContactResolution, NamesContactsWhoseBodiesFitBetweenPoints) {
   const CuboidShape finger{{0.01, 0.02, 0.02}};
-  const auto found = [](const Scene& s) { return coarse_contacts(s).size(); };
+  const auto found = [](const Scene& s) {
+    return coarse_contacts(s, ComparedWidth::second).size();
+  };
   EXPECT_EQ(found(two(CylinderShape{0.1, 0.015}, finger)), 1U);
   EXPECT_EQ(found(two(finger, CylinderShape{0.1, 0.015})), 0U);
   EXPECT_EQ(found(two(CylinderShape{0.1, 0.015}, finger, true)), 0U) << "the finger's points do";
@@ -69,8 +72,17 @@ TEST(ContactResolution, NamesContactsWhoseBodiesFitBetweenPoints) {
   const auto cube = [](int n) { return CuboidShape{{0.05, 0.05, 0.05}, {n, n, n}}; };
   EXPECT_EQ(found(two(cube(3), cube(3))), 1U) << "one row of points is not in the rims";
   EXPECT_EQ(found(two(cube(4), cube(4))), 0U);
+  const CuboidShape card{{0.06, 0.1, 0.002}, {7, 10, 2}};
+  EXPECT_EQ(found(two(card, card)), 0U) << "the thickness needs two rows alone";
+  Scene idle = two(CylinderShape{0.1, 0.015}, finger);
+  idle.pair_contacts[0].coefficients = {};
+  EXPECT_EQ(found(idle), 0U) << "it never pushes";
+  // A plate that falls on its edge fits between points that it lies on when flat.
+  const Scene plate = two(CuboidShape{{0.1, 0.1, 0.1}, {3, 3, 3}}, CuboidShape{{0.002, 0.1, 0.1}});
+  EXPECT_EQ(found(plate), 0U);
+  EXPECT_EQ(coarse_contacts(plate, ComparedWidth::smallest).size(), 1U);
   EXPECT_THAT(coarse_contact_lines(two(CylinderShape{0.1, 0.015}, finger)).front(),
-              HasSubstr("up to 0.1 m apart, and 'other' is 0.02 m across"));
+              HasSubstr("up to 0.101 m apart, and 'other' is 0.02 m across"));
 }
 
 /// A polygon of as many corners as the line names stands out by no more than the body sinks in, and
@@ -80,9 +92,11 @@ TEST(ContactResolution, SaysHowManyPointsRollingNeeds) {
   s.ground = GroundDescription{};
   constexpr double kRadius = 0.05, kLength = 0.1, kKn = 2000;
   s.ground_contacts.push_back({"body", {kKn, 1, 0.5, 1}, ContactLaw::linear, 1e-5, {}});
+  const Quaternion kLying = {std::sqrt(0.5), std::sqrt(0.5), 0, 0};
   const auto with = [&](int around) {
     s.links = {
         link("body", JointType::free, {0, 0, 0}, CylinderShape{kLength, kRadius, around, 3}, 500)};
+    s.links[0].joint.pose.orientation = kLying;
     return polygonal_rolling_lines(s);
   };
   const double mass = 500 * std::numbers::pi * kRadius * kRadius * kLength,
@@ -94,6 +108,21 @@ TEST(ContactResolution, SaysHowManyPointsRollingNeeds) {
   EXPECT_THAT(with(8).front(), HasSubstr("of " + std::to_string(enough) + " or more"));
   EXPECT_EQ(with(enough - 1).size(), 1U);
   EXPECT_THAT(with(enough), IsEmpty());
+  // Nothing rolls that stands on its end, or that does not move freely.
+  with(8);
+  s.links[0].joint.type = JointType::prismatic;
+  EXPECT_THAT(polygonal_rolling_lines(s), IsEmpty());
+  s.links[0].joint.type = JointType::free;
+  s.links[0].joint.pose.orientation = {1, 0, 0, 0};
+  EXPECT_THAT(polygonal_rolling_lines(s), IsEmpty());
+  // A cuboid is ground as well.
+  s.links[0].joint.pose.orientation = kLying;
+  s.ground_contacts.clear();
+  s.links.push_back(link("floor", JointType::fixed, {0, 0, 0}, CuboidShape{{1, 1, 0.1}}, 500));
+  s.pair_contacts.push_back({"body", "floor", {kKn, 1, 0.5, 1}, ContactLaw::clamped, {}, {}});
+  ASSERT_EQ(polygonal_rolling_lines(s).size(), 1U);
+  EXPECT_THAT(polygonal_rolling_lines(s).front(),
+              HasSubstr("touches 'floor' with 8 points around"));
 }
 
 }  // namespace

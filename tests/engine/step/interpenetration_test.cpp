@@ -131,6 +131,87 @@ TEST(Interpenetration, BodiesThatCrossASoftPlateAreTold) {
           << speed << " m/s, " << h << " s";
 }
 
+/// Whichever way a body comes through another, along its thinnest axis or not, through its middle
+/// or beside it, in one step or in many.
+TEST(Interpenetration, BodiesThatCrossACubeAreTold) {
+  for (const double speed : {2.0, 100.0})
+    for (const int axis : {0, 1, 2})
+      for (const double beside : {0.0, 0.01})
+        for (const bool ball : {false, true}) {
+          Scene s;
+          s.gravity = {0, 0, 0};
+          Vector3 start{};
+          start[std::size_t(axis)] = 0.06;
+          start[std::size_t((axis + 1) % 3)] = start[std::size_t((axis + 2) % 3)] = beside;
+          s.links = {link("cube", JointType::fixed, {0, 0, 0}, plank({0.04, 0.04, 0.04}), 1000),
+                     link("small", JointType::translational, start,
+                          ball ? Shape(SphereShape{0.01})
+                               : Shape(CuboidShape{{0.02, 0.02, 0.02}, {6, 6, 6}}),
+                          1000)};
+          s.pair_contacts.push_back({"small", "cube", {1, 0, 0, 0}, ContactLaw::clamped, {}, {}});
+          const Model model(s);
+          Batch batch(model, 1);
+          std::vector<double> v(3);
+          v[std::size_t(axis)] = -speed;
+          batch.set_state(0, q_of(batch), v);
+          Stepper stepper(model, testing::options(Integrator::bdf2, 5e-3));
+          int passed = 0;
+          for (int t = 0; t < int(0.1 / speed / 5e-3) + 3; ++t) {
+            stepper.step(batch, {});
+            passed += batch.status(0) == StepStatus::passed;
+          }
+          EXPECT_GE(passed, 1) << speed << " m/s along " << axis << ", " << beside << " m, "
+                               << ball;
+        }
+}
+
+/// A plate that falls on its edge between points that it would lie on when flat, and a ball on a
+/// table of eight corners that is thinner than a sixteenth of its length.
+TEST(Interpenetration, ThinBodiesAreTold) {
+  Scene knife = one_above_another(CuboidShape{{0.1, 0.1, 0.1}, {3, 3, 3}}, plank({0.002, 0.1, 0.1}),
+                                  0.11, 1000);
+  knife.links[1].joint.pose.position[0] = 0.012;
+  EXPECT_GE(fall(knife, 0.5, 1e-3, 250).overlapping, 2);
+  MeshShape table;
+  for (int k = 0; k < 8; ++k)
+    for (int c = 0; c < 3; ++c)
+      table.vertices.push_back((k >> c & 1 ? 1 : -1) * (c == 2 ? 0.003 : 0.1));
+  table.triangles = {{0, 2, 3}, {0, 3, 1}, {4, 5, 7}, {4, 7, 6}, {0, 1, 5}, {0, 5, 4},
+                     {2, 6, 7}, {2, 7, 3}, {0, 4, 6}, {0, 6, 2}, {1, 3, 7}, {1, 7, 5}};
+  Scene ball = one_above_another(table, SphereShape{0.02}, 0.03, 1000);
+  ball.pair_contacts.erase(ball.pair_contacts.begin());  // a ball cannot touch a mesh
+  EXPECT_GE(fall(ball, 0.5, 1e-3, 100).overlapping, 2);
+}
+
+/// Contacts that never push miss nothing.
+TEST(Interpenetration, ContactsThatNeverPushAreNotChecked) {
+  Scene planks = one_above_another(kAlongX, kAlongY, 0, 1000);
+  for (PairContactDescription& c : planks.pair_contacts) c.coefficients = {};
+  EXPECT_EQ(status_at(planks, 0.002), StepStatus::converged);
+}
+
+/// Sizes are those of the environment: beside a rod of a quarter of the scene's radius, a ball may
+/// pass where the thick one would be.
+TEST(Interpenetration, SizesThatVaryCount) {
+  Scene s;
+  s.gravity = {0, 0, 0};
+  s.links = {link("rod", JointType::fixed, {0, 0, 0}, CylinderShape{0.2, 0.04}, 1000),
+             link("ball", JointType::translational, {0.02, 0.05, 0}, SphereShape{0.005}, 1000)};
+  s.pair_contacts.push_back({"ball", "rod", {1, 0, 0, 0}, ContactLaw::clamped, {}, {}});
+  s.randomizations.push_back({{NumberOwner::body, NumberField::radius, "rod"},
+                              {Distribution::Kind::list, 0, 0, {0.01}},
+                              {}});
+  const Model model(s);
+  Batch batch(model, 1);
+  batch.set_state(0, q_of(batch), std::vector<double>{0, -1, 0});
+  Stepper stepper(model, testing::options(Integrator::bdf1, 1e-3));
+  for (int t = 0; t < 100; ++t) {
+    stepper.step(batch, {});
+    ASSERT_EQ(batch.status(0), StepStatus::converged) << t;
+  }
+  EXPECT_LT(q_of(batch)[1], -0.09);
+}
+
 /// What bodies have moved since the last check decides whether there is one. The statuses are those
 /// of checks after every step: restoring a block makes the next one due.
 TEST(Interpenetration, NoStepIsLeftOutThatACheckWouldTell) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests that lengths and times far below those of a robot's change nothing: steps of nanoseconds and
-// balls of a micrometre.
+// Tests that lengths and times far below those of a robot's change nothing: steps of nanoseconds
+// and balls of a micrometre.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -78,6 +78,17 @@ TEST(SmallScales, DampingThatTakesNothingIsNone) {
         << lines(law, 1e-9)[0];
   }
   EXPECT_TRUE(lines(ContactLaw::linear, 0.4 * std::sqrt(1e4 * 0.01)).empty());
+  // Of a damping that varies, the largest counts.
+  for (const double most : {1e-9, 1e4}) {
+    Scene s;
+    s.ground = GroundDescription{};
+    s.links = {link("ball", JointType::free, {0, 0, 0.05}, SphereShape{0.01}, 2387.3241)};
+    s.ground_contacts.push_back({"ball", {1e4, 1, 0.5, 0}, ContactLaw::clamped, {}, {}});
+    s.randomizations.push_back({{NumberOwner::ground, NumberField::damping, "ball"},
+                                {Distribution::Kind::uniform, 0, most, {}},
+                                {}});
+    EXPECT_EQ(short_touches(Model(s), Integrator::sdirk2, 5e-3).size(), most < 1 ? 1U : 0U) << most;
+  }
   EXPECT_TRUE(lines(ContactLaw::clamped, 1e4).empty());
 }
 

@@ -73,8 +73,8 @@ TEST(BoundedEnergy, IsAChoiceOfTheScene) {
   EXPECT_EQ(free.damped, 0);
 }
 
-/// The same where friction has a spring: at the ball's own contact, or at one of a box 5 m away that
-/// rests in the ground and shares nothing with the ball but the environment.
+/// The same where friction has a spring: at the ball's own contact, or at one of a box 5 m away
+/// that rests in the ground and shares nothing with the ball but the environment.
 TEST(BoundedEnergy, NoSchemeCreatesEnergyBesideSpringsOfFriction) {
   for (const Integrator scheme : integrators())
     for (const double kn : {1e4, 1e6, 1e8})

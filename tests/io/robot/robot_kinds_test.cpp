@@ -256,8 +256,8 @@ TEST_F(RobotKinds, APointerOfGitLfsIsNamed) {
               HasSubstr("t.stl:1: a pointer of Git LFS"));
 }
 
-/// A skin does not feel what the file keeps from touching its link: geoms without contact, and links
-/// of an <exclude>, with all their shapes.
+/// A skin does not feel what the file keeps from touching its link: geoms without contact, and
+/// links of an <exclude>, with all their shapes.
 TEST_F(RobotKinds, SkinsIgnoreWhatTouchesNothing) {
   const std::string text =
       "<mujoco><worldbody><body name=\"palm\"><joint name=\"p\" type=\"slide\"/>"
