@@ -222,7 +222,6 @@ def test_what_friction_remembers_goes_on():
     assert {name: places.shape for name, places in points.items()} == {
         "contact pad box": (66, 3),
         "ground box": (8, 3),
-        "tactile pad turntable": (130, 3),
         "tactile pad box_carriage": (130, 3),
         "tactile pad box": (130, 3),
     }
@@ -231,7 +230,7 @@ def test_what_friction_remembers_goes_on():
     np.testing.assert_allclose(down, [0, 0, 0.0015], atol=1e-12)
     np.testing.assert_allclose(np.diff(pad, axis=0), np.full((12, 10, 3), down), atol=1e-12)
     batch = tangere.Batch(model, envs=19, seed=3, precision="double")
-    assert batch.memory.shape == (19, 464, 3) and not batch.memory.any()
+    assert batch.memory.shape == (19, 334, 3) and not batch.memory.any()
     u = batch.scene_controls(120)
     batch.run(u[:90])
     middle = batch.q, batch.v, batch.memory
@@ -263,9 +262,9 @@ def test_what_friction_remembers_goes_on():
         with pytest.raises(tangere.InputError, match=message):
             other.set_steps(steps)
     for wrong, message in [
-        (memory[:, :-1], r"memory of shape \(19, 463, 3\); expected \(19, 464, 3\)"),
-        (memory[0, :, :2], r"memory of shape \(464, 2\); expected \(464, 3\)"),
-        (np.full((464, 3), np.inf), "not finite"),
+        (memory[:, :-1], r"memory of shape \(19, 333, 3\); expected \(19, 334, 3\)"),
+        (memory[0, :, :2], r"memory of shape \(334, 2\); expected \(334, 3\)"),
+        (np.full((334, 3), np.inf), "not finite"),
     ]:
         with pytest.raises(tangere.InputError, match=message):
             other.set_memory(wrong)
