@@ -15,8 +15,8 @@ using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
 /// A box of 50 mm with `resolution` above a body, and what else touches.
-std::vector<std::string> warnings(const std::string& resolution, const std::string& below,
-                                  const std::string& more = "") {
+std::vector<std::string> point_warnings(const std::string& resolution, const std::string& below,
+                                        const std::string& more = "") {
   return parse_scene(
              "<tangere model=\"m\"><option unit=\"m-kg\"/>\n"
              "<robot><link name=\"box\"><joint name=\"box\" type=\"free3d\" pos=\"0 0 0.2\"/>\n"
@@ -37,33 +37,36 @@ std::vector<std::string> warnings(const std::string& resolution, const std::stri
 
 TEST(CoarsePoints, ABodyThatFitsBetweenThemIsTold) {
   const std::string post = "type=\"cuboid\" size=\"0.006 0.006 0.1\"";
-  EXPECT_THAT(warnings("2 2 2", post),
+  EXPECT_THAT(point_warnings("2 2 2", post),
               ElementsAre(AllOf(HasSubstr("s.xml:6: <general_primitive_contact>: contact points of "
                                           "'box' are up to 0.05 m apart, and 'below' is 0.006 m "
                                           "across"),
                                 HasSubstr("general_contact_resolution"))));
-  EXPECT_THAT(warnings("10 10 10", post), IsEmpty());
-  EXPECT_THAT(warnings("2 2 2", post,
-                       "<general_primitive_contact general_body=\"below\" primitive_body=\"box\" "
-                       "kn=\"1e3\"/>"),
-              IsEmpty());
+  EXPECT_THAT(point_warnings("10 10 10", post), IsEmpty());
+  EXPECT_THAT(
+      point_warnings("2 2 2", post,
+                     "<general_primitive_contact general_body=\"below\" primitive_body=\"box\" "
+                     "kn=\"1e3\"/>"),
+      IsEmpty());
   const std::string sphere = "type=\"sphere\" radius=\"0.02\"";
-  EXPECT_THAT(warnings("2 2 2", sphere),
+  EXPECT_THAT(point_warnings("2 2 2", sphere),
               ElementsAre(AllOf(HasSubstr("'below' is 0.04 m across"),
                                 HasSubstr("or the two bodies swapped"))));
   // With its surface it would need no points of the box, whose forces add to its own.
-  EXPECT_THAT(warnings("2 2 2", sphere,
-                       "<general_primitive_contact general_body=\"below\" primitive_body=\"box\" "
-                       "kn=\"1e3\"/>"),
-              ElementsAre(HasSubstr("the forces of both contacts add up; expected one of them")));
+  EXPECT_THAT(
+      point_warnings("2 2 2", sphere,
+                     "<general_primitive_contact general_body=\"below\" primitive_body=\"box\" "
+                     "kn=\"1e3\"/>"),
+      ElementsAre(HasSubstr("the forces of both contacts add up; expected one of them")));
 }
 
 /// A shift leaves the corners of a box without the box below.
 TEST(CoarsePoints, ABoxOnItsEqualIsTold) {
   const std::string equal = "type=\"cuboid\" size=\"0.05 0.05 0.05\"";
-  EXPECT_THAT(warnings("2 2 2", equal), ElementsAre(HasSubstr("or out from under them")));
-  EXPECT_THAT(warnings("3 3 3", equal), ElementsAre(HasSubstr("it can come out from under them")));
-  EXPECT_THAT(warnings("4 4 4", equal), IsEmpty());
+  EXPECT_THAT(point_warnings("2 2 2", equal), ElementsAre(HasSubstr("or out from under them")));
+  EXPECT_THAT(point_warnings("3 3 3", equal),
+              ElementsAre(HasSubstr("it can come out from under them")));
+  EXPECT_THAT(point_warnings("4 4 4", equal), IsEmpty());
 }
 
 /// Whatever the shapes are. In both directions, both must be fine enough or one of them.
@@ -72,12 +75,12 @@ TEST(CoarsePoints, OtherShapesAreTold) {
                     other_way =
                         "<general_primitive_contact general_body=\"below\" primitive_body=\"box\" "
                         "kn=\"1e3\"/>";
-  EXPECT_THAT(warnings("2 2 2", rod), ElementsAre(HasSubstr("'below' is 0.02 m across")));
-  EXPECT_THAT(warnings("2 2 2", rod, other_way),
+  EXPECT_THAT(point_warnings("2 2 2", rod), ElementsAre(HasSubstr("'below' is 0.02 m across")));
+  EXPECT_THAT(point_warnings("2 2 2", rod, other_way),
               ElementsAre(HasSubstr("contact points of 'box' are up to 0.05 m apart"),
                           AllOf(HasSubstr("contact points of 'below' are up to 0.2 m apart"),
                                 HasSubstr("expected the same contact the other way round"))));
-  EXPECT_THAT(warnings("8 8 8", rod, other_way), IsEmpty());
+  EXPECT_THAT(point_warnings("8 8 8", rod, other_way), IsEmpty());
 }
 
 /// A pile has many such contacts. Five lines say it, and one how many there are.
@@ -132,7 +135,7 @@ TEST(CoarsePoints, ARoundBodyOnTheGroundIsToldToHaveCorners) {
 }
 
 TEST(CoarsePoints, BoxesOnPlatesAreNot) {
-  EXPECT_THAT(warnings("2 2 2", "type=\"cuboid\" size=\"0.3 0.3 0.01\""), IsEmpty());
+  EXPECT_THAT(point_warnings("2 2 2", "type=\"cuboid\" size=\"0.3 0.3 0.01\""), IsEmpty());
 }
 
 }  // namespace
