@@ -111,7 +111,7 @@ void write_shards(benchmark::State& state, std::int64_t episodes, std::int64_t r
     for (std::int64_t first = 0; first < episodes; first += kBlock) {
       writer.prepare(block.rows(first));
       writer.write(block.rows(first));
-      writer.finish(first, {});
+      writer.finish(first, {}, {});
     }
     state.PauseTiming();
     bytes = 0;
@@ -162,7 +162,7 @@ void merge(benchmark::State& state) {
     DatasetWriter writer({folder.path + "/set"}, l);
     for (std::int64_t first = 0; first < episodes; first += kBlock) {
       writer.write(block.rows(first));
-      writer.finish(first, {});
+      writer.finish(first, {}, {});
     }
   }
   const DatasetFiles dataset = find_dataset(folder.path + "/set");
