@@ -51,6 +51,7 @@ TEST(DialectFinger, LoadsAndListsEveryAttributeThatIsLeftOver) {
                           line(30, "joint>: attribute 'format' has no effect here"),
                           line(31, "body>: attribute 'mu' has no effect here"),
                           line(23, "body>: mesh 'tip_2' touches with all its 6 vertices"),
+                          line(42, "general_primitive_contact>: contact points of 'tip_2'"),
                           line(44, "virtual>: shapes for pictures only")));
   EXPECT_THAT(file.warnings[7], HasSubstr("general_contact_resolution=\"1\""));
 }
