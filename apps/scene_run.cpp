@@ -161,10 +161,10 @@ ExitCode exit_code(const Console& console, bool failed, const StepCounts& counts
   if (counts.missed_contacts() == 0) return failed ? kSomeFailed : kDone;
   std::string what;
   if (counts.passed_steps > 0)
-    what = fmt::format("in {} a body came through another", counts.passed_steps);
+    what = fmt::format("in {} steps a body came through another", counts.passed_steps);
   if (counts.overlapping_steps > 0)
     what += fmt::format(
-        "{}after {} bodies overlap by more than a quarter of their thickness, and no "
+        "{}after {} steps bodies overlap by more than a quarter of their thickness, and no "
         "contact point is as deep",
         what.empty() ? "" : ", ", counts.overlapping_steps);
   console.note(fmt::format(

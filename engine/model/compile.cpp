@@ -167,7 +167,9 @@ class Compiler {
         throw InputError(d.source.prefix() + "body '" + d.name + "': " + error.what());
       }
       const kernels::DistanceGrid& view = grid->view;
-      m_.bodies[b].inscribed = -*std::ranges::min_element(grid->coefficients);
+      // A wall of less than a cell is not resolved: what the spline has there says nothing.
+      const double deepest = -*std::ranges::min_element(grid->coefficients);
+      m_.bodies[b].inscribed = deepest > 0.5 * view.cell ? deepest : 0;
       m_.bodies[b].grid = &view;
       m_.mesh_grids.push_back(std::move(grid));
       if (!touched) continue;

@@ -251,12 +251,18 @@ std::vector<std::string> coarse_contact_lines(const Scene& scene) {
     const Shape& points = link_with(scene, c.general_body)->body.shape;
     const bool ball = is_ball(link_with(scene, c.primitive_body)->body.shape),
                mesh = std::holds_alternative<MeshShape>(points);
-    // A cylinder has no points on its side, however many there are on its ends.
+    // A cylinder has no points on its side, however many there are on its ends. A sphere does not
+    // touch a mesh.
     const std::string finer =
-        mesh ? "a smaller 'pitch' or larger 'count', or "
+        mesh ? "a smaller 'pitch' or larger 'count'"
         : std::holds_alternative<CylinderShape>(points)
             ? ""
-            : fmt::format("a finer {}, or ", row_of(points).counts.front().attribute);
+            : fmt::format("a finer {}", row_of(points).counts.front().attribute);
+    const std::string other_way =
+        ball && mesh ? ""
+        : ball       ? "the two bodies swapped"
+                     : "the same contact the other way round as well, with near enough points";
+    const std::string both = finer.empty() || other_way.empty() ? "" : ", or ";
     if (coarse.rims) {
       lines.push_back(fmt::format(
           "{}<general_primitive_contact>: '{}' and '{}' are equal, and '{}' has fewer than 4 "
@@ -269,10 +275,9 @@ std::vector<std::string> coarse_contact_lines(const Scene& scene) {
     lines.push_back(fmt::format(
         "{}<general_primitive_contact>: contact points of '{}' are up to {:.3g} m apart, and '{}' "
         "is {:.3g} m across, so it can come between them, or out from under them, unnoticed; "
-        "expected {}{}",
-        c.source.prefix(), c.general_body, coarse.gap, c.primitive_body, coarse.width, finer,
-        ball && !mesh ? "the two bodies swapped"
-                      : "the same contact the other way round as well, with near enough points"));
+        "expected {}",
+        c.source.prefix(), c.general_body, coarse.gap, c.primitive_body, coarse.width,
+        finer + both + other_way));
   }
   return lines;
 }

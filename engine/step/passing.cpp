@@ -24,7 +24,7 @@ using kernels::Vec3;
 
 namespace {
 
-/// Of the wall's half edges: what crosses its plane farther out may go past it.
+/// Of the wall's half widths: what crosses its plane farther out may go past it.
 constexpr double kWithin = 0.7;
 
 double component(const Vec3<double>& a, int k) { return k == 0 ? a.x : k == 1 ? a.y : a.z; }
@@ -39,6 +39,12 @@ Vec3<double> Passing::half_of(PrimitiveShape shape, const Vec3<double>& size) {
   return hull.straight + hull.round;
 }
 
+/// Returns how far from a wall's middle, along an axis of half width `half`, the middle of the other
+/// body is surely inside [m]: a body that goes past an edge keeps its own thickness away from it.
+double Passing::within_of(const Wall& wall, double half) {
+  return std::max(kWithin * half, half - wall.other_thin);
+}
+
 /// Returns half the widths of a wall in an environment.
 Vec3<double> Passing::half_in(const Wall& wall, const double* column) {
   if (wall.size_row < 0) return wall.half;
@@ -46,7 +52,7 @@ Vec3<double> Passing::half_in(const Wall& wall, const double* column) {
 }
 
 void Passing::add(int link, const Frame<double>& at, PrimitiveShape shape, const Vec3<double>& size,
-                  int size_row, int other, const Vec3<double>& middle, bool other_convex) {
+                  int size_row, int other, const Vec3<double>& middle, double other_thin) {
   const Vec3<double> half = half_of(shape, size);
   if (!(half.x > 0 && half.y > 0 && half.z > 0)) return;  // a plane has one side
   const double thin = std::min({half.x, half.y, half.z});
@@ -54,7 +60,7 @@ void Passing::add(int link, const Frame<double>& at, PrimitiveShape shape, const
     return std::minmax(g.link, g.other) == std::minmax(link, other);
   };
   const auto gate = std::find_if(gates_.begin(), gates_.end(), same);
-  walls_.push_back({link, other, at, half, shape, size_row, middle, other_convex,
+  walls_.push_back({link, other, at, half, shape, size_row, middle, other_thin,
                     std::size_t(gate - gates_.begin())});
   if (gate == gates_.end()) {
     gates_.push_back({link, other, thin});
@@ -148,20 +154,25 @@ Passing::Passing(const CompiledModel& m) : model_(m), arm_(m.links.size(), 0.0) 
   for (const kernels::PairContact& p : m.pairs) {
     if (!pushes(p.parameters)) continue;  // it holds nothing back
     if (p.body1 < 0) {
-      add(p.link2, p.frame2, p.shape, p.size, p.size_row, p.link1, p.middle, false);
+      add(p.link2, p.frame2, p.shape, p.size, p.size_row, p.link1, p.middle, HUGE_VAL);
       continue;
     }
     const kernels::Solid& solid = m.solids[std::size_t(p.body1)];
-    const auto convex = [](PrimitiveShape shape) { return row_of(shape).half_widths != nullptr; };
-    const bool is_convex = convex(solid.shape);  // then its middle is not that of a skin on it
+    const auto thin = [](PrimitiveShape shape, const Vec3<double>& size) {
+      if (row_of(shape).half_widths == nullptr) return HUGE_VAL;
+      const Vec3<double> half = half_of(shape, size);
+      return std::min({half.x, half.y, half.z});
+    };
+    const double thin1 = thin(solid.shape, solid.size);  // its middle is not that of a skin on it
     add(p.link2, p.frame2, p.shape, p.size, p.size_row, p.link1,
-        is_convex ? solid.frame.p : p.middle, is_convex);
+        thin1 < HUGE_VAL ? solid.frame.p : p.middle, thin1);
     // Bodies with points of their own need not be convex. A ball has none.
     // Sizes of a part of a model that vary are taken as in the scene; only whole models are checked
     // with those of an environment.
     const int row = m.bodies.empty() ? -1 : m.bodies[std::size_t(p.body1)].size_row;
     if (solid.stretches || p.ball_radius > 0)
-      add(p.link1, solid.frame, solid.shape, solid.size, row, p.link2, p.frame2.p, convex(p.shape));
+      add(p.link1, solid.frame, solid.shape, solid.size, row, p.link2, p.frame2.p,
+          thin(p.shape, p.size));
   }
   bound_gates();
   // passed() looks at a gate once.
@@ -256,14 +267,14 @@ bool Passing::came_through(const Wall& wall, const Vec3<double>& half, const Vec
   const double thin = std::min({half.x, half.y, half.z});
   for (int axis = 0; axis < 3; ++axis) {
     // The middle of a hollow body may be beside what it is made of.
-    if (!wall.other_convex && component(half, axis) > thin) continue;
+    if (!wall.other_convex() && component(half, axis) > thin) continue;
     const double a = component(from, axis), b = component(to, axis);
     if (!(a * b < 0)) continue;
     const double share = a / (a - b);
     bool within = true;
     for (int k = 0; k < 3; ++k) {
       const double at = component(from, k) + share * (component(to, k) - component(from, k));
-      within = within && (k == axis || std::abs(at) < kWithin * component(half, k));
+      within = within && (k == axis || std::abs(at) < within_of(wall, component(half, k)));
     }
     if (within) return true;
   }
@@ -287,7 +298,7 @@ bool Passing::changed_sides(const AlignedVector<LinkPose<Row<1>>>& before,
                             const AlignedVector<LinkPose<Row<1>>>& after,
                             const double* column) const {
   return std::any_of(walls_.begin(), walls_.end(), [&](const Wall& wall) {
-    return wall.other_convex &&
+    return wall.other_convex() &&
            came_through(wall, half_in(wall, column), middle_in<1>(wall, before, 0),
                         middle_in<1>(wall, after, 0));
   });
@@ -302,17 +313,17 @@ double Passing::clearance(const AlignedVector<LinkPose<Row<1>>>& poses,
   };
   double least = HUGE_VAL;
   for (const Wall& wall : walls_) {
-    if (!wall.other_convex) continue;
+    if (!wall.other_convex()) continue;
     const Vec3<double> arm = in_world(wall.other, wall.middle) - in_world(wall.link, wall.at.p);
     const Vec3<double> half = half_in(wall, column);
-    const double far = least + kWithin * std::sqrt(dot(half, half));
+    const double far = least + std::sqrt(dot(half, half));
     if (dot(arm, arm) >= far * far) continue;
     const Vec3<double> at = middle_in<1>(wall, poses, 0);
     double nearest = HUGE_VAL;
     for (int axis = 0; axis < 3; ++axis) {
       double square = 0;
       for (int k = 0; k < 3; ++k) {
-        const double edge = k == axis ? 0 : kWithin * component(half, k),
+        const double edge = k == axis ? 0 : within_of(wall, component(half, k)),
                      beyond = std::max(std::abs(component(at, k)) - edge, 0.0);
         square += beyond * beyond;
       }

@@ -66,6 +66,13 @@ class SensorWarnings {
     return -1;
   }
 
+  /// Whether a body could be felt. Where it is not, the sensor's lists say so.
+  [[nodiscard]] bool has_a_distance(const std::string& body) const {
+    const auto link =
+        std::ranges::find_if(scene_.links, [&](const auto& l) { return l.body.name == body; });
+    return link != scene_.links.end() && has_distance(link->body.shape);
+  }
+
   /// The body that a contact lets touch the sensor's; "" for none.
   [[nodiscard]] std::string other_of(const PairContactDescription& c) const {
     const bool first = group_of(c.general_body) == own_,
@@ -88,7 +95,8 @@ class SensorWarnings {
     std::set<std::string> unfelt;
     for (const PairContactDescription& c : scene_.pair_contacts) {
       const std::string other = other_of(c);
-      if (!other.empty() && !felt_.contains(group_of(other))) unfelt.insert(other);
+      if (!other.empty() && !felt_.contains(group_of(other)) && !has_a_distance(other))
+        unfelt.insert(other);
     }
     if (unfelt.empty()) return;
     add(

@@ -165,6 +165,24 @@ TEST(Interpenetration, BodiesThatCrossACubeAreTold) {
         }
 }
 
+/// A ball that goes through a wide wall near its edge, and one that goes past it.
+TEST(Interpenetration, TheEdgeOfAWallIsAThicknessWide) {
+  for (const auto& [beside, status] :
+       {std::pair{0.47, StepStatus::passed}, {0.52, StepStatus::converged}}) {
+    Scene s;
+    s.gravity = {0, 0, 0};
+    s.links = {link("wall", JointType::fixed, {0, 0, 0}, plank({1, 1, 0.02}), 1000),
+               link("ball", JointType::translational, {0, beside, 0.2}, SphereShape{0.015}, 1000)};
+    s.pair_contacts.push_back({"ball", "wall", {1, 0, 0, 0}, ContactLaw::clamped, {}, {}});
+    const Model model(s);
+    Batch batch(model, 1);
+    batch.set_state(0, q_of(batch), std::vector<double>{0, 0, -100});
+    Stepper stepper(model, testing::options(Integrator::bdf1, 5e-3));
+    stepper.step(batch, {});
+    EXPECT_EQ(batch.status(0), status) << beside << " m";
+  }
+}
+
 /// A plate that falls on its edge between points that it would lie on when flat, and a ball on a
 /// table of eight corners that is thinner than a sixteenth of its length.
 TEST(Interpenetration, ThinBodiesAreTold) {
