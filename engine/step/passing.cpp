@@ -39,8 +39,9 @@ Vec3<double> Passing::half_of(PrimitiveShape shape, const Vec3<double>& size) {
   return hull.straight + hull.round;
 }
 
-/// Returns how far from a wall's middle, along an axis of half width `half`, the middle of the other
-/// body is surely inside [m]: a body that goes past an edge keeps its own thickness away from it.
+/// Returns how far from a wall's middle, along an axis of half width `half`, the middle of the
+/// other body is surely inside [m]: a body that goes past an edge keeps its own thickness away from
+/// it.
 double Passing::within_of(const Wall& wall, double half) {
   return std::max(kWithin * half, half - wall.other_thin);
 }
