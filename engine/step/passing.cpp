@@ -41,7 +41,7 @@ Vec3<double> Passing::half_of(PrimitiveShape shape, const Vec3<double>& size) {
 
 /// Returns how far from a wall's middle, along an axis of half width `half`, the middle of the other
 /// body is surely inside [m]. What goes past the edge of a cuboid keeps its own thickness away from
-/// it. In other shapes kWithin of the widths is inside: 0.7² · 2 < 1.
+/// it. In other shapes kWithin of the widths is inside, because 2 kWithin² < 1.
 double Passing::within_of(const Wall& wall, double half) {
   if (wall.shape != PrimitiveShape::cuboid) return kWithin * half;
   return std::max(kWithin * half, half - wall.other_thin);
