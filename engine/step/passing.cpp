@@ -39,8 +39,8 @@ Vec3<double> Passing::half_of(PrimitiveShape shape, const Vec3<double>& size) {
   return hull.straight + hull.round;
 }
 
-/// Returns how far from a wall's middle, along an axis of half width `half`, the other body's middle
-/// is surely inside [m]. What goes past the edge of a cuboid keeps its own thickness away from
+/// Returns how far from a wall's middle the middle of the other body is surely inside [m], along an
+/// axis of half width `half`. What goes past the edge of a cuboid keeps its own thickness away from
 /// it. In other shapes kWithin of the widths is inside, because 2 kWithin² < 1.
 double Passing::within_of(const Wall& wall, double half) {
   if (wall.shape != PrimitiveShape::cuboid) return kWithin * half;
