@@ -39,6 +39,10 @@ struct IdentifyArguments {
 void check_arguments(const IdentifyArguments& a) {
   if (a.numbers.empty())
     throw InputError("--number is missing; expected the name of a number, as often as wanted");
+  for (const std::string& number : a.numbers)
+    if (std::ranges::count(a.numbers, number) > 1)
+      throw InputError(
+          fmt::format("--number '{}' is given twice; expected each number once", number));
   const bool trial = a.recording.empty();
   if (!trial && (a.seed || a.steps))
     throw InputError("--seed or --steps with a recording; expected them without one");

@@ -151,6 +151,7 @@ TEST(Identify, SaysWhatIsWrong) {
   const std::string ball = scene("identify_ball.xml");
   fails({"gone.xml", "--number", "tactile pad kn"}, 3, "gone.xml");
   fails({ball}, 2, "--number is missing");
+  fails({ball, "--number", "tactile pad kn", "--number", "tactile pad kn"}, 2, "is given twice");
   fails({ball, "gone.h5", "--number", "tactile pad kn"}, 3, "gone.h5");
   fails({ball, "--number", "tactile pad k"}, 2, "no number 'tactile pad k'");
   fails({ball, "--number", "tactile pad kn", "--noise", "-1"}, 2, "--noise");
