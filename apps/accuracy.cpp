@@ -81,7 +81,7 @@ int report_sweep(const AccuracySubject& subject, const Console& console, const M
   else if (svg.wanted())
     console.note("no picture: no setting has both an error and a cost");
   if (csv.wanted()) csv.write(accuracy_csv(subject, report), console);
-  int code = report.resolved && report.advice >= 0 ? kDone : kSomeFailed;
+  int code = exit_code(console, !report.resolved || report.advice < 0, report.reference.counts);
   if (report.stopped) code = signal == SIGINT ? kInterrupted : kTerminated;
   Json result = accuracy_json(subject, report, model);
   result["exit_code"] = code;

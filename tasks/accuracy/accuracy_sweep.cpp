@@ -100,6 +100,7 @@ class Sweep {
         if (others[k].stopped) return false;
       }
       describe_reference(setting, made, others);
+      report_.reference.counts = made.counts;
       if (report_.reference.environments == 0 && made.failures.empty())
         throw InputError(options_.quantity == AccuracyQuantity::tactile
                              ? "nothing to compare: every field stays zero in every environment"

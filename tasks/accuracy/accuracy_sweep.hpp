@@ -46,7 +46,8 @@ struct AccuracyPoint {
 
 struct AccuracyReference {
   AccuracySetting setting;
-  double step = 0;  ///< [s]
+  StepCounts counts;  ///< of its steps
+  double step = 0;    ///< [s]
   /// Not exceeded in 95 % of the environments: the larger of the distance to SDIRK2 at the same
   /// step and of what its distances to itself with twice and four times the step say
   /// (richardson()).

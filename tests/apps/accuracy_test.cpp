@@ -112,6 +112,25 @@ TEST(Accuracy, SaysWhyNothingIsResolved) {
   EXPECT_GT(answer.at("vibration").at("frequency"), 20);
 }
 
+/// The reference plays bodies that fall through each other as well as any scheme.
+TEST(Accuracy, FailsWhereContactsMissBodies) {
+  const Folder folder;
+  folder.write("planks.xml", R"(<tangere model="planks">
+  <option unit="m-kg" timestep="5e-3" integrator="SDIRK2"/>
+  <robot><link name="low"><joint name="low" type="fixed"/>
+    <body name="low" type="cuboid" size="0.4 0.02 0.01" density="1000"
+          general_contact_resolution="2 2 2"/></link></robot>
+  <robot><link name="high"><joint name="high" type="free3d" pos="0 0 0.02"/>
+    <body name="high" type="cuboid" size="0.02 0.4 0.01" density="1000"
+          general_contact_resolution="2 2 2"/></link></robot>
+  <contact><general_primitive_contact general_body="high" primitive_body="low" kn="1e3"
+                                      damping="10"/></contact>
+</tangere>)");
+  const Outcome r = run(folder, {"accuracy", "planks.xml", "--steps", "30", "--envs", "1"});
+  EXPECT_EQ(r.exit_code, 1);
+  EXPECT_THAT(r.err, HasSubstr("contacts missed bodies in"));
+}
+
 /// All schemes share the error of a force that holds for a step.
 TEST(Accuracy, NamesLawsOfFirstOrderAndGivesNoAdviceBelowTheirError) {
   const Folder folder;
