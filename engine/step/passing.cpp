@@ -40,11 +40,11 @@ Vec3<double> Passing::half_of(PrimitiveShape shape, const Vec3<double>& size) {
 }
 
 /// Returns how far from a wall's middle the middle of the other body is surely inside [m], along an
-/// axis of half width `half`. What goes past the edge of a cuboid keeps its own thickness away from
-/// it. In other shapes kWithin of the widths is inside, because 2 kWithin² < 1.
+/// axis of half width `half`. What goes past the edge of a cuboid keeps its own width away from it,
+/// and what is pressed into a face does not come as deep. In other shapes kWithin of the widths is inside, because 2 kWithin² < 1.
 double Passing::within_of(const Wall& wall, double half) {
   if (wall.shape != PrimitiveShape::cuboid) return kWithin * half;
-  return std::max(kWithin * half, half - wall.other_thin);
+  return std::max(kWithin * half, half - wall.other_wide);
 }
 
 /// Returns half the widths of a wall in an environment.
@@ -54,7 +54,7 @@ Vec3<double> Passing::half_in(const Wall& wall, const double* column) {
 }
 
 void Passing::add(int link, const Frame<double>& at, PrimitiveShape shape, const Vec3<double>& size,
-                  int size_row, int other, const Vec3<double>& middle, double other_thin) {
+                  int size_row, int other, const Vec3<double>& middle, double other_wide) {
   const Vec3<double> half = half_of(shape, size);
   if (!(half.x > 0 && half.y > 0 && half.z > 0)) return;  // a plane has one side
   const double thin = std::min({half.x, half.y, half.z});
@@ -62,7 +62,7 @@ void Passing::add(int link, const Frame<double>& at, PrimitiveShape shape, const
     return std::minmax(g.link, g.other) == std::minmax(link, other);
   };
   const auto gate = std::find_if(gates_.begin(), gates_.end(), same);
-  walls_.push_back({link, other, at, half, shape, size_row, middle, other_thin,
+  walls_.push_back({link, other, at, half, shape, size_row, middle, other_wide,
                     std::size_t(gate - gates_.begin())});
   if (gate == gates_.end()) {
     gates_.push_back({link, other, thin});
@@ -160,21 +160,21 @@ Passing::Passing(const CompiledModel& m) : model_(m), arm_(m.links.size(), 0.0) 
       continue;
     }
     const kernels::Solid& solid = m.solids[std::size_t(p.body1)];
-    const auto thin = [](PrimitiveShape shape, const Vec3<double>& size) {
+    const auto wide = [](PrimitiveShape shape, const Vec3<double>& size) {
       if (row_of(shape).half_widths == nullptr) return HUGE_VAL;
       const Vec3<double> half = half_of(shape, size);
-      return std::min({half.x, half.y, half.z});
+      return std::max({half.x, half.y, half.z});
     };
-    const double thin1 = thin(solid.shape, solid.size);  // its middle is not that of a skin on it
+    const double wide1 = wide(solid.shape, solid.size);  // its middle is not that of a skin on it
     add(p.link2, p.frame2, p.shape, p.size, p.size_row, p.link1,
-        thin1 < HUGE_VAL ? solid.frame.p : p.middle, thin1);
+        wide1 < HUGE_VAL ? solid.frame.p : p.middle, wide1);
     // Bodies with points of their own need not be convex. A ball has none.
     // Sizes of a part of a model that vary are taken as in the scene; only whole models are checked
     // with those of an environment.
     const int row = m.bodies.empty() ? -1 : m.bodies[std::size_t(p.body1)].size_row;
     if (solid.stretches || p.ball_radius > 0)
       add(p.link1, solid.frame, solid.shape, solid.size, row, p.link2, p.frame2.p,
-          thin(p.shape, p.size));
+          wide(p.shape, p.size));
   }
   bound_gates();
   // passed() looks at a gate once.

@@ -55,15 +55,15 @@ class Passing {
     PrimitiveShape shape;
     int size_row;                  ///< as in kernels::PairContact
     kernels::Vec3<double> middle;  ///< of the other body, in its link
-    /// Half the smallest width of the other body [m]; infinite if it is not convex, so that its
+    /// Half the largest width of the other body [m]; infinite if it is not convex, so that its
     /// middle may lie beside it.
-    double other_thin;
-    [[nodiscard]] bool other_convex() const { return other_thin < HUGE_VAL; }
+    double other_wide;
+    [[nodiscard]] bool other_convex() const { return other_wide < HUGE_VAL; }
     std::size_t gate;
   };
   void add(int link, const kernels::Frame<double>& at, PrimitiveShape shape,
            const kernels::Vec3<double>& size, int size_row, int other,
-           const kernels::Vec3<double>& middle, double other_thin);
+           const kernels::Vec3<double>& middle, double other_wide);
   [[nodiscard]] static double within_of(const Wall& wall, double half);
   [[nodiscard]] static kernels::Vec3<double> half_in(const Wall& wall, const double* column);
   template <int L>
