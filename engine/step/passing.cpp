@@ -41,7 +41,8 @@ Vec3<double> Passing::half_of(PrimitiveShape shape, const Vec3<double>& size) {
 
 /// Returns how far from a wall's middle the middle of the other body is surely inside [m], along an
 /// axis of half width `half`. What goes past the edge of a cuboid keeps its own width away from it,
-/// and what is pressed into a face does not come as deep. In other shapes kWithin of the widths is inside, because 2 kWithin² < 1.
+/// and what is pressed into a face does not come as deep. In other shapes kWithin of the widths is
+/// inside, because 2 kWithin² < 1.
 double Passing::within_of(const Wall& wall, double half) {
   if (wall.shape != PrimitiveShape::cuboid) return kWithin * half;
   return std::max(kWithin * half, half - wall.other_wide);
