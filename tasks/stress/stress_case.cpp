@@ -86,6 +86,7 @@ Cases geometry() {
       {{.name = "ball_through_pad"}});
   add(cases, {"depth of the box's middle below the ground [m]", sinks_below_ground(0), 0, 1},
       {{.name = "edge_drop"}});
+  add(cases, {"largest sink of the box [m]", largest_sink, 1e-3, 0.35}, {{.name = "seam"}});
   add(cases, {"largest shift of a finger or the rod [m]", largest_shift, 0.01, 0.2},
       {{.name = "rod_between_fingers"}});
   return cases;
