@@ -4,6 +4,7 @@
 #include "tasks/stress/stress_history.hpp"
 
 #include "engine/base/as_size.hpp"
+#include "engine/model/felt_bodies.hpp"
 #include "engine/model/shapes.hpp"
 
 namespace tangere {
@@ -25,9 +26,11 @@ Vector3 product(const std::array<double, 6>& i, const Vector3& w) {
 StressHistory::StressHistory(const Model& model, double step) : model_(model), step_(step) {
   for (int b = 0; b < bodies(); ++b) {
     const Shape& shape = scene().links[as_size(b)].body.shape;
-    if (std::holds_alternative<MeshShape>(shape))
-      throw InputError("a hard case with a mesh; expected shapes whose centre is their origin");
-    inertia_.push_back(solid_inertia(shape, mass(b)));
+    const bool mesh = std::holds_alternative<MeshShape>(shape);
+    if (mesh && moving_link(scene(), b) >= 0)
+      throw InputError(
+          "a hard case with a mesh that moves; expected shapes whose centre is their origin");
+    inertia_.push_back(mesh ? std::array<double, 6>{} : solid_inertia(shape, mass(b)));
   }
 }
 
