@@ -144,7 +144,7 @@ class Compiler {
       if (touched.grid == nullptr || !d.points.empty()) continue;
       const int general = bodies_.find("body", d.general_body, d.source);
       const double gap = contact_point_gap(m_.scene.links[std::size_t(general)].body.shape);
-      if (gap >= 2 * touched.inscribed * touched.size.x) add_coarse_pair(d);
+      if (gap > 0 && gap >= 2 * touched.inscribed * touched.size.x) add_coarse_pair(d);
     }
   }
 

@@ -218,6 +218,22 @@ void Interpenetration::bound_arms() {
   }
 }
 
+/// Returns how many times as long as in the scene an arm can be in an environment, whose sizes and
+/// places of joints may vary; infinite where a place is at the origin in the scene.
+double Interpenetration::arm_ratio(const double* column) const {
+  const auto in_lane = [&](const Vec3<double>& value, int row) {
+    return euclidean(kernels::load_vector<double>(value, row, column, 0));
+  };
+  double ratio = 1;
+  for (const CompiledBody& body : model_.bodies)
+    if (body.size_row >= 0)
+      ratio = std::max(ratio, in_lane(body.size, body.size_row) / euclidean(body.size));
+  for (const kernels::Link& link : model_.links)
+    if (link.place_row >= 0 && link.parent >= 0)
+      ratio = std::max(ratio, in_lane(link.frame.p, link.place_row) / euclidean(link.frame.p));
+  return ratio;
+}
+
 // A joint that turns by θ moves a point at distance a by no more than θ a. Of unit quaternions,
 // |q - q'| = 2 sin(θ/4) ≥ θ/π for θ ≤ π.
 template <int L>
@@ -274,7 +290,8 @@ Interpenetration::Finding Interpenetration::check(const kernels::KernelTable& ta
   Finding found;
   find_poses(model_.layout.q, w.q1, w.poses_after);
   found.clearance = passing_.clearance(w.poses_after, column);
-  if (found.clearance <= motion) {  // else nothing can have come from the other side
+  const double ratio = arm_ratio(column);
+  if (found.clearance <= ratio * motion) {  // else nothing can have come from the other side
     find_poses(model_.layout.previous_q, w.q0, w.poses_before);
     found.passed = passing_.changed_sides(w.poses_before, w.poses_after, column);
   }
@@ -291,6 +308,7 @@ Interpenetration::Finding Interpenetration::check(const kernels::KernelTable& ta
     const double missing = overlap.sure ? threshold - overlap.most : 0.25 * threshold;
     found.clearance = std::min(found.clearance, std::max(missing, 0.0));
   }
+  found.clearance /= ratio;
   return found;
 }
 

@@ -50,6 +50,7 @@ class Interpenetration {
   class Lane;
 
   void bound_arms();
+  [[nodiscard]] double arm_ratio(const double* column) const;
 
   const CompiledModel& model_;
   Passing passing_;

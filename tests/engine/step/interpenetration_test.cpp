@@ -230,6 +230,37 @@ TEST(Interpenetration, SizesThatVaryCount) {
   EXPECT_LT(q_of(batch)[1], -0.09);
 }
 
+/// An arm that is six times as long as in the scene sweeps through a post with its end, which moves
+/// farther than arms of the scene's size would.
+TEST(Interpenetration, MotionsAreThoseOfSizesThatVary) {
+  Scene s;
+  s.gravity = {0, 0, 0};
+  s.links = {link("arm", JointType::revolute, {0, 0, 0}, plank({0.1, 0.01, 0.01}), 1000),
+             link("post", JointType::fixed, {0.2, 0.1, 0}, plank({0.02, 0.02, 0.2}), 1000)};
+  s.links[0].joint.axis0 = {0, 0, 1};
+  s.pair_contacts.push_back({"post", "arm", {1, 0, 0, 0}, ContactLaw::clamped, {}, {}});
+  s.randomizations.push_back(
+      {{NumberOwner::body, NumberField::size, "arm"}, {Distribution::Kind::list, 0, 0, {0.6}}, {}});
+  const Model model(s);
+  const auto play = [&](bool always) {
+    Batch batch(model, 1);
+    batch.set_state(0, q_of(batch), std::vector<double>{2});
+    Stepper stepper(model, testing::options(Integrator::bdf1, 2e-3));
+    std::vector<StepStatus> statuses;
+    for (int t = 0; t < 300; ++t) {
+      if (always) batch.restore_block(0, batch.save_block(0));
+      stepper.step(batch, {});
+      statuses.push_back(batch.status(0));
+    }
+    return statuses;
+  };
+  const std::vector<StepStatus> checked = play(true);
+  EXPECT_EQ(play(false), checked);
+  EXPECT_GE(std::ranges::count_if(
+                checked, [](StepStatus status) { return status != StepStatus::converged; }),
+            1);
+}
+
 /// What bodies have moved since the last check decides whether there is one. The statuses are those
 /// of checks after every step: restoring a block makes the next one due.
 TEST(Interpenetration, NoStepIsLeftOutThatACheckWouldTell) {
