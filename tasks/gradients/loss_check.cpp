@@ -13,8 +13,9 @@
 #include "engine/derivative/tangent.hpp"
 #include "engine/model/scene_number.hpp"
 #include "engine/sense/readout.hpp"
-#include "tasks/gradients/loss_block.hpp"
+#include "tasks/gradients/gradient_compare.hpp"
 #include "tasks/gradients/run_trace.hpp"
+#include "tasks/gradients/scene_block.hpp"
 
 namespace tangere {
 namespace {
@@ -27,7 +28,7 @@ struct Setting {
 
   [[nodiscard]] std::span<const double> u(const CheckInputs& of, std::int64_t step) const {
     const auto nu = std::size_t(start.model().nu());
-    if (step == options.steps) return {};
+    if (step == options.length) return {};
     return std::span(of.u).subspan(std::size_t(step) * nu, nu);
   }
 };
@@ -47,7 +48,7 @@ class Look {
             std::span<const double> u) {
     if (s.loss.reads_fields(step))
       for (auto& frame : frames_) readout_.read(batch, e, *frame);
-    return reading_.evaluate(s.loss, batch, readout_, e, step, s.options.steps, u);
+    return reading_.evaluate(s.loss, batch, readout_, e, step, s.options.length, u);
   }
   [[nodiscard]] const LossReading& reading() const { return reading_; }
   [[nodiscard]] Readout& readout() { return readout_; }
@@ -80,14 +81,14 @@ std::vector<double> losses_of(const Setting& s, const Model& model,
   Stepper stepper(model, s.options.stepper);
   Look look(model);
   std::vector<double> sums(inputs.size()), u(inputs.size() * nu);
-  for (std::int64_t t = 0; t <= s.options.steps; ++t) {
+  for (std::int64_t t = 0; t <= s.options.length; ++t) {
     for (std::size_t e = 0; e < inputs.size(); ++e) {
       const std::span<const double> own = s.u(inputs[e], t);
       sums[e] += look.at(s, batch, static_cast<int>(e), t, own);
       std::copy(own.begin(), own.end(), u.begin() + std::ptrdiff_t(e * nu));
     }
     if (trace != nullptr) trace->add(batch);
-    if (t < s.options.steps) stepper.step(batch, u);
+    if (t < s.options.length) stepper.step(batch, u);
   }
   for (std::size_t e = 0; e < inputs.size(); ++e)
     if (failed(batch.status(static_cast<int>(e)))) sums[e] = NAN;
@@ -138,11 +139,11 @@ class Directions {
     const Model& model = s.start.model();
     Batch batch = s.start;
     Stepper stepper(model, s.options.stepper);
-    tape_.emplace(model, stepper.integrator(), s.options.steps);
+    tape_.emplace(model, stepper.integrator(), s.options.length);
     tape_->start(batch, 0);
     const auto nu = std::size_t(model.nu());
     std::vector<double> u(std::size_t(batch.environments()) * nu);
-    for (std::int64_t t = 0; t < s.options.steps; ++t) {
+    for (std::int64_t t = 0; t < s.options.length; ++t) {
       const std::span<const double> own = s.u(s.at, t);
       for (int e = 0; e < batch.environments(); ++e)
         std::copy(own.begin(), own.end(), u.begin() + std::ptrdiff_t(std::size_t(e) * nu));
@@ -166,13 +167,13 @@ class Directions {
     Batch batch = s_.start;
     Look look(model);
     double sum = 0;
-    for (std::int64_t t = 0; t <= s_.options.steps; ++t) {
-      const std::span<const double> u_dot = d.u.empty() || t == s_.options.steps
+    for (std::int64_t t = 0; t <= s_.options.length; ++t) {
+      const std::span<const double> u_dot = d.u.empty() || t == s_.options.length
                                                 ? std::span<const double>(no_u)
                                                 : d.u.subspan(std::size_t(t) * nu, nu);
       tape_->show(t, batch, 0);
       sum += change_at(batch, look, tangent, t, state, u_dot, d.numbers, points);
-      if (t == s_.options.steps) break;
+      if (t == s_.options.length) break;
       tangent.step(batch, 0, 0, *tape_, t, s_.u(s_.at, t), u_dot, d.numbers, state);
     }
     return sum;
@@ -230,16 +231,16 @@ Setting setting_of(const Batch& start, const StepControls& controls, const Rollo
             loss,
             options,
             {numbers(model.nq()), numbers(model.nv()),
-             std::vector<double>(std::size_t(options.steps) * nu)}};
+             std::vector<double>(std::size_t(options.length) * nu)}};
   start.get_q(0, s.at.q);
   start.get_v(0, s.at.v);
-  for (std::int64_t t = 0; t < options.steps; ++t)
+  for (std::int64_t t = 0; t < options.length; ++t)
     controls(t, 0, std::span(s.at.u).subspan(std::size_t(t) * nu, nu));
   return s;
 }
 
 bool reads_fields(const RolloutLoss& loss, const CheckOptions& options) {
-  for (std::int64_t t = 0; t <= options.steps; ++t)
+  for (std::int64_t t = 0; t <= options.length; ++t)
     if (loss.reads_fields(t)) return true;
   return false;
 }
@@ -257,8 +258,8 @@ bool checks_points(const Model& model, const RolloutLoss& loss, const CheckOptio
 
 LossGradient gradient_of(const Batch& start, const StepControls& controls, const RolloutLoss& loss,
                          const CheckOptions& options) {
-  GradientOptions wanted;
-  wanted.steps = options.steps;
+  TapeOptions wanted;
+  wanted.length = options.length;
   wanted.stepper = options.stepper;
   wanted.parameters = true;
   wanted.points = checks_points(start.model(), loss, options);
@@ -281,6 +282,7 @@ class LossChecker : public GradientChecker {
     by_v_ = first(g.v, s.at.v.size());
     by_numbers_ = first(g.parameters, std::size_t(parameters_.count()));
     out_.loss = g.value[0];
+    out_.length = s.options.length;
   }
 
   /// Checks by positions and coefficients of all points of a sensor at once.
