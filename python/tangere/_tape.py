@@ -38,7 +38,8 @@ class TapeBase:
         """Rows (E, n) by key, each (E, …), or as they are with `flatten`."""
         if self.flatten:
             return rows
-        parts, first = {}, 0
+        parts: dict[str, Any] = {}
+        first = 0
         for t in self.spec.observations:
             last = first + int(np.prod(t.shape))
             parts[t.name] = rows[:, first:last].reshape(self.num_envs, *t.shape)

@@ -35,31 +35,16 @@ struct Setting {
 
 std::vector<double> numbers(int n) { return std::vector<double>(std::size_t(n)); }
 
-/// Reads a loss at the current state of one environment, fields included.
-class Look {
- public:
-  explicit Look(const Model& model) : readout_(model), reading_(model) {
-    for (std::size_t k = 0; k < model.sensors().size(); ++k) {
-      frames_.push_back(std::make_unique<CompactFrame<double>>(model, static_cast<int>(k)));
-      reading_.set_field(k, *frames_.back());
-    }
-  }
+/// A loss at the current state of one environment.
+struct Look {
+  explicit Look(const Model& model) : readout(model), reading(model) {}
   double at(const Setting& s, const Batch& batch, int e, std::int64_t step,
             std::span<const double> u) {
-    if (s.loss.reads_fields(step))
-      for (auto& frame : frames_) readout_.read(batch, e, *frame);
-    return reading_.evaluate(s.loss, batch, readout_, e, step, s.options.length, u);
+    if (s.loss.reads_fields(step)) reading.read_fields(batch, readout, e);
+    return reading.evaluate(s.loss, batch, readout, e, step, s.options.length, u);
   }
-  [[nodiscard]] const LossReading& reading() const { return reading_; }
-  [[nodiscard]] Readout& readout() { return readout_; }
-  [[nodiscard]] const CompactFrame<double>& frame(std::size_t sensor) const {
-    return *frames_[sensor];
-  }
-
- private:
-  Readout readout_;
-  LossReading reading_;
-  std::vector<std::unique_ptr<CompactFrame<double>>> frames_;
+  Readout readout;
+  LossReading reading;
 };
 
 /// Returns the loss of each of `inputs`, as environments of one batch; NaN where a step finds no
@@ -186,21 +171,21 @@ class Directions {
                    std::span<const double> rows, const std::vector<std::vector<double>>& points) {
     const Model& model = batch.model();
     look.at(s_, batch, 0, t, s_.u(s_.at, t));
-    const LossReading& bar = look.reading();
+    const LossReading& bar = look.reading;
     double sum = 0;
     for (std::size_t i = 0; i < state.q.size(); ++i)
       sum += bar.q_bar()[i] * state.q[i] + bar.v_bar()[i] * state.v[i];
     for (std::size_t i = 0; i < u_dot.size(); ++i) sum += bar.u_bar()[i] * u_dot[i];
     for (std::size_t k = 0; k < model.sensors().size() && s_.loss.reads_fields(t); ++k) {
-      std::vector<double> change(look.frame(k).dense_size()), of_tiles(change.size());
+      std::vector<double> change(bar.field(k).dense_size()), of_tiles(change.size());
       tangent.field(batch, 0, 0, *tape_, t, static_cast<int>(k), rows,
                     points.empty() ? std::span<const double>{} : points[k], state, change);
       // The cotangents have the layout of the tiles. Spread them as the frame spreads its values.
-      look.frame(k).spread(bar.field_bar(k), of_tiles);
+      bar.field(k).spread(bar.field_bar(k), of_tiles);
       sum += std::inner_product(change.begin(), change.end(), of_tiles.begin(), 0.0);
     }
     if (s_.loss.reads_end_effectors(t))
-      sum += along_end_effectors(batch, look.readout(), bar.end_effectors_bar(), state);
+      sum += along_end_effectors(batch, look.readout, bar.end_effectors_bar(), state);
     return sum;
   }
 

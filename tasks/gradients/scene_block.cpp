@@ -39,6 +39,15 @@ LossReading::LossReading(const Model& model)
       field_bars_(fields_.size()),
       field_spans_(fields_.size()) {}
 
+void LossReading::read_fields(const Batch& batch, Readout& readout, int environment) {
+  for (std::size_t s = 0; s < fields_.size(); ++s) {
+    if (own_.size() == s)
+      own_.push_back(std::make_unique<CompactFrame<double>>(batch.model(), static_cast<int>(s)));
+    readout.read(batch, environment, *own_[s]);
+    fields_[s] = own_[s].get();
+  }
+}
+
 double LossReading::evaluate(const RolloutLoss& loss, const Batch& batch, Readout& readout,
                              int environment, std::int64_t step, std::int64_t steps,
                              std::span<const double> u) {

@@ -3,6 +3,7 @@
 // state, the readings and the controls enter there.
 #pragma once
 
+#include <memory>
 #include <vector>
 
 #include "engine/derivative/loss.hpp"
@@ -23,6 +24,11 @@ class LossReading {
   void set_field(std::size_t sensor, const CompactFrame<double>& frame) {
     fields_[sensor] = &frame;
   }
+  /// Reads an environment's fields and sets them.
+  void read_fields(const Batch& batch, Readout& readout, int environment);
+  [[nodiscard]] const CompactFrame<double>& field(std::size_t sensor) const {
+    return *fields_[sensor];
+  }
   /// Reads the rest and evaluates. `u`: controls of the step that follows; empty after the last.
   double evaluate(const RolloutLoss& loss, const Batch& batch, Readout& readout, int environment,
                   std::int64_t step, std::int64_t steps, std::span<const double> u);
@@ -41,8 +47,9 @@ class LossReading {
 
  private:
   std::vector<double> q_, v_, end_effectors_, q_bar_, v_bar_, u_bar_, end_effectors_bar_;
-  std::vector<const CompactFrame<double>*> fields_;  // (sensors)
-  std::vector<std::vector<double>> field_bars_;      // (sensors)
+  std::vector<const CompactFrame<double>*> fields_;         // (sensors)
+  std::vector<std::unique_ptr<CompactFrame<double>>> own_;  // (sensors), if read_fields was called
+  std::vector<std::vector<double>> field_bars_;             // (sensors)
   std::vector<std::span<double>> field_spans_;
 };
 
