@@ -6,48 +6,14 @@
 #include <memory>
 #include <span>
 #include <stop_token>
-#include <vector>
 
 #include "engine/derivative/loss.hpp"
 #include "engine/rows/episode_sink.hpp"
 #include "engine/step/batch.hpp"
 #include "tasks/gradients/tape_options.hpp"
 #include "tasks/gradients/task_rollout.hpp"
-#include "tasks/run/step_tally.hpp"
 
 namespace tangere {
-
-/// Gradient of one loss or of the return, for every environment or episode. An environment that
-/// fails contributes its states until then and stands still afterwards.
-struct LossGradient {
-  std::vector<double> value;       ///< (E)
-  std::vector<double> u;           ///< (E, steps, nu) by controls; of a task (E, A, action)
-  std::vector<double> q, v;        ///< (E, nv) by the initial state; q along the dofs of v
-  std::vector<double> parameters;  ///< (E, NumberGradients::count()) or empty
-  std::vector<double> points;      ///< (E, tactile_points(model), kPointNumbers) or empty
-};
-
-/// How the rollouts or episodes went.
-struct GradientCounts {
-  /// In the order of environments. For a task: in the order of its episodes; steps count actions,
-  /// and -1 is the reset.
-  std::vector<FailedEnvironment> failures;
-  std::int64_t newton_iterations = 0;
-  std::int64_t recomputed_steps = 0;  ///< from checkpoints, counted by block
-  bool stopped = false;               ///< before the end: gradients are incomplete
-};
-
-struct GradientSummary : GradientCounts {
-  std::vector<LossGradient> losses;
-};
-
-/// The value is the sum of rewards until the end. A derivative by a component of an action beyond
-/// its bounds is 0. The initial state is that at the first action: the reset (settling, an opening)
-/// and all random draws count as given.
-struct TaskGradients : GradientCounts, LossGradient {
-  std::vector<std::int64_t> length;  ///< (E) actions until the end
-  std::vector<double> action;        ///< (E, A, action) as chosen; zeros after the end
-};
 
 /// Owns the threads and their scratch. Use it for many rollouts of one model, as in a descent.
 class GradientRollouts {

@@ -35,9 +35,9 @@ class RowChain {
   std::vector<double> now_, before_, next_;  // (2 nv, columns)
 };
 
-/// Derivatives of what a task writes where an action begins, a row for each number, by (q, v, action,
-/// memory) of `view`: of the controls from `step` on, of the state after a restart, and of the
-/// memory after begin_action.
+/// Derivatives of what a task writes where an action begins, a row for each number, by (q, v,
+/// action, memory) of `view`: of the controls from `step` on, of the state after a restart, and of
+/// the memory after begin_action.
 std::vector<double> control_rows(const Task& task, const TaskView& view, int step);
 std::vector<double> restart_rows(const Task& task, const TaskView& view);
 std::vector<double> memory_rows(const Task& task, const TaskView& view);

@@ -8,7 +8,6 @@
 
 #include "engine/derivative/loss.hpp"
 #include "engine/sense/readout.hpp"
-#include "tasks/gradients/gradients.hpp"
 #include "tasks/gradients/tape_block.hpp"
 
 namespace tangere {

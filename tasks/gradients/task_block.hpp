@@ -7,7 +7,7 @@
 #include <array>
 #include <vector>
 
-#include "tasks/gradients/gradients.hpp"
+#include "engine/rows/episode_sink.hpp"
 #include "tasks/gradients/tape_block.hpp"
 #include "tasks/gradients/task_rollout.hpp"
 

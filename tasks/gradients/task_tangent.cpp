@@ -120,7 +120,8 @@ TaskView TaskTangent::start_view() {
   return view;
 }
 
-/// Products of `rows` with the changes of the state, the action and the memory at an action's start.
+/// Products of `rows` with the changes of the state, the action and the memory where an action
+/// begins.
 std::vector<double> TaskTangent::times(const std::vector<double>& rows,
                                        const StateTangent& start) const {
   std::vector<double> change;
