@@ -122,7 +122,9 @@ TEST(FixedEpisodes, OfATaskReplayItsControls) {
 TEST(FixedEpisodes, StopAndRefuseWhatIsTooLong) {
   const auto task = testing::task_named("box_pushing");
   const Policy policy(*task, PolicyKind::scripted);
-  EXPECT_FALSE(task_episodes(Batch(task->model(), 1, 1), *task, policy, 5, [] { return false; }));
+  std::stop_source source;
+  source.request_stop();
+  EXPECT_FALSE(task_episodes(Batch(task->model(), 1, 1), *task, policy, 5, source.get_token()));
   const Batch start(pressed_ball(), 1, 3);
   const ControlProgram controls(pressed_ball(), pressed_ball().timestep(), 3);
   EXPECT_THROW(scene_episodes(start, controls, 1'000'000'000'000, 5), InputError);

@@ -45,11 +45,11 @@ TEST(EpisodeLimits, AsManyBlocksAreInFlightAsTheLimitSays) {
   for (const int limit : {1, 2, 4}) {
     EpisodeOptions o = options(2);
     o.blocks_in_flight = limit;
-    o.piece_bytes = kWhole;  // a block is one piece: every step is asked for once per block
-    std::atomic<std::int64_t> asked = 0;
-    SlowSink sink(asked, std::int64_t{limit} * kSteps);
-    const EpisodeSummary summary = run(small_ball(), o, sink, [&] { return ++asked, false; });
-    EXPECT_EQ(sink.seen, std::int64_t{limit} * kSteps);
+    o.piece_bytes = kWhole;  // a block is one piece: every row is counted once per block
+    std::atomic<std::int64_t> rows = 0;
+    SlowSink sink(rows, std::int64_t{limit} * kRows);
+    const EpisodeSummary summary = run(small_ball(), o, sink, [&](std::int64_t) { ++rows; });
+    EXPECT_EQ(sink.seen, std::int64_t{limit} * kRows);
     EXPECT_EQ(summary.peak_blocks_in_flight, limit);
     EXPECT_EQ(summary.episodes, kEpisodes);
   }
