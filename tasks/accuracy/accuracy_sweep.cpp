@@ -69,7 +69,7 @@ class Sweep {
     if (!find_reference()) return stop();
     if (!report_.resolved) look_for_vibration();
     if (report_.reference.environments == 0) return std::move(report_);  // the reference failed
-    if (!measure_points() || !look_again()) return stop();
+    if (!measure_points() || !recompute_snapshots()) return stop();
     measure_orders();
     choose();
     if (!measure_own() || !measure_tolerances() || !measure_pitches()) return stop();
@@ -264,7 +264,7 @@ class Sweep {
   /// Steps as long as the controls allow, cut into parts that keep an accuracy.
   bool measure_cut_steps() {
     const auto parts = std::ranges::find_if(kParts, [&](int n) { return episodes_.can_cut(n); });
-    AccuracySetting setting{keeping_accuracy(Integrator::usual, kAccuracies[0]),
+    AccuracySetting setting{keeping_accuracy(Integrator::default_integrator, kAccuracies[0]),
                             parts == kParts.end() ? episodes_.every : *parts};
     for (const double accuracy : kAccuracies) {
       setting.accuracy = accuracy;
@@ -296,7 +296,7 @@ class Sweep {
 
   /// A few environments can be much worse than the rest, and the bound of 64 takes the worst of
   /// them. More environments bound the same quantile by a smaller error.
-  bool look_again() {
+  bool recompute_snapshots() {
     const std::vector<std::size_t> candidates = worth_a_look();
     if (!report_.resolved || !fresh_ || candidates.empty()) return true;
     const std::optional<FixedEpisodes> episodes = fresh_();

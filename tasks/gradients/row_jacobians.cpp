@@ -35,11 +35,11 @@ std::span<const double> of_lane(const std::vector<double>& all, int lane) {
 template <class Reverse>
 std::vector<double> reversed_rows(const Task& task, std::size_t count, const Reverse& reverse) {
   const std::size_t nv = as_size(task.model().nv()), width = task.spec().action.size(),
-                    columns = 2 * nv + width + as_size(task.spec().memory);
+                    columns = 2 * nv + width + as_size(task.spec().task_state);
   std::vector<double> rows(count * columns), weight(count);
   for (std::size_t k = 0; k < count; ++k) {
     const std::span<double> row = std::span(rows).subspan(k * columns, columns);
-    const MomentCotangent moment{row.first(nv), row.subspan(nv, nv), {}, {}};
+    const SnapshotCotangent moment{row.first(nv), row.subspan(nv, nv), {}, {}};
     weight[k] = 1;
     reverse(weight,
             ViewCotangent{{&moment, 1}, row.subspan(2 * nv, width), row.subspan(2 * nv + width)});
@@ -107,15 +107,15 @@ std::vector<double> control_rows(const Task& task, const TaskView& view, int ste
 std::vector<double> restart_rows(const Task& task, const TaskView& view) {
   const std::size_t nv = as_size(task.model().nv());
   return reversed_rows(task, 2 * nv, [&](std::span<const double> weight, const auto& out) {
-    task.place_vjp(view, weight.first(nv), weight.subspan(nv), out);
+    task.restart_state_vjp(view, weight.first(nv), weight.subspan(nv), out);
   });
 }
 
 std::vector<double> memory_rows(const Task& task, const TaskView& view) {
-  return reversed_rows(task, as_size(task.spec().memory),
+  return reversed_rows(task, as_size(task.spec().task_state),
                        [&](const auto& weight, const ViewCotangent& out) {
-                         std::copy(weight.begin(), weight.end(), out.memory.begin());
-                         task.begin_action_vjp(view, out.memory, {out.moments, out.action});
+                         std::copy(weight.begin(), weight.end(), out.task_state.begin());
+                         task.begin_action_vjp(view, out.task_state, {out.snapshots, out.action});
                        });
 }
 
@@ -124,7 +124,7 @@ ActionJacobians::ActionJacobians(const Task& task, const StepperOptions& options
       steps_(task.model(), options),
       state_(2 * as_size(task.model().nv())),
       width_(task.spec().action.size()),
-      memory_(as_size(task.spec().memory)),
+      memory_(as_size(task.spec().task_state)),
       chains_(kBlock, RowChain(task.model().nv(), width_ + memory_)),
       controls_(kBlock,
                 std::vector<double>(as_size(task.model().nu()) * (state_ + width_ + memory_))),
@@ -137,13 +137,13 @@ void ActionJacobians::evaluate(TaskRollout& rollout, const ActionRecord& r, std:
   StepJacobian step;
   for (int t = 0; t < spec.steps_per_action; ++t) {
     if (t % spec.control_every == 0) {
-      rollout.ask_again(r, action, t, tape);
+      rollout.recompute_controls(r, action, t, tape);
       for (int l = 0; l < rollout.lanes(); ++l) {
         std::ranges::fill(controls_[as_size(l)], 0.0);
         if (!r.taken[as_size(l)]) continue;
-        const Moment first = rollout.first_moment(tape, l);
-        controls_[as_size(l)] =
-            control_rows(task_, rollout.view(r, action, l, of_lane(r.memory, l), {&first, 1}), t);
+        const Snapshot first = rollout.first_moment(tape, l);
+        controls_[as_size(l)] = control_rows(
+            task_, rollout.view(r, action, l, of_lane(r.task_state, l), {&first, 1}), t);
       }
     }
     steps_.evaluate(rollout.batch(), 0, tape, t, rollout.u());
@@ -174,7 +174,7 @@ void ActionJacobians::compose(TaskRollout& rollout, const ActionRecord& r, std::
                 row(by_memory, i, memory_).begin());
   }
   if (!r.taken[as_size(lane)]) return;
-  const Moment seen{of_lane(r.q, lane), of_lane(r.v, lane), {}, {}};
+  const Snapshot seen{of_lane(r.q, lane), of_lane(r.v, lane), {}, {}};
   std::vector<double> rows;
   // Adds a number of each row, `by`, times row k of `rows`.
   const auto add_row = [&](std::size_t i, std::size_t k, double by) {
@@ -186,7 +186,8 @@ void ActionJacobians::compose(TaskRollout& rollout, const ActionRecord& r, std::
   if (task_.spec().restarts) {
     std::fill(out.state.begin(), out.state.end(), 0.0);
     std::fill(out.previous.begin(), out.previous.end(), 0.0);
-    rows = restart_rows(task_, rollout.view(r, action, lane, of_lane(r.memory, lane), {&seen, 1}));
+    rows =
+        restart_rows(task_, rollout.view(r, action, lane, of_lane(r.task_state, lane), {&seen, 1}));
     for (std::size_t k = 0; k < state_; ++k)
       for (std::size_t i = 0; i < state_; ++i) add_row(i, k, chain.state[i * state_ + k]);
   }
@@ -197,7 +198,7 @@ void ActionJacobians::compose(TaskRollout& rollout, const ActionRecord& r, std::
     for (std::size_t i = 0; i < state_; ++i) add_row(i, k, kept[i * memory_ + k]);
   const TensorSpec& spec = task_.spec().action;
   for (std::size_t k = 0; k < width_; ++k) {
-    const double asked = of_lane(r.asked, lane)[k];
+    const double asked = of_lane(r.chosen, lane)[k];
     for (std::size_t i = 0; i < state_ && (asked < spec.low || asked > spec.high); ++i)
       out.others[i * width_ + k] = 0;
   }

@@ -76,28 +76,28 @@ TaskBlock::TaskBlock(const Task& task, const TapeOptions& options, std::int64_t 
       options_(options),
       rollout_(task, options.stepper, options.precision),
       records_(as_size(options.length), ActionRecord(task)),
-      to_moments_(task.spec().moments.size()),
+      to_moments_(task.spec().snapshots.size()),
       start_q_(lane_rows(as_size(task.model().nv()))),
       start_v_(start_q_),
       by_u_(lane_rows(as_size(task.model().nu()))),
       by_action_(lane_rows(task.spec().action.size())),
-      by_memory_(lane_rows(as_size(task.spec().memory))),
+      by_memory_(lane_rows(as_size(task.spec().task_state))),
       shown_(lane_rows(task.spec().observation_size())),
       shown_q_(start_q_),
       shown_v_(start_q_),
       by_reward_(kBlock) {
-  if (task_.spec().looks_at_tactile) check_has_no_memory(task_.model());
+  if (task_.spec().reads_tactile) check_has_no_lag(task_.model());
   const auto end_effectors = lane_rows(task.end_effectors_size()),
              tactile = lane_rows(task.tactile_size());
   moments_.assign(to_moments_.size(), {start_q_, start_v_, end_effectors, tactile});
-  if (task_.spec().opening)
+  if (task_.spec().warm_up)
     opening_.assign(moments_.size() - 1,
                     {lane_rows(as_size(task.model().nq())), start_v_, end_effectors, tactile});
 }
 
 double TaskBlock::bytes(const Task& task, const TapeOptions& o, std::int64_t blocks) {
   // Cotangents of moments, and what an opening has shown, take as much as moments.
-  const double moments = (task.spec().opening ? 3 : 2) * BlockWorker::bytes(task);
+  const double moments = (task.spec().warm_up ? 3 : 2) * BlockWorker::bytes(task);
   return std::min(double(blocks) * bytes_with(task, o, o.length), o.tape_bytes) +
          double(blocks) * (moments + 2 * double(Stepper::workspace_bytes(task.model())));
 }
@@ -109,8 +109,8 @@ void TaskBlock::start(std::uint64_t seed, EpisodeRange episodes) {
   start_forward();
   took_.fill(false);
   for (int l = 0; l < lanes(); ++l) {
-    start_memory_[as_size(l)] = rollout_.batch().memory(l);
-    const std::span<const Moment> seen = rollout_.start_view(l).moments;
+    start_memory_[as_size(l)] = rollout_.batch().shear_state(l);
+    const std::span<const Snapshot> seen = rollout_.start_view(l).snapshots;
     for (std::size_t m = 0; m < opening_.size(); ++m) {
       const auto keep = [l](std::span<const double> from, std::vector<double>& to) {
         std::copy(from.begin(), from.end(), part(to, l).begin());
@@ -125,7 +125,7 @@ void TaskBlock::start(std::uint64_t seed, EpisodeRange episodes) {
 
 void TaskBlock::displace(int lane, std::span<const double> q, std::span<const double> v) {
   rollout_.displace(lane, q, v);
-  rollout_.look_at_start();
+  rollout_.record_start();
   rollout_.observe_start(lane);
 }
 
@@ -133,7 +133,7 @@ void TaskBlock::step(std::span<const double> actions) {
   took_.fill(false);
   if (!rollout_.running()) return;
   ActionRecord& r = records_[as_size(taken_)];
-  std::copy(actions.begin(), actions.end(), r.asked.begin());
+  std::copy(actions.begin(), actions.end(), r.chosen.begin());
   take(r);
 }
 
@@ -149,7 +149,7 @@ void TaskBlock::take_steps(std::int64_t, BlockTape* tape) {
 }
 
 void TaskBlock::retake_steps(std::int64_t action, bool from_checkpoint, BlockTape& tape) {
-  if (!from_checkpoint) rollout_.place_again(records_[as_size(action)], action);
+  if (!from_checkpoint) rollout_.recompute_restart(records_[as_size(action)], action);
   rollout_.retake_steps(records_[as_size(action)], action, tape);
 }
 
@@ -177,7 +177,7 @@ void TaskBlock::reverse(std::int64_t action, const ActionCotangents& by,
   for (int l = 0; l < lanes(); ++l) {
     if (!r.taken[as_size(l)]) continue;
     for (std::size_t k = 0; k < spec.size(); ++k) {
-      const double asked = part(r.asked, l)[k];
+      const double asked = part(r.chosen, l)[k];
       if (asked >= spec.low && asked <= spec.high)
         by_action[as_size(l) * spec.size() + k] = part(by_action_, l)[k];
     }
@@ -190,10 +190,10 @@ void TaskBlock::reverse(std::int64_t action, const ActionCotangents& by,
 /// was chosen.
 void TaskBlock::reverse_steps(std::int64_t action, const BlockTape& tape) {
   const ActionRecord& r = records_[as_size(action)];
-  const std::vector<int>& looks = task_.spec().moments;
+  const std::vector<int>& looks = task_.spec().snapshots;
   const int every = task_.spec().control_every;
   clear({&start_q_, &start_v_, &by_u_, &by_action_});
-  rollout_.look_again(tape);
+  rollout_.recompute_snapshots(tape);
   reverse_outcome(r, action);
   std::size_t next = looks.size();
   for (int t = task_.spec().steps_per_action; t > 0; --t) {
@@ -202,7 +202,7 @@ void TaskBlock::reverse_steps(std::int64_t action, const BlockTape& tape) {
       add_moment(--next);
     }
     if (t % every == 0 || t == task_.spec().steps_per_action)
-      rollout_.ask_again(r, action, (t - 1) / every * every, tape);
+      rollout_.recompute_controls(r, action, (t - 1) / every * every, tape);
     adjoint_.reverse_step(rollout_.batch(), 0, tape, t - 1, rollout_.u());
     for (int l = 0; l < lanes(); ++l) {
       const std::span<double> by_u = part(by_u_, l);
@@ -220,7 +220,8 @@ void TaskBlock::reverse_outcome(const ActionRecord& r, std::int64_t action) {
   clear_moments();
   for (int l = 0; l < lanes(); ++l) {
     if (!r.taken[as_size(l)]) continue;
-    const TaskView view = rollout_.view(r, action + 1, l, part(r.memory, l), rollout_.moments(l));
+    const TaskView view =
+        rollout_.view(r, action + 1, l, part(r.task_state, l), rollout_.snapshots(l));
     const ViewCotangent to{cotangents(l), part(by_action_, l), part(by_memory_, l)};
     const double weight = by_reward_[as_size(l)];
     if (weight != 0) task_.reward_vjp(view, weight, to);
@@ -238,7 +239,7 @@ void TaskBlock::reverse_shown(const TaskView& view, int lane, const ViewCotangen
   const std::span<const double> weight = part(shown_, lane);
   if (std::any_of(weight.begin(), weight.end(), [](double w) { return w != 0; }))
     task_.observe_vjp(view, weight, to);
-  const MomentCotangent& now = to.moments.back();
+  const SnapshotCotangent& now = to.snapshots.back();
   for (std::size_t i = 0; i < now.q.size(); ++i) {
     now.q[i] += part(shown_q_, lane)[i];
     now.v[i] += part(shown_v_, lane)[i];
@@ -282,9 +283,9 @@ void TaskBlock::reverse_controls(const ActionRecord& r, std::int64_t action, int
                                  const BlockTape& tape) {
   for (int l = 0; l < lanes(); ++l) {
     if (!r.taken[as_size(l)]) continue;
-    const Moment first = rollout_.first_moment(tape, l);
-    const MomentCotangent to{part(start_q_, l), part(start_v_, l), {}, {}};
-    task_.controls_vjp(rollout_.view(r, action, l, part(r.memory, l), {&first, 1}), step,
+    const Snapshot first = rollout_.first_moment(tape, l);
+    const SnapshotCotangent to{part(start_q_, l), part(start_v_, l), {}, {}};
+    task_.controls_vjp(rollout_.view(r, action, l, part(r.task_state, l), {&first, 1}), step,
                        part(by_u_, l), {{&to, 1}, part(by_action_, l), part(by_memory_, l)});
   }
   std::fill(by_u_.begin(), by_u_.end(), 0.0);
@@ -303,7 +304,7 @@ void TaskBlock::reverse_start(const ActionRecord& r, std::int64_t action) {
     const std::span<double> q = part(start_q_, l), v = part(start_v_, l),
                             memory = part(by_memory_, l);
     const std::span<double> by_action = part(by_action_, l);
-    const Moment seen{part(r.q, l), part(r.v, l), {}, {}};
+    const Snapshot seen{part(r.q, l), part(r.v, l), {}, {}};
     if (task_.spec().restarts) {
       std::vector<double> placed_q(q.begin(), q.end()), placed_v(v.begin(), v.end());
       for (std::size_t i = 0; i < nv; ++i) {
@@ -311,12 +312,12 @@ void TaskBlock::reverse_start(const ActionRecord& r, std::int64_t action) {
         placed_v[i] += at(c.v, i);
         q[i] = v[i] = at(c.q, i) = at(c.v, i) = at(c.previous_q, i) = at(c.previous_v, i) = 0;
       }
-      c.memory[as_size(l)].clear();  // friction remembers nothing of before
-      const MomentCotangent to{q, v, {}, {}};
-      task_.place_vjp(rollout_.view(r, action, l, part(r.memory, l), {&seen, 1}), placed_q,
-                      placed_v, {{&to, 1}, by_action, memory});
+      c.shear[as_size(l)].clear();  // friction remembers nothing of before
+      const SnapshotCotangent to{q, v, {}, {}};
+      task_.restart_state_vjp(rollout_.view(r, action, l, part(r.task_state, l), {&seen, 1}),
+                              placed_q, placed_v, {{&to, 1}, by_action, memory});
     }
-    const MomentCotangent to{q, v, {}, {}};
+    const SnapshotCotangent to{q, v, {}, {}};
     task_.begin_action_vjp(rollout_.view(r, action, l, part(r.found, l), {&seen, 1}), memory,
                            {{&to, 1}, by_action, {}});
     for (std::size_t i = 0; i < nv; ++i) {
@@ -326,7 +327,7 @@ void TaskBlock::reverse_start(const ActionRecord& r, std::int64_t action) {
   }
 }
 
-std::span<const MomentCotangent> TaskBlock::cotangents(int lane) {
+std::span<const SnapshotCotangent> TaskBlock::cotangents(int lane) {
   for (std::size_t m = 0; m < moments_.size(); ++m) {
     MomentRows& rows = moments_[m];
     to_moments_[m] = {part(rows.q, lane), part(rows.v, lane), part(rows.end_effectors, lane),
@@ -346,9 +347,9 @@ void TaskBlock::show_start() {
     };
     rollout_.batch().displace_state(l, first(records_[0].q, data.q, nq),
                                     first(records_[0].v, data.v, nv));
-    rollout_.batch().set_memory(l, start_memory_[as_size(l)]);
+    rollout_.batch().set_shear_state(l, start_memory_[as_size(l)]);
   }
-  rollout_.look_at_start();
+  rollout_.record_start();
 }
 
 void TaskBlock::reverse_reset(const ActionCotangents& by, std::span<double> by_q,
@@ -357,10 +358,10 @@ void TaskBlock::reverse_reset(const ActionCotangents& by, std::span<double> by_q
   show_start();
   clear_moments();
   const std::vector<double> no_action(task_.spec().action.size());
-  std::vector<double> by_no_action(no_action.size()), by_memory(as_size(task_.spec().memory));
+  std::vector<double> by_no_action(no_action.size()), by_memory(as_size(task_.spec().task_state));
   for (int l = 0; l < lanes(); ++l) {
     TaskView view = rollout_.start_view(l);
-    std::vector<Moment> seen(view.moments.begin(), view.moments.end());
+    std::vector<Snapshot> seen(view.snapshots.begin(), view.snapshots.end());
     for (std::size_t m = 0; m < opening_.size(); ++m) {
       const MomentRows& kept = opening_[m];
       seen[m] = {part(kept.q, l), part(kept.v, l), part(kept.end_effectors, l),
@@ -368,8 +369,8 @@ void TaskBlock::reverse_reset(const ActionCotangents& by, std::span<double> by_q
     }
     view.actions = 0;
     view.action = no_action;
-    if (taken_ > 0) view.memory = part(records_[0].found, l);
-    view.moments = seen;
+    if (taken_ > 0) view.task_state = part(records_[0].found, l);
+    view.snapshots = seen;
     reverse_shown(view, l, {cotangents(l).last(seen.size()), by_no_action, by_memory});
   }
   add_moment(moments_.size() - 1);
@@ -414,7 +415,7 @@ void TaskBlock::play(std::uint64_t seed, EpisodeRange episodes, const TaskAction
     for (int l = 0; l < count; ++l) {
       if (!records_[as_size(a)].taken[as_size(l)]) continue;
       const std::size_t at = as_size(to + l) * row + as_size(a) * width;
-      std::ranges::copy(part(records_[as_size(a)].asked, l),
+      std::ranges::copy(part(records_[as_size(a)].chosen, l),
                         out.action.begin() + std::ptrdiff_t(at));
       std::ranges::copy(number_row(by_action, l, width), out.u.begin() + std::ptrdiff_t(at));
     }

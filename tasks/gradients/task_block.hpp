@@ -72,18 +72,18 @@ class TaskBlock : public TapeBlock {
   void show_start();
   void finish_return(std::int64_t to, TaskGradients& out);
   /// A lane's cotangents of all moments, until the next call.
-  [[nodiscard]] std::span<const MomentCotangent> cotangents(int lane);
+  [[nodiscard]] std::span<const SnapshotCotangent> cotangents(int lane);
 
   const Task& task_;
   TapeOptions options_;
   TaskRollout rollout_;
   std::vector<ActionRecord> records_;  // (actions)
   std::array<bool, kernels::kBlock> took_{};
-  std::array<ShearMemory, kernels::kBlock> start_memory_;  // what friction remembered at the reset
+  std::array<ShearState, kernels::kBlock> start_memory_;  // what friction remembered at the reset
   std::vector<MomentRows> opening_;  // what the task saw of an opening before its last moment
   // Cotangents of the action reversed last: of its moments, its first state, its controls, itself.
   std::vector<MomentRows> moments_;
-  std::vector<MomentCotangent> to_moments_;
+  std::vector<SnapshotCotangent> to_moments_;
   std::vector<double> start_q_, start_v_, by_u_, by_action_;  // (16, nv), …, (16, nu), (16, action)
   std::vector<double> by_memory_;  // (16, memory) of the memory after begin_action
   /// Sums of derivatives by what a lane has shown since its last action that is not reversed yet.

@@ -55,7 +55,7 @@ class TaskTangent {
             ViewTangent& seen);
   [[nodiscard]] double reward(std::size_t action) const;
   [[nodiscard]] TaskView view_of_action(std::size_t action, const std::vector<double>& memory,
-                                        const Moment& first) const;
+                                        const Snapshot& first) const;
   [[nodiscard]] std::vector<double> times(const std::vector<double>& rows,
                                           const StateTangent& start) const;
   [[nodiscard]] ViewTangent unseen(std::size_t moments) const;

@@ -136,7 +136,7 @@ TEST_P(EveryTape, GoingBackIsTheTransposeOfGoingForward) {
     const Numbers to_o = by_o(t + 1), to_r = by_r(t + 1);
     tape.reverse({to_o, to_r, to_q, to_v}, std::span(by_action).subspan(t * width, width));
   }
-  const bool opens = task->spec().opening;
+  const bool opens = task->spec().warm_up;
   Numbers first_q(nv), first_v(nv), by_number(numbers);
   const Numbers to_q = by_q(0), to_v = by_v(0);
   const Numbers to_o = opens ? Numbers{} : by_o(0);
