@@ -67,8 +67,8 @@ class TaskTape {
   /// (E, action) goes out: all of it that passes through this step and later ones. It is 0 for a
   /// component beyond its bounds and for an environment that did not take the action. What an ended
   /// episode goes on showing counts for its last action. Throws InputError when every step is
-  /// reversed, and when a task has no Task::observe_vjp or restart_state_vjp that it would need; then only
-  /// reset() is possible.
+  /// reversed, and when a task has no Task::observe_vjp or restart_state_vjp that it needs; then
+  /// only reset() is possible.
   void reverse(std::span<const double> by_observation, std::span<const double> by_reward,
                std::span<double> by_action, const StateCotangents& by_state = {});
   /// Ends the reverse pass. Derivatives by the observation of the reset, (E, observation), and by
