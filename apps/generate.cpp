@@ -98,8 +98,7 @@ int make(const GenerateOptions& options, const Console& console, const Job& job,
     Progress progress(console, job.unit,
                       episodes * (job.layout.task ? job.layout.rows() : run.steps), 1);
     done = job.simulate(
-        run, output, [&](std::int64_t steps) { progress.update(steps); },
-        [&] { return signals.received() != 0; });
+        run, output, [&](std::int64_t steps) { progress.update(steps); }, signals.token());
   }
   if (done.summary.stopped)
     return report_stopped(options, console, signals.received(), done.summary.episodes, episodes,
@@ -193,8 +192,8 @@ int generate_task(const GenerateOptions& options, const Console& console, const 
   job.layout =
       make_layout(options, task.model(), Stepper(task.model()), job.run, {}, info, plan, &task,
                   {to_string(kind), policy.players(), variation.noise, variation.random_share});
-  job.simulate = [&](const EpisodeOptions& run, EpisodeSink& sink, const EpisodeProgress& progress,
-                     const StopRequest& stop) -> JobResult {
+  job.simulate = [&](const EpisodeOptions& run, EpisodeSink& sink, const ProgressCallback& progress,
+                     const std::stop_token& stop) -> JobResult {
     const EpisodeSummary summary = with_gradients(plan_of(run), sink, [&](EpisodeSink& to) {
       return run_episodes(task, policy, run, to, progress, stop);
     });
@@ -240,7 +239,7 @@ int generate(GenerateOptions options, const Console& console, const ProgramInfo&
   // The same for the episodes and their gradients, which play them again.
   SolverOptions asked{.accuracy = options.accuracy, .sleep = options.sleep ? kUsualSleep : 0};
   if (options.gradients != "none") asked.tolerance = kGradientTolerance;
-  asked.all_contacts = options.gradients != "none";
+  asked.keep_inert_contacts = options.gradients != "none";
   if (const std::unique_ptr<Task> task = find_task(options.scene, console, asked))
     return generate_task(options, console, info, *task);
   refuse_with_scene(options.scene, {{"--policy", !options.policy.empty()},
@@ -248,9 +247,9 @@ int generate(GenerateOptions options, const Console& console, const ProgramInfo&
                                     {"--noise", options.noise.has_value()},
                                     {"--mix", !options.mix.empty()}});
   const Model model(read_scene_for(options.scene, options.allow_unknown, console, asked));
-  warn_of_geometry(console, model);
+  warn_about_geometry(console, model);
   const Stepper stepper(model);
-  warn_of_steps(console, model, stepper);
+  warn_about_steps(console, model, stepper);
   const ControlProgram controls =
       make_controls(options.controls, options.seed.value_or(0), model, stepper, console);
   Job job;
@@ -273,8 +272,8 @@ int generate(GenerateOptions options, const Console& console, const ProgramInfo&
   job.effects = effect_names(model);
   job.moving_bodies = model.moving_bodies();
   job.layout = make_layout(options, model, stepper, job.run, record, info, plan);
-  job.simulate = [&](const EpisodeOptions& run, EpisodeSink& sink, const EpisodeProgress& progress,
-                     const StopRequest& stop) -> JobResult {
+  job.simulate = [&](const EpisodeOptions& run, EpisodeSink& sink, const ProgressCallback& progress,
+                     const std::stop_token& stop) -> JobResult {
     return {with_gradients(plan_of(run), sink,
                            [&](EpisodeSink& to) {
                              return run_episodes(model, {}, controls, run, to, progress, stop);

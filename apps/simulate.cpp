@@ -117,14 +117,14 @@ std::vector<Failure> failures_of(const RolloutSummary& summary) {
 }
 
 /// What `--audit` adds to the report: a line for people, which ends in a line break, and keys.
-std::string audit_text(const std::optional<AuditSummary>& audit) {
+std::string audit_text(const std::optional<EnergyBalanceSummary>& audit) {
   if (!audit) return "";
   return fmt::format(
       "audit: motors did {:.4g} J, damping and friction took {:.4g} J, the scheme made {:.4g} J; "
       "at worst {:.2g} % of what environment {} had\n",
       audit->motors, audit->taken, audit->made, 100 * audit->worst_share, audit->worst_environment);
 }
-Json audit_json(const std::optional<AuditSummary>& audit) {
+Json audit_json(const std::optional<EnergyBalanceSummary>& audit) {
   if (!audit) return nullptr;
   return {{"motors", audit->motors},
           {"taken", audit->taken},
@@ -220,7 +220,7 @@ struct Start {
   void print(const Console& console, const Model& model, const Scene& scene,
              const Stepper& stepper) const {
     if (!saved) return;
-    if (model.remembers() && !saved->memory)
+    if (model.has_shear_springs() && !saved->memory)
       console.note(fmt::format(
           "row {} of {} does not hold what friction remembers{}: contacts with ks begin unsheared; "
           "simulate stores it at its last row, and with --record memory at every row",
@@ -289,10 +289,7 @@ int write_run(const SimulateArguments& options, const Console& console, const Ba
   {
     const h5::NotReading computing;
     Progress progress(console, "step", rollout.steps, batch.environments());
-    summary = run([&](std::int64_t done) {
-      progress.update(done);
-      return signals.received() == 0;
-    });
+    summary = run([&](std::int64_t done) { progress.update(done); });
   }
   if (summary.stopped)
     return report_stop(console, "simulate", signals.received(),
@@ -331,8 +328,8 @@ int simulate_task(const SimulateArguments& options, const Console& console, cons
   TrajectoryFile output(options.output, layout, options.overwrite);
   return write_run(
       options, console, batch, layout, rollout, output, signals,
-      [&](const RolloutProgress& progress) {
-        return run_rollout(batch, steppers, program, rollout, output, progress);
+      [&](const ProgressCallback& progress) {
+        return run_rollout(batch, steppers, program, rollout, output, progress, signals.token());
       },
       [&] {
         const auto solved = std::count(data->success.begin(), data->success.end(), 1);
@@ -355,10 +352,10 @@ int simulate(const SimulateArguments& options, const Console& console, const Pro
 
   const Model model(
       read_scene_for(options.scene, options.allow_unknown, console, options.solver.asked()));
-  warn_of_geometry(console, model);
+  warn_about_geometry(console, model);
   if (options.gradients.wanted()) solver = for_gradients(model, solver);
   Stepper stepper(model, solver);
-  warn_of_steps(console, model, stepper);
+  warn_about_steps(console, model, stepper);
   const Start start(options, stepper);
   start.print(console, model, model.scene(), stepper);
   const ControlProgram controls =
@@ -382,8 +379,9 @@ int simulate(const SimulateArguments& options, const Console& console, const Pro
   TrajectoryFile output(options.output, layout, options.overwrite);
   return write_run(
       options, console, batch, layout, rollout, output, signals,
-      [&](const RolloutProgress& progress) {
-        RolloutSummary summary = run_rollout(batch, steppers, controls, rollout, output, progress);
+      [&](const ProgressCallback& progress) {
+        RolloutSummary summary =
+            run_rollout(batch, steppers, controls, rollout, output, progress, signals.token());
         if (gradients.wanted() && !summary.stopped)
           summary.stopped = !gradients.write(controls, rollout, signals, output);
         return summary;

@@ -45,7 +45,7 @@ set(public_headers
   engine/derivative/tangent.hpp
   engine/model/contact_resolution.hpp
   engine/model/effects.hpp
-  engine/model/felt_bodies.hpp
+  engine/model/sensed_bodies.hpp
   engine/model/field_form.hpp
   engine/model/model.hpp
   engine/model/model_info.hpp
@@ -63,7 +63,7 @@ set(public_headers
   engine/rows/episode_sink.hpp
   engine/rows/row_sink.hpp
   engine/rows/task_spec.hpp
-  engine/sense/audit.hpp
+  engine/sense/energy_balance.hpp
   engine/sense/contact_state.hpp
   engine/sense/flow_map.hpp
   engine/sense/marker_map.hpp
@@ -73,9 +73,9 @@ set(public_headers
   engine/step/batch.hpp
   engine/step/control.hpp
   engine/step/displacement.hpp
-  engine/step/memory_arrays.hpp
+  engine/step/shear_state_arrays.hpp
   engine/step/sleeping_trees.hpp
-  engine/step/shear_memory.hpp
+  engine/step/shear_state.hpp
   engine/step/sleep_state.hpp
   engine/step/stepper.hpp
   engine/step/stepper_options.hpp
@@ -99,19 +99,15 @@ set(public_headers
   tasks/catalogue/task.hpp
   tasks/catalogue/task_list.hpp
   tasks/gradients/field_sequence.hpp
-  tasks/gradients/gradient_options.hpp
   tasks/gradients/gradients.hpp
   tasks/gradients/identification.hpp
   tasks/gradients/losses.hpp
   tasks/gradients/residual_test.hpp
-  tasks/gradients/task_gradient_options.hpp
-  tasks/gradients/task_gradients.hpp
+  tasks/gradients/tape_options.hpp
   tasks/gradients/task_rollout.hpp
   tasks/gradients/task_tape.hpp
-  tasks/gradients/task_tape_options.hpp
   tasks/gradients/gradient_check.hpp
-  tasks/gradients/gradient_compare.hpp
-  tasks/run/audit_summary.hpp
+  tasks/run/energy_balance_summary.hpp
   tasks/run/benchmark_options.hpp
   tasks/run/benchmark_run.hpp
   tasks/run/block_worker.hpp
@@ -119,6 +115,7 @@ set(public_headers
   tasks/run/episode_options.hpp
   tasks/run/episodes.hpp
   tasks/run/policy.hpp
+  tasks/run/progress.hpp
   tasks/run/rollout.hpp
   tasks/run/step_counts.hpp
   tasks/run/step_tally.hpp

@@ -6,7 +6,7 @@
 
 #include <memory>
 
-#include "engine/derivative/memory_adjoint.hpp"
+#include "engine/derivative/shear_adjoint.hpp"
 #include "engine/step/group_step.hpp"
 
 namespace tangere {
@@ -17,14 +17,14 @@ struct AdjointWorkspace {
   using Row = kernels::Row<L>;
   AdjointWorkspace(const CompiledModel& model, int losses, bool parameters, int inner_stages);
 
-  AlignedVector<Row> memory;
+  AlignedVector<Row> shear;
   std::vector<LossRows<L>> losses;
   // One stage: the system, and what it hands on in all lanes before some are picked.
   Row *rhs, *lambda, *nu, *mass_lambda, *target, *difference, *q_centre, *v_centre;
   Row *q_older, *v_older;  ///< (nv) for each state that a stage may depend on, one after another
   Row* numbers = nullptr;  ///< (parameter_numbers), or null
   Row sound;
-  MemoryAdjoint<L> memory_adjoint;
+  ShearAdjoint<L> shear_adjoint;
   AlignedVector<Row> q_stage;  ///< (nq) coordinates of the stage in hand
 };
 

@@ -135,7 +135,7 @@ struct ReadoutPullback::Impl {
     if (!points.empty()) check_has_plain_points(model);
     const int environment = kBlock * block + lane, group = lane / kGroup;
     std::vector<double>& remembered = memory[std::size_t(lane)];
-    remembered.resize(3 * batch->memory(environment).size());
+    remembered.resize(3 * batch->shear_state(environment).size());
     used[std::size_t(group)] = true;
     for (const ElasticField::Share& share : elastic.pull_back(
              reader, *batch, environment, s.number,
@@ -171,9 +171,9 @@ void check_has_plain_points(const Model& model) {
                        "expected none of them to be asked for");
 }
 
-void check_has_no_memory(const Model& model) {
+void check_has_no_lag(const Model& model) {
   for (std::size_t s = 0; s < model.sensors().size(); ++s)
-    check_has_no_memory(model, static_cast<int>(s));
+    check_has_no_lag(model, static_cast<int>(s));
 }
 
 ReadoutPullback::ReadoutPullback(const Model& model) : impl_(std::make_unique<Impl>(model)) {}
@@ -226,7 +226,7 @@ void ReadoutPullback::Impl::pull_back(int lane, int sensor, std::span<const int>
 void ReadoutPullback::field(int lane, int sensor, std::span<const int> tiles,
                             std::span<const double> cotangents, std::span<double> parameters,
                             std::span<double> points) {
-  check_has_no_memory(impl_->model, sensor);
+  check_has_no_lag(impl_->model, sensor);
   const CompiledSensor& s = compiled(impl_->model).sensors[std::size_t(sensor)];
   if (!s.imperfect && !s.elastic)
     return impl_->pull_back(lane, sensor, tiles, cotangents, parameters, points);
@@ -243,7 +243,7 @@ void ReadoutPullback::field(int lane, int sensor, std::span<const int> tiles,
 
 void ReadoutPullback::dense_field(int lane, int sensor, std::span<const double> cotangents,
                                   std::span<double> parameters, std::span<double> points) {
-  check_has_no_memory(impl_->model, sensor);
+  check_has_no_lag(impl_->model, sensor);
   const CompiledSensor& s = compiled(impl_->model).sensors[std::size_t(sensor)];
   if (s.imperfect || s.elastic) {
     std::copy(cotangents.begin(), cotangents.end(), impl_->whole.begin());
@@ -272,7 +272,7 @@ void ReadoutPullback::finish(BlockCotangent& out) {
   const CompiledModel& m = compiled(i.model);
   for (std::size_t l = 0; l < kBlock; ++l) {
     if (i.memory[l].empty()) continue;
-    std::vector<double>& to = out.memory[l];
+    std::vector<double>& to = out.shear[l];
     to.resize(i.memory[l].size());
     for (std::size_t k = 0; k < to.size(); ++k) to[k] += i.memory[l][k];
   }

@@ -307,7 +307,7 @@ void Tangent::step(const Batch& batch, int block, int lane, const BlockTape& tap
   const double* column = batch.block(block) + lane;
   i.stage.set_numbers(column, numbers_dot);
   i.set_motors(start, u, u_dot, numbers_dot, column);
-  i.set_memory(tape.memory(step, lane), state.memory);
+  i.set_memory(tape.memory(step, lane), state.shear);
   DualState end = start;
   if (const TapedStep* special = tape.special(step, lane); special != nullptr) {
     for (const TapedSolve& s : special->solves)
@@ -317,8 +317,8 @@ void Tangent::step(const Batch& batch, int block, int lane, const BlockTape& tap
                        rows(step + 1), tape.inner(step) + lane, kBlock);
   }
   if (m.kept_points > 0 && tape.took(step, lane))
-    i.stage.advance_readings(end.q, end.v, tape.episode_step(step + 1, lane));
-  state.memory = i.memory_dot(tape.memory(step + 1, lane));
+    i.stage.update_sensor_shear_state(end.q, end.v, tape.episode_step(step + 1, lane));
+  state.shear = i.memory_dot(tape.memory(step + 1, lane));
   state.previous_q = std::move(state.q);
   state.previous_v = std::move(state.v);
   state.q = tangent_of(m, end.q);
@@ -332,7 +332,7 @@ void Tangent::field(const Batch& batch, int block, int lane, const BlockTape& ta
                     std::span<double> field_dot) {
   Impl& i = *impl_;
   const CompiledModel& m = i.m();
-  check_has_no_memory(i.model, sensor);
+  check_has_no_lag(i.model, sensor);
   const double* row = tape.state(step) + lane;
   i.stage.centre = with_tangent(m, row, kBlock, state.q);
   const Duals v = with_tangent(row + m.nq * kBlock, kBlock, state.v);
@@ -342,7 +342,7 @@ void Tangent::field(const Batch& batch, int block, int lane, const BlockTape& ta
   i.stage.inverse_h = 1;
   const CompiledSensor& s = m.sensors[std::size_t(sensor)];
   std::vector<double> field(s.imperfect ? field_dot.size() : 0);
-  i.set_memory(tape.memory(step, lane), state.memory);
+  i.set_memory(tape.memory(step, lane), state.shear);
   i.stage.set_numbers(batch.block(block) + lane, numbers_dot);
   i.stage.field(sensor, batch.block(block) + lane, numbers_dot, points_dot, field, field_dot);
   const ReadingKey key = {batch.seed(), batch.episode(block * kBlock + lane),

@@ -16,7 +16,7 @@ namespace tangere {
 std::vector<int> trees_of(const std::vector<kernels::Link>& links);
 
 /// Whether a contact with these coefficients can ever have a force: friction is bounded by μ|N|.
-inline bool pushes(const kernels::ContactParameters& p) {
+inline bool can_exert_force(const kernels::ContactParameters& p) {
   return p.kn.value != 0 || p.kn.row >= 0 || p.damping.value != 0 || p.damping.row >= 0;
 }
 
@@ -35,6 +35,6 @@ std::unique_ptr<ModelPart> part_of(const CompiledModel& whole, std::span<const i
 
 /// Returns the model without the contacts that never push (pushes), which is the model of
 /// a scene that does not name them. Null where all push, and where friction remembers.
-std::unique_ptr<ModelPart> pushing_part(const CompiledModel& whole);
+std::unique_ptr<ModelPart> without_inert_contacts(const CompiledModel& whole);
 
 }  // namespace tangere

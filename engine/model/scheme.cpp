@@ -19,15 +19,17 @@
 
 namespace tangere {
 
-const Scheme* Scheme::of_gains() const { return order > 1 ? &Integrator::bdf1.scheme() : nullptr; }
+const Scheme* Scheme::energy_fallback() const {
+  return order > 1 ? &Integrator::bdf1.scheme() : nullptr;
+}
 
-const Scheme& Scheme::of_turns() const {
-  return order > 1 ? of_parts() : Integrator::sdirk2.scheme();
+const Scheme& Scheme::rotation_fallback() const {
+  return order > 1 ? substep_scheme() : Integrator::sdirk2.scheme();
 }
 
 int Scheme::most_inner_stages() const {
   return std::max({inner_stages(), start == nullptr ? 0 : start->inner_stages(),
-                   of_parts().inner_stages(), of_turns().inner_stages()});
+                   substep_scheme().inner_stages(), rotation_fallback().inner_stages()});
 }
 
 namespace {
@@ -168,7 +170,7 @@ constinit const Integrator Integrator::bdf2{kBdf2};
 constinit const Integrator Integrator::sdirk2{kSdirk2};
 constinit const Integrator Integrator::sdirk3{kSdirk3};
 constinit const Integrator Integrator::sdirk4{kSdirk4};
-constinit const Integrator Integrator::usual{kBdf1};
+constinit const Integrator Integrator::default_integrator{kBdf1};
 constinit const Integrator Integrator::reference{kSdirk4};
 constinit const Integrator Integrator::second_reference{kSdirk2};
 

@@ -70,14 +70,14 @@ void check_names(const SavedState& from, const char* what, const std::vector<std
 }
 
 /// Throws InputError unless the points of a file are those of the scene.
-void check_points(const SavedState& from, const MemoryPoints& points) {
+void check_points(const SavedState& from, const ShearStateArrays& points) {
   constexpr double kSamePlace = 1e-9;  // [m]
-  const std::vector<MemoryContact>& saved = from.memory->contacts;
+  const std::vector<ShearSpringPlaces>& saved = from.memory->contacts;
   if (saved.size() != points.contacts.size())
     throw InputError(fmt::format("{}: {} contacts remember; in the scene {} do", from.path,
                                  saved.size(), points.contacts.size()));
   for (std::size_t c = 0; c < saved.size(); ++c) {
-    const MemoryContact &one = saved[c], &other = points.contacts[c];
+    const ShearSpringPlaces &one = saved[c], &other = points.contacts[c];
     if (one.name != other.name || one.places.size() != other.places.size())
       throw InputError(fmt::format("{}: '{}' remembers, with {} points; in the scene '{}', with {}",
                                    from.path, one.name, one.places.size(), other.name,
@@ -178,8 +178,8 @@ void restore_state(const SavedState& from, bool continues, Batch& batch) {
     throw InputError(fmt::format("{} environments; {} has {}", batch.environments(), from.path,
                                  from.environments));
   const auto nq = static_cast<std::size_t>(model.nq()), nv = static_cast<std::size_t>(model.nv());
-  const MemoryPoints points = memory_points(model);
-  const bool remembers = model.remembers() && from.memory;
+  const ShearStateArrays points = shear_state_arrays(model);
+  const bool remembers = model.has_shear_springs() && from.memory;
   if (remembers) check_points(from, points);
   const bool sleeps = continues && from.sleepers;
   if (sleeps)
@@ -200,7 +200,7 @@ void restore_state(const SavedState& from, bool continues, Batch& batch) {
       std::fill(displacements.begin(), displacements.end(), 0.0);
       for (const ShearEntry& entry : from.memory->environments[static_cast<std::size_t>(e)])
         std::copy_n(entry.s, 3, &displacements[3 * static_cast<std::size_t>(entry.point)]);
-      batch.set_memory(e, points.read(displacements));
+      batch.set_shear_state(e, points.read(displacements));
     }
     if (sleeps) batch.set_sleep(e, from.sleepers->environments[static_cast<std::size_t>(e)]);
     const StepStatus status = from.status[static_cast<std::size_t>(e)];

@@ -3,7 +3,6 @@
 // cheapest that is accurate enough.
 #pragma once
 
-#include <functional>
 #include <optional>
 #include <span>
 #include <string>
@@ -67,7 +66,7 @@ struct AccuracyReference {
 /// The order that a scheme has on these episodes between its two finest steps, without those that
 /// are off by less than ten times the reference; with them where the reference shares their errors.
 struct SchemeOrder {
-  Integrator integrator = Integrator::usual;
+  Integrator integrator = Integrator::default_integrator;
   double coarse = 0, fine = 0;  ///< those steps [s]
   double order = 0;             ///< of the medians of the errors
 };
@@ -90,7 +89,7 @@ struct AccuracyReport {
 
 /// Told as the sweep goes on.
 struct AccuracyListener {
-  AccuracyGoOn go_on;
+  std::stop_token stop;                                         ///< ends it before any sample
   std::function<void(const AccuracyReference&)> reference;      ///< each attempt, ever finer
   std::function<void(std::span<const AccuracyPoint>)> setting;  ///< in every precision
   std::function<void()> second_look{};                          ///< settings are told once more

@@ -29,10 +29,10 @@ std::vector<double> given(std::span<const double> x, std::size_t n) {
 struct TaskTangent::OwnCotangent {
   std::vector<std::vector<double>> q, v, end_effectors, tactile;
   std::vector<double> memory, action;
-  std::vector<MomentCotangent> moments;
+  std::vector<SnapshotCotangent> moments;
 
   OwnCotangent(const Task& task, std::size_t count)
-      : memory(as_size(task.spec().memory)), action(task.spec().action.size()) {
+      : memory(as_size(task.spec().task_state)), action(task.spec().action.size()) {
     const std::vector<double> dofs(as_size(task.model().nv()));
     for (std::size_t m = 0; m < count; ++m) {
       q.push_back(dofs);
@@ -44,11 +44,6 @@ struct TaskTangent::OwnCotangent {
       moments.push_back({q[m], v[m], end_effectors[m], tactile[m]});
   }
   [[nodiscard]] ViewCotangent out() { return {moments, action, memory}; }
-  /// Product with the changes of an action's start.
-  [[nodiscard]] double start_dot(const StateTangent& x, const std::vector<double>& dm,
-                                 const std::vector<double>& da) const {
-    return product(q[0], x.q) + product(v[0], x.v) + product(memory, dm) + product(action, da);
-  }
 };
 
 TaskTangent::TaskTangent(TaskRollout& rollout, std::span<const double> actions,
@@ -57,12 +52,12 @@ TaskTangent::TaskTangent(TaskRollout& rollout, std::span<const double> actions,
       task_(rollout.task()),
       tangent_(task_.model(), options),
       readout_(task_.model()),
-      memory_(as_size(task_.spec().memory)),
+      memory_(as_size(task_.spec().task_state)),
       action_(task_.spec().action.size()) {
   for (std::size_t a = 0; a * action_.size() < actions.size(); ++a) {
     ActionRecord& r = records_.emplace_back(task_);
     const auto own = actions.subspan(a * action_.size(), action_.size());
-    std::copy(own.begin(), own.end(), r.asked.begin());
+    std::copy(own.begin(), own.end(), r.chosen.begin());
     rollout.begin(r);
     tapes_.emplace_back(task_.model(), rollout.integrator(), task_.spec().steps_per_action);
     rollout.take_steps(&tapes_.back());
@@ -88,9 +83,9 @@ void TaskTangent::start(std::span<const double> q, std::span<const double> v) {
 double TaskTangent::take(std::span<const double> change, std::span<const double> numbers) {
   const std::size_t action = taken_++;
   action_ = given(change, action_.size());
-  rollout_.look_again(tapes_[action]);
+  rollout_.recompute_snapshots(tapes_[action]);
   begin(action);
-  seen_ = unseen(task_.spec().moments.size());
+  seen_ = unseen(task_.spec().snapshots.size());
   take_steps(action, numbers);
   return reward(action);
 }
@@ -105,7 +100,7 @@ ViewTangent TaskTangent::unseen(std::size_t moments) const {
 
 TaskView TaskTangent::view() const {
   return rollout_.view(records_[taken_ - 1], std::int64_t(taken_), 0,
-                       first_lane(records_[taken_ - 1].memory), rollout_.moments(0));
+                       first_lane(records_[taken_ - 1].task_state), rollout_.snapshots(0));
 }
 
 ViewTangent TaskTangent::seen_at_start(std::span<const double> numbers) {
@@ -117,41 +112,44 @@ ViewTangent TaskTangent::seen_at_start(std::span<const double> numbers) {
 
 TaskView TaskTangent::start_view() {
   tapes_.front().show(0, rollout_.batch(), 0);
-  rollout_.look_at_start();
+  rollout_.record_start();
   TaskView view = rollout_.start_view(0);
   view.actions = 0;
-  view.memory = first_lane(records_.front().found);
-  view.moments = view.moments.last(1);
+  view.task_state = first_lane(records_.front().found);
+  view.snapshots = view.snapshots.last(1);
   return view;
+}
+
+/// Products of `rows` with the changes of the state, the action and the memory where an action
+/// begins.
+std::vector<double> TaskTangent::times(const std::vector<double>& rows,
+                                       const StateTangent& start) const {
+  std::vector<double> change;
+  for (const auto* part : {&start.q, &start.v, &action_, &memory_})
+    change.insert(change.end(), part->begin(), part->end());
+  std::vector<double> products;
+  for (std::size_t k = 0; k < rows.size(); k += change.size())
+    products.push_back(product(std::span(rows).subspan(k, change.size()), change));
+  return products;
+}
+
+/// What the task sees where an action begins.
+TaskView TaskTangent::view_of_action(std::size_t action, const std::vector<double>& memory,
+                                     const Snapshot& first) const {
+  return rollout_.view(records_[action], std::int64_t(action), 0, first_lane(memory), {&first, 1});
 }
 
 /// Computes the memory that the action keeps, and the state from which it starts.
 void TaskTangent::begin(std::size_t action) {
   const ActionRecord& r = records_[action];
-  const Moment seen{first_lane(r.q), first_lane(r.v), {}, {}};
-  std::vector<double> memory(memory_.size());
-  for (std::size_t k = 0; k < memory.size(); ++k) {
-    OwnCotangent bar(task_, 1);
-    bar.memory[k] = 1;
-    task_.begin_action_vjp(
-        rollout_.view(r, std::int64_t(action), 0, first_lane(r.found), {&seen, 1}), bar.memory,
-        {bar.moments, bar.action});
-    memory[k] = bar.start_dot(state_, memory_, action_);
-  }
-  memory_ = memory;
+  const Snapshot seen{first_lane(r.q), first_lane(r.v), {}, {}};
+  memory_ = times(memory_rows(task_, view_of_action(action, r.found, seen)), state_);
   if (!task_.spec().restarts) return;
-  const std::size_t nv = state_.q.size();
-  StateTangent placed{std::vector<double>(nv), std::vector<double>(nv), std::vector<double>(nv),
-                      std::vector<double>(nv)};
-  for (std::size_t i = 0; i < 2 * nv; ++i) {
-    OwnCotangent bar(task_, 1);
-    std::vector<double> q(nv), v(nv);
-    (i < nv ? q[i] : v[i - nv]) = 1;
-    task_.place_vjp(rollout_.view(r, std::int64_t(action), 0, first_lane(r.memory), {&seen, 1}), q,
-                    v, bar.out());
-    (i < nv ? placed.q[i] : placed.v[i - nv]) = bar.start_dot(state_, memory_, action_);
-  }
-  state_ = placed;
+  const std::vector<double> placed =
+      times(restart_rows(task_, view_of_action(action, r.task_state, seen)), state_);
+  const auto middle = placed.begin() + std::ptrdiff_t(state_.q.size());
+  const std::vector<double> zero(state_.q.size());
+  state_ = {{placed.begin(), middle}, {middle, placed.end()}, zero, zero};
 }
 
 void TaskTangent::take_steps(std::size_t action, std::span<const double> numbers) {
@@ -160,25 +158,17 @@ void TaskTangent::take_steps(std::size_t action, std::span<const double> numbers
   const TaskSpec& spec = task_.spec();
   const StateTangent start = state_;
   const std::size_t nu = as_size(task_.model().nu());
-  std::vector<double> u_dot(nu);
+  std::vector<double> u_dot;
   std::size_t next = 0;
   for (int t = 0; t < spec.steps_per_action; ++t) {
     if (t % spec.control_every == 0) {
-      rollout_.ask_again(r, std::int64_t(action), t, tape);
-      for (std::size_t k = 0; k < nu; ++k) {
-        OwnCotangent bar(task_, 1);
-        std::vector<double> weight(nu);
-        weight[k] = 1;
-        const Moment first = rollout_.first_moment(tape, 0);
-        task_.controls_vjp(
-            rollout_.view(r, std::int64_t(action), 0, first_lane(r.memory), {&first, 1}), t, weight,
-            bar.out());
-        u_dot[k] = bar.start_dot(start, memory_, action_);
-      }
+      rollout_.recompute_controls(r, std::int64_t(action), t, tape);
+      const Snapshot first = rollout_.first_moment(tape, 0);
+      u_dot = times(control_rows(task_, view_of_action(action, r.task_state, first), t), start);
     }
     tape.show(t, rollout_.batch(), 0);
     tangent_.step(rollout_.batch(), 0, 0, tape, t, rollout_.u().first(nu), u_dot, numbers, state_);
-    if (spec.moments[next] == t + 1) look(tape, t + 1, next++, numbers, seen_);
+    if (spec.snapshots[next] == t + 1) look(tape, t + 1, next++, numbers, seen_);
   }
 }
 
@@ -208,7 +198,7 @@ void TaskTangent::look(const BlockTape& tape, int step, std::size_t moment,
 double TaskTangent::reward(std::size_t action) const {
   OwnCotangent bar(task_, seen_.q.size());
   task_.reward_vjp(rollout_.view(records_[action], std::int64_t(action) + 1, 0,
-                                 first_lane(records_[action].memory), rollout_.moments(0)),
+                                 first_lane(records_[action].task_state), rollout_.snapshots(0)),
                    1, bar.out());
   double sum = product(bar.memory, seen_.memory) + product(bar.action, seen_.action);
   for (std::size_t m = 0; m < seen_.q.size(); ++m)

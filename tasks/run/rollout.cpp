@@ -8,9 +8,9 @@
 #include <string>
 
 #include "kernels/numbers/block.hpp"
-#include "tasks/run/audit_recorder.hpp"
 #include "tasks/run/block_reader.hpp"
 #include "tasks/run/block_threads.hpp"
+#include "tasks/run/energy_balance_recorder.hpp"
 
 namespace tangere {
 namespace {
@@ -92,7 +92,7 @@ class Recorder {
 
   void write_memory(std::int64_t step) {
     if (options_.outputs.memory && is_due(options_.outputs.of_memory, step))
-      sink_.write(MemoryRow{step, batch_.memories()});
+      sink_.write(MemoryRow{step, batch_.shear_states()});
   }
 
   /// Writes step `step`, which has been taken but not counted yet.
@@ -200,24 +200,25 @@ double rollout_bytes(const Model& model, int environments, const RolloutOutputs&
                           largest_reading(model, outputs));
   constexpr double kFlags = sizeof(std::int32_t) + sizeof(std::int8_t);
   return environments * (numbers * sizeof(double) + kFlags) +
-         (outputs.audit ? AuditRecorder::bytes(environments) : 0);
+         (outputs.audit ? EnergyBalanceRecorder::bytes(environments) : 0);
 }
 
 RolloutSummary run_rollout(Batch& batch, std::span<Stepper> steppers,
                            const ControlProgram& controls, const RolloutOptions& options,
-                           RowSink& sink, const RolloutProgress& progress) {
+                           RowSink& sink, const ProgressCallback& progress,
+                           const std::stop_token& stop) {
   check(steppers, options);
   if (const double step = steppers.front().timestep(); controls.timestep() != step)
     throw InputError("controls laid out for a timestep of " + std::to_string(controls.timestep()) +
                      " s; the stepper's is " + std::to_string(step) + " s");
   controls.check_covers(options.first_step + options.steps);
   SceneProgram program(controls, 1, options.first_step);
-  return run_rollout(batch, steppers, program, options, sink, progress);
+  return run_rollout(batch, steppers, program, options, sink, progress, stop);
 }
 
 RolloutSummary run_rollout(Batch& batch, std::span<Stepper> steppers, EpisodeProgram& program,
                            const RolloutOptions& options, RowSink& sink,
-                           const RolloutProgress& progress) {
+                           const ProgressCallback& progress, const std::stop_token& stop) {
   check(steppers, options);
   const double timestep = steppers.front().timestep();
   check_bodies(batch.model(), options.outputs.chosen_bodies);
@@ -226,7 +227,7 @@ RolloutSummary run_rollout(Batch& batch, std::span<Stepper> steppers, EpisodePro
   const int workers = static_cast<int>(steppers.size());
   BlockThreads threads(workers);
   Recorder recorder(batch, options, threads, workers, sink);
-  std::optional<AuditRecorder> audit;
+  std::optional<EnergyBalanceRecorder> audit;
   if (options.outputs.audit) audit.emplace(batch, timestep, sink);
   struct Reading {
     FieldOutput output;
@@ -270,7 +271,8 @@ RolloutSummary run_rollout(Batch& batch, std::span<Stepper> steppers, EpisodePro
       if (reading.times.at(t + 1, options.steps, options.first_step))
         recorder.write_field(reading.output, reading.frame++, t + 1);
     summary.steps = t + 1;
-    summary.stopped = progress && !progress(t + 1);
+    if (progress) progress(t + 1);
+    summary.stopped = stop.stop_requested();
     if (summary.stopped) break;
   }
   summary.counts = tally.counts;

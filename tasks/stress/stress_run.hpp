@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <functional>
 #include <optional>
+#include <stop_token>
 #include <string>
 #include <vector>
 
@@ -24,7 +25,7 @@ const char* to_string(StressVerdict value);
 /// One case with one scheme and one step.
 struct StressRow {
   const StressCase* of = nullptr;
-  Integrator integrator = Integrator::usual;
+  Integrator integrator = Integrator::default_integrator;
   double step = 0;           ///< [s]
   double accuracy = 0;       ///< of its parts; 0: steps are not cut
   double value = 0;          ///< measured, in the worst environment that did not fail; NaN: none
@@ -60,8 +61,7 @@ struct StressScene {
 using StressScenes = std::function<StressScene(const std::string& file)>;
 
 struct StressListener {
-  /// Called before every step of every block, from any thread. False stops the run.
-  std::function<bool()> go_on;
+  std::stop_token stop;                       ///< ends the run before any step of a block
   std::function<void(const StressRow&)> row;  ///< each as it is measured
 };
 
