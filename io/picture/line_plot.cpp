@@ -47,7 +47,8 @@ struct Scale {
   [[nodiscard]] bool has(double value) const { return std::isfinite(of(value)); }
   [[nodiscard]] double share(double value) const { return (of(value) - low) / (high - low); }
   void cover(double value) { low = std::min(low, of(value)), high = std::max(high, of(value)); }
-  /// Rounds the ends of decades, and gives every range a width. `margin`: of the width, at the ends.
+  /// Rounds the ends of decades, and gives every range a width. `margin`: of the width, at both
+  /// ends.
   void close(double margin) {
     if (axis.decades) {
       low = std::floor(low + 1e-9);
@@ -155,7 +156,7 @@ class Panel {
   }
 
   void vertical(const PlotVertical& v) {
-    if (!x_.has(v.x) || x_.of(v.x) <= x_.low || x_.of(v.x) >= x_.high) return;
+    if (!x_.has(v.x) || x_.of(v.x) < x_.low || x_.of(v.x) > x_.high) return;
     out_ += line(x(v.x), top_, x(v.x), top_ + panel_.height,
                  v.dashed ? kComparison : "stroke=\"#c33\"");
     out_ += text(x(v.x) + 4, top_ + 12, v.label, "font-size=\"11\"");

@@ -18,8 +18,8 @@ struct PlotPoint {
 enum class PlotMark { none, small_dot, dot, star };
 
 struct PlotCurve {
-  std::string name;  ///< in the legend; "": not there
-  std::vector<PlotPoint> points;
+  std::string name = {};  ///< in the legend; "": not there
+  std::vector<PlotPoint> points = {};
   PlotMark mark = PlotMark::none;  ///< at every point
   bool line = true;                ///< joins neighbouring points; a point that is left out is a gap
   bool dashed = false;             ///< grey and dashed, for comparison
