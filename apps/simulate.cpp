@@ -353,7 +353,7 @@ int simulate(const SimulateArguments& options, const Console& console, const Pro
   const Model model(
       read_scene_for(options.scene, options.allow_unknown, console, options.solver.asked()));
   warn_about_geometry(console, model);
-  if (options.gradients.wanted()) solver = for_gradients(model, solver);
+  solver.differentiable = options.gradients.wanted();
   Stepper stepper(model, solver);
   warn_about_steps(console, model, stepper);
   const Start start(options, stepper);

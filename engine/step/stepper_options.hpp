@@ -8,6 +8,10 @@
 
 namespace tangere {
 
+/// Tolerance of differentiable runs. A gradient is exact for states that solve their equations, so
+/// its error is about as large.
+inline constexpr double kGradientTolerance = 1e-9;
+
 /// What a caller may change about the solve. Defaults come from the scene.
 struct StepperOptions {
   std::optional<Integrator> integrator;
@@ -19,9 +23,16 @@ struct StepperOptions {
   /// Bodies sleep that have moved by less than this share of their size for a while
   /// (docs/sleeping.md), below 1. 0: none does.
   std::optional<double> sleep{};
-  /// Steps without a tape take contacts that can never push, too. So they have the bits of steps
-  /// with one.
-  bool keep_inert_contacts = false;
+  /// Steps have the bits of steps that are differentiated: contacts that can never exert a force are
+  /// evaluated too, and where neither caller nor scene names a tolerance it is kGradientTolerance.
+  /// Bodies may not sleep then.
+  bool differentiable = false;
 };
+
+/// Returns the options of differentiable steps.
+inline StepperOptions differentiable(StepperOptions options) {
+  options.differentiable = true;
+  return options;
+}
 
 }  // namespace tangere
