@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 
+#include "engine/base/hash.hpp"
 #include "io/dataset/dataset_from_model.hpp"
 #include "io/files/name_list.hpp"
 #include "io/files/text_file.hpp"
@@ -17,10 +18,8 @@ namespace {
 std::string controls_named(const std::string& path) {
   if (path.empty()) return "of the scene";
   constexpr std::size_t kLargestTable = std::size_t{1} << 32;
-  std::uint64_t hash = 0xCBF29CE484222325ULL;  // FNV-1a
-  for (const char c : read_text_file(path, kLargestTable, "a csv file"))
-    hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001B3ULL;
-  return fmt::format("a table of checksum {:016x}", hash);
+  const std::string text = read_text_file(path, kLargestTable, "a csv file");
+  return fmt::format("a table of checksum {:016x}", hash_bytes(text));
 }
 
 /// Names what is recorded, for the files.

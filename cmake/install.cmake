@@ -23,7 +23,7 @@ set_target_properties(tangere_flags PROPERTIES EXPORT_NAME flags)  # passes a sa
 install(TARGETS tangere_kernels tangere_engine tangere_tasks tangere_io tangere_command tangere_umbrella tangere_flags
   EXPORT tangere ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR})
 install(TARGETS tangere RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
-# Installs cmake/tangere.hpp and what it includes, with names that begin with tangere/.
+# Installs apps/tangere.hpp and what it includes, with names that begin with tangere/.
 install(CODE "set(source [[${PROJECT_SOURCE_DIR}]])\nset(destination [[${CMAKE_INSTALL_INCLUDEDIR}/tangere]])")
 install(SCRIPT cmake/install_headers.cmake)
 install(DIRECTORY scenes/ DESTINATION ${CMAKE_INSTALL_DATADIR}/tangere/scenes)

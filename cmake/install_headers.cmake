@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-# Copies the public headers: ${source}/cmake/tangere.hpp and all that it includes. In the copies
+# Copies the public headers: ${source}/apps/tangere.hpp and all that it includes. In the copies
 # "engine/…" is <tangere/engine/…>, so users have one folder of ours on their include path.
 set(folder "$ENV{DESTDIR}${CMAKE_INSTALL_PREFIX}/${destination}")
 file(REMOVE_RECURSE "${folder}")
-set(waiting cmake/tangere.hpp)
+set(waiting apps/tangere.hpp)
 set(done "")
 while(waiting)
   list(POP_FRONT waiting header)
@@ -17,7 +17,7 @@ while(waiting)
     endif()
   endforeach()
   string(REGEX REPLACE "#include \"([^\"]+)\"" "#include <tangere/\\1>" text "${text}")
-  if(header STREQUAL "cmake/tangere.hpp")
+  if(header STREQUAL "apps/tangere.hpp")
     set(header tangere.hpp)
   endif()
   file(WRITE "${folder}/${header}" "${text}")

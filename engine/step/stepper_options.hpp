@@ -14,18 +14,18 @@ inline constexpr double kGradientTolerance = 1e-9;
 
 /// What a caller may change about the solve. Defaults come from the scene.
 struct StepperOptions {
-  std::optional<Integrator> integrator;
-  std::optional<double> timestep;   ///< [s]
-  std::optional<double> tolerance;  ///< scaled residual, dimensionless
+  std::optional<Integrator> integrator{};
+  std::optional<double> timestep{};   ///< [s]
+  std::optional<double> tolerance{};  ///< scaled residual, dimensionless
   /// Steps are cut into parts that keep this accuracy (docs/accuracy.md), relative, below 1. 0:
   /// every step is one part.
   std::optional<double> accuracy{};
   /// Bodies sleep that have moved by less than this share of their size for a while
   /// (docs/sleeping.md), below 1. 0: none does.
   std::optional<double> sleep{};
-  /// Steps have the bits of steps that are differentiated: contacts that can never exert a force are
-  /// evaluated too, and where neither caller nor scene names a tolerance it is kGradientTolerance.
-  /// Bodies may not sleep then.
+  /// Steps have the bits of steps that are differentiated: contacts that can never exert a force
+  /// are evaluated too, and where neither caller nor scene names a tolerance it is
+  /// kGradientTolerance. Bodies may not sleep then.
   bool differentiable = false;
 };
 

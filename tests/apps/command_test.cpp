@@ -21,8 +21,15 @@ using ::testing::HasSubstr;
 using testing::IsEmpty;
 using testing::Not;
 
-const Words kSubcommands{"inspect", "simulate", "generate", "validate", "info",      "merge",
-                         "export",  "plot",     "view",     "bench",    "gradcheck", "skin"};
+/// The subcommands that `tangere --help` lists.
+Words subcommands() {
+  const std::string help = run(Folder(), {"--help"}).out;
+  std::istringstream lines(help.substr(help.find("\nSubcommands:\n") + 14));
+  Words names;
+  for (std::string line; std::getline(lines, line) && line.starts_with("  ");)
+    names.push_back(line.substr(2, line.find(' ', 2) - 2));
+  return names;
+}
 
 /// `tangere simulate small.xml --output out.h5` and more.
 Words simulate(const Words& more = {}) {
@@ -40,7 +47,7 @@ Words example_of(const std::string& help) {
 TEST(Command, HelpEndsWithAnExampleThatWorks) {
   const Folder folder;
   std::filesystem::create_directory_symlink(TANGERE_SOURCE_DIR "/scenes", folder.path("scenes"));
-  for (const std::string& name : kSubcommands) {
+  for (const std::string& name : subcommands()) {
     const Outcome help = run(folder, {name, "--help"});
     EXPECT_EQ(help.exit_code, 0) << name;
     EXPECT_THAT(help.err, IsEmpty());
@@ -95,12 +102,11 @@ TEST(Command, ASkinOfRubberHasItsCoefficients) {
 
 TEST(Command, ThePageNamesEveryOption) {
   const Folder folder;
-  const std::string page = file_bytes(TANGERE_SOURCE_DIR "/docs/command.md");
-  for (const std::string& name : kSubcommands) {
+  for (const std::string& name : subcommands()) {
     const std::string help = run(folder, {name, "--help"}).out;
     const std::regex option("--[a-z-]+");
     for (std::sregex_iterator at(help.begin(), help.end(), option), end; at != end; ++at)
-      EXPECT_THAT(page, HasSubstr("`" + at->str() + "`")) << name;
+      EXPECT_THAT(page_of(name), HasSubstr("`" + at->str() + "`")) << name;
   }
 }
 
@@ -108,8 +114,7 @@ TEST(Command, TopLevelHelpNamesEverySubcommandAndExitCode) {
   const Folder folder;
   const Outcome help = run(folder, {"--help"});
   EXPECT_EQ(help.exit_code, 0);
-  for (const std::string& name : kSubcommands)
-    EXPECT_THAT(help.out, HasSubstr("\n  " + name + " "));
+  EXPECT_THAT(subcommands(), testing::SizeIs(16));
   for (const char* code : {"0 done", "1 finished", "2 usage", "3 input", "75 ", "130 "})
     EXPECT_THAT(help.out, HasSubstr(code));
 }

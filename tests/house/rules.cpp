@@ -131,7 +131,7 @@ std::string resolve(const Tree& tree, const std::string& from, const std::string
   return tree.contains(beside) ? beside : "";
 }
 
-constexpr const char* kUmbrella = "cmake/tangere.hpp";
+constexpr const char* kUmbrella = "apps/tangere.hpp";
 
 /// A header and all project files that it includes, directly or not.
 Names headers_behind(const Tree& tree, const std::string& path) {
@@ -273,7 +273,8 @@ std::vector<Violation> check_public_headers(const Tree& tree) {
   for (const std::string& path : headers_behind(tree, kUmbrella)) {
     for (const Include& include : includes_of(tree.at(path))) {
       if (include.quoted && !tree.contains(include.name))
-        found.push_back({path, include.line, "includes " + include.name + ", which does not exist"});
+        found.push_back(
+            {path, include.line, "includes " + include.name + ", which does not exist"});
       else if (!include.quoted && include.name.find_first_of("./") != std::string::npos)
         found.push_back({path, include.line, "is installed, and needs <" + include.name + ">"});
     }
@@ -296,7 +297,8 @@ std::vector<Violation> check_private_headers(const Tree& tree) {
       const std::string to = top_of(target);
       if (installed.contains(target) || (to != "engine" && to != "kernels")) continue;
       if (to == "kernels" || headers_behind(tree, target).contains(arrays))
-        found.push_back({path, include.line, "includes \"" + target + "\", which is private to " + to});
+        found.push_back(
+            {path, include.line, "includes \"" + target + "\", which is private to " + to});
     }
   }
   return found;

@@ -11,6 +11,7 @@
 #include "engine/step/stepper.hpp"
 #include "io/robot/robot_import.hpp"
 #include "io/scene/scene_reader.hpp"
+#include "kernels/table/isa.hpp"
 
 // Tasks and policies.
 #include "apps/program.hpp"
