@@ -113,7 +113,7 @@ class TaskProgram : public EpisodeProgram {
   const Task& task_;
   const Policy& policy_;
   std::shared_ptr<EnvironmentData> data_;
-  std::vector<BlockWorker> workers_;   // each holds what it last saw of its block
+  std::vector<BlockWorker> workers_;   // each with the last snapshots of its block
   std::vector<double> actions_;        // (E, action)
   std::vector<double> seen_, chosen_;  // (16, observation), (16, action) for one question
   AtEnd at_end_;
