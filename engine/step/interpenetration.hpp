@@ -17,7 +17,7 @@ namespace tangere {
 inline constexpr double kOverlapShare = 0.25;
 
 /// Scratch of one thread. A state is checked only if bodies have moved farther since the last check
-/// than the clearance that it found, to an overlap or a change of sides (Batch::clearance).
+/// than the clearance that it found, to an overlap or a change of sides (stored in Batch).
 class Interpenetration {
  public:
   explicit Interpenetration(const CompiledModel& model);

@@ -48,7 +48,7 @@ class BlockTape {
   void add(TapedStep step) { special_.push_back(std::move(step)); }
 
   /// Copies the states after `step` steps, and their steps since the start of the episodes, into a
-  /// block, for reading. History and sleep state are not restored.
+  /// block, for reading. History is not restored.
   void show(std::int64_t step, Batch& batch, int block) const;
 
   [[nodiscard]] std::int64_t steps() const { return steps_; }

@@ -71,7 +71,7 @@ class TaskBlock : public TapeBlock {
   void reverse_start(const ActionRecord& r, std::int64_t action);
   void show_start();
   void finish_return(std::int64_t to, TaskGradients& out);
-  /// A lane's cotangents of all moments, until the next call.
+  /// A lane's cotangents of all snapshots, valid until the next call.
   [[nodiscard]] std::span<const SnapshotCotangent> cotangents(int lane);
 
   const Task& task_;
@@ -79,7 +79,7 @@ class TaskBlock : public TapeBlock {
   TaskRollout rollout_;
   std::vector<ActionRecord> records_;  // (actions)
   std::array<bool, kernels::kBlock> took_{};
-  std::array<ShearState, kernels::kBlock> start_memory_;  // what friction remembered at the reset
+  std::array<ShearState, kernels::kBlock> start_memory_;  // shear states at the reset
   std::vector<MomentRows> opening_;  // snapshots of a warm-up before its last one
   // Cotangents for the action reversed last: of its snapshots, first state, controls, and itself.
   std::vector<MomentRows> moments_;

@@ -70,7 +70,7 @@ class TaskTangent {
   StateTangent state_;
   ViewTangent seen_;
   std::vector<double> memory_,
-      action_;  // changes of the memory after begin_action and of the current action
+      action_;  // tangents of the task state after begin_action, and of the action
 };
 
 }  // namespace tangere

@@ -18,8 +18,8 @@ namespace tangere {
 class TaskProgram;
 struct StepTally;
 
-/// Steps count from the start of the episodes, including their opening. Every step calls
-/// controls(), steps, and calls look(). After the last step of the opening and of each row, judge()
+/// Steps count from the start of the episodes, including their warm-up. Every step calls
+/// controls(), steps, and calls look(). After the last step of the warm-up and of each row, judge()
 /// follows. Different blocks of a batch may be in different threads, each with a program of its
 /// own.
 class EpisodeProgram {
