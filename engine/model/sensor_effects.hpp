@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Rows of the table of effects (effects.cpp) for what a sensor may have besides its field. Every
-// function takes the index of a sensor; −1: all sensors.
+// Rows of the table of effects (effects.cpp) for optional parts of a sensor. Every function takes
+// the index of a sensor; −1: all sensors.
 #pragma once
 
 #include "engine/model/effects.hpp"

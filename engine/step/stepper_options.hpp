@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a caller may change about steps.
+// Options of a Stepper.
 #pragma once
 
 #include <optional>
@@ -12,7 +12,7 @@ namespace tangere {
 /// its error is about as large.
 inline constexpr double kGradientTolerance = 1e-9;
 
-/// What a caller may change about the solve. Defaults come from the scene.
+/// Options of a Stepper. Defaults are those of the scene.
 struct StepperOptions {
   std::optional<Integrator> integrator{};
   std::optional<double> timestep{};   ///< [s]
