@@ -25,7 +25,7 @@ std::string controls_named(const std::string& path) {
 
 /// Names what is recorded, for the files.
 void describe(const Record& record, const Model& model, const EpisodeOptions& run,
-              DatasetDescription& description) {
+              DatasetLayout& description) {
   for (const AskedOutput& asked : record.asked) {
     description.record.push_back(asked.name);
     description.record_times.push_back(asked.times);
@@ -94,8 +94,8 @@ DatasetLayout make_layout(const GenerateOptions& options, const Model& model,
                           const Stepper& stepper, const EpisodeOptions& run, const Record& record,
                           const ProgramInfo& info, const GradientPlan& gradients, const Task* task,
                           const PlayedBy& played_by) {
-  DatasetDescription description;
-  if (task != nullptr) description.task = task->spec();
+  DatasetLayout description;
+  if (task != nullptr) description.task.emplace(task->spec());
   description.played_by = played_by;
   description.set_name = options.name;
   description.controls = controls_named(options.controls);
@@ -106,7 +106,6 @@ DatasetLayout make_layout(const GenerateOptions& options, const Model& model,
     describe(record, model, run, description);
   else
     description.record = split_if_any(options.record);
-  description.fields = record.outputs.fields;
   description.sparse = options.tactile == "sparse";
   description.gradients_of =
       options.loss.empty() ? options.gradients : options.gradients + " " + options.loss;
@@ -119,7 +118,7 @@ DatasetLayout make_layout(const GenerateOptions& options, const Model& model,
   description.single = run.precision == Precision::mixed;
   description.version = info.version;
   description.instruction_set = kernels::active_isa_name();
-  return dataset_layout_from(model, stepper, description);
+  return dataset_layout_from(model, stepper, description, record.outputs.fields);
 }
 
 }  // namespace tangere::apps

@@ -59,8 +59,10 @@ set(public_headers
   engine/model/sensor_imperfections.hpp
   engine/model/shapes.hpp
   engine/model/short_touches.hpp
+  engine/rows/channel.hpp
   engine/rows/episode_sink.hpp
-  engine/rows/row_sink.hpp
+  engine/rows/run_facts.hpp
+  engine/rows/sensor_layout.hpp
   engine/rows/task_spec.hpp
   engine/sense/audit.hpp
   engine/sense/contact_state.hpp
@@ -88,10 +90,7 @@ set(public_headers
   io/dataset/shard_check.hpp
   io/robot/robot_import.hpp
   io/scene/scene_reader.hpp
-  io/trajectory/layout_from_model.hpp
-  io/trajectory/run_facts.hpp
   io/trajectory/trajectory_file.hpp
-  io/trajectory/trajectory_layout.hpp
   kernels/contact/contact_types.hpp
   kernels/numbers/block.hpp
   kernels/table/isa.hpp

@@ -11,9 +11,10 @@
 #include <sstream>
 
 #include "engine/base/error.hpp"
+#include "engine/rows/sensor_layout.hpp"
 #include "io/dataset/learner_notes.hpp"
+#include "io/hdf5/h5_channels.hpp"
 #include "io/hdf5/h5_listing.hpp"
-#include "io/trajectory/sensor_description.hpp"
 
 namespace tangere {
 namespace {
@@ -26,7 +27,7 @@ constexpr std::size_t kLongText =
 
 void describe_task(const h5::Id& scene, const DatasetLayout& layout) {
   if (!layout.task) {
-    h5::write_attribute(scene, "task", "none: a scene alone, whose every reward is 0");
+    h5::write_attribute(scene, "task", kNoTask);
     return;
   }
   const TaskSpec& task = *layout.task;
@@ -62,16 +63,7 @@ void describe_run(const h5::Id& scene, const DatasetLayout& layout) {
   h5::write_attribute(scene, "text", layout.scene_text);
   h5::write_attribute(scene, "tables", layout.tables);
   h5::write_attribute(scene, "controls", layout.controls);
-  h5::write_scalar<std::uint64_t>(scene, "seed", layout.seed);
-  h5::write_scalar<std::int64_t>(scene, "steps", layout.steps);
-  h5::write_scalar<std::int64_t>(scene, "every", layout.every);
-  h5::write_scalar<double>(scene, "timestep", layout.timestep);
-  h5::write_attribute(scene, "timestep_unit", "s");
-  h5::write_attribute(scene, "integrator", layout.integrator);
-  h5::write_scalar<double>(scene, "tolerance", layout.tolerance);
-  h5::write_scalar<double>(scene, "accuracy", layout.accuracy);
-  if (layout.sleep > 0) h5::write_scalar<double>(scene, "sleep", layout.sleep);
-  h5::write_attribute(scene, "precision", layout.precision);
+  h5::write_attributes(scene, attributes_of(layout, layout.steps, layout.every));
   h5::write_attribute(scene, "compression", layout.compression);
   h5::write_attribute(scene, "tactile", layout.sparse ? "sparse" : "dense");
   h5::write_attribute(scene, "tangere_version", layout.version);
@@ -123,8 +115,8 @@ void describe_numbers(const h5::Id& scene, const DatasetLayout& layout) {
   const h5::Id sensors = h5::create_group(scene, "sensors");
   for (const SensorLayout& sensor : layout.sensors) {
     const h5::Id group = h5::create_group(sensors, sensor.name);
-    describe_reading(group, sensor, FieldForm::field);
-    describe_points(group, sensor);
+    h5::write_attributes(group, reading_attributes(sensor, FieldForm::field));
+    for (const Table& table : point_tables(sensor, "")) h5::write_table(group, table);
     std::vector<std::string> readings, components;
     for (const FieldOutput of : layout.fields)
       if (&layout.sensors[static_cast<std::size_t>(of.sensor)] == &sensor &&

@@ -241,10 +241,7 @@ void DatasetLayout::check() const {
       throw InputError(
           fmt::format("--record: unknown observation '{}'{}", name, suggestion(name, all)));
   check_lengths(all);
-  for (const SensorLayout& sensor : sensors)
-    if (sensor.name.empty() || sensor.name == "." || sensor.name.find('/') != std::string::npos)
-      throw InputError(fmt::format(
-          "sensor '{}': a dataset cannot have this name; expected one without '/'", sensor.name));
+  for (const SensorLayout& sensor : sensors) check_sensor_name(sensor.name);
   std::set<std::string> names;
   for (const std::string& name : all)
     if (!task && !names.insert(name).second)

@@ -10,7 +10,8 @@
 #include <vector>
 
 #include "engine/rows/episode_sink.hpp"
-#include "io/trajectory/trajectory_layout.hpp"
+#include "engine/rows/run_facts.hpp"
+#include "engine/rows/sensor_layout.hpp"
 
 namespace tangere {
 
@@ -60,9 +61,8 @@ struct DatasetLayout : RunFacts {
   std::string set_name;         ///< the part of dataset_id() that is asked for; none: as below
   std::string tables = "none";  ///< checksum of the files that the text refers to
   std::string controls = "of the scene";  ///< or a table, named by its content
-  std::string command;  ///< makes this data set again; without threads, folder and the like
-  double shard_bytes = 1 << 30;  ///< upper limit of a shard, unless 16 episodes are more
-  std::int64_t shards = 0;       ///< number of shards; 0: as shard_bytes determines
+  double shard_bytes = 1 << 30;           ///< upper limit of a shard, unless 16 episodes are more
+  std::int64_t shards = 0;                ///< number of shards; 0: as shard_bytes determines
   std::string compression =
       "none";           ///< or "deflate", "lz4", for observations with rows large enough
   bool sparse = false;  ///< parts of large fields that are zero are left out

@@ -9,7 +9,9 @@
 #include <vector>
 
 #include "engine/base/precision.hpp"
-#include "engine/rows/row_sink.hpp"
+#include "engine/model/field_form.hpp"
+#include "engine/rows/channel.hpp"
+#include "engine/rows/run_facts.hpp"
 #include "engine/step/batch.hpp"
 #include "engine/step/stepper.hpp"
 #include "tasks/run/audit_summary.hpp"
@@ -52,14 +54,19 @@ struct RolloutSummary {
 /// Is called after each step with the number of steps done. False stops the run at this safe point.
 using RolloutProgress = std::function<bool(std::int64_t done)>;
 
-/// Steps the batch and hands every row to the sink: row 0 of the state, then for each step its
-/// StepRow, the ActionRow if it ends a task's action, the StateRow after it, the MemoryRow and the
-/// tactile rows due. A row of which nothing is wanted does not leave. A tactile sensor is read
-/// after steps K, 2K, …, so field k comes from row (k + 1) K of q. In a StepRow, an environment
-/// that failed earlier has 0 iterations and its last status and residual. `program` must have
-/// started every block; it takes all of them through a step in turn. `steppers`: one for each
-/// thread that steps and reads blocks, all of the same options; rows are the same for any number of
-/// them.
+/// Returns what a rollout of `batch` hands on, in the order of RowSink::write(). `facts` of a task
+/// name it. Throws InputError as check_outputs() does, for a body that is not there and for a
+/// sensor whose name cannot be a name in a file.
+Recording rollout_recording(const Batch& batch, const Stepper& stepper,
+                            const RolloutOptions& options, const RunFacts& facts);
+
+/// Steps the batch and hands every row to the sink: the start, then after each step the channels of
+/// the step, those of a task's action that it ends, and those of the state that are due. What is
+/// not wanted is not computed. A tactile sensor is read after steps K, 2K, …, so field k comes from
+/// row (k + 1) K of q. An environment that failed earlier has 0 iterations and its last status and
+/// residual. `program` must have started every block; it takes all of them through a step in turn.
+/// `steppers`: one for each thread that steps and reads blocks, all of the same options; rows are
+/// the same for any number of them.
 /// Throws InputError without a stepper and when steps < 1, every < 0 or first_step < 0. Passes on
 /// what the sink throws.
 RolloutSummary run_rollout(Batch& batch, std::span<Stepper> steppers, EpisodeProgram& program,

@@ -7,6 +7,7 @@
 #include "kernels/table/kernel_table.hpp"
 #include "tasks/run/rollout.hpp"
 #include "tests/tasks/episode_by_hand.hpp"
+#include "tests/tasks/recorded.hpp"
 
 namespace tangere {
 namespace {
@@ -80,14 +81,6 @@ TEST(Outputs, FieldsThatNobodyAskedForAreNotRead) {
 }
 
 TEST(Outputs, ARolloutReadsNeitherFieldsNorBodiesThatNobodyAskedFor) {
-  struct Sizes : RowSink {
-    std::size_t bodies = 0, fields = 0;
-    void write(const StateRow& row) override {
-      bodies += row.body_pose.size() + row.body_twist.size() + row.end_effectors.size();
-    }
-    void write(const StepRow&) override {}
-    void write(const TactileRow& row) override { fields += row.numbers.size(); }
-  } sizes;
   const Model model(small_scene());
   Batch batch(model, 2);
   Stepper stepper(model);
@@ -95,36 +88,28 @@ TEST(Outputs, ARolloutReadsNeitherFieldsNorBodiesThatNobodyAskedFor) {
   RolloutOptions o{3, 1};
   o.outputs = {std::vector<FieldOutput>{}, false, false};
   const Counting counting;
-  run_rollout(batch, std::span(&stepper, 1), controls, o, sizes);
-  EXPECT_EQ(sizes.bodies + sizes.fields, 0U);
+  Recorded sink(rollout_recording(batch, stepper, o, {}));
+  run_rollout(batch, std::span(&stepper, 1), controls, o, sink);
+  for (const auto& [name, rows] : sink.all())
+    EXPECT_EQ(name.find_first_of("/"), name.starts_with("solver/") ? 6 : std::string::npos) << name;
   EXPECT_EQ(whole_calls + pressure_calls, 0);
   EXPECT_LT(rollout_bytes(model, 1, o.outputs), rollout_bytes(model, 1) / 2);
 }
 
+std::vector<std::int64_t> steps_of(const std::vector<RecordedRow>& rows) {
+  std::vector<std::int64_t> steps;
+  for (const RecordedRow& row : rows) steps.push_back(row.step);
+  return steps;
+}
+
 /// What a rollout of 12 steps hands on.
-struct Handed : RowSink {
-  int states = 0, poses = 0, steps = 0, fields = 0;
-  std::vector<std::int64_t> state_steps, field_steps;
-  std::vector<std::vector<double>> q, pose, numbers;
-  void write(const StateRow& row) override {
-    if (!row.q.empty()) state_steps.push_back(row.step), q.emplace_back(row.q.begin(), row.q.end());
-    if (!row.body_pose.empty()) pose.emplace_back(row.body_pose.begin(), row.body_pose.end());
-    states += row.q.empty() ? 0 : 1, poses += row.body_pose.empty() ? 0 : 1;
-  }
-  void write(const StepRow& row) override { steps += row.u.empty() ? 0 : 1; }
-  void write(const TactileRow& row) override {
-    ++fields, field_steps.push_back(row.step);
-    numbers.emplace_back(row.numbers.begin(), row.numbers.end());
-    EXPECT_EQ(row.frame, fields - 1);
-  }
-};
-Handed handed(const Model& model, const RolloutOutputs& outputs) {
-  Handed sink;
+Recorded handed(const Model& model, const RolloutOutputs& outputs) {
   Batch batch(model, 3);
   Stepper stepper(model);
   const ControlProgram controls(model, stepper.timestep(), 0);
   RolloutOptions o{12, 1};
   o.outputs = outputs;
+  Recorded sink(rollout_recording(batch, stepper, o, {}));
   run_rollout(batch, std::span(&stepper, 1), controls, o, sink);
   return sink;
 }
@@ -132,7 +117,7 @@ Handed handed(const Model& model, const RolloutOutputs& outputs) {
 TEST(Outputs, WhatIsTakenAtTimesOfItsOwnIsReadThenAndNeverElse) {
   const Model model(small_scene());
   const Counting counting;
-  const Handed all = handed(model, {});
+  const Recorded all = handed(model, {});
   const int of_all = whole_calls;
   ASSERT_GT(of_all, 0);
   RolloutOutputs some;
@@ -141,22 +126,23 @@ TEST(Outputs, WhatIsTakenAtTimesOfItsOwnIsReadThenAndNeverElse) {
   some.of_bodies = {6};
   some.chosen_bodies = {model.nb() - 1};
   whole_calls = 0;
-  const Handed few = handed(model, some);
+  const Recorded few = handed(model, some);
   EXPECT_EQ(12 * whole_calls, 3 * of_all);
-  EXPECT_THAT(few.field_steps, ElementsAre(4, 8, 12));
-  for (std::size_t k = 0; k < 3; ++k) EXPECT_EQ(few.numbers[k], all.numbers[4 * k + 3]);
-  EXPECT_THAT(few.state_steps, ElementsAre(12));
-  EXPECT_EQ(few.q[0], all.q[12]);
-  EXPECT_EQ(few.steps, 0) << "controls leave with every state alone";
-  ASSERT_EQ(few.poses, 3);
+  const std::string field = "tactile/" + std::string(model.sensors()[0].name) + "/force";
+  EXPECT_THAT(steps_of(few[field]), ElementsAre(4, 8, 12));
+  for (std::size_t k = 0; k < 3; ++k) EXPECT_EQ(few[field][k], all[field][4 * k + 3]);
+  EXPECT_THAT(few["q"], ElementsAre(all["q"][12]));
+  EXPECT_TRUE(few["u"].empty()) << "controls leave with every state alone";
+  ASSERT_EQ(few["bodies/pose"].size(), 3U);
   const std::size_t nb = std::size_t(model.nb());
   for (std::size_t k = 0; k < 3; ++k)
     for (std::size_t e = 0; e < 3; ++e)
       for (std::size_t i = 0; i < 7; ++i)
-        EXPECT_EQ(few.pose[k][7 * e + i], all.pose[6 * k][7 * (nb * e + nb - 1) + i]);
+        EXPECT_EQ(few["bodies/pose"][k].numbers[7 * e + i],
+                  all["bodies/pose"][6 * k].numbers[7 * (nb * e + nb - 1) + i]);
   some.fields = {{0, FieldForm::field, {0, true}}};
   whole_calls = 0;
-  EXPECT_THAT(handed(model, some).field_steps, ElementsAre(12));
+  EXPECT_THAT(steps_of(handed(model, some)[field]), ElementsAre(12));
   EXPECT_EQ(12 * whole_calls, of_all);
   EXPECT_LT(rollout_bytes(model, 1, some), rollout_bytes(model, 1));
 }
