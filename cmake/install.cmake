@@ -118,6 +118,7 @@ set(public_headers
   tasks/run/episodes.hpp
   tasks/run/policy.hpp
   tasks/run/rollout.hpp
+  tasks/run/rollout_options.hpp
   tasks/run/step_counts.hpp
   tasks/run/step_tally.hpp
   tasks/run/vector_task.hpp)

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Lists of steps are channels, too: "bodies/step" belongs to all of "bodies", "tactile/pad/sum_step"
-// to "tactile/pad/sum" alone.
+// Lists of steps are channels, too: "bodies/step" belongs to all of "bodies",
+// "tactile/pad/sum_step" to "tactile/pad/sum" alone.
 #include "io/trajectory/row_steps.hpp"
 
 #include <fmt/format.h>

@@ -74,12 +74,13 @@ class TrajectoryView {
   };
 
   /// Numbers of each environment in time, with names where there are several. Coordinates and
-  /// fields are drawn in their own way.
+  /// fields are drawn in their own way; what else is left out is a table whose rows are no times.
   [[nodiscard]] bool is_curve(const Channel& channel) const {
     const std::vector<std::uint64_t>& shape = channel.shape;
-    if (channel.name == "q" || channel.name.starts_with("tactile/") ||
-        channel.name.starts_with("gradients/") || shape.empty() || shape[0] != environments())
-      return false;
+    const std::string group = channel.name.substr(0, channel.name.find('/'));
+    for (const char* other : {"q", "tactile", "randomized", "gradients", "memory"})
+      if (group == other) return false;
+    if (shape.empty() || shape[0] != environments()) return false;
     return shape.size() == 1 || (shape.size() == 2 && shape[1] == channel.names.size());
   }
 

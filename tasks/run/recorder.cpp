@@ -24,19 +24,6 @@ std::size_t numbers_in(const Model& model, FieldOutput output) {
   return numbers_of(model.sensors()[as_size(output.sensor)].points, output.form);
 }
 
-/// Numbers of one environment in the largest reading.
-std::size_t largest_reading(const Model& model, const RolloutOutputs& outputs) {
-  std::size_t largest = 0;
-  for (const FieldOutput output : fields_of(model, outputs))
-    largest = std::max(largest, numbers_in(model, output));
-  return largest;
-}
-
-std::size_t bodies_in(const Model& model, const RolloutOutputs& outputs) {
-  if (!outputs.bodies) return 0;
-  return outputs.chosen_bodies.empty() ? as_size(model.nb()) : outputs.chosen_bodies.size();
-}
-
 std::vector<std::string> recorded_bodies(const Model& model, const RolloutOutputs& outputs) {
   const auto all = model.body_names();
   if (outputs.chosen_bodies.empty()) return {all.begin(), all.end()};
@@ -59,18 +46,6 @@ Numbers flags(const std::vector<std::uint8_t>& values) {
 }
 
 }  // namespace
-
-double rollout_bytes(const Model& model, int environments, const RolloutOutputs& outputs) {
-  const double numbers =
-      model.nq() + model.nv() + model.nu() +
-      double{kPoseWidth + kTwistWidth} * static_cast<double>(bodies_in(model, outputs)) +
-      static_cast<double>((outputs.end_effectors ? model.end_effectors().size() : 0) *
-                              kPositionWidth +
-                          largest_reading(model, outputs));
-  constexpr double kFlags = sizeof(std::int32_t) + sizeof(std::int8_t);
-  return environments * (numbers * sizeof(double) + kFlags) +
-         (outputs.audit ? AuditRecorder::bytes(environments) : 0);
-}
 
 Recorder::Recorder(const Batch& batch, std::span<const Stepper> steppers,
                    const RolloutOptions& options, const TaskSpec* task)
@@ -259,6 +234,7 @@ void Recorder::add_motion() {
   const RolloutOutputs& outputs = options_.outputs;
   if (outputs.bodies && model_.nb() > 0) {
     const std::vector<std::string> names = recorded_bodies(model_, outputs);
+    bodies_ = names.size();
     const Attributes bodies{{"bodies", names}};
     recording_.groups.push_back({"bodies", {{"names", names}}});
     const auto at = [&](Read read) {
@@ -378,6 +354,7 @@ void Recorder::add_readings() {
     const SensorLayout layout =
         sensor_layout(info, model_.scene().sensors[as_size(output.sensor)], 1);
     check_sensor_name(layout.name);
+    largest_reading_ = std::max(largest_reading_, numbers_in(model_, output));
     const std::string group = "tactile/" + layout.name + "/";
     const OutputTimes times = reading_times(model_, output, options_);
     Channel channel{.name = group + dataset_of(output.form), .shape = {environments_}};
@@ -458,15 +435,14 @@ std::span<double> Recorder::part(std::span<double> all, int environment) const {
 }
 
 void Recorder::resize_buffers() {
-  const RolloutOutputs& outputs = options_.outputs;
-  const std::size_t e = environments_, bodies = bodies_in(model_, outputs);
+  const std::size_t e = environments_;
   q_.resize(e * as_size(model_.nq()));
   v_.resize(e * as_size(model_.nv()));
-  pose_.resize(e * bodies * kPoseWidth);
-  twist_.resize(e * bodies * kTwistWidth);
-  if (outputs.end_effectors)
+  pose_.resize(e * bodies_ * kPoseWidth);
+  twist_.resize(e * bodies_ * kTwistWidth);
+  if (options_.outputs.end_effectors)
     end_effectors_.resize(e * model_.end_effectors().size() * kPositionWidth);
-  reading_.resize(e * largest_reading(model_, outputs));
+  reading_.resize(e * largest_reading_);
   shear_.resize(std::min<std::size_t>(e, kernels::kBlock) * 3 * shear_points_.count());
   iterations_.resize(e);
   status_.resize(e);

@@ -12,7 +12,9 @@
 #include "engine/step/memory_arrays.hpp"
 #include "tasks/run/audit_recorder.hpp"
 #include "tasks/run/block_threads.hpp"
-#include "tasks/run/rollout.hpp"
+#include "tasks/run/episode_program.hpp"
+#include "tasks/run/rollout_options.hpp"
+#include "tasks/run/step_tally.hpp"
 
 namespace tangere {
 
@@ -35,13 +37,13 @@ class Recorder {
   /// Returns the description of all that is recorded, without facts of the run.
   [[nodiscard]] Recording take_description() { return std::move(recording_); }
 
-  /// Begins to hand rows on. `u`: (E, nu) controls of each step; `tally` counts them; `data`: of the
-  /// task. All must outlive this object.
+  /// Begins to hand rows on. `u`: (E, nu) controls of each step; `tally` counts them; `data`: of
+  /// the task. All must outlive this object.
   void begin(std::span<const double> u, const StepTally& tally, const EnvironmentData* data,
              BlockThreads& threads, RowSink& sink);
   /// Notes what the batch is before a step.
   void before_step();
-  /// Notes how step `t` - 1 went, which has been taken but not counted yet, and writes its channels.
+  /// Notes how step `t` - 1 went, which was taken but not counted yet, and writes its channels.
   void after_step(std::int64_t t);
   /// Writes the channels that are due after `t` steps.
   void write(When when, std::int64_t t);
@@ -92,6 +94,7 @@ class Recorder {
   std::vector<Readout> readouts_;  // one for each thread
   std::optional<AuditRecorder> audit_;
   MemoryPoints shear_points_;
+  std::size_t bodies_ = 0, largest_reading_ = 0;  // recorded; numbers of an environment
   std::int64_t row_ = 0;
   double time_ = 0;
   std::vector<double> q_, v_, pose_, twist_, end_effectors_;  // (E, …)

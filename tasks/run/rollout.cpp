@@ -28,29 +28,6 @@ void check(std::span<const Stepper> steppers, const RolloutOptions& options) {
 
 }  // namespace
 
-std::vector<FieldOutput> fields_of(const Model& model, const RolloutOutputs& outputs) {
-  if (!outputs.fields) return whole_fields(model.scene());
-  check_outputs(*outputs.fields, model.sensors().size());
-  return *outputs.fields;
-}
-
-int tactile_interval(const SensorInfo& sensor, const RolloutOptions& options) {
-  if (options.every > 0) return options.every;
-  return sensor.every > 0 ? sensor.every : 1;
-}
-
-OutputTimes reading_times(const Model& model, FieldOutput output, const RolloutOptions& options) {
-  if (output.times.given()) return output.times;
-  return {tactile_interval(model.sensors()[static_cast<std::size_t>(output.sensor)], options)};
-}
-
-/// Readings follow steps, so none is taken at row 0.
-std::int64_t tactile_frames(const Model& model, FieldOutput output, const RolloutOptions& options) {
-  const OutputTimes times = reading_times(model, output, options);
-  return times.before(options.steps + 1, options.steps, options.first_step) -
-         times.before(1, options.steps, options.first_step);
-}
-
 Recording rollout_recording(const Batch& batch, const Stepper& stepper,
                             const RolloutOptions& options, const RunFacts& facts) {
   Recorder recorder(batch, std::span(&stepper, 1), options, facts.task ? &*facts.task : nullptr);

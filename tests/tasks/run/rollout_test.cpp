@@ -15,7 +15,7 @@
 namespace tangere {
 namespace {
 
-using testing::ElementsAre;
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
 /// A pad that sinks onto a ball, with a sensor read every 2 steps and one without an interval.
@@ -65,7 +65,7 @@ class Memory : public testing::Recorded {
   std::string order;
 };
 
-class Rollout : public testing::Test {
+class Rollout : public ::testing::Test {
  protected:
   RolloutSummary run(Batch& batch, const RolloutOptions& options, RowSink& sink,
                      const RolloutProgress& progress = {}) {
