@@ -23,24 +23,12 @@ std::string controls_named(const std::string& path) {
   return fmt::format("a table of checksum {:016x}", hash);
 }
 
-/// Names what is recorded, for the files.
-void describe(const Record& record, const Model& model, const EpisodeOptions& run,
-              DatasetLayout& description) {
-  for (const AskedOutput& asked : record.asked) {
-    description.record.push_back(asked.name);
-    description.record_times.push_back(asked.times);
-  }
-  const std::vector<std::string> names(model.body_names().begin(), model.body_names().end());
-  for (const BodyRows& rows : run.bodies) {
-    const bool all = rows.bodies.empty();
-    const std::string one = all ? "" : names[static_cast<std::size_t>(rows.bodies.front())];
-    description.bodies.push_back(
-        {all ? "bodies" : body_output(one), all ? names : std::vector{one}});
-  }
-}
-
-std::vector<std::string> split_if_any(const std::string& list) {
-  return list.empty() ? std::vector<std::string>{} : split_names("--record", list);
+/// Names of a task's observations.
+std::vector<TimedName> split_if_any(const std::string& list) {
+  std::vector<TimedName> record;
+  if (!list.empty())
+    for (std::string& name : split_names("--record", list)) record.push_back({std::move(name), {}});
+  return record;
 }
 
 /// For a shell that reads the command again.
@@ -76,22 +64,8 @@ std::string command_of(const GenerateOptions& options, const EpisodeOptions& run
 
 }  // namespace
 
-void take(const Record& record, const Model& model, EpisodeOptions& run) {
-  const auto rows_of = [&](const char* name) -> RowOutput {
-    const AskedOutput* const asked = record.find(name);
-    return {record.asked.empty() || asked != nullptr, asked ? asked->times : OutputTimes{}};
-  };
-  run.fields = record.outputs.fields;
-  run.q = rows_of("q"), run.v = rows_of("v"), run.end_effectors = rows_of("variables");
-  if (const AskedOutput* const all = record.find("bodies")) run.bodies.push_back({{}, all->times});
-  for (int b = 0; b < model.nb(); ++b)  // in the order of the scene, whatever that of the words
-    if (const AskedOutput* const one =
-            record.find(body_output(model.body_names()[static_cast<std::size_t>(b)])))
-      run.bodies.push_back({{b}, one->times});
-}
-
 DatasetLayout make_layout(const GenerateOptions& options, const Model& model,
-                          const Stepper& stepper, const EpisodeOptions& run, const Record& record,
+                          const Stepper& stepper, const EpisodeOptions& run,
                           const ProgramInfo& info, const GradientPlan& gradients, const Task* task,
                           const PlayedBy& played_by) {
   DatasetLayout description;
@@ -102,10 +76,7 @@ DatasetLayout make_layout(const GenerateOptions& options, const Model& model,
   description.command = command_of(options, run, played_by.policy);
   description.shards = options.shards.value_or(0);
   description.compression = options.compress;
-  if (task == nullptr)
-    describe(record, model, run, description);
-  else
-    description.record = split_if_any(options.record);
+  description.record = task == nullptr ? run.record : split_if_any(options.record);
   description.sparse = options.tactile == "sparse";
   description.gradients_of =
       options.loss.empty() ? options.gradients : options.gradients + " " + options.loss;
@@ -118,7 +89,7 @@ DatasetLayout make_layout(const GenerateOptions& options, const Model& model,
   description.single = run.precision == Precision::mixed;
   description.version = info.version;
   description.instruction_set = kernels::active_isa_name();
-  return dataset_layout_from(model, stepper, description, record.outputs.fields);
+  return dataset_layout_from(model, stepper, description);
 }
 
 }  // namespace tangere::apps

@@ -60,6 +60,7 @@ set(public_headers
   engine/model/shapes.hpp
   engine/model/short_touches.hpp
   engine/rows/channel.hpp
+  engine/rows/episode_channels.hpp
   engine/rows/episode_sink.hpp
   engine/rows/run_facts.hpp
   engine/rows/sensor_layout.hpp

@@ -7,15 +7,14 @@
 namespace tangere {
 
 DatasetLayout dataset_layout_from(const Model& model, const Stepper& stepper,
-                                  const DatasetLayout& asked,
-                                  const std::optional<std::vector<FieldOutput>>& fields) {
+                                  const DatasetLayout& asked) {
   const Scene& scene = model.scene();
   DatasetLayout layout = asked;
   static_cast<RunFacts&>(layout) = run_facts(model, stepper, asked, asked.seed);
   for (std::size_t i = 0; i < model.sensors().size(); ++i)
     layout.sensors.push_back(sensor_layout(model.sensors()[i], scene.sensors[i], asked.every));
   layout.tables = tables_of(scene);
-  layout.fields = fields ? *fields : whole_fields(scene);
+  layout.body_names.assign(model.body_names().begin(), model.body_names().end());
   return layout;
 }
 

@@ -7,10 +7,8 @@
 
 namespace tangere {
 
-/// Returns `asked` with the facts of a run of `model` by `stepper`, its sensors and its tables.
-/// `fields`: DatasetLayout::fields; none: the field of every sensor.
+/// Returns `asked` with the facts of a run of `model` by `stepper`, its bodies, sensors and tables.
 DatasetLayout dataset_layout_from(const Model& model, const Stepper& stepper,
-                                  const DatasetLayout& asked,
-                                  const std::optional<std::vector<FieldOutput>>& fields = {});
+                                  const DatasetLayout& asked);
 
 }  // namespace tangere

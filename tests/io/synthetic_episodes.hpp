@@ -26,7 +26,6 @@ inline DatasetLayout dataset_layout(std::int64_t episodes, bool single = true) {
   l.v_units = {"m/s", "rad/s"};
   l.u_names = {"a.vx", "b"};
   l.sensors = {skin()};
-  l.fields = {{0}};
   l.scene_name = "syn \"thetic\"";
   l.scene_text = "<tangere/>";
   l.integrator = "BDF2";

@@ -48,12 +48,12 @@ class Counting {
 };
 
 /// Runs 16 episodes and returns how many bytes of readings one gave.
-std::size_t run_with(const Model& model, std::optional<std::vector<FieldOutput>> fields) {
+std::size_t run_with(const Model& model, const std::vector<TimedName>& record) {
   EpisodeOptions o;
   o.episodes = 16;
   o.steps = 4;
   o.every = 2;
-  o.fields = std::move(fields);
+  o.record = record;
   const ControlProgram controls(model, model.timestep(), 0);
   Recorder recorder(2);
   run_episodes(model, {}, controls, o, recorder);
@@ -68,14 +68,14 @@ TEST(Outputs, FieldsThatNobodyAskedForAreNotRead) {
   const Model model(small_scene());
   const auto points = std::size_t(model.sensors()[0].points);
   const Counting counting;
-  EXPECT_EQ(run_with(model, std::vector<FieldOutput>{}), 0U);
+  const std::string sensor = std::string(model.sensors()[0].name);
+  EXPECT_EQ(run_with(model, {{"q"}}), 0U);
   EXPECT_EQ(whole_calls + pressure_calls, 0);
-  EXPECT_EQ(run_with(model, std::vector<FieldOutput>{{0, FieldForm::pressure}}),
-            3 * points * sizeof(double));
+  EXPECT_EQ(run_with(model, {{sensor + ".pressure"}}), 3 * points * sizeof(double));
   EXPECT_EQ(whole_calls, 0);
   EXPECT_GT(pressure_calls, 0);
   pressure_calls = 0;
-  EXPECT_EQ(run_with(model, std::vector<FieldOutput>{{0, FieldForm::sum}}), 3 * 6 * sizeof(double));
+  EXPECT_EQ(run_with(model, {{sensor + ".sum"}}), 3 * 6 * sizeof(double));
   EXPECT_EQ(pressure_calls, 0);
   EXPECT_GT(whole_calls, 0);
 }
@@ -166,9 +166,9 @@ TEST(Outputs, EpisodesHoldWhatIsTakenAndComputeNothingElse) {
   const Counting counting;
   const auto all = played(o);
   const int of_all = whole_calls;
-  o.q.times = {4}, o.v.wanted = false;
-  o.bodies = {{{1}, {0, true}}, {{}, {}}};
-  o.fields = {{0, FieldForm::field, {8}}};
+  const std::string sensor = std::string(model.sensors()[0].name),
+                    body = body_output(model.body_names()[1]);
+  o.record = {{"q", {4}}, {body, {0, true}}, {"bodies"}, {sensor, {8}}};
   for (const std::size_t piece : {std::size_t(1), std::size_t(30000), std::size_t(1) << 25}) {
     o.piece_bytes = piece;
     whole_calls = 0;
@@ -182,19 +182,16 @@ TEST(Outputs, EpisodesHoldWhatIsTakenAndComputeNothingElse) {
         EXPECT_EQ(row(episode.observations[0], 3, k), row(whole.observations[0], 5, 2 * k));
       EXPECT_EQ(episode.observations[1], "");
       const std::size_t motion = 13 * sizeof(double);
-      ASSERT_EQ(episode.observations[bodies].size(), motion);
-      EXPECT_EQ(episode.observations[bodies],
-                row(episode.observations[bodies + 1], 5, 4).substr(motion, motion));
+      ASSERT_EQ(episode.observations[bodies + 1].size(), motion);
+      EXPECT_EQ(episode.observations[bodies + 1],
+                row(episode.observations[bodies], 5, 4).substr(motion, motion));
       for (std::size_t k = 0; k < 2; ++k)
         EXPECT_EQ(row(episode.observations[bodies + 2], 2, k),
                   row(whole.observations[bodies], 5, 4 * k));
     }
   }
-  o.fields = {{0, FieldForm::field, {3}}};
+  o.record = {{sensor, {3}}};
   EXPECT_THROW(played(o), InputError) << "a row is two steps";
-  o.fields.reset();
-  o.bodies = {{{model.nb()}, {}}};
-  EXPECT_THROW(played(o), InputError);
   RolloutOutputs nobody;
   nobody.chosen_bodies = {-1};
   EXPECT_THROW(handed(model, nobody), InputError);
