@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Points are those of the file; restore_state() compares them with the model's.
-#include "io/trajectory/memory_rows.hpp"
+#include "io/trajectory/shear_rows.hpp"
 
 #include <fmt/format.h>
 
@@ -22,7 +22,7 @@ constexpr std::size_t kMostMemoryPoints = std::size_t{1} << 26;  // more is dama
 }
 
 /// Reads names and places of the points.
-std::vector<MemoryContact> read_contacts(const h5::Id& group) {
+std::vector<ShearSpringPlaces> read_contacts(const h5::Id& group) {
   const std::vector<std::string> names = h5::read_texts(group, "contacts");
   const auto first = h5::read_numbers<std::int64_t>(group, "first");
   const h5::Id dataset = h5::open_dataset(group, "place");
@@ -34,7 +34,7 @@ std::vector<MemoryContact> read_contacts(const h5::Id& group) {
   if (!fits) damaged(group, "contacts, first and place do not belong together");
   std::vector<double> places(3 * dims[0]);
   h5::read_box<double>(dataset, {0, 0}, dims, places.data());
-  std::vector<MemoryContact> contacts;
+  std::vector<ShearSpringPlaces> contacts;
   const double* place = places.data();
   for (std::size_t c = 0; c < names.size(); ++c) {
     contacts.push_back({names[c], std::vector<Vector3>(std::size_t(first[c + 1] - first[c]))});
@@ -54,7 +54,7 @@ std::optional<SavedMemory> read_memory(const h5::Id& file, int environments, std
   const auto found = std::lower_bound(rows.begin(), rows.end(), row);
   if (found == rows.end() || *found != row) return {};
   SavedMemory memory{read_contacts(group), {}};
-  MemoryPoints in_order;
+  ShearStateArrays in_order;
   in_order.row_of.resize(h5::dimensions(h5::open_dataset(group, "place"))[0]);
   std::iota(in_order.row_of.begin(), in_order.row_of.end(), 0);
   const h5::Id dataset = h5::open_dataset(group, "s");

@@ -189,13 +189,13 @@ void Recorder::add_sleep() {
 
 void Recorder::add_shear(const OutputTimes& times) {
   constexpr const char* kFrame = "axes of the moving frame that carries the point";
-  shear_points_ = memory_points(model_);
+  shear_points_ = shear_state_arrays(model_);
   const std::size_t points = shear_points_.count();
   if (points == 0) return;
   std::vector<std::string> names;
   std::vector<std::int64_t> first{0};
   std::vector<double> places;
-  for (const MemoryContact& contact : shear_points_.contacts) {
+  for (const ShearSpringPlaces& contact : shear_points_.contacts) {
     names.push_back(contact.name);
     first.push_back(first.back() + std::ssize(contact.places));
     for (const Vector3& p : contact.places) places.insert(places.end(), p.begin(), p.end());
@@ -479,7 +479,7 @@ void Recorder::write(When when, std::int64_t t) {
   }
 }
 
-std::optional<AuditSummary> Recorder::audit() const {
+std::optional<EnergyBalanceSummary> Recorder::audit() const {
   if (!audit_) return {};
   return audit_->summary();
 }

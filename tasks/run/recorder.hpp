@@ -9,8 +9,8 @@
 
 #include "engine/rows/channel.hpp"
 #include "engine/sense/readout.hpp"
-#include "engine/step/memory_arrays.hpp"
-#include "tasks/run/audit_recorder.hpp"
+#include "engine/step/shear_state_arrays.hpp"
+#include "tasks/run/energy_balance_recorder.hpp"
 #include "tasks/run/block_threads.hpp"
 #include "tasks/run/episode_program.hpp"
 #include "tasks/run/rollout_options.hpp"
@@ -48,7 +48,7 @@ class Recorder {
   /// Writes the channels that are due after `t` steps.
   void write(When when, std::int64_t t);
 
-  [[nodiscard]] std::optional<AuditSummary> audit() const;
+  [[nodiscard]] std::optional<EnergyBalanceSummary> audit() const;
 
  private:
   using Read = std::function<Numbers(std::int64_t t, int part)>;
@@ -92,8 +92,8 @@ class Recorder {
   BlockThreads* threads_ = nullptr;
   RowSink* sink_ = nullptr;
   std::vector<Readout> readouts_;  // one for each thread
-  std::optional<AuditRecorder> audit_;
-  MemoryPoints shear_points_;
+  std::optional<EnergyBalanceRecorder> audit_;
+  ShearStateArrays shear_points_;
   std::size_t bodies_ = 0, largest_reading_ = 0;  // recorded; numbers of an environment
   std::int64_t row_ = 0;
   double time_ = 0;

@@ -5,7 +5,7 @@
 #include <algorithm>
 
 #include "engine/base/as_size.hpp"
-#include "tasks/run/audit_recorder.hpp"
+#include "tasks/run/energy_balance_recorder.hpp"
 
 namespace tangere {
 namespace {
@@ -60,7 +60,7 @@ double rollout_bytes(const Model& model, int environments, const RolloutOutputs&
                           largest_reading(model, outputs));
   constexpr double kFlags = sizeof(std::int32_t) + sizeof(std::int8_t);
   return environments * (numbers * sizeof(double) + kFlags) +
-         (outputs.audit ? AuditRecorder::bytes(environments) : 0);
+         (outputs.audit ? EnergyBalanceRecorder::bytes(environments) : 0);
 }
 
 }  // namespace tangere

@@ -4,7 +4,7 @@
 #include "tasks/stress/stress_history.hpp"
 
 #include "engine/base/as_size.hpp"
-#include "engine/model/felt_bodies.hpp"
+#include "engine/model/sensed_bodies.hpp"
 #include "engine/model/shapes.hpp"
 
 namespace tangere {

@@ -6,7 +6,7 @@
 #include <filesystem>
 #include <fstream>
 
-#include "engine/model/felt_bodies.hpp"
+#include "engine/model/sensed_bodies.hpp"
 #include "engine/model/model.hpp"
 #include "engine/model/shapes.hpp"
 #include "engine/step/stepper.hpp"
@@ -285,7 +285,7 @@ TEST_F(RobotKinds, SkinsIgnoreWhatTouchesNothing) {
   const Scene scene = parse_scene(made.text, folder_ / "scene.xml").scene;
   EXPECT_THAT(scene.sensors.at(0).ignores, ElementsAre("cover", "thumb", "thumb_shape"));
   std::vector<std::string> felt;
-  for (const int k : felt_bodies(scene, scene.sensors[0]))
+  for (const int k : sensed_bodies(scene, scene.sensors[0]))
     felt.push_back(scene.links[std::size_t(k)].body.name);
   EXPECT_THAT(felt, ElementsAre("finger")) << "the palm is a neighbour";
 }
