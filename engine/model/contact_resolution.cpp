@@ -15,9 +15,9 @@
 #include <map>
 #include <numbers>
 
-#include "engine/model/sensed_bodies.hpp"
 #include "engine/model/mass_properties.hpp"
 #include "engine/model/outer_pose.hpp"
+#include "engine/model/sensed_bodies.hpp"
 #include "engine/model/shapes.hpp"
 
 namespace tangere {

@@ -226,7 +226,7 @@ void Recorder::add_shear(const OutputTimes& times) {
 void Recorder::read_shear(int block) {
   const std::size_t width = 3 * shear_points_.count();
   for (int lane = 0; lane < lanes_of(batch_, block); ++lane)
-    shear_points_.write(batch_.memories()[as_size(block * kernels::kBlock + lane)],
+    shear_points_.write(batch_.shear_states()[as_size(block * kernels::kBlock + lane)],
                         std::span(shear_).subspan(as_size(lane) * width, width));
 }
 

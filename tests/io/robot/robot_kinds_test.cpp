@@ -6,8 +6,8 @@
 #include <filesystem>
 #include <fstream>
 
-#include "engine/model/sensed_bodies.hpp"
 #include "engine/model/model.hpp"
+#include "engine/model/sensed_bodies.hpp"
 #include "engine/model/shapes.hpp"
 #include "engine/step/stepper.hpp"
 #include "io/robot/robot_import.hpp"
