@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Points are those of the file; restore_state() compares them with the model's.
-#include "io/trajectory/shear_rows.hpp"
+#include "io/trajectory/memory_rows.hpp"
 
 #include <fmt/format.h>
 

@@ -26,11 +26,11 @@ EnergyBalanceRecorder::EnergyBalanceRecorder(const Batch& batch, double h)
 }
 
 double EnergyBalanceRecorder::bytes(int environments) {
-  return environments *
-         double(sizeof(EnergyBalance) + sizeof(Sums) + (kEnergies + kMomenta + kPassed) * sizeof(double));
+  return environments * double(sizeof(EnergyBalance) + sizeof(Sums) +
+                               (kEnergies + kMomenta + kPassed) * sizeof(double));
 }
 
-Audit EnergyBalanceRecorder::audit(int environment, std::span<const double> u) {
+EnergyBalance EnergyBalanceRecorder::audit(int environment, std::span<const double> u) {
   const std::size_t nu = as_size(batch_.model().nu());
   return auditor_.read(batch_, environment, u.subspan(as_size(environment) * nu, nu));
 }

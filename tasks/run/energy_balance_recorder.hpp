@@ -40,7 +40,7 @@ class EnergyBalanceRecorder {
   const Batch& batch_;
   double h_;
   EnergyBalanceReader auditor_;
-  std::vector<EnergyBalance> before_;                       // (E)
+  std::vector<EnergyBalance> before_;               // (E)
   std::vector<double> energy_, momentum_, passed_;  // as above
   struct Sums {
     double motors = 0, taken = 0, made = 0, work = 0, most = 0;

@@ -126,65 +126,56 @@ void Recorder::add_sleep() {
        {{"trees", trees},
         {"meaning",
          "at each row of /q; a tree is a body, named, with all that joints connect it with"}}});
-  const auto source = [&](Read read) {
-    return Source{When::row, options_.outputs.states, true, 1, std::move(read)};
+  // `member`: of SleepState; numbers that it lacks are `none`.
+  const auto list = [&](const char* name, NumberType type, auto& buffer, auto member, auto none,
+                        std::size_t width, const char* meaning) {
+    buffer.resize(environments_ * width);
+    add({.name = name,
+         .type = type,
+         .shape = {environments_, width},
+         .meaning = meaning,
+         .storage = Channel::Storage::compressed},
+        {When::row, options_.outputs.states, true, 1,
+         [this, &buffer, member, none, width](auto, int) {
+           std::fill(buffer.begin(), buffer.end(), none);
+           for (std::size_t e = 0; e < environments_; ++e) {
+             const auto& numbers = batch_.sleeps()[e].*member;
+             std::copy(numbers.begin(), numbers.end(), buffer.begin() + std::ptrdiff_t(e * width));
+           }
+           return Numbers(std::span(std::as_const(buffer)));
+         }});
   };
-  const auto described = [&](const char* name, NumberType type, std::size_t width,
-                             const char* meaning) {
-    Channel channel{.name = name, .type = type, .shape = {environments_}, .meaning = meaning};
-    if (width > 0) channel.shape.push_back(width);
-    channel.storage = Channel::Storage::compressed;
-    return channel;
+  list("sleep/island", NumberType::int32, island_, &SleepState::island, -1, trees.size(),
+       "-1: awake; else the lowest tree of those that fell asleep together");
+  list("sleep/rested", NumberType::int32, rested_, &SleepState::rested, 0, trees.size(),
+       "steps in a row in which the tree hardly moved");
+  list("sleep/u", NumberType::float64, sleep_u_, &SleepState::u,
+       std::numeric_limits<double>::quiet_NaN(), as_size(model_.nu()),
+       "controls of the last step before which some tree rested; NaN: none");
+  const auto one = [&](const char* name, NumberType type, auto& buffer, auto number,
+                       const char* meaning) {
+    buffer.resize(environments_);
+    add({.name = name,
+         .type = type,
+         .shape = {environments_},
+         .meaning = meaning,
+         .storage = Channel::Storage::compressed},
+        {When::row, options_.outputs.states, true, 1, [this, &buffer, number](auto, int) {
+           for (std::size_t e = 0; e < environments_; ++e) buffer[e] = number(batch_.sleeps()[e]);
+           return Numbers(std::span(std::as_const(buffer)));
+         }});
   };
-  add(described("sleep/island", NumberType::int32, trees.size(),
-                "-1: awake; else the lowest tree of those that fell asleep together"),
-      source([this](auto, int) {
-        std::fill(island_.begin(), island_.end(), -1);
-        for (std::size_t e = 0; e < environments_; ++e)
-          std::copy(batch_.sleeps()[e].island.begin(), batch_.sleeps()[e].island.end(),
-                    &island_[e * island_.size() / environments_]);
-        return std::span<const std::int32_t>(island_);
-      }));
-  add(described("sleep/rested", NumberType::int32, trees.size(),
-                "steps in a row in which the tree hardly moved"),
-      source([this](auto, int) {
-        std::fill(rested_.begin(), rested_.end(), 0);
-        for (std::size_t e = 0; e < environments_; ++e)
-          std::copy(batch_.sleeps()[e].rested.begin(), batch_.sleeps()[e].rested.end(),
-                    &rested_[e * rested_.size() / environments_]);
-        return std::span<const std::int32_t>(rested_);
-      }));
-  island_.resize(environments_ * trees.size());
-  rested_.resize(island_.size());
-  Channel u = described("sleep/u", NumberType::float64, 1,
-                        "controls of the last step before which some tree rested; NaN: none");
-  u.shape[1] = as_size(model_.nu());
-  sleep_u_.resize(u.width());
-  add(std::move(u), source([this](auto, int) {
-        std::fill(sleep_u_.begin(), sleep_u_.end(), std::numeric_limits<double>::quiet_NaN());
-        for (int e = 0; e < batch_.environments(); ++e)
-          std::copy(batch_.sleeps()[as_size(e)].u.begin(), batch_.sleeps()[as_size(e)].u.end(),
-                    part(sleep_u_, e).begin());
-        return std::span<const double>(sleep_u_);
-      }));
-  clearance_.resize(environments_), resting_.resize(environments_);
-  add(described("sleep/clearance", NumberType::float64, 0,
-                "what awake bodies may move before one may reach a sleeping one [m]"),
-      source([this](auto, int) {
-        for (std::size_t e = 0; e < environments_; ++e)
-          clearance_[e] = batch_.sleeps()[e].clearance;
-        return std::span<const double>(clearance_);
-      }));
-  add(described("sleep/resting", NumberType::int8, 0,
-                "1: a tree that is awake rested in the last step; -1: nothing is known yet of this "
-                "environment"),
-      source([this](auto, int) {
-        for (std::size_t e = 0; e < environments_; ++e) {
-          const SleepState& sleep = batch_.sleeps()[e];
-          resting_[e] = sleep.asleep.empty() ? std::int8_t{-1} : std::int8_t{sleep.resting};
-        }
-        return std::span<const std::int8_t>(resting_);
-      }));
+  one(
+      "sleep/clearance", NumberType::float64, clearance_,
+      [](const SleepState& sleep) { return sleep.clearance; },
+      "what awake bodies may move before one may reach a sleeping one [m]");
+  one(
+      "sleep/resting", NumberType::int8, resting_,
+      [](const SleepState& sleep) {
+        return sleep.asleep.empty() ? std::int8_t{-1} : std::int8_t{sleep.resting};
+      },
+      "1: a tree that is awake rested in the last step; -1: nothing is known yet of this "
+      "environment");
 }
 
 void Recorder::add_shear(const OutputTimes& times) {
