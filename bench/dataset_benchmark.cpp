@@ -203,22 +203,32 @@ class Column {
                                  creation.get(), access.get()));
   }
   void append(const float* numbers, std::size_t rows) {
-    held_.insert(held_.end(), numbers, numbers + rows * width_);
-    while (held_.size() >= most_ * width_) flush(most_);
+    while (rows > 0) {
+      const std::size_t count = std::min<std::size_t>(rows, most_ - held_.size() / width_);
+      if (count == most_) {
+        write(numbers, count);
+      } else {
+        held_.insert(held_.end(), numbers, numbers + count * width_);
+        if (held_.size() == most_ * width_) end();
+      }
+      numbers += count * width_, rows -= count;
+    }
   }
-  void flush(hsize_t rows) {
-    if (rows == 0) return;
+  void end() {
+    if (!held_.empty()) write(held_.data(), held_.size() / width_);
+    held_.clear();
+  }
+
+ private:
+  void write(const float* numbers, hsize_t rows) {
     h5::Dims offset(row_.size() + 1, 0), count{rows}, size{written_ + rows};
     for (h5::Dims* dims : {&count, &size}) dims->insert(dims->end(), row_.begin(), row_.end());
     offset[0] = written_;
     H5Dset_extent(dataset_.get(), size.data());
-    h5::write_box<float>(dataset_, offset, count, held_.data());
-    held_.erase(held_.begin(), held_.begin() + std::ptrdiff_t(rows * width_));
+    h5::write_box<float>(dataset_, offset, count, numbers);
     written_ += rows;
   }
-  void end() { flush(held_.size() / width_); }
 
- private:
   h5::Dims row_;
   hsize_t width_ = 1, most_ = 1, written_ = 0;
   std::vector<float> held_;
