@@ -15,8 +15,8 @@
 #include "engine/base/error.hpp"
 #include "engine/step/sleeping_trees.hpp"
 #include "io/hdf5/h5.hpp"
-#include "io/trajectory/row_steps.hpp"
 #include "io/trajectory/memory_rows.hpp"
+#include "io/trajectory/row_steps.hpp"
 #include "io/trajectory/sleep_rows.hpp"
 
 namespace tangere {

@@ -150,8 +150,8 @@ class DatasetView {
     data_.episodes.push_back(std::move(episode));
   }
 
-  /// Takes the newest field at each frame, once: rows of obs, then final_obs; of a sensor that is not
-  /// read at every row, its samples.
+  /// Takes the newest field at each frame, once: rows of obs, then final_obs; of a sensor that is
+  /// not read at every row, its samples.
   void add_fields(std::size_t sensor, const Demo& which, const h5::Id& demo, ViewEpisode& episode) {
     const ViewSensor& view = data_.sensors[sensor];
     const std::optional<SampleSaid>& sampled = sampled_[sensor];

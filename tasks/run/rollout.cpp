@@ -51,19 +51,20 @@ Recording rollout_recording(const Batch& batch, const Stepper& stepper,
 
 RolloutSummary run_rollout(Batch& batch, std::span<Stepper> steppers,
                            const ControlProgram& controls, const RolloutOptions& options,
-                           RowSink& sink, const RolloutProgress& progress) {
+                           RowSink& sink, const ProgressCallback& progress,
+                           const std::stop_token& stop) {
   check(steppers, options);
   if (const double step = steppers.front().timestep(); controls.timestep() != step)
     throw InputError("controls laid out for a timestep of " + std::to_string(controls.timestep()) +
                      " s; the stepper's is " + std::to_string(step) + " s");
   controls.check_covers(options.first_step + options.steps);
   SceneProgram program(controls, 1, options.first_step);
-  return run_rollout(batch, steppers, program, options, sink, progress);
+  return run_rollout(batch, steppers, program, options, sink, progress, stop);
 }
 
 RolloutSummary run_rollout(Batch& batch, std::span<Stepper> steppers, EpisodeProgram& program,
                            const RolloutOptions& options, RowSink& sink,
-                           const RolloutProgress& progress) {
+                           const ProgressCallback& progress, const std::stop_token& stop) {
   check(steppers, options);
   const double timestep = steppers.front().timestep();
   check_sensor_memory(batch.model(), timestep);
@@ -96,7 +97,8 @@ RolloutSummary run_rollout(Batch& batch, std::span<Stepper> steppers, EpisodePro
     }
     recorder.write(Recorder::When::row, t + 1);
     summary.steps = t + 1;
-    summary.stopped = progress && !progress(t + 1);
+    if (progress) progress(t + 1);
+    summary.stopped = stop.stop_requested();
     if (summary.stopped) break;
   }
   summary.counts = tally.counts;
