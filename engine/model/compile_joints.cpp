@@ -68,7 +68,7 @@ void check_effects(const JointDescription& d, const JointEffects& e) {
                      std::to_string((*e.limits)[1]) + "; expected low, then high");
 }
 
-/// How kernels keep an effect and know of it, in the order of effect_field().
+/// Flag and storage of an effect in kernels, in the order of effect_field().
 struct EffectOfDof {
   kernels::Parameter kernels::DofEffects::*number;
   kernels::JointEffect flag;

@@ -299,7 +299,7 @@ void silence_element(Scene& scene, Element& d, Way way) {
   if (P == Part::tangential) fields = {Field::kt, Field::ks};
   if (P == Part::tangential && way == Way::removed) fields.push_back(Field::mu);
   if constexpr (std::is_same_v<Element, TactileDescription>) {
-    // The gel moves as before where it no longer remembers.
+    // Keep the stiffness of the gel for its markers when the shear springs are removed.
     if (d.markers && d.markers->stiffness == 0) d.markers->stiffness = d.coefficients.ks;
   }
   for (const Field field : fields) d.coefficients[coefficient_index(field)] = 0;

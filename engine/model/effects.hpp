@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The effects that a scene can call for: one table says of each whether a scene has it on, which
-// lines call for it, and how to make the scene without it. `inspect`, the measurement of what
-// effects cost and the tests all go by it, so that none of them can forget one.
+// Table of the physical effects: for each, whether a scene has it on, the lines that request it,
+// and how to remove it. `inspect`, the measurement of costs and the tests iterate over this table.
 #pragma once
 
 #include <cstdint>

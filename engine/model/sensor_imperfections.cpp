@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The table of a sensor's imperfections: reader, files, effects and checks go by it.
+// Table of a sensor's imperfections, used by reader, files, effects and checks.
 #include "engine/model/sensor_imperfections.hpp"
 
 #include <fmt/format.h>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Runs a batch once: takes controls and writes every row. It is serial; tasks/run/episodes.hpp runs
-// many episodes on many threads.
+// Runs one batch: computes controls, steps all blocks, one thread per stepper, and writes every
+// row. tasks/run/episodes.hpp runs many episodes as blocks on many threads.
 #pragma once
 
 #include <cstdint>
@@ -22,7 +22,7 @@ namespace tangere {
 struct RolloutSummary {
   std::int64_t steps = 0;  ///< done; fewer than requested if the caller stopped it
   StepCounts counts;       ///< of environments' steps, failing ones included
-  std::optional<EnergyBalanceSummary> audit;  ///< if it was asked for
+  std::optional<EnergyBalanceSummary> audit;  ///< if requested
   std::vector<FailedEnvironment> failures;    ///< in the order in which they failed
   bool stopped = false;                       ///< before its end
   double seconds = 0;                         ///< wall clock of the whole rollout, sink included
