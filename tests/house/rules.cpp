@@ -310,7 +310,7 @@ std::vector<Violation> check_heavy_headers(const Tree& tree) {
   static const std::map<std::string, std::map<std::string, int>> allowed{
       {"CLI/", {{"apps", 1}}},
       {"Eigen/", {{"engine/derivative", 1}, {"engine/step", 1}, {"tasks/gradients", 1}}},
-      {"hdf5.h", {{"io/hdf5", 8}, {"io/dataset", 10}, {"io/trajectory", 6}, {"io/view", 4}}},
+      {"hdf5.h", {{"io/hdf5", 9}, {"io/dataset", 10}, {"io/trajectory", 6}, {"io/view", 4}}},
       {"nlohmann/json.hpp", {{"apps", 31}, {"io/dataset", 2}, {"io/view", 1}}},
       {"tbb/flow_graph.h", {{"tasks/run", 1}}},
       {"regex", {}},
