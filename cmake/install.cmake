@@ -42,22 +42,24 @@ set(public_headers
   engine/derivative/readout_pullback.hpp
   engine/derivative/step_jacobian.hpp
   engine/derivative/tangent.hpp
-  engine/model/contact_resolution.hpp
-  engine/model/effects.hpp
-  engine/model/felt_bodies.hpp
-  engine/model/field_form.hpp
+  engine/scene/contact_resolution.hpp
+  engine/scene/effect_kind.hpp
+  engine/scene/effects.hpp
+  engine/scene/felt_bodies.hpp
+  engine/scene/field_form.hpp
   engine/model/model.hpp
   engine/model/model_info.hpp
-  engine/model/number_address.hpp
-  engine/model/outer_pose.hpp
-  engine/model/output_times.hpp
-  engine/model/pose.hpp
+  engine/scene/number_address.hpp
+  engine/scene/outer_pose.hpp
+  engine/scene/output_times.hpp
+  engine/scene/pose.hpp
   engine/model/random.hpp
-  engine/model/scene.hpp
-  engine/model/scene_number.hpp
-  engine/model/scheme.hpp
-  engine/model/sensor_imperfections.hpp
-  engine/model/shapes.hpp
+  engine/scene/scene.hpp
+  engine/scene/scene_number.hpp
+  engine/scene/scheme.hpp
+  engine/scene/sensor_imperfections.hpp
+  engine/scene/shapes.hpp
+  engine/scene/units.hpp
   engine/model/short_touches.hpp
   engine/rows/episode_sink.hpp
   engine/rows/row_sink.hpp

@@ -3,7 +3,7 @@
 // lost in silence.
 #pragma once
 
-#include "engine/model/scene.hpp"
+#include "engine/scene/scene.hpp"
 #include "kernels/contact/shapes/distance_grid.hpp"
 
 namespace tangere {

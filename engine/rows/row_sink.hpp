@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <span>
 
-#include "engine/model/field_form.hpp"
+#include "engine/scene/field_form.hpp"
 #include "engine/step/shear_memory.hpp"
 #include "engine/step/sleep_state.hpp"
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The imperfections of sensors, at the one place where fields are read: what a sensor says for an
 // ideal field, and the derivative of that, forward and in reverse
-// (engine/model/sensor_imperfections.hpp has the equations).
+// (engine/scene/sensor_imperfections.hpp has the equations).
 #pragma once
 
 #include <span>

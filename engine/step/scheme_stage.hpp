@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // What a stage of a scheme begins with, in a workspace's rows, by the equations at the head of
-// engine/model/scheme.hpp.
+// engine/scene/scheme.hpp.
 #pragma once
 
-#include "engine/model/scheme.hpp"
+#include "engine/scene/scheme.hpp"
 #include "engine/step/state_difference.hpp"
 #include "engine/step/workspace.hpp"
 

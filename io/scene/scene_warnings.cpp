@@ -10,8 +10,8 @@
 #include <optional>
 #include <set>
 
-#include "engine/model/felt_bodies.hpp"
-#include "engine/model/shapes.hpp"
+#include "engine/scene/felt_bodies.hpp"
+#include "engine/scene/shapes.hpp"
 #include "io/scene/scene_sections.hpp"
 
 namespace tangere {

@@ -4,7 +4,7 @@
 
 #include <stdexcept>
 
-#include "engine/model/scene_number.hpp"
+#include "engine/scene/scene_number.hpp"
 #include "engine/step/sleeping_trees.hpp"
 
 namespace tangere {

@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "engine/model/field_form.hpp"
-#include "engine/model/scene.hpp"
+#include "engine/scene/field_form.hpp"
+#include "engine/scene/scene.hpp"
 #include "engine/step/memory_arrays.hpp"
 #include "io/trajectory/run_facts.hpp"
 

@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "engine/base/precision.hpp"
-#include "engine/model/field_form.hpp"
 #include "engine/rows/episode_sink.hpp"
+#include "engine/scene/field_form.hpp"
 #include "tasks/run/step_counts.hpp"
 
 namespace tangere {

@@ -6,9 +6,9 @@
 #include <filesystem>
 #include <fstream>
 
-#include "engine/model/felt_bodies.hpp"
 #include "engine/model/model.hpp"
-#include "engine/model/shapes.hpp"
+#include "engine/scene/felt_bodies.hpp"
+#include "engine/scene/shapes.hpp"
 #include "engine/step/stepper.hpp"
 #include "io/robot/robot_import.hpp"
 #include "io/scene/scene_reader.hpp"
