@@ -99,6 +99,7 @@ set(public_headers
   kernels/table/isa.hpp
   tasks/catalogue/task.hpp
   tasks/catalogue/task_list.hpp
+  tasks/effects/ablation.hpp
   tasks/gradients/field_sequence.hpp
   tasks/gradients/gradient_options.hpp
   tasks/gradients/gradients.hpp

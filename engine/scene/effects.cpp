@@ -5,10 +5,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
+#include <functional>
 #include <iterator>
 #include <type_traits>
-#include <utility>
 
 #include "engine/scene/scene_number.hpp"
 #include "engine/scene/schema.hpp"
@@ -26,6 +25,23 @@ std::string number_and_word(std::size_t n, const char* one, const char* many) {
 void add_source(EffectInfo& info, const Source& source) {
   if (source.line > 0) info.sources.push_back(source);
 }
+
+/// Sums `count_of` each member of a list; the lines are those of members that count.
+template <class List, class CountOf, class SourceOf>
+EffectInfo counted(const List& list, const CountOf& count_of, const SourceOf& source_of,
+                   const char* one, const char* many) {
+  EffectInfo info;
+  std::size_t sum = 0;
+  for (const auto& member : list) {
+    const auto count = static_cast<std::size_t>(count_of(member));
+    if (count > 0) add_source(info, source_of(member));
+    sum += count;
+  }
+  info.on = sum > 0;
+  info.reason = number_and_word(sum, one, many);
+  return info;
+}
+const Source& joint_source(const LinkDescription& link) { return link.joint.source; }
 
 bool varies(const Scene& scene, SceneNumber number, Field field) {
   number.field = field;
@@ -46,18 +62,13 @@ EffectInfo find_gravity(const Scene& scene, int /*element*/) {
 }
 
 EffectInfo find_velocity_products(const Scene& scene, int /*element*/) {
-  EffectInfo info;
-  std::size_t joints = 0;
-  for (const LinkDescription& link : scene.links) {
-    bool turns = false;
-    for (int k = 0; k < dof_count(link.joint.type); ++k)
-      turns = turns || dof_turns(link.joint.type, k);
-    if (!turns) continue;
-    ++joints;
-    add_source(info, link.joint.source);
-  }
-  info.on = joints > 0;
-  info.reason = info.on ? number_and_word(joints, "joint turns", "joints turn") : "no joint turns";
+  const auto turns = [](const LinkDescription& link) {
+    int count = 0;
+    for (int k = 0; k < dof_count(link.joint.type); ++k) count += dof_turns(link.joint.type, k);
+    return count > 0;
+  };
+  EffectInfo info = counted(scene.links, turns, joint_source, "joint turns", "joints turn");
+  if (!info.on) info.reason = "no joint turns";
   return info;
 }
 
@@ -72,39 +83,24 @@ bool has_effect(const Scene& scene, const JointDescription& joint, std::size_t k
 
 template <Field Of>
 EffectInfo find_in_joints(const Scene& scene, int /*element*/) {
-  EffectInfo info;
-  std::size_t joints = 0;
-  for (const LinkDescription& link : scene.links) {
-    if (!has_effect(scene, link.joint, effect_index(Of))) continue;
-    ++joints;
-    add_source(info, link.joint.source);
-  }
-  info.on = joints > 0;
-  info.reason = number_and_word(joints, "joint", "joints");
-  return info;
+  const auto has = [&](const LinkDescription& link) {
+    return has_effect(scene, link.joint, effect_index(Of));
+  };
+  return counted(scene.links, has, joint_source, "joint", "joints");
 }
-
-// --- motors ---
 
 template <MotorControl Control>
 EffectInfo find_motors(const Scene& scene, int /*element*/) {
-  EffectInfo info;
-  std::size_t controls = 0;
-  for (const MotorDescription& motor : scene.motors) {
-    if (motor.control != Control) continue;
-    controls += std::size_t(dofs_driven(scene, motor));
-    add_source(info, motor.source);
-  }
-  info.on = controls > 0;
-  info.reason = number_and_word(controls, "control", "controls");
-  return info;
+  const auto controls = [&](const MotorDescription& motor) {
+    return motor.control == Control ? dofs_driven(scene, motor) : 0;
+  };
+  return counted(scene.motors, controls, std::mem_fn(&MotorDescription::source), "control",
+                 "controls");
 }
 
 // --- contacts and sensors ---
 
-/// The effects of a contact or a sensor.
-enum class Part { whole, tangential, damping, memory };
-
+using Kind = EffectKind;
 template <Owner Of, class AnyScene>
 auto& elements(AnyScene& scene) {
   if constexpr (Of == Owner::contact)
@@ -132,25 +128,28 @@ bool acts(const Scene& scene, const Element& d, Field field) {
   return d.coefficients[coefficient_index(field)] != 0 || varies(scene, first_number(d), field);
 }
 
-template <Part Of, class Element>
-bool element_on(const Scene& scene, const Element& d) {
-  if (Of == Part::tangential)
+template <class Element>
+bool element_on(const Scene& scene, const Element& d, Kind kind) {
+  if (kind == Kind::pair_contact) return true;
+  if (kind == Kind::pair_friction)  // from damping or a spring
     return (acts(scene, d, Field::kt) || acts(scene, d, Field::ks)) && acts(scene, d, Field::mu);
-  if (Of == Part::memory) return acts(scene, d, Field::ks);
-  return Of == Part::whole || acts(scene, d, Field::damping);
+  return std::ranges::any_of(coefficients_of(kind),
+                             [&](Field field) { return acts(scene, d, field); });
 }
 
-template <Part Of, class Element>
-std::string element_reason(const Scene& scene, const Element& d) {
+template <class Element>
+std::string element_reason(const Scene& scene, const Element& d, Kind kind) {
   const auto text = [&](Field field) { return coefficient_text(scene, d, field); };
   const bool idle = !std::is_same_v<Element, TactileDescription> && !acts(scene, d, Field::kn) &&
                     !acts(scene, d, Field::damping);
-  if (Of == Part::whole)
+  if (kind == Kind::pair_contact)
     return "declared, " + text(Field::kn) + (idle ? ", no damping: it never pushes" : "");
-  if (Of == Part::tangential)
+  if (kind == Kind::pair_friction)
     return text(Field::kt) + (acts(scene, d, Field::ks) ? ", " + text(Field::ks) : "") + ", " +
            text(Field::mu);
-  return text(Of == Part::memory ? Field::ks : Field::damping);
+  std::string all;
+  for (const Field field : coefficients_of(kind)) all += (all.empty() ? "" : ", ") + text(field);
+  return all;
 }
 
 template <Owner Of>
@@ -160,20 +159,20 @@ std::string number_of_elements(std::size_t n) {
   return number_and_word(n, "sensor declared", "sensors declared");
 }
 
-template <Owner Of, Part P>
+template <Owner Of, Kind K>
 EffectInfo find_elements(const Scene& scene, int element) {
   const auto& all = elements<Of>(scene);
   EffectInfo info;
   std::size_t on = 0;
   for (std::size_t k = 0; k < all.size(); ++k) {
-    if ((element >= 0 && std::size_t(element) != k) || !element_on<P>(scene, all[k])) continue;
+    if ((element >= 0 && std::size_t(element) != k) || !element_on(scene, all[k], K)) continue;
     ++on;
     add_source(info, all[k].source);
   }
   info.on = on > 0;
   if (element >= 0)
-    info.reason = element_reason<P>(scene, all[std::size_t(element)]);
-  else if (P == Part::whole)
+    info.reason = element_reason(scene, all[std::size_t(element)], K);
+  else if (K == Kind::pair_contact)
     info.reason = number_of_elements<Of>(all.size());
   else
     info.reason = fmt::format("{} of {}", on, number_of_elements<Of>(all.size()));
@@ -256,17 +255,10 @@ EffectInfo find_feedback(const Scene& scene, int element) {
 // --- numbers that vary ---
 
 EffectInfo find_varying(const Scene& scene, int /*element*/) {
-  EffectInfo info;
-  std::size_t numbers = 0;
-  for (const RandomizationDescription& d : scene.randomizations) {
-    if (is_of_start(d.number)) continue;
-    ++numbers;
-    add_source(info, d.source);
-  }
-  info.on = numbers > 0;
-  info.reason =
-      number_and_word(numbers, "number varies by environment", "numbers vary by environment");
-  return info;
+  return counted(
+      scene.randomizations, [](const auto& d) { return !is_of_start(d.number); },
+      std::mem_fn(&RandomizationDescription::source), "number varies by environment",
+      "numbers vary by environment");
 }
 
 // --- sleeping ---
@@ -289,12 +281,11 @@ struct Row {
   std::optional<Owner> owner{};  ///< element_owner()
 };
 
-template <Owner Of, Part P>
-constexpr Row element_row(EffectKind kind, const char* name, const char* of_element) {
-  return {kind, name, of_element, find_elements<Of, P>, Of};
+template <Owner Of, Kind K>
+constexpr Row element_row(const char* name, const char* of_element = "") {
+  return {K, name, of_element, find_elements<Of, pair_kind(K)>, Of};
 }
 
-using Kind = EffectKind;
 constexpr Row kTable[] = {
     {Kind::gravity, "gravity", "", find_gravity},
     {Kind::velocity_products, "velocity products", "", find_velocity_products},
@@ -304,21 +295,18 @@ constexpr Row kTable[] = {
     {Kind::armature, "armature", "", find_in_joints<Field::armature>},
     {Kind::force_motors, "force motors", "", find_motors<MotorControl::force>},
     {Kind::position_motors, "position motors", "", find_motors<MotorControl::position>},
-    element_row<Owner::contact, Part::whole>(Kind::pair_contact, "pair contact", ""),
-    element_row<Owner::contact, Part::tangential>(Kind::pair_friction, "pair friction",
-                                                  " friction"),
-    element_row<Owner::contact, Part::damping>(Kind::pair_damping, "pair damping", " damping"),
-    element_row<Owner::contact, Part::memory>(Kind::pair_memory, "pair memory", " memory"),
-    element_row<Owner::ground, Part::whole>(Kind::ground_contact, "ground contact", ""),
-    element_row<Owner::ground, Part::tangential>(Kind::ground_friction, "ground friction",
-                                                 " friction"),
-    element_row<Owner::ground, Part::damping>(Kind::ground_damping, "ground damping", " damping"),
-    element_row<Owner::ground, Part::memory>(Kind::ground_memory, "ground memory", " memory"),
-    element_row<Owner::tactile, Part::whole>(Kind::tactile, "tactile", ""),
-    element_row<Owner::tactile, Part::tangential>(Kind::tactile_shear, "tactile shear", " shear"),
-    element_row<Owner::tactile, Part::damping>(Kind::tactile_damping, "tactile damping",
-                                               " damping"),
-    element_row<Owner::tactile, Part::memory>(Kind::tactile_memory, "tactile memory", " memory"),
+    element_row<Owner::contact, Kind::pair_contact>("pair contact"),
+    element_row<Owner::contact, Kind::pair_friction>("pair friction", " friction"),
+    element_row<Owner::contact, Kind::pair_damping>("pair damping", " damping"),
+    element_row<Owner::contact, Kind::pair_memory>("pair memory", " memory"),
+    element_row<Owner::ground, Kind::ground_contact>("ground contact"),
+    element_row<Owner::ground, Kind::ground_friction>("ground friction", " friction"),
+    element_row<Owner::ground, Kind::ground_damping>("ground damping", " damping"),
+    element_row<Owner::ground, Kind::ground_memory>("ground memory", " memory"),
+    element_row<Owner::tactile, Kind::tactile>("tactile"),
+    element_row<Owner::tactile, Kind::tactile_shear>("tactile shear", " shear"),
+    element_row<Owner::tactile, Kind::tactile_damping>("tactile damping", " damping"),
+    element_row<Owner::tactile, Kind::tactile_memory>("tactile memory", " memory"),
     {Kind::sensor_imperfections, "sensor imperfections", " imperfections", find_imperfections,
      Owner::tactile},
     {Kind::markers, "markers", " markers", find_markers, Owner::tactile},

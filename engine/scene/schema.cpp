@@ -387,6 +387,14 @@ const Attribute& attribute_of(Element element, std::string_view name) {
   throw std::logic_error(fmt::format("<{}> has no attribute {}", to_string(element), name));
 }
 
+std::vector<NumberField> coefficients_of(EffectKind kind) {
+  std::vector<NumberField> fields;
+  const EffectKind of = kind < E::pair_contact ? kind : pair_kind(kind);
+  for (const Attribute& a : kSchema)
+    if (a.field && a.effect == of) fields.push_back(*a.field);
+  return fields;
+}
+
 std::vector<std::string> words_of(const char* between_blanks) {
   std::vector<std::string> words;
   std::istringstream stream(between_blanks);

@@ -119,6 +119,14 @@ std::vector<std::string> words_of(const char* between_blanks);
 /// Returns the attribute of an element. Throws std::logic_error where the schema has none.
 const Attribute& attribute_of(Element element, std::string_view name);
 
+/// The kind of pair contacts for an effect of contacts or sensors.
+constexpr EffectKind pair_kind(EffectKind kind) {
+  constexpr int kFirst = static_cast<int>(EffectKind::pair_contact), kParts = 4;
+  return static_cast<EffectKind>(kFirst + (static_cast<int>(kind) - kFirst) % kParts);
+}
+/// Returns the coefficients of joints, contacts or sensors that call for an effect of theirs.
+std::vector<NumberField> coefficients_of(EffectKind kind);
+
 /// Calls f(row, member) for all attributes of an element whose values are members of T.
 template <class T, class F>
 void for_each_member(Element element, const F& f) {

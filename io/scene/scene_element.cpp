@@ -35,8 +35,8 @@ bool SceneElement::is_there(const Attribute& row) const {
 std::vector<double> SceneElement::values(const Attribute& row, std::size_t count,
                                          bool turns_or_linear) const {
   std::vector<double> x;
-  if (has(row.name) || row.usual == nullptr) {
-    x = SceneNode::numbers(row.name, count);
+  if (has(row.name) || row.usual == nullptr || *row.usual == '\0') {
+    x = SceneNode::numbers(row.name, count);  // fails if it is missing
   } else {
     std::istringstream usual(row.usual);
     for (double value; usual >> value;) x.push_back(value);

@@ -9,6 +9,7 @@
 
 #include "engine/scene/field_form.hpp"
 #include "engine/scene/scene_number.hpp"
+#include "engine/scene/schema.hpp"
 
 namespace tangere {
 namespace {
@@ -134,31 +135,24 @@ void drop_feedback(Scene& scene, int element, Ablation way) {
   }
 }
 
-/// The coefficients whose values are the effect.
-Fields coefficients_of(EffectKind kind, Ablation way) {
-  switch (kind) {
-    case Kind::pair_friction:
-    case Kind::ground_friction:
-    case Kind::tactile_shear:
-      return way == Ablation::removed ? Fields{Field::kt, Field::ks, Field::mu}
-                                      : Fields{Field::kt, Field::ks};
-    case Kind::pair_damping:
-    case Kind::ground_damping:
-    case Kind::tactile_damping: return {Field::damping};
-    case Kind::pair_memory:
-    case Kind::ground_memory:
-    case Kind::tactile_memory: return {Field::ks};
-    default: break;
+/// The coefficients to set to zero for one of the effects of contacts or sensors.
+Fields zeros_of(EffectKind kind, Ablation way) {
+  Fields fields = coefficients_of(kind);
+  if (!is_part(kind)) {
+    fields.clear();
+    for (int k = 0; k < kCoefficients; ++k) fields.push_back(coefficient_field(k));
+  } else if (kind == Kind::pair_friction || kind == Kind::ground_friction ||
+             kind == Kind::tactile_shear) {
+    fields.push_back(Field::ks);  // what friction remembers goes with it
+    if (way != Ablation::removed) std::erase(fields, Field::mu);
   }
-  Fields all;
-  for (int k = 0; k < kCoefficients; ++k) all.push_back(coefficient_field(k));
-  return all;
+  return fields;
 }
 
 /// Removes an effect of contacts or sensors: coefficients, or the elements themselves.
 template <class Element>
 void drop_elements(Scene& scene, std::vector<Element>& all, const Effect& effect, Ablation way) {
-  const Fields fields = coefficients_of(effect.kind, way);
+  const Fields fields = zeros_of(effect.kind, way);
   for (std::size_t k = 0; k < all.size(); ++k) {
     if (!is_meant(effect.element, k)) continue;
     if constexpr (std::is_same_v<Element, TactileDescription>) {
