@@ -30,6 +30,7 @@ set(public_headers
   apps/program.hpp
   engine/base/aligned.hpp
   engine/base/as_size.hpp
+  engine/base/checks.hpp
   engine/base/error.hpp
   engine/base/precision.hpp
   engine/base/vector3.hpp

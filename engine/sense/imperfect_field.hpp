@@ -7,6 +7,7 @@
 #include <span>
 
 #include "engine/model/compiled_model.hpp"
+#include "engine/model/field_form.hpp"
 #include "engine/sense/pad_reader.hpp"
 #include "engine/step/batch.hpp"
 
@@ -23,6 +24,11 @@ ReadingKey key_of(const Batch& batch, int environment);
 struct FieldPart {
   int first = 0, count = 3;
 };
+/// Returns those that a form is computed from.
+inline FieldPart part_of(FieldForm form) {
+  if (form == FieldForm::sum) return {0, 3};
+  return {form == FieldForm::pressure ? 2 : 0, components_of(form)};
+}
 
 /// Owns the scratch of one thread. Allocates only when made, and only for a model with a sensor
 /// that is imperfect. Functions of a sensor that is not change nothing.

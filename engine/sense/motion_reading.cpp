@@ -33,9 +33,12 @@ void write_positions(const CompiledModel& m, const PadReader& reader, int group,
 
 void read_bodies(const CompiledModel& m, PadReader& reader, const Batch& batch, int environment,
                  std::span<double> pose, std::span<double> twist, std::span<const int> chosen) {
+  for (const int body : chosen) checked_index("body", body, std::ssize(m.bodies));
+  const std::size_t count = chosen.empty() ? m.bodies.size() : chosen.size();
+  check_size("poses of bodies", pose.size(), 7 * count);
+  check_size("twists of bodies", twist.size(), 6 * count);
   const int group = environment % kBlock / kGroup, lane = environment % kGroup;
   reader.move(batch, environment / kBlock, group);
-  const std::size_t count = chosen.empty() ? m.bodies.size() : chosen.size();
   for (std::size_t b = 0; b < count; ++b) {
     const CompiledBody& body = m.bodies[chosen.empty() ? b : std::size_t(chosen[b])];
     const kernels::LinkPose<double> link = reader.link(body.link, group, lane);
@@ -53,6 +56,9 @@ void read_bodies(const CompiledModel& m, PadReader& reader, const Batch& batch, 
 
 void read_end_effectors(const CompiledModel& m, PadReader& reader, const Batch& batch,
                         int environment, std::span<double> position, std::span<double> velocity) {
+  check_size("positions of end effectors", position.size(), 3 * m.end_effectors.size());
+  if (!velocity.empty())
+    check_size("velocities of end effectors", velocity.size(), 3 * m.end_effectors.size());
   const int group = environment % kBlock / kGroup, lane = environment % kGroup;
   reader.move(batch, environment / kBlock, group);
   write_positions(m, reader, group, lane, position);
@@ -74,6 +80,8 @@ void read_end_effectors(const CompiledModel& m, PadReader& reader, const Batch& 
 
 void read_end_effector_jacobian(const CompiledModel& m, PadReader& reader, const Batch& batch,
                                 int environment, std::span<double> jacobian) {
+  check_size("Jacobian of end effectors", jacobian.size(),
+             3 * m.end_effectors.size() * std::size_t(m.nv));
   const int group = environment % kBlock / kGroup, lane = environment % kGroup;
   reader.move(batch, environment / kBlock, group);
   const auto nv = std::size_t(m.nv);

@@ -56,4 +56,18 @@ class PadReader {
   AlignedVector<kernels::LaneRow> sizes_;  // (targets, kGroups, 3) of shapes whose size varies
 };
 
+/// Runs the kernel of a field's precision.
+inline int run_tactile(const kernels::TactileArgs<double>& a) {
+  return kernels::active_kernels().tactile(a);
+}
+inline int run_tactile(const kernels::TactileArgs<float>& a) {
+  return kernels::active_kernels().tactile_mixed(a);
+}
+inline void run_tactile(const kernels::TactileBlockArgs<double>& a) {
+  kernels::active_kernels().tactile_block(a);
+}
+inline void run_tactile(const kernels::TactileBlockArgs<float>& a) {
+  kernels::active_kernels().tactile_block_mixed(a);
+}
+
 }  // namespace tangere

@@ -20,6 +20,7 @@
 #include "engine/sense/motion_reading.hpp"
 #include "engine/sense/pad_reader.hpp"
 #include "engine/sense/past_states.hpp"
+#include "engine/sense/readout_checks.hpp"
 
 namespace tangere {
 
@@ -89,19 +90,6 @@ struct Readout::Impl {
     if constexpr (std::is_same_v<Real, float>) return single.data();
   }
 
-  static int run(const kernels::TactileArgs<double>& a) {
-    return kernels::active_kernels().tactile(a);
-  }
-  static int run(const kernels::TactileArgs<float>& a) {
-    return kernels::active_kernels().tactile_mixed(a);
-  }
-  static void run(const kernels::TactileBlockArgs<double>& a) {
-    kernels::active_kernels().tactile_block(a);
-  }
-  static void run(const kernels::TactileBlockArgs<float>& a) {
-    kernels::active_kernels().tactile_block_mixed(a);
-  }
-
   /// Calls `body` with a zero of the type in which the readout computes.
   template <class Body>
   auto in_precision(const Body& body) {
@@ -130,7 +118,7 @@ struct Readout::Impl {
   int put_touched(int environment, FieldOutput of, T* dense, const Put& put) {
     auto a = arguments<Real>(environment, of);
     a.values = scratch<Real>();
-    const int count = run(a), numbers = computed(of.form) * kTactileTile;
+    const int count = run_tactile(a), numbers = computed(of.form) * kTactileTile;
     const auto expand = [&]<int Components>() {
       for (int k = 0; k < count; ++k)
         put_tile<Components>(*a.pad, a.active[k], a.values + numbers * k, dense, put);
@@ -153,7 +141,7 @@ struct Readout::Impl {
         if (of.form != FieldForm::shear) {
           auto a = arguments<Real>(environment, of);
           a.dense = dense;
-          return run(a);
+          return run_tactile(a);
         }
       }
       return put_touched<Real>(environment, of, dense,
@@ -179,12 +167,6 @@ struct Readout::Impl {
     return of.form == FieldForm::markers || is_elastic(of) ||
            (of.form != FieldForm::ideal && sensor_of(of.sensor).imperfect);
   }
-  static FieldPart part_of(FieldForm form) {
-    const int components = components_of(form);
-    if (form == FieldForm::sum) return {0, 3};
-    return {form == FieldForm::pressure ? 2 : 0, components};
-  }
-
   /// Turns an ideal field into the reading of an imperfect sensor, in the readout's precision.
   void make_imperfect(const Batch& batch, int environment, FieldOutput of,
                       std::span<double> field) {
@@ -325,7 +307,7 @@ struct Readout::Impl {
       pad.skewed = false;  // forces in the pad's own axes, which are perpendicular
       a.pad = &pad;
       a.values = scratch<Real>();
-      const int count = run(a);
+      const int count = run_tactile(a);
       const int sign = compiled(model).sensor_info[std::size_t(sensor)].pressure_sign;
       const FieldSum total = field_sum(pad, in_body[std::size_t(sensor)], sign,
                                        {reader.active.data(), std::size_t(count)}, a.values);
@@ -379,7 +361,7 @@ struct Readout::Impl {
         auto a = reader.block_arguments<Real>(of.sensor, first / kGroup);
         a.pressure = of.form == FieldForm::pressure;
         a.dense = out.data() + first;
-        run(a);
+        run_tactile(a);
       }
       const auto kept = std::size_t(components_of(of.form));
       for (std::size_t e = 0; !direct && e < std::size_t(environments); ++e)
@@ -409,10 +391,10 @@ struct Readout::Impl {
       a.active = frame.tiles_.data();
       if constexpr (std::is_same_v<Real, T>) {
         a.values = frame.values_.get();
-        return run(a);
+        return run_tactile(a);
       } else {
         a.values = scratch<Real>();
-        const int count = run(a);
+        const int count = run_tactile(a);
         std::transform(a.values, a.values + std::ptrdiff_t{3} * kTactileTile * count,
                        frame.values_.get(), [](Real x) { return static_cast<T>(x); });
         return count;
@@ -480,8 +462,20 @@ struct Readout::Impl {
   }
 
   template <class T>
+  void tactile(const Batch& batch, int environment, int sensor, std::span<T> force) {
+    check_environment(model, batch, environment);
+    checked_index("sensor", sensor, std::ssize(model.sensors()));
+    check_size("field", force.size(), numbers_of(sensor_of(sensor).points(), FieldForm::field));
+    place(batch, environment, sensor);
+    write(batch, environment, {sensor}, force.data());
+  }
+
+  template <class T>
   void block_spans(const Batch& batch, int number, FieldOutput of,
                    std::span<const std::span<T>> readings) {
+    checked_index("sensor", of.sensor, std::ssize(model.sensors()));
+    check_block(model, batch, number, "reading", readings,
+                numbers_of(sensor_of(of.sensor).points(), of.form));
     std::array<T*, kBlock> out{};
     for (std::size_t e = 0; e < std::min(readings.size(), std::size_t(kBlock)); ++e)
       out[e] = readings[e].data();
@@ -514,39 +508,44 @@ Precision Readout::precision() const { return impl_->precision; }
 
 void Readout::bodies(const Batch& batch, int environment, std::span<double> pose,
                      std::span<double> twist, std::span<const int> chosen) {
+  check_environment(impl_->model, batch, environment);
   read_bodies(compiled(impl_->model), impl_->reader, batch, environment, pose, twist, chosen);
 }
 void Readout::end_effectors(const Batch& batch, int environment, std::span<double> position,
                             std::span<double> velocity) {
+  check_environment(impl_->model, batch, environment);
   tangere::read_end_effectors(compiled(impl_->model), impl_->reader, batch, environment, position,
                               velocity);
 }
 void Readout::read_end_effectors(const Batch& batch, int block,
                                  std::span<const std::span<double>> positions) {
+  check_block(impl_->model, batch, block, "positions of end effectors", positions,
+              3 * impl_->model.end_effectors().size());
   tangere::read_end_effectors(compiled(impl_->model), impl_->reader, batch, block, positions);
 }
 void Readout::end_effector_jacobian(const Batch& batch, int environment,
                                     std::span<double> jacobian) {
+  check_environment(impl_->model, batch, environment);
   read_end_effector_jacobian(compiled(impl_->model), impl_->reader, batch, environment, jacobian);
 }
 
 void Readout::tactile(const Batch& batch, int environment, int sensor, std::span<double> force) {
-  impl_->place(batch, environment, sensor);
-  impl_->write(batch, environment, {sensor}, force.data());
+  impl_->tactile(batch, environment, sensor, force);
 }
 void Readout::tactile(const Batch& batch, int environment, int sensor, std::span<float> force) {
-  impl_->place(batch, environment, sensor);
-  impl_->write(batch, environment, {sensor}, force.data());
+  impl_->tactile(batch, environment, sensor, force);
 }
 
 template <class T>
 void Readout::read(const Batch& batch, int environment, DenseFrame<T>& frame) {
+  check_frame(impl_->model, batch, environment, frame.model());
   impl_->place(batch, environment, frame.sensor_);
   impl_->refresh(batch, environment, frame);
 }
 
 template <class T>
 void Readout::read(const Batch& batch, int environment, CompactFrame<T>& frame) {
+  check_frame(impl_->model, batch, environment, frame.model());
   impl_->place(batch, environment, frame.sensor_);
   impl_->compact(batch, environment, frame);
 }
@@ -562,6 +561,7 @@ void Readout::read_block(const Batch& batch, int block, FieldOutput output,
 
 template <class T>
 void Readout::read_block(const Batch& batch, int block, std::span<DenseFrame<T>> frames) {
+  check_frames(impl_->model, batch, block, std::span<const DenseFrame<T>>(frames));
   if (frames.empty()) return;
   std::array<T*, kBlock> dense{};
   const bool whole = impl_->together(batch, block, frames[0].sensor_);
@@ -578,6 +578,7 @@ void Readout::read_block(const Batch& batch, int block, std::span<DenseFrame<T>>
 
 template <class T>
 void Readout::read_block(const Batch& batch, int block, std::span<CompactFrame<T>> frames) {
+  check_frames(impl_->model, batch, block, std::span<const CompactFrame<T>>(frames));
   if (frames.empty()) return;
   impl_->place_block(batch, block, frames[0].sensor_);
   const int environments = Impl::environments_of(batch, block);

@@ -22,6 +22,7 @@ class DenseFrame {
   /// has no points.
   DenseFrame(const Model& model, int sensor, FieldForm form = FieldForm::field);
 
+  [[nodiscard]] const Model& model() const { return model_; }
   [[nodiscard]] int sensor() const { return sensor_; }
   [[nodiscard]] FieldForm form() const { return form_; }
   [[nodiscard]] std::span<const T> values() const { return values_; }
@@ -46,6 +47,7 @@ class CompactFrame {
   /// no such sensor.
   CompactFrame(const Model& model, int sensor);
 
+  [[nodiscard]] const Model& model() const { return model_; }
   [[nodiscard]] int sensor() const { return sensor_; }
   /// Indices of the touched tiles, rising. Tile t holds the 8 rows from 8 (t / tile_cols()) on and
   /// the 8 columns from 8 (t % tile_cols()) on.

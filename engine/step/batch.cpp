@@ -94,6 +94,14 @@ Batch::Batch(const Model& model, int environments, std::uint64_t seed, std::int6
 double* Batch::column(std::size_t lane) {
   return data_.data() + (lane / kBlock) * block_stride_ + lane % kBlock;
 }
+const double* Batch::column(std::size_t lane) const {
+  return data_.data() + (lane / kBlock) * block_stride_ + lane % kBlock;
+}
+
+const RandomizationDescription& Batch::randomization(int k) const {
+  const std::vector<RandomizationDescription>& all = compiled(model_).scene.randomizations;
+  return all[checked_index("randomized number", k, std::ssize(all))];
+}
 
 /// Draws an episode's numbers. Padding lanes keep the scene's own numbers.
 void Batch::draw_episode(std::size_t lane) {
@@ -117,7 +125,7 @@ void Batch::draw_episode(std::size_t lane) {
 }
 
 void Batch::reset(int environment, std::int64_t episode) {
-  const std::size_t lane = std::size_t(environment);
+  const std::size_t lane = this->lane(environment);
   episode_[lane] = episode;
   draw_episode(lane);
   status_[lane] = StepStatus::converged;
@@ -132,16 +140,22 @@ void Batch::reset(int environment, std::int64_t episode) {
 }
 
 void Batch::displace_state(int environment, std::span<const double> q, std::span<const double> v) {
+  displace(lane(environment), q, v);
+}
+
+void Batch::displace(std::size_t lane, std::span<const double> q, std::span<const double> v) {
   const CompiledModel& m = compiled(model_);
-  double* const own = column(std::size_t(environment));
+  check_size("q", q.size(), as_size(m.nq));
+  check_size("v", v.size(), as_size(m.nv));
+  double* const own = column(lane);
   for (int i = 0; i < m.nq; ++i) own[(m.layout.q + i) * kBlock] = q[std::size_t(i)];
   for (int i = 0; i < m.nv; ++i) own[(m.layout.v + i) * kBlock] = v[std::size_t(i)];
-  sleep_[std::size_t(environment)].wake();
-  clearance_[std::size_t(environment)] = 0;
+  sleep_[lane].wake();
+  clearance_[lane] = 0;
 }
 
 void Batch::write_state(std::size_t lane, std::span<const double> q, std::span<const double> v) {
-  displace_state(static_cast<int>(lane), q, v);
+  displace(lane, q, v);
   complete_state(lane);
 }
 
@@ -176,19 +190,21 @@ void Batch::complete_state(std::size_t lane) {
 }
 
 void Batch::get_q(int environment, std::span<double> q) const {
-  const double* column = block(environment / kBlock) + environment % kBlock;
+  const double* const column = this->column(lane(environment));
   const CompiledModel& m = compiled(model_);
+  check_size("q", q.size(), as_size(m.nq));
   for (int i = 0; i < m.nq; ++i) q[i] = column[std::size_t(m.layout.q + i) * kBlock];
 }
 
 void Batch::get_v(int environment, std::span<double> v) const {
-  const double* column = block(environment / kBlock) + environment % kBlock;
+  const double* const column = this->column(lane(environment));
   const CompiledModel& m = compiled(model_);
+  check_size("v", v.size(), as_size(m.nv));
   for (int i = 0; i < m.nv; ++i) v[i] = column[std::size_t(m.layout.v + i) * kBlock];
 }
 
 void Batch::set_state(int environment, std::span<const double> q, std::span<const double> v) {
-  const std::size_t lane = std::size_t(environment);
+  const std::size_t lane = this->lane(environment);
   write_state(lane, q, v);
   memory_[lane].clear();
   status_[lane] = StepStatus::converged;
@@ -197,10 +213,12 @@ void Batch::set_state(int environment, std::span<const double> q, std::span<cons
 
 void Batch::set_state(int environment, std::span<const double> q, std::span<const double> v,
                       std::span<const double> previous_q, std::span<const double> previous_v) {
-  const std::size_t lane = std::size_t(environment);
-  write_state(lane, previous_q, previous_v);
+  const std::size_t lane = this->lane(environment);
   const CompiledModel& m = compiled(model_);
-  double* column = block(environment / kBlock) + environment % kBlock;
+  check_size("q", q.size(), as_size(m.nq));
+  check_size("v", v.size(), as_size(m.nv));
+  write_state(lane, previous_q, previous_v);
+  double* const column = this->column(lane);
   std::vector<double> before_q(m.nq), before_v(m.nv);
   get_q(environment, before_q);
   get_v(environment, before_v);
@@ -215,6 +233,7 @@ void Batch::set_state(int environment, std::span<const double> q, std::span<cons
 }
 
 void Batch::set_memory(int environment, std::span<const ShearEntry> memory) {
+  const std::size_t lane = this->lane(environment);
   const int points = compiled(model_).remembering_points;
   int last = -1;
   for (const ShearEntry& e : memory) {
@@ -227,10 +246,11 @@ void Batch::set_memory(int environment, std::span<const ShearEntry> memory) {
         throw InputError("memory of friction: point " + std::to_string(e.point) + " is not finite");
     last = e.point;
   }
-  memory_[std::size_t(environment)].assign(memory.begin(), memory.end());
+  memory_[lane].assign(memory.begin(), memory.end());
 }
 
 void Batch::set_sleep(int environment, const SleepState& state) {
+  const std::size_t lane = this->lane(environment);
   const CompiledModel& m = compiled(model_);
   const std::vector<int> tree = trees_of(m.links);
   const int trees = tree.empty() ? 0 : std::ranges::max(tree) + 1;
@@ -245,7 +265,7 @@ void Batch::set_sleep(int environment, const SleepState& state) {
     throw InputError("who sleeps in environment " + std::to_string(environment) +
                      "; expected islands and steps of rest of " + std::to_string(trees) +
                      " trees and " + std::to_string(m.nu) + " finite controls");
-  SleepState& own = sleep_[std::size_t(environment)];
+  SleepState& own = sleep_[lane];
   own = state;
   own.bodies = 0;
   if (state.asleep.empty()) return;
@@ -254,7 +274,7 @@ void Batch::set_sleep(int environment, const SleepState& state) {
   };
   for (std::size_t t = 0; t < own.asleep.size(); ++t) own.asleep[t] = own.island[t] >= 0 ? 1 : 0;
   for (const CompiledBody& body : m.bodies) own.bodies += sleeps(body.link) ? 1 : 0;
-  double* const column = this->column(std::size_t(environment));
+  double* const column = this->column(lane);
   const auto row = [&](int r) -> double& { return column[r * kBlock]; };
   for (std::size_t i = 0; i < m.links.size(); ++i) {
     if (!sleeps(static_cast<int>(i))) continue;
@@ -270,7 +290,7 @@ void Batch::set_failed(int environment, StepStatus status) {
   if (!failed(status))
     throw InputError(std::string("status '") + to_string(status) +
                      "' is none of a failed environment");
-  status_[std::size_t(environment)] = status;
+  status_[lane(environment)] = status;
 }
 
 int Batch::failed_count() const {
@@ -280,7 +300,7 @@ int Batch::failed_count() const {
 }
 
 BlockState Batch::save_block(int block) const {
-  const double* rows = this->block(block);
+  const double* const rows = this->block(block);
   const auto lane = std::ptrdiff_t(block) * kBlock;
   return {{rows, rows + block_stride_},
           {status_.begin() + lane, status_.begin() + lane + kBlock},
@@ -291,8 +311,10 @@ BlockState Batch::save_block(int block) const {
 }
 
 void Batch::restore_block(int block, const BlockState& state) {
+  double* const rows = this->block(block);
+  check_size("state of a block", state.rows.size(), block_stride_);
   const auto lane = std::ptrdiff_t(block) * kBlock;
-  std::copy(state.rows.begin(), state.rows.end(), this->block(block));
+  std::copy(state.rows.begin(), state.rows.end(), rows);
   std::copy(state.status.begin(), state.status.end(), status_.begin() + lane);
   std::copy(state.has_history.begin(), state.has_history.end(), has_history_.begin() + lane);
   std::copy(state.steps.begin(), state.steps.end(), steps_.begin() + lane);
@@ -303,29 +325,30 @@ void Batch::restore_block(int block, const BlockState& state) {
 
 bool Batch::is_parameter(int k) const {
   const CompiledModel& m = compiled(model_);
-  return m.randomized_row[std::size_t(k)] >= m.layout.parameters;
+  const auto count = std::ssize(m.randomized_row);
+  return m.randomized_row[checked_index("randomized number", k, count)] >= m.layout.parameters;
 }
 
 double Batch::randomized_value(int environment, int k) const {
-  const CompiledModel& m = compiled(model_);
-  const RandomizationDescription& d = m.scene.randomizations[std::size_t(k)];
-  const int row = m.randomized_row[std::size_t(k)];
-  if (is_parameter(k))
-    return (block(environment / kBlock) + environment % kBlock)[std::size_t(row) * kBlock];
+  const RandomizationDescription& d = randomization(k);
+  if (is_parameter(k)) {
+    const int row = compiled(model_).randomized_row[std::size_t(k)];
+    return column(lane(environment))[std::size_t(row) * kBlock];
+  }
   return draw(d.distribution,
               RandomKey{seed_, episode(environment), 0, purpose_of(d.number), std::uint32_t(k)});
 }
 
 void Batch::set_randomized_value(int environment, int k, double value) {
+  const std::size_t lane = this->lane(environment);
   const CompiledModel& m = compiled(model_);
-  const int row = m.randomized_row[std::size_t(k)];
   if (!is_parameter(k))
-    throw InputError("'" + name_of(m.scene.randomizations[std::size_t(k)].number) +
+    throw InputError("'" + name_of(randomization(k).number) +
                      "' is of the starting state; expected a parameter");
-  column(std::size_t(environment))[std::size_t(row) * kBlock] = value;
-  update_derived_rows(m, column(std::size_t(environment)));
-  sleep_[std::size_t(environment)].wake();
-  clearance_[std::size_t(environment)] = 0;
+  column(lane)[std::size_t(m.randomized_row[std::size_t(k)]) * kBlock] = value;
+  update_derived_rows(m, column(lane));
+  sleep_[lane].wake();
+  clearance_[lane] = 0;
 }
 
 }  // namespace tangere

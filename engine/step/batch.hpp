@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "engine/base/aligned.hpp"
+#include "engine/base/checks.hpp"
 #include "engine/model/model.hpp"
 #include "engine/step/shear_memory.hpp"
 #include "engine/step/sleep_state.hpp"
@@ -45,7 +46,8 @@ struct BlockState {
 };
 
 /// Environments stepped together. A failed environment keeps its last good state and is not stepped
-/// again until reset.
+/// again until reset. Every function throws InputError for an environment or block that does not
+/// exist and for an array of another length than its shape says.
 class Batch {
  public:
   /// Makes `environments` states drawn from the scene's <initial> and <randomize>, keyed by
@@ -57,24 +59,20 @@ class Batch {
   [[nodiscard]] int environments() const { return environments_; }
   [[nodiscard]] int blocks() const { return blocks_; }
   [[nodiscard]] std::uint64_t seed() const { return seed_; }
-  [[nodiscard]] std::int64_t episode(int environment) const {
-    return episode_[std::size_t(environment)];
-  }
+  [[nodiscard]] std::int64_t episode(int environment) const { return episode_[lane(environment)]; }
 
   /// Draws another episode into one environment, with the same bits as in a new batch. Environments
   /// of different blocks may be reset from different threads.
   void reset(int environment, std::int64_t episode);
   /// A held environment is not stepped and keeps its state. reset() also releases it.
-  void hold(int environment, bool held = true) { held_[std::size_t(environment)] = held ? 1 : 0; }
-  [[nodiscard]] bool held(int environment) const { return held_[std::size_t(environment)] != 0; }
+  void hold(int environment, bool held = true) { held_[lane(environment)] = held ? 1 : 0; }
+  [[nodiscard]] bool held(int environment) const { return held_[lane(environment)] != 0; }
 
   /// Steps that an environment has taken since its episode began. Steps that fail do not count.
   /// Noise of sensors goes by it.
-  [[nodiscard]] std::int64_t steps(int environment) const {
-    return steps_[std::size_t(environment)];
-  }
+  [[nodiscard]] std::int64_t steps(int environment) const { return steps_[lane(environment)]; }
   /// Sets this count, for a run that goes on from a stored state, in [0, 2^48).
-  void set_steps(int environment, std::int64_t steps) { steps_[std::size_t(environment)] = steps; }
+  void set_steps(int environment, std::int64_t steps) { steps_[lane(environment)] = steps; }
 
   /// Copy one environment's coordinates out of its lane: (nq), (nv).
   void get_q(int environment, std::span<double> q) const;
@@ -90,7 +88,7 @@ class Batch {
   /// What the friction of an environment remembers (docs/shear.md). It is empty when an episode
   /// begins and after set_state().
   [[nodiscard]] const ShearMemory& memory(int environment) const {
-    return memory_[std::size_t(environment)];
+    return memory_[lane(environment)];
   }
   [[nodiscard]] std::span<const ShearMemory> memories() const {
     return {memory_.data(), std::size_t(environments_)};
@@ -101,9 +99,7 @@ class Batch {
 
   /// Who sleeps in an environment (docs/sleeping.md): nobody, where no stepper with sleep stepped
   /// it. reset() and every set_ function wake all bodies.
-  [[nodiscard]] const SleepState& sleep(int environment) const {
-    return sleep_[std::size_t(environment)];
-  }
+  [[nodiscard]] const SleepState& sleep(int environment) const { return sleep_[lane(environment)]; }
   [[nodiscard]] std::span<const SleepState> sleeps() const {
     return {sleep_.data(), std::size_t(environments_)};
   }
@@ -119,15 +115,11 @@ class Batch {
   /// failure.
   void set_failed(int environment, StepStatus status);
 
-  [[nodiscard]] StepStatus status(int environment) const {
-    return status_[std::size_t(environment)];
-  }
+  [[nodiscard]] StepStatus status(int environment) const { return status_[lane(environment)]; }
   [[nodiscard]] std::int32_t iterations(int environment) const {
-    return iterations_[std::size_t(environment)];
+    return iterations_[lane(environment)];
   }
-  [[nodiscard]] double residual(int environment) const {
-    return residual_[std::size_t(environment)];
-  }
+  [[nodiscard]] double residual(int environment) const { return residual_[lane(environment)]; }
   [[nodiscard]] std::span<const StepStatus> statuses() const {
     return {status_.data(), std::size_t(environments_)};
   }
@@ -141,7 +133,7 @@ class Batch {
 
   /// Whether the next step continues a run, because the state one step before is known.
   [[nodiscard]] bool has_history(int environment) const {
-    return has_history_[std::size_t(environment)] != 0;
+    return has_history_[lane(environment)] != 0;
   }
   /// Saves a block, and restores it.
   [[nodiscard]] BlockState save_block(int block) const;
@@ -157,18 +149,25 @@ class Batch {
   void set_randomized_value(int environment, int k, double value);
 
   /// First row of a block. Row r of lane l is block(b)[r * 16 + l]. For the stepper and the tests.
-  double* block(int b) { return data_.data() + std::size_t(b) * block_stride_; }
-  [[nodiscard]] const double* block(int b) const {
-    return data_.data() + std::size_t(b) * block_stride_;
-  }
+  double* block(int b) { return data_.data() + first_row(b); }
+  [[nodiscard]] const double* block(int b) const { return data_.data() + first_row(b); }
 
  private:
   friend class Stepper;
+  [[nodiscard]] std::size_t lane(int environment) const {
+    return checked_index("environment", environment, environments_);
+  }
+  [[nodiscard]] std::size_t first_row(int b) const {
+    return checked_index("block", b, blocks_) * block_stride_;
+  }
+  [[nodiscard]] const RandomizationDescription& randomization(int k) const;
+  void displace(std::size_t lane, std::span<const double> q, std::span<const double> v);
   void write_state(std::size_t lane, std::span<const double> q, std::span<const double> v);
   void complete_state(std::size_t lane);
   void remember_state(std::size_t lane);
   void draw_episode(std::size_t lane);
   [[nodiscard]] double* column(std::size_t lane);
+  [[nodiscard]] const double* column(std::size_t lane) const;
 
   Model model_;
   int environments_, blocks_;

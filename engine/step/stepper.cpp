@@ -344,12 +344,21 @@ double Stepper::tolerance() const { return impl_->settings.tolerance; }
 double Stepper::accuracy() const { return impl_->settings.accuracy; }
 double Stepper::sleep() const { return impl_->settings.sleep; }
 
+/// Throws InputError for a batch of another model and for controls of another shape.
+void Stepper::check(const Batch& batch, std::span<const double> controls) const {
+  if (batch.model() != impl_->model)
+    throw InputError("the batch is of another Model; expected the Model of the stepper");
+  check_size("controls", controls.size(),
+             as_size(batch.environments()) * as_size(impl_->model.nu()));
+}
+
 void Stepper::step(Batch& batch, std::span<const double> controls) {
   for (int b = 0; b < batch.blocks(); ++b) step_block(batch, b, controls);
 }
 
 void Stepper::step_block(Batch& batch, int block, std::span<const double> controls,
                          BlockTape* tape) {
+  check(batch, controls);
   Impl& i = *impl_;
   if (tape != nullptr) refuse_sleep(i.model, i.settings);
   Machine& machine = i.machine_for(tape);

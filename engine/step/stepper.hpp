@@ -39,11 +39,13 @@ class Stepper {
   [[nodiscard]] double sleep() const;     ///< 0: no body sleeps
 
   /// Advances every environment that has not failed by one step. `controls`: (E, nu), clipped to
-  /// the motors' range.
+  /// the motors' range. Throws InputError for a batch of another Model and for controls of another
+  /// length.
   void step(Batch& batch, std::span<const double> controls);
 
   /// The same for one block of 16. `controls`: (E, nu) of the whole batch. The resulting states are
-  /// added to `tape`. Throws InputError if there is a tape and bodies may sleep.
+  /// added to `tape`. Also throws InputError for a block that does not exist, and if there is a
+  /// tape and bodies may sleep.
   void step_block(Batch& batch, int block, std::span<const double> controls,
                   BlockTape* tape = nullptr);
 
@@ -51,6 +53,8 @@ class Stepper {
   static std::size_t workspace_bytes(const Model& model);
 
  private:
+  void check(const Batch& batch, std::span<const double> controls) const;
+
   struct Impl;
   std::unique_ptr<Impl> impl_;
 };

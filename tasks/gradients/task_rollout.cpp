@@ -139,9 +139,10 @@ void TaskRollout::retake_steps(const ActionRecord& r, std::int64_t action, Block
   for (int l = 0; l < lanes(); ++l) batch_->hold(l, !r.taken[as_size(l)]);
   tape.start(*batch_, 0);
   const int every = task_.spec().control_every;
+  const auto u = std::span(u_).first(as_size(lanes()) * as_size(task_.model().nu()));
   for (int k = 0; k < task_.spec().steps_per_action; ++k) {
     if (k % every == 0) ask_again(r, action, k, tape);
-    stepper_.step_block(*batch_, 0, u_, &tape);
+    stepper_.step_block(*batch_, 0, u, &tape);
   }
 }
 

@@ -198,10 +198,11 @@ bool EpisodeSlot<T>::act(int row, const StopRequest& stop) {
 template <class T>
 bool EpisodeSlot<T>::take_steps(std::int64_t from, std::int64_t count, const StopRequest& stop) {
   const bool asked = from >= program_->opening_steps();
+  const std::size_t numbers = as_size(batch_->environments()) * as_size(batch_->model().nu());
   for (std::int64_t t = from; t < from + count; ++t) {
     if (stop && stop()) return false;
     if (t > from || !asked) program_->controls(t, *batch_, 0, u_);
-    stepper_.step(*batch_, u_);
+    stepper_.step(*batch_, std::span(u_).first(numbers));
     tally_->count(*batch_, t);
     program_->look(t, *batch_, 0);
   }
