@@ -7,7 +7,7 @@
 #include <span>
 
 #include "engine/model/compiled_model.hpp"
-#include "engine/model/field_form.hpp"
+#include "engine/scene/field_form.hpp"
 #include "engine/sense/pad_reader.hpp"
 #include "engine/step/batch.hpp"
 
