@@ -226,7 +226,7 @@ int bench_task(const BenchArguments& options, const Console& console, const Task
   setting.isa = kernels::active_isa_name();
   setting.environments = options.environments.value_or(kDefaultEnvironments);
   setting.options.precision = precision_named(options.precision);
-  setting.options.frames = task.spec().looks_at_tactile ? FrameKind::dense : FrameKind::none;
+  setting.options.frames = task.spec().reads_tactile ? FrameKind::dense : FrameKind::none;
   setting.options.rollout.steps = options.steps.value_or(task.spec().horizon);
   setting.options.repeat = options.repeat.value_or(setting.options.repeat);
   const std::vector<int> threads = thread_counts(options);

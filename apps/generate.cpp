@@ -240,7 +240,7 @@ int generate(GenerateOptions options, const Console& console, const ProgramInfo&
   // The same for the episodes and their gradients, which play them again.
   SolverOptions asked{.accuracy = options.accuracy, .sleep = options.sleep ? kUsualSleep : 0};
   if (options.gradients != "none") asked.tolerance = kGradientTolerance;
-  asked.all_contacts = options.gradients != "none";
+  asked.keep_inert_contacts = options.gradients != "none";
   if (const std::unique_ptr<Task> task = find_task(options.scene, console, asked))
     return generate_task(options, console, info, *task);
   refuse_with_scene(options.scene, {{"--policy", !options.policy.empty()},
@@ -248,9 +248,9 @@ int generate(GenerateOptions options, const Console& console, const ProgramInfo&
                                     {"--noise", options.noise.has_value()},
                                     {"--mix", !options.mix.empty()}});
   const Model model(read_scene_for(options.scene, options.allow_unknown, console, asked));
-  warn_of_geometry(console, model);
+  warn_about_geometry(console, model);
   const Stepper stepper(model);
-  warn_of_steps(console, model, stepper);
+  warn_about_steps(console, model, stepper);
   const ControlProgram controls =
       make_controls(options.controls, options.seed.value_or(0), model, stepper, console);
   Job job;

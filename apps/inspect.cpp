@@ -265,7 +265,7 @@ int inspect(const InspectArguments& options, const Console& console) {
     return report(task->model(), &task->spec(), options, console);
   }
   const Model model(read_scene_for(options.scene, options.allow_unknown, console));
-  warn_of_geometry(console, model);
+  warn_about_geometry(console, model);
   return report(model, nullptr, options, console);
 }
 

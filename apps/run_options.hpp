@@ -52,7 +52,7 @@ struct SolverArguments {
   bool sleep = false;
 
   void add(CLI::App& app);
-  /// As in ask_of_solver(), where the scene's own come first.
+  /// As in apply_solver_options(), where the scene's own come first.
   [[nodiscard]] SolverOptions asked() const;
 };
 

@@ -45,8 +45,8 @@ std::string split_text(const StepCounts& counts) {
   const auto add = [&](const char* what, std::int64_t count) {
     if (count > 0) text += fmt::format(", {}: {}", what, count);
   };
-  add("less accurate than asked", counts.coarse_steps);
-  add("a body came through another", counts.passed_steps);
+  add("less accurate than asked", counts.accuracy_not_met_steps);
+  add("a body came through another", counts.tunnelled_steps);
   add("damped because they created energy", counts.damped_steps);
   add("bodies overlap", counts.overlapping_steps);
   return text;
@@ -54,15 +54,15 @@ std::string split_text(const StepCounts& counts) {
 
 Json split_json(const StepCounts& counts) {
   return {{"split_steps", counts.split_steps},
-          {"coarse_steps", counts.coarse_steps},
-          {"passed_steps", counts.passed_steps},
+          {"accuracy_not_met_steps", counts.accuracy_not_met_steps},
+          {"tunnelled_steps", counts.tunnelled_steps},
           {"damped_steps", counts.damped_steps},
           {"overlapping_steps", counts.overlapping_steps}};
 }
 
 Json steps_json(const std::optional<EpisodeSteps>& steps) {
   return {{"simulation_steps", steps ? Json(steps->taken) : Json()},
-          {"passed_steps", steps ? Json(steps->passed) : Json()},
+          {"tunnelled_steps", steps ? Json(steps->passed) : Json()},
           {"overlapping_steps", steps ? Json(steps->overlapping) : Json()}};
 }
 
@@ -84,17 +84,17 @@ std::string sleep_text(double sleep, int moving_bodies, const StepCounts& counts
   return fmt::format("bodies asleep: {:.2f} of {} on average\n", mean.get<double>(), moving_bodies);
 }
 
-void ask_of_solver(SolverOptions& of_scene, const SolverOptions& asked) {
+void apply_solver_options(SolverOptions& of_scene, const SolverOptions& asked) {
   if (asked.accuracy) of_scene.accuracy = asked.accuracy;
   if (!of_scene.tolerance) of_scene.tolerance = asked.tolerance;
   if (of_scene.sleep == 0) of_scene.sleep = asked.sleep;
-  of_scene.all_contacts |= asked.all_contacts;
+  of_scene.keep_inert_contacts |= asked.keep_inert_contacts;
 }
 
 Scene read_scene_for(const std::string& path, bool allow_unknown, const Console& console,
                      const SolverOptions& asked) {
   SceneFile file = read_scene(path, {allow_unknown});
-  ask_of_solver(file.scene.solver, asked);
+  apply_solver_options(file.scene.solver, asked);
   for (const std::string& warning : file.warnings) console.note("warning: " + warning);
   return std::move(file.scene);
 }
@@ -119,7 +119,7 @@ std::int64_t step_count(const std::optional<std::int64_t>& asked, const ControlP
   return steps;
 }
 
-void warn_of_geometry(const Console& console, const Model& model) {
+void warn_about_geometry(const Console& console, const Model& model) {
   for (const MeshInfo& mesh : model.meshes())
     if (mesh.unresolved > MeshInfo::kMostUnresolved)
       console.note(fmt::format(
@@ -132,7 +132,7 @@ void warn_of_geometry(const Console& console, const Model& model) {
     for (const std::string& line : lines) console.note("warning: " + line);
 }
 
-void warn_of_steps(const Console& console, const Model& model, const Stepper& stepper) {
+void warn_about_steps(const Console& console, const Model& model, const Stepper& stepper) {
   if (stepper.accuracy() > 0) {
     std::string laws;
     for (const std::string& law : first_order_laws(model.scene()))
@@ -160,8 +160,8 @@ Json note_costly_steps(const Console& console, Integrator integrator, double acc
 ExitCode exit_code(const Console& console, bool failed, const StepCounts& counts) {
   if (counts.missed_contacts() == 0) return failed ? kSomeFailed : kDone;
   std::string what;
-  if (counts.passed_steps > 0)
-    what = fmt::format("in {} steps a body came through another", counts.passed_steps);
+  if (counts.tunnelled_steps > 0)
+    what = fmt::format("in {} steps a body came through another", counts.tunnelled_steps);
   if (counts.overlapping_steps > 0)
     what += fmt::format(
         "{}after {} steps bodies overlap by more than a quarter of their thickness, and no "

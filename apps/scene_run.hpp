@@ -32,11 +32,11 @@ LossKind loss_named(const std::string& name);
 /// Says how many steps were split, and how many missed the accuracy, let a body through, were
 /// damped or let bodies overlap, if any did.
 std::string split_text(const StepCounts& counts);
-/// The same five numbers, as "split_steps", "coarse_steps", "passed_steps", "damped_steps" and
+/// The same five numbers, as "split_steps", "accuracy_not_met_steps", "tunnelled_steps", "damped_steps" and
 /// "overlapping_steps".
 Json split_json(const StepCounts& counts);
 
-/// Steps of all episodes of a data set, as "simulation_steps", "passed_steps" and
+/// Steps of all episodes of a data set, as "simulation_steps", "tunnelled_steps" and
 /// "overlapping_steps"; null where a file does not store them. The text is empty if none of the
 /// last two is stored or more than 0; else it begins with a comma.
 Json steps_json(const std::optional<EpisodeSteps>& steps);
@@ -48,13 +48,13 @@ std::string sleep_text(double sleep, int moving_bodies, const StepCounts& counts
 /// The same mean; null if no body may sleep. `sleep`: Stepper::sleep().
 Json mean_asleep(double sleep, const StepCounts& counts);
 
-/// Reads a scene; its warnings go to the console. `asked`: as in ask_of_solver().
+/// Reads a scene; its warnings go to the console. `asked`: as in apply_solver_options().
 Scene read_scene_for(const std::string& path, bool allow_unknown, const Console& console,
                      const SolverOptions& asked = {});
 
 /// What the command line asks of the solver: an accuracy in place of the scene's, a tolerance, and
 /// whether bodies sleep, where the scene names none.
-void ask_of_solver(SolverOptions& of_scene, const SolverOptions& asked);
+void apply_solver_options(SolverOptions& of_scene, const SolverOptions& asked);
 
 /// The controls of the table at `path`, or the scene's own if `path` is empty.
 ControlProgram make_controls(const std::string& path, std::uint64_t seed, const Model& model,
@@ -65,10 +65,10 @@ std::int64_t step_count(const std::optional<std::int64_t>& asked, const ControlP
 
 /// Warns of meshes whose grids are too coarse, and of bodies that start deep inside one another or
 /// too far away.
-void warn_of_geometry(const Console& console, const Model& model);
+void warn_about_geometry(const Console& console, const Model& model);
 /// Warns of contacts whose touches are too short for the steps; where steps are cut to keep an
 /// accuracy, of laws whose errors their estimate does not see.
-void warn_of_steps(const Console& console, const Model& model, const Stepper& stepper);
+void warn_about_steps(const Console& console, const Model& model, const Stepper& stepper);
 /// Says on stderr that steps were costly, if they were, and returns it; null if not, or if steps
 /// were cut to keep an accuracy.
 Json note_costly_steps(const Console& console, Integrator integrator, double accuracy,

@@ -117,14 +117,14 @@ std::vector<Failure> failures_of(const RolloutSummary& summary) {
 }
 
 /// What `--audit` adds to the report: a line for people, which ends in a line break, and keys.
-std::string audit_text(const std::optional<AuditSummary>& audit) {
+std::string audit_text(const std::optional<EnergyBalanceSummary>& audit) {
   if (!audit) return "";
   return fmt::format(
       "audit: motors did {:.4g} J, damping and friction took {:.4g} J, the scheme made {:.4g} J; "
       "at worst {:.2g} % of what environment {} had\n",
       audit->motors, audit->taken, audit->made, 100 * audit->worst_share, audit->worst_environment);
 }
-Json audit_json(const std::optional<AuditSummary>& audit) {
+Json audit_json(const std::optional<EnergyBalanceSummary>& audit) {
   if (!audit) return nullptr;
   return {{"motors", audit->motors},
           {"taken", audit->taken},
@@ -355,10 +355,10 @@ int simulate(const SimulateArguments& options, const Console& console, const Pro
 
   const Model model(
       read_scene_for(options.scene, options.allow_unknown, console, options.solver.asked()));
-  warn_of_geometry(console, model);
+  warn_about_geometry(console, model);
   if (options.gradients.wanted()) solver = for_gradients(model, solver);
   Stepper stepper(model, solver);
-  warn_of_steps(console, model, stepper);
+  warn_about_steps(console, model, stepper);
   const Start start(options, stepper);
   start.print(console, model, model.scene(), stepper);
   const ControlProgram controls =

@@ -24,7 +24,7 @@ std::unique_ptr<Task> find_task(const std::string& word, const Console& console,
     // A task of another program names a file.
     SceneFile file = text != nullptr ? parse_scene(text, spec.scene) : read_scene(spec.scene);
     for (const std::string& warning : file.warnings) console.note("warning: " + warning);
-    ask_of_solver(file.scene.solver, asked);
+    apply_solver_options(file.scene.solver, asked);
     return make_task(word, file.scene);
   }
   const bool plain = word.find('/') == std::string::npos && word.find('.') == std::string::npos;

@@ -46,7 +46,7 @@ set(public_headers
   engine/scene/contact_resolution.hpp
   engine/scene/effect_kind.hpp
   engine/scene/effects.hpp
-  engine/scene/felt_bodies.hpp
+  engine/scene/sensed_bodies.hpp
   engine/scene/field_form.hpp
   engine/model/model.hpp
   engine/model/model_info.hpp
@@ -65,7 +65,7 @@ set(public_headers
   engine/rows/episode_sink.hpp
   engine/rows/row_sink.hpp
   engine/rows/task_spec.hpp
-  engine/sense/audit.hpp
+  engine/sense/energy_balance.hpp
   engine/sense/contact_state.hpp
   engine/sense/flow_map.hpp
   engine/sense/marker_map.hpp
@@ -75,9 +75,9 @@ set(public_headers
   engine/step/batch.hpp
   engine/step/control.hpp
   engine/step/displacement.hpp
-  engine/step/memory_arrays.hpp
+  engine/step/shear_state_arrays.hpp
   engine/step/sleeping_trees.hpp
-  engine/step/shear_memory.hpp
+  engine/step/shear_state.hpp
   engine/step/sleep_state.hpp
   engine/step/stepper.hpp
   engine/step/stepper_options.hpp
@@ -114,7 +114,7 @@ set(public_headers
   tasks/gradients/task_tape_options.hpp
   tasks/gradients/gradient_check.hpp
   tasks/gradients/gradient_compare.hpp
-  tasks/run/audit_summary.hpp
+  tasks/run/energy_balance_summary.hpp
   tasks/run/benchmark_options.hpp
   tasks/run/benchmark_run.hpp
   tasks/run/block_worker.hpp

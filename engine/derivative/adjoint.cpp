@@ -196,7 +196,7 @@ struct Adjoint::Impl {
       readings[std::size_t(l)] = {g.tape.episode_step(g.step + 1, g.first + l), kept(g.step),
                                   kept(g.step + 1)};
     }
-    x.adjoint.memory_adjoint.reverse_readings(compiled(model), kernels::active_kernels(), x.work,
+    x.adjoint.shear_adjoint.reverse_readings(compiled(model), kernels::active_kernels(), x.work,
                                               readings, x.adjoint.losses);
   }
 

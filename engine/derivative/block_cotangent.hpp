@@ -18,7 +18,7 @@ struct BlockCotangent {
   AlignedVector<double> previous_q, previous_v;  ///< (nv, 16) of the state one step before it
   AlignedVector<double> u;  ///< (nu, 16) of the controls of the step reversed last
   /// Of what friction remembers at the newest state: of each lane, three numbers for each of its
-  /// entries (engine/step/shear_memory.hpp); or empty, zeros.
+  /// entries (engine/step/shear_state.hpp); or empty, zeros.
   std::array<std::vector<double>, 16> memory;
   /// (parameter_rows, 16), summed over steps (engine/derivative/number_gradients.hpp); or empty
   AlignedVector<double> parameters;

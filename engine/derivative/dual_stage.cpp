@@ -7,7 +7,7 @@
 
 #include "engine/derivative/dual_field.hpp"
 #include "engine/step/kept_anchors.hpp"
-#include "kernels/memory/advance.hpp"
+#include "kernels/shear/update_shear_state.hpp"
 #include "kernels/step/link_poses.hpp"
 #include "kernels/step/residual.hpp"
 
@@ -115,7 +115,7 @@ struct DualStage::Impl {
       listed_anchors.back().assign(std::size_t(kernels::kAnchorNumbers * p.n_points), D(0.0));
       lists.back().anchors = listed_anchors.back().data();
     }
-    anchors.resize(std::size_t(m.remembering_points));
+    anchors.resize(std::size_t(m.shear_spring_points));
     ground_anchors.assign(std::size_t(kernels::kAnchorNumbers * m.ground_anchors), D(0.0));
     sensor_laws.resize(m.sensors.size());
     felt_sizes.resize(m.bodies.size());
@@ -160,7 +160,7 @@ struct DualStage::Impl {
     for (int i = 0; i < kernels::kAnchorNumbers; ++i) to[i] = frozen ? D(from[i].value) : from[i];
   }
   void put_ground_anchors() {
-    for (const kernels::RememberingContact& of : m.memories) {
+    for (const kernels::ShearSpringContact& of : m.memories) {
       if (!of.ground) continue;
       const int first = grounds[std::size_t(of.grounded)].first_anchor;
       for (int i = 0; i < of.contact.n_points; ++i)
@@ -171,7 +171,7 @@ struct DualStage::Impl {
 
   /// Returns a contact that remembers at the poses of all links.
   [[nodiscard]] kernels::LoadedTouch<D> touch(
-      const kernels::RememberingContact& of, const std::vector<kernels::LinkPose<D>>& poses) const {
+      const kernels::ShearSpringContact& of, const std::vector<kernels::LinkPose<D>>& poses) const {
     const auto pose = [&](int link) {
       return link < 0 ? kernels::LinkPose<D>{{kernels::diagonal(D(1.0)), kernels::zero3<D>()},
                                              kernels::zero6<D>()}
@@ -199,7 +199,7 @@ struct DualStage::Impl {
 
   /// Calls f with the shape that a contact touches.
   template <class F>
-  void with_touched_shape(const kernels::RememberingContact& of, const F& f) const {
+  void with_touched_shape(const kernels::ShearSpringContact& of, const F& f) const {
     if (of.pair >= 0) {
       const kernels::PairContact& pair = pairs[std::size_t(of.pair)];
       const kernels::Vec3<double> size =
@@ -217,7 +217,7 @@ struct DualStage::Impl {
   }
 
   /// Returns the law at point i of a contact: a sensor's points may have factors.
-  [[nodiscard]] kernels::LawParameters<D> law_of(const kernels::RememberingContact& of, int i,
+  [[nodiscard]] kernels::LawParameters<D> law_of(const kernels::ShearSpringContact& of, int i,
                                                  const kernels::LoadedTouch<D>& t) const {
     kernels::LawParameters<D> law = t.law;
     if (of.sensor < 0) return law;
@@ -231,11 +231,11 @@ struct DualStage::Impl {
   /// Returns the anchor of point k of a sensor at this touch (engine/step/kept_anchors.hpp).
   template <class Shape>
   [[nodiscard]] kernels::Anchor<D> felt_anchor(const Shape& shape, const kernels::LoadedTouch<D>& t,
-                                               const kernels::RememberingContact& of, int k,
+                                               const kernels::ShearSpringContact& of, int k,
                                                const std::vector<D>& remembered) const {
     const D* const b = &remembered[3 * std::size_t(of.first + k)];
     const kernels::Vec3<D> xi = place(of, k);
-    if (m.memory_every(of) == 0)
+    if (m.shear_interval(of) == 0)
       return kernels::recalled(shape, t, xi, kernels::Vec3<D>{b[0], b[1], b[2]});
     const D* const a = b + 3 * of.contact.n_points;
     const auto is_zero = [](const D* x) {
@@ -247,7 +247,7 @@ struct DualStage::Impl {
 
   /// Calls f(shape, touch, k, point) for every point of a sensor against one body.
   template <class F>
-  void meet_felt(const kernels::RememberingContact& of,
+  void meet_felt(const kernels::ShearSpringContact& of,
                  const std::vector<kernels::LinkPose<D>>& poses, const std::vector<D>& remembered,
                  const F& f) const {
     const kernels::LoadedTouch<D> t = touch(of, poses);
@@ -275,7 +275,7 @@ struct DualStage::Impl {
     return out;
   }
 
-  static kernels::Vec3<D> place(const kernels::RememberingContact& of, int i) {
+  static kernels::Vec3<D> place(const kernels::ShearSpringContact& of, int i) {
     const double* p = of.contact.points + 3 * i;
     return {D(p[0]), D(p[1]), D(p[2])};
   }
@@ -378,7 +378,7 @@ struct DualStage::Impl {
 DualStage::DualStage(const CompiledModel& model) : impl_(std::make_unique<Impl>(model)) {
   centre.resize(std::size_t(model.nq));
   for (auto* p : {&x, &r, &s, &tau, &target, &v, &g}) p->assign(std::size_t(model.nv), D(0.0));
-  remembered.assign(3 * std::size_t(model.remembering_points), D(0.0));
+  remembered.assign(3 * std::size_t(model.shear_spring_points), D(0.0));
 }
 DualStage::~DualStage() = default;
 
@@ -433,8 +433,8 @@ void DualStage::recall() {
   if (i.m.memories.empty()) return;
   const std::vector<D> still(v.size(), D(0.0));
   const std::vector<kernels::LinkPose<D>> poses = i.poses_at(centre, still);
-  for (const kernels::RememberingContact& of : i.m.memories) {
-    if (i.m.memory_every(of) > 0) continue;
+  for (const kernels::ShearSpringContact& of : i.m.memories) {
+    if (i.m.shear_interval(of) > 0) continue;
     const kernels::LoadedTouch<D> t = i.touch(of, poses);
     i.with_touched_shape(of, [&](const auto& shape) {
       for (int k = 0; k < of.contact.n_points; ++k) {
@@ -450,8 +450,8 @@ void DualStage::advance(const std::vector<D>& q, const std::vector<D>& twist) {
   Impl& i = *impl_;
   if (i.m.memories.empty()) return;
   const std::vector<kernels::LinkPose<D>> poses = i.poses_at(q, twist);
-  for (const kernels::RememberingContact& of : i.m.memories) {
-    if (i.m.memory_every(of) > 0) continue;
+  for (const kernels::ShearSpringContact& of : i.m.memories) {
+    if (i.m.shear_interval(of) > 0) continue;
     const kernels::LoadedTouch<D> t = i.touch(of, poses);
     i.with_touched_shape(of, [&](const auto& shape) {
       for (int k = 0; k < of.contact.n_points; ++k) {
@@ -465,11 +465,11 @@ void DualStage::advance(const std::vector<D>& q, const std::vector<D>& twist) {
   }
 }
 
-void DualStage::advance_readings(const std::vector<D>& q, const std::vector<D>& twist,
+void DualStage::update_sensor_shear_state(const std::vector<D>& q, const std::vector<D>& twist,
                                  std::int64_t steps) {
   Impl& i = *impl_;
   const std::vector<kernels::LinkPose<D>> poses = i.poses_at(q, twist);
-  for (const kernels::RememberingContact& of : i.m.memories) {
+  for (const kernels::ShearSpringContact& of : i.m.memories) {
     if (!is_due(i.m, of, steps)) continue;
     i.meet_felt(of, poses, remembered, [&](const auto& shape, const auto& t, int k, const auto& p) {
       kernels::Anchor<D> after = {kernels::zero3<D>(), kernels::zero3<D>(), D(0.0)};
@@ -535,7 +535,7 @@ void DualStage::elastic_field(int sensor, const Coefficients<D>& law, std::span<
   std::fill(field.begin(), field.end(), 0.0);
   std::fill(field_dot.begin(), field_dot.end(), 0.0);
   const std::vector<kernels::LinkPose<D>> poses = i.poses_at(centre, r);
-  for (const kernels::RememberingContact& of : i.m.memories) {
+  for (const kernels::ShearSpringContact& of : i.m.memories) {
     if (of.sensor != sensor) continue;
     i.meet_felt(of, poses, remembered, [&](const auto&, const auto&, int k, const auto& p) {
       const D f[3] = {p.force.x, p.force.y, p.force.z};

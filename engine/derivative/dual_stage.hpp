@@ -43,7 +43,7 @@ class DualStage {
   void advance(const std::vector<DualNumber>& q, const std::vector<DualNumber>& v);
 
   /// The same for sensors that keep anchors, where they are due after `steps` steps of an episode.
-  void advance_readings(const std::vector<DualNumber>& q, const std::vector<DualNumber>& v,
+  void update_sensor_shear_state(const std::vector<DualNumber>& q, const std::vector<DualNumber>& v,
                         std::int64_t steps);
 
   /// Computes v and g, with the tangents of masses included.

@@ -148,7 +148,7 @@ void FieldTangent::move(int lane, std::span<const double> q, std::span<const dou
 
 void FieldTangent::field(int sensor, std::span<const int> tiles, std::span<double> change) {
   Impl& i = *impl_;
-  check_has_no_memory(i.model, sensor);
+  check_has_no_lag(i.model, sensor);
   const CompiledModel& m = compiled(i.model);
   const CompiledSensor& s = m.sensors[std::size_t(sensor)];
   if (s.elastic)

@@ -6,7 +6,7 @@
 #include <algorithm>
 
 #include "engine/step/detection.hpp"
-#include "engine/step/remember.hpp"
+#include "engine/step/shear_update.hpp"
 #include "engine/step/scheme_stage.hpp"
 
 namespace tangere {
@@ -17,7 +17,7 @@ template <int L>
 AdjointWorkspace<L>::AdjointWorkspace(const CompiledModel& model, int loss_count, bool parameters,
                                       int inner_stages)
     : losses(std::size_t(loss_count)),
-      memory_adjoint(model, loss_count),
+      shear_adjoint(model, loss_count),
       q_stage(std::size_t(model.nq)) {
   const std::size_t nv = std::size_t(model.nv), inner = std::size_t(inner_stages),
                     per_loss = 8 + 2 * inner, shared = 8 + 2 * (1 + inner);
@@ -193,8 +193,8 @@ void GroupAdjoint::reverse_stages(const StageContext<L>& s, const Scheme& scheme
   for (const LossRows<L>& o : s.a.losses)
     for (Row<L>* rows : {o.q_inner, o.v_inner}) clear(rows, last * model_.nv);
   choose_faces(model_, s.table, w);
-  begin_memory(model_, s.table, w);
-  s.a.memory_adjoint.begin(model_);
+  begin_shear(model_, s.table, w);
+  s.a.shear_adjoint.begin(model_);
   find_inner_velocities(s, scheme, h);
   for (int k = last; k >= 0; --k) {
     set_stage(model_, scheme, k, Row<L>::all(h), w);
@@ -209,14 +209,14 @@ void GroupAdjoint::reverse_stages(const StageContext<L>& s, const Scheme& scheme
     for (std::size_t n = 0; n < s.a.losses.size(); ++n) {
       LossRows<L>& o = s.a.losses[n];
       if (k == last)
-        s.a.memory_adjoint.reverse_end(model_, s.table, w, s.lanes, o, static_cast<int>(n));
+        s.a.shear_adjoint.reverse_end(model_, s.table, w, s.lanes, o, static_cast<int>(n));
       hand_on(s, scheme, k, o);
-      s.a.memory_adjoint.reverse_forces(model_, s.table, w, s.lanes, s.a.q_stage.data(), s.a.lambda,
+      s.a.shear_adjoint.reverse_forces(model_, s.table, w, s.lanes, s.a.q_stage.data(), s.a.lambda,
                                         o, static_cast<int>(n));
     }
   }
   for (std::size_t n = 0; n < s.a.losses.size(); ++n)
-    s.a.memory_adjoint.finish(model_, s.table, w, s.lanes, s.a.losses[n], static_cast<int>(n));
+    s.a.shear_adjoint.finish(model_, s.table, w, s.lanes, s.a.losses[n], static_cast<int>(n));
 }
 
 template <int L>

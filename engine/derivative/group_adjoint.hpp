@@ -6,7 +6,7 @@
 
 #include <memory>
 
-#include "engine/derivative/memory_adjoint.hpp"
+#include "engine/derivative/shear_adjoint.hpp"
 #include "engine/step/group_step.hpp"
 
 namespace tangere {
@@ -24,7 +24,7 @@ struct AdjointWorkspace {
   Row *q_older, *v_older;  ///< (nv) for each state that a stage may depend on, one after another
   Row* numbers = nullptr;  ///< (parameter_numbers), or null
   Row sound;
-  MemoryAdjoint<L> memory_adjoint;
+  ShearAdjoint<L> shear_adjoint;
   AlignedVector<Row> q_stage;  ///< (nq) coordinates of the stage in hand
 };
 

@@ -171,9 +171,9 @@ void check_has_plain_points(const Model& model) {
                        "expected none of them to be asked for");
 }
 
-void check_has_no_memory(const Model& model) {
+void check_has_no_lag(const Model& model) {
   for (std::size_t s = 0; s < model.sensors().size(); ++s)
-    check_has_no_memory(model, static_cast<int>(s));
+    check_has_no_lag(model, static_cast<int>(s));
 }
 
 ReadoutPullback::ReadoutPullback(const Model& model) : impl_(std::make_unique<Impl>(model)) {}
@@ -226,7 +226,7 @@ void ReadoutPullback::Impl::pull_back(int lane, int sensor, std::span<const int>
 void ReadoutPullback::field(int lane, int sensor, std::span<const int> tiles,
                             std::span<const double> cotangents, std::span<double> parameters,
                             std::span<double> points) {
-  check_has_no_memory(impl_->model, sensor);
+  check_has_no_lag(impl_->model, sensor);
   const CompiledSensor& s = compiled(impl_->model).sensors[std::size_t(sensor)];
   if (!s.imperfect && !s.elastic)
     return impl_->pull_back(lane, sensor, tiles, cotangents, parameters, points);
@@ -243,7 +243,7 @@ void ReadoutPullback::field(int lane, int sensor, std::span<const int> tiles,
 
 void ReadoutPullback::dense_field(int lane, int sensor, std::span<const double> cotangents,
                                   std::span<double> parameters, std::span<double> points) {
-  check_has_no_memory(impl_->model, sensor);
+  check_has_no_lag(impl_->model, sensor);
   const CompiledSensor& s = compiled(impl_->model).sensors[std::size_t(sensor)];
   if (s.imperfect || s.elastic) {
     std::copy(cotangents.begin(), cotangents.end(), impl_->whole.begin());

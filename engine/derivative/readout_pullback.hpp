@@ -13,7 +13,7 @@ namespace tangere {
 
 /// Throws InputError (file:line) where a sensor of the scene has a memory
 /// (SensorInfo::past_states), for runs that take derivatives of fields.
-void check_has_no_memory(const Model& model);
+void check_has_no_lag(const Model& model);
 
 /// Throws InputError if some sensor has ks: its points have no derivatives of their own.
 void check_has_plain_points(const Model& model);

@@ -317,7 +317,7 @@ void Tangent::step(const Batch& batch, int block, int lane, const BlockTape& tap
                        rows(step + 1), tape.inner(step) + lane, kBlock);
   }
   if (m.kept_points > 0 && tape.took(step, lane))
-    i.stage.advance_readings(end.q, end.v, tape.episode_step(step + 1, lane));
+    i.stage.update_sensor_shear_state(end.q, end.v, tape.episode_step(step + 1, lane));
   state.memory = i.memory_dot(tape.memory(step + 1, lane));
   state.previous_q = std::move(state.q);
   state.previous_v = std::move(state.v);
@@ -332,7 +332,7 @@ void Tangent::field(const Batch& batch, int block, int lane, const BlockTape& ta
                     std::span<double> field_dot) {
   Impl& i = *impl_;
   const CompiledModel& m = i.m();
-  check_has_no_memory(i.model, sensor);
+  check_has_no_lag(i.model, sensor);
   const double* row = tape.state(step) + lane;
   i.stage.centre = with_tangent(m, row, kBlock, state.q);
   const Duals v = with_tangent(row + m.nq * kBlock, kBlock, state.v);

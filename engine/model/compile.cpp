@@ -11,7 +11,7 @@
 #include "engine/model/compile_imperfections.hpp"
 #include "engine/model/compile_joints.hpp"
 #include "engine/model/compile_markers.hpp"
-#include "engine/model/compile_memories.hpp"
+#include "engine/model/compile_shear_springs.hpp"
 #include "engine/model/compile_sensor.hpp"
 #include "engine/model/compile_variations.hpp"
 #include "engine/model/components.hpp"
@@ -19,7 +19,7 @@
 #include "engine/model/group_contacts.hpp"
 #include "engine/model/link_inertia.hpp"
 #include "engine/scene/contact_resolution.hpp"
-#include "engine/scene/felt_bodies.hpp"
+#include "engine/scene/sensed_bodies.hpp"
 #include "engine/scene/frames.hpp"
 #include "engine/scene/scene_faults.hpp"
 #include "engine/scene/scene_number.hpp"
@@ -117,7 +117,7 @@ class Compiler {
     };
     // A sensor's signs are those of its own body's surface.
     const auto of_sensor = [&](const TactileDescription& d) {
-      return d.body == name || std::ranges::binary_search(felt_bodies(m_.scene, d), int(body));
+      return d.body == name || std::ranges::binary_search(sensed_bodies(m_.scene, d), int(body));
     };
     const Scene& s = m_.scene;
     return std::any_of(s.pair_contacts.begin(), s.pair_contacts.end(), of_contact) ||
@@ -323,7 +323,7 @@ class Compiler {
       if (d.markers) static_cast<void>(compile_markers(d, info.pressure_sign));  // checks them
       m_.layout.past_states = std::max(m_.layout.past_states, info.past_states);
       sensor.parameters = constants(d.coefficients);
-      for (const int t : felt_bodies(m_.scene, d))
+      for (const int t : sensed_bodies(m_.scene, d))
         if (m_.bodies[t].touchable) sensor.targets.push_back(t);
       m_.sensors.push_back(std::move(sensor));
       m_.sensor_info.push_back(std::move(info));
@@ -488,8 +488,8 @@ std::shared_ptr<const CompiledModel> compile(const Scene& scene) {
   for (std::size_t k = 0; k < m->bodies.size(); ++k)
     m->solids.push_back(solid_of(m->scene.links[k].body.shape, m->bodies[k]));
   point_view(*m);
-  compile_memories(*m);
-  v.n_memories = static_cast<int>(m->memories.size());
+  compile_shear_springs(*m);
+  v.n_shear_springs = static_cast<int>(m->memories.size());
   v.memories = m->memories.data();
   return m;
 }

@@ -85,8 +85,8 @@ const char* motion_variant(const std::vector<Link>& links) {
 std::string effects_variant(std::uint8_t effects) {
   const std::pair<kernels::JointEffect, const char*> names[] = {
       {kernels::kDamped, "damping"},
-      {kernels::kArmoured, "armature"},
-      {kernels::kSprung, "spring"},
+      {kernels::kArmature, "armature"},
+      {kernels::kSpring, "spring"},
       {kernels::kLimited, "limits"},
       {kernels::kDriven, "position motor"}};
   std::string text;

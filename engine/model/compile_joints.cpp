@@ -65,8 +65,8 @@ struct EffectOfDof {
 };
 constexpr EffectOfDof kEffectsOfDof[kJointEffects] = {
     {&kernels::DofEffects::damping, kernels::kDamped},
-    {&kernels::DofEffects::armature, kernels::kArmoured},
-    {&kernels::DofEffects::stiffness, kernels::kSprung},
+    {&kernels::DofEffects::armature, kernels::kArmature},
+    {&kernels::DofEffects::stiffness, kernels::kSpring},
     {&kernels::DofEffects::limit_stiffness, kernels::kLimited}};
 
 kernels::DofEffects dof_effects(const JointEffects& e, double rest) {

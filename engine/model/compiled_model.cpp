@@ -48,7 +48,7 @@ void point_view(CompiledModel& m) {
   v.ground_order = m.ground_order.data();
   v.n_solids = static_cast<int>(m.solids.size());
   v.solids = m.solids.data();
-  v.n_memories = static_cast<int>(m.memories.size());
+  v.n_shear_springs = static_cast<int>(m.memories.size());
   v.memories = m.memories.data();
   kernels::ParameterRows& rows = v.rows;
   rows.grounds = rows.pair(v.n_pairs);

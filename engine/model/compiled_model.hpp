@@ -103,7 +103,7 @@ struct CompiledSensor {
   bool elastic = false;                   ///< its friction remembers
   /// Steps from one advance of that memory to the next. It keeps the anchors b and a of each point
   /// then, in this order all b, all a. 0: it advances at every step and keeps s.
-  int memory_every = 0;
+  int shear_interval = 0;
   /// Points of an elastic sensor in the order of the tiles of its contacts.
   std::vector<int> in_field;          ///< (n) number in the field
   std::vector<double> point_axes;     ///< (n, 9) rows axis0, axis1, -normal; axes of the link
@@ -192,23 +192,23 @@ struct CompiledModel {
   std::vector<kernels::PairContact> pairs;
   std::vector<kernels::GroundContact> grounds;
   std::vector<kernels::Solid> solids;  ///< parallel to bodies
-  std::vector<kernels::RememberingContact> memories;
+  std::vector<kernels::ShearSpringContact> memories;
   /// Bodies whose contact points are far apart for each other (contact_resolution.hpp).
   std::vector<std::array<int, 2>> coarse_pairs;
-  int remembering_points = 0;  ///< of all `memories`
+  int shear_spring_points = 0;  ///< of all `memories`
   /// The same with the points of a sensor counted once, not for every body that it feels.
   int taped_points = 0;
   int ground_anchors = 0;  ///< points of those on the ground
-  /// The first of remembering_points are those of sensors whose memory does not advance at every
+  /// The first of shear_spring_points are those of sensors whose memory does not advance at every
   /// step. Steps do not touch their entries.
   int kept_points = 0;
   /// Steps between advances of a contact's memory; 0: one at every step.
-  [[nodiscard]] int memory_every(const kernels::RememberingContact& of) const {
-    return of.sensor < 0 ? 0 : sensors[std::size_t(of.sensor)].memory_every;
+  [[nodiscard]] int shear_interval(const kernels::ShearSpringContact& of) const {
+    return of.sensor < 0 ? 0 : sensors[std::size_t(of.sensor)].shear_interval;
   }
   /// How many of the points that remember are a contact's.
-  [[nodiscard]] int remembering(const kernels::RememberingContact& of) const {
-    return of.contact.n_points * (memory_every(of) > 0 ? 2 : 1);
+  [[nodiscard]] int remembering(const kernels::ShearSpringContact& of) const {
+    return of.contact.n_points * (shear_interval(of) > 0 ? 2 : 1);
   }
   std::vector<kernels::LinkPair> link_pairs;
   std::vector<kernels::GroundedLink> grounded;

@@ -161,7 +161,7 @@ std::unique_ptr<ModelPart> part_of(const CompiledModel& whole, std::span<const i
   return Filter(whole, tree, left_out, false).part();
 }
 
-std::unique_ptr<ModelPart> pushing_part(const CompiledModel& whole) {
+std::unique_ptr<ModelPart> without_inert_contacts(const CompiledModel& whole) {
   const auto all_push = [](const auto& contacts) {
     return std::ranges::all_of(contacts, [](const auto& c) { return pushes(c.parameters); });
   };

@@ -35,6 +35,6 @@ std::unique_ptr<ModelPart> part_of(const CompiledModel& whole, std::span<const i
 
 /// Returns the model without the contacts that never push (pushes), which is the model of
 /// a scene that does not name them. Null where all push, and where friction remembers.
-std::unique_ptr<ModelPart> pushing_part(const CompiledModel& whole);
+std::unique_ptr<ModelPart> without_inert_contacts(const CompiledModel& whole);
 
 }  // namespace tangere

@@ -80,7 +80,7 @@ struct FailedEpisode {
 /// scene.
 struct EpisodeSteps {
   std::int64_t taken = 0;        ///< of the simulation, without those that failed
-  std::int64_t passed = 0;       ///< in which a body came through another (StepStatus::passed)
+  std::int64_t passed = 0;       ///< in which a body came through another (StepStatus::tunnelled)
   std::int64_t overlapping = 0;  ///< after which bodies overlap (StepStatus::overlapping)
 
   EpisodeSteps& operator+=(const EpisodeSteps& other) {

@@ -7,7 +7,7 @@
 #include <span>
 
 #include "engine/scene/field_form.hpp"
-#include "engine/step/shear_memory.hpp"
+#include "engine/step/shear_state.hpp"
 #include "engine/step/sleep_state.hpp"
 
 namespace tangere {
@@ -56,7 +56,7 @@ struct ActionRow {
   std::span<const std::uint8_t> terminated, truncated, success;
 };
 
-/// The books of row t of a trajectory, for all environments (engine/sense/audit.hpp).
+/// The books of row t of a trajectory, for all environments (engine/sense/energy_balance.hpp).
 struct AuditRow {
   std::int64_t step;                 ///< t
   std::span<const double> energy;    ///< (E, 3) of motion, of height, held [J]
@@ -69,7 +69,7 @@ struct AuditRow {
 /// What friction remembers at row t of a trajectory, for all environments.
 struct MemoryRow {
   std::int64_t step;                    ///< t
-  std::span<const ShearMemory> memory;  ///< (E)
+  std::span<const ShearState> memory;  ///< (E)
 };
 
 /// Which bodies sleep at row t of a trajectory, for all environments. It follows the StateRow.

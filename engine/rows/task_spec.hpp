@@ -50,7 +50,7 @@ struct TaskSpec {
   double settling_timestep = 0;
   int memory = 0;  ///< numbers that an episode keeps for the task: a goal, a force
   /// What the task looks at besides q and v.
-  bool looks_at_end_effectors = false, looks_at_tactile = false;
+  bool reads_end_effectors = false, reads_tactile = false;
 
   [[nodiscard]] std::size_t observation_size() const;
   /// Throws InputError when something is missing or contradicts something else.

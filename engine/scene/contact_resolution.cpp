@@ -15,7 +15,7 @@
 #include <map>
 #include <numbers>
 
-#include "engine/scene/felt_bodies.hpp"
+#include "engine/scene/sensed_bodies.hpp"
 #include "engine/scene/mass_properties.hpp"
 #include "engine/scene/outer_pose.hpp"
 #include "engine/scene/shapes.hpp"

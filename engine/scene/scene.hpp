@@ -190,7 +190,7 @@ struct TactileDescription {
   bool remembers_readings = false;
   std::optional<int> pressure_sign;  ///< +1 or -1; found from the geometry when not given
   Source source;
-  /// Bodies that it feels, or does not feel, by name (felt_bodies.hpp); one of the two at most.
+  /// Bodies that it feels, or does not feel, by name (sensed_bodies.hpp); one of the two at most.
   std::vector<std::string> feels{}, ignores{};
   SensorImperfections imperfections{};          ///< of its readings; none to begin with
   std::optional<MarkersDescription> markers{};  ///< none: it has none
@@ -311,7 +311,7 @@ struct SolverOptions {
   /// none sleeps.
   double sleep = 0;
   Source sleep_source{};
-  bool all_contacts = false;  ///< StepperOptions::all_contacts
+  bool keep_inert_contacts = false;  ///< StepperOptions::keep_inert_contacts
 };
 
 struct Scene {

@@ -19,15 +19,15 @@
 
 namespace tangere {
 
-const Scheme* Scheme::of_gains() const { return order > 1 ? &Integrator::bdf1.scheme() : nullptr; }
+const Scheme* Scheme::energy_fallback() const { return order > 1 ? &Integrator::bdf1.scheme() : nullptr; }
 
-const Scheme& Scheme::of_turns() const {
-  return order > 1 ? of_parts() : Integrator::sdirk2.scheme();
+const Scheme& Scheme::rotation_fallback() const {
+  return order > 1 ? substep_scheme() : Integrator::sdirk2.scheme();
 }
 
 int Scheme::most_inner_stages() const {
   return std::max({inner_stages(), start == nullptr ? 0 : start->inner_stages(),
-                   of_parts().inner_stages(), of_turns().inner_stages()});
+                   substep_scheme().inner_stages(), rotation_fallback().inner_stages()});
 }
 
 namespace {

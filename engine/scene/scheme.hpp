@@ -54,11 +54,11 @@ struct Scheme {
   /// Number of stages whose results a tape keeps.
   [[nodiscard]] int inner_stages() const { return static_cast<int>(stages.size()) - 1; }
   [[nodiscard]] bool needs_history() const { return start != nullptr; }
-  [[nodiscard]] const Scheme& of_parts() const { return parts == nullptr ? *this : *parts; }
+  [[nodiscard]] const Scheme& substep_scheme() const { return parts == nullptr ? *this : *parts; }
   /// The scheme of steps to which this one would add energy; null: it adds none.
-  [[nodiscard]] const Scheme* of_gains() const;
+  [[nodiscard]] const Scheme* energy_fallback() const;
   /// The scheme of steps in which bodies turn too far for this one.
-  [[nodiscard]] const Scheme& of_turns() const;
+  [[nodiscard]] const Scheme& rotation_fallback() const;
   /// The largest number of inner stages of this scheme, its start, its parts and its turns.
   [[nodiscard]] int most_inner_stages() const;
 };

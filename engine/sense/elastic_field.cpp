@@ -9,9 +9,9 @@ namespace tangere {
 
 using kernels::kBlock;
 using kernels::kGroup;
-using kernels::RememberingContact;
-using kernels::RememberingPoints;
-using kernels::RememberingTouch;
+using kernels::ShearSpringContact;
+using kernels::ShearSpringPoints;
+using kernels::ShearSpringTouch;
 using kernels::Vec3;
 
 ElasticField::ElasticField(const Model& model) : model_(model), felt_(compiled(model)) {
@@ -33,18 +33,18 @@ void ElasticField::for_each_touched(const PadReader& reader, const Batch& batch,
   const kernels::KernelTable& table = kernels::active_kernels();
   const int block = environment / kBlock, group = environment % kBlock / kGroup,
             lane = environment % kGroup;
-  const ShearMemory& memory = batch.memory(environment);
+  const ShearState& memory = batch.memory(environment);
   std::size_t next = 0;
-  for (const RememberingContact& of : m.memories) {
+  for (const ShearSpringContact& of : m.memories) {
     if (of.sensor != sensor) continue;
-    const RememberingTouch touch = touch_between(
+    const ShearSpringTouch touch = touch_between(
         of, reader.link(of.contact.link1, group, lane), reader.link(of.contact.link2, group, lane),
         [&](const kernels::Parameter& p) {
           return p.row < 0 ? p.value : kernels::row_of(batch.block(block), p.row, group)[lane];
         });
-    const RememberingPoints points = felt_.find(m.sensors[std::size_t(sensor)], table, touch);
+    const ShearSpringPoints points = felt_.find(m.sensors[std::size_t(sensor)], table, touch);
     if (points.count == 0) continue;
-    if (m.memory_every(of) > 0) {
+    if (m.shear_interval(of) > 0) {
       set_anchors(table, touch, memory, felt_.index(), points, felt_.scratch());
     } else {
       look_up(memory, of, felt_.index(), points.count, points.stride, remembered_.data(), next);
@@ -60,8 +60,8 @@ void ElasticField::read(const PadReader& reader, const Batch& batch, int environ
   const CompiledSensor& s = compiled(model_).sensors[std::size_t(sensor)];
   std::fill(field.begin(), field.end(), 0.0);
   for_each_touched(reader, batch, environment, sensor,
-                   [&](const RememberingContact&, const RememberingTouch& touch,
-                       const RememberingPoints& points) {
+                   [&](const ShearSpringContact&, const ShearSpringTouch& touch,
+                       const ShearSpringPoints& points) {
                      kernels::active_kernels().advance(touch, points, s_.data(), force_.data());
                      for (int k = 0; k < points.count; ++k) {
                        const auto point = std::size_t(felt_.index()[k]);
@@ -83,8 +83,8 @@ std::span<const ElasticField::Share> ElasticField::pull_back(const PadReader& re
   shares_.clear();
   for_each_touched(
       reader, batch, environment, sensor,
-      [&](const RememberingContact& of, const RememberingTouch& touch,
-          const RememberingPoints& points) {
+      [&](const ShearSpringContact& of, const ShearSpringTouch& touch,
+          const ShearSpringPoints& points) {
         std::fill(force_.begin(), force_.end(), 0.0);
         std::fill(s_.begin(), s_.end(), 0.0);
         for (int k = 0; k < points.count; ++k) {
@@ -95,11 +95,11 @@ std::span<const ElasticField::Share> ElasticField::pull_back(const PadReader& re
             for (int i = 0; i < 3; ++i)
               force_[std::size_t(i * points.stride + k)] += axes[3 * c + i] * from[c];
         }
-        kernels::MemoryCotangent sums{};
-        kernels::MemoryPullback pullback = {&touch,  &touch,        points,  remembered_.data(),
+        kernels::ShearCotangentSums sums{};
+        kernels::ShearPullback pullback = {&touch,  &touch,        points,  remembered_.data(),
                                             nullptr, force_.data(), nullptr, s_.data(),
                                             &sums};
-        const bool keeps = compiled(model_).memory_every(of) > 0;
+        const bool keeps = compiled(model_).shear_interval(of) > 0;
         if (keeps) {
           std::fill(remembered_.begin(), remembered_.end(), 0.0);
           std::fill(anchors_.begin(), anchors_.end(), 0.0);

@@ -6,7 +6,7 @@
 #include <span>
 
 #include "engine/sense/pad_reader.hpp"
-#include "engine/step/felt_points.hpp"
+#include "engine/step/touching_sensor_points.hpp"
 
 namespace tangere {
 
@@ -22,7 +22,7 @@ class ElasticField {
 
   /// What a cotangent of the field comes to, by one body that the sensor touches.
   struct Share {
-    const kernels::RememberingContact* of;
+    const kernels::ShearSpringContact* of;
     kernels::TouchCotangent<double> motion;  ///< body 1's axes and origin
   };
   /// Returns what a cotangent of the field comes to, valid until the next call, and adds to
@@ -36,7 +36,7 @@ class ElasticField {
   void for_each_touched(const PadReader& reader, const Batch& batch, int environment, int sensor,
                         const F& f);
   Model model_;
-  FeltPoints felt_;
+  TouchingSensorPoints felt_;
   std::vector<Share> shares_;
   AlignedVector<double> remembered_, s_, force_;  // (3, stride), (4, stride), (3, stride)
   AlignedVector<double> anchors_;                 // (6, stride)

@@ -239,7 +239,7 @@ void ImperfectField::scale_by_slope(const CompiledSensor& s, const ReadingKey& k
   });
 }
 
-void check_has_no_memory(const Model& model, int sensor) {
+void check_has_no_lag(const Model& model, int sensor) {
   const SensorInfo& info = model.sensors()[std::size_t(sensor)];
   if (info.past_states == 0) return;
   const std::string where =

@@ -59,7 +59,7 @@ class ImperfectField {
 };
 
 /// Throws InputError for a sensor with memory: its reading has no derivative by one state alone.
-void check_has_no_memory(const Model& model, int sensor);
+void check_has_no_lag(const Model& model, int sensor);
 
 /// Computes the ideal field of a sensor, (points, 3), in a lane of the group whose touches were
 /// found.

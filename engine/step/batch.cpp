@@ -45,9 +45,9 @@ const char* to_string(StepStatus value) {
   switch (value) {
     case StepStatus::converged: return "converged";
     case StepStatus::split: return "converged after the step was split";
-    case StepStatus::coarse:
+    case StepStatus::accuracy_not_met:
       return "converged, but its shortest parts missed the accuracy or created energy";
-    case StepStatus::passed: return "converged, but a body came through one that it touches";
+    case StepStatus::tunnelled: return "converged, but a body came through one that it touches";
     case StepStatus::damped: return "converged, but damped, because the scheme created energy";
     case StepStatus::overlapping:
       return "converged, but bodies overlap where no contact point is as deep";
@@ -234,7 +234,7 @@ void Batch::set_state(int environment, std::span<const double> q, std::span<cons
 
 void Batch::set_memory(int environment, std::span<const ShearEntry> memory) {
   const std::size_t lane = this->lane(environment);
-  const int points = compiled(model_).remembering_points;
+  const int points = compiled(model_).shear_spring_points;
   int last = -1;
   for (const ShearEntry& e : memory) {
     if (e.point <= last || e.point >= points)

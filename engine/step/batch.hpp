@@ -10,7 +10,7 @@
 #include "engine/base/aligned.hpp"
 #include "engine/base/checks.hpp"
 #include "engine/model/model.hpp"
-#include "engine/step/shear_memory.hpp"
+#include "engine/step/shear_state.hpp"
 #include "engine/step/sleep_state.hpp"
 
 namespace tangere {
@@ -41,7 +41,7 @@ struct BlockState {
   std::vector<StepStatus> status;
   std::vector<std::uint8_t> has_history;
   std::vector<std::int64_t> steps;
-  std::vector<ShearMemory> memory;
+  std::vector<ShearState> memory;
   std::vector<SleepState> sleep;
 };
 
@@ -87,10 +87,10 @@ class Batch {
 
   /// What the friction of an environment remembers (docs/shear.md). It is empty when an episode
   /// begins and after set_state().
-  [[nodiscard]] const ShearMemory& memory(int environment) const {
+  [[nodiscard]] const ShearState& memory(int environment) const {
     return memory_[lane(environment)];
   }
-  [[nodiscard]] std::span<const ShearMemory> memories() const {
+  [[nodiscard]] std::span<const ShearState> memories() const {
     return {memory_.data(), std::size_t(environments_)};
   }
   /// Sets it, for a run that goes on from a stored state. Throws InputError unless the points rise
@@ -181,7 +181,7 @@ class Batch {
   std::vector<std::uint8_t> has_history_;  // BDF2: the previous state is valid
   std::vector<std::uint8_t> held_;
   std::vector<std::int64_t> episode_, steps_;
-  std::vector<ShearMemory> memory_;
+  std::vector<ShearState> memory_;
   std::vector<SleepState> sleep_;
   // What bodies may move until overlaps must be checked again [m] (interpenetration.hpp); 0: now.
   std::vector<double> clearance_;

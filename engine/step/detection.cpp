@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "engine/step/remember.hpp"
+#include "engine/step/shear_update.hpp"
 
 namespace tangere {
 
@@ -59,7 +59,7 @@ static void search_pair(const CompiledModel& model, const kernels::KernelTable& 
         {&model.pairs[k], size_of<L>(model.pairs[k], w.stage, l), pose, list.margin,
          list.own + 3 * list.stride * l, list.stride, faces_of<L>(w.stage, k, l),
          list.own_index == nullptr ? nullptr : list.own_index + list.stride * l});
-    if (list.own_index != nullptr) recall_list(model, table, w, static_cast<int>(k), l);
+    if (list.own_index != nullptr) set_list_anchors(model, table, w, static_cast<int>(k), l);
   }
 }
 

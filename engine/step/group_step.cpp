@@ -8,7 +8,7 @@
 
 #include "engine/model/model_part.hpp"
 #include "engine/step/detection.hpp"
-#include "engine/step/remember.hpp"
+#include "engine/step/shear_update.hpp"
 #include "engine/step/scheme_stage.hpp"
 #include "engine/step/softened.hpp"
 
@@ -29,7 +29,7 @@ constexpr int kPatience = 4, kSplitPatience = 40;
 /// Where a part begins in one lane, to go back to.
 struct LaneState {
   std::vector<double> q, v;
-  ShearMemory memory;
+  ShearState memory;
 };
 
 template <int L>
@@ -76,7 +76,7 @@ LaneBits GroupStep::run(const Scheme& scheme, const kernels::KernelTable& table,
   const bool softens = inside_split || settings_.accuracy == 0;
   factors = {};
   choose_faces(model_, table, w);
-  begin_memory(model_, table, w);
+  begin_shear(model_, table, w);
   for (int k = 0; k <= scheme.inner_stages(); ++k) {
     set_stage(model_, scheme, k, h, w);
     guess_stage(model_, scheme, k, h, w);
@@ -94,8 +94,8 @@ LaneBits GroupStep::run(const Scheme& scheme, const kernels::KernelTable& table,
   LaneBits resolved = lanes;
   finish(w, lanes, h, resolved, report);
   watch_faces(table, w, resolved, report);
-  watch_.look_for_passing(table, w, resolved, report);
-  advance_memory(model_, table, w, resolved);
+  watch_.find_tunnelling(table, w, resolved, report);
+  update_shear_state(model_, table, w, resolved);
   return resolved;
 }
 
@@ -186,7 +186,7 @@ void GroupStep::log_inner(const BasicWorkspace<L>& w, int lane, const Scheme& sc
 
 /// Solves a step of length h, and looks at what it came to.
 template <int L>
-Solved GroupStep::solve_and_watch(const Scheme& scheme, const kernels::KernelTable& table,
+Solved GroupStep::solve_and_check(const Scheme& scheme, const kernels::KernelTable& table,
                                   BasicWorkspace<L>& w, LaneBits lanes, double h, bool inside_split,
                                   NewtonReport& report) const {
   Solved solved;
@@ -216,8 +216,8 @@ bool GroupStep::split(const kernels::KernelTable& table, SingleWorkspace& w, dou
 /// not sound is better than none.
 bool GroupStep::take_part(const kernels::KernelTable& table, SingleWorkspace& w, double h,
                           int depth, NewtonReport& report, std::vector<TapedSolve>* solves) const {
-  const Scheme* scheme = &settings_.integrator.scheme().of_parts();
-  const auto solve = [&] { return solve_and_watch(*scheme, table, w, 1U, h, true, report); };
+  const Scheme* scheme = &settings_.integrator.scheme().substep_scheme();
+  const auto solve = [&] { return solve_and_check(*scheme, table, w, 1U, h, true, report); };
   const auto take = [&] {
     commit(w, 1U);
     note(w, 0, *scheme, h, solves);
@@ -236,11 +236,11 @@ bool GroupStep::take_part(const kernels::KernelTable& table, SingleWorkspace& w,
   };
   // Where one scheme finds no root of a shortest part, the equations of another may have one.
   const bool lost = one.found == 0 && depth == kDeepestSplit;
-  if (const Scheme* const of_gains = scheme->of_gains();
-      of_gains != nullptr && (one.created != 0 || lost)) {
-    try_by(*of_gains);
+  if (const Scheme* const energy_fallback = scheme->energy_fallback();
+      energy_fallback != nullptr && (one.created != 0 || lost)) {
+    try_by(*energy_fallback);
   } else if (one.turned != 0 || lost) {
-    try_by(scheme->of_turns());
+    try_by(scheme->rotation_fallback());
   }
   if (one.sound() != 0) return take();
   if (one.found == 0) return split(table, w, h, depth + 1, report, solves);
@@ -321,7 +321,7 @@ void GroupStep::advance_plainly(const kernels::KernelTable& table, BasicWorkspac
   };
   LaneBits resolved = 0, passed = 0, created = 0, turned = 0;
   const auto solve_and_commit = [&](const Scheme& by, LaneBits which) {
-    const Solved s = solve_and_watch(by, table, w, which, h, false, report);
+    const Solved s = solve_and_check(by, table, w, which, h, false, report);
     commit(w, s.sound());
     resolved |= s.sound(), passed |= s.passed, created |= s.created, turned |= s.turned;
     return s.sound();
@@ -338,10 +338,10 @@ void GroupStep::advance_plainly(const kernels::KernelTable& table, BasicWorkspac
       if (has(done, l)) note(w, l, by, h, solves_of(l));
   };
   if (starting != 0) take_by(*scheme.start, starting);
-  if (const Scheme* const of_gains = scheme.of_gains(); of_gains != nullptr) {
-    if (created != 0) take_by(*of_gains, created);
+  if (const Scheme* const energy_fallback = scheme.energy_fallback(); energy_fallback != nullptr) {
+    if (created != 0) take_by(*energy_fallback, created);
   } else if (turned != 0) {
-    take_by(scheme.of_turns(), turned);
+    take_by(scheme.rotation_fallback(), turned);
   }
   for (int l = 0; l < L; ++l) {
     if (!has(lanes & ~resolved, l)) continue;
@@ -384,8 +384,8 @@ void GroupStep::advance_plainly(const kernels::KernelTable& table, BasicWorkspac
     const LaneBits coarse = report.created | report.turned;
     if (!has(lanes & (report.passed | created | turned | coarse), l) || failed(report.status[l]))
       continue;
-    report.status[l] = has(report.passed, l) ? StepStatus::passed
-                       : has(coarse, l)      ? StepStatus::coarse
+    report.status[l] = has(report.passed, l) ? StepStatus::tunnelled
+                       : has(coarse, l)      ? StepStatus::accuracy_not_met
                        : has(created, l)     ? StepStatus::damped
                                              : StepStatus::split;
   }

@@ -7,7 +7,7 @@
 #include "engine/step/contact_forces.hpp"
 #include "engine/step/newton.hpp"
 #include "engine/step/step_settings.hpp"
-#include "engine/step/step_watch.hpp"
+#include "engine/step/step_checks.hpp"
 #include "engine/step/tape.hpp"
 
 namespace tangere {
@@ -81,7 +81,7 @@ class GroupStep {
   void watch_faces(const kernels::KernelTable& table, BasicWorkspace<L>& w, LaneBits lanes,
                    NewtonReport& report) const;
   template <int L>
-  Solved solve_and_watch(const Scheme& scheme, const kernels::KernelTable& table,
+  Solved solve_and_check(const Scheme& scheme, const kernels::KernelTable& table,
                          BasicWorkspace<L>& w, LaneBits lanes, double h, bool inside_split,
                          NewtonReport& report) const;
   template <int L>
@@ -92,7 +92,7 @@ class GroupStep {
 
   const CompiledModel& model_;
   StepSettings settings_;
-  StepWatch watch_;
+  StepChecks watch_;
   ContactForces contact_forces_;
   std::vector<int> component_of_;  ///< (nv)
 };

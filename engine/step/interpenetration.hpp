@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "engine/step/batch.hpp"
-#include "engine/step/passing.hpp"
+#include "engine/step/tunnelling_check.hpp"
 #include "engine/step/workspace.hpp"
 
 namespace tangere {

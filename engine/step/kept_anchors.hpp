@@ -4,21 +4,21 @@
 // state is needed. A point without anchors begins unsheared where it is found.
 #pragma once
 
-#include "engine/step/remembering_lane.hpp"
+#include "engine/step/shear_lane.hpp"
 
 namespace tangere {
 
 /// Whether the memory of a contact advances after `steps` ≥ 0 steps of an episode.
-inline bool is_due(const CompiledModel& m, const kernels::RememberingContact& of,
+inline bool is_due(const CompiledModel& m, const kernels::ShearSpringContact& of,
                    std::int64_t steps) {
-  const int every = m.memory_every(of);
+  const int every = m.shear_interval(of);
   return every > 0 && steps >= 0 && steps % every == 0;
 }
 
 /// Returns what is remembered of a contact's points.
 inline std::span<const ShearEntry> entries_of(std::span<const ShearEntry> memory,
                                               const CompiledModel& m,
-                                              const kernels::RememberingContact& of) {
+                                              const kernels::ShearSpringContact& of) {
   const auto from = [&](int point) {
     return std::lower_bound(memory.begin(), memory.end(), point,
                             [](const ShearEntry& e, int value) { return e.point < value; });
@@ -34,15 +34,15 @@ inline std::ptrdiff_t kept_entries(const CompiledModel& m, std::span<const Shear
 }
 
 /// The points among all that remember of which b, and of which a, of a contact is kept.
-inline PointRange b_range(const kernels::RememberingContact& of) { return of; }
-inline PointRange a_range(const kernels::RememberingContact& of) {
+inline PointRange b_range(const kernels::ShearSpringContact& of) { return of; }
+inline PointRange a_range(const kernels::ShearSpringContact& of) {
   return {of.first + of.contact.n_points, of.contact.n_points};
 }
 
 /// Writes two sets of three numbers of points, (6, stride): those of the entries of b, then of a.
 template <class Number>
-void look_up_anchors(std::span<const ShearEntry> memory, const kernels::RememberingContact& of,
-                     const int* index, const kernels::RememberingPoints& points,
+void look_up_anchors(std::span<const ShearEntry> memory, const kernels::ShearSpringContact& of,
+                     const int* index, const kernels::ShearSpringPoints& points,
                      const Number& number, double* out) {
   std::size_t next = 0;
   look_up(memory, b_range(of), index, points.count, points.stride, number, out, next);
@@ -52,8 +52,8 @@ void look_up_anchors(std::span<const ShearEntry> memory, const kernels::Remember
 
 /// Adds (6, stride) numbers of points to those of their entries of b and a.
 inline void add_to_anchors(std::span<const ShearEntry> memory,
-                           const kernels::RememberingContact& of, const int* index,
-                           const kernels::RememberingPoints& points, const double* numbers,
+                           const kernels::ShearSpringContact& of, const int* index,
+                           const kernels::ShearSpringPoints& points, const double* numbers,
                            std::span<double> to) {
   add_to_entries(memory, b_range(of), index, points, numbers, to);
   add_to_entries(memory, a_range(of), index, points, numbers + 3 * points.stride, to);
@@ -61,9 +61,9 @@ inline void add_to_anchors(std::span<const ShearEntry> memory,
 
 /// Sets the anchors of points: those that are kept, else those of an unsheared spring. `kept`:
 /// (kKeptNumbers, stride) scratch; its last row is 1 where an anchor is kept, else 0.
-inline void set_anchors(const kernels::KernelTable& table, const kernels::RememberingTouch& touch,
+inline void set_anchors(const kernels::KernelTable& table, const kernels::ShearSpringTouch& touch,
                         std::span<const ShearEntry> memory, const int* index,
-                        const kernels::RememberingPoints& points, double* kept) {
+                        const kernels::ShearSpringPoints& points, double* kept) {
   const int stride = points.stride,
             end = (points.count + kernels::kGroup - 1) / kernels::kGroup * kernels::kGroup;
   for (int c = 3; c < 6; ++c) std::fill_n(points.anchors + c * stride, end, 0.0);
@@ -84,11 +84,11 @@ inline void set_anchors(const kernels::KernelTable& table, const kernels::Rememb
 
 /// Appends the anchors after a step that ends at `touch`, from those before it.
 inline void advance_anchors(const CompiledModel& m, const kernels::KernelTable& table,
-                            const kernels::RememberingTouch& touch,
-                            std::span<const ShearEntry> before, FeltPoints& felt,
-                            ShearMemory& after) {
-  const kernels::RememberingContact& of = *touch.of;
-  const kernels::RememberingPoints points =
+                            const kernels::ShearSpringTouch& touch,
+                            std::span<const ShearEntry> before, TouchingSensorPoints& felt,
+                            ShearState& after) {
+  const kernels::ShearSpringContact& of = *touch.of;
+  const kernels::ShearSpringPoints points =
       felt.find(m.sensors[std::size_t(of.sensor)], table, touch);
   if (points.count == 0) return;
   const int stride = points.stride;

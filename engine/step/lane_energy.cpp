@@ -6,7 +6,7 @@
 #include <array>
 #include <cmath>
 
-#include "engine/step/remembering_lane.hpp"
+#include "engine/step/shear_lane.hpp"
 #include "engine/step/rotation_log.hpp"
 #include "engine/step/state_difference.hpp"
 #include "kernels/contact/pair_contact.hpp"
@@ -69,7 +69,7 @@ struct LaneAt {
   void add_held(const kernels::Link& link, int k, double place, double stretch, double error,
                 double rate) {
     const kernels::DofEffects& e = model.dof_effects[std::size_t(link.v + k)];
-    if ((link.effects & kernels::kSprung) != 0)
+    if ((link.effects & kernels::kSpring) != 0)
       sum.moving += 0.5 * number(e.stiffness) * stretch * stretch;
     if ((link.effects & kernels::kLimited) != 0) {
       const double beyond = std::max({e.low - place, place - e.high, 0.0});
@@ -101,7 +101,7 @@ struct LaneAt {
       if ((link.effects & kernels::kBeyondDamping) == 0) continue;
       for (int k = 0; k < kernels::dofs(link.kind); ++k) {
         const double rate = v[link.v + k][lane];
-        if ((link.effects & kernels::kArmoured) == 0) continue;
+        if ((link.effects & kernels::kArmature) == 0) continue;
         const double energy =
             0.5 * number(model.dof_effects[std::size_t(link.v + k)].armature) * rate * rate;
         sum.moving += energy;
@@ -257,10 +257,10 @@ double energy_of_contacts(const CompiledModel& model, const kernels::KernelTable
 
 template <int L>
 double energy_of_friction(const CompiledModel& model, const BasicWorkspace<L>& w,
-                          const ShearMemory& memory, int lane) {
+                          const ShearState& memory, int lane) {
   double sum = 0;
   std::size_t e = 0;
-  for (const kernels::RememberingContact& contact : model.memories) {  // by rising point
+  for (const kernels::ShearSpringContact& contact : model.memories) {  // by rising point
     double square = 0;
     const int end = contact.first + model.remembering(contact);
     for (; e < memory.size() && memory[e].point < end; ++e)
@@ -293,7 +293,7 @@ LaneBooks lane_books(const CompiledModel& model, const kernels::KernelTable& tab
                                      BasicWorkspace<L>&, const AlignedVector<LinkPose<Row<L>>>&, \
                                      int);                                                       \
   template double energy_of_friction(const CompiledModel&, const BasicWorkspace<L>&,             \
-                                     const ShearMemory&, int);
+                                     const ShearState&, int);
 TANGERE_FOR_LANES(kernels::kGroup)
 TANGERE_FOR_LANES(1)
 #undef TANGERE_FOR_LANES

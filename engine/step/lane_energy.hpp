@@ -38,7 +38,7 @@ double energy_of_contacts(const CompiledModel& model, const kernels::KernelTable
 /// points of `memory`. Sensors act on no body, so their springs are left out.
 template <int L>
 double energy_of_friction(const CompiledModel& model, const BasicWorkspace<L>& w,
-                          const ShearMemory& memory, int lane);
+                          const ShearState& memory, int lane);
 
 /// The books of one environment: what it holds, and what passes through motors and damping.
 struct LaneBooks {

@@ -122,7 +122,7 @@ void Sleep::add_meetings() {
   }
 }
 
-void Sleep::heed_controls(SleepState& s, std::span<const double> u) const {
+void Sleep::wake_on_control_change(SleepState& s, std::span<const double> u) const {
   if (s.asleep.empty()) {
     s.asleep.assign(steps_.size(), 0);
     s.island.assign(steps_.size(), -1);
@@ -206,7 +206,7 @@ void for_pairs(const CompiledModel& m, const kernels::LinkPair& links, const dou
 
 /// Returns a distance by which no point of the links is nearer to a shape of the others; less than
 /// `reach` where it is not known to be as large as that.
-double Sleep::way_to_touch(const kernels::LinkPair& links, const double* column, double reach,
+double Sleep::distance_to_contact(const kernels::LinkPair& links, const double* column, double reach,
                            const SingleWorkspace& single) const {
   double way = kFarLook * reach;
   for_pairs(model_, links, column, single,
@@ -244,7 +244,7 @@ bool Sleep::is_clear(SleepState& s, double moved) const {
   return bounded_ && s.clearance >= 2 * moved;
 }
 
-bool Sleep::wake_touched(const kernels::KernelTable& table, const SleeperAt& at,
+bool Sleep::wake_touched(const kernels::KernelTable& table, const SleepingLane& at,
                          std::span<const double> q, double moved, SingleWorkspace& single) {
   SleepState& s = at.state;
   for (std::size_t i = 0; i < q.size(); ++i) single.q0[i][0] = q[i];
@@ -255,7 +255,7 @@ bool Sleep::wake_touched(const kernels::KernelTable& table, const SleeperAt& at,
     if (s.asleep[std::size_t(m.tree1)] == s.asleep[std::size_t(m.tree2)]) continue;
     const kernels::LinkPair& links = model_.link_pairs[std::size_t(m.pair)];
     const double reach = links.margin + 2 * moved;
-    const double way = way_to_touch(links, at.column, reach, single);
+    const double way = distance_to_contact(links, at.column, reach, single);
     if (way >= reach || !within(table, links, at.column, reach, single)) {
       clearance = std::min(clearance, std::max(way, reach));
       continue;
@@ -272,7 +272,7 @@ bool Sleep::wake_touched(const kernels::KernelTable& table, const SleeperAt& at,
 /// Labels trees that are awake: those that could touch each other, directly or through others, have
 /// the same label, which is their lowest number. Pairs of which neither has rested are left out.
 /// Returns false where no tree that has rested is without others that have not.
-bool Sleep::group_by_nearness(const kernels::KernelTable& table, const SleeperAt& at,
+bool Sleep::group_by_nearness(const kernels::KernelTable& table, const SleepingLane& at,
                               SingleWorkspace& single) {
   const SleepState& s = at.state;
   for (int i = 0; i < model_.nq; ++i) single.q0[i][0] = at.column[(model_.layout.q + i) * kBlock];
@@ -285,7 +285,7 @@ bool Sleep::group_by_nearness(const kernels::KernelTable& table, const SleeperAt
       continue;
     if (!rested(m.tree1) && !rested(m.tree2)) continue;
     const kernels::LinkPair& links = model_.link_pairs[std::size_t(m.pair)];
-    if (way_to_touch(links, at.column, links.margin, single) >= links.margin) continue;
+    if (distance_to_contact(links, at.column, links.margin, single) >= links.margin) continue;
     if (!within(table, links, at.column, links.margin, single)) continue;
     std::ranges::replace(label_, std::max(from, to), std::min(from, to));
   }
@@ -295,7 +295,7 @@ bool Sleep::group_by_nearness(const kernels::KernelTable& table, const SleeperAt
   return std::ranges::any_of(label_, [](int label) { return label >= 0; });
 }
 
-void Sleep::fall_asleep(const SleeperAt& at, int tree) const {
+void Sleep::fall_asleep(const SleepingLane& at, int tree) const {
   const BlockLayout& layout = model_.layout;
   const auto row = [&](int r) -> double& { return at.column[r * kBlock]; };
   for (std::size_t i = 0; i < model_.links.size(); ++i) {
@@ -312,7 +312,7 @@ void Sleep::fall_asleep(const SleeperAt& at, int tree) const {
   at.state.clearance = 0;
 }
 
-bool Sleep::count_rest(SleepState& s, const double* moved, int stride, bool plainly) const {
+bool Sleep::update_rest_counters(SleepState& s, const double* moved, int stride, bool plainly) const {
   s.slept += s.bodies;
   bool due = false, resting = false;
   for (std::size_t t = 0; t < steps_.size(); ++t) {
@@ -327,7 +327,7 @@ bool Sleep::count_rest(SleepState& s, const double* moved, int stride, bool plai
   return due;
 }
 
-void Sleep::settle(const kernels::KernelTable& table, const SleeperAt& at,
+void Sleep::settle(const kernels::KernelTable& table, const SleepingLane& at,
                    SingleWorkspace& single) {
   SleepState& s = at.state;
   soon_.assign(s.asleep.begin(), s.asleep.end());

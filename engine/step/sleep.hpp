@@ -17,7 +17,7 @@
 namespace tangere {
 
 /// One lane of a block: the environment that rules are applied to.
-struct SleeperAt {
+struct SleepingLane {
   double* column;  ///< row r: column[r * kBlock]
   SleepState& state;
 };
@@ -33,7 +33,7 @@ class Sleep {
 
   /// Makes room in a state that is empty. Trees whose controls are not those of the last step
   /// wake, or have not rested.
-  void heed_controls(SleepState& state, std::span<const double> u) const;
+  void wake_on_control_change(SleepState& state, std::span<const double> u) const;
 
   /// Computes m of each tree, (trees, L) [m], from the state in `rows` to that in the workspace.
   /// `q`: the number in the whole model of each coordinate in the workspace.
@@ -48,16 +48,16 @@ class Sleep {
   /// at the end of this step. `moved`: the largest m in this step [m]. Returns true if one of them
   /// is touched already: the step must then be taken again, with it awake. Overwrites q0 of
   /// `single`.
-  bool wake_touched(const kernels::KernelTable& table, const SleeperAt& at,
+  bool wake_touched(const kernels::KernelTable& table, const SleepingLane& at,
                     std::span<const double> q, double moved, SingleWorkspace& single);
 
   /// Counts the steps of rest after one that is in the block. `moved`: m of tree t at t · stride,
   /// of those that are awake. `plainly`: the step was neither split nor taken again. Returns
   /// whether settle() may let some tree fall asleep; while its neighbours keep it awake, it is
   /// asked again after as many steps.
-  bool count_rest(SleepState& state, const double* moved, int stride, bool plainly) const;
+  bool update_rest_counters(SleepState& state, const double* moved, int stride, bool plainly) const;
   /// Lets trees fall asleep. Overwrites q0 of `single`.
-  void settle(const kernels::KernelTable& table, const SleeperAt& at, SingleWorkspace& single);
+  void settle(const kernels::KernelTable& table, const SleepingLane& at, SingleWorkspace& single);
 
  private:
   /// Links of different trees that may touch.
@@ -69,15 +69,15 @@ class Sleep {
   void measure();
   void add_meetings();
   void find_poses(const kernels::KernelTable& table, const double* column, SingleWorkspace& single);
-  [[nodiscard]] double way_to_touch(const kernels::LinkPair& links, const double* column,
+  [[nodiscard]] double distance_to_contact(const kernels::LinkPair& links, const double* column,
                                     double reach, const SingleWorkspace& single) const;
   [[nodiscard]] bool within(const kernels::KernelTable& table, const kernels::LinkPair& links,
                             const double* column, double reach, SingleWorkspace& single) const;
   [[nodiscard]] bool pays(std::span<const std::uint8_t> asleep) const;
   void wake_island(SleepState& state, int tree) const;
-  bool group_by_nearness(const kernels::KernelTable& table, const SleeperAt& at,
+  bool group_by_nearness(const kernels::KernelTable& table, const SleepingLane& at,
                          SingleWorkspace& single);
-  void fall_asleep(const SleeperAt& at, int tree) const;
+  void fall_asleep(const SleepingLane& at, int tree) const;
 
   const CompiledModel& model_;
   std::vector<int> tree_;        // of each link

@@ -240,8 +240,8 @@ void GroupStep::advance_in_parts(const kernels::KernelTable& table, BasicWorkspa
       at[l].take(ratio);
       if (!at[l].finished()) continue;
       open &= ~bit;
-      report.status[l] = has(passed, l)   ? StepStatus::passed
-                         : has(coarse, l) ? StepStatus::coarse
+      report.status[l] = has(passed, l)   ? StepStatus::tunnelled
+                         : has(coarse, l) ? StepStatus::accuracy_not_met
                          : has(split, l)  ? StepStatus::split
                                           : StepStatus::converged;
     }

@@ -50,7 +50,7 @@ StepSettings step_settings(const Model& model, const StepperOptions& o) {
       .accuracy = accuracy,
       .spare = false,
       .bounded_energy = model.solver().bounded_energy,
-      .all_contacts = o.all_contacts || model.solver().all_contacts,
+      .keep_inert_contacts = o.keep_inert_contacts || model.solver().keep_inert_contacts,
       .sleep = o.sleep.value_or(model.solver().sleep)};
   check_sleep(model, s.sleep);
   if (!(s.timestep > 0) || !std::isfinite(s.timestep))

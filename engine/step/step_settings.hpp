@@ -19,7 +19,7 @@ struct StepSettings {
   /// Steps that create energy are taken by BDF1 or in parts, and those in which bodies turn too far
   /// by SDIRK2 or in parts.
   bool bounded_energy = true;
-  bool all_contacts = false;  ///< those that can never push, in steps without a tape, too
+  bool keep_inert_contacts = false;  ///< those that can never push, in steps without a tape, too
   double sleep = 0;  ///< share of its size that a body may move and still rest; 0: none sleeps
 };
 

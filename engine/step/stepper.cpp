@@ -12,7 +12,7 @@
 #include "engine/step/interpenetration.hpp"
 #include "engine/step/kept_anchors.hpp"
 #include "engine/step/motor_force.hpp"
-#include "engine/step/remember.hpp"
+#include "engine/step/shear_update.hpp"
 #include "engine/step/sleep.hpp"
 #include "engine/step/step_settings.hpp"
 #include "engine/step/tape.hpp"
@@ -98,7 +98,7 @@ struct Stepper::Impl {
   Impl(const Model& m, const StepSettings& s)
       : model(m),
         settings(s),
-        pushing(s.sleep > 0 || s.all_contacts ? nullptr : pushing_part(compiled(model))),
+        pushing(s.sleep > 0 || s.keep_inert_contacts ? nullptr : without_inert_contacts(compiled(model))),
         machine(pushing ? pushing->model : compiled(model), s),
         all_q(as_size(m.nq())),
         all_v(as_size(m.nv())),
@@ -151,7 +151,7 @@ struct Stepper::Impl {
     gather(w.v_before, m.layout.previous_v, stepped.v);
     if (!m.memories.empty())
       for (int l = 0; l < L; ++l) {
-        const ShearMemory& memory = batch.memory_[std::size_t(g.first + lane + l)];
+        const ShearState& memory = batch.memory_[std::size_t(g.first + lane + l)];
         w.remembered.now[std::size_t(l)].assign(memory.begin() + kept_entries(m, memory),
                                                 memory.end());
       }
@@ -181,8 +181,8 @@ struct Stepper::Impl {
       if (m.layout.past_states > 0) remember(m.layout, g.rows + lane + l, batch.steps_[e]);
       ++batch.steps_[e];
       if (!m.memories.empty()) {
-        ShearMemory& memory = batch.memory_[e];
-        const ShearMemory& now = w.remembered.now[std::size_t(l)];
+        ShearState& memory = batch.memory_[e];
+        const ShearState& now = w.remembered.now[std::size_t(l)];
         memory.resize(std::size_t(kept_entries(m, memory)));
         memory.insert(memory.end(), now.begin(), now.end());
         reading[std::size_t(l)] = {batch.steps_[e], &memory};
@@ -191,7 +191,7 @@ struct Stepper::Impl {
       batch.has_history_[e] = settings.accuracy > 0 ? 0 : 1;
       moved |= 1U << l;
     }
-    if (m.kept_points > 0) advance_readings(m, kernels::active_kernels(), w, reading);
+    if (m.kept_points > 0) update_sensor_shear_state(m, kernels::active_kernels(), w, reading);
     const auto shift = [&](int now, int before, const Row<L>* from, std::span<const int> of) {
       for (std::size_t i = 0; i < of.size(); ++i) {
         double* const row = g.rows + of[i] * kBlock + lane;
@@ -223,8 +223,8 @@ struct Stepper::Impl {
           overlaps.check(kernels::active_kernels(), w, g.rows + first + l, motion[l]);
       clearance = found.clearance;
       if (found.passed)
-        batch.status_[e] = StepStatus::passed;
-      else if (found.overlapping && batch.status_[e] != StepStatus::passed)
+        batch.status_[e] = StepStatus::tunnelled;
+      else if (found.overlapping && batch.status_[e] != StepStatus::tunnelled)
         batch.status_[e] = StepStatus::overlapping;
     }
   }
@@ -236,7 +236,7 @@ struct Stepper::Impl {
     const auto state = [&](int l) -> SleepState& { return batch.sleep_[as_size(g.first + l)]; };
     for (int l = 0; l < kGroup; ++l)
       if (has(g.live, l))
-        sleeping->rules.heed_controls(state(l), controls.subspan(as_size(g.first + l) * nu, nu));
+        sleeping->rules.wake_on_control_change(state(l), controls.subspan(as_size(g.first + l) * nu, nu));
     const auto same = [](const SleepState& a, const SleepState& b) {
       return a.bodies == b.bodies && (a.bodies == 0 || a.asleep == b.asleep);
     };
@@ -324,7 +324,7 @@ struct Stepper::Impl {
       const std::size_t e = as_size(g.first + lane + l);
       if (!has(lanes, l) || failed(batch.status_[e])) continue;
       SleepState& state = batch.sleep_[e];
-      if (sleeping->rules.count_rest(state, moved + l, L,
+      if (sleeping->rules.update_rest_counters(state, moved + l, L,
                                      batch.status_[e] == StepStatus::converged))
         sleeping->rules.settle(kernels::active_kernels(), {g.rows + lane + l, state},
                                machine.single);
@@ -404,7 +404,7 @@ Integrator integrator_in_force(const Model& model, const StepperOptions& options
 StepperOptions for_gradients(const Model& model, StepperOptions options) {
   refuse_sleep(model, step_settings(model, options));
   if (!options.tolerance && !model.solver().tolerance) options.tolerance = kGradientTolerance;
-  options.all_contacts = true;
+  options.keep_inert_contacts = true;
   return options;
 }
 

@@ -21,7 +21,7 @@ struct StepperOptions {
   std::optional<double> sleep{};
   /// Steps without a tape take contacts that can never push, too. So they have the bits of steps
   /// with one.
-  bool all_contacts = false;
+  bool keep_inert_contacts = false;
 };
 
 }  // namespace tangere

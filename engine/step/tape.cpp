@@ -68,7 +68,7 @@ void BlockTape::keep_memory(const Batch& batch, int block) {
   if (compiled(model_).memories.empty()) return;
   for (int l = 0; l < kBlock; ++l) {
     if (const int e = block * kBlock + l; e < batch.environments()) {
-      const ShearMemory& m = batch.memory(e);
+      const ShearState& m = batch.memory(e);
       memory_.insert(memory_.end(), m.begin(), m.end());
     }
     memory_end_.push_back(memory_.size());

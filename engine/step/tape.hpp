@@ -10,7 +10,7 @@
 
 #include "engine/base/aligned.hpp"
 #include "engine/model/model.hpp"
-#include "engine/step/shear_memory.hpp"
+#include "engine/step/shear_state.hpp"
 
 namespace tangere {
 
@@ -22,7 +22,7 @@ struct TapedSolve {
   double h;                   ///< [s]
   std::vector<double> q, v;   ///< its result: (nq), (nv)
   std::vector<double> inner;  ///< inner stages relative to the solve's start, (inner_stages, nv)
-  ShearMemory memory;         ///< what friction remembers after it
+  ShearState memory;         ///< what friction remembers after it
 };
 
 /// The solves of one environment's step, first to last.
@@ -93,7 +93,7 @@ class BlockTape {
   std::vector<std::int64_t> before_;  // (16) steps of the episodes before the tape began
   // What friction remembers, and where each lane's part ends: (steps + 1, 16). Empty where nothing
   // remembers.
-  ShearMemory memory_;
+  ShearState memory_;
   std::vector<std::size_t> memory_end_;
 };
 

@@ -66,7 +66,7 @@ void BasicWorkspace<L>::make_memory(const CompiledModel& m) {
   for (auto& list : lists) list.own_index = nullptr, list.own_anchors = nullptr;
   if (m.memories.empty()) return;
   std::size_t listed = 0, most_on_ground = 0, most = 0;
-  for (const kernels::RememberingContact& of : m.memories) {
+  for (const kernels::ShearSpringContact& of : m.memories) {
     const int stride = of.pair >= 0 ? lists[std::size_t(of.pair)].stride
                        : of.ground  ? of.stride
                                     : of.contact.n_points + 2 * kGroup;
@@ -77,7 +77,7 @@ void BasicWorkspace<L>::make_memory(const CompiledModel& m) {
   own_index.resize(listed);
   own_anchors.resize(listed * kernels::kAnchorNumbers);
   std::size_t at = 0;
-  for (const kernels::RememberingContact& of : m.memories) {
+  for (const kernels::ShearSpringContact& of : m.memories) {
     if (of.pair < 0) continue;
     auto& list = lists[std::size_t(of.pair)];
     list.own_index = own_index.data() + at;
@@ -88,13 +88,13 @@ void BasicWorkspace<L>::make_memory(const CompiledModel& m) {
   remembered.grounded.reserve(std::size_t(m.ground_anchors));
   remembered.ground_anchors.resize(most_on_ground * kernels::kAnchorNumbers);
   remembered.s.resize(4 * most);
-  remembered.felt = FeltPoints(m);
+  remembered.felt = TouchingSensorPoints(m);
   remembered.start.resize(m.links.size());
   remembered.end.resize(m.links.size());
   remembered.start_touches.resize(m.memories.size());
   remembered.end_touches.resize(m.memories.size());
   for (auto* lanes : {&remembered.now, &remembered.after})
-    for (ShearMemory& lane : *lanes) lane.reserve(std::size_t(m.taped_points));
+    for (ShearState& lane : *lanes) lane.reserve(std::size_t(m.taped_points));
 }
 
 template <int L>

@@ -10,9 +10,9 @@
 
 #include "engine/base/aligned.hpp"
 #include "engine/model/compiled_model.hpp"
-#include "engine/step/felt_points.hpp"
+#include "engine/step/touching_sensor_points.hpp"
 #include "engine/step/pivoted_factors.hpp"
-#include "engine/step/shear_memory.hpp"
+#include "engine/step/shear_state.hpp"
 #include "kernels/table/kernel_table.hpp"
 
 namespace tangere {
@@ -39,18 +39,18 @@ inline constexpr int kInnerStages = 1;
 
 /// What friction remembers in the lanes of a group, and scratch. Empty where nothing remembers.
 template <int L>
-struct MemoryLanes {
+struct ShearLanes {
   using Poses = AlignedVector<kernels::LinkPose<kernels::Row<L>>>;
-  std::array<ShearMemory, L> now, after;  ///< where a solve begins, and at its end
+  std::array<ShearState, L> now, after;  ///< where a solve begins, and at its end
   Poses start, end;                       ///< (n_links) poses there
-  /// (n_memories) of each contact that remembers: the touched shape in body 1, and W.
+  /// (n_shear_springs) of each contact that remembers: the touched shape in body 1, and W.
   Poses start_touches, end_touches;
   AlignedVector<kernels::Row<L>> ground;  ///< (points on the ground, 4)
   std::vector<int> grounded;              ///< those of them that touch in some lane
   AlignedVector<double> ground_anchors;   ///< (kAnchorNumbers, largest stride) of one lane
   AlignedVector<double> s;                ///< (4, largest stride)
   std::array<std::size_t, L> next{};      ///< where look_up() was in `now`
-  FeltPoints felt;
+  TouchingSensorPoints felt;
 };
 
 template <int L>
@@ -95,7 +95,7 @@ struct BasicWorkspace {
   LaneRow *x_guess, *x_softened;  ///< where a stage begins; where it goes on with softer contacts
   LaneRow sound;
   PivotedFactors pivoted;  ///< for lanes whose plain LU is useless
-  MemoryLanes<L> remembered;
+  ShearLanes<L> remembered;
   AlignedVector<double> own_anchors;
   std::vector<int> own_index;
 };

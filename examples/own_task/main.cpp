@@ -25,7 +25,7 @@ class Press : public Task {
     spec.observations = {{"error", {1}, "N", "goal minus what the skin feels", {0.1}},
                          {"field", {8, 8, 3}, "N", "what the skin feels", {0.01}}};
     spec.observations.back().touch = true;
-    spec.looks_at_tactile = true;
+    spec.reads_tactile = true;
     spec.steps_per_action = 5;
     spec.moments = {5};
     spec.horizon = 30;

@@ -199,7 +199,7 @@ std::uint64_t hash_group(std::uint64_t hash, const h5::Id& group, const std::str
   return hash;
 }
 
-constexpr const char *kTaken = "simulation_steps", *kPassed = "passed_steps",
+constexpr const char *kTaken = "simulation_steps", *kPassed = "tunnelled_steps",
                      *kOverlapping = "overlapping_steps";
 
 /// A count that a file may claim: sums over as many shards as there may be do not overflow.

@@ -57,7 +57,7 @@ std::vector<SampleSaid> samples_said(const h5::Id& scene, std::int64_t every, st
 std::vector<std::string> touch_said(const h5::Id& scene);
 
 /// Writes the sums over the episodes of one file as attributes of the root: "simulation_steps",
-/// "passed_steps", "overlapping_steps".
+/// "tunnelled_steps", "overlapping_steps".
 void write_steps(const h5::Id& file, const EpisodeSteps& steps);
 /// Reads them; none: an older version wrote the file. Throws IoError for counts that contradict
 /// each other.

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "engine/scene/felt_bodies.hpp"
+#include "engine/scene/sensed_bodies.hpp"
 #include "engine/scene/field_form.hpp"
 #include "io/files/name_list.hpp"
 #include "io/files/nearest_name.hpp"
@@ -142,7 +142,7 @@ void add_feedback(Scene& scene, const SceneNode& node, const TactileDescription&
   pair.coefficients = d.coefficients;
   pair.law = d.law;
   pair.source = d.source;
-  const std::vector<int> felt = felt_bodies(scene, d);
+  const std::vector<int> felt = sensed_bodies(scene, d);
   for (const int other : felt) {
     const BodyDescription& touched = scene.links[std::size_t(other)].body;
     for (const PairContactDescription& c : scene.pair_contacts)
@@ -209,7 +209,7 @@ void read_sensors(Scene& scene, const SceneNode& section) {
     read_parts(node, d);
     for (const auto& [name, list] : {std::pair{"feels", &d.feels}, {"ignores", &d.ignores}})
       if (node.has(name)) *list = body_names(node, name);
-    static_cast<void>(felt_bodies(scene, d));  // checks the names
+    static_cast<void>(sensed_bodies(scene, d));  // checks the names
     if (node.word("feedback") == 1) add_feedback(scene, node, d);
     scene.sensors.push_back(std::move(d));
   }

@@ -10,7 +10,7 @@
 #include <optional>
 #include <set>
 
-#include "engine/scene/felt_bodies.hpp"
+#include "engine/scene/sensed_bodies.hpp"
 #include "engine/scene/shapes.hpp"
 #include "io/scene/scene_sections.hpp"
 
@@ -37,7 +37,7 @@ class SensorWarnings {
       const BodyDescription& body = scene_.links[k].body;
       if (!has_distance(body.shape)) without.insert(body.name);
     }
-    for (const int k : felt_bodies(scene_, sensor_)) felt_.insert(moving_link(scene_, k));
+    for (const int k : sensed_bodies(scene_, sensor_)) felt_.insert(moving_link(scene_, k));
     if (felt_.empty())
       return add(without.empty()
                      ? "can feel nothing: no body that it feels moves against it; bodies that a "

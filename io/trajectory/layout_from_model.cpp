@@ -96,7 +96,7 @@ TrajectoryLayout layout_from(const Batch& batch, const Stepper& stepper,
   layout.of_end_effectors = run.of_end_effectors;
   if (!run.end_effectors) layout.end_effector_names.clear();
   layout.audit = run.audit;
-  if (run.memory) layout.memory = memory_points(model);
+  if (run.memory) layout.memory = shear_state_arrays(model);
   layout.of_memory = run.of_memory;
   if (layout.sleep > 0) layout.trees = sleeping_trees(model);
   for (std::size_t i = 0; i < model.sensors().size(); ++i)

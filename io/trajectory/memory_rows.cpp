@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Points that do not touch are zeros, which a chunk of whole environments compresses away.
-#include "io/trajectory/memory_rows.hpp"
+#include "io/trajectory/shear_rows.hpp"
 
 #include <fmt/format.h>
 
@@ -22,7 +22,7 @@ constexpr std::size_t kMostMemoryPoints = std::size_t{1} << 26;  // more is dama
 }
 
 /// Reads names and places of the points.
-std::vector<MemoryContact> read_contacts(const h5::Id& group) {
+std::vector<ShearSpringPlaces> read_contacts(const h5::Id& group) {
   const std::vector<std::string> names = h5::read_texts(group, "contacts");
   const auto first = h5::read_numbers<std::int64_t>(group, "first");
   const h5::Id dataset = h5::open_dataset(group, "place");
@@ -34,7 +34,7 @@ std::vector<MemoryContact> read_contacts(const h5::Id& group) {
   if (!fits) damaged(group, "contacts, first and place do not belong together");
   std::vector<double> places(3 * dims[0]);
   h5::read_box<double>(dataset, {0, 0}, dims, places.data());
-  std::vector<MemoryContact> contacts;
+  std::vector<ShearSpringPlaces> contacts;
   const double* place = places.data();
   for (std::size_t c = 0; c < names.size(); ++c) {
     contacts.push_back({names[c], std::vector<Vector3>(std::size_t(first[c + 1] - first[c]))});
@@ -47,14 +47,14 @@ std::vector<MemoryContact> read_contacts(const h5::Id& group) {
 }  // namespace
 
 MemoryRows::MemoryRows(const h5::Id& file, const TrajectoryLayout& layout) : layout_(layout) {
-  const MemoryPoints& memory = layout.memory;
+  const ShearStateArrays& memory = layout.memory;
   const hsize_t E = static_cast<hsize_t>(layout.environments), P = memory.count(),
                 M = static_cast<hsize_t>(layout.rows(layout.of_memory));
   const h5::Id group = h5::create_group(file, "memory");
   std::vector<std::string> names;
   std::vector<std::int64_t> first = {0};
   std::vector<double> places;
-  for (const MemoryContact& c : memory.contacts) {
+  for (const ShearSpringPlaces& c : memory.contacts) {
     names.push_back(c.name);
     first.push_back(first.back() + static_cast<std::int64_t>(c.places.size()));
     for (const Vector3& p : c.places) places.insert(places.end(), p.begin(), p.end());
@@ -81,7 +81,7 @@ MemoryRows::MemoryRows(const h5::Id& file, const TrajectoryLayout& layout) : lay
 }
 
 void MemoryRows::write(const MemoryRow& row) {
-  const MemoryPoints& memory = layout_.memory;
+  const ShearStateArrays& memory = layout_.memory;
   const hsize_t E = static_cast<hsize_t>(layout_.environments), P = memory.count();
   const auto at =
       static_cast<hsize_t>(layout_.of_memory.before(row.step, layout_.steps, layout_.first_step));
@@ -116,7 +116,7 @@ std::optional<SavedMemory> read_memory(const h5::Id& file, std::int64_t steps, i
   const auto found = std::lower_bound(rows.begin(), rows.end(), row);
   if (found == rows.end() || *found != row) return {};
   SavedMemory memory{read_contacts(group), {}};
-  MemoryPoints in_order;
+  ShearStateArrays in_order;
   in_order.row_of.resize(h5::dimensions(h5::open_dataset(group, "place"))[0]);
   std::iota(in_order.row_of.begin(), in_order.row_of.end(), 0);
   const h5::Id dataset = h5::open_dataset(group, "s");

@@ -4,14 +4,14 @@
 
 #include <vector>
 
-#include "engine/step/memory_arrays.hpp"
+#include "engine/step/shear_state_arrays.hpp"
 
 namespace tangere {
 
 /// What friction remembered at a row, as the file holds it.
 struct SavedMemory {
-  std::vector<MemoryContact> contacts;
-  std::vector<ShearMemory> environments;  ///< (E); points are rows of the file's arrays
+  std::vector<ShearSpringPlaces> contacts;
+  std::vector<ShearState> environments;  ///< (E); points are rows of the file's arrays
 };
 
 }  // namespace tangere

@@ -15,7 +15,7 @@
 #include "engine/base/error.hpp"
 #include "engine/step/sleeping_trees.hpp"
 #include "io/hdf5/h5.hpp"
-#include "io/trajectory/memory_rows.hpp"
+#include "io/trajectory/shear_rows.hpp"
 #include "io/trajectory/sleep_rows.hpp"
 
 namespace tangere {
@@ -70,14 +70,14 @@ void check_names(const SavedState& from, const char* what, const std::vector<std
 }
 
 /// Throws InputError unless the points of a file are those of the scene.
-void check_points(const SavedState& from, const MemoryPoints& points) {
+void check_points(const SavedState& from, const ShearStateArrays& points) {
   constexpr double kSamePlace = 1e-9;  // [m]
-  const std::vector<MemoryContact>& saved = from.memory->contacts;
+  const std::vector<ShearSpringPlaces>& saved = from.memory->contacts;
   if (saved.size() != points.contacts.size())
     throw InputError(fmt::format("{}: {} contacts remember; in the scene {} do", from.path,
                                  saved.size(), points.contacts.size()));
   for (std::size_t c = 0; c < saved.size(); ++c) {
-    const MemoryContact &one = saved[c], &other = points.contacts[c];
+    const ShearSpringPlaces &one = saved[c], &other = points.contacts[c];
     if (one.name != other.name || one.places.size() != other.places.size())
       throw InputError(fmt::format("{}: '{}' remembers, with {} points; in the scene '{}', with {}",
                                    from.path, one.name, one.places.size(), other.name,
@@ -178,7 +178,7 @@ void restore_state(const SavedState& from, bool continues, Batch& batch) {
     throw InputError(fmt::format("{} environments; {} has {}", batch.environments(), from.path,
                                  from.environments));
   const auto nq = static_cast<std::size_t>(model.nq()), nv = static_cast<std::size_t>(model.nv());
-  const MemoryPoints points = memory_points(model);
+  const ShearStateArrays points = shear_state_arrays(model);
   const bool remembers = model.remembers() && from.memory;
   if (remembers) check_points(from, points);
   const bool sleeps = continues && from.sleepers;

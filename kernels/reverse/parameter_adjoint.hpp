@@ -98,7 +98,7 @@ void link_pair_parameters(const ModelView& model, const StageArgs<N>& a, const L
   for (int m = links.first; m < links.first + links.count; ++m) {
     const int k = model.pair_order[m];
     const PairContact& pair = model.pairs[k];
-    if (pair.memory >= 0) continue;  // kernels/memory/memory_pullback.hpp
+    if (pair.memory >= 0) continue;  // kernels/shear/shear_pullback.hpp
     const LawParameters<N> law =
         load_law<N>(pair.parameters, pair.law, pair.ramp, a.block, a.group);
     const Frame<N> at = compose(o.link2_in_1, broadcast<N>(pair.frame2));
@@ -216,13 +216,13 @@ void joint_parameters(const ModelView& model, const StageArgs<N>& a, const Link&
   if constexpr (K != JointKind::spherical) {
     for (int k = 0; k < dofs(K); ++k) {
       const N q = c[k] + x[k];
-      if (link.effects & kSprung)
+      if (link.effects & kSpring)
         out[kDofNumbers * k + kDofStiffness] += lambda[link.v + k] * (N(e[k].rest) - q);
       if (link.effects & kDriven) motor(k, u[k] - q);
     }
   } else {
     const Quat<N> q = Quat<N>{c[0], c[1], c[2], c[3]} * quaternion_exp(Vec3<N>{x[0], x[1], x[2]});
-    if (link.effects & kSprung) {
+    if (link.effects & kSpring) {
       const Quat<N> rest = quaternion_exp(Vec3<N>{N(e[0].rest), N(e[1].rest), N(e[2].rest)});
       const Vec3<N> phi = rotation_vector<false>(conjugate(rest) * q).phi;
       out[kDofStiffness] -=

@@ -65,7 +65,7 @@ template <class N>
 void add_plain_effects(const StageArgs<N>& a, const Link& link, const DofEffects& e, int k,
                        JointLoad<N>& out) {
   const N q = a.centre[link.q + k] + a.x[link.v + k];
-  if (link.effects & kSprung) {
+  if (link.effects & kSpring) {
     const N stiffness = load_parameter(a, e.stiffness);
     add_force(out, k, stiffness * (N(e.rest) - q));
     out.by_q[k] += stiffness;
@@ -136,7 +136,7 @@ void add_turning_effects(const StageArgs<N>& a, const Link& link, const DofEffec
   out.by_turn = zero33<N>();
   const N *c = a.centre + link.q, *x = a.x + link.v;
   const Quat<N> q = Quat<N>{c[0], c[1], c[2], c[3]} * quaternion_exp(Vec3<N>{x[0], x[1], x[2]});
-  if (link.effects & kSprung) {
+  if (link.effects & kSpring) {
     const Quat<N> rest = quaternion_exp(Vec3<N>{N(e[0].rest), N(e[1].rest), N(e[2].rest)});
     const RotationVector<N> turn = rotation_vector<false>(conjugate(rest) * q);
     const N stiffness = load_parameter(a, e[0].stiffness);
@@ -166,16 +166,16 @@ void joint_load(const ModelView& model, const StageArgs<N>& a, const Link& link,
   for (int k = 0; k < dofs(K); ++k) {
     const int d = link.v + k;
     out.force[k] = out.magnitude[k] = out.by_q[k] = out.by_v[k] = out.armature[k] = N(0.0);
-    if (link.effects & kArmoured) {
+    if (link.effects & kArmature) {
       out.armature[k] = load_parameter(a, e[k].armature);
       out.force[k] -= out.armature[k] * mul_add(a.c0_over_h, a.v[d], a.inverse_h * a.s[d]);
       out.by_v[k] = a.c0_over_h * out.armature[k];
     }
     if constexpr (K != JointKind::spherical)
-      if (link.effects & kOfPosition) add_plain_effects(a, link, e[k], k, out);
+      if (link.effects & kPositionDependent) add_plain_effects(a, link, e[k], k, out);
   }
   if constexpr (K == JointKind::spherical)
-    if (link.effects & kOfPosition) add_turning_effects<Derivatives>(a, link, e, out);
+    if (link.effects & kPositionDependent) add_turning_effects<Derivatives>(a, link, e, out);
 }
 
 // Not inlined: its frame would cost time in joints that have no such effects.
@@ -211,7 +211,7 @@ template <JointKind K, class N>
   for (int j = 0; j < dofs(K); ++j) {
     a.mass_diagonal[link.v + j] += load.armature[j];
     add_by_v<K>(model, a, link, j, load.by_v[j]);
-    if (!(link.effects & kOfPosition)) continue;
+    if (!(link.effects & kPositionDependent)) continue;
     const int* slot = model.pattern.slot + (link.v + j) * model.nv + link.v;
     if constexpr (K != JointKind::spherical) {
       a.A[slot[j]] += load.by_q[j];

@@ -26,13 +26,13 @@ constexpr int coordinates(JointKind k) { return k == JointKind::spherical ? 4 : 
 /// What acts on a joint's dofs besides inertia and contacts. Bits of Link::effects.
 enum JointEffect : std::uint8_t {
   kDamped = 1,
-  kArmoured = 2,
-  kSprung = 4,
+  kArmature = 2,
+  kSpring = 4,
   kLimited = 8,
   kDriven = 16
 };
-inline constexpr int kOfPosition = kSprung | kLimited | kDriven,
-                     kBeyondDamping = kOfPosition | kArmoured;
+inline constexpr int kPositionDependent = kSpring | kLimited | kDriven,
+                     kBeyondDamping = kPositionDependent | kArmature;
 
 /// One elementary joint and everything that moves rigidly with it.
 struct Link {
@@ -179,7 +179,7 @@ struct GroundContact {
 
 /// Points whose friction remembers (kernels/contact/elastic_contact.hpp), against one shape: those
 /// of a pair of bodies, of a body on the ground, or of a tactile sensor.
-struct RememberingContact {
+struct ShearSpringContact {
   PairContact contact;  ///< the ground is a plane that is fixed in the world
   bool ground = false;
   int grounded = -1;  ///< index into ModelView::grounds, or -1
@@ -262,8 +262,8 @@ struct ModelView {
   int n_solids;
   const Solid* solids;  ///< (n_solids) all bodies of the scene
   ParameterRows rows;
-  int n_memories;
-  const RememberingContact* memories;
+  int n_shear_springs;
+  const ShearSpringContact* memories;
   Frame<double> ground;  ///< frame of the ground in the world; its third axis is the normal
   Pattern pattern;
 };

@@ -20,7 +20,7 @@ template <class N, int L>
 constexpr StageKernels<L> stage_kernels() {
   using Step = StepPart<N, L>;
   using Adjoint = AdjointPart<N, L>;
-  using Memory = MemoryRowsPart<N, L>;
+  using Memory = ShearRowsPart<N, L>;
   return {Adjoint::scratch_bytes,
           Step::kinematics,
           Step::choose_faces,
@@ -55,7 +55,7 @@ constexpr KernelTable table_of(const char* name) {
   using Tactile = TactilePart<Arch, double>;
   using MixedTactile = TactilePart<Arch, float>;
   using Pullback = ReadingPullbackPart<Arch>;
-  using Memory = MemoryPart<Arch>;
+  using Memory = ShearPart<Arch>;
   return {name,
           stage_kernels<Lanes<Arch>, kGroup>(),
           stage_kernels<OneLane<Arch>, 1>(),

@@ -5,7 +5,7 @@
 
 #include <span>
 
-#include "kernels/memory/memory_types.hpp"
+#include "kernels/shear/shear_types.hpp"
 #include "kernels/step/arguments.hpp"
 #include "kernels/tactile/tactile_types.hpp"
 
@@ -71,7 +71,7 @@ struct StageKernels {
                           const Row<L>* zero, std::byte* scratch, MotionCotangent<Row<L>>* links,
                           Row<L>* q_bar, Row<L>* v_bar);
   /// Computes the touched shape in body 1 and the twist W of each contact that remembers,
-  /// (n_memories), from poses and twists of the links.
+  /// (n_shear_springs), from poses and twists of the links.
   void (*touches_at)(const ModelView&, const LinkPose<Row<L>>* links, LinkPose<Row<L>>* out);
   /// Computes Stage::ground_anchors from what is remembered (body 1's axes, or null) and from the
   /// touches where a solve begins.
@@ -113,12 +113,12 @@ struct KernelTable {
   /// Computes how a field changes with motion.
   void (*field_tangent)(const TactileTangent&);
   /// Turns what friction remembers, in rows 3 to 5 of the anchors, into anchors.
-  void (*recall)(const RememberingTouch&, const RememberingPoints&);
+  void (*recall)(const ShearSpringTouch&, const ShearSpringPoints&);
   /// Computes what is remembered at the end of a step, (4, stride): s in body 1's axes, then 1 at
   /// points that touch, else 0; and the forces there, (3, stride), or null.
-  void (*advance)(const RememberingTouch& end, const RememberingPoints&, double* s, double* force);
+  void (*advance)(const ShearSpringTouch& end, const ShearSpringPoints&, double* s, double* force);
   /// Reverses both.
-  void (*pull_back_memory)(const MemoryPullback&);
+  void (*pull_back_memory)(const ShearPullback&);
 
   template <int L>
   [[nodiscard]] const StageKernels<L>& stage() const {

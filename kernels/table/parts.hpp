@@ -4,7 +4,7 @@
 // set, or ScalarArch.
 #pragma once
 
-#include "kernels/memory/memory_types.hpp"
+#include "kernels/shear/shear_types.hpp"
 #include "kernels/step/arguments.hpp"
 #include "kernels/tactile/tactile_types.hpp"
 
@@ -69,16 +69,16 @@ struct TactilePart {
 
 /// What friction remembers.
 template <class Arch>
-struct MemoryPart {
-  static void recall(const RememberingTouch&, const RememberingPoints&);
-  static void advance(const RememberingTouch& end, const RememberingPoints&, double* s,
+struct ShearPart {
+  static void recall(const ShearSpringTouch&, const ShearSpringPoints&);
+  static void advance(const ShearSpringTouch& end, const ShearSpringPoints&, double* s,
                       double* force);
-  static void pull_back_memory(const MemoryPullback&);
+  static void pull_back_memory(const ShearPullback&);
 };
 
 /// The same of all lanes of a group, in numbers N of L lanes.
 template <class N, int L>
-struct MemoryRowsPart {
+struct ShearRowsPart {
   static void touches_at(const ModelView&, const LinkPose<Row<L>>* links, LinkPose<Row<L>>* out);
   static void recall_ground(const ModelView&, const Stage<L>&, const LinkPose<Row<L>>* touches,
                             const Row<L>* s);

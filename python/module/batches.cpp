@@ -23,7 +23,7 @@ using nb::literals::operator""_a;
 
 PythonBatch::PythonBatch(const Model& model, int environments, const BatchOptions& options)
     : batch_(model, environments, options.seed, options.first_episode),
-      memory_points_(memory_points(model)),
+      memory_points_(shear_state_arrays(model)),
       precision_(options.precision),
       threads_(options.threads) {
   for (int i = 0; i < options.threads; ++i)
@@ -435,7 +435,7 @@ void add_batches(nb::module_& m) {
           "state one step before and what friction remembers.")
       .def_prop_ro("memory", &PythonBatch::memory, nb::rv_policy::automatic,
                    "(E, points, 3) what friction with ks remembers: the elastic displacement of\n"
-                   "every point of Model.memory_points [m], in the axes of the moving frame that\n"
+                   "every point of Model.shear_state_arrays [m], in the axes of the moving frame that\n"
                    "carries it; 0 where it has not moved or does not touch.")
       .def("set_memory", &PythonBatch::set_memory, "memory"_a, "envs"_a = nb::none(),
            "Sets what friction remembers, (n, points, 3) or (points, 3) as in `memory`, of the\n"

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "engine/sense/readout.hpp"
-#include "engine/step/memory_arrays.hpp"
+#include "engine/step/shear_state_arrays.hpp"
 #include "engine/step/stepper.hpp"
 #include "python/module/arrays.hpp"
 #include "python/module/whole_number.hpp"
@@ -80,7 +80,7 @@ class PythonBatch {
              const std::vector<std::string>& readings);
 
   Batch batch_;
-  MemoryPoints memory_points_;
+  ShearStateArrays memory_points_;
   Precision precision_;
   std::vector<Worker> workers_;  // by the thread's index in the arena
   BlockThreads threads_;

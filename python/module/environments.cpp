@@ -93,8 +93,8 @@ class Environments {
     d["simulation_steps"] = c.steps.simulation_steps;
     d["newton_iterations"] = c.steps.newton_iterations;
     d["split_steps"] = c.steps.split_steps;
-    d["coarse_steps"] = c.steps.coarse_steps;
-    d["passed_steps"] = c.steps.passed_steps;
+    d["accuracy_not_met_steps"] = c.steps.accuracy_not_met_steps;
+    d["tunnelled_steps"] = c.steps.tunnelled_steps;
     d["damped_steps"] = c.steps.damped_steps;
     d["overlapping_steps"] = c.steps.overlapping_steps;
     return d;
@@ -173,7 +173,7 @@ void add_environments(nb::module_& m) {
       .def("counts", &Environments::counts, nb::sig("def counts(self) -> dict[str, int]"),
            "Since the last reset: environment_steps, simulation_steps, newton_iterations, and "
            "steps\n"
-           "by their status: split_steps, coarse_steps, passed_steps, damped_steps and\n"
+           "by their status: split_steps, accuracy_not_met_steps, tunnelled_steps, damped_steps and\n"
            "overlapping_steps.")
       .def_prop_ro("spec", &Environments::spec)
       .def_prop_ro("model", &Environments::model)

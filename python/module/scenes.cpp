@@ -7,7 +7,7 @@
 #include "engine/model/model.hpp"
 #include "engine/scene/field_form.hpp"
 #include "engine/scene/scheme.hpp"
-#include "engine/step/memory_arrays.hpp"
+#include "engine/step/shear_state_arrays.hpp"
 #include "io/scene/scene_reader.hpp"
 #include "python/module/arrays.hpp"
 #include "python/module/module.hpp"
@@ -110,10 +110,10 @@ void add_model(nb::module_& m) {
           },
           "Names of everything that can be read: q, v, …, pad, pad.pressure, pad.sum.")
       .def_prop_ro(
-          "memory_points",
+          "shear_state_arrays",
           [](const Model& s) {
             nb::dict contacts;
-            for (const MemoryContact& c : memory_points(s).contacts) {
+            for (const ShearSpringPlaces& c : shear_state_arrays(s).contacts) {
               std::span<double> numbers;
               auto array = new_array<double>({c.places.size(), 3}, numbers);
               for (std::size_t k = 0; k < c.places.size(); ++k)
@@ -122,7 +122,7 @@ void add_model(nb::module_& m) {
             }
             return contacts;
           },
-          nb::for_getter(nb::sig("def memory_points(self) -> "
+          nb::for_getter(nb::sig("def shear_state_arrays(self) -> "
                                  "dict[str, numpy.typing.NDArray[numpy.float64]]")),
           "Points of every contact and sensor with ks, by name, in the order of Batch.memory:\n"
           "(n, 3) their places [m], in the axes of the moving frame that carries them. Points of\n"

@@ -218,7 +218,7 @@ def test_steps_are_cut_to_keep_an_accuracy(model):
 
 def test_what_friction_remembers_goes_on():
     model = tangere.Model(tangere.Scene(tangere.scenes()["box_pushing_elastic"]))
-    points = model.memory_points
+    points = model.shear_state_arrays
     assert {name: places.shape for name, places in points.items()} == {
         "contact pad box": (66, 3),
         "ground box": (8, 3),
@@ -271,7 +271,7 @@ def test_what_friction_remembers_goes_on():
 
 
 def test_a_scene_without_springs_has_no_memory(model):
-    assert model.memory_points == {} and "memory" not in model.readings
+    assert model.shear_state_arrays == {} and "memory" not in model.readings
     assert tangere.Batch(model, envs=2).memory.shape == (2, 0, 3)
 
 

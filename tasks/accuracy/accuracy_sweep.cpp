@@ -69,7 +69,7 @@ class Sweep {
     if (!find_reference()) return stop();
     if (!report_.resolved) look_for_vibration();
     if (report_.reference.environments == 0) return std::move(report_);  // the reference failed
-    if (!measure_points() || !look_again()) return stop();
+    if (!measure_points() || !recompute_snapshots()) return stop();
     measure_orders();
     choose();
     if (!measure_own() || !measure_tolerances() || !measure_pitches()) return stop();
@@ -296,7 +296,7 @@ class Sweep {
 
   /// A few environments can be much worse than the rest, and the bound of 64 takes the worst of
   /// them. More environments bound the same quantile by a smaller error.
-  bool look_again() {
+  bool recompute_snapshots() {
     const std::vector<std::size_t> candidates = worth_a_look();
     if (!report_.resolved || !fresh_ || candidates.empty()) return true;
     const std::optional<FixedEpisodes> episodes = fresh_();

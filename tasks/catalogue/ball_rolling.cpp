@@ -45,7 +45,7 @@ class BallRolling : public Task {
 
   void observe_vjp(const TaskView&, std::span<const double> weight,
                    const ViewCotangent& out) const override {
-    const MomentCotangent& to = out.moments.back();
+    const SnapshotCotangent& to = out.moments.back();
     for (std::size_t k = 0; k < 3; ++k) to.q[pad_v_ + k] += weight[k];
     for (std::size_t k = 0; k < 2; ++k) {
       to.q[ball_v_ + k] -= weight[3 + k];
@@ -119,7 +119,7 @@ TaskSpec declare_ball_rolling(BallPad pad) {
   spec.moments = {5};
   spec.horizon = kActions;
   spec.memory = 2;
-  spec.looks_at_tactile = true;
+  spec.reads_tactile = true;
   return spec;
 }
 

@@ -88,7 +88,7 @@ class BoxPushing : public Task {
                    const ViewCotangent& out) const override {
     // Every joint here slides or turns about one axis: coordinates and dofs have the same places.
     const Moment& now = view.now();
-    const MomentCotangent& to = out.moments.back();
+    const SnapshotCotangent& to = out.moments.back();
     const std::array<double, 3> by_goal = in_hand_vjp(
         now, {view.memory[kGoal], view.memory[kGoal + 1], view.memory[kGoal + 2]}, weight, to);
     for (std::size_t k = 0; k < 3; ++k) out.memory[kGoal + k] += by_goal[k];
@@ -119,7 +119,7 @@ class BoxPushing : public Task {
   void reward_vjp(const TaskView& view, double weight, const ViewCotangent& out) const override {
     const std::array<double, 3> off = to_goal(view);
     const Moment& now = view.now();
-    const MomentCotangent& to = out.moments.back();
+    const SnapshotCotangent& to = out.moments.back();
     // Every joint here slides or turns about one axis: coordinates and dofs have the same places.
     for (std::size_t k = 0; k < 2; ++k) {
       const double by_place = weight * 2 * kPosition * off[k] / square(kLengthUnit);
@@ -193,7 +193,7 @@ class BoxPushing : public Task {
   /// hand's turn: ∂o_x/∂θ = o_y, ∂o_y/∂θ = -o_x.
   std::array<double, 3> in_hand_vjp(const Moment& now, const std::array<double, 3>& pose,
                                     std::span<const double> weight,
-                                    const MomentCotangent& to) const {
+                                    const SnapshotCotangent& to) const {
     std::array<double, 3> o{};
     in_hand(now, pose, o);
     const double c = std::cos(now.q[turn_]), s = std::sin(now.q[turn_]);
@@ -226,11 +226,11 @@ TaskSpec declare_box_pushing(PushObservation observation, Friction friction) {
   spec.moments = {5};
   spec.horizon = kActions;
   spec.memory = 5;
-  spec.looks_at_end_effectors = true;
+  spec.reads_end_effectors = true;
   if (observation == PushObservation::tactile) {
     spec.observations.push_back({"tactile", {13, 10, 3}, "N", "field of the pad", tactile_scale});
     spec.observations.back().touch = true;
-    spec.looks_at_tactile = true;
+    spec.reads_tactile = true;
   } else if (observation == PushObservation::privileged) {
     spec.name = "box_pushing_privileged";
     spec.summary = "The same; the goal and the box's pose are observed.";

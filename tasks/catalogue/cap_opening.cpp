@@ -120,7 +120,7 @@ class CapOpening : public Task {
   void observe_vjp(const TaskView&, std::span<const double> weight,
                    const ViewCotangent& out) const override {
     // Every joint here turns about one axis: coordinates and dofs have the same places.
-    const MomentCotangent& to = out.moments.back();
+    const SnapshotCotangent& to = out.moments.back();
     for (std::size_t k = 0; k < kAngles; ++k) {
       to.q[finger_ + k] += weight[k];
       to.end_effectors[k] += weight[kAngles + k];  // three fingertips of three coordinates
@@ -242,8 +242,8 @@ TaskSpec declare_cap_opening(CapObservation observation, Friction friction) {
   spec.moments = {5};
   spec.horizon = kActions;
   spec.memory = kFingers + 3;
-  spec.looks_at_end_effectors = true;
-  spec.looks_at_tactile = true;  // the reward asks which fingers touch
+  spec.reads_end_effectors = true;
+  spec.reads_tactile = true;  // the reward asks which fingers touch
   if (observation == CapObservation::tactile) {
     spec.observations.push_back(
         {"tactile",

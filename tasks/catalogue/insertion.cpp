@@ -193,7 +193,7 @@ class Insertion : public Task {
   }
 
   /// Reverse of hold(): hand and box turn about the same axis.
-  void place_vjp(const TaskView&, std::span<const double> q, std::span<const double>,
+  void restart_state_vjp(const TaskView&, std::span<const double> q, std::span<const double>,
                  const ViewCotangent& out) const override {
     for (std::size_t k = 0; k < 2; ++k) out.memory[kNow + k] += q[hand_v_ + k] + q[box_v_ + k];
     out.memory[kNow + 2] += q[turn_v_] + q[box_v_ + 5];
@@ -360,7 +360,7 @@ TaskSpec declare_insertion(InsertionMotion motion, Friction friction) {
   spec.opening = true;
   spec.restarts = true;
   spec.memory = 9;
-  spec.looks_at_tactile = true;
+  spec.reads_tactile = true;
   return with_friction(std::move(spec), friction);
 }
 

@@ -253,7 +253,7 @@ TaskSpec declare_stable_grasp(Friction friction) {
   spec.settling_steps = 50;
   spec.settling_timestep = 0.05;
   spec.memory = 3;
-  spec.looks_at_tactile = true;
+  spec.reads_tactile = true;
   return with_friction(std::move(spec), friction);
 }
 

@@ -31,11 +31,11 @@ std::size_t Task::tactile_size() const {
   std::size_t numbers = 0;
   for (const SensorInfo& sensor : model_.sensors())
     numbers += 3 * static_cast<std::size_t>(sensor.points);
-  return spec_.looks_at_tactile ? numbers : 0;
+  return spec_.reads_tactile ? numbers : 0;
 }
 
 std::size_t Task::end_effectors_size() const {
-  return spec_.looks_at_end_effectors ? 3 * model_.end_effectors().size() : 0;
+  return spec_.reads_end_effectors ? 3 * model_.end_effectors().size() : 0;
 }
 
 void Task::start(const TaskStart&) const {}
@@ -63,11 +63,11 @@ void Task::observe_vjp(const TaskView&, std::span<const double>, const ViewCotan
                   spec_.name));
 }
 void Task::begin_action_vjp(const TaskView&, std::span<double>, const ViewCotangent&) const {}
-void Task::place_vjp(const TaskView&, std::span<const double>, std::span<const double>,
+void Task::restart_state_vjp(const TaskView&, std::span<const double>, std::span<const double>,
                      const ViewCotangent&) const {
   throw InputError(fmt::format(
       "task {} restarts at every action and has no derivative of the states it restarts from; "
-      "expected Task::place_vjp",
+      "expected Task::restart_state_vjp",
       spec_.name));
 }
 

@@ -53,13 +53,13 @@ struct Verdict {
 /// Accumulates derivatives by a moment. Those by q are by displacements along the dofs of v, with
 /// rotations on the right (docs/dynamics.md); the others are by component. What the task does not
 /// look at is empty.
-struct MomentCotangent {
+struct SnapshotCotangent {
   std::span<double> q, v;           ///< (nv), (nv)
   std::span<double> end_effectors;  ///< (n, 3)
   std::span<double> tactile;        ///< as in Moment
 };
 struct ViewCotangent {
-  std::span<const MomentCotangent> moments;  ///< parallel to TaskView::moments
+  std::span<const SnapshotCotangent> moments;  ///< parallel to TaskView::moments
   std::span<double> action;
   std::span<double> memory = {};  ///< (memory)
 };
@@ -113,7 +113,7 @@ class Task {
   /// Reverses place: adds ∂(q̄·q + v̄·v)/∂(action, memory, q and v after the last action), where q̄
   /// is `q` and v̄ is `v`, both (nv). A task that restarts must override it; the default throws
   /// InputError.
-  virtual void place_vjp(const TaskView& view, std::span<const double> q, std::span<const double> v,
+  virtual void restart_state_vjp(const TaskView& view, std::span<const double> q, std::span<const double> v,
                          const ViewCotangent& out) const;
 
   /// Fills an action that solves the task without learning. The default throws InputError.

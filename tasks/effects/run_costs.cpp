@@ -10,7 +10,7 @@
 
 #include "engine/base/as_size.hpp"
 #include "engine/derivative/adjoint.hpp"
-#include "engine/sense/audit.hpp"
+#include "engine/sense/energy_balance.hpp"
 #include "engine/sense/readout.hpp"
 #include "engine/step/tape.hpp"
 #include "tasks/run/thread_time.hpp"
@@ -92,7 +92,7 @@ std::vector<RunCost> measure_run_costs(TimedModel& timed, const StepTimes& times
   const std::size_t nq = as_size(model.nq()), nv = as_size(model.nv()), nb = as_size(model.nb()),
                     nu = as_size(model.nu());
   Readout readout(model);
-  Auditor auditor(model);
+  EnergyBalanceReader auditor(model);
   StepBack gradients(model, timed.options());
   std::vector<double> q(nq), v(nv), pose(7 * nb), twist(6 * nb),
       places(3 * model.end_effectors().size());

@@ -56,7 +56,7 @@ ActionBlock::ActionBlock(const ActionTapes& tapes, Precision precision, bool par
       start_q_(kBlock * as_size(tapes.task.model().nv())),
       start_v_(start_q_.size()),
       by_u_(kBlock * as_size(tapes.task.model().nu())) {
-  if (task_.spec().looks_at_tactile) check_has_no_memory(task_.model());
+  if (task_.spec().reads_tactile) check_has_no_lag(task_.model());
   for (MomentRows& m : moments_) {
     m.q = m.v = start_q_;
     m.end_effectors.resize(kBlock * task_.end_effectors_size());
@@ -79,7 +79,7 @@ void ActionBlock::take_steps(std::int64_t, BlockTape* tape) {
 }
 
 void ActionBlock::retake_steps(std::int64_t action, bool from_checkpoint, BlockTape& tape) {
-  if (!from_checkpoint) rollout_.place_again(records_[as_size(action)], action);
+  if (!from_checkpoint) rollout_.recompute_restart(records_[as_size(action)], action);
   rollout_.retake_steps(records_[as_size(action)], action, tape);
 }
 
@@ -92,7 +92,7 @@ void ActionBlock::reverse_action(std::int64_t action, const BlockTape& tape,
   const int every = task_.spec().control_every;
   for (std::vector<double>* x : {&start_q_, &start_v_, &by_u_, &by_action_})
     std::fill(x->begin(), x->end(), 0.0);
-  rollout_.look_again(tape);
+  rollout_.recompute_snapshots(tape);
   reverse_judgement(r, action, after);
   std::size_t next = looks.size();
   for (int t = task_.spec().steps_per_action; t > 0; --t) {
@@ -101,7 +101,7 @@ void ActionBlock::reverse_action(std::int64_t action, const BlockTape& tape,
       add_moment(--next);
     }
     if (t % every == 0 || t == task_.spec().steps_per_action)
-      rollout_.ask_again(r, action, (t - 1) / every * every, tape);
+      rollout_.recompute_controls(r, action, (t - 1) / every * every, tape);
     adjoint_.reverse_step(rollout_.batch(), 0, tape, t - 1, rollout_.u());
     for (int l = 0; l < rollout_.lanes(); ++l) {
       const std::span<double> by_u = part(by_u_, l);
@@ -144,7 +144,7 @@ void ActionBlock::add_seen(const TaskView& view, int lane, const AfterAction& af
   const std::span<const double> weight = own(after.observation), q = own(after.q), v = own(after.v);
   if (std::any_of(weight.begin(), weight.end(), [](double w) { return w != 0; }))
     task_.observe_vjp(view, weight, to);
-  const MomentCotangent& now = to.moments.back();
+  const SnapshotCotangent& now = to.moments.back();
   for (std::size_t i = 0; i < q.size(); ++i) now.q[i] += q[i];
   for (std::size_t i = 0; i < v.size(); ++i) now.v[i] += v[i];
 }
@@ -187,7 +187,7 @@ void ActionBlock::reverse_controls(const ActionRecord& r, std::int64_t action, i
   for (int l = 0; l < rollout_.lanes(); ++l) {
     if (!r.taken[as_size(l)]) continue;
     const Moment first = rollout_.first_moment(tape, l);
-    const MomentCotangent to{part(start_q_, l), part(start_v_, l), {}, {}};
+    const SnapshotCotangent to{part(start_q_, l), part(start_v_, l), {}, {}};
     task_.controls_vjp(rollout_.view(r, action, l, part(r.memory, l), {&first, 1}), step,
                        part(by_u_, l), {{&to, 1}, part(by_action_, l), part(by_memory_, l)});
   }
@@ -216,11 +216,11 @@ void ActionBlock::reverse_start(const ActionRecord& r, std::int64_t action) {
         q[i] = v[i] = at(c.q, i) = at(c.v, i) = at(c.previous_q, i) = at(c.previous_v, i) = 0;
       }
       c.memory[as_size(l)].clear();  // friction remembers nothing of before
-      const MomentCotangent to{q, v, {}, {}};
-      task_.place_vjp(rollout_.view(r, action, l, part(r.memory, l), {&seen, 1}), placed_q,
+      const SnapshotCotangent to{q, v, {}, {}};
+      task_.restart_state_vjp(rollout_.view(r, action, l, part(r.memory, l), {&seen, 1}), placed_q,
                       placed_v, {{&to, 1}, by_action, memory});
     }
-    const MomentCotangent to{q, v, {}, {}};
+    const SnapshotCotangent to{q, v, {}, {}};
     task_.begin_action_vjp(rollout_.view(r, action, l, part(r.found, l), {&seen, 1}), memory,
                            {{&to, 1}, by_action, {}});
     for (std::size_t i = 0; i < nv; ++i) {
@@ -239,7 +239,7 @@ std::span<const double> ActionBlock::part(const std::vector<double>& all, int la
   return std::span(all).subspan(as_size(lane) * width, width);
 }
 
-std::span<const MomentCotangent> ActionBlock::cotangents(int lane) {
+std::span<const SnapshotCotangent> ActionBlock::cotangents(int lane) {
   for (std::size_t m = 0; m < moments_.size(); ++m) {
     MomentRows& rows = moments_[m];
     to_moments_[m] = {part(rows.q, lane), part(rows.v, lane), part(rows.end_effectors, lane),

@@ -53,7 +53,7 @@ class ActionBlock : public GradientBlock {
   void add_seen(const TaskView& view, int lane, const AfterAction& after, const ViewCotangent& to);
   void add_moment(std::size_t moment);
   /// A lane's cotangents of all moments, until the next call.
-  [[nodiscard]] std::span<const MomentCotangent> cotangents(int lane);
+  [[nodiscard]] std::span<const SnapshotCotangent> cotangents(int lane);
 
   /// A lane's part of rows by lane.
   [[nodiscard]] static std::span<double> part(std::vector<double>& all, int lane);
@@ -76,7 +76,7 @@ class ActionBlock : public GradientBlock {
     std::vector<double> q, v, end_effectors, tactile;  // (16, width)
   };
   std::vector<MomentRows> moments_;  // cotangents of an action's moments
-  std::vector<MomentCotangent> to_moments_;
+  std::vector<SnapshotCotangent> to_moments_;
   std::vector<double> start_q_, start_v_;  // (16, nv) cotangents of its first state
   std::vector<double> by_u_;               // (16, nu) cotangents of the current controls
 };

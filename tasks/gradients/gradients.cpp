@@ -69,7 +69,7 @@ static void check_memories(const Model& model, const GradientOptions& options,
     return false;
   };
   if (!std::any_of(losses.begin(), losses.end(), reads_fields)) return;
-  check_has_no_memory(model);
+  check_has_no_lag(model);
   if (options.points) check_has_plain_points(model);
 }
 

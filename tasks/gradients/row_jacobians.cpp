@@ -33,7 +33,7 @@ std::span<const double> of_lane(const std::vector<double>& all, int lane) {
 /// Results of a task's reverse functions for one number.
 struct Bars {
   std::vector<double> state, action, memory;  // (2 nv), …
-  MomentCotangent moment;
+  SnapshotCotangent moment;
 
   Bars(std::size_t two_nv, std::size_t width, std::size_t memories)
       : state(two_nv), action(width), memory(memories) {
@@ -111,7 +111,7 @@ void ActionJacobians::evaluate(TaskRollout& rollout, const ActionRecord& r, std:
   StepJacobian step;
   for (int t = 0; t < spec.steps_per_action; ++t) {
     if (t % spec.control_every == 0) {
-      rollout.ask_again(r, action, t, tape);
+      rollout.recompute_controls(r, action, t, tape);
       for (int l = 0; l < rollout.lanes(); ++l) ask(rollout, r, action, t, tape, l);
     }
     steps_.evaluate(rollout.batch(), 0, tape, t, rollout.u());
@@ -171,7 +171,7 @@ void ActionJacobians::compose(TaskRollout& rollout, const ActionRecord& r, std::
       Bars bars(state_, width_, memory_);
       std::vector<double> weight(state_);
       weight[k] = 1;
-      task_.place_vjp(rollout.view(r, action, lane, of_lane(r.memory, lane), {&seen, 1}),
+      task_.restart_state_vjp(rollout.view(r, action, lane, of_lane(r.memory, lane), {&seen, 1}),
                       std::span(weight).first(state_ / 2), std::span(weight).subspan(state_ / 2),
                       bars.out());
       for (std::size_t i = 0; i < state_; ++i) {

@@ -63,7 +63,7 @@ void TapeBlock::start(std::uint64_t seed, std::int64_t first) {
 
 void TapeBlock::displace(int lane, std::span<const double> q, std::span<const double> v) {
   rollout_.displace(lane, q, v);
-  rollout_.look_at_start();
+  rollout_.record_start();
   rollout_.observe_start(lane);
 }
 
@@ -132,7 +132,7 @@ void TapeBlock::show_start() {
         began ? part(records_[0].v, l) : number_row(rollout.data().v, l, nv));
     rollout_.batch().set_memory(l, start_memory_[as_size(l)]);
   }
-  rollout_.look_at_start();
+  rollout_.record_start();
 }
 
 void TapeBlock::reverse_reset(std::span<const double> by_observation,
@@ -158,7 +158,7 @@ void TapeBlock::reverse_reset(std::span<const double> by_observation,
     view.action = no_action;
     if (taken_ > 0) view.memory = part(records_[0].found, l);
     view.moments = seen;
-    const std::span<const MomentCotangent> to = cotangents(l);
+    const std::span<const SnapshotCotangent> to = cotangents(l);
     add_seen(view, l, {by_reward_, shown_, shown_q_, shown_v_},
              {to.last(seen.size()), by_no_action, by_memory});
   }

@@ -47,7 +47,7 @@ class TapeBlock : public ActionBlock {
 
   int lanes_;
   std::array<bool, kernels::kBlock> took_{};
-  std::array<ShearMemory, kernels::kBlock> start_memory_;  // what friction remembered at the reset
+  std::array<ShearState, kernels::kBlock> start_memory_;  // what friction remembered at the reset
   /// What the task saw of an opening before its last moment: (moments, 16, width) each.
   std::vector<double> seen_q_, seen_v_, seen_end_effectors_, seen_tactile_;
   /// Derivatives by what a lane shows since its last action that is not reversed yet. An episode

@@ -46,12 +46,12 @@ void TaskRollout::start(std::uint64_t seed, std::span<const std::int64_t> episod
   worker_.begin(*batch_, *data_, 0, {});
   if (task_.spec().opening) {
     for (int k = 0; k < task_.spec().steps_per_action; ++k) {
-      worker_.ask_for_controls(*batch_, *data_, 0, k);
+      worker_.compute_controls(*batch_, *data_, 0, k);
       stepper_.step_block(*batch_, 0, data_->u);
-      worker_.look_after(*batch_, 0, k, counts_);
+      worker_.record_snapshot(*batch_, 0, k, counts_);
     }
   } else {
-    worker_.look_at_start(*batch_, 0);
+    worker_.record_start(*batch_, 0);
   }
   worker_.conclude(*batch_, *data_, 0, counts_);
 }
@@ -62,7 +62,7 @@ void TaskRollout::displace(int lane, std::span<const double> q, std::span<const 
   std::copy(v.begin(), v.end(), number_row(data_->v, lane, v.size()).begin());
 }
 
-void TaskRollout::look_at_start() { worker_.look_at_start(*batch_, 0); }
+void TaskRollout::record_start() { worker_.record_start(*batch_, 0); }
 
 TaskView TaskRollout::start_view(int lane) const {
   TaskView view = view_of(*batch_, *data_, lane);
@@ -112,15 +112,15 @@ void TaskRollout::begin(ActionRecord& r) {
 void TaskRollout::take_steps(BlockTape* tape) {
   if (tape != nullptr) tape->start(*batch_, 0);
   for (int k = 0; k < task_.spec().steps_per_action; ++k) {
-    worker_.ask_for_controls(*batch_, *data_, 0, k);
+    worker_.compute_controls(*batch_, *data_, 0, k);
     stepper_.step_block(*batch_, 0, data_->u, tape);
-    worker_.look_after(*batch_, 0, k, counts_);
+    worker_.record_snapshot(*batch_, 0, k, counts_);
   }
 }
 
 void TaskRollout::conclude() { worker_.conclude(*batch_, *data_, 0, counts_); }
 
-void TaskRollout::place_again(const ActionRecord& r, std::int64_t action) {
+void TaskRollout::recompute_restart(const ActionRecord& r, std::int64_t action) {
   if (!task_.spec().restarts) return;
   for (int l = 0; l < lanes(); ++l) {
     if (!r.taken[as_size(l)]) continue;
@@ -141,12 +141,12 @@ void TaskRollout::retake_steps(const ActionRecord& r, std::int64_t action, Block
   const int every = task_.spec().control_every;
   const auto u = std::span(u_).first(as_size(lanes()) * as_size(task_.model().nu()));
   for (int k = 0; k < task_.spec().steps_per_action; ++k) {
-    if (k % every == 0) ask_again(r, action, k, tape);
+    if (k % every == 0) recompute_controls(r, action, k, tape);
     stepper_.step_block(*batch_, 0, u, &tape);
   }
 }
 
-void TaskRollout::ask_again(const ActionRecord& r, std::int64_t action, int step,
+void TaskRollout::recompute_controls(const ActionRecord& r, std::int64_t action, int step,
                             const BlockTape& tape) {
   const std::size_t memory = as_size(task_.spec().memory);
   for (int l = 0; l < lanes(); ++l) {
@@ -157,10 +157,10 @@ void TaskRollout::ask_again(const ActionRecord& r, std::int64_t action, int step
   }
 }
 
-void TaskRollout::look_again(const BlockTape& tape) {
+void TaskRollout::recompute_snapshots(const BlockTape& tape) {
   for (const int moment : task_.spec().moments) {
     tape.show(moment, *batch_, 0);
-    worker_.look_after(*batch_, 0, moment - 1, recounted_);
+    worker_.record_snapshot(*batch_, 0, moment - 1, recounted_);
   }
 }
 

@@ -39,7 +39,7 @@ class TaskRollout {
   /// Starts a lane's first action from another state. The history of a scheme of two steps stays.
   void displace(int lane, std::span<const double> q, std::span<const double> v);
   /// Looks at the states in which the first actions begin, as the batch has them now.
-  void look_at_start();
+  void record_start();
   /// What the task saw when it reset a lane, until the first action begins.
   [[nodiscard]] TaskView start_view(int lane) const;
   /// Observes a lane's reset again.
@@ -58,12 +58,12 @@ class TaskRollout {
   /// Takes the steps of an action again, from the state in which it began.
   void retake_steps(const ActionRecord& record, std::int64_t action, BlockTape& tape);
   /// Restarts a lane again as the task did.
-  void place_again(const ActionRecord& record, std::int64_t action);
+  void recompute_restart(const ActionRecord& record, std::int64_t action);
   /// Fills u() with the controls for the steps of an action from `step` on, for lanes that took it.
   /// The action's first state is entry 0 of `tape`.
-  void ask_again(const ActionRecord& record, std::int64_t action, int step, const BlockTape& tape);
+  void recompute_controls(const ActionRecord& record, std::int64_t action, int step, const BlockTape& tape);
   /// Reads again what the task saw during the action on `tape`.
-  void look_again(const BlockTape& tape);
+  void recompute_snapshots(const BlockTape& tape);
 
   [[nodiscard]] const Task& task() const { return task_; }
   [[nodiscard]] const Batch& batch() const { return *batch_; }
@@ -88,7 +88,7 @@ class TaskRollout {
   std::optional<Batch> batch_;
   std::optional<EnvironmentData> data_;
   VectorCounts counts_, recounted_;
-  std::vector<double> u_;      // (16, nu) written by ask_again
+  std::vector<double> u_;      // (16, nu) written by recompute_controls
   std::vector<double> q_, v_;  // (nq), (nv) written by first_moment
 };
 

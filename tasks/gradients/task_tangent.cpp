@@ -29,7 +29,7 @@ std::vector<double> given(std::span<const double> x, std::size_t n) {
 struct TaskTangent::OwnCotangent {
   std::vector<std::vector<double>> q, v, end_effectors, tactile;
   std::vector<double> memory, action;
-  std::vector<MomentCotangent> moments;
+  std::vector<SnapshotCotangent> moments;
 
   OwnCotangent(const Task& task, std::size_t count)
       : memory(as_size(task.spec().memory)), action(task.spec().action.size()) {
@@ -88,7 +88,7 @@ void TaskTangent::start(std::span<const double> q, std::span<const double> v) {
 double TaskTangent::take(std::span<const double> change, std::span<const double> numbers) {
   const std::size_t action = taken_++;
   action_ = given(change, action_.size());
-  rollout_.look_again(tapes_[action]);
+  rollout_.recompute_snapshots(tapes_[action]);
   begin(action);
   seen_ = unseen(task_.spec().moments.size());
   take_steps(action, numbers);
@@ -117,7 +117,7 @@ ViewTangent TaskTangent::seen_at_start(std::span<const double> numbers) {
 
 TaskView TaskTangent::start_view() {
   tapes_.front().show(0, rollout_.batch(), 0);
-  rollout_.look_at_start();
+  rollout_.record_start();
   TaskView view = rollout_.start_view(0);
   view.actions = 0;
   view.memory = first_lane(records_.front().found);
@@ -147,7 +147,7 @@ void TaskTangent::begin(std::size_t action) {
     OwnCotangent bar(task_, 1);
     std::vector<double> q(nv), v(nv);
     (i < nv ? q[i] : v[i - nv]) = 1;
-    task_.place_vjp(rollout_.view(r, std::int64_t(action), 0, first_lane(r.memory), {&seen, 1}), q,
+    task_.restart_state_vjp(rollout_.view(r, std::int64_t(action), 0, first_lane(r.memory), {&seen, 1}), q,
                     v, bar.out());
     (i < nv ? placed.q[i] : placed.v[i - nv]) = bar.start_dot(state_, memory_, action_);
   }
@@ -164,7 +164,7 @@ void TaskTangent::take_steps(std::size_t action, std::span<const double> numbers
   std::size_t next = 0;
   for (int t = 0; t < spec.steps_per_action; ++t) {
     if (t % spec.control_every == 0) {
-      rollout_.ask_again(r, std::int64_t(action), t, tape);
+      rollout_.recompute_controls(r, std::int64_t(action), t, tape);
       for (std::size_t k = 0; k < nu; ++k) {
         OwnCotangent bar(task_, 1);
         std::vector<double> weight(nu);

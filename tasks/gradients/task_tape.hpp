@@ -67,7 +67,7 @@ class TaskTape {
   /// (E, action) goes out: all of it that passes through this step and later ones. It is 0 for a
   /// component beyond its bounds and for an environment that did not take the action. What an ended
   /// episode goes on showing counts for its last action. Throws InputError when every step is
-  /// reversed, and when a task has no Task::observe_vjp or place_vjp that it would need; then only
+  /// reversed, and when a task has no Task::observe_vjp or restart_state_vjp that it would need; then only
   /// reset() is possible.
   void reverse(std::span<const double> by_observation, std::span<const double> by_reward,
                std::span<double> by_action, const StateCotangents& by_state = {});

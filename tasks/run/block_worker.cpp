@@ -108,9 +108,9 @@ void BlockWorker::act(Batch& batch, Stepper& stepper, EnvironmentData& data, int
                       std::span<const double> actions, VectorCounts& counts) {
   begin(batch, data, block, actions);
   for (int k = 0; k < task_.spec().steps_per_action; ++k) {
-    ask_for_controls(batch, data, block, k);
+    compute_controls(batch, data, block, k);
     stepper.step_block(batch, block, data.u);
-    look_after(batch, block, k, counts);
+    record_snapshot(batch, block, k, counts);
   }
   conclude(batch, data, block, counts);
 }
@@ -128,7 +128,7 @@ void BlockWorker::begin(Batch& batch, EnvironmentData& data, int block,
   }
 }
 
-void BlockWorker::ask_for_controls(const Batch& batch, EnvironmentData& data, int block,
+void BlockWorker::compute_controls(const Batch& batch, EnvironmentData& data, int block,
                                    int step) const {
   if (step % task_.spec().control_every != 0) return;
   const int first = block * kBlock, last = std::min(first + kBlock, batch.environments());
@@ -138,7 +138,7 @@ void BlockWorker::ask_for_controls(const Batch& batch, EnvironmentData& data, in
                      number_row(data.u, e, as_size(task_.model().nu())));
 }
 
-void BlockWorker::look_after(const Batch& batch, int block, int step, VectorCounts& counts) {
+void BlockWorker::record_snapshot(const Batch& batch, int block, int step, VectorCounts& counts) {
   const int first = block * kBlock, last = std::min(first + kBlock, batch.environments());
   for (int e = first; e < last; ++e)
     if (!batch.held(e) && !failed(batch.status(e))) counts.steps.count(batch, e);
@@ -147,7 +147,7 @@ void BlockWorker::look_after(const Batch& batch, int block, int step, VectorCoun
   if (*moment == step + 1) look(batch, block, as_size(static_cast<int>(moment - moments.begin())));
 }
 
-void BlockWorker::look_at_start(const Batch& batch, int block) {
+void BlockWorker::record_start(const Batch& batch, int block) {
   look(batch, block, task_.spec().moments.size() - 1);
 }
 
@@ -236,7 +236,7 @@ void BlockWorker::look(const Batch& batch, int block, std::size_t moment) {
   read_states(batch, block, place(q_), place(v_));
   if (task_.end_effectors_size() > 0)
     read_end_effectors(readout_, batch, block, place(end_effectors_));
-  if (task_.spec().looks_at_tactile)
+  if (task_.spec().reads_tactile)
     read_all_fields<double>(readout_, batch, block, FieldForm::field, place(tactile_));
 }
 

@@ -53,10 +53,10 @@ class BlockWorker {
   // step, look; then conclude.
   void begin(Batch& batch, EnvironmentData& data, int block, std::span<const double> actions);
   /// Writes the controls for step k into data.u.
-  void ask_for_controls(const Batch& batch, EnvironmentData& data, int block, int step) const;
-  void look_after(const Batch& batch, int block, int step, VectorCounts& counts);
+  void compute_controls(const Batch& batch, EnvironmentData& data, int block, int step) const;
+  void record_snapshot(const Batch& batch, int block, int step, VectorCounts& counts);
   /// Replaces steps and looks if every environment starts and there is no opening.
-  void look_at_start(const Batch& batch, int block);
+  void record_start(const Batch& batch, int block);
   void conclude(Batch& batch, EnvironmentData& data, int block, VectorCounts& counts);
   /// What was seen of a lane of the block looked at last: each of the task's moments.
   [[nodiscard]] std::span<const Moment> moments(int lane) const;

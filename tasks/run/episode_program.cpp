@@ -50,7 +50,7 @@ TaskProgram::TaskProgram(const Task& task, const Policy& policy,
 void TaskProgram::start(Batch& batch, int block) {
   worker(block).begin(batch, *data_, block, {});
   if (task_.spec().opening) return;
-  worker(block).look_at_start(batch, block);
+  worker(block).record_start(batch, block);
   worker(block).conclude(batch, *data_, block, counts_);
 }
 
@@ -101,7 +101,7 @@ void TaskProgram::controls(std::int64_t step, Batch& batch, int block, std::span
     choose(batch, block);
     worker(block).begin(batch, *data_, block, actions_);
   }
-  worker(block).ask_for_controls(batch, *data_, block, k);
+  worker(block).compute_controls(batch, *data_, block, k);
   const auto nu = static_cast<std::size_t>(batch.model().nu());
   const std::size_t first = static_cast<std::size_t>(block) * kBlock * nu,
                     count = static_cast<std::size_t>(lanes_of(batch, block)) * nu;
@@ -110,7 +110,7 @@ void TaskProgram::controls(std::int64_t step, Batch& batch, int block, std::span
 }
 
 void TaskProgram::look(std::int64_t step, const Batch& batch, int block) {
-  worker(block).look_after(batch, block, static_cast<int>(step % steps_per_row()), counts_);
+  worker(block).record_snapshot(batch, block, static_cast<int>(step % steps_per_row()), counts_);
 }
 
 void TaskProgram::judge(Batch& batch, int block) {

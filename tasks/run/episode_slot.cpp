@@ -280,7 +280,7 @@ void EpisodeSlot<T>::add_to(EpisodeSummary& run) const {
 template <class T>
 EpisodeSteps EpisodeSlot<T>::steps() const {
   const StepCounts counts = program_->counts(*tally_).steps;
-  return {counts.simulation_steps, counts.passed_steps, counts.overlapping_steps};
+  return {counts.simulation_steps, counts.tunnelled_steps, counts.overlapping_steps};
 }
 
 template <class T>

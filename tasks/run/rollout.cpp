@@ -8,7 +8,7 @@
 #include <string>
 
 #include "kernels/numbers/block.hpp"
-#include "tasks/run/audit_recorder.hpp"
+#include "tasks/run/energy_balance_recorder.hpp"
 #include "tasks/run/block_reader.hpp"
 #include "tasks/run/block_threads.hpp"
 
@@ -200,7 +200,7 @@ double rollout_bytes(const Model& model, int environments, const RolloutOutputs&
                           largest_reading(model, outputs));
   constexpr double kFlags = sizeof(std::int32_t) + sizeof(std::int8_t);
   return environments * (numbers * sizeof(double) + kFlags) +
-         (outputs.audit ? AuditRecorder::bytes(environments) : 0);
+         (outputs.audit ? EnergyBalanceRecorder::bytes(environments) : 0);
 }
 
 RolloutSummary run_rollout(Batch& batch, std::span<Stepper> steppers,
@@ -226,7 +226,7 @@ RolloutSummary run_rollout(Batch& batch, std::span<Stepper> steppers, EpisodePro
   const int workers = static_cast<int>(steppers.size());
   BlockThreads threads(workers);
   Recorder recorder(batch, options, threads, workers, sink);
-  std::optional<AuditRecorder> audit;
+  std::optional<EnergyBalanceRecorder> audit;
   if (options.outputs.audit) audit.emplace(batch, timestep, sink);
   struct Reading {
     FieldOutput output;

@@ -12,7 +12,7 @@
 #include "engine/rows/row_sink.hpp"
 #include "engine/step/batch.hpp"
 #include "engine/step/stepper.hpp"
-#include "tasks/run/audit_summary.hpp"
+#include "tasks/run/energy_balance_summary.hpp"
 #include "tasks/run/episode_program.hpp"
 #include "tasks/run/step_tally.hpp"
 
@@ -43,7 +43,7 @@ struct RolloutOptions {
 struct RolloutSummary {
   std::int64_t steps = 0;                   ///< done; fewer than requested if the caller stopped it
   StepCounts counts;                        ///< of environments' steps, failing ones included
-  std::optional<AuditSummary> audit;        ///< if it was asked for
+  std::optional<EnergyBalanceSummary> audit;        ///< if it was asked for
   std::vector<FailedEnvironment> failures;  ///< in the order in which they failed
   bool stopped = false;                     ///< progress returned false
   double seconds = 0;                       ///< wall clock of the whole rollout, sink included

@@ -13,8 +13,8 @@ struct StepCounts {
   std::int64_t simulation_steps = 0;
   std::int64_t newton_iterations = 0;
   std::int64_t split_steps = 0;
-  std::int64_t coarse_steps = 0;       ///< with parts that missed the accuracy that was asked for
-  std::int64_t passed_steps = 0;       ///< in which a body came through another
+  std::int64_t accuracy_not_met_steps = 0;       ///< with parts that missed the accuracy that was asked for
+  std::int64_t tunnelled_steps = 0;       ///< in which a body came through another
   std::int64_t damped_steps = 0;       ///< that would have created energy
   std::int64_t overlapping_steps = 0;  ///< after which bodies of a contact overlap unnoticed
   std::int64_t bodies_asleep = 0;      ///< summed over simulation_steps
@@ -25,22 +25,22 @@ struct StepCounts {
     ++simulation_steps;
     newton_iterations += batch.iterations(environment);
     split_steps += status == StepStatus::split ? 1 : 0;
-    coarse_steps += status == StepStatus::coarse ? 1 : 0;
-    passed_steps += status == StepStatus::passed ? 1 : 0;
+    accuracy_not_met_steps += status == StepStatus::accuracy_not_met ? 1 : 0;
+    tunnelled_steps += status == StepStatus::tunnelled ? 1 : 0;
     damped_steps += status == StepStatus::damped ? 1 : 0;
     overlapping_steps += status == StepStatus::overlapping ? 1 : 0;
     bodies_asleep += batch.sleep(environment).bodies;
   }
 
   /// Steps whose motion is not that of the bodies in the scene, because contacts missed each other.
-  [[nodiscard]] std::int64_t missed_contacts() const { return passed_steps + overlapping_steps; }
+  [[nodiscard]] std::int64_t missed_contacts() const { return tunnelled_steps + overlapping_steps; }
 
   StepCounts& operator+=(const StepCounts& other) {
     simulation_steps += other.simulation_steps;
     newton_iterations += other.newton_iterations;
     split_steps += other.split_steps;
-    coarse_steps += other.coarse_steps;
-    passed_steps += other.passed_steps;
+    accuracy_not_met_steps += other.accuracy_not_met_steps;
+    tunnelled_steps += other.tunnelled_steps;
     damped_steps += other.damped_steps;
     overlapping_steps += other.overlapping_steps;
     bodies_asleep += other.bodies_asleep;

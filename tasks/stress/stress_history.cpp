@@ -4,7 +4,7 @@
 #include "tasks/stress/stress_history.hpp"
 
 #include "engine/base/as_size.hpp"
-#include "engine/scene/felt_bodies.hpp"
+#include "engine/scene/sensed_bodies.hpp"
 #include "engine/scene/shapes.hpp"
 
 namespace tangere {

@@ -166,12 +166,12 @@ void judge(const BlockOutcome& out, StressRow& row) {
   if (row.verdict != StressVerdict::flagged) return;
   if (row.failed > 0)
     row.reason = to_string(out.failures.front().status);
-  else if (row.counts.passed_steps > 0)
-    row.reason = to_string(StepStatus::passed);
+  else if (row.counts.tunnelled_steps > 0)
+    row.reason = to_string(StepStatus::tunnelled);
   else if (row.counts.overlapping_steps > 0)
     row.reason = to_string(StepStatus::overlapping);
-  else if (row.counts.coarse_steps > 0)
-    row.reason = to_string(StepStatus::coarse);
+  else if (row.counts.accuracy_not_met_steps > 0)
+    row.reason = to_string(StepStatus::accuracy_not_met);
   else if (row.counts.damped_steps > 0)
     row.reason = to_string(StepStatus::damped);
 }

@@ -195,7 +195,7 @@ TEST(GenerateShards, KeptShardsWhoseContactsMissedEndWithTheSameCode) {
     for (const char* const command : {"info", "validate"}) {
       const json answer = json::parse(run(folder, {command, name, "--json"}).out);
       EXPECT_EQ(answer.at("simulation_steps"), 128) << command << " " << name;
-      EXPECT_EQ(answer.at("passed_steps"), 0) << command << " " << name;
+      EXPECT_EQ(answer.at("tunnelled_steps"), 0) << command << " " << name;
       EXPECT_EQ(answer.at("overlapping_steps"), 128) << command << " " << name;
     }
   EXPECT_THAT(run(folder, {"info", "set"}).out,

@@ -166,7 +166,7 @@ TEST(ImperfectGradient, SensorsWithMemoryAreRefused) {
   pullback.clear();
   EXPECT_THROW(pullback.dense_field(kLane, 0, field), InputError);
   try {
-    check_has_no_memory(model);
+    check_has_no_lag(model);
     ADD_FAILURE();
   } catch (const InputError& error) {
     EXPECT_EQ(std::string(error.what()),

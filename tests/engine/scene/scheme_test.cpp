@@ -28,8 +28,8 @@ TEST(Schemes, EveryStageKeepsUniformMotion) {
       EXPECT_EQ(stage.r_before != 0, scheme.needs_history());
     }
     EXPECT_EQ(scheme.stages.back().end, 1);
-    EXPECT_LE(scheme.of_parts().order, scheme.order);
-    EXPECT_FALSE(scheme.of_parts().needs_history()) << "parts have no state one step before";
+    EXPECT_LE(scheme.substep_scheme().order, scheme.order);
+    EXPECT_FALSE(scheme.substep_scheme().needs_history()) << "parts have no state one step before";
     if (scheme.needs_history()) {
       EXPECT_FALSE(scheme.start->needs_history());
     }
@@ -79,10 +79,10 @@ TEST(Schemes, HaveNamesOfTheirOwn) {
 TEST(Schemes, OfHigherOrderLeaveGainsToOneOfOrderOne) {
   for (const Integrator integrator : integrators()) {
     const Scheme& scheme = integrator.scheme();
-    const Scheme* const of_gains = scheme.of_gains();
-    EXPECT_EQ(of_gains == nullptr, scheme.order == 1) << scheme.name;
-    if (of_gains != nullptr) {
-      EXPECT_EQ(of_gains->order, 1) << scheme.name;
+    const Scheme* const energy_fallback = scheme.energy_fallback();
+    EXPECT_EQ(energy_fallback == nullptr, scheme.order == 1) << scheme.name;
+    if (energy_fallback != nullptr) {
+      EXPECT_EQ(energy_fallback->order, 1) << scheme.name;
     }
     EXPECT_NE(&scheme, &Integrator::reference.scheme());
   }

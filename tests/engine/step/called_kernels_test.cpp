@@ -212,9 +212,9 @@ TEST(CalledKernels, LinksCarryTheirOwnEffects) {
     int links;
   };
   for (const LinkCase& c : {LinkCase{EffectKind::joint_damping, kernels::kDamped, 2},
-                            LinkCase{EffectKind::joint_springs, kernels::kSprung, 1},
+                            LinkCase{EffectKind::joint_springs, kernels::kSpring, 1},
                             LinkCase{EffectKind::joint_limits, kernels::kLimited, 1},
-                            LinkCase{EffectKind::armature, kernels::kArmoured, 1},
+                            LinkCase{EffectKind::armature, kernels::kArmature, 1},
                             LinkCase{EffectKind::position_motors, kernels::kDriven, 1}}) {
     SCOPED_TRACE(to_string(c.kind));
     const Scene scene = testing::scene_that_sleeps();

@@ -97,7 +97,7 @@ Fall fall(const Scene& scene, double speed, double h, int steps) {
   for (int t = 0; t < steps; ++t) {
     stepper.step(batch, {});
     f.overlapping += batch.status(0) == StepStatus::overlapping;
-    f.passed += batch.status(0) == StepStatus::passed;
+    f.passed += batch.status(0) == StepStatus::tunnelled;
     f.others += failed(batch.status(0));
   }
   return f;
@@ -158,7 +158,7 @@ TEST(Interpenetration, BodiesThatCrossACubeAreTold) {
           int passed = 0;
           for (int t = 0; t < int(0.1 / speed / 5e-3) + 3; ++t) {
             stepper.step(batch, {});
-            passed += batch.status(0) == StepStatus::passed;
+            passed += batch.status(0) == StepStatus::tunnelled;
           }
           EXPECT_GE(passed, 1) << speed << " m/s along " << axis << ", " << beside << " m, "
                                << ball;
@@ -168,7 +168,7 @@ TEST(Interpenetration, BodiesThatCrossACubeAreTold) {
 /// A ball that goes through a wide wall near its edge, and one that goes past it.
 TEST(Interpenetration, TheEdgeOfAWallIsAThicknessWide) {
   for (const auto& [beside, status] :
-       {std::pair{0.47, StepStatus::passed}, {0.52, StepStatus::converged}}) {
+       {std::pair{0.47, StepStatus::tunnelled}, {0.52, StepStatus::converged}}) {
     Scene s;
     s.gravity = {0, 0, 0};
     s.links = {link("wall", JointType::fixed, {0, 0, 0}, plank({1, 1, 0.02}), 1000),
@@ -287,7 +287,7 @@ TEST(Interpenetration, NoStepIsLeftOutThatACheckWouldTell) {
       stepper.step(batch, {});
       for (int e = 0; e < environments; ++e) statuses.push_back(batch.status(e));
       told += int(std::ranges::count(batch.statuses(), StepStatus::overlapping) +
-                  std::ranges::count(batch.statuses(), StepStatus::passed));
+                  std::ranges::count(batch.statuses(), StepStatus::tunnelled));
     }
     return statuses;
   };

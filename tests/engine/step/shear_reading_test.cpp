@@ -119,7 +119,7 @@ TEST(ShearReading, HasTheSameBitsInAnyBatch) {
     Batch alone(model, 1, 0, e);
     for (int t = e; t < 43; ++t) stepper.step(alone, control(e, t));
     EXPECT_EQ(testing::q_of(alone, 0), testing::q_of(batch, e));
-    const ShearMemory &one = alone.memory(0), &other = batch.memory(e);
+    const ShearState &one = alone.memory(0), &other = batch.memory(e);
     ASSERT_EQ(one.size(), other.size()) << e;
     EXPECT_EQ(one.size(), 32U);
     for (std::size_t k = 0; k < one.size(); ++k)

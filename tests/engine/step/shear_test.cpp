@@ -188,7 +188,7 @@ TEST(Shear, ABlockIsSavedAndRestoredWithItsMemory) {
   Held run(slope(20, true, 500), Integrator::sdirk2, 5e-3);
   run.go(0.5);
   const BlockState saved = run.batch.save_block(0);
-  const ShearMemory memory = run.batch.memory(0);
+  const ShearState memory = run.batch.memory(0);
   EXPECT_EQ(memory.size(), 4U);
   run.go(0.2);
   const std::vector<double> went = testing::q_of(run.batch);
@@ -211,7 +211,7 @@ TEST(Shear, ABlockIsSavedAndRestoredWithItsMemory) {
 
 TEST(Shear, MemoryThatTheSceneDoesNotHaveIsRefused) {
   Held run(slope(20, true, 500), Integrator::bdf1, 5e-3);
-  const auto message = [&](const ShearMemory& memory) {
+  const auto message = [&](const ShearState& memory) {
     try {
       run.batch.set_memory(0, memory);
     } catch (const InputError& e) {

@@ -37,7 +37,7 @@ Played play(const Model& model, const StepperOptions& options, int environments 
     for (int part = 0; part < steps; ++part) {
       testing::step_all(stepper, batch, testing::rolling_ball_control(k));
       run.evaluations += batch.iterations(wanted);
-      run.coarse += batch.status(wanted) == StepStatus::coarse ? 1 : 0;
+      run.coarse += batch.status(wanted) == StepStatus::accuracy_not_met ? 1 : 0;
       EXPECT_FALSE(failed(batch.status(wanted)));
     }
     const std::vector<double> q = q_of(batch, wanted);

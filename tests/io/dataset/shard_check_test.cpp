@@ -195,7 +195,7 @@ TEST_F(ShardCheck, FindsCountsThatAreWrong) {
   EXPECT_THAT(with("scene", "steps", 8), HasSubstr("demo_0 has 3 rows, expected 4"));
   EXPECT_THAT(with(".", "content_sum", 1), HasSubstr("expected 0000000000000001"));
   // 192 steps, of which bodies passed in 3 and overlapped after 36.
-  EXPECT_THAT(with(".", "passed_steps", -1), HasSubstr("is -1; expected 0 to 192"));
+  EXPECT_THAT(with(".", "tunnelled_steps", -1), HasSubstr("is -1; expected 0 to 192"));
   EXPECT_THAT(with(".", "overlapping_steps", 190), HasSubstr("is 190; expected 0 to 189"));
   EXPECT_THAT(with(".", "simulation_steps", 38), HasSubstr("is 36; expected 0 to 35"));
   EXPECT_THAT(with(".", "simulation_steps", -1), HasSubstr("'simulation_steps' of '/'"));

@@ -7,7 +7,7 @@
 #include <fstream>
 
 #include "engine/model/model.hpp"
-#include "engine/scene/felt_bodies.hpp"
+#include "engine/scene/sensed_bodies.hpp"
 #include "engine/scene/shapes.hpp"
 #include "engine/step/stepper.hpp"
 #include "io/robot/robot_import.hpp"
@@ -285,7 +285,7 @@ TEST_F(RobotKinds, SkinsIgnoreWhatTouchesNothing) {
   const Scene scene = parse_scene(made.text, folder_ / "scene.xml").scene;
   EXPECT_THAT(scene.sensors.at(0).ignores, ElementsAre("cover", "thumb", "thumb_shape"));
   std::vector<std::string> felt;
-  for (const int k : felt_bodies(scene, scene.sensors[0]))
+  for (const int k : sensed_bodies(scene, scene.sensors[0]))
     felt.push_back(scene.links[std::size_t(k)].body.name);
   EXPECT_THAT(felt, ElementsAre("finger")) << "the palm is a neighbour";
 }

@@ -9,7 +9,7 @@
 
 #include "kernels/contact/elastic_face_contact.hpp"
 #include "kernels/contact/elastic_sphere_contact.hpp"
-#include "kernels/memory/memory_pullback.hpp"
+#include "kernels/shear/shear_pullback.hpp"
 #include "kernels/numbers/dual.hpp"
 #include "tests/kernels/contact/product_sums.hpp"
 #include "tests/kernels/lift.hpp"

@@ -95,7 +95,7 @@ TEST(CapOpening, TargetsFollowTheAnglesWithinTheirLimits) {
   task->controls(own.view(), 0, u);
   const std::vector<double> expected{-0.45, -0.44, 0.77, 0, 2, 0, 0, 0, -2};
   for (std::size_t k = 0; k < u.size(); ++k) EXPECT_NEAR(u[k], expected[k], 1e-15) << k;
-  const std::vector<MomentCotangent> to{{q, v, {}, {}}};
+  const std::vector<SnapshotCotangent> to{{q, v, {}, {}}};
   task->controls_vjp(own.view(), 0, std::vector<double>{1, 2, 3, 4, 5, 6, 7, 8, 9}, {to, action});
   EXPECT_THAT(q, ::testing::ElementsAre(0, 0, 2, 3, 4, 0, 6, 7, 8, 0))
       << "a target at its limit stays there";

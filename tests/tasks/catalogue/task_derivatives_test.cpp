@@ -34,7 +34,7 @@ class Differences {
   void check() {
     const std::size_t moments = own_.q.size();
     std::vector<std::vector<double>> q, v, end_effectors, tactile;
-    std::vector<MomentCotangent> to;
+    std::vector<SnapshotCotangent> to;
     for (std::size_t m = 0; m < moments; ++m) {
       q.emplace_back(v.emplace_back(std::size_t(task_.model().nv())));
       end_effectors.emplace_back(task_.end_effectors_size());
@@ -195,7 +195,7 @@ class ViewDerivatives {
   }
   OwnView& own_;
   std::vector<double> q_, v_;
-  std::vector<MomentCotangent> to_;
+  std::vector<SnapshotCotangent> to_;
 };
 
 /// Number of coordinates before the first quaternion. They have the same indices as their dofs.
@@ -266,12 +266,12 @@ TEST_P(EveryTask, RestartsHaveTheDerivativesOfDifferences) {
     by_v[k] = uniform({12, 0, 0, Purpose::control, std::uint32_t(k)}, -1, 1);
   ViewDerivatives slopes(*task, own);
   if (!task->spec().restarts) {
-    EXPECT_THROW(task->place_vjp(own.view(), along, by_v, slopes.out()), InputError);
+    EXPECT_THROW(task->restart_state_vjp(own.view(), along, by_v, slopes.out()), InputError);
     return;
   }
   task->place(own.view(), start, speed);
   add_along_dofs(task->model(), start, by_q, along);
-  task->place_vjp(own.view(), along, by_v, slopes.out());
+  task->restart_state_vjp(own.view(), along, by_v, slopes.out());
   slopes.check(
       [&] {
         std::vector<double> q(nq), v(nv);

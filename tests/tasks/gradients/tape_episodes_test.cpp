@@ -84,7 +84,7 @@ class Watched : public Task {
                    const ViewCotangent& out) const override {
     if (how_ == Watching::without_derivative) return Task::observe_vjp(view, w, out);
     const Moment &first = view.moments.front(), &now = view.now();
-    const MomentCotangent &to_first = out.moments.front(), &to = out.moments.back();
+    const SnapshotCotangent &to_first = out.moments.front(), &to = out.moments.back();
     to_first.q[pad_v_ + 2] += w[0] * now.v[pad_v_ + 2] * 100;
     to.v[pad_v_ + 2] += w[0] * first.q[pad_ + 2] * 100;
     for (std::size_t i = 0; i < now.tactile.size(); ++i)

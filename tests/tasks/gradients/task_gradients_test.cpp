@@ -124,7 +124,7 @@ class Everything : public Task {
     for (std::size_t k = 0; k < 2; ++k) q[pad_ + k] = 0.2 * q[pad_ + k] + 0.7 * view.memory[k];
     v[pad_v_] = 0.1 * v[pad_v_] + 0.02 * view.action[1] + 0.05 * view.memory[3];
   }
-  void place_vjp(const TaskView&, std::span<const double> q, std::span<const double> v,
+  void restart_state_vjp(const TaskView&, std::span<const double> q, std::span<const double> v,
                  const ViewCotangent& out) const override {
     for (std::size_t i = 0; i < q.size(); ++i) {
       const bool placed = i == pad_v_ || i == pad_v_ + 1;

@@ -1,0 +1,227 @@
+// SPDX-License-Identifier: Apache-2.0
+// Hands one lane after another to the kernels, and their sums on to the links.
+#include "engine/derivative/shear_adjoint.hpp"
+
+#include "engine/derivative/link_cotangents.hpp"
+#include "engine/step/kept_anchors.hpp"
+
+namespace tangere {
+
+using kernels::Frame;
+using kernels::kGroup;
+using kernels::LinkPose;
+using kernels::MotionCotangent;
+using kernels::ShearSpringContact;
+using kernels::ShearSpringPoints;
+using kernels::ShearSpringTouch;
+using kernels::Row;
+using kernels::Vec6;
+
+namespace {
+
+/// Hands cotangents of the motion of body 2 relative to body 1 on to the two links.
+template <int L>
+void hand_on(const ShearSpringContact& of, const AlignedVector<LinkPose<Row<L>>>& poses,
+             const Vec6<double>& displacement, const Vec6<double>& twist, int lane,
+             AlignedVector<MotionCotangent<Row<L>>>& links) {
+  const int first = of.contact.link1, second = of.contact.link2;
+  const LinkPose<double> one = pose_of<L>(poses, first, lane),
+                         two = pose_of<L>(poses, second, lane);
+  const Frame<double> second_in_first = relative(one.world, two.world);
+  const Vec6<double> Z = motion_to_parent(second_in_first, two.V);
+  const Vec6<double> pose = displacement + cross_wrench(Z, twist);
+  const auto link = [&](int k) { return k < 0 ? nullptr : &links[std::size_t(k)]; };
+  hand_on_to_links<L>(second_in_first, pose, twist, lane, link(first), link(second));
+}
+
+}  // namespace
+
+template <int L>
+ShearAdjoint<L>::ShearAdjoint(const CompiledModel& m, int losses) {
+  if (m.memories.empty()) return;
+  start_.resize(std::size_t(losses));
+  for (Cotangents& of : start_) of.resize(m.links.size());
+  end_.resize(m.links.size());
+  at_.resize(m.links.size());
+  slip_.resize(m.links.size());
+  at_touches_.resize(m.memories.size());
+  slip_touches_.resize(m.memories.size());
+  rows_.resize(2 * std::size_t(m.nv));
+  std::size_t bytes = 0, stride = 0;
+  for (const kernels::KernelTable* table : kernels::available_kernels())
+    bytes = std::max(bytes, table->pullback_bytes(m.view));
+  scratch_.resize(bytes);
+  for (const ShearSpringContact& of : m.memories)
+    stride = std::max(stride, std::size_t(of.contact.n_points + 2 * kGroup));
+  numbers_.resize(18 * stride);
+}
+
+template <int L>
+void ShearAdjoint<L>::begin(const CompiledModel& m) {
+  if (m.memories.empty()) return;
+  for (Cotangents& of : start_) std::fill(of.begin(), of.end(), MotionCotangent<Row<L>>{});
+}
+
+template <int L>
+void ShearAdjoint<L>::add_to_state(const CompiledModel& m, const kernels::KernelTable& table,
+                                    BasicWorkspace<L>& w, LaneBits lanes, const Row<L>* q,
+                                    const Row<L>* v, Cotangents& links, Row<L>* q_bar,
+                                    Row<L>* v_bar) {
+  std::fill(rows_.begin(), rows_.end(), Row<L>{});
+  Row<L>*const by_q = rows_.data(), *const by_v = by_q + m.nv;
+  table.stage<L>().pull_back_poses(m.view, w.stage, q, v, w.zero, scratch_.data(), links.data(),
+                                   by_q, by_v);
+  for (int i = 0; i < m.nv; ++i)
+    for (int l = 0; l < L; ++l)
+      if (has(lanes, l)) q_bar[i][l] += by_q[i][l], v_bar[i][l] += by_v[i][l];
+}
+
+/// Pulls back through all contacts: what is remembered at the end, or the forces along a slip.
+template <int L>
+void ShearAdjoint<L>::pull_back(const CompiledModel& m, const kernels::KernelTable& table,
+                                 BasicWorkspace<L>& w, LaneBits lanes, bool of_forces,
+                                 LossRows<L>& loss, int number) {
+  for (int l = 0; l < L; ++l) {
+    if (!has(lanes, l)) continue;
+    const std::size_t lane = std::size_t(l);
+    const ShearState &now = w.remembered.now[lane], &after = w.remembered.after[lane];
+    const std::vector<double>& bar = loss.memory[lane];
+    std::vector<double>& before = loss.memory_before[lane];
+    before.resize(3 * now.size());
+    if (!of_forces && bar.empty()) continue;
+    const auto one = [&](const ShearSpringContact& of, const int* index,
+                         const ShearSpringPoints& points) {
+      const std::size_t rows = 3 * std::size_t(points.stride);
+      double *const remembered = numbers_.data(), *const s_bar = remembered + rows,
+                    *const s_out = s_bar + rows;
+      std::size_t next = 0;
+      look_up(now, of, index, points.count, points.stride, remembered, next);
+      if (!of_forces)
+        look_up(
+            after, of, index, points.count, points.stride,
+            [&](std::size_t entry, int c) { return bar[3 * entry + std::size_t(c)]; }, s_bar, next);
+      std::fill(s_out, s_out + rows, 0.0);
+      const ShearSpringTouch start = touch_of(m, w, of, w.remembered.start_touches, l),
+                             end = touch_of(m, w, of, at_touches_, l);
+      Vec6<double> slip{};
+      if (of_forces) slip = touch_of(m, w, of, slip_touches_, l).twist;
+      kernels::ShearCotangentSums sums{};
+      table.pull_back_memory({&start, &end, points, remembered, of_forces ? nullptr : s_bar,
+                              nullptr, of_forces ? &slip : nullptr, s_out, &sums});
+      if (!of_forces) hand_on<L>(of, at_, sums.end.displacement, sums.end.twist, l, end_);
+      hand_on<L>(of, w.remembered.start, sums.start, Vec6<double>{}, l,
+                 start_[std::size_t(number)]);
+      if (loss.parameters != nullptr)
+        for (std::size_t k = 0; k < kCoefficients; ++k)
+          loss.parameters[std::size_t(of.number) + k][l] += sums.end.law[k];
+      add_to_entries(now, of, index, points, s_out, before);
+    };
+    for_each_contact(m, w, l, one);
+    if (!of_forces) for_each_touching_sensor(m, table, w, at_touches_, l, one);
+  }
+}
+
+template <int L>
+void ShearAdjoint<L>::reverse_end(const CompiledModel& m, const kernels::KernelTable& table,
+                                   BasicWorkspace<L>& w, LaneBits lanes, LossRows<L>& loss,
+                                   int number) {
+  if (m.memories.empty()) return;
+  std::fill(end_.begin(), end_.end(), MotionCotangent<Row<L>>{});
+  table.stage<L>().poses_at(m.view, w.stage, w.q1, w.stage.v, w.zero, at_.data());
+  table.stage<L>().touches_at(m.view, at_.data(), at_touches_.data());
+  pull_back(m, table, w, lanes, false, loss, number);
+  add_to_state(m, table, w, lanes, w.q1, w.stage.v, end_, loss.q, loss.v);
+}
+
+/// Pulls one contact of one lane back.
+template <int L>
+void ShearAdjoint<L>::pull_back_reading(const CompiledModel& m, const kernels::KernelTable& table,
+                                         BasicWorkspace<L>& w, const ShearSpringContact& of,
+                                         int lane, const TapedReading& reading, LossRows<L>& loss) {
+  TouchingSensorPoints& felt = w.remembered.felt;
+  const ShearSpringTouch touch = touch_of(m, w, of, at_touches_, lane);
+  const ShearSpringPoints points = felt.find(m.sensors[std::size_t(of.sensor)], table, touch);
+  if (points.count == 0) return;
+  set_anchors(table, touch, reading.before, felt.index(), points, felt.scratch());
+  const std::size_t rows = 3 * std::size_t(points.stride);
+  double *const none = numbers_.data(), *const s_out = none + rows,
+                *const anchor_bar = s_out + rows, *const anchor_out = anchor_bar + 2 * rows;
+  std::fill_n(none, 6 * rows, 0.0);
+  const std::vector<double>& bar = loss.kept[std::size_t(lane)];
+  look_up_anchors(
+      reading.after, of, felt.index(), points,
+      [&](std::size_t entry, int c) { return bar[3 * entry + std::size_t(c)]; }, anchor_bar);
+  kernels::ShearCotangentSums sums{};
+  kernels::ShearPullback pullback = {&touch,  &touch,  points, none, nullptr,
+                                      nullptr, nullptr, s_out,  &sums};
+  pullback.anchor_bar = anchor_bar;
+  pullback.kept = felt.scratch() + 6 * points.stride;
+  pullback.anchor_out = anchor_out;
+  table.pull_back_memory(pullback);
+  sums.end.displacement += sums.start;
+  hand_on<L>(of, at_, sums.end.displacement, sums.end.twist, lane, end_);
+  if (loss.parameters != nullptr)
+    for (std::size_t k = 0; k < kCoefficients; ++k)
+      loss.parameters[std::size_t(of.number) + k][lane] += sums.end.law[k];
+  add_to_anchors(reading.before, of, felt.index(), points, anchor_out, kept_before_);
+}
+
+template <int L>
+void ShearAdjoint<L>::reverse_readings(const CompiledModel& m, const kernels::KernelTable& table,
+                                        BasicWorkspace<L>& w,
+                                        const std::array<TapedReading, L>& readings,
+                                        std::vector<LossRows<L>>& losses) {
+  LaneBits lanes = 0;
+  for (int l = 0; l < L; ++l)
+    for (const ShearSpringContact& of : m.memories)
+      if (is_due(m, of, readings[std::size_t(l)].steps)) lanes |= 1U << l;
+  if (lanes == 0) return;
+  table.stage<L>().poses_at(m.view, w.stage, w.q1, w.v1, w.zero, at_.data());
+  table.stage<L>().touches_at(m.view, at_.data(), at_touches_.data());
+  for (LossRows<L>& loss : losses) {
+    std::fill(end_.begin(), end_.end(), MotionCotangent<Row<L>>{});
+    for (int l = 0; l < L; ++l) {
+      const TapedReading& reading = readings[std::size_t(l)];
+      std::vector<double>& bar = loss.kept[std::size_t(l)];
+      if (!has(lanes, l) || bar.empty()) continue;
+      kept_before_.assign(3 * reading.before.size(), 0.0);
+      for (const ShearSpringContact& of : m.memories) {
+        if (m.shear_interval(of) == 0) break;  // those that keep anchors come first
+        if (is_due(m, of, reading.steps)) {
+          pull_back_reading(m, table, w, of, l, reading, loss);
+          continue;
+        }
+        const auto from = entries_of(reading.after, m, of), to = entries_of(reading.before, m, of);
+        std::copy_n(bar.begin() + 3 * (from.data() - reading.after.data()), 3 * from.size(),
+                    kept_before_.begin() + 3 * (to.data() - reading.before.data()));
+      }
+      bar = kept_before_;
+    }
+    add_to_state(m, table, w, lanes, w.q1, w.v1, end_, loss.q, loss.v);
+  }
+}
+
+template <int L>
+void ShearAdjoint<L>::reverse_forces(const CompiledModel& m, const kernels::KernelTable& table,
+                                      BasicWorkspace<L>& w, LaneBits lanes, const Row<L>* q,
+                                      const Row<L>* lambda, LossRows<L>& loss, int number) {
+  if (m.memories.empty()) return;
+  table.stage<L>().poses_at(m.view, w.stage, q, w.stage.v, w.zero, at_.data());
+  table.stage<L>().poses_at(m.view, w.stage, q, lambda, w.zero, slip_.data());
+  table.stage<L>().touches_at(m.view, at_.data(), at_touches_.data());
+  table.stage<L>().touches_at(m.view, slip_.data(), slip_touches_.data());
+  pull_back(m, table, w, lanes, true, loss, number);
+}
+
+template <int L>
+void ShearAdjoint<L>::finish(const CompiledModel& m, const kernels::KernelTable& table,
+                              BasicWorkspace<L>& w, LaneBits lanes, LossRows<L>& loss, int number) {
+  if (m.memories.empty()) return;
+  add_to_state(m, table, w, lanes, w.q0, w.v0, start_[std::size_t(number)], loss.q_centre,
+               loss.v_centre);
+}
+
+template class ShearAdjoint<kGroup>;
+template class ShearAdjoint<1>;
+
+}  // namespace tangere

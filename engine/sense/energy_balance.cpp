@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: Apache-2.0
+// The books themselves are those that steps are looked at with (engine/step/lane_energy.hpp).
+#include "engine/sense/energy_balance.hpp"
+
+#include "engine/step/lane_energy.hpp"
+#include "engine/step/motor_force.hpp"
+#include "kernels/step/stage.hpp"
+
+namespace tangere {
+
+using kernels::kBlock;
+using kernels::Vec3;
+
+struct EnergyBalanceReader::Impl {
+  Model model;
+  SingleWorkspace w;
+
+  explicit Impl(const Model& m) : model(m), w(compiled(m)) {}
+
+  /// Linear momentum, and angular about the world's origin.
+  [[nodiscard]] std::array<double, 6> momentum(const double* block) const {
+    const CompiledModel& m = compiled(model);
+    Vec3<double> linear = {0, 0, 0}, angular = {0, 0, 0};
+    for (std::size_t i = 0; i < m.links.size(); ++i) {
+      if (!m.links[i].massive) continue;
+      const auto [mass, c, J] = kernels::load_inertia<double>(m.links[i], block, 0);
+      const kernels::Frame<double> at = frame_in_lane<1>(w.poses_before[i], 0);
+      const auto& V = w.poses_before[i].V;
+      const Vec3<double> turn = {V.a.x[0], V.a.y[0], V.a.z[0]},
+                         slide = {V.l.x[0], V.l.y[0], V.l.z[0]};
+      const Vec3<double> p = at.R * (mass * slide + cross(turn, c));
+      linear = linear + p;
+      angular = angular + at.R * (J * turn + cross(c, slide)) + cross(m.in_world(at.p), p);
+    }
+    return {linear.x, linear.y, linear.z, angular.x, angular.y, angular.z};
+  }
+
+  Audit audit(const Batch& batch, int environment, std::span<const double> u) {
+    const CompiledModel& m = compiled(model);
+    const double* column = batch.block(environment / kBlock) + environment % kBlock;
+    for (int i = 0; i < m.nq; ++i) w.q0[i][0] = column[(m.layout.q + i) * kBlock];
+    for (int i = 0; i < m.nv; ++i) w.v0[i][0] = column[(m.layout.v + i) * kBlock];
+    w.stage.block = column;
+    w.stage.group = 0;
+    set_motors(m, w, 0, column, u);
+    const kernels::KernelTable& table = kernels::active_kernels();
+    const auto& stage = table.stage<1>();
+    if (m.view.faced) stage.choose_faces_at(m.view, w.stage, w.q0, w.zero, w.stage.faces);
+    stage.poses_at(m.view, w.stage, w.q0, w.v0, w.zero, w.poses_before.data());
+    const LaneBooks books = lane_books(m, table, w);
+    return {books.motion, books.height, books.held, books.motors, books.taken, momentum(column)};
+  }
+};
+
+StepEnergyBalance between(const Audit& start, const Audit& end, double h) {
+  StepEnergyBalance step;
+  step.motors = 0.5 * h * (start.motors + end.motors);
+  step.taken = 0.5 * h * (start.taken + end.taken);
+  step.made = end.energy() - start.energy() - step.motors + step.taken;
+  return step;
+}
+
+EnergyBalanceReader::EnergyBalanceReader(const Model& model) : impl_(std::make_unique<Impl>(model)) {}
+EnergyBalanceReader::~EnergyBalanceReader() = default;
+EnergyBalanceReader::EnergyBalanceReader(EnergyBalanceReader&&) noexcept = default;
+EnergyBalanceReader& EnergyBalanceReader::operator=(EnergyBalanceReader&&) noexcept = default;
+
+Audit EnergyBalanceReader::audit(const Batch& batch, int environment, std::span<const double> u) {
+  return impl_->audit(batch, environment, u);
+}
+
+}  // namespace tangere

@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: Apache-2.0
+// One ball around a sensor is tested first, then its tiles and points, as for contacts.
+#include "engine/step/touching_sensor_points.hpp"
+
+#include <algorithm>
+
+#include "kernels/contact/distance.hpp"
+#include "kernels/contact/elastic_contact.hpp"
+
+namespace tangere {
+
+using kernels::kAnchorNumbers;
+using kernels::kGroup;
+using kernels::Vec3;
+
+namespace {
+
+/// Above rounding: some shapes test squares of distances, and no square is below zero [m].
+constexpr double kMargin = 1e-9;
+
+}  // namespace
+
+TouchingSensorPoints::TouchingSensorPoints(const CompiledModel& m) {
+  std::size_t most = 0;
+  for (const CompiledSensor& s : m.sensors)
+    if (s.elastic) most = std::max(most, std::size_t(s.points()));
+  if (most == 0) return;
+  const std::size_t stride = (most + kGroup - 1) / kGroup * kGroup + kGroup;
+  places_.resize(3 * stride);
+  anchors_.resize(kAnchorNumbers * stride);
+  factors_.resize(kPointCoefficients * stride);
+  index_.resize(stride);
+  scratch_.resize(kKeptNumbers * stride);
+}
+
+kernels::ShearSpringPoints TouchingSensorPoints::find(const CompiledSensor& sensor,
+                                            const kernels::KernelTable& table,
+                                            const kernels::ShearSpringTouch& touch) {
+  const kernels::PairContact& c = touch.of->contact;
+  const int stride = static_cast<int>(index_.size());
+  kernels::ShearSpringPoints points = {places_.data(), anchors_.data(), nullptr, 0, stride};
+  const Vec3<double> middle = transposed_times(touch.shape.R, c.middle - touch.shape.p);
+  const bool near = kernels::with_distance<double>(
+      c.shape, touch.size,
+      [&](const auto& shape) -> bool { return nearer_than(shape, middle, c.extent); }, c.grid);
+  if (!near) return points;
+  double pose[12];
+  for (int i = 0; i < 9; ++i) pose[i] = touch.shape.R.m[i / 3][i % 3];
+  pose[9] = touch.shape.p.x, pose[10] = touch.shape.p.y, pose[11] = touch.shape.p.z;
+  points.count = table.find_candidates(
+      {&c, touch.size, pose, kMargin, places_.data(), stride, touch.faces, index_.data()});
+  if (sensor.point_factors.empty()) return points;
+  points.factors = factors_.data();
+  const int end = (points.count + kGroup - 1) / kGroup * kGroup;
+  for (int k = 0; k < end; ++k)
+    for (int i = 0; i < kPointCoefficients; ++i)
+      factors_[std::size_t(i * stride + k)] =
+          k < points.count
+              ? sensor.point_factors[std::size_t(kPointCoefficients * index_[std::size_t(k)] + i)]
+              : 1;
+  return points;
+}
+
+}  // namespace tangere

@@ -1,0 +1,349 @@
+// SPDX-License-Identifier: Apache-2.0
+// A wall is a body of a pair. The other body has come through it when its middle changes sides of a
+// plane that halves the wall along one of its axes, well within the wall's other widths: deep in a
+// convex wall, where contacts at rest never are. In parts of a step only those are compared in
+// which links move against each other by more than half of what is thinnest.
+#include "engine/step/tunnelling_check.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "engine/model/body_shape.hpp"
+#include "engine/model/model_part.hpp"
+#include "engine/scene/shapes.hpp"
+#include "engine/step/lane_energy.hpp"
+#include "kernels/step/stage.hpp"
+
+namespace tangere {
+
+using kernels::Frame;
+using kernels::LinkPose;
+using kernels::Row;
+using kernels::Vec3;
+
+namespace {
+
+/// Of the wall's half widths: what crosses its plane farther out may go past it.
+constexpr double kWithin = 0.7;
+
+double component(const Vec3<double>& a, int k) { return k == 0 ? a.x : k == 1 ? a.y : a.z; }
+
+}  // namespace
+
+Vec3<double> Passing::half_of(PrimitiveShape shape, const Vec3<double>& size) {
+  CompiledBody body;
+  body.shape = shape;
+  body.size = size;
+  const kernels::Hull hull = hull_of(body);
+  return hull.straight + hull.round;
+}
+
+/// Returns how far from a wall's middle the middle of the other body is surely inside [m], along an
+/// axis of half width `half`. What goes past the edge of a cuboid keeps its own width away from it,
+/// and what is pressed into a face does not come as deep. In other shapes kWithin of the widths is
+/// inside, because 2 kWithin² < 1.
+double Passing::within_of(const Wall& wall, double half) {
+  if (wall.shape != PrimitiveShape::cuboid) return kWithin * half;
+  return std::max(kWithin * half, half - wall.other_wide);
+}
+
+/// Returns half the widths of a wall in an environment.
+Vec3<double> Passing::half_in(const Wall& wall, const double* column) {
+  if (wall.size_row < 0) return wall.half;
+  return half_of(wall.shape, kernels::load_vector<double>({}, wall.size_row, column, 0));
+}
+
+void Passing::add(int link, const Frame<double>& at, PrimitiveShape shape, const Vec3<double>& size,
+                  int size_row, int other, const Vec3<double>& middle, double other_wide) {
+  const Vec3<double> half = half_of(shape, size);
+  if (!(half.x > 0 && half.y > 0 && half.z > 0)) return;  // a plane has one side
+  const double thin = std::min({half.x, half.y, half.z});
+  const auto same = [&](const Gate& g) {
+    return std::minmax(g.link, g.other) == std::minmax(link, other);
+  };
+  const auto gate = std::find_if(gates_.begin(), gates_.end(), same);
+  walls_.push_back({link, other, at, half, shape, size_row, middle, other_wide,
+                    std::size_t(gate - gates_.begin())});
+  if (gate == gates_.end()) {
+    gates_.push_back({link, other, thin});
+  } else {
+    gate->half = std::min(gate->half, thin);
+  }
+}
+
+/// Puts balls around the walls and middles of every gate: their centres are means, so that a gate
+/// of two bodies has the bodies' own.
+void Passing::bound_slab_pairs() {
+  const auto for_sides = [&](const auto& f) {
+    for (const Wall& wall : walls_) {
+      Gate& gate = gates_[wall.gate];
+      const bool own = wall.link == gate.link;
+      f(own ? gate.of_link : gate.of_other, wall.at.p, std::sqrt(dot(wall.half, wall.half)));
+      f(own ? gate.of_other : gate.of_link, wall.middle, 0.0);
+    }
+  };
+  std::vector<double> count(gates_.size(), 0.0);
+  for (const Wall& wall : walls_) ++count[wall.gate];
+  for_sides([](Ball& ball, const Vec3<double>& at, double) { ball.centre += at; });
+  for (std::size_t k = 0; k < gates_.size(); ++k)
+    for (Ball* ball : {&gates_[k].of_link, &gates_[k].of_other})
+      ball->centre = (1 / count[k]) * ball->centre;
+  for_sides([](Ball& ball, const Vec3<double>& at, double radius) {
+    const Vec3<double> arm = at - ball.centre;
+    ball.radius = std::max(ball.radius, std::sqrt(dot(arm, arm)) + radius);
+  });
+}
+
+/// Says for every pair of links that has a wall how much room its walls and middles take.
+void Passing::bound_link_pairs() {
+  const auto length = [](const Vec3<double>& a) { return std::sqrt(dot(a, a)); };
+  for (std::size_t g = 0; g < model_.link_pairs.size(); ++g) {
+    const kernels::LinkPair& links = model_.link_pairs[g];
+    Bound bound{g, -1};
+    for (const Wall& wall : walls_) {
+      const bool of_shapes = wall.link == links.link2 && wall.other == links.link1;
+      if (!of_shapes && (wall.link != links.link1 || wall.other != links.link2)) continue;
+      const Vec3<double>& at = of_shapes ? links.shapes_middle : links.points_middle;
+      const Vec3<double>& other = of_shapes ? links.points_middle : links.shapes_middle;
+      bound.room = std::max(
+          bound.room, length(wall.at.p - at) + length(wall.middle - other) + length(wall.half));
+    }
+    if (bound.room >= 0) bounds_.push_back(bound);
+  }
+  const std::vector<kernels::Link>& links = model_.links;
+  // Where the place of a joint varies, its arms are not known here.
+  bounded_ = std::none_of(links.begin(), links.end(), [](const kernels::Link& link) {
+    return link.parent >= 0 && link.place_row >= 0;
+  });
+  const auto turned = [&](const kernels::Link& link) {
+    for (int i = link.parent; i >= 0; i = links[std::size_t(i)].parent)
+      if (!kernels::slides(links[std::size_t(i)].kind)) return true;
+    return false;
+  };
+  for (const kernels::Link& link : links)
+    for (int k = 0; kernels::slides(link.kind) && turned(link) && k < kernels::dofs(link.kind); ++k)
+      sliders_.push_back(link.q + k);
+}
+
+/// Whether the balls of two links were farther apart than any point of one can have moved in the
+/// axes of the other.
+template <int L>
+bool Passing::stay_apart(const Gate& gate, const AlignedVector<LinkPose<Row<L>>>& before,
+                         const AlignedVector<LinkPose<Row<L>>>& after, int lane) {
+  const auto other_in_link = [&](const AlignedVector<LinkPose<Row<L>>>& poses) {
+    const auto world = [&](int link) {
+      return link < 0 ? Frame<double>{kernels::diagonal(1.0), {0, 0, 0}}
+                      : frame_in_lane<L>(poses[std::size_t(link)], lane);
+    };
+    return relative(world(gate.link), world(gate.other));
+  };
+  const auto length = [](const Vec3<double>& a) { return std::sqrt(dot(a, a)); };
+  const Frame<double> from = other_in_link(before), to = other_in_link(after);
+  const Vec3<double>&a = gate.of_link.centre, &b = gate.of_other.centre;
+  double square = 0;
+  for (int i = 0; i < 9; ++i) {
+    const double turn = to.R.m[i / 3][i % 3] - from.R.m[i / 3][i % 3];
+    square += turn * turn;
+  }
+  const Vec3<double> start = from.R * b + from.p, end = to.R * b + to.p;
+  const double own = length(end - start), back = length(transposed_times(to.R, a - to.p) -
+                                                        transposed_times(from.R, a - from.p));
+  const double radius = gate.of_link.radius + gate.of_other.radius;
+  return length(start - a) > radius + std::max(own, back) + std::sqrt(square) * radius;
+}
+
+Passing::Passing(const CompiledModel& m) : model_(m), arm_(m.links.size(), 0.0) {
+  for (const kernels::PairContact& p : m.pairs) {
+    if (!pushes(p.parameters)) continue;  // it holds nothing back
+    if (p.body1 < 0) {
+      add(p.link2, p.frame2, p.shape, p.size, p.size_row, p.link1, p.middle, HUGE_VAL);
+      continue;
+    }
+    const kernels::Solid& solid = m.solids[std::size_t(p.body1)];
+    const auto wide = [](PrimitiveShape shape, const Vec3<double>& size) {
+      if (row_of(shape).half_widths == nullptr) return HUGE_VAL;
+      const Vec3<double> half = half_of(shape, size);
+      return std::max({half.x, half.y, half.z});
+    };
+    const double wide1 = wide(solid.shape, solid.size);  // its middle is not that of a skin on it
+    add(p.link2, p.frame2, p.shape, p.size, p.size_row, p.link1,
+        wide1 < HUGE_VAL ? solid.frame.p : p.middle, wide1);
+    // Bodies with points of their own need not be convex. A ball has none.
+    // Sizes of a part of a model that vary are taken as in the scene; only whole models are checked
+    // with those of an environment.
+    const int row = m.bodies.empty() ? -1 : m.bodies[std::size_t(p.body1)].size_row;
+    if (solid.stretches || p.ball_radius > 0)
+      add(p.link1, solid.frame, solid.shape, solid.size, row, p.link2, p.frame2.p,
+          wide(p.shape, p.size));
+  }
+  bound_slab_pairs();
+  // passed() looks at a gate once.
+  std::stable_sort(walls_.begin(), walls_.end(),
+                   [](const Wall& a, const Wall& b) { return a.gate < b.gate; });
+  for (const Wall& wall : walls_)
+    for (const auto& [link, place] : {std::pair{wall.link, wall.at.p}, {wall.other, wall.middle}}) {
+      double arm = std::sqrt(dot(place, place));
+      for (int i = link; i >= 0; i = m.links[std::size_t(i)].parent) {
+        arm_[std::size_t(i)] = std::max(arm_[std::size_t(i)], arm);
+        const Vec3<double>& p = m.links[std::size_t(i)].frame.p;
+        arm += std::sqrt(dot(p, p));
+      }
+    }
+  bound_link_pairs();
+}
+
+template <int L>
+LaneBits Passing::far_movers(const Row<L>* x, Row<L>* way) const {
+  if (gates_.empty()) return kNoLane;
+  for (std::size_t i = 0; i < model_.links.size(); ++i) {  // links are no more than dofs
+    const kernels::Link& link = model_.links[i];
+    const double arm = kernels::slides(link.kind) ? 1 : arm_[i];
+    for (int l = 0; l < L; ++l) {
+      double sum = link.parent < 0 ? 0 : way[link.parent][l];
+      for (int k = 0; k < kernels::dofs(link.kind); ++k) sum += std::abs(x[link.v + k][l]) * arm;
+      way[i][l] = sum;
+    }
+  }
+  LaneBits far = 0;
+  for (const Gate& gate : gates_)
+    for (int l = 0; l < L; ++l) {
+      const double sum =
+          (gate.link < 0 ? 0 : way[gate.link][l]) + (gate.other < 0 ? 0 : way[gate.other][l]);
+      if (sum > gate.half) far |= 1U << l;
+    }
+  return far;
+}
+
+// With d the vector from a wall to a middle, d moves in the wall's axes by no more than the ways of
+// both and |d| times the angle by which the wall turned. A line of this length that ends |d| away
+// comes within the wall only if |d| is no longer than both together. A way is a sum over joints of
+// what they slide, and of their angle times an arm: taken back from the root on, every joint turns
+// the rest as it is where the solve ended. Here it is over all joints of the scene. Where the last
+// evaluation was spared, kinematics ran once more, so |d| is that of the end.
+template <int L>
+LaneBits Passing::out_of_reach(const BasicWorkspace<L>& w, LaneBits lanes) const {
+  if (walls_.empty()) return lanes;
+  if (!bounded_ || std::any_of(bounds_.begin(), bounds_.end(),
+                               [&](const Bound& bound) { return w.apart[bound.link_pair] == 0; }))
+    return kNoLane;
+  Row<L> slid{}, way{}, angle{};
+  for (const int q : sliders_)
+    for (int l = 0; l < L; ++l) slid[l] += std::abs(w.q1[q][l]);
+  for (std::size_t i = 0; i < model_.links.size(); ++i) {
+    const kernels::Link& link = model_.links[i];
+    const bool slides = kernels::slides(link.kind);
+    for (int k = 0; k < kernels::dofs(link.kind); ++k) {
+      const Row<L>& x = w.stage.x[link.v + k];
+      if (slides) {
+        for (int l = 0; l < L; ++l) way[l] += std::abs(x[l]);
+      } else {
+        for (int l = 0; l < L; ++l) {
+          way[l] += std::abs(x[l]) * (arm_[i] + slid[l]);
+          angle[l] += std::abs(x[l]);
+        }
+      }
+    }
+  }
+  for (const Bound& bound : bounds_)
+    for (int l = 0; l < L; ++l) {
+      const double nearer = 1 - angle[l], reach = bound.room + way[l];
+      if (!(nearer > 0 && w.stage.between[bound.link_pair][l] * nearer * nearer > reach * reach))
+        lanes &= ~(1U << l);
+    }
+  return lanes;
+}
+
+/// Returns the place of the other body's middle in a wall's axes.
+template <int L>
+Vec3<double> Passing::middle_in(const Wall& wall, const AlignedVector<LinkPose<Row<L>>>& poses,
+                                int lane) {
+  const auto world = [&](int link, const Frame<double>& x) {
+    return link < 0 ? x : compose(frame_in_lane<L>(poses[std::size_t(link)], lane), x);
+  };
+  const Frame<double> middle = {kernels::diagonal(1.0), wall.middle};
+  return relative(world(wall.link, wall.at), world(wall.other, middle)).p;
+}
+
+bool Passing::came_through(const Wall& wall, const Vec3<double>& half, const Vec3<double>& from,
+                           const Vec3<double>& to) {
+  const double thin = std::min({half.x, half.y, half.z});
+  for (int axis = 0; axis < 3; ++axis) {
+    // The middle of a hollow body may be beside what it is made of.
+    if (!wall.other_convex() && component(half, axis) > thin) continue;
+    const double a = component(from, axis), b = component(to, axis);
+    if (!(a * b < 0)) continue;
+    const double share = a / (a - b);
+    bool within = true;
+    for (int k = 0; k < 3; ++k) {
+      const double at = component(from, k) + share * (component(to, k) - component(from, k));
+      within = within && (k == axis || std::abs(at) < within_of(wall, component(half, k)));
+    }
+    if (within) return true;
+  }
+  return false;
+}
+
+template <int L>
+bool Passing::passed(const AlignedVector<LinkPose<Row<L>>>& before,
+                     const AlignedVector<LinkPose<Row<L>>>& after, int lane) const {
+  std::size_t gate = gates_.size();
+  bool apart = false;
+  return std::any_of(walls_.begin(), walls_.end(), [&](const Wall& wall) {
+    if (std::exchange(gate, wall.gate) != wall.gate)
+      apart = stay_apart<L>(gates_[wall.gate], before, after, lane);
+    return !apart && came_through(wall, wall.half, middle_in<L>(wall, before, lane),
+                                  middle_in<L>(wall, after, lane));
+  });
+}
+
+bool Passing::changed_sides(const AlignedVector<LinkPose<Row<1>>>& before,
+                            const AlignedVector<LinkPose<Row<1>>>& after,
+                            const double* column) const {
+  return std::any_of(walls_.begin(), walls_.end(), [&](const Wall& wall) {
+    return wall.other_convex() &&
+           came_through(wall, half_in(wall, column), middle_in<1>(wall, before, 0),
+                        middle_in<1>(wall, after, 0));
+  });
+}
+
+double Passing::clearance(const AlignedVector<LinkPose<Row<1>>>& poses,
+                          const double* column) const {
+  const auto in_world = [&](int link, const Vec3<double>& p) {
+    if (link < 0) return p;
+    const Frame<double> at = frame_in_lane<1>(poses[std::size_t(link)], 0);
+    return at.R * p + at.p;
+  };
+  double least = HUGE_VAL;
+  for (const Wall& wall : walls_) {
+    if (!wall.other_convex()) continue;
+    const Vec3<double> arm = in_world(wall.other, wall.middle) - in_world(wall.link, wall.at.p);
+    const Vec3<double> half = half_in(wall, column);
+    const double far = least + std::sqrt(dot(half, half));
+    if (dot(arm, arm) >= far * far) continue;
+    const Vec3<double> at = middle_in<1>(wall, poses, 0);
+    double nearest = HUGE_VAL;
+    for (int axis = 0; axis < 3; ++axis) {
+      double square = 0;
+      for (int k = 0; k < 3; ++k) {
+        const double edge = k == axis ? 0 : within_of(wall, component(half, k)),
+                     beyond = std::max(std::abs(component(at, k)) - edge, 0.0);
+        square += beyond * beyond;
+      }
+      nearest = std::min(nearest, square);
+    }
+    least = std::min(least, std::sqrt(nearest));
+  }
+  return least;
+}
+
+#define TANGERE_FOR_LANES(L)                                                            \
+  template LaneBits Passing::far_movers<L>(const Row<L>*, Row<L>*) const;               \
+  template LaneBits Passing::out_of_reach<L>(const BasicWorkspace<L>&, LaneBits) const; \
+  template bool Passing::passed<L>(const AlignedVector<LinkPose<Row<L>>>&,              \
+                                   const AlignedVector<LinkPose<Row<L>>>&, int) const;
+TANGERE_FOR_LANES(kernels::kGroup)
+TANGERE_FOR_LANES(1)
+#undef TANGERE_FOR_LANES
+
+}  // namespace tangere

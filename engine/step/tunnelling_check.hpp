@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: Apache-2.0
+// Finds bodies that came through each other within a step, which a look at its end alone misses.
+#pragma once
+
+#include <cmath>
+#include <vector>
+
+#include "engine/step/workspace.hpp"
+
+namespace tangere {
+
+/// The pairs of a model, and how thin their bodies are.
+class Passing {
+ public:
+  explicit Passing(const CompiledModel& model);
+
+  /// Returns the lanes in which some link moved so far against another that it could have come
+  /// through a body of a pair. `x`: displacements of the step, (nv). `way`: scratch, (nv).
+  template <int L>
+  [[nodiscard]] LaneBits far_movers(const kernels::Row<L>* x, kernels::Row<L>* way) const;
+
+  /// Returns those of `lanes` in which nothing came near enough to come through: where the solve
+  /// ended, the links of every pair are farther apart than what moved could have bridged. Looks at
+  /// what kinematics() left there.
+  template <int L>
+  [[nodiscard]] LaneBits out_of_reach(const BasicWorkspace<L>& w, LaneBits lanes) const;
+
+  /// Whether in one lane the middle of a body came through the middle plane of another that it
+  /// touches, between these poses of the links.
+  template <int L>
+  [[nodiscard]] bool passed(const AlignedVector<kernels::LinkPose<kernels::Row<L>>>& before,
+                            const AlignedVector<kernels::LinkPose<kernels::Row<L>>>& after,
+                            int lane) const;
+
+  /// Whether between two states of an environment, however far apart, the middle of a convex body
+  /// came through the middle plane of another. `column`: its numbers in the block, for sizes that
+  /// vary.
+  [[nodiscard]] bool changed_sides(const AlignedVector<kernels::LinkPose<kernels::Row<1>>>& before,
+                                   const AlignedVector<kernels::LinkPose<kernels::Row<1>>>& after,
+                                   const double* column) const;
+  /// Returns how far bodies may move against each other until one can change sides [m]: the least
+  /// distance of a middle from the part of a middle plane that it would have to come through.
+  [[nodiscard]] double clearance(const AlignedVector<kernels::LinkPose<kernels::Row<1>>>& poses,
+                                 const double* column) const;
+
+ private:
+  /// Returns half the widths of a shape of this size along its axes [m]; zeros of a plane or a
+  /// mesh.
+  static kernels::Vec3<double> half_of(PrimitiveShape shape, const kernels::Vec3<double>& size);
+  /// A convex body of a pair, and the middle of the other one.
+  struct Wall {
+    int link, other;             ///< -1: the world
+    kernels::Frame<double> at;   ///< the body in its link
+    kernels::Vec3<double> half;  ///< of the size in the scene
+    PrimitiveShape shape;
+    int size_row;                  ///< as in kernels::PairContact
+    kernels::Vec3<double> middle;  ///< of the other body, in its link
+    /// Half the largest width of the other body [m]; infinite if it is not convex, so that its
+    /// middle may lie beside it.
+    double other_wide;
+    [[nodiscard]] bool other_convex() const { return other_wide < HUGE_VAL; }
+    std::size_t gate;
+  };
+  void add(int link, const kernels::Frame<double>& at, PrimitiveShape shape,
+           const kernels::Vec3<double>& size, int size_row, int other,
+           const kernels::Vec3<double>& middle, double other_wide);
+  [[nodiscard]] static double within_of(const Wall& wall, double half);
+  [[nodiscard]] static kernels::Vec3<double> half_in(const Wall& wall, const double* column);
+  template <int L>
+  [[nodiscard]] static kernels::Vec3<double> middle_in(
+      const Wall& wall, const AlignedVector<kernels::LinkPose<kernels::Row<L>>>& poses, int lane);
+  [[nodiscard]] static bool came_through(const Wall& wall, const kernels::Vec3<double>& half,
+                                         const kernels::Vec3<double>& from,
+                                         const kernels::Vec3<double>& to);
+
+  /// A ball around all walls and middles of one link, in its axes.
+  struct Ball {
+    kernels::Vec3<double> centre{};
+    double radius = 0;
+  };
+  /// Two links, half of what is thinnest between them [m], and the balls of both.
+  struct Gate {
+    int link, other;
+    double half;
+    Ball of_link{}, of_other{};
+  };
+  void bound_slab_pairs();
+  void bound_link_pairs();
+  template <int L>
+  [[nodiscard]] static bool stay_apart(
+      const Gate& gate, const AlignedVector<kernels::LinkPose<kernels::Row<L>>>& before,
+      const AlignedVector<kernels::LinkPose<kernels::Row<L>>>& after, int lane);
+
+  /// A pair of links, and the largest sum of a wall's half diagonal and of the distances of wall
+  /// and middle from the balls' centres (LinkPair) [m].
+  struct Bound {
+    std::size_t link_pair;
+    double room;
+  };
+
+  const CompiledModel& model_;
+  std::vector<Wall> walls_;
+  std::vector<Bound> bounds_;  ///< of every pair of links with a wall
+  bool bounded_ = true;        ///< whether the arms of all links are known
+  std::vector<int> sliders_;   ///< in q: the sliding dofs of links that others turn
+  std::vector<Gate> gates_;
+  std::vector<double> arm_;  ///< (links) from a link's origin to any middle that it moves [m]
+};
+
+}  // namespace tangere

@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: Apache-2.0
+// The memory after an accepted step, s' = λ s at the points that touch, and the forces there.
+#pragma once
+
+#include "kernels/shear/anchors_from_state.hpp"
+
+namespace tangere::kernels {
+
+/// The law of eight points with factors of their own.
+template <class A>
+LawParameters<Lanes<A>> law_at(const LoadedTouch<Lanes<A>>& t, const ShearSpringPoints& points,
+                               int k) {
+  LawParameters<Lanes<A>> law = t.law;
+  if (points.factors == nullptr) return law;
+  for (std::size_t i = 0; i < kCoefficients; ++i)
+    law[i] = law[i] * load_lanes<A>(points.factors + int(factor_index(i)) * points.stride + k);
+  return law;
+}
+
+template <class Shape, class N>
+ElasticPoint<N> meet_elastic(const Shape& shape, const LoadedTouch<N>& t,
+                             const LawParameters<N>& law, const Vec3<N>& xi,
+                             const Anchor<N>& anchor) {
+  ElasticPoint<N> p;
+  find_place(shape, t, xi, p);
+  find_motion(law, t.omega, t.v, p);
+  add_spring(law, t.Q, t.c, anchor, p);
+  return p;
+}
+
+/// Computes s' and the forces at the end of a step. `s`: (4, stride) out: s' in body 1's axes, then
+/// 1 at points that touch, else 0. `force`: (3, stride) out, on body 1, its axes; or null.
+template <class A>
+void advance(const ShearSpringTouch& end, const ShearSpringPoints& points, double* s,
+             double* force) {
+  using N = Lanes<A>;
+  const LoadedTouch<N> t = loaded<N>(end);
+  with_shape<N>(end, [&](const auto& shape) {
+    const int stride = points.stride;
+    for (int k = 0; k < points.count; k += kGroup) {
+      ElasticPoint<N> p;
+      find_place(shape, t, load3<A>(points.places, stride, k), p);
+      const N touches = select(p.d < N(0.0), N(1.0), N(0.0));
+      if (!any(p.d < N(0.0))) {
+        store_lanes(touches, s + 3 * stride + k);
+        if (force != nullptr) store3(zero3<N>(), force, stride, k);
+        continue;
+      }
+      const LawParameters<N> law = law_at<A>(t, points, k);
+      find_motion(law, t.omega, t.v, p);
+      add_spring(law, t.Q, t.c, load_anchors<A>(points, k), p);
+      store3((touches * p.hold) * p.s, s, stride, k);
+      store_lanes(touches, s + 3 * stride + k);
+      if (force != nullptr) store3(p.force, force, stride, k);
+    }
+  });
+}
+
+}  // namespace tangere::kernels
