@@ -145,7 +145,7 @@ int accuracy_of_task(const AccuracyArguments& o, const Console& console, const T
   const PolicyKind kind = policy_named(o.policy, o.controls, PolicyKind::scripted);
   const Policy policy = make_policy(task, kind, o.controls);
   check_size(o, task.model(), TaskProgram::steps(task.spec()));
-  if (task.spec().restarts && task.spec().opening)
+  if (task.spec().restarts && task.spec().warm_up)
     console.note(
         "every action of this task restarts: an episode is its opening, without the policy");
   else

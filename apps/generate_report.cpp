@@ -95,7 +95,7 @@ int report_shards(const GenerateOptions& options, const Console& console, const 
   const EpisodeOptions& run = job.run;
   StepCounts of_all = summary.counts;
   of_all.simulation_steps += output.kept_steps().taken;
-  of_all.tunnelled_steps += output.kept_steps().passed;
+  of_all.tunnelled_steps += output.kept_steps().tunnelled;
   of_all.overlapping_steps += output.kept_steps().overlapping;
   const ExitCode code =
       exit_code(console, !summary.failures.empty() || output.kept_failed() > 0, of_all);
@@ -113,7 +113,7 @@ int report_shards(const GenerateOptions& options, const Console& console, const 
               {"bytes", shards.bytes},
               {"kept", output.kept()},
               {"kept_failed", output.kept_failed()},
-              {"kept_passed_steps", output.kept_steps().passed},
+              {"kept_passed_steps", output.kept_steps().tunnelled},
               {"kept_overlapping_steps", output.kept_steps().overlapping},
               {"episodes", summary.episodes},
               {"rows", summary.rows},

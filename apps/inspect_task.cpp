@@ -31,7 +31,7 @@ std::string reset_text(const TaskSpec& spec) {
   if (spec.settling_steps > 0)
     text += fmt::format("a reset settles for {} steps of {:g} s\n", spec.settling_steps,
                         spec.settling_timestep);
-  if (spec.opening)
+  if (spec.warm_up)
     text += "a reset ends with one action of zeros, whose observation is the first\n";
   if (spec.restarts) text += "every action starts from a state that the task gives\n";
   return text;
@@ -49,13 +49,13 @@ Json task_json(const TaskSpec& spec) {
           {"observations", observations},
           {"steps_per_action", spec.steps_per_action},
           {"control_every", spec.control_every},
-          {"moments", spec.moments},
+          {"moments", spec.snapshots},
           {"horizon", spec.horizon},
-          {"opening", spec.opening},
+          {"opening", spec.warm_up},
           {"restarts", spec.restarts},
           {"settling_steps", spec.settling_steps},
           {"settling_timestep", spec.settling_timestep},
-          {"memory", spec.memory}};
+          {"memory", spec.task_state}};
 }
 
 std::string task_text(const TaskSpec& spec) {
@@ -63,13 +63,13 @@ std::string task_text(const TaskSpec& spec) {
       fmt::format("task {}: {}\nsuccess: {}\naction {}\nobservations ({} numbers)\n", spec.name,
                   spec.summary, spec.success, tensor_text(spec.action), spec.observation_size());
   for (const TensorSpec& o : spec.observations) text += fmt::format("  {}\n", tensor_text(o));
-  text +=
-      fmt::format("{} steps per action, controls {}, a look after step{} {}; at most {} actions\n",
-                  spec.steps_per_action,
-                  spec.control_every == 0   ? "once per action"
-                  : spec.control_every == 1 ? "at every step"
-                                            : fmt::format("every {} steps", spec.control_every),
-                  spec.moments.size() == 1 ? "" : "s", fmt::join(spec.moments, ", "), spec.horizon);
+  text += fmt::format(
+      "{} steps per action, controls {}, a look after step{} {}; at most {} actions\n",
+      spec.steps_per_action,
+      spec.control_every == 0   ? "once per action"
+      : spec.control_every == 1 ? "at every step"
+                                : fmt::format("every {} steps", spec.control_every),
+      spec.snapshots.size() == 1 ? "" : "s", fmt::join(spec.snapshots, ", "), spec.horizon);
   return text + reset_text(spec);
 }
 

@@ -76,7 +76,7 @@ Record record_of(const std::string& option, const Model& model) {
   const AskedOutput* const v = record.find("v");
   if (q != nullptr) outputs.states = q->times;
   if (v != nullptr) outputs.states = v->times;
-  if (record.find("memory") != nullptr && !model.remembers())
+  if (record.find("memory") != nullptr && !model.has_shear_springs())
     throw InputError(record.where + ": 'memory', but no contact or sensor of the scene has ks");
   outputs.fields.emplace();
   const std::vector<std::string> sensors = sensor_names(model.scene());
@@ -95,7 +95,7 @@ Record record_of(const std::string& option, const Model& model) {
 
 void take_memory(Record& record, const Model& model) {
   RolloutOutputs& outputs = record.outputs;
-  outputs.memory = model.remembers();
+  outputs.memory = model.has_shear_springs();
   outputs.of_memory = outputs.states.given() ? outputs.states : OutputTimes{.final = true};
   if (const AskedOutput* const asked = record.find("memory")) outputs.of_memory = asked->times;
 }

@@ -62,14 +62,14 @@ Json split_json(const StepCounts& counts) {
 
 Json steps_json(const std::optional<EpisodeSteps>& steps) {
   return {{"simulation_steps", steps ? Json(steps->taken) : Json()},
-          {"tunnelled_steps", steps ? Json(steps->passed) : Json()},
+          {"tunnelled_steps", steps ? Json(steps->tunnelled) : Json()},
           {"overlapping_steps", steps ? Json(steps->overlapping) : Json()}};
 }
 
 std::string missed_text(const std::optional<EpisodeSteps>& steps) {
-  if (!steps || steps->passed + steps->overlapping == 0) return "";
+  if (!steps || steps->tunnelled + steps->overlapping == 0) return "";
   return fmt::format(", steps in which a body came through another: {}, bodies overlap: {}, of {}",
-                     steps->passed, steps->overlapping, steps->taken);
+                     steps->tunnelled, steps->overlapping, steps->taken);
 }
 
 Json mean_asleep(double sleep, const StepCounts& counts) {

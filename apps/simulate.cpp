@@ -220,7 +220,7 @@ struct Start {
   void print(const Console& console, const Model& model, const Scene& scene,
              const Stepper& stepper) const {
     if (!saved) return;
-    if (model.remembers() && !saved->memory)
+    if (model.has_shear_springs() && !saved->memory)
       console.note(fmt::format(
           "row {} of {} does not hold what friction remembers{}: contacts with ks begin unsheared; "
           "simulate stores it at its last row, and with --record memory at every row",

@@ -105,11 +105,11 @@ struct Adjoint::Impl {
     gather(w.q1, g.tape.state(g.step + 1), m.nq, g.first);
     gather(w.x_inner, g.tape.inner(g.step), settings.integrator.scheme().inner_stages() * m.nv,
            g.first);
-    for (int l = 0; l < L && !m.memories.empty(); ++l) {
+    for (int l = 0; l < L && !m.shear_springs.empty(); ++l) {
       const auto after = g.tape.memory(g.step + 1, g.first + l);
       set_memory(x, l, without_kept(g.tape.memory(g.step, g.first + l)), without_kept(after));
       for (std::size_t k = 0; k < losses.size(); ++k) {
-        const std::vector<double>& bar = losses[k].memory[std::size_t(g.first + l)];
+        const std::vector<double>& bar = losses[k].shear[std::size_t(g.first + l)];
         const auto rest = bar.begin() + (bar.empty() ? 0 : 3 * kept_entries(m, after));
         x.adjoint.losses[k].kept[std::size_t(l)].assign(bar.begin(), rest);
         x.adjoint.losses[k].memory[std::size_t(l)].assign(rest, bar.end());
@@ -155,7 +155,7 @@ struct Adjoint::Impl {
       const TapedSolve& solve = special.solves[k];
       set(w.q1, solve.q);
       set(w.x_inner, solve.inner);
-      if (!compiled(model).memories.empty())
+      if (!compiled(model).shear_springs.empty())
         set_memory(x, lane,
                    k > 0 ? std::span<const ShearEntry>(special.solves[k - 1].memory)
                          : without_kept(g.tape.memory(g.step, g.first + lane)),
@@ -197,7 +197,7 @@ struct Adjoint::Impl {
                                   kept(g.step + 1)};
     }
     x.adjoint.shear_adjoint.reverse_readings(compiled(model), kernels::active_kernels(), x.work,
-                                              readings, x.adjoint.losses);
+                                             readings, x.adjoint.losses);
   }
 
   template <int L>
@@ -243,8 +243,8 @@ struct Adjoint::Impl {
       c.previous_q[at] = o.q_before[i][lane];
       c.previous_v[at] = o.v_before[i][lane];
     }
-    if (!m.memories.empty()) {
-      std::vector<double>& memory = c.memory[std::size_t(column)];
+    if (!m.shear_springs.empty()) {
+      std::vector<double>& memory = c.shear[std::size_t(column)];
       const std::vector<double>& rest = o.memory_before[std::size_t(lane)];
       memory = o.kept[std::size_t(lane)];
       memory.resize(3 * std::size_t(kept), 0.0);  // nothing reached them: zeros
@@ -286,7 +286,7 @@ void Adjoint::clear() {
     for (auto* x : {&c.q, &c.v, &c.previous_q, &c.previous_v, &c.u, &c.parameters, &c.points})
       std::fill(x->begin(), x->end(), 0.0);
   for (BlockCotangent& c : impl_->losses)
-    for (std::vector<double>& lane : c.memory) lane.clear();
+    for (std::vector<double>& lane : c.shear) lane.clear();
 }
 
 void Adjoint::reverse_step(const Batch& batch, int block, const BlockTape& tape, std::int64_t step,

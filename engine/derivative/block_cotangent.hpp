@@ -19,7 +19,7 @@ struct BlockCotangent {
   AlignedVector<double> u;  ///< (nu, 16) of the controls of the step reversed last
   /// Of what friction remembers at the newest state: of each lane, three numbers for each of its
   /// entries (engine/step/shear_state.hpp); or empty, zeros.
-  std::array<std::vector<double>, 16> memory;
+  std::array<std::vector<double>, 16> shear;
   /// (parameter_rows, 16), summed over steps (engine/derivative/number_gradients.hpp); or empty
   AlignedVector<double> parameters;
   /// (16, tactile points, kPointNumbers), summed over steps

@@ -160,7 +160,7 @@ struct DualStage::Impl {
     for (int i = 0; i < kernels::kAnchorNumbers; ++i) to[i] = frozen ? D(from[i].value) : from[i];
   }
   void put_ground_anchors() {
-    for (const kernels::ShearSpringContact& of : m.memories) {
+    for (const kernels::ShearSpringContact& of : m.shear_springs) {
       if (!of.ground) continue;
       const int first = grounds[std::size_t(of.grounded)].first_anchor;
       for (int i = 0; i < of.contact.n_points; ++i)
@@ -315,7 +315,7 @@ struct DualStage::Impl {
           list[std::size_t(3 * count + 1)] = {p[1], moves.y};
           list[std::size_t(3 * count + 2)] = {p[2], moves.z};
           if (pair.memory >= 0)
-            put_anchor(m.memories[std::size_t(pair.memory)].first + i,
+            put_anchor(m.shear_springs[std::size_t(pair.memory)].first + i,
                        &listed_anchors[std::size_t(at)][std::size_t(7 * count)]);
           ++count;
         }
@@ -330,10 +330,10 @@ struct DualStage::Impl {
     std::vector<kernels::Link> light = bodies;
     for (std::size_t k = 0; k < light.size(); ++k) {
       const double* n = &inertia[k * kernels::kInertiaNumbers];
-      light[k].massive = true;
+      light[k].has_mass = true;
       light[k].effects = 0;
       light[k].mass = n[0];
-      light[k].moment = {n[1], n[2], n[3]};
+      light[k].mass_times_com = {n[1], n[2], n[3]};
       light[k].inertia = {{{n[4], n[5], n[6]}, {n[5], n[7], n[8]}, {n[6], n[8], n[9]}}};
     }
     kernels::ModelView weight = view;
@@ -396,7 +396,7 @@ void DualStage::set_numbers(const double* column, std::span<const double> tangen
     const auto row = [&](int n) { return column[(first + n) * kBlock]; };
     kernels::Link& link = i.bodies[k];
     link.mass = row(0);
-    link.moment = {row(1), row(2), row(3)};
+    link.mass_times_com = {row(1), row(2), row(3)};
     link.inertia = {{{row(4), row(5), row(6)}, {row(5), row(7), row(8)}, {row(6), row(8), row(9)}}};
   }
   const auto first = std::size_t(i.view.rows.links), sizes = std::size_t(i.view.rows.solids);
@@ -430,10 +430,10 @@ void DualStage::choose_faces() {
 
 void DualStage::recall() {
   Impl& i = *impl_;
-  if (i.m.memories.empty()) return;
+  if (i.m.shear_springs.empty()) return;
   const std::vector<D> still(v.size(), D(0.0));
   const std::vector<kernels::LinkPose<D>> poses = i.poses_at(centre, still);
-  for (const kernels::ShearSpringContact& of : i.m.memories) {
+  for (const kernels::ShearSpringContact& of : i.m.shear_springs) {
     if (i.m.shear_interval(of) > 0) continue;
     const kernels::LoadedTouch<D> t = i.touch(of, poses);
     i.with_touched_shape(of, [&](const auto& shape) {
@@ -448,9 +448,9 @@ void DualStage::recall() {
 
 void DualStage::advance(const std::vector<D>& q, const std::vector<D>& twist) {
   Impl& i = *impl_;
-  if (i.m.memories.empty()) return;
+  if (i.m.shear_springs.empty()) return;
   const std::vector<kernels::LinkPose<D>> poses = i.poses_at(q, twist);
-  for (const kernels::ShearSpringContact& of : i.m.memories) {
+  for (const kernels::ShearSpringContact& of : i.m.shear_springs) {
     if (i.m.shear_interval(of) > 0) continue;
     const kernels::LoadedTouch<D> t = i.touch(of, poses);
     i.with_touched_shape(of, [&](const auto& shape) {
@@ -466,10 +466,10 @@ void DualStage::advance(const std::vector<D>& q, const std::vector<D>& twist) {
 }
 
 void DualStage::update_sensor_shear_state(const std::vector<D>& q, const std::vector<D>& twist,
-                                 std::int64_t steps) {
+                                          std::int64_t steps) {
   Impl& i = *impl_;
   const std::vector<kernels::LinkPose<D>> poses = i.poses_at(q, twist);
-  for (const kernels::ShearSpringContact& of : i.m.memories) {
+  for (const kernels::ShearSpringContact& of : i.m.shear_springs) {
     if (!is_due(i.m, of, steps)) continue;
     i.meet_felt(of, poses, remembered, [&](const auto& shape, const auto& t, int k, const auto& p) {
       kernels::Anchor<D> after = {kernels::zero3<D>(), kernels::zero3<D>(), D(0.0)};
@@ -535,7 +535,7 @@ void DualStage::elastic_field(int sensor, const Coefficients<D>& law, std::span<
   std::fill(field.begin(), field.end(), 0.0);
   std::fill(field_dot.begin(), field_dot.end(), 0.0);
   const std::vector<kernels::LinkPose<D>> poses = i.poses_at(centre, r);
-  for (const kernels::ShearSpringContact& of : i.m.memories) {
+  for (const kernels::ShearSpringContact& of : i.m.shear_springs) {
     if (of.sensor != sensor) continue;
     i.meet_felt(of, poses, remembered, [&](const auto&, const auto&, int k, const auto& p) {
       const D f[3] = {p.force.x, p.force.y, p.force.z};

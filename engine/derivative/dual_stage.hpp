@@ -44,7 +44,7 @@ class DualStage {
 
   /// The same for sensors that keep anchors, where they are due after `steps` steps of an episode.
   void update_sensor_shear_state(const std::vector<DualNumber>& q, const std::vector<DualNumber>& v,
-                        std::int64_t steps);
+                                 std::int64_t steps);
 
   /// Computes v and g, with the tangents of masses included.
   void residual();

@@ -6,8 +6,8 @@
 #include <algorithm>
 
 #include "engine/step/detection.hpp"
-#include "engine/step/shear_update.hpp"
 #include "engine/step/scheme_stage.hpp"
+#include "engine/step/shear_update.hpp"
 
 namespace tangere {
 
@@ -23,8 +23,8 @@ AdjointWorkspace<L>::AdjointWorkspace(const CompiledModel& model, int loss_count
                     per_loss = 8 + 2 * inner, shared = 8 + 2 * (1 + inner);
   const std::size_t count = parameters ? std::size_t(model.view.rows.sensors) : 0,
                     all = parameters ? std::size_t(model.view.rows.count) : 0;
-  memory.assign(nv * (per_loss * losses.size() + shared) + all * losses.size() + count, Row{});
-  Row* at = memory.data();
+  shear.assign(nv * (per_loss * losses.size() + shared) + all * losses.size() + count, Row{});
+  Row* at = shear.data();
   const auto take = [&](Row*& p, std::size_t rows) {
     p = at;
     at += rows;
@@ -205,14 +205,14 @@ void GroupAdjoint::reverse_stages(const StageContext<L>& s, const Scheme& scheme
       std::copy_n(w.x_inner + k * model_.nv, model_.nv, w.stage.x);
     }
     assemble(s);
-    if (!model_.memories.empty()) find_stage(s);
+    if (!model_.shear_springs.empty()) find_stage(s);
     for (std::size_t n = 0; n < s.a.losses.size(); ++n) {
       LossRows<L>& o = s.a.losses[n];
       if (k == last)
         s.a.shear_adjoint.reverse_end(model_, s.table, w, s.lanes, o, static_cast<int>(n));
       hand_on(s, scheme, k, o);
       s.a.shear_adjoint.reverse_forces(model_, s.table, w, s.lanes, s.a.q_stage.data(), s.a.lambda,
-                                        o, static_cast<int>(n));
+                                       o, static_cast<int>(n));
     }
   }
   for (std::size_t n = 0; n < s.a.losses.size(); ++n)

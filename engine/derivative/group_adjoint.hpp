@@ -17,7 +17,7 @@ struct AdjointWorkspace {
   using Row = kernels::Row<L>;
   AdjointWorkspace(const CompiledModel& model, int losses, bool parameters, int inner_stages);
 
-  AlignedVector<Row> memory;
+  AlignedVector<Row> shear;
   std::vector<LossRows<L>> losses;
   // One stage: the system, and what it hands on in all lanes before some are picked.
   Row *rhs, *lambda, *nu, *mass_lambda, *target, *difference, *q_centre, *v_centre;

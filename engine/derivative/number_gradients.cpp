@@ -74,7 +74,7 @@ bool size_matters(const CompiledModel& m, int body) {
 
 /// Whether friction remembers where a body touches.
 bool is_remembered(const CompiledModel& m, int body) {
-  return std::any_of(m.memories.begin(), m.memories.end(), [body](const auto& of) {
+  return std::any_of(m.shear_springs.begin(), m.shear_springs.end(), [body](const auto& of) {
     return of.contact.body1 == body || of.contact.body2 == body;
   });
 }

@@ -135,7 +135,7 @@ struct ReadoutPullback::Impl {
     if (!points.empty()) check_has_plain_points(model);
     const int environment = kBlock * block + lane, group = lane / kGroup;
     std::vector<double>& remembered = memory[std::size_t(lane)];
-    remembered.resize(3 * batch->memory(environment).size());
+    remembered.resize(3 * batch->shear_state(environment).size());
     used[std::size_t(group)] = true;
     for (const ElasticField::Share& share : elastic.pull_back(
              reader, *batch, environment, s.number,
@@ -272,7 +272,7 @@ void ReadoutPullback::finish(BlockCotangent& out) {
   const CompiledModel& m = compiled(i.model);
   for (std::size_t l = 0; l < kBlock; ++l) {
     if (i.memory[l].empty()) continue;
-    std::vector<double>& to = out.memory[l];
+    std::vector<double>& to = out.shear[l];
     to.resize(i.memory[l].size());
     for (std::size_t k = 0; k < to.size(); ++k) to[k] += i.memory[l][k];
   }

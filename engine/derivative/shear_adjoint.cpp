@@ -11,10 +11,10 @@ using kernels::Frame;
 using kernels::kGroup;
 using kernels::LinkPose;
 using kernels::MotionCotangent;
+using kernels::Row;
 using kernels::ShearSpringContact;
 using kernels::ShearSpringPoints;
 using kernels::ShearSpringTouch;
-using kernels::Row;
 using kernels::Vec6;
 
 namespace {
@@ -38,35 +38,35 @@ void hand_on(const ShearSpringContact& of, const AlignedVector<LinkPose<Row<L>>>
 
 template <int L>
 ShearAdjoint<L>::ShearAdjoint(const CompiledModel& m, int losses) {
-  if (m.memories.empty()) return;
+  if (m.shear_springs.empty()) return;
   start_.resize(std::size_t(losses));
   for (Cotangents& of : start_) of.resize(m.links.size());
   end_.resize(m.links.size());
   at_.resize(m.links.size());
   slip_.resize(m.links.size());
-  at_touches_.resize(m.memories.size());
-  slip_touches_.resize(m.memories.size());
+  at_touches_.resize(m.shear_springs.size());
+  slip_touches_.resize(m.shear_springs.size());
   rows_.resize(2 * std::size_t(m.nv));
   std::size_t bytes = 0, stride = 0;
   for (const kernels::KernelTable* table : kernels::available_kernels())
     bytes = std::max(bytes, table->pullback_bytes(m.view));
   scratch_.resize(bytes);
-  for (const ShearSpringContact& of : m.memories)
+  for (const ShearSpringContact& of : m.shear_springs)
     stride = std::max(stride, std::size_t(of.contact.n_points + 2 * kGroup));
   numbers_.resize(18 * stride);
 }
 
 template <int L>
 void ShearAdjoint<L>::begin(const CompiledModel& m) {
-  if (m.memories.empty()) return;
+  if (m.shear_springs.empty()) return;
   for (Cotangents& of : start_) std::fill(of.begin(), of.end(), MotionCotangent<Row<L>>{});
 }
 
 template <int L>
 void ShearAdjoint<L>::add_to_state(const CompiledModel& m, const kernels::KernelTable& table,
-                                    BasicWorkspace<L>& w, LaneBits lanes, const Row<L>* q,
-                                    const Row<L>* v, Cotangents& links, Row<L>* q_bar,
-                                    Row<L>* v_bar) {
+                                   BasicWorkspace<L>& w, LaneBits lanes, const Row<L>* q,
+                                   const Row<L>* v, Cotangents& links, Row<L>* q_bar,
+                                   Row<L>* v_bar) {
   std::fill(rows_.begin(), rows_.end(), Row<L>{});
   Row<L>*const by_q = rows_.data(), *const by_v = by_q + m.nv;
   table.stage<L>().pull_back_poses(m.view, w.stage, q, v, w.zero, scratch_.data(), links.data(),
@@ -79,8 +79,8 @@ void ShearAdjoint<L>::add_to_state(const CompiledModel& m, const kernels::Kernel
 /// Pulls back through all contacts: what is remembered at the end, or the forces along a slip.
 template <int L>
 void ShearAdjoint<L>::pull_back(const CompiledModel& m, const kernels::KernelTable& table,
-                                 BasicWorkspace<L>& w, LaneBits lanes, bool of_forces,
-                                 LossRows<L>& loss, int number) {
+                                BasicWorkspace<L>& w, LaneBits lanes, bool of_forces,
+                                LossRows<L>& loss, int number) {
   for (int l = 0; l < L; ++l) {
     if (!has(lanes, l)) continue;
     const std::size_t lane = std::size_t(l);
@@ -95,9 +95,9 @@ void ShearAdjoint<L>::pull_back(const CompiledModel& m, const kernels::KernelTab
       double *const remembered = numbers_.data(), *const s_bar = remembered + rows,
                     *const s_out = s_bar + rows;
       std::size_t next = 0;
-      look_up(now, of, index, points.count, points.stride, remembered, next);
+      shear_of_points(now, of, index, points.count, points.stride, remembered, next);
       if (!of_forces)
-        look_up(
+        shear_of_points(
             after, of, index, points.count, points.stride,
             [&](std::size_t entry, int c) { return bar[3 * entry + std::size_t(c)]; }, s_bar, next);
       std::fill(s_out, s_out + rows, 0.0);
@@ -123,9 +123,9 @@ void ShearAdjoint<L>::pull_back(const CompiledModel& m, const kernels::KernelTab
 
 template <int L>
 void ShearAdjoint<L>::reverse_end(const CompiledModel& m, const kernels::KernelTable& table,
-                                   BasicWorkspace<L>& w, LaneBits lanes, LossRows<L>& loss,
-                                   int number) {
-  if (m.memories.empty()) return;
+                                  BasicWorkspace<L>& w, LaneBits lanes, LossRows<L>& loss,
+                                  int number) {
+  if (m.shear_springs.empty()) return;
   std::fill(end_.begin(), end_.end(), MotionCotangent<Row<L>>{});
   table.stage<L>().poses_at(m.view, w.stage, w.q1, w.stage.v, w.zero, at_.data());
   table.stage<L>().touches_at(m.view, at_.data(), at_touches_.data());
@@ -136,8 +136,8 @@ void ShearAdjoint<L>::reverse_end(const CompiledModel& m, const kernels::KernelT
 /// Pulls one contact of one lane back.
 template <int L>
 void ShearAdjoint<L>::pull_back_reading(const CompiledModel& m, const kernels::KernelTable& table,
-                                         BasicWorkspace<L>& w, const ShearSpringContact& of,
-                                         int lane, const TapedReading& reading, LossRows<L>& loss) {
+                                        BasicWorkspace<L>& w, const ShearSpringContact& of,
+                                        int lane, const TapedReading& reading, LossRows<L>& loss) {
   TouchingSensorPoints& felt = w.remembered.felt;
   const ShearSpringTouch touch = touch_of(m, w, of, at_touches_, lane);
   const ShearSpringPoints points = felt.find(m.sensors[std::size_t(of.sensor)], table, touch);
@@ -153,7 +153,7 @@ void ShearAdjoint<L>::pull_back_reading(const CompiledModel& m, const kernels::K
       [&](std::size_t entry, int c) { return bar[3 * entry + std::size_t(c)]; }, anchor_bar);
   kernels::ShearCotangentSums sums{};
   kernels::ShearPullback pullback = {&touch,  &touch,  points, none, nullptr,
-                                      nullptr, nullptr, s_out,  &sums};
+                                     nullptr, nullptr, s_out,  &sums};
   pullback.anchor_bar = anchor_bar;
   pullback.kept = felt.scratch() + 6 * points.stride;
   pullback.anchor_out = anchor_out;
@@ -168,12 +168,12 @@ void ShearAdjoint<L>::pull_back_reading(const CompiledModel& m, const kernels::K
 
 template <int L>
 void ShearAdjoint<L>::reverse_readings(const CompiledModel& m, const kernels::KernelTable& table,
-                                        BasicWorkspace<L>& w,
-                                        const std::array<TapedReading, L>& readings,
-                                        std::vector<LossRows<L>>& losses) {
+                                       BasicWorkspace<L>& w,
+                                       const std::array<TapedReading, L>& readings,
+                                       std::vector<LossRows<L>>& losses) {
   LaneBits lanes = 0;
   for (int l = 0; l < L; ++l)
-    for (const ShearSpringContact& of : m.memories)
+    for (const ShearSpringContact& of : m.shear_springs)
       if (is_due(m, of, readings[std::size_t(l)].steps)) lanes |= 1U << l;
   if (lanes == 0) return;
   table.stage<L>().poses_at(m.view, w.stage, w.q1, w.v1, w.zero, at_.data());
@@ -185,7 +185,7 @@ void ShearAdjoint<L>::reverse_readings(const CompiledModel& m, const kernels::Ke
       std::vector<double>& bar = loss.kept[std::size_t(l)];
       if (!has(lanes, l) || bar.empty()) continue;
       kept_before_.assign(3 * reading.before.size(), 0.0);
-      for (const ShearSpringContact& of : m.memories) {
+      for (const ShearSpringContact& of : m.shear_springs) {
         if (m.shear_interval(of) == 0) break;  // those that keep anchors come first
         if (is_due(m, of, reading.steps)) {
           pull_back_reading(m, table, w, of, l, reading, loss);
@@ -203,9 +203,9 @@ void ShearAdjoint<L>::reverse_readings(const CompiledModel& m, const kernels::Ke
 
 template <int L>
 void ShearAdjoint<L>::reverse_forces(const CompiledModel& m, const kernels::KernelTable& table,
-                                      BasicWorkspace<L>& w, LaneBits lanes, const Row<L>* q,
-                                      const Row<L>* lambda, LossRows<L>& loss, int number) {
-  if (m.memories.empty()) return;
+                                     BasicWorkspace<L>& w, LaneBits lanes, const Row<L>* q,
+                                     const Row<L>* lambda, LossRows<L>& loss, int number) {
+  if (m.shear_springs.empty()) return;
   table.stage<L>().poses_at(m.view, w.stage, q, w.stage.v, w.zero, at_.data());
   table.stage<L>().poses_at(m.view, w.stage, q, lambda, w.zero, slip_.data());
   table.stage<L>().touches_at(m.view, at_.data(), at_touches_.data());
@@ -215,8 +215,8 @@ void ShearAdjoint<L>::reverse_forces(const CompiledModel& m, const kernels::Kern
 
 template <int L>
 void ShearAdjoint<L>::finish(const CompiledModel& m, const kernels::KernelTable& table,
-                              BasicWorkspace<L>& w, LaneBits lanes, LossRows<L>& loss, int number) {
-  if (m.memories.empty()) return;
+                             BasicWorkspace<L>& w, LaneBits lanes, LossRows<L>& loss, int number) {
+  if (m.shear_springs.empty()) return;
   add_to_state(m, table, w, lanes, w.q0, w.v0, start_[std::size_t(number)], loss.q_centre,
                loss.v_centre);
 }

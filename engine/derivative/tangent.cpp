@@ -307,7 +307,7 @@ void Tangent::step(const Batch& batch, int block, int lane, const BlockTape& tap
   const double* column = batch.block(block) + lane;
   i.stage.set_numbers(column, numbers_dot);
   i.set_motors(start, u, u_dot, numbers_dot, column);
-  i.set_memory(tape.memory(step, lane), state.memory);
+  i.set_memory(tape.memory(step, lane), state.shear);
   DualState end = start;
   if (const TapedStep* special = tape.special(step, lane); special != nullptr) {
     for (const TapedSolve& s : special->solves)
@@ -318,7 +318,7 @@ void Tangent::step(const Batch& batch, int block, int lane, const BlockTape& tap
   }
   if (m.kept_points > 0 && tape.took(step, lane))
     i.stage.update_sensor_shear_state(end.q, end.v, tape.episode_step(step + 1, lane));
-  state.memory = i.memory_dot(tape.memory(step + 1, lane));
+  state.shear = i.memory_dot(tape.memory(step + 1, lane));
   state.previous_q = std::move(state.q);
   state.previous_v = std::move(state.v);
   state.q = tangent_of(m, end.q);
@@ -342,7 +342,7 @@ void Tangent::field(const Batch& batch, int block, int lane, const BlockTape& ta
   i.stage.inverse_h = 1;
   const CompiledSensor& s = m.sensors[std::size_t(sensor)];
   std::vector<double> field(s.imperfect ? field_dot.size() : 0);
-  i.set_memory(tape.memory(step, lane), state.memory);
+  i.set_memory(tape.memory(step, lane), state.shear);
   i.stage.set_numbers(batch.block(block) + lane, numbers_dot);
   i.stage.field(sensor, batch.block(block) + lane, numbers_dot, points_dot, field, field_dot);
   const ReadingKey key = {batch.seed(), batch.episode(block * kBlock + lane),

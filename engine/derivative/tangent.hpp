@@ -18,7 +18,7 @@ struct StateTangent {
   std::vector<double> q, v;
   std::vector<double> previous_q, previous_v;  ///< of the state one step before
   /// Of what friction remembers, three numbers for each of its entries; or empty, zeros.
-  std::vector<double> memory = {};
+  std::vector<double> shear = {};
 };
 
 class Tangent {

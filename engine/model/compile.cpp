@@ -11,18 +11,18 @@
 #include "engine/model/compile_imperfections.hpp"
 #include "engine/model/compile_joints.hpp"
 #include "engine/model/compile_markers.hpp"
-#include "engine/model/compile_shear_springs.hpp"
 #include "engine/model/compile_sensor.hpp"
+#include "engine/model/compile_shear_springs.hpp"
 #include "engine/model/compile_variations.hpp"
 #include "engine/model/components.hpp"
 #include "engine/model/contact_tiles.hpp"
 #include "engine/model/group_contacts.hpp"
 #include "engine/model/link_inertia.hpp"
 #include "engine/scene/contact_resolution.hpp"
-#include "engine/scene/sensed_bodies.hpp"
 #include "engine/scene/frames.hpp"
 #include "engine/scene/scene_faults.hpp"
 #include "engine/scene/scene_number.hpp"
+#include "engine/scene/sensed_bodies.hpp"
 #include "engine/scene/shapes.hpp"
 
 namespace tangere {
@@ -489,8 +489,8 @@ std::shared_ptr<const CompiledModel> compile(const Scene& scene) {
     m->solids.push_back(solid_of(m->scene.links[k].body.shape, m->bodies[k]));
   point_view(*m);
   compile_shear_springs(*m);
-  v.n_shear_springs = static_cast<int>(m->memories.size());
-  v.memories = m->memories.data();
+  v.n_shear_springs = static_cast<int>(m->shear_springs.size());
+  v.memories = m->shear_springs.data();
   return m;
 }
 

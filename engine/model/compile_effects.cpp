@@ -36,7 +36,7 @@ std::string counted(std::size_t n, const std::string& one, const std::string& ma
 bool remembers(const CompiledModel& m) {
   const auto any = [](const auto& all) {
     return std::any_of(all.begin(), all.end(),
-                       [](const auto& x) { return kernels::remembers(x.parameters); });
+                       [](const auto& x) { return kernels::has_shear_spring(x.parameters); });
   };
   return any(m.pairs) || any(m.grounds) || any(m.sensors);
 }
@@ -52,7 +52,8 @@ std::string pair_variant(const CompiledModel& m, const kernels::LinkPair& links)
   std::vector<Kind> kinds;
   for (int i = links.first; i < links.first + links.count; ++i) {
     const kernels::PairContact& pair = m.pairs[std::size_t(m.pair_order[std::size_t(i)])];
-    const Kind kind = {pair.shape, kernels::remembers(pair.parameters), pair.ball_radius > 0};
+    const Kind kind = {pair.shape, kernels::has_shear_spring(pair.parameters),
+                       pair.ball_radius > 0};
     if (std::find(kinds.begin(), kinds.end(), kind) == kinds.end()) kinds.push_back(kind);
   }
   std::string text;
@@ -75,20 +76,20 @@ std::string pair_name(const CompiledModel& m, const kernels::LinkPair& links) {
 }
 
 const char* motion_variant(const std::vector<Link>& links) {
-  if (std::all_of(links.begin(), links.end(), [](const Link& l) { return l.still; }))
+  if (std::all_of(links.begin(), links.end(), [](const Link& l) { return l.never_rotates; }))
     return "nothing turns";
-  if (std::any_of(links.begin(), links.end(), [](const Link& l) { return l.still; }))
+  if (std::any_of(links.begin(), links.end(), [](const Link& l) { return l.never_rotates; }))
     return "some links never turn";
   return "every link may turn";
 }
 
 std::string effects_variant(std::uint8_t effects) {
   const std::pair<kernels::JointEffect, const char*> names[] = {
-      {kernels::kDamped, "damping"},
+      {kernels::kDamping, "damping"},
       {kernels::kArmature, "armature"},
       {kernels::kSpring, "spring"},
-      {kernels::kLimited, "limits"},
-      {kernels::kDriven, "position motor"}};
+      {kernels::kLimit, "limits"},
+      {kernels::kPositionServo, "position motor"}};
   std::string text;
   for (const auto& [bit, name] : names)
     if ((effects & bit) != 0) text += (text.empty() ? "" : ", ") + std::string(name);

@@ -97,7 +97,7 @@ void compile_imperfections(const TactileDescription& d, double timestep, Compile
   info.imperfect = s.imperfect = true;
   s.imperfections = d.imperfections;
   s.name_bits = bits_of(d.name);
-  if (has_memory(d.imperfections)) remember(d, timestep, s);
+  if (has_lag(d.imperfections)) remember(d, timestep, s);
   info.past_states = s.past_states();
   if (!has_grid(d)) return;
   s.grid_rows = d.array.rows, s.grid_cols = d.array.cols;

@@ -64,10 +64,10 @@ struct EffectOfDof {
   kernels::JointEffect flag;
 };
 constexpr EffectOfDof kEffectsOfDof[kJointEffects] = {
-    {&kernels::DofEffects::damping, kernels::kDamped},
+    {&kernels::DofEffects::damping, kernels::kDamping},
     {&kernels::DofEffects::armature, kernels::kArmature},
     {&kernels::DofEffects::stiffness, kernels::kSpring},
-    {&kernels::DofEffects::limit_stiffness, kernels::kLimited}};
+    {&kernels::DofEffects::limit_stiffness, kernels::kLimit}};
 
 kernels::DofEffects dof_effects(const JointEffects& e, double rest) {
   constexpr double kNone = HUGE_VAL;
@@ -112,7 +112,7 @@ CompiledJoint add_joint(CompiledModel& m, const JointDescription& d, int parent,
     const bool first = joint.link_count == 0;
     const Frame<double>& at = first ? frame : kIdentityFrame;
     const int up = first ? parent : joint.link;
-    const bool slides = kernels::slides(kind), steady = up < 0 || m.links[up].still;
+    const bool slides = kernels::slides(kind), steady = up < 0 || m.links[up].never_rotates;
     const bool rotated = !is_identity({at.R, {0, 0, 0}}), turned = !slides || rotated;
     const bool placed = slides || !is_identity({kIdentityFrame.R, at.p});
     Link link{up,
@@ -194,7 +194,7 @@ void compile_motors(CompiledModel& m, const NameIndex& joints) {
       const bool position = d.control == MotorControl::position;
       m.u_units.emplace_back(!position ? "1" : dof_turns(type, k) ? "rad" : "m");
       if (!position || d.timing == MotorTiming::start) continue;
-      link.effects |= kernels::kDriven;
+      link.effects |= kernels::kPositionServo;
       kernels::DofEffects& e = m.dof_effects[std::size_t(dof)];
       e.P = {d.P, -1};
       e.D = {d.D, -1};
@@ -253,7 +253,7 @@ void vary_joint(CompiledModel& m, int joint, const RandomizationDescription& d, 
 void check_masses(const CompiledModel& m) {
   std::vector<char> carried(m.links.size(), 0);
   for (std::size_t i = m.links.size(); i-- > 0;) {
-    if (m.links[i].massive) carried[i] = 1;
+    if (m.links[i].has_mass) carried[i] = 1;
     if (carried[i] != 0 && m.links[i].parent >= 0) carried[std::size_t(m.links[i].parent)] = 1;
   }
   for (std::size_t i = 0; i < m.joints.size(); ++i) {

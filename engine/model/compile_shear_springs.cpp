@@ -32,15 +32,15 @@ void keep_places(CompiledModel& m, kernels::ShearSpringContact& of) {
 int add(CompiledModel& m, kernels::ShearSpringContact of) {
   of.first = m.shear_spring_points;
   if (of.sensor < 0) m.taped_points += of.contact.n_points;
-  m.shear_spring_points += m.remembering(of);
-  m.memories.push_back(of);
-  return static_cast<int>(m.memories.size()) - 1;
+  m.shear_spring_points += m.shear_rows(of);
+  m.shear_springs.push_back(of);
+  return static_cast<int>(m.shear_springs.size()) - 1;
 }
 
 void add_grounds(CompiledModel& m) {
   for (int k = 0; k < m.view.n_grounds; ++k) {
     kernels::GroundContact& g = m.grounds[std::size_t(k)];
-    if (!remembers(g.parameters)) continue;
+    if (!has_shear_spring(g.parameters)) continue;
     kernels::ShearSpringContact of;
     of.number = m.view.rows.ground(k);
     of.ground = true;
@@ -106,7 +106,7 @@ std::vector<double> order_points(CompiledSensor& s, PadPoints& points) {
 void add_sensors(CompiledModel& m, bool keep_anchors) {
   for (CompiledSensor& s : m.sensors) {
     const TactileDescription& d = m.scene.sensors[std::size_t(s.number)];
-    if (!remembers(s.parameters) || d.remembers_readings != keep_anchors) continue;
+    if (!has_shear_spring(s.parameters) || d.remembers_readings != keep_anchors) continue;
     if (s.past_states() > 0)
       throw InputError(d.source.prefix() + "tactile sensor '" + d.name +
                        "' has ks and low_pass or delay; expected one of them: friction does not "
@@ -161,7 +161,7 @@ void compile_shear_springs(CompiledModel& m) {
   m.kept_points = m.shear_spring_points;
   for (std::size_t k = 0; k < m.pairs.size(); ++k) {
     kernels::PairContact& pair = m.pairs[k];
-    if (!remembers(pair.parameters)) continue;
+    if (!has_shear_spring(pair.parameters)) continue;
     if (pair.ball_radius > 0) {
       const PairContactDescription& d = m.scene.pair_contacts[k];
       throw InputError(d.source.prefix() + "ks of the sphere '" + d.general_body + "' against '" +

@@ -164,7 +164,7 @@ int add_derived_rows(CompiledModel& m, int next) {
   for (VaryingPlace& place : m.varying_places) {
     Link& link = m.links[std::size_t(m.joints[std::size_t(place.joint)].first_link)];
     link.place_row = place.row = next;
-    link.placed = true;
+    link.has_offset = true;
     next += 3;
   }
   return next;

@@ -48,8 +48,8 @@ void point_view(CompiledModel& m) {
   v.ground_order = m.ground_order.data();
   v.n_solids = static_cast<int>(m.solids.size());
   v.solids = m.solids.data();
-  v.n_shear_springs = static_cast<int>(m.memories.size());
-  v.memories = m.memories.data();
+  v.n_shear_springs = static_cast<int>(m.shear_springs.size());
+  v.memories = m.shear_springs.data();
   kernels::ParameterRows& rows = v.rows;
   rows.grounds = rows.pair(v.n_pairs);
   rows.links = rows.ground(v.n_grounds);

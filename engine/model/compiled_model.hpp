@@ -192,7 +192,7 @@ struct CompiledModel {
   std::vector<kernels::PairContact> pairs;
   std::vector<kernels::GroundContact> grounds;
   std::vector<kernels::Solid> solids;  ///< parallel to bodies
-  std::vector<kernels::ShearSpringContact> memories;
+  std::vector<kernels::ShearSpringContact> shear_springs;
   /// Bodies whose contact points are far apart for each other (contact_resolution.hpp).
   std::vector<std::array<int, 2>> coarse_pairs;
   int shear_spring_points = 0;  ///< of all `memories`
@@ -207,7 +207,7 @@ struct CompiledModel {
     return of.sensor < 0 ? 0 : sensors[std::size_t(of.sensor)].shear_interval;
   }
   /// How many of the points that remember are a contact's.
-  [[nodiscard]] int remembering(const kernels::ShearSpringContact& of) const {
+  [[nodiscard]] int shear_rows(const kernels::ShearSpringContact& of) const {
     return of.contact.n_points * (shear_interval(of) > 0 ? 2 : 1);
   }
   std::vector<kernels::LinkPair> link_pairs;

@@ -45,7 +45,7 @@ double Model::following_tolerance(Integrator integrator, double timestep) const 
   return std::clamp(tolerance, kTightTolerance, kLooseTolerance);
 }
 std::span<const double> Model::initial_q() const { return compiled_->initial_q; }
-bool Model::remembers() const { return !compiled_->memories.empty(); }
+bool Model::has_shear_springs() const { return !compiled_->shear_springs.empty(); }
 std::span<const SensorInfo> Model::sensors() const { return compiled_->sensor_info; }
 std::span<const EndEffectorInfo> Model::end_effectors() const {
   return compiled_->end_effector_info;

@@ -39,7 +39,7 @@ class Model {
   [[nodiscard]] double following_tolerance(Integrator integrator, double timestep) const;
   [[nodiscard]] std::span<const double> initial_q() const;  ///< (nq) where the scene starts
   /// Whether friction of some contact or sensor remembers (docs/shear.md).
-  [[nodiscard]] bool remembers() const;
+  [[nodiscard]] bool has_shear_springs() const;
   [[nodiscard]] std::span<const SensorInfo> sensors() const;
   [[nodiscard]] std::span<const EndEffectorInfo> end_effectors()
       const;  ///< end effectors, in file order

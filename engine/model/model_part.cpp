@@ -48,7 +48,7 @@ class Filter {
   }
 
   [[nodiscard]] bool stays(const kernels::ContactParameters& contact) const {
-    return !pushing_alone_ || pushes(contact);
+    return !pushing_alone_ || can_exert_force(contact);
   }
 
   void links(std::span<const int> tree, std::span<const std::uint8_t> left_out) {
@@ -163,9 +163,11 @@ std::unique_ptr<ModelPart> part_of(const CompiledModel& whole, std::span<const i
 
 std::unique_ptr<ModelPart> without_inert_contacts(const CompiledModel& whole) {
   const auto all_push = [](const auto& contacts) {
-    return std::ranges::all_of(contacts, [](const auto& c) { return pushes(c.parameters); });
+    return std::ranges::all_of(contacts,
+                               [](const auto& c) { return can_exert_force(c.parameters); });
   };
-  if (!whole.memories.empty() || (all_push(whole.pairs) && all_push(whole.grounds))) return nullptr;
+  if (!whole.shear_springs.empty() || (all_push(whole.pairs) && all_push(whole.grounds)))
+    return nullptr;
   const std::vector<int> one_tree(whole.links.size(), 0);
   const std::uint8_t stays = 0;
   return Filter(whole, one_tree, {&stays, 1}, true).part();

@@ -16,7 +16,7 @@ namespace tangere {
 std::vector<int> trees_of(const std::vector<kernels::Link>& links);
 
 /// Whether a contact with these coefficients can ever have a force: friction is bounded by μ|N|.
-inline bool pushes(const kernels::ContactParameters& p) {
+inline bool can_exert_force(const kernels::ContactParameters& p) {
   return p.kn.value != 0 || p.kn.row >= 0 || p.damping.value != 0 || p.damping.row >= 0;
 }
 

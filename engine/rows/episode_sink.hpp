@@ -80,12 +80,12 @@ struct FailedEpisode {
 /// scene.
 struct EpisodeSteps {
   std::int64_t taken = 0;        ///< of the simulation, without those that failed
-  std::int64_t passed = 0;       ///< in which a body came through another (StepStatus::tunnelled)
+  std::int64_t tunnelled = 0;    ///< in which a body came through another (StepStatus::tunnelled)
   std::int64_t overlapping = 0;  ///< after which bodies overlap (StepStatus::overlapping)
 
   EpisodeSteps& operator+=(const EpisodeSteps& other) {
     taken += other.taken;
-    passed += other.passed;
+    tunnelled += other.tunnelled;
     overlapping += other.overlapping;
     return *this;
   }

@@ -68,7 +68,7 @@ struct AuditRow {
 
 /// What friction remembers at row t of a trajectory, for all environments.
 struct MemoryRow {
-  std::int64_t step;                    ///< t
+  std::int64_t step;                   ///< t
   std::span<const ShearState> memory;  ///< (E)
 };
 

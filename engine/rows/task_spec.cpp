@@ -30,11 +30,11 @@ void TaskSpec::check() const {
   if (steps_per_action < 1 || horizon < 1)
     fail(fmt::format("{} steps per action, {} actions; expected at least 1", steps_per_action,
                      horizon));
-  if (control_every < 0 || settling_steps < 0 || memory < 0) fail("a count is negative");
-  if (moments.empty() || moments.front() < 1 || moments.back() != steps_per_action)
+  if (control_every < 0 || settling_steps < 0 || task_state < 0) fail("a count is negative");
+  if (snapshots.empty() || snapshots.front() < 1 || snapshots.back() != steps_per_action)
     fail(fmt::format("it must look after its last step, {}", steps_per_action));
-  for (std::size_t i = 1; i < moments.size(); ++i)
-    if (moments[i] <= moments[i - 1]) fail("the steps after which it looks must ascend");
+  for (std::size_t i = 1; i < snapshots.size(); ++i)
+    if (snapshots[i] <= snapshots[i - 1]) fail("the steps after which it looks must ascend");
   if (!action.scale.empty()) fail("an action has bounds, not a scale");
   if (action.size() == 0 || observation_size() == 0) fail("expected an action and an observation");
   for (const TensorSpec& tensor : observations) {

@@ -41,14 +41,14 @@ struct TaskSpec {
   int control_every = 0;     ///< simulation steps between requests for controls; 0: once per action
   /// Steps of an action after which the task looks at the state: ascending, the last one is
   /// steps_per_action.
-  std::vector<int> moments;
+  std::vector<int> snapshots;
   int horizon = 1;  ///< actions of an episode, after which it is truncated
   /// A reset is followed by one action of zeros, which belongs to the reset.
-  bool opening = false;
+  bool warm_up = false;
   bool restarts = false;   ///< every action starts from a state that the task gives
   int settling_steps = 0;  ///< a reset ends with this many steps of `settling_timestep` [s]
   double settling_timestep = 0;
-  int memory = 0;  ///< numbers that an episode keeps for the task: a goal, a force
+  int task_state = 0;  ///< numbers that an episode keeps for the task: a goal, a force
   /// What the task looks at besides q and v.
   bool reads_end_effectors = false, reads_tactile = false;
 

@@ -15,9 +15,9 @@
 #include <map>
 #include <numbers>
 
-#include "engine/scene/sensed_bodies.hpp"
 #include "engine/scene/mass_properties.hpp"
 #include "engine/scene/outer_pose.hpp"
+#include "engine/scene/sensed_bodies.hpp"
 #include "engine/scene/shapes.hpp"
 
 namespace tangere {

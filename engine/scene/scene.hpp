@@ -320,7 +320,7 @@ struct Scene {
   std::string text;  ///< the file as read, stored with every dataset
   Vector3 gravity{0, 0, -9.8};
   double timestep = 5e-3;  ///< [s]
-  Integrator integrator = Integrator::usual;
+  Integrator integrator = Integrator::default_integrator;
   SolverOptions solver;
   std::optional<GroundDescription> ground;
   std::vector<LinkDescription> links;

@@ -19,7 +19,9 @@
 
 namespace tangere {
 
-const Scheme* Scheme::energy_fallback() const { return order > 1 ? &Integrator::bdf1.scheme() : nullptr; }
+const Scheme* Scheme::energy_fallback() const {
+  return order > 1 ? &Integrator::bdf1.scheme() : nullptr;
+}
 
 const Scheme& Scheme::rotation_fallback() const {
   return order > 1 ? substep_scheme() : Integrator::sdirk2.scheme();
@@ -168,7 +170,7 @@ constinit const Integrator Integrator::bdf2{kBdf2};
 constinit const Integrator Integrator::sdirk2{kSdirk2};
 constinit const Integrator Integrator::sdirk3{kSdirk3};
 constinit const Integrator Integrator::sdirk4{kSdirk4};
-constinit const Integrator Integrator::usual{kBdf1};
+constinit const Integrator Integrator::default_integrator{kBdf1};
 constinit const Integrator Integrator::reference{kSdirk4};
 constinit const Integrator Integrator::second_reference{kSdirk2};
 

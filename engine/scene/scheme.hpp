@@ -73,8 +73,8 @@ class Integrator {
  public:
   explicit constexpr Integrator(const Scheme& scheme) : scheme_(&scheme) {}
   static const Integrator bdf1, bdf2, sdirk2, sdirk3;
-  static const Integrator sdirk4;  ///< not in the table
-  static const Integrator usual;   ///< of scenes that name none
+  static const Integrator sdirk4;              ///< not in the table
+  static const Integrator default_integrator;  ///< of scenes that name none
   /// What others are compared with, and what tells how far that is wrong.
   static const Integrator reference, second_reference;
 

@@ -30,7 +30,7 @@ bool is_imperfect(const SensorImperfections& imperfections) {
   return found;
 }
 
-bool has_memory(const SensorImperfections& imperfections) {
+bool has_lag(const SensorImperfections& imperfections) {
   return imperfections.hysteresis != 0 || imperfections.low_pass != 0 || imperfections.delay != 0;
 }
 

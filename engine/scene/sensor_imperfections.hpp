@@ -47,7 +47,7 @@ struct SensorImperfections {
 /// Whether any coefficient is not 0.
 bool is_imperfect(const SensorImperfections& imperfections);
 /// Whether a reading depends on earlier states.
-bool has_memory(const SensorImperfections& imperfections);
+bool has_lag(const SensorImperfections& imperfections);
 /// Returns "noise 0.002 0.001 N, dead 0.01": what is on, normal before shear where they differ.
 std::string text_of(const SensorImperfections& imperfections);
 /// Throws InputError (file:line) for a value that is negative, not finite or too large. `sensor`:

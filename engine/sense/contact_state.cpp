@@ -18,7 +18,7 @@ namespace {
 std::vector<int> beyond_limits(const CompiledModel& m, const double* column) {
   std::vector<int> beyond(static_cast<std::size_t>(m.nv));
   for (const kernels::Link& link : m.links) {
-    if ((link.effects & kernels::kLimited) == 0 || link.kind == kernels::JointKind::spherical)
+    if ((link.effects & kernels::kLimit) == 0 || link.kind == kernels::JointKind::spherical)
       continue;
     for (int k = 0; k < kernels::dofs(link.kind); ++k) {
       const kernels::DofEffects& e = m.dof_effects[static_cast<std::size_t>(link.v + k)];

@@ -33,9 +33,9 @@ void ElasticField::for_each_touched(const PadReader& reader, const Batch& batch,
   const kernels::KernelTable& table = kernels::active_kernels();
   const int block = environment / kBlock, group = environment % kBlock / kGroup,
             lane = environment % kGroup;
-  const ShearState& memory = batch.memory(environment);
+  const ShearState& memory = batch.shear_state(environment);
   std::size_t next = 0;
-  for (const ShearSpringContact& of : m.memories) {
+  for (const ShearSpringContact& of : m.shear_springs) {
     if (of.sensor != sensor) continue;
     const ShearSpringTouch touch = touch_between(
         of, reader.link(of.contact.link1, group, lane), reader.link(of.contact.link2, group, lane),
@@ -47,7 +47,8 @@ void ElasticField::for_each_touched(const PadReader& reader, const Batch& batch,
     if (m.shear_interval(of) > 0) {
       set_anchors(table, touch, memory, felt_.index(), points, felt_.scratch());
     } else {
-      look_up(memory, of, felt_.index(), points.count, points.stride, remembered_.data(), next);
+      shear_of_points(memory, of, felt_.index(), points.count, points.stride, remembered_.data(),
+                      next);
       std::copy_n(remembered_.data(), 3 * points.stride, points.anchors + 3 * points.stride);
       table.recall(touch, points);
     }
@@ -81,41 +82,41 @@ std::span<const ElasticField::Share> ElasticField::pull_back(const PadReader& re
                                                              std::span<double> memory) {
   const CompiledSensor& s = compiled(model_).sensors[std::size_t(sensor)];
   shares_.clear();
-  for_each_touched(
-      reader, batch, environment, sensor,
-      [&](const ShearSpringContact& of, const ShearSpringTouch& touch,
-          const ShearSpringPoints& points) {
-        std::fill(force_.begin(), force_.end(), 0.0);
-        std::fill(s_.begin(), s_.end(), 0.0);
-        for (int k = 0; k < points.count; ++k) {
-          const auto point = std::size_t(felt_.index()[k]);
-          const double* const axes = &s.point_axes[9 * point];
-          const double* const from = &cotangent[3 * std::size_t(s.in_field[point])];
-          for (int c = 0; c < 3; ++c)
-            for (int i = 0; i < 3; ++i)
-              force_[std::size_t(i * points.stride + k)] += axes[3 * c + i] * from[c];
-        }
-        kernels::ShearCotangentSums sums{};
-        kernels::ShearPullback pullback = {&touch,  &touch,        points,  remembered_.data(),
-                                            nullptr, force_.data(), nullptr, s_.data(),
-                                            &sums};
-        const bool keeps = compiled(model_).shear_interval(of) > 0;
-        if (keeps) {
-          std::fill(remembered_.begin(), remembered_.end(), 0.0);
-          std::fill(anchors_.begin(), anchors_.end(), 0.0);
-          pullback.kept = felt_.scratch() + 6 * points.stride;
-          pullback.anchor_out = anchors_.data();
-        }
-        kernels::active_kernels().pull_back_memory(pullback);
-        sums.end.displacement += sums.start;
-        shares_.push_back({&of, sums.end});
-        if (keeps) {
-          add_to_anchors(batch.memory(environment), of, felt_.index(), points, anchors_.data(),
-                         memory);
-        } else {
-          add_to_entries(batch.memory(environment), of, felt_.index(), points, s_.data(), memory);
-        }
-      });
+  for_each_touched(reader, batch, environment, sensor,
+                   [&](const ShearSpringContact& of, const ShearSpringTouch& touch,
+                       const ShearSpringPoints& points) {
+                     std::fill(force_.begin(), force_.end(), 0.0);
+                     std::fill(s_.begin(), s_.end(), 0.0);
+                     for (int k = 0; k < points.count; ++k) {
+                       const auto point = std::size_t(felt_.index()[k]);
+                       const double* const axes = &s.point_axes[9 * point];
+                       const double* const from = &cotangent[3 * std::size_t(s.in_field[point])];
+                       for (int c = 0; c < 3; ++c)
+                         for (int i = 0; i < 3; ++i)
+                           force_[std::size_t(i * points.stride + k)] += axes[3 * c + i] * from[c];
+                     }
+                     kernels::ShearCotangentSums sums{};
+                     kernels::ShearPullback pullback = {
+                         &touch,  &touch,    points, remembered_.data(), nullptr, force_.data(),
+                         nullptr, s_.data(), &sums};
+                     const bool keeps = compiled(model_).shear_interval(of) > 0;
+                     if (keeps) {
+                       std::fill(remembered_.begin(), remembered_.end(), 0.0);
+                       std::fill(anchors_.begin(), anchors_.end(), 0.0);
+                       pullback.kept = felt_.scratch() + 6 * points.stride;
+                       pullback.anchor_out = anchors_.data();
+                     }
+                     kernels::active_kernels().pull_back_memory(pullback);
+                     sums.end.displacement += sums.start;
+                     shares_.push_back({&of, sums.end});
+                     if (keeps) {
+                       add_to_anchors(batch.shear_state(environment), of, felt_.index(), points,
+                                      anchors_.data(), memory);
+                     } else {
+                       add_to_entries(batch.shear_state(environment), of, felt_.index(), points,
+                                      s_.data(), memory);
+                     }
+                   });
   return shares_;
 }
 

@@ -22,7 +22,7 @@ struct EnergyBalanceReader::Impl {
     const CompiledModel& m = compiled(model);
     Vec3<double> linear = {0, 0, 0}, angular = {0, 0, 0};
     for (std::size_t i = 0; i < m.links.size(); ++i) {
-      if (!m.links[i].massive) continue;
+      if (!m.links[i].has_mass) continue;
       const auto [mass, c, J] = kernels::load_inertia<double>(m.links[i], block, 0);
       const kernels::Frame<double> at = frame_in_lane<1>(w.poses_before[i], 0);
       const auto& V = w.poses_before[i].V;
@@ -35,7 +35,7 @@ struct EnergyBalanceReader::Impl {
     return {linear.x, linear.y, linear.z, angular.x, angular.y, angular.z};
   }
 
-  Audit audit(const Batch& batch, int environment, std::span<const double> u) {
+  EnergyBalance audit(const Batch& batch, int environment, std::span<const double> u) {
     const CompiledModel& m = compiled(model);
     const double* column = batch.block(environment / kBlock) + environment % kBlock;
     for (int i = 0; i < m.nq; ++i) w.q0[i][0] = column[(m.layout.q + i) * kBlock];
@@ -52,20 +52,22 @@ struct EnergyBalanceReader::Impl {
   }
 };
 
-StepEnergyBalance between(const Audit& start, const Audit& end, double h) {
+StepEnergyBalance between(const EnergyBalance& start, const EnergyBalance& end, double h) {
   StepEnergyBalance step;
-  step.motors = 0.5 * h * (start.motors + end.motors);
-  step.taken = 0.5 * h * (start.taken + end.taken);
-  step.made = end.energy() - start.energy() - step.motors + step.taken;
+  step.motor_work = 0.5 * h * (start.motor_power + end.motor_power);
+  step.dissipated = 0.5 * h * (start.dissipation + end.dissipation);
+  step.integrator_error = end.energy() - start.energy() - step.motor_work + step.dissipated;
   return step;
 }
 
-EnergyBalanceReader::EnergyBalanceReader(const Model& model) : impl_(std::make_unique<Impl>(model)) {}
+EnergyBalanceReader::EnergyBalanceReader(const Model& model)
+    : impl_(std::make_unique<Impl>(model)) {}
 EnergyBalanceReader::~EnergyBalanceReader() = default;
 EnergyBalanceReader::EnergyBalanceReader(EnergyBalanceReader&&) noexcept = default;
 EnergyBalanceReader& EnergyBalanceReader::operator=(EnergyBalanceReader&&) noexcept = default;
 
-Audit EnergyBalanceReader::audit(const Batch& batch, int environment, std::span<const double> u) {
+EnergyBalance EnergyBalanceReader::read(const Batch& batch, int environment,
+                                        std::span<const double> u) {
   return impl_->audit(batch, environment, u);
 }
 

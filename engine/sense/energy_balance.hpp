@@ -12,25 +12,25 @@
 namespace tangere {
 
 /// One environment at one instant.
-struct Audit {
-  double motion = 0;  ///< energy of moving bodies [J]
-  double height = 0;  ///< -Σ m gravity·x [J]
-  double held = 0;    ///< by springs, limits and contacts: Σ k_n d²/2 [J]
-  double motors = 0;  ///< power of the motors [W]
-  double taken = 0;   ///< power that damping and friction take [W]
+struct EnergyBalance {
+  double kinetic = 0;      ///< energy of moving bodies [J]
+  double potential = 0;    ///< -Σ m gravity·x [J]
+  double elastic = 0;      ///< by springs, limits and contacts: Σ k_n d²/2 [J]
+  double motor_power = 0;  ///< power of the motors [W]
+  double dissipation = 0;  ///< power that damping and friction take [W]
   /// Of all bodies: linear [kg m/s], then angular about the world's origin [kg m²/s], world axes.
   std::array<double, 6> momentum{};
-  [[nodiscard]] double energy() const { return motion + height + held; }
+  [[nodiscard]] double energy() const { return kinetic + potential + elastic; }
 };
 
 /// What passed in a step, by the trapezoid rule over its two ends [J].
 struct StepEnergyBalance {
-  double motors = 0;  ///< work of the motors
-  double taken = 0;   ///< by damping and friction
-  double made = 0;    ///< by the scheme: the change of energy less motors, plus taken
+  double motor_work = 0;        ///< work of the motors
+  double dissipated = 0;        ///< by damping and friction
+  double integrator_error = 0;  ///< by the scheme: the change of energy less motors, plus taken
 };
 /// `h`: [s]. Both ends under the controls of the step.
-StepEnergyBalance between(const Audit& start, const Audit& end, double h);
+StepEnergyBalance between(const EnergyBalance& start, const EnergyBalance& end, double h);
 
 /// Scratch for audits of batches of a model. One per thread.
 class EnergyBalanceReader {
@@ -41,7 +41,7 @@ class EnergyBalanceReader {
   EnergyBalanceReader& operator=(EnergyBalanceReader&&) noexcept;
 
   /// `u`: (nu) controls of the environment, as a step takes them.
-  Audit audit(const Batch& batch, int environment, std::span<const double> u);
+  EnergyBalance read(const Batch& batch, int environment, std::span<const double> u);
 
  private:
   struct Impl;

@@ -36,8 +36,9 @@ Purpose purpose_of(const SceneNumber& number) {
 
 std::span<const StepStatus> step_statuses() {
   using enum StepStatus;
-  static constexpr StepStatus kAll[] = {converged,   split,         coarse,     passed,   damped,
-                                        overlapping, not_converged, non_finite, rotation, singular};
+  static constexpr StepStatus kAll[] = {converged, split,       accuracy_not_met, tunnelled,
+                                        damped,    overlapping, not_converged,    non_finite,
+                                        rotation,  singular};
   return kAll;
 }
 
@@ -77,7 +78,7 @@ Batch::Batch(const Model& model, int environments, std::uint64_t seed, std::int6
     held_.assign(lanes, 0);
     episode_.resize(lanes);
     steps_.assign(lanes, 0);
-    memory_.resize(lanes);
+    shear_.resize(lanes);
     sleep_.resize(lanes);
     clearance_.assign(lanes, 0.0);
   } catch (const std::exception&) {
@@ -134,7 +135,7 @@ void Batch::reset(int environment, std::int64_t episode) {
   has_history_[lane] = 0;
   held_[lane] = 0;
   steps_[lane] = 0;
-  memory_[lane].clear();
+  shear_[lane].clear();
   sleep_[lane] = {};
   clearance_[lane] = 0;
 }
@@ -160,7 +161,7 @@ void Batch::write_state(std::size_t lane, std::span<const double> q, std::span<c
 }
 
 /// Fills the earlier states with the state of now.
-void Batch::remember_state(std::size_t lane) {
+void Batch::fill_past_states(std::size_t lane) {
   const BlockLayout& layout = compiled(model_).layout;
   double* const own = column(lane);
   const int numbers = layout.previous_q - layout.q;  // q, then v
@@ -186,7 +187,7 @@ void Batch::complete_state(std::size_t lane) {
   }
   for (int i = 0; i < m.nq; ++i) at(m.layout.previous_q + i) = at(m.layout.q + i);
   for (int i = 0; i < m.nv; ++i) at(m.layout.previous_v + i) = at(m.layout.v + i);
-  remember_state(lane);
+  fill_past_states(lane);
 }
 
 void Batch::get_q(int environment, std::span<double> q) const {
@@ -206,7 +207,7 @@ void Batch::get_v(int environment, std::span<double> v) const {
 void Batch::set_state(int environment, std::span<const double> q, std::span<const double> v) {
   const std::size_t lane = this->lane(environment);
   write_state(lane, q, v);
-  memory_[lane].clear();
+  shear_[lane].clear();
   status_[lane] = StepStatus::converged;
   has_history_[lane] = 0;
 }
@@ -227,12 +228,12 @@ void Batch::set_state(int environment, std::span<const double> q, std::span<cons
     column[std::size_t(m.layout.previous_q + i) * kBlock] = before_q[i];
   for (int i = 0; i < m.nv; ++i)
     column[std::size_t(m.layout.previous_v + i) * kBlock] = before_v[i];
-  memory_[lane].clear();
+  shear_[lane].clear();
   status_[lane] = StepStatus::converged;
   has_history_[lane] = 1;
 }
 
-void Batch::set_memory(int environment, std::span<const ShearEntry> memory) {
+void Batch::set_shear_state(int environment, std::span<const ShearEntry> memory) {
   const std::size_t lane = this->lane(environment);
   const int points = compiled(model_).shear_spring_points;
   int last = -1;
@@ -246,7 +247,7 @@ void Batch::set_memory(int environment, std::span<const ShearEntry> memory) {
         throw InputError("memory of friction: point " + std::to_string(e.point) + " is not finite");
     last = e.point;
   }
-  memory_[lane].assign(memory.begin(), memory.end());
+  shear_[lane].assign(memory.begin(), memory.end());
 }
 
 void Batch::set_sleep(int environment, const SleepState& state) {
@@ -306,7 +307,7 @@ BlockState Batch::save_block(int block) const {
           {status_.begin() + lane, status_.begin() + lane + kBlock},
           {has_history_.begin() + lane, has_history_.begin() + lane + kBlock},
           {steps_.begin() + lane, steps_.begin() + lane + kBlock},
-          {memory_.begin() + lane, memory_.begin() + lane + kBlock},
+          {shear_.begin() + lane, shear_.begin() + lane + kBlock},
           {sleep_.begin() + lane, sleep_.begin() + lane + kBlock}};
 }
 
@@ -318,7 +319,7 @@ void Batch::restore_block(int block, const BlockState& state) {
   std::copy(state.status.begin(), state.status.end(), status_.begin() + lane);
   std::copy(state.has_history.begin(), state.has_history.end(), has_history_.begin() + lane);
   std::copy(state.steps.begin(), state.steps.end(), steps_.begin() + lane);
-  std::copy(state.memory.begin(), state.memory.end(), memory_.begin() + lane);
+  std::copy(state.shear.begin(), state.shear.end(), shear_.begin() + lane);
   std::copy(state.sleep.begin(), state.sleep.end(), sleep_.begin() + lane);
   std::fill_n(clearance_.begin() + lane, kBlock, 0.0);
 }

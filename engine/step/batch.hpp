@@ -18,11 +18,11 @@ namespace tangere {
 /// How the last step of an environment ended. Values are written to files: never renumber.
 enum class StepStatus : std::int8_t {
   converged = 0,
-  split = 1,           ///< converged in parts, or by SDIRK2 because a body turned too far
-  coarse = 2,          ///< converged, but a part of h/256 missed the accuracy that was asked for,
-                       ///< created energy or turned a body too far
-  passed = 3,          ///< converged, but a body came through another that it touches
-  damped = 4,          ///< converged by BDF1 or in parts: the scheme would have created energy
+  split = 1,             ///< converged in parts, or by SDIRK2 because a body turned too far
+  accuracy_not_met = 2,  ///< converged, but a part of h/256 missed the accuracy that was asked for,
+                         ///< created energy or turned a body too far
+  tunnelled = 3,         ///< converged, but a body came through another that it touches
+  damped = 4,            ///< converged by BDF1 or in parts: the scheme would have created energy
   overlapping = 5,     ///< converged, but bodies of a contact overlap and none of its points is as
                        ///< deep (engine/step/interpenetration.hpp)
   not_converged = -1,  ///< no root found down to h/256
@@ -41,7 +41,7 @@ struct BlockState {
   std::vector<StepStatus> status;
   std::vector<std::uint8_t> has_history;
   std::vector<std::int64_t> steps;
-  std::vector<ShearState> memory;
+  std::vector<ShearState> shear;
   std::vector<SleepState> sleep;
 };
 
@@ -87,15 +87,15 @@ class Batch {
 
   /// What the friction of an environment remembers (docs/shear.md). It is empty when an episode
   /// begins and after set_state().
-  [[nodiscard]] const ShearState& memory(int environment) const {
-    return memory_[lane(environment)];
+  [[nodiscard]] const ShearState& shear_state(int environment) const {
+    return shear_[lane(environment)];
   }
-  [[nodiscard]] std::span<const ShearState> memories() const {
-    return {memory_.data(), std::size_t(environments_)};
+  [[nodiscard]] std::span<const ShearState> shear_states() const {
+    return {shear_.data(), std::size_t(environments_)};
   }
   /// Sets it, for a run that goes on from a stored state. Throws InputError unless the points rise
   /// and the scene has them.
-  void set_memory(int environment, std::span<const ShearEntry> memory);
+  void set_shear_state(int environment, std::span<const ShearEntry> memory);
 
   /// Who sleeps in an environment (docs/sleeping.md): nobody, where no stepper with sleep stepped
   /// it. reset() and every set_ function wake all bodies.
@@ -164,7 +164,7 @@ class Batch {
   void displace(std::size_t lane, std::span<const double> q, std::span<const double> v);
   void write_state(std::size_t lane, std::span<const double> q, std::span<const double> v);
   void complete_state(std::size_t lane);
-  void remember_state(std::size_t lane);
+  void fill_past_states(std::size_t lane);
   void draw_episode(std::size_t lane);
   [[nodiscard]] double* column(std::size_t lane);
   [[nodiscard]] const double* column(std::size_t lane) const;
@@ -181,7 +181,7 @@ class Batch {
   std::vector<std::uint8_t> has_history_;  // BDF2: the previous state is valid
   std::vector<std::uint8_t> held_;
   std::vector<std::int64_t> episode_, steps_;
-  std::vector<ShearState> memory_;
+  std::vector<ShearState> shear_;
   std::vector<SleepState> sleep_;
   // What bodies may move until overlaps must be checked again [m] (interpenetration.hpp); 0: now.
   std::vector<double> clearance_;

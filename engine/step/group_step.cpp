@@ -8,8 +8,8 @@
 
 #include "engine/model/model_part.hpp"
 #include "engine/step/detection.hpp"
-#include "engine/step/shear_update.hpp"
 #include "engine/step/scheme_stage.hpp"
+#include "engine/step/shear_update.hpp"
 #include "engine/step/softened.hpp"
 
 namespace tangere {
@@ -53,7 +53,7 @@ void set_state(const LaneState& s, BasicWorkspace<L>& w, int lane) {
 GroupStep::GroupStep(const CompiledModel& model, const StepSettings& settings)
     : model_(model),
       settings_(settings),
-      watch_(model, settings),
+      checks_(model, settings),
       contact_forces_(model),
       component_of_(std::size_t(model.nv)) {
   for (int c = 0; c < model.components(); ++c)
@@ -94,7 +94,7 @@ LaneBits GroupStep::run(const Scheme& scheme, const kernels::KernelTable& table,
   LaneBits resolved = lanes;
   finish(w, lanes, h, resolved, report);
   watch_faces(table, w, resolved, report);
-  watch_.find_tunnelling(table, w, resolved, report);
+  checks_.find_tunnelling(table, w, resolved, report);
   update_shear_state(model_, table, w, resolved);
   return resolved;
 }
@@ -107,7 +107,7 @@ void GroupStep::watch_faces(const kernels::KernelTable& table, BasicWorkspace<L>
   if (!model_.view.faced) return;
   table.stage<L>().choose_faces(model_.view, w.stage, w.faces_after);
   for (std::size_t k = 0; k < model_.pairs.size(); ++k) {
-    if (!pushes(model_.pairs[k].parameters)) continue;
+    if (!can_exert_force(model_.pairs[k].parameters)) continue;
     for (int l = 0; l < L; ++l) {
       double along = 0, all = 0;
       for (std::size_t i = 3 * k; i < 3 * k + 3; ++i) {
@@ -115,7 +115,7 @@ void GroupStep::watch_faces(const kernels::KernelTable& table, BasicWorkspace<L>
         along += before * after;
         all += std::abs(before) + std::abs(after);
       }
-      if (along == -1 && all == 2) report.passed |= lanes & (1U << l);
+      if (along == -1 && all == 2) report.tunnelled |= lanes & (1U << l);
     }
   }
 }
@@ -186,22 +186,22 @@ void GroupStep::log_inner(const BasicWorkspace<L>& w, int lane, const Scheme& sc
 
 /// Solves a step of length h, and looks at what it came to.
 template <int L>
-Solved GroupStep::solve_and_check(const Scheme& scheme, const kernels::KernelTable& table,
-                                  BasicWorkspace<L>& w, LaneBits lanes, double h, bool inside_split,
-                                  NewtonReport& report) const {
-  Solved solved;
-  const LaneBits of_other_parts = std::exchange(report.passed, kNoLane);
+CheckedSolve GroupStep::solve_and_check(const Scheme& scheme, const kernels::KernelTable& table,
+                                        BasicWorkspace<L>& w, LaneBits lanes, double h,
+                                        bool inside_split, NewtonReport& report) const {
+  CheckedSolve solved;
+  const LaneBits of_other_parts = std::exchange(report.tunnelled, kNoLane);
   StageFactors<L> unused;
   report.softened = 0;
   solved.found = run(scheme, table, w, lanes, Row<L>::all(h), inside_split, report, unused);
   // Forces that no search could follow from the first guess and that throw bodies about are not
   // smooth, which a scheme of higher order relies on. Parts of the step resolve them.
   if (scheme.order > 1 && !inside_split && report.softened != 0)
-    solved.found &= ~watch_.jumping(w, solved.found & report.softened, h);
-  solved.passed = std::exchange(report.passed, of_other_parts) & solved.found;
-  solved.created = watch_.creating(table, w, solved.found & ~solved.passed, h);
-  solved.turned =
-      watch_.turning(scheme, table, w, solved.found & ~(solved.passed | solved.created), h);
+    solved.found &= ~checks_.velocity_jumps(w, solved.found & report.softened, h);
+  solved.tunnelled = std::exchange(report.tunnelled, of_other_parts) & solved.found;
+  solved.energy_created = checks_.energy_gains(table, w, solved.found & ~solved.tunnelled, h);
+  solved.over_rotated = checks_.over_rotations(
+      scheme, table, w, solved.found & ~(solved.tunnelled | solved.energy_created), h);
   return solved;
 }
 
@@ -223,11 +223,11 @@ bool GroupStep::take_part(const kernels::KernelTable& table, SingleWorkspace& w,
     note(w, 0, *scheme, h, solves);
     return true;
   };
-  Solved one = solve();
+  CheckedSolve one = solve();
   const auto try_by = [&](const Scheme& other) {
     if (scheme == &other) return;
     const Scheme* const own = std::exchange(scheme, &other);
-    const Solved again = solve();
+    const CheckedSolve again = solve();
     if (again.found != 0) {
       one = again;
     } else {
@@ -237,24 +237,25 @@ bool GroupStep::take_part(const kernels::KernelTable& table, SingleWorkspace& w,
   // Where one scheme finds no root of a shortest part, the equations of another may have one.
   const bool lost = one.found == 0 && depth == kDeepestSplit;
   if (const Scheme* const energy_fallback = scheme->energy_fallback();
-      energy_fallback != nullptr && (one.created != 0 || lost)) {
+      energy_fallback != nullptr && (one.energy_created != 0 || lost)) {
     try_by(*energy_fallback);
-  } else if (one.turned != 0 || lost) {
+  } else if (one.over_rotated != 0 || lost) {
     try_by(scheme->rotation_fallback());
   }
-  if (one.sound() != 0) return take();
+  if (one.accepted() != 0) return take();
   if (one.found == 0) return split(table, w, h, depth + 1, report, solves);
   const LaneState start = state_of(w, model_, 0);
   const std::size_t noted = solves == nullptr ? 0 : solves->size();
-  const LaneBits passed = report.passed, created = report.created, turned = report.turned;
+  const LaneBits passed = report.tunnelled, created = report.energy_created,
+                 turned = report.over_rotated;
   if (split(table, w, h, depth + 1, report, solves)) return true;
   set_state(start, w, 0);
   if (solves != nullptr) solves->erase(solves->begin() + std::ptrdiff_t(noted), solves->end());
-  report.passed = passed, report.created = created, report.turned = turned;
+  report.tunnelled = passed, report.energy_created = created, report.over_rotated = turned;
   solve();
-  report.passed |= one.passed;
-  report.created |= one.created;
-  report.turned |= one.turned;
+  report.tunnelled |= one.tunnelled;
+  report.energy_created |= one.energy_created;
+  report.over_rotated |= one.over_rotated;
   return take();
 }
 
@@ -291,9 +292,9 @@ bool GroupStep::split_lane(const kernels::KernelTable& table, BasicWorkspace<L>&
   report.status[lane] = one.status[0];
   report.iterations[lane] = one.iterations[0];
   report.residual[lane] = one.residual[0];
-  report.passed |= one.passed << lane;
-  report.created |= one.created << lane;
-  report.turned |= one.turned << lane;
+  report.tunnelled |= one.tunnelled << lane;
+  report.energy_created |= one.energy_created << lane;
+  report.over_rotated |= one.over_rotated << lane;
   return done;
 }
 
@@ -321,10 +322,11 @@ void GroupStep::advance_plainly(const kernels::KernelTable& table, BasicWorkspac
   };
   LaneBits resolved = 0, passed = 0, created = 0, turned = 0;
   const auto solve_and_commit = [&](const Scheme& by, LaneBits which) {
-    const Solved s = solve_and_check(by, table, w, which, h, false, report);
-    commit(w, s.sound());
-    resolved |= s.sound(), passed |= s.passed, created |= s.created, turned |= s.turned;
-    return s.sound();
+    const CheckedSolve s = solve_and_check(by, table, w, which, h, false, report);
+    commit(w, s.accepted());
+    resolved |= s.accepted(), passed |= s.tunnelled, created |= s.energy_created,
+        turned |= s.over_rotated;
+    return s.accepted();
   };
   if ((lanes & ~starting) != 0) {
     const LaneBits done = solve_and_commit(scheme, lanes & ~starting);
@@ -362,9 +364,9 @@ void GroupStep::advance_plainly(const kernels::KernelTable& table, BasicWorkspac
       } else if (log != nullptr) {
         log_inner(w, l, by, *log);
       }
-      (has(passed, l)    ? report.passed
-       : has(created, l) ? report.created
-                         : report.turned) |= 1U << l;
+      (has(passed, l)    ? report.tunnelled
+       : has(created, l) ? report.energy_created
+                         : report.over_rotated) |= 1U << l;
     } else if (!failed(report.status[l])) {
       report.status[l] = first;
     }
@@ -381,13 +383,13 @@ void GroupStep::advance_plainly(const kernels::KernelTable& table, BasicWorkspac
     }
   }
   for (int l = 0; l < L; ++l) {
-    const LaneBits coarse = report.created | report.turned;
-    if (!has(lanes & (report.passed | created | turned | coarse), l) || failed(report.status[l]))
+    const LaneBits coarse = report.energy_created | report.over_rotated;
+    if (!has(lanes & (report.tunnelled | created | turned | coarse), l) || failed(report.status[l]))
       continue;
-    report.status[l] = has(report.passed, l) ? StepStatus::tunnelled
-                       : has(coarse, l)      ? StepStatus::accuracy_not_met
-                       : has(created, l)     ? StepStatus::damped
-                                             : StepStatus::split;
+    report.status[l] = has(report.tunnelled, l) ? StepStatus::tunnelled
+                       : has(coarse, l)         ? StepStatus::accuracy_not_met
+                       : has(created, l)        ? StepStatus::damped
+                                                : StepStatus::split;
   }
 }
 

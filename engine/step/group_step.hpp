@@ -6,8 +6,8 @@
 
 #include "engine/step/contact_forces.hpp"
 #include "engine/step/newton.hpp"
-#include "engine/step/step_settings.hpp"
 #include "engine/step/step_checks.hpp"
+#include "engine/step/step_settings.hpp"
 #include "engine/step/tape.hpp"
 
 namespace tangere {
@@ -81,9 +81,9 @@ class GroupStep {
   void watch_faces(const kernels::KernelTable& table, BasicWorkspace<L>& w, LaneBits lanes,
                    NewtonReport& report) const;
   template <int L>
-  Solved solve_and_check(const Scheme& scheme, const kernels::KernelTable& table,
-                         BasicWorkspace<L>& w, LaneBits lanes, double h, bool inside_split,
-                         NewtonReport& report) const;
+  CheckedSolve solve_and_check(const Scheme& scheme, const kernels::KernelTable& table,
+                               BasicWorkspace<L>& w, LaneBits lanes, double h, bool inside_split,
+                               NewtonReport& report) const;
   template <int L>
   void finish(BasicWorkspace<L>& w, LaneBits lanes, const kernels::Row<L>& h, LaneBits& resolved,
               NewtonReport& report) const;
@@ -92,7 +92,7 @@ class GroupStep {
 
   const CompiledModel& model_;
   StepSettings settings_;
-  StepChecks watch_;
+  StepChecks checks_;
   ContactForces contact_forces_;
   std::vector<int> component_of_;  ///< (nv)
 };

@@ -193,7 +193,7 @@ void Interpenetration::bound_arms() {
   const std::vector<kernels::Link>& links = model_.links;
   for (const kernels::PairContact& c : model_.pairs)
     for (const int b : {c.body1, c.body2}) {
-      if (b < 0 || !pushes(c.parameters)) continue;
+      if (b < 0 || !can_exert_force(c.parameters)) continue;
       const CompiledBody& body = model_.bodies[std::size_t(b)];
       if (body.link >= 0) checked_[std::size_t(body.link)] = 1;
       has_pairs_ = true;
@@ -293,7 +293,7 @@ Interpenetration::Finding Interpenetration::check(const kernels::KernelTable& ta
   const double ratio = arm_ratio(column);
   if (found.clearance <= ratio * motion) {  // else nothing can have come from the other side
     find_poses(model_.layout.previous_q, w.q0, w.poses_before);
-    found.passed = passing_.changed_sides(w.poses_before, w.poses_after, column);
+    found.tunnelled = passing_.changed_sides(w.poses_before, w.poses_after, column);
   }
   const Lane lane(model_, w.poses_after, column);
   for (const CoarsePair& pair : coarse_) {

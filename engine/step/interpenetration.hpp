@@ -33,7 +33,7 @@ class Interpenetration {
 
   /// What a check found, and how far bodies may move until the next one must be made [m].
   struct Finding {
-    bool passed = false, overlapping = false;
+    bool tunnelled = false, overlapping = false;
     double clearance = 0;
   };
   /// Checks one lane. `column`: its numbers in the block. `motion`: its number of motions().
@@ -53,7 +53,7 @@ class Interpenetration {
   [[nodiscard]] double arm_ratio(const double* column) const;
 
   const CompiledModel& model_;
-  Passing passing_;
+  TunnellingCheck passing_;
   std::vector<CoarsePair> coarse_;
   bool has_pairs_ = false;
   std::vector<double> arm_;            ///< (links) from its origin to any point that it moves [m]

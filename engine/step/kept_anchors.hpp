@@ -23,7 +23,7 @@ inline std::span<const ShearEntry> entries_of(std::span<const ShearEntry> memory
     return std::lower_bound(memory.begin(), memory.end(), point,
                             [](const ShearEntry& e, int value) { return e.point < value; });
   };
-  return {from(of.first), from(of.first + m.remembering(of))};
+  return {from(of.first), from(of.first + m.shear_rows(of))};
 }
 
 /// How many entries, the first ones, are of sensors that keep anchors.
@@ -45,9 +45,9 @@ void look_up_anchors(std::span<const ShearEntry> memory, const kernels::ShearSpr
                      const int* index, const kernels::ShearSpringPoints& points,
                      const Number& number, double* out) {
   std::size_t next = 0;
-  look_up(memory, b_range(of), index, points.count, points.stride, number, out, next);
-  look_up(memory, a_range(of), index, points.count, points.stride, number, out + 3 * points.stride,
-          next);
+  shear_of_points(memory, b_range(of), index, points.count, points.stride, number, out, next);
+  shear_of_points(memory, a_range(of), index, points.count, points.stride, number,
+                  out + 3 * points.stride, next);
 }
 
 /// Adds (6, stride) numbers of points to those of their entries of b and a.

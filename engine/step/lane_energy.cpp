@@ -6,8 +6,8 @@
 #include <array>
 #include <cmath>
 
-#include "engine/step/shear_lane.hpp"
 #include "engine/step/rotation_log.hpp"
+#include "engine/step/shear_lane.hpp"
 #include "engine/step/state_difference.hpp"
 #include "kernels/contact/pair_contact.hpp"
 #include "kernels/step/faces.hpp"
@@ -52,7 +52,7 @@ struct LaneAt {
   void add_motion() {
     for (std::size_t i = 0; i < model.links.size(); ++i) {
       const kernels::Link& link = model.links[i];
-      if (!link.massive) continue;
+      if (!link.has_mass) continue;
       const auto& [mass, c, J] = kernels::load_inertia<double>(link, block(), 0);
       const auto& V = poses[i].V;
       const Vec3<double> turn = {V.a.x[lane], V.a.y[lane], V.a.z[lane]},
@@ -71,11 +71,11 @@ struct LaneAt {
     const kernels::DofEffects& e = model.dof_effects[std::size_t(link.v + k)];
     if ((link.effects & kernels::kSpring) != 0)
       sum.moving += 0.5 * number(e.stiffness) * stretch * stretch;
-    if ((link.effects & kernels::kLimited) != 0) {
+    if ((link.effects & kernels::kLimit) != 0) {
       const double beyond = std::max({e.low - place, place - e.high, 0.0});
       sum.moving += 0.5 * number(e.limit_stiffness) * beyond * beyond;
     }
-    if ((link.effects & kernels::kDriven) == 0) return;
+    if ((link.effects & kernels::kPositionServo) == 0) return;
     const double P = number(e.P);
     if (books != nullptr) {
       books->motors += rate * std::clamp(P * error - number(e.D) * rate, e.force_low, e.force_high);
@@ -91,7 +91,7 @@ struct LaneAt {
       for (int k = link.v; k < link.v + kernels::dofs(link.kind); ++k) {
         const double rate = v[k][lane];
         books->motors += w.stage.tau[k][lane] * rate;
-        if ((link.effects & kernels::kDamped) != 0)
+        if ((link.effects & kernels::kDamping) != 0)
           books->taken += number(model.dof_effects[std::size_t(k)].damping) * rate * rate;
       }
   }
@@ -260,9 +260,9 @@ double energy_of_friction(const CompiledModel& model, const BasicWorkspace<L>& w
                           const ShearState& memory, int lane) {
   double sum = 0;
   std::size_t e = 0;
-  for (const kernels::ShearSpringContact& contact : model.memories) {  // by rising point
+  for (const kernels::ShearSpringContact& contact : model.shear_springs) {  // by rising point
     double square = 0;
-    const int end = contact.first + model.remembering(contact);
+    const int end = contact.first + model.shear_rows(contact);
     for (; e < memory.size() && memory[e].point < end; ++e)
       for (const double s : memory[e].s) square += s * s;
     if (contact.sensor < 0 && square > 0)

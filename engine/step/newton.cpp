@@ -190,7 +190,8 @@ struct Search {
         report.residual[l] = residual[l];
         if (chord_suffices(l, residual[l], 1)) {
           take_chord(l, test_norm[l]);
-          if (limits.spare && residual[l] * factors.share[l] <= limits.tolerance) spare(l);
+          if (limits.skip_final_evaluation && residual[l] * factors.share[l] <= limits.tolerance)
+            spare(l);
         } else if (stalls(l, residual[l])) {
           stop(l, StepStatus::not_converged);
         } else {

@@ -15,7 +15,7 @@ struct NewtonLimits {
   int max_halvings;    ///< per direction
   int patience;        ///< directions in a row that may bring no new lowest residual
   /// The last evaluation is spared where the contraction so far promises that it would pass.
-  bool spare;
+  bool skip_final_evaluation;
 };
 
 /// What the stages of one step hand on to each other.
@@ -42,10 +42,10 @@ struct NewtonReport {
   std::array<int, kernels::kGroup> iterations{};  ///< evaluations of the residual, accumulated
   /// Scaled residual at the last accepted point; the expected one where its evaluation was spared.
   std::array<double, kernels::kGroup> residual{};
-  LaneBits softened = 0;  ///< lanes whose root was approached from softer contacts
-  LaneBits passed = 0;    ///< lanes in which a body came through another that it touches
-  LaneBits created = 0;   ///< lanes in which a part created energy, however short it was
-  LaneBits turned = 0;    ///< lanes in which a part turned too far, however short it was
+  LaneBits softened = 0;        ///< lanes whose root was approached from softer contacts
+  LaneBits tunnelled = 0;       ///< lanes in which a body came through another that it touches
+  LaneBits energy_created = 0;  ///< lanes in which a part created energy, however short it was
+  LaneBits over_rotated = 0;    ///< lanes in which a part turned too far, however short it was
 };
 
 /// Solves g(x) = 0 for the lanes in `lanes`, from the x in the stage. On return the stage's x and v

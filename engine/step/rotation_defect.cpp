@@ -46,7 +46,7 @@ Mat3<double> inertia_of(const CompiledModel& m, const Link& link, const BasicWor
   const double* block =
       w.stage.block == nullptr ? nullptr : w.stage.block + w.stage.group * kGroup + lane;
   const auto [mass, c, J] = kernels::load_inertia<double>(link, block, 0);
-  const bool free = link.parent >= 0 && !m.links[std::size_t(link.parent)].massive &&
+  const bool free = link.parent >= 0 && !m.links[std::size_t(link.parent)].has_mass &&
                     m.links[std::size_t(link.parent)].kind == JointKind::translational;
   if (!free || !(mass > 0)) return J;
   Mat3<double> about = J;
@@ -128,7 +128,7 @@ LaneBits far_turners(const CompiledModel& model, const Scheme& scheme, const Bas
   const double far = far_turn(scheme) / h;
   Row<L> most{};  // squares of rates at the end: a step from fast to slow turning began as an end
   for (const Link& link : model.links) {
-    if (link.kind != JointKind::spherical || !link.massive) continue;
+    if (link.kind != JointKind::spherical || !link.has_mass) continue;
     const Row<L>* v = w.v1 + link.v;
     for (int l = 0; l < L; ++l) {
       const double square = v[0][l] * v[0][l] + v[1][l] * v[1][l] + v[2][l] * v[2][l];
@@ -145,7 +145,7 @@ template <int L>
 bool turned_too_far(const CompiledModel& model, const Scheme& scheme, const BasicWorkspace<L>& w,
                     double h, int lane) {
   for (const Link& link : model.links) {
-    if (link.kind != JointKind::spherical || !link.massive) continue;
+    if (link.kind != JointKind::spherical || !link.has_mass) continue;
     const double turn = std::sqrt(fastest(link, w, lane)) * h;
     if (!(turn > far_turn(scheme))) continue;
     const TurningBody<L> body{scheme, w, link, inertia_of(model, link, w, lane), h, lane, model.nv};

@@ -67,7 +67,7 @@ kernels::ShearSpringTouch touch_of(const CompiledModel& m, const BasicWorkspace<
                                    const AlignedVector<kernels::LinkPose<kernels::Row<L>>>& touches,
                                    int lane) {
   kernels::ShearSpringTouch t =
-      touch_at(of, pose_of<L>(touches, static_cast<int>(&of - m.memories.data()), lane),
+      touch_at(of, pose_of<L>(touches, static_cast<int>(&of - m.shear_springs.data()), lane),
                [&](const kernels::Parameter& p) { return number_of<L>(p, w.stage, lane); });
   if (of.contact.faced) {
     const kernels::Row<L>* side = w.stage.faces + 3 * of.pair;
@@ -89,8 +89,8 @@ struct PointRange {
 /// null: all points in order. `number`(entry, c): component c of an entry. `next`: any place in the
 /// memory; contacts are found soonest one after the other. It moves on to the end of this one.
 template <class Number>
-void look_up(std::span<const ShearEntry> memory, const PointRange& of, const int* index, int count,
-             int stride, const Number& number, double* out, std::size_t& next) {
+void shear_of_points(std::span<const ShearEntry> memory, const PointRange& of, const int* index,
+                     int count, int stride, const Number& number, double* out, std::size_t& next) {
   const std::size_t end =
       std::size_t((count + kernels::kGroup - 1) / kernels::kGroup) * std::size_t(kernels::kGroup);
   for (int c = 0; c < 3; ++c) std::fill_n(out + c * stride, end, 0.0);
@@ -109,9 +109,10 @@ void look_up(std::span<const ShearEntry> memory, const PointRange& of, const int
   }
 }
 /// Writes what is remembered of points.
-inline void look_up(std::span<const ShearEntry> memory, const PointRange& of, const int* index,
-                    int count, int stride, double* out, std::size_t& next) {
-  look_up(
+inline void shear_of_points(std::span<const ShearEntry> memory, const PointRange& of,
+                            const int* index, int count, int stride, double* out,
+                            std::size_t& next) {
+  shear_of_points(
       memory, of, index, count, stride,
       [&](std::size_t entry, int c) { return memory[entry].s[c]; }, out, next);
 }
@@ -143,7 +144,7 @@ kernels::ShearSpringPoints listed(const typename kernels::Stage<L>::List& list, 
 /// are set, by set_list_anchors().
 template <int L, class F>
 void for_each_pair(const CompiledModel& m, BasicWorkspace<L>& w, int lane, const F& f) {
-  for (const kernels::ShearSpringContact& of : m.memories) {
+  for (const kernels::ShearSpringContact& of : m.shear_springs) {
     if (of.pair < 0) continue;
     const auto& list = w.lists[std::size_t(of.pair)];
     if (list.own_count[lane] > 0) f(of, list.own_index + list.stride * lane, listed<L>(list, lane));
@@ -156,7 +157,7 @@ void for_each_contact(const CompiledModel& m, BasicWorkspace<L>& w, int lane, co
   for_each_pair(m, w, lane, f);
   const kernels::Row<L>* rows = w.stage.ground_anchors;
   double* const anchors = w.remembered.ground_anchors.data();
-  for (const kernels::ShearSpringContact& of : m.memories) {
+  for (const kernels::ShearSpringContact& of : m.shear_springs) {
     if (!of.ground) continue;
     for (int k = 0; k < of.contact.n_points; ++k)
       for (int c = 0; c < kernels::kAnchorNumbers; ++c)
@@ -169,17 +170,19 @@ void for_each_contact(const CompiledModel& m, BasicWorkspace<L>& w, int lane, co
 /// Calls f as for_each_contact() does for the points of elastic sensors that touch where `end`
 /// says. The anchors are those of w.remembered.now. Sensors that keep anchors are left out.
 template <int L, class F>
-void for_each_touching_sensor(const CompiledModel& m, const kernels::KernelTable& table, BasicWorkspace<L>& w,
-                   const AlignedVector<kernels::LinkPose<kernels::Row<L>>>& end, int lane,
-                   const F& f) {
+void for_each_touching_sensor(const CompiledModel& m, const kernels::KernelTable& table,
+                              BasicWorkspace<L>& w,
+                              const AlignedVector<kernels::LinkPose<kernels::Row<L>>>& end,
+                              int lane, const F& f) {
   TouchingSensorPoints& felt = w.remembered.felt;
-  for (const kernels::ShearSpringContact& of : m.memories) {
+  for (const kernels::ShearSpringContact& of : m.shear_springs) {
     if (of.sensor < 0 || m.shear_interval(of) > 0) continue;
     const kernels::ShearSpringPoints points =
         felt.find(m.sensors[std::size_t(of.sensor)], table, touch_of(m, w, of, end, lane));
     if (points.count == 0) continue;
-    look_up(w.remembered.now[std::size_t(lane)], of, felt.index(), points.count, points.stride,
-            points.anchors + 3 * points.stride, w.remembered.next[std::size_t(lane)]);
+    shear_of_points(w.remembered.now[std::size_t(lane)], of, felt.index(), points.count,
+                    points.stride, points.anchors + 3 * points.stride,
+                    w.remembered.next[std::size_t(lane)]);
     table.recall(touch_of(m, w, of, w.remembered.start_touches, lane), points);
     f(of, felt.index(), points);
   }

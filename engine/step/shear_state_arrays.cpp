@@ -42,7 +42,7 @@ ShearState ShearStateArrays::read(std::span<const double> array) const {
 ShearStateArrays shear_state_arrays(const Model& model) {
   const CompiledModel& m = compiled(model);
   ShearStateArrays out;
-  for (const kernels::ShearSpringContact& of : m.memories) {
+  for (const kernels::ShearSpringContact& of : m.shear_springs) {
     const auto n = std::size_t(of.contact.n_points);
     const bool anchors = m.shear_interval(of) > 0;
     for (const char* part : {anchors ? " b" : "", " a"}) {

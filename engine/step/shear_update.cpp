@@ -8,9 +8,9 @@
 
 namespace tangere {
 
+using kernels::Row;
 using kernels::ShearSpringContact;
 using kernels::ShearSpringPoints;
-using kernels::Row;
 
 namespace {
 
@@ -31,9 +31,9 @@ void advance_points(const CompiledModel& m, const kernels::KernelTable& table, B
 
 /// The first point on the ground among all that remember; there are CompiledModel::ground_anchors.
 int first_on_ground(const CompiledModel& m) {
-  const auto first = std::find_if(m.memories.begin(), m.memories.end(),
+  const auto first = std::find_if(m.shear_springs.begin(), m.shear_springs.end(),
                                   [](const ShearSpringContact& of) { return of.ground; });
-  return first == m.memories.end() ? 0 : first->first;
+  return first == m.shear_springs.end() ? 0 : first->first;
 }
 
 /// Computes poses at (q, v), and from them how every contact touches.
@@ -77,7 +77,7 @@ void find_grounded(const AlignedVector<Row<L>>& kept, std::vector<int>& out) {
 
 template <int L>
 void begin_shear(const CompiledModel& m, const kernels::KernelTable& table, BasicWorkspace<L>& w) {
-  if (m.memories.empty()) return;
+  if (m.shear_springs.empty()) return;
   ShearLanes<L>& lanes = w.remembered;
   find_touches(m, table, w, w.q0, w.v0, lanes.start, lanes.start_touches);
   if (m.ground_anchors == 0) return;
@@ -87,22 +87,22 @@ void begin_shear(const CompiledModel& m, const kernels::KernelTable& table, Basi
 }
 
 template <int L>
-void set_list_anchors(const CompiledModel& m, const kernels::KernelTable& table, BasicWorkspace<L>& w,
-                 int k, int lane) {
+void set_list_anchors(const CompiledModel& m, const kernels::KernelTable& table,
+                      BasicWorkspace<L>& w, int k, int lane) {
   const auto& list = w.lists[std::size_t(k)];
   if (list.own_count[lane] == 0) return;
-  const ShearSpringContact& of = m.memories[std::size_t(m.pairs[std::size_t(k)].memory)];
+  const ShearSpringContact& of = m.shear_springs[std::size_t(m.pairs[std::size_t(k)].memory)];
   const ShearSpringPoints points = listed<L>(list, lane);
-  look_up(w.remembered.now[std::size_t(lane)], of, list.own_index + list.stride * lane,
-          points.count, points.stride, points.anchors + 3 * points.stride,
-          w.remembered.next[std::size_t(lane)]);
+  shear_of_points(w.remembered.now[std::size_t(lane)], of, list.own_index + list.stride * lane,
+                  points.count, points.stride, points.anchors + 3 * points.stride,
+                  w.remembered.next[std::size_t(lane)]);
   table.recall(touch_of(m, w, of, w.remembered.start_touches, lane), points);
 }
 
 template <int L>
-void update_shear_state(const CompiledModel& m, const kernels::KernelTable& table, BasicWorkspace<L>& w,
-                    LaneBits lanes) {
-  if (m.memories.empty() || lanes == 0) return;
+void update_shear_state(const CompiledModel& m, const kernels::KernelTable& table,
+                        BasicWorkspace<L>& w, LaneBits lanes) {
+  if (m.shear_springs.empty() || lanes == 0) return;
   ShearLanes<L>& of_lanes = w.remembered;
   find_touches(m, table, w, w.q1, w.v1, of_lanes.end, of_lanes.end_touches);
   if (m.ground_anchors > 0) {
@@ -130,18 +130,18 @@ void update_shear_state(const CompiledModel& m, const kernels::KernelTable& tabl
 
 template <int L>
 void update_sensor_shear_state(const CompiledModel& m, const kernels::KernelTable& table,
-                      BasicWorkspace<L>& w, std::span<const ReadingLane> lanes) {
+                               BasicWorkspace<L>& w, std::span<const ReadingLane> lanes) {
   ShearLanes<L>& of_lanes = w.remembered;
   bool found = false;
   for (int l = 0; l < L; ++l) {
     const ReadingLane& lane = lanes[std::size_t(l)];
     const auto due = [&](const ShearSpringContact& of) { return is_due(m, of, lane.steps); };
-    if (std::none_of(m.memories.begin(), m.memories.end(), due)) continue;
+    if (std::none_of(m.shear_springs.begin(), m.shear_springs.end(), due)) continue;
     if (!found) find_touches(m, table, w, w.q0, w.v0, of_lanes.end, of_lanes.end_touches);
     found = true;
-    ShearState &now = *lane.memory, &after = of_lanes.after[std::size_t(l)];
+    ShearState &now = *lane.shear, &after = of_lanes.after[std::size_t(l)];
     after.clear();
-    for (const ShearSpringContact& of : m.memories) {
+    for (const ShearSpringContact& of : m.shear_springs) {
       if (m.shear_interval(of) == 0) break;  // those that keep anchors come first
       if (due(of)) {
         advance_anchors(m, table, touch_of(m, w, of, of_lanes.end_touches, l), now, of_lanes.felt,
@@ -158,16 +158,17 @@ void update_sensor_shear_state(const CompiledModel& m, const kernels::KernelTabl
 
 template void begin_shear(const CompiledModel&, const kernels::KernelTable&, Workspace&);
 template void begin_shear(const CompiledModel&, const kernels::KernelTable&, SingleWorkspace&);
-template void set_list_anchors(const CompiledModel&, const kernels::KernelTable&, Workspace&, int, int);
-template void set_list_anchors(const CompiledModel&, const kernels::KernelTable&, SingleWorkspace&, int,
-                          int);
+template void set_list_anchors(const CompiledModel&, const kernels::KernelTable&, Workspace&, int,
+                               int);
+template void set_list_anchors(const CompiledModel&, const kernels::KernelTable&, SingleWorkspace&,
+                               int, int);
 template void update_shear_state(const CompiledModel&, const kernels::KernelTable&, Workspace&,
-                             LaneBits);
-template void update_shear_state(const CompiledModel&, const kernels::KernelTable&, SingleWorkspace&,
-                             LaneBits);
-template void update_sensor_shear_state(const CompiledModel&, const kernels::KernelTable&, Workspace&,
-                               std::span<const ReadingLane>);
-template void update_sensor_shear_state(const CompiledModel&, const kernels::KernelTable&, SingleWorkspace&,
-                               std::span<const ReadingLane>);
+                                 LaneBits);
+template void update_shear_state(const CompiledModel&, const kernels::KernelTable&,
+                                 SingleWorkspace&, LaneBits);
+template void update_sensor_shear_state(const CompiledModel&, const kernels::KernelTable&,
+                                        Workspace&, std::span<const ReadingLane>);
+template void update_sensor_shear_state(const CompiledModel&, const kernels::KernelTable&,
+                                        SingleWorkspace&, std::span<const ReadingLane>);
 
 }  // namespace tangere

@@ -74,7 +74,7 @@ Sleep::Sleep(const CompiledModel& model, double share, double h)
   for (const CompiledMotor& motor : model.motors)
     motor_tree_.push_back(tree_[std::size_t(motor.link)]);
   measure();
-  add_meetings();
+  add_tree_pairs();
 }
 
 /// Finds how far coordinates move points.
@@ -102,7 +102,8 @@ void Sleep::measure() {
   for (std::size_t i = 0; i < model_.links.size(); ++i) {
     const Link& link = model_.links[i];
     // What slides out lengthens the arms of joints that turn before it.
-    if (link.parent >= 0 && kernels::slides(link.kind) && !link.steady) bounded_ = false;
+    if (link.parent >= 0 && kernels::slides(link.kind) && !link.parent_never_rotates)
+      bounded_ = false;
     const double weight = kernels::slides(link.kind)          ? 1
                           : link.kind == JointKind::spherical ? kOfQuaternion * arm[i]
                                                               : arm[i];
@@ -113,12 +114,12 @@ void Sleep::measure() {
   }
 }
 
-void Sleep::add_meetings() {
+void Sleep::add_tree_pairs() {
   for (std::size_t g = 0; g < model_.link_pairs.size(); ++g) {
     const kernels::LinkPair& links = model_.link_pairs[g];
     if (links.link1 < 0 || links.link2 < 0) continue;
     const int tree1 = tree_[std::size_t(links.link1)], tree2 = tree_[std::size_t(links.link2)];
-    if (tree1 != tree2) meetings_.push_back({static_cast<int>(g), tree1, tree2});
+    if (tree1 != tree2) tree_pairs_.push_back({static_cast<int>(g), tree1, tree2});
   }
 }
 
@@ -166,11 +167,11 @@ void Sleep::wake_island(SleepState& s, int tree) const {
     }
   };
   wake([&](std::size_t t) { return s.island[t] == island; });
-  if (!pays(s.asleep)) wake([](std::size_t) { return true; });
+  if (!saves_time(s.asleep)) wake([](std::size_t) { return true; });
   s.clearance = 0;
 }
 
-bool Sleep::pays(std::span<const std::uint8_t> asleep) const {
+bool Sleep::saves_time(std::span<const std::uint8_t> asleep) const {
   int awake = 0;
   for (std::size_t t = 0; t < steps_.size(); ++t) awake += asleep[t] != 0 ? 0 : dofs_[t];
   return kFewestPerAwake * awake <= model_.nv;
@@ -206,8 +207,8 @@ void for_pairs(const CompiledModel& m, const kernels::LinkPair& links, const dou
 
 /// Returns a distance by which no point of the links is nearer to a shape of the others; less than
 /// `reach` where it is not known to be as large as that.
-double Sleep::distance_to_contact(const kernels::LinkPair& links, const double* column, double reach,
-                           const SingleWorkspace& single) const {
+double Sleep::distance_to_contact(const kernels::LinkPair& links, const double* column,
+                                  double reach, const SingleWorkspace& single) const {
   double way = kFarLook * reach;
   for_pairs(model_, links, column, single,
             [&](const kernels::PairContact& pair, const Frame<double>& at, const auto& size) {
@@ -239,7 +240,7 @@ bool Sleep::within(const kernels::KernelTable& table, const kernels::LinkPair& l
   return found;
 }
 
-bool Sleep::is_clear(SleepState& s, double moved) const {
+bool Sleep::no_awake_body_in_reach(SleepState& s, double moved) const {
   s.clearance -= moved;
   return bounded_ && s.clearance >= 2 * moved;
 }
@@ -251,7 +252,7 @@ bool Sleep::wake_touched(const kernels::KernelTable& table, const SleepingLane& 
   find_poses(table, at.column, single);
   double clearance = HUGE_VAL;
   bool touched = false, woken = false;
-  for (const Meeting& m : meetings_) {
+  for (const TreePair& m : tree_pairs_) {
     if (s.asleep[std::size_t(m.tree1)] == s.asleep[std::size_t(m.tree2)]) continue;
     const kernels::LinkPair& links = model_.link_pairs[std::size_t(m.pair)];
     const double reach = links.margin + 2 * moved;
@@ -279,7 +280,7 @@ bool Sleep::group_by_nearness(const kernels::KernelTable& table, const SleepingL
   find_poses(table, at.column, single);
   for (std::size_t t = 0; t < label_.size(); ++t) label_[t] = static_cast<int>(t);
   const auto rested = [&](int t) { return s.rested[std::size_t(t)] >= steps_[std::size_t(t)]; };
-  for (const Meeting& m : meetings_) {
+  for (const TreePair& m : tree_pairs_) {
     const int from = label_[std::size_t(m.tree1)], to = label_[std::size_t(m.tree2)];
     if (from == to || s.asleep[std::size_t(m.tree1)] != 0 || s.asleep[std::size_t(m.tree2)] != 0)
       continue;
@@ -312,7 +313,8 @@ void Sleep::fall_asleep(const SleepingLane& at, int tree) const {
   at.state.clearance = 0;
 }
 
-bool Sleep::update_rest_counters(SleepState& s, const double* moved, int stride, bool plainly) const {
+bool Sleep::update_rest_counters(SleepState& s, const double* moved, int stride,
+                                 bool plainly) const {
   s.slept += s.bodies;
   bool due = false, resting = false;
   for (std::size_t t = 0; t < steps_.size(); ++t) {
@@ -327,17 +329,17 @@ bool Sleep::update_rest_counters(SleepState& s, const double* moved, int stride,
   return due;
 }
 
-void Sleep::settle(const kernels::KernelTable& table, const SleepingLane& at,
-                   SingleWorkspace& single) {
+void Sleep::put_to_sleep(const kernels::KernelTable& table, const SleepingLane& at,
+                         SingleWorkspace& single) {
   SleepState& s = at.state;
   soon_.assign(s.asleep.begin(), s.asleep.end());
   for (std::size_t t = 0; t < steps_.size(); ++t)
     if (s.rested[t] >= steps_[t]) soon_[t] = 1;
-  if (!pays(soon_) || !group_by_nearness(table, at, single)) return;
+  if (!saves_time(soon_) || !group_by_nearness(table, at, single)) return;
   soon_.assign(s.asleep.begin(), s.asleep.end());
   for (std::size_t t = 0; t < steps_.size(); ++t)
     if (label_[t] >= 0) soon_[t] = 1;
-  if (!pays(soon_)) return;
+  if (!saves_time(soon_)) return;
   for (std::size_t t = 0; t < steps_.size(); ++t)
     if (s.asleep[t] != soon_[t]) fall_asleep(at, static_cast<int>(t));
 }

@@ -43,7 +43,7 @@ class Sleep {
 
   /// Notes how far awake bodies moved in this step, at most [m], where some sleep. Returns true
   /// where none of them can come within reach of a sleeping one in the next step, by the last look.
-  bool is_clear(SleepState& state, double moved) const;
+  bool no_awake_body_in_reach(SleepState& state, double moved) const;
   /// Looks, and wakes the bodies that awake ones may reach in the next step. `q`: (nq) coordinates
   /// at the end of this step. `moved`: the largest m in this step [m]. Returns true if one of them
   /// is touched already: the step must then be taken again, with it awake. Overwrites q0 of
@@ -57,23 +57,24 @@ class Sleep {
   /// asked again after as many steps.
   bool update_rest_counters(SleepState& state, const double* moved, int stride, bool plainly) const;
   /// Lets trees fall asleep. Overwrites q0 of `single`.
-  void settle(const kernels::KernelTable& table, const SleepingLane& at, SingleWorkspace& single);
+  void put_to_sleep(const kernels::KernelTable& table, const SleepingLane& at,
+                    SingleWorkspace& single);
 
  private:
   /// Links of different trees that may touch.
-  struct Meeting {
+  struct TreePair {
     int pair;  ///< index into link_pairs
     int tree1, tree2;
   };
 
   void measure();
-  void add_meetings();
+  void add_tree_pairs();
   void find_poses(const kernels::KernelTable& table, const double* column, SingleWorkspace& single);
   [[nodiscard]] double distance_to_contact(const kernels::LinkPair& links, const double* column,
-                                    double reach, const SingleWorkspace& single) const;
+                                           double reach, const SingleWorkspace& single) const;
   [[nodiscard]] bool within(const kernels::KernelTable& table, const kernels::LinkPair& links,
                             const double* column, double reach, SingleWorkspace& single) const;
-  [[nodiscard]] bool pays(std::span<const std::uint8_t> asleep) const;
+  [[nodiscard]] bool saves_time(std::span<const std::uint8_t> asleep) const;
   void wake_island(SleepState& state, int tree) const;
   bool group_by_nearness(const kernels::KernelTable& table, const SleepingLane& at,
                          SingleWorkspace& single);
@@ -88,7 +89,7 @@ class Sleep {
   std::vector<int> steps_;       // (trees) n
   std::vector<int> bodies_;      // (trees) bodies of the scene
   std::vector<int> dofs_;        // (trees)
-  std::vector<Meeting> meetings_;
+  std::vector<TreePair> tree_pairs_;
   bool bounded_ = true;  // m bounds how far points move
   std::vector<int> label_;
   std::vector<std::uint8_t> soon_;

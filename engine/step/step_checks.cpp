@@ -33,7 +33,7 @@ StepChecks::StepChecks(const CompiledModel& model, const StepSettings& settings)
     : model_(model),
       bounded_energy_(settings.bounded_energy),
       cut_(settings.accuracy > 0),
-      passing_(model) {
+      tunnelling_(model) {
   std::vector<double> of_dof(std::size_t(model.nv));  // a link's mass counts at its first dof
   for (const kernels::Link& link : model.links) of_dof[std::size_t(link.v)] = link.mass;
   for (int c = 0; c < model.components(); ++c) {
@@ -58,18 +58,18 @@ void StepChecks::find_poses(const kernels::KernelTable& table, BasicWorkspace<L>
 template <int L>
 void StepChecks::find_tunnelling(const kernels::KernelTable& table, BasicWorkspace<L>& w,
                                  LaneBits lanes, NewtonReport& report) const {
-  const LaneBits near = lanes & ~passing_.out_of_reach<L>(w, lanes);
+  const LaneBits near = lanes & ~tunnelling_.out_of_reach<L>(w, lanes);
   if (near == 0) return;
-  const LaneBits far = near & passing_.far_movers<L>(w.stage.x, w.test);
+  const LaneBits far = near & tunnelling_.far_movers<L>(w.stage.x, w.test);
   if (far == 0) return;
   find_poses(table, w);
   for (int l = 0; l < L; ++l)
-    if (has(far, l) && passing_.passed<L>(w.poses_before, w.poses_after, l))
-      report.passed |= 1U << l;
+    if (has(far, l) && tunnelling_.tunnelled<L>(w.poses_before, w.poses_after, l))
+      report.tunnelled |= 1U << l;
 }
 
 template <int L>
-LaneBits StepChecks::jumping(const BasicWorkspace<L>& w, LaneBits lanes, double h) const {
+LaneBits StepChecks::velocity_jumps(const BasicWorkspace<L>& w, LaneBits lanes, double h) const {
   const double fall = dot(model_.view.gravity, model_.view.gravity) * h * h;
   LaneBits found = 0;
   for (int c = 0; c < model_.components(); ++c) {
@@ -95,10 +95,10 @@ LaneBits StepChecks::jumping(const BasicWorkspace<L>& w, LaneBits lanes, double 
 }
 
 template <int L>
-LaneBits StepChecks::creating(const kernels::KernelTable& table, BasicWorkspace<L>& w,
-                             LaneBits lanes, double h) const {
+LaneBits StepChecks::energy_gains(const kernels::KernelTable& table, BasicWorkspace<L>& w,
+                                  LaneBits lanes, double h) const {
   if (!bounded_energy_ || cut_) return kNoLane;
-  const LaneBits looked_at = jumping(w, lanes, h);
+  const LaneBits looked_at = velocity_jumps(w, lanes, h);
   if (looked_at == 0) return kNoLane;
   find_poses(table, w);
   LaneBits found = 0;
@@ -120,8 +120,8 @@ LaneBits StepChecks::creating(const kernels::KernelTable& table, BasicWorkspace<
 }
 
 template <int L>
-LaneBits StepChecks::turning(const Scheme& scheme, const kernels::KernelTable& table,
-                            BasicWorkspace<L>& w, LaneBits lanes, double h) const {
+LaneBits StepChecks::over_rotations(const Scheme& scheme, const kernels::KernelTable& table,
+                                    BasicWorkspace<L>& w, LaneBits lanes, double h) const {
   if (!bounded_energy_) return kNoLane;
   const LaneBits far = far_turners(model_, scheme, w, lanes, h);
   LaneBits found = 0;
@@ -136,14 +136,14 @@ LaneBits StepChecks::turning(const Scheme& scheme, const kernels::KernelTable& t
   return found;
 }
 
-#define TANGERE_FOR_LANES(L)                                                                       \
-  template void StepChecks::find_tunnelling(const kernels::KernelTable&, BasicWorkspace<L>&,       \
-                                            LaneBits, NewtonReport&) const;                        \
-  template LaneBits StepChecks::jumping(const BasicWorkspace<L>&, LaneBits, double) const;          \
-  template LaneBits StepChecks::creating(const kernels::KernelTable&, BasicWorkspace<L>&, LaneBits, \
-                                        double) const;                                             \
-  template LaneBits StepChecks::turning(const Scheme&, const kernels::KernelTable&,                 \
-                                       BasicWorkspace<L>&, LaneBits, double) const;
+#define TANGERE_FOR_LANES(L)                                                                      \
+  template void StepChecks::find_tunnelling(const kernels::KernelTable&, BasicWorkspace<L>&,      \
+                                            LaneBits, NewtonReport&) const;                       \
+  template LaneBits StepChecks::velocity_jumps(const BasicWorkspace<L>&, LaneBits, double) const; \
+  template LaneBits StepChecks::energy_gains(const kernels::KernelTable&, BasicWorkspace<L>&,     \
+                                             LaneBits, double) const;                             \
+  template LaneBits StepChecks::over_rotations(const Scheme&, const kernels::KernelTable&,        \
+                                               BasicWorkspace<L>&, LaneBits, double) const;
 TANGERE_FOR_LANES(kernels::kGroup)
 TANGERE_FOR_LANES(1)
 #undef TANGERE_FOR_LANES

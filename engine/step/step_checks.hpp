@@ -5,17 +5,19 @@
 #include <vector>
 
 #include "engine/step/newton.hpp"
-#include "engine/step/tunnelling_check.hpp"
 #include "engine/step/step_settings.hpp"
+#include "engine/step/tunnelling_check.hpp"
 #include "engine/step/workspace.hpp"
 
 namespace tangere {
 
 /// Lanes that found a root. Those in which a body came through another, that created energy, or in
 /// which a body turned too far for the scheme should not be taken.
-struct Solved {
-  LaneBits found = 0, passed = 0, created = 0, turned = 0;
-  [[nodiscard]] LaneBits sound() const { return found & ~(passed | created | turned); }
+struct CheckedSolve {
+  LaneBits found = 0, tunnelled = 0, energy_created = 0, over_rotated = 0;
+  [[nodiscard]] LaneBits accepted() const {
+    return found & ~(tunnelled | energy_created | over_rotated);
+  }
 };
 
 /// The solve that is looked at began at q0, v0 of the workspace and ended in q1, v1.
@@ -26,19 +28,19 @@ class StepChecks {
   /// Notes lanes in which a body came through another that it touches.
   template <int L>
   void find_tunnelling(const kernels::KernelTable& table, BasicWorkspace<L>& w, LaneBits lanes,
-                        NewtonReport& report) const;
+                       NewtonReport& report) const;
   /// Returns the lanes whose velocities jumped.
   template <int L>
-  LaneBits jumping(const BasicWorkspace<L>& w, LaneBits lanes, double h) const;
+  LaneBits velocity_jumps(const BasicWorkspace<L>& w, LaneBits lanes, double h) const;
   /// Returns the lanes whose solve created energy.
   template <int L>
-  LaneBits creating(const kernels::KernelTable& table, BasicWorkspace<L>& w, LaneBits lanes,
-                    double h) const;
+  LaneBits energy_gains(const kernels::KernelTable& table, BasicWorkspace<L>& w, LaneBits lanes,
+                        double h) const;
   /// Returns the lanes in which a body turned too far for the scheme of the solve. Where something
   /// touches, the scheme is left to damp what it meets.
   template <int L>
-  LaneBits turning(const Scheme& scheme, const kernels::KernelTable& table, BasicWorkspace<L>& w,
-                   LaneBits lanes, double h) const;
+  LaneBits over_rotations(const Scheme& scheme, const kernels::KernelTable& table,
+                          BasicWorkspace<L>& w, LaneBits lanes, double h) const;
 
  private:
   template <int L>
@@ -46,7 +48,7 @@ class StepChecks {
 
   const CompiledModel& model_;
   bool bounded_energy_, cut_;  ///< as the settings say; steps are cut to keep an accuracy
-  Passing passing_;
+  TunnellingCheck tunnelling_;
   std::vector<double> component_mass_;  ///< [kg] without densities that vary
 };
 

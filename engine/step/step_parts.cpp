@@ -83,7 +83,7 @@ template <int L>
 LaneBits GroupStep::left_limits(const BasicWorkspace<L>& w, LaneBits lanes, int component) const {
   LaneBits left = 0;
   for (const kernels::Link& link : model_.links) {
-    if ((link.effects & kernels::kLimited) == 0 || link.kind == kernels::JointKind::spherical)
+    if ((link.effects & kernels::kLimit) == 0 || link.kind == kernels::JointKind::spherical)
       continue;
     if (component >= 0 && component_of_[std::size_t(link.v)] != component) continue;
     for (int k = 0; k < kernels::dofs(link.kind); ++k) {
@@ -201,10 +201,10 @@ void GroupStep::advance_in_parts(const kernels::KernelTable& table, BasicWorkspa
     for (int l = 0; l < L; ++l) h[l] *= at[l].length();
     StageFactors<L> factors;
     const LaneBits solved = run(scheme, table, w, open, h, false, report, factors);
-    const LaneBits through = std::exchange(report.passed, kNoLane);
+    const LaneBits through = std::exchange(report.tunnelled, kNoLane);
     LaneBits turned = 0;
     for (int l = 0; l < L; ++l)
-      if (has(solved, l)) turned |= watch_.turning(scheme, table, w, 1U << l, h[l]);
+      if (has(solved, l)) turned |= checks_.over_rotations(scheme, table, w, 1U << l, h[l]);
     Row<L> error{};
     if (solved != 0) error = estimated_error(table, w, solved, h, factors, report);
     for (int l = 0; l < L; ++l) {
@@ -230,8 +230,9 @@ void GroupStep::advance_in_parts(const kernels::KernelTable& table, BasicWorkspa
         }
       } else if (split_lane(table, w, l, h[l], alone, report, solves)) {
         split |= bit;
-        passed |= std::exchange(report.passed, kNoLane);
-        if ((std::exchange(report.turned, kNoLane) | std::exchange(report.created, kNoLane)) != 0)
+        passed |= std::exchange(report.tunnelled, kNoLane);
+        if ((std::exchange(report.over_rotated, kNoLane) |
+             std::exchange(report.energy_created, kNoLane)) != 0)
           coarse |= bit;
       } else {
         open &= ~bit;  // its status says why

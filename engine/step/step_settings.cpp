@@ -30,7 +30,7 @@ void check_sleep(const Model& model, double sleep) {
     throw InputError(model.solver().sleep_source.prefix() + "sleep " + std::to_string(sleep) +
                      "; expected the share of its size that a body may move and still rest, below "
                      "1 (0.001 is usual), or 0 for bodies that never sleep");
-  if (sleep > 0 && model.remembers())
+  if (sleep > 0 && model.has_shear_springs())
     throw InputError(
         model.solver().sleep_source.prefix() +
         "bodies cannot sleep in a scene with ks: what friction remembers of them would stand "

@@ -31,12 +31,12 @@ static void remember(const BlockLayout& layout, double* column, std::int64_t ste
 }
 
 /// A step of a model, and its scratch.
-struct Machine {
+struct ModelStepper {
   GroupStep step;
   Workspace work;
   SingleWorkspace single;
 
-  Machine(const CompiledModel& m, const StepSettings& s)
+  ModelStepper(const CompiledModel& m, const StepSettings& s)
       : step(m, s),
         work(m, s.integrator.scheme().most_inner_stages()),
         single(m, s.integrator.scheme().most_inner_stages()) {}
@@ -87,10 +87,10 @@ struct Stepper::Impl {
   StepSettings settings;
   /// Without the contacts that never push; null where nothing is to be left out. Sleep looks at
   /// all contacts.
-  std::unique_ptr<ModelPart> pushing;
-  Machine machine;
+  std::unique_ptr<ModelPart> without_inert;
+  ModelStepper machine;
   /// With all of them, for derivatives by their numbers: made when a tape first asks for it.
-  std::unique_ptr<Machine> of_all;
+  std::unique_ptr<ModelStepper> with_all_contacts;
   std::vector<int> all_q, all_v;  ///< 0, 1, …
   std::unique_ptr<Sleeping> sleeping;
   Interpenetration overlaps;
@@ -98,8 +98,10 @@ struct Stepper::Impl {
   Impl(const Model& m, const StepSettings& s)
       : model(m),
         settings(s),
-        pushing(s.sleep > 0 || s.keep_inert_contacts ? nullptr : without_inert_contacts(compiled(model))),
-        machine(pushing ? pushing->model : compiled(model), s),
+        without_inert(s.sleep > 0 || s.keep_inert_contacts
+                          ? nullptr
+                          : without_inert_contacts(compiled(model))),
+        machine(without_inert ? without_inert->model : compiled(model), s),
         all_q(as_size(m.nq())),
         all_v(as_size(m.nv())),
         overlaps(compiled(model)) {
@@ -108,21 +110,22 @@ struct Stepper::Impl {
     if (s.sleep > 0) sleeping = std::make_unique<Sleeping>(compiled(model), s);
   }
 
-  Machine& machine_for(const BlockTape* tape) {
-    if (tape == nullptr || !pushing) return machine;
-    if (!of_all) of_all = std::make_unique<Machine>(compiled(model), settings);
-    return *of_all;
+  ModelStepper& machine_for(const BlockTape* tape) {
+    if (tape == nullptr || !without_inert) return machine;
+    if (!with_all_contacts)
+      with_all_contacts = std::make_unique<ModelStepper>(compiled(model), settings);
+    return *with_all_contacts;
   }
   /// All bodies, by a machine of this stepper.
-  SteppedModel whole(Machine& by) {
-    return {pushing && &by == &machine ? pushing->model : compiled(model), by.step, by.single,
-            all_q, all_v};
+  SteppedModel whole(ModelStepper& by) {
+    return {without_inert && &by == &machine ? without_inert->model : compiled(model), by.step,
+            by.single, all_q, all_v};
   }
 
   /// Sets what the motors of the live lanes do; takes out lanes with controls that are not finite.
   template <int L>
-  void drive(Batch& batch, BasicWorkspace<L>& w, GroupOfBlock& g, int lane,
-             std::span<const double> controls) {
+  void set_motors_of(Batch& batch, BasicWorkspace<L>& w, GroupOfBlock& g, int lane,
+                     std::span<const double> controls) {
     const CompiledModel& m = compiled(model);
     const std::size_t nu = as_size(m.nu);
     for (int l = 0; l < L; ++l) {
@@ -149,9 +152,9 @@ struct Stepper::Impl {
     gather(w.v0, m.layout.v, stepped.v);
     gather(w.q_before, m.layout.previous_q, stepped.q);
     gather(w.v_before, m.layout.previous_v, stepped.v);
-    if (!m.memories.empty())
+    if (!m.shear_springs.empty())
       for (int l = 0; l < L; ++l) {
-        const ShearState& memory = batch.memory_[std::size_t(g.first + lane + l)];
+        const ShearState& memory = batch.shear_[std::size_t(g.first + lane + l)];
         w.remembered.now[std::size_t(l)].assign(memory.begin() + kept_entries(m, memory),
                                                 memory.end());
       }
@@ -180,8 +183,8 @@ struct Stepper::Impl {
       if (failed(report.status[l])) continue;
       if (m.layout.past_states > 0) remember(m.layout, g.rows + lane + l, batch.steps_[e]);
       ++batch.steps_[e];
-      if (!m.memories.empty()) {
-        ShearState& memory = batch.memory_[e];
+      if (!m.shear_springs.empty()) {
+        ShearState& memory = batch.shear_[e];
         const ShearState& now = w.remembered.now[std::size_t(l)];
         memory.resize(std::size_t(kept_entries(m, memory)));
         memory.insert(memory.end(), now.begin(), now.end());
@@ -201,7 +204,7 @@ struct Stepper::Impl {
     };
     shift(m.layout.q, m.layout.previous_q, w.q0, stepped.q);
     shift(m.layout.v, m.layout.previous_v, w.v0, stepped.v);
-    if (sleeping) settle<L>(batch, g, lane, live & ~again);
+    if (sleeping) put_to_sleep<L>(batch, g, lane, live & ~again);
     return again << lane;
   }
 
@@ -222,7 +225,7 @@ struct Stepper::Impl {
       const Interpenetration::Finding found =
           overlaps.check(kernels::active_kernels(), w, g.rows + first + l, motion[l]);
       clearance = found.clearance;
-      if (found.passed)
+      if (found.tunnelled)
         batch.status_[e] = StepStatus::tunnelled;
       else if (found.overlapping && batch.status_[e] != StepStatus::tunnelled)
         batch.status_[e] = StepStatus::overlapping;
@@ -236,7 +239,8 @@ struct Stepper::Impl {
     const auto state = [&](int l) -> SleepState& { return batch.sleep_[as_size(g.first + l)]; };
     for (int l = 0; l < kGroup; ++l)
       if (has(g.live, l))
-        sleeping->rules.wake_on_control_change(state(l), controls.subspan(as_size(g.first + l) * nu, nu));
+        sleeping->rules.wake_on_control_change(state(l),
+                                               controls.subspan(as_size(g.first + l) * nu, nu));
     const auto same = [](const SleepState& a, const SleepState& b) {
       return a.bodies == b.bodies && (a.bodies == 0 || a.asleep == b.asleep);
     };
@@ -258,7 +262,7 @@ struct Stepper::Impl {
   LaneBits step_alike(Batch& batch, BasicWorkspace<L>& w, GroupOfBlock& g, int lane,
                       std::span<const double> controls) {
     const SleepState& one = batch.sleep_[as_size(g.first + __builtin_ctz(g.live))];
-    drive(batch, w, g, lane, controls);
+    set_motors_of(batch, w, g, lane, controls);
     if (g.live == 0) return kNoLane;
     if (one.bodies == 0) return step_lanes(batch, whole(machine), w, g, lane, nullptr);
     if (std::ranges::count(one.asleep, 0) == 0) return rest(batch, g);
@@ -303,7 +307,7 @@ struct Stepper::Impl {
       if (state.bodies == 0) continue;
       double most = 0;
       for (int t = 0; t < sleeping->rules.trees(); ++t) most = std::max(most, moved[t][l]);
-      if (sleeping->rules.is_clear(state, most)) continue;
+      if (sleeping->rules.no_awake_body_in_reach(state, most)) continue;
       double* const column = g.rows + lane + l;
       const CompiledModel& m = compiled(model);
       std::vector<double>& q = sleeping->q_in_lane;
@@ -318,16 +322,16 @@ struct Stepper::Impl {
 
   /// Lets bodies of lanes that have stepped fall asleep.
   template <int L>
-  void settle(Batch& batch, const GroupOfBlock& g, int lane, LaneBits lanes) {
+  void put_to_sleep(Batch& batch, const GroupOfBlock& g, int lane, LaneBits lanes) {
     const double* const moved = sleeping->moved_rows<L>()->lane;
     for (int l = 0; l < L; ++l) {
       const std::size_t e = as_size(g.first + lane + l);
       if (!has(lanes, l) || failed(batch.status_[e])) continue;
       SleepState& state = batch.sleep_[e];
       if (sleeping->rules.update_rest_counters(state, moved + l, L,
-                                     batch.status_[e] == StepStatus::converged))
-        sleeping->rules.settle(kernels::active_kernels(), {g.rows + lane + l, state},
-                               machine.single);
+                                               batch.status_[e] == StepStatus::converged))
+        sleeping->rules.put_to_sleep(kernels::active_kernels(), {g.rows + lane + l, state},
+                                     machine.single);
     }
   }
 };
@@ -361,7 +365,7 @@ void Stepper::step_block(Batch& batch, int block, std::span<const double> contro
   check(batch, controls);
   Impl& i = *impl_;
   if (tape != nullptr) refuse_sleep(i.model, i.settings);
-  Machine& machine = i.machine_for(tape);
+  ModelStepper& machine = i.machine_for(tape);
   for (int group = 0; group < kBlock / kGroup; ++group) {
     GroupOfBlock g{batch.block(block) + group * kGroup, block * kBlock + group * kGroup};
     for (int l = 0; l < kGroup; ++l) {
@@ -379,10 +383,10 @@ void Stepper::step_block(Batch& batch, int block, std::span<const double> contro
     if (i.sleeping) {
       i.step_sleepers(batch, g, controls);
     } else if (alone) {
-      i.drive(batch, machine.single, g, lane, controls);
+      i.set_motors_of(batch, machine.single, g, lane, controls);
       if (g.live != 0) i.step_lanes(batch, i.whole(machine), machine.single, g, lane, tape);
     } else {
-      i.drive(batch, machine.work, g, lane, controls);
+      i.set_motors_of(batch, machine.work, g, lane, controls);
       if (g.live != 0) i.step_lanes(batch, i.whole(machine), machine.work, g, lane, tape);
     }
     if (alone)

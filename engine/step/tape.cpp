@@ -65,10 +65,10 @@ void BlockTape::append(const Batch& batch, int block) {
 }
 
 void BlockTape::keep_memory(const Batch& batch, int block) {
-  if (compiled(model_).memories.empty()) return;
+  if (compiled(model_).shear_springs.empty()) return;
   for (int l = 0; l < kBlock; ++l) {
     if (const int e = block * kBlock + l; e < batch.environments()) {
-      const ShearState& m = batch.memory(e);
+      const ShearState& m = batch.shear_state(e);
       memory_.insert(memory_.end(), m.begin(), m.end());
     }
     memory_end_.push_back(memory_.size());
@@ -87,7 +87,7 @@ void BlockTape::show(std::int64_t step, Batch& batch, int block) const {
               batch.block(block) + compiled(model_).layout.q * kBlock);
   for (int l = 0; l < kBlock && block * kBlock + l < batch.environments(); ++l) {
     batch.set_steps(block * kBlock + l, episode_step(step, l));
-    batch.set_memory(block * kBlock + l, memory(step, l));
+    batch.set_shear_state(block * kBlock + l, memory(step, l));
   }
 }
 

@@ -22,7 +22,7 @@ struct TapedSolve {
   double h;                   ///< [s]
   std::vector<double> q, v;   ///< its result: (nq), (nv)
   std::vector<double> inner;  ///< inner stages relative to the solve's start, (inner_stages, nv)
-  ShearState memory;         ///< what friction remembers after it
+  ShearState memory;          ///< what friction remembers after it
 };
 
 /// The solves of one environment's step, first to last.

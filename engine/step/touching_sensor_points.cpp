@@ -34,8 +34,8 @@ TouchingSensorPoints::TouchingSensorPoints(const CompiledModel& m) {
 }
 
 kernels::ShearSpringPoints TouchingSensorPoints::find(const CompiledSensor& sensor,
-                                            const kernels::KernelTable& table,
-                                            const kernels::ShearSpringTouch& touch) {
+                                                      const kernels::KernelTable& table,
+                                                      const kernels::ShearSpringTouch& touch) {
   const kernels::PairContact& c = touch.of->contact;
   const int stride = static_cast<int>(index_.size());
   kernels::ShearSpringPoints points = {places_.data(), anchors_.data(), nullptr, 0, stride};

@@ -31,7 +31,7 @@ double component(const Vec3<double>& a, int k) { return k == 0 ? a.x : k == 1 ? 
 
 }  // namespace
 
-Vec3<double> Passing::half_of(PrimitiveShape shape, const Vec3<double>& size) {
+Vec3<double> TunnellingCheck::half_of(PrimitiveShape shape, const Vec3<double>& size) {
   CompiledBody body;
   body.shape = shape;
   body.size = size;
@@ -43,30 +43,31 @@ Vec3<double> Passing::half_of(PrimitiveShape shape, const Vec3<double>& size) {
 /// axis of half width `half`. What goes past the edge of a cuboid keeps its own width away from it,
 /// and what is pressed into a face does not come as deep. In other shapes kWithin of the widths is
 /// inside, because 2 kWithin² < 1.
-double Passing::within_of(const Wall& wall, double half) {
+double TunnellingCheck::within_of(const Slab& wall, double half) {
   if (wall.shape != PrimitiveShape::cuboid) return kWithin * half;
   return std::max(kWithin * half, half - wall.other_wide);
 }
 
 /// Returns half the widths of a wall in an environment.
-Vec3<double> Passing::half_in(const Wall& wall, const double* column) {
+Vec3<double> TunnellingCheck::half_in(const Slab& wall, const double* column) {
   if (wall.size_row < 0) return wall.half;
   return half_of(wall.shape, kernels::load_vector<double>({}, wall.size_row, column, 0));
 }
 
-void Passing::add(int link, const Frame<double>& at, PrimitiveShape shape, const Vec3<double>& size,
-                  int size_row, int other, const Vec3<double>& middle, double other_wide) {
+void TunnellingCheck::add(int link, const Frame<double>& at, PrimitiveShape shape,
+                          const Vec3<double>& size, int size_row, int other,
+                          const Vec3<double>& middle, double other_wide) {
   const Vec3<double> half = half_of(shape, size);
   if (!(half.x > 0 && half.y > 0 && half.z > 0)) return;  // a plane has one side
   const double thin = std::min({half.x, half.y, half.z});
-  const auto same = [&](const Gate& g) {
+  const auto same = [&](const LinkPairBound& g) {
     return std::minmax(g.link, g.other) == std::minmax(link, other);
   };
-  const auto gate = std::find_if(gates_.begin(), gates_.end(), same);
-  walls_.push_back({link, other, at, half, shape, size_row, middle, other_wide,
-                    std::size_t(gate - gates_.begin())});
-  if (gate == gates_.end()) {
-    gates_.push_back({link, other, thin});
+  const auto gate = std::find_if(link_pair_bounds_.begin(), link_pair_bounds_.end(), same);
+  slabs_.push_back({link, other, at, half, shape, size_row, middle, other_wide,
+                    std::size_t(gate - link_pair_bounds_.begin())});
+  if (gate == link_pair_bounds_.end()) {
+    link_pair_bounds_.push_back({link, other, thin});
   } else {
     gate->half = std::min(gate->half, thin);
   }
@@ -74,20 +75,20 @@ void Passing::add(int link, const Frame<double>& at, PrimitiveShape shape, const
 
 /// Puts balls around the walls and middles of every gate: their centres are means, so that a gate
 /// of two bodies has the bodies' own.
-void Passing::bound_slab_pairs() {
+void TunnellingCheck::bound_slab_pairs() {
   const auto for_sides = [&](const auto& f) {
-    for (const Wall& wall : walls_) {
-      Gate& gate = gates_[wall.gate];
+    for (const Slab& wall : slabs_) {
+      LinkPairBound& gate = link_pair_bounds_[wall.link_pair_bound];
       const bool own = wall.link == gate.link;
       f(own ? gate.of_link : gate.of_other, wall.at.p, std::sqrt(dot(wall.half, wall.half)));
       f(own ? gate.of_other : gate.of_link, wall.middle, 0.0);
     }
   };
-  std::vector<double> count(gates_.size(), 0.0);
-  for (const Wall& wall : walls_) ++count[wall.gate];
+  std::vector<double> count(link_pair_bounds_.size(), 0.0);
+  for (const Slab& wall : slabs_) ++count[wall.link_pair_bound];
   for_sides([](Ball& ball, const Vec3<double>& at, double) { ball.centre += at; });
-  for (std::size_t k = 0; k < gates_.size(); ++k)
-    for (Ball* ball : {&gates_[k].of_link, &gates_[k].of_other})
+  for (std::size_t k = 0; k < link_pair_bounds_.size(); ++k)
+    for (Ball* ball : {&link_pair_bounds_[k].of_link, &link_pair_bounds_[k].of_other})
       ball->centre = (1 / count[k]) * ball->centre;
   for_sides([](Ball& ball, const Vec3<double>& at, double radius) {
     const Vec3<double> arm = at - ball.centre;
@@ -96,20 +97,21 @@ void Passing::bound_slab_pairs() {
 }
 
 /// Says for every pair of links that has a wall how much room its walls and middles take.
-void Passing::bound_link_pairs() {
+void TunnellingCheck::bound_link_pairs() {
   const auto length = [](const Vec3<double>& a) { return std::sqrt(dot(a, a)); };
   for (std::size_t g = 0; g < model_.link_pairs.size(); ++g) {
     const kernels::LinkPair& links = model_.link_pairs[g];
-    Bound bound{g, -1};
-    for (const Wall& wall : walls_) {
+    RadiusBound bound{g, -1};
+    for (const Slab& wall : slabs_) {
       const bool of_shapes = wall.link == links.link2 && wall.other == links.link1;
       if (!of_shapes && (wall.link != links.link1 || wall.other != links.link2)) continue;
       const Vec3<double>& at = of_shapes ? links.shapes_middle : links.points_middle;
       const Vec3<double>& other = of_shapes ? links.points_middle : links.shapes_middle;
-      bound.room = std::max(
-          bound.room, length(wall.at.p - at) + length(wall.middle - other) + length(wall.half));
+      bound.radius_sum =
+          std::max(bound.radius_sum,
+                   length(wall.at.p - at) + length(wall.middle - other) + length(wall.half));
     }
-    if (bound.room >= 0) bounds_.push_back(bound);
+    if (bound.radius_sum >= 0) bounds_.push_back(bound);
   }
   const std::vector<kernels::Link>& links = model_.links;
   // Where the place of a joint varies, its arms are not known here.
@@ -129,8 +131,9 @@ void Passing::bound_link_pairs() {
 /// Whether the balls of two links were farther apart than any point of one can have moved in the
 /// axes of the other.
 template <int L>
-bool Passing::stay_apart(const Gate& gate, const AlignedVector<LinkPose<Row<L>>>& before,
-                         const AlignedVector<LinkPose<Row<L>>>& after, int lane) {
+bool TunnellingCheck::stay_apart(const LinkPairBound& gate,
+                                 const AlignedVector<LinkPose<Row<L>>>& before,
+                                 const AlignedVector<LinkPose<Row<L>>>& after, int lane) {
   const auto other_in_link = [&](const AlignedVector<LinkPose<Row<L>>>& poses) {
     const auto world = [&](int link) {
       return link < 0 ? Frame<double>{kernels::diagonal(1.0), {0, 0, 0}}
@@ -153,9 +156,9 @@ bool Passing::stay_apart(const Gate& gate, const AlignedVector<LinkPose<Row<L>>>
   return length(start - a) > radius + std::max(own, back) + std::sqrt(square) * radius;
 }
 
-Passing::Passing(const CompiledModel& m) : model_(m), arm_(m.links.size(), 0.0) {
+TunnellingCheck::TunnellingCheck(const CompiledModel& m) : model_(m), arm_(m.links.size(), 0.0) {
   for (const kernels::PairContact& p : m.pairs) {
-    if (!pushes(p.parameters)) continue;  // it holds nothing back
+    if (!can_exert_force(p.parameters)) continue;  // it holds nothing back
     if (p.body1 < 0) {
       add(p.link2, p.frame2, p.shape, p.size, p.size_row, p.link1, p.middle, HUGE_VAL);
       continue;
@@ -179,9 +182,10 @@ Passing::Passing(const CompiledModel& m) : model_(m), arm_(m.links.size(), 0.0) 
   }
   bound_slab_pairs();
   // passed() looks at a gate once.
-  std::stable_sort(walls_.begin(), walls_.end(),
-                   [](const Wall& a, const Wall& b) { return a.gate < b.gate; });
-  for (const Wall& wall : walls_)
+  std::stable_sort(slabs_.begin(), slabs_.end(), [](const Slab& a, const Slab& b) {
+    return a.link_pair_bound < b.link_pair_bound;
+  });
+  for (const Slab& wall : slabs_)
     for (const auto& [link, place] : {std::pair{wall.link, wall.at.p}, {wall.other, wall.middle}}) {
       double arm = std::sqrt(dot(place, place));
       for (int i = link; i >= 0; i = m.links[std::size_t(i)].parent) {
@@ -194,8 +198,8 @@ Passing::Passing(const CompiledModel& m) : model_(m), arm_(m.links.size(), 0.0) 
 }
 
 template <int L>
-LaneBits Passing::far_movers(const Row<L>* x, Row<L>* way) const {
-  if (gates_.empty()) return kNoLane;
+LaneBits TunnellingCheck::far_movers(const Row<L>* x, Row<L>* way) const {
+  if (link_pair_bounds_.empty()) return kNoLane;
   for (std::size_t i = 0; i < model_.links.size(); ++i) {  // links are no more than dofs
     const kernels::Link& link = model_.links[i];
     const double arm = kernels::slides(link.kind) ? 1 : arm_[i];
@@ -206,7 +210,7 @@ LaneBits Passing::far_movers(const Row<L>* x, Row<L>* way) const {
     }
   }
   LaneBits far = 0;
-  for (const Gate& gate : gates_)
+  for (const LinkPairBound& gate : link_pair_bounds_)
     for (int l = 0; l < L; ++l) {
       const double sum =
           (gate.link < 0 ? 0 : way[gate.link][l]) + (gate.other < 0 ? 0 : way[gate.other][l]);
@@ -222,10 +226,11 @@ LaneBits Passing::far_movers(const Row<L>* x, Row<L>* way) const {
 // the rest as it is where the solve ended. Here it is over all joints of the scene. Where the last
 // evaluation was spared, kinematics ran once more, so |d| is that of the end.
 template <int L>
-LaneBits Passing::out_of_reach(const BasicWorkspace<L>& w, LaneBits lanes) const {
-  if (walls_.empty()) return lanes;
-  if (!bounded_ || std::any_of(bounds_.begin(), bounds_.end(),
-                               [&](const Bound& bound) { return w.apart[bound.link_pair] == 0; }))
+LaneBits TunnellingCheck::out_of_reach(const BasicWorkspace<L>& w, LaneBits lanes) const {
+  if (slabs_.empty()) return lanes;
+  if (!bounded_ || std::any_of(bounds_.begin(), bounds_.end(), [&](const RadiusBound& bound) {
+        return w.apart[bound.link_pair] == 0;
+      }))
     return kNoLane;
   Row<L> slid{}, way{}, angle{};
   for (const int q : sliders_)
@@ -245,9 +250,9 @@ LaneBits Passing::out_of_reach(const BasicWorkspace<L>& w, LaneBits lanes) const
       }
     }
   }
-  for (const Bound& bound : bounds_)
+  for (const RadiusBound& bound : bounds_)
     for (int l = 0; l < L; ++l) {
-      const double nearer = 1 - angle[l], reach = bound.room + way[l];
+      const double nearer = 1 - angle[l], reach = bound.radius_sum + way[l];
       if (!(nearer > 0 && w.stage.between[bound.link_pair][l] * nearer * nearer > reach * reach))
         lanes &= ~(1U << l);
     }
@@ -256,8 +261,8 @@ LaneBits Passing::out_of_reach(const BasicWorkspace<L>& w, LaneBits lanes) const
 
 /// Returns the place of the other body's middle in a wall's axes.
 template <int L>
-Vec3<double> Passing::middle_in(const Wall& wall, const AlignedVector<LinkPose<Row<L>>>& poses,
-                                int lane) {
+Vec3<double> TunnellingCheck::middle_in(const Slab& wall,
+                                        const AlignedVector<LinkPose<Row<L>>>& poses, int lane) {
   const auto world = [&](int link, const Frame<double>& x) {
     return link < 0 ? x : compose(frame_in_lane<L>(poses[std::size_t(link)], lane), x);
   };
@@ -265,8 +270,8 @@ Vec3<double> Passing::middle_in(const Wall& wall, const AlignedVector<LinkPose<R
   return relative(world(wall.link, wall.at), world(wall.other, middle)).p;
 }
 
-bool Passing::came_through(const Wall& wall, const Vec3<double>& half, const Vec3<double>& from,
-                           const Vec3<double>& to) {
+bool TunnellingCheck::came_through(const Slab& wall, const Vec3<double>& half,
+                                   const Vec3<double>& from, const Vec3<double>& to) {
   const double thin = std::min({half.x, half.y, half.z});
   for (int axis = 0; axis < 3; ++axis) {
     // The middle of a hollow body may be beside what it is made of.
@@ -285,37 +290,37 @@ bool Passing::came_through(const Wall& wall, const Vec3<double>& half, const Vec
 }
 
 template <int L>
-bool Passing::passed(const AlignedVector<LinkPose<Row<L>>>& before,
-                     const AlignedVector<LinkPose<Row<L>>>& after, int lane) const {
-  std::size_t gate = gates_.size();
+bool TunnellingCheck::tunnelled(const AlignedVector<LinkPose<Row<L>>>& before,
+                                const AlignedVector<LinkPose<Row<L>>>& after, int lane) const {
+  std::size_t gate = link_pair_bounds_.size();
   bool apart = false;
-  return std::any_of(walls_.begin(), walls_.end(), [&](const Wall& wall) {
-    if (std::exchange(gate, wall.gate) != wall.gate)
-      apart = stay_apart<L>(gates_[wall.gate], before, after, lane);
+  return std::any_of(slabs_.begin(), slabs_.end(), [&](const Slab& wall) {
+    if (std::exchange(gate, wall.link_pair_bound) != wall.link_pair_bound)
+      apart = stay_apart<L>(link_pair_bounds_[wall.link_pair_bound], before, after, lane);
     return !apart && came_through(wall, wall.half, middle_in<L>(wall, before, lane),
                                   middle_in<L>(wall, after, lane));
   });
 }
 
-bool Passing::changed_sides(const AlignedVector<LinkPose<Row<1>>>& before,
-                            const AlignedVector<LinkPose<Row<1>>>& after,
-                            const double* column) const {
-  return std::any_of(walls_.begin(), walls_.end(), [&](const Wall& wall) {
+bool TunnellingCheck::changed_sides(const AlignedVector<LinkPose<Row<1>>>& before,
+                                    const AlignedVector<LinkPose<Row<1>>>& after,
+                                    const double* column) const {
+  return std::any_of(slabs_.begin(), slabs_.end(), [&](const Slab& wall) {
     return wall.other_convex() &&
            came_through(wall, half_in(wall, column), middle_in<1>(wall, before, 0),
                         middle_in<1>(wall, after, 0));
   });
 }
 
-double Passing::clearance(const AlignedVector<LinkPose<Row<1>>>& poses,
-                          const double* column) const {
+double TunnellingCheck::clearance(const AlignedVector<LinkPose<Row<1>>>& poses,
+                                  const double* column) const {
   const auto in_world = [&](int link, const Vec3<double>& p) {
     if (link < 0) return p;
     const Frame<double> at = frame_in_lane<1>(poses[std::size_t(link)], 0);
     return at.R * p + at.p;
   };
   double least = HUGE_VAL;
-  for (const Wall& wall : walls_) {
+  for (const Slab& wall : slabs_) {
     if (!wall.other_convex()) continue;
     const Vec3<double> arm = in_world(wall.other, wall.middle) - in_world(wall.link, wall.at.p);
     const Vec3<double> half = half_in(wall, column);
@@ -337,11 +342,11 @@ double Passing::clearance(const AlignedVector<LinkPose<Row<1>>>& poses,
   return least;
 }
 
-#define TANGERE_FOR_LANES(L)                                                            \
-  template LaneBits Passing::far_movers<L>(const Row<L>*, Row<L>*) const;               \
-  template LaneBits Passing::out_of_reach<L>(const BasicWorkspace<L>&, LaneBits) const; \
-  template bool Passing::passed<L>(const AlignedVector<LinkPose<Row<L>>>&,              \
-                                   const AlignedVector<LinkPose<Row<L>>>&, int) const;
+#define TANGERE_FOR_LANES(L)                                                                    \
+  template LaneBits TunnellingCheck::far_movers<L>(const Row<L>*, Row<L>*) const;               \
+  template LaneBits TunnellingCheck::out_of_reach<L>(const BasicWorkspace<L>&, LaneBits) const; \
+  template bool TunnellingCheck::tunnelled<L>(const AlignedVector<LinkPose<Row<L>>>&,           \
+                                              const AlignedVector<LinkPose<Row<L>>>&, int) const;
 TANGERE_FOR_LANES(kernels::kGroup)
 TANGERE_FOR_LANES(1)
 #undef TANGERE_FOR_LANES

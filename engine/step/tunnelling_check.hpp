@@ -10,9 +10,9 @@
 namespace tangere {
 
 /// The pairs of a model, and how thin their bodies are.
-class Passing {
+class TunnellingCheck {
  public:
-  explicit Passing(const CompiledModel& model);
+  explicit TunnellingCheck(const CompiledModel& model);
 
   /// Returns the lanes in which some link moved so far against another that it could have come
   /// through a body of a pair. `x`: displacements of the step, (nv). `way`: scratch, (nv).
@@ -28,9 +28,9 @@ class Passing {
   /// Whether in one lane the middle of a body came through the middle plane of another that it
   /// touches, between these poses of the links.
   template <int L>
-  [[nodiscard]] bool passed(const AlignedVector<kernels::LinkPose<kernels::Row<L>>>& before,
-                            const AlignedVector<kernels::LinkPose<kernels::Row<L>>>& after,
-                            int lane) const;
+  [[nodiscard]] bool tunnelled(const AlignedVector<kernels::LinkPose<kernels::Row<L>>>& before,
+                               const AlignedVector<kernels::LinkPose<kernels::Row<L>>>& after,
+                               int lane) const;
 
   /// Whether between two states of an environment, however far apart, the middle of a convex body
   /// came through the middle plane of another. `column`: its numbers in the block, for sizes that
@@ -48,7 +48,7 @@ class Passing {
   /// mesh.
   static kernels::Vec3<double> half_of(PrimitiveShape shape, const kernels::Vec3<double>& size);
   /// A convex body of a pair, and the middle of the other one.
-  struct Wall {
+  struct Slab {
     int link, other;             ///< -1: the world
     kernels::Frame<double> at;   ///< the body in its link
     kernels::Vec3<double> half;  ///< of the size in the scene
@@ -59,17 +59,17 @@ class Passing {
     /// middle may lie beside it.
     double other_wide;
     [[nodiscard]] bool other_convex() const { return other_wide < HUGE_VAL; }
-    std::size_t gate;
+    std::size_t link_pair_bound;
   };
   void add(int link, const kernels::Frame<double>& at, PrimitiveShape shape,
            const kernels::Vec3<double>& size, int size_row, int other,
            const kernels::Vec3<double>& middle, double other_wide);
-  [[nodiscard]] static double within_of(const Wall& wall, double half);
-  [[nodiscard]] static kernels::Vec3<double> half_in(const Wall& wall, const double* column);
+  [[nodiscard]] static double within_of(const Slab& wall, double half);
+  [[nodiscard]] static kernels::Vec3<double> half_in(const Slab& wall, const double* column);
   template <int L>
   [[nodiscard]] static kernels::Vec3<double> middle_in(
-      const Wall& wall, const AlignedVector<kernels::LinkPose<kernels::Row<L>>>& poses, int lane);
-  [[nodiscard]] static bool came_through(const Wall& wall, const kernels::Vec3<double>& half,
+      const Slab& wall, const AlignedVector<kernels::LinkPose<kernels::Row<L>>>& poses, int lane);
+  [[nodiscard]] static bool came_through(const Slab& wall, const kernels::Vec3<double>& half,
                                          const kernels::Vec3<double>& from,
                                          const kernels::Vec3<double>& to);
 
@@ -79,7 +79,7 @@ class Passing {
     double radius = 0;
   };
   /// Two links, half of what is thinnest between them [m], and the balls of both.
-  struct Gate {
+  struct LinkPairBound {
     int link, other;
     double half;
     Ball of_link{}, of_other{};
@@ -88,22 +88,22 @@ class Passing {
   void bound_link_pairs();
   template <int L>
   [[nodiscard]] static bool stay_apart(
-      const Gate& gate, const AlignedVector<kernels::LinkPose<kernels::Row<L>>>& before,
+      const LinkPairBound& gate, const AlignedVector<kernels::LinkPose<kernels::Row<L>>>& before,
       const AlignedVector<kernels::LinkPose<kernels::Row<L>>>& after, int lane);
 
   /// A pair of links, and the largest sum of a wall's half diagonal and of the distances of wall
   /// and middle from the balls' centres (LinkPair) [m].
-  struct Bound {
+  struct RadiusBound {
     std::size_t link_pair;
-    double room;
+    double radius_sum;
   };
 
   const CompiledModel& model_;
-  std::vector<Wall> walls_;
-  std::vector<Bound> bounds_;  ///< of every pair of links with a wall
-  bool bounded_ = true;        ///< whether the arms of all links are known
-  std::vector<int> sliders_;   ///< in q: the sliding dofs of links that others turn
-  std::vector<Gate> gates_;
+  std::vector<Slab> slabs_;
+  std::vector<RadiusBound> bounds_;  ///< of every pair of links with a wall
+  bool bounded_ = true;              ///< whether the arms of all links are known
+  std::vector<int> sliders_;         ///< in q: the sliding dofs of links that others turn
+  std::vector<LinkPairBound> link_pair_bounds_;
   std::vector<double> arm_;  ///< (links) from a link's origin to any middle that it moves [m]
 };
 

@@ -64,9 +64,9 @@ std::size_t lay_out(const CompiledModel& m, BasicWorkspace<L>& w, Row<L>* base) 
 template <int L>
 void BasicWorkspace<L>::make_memory(const CompiledModel& m) {
   for (auto& list : lists) list.own_index = nullptr, list.own_anchors = nullptr;
-  if (m.memories.empty()) return;
+  if (m.shear_springs.empty()) return;
   std::size_t listed = 0, most_on_ground = 0, most = 0;
-  for (const kernels::ShearSpringContact& of : m.memories) {
+  for (const kernels::ShearSpringContact& of : m.shear_springs) {
     const int stride = of.pair >= 0 ? lists[std::size_t(of.pair)].stride
                        : of.ground  ? of.stride
                                     : of.contact.n_points + 2 * kGroup;
@@ -77,7 +77,7 @@ void BasicWorkspace<L>::make_memory(const CompiledModel& m) {
   own_index.resize(listed);
   own_anchors.resize(listed * kernels::kAnchorNumbers);
   std::size_t at = 0;
-  for (const kernels::ShearSpringContact& of : m.memories) {
+  for (const kernels::ShearSpringContact& of : m.shear_springs) {
     if (of.pair < 0) continue;
     auto& list = lists[std::size_t(of.pair)];
     list.own_index = own_index.data() + at;
@@ -91,8 +91,8 @@ void BasicWorkspace<L>::make_memory(const CompiledModel& m) {
   remembered.felt = TouchingSensorPoints(m);
   remembered.start.resize(m.links.size());
   remembered.end.resize(m.links.size());
-  remembered.start_touches.resize(m.memories.size());
-  remembered.end_touches.resize(m.memories.size());
+  remembered.start_touches.resize(m.shear_springs.size());
+  remembered.end_touches.resize(m.shear_springs.size());
   for (auto* lanes : {&remembered.now, &remembered.after})
     for (ShearState& lane : *lanes) lane.reserve(std::size_t(m.taped_points));
 }

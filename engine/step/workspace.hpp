@@ -10,9 +10,9 @@
 
 #include "engine/base/aligned.hpp"
 #include "engine/model/compiled_model.hpp"
-#include "engine/step/touching_sensor_points.hpp"
 #include "engine/step/pivoted_factors.hpp"
 #include "engine/step/shear_state.hpp"
+#include "engine/step/touching_sensor_points.hpp"
 #include "kernels/table/kernel_table.hpp"
 
 namespace tangere {
@@ -42,14 +42,14 @@ template <int L>
 struct ShearLanes {
   using Poses = AlignedVector<kernels::LinkPose<kernels::Row<L>>>;
   std::array<ShearState, L> now, after;  ///< where a solve begins, and at its end
-  Poses start, end;                       ///< (n_links) poses there
+  Poses start, end;                      ///< (n_links) poses there
   /// (n_shear_springs) of each contact that remembers: the touched shape in body 1, and W.
   Poses start_touches, end_touches;
   AlignedVector<kernels::Row<L>> ground;  ///< (points on the ground, 4)
   std::vector<int> grounded;              ///< those of them that touch in some lane
   AlignedVector<double> ground_anchors;   ///< (kAnchorNumbers, largest stride) of one lane
   AlignedVector<double> s;                ///< (4, largest stride)
-  std::array<std::size_t, L> next{};      ///< where look_up() was in `now`
+  std::array<std::size_t, L> next{};      ///< where shear_of_points() was in `now`
   TouchingSensorPoints felt;
 };
 

@@ -316,7 +316,7 @@ std::vector<GradientSaid> gradients_said(const h5::Id& scene) {
 
 void write_steps(const h5::Id& file, const EpisodeSteps& steps) {
   h5::write_scalar<std::int64_t>(file, kTaken, steps.taken);
-  h5::write_scalar<std::int64_t>(file, kPassed, steps.passed);
+  h5::write_scalar<std::int64_t>(file, kPassed, steps.tunnelled);
   h5::write_scalar<std::int64_t>(file, kOverlapping, steps.overlapping);
 }
 
@@ -325,8 +325,8 @@ std::optional<EpisodeSteps> steps_said(const h5::Id& file) {
   EpisodeSteps steps;
   steps.taken =
       step_count_said(file, kTaken, std::numeric_limits<std::int64_t>::max() / kMostShards);
-  steps.passed = step_count_said(file, kPassed, steps.taken);
-  steps.overlapping = step_count_said(file, kOverlapping, steps.taken - steps.passed);
+  steps.tunnelled = step_count_said(file, kPassed, steps.taken);
+  steps.overlapping = step_count_said(file, kOverlapping, steps.taken - steps.tunnelled);
   return steps;
 }
 

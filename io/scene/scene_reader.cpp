@@ -228,7 +228,7 @@ void read_root(const SceneNode& root, Scene& scene) {
   });
   if (!metres) c.use_centimetres_and_grams();
   scene.timestep = 0.02;
-  scene.integrator = Integrator::usual;
+  scene.integrator = Integrator::default_integrator;
   scene.gravity = {0, 0, -9.8};
   once("option", [&](const SceneNode& s) { read_option(scene, {s, kOption}); });
   once("solver_option", [&](const SceneNode& s) { read_solver(scene, {s, kSolver}); });

@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "engine/scene/sensed_bodies.hpp"
 #include "engine/scene/field_form.hpp"
+#include "engine/scene/sensed_bodies.hpp"
 #include "io/files/name_list.hpp"
 #include "io/files/nearest_name.hpp"
 #include "io/scene/scene_sections.hpp"

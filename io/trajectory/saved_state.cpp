@@ -179,7 +179,7 @@ void restore_state(const SavedState& from, bool continues, Batch& batch) {
                                  from.environments));
   const auto nq = static_cast<std::size_t>(model.nq()), nv = static_cast<std::size_t>(model.nv());
   const ShearStateArrays points = shear_state_arrays(model);
-  const bool remembers = model.remembers() && from.memory;
+  const bool remembers = model.has_shear_springs() && from.memory;
   if (remembers) check_points(from, points);
   const bool sleeps = continues && from.sleepers;
   if (sleeps)
@@ -200,7 +200,7 @@ void restore_state(const SavedState& from, bool continues, Batch& batch) {
       std::fill(displacements.begin(), displacements.end(), 0.0);
       for (const ShearEntry& entry : from.memory->environments[static_cast<std::size_t>(e)])
         std::copy_n(entry.s, 3, &displacements[3 * static_cast<std::size_t>(entry.point)]);
-      batch.set_memory(e, points.read(displacements));
+      batch.set_shear_state(e, points.read(displacements));
     }
     if (sleeps) batch.set_sleep(e, from.sleepers->environments[static_cast<std::size_t>(e)]);
     const StepStatus status = from.status[static_cast<std::size_t>(e)];

@@ -50,7 +50,7 @@ struct TrajectoryLayout : RunFacts {
   std::int64_t first_step = 0;          ///< steps before row 0, from runs that this one continues
   int environments = 1;                 ///< E
   std::vector<std::string> body_names;  ///< (nb) recorded, empty when no poses are
-  ShearStateArrays memory;                  ///< what friction remembers; no points: it is not recorded
+  ShearStateArrays memory;              ///< what friction remembers; no points: it is not recorded
   std::vector<std::string> trees;       ///< that may sleep, each by its first body; none: no sleep
   /// At which rows q and v, bodies, end effectors and memory are recorded; none: at all. Where
   /// `states` are given, there are no controls, and of the solver's numbers the status alone.

@@ -82,9 +82,9 @@ void adjoint_outward(const ModelView& model, const StageArgs<N>& a, const Adjoin
     });
     if (link.parent >= 0) o.twist += motion_to_child(link, s.local, d.links[link.parent].twist);
     o.by_v = o.by_a = zero6<N>();
-    if (!link.massive) continue;
+    if (!link.has_mass) continue;
     const LinkInertia<N> own = load_inertia<N>(link, a.block, a.group);
-    if (link.still) {
+    if (link.never_rotates) {
       o.by_a.l = own.mass * o.twist.l;
       continue;
     }
@@ -166,7 +166,7 @@ void adjoint_targets(const ModelView& model, const StageArgs<N>& a, const Link& 
 template <JointKind K, class N>
 void adjoint_effects(const ModelView& model, const StageArgs<N>& a, const AdjointArgs<N>& d,
                      const Link& link, N* by_v) {
-  if (link.effects & kDamped)
+  if (link.effects & kDamping)
     for (int k = 0; k < dofs(K); ++k)
       by_v[k] = mul_add(load_parameter(a, model.effects[link.v + k].damping), d.lambda[link.v + k],
                         by_v[k]);
@@ -178,7 +178,7 @@ void adjoint_effects(const ModelView& model, const StageArgs<N>& a, const Adjoin
     by_v[k] = mul_add(load.by_v[k], lambda, by_v[k]);
     d.mass_lambda[link.v + k] = mul_add(load.armature[k], lambda, d.mass_lambda[link.v + k]);
   }
-  if (link.effects & kDriven) adjoint_targets<K>(model, a, link, d.lambda, d.target);
+  if (link.effects & kPositionServo) adjoint_targets<K>(model, a, link, d.lambda, d.target);
 }
 
 /// Computes M λ, ν and the targets' cotangents, leaves first.
@@ -190,7 +190,7 @@ void adjoint_inward(const ModelView& model, const StageArgs<N>& a, const Adjoint
     const LinkScratch<N>& s = a.links[i];
     LinkAdjoint<N>& o = d.links[i];
     Vec6<N> projected = o.by_v;
-    if (!link.still) {
+    if (!link.never_rotates) {
       o.by_v += cross_wrench(o.rate, o.by_a);
       projected = o.by_v - cross_wrench(s.V, o.by_a);
     }

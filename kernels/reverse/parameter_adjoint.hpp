@@ -188,7 +188,7 @@ void inertia_parameters(const ModelView& model, const StageArgs<N>& a, const Lin
                         N* out) {
   for (int i = 0; i < model.n_links; ++i, out += kInertiaNumbers) {
     const LinkScratch<N>& s = a.links[i];
-    if (model.links[i].still) {
+    if (model.links[i].never_rotates) {
       out[0] -= dot(links[i].twist.l, s.A.l);
       continue;
     }
@@ -218,7 +218,7 @@ void joint_parameters(const ModelView& model, const StageArgs<N>& a, const Link&
       const N q = c[k] + x[k];
       if (link.effects & kSpring)
         out[kDofNumbers * k + kDofStiffness] += lambda[link.v + k] * (N(e[k].rest) - q);
-      if (link.effects & kDriven) motor(k, u[k] - q);
+      if (link.effects & kPositionServo) motor(k, u[k] - q);
     }
   } else {
     const Quat<N> q = Quat<N>{c[0], c[1], c[2], c[3]} * quaternion_exp(Vec3<N>{x[0], x[1], x[2]});
@@ -228,7 +228,7 @@ void joint_parameters(const ModelView& model, const StageArgs<N>& a, const Link&
       out[kDofStiffness] -=
           dot(phi, Vec3<N>{lambda[link.v], lambda[link.v + 1], lambda[link.v + 2]});
     }
-    if (link.effects & kDriven) {
+    if (link.effects & kPositionServo) {
       const Vec3<N> psi =
           rotation_vector<false>(conjugate(q) * quaternion_exp(Vec3<N>{u[0], u[1], u[2]})).phi;
       motor(0, psi.x), motor(1, psi.y), motor(2, psi.z);

@@ -8,8 +8,8 @@
 //   the ground, x = ξ_c - r n: n̄ -= r x̄;            ρ̄ -= d̄ n,       θ̄ += ξ_c × ρ̄ + n × n̄
 #pragma once
 
-#include "kernels/shear/shear_types.hpp"
 #include "kernels/reverse/point_pullback.hpp"
+#include "kernels/shear/shear_types.hpp"
 #include "kernels/step/faces.hpp"
 
 namespace tangere::kernels {

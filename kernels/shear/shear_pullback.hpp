@@ -10,8 +10,8 @@
 // and the rest as in kernels/reverse/point_pullback.hpp.
 #pragma once
 
-#include "kernels/shear/update_shear_state.hpp"
 #include "kernels/reverse/tactile_pullback.hpp"
+#include "kernels/shear/update_shear_state.hpp"
 
 namespace tangere::kernels {
 

@@ -47,7 +47,7 @@ void add_composites(const Link& link, const LinkScratch<N>& o, LinkScratch<N>& p
   p.mass += o.mass;
   Vec3<N> moment = o.moment, momentum = o.momentum;
   Mat3<N> inertia = o.inertia, bias = o.bias;
-  if (link.turned) {
+  if (link.may_rotate) {
     const Mat3<N>& R = o.local.R;
     const Mat3<N> Rt = transpose(R);
     moment = R * moment;
@@ -55,7 +55,7 @@ void add_composites(const Link& link, const LinkScratch<N>& o, LinkScratch<N>& p
     inertia = R * inertia * Rt;
     bias = R * bias * Rt;
   }
-  if (link.placed) {
+  if (link.has_offset) {
     const Vec3<N>& at = o.local.p;
     const Mat3<N> pm = cross_columns(at, skew(moment));  // [p][moment]
     inertia += -(pm + transpose(pm)) - o.mass * cross_columns(at, skew(at));
@@ -79,9 +79,9 @@ void composite_sweep(const ModelView& model, const StageArgs<N>& a) {
     o.mass = own.mass;
     o.moment = own.moment;
     o.momentum = zero3<N>();
-    if (link.still) continue;
+    if (link.never_rotates) continue;
     o.inertia = own.inertia;
-    if (link.massive) {
+    if (link.has_mass) {
       own_bias(o);
     } else {
       o.bias = zero33<N>();
@@ -90,7 +90,7 @@ void composite_sweep(const ModelView& model, const StageArgs<N>& a) {
   for (int i = model.n_links - 1; i >= 0; --i) {
     const int parent = model.links[i].parent;
     if (parent < 0) continue;
-    if (model.links[parent].still) {
+    if (model.links[parent].never_rotates) {
       a.links[parent].mass += a.links[i].mass;
     } else {
       add_composites(model.links[i], a.links[i], a.links[parent]);
@@ -113,7 +113,7 @@ void joint_rates(const Link& link, LinkScratch<N>& o) {
       pd.l = cross_axis<K>(link, k, o.Vp.l);
       pdd.l = cross_axis<K>(link, k, o.Ap.l);
       pd.a = pdd.a = zero3<N>();
-      if (link.steady) continue;
+      if (link.parent_never_rotates) continue;
       pd.a = cross_axis<K>(link, k, o.Vp.a);
       pdd.a = cross_axis<K>(link, k, o.Ap.a) + cross(o.Vp.a, pd.a);
       pdd.l += cross(o.Vp.l, pd.a) + cross(o.Vp.a, pd.l);
@@ -152,7 +152,7 @@ Vec6<N> inertia_times_linear(const LinkScratch<N>& o, const Vec3<N>& l) {
 template <JointKind K, class N>
 void joint_wrenches(const Link& link, const LinkScratch<N>& o, const N& c0_over_h,
                     JointWrenches<N>& w) {
-  if (slides(K) && link.still) {  // only the force by a matters
+  if (slides(K) && link.never_rotates) {  // only the force by a matters
     for (int k = 0; k < dofs(K); ++k) {
       w.by_a[k] = {zero3<N>(), o.mass * joint_axis<K, N>(link, k)};
       w.by_x[k] = {zero3<N>(), (c0_over_h * c0_over_h) * w.by_a[k].l};
@@ -174,7 +174,7 @@ void joint_wrenches(const Link& link, const LinkScratch<N>& o, const N& c0_over_
       by_v[k] =
           inertia_times(o.mass, o.moment, o.inertia, rate) +
           Vec6<N>{times_axis<K>(link, k, o.bias), N(-2.0) * cross_axis<K>(link, k, o.momentum)};
-      if (link.steady) {
+      if (link.parent_never_rotates) {
         by_q[k] = inertia_times_linear(o, o.psi_ddot[k].l);
       } else {
         by_q[k] =
@@ -199,7 +199,7 @@ void ancestor_entries(const ModelView& model, const StageArgs<N>& a, int up, int
     a.A[model.pattern.slot[(ancestor.v + j) * n + d]] = project<K>(ancestor, j, by_x);
     v[j] = a.c0_over_h * project<K>(ancestor, j, by_a);
     q[j] = N(0.0);
-    if (slides(K) && ancestor.still) continue;
+    if (slides(K) && ancestor.never_rotates) continue;
     if constexpr (!slides(K)) v[j] += along_axis<K>(ancestor, j, row);
     v[j] += dot(by_a, p.psi_dot[j] + p.s_dot[j]);
     q[j] = dot(row, p.psi_dot[j].a) + dot(by_a, p.psi_ddot[j]);
@@ -216,11 +216,11 @@ void walk_ancestors(const ModelView& model, const StageArgs<N>& a, int i, JointW
     const Link& link = model.links[i];
     const Frame<N>& local = a.links[i].local;
     for (int k = 0; k < count; ++k) {
-      if (!model.links[up].still) {
+      if (!model.links[up].never_rotates) {
         w.by_x[k] = wrench_to_parent(link, local, w.by_x[k]);
         w.by_a[k] = wrench_to_parent(link, local, w.by_a[k]);
-        if (link.turned) w.row[k] = local.R * w.row[k];
-      } else if (link.turned) {  // nothing above turns, so torques no longer matter
+        if (link.may_rotate) w.row[k] = local.R * w.row[k];
+      } else if (link.may_rotate) {  // nothing above turns, so torques no longer matter
         w.by_x[k].l = local.R * w.by_x[k].l;
         w.by_a[k].l = local.R * w.by_a[k].l;
       }
@@ -239,7 +239,7 @@ void joint_jacobian(const ModelView& model, const StageArgs<N>& a, int i) {
   const Link& link = model.links[i];
   LinkScratch<N>& o = a.links[i];
   const int n = model.nv;
-  if (!link.still) joint_rates<K>(link, o);
+  if (!link.never_rotates) joint_rates<K>(link, o);
   JointWrenches<N> w;
   joint_wrenches<K>(link, o, a.c0_over_h, w);
   for (int j = 0; j < dofs(K); ++j) {
@@ -253,7 +253,7 @@ void joint_jacobian(const ModelView& model, const StageArgs<N>& a, int i) {
   // Moving the joint turns the subtree's wrench as well: S × F, by x.
   for (int k = 0; k < dofs(K); ++k) {
     if constexpr (slides(K)) {
-      if (!link.still) w.by_x[k].a -= cross_axis<K>(link, k, o.F.l);
+      if (!link.never_rotates) w.by_x[k].a -= cross_axis<K>(link, k, o.F.l);
     } else {
       const Vec3<N> s = K == JointKind::spherical
                             ? Vec3<N>{o.chart.m[0][k], o.chart.m[1][k], o.chart.m[2][k]}

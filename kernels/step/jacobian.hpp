@@ -25,7 +25,7 @@ int body_columns(const ModelView& model, const StageArgs<N>& a, int body, const 
     const LinkScratch<N>& o = a.links[i];
     JointColumns<N>& c = out[count];
     c.link = i;
-    c.rates = !link.still;
+    c.rates = !link.never_rotates;
     c.own = !moved;
     with_kind(link.kind, [&]<JointKind K>() {
       for (int k = 0; k < dofs(K); ++k) {

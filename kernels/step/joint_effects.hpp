@@ -70,12 +70,12 @@ void add_plain_effects(const StageArgs<N>& a, const Link& link, const DofEffects
     add_force(out, k, stiffness * (N(e.rest) - q));
     out.by_q[k] += stiffness;
   }
-  if (link.effects & kLimited) {
+  if (link.effects & kLimit) {
     N slope;
     add_force(out, k, limit_force(e, load_parameter(a, e.limit_stiffness), q, slope));
     out.by_q[k] += slope;
   }
-  if (link.effects & kDriven) {
+  if (link.effects & kPositionServo) {
     const N P = load_parameter(a, e.P), D = load_parameter(a, e.D);
     N inside;
     add_force(out, k, motor_force(e, P, D, a.target[link.v + k] - q, a.v[link.v + k], inside));
@@ -143,8 +143,8 @@ void add_turning_effects(const StageArgs<N>& a, const Link& link, const DofEffec
     add_torque(out, -(stiffness * turn.phi));
     if constexpr (Derivatives) out.by_turn += stiffness * inverse_right_jacobian(turn);
   }
-  if (link.effects & kLimited) add_turning_limits<Derivatives>(a, e, q, out);
-  if (link.effects & kDriven) add_turning_motor<Derivatives>(a, link, e, q, out);
+  if (link.effects & kLimit) add_turning_limits<Derivatives>(a, e, q, out);
+  if (link.effects & kPositionServo) add_turning_motor<Derivatives>(a, link, e, q, out);
 }
 
 /// Adds damping alone: most joints have nothing else.
@@ -227,7 +227,7 @@ template <JointKind K, class N>
 /// Adds a joint's effects to its diagonal block of A and to the diagonal of M.
 template <JointKind K, class N>
 void add_effect_entries(const ModelView& model, const StageArgs<N>& a, const Link& link) {
-  if (link.effects & kDamped)
+  if (link.effects & kDamping)
     for (int j = 0; j < dofs(K); ++j)
       add_by_v<K>(model, a, link, j, load_parameter(a, model.effects[link.v + j].damping));
   if (link.effects & kBeyondDamping) add_load_entries<K>(model, a, link);

@@ -25,32 +25,33 @@ constexpr int coordinates(JointKind k) { return k == JointKind::spherical ? 4 : 
 
 /// What acts on a joint's dofs besides inertia and contacts. Bits of Link::effects.
 enum JointEffect : std::uint8_t {
-  kDamped = 1,
+  kDamping = 1,
   kArmature = 2,
   kSpring = 4,
-  kLimited = 8,
-  kDriven = 16
+  kLimit = 8,
+  kPositionServo = 16
 };
-inline constexpr int kPositionDependent = kSpring | kLimited | kDriven,
+inline constexpr int kPositionDependent = kSpring | kLimit | kPositionServo,
                      kBeyondDamping = kPositionDependent | kArmature;
 
 /// One elementary joint and everything that moves rigidly with it.
 struct Link {
   int parent;  ///< -1: the world
   JointKind kind;
-  int q, v;             ///< first coordinate, first dof
-  Vec3<double> axis;    ///< revolute, prismatic: unit, same in parent joint frame and child
-  Frame<double> frame;  ///< joint frame at rest, in the parent link's frame
-  bool rotated;         ///< frame.R is not the identity
-  bool turned;          ///< the link's axes may differ from its parent's
-  bool placed;          ///< its origin may differ from its parent's
-  bool steady;          ///< no ancestor ever turns: ω and α of the parent are zero
-  bool still;  ///< nor does this joint: ω and α are zero, and only the force of a wrench does work
-  bool massive;          ///< false: no inertia of its own
-  std::uint8_t effects;  ///< JointEffect bits: effects that some dof of the joint has
-  double mass;           ///< [kg]
-  Vec3<double> moment;   ///< mass times centre of mass, link axes [kg m]
-  Mat3<double> inertia;  ///< about the link's origin, link axes [kg m²]
+  int q, v;                   ///< first coordinate, first dof
+  Vec3<double> axis;          ///< revolute, prismatic: unit, same in parent joint frame and child
+  Frame<double> frame;        ///< joint frame at rest, in the parent link's frame
+  bool has_rest_rotation;     ///< frame.R is not the identity
+  bool may_rotate;            ///< the link's axes may differ from its parent's
+  bool has_offset;            ///< its origin may differ from its parent's
+  bool parent_never_rotates;  ///< no ancestor ever turns: ω and α of the parent are zero
+  bool
+      never_rotates;  ///< nor does this joint: ω and α are zero, and only the force of a wrench does work
+  bool has_mass;                ///< false: no inertia of its own
+  std::uint8_t effects;         ///< JointEffect bits: effects that some dof of the joint has
+  double mass;                  ///< [kg]
+  Vec3<double> mass_times_com;  ///< mass times centre of mass, link axes [kg m]
+  Mat3<double> inertia;         ///< about the link's origin, link axes [kg m²]
   int inertia_row = -1;  ///< ≥ 0: mass, moment and inertia (xx xy xz yy yz zz) are read from ten
                          ///< rows of the block instead
   int place_row = -1;    ///< ≥ 0: frame.p is read from three rows of the block instead
@@ -95,7 +96,9 @@ struct ParameterRows {
 
 using ContactParameters = Coefficients<Parameter>;
 /// Whether friction with these coefficients remembers.
-inline bool remembers(const ContactParameters& p) { return p.ks.value != 0 || p.ks.row >= 0; }
+inline bool has_shear_spring(const ContactParameters& p) {
+  return p.ks.value != 0 || p.ks.row >= 0;
+}
 
 /// A convex body for finding where it is widest: half its width along a unit vector e is
 /// Σ straight_i |e_i| + √Σ (round_i e_i)².

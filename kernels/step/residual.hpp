@@ -76,8 +76,9 @@ void joint_motion(const Link& link, const StageArgs<N>& a, LinkScratch<N>& out, 
   }
   const Frame<N> base = {broadcast<N>(link.frame.R),
                          load_vector<N>(link.frame.p, link.place_row, a.block, a.group)};
-  out.local.R = link.rotated ? (turns ? base.R * moved.R : base.R) : moved.R;
-  out.local.p = slides(link.kind) ? (link.rotated ? base.R * moved.p : moved.p) + base.p : base.p;
+  out.local.R = link.has_rest_rotation ? (turns ? base.R * moved.R : base.R) : moved.R;
+  out.local.p =
+      slides(link.kind) ? (link.has_rest_rotation ? base.R * moved.p : moved.p) + base.p : base.p;
 }
 
 /// Returns I m for a rigid body: (J ω + c × v; m v - c × ω), c = mass times centre of mass.
@@ -99,7 +100,7 @@ void outward_sweep(const ModelView& model, const StageArgs<N>& a) {
       o.world = o.local;
       o.Vp = zero6<N>();
       const Vec3<N> rising = -broadcast<N>(model.gravity);
-      o.Ap = {zero3<N>(), link.turned ? transposed_times(o.local.R, rising) : rising};
+      o.Ap = {zero3<N>(), link.may_rotate ? transposed_times(o.local.R, rising) : rising};
     } else {
       const LinkScratch<N>& p = a.links[link.parent];
       o.world = compose(link, p.world, o.local);
@@ -108,7 +109,7 @@ void outward_sweep(const ModelView& model, const StageArgs<N>& a) {
     }
     o.V = o.Vp + rate;
     o.A = o.Ap + acceleration;
-    if (!link.still) o.A += cross_motion(o.V, rate);
+    if (!link.never_rotates) o.A += cross_motion(o.V, rate);
   }
 }
 
@@ -119,9 +120,9 @@ void inertial_wrenches(const ModelView& model, const StageArgs<N>& a) {
     const Link& link = model.links[i];
     LinkScratch<N>& o = a.links[i];
     o.F = zero6<N>();
-    if (!link.massive) continue;
+    if (!link.has_mass) continue;
     const auto [mass, moment, inertia] = load_inertia<N>(link, a.block, a.group);
-    if (link.still) {  // its torque does no work
+    if (link.never_rotates) {  // its torque does no work
       o.F.l = mass * o.A.l;
       continue;
     }
@@ -403,7 +404,7 @@ void inward_sweep(const ModelView& model, const StageArgs<N>& a) {
         a.g[d] = project<K>(link, k, o.F) - a.tau[d];
         a.force_scale[d] = abs(a.tau[d]);
       }
-      if (link.effects & kDamped) add_damping<K>(model, a, link);
+      if (link.effects & kDamping) add_damping<K>(model, a, link);
       if (link.effects & kBeyondDamping) add_joint_load<K>(model, a, link);
     });
     if (link.parent >= 0) a.links[link.parent].F += wrench_to_parent(link, o.local, o.F);

@@ -153,19 +153,20 @@ N project(const Link& link, int k, const Vec6<N>& f) {
 // Transforms between a link and its parent. They leave out what the joint never does.
 template <class N>
 Vec6<N> motion_to_child(const Link& link, const Frame<N>& x, const Vec6<N>& v) {
-  const Vec3<N> l = link.placed && !link.steady ? v.l + cross(v.a, x.p) : v.l;
-  if (!link.turned) return {v.a, l};
-  return {link.steady ? zero3<N>() : transposed_times(x.R, v.a), transposed_times(x.R, l)};
+  const Vec3<N> l = link.has_offset && !link.parent_never_rotates ? v.l + cross(v.a, x.p) : v.l;
+  if (!link.may_rotate) return {v.a, l};
+  return {link.parent_never_rotates ? zero3<N>() : transposed_times(x.R, v.a),
+          transposed_times(x.R, l)};
 }
 template <class N>
 Vec6<N> wrench_to_parent(const Link& link, const Frame<N>& x, const Vec6<N>& f) {
-  const Vec6<N> r = link.turned ? Vec6<N>{x.R * f.a, x.R * f.l} : f;
-  return link.placed ? Vec6<N>{r.a + cross(x.p, r.l), r.l} : r;
+  const Vec6<N> r = link.may_rotate ? Vec6<N>{x.R * f.a, x.R * f.l} : f;
+  return link.has_offset ? Vec6<N>{r.a + cross(x.p, r.l), r.l} : r;
 }
 template <class N>
 Frame<N> compose(const Link& link, const Frame<N>& parent, const Frame<N>& x) {
-  return {link.turned ? parent.R * x.R : parent.R,
-          link.placed ? parent.R * x.p + parent.p : parent.p};
+  return {link.may_rotate ? parent.R * x.R : parent.R,
+          link.has_offset ? parent.R * x.p + parent.p : parent.p};
 }
 
 /// Loads a parameter of the scene for these lanes.
@@ -221,7 +222,7 @@ struct LinkInertia {
 template <class N>
 LinkInertia<N> load_inertia(const Link& link, const double* block, int group) {
   if (link.inertia_row < 0)
-    return {N(link.mass), broadcast<N>(link.moment), broadcast<N>(link.inertia)};
+    return {N(link.mass), broadcast<N>(link.mass_times_com), broadcast<N>(link.inertia)};
   const auto row = [&](int i) {
     return ParameterLoad<N>::load({0, link.inertia_row + i}, block, group);
   };

@@ -2,9 +2,9 @@
 // The functions of an instruction set's table that move what friction remembers.
 #pragma once
 
+#include "kernels/numbers/one_lane.hpp"
 #include "kernels/shear/shear_pullback.hpp"
 #include "kernels/shear/shear_rows.hpp"
-#include "kernels/numbers/one_lane.hpp"
 #include "kernels/table/parts.hpp"
 #include "kernels/table/stage_view.hpp"
 
@@ -17,7 +17,7 @@ void ShearPart<Arch>::recall(const ShearSpringTouch& touch, const ShearSpringPoi
 
 template <class Arch>
 void ShearPart<Arch>::advance(const ShearSpringTouch& end, const ShearSpringPoints& points,
-                               double* s, double* force) {
+                              double* s, double* force) {
   kernels::advance<Arch>(end, points, s, force);
 }
 
@@ -28,13 +28,13 @@ void ShearPart<Arch>::pull_back_memory(const ShearPullback& m) {
 
 template <class N, int L>
 void ShearRowsPart<N, L>::touches_at(const ModelView& m, const LinkPose<Row<L>>* links,
-                                      LinkPose<Row<L>>* out) {
+                                     LinkPose<Row<L>>* out) {
   find_touches(m, reinterpret_cast<const LinkPose<N>*>(links), reinterpret_cast<LinkPose<N>*>(out));
 }
 
 template <class N, int L>
 void ShearRowsPart<N, L>::recall_ground(const ModelView& m, const Stage<L>& stage,
-                                         const LinkPose<Row<L>>* touches, const Row<L>* s) {
+                                        const LinkPose<Row<L>>* touches, const Row<L>* s) {
   using View = StageView<N, L>;
   kernels::recall_ground(m, reinterpret_cast<const LinkPose<N>*>(touches), View::view(s),
                          View::view(stage.ground_anchors), stage.block, stage.group);
@@ -42,7 +42,7 @@ void ShearRowsPart<N, L>::recall_ground(const ModelView& m, const Stage<L>& stag
 
 template <class N, int L>
 void ShearRowsPart<N, L>::advance_ground(const ModelView& m, const Stage<L>& stage,
-                                          const LinkPose<Row<L>>* touches, Row<L>* kept) {
+                                         const LinkPose<Row<L>>* touches, Row<L>* kept) {
   using View = StageView<N, L>;
   kernels::advance_ground(m, reinterpret_cast<const LinkPose<N>*>(touches),
                           View::view(stage.ground_anchors), View::view(kept), stage.block,

@@ -293,7 +293,7 @@ Array<double> PythonBatch::memory() {
   std::span<double> numbers;
   auto array = new_array<double>({count(), n, 3}, numbers);
   for (int e = 0; e < environments(); ++e)
-    memory_points_.write(batch_.memory(e), numbers.subspan(as_size(e) * 3 * n, 3 * n));
+    memory_points_.write(batch_.shear_state(e), numbers.subspan(as_size(e) * 3 * n, 3 * n));
   return array;
 }
 
@@ -312,7 +312,7 @@ void PythonBatch::set_memory(const Argument<double>& memory, const nb::object& e
     throw InputError("a memory that is not finite; expected numbers");
   const InUse::Turn turn(in_use_);
   for (std::size_t k = 0; k < list.size(); ++k)
-    batch_.set_memory(list[k], memory_points_.read(std::span(all).subspan(k * 3 * n, 3 * n)));
+    batch_.set_shear_state(list[k], memory_points_.read(std::span(all).subspan(k * 3 * n, 3 * n)));
 }
 
 void PythonBatch::reset(const nb::object& environments,
@@ -433,10 +433,11 @@ void add_batches(nb::module_& m) {
           "Sets states: `q` (n, nq) or (nq), `v` (n, nv) or (nv), of the environments listed in\n"
           "`envs` (indices, or a mask (E)), or of all. Releases a failed environment; forgets the\n"
           "state one step before and what friction remembers.")
-      .def_prop_ro("memory", &PythonBatch::memory, nb::rv_policy::automatic,
-                   "(E, points, 3) what friction with ks remembers: the elastic displacement of\n"
-                   "every point of Model.shear_state_arrays [m], in the axes of the moving frame that\n"
-                   "carries it; 0 where it has not moved or does not touch.")
+      .def_prop_ro(
+          "memory", &PythonBatch::memory, nb::rv_policy::automatic,
+          "(E, points, 3) what friction with ks remembers: the elastic displacement of\n"
+          "every point of Model.shear_state_arrays [m], in the axes of the moving frame that\n"
+          "carries it; 0 where it has not moved or does not touch.")
       .def("set_memory", &PythonBatch::set_memory, "memory"_a, "envs"_a = nb::none(),
            "Sets what friction remembers, (n, points, 3) or (points, 3) as in `memory`, of the\n"
            "environments listed in `envs` (indices, or a mask (E)), or of all. To go on from a\n"

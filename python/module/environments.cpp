@@ -59,13 +59,13 @@ class Environments {
   nb::tuple state() {
     const InUse::Turn turn(in_use_);
     const std::size_t widths[] = {as_size(task_->model().nq()), as_size(task_->model().nv()),
-                                  as_size(spec().memory)};
+                                  as_size(spec().task_state)};
     std::span<double> numbers[3];
     Array<double> arrays[3];
     for (int k = 0; k < 3; ++k) arrays[k] = new_array<double>({count(), widths[k]}, numbers[k]);
     for (std::size_t e = 0; e < count(); ++e) {
       const TaskView view = vector_.view(static_cast<int>(e));
-      const std::span<const double> from[] = {view.now().q, view.now().v, view.memory};
+      const std::span<const double> from[] = {view.now().q, view.now().v, view.task_state};
       for (int k = 0; k < 3; ++k)
         std::copy(from[k].begin(), from[k].end(),
                   numbers[k].begin() + std::ptrdiff_t(e * widths[k]));
@@ -173,7 +173,8 @@ void add_environments(nb::module_& m) {
       .def("counts", &Environments::counts, nb::sig("def counts(self) -> dict[str, int]"),
            "Since the last reset: environment_steps, simulation_steps, newton_iterations, and "
            "steps\n"
-           "by their status: split_steps, accuracy_not_met_steps, tunnelled_steps, damped_steps and\n"
+           "by their status: split_steps, accuracy_not_met_steps, tunnelled_steps, damped_steps "
+           "and\n"
            "overlapping_steps.")
       .def_prop_ro("spec", &Environments::spec)
       .def_prop_ro("model", &Environments::model)

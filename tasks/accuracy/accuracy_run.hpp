@@ -29,7 +29,7 @@ const char* to_string(AccuracyQuantity value);
 const char* accuracy_meaning(AccuracyQuantity value);
 
 struct AccuracySetting {
-  Integrator integrator = Integrator::usual;
+  Integrator integrator = Integrator::default_integrator;
   int parts = 1;  ///< steps between samples
   double tolerance = 1e-9;
   double accuracy = 0;  ///< of the parts of a step; 0: every step is one part

@@ -264,7 +264,7 @@ class Sweep {
   /// Steps as long as the controls allow, cut into parts that keep an accuracy.
   bool measure_cut_steps() {
     const auto parts = std::ranges::find_if(kParts, [&](int n) { return episodes_.can_cut(n); });
-    AccuracySetting setting{keeping_accuracy(Integrator::usual, kAccuracies[0]),
+    AccuracySetting setting{keeping_accuracy(Integrator::default_integrator, kAccuracies[0]),
                             parts == kParts.end() ? episodes_.every : *parts};
     for (const double accuracy : kAccuracies) {
       setting.accuracy = accuracy;

@@ -67,7 +67,7 @@ struct AccuracyReference {
 /// The order that a scheme has on these episodes between its two finest steps, without those that
 /// are off by less than ten times the reference; with them where the reference shares their errors.
 struct SchemeOrder {
-  Integrator integrator = Integrator::usual;
+  Integrator integrator = Integrator::default_integrator;
   double coarse = 0, fine = 0;  ///< those steps [s]
   double order = 0;             ///< of the medians of the errors
 };

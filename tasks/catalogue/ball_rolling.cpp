@@ -29,7 +29,7 @@ class BallRolling : public Task {
   /// Stores the goal in the memory.
   void start(const TaskStart& s) const override {
     for (std::uint32_t k = 0; k < 2; ++k)
-      s.memory[k] = s.q[ball_q_ + k] + task_uniform(s.seed, s.episode, 0, k, -kReach, kReach);
+      s.task_state[k] = s.q[ball_q_ + k] + task_uniform(s.seed, s.episode, 0, k, -kReach, kReach);
   }
 
   void controls(const TaskView& view, int, std::span<double> u) const override {
@@ -37,7 +37,7 @@ class BallRolling : public Task {
   }
 
   void observe(const TaskView& view, std::span<double> o) const override {
-    const Moment& now = view.now();
+    const Snapshot& now = view.now();
     for (std::size_t k = 0; k < 3; ++k) o[k] = now.q[pad_q_ + k];
     for (std::size_t k = 0; k < 2; ++k) o[3 + k] = to_goal(view, k);
     std::copy(now.tactile.begin(), now.tactile.end(), o.begin() + 5);
@@ -45,16 +45,16 @@ class BallRolling : public Task {
 
   void observe_vjp(const TaskView&, std::span<const double> weight,
                    const ViewCotangent& out) const override {
-    const SnapshotCotangent& to = out.moments.back();
+    const SnapshotCotangent& to = out.snapshots.back();
     for (std::size_t k = 0; k < 3; ++k) to.q[pad_v_ + k] += weight[k];
     for (std::size_t k = 0; k < 2; ++k) {
       to.q[ball_v_ + k] -= weight[3 + k];
-      out.memory[k] += weight[3 + k];
+      out.task_state[k] += weight[3 + k];
     }
     for (std::size_t i = 0; i < to.tactile.size(); ++i) to.tactile[i] += weight[5 + i];
   }
 
-  Verdict judge(const TaskView& view) const override {
+  StepOutcome evaluate(const TaskView& view) const override {
     const double x = to_goal(view, 0), y = to_goal(view, 1);
     double effort = 0;
     for (const double a : view.action) effort += a * a;
@@ -65,8 +65,8 @@ class BallRolling : public Task {
   void reward_vjp(const TaskView& view, double weight, const ViewCotangent& out) const override {
     for (std::size_t k = 0; k < 2; ++k) {
       const double by_ball = weight * 2 * to_goal(view, k) / (kLength * kLength);
-      out.moments.back().q[ball_v_ + k] += by_ball;
-      out.memory[k] -= by_ball;
+      out.snapshots.back().q[ball_v_ + k] += by_ball;
+      out.task_state[k] -= by_ball;
     }
     for (std::size_t k = 0; k < 3; ++k) out.action[k] -= weight * 2 * kEffort * view.action[k];
   }
@@ -91,7 +91,7 @@ class BallRolling : public Task {
 
  private:
   [[nodiscard]] double to_goal(const TaskView& view, std::size_t k) const {
-    return view.memory[k] - view.now().q[ball_q_ + k];
+    return view.task_state[k] - view.now().q[ball_q_ + k];
   }
   std::size_t pad_q_, ball_q_, pad_v_, ball_v_;
 };
@@ -116,9 +116,9 @@ TaskSpec declare_ball_rolling(BallPad pad) {
                        {"tactile", {side, side, 3}, "N", "field of the pad", tactile_scale}};
   spec.observations.back().touch = true;
   spec.steps_per_action = 5;
-  spec.moments = {5};
+  spec.snapshots = {5};
   spec.horizon = kActions;
-  spec.memory = 2;
+  spec.task_state = 2;
   spec.reads_tactile = true;
   return spec;
 }

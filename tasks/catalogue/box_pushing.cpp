@@ -53,10 +53,10 @@ class BoxPushing : public Task {
     };
     s.q[box_ + 1] = number(0, -0.02, 0.02);
     const double along = number(1, 0.15, 0.25), aside = number(2, -0.2, 0.2);
-    s.memory[kGoal] = script_.box_rest()[0] + along;
-    s.memory[kGoal + 1] = script_.box_rest()[1] + aside;
+    s.task_state[kGoal] = script_.box_rest()[0] + along;
+    s.task_state[kGoal + 1] = script_.box_rest()[1] + aside;
     const double yaw = std::numbers::pi * aside, spread = std::numbers::pi / 16;
-    s.memory[kGoal + 2] = number(3, yaw - spread, yaw + spread);
+    s.task_state[kGoal + 2] = number(3, yaw - spread, yaw + spread);
   }
 
   /// Every tenth action draws a new push or none, each with probability ½.
@@ -71,14 +71,15 @@ class BoxPushing : public Task {
 
   void controls(const TaskView& view, int, std::span<double> u) const override {
     for (std::size_t k = 0; k < 3; ++k) u[k] = view.action[k];
-    u[3] = view.memory[kPush];
-    u[4] = view.memory[kPush + 1];
+    u[3] = view.task_state[kPush];
+    u[4] = view.task_state[kPush + 1];
     u[5] = 0;
   }
 
   void observe(const TaskView& view, std::span<double> o) const override {
-    const Moment& now = view.now();
-    in_hand(now, {view.memory[kGoal], view.memory[kGoal + 1], view.memory[kGoal + 2]}, o.first(3));
+    const Snapshot& now = view.now();
+    in_hand(now, {view.task_state[kGoal], view.task_state[kGoal + 1], view.task_state[kGoal + 2]},
+            o.first(3));
     if (observation_ == PushObservation::privileged) in_hand(now, box_pose(now), o.subspan(3));
     if (observation_ == PushObservation::tactile)
       std::copy(now.tactile.begin(), now.tactile.end(), o.begin() + 3);
@@ -87,11 +88,12 @@ class BoxPushing : public Task {
   void observe_vjp(const TaskView& view, std::span<const double> weight,
                    const ViewCotangent& out) const override {
     // Every joint here slides or turns about one axis: coordinates and dofs have the same places.
-    const Moment& now = view.now();
-    const SnapshotCotangent& to = out.moments.back();
+    const Snapshot& now = view.now();
+    const SnapshotCotangent& to = out.snapshots.back();
     const std::array<double, 3> by_goal = in_hand_vjp(
-        now, {view.memory[kGoal], view.memory[kGoal + 1], view.memory[kGoal + 2]}, weight, to);
-    for (std::size_t k = 0; k < 3; ++k) out.memory[kGoal + k] += by_goal[k];
+        now, {view.task_state[kGoal], view.task_state[kGoal + 1], view.task_state[kGoal + 2]},
+        weight, to);
+    for (std::size_t k = 0; k < 3; ++k) out.task_state[kGoal + k] += by_goal[k];
     if (observation_ == PushObservation::privileged) {
       const std::array<double, 3> by_box = in_hand_vjp(now, box_pose(now), weight.subspan(3), to);
       for (std::size_t k = 0; k < 2; ++k) to.q[box_ + k] += by_box[k];
@@ -101,9 +103,9 @@ class BoxPushing : public Task {
       for (std::size_t i = 0; i < to.tactile.size(); ++i) to.tactile[i] += weight[3 + i];
   }
 
-  Verdict judge(const TaskView& view) const override {
+  StepOutcome evaluate(const TaskView& view) const override {
     const std::array<double, 3> off = to_goal(view);
-    const Moment& now = view.now();
+    const Snapshot& now = view.now();
     double gap = 0, effort = 0;
     for (std::size_t k = 0; k < 2; ++k)
       gap += square(now.end_effectors[kTip + k] - now.end_effectors[kFace + k]);
@@ -118,13 +120,13 @@ class BoxPushing : public Task {
 
   void reward_vjp(const TaskView& view, double weight, const ViewCotangent& out) const override {
     const std::array<double, 3> off = to_goal(view);
-    const Moment& now = view.now();
-    const SnapshotCotangent& to = out.moments.back();
+    const Snapshot& now = view.now();
+    const SnapshotCotangent& to = out.snapshots.back();
     // Every joint here slides or turns about one axis: coordinates and dofs have the same places.
     for (std::size_t k = 0; k < 2; ++k) {
       const double by_place = weight * 2 * kPosition * off[k] / square(kLengthUnit);
       to.q[box_ + k] -= by_place;
-      out.memory[kGoal + k] += by_place;
+      out.task_state[kGoal + k] += by_place;
       const double gap =
           weight * 2 * (now.end_effectors[kTip + k] - now.end_effectors[kFace + k]) / square(kGap);
       to.end_effectors[kTip + k] -= gap;
@@ -132,7 +134,7 @@ class BoxPushing : public Task {
     }
     const double by_yaw = weight * 2 * kAngle * off[2] / square(kAngleUnit);
     to.q[box_turn_] -= by_yaw;
-    out.memory[kGoal + 2] += by_yaw;
+    out.task_state[kGoal + 2] += by_yaw;
     for (std::size_t k = 0; k < 3; ++k) {
       const double a = view.action[k];
       if (std::abs(a) <= kMostDrive)
@@ -143,7 +145,7 @@ class BoxPushing : public Task {
   void controls_vjp(const TaskView&, int, std::span<const double> weight,
                     const ViewCotangent& out) const override {
     for (std::size_t k = 0; k < 3; ++k) out.action[k] += weight[k];
-    for (std::size_t k = 0; k < 2; ++k) out.memory[kPush + k] += weight[3 + k];
+    for (std::size_t k = 0; k < 2; ++k) out.task_state[kPush + k] += weight[3 + k];
   }
 
   void begin_action_vjp(const TaskView& view, std::span<double> memory,
@@ -155,12 +157,13 @@ class BoxPushing : public Task {
   /// Feeds back the state, whatever the task observes.
   void scripted(const TaskView& view, std::span<const double>,
                 std::span<double> action) const override {
-    const Moment& now = view.now();
+    const Snapshot& now = view.now();
     const std::array<double, 3> box = box_pose(now);
-    const PushState state = {now.q[turn_],
-                             {now.q[slide_], now.q[slide_ + 1]},
-                             box,
-                             {view.memory[kGoal], view.memory[kGoal + 1], view.memory[kGoal + 2]}};
+    const PushState state = {
+        now.q[turn_],
+        {now.q[slide_], now.q[slide_ + 1]},
+        box,
+        {view.task_state[kGoal], view.task_state[kGoal + 1], view.task_state[kGoal + 2]}};
     const std::array<double, 3> u = script_.controls(state);
     for (std::size_t k = 0; k < 3; ++k) action[k] = std::clamp(u[k], -0.99, 0.99);
   }
@@ -171,18 +174,18 @@ class BoxPushing : public Task {
   static double push_of(double a) { return std::atanh(std::clamp(a, -kMostDrive, kMostDrive)); }
 
   /// x, y [m] and yaw [rad] in the world.
-  [[nodiscard]] std::array<double, 3> box_pose(const Moment& now) const {
+  [[nodiscard]] std::array<double, 3> box_pose(const Snapshot& now) const {
     return {script_.box_rest()[0] + now.q[box_], script_.box_rest()[1] + now.q[box_ + 1],
             now.q[box_turn_]};
   }
   /// Pose of the box minus its goal.
   [[nodiscard]] std::array<double, 3> to_goal(const TaskView& view) const {
     std::array<double, 3> off = box_pose(view.now());
-    for (std::size_t k = 0; k < 3; ++k) off[k] -= view.memory[kGoal + k];
+    for (std::size_t k = 0; k < 3; ++k) off[k] -= view.task_state[kGoal + k];
     return off;
   }
   /// Writes a pose relative to the middle of the pad; the pad pushes along x.
-  void in_hand(const Moment& now, const std::array<double, 3>& pose, std::span<double> o) const {
+  void in_hand(const Snapshot& now, const std::array<double, 3>& pose, std::span<double> o) const {
     const double c = std::cos(now.q[turn_]), s = std::sin(now.q[turn_]);
     const double x = pose[0] - now.end_effectors[kTip], y = pose[1] - now.end_effectors[kTip + 1];
     o[0] = c * x + s * y;
@@ -191,7 +194,7 @@ class BoxPushing : public Task {
   }
   /// Reverse of in_hand(): returns derivatives by the pose and adds those by the hand. With θ the
   /// hand's turn: ∂o_x/∂θ = o_y, ∂o_y/∂θ = -o_x.
-  std::array<double, 3> in_hand_vjp(const Moment& now, const std::array<double, 3>& pose,
+  std::array<double, 3> in_hand_vjp(const Snapshot& now, const std::array<double, 3>& pose,
                                     std::span<const double> weight,
                                     const SnapshotCotangent& to) const {
     std::array<double, 3> o{};
@@ -223,9 +226,9 @@ TaskSpec declare_box_pushing(PushObservation observation, Friction friction) {
   spec.observations = {
       {"goal", {3}, "m m rad", "goal of the box: x, y, yaw as seen from the pad", pose_scale}};
   spec.steps_per_action = 5;
-  spec.moments = {5};
+  spec.snapshots = {5};
   spec.horizon = kActions;
-  spec.memory = 5;
+  spec.task_state = 5;
   spec.reads_end_effectors = true;
   if (observation == PushObservation::tactile) {
     spec.observations.push_back({"tactile", {13, 10, 3}, "N", "field of the pad", tactile_scale});

@@ -78,14 +78,14 @@ class CapOpening : public Task {
 
   /// Draws every angle. Draws a finger again if it would begin inside the cap.
   void start(const TaskStart& s) const override {
-    std::copy_n(s.varying.end() - 3, 3, s.memory.begin() + kFingers);
+    std::copy_n(s.varying.end() - 3, 3, s.task_state.begin() + kFingers);
     std::uint32_t drawn = 0;
     for (std::size_t f = 0; f < kFingers; ++f) {
       FingerAngles q{};
       do {
         for (std::size_t k = 0; k < q.size(); ++k)
           q[k] = kStart[k] + task_normal(s.seed, s.episode, 0, drawn++, kSpread);
-      } while (script_.gap(q, cap(s.memory, f)) < kLeast);
+      } while (script_.gap(q, cap(s.task_state, f)) < kLeast);
       std::copy(q.begin(), q.end(),
                 s.q.begin() + static_cast<std::ptrdiff_t>(finger_ + f * q.size()));
     }
@@ -107,7 +107,7 @@ class CapOpening : public Task {
   }
 
   void observe(const TaskView& view, std::span<double> o) const override {
-    const Moment& now = view.now();
+    const Snapshot& now = view.now();
     for (std::size_t k = 0; k < kAngles; ++k) o[k] = now.q[finger_ + k];
     std::copy(now.end_effectors.begin(), now.end_effectors.end(), o.begin() + kAngles);
     if (observation_ == CapObservation::blind) return;
@@ -120,7 +120,7 @@ class CapOpening : public Task {
   void observe_vjp(const TaskView&, std::span<const double> weight,
                    const ViewCotangent& out) const override {
     // Every joint here turns about one axis: coordinates and dofs have the same places.
-    const SnapshotCotangent& to = out.moments.back();
+    const SnapshotCotangent& to = out.snapshots.back();
     for (std::size_t k = 0; k < kAngles; ++k) {
       to.q[finger_ + k] += weight[k];
       to.end_effectors[k] += weight[kAngles + k];  // three fingertips of three coordinates
@@ -131,7 +131,7 @@ class CapOpening : public Task {
       for (std::size_t c = 0; c < 3; ++c) to.tactile[3 * p + c] += images[3 * pixel_[p] + c];
   }
 
-  Verdict judge(const TaskView& view) const override {
+  StepOutcome evaluate(const TaskView& view) const override {
     double reward = 0;
     for (std::size_t f = 0; f < kFingers; ++f) reward -= touches(view.now(), f) ? 0 : kIdle;
     const double missing = std::min(view.now().q[cap_] - kOpen, 0.0);
@@ -144,7 +144,7 @@ class CapOpening : public Task {
 
   void reward_vjp(const TaskView& view, double weight, const ViewCotangent& out) const override {
     // Every joint here turns about one axis: coordinates and dofs have the same places.
-    out.moments.back().q[cap_] -= weight * 2 * std::min(view.now().q[cap_] - kOpen, 0.0);
+    out.snapshots.back().q[cap_] -= weight * 2 * std::min(view.now().q[cap_] - kOpen, 0.0);
     for (std::size_t k = 0; k < kAngles; ++k)
       out.action[k] -= weight * 2 * kEffort * view.action[k];
   }
@@ -155,7 +155,7 @@ class CapOpening : public Task {
       const double to = target(view, k);
       if (to < limits_[k][0] || to > limits_[k][1]) continue;
       out.action[k] += weight[k] * kStep;
-      out.moments.back().q[finger_ + k] += weight[k];
+      out.snapshots.back().q[finger_ + k] += weight[k];
     }
   }
 
@@ -164,7 +164,7 @@ class CapOpening : public Task {
                 std::span<double> action) const override {
     for (std::size_t f = 0; f < kFingers; ++f) {
       const FingerAngles q = angles(view, f),
-                         to = script_.targets(q, cap(view.memory, f), view.memory[f] != 0);
+                         to = script_.targets(q, cap(view.task_state, f), view.task_state[f] != 0);
       for (std::size_t k = 0; k < q.size(); ++k)
         action[f * q.size() + k] = std::clamp((to[k] - q[k]) / kStep, -1.0, 1.0);
     }
@@ -203,11 +203,11 @@ class CapOpening : public Task {
     return view.now().q[finger_ + k] + kStep * view.action[k];
   }
   /// A field is exactly zero where nothing touches.
-  static bool touches(const Moment& m, std::size_t finger) {
+  static bool touches(const Snapshot& m, std::size_t finger) {
     const std::span<const double> field = m.tactile.subspan(finger * kField, kField);
     return std::any_of(field.begin(), field.end(), [](double force) { return force != 0; });
   }
-  static bool left(const Moment& m) {
+  static bool left(const Snapshot& m) {
     for (std::size_t f = 0; f < kFingers; ++f)
       if (m.end_effectors[3 * f + 2] > kHighest) return true;
     return false;
@@ -239,9 +239,9 @@ TaskSpec declare_cap_opening(CapObservation observation, Friction friction) {
   spec.observations = {{"angles", {kAngles}, "rad", "swing, upper and lower of each finger", {0.5}},
                        {"tips", {kFingers, 3}, "m", "middles of the fingertips' spheres", {0.05}}};
   spec.steps_per_action = 5;
-  spec.moments = {5};
+  spec.snapshots = {5};
   spec.horizon = kActions;
-  spec.memory = kFingers + 3;
+  spec.task_state = kFingers + 3;
   spec.reads_end_effectors = true;
   spec.reads_tactile = true;  // the reward asks which fingers touch
   if (observation == CapObservation::tactile) {

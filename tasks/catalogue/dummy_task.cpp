@@ -24,13 +24,13 @@ class Dummy : public Task {
     spec.observations = {{"error", {1}, "m", "goal minus height of the pad", {0.01}},
                          {"speed", {1}, "m/s", "upward", {0.05}}};
     spec.steps_per_action = 5;
-    spec.moments = {5};
+    spec.snapshots = {5};
     spec.horizon = 40;
-    spec.memory = 1;  // the goal [m]
+    spec.task_state = 1;  // the goal [m]
     return spec;
   }
   void start(const TaskStart& s) const override {
-    s.memory[0] = task_uniform(s.seed, s.episode, 0, 0, 0.01, 0.03);
+    s.task_state[0] = task_uniform(s.seed, s.episode, 0, 0, 0.01, 0.03);
   }
   void controls(const TaskView& view, int, std::span<double> u) const override {
     u[2] = 0.245 + view.action[0];
@@ -40,17 +40,17 @@ class Dummy : public Task {
   }
   void observe_vjp(const TaskView&, std::span<const double> weight,
                    const ViewCotangent& out) const override {
-    out.memory[0] += weight[0];
-    out.moments.back().q[vz_] -= weight[0];
-    out.moments.back().v[vz_] += weight[1];
+    out.task_state[0] += weight[0];
+    out.snapshots.back().q[vz_] -= weight[0];
+    out.snapshots.back().v[vz_] += weight[1];
   }
-  Verdict judge(const TaskView& view) const override {
+  StepOutcome evaluate(const TaskView& view) const override {
     return {-1e4 * error(view) * error(view), false,
             view.actions == spec().horizon && std::abs(error(view)) < 1e-3};
   }
   void reward_vjp(const TaskView& view, double weight, const ViewCotangent& out) const override {
-    out.moments.back().q[vz_] += weight * 2e4 * error(view);
-    out.memory[0] -= weight * 2e4 * error(view);
+    out.snapshots.back().q[vz_] += weight * 2e4 * error(view);
+    out.task_state[0] -= weight * 2e4 * error(view);
   }
   void controls_vjp(const TaskView&, int, std::span<const double> weight,
                     const ViewCotangent& out) const override {
@@ -63,7 +63,7 @@ class Dummy : public Task {
 
  private:
   [[nodiscard]] double error(const TaskView& view) const {
-    return view.memory[0] - view.now().q[z_];
+    return view.task_state[0] - view.now().q[z_];
   }
   std::size_t z_, vz_;  // of the pad: coordinate, dof
 };

@@ -92,10 +92,10 @@ class Insertion : public Task {
       return task_uniform(s.seed, s.episode, 0, k, low, high);
     };
     for (const std::size_t k : moved_)
-      s.memory[kBefore + k] = s.memory[kNow + k] =
+      s.task_state[kBefore + k] = s.task_state[kNow + k] =
           number(static_cast<std::uint32_t>(k), -kOff[k], kOff[k]);
-    s.memory[kHeight] = number(3, -0.01, 5e-3);
-    s.memory[kGrip] = number(4, 0.125, 0.8);
+    s.task_state[kHeight] = number(3, -0.01, 5e-3);
+    s.task_state[kGrip] = number(4, 0.125, 0.8);
     const double contact_kn = number(5, 2e3, 14e3), contact_mu = number(7, 0.5, 2.5);
     const double tactile_kn = number(8, 50, 450), tactile_mu = number(10, 0.5, 2.5);
     std::vector<double> skin{contact_kn,          number(6, 20, 140), contact_mu,        tactile_kn,
@@ -108,7 +108,7 @@ class Insertion : public Task {
       skin.insert(skin.end(), tactile.begin(), tactile.end());
     }
     for (std::size_t k = 0; k < s.varying.size(); ++k) s.varying[k] = skin[k % skin.size()];
-    hold({0, 0, 0, s.memory, {}, {}}, s.q, s.v);
+    hold({0, 0, 0, s.task_state, {}, {}}, s.q, s.v);
   }
 
   void begin_action(const TaskView& view, std::span<double> memory) const override {
@@ -119,7 +119,8 @@ class Insertion : public Task {
   }
 
   /// The box between open fingers, 3 mm above the rim.
-  void place(const TaskView& view, std::span<double> q, std::span<double> v) const override {
+  void restart_state(const TaskView& view, std::span<double> q,
+                     std::span<double> v) const override {
     hold(view, q, v);
   }
 
@@ -129,9 +130,9 @@ class Insertion : public Task {
     const std::array<double, 3> e = off(view);
     u[0] = e[0];
     u[1] = e[1];
-    u[2] = view.memory[kHeight] + kLift - 2 * kLift * std::clamp((step - 4) / 18.0, 0.0, 1.0);
+    u[2] = view.task_state[kHeight] + kLift - 2 * kLift * std::clamp((step - 4) / 18.0, 0.0, 1.0);
     u[3] = e[2];
-    u[4] = u[5] = view.memory[kGrip];
+    u[4] = u[5] = view.task_state[kGrip];
   }
 
   void observe(const TaskView& view, std::span<double> o) const override {
@@ -152,8 +153,8 @@ class Insertion : public Task {
     std::array<double, 2 * kPads * kPoints> by_flow{};
     std::array<ShearCotangent, kPads> by_pads;
     for (std::size_t pad = 0; pad < kPads; ++pad) {
-      by_pads[pad] = {out.moments[1].tactile.subspan(3 * kPoints * pad, 3 * kPoints),
-                      out.moments[0].tactile.subspan(3 * kPoints * pad, 3 * kPoints)};
+      by_pads[pad] = {out.snapshots[1].tactile.subspan(3 * kPoints * pad, 3 * kPoints),
+                      out.snapshots[0].tactile.subspan(3 * kPoints * pad, 3 * kPoints)};
       for (std::size_t p = 0; p < kPoints; ++p)
         for (std::size_t c = 0; c < 2; ++c)
           by_flow[(pad * kPoints + p) * 2 + c] = weight[(2 * pad + c) * kPoints + p];
@@ -161,7 +162,7 @@ class Insertion : public Task {
     normalised_flow_vjp(read.pads(), by_flow, by_pads, kTooLittle);
   }
 
-  Verdict judge(const TaskView& view) const override {
+  StepOutcome evaluate(const TaskView& view) const override {
     const std::array<double, 3> e = off(view);
     const bool inside = highest_below(view.now()) < kInside;
     double far = 0;
@@ -170,7 +171,7 @@ class Insertion : public Task {
   }
 
   void reward_vjp(const TaskView& view, double weight, const ViewCotangent& out) const override {
-    if (judge(view).success) return;
+    if (evaluate(view).success) return;
     std::array<double, 3> by_off = off(view);
     for (std::size_t k = 0; k < 3; ++k) by_off[k] *= -weight * 2 / (kOff[k] * kOff[k]);
     off_vjp(by_off, out);
@@ -179,8 +180,8 @@ class Insertion : public Task {
   void controls_vjp(const TaskView&, int, std::span<const double> weight,
                     const ViewCotangent& out) const override {
     off_vjp({weight[0], weight[1], weight[3]}, out);
-    out.memory[kHeight] += weight[2];
-    out.memory[kGrip] += weight[4] + weight[5];
+    out.task_state[kHeight] += weight[2];
+    out.task_state[kGrip] += weight[4] + weight[5];
   }
 
   void begin_action_vjp(const TaskView&, std::span<double> memory,
@@ -194,10 +195,10 @@ class Insertion : public Task {
 
   /// Reverse of hold(): hand and box turn about the same axis.
   void restart_state_vjp(const TaskView&, std::span<const double> q, std::span<const double>,
-                 const ViewCotangent& out) const override {
-    for (std::size_t k = 0; k < 2; ++k) out.memory[kNow + k] += q[hand_v_ + k] + q[box_v_ + k];
-    out.memory[kNow + 2] += q[turn_v_] + q[box_v_ + 5];
-    out.memory[kHeight] += q[hand_v_ + 2];
+                         const ViewCotangent& out) const override {
+    for (std::size_t k = 0; k < 2; ++k) out.task_state[kNow + k] += q[hand_v_ + k] + q[box_v_ + k];
+    out.task_state[kNow + 2] += q[turn_v_] + q[box_v_ + 5];
+    out.task_state[kHeight] += q[hand_v_ + 2];
   }
 
   void scripted(const TaskView& view, std::span<const double> o,
@@ -218,8 +219,8 @@ class Insertion : public Task {
                            kNoise);
       };
       for (std::size_t i = 0; i < kNumbers; ++i) {
-        read[i] = view.moments[1].tactile[i] + noise(i);
-        first[i] = view.moments[0].tactile[i] + noise(kNumbers + i);
+        read[i] = view.snapshots[1].tactile[i] + noise(i);
+        first[i] = view.snapshots[0].tactile[i] + noise(kNumbers + i);
       }
     }
     [[nodiscard]] std::array<ShearField<double>, kPads> pads() const {
@@ -233,7 +234,7 @@ class Insertion : public Task {
 
   /// Height of the highest corner of the box's lower face [m]. A box that tilts in its grip is not
   /// inside.
-  [[nodiscard]] double highest_below(const Moment& m) const {
+  [[nodiscard]] double highest_below(const Snapshot& m) const {
     const double* const r = &m.q[box_ + 3];
     const double zx = 2 * (r[1] * r[3] - r[0] * r[2]), zy = 2 * (r[2] * r[3] + r[0] * r[1]);
     const double zz = 1 - 2 * (r[1] * r[1] + r[2] * r[2]);
@@ -244,25 +245,25 @@ class Insertion : public Task {
   [[nodiscard]] bool turns() const { return moved_.back() == 2; }
   /// e in the current action: e before it plus the change that it asks for.
   [[nodiscard]] std::array<double, 3> off(const TaskView& view) const {
-    std::array<double, 3> e{view.memory[kBefore], view.memory[kBefore + 1],
-                            view.memory[kBefore + 2]};
+    std::array<double, 3> e{view.task_state[kBefore], view.task_state[kBefore + 1],
+                            view.task_state[kBefore + 2]};
     for (std::size_t a = 0; a < moved_.size() && a < view.action.size(); ++a)
       e[moved_[a]] += kAct[moved_[a]] * view.action[a];
     return e;
   }
 
   void off_vjp(const std::array<double, 3>& by_off, const ViewCotangent& out) const {
-    for (std::size_t k = 0; k < 3; ++k) out.memory[kBefore + k] += by_off[k];
+    for (std::size_t k = 0; k < 3; ++k) out.task_state[kBefore + k] += by_off[k];
     for (std::size_t a = 0; a < moved_.size(); ++a)
       out.action[a] += kAct[moved_[a]] * by_off[moved_[a]];
   }
 
   void hold(const TaskView& view, std::span<double> q, std::span<double> v) const {
-    const std::span<const double> e = view.memory.subspan(kNow, 3);
+    const std::span<const double> e = view.task_state.subspan(kNow, 3);
     std::fill(v.begin(), v.end(), 0.0);
     q[hand_] = e[0];
     q[hand_ + 1] = e[1];
-    q[hand_ + 2] = view.memory[kHeight];
+    q[hand_ + 2] = view.task_state[kHeight];
     q[turn_] = e[2];
     q[finger_] = q[finger_ + 1] = kApart;
     q[box_] = e[0] - rest_[0];
@@ -315,7 +316,7 @@ void Insertion::scripted(const TaskView& view, std::span<const double> o,
     move[k] = -std::copysign(kShift, k == 0 ? apart : turning);
   }
   if (turns() && (straight || view.actions % kPatience == kPatience - 1)) {
-    const double turned = view.memory[kTurned];
+    const double turned = view.task_state[kTurned];
     const double next = turned == 0 ? kTurn : turned > 0 ? -kTurn : slides() ? 0 : kTurn;
     move[2] = next - turned;
   }
@@ -355,11 +356,11 @@ TaskSpec declare_insertion(InsertionMotion motion, Friction friction) {
   spec.observations.back().touch = true;
   spec.steps_per_action = kSteps;
   spec.control_every = 1;
-  spec.moments = {6, 44, kSteps};
+  spec.snapshots = {6, 44, kSteps};
   spec.horizon = kAttempts - 1;
-  spec.opening = true;
+  spec.warm_up = true;
   spec.restarts = true;
-  spec.memory = 9;
+  spec.task_state = 9;
   spec.reads_tactile = true;
   return with_friction(std::move(spec), friction);
 }

@@ -102,13 +102,13 @@ class StableGrasp : public Task {
   void controls(const TaskView& view, int step, std::span<double> u) const override {
     const double moved = ramp(step, 0, 10), closed = ramp(step, 10, 10) - ramp(step, 160, 20);
     u[0] = u[3] = 0;
-    u[1] = view.memory[kBefore] + moved * (place(view) - view.memory[kBefore]);
+    u[1] = view.task_state[kBefore] + moved * (place(view) - view.task_state[kBefore]);
     u[2] = kHeight * (ramp(step, 30, 50) - ramp(step, 100, 50));
     u[4] = u[5] = kOpen + closed * (kClosed - kOpen);
   }
 
   void observe(const TaskView& view, std::span<double> o) const override {
-    const std::span<const double> field = view.moments.front().tactile;
+    const std::span<const double> field = view.snapshots.front().tactile;
     const std::array<ShearField<double>, kPads> pads{
         ShearField<double>{field.first(field.size() / 2)},
         ShearField<double>{field.subspan(field.size() / 2)}};
@@ -124,8 +124,8 @@ class StableGrasp : public Task {
   /// The threshold of the normalisation only chooses between a flow and none.
   void observe_vjp(const TaskView& view, std::span<const double> weight,
                    const ViewCotangent& out) const override {
-    const std::span<const double> field = view.moments.front().tactile;
-    const std::span<double> to = out.moments.front().tactile;
+    const std::span<const double> field = view.snapshots.front().tactile;
+    const std::span<double> to = out.snapshots.front().tactile;
     const std::array<ShearField<double>, kPads> pads{
         ShearField<double>{field.first(field.size() / 2)},
         ShearField<double>{field.subspan(field.size() / 2)}};
@@ -140,35 +140,36 @@ class StableGrasp : public Task {
     normalised_flow_vjp(pads, by_flow, by_pads, kTooLittle);
   }
 
-  Verdict judge(const TaskView& view) const override {
+  StepOutcome evaluate(const TaskView& view) const override {
     const double tilt = std::abs(std::asin(slope(lifted(view))));
-    const bool level = tilt < kLevel && lifted(view).q[bar_ + 2] - view.memory[kRest] > kLifted;
+    const bool level = tilt < kLevel && lifted(view).q[bar_ + 2] - view.task_state[kRest] > kLifted;
     return {level ? kSuccess : -kTilt * tilt, level, level};
   }
 
   void reward_vjp(const TaskView& view, double weight, const ViewCotangent& out) const override {
-    if (judge(view).success) return;
+    if (evaluate(view).success) return;
     // δR = R [θ]: δ(e_z · R e_y) = R_zz θ_x - R_zx θ_z.
     const double* const r = &lifted(view).q[bar_ + 3];
     const double zx = 2 * (r[1] * r[3] - r[0] * r[2]), zz = 1 - 2 * (r[1] * r[1] + r[2] * r[2]);
     const double at = slope(lifted(view));
     const double by_slope = -weight * kTilt * (at < 0 ? -1 : 1) / std::sqrt(1 - at * at);
-    out.moments.front().q[bar_v_ + 3] += by_slope * zz;
-    out.moments.front().q[bar_v_ + 5] -= by_slope * zx;
+    out.snapshots.front().q[bar_v_ + 3] += by_slope * zz;
+    out.snapshots.front().q[bar_v_ + 5] -= by_slope * zx;
   }
 
   void controls_vjp(const TaskView& view, int step, std::span<const double> weight,
                     const ViewCotangent& out) const override {
     const double moved = ramp(step, 0, 10);
-    const bool within = within_reach(view.memory[kBefore], view.action[0]);
-    out.memory[kBefore] += weight[1] * (within ? 1 : 1 - moved);
+    const bool within = within_reach(view.task_state[kBefore], view.action[0]);
+    out.task_state[kBefore] += weight[1] * (within ? 1 : 1 - moved);
     if (within) out.action[0] += weight[1] * moved * kReach;
   }
 
   void begin_action_vjp(const TaskView& view, std::span<double> memory,
                         const ViewCotangent& out) const override {
-    if (view.actions == 0) out.moments.back().q[bar_v_ + 2] += std::exchange(memory[kRest], 0.0);
-    const double by_place = within_reach(view.memory[kPlace], view.action[0]) ? memory[kPlace] : 0;
+    if (view.actions == 0) out.snapshots.back().q[bar_v_ + 2] += std::exchange(memory[kRest], 0.0);
+    const double by_place =
+        within_reach(view.task_state[kPlace], view.action[0]) ? memory[kPlace] : 0;
     out.action[0] += by_place * kReach;
     memory[kPlace] = by_place + std::exchange(memory[kBefore], 0.0);
   }
@@ -208,14 +209,14 @@ class StableGrasp : public Task {
 
   /// Where the current action grasps [m].
   static double place(const TaskView& view) {
-    return std::clamp(view.memory[kBefore] + kReach * view.action[0], -kFarthest, kFarthest);
+    return std::clamp(view.task_state[kBefore] + kReach * view.action[0], -kFarthest, kFarthest);
   }
   static bool within_reach(double before, double action) {
     return std::abs(before + kReach * action) <= kFarthest;
   }
-  static const Moment& lifted(const TaskView& view) { return view.moments.front(); }
+  static const Snapshot& lifted(const TaskView& view) { return view.snapshots.front(); }
   /// Returns e_z · R e_y.
-  [[nodiscard]] double slope(const Moment& m) const {
+  [[nodiscard]] double slope(const Snapshot& m) const {
     const double* const r = &m.q[bar_ + 3];
     return std::clamp(2 * (r[2] * r[3] + r[0] * r[1]), -1.0, 1.0);
   }
@@ -247,12 +248,12 @@ TaskSpec declare_stable_grasp(Friction friction) {
   spec.observations.back().touch = true;
   spec.steps_per_action = kSteps;
   spec.control_every = 1;
-  spec.moments = {kLook, kSteps};
+  spec.snapshots = {kLook, kSteps};
   spec.horizon = kGrasps - 1;
-  spec.opening = true;
+  spec.warm_up = true;
   spec.settling_steps = 50;
   spec.settling_timestep = 0.05;
-  spec.memory = 3;
+  spec.task_state = 3;
   spec.reads_tactile = true;
   return with_friction(std::move(spec), friction);
 }

@@ -40,7 +40,7 @@ std::size_t Task::end_effectors_size() const {
 
 void Task::start(const TaskStart&) const {}
 void Task::begin_action(const TaskView&, std::span<double>) const {}
-void Task::place(const TaskView&, std::span<double>, std::span<double>) const {}
+void Task::restart_state(const TaskView&, std::span<double>, std::span<double>) const {}
 
 void Task::reward_vjp(const TaskView&, double, const ViewCotangent&) const {
   throw InputError(fmt::format("task {} has no derivative of its reward; expected Task::reward_vjp",
@@ -64,7 +64,7 @@ void Task::observe_vjp(const TaskView&, std::span<const double>, const ViewCotan
 }
 void Task::begin_action_vjp(const TaskView&, std::span<double>, const ViewCotangent&) const {}
 void Task::restart_state_vjp(const TaskView&, std::span<const double>, std::span<const double>,
-                     const ViewCotangent&) const {
+                             const ViewCotangent&) const {
   throw InputError(fmt::format(
       "task {} restarts at every action and has no derivative of the states it restarts from; "
       "expected Task::restart_state_vjp",

@@ -14,7 +14,7 @@
 namespace tangere {
 
 /// The state of an environment at one time.
-struct Moment {
+struct Snapshot {
   std::span<const double> q, v;           ///< (nq), (nv)
   std::span<const double> end_effectors;  ///< (n, 3) positions [m], if the task looks at them
   std::span<const double>
@@ -25,26 +25,26 @@ struct Moment {
 struct TaskView {
   std::uint64_t seed = 0;
   std::int64_t episode = 0;
-  std::int64_t actions = 0;        ///< taken in this episode so far
-  std::span<const double> memory;  ///< (memory)
-  std::span<const double> action;  ///< the current or the last action; empty before the first
-  std::span<const Moment>
-      moments;  ///< of that action, as declared; before an action only its start
+  std::int64_t actions = 0;            ///< taken in this episode so far
+  std::span<const double> task_state;  ///< (memory)
+  std::span<const double> action;      ///< the current or the last action; empty before the first
+  std::span<const Snapshot>
+      snapshots;  ///< of that action, as declared; before an action only its start
 
-  [[nodiscard]] const Moment& now() const { return moments.back(); }
+  [[nodiscard]] const Snapshot& now() const { return snapshots.back(); }
 };
 
 /// The start of an episode as the scene has drawn it. A task may change any of it.
 struct TaskStart {
   std::uint64_t seed = 0;
   std::int64_t episode = 0;
-  std::span<double> q, v;     ///< (nq), (nv)
-  std::span<double> varying;  ///< what the scene randomises, in its order; states have no effect
-  std::span<double> memory;   ///< (memory), zeros
+  std::span<double> q, v;        ///< (nq), (nv)
+  std::span<double> varying;     ///< what the scene randomises, in its order; states have no effect
+  std::span<double> task_state;  ///< (memory), zeros
 };
 
 /// Judgement of a state.
-struct Verdict {
+struct StepOutcome {
   double reward = 0;
   bool terminated = false;  ///< the episode ends here, and not because time ran out
   bool success = false;
@@ -59,9 +59,9 @@ struct SnapshotCotangent {
   std::span<double> tactile;        ///< as in Moment
 };
 struct ViewCotangent {
-  std::span<const SnapshotCotangent> moments;  ///< parallel to TaskView::moments
+  std::span<const SnapshotCotangent> snapshots;  ///< parallel to TaskView::moments
   std::span<double> action;
-  std::span<double> memory = {};  ///< (memory)
+  std::span<double> task_state = {};  ///< (memory)
 };
 
 class Task {
@@ -83,12 +83,12 @@ class Task {
   virtual void begin_action(const TaskView& view, std::span<double> memory) const;
   /// For a task that restarts: sets the state in which the action begins. On entry q and v are the
   /// state after the last action.
-  virtual void place(const TaskView& view, std::span<double> q, std::span<double> v) const;
+  virtual void restart_state(const TaskView& view, std::span<double> q, std::span<double> v) const;
   /// Fills the controls (nu) for the steps of an action from `step` on.
   virtual void controls(const TaskView& view, int step, std::span<double> u) const = 0;
   /// Fills the observations, one after the other.
   virtual void observe(const TaskView& view, std::span<double> observation) const = 0;
-  virtual Verdict judge(const TaskView& view) const = 0;
+  virtual StepOutcome evaluate(const TaskView& view) const = 0;
 
   /// Adds `weight` times the derivative of the reward to `out`. A choice between cases has no
   /// derivative. Only gradients of returns need it; the default throws InputError.
@@ -113,8 +113,8 @@ class Task {
   /// Reverses place: adds ∂(q̄·q + v̄·v)/∂(action, memory, q and v after the last action), where q̄
   /// is `q` and v̄ is `v`, both (nv). A task that restarts must override it; the default throws
   /// InputError.
-  virtual void restart_state_vjp(const TaskView& view, std::span<const double> q, std::span<const double> v,
-                         const ViewCotangent& out) const;
+  virtual void restart_state_vjp(const TaskView& view, std::span<const double> q,
+                                 std::span<const double> v, const ViewCotangent& out) const;
 
   /// Fills an action that solves the task without learning. The default throws InputError.
   virtual void scripted(const TaskView& view, std::span<const double> observation,

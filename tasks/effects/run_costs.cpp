@@ -123,8 +123,8 @@ std::vector<RunCost> measure_run_costs(TimedModel& timed, const StepTimes& times
   // Both ends of every step: energies, momenta, and what passed.
   add("audit", nobody, 3 + 6 + 3, [&] {
     return first_block([&](int e) {
-      auditor.audit(*end, e, controls.subspan(as_size(e) * nu, nu));
-      auditor.audit(*end, e, controls.subspan(as_size(e) * nu, nu));
+      auditor.read(*end, e, controls.subspan(as_size(e) * nu, nu));
+      auditor.read(*end, e, controls.subspan(as_size(e) * nu, nu));
     });
   });
   const std::size_t tape =

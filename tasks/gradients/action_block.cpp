@@ -50,8 +50,8 @@ ActionBlock::ActionBlock(const ActionTapes& tapes, Precision precision, bool par
       rollout_(tapes.task, tapes.stepper, precision),
       records_(as_size(tapes.actions), ActionRecord(tapes.task)),
       by_action_(kBlock * tapes.task.spec().action.size()),
-      by_memory_(kBlock * as_size(tapes.task.spec().memory)),
-      moments_(tapes.task.spec().moments.size()),
+      by_memory_(kBlock * as_size(tapes.task.spec().task_state)),
+      moments_(tapes.task.spec().snapshots.size()),
       to_moments_(moments_.size()),
       start_q_(kBlock * as_size(tapes.task.model().nv())),
       start_v_(start_q_.size()),
@@ -88,7 +88,7 @@ void ActionBlock::retake_steps(std::int64_t action, bool from_checkpoint, BlockT
 void ActionBlock::reverse_action(std::int64_t action, const BlockTape& tape,
                                  const AfterAction& after) {
   const ActionRecord& r = records_[as_size(action)];
-  const std::vector<int>& looks = task_.spec().moments;
+  const std::vector<int>& looks = task_.spec().snapshots;
   const int every = task_.spec().control_every;
   for (std::vector<double>* x : {&start_q_, &start_v_, &by_u_, &by_action_})
     std::fill(x->begin(), x->end(), 0.0);
@@ -120,7 +120,8 @@ void ActionBlock::reverse_judgement(const ActionRecord& r, std::int64_t action,
   clear_moments();
   for (int l = 0; l < rollout_.lanes(); ++l) {
     if (!r.taken[as_size(l)]) continue;
-    const TaskView view = rollout_.view(r, action + 1, l, part(r.memory, l), rollout_.moments(l));
+    const TaskView view =
+        rollout_.view(r, action + 1, l, part(r.task_state, l), rollout_.snapshots(l));
     const ViewCotangent to{cotangents(l), part(by_action_, l), part(by_memory_, l)};
     if (after.reward[as_size(l)] != 0) task_.reward_vjp(view, after.reward[as_size(l)], to);
     add_seen(view, l, after, to);
@@ -144,7 +145,7 @@ void ActionBlock::add_seen(const TaskView& view, int lane, const AfterAction& af
   const std::span<const double> weight = own(after.observation), q = own(after.q), v = own(after.v);
   if (std::any_of(weight.begin(), weight.end(), [](double w) { return w != 0; }))
     task_.observe_vjp(view, weight, to);
-  const SnapshotCotangent& now = to.moments.back();
+  const SnapshotCotangent& now = to.snapshots.back();
   for (std::size_t i = 0; i < q.size(); ++i) now.q[i] += q[i];
   for (std::size_t i = 0; i < v.size(); ++i) now.v[i] += v[i];
 }
@@ -186,9 +187,9 @@ void ActionBlock::reverse_controls(const ActionRecord& r, std::int64_t action, i
                                    const BlockTape& tape) {
   for (int l = 0; l < rollout_.lanes(); ++l) {
     if (!r.taken[as_size(l)]) continue;
-    const Moment first = rollout_.first_moment(tape, l);
+    const Snapshot first = rollout_.first_moment(tape, l);
     const SnapshotCotangent to{part(start_q_, l), part(start_v_, l), {}, {}};
-    task_.controls_vjp(rollout_.view(r, action, l, part(r.memory, l), {&first, 1}), step,
+    task_.controls_vjp(rollout_.view(r, action, l, part(r.task_state, l), {&first, 1}), step,
                        part(by_u_, l), {{&to, 1}, part(by_action_, l), part(by_memory_, l)});
   }
   std::fill(by_u_.begin(), by_u_.end(), 0.0);
@@ -207,7 +208,7 @@ void ActionBlock::reverse_start(const ActionRecord& r, std::int64_t action) {
     const std::span<double> q = part(start_q_, l), v = part(start_v_, l),
                             memory = part(by_memory_, l);
     const std::span<double> by_action = part(by_action_, l);
-    const Moment seen{part(r.q, l), part(r.v, l), {}, {}};
+    const Snapshot seen{part(r.q, l), part(r.v, l), {}, {}};
     if (task_.spec().restarts) {
       std::vector<double> placed_q(q.begin(), q.end()), placed_v(v.begin(), v.end());
       for (std::size_t i = 0; i < nv; ++i) {
@@ -215,10 +216,10 @@ void ActionBlock::reverse_start(const ActionRecord& r, std::int64_t action) {
         placed_v[i] += at(c.v, i);
         q[i] = v[i] = at(c.q, i) = at(c.v, i) = at(c.previous_q, i) = at(c.previous_v, i) = 0;
       }
-      c.memory[as_size(l)].clear();  // friction remembers nothing of before
+      c.shear[as_size(l)].clear();  // friction remembers nothing of before
       const SnapshotCotangent to{q, v, {}, {}};
-      task_.restart_state_vjp(rollout_.view(r, action, l, part(r.memory, l), {&seen, 1}), placed_q,
-                      placed_v, {{&to, 1}, by_action, memory});
+      task_.restart_state_vjp(rollout_.view(r, action, l, part(r.task_state, l), {&seen, 1}),
+                              placed_q, placed_v, {{&to, 1}, by_action, memory});
     }
     const SnapshotCotangent to{q, v, {}, {}};
     task_.begin_action_vjp(rollout_.view(r, action, l, part(r.found, l), {&seen, 1}), memory,

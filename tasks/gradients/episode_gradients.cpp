@@ -182,7 +182,7 @@ EpisodeGradients task_returns(const Task& task, const TaskActions& actions,
 
 /// Refuses scenes in which a state is more than q and v.
 void check_remembers_nothing(const Model& model) {
-  if (model.remembers())
+  if (model.has_shear_springs())
     throw InputError("scene '" + model.scene().name +
                      "' has contacts with ks; expected none: the derivative of a state by the one "
                      "before leaves out what friction remembers");

@@ -75,7 +75,7 @@ std::vector<double> losses_of(const Setting& s, const Model& model,
       if (batch.is_parameter(static_cast<int>(k)))
         batch.set_randomized_value(e, static_cast<int>(k), varying[k]);
     batch.set_state(e, inputs[std::size_t(e)].q, inputs[std::size_t(e)].v);
-    batch.set_memory(e, s.start.memory(0));
+    batch.set_shear_state(e, s.start.shear_state(0));
   }
   Stepper stepper(model, s.options.stepper);
   Look look(model);

@@ -84,7 +84,7 @@ void ReturnBlock::finish(std::int64_t to, TaskGradients& out) {
     for (std::size_t a = 0; a < as_size(out.length[e]); ++a)
       for (std::size_t k = 0; k < width; ++k) {
         const std::size_t at = (e * as_size(options_.actions) + a) * width + k;
-        const double asked = part(records_[a].asked, l)[k];
+        const double asked = part(records_[a].chosen, l)[k];
         out.action[at] = asked;
         out.by_action[at] = asked < spec.low || asked > spec.high ? 0 : part(by_actions_[a], l)[k];
       }

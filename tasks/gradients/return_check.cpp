@@ -41,7 +41,7 @@ class ReturnChecker : public GradientChecker {
     by_numbers_ = std::move(gradient.by_parameter);
     rollout_.emplace(task, o.stepper, Precision::f64);
     rollout_->start(o.seed, {&o.episode, 1});
-    const Moment first = view_of(rollout_->batch(), rollout_->data(), 0).now();
+    const Snapshot first = view_of(rollout_->batch(), rollout_->data(), 0).now();
     at_ = {{first.q.begin(), first.q.end()}, {first.v.begin(), first.v.end()}, gradient.action};
     for (std::size_t k = 0; k < model_.scene().randomizations.size(); ++k)
       varying_.push_back(rollout_->batch().randomized_value(0, static_cast<int>(k)));
@@ -90,7 +90,7 @@ class ReturnChecker : public GradientChecker {
     for (std::int64_t a = 0; a < length_; ++a) {
       for (std::size_t l = 0; l < inputs.size(); ++l)
         std::copy_n(inputs[l].u.begin() + a * std::int64_t(width), width,
-                    record.asked.begin() + std::ptrdiff_t(l * width));
+                    record.chosen.begin() + std::ptrdiff_t(l * width));
       rollout.begin(record);
       rollout.take_steps(nullptr);
       rollout.conclude();

@@ -98,7 +98,7 @@ ActionJacobians::ActionJacobians(const Task& task, const StepperOptions& options
       steps_(task.model(), options),
       state_(2 * as_size(task.model().nv())),
       width_(task.spec().action.size()),
-      memory_(as_size(task.spec().memory)),
+      memory_(as_size(task.spec().task_state)),
       chains_(kBlock, RowChain(task.model().nv(), width_ + memory_)),
       controls_(kBlock,
                 std::vector<double>(as_size(task.model().nu()) * (state_ + width_ + memory_))),
@@ -135,9 +135,9 @@ void ActionJacobians::ask(TaskRollout& rollout, const ActionRecord& r, std::int6
     Bars bars(state_, width_, memory_);
     std::vector<double> weight(nu);
     weight[k] = 1;
-    const Moment first = rollout.first_moment(tape, lane);
-    task_.controls_vjp(rollout.view(r, action, lane, of_lane(r.memory, lane), {&first, 1}), step,
-                       weight, bars.out());
+    const Snapshot first = rollout.first_moment(tape, lane);
+    task_.controls_vjp(rollout.view(r, action, lane, of_lane(r.task_state, lane), {&first, 1}),
+                       step, weight, bars.out());
     auto to = d.begin() + static_cast<std::ptrdiff_t>(k * given);
     for (const auto* part : {&bars.state, &bars.action, &bars.memory})
       to = std::copy(part->begin(), part->end(), to);
@@ -163,7 +163,7 @@ void ActionJacobians::compose(TaskRollout& rollout, const ActionRecord& r, std::
                 row(by_memory, i, memory_).begin());
   }
   if (!r.taken[as_size(lane)]) return;
-  const Moment seen{of_lane(r.q, lane), of_lane(r.v, lane), {}, {}};
+  const Snapshot seen{of_lane(r.q, lane), of_lane(r.v, lane), {}, {}};
   if (task_.spec().restarts) {
     std::fill(out.state.begin(), out.state.end(), 0.0);
     std::fill(out.previous.begin(), out.previous.end(), 0.0);
@@ -171,9 +171,9 @@ void ActionJacobians::compose(TaskRollout& rollout, const ActionRecord& r, std::
       Bars bars(state_, width_, memory_);
       std::vector<double> weight(state_);
       weight[k] = 1;
-      task_.restart_state_vjp(rollout.view(r, action, lane, of_lane(r.memory, lane), {&seen, 1}),
-                      std::span(weight).first(state_ / 2), std::span(weight).subspan(state_ / 2),
-                      bars.out());
+      task_.restart_state_vjp(
+          rollout.view(r, action, lane, of_lane(r.task_state, lane), {&seen, 1}),
+          std::span(weight).first(state_ / 2), std::span(weight).subspan(state_ / 2), bars.out());
       for (std::size_t i = 0; i < state_; ++i) {
         const double by_placed = chain.state[i * state_ + k];
         add_times(row(out.state, i, state_), by_placed, bars.state);
@@ -194,7 +194,7 @@ void ActionJacobians::compose(TaskRollout& rollout, const ActionRecord& r, std::
   }
   const TensorSpec& spec = task_.spec().action;
   for (std::size_t k = 0; k < width_; ++k) {
-    const double asked = of_lane(r.asked, lane)[k];
+    const double asked = of_lane(r.chosen, lane)[k];
     for (std::size_t i = 0; i < state_ && (asked < spec.low || asked > spec.high); ++i)
       out.others[i * width_ + k] = 0;
   }

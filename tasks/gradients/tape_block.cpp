@@ -30,8 +30,8 @@ TapeBlock::TapeBlock(const ActionTapes& tapes, Precision precision, bool paramet
       shown_q_(lane_rows(as_size(task_.model().nv()))),
       shown_v_(shown_q_),
       by_reward_(kBlock) {
-  if (!task_.spec().opening) return;
-  const std::size_t moments = task_.spec().moments.size() - 1;
+  if (!task_.spec().warm_up) return;
+  const std::size_t moments = task_.spec().snapshots.size() - 1;
   seen_q_ = lane_rows(moments * as_size(task_.model().nq()));
   seen_v_ = lane_rows(moments * as_size(task_.model().nv()));
   seen_end_effectors_ = lane_rows(moments * task_.end_effectors_size());
@@ -44,10 +44,10 @@ void TapeBlock::start(std::uint64_t seed, std::int64_t first) {
   ActionBlock::start(seed, episodes);
   start_forward();
   took_.fill(false);
-  for (int l = 0; l < lanes_; ++l) start_memory_[as_size(l)] = rollout_.batch().memory(l);
-  if (!task_.spec().opening) return;
+  for (int l = 0; l < lanes_; ++l) start_memory_[as_size(l)] = rollout_.batch().shear_state(l);
+  if (!task_.spec().warm_up) return;
   for (int l = 0; l < lanes_; ++l) {
-    const std::span<const Moment> seen = rollout_.start_view(l).moments;
+    const std::span<const Snapshot> seen = rollout_.start_view(l).snapshots;
     for (std::size_t m = 0; m + 1 < seen.size(); ++m) {
       const auto keep = [&](std::span<const double> from, std::vector<double>& to) {
         std::copy(from.begin(), from.end(),
@@ -71,7 +71,7 @@ void TapeBlock::step(std::span<const double> actions) {
   took_.fill(false);
   if (!rollout_.running()) return;
   ActionRecord& r = records_[as_size(taken_)];
-  std::copy(actions.begin(), actions.end(), r.asked.begin());
+  std::copy(actions.begin(), actions.end(), r.chosen.begin());
   rollout_.begin(r);
   took_ = r.taken;
   take_stretch(rollout_.batch(), 0);
@@ -110,7 +110,7 @@ void TapeBlock::reverse(std::int64_t action, std::span<const double> by_observat
   const TensorSpec& spec = task_.spec().action;
   for (int l = 0; l < lanes_; ++l)
     for (std::size_t k = 0; k < spec.size() && r.taken[as_size(l)]; ++k) {
-      const double asked = part(r.asked, l)[k];
+      const double asked = part(r.chosen, l)[k];
       if (asked >= spec.low && asked <= spec.high)
         by_action[as_size(l) * spec.size() + k] = part(by_action_, l)[k];
     }
@@ -130,7 +130,7 @@ void TapeBlock::show_start() {
     rollout_.batch().displace_state(
         l, began ? part(records_[0].q, l) : number_row(rollout.data().q, l, nq),
         began ? part(records_[0].v, l) : number_row(rollout.data().v, l, nv));
-    rollout_.batch().set_memory(l, start_memory_[as_size(l)]);
+    rollout_.batch().set_shear_state(l, start_memory_[as_size(l)]);
   }
   rollout_.record_start();
 }
@@ -141,12 +141,12 @@ void TapeBlock::reverse_reset(std::span<const double> by_observation,
   expect(by_observation, by_state);
   show_start();
   clear_moments();
-  const std::size_t last = task_.spec().moments.size() - 1;
+  const std::size_t last = task_.spec().snapshots.size() - 1;
   const std::vector<double> no_action(task_.spec().action.size());
   std::vector<double> by_no_action(no_action.size()), by_memory(by_memory_.size() / kBlock);
   for (int l = 0; l < lanes_; ++l) {
     TaskView view = rollout_.start_view(l);
-    std::vector<Moment> seen(view.moments.begin(), view.moments.end());
+    std::vector<Snapshot> seen(view.snapshots.begin(), view.snapshots.end());
     for (std::size_t m = 0; m + 1 < seen.size(); ++m) {
       const auto kept = [&](const std::vector<double>& all) {
         const std::size_t width = all.size() / kBlock / last;
@@ -156,8 +156,8 @@ void TapeBlock::reverse_reset(std::span<const double> by_observation,
     }
     view.actions = 0;
     view.action = no_action;
-    if (taken_ > 0) view.memory = part(records_[0].found, l);
-    view.moments = seen;
+    if (taken_ > 0) view.task_state = part(records_[0].found, l);
+    view.snapshots = seen;
     const std::span<const SnapshotCotangent> to = cotangents(l);
     add_seen(view, l, {by_reward_, shown_, shown_q_, shown_v_},
              {to.last(seen.size()), by_no_action, by_memory});

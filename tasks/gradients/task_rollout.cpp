@@ -18,13 +18,13 @@ ActionRecord::ActionRecord(const Task& task) {
   const auto rows = [](std::size_t width) { return std::vector<double>(kBlock * width); };
   q = rows(as_size(task.model().nq()));
   v = rows(as_size(task.model().nv()));
-  found = memory = rows(as_size(task.spec().memory));
-  asked = action = rows(task.spec().action.size());
+  found = task_state = rows(as_size(task.spec().task_state));
+  chosen = action = rows(task.spec().action.size());
 }
 
 double ActionRecord::bytes(const Task& task) {
   const std::size_t numbers = as_size(task.model().nq()) + as_size(task.model().nv()) +
-                              2 * as_size(task.spec().memory) + 2 * task.spec().action.size();
+                              2 * as_size(task.spec().task_state) + 2 * task.spec().action.size();
   return static_cast<double>(numbers * kBlock * sizeof(double) + sizeof(ActionRecord));
 }
 
@@ -44,7 +44,7 @@ void TaskRollout::start(std::uint64_t seed, std::span<const std::int64_t> episod
   counts_ = {};
   std::fill(u_.begin(), u_.end(), 0.0);
   worker_.begin(*batch_, *data_, 0, {});
-  if (task_.spec().opening) {
+  if (task_.spec().warm_up) {
     for (int k = 0; k < task_.spec().steps_per_action; ++k) {
       worker_.compute_controls(*batch_, *data_, 0, k);
       stepper_.step_block(*batch_, 0, data_->u);
@@ -66,8 +66,8 @@ void TaskRollout::record_start() { worker_.record_start(*batch_, 0); }
 
 TaskView TaskRollout::start_view(int lane) const {
   TaskView view = view_of(*batch_, *data_, lane);
-  const std::span<const Moment> seen = worker_.moments(lane);
-  view.moments = task_.spec().opening ? seen : seen.last(1);
+  const std::span<const Snapshot> seen = worker_.snapshots(lane);
+  view.snapshots = task_.spec().warm_up ? seen : seen.last(1);
   return view;
 }
 
@@ -85,7 +85,7 @@ void TaskRollout::choose(const TaskActions& actions, ActionRecord& r) {
   const std::size_t width = task_.spec().action.size(), seen = task_.spec().observation_size();
   for (int l = 0; l < lanes(); ++l) {
     if (data_->state[as_size(l)] != EnvironmentState::running) continue;
-    const std::span<double> asked = number_row(r.asked, l, width);
+    const std::span<double> asked = number_row(r.chosen, l, width);
     actions(view_of(*batch_, *data_, l), number_row(data_->observation, l, seen), asked);
     for (std::size_t k = 0; k < width; ++k)
       if (!std::isfinite(asked[k]))
@@ -103,9 +103,9 @@ void TaskRollout::begin(ActionRecord& r) {
   };
   keep(data_->q, r.q);
   keep(data_->v, r.v);
-  keep(data_->memory, r.found);
-  worker_.begin(*batch_, *data_, 0, std::span<const double>(r.asked).first(data_->action.size()));
-  keep(data_->memory, r.memory);
+  keep(data_->task_state, r.found);
+  worker_.begin(*batch_, *data_, 0, std::span<const double>(r.chosen).first(data_->action.size()));
+  keep(data_->task_state, r.task_state);
   keep(data_->action, r.action);
 }
 
@@ -127,10 +127,11 @@ void TaskRollout::recompute_restart(const ActionRecord& r, std::int64_t action) 
     const auto q = number_row(r.q, l, q_.size()), v = number_row(r.v, l, v_.size());
     std::copy(q.begin(), q.end(), q_.begin());
     std::copy(v.begin(), v.end(), v_.begin());
-    const Moment seen{q, v, {}, {}};
-    task_.place(
-        view(r, action, l, number_row(r.memory, l, as_size(task_.spec().memory)), {&seen, 1}), q_,
-        v_);
+    const Snapshot seen{q, v, {}, {}};
+    task_.restart_state(
+        view(r, action, l, number_row(r.task_state, l, as_size(task_.spec().task_state)),
+             {&seen, 1}),
+        q_, v_);
     batch_->set_state(l, q_, v_);
   }
 }
@@ -147,25 +148,25 @@ void TaskRollout::retake_steps(const ActionRecord& r, std::int64_t action, Block
 }
 
 void TaskRollout::recompute_controls(const ActionRecord& r, std::int64_t action, int step,
-                            const BlockTape& tape) {
-  const std::size_t memory = as_size(task_.spec().memory);
+                                     const BlockTape& tape) {
+  const std::size_t memory = as_size(task_.spec().task_state);
   for (int l = 0; l < lanes(); ++l) {
     if (!r.taken[as_size(l)]) continue;
-    const Moment first = first_moment(tape, l);
-    task_.controls(view(r, action, l, number_row(r.memory, l, memory), {&first, 1}), step,
+    const Snapshot first = first_moment(tape, l);
+    task_.controls(view(r, action, l, number_row(r.task_state, l, memory), {&first, 1}), step,
                    number_row(u_, l, as_size(task_.model().nu())));
   }
 }
 
 void TaskRollout::recompute_snapshots(const BlockTape& tape) {
-  for (const int moment : task_.spec().moments) {
+  for (const int moment : task_.spec().snapshots) {
     tape.show(moment, *batch_, 0);
     worker_.record_snapshot(*batch_, 0, moment - 1, recounted_);
   }
 }
 
 TaskView TaskRollout::view(const ActionRecord& r, std::int64_t action, int lane,
-                           std::span<const double> memory, std::span<const Moment> now) const {
+                           std::span<const double> memory, std::span<const Snapshot> now) const {
   return {batch_->seed(),
           data_->episodes[as_size(lane)],
           action,
@@ -174,7 +175,7 @@ TaskView TaskRollout::view(const ActionRecord& r, std::int64_t action, int lane,
           now};
 }
 
-Moment TaskRollout::first_moment(const BlockTape& tape, int lane) {
+Snapshot TaskRollout::first_moment(const BlockTape& tape, int lane) {
   const double* const column = tape.state(0) + lane;
   for (std::size_t i = 0; i < q_.size(); ++i) q_[i] = column[i * kBlock];
   for (std::size_t i = 0; i < v_.size(); ++i) v_[i] = column[(q_.size() + i) * kBlock];

@@ -21,8 +21,8 @@ using TaskActions = std::function<void(const TaskView& view, std::span<const dou
 /// The start of an action, for every lane.
 struct ActionRecord {
   std::vector<double> q, v;  ///< (16, nq), (16, nv) when it was chosen, before a task restarts
-  std::vector<double> found, memory;          ///< (16, memory) before and after begin_action
-  std::vector<double> asked, action;          ///< (16, action): as chosen, as taken
+  std::vector<double> found, task_state;      ///< (16, memory) before and after begin_action
+  std::vector<double> chosen, action;         ///< (16, action): as chosen, as taken
   std::array<bool, kernels::kBlock> taken{};  ///< false: the episode had ended
 
   explicit ActionRecord(const Task& task);
@@ -61,7 +61,8 @@ class TaskRollout {
   void recompute_restart(const ActionRecord& record, std::int64_t action);
   /// Fills u() with the controls for the steps of an action from `step` on, for lanes that took it.
   /// The action's first state is entry 0 of `tape`.
-  void recompute_controls(const ActionRecord& record, std::int64_t action, int step, const BlockTape& tape);
+  void recompute_controls(const ActionRecord& record, std::int64_t action, int step,
+                          const BlockTape& tape);
   /// Reads again what the task saw during the action on `tape`.
   void recompute_snapshots(const BlockTape& tape);
 
@@ -71,15 +72,17 @@ class TaskRollout {
   [[nodiscard]] const EnvironmentData& data() const { return *data_; }
   [[nodiscard]] int lanes() const { return batch_->environments(); }
   [[nodiscard]] std::span<const double> u() const { return u_; }
-  [[nodiscard]] std::span<const Moment> moments(int lane) const { return worker_.moments(lane); }
+  [[nodiscard]] std::span<const Snapshot> snapshots(int lane) const {
+    return worker_.snapshots(lane);
+  }
   [[nodiscard]] Integrator integrator() const { return stepper_.integrator(); }
   [[nodiscard]] const VectorCounts& counts() const { return counts_; }
 
   /// What the task saw when it took action number `action`. The caller gives `memory` and `now`.
   [[nodiscard]] TaskView view(const ActionRecord& record, std::int64_t action, int lane,
-                              std::span<const double> memory, std::span<const Moment> now) const;
+                              std::span<const double> memory, std::span<const Snapshot> now) const;
   /// A lane's first state of an action, from its tape.
-  [[nodiscard]] Moment first_moment(const BlockTape& tape, int lane);
+  [[nodiscard]] Snapshot first_moment(const BlockTape& tape, int lane);
 
  private:
   const Task& task_;

@@ -32,7 +32,7 @@ struct TaskTangent::OwnCotangent {
   std::vector<SnapshotCotangent> moments;
 
   OwnCotangent(const Task& task, std::size_t count)
-      : memory(as_size(task.spec().memory)), action(task.spec().action.size()) {
+      : memory(as_size(task.spec().task_state)), action(task.spec().action.size()) {
     const std::vector<double> dofs(as_size(task.model().nv()));
     for (std::size_t m = 0; m < count; ++m) {
       q.push_back(dofs);
@@ -57,12 +57,12 @@ TaskTangent::TaskTangent(TaskRollout& rollout, std::span<const double> actions,
       task_(rollout.task()),
       tangent_(task_.model(), options),
       readout_(task_.model()),
-      memory_(as_size(task_.spec().memory)),
+      memory_(as_size(task_.spec().task_state)),
       action_(task_.spec().action.size()) {
   for (std::size_t a = 0; a * action_.size() < actions.size(); ++a) {
     ActionRecord& r = records_.emplace_back(task_);
     const auto own = actions.subspan(a * action_.size(), action_.size());
-    std::copy(own.begin(), own.end(), r.asked.begin());
+    std::copy(own.begin(), own.end(), r.chosen.begin());
     rollout.begin(r);
     tapes_.emplace_back(task_.model(), rollout.integrator(), task_.spec().steps_per_action);
     rollout.take_steps(&tapes_.back());
@@ -90,7 +90,7 @@ double TaskTangent::take(std::span<const double> change, std::span<const double>
   action_ = given(change, action_.size());
   rollout_.recompute_snapshots(tapes_[action]);
   begin(action);
-  seen_ = unseen(task_.spec().moments.size());
+  seen_ = unseen(task_.spec().snapshots.size());
   take_steps(action, numbers);
   return reward(action);
 }
@@ -105,7 +105,7 @@ ViewTangent TaskTangent::unseen(std::size_t moments) const {
 
 TaskView TaskTangent::view() const {
   return rollout_.view(records_[taken_ - 1], std::int64_t(taken_), 0,
-                       first_lane(records_[taken_ - 1].memory), rollout_.moments(0));
+                       first_lane(records_[taken_ - 1].task_state), rollout_.snapshots(0));
 }
 
 ViewTangent TaskTangent::seen_at_start(std::span<const double> numbers) {
@@ -120,15 +120,15 @@ TaskView TaskTangent::start_view() {
   rollout_.record_start();
   TaskView view = rollout_.start_view(0);
   view.actions = 0;
-  view.memory = first_lane(records_.front().found);
-  view.moments = view.moments.last(1);
+  view.task_state = first_lane(records_.front().found);
+  view.snapshots = view.snapshots.last(1);
   return view;
 }
 
 /// Computes the memory that the action keeps, and the state from which it starts.
 void TaskTangent::begin(std::size_t action) {
   const ActionRecord& r = records_[action];
-  const Moment seen{first_lane(r.q), first_lane(r.v), {}, {}};
+  const Snapshot seen{first_lane(r.q), first_lane(r.v), {}, {}};
   std::vector<double> memory(memory_.size());
   for (std::size_t k = 0; k < memory.size(); ++k) {
     OwnCotangent bar(task_, 1);
@@ -147,8 +147,9 @@ void TaskTangent::begin(std::size_t action) {
     OwnCotangent bar(task_, 1);
     std::vector<double> q(nv), v(nv);
     (i < nv ? q[i] : v[i - nv]) = 1;
-    task_.restart_state_vjp(rollout_.view(r, std::int64_t(action), 0, first_lane(r.memory), {&seen, 1}), q,
-                    v, bar.out());
+    task_.restart_state_vjp(
+        rollout_.view(r, std::int64_t(action), 0, first_lane(r.task_state), {&seen, 1}), q, v,
+        bar.out());
     (i < nv ? placed.q[i] : placed.v[i - nv]) = bar.start_dot(state_, memory_, action_);
   }
   state_ = placed;
@@ -169,16 +170,16 @@ void TaskTangent::take_steps(std::size_t action, std::span<const double> numbers
         OwnCotangent bar(task_, 1);
         std::vector<double> weight(nu);
         weight[k] = 1;
-        const Moment first = rollout_.first_moment(tape, 0);
+        const Snapshot first = rollout_.first_moment(tape, 0);
         task_.controls_vjp(
-            rollout_.view(r, std::int64_t(action), 0, first_lane(r.memory), {&first, 1}), t, weight,
-            bar.out());
+            rollout_.view(r, std::int64_t(action), 0, first_lane(r.task_state), {&first, 1}), t,
+            weight, bar.out());
         u_dot[k] = bar.start_dot(start, memory_, action_);
       }
     }
     tape.show(t, rollout_.batch(), 0);
     tangent_.step(rollout_.batch(), 0, 0, tape, t, rollout_.u().first(nu), u_dot, numbers, state_);
-    if (spec.moments[next] == t + 1) look(tape, t + 1, next++, numbers, seen_);
+    if (spec.snapshots[next] == t + 1) look(tape, t + 1, next++, numbers, seen_);
   }
 }
 
@@ -208,7 +209,7 @@ void TaskTangent::look(const BlockTape& tape, int step, std::size_t moment,
 double TaskTangent::reward(std::size_t action) const {
   OwnCotangent bar(task_, seen_.q.size());
   task_.reward_vjp(rollout_.view(records_[action], std::int64_t(action) + 1, 0,
-                                 first_lane(records_[action].memory), rollout_.moments(0)),
+                                 first_lane(records_[action].task_state), rollout_.snapshots(0)),
                    1, bar.out());
   double sum = product(bar.memory, seen_.memory) + product(bar.action, seen_.action);
   for (std::size_t m = 0; m < seen_.q.size(); ++m)

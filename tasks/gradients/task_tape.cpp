@@ -281,7 +281,7 @@ double TaskTape::bytes(const Task& task, int environments, const TaskTapeOptions
   const TaskTapeOptions o = checked(task, environments, asked);
   const std::size_t shown = task.spec().observation_size() + 2 * as_size(task.model().nv());
   // Cotangents of moments, and what an opening has shown, take as much as moments.
-  const double moments = (task.spec().opening ? 2 : 1) * BlockWorker::bytes(task);
+  const double moments = (task.spec().warm_up ? 2 : 1) * BlockWorker::bytes(task);
   return bytes_of(tapes_of(task, environments, o)) +
          double(blocks_of(environments)) * (ActionBlock::workspace_bytes(task) + moments) +
          double(environments) * (2 * 8.0 * double(shown) + EnvironmentData::bytes(task));

@@ -282,7 +282,7 @@ BenchmarkResult run_benchmark(const Batch& start, const Task& task, const Policy
                                              TaskProgram::AtEnd::again);
       }).run();
   result.tactile_points = static_cast<std::int64_t>(task.tactile_size() / 3) *
-                          std::ssize(task.spec().moments) * start.environments() *
+                          std::ssize(task.spec().snapshots) * start.environments() *
                           options.rollout.steps;
   return result;
 }

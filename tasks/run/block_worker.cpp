@@ -20,7 +20,7 @@ EnvironmentData::EnvironmentData(const Task& task, int environments) {
   const TaskSpec& spec = task.spec();
   const Model& model = task.model();
   const std::size_t e = as_size(environments);
-  memory.resize(e * as_size(spec.memory));
+  task_state.resize(e * as_size(spec.task_state));
   action.resize(e * spec.action.size());
   observation.resize(e * spec.observation_size());
   u.resize(e * as_size(model.nu()));
@@ -41,9 +41,10 @@ EnvironmentData::EnvironmentData(const Task& task, int environments) {
 double EnvironmentData::bytes(const Task& task) {
   const TaskSpec& spec = task.spec();
   const Model& model = task.model();
-  const std::size_t numbers = as_size(spec.memory) + spec.action.size() + spec.observation_size() +
-                              as_size(model.nu()) + as_size(model.nq()) + as_size(model.nv()) + 5;
-  return static_cast<double>(numbers * sizeof(double) + 5 + sizeof(Moment));
+  const std::size_t numbers = as_size(spec.task_state) + spec.action.size() +
+                              spec.observation_size() + as_size(model.nu()) + as_size(model.nq()) +
+                              as_size(model.nv()) + 5;
+  return static_cast<double>(numbers * sizeof(double) + 5 + sizeof(Snapshot));
 }
 
 void EnvironmentData::restart(const Batch& batch) {
@@ -62,12 +63,12 @@ void EnvironmentData::start_next(int first, int environments) {
 
 TaskView view_of(const Batch& batch, const EnvironmentData& data, int environment) {
   const std::size_t e = as_size(environment), environments = data.reward.size();
-  const std::size_t memory = data.memory.size() / environments,
+  const std::size_t memory = data.task_state.size() / environments,
                     action = data.action.size() / environments;
   return {batch.seed(),
           data.episodes[e],
           data.length[e],
-          number_row(data.memory, environment, memory),
+          number_row(data.task_state, environment, memory),
           number_row(data.action, environment, action),
           {&data.now[e], 1}};
 }
@@ -77,7 +78,7 @@ BlockWorker::BlockWorker(const Task& task, Precision precision)
       readout_(task.model(), precision),
       varying_(task.model().scene().randomizations.size()) {
   const TaskSpec& spec = task.spec();
-  const std::size_t moments = spec.moments.size();
+  const std::size_t moments = spec.snapshots.size();
   q_.resize(moments * kBlock * as_size(task.model().nq()));
   v_.resize(moments * kBlock * as_size(task.model().nv()));
   end_effectors_.resize(moments * kBlock * task.end_effectors_size());
@@ -95,12 +96,12 @@ BlockWorker::BlockWorker(const Task& task, Precision precision)
 double BlockWorker::bytes(const Task& task) {
   const std::size_t numbers = as_size(task.model().nq()) + as_size(task.model().nv()) +
                               task.end_effectors_size() + task.tactile_size();
-  return static_cast<double>(task.spec().moments.size() * kBlock * numbers * sizeof(double));
+  return static_cast<double>(task.spec().snapshots.size() * kBlock * numbers * sizeof(double));
 }
 
 std::span<double> BlockWorker::part(std::vector<double>& of_moments, std::size_t moment,
                                     int lane) const {
-  const std::size_t width = of_moments.size() / (task_.spec().moments.size() * kBlock);
+  const std::size_t width = of_moments.size() / (task_.spec().snapshots.size() * kBlock);
   return std::span(of_moments).subspan((moment * kBlock + as_size(lane)) * width, width);
 }
 
@@ -142,13 +143,14 @@ void BlockWorker::record_snapshot(const Batch& batch, int block, int step, Vecto
   const int first = block * kBlock, last = std::min(first + kBlock, batch.environments());
   for (int e = first; e < last; ++e)
     if (!batch.held(e) && !failed(batch.status(e))) counts.steps.count(batch, e);
-  const std::vector<int>& moments = task_.spec().moments;
+  const std::vector<int>& moments = task_.spec().snapshots;
   const auto moment = std::lower_bound(moments.begin(), moments.end(), step + 1);
-  if (*moment == step + 1) look(batch, block, as_size(static_cast<int>(moment - moments.begin())));
+  if (*moment == step + 1)
+    read_snapshot(batch, block, as_size(static_cast<int>(moment - moments.begin())));
 }
 
 void BlockWorker::record_start(const Batch& batch, int block) {
-  look(batch, block, task_.spec().moments.size() - 1);
+  read_snapshot(batch, block, task_.spec().snapshots.size() - 1);
 }
 
 void BlockWorker::conclude(Batch& batch, EnvironmentData& data, int block, VectorCounts& counts) {
@@ -156,8 +158,8 @@ void BlockWorker::conclude(Batch& batch, EnvironmentData& data, int block, Vecto
   for (int e = first; e < last; ++e) conclude_one(batch, data, e, counts);
 }
 
-std::span<const Moment> BlockWorker::moments(int lane) const {
-  const std::size_t count = task_.spec().moments.size();
+std::span<const Snapshot> BlockWorker::snapshots(int lane) const {
+  const std::size_t count = task_.spec().snapshots.size();
   return std::span(moments_).subspan(as_size(lane) * count, count);
 }
 
@@ -166,7 +168,8 @@ void BlockWorker::start(Batch& batch, EnvironmentData& data, int environment) {
   const std::size_t e = as_size(environment);
   const std::span<double> q = number_row(data.q, environment, as_size(task_.model().nq()));
   const std::span<double> v = number_row(data.v, environment, as_size(task_.model().nv()));
-  const std::span<double> memory = number_row(data.memory, environment, as_size(spec.memory));
+  const std::span<double> memory =
+      number_row(data.task_state, environment, as_size(spec.task_state));
   data.episodes[e] = data.next_episode[e];
   data.length[e] = 0;
   data.returns[e] = 0;
@@ -182,10 +185,10 @@ void BlockWorker::start(Batch& batch, EnvironmentData& data, int environment) {
       batch.set_randomized_value(environment, static_cast<int>(k), varying_[k]);
   const std::span<double> action = number_row(data.action, environment, spec.action.size());
   std::fill(action.begin(), action.end(), 0.0);
-  if (spec.settling_steps > 0) settle(batch, data, environment);
+  if (spec.settling_steps > 0) settle_start(batch, data, environment);
   batch.set_state(environment, q, v);
-  if (spec.settling_steps > 0) batch.set_memory(environment, settling_->memory(0));
-  if (spec.opening) {
+  if (spec.settling_steps > 0) batch.set_shear_state(environment, settling_->shear_state(0));
+  if (spec.warm_up) {
     task_.begin_action(view_of(batch, data, environment), memory);
   } else {
     batch.hold(environment);
@@ -193,10 +196,10 @@ void BlockWorker::start(Batch& batch, EnvironmentData& data, int environment) {
 }
 
 /// Settles one environment alone, so that the others' steps do not wait for it.
-void BlockWorker::settle(const Batch& batch, EnvironmentData& data, int environment) {
+void BlockWorker::settle_start(const Batch& batch, EnvironmentData& data, int environment) {
   const Model& model = task_.model();
   if (!settling_ || settling_->seed() != batch.seed()) settling_.emplace(model, 1, batch.seed());
-  const Moment& now = data.now[as_size(environment)];
+  const Snapshot& now = data.now[as_size(environment)];
   settling_->reset(0, data.episodes[as_size(environment)]);
   for (std::size_t k = 0; k < varying_.size(); ++k)
     if (batch.is_parameter(static_cast<int>(k)))
@@ -219,15 +222,15 @@ void BlockWorker::take_action(Batch& batch, EnvironmentData& data, int environme
     action[k] = std::clamp(asked, spec.low, spec.high);
   }
   task_.begin_action(view_of(batch, data, environment),
-                     number_row(data.memory, environment, as_size(task_.spec().memory)));
+                     number_row(data.task_state, environment, as_size(task_.spec().task_state)));
   if (!task_.spec().restarts) return;
   const std::span<double> q = number_row(data.q, environment, as_size(task_.model().nq()));
   const std::span<double> v = number_row(data.v, environment, as_size(task_.model().nv()));
-  task_.place(view_of(batch, data, environment), q, v);
+  task_.restart_state(view_of(batch, data, environment), q, v);
   batch.set_state(environment, q, v);
 }
 
-void BlockWorker::look(const Batch& batch, int block, std::size_t moment) {
+void BlockWorker::read_snapshot(const Batch& batch, int block, std::size_t moment) {
   const int first = block * kBlock;
   const auto place = [&](std::vector<double>& of_moments) {
     return
@@ -247,23 +250,23 @@ void BlockWorker::conclude_one(Batch& batch, EnvironmentData& data, int environm
   data.reward[e] = 0;
   if (data.state[e] == EnvironmentState::over) return;
   TaskView view = view_of(batch, data, environment);
-  const std::span<const Moment> moments = this->moments(environment % kBlock);
-  view.moments = moments;
-  const Moment& now = moments.back();
+  const std::span<const Snapshot> moments = this->snapshots(environment % kBlock);
+  view.snapshots = moments;
+  const Snapshot& now = moments.back();
   std::copy(now.q.begin(), now.q.end(), number_row(data.q, environment, now.q.size()).begin());
   std::copy(now.v.begin(), now.v.end(), number_row(data.v, environment, now.v.size()).begin());
   data.terminated[e] = data.truncated[e] = data.success[e] = 0;
   if (data.starting[e] != 0) {
-    if (!spec.opening) {
+    if (!spec.warm_up) {
       batch.hold(environment, false);
-      view.moments = moments.last(1);
+      view.snapshots = moments.last(1);
     }
     data.state[e] = EnvironmentState::running;
   } else {
     const bool lost = failed(batch.status(environment));
     ++counts.environment_steps;
     view.actions = ++data.length[e];
-    Verdict verdict = task_.judge(view);
+    StepOutcome verdict = task_.evaluate(view);
     if (lost && !std::isfinite(verdict.reward)) verdict.reward = 0;  // the action was no number
     data.reward[e] = verdict.reward;
     data.returns[e] += verdict.reward;

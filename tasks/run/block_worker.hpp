@@ -33,12 +33,12 @@ struct EnvironmentData {
   /// action. Environment e plays e, e + E, e + 2 E … counted from the first episode.
   void start_next(int first, int environments);
 
-  std::vector<double> memory, action, observation, u, q, v;
+  std::vector<double> task_state, action, observation, u, q, v;
   std::vector<double> reward, returns;
   std::vector<std::uint8_t> terminated, truncated, success, starting;
   std::vector<std::int64_t> length, episodes, next_episode;
   std::vector<EnvironmentState> state;
-  std::vector<Moment> now;  ///< views of q and v
+  std::vector<Snapshot> now;  ///< views of q and v
 };
 
 class BlockWorker {
@@ -59,16 +59,16 @@ class BlockWorker {
   void record_start(const Batch& batch, int block);
   void conclude(Batch& batch, EnvironmentData& data, int block, VectorCounts& counts);
   /// What was seen of a lane of the block looked at last: each of the task's moments.
-  [[nodiscard]] std::span<const Moment> moments(int lane) const;
+  [[nodiscard]] std::span<const Snapshot> snapshots(int lane) const;
 
   static double bytes(const Task& task);
 
  private:
   void start(Batch& batch, EnvironmentData& data, int environment);
-  void settle(const Batch& batch, EnvironmentData& data, int environment);
+  void settle_start(const Batch& batch, EnvironmentData& data, int environment);
   void take_action(Batch& batch, EnvironmentData& data, int environment,
                    std::span<const double> actions);
-  void look(const Batch& batch, int block, std::size_t moment);
+  void read_snapshot(const Batch& batch, int block, std::size_t moment);
   void conclude_one(Batch& batch, EnvironmentData& data, int environment, VectorCounts& counts);
   [[nodiscard]] std::span<double> part(std::vector<double>& of_moments, std::size_t moment,
                                        int lane) const;
@@ -79,7 +79,7 @@ class BlockWorker {
   std::optional<Batch> settling_;                        // one environment
   std::vector<double> varying_;                          // values of the environment that starts
   std::vector<double> q_, v_, end_effectors_, tactile_;  // (moments, 16, width)
-  std::vector<Moment> moments_;                          // (16, moments): views of them
+  std::vector<Snapshot> moments_;                        // (16, moments): views of them
 };
 
 /// Returns what a task may look at between two actions of an environment.

@@ -26,21 +26,21 @@ EnergyBalanceRecorder::EnergyBalanceRecorder(const Batch& batch, double h, RowSi
 }
 
 double EnergyBalanceRecorder::bytes(int environments) {
-  return environments *
-         double(sizeof(Audit) + sizeof(Sums) + (kEnergies + kMomenta + kPassed) * sizeof(double));
+  return environments * double(sizeof(EnergyBalance) + sizeof(Sums) +
+                               (kEnergies + kMomenta + kPassed) * sizeof(double));
 }
 
-Audit EnergyBalanceRecorder::audit(int environment, std::span<const double> u) {
+EnergyBalance EnergyBalanceRecorder::audit(int environment, std::span<const double> u) {
   const std::size_t nu = as_size(batch_.model().nu());
-  return auditor_.audit(batch_, environment, u.subspan(as_size(environment) * nu, nu));
+  return auditor_.read(batch_, environment, u.subspan(as_size(environment) * nu, nu));
 }
 
-void EnergyBalanceRecorder::set_row(int environment, const Audit& audit) {
+void EnergyBalanceRecorder::set_row(int environment, const EnergyBalance& audit) {
   const std::size_t e = as_size(environment);
-  const double energy[] = {audit.motion, audit.height, audit.held};
+  const double energy[] = {audit.kinetic, audit.potential, audit.elastic};
   std::copy_n(energy, kEnergies, &energy_[e * kEnergies]);
   std::copy_n(audit.momentum.begin(), kMomenta, &momentum_[e * kMomenta]);
-  sums_[e].most = std::max(sums_[e].most, audit.motion + audit.held);
+  sums_[e].most = std::max(sums_[e].most, audit.kinetic + audit.elastic);
 }
 
 void EnergyBalanceRecorder::start() {
@@ -53,23 +53,24 @@ void EnergyBalanceRecorder::before(std::span<const double> u) {
   for (int e = 0; e < batch_.environments(); ++e) before_[as_size(e)] = audit(e, u);
 }
 
-void EnergyBalanceRecorder::after(std::int64_t step, std::span<const double> u, const StepTally& tally) {
+void EnergyBalanceRecorder::after(std::int64_t step, std::span<const double> u,
+                                  const StepTally& tally) {
   for (int e = 0; e < batch_.environments(); ++e) {
     const std::size_t i = as_size(e);
     StepEnergyBalance passed;
     if (tally.steps(batch_, e) && !failed(batch_.status(e))) {
-      const Audit now = audit(e, u);
+      const EnergyBalance now = audit(e, u);
       passed = between(before_[i], now, h_);
       set_row(e, now);
     }
-    passed_[i * kPassed] = passed.motors;
-    passed_[i * kPassed + 1] = passed.taken;
-    passed_[i * kPassed + 2] = passed.made;
+    passed_[i * kPassed] = passed.motor_work;
+    passed_[i * kPassed + 1] = passed.dissipated;
+    passed_[i * kPassed + 2] = passed.integrator_error;
     Sums& sums = sums_[i];
-    sums.motors += passed.motors;
-    sums.work += std::abs(passed.motors);
-    sums.taken += passed.taken;
-    sums.made += passed.made;
+    sums.motors += passed.motor_work;
+    sums.work += std::abs(passed.motor_work);
+    sums.taken += passed.dissipated;
+    sums.made += passed.integrator_error;
   }
   sink_.write(AuditRow{step + 1, energy_, momentum_, passed_});
 }

@@ -27,14 +27,14 @@ class EnergyBalanceRecorder {
   static double bytes(int environments);
 
  private:
-  [[nodiscard]] Audit audit(int environment, std::span<const double> u);
-  void set_row(int environment, const Audit& audit);
+  [[nodiscard]] EnergyBalance audit(int environment, std::span<const double> u);
+  void set_row(int environment, const EnergyBalance& audit);
 
   const Batch& batch_;
   double h_;
   RowSink& sink_;
   EnergyBalanceReader auditor_;
-  std::vector<Audit> before_;                       // (E)
+  std::vector<EnergyBalance> before_;               // (E)
   std::vector<double> energy_, momentum_, passed_;  // as in AuditRow
   struct Sums {
     double motors = 0, taken = 0, made = 0, work = 0, most = 0;

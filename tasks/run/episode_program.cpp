@@ -49,7 +49,7 @@ TaskProgram::TaskProgram(const Task& task, const Policy& policy,
 
 void TaskProgram::start(Batch& batch, int block) {
   worker(block).begin(batch, *data_, block, {});
-  if (task_.spec().opening) return;
+  if (task_.spec().warm_up) return;
   worker(block).record_start(batch, block);
   worker(block).conclude(batch, *data_, block, counts_);
 }
@@ -119,7 +119,7 @@ void TaskProgram::judge(Batch& batch, int block) {
 }
 
 std::int64_t TaskProgram::steps(const TaskSpec& spec) {
-  return (spec.horizon + (spec.opening ? 1 : 0)) * static_cast<std::int64_t>(spec.steps_per_action);
+  return (spec.horizon + (spec.warm_up ? 1 : 0)) * static_cast<std::int64_t>(spec.steps_per_action);
 }
 
 }  // namespace tangere

@@ -84,7 +84,7 @@ class TaskProgram : public EpisodeProgram {
 
   [[nodiscard]] int steps_per_row() const override { return task_.spec().steps_per_action; }
   [[nodiscard]] int opening_steps() const override {
-    return task_.spec().opening ? task_.spec().steps_per_action : 0;
+    return task_.spec().warm_up ? task_.spec().steps_per_action : 0;
   }
   void start(Batch& batch, int block) override;
   void controls(std::int64_t step, Batch& batch, int block, std::span<double> u) override;

@@ -8,9 +8,9 @@
 #include <string>
 
 #include "kernels/numbers/block.hpp"
-#include "tasks/run/energy_balance_recorder.hpp"
 #include "tasks/run/block_reader.hpp"
 #include "tasks/run/block_threads.hpp"
+#include "tasks/run/energy_balance_recorder.hpp"
 
 namespace tangere {
 namespace {
@@ -92,7 +92,7 @@ class Recorder {
 
   void write_memory(std::int64_t step) {
     if (options_.outputs.memory && is_due(options_.outputs.of_memory, step))
-      sink_.write(MemoryRow{step, batch_.memories()});
+      sink_.write(MemoryRow{step, batch_.shear_states()});
   }
 
   /// Writes step `step`, which has been taken but not counted yet.

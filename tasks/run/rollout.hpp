@@ -41,12 +41,12 @@ struct RolloutOptions {
 };
 
 struct RolloutSummary {
-  std::int64_t steps = 0;                   ///< done; fewer than requested if the caller stopped it
-  StepCounts counts;                        ///< of environments' steps, failing ones included
-  std::optional<EnergyBalanceSummary> audit;        ///< if it was asked for
-  std::vector<FailedEnvironment> failures;  ///< in the order in which they failed
-  bool stopped = false;                     ///< progress returned false
-  double seconds = 0;                       ///< wall clock of the whole rollout, sink included
+  std::int64_t steps = 0;  ///< done; fewer than requested if the caller stopped it
+  StepCounts counts;       ///< of environments' steps, failing ones included
+  std::optional<EnergyBalanceSummary> audit;  ///< if it was asked for
+  std::vector<FailedEnvironment> failures;    ///< in the order in which they failed
+  bool stopped = false;                       ///< progress returned false
+  double seconds = 0;                         ///< wall clock of the whole rollout, sink included
 };
 
 /// Is called after each step with the number of steps done. False stops the run at this safe point.

@@ -13,8 +13,9 @@ struct StepCounts {
   std::int64_t simulation_steps = 0;
   std::int64_t newton_iterations = 0;
   std::int64_t split_steps = 0;
-  std::int64_t accuracy_not_met_steps = 0;       ///< with parts that missed the accuracy that was asked for
-  std::int64_t tunnelled_steps = 0;       ///< in which a body came through another
+  std::int64_t accuracy_not_met_steps =
+      0;                               ///< with parts that missed the accuracy that was asked for
+  std::int64_t tunnelled_steps = 0;    ///< in which a body came through another
   std::int64_t damped_steps = 0;       ///< that would have created energy
   std::int64_t overlapping_steps = 0;  ///< after which bodies of a contact overlap unnoticed
   std::int64_t bodies_asleep = 0;      ///< summed over simulation_steps

@@ -24,7 +24,7 @@ const char* to_string(StressVerdict value);
 /// One case with one scheme and one step.
 struct StressRow {
   const StressCase* of = nullptr;
-  Integrator integrator = Integrator::usual;
+  Integrator integrator = Integrator::default_integrator;
   double step = 0;           ///< [s]
   double accuracy = 0;       ///< of its parts; 0: steps are not cut
   double value = 0;          ///< measured, in the worst environment that did not fail; NaN: none

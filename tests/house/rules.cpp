@@ -36,7 +36,7 @@ const std::map<std::string, Folder, std::less<>>& folders() {
       {"kernels/step", {{"kernels/tactile", "kernels/contact", "kernels/numbers"}, of_kernels}},
       {"kernels/reverse",
        {{"kernels/step", "kernels/tactile", "kernels/contact", "kernels/numbers"}, of_kernels}},
-      {"kernels/memory",
+      {"kernels/shear",
        {{"kernels/reverse", "kernels/step", "kernels/tactile", "kernels/contact",
          "kernels/numbers"},
         of_kernels}},

@@ -90,12 +90,12 @@ inline Played play_episodes(const Task& task, PolicyKind kind, int episodes,
 struct OwnView {
   std::vector<double> memory, action;
   std::vector<std::vector<double>> q, v, end_effectors, tactile;  // per moment
-  std::vector<Moment> moments;
+  std::vector<Snapshot> moments;
   std::int64_t actions = 0;
 
   explicit OwnView(const Task& task)
-      : memory(std::size_t(task.spec().memory)), action(task.spec().action.size()) {
-    for (std::size_t m = 0; m < task.spec().moments.size(); ++m) {
+      : memory(std::size_t(task.spec().task_state)), action(task.spec().action.size()) {
+    for (std::size_t m = 0; m < task.spec().snapshots.size(); ++m) {
       q.emplace_back(std::size_t(task.model().nq()));
       v.emplace_back(std::size_t(task.model().nv()));
       end_effectors.emplace_back(task.end_effectors_size());

@@ -50,7 +50,7 @@ inline std::vector<Start> starts(const Task& task) {
     Start s{std::vector<double>(std::size_t(task.model().nq())),
             std::vector<double>(std::size_t(task.model().nv())),
             {},
-            std::vector<double>(std::size_t(task.spec().memory))};
+            std::vector<double>(std::size_t(task.spec().task_state))};
     batch.get_q(0, s.q);
     batch.get_v(0, s.v);
     for (std::size_t k = 0; k < task.model().scene().randomizations.size(); ++k)

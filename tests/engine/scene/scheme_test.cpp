@@ -87,7 +87,7 @@ TEST(Schemes, OfHigherOrderLeaveGainsToOneOfOrderOne) {
     EXPECT_NE(&scheme, &Integrator::reference.scheme());
   }
   EXPECT_NE(Integrator::reference, Integrator::second_reference);
-  EXPECT_EQ(Scene{}.integrator, Integrator::usual);
+  EXPECT_EQ(Scene{}.integrator, Integrator::default_integrator);
 }
 
 TEST(Schemes, RefuseWhatNoStageSolves) {

@@ -27,7 +27,7 @@ using testing::v_of;
 struct Books {
   double motors = 0, taken = 0, made = 0;  ///< sums
   double made_at_most = 0;                 ///< |made| of a step
-  Audit last;
+  EnergyBalance last;
 };
 
 /// Plays a run from (q, v) and audits every step.
@@ -41,15 +41,15 @@ Books play(const Scene& scene, const testing::RunInput& in, Integrator scheme, d
   Books books;
   for (int t = 0; t < steps * parts; ++t) {
     const std::vector<double>& u = in.u[std::size_t(t / parts)];
-    const Audit start = auditor.audit(batch, 0, u);
+    const EnergyBalance start = auditor.read(batch, 0, u);
     stepper.step(batch, u);
     EXPECT_FALSE(failed(batch.status(0)));
-    books.last = auditor.audit(batch, 0, u);
+    books.last = auditor.read(batch, 0, u);
     const StepEnergyBalance step = between(start, books.last, stepper.timestep());
-    books.motors += step.motors;
-    books.taken += step.taken;
-    books.made += step.made;
-    books.made_at_most = std::max(books.made_at_most, std::abs(step.made));
+    books.motors += step.motor_work;
+    books.taken += step.dissipated;
+    books.made += step.integrator_error;
+    books.made_at_most = std::max(books.made_at_most, std::abs(step.integrator_error));
   }
   return books;
 }
@@ -61,7 +61,8 @@ TEST(Audit, BooksOfMachinesBalance) {
     const testing::RunInput in = testing::random_input(Model(scene), seed, 10);
     const Books coarse = play(scene, in, Integrator::sdirk3, 1e-3, 10, 1),
                 fine = play(scene, in, Integrator::sdirk3, 1e-3, 10, 16);
-    const double passed = std::abs(fine.motors) + fine.taken + fine.last.motion + fine.last.held;
+    const double passed =
+        std::abs(fine.motors) + fine.taken + fine.last.kinetic + fine.last.elastic;
     EXPECT_LE(std::abs(fine.made), 1e-3 * passed) << seed << " of " << passed << " J";
     EXPECT_LE(std::abs(fine.made), 0.1 * std::abs(coarse.made) + 1e-9 * passed) << seed;
     EXPECT_GE(fine.taken, 0) << seed;
@@ -75,7 +76,7 @@ TEST(Audit, BooksOfContactsBalance) {
       const Scene scene = testing::random_contacts(seed, 4, law);
       const testing::RunInput in = testing::random_input(Model(scene), seed, 8);
       const Books fine = play(scene, in, Integrator::sdirk3, 1e-3, 8, 32);
-      const double passed = fine.taken + fine.last.motion + fine.last.held;
+      const double passed = fine.taken + fine.last.kinetic + fine.last.elastic;
       EXPECT_LE(std::abs(fine.made), 1e-3 * passed)
           << seed << " law " << int(law) << " of " << passed << " J";
     }
@@ -99,7 +100,7 @@ TEST(Audit, SaysWhatTheSchemeTook) {
   EXPECT_NEAR(books.made, books.last.energy() - start, 1e-15);
   EXPECT_LT(books.made, -0.9 * start);
   EXPECT_NEAR(books.last.momentum[2],
-              Model(s).mass(0) * std::sqrt(2 * books.last.motion / Model(s).mass(0)), 1e-12);
+              Model(s).mass(0) * std::sqrt(2 * books.last.kinetic / Model(s).mass(0)), 1e-12);
 }
 
 /// Friction takes the energy of a cube that slides to a stop.
@@ -132,7 +133,7 @@ TEST(Audit, MomentumOfAFreeBodyStays) {
   const Model model(s);
   Batch batch(model, 1);
   batch.set_state(0, in.q, in.v);
-  const Audit start = EnergyBalanceReader(model).audit(batch, 0, {});
+  const EnergyBalance start = EnergyBalanceReader(model).read(batch, 0, {});
   const Books end = play(s, in, Integrator::sdirk3, 1e-3, 200, 1);
   // Its centre moves with v + ω × c, and 300 m of arm carry that into the angular momentum.
   EXPECT_NEAR(start.momentum[1], model.mass(0) * (-0.2 + 3 * 0.03 - 2 * 0.01), 1e-12);
@@ -147,7 +148,8 @@ TEST(Audit, HeightIsThatInTheWorld) {
   s.links = {link("box", JointType::free, {0, 0, 500}, CuboidShape{{0.06, 0.04, 0.02}}, 1000)};
   const Model model(s);
   EXPECT_TRUE(compiled(model).moved);
-  EXPECT_NEAR(EnergyBalanceReader(model).audit(Batch(model, 1), 0, {}).height, model.mass(0) * 9.8 * 500, 1e-9);
+  EXPECT_NEAR(EnergyBalanceReader(model).read(Batch(model, 1), 0, {}).potential,
+              model.mass(0) * 9.8 * 500, 1e-9);
 }
 
 /// Numbers of a scene that vary are those of the environment, and a batch has the bits of one.
@@ -167,12 +169,13 @@ TEST(Audit, IsThatOfTheEnvironment) {
     Batch one(model, 1, 3, e);
     for (int t = 0; t < 90; ++t) testing::step_all(stepper, one, testing::rolling_ball_control(t));
     const std::vector<double> u = testing::rolling_ball_control(90);
-    const Audit a = together.audit(batch, e, u), b = EnergyBalanceReader(model).audit(one, 0, u);
+    const EnergyBalance a = together.read(batch, e, u),
+                        b = EnergyBalanceReader(model).read(one, 0, u);
     EXPECT_EQ(a.energy(), b.energy()) << e;
-    EXPECT_EQ(a.motors, b.motors) << e;
-    EXPECT_EQ(a.taken, b.taken) << e;
+    EXPECT_EQ(a.motor_power, b.motor_power) << e;
+    EXPECT_EQ(a.dissipation, b.dissipation) << e;
     EXPECT_EQ(a.momentum, b.momentum) << e;
-    least = std::min(least, a.height), most = std::max(most, a.height);
+    least = std::min(least, a.potential), most = std::max(most, a.potential);
   }
   EXPECT_GT(most, 1.2 * least);
 }

@@ -211,11 +211,11 @@ TEST(CalledKernels, LinksCarryTheirOwnEffects) {
     kernels::JointEffect bit;
     int links;
   };
-  for (const LinkCase& c : {LinkCase{EffectKind::joint_damping, kernels::kDamped, 2},
+  for (const LinkCase& c : {LinkCase{EffectKind::joint_damping, kernels::kDamping, 2},
                             LinkCase{EffectKind::joint_springs, kernels::kSpring, 1},
-                            LinkCase{EffectKind::joint_limits, kernels::kLimited, 1},
+                            LinkCase{EffectKind::joint_limits, kernels::kLimit, 1},
                             LinkCase{EffectKind::armature, kernels::kArmature, 1},
-                            LinkCase{EffectKind::position_motors, kernels::kDriven, 1}}) {
+                            LinkCase{EffectKind::position_motors, kernels::kPositionServo, 1}}) {
     SCOPED_TRACE(to_string(c.kind));
     const Scene scene = testing::scene_that_sleeps();
     EXPECT_EQ(links_with(scene, c.bit), c.links);

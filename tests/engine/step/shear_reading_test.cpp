@@ -67,7 +67,7 @@ struct Drag {
 TEST(ShearReading, KeepsWhatStickingPointsKeepAtEveryStep) {
   Drag step(0, 50), read(7, 50);
   for (Drag* d : {&step, &read}) d->go(7, 0.1);
-  EXPECT_EQ(read.batch.memory(0).size(), 2U * 16) << "b and a of 16 points";
+  EXPECT_EQ(read.batch.shear_state(0).size(), 2U * 16) << "b and a of 16 points";
   const auto first = whole(step.readout, step.batch), begun = whole(read.readout, read.batch);
   EXPECT_NEAR(begun[2], first[2], 1e-12) << "pressure does not remember";
   EXPECT_GT(std::abs(first[0]), 1e-3);
@@ -91,10 +91,10 @@ TEST(ShearReading, SlipsToTheSameBound) {
 TEST(ShearReading, ForgetsPointsThatLeave) {
   Drag read(5, 50);
   read.go(20, 0.1);
-  EXPECT_FALSE(read.batch.memory(0).empty());
+  EXPECT_FALSE(read.batch.shear_state(0).empty());
   const std::vector<double> up = {0, 0, 1};
   for (int t = 0; t < 200; ++t) read.stepper.step(read.batch, up);
-  EXPECT_TRUE(read.batch.memory(0).empty());
+  EXPECT_TRUE(read.batch.shear_state(0).empty());
 }
 
 /// Lanes of a group are due at steps of their own episodes.
@@ -119,7 +119,7 @@ TEST(ShearReading, HasTheSameBitsInAnyBatch) {
     Batch alone(model, 1, 0, e);
     for (int t = e; t < 43; ++t) stepper.step(alone, control(e, t));
     EXPECT_EQ(testing::q_of(alone, 0), testing::q_of(batch, e));
-    const ShearState &one = alone.memory(0), &other = batch.memory(e);
+    const ShearState &one = alone.shear_state(0), &other = batch.shear_state(e);
     ASSERT_EQ(one.size(), other.size()) << e;
     EXPECT_EQ(one.size(), 32U);
     for (std::size_t k = 0; k < one.size(); ++k)

@@ -73,7 +73,7 @@ TEST_P(Slope, BelowTheAngleOfFrictionABoxStandsStill) {
   EXPECT_NEAR(run.q(0), x, 1e-9);
   EXPECT_NEAR(run.q(2), z, 1e-9);
   double held = 0;  // by the springs alone
-  for (const ShearEntry& e : run.batch.memory(0)) held -= 500 * e.s[0];
+  for (const ShearEntry& e : run.batch.shear_state(0)) held -= 500 * e.s[0];
   EXPECT_NEAR(held, -0.2 * kGravity * std::sin(20 * M_PI / 180), 1e-6);
 }
 
@@ -176,7 +176,7 @@ TEST(Shear, ASkinKeepsItsShear) {
     EXPECT_NEAR(shear(), early, 1e-7);
     // The skin's normal points at the box, so what it feels is the box's pull along x.
     double moved = 0;
-    for (const ShearEntry& e : run.batch.memory(0))
+    for (const ShearEntry& e : run.batch.shear_state(0))
       if (e.point >= 8) moved -= e.s[0] / 49;
     EXPECT_NEAR(early, 49 * ks * moved, 1e-3);
     EXPECT_GT(early, 0.1);
@@ -188,7 +188,7 @@ TEST(Shear, ABlockIsSavedAndRestoredWithItsMemory) {
   Held run(slope(20, true, 500), Integrator::sdirk2, 5e-3);
   run.go(0.5);
   const BlockState saved = run.batch.save_block(0);
-  const ShearState memory = run.batch.memory(0);
+  const ShearState memory = run.batch.shear_state(0);
   EXPECT_EQ(memory.size(), 4U);
   run.go(0.2);
   const std::vector<double> went = testing::q_of(run.batch);
@@ -200,8 +200,8 @@ TEST(Shear, ABlockIsSavedAndRestoredWithItsMemory) {
     run.batch.restore_block(0, saved);
     const std::vector<double> q = testing::q_of(run.batch), v = testing::v_of(run.batch);
     run.batch.set_state(0, q, v);
-    EXPECT_TRUE(run.batch.memory(0).empty());
-    if (with_memory) run.batch.set_memory(0, memory);
+    EXPECT_TRUE(run.batch.shear_state(0).empty());
+    if (with_memory) run.batch.set_shear_state(0, memory);
     run.go(0.2);
     return testing::q_of(run.batch);
   };
@@ -213,7 +213,7 @@ TEST(Shear, MemoryThatTheSceneDoesNotHaveIsRefused) {
   Held run(slope(20, true, 500), Integrator::bdf1, 5e-3);
   const auto message = [&](const ShearState& memory) {
     try {
-      run.batch.set_memory(0, memory);
+      run.batch.set_shear_state(0, memory);
     } catch (const InputError& e) {
       return std::string(e.what());
     }
@@ -287,9 +287,10 @@ TEST(Shear, AnEnvironmentHasTheSameBitsInEveryLane) {
   }
   for (const int e : {0, 8, 15, 20}) {
     EXPECT_EQ(testing::q_of(one), testing::q_of(many, e)) << e;
-    ASSERT_EQ(one.memory(0).size(), many.memory(e).size());
-    for (std::size_t k = 0; k < one.memory(0).size(); ++k)
-      for (int c = 0; c < 3; ++c) EXPECT_EQ(one.memory(0)[k].s[c], many.memory(e)[k].s[c]);
+    ASSERT_EQ(one.shear_state(0).size(), many.shear_state(e).size());
+    for (std::size_t k = 0; k < one.shear_state(0).size(); ++k)
+      for (int c = 0; c < 3; ++c)
+        EXPECT_EQ(one.shear_state(0)[k].s[c], many.shear_state(e)[k].s[c]);
   }
 }
 

@@ -61,7 +61,7 @@ TEST(Passing, WhatIsOutOfReachDidNotPass) {
         const auto m = compile(spread_trees(seed, kSpreads[seed % 3]));
         Workspace w(*m);
         clear_candidates(w);  // all count as apart
-        const Passing passing(*m);
+        const TunnellingCheck passing(*m);
         for (int l = 0; l < kGroup; ++l) displace(*m, 100 * seed + unsigned(l), way, l, w);
         for (double& x : w.stage.c0_over_h.lane) x = 1;
         for (double& x : w.stage.inverse_h.lane) x = 1;
@@ -71,7 +71,7 @@ TEST(Passing, WhatIsOutOfReachDidNotPass) {
         table->group.poses_at(m->view, w.stage, w.q0, w.v0, w.zero, w.poses_before.data());
         table->group.poses_at(m->view, w.stage, w.q1, w.v0, w.zero, w.poses_after.data());
         for (int l = 0; l < kGroup; ++l) {
-          const bool came_through = passing.passed<kGroup>(w.poses_before, w.poses_after, l);
+          const bool came_through = passing.tunnelled<kGroup>(w.poses_before, w.poses_after, l);
           EXPECT_FALSE(came_through && has(spared, l)) << "seed " << seed << " lane " << l;
           passed += came_through ? 1 : 0;
           out_of_reach += has(spared, l) ? 1 : 0;

@@ -99,8 +99,7 @@ TEST(SensorImperfectionsElement, MistakesNameLineValueAndWhatWasExpected) {
   };
   expect("<imperfections nois=\"1\"/>", "25", {"unknown attribute 'nois'", "did you mean 'noise'"});
   expect("<imperfection/>", "25", {"did you mean 'imperfections'"});
-  expect("<imperfections noise=\"-0.1\"/>", "25",
-         {"noise=\"-0.1\"; expected zero or more"});
+  expect("<imperfections noise=\"-0.1\"/>", "25", {"noise=\"-0.1\"; expected zero or more"});
   expect("<imperfections dead=\"2\"/>", "25", {"dead=\"2\"; expected a number from 0 to 1"});
   expect("<imperfections noise=\"1 2 3\"/>", "25", {"3 numbers; expected 1 or 2"});
   expect("<imperfections gain=\"0.1 0.2\"/>", "25", {"2 numbers; expected 1"});

@@ -374,9 +374,9 @@ TEST_F(SurfaceFiles, ACompiledMeshIsTheCuboidInItsPlace) {
   const auto a = compile(placed), b = compile(cuboid);
   const kernels::Link &x = a->links.back(), &y = b->links.back();
   EXPECT_NEAR(x.mass, y.mass, 1e-14);
-  EXPECT_NEAR(x.moment.x, y.moment.x, 1e-15);
-  EXPECT_NEAR(x.moment.y, y.moment.y, 1e-15);
-  EXPECT_NEAR(x.moment.z, y.moment.z, 1e-15);
+  EXPECT_NEAR(x.mass_times_com.x, y.mass_times_com.x, 1e-15);
+  EXPECT_NEAR(x.mass_times_com.y, y.mass_times_com.y, 1e-15);
+  EXPECT_NEAR(x.mass_times_com.z, y.mass_times_com.z, 1e-15);
   for (int i = 0; i < 3; ++i)
     for (int j = 0; j < 3; ++j) EXPECT_NEAR(x.inertia.m[i][j], y.inertia.m[i][j], 1e-16);
   // In the world: the joint stands at (1 0 0) cm, turned by 90° about z.

@@ -9,8 +9,8 @@
 
 #include "kernels/contact/elastic_face_contact.hpp"
 #include "kernels/contact/elastic_sphere_contact.hpp"
-#include "kernels/shear/shear_pullback.hpp"
 #include "kernels/numbers/dual.hpp"
+#include "kernels/shear/shear_pullback.hpp"
 #include "tests/kernels/contact/product_sums.hpp"
 #include "tests/kernels/lift.hpp"
 #include "tests/kernels/random_numbers.hpp"

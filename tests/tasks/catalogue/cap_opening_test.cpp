@@ -71,17 +71,17 @@ TEST(CapOpening, PaysWhatThePaperSays) {
   own.tactile[0][3 * 302 + 7] = 0.01;  // the second finger touches
   own.q[0][0] = std::numbers::pi / 4 - 0.2;
   const double plain = -0.5 * 2 - 0.04 - 0.005 * 0.5;
-  Verdict verdict = task->judge(own.view());
+  StepOutcome verdict = task->evaluate(own.view());
   EXPECT_NEAR(verdict.reward, plain, 1e-12);
   EXPECT_FALSE(verdict.terminated || verdict.success);
   own.end_effectors[0][8] = 0.051;  // the third fingertip is too high
-  verdict = task->judge(own.view());
+  verdict = task->evaluate(own.view());
   EXPECT_NEAR(verdict.reward, plain - 50, 1e-12);
   EXPECT_TRUE(verdict.terminated);
   EXPECT_FALSE(verdict.success);
   own.end_effectors[0][8] = 0.049;
   own.q[0][0] = std::numbers::pi / 4 + 0.2;
-  verdict = task->judge(own.view());
+  verdict = task->evaluate(own.view());
   EXPECT_NEAR(verdict.reward, plain + 0.04 + 50, 1e-12);
   EXPECT_TRUE(verdict.terminated && verdict.success);
 }

@@ -71,7 +71,7 @@ TEST(BoxPushing, PaysWhatThePaperSays) {
               0,
               0.3 + std::numbers::pi / 18};  // 0.05 + 0.13: 20 mm short, 20 mm left, 10 degrees
   own.end_effectors[0] = {0.1, 0.2, 0.03, 0.11, 0.22, 0.5};  // 10 mm and 20 mm apart
-  const Verdict verdict = task->judge(own.view());
+  const StepOutcome verdict = task->evaluate(own.view());
   EXPECT_NEAR(verdict.reward, -0.01 * (4 + 4) - 0.1 * 4 - (0.25 + 1) - 0.1 * 5.25, 1e-12);
   EXPECT_FALSE(verdict.terminated || verdict.success);
   std::vector<double> o(task->spec().observation_size());
@@ -247,15 +247,15 @@ TEST(Insertion, WhatGoesInFeelsNoRim) {
   constexpr int kEnvironments = 48;
   VectorTask vector(*task, kEnvironments);
   for (int e = 0; e < kEnvironments; ++e) {
-    const auto off = vector.view(e).memory.subspan(3, 2);
+    const auto off = vector.view(e).task_state.subspan(3, 2);
     const bool fits = std::abs(off[0]) < 2e-3 && std::abs(off[1]) < 2e-3;
-    const Moment now = vector.view(e).now();
-    const bool inside = task->judge({0,
-                                     0,
-                                     1,
-                                     vector.view(e).memory,
-                                     vector.actions().subspan(2 * std::size_t(e), 2),
-                                     {&now, 1}})
+    const Snapshot now = vector.view(e).now();
+    const bool inside = task->evaluate({0,
+                                        0,
+                                        1,
+                                        vector.view(e).task_state,
+                                        vector.actions().subspan(2 * std::size_t(e), 2),
+                                        {&now, 1}})
                             .success;
     EXPECT_TRUE(inside || !fits) << off[0] << " " << off[1];
     if (std::abs(off[0]) > 3e-3 || std::abs(off[1]) > 3e-3) {

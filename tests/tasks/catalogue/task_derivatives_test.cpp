@@ -122,7 +122,7 @@ TEST_P(EveryTask, TheRewardsDerivativesAreThoseOfDifferences) {
     OwnView own(*task);
     draw_all(*task, own, 5 + 100 * trial);
     Differences(*task, own,
-                {[&] { return kWeight * task->judge(own.view()).reward; },
+                {[&] { return kWeight * task->evaluate(own.view()).reward; },
                  [&](const ViewCotangent& out) { task->reward_vjp(own.view(), kWeight, out); }})
         .check();
   }
@@ -239,7 +239,7 @@ TEST_P(EveryTask, WhatAnActionKeepsHasTheDerivativesOfDifferences) {
     ViewDerivatives slopes(*task, own);
     std::vector<double> memory = weight;
     const ViewCotangent out = slopes.out();
-    task->begin_action_vjp(own.view(), memory, {out.moments, out.action});
+    task->begin_action_vjp(own.view(), memory, {out.snapshots, out.action});
     slopes.memory = memory;
     slopes.check(
         [&] {
@@ -269,13 +269,13 @@ TEST_P(EveryTask, RestartsHaveTheDerivativesOfDifferences) {
     EXPECT_THROW(task->restart_state_vjp(own.view(), along, by_v, slopes.out()), InputError);
     return;
   }
-  task->place(own.view(), start, speed);
+  task->restart_state(own.view(), start, speed);
   add_along_dofs(task->model(), start, by_q, along);
   task->restart_state_vjp(own.view(), along, by_v, slopes.out());
   slopes.check(
       [&] {
         std::vector<double> q(nq), v(nv);
-        task->place(own.view(), q, v);
+        task->restart_state(own.view(), q, v);
         return std::inner_product(q.begin(), q.end(), by_q.begin(), 0.0) +
                std::inner_product(v.begin(), v.end(), by_v.begin(), 0.0);
       },

@@ -27,7 +27,7 @@ std::size_t place_of(const Task& task, const std::string& joint) {
 }
 
 void expect_pays(const Task& task, OwnView& own, double reward, bool solved, const char* what) {
-  const Verdict verdict = task.judge(own.view());
+  const StepOutcome verdict = task.evaluate(own.view());
   EXPECT_NEAR(verdict.reward, reward, 1e-12) << what;
   EXPECT_EQ(verdict.success, solved) << what;
 }
@@ -61,7 +61,7 @@ TEST(Rewards, OfStableGrasp) {
     SCOPED_TRACE(c.tilt);
     hang(c.lifted, c.tilt);
     expect_pays(*task, own, c.reward, c.solved, "a bar that hangs");
-    EXPECT_EQ(task->judge(own.view()).terminated, c.solved);
+    EXPECT_EQ(task->evaluate(own.view()).terminated, c.solved);
   }
 }
 
@@ -86,12 +86,12 @@ TEST(Rewards, OfInsertion) {
   };
   stand(30, 0);
   expect_pays(*task, own, outside, false, "on the rim");
-  EXPECT_FALSE(task->judge(own.view()).terminated);
+  EXPECT_FALSE(task->evaluate(own.view()).terminated);
   stand(24.8, 0);
   expect_pays(*task, own, outside, false, "0.1 mm too high");
   stand(24.6, 0);
   expect_pays(*task, own, 10, true, "0.1 mm below 24.7 mm");
-  EXPECT_TRUE(task->judge(own.view()).terminated);
+  EXPECT_TRUE(task->evaluate(own.view()).terminated);
   // Tilted by 0.01 rad a corner is 25 mm * 0.01 = 0.25 mm higher: at 24.85 and 24.65 mm.
   stand(24.6, 0.01);
   expect_pays(*task, own, outside, false, "inside with its middle, not with its corners");
@@ -127,7 +127,7 @@ TEST(Rewards, OfBallRolling) {
   own.q[0][ball + 1] = -11.5 * kMillimetre;
   // 1.5 and 1.5 mm, 2.1 mm together: 2 * 0.15² = 0.045
   expect_pays(*task, own, -0.045, false, "too far at the end");
-  EXPECT_FALSE(task->judge(own.view()).terminated);
+  EXPECT_FALSE(task->evaluate(own.view()).terminated);
 }
 
 TEST(Rewards, OfTheDummy) {

@@ -159,7 +159,7 @@ class ClosedLoop {
     TaskTangent tangent(rollout, actions_, stepper());
     tangent.start(d.q, d.v);
     Numbers o_dot(seen_);
-    if (!task_.spec().opening) {
+    if (!task_.spec().warm_up) {
       const ViewTangent first = tangent.seen_at_start({});
       o_dot = observed_change(tangent.start_view(), first);
     }

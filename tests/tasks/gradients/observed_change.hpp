@@ -20,11 +20,12 @@ inline std::vector<double> observe_moved(const Task& task, const TaskView& at,
     for (std::size_t i = 0; i < d.size(); ++i) y[i] += by * d[i];
     return y;
   };
-  const Numbers memory = moved(at.memory, change.memory), action = moved(at.action, change.action);
+  const Numbers memory = moved(at.task_state, change.memory),
+                action = moved(at.action, change.action);
   std::vector<std::vector<Numbers>> kept;
-  std::vector<Moment> moments;
-  for (std::size_t m = 0; m < at.moments.size(); ++m) {
-    const Moment& from = at.moments[m];
+  std::vector<Snapshot> moments;
+  for (std::size_t m = 0; m < at.snapshots.size(); ++m) {
+    const Snapshot& from = at.snapshots[m];
     Numbers q(from.q.begin(), from.q.end());
     for (std::size_t i = 0; i < change.q[m].size(); ++i)
       displace(task.model(), q, int(i), by * change.q[m][i]);
@@ -34,9 +35,9 @@ inline std::vector<double> observe_moved(const Task& task, const TaskView& at,
   }
   for (const auto& k : kept) moments.push_back({k[0], k[1], k[2], k[3]});
   TaskView view = at;
-  view.memory = memory;
+  view.task_state = memory;
   view.action = action;
-  view.moments = moments;
+  view.snapshots = moments;
   Numbers o(task.spec().observation_size());
   task.observe(view, o);
   return o;

@@ -44,15 +44,15 @@ class Watched : public Task {
     TaskSpec spec = task_spec("ball_rolling_small");
     spec.name = "watched";
     spec.observations = {{"numbers", {4}, "1", "what is watched"}};
-    spec.moments = {3, 5};
+    spec.snapshots = {3, 5};
     spec.horizon = 6;
-    spec.opening = how == Watching::after_opening;
-    spec.memory = 1;
+    spec.warm_up = how == Watching::after_opening;
+    spec.task_state = 1;
     return spec;
   }
   void start(const TaskStart& s) const override {
     s.q[pad_ + 2] = -0.0152;  // it touches at once
-    s.memory[0] = 0.3;
+    s.task_state[0] = 0.3;
   }
   void begin_action(const TaskView& view, std::span<double> m) const override {
     m[0] = 0.5 * m[0] + view.action[0] + 10 * view.now().q[pad_];
@@ -60,7 +60,7 @@ class Watched : public Task {
   void begin_action_vjp(const TaskView&, std::span<double> m,
                         const ViewCotangent& out) const override {
     out.action[0] += m[0];
-    out.moments[0].q[pad_v_] += 10 * m[0];
+    out.snapshots[0].q[pad_v_] += 10 * m[0];
     m[0] *= 0.5;
   }
   void controls(const TaskView& view, int, std::span<double> u) const override {
@@ -73,33 +73,33 @@ class Watched : public Task {
     for (std::size_t k = 0; k < 3; ++k) out.action[k] += weight[k];
   }
   void observe(const TaskView& view, std::span<double> o) const override {
-    const Moment &first = view.moments.front(), &now = view.now();
+    const Snapshot &first = view.snapshots.front(), &now = view.now();
     o[0] = first.q[pad_ + 2] * now.v[pad_v_ + 2] * 100;
     o[1] = 0;
     for (const double f : now.tactile) o[1] += 100 * f * f;
-    o[2] = view.memory[0] * (1 + view.action[1]);
+    o[2] = view.task_state[0] * (1 + view.action[1]);
     o[3] = std::sin(10 * now.q[pad_] + now.v[pad_v_ + 1]);
   }
   void observe_vjp(const TaskView& view, std::span<const double> w,
                    const ViewCotangent& out) const override {
     if (how_ == Watching::without_derivative) return Task::observe_vjp(view, w, out);
-    const Moment &first = view.moments.front(), &now = view.now();
-    const SnapshotCotangent &to_first = out.moments.front(), &to = out.moments.back();
+    const Snapshot &first = view.snapshots.front(), &now = view.now();
+    const SnapshotCotangent &to_first = out.snapshots.front(), &to = out.snapshots.back();
     to_first.q[pad_v_ + 2] += w[0] * now.v[pad_v_ + 2] * 100;
     to.v[pad_v_ + 2] += w[0] * first.q[pad_ + 2] * 100;
     for (std::size_t i = 0; i < now.tactile.size(); ++i)
       to.tactile[i] += w[1] * 200 * now.tactile[i];
-    out.memory[0] += w[2] * (1 + view.action[1]);
-    out.action[1] += w[2] * view.memory[0];
+    out.task_state[0] += w[2] * (1 + view.action[1]);
+    out.action[1] += w[2] * view.task_state[0];
     const double slope = w[3] * std::cos(10 * now.q[pad_] + now.v[pad_v_ + 1]);
     to.q[pad_v_] += 10 * slope;
     to.v[pad_v_ + 1] += slope;
   }
-  Verdict judge(const TaskView& view) const override {
+  StepOutcome evaluate(const TaskView& view) const override {
     return {view.now().q[pad_] + 0.1 * view.action[0] * view.action[0], false, false};
   }
   void reward_vjp(const TaskView& view, double weight, const ViewCotangent& out) const override {
-    out.moments.back().q[pad_v_] += weight;
+    out.snapshots.back().q[pad_v_] += weight;
     out.action[0] += weight * 0.2 * view.action[0];
   }
   void scripted(const TaskView& view, std::span<const double>, std::span<double> a) const override {

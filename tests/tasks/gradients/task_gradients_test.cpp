@@ -100,10 +100,10 @@ class Everything : public Task {
     TaskSpec spec = task_spec("ball_rolling_small");
     spec.name = "everything";
     spec.control_every = 2;
-    spec.moments = {3, 5};
+    spec.snapshots = {3, 5};
     spec.horizon = 12;
     spec.restarts = true;
-    spec.memory = 4;  // where the pad is to restart, how often it pressed
+    spec.task_state = 4;  // where the pad is to restart, how often it pressed
     return spec;
   }
   void start(const TaskStart& s) const override {
@@ -115,46 +115,47 @@ class Everything : public Task {
   }
   void begin_action_vjp(const TaskView&, std::span<double> m,
                         const ViewCotangent& out) const override {
-    for (std::size_t k = 0; k < 3; ++k) out.moments[0].q[pad_v_ + k] += 0.9 * m[k];
+    for (std::size_t k = 0; k < 3; ++k) out.snapshots[0].q[pad_v_ + k] += 0.9 * m[k];
     for (std::size_t k = 0; k < 3; ++k) m[k] *= 0.5;
     out.action[0] += 0.1 * m[3];
     m[3] *= 0.3;
   }
-  void place(const TaskView& view, std::span<double> q, std::span<double> v) const override {
-    for (std::size_t k = 0; k < 2; ++k) q[pad_ + k] = 0.2 * q[pad_ + k] + 0.7 * view.memory[k];
-    v[pad_v_] = 0.1 * v[pad_v_] + 0.02 * view.action[1] + 0.05 * view.memory[3];
+  void restart_state(const TaskView& view, std::span<double> q,
+                     std::span<double> v) const override {
+    for (std::size_t k = 0; k < 2; ++k) q[pad_ + k] = 0.2 * q[pad_ + k] + 0.7 * view.task_state[k];
+    v[pad_v_] = 0.1 * v[pad_v_] + 0.02 * view.action[1] + 0.05 * view.task_state[3];
   }
   void restart_state_vjp(const TaskView&, std::span<const double> q, std::span<const double> v,
-                 const ViewCotangent& out) const override {
+                         const ViewCotangent& out) const override {
     for (std::size_t i = 0; i < q.size(); ++i) {
       const bool placed = i == pad_v_ || i == pad_v_ + 1;
-      out.moments[0].q[i] += placed ? 0.2 * q[i] : q[i];
-      if (placed) out.memory[i - pad_v_] += 0.7 * q[i];
-      out.moments[0].v[i] += i == pad_v_ ? 0.1 * v[i] : v[i];
+      out.snapshots[0].q[i] += placed ? 0.2 * q[i] : q[i];
+      if (placed) out.task_state[i - pad_v_] += 0.7 * q[i];
+      out.snapshots[0].v[i] += i == pad_v_ ? 0.1 * v[i] : v[i];
     }
     out.action[1] += 0.02 * v[pad_v_];
-    out.memory[3] += 0.05 * v[pad_v_];
+    out.task_state[3] += 0.05 * v[pad_v_];
   }
   void controls(const TaskView& view, int step, std::span<double> u) const override {
     for (std::size_t k = 0; k < 3; ++k)
-      u[k] = view.action[k] * view.action[k] * (1 + 0.1 * step) + 0.2 * view.memory[k] -
+      u[k] = view.action[k] * view.action[k] * (1 + 0.1 * step) + 0.2 * view.task_state[k] -
              0.3 * view.now().v[pad_v_ + k] - view.now().q[pad_ + k];
   }
   void controls_vjp(const TaskView& view, int step, std::span<const double> weight,
                     const ViewCotangent& out) const override {
     for (std::size_t k = 0; k < 3; ++k) {
       out.action[k] += weight[k] * 2 * view.action[k] * (1 + 0.1 * step);
-      out.memory[k] += 0.2 * weight[k];
-      out.moments[0].v[pad_v_ + k] -= 0.3 * weight[k];
-      out.moments[0].q[pad_v_ + k] -= weight[k];
+      out.task_state[k] += 0.2 * weight[k];
+      out.snapshots[0].v[pad_v_ + k] -= 0.3 * weight[k];
+      out.snapshots[0].q[pad_v_ + k] -= weight[k];
     }
   }
   void observe(const TaskView&, std::span<double> o) const override {
     std::fill(o.begin(), o.end(), 0.0);
   }
-  Verdict judge(const TaskView& view) const override {
-    double sum = view.memory[3] * view.action[2];
-    for (const Moment& m : view.moments) {
+  StepOutcome evaluate(const TaskView& view) const override {
+    double sum = view.task_state[3] * view.action[2];
+    for (const Snapshot& m : view.snapshots) {
       for (const double f : m.tactile) sum += 50 * f * f;
       for (const double v : m.v) sum += v * v;
       sum += m.q[ball_] + 3 * m.q[pad_ + 2];
@@ -162,15 +163,15 @@ class Everything : public Task {
     return {sum, false, false};
   }
   void reward_vjp(const TaskView& view, double weight, const ViewCotangent& out) const override {
-    out.memory[3] += weight * view.action[2];
-    out.action[2] += weight * view.memory[3];
-    for (std::size_t m = 0; m < view.moments.size(); ++m) {
-      for (std::size_t i = 0; i < view.moments[m].tactile.size(); ++i)
-        out.moments[m].tactile[i] += weight * 100 * view.moments[m].tactile[i];
-      for (std::size_t i = 0; i < view.moments[m].v.size(); ++i)
-        out.moments[m].v[i] += weight * 2 * view.moments[m].v[i];
-      out.moments[m].q[dof("ball_joint")] += weight;
-      out.moments[m].q[pad_v_ + 2] += 3 * weight;
+    out.task_state[3] += weight * view.action[2];
+    out.action[2] += weight * view.task_state[3];
+    for (std::size_t m = 0; m < view.snapshots.size(); ++m) {
+      for (std::size_t i = 0; i < view.snapshots[m].tactile.size(); ++i)
+        out.snapshots[m].tactile[i] += weight * 100 * view.snapshots[m].tactile[i];
+      for (std::size_t i = 0; i < view.snapshots[m].v.size(); ++i)
+        out.snapshots[m].v[i] += weight * 2 * view.snapshots[m].v[i];
+      out.snapshots[m].q[dof("ball_joint")] += weight;
+      out.snapshots[m].q[pad_v_ + 2] += 3 * weight;
     }
   }
   void scripted(const TaskView& view, std::span<const double>, std::span<double> a) const override {
@@ -367,11 +368,11 @@ void check_row(const Task& task, std::int64_t last) {
     const Lanes moved = after(task, last, actions, [&](TaskRollout& r, ActionRecord& asked) {
       for (int l = 0; l < 2; ++l) {
         const double e = l == 0 ? kMove : -kMove;
-        const Moment now = view_of(r.batch(), r.data(), l).now();
+        const Snapshot now = view_of(r.batch(), r.data(), l).now();
         std::vector<double> q(now.q.begin(), now.q.end()), v(now.v.begin(), now.v.end());
         if (column < nv) displace(task.model(), q, static_cast<int>(column), e);
         if (column >= nv && column < 2 * nv) v[column - nv] += e;
-        if (column >= 2 * nv) asked.asked[std::size_t(l) * width + column - 2 * nv] += e;
+        if (column >= 2 * nv) asked.chosen[std::size_t(l) * width + column - 2 * nv] += e;
         r.displace(l, q, v);
       }
     });

@@ -141,7 +141,7 @@ TEST_P(EveryTape, GoingBackIsTheTransposeOfGoingForward) {
     tape.reverse(by_o(t + 1), by_r(t + 1), std::span(by_action).subspan(t * width, width),
                  {to_q, to_v});
   }
-  const bool opens = task->spec().opening;
+  const bool opens = task->spec().warm_up;
   Numbers first_q(nv), first_v(nv), by_number(numbers);
   const Numbers to_q = by_q(0), to_v = by_v(0);
   tape.reverse_start(opens ? Numbers{} : by_o(0), first_q, first_v, {to_q, to_v}, by_number);
