@@ -69,7 +69,7 @@ void check_size(const AccuracyArguments& o, const Model& model, std::int64_t ste
 
 /// Makes the episodes of so many environments with a seed; none when a signal came.
 using MakeEpisodes =
-    std::function<std::optional<FixedEpisodes>(int, std::uint64_t, const AccuracyGoOn&)>;
+    std::function<std::optional<FixedEpisodes>(int, std::uint64_t, const std::stop_token&)>;
 
 /// Ends with the report of a sweep.
 int report_sweep(const AccuracySubject& subject, const Console& console, const Model& model,
@@ -100,9 +100,9 @@ int run_sweep(const AccuracyArguments& o, const Console& console, const Model& m
   const StopSignals signals;
   TextOutput svg(o.svg, o.overwrite), csv(o.csv, o.overwrite);
   AccuracyListener listener;
-  listener.go_on = [&] { return signals.received() == 0; };
+  listener.stop = signals.token();
   const std::uint64_t seed = o.seed.value_or(0);
-  const std::optional<FixedEpisodes> episodes = make(environments_of(o), seed, listener.go_on);
+  const std::optional<FixedEpisodes> episodes = make(environments_of(o), seed, listener.stop);
   if (!episodes)
     return report_stop(console, "accuracy", signals.received(), "in the first episode");
   const double bytes = accuracy_bytes(*episodes, options.quantity, options.threads);
@@ -131,7 +131,7 @@ int run_sweep(const AccuracyArguments& o, const Console& console, const Model& m
   };
   FreshEpisodes fresh;
   if ((1 + kMoreEnvironments) * bytes < available_memory())
-    fresh = [&] { return make(more, seed ^ kOtherSeed, listener.go_on); };
+    fresh = [&] { return make(more, seed ^ kOtherSeed, listener.stop); };
   else
     console.note(fmt::format("no second look: memory does not suffice for {} environments", more));
   const AccuracyReport report = accuracy_sweep(*episodes, options, listener, fresh);
@@ -152,9 +152,9 @@ int accuracy_of_task(const AccuracyArguments& o, const Console& console, const T
     console.note("controls are those that the policy asks for at the scene's own scheme and step");
   const int every = std::min(sample_interval(task.model()), task.spec().steps_per_action);
   return run_sweep(o, console, task.model(), "task " + task.spec().name,
-                   [&](int environments, std::uint64_t seed, const AccuracyGoOn& go_on) {
+                   [&](int environments, std::uint64_t seed, const std::stop_token& stop) {
                      return task_episodes(Batch(task.model(), environments, seed), task, policy,
-                                          every, go_on);
+                                          every, stop);
                    });
 }
 
@@ -168,7 +168,7 @@ int accuracy(const AccuracyArguments& o, const Console& console) {
       make_controls(o.controls, o.seed.value_or(0), model, Stepper(model), console);
   const std::int64_t steps = step_count(o.steps, controls);
   check_size(o, model, steps);
-  const auto make = [&](int environments, std::uint64_t seed, const AccuracyGoOn&) {
+  const auto make = [&](int environments, std::uint64_t seed, const std::stop_token&) {
     // A table has no random numbers.
     const ControlProgram own =
         o.controls.empty() ? ControlProgram(model, controls.timestep(), seed) : controls;

@@ -102,7 +102,8 @@ int report(const BenchArguments& options, const Console& console, const BenchSet
 
 /// Compares what the scene's setting gives with a reference, in environments of its own.
 BenchError error_of(const BenchArguments& options, const Model& model,
-                    const ControlProgram& controls, std::int64_t steps, const AccuracyGoOn& go_on) {
+                    const ControlProgram& controls, std::int64_t steps,
+                    const std::stop_token& stop) {
   const int environments =
       std::min(options.environments.value_or(kDefaultEnvironments), kErrorEnvironments);
   const Batch start(model, environments, options.seed.value_or(0));
@@ -111,7 +112,7 @@ BenchError error_of(const BenchArguments& options, const Model& model,
   of.quantity = model.sensors().empty() ? AccuracyQuantity::state : AccuracyQuantity::tactile;
   of.threads = 1;
   check_memory(accuracy_bytes(episodes, of.quantity, of.threads), "--error");
-  const AccuracyReport report = own_accuracy(episodes, of, {go_on, {}, {}});
+  const AccuracyReport report = own_accuracy(episodes, of, {stop, {}, {}});
   const AccuracyReference& reference = report.reference;
   Json json{{"quantity", to_string(of.quantity)},
             {"envs", reference.environments},
@@ -160,7 +161,7 @@ BenchSetting setting_of(const BenchArguments& options, const Model& model,
 template <class Run>
 int measure(const BenchArguments& options, const Console& console, BenchSetting& setting,
             const std::vector<int>& threads, const Model& model, const Json& of_task,
-            const Run& run, const std::function<BenchError(const AccuracyGoOn&)>& error = {}) {
+            const Run& run, const std::function<BenchError(const std::stop_token&)>& error = {}) {
   const StopSignals signals;
   TextOutput svg(options.svg, options.overwrite), csv(options.csv, options.overwrite);
   console.print(bench_heading(setting));
@@ -168,7 +169,7 @@ int measure(const BenchArguments& options, const Console& console, BenchSetting&
   Json entries = Json::array();
   for (const int n : threads) {
     setting.options.threads = n;
-    runs.push_back({n, run([&] { return signals.received() == 0; })});
+    runs.push_back({n, run(signals.token())});
     if (runs.back().result.stopped)
       return report_stop(console, "bench", signals.received(),
                          fmt::format("while measuring {} thread{}", n, n == 1 ? "" : "s"));
@@ -180,7 +181,7 @@ int measure(const BenchArguments& options, const Console& console, BenchSetting&
   list_failures(console, "environment", failures_of(runs.front()), "--json names all");
   Json more = of_task;
   if (error) {
-    const BenchError found = error([&] { return signals.received() == 0; });
+    const BenchError found = error(signals.token());
     if (signals.received() != 0)
       return report_stop(console, "bench", signals.received(), "while measuring the error");
     console.print(found.text);
@@ -240,8 +241,8 @@ int bench_task(const BenchArguments& options, const Console& console, const Task
                      {"policy", to_string(kind)},
                      {"steps_per_action", task.spec().steps_per_action}};
   return measure(options, console, setting, threads, task.model(), of_task,
-                 [&](const BenchmarkGoOn& go_on) {
-                   return run_benchmark(start, task, policy, setting.options, go_on);
+                 [&](const std::stop_token& stop) {
+                   return run_benchmark(start, task, policy, setting.options, stop);
                  });
 }
 
@@ -280,15 +281,15 @@ int bench(const BenchArguments& options, const Console& console) {
              benchmark_bytes(model, setting.environments, setting.options));
   const Batch start(model, setting.environments, seed);
 
-  std::function<BenchError(const AccuracyGoOn&)> error;
+  std::function<BenchError(const std::stop_token&)> error;
   if (options.error)
-    error = [&](const AccuracyGoOn& go_on) {
-      return error_of(options, model, controls, setting.options.rollout.steps, go_on);
+    error = [&](const std::stop_token& stop) {
+      return error_of(options, model, controls, setting.options.rollout.steps, stop);
     };
   return measure(
       options, console, setting, threads, model, {{"task", nullptr}},
-      [&](const BenchmarkGoOn& go_on) {
-        return run_benchmark(start, controls, setting.options, go_on);
+      [&](const std::stop_token& stop) {
+        return run_benchmark(start, controls, setting.options, stop);
       },
       error);
 }

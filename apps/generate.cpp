@@ -98,8 +98,7 @@ int make(const GenerateOptions& options, const Console& console, const Job& job,
     Progress progress(console, job.unit,
                       episodes * (job.layout.task ? job.layout.rows() : run.steps), 1);
     done = job.simulate(
-        run, output, [&](std::int64_t steps) { progress.update(steps); },
-        [&] { return signals.received() != 0; });
+        run, output, [&](std::int64_t steps) { progress.update(steps); }, signals.token());
   }
   if (done.summary.stopped)
     return report_stopped(options, console, signals.received(), done.summary.episodes, episodes,
@@ -193,8 +192,8 @@ int generate_task(const GenerateOptions& options, const Console& console, const 
   job.layout =
       make_layout(options, task.model(), Stepper(task.model()), job.run, {}, info, plan, &task,
                   {to_string(kind), policy.players(), variation.noise, variation.random_share});
-  job.simulate = [&](const EpisodeOptions& run, EpisodeSink& sink, const EpisodeProgress& progress,
-                     const StopRequest& stop) -> JobResult {
+  job.simulate = [&](const EpisodeOptions& run, EpisodeSink& sink, const ProgressCallback& progress,
+                     const std::stop_token& stop) -> JobResult {
     const EpisodeSummary summary = with_gradients(plan_of(run), sink, [&](EpisodeSink& to) {
       return run_episodes(task, policy, run, to, progress, stop);
     });
@@ -273,8 +272,8 @@ int generate(GenerateOptions options, const Console& console, const ProgramInfo&
   job.effects = effect_names(model);
   job.moving_bodies = model.moving_bodies();
   job.layout = make_layout(options, model, stepper, job.run, record, info, plan);
-  job.simulate = [&](const EpisodeOptions& run, EpisodeSink& sink, const EpisodeProgress& progress,
-                     const StopRequest& stop) -> JobResult {
+  job.simulate = [&](const EpisodeOptions& run, EpisodeSink& sink, const ProgressCallback& progress,
+                     const std::stop_token& stop) -> JobResult {
     return {with_gradients(plan_of(run), sink,
                            [&](EpisodeSink& to) {
                              return run_episodes(model, {}, controls, run, to, progress, stop);

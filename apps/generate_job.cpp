@@ -56,7 +56,7 @@ Extent extent_of(const GenerateOptions& options, const DatasetLayout& layout,
 }
 
 /// Environment steps per second. Simulates a first block for each thread, for about a second.
-double measured_rate(const Job& job, const StopRequest& stop) {
+double measured_rate(const Job& job, const std::stop_token& stop) {
   EpisodeOptions some = job.run;
   some.ranges.clear();
   some.episodes = std::min<std::int64_t>(job.run.episodes, 16LL * job.run.threads);
@@ -156,8 +156,7 @@ int dry_run(const GenerateOptions& options, const Console& console, const Job& j
   const Extent extent = extent_of(options, job.layout, output_for(options, job.layout, console));
   const double of_one = job.layout.episode_bytes(),
                bytes = of_one * static_cast<double>(extent.episodes);
-  const double free = free_bytes_at(options.output),
-               rate = measured_rate(job, [&] { return signals.received() != 0; });
+  const double free = free_bytes_at(options.output), rate = measured_rate(job, signals.token());
   if (signals.received() != 0)
     return report_stop(console, "generate", signals.received(), "while it measured");
   // For a task these are actions, if every episode lasts as long as it can.

@@ -28,8 +28,8 @@ struct Job {
   std::string unit;                  ///< what progress counts: "environment step", "action"
   std::vector<std::string> effects;  ///< that are switched on
   int moving_bodies = 0;
-  std::function<JobResult(const EpisodeOptions&, EpisodeSink&, const EpisodeProgress&,
-                          const StopRequest&)>
+  std::function<JobResult(const EpisodeOptions&, EpisodeSink&, const ProgressCallback&,
+                          const std::stop_token&)>
       simulate;
 };
 

@@ -54,7 +54,7 @@ std::int64_t steps_of(const GradcheckArguments& o, const ControlProgram& control
 
 ExitCode exit_code(const GradientCheck& check) { return check.passed() ? kDone : kSomeFailed; }
 
-void set_comparison(const GradcheckArguments& o, CompareOptions& options) {
+void set_comparison(const GradcheckArguments& o, CheckOptions& options) {
   options.entries = o.entries.value_or(kDefaultEntries);
   options.seed = o.seed.value_or(0);
   options.tolerance = o.tolerance.value_or(options.tolerance);
@@ -165,28 +165,28 @@ int run_task(const GradcheckArguments& o, const Console& console, const Task& ta
   const PolicyKind kind = policy_named(o.policy, o.controls, PolicyKind::scripted);
   const Policy policy = make_policy(task, kind, o.controls);
   const TaskSpec& spec = task.spec();
-  TaskCheckOptions options;
-  options.actions = actions_of(o, spec);
+  CheckOptions options;
+  options.length = actions_of(o, spec);
   set_comparison(o, options);
   const Stepper stepper(task.model());
   options.stepper.tolerance = std::min(stepper.tolerance(), kTolerance);
   console.print(fmt::format("task {}: at most {} actions of {} steps of {:g} s, {}, policy {}",
-                            spec.name, options.actions, spec.steps_per_action, stepper.timestep(),
+                            spec.name, options.length, spec.steps_per_action, stepper.timestep(),
                             to_string(stepper.integrator()), to_string(kind)));
-  const TaskGradientCheck check = check_task_gradient(
+  const GradientCheck check = check_task_gradient(
       task, [&](const Scene& scene) { return make_task(spec.name, scene); },
       [&](const TaskView& view, std::span<const double> observation, std::span<double> action) {
         policy.act(view, observation, action);
       },
       options);
-  console.print(fmt::format("return {:.9g} of {} actions", check.loss, check.actions));
+  console.print(fmt::format("return {:.9g} of {} actions", check.loss, check.length));
   print(console, check, "return", "another --seed or --policy, or more --actions");
   Json result = json_of_check(check, options.seed, stepper);
   result.update({{"task", spec.name},
                  {"policy", to_string(kind)},
-                 {"actions", check.actions},
+                 {"actions", check.length},
                  {"loss_name", "return"},
-                 {"steps", check.actions * spec.steps_per_action}});
+                 {"steps", check.length * spec.steps_per_action}});
   console.result(result);
   return exit_code(check);
 }
@@ -201,12 +201,12 @@ int run(const GradcheckArguments& o, const Console& console) {
   const ControlProgram controls =
       make_controls(o.controls, o.seed.value_or(0), model, stepper, console);
   CheckOptions options;
-  options.steps = steps_of(o, controls);
+  options.length = steps_of(o, controls);
   set_comparison(o, options);
   options.stepper.tolerance = std::min(stepper.tolerance(), kTolerance);
   check_memory(
-      gradient_bytes(model, 1, {.steps = options.steps, .stepper = {}, .parameters = true}, 1),
-      fmt::format("gradients of {} steps", options.steps));
+      gradient_bytes(model, 1, {.length = options.length, .stepper = {}, .parameters = true}, 1),
+      fmt::format("gradients of {} steps", options.length));
   const LossKind kind = loss_of(o.loss, model);
   RolloutOptions rollout;
   rollout.every = o.every.value_or(0);
@@ -215,7 +215,7 @@ int run(const GradcheckArguments& o, const Console& console) {
   const auto loss = make_loss(kind, model, every);
   const Batch start(model, 1, o.seed.value_or(0));
   console.print(fmt::format("{}: {} steps of {:g} s, {}, loss {}", model.scene().name,
-                            options.steps, stepper.timestep(), to_string(stepper.integrator()),
+                            options.length, stepper.timestep(), to_string(stepper.integrator()),
                             to_string(kind)));
   const GradientCheck check = check_gradient(
       start, [&](std::int64_t step, int, std::span<double> u) { controls.evaluate(step, 0, u); },
@@ -226,7 +226,7 @@ int run(const GradcheckArguments& o, const Console& console) {
   result.update({{"scene", o.scene},
                  {"task", nullptr},
                  {"loss_name", to_string(kind)},
-                 {"steps", options.steps},
+                 {"steps", options.length},
                  {"every", every}});
   console.result(result);
   return exit_code(check);

@@ -43,8 +43,8 @@ RunGradients::RunGradients(const GradientArguments& arguments, const Batch& batc
     throw InputError("--point-gradients with --gradients " + name_ +
                      "; expected a loss that reads fields, tactile or shear");
   loss_ = make_loss(kind, model, every);
-  GradientOptions options;
-  options.steps = rollout.steps;
+  TapeOptions options;
+  options.length = rollout.steps;
   options.stepper = {stepper.integrator(), stepper.timestep(), stepper.tolerance(),
                      stepper.accuracy()};
   options.precision = rollout.precision;
@@ -66,7 +66,7 @@ bool RunGradients::write(const ControlProgram& controls, const RolloutOptions& r
       [&](std::int64_t step, int e, std::span<double> u) {
         controls.evaluate(rollout.first_step + step, start_->episode(e), u);
       },
-      [&] { return signals.received() == 0; });
+      signals.token());
   if (summary.stopped) return false;
   const LossGradient& g = summary.losses[0];
   std::vector<std::string> names, units;

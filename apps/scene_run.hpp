@@ -32,7 +32,8 @@ LossKind loss_named(const std::string& name);
 /// Says how many steps were split, and how many missed the accuracy, let a body through, were
 /// damped or let bodies overlap, if any did.
 std::string split_text(const StepCounts& counts);
-/// The same five numbers, as "split_steps", "accuracy_not_met_steps", "tunnelled_steps", "damped_steps" and
+/// The same five numbers, as "split_steps", "accuracy_not_met_steps", "tunnelled_steps",
+/// "damped_steps" and
 /// "overlapping_steps".
 Json split_json(const StepCounts& counts);
 

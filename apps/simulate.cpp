@@ -289,10 +289,7 @@ int write_run(const SimulateArguments& options, const Console& console, const Ba
   {
     const h5::NotReading computing;
     Progress progress(console, "step", rollout.steps, batch.environments());
-    summary = run([&](std::int64_t done) {
-      progress.update(done);
-      return signals.received() == 0;
-    });
+    summary = run([&](std::int64_t done) { progress.update(done); });
   }
   if (summary.stopped)
     return report_stop(console, "simulate", signals.received(),
@@ -331,8 +328,8 @@ int simulate_task(const SimulateArguments& options, const Console& console, cons
   TrajectoryFile output(options.output, layout, options.overwrite);
   return write_run(
       options, console, batch, layout, rollout, output, signals,
-      [&](const RolloutProgress& progress) {
-        return run_rollout(batch, steppers, program, rollout, output, progress);
+      [&](const ProgressCallback& progress) {
+        return run_rollout(batch, steppers, program, rollout, output, progress, signals.token());
       },
       [&] {
         const auto solved = std::count(data->success.begin(), data->success.end(), 1);
@@ -382,8 +379,9 @@ int simulate(const SimulateArguments& options, const Console& console, const Pro
   TrajectoryFile output(options.output, layout, options.overwrite);
   return write_run(
       options, console, batch, layout, rollout, output, signals,
-      [&](const RolloutProgress& progress) {
-        RolloutSummary summary = run_rollout(batch, steppers, controls, rollout, output, progress);
+      [&](const ProgressCallback& progress) {
+        RolloutSummary summary =
+            run_rollout(batch, steppers, controls, rollout, output, progress, signals.token());
         if (gradients.wanted() && !summary.stopped)
           summary.stopped = !gradients.write(controls, rollout, signals, output);
         return summary;

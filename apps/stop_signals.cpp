@@ -16,6 +16,9 @@ constexpr std::array kSignals{SIGINT, SIGTERM};
 
 std::atomic<int> first_signal{0};
 static_assert(std::atomic<int>::is_always_lock_free, "the handler may not wait");
+// A request sets a bit of an atomic number. Tokens of this source are polled: it has no callbacks,
+// which a request would call.
+std::stop_source stop_source;
 
 /// What the process ends with, made beforehand: a handler may not allocate.
 struct LastWords {
@@ -35,6 +38,7 @@ std::array<LastWords, 5> last_words{{
 void remember(int signal) {
   int none = 0;
   first_signal.compare_exchange_strong(none, signal);
+  stop_source.request_stop();
 }
 
 void end(int signal) {
@@ -92,6 +96,7 @@ void ignore_signals() {
 
 StopSignals::StopSignals() {
   first_signal = 0;
+  stop_source = {};
   for (std::size_t i = 0; i < kSignals.size(); ++i)
     previous_[i] = handle(kSignals[i], remember, SA_RESTART);
 }
@@ -99,6 +104,8 @@ StopSignals::StopSignals() {
 StopSignals::~StopSignals() {
   for (std::size_t i = 0; i < kSignals.size(); ++i) sigaction(kSignals[i], &previous_[i], nullptr);
 }
+
+std::stop_token StopSignals::token() const { return stop_source.get_token(); }
 
 int StopSignals::received() const { return first_signal; }
 

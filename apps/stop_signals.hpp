@@ -6,6 +6,7 @@
 #include <array>
 #include <csignal>
 #include <functional>
+#include <stop_token>
 #include <string>
 
 #include "apps/console.hpp"
@@ -33,6 +34,8 @@ class StopSignals {
   StopSignals(const StopSignals&) = delete;
   StopSignals& operator=(const StopSignals&) = delete;
 
+  /// Asks to stop from the first SIGINT or SIGTERM on.
+  [[nodiscard]] std::stop_token token() const;
   /// The first SIGINT or SIGTERM that came; 0 if none came.
   [[nodiscard]] int received() const;
 

@@ -55,7 +55,7 @@ int stress(const StressArguments& o, const Console& console) {
   const StopSignals signals;
   console.print(fmt::format("hard cases; {}; {}\n\n{}", kernels::active_isa_name(),
                             processor_name(), stress_head()));
-  const StressListener listener{[&] { return signals.received() == 0; },
+  const StressListener listener{signals.token(),
                                 [&](const StressRow& row) { console.print(stress_row(row)); }};
   const StressReport report = run_stress(stress_cases(), options, scene_of_program, listener);
   if (report.stopped && report.rows.empty())

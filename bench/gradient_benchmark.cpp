@@ -60,7 +60,7 @@ class Rollout {
         stepper_(model_),
         readout_(model_, Precision::f64),
         fields_(model_, environments, {}, tactile ? FrameKind::compact : FrameKind::none) {
-    options_.steps = program_.steps();
+    options_.length = program_.steps();
     if (tactile) {
       owned_.push_back(make_loss(LossKind::tactile, model_, kEvery));
     } else {
@@ -70,7 +70,7 @@ class Rollout {
     tactile_ = tactile;
   }
 
-  [[nodiscard]] double steps() const { return double(options_.steps) * start_.environments(); }
+  [[nodiscard]] double steps() const { return double(options_.length) * start_.environments(); }
 
   /// Runs the rollout alone, with the fields that its loss reads. Returns its processor time.
   double forward() {
@@ -79,7 +79,7 @@ class Rollout {
     const auto nu = std::size_t(model_.nu());
     const double begin = cpu_seconds();
     for (int b = 0; b < batch.blocks(); ++b)
-      for (std::int64_t t = 0; t < options_.steps; ++t) {
+      for (std::int64_t t = 0; t < options_.length; ++t) {
         for (int e = 16 * b; e < std::min(16 * b + 16, batch.environments()); ++e)
           program_.evaluate(t, e, std::span(u).subspan(std::size_t(e) * nu, nu));
         stepper_.step_block(batch, b, u);
@@ -102,8 +102,8 @@ class Rollout {
     return cpu_seconds() - begin;
   }
   [[nodiscard]] double tape_bytes() const {
-    return double(BlockTape::bytes(model_, model_.integrator(), options_.steps)) / 16 /
-           double(options_.steps);
+    return double(BlockTape::bytes(model_, model_.integrator(), options_.length)) / 16 /
+           double(options_.length);
   }
 
  private:
@@ -114,7 +114,7 @@ class Rollout {
   Stepper stepper_;
   Readout readout_;
   BenchmarkFields fields_;
-  GradientOptions options_;
+  TapeOptions options_;
   std::vector<std::unique_ptr<RolloutLoss>> owned_;
   std::vector<const RolloutLoss*> losses_;
   std::optional<GradientRollouts> rollouts_;
@@ -163,8 +163,9 @@ TANGERE_GRADIENTS(insertion, "insertion", false, 1, false);
 class Loop {
  public:
   explicit Loop(const char* name) : task_(make(name)), vector_(*task_, kEnvironments, forward()) {
-    TaskTapeOptions options;
-    options.actions = kActions;
+    TapeOptions options;
+    options.length = kActions;
+    options.precision = Precision::mixed;
     tape_.emplace(*task_, kEnvironments, options);
     const std::size_t e = kEnvironments, seen = task_->spec().observation_size(),
                       width = task_->spec().action.size();
@@ -195,7 +196,7 @@ class Loop {
     const double begin = cpu_seconds();
     for (const auto& a : actions_) tape_->step(a);
     const double middle = cpu_seconds();
-    for (int t = 0; t < kActions; ++t) tape_->reverse(by_observation_, by_reward_, by_action_);
+    for (int t = 0; t < kActions; ++t) tape_->reverse({by_observation_, by_reward_}, by_action_);
     benchmark::DoNotOptimize(by_action_.data());
     return {middle - begin, cpu_seconds() - begin};
   }

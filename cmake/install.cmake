@@ -102,18 +102,14 @@ set(public_headers
   tasks/catalogue/task_list.hpp
   tasks/effects/ablation.hpp
   tasks/gradients/field_sequence.hpp
-  tasks/gradients/gradient_options.hpp
   tasks/gradients/gradients.hpp
   tasks/gradients/identification.hpp
   tasks/gradients/losses.hpp
   tasks/gradients/residual_test.hpp
-  tasks/gradients/task_gradient_options.hpp
-  tasks/gradients/task_gradients.hpp
+  tasks/gradients/tape_options.hpp
   tasks/gradients/task_rollout.hpp
   tasks/gradients/task_tape.hpp
-  tasks/gradients/task_tape_options.hpp
   tasks/gradients/gradient_check.hpp
-  tasks/gradients/gradient_compare.hpp
   tasks/run/energy_balance_summary.hpp
   tasks/run/benchmark_options.hpp
   tasks/run/benchmark_run.hpp
@@ -122,6 +118,7 @@ set(public_headers
   tasks/run/episode_options.hpp
   tasks/run/episodes.hpp
   tasks/run/policy.hpp
+  tasks/run/progress.hpp
   tasks/run/rollout.hpp
   tasks/run/step_counts.hpp
   tasks/run/step_tally.hpp

@@ -199,6 +199,8 @@ def page(package: Path) -> tuple[str, list[str]]:
                 if isinstance(field, ast.AnnAssign) and public(ast.unparse(field.target)):
                     kind = ast.unparse(field.annotation)
                     shown.append(f"- `{ast.unparse(field.target)}`: {kind}")
+            if any(base.endswith("Enum") for base in bases.split(", ")):
+                shown += [*values(node), ""]
             for member in properties:
                 kind = ast.unparse(member.returns) if member.returns else ""
                 doc = " ".join((ast.get_docstring(member) or "").split())
@@ -211,6 +213,17 @@ def page(package: Path) -> tuple[str, list[str]]:
                 describe(f"{prefix}{name}.{member.name}", member)
     text = "\n".join(shown)
     return re.sub(r"\n{3,}", "\n\n", text).rstrip() + "\n", silent
+
+
+def values(enumeration: ast.ClassDef) -> list[str]:
+    """Its values, each with the text that follows it."""
+    lines = []
+    for field, after in zip(enumeration.body, [*enumeration.body[1:], None]):
+        if not isinstance(field, ast.Assign):
+            continue
+        doc = " ".join(after.value.value.split()) if isinstance(after, ast.Expr) else ""
+        lines += wrapped(f"- `{ast.unparse(field)}` {doc}".rstrip())
+    return lines
 
 
 def wrapped(text: str) -> list[str]:

@@ -60,7 +60,7 @@ kernels::ShearSpringTouch touch_between(const kernels::ShearSpringContact& of,
                   number);
 }
 
-/// The same for one lane of a workspace. `touches`: (n_shear_springs), see StageKernels::touches_at.
+/// The same for one lane of a workspace. `touches`: (n_shear_springs), StageKernels::touches_at.
 template <int L>
 kernels::ShearSpringTouch touch_of(const CompiledModel& m, const BasicWorkspace<L>& w,
                                    const kernels::ShearSpringContact& of,

@@ -27,26 +27,26 @@ class Press : public Task {
     spec.observations.back().touch = true;
     spec.reads_tactile = true;
     spec.steps_per_action = 5;
-    spec.moments = {5};
+    spec.snapshots = {5};
     spec.horizon = 30;
-    spec.memory = 2;  // the goal [N], the pad's target [m]
+    spec.task_state = 2;  // the goal [N], the pad's target [m]
     return spec;
   }
   void start(const TaskStart& s) const override {
-    s.memory[0] = task_uniform(s.seed, s.episode, 0, 0, 0.05, 0.3);
-    s.memory[1] = 0;
+    s.task_state[0] = task_uniform(s.seed, s.episode, 0, 0, 0.05, 0.3);
+    s.task_state[1] = 0;
   }
-  void begin_action(const TaskView& view, std::span<double> memory) const override {
-    memory[1] = view.now().q[z_] + 1e-3 * view.action[0];
+  void begin_action(const TaskView& view, std::span<double> state) const override {
+    state[1] = view.now().q[z_] + 1e-3 * view.action[0];
   }
   void controls(const TaskView& view, int, std::span<double> u) const override {
-    u[0] = view.memory[1];
+    u[0] = view.task_state[1];
   }
   void observe(const TaskView& view, std::span<double> o) const override {
     o[0] = error(view);
     std::copy(view.now().tactile.begin(), view.now().tactile.end(), o.begin() + 1);
   }
-  Verdict judge(const TaskView& view) const override {
+  StepOutcome evaluate(const TaskView& view) const override {
     return {-std::abs(error(view)), false,
             view.actions == spec().horizon && std::abs(error(view)) < 0.02};
   }
@@ -59,7 +59,7 @@ class Press : public Task {
   [[nodiscard]] static double error(const TaskView& view) {
     double force = 0;  // the third number of a point is its pressure
     for (std::size_t p = 2; p < view.now().tactile.size(); p += 3) force += view.now().tactile[p];
-    return view.memory[0] - force;
+    return view.task_state[0] - force;
   }
   std::size_t z_;  // of the pad
 };

@@ -9,7 +9,8 @@
 //   λ = 1 if |w| ≤ μ B, else μ B/|w|,   f = N n - λ w
 // β = d/(d - g) is the share of the step after the point crossed the surface, where g ≥ 0 is how
 // far it was from it at the last accepted state. It is 1 for points that touched then.
-// Accepted states hand on s' = λ s, from which b, a and g follow (kernels/shear/anchors_from_state.hpp).
+// The shear state after an accepted step is s' = λ s, from which b, a and g follow
+// (kernels/shear/anchors_from_state.hpp).
 //
 // Derivatives by ε = (θ; ρ₂) as in kernels/contact/pair_contact.hpp, with m = x - A, Z = η I + n rᵀ
 // and s̃ = β'_d P r, β'_d = -g/(d - g)²:

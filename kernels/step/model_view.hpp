@@ -45,8 +45,8 @@ struct Link {
   bool may_rotate;            ///< the link's axes may differ from its parent's
   bool has_offset;            ///< its origin may differ from its parent's
   bool parent_never_rotates;  ///< no ancestor ever turns: ω and α of the parent are zero
-  bool
-      never_rotates;  ///< nor does this joint: ω and α are zero, and only the force of a wrench does work
+  /// Nor does this joint: ω and α are zero, and only the force of a wrench does work.
+  bool never_rotates;
   bool has_mass;                ///< false: no inertia of its own
   std::uint8_t effects;         ///< JointEffect bits: effects that some dof of the joint has
   double mass;                  ///< [kg]

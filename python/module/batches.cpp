@@ -23,7 +23,7 @@ using nb::literals::operator""_a;
 
 PythonBatch::PythonBatch(const Model& model, int environments, const BatchOptions& options)
     : batch_(model, environments, options.seed, options.first_episode),
-      memory_points_(shear_state_arrays(model)),
+      shear_arrays_(shear_state_arrays(model)),
       precision_(options.precision),
       threads_(options.threads) {
   for (int i = 0; i < options.threads; ++i)
@@ -287,32 +287,32 @@ void PythonBatch::set_steps(const std::vector<Whole<std::int64_t>>& steps,
   for (std::size_t k = 0; k < list.size(); ++k) batch_.set_steps(list[k], counts[k]);
 }
 
-Array<double> PythonBatch::memory() {
+Array<double> PythonBatch::shear_state() {
   const InUse::Turn turn(in_use_);
-  const std::size_t n = memory_points_.count();
+  const std::size_t n = shear_arrays_.count();
   std::span<double> numbers;
   auto array = new_array<double>({count(), n, 3}, numbers);
   for (int e = 0; e < environments(); ++e)
-    memory_points_.write(batch_.shear_state(e), numbers.subspan(as_size(e) * 3 * n, 3 * n));
+    shear_arrays_.write(batch_.shear_state(e), numbers.subspan(as_size(e) * 3 * n, 3 * n));
   return array;
 }
 
-void PythonBatch::set_memory(const Argument<double>& memory, const nb::object& environments) {
+void PythonBatch::set_shear_state(const Argument<double>& state, const nb::object& environments) {
   const std::vector<int> list = listed(environments);
-  const std::size_t n = memory_points_.count();
+  const std::size_t n = shear_arrays_.count();
   std::vector<double> all;
-  if (memory.ndim() == 2) {
-    const std::span<const double> one = numbers_of(memory, {n, 3}, "memory");
+  if (state.ndim() == 2) {
+    const std::span<const double> one = numbers_of(state, {n, 3}, "shear_state");
     for (std::size_t k = 0; k < list.size(); ++k) all.insert(all.end(), one.begin(), one.end());
   } else {
-    const std::span<const double> each = numbers_of(memory, {list.size(), n, 3}, "memory");
+    const std::span<const double> each = numbers_of(state, {list.size(), n, 3}, "shear_state");
     all.assign(each.begin(), each.end());
   }
   if (!std::all_of(all.begin(), all.end(), [](double x) { return std::isfinite(x); }))
-    throw InputError("a memory that is not finite; expected numbers");
+    throw InputError("a shear state that is not finite; expected numbers");
   const InUse::Turn turn(in_use_);
   for (std::size_t k = 0; k < list.size(); ++k)
-    batch_.set_shear_state(list[k], memory_points_.read(std::span(all).subspan(k * 3 * n, 3 * n)));
+    batch_.set_shear_state(list[k], shear_arrays_.read(std::span(all).subspan(k * 3 * n, 3 * n)));
 }
 
 void PythonBatch::reset(const nb::object& environments,
@@ -376,7 +376,29 @@ static void make_batch(PythonBatch* self, const Model& model, const Whole<int>& 
   new (self) PythonBatch(model, envs.value("envs"), options);
 }
 
+static void add_statuses(nb::module_& m) {
+  nb::enum_<StepStatus>(m, "StepStatus", nb::is_arithmetic(),
+                        "How a step ended. Values below 0 are failures: the environment stands\n"
+                        "still until it is reset.")
+      .value("converged", StepStatus::converged)
+      .value("split", StepStatus::split, "Converged in parts.")
+      .value("accuracy_not_met", StepStatus::accuracy_not_met,
+             "Converged, but its shortest parts missed the accuracy or created energy.")
+      .value("tunnelled", StepStatus::tunnelled,
+             "Converged, but a body came through another that it touches.")
+      .value("damped", StepStatus::damped,
+             "Converged, but damped, because the scheme would have created energy.")
+      .value("overlapping", StepStatus::overlapping,
+             "Converged, but bodies overlap where no contact point is as deep.")
+      .value("not_converged", StepStatus::not_converged, "No solution was found.")
+      .value("non_finite", StepStatus::non_finite, "A control or state was not finite.")
+      .value("rotation", StepStatus::rotation, "A joint turned by pi or more.")
+      .value("singular", StepStatus::singular, "The Jacobian could not be factored.");
+}
+
 void add_batches(nb::module_& m) {
+  add_statuses(m);
+
   add_run(m);
   nb::class_<PythonBatch>(
       m, "Batch",
@@ -403,9 +425,8 @@ void add_batches(nb::module_& m) {
       .def_prop_ro("v", &PythonBatch::v, nb::rv_policy::automatic,
                    "(E, nv) velocities: m/s, rad/s.")
       .def_prop_ro("status", &PythonBatch::status, nb::rv_policy::automatic,
-                   "(E) int8: 0 for a step that converged, 1 after a split, 2 coarse, 3 passed\n"
-                   "through, 4 damped, 5 overlapping; negative where an environment has failed\n"
-                   "and stands still.")
+                   "(E) int8, values of StepStatus: how the last step of each environment ended;\n"
+                   "negative where it has failed and stands still.")
       .def("end_effectors", &PythonBatch::end_effectors, "(E, n, 3) places in the world [m].")
       .def("bodies", &PythonBatch::bodies,
            nb::sig("def bodies(self) -> tuple[numpy.typing.NDArray[numpy.float64], "
@@ -428,18 +449,17 @@ void add_batches(nb::module_& m) {
            "shear over its largest length; 'pad.ideal' the field without imperfections;\n"
            "'pad.markers' the displacement of markers [m]. `out`: an array to fill instead of a\n"
            "new one.")
-      .def(
-          "set_state", &PythonBatch::set_state, "q"_a, "v"_a, "envs"_a = nb::none(),
-          "Sets states: `q` (n, nq) or (nq), `v` (n, nv) or (nv), of the environments listed in\n"
-          "`envs` (indices, or a mask (E)), or of all. Releases a failed environment; forgets the\n"
-          "state one step before and what friction remembers.")
+      .def("set_state", &PythonBatch::set_state, "q"_a, "v"_a, "envs"_a = nb::none(),
+           "Sets states: `q` (n, nq) or (nq), `v` (n, nv) or (nv), of the environments listed in\n"
+           "`envs` (indices, or a mask (E)), or of all. Releases a failed environment; drops the\n"
+           "state one step before and the shear state.")
       .def_prop_ro(
-          "memory", &PythonBatch::memory, nb::rv_policy::automatic,
-          "(E, points, 3) what friction with ks remembers: the elastic displacement of\n"
+          "shear_state", &PythonBatch::shear_state, nb::rv_policy::automatic,
+          "(E, points, 3) the shear state of contacts with ks: the elastic displacement of\n"
           "every point of Model.shear_state_arrays [m], in the axes of the moving frame that\n"
           "carries it; 0 where it has not moved or does not touch.")
-      .def("set_memory", &PythonBatch::set_memory, "memory"_a, "envs"_a = nb::none(),
-           "Sets what friction remembers, (n, points, 3) or (points, 3) as in `memory`, of the\n"
+      .def("set_shear_state", &PythonBatch::set_shear_state, "shear_state"_a, "envs"_a = nb::none(),
+           "Sets the shear state, (n, points, 3) or (points, 3) as in `shear_state`, of the\n"
            "environments listed in `envs` (indices, or a mask (E)), or of all. To go on from a\n"
            "state, set it after set_state(). InputError: another shape, or not finite.")
       .def_prop_ro("steps", &PythonBatch::steps, nb::rv_policy::automatic,

@@ -48,8 +48,8 @@ class PythonBatch {
                  const nb::object& environments);
   [[nodiscard]] Array<std::int64_t> steps();
   void set_steps(const std::vector<Whole<std::int64_t>>& steps, const nb::object& environments);
-  [[nodiscard]] Array<double> memory();
-  void set_memory(const Argument<double>& memory, const nb::object& environments);
+  [[nodiscard]] Array<double> shear_state();
+  void set_shear_state(const Argument<double>& state, const nb::object& environments);
   void reset(const nb::object& environments,
              const std::optional<std::vector<Whole<std::int64_t>>>& episodes);
   Array<double> scene_controls(const Whole<std::int64_t>& count_of_steps);
@@ -80,7 +80,7 @@ class PythonBatch {
              const std::vector<std::string>& readings);
 
   Batch batch_;
-  ShearStateArrays memory_points_;
+  ShearStateArrays shear_arrays_;
   Precision precision_;
   std::vector<Worker> workers_;  // by the thread's index in the arena
   BlockThreads threads_;

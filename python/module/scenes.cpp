@@ -124,7 +124,8 @@ void add_model(nb::module_& m) {
           },
           nb::for_getter(nb::sig("def shear_state_arrays(self) -> "
                                  "dict[str, numpy.typing.NDArray[numpy.float64]]")),
-          "Points of every contact and sensor with ks, by name, in the order of Batch.memory:\n"
+          "Points of every contact and sensor with ks, by name, in the order of "
+          "Batch.shear_state:\n"
           "(n, 3) their places [m], in the axes of the moving frame that carries them. Points of\n"
           "a sensor have the order of its field, once for every body that it feels.")
       .def_prop_ro(

@@ -21,9 +21,9 @@ namespace {
 /// by the scales or not.
 class Tape {
  public:
-  Tape(const std::string& task, const Scene& scene, int environments,
-       const TaskTapeOptions& options, bool scaled)
-      : task_(make_task(task, scene)), tape_(*task_, environments, options) {
+  Tape(const std::string& task, const Scene& scene, int environments, const TapeOptions& options,
+       std::uint64_t seed, std::int64_t first_episode, bool scaled)
+      : task_(make_task(task, scene)), tape_(*task_, environments, options, seed, first_episode) {
     for (const TensorSpec& tensor : spec().observations)
       for (std::size_t i = 0; i < tensor.size(); ++i)
         factor_.push_back(scaled ? 1 / scale_of(tensor, i) : 1);
@@ -62,7 +62,7 @@ class Tape {
     auto array = new_array<double>({count(), spec().action.size()}, by_action);
     const InUse::Turn turn(in_use_);
     const nb::gil_scoped_release free;
-    tape_.reverse(o, r, by_action);
+    tape_.reverse({o, r}, by_action);
     return array;
   }
   nb::tuple reverse_start(const Argument<double>& by_observation) {
@@ -73,7 +73,7 @@ class Tape {
     {
       const InUse::Turn turn(in_use_);
       const nb::gil_scoped_release free;
-      tape_.reverse_start(o, q, v);
+      tape_.reverse_start({o}, q, v);
     }
     return nb::make_tuple(by_q, by_v);
   }
@@ -120,14 +120,13 @@ void add_tapes(nb::module_& m) {
              const Whole<std::int64_t>& actions, const Whole<std::uint64_t>& seed,
              const Whole<std::int64_t>& first_episode, const std::optional<Whole<int>>& threads,
              bool scaled, const std::string& precision, double tape_bytes) {
-            TaskTapeOptions options;
+            TapeOptions options;
             options.precision = precision_named(precision);
-            options.seed = seed.value("seed");
-            options.first_episode = first_episode.value("first_episode");
-            options.actions = actions.value("actions");
+            options.length = actions.value("actions");
             options.threads = threads_of(threads);
             options.tape_bytes = tape_bytes;
-            new (self) Tape(task, scene, envs.value("envs"), options, scaled);
+            new (self) Tape(task, scene, envs.value("envs"), options, seed.value("seed"),
+                            first_episode.value("first_episode"), scaled);
           },
           "task"_a, "scene"_a, "envs"_a, "actions"_a = 0, "seed"_a = 0, "first_episode"_a = 0,
           "threads"_a = nb::none(), "scaled"_a = true, "precision"_a = "mixed",

@@ -39,7 +39,7 @@ void add_tasks(nb::module_& m) {
       .def_ro("observations", &TaskSpec::observations)
       .def_ro("steps_per_action", &TaskSpec::steps_per_action, "Simulation steps.")
       .def_ro("horizon", &TaskSpec::horizon, "Actions after which an episode is truncated.")
-      .def_ro("memory", &TaskSpec::task_state, "Numbers that an episode keeps for the task.")
+      .def_ro("task_state", &TaskSpec::task_state, "Numbers that an episode keeps for the task.")
       .def("__repr__", [](const TaskSpec& s) { return fmt::format("TaskSpec('{}')", s.name); });
   m.def("task_names", &task_names, "Names of all tasks.");
   m.def("task_spec", &task_spec, "name"_a,

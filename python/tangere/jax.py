@@ -27,10 +27,7 @@ import numpy as np
 from jax.experimental.buffer_callback import buffer_callback
 
 from . import _core
-from .gym import task_scene
-
-# KEY → array, or with `flatten` one array.
-Observations = Any
+from ._tape import Observations, TapeBase, check_rollout
 
 
 class State(NamedTuple):
@@ -50,7 +47,7 @@ class Rollout(NamedTuple):
     success: jax.Array  #: (E) bool
 
 
-class Tape:
+class Tape(TapeBase):
     """A batch of episodes of one task, recorded for the way back.
 
     It holds one run at a time. A computation with two runs needs two tapes; with one tape, it ends
@@ -84,21 +81,10 @@ class Tape:
         dtype: Any = jnp.float32,
         scene: _core.Scene | str | Path | None = None,
     ):
-        self.num_envs, self.flatten = num_envs, flatten
         if np.dtype(dtype) not in (np.float32, _real()):
             raise _core.InputError(f"{dtype}; expected float32, or float64 with jax_enable_x64")
-        self.tape = _core.TaskTape(
-            task,
-            task_scene(task, scene),
-            num_envs,
-            actions or 0,
-            threads=threads,
-            scaled=normalise,
-            precision=precision,
-            tape_bytes=tape_bytes,
-        )
-        self.spec = self.tape.spec
-        self.actions = actions or self.spec.horizon
+        options = dict(scaled=normalise, precision=precision, tape_bytes=tape_bytes)
+        super().__init__(task, num_envs, actions, flatten, scene, threads=threads, **options)
         self._host = _Host(self.tape, dtype)
 
     def reset(self, seed: Any = 0, first_episode: Any = 0) -> tuple[State, Observations]:
@@ -164,15 +150,6 @@ class Tape:
         )
         return Rollout(rewards.T, observations, alive.T, state.success)
 
-    def _split(self, rows: jax.Array) -> Observations:
-        if self.flatten:
-            return rows
-        ends = np.cumsum([int(np.prod(t.shape)) for t in self.spec.observations])
-        return {
-            t.name: part.reshape(self.num_envs, *t.shape)
-            for t, part in zip(self.spec.observations, jnp.split(rows, ends[:-1], axis=1))
-        }
-
 
 def rollout(
     task: str,
@@ -189,9 +166,7 @@ def rollout(
     Each call makes a tape, under jit each compilation. `Tape.play` uses one tape again and again.
     """
     actions = jnp.asarray(actions)
-    if actions.ndim != 3 or actions.shape[1] == 0:
-        raise _core.InputError(f"actions of shape {actions.shape}; expected (E, A, na)")
-    envs, count, _ = actions.shape
+    envs, count = check_rollout(actions)
     tape = Tape(task, envs, count, threads=threads, normalise=normalise, dtype=dtype)
     return tape.play(lambda _, t: actions[:, t], seed, first_episode)
 
@@ -314,10 +289,9 @@ class _Host:
                 if self.left is not None:
                     self.tape.begin_reverse()
                 passing = self.passing = self.passing % (1 << 24) + 1
-                self.left = self.tape.taken
-                while self.left > taken:  # later steps on which the loss does not hang
+                self.left = int(taken)
+                for _ in range(self.tape.taken - self.left):  # on which the loss does not hang
                     self.tape.reverse(np.zeros_like(by_rows), np.zeros_like(by_reward))
-                    self.left -= 1
             if passing != self.passing or self.left != taken:
                 raise _core.InputError("two ways back over one tape at the same time")
             np.asarray(out[1])[...] = self.tape.reverse(by_rows, by_reward)

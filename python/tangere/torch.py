@@ -24,13 +24,10 @@ import numpy as np
 import torch
 
 from . import _core
-from .gym import task_scene
-
-# KEY → tensor, or with `flatten` one tensor.
-Observations = Any
+from ._tape import Observations, TapeBase, check_rollout
 
 
-class Tape:
+class Tape(TapeBase):
     """A batch of episodes of one task, recorded for the way back.
 
     Parameters
@@ -60,19 +57,9 @@ class Tape:
         dtype: torch.dtype = torch.float32,
         scene: _core.Scene | str | Path | None = None,
     ):
-        self.num_envs, self.flatten, self.dtype = num_envs, flatten, dtype
-        self.tape = _core.TaskTape(
-            task,
-            task_scene(task, scene),
-            num_envs,
-            actions or 0,
-            threads=threads,
-            scaled=normalise,
-            precision=precision,
-            tape_bytes=tape_bytes,
-        )
-        self.spec = self.tape.spec
-        self.actions = actions or self.spec.horizon
+        options = dict(scaled=normalise, precision=precision, tape_bytes=tape_bytes)
+        super().__init__(task, num_envs, actions, flatten, scene, threads=threads, **options)
+        self.dtype = dtype
         self._token: torch.Tensor | None = None
         self._run = _Run(self.tape)
 
@@ -111,15 +98,6 @@ class Tape:
     def state(self) -> tuple[np.ndarray, np.ndarray]:
         """q (E, nq) and v (E, nv) now, without derivatives."""
         return self.tape.q(), self.tape.v()
-
-    def _split(self, rows: torch.Tensor) -> Observations:
-        if self.flatten:
-            return rows
-        parts = torch.split(rows, [int(np.prod(t.shape)) for t in self.spec.observations], dim=1)
-        return {
-            t.name: part.reshape(self.num_envs, *t.shape)
-            for t, part in zip(self.spec.observations, parts)
-        }
 
 
 class _Run:
@@ -201,9 +179,7 @@ def rollout(
 ) -> Rollout:
     """Plays E episodes with the actions (E, A, na) and returns all that they show."""
     actions = torch.as_tensor(actions)
-    if actions.ndim != 3 or actions.shape[1] == 0:
-        raise _core.InputError(f"actions of shape {tuple(actions.shape)}; expected (E, A, na)")
-    envs, count, _ = actions.shape
+    envs, count = check_rollout(actions)
     tape = Tape(task, envs, count, threads=threads, normalise=normalise, dtype=dtype)
     seen, rewards, alive = [tape.reset(seed, first_episode)], [], []
     for t in range(actions.shape[1]):

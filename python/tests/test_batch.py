@@ -167,6 +167,7 @@ def test_a_failed_environment_is_told(model):
     u[1, 0] = np.nan
     batch.step(u)
     assert batch.status.tolist() == [0, -2]
+    assert tangere.StepStatus(batch.status[1]) is tangere.StepStatus.non_finite == -2
     assert batch.run(np.zeros((1, 2, 3))).status.tolist() == [0, -2]
     batch.set_state(batch.q, batch.v)
     assert batch.status.tolist() == [0, 0]
@@ -230,29 +231,30 @@ def test_what_friction_remembers_goes_on():
     np.testing.assert_allclose(down, [0, 0, 0.0015], atol=1e-12)
     np.testing.assert_allclose(np.diff(pad, axis=0), np.full((12, 10, 3), down), atol=1e-12)
     batch = tangere.Batch(model, envs=19, seed=3, precision="double")
-    assert batch.memory.shape == (19, 334, 3) and not batch.memory.any()
+    assert batch.shear_state.shape == (19, 334, 3) and not batch.shear_state.any()
     u = batch.scene_controls(120)
     batch.run(u[:90])
-    middle = batch.q, batch.v, batch.memory
+    middle = batch.q, batch.v, batch.shear_state
     touched = middle[2][:, -130:].any(axis=-1)
     assert touched.any(axis=1).all() and not touched.all()
     felt = np.linalg.norm(batch.tactile("pad"), axis=-1).reshape(19, 130)
     assert (felt[touched] > 0).all()
     whole = batch.run(u[90:], fields=["pad"])
-    end = batch.memory
+    end = batch.shear_state
     other = tangere.Batch(model, envs=19, seed=3, precision="double")
     q, v, memory = middle
     other.set_state(q, v)
-    other.set_memory(memory)
-    np.testing.assert_array_equal(other.memory, memory)
+    other.set_shear_state(memory)
+    np.testing.assert_array_equal(other.shear_state, memory)
     again = other.run(u[90:], fields=["pad"])  # BDF1 has no state before
     np.testing.assert_array_equal(again.q, whole.q)
     np.testing.assert_array_equal(again.fields["pad"], whole.fields["pad"])
-    np.testing.assert_array_equal(other.memory, end)
-    other.set_memory(memory[4], envs=[1, 2])
-    np.testing.assert_array_equal(other.memory, end[:1].tolist() + [memory[4]] * 2 + [*end[3:]])
+    np.testing.assert_array_equal(other.shear_state, end)
+    other.set_shear_state(memory[4], envs=[1, 2])
+    changed = end[:1].tolist() + [memory[4]] * 2 + [*end[3:]]
+    np.testing.assert_array_equal(other.shear_state, changed)
     other.reset(envs=[1])
-    assert not other.memory[1].any() and other.memory[2].any()
+    assert not other.shear_state[1].any() and other.shear_state[2].any()
     assert other.steps[1] == 0 and other.steps[2] == 30 and other.steps.dtype == np.int64
     other.set_steps(batch.steps)
     np.testing.assert_array_equal(other.steps, 19 * [120])
@@ -262,17 +264,17 @@ def test_what_friction_remembers_goes_on():
         with pytest.raises(tangere.InputError, match=message):
             other.set_steps(steps)
     for wrong, message in [
-        (memory[:, :-1], r"memory of shape \(19, 333, 3\); expected \(19, 334, 3\)"),
-        (memory[0, :, :2], r"memory of shape \(334, 2\); expected \(334, 3\)"),
+        (memory[:, :-1], r"shear_state of shape \(19, 333, 3\); expected \(19, 334, 3\)"),
+        (memory[0, :, :2], r"shear_state of shape \(334, 2\); expected \(334, 3\)"),
         (np.full((334, 3), np.inf), "not finite"),
     ]:
         with pytest.raises(tangere.InputError, match=message):
-            other.set_memory(wrong)
+            other.set_shear_state(wrong)
 
 
 def test_a_scene_without_springs_has_no_memory(model):
     assert model.shear_state_arrays == {} and "memory" not in model.readings
-    assert tangere.Batch(model, envs=2).memory.shape == (2, 0, 3)
+    assert tangere.Batch(model, envs=2).shear_state.shape == (2, 0, 3)
 
 
 @pytest.mark.parametrize(

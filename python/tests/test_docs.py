@@ -66,6 +66,8 @@ def test_the_stub_has_what_the_module_has():
     for name, node in said.items():
         if isinstance(node, ast.ClassDef) and name not in ("InputError", "IoError"):
             members = {n.name for n in node.body if isinstance(n, ast.FunctionDef)}
+            values = [n.targets[0] for n in node.body if isinstance(n, ast.Assign)]
+            members |= {n.id for n in values if isinstance(n, ast.Name)}
             own = {n for n in vars(getattr(_core, name)) if not n.startswith("_")}
             assert {n for n in members if not n.startswith("_")} == own, name
 

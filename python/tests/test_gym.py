@@ -248,7 +248,8 @@ def test_counts_say_how_many_steps_had_which_status(tmp_path):
         counts = env.counts()
         assert counts.pop("newton_iterations") >= 30
         assert counts == {
-            "environment_steps": 6, "simulation_steps": 30, "split_steps": 0, "accuracy_not_met_steps": 0,
+            "environment_steps": 6, "simulation_steps": 30, "split_steps": 0,
+            "accuracy_not_met_steps": 0,
             "tunnelled_steps": 0, "damped_steps": 0, "overlapping_steps": overlapping,
         }  # fmt: skip
 

@@ -86,14 +86,14 @@ class SampleRun : public AccuracyRun {
   }
 
   AccuracyOutcome make_reference(const AccuracySetting& setting,
-                                 const AccuracyGoOn& go_on) override {
-    AccuracyOutcome out = play(setting, go_on, true);
+                                 const std::stop_token& stop) override {
+    AccuracyOutcome out = play(setting, stop, true);
     if (!out.stopped) weigh(out);
     return out;
   }
 
-  AccuracyOutcome compare(const AccuracySetting& setting, const AccuracyGoOn& go_on) override {
-    AccuracyOutcome out = play(setting, go_on, false);
+  AccuracyOutcome compare(const AccuracySetting& setting, const std::stop_token& stop) override {
+    AccuracyOutcome out = play(setting, stop, false);
     if (out.stopped) return out;
     for (std::size_t p = 0; p < kPrecisions.size(); ++p)
       out.error[p] = relative_errors(sum[quantity == AccuracyQuantity::state ? 0 : p], norm,
@@ -157,7 +157,7 @@ class SampleRun : public AccuracyRun {
       sum[1][as_size(e)] += squared_distance<float>(lane(w.narrow, e), of, weight);
   }
 
-  AccuracyOutcome play(const AccuracySetting& setting, const AccuracyGoOn& go_on, bool keep) {
+  AccuracyOutcome play(const AccuracySetting& setting, const std::stop_token& stop, bool keep) {
     const double interval = episodes.interval();
     const std::optional<double> tolerance =
         setting.follows ? std::nullopt : std::optional(setting.tolerance);
@@ -173,7 +173,7 @@ class SampleRun : public AccuracyRun {
     std::vector<BlockOutcome> blocks(as_size(batch.blocks()));
     std::atomic<bool> stopped{false};
     threads.for_each(batch.blocks(), workers, [&](Worker& w, int b) {
-      play_block(setting, go_on, keep, w, batch, b, blocks[as_size(b)], stopped);
+      play_block(setting, stop, keep, w, batch, b, blocks[as_size(b)], stopped);
     });
     AccuracyOutcome out;
     for (const BlockOutcome& block : blocks) {
@@ -188,11 +188,10 @@ class SampleRun : public AccuracyRun {
     return out;
   }
 
-  void play_block(const AccuracySetting& setting, const AccuracyGoOn& go_on, bool keep, Worker& w,
+  void play_block(const AccuracySetting& setting, const std::stop_token& stop, bool keep, Worker& w,
                   Batch& batch, int b, BlockOutcome& out, std::atomic<bool>& stopped) {
     const int first = b * kBlock, lanes = lanes_of(batch, b);
     StepTally tally(batch, first, lanes);
-    const auto may_go_on = [&] { return !stopped && (!go_on || go_on()); };
     const auto after_step = [&](std::int64_t step) { tally.count(batch, step); };
     const auto after_sample = [&](int k) {
       read(w, batch, b, !keep, out);
@@ -205,7 +204,7 @@ class SampleRun : public AccuracyRun {
           compare_sample(w, e, k);
       }
     };
-    if (!episodes.play(*w.stepper, setting.parts, batch, b, out.step_seconds, may_go_on, after_step,
+    if (!episodes.play(*w.stepper, setting.parts, batch, b, out.step_seconds, stop, after_step,
                        after_sample)) {
       stopped = true;
       return;

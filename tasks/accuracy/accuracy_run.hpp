@@ -4,9 +4,9 @@
 #pragma once
 
 #include <array>
-#include <functional>
 #include <memory>
 #include <span>
+#include <stop_token>
 #include <vector>
 
 #include "engine/base/precision.hpp"
@@ -55,17 +55,15 @@ struct AccuracyOutcome {
   bool stopped = false;
 };
 
-/// Is called before every sample of every block, from any thread. False stops the run.
-using AccuracyGoOn = std::function<bool()>;
-
+/// Runs end before any sample of a block where their `stop` asks for it.
 class AccuracyRun {
  public:
   virtual ~AccuracyRun() = default;
   /// Plays with a setting and keeps its samples as the reference. Errors are left empty.
   virtual AccuracyOutcome make_reference(const AccuracySetting& setting,
-                                         const AccuracyGoOn& go_on) = 0;
+                                         const std::stop_token& stop) = 0;
   /// Plays with a setting and compares with the reference, which must have been made.
-  virtual AccuracyOutcome compare(const AccuracySetting& setting, const AccuracyGoOn& go_on) = 0;
+  virtual AccuracyOutcome compare(const AccuracySetting& setting, const std::stop_token& stop) = 0;
 };
 
 /// `episodes` must outlive what is returned. Throws InputError for tactile without a sensor, and

@@ -88,7 +88,7 @@ class Sweep {
     for (const int per_step : kReferenceParts) {
       AccuracySetting setting{Integrator::reference, episodes_.every * per_step,
                               kReferenceTolerance};
-      const AccuracyOutcome made = run_->make_reference(setting, listener_.go_on);
+      const AccuracyOutcome made = run_->make_reference(setting, listener_.stop);
       // An unfinished reference is worth nothing. What came before was judged too coarse.
       if (made.stopped) return false;
       std::array<AccuracyOutcome, 3> others;  // SDIRK2; itself with twice and four times the step
@@ -96,7 +96,7 @@ class Sweep {
         const int divisor = k == 0 ? 1 : 1 << k;
         others[k] = run_->compare({k == 0 ? Integrator::second_reference : Integrator::reference,
                                    setting.parts / divisor, kReferenceTolerance},
-                                  listener_.go_on);
+                                  listener_.stop);
         if (others[k].stopped) return false;
       }
       describe_reference(setting, made, others);
@@ -148,7 +148,7 @@ class Sweep {
     report_.vibration =
         strongest_vibration(episodes_, static_cast<int>(at - errors_of_environments_.begin()),
                             Integrator::second_reference, episodes_.every * kReferenceParts[0],
-                            kReferenceTolerance, listener_.go_on);
+                            kReferenceTolerance, listener_.stop);
   }
 
   /// Gradients have a tolerance of their own. Nothing sleeps in a comparison.
@@ -178,12 +178,12 @@ class Sweep {
 
   /// Plays a setting up to kPasses times; the least times count. Returns false when stopped.
   bool measure(const AccuracySetting& setting, std::vector<AccuracyPoint>& points) {
-    AccuracyOutcome best = run_->compare(setting, listener_.go_on);
+    AccuracyOutcome best = run_->compare(setting, listener_.stop);
     if (best.stopped) return false;
     double spent = best.step_seconds;
     bool stopped = false;  // what the first pass measured is kept
     for (int pass = 1; pass < kPasses && spent < kEnoughSeconds && !stopped; ++pass) {
-      const AccuracyOutcome again = run_->compare(setting, listener_.go_on);
+      const AccuracyOutcome again = run_->compare(setting, listener_.stop);
       stopped = again.stopped;
       if (stopped) break;
       spent += again.step_seconds;
@@ -304,11 +304,11 @@ class Sweep {
     if (listener_.second_look) listener_.second_look();
     const std::unique_ptr<AccuracyRun> run =
         make_accuracy_run(*episodes, options_.quantity, options_.threads);
-    const AccuracyOutcome made = run->make_reference(report_.reference.setting, listener_.go_on);
+    const AccuracyOutcome made = run->make_reference(report_.reference.setting, listener_.stop);
     if (made.stopped) return false;
     failed_again_ = static_cast<int>(made.failures.size());
     for (const std::size_t first : candidates) {
-      const AccuracyOutcome seen = run->compare(report_.points[first].setting, listener_.go_on);
+      const AccuracyOutcome seen = run->compare(report_.points[first].setting, listener_.stop);
       if (seen.stopped) return false;
       const std::span points = std::span(report_.points).subspan(first, precisions());
       for (std::size_t p = 0; p < points.size(); ++p) add(seen, p, points[p]);
@@ -375,7 +375,7 @@ class Sweep {
 
   bool measure_pitches() {
     if (options_.quantity != AccuracyQuantity::tactile) return true;
-    report_.pitches = sweep_pitches(episodes_, options_.target, listener_.go_on);
+    report_.pitches = sweep_pitches(episodes_, options_.target, listener_.stop);
     return !report_.pitches.empty();
   }
 

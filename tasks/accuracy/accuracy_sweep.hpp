@@ -3,7 +3,6 @@
 // cheapest that is accurate enough.
 #pragma once
 
-#include <functional>
 #include <optional>
 #include <span>
 #include <string>
@@ -90,7 +89,7 @@ struct AccuracyReport {
 
 /// Told as the sweep goes on.
 struct AccuracyListener {
-  AccuracyGoOn go_on;
+  std::stop_token stop;                                         ///< ends it before any sample
   std::function<void(const AccuracyReference&)> reference;      ///< each attempt, ever finer
   std::function<void(std::span<const AccuracyPoint>)> setting;  ///< in every precision
   std::function<void()> second_look{};                          ///< settings are told once more

@@ -70,7 +70,7 @@ FixedEpisodes scene_episodes(const Batch& start, const ControlProgram& controls,
 
 std::optional<FixedEpisodes> task_episodes(const Batch& start, const Task& task,
                                            const Policy& policy, int every,
-                                           const std::function<bool()>& go_on) {
+                                           const std::stop_token& stop) {
   const std::int64_t steps =
       task.spec().restarts ? task.spec().steps_per_action : TaskProgram::steps(task.spec());
   FixedEpisodes episodes = with_room(start, steps, every);
@@ -87,7 +87,7 @@ std::optional<FixedEpisodes> task_episodes(const Batch& start, const Task& task,
     const int first = b * kBlock, lanes = lanes_of(batch, b);
     const auto controls_begin = static_cast<std::ptrdiff_t>(as_size(first) * nu);
     for (std::int64_t t = 0; t < std::int64_t{episodes.samples} * every; ++t) {
-      if (go_on && !go_on()) return std::nullopt;
+      if (stop.stop_requested()) return std::nullopt;
       program.controls(t, batch, b, u);
       // Where every action restarts, the first one sets the state.
       if (t == 0) episodes.start.restore_block(b, batch.save_block(b));

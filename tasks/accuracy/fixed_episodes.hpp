@@ -3,9 +3,9 @@
 // and any step.
 #pragma once
 
-#include <functional>
 #include <optional>
 #include <span>
+#include <stop_token>
 #include <vector>
 
 #include "engine/step/batch.hpp"
@@ -37,13 +37,14 @@ struct FixedEpisodes {
   /// Plays a block of `batch`, which begins as `start`, with `parts` steps between samples. Holds
   /// environments whose episode is over. Calls after_step(step) after every step, and
   /// after_sample(sample) after every sample; only steps and after_step() add to `seconds` (CPU
-  /// time). go_on() is called before every sample; false stops, and play() returns false.
-  template <class GoOn, class AfterStep, class AfterSample>
+  /// time). `stop` ends it before any sample; play() then returns false.
+  template <class AfterStep, class AfterSample>
   bool play(Stepper& stepper, int parts, Batch& batch, int block, double& seconds,
-            const GoOn& go_on, const AfterStep& after_step, const AfterSample& after_sample) const {
+            const std::stop_token& stop, const AfterStep& after_step,
+            const AfterSample& after_sample) const {
     const int first = block * kernels::kBlock, last = first + lanes_of(batch, block);
     for (int sample = 0; sample < samples; ++sample) {
-      if (!go_on()) return false;
+      if (stop.stop_requested()) return false;
       for (int e = first; e < last; ++e)
         if (sample >= samples_of[static_cast<std::size_t>(e)]) batch.hold(e);
       const double begin = thread_seconds();
@@ -65,11 +66,11 @@ FixedEpisodes scene_episodes(const Batch& start, const ControlProgram& controls,
 
 /// Episodes of a task from `start`, whose states are replaced. The controls are those that the
 /// policy asks for at the scene's own scheme and step. For a task whose actions restart, an episode
-/// is its opening, or its first action if it has none. `go_on` is called before every step; false
-/// stops, and nothing is returned. Throws like scene_episodes.
+/// is its opening, or its first action if it has none. `stop` ends it before any step, and
+/// nothing is returned. Throws like scene_episodes.
 std::optional<FixedEpisodes> task_episodes(const Batch& start, const Task& task,
                                            const Policy& policy, int every,
-                                           const std::function<bool()>& go_on = {});
+                                           const std::stop_token& stop = {});
 
 /// Timesteps between samples: those between fields if all sensors agree and that is 10 ms or more,
 /// else as many as make about 25 ms.

@@ -40,10 +40,9 @@ class SampledLoss : public RolloutLoss {
   std::unique_ptr<RolloutLoss> of_samples_;
 };
 
-GradientOptions options_of(const FixedEpisodes& episodes, const AccuracySetting& setting,
-                           int threads) {
-  GradientOptions options;
-  options.steps = std::int64_t{episodes.samples} * setting.parts;
+TapeOptions options_of(const FixedEpisodes& episodes, const AccuracySetting& setting, int threads) {
+  TapeOptions options;
+  options.length = std::int64_t{episodes.samples} * setting.parts;
   options.threads = threads;
   options.stepper = {.integrator = setting.integrator,
                      .timestep = episodes.interval() / setting.parts,
@@ -64,12 +63,12 @@ GradientRun::GradientRun(const FixedEpisodes& episodes, int threads)
   width_ = as_size(by_controls ? model.nu() : model.nv());
 }
 
-AccuracyOutcome GradientRun::play(const AccuracySetting& setting, const AccuracyGoOn& go_on,
+AccuracyOutcome GradientRun::play(const AccuracySetting& setting, const std::stop_token& stop,
                                   std::vector<double>& derivatives) const {
   const Batch& start = episodes_.start;
   const SampledLoss loss(episodes_, setting.parts);
   const RolloutLoss* const losses[] = {&loss};
-  const GradientOptions options = options_of(episodes_, setting, threads_);
+  const TapeOptions options = options_of(episodes_, setting, threads_);
   GradientRollouts rollouts(start.model(), options, losses);
   const std::size_t nu = as_size(start.model().nu());
   const auto controls = [&](std::int64_t step, int e, std::span<double> u) {
@@ -78,15 +77,15 @@ AccuracyOutcome GradientRun::play(const AccuracySetting& setting, const Accuracy
     std::ranges::copy(all.subspan(as_size(e) * nu, nu), u.begin());
   };
   const double begin = process_seconds();
-  const GradientSummary found = rollouts.run(start, controls, go_on);
+  const GradientSummary found = rollouts.run(start, controls, stop);
   AccuracyOutcome out;
   out.step_seconds = process_seconds() - begin;
   out.failures = found.failures;
   out.counts.newton_iterations = found.newton_iterations;
   out.stopped = found.stopped;
-  out.counts.simulation_steps = options.steps * start.environments();
+  out.counts.simulation_steps = options.length * start.environments();
   for (const FailedEnvironment& f : out.failures)
-    out.counts.simulation_steps -= options.steps - std::max<std::int64_t>(0, f.step);
+    out.counts.simulation_steps -= options.length - std::max<std::int64_t>(0, f.step);
   out.simulated_seconds =
       static_cast<double>(out.counts.simulation_steps) * episodes_.interval() / setting.parts;
   const LossGradient& g = found.losses.front();
@@ -129,15 +128,15 @@ void GradientRun::weigh(const AccuracyOutcome& out) {
 }
 
 AccuracyOutcome GradientRun::make_reference(const AccuracySetting& setting,
-                                            const AccuracyGoOn& go_on) {
-  AccuracyOutcome out = play(setting, go_on, reference_);
+                                            const std::stop_token& stop) {
+  AccuracyOutcome out = play(setting, stop, reference_);
   if (!out.stopped) weigh(out);
   return out;
 }
 
-AccuracyOutcome GradientRun::compare(const AccuracySetting& setting, const AccuracyGoOn& go_on) {
+AccuracyOutcome GradientRun::compare(const AccuracySetting& setting, const std::stop_token& stop) {
   std::vector<double> found;
-  AccuracyOutcome out = play(setting, go_on, found);
+  AccuracyOutcome out = play(setting, stop, found);
   if (out.stopped) return out;
   std::vector<double> sum(norm_.size());
   for (std::size_t k = 0; k < found.size(); ++k) {

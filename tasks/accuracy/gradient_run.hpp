@@ -11,14 +11,14 @@ class GradientRun : public AccuracyRun {
  public:
   GradientRun(const FixedEpisodes& episodes, int threads);
   AccuracyOutcome make_reference(const AccuracySetting& setting,
-                                 const AccuracyGoOn& go_on) override;
-  AccuracyOutcome compare(const AccuracySetting& setting, const AccuracyGoOn& go_on) override;
+                                 const std::stop_token& stop) override;
+  AccuracyOutcome compare(const AccuracySetting& setting, const std::stop_token& stop) override;
 
   /// Memory of tapes and of the derivatives by every step of the finest reference [bytes].
   static double bytes(const FixedEpisodes& episodes, int threads);
 
  private:
-  AccuracyOutcome play(const AccuracySetting& setting, const AccuracyGoOn& go_on,
+  AccuracyOutcome play(const AccuracySetting& setting, const std::stop_token& stop,
                        std::vector<double>& derivatives) const;
   void weigh(const AccuracyOutcome& out);
 

@@ -195,14 +195,14 @@ class Pitches {
       if (fits(factor)) rungs_.push_back(std::make_unique<Rung>(episodes.start, factor));
   }
 
-  bool play(const std::function<bool()>& go_on) {
+  bool play(const std::stop_token& stop) {
     if (rungs_.empty()) return true;
     StepperOptions awake;
     awake.sleep = 0;
     Stepper stepper(episodes_.start.model(), awake);
     Batch batch = episodes_.start;
     for (int b = 0; b < batch.blocks(); ++b)
-      if (!play_block(stepper, batch, b, go_on)) return false;
+      if (!play_block(stepper, batch, b, stop)) return false;
     return true;
   }
 
@@ -241,7 +241,7 @@ class Pitches {
     });
   }
 
-  bool play_block(Stepper& stepper, Batch& batch, int b, const std::function<bool()>& go_on) {
+  bool play_block(Stepper& stepper, Batch& batch, int b, const std::stop_token& stop) {
     const int first = b * kBlock, lanes = lanes_of(batch, b);
     const auto after_sample = [&](int) {
       for (const auto& rung : rungs_)
@@ -255,8 +255,7 @@ class Pitches {
       }
     };
     return episodes_.play(
-        stepper, episodes_.every, batch, b, step_seconds_, [&] { return !go_on || go_on(); },
-        [](std::int64_t) {}, after_sample);
+        stepper, episodes_.every, batch, b, step_seconds_, stop, [](std::int64_t) {}, after_sample);
   }
 
   [[nodiscard]] PitchPoint point_of(const Rung& rung, std::size_t s) const {
@@ -283,9 +282,9 @@ class Pitches {
 }  // namespace
 
 std::vector<PitchSweep> sweep_pitches(const FixedEpisodes& episodes, double target,
-                                      const std::function<bool()>& go_on) {
+                                      const std::stop_token& stop) {
   Pitches pitches(episodes);
-  if (!pitches.play(go_on)) return {};
+  if (!pitches.play(stop)) return {};
   std::vector<PitchSweep> sweeps;
   for (std::size_t s = 0; s < episodes.start.model().sensors().size(); ++s)
     sweeps.push_back(pitches.of_sensor(s, target));

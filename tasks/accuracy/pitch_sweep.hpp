@@ -3,7 +3,7 @@
 #pragma once
 
 #include <array>
-#include <functional>
+#include <stop_token>
 #include <string>
 #include <vector>
 
@@ -37,9 +37,9 @@ struct PitchSweep {
 
 /// Plays the episodes at the scene's own scheme and step, and reads every rectangular sensor at
 /// each sample with pitches from 8 times the scene's to a quarter of it, fewer where a pad would
-/// have more than a million points. `go_on` is called at every sample; false ends with nothing.
+/// have more than a million points. `stop` ends it before any sample, with nothing.
 /// Throws like Model.
 std::vector<PitchSweep> sweep_pitches(const FixedEpisodes& episodes, double target,
-                                      const std::function<bool()>& go_on);
+                                      const std::stop_token& stop);
 
 }  // namespace tangere

@@ -22,7 +22,7 @@ constexpr std::ptrdiff_t kMostForces =
 using Series = std::vector<std::array<std::vector<double>, 3>>;
 
 Series net_forces(const FixedEpisodes& episodes, int environment, const StepperOptions& options,
-                  int parts, const std::function<bool()>& go_on) {
+                  int parts, const std::stop_token& stop) {
   const Model& model = episodes.start.model();
   Batch batch = episodes.start;
   for (int e = 0; e < batch.environments(); ++e) batch.hold(e, e != environment);
@@ -36,7 +36,7 @@ Series net_forces(const FixedEpisodes& episodes, int environment, const StepperO
     for (int part = 0; part < parts; ++part) {
       stepper.step_block(batch, environment / kernels::kBlock,
                          episodes.controls_of(k, parts, part));
-      if (failed(batch.status(environment)) || (go_on && !go_on())) return series;
+      if (failed(batch.status(environment)) || stop.stop_requested()) return series;
       for (std::size_t s = 0; s < series.size(); ++s) {
         readout.read(batch, environment, frames[s]);
         const std::span<const double> field = frames[s].values();
@@ -67,13 +67,13 @@ double power(const std::vector<double>& x, int turns) {
 }  // namespace
 
 Vibration strongest_vibration(const FixedEpisodes& episodes, int environment, Integrator integrator,
-                              int parts, double tolerance, const std::function<bool()>& go_on) {
+                              int parts, double tolerance, const std::stop_token& stop) {
   StepperOptions options;
   options.integrator = integrator;
   options.timestep = episodes.interval() / parts;
   options.tolerance = tolerance;
   options.sleep = 0;
-  Series series = net_forces(episodes, environment, options, parts, go_on);
+  Series series = net_forces(episodes, environment, options, parts, stop);
   for (auto& forces : series)
     for (std::vector<double>& x : forces)
       if (std::ssize(x) > kMostForces) x.erase(x.begin(), x.end() - kMostForces);

@@ -13,9 +13,9 @@ struct Vibration {
 };
 
 /// Steps one environment with `parts` steps between samples and looks at the net force on
-/// each sensor after every step, at most the last 8192. Where `go_on` returns false, or the
+/// each sensor after every step, at most the last 8192. Where `stop` asks for it, or the
 /// environment fails, the steps before that count.
 Vibration strongest_vibration(const FixedEpisodes& episodes, int environment, Integrator integrator,
-                              int parts, double tolerance, const std::function<bool()>& go_on = {});
+                              int parts, double tolerance, const std::stop_token& stop = {});
 
 }  // namespace tangere

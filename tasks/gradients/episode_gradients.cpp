@@ -9,9 +9,9 @@
 #include "engine/base/as_size.hpp"
 #include "engine/derivative/number_gradients.hpp"
 #include "tasks/gradients/gradients.hpp"
-#include "tasks/gradients/loss_block.hpp"
-#include "tasks/gradients/return_block.hpp"
 #include "tasks/gradients/row_jacobians.hpp"
+#include "tasks/gradients/scene_block.hpp"
+#include "tasks/gradients/task_block.hpp"
 
 namespace tangere {
 namespace {
@@ -139,9 +139,9 @@ void put_row(const RowJacobian& j, bool with_previous, std::size_t row,
 }
 
 EpisodeGradients scene_returns(const Model& model, const ControlProgram& controls,
-                               const EpisodeOptions& run, const GradientOptions& options,
+                               const EpisodeOptions& run, const TapeOptions& options,
                                const RolloutLoss* loss) {
-  const auto block = std::make_shared<LossBlock>(model, options, std::span(&loss, 1));
+  const auto block = std::make_shared<SceneBlock>(model, options, std::span(&loss, 1));
   return [&model, &controls, &run, options, block](std::int64_t first, int episodes, auto& out) {
     Batch batch(model, episodes, run.seed, first);
     const std::size_t nu = as_size(model.nu());
@@ -164,19 +164,17 @@ EpisodeGradients scene_returns(const Model& model, const ControlProgram& control
   };
 }
 
-EpisodeGradients task_returns(const Task& task, const TaskActions& actions,
-                              TaskGradientOptions options) {
-  const auto block = std::make_shared<ReturnBlock>(task, options);
-  return [&task, &actions, options, block](std::int64_t first, int episodes, auto& out) {
-    TaskGradientOptions some = options;
-    some.episodes = episodes;
-    TaskGradients g = empty_task_gradients(task, some);
+EpisodeGradients task_returns(const Task& task, const TaskActions& actions, std::uint64_t seed,
+                              const TapeOptions& options) {
+  const auto block = std::make_shared<TaskBlock>(task, options, 1);
+  return [&task, &actions, seed, options, block](std::int64_t first, int episodes, auto& out) {
+    TaskGradients g = empty_gradients(task, episodes, options);
     std::vector<FailedEnvironment> failures;
-    block->run(first, episodes, actions, 0, g, failures);
-    out[0] = std::move(g.by_action);
-    out[1] = std::move(g.by_q);
-    out[2] = std::move(g.by_v);
-    if (out.size() > 3) out[3] = std::move(g.by_parameter);
+    block->play(seed, {first, first + episodes}, actions, 0, g, failures);
+    out[0] = std::move(g.u);
+    out[1] = std::move(g.q);
+    out[2] = std::move(g.v);
+    if (out.size() > 3) out[3] = std::move(g.parameters);
   };
 }
 
@@ -272,6 +270,15 @@ GradientPlan plan_of_jacobians(const Model& model, const Named& actions, std::in
   return plan;
 }
 
+TapeOptions options_of(const EpisodeOptions& run, std::int64_t length, double tape_bytes) {
+  TapeOptions options;
+  options.length = length;
+  options.precision = run.precision;
+  options.parameters = true;
+  options.tape_bytes = tape_bytes;
+  return options;
+}
+
 }  // namespace
 
 const char* to_string(GradientKind kind) {
@@ -291,11 +298,7 @@ GradientPlan scene_gradients(const Model& model, const ControlProgram& controls,
   if (kind == GradientKind::jacobians)
     return plan_of_jacobians(model, actions_of(model), rows, 1,
                              [&] { return scene_jacobians(model, controls, run); });
-  GradientOptions options;
-  options.steps = run.steps;
-  options.precision = run.precision;
-  options.parameters = true;
-  options.tape_bytes = tape_bytes;
+  const TapeOptions options = options_of(run, run.steps, tape_bytes);
   GradientPlan plan{arrays_of_return(model, actions_of(model), "the loss"), rows,
                     [&model, &controls, &run, options, loss] {
                       return scene_returns(model, controls, run, options, loss);
@@ -314,16 +317,13 @@ GradientPlan task_episode_gradients(const Task& task, const TaskActions& actions
   if (kind == GradientKind::jacobians)
     return plan_of_jacobians(model, actions_of(task), rows, kBlocksOfThread,
                              [&] { return task_jacobians(task, actions, run); });
-  TaskGradientOptions options;
-  options.episodes = kBlock;
-  options.seed = run.seed;
-  options.actions = rows;
-  options.precision = run.precision;
-  options.parameters = true;
-  options.tape_bytes = tape_bytes;
+  const TapeOptions options = options_of(run, rows, tape_bytes);
   GradientPlan plan{arrays_of_return(model, actions_of(task), "the return"), rows,
-                    [&task, &actions, options] { return task_returns(task, actions, options); }};
-  plan.bytes = kBlocksOfThread * bytes_of(plan.arrays, rows) + task_gradient_bytes(task, options);
+                    [&task, &actions, seed = run.seed, options] {
+                      return task_returns(task, actions, seed, options);
+                    }};
+  plan.bytes =
+      kBlocksOfThread * bytes_of(plan.arrays, rows) + gradient_bytes(task, kBlock, options);
   return plan;
 }
 

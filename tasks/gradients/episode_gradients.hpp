@@ -9,7 +9,7 @@
 
 #include "engine/derivative/loss.hpp"
 #include "engine/step/control.hpp"
-#include "tasks/gradients/task_gradients.hpp"
+#include "tasks/gradients/gradients.hpp"
 #include "tasks/run/episodes.hpp"
 
 namespace tangere {

@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numeric>
 
@@ -18,6 +19,11 @@
 namespace tangere {
 namespace {
 
+/// Number of step sizes of a sweep. Each is a quarter of the one before and is taken in both
+/// directions, so a sweep fills a block of environments.
+constexpr int kSweepLevels = 8;
+/// Scales of changes. Positions use 1 (m or rad); velocities and controls change more.
+constexpr double kVelocityScale = 10, kControlScale = 10;
 constexpr double kLargest = 1e-3;      // step size, times the input's scale
 constexpr std::size_t kExplained = 2;  // kinks of an input
 constexpr double kNoInfluence =
@@ -50,8 +56,7 @@ std::vector<std::string> with_change(std::vector<std::string> texts, double chan
   return texts;
 }
 
-}  // namespace
-
+/// Changes of an input whose entries have size `scale`: +, -, largest step size first.
 std::array<double, 2 * kSweepLevels> sweep(double scale) {
   std::array<double, 2 * kSweepLevels> changes{};
   double step = kLargest * scale;
@@ -62,6 +67,7 @@ std::array<double, 2 * kSweepLevels> sweep(double scale) {
   return changes;
 }
 
+/// `values`: the function after each change of sweep(scale).
 Difference best_difference(std::span<const double> values, double scale) {
   std::array<double, kSweepLevels>
       slopes{};  // without the error of second order; none for the first size
@@ -80,7 +86,8 @@ Difference best_difference(std::span<const double> values, double scale) {
   return best;
 }
 
-CheckedInput compare(const Comparison& of, double loss, const CompareOptions& o,
+/// `loss`: reference for the influence of the input. `purpose`: key for the draw of entries.
+CheckedInput compare(const Comparison& of, double loss, const CheckOptions& o,
                      std::uint32_t purpose) {
   CheckedInput c;
   c.name = of.name;
@@ -114,6 +121,7 @@ CheckedInput compare(const Comparison& of, double loss, const CompareOptions& o,
   return c;
 }
 
+/// `along`: the derivative along `direction`, computed another way.
 void compare_along(CheckedInput& c, std::span<const double> gradient,
                    std::span<const double> direction, double along) {
   if (!c.influence) return;
@@ -121,22 +129,30 @@ void compare_along(CheckedInput& c, std::span<const double> gradient,
   c.tangent_error = finite_error(std::abs(dot - along) / (c.scale * norm_of(direction)));
 }
 
-RelativeGradient::RelativeGradient(const NumberGradients& parameters, const Scene& scene,
-                                   std::span<const double> varying,
-                                   std::span<const double> absolute) {
-  for (std::size_t k = 0; k < absolute.size(); ++k) {
-    const int random = randomization_of(scene, parameters.infos()[k].number);
-    has.push_back(random < 0 ? parameters.infos()[k].value : varying[std::size_t(random)]);
-    gradient.push_back(absolute[k] * has[k]);
-    if (has[k] != 0) given.push_back(k);
-  }
-}
+/// A gradient by relative changes of a scene's numbers. `varying`: values of what the scene
+/// randomises, in its order.
+struct RelativeGradient {
+  std::vector<double> has, gradient;  ///< values in the environment; gradient times values
+  std::vector<std::size_t>
+      given;  ///< indices of values that are not zero, which a relative change moves
 
-std::vector<double> RelativeGradient::change(std::span<const double> relative) const {
-  std::vector<double> change(relative.size());
-  for (std::size_t k = 0; k < change.size(); ++k) change[k] = relative[k] * has[k];
-  return change;
-}
+  RelativeGradient(const NumberGradients& parameters, const Scene& scene,
+                   std::span<const double> varying, std::span<const double> absolute) {
+    for (std::size_t k = 0; k < absolute.size(); ++k) {
+      const int random = randomization_of(scene, parameters.infos()[k].number);
+      has.push_back(random < 0 ? parameters.infos()[k].value : varying[std::size_t(random)]);
+      gradient.push_back(absolute[k] * has[k]);
+      if (has[k] != 0) given.push_back(k);
+    }
+  }
+  [[nodiscard]] std::vector<double> change(std::span<const double> relative) const {
+    std::vector<double> change(relative.size());
+    for (std::size_t k = 0; k < change.size(); ++k) change[k] = relative[k] * has[k];
+    return change;
+  }
+};
+
+}  // namespace
 
 std::vector<std::size_t> all_of(std::size_t count) {
   std::vector<std::size_t> all(count);

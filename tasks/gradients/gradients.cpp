@@ -1,20 +1,26 @@
 // SPDX-License-Identifier: Apache-2.0
-// A thread takes a block forward and back; blocks share nothing but the model.
+// A thread takes a block forward and back; blocks share nothing but the model or the task.
 #include "tasks/gradients/gradients.hpp"
+
+#include <fmt/format.h>
 
 #include <algorithm>
 #include <string>
 
+#include "engine/base/as_size.hpp"
 #include "engine/derivative/tactile_point_numbers.hpp"
-#include "kernels/numbers/block.hpp"
-#include "tasks/gradients/loss_block.hpp"
+#include "tasks/gradients/scene_block.hpp"
+#include "tasks/gradients/task_block.hpp"
+#include "tasks/run/block_threads.hpp"
 
 namespace tangere {
 namespace {
 
-void check(const GradientOptions& options) {
-  if (options.steps < 1)
-    throw InputError("gradients of " + std::to_string(options.steps) +
+using kernels::kBlock;
+
+void check(const TapeOptions& options) {
+  if (options.length < 1)
+    throw InputError("gradients of " + std::to_string(options.length) +
                      " steps; expected at least 1");
   if (!(options.tape_bytes > 0))
     throw InputError("a tape of " + std::to_string(options.tape_bytes) +
@@ -24,47 +30,12 @@ void check(const GradientOptions& options) {
                      " threads; expected at least 1");
 }
 
-std::int64_t point_count(const Model& model, const GradientOptions& o) {
-  return o.points ? std::int64_t{tactile_points(model)} * kPointNumbers : 0;
-}
-
-}  // namespace
-
-GradientSummary empty_gradients(const Model& model, int environments, const GradientOptions& o,
-                                std::size_t losses) {
-  const auto size = [environments](std::int64_t each) {
-    return std::size_t(environments) * std::size_t(each);
-  };
-  GradientSummary out;
-  const int numbers = o.parameters ? NumberGradients(model).count() : 0;
-  out.losses.assign(
-      losses,
-      {std::vector<double>(size(1)), std::vector<double>(size(o.steps * model.nu())),
-       std::vector<double>(size(model.nv())), std::vector<double>(size(model.nv())),
-       std::vector<double>(size(numbers)), std::vector<double>(size(point_count(model, o)))});
-  return out;
-}
-
-struct GradientRollouts::Impl {
-  Model model;
-  GradientOptions options;
-  std::vector<LossBlock> workers;  // by the thread's index in the arena
-  std::size_t losses;
-  BlockThreads threads;
-
-  Impl(const Model& m, const GradientOptions& o, std::span<const RolloutLoss* const> l)
-      : model(m), options(o), losses(l.size()), threads(o.threads) {
-    workers.reserve(std::size_t(o.threads));
-    for (int i = 0; i < o.threads; ++i) workers.emplace_back(model, o, l);
-  }
-};
-
 /// Losses of fields cannot have sensors with memory. Points of sensors with ks have no derivatives
 /// of their own.
-static void check_memories(const Model& model, const GradientOptions& options,
-                           std::span<const RolloutLoss* const> losses) {
+void check_memories(const Model& model, const TapeOptions& options,
+                    std::span<const RolloutLoss* const> losses) {
   const auto reads_fields = [&](const RolloutLoss* loss) {
-    for (std::int64_t step = 0; step <= options.steps; ++step)
+    for (std::int64_t step = 0; step <= options.length; ++step)
       if (loss->reads_fields(step)) return true;
     return false;
   };
@@ -73,7 +44,73 @@ static void check_memories(const Model& model, const GradientOptions& options,
   if (options.points) check_has_plain_points(model);
 }
 
-GradientRollouts::GradientRollouts(const Model& model, const GradientOptions& options,
+TapeOptions checked(const Task& task, std::int64_t episodes, const TapeOptions& options) {
+  if (episodes < 1 || options.threads < 1)
+    throw InputError(fmt::format("gradients of {} episodes on {} threads; expected at least 1",
+                                 episodes, options.threads));
+  return options_for(task, options, "gradients");
+}
+
+/// Numbers of one gradient of an environment, without points.
+std::int64_t parameter_count(const Model& model, const TapeOptions& o) {
+  return o.parameters ? NumberGradients(model).count() : 0;
+}
+std::int64_t point_count(const Model& model, const TapeOptions& o) {
+  return o.points ? std::int64_t{tactile_points(model)} * kPointNumbers : 0;
+}
+
+/// `width`: derivatives by controls or by an action.
+LossGradient zeros(const Model& model, std::int64_t environments, const TapeOptions& o,
+                   std::int64_t width) {
+  const auto rows = [environments](std::int64_t each) {
+    return std::vector<double>(as_size(environments * each));
+  };
+  return {rows(1),          rows(o.length * width),          rows(model.nv()),
+          rows(model.nv()), rows(parameter_count(model, o)), rows(point_count(model, o))};
+}
+
+/// Numbers of a LossGradient per environment.
+double numbers_of(const Model& model, const TapeOptions& o, double width) {
+  return double(o.length) * width + 2.0 * model.nv() + double(parameter_count(model, o)) +
+         double(point_count(model, o)) + 1;
+}
+
+/// Takes all blocks forward and back on all threads, `run` one of them with a worker of a thread;
+/// fills in what a summary counts. The same bits for any number of threads.
+template <class Worker, class Run>
+void run_blocks(BlockThreads& threads, std::vector<Worker>& workers, int blocks,
+                const std::stop_token& stop, GradientCounts& out, const Run& run) {
+  std::vector<std::vector<FailedEnvironment>> failures(as_size(blocks));
+  for (Worker& worker : workers) worker.begin(stop);
+  threads.for_each(blocks, workers,
+                   [&](Worker& worker, int b) { run(worker, b, failures[as_size(b)]); });
+  for (const auto& of_block : failures)
+    out.failures.insert(out.failures.end(), of_block.begin(), of_block.end());
+  std::ranges::sort(out.failures, {}, &FailedEnvironment::environment);
+  for (const Worker& worker : workers) {
+    out.newton_iterations += worker.newton_iterations();
+    out.recomputed_steps += worker.recomputed_steps();
+    out.stopped = out.stopped || worker.stopped();
+  }
+}
+
+}  // namespace
+
+struct GradientRollouts::Impl {
+  Model model;
+  TapeOptions options;
+  std::vector<SceneBlock> workers;  // by the thread's index in the arena
+  std::size_t losses;
+  BlockThreads threads;
+
+  Impl(const Model& m, const TapeOptions& o, std::span<const RolloutLoss* const> l)
+      : model(m), options(o), losses(l.size()), threads(o.threads) {
+    workers.reserve(as_size(o.threads));
+    for (int i = 0; i < o.threads; ++i) workers.emplace_back(model, o, l);
+  }
+};
+
+GradientRollouts::GradientRollouts(const Model& model, const TapeOptions& options,
                                    std::span<const RolloutLoss* const> losses) {
   check(options);
   check_memories(model, options, losses);
@@ -84,7 +121,7 @@ GradientRollouts::GradientRollouts(GradientRollouts&&) noexcept = default;
 GradientRollouts& GradientRollouts::operator=(GradientRollouts&&) noexcept = default;
 
 GradientSummary GradientRollouts::run(const Batch& start, const StepControls& controls,
-                                      const GradientGoOn& go_on) {
+                                      const std::stop_token& stop) {
   Impl& i = *impl_;
   if (start.model() != i.model)
     throw InputError("a batch of scene '" + start.model().scene().name +
@@ -92,30 +129,68 @@ GradientSummary GradientRollouts::run(const Batch& start, const StepControls& co
                      "'; expected the same Model");
   GradientSummary out = empty_gradients(i.model, start.environments(), i.options, i.losses);
   Batch batch = start;
-  std::vector<double> u(std::size_t(start.environments()) * std::size_t(i.model.nu()));
-  run_gradients(i.threads, i.workers, batch.blocks(), go_on, out,
-                [&](LossBlock& worker, int b, std::vector<FailedEnvironment>& failures) {
-                  worker.run(batch, b, controls, u, out, failures);
-                });
+  std::vector<double> u(as_size(start.environments()) * as_size(i.model.nu()));
+  run_blocks(i.threads, i.workers, batch.blocks(), stop, out,
+             [&](SceneBlock& worker, int b, std::vector<FailedEnvironment>& failures) {
+               worker.run(batch, b, controls, u, out, failures);
+             });
   return out;
 }
 
-double gradient_bytes(const Model& model, int environments, const GradientOptions& o, int losses) {
-  const double numbers = o.parameters ? NumberGradients(model).count() : 0;
-  const double results =
-      double(o.steps) * model.nu() + 2.0 * model.nv() + numbers + double(point_count(model, o)) + 1;
+GradientSummary rollout_gradients(const Batch& start, const StepControls& controls,
+                                  const TapeOptions& options,
+                                  std::span<const RolloutLoss* const> losses) {
+  return GradientRollouts(start.model(), options, losses).run(start, controls);
+}
+
+TaskGradients task_gradients(const Task& task, const TaskActions& actions, std::uint64_t seed,
+                             EpisodeRange episodes, const TapeOptions& options,
+                             const std::stop_token& stop) {
+  const std::int64_t all = episodes.end - episodes.first;
+  const TapeOptions o = checked(task, all, options);
+  TaskGradients out = empty_gradients(task, all, o);
+  std::vector<TaskBlock> workers;  // by the thread's index in the arena
+  workers.reserve(as_size(o.threads));
+  for (int i = 0; i < o.threads; ++i) workers.emplace_back(task, o, 1);
+  BlockThreads threads(o.threads);
+  run_blocks(threads, workers, static_cast<int>((all + kBlock - 1) / kBlock), stop, out,
+             [&](TaskBlock& worker, int b, std::vector<FailedEnvironment>& failures) {
+               const std::int64_t first = std::int64_t{b} * kBlock;
+               const EpisodeRange some{episodes.first + first,
+                                       episodes.first + std::min(first + kBlock, all)};
+               worker.play(seed, some, actions, first, out, failures);
+             });
+  return out;
+}
+
+GradientSummary empty_gradients(const Model& model, int environments, const TapeOptions& o,
+                                std::size_t losses) {
+  GradientSummary out;
+  out.losses.assign(losses, zeros(model, environments, o, model.nu()));
+  return out;
+}
+
+TaskGradients empty_gradients(const Task& task, std::int64_t episodes, const TapeOptions& o) {
+  const auto width = static_cast<std::int64_t>(task.spec().action.size());
+  TaskGradients out{{}, zeros(task.model(), episodes, o, width), {}, {}};
+  out.length.resize(out.value.size());
+  out.action.resize(out.u.size());
+  return out;
+}
+
+double gradient_bytes(const Model& model, int environments, const TapeOptions& o, int losses) {
   const Integrator scheme = integrator_in_force(model, o.stepper);
-  const double tape = std::min(double(BlockTape::bytes(model, scheme, o.steps)), o.tape_bytes);
-  const double of_points =
-      double(kernels::kBlock) * double(point_count(model, o)) * losses;  // each thread's own sums
-  return 8 * results * environments * losses +
+  const double tape = std::min(double(BlockTape::bytes(model, scheme, o.length)), o.tape_bytes);
+  const double of_points = kBlock * double(point_count(model, o)) * losses;  // each thread's sums
+  return 8 * numbers_of(model, o, model.nu()) * environments * losses +
          o.threads * (tape + 2 * double(Stepper::workspace_bytes(model)) + 8 * of_points);
 }
 
-GradientSummary rollout_gradients(const Batch& start, const StepControls& controls,
-                                  const GradientOptions& options,
-                                  std::span<const RolloutLoss* const> losses) {
-  return GradientRollouts(start.model(), options, losses).run(start, controls);
+double gradient_bytes(const Task& task, std::int64_t episodes, const TapeOptions& asked) {
+  const TapeOptions o = checked(task, episodes, asked);
+  const auto width = double(task.spec().action.size());
+  const double results = numbers_of(task.model(), o, 2 * width) + 1;  // actions and lengths, too
+  return 8 * results * double(episodes) + o.threads * TaskBlock::bytes(task, o, 1);
 }
 
 }  // namespace tangere

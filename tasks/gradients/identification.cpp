@@ -98,8 +98,8 @@ class Problem {
     const Model model(at(x));
     const FieldMisfit misfit(model, recorded_);
     const RolloutLoss* const losses[] = {&misfit};
-    GradientOptions options;
-    options.steps = run_.steps;
+    TapeOptions options;
+    options.length = run_.steps;
     options.parameters = true;
     const GradientSummary summary =
         rollout_gradients(Batch(model, 1), run_.controls, options, losses);
@@ -385,8 +385,8 @@ FieldSequence simulate_fields(const Scene& scene, const RecordedRun& run) {
 }
 
 double identification_bytes(const Model& model, const RecordedRun& run, std::size_t numbers) {
-  GradientOptions options;
-  options.steps = run.steps;
+  TapeOptions options;
+  options.length = run.steps;
   options.parameters = true;
   // The recording, its residuals, two runs of a difference, and columns of the Jacobian.
   const double sequences = 4 + static_cast<double>(numbers);

@@ -13,8 +13,9 @@
 #include "engine/derivative/tangent.hpp"
 #include "engine/scene/scene_number.hpp"
 #include "engine/sense/readout.hpp"
-#include "tasks/gradients/loss_block.hpp"
+#include "tasks/gradients/gradient_compare.hpp"
 #include "tasks/gradients/run_trace.hpp"
+#include "tasks/gradients/scene_block.hpp"
 
 namespace tangere {
 namespace {
@@ -27,38 +28,23 @@ struct Setting {
 
   [[nodiscard]] std::span<const double> u(const CheckInputs& of, std::int64_t step) const {
     const auto nu = std::size_t(start.model().nu());
-    if (step == options.steps) return {};
+    if (step == options.length) return {};
     return std::span(of.u).subspan(std::size_t(step) * nu, nu);
   }
 };
 
 std::vector<double> numbers(int n) { return std::vector<double>(std::size_t(n)); }
 
-/// Reads a loss at the current state of one environment, fields included.
-class Look {
- public:
-  explicit Look(const Model& model) : readout_(model), reading_(model) {
-    for (std::size_t k = 0; k < model.sensors().size(); ++k) {
-      frames_.push_back(std::make_unique<CompactFrame<double>>(model, static_cast<int>(k)));
-      reading_.set_field(k, *frames_.back());
-    }
-  }
+/// A loss at the current state of one environment.
+struct Look {
+  explicit Look(const Model& model) : readout(model), reading(model) {}
   double at(const Setting& s, const Batch& batch, int e, std::int64_t step,
             std::span<const double> u) {
-    if (s.loss.reads_fields(step))
-      for (auto& frame : frames_) readout_.read(batch, e, *frame);
-    return reading_.evaluate(s.loss, batch, readout_, e, step, s.options.steps, u);
+    if (s.loss.reads_fields(step)) reading.read_fields(batch, readout, e);
+    return reading.evaluate(s.loss, batch, readout, e, step, s.options.length, u);
   }
-  [[nodiscard]] const LossReading& reading() const { return reading_; }
-  [[nodiscard]] Readout& readout() { return readout_; }
-  [[nodiscard]] const CompactFrame<double>& frame(std::size_t sensor) const {
-    return *frames_[sensor];
-  }
-
- private:
-  Readout readout_;
-  LossReading reading_;
-  std::vector<std::unique_ptr<CompactFrame<double>>> frames_;
+  Readout readout;
+  LossReading reading;
 };
 
 /// Returns the loss of each of `inputs`, as environments of one batch; NaN where a step finds no
@@ -80,14 +66,14 @@ std::vector<double> losses_of(const Setting& s, const Model& model,
   Stepper stepper(model, s.options.stepper);
   Look look(model);
   std::vector<double> sums(inputs.size()), u(inputs.size() * nu);
-  for (std::int64_t t = 0; t <= s.options.steps; ++t) {
+  for (std::int64_t t = 0; t <= s.options.length; ++t) {
     for (std::size_t e = 0; e < inputs.size(); ++e) {
       const std::span<const double> own = s.u(inputs[e], t);
       sums[e] += look.at(s, batch, static_cast<int>(e), t, own);
       std::copy(own.begin(), own.end(), u.begin() + std::ptrdiff_t(e * nu));
     }
     if (trace != nullptr) trace->add(batch);
-    if (t < s.options.steps) stepper.step(batch, u);
+    if (t < s.options.length) stepper.step(batch, u);
   }
   for (std::size_t e = 0; e < inputs.size(); ++e)
     if (failed(batch.status(static_cast<int>(e)))) sums[e] = NAN;
@@ -138,11 +124,11 @@ class Directions {
     const Model& model = s.start.model();
     Batch batch = s.start;
     Stepper stepper(model, s.options.stepper);
-    tape_.emplace(model, stepper.integrator(), s.options.steps);
+    tape_.emplace(model, stepper.integrator(), s.options.length);
     tape_->start(batch, 0);
     const auto nu = std::size_t(model.nu());
     std::vector<double> u(std::size_t(batch.environments()) * nu);
-    for (std::int64_t t = 0; t < s.options.steps; ++t) {
+    for (std::int64_t t = 0; t < s.options.length; ++t) {
       const std::span<const double> own = s.u(s.at, t);
       for (int e = 0; e < batch.environments(); ++e)
         std::copy(own.begin(), own.end(), u.begin() + std::ptrdiff_t(std::size_t(e) * nu));
@@ -166,13 +152,13 @@ class Directions {
     Batch batch = s_.start;
     Look look(model);
     double sum = 0;
-    for (std::int64_t t = 0; t <= s_.options.steps; ++t) {
-      const std::span<const double> u_dot = d.u.empty() || t == s_.options.steps
+    for (std::int64_t t = 0; t <= s_.options.length; ++t) {
+      const std::span<const double> u_dot = d.u.empty() || t == s_.options.length
                                                 ? std::span<const double>(no_u)
                                                 : d.u.subspan(std::size_t(t) * nu, nu);
       tape_->show(t, batch, 0);
       sum += change_at(batch, look, tangent, t, state, u_dot, d.numbers, points);
-      if (t == s_.options.steps) break;
+      if (t == s_.options.length) break;
       tangent.step(batch, 0, 0, *tape_, t, s_.u(s_.at, t), u_dot, d.numbers, state);
     }
     return sum;
@@ -185,21 +171,21 @@ class Directions {
                    std::span<const double> rows, const std::vector<std::vector<double>>& points) {
     const Model& model = batch.model();
     look.at(s_, batch, 0, t, s_.u(s_.at, t));
-    const LossReading& bar = look.reading();
+    const LossReading& bar = look.reading;
     double sum = 0;
     for (std::size_t i = 0; i < state.q.size(); ++i)
       sum += bar.q_bar()[i] * state.q[i] + bar.v_bar()[i] * state.v[i];
     for (std::size_t i = 0; i < u_dot.size(); ++i) sum += bar.u_bar()[i] * u_dot[i];
     for (std::size_t k = 0; k < model.sensors().size() && s_.loss.reads_fields(t); ++k) {
-      std::vector<double> change(look.frame(k).dense_size()), of_tiles(change.size());
+      std::vector<double> change(bar.field(k).dense_size()), of_tiles(change.size());
       tangent.field(batch, 0, 0, *tape_, t, static_cast<int>(k), rows,
                     points.empty() ? std::span<const double>{} : points[k], state, change);
       // The cotangents have the layout of the tiles. Spread them as the frame spreads its values.
-      look.frame(k).spread(bar.field_bar(k), of_tiles);
+      bar.field(k).spread(bar.field_bar(k), of_tiles);
       sum += std::inner_product(change.begin(), change.end(), of_tiles.begin(), 0.0);
     }
     if (s_.loss.reads_end_effectors(t))
-      sum += along_end_effectors(batch, look.readout(), bar.end_effectors_bar(), state);
+      sum += along_end_effectors(batch, look.readout, bar.end_effectors_bar(), state);
     return sum;
   }
 
@@ -230,16 +216,16 @@ Setting setting_of(const Batch& start, const StepControls& controls, const Rollo
             loss,
             options,
             {numbers(model.nq()), numbers(model.nv()),
-             std::vector<double>(std::size_t(options.steps) * nu)}};
+             std::vector<double>(std::size_t(options.length) * nu)}};
   start.get_q(0, s.at.q);
   start.get_v(0, s.at.v);
-  for (std::int64_t t = 0; t < options.steps; ++t)
+  for (std::int64_t t = 0; t < options.length; ++t)
     controls(t, 0, std::span(s.at.u).subspan(std::size_t(t) * nu, nu));
   return s;
 }
 
 bool reads_fields(const RolloutLoss& loss, const CheckOptions& options) {
-  for (std::int64_t t = 0; t <= options.steps; ++t)
+  for (std::int64_t t = 0; t <= options.length; ++t)
     if (loss.reads_fields(t)) return true;
   return false;
 }
@@ -257,8 +243,8 @@ bool checks_points(const Model& model, const RolloutLoss& loss, const CheckOptio
 
 LossGradient gradient_of(const Batch& start, const StepControls& controls, const RolloutLoss& loss,
                          const CheckOptions& options) {
-  GradientOptions wanted;
-  wanted.steps = options.steps;
+  TapeOptions wanted;
+  wanted.length = options.length;
   wanted.stepper = options.stepper;
   wanted.parameters = true;
   wanted.points = checks_points(start.model(), loss, options);
@@ -281,6 +267,7 @@ class LossChecker : public GradientChecker {
     by_v_ = first(g.v, s.at.v.size());
     by_numbers_ = first(g.parameters, std::size_t(parameters_.count()));
     out_.loss = g.value[0];
+    out_.length = s.options.length;
   }
 
   /// Checks by positions and coefficients of all points of a sensor at once.

@@ -10,6 +10,7 @@
 #include <optional>
 
 #include "engine/base/as_size.hpp"
+#include "tasks/gradients/gradient_compare.hpp"
 #include "tasks/gradients/run_trace.hpp"
 #include "tasks/gradients/task_tangent.hpp"
 
@@ -22,23 +23,24 @@ constexpr double kMargin =
 class ReturnChecker : public GradientChecker {
  public:
   ReturnChecker(const Task& task, const TaskMaker& make, const TaskActions& actions,
-                const TaskCheckOptions& o)
-      : GradientChecker(task.model(), o), task_(task), make_(make), task_options_(o) {
-    TaskGradients gradient = task_gradients(task, within_bounds(actions), wanted());
+                const CheckOptions& o)
+      : GradientChecker(task.model(), o), task_(task), make_(make) {
+    TaskGradients gradient =
+        task_gradients(task, within_bounds(actions), o.seed, {o.episode, o.episode + 1}, wanted());
     if (!gradient.failures.empty())
       throw InputError(fmt::format("action {} of episode {} of task {} finds no solution: {}",
                                    gradient.failures[0].step, o.episode, task.spec().name,
                                    to_string(gradient.failures[0].status)));
     out_.loss = gradient.value[0];
-    length_ = gradient.length[0];
-    const std::size_t numbers = as_size(length_) * task.spec().action.size();
+    out_.length = gradient.length[0];
+    const std::size_t numbers = as_size(out_.length) * task.spec().action.size();
     gradient.action.resize(numbers);
-    gradient.by_action.resize(numbers);
+    gradient.u.resize(numbers);
     u_name_ = "actions";
-    by_u_ = std::move(gradient.by_action);
-    by_q_ = std::move(gradient.by_q);
-    by_v_ = std::move(gradient.by_v);
-    by_numbers_ = std::move(gradient.by_parameter);
+    by_u_ = std::move(gradient.u);
+    by_q_ = std::move(gradient.q);
+    by_v_ = std::move(gradient.v);
+    by_numbers_ = std::move(gradient.parameters);
     rollout_.emplace(task, o.stepper, Precision::f64);
     rollout_->start(o.seed, {&o.episode, 1});
     const Snapshot first = view_of(rollout_->batch(), rollout_->data(), 0).now();
@@ -47,8 +49,6 @@ class ReturnChecker : public GradientChecker {
       varying_.push_back(rollout_->batch().randomized_value(0, static_cast<int>(k)));
     tangent_.emplace(*rollout_, at_.u, o.stepper);
   }
-
-  [[nodiscard]] std::int64_t length() const { return length_; }
 
  private:
   TaskActions within_bounds(const TaskActions& actions) const {
@@ -59,14 +59,10 @@ class ReturnChecker : public GradientChecker {
       for (double& a : action) a = std::clamp(a, low, high);
     };
   }
-  [[nodiscard]] TaskGradientOptions wanted() const {
-    TaskGradientOptions wanted;
-    wanted.episodes = 1;
-    wanted.first_episode = task_options_.episode;
-    wanted.seed = options_.seed;
-    wanted.actions = task_options_.actions;
-    wanted.stepper = task_options_.stepper;
-    wanted.precision = Precision::f64;
+  [[nodiscard]] TapeOptions wanted() const {
+    TapeOptions wanted;
+    wanted.length = options_.length;
+    wanted.stepper = options_.stepper;
     wanted.parameters = true;
     return wanted;
   }
@@ -77,8 +73,8 @@ class ReturnChecker : public GradientChecker {
                                            RunTrace* trace) const override {
     const std::unique_ptr<Task> made = other != nullptr ? make_(*other) : nullptr;
     const Task& task = made ? *made : task_;
-    TaskRollout rollout(task, task_options_.stepper, Precision::f64);
-    rollout.start(options_.seed, std::vector<std::int64_t>(inputs.size(), task_options_.episode));
+    TaskRollout rollout(task, options_.stepper, Precision::f64);
+    rollout.start(options_.seed, std::vector<std::int64_t>(inputs.size(), options_.episode));
     for (int l = 0; l < rollout.lanes(); ++l) {
       for (std::size_t k = 0; k < varying.size(); ++k)
         if (rollout.batch().is_parameter(static_cast<int>(k)))
@@ -87,7 +83,7 @@ class ReturnChecker : public GradientChecker {
     }
     const std::size_t width = task.spec().action.size();
     ActionRecord record(task);
-    for (std::int64_t a = 0; a < length_; ++a) {
+    for (std::int64_t a = 0; a < out_.length; ++a) {
       for (std::size_t l = 0; l < inputs.size(); ++l)
         std::copy_n(inputs[l].u.begin() + a * std::int64_t(width), width,
                     record.chosen.begin() + std::ptrdiff_t(l * width));
@@ -112,20 +108,18 @@ class ReturnChecker : public GradientChecker {
 
   const Task& task_;
   const TaskMaker& make_;
-  const TaskCheckOptions& task_options_;
-  std::int64_t length_ = 0;  // actions until the end
   std::optional<TaskRollout> rollout_;
   std::optional<TaskTangent> tangent_;
 };
 
 }  // namespace
 
-TaskGradientCheck check_task_gradient(const Task& task, const TaskMaker& make,
-                                      const TaskActions& actions, const TaskCheckOptions& options) {
+GradientCheck check_task_gradient(const Task& task, const TaskMaker& make,
+                                  const TaskActions& actions, const CheckOptions& options) {
   ReturnChecker checker(task, make, actions, options);
   checker.check();
   checker.explain();
-  return {checker.result(), checker.length()};
+  return checker.result();
 }
 
 }  // namespace tangere

@@ -30,18 +30,23 @@ std::span<const double> of_lane(const std::vector<double>& all, int lane) {
   return std::span(all).subspan(as_size(lane) * width, width);
 }
 
-/// Results of a task's reverse functions for one number.
-struct Bars {
-  std::vector<double> state, action, memory;  // (2 nv), …
-  SnapshotCotangent moment;
-
-  Bars(std::size_t two_nv, std::size_t width, std::size_t memories)
-      : state(two_nv), action(width), memory(memories) {
-    moment = {std::span(state).first(two_nv / 2), std::span(state).subspan(two_nv / 2), {}, {}};
+/// Rows of derivatives by (q, v, action, memory): calls reverse(weight, out) with a weight of 1 for
+/// each of `count` numbers in turn.
+template <class Reverse>
+std::vector<double> reversed_rows(const Task& task, std::size_t count, const Reverse& reverse) {
+  const std::size_t nv = as_size(task.model().nv()), width = task.spec().action.size(),
+                    columns = 2 * nv + width + as_size(task.spec().task_state);
+  std::vector<double> rows(count * columns), weight(count);
+  for (std::size_t k = 0; k < count; ++k) {
+    const std::span<double> row = std::span(rows).subspan(k * columns, columns);
+    const SnapshotCotangent moment{row.first(nv), row.subspan(nv, nv), {}, {}};
+    weight[k] = 1;
+    reverse(weight,
+            ViewCotangent{{&moment, 1}, row.subspan(2 * nv, width), row.subspan(2 * nv + width)});
+    weight[k] = 0;
   }
-  Bars(const Bars&) = delete;
-  [[nodiscard]] ViewCotangent out() { return {{&moment, 1}, action, memory}; }
-};
+  return rows;
+}
 
 /// to += x times from.
 void add_times(std::span<double> to, double x, std::span<const double> from) {
@@ -93,6 +98,27 @@ void RowChain::get(RowJacobian& out) const {
   }
 }
 
+std::vector<double> control_rows(const Task& task, const TaskView& view, int step) {
+  return reversed_rows(task, as_size(task.model().nu()), [&](const auto& weight, const auto& out) {
+    task.controls_vjp(view, step, weight, out);
+  });
+}
+
+std::vector<double> restart_rows(const Task& task, const TaskView& view) {
+  const std::size_t nv = as_size(task.model().nv());
+  return reversed_rows(task, 2 * nv, [&](std::span<const double> weight, const auto& out) {
+    task.restart_state_vjp(view, weight.first(nv), weight.subspan(nv), out);
+  });
+}
+
+std::vector<double> memory_rows(const Task& task, const TaskView& view) {
+  return reversed_rows(task, as_size(task.spec().task_state),
+                       [&](const auto& weight, const ViewCotangent& out) {
+                         std::copy(weight.begin(), weight.end(), out.task_state.begin());
+                         task.begin_action_vjp(view, out.task_state, {out.snapshots, out.action});
+                       });
+}
+
 ActionJacobians::ActionJacobians(const Task& task, const StepperOptions& options)
     : task_(task),
       steps_(task.model(), options),
@@ -112,7 +138,13 @@ void ActionJacobians::evaluate(TaskRollout& rollout, const ActionRecord& r, std:
   for (int t = 0; t < spec.steps_per_action; ++t) {
     if (t % spec.control_every == 0) {
       rollout.recompute_controls(r, action, t, tape);
-      for (int l = 0; l < rollout.lanes(); ++l) ask(rollout, r, action, t, tape, l);
+      for (int l = 0; l < rollout.lanes(); ++l) {
+        std::ranges::fill(controls_[as_size(l)], 0.0);
+        if (!r.taken[as_size(l)]) continue;
+        const Snapshot first = rollout.first_moment(tape, l);
+        controls_[as_size(l)] = control_rows(
+            task_, rollout.view(r, action, l, of_lane(r.task_state, l), {&first, 1}), t);
+      }
     }
     steps_.evaluate(rollout.batch(), 0, tape, t, rollout.u());
     for (int l = 0; l < rollout.lanes(); ++l) {
@@ -121,27 +153,6 @@ void ActionJacobians::evaluate(TaskRollout& rollout, const ActionRecord& r, std:
     }
   }
   for (int l = 0; l < rollout.lanes(); ++l) compose(rollout, r, action, l);
-}
-
-/// Computes the derivatives of a lane's controls from `step` on by the action's first state, the
-/// action and the memory.
-void ActionJacobians::ask(TaskRollout& rollout, const ActionRecord& r, std::int64_t action,
-                          int step, const BlockTape& tape, int lane) {
-  std::vector<double>& d = controls_[as_size(lane)];
-  std::fill(d.begin(), d.end(), 0.0);
-  if (!r.taken[as_size(lane)]) return;
-  const std::size_t nu = as_size(task_.model().nu()), given = state_ + width_ + memory_;
-  for (std::size_t k = 0; k < nu; ++k) {
-    Bars bars(state_, width_, memory_);
-    std::vector<double> weight(nu);
-    weight[k] = 1;
-    const Snapshot first = rollout.first_moment(tape, lane);
-    task_.controls_vjp(rollout.view(r, action, lane, of_lane(r.task_state, lane), {&first, 1}),
-                       step, weight, bars.out());
-    auto to = d.begin() + static_cast<std::ptrdiff_t>(k * given);
-    for (const auto* part : {&bars.state, &bars.action, &bars.memory})
-      to = std::copy(part->begin(), part->end(), to);
-  }
 }
 
 /// Turns derivatives by the first state, the action and the memory into derivatives at the point
@@ -164,34 +175,27 @@ void ActionJacobians::compose(TaskRollout& rollout, const ActionRecord& r, std::
   }
   if (!r.taken[as_size(lane)]) return;
   const Snapshot seen{of_lane(r.q, lane), of_lane(r.v, lane), {}, {}};
+  std::vector<double> rows;
+  // Adds a number of each row, `by`, times row k of `rows`.
+  const auto add_row = [&](std::size_t i, std::size_t k, double by) {
+    const std::span<const double> from = std::span(rows).subspan(k * (state_ + width_ + memory_));
+    add_times(row(out.state, i, state_), by, from);
+    add_times(row(out.others, i, width_), by, from.subspan(state_));
+    add_times(row(by_memory, i, memory_), by, from.subspan(state_ + width_));
+  };
   if (task_.spec().restarts) {
     std::fill(out.state.begin(), out.state.end(), 0.0);
     std::fill(out.previous.begin(), out.previous.end(), 0.0);
-    for (std::size_t k = 0; k < state_; ++k) {
-      Bars bars(state_, width_, memory_);
-      std::vector<double> weight(state_);
-      weight[k] = 1;
-      task_.restart_state_vjp(
-          rollout.view(r, action, lane, of_lane(r.task_state, lane), {&seen, 1}),
-          std::span(weight).first(state_ / 2), std::span(weight).subspan(state_ / 2), bars.out());
-      for (std::size_t i = 0; i < state_; ++i) {
-        const double by_placed = chain.state[i * state_ + k];
-        add_times(row(out.state, i, state_), by_placed, bars.state);
-        add_times(row(out.others, i, width_), by_placed, bars.action);
-        add_times(row(by_memory, i, memory_), by_placed, bars.memory);
-      }
-    }
+    rows =
+        restart_rows(task_, rollout.view(r, action, lane, of_lane(r.task_state, lane), {&seen, 1}));
+    for (std::size_t k = 0; k < state_; ++k)
+      for (std::size_t i = 0; i < state_; ++i) add_row(i, k, chain.state[i * state_ + k]);
   }
-  for (std::size_t k = 0; k < memory_; ++k) {
-    Bars bars(state_, width_, memory_);
-    bars.memory[k] = 1;
-    task_.begin_action_vjp(rollout.view(r, action, lane, of_lane(r.found, lane), {&seen, 1}),
-                           bars.memory, {{&bars.moment, 1}, bars.action});
-    for (std::size_t i = 0; i < state_; ++i) {
-      add_times(row(out.state, i, state_), by_memory[i * memory_ + k], bars.state);
-      add_times(row(out.others, i, width_), by_memory[i * memory_ + k], bars.action);
-    }
-  }
+  // The memory that the action found counts as given.
+  const std::vector<double> kept = by_memory;
+  rows = memory_rows(task_, rollout.view(r, action, lane, of_lane(r.found, lane), {&seen, 1}));
+  for (std::size_t k = 0; k < memory_; ++k)
+    for (std::size_t i = 0; i < state_; ++i) add_row(i, k, kept[i * memory_ + k]);
   const TensorSpec& spec = task_.spec().action;
   for (std::size_t k = 0; k < width_; ++k) {
     const double asked = of_lane(r.chosen, lane)[k];

@@ -35,6 +35,13 @@ class RowChain {
   std::vector<double> now_, before_, next_;  // (2 nv, columns)
 };
 
+/// Derivatives of what a task writes where an action begins, a row for each number, by (q, v,
+/// action, memory) of `view`: of the controls from `step` on, of the state after a restart, and of
+/// the memory after begin_action.
+std::vector<double> control_rows(const Task& task, const TaskView& view, int step);
+std::vector<double> restart_rows(const Task& task, const TaskView& view);
+std::vector<double> memory_rows(const Task& task, const TaskView& view);
+
 /// Jacobian of an action of a task from where it was chosen, through the update of the memory, the
 /// restart, the controls and the steps.
 class ActionJacobians {
@@ -48,8 +55,6 @@ class ActionJacobians {
   [[nodiscard]] const RowJacobian& of(int lane) const { return rows_[std::size_t(lane)]; }
 
  private:
-  void ask(TaskRollout& rollout, const ActionRecord& record, std::int64_t action, int step,
-           const BlockTape& tape, int lane);
   void compose(TaskRollout& rollout, const ActionRecord& record, std::int64_t action, int lane);
 
   const Task& task_;

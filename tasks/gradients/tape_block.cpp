@@ -1,175 +1,103 @@
 // SPDX-License-Identifier: Apache-2.0
-// Derivatives by what a lane shows are collected until the action that led to it is reversed.
+// Runs forward with checkpoints, then back segment by segment. Each segment is run again onto the
+// tapes unless it is the only one.
 #include "tasks/gradients/tape_block.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
-#include <numeric>
+#include <cmath>
+#include <utility>
 
 #include "engine/base/as_size.hpp"
-#include "tasks/run/number_row.hpp"
+#include "kernels/numbers/block.hpp"
 
 namespace tangere {
 
 using kernels::kBlock;
 
-namespace {
-
-/// Adds to rows of lanes what there is of them.
-void add_rows(std::span<const double> from, std::vector<double>& to) {
-  for (std::size_t i = 0; i < from.size(); ++i) to[i] += from[i];
+double checkpoint_bytes(const Model& model, std::int64_t all, std::int64_t n) {
+  if (n == all) return 0;
+  return double(model.state_bytes_per_environment()) * kBlock * std::ceil(double(all) / double(n));
 }
 
-std::vector<double> lane_rows(std::size_t width) { return std::vector<double>(kBlock * width); }
-
-}  // namespace
-
-TapeBlock::TapeBlock(const ActionTapes& tapes, Precision precision, bool parameters, int lanes)
-    : ActionBlock(tapes, precision, parameters),
-      lanes_(lanes),
-      shown_(lane_rows(task_.spec().observation_size())),
-      shown_q_(lane_rows(as_size(task_.model().nv()))),
-      shown_v_(shown_q_),
-      by_reward_(kBlock) {
-  if (!task_.spec().warm_up) return;
-  const std::size_t moments = task_.spec().snapshots.size() - 1;
-  seen_q_ = lane_rows(moments * as_size(task_.model().nq()));
-  seen_v_ = lane_rows(moments * as_size(task_.model().nv()));
-  seen_end_effectors_ = lane_rows(moments * task_.end_effectors_size());
-  seen_tactile_ = lane_rows(moments * task_.tactile_size());
+std::int64_t units_on_tape(const Model& model, std::int64_t all, double one, double most,
+                           const std::function<double(std::int64_t)>& bytes_with,
+                           const char* units) {
+  if (bytes_with(all) <= most) return all;
+  const double checkpoint = double(model.state_bytes_per_environment()) * kBlock;
+  const auto best =
+      std::clamp<std::int64_t>(std::llround(std::sqrt(double(all) * checkpoint / one)), 1, all);
+  const double needed = bytes_with(best);
+  if (needed > most)
+    throw InputError(fmt::format("tapes of {:.0f} bytes for {} {}; expected at least {:.0f}", most,
+                                 all, units, needed));
+  return best;
 }
 
-void TapeBlock::start(std::uint64_t seed, std::int64_t first) {
-  std::vector<std::int64_t> episodes(as_size(lanes_));
-  std::iota(episodes.begin(), episodes.end(), first);
-  ActionBlock::start(seed, episodes);
-  start_forward();
-  took_.fill(false);
-  for (int l = 0; l < lanes_; ++l) start_memory_[as_size(l)] = rollout_.batch().shear_state(l);
-  if (!task_.spec().warm_up) return;
-  for (int l = 0; l < lanes_; ++l) {
-    const std::span<const Snapshot> seen = rollout_.start_view(l).snapshots;
-    for (std::size_t m = 0; m + 1 < seen.size(); ++m) {
-      const auto keep = [&](std::span<const double> from, std::vector<double>& to) {
-        std::copy(from.begin(), from.end(),
-                  part(to, l).begin() + static_cast<std::ptrdiff_t>(m * from.size()));
-      };
-      keep(seen[m].q, seen_q_);
-      keep(seen[m].v, seen_v_);
-      keep(seen[m].end_effectors, seen_end_effectors_);
-      keep(seen[m].tactile, seen_tactile_);
+TapeBlock::TapeBlock(const Model& model, const TapeOptions& options, int losses,
+                     const TapePlan& plan)
+    : model_(model),
+      adjoint_(model, options.stepper, {losses, options.parameters, options.points}),
+      pullback_(model),
+      parameters_(model),
+      plan_(plan) {
+  const Integrator scheme = integrator_in_force(model, options.stepper);
+  for (std::int64_t k = 0; k < plan.segment; ++k) tapes_.emplace_back(model, scheme, plan.steps);
+}
+
+void TapeBlock::begin(std::stop_token stop) {
+  stop_ = std::move(stop);
+  newton_iterations_ = recomputed_steps_ = 0;
+  stopped_ = false;
+}
+
+bool TapeBlock::may_go_on() {
+  stopped_ = stopped_ || stop_.stop_requested();
+  return !stopped_;
+}
+
+void TapeBlock::start_forward() {
+  checkpoints_.clear();
+  taken_ = left_ = 0;
+}
+
+void TapeBlock::take_tape(Batch& batch, int block) {
+  if (!plan_.whole() && taken_ % plan_.segment == 0)
+    checkpoints_.push_back(batch.save_block(block));
+  take_steps(taken_, plan_.whole() ? &tapes_[as_size(taken_)] : nullptr);
+  ++taken_;
+}
+
+void TapeBlock::start_back() {
+  adjoint_.clear();
+  left_ = taken_;
+}
+
+void TapeBlock::reverse_tape(Batch& batch, int block) {
+  const std::int64_t last = left_ - 1;
+  const std::int64_t first = plan_.whole() ? 0 : last / plan_.segment * plan_.segment;
+  if (!plan_.whole() && (left_ == taken_ || left_ % plan_.segment == 0)) {
+    batch.restore_block(block, checkpoints_[as_size(last / plan_.segment)]);
+    for (std::int64_t k = first; k <= last; ++k) {
+      retake_steps(k, k == first, tapes_[as_size(k - first)]);
+      recomputed_steps_ += tapes_[as_size(k - first)].steps();
     }
   }
+  reverse_steps(last, tapes_[as_size(last - first)]);
+  left_ = last;
 }
 
-void TapeBlock::displace(int lane, std::span<const double> q, std::span<const double> v) {
-  rollout_.displace(lane, q, v);
-  rollout_.record_start();
-  rollout_.observe_start(lane);
-}
-
-void TapeBlock::step(std::span<const double> actions) {
-  took_.fill(false);
-  if (!rollout_.running()) return;
-  ActionRecord& r = records_[as_size(taken_)];
-  std::copy(actions.begin(), actions.end(), r.chosen.begin());
-  rollout_.begin(r);
-  took_ = r.taken;
-  take_stretch(rollout_.batch(), 0);
-}
-
-void TapeBlock::begin_reverse() {
-  start_back();
-  for (std::vector<double>* x : {&by_memory_, &shown_, &shown_q_, &shown_v_})
-    std::fill(x->begin(), x->end(), 0.0);
-}
-
-void TapeBlock::expect(std::span<const double> by_observation, const StateCotangents& by_state) {
-  add_rows(by_observation, shown_);
-  add_rows(by_state.q, shown_q_);
-  add_rows(by_state.v, shown_v_);
-}
-
-/// Sets to zero what has been passed on.
-void TapeBlock::forget(const std::array<bool, kBlock>& lanes) {
-  for (int l = 0; l < lanes_; ++l)
-    if (lanes[as_size(l)])
-      for (std::vector<double>* x : {&shown_, &shown_q_, &shown_v_})
-        std::fill(part(*x, l).begin(), part(*x, l).end(), 0.0);
-}
-
-void TapeBlock::reverse(std::int64_t action, std::span<const double> by_observation,
-                        std::span<const double> by_reward, const StateCotangents& by_state,
-                        std::span<double> by_action) {
-  expect(by_observation, by_state);
-  std::fill(by_reward_.begin(), by_reward_.end(), 0.0);
-  add_rows(by_reward, by_reward_);
-  std::fill(by_action.begin(), by_action.end(), 0.0);
-  if (action >= taken_) return;  // no lane took it
-  reverse_stretch(rollout_.batch(), 0);
-  const ActionRecord& r = records_[as_size(action)];
-  const TensorSpec& spec = task_.spec().action;
-  for (int l = 0; l < lanes_; ++l)
-    for (std::size_t k = 0; k < spec.size() && r.taken[as_size(l)]; ++k) {
-      const double asked = part(r.chosen, l)[k];
-      if (asked >= spec.low && asked <= spec.high)
-        by_action[as_size(l) * spec.size() + k] = part(by_action_, l)[k];
-    }
-  forget(r.taken);
-}
-
-void TapeBlock::reverse(std::int64_t action, const BlockTape& tape) {
-  reverse_action(action, tape, {by_reward_, shown_, shown_q_, shown_v_});
-}
-
-/// Makes the batch show the states in which the first actions began.
-void TapeBlock::show_start() {
-  const TaskRollout& rollout = rollout_;
-  const std::size_t nq = as_size(task_.model().nq()), nv = as_size(task_.model().nv());
-  for (int l = 0; l < lanes_; ++l) {
-    const bool began = taken_ > 0;
-    rollout_.batch().displace_state(
-        l, began ? part(records_[0].q, l) : number_row(rollout.data().q, l, nq),
-        began ? part(records_[0].v, l) : number_row(rollout.data().v, l, nv));
-    rollout_.batch().set_shear_state(l, start_memory_[as_size(l)]);
-  }
-  rollout_.record_start();
-}
-
-void TapeBlock::reverse_reset(std::span<const double> by_observation,
-                              const StateCotangents& by_state, std::span<double> by_q,
-                              std::span<double> by_v, std::span<double> by_parameter) {
-  expect(by_observation, by_state);
-  show_start();
-  clear_moments();
-  const std::size_t last = task_.spec().snapshots.size() - 1;
-  const std::vector<double> no_action(task_.spec().action.size());
-  std::vector<double> by_no_action(no_action.size()), by_memory(by_memory_.size() / kBlock);
-  for (int l = 0; l < lanes_; ++l) {
-    TaskView view = rollout_.start_view(l);
-    std::vector<Snapshot> seen(view.snapshots.begin(), view.snapshots.end());
-    for (std::size_t m = 0; m + 1 < seen.size(); ++m) {
-      const auto kept = [&](const std::vector<double>& all) {
-        const std::size_t width = all.size() / kBlock / last;
-        return part(all, l).subspan(m * width, width);
-      };
-      seen[m] = {kept(seen_q_), kept(seen_v_), kept(seen_end_effectors_), kept(seen_tactile_)};
-    }
-    view.actions = 0;
-    view.action = no_action;
-    if (taken_ > 0) view.task_state = part(records_[0].found, l);
-    view.snapshots = seen;
-    const std::span<const SnapshotCotangent> to = cotangents(l);
-    add_seen(view, l, {by_reward_, shown_, shown_q_, shown_v_},
-             {to.last(seen.size()), by_no_action, by_memory});
-  }
-  add_moment(last);
-  const std::size_t nv = as_size(task_.model().nv()), count = by_parameter.size() / as_size(lanes_);
-  for (int l = 0; l < lanes_; ++l) {
-    const auto own = [l](std::span<double> all, std::size_t width) {
-      return all.empty() ? all : all.subspan(as_size(l) * width, width);
-    };
-    get_start(0, rollout_.batch(), l, own(by_q, nv), own(by_v, nv), own(by_parameter, count), {});
-  }
+void TapeBlock::get_start(int loss, const Batch& batch, int environment, std::span<double> q,
+                          std::span<double> v, std::span<double> parameters,
+                          std::span<double> points) const {
+  const BlockCotangent& c = adjoint_.loss(loss);
+  const std::size_t lane = as_size(environment % kBlock);
+  for (std::size_t i = 0; i < q.size(); ++i) q[i] = c.q[i * kBlock + lane];
+  for (std::size_t i = 0; i < v.size(); ++i) v[i] = c.v[i * kBlock + lane];
+  if (!parameters.empty()) parameters_.gradient(c, batch, environment, parameters);
+  std::copy_n(c.points.begin() + std::ptrdiff_t(lane * points.size()), points.size(),
+              points.begin());
 }
 
 }  // namespace tangere

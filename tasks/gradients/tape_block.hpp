@@ -1,59 +1,89 @@
 // SPDX-License-Identifier: Apache-2.0
-// One block of a TaskTape: up to sixteen episodes whose actions, and the derivatives by what they
-// lead to, come from outside.
+// The primitive of all gradients of rollouts: one block forward onto tapes, segment by segment with
+// a checkpoint before each, then back from the last state to the first. Cotangents enter on the way
+// back. Derived classes define the steps of a tape and what enters and leaves: losses of a scene
+// (scene_block.hpp), or rewards, observations and states of a task (task_block.hpp).
 #pragma once
 
-#include <array>
+#include <functional>
+#include <stop_token>
 #include <vector>
 
-#include "tasks/gradients/action_block.hpp"
-#include "tasks/gradients/task_tape_options.hpp"
+#include "engine/derivative/number_gradients.hpp"
+#include "engine/derivative/readout_pullback.hpp"
+#include "tasks/gradients/tape_options.hpp"
 
 namespace tangere {
 
-class TapeBlock : public ActionBlock {
+/// How a rollout is split into tapes: of a scene one for each segment, of a task one for each
+/// action.
+struct TapePlan {
+  std::int64_t tapes = 1;    ///< of a rollout
+  std::int64_t steps = 1;    ///< on each; the last one may have fewer
+  std::int64_t segment = 1;  ///< tapes between two checkpoints, which are in memory at a time
+  [[nodiscard]] bool whole() const { return segment == tapes; }
+};
+
+/// Returns how many of a rollout's `all` units are on tape at a time: all, or the number that makes
+/// tapes and checkpoints together smallest. `bytes_with(n)`: tapes of n units and the checkpoints
+/// between them [bytes]. `one`: the tape of one unit [bytes]. Throws InputError when they do not
+/// fit into `most` bytes.
+std::int64_t units_on_tape(const Model& model, std::int64_t all, double one, double most,
+                           const std::function<double(std::int64_t)>& bytes_with,
+                           const char* units);
+/// Size of the checkpoints of `all` units in segments of n; 0 if there is only one [bytes].
+double checkpoint_bytes(const Model& model, std::int64_t all, std::int64_t n);
+
+/// Scratch of one thread, or one block of a TaskTape.
+class TapeBlock {
  public:
-  /// `lanes`: its environments, at most 16.
-  TapeBlock(const ActionTapes& tapes, Precision precision, bool parameters, int lanes);
+  virtual ~TapeBlock() = default;
+  TapeBlock(TapeBlock&&) noexcept = default;
 
-  /// Resets: lane l plays episode first + l.
-  void start(std::uint64_t seed, std::int64_t first);
-  void displace(int lane, std::span<const double> q, std::span<const double> v);
-  /// Takes `actions`, (lanes, action), in the lanes whose episodes go on.
-  void step(std::span<const double> actions);
-  /// Whether a lane took the last action.
-  [[nodiscard]] bool took(int lane) const { return took_[static_cast<std::size_t>(lane)]; }
+  /// Sets the counts to 0. `stop`: asked before every step.
+  void begin(std::stop_token stop);
+  [[nodiscard]] bool stopped() const { return stopped_; }
+  [[nodiscard]] std::int64_t newton_iterations() const { return newton_iterations_; }
+  [[nodiscard]] std::int64_t recomputed_steps() const { return recomputed_steps_; }
 
-  void begin_reverse();
-  /// Reverses action number `action`. All spans hold the block's lanes, in their order.
-  void reverse(std::int64_t action, std::span<const double> by_observation,
-               std::span<const double> by_reward, const StateCotangents& by_state,
-               std::span<double> by_action);
-  void reverse_reset(std::span<const double> by_observation, const StateCotangents& by_state,
-                     std::span<double> by_q, std::span<double> by_v,
-                     std::span<double> by_parameter);
+ protected:
+  TapeBlock(const Model& model, const TapeOptions& options, int losses, const TapePlan& plan);
 
-  [[nodiscard]] const TaskRollout& rollout() const { return rollout_; }
-  [[nodiscard]] int lanes() const { return lanes_; }
-  /// Numbers of the scene by which there are derivatives.
-  [[nodiscard]] int numbers() const { return parameters_.count(); }
+  void start_forward();
+  /// Takes the steps of the next tape, after a checkpoint where one is due.
+  void take_tape(Batch& batch, int block);
+  /// Sets all cotangents to zero after the last tape. May be called again to go back again.
+  void start_back();
+  /// Reverses the last tape that is not reversed yet. A segment whose steps are on no tape is taken
+  /// again.
+  void reverse_tape(Batch& batch, int block);
+  /// Takes the steps of tape number k. Clears `tape`, if any, and records them on it.
+  virtual void take_steps(std::int64_t k, BlockTape* tape) = 0;
+  /// Takes the same steps again, from a checkpoint or from the end of the tape before.
+  virtual void retake_steps(std::int64_t k, bool from_checkpoint, BlockTape& tape) = 0;
+  /// Moves the adjoint's cotangents from the state after a tape to the state before it.
+  virtual void reverse_steps(std::int64_t k, const BlockTape& tape) = 0;
+
+  [[nodiscard]] bool may_go_on();
+  /// Fills derivatives by a lane's first state and by the scene's numbers. Skips empty spans.
+  void get_start(int loss, const Batch& batch, int environment, std::span<double> q,
+                 std::span<double> v, std::span<double> parameters, std::span<double> points) const;
+
+  Model model_;
+  Adjoint adjoint_;
+  ReadoutPullback pullback_;
+  NumberGradients parameters_;
+  TapePlan plan_;
+  std::int64_t taken_ = 0;  // tapes
+  std::int64_t left_ = 0;   // of these, to reverse
+  std::int64_t newton_iterations_ = 0;
 
  private:
-  bool begin_stretch(std::int64_t) override { return false; }  // run() is not used
-  void reverse(std::int64_t action, const BlockTape& tape) override;
-  void expect(std::span<const double> by_observation, const StateCotangents& by_state);
-  void forget(const std::array<bool, kernels::kBlock>& lanes);
-  void show_start();
-
-  int lanes_;
-  std::array<bool, kernels::kBlock> took_{};
-  std::array<ShearState, kernels::kBlock> start_memory_;  // what friction remembered at the reset
-  /// What the task saw of an opening before its last moment: (moments, 16, width) each.
-  std::vector<double> seen_q_, seen_v_, seen_end_effectors_, seen_tactile_;
-  /// Derivatives by what a lane shows since its last action that is not reversed yet. An episode
-  /// that has ended goes on showing its last state.
-  std::vector<double> shown_, shown_q_, shown_v_;  // (16, observation), (16, nv), (16, nv)
-  std::vector<double> by_reward_;                  // (16)
+  std::vector<BlockTape> tapes_;  // (segment)
+  std::vector<BlockState> checkpoints_;
+  std::stop_token stop_;
+  bool stopped_ = false;
+  std::int64_t recomputed_steps_ = 0;
 };
 
 }  // namespace tangere

@@ -44,11 +44,6 @@ struct TaskTangent::OwnCotangent {
       moments.push_back({q[m], v[m], end_effectors[m], tactile[m]});
   }
   [[nodiscard]] ViewCotangent out() { return {moments, action, memory}; }
-  /// Product with the changes of an action's start.
-  [[nodiscard]] double start_dot(const StateTangent& x, const std::vector<double>& dm,
-                                 const std::vector<double>& da) const {
-    return product(q[0], x.q) + product(v[0], x.v) + product(memory, dm) + product(action, da);
-  }
 };
 
 TaskTangent::TaskTangent(TaskRollout& rollout, std::span<const double> actions,
@@ -125,34 +120,36 @@ TaskView TaskTangent::start_view() {
   return view;
 }
 
+/// Products of `rows` with the changes of the state, the action and the memory where an action
+/// begins.
+std::vector<double> TaskTangent::times(const std::vector<double>& rows,
+                                       const StateTangent& start) const {
+  std::vector<double> change;
+  for (const auto* part : {&start.q, &start.v, &action_, &memory_})
+    change.insert(change.end(), part->begin(), part->end());
+  std::vector<double> products;
+  for (std::size_t k = 0; k < rows.size(); k += change.size())
+    products.push_back(product(std::span(rows).subspan(k, change.size()), change));
+  return products;
+}
+
+/// What the task sees where an action begins.
+TaskView TaskTangent::view_of_action(std::size_t action, const std::vector<double>& memory,
+                                     const Snapshot& first) const {
+  return rollout_.view(records_[action], std::int64_t(action), 0, first_lane(memory), {&first, 1});
+}
+
 /// Computes the memory that the action keeps, and the state from which it starts.
 void TaskTangent::begin(std::size_t action) {
   const ActionRecord& r = records_[action];
   const Snapshot seen{first_lane(r.q), first_lane(r.v), {}, {}};
-  std::vector<double> memory(memory_.size());
-  for (std::size_t k = 0; k < memory.size(); ++k) {
-    OwnCotangent bar(task_, 1);
-    bar.memory[k] = 1;
-    task_.begin_action_vjp(
-        rollout_.view(r, std::int64_t(action), 0, first_lane(r.found), {&seen, 1}), bar.memory,
-        {bar.moments, bar.action});
-    memory[k] = bar.start_dot(state_, memory_, action_);
-  }
-  memory_ = memory;
+  memory_ = times(memory_rows(task_, view_of_action(action, r.found, seen)), state_);
   if (!task_.spec().restarts) return;
-  const std::size_t nv = state_.q.size();
-  StateTangent placed{std::vector<double>(nv), std::vector<double>(nv), std::vector<double>(nv),
-                      std::vector<double>(nv)};
-  for (std::size_t i = 0; i < 2 * nv; ++i) {
-    OwnCotangent bar(task_, 1);
-    std::vector<double> q(nv), v(nv);
-    (i < nv ? q[i] : v[i - nv]) = 1;
-    task_.restart_state_vjp(
-        rollout_.view(r, std::int64_t(action), 0, first_lane(r.task_state), {&seen, 1}), q, v,
-        bar.out());
-    (i < nv ? placed.q[i] : placed.v[i - nv]) = bar.start_dot(state_, memory_, action_);
-  }
-  state_ = placed;
+  const std::vector<double> placed =
+      times(restart_rows(task_, view_of_action(action, r.task_state, seen)), state_);
+  const auto middle = placed.begin() + std::ptrdiff_t(state_.q.size());
+  const std::vector<double> zero(state_.q.size());
+  state_ = {{placed.begin(), middle}, {middle, placed.end()}, zero, zero};
 }
 
 void TaskTangent::take_steps(std::size_t action, std::span<const double> numbers) {
@@ -161,21 +158,13 @@ void TaskTangent::take_steps(std::size_t action, std::span<const double> numbers
   const TaskSpec& spec = task_.spec();
   const StateTangent start = state_;
   const std::size_t nu = as_size(task_.model().nu());
-  std::vector<double> u_dot(nu);
+  std::vector<double> u_dot;
   std::size_t next = 0;
   for (int t = 0; t < spec.steps_per_action; ++t) {
     if (t % spec.control_every == 0) {
       rollout_.recompute_controls(r, std::int64_t(action), t, tape);
-      for (std::size_t k = 0; k < nu; ++k) {
-        OwnCotangent bar(task_, 1);
-        std::vector<double> weight(nu);
-        weight[k] = 1;
-        const Snapshot first = rollout_.first_moment(tape, 0);
-        task_.controls_vjp(
-            rollout_.view(r, std::int64_t(action), 0, first_lane(r.task_state), {&first, 1}), t,
-            weight, bar.out());
-        u_dot[k] = bar.start_dot(start, memory_, action_);
-      }
+      const Snapshot first = rollout_.first_moment(tape, 0);
+      u_dot = times(control_rows(task_, view_of_action(action, r.task_state, first), t), start);
     }
     tape.show(t, rollout_.batch(), 0);
     tangent_.step(rollout_.batch(), 0, 0, tape, t, rollout_.u().first(nu), u_dot, numbers, state_);

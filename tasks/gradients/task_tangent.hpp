@@ -11,6 +11,7 @@
 #include "engine/derivative/tangent.hpp"
 #include "engine/sense/readout.hpp"
 #include "tasks/gradients/gradient_compare.hpp"
+#include "tasks/gradients/row_jacobians.hpp"
 #include "tasks/gradients/task_rollout.hpp"
 
 namespace tangere {
@@ -53,6 +54,10 @@ class TaskTangent {
   void look(const BlockTape& tape, int step, std::size_t moment, std::span<const double> numbers,
             ViewTangent& seen);
   [[nodiscard]] double reward(std::size_t action) const;
+  [[nodiscard]] TaskView view_of_action(std::size_t action, const std::vector<double>& memory,
+                                        const Snapshot& first) const;
+  [[nodiscard]] std::vector<double> times(const std::vector<double>& rows,
+                                          const StateTangent& start) const;
   [[nodiscard]] ViewTangent unseen(std::size_t moments) const;
 
   TaskRollout& rollout_;

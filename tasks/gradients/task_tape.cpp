@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "engine/base/as_size.hpp"
-#include "tasks/gradients/tape_block.hpp"
+#include "tasks/gradients/task_block.hpp"
 #include "tasks/run/block_threads.hpp"
 
 namespace tangere {
@@ -20,26 +20,15 @@ namespace {
 
 enum class Phase : std::uint8_t { forward, back, done, broken };
 
-TaskTapeOptions checked(const Task& task, int environments, TaskTapeOptions o) {
+TapeOptions checked(const Task& task, int environments, const TapeOptions& o) {
   if (environments < 1 || o.threads < 1)
     throw InputError(fmt::format("a tape of {} environments on {} threads; expected at least 1",
                                  environments, o.threads));
-  if (o.actions < 0 || o.actions > task.spec().horizon)
-    throw InputError(
-        fmt::format("a tape of {} actions of task {}; expected 1 to {}, its horizon, or 0 for all",
-                    o.actions, task.spec().name, task.spec().horizon));
-  if (o.actions == 0) o.actions = task.spec().horizon;
-  if (!(o.tape_bytes > 0))
-    throw InputError(fmt::format("tapes of {} bytes; expected a positive number", o.tape_bytes));
-  return o;
+  return options_for(task, o, "a tape");
 }
 
 std::int64_t blocks_of(int environments) {
   return (std::int64_t{environments} + kBlock - 1) / kBlock;
-}
-
-ActionTapes tapes_of(const Task& task, int environments, const TaskTapeOptions& o) {
-  return {task, o.stepper, o.actions, blocks_of(environments), o.tape_bytes};
 }
 
 void expect_numbers(std::size_t found, std::size_t expected, bool may_be_empty, const char* what) {
@@ -51,7 +40,7 @@ void expect_numbers(std::size_t found, std::size_t expected, bool may_be_empty, 
 }  // namespace
 
 struct TaskTape::Impl {
-  Impl(const Task& t, int environments, const TaskTapeOptions& asked)
+  Impl(const Task& t, int environments, const TapeOptions& asked)
       : task(t),
         options(checked(t, environments, asked)),
         e(as_size(environments)),
@@ -69,22 +58,22 @@ struct TaskTape::Impl {
         threads(options.threads) {
     for (std::vector<std::uint8_t>* flags : {&alive, &terminated, &truncated, &success})
       flags->resize(e);
-    const ActionTapes tapes = tapes_of(t, environments, options);
-    blocks.reserve(as_size(tapes.blocks));
-    for (std::int64_t b = 0; b < tapes.blocks; ++b)
-      blocks.emplace_back(
-          tapes, options.precision, options.parameters,
-          static_cast<int>(std::min<std::int64_t>(kBlock, environments - b * kBlock)));
+    const std::int64_t count = blocks_of(environments);
+    blocks.reserve(as_size(count));
+    for (std::int64_t b = 0; b < count; ++b) blocks.emplace_back(t, options, count);
   }
 
-  /// Environments of block b among rows of `row` numbers each; empty stays empty.
-  template <class T>
-  [[nodiscard]] std::span<T> of(std::span<T> all, int b, std::size_t row) const {
-    if (all.empty()) return all;
-    return all.subspan(as_size(b) * kBlock * row, as_size(blocks[as_size(b)].lanes()) * row);
+  [[nodiscard]] std::size_t lanes(int b) const {
+    return std::min(as_size(kBlock), e - as_size(b) * kBlock);
   }
-  [[nodiscard]] StateCotangents of(const StateCotangents& all, int b) const {
-    return {of(all.q, b, nv), of(all.v, b, nv)};
+  /// Environments of block b among rows by environment; empty stays empty.
+  template <class T>
+  [[nodiscard]] std::span<T> of(std::span<T> all, int b) const {
+    const std::size_t row = all.size() / e;
+    return all.subspan(as_size(b) * kBlock * row, lanes(b) * row);
+  }
+  [[nodiscard]] ActionCotangents of(const ActionCotangents& all, int b) const {
+    return {of(all.observation, b), of(all.reward, b), of(all.q, b), of(all.v, b)};
   }
 
   /// Calls body(block, its index) for every block. If it throws, only a reset helps.
@@ -97,7 +86,7 @@ struct TaskTape::Impl {
   }
 
   /// Copies what a block shows to the arrays of all environments.
-  void show(const TapeBlock& block, int b) {
+  void show(const TaskBlock& block, int b) {
     const EnvironmentData& data = block.rollout().data();
     const std::size_t first = as_size(b) * kBlock;
     const auto copy = [&](const auto& from, auto& to, std::size_t row) {
@@ -119,8 +108,9 @@ struct TaskTape::Impl {
 
   void reset(std::uint64_t seed, std::int64_t first) {
     taken = left = 0;
-    each(Phase::forward, [&](TapeBlock& block, int b) {
-      block.start(seed, first + std::int64_t{b} * kBlock);
+    each(Phase::forward, [&](TaskBlock& block, int b) {
+      const std::int64_t own = first + std::int64_t{b} * kBlock;
+      block.start(seed, {own, own + std::int64_t(lanes(b))});
       show(block, b);
     });
   }
@@ -129,9 +119,9 @@ struct TaskTape::Impl {
     check_sound();
     if (phase != Phase::forward)
       throw InputError("an action on a tape that has been reversed; expected reset() before it");
-    if (taken == options.actions)
+    if (taken == options.length)
       throw InputError(fmt::format("action {} on a tape of {} actions; expected reset() before it",
-                                   taken, options.actions));
+                                   taken, options.length));
     expect_numbers(actions.size(), e * width, false, "actions");
     for (std::size_t i = 0; i < actions.size(); ++i)
       if (!std::isfinite(actions[i]) && terminated[i / width] + truncated[i / width] == 0)
@@ -140,10 +130,11 @@ struct TaskTape::Impl {
                         i % width, taken, i / width, actions[i]));
   }
 
-  void check_cotangents(std::span<const double> by_observation, const StateCotangents& s) const {
-    expect_numbers(by_observation.size(), e * seen, true, "derivatives by observations");
-    expect_numbers(s.q.size(), e * nv, true, "derivatives by q");
-    expect_numbers(s.v.size(), e * nv, true, "derivatives by v");
+  void check_cotangents(const ActionCotangents& by) const {
+    expect_numbers(by.observation.size(), e * seen, true, "derivatives by observations");
+    expect_numbers(by.reward.size(), e, true, "derivatives by rewards");
+    expect_numbers(by.q.size(), e * nv, true, "derivatives by q");
+    expect_numbers(by.v.size(), e * nv, true, "derivatives by v");
   }
 
   void check_sound() const {
@@ -155,26 +146,27 @@ struct TaskTape::Impl {
 
   void begin_reverse() {
     check_sound();
-    each(Phase::back, [](TapeBlock& block, int) { block.begin_reverse(); });
+    each(Phase::back, [](TaskBlock& block, int) { block.begin_reverse(); });
     left = taken;
   }
 
   const Task& task;
-  const TaskTapeOptions options;
+  const TapeOptions options;
   const std::size_t e, nq, nv, width, seen, numbers;  // numbers of one environment
   std::vector<double> observation, reward, q, v;
   std::vector<std::uint8_t> alive, terminated, truncated, success;
   std::vector<StepStatus> status;
-  std::vector<TapeBlock> blocks;
+  std::vector<TaskBlock> blocks;
   std::vector<char> scratch;  // by the thread's index in the arena; what threads need is in blocks
   BlockThreads threads;
   Phase phase = Phase::forward;
   std::int64_t taken = 0, left = 0;  // steps; of these, to reverse
 };
 
-TaskTape::TaskTape(const Task& task, int environments, const TaskTapeOptions& options)
+TaskTape::TaskTape(const Task& task, int environments, const TapeOptions& options,
+                   std::uint64_t seed, std::int64_t first_episode)
     : impl_(std::make_unique<Impl>(task, environments, options)) {
-  impl_->reset(options.seed, options.first_episode);
+  impl_->reset(seed, first_episode);
 }
 TaskTape::~TaskTape() = default;
 TaskTape::TaskTape(TaskTape&&) noexcept = default;
@@ -193,7 +185,7 @@ void TaskTape::displace(int environment, std::span<const double> q, std::span<co
         fmt::format("environment {} of a tape; expected 0 to {}", environment, environments() - 1));
   expect_numbers(q.size(), i.nq, false, "q");
   expect_numbers(v.size(), i.nv, false, "v");
-  TapeBlock& block = i.blocks[as_size(environment / kBlock)];
+  TaskBlock& block = i.blocks[as_size(environment / kBlock)];
   block.displace(environment % kBlock, q, v);
   i.show(block, environment / kBlock);
 }
@@ -203,18 +195,16 @@ void TaskTape::check_step(std::span<const double> actions) const { impl_->check_
 void TaskTape::step(std::span<const double> actions) {
   Impl& i = *impl_;
   i.check_actions(actions);
-  i.each(Phase::forward, [&](TapeBlock& block, int b) {
-    block.step(i.of(actions, b, i.width));
+  i.each(Phase::forward, [&](TaskBlock& block, int b) {
+    block.step(i.of(actions, b));
     i.show(block, b);
   });
   ++i.taken;
 }
 
-void TaskTape::reverse(std::span<const double> by_observation, std::span<const double> by_reward,
-                       std::span<double> by_action, const StateCotangents& by_state) {
+void TaskTape::reverse(const ActionCotangents& by, std::span<double> by_action) {
   Impl& i = *impl_;
-  i.check_cotangents(by_observation, by_state);
-  expect_numbers(by_reward.size(), i.e, true, "derivatives by rewards");
+  i.check_cotangents(by);
   expect_numbers(by_action.size(), i.e * i.width, false, "derivatives by actions");
   i.check_sound();
   if (i.to_reverse() == 0)
@@ -222,18 +212,16 @@ void TaskTape::reverse(std::span<const double> by_observation, std::span<const d
         "one more reverse than the {} actions on tape; expected reverse_start() or reset()",
         i.taken));
   if (i.phase == Phase::forward) i.begin_reverse();
-  i.each(Phase::back, [&](TapeBlock& block, int b) {
-    block.reverse(i.left - 1, i.of(by_observation, b, i.seen), i.of(by_reward, b, 1),
-                  i.of(by_state, b), i.of(by_action, b, i.width));
+  i.each(Phase::back, [&](TaskBlock& block, int b) {
+    block.reverse(i.left - 1, i.of(by, b), i.of(by_action, b));
   });
   --i.left;
 }
 
-void TaskTape::reverse_start(std::span<const double> by_observation, std::span<double> by_q,
-                             std::span<double> by_v, const StateCotangents& by_state,
-                             std::span<double> by_parameter) {
+void TaskTape::reverse_start(const ActionCotangents& by, std::span<double> by_q,
+                             std::span<double> by_v, std::span<double> by_parameter) {
   Impl& i = *impl_;
-  i.check_cotangents(by_observation, by_state);
+  i.check_cotangents(by);
   expect_numbers(by_q.size(), i.e * i.nv, true, "derivatives by the first q");
   expect_numbers(by_v.size(), i.e * i.nv, true, "derivatives by the first v");
   expect_numbers(by_parameter.size(), i.e * i.numbers, true, "derivatives by the scene's numbers");
@@ -246,9 +234,8 @@ void TaskTape::reverse_start(std::span<const double> by_observation, std::span<d
                     "each",
                     i.to_reverse(), i.taken));
   if (i.phase == Phase::forward) i.begin_reverse();
-  i.each(Phase::done, [&](TapeBlock& block, int b) {
-    block.reverse_reset(i.of(by_observation, b, i.seen), i.of(by_state, b), i.of(by_q, b, i.nv),
-                        i.of(by_v, b, i.nv), i.of(by_parameter, b, i.numbers));
+  i.each(Phase::done, [&](TaskBlock& block, int b) {
+    block.reverse_reset(i.of(by, b), i.of(by_q, b), i.of(by_v, b), i.of(by_parameter, b));
   });
 }
 
@@ -273,17 +260,13 @@ TaskView TaskTape::view(int environment) const {
 
 std::int64_t TaskTape::recomputed_steps() const {
   std::int64_t sum = 0;
-  for (const TapeBlock& block : impl_->blocks) sum += block.recomputed_steps();
+  for (const TaskBlock& block : impl_->blocks) sum += block.recomputed_steps();
   return sum;
 }
 
-double TaskTape::bytes(const Task& task, int environments, const TaskTapeOptions& asked) {
-  const TaskTapeOptions o = checked(task, environments, asked);
+double TaskTape::bytes(const Task& task, int environments, const TapeOptions& options) {
   const std::size_t shown = task.spec().observation_size() + 2 * as_size(task.model().nv());
-  // Cotangents of moments, and what an opening has shown, take as much as moments.
-  const double moments = (task.spec().warm_up ? 2 : 1) * BlockWorker::bytes(task);
-  return bytes_of(tapes_of(task, environments, o)) +
-         double(blocks_of(environments)) * (ActionBlock::workspace_bytes(task) + moments) +
+  return TaskBlock::bytes(task, checked(task, environments, options), blocks_of(environments)) +
          double(environments) * (2 * 8.0 * double(shown) + EnvironmentData::bytes(task));
 }
 

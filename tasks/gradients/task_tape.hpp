@@ -11,7 +11,7 @@
 #include <span>
 
 #include "tasks/catalogue/task.hpp"
-#include "tasks/gradients/task_tape_options.hpp"
+#include "tasks/gradients/tape_options.hpp"
 
 namespace tangere {
 
@@ -21,10 +21,11 @@ namespace tangere {
 /// simulation has failed, keeps its last state and shows it again.
 class TaskTape {
  public:
-  /// Makes E environments and resets them. `task` must outlive this object. Throws InputError for
-  /// numbers of environments, actions or threads out of range, and for a tape_bytes that does not
-  /// hold the checkpoints.
-  TaskTape(const Task& task, int environments, const TaskTapeOptions& options = {});
+  /// Makes E environments and resets them. `task` must outlive this object. options.points is not
+  /// used. Throws InputError for numbers of environments, actions or threads out of range, and for
+  /// a tape_bytes that does not hold the checkpoints.
+  TaskTape(const Task& task, int environments, const TapeOptions& options = {},
+           std::uint64_t seed = 0, std::int64_t first_episode = 0);
   ~TaskTape();
   TaskTape(TaskTape&&) noexcept;
   TaskTape& operator=(TaskTape&&) noexcept;
@@ -36,7 +37,7 @@ class TaskTape {
   void displace(int environment, std::span<const double> q, std::span<const double> v);
   /// Takes one action of every environment whose episode goes on, (E, action), clipped to its
   /// bounds, and records it. Actions of the other environments are ignored. Throws InputError for
-  /// an action of theirs that is not finite, for one more than `actions`, and after reverse().
+  /// an action of theirs that is not finite, for one more than `length`, and after reverse().
   void step(std::span<const double> actions);
   /// Throws what step() would throw for these actions, and takes none.
   void check_step(std::span<const double> actions) const;
@@ -62,23 +63,20 @@ class TaskTape {
   [[nodiscard]] TaskView view(int environment) const;
 
   /// Reverses the last step that is not reversed yet; the first call begins at the last step.
-  /// Derivatives of a loss L by what that step returned come in: ∂L/∂observations (E, observation)
-  /// and ∂L/∂rewards (E), and optionally by the states; an empty span means zeros. ∂L/∂actions
-  /// (E, action) goes out: all of it that passes through this step and later ones. It is 0 for a
-  /// component beyond its bounds and for an environment that did not take the action. What an ended
-  /// episode goes on showing counts for its last action. Throws InputError when every step is
-  /// reversed, and when a task has no Task::observe_vjp or restart_state_vjp that it would need; then only
-  /// reset() is possible.
-  void reverse(std::span<const double> by_observation, std::span<const double> by_reward,
-               std::span<double> by_action, const StateCotangents& by_state = {});
-  /// Ends the reverse pass. Derivatives by the observation of the reset, (E, observation), and by
-  /// the states at the first action come in; those of the whole by these states go out: (E, nv)
-  /// each, positions along the dofs of v, and (E, NumberGradients::count()) by the scene's numbers
-  /// if they were asked for. Empty spans out are skipped. The reset and all random draws count as
-  /// given, with what was seen in an opening before its last moment. Throws InputError while steps
-  /// are left to reverse, and at a second call.
-  void reverse_start(std::span<const double> by_observation, std::span<double> by_q,
-                     std::span<double> by_v, const StateCotangents& by_state = {},
+  /// Derivatives of a loss by what that step returned come in; an empty span means zeros.
+  /// ∂L/∂actions (E, action) goes out: all of it that passes through this step and later ones. It
+  /// is 0 for a component beyond its bounds and for an environment that did not take the action.
+  /// What an ended episode goes on showing counts for its last action. Throws InputError when every
+  /// step is reversed, and when a task has no Task::observe_vjp or restart_state_vjp that it would
+  /// need; then only reset() is possible.
+  void reverse(const ActionCotangents& by, std::span<double> by_action);
+  /// Ends the reverse pass. Derivatives by the observation of the reset and by the states at the
+  /// first action come in (rewards have no meaning); those of the whole by these states go out:
+  /// (E, nv) each, positions along the dofs of v, and (E, NumberGradients::count()) by the scene's
+  /// numbers if they were asked for. Empty spans out are skipped. The reset and all random draws
+  /// count as given, with what was seen in an opening before its last moment. Throws InputError
+  /// while steps are left to reverse, and at a second call.
+  void reverse_start(const ActionCotangents& by, std::span<double> by_q, std::span<double> by_v,
                      std::span<double> by_parameter = {});
   /// Begins another reverse pass over the same steps, from the last one.
   void begin_reverse();
@@ -86,7 +84,7 @@ class TaskTape {
   /// Simulation steps taken again from checkpoints since this object was made, counted by block.
   [[nodiscard]] std::int64_t recomputed_steps() const;
   /// Memory that a TaskTape takes [bytes].
-  static double bytes(const Task& task, int environments, const TaskTapeOptions& options = {});
+  static double bytes(const Task& task, int environments, const TapeOptions& options = {});
 
  private:
   struct Impl;

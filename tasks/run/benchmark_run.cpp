@@ -48,12 +48,12 @@ class Benchmark {
   using MakeProgram = std::function<std::unique_ptr<EpisodeProgram>()>;
 
   /// `task_data`: shared by the programs of a task; null for a scene.
-  Benchmark(const Batch& start, const BenchmarkOptions& options, const BenchmarkGoOn& go_on,
+  Benchmark(const Batch& start, const BenchmarkOptions& options, const std::stop_token& stop,
             std::shared_ptr<EnvironmentData> task_data, const MakeProgram& make_program)
       : start_(start),
         batch_(start),
         options_(options),
-        go_on_(go_on),
+        stop_(stop),
         data_(std::move(task_data)),
         frames_(data_ == nullptr ? options.frames : FrameKind::none),
         u_(as_size(start.environments()) * as_size(start.model().nu())),
@@ -138,7 +138,7 @@ class Benchmark {
         checksums_[as_size(e)] = static_cast<std::uint64_t>(start_.episode(e));
     for (std::int64_t row = 0; row < options_.rollout.steps; ++row) {
       for (int k = 0; k < program.steps_per_row(); ++k) {
-        if (go_on_ && !go_on_()) {
+        if (stop_.stop_requested()) {
           stopped_ = true;
           return;
         }
@@ -206,7 +206,7 @@ class Benchmark {
   const Batch& start_;
   Batch batch_;
   const BenchmarkOptions& options_;
-  const BenchmarkGoOn& go_on_;
+  const std::stop_token& stop_;
   std::shared_ptr<EnvironmentData> data_;
   FrameKind frames_;
   std::vector<double> u_;  // (E, nu)
@@ -260,24 +260,24 @@ BenchmarkTime BenchmarkResult::median() const {
 }
 
 BenchmarkResult run_benchmark(const Batch& start, const ControlProgram& controls,
-                              const BenchmarkOptions& options, const BenchmarkGoOn& go_on) {
+                              const BenchmarkOptions& options, const std::stop_token& stop) {
   check(options);
   controls.check_covers(options.rollout.steps);
   const double timestep = Stepper(start.model()).timestep();
   if (timestep != controls.timestep())
     throw InputError("controls laid out for a timestep of " + std::to_string(controls.timestep()) +
                      " s; the scene's is " + std::to_string(timestep) + " s");
-  return Benchmark(start, options, go_on, nullptr,
+  return Benchmark(start, options, stop, nullptr,
                    [&] { return std::make_unique<SceneProgram>(controls); })
       .run();
 }
 
 BenchmarkResult run_benchmark(const Batch& start, const Task& task, const Policy& policy,
-                              const BenchmarkOptions& options, const BenchmarkGoOn& go_on) {
+                              const BenchmarkOptions& options, const std::stop_token& stop) {
   check(options);
   const auto data = std::make_shared<EnvironmentData>(task, start.environments());
   BenchmarkResult result =
-      Benchmark(start, options, go_on, data, [&] {
+      Benchmark(start, options, stop, data, [&] {
         return std::make_unique<TaskProgram>(task, policy, data, options.precision, 1,
                                              TaskProgram::AtEnd::again);
       }).run();

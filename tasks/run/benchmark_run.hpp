@@ -5,7 +5,7 @@
 #pragma once
 
 #include <cstdint>
-#include <functional>
+#include <stop_token>
 #include <vector>
 
 #include "engine/step/batch.hpp"
@@ -32,7 +32,7 @@ struct BenchmarkResult {
   /// the final state; for a task those of observations, rewards and flags. It depends on the
   /// environment's episode, but not on threads, blocks or the size of the batch.
   std::vector<std::uint64_t> checksums;
-  bool stopped = false;  ///< `go_on` returned false; the times are of complete passes only
+  bool stopped = false;  ///< before its end; the times are of complete passes only
 
   /// Returns the sum of the checksums modulo 2^64, which does not depend on their order.
   [[nodiscard]] std::uint64_t checksum() const;
@@ -42,21 +42,18 @@ struct BenchmarkResult {
   [[nodiscard]] BenchmarkTime median() const;
 };
 
-/// Is called before each step of each block, from any thread. False stops the run there.
-using BenchmarkGoOn = std::function<bool()>;
-
 /// Runs the episode that begins with `start` once for checksums. This run also warms caches, pages
 /// and threads. Then it times `repeat` passes, which contain only controls, steps and readings. An
-/// environment that fails is not read again. Throws InputError for threads or repeat < 1 and for
-/// what a rollout refuses: steps < 1, every < 0, controls that are too short or laid out for a
-/// timestep other than the scene's.
+/// environment that fails is not read again. `stop` ends it before any step of a block. Throws
+/// InputError for threads or repeat < 1 and for what a rollout refuses: steps < 1, every < 0,
+/// controls that are too short or laid out for a timestep other than the scene's.
 BenchmarkResult run_benchmark(const Batch& start, const ControlProgram& controls,
-                              const BenchmarkOptions& options, const BenchmarkGoOn& go_on = {});
+                              const BenchmarkOptions& options, const std::stop_token& stop = {});
 
 /// Does the same for a task's episodes, played by a policy from a fresh batch. Environments start
 /// new episodes when theirs end, as in a VectorTask.
 BenchmarkResult run_benchmark(const Batch& start, const Task& task, const Policy& policy,
-                              const BenchmarkOptions& options, const BenchmarkGoOn& go_on = {});
+                              const BenchmarkOptions& options, const std::stop_token& stop = {});
 
 /// Memory that run_benchmark takes besides `start` [bytes].
 double benchmark_bytes(const Model& model, int environments, const BenchmarkOptions& options);

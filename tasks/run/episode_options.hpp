@@ -57,19 +57,12 @@ struct EpisodeSummary {
   double mean_return = 0;               ///< over the same episodes
   std::vector<FailedEpisode> failures;  ///< in ascending order
   int peak_blocks_in_flight = 0;
-  bool stopped = false;  ///< by StopRequest; unfinished blocks are lost
+  bool stopped = false;  ///< before its end; unfinished blocks are lost
   double seconds = 0;    ///< wall clock of the whole run, sink included
   /// Sums over threads: time for stepping, for turning rows into the stored form (compression
   /// included), and for the one thread that writes.
   double simulation_seconds = 0, encoding_seconds = 0, writing_seconds = 0;
 };
-
-/// Is called after each row of each block, by one thread at a time, with the environment steps
-/// done.
-using EpisodeProgress = std::function<void(std::int64_t environment_steps)>;
-/// Is called before every step, by all threads at once. True ends the run without finishing a
-/// block.
-using StopRequest = std::function<bool()>;
 
 /// Actions of an episode, R = steps / every. Throws InputError when R is not whole.
 std::int64_t action_rows(const EpisodeOptions& options);

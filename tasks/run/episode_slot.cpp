@@ -56,7 +56,7 @@ void EpisodeSlot<T>::begin(EpisodeRange range) {
 }
 
 template <class T>
-bool EpisodeSlot<T>::simulate(const StopRequest& stop,
+bool EpisodeSlot<T>::simulate(const std::function<bool()>& stopped,
                               const std::function<void(std::int64_t)>& on_steps) {
   first_row_ = next_row_;
   rows_ = static_cast<int>(std::min<std::int64_t>(piece_rows_, source_.rows + 1 - first_row_));
@@ -65,7 +65,7 @@ bool EpisodeSlot<T>::simulate(const StopRequest& stop,
     observe(row);
     if (row == action_rows_ || std::count(playing_.begin(), playing_.end(), true) == 0) break;
     const std::int64_t before = program_->counts(*tally_).environment_steps;
-    if (!act(row, stop)) return false;
+    if (!act(row, stopped)) return false;
     on_steps(program_->counts(*tally_).environment_steps - before);
   }
   next_row_ += rows_;
@@ -179,12 +179,12 @@ void EpisodeSlot<T>::observe_bodies(int row) {
 }
 
 template <class T>
-bool EpisodeSlot<T>::act(int row, const StopRequest& stop) {
+bool EpisodeSlot<T>::act(int row, const std::function<bool()>& stopped) {
   const int steps = program_->steps_per_row();
   const std::int64_t first = program_->opening_steps() + (first_row_ + row) * steps;
   program_->controls(first, *batch_, 0, u_);
   keep_action(row);
-  if (!take_steps(first, steps, stop)) return false;
+  if (!take_steps(first, steps, stopped)) return false;
   program_->judge(*batch_, 0);
   if (const TaskProgram* const task = program_->judged())
     for (int e = 0; e < batch_->environments(); ++e)
@@ -196,11 +196,12 @@ bool EpisodeSlot<T>::act(int row, const StopRequest& stop) {
 
 /// If step `from` begins a row, its controls are already in place.
 template <class T>
-bool EpisodeSlot<T>::take_steps(std::int64_t from, std::int64_t count, const StopRequest& stop) {
+bool EpisodeSlot<T>::take_steps(std::int64_t from, std::int64_t count,
+                                const std::function<bool()>& stopped) {
   const bool asked = from >= program_->opening_steps();
   const std::size_t numbers = as_size(batch_->environments()) * as_size(batch_->model().nu());
   for (std::int64_t t = from; t < from + count; ++t) {
-    if (stop && stop()) return false;
+    if (stopped && stopped()) return false;
     if (t > from || !asked) program_->controls(t, *batch_, 0, u_);
     stepper_.step(*batch_, std::span(u_).first(numbers));
     tally_->count(*batch_, t);

@@ -24,8 +24,8 @@ class EpisodeSlot {
   /// Starts a block with the episodes of `range`, at most 16.
   void begin(EpisodeRange range);
   /// Steps through the rows of the next piece. `on_steps` gets the environment steps of each.
-  /// Returns false if `stop` ended it; the piece is then void.
-  [[nodiscard]] bool simulate(const StopRequest& stop,
+  /// Returns false if `stopped` did before any step; the piece is then void.
+  [[nodiscard]] bool simulate(const std::function<bool()>& stopped,
                               const std::function<void(std::int64_t)>& on_steps);
 
   [[nodiscard]] EpisodeRows piece() const;  ///< valid until the next simulate()
@@ -47,8 +47,9 @@ class EpisodeSlot {
   void observe(int row);
   void observe_scene(int row);
   void observe_task(const TaskProgram& task, int row);
-  [[nodiscard]] bool act(int row, const StopRequest& stop);
-  [[nodiscard]] bool take_steps(std::int64_t from, std::int64_t count, const StopRequest& stop);
+  [[nodiscard]] bool act(int row, const std::function<bool()>& stopped);
+  [[nodiscard]] bool take_steps(std::int64_t from, std::int64_t count,
+                                const std::function<bool()>& stopped);
   void keep_action(int row);
   void collect();
   [[nodiscard]] std::int64_t step_of_failure(int episode) const;

@@ -78,7 +78,7 @@ template <class T>
 class EpisodeGraph {
  public:
   EpisodeGraph(const EpisodeSource& source, const EpisodeOptions& options, EpisodeSink& sink,
-               const EpisodeProgress& progress, const StopRequest& stop)
+               const ProgressCallback& progress, const std::stop_token& stop)
       : source_(source),
         options_(options),
         ranges_(checked_ranges(options.ranges, options.episodes)),
@@ -180,7 +180,7 @@ class EpisodeGraph {
       t.slot = slots_.take([&] { return std::make_unique<EpisodeSlot<T>>(source_, options_); });
     const TsanOrder::Task task(order_, t.slot);
     const auto ends = [this] {
-      if (stop_ && stop_()) stopped_ = true;
+      if (stop_.stop_requested()) stopped_ = true;
       return stopped_ || tbb::is_current_task_group_canceling();  // a throw elsewhere
     };
     const Stopwatch watch(simulation_);
@@ -215,8 +215,8 @@ class EpisodeGraph {
   std::int64_t next_episode_;
   TsanOrder order_;
   EpisodeSink& sink_;
-  const EpisodeProgress& progress_;
-  const StopRequest& stop_;
+  const ProgressCallback& progress_;
+  const std::stop_token& stop_;
   SlotPool<EpisodeSlot<T>> slots_;
   flow::graph graph_;
   std::atomic<bool> stopped_{false};
@@ -227,7 +227,7 @@ class EpisodeGraph {
 };
 
 EpisodeSummary run(const EpisodeSource& source, const EpisodeOptions& options, EpisodeSink& sink,
-                   const EpisodeProgress& progress, const StopRequest& stop) {
+                   const ProgressCallback& progress, const std::stop_token& stop) {
   const auto start = std::chrono::steady_clock::now();
   require_threads(options.threads);
   // More threads than cores need both. Tests use that to compare bits at any number of threads.
@@ -257,15 +257,15 @@ double bytes_of(const EpisodeSource& source, const EpisodeOptions& options, doub
 
 EpisodeSummary run_episodes(const Model& model, const StepperOptions& solver,
                             const ControlProgram& controls, const EpisodeOptions& options,
-                            EpisodeSink& sink, const EpisodeProgress& progress,
-                            const StopRequest& stop) {
+                            EpisodeSink& sink, const ProgressCallback& progress,
+                            const std::stop_token& stop) {
   check(options);
   return run(source_of(model, solver, controls, options), options, sink, progress, stop);
 }
 
 EpisodeSummary run_episodes(const Task& task, const Policy& policy, const EpisodeOptions& options,
-                            EpisodeSink& sink, const EpisodeProgress& progress,
-                            const StopRequest& stop) {
+                            EpisodeSink& sink, const ProgressCallback& progress,
+                            const std::stop_token& stop) {
   check(options);
   return run(source_of(task, policy, options), options, sink, progress, stop);
 }

@@ -17,6 +17,7 @@
 #include "engine/step/stepper.hpp"
 #include "tasks/run/episode_options.hpp"
 #include "tasks/run/policy.hpp"
+#include "tasks/run/progress.hpp"
 
 namespace tangere {
 
@@ -24,16 +25,17 @@ namespace tangere {
 /// an episode are keyed by (seed, episode), so neither `threads` nor `blocks_in_flight` changes a
 /// bit. Throws InputError when a number is out of its range, when steps is no multiple of every,
 /// and when the controls are too short, were laid out for another timestep, or change while an
-/// action is held. Passes on what the sink throws, after all threads have ended.
+/// action is held. `progress` gets environment steps after each row of each block; `stop` ends the
+/// run without finishing a block. Passes on what the sink throws, after all threads have ended.
 EpisodeSummary run_episodes(const Model& model, const StepperOptions& solver,
                             const ControlProgram& controls, const EpisodeOptions& options,
-                            EpisodeSink& sink, const EpisodeProgress& progress = {},
-                            const StopRequest& stop = {});
+                            EpisodeSink& sink, const ProgressCallback& progress = {},
+                            const std::stop_token& stop = {});
 /// Does the same for a task's episodes. Many threads ask the policy. Each block is one piece, and
 /// blocks are in ascending order.
 EpisodeSummary run_episodes(const Task& task, const Policy& policy, const EpisodeOptions& options,
-                            EpisodeSink& sink, const EpisodeProgress& progress = {},
-                            const StopRequest& stop = {});
+                            EpisodeSink& sink, const ProgressCallback& progress = {},
+                            const std::stop_token& stop = {});
 
 /// Returns `ranges`, or one range with all episodes if there are none. Throws InputError when a
 /// range begins or ends within a block of 16 (except at the last episode), is empty, or lies

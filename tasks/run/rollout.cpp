@@ -205,19 +205,20 @@ double rollout_bytes(const Model& model, int environments, const RolloutOutputs&
 
 RolloutSummary run_rollout(Batch& batch, std::span<Stepper> steppers,
                            const ControlProgram& controls, const RolloutOptions& options,
-                           RowSink& sink, const RolloutProgress& progress) {
+                           RowSink& sink, const ProgressCallback& progress,
+                           const std::stop_token& stop) {
   check(steppers, options);
   if (const double step = steppers.front().timestep(); controls.timestep() != step)
     throw InputError("controls laid out for a timestep of " + std::to_string(controls.timestep()) +
                      " s; the stepper's is " + std::to_string(step) + " s");
   controls.check_covers(options.first_step + options.steps);
   SceneProgram program(controls, 1, options.first_step);
-  return run_rollout(batch, steppers, program, options, sink, progress);
+  return run_rollout(batch, steppers, program, options, sink, progress, stop);
 }
 
 RolloutSummary run_rollout(Batch& batch, std::span<Stepper> steppers, EpisodeProgram& program,
                            const RolloutOptions& options, RowSink& sink,
-                           const RolloutProgress& progress) {
+                           const ProgressCallback& progress, const std::stop_token& stop) {
   check(steppers, options);
   const double timestep = steppers.front().timestep();
   check_bodies(batch.model(), options.outputs.chosen_bodies);
@@ -270,7 +271,8 @@ RolloutSummary run_rollout(Batch& batch, std::span<Stepper> steppers, EpisodePro
       if (reading.times.at(t + 1, options.steps, options.first_step))
         recorder.write_field(reading.output, reading.frame++, t + 1);
     summary.steps = t + 1;
-    summary.stopped = progress && !progress(t + 1);
+    if (progress) progress(t + 1);
+    summary.stopped = stop.stop_requested();
     if (summary.stopped) break;
   }
   summary.counts = tally.counts;

@@ -4,7 +4,6 @@
 #pragma once
 
 #include <cstdint>
-#include <functional>
 #include <optional>
 #include <vector>
 
@@ -14,6 +13,7 @@
 #include "engine/step/stepper.hpp"
 #include "tasks/run/energy_balance_summary.hpp"
 #include "tasks/run/episode_program.hpp"
+#include "tasks/run/progress.hpp"
 #include "tasks/run/step_tally.hpp"
 
 namespace tangere {
@@ -45,12 +45,9 @@ struct RolloutSummary {
   StepCounts counts;       ///< of environments' steps, failing ones included
   std::optional<EnergyBalanceSummary> audit;  ///< if it was asked for
   std::vector<FailedEnvironment> failures;    ///< in the order in which they failed
-  bool stopped = false;                       ///< progress returned false
+  bool stopped = false;                       ///< before its end
   double seconds = 0;                         ///< wall clock of the whole rollout, sink included
 };
-
-/// Is called after each step with the number of steps done. False stops the run at this safe point.
-using RolloutProgress = std::function<bool(std::int64_t done)>;
 
 /// Steps the batch and hands every row to the sink: row 0 of the state, then for each step its
 /// StepRow, the ActionRow if it ends a task's action, the StateRow after it, the MemoryRow and the
@@ -59,17 +56,18 @@ using RolloutProgress = std::function<bool(std::int64_t done)>;
 /// that failed earlier has 0 iterations and its last status and residual. `program` must have
 /// started every block; it takes all of them through a step in turn. `steppers`: one for each
 /// thread that steps and reads blocks, all of the same options; rows are the same for any number of
-/// them.
+/// them. Both `progress` and `stop` are used after each step.
 /// Throws InputError without a stepper and when steps < 1, every < 0 or first_step < 0. Passes on
 /// what the sink throws.
 RolloutSummary run_rollout(Batch& batch, std::span<Stepper> steppers, EpisodeProgram& program,
                            const RolloutOptions& options, RowSink& sink,
-                           const RolloutProgress& progress = {});
+                           const ProgressCallback& progress = {}, const std::stop_token& stop = {});
 /// Does the same for a scene. Also throws InputError when a table of controls is too short or was
 /// laid out for another timestep.
 RolloutSummary run_rollout(Batch& batch, std::span<Stepper> steppers,
                            const ControlProgram& controls, const RolloutOptions& options,
-                           RowSink& sink, const RolloutProgress& progress = {});
+                           RowSink& sink, const ProgressCallback& progress = {},
+                           const std::stop_token& stop = {});
 
 /// Returns what is read of tactile fields. Throws InputError as check_outputs() does.
 std::vector<FieldOutput> fields_of(const Model& model, const RolloutOutputs& outputs);

@@ -54,7 +54,7 @@ struct Play {
   Batch batch;
   ControlProgram controls;
   std::int64_t steps;
-  std::function<bool()> go_on;
+  std::stop_token stop;
   std::atomic<bool> stopped{false};
 
   [[nodiscard]] const Model& model() const { return batch.model(); }
@@ -73,7 +73,7 @@ struct Play {
     // Those with a step that says that it may be wrong.
     std::vector<bool> flagged(as_size(lanes));
     for (std::int64_t k = 0; k < steps; ++k) {
-      if (stopped || (go_on && !go_on())) {
+      if (stop.stop_requested()) {
         stopped = true;
         return;
       }
@@ -104,7 +104,7 @@ struct Play {
 
 /// Plays a scene and adds up its blocks. None when it was stopped.
 std::optional<BlockOutcome> play(const Scene& scene, const StressCase& of, const Setting& setting,
-                                 int threads, const std::function<bool()>& go_on) {
+                                 int threads, const std::stop_token& stop) {
   const Model model(scene);
   const ControlProgram controls(model, setting.step, 0);
   const std::int64_t steps =
@@ -117,7 +117,7 @@ std::optional<BlockOutcome> play(const Scene& scene, const StressCase& of, const
   Play run{of.measure, of.bound,
            setting,    Batch(model, of.environments),
            controls,   std::max<std::int64_t>(steps, 1),
-           go_on};
+           stop};
   const int used = std::min(threads, run.batch.blocks());
   BlockThreads block_threads(used);
   std::vector<Worker> workers;
@@ -187,13 +187,13 @@ std::string warning_of(const Scene& scene, const StressRow& row) {
 }
 
 /// Fills in what a setting came to. False when it was stopped.
-bool measure(const Scene& scene, int threads, const std::function<bool()>& go_on, StressRow& row) {
+bool measure(const Scene& scene, int threads, const std::stop_token& stop, StressRow& row) {
   const Setting setting{row.integrator, row.step, row.accuracy};
-  const auto out = play(varied(scene, row.of->variant), *row.of, setting, threads, go_on);
+  const auto out = play(varied(scene, row.of->variant), *row.of, setting, threads, stop);
   if (!out) return false;
   row.value = out->worst;
   if (!row.of->measure) {
-    const auto ordinary = play(scene, *row.of, setting, threads, go_on);
+    const auto ordinary = play(scene, *row.of, setting, threads, stop);
     if (!ordinary) return false;
     row.value = passes(*out) / passes(*ordinary);
   }
@@ -264,7 +264,7 @@ bool run_case(const StressCase& of, const StressOptions& options, const StressSc
     row.step = setting.step;
     row.accuracy = setting.accuracy;
     row.environments = of.environments;
-    if (!measure(scene, options.threads, listener.go_on, row)) return false;
+    if (!measure(scene, options.threads, listener.stop, row)) return false;
     if (row.verdict == StressVerdict::fails && !warnings.empty()) {
       row.verdict = StressVerdict::flagged;
       row.reason = "warning: " + warnings.front();

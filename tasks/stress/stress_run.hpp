@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <functional>
 #include <optional>
+#include <stop_token>
 #include <string>
 #include <vector>
 
@@ -60,8 +61,7 @@ struct StressScene {
 using StressScenes = std::function<StressScene(const std::string& file)>;
 
 struct StressListener {
-  /// Called before every step of every block, from any thread. False stops the run.
-  std::function<bool()> go_on;
+  std::stop_token stop;                       ///< ends the run before any step of a block
   std::function<void(const StressRow&)> row;  ///< each as it is measured
 };
 

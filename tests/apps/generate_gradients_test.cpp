@@ -16,7 +16,6 @@
 #include "tasks/catalogue/task_list.hpp"
 #include "tasks/gradients/gradients.hpp"
 #include "tasks/gradients/losses.hpp"
-#include "tasks/gradients/task_gradients.hpp"
 #include "tasks/run/policy.hpp"
 #include "tests/apps/program.hpp"
 #include "tests/files.hpp"
@@ -57,15 +56,15 @@ TEST(GenerateGradients, OfATasksReturnAreThoseOfTheLibrary) {
   EXPECT_EQ(answer.at("gradients"), "return");
   const auto task = make_task("dummy", read_scene(kSmall).scene);
   const Policy policy(*task, PolicyKind::scripted);
-  TaskGradientOptions options;
-  options.episodes = 18;
+  TapeOptions options;
+  options.precision = Precision::mixed;
   options.parameters = true;
   const TaskGradients g = task_gradients(
       *task,
       [&](const TaskView& view, std::span<const double> o, std::span<double> a) {
         policy.act(view, o, a);
       },
-      options);
+      0, {0, 18}, options);
   const h5::Id file = h5::open_file(folder.path("set/shard-00000.h5"));
   const auto part = [](const std::vector<double>& all, int e, std::size_t width) {
     return std::vector<double>(all.begin() + std::ptrdiff_t(std::size_t(e) * width),
@@ -74,11 +73,11 @@ TEST(GenerateGradients, OfATasksReturnAreThoseOfTheLibrary) {
   for (const int e : {0, 15, 17}) {
     const Array by_actions = read(file, e, "grad_actions");
     EXPECT_EQ(by_actions.dims, (h5::Dims{40, 1}));
-    EXPECT_EQ(by_actions.values, part(g.by_action, e, 40));
-    EXPECT_EQ(read(file, e, "grad_q").values, part(g.by_q, e, 9));
-    EXPECT_EQ(read(file, e, "grad_v").values, part(g.by_v, e, 9));
+    EXPECT_EQ(by_actions.values, part(g.u, e, 40));
+    EXPECT_EQ(read(file, e, "grad_q").values, part(g.q, e, 9));
+    EXPECT_EQ(read(file, e, "grad_v").values, part(g.v, e, 9));
     EXPECT_EQ(read(file, e, "grad_numbers").values,
-              part(g.by_parameter, e, g.by_parameter.size() / 18));
+              part(g.parameters, e, g.parameters.size() / 18));
   }
   EXPECT_THAT(h5::read_text(h5::open_dataset(file, "data/demo_0/grad_actions"), "meaning"),
               HasSubstr("the return by the action"));
@@ -95,8 +94,8 @@ TEST(GenerateGradients, OfASceneAreOfALossByItsActions) {
   const ControlProgram program(model, model.timestep(), 0);
   const auto loss = make_loss(LossKind::final_state, model, 5);
   const RolloutLoss* const losses[] = {loss.get()};
-  GradientOptions options;
-  options.steps = 100;
+  TapeOptions options;
+  options.length = 100;
   options.parameters = true;
   const LossGradient g = rollout_gradients(
                              Batch(model, 3, 0),

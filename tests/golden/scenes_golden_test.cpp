@@ -129,8 +129,8 @@ std::string combined(std::span<const Hash> hashes) {
 /// Hashes gradients of a loss on fields, or on the last state where nothing feels.
 std::string gradients(const Model& model, int environments, int steps) {
   if (steps == 0) return "-";
-  GradientOptions options;
-  options.steps = steps;
+  TapeOptions options;
+  options.length = steps;
   options.parameters = true;
   const Batch start(model, environments, kSeed);
   const ControlProgram controls(model, model.timestep(), kSeed);

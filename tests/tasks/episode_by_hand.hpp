@@ -41,8 +41,9 @@ inline EpisodeOptions options(int threads = 2, Precision precision = Precision::
 }
 
 inline EpisodeSummary run(const Model& model, const EpisodeOptions& o, EpisodeSink& sink,
-                          const StopRequest& stop = {}) {
-  return run_episodes(model, {}, ControlProgram(model, model.timestep(), kSeed), o, sink, {}, stop);
+                          const ProgressCallback& progress = {}, const std::stop_token& stop = {}) {
+  return run_episodes(model, {}, ControlProgram(model, model.timestep(), kSeed), o, sink, progress,
+                      stop);
 }
 
 /// One episode, stepped by hand. T: type of the stored observations.

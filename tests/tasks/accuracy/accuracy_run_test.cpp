@@ -122,7 +122,9 @@ TEST(FixedEpisodes, OfATaskReplayItsControls) {
 TEST(FixedEpisodes, StopAndRefuseWhatIsTooLong) {
   const auto task = testing::task_named("box_pushing");
   const Policy policy(*task, PolicyKind::scripted);
-  EXPECT_FALSE(task_episodes(Batch(task->model(), 1, 1), *task, policy, 5, [] { return false; }));
+  std::stop_source source;
+  source.request_stop();
+  EXPECT_FALSE(task_episodes(Batch(task->model(), 1, 1), *task, policy, 5, source.get_token()));
   const Batch start(pressed_ball(), 1, 3);
   const ControlProgram controls(pressed_ball(), pressed_ball().timestep(), 3);
   EXPECT_THROW(scene_episodes(start, controls, 1'000'000'000'000, 5), InputError);
@@ -230,10 +232,12 @@ TEST(AccuracyRun, ErrorsAreTheSameBitsOnAnyNumberOfThreads) {
 TEST(AccuracyRun, StopsWhereItIsTold) {
   const FixedEpisodes episodes = ball_episodes(2);
   const auto run = make_accuracy_run(episodes, AccuracyQuantity::tactile, 1);
-  int asked = 0;
-  EXPECT_TRUE(
-      run->make_reference({Integrator::bdf1, 5, 1e-6}, [&] { return ++asked < 4; }).stopped);
-  EXPECT_EQ(asked, 4);
+  std::stop_source source;
+  EXPECT_FALSE(run->make_reference({Integrator::bdf1, 5, 1e-6}, source.get_token()).stopped);
+  source.request_stop();
+  const AccuracyOutcome out = run->make_reference({Integrator::bdf1, 5, 1e-6}, source.get_token());
+  EXPECT_TRUE(out.stopped);
+  EXPECT_EQ(out.counts.newton_iterations, 0);
 }
 
 /// The sample sizes at which one, two and three numbers may lie beyond are in tables of order
@@ -290,8 +294,11 @@ TEST(AccuracySweep, LooksAgainAtWhatMayBeCheaper) {
   const FixedEpisodes episodes = ball_episodes(21, 100);
   int settings = 0;
   AccuracyListener listener;
-  listener.setting = [&](std::span<const AccuracyPoint>) { ++settings; };
-  listener.go_on = [&] { return settings < 3; };
+  std::stop_source after_three;
+  listener.stop = after_three.get_token();
+  listener.setting = [&](std::span<const AccuracyPoint>) {
+    if (++settings == 3) after_three.request_stop();
+  };
   const auto longest_sdirk2 = [](const AccuracyReport& report) {
     return *std::ranges::find_if(report.points, [](const AccuracyPoint& p) {
       return p.setting.integrator == Integrator::sdirk2 && p.setting.parts == 1;
@@ -305,12 +312,13 @@ TEST(AccuracySweep, LooksAgainAtWhatMayBeCheaper) {
   const Batch start(pressed_ball(), 42, 8);
   const ControlProgram controls(pressed_ball(), pressed_ball().timestep(), 8);
   int looks = 0;
-  bool seen = false;  // what comes after the second look takes long
-  listener.go_on = [&] { return !seen; };
+  std::stop_source seen;  // what comes after the second look takes long
+  listener.stop = seen.get_token();
   listener.second_look = [&] { ++looks; };
   listener.setting = [&](std::span<const AccuracyPoint> points) {
-    seen = points[0].errors.size() == 63 && points[0].setting.integrator == Integrator::sdirk2 &&
-           points[0].setting.parts == 1;
+    if (points[0].errors.size() == 63 && points[0].setting.integrator == Integrator::sdirk2 &&
+        points[0].setting.parts == 1)
+      seen.request_stop();
   };
   const auto fresh = [&] { return scene_episodes(start, controls, 100, 5); };
   const AccuracyReport report = accuracy_sweep(episodes, options, listener, fresh);
@@ -335,8 +343,11 @@ TEST(AccuracySweep, KeepsWhatThereIsWhenItIsStopped) {
   const FixedEpisodes episodes = ball_episodes(2, 100);
   int settings = 0;
   AccuracyListener listener;
-  listener.setting = [&](std::span<const AccuracyPoint>) { ++settings; };
-  listener.go_on = [&] { return settings < 2; };
+  std::stop_source after_two;
+  listener.stop = after_two.get_token();
+  listener.setting = [&](std::span<const AccuracyPoint>) {
+    if (++settings == 2) after_two.request_stop();
+  };
   const AccuracyReport report = accuracy_sweep(episodes, quick(), listener);
   EXPECT_TRUE(report.stopped);
   EXPECT_THAT(report.points, ::testing::SizeIs(4)) << "two settings in two precisions";

@@ -133,10 +133,10 @@ class ClosedLoop {
     LoopInputs g{Numbers(at.w.size()), Numbers(at.b.size()), Numbers(nv_), Numbers(nv_)};
     Numbers by_o = end_o_, by_action(width_);
     const Numbers one{1};
-    StateCotangents by_state{end_q_, end_v_};
+    ActionCotangents by{by_o, one, end_q_, end_v_};
     for (std::size_t t = n_; t-- > 0;) {
-      tape_.reverse(by_o, one, by_action, by_state);
-      by_state = {};
+      tape_.reverse(by, by_action);
+      by.q = by.v = {};
       std::fill(by_o.begin(), by_o.end(), 0.0);
       for (std::size_t k = 0; k < width_; ++k) {
         const double inner = by_action[k] * kSway * (1 - squashed_[t][k] * squashed_[t][k]);
@@ -147,7 +147,7 @@ class ClosedLoop {
         }
       }
     }
-    tape_.reverse_start(by_o, g.q, g.v);
+    tape_.reverse_start({by_o}, g.q, g.v);
     return g;
   }
 
@@ -185,11 +185,10 @@ class ClosedLoop {
  private:
   static constexpr std::uint64_t kSeed = 4;
   static StepperOptions stepper() { return {{}, {}, 1e-12}; }
-  static TaskTapeOptions options_of(const LoopCase& c) {
-    TaskTapeOptions o;
-    o.actions = c.actions;
+  static TapeOptions options_of(const LoopCase& c) {
+    TapeOptions o;
+    o.length = c.actions;
     o.stepper = stepper();
-    o.precision = Precision::f64;
     return o;
   }
   [[nodiscard]] std::span<const double> row(const Numbers& w, std::size_t k) const {

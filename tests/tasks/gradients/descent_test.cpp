@@ -11,7 +11,6 @@
 #include "io/scene/scene_reader.hpp"
 #include "tasks/catalogue/task_list.hpp"
 #include "tasks/gradients/gradients.hpp"
-#include "tasks/gradients/task_gradients.hpp"
 #include "tasks/gradients/task_tape.hpp"
 
 namespace tangere {
@@ -129,8 +128,8 @@ TEST(Descent, FiftyAdamStepsHalveTheDistanceOfAPushedBox) {
   }
   const ReachGoal loss(box, goals);
   const RolloutLoss* const losses[] = {&loss};
-  GradientOptions options;
-  options.steps = kActions * kHeld;
+  TapeOptions options;
+  options.length = kActions * kHeld;
 
   const double before = mean_distance(p, loss);
   Adam adam(p.actions.size(), 0.02);
@@ -155,10 +154,8 @@ TEST(Descent, AdamOnActionsRaisesTheReturnOfBoxPushing) {
   constexpr std::size_t kWidth = 3;
   std::vector<double> actions(kEnvironments * kActions * kWidth);
   for (std::size_t k = 0; k < actions.size(); k += kWidth) actions[k] = 0.05;
-  TaskGradientOptions options;
-  options.episodes = kEnvironments;
-  options.actions = kActions;
-  options.seed = 1;
+  TapeOptions options;
+  options.length = kActions;
   const TaskActions given = [&](const TaskView& view, std::span<const double>,
                                 std::span<double> action) {
     std::copy_n(actions.begin() + (view.episode * kActions + view.actions) * std::int64_t(kWidth),
@@ -167,13 +164,12 @@ TEST(Descent, AdamOnActionsRaisesTheReturnOfBoxPushing) {
   Adam adam(actions.size(), 0.02);
   double before = 0, after = 0;
   for (int k = 0; k <= 50; ++k) {
-    const TaskGradients g = task_gradients(*task, given, options);
+    const TaskGradients g = task_gradients(*task, given, 1, {0, kEnvironments}, options);
     ASSERT_TRUE(g.failures.empty());
     after = std::accumulate(g.value.begin(), g.value.end(), 0.0) / kEnvironments;
     if (k == 0) before = after;
-    std::vector<double> down(g.by_action.size());
-    std::transform(g.by_action.begin(), g.by_action.end(), down.begin(),
-                   [](double x) { return -x; });
+    std::vector<double> down(g.u.size());
+    std::transform(g.u.begin(), g.u.end(), down.begin(), [](double x) { return -x; });
     adam.step(actions, down);
   }
   RecordProperty("mean_return_before", std::to_string(before));
@@ -191,8 +187,8 @@ TEST(Descent, BackPropagationThroughTimeTrainsAPolicyThatPushes) {
   constexpr int kUpdates = 25;
   constexpr double kMost = 0.45, kScale = 10;  // of an action; of what the policy sees [1/m, 1/rad]
   const std::size_t seen = task->spec().observation_size(), inputs = seen + 1;
-  TaskTapeOptions options;
-  options.actions = kActions;
+  TapeOptions options;
+  options.length = kActions;
   options.threads = 2;
   TaskTape tape(*task, kEnvironments, options);
   std::vector<double> weights(kWidth * inputs);
@@ -224,7 +220,7 @@ TEST(Descent, BackPropagationThroughTimeTrainsAPolicyThatPushes) {
     std::vector<double> down(weights.size()), by_observation, by_action(kEnvironments * kWidth);
     const std::vector<double> by_reward(kEnvironments, -1.0 / kEnvironments);
     for (std::size_t t = kActions; t-- > 0;) {
-      tape.reverse(by_observation, by_reward, by_action);
+      tape.reverse({by_observation, by_reward}, by_action);
       by_observation.assign(kEnvironments * seen, 0.0);
       for (std::size_t e = 0; e < kEnvironments; ++e)
         for (std::size_t i = 0; i < kWidth; ++i) {

@@ -59,7 +59,7 @@ Scene coming(double height) {
 
 GradientCheck check(const Model& model, const RolloutLoss& loss, std::int64_t steps) {
   CheckOptions options;
-  options.steps = steps;
+  options.length = steps;
   options.entries = 0;
   options.stepper.tolerance = 1e-12;
   const ControlProgram controls(model, model.timestep(), 0);
@@ -100,7 +100,7 @@ TEST(GradientCheck, NamesRoundedReadings) {
   const auto checked = [](const Scene& of) {
     const Model model(of);
     CheckOptions options;
-    options.steps = 20;
+    options.length = 20;
     options.entries = 3;
     options.stepper.tolerance = 1e-12;
     const ControlProgram controls(model, model.timestep(), 0);

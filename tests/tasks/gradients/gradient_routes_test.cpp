@@ -29,7 +29,7 @@ GradientCheck check(const Scene& scene, LossKind kind, std::int64_t steps, int e
   const ControlProgram program(model, model.timestep(), 3);
   const auto loss = make_loss(kind, model, steps < 5 ? 1 : 5);
   CheckOptions options;
-  options.steps = steps;
+  options.length = steps;
   options.entries = entries;
   options.settled = 1e-6;
   options.stepper.tolerance = 1e-12;
@@ -153,8 +153,8 @@ LossGradient gradient(const Model& model, std::int64_t steps, double tolerance,
   const ControlProgram program(model, model.timestep(), 3);
   const auto loss = make_loss(LossKind::shear, model, 5);
   const RolloutLoss* const losses[] = {loss.get()};
-  GradientOptions options;
-  options.steps = steps;
+  TapeOptions options;
+  options.length = steps;
   options.stepper.tolerance = tolerance;
   options.precision = precision;
   options.parameters = true;

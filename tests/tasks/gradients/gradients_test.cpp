@@ -32,8 +32,8 @@ GradientSummary gradients(const Model& model, int environments, std::int64_t ste
   const auto shear = make_loss(LossKind::shear, model, 5),
              final_state = make_loss(LossKind::final_state, model, 5);
   const RolloutLoss* const both[] = {shear.get(), final_state.get()};
-  GradientOptions options;
-  options.steps = steps;
+  TapeOptions options;
+  options.length = steps;
   options.threads = threads;
   options.parameters = options.points = true;
   options.tape_bytes = tape_bytes;
@@ -89,8 +89,8 @@ TEST(Gradients, TapesThatAreTooSmallAreRefused) {
 /// By points: a result of each environment, and the sums of sixteen on every thread.
 TEST(Gradients, MemoryOfPointsIsCounted) {
   const Model model(shipped("rolling_ball_small"));
-  GradientOptions options;
-  options.steps = 10;
+  TapeOptions options;
+  options.length = 10;
   options.threads = 3;
   const double without = gradient_bytes(model, 40, options, 2);
   options.points = true;
@@ -104,8 +104,8 @@ TEST(Gradients, RolloutsCanBeUsedAgain) {
   const ControlProgram program(model, model.timestep(), 5);
   const auto loss = make_loss(LossKind::shear, model, 5);
   const RolloutLoss* const losses[] = {loss.get()};
-  GradientOptions options;
-  options.steps = 80;
+  TapeOptions options;
+  options.length = 80;
   GradientRollouts rollouts(model, options, losses);
   const GradientSummary large = rollouts.run(Batch(model, 18, 5), controls_of(program));
   const GradientSummary small = rollouts.run(Batch(model, 2, 5), controls_of(program));
@@ -122,8 +122,8 @@ TEST(Gradients, AFailureDisturbsNobody) {
   const ControlProgram program(model, model.timestep(), 5);
   const auto loss = make_loss(LossKind::final_state, model, 5);
   const RolloutLoss* const losses[] = {loss.get()};
-  GradientOptions options;
-  options.steps = 30;
+  TapeOptions options;
+  options.length = 30;
   const auto broken = [&](std::int64_t step, int e, std::span<double> u) {
     program.evaluate(step, e, u);
     if (e == 1 && step == 12) u[0] = NAN;
@@ -185,7 +185,7 @@ TEST_P(ShippedScene, GradientsAgreeByThreeRoutes) {
   const ControlProgram program(model, model.timestep(), 3);
   const auto loss = make_loss(kind, model, 5);
   CheckOptions options;
-  options.steps = steps;
+  options.length = steps;
   options.entries = 8;
   options.stepper.tolerance = 1e-12;
   const GradientCheck check = check_gradient(start, controls_of(program), *loss, options);

@@ -192,8 +192,8 @@ TEST(Identification, MisfitIsHalfTheSquaresOfAllPoints) {
   const Model model(other);
   const FieldMisfit misfit(model, recorded);
   const RolloutLoss* const losses[] = {&misfit};
-  GradientOptions options;
-  options.steps = r.run.steps;
+  TapeOptions options;
+  options.length = r.run.steps;
   const GradientSummary summary =
       rollout_gradients(Batch(model, 1), r.run.controls, options, losses);
   EXPECT_NEAR(summary.losses[0].value[0], expected, 1e-12 * expected);

@@ -142,16 +142,16 @@ void check_by_differences(Watching how) {
   const Watched task(small_ball(), how);
   constexpr std::int64_t kActions = 5;
   constexpr int kEnvironments = 5;
-  TaskTapeOptions options = tape_options(kActions);
+  TapeOptions options = tape_options(kActions);
   options.stepper.tolerance = 1e-12;
   options.precision = Precision::f64;
-  TaskTape tape(task, kEnvironments, options);
+  TaskTape tape(task, kEnvironments, options, kTapeSeed);
   const std::size_t nq = std::size_t(task.model().nq()), nv = std::size_t(task.model().nv()),
                     width = 3;
   const Row first_q(tape.q().begin(), tape.q().end()), first_v(tape.v().begin(), tape.v().end());
   Row given;
   {
-    TaskTape probe(task, kEnvironments, options);
+    TaskTape probe(task, kEnvironments, options, kTapeSeed);
     for (std::int64_t t = 0; t < kActions; ++t) {
       const Row a = scripted_actions(probe);
       given.insert(given.end(), a.begin(), a.end());
@@ -226,9 +226,7 @@ TEST(TapeEpisodes, AreThoseOfAVectorTask) {
     scene.solver.tolerance = kGradientTolerance;  // a VectorTask's follows the step otherwise
     const auto task = make_task(name, scene);
     const std::int64_t actions = std::min(task->spec().horizon, 20);
-    TaskTapeOptions options = tape_options(actions, 2);
-    options.first_episode = 5;
-    TaskTape tape(*task, 18, options);
+    TaskTape tape(*task, 18, tape_options(actions, 2), kTapeSeed, 5);
     VectorOptions as_vector;
     as_vector.seed = kTapeSeed;
     as_vector.first_episode = 5;
@@ -266,10 +264,10 @@ TEST(TapeEpisodes, ThreadsNeighboursAndTapesChangeNothing) {
   for (const char* name : {"box_pushing", "insertion"}) {
     const auto task = task_named(name);
     const std::int64_t actions = name == std::string("insertion") ? 4 : 15;
-    TaskTape many(*task, 37, tape_options(actions, 3)), few(*task, 3, tape_options(actions)),
-        again(
-            *task, 37,
-            tape_options(actions, 2, testing::least_tape_bytes(*task, 37, tape_options(actions))));
+    const double least = testing::least_tape_bytes(*task, 37, tape_options(actions));
+    TaskTape many(*task, 37, tape_options(actions, 3), kTapeSeed),
+        few(*task, 3, tape_options(actions), kTapeSeed),
+        again(*task, 37, tape_options(actions, 2, least), kTapeSeed);
     const Swept of_many = sweep_of(many, actions, keyed_incoming),
                 of_few = sweep_of(few, actions, keyed_incoming);
     for (std::size_t e = 0; e < 3; ++e)
@@ -280,9 +278,7 @@ TEST(TapeEpisodes, ThreadsNeighboursAndTapesChangeNothing) {
     many.reset(kTapeSeed, 0);
     EXPECT_EQ(sweep_of(many, actions, keyed_incoming), of_many) << name;
     // Another first episode shifts the environments.
-    TaskTapeOptions shifted = tape_options(actions);
-    shifted.first_episode = 20;
-    TaskTape late(*task, 2, shifted);
+    TaskTape late(*task, 2, tape_options(actions), kTapeSeed, 20);
     const Swept of_late = sweep_of(late, actions, [](int e, std::int64_t t, std::size_t k) {
       return keyed_incoming(e + 20, t, k);
     });
@@ -294,8 +290,8 @@ TEST(TapeEpisodes, ThreadsNeighboursAndTapesChangeNothing) {
 TEST(TapeEpisodes, NeighboursThatFailOrReceiveNoNumbersChangeNothing) {
   const Watched sound(small_ball(), Watching::at_once, -1), breaks(small_ball(), Watching::at_once);
   for (const double tape_bytes : {1e9, testing::least_tape_bytes(sound, 18, tape_options(6))}) {
-    TaskTape whole(sound, 18, tape_options(6, 1, tape_bytes)),
-        broken(breaks, 18, tape_options(6, 1, tape_bytes));
+    TaskTape whole(sound, 18, tape_options(6, 1, tape_bytes), kTapeSeed),
+        broken(breaks, 18, tape_options(6, 1, tape_bytes), kTapeSeed);
     const Swept of_whole = sweep_of(whole, 6, keyed_incoming);
     const Swept of_broken = sweep_of(broken, 6, [](int e, std::int64_t t, std::size_t k) {
       return e == 5 && t == 4 ? NAN : keyed_incoming(e, t, k);
@@ -314,7 +310,7 @@ TEST(TapeEpisodes, EndedEpisodesKeepWhatTheyShow) {
   const auto task = task_named("insertion");
   constexpr std::int64_t kActions = 8;
   constexpr std::size_t kEpisodes = 18;
-  TaskTape tape(*task, int(kEpisodes), tape_options(kActions));
+  TaskTape tape(*task, int(kEpisodes), tape_options(kActions), kTapeSeed);
   std::vector<std::int64_t> last(kEpisodes, 0);
   for (std::int64_t t = 0; t < kActions; ++t) {
     std::vector<double> actions = Row(kEpisodes * 3);
@@ -343,7 +339,7 @@ TEST(TapeEpisodes, EndedEpisodesKeepWhatTheyShow) {
           for (std::size_t k = 0; k < 520; ++k) by_o[e * 520 + k] = keyed(std::int64_t(e), 0, k);
           for (std::size_t k = 0; k < 12; ++k) by_q[e * 12 + k] = keyed(std::int64_t(e), 1, k);
         }
-      tape.reverse(by_o, {}, by_action, {by_q, {}});
+      tape.reverse({.observation = by_o, .q = by_q}, by_action);
       all.insert(all.end(), by_action.begin(), by_action.end());
     }
     return all;
@@ -359,11 +355,11 @@ TEST(TapeEpisodes, EndedEpisodesKeepWhatTheyShow) {
 
 TEST(TapeEpisodes, AnActionBeyondItsBoundsHasNoDerivativeOnTape) {
   const auto task = task_named("dummy");
-  TaskTape tape(*task, 3, tape_options(0));
+  TaskTape tape(*task, 3, tape_options(0), kTapeSeed);
   const Row actions{0.5, 0.6, -0.7}, ones(3, 1);
   tape.step(actions);
   Row by_action(3);
-  tape.reverse({}, ones, by_action);
+  tape.reverse({.reward = ones}, by_action);
   EXPECT_NE(by_action[0], 0) << "on the bound it is that of its inside";
   EXPECT_EQ(by_action[1], 0);
   EXPECT_EQ(by_action[2], 0);
@@ -397,11 +393,11 @@ TEST(TapeEpisodes, MisuseIsRefused) {
   EXPECT_THROW(TaskTape(*task, 1, tape_options(-1)), InputError);
   EXPECT_THROW(TaskTape(*task, 1, tape_options(3, 0)), InputError);
   EXPECT_THROW(TaskTape(*task, 1, tape_options(3, 1, NAN)), InputError);
-  TaskTape tape(*task, 2, tape_options(2));
+  TaskTape tape(*task, 2, tape_options(2), kTapeSeed);
   Row actions(2), by_action(2), two(2), wrong(3);
   const Row q(tape.q().begin(), tape.q().begin() + task->model().nq()),
       v(std::size_t(task->model().nv()));
-  expect_refusal([&] { tape.reverse({}, {}, by_action); }, "one more reverse");
+  expect_refusal([&] { tape.reverse({}, by_action); }, "one more reverse");
   expect_refusal([&] { tape.step(wrong); }, "3 numbers of actions; expected 2");
   actions[1] = INFINITY;
   expect_refusal([&] { tape.step(actions); }, "number 0 of action 0 of environment 1 is inf");
@@ -413,35 +409,35 @@ TEST(TapeEpisodes, MisuseIsRefused) {
   expect_refusal([&] { tape.reverse_start({}, {}, {}); }, "1 of 1 actions left");
   tape.step(actions);  // refused calls have left no trace
   expect_refusal([&] { tape.step(actions); }, "action 2 on a tape of 2 actions");
-  expect_refusal([&] { tape.reverse(wrong, {}, by_action); }, "3 numbers of derivatives by obs");
-  expect_refusal([&] { tape.reverse({}, wrong, by_action); }, "derivatives by rewards");
-  expect_refusal([&] { tape.reverse({}, {}, wrong); }, "derivatives by actions");
-  expect_refusal([&] { tape.reverse({}, {}, by_action, {wrong, {}}); }, "derivatives by q");
-  expect_refusal([&] { tape.reverse({}, {}, by_action, {{}, wrong}); }, "derivatives by v");
-  tape.reverse({}, two, by_action);
+  expect_refusal([&] { tape.reverse({wrong}, by_action); }, "3 numbers of derivatives by obs");
+  expect_refusal([&] { tape.reverse({{}, wrong}, by_action); }, "derivatives by rewards");
+  expect_refusal([&] { tape.reverse({}, wrong); }, "derivatives by actions");
+  expect_refusal([&] { tape.reverse({.q = wrong}, by_action); }, "derivatives by q");
+  expect_refusal([&] { tape.reverse({.v = wrong}, by_action); }, "derivatives by v");
+  tape.reverse({.reward = two}, by_action);
   expect_refusal([&] { tape.step(actions); }, "has been reversed");
-  tape.reverse({}, two, by_action);
-  expect_refusal([&] { tape.reverse({}, two, by_action); }, "one more reverse");
+  tape.reverse({.reward = two}, by_action);
+  expect_refusal([&] { tape.reverse({.reward = two}, by_action); }, "one more reverse");
   expect_refusal([&] { tape.reverse_start({}, wrong, {}); }, "derivatives by the first q");
-  expect_refusal([&] { tape.reverse_start({}, {}, {}, {}, wrong); }, "the scene's numbers");
+  expect_refusal([&] { tape.reverse_start({}, {}, {}, wrong); }, "the scene's numbers");
   tape.reverse_start({}, {}, {});
   expect_refusal([&] { tape.reverse_start({}, {}, {}); }, "a second end");
   tape.begin_reverse();
-  tape.reverse({}, two, by_action);
+  tape.reverse({.reward = two}, by_action);
   tape.reset(1, 0);
   tape.step(actions);
 }
 
 TEST(TapeEpisodes, ATaskWithoutADerivativeOfItsObservationsIsNamed) {
   const Watched task(small_ball(), Watching::without_derivative);
-  TaskTape tape(task, 20, tape_options(2, 2));
+  TaskTape tape(task, 20, tape_options(2, 2), kTapeSeed);
   Row ones(20, 1), by_o(80, 1), by_action(60);
   tape.step(scripted_actions(tape));
-  tape.reverse({}, ones, by_action);  // rewards need none
+  tape.reverse({.reward = ones}, by_action);  // rewards need none
   tape.begin_reverse();
-  expect_refusal([&] { tape.reverse(by_o, {}, by_action); },
+  expect_refusal([&] { tape.reverse({by_o}, by_action); },
                  "task watched has no derivative of its observations; expected Task::observe_vjp");
-  expect_refusal([&] { tape.reverse({}, ones, by_action); }, "has failed halfway");
+  expect_refusal([&] { tape.reverse({.reward = ones}, by_action); }, "has failed halfway");
   expect_refusal([&] { tape.begin_reverse(); }, "has failed halfway");
   expect_refusal([&] { tape.step(Row(60)); }, "has failed halfway");
   tape.reset(kTapeSeed, 0);

@@ -23,19 +23,18 @@ inline double keyed(std::int64_t episode, std::int64_t action, std::size_t index
   return uniform({17, episode, action, Purpose::control, std::uint32_t(index)}, -1, 1);
 }
 
-inline TaskTapeOptions tape_options(std::int64_t actions, int threads = 1,
-                                    double tape_bytes = 1e9) {
-  TaskTapeOptions o;
-  o.seed = kTapeSeed;
-  o.actions = actions;
+inline TapeOptions tape_options(std::int64_t actions, int threads = 1, double tape_bytes = 1e9) {
+  TapeOptions o;
+  o.length = actions;
   o.threads = threads;
+  o.precision = Precision::mixed;
   o.tape_bytes = tape_bytes;
   return o;
 }
 
 /// The least tape_bytes with which such a tape can be made, by its own message: those of
 /// checkpoints.
-inline double least_tape_bytes(const Task& task, int environments, TaskTapeOptions options) {
+inline double least_tape_bytes(const Task& task, int environments, TapeOptions options) {
   options.tape_bytes = 1;
   try {
     const TaskTape none(task, environments, options);
@@ -102,14 +101,14 @@ inline Swept sweep_of(TaskTape& tape, std::int64_t actions, const Incoming& inco
   out.by_action.resize(std::size_t(actions) * e * width);
   for (std::int64_t t = actions; t-- > 0;) {
     arrive(t + 1);
-    tape.reverse(by_o, by_r,
+    tape.reverse({by_o, by_r},
                  std::span(out.by_action).subspan(std::size_t(t) * e * width, e * width));
   }
   arrive(0);
   out.by_q.resize(e * nv);
   out.by_v.resize(e * nv);
   out.by_parameter.resize(e * numbers);
-  tape.reverse_start(by_o, out.by_q, out.by_v, {}, out.by_parameter);
+  tape.reverse_start({by_o}, out.by_q, out.by_v, out.by_parameter);
   return out;
 }
 

@@ -40,7 +40,7 @@ void PrintTo(const Checked& c, std::ostream* out) {
 
 class TaskReturn : public ::testing::TestWithParam<Checked> {};
 
-void expect_agreement(const TaskGradientCheck& check, double tolerance) {
+void expect_agreement(const GradientCheck& check, double tolerance) {
   for (const CheckedInput& c : check.inputs) {
     EXPECT_LE(c.tangent_error, 1e-10) << c.name;
     EXPECT_LE(c.difference_error, tolerance) << c.name << " at " << c.worst;
@@ -54,14 +54,14 @@ TEST_P(TaskReturn, GradientsAgreeByThreeRoutes) {
   const auto [name, kind, actions, episode, entries] = GetParam();
   const auto task = task_named(name);
   const Policy policy(*task, kind);
-  TaskCheckOptions options;
-  options.actions = actions;
+  CheckOptions options;
+  options.length = actions;
   options.episode = episode;
   options.entries = entries;
   options.seed = 4;
   options.stepper.tolerance = 1e-12;
   const std::string own = name;
-  const TaskGradientCheck check = check_task_gradient(
+  const GradientCheck check = check_task_gradient(
       *task, [&](const Scene& scene) { return make_task(own, scene); }, actions_of(policy),
       options);
   expect_agreement(check, 5e-6);
@@ -192,11 +192,10 @@ Scene scene_of(const std::string& name) {
 TEST(TaskGradients, WhateverATaskLooksAtHasItsShare) {
   const auto task = everything(scene_of("rolling_ball_small"));
   const Policy policy(*task, PolicyKind::scripted);
-  TaskCheckOptions options;
+  CheckOptions options;
   options.entries = 8;
   options.stepper.tolerance = 1e-12;
-  const TaskGradientCheck check =
-      check_task_gradient(*task, everything, actions_of(policy), options);
+  const GradientCheck check = check_task_gradient(*task, everything, actions_of(policy), options);
   expect_agreement(check, 1e-6);
   for (const CheckedInput& c : check.inputs) EXPECT_GT(c.norm, 0) << c.name;
 }
@@ -204,24 +203,23 @@ TEST(TaskGradients, WhateverATaskLooksAtHasItsShare) {
 TaskGradients gradients(const Task& task, std::int64_t episodes, int threads, double tape_bytes,
                         std::int64_t actions = 0) {
   const Policy policy(task, PolicyKind::scripted);
-  TaskGradientOptions options;
-  options.episodes = episodes;
-  options.seed = 2;
-  options.actions = actions;
+  TapeOptions options;
+  options.length = actions;
+  options.precision = Precision::mixed;
   options.threads = threads;
   options.parameters = true;
   options.tape_bytes = tape_bytes;
-  return task_gradients(task, actions_of(policy), options);
+  return task_gradients(task, actions_of(policy), 2, {0, episodes}, options);
 }
 
 void expect_same(const TaskGradients& a, const TaskGradients& b) {
   EXPECT_EQ(a.value, b.value);
   EXPECT_EQ(a.length, b.length);
   EXPECT_EQ(a.action, b.action);
-  EXPECT_EQ(a.by_action, b.by_action);
-  EXPECT_EQ(a.by_q, b.by_q);
-  EXPECT_EQ(a.by_v, b.by_v);
-  EXPECT_EQ(a.by_parameter, b.by_parameter);
+  EXPECT_EQ(a.u, b.u);
+  EXPECT_EQ(a.q, b.q);
+  EXPECT_EQ(a.v, b.v);
+  EXPECT_EQ(a.parameters, b.parameters);
 }
 
 TEST(TaskGradients, ThreadsAndNeighboursChangeNothing) {
@@ -230,8 +228,7 @@ TEST(TaskGradients, ThreadsAndNeighboursChangeNothing) {
                       three = gradients(*task, 40, 3, 1e9, 30);
   expect_same(one, three);
   const TaskGradients few = gradients(*task, 3, 1, 1e9, 30);
-  for (std::size_t i = 0; i < few.by_action.size(); ++i)
-    EXPECT_EQ(few.by_action[i], one.by_action[i]);
+  for (std::size_t i = 0; i < few.u.size(); ++i) EXPECT_EQ(few.u[i], one.u[i]);
   EXPECT_EQ(one.recomputed_steps, 0);
 }
 
@@ -279,18 +276,17 @@ TEST(TaskGradients, TheEpisodesAreThoseOfAVectorTask) {
 
 TEST(TaskGradients, AnActionBeyondItsBoundsHasNoDerivative) {
   const auto task = task_named("dummy");
-  TaskGradientOptions options;
-  options.episodes = 1;
-  options.actions = 3;
+  TapeOptions options;
+  options.length = 3;
   const auto g = task_gradients(
       *task,
       [](const TaskView& view, std::span<const double>, std::span<double> a) {
         a[0] = view.actions == 1 ? 0.6 : 0.5;
       },
-      options);
-  EXPECT_NE(g.by_action[0], 0) << "on the bound it is that of its inside";
-  EXPECT_EQ(g.by_action[1], 0);
-  EXPECT_NE(g.by_action[2], 0);
+      0, {0, 1}, options);
+  EXPECT_NE(g.u[0], 0) << "on the bound it is that of its inside";
+  EXPECT_EQ(g.u[1], 0);
+  EXPECT_NE(g.u[2], 0);
   EXPECT_EQ(g.action[1], 0.6) << "as it was chosen";
 }
 
@@ -300,12 +296,10 @@ TEST(TaskGradients, RefusesWhatItCannotDo) {
   EXPECT_THROW(gradients(*task, 1, 0, 1e9), InputError);
   EXPECT_THROW(gradients(*task, 1, 1, 1e9, 41), InputError);
   EXPECT_THROW(gradients(*task, 1, 1, 1e3), InputError);
-  TaskGradientOptions options;
-  options.episodes = 1;
   EXPECT_THROW(
       task_gradients(
           *task, [](const TaskView&, std::span<const double>, std::span<double> a) { a[0] = NAN; },
-          options),
+          0, {0, 1}, {}),
       InputError);
 }
 

@@ -13,7 +13,7 @@
 #include "engine/derivative/number_gradients.hpp"
 #include "engine/model/random.hpp"
 #include "engine/step/displacement.hpp"
-#include "tasks/gradients/task_gradients.hpp"
+#include "tasks/gradients/gradients.hpp"
 #include "tasks/gradients/task_tangent.hpp"
 #include "tests/tasks/gradients/observed_change.hpp"
 #include "tests/tasks/gradients/tape_sweep.hpp"
@@ -45,21 +45,16 @@ TEST_P(EveryTape, WithRewardsAloneItIsTheGradientOfTheReturn) {
   const auto [name, actions] = GetParam();
   const auto task = task_named(name);
   constexpr int kEpisodes = 18;
-  TaskTapeOptions options = tape_options(actions, 2);
+  TapeOptions options = tape_options(actions, 2);
   options.parameters = true;
   const std::size_t numbers = std::size_t(NumberGradients(task->model()).count()),
                     seen = task->spec().observation_size();
   const testing::Incoming one = [&](int, std::int64_t, std::size_t k) {
     return k == seen ? 1.0 : 0.0;
   };
-  TaskTape tape(*task, kEpisodes, options);
+  TaskTape tape(*task, kEpisodes, options, kTapeSeed);
   const Swept swept = sweep_of(tape, actions, one, numbers);
 
-  TaskGradientOptions wanted;
-  wanted.episodes = kEpisodes;
-  wanted.seed = kTapeSeed;
-  wanted.actions = actions;
-  wanted.parameters = true;
   const TaskGradients g = task_gradients(
       *task,
       [&](const TaskView& view, std::span<const double> o, std::span<double> a) {
@@ -67,7 +62,7 @@ TEST_P(EveryTape, WithRewardsAloneItIsTheGradientOfTheReturn) {
         for (std::size_t k = 0; k < a.size(); ++k)
           a[k] = std::clamp(0.8 * a[k], -0.4, 0.4) + 0.05 * keyed(view.episode, view.actions, k);
       },
-      wanted);
+      kTapeSeed, {0, kEpisodes}, options);
   Numbers by_action, value(kEpisodes);
   for (std::size_t e = 0; e < kEpisodes; ++e) {
     const Numbers own = rows_of(swept.by_action, kEpisodes, e, std::size_t(actions));
@@ -75,16 +70,16 @@ TEST_P(EveryTape, WithRewardsAloneItIsTheGradientOfTheReturn) {
     for (const double r : rows_of(swept.rewards, kEpisodes, e, std::size_t(actions))) value[e] += r;
   }
   EXPECT_EQ(value, g.value);
-  EXPECT_EQ(by_action, g.by_action);
-  EXPECT_EQ(swept.by_q, g.by_q);
-  EXPECT_EQ(swept.by_v, g.by_v);
-  EXPECT_EQ(swept.by_parameter, g.by_parameter);
+  EXPECT_EQ(by_action, g.u);
+  EXPECT_EQ(swept.by_q, g.q);
+  EXPECT_EQ(swept.by_v, g.v);
+  EXPECT_EQ(swept.by_parameter, g.parameters);
   EXPECT_GT(std::inner_product(by_action.begin(), by_action.end(), by_action.begin(), 0.0), 0);
   EXPECT_EQ(tape.recomputed_steps(), 0);
   EXPECT_GT(g.newton_iterations, 0);
 
   options.tape_bytes = testing::least_tape_bytes(*task, kEpisodes, options);
-  TaskTape small(*task, kEpisodes, options);
+  TaskTape small(*task, kEpisodes, options, kTapeSeed);
   EXPECT_EQ(sweep_of(small, actions, one, numbers), swept);
   if (actions > 3) {
     EXPECT_GT(small.recomputed_steps(), 0);
@@ -102,7 +97,7 @@ TEST_P(EveryTape, GoingBackIsTheTransposeOfGoingForward) {
   const NumberGradients parameters(task->model());
   const std::size_t numbers = std::size_t(parameters.count());
   const StepperOptions stepper{{}, {}, 1e-12};
-  TaskTapeOptions options = tape_options(actions);
+  TapeOptions options = tape_options(actions);
   options.stepper = stepper;
   options.parameters = true;
   options.precision = Precision::f64;
@@ -138,13 +133,14 @@ TEST_P(EveryTape, GoingBackIsTheTransposeOfGoingForward) {
   const auto by_v = [&](std::size_t t) { return weights(nv, 3000 + std::int64_t(t), 1); };
   for (std::size_t t = n; t-- > 0;) {
     const Numbers to_q = by_q(t + 1), to_v = by_v(t + 1);
-    tape.reverse(by_o(t + 1), by_r(t + 1), std::span(by_action).subspan(t * width, width),
-                 {to_q, to_v});
+    const Numbers to_o = by_o(t + 1), to_r = by_r(t + 1);
+    tape.reverse({to_o, to_r, to_q, to_v}, std::span(by_action).subspan(t * width, width));
   }
   const bool opens = task->spec().warm_up;
   Numbers first_q(nv), first_v(nv), by_number(numbers);
   const Numbers to_q = by_q(0), to_v = by_v(0);
-  tape.reverse_start(opens ? Numbers{} : by_o(0), first_q, first_v, {to_q, to_v}, by_number);
+  const Numbers to_o = opens ? Numbers{} : by_o(0);
+  tape.reverse_start({to_o, {}, to_q, to_v}, first_q, first_v, by_number);
 
   TaskRollout rollout(*task, stepper, Precision::f64);
   rollout.start(kTapeSeed, {&episode, 1});

@@ -48,7 +48,7 @@ TEST_P(VaryingNumbers, AgreeByThreeRoutes) {
   const ControlProgram program(model, model.timestep(), 3);
   const auto loss = make_loss(c.loss, model, 5);
   CheckOptions options;
-  options.steps = c.steps;
+  options.length = c.steps;
   options.entries = 8;
   options.stepper.tolerance = 1e-12;
   const GradientCheck check = check_gradient(start, controls_of(program), *loss, options);
@@ -100,14 +100,14 @@ TEST(VaryingGradients, OfABatchAreThoseOfScenesOfTheirOwn) {
     const Batch start(model, 9, 3);
     const ControlProgram program(model, model.timestep(), 3);
     const auto loss = make_loss(LossKind::tactile, model, 5);
-    GradientOptions options;
-    options.steps = 100;
+    TapeOptions options;
+    options.length = 100;
     options.parameters = options.points = true;
     const RolloutLoss* const losses[] = {loss.get()};
     const LossGradient all =
         rollout_gradients(start, controls_of(program), options, losses).losses[0];
     const std::size_t nv = std::size_t(model.nv()),
-                      nu = std::size_t(options.steps) * std::size_t(model.nu());
+                      nu = std::size_t(options.length) * std::size_t(model.nu());
     for (const std::size_t e : {0U, 3U, 8U}) {
       const Model alone(written(scene, start, static_cast<int>(e), std::size_t(count)));
       const Batch one(alone, 1, 3, static_cast<std::int64_t>(e));

@@ -45,11 +45,11 @@ TEST(EpisodeLimits, AsManyBlocksAreInFlightAsTheLimitSays) {
   for (const int limit : {1, 2, 4}) {
     EpisodeOptions o = options(2);
     o.blocks_in_flight = limit;
-    o.piece_bytes = kWhole;  // a block is one piece: every step is asked for once per block
-    std::atomic<std::int64_t> asked = 0;
-    SlowSink sink(asked, std::int64_t{limit} * kSteps);
-    const EpisodeSummary summary = run(small_ball(), o, sink, [&] { return ++asked, false; });
-    EXPECT_EQ(sink.seen, std::int64_t{limit} * kSteps);
+    o.piece_bytes = kWhole;  // a block is one piece: every row is counted once per block
+    std::atomic<std::int64_t> rows = 0;
+    SlowSink sink(rows, std::int64_t{limit} * kRows);
+    const EpisodeSummary summary = run(small_ball(), o, sink, [&](std::int64_t) { ++rows; });
+    EXPECT_EQ(sink.seen, std::int64_t{limit} * kRows);
     EXPECT_EQ(summary.peak_blocks_in_flight, limit);
     EXPECT_EQ(summary.episodes, kEpisodes);
   }
@@ -108,13 +108,17 @@ TEST(EpisodeLimits, EndWhenAskedTo) {
   for (const int threads : {1, 2, 4}) {
     EpisodeOptions o = options(threads);
     o.episodes = 100000;
-    std::atomic<std::int64_t> asked = 0;
+    std::stop_source source;
+    std::int64_t done = 0;
+    const auto stop_later = [&](std::int64_t steps) {
+      done = steps;
+      if (steps > std::int64_t{7} * 16 * kSteps) source.request_stop();
+    };
     Recorder recorder(kRows);
-    const EpisodeSummary summary =
-        run(small_ball(), o, recorder, [&] { return ++asked > std::int64_t{7} * kSteps; });
+    const EpisodeSummary summary = run(small_ball(), o, recorder, stop_later, source.get_token());
     EXPECT_TRUE(summary.stopped);
-    // Every thread may ask once more before it sees that another one was told to stop.
-    EXPECT_LE(asked, std::int64_t{7} * kSteps + threads);
+    // Every thread may end the row that it has begun.
+    EXPECT_LE(done, std::int64_t{16} * (7 * kSteps + (threads + 1) * kEvery));
     EXPECT_EQ(summary.episodes, 16 * std::ssize(recorder.finished));
     EXPECT_LE(summary.episodes, 16 * 7);
     for (const std::int64_t first : recorder.finished)  // what was finished is whole

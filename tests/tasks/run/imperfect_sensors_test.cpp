@@ -7,8 +7,8 @@
 #include <map>
 
 #include "tasks/gradients/gradient_check.hpp"
+#include "tasks/gradients/gradients.hpp"
 #include "tasks/gradients/losses.hpp"
-#include "tasks/gradients/task_gradients.hpp"
 #include "tasks/run/benchmark_run.hpp"
 #include "tasks/run/rollout.hpp"
 #include "tests/tasks/episode_by_hand.hpp"
@@ -170,7 +170,7 @@ TEST(ImperfectSensors, GradientsOfALossAgreeByThreeRoutes) {
   const ControlProgram program(model, model.timestep(), 3);
   const auto loss = make_loss(LossKind::tactile, model, 5);
   CheckOptions options;
-  options.steps = 100;
+  options.length = 100;
   options.entries = 3;
   options.settled = 1e-6;
   options.stepper.tolerance = 1e-12;
@@ -182,12 +182,12 @@ TEST(ImperfectSensors, GradientsOfALossAgreeByThreeRoutes) {
 TEST(ImperfectSensors, GradientsOfATaskAgreeByThreeRoutes) {
   const auto task = task_with_imperfections("ball_rolling_small", 0);
   const Policy policy(*task, PolicyKind::scripted);
-  TaskCheckOptions options;
-  options.actions = 12;
+  CheckOptions options;
+  options.length = 12;
   options.entries = 3;
   options.seed = 4;
   options.stepper.tolerance = 1e-12;
-  const TaskGradientCheck check = check_task_gradient(
+  const GradientCheck check = check_task_gradient(
       *task, [](const Scene& scene) { return make_task("ball_rolling_small", scene); },
       [&](const TaskView& view, std::span<const double> o, std::span<double> a) {
         policy.act(view, o, a);
@@ -200,8 +200,8 @@ TEST(ImperfectSensors, GradientsOfReadingsWithMemoryAreRefused) {
   const Model& model = imperfect_ball(true);
   const auto tactile = make_loss(LossKind::tactile, model, 5),
              end = make_loss(LossKind::final_state, model, 5);
-  GradientOptions options;
-  options.steps = 10;
+  TapeOptions options;
+  options.length = 10;
   const RolloutLoss* const fields[] = {tactile.get()};
   const RolloutLoss* const states[] = {end.get()};
   EXPECT_THROW(GradientRollouts(model, options, fields), InputError);

@@ -99,10 +99,10 @@ class Memory : public RowSink {
 class Rollout : public testing::Test {
  protected:
   RolloutSummary run(Batch& batch, const RolloutOptions& options, RowSink& sink,
-                     const RolloutProgress& progress = {}) {
+                     const ProgressCallback& progress = {}, const std::stop_token& stop = {}) {
     Stepper stepper(model_);
     const ControlProgram controls(model_, stepper.timestep(), 0, control_);
-    return run_rollout(batch, std::span(&stepper, 1), controls, options, sink, progress);
+    return run_rollout(batch, std::span(&stepper, 1), controls, options, sink, progress, stop);
   }
 
   Model model_ = pad_on_ball();
@@ -229,13 +229,15 @@ TEST_F(Rollout, AFailedEnvironmentIsARecordAndDisturbsNobody) {
   }
 }
 
-TEST_F(Rollout, StopsWhereProgressSays) {
+TEST_F(Rollout, StopsAfterTheStepInWhichItIsRequested) {
   Batch batch(model_, 1);
   std::vector<std::int64_t> seen;
-  const RolloutSummary summary = run(batch, {5, 1}, memory_, [&](std::int64_t done) {
+  std::stop_source source;
+  const auto progress = [&](std::int64_t done) {
     seen.push_back(done);
-    return done < 3;
-  });
+    if (done == 3) source.request_stop();
+  };
+  const RolloutSummary summary = run(batch, {5, 1}, memory_, progress, source.get_token());
   EXPECT_THAT(seen, ElementsAre(1, 2, 3));
   EXPECT_TRUE(summary.stopped);
   EXPECT_EQ(summary.steps, 3);

@@ -90,7 +90,7 @@ EpisodeOptions options_on(int threads) {
 }
 
 EpisodeSummary play(const Task& task, Keeper& keeper, int threads,
-                    const EpisodeProgress& progress = {}, const StopRequest& stop = {}) {
+                    const ProgressCallback& progress = {}, const std::stop_token& stop = {}) {
   return run_episodes(task, Policy(task, PolicyKind::random), options_on(threads), keeper, progress,
                       stop);
 }
@@ -212,10 +212,15 @@ TEST(TaskEpisodes, EndWhenAskedTo) {
   const auto task = task_named("dummy");
   for (const int threads : {1, 4}) {
     Keeper keeper;
-    std::atomic<int> asked = 0;
-    const EpisodeSummary summary = play(*task, keeper, threads, {}, [&] { return ++asked > 100; });
+    std::stop_source source;
+    std::int64_t done = 0;
+    const auto stop_later = [&](std::int64_t actions) {
+      done = actions;
+      if (actions > 400) source.request_stop();
+    };
+    const EpisodeSummary summary = play(*task, keeper, threads, stop_later, source.get_token());
     EXPECT_TRUE(summary.stopped);
-    EXPECT_LE(asked, 100 + 2 * threads + 1);
+    EXPECT_LE(done, 400 + 16 * (threads + 1));
     EXPECT_EQ(std::ssize(keeper.episodes), summary.episodes);
     EXPECT_LT(summary.episodes, 48);
   }

@@ -113,9 +113,12 @@ TEST(StressRun, ComparesPassesWithTheOrdinaryScene) {
 
 TEST(StressRun, StopsWhenItIsToldTo) {
   const StressCase of = a_case(largest_sink, 1);
-  int steps = 0;
-  const StressListener listener{[&] { return ++steps < 5; }, {}};
-  const StressReport report = run_stress({&of, 1}, {}, falling, listener);
+  std::stop_source source;
+  const auto stopping = [&](const std::string& file) {
+    source.request_stop();
+    return falling(file);
+  };
+  const StressReport report = run_stress({&of, 1}, {}, stopping, {source.get_token(), {}});
   EXPECT_TRUE(report.stopped);
   EXPECT_THAT(report.rows, IsEmpty());
 }

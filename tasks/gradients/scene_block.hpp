@@ -1,18 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
-// Takes one block of a batch through its rollout and back. The losses of a scene look at every
-// state on the way.
+// The tape of a scene's losses: each loss is evaluated at every state, and its derivatives by the
+// state, the readings and the controls enter there.
 #pragma once
 
+#include <memory>
 #include <vector>
 
 #include "engine/derivative/loss.hpp"
 #include "engine/sense/readout.hpp"
-#include "tasks/gradients/gradient_block.hpp"
+#include "tasks/gradients/tape_block.hpp"
 
 namespace tangere {
 
-/// What a loss reads at one environment's state, and room for its derivatives. Made once and used
-/// for state after state.
+/// The inputs of a loss at one environment's state, and room for its derivatives by them. Made once
+/// and used for state after state.
 class LossReading {
  public:
   explicit LossReading(const Model& model);
@@ -21,6 +22,11 @@ class LossReading {
   /// done.
   void set_field(std::size_t sensor, const CompactFrame<double>& frame) {
     fields_[sensor] = &frame;
+  }
+  /// Reads an environment's fields and sets them.
+  void read_fields(const Batch& batch, Readout& readout, int environment);
+  [[nodiscard]] const CompactFrame<double>& field(std::size_t sensor) const {
+    return *fields_[sensor];
   }
   /// Reads the rest and evaluates. `u`: controls of the step that follows; empty after the last.
   double evaluate(const RolloutLoss& loss, const Batch& batch, Readout& readout, int environment,
@@ -40,15 +46,16 @@ class LossReading {
 
  private:
   std::vector<double> q_, v_, end_effectors_, q_bar_, v_bar_, u_bar_, end_effectors_bar_;
-  std::vector<const CompactFrame<double>*> fields_;  // (sensors)
-  std::vector<std::vector<double>> field_bars_;      // (sensors)
+  std::vector<const CompactFrame<double>*> fields_;         // (sensors)
+  std::vector<std::unique_ptr<CompactFrame<double>>> own_;  // (sensors), if read_fields was called
+  std::vector<std::vector<double>> field_bars_;             // (sensors)
   std::vector<std::span<double>> field_spans_;
 };
 
-class LossBlock : public GradientBlock {
+class SceneBlock : public TapeBlock {
  public:
-  LossBlock(const Model& model, const GradientOptions& options,
-            std::span<const RolloutLoss* const> losses);
+  SceneBlock(const Model& model, const TapeOptions& options,
+             std::span<const RolloutLoss* const> losses);
 
   /// Writes results to `out` and failures of the block to `failures`. Blocks of one batch may run
   /// at the same time. `u`: room for the batch's controls.
@@ -64,18 +71,17 @@ class LossBlock : public GradientBlock {
     GradientSummary& out;
     StepTally tally;
   };
-  bool begin_stretch(std::int64_t) override { return true; }
-  void take_steps(std::int64_t stretch, BlockTape* tape) override;
-  void retake_steps(std::int64_t stretch, bool from_checkpoint, BlockTape& tape) override;
-  void reverse(std::int64_t stretch, const BlockTape& tape) override;
-  [[nodiscard]] std::int64_t end_of(std::int64_t stretch) const;
-  void ask(std::int64_t step);
-  void look(std::int64_t step);
-  void judge(std::int64_t step, std::size_t loss, int e);
-  void read(std::int64_t step);
+  void take_steps(std::int64_t segment, BlockTape* tape) override;
+  void retake_steps(std::int64_t segment, bool from_checkpoint, BlockTape& tape) override;
+  void reverse_steps(std::int64_t segment, const BlockTape& tape) override;
+  [[nodiscard]] std::int64_t end_of(std::int64_t segment) const;
+  std::span<const double> evaluate_controls(std::int64_t step, int environment);
+  void step(std::int64_t step, BlockTape* tape);
+  void add_losses(std::int64_t step);
+  void add_loss(std::int64_t step, std::size_t loss, int environment);
   void finish();
 
-  GradientOptions options_;
+  TapeOptions options_;
   std::vector<const RolloutLoss*> losses_;
   Stepper stepper_;
   Readout readout_;

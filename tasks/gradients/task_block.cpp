@@ -1,0 +1,439 @@
+// SPDX-License-Identifier: Apache-2.0
+// Each action has a tape of its own. It begins at x and finds the memory m. It leaves m⁺, with K
+// steps and moments in between:
+//   r = judge(moments, m⁺, a);  o = observe(moments, m⁺, a)
+//   x_(k+1) = step(x_k, controls(x_0, m⁺, a));  x_0 = place(x, m⁺, a);  m⁺ = begin_action(x, m, a)
+#include "tasks/gradients/task_block.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <numeric>
+
+#include "engine/base/as_size.hpp"
+#include "tasks/run/number_row.hpp"
+
+namespace tangere {
+
+using kernels::kBlock;
+
+namespace {
+
+double bytes_of_tape(const Task& task, const TapeOptions& o) {
+  return double(BlockTape::bytes(task.model(), integrator_in_force(task.model(), o.stepper),
+                                 task.spec().steps_per_action));
+}
+
+/// Tapes of `segment` actions, the checkpoints between them and all records [bytes].
+double bytes_with(const Task& task, const TapeOptions& o, std::int64_t segment) {
+  return double(o.length) * ActionRecord::bytes(task) + double(segment) * bytes_of_tape(task, o) +
+         checkpoint_bytes(task.model(), o.length, segment);
+}
+
+TapePlan plan_of(const Task& task, const TapeOptions& o, std::int64_t blocks) {
+  return {o.length, task.spec().steps_per_action,
+          units_on_tape(
+              task.model(), o.length, bytes_of_tape(task, o), o.tape_bytes,
+              [&](std::int64_t segment) { return double(blocks) * bytes_with(task, o, segment); },
+              "actions")};
+}
+
+std::vector<double> lane_rows(std::size_t width) { return std::vector<double>(kBlock * width); }
+
+/// A lane's part of rows by lane.
+template <class Rows>
+auto part(Rows& all, int lane) {
+  const std::size_t width = all.size() / kBlock;
+  return std::span(all).subspan(as_size(lane) * width, width);
+}
+
+void clear(std::initializer_list<std::vector<double>*> all) {
+  for (std::vector<double>* x : all) std::fill(x->begin(), x->end(), 0.0);
+}
+
+/// Adds to rows of lanes what there is of them.
+void add_rows(std::span<const double> from, std::vector<double>& to) {
+  for (std::size_t i = 0; i < from.size(); ++i) to[i] += from[i];
+}
+
+}  // namespace
+
+TapeOptions options_for(const Task& task, TapeOptions o, const char* what) {
+  if (o.length < 0 || o.length > task.spec().horizon)
+    throw InputError(
+        fmt::format("{} of {} actions of task {}; expected 1 to {}, its horizon, or 0 for all",
+                    what, o.length, task.spec().name, task.spec().horizon));
+  if (o.length == 0) o.length = task.spec().horizon;
+  if (!(o.tape_bytes > 0))
+    throw InputError(fmt::format("tapes of {} bytes; expected a positive number", o.tape_bytes));
+  o.points = false;
+  return o;
+}
+
+TaskBlock::TaskBlock(const Task& task, const TapeOptions& options, std::int64_t blocks)
+    : TapeBlock(task.model(), options, 1, plan_of(task, options, blocks)),
+      task_(task),
+      options_(options),
+      rollout_(task, options.stepper, options.precision),
+      records_(as_size(options.length), ActionRecord(task)),
+      to_moments_(task.spec().snapshots.size()),
+      start_q_(lane_rows(as_size(task.model().nv()))),
+      start_v_(start_q_),
+      by_u_(lane_rows(as_size(task.model().nu()))),
+      by_action_(lane_rows(task.spec().action.size())),
+      by_memory_(lane_rows(as_size(task.spec().task_state))),
+      shown_(lane_rows(task.spec().observation_size())),
+      shown_q_(start_q_),
+      shown_v_(start_q_),
+      by_reward_(kBlock) {
+  if (task_.spec().reads_tactile) check_has_no_lag(task_.model());
+  const auto end_effectors = lane_rows(task.end_effectors_size()),
+             tactile = lane_rows(task.tactile_size());
+  moments_.assign(to_moments_.size(), {start_q_, start_v_, end_effectors, tactile});
+  if (task_.spec().warm_up)
+    opening_.assign(moments_.size() - 1,
+                    {lane_rows(as_size(task.model().nq())), start_v_, end_effectors, tactile});
+}
+
+double TaskBlock::bytes(const Task& task, const TapeOptions& o, std::int64_t blocks) {
+  // Cotangents of moments, and what an opening has shown, take as much as moments.
+  const double moments = (task.spec().warm_up ? 3 : 2) * BlockWorker::bytes(task);
+  return std::min(double(blocks) * bytes_with(task, o, o.length), o.tape_bytes) +
+         double(blocks) * (moments + 2 * double(Stepper::workspace_bytes(task.model())));
+}
+
+void TaskBlock::start(std::uint64_t seed, EpisodeRange episodes) {
+  std::vector<std::int64_t> numbers(as_size(episodes.end - episodes.first));
+  std::iota(numbers.begin(), numbers.end(), episodes.first);
+  rollout_.start(seed, numbers);
+  start_forward();
+  took_.fill(false);
+  for (int l = 0; l < lanes(); ++l) {
+    start_memory_[as_size(l)] = rollout_.batch().shear_state(l);
+    const std::span<const Snapshot> seen = rollout_.start_view(l).snapshots;
+    for (std::size_t m = 0; m < opening_.size(); ++m) {
+      const auto keep = [l](std::span<const double> from, std::vector<double>& to) {
+        std::copy(from.begin(), from.end(), part(to, l).begin());
+      };
+      keep(seen[m].q, opening_[m].q);
+      keep(seen[m].v, opening_[m].v);
+      keep(seen[m].end_effectors, opening_[m].end_effectors);
+      keep(seen[m].tactile, opening_[m].tactile);
+    }
+  }
+}
+
+void TaskBlock::displace(int lane, std::span<const double> q, std::span<const double> v) {
+  rollout_.displace(lane, q, v);
+  rollout_.record_start();
+  rollout_.observe_start(lane);
+}
+
+void TaskBlock::step(std::span<const double> actions) {
+  took_.fill(false);
+  if (!rollout_.running()) return;
+  ActionRecord& r = records_[as_size(taken_)];
+  std::copy(actions.begin(), actions.end(), r.chosen.begin());
+  take(r);
+}
+
+void TaskBlock::take(ActionRecord& r) {
+  rollout_.begin(r);
+  took_ = r.taken;
+  take_tape(rollout_.batch(), 0);
+}
+
+void TaskBlock::take_steps(std::int64_t, BlockTape* tape) {
+  rollout_.take_steps(tape);
+  rollout_.conclude();
+}
+
+void TaskBlock::retake_steps(std::int64_t action, bool from_checkpoint, BlockTape& tape) {
+  if (!from_checkpoint) rollout_.recompute_restart(records_[as_size(action)], action);
+  rollout_.retake_steps(records_[as_size(action)], action, tape);
+}
+
+void TaskBlock::begin_reverse() {
+  start_back();
+  clear({&by_memory_, &shown_, &shown_q_, &shown_v_});
+}
+
+void TaskBlock::add_shown(const ActionCotangents& by) {
+  add_rows(by.observation, shown_);
+  add_rows(by.q, shown_q_);
+  add_rows(by.v, shown_v_);
+}
+
+void TaskBlock::reverse(std::int64_t action, const ActionCotangents& by,
+                        std::span<double> by_action) {
+  add_shown(by);
+  clear({&by_reward_});
+  add_rows(by.reward, by_reward_);
+  std::fill(by_action.begin(), by_action.end(), 0.0);
+  if (action >= taken_) return;  // no lane took it
+  reverse_tape(rollout_.batch(), 0);
+  const ActionRecord& r = records_[as_size(action)];
+  const TensorSpec& spec = task_.spec().action;
+  for (int l = 0; l < lanes(); ++l) {
+    if (!r.taken[as_size(l)]) continue;
+    for (std::size_t k = 0; k < spec.size(); ++k) {
+      const double asked = part(r.chosen, l)[k];
+      if (asked >= spec.low && asked <= spec.high)
+        by_action[as_size(l) * spec.size() + k] = part(by_action_, l)[k];
+    }
+    for (std::vector<double>* x : {&shown_, &shown_q_, &shown_v_})  // it has been passed on
+      std::ranges::fill(part(*x, l), 0.0);
+  }
+}
+
+/// Moves the adjoint's cotangents from the state after an action to the state in which the action
+/// was chosen.
+void TaskBlock::reverse_steps(std::int64_t action, const BlockTape& tape) {
+  const ActionRecord& r = records_[as_size(action)];
+  const std::vector<int>& looks = task_.spec().snapshots;
+  const int every = task_.spec().control_every;
+  clear({&start_q_, &start_v_, &by_u_, &by_action_});
+  rollout_.recompute_snapshots(tape);
+  reverse_outcome(r, action);
+  std::size_t next = looks.size();
+  for (int t = task_.spec().steps_per_action; t > 0; --t) {
+    if (next > 0 && looks[next - 1] == t) {
+      tape.show(t, rollout_.batch(), 0);
+      add_moment(--next);
+    }
+    if (t % every == 0 || t == task_.spec().steps_per_action)
+      rollout_.recompute_controls(r, action, (t - 1) / every * every, tape);
+    adjoint_.reverse_step(rollout_.batch(), 0, tape, t - 1, rollout_.u());
+    for (int l = 0; l < lanes(); ++l) {
+      const std::span<double> by_u = part(by_u_, l);
+      for (std::size_t k = 0; k < by_u.size(); ++k)
+        by_u[k] += adjoint_.loss(0).u[k * kBlock + as_size(l)];
+    }
+    if ((t - 1) % every == 0) reverse_controls(r, action, t - 1, tape);
+  }
+  reverse_start(r, action);
+}
+
+/// Adds what the reward, the observation and the state after an action pass on to the moments, the
+/// memory and the action.
+void TaskBlock::reverse_outcome(const ActionRecord& r, std::int64_t action) {
+  clear_moments();
+  for (int l = 0; l < lanes(); ++l) {
+    if (!r.taken[as_size(l)]) continue;
+    const TaskView view =
+        rollout_.view(r, action + 1, l, part(r.task_state, l), rollout_.snapshots(l));
+    const ViewCotangent to{cotangents(l), part(by_action_, l), part(by_memory_, l)};
+    const double weight = by_reward_[as_size(l)];
+    if (weight != 0) task_.reward_vjp(view, weight, to);
+    reverse_shown(view, l, to);
+  }
+}
+
+void TaskBlock::clear_moments() {
+  for (MomentRows& m : moments_) clear({&m.q, &m.v, &m.end_effectors, &m.tactile});
+}
+
+/// Adds what a lane's observation and the state that it shows pass on. An observation that has no
+/// weight needs no derivative.
+void TaskBlock::reverse_shown(const TaskView& view, int lane, const ViewCotangent& to) {
+  const std::span<const double> weight = part(shown_, lane);
+  if (std::any_of(weight.begin(), weight.end(), [](double w) { return w != 0; }))
+    task_.observe_vjp(view, weight, to);
+  const SnapshotCotangent& now = to.snapshots.back();
+  for (std::size_t i = 0; i < now.q.size(); ++i) {
+    now.q[i] += part(shown_q_, lane)[i];
+    now.v[i] += part(shown_v_, lane)[i];
+  }
+}
+
+/// Adds cotangents of a moment, whose states the batch shows, to those of the state.
+void TaskBlock::add_moment(std::size_t moment) {
+  const MomentRows& m = moments_[moment];
+  BlockCotangent& c = adjoint_.loss(0);
+  for (int l = 0; l < lanes(); ++l) {
+    const std::span<const double> q = part(m.q, l), v = part(m.v, l);
+    for (std::size_t i = 0; i < q.size(); ++i) {
+      c.q[i * kBlock + as_size(l)] += q[i];
+      c.v[i * kBlock + as_size(l)] += v[i];
+    }
+  }
+  if (m.end_effectors.empty() && m.tactile.empty()) return;
+  pullback_.place(rollout_.batch(), 0);
+  pullback_.clear();
+  for (int l = 0; l < lanes(); ++l) add_fields(moment, l);
+  pullback_.finish(c);
+}
+
+void TaskBlock::add_fields(std::size_t moment, int lane) {
+  const std::span<const double> end_effectors = part(moments_[moment].end_effectors, lane);
+  std::span<const double> fields = part(moments_[moment].tactile, lane);
+  for (std::size_t k = 0; 3 * k < end_effectors.size(); ++k)
+    pullback_.end_effector(lane, static_cast<int>(k), end_effectors.subspan(3 * k, 3));
+  const auto sensors = task_.model().sensors();
+  for (std::size_t s = 0; s < sensors.size() && !fields.empty(); ++s) {
+    const std::size_t numbers = 3 * as_size(sensors[s].points);
+    pullback_.dense_field(lane, static_cast<int>(s), fields.first(numbers),
+                          adjoint_.loss(0).parameters);
+    fields = fields.subspan(numbers);
+  }
+}
+
+/// Reverses the controls that hold from `step` on.
+void TaskBlock::reverse_controls(const ActionRecord& r, std::int64_t action, int step,
+                                 const BlockTape& tape) {
+  for (int l = 0; l < lanes(); ++l) {
+    if (!r.taken[as_size(l)]) continue;
+    const Snapshot first = rollout_.first_moment(tape, l);
+    const SnapshotCotangent to{part(start_q_, l), part(start_v_, l), {}, {}};
+    task_.controls_vjp(rollout_.view(r, action, l, part(r.task_state, l), {&first, 1}), step,
+                       part(by_u_, l), {{&to, 1}, part(by_action_, l), part(by_memory_, l)});
+  }
+  std::fill(by_u_.begin(), by_u_.end(), 0.0);
+}
+
+/// Goes back to where the action was chosen, through a restart and through the update of the
+/// memory.
+void TaskBlock::reverse_start(const ActionRecord& r, std::int64_t action) {
+  BlockCotangent& c = adjoint_.loss(0);
+  const std::size_t nv = as_size(task_.model().nv());
+  for (int l = 0; l < lanes(); ++l) {
+    if (!r.taken[as_size(l)]) continue;
+    const auto at = [l](AlignedVector<double>& rows, std::size_t i) -> double& {
+      return rows[i * kBlock + as_size(l)];
+    };
+    const std::span<double> q = part(start_q_, l), v = part(start_v_, l),
+                            memory = part(by_memory_, l);
+    const std::span<double> by_action = part(by_action_, l);
+    const Snapshot seen{part(r.q, l), part(r.v, l), {}, {}};
+    if (task_.spec().restarts) {
+      std::vector<double> placed_q(q.begin(), q.end()), placed_v(v.begin(), v.end());
+      for (std::size_t i = 0; i < nv; ++i) {
+        placed_q[i] += at(c.q, i);
+        placed_v[i] += at(c.v, i);
+        q[i] = v[i] = at(c.q, i) = at(c.v, i) = at(c.previous_q, i) = at(c.previous_v, i) = 0;
+      }
+      c.shear[as_size(l)].clear();  // friction remembers nothing of before
+      const SnapshotCotangent to{q, v, {}, {}};
+      task_.restart_state_vjp(rollout_.view(r, action, l, part(r.task_state, l), {&seen, 1}),
+                              placed_q, placed_v, {{&to, 1}, by_action, memory});
+    }
+    const SnapshotCotangent to{q, v, {}, {}};
+    task_.begin_action_vjp(rollout_.view(r, action, l, part(r.found, l), {&seen, 1}), memory,
+                           {{&to, 1}, by_action, {}});
+    for (std::size_t i = 0; i < nv; ++i) {
+      at(c.q, i) += q[i];
+      at(c.v, i) += v[i];
+    }
+  }
+}
+
+std::span<const SnapshotCotangent> TaskBlock::cotangents(int lane) {
+  for (std::size_t m = 0; m < moments_.size(); ++m) {
+    MomentRows& rows = moments_[m];
+    to_moments_[m] = {part(rows.q, lane), part(rows.v, lane), part(rows.end_effectors, lane),
+                      part(rows.tactile, lane)};
+  }
+  return to_moments_;
+}
+
+/// Makes the batch show the states in which the first actions began.
+void TaskBlock::show_start() {
+  const EnvironmentData& data = rollout_.data();
+  const std::size_t nq = as_size(model_.nq()), nv = as_size(model_.nv());
+  for (int l = 0; l < lanes(); ++l) {
+    const auto first = [&](const std::vector<double>& recorded, const std::vector<double>& now,
+                           std::size_t width) {
+      return taken_ > 0 ? std::span(part(recorded, l)) : number_row(now, l, width);
+    };
+    rollout_.batch().displace_state(l, first(records_[0].q, data.q, nq),
+                                    first(records_[0].v, data.v, nv));
+    rollout_.batch().set_shear_state(l, start_memory_[as_size(l)]);
+  }
+  rollout_.record_start();
+}
+
+void TaskBlock::reverse_reset(const ActionCotangents& by, std::span<double> by_q,
+                              std::span<double> by_v, std::span<double> by_parameter) {
+  add_shown(by);
+  show_start();
+  clear_moments();
+  const std::vector<double> no_action(task_.spec().action.size());
+  std::vector<double> by_no_action(no_action.size()), by_memory(as_size(task_.spec().task_state));
+  for (int l = 0; l < lanes(); ++l) {
+    TaskView view = rollout_.start_view(l);
+    std::vector<Snapshot> seen(view.snapshots.begin(), view.snapshots.end());
+    for (std::size_t m = 0; m < opening_.size(); ++m) {
+      const MomentRows& kept = opening_[m];
+      seen[m] = {part(kept.q, l), part(kept.v, l), part(kept.end_effectors, l),
+                 part(kept.tactile, l)};
+    }
+    view.actions = 0;
+    view.action = no_action;
+    if (taken_ > 0) view.task_state = part(records_[0].found, l);
+    view.snapshots = seen;
+    reverse_shown(view, l, {cotangents(l).last(seen.size()), by_no_action, by_memory});
+  }
+  add_moment(moments_.size() - 1);
+  for (int l = 0; l < lanes(); ++l) {
+    const auto own = [&](std::span<double> all) {
+      const std::size_t width = all.size() / as_size(lanes());
+      return all.subspan(as_size(l) * width, width);
+    };
+    get_start(0, rollout_.batch(), l, own(by_q), own(by_v), own(by_parameter), {});
+  }
+}
+
+void TaskBlock::play(std::uint64_t seed, EpisodeRange episodes, const TaskActions& actions,
+                     std::int64_t to, TaskGradients& out,
+                     std::vector<FailedEnvironment>& failures) {
+  start(seed, episodes);
+  const int count = lanes();
+  std::vector<bool> solved(as_size(count), true);
+  const auto note_failures = [&](std::int64_t action) {
+    for (int l = 0; l < count; ++l) {
+      const StepStatus status = rollout_.batch().status(l);
+      if (failed(status) && solved[as_size(l)])
+        failures.push_back({static_cast<int>(to) + l, action, status});
+      solved[as_size(l)] = !failed(status);
+    }
+  };
+  note_failures(-1);
+  while (taken_ < plan_.tapes && may_go_on() && rollout_.running()) {
+    ActionRecord& r = records_[as_size(taken_)];
+    rollout_.choose(actions, r);
+    take(r);
+    note_failures(taken_ - 1);
+  }
+  newton_iterations_ += rollout_.counts().steps.newton_iterations;
+  if (stopped()) return;
+  begin_reverse();
+  const std::size_t width = task_.spec().action.size(), row = as_size(options_.length) * width;
+  const std::vector<double> ones(as_size(count), 1.0);
+  std::vector<double> by_action(as_size(count) * width);
+  for (std::int64_t a = taken_ - 1; a >= 0 && may_go_on(); --a) {
+    reverse(a, {.reward = ones}, by_action);
+    for (int l = 0; l < count; ++l) {
+      if (!records_[as_size(a)].taken[as_size(l)]) continue;
+      const std::size_t at = as_size(to + l) * row + as_size(a) * width;
+      std::ranges::copy(part(records_[as_size(a)].chosen, l),
+                        out.action.begin() + std::ptrdiff_t(at));
+      std::ranges::copy(number_row(by_action, l, width), out.u.begin() + std::ptrdiff_t(at));
+    }
+  }
+  if (!stopped()) finish_return(to, out);
+}
+
+void TaskBlock::finish_return(std::int64_t to, TaskGradients& out) {
+  for (int l = 0; l < lanes(); ++l) {
+    const std::size_t e = as_size(to + l);
+    const auto own = [&](std::vector<double>& all) {
+      const std::size_t width = all.size() / out.value.size();
+      return std::span(all).subspan(e * width, width);
+    };
+    out.value[e] = rollout_.data().returns[as_size(l)];
+    out.length[e] = rollout_.data().length[as_size(l)];
+    get_start(0, rollout_.batch(), l, own(out.q), own(out.v), own(out.parameters), {});
+  }
+}
+
+}  // namespace tangere

@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: Apache-2.0
+// The tape of up to sixteen episodes of a task, one action after the other. Derivatives enter by
+// rewards, observations and states; they pass through steps, controls, restarts and the task's
+// memory, and leave by actions. A return is the case in which each reward has the derivative 1.
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "engine/rows/episode_sink.hpp"
+#include "tasks/gradients/tape_block.hpp"
+#include "tasks/gradients/task_rollout.hpp"
+
+namespace tangere {
+
+/// Options for a task: with the final number of actions, without points. `what` is for messages.
+/// Throws InputError for numbers out of range.
+TapeOptions options_for(const Task& task, TapeOptions options, const char* what);
+
+class TaskBlock : public TapeBlock {
+ public:
+  /// One of `blocks` that hold tapes at once, within options.tape_bytes together. options.length is
+  /// the final number of actions. Throws InputError when not even checkpoints fit.
+  TaskBlock(const Task& task, const TapeOptions& options, std::int64_t blocks);
+  /// Memory of all these blocks [bytes].
+  static double bytes(const Task& task, const TapeOptions& options, std::int64_t blocks);
+
+  /// Resets one episode per lane.
+  void start(std::uint64_t seed, EpisodeRange episodes);
+  /// Moves the state in which a lane's first action begins.
+  void displace(int lane, std::span<const double> q, std::span<const double> v);
+  /// Takes `actions`, (lanes, action), in the lanes whose episodes go on.
+  void step(std::span<const double> actions);
+  /// Whether a lane took the last action.
+  [[nodiscard]] bool took(int lane) const { return took_[static_cast<std::size_t>(lane)]; }
+
+  void begin_reverse();
+  /// Reverses action number `action` and fills derivatives by it, (lanes, action). All spans hold
+  /// the block's lanes, in their order.
+  void reverse(std::int64_t action, const ActionCotangents& by, std::span<double> by_action);
+  /// Ends the way back: takes derivatives by what the reset has shown, and fills those by the first
+  /// states and the scene's numbers. Skips empty spans.
+  void reverse_reset(const ActionCotangents& by, std::span<double> by_q, std::span<double> by_v,
+                     std::span<double> by_parameter);
+
+  /// Plays up to 16 episodes and reverses their returns. Writes results to places `to`, to + 1 … of
+  /// `out`, and failures with these places as their numbers.
+  void play(std::uint64_t seed, EpisodeRange episodes, const TaskActions& actions, std::int64_t to,
+            TaskGradients& out, std::vector<FailedEnvironment>& failures);
+
+  [[nodiscard]] const TaskRollout& rollout() const { return rollout_; }
+  [[nodiscard]] int lanes() const { return rollout_.lanes(); }
+
+ private:
+  /// Rows of lanes: what is seen of one moment, or derivatives by it.
+  struct MomentRows {
+    std::vector<double> q, v, end_effectors, tactile;  // (16, width)
+  };
+  void take_steps(std::int64_t action, BlockTape* tape) override;
+  void retake_steps(std::int64_t action, bool from_checkpoint, BlockTape& tape) override;
+  void reverse_steps(std::int64_t action, const BlockTape& tape) override;
+  void take(ActionRecord& record);
+  void add_shown(const ActionCotangents& by);
+  void clear_moments();
+  void reverse_outcome(const ActionRecord& r, std::int64_t action);
+  void reverse_shown(const TaskView& view, int lane, const ViewCotangent& to);
+  void add_moment(std::size_t moment);
+  void add_fields(std::size_t moment, int lane);
+  void reverse_controls(const ActionRecord& r, std::int64_t action, int step,
+                        const BlockTape& tape);
+  void reverse_start(const ActionRecord& r, std::int64_t action);
+  void show_start();
+  void finish_return(std::int64_t to, TaskGradients& out);
+  /// A lane's cotangents of all moments, until the next call.
+  [[nodiscard]] std::span<const SnapshotCotangent> cotangents(int lane);
+
+  const Task& task_;
+  TapeOptions options_;
+  TaskRollout rollout_;
+  std::vector<ActionRecord> records_;  // (actions)
+  std::array<bool, kernels::kBlock> took_{};
+  std::array<ShearState, kernels::kBlock> start_memory_;  // what friction remembered at the reset
+  std::vector<MomentRows> opening_;  // what the task saw of an opening before its last moment
+  // Cotangents of the action reversed last: of its moments, its first state, its controls, itself.
+  std::vector<MomentRows> moments_;
+  std::vector<SnapshotCotangent> to_moments_;
+  std::vector<double> start_q_, start_v_, by_u_, by_action_;  // (16, nv), …, (16, nu), (16, action)
+  std::vector<double> by_memory_;  // (16, memory) of the memory after begin_action
+  /// Sums of derivatives by what a lane has shown since its last action that is not reversed yet.
+  /// An episode that has ended goes on showing its last state.
+  std::vector<double> shown_, shown_q_, shown_v_;  // (16, observation), (16, nv), (16, nv)
+  std::vector<double> by_reward_;                  // (16)
+};
+
+}  // namespace tangere
