@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Points that do not touch are zeros, which a chunk of whole environments compresses away.
-#include "io/trajectory/shear_rows.hpp"
+#include "io/trajectory/memory_rows.hpp"
 
 #include <fmt/format.h>
 

@@ -15,7 +15,7 @@
 #include "engine/base/error.hpp"
 #include "engine/step/sleeping_trees.hpp"
 #include "io/hdf5/h5.hpp"
-#include "io/trajectory/shear_rows.hpp"
+#include "io/trajectory/memory_rows.hpp"
 #include "io/trajectory/sleep_rows.hpp"
 
 namespace tangere {

@@ -12,8 +12,8 @@
 #include "engine/derivative/tactile_point_numbers.hpp"
 #include "io/files/part_file.hpp"
 #include "io/hdf5/h5.hpp"
+#include "io/trajectory/memory_rows.hpp"
 #include "io/trajectory/sensor_description.hpp"
-#include "io/trajectory/shear_rows.hpp"
 #include "io/trajectory/sleep_rows.hpp"
 
 namespace tangere {
