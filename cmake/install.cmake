@@ -56,7 +56,9 @@ set(public_headers
   engine/scene/pose.hpp
   engine/model/random.hpp
   engine/scene/scene.hpp
+  engine/scene/scene_faults.hpp
   engine/scene/scene_number.hpp
+  engine/scene/schema.hpp
   engine/scene/scheme.hpp
   engine/scene/sensor_imperfections.hpp
   engine/scene/shapes.hpp

@@ -140,8 +140,8 @@ void for_each_member(Element element, const F& f) {
   }
 }
 
-/// Returns what is wrong with the values that T keeps of an element; "" if nothing is. A zero stands
-/// for a value that is not given where the element has no default.
+/// Returns what is wrong with the values that T keeps of an element; "" if nothing is. A zero
+/// stands for a value that is not given where the element has no default.
 template <class T>
 std::string value_fault(Element element, const T& of) {
   std::string fault;
