@@ -10,7 +10,7 @@
 #include <nlohmann/json.hpp>
 
 #include "apps/pitch_report.hpp"
-#include "io/picture/precision_plot.hpp"
+#include "io/picture/line_plot.hpp"
 #include "tasks/accuracy/measured_order.hpp"
 
 namespace tangere::apps {
@@ -133,15 +133,16 @@ std::string unkept_text(const AccuracyReport& report) {
 }
 
 /// Adds a curve of the points whose settings belong to it: labelled by step in ms, or by accuracy.
-void add_curve(PrecisionPlot& plot, const AccuracyReport& report, const std::string& name,
+void add_curve(PlotPanel& panel, const AccuracyReport& report, const std::string& name,
                const std::function<bool(const AccuracySetting&)>& belongs) {
-  PrecisionCurve curve{name, {}};
+  PlotCurve curve{name, {}, PlotMark::dot};
+  curve.colour = static_cast<int>(panel.curves.size());
   for (const AccuracyPoint& p : report.points) {
     if (p.precision != Precision::f64 || !belongs(p.setting)) continue;
     const double label = p.setting.accuracy > 0 ? p.setting.accuracy : 1e3 * p.step;
-    curve.points.push_back({p.error, 1 / p.rate, p.blurred, fmt::format("{:g}", label)});
+    curve.points.push_back({p.error, 1 / p.rate, fmt::format("{:g}", label), p.blurred});
   }
-  if (!curve.points.empty()) plot.curves.push_back(std::move(curve));
+  if (!curve.points.empty()) panel.curves.push_back(std::move(curve));
 }
 
 }  // namespace
@@ -295,27 +296,31 @@ bool can_draw(const AccuracyReport& report) {
 }
 
 std::string accuracy_svg(const AccuracySubject& subject, const AccuracyReport& report) {
-  PrecisionPlot plot;
-  plot.title = subject.name + ": what accuracy costs";
-  plot.captions = {
-      fmt::format("{} of {} environments over {:g} s; {}, {}", to_string(subject.quantity),
-                  subject.environments, subject.seconds, subject.machine, subject.isa),
-      fmt::format("reference {}, its own error {:.1e} (line); hollow: at most ten times it",
-                  setting_text(report.reference.setting, report.reference.step),
-                  report.reference.error)};
-  plot.x_label = fmt::format("relative error of the {}, not exceeded in 95 % of the environments",
-                             accuracy_meaning(subject.quantity));
-  plot.y_label = "CPU seconds per simulated second [1]";
-  plot.floor = report.reference.error;
-  plot.target = subject.target;
+  PlotPanel panel;
+  panel.height = 380;
+  panel.x = {fmt::format("relative error of the {}, not exceeded in 95 % of the environments",
+                         accuracy_meaning(subject.quantity)),
+             /*decades=*/true};
+  panel.y = {"CPU seconds per simulated second [1]", /*decades=*/true};
   for (const Integrator integrator : integrators())
-    add_curve(plot, report, to_string(integrator), [&](const AccuracySetting& s) {
+    add_curve(panel, report, to_string(integrator), [&](const AccuracySetting& s) {
       return s.accuracy == 0 && s.integrator == integrator;
     });
-  add_curve(plot, report, "cut steps", [](const AccuracySetting& s) { return s.accuracy > 0; });
+  add_curve(panel, report, "cut steps", [](const AccuracySetting& s) { return s.accuracy > 0; });
   if (report.own.rate > 0)
-    plot.marked = {report.own.error, 1 / report.own.rate, false, "the scene's"};
-  return render_precision_svg(plot);
+    panel.curves.push_back(
+        {"", {{report.own.error, 1 / report.own.rate, "the scene's"}}, PlotMark::star, false});
+  panel.verticals = {{report.reference.error, "reference"}};
+  if (subject.target > 0) panel.verticals.push_back({subject.target, "target", true});
+  return render_line_plot_svg(
+      {subject.name + ": what accuracy costs",
+       {fmt::format("{} of {} environments over {:g} s; {}, {}", to_string(subject.quantity),
+                    subject.environments, subject.seconds, subject.machine, subject.isa),
+        fmt::format("reference {}, its own error {:.1e} (line); hollow: at most ten times it",
+                    setting_text(report.reference.setting, report.reference.step),
+                    report.reference.error)},
+       {std::move(panel)},
+       "numbers: step size [ms]; the lower left is best; star: the setting of the scene"});
 }
 
 }  // namespace tangere::apps

@@ -4,10 +4,11 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
-#include "io/picture/scaling_plot.hpp"
+#include "io/picture/line_plot.hpp"
 
 namespace tangere::apps {
 namespace {
@@ -126,20 +127,31 @@ std::string bench_csv(const BenchSetting& setting, const Json& entries) {
 }
 
 std::string bench_svg(const BenchSetting& setting, const std::vector<BenchRun>& runs) {
-  ScalingCurve curve;
-  curve.title = setting.model + ": speed by threads";
-  curve.captions = {
-      fmt::format("{}; {}, {}", setting.machine, setting.isa, to_string(setting.options.precision)),
-      fmt::format("scene {}, {} environments, {} steps",
-                  std::filesystem::path(setting.scene).filename().string(), setting.environments,
-                  setting.options.rollout.steps),
-      fmt::format("{}; {} pass{}", frames_text(setting), setting.options.repeat,
-                  setting.options.repeat == 1 ? "" : "es")};
-  for (const BenchRun& run : runs)
-    curve.points.push_back({run.threads,
-                            rate(run.result.environment_steps, run.result.best().seconds),
-                            rate(run.result.environment_steps, run.result.median().seconds)});
-  return render_scaling_svg(curve);
+  PlotCurve curve{"", {}, PlotMark::dot};
+  for (const BenchRun& run : runs) {
+    const BenchmarkResult& r = run.result;
+    curve.points.push_back({static_cast<double>(run.threads),
+                            rate(r.environment_steps, r.best().seconds), "", false,
+                            rate(r.environment_steps, r.median().seconds)});
+  }
+  std::ranges::sort(curve.points, {}, &PlotPoint::x);
+  const PlotPoint first = curve.points.front(), last = curve.points.back();
+  PlotCurve ideal{"", {{0, 0}, {last.x, first.y / first.x * last.x}}};
+  ideal.dashed = true;
+  PlotPanel panel{"", {"threads"}, {"environment steps per second [1/s]"}, {ideal, curve}};
+  panel.height = 320;
+  panel.x.from_zero = panel.x.whole = panel.y.from_zero = true;
+  return render_line_plot_svg(
+      {setting.model + ": speed by threads",
+       {fmt::format("{}; {}, {}", setting.machine, setting.isa,
+                    to_string(setting.options.precision)),
+        fmt::format("scene {}, {} environments, {} steps",
+                    std::filesystem::path(setting.scene).filename().string(), setting.environments,
+                    setting.options.rollout.steps),
+        fmt::format("{}; {} pass{}", frames_text(setting), setting.options.repeat,
+                    setting.options.repeat == 1 ? "" : "es")},
+       {std::move(panel)},
+       "dots: best pass; bars: down to the median; dashed: ideal, in proportion to threads"});
 }
 
 }  // namespace tangere::apps

@@ -11,7 +11,7 @@
 
 #include "engine/base/as_size.hpp"
 #include "engine/derivative/number_gradients.hpp"
-#include "io/picture/series_plot.hpp"
+#include "io/picture/line_plot.hpp"
 
 namespace tangere::apps {
 namespace {
@@ -33,48 +33,47 @@ const std::vector<double>& reference(const IdentifyReport& r) {
   return r.truth.empty() ? r.fit.points.front().values : r.truth;
 }
 
-CurvePanel misfit_panel(const Identification& fit) {
-  CurvePanel panel{"The fit",
-                   "iteration",
-                   "over its first value",
-                   true,
-                   {{"misfit", {}, {}, false, 0}, {"|gradient|", {}, {}, false, 1}}};
+PlotPanel misfit_panel(const Identification& fit) {
+  PlotPanel panel{"The fit", {"iteration"}, {"over its first value", /*decades=*/true}, {}};
+  panel.curves = {{.name = "misfit"}, {.name = "|gradient|", .colour = 1}};
   for (std::size_t k = 0; k < fit.points.size(); ++k) {
-    for (Curve& c : panel.curves) c.x.push_back(static_cast<double>(k));
-    panel.curves[0].y.push_back(fit.points[k].misfit / fit.points[0].misfit);
-    panel.curves[1].y.push_back(fit.points[k].gradient / fit.points[0].gradient);
+    const double iteration = static_cast<double>(k);
+    panel.curves[0].points.push_back({iteration, fit.points[k].misfit / fit.points[0].misfit});
+    panel.curves[1].points.push_back({iteration, fit.points[k].gradient / fit.points[0].gradient});
   }
   return panel;
 }
 
-CurvePanel values_panel(const IdentifyReport& r) {
+PlotPanel values_panel(const IdentifyReport& r) {
   const char* over = r.truth.empty() ? "their start" : "their true values";
-  CurvePanel panel{fmt::format("Numbers over {}", over), "iteration", "ratio", false, {}};
+  PlotPanel panel{fmt::format("Numbers over {}", over), {"iteration"}, {"ratio"}, {}};
   for (std::size_t n = 0; n < r.names.size(); ++n) {
-    Curve c{r.names[n], {}, {}, false, static_cast<int>(n)};
-    for (std::size_t k = 0; k < r.fit.points.size(); ++k) {
-      c.x.push_back(static_cast<double>(k));
-      c.y.push_back(r.fit.points[k].values[n] / reference(r)[n]);
-    }
-    panel.curves.push_back(std::move(c));
+    PlotCurve curve{.name = r.names[n], .colour = static_cast<int>(n)};
+    for (std::size_t k = 0; k < r.fit.points.size(); ++k)
+      curve.points.push_back({static_cast<double>(k), r.fit.points[k].values[n] / reference(r)[n]});
+    panel.curves.push_back(std::move(curve));
   }
   return panel;
 }
 
 /// Forces on all sensors over time, recorded and fitted.
-CurvePanel forces_panel(const FieldSequence& recorded, const FieldSequence& fitted,
-                        double timestep) {
-  CurvePanel panel{
-      "Force on the sensors: recorded (dots) and fitted", "time [s]", "force [N]", false, {}};
+PlotPanel forces_panel(const FieldSequence& recorded, const FieldSequence& fitted,
+                       double timestep) {
+  PlotPanel panel{
+      "Force on the sensors: recorded (dots) and fitted", {"time [s]"}, {"force [N]"}, {}};
   const std::array<const char*, 3> names = {"shear along axis0", "shear along axis1", "pressure"};
   for (const FieldSequence* s : {&recorded, &fitted})
     for (std::size_t c = 0; c < 3; ++c) {
-      Curve curve{s == &recorded ? "" : names[c], {}, {}, s == &recorded, static_cast<int>(c)};
+      PlotCurve curve{.colour = static_cast<int>(c)};
+      if (s == &recorded)
+        curve.mark = PlotMark::small_dot, curve.line = false;
+      else
+        curve.name = names[c];
       for (std::size_t k = 0; k < s->readings.size(); ++k) {
         double sum = 0;
         for (std::size_t i = c; i < s->readings[k].size(); i += 3) sum += s->readings[k][i];
-        curve.x.push_back(timestep * static_cast<double>(s->every) * static_cast<double>(k + 1));
-        curve.y.push_back(sum);
+        curve.points.push_back(
+            {timestep * static_cast<double>(s->every) * static_cast<double>(k + 1), sum});
       }
       panel.curves.push_back(std::move(curve));
     }
@@ -254,11 +253,11 @@ void print(const Console& console, const IdentifyReport& r) {
 }
 
 std::string draw(const IdentifyReport& r, const FieldSequence& fitted, double timestep) {
-  const std::array<CurvePanel, 3> panels = {misfit_panel(r.fit), values_panel(r),
-                                            forces_panel(r.recorded, fitted, timestep)};
-  const std::array<std::string, 1> captions = {fmt::format(
-      "{:.2g} % of the fields' peak is left; condition {:.1f}", noise_percent(r), r.fit.condition)};
-  return render_curves_svg("Numbers of " + r.scene.name + " from a recording", captions, panels);
+  return render_line_plot_svg(
+      {"Numbers of " + r.scene.name + " from a recording",
+       {fmt::format("{:.2g} % of the fields' peak is left; condition {:.1f}", noise_percent(r),
+                    r.fit.condition)},
+       {misfit_panel(r.fit), values_panel(r), forces_panel(r.recorded, fitted, timestep)}});
 }
 
 }  // namespace tangere::apps

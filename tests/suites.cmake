@@ -1,7 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-# The suites that run longest, longest first: a fresh ctest starts them first, so that all cores end together.
-# Afterwards it goes by the times that it has measured.
+# The suites that take seconds, longest first. They have the label slow. A fresh ctest starts them first, so that all
+# cores end together; afterwards it goes by the times that it has measured.
 set(long engine_test.All/AdjointScheme tasks_test.Scenes/EveryScene apps_fault_test.Calls/Fault tasks_test.Scripted
+  engine_test.All/Landing engine_test.Schemes/ShearGradient engine_test.MeshGrid engine_test.MeshContact
+  engine_test.Laws/ContactJacobian apps_test.Stress apps_test.InspectEffects tasks_test.PublishedFaults
+  tasks_test.Identification tasks_test.Tasks/EveryLoop tasks_test.Tasks/EveryTape apps_test.View
   apps_test.Command apps_threads_test.GenerateGradients apps_threads_test.Tasks
   apps_memory_test.DatasetCommand io_memory_test.ChunkCodec apps_threads_test.GenerateShards
   tasks_memory_threads_test.Tasks/EveryTask tasks_memory_threads_test.BenchmarkRun apps_threads_test.GeneratePolicy
@@ -23,14 +26,16 @@ foreach(suite ${suites})
   string(STRIP "${suite}" suite)
   string(REGEX REPLACE "\\.$" "" suite "${suite}")
   set(cost "")
+  set(labels ${LABELS})
   list(FIND long ${NAME}.${suite} place)
   if(place GREATER -1)
     math(EXPR cost "${count} - ${place}")
     set(cost " COST ${cost}")
+    list(APPEND labels slow)
   endif()
   string(APPEND text "add_test([=[${NAME}.${suite}]=] [=[${PROGRAM}]=] [=[--gtest_filter=${suite}.*${LEFT_OUT}]=])
 set_tests_properties([=[${NAME}.${suite}]=] PROPERTIES TIMEOUT 1800
-  LABELS [=[${LABELS}]=] ENVIRONMENT [=[${ENVIRONMENT}]=]${cost})
+  LABELS [=[${labels}]=] ENVIRONMENT [=[${ENVIRONMENT}]=]${cost})
 ")
 endforeach()
 file(WRITE ${OUTPUT} "${text}")

@@ -8,76 +8,53 @@
 #include <string>
 
 #include "kernels/numbers/one_lane.hpp"
-#include "kernels/table/parts.hpp"
 #include "kernels/table/processor.hpp"
 
 #include "kernels/table/isa.hpp"
 
 namespace tangere::kernels {
+
+// Each fills the functions of one part. Parts are compiled elsewhere, with the flags of their
+// instruction set (kernels/CMakeLists.txt), so that a change recompiles the parts that use it. N:
+// numbers of L lanes.
+template <class N, int L>
+void add_step_kernels(StageKernels<L>& k);
+template <class N, int L>
+void add_adjoint_kernels(StageKernels<L>& k);
+template <class N, int L>
+void add_shear_row_kernels(StageKernels<L>& k);
+template <class Arch>
+void add_group_kernels(KernelTable& k);
+template <class Arch, class Real>
+void add_tactile_kernels(KernelTable& k);
+template <class Arch>
+void add_reading_pullback_kernels(KernelTable& k);
+template <class Arch>
+void add_shear_kernels(KernelTable& k);
+
 namespace {
 
-template <class N, int L>
-constexpr StageKernels<L> stage_kernels() {
-  using Step = StepPart<N, L>;
-  using Adjoint = AdjointPart<N, L>;
-  using Memory = ShearRowsPart<N, L>;
-  return {Adjoint::scratch_bytes,
-          Step::kinematics,
-          Step::choose_faces,
-          Step::choose_faces_at,
-          Step::poses_at,
-          Step::near_pairs,
-          Step::residual,
-          Step::evaluate,
-          Step::contact_wrenches,
-          Step::set_weights,
-          Step::set_floor,
-          Step::scaled_residual,
-          Step::weighted_norm,
-          Step::factor,
-          Step::solve,
-          Step::solve_watched,
-          Step::solve_transposed,
-          Adjoint::adjoint_rhs,
-          Adjoint::adjoint_products,
-          Adjoint::parameter_products,
-          Adjoint::pull_back_poses,
-          Memory::touches_at,
-          Memory::recall_ground,
-          Memory::advance_ground};
-}
-
-/// The functions of this table are compiled elsewhere, with the flags of Arch
-/// (kernels/CMakeLists.txt).
+/// Fills a table for the instruction set Arch, an xsimd tag or ScalarArch.
 template <class Arch>
-constexpr KernelTable table_of(const char* name) {
-  using Group = GroupPart<Arch>;
-  using Tactile = TactilePart<Arch, double>;
-  using MixedTactile = TactilePart<Arch, float>;
-  using Pullback = ReadingPullbackPart<Arch>;
-  using Memory = ShearPart<Arch>;
-  return {name,
-          stage_kernels<Lanes<Arch>, kGroup>(),
-          stage_kernels<OneLane<Arch>, 1>(),
-          Group::find_candidates,
-          Group::transpose_list,
-          Group::link_poses,
-          Group::pad_touch,
-          Tactile::tactile,
-          MixedTactile::tactile,
-          Tactile::tactile_block,
-          MixedTactile::tactile_block,
-          Pullback::pull_back_links,
-          Pullback::pullback_bytes,
-          Pullback::pull_back_field,
-          Pullback::field_tangent,
-          Memory::recall,
-          Memory::advance,
-          Memory::pull_back_memory};
+KernelTable table_of(const char* name) {
+  KernelTable k{};
+  k.name = name;
+  add_step_kernels<Lanes<Arch>, kGroup>(k.group);
+  add_step_kernels<OneLane<Arch>, 1>(k.single);
+  add_adjoint_kernels<Lanes<Arch>, kGroup>(k.group);
+  add_adjoint_kernels<OneLane<Arch>, 1>(k.single);
+  add_shear_row_kernels<Lanes<Arch>, kGroup>(k.group);
+  add_shear_row_kernels<OneLane<Arch>, 1>(k.single);
+  add_group_kernels<Arch>(k);
+  add_tactile_kernels<Arch, double>(k);
+  add_tactile_kernels<Arch, float>(k);
+  add_reading_pullback_kernels<Arch>(k);
+  add_shear_kernels<Arch>(k);
+  return k;
 }
 
 /// The tables that were built. Best first.
-constexpr KernelTable kBuilt[] = {
+const KernelTable kBuilt[] = {
 #if TANGERE_AVX512
     table_of<xsimd::avx512bw>("avx512"),
 #endif

@@ -6,7 +6,7 @@
 #include "kernels/reverse/parameter_adjoint.hpp"
 #include "kernels/reverse/tactile_pullback.hpp"
 #include "kernels/reverse/tactile_tangent.hpp"
-#include "kernels/table/parts.hpp"
+#include "kernels/table/kernel_table.hpp"
 #include "kernels/table/stage_view.hpp"
 
 namespace tangere::kernels {
@@ -33,75 +33,55 @@ AdjointArgs<N> adjoint_arguments(const StageAdjoint<L>& d, LinkAdjoint<N>* links
 }
 
 template <class N, int L>
-std::size_t AdjointPart<N, L>::scratch_bytes(const ModelView& m) {
-  return sizeof(LinkScratch<N>) * m.n_links +
-         sizeof(ContactScratch<N>) * (m.n_link_pairs + m.n_grounded) +
-         sizeof(CandidateList<N>) * m.n_pairs + sizeof(JointColumns<N>) * 2 * m.n_links +
-         sizeof(LinkAdjoint<N>) * m.n_links + 5 * alignof(N);
-}
-
-template <class N, int L>
-void AdjointPart<N, L>::adjoint_rhs(const ModelView& m, const Stage<L>& s,
-                                    const StageAdjoint<L>& d) {
-  kernels::adjoint_rhs(m, StageView<N, L>::arguments(m, s, -1), adjoint_arguments<N>(d, nullptr));
-}
-
-template <class N, int L>
-void AdjointPart<N, L>::adjoint_products(const ModelView& m, const Stage<L>& s,
-                                         const StageAdjoint<L>& d) {
+void add_adjoint_kernels(StageKernels<L>& k) {
   using View = StageView<N, L>;
-  typename View::Scratch scratch{s.scratch};
-  const StageArgs<N> a = View::arguments(m, s, -1, scratch);
-  kernels::adjoint_products(
-      m, a, adjoint_arguments<N>(d, scratch.template take<LinkAdjoint<N>>(m.n_links)));
-}
-
-template <class N, int L>
-void AdjointPart<N, L>::parameter_products(const ModelView& m, const Stage<L>& s,
-                                           const StageAdjoint<L>& d, int lone, Row<L>* out) {
-  using View = StageView<N, L>;
-  typename View::Scratch scratch{s.scratch};
-  const StageArgs<N> a = View::arguments(m, s, lone, scratch);
-  kernels::parameter_products(
-      m, a, adjoint_arguments<N>(d, scratch.template take<LinkAdjoint<N>>(m.n_links)),
-      View::view(out));
-}
-
-template <class N, int L>
-void AdjointPart<N, L>::pull_back_poses(const ModelView& m, const Stage<L>& s, const Row<L>* q,
-                                        const Row<L>* v, const Row<L>* zero, std::byte* scratch,
-                                        MotionCotangent<Row<L>>* links, Row<L>* q_bar,
-                                        Row<L>* v_bar) {
-  using View = StageView<N, L>;
-  kernels::pull_back_links(
-      m, View::state_of(s, q, v, zero), reinterpret_cast<LinkMotion<N>*>(scratch),
-      reinterpret_cast<MotionCotangent<N>*>(links), View::view(q_bar), View::view(v_bar));
-}
-
-template <class Arch>
-void ReadingPullbackPart<Arch>::pull_back_links(const ModelView& m, const GroupState& s,
-                                                std::byte* scratch, MotionCotangent<LaneRow>* links,
-                                                LaneRow* q_bar, LaneRow* v_bar) {
-  using N = Lanes<Arch>;
-  using View = StageView<N, kGroup>;
-  kernels::pull_back_links(m, at_state<N>(s), reinterpret_cast<LinkMotion<N>*>(scratch),
-                           reinterpret_cast<MotionCotangent<N>*>(links), View::view(q_bar),
-                           View::view(v_bar));
+  k.scratch_bytes = [](const ModelView& m) -> std::size_t {
+    return sizeof(LinkScratch<N>) * m.n_links +
+           sizeof(ContactScratch<N>) * (m.n_link_pairs + m.n_grounded) +
+           sizeof(CandidateList<N>) * m.n_pairs + sizeof(JointColumns<N>) * 2 * m.n_links +
+           sizeof(LinkAdjoint<N>) * m.n_links + 5 * alignof(N);
+  };
+  k.adjoint_rhs = [](const ModelView& m, const Stage<L>& s, const StageAdjoint<L>& d) {
+    kernels::adjoint_rhs(m, StageView<N, L>::arguments(m, s, -1), adjoint_arguments<N>(d, nullptr));
+  };
+  k.adjoint_products = [](const ModelView& m, const Stage<L>& s, const StageAdjoint<L>& d) {
+    typename View::Scratch scratch{s.scratch};
+    const StageArgs<N> a = View::arguments(m, s, -1, scratch);
+    kernels::adjoint_products(
+        m, a, adjoint_arguments<N>(d, scratch.template take<LinkAdjoint<N>>(m.n_links)));
+  };
+  k.parameter_products = [](const ModelView& m, const Stage<L>& s, const StageAdjoint<L>& d,
+                            int lone, Row<L>* out) {
+    typename View::Scratch scratch{s.scratch};
+    const StageArgs<N> a = View::arguments(m, s, lone, scratch);
+    kernels::parameter_products(
+        m, a, adjoint_arguments<N>(d, scratch.template take<LinkAdjoint<N>>(m.n_links)),
+        View::view(out));
+  };
+  k.pull_back_poses = [](const ModelView& m, const Stage<L>& s, const Row<L>* q, const Row<L>* v,
+                         const Row<L>* zero, std::byte* scratch, MotionCotangent<Row<L>>* links,
+                         Row<L>* q_bar, Row<L>* v_bar) {
+    kernels::pull_back_links(
+        m, View::state_of(s, q, v, zero), reinterpret_cast<LinkMotion<N>*>(scratch),
+        reinterpret_cast<MotionCotangent<N>*>(links), View::view(q_bar), View::view(v_bar));
+  };
 }
 
 template <class Arch>
-std::size_t ReadingPullbackPart<Arch>::pullback_bytes(const ModelView& m) {
-  return sizeof(LinkMotion<Lanes<Arch>>) * std::size_t(m.n_links);
-}
-
-template <class Arch>
-void ReadingPullbackPart<Arch>::pull_back_field(const TactilePullback& a) {
-  kernels::pull_back_field<Arch>(a);
-}
-
-template <class Arch>
-void ReadingPullbackPart<Arch>::field_tangent(const TactileTangent& a) {
-  kernels::field_tangent<Arch>(a);
+void add_reading_pullback_kernels(KernelTable& k) {
+  k.pull_back_links = [](const ModelView& m, const GroupState& s, std::byte* scratch,
+                         MotionCotangent<LaneRow>* links, LaneRow* q_bar, LaneRow* v_bar) {
+    using N = Lanes<Arch>;
+    using View = StageView<N, kGroup>;
+    kernels::pull_back_links(m, at_state<N>(s), reinterpret_cast<LinkMotion<N>*>(scratch),
+                             reinterpret_cast<MotionCotangent<N>*>(links), View::view(q_bar),
+                             View::view(v_bar));
+  };
+  k.pullback_bytes = [](const ModelView& m) -> std::size_t {
+    return sizeof(LinkMotion<Lanes<Arch>>) * std::size_t(m.n_links);
+  };
+  k.pull_back_field = [](const TactilePullback& a) { kernels::pull_back_field<Arch>(a); };
+  k.field_tangent = [](const TactileTangent& a) { kernels::field_tangent<Arch>(a); };
 }
 
 }  // namespace tangere::kernels

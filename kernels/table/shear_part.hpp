@@ -5,48 +5,39 @@
 #include "kernels/numbers/one_lane.hpp"
 #include "kernels/shear/shear_pullback.hpp"
 #include "kernels/shear/shear_rows.hpp"
-#include "kernels/table/parts.hpp"
+#include "kernels/table/kernel_table.hpp"
 #include "kernels/table/stage_view.hpp"
 
 namespace tangere::kernels {
 
 template <class Arch>
-void ShearPart<Arch>::recall(const ShearSpringTouch& touch, const ShearSpringPoints& points) {
-  kernels::recall<Arch>(touch, points);
-}
-
-template <class Arch>
-void ShearPart<Arch>::advance(const ShearSpringTouch& end, const ShearSpringPoints& points,
-                              double* s, double* force) {
-  kernels::advance<Arch>(end, points, s, force);
-}
-
-template <class Arch>
-void ShearPart<Arch>::pull_back_memory(const ShearPullback& m) {
-  kernels::pull_back_memory<Arch>(m);
+void add_shear_kernels(KernelTable& k) {
+  k.recall = [](const ShearSpringTouch& touch, const ShearSpringPoints& points) {
+    kernels::recall<Arch>(touch, points);
+  };
+  k.advance = [](const ShearSpringTouch& end, const ShearSpringPoints& points, double* s,
+                 double* force) { kernels::advance<Arch>(end, points, s, force); };
+  k.pull_back_memory = [](const ShearPullback& m) { kernels::pull_back_memory<Arch>(m); };
 }
 
 template <class N, int L>
-void ShearRowsPart<N, L>::touches_at(const ModelView& m, const LinkPose<Row<L>>* links,
-                                     LinkPose<Row<L>>* out) {
-  find_touches(m, reinterpret_cast<const LinkPose<N>*>(links), reinterpret_cast<LinkPose<N>*>(out));
-}
-
-template <class N, int L>
-void ShearRowsPart<N, L>::recall_ground(const ModelView& m, const Stage<L>& stage,
-                                        const LinkPose<Row<L>>* touches, const Row<L>* s) {
+void add_shear_row_kernels(StageKernels<L>& k) {
   using View = StageView<N, L>;
-  kernels::recall_ground(m, reinterpret_cast<const LinkPose<N>*>(touches), View::view(s),
-                         View::view(stage.ground_anchors), stage.block, stage.group);
-}
-
-template <class N, int L>
-void ShearRowsPart<N, L>::advance_ground(const ModelView& m, const Stage<L>& stage,
-                                         const LinkPose<Row<L>>* touches, Row<L>* kept) {
-  using View = StageView<N, L>;
-  kernels::advance_ground(m, reinterpret_cast<const LinkPose<N>*>(touches),
-                          View::view(stage.ground_anchors), View::view(kept), stage.block,
-                          stage.group);
+  k.touches_at = [](const ModelView& m, const LinkPose<Row<L>>* links, LinkPose<Row<L>>* out) {
+    find_touches(m, reinterpret_cast<const LinkPose<N>*>(links),
+                 reinterpret_cast<LinkPose<N>*>(out));
+  };
+  k.recall_ground = [](const ModelView& m, const Stage<L>& stage, const LinkPose<Row<L>>* touches,
+                       const Row<L>* s) {
+    kernels::recall_ground(m, reinterpret_cast<const LinkPose<N>*>(touches), View::view(s),
+                           View::view(stage.ground_anchors), stage.block, stage.group);
+  };
+  k.advance_ground = [](const ModelView& m, const Stage<L>& stage, const LinkPose<Row<L>>* touches,
+                        Row<L>* kept) {
+    kernels::advance_ground(m, reinterpret_cast<const LinkPose<N>*>(touches),
+                            View::view(stage.ground_anchors), View::view(kept), stage.block,
+                            stage.group);
+  };
 }
 
 }  // namespace tangere::kernels

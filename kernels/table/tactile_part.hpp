@@ -4,7 +4,7 @@
 
 #include <type_traits>
 
-#include "kernels/table/parts.hpp"
+#include "kernels/table/kernel_table.hpp"
 #include "kernels/tactile/tactile_block.hpp"
 
 namespace tangere::kernels {
@@ -14,13 +14,14 @@ using PointNumbers =
     std::conditional_t<std::is_same_v<Real, double>, InDouble<Arch>, InMixed<Arch>>;
 
 template <class Arch, class Real>
-int TactilePart<Arch, Real>::tactile(const TactileArgs<Real>& a) {
-  return any_field<PointNumbers<Arch, Real>>(a);
-}
-
-template <class Arch, class Real>
-void TactilePart<Arch, Real>::tactile_block(const TactileBlockArgs<Real>& a) {
-  any_block<PointNumbers<Arch, Real>>(a);
+void add_tactile_kernels(KernelTable& k) {
+  using Numbers = PointNumbers<Arch, Real>;
+  const auto one = [](const TactileArgs<Real>& a) { return any_field<Numbers>(a); };
+  const auto block = [](const TactileBlockArgs<Real>& a) { any_block<Numbers>(a); };
+  if constexpr (std::is_same_v<Real, double>)
+    k.tactile = one, k.tactile_block = block;
+  else
+    k.tactile_mixed = one, k.tactile_block_mixed = block;
 }
 
 }  // namespace tangere::kernels
