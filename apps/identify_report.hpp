@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "apps/console.hpp"
-#include "engine/model/scene.hpp"
+#include "engine/scene/scene.hpp"
 #include "tasks/gradients/identification.hpp"
 
 namespace tangere::apps {

@@ -16,7 +16,7 @@
 #include "apps/task_run.hpp"
 #include "apps/text_output.hpp"
 #include "engine/model/model.hpp"
-#include "engine/model/scene_number.hpp"
+#include "engine/scene/scene_number.hpp"
 #include "engine/step/control.hpp"
 #include "engine/step/stepper.hpp"
 #include "kernels/table/isa.hpp"

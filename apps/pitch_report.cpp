@@ -8,7 +8,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "engine/model/scene_number.hpp"
+#include "engine/scene/scene_number.hpp"
 
 namespace tangere::apps {
 namespace {

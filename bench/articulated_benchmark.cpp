@@ -15,12 +15,12 @@
 #include <string>
 #include <vector>
 
-#include "engine/model/effects.hpp"
 #include "engine/step/control.hpp"
 #include "engine/step/stepper.hpp"
 #include "io/scene/scene_reader.hpp"
 #include "kernels/table/isa.hpp"
 #include "kernels/table/kernel_table.hpp"
+#include "tasks/effects/ablation.hpp"
 
 namespace tangere {
 namespace {

@@ -75,7 +75,7 @@ void read_dual_field(const CompiledModel& m, int sensor,
     const kernels::LinkPose<D> other = pose(body.link);
     kernels::Touch<D> t;
     kernels::pad_touch(&hand, felt.pad, &other, body.frame, t);
-    const int first_size = kernels::first_size_number(m.view) + kernels::kSizeNumbers * number;
+    const int first_size = m.view.rows.solid(number);
     const kernels::Vec3<double> has =
         kernels::load_vector<double>(body.size, body.size_row, column, 0);
     const kernels::Vec3<D> size = {{has.x, tangent(first_size, 0)},

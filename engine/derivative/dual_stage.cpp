@@ -61,15 +61,17 @@ struct DualStage::Impl {
       number.push_back(which);
       p.row = static_cast<int>(origin.size()) - 1;
     };
-    int next = 0;
-    const auto contact = [&](kernels::ContactParameters& c) {
-      for (std::size_t k = 0; k < kCoefficients; ++k) row(c[k], next++);
+    const auto contact = [&](kernels::ContactParameters& c, int first) {
+      for (int k = 0; k < kCoefficients; ++k) row(c[std::size_t(k)], first + k);
     };
-    for (auto& p : pairs) contact(p.parameters);
-    for (auto& g : grounds) contact(g.parameters);
-    next += kernels::kInertiaNumbers * view.n_links;
-    for (auto& e : effects) {
-      for (const auto member : kernels::kDofParameters) row(e.*member, next++);
+    for (int k = 0; k < view.n_pairs; ++k)
+      contact(pairs[std::size_t(k)].parameters, view.rows.pair(k));
+    for (int k = 0; k < view.n_grounds; ++k)
+      contact(grounds[std::size_t(k)].parameters, view.rows.ground(k));
+    for (int dof = 0; dof < view.nv; ++dof) {
+      kernels::DofEffects& e = effects[std::size_t(dof)];
+      for (int k = 0; k < kernels::kDofNumbers; ++k)
+        row(e.*kernels::kDofParameters[k], view.rows.dof(dof, k));
       row(e.armature, -1);
       row(e.limit_stiffness, -1);
     }
@@ -82,12 +84,9 @@ struct DualStage::Impl {
         number.push_back(which < 0 ? -1 : which + i);
       }
     };
-    const auto size_of = [this](int body) {
-      return kernels::first_size_number(view) + kernels::kSizeNumbers * body;
-    };
-    for (auto& p : pairs) side_by_side(p.size_row, 3, &p.size.x, size_of(p.body2));
+    for (auto& p : pairs) side_by_side(p.size_row, 3, &p.size.x, view.rows.solid(p.body2));
     for (auto& g : grounds)
-      if (g.radius > 0) side_by_side(g.radius_row, 1, &g.radius, size_of(g.body));
+      if (g.radius > 0) side_by_side(g.radius_row, 1, &g.radius, view.rows.solid(g.body));
     for (auto& g : grounds)
       g.point_tangents = ground_tangents.emplace_back(std::size_t(3 * g.n_points)).data();
     for (kernels::Link& link : bodies) {
@@ -163,14 +162,11 @@ struct DualStage::Impl {
   void put_ground_anchors() {
     for (const kernels::ShearSpringContact& of : m.shear_springs) {
       if (!of.ground) continue;
-      const int first = grounds[ground_of(of)].first_anchor;
+      const int first = grounds[std::size_t(of.grounded)].first_anchor;
       for (int i = 0; i < of.contact.n_points; ++i)
         put_anchor(of.first + i,
                    &ground_anchors[std::size_t(kernels::kAnchorNumbers * (first + i))]);
     }
-  }
-  [[nodiscard]] std::size_t ground_of(const kernels::ShearSpringContact& of) const {
-    return std::size_t(of.number / kCoefficients) - pairs.size();
   }
 
   /// Returns a contact with shear springs at the poses of all links.
@@ -190,13 +186,14 @@ struct DualStage::Impl {
     };
     const kernels::LawParameters<D> law =
         of.pair >= 0 ? loaded(pairs[std::size_t(of.pair)].parameters)
-        : of.ground  ? loaded(grounds[ground_of(of)].parameters)
+        : of.ground  ? loaded(grounds[std::size_t(of.grounded)].parameters)
                     : kernels::LawParameters<D>{sensor_laws[std::size_t(of.sensor)], of.contact.law,
                                                 of.contact.ramp};
     // No tangents of sizes: gradients by sizes are refused for contacts with shear springs.
     D radius(0.0);
     if (of.ground)
-      radius = D(kernels::ground_radius<D>(grounds[ground_of(of)], block.data(), 0).value);
+      radius =
+          D(kernels::ground_radius<D>(grounds[std::size_t(of.grounded)], block.data(), 0).value);
     return {shape.R, shape.p, twist.a, twist.l, law, radius, of.ground};
   }
 
@@ -402,8 +399,7 @@ void DualStage::set_numbers(const double* column, std::span<const double> tangen
     link.mass_times_com = {row(1), row(2), row(3)};
     link.inertia = {{{row(4), row(5), row(6)}, {row(5), row(7), row(8)}, {row(6), row(8), row(9)}}};
   }
-  const auto first = std::size_t(kernels::first_inertia_number(i.view)),
-             sizes = std::size_t(kernels::first_size_number(i.view));
+  const auto first = std::size_t(i.view.rows.links), sizes = std::size_t(i.view.rows.solids);
   for (std::size_t k = 0; k < i.inertia.size(); ++k)
     i.inertia[k] = tangents.empty() ? 0 : tangents[first + k];
   for (std::size_t k = 0; k < i.stretch.size(); ++k)
@@ -412,7 +408,7 @@ void DualStage::set_numbers(const double* column, std::span<const double> tangen
     i.felt_sizes[b] =
         kernels::load_vector<double>(i.m.bodies[b].size, i.m.bodies[b].size_row, column, 0);
   for (std::size_t k = 0; k < i.sensor_laws.size(); ++k) {
-    std::size_t row = std::size_t(kernels::parameter_numbers(i.view)) + kCoefficients * k;
+    auto row = std::size_t(i.view.rows.sensor(static_cast<int>(k)));
     i.sensor_laws[k] = transformed(i.m.sensors[k].parameters, [&](const Parameter& p) {
       const double tangent = tangents.size() > row ? tangents[row] : 0;
       ++row;
@@ -519,7 +515,7 @@ void DualStage::field(int sensor, const double* column, std::span<const double> 
   Impl& i = *impl_;
   const CompiledSensor& felt = i.m.sensors[std::size_t(sensor)];
   kernels::kinematics(i.view, i.arguments(*this));
-  auto number = std::size_t(kernels::parameter_numbers(i.m.view) + kCoefficients * sensor);
+  auto number = std::size_t(i.m.view.rows.sensor(sensor));
   const Coefficients<D> coefficients = transformed(felt.parameters, [&](const Parameter& p) {
     const double tangent = numbers.empty() ? 0.0 : numbers[number];
     ++number;

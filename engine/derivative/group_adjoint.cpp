@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The stages of a scheme backwards (engine/model/scheme.hpp). Lanes outside the mask compute with
+// The stages of a scheme backwards (engine/scene/scheme.hpp). Lanes outside the mask compute with
 // whatever is there and change nothing.
 #include "engine/derivative/group_adjoint.hpp"
 
@@ -21,10 +21,9 @@ AdjointWorkspace<L>::AdjointWorkspace(const CompiledModel& model, int loss_count
       q_stage(std::size_t(model.nq)) {
   const std::size_t nv = std::size_t(model.nv), inner = std::size_t(inner_stages),
                     per_loss = 8 + 2 * inner, shared = 8 + 2 * (1 + inner);
-  const std::size_t count = parameters ? std::size_t(kernels::parameter_numbers(model.view)) : 0,
-                    more = parameters ? kCoefficients * model.sensors.size() : 0;
-  shear.assign(nv * (per_loss * losses.size() + shared) + (count + more) * losses.size() + count,
-               Row{});
+  const std::size_t count = parameters ? std::size_t(model.view.rows.sensors) : 0,
+                    all = parameters ? std::size_t(model.view.rows.count) : 0;
+  shear.assign(nv * (per_loss * losses.size() + shared) + all * losses.size() + count, Row{});
   Row* at = shear.data();
   const auto take = [&](Row*& p, std::size_t rows) {
     p = at;
@@ -42,7 +41,7 @@ AdjointWorkspace<L>::AdjointWorkspace(const CompiledModel& model, int loss_count
   for (LossRows<L>& l : losses) l.parameters = nullptr;
   if (!parameters) return;
   take(numbers, count);
-  for (LossRows<L>& l : losses) take(l.parameters, count + more);
+  for (LossRows<L>& l : losses) take(l.parameters, all);
 }
 
 namespace {
@@ -146,7 +145,7 @@ void GroupAdjoint::hand_on(const StageContext<L>& s, const Scheme& scheme, int s
   add_lanes(loss.tau, a.lambda, n, s.lanes);
   add_lanes(loss.target, a.target, n, s.lanes);
   if (loss.parameters == nullptr) return;
-  const int count = kernels::parameter_numbers(model_.view);
+  const int count = model_.view.rows.sensors;
   clear(a.numbers, count);
   kernel.parameter_products(model_.view, s.w.stage, d, s.lone(), a.numbers);
   add_lanes(loss.parameters, a.numbers, count, s.lanes);

@@ -77,7 +77,7 @@ struct MotorPullback {
     CompiledMotor unit = motor;  // P = 1, D = 0: the error alone
     unit.P = {1, -1}, unit.D = {0, -1}, unit.low = -HUGE_VAL, unit.high = HUGE_VAL;
     const auto by = [&](kernels::DofNumber which) -> double& {
-      return o.parameters[kernels::dof_number(m.view, motor.dof, which)][lane];
+      return o.parameters[m.view.rows.dof(motor.dof, which)][lane];
     };
     by(kernels::kDofP) += lambda * force_at_start(m, unit, state, u.data() + (k - motor.component));
     by(kernels::kDofD) -= lambda * row(m.layout.v + motor.dof);

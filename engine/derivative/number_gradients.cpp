@@ -6,10 +6,10 @@
 #include <optional>
 
 #include "engine/model/compiled_model.hpp"
-#include "engine/model/mass_properties.hpp"
+#include "engine/model/link_inertia.hpp"
 #include "engine/model/model.hpp"
-#include "engine/model/scene_number.hpp"
-#include "engine/model/shapes.hpp"
+#include "engine/scene/scene_number.hpp"
+#include "engine/scene/shapes.hpp"
 #include "kernels/table/kernel_table.hpp"
 
 namespace tangere {
@@ -18,10 +18,7 @@ using kernels::kBlock;
 using Field = NumberField;
 using Owner = NumberOwner;
 
-int parameter_rows(const Model& model) {
-  const CompiledModel& m = compiled(model);
-  return kernels::parameter_numbers(m.view) + kCoefficients * static_cast<int>(m.sensors.size());
-}
+int parameter_rows(const Model& model) { return compiled(model).view.rows.count; }
 
 NumberGradients::NumberGradients(const Model& model) : model_(model) {
   add_contacts();
@@ -49,20 +46,13 @@ void NumberGradients::add_coefficients(SceneNumber of, int row) {
 
 void NumberGradients::add_contacts() {
   const CompiledModel& m = compiled(model_);
-  int row = 0;
-  for (const PairContactDescription& c : m.scene.pair_contacts) {
-    add_coefficients({Owner::contact, Field::kn, c.first_name(), 0, c.primitive_body}, row);
-    row += kCoefficients;
-  }
-  for (const GroundContactDescription& c : m.scene.ground_contacts) {
-    add_coefficients({Owner::ground, Field::kn, c.body}, row);
-    row += kCoefficients;
-  }
-  row = kernels::parameter_numbers(m.view);
-  for (const TactileDescription& t : m.scene.sensors) {
-    add_coefficients({Owner::tactile, Field::kn, t.name}, row);
-    row += kCoefficients;
-  }
+  const kernels::ParameterRows& rows = m.view.rows;
+  int k = 0;
+  for (const auto& c : m.scene.pair_contacts) add_coefficients(first_number(c), rows.pair(k++));
+  k = 0;
+  for (const auto& c : m.scene.ground_contacts) add_coefficients(first_number(c), rows.ground(k++));
+  k = 0;
+  for (const auto& t : m.scene.sensors) add_coefficients(first_number(t), rows.sensor(k++));
 }
 
 namespace {
@@ -128,18 +118,15 @@ void NumberGradients::add_bodies() {
     for (int which = 0; which < kSizeIndices && known; ++which) {
       const SizeNumber* const size = row_of(d.shape).size(which);
       if (size == nullptr) continue;
-      const Term of_contacts = {
-          kernels::first_size_number(m.view) + kernels::kSizeNumbers * b + size->component,
-          size->scale};
-      add_with_masses(size_of_body(d.name, which), {of_contacts});
+      add_with_masses(size_of_body(d.name, which),
+                      {{m.view.rows.solid(b) + size->component, size->scale}});
     }
   }
 }
 
 int NumberGradients::mass_row(int body) const {
   const CompiledModel& m = compiled(model_);
-  return kernels::first_inertia_number(m.view) +
-         kernels::kInertiaNumbers * m.bodies[std::size_t(body)].link;
+  return m.view.rows.link(m.bodies[std::size_t(body)].link);
 }
 
 NumberGradients::Masses NumberGradients::masses_by(const SceneNumber& number, int body,
@@ -178,7 +165,7 @@ NumberGradients::Terms NumberGradients::of_dofs(std::size_t joint, int which, in
   const CompiledModel& m = compiled(model_);
   Terms terms;
   for (int k = first; k < end; ++k)
-    terms.push_back({kernels::dof_number(m.view, m.joints[joint].v + k, which), 1});
+    terms.push_back({m.view.rows.dof(m.joints[joint].v + k, which), 1});
   return terms;
 }
 

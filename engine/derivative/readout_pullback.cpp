@@ -211,14 +211,14 @@ void ReadoutPullback::Impl::pull_back(int lane, int sensor, std::span<const int>
        points.empty() ? nullptr : own.data(), touches.data()});
   if (!points.empty()) hand_on_points(s, touched, points);
   used[std::size_t(group)] = true;
-  const int row = kernels::parameter_numbers(m.view) + kCoefficients * sensor;
+  const int row = m.view.rows.sensor(sensor);
   for (std::size_t k = 0; k < s.targets.size(); ++k) {
     const kernels::TouchCotangent<double>& c = touches[k];
     hand_on(c, s.link, s.pad, m.bodies[std::size_t(s.targets[k])].link, group, in_group);
     if (parameters.empty()) continue;
     const auto add = [&](int at, double x) { parameters[std::size_t(at * kBlock + lane)] += x; };
     for (int n = 0; n < kCoefficients; ++n) add(row + n, c.law[std::size_t(n)]);
-    const int size = kernels::first_size_number(m.view) + kernels::kSizeNumbers * s.targets[k];
+    const int size = m.view.rows.solid(s.targets[k]);
     add(size, c.size.x), add(size + 1, c.size.y), add(size + 2, c.size.z);
   }
 }

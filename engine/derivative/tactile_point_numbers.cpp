@@ -3,9 +3,10 @@
 #include "engine/derivative/tactile_point_numbers.hpp"
 
 #include "engine/model/compiled_model.hpp"
-#include "engine/model/frames.hpp"
 #include "engine/model/model.hpp"
-#include "engine/model/scene_number.hpp"
+#include "engine/scene/frames.hpp"
+#include "engine/scene/scene_number.hpp"
+#include "engine/scene/schema.hpp"
 #include "engine/step/batch.hpp"
 
 namespace tangere {
@@ -19,8 +20,8 @@ const char* point_number_name(int k) {
 
 const char* point_number_unit(int k, ContactLaw law) {
   return k < 3 ? "m"
-               : number_kind(NumberOwner::tactile, coefficient_field(k - 3))
-                     .unit_of(law == ContactLaw::linear);
+               : to_string(number_kind(NumberOwner::tactile, coefficient_field(k - 3))
+                               .unit_of(law == ContactLaw::linear));
 }
 
 int first_tactile_point(const Model& model, int sensor) {

@@ -260,7 +260,7 @@ struct Tangent::Impl {
       }
       const auto gain = [&](const kernels::Parameter& p, kernels::DofNumber which) {
         const double value = p.row < 0 ? p.value : column[p.row * kBlock];
-        const int row = kernels::dof_number(m().view, motor.dof, which);
+        const int row = m().view.rows.dof(motor.dof, which);
         return D(value, numbers_dot.empty() ? 0 : numbers_dot[std::size_t(row)]);
       };
       const D force = gain(motor.P, kernels::kDofP) * error_of(motor, k, at, u, u_dot) -

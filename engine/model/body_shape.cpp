@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "engine/model/frames.hpp"
-#include "engine/model/shapes.hpp"
+#include "engine/scene/frames.hpp"
+#include "engine/scene/shapes.hpp"
 #include "kernels/contact/distance.hpp"
 
 namespace tangere {

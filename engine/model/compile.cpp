@@ -15,14 +15,15 @@
 #include "engine/model/compile_shear_springs.hpp"
 #include "engine/model/compile_variations.hpp"
 #include "engine/model/components.hpp"
-#include "engine/model/contact_resolution.hpp"
 #include "engine/model/contact_tiles.hpp"
-#include "engine/model/frames.hpp"
 #include "engine/model/group_contacts.hpp"
-#include "engine/model/mass_properties.hpp"
-#include "engine/model/scene_number.hpp"
-#include "engine/model/sensed_bodies.hpp"
-#include "engine/model/shapes.hpp"
+#include "engine/model/link_inertia.hpp"
+#include "engine/scene/contact_resolution.hpp"
+#include "engine/scene/frames.hpp"
+#include "engine/scene/scene_faults.hpp"
+#include "engine/scene/scene_number.hpp"
+#include "engine/scene/sensed_bodies.hpp"
+#include "engine/scene/shapes.hpp"
 
 namespace tangere {
 
@@ -43,6 +44,7 @@ class Compiler {
   explicit Compiler(const Scene& scene) { m_.scene = scene; }
 
   CompiledModel run() {
+    check_scene(m_.scene);
     for (int i = 0; i < static_cast<int>(m_.scene.links.size()); ++i) add_link(i);
     move_near();
     if (m_.nv == 0)
@@ -95,8 +97,6 @@ class Compiler {
     CompiledBody body;
     body.link = joint.link;
     body.frame = compose(joint.frame, to_frame(d.body.pose));
-    if (const std::string fault = slenderness_fault(d.body.shape); !fault.empty())
-      throw InputError(d.body.source.prefix() + "body '" + d.body.name + "' is " + fault);
     place_shape(d.body.shape, body);
     const MassProperties properties = mass_properties(d.body.shape, d.body.density);
     body.mass = properties.mass;
@@ -215,26 +215,9 @@ class Compiler {
       const int b1 = bodies_.find("body", d.general_body, d.source);
       const int b2 = bodies_.find("body", d.primitive_body, d.source);
       const CompiledBody &first = m_.bodies[b1], &second = m_.bodies[b2];
-      const Shape &general = m_.scene.links[b1].body.shape,
-                  &primitive = m_.scene.links[b2].body.shape;
+      const Shape& general = m_.scene.links[b1].body.shape;
       const bool ball = d.points.empty() && is_ball(general);
-      if (d.points.empty() && !ball && !has_contact_points(general))
-        throw InputError(d.source.prefix() + "general_body '" + d.general_body + "' (" +
-                         shape_name(general) + ") has no contact points; expected " +
-                         shapes_with([](const ShapeRow& row) { return row.stretches(); }) +
-                         " (swap the two bodies)");
-      if (!has_distance(primitive))
-        throw InputError(d.source.prefix() + "primitive_body '" + d.primitive_body + "' (" +
-                         shape_name(primitive) + ") has no distance; expected " +
-                         shapes_with([](const ShapeRow& row) { return row.distance.has_value(); }));
-      if (ball && !can_touch(general, primitive))
-        throw InputError(
-            d.source.prefix() + "general_body '" + d.general_body +
-            "' is a sphere, and primitive_body '" + d.primitive_body +
-            "' a mesh, whose distance is known only near its surface; expected the mesh "
-            "as general_body, with contact points nearer to each other than the "
-            "sphere is wide");
-      if (b1 == b2 || first.link == second.link)
+      if (first.link == second.link)
         throw InputError(d.source.prefix() + "bodies '" + d.general_body + "' and '" +
                          d.primitive_body + "' cannot move against each other");
       const std::vector<double> centre = {0, 0, 0};
@@ -298,9 +281,6 @@ class Compiler {
 
   void ground_contacts() {
     for (const GroundContactDescription& d : m_.scene.ground_contacts) {
-      if (!m_.scene.ground)
-        throw InputError(d.source.prefix() + "ground_contact of '" + d.body +
-                         "', but the scene has no <ground>");
       const int b = bodies_.find("body", d.body, d.source);
       const CompiledBody& body = m_.bodies[b];
       if (body.link < 0)
@@ -312,9 +292,6 @@ class Compiler {
         points = {0, 0, 0};
         ground.radius = body.size.x;
       }
-      if (points.empty())
-        throw InputError(d.source.prefix() + "body '" + d.body + "' (" + shape_name(shape) +
-                         ") has no contact points");
       for (std::size_t k = 0; k < points.size(); k += 3) {
         const Vec3<double> p =
             body.frame.R * Vec3<double>{points[k], points[k + 1], points[k + 2]} + body.frame.p;
@@ -445,7 +422,6 @@ class Compiler {
     m_.layout = {0, m_.nq, m_.nq + m_.nv, 2 * m_.nq + m_.nv, 2 * (m_.nq + m_.nv), 0, 0, past};
     int next = m_.layout.parameters;
     for (const RandomizationDescription& d : m_.scene.randomizations) {
-      name_of(d.number);  // throws if there is no such number
       if (!is_of_start(d.number)) vary(d, next);
       m_.randomized_row.push_back(is_of_start(d.number) ? state_row(d) : next++);
     }
@@ -455,14 +431,8 @@ class Compiler {
 
   int state_row(const RandomizationDescription& d) const {
     const int i = joints_.find("joint", d.number.name, d.source), k = d.number.component;
-    const JointType type = m_.scene.links[i].joint.type;
-    const bool position = d.number.field == NumberField::q;
-    const int count = position ? position_count(type) : dof_count(type);
-    if (k < 0 || k >= count)
-      throw InputError(d.source.prefix() + "joint '" + d.number.name + "' has " +
-                       std::to_string(count) + (position ? " coordinates" : " velocities") +
-                       "; index " + std::to_string(k) + " is not one of them");
-    return position ? m_.layout.q + m_.joints[i].q + k : m_.layout.v + m_.joints[i].v + k;
+    return d.number.field == NumberField::q ? m_.layout.q + m_.joints[i].q + k
+                                            : m_.layout.v + m_.joints[i].v + k;
   }
 
   /// Makes a row of the block the source of a number.

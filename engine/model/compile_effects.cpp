@@ -6,7 +6,7 @@
 #include <cstdio>
 #include <utility>
 
-#include "engine/model/shapes.hpp"
+#include "engine/scene/shapes.hpp"
 #include "kernels/contact/distance.hpp"
 
 namespace tangere {

@@ -6,8 +6,9 @@
 #include <array>
 #include <cmath>
 
-#include "engine/model/frames.hpp"
-#include "engine/model/scene_number.hpp"
+#include "engine/scene/frames.hpp"
+#include "engine/scene/scene_number.hpp"
+#include "engine/scene/schema.hpp"
 
 namespace tangere {
 
@@ -41,14 +42,14 @@ void name_coordinates(CompiledModel& m, const JointDescription& d) {
       v.insert(v.end(), {"wx", "wy", "wz"});
       break;
   }
-  const NumberKind& rate = number_kind(NumberOwner::joint, NumberField::v);
+  const Attribute& rate = number_kind(NumberOwner::joint, NumberField::v);
   for (std::size_t k = 0; k < q.size(); ++k) {
     m.q_names.push_back(d.name + "." + q[k]);
     m.q_units.emplace_back(coordinate_unit(d.type, static_cast<int>(k)));
   }
   for (std::size_t k = 0; k < v.size(); ++k) {
     m.v_names.push_back(d.name + "." + v[k]);
-    m.v_units.emplace_back(rate.unit_of(dof_turns(d.type, static_cast<int>(k))));
+    m.v_units.emplace_back(to_string(rate.unit_of(dof_turns(d.type, static_cast<int>(k)))));
   }
 }
 
@@ -57,18 +58,7 @@ const JointEffects& joint_effects_of_dof(const JointDescription& d, int k) {
   return d.turning && dof_turns(d.type, k) ? *d.turning : d;
 }
 
-void check_effects(const JointDescription& d, const JointEffects& e) {
-  const std::string of = d.source.prefix() + "joint '" + d.name + "': ";
-  for (std::size_t k = 0; k < kJointEffects; ++k)
-    if (!(e[k] >= 0) || !std::isfinite(e[k]))
-      throw InputError(of + number_kind(NumberOwner::joint, effect_field(k)).name + " is " +
-                       std::to_string(e[k]) + "; expected a finite number, zero or more");
-  if (e.limits && !((*e.limits)[0] <= (*e.limits)[1]))
-    throw InputError(of + "limits " + std::to_string((*e.limits)[0]) + " and " +
-                     std::to_string((*e.limits)[1]) + "; expected low, then high");
-}
-
-/// Flag and storage of an effect in kernels, in the order of effect_field().
+/// How kernels keep an effect and know of it, in the order of effect_field().
 struct EffectOfDof {
   kernels::Parameter kernels::DofEffects::*number;
   kernels::JointEffect flag;
@@ -104,21 +94,6 @@ std::uint8_t flags_of(const JointEffects& e) {
 int link_of_dof(const CompiledModel& m, int dof) {
   for (int i = 0;; ++i)
     if (dof < m.links[std::size_t(i)].v + kernels::dofs(m.links[std::size_t(i)].kind)) return i;
-}
-
-void check_motor(const MotorDescription& d) {
-  bool finite = std::isfinite(d.P) && std::isfinite(d.D);
-  const std::array<double, 2> sliding = {d.low, d.high};
-  for (const auto& [low, high] : {sliding, d.turning.value_or(sliding)}) {
-    if (d.control == MotorControl::position && !(low <= high))
-      throw InputError(d.source.prefix() + "motor of joint '" + d.joint + "': range " +
-                       std::to_string(low) + " " + std::to_string(high) +
-                       "; expected low, then high");
-    finite = finite && std::isfinite(low) && std::isfinite(high);
-  }
-  if (d.control == MotorControl::force ? !finite : !(d.P >= 0 && d.D >= 0))
-    throw InputError(d.source.prefix() + "motor of joint '" + d.joint +
-                     "': expected a finite range, or gains P and D of zero or more");
 }
 
 }  // namespace
@@ -195,14 +170,9 @@ void compile_joint_effects(CompiledModel& m) {
   for (std::size_t i = 0; i < m.scene.links.size(); ++i) {
     const JointDescription& d = m.scene.links[i].joint;
     const int count = dof_count(d.type);
-    if (!d.rest.empty() && d.rest.size() != std::size_t(count))
-      throw InputError(d.source.prefix() + "joint '" + d.name + "': rest has " +
-                       std::to_string(d.rest.size()) + " values; expected " +
-                       std::to_string(count));
     for (int k = 0; k < count; ++k) {
       const int dof = m.joints[i].v + k;
       const JointEffects& e = joint_effects_of_dof(d, k);
-      check_effects(d, e);
       m.dof_effects[std::size_t(dof)] = dof_effects(e, d.rest.empty() ? 0 : d.rest[std::size_t(k)]);
       m.links[std::size_t(link_of_dof(m, dof))].effects |= flags_of(e);
     }
@@ -210,16 +180,9 @@ void compile_joint_effects(CompiledModel& m) {
 }
 
 void compile_motors(CompiledModel& m, const NameIndex& joints) {
-  std::vector<char> driven(m.scene.links.size(), 0);
   for (const MotorDescription& d : m.scene.motors) {
     const auto i = std::size_t(joints.find("joint", d.joint, d.source));
     const JointType type = m.scene.links[i].joint.type;
-    if (dof_count(type) == 0)
-      throw InputError(d.source.prefix() + "motor on the fixed joint '" + d.joint + "'");
-    if (driven[i] != 0)
-      throw InputError(d.source.prefix() + "joint '" + d.joint + "' has two motors");
-    driven[i] = 1;
-    check_motor(d);
     for (int k = 0; k < dof_count(type); ++k) {
       const int dof = m.joints[i].v + k, at = link_of_dof(m, dof);
       Link& link = m.links[std::size_t(at)];
@@ -268,10 +231,6 @@ void vary_joint(CompiledModel& m, int joint, const RandomizationDescription& d, 
   const NumberField field = d.number.field;
   const CompiledJoint& compiled = m.joints[std::size_t(joint)];
   const JointDescription& of = m.scene.links[std::size_t(joint)].joint;
-  const auto fail = [&](const std::string& why) {
-    throw InputError(d.source.prefix() + "'" + name_of(d.number) + "' varies, but " + why);
-  };
-  bool found = false;
   if (d.number.owner == NumberOwner::motor) {
     const bool P = field == NumberField::P;
     for (CompiledMotor& motor : m.motors) {
@@ -280,16 +239,10 @@ void vary_joint(CompiledModel& m, int joint, const RandomizationDescription& d, 
       kernels::DofEffects& e = m.dof_effects[std::size_t(motor.dof)];
       (P ? motor.P : motor.D).row = row;
       (P ? e.P : e.D).row = row;
-      found = true;
     }
-    if (!found) fail("the joint has no position motor");
     return;
   }
-  if (dof_count(of.type) == 0) fail("the joint is fixed");
-  if (of.turning) fail("its dofs do not share one number");
-  if (field == NumberField::lim_stiffness && !of.limits) fail("the joint has no limits");
-  const auto effect = static_cast<std::size_t>(offset_from(NumberField::damping, field));
-  if (effect >= kJointEffects) fail("no dof of the joint turns by a number of its own");
+  const std::size_t effect = effect_index(field);
   for (int k = 0; k < dof_count(of.type); ++k) {
     const int dof = compiled.v + k;
     (m.dof_effects[std::size_t(dof)].*kEffectsOfDof[effect].number).row = row;

@@ -4,8 +4,6 @@
 
 #include <fmt/format.h>
 
-#include <cmath>
-
 #include "engine/model/lateral_spread.hpp"
 
 namespace tangere {
@@ -13,14 +11,6 @@ namespace tangere {
 CompiledMarkers compile_markers(const TactileDescription& d, int pressure_sign) {
   const MarkersDescription& of = *d.markers;
   const std::string where = fmt::format("{}markers of '{}': ", of.source.prefix(), d.name);
-  const auto check = [&](const char* name, double x, const char* unit) {
-    if (!(x >= 0) || !std::isfinite(x))
-      throw InputError(
-          fmt::format("{}{}=\"{}\"; expected a number from 0 on {}", where, name, x, unit));
-  };
-  check("stiffness", of.stiffness, "N/m");
-  check("thickness", of.thickness, "m");
-  check("spread", of.spread, "m");
   const double stiffness = of.stiffness > 0 ? of.stiffness : d.coefficients.ks;
   if (!(stiffness > 0))
     throw InputError(

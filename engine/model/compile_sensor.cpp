@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "engine/model/body_shape.hpp"
-#include "engine/model/frames.hpp"
 #include "engine/model/tactile_points.hpp"
+#include "engine/scene/frames.hpp"
 #include "kernels/table/kernel_table.hpp"
 
 namespace tangere {

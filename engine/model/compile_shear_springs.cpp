@@ -7,8 +7,8 @@
 
 #include "engine/model/compiled_model.hpp"
 #include "engine/model/contact_tiles.hpp"
-#include "engine/model/frames.hpp"
 #include "engine/model/group_contacts.hpp"
+#include "engine/scene/frames.hpp"
 #include "kernels/step/arguments.hpp"
 
 namespace tangere {
@@ -38,13 +38,13 @@ int add(CompiledModel& m, kernels::ShearSpringContact of) {
 }
 
 void add_grounds(CompiledModel& m) {
-  int number = kCoefficients * (static_cast<int>(m.pairs.size()) - 1);
-  for (kernels::GroundContact& g : m.grounds) {
-    number += kCoefficients;
+  for (int k = 0; k < m.view.n_grounds; ++k) {
+    kernels::GroundContact& g = m.grounds[std::size_t(k)];
     if (!has_shear_spring(g.parameters)) continue;
     kernels::ShearSpringContact of;
-    of.number = number;
+    of.number = m.view.rows.ground(k);
     of.ground = true;
+    of.grounded = k;
     of.radius = g.radius;
     of.radius_row = g.radius_row;
     of.contact = {};
@@ -139,7 +139,7 @@ void add_sensors(CompiledModel& m, bool keep_anchors) {
       of.contact.grid = body.grid;
       of.contact.body2 = target;
       of.sensor = s.number;
-      of.number = kernels::parameter_numbers(m.view) + kCoefficients * s.number;
+      of.number = m.view.rows.sensor(s.number);
       add(m, of);
     }
   }
@@ -172,7 +172,7 @@ void compile_shear_springs(CompiledModel& m) {
     kernels::ShearSpringContact of;
     of.contact = pair;
     of.pair = static_cast<int>(k);
-    of.number = kCoefficients * of.pair;
+    of.number = m.view.rows.pair(of.pair);
     pair.memory = add(m, of);
   }
   add_grounds(m);

@@ -8,10 +8,10 @@
 #include <cmath>
 
 #include "engine/model/compile_joints.hpp"
-#include "engine/model/frames.hpp"
-#include "engine/model/mass_properties.hpp"
-#include "engine/model/scene_number.hpp"
-#include "engine/model/shapes.hpp"
+#include "engine/model/link_inertia.hpp"
+#include "engine/scene/frames.hpp"
+#include "engine/scene/scene_number.hpp"
+#include "engine/scene/shapes.hpp"
 
 namespace tangere {
 
@@ -78,10 +78,7 @@ std::string drawn_slenderness_fault(const Scene& scene, BodyDescription& body) {
 void vary_density(CompiledModel& m, int body, const RandomizationDescription& d, int row) {
   const BodyDescription& b = m.scene.links[std::size_t(body)].body;
   const int link = m.bodies[std::size_t(body)].link;
-  if (std::holds_alternative<AbstractShape>(b.shape))
-    fail(d, "its mass is given; expected a body with volume");
   if (link < 0) fail(d, "it is fixed in the world");
-  if (!(b.density > 0)) fail(d, "it is massless; expected a positive density");
   VaryingInertia& varying = varying_inertia(m, link);
   const InertiaRows of_density =
       inertia_rows(m.bodies[std::size_t(body)], mass_properties(b.shape, 1));
@@ -94,16 +91,6 @@ void vary_size(CompiledModel& m, int body, const RandomizationDescription& d, in
   BodyDescription& b = m.scene.links[std::size_t(body)].body;
   CompiledBody& compiled = m.bodies[std::size_t(body)];
   const int which = size_index(d.number);
-  if (size_number(b.shape, which) == nullptr)
-    fail(d, with_article(shape_name(b.shape)) + " has none");
-  const Distribution& x = d.distribution;
-  const bool listed = x.kind == Distribution::Kind::list;
-  const double least = listed && !x.values.empty()
-                           ? *std::min_element(x.values.begin(), x.values.end())
-                       : listed ? 0
-                                : x.a;
-  if (x.kind == Distribution::Kind::normal || !(least > 0))
-    fail(d, "not all that may be drawn is positive");
   if (const std::string fault = drawn_slenderness_fault(m.scene, b); !fault.empty())
     fail(d, "that allows " + fault);
   for (const PairContactDescription& c : m.scene.pair_contacts) {
@@ -140,10 +127,7 @@ void vary_body(CompiledModel& m, int body, const RandomizationDescription& d, in
 }
 
 void vary_place(CompiledModel& m, int joint, const RandomizationDescription& d, int row) {
-  const CompiledJoint& compiled = m.joints[std::size_t(joint)];
   const int axis = d.number.component;
-  if (axis < 0 || axis > 2) fail(d, "index " + std::to_string(axis) + " is none of 0, 1, 2");
-  if (compiled.link_count == 0) fail(d, "the joint is fixed; expected one that moves");
   for (VaryingPlace& place : m.varying_places)
     if (place.joint == joint) {
       place.numbers.push_back({axis, row});

@@ -50,6 +50,13 @@ void point_view(CompiledModel& m) {
   v.solids = m.solids.data();
   v.n_shear_springs = static_cast<int>(m.shear_springs.size());
   v.memories = m.shear_springs.data();
+  kernels::ParameterRows& rows = v.rows;
+  rows.grounds = rows.pair(v.n_pairs);
+  rows.links = rows.ground(v.n_grounds);
+  rows.dofs = rows.link(v.n_links);
+  rows.solids = rows.dof(v.nv, 0);
+  rows.sensors = rows.solid(v.n_solids);
+  rows.count = rows.sensor(static_cast<int>(m.sensors.size()));
   v.pattern = m.pattern.view();
 }
 

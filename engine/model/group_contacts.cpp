@@ -8,7 +8,7 @@
 
 #include "engine/model/body_shape.hpp"
 #include "engine/model/compiled_model.hpp"
-#include "engine/model/shapes.hpp"
+#include "engine/scene/shapes.hpp"
 #include "kernels/contact/distance.hpp"
 
 namespace tangere {

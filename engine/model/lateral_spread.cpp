@@ -7,7 +7,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "engine/model/frames.hpp"
+#include "engine/scene/frames.hpp"
 
 namespace tangere {
 namespace {

@@ -2,7 +2,7 @@
 // Error of a mesh's distance grid at the surface. It is large where walls are thinner than cells.
 #pragma once
 
-#include "engine/model/scene.hpp"
+#include "engine/scene/scene.hpp"
 #include "kernels/contact/shapes/distance_grid.hpp"
 
 namespace tangere {

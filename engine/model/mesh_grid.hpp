@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "engine/model/mesh_fit.hpp"
-#include "engine/model/scene.hpp"
+#include "engine/scene/scene.hpp"
 #include "kernels/contact/shapes/distance_grid.hpp"
 
 namespace tangere {

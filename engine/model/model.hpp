@@ -9,9 +9,9 @@
 #include <string>
 #include <vector>
 
-#include "engine/model/effects.hpp"
 #include "engine/model/model_info.hpp"
-#include "engine/model/scene.hpp"
+#include "engine/scene/effects.hpp"
+#include "engine/scene/scene.hpp"
 
 namespace tangere {
 

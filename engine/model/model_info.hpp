@@ -6,7 +6,7 @@
 #include <cstddef>
 #include <string>
 
-#include "engine/model/effects.hpp"
+#include "engine/scene/effects.hpp"
 
 namespace tangere {
 

@@ -8,7 +8,7 @@
 #include <array>
 #include <cstdint>
 
-#include "engine/model/scene.hpp"
+#include "engine/scene/scene.hpp"
 
 namespace tangere {
 

@@ -7,7 +7,7 @@
 #include <numeric>
 
 #include "engine/model/body_shape.hpp"
-#include "engine/model/frames.hpp"
+#include "engine/scene/frames.hpp"
 #include "kernels/table/kernel_table.hpp"
 
 namespace tangere {

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "engine/model/field_form.hpp"
+#include "engine/scene/field_form.hpp"
 #include "engine/rows/run_facts.hpp"
 #include "engine/rows/sensor_layout.hpp"
 

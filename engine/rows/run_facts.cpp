@@ -2,7 +2,7 @@
 // Copies names and settings out of model and stepper.
 #include "engine/rows/run_facts.hpp"
 
-#include "engine/model/scene_number.hpp"
+#include "engine/scene/scene_number.hpp"
 
 namespace tangere {
 namespace {

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "engine/model/field_form.hpp"
+#include "engine/scene/field_form.hpp"
 #include "engine/model/model.hpp"
 #include "engine/rows/channel.hpp"
 

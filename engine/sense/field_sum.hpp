@@ -4,7 +4,7 @@
 
 #include <span>
 
-#include "engine/model/field_form.hpp"
+#include "engine/scene/field_form.hpp"
 #include "kernels/numbers/linalg.hpp"
 #include "kernels/tactile/tactile_types.hpp"
 

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // Applies the imperfections of a sensor to an ideal field, with tangent and pullback
-// (equations in engine/model/sensor_imperfections.hpp).
+// (equations in engine/scene/sensor_imperfections.hpp).
 #pragma once
 
 #include <span>
 
 #include "engine/model/compiled_model.hpp"
-#include "engine/model/field_form.hpp"
+#include "engine/scene/field_form.hpp"
 #include "engine/sense/pad_reader.hpp"
 #include "engine/step/batch.hpp"
 

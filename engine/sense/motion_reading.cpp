@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "engine/model/frames.hpp"
+#include "engine/scene/frames.hpp"
 
 namespace tangere {
 

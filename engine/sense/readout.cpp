@@ -10,8 +10,8 @@
 #include <type_traits>
 
 #include "engine/model/compiled_model.hpp"
-#include "engine/model/frames.hpp"
 #include "engine/model/model.hpp"
+#include "engine/scene/frames.hpp"
 #include "engine/sense/dense_tiles.hpp"
 #include "engine/sense/elastic_field.hpp"
 #include "engine/sense/field_sum.hpp"

@@ -9,8 +9,8 @@
 #include <limits>
 
 #include "engine/model/compiled_model.hpp"
-#include "engine/model/frames.hpp"
 #include "engine/model/model.hpp"
+#include "engine/scene/frames.hpp"
 #include "engine/sense/pad_reader.hpp"
 #include "engine/sense/point_depths.hpp"
 #include "engine/step/batch.hpp"

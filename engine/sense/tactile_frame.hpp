@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "engine/base/aligned.hpp"
-#include "engine/model/field_form.hpp"
 #include "engine/model/model.hpp"
+#include "engine/scene/field_form.hpp"
 
 namespace tangere {
 

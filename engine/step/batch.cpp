@@ -10,7 +10,7 @@
 #include "engine/model/compile_variations.hpp"
 #include "engine/model/model_part.hpp"
 #include "engine/model/random.hpp"
-#include "engine/model/scene_number.hpp"
+#include "engine/scene/scene_number.hpp"
 
 namespace tangere {
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Takes one step of a group of eight environments by the stages of its scheme
-// (engine/model/scheme.hpp), splits steps that do not converge, and cuts steps into parts that keep
+// (engine/scene/scheme.hpp), splits steps that do not converge, and cuts steps into parts that keep
 // an accuracy.
 #pragma once
 

@@ -14,7 +14,7 @@
 #include <numbers>
 
 #include "engine/model/model_part.hpp"
-#include "engine/model/shapes.hpp"
+#include "engine/scene/shapes.hpp"
 #include "engine/step/lane_energy.hpp"
 #include "kernels/contact/distance.hpp"
 #include "kernels/step/stage.hpp"

@@ -42,7 +42,7 @@ class Interpenetration {
                               const double* column, double motion) const;
 
  private:
-  /// Two bodies whose contact points are far apart (engine/model/contact_resolution.hpp).
+  /// Two bodies whose contact points are far apart (engine/scene/contact_resolution.hpp).
   struct CoarsePair {
     int body1, body2;
     std::vector<int> contacts;  ///< of these bodies, in either direction: indices of pairs

@@ -2,14 +2,14 @@
 // Error of a scheme in angular momentum, for bodies that rotate far in a step.
 //
 // A scheme integrates angular velocities in body axes. Its change of the momentum P = R J ω of a
-// body, in fixed axes, follows from its equations (engine/model/scheme.hpp): with T = J a + ω × Jω
+// body, in fixed axes, follows from its equations (engine/scene/scheme.hpp): with T = J a + ω × Jω
 // the torque of a stage, and ΔR its rotation since the start of the step,
 //   (c₀ ΔP + (s_before ΔP_before + Σ s_inner ΔP_j)/s_divisor)/h - ΔR T,  ΔP = ΔR Jω - Jω₀
 // should be zero. Solved for ΔP stage by stage, it is the error of momentum of the step. It is zero
 // for a constant axis of rotation, and of the scheme's order in the angle of rotation.
 #pragma once
 
-#include "engine/model/scheme.hpp"
+#include "engine/scene/scheme.hpp"
 #include "engine/step/workspace.hpp"
 
 namespace tangere {

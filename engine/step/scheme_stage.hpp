@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // Sets centre, c₀, r, s and first guess of a stage in a workspace's rows (equations in
-// engine/model/scheme.hpp).
+// engine/scene/scheme.hpp).
 #pragma once
 
-#include "engine/model/scheme.hpp"
+#include "engine/scene/scheme.hpp"
 #include "engine/step/state_difference.hpp"
 #include "engine/step/workspace.hpp"
 

@@ -5,7 +5,7 @@
 #include <algorithm>
 
 #include "engine/model/compiled_model.hpp"
-#include "engine/model/scene_number.hpp"
+#include "engine/scene/scene_number.hpp"
 
 namespace tangere {
 namespace {

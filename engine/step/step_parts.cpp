@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Cuts a step into parts whose errors keep the accuracy that was asked for.
 //
-// The estimates e and e_v of the errors of displacement and velocity (engine/model/scheme.hpp) say
+// The estimates e and e_v of the errors of displacement and velocity (engine/scene/scheme.hpp) say
 // how far the start and the stages are from one smooth motion. Stiff contacts pull most of either
 // back, so they are taken through the Jacobian A of the last stage:
 //   δ = A⁻¹ M (c₀/h)² e,   δ_v = A⁻¹ M (c₀/h) e_v

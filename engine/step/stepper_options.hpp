@@ -4,7 +4,7 @@
 
 #include <optional>
 
-#include "engine/model/scheme.hpp"
+#include "engine/scene/scheme.hpp"
 
 namespace tangere {
 

@@ -11,7 +11,7 @@
 
 #include "engine/model/body_shape.hpp"
 #include "engine/model/model_part.hpp"
-#include "engine/model/shapes.hpp"
+#include "engine/scene/shapes.hpp"
 #include "engine/step/lane_energy.hpp"
 #include "kernels/step/stage.hpp"
 

@@ -10,7 +10,7 @@
 #include <map>
 
 #include "engine/base/vector3.hpp"
-#include "engine/model/shapes.hpp"
+#include "engine/scene/shapes.hpp"
 
 namespace tangere {
 namespace {

@@ -5,7 +5,7 @@
 #include <array>
 #include <vector>
 
-#include "engine/model/scene.hpp"
+#include "engine/scene/scene.hpp"
 
 namespace tangere {
 

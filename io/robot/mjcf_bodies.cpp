@@ -7,7 +7,7 @@
 #include <cmath>
 #include <limits>
 
-#include "engine/model/shapes.hpp"
+#include "engine/scene/shapes.hpp"
 #include "io/robot/mesh_solid.hpp"
 #include "io/robot/mjcf_file.hpp"
 #include "io/robot/mjcf_words.hpp"

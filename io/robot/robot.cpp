@@ -11,7 +11,7 @@
 #include <filesystem>
 #include <variant>
 
-#include "engine/model/shapes.hpp"
+#include "engine/scene/shapes.hpp"
 #include "io/files/nearest_name.hpp"
 
 namespace tangere {

@@ -9,7 +9,7 @@
 #include <limits>
 
 #include "engine/model/model.hpp"
-#include "engine/model/shapes.hpp"
+#include "engine/scene/shapes.hpp"
 #include "io/files/text_file.hpp"
 #include "io/robot/mjcf_reader.hpp"
 #include "io/robot/robot_pads.hpp"

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "engine/model/scene.hpp"
+#include "engine/scene/scene.hpp"
 
 namespace tangere {
 

@@ -9,7 +9,8 @@
 #include <filesystem>
 #include <limits>
 
-#include "engine/model/shapes.hpp"
+#include "engine/scene/schema.hpp"
+#include "engine/scene/shapes.hpp"
 
 namespace tangere {
 namespace {
@@ -24,8 +25,20 @@ std::string numbers_text(const std::vector<double>& numbers) {
   return text;
 }
 
-std::string attribute(const char* name, double x, double usual) {
-  return x == usual ? "" : fmt::format(" {}=\"{}\"", name, number_text(x));
+/// ` name="value"` of all members of T that an element keeps, but for those with their default.
+template <class T>
+std::string members_text(Element element, const T& of, std::string_view type = {}) {
+  std::string text;
+  for_each_member<T>(element, [&](const Attribute& row, auto member) {
+    std::string value;
+    if constexpr (requires { (of.*member).size(); })
+      value = numbers_text({(of.*member).begin(), (of.*member).end()});
+    else
+      value = number_text(of.*member);
+    if (row.serves(type) && (row.usual == nullptr || value != row.usual))
+      text += fmt::format(" {}=\"{}\"", row.name, value);
+  });
+  return text;
 }
 
 const char* joint_word(JointType type) {
@@ -68,9 +81,7 @@ class Writer {
   }
 
   void write_ground(const GroundDescription& ground) {
-    out_ += "  <ground";
-    if (ground.position != Vector3{0, 0, 0})
-      out_ += fmt::format(" pos=\"{}\"", vector_text(ground.position));
+    out_ += "  <ground" + members_text(kGround, ground);
     if (ground.normal != Vector3{0, 0, 1})
       out_ += fmt::format(" normal=\"{}\"", vector_text(ground.normal));
     out_ += "/>\n";
@@ -94,12 +105,14 @@ class Writer {
                         joint_word(joint.type), pose_text(joint.pose));
     if (joint.type == JointType::revolute || joint.type == JointType::prismatic)
       out_ += fmt::format(" axis=\"{}\"", vector_text(joint.axis0));
-    out_ += attribute("damping", joint.damping, 0) + attribute("armature", joint.armature, 0) +
-            attribute("stiffness", joint.stiffness, 0);
-    if (!joint.rest.empty()) out_ += attribute("rest", joint.rest[0], 0);
+    JointEffects effects = joint;
+    if (!joint.limits) effects.limit_stiffness = 0;
+    out_ += members_text(kJoint, effects, to_string(joint.type));
+    if (!joint.rest.empty() && joint.rest[0] != 0)
+      out_ += fmt::format(" rest=\"{}\"", number_text(joint.rest[0]));
     if (joint.limits)
-      out_ += fmt::format(" lim=\"{} {}\" lim_stiffness=\"{}\"", number_text((*joint.limits)[0]),
-                          number_text((*joint.limits)[1]), number_text(joint.limit_stiffness));
+      out_ += fmt::format(" lim=\"{} {}\"", number_text((*joint.limits)[0]),
+                          number_text((*joint.limits)[1]));
     out_ += "/>\n";
   }
 
@@ -107,14 +120,10 @@ class Writer {
     out_ += fmt::format("{}<body name=\"{}\" type=\"{}\"{}", space, attribute_text(body.name),
                         shape_name(body.shape), pose_text(body.pose));
     write_size(body);
-    if (!std::holds_alternative<AbstractShape>(body.shape) &&
-        !std::holds_alternative<PlaneShape>(body.shape))
-      out_ += body.density > 0 ? fmt::format(" density=\"{}\"", number_text(body.density))
-                               : std::string(" mass=\"0\"");
-    constexpr std::array<double, 4> kUsual{0.7, 0.7, 0.7, 1};
-    if (body.rgba != kUsual)
-      out_ += fmt::format(" rgba=\"{} {} {} {}\"", body.rgba[0], body.rgba[1], body.rgba[2],
-                          body.rgba[3]);
+    const char* const type = shape_name(body.shape);
+    const bool massless = body.density == 0 && attribute_of(kBody, "density").serves(type);
+    out_ += massless ? " mass=\"0\"" : "";
+    out_ += members_text(kBody, body, massless ? "" : type);
     out_ += "/>\n";
   }
 
@@ -163,7 +172,7 @@ class Writer {
       const bool position = m.control == MotorControl::position;
       out_ += fmt::format("    <motor joint=\"{}\" ctrl=\"{}\"", attribute_text(m.joint),
                           position ? "position" : "force");
-      if (position) out_ += fmt::format(" P=\"{}\" D=\"{}\"", number_text(m.P), number_text(m.D));
+      out_ += members_text(kMotor, m, position ? "position" : "force");
       if (std::isfinite(m.low) || std::isfinite(m.high))
         out_ += fmt::format(" ctrl_range=\"{} {}\"", number_text(bounded(m.low)),
                             number_text(bounded(m.high)));
@@ -209,14 +218,9 @@ std::string replaced(std::string text, const std::string& what, const std::strin
 std::string number_text(double x) { return x == 0 ? "0" : fmt::format("{}", x); }
 
 std::string pose_text(const Pose& pose) {
-  std::string text;
-  if (pose.position != Vector3{0, 0, 0})
-    text += fmt::format(" pos=\"{}\"", vector_text(pose.position));
-  const Quaternion& q = pose.orientation;
-  if (q != Quaternion{1, 0, 0, 0} && q != Quaternion{-1, 0, 0, 0})
-    text += fmt::format(" quat=\"{} {} {} {}\"", number_text(q[0]), number_text(q[1]),
-                        number_text(q[2]), number_text(q[3]));
-  return text;
+  Pose written = pose;
+  if (pose.orientation == Quaternion{-1, 0, 0, 0}) written.orientation = {1, 0, 0, 0};
+  return members_text(kBody, written);
 }
 
 std::string attribute_text(const std::string& text) {

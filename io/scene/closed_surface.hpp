@@ -4,7 +4,7 @@
 
 #include <string>
 
-#include "engine/model/scene.hpp"
+#include "engine/scene/scene.hpp"
 #include "io/scene/triangle_files.hpp"
 
 namespace tangere {

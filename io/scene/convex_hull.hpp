@@ -4,7 +4,7 @@
 
 #include <vector>
 
-#include "engine/model/scene.hpp"
+#include "engine/scene/scene.hpp"
 
 namespace tangere {
 

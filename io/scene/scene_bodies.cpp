@@ -5,8 +5,10 @@
 #include <algorithm>
 #include <cmath>
 
-#include "engine/model/scene_number.hpp"
-#include "engine/model/shapes.hpp"
+#include "engine/scene/scene_faults.hpp"
+#include "engine/scene/scene_number.hpp"
+#include "engine/scene/schema.hpp"
+#include "engine/scene/shapes.hpp"
 #include "io/scene/convex_hull.hpp"
 #include "io/scene/scene_sections.hpp"
 #include "io/scene/surface_files.hpp"
@@ -16,146 +18,81 @@ namespace tangere {
 
 namespace {
 
-constexpr int kLargestResolution = 1000;  // contact points along one edge or around one ring
-constexpr int kMostSpread = 4096;         // contact points spread over a mesh
-
-using Names = std::vector<std::string>;
-
-/// The attributes that this element's type uses. The other attributes of bodies have no effect.
-class Attributes {
- public:
-  void use(std::initializer_list<const char*> names) {
-    for (const char* name : names) {
-      used.emplace_back(name);
-      idle.erase(std::remove(idle.begin(), idle.end(), name), idle.end());
-    }
-  }
-  void leave(const char* name) {
-    used.erase(std::remove(used.begin(), used.end(), name), used.end());
-    idle.emplace_back(name);
-  }
-
-  Attributes() { idle.insert(idle.end(), kLeftOver.begin(), kLeftOver.end()); }
-
-  Names used = {"name", "type", "pos", "quat", "density", "mass", "rgba"};
-  Names idle = {"scale",
-                "general_contact_resolution",
-                "general_contact_angle_resolution",
-                "general_contact_radius_resolution",
-                "size",
-                "radius",
-                "length",
-                "filename",
-                "hull",
-                "transform_type",
-                "inertia",
-                "mesh",
-                "resolution",
-                "error",
-                "count",
-                "pitch"};
-};
-
 /// Reads a shape that its size and the numbers of its contact points define completely.
-void read_sized(const SceneNode& node, const ShapeRow& row, Shape& shape, Attributes& attributes) {
-  const double length = node.context().length;
+void read_sized(const SceneElement& node, const ShapeRow& row, Shape& shape) {
   for (const SizeNumber& n : row.sizes) {
-    if (n.which < 2) {  // radius, length
-      const char* const name = number_kind(NumberOwner::body, size_of_body("", n.which).field).name;
-      attributes.use({name});
-      *n.at(shape) = node.positive(name) * length;
-      continue;
-    }
-    if (n.which == 2) attributes.use({"size"});
-    const double edge = scaled(node.vector("size"), length)[std::size_t(n.which - 2)];
-    if (!(edge > 0))
-      node.fail(fmt::format("size has the edge {} m; expected positive lengths", edge));
-    *n.at(shape) = edge;
+    const SceneNumber number = size_of_body("", n.which);
+    const char* const name = number_kind(number.owner, number.field).name;
+    *n.at(shape) = number.field == NumberField::size
+                       ? node.vector(name)[std::size_t(number.component)]
+                       : node.number(name);
   }
   for (const PointCounts& c : row.counts) {
-    attributes.use({c.attribute});
     std::vector<int> n;
     for (const auto& at : c.at) n.push_back(*at(shape));
-    if (n.size() == 1) {
-      n[0] = node.integer(c.attribute, c.least, kLargestResolution, n[0]);
-    } else {
-      n = node.integers(c.attribute, n, c.least, kLargestResolution);
-    }
+    n = node.integers(c.attribute, n, c.least, int(node.row(c.attribute).most));
     for (std::size_t k = 0; k < n.size(); ++k) *c.at[k](shape) = n[k];
   }
-  if (row.mass == nullptr) attributes.leave("density");
-  if (const std::string fault = slenderness_fault(shape); !fault.empty()) node.fail(fault);
 }
 
-/// Reads contact points of a <collision> in the scene's unit, from a file or for a hemisphere.
-std::vector<double> read_collision(const SceneNode& node) {
+/// Reads the file of contact points that an element names [m].
+std::vector<double> read_points_beside(const SceneNode& node) {
+  std::vector<double> points = read_beside(node, "contacts", read_contact_points);
+  for (double& x : points) x *= node.context().length;
+  return points;
+}
+
+/// Reads contact points of a <collision>, from a file or for a hemisphere [m].
+std::vector<double> read_collision(const SceneElement& node) {
   const bool generated = node.has("radius") || node.has("count");
   if (generated == node.has("contacts"))
     node.fail(
         fmt::format("{}; expected 'contacts' (a file), or 'radius' and 'count' (a hemisphere)",
                     generated ? "both 'contacts' and a hemisphere" : "no contact points"));
-  if (!generated) return read_beside(node, "contacts", read_contact_points);
+  if (!generated) return read_points_beside(node);
   std::vector<double> points;
-  for (const TactilePoint& p :
-       hemisphere_points(node.positive("radius"), node.integer("count", 1, kMostPoints)))
+  for (const TactilePoint& p : hemisphere_points(node.number("radius"), node.integer("count")))
     points.insert(points.end(), p.position.begin(), p.position.end());
   return points;
 }
 
-/// Appends contact points in the frame `at` of the body, in metres.
-void place_points(const std::vector<double>& points, const Pose& at, double length,
-                  std::vector<double>& out) {
-  for (std::size_t k = 0; k < points.size(); k += 3) {
-    const Vector3 p =
-        outer_point(at, {length * points[k], length * points[k + 1], length * points[k + 2]});
-    out.insert(out.end(), p.begin(), p.end());
-  }
-}
-
 /// Reads the contact points of an abstract body: those of its attribute `contacts`, which are in
 /// the body's frame, or those of its child <collision>.
-void read_contact_places(const SceneNode& node, double length, std::vector<double>& out) {
-  if (node.has("contacts"))
-    place_points(read_beside(node, "contacts", read_contact_points), Pose{}, length, out);
+void read_contact_places(const SceneNode& node, std::vector<double>& out) {
+  if (node.has("contacts")) out = read_points_beside(node);
   for (const SceneNode& child : node.children({"visual", "collision"})) {
-    if (child.name() == "visual") {
-      child.check_attributes({}, {"mesh", "pos", "quat"});
-      continue;
-    }
-    child.check_attributes({"contacts", "radius", "count", "pos", "quat"});
+    const SceneElement part(child, child.name() == "visual" ? kVisual : kCollision);
+    part.check();
+    if (part.of() == kVisual) continue;
     if (!out.empty())
-      child.fail(node.has("contacts") ? "the body has the attribute 'contacts' too; expected one"
-                                      : "given twice; expected once");
-    place_points(read_collision(child),
-                 {scaled(child.vector("pos", Vector3{0, 0, 0}), length), child.quaternion("quat")},
-                 length, out);
+      part.fail(node.has("contacts") ? "the body has the attribute 'contacts' too; expected one"
+                                     : "given twice; expected once");
+    Pose at;
+    part.read(at);
+    const std::vector<double> points = read_collision(part);
+    for (std::size_t k = 0; k < points.size(); k += 3) {
+      const Vector3 p = outer_point(at, {points[k], points[k + 1], points[k + 2]});
+      out.insert(out.end(), p.begin(), p.end());
+    }
   }
 }
 
-AbstractShape read_abstract(const SceneNode& node, double length) {
-  const SceneContext& c = node.context();
+AbstractShape read_abstract(const SceneElement& node) {
   AbstractShape shape;
-  shape.mass = node.not_negative("mass") * c.density * c.length * c.length * c.length;
+  shape.mass = node.number("mass");
   std::vector<double> inertia = node.numbers("inertia");
   if (inertia.size() == 3) inertia = {inertia[0], 0, 0, inertia[1], 0, inertia[2]};
   if (inertia.size() != 6)
     node.fail(fmt::format("inertia has {} numbers; expected 3 (xx yy zz) or 6 (xx xy xz yy yz zz)",
                           inertia.size()));
-  for (std::size_t k = 0; k < 6; ++k) shape.inertia[k] = inertia[k] * c.torque;
-  const bool weightless =
-      std::all_of(shape.inertia.begin(), shape.inertia.end(), [](double x) { return x == 0; });
-  if (shape.mass == 0 ? !weightless : !is_inertia(shape.inertia))
-    node.fail(
-        fmt::format("no solid body of mass {1} has inertia=\"{0}\"; expected positive moments, "
-                    "each at most the sum of the other two, or zeros with mass 0",
-                    node.text("inertia"), node.text("mass")));
-  read_contact_places(node, length, shape.contact_points);
+  std::copy(inertia.begin(), inertia.end(), shape.inertia.begin());
+  read_contact_places(node, shape.contact_points);
   return shape;
 }
 
 /// Reads with which points a mesh touches: with some of its vertices, or with points that are
 /// spread over its area. Without a number, it touches with all vertices.
-void read_contact_count(const SceneNode& node, double length, MeshShape& mesh) {
+void read_contact_count(const SceneElement& node, MeshShape& mesh) {
   const char* given = nullptr;
   for (const char* name : {"general_contact_resolution", "count", "pitch"}) {
     if (!node.has(name)) continue;
@@ -164,23 +101,23 @@ void read_contact_count(const SceneNode& node, double length, MeshShape& mesh) {
     given = name;
   }
   if (node.has("count")) {
-    mesh.contact_points = points_by_area(mesh, node.integer("count", 1, kMostSpread));
+    mesh.contact_points = points_by_area(mesh, node.integer("count"));
     return;
   }
   if (node.has("pitch")) {
-    const double pitch = node.positive("pitch") * length, area = area_of(mesh),
-                 count = std::round(area / (pitch * pitch));
-    if (!(count >= 1 && count <= kMostSpread))
+    const double pitch = node.number("pitch"), area = area_of(mesh),
+                 count = std::round(area / (pitch * pitch)), most = node.row("count").most;
+    if (!(count >= 1 && count <= most))
       node.fail(
           fmt::format("a pitch of {:g} m on an area of {:g} m² takes {:g} points; expected 1 "
                       "to {}",
-                      pitch, area, count, kMostSpread));
+                      pitch, area, count, most));
     mesh.contact_points = points_by_area(mesh, static_cast<int>(count));
     return;
   }
   if (!node.has("general_contact_resolution")) return;
   const auto vertices = static_cast<int>(mesh.vertices.size() / 3);
-  const int count = node.integer("general_contact_resolution", 1, kLargestResolution);
+  const int count = node.integer("general_contact_resolution");
   if (count > vertices)
     node.fail(
         fmt::format("general_contact_resolution=\"{}\"; expected at most the {} vertices of "
@@ -219,37 +156,27 @@ MeshShape read_written_mesh(const SceneNode& node, bool hull) {
   return out;
 }
 
-Shape read_shape(const SceneNode& node, Attributes& attributes) {
-  const double length = node.context().length;
-  Names names;
-  for (const ShapeRow& row : shape_rows()) names.emplace_back(row.name);
-  const ShapeRow& row = shape_rows()[std::size_t(node.choice("type", names))];
+Shape read_shape(const SceneElement& node, const ShapeRow& row) {
   Shape shape = row.make();
   if (std::holds_alternative<MeshShape>(shape)) {
-    attributes.use({"filename", "vertices", "triangles", "scale", "hull", "transform_type",
-                    "general_contact_resolution", "resolution", "error", "count", "pitch"});
-    MeshShape mesh = read_mesh(node, length);
-    mesh.resolution = node.integer("resolution", 0, MeshShape::kMostCells, mesh.resolution);
+    MeshShape mesh = read_mesh(node);
+    mesh.resolution = node.integer("resolution");
     if (node.has("error")) {
       if (node.has("resolution"))
         node.fail("error chooses the cells; expected error or resolution, not both");
-      mesh.error = node.positive("error", 1.0) * length;
+      mesh.error = node.number("error");
     }
-    read_contact_count(node, length, mesh);
+    read_contact_count(node, mesh);
     return mesh;
   }
-  if (std::holds_alternative<AbstractShape>(shape)) {
-    attributes.use({"inertia", "contacts", "mesh"});
-    attributes.leave("density");
-    return read_abstract(node, length);
-  }
-  read_sized(node, row, shape, attributes);
+  if (std::holds_alternative<AbstractShape>(shape)) return read_abstract(node);
+  read_sized(node, row, shape);
   return shape;
 }
 
 }  // namespace
 
-MeshShape read_mesh(const SceneNode& node, double length) {
+MeshShape read_mesh(const SceneNode& node) {
   const Vector3 scale = node.vector("scale", Vector3{1, 1, 1});
   for (const double s : scale)
     if (s == 0) node.fail("scale has 0; expected factors other than 0");
@@ -257,32 +184,34 @@ MeshShape read_mesh(const SceneNode& node, double length) {
   MeshShape shape = node.has("vertices")
                         ? read_written_mesh(node, hull)
                         : read_beside(node, "filename", hull ? read_hull : read_surface);
-  scale_surface(shape, scaled(scale, length));
+  scale_surface(shape, scaled(scale, node.context().length));
   return shape;
 }
 
-BodyDescription read_body(const SceneNode& node) {
+BodyDescription read_body(const SceneNode& child) {
+  const SceneElement node(child, kBody);
   BodyDescription body;
   body.source = node.source();
   body.name = node.text("name", "");
-  Attributes attributes;
-  body.shape = read_shape(node, attributes);
-  node.check_attributes(attributes.used, {"texture"}, attributes.idle);
-  body.pose.position = scaled(node.vector("pos", Vector3{0, 0, 0}), node.context().length);
-  body.pose.orientation = node.quaternion("quat");
-  body.density = node.positive("density", 1.0) * node.context().density;
+  std::vector<std::string> names;
+  for (const ShapeRow& row : shape_rows()) names.emplace_back(row.name);
+  const ShapeRow& row = shape_rows()[std::size_t(node.choice("type", names))];
+  node.check(row.name);
+  body.shape = read_shape(node, row);
+  node.refuse(body_fault(body));
+  node.read(body.pose);
+  node.read(body, false, row.name);
   if (node.has("mass") && !std::holds_alternative<AbstractShape>(body.shape)) {
     if (node.number("mass") != 0)
       node.fail("mass=\"" + node.text("mass") + "\"; expected 0 (massless), or a density");
     body.density = 0;
   }
-  read_colour(node, body.rgba);
   return body;
 }
 
 bool placed_in_world(const SceneNode& node, const BodyDescription& body) {
   if (!std::holds_alternative<MeshShape>(body.shape)) return false;
-  const int type = node.choice("transform_type", {"OBJ_TO_JOINT", "OBJ_TO_WORLD", "BODY_TO_JOINT"});
+  const std::size_t type = SceneElement(node, kBody).word("transform_type");
   if (type == 2)
     node.fail(
         "transform_type BODY_TO_JOINT places the mesh by its principal axes, whose directions are "

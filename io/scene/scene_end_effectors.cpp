@@ -8,19 +8,9 @@
 
 namespace tangere {
 
-void read_colour(const SceneNode& node, std::array<double, 4>& rgba) {
-  if (!node.has("rgba")) return;
-  const std::vector<double> c = node.numbers("rgba");
-  if (c.size() != 3 && c.size() != 4)
-    node.fail(fmt::format("rgba has {} numbers; expected 3 or 4", c.size()));
-  std::copy(c.begin(), c.end(), rgba.begin());
-}
-
 void read_end_effectors(Scene& scene, const SceneNode& section) {
-  section.check_attributes({});
-  for (const SceneNode& node : section.children({"endeffector"})) {
-    node.check_attributes({"name", "joint", "pos", "radius", "rgba"});
-    const double length = node.context().length;
+  for (const SceneElement& node : elements_in(section, kEndEffector)) {
+    node.check();
     EndEffectorDescription d;
     d.source = node.source();
     find_joint(scene, node, "joint");
@@ -29,9 +19,7 @@ void read_end_effectors(Scene& scene, const SceneNode& section) {
     for (const EndEffectorDescription& other : scene.end_effectors)
       if (!d.name.empty() && other.name == d.name)
         node.fail("endeffector name '" + d.name + "' is used twice");
-    d.position = scaled(node.vector("pos"), length);
-    if (node.has("radius")) d.radius = node.positive("radius") * length;
-    read_colour(node, d.rgba);
+    node.read(d);
     scene.end_effectors.push_back(std::move(d));
   }
 }

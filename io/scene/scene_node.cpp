@@ -18,27 +18,10 @@ constexpr const char* kAllow = " (--allow-unknown ignores it)";
 
 }  // namespace
 
-void SceneContext::use_centimetres_and_grams() {
-  length = 1e-2;
-  stiffness = 1e-3;
-  damping_force = 1e-3;
-  damping_area = 0.1;
-  density = 1e3;
-  force = 1e-5;
-  torque = 1e-7;
-  rotational = 1e-7;
-}
+void SceneContext::use_centimetres_and_grams() { length = kUnits[static_cast<int>(Unit::m)].in_si; }
 
-double SceneContext::factor(std::string_view unit) const {
-  if (unit == "m" || unit == "m/s") return length;
-  if (unit == "N/m") return stiffness;
-  if (unit == "N s/m") return damping_force;
-  if (unit == "N s/m^2") return damping_area;
-  if (unit == "kg/m^3") return density;
-  if (unit == "kg") return density * length * length * length;
-  // Torque per angle, rate or acceleration: a mass times a squared length.
-  if (unit == "N m/rad" || unit == "N m s/rad" || unit == "kg m^2") return rotational;
-  return 1;
+double SceneContext::factor(Unit unit) const {
+  return length == 1 ? 1 : kUnits[static_cast<int>(unit)].in_si;
 }
 
 void SceneNode::fail(const std::string& message) const {
@@ -52,6 +35,12 @@ void SceneNode::fail_at(const char* attribute, const std::string& message) const
     fail(fmt::format("{} (from the <include>, line {})", message, include_->GetLineNum()));
   fail(given == nullptr ? message
                         : fmt::format("{} (from <default>, line {})", message, given->line));
+}
+
+void SceneNode::fail_count(const char* attribute, std::size_t found,
+                           const std::string& expected) const {
+  fail_at(attribute, fmt::format("{}=\"{}\" has {} numbers; expected {}", attribute,
+                                 text(attribute).substr(0, 80), found, expected));
 }
 
 void SceneNode::warn(const std::string& message) const {
@@ -184,9 +173,7 @@ std::vector<double> SceneNode::numbers(const char* attribute, std::size_t count)
     out.push_back(x);
     p = end;
   }
-  if (count > 0 && out.size() != count)
-    fail_at(attribute, fmt::format("{}=\"{}\" has {} numbers; expected {}", attribute,
-                                   value.substr(0, 80), out.size(), count));
+  if (count > 0 && out.size() != count) fail_count(attribute, out.size(), std::to_string(count));
   return out;
 }
 

@@ -12,7 +12,8 @@
 #include <string_view>
 #include <vector>
 
-#include "engine/model/scene.hpp"
+#include "engine/scene/scene.hpp"
+#include "engine/scene/units.hpp"
 #include "io/files/nearest_name.hpp"
 
 namespace tangere {
@@ -32,9 +33,7 @@ struct SceneContext {
   /// Values for attributes that an element leaves out: [element][attribute].
   std::map<std::string, std::map<std::string, Default>> defaults;
 
-  // Factors to SI, by dimension.
-  double length = 1, stiffness = 1, damping_force = 1, damping_area = 1, density = 1, force = 1,
-         torque = 1, rotational = 1;
+  double length = 1;  ///< factor to metres
   void use_centimetres_and_grams();
   /// The file whose <include> names this one; nullptr for the file that the user names.
   SceneContext* includer = nullptr;
@@ -46,8 +45,8 @@ struct SceneContext {
     return includer == nullptr ? *this : includer->outermost();
   }
 
-  /// Factor from the scene's units to a unit of the table in engine/model/scene_number.cpp.
-  [[nodiscard]] double factor(std::string_view unit) const;
+  /// Factor from the scene's units to SI.
+  [[nodiscard]] double factor(Unit unit) const;
 };
 
 class SceneNode {
@@ -65,6 +64,8 @@ class SceneNode {
   [[noreturn]] void fail(const std::string& message) const;
   /// Fails because of an attribute's value. The message says if the value comes from <default>.
   [[noreturn]] void fail_at(const char* attribute, const std::string& message) const;
+  [[noreturn]] void fail_count(const char* attribute, std::size_t found,
+                               const std::string& expected) const;
   void warn(const std::string& message) const;
 
   /// Refuses attributes outside the three lists. Attributes in `used` are read. Those in `pictures`

@@ -38,7 +38,7 @@ class TreeReader {
   explicit TreeReader(Scene& scene) : scene_(scene) {}
 
   void read_robot(const SceneNode& robot) {
-    robot.check_attributes({"name"});
+    SceneElement(robot, kRobot).check();
     for (const SceneNode& link : robot.children({"link"})) read_link(link, parent_of(link), 0);
   }
 
@@ -70,12 +70,10 @@ class TreeReader {
 
   void read_link(const SceneNode& node, int parent, int depth) {
     if (depth > kDeepestTree) node.fail(fmt::format("links nested deeper than {}", kDeepestTree));
-    std::vector<std::string> used = {"name"};
-    if (depth == 0) used.emplace_back("parent");
     if (depth > 0 && node.has("parent"))
       node.fail("parent=\"" + node.text("parent") +
                 "\" of a link inside another; expected it of links directly in <robot>");
-    node.check_attributes(used, {}, {"design_params"});
+    SceneElement(node, kLink).check();
     LinkDescription link;
     link.name = node.text("name");
     link.parent = parent;
@@ -112,37 +110,22 @@ class TreeReader {
           fmt::format("{} name '{}' is used twice, first in line {}", kind, name, first->second));
   }
 
-  JointDescription read_joint(const SceneNode& node, int parent) {
-    const double length = node.context().length;
+  JointDescription read_joint(const SceneNode& child, int parent) {
+    const SceneElement node(child, kJoint);
     JointDescription joint;
     joint.source = node.source();
     joint.name = node.text("name");
     unique("joint", joint.name, node);
     joint.type = kJointTypeOf[node.choice("type", kJointTypes)];
-    std::vector<std::string> used = {"name", "type", "pos", "quat", "frame", "damping"};
-    std::vector<std::string> idle = {"lim",      "lim_stiffness", "stiffness", "rest",
-                                     "armature", "axis",          "axis0",     "axis1"};
-    idle.insert(idle.end(), kLeftOver.begin(), kLeftOver.end());
-    const auto take = [&](const char* attribute) {
-      used.emplace_back(attribute);
-      idle.erase(std::find(idle.begin(), idle.end(), attribute));
-    };
-    if (joint.type != JointType::fixed)
-      for (const char* effect : {"lim", "lim_stiffness", "stiffness", "rest", "armature"})
-        take(effect);
+    node.check(to_string(joint.type));
     if (joint.type == JointType::revolute || joint.type == JointType::prismatic) {
-      take("axis");
       joint.axis0 = node.direction("axis");
     } else if (joint.type == JointType::planar) {
-      take("axis0");
-      take("axis1");
       joint.axis0 = node.direction("axis0");
       joint.axis1 = node.direction("axis1");
     }
-    node.check_attributes(used, {}, idle);
-    joint.pose.position = scaled(node.vector("pos", Vector3{0, 0, 0}), length);
-    joint.pose.orientation = node.quaternion("quat");
-    if (node.choice("frame", {"LOCAL", "WORLD"}, 0) == 1) place_in_world(joint, parent);
+    node.read(joint.pose);
+    if (node.word("frame") == 1) place_in_world(joint, parent);
     read_joint_effects(node, joint);
     return joint;
   }
@@ -169,12 +152,11 @@ class TreeReader {
   std::map<std::string, int> names_;  // kind/name, line
 };
 
-void read_option(Scene& scene, const SceneNode& node) {
-  SceneContext& c = node.context();
-  node.check_attributes({"gravity", "timestep", "integrator", "unit"});
-  scene.gravity = scaled(node.vector("gravity", Vector3{0, 0, -9.8 / c.length}), c.length);
-  if (node.has("gravity")) scene.gravity_source = node.source();
-  scene.timestep = node.positive("timestep", 0.02);
+void read_option(Scene& scene, const SceneElement& node) {
+  node.check();
+  if (node.has("gravity"))
+    scene.gravity = node.vector("gravity"), scene.gravity_source = node.source();
+  node.read(scene);
   std::vector<std::string> names;
   for (const Integrator known : integrators()) names.emplace_back(to_string(known));
   if (node.has("integrator") && node.text("integrator") == "linear-implicit")
@@ -185,47 +167,27 @@ void read_option(Scene& scene, const SceneNode& node) {
   scene.integrator = integrators()[std::size_t(node.choice("integrator", names, 0))];
 }
 
-void read_solver(Scene& scene, const SceneNode& node) {
-  node.check_attributes({"tol", "max_iter", "accuracy", "energy", "sleep"}, {}, {"max_ls"});
-  if (node.has("tol")) scene.solver.tolerance = node.positive("tol");
-  if (node.has("accuracy")) {
-    scene.solver.accuracy = node.positive("accuracy");
-    if (!(*scene.solver.accuracy < 1))
-      throw InputError(node.source().prefix() + "accuracy " + node.text("accuracy") +
-                       "; expected a share below 1: 0.01 is one percent");
-  }
-  if (node.has("sleep")) {
-    scene.solver.sleep = node.positive("sleep");
-    scene.solver.sleep_source = node.source();
-    if (!(scene.solver.sleep < 1))
-      throw InputError(node.source().prefix() + "sleep " + node.text("sleep") +
-                       "; expected the share of its size that a body may move and still rest, "
-                       "below 1: 0.001 is usual");
-  }
-  if (node.has("energy"))
-    scene.solver.bounded_energy = node.choice("energy", {"bounded", "free"}, 0) == 0;
-  scene.solver.max_iterations = node.integer("max_iter", 1, 100000, scene.solver.max_iterations);
+void read_solver(Scene& scene, const SceneElement& node) {
+  node.check();
+  node.read(scene.solver);
+  if (node.has("sleep")) scene.solver.sleep_source = node.source();
+  scene.solver.bounded_energy = node.word("energy") == 0;
 }
 
-void read_defaults(const SceneNode& node) {
-  const std::map<std::string, std::vector<std::string>> known = {
-      {"joint", {"damping", "lim_stiffness", "stiffness", "armature"}},
-      {"body", {"density", "scale", "rgba"}},
-      {"general_primitive_contact", with_coefficients({"render", "law", "ramp"})},
-      {"ground_contact", with_coefficients({"render", "law", "ramp"})},
-      {"tactile", with_coefficients({"render", "law", "every", "memory"})},
-      {"motor", {"P", "D", "ctrl_range", "timing"}},
-      {"endeffector", {"radius", "rgba"}}};
-  std::vector<std::string> names;
-  names.reserve(known.size());
-  for (const auto& [name, attributes] : known) names.push_back(name);
-  for (const SceneNode& child : node.children(names)) {
-    const std::vector<std::string>& attributes = known.at(child.name());
-    const bool of_link = child.name() == "joint" || child.name() == "body";
-    child.check_attributes(attributes, {}, of_link ? kLeftOver : std::vector<std::string>{});
-    for (const std::string& a : attributes)
-      if (child.has(a.c_str()))
-        node.context().defaults[child.name()][a] = {child.text(a.c_str()), child.source().line};
+void read_ground(Scene& scene, const SceneElement& node) {
+  node.check();
+  scene.ground.emplace();
+  node.read(*scene.ground);
+  scene.ground->normal = node.direction("normal", scene.ground->normal);
+}
+
+void read_defaults(const SceneNode& section) {
+  for (const SceneElement& node :
+       elements_in(section, kJoint | kBody | kTouching | kMotor | kEndEffector)) {
+    node.check_default();
+    for (const Attribute& a : schema())
+      if ((a.of & node.of()) != 0 && a.has(kInDefault) && node.has(a.name))
+        section.context().defaults[node.name()][a.name] = {node.text(a.name), node.source().line};
   }
 }
 
@@ -268,14 +230,10 @@ void read_root(const SceneNode& root, Scene& scene) {
   scene.timestep = 0.02;
   scene.integrator = Integrator::default_integrator;
   scene.gravity = {0, 0, -9.8};
-  once("option", [&](const SceneNode& s) { read_option(scene, s); });
-  once("solver_option", [&](const SceneNode& s) { read_solver(scene, s); });
+  once("option", [&](const SceneNode& s) { read_option(scene, {s, kOption}); });
+  once("solver_option", [&](const SceneNode& s) { read_solver(scene, {s, kSolver}); });
   each("default", [&](const SceneNode& s) { read_defaults(s); });
-  once("ground", [&](const SceneNode& s) {
-    s.check_attributes({"pos", "normal"}, {"size", "texture", "rgba"});
-    scene.ground = GroundDescription{scaled(s.vector("pos", Vector3{0, 0, 0}), s.context().length),
-                                     s.direction("normal", Vector3{0, 0, 1})};
-  });
+  once("ground", [&](const SceneNode& s) { read_ground(scene, {s, kGround}); });
   TreeReader tree(scene);
   each("robot", [&](const SceneNode& s) { tree.read_robot(s); });
   tree.name_bodies();

@@ -6,8 +6,9 @@
 #include <cmath>
 #include <filesystem>
 
-#include "engine/model/scene_number.hpp"
-#include "engine/model/shapes.hpp"
+#include "engine/scene/scene_faults.hpp"
+#include "engine/scene/scene_number.hpp"
+#include "engine/scene/shapes.hpp"
 #include "io/files/csv.hpp"
 #include "io/scene/scene_sections.hpp"
 
@@ -32,13 +33,13 @@ std::vector<double> read_controls(const Scene& scene, const SceneNode& node) {
   return values;
 }
 
-PiecewiseControl read_piecewise(const Scene& scene, const SceneNode& node) {
+PiecewiseControl read_piecewise(const Scene& scene, const SceneElement& node) {
   PiecewiseControl control;
-  node.check_attributes({"end"});
-  control.end = node.has("end") ? node.positive("end") : 0;
-  for (const SceneNode& at : node.children({"at"})) {
-    at.check_attributes({"time", "value"});
-    const double time = at.not_negative("time");
+  node.read(control);
+  for (const SceneNode& child : node.children({"at"})) {
+    const SceneElement at(child, kAt);
+    at.check();
+    const double time = at.number("time");
     if (control.times.empty() && time != 0)
       at.fail(fmt::format("time=\"{}\"; the first must be 0", time));
     if (!control.times.empty() && !(time > control.times.back()))
@@ -80,139 +81,80 @@ Distribution read_distribution(const SceneNode& node, double scale) {
   return d;
 }
 
-/// Refuses a normal distribution, because every draw of a coefficient must be zero or more.
-void check_coefficient(const SceneNode& node, const Distribution& d) {
-  if (d.kind == Distribution::Kind::normal)
-    node.fail("normal can draw a negative coefficient; expected uniform, log_uniform or list");
-  bool negative = d.a < 0;
-  for (double x : d.values) negative = negative || x < 0;
-  if (negative) node.fail("a coefficient may not be negative");
-}
-
-/// Reads the attribute `field`: one of the owner's fields from `first` to `last`.
-NumberField read_field(const SceneNode& node, NumberOwner owner, NumberField first,
-                       NumberField last) {
+/// Reads the attribute `field`: one of the numbers of an owner that may vary.
+NumberField read_field(const SceneNode& node, NumberOwner owner) {
   std::vector<std::string> names;
-  for (int k = 0; k <= offset_from(first, last); ++k)
-    names.emplace_back(number_kind(owner, NumberField(int(first) + k)).name);
-  return static_cast<NumberField>(static_cast<int>(first) + int(node.choice("field", names)));
+  std::vector<NumberField> fields;
+  for (const Attribute& row : schema()) {
+    if ((row.of & element_of(owner)) == 0 || !row.has(kVaries) || row.has(kIndexed)) continue;
+    names.emplace_back(row.name);
+    fields.push_back(*row.field);
+  }
+  return fields[std::size_t(node.choice("field", names))];
 }
 
 /// Reads a distribution in the unit of a number.
 Distribution read_distribution(const Scene& scene, const SceneNode& node, const SceneNumber& n) {
-  return read_distribution(node, node.context().factor(unit_of(scene, n)));
+  const std::vector<Unit> units = units_of(scene, n);
+  return read_distribution(node, units.size() == 1 ? node.context().factor(units[0]) : 1);
 }
 
 /// Reads damping, armature, stiffness, lim_stiffness of a joint, or P, D of its motor.
-void read_joint_variation(const Scene& scene, const SceneNode& node, RandomizationDescription& d) {
-  const bool motor = node.name() == "motor";
-  const char* by = motor ? "joint" : "name";
-  const JointDescription& joint = scene.links[std::size_t(find_joint(scene, node, by))].joint;
-  node.check_attributes({by, "field", "uniform", "log_uniform", "normal", "list"});
+void read_joint_variation(const Scene& scene, const SceneElement& node,
+                          RandomizationDescription& d) {
+  const bool motor = node.of() == kVaryMotor;
+  const JointDescription& joint =
+      scene.links[std::size_t(find_joint(scene, node, motor ? "joint" : "name"))].joint;
   d.number.name = joint.name;
-  if (motor) {
-    d.number.owner = NumberOwner::motor;
-    d.number.field = read_field(node, NumberOwner::motor, NumberField::P, NumberField::D);
-    bool position = false;
-    for (const MotorDescription& m : scene.motors)
-      position = position || (m.joint == joint.name && m.control == MotorControl::position);
-    if (!position)
-      node.fail("joint '" + joint.name + "' has no position motor; force motors have no gains");
-  } else {
-    d.number.field =
-        read_field(node, NumberOwner::joint, NumberField::damping, NumberField::lim_stiffness);
-    if (joint.type == JointType::fixed)
-      node.fail("joint '" + joint.name + "' is fixed; nothing of it can vary");
-    if (d.number.field == NumberField::lim_stiffness && !joint.limits)
-      node.fail("joint '" + joint.name + "' has no 'lim'");
-    const bool mixed = joint.type == JointType::free || joint.type == JointType::free2d;
-    if (mixed && node.context().length != 1)
-      node.fail("joint '" + joint.name +
-                "' slides and turns: one number has two units; use unit=\"m-kg\"");
-  }
-  d.distribution = read_distribution(scene, node, d.number);
-  check_coefficient(node, d.distribution);
+  d.number.owner = motor ? NumberOwner::motor : NumberOwner::joint;
+  d.number.field = read_field(node, d.number.owner);
+  const bool mixed = joint.type == JointType::free || joint.type == JointType::free2d;
+  if (!motor && mixed && node.context().length != 1)
+    node.fail("joint '" + joint.name +
+              "' slides and turns: one number has two units; use unit=\"m-kg\"");
 }
 
 /// Reads a coordinate or velocity at the start, or the place of a joint.
-void read_state_variation(const Scene& scene, const SceneNode& node, RandomizationDescription& d) {
-  node.check_attributes({"name", "q", "v", "pos", "uniform", "log_uniform", "normal", "list"});
+void read_state_variation(const Scene& scene, const SceneElement& node,
+                          RandomizationDescription& d) {
   const int joint = find_joint(scene, node, "name");
   const JointType type = scene.links[std::size_t(joint)].joint.type;
   if (int{node.has("q")} + int{node.has("v")} + int{node.has("pos")} != 1)
     node.fail("expected exactly one of q, v, pos (the index of what varies) and field");
   d.number.name = node.text("name");
   if (node.has("pos")) {
-    if (type == JointType::fixed)
-      node.fail("joint '" + d.number.name + "' is fixed; expected one that moves");
     d.number.field = NumberField::pos;
-    d.number.component = node.integer("pos", 0, 2);
+    d.number.component = node.integer("pos");
   } else {
     const bool position = node.has("q");
-    const int count = position ? position_count(type) : dof_count(type);
-    if (count == 0) node.fail("joint '" + d.number.name + "' is fixed; nothing of it can vary");
+    const int count = std::max(1, position ? position_count(type) : dof_count(type));
     d.number.field = position ? NumberField::q : NumberField::v;
-    d.number.component = node.integer(position ? "q" : "v", 0, count - 1);
+    d.number.component = node.SceneNode::integer(position ? "q" : "v", 0, count - 1);
   }
-  d.distribution = read_distribution(scene, node, d.number);
-}
-
-/// Requires positive draws for masses and sizes.
-void check_positive(const SceneNode& node, const RandomizationDescription& of) {
-  const Distribution& d = of.distribution;
-  if (d.kind == Distribution::Kind::normal)
-    node.fail("normal can draw a negative '" + name_of(of.number) +
-              "'; expected uniform, log_uniform or list");
-  double least = d.a;
-  if (d.kind == Distribution::Kind::list)
-    least = *std::min_element(d.values.begin(), d.values.end());
-  if (!(least > 0))
-    node.fail(fmt::format("'{}' can be {:g}, in SI units; expected positive values only",
-                          name_of(of.number), least));
 }
 
 /// Reads the density of a body, or a number of its size.
-void read_body_variation(const Scene& scene, const SceneNode& node, RandomizationDescription& d) {
-  node.check_attributes({"name", "field", "size", "uniform", "log_uniform", "normal", "list"});
+void read_body_variation(const Scene& scene, const SceneElement& node,
+                         RandomizationDescription& d) {
   const BodyDescription& body = scene.links[std::size_t(find_body(scene, node, "name"))].body;
   if (node.has("field") == node.has("size"))
     node.fail("expected exactly one of field and size (the index of an edge)");
-  constexpr NumberField kFields[] = {NumberField::radius, NumberField::length, NumberField::density,
-                                     NumberField::scale};
-  std::vector<std::string> fields;
-  for (const NumberField field : kFields)
-    fields.emplace_back(number_kind(NumberOwner::body, field).name);
   d.number = {NumberOwner::body, NumberField::size, body.name};
   if (node.has("size")) {
-    d.number.component = node.integer("size", 0, 2);
+    d.number.component = node.integer("size");
   } else {
-    d.number.field = kFields[node.choice("field", fields)];
+    d.number.field = read_field(node, NumberOwner::body);
   }
-  if (d.number.field != NumberField::density) {
-    Shape shape = body.shape;
-    if (size_number(shape, size_index(d.number)) == nullptr)
-      node.fail(fmt::format("there is no '{}': body '{}' is {}; expected a body that has one",
-                            name_of(d.number), body.name, with_article(shape_name(shape))));
-  } else {
-    if (std::holds_alternative<AbstractShape>(body.shape))
-      node.fail("body '" + body.name + "' is known by its mass; nothing of it can vary");
-    if (!(body.density > 0))
-      node.fail("body '" + body.name + "' is massless; expected a positive density");
-  }
-  d.distribution = read_distribution(scene, node, d.number);
-  check_positive(node, d);
 }
 
-void read_coefficient_variation(const Scene& scene, const SceneNode& node,
+void read_coefficient_variation(const Scene& scene, const SceneElement& node,
                                 RandomizationDescription& d) {
-  std::vector<std::string> attributes = {"field", "uniform", "log_uniform", "normal", "list"};
   const auto declared = [&](const auto& list, const auto& matches) {
     if (std::none_of(list.begin(), list.end(), matches))
       node.fail("no such contact is declared in <contact>");
   };
   SceneNumber& n = d.number;
-  if (node.name() == "general_primitive_contact") {
-    attributes.insert(attributes.end(), {"general_body", "primitive_body"});
+  if (node.of() == kVaryPair) {
     find_body(scene, node, "general_body");
     find_body(scene, node, "primitive_body");
     n.owner = NumberOwner::contact;
@@ -221,39 +163,28 @@ void read_coefficient_variation(const Scene& scene, const SceneNode& node,
     declared(scene.pair_contacts, [&](const PairContactDescription& c) {
       return c.first_name() == n.name && c.primitive_body == n.second_name;
     });
-  } else if (node.name() == "ground_contact") {
-    attributes.emplace_back("body");
+  } else if (node.of() == kVaryGround) {
     find_body(scene, node, "body");
     n.owner = NumberOwner::ground;
     n.name = node.text("body");
     declared(scene.ground_contacts,
              [&](const GroundContactDescription& c) { return c.body == n.name; });
   } else {
-    attributes.emplace_back("name");
     n.owner = NumberOwner::tactile;
     n.name = node.text("name");
     std::vector<std::string> names;
     for (const auto& s : scene.sensors) names.push_back(s.name);
     if (std::find(names.begin(), names.end(), n.name) == names.end())
       node.fail("no tactile sensor is named '" + n.name + "'" + suggestion(n.name, names));
-    for (const PairContactDescription& c : scene.pair_contacts)
-      if (c.sensor == n.name)
-        node.fail("tactile sensor '" + n.name +
-                  "' has feedback, so its coefficients act on the motion as well; they cannot vary "
-                  "between environments");
   }
-  node.check_attributes(attributes);
-  n.field = coefficient_field(node.choice("field", with_coefficients({})));
-  d.distribution = read_distribution(scene, node, n);
-  check_coefficient(node, d.distribution);
+  n.field = read_field(node, n.owner);
 }
 
 }  // namespace
 
 void read_initial(Scene& scene, const SceneNode& section) {
-  section.check_attributes({});
-  for (const SceneNode& node : section.children({"joint"})) {
-    node.check_attributes({"name", "q", "v"});
+  for (const SceneElement& node : elements_in(section, kInitialJoint)) {
+    node.check();
     const int joint = find_joint(scene, node, "name");
     const JointType type = scene.links[std::size_t(joint)].joint.type;
     InitialState state;
@@ -277,18 +208,17 @@ void read_initial(Scene& scene, const SceneNode& section) {
 }
 
 void read_control(Scene& scene, const SceneNode& section) {
-  section.check_attributes({});
-  const std::vector<SceneNode> kinds = section.children({"constant", "piecewise", "csv", "random"});
+  const std::vector<SceneElement> kinds =
+      elements_in(section, kConstant | kPiecewise | kCsv | kRandom);
   if (kinds.size() != 1)
     section.fail(fmt::format("{} ways to drive the scene; expected one", kinds.size()));
-  const SceneNode& node = kinds.front();
-  if (node.name() == "constant") {
-    node.check_attributes({"value"});
+  const SceneElement& node = kinds.front();
+  node.check();
+  if (node.of() == kConstant) {
     scene.control = ConstantControl{read_controls(scene, node)};
-  } else if (node.name() == "piecewise") {
+  } else if (node.of() == kPiecewise) {
     scene.control = read_piecewise(scene, node);
-  } else if (node.name() == "csv") {
-    node.check_attributes({"file"});
+  } else if (node.of() == kCsv) {
     const std::filesystem::path beside = std::filesystem::path(node.context().file).parent_path();
     CsvControl control;
     control.path = (beside / node.text("file")).string();
@@ -297,28 +227,26 @@ void read_control(Scene& scene, const SceneNode& section) {
     control.rows = read_csv(control.path, std::size_t(control_count(scene)));
     scene.control = std::move(control);
   } else {
-    node.check_attributes({"amplitude", "period"});
-    scene.control =
-        RandomControl{node.not_negative("amplitude", 1.0), node.positive("period", 0.1)};
+    node.read(scene.control.emplace().emplace<RandomControl>());
   }
 }
 
 void read_randomize(Scene& scene, const SceneNode& section) {
-  section.check_attributes({});
-  const std::vector<std::string> kinds = {
-      "joint", "motor", "ground_contact", "general_primitive_contact", "tactile", "body"};
-  for (const SceneNode& node : section.children(kinds)) {
+  for (const SceneElement& node : elements_in(section, kVarying)) {
+    node.check();
     RandomizationDescription d;
     d.source = node.source();
-    if (node.name() == "motor" || (node.name() == "joint" && node.has("field"))) {
+    if (node.of() == kVaryMotor || (node.of() == kVaryJoint && node.has("field"))) {
       read_joint_variation(scene, node, d);
-    } else if (node.name() == "joint") {
+    } else if (node.of() == kVaryJoint) {
       read_state_variation(scene, node, d);
-    } else if (node.name() == "body") {
+    } else if (node.of() == kVaryBody) {
       read_body_variation(scene, node, d);
     } else {
       read_coefficient_variation(scene, node, d);
     }
+    d.distribution = read_distribution(scene, node, d.number);
+    node.refuse(variation_fault(scene, d));
     for (const RandomizationDescription& other : scene.randomizations)
       if (other.number == d.number) node.fail("'" + name_of(d.number) + "' already varies");
     scene.randomizations.push_back(std::move(d));

@@ -8,19 +8,16 @@
 #include <array>
 #include <cmath>
 
-#include "engine/model/contact_resolution.hpp"
-#include "engine/model/scene_number.hpp"
-#include "engine/model/shapes.hpp"
+#include "engine/scene/contact_resolution.hpp"
+#include "engine/scene/scene_faults.hpp"
+#include "engine/scene/shapes.hpp"
 
 namespace tangere {
 
 namespace {
 
-const std::vector<std::string> kLaws = {"clamped", "paper", "linear", "published"};
-constexpr ContactLaw kLawOf[] = {ContactLaw::clamped, ContactLaw::paper, ContactLaw::linear,
-                                 ContactLaw::linear};
 constexpr std::size_t kPublishedShare = 50;  // vertices of a mesh for each that touches there
-constexpr int kClamped = 0, kLinear = 2, kPublished = 3;  // indices into them
+constexpr std::size_t kPublished = 3;        // among the words of `law`
 
 template <class Name>
 int find_named(const Scene& scene, const SceneNode& node, const char* attribute, const char* kind,
@@ -37,33 +34,17 @@ int find_named(const Scene& scene, const SceneNode& node, const char* attribute,
 
 /// Reads law, ramp and coefficients of a contact of either kind.
 template <class Contact>
-void read_law(const SceneNode& node, int fallback, Contact& contact) {
-  const int law = node.choice("law", kLaws, fallback);
-  contact.law = kLawOf[law];
-  if (node.has("ramp")) contact.ramp = node.not_negative("ramp") * node.context().length;
-  if (node.has("ramp") && law != kLinear)
-    node.warn("'ramp' has no effect with law=\"" + kLaws[std::size_t(law)] + "\"");
+void read_law(const SceneElement& node, Contact& contact) {
+  const std::size_t law = node.word("law");
+  contact.law = law == kPublished ? ContactLaw::linear : static_cast<ContactLaw>(law);
+  if (node.has("ramp")) contact.ramp = node.number("ramp");
+  if (node.has("ramp") && (law == kPublished || contact.law != ContactLaw::linear))
+    node.warn("'ramp' has no effect with law=\"" + node.text("law", to_string(contact.law)) + "\"");
   if (law == kPublished) contact.ramp = 0;
-  contact.coefficients = read_coefficients(node, contact.law);
+  node.read(contact.coefficients, contact.law == ContactLaw::linear);
 }
 
 }  // namespace
-
-std::vector<std::string> with_coefficients(std::vector<std::string> attributes) {
-  for (int k = 0; k < kCoefficients; ++k)
-    attributes.emplace_back(number_kind(NumberOwner::contact, coefficient_field(k)).name);
-  return attributes;
-}
-
-ContactCoefficients read_coefficients(const SceneNode& node, ContactLaw law) {
-  ContactCoefficients c{};
-  for (int k = 0; k < kCoefficients; ++k) {
-    const NumberKind& kind = number_kind(NumberOwner::contact, coefficient_field(k));
-    c[std::size_t(k)] = node.not_negative(kind.name, 0.0) *
-                        node.context().factor(kind.unit_of(law == ContactLaw::linear));
-  }
-  return c;
-}
 
 int find_joint(const Scene& scene, const SceneNode& node, const char* attribute) {
   return find_named(scene, node, attribute, "joint",
@@ -118,56 +99,25 @@ void warn_of_coarse_points(const Scene& scene, const SceneNode& root) {
 }
 
 void read_contacts(Scene& scene, const SceneNode& section) {
-  section.check_attributes({});
-  for (const SceneNode& node : section.children({"ground_contact", "general_primitive_contact"})) {
-    if (node.name() == "ground_contact") {
-      node.check_attributes(with_coefficients({"body", "law", "ramp"}), {"render", "scale"});
-      if (!scene.ground) node.fail("the scene has no <ground> to touch");
+  for (const SceneElement& node : elements_in(section, kContacts)) {
+    node.check();
+    if (node.of() == kGroundContact) {
       GroundContactDescription d;
       d.source = node.source();
-      const int body = find_body(scene, node, "body");
+      find_body(scene, node, "body");
       d.body = node.text("body");
-      const Shape& shape = scene.links[std::size_t(body)].body.shape;
-      if (!has_contact_points(shape) && !is_ball(shape))
-        node.fail("body '" + d.body + "' is " + with_article(shape_name(shape)) + " body" +
-                  ", which has no contact points");
-      read_law(node, kLinear, d);
+      read_law(node, d);
+      node.refuse(contact_fault(scene, d));
       scene.ground_contacts.push_back(std::move(d));
     } else {
-      node.check_attributes(with_coefficients({"general_body", "primitive_body", "law", "ramp"}),
-                            {"render", "scale"});
       PairContactDescription d;
       d.source = node.source();
-      const int general = find_body(scene, node, "general_body");
-      const int primitive = find_body(scene, node, "primitive_body");
+      find_body(scene, node, "general_body");
+      find_body(scene, node, "primitive_body");
       d.general_body = node.text("general_body");
       d.primitive_body = node.text("primitive_body");
-      if (general == primitive)
-        node.fail("body '" + d.general_body + "' against itself; expected two bodies");
-      const Shape& points = scene.links[std::size_t(general)].body.shape;
-      if (!has_contact_points(points) && !is_ball(points))
-        node.fail(fmt::format(
-            "general_body '{}' is {} body, which has no contact points; {}", d.general_body,
-            with_article(shape_name(points)),
-            has_distance(points) ? "swap the two bodies" : "give it a <collision contacts>"));
-      const Shape& touched = scene.links[std::size_t(primitive)].body.shape;
-      if (!has_distance(touched) && std::holds_alternative<MeshShape>(touched))
-        node.fail(
-            fmt::format("primitive_body '{}' is a mesh with resolution=\"0\", which has no "
-                        "distance function; expected a resolution of 1 or more",
-                        d.primitive_body));
-      if (!has_distance(touched))
-        node.fail(fmt::format(
-            "primitive_body '{}' is {} body, which has no distance function; expected {}",
-            d.primitive_body, with_article(shape_name(touched)),
-            shapes_with([](const ShapeRow& row) { return row.distance.has_value(); })));
-      if (!can_touch(points, touched))
-        node.fail(fmt::format(
-            "general_body '{}' is a sphere, and primitive_body '{}' a mesh, whose distance is "
-            "known only near its surface; expected the mesh as general_body, with contact points "
-            "nearer to each other than the sphere is wide ('pitch' or 'count')",
-            d.general_body, d.primitive_body));
-      read_law(node, kClamped, d);
+      read_law(node, d);
+      node.refuse(contact_fault(scene, d));
       scene.pair_contacts.push_back(std::move(d));
     }
   }

@@ -6,16 +6,9 @@
 #include <filesystem>
 
 #include "engine/base/error.hpp"
-#include "io/scene/scene_node.hpp"
+#include "io/scene/scene_element.hpp"
 
 namespace tangere {
-
-/// Limit of the surface points of a body and of the points of a sensor.
-inline constexpr int kMostPoints = 1 << 20;
-
-/// Attributes that published scenes leave on bodies and joints, and that no reader of the dialect
-/// uses there. They give warnings.
-inline const std::vector<std::string> kLeftOver = {"mu", "damping", "format", "contacts"};
 
 /// Reads a body in its joint's frame, including files that it names. The name is empty if it has
 /// none.
@@ -54,18 +47,9 @@ auto read_beside(const SceneNode& node, const char* attribute, Read&& read) {
 }
 
 /// Reads the closed surface of `filename`, scaled by `scale` and to metres.
-MeshShape read_mesh(const SceneNode& node, double length);
-
-/// Returns `attributes`, then the names of coefficients.
-std::vector<std::string> with_coefficients(std::vector<std::string> attributes);
-/// Reads k_n, k_t, μ and the damping that a law uses, in SI; all 0 by default.
-ContactCoefficients read_coefficients(const SceneNode& node, ContactLaw law);
+MeshShape read_mesh(const SceneNode& node);
 
 inline Vector3 scaled(const Vector3& a, double s) { return {s * a[0], s * a[1], s * a[2]}; }
-
-/// Reads three or four numbers; alpha stays 1 if not given. Changes nothing if the attribute is
-/// missing.
-void read_colour(const SceneNode& node, std::array<double, 4>& rgba);
 
 /// Returns the index of the named joint or body. If there is none, fails at the attribute's element
 /// with the nearest name.
@@ -83,6 +67,6 @@ int control_count(const Scene& scene);
 std::vector<double> control_scales(const Scene& scene, const SceneContext& context);
 
 /// Reads damping, armature, spring and limits of a joint whose type is known.
-void read_joint_effects(const SceneNode& node, JointDescription& joint);
+void read_joint_effects(const SceneElement& node, JointDescription& joint);
 
 }  // namespace tangere

@@ -10,8 +10,8 @@
 #include <optional>
 #include <set>
 
-#include "engine/model/sensed_bodies.hpp"
-#include "engine/model/shapes.hpp"
+#include "engine/scene/sensed_bodies.hpp"
+#include "engine/scene/shapes.hpp"
 #include "io/scene/scene_sections.hpp"
 
 namespace tangere {

@@ -2,7 +2,7 @@
 // What a scene that can be read will probably not do as its author expects.
 #pragma once
 
-#include "engine/model/scene.hpp"
+#include "engine/scene/scene.hpp"
 #include "io/scene/scene_node.hpp"
 
 namespace tangere {

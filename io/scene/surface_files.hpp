@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "engine/model/scene.hpp"
+#include "engine/scene/scene.hpp"
 #include "io/scene/triangle_files.hpp"
 
 namespace tangere {

@@ -12,7 +12,7 @@
 #include <map>
 #include <string>
 
-#include "engine/model/shapes.hpp"
+#include "engine/scene/shapes.hpp"
 
 namespace tangere {
 namespace {

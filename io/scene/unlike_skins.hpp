@@ -2,7 +2,7 @@
 // Skins that are far from as stiff as what touches.
 #pragma once
 
-#include "engine/model/scene.hpp"
+#include "engine/scene/scene.hpp"
 #include "io/scene/scene_node.hpp"
 
 namespace tangere {

@@ -7,7 +7,7 @@
 #include <type_traits>
 #include <variant>
 
-#include "engine/model/shapes.hpp"
+#include "engine/scene/shapes.hpp"
 #include "io/files/printable_text.hpp"
 #include "io/picture/body_faces.hpp"
 #include "io/view/page_files.hpp"

@@ -11,8 +11,8 @@
 
 #include "engine/base/error.hpp"
 #include "engine/base/vector3.hpp"
-#include "engine/model/scene_number.hpp"
 #include "engine/rows/sensor_layout.hpp"
+#include "engine/scene/scene_number.hpp"
 #include "engine/sense/readout.hpp"
 #include "io/picture/tactile_drawing.hpp"
 #include "io/scene/scene_reader.hpp"

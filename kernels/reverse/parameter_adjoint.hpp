@@ -85,12 +85,6 @@ void pair_adjoint(const Shape& shape, const Frame<N>& at, const Vec6<N>& W,
   }
 }
 
-/// Where contacts add their derivatives.
-template <class N>
-struct ContactRows {
-  N* law;   ///< (n_pairs + n_grounds, kCoefficients)
-  N* size;  ///< (n_solids, kSizeNumbers)
-};
 template <class N>
 void subtract(const Vec3<N>& sum, N* out) {
   out[0] -= sum.x, out[1] -= sum.y, out[2] -= sum.z;
@@ -99,8 +93,7 @@ void subtract(const Vec3<N>& sum, N* out) {
 /// Adds the derivatives by coefficients and sizes of every shape of two links.
 template <class N>
 void link_pair_parameters(const ModelView& model, const StageArgs<N>& a, const LinkPair& links,
-                          const ContactScratch<N>& o, const LinkAdjoint<N>* adjoint,
-                          const ContactRows<N>& out) {
+                          const ContactScratch<N>& o, const LinkAdjoint<N>* adjoint, N* out) {
   const Vec6<N> slip = adjoint_slip(links, o, adjoint);
   for (int m = links.first; m < links.first + links.count; ++m) {
     const int k = model.pair_order[m];
@@ -115,9 +108,9 @@ void link_pair_parameters(const ModelView& model, const StageArgs<N>& a, const L
       pair_adjoint(shape, at, o.W, law, model.solids[pair.body1], a.candidates[k], a.lone, slip,
                    sum);
     });
-    subtract_law(sum.law, out.law + kCoefficients * k);
-    subtract(sum.size, out.size + kSizeNumbers * pair.body2);
-    subtract(sum.stretch, out.size + kSizeNumbers * pair.body1);
+    subtract_law(sum.law, out + model.rows.pair(k));
+    subtract(sum.size, out + model.rows.solid(pair.body2));
+    subtract(sum.stretch, out + model.rows.solid(pair.body1));
   }
 }
 
@@ -156,7 +149,7 @@ ContactCotangent<N> ground_adjoint(const ModelView& model, const StageArgs<N>& a
 /// Adds the derivatives of every pair and ground contact.
 template <class N>
 void contact_parameters(const ModelView& model, const StageArgs<N>& a, const LinkAdjoint<N>* links,
-                        const ContactRows<N>& out) {
+                        N* out) {
   for (int k = 0; k < model.n_link_pairs; ++k)
     if (a.contacts[k].near)
       link_pair_parameters(model, a, model.link_pairs[k], a.contacts[k], links, out);
@@ -168,8 +161,8 @@ void contact_parameters(const ModelView& model, const StageArgs<N>& a, const Lin
       if (model.grounds[g].memory >= 0) continue;
       const ContactCotangent<N> sum =
           ground_adjoint(model, a, model.grounds[g], links[grounded.link].twist);
-      subtract_law(sum.law, out.law + kCoefficients * (model.n_pairs + g));
-      subtract(sum.size + sum.stretch, out.size + kSizeNumbers * model.grounds[g].body);
+      subtract_law(sum.law, out + model.rows.ground(g));
+      subtract(sum.size + sum.stretch, out + model.rows.solid(model.grounds[g].body));
     }
   }
 }
@@ -243,17 +236,16 @@ void joint_parameters(const ModelView& model, const StageArgs<N>& a, const Link&
   }
 }
 
-/// Adds all derivatives to (parameter_numbers(model)).
+/// Adds all derivatives to `out`, in the order of ParameterRows.
 template <class N>
 void parameter_products(const ModelView& model, const StageArgs<N>& a, const AdjointArgs<N>& d,
                         N* out) {
-  contact_parameters<N>(model, a, d.links, {out, out + first_size_number(model)});
-  inertia_parameters(model, a, d.links, out + first_inertia_number(model));
-  out += first_dof_number(model);
+  contact_parameters<N>(model, a, d.links, out);
+  inertia_parameters(model, a, d.links, out + model.rows.links);
   for (int i = 0; i < model.n_links; ++i) {
     const Link& link = model.links[i];
     with_kind(link.kind, [&]<JointKind K>() {
-      joint_parameters<K>(model, a, link, d.lambda, out + kDofNumbers * link.v);
+      joint_parameters<K>(model, a, link, d.lambda, out + model.rows.dof(link.v, 0));
     });
   }
 }

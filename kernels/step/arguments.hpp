@@ -76,32 +76,6 @@ struct StageHistory {
   OlderState<R> older[kMost];
 };
 
-/// Numbers of a scene that have a derivative, in the order of parameter_products(): the
-/// coefficients of each pair and ground contact; mass, mass · centre and inertia (xx xy xz yy yz
-/// zz) of each link; those of DofNumber of each dof; the size of each solid in contacts, at fixed
-/// masses.
-inline constexpr int kInertiaNumbers = 10, kSizeNumbers = 3;
-enum DofNumber : int { kDofDamping, kDofStiffness, kDofP, kDofD, kDofNumbers };
-/// Where a dof's effects keep these numbers.
-inline constexpr Parameter DofEffects::*kDofParameters[kDofNumbers] = {
-    &DofEffects::damping, &DofEffects::stiffness, &DofEffects::P, &DofEffects::D};
-inline int first_inertia_number(const ModelView& m) {
-  return kCoefficients * (m.n_pairs + m.n_grounds);
-}
-inline int first_dof_number(const ModelView& m) {
-  return first_inertia_number(m) + kInertiaNumbers * m.n_links;
-}
-/// The place of number `which` (DofNumber) of a dof.
-inline int dof_number(const ModelView& m, int dof, int which) {
-  return first_dof_number(m) + kDofNumbers * dof + which;
-}
-inline int first_size_number(const ModelView& m) {
-  return first_dof_number(m) + kDofNumbers * m.nv;
-}
-inline int parameter_numbers(const ModelView& m) {
-  return first_size_number(m) + kSizeNumbers * m.n_solids;
-}
-
 /// Cotangents that pass back through a solved stage. Every array is (nv), positions by their right
 /// tangent (kernels/reverse/adjoint.hpp).
 template <int L>

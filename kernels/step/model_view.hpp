@@ -72,6 +72,28 @@ struct DofEffects {
   double force_low, force_high;  ///< range of the motor's force; infinite: none
 };
 
+/// Parameters of a link (mass, moment, inertia xx xy xz yy yz zz), of a solid (its size as contacts
+/// see it, with masses held fixed) and of a dof that have a derivative.
+inline constexpr int kInertiaNumbers = 10, kSizeNumbers = 3;
+enum DofNumber : int { kDofDamping, kDofStiffness, kDofP, kDofD, kDofNumbers };
+/// Where a dof's effects keep these parameters.
+inline constexpr Parameter DofEffects::*kDofParameters[kDofNumbers] = {
+    &DofEffects::damping, &DofEffects::stiffness, &DofEffects::P, &DofEffects::D};
+
+/// The row of each parameter among the derivatives by parameters: coefficients of pairs, of ground
+/// contacts, parameters of links, of dofs, of solids, coefficients of sensors. The compiler of
+/// models sets it. Kernels compute the rows before `sensors`.
+struct ParameterRows {
+  int grounds = 0, links = 0, dofs = 0, solids = 0, sensors = 0;  ///< first row of each kind
+  int count = 0;
+  [[nodiscard]] int pair(int k) const { return kCoefficients * k; }
+  [[nodiscard]] int ground(int k) const { return grounds + kCoefficients * k; }
+  [[nodiscard]] int link(int k) const { return links + kInertiaNumbers * k; }
+  [[nodiscard]] int dof(int k, int which) const { return dofs + kDofNumbers * k + which; }
+  [[nodiscard]] int solid(int k) const { return solids + kSizeNumbers * k; }
+  [[nodiscard]] int sensor(int k) const { return sensors + kCoefficients * k; }
+};
+
 using ContactParameters = Coefficients<Parameter>;
 /// Whether a contact with these coefficients has shear springs.
 inline bool has_shear_spring(const ContactParameters& p) {
@@ -163,12 +185,13 @@ struct GroundContact {
 struct ShearSpringContact {
   PairContact contact;  ///< the ground is a plane that is fixed in the world
   bool ground = false;
+  int grounded = -1;  ///< index into ModelView::grounds, or -1
   double radius = 0;  ///< as in GroundContact
   int radius_row = -1;
   int first = 0;    ///< number of its first point among all points with shear springs
   int pair = -1;    ///< index into ModelView::pairs, or -1
   int sensor = -1;  ///< index of the sensor, or -1
-  int number = 0;   ///< first of its coefficients among parameter_numbers()
+  int number = 0;   ///< row of its first coefficient (ParameterRows)
   /// (3, stride) all points, padded with far points to whole vectors; of the ground and of sensors.
   const double* places = nullptr;
   int stride = 0;
@@ -241,6 +264,7 @@ struct ModelView {
   const int *pair_order, *ground_order;  ///< (n_pairs), (n_grounds): members side by side
   int n_solids;
   const Solid* solids;  ///< (n_solids) all bodies of the scene
+  ParameterRows rows;
   int n_shear_springs;
   const ShearSpringContact* memories;
   Frame<double> ground;  ///< frame of the ground in the world; its third axis is the normal

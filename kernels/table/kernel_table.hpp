@@ -61,7 +61,7 @@ struct StageKernels {
   void (*adjoint_rhs)(const ModelView&, const Stage<L>&, const StageAdjoint<L>&);
   /// Computes everything that follows from λ.
   void (*adjoint_products)(const ModelView&, const Stage<L>&, const StageAdjoint<L>&);
-  /// Adds -(∂g/∂p)ᵀ λ to (parameter_numbers(model)). Call after adjoint_products(). `lone` as in
+  /// Adds -(∂g/∂p)ᵀ λ to rows (ParameterRows). Call after adjoint_products(). `lone` as in
   /// evaluate().
   void (*parameter_products)(const ModelView&, const Stage<L>&, const StageAdjoint<L>&, int lone,
                              Row<L>* out);

@@ -4,9 +4,9 @@
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
-#include "engine/model/field_form.hpp"
 #include "engine/model/model.hpp"
-#include "engine/model/scheme.hpp"
+#include "engine/scene/field_form.hpp"
+#include "engine/scene/scheme.hpp"
 #include "engine/step/shear_state_arrays.hpp"
 #include "io/scene/scene_reader.hpp"
 #include "python/module/arrays.hpp"

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "engine/model/scene_number.hpp"
+#include "engine/scene/scene_number.hpp"
 
 namespace tangere {
 namespace {

@@ -5,7 +5,7 @@
 
 #include <array>
 
-#include "engine/model/scene.hpp"
+#include "engine/scene/scene.hpp"
 #include "tasks/catalogue/task_list.hpp"
 
 namespace tangere {

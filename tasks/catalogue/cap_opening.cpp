@@ -13,7 +13,7 @@
 #include <utility>
 #include <vector>
 
-#include "engine/model/scene_number.hpp"
+#include "engine/scene/scene_number.hpp"
 #include "tasks/catalogue/cap_opening_script.hpp"
 #include "tasks/catalogue/task_list.hpp"
 

@@ -6,7 +6,7 @@
 
 #include <array>
 
-#include "engine/model/scene.hpp"
+#include "engine/scene/scene.hpp"
 
 namespace tangere {
 

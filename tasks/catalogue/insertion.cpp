@@ -9,7 +9,7 @@
 #include <numbers>
 #include <utility>
 
-#include "engine/model/scene_number.hpp"
+#include "engine/scene/scene_number.hpp"
 #include "engine/sense/flow_map.hpp"
 #include "tasks/catalogue/task_list.hpp"
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Goes through the table of effects: the scene without each, and how the times compare.
 #include "tasks/effects/effect_costs.hpp"
+#include "tasks/effects/ablation.hpp"
 
 #include <fmt/format.h>
 
@@ -65,7 +66,7 @@ std::ptrdiff_t elements_of(const Model& model, EffectKind kind) {
 
 /// Returns why an effect is not timed; "" where it is.
 std::string reason_not_to_time(const Model& model, const Effect& effect) {
-  if (!has_way(effect.kind, Way::removed)) return "follows from the joints; cannot be removed";
+  if (!has_way(effect.kind, Ablation::removed)) return "follows from the joints; cannot be removed";
   const std::ptrdiff_t elements = elements_of(model, effect.kind);
   if (effect.element >= 0 && !times_elements(effect.kind, elements))
     return fmt::format("one of {}; timed together, as '{}'", elements, to_string(effect.kind));
@@ -147,7 +148,7 @@ EffectCost measure(Measurement& m, const EffectInfo& info, const EffectCostOptio
     return cost;
   }
   cost.note = reason_not_to_time(m.model, info.effect);
-  if (!has_way(info.effect.kind, Way::removed)) return cost;
+  if (!has_way(info.effect.kind, Ablation::removed)) return cost;
   if (info.effect.kind == EffectKind::sleeping) {
     measure_sleep(m, options, cost);
     return cost;

@@ -8,7 +8,7 @@
 
 #include "engine/base/as_size.hpp"
 #include "engine/base/error.hpp"
-#include "engine/model/scene_number.hpp"
+#include "engine/scene/scene_number.hpp"
 #include "kernels/numbers/block.hpp"
 #include "tasks/run/thread_time.hpp"
 

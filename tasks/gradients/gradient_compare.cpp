@@ -12,7 +12,7 @@
 
 #include "engine/derivative/tangent.hpp"
 #include "engine/model/random.hpp"
-#include "engine/model/scene_number.hpp"
+#include "engine/scene/scene_number.hpp"
 #include "engine/step/displacement.hpp"
 #include "tasks/gradients/run_trace.hpp"
 

@@ -13,7 +13,7 @@
 
 #include "engine/derivative/number_gradients.hpp"
 #include "engine/model/random.hpp"
-#include "engine/model/scene_number.hpp"
+#include "engine/scene/scene_number.hpp"
 #include "engine/sense/readout.hpp"
 
 namespace tangere {

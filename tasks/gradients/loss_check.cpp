@@ -11,7 +11,7 @@
 #include "engine/derivative/number_gradients.hpp"
 #include "engine/derivative/tactile_point_numbers.hpp"
 #include "engine/derivative/tangent.hpp"
-#include "engine/model/scene_number.hpp"
+#include "engine/scene/scene_number.hpp"
 #include "engine/sense/readout.hpp"
 #include "tasks/gradients/gradient_compare.hpp"
 #include "tasks/gradients/run_trace.hpp"

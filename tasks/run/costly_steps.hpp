@@ -4,7 +4,7 @@
 
 #include <string>
 
-#include "engine/model/scheme.hpp"
+#include "engine/scene/scheme.hpp"
 #include "tasks/run/step_counts.hpp"
 
 namespace tangere {

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "engine/base/precision.hpp"
-#include "engine/model/output_times.hpp"
+#include "engine/scene/output_times.hpp"
 #include "engine/rows/episode_sink.hpp"
 #include "tasks/run/step_counts.hpp"
 

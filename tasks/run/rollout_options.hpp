@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "engine/base/precision.hpp"
-#include "engine/model/field_form.hpp"
+#include "engine/scene/field_form.hpp"
 #include "engine/model/model.hpp"
 
 namespace tangere {

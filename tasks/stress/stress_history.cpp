@@ -4,8 +4,8 @@
 #include "tasks/stress/stress_history.hpp"
 
 #include "engine/base/as_size.hpp"
-#include "engine/model/sensed_bodies.hpp"
-#include "engine/model/shapes.hpp"
+#include "engine/scene/sensed_bodies.hpp"
+#include "engine/scene/shapes.hpp"
 
 namespace tangere {
 namespace {

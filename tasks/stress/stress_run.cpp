@@ -10,8 +10,8 @@
 #include <memory>
 
 #include "engine/base/as_size.hpp"
-#include "engine/model/contact_resolution.hpp"
 #include "engine/model/short_touches.hpp"
+#include "engine/scene/contact_resolution.hpp"
 #include "engine/step/control.hpp"
 #include "engine/step/stepper.hpp"
 #include "tasks/run/block_threads.hpp"

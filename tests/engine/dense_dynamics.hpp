@@ -13,7 +13,7 @@
 #include <stdexcept>
 #include <vector>
 
-#include "engine/model/scene.hpp"
+#include "engine/scene/scene.hpp"
 
 namespace tangere::testing {
 

@@ -10,7 +10,7 @@
 
 #include "engine/derivative/adjoint.hpp"
 #include "engine/derivative/number_gradients.hpp"
-#include "engine/model/scene_number.hpp"
+#include "engine/scene/scene_number.hpp"
 #include "engine/step/displacement.hpp"
 #include "tests/engine/runs.hpp"
 #include "tests/kernels/random_numbers.hpp"

@@ -8,7 +8,7 @@
 #include <functional>
 #include <map>
 
-#include "engine/model/scene.hpp"
+#include "engine/scene/scene.hpp"
 
 namespace tangere::testing {
 

@@ -3,7 +3,7 @@
 // ground.
 #pragma once
 
-#include "engine/model/scene.hpp"
+#include "engine/scene/scene.hpp"
 #include "tests/kernels/random_numbers.hpp"
 
 namespace tangere::testing {

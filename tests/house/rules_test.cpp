@@ -160,13 +160,13 @@ TEST(HouseRules, SeeACircleOfRooms) {
                   {"engine/step/b.cpp", "#include \"engine/step/c.hpp\"\n"},
                   {"engine/step/c.hpp", "#include \"engine/step/a.hpp\"\n"},
                   {"engine/step/d.hpp", "#include \"engine/step/a.hpp\"\n"},
-                  {"engine/model/effects.hpp", ""},
-                  {"engine/model/sensor_effects.hpp", ""},
+                  {"io/picture/projection.hpp", ""},
+                  {"io/picture/scene_plot.hpp", ""},
                   {"tests/a.hpp", "#include \"tests/b.hpp\"\n"},
                   {"tests/b.hpp", "#include \"tests/a.hpp\"\n"}};
   EXPECT_THAT(check_circles(tree),
               ElementsAre(Says("engine/step/a", 0, "engine/step/a, engine/step/b, engine/step/c"),
-                          Says("engine/model/effects", 0, "is listed as a circle")));
+                          Says("io/picture/projection", 0, "is listed as a circle")));
 }
 
 TEST(HouseRules, SeeAHeadlessOrOverlongSource) {

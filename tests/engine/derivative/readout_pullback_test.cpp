@@ -6,7 +6,7 @@
 #include "engine/derivative/readout_pullback.hpp"
 #include "engine/model/compiled_model.hpp"
 #include "engine/model/model.hpp"
-#include "engine/model/scene_number.hpp"
+#include "engine/scene/scene_number.hpp"
 #include "engine/sense/readout.hpp"
 #include "tests/engine/pad_scene.hpp"
 

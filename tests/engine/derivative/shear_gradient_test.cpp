@@ -6,7 +6,7 @@
 #include <algorithm>
 
 #include "engine/derivative/readout_pullback.hpp"
-#include "engine/model/scene_number.hpp"
+#include "engine/scene/scene_number.hpp"
 #include "tests/engine/gradient_differences.hpp"
 #include "tests/engine/gradient_tangent.hpp"
 #include "tests/engine/meshes.hpp"

@@ -6,7 +6,7 @@
 
 #include <map>
 
-#include "engine/model/scene_number.hpp"
+#include "engine/scene/scene_number.hpp"
 #include "tests/engine/gradient_run.hpp"
 #include "tests/engine/meshes.hpp"
 #include "tests/engine/scenes.hpp"

@@ -5,7 +5,7 @@
 
 #include <cmath>
 
-#include "engine/model/scene_number.hpp"
+#include "engine/scene/scene_number.hpp"
 #include "engine/step/control.hpp"
 #include "engine/step/stepper.hpp"
 #include "io/scene/scene_reader.hpp"

@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "engine/model/compiled_model.hpp"
-#include "engine/model/frames.hpp"
+#include "engine/scene/frames.hpp"
 #include "engine/step/rotation_log.hpp"
 #include "tests/engine/runs.hpp"
 #include "tests/engine/scenes.hpp"

@@ -8,7 +8,7 @@
 
 #include "engine/model/compiled_model.hpp"
 #include "engine/model/model.hpp"
-#include "engine/model/scene_number.hpp"
+#include "engine/scene/scene_number.hpp"
 #include "engine/sense/readout.hpp"
 #include "engine/step/control.hpp"
 #include "engine/step/stepper.hpp"
@@ -300,14 +300,14 @@ TEST(VaryingGeometry, IsReadFromAScene) {
     return std::string("accepted");
   };
   EXPECT_THAT(error("<body name=\"box\" field=\"radius\" uniform=\"1 2\"/>"),
-              HasSubstr("there is no 'body box radius': body 'box' is a cuboid"));
+              HasSubstr("'body box radius' varies, but a cuboid has none"));
   EXPECT_THAT(error("<body name=\"box\" field=\"raduis\" uniform=\"1 2\"/>"),
               HasSubstr("did you mean 'radius'"));
   EXPECT_THAT(error("<body name=\"box\" size=\"3\" uniform=\"1 2\"/>"), HasSubstr("size=\"3\""));
   EXPECT_THAT(error("<body name=\"box\" size=\"0\" uniform=\"0 2\"/>"),
-              HasSubstr("'body box size[0]' can be 0, in SI units; expected positive values only"));
+              HasSubstr("'body box size[0]' varies, but size=\"0\"; expected a positive number"));
   EXPECT_THAT(error("<body name=\"box\" size=\"0\" normal=\"1 2\"/>"),
-              HasSubstr("normal can draw a negative 'body box size[0]'"));
+              HasSubstr("'body box size[0]' varies, but normal can draw a negative value"));
   EXPECT_THAT(error("<body name=\"box\" size=\"0\" field=\"density\" uniform=\"1 2\"/>"),
               HasSubstr("exactly one of field and size"));
   EXPECT_THAT(error("<joint name=\"box_slide\" pos=\"3\" uniform=\"1 2\"/>"),
@@ -335,7 +335,7 @@ TEST(VaryingGeometry, WhatCannotVaryIsAnError) {
   EXPECT_THAT(refusal(cap, varying(size("cap", 3), 0.1, 0.2)),
               HasSubstr("'body cap size[1]' varies, but a cylinder has none"));
   EXPECT_THAT(refusal(cap, varying(size("cap", 0), 0, 0.2)),
-              HasSubstr("not all that may be drawn is positive"));
+              HasSubstr("radius=\"0\"; expected a positive number"));
   EXPECT_THAT(
       refusal(pad_on(EllipsoidShape{{0.06, 0.05, 0.06}}, {}), varying(size("anvil", 3), 0.01, 6.1)),
       HasSubstr("'body anvil size[1]' varies, but that allows an ellipsoid with a longest"));

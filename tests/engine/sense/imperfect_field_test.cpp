@@ -10,10 +10,10 @@
 #include <numbers>
 #include <set>
 
-#include "engine/model/effects.hpp"
 #include "engine/model/random_run.hpp"
 #include "engine/sense/readout.hpp"
 #include "engine/step/stepper.hpp"
+#include "tasks/effects/ablation.hpp"
 #include "tests/engine/pad_scene.hpp"
 
 namespace tangere {
@@ -446,7 +446,7 @@ TEST(Imperfections, OffIsIdealToTheBit) {
   const Numbers expected = read(ideal);
   EXPECT_EQ(read(named), expected);
   EXPECT_NE(read(on), expected);
-  for (const Way way : {Way::removed, Way::zero})
+  for (const Ablation way : {Ablation::removed, Ablation::zero})
     EXPECT_EQ(read(without(on, {EffectKind::sensor_imperfections}, way)), expected);
 }
 
@@ -542,7 +542,7 @@ TEST(Imperfections, ValuesOutOfRangeAreRefused) {
       EXPECT_NE(std::string(error.what()).find(text), std::string::npos) << error.what();
     }
   };
-  refused([](auto& i) { i.noise.shear = -1; }, Pad::flat, "noise=\"-1\"; expected a number from 0");
+  refused([](auto& i) { i.noise.shear = -1; }, Pad::flat, "noise=\"-1\"; expected zero or more");
   refused([](auto& i) { i.bias.normal = NAN; }, Pad::flat, "bias");
   refused([](auto& i) { i.saturation.normal = INFINITY; }, Pad::flat, "saturation");
   refused([](auto& i) { i.dead = 1.5; }, Pad::flat, "dead=\"1.5\"; expected a number from 0 to 1");

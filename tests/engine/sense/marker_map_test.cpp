@@ -182,7 +182,7 @@ TEST(Markers, WhatCannotBeIsRefusedWithItsLine) {
   refused(none, "no stiffness, and the sensor has no ks");
   none.sensors[0].coefficients.ks = 40;
   EXPECT_NO_THROW(Model{none});
-  refused(marked_scene(-1), "thickness=\"-1\"; expected a number from 0 on m");
+  refused(marked_scene(-1), "thickness=\"-1\"; expected a positive number");
   refused(marked_scene(0, NAN), "spread");
   refused(marked_scene(0, 1e-3, Pad::curved), "spread on a list of points");
   refused(marked_scene(1e-3, 0, Pad::curved), "thickness on a list of points");

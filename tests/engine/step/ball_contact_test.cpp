@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "engine/model/scene_number.hpp"
+#include "engine/scene/scene_number.hpp"
 #include "engine/sense/start_overlaps.hpp"
 #include "kernels/numbers/linalg.hpp"
 #include "tests/engine/meshes.hpp"

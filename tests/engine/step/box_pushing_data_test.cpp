@@ -12,9 +12,9 @@
 #include <sstream>
 
 #include "engine/model/compiled_model.hpp"
-#include "engine/model/frames.hpp"
 #include "engine/model/model.hpp"
-#include "engine/model/shapes.hpp"
+#include "engine/scene/frames.hpp"
+#include "engine/scene/shapes.hpp"
 #include "engine/sense/readout.hpp"
 #include "engine/step/stepper.hpp"
 #include "kernels/contact/pair_contact.hpp"

@@ -4,9 +4,9 @@
 #include <gtest/gtest.h>
 
 #include "engine/model/compiled_model.hpp"
-#include "engine/model/effects.hpp"
 #include "engine/model/model.hpp"
 #include "kernels/table/kernel_table.hpp"
+#include "tasks/effects/ablation.hpp"
 #include "tests/engine/effect_scenes.hpp"
 #include "tests/engine/gradient_run.hpp"
 #include "tests/engine/runs.hpp"
@@ -135,7 +135,7 @@ TEST(CalledKernels, WithoutPairsNobodySearches) {
 TEST(CalledKernels, ContactsThatNeverPushAreSteppedForGradientsAlone) {
   Scene scene = without(testing::scene_that_sleeps(), {EffectKind::sleeping});
   scene = without(scene, {EffectKind::feedback});
-  scene = without(scene, {EffectKind::pair_contact}, Way::zero);
+  scene = without(scene, {EffectKind::pair_contact}, Ablation::zero);
   const Model model(scene);
   const Counting counting;
   run_briefly(model, false);

@@ -6,7 +6,8 @@
 #include <cmath>
 
 #include "engine/model/compiled_model.hpp"
-#include "engine/model/scene_number.hpp"
+#include "engine/scene/scene_number.hpp"
+#include "engine/scene/schema.hpp"
 #include "engine/step/rotation_log.hpp"
 #include "tests/engine/runs.hpp"
 #include "tests/engine/scenes.hpp"

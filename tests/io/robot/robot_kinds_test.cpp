@@ -7,8 +7,8 @@
 #include <fstream>
 
 #include "engine/model/model.hpp"
-#include "engine/model/sensed_bodies.hpp"
-#include "engine/model/shapes.hpp"
+#include "engine/scene/sensed_bodies.hpp"
+#include "engine/scene/shapes.hpp"
 #include "engine/step/stepper.hpp"
 #include "io/robot/robot_import.hpp"
 #include "io/scene/scene_reader.hpp"

@@ -8,8 +8,8 @@
 #include <sstream>
 
 #include "engine/model/compile.hpp"
-#include "engine/model/mass_properties.hpp"
-#include "engine/model/shapes.hpp"
+#include "engine/scene/mass_properties.hpp"
+#include "engine/scene/shapes.hpp"
 #include "engine/sense/readout.hpp"
 #include "io/robot/robot_import.hpp"
 #include "io/robot/rotations.hpp"

@@ -8,7 +8,7 @@
 #include <cmath>
 #include <random>
 
-#include "engine/model/shapes.hpp"
+#include "engine/scene/shapes.hpp"
 #include "io/scene/surface_files.hpp"
 
 namespace tangere {

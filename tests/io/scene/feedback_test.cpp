@@ -129,7 +129,7 @@ TEST(Feedback, RefusesAndWarns) {
                             "<randomize><tactile name=\"skin\" field=\"kn\" uniform=\"1 2\"/>"
                             "</randomize></tangere>",
                             kTable)),
-      HasSubstr("'skin' has feedback, so its coefficients act on the motion as well"));
+      HasSubstr("the sensor has feedback, so its coefficients act on the motion as well"));
   EXPECT_THAT(feedback_refusal(with("damping=\"20\"", "damping=\"20\" ks=\"1\"", kTable)),
               AllOf(HasSubstr("s.xml:17:"), HasSubstr("feedback and ks")));
   const std::string both =

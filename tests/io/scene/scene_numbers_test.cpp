@@ -10,8 +10,9 @@
 #include "engine/derivative/number_gradients.hpp"
 #include "engine/model/compiled_model.hpp"
 #include "engine/model/model.hpp"
-#include "engine/model/scene_number.hpp"
 #include "engine/rows/sensor_layout.hpp"
+#include "engine/scene/scene_number.hpp"
+#include "engine/scene/schema.hpp"
 #include "io/dataset/dataset_from_model.hpp"
 #include "io/scene/scene_reader.hpp"
 
@@ -199,16 +200,23 @@ TEST(SceneNumbers, NoKindIsForgotten) {
     EXPECT_EQ(info->value, row.value) << row.name;
     EXPECT_EQ(unit_of(scene, info->number), row.unit);
   }
-  for (const NumberKind& kind : number_kinds()) {
-    const auto is_of = [&](const Row& row) {
-      const std::string name = row.name, field = std::string(" ") + kind.name;
-      const std::string owner = owner_of({kind.owner, kind.field, ""});
-      const std::string end = kind.indexed ? field + "[" : field;
-      const std::size_t at = name.rfind(end);
-      return name.starts_with(owner.substr(0, owner.find(' ') + 1)) && at != std::string::npos &&
-             (kind.indexed || at + end.size() == name.size());
-    };
-    EXPECT_TRUE(std::any_of(std::begin(kRows), std::end(kRows), is_of)) << kind.name;
+  for (const Attribute& kind : schema()) {
+    if (!kind.field) continue;
+    for (const auto owner : {NumberOwner::contact, NumberOwner::ground, NumberOwner::tactile,
+                             NumberOwner::body, NumberOwner::joint, NumberOwner::motor}) {
+      if ((kind.of & element_of(owner)) == 0) continue;
+      const std::string of = owner_of({owner, *kind.field, ""});
+      const bool indexed = kind.has(kIndexed);
+      const auto is_of = [&](const Row& row) {
+        const std::string name = row.name,
+                          end = std::string(" ") + kind.name + (indexed ? "[" : "");
+        const std::size_t at = name.rfind(end);
+        return name.starts_with(of.substr(0, of.find(' ') + 1)) && at != std::string::npos &&
+               (indexed || at + end.size() == name.size()) &&
+               row.has_gradient == kind.has(kGradient);
+      };
+      EXPECT_TRUE(std::any_of(std::begin(kRows), std::end(kRows), is_of)) << of << kind.name;
+    }
   }
 }
 

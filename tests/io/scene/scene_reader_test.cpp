@@ -218,7 +218,7 @@ TEST(SceneReader, AnEllipsoidHasASizeLikeACuboids) {
     return "accepted";
   };
   EXPECT_THAT(refusal(R"(size="4 3 0.03")"), HasSubstr("expected at most 100 times"));
-  EXPECT_THAT(refusal(R"(size="4 -3 2")"), HasSubstr("expected positive lengths"));
+  EXPECT_THAT(refusal(R"(size="4 -3 2")"), HasSubstr("size=\"-3\"; expected a positive number"));
   EXPECT_THAT(refusal(R"(sice="4 3 2")"), HasSubstr("'size'"));
 }
 

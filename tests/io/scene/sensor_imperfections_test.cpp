@@ -2,7 +2,7 @@
 // Tests <imperfections> of a sensor: units, defaults, and errors with line and nearest name.
 #include <gmock/gmock.h>
 
-#include "engine/model/sensor_imperfections.hpp"
+#include "engine/scene/sensor_imperfections.hpp"
 #include "io/scene/scene_reader.hpp"
 #include "tests/io/scene/scene_text.hpp"
 
@@ -99,8 +99,7 @@ TEST(SensorImperfectionsElement, MistakesNameLineValueAndWhatWasExpected) {
   };
   expect("<imperfections nois=\"1\"/>", "25", {"unknown attribute 'nois'", "did you mean 'noise'"});
   expect("<imperfection/>", "25", {"did you mean 'imperfections'"});
-  expect("<imperfections noise=\"-0.1\"/>", "25",
-         {"noise=\"-0.1\"; expected a number from 0 on N"});
+  expect("<imperfections noise=\"-0.1\"/>", "25", {"noise=\"-0.1\"; expected zero or more"});
   expect("<imperfections dead=\"2\"/>", "25", {"dead=\"2\"; expected a number from 0 to 1"});
   expect("<imperfections noise=\"1 2 3\"/>", "25", {"3 numbers; expected 1 or 2"});
   expect("<imperfections gain=\"0.1 0.2\"/>", "25", {"2 numbers; expected 1"});

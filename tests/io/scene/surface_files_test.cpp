@@ -12,8 +12,8 @@
 
 #include "engine/model/compile.hpp"
 #include "engine/model/compiled_model.hpp"
-#include "engine/model/mass_properties.hpp"
-#include "engine/model/shapes.hpp"
+#include "engine/scene/mass_properties.hpp"
+#include "engine/scene/shapes.hpp"
 #include "io/scene/scene_reader.hpp"
 #include "io/scene/tactile_layouts.hpp"
 #include "tests/kernels/random_numbers.hpp"
@@ -464,7 +464,7 @@ TEST_F(SurfaceFiles, ScenesSayWhatIsWrongWithTheirBodies) {
   EXPECT_THAT(scene_error(R"(<body name="a" type="abstract" mass="1" inertia="1 1"/>)"),
               HasSubstr("inertia has 2 numbers; expected 3"));
   EXPECT_THAT(scene_error(R"(<body name="a" type="abstract" mass="1" inertia="1 1 3"/>)"),
-              HasSubstr("has inertia=\"1 1 3\"; expected positive moments"));
+              HasSubstr("and inertia=\"1 0 0 1 0 3\"; expected positive moments"));
   EXPECT_THAT(scene_error(R"(<body name="a" type="abstract" mass="1" inertia="1 2 0 1 0 1"/>)"),
               HasSubstr("no solid body"));
 }
@@ -497,8 +497,8 @@ rect_pos1="0.1 0.1 0.5" axis0="1 0 0" axis1="0 1 0" resolution="2 2"/></sensor><
 TEST_F(TouchedMesh, NothingTouchesAMeshWithoutCells) {
   const std::string none = "resolution=\"0\"";
   EXPECT_THAT(error_of([&] { with_contact(none, "b", "a"); }),
-              HasSubstr("primitive_body 'a' is a mesh with resolution=\"0\", which has no distance "
-                        "function"));
+              HasSubstr("primitive_body 'a' is a mesh body, which has no distance; expected a "
+                        "resolution of 1 or more"));
   SceneFile file = with_contact(none, "a", "b");
   ASSERT_EQ(file.warnings.size(), 1U);
   EXPECT_THAT(file.warnings[0], HasSubstr("sensor 'skin' on body 'b' can feel nothing"));
@@ -509,7 +509,7 @@ TEST_F(TouchedMesh, NothingTouchesAMeshWithoutCells) {
   EXPECT_TRUE(model->sensors[0].targets.empty());
   std::swap(s.pair_contacts[0].general_body, s.pair_contacts[0].primitive_body);
   EXPECT_THAT(error_of([&] { compile(s); }),
-              HasSubstr("primitive_body 'a' (mesh) has no distance"));
+              HasSubstr("primitive_body 'a' is a mesh body, which has no distance"));
 }
 
 TEST_F(TouchedMesh, AnErrorTakesThePlaceOfItsResolution) {

@@ -15,7 +15,7 @@
 
 #include "engine/base/error.hpp"
 #include "engine/model/model.hpp"
-#include "engine/model/shapes.hpp"
+#include "engine/scene/shapes.hpp"
 #include "engine/step/stepper.hpp"
 #include "io/files/csv.hpp"
 #include "io/hdf5/h5.hpp"

@@ -2,6 +2,7 @@
 // Tests that effects are timed from the states of a run: a step from a recorded state is the run's
 // own step, also in a model without an effect, whose controls and numbers are at other places.
 #include "tasks/effects/timed_model.hpp"
+#include "tasks/effects/ablation.hpp"
 
 #include <gtest/gtest.h>
 

@@ -7,7 +7,7 @@
 #include <tuple>
 
 #include "engine/derivative/number_gradients.hpp"
-#include "engine/model/scene_number.hpp"
+#include "engine/scene/scene_number.hpp"
 #include "engine/step/control.hpp"
 #include "io/scene/scene_reader.hpp"
 #include "tasks/gradients/gradient_check.hpp"

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0
+// The kinds of effects that a scene can call for (effects.hpp).
+#pragma once
+
+#include <cstdint>
+
+namespace tangere {
+
+enum class EffectKind : std::uint8_t {
+  gravity,
+  velocity_products,
+  joint_damping,
+  joint_springs,
+  joint_limits,
+  armature,
+  force_motors,
+  position_motors,
+  pair_contact,
+  pair_friction,
+  pair_damping,
+  pair_memory,
+  ground_contact,
+  ground_friction,
+  ground_damping,
+  ground_memory,
+  tactile,
+  tactile_shear,
+  tactile_damping,
+  tactile_memory,
+  sensor_imperfections,
+  markers,
+  feedback,
+  varying_parameters,
+  sleeping,
+};
+inline constexpr int kEffectKinds = 25;
+
+}  // namespace tangere

@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: Apache-2.0
+// Quantities of a tactile field: the whole field, pressure, shear, flow, sum, or displacements of
+// markers. Only requested quantities are computed and stored.
+#pragma once
+
+#include <array>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "engine/scene/output_times.hpp"
+#include "engine/scene/scene.hpp"
+
+namespace tangere {
+
+enum class FieldForm {
+  field,     ///< (points, 3) [N]: f·axis0, f·axis1, -f·(axis0 × axis1)
+  pressure,  ///< (points, 1) [N]: the third of these, without friction (docs/outputs.md)
+  shear,     ///< (points, 2) [N]: the first two
+  sum,       ///< (6): force on the body [N], then where it presses [m], body axes
+  ideal,     ///< the field without the sensor's imperfections
+  markers,   ///< (points, 2) [m]: where the ideal field pushes them, along axis0 and axis1
+  flow,      ///< (points, 2): the shear over its largest length on this sensor; 0 without shear
+};
+
+/// Force x y z on the body [N], then its centre x y z [m]: the mean of the points' places, each
+/// weighted by the third number of its field where that presses. Body axes; the centre is 0 where
+/// nothing presses.
+using FieldSum = std::array<double, 6>;
+
+/// The words of files and options: "field", "pressure", "shear", "sum", "ideal", "markers", "flow".
+const char* to_string(FieldForm form);
+
+/// Numbers of a point: 3, 1, 2, 3, 2, 2; 0 for a sum.
+int components_of(FieldForm form);
+/// Numbers of a whole reading.
+std::size_t numbers_of(int points, FieldForm form);
+
+/// One reading of one sensor.
+struct FieldOutput {
+  int sensor = 0;
+  FieldForm form = FieldForm::field;
+  OutputTimes times = {};  ///< none: as often as the run reads this sensor
+  friend bool operator==(const FieldOutput&, const FieldOutput&) = default;
+};
+
+/// Returns the output from which a reading is computed: for a flow the shear, else itself.
+inline FieldOutput undivided(FieldOutput of) {
+  if (of.form == FieldForm::flow) of.form = FieldForm::shear;
+  return of;
+}
+
+/// Returns "pad" for a field, else "pad.pressure", "pad.shear", "pad.sum", "pad.ideal",
+/// "pad.markers" or "pad.flow".
+std::string output_name(const std::string& sensor, FieldForm form);
+/// Returns the names of a scene's sensors, in file order.
+std::vector<std::string> sensor_names(const Scene& scene);
+/// Whether a name is that of an output of no sensor: q, v, variables (positions of end effectors),
+/// bodies (poses and twists) or memory (the shear state).
+bool is_plain_output(const std::string& name);
+/// Returns the reading of this name; none where no sensor has it.
+std::optional<FieldOutput> find_output(std::span<const std::string> sensors,
+                                       const std::string& name);
+/// Returns the name of the motion of one body: "bodies.box".
+std::string body_output(const std::string& body);
+/// Returns the index of the body whose motion has this name, "bodies.box"; none where there is no
+/// such body.
+std::optional<int> find_body_output(const Scene& scene, const std::string& name);
+/// Whether a scene has an output of this name, with or without times: "q/final", "bodies.box".
+/// Throws InputError as split_times() does.
+bool has_output(const Scene& scene, const std::string& word);
+/// Returns why a scene lacks a reading, as in "sensor 'pad' has no <markers>"; "" where it has it.
+std::string reason_against(const Scene& scene, const FieldOutput& output);
+/// Throws InputError for a sensor that is not there and for an output that is listed twice.
+void check_outputs(std::span<const FieldOutput> outputs, std::size_t sensors);
+/// Returns the field of every sensor: the outputs of a scene without <outputs>.
+std::vector<FieldOutput> whole_fields(const Scene& scene);
+/// Returns the sensor outputs of the scene's <outputs>, with their times; without <outputs>, the
+/// field of every sensor.
+std::vector<FieldOutput> asked_fields(const Scene& scene);
+/// Returns all names of outputs, the plain ones included.
+std::vector<std::string> output_names(std::span<const std::string> sensors);
+/// The same with the names of single bodies.
+std::vector<std::string> output_names(const Scene& scene);
+
+}  // namespace tangere

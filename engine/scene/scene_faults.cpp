@@ -1,0 +1,227 @@
+// SPDX-License-Identifier: Apache-2.0
+// Bounds of single values are those of the schema. Values in messages are in SI.
+#include "engine/scene/scene_faults.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "engine/scene/scene_number.hpp"
+#include "engine/scene/schema.hpp"
+#include "engine/scene/shapes.hpp"
+
+namespace tangere {
+namespace {
+
+using Field = NumberField;
+
+const LinkDescription* link_with_body(const Scene& scene, const std::string& body) {
+  const auto at =
+      std::ranges::find_if(scene.links, [&](const auto& l) { return l.body.name == body; });
+  return at == scene.links.end() ? nullptr : &*at;
+}
+const LinkDescription* link_with_joint(const Scene& scene, const std::string& joint) {
+  const auto at =
+      std::ranges::find_if(scene.links, [&](const auto& l) { return l.joint.name == joint; });
+  return at == scene.links.end() ? nullptr : &*at;
+}
+
+/// Returns the first fault that is one.
+template <class... Faults>
+std::string first_of(std::string fault, const Faults&... more) {
+  (static_cast<void>(fault.empty() ? fault = more : fault), ...);
+  return fault;
+}
+
+std::string limits_fault(const JointEffects& e) {
+  if (!e.limits || (*e.limits)[0] <= (*e.limits)[1]) return "";
+  return fmt::format("lim=\"{} {}\": expected low, then high", (*e.limits)[0], (*e.limits)[1]);
+}
+
+std::string points_fault(const char* role, const std::string& body, const Shape& shape) {
+  if (has_contact_points(shape) || is_ball(shape)) return "";
+  return fmt::format(
+      "{} '{}' is {} body, which has no contact points; {}", role, body,
+      with_article(shape_name(shape)),
+      has_distance(shape) ? "swap the two bodies" : "give it a <collision contacts>");
+}
+
+/// Least and largest value that may be drawn; a normal distribution has none.
+double least_of(const Distribution& d) {
+  if (d.kind != Distribution::Kind::list) return d.a;
+  return d.values.empty() ? 0 : *std::ranges::min_element(d.values);
+}
+
+std::string joint_variation_fault(const JointDescription& joint, const SceneNumber& n) {
+  const int count = n.field == Field::pos ? 3
+                    : n.field == Field::q ? position_count(joint.type)
+                                          : dof_count(joint.type);
+  if (dof_count(joint.type) == 0) return "the joint is fixed; expected one that moves";
+  if (is_of_start(n) || n.field == Field::pos)
+    return n.component >= 0 && n.component < count
+               ? ""
+               : fmt::format("index {} is none of 0 to {}", n.component, count - 1);
+  if (joint.turning) return "its dofs do not share one number";
+  if (n.field == Field::lim_stiffness && !joint.limits) return "the joint has no 'lim'";
+  return effect_index(n.field) < kJointEffects ? ""
+                                               : "no dof of the joint turns by a number of its own";
+}
+
+std::string body_variation_fault(const BodyDescription& body, const SceneNumber& n) {
+  Shape shape = body.shape;
+  if (n.field != Field::density)
+    return size_number(shape, size_index(n)) == nullptr
+               ? fmt::format("{} has none", with_article(shape_name(shape)))
+               : "";
+  if (std::holds_alternative<AbstractShape>(shape))
+    return "its mass is given; expected a body with volume";
+  return body.density > 0 ? "" : "it is massless; expected a positive density";
+}
+
+/// What is wrong with the number that varies.
+std::string varying_number_fault(const Scene& scene, const SceneNumber& n) {
+  const LinkDescription* const with_joint = link_with_joint(scene, n.name);
+  const LinkDescription* const with_body = link_with_body(scene, n.name);
+  switch (n.owner) {
+    case NumberOwner::joint:
+      return with_joint == nullptr ? "" : joint_variation_fault(with_joint->joint, n);
+    case NumberOwner::body:
+      return with_body == nullptr ? "" : body_variation_fault(with_body->body, n);
+    case NumberOwner::motor:
+      return std::ranges::any_of(scene.motors,
+                                 [&](const MotorDescription& m) {
+                                   return m.joint == n.name && m.control == MotorControl::position;
+                                 })
+                 ? ""
+                 : "the joint has no position motor; force motors have no gains";
+    case NumberOwner::tactile:
+      return std::ranges::any_of(scene.pair_contacts,
+                                 [&](const auto& c) { return c.sensor == n.name; })
+                 ? "the sensor has feedback, so its coefficients act on the motion as well"
+                 : "";
+    default: return "";
+  }
+}
+
+}  // namespace
+
+std::string joint_fault(const JointDescription& joint) {
+  const JointEffects& turning = joint.turning ? *joint.turning : joint;
+  if (!joint.rest.empty() && joint.rest.size() != std::size_t(dof_count(joint.type)))
+    return fmt::format("rest has {} numbers; expected {}", joint.rest.size(),
+                       dof_count(joint.type));
+  return first_of(value_fault<JointEffects>(kJoint, joint), limits_fault(joint),
+                  value_fault(kJoint, turning), limits_fault(turning));
+}
+
+std::string body_fault(const BodyDescription& body) {
+  if (const auto* const abstract = std::get_if<AbstractShape>(&body.shape)) {
+    const auto& [xx, xy, xz, yy, yz, zz] = abstract->inertia;
+    const bool weightless = std::ranges::all_of(abstract->inertia, [](double x) { return x == 0; });
+    if (abstract->mass == 0 ? !weightless : !is_inertia(abstract->inertia))
+      return fmt::format(
+          "no solid body of mass {} and inertia=\"{} {} {} {} {} {}\"; expected "
+          "positive moments, each at most the sum of the other two, or zeros with "
+          "mass 0",
+          abstract->mass, xx, xy, xz, yy, yz, zz);
+  }
+  return slenderness_fault(body.shape);
+}
+
+std::string motor_fault(const Scene& scene, const MotorDescription& motor) {
+  const LinkDescription* const link = link_with_joint(scene, motor.joint);
+  if (link != nullptr && dof_count(link->joint.type) == 0)
+    return "joint '" + motor.joint + "' is fixed; a motor needs a joint that moves";
+  for (const MotorDescription& other : scene.motors) {
+    if (&other == &motor) break;
+    if (other.joint == motor.joint) return "joint '" + motor.joint + "' already has a motor";
+  }
+  if (std::string fault = value_fault(kMotor, motor); !fault.empty()) return fault;
+  const std::array<double, 2> sliding = {motor.low, motor.high};
+  for (const auto& [low, high] : {sliding, motor.turning.value_or(sliding)}) {
+    const std::string range = fmt::format("ctrl_range=\"{} {}\": expected ", low, high);
+    if (motor.control == MotorControl::position && !(low <= high)) return range + "low, then high";
+    if (motor.control == MotorControl::force && !(std::isfinite(low) && std::isfinite(high)))
+      return range + "a finite range";
+  }
+  return "";
+}
+
+std::string contact_fault(const Scene& scene, const GroundContactDescription& d) {
+  if (!scene.ground) return "the scene has no <ground> for '" + d.body + "' to touch";
+  const LinkDescription* const link = link_with_body(scene, d.body);
+  return first_of(link == nullptr ? "" : points_fault("body", d.body, link->body.shape),
+                  value_fault(kGroundContact, d.coefficients));
+}
+
+std::string contact_fault(const Scene& scene, const PairContactDescription& d) {
+  if (d.general_body == d.primitive_body)
+    return "body '" + d.general_body + "' against itself; expected two bodies";
+  const LinkDescription *const one = link_with_body(scene, d.general_body),
+                               *const two = link_with_body(scene, d.primitive_body);
+  if (one == nullptr || two == nullptr) return "";
+  const Shape &general = one->body.shape, &primitive = two->body.shape;
+  if (d.points.empty())
+    if (std::string fault = points_fault("general_body", d.general_body, general); !fault.empty())
+      return fault;
+  if (!has_distance(primitive))
+    return fmt::format(
+        "primitive_body '{}' is {} body, which has no distance; expected {}", d.primitive_body,
+        with_article(shape_name(primitive)),
+        std::holds_alternative<MeshShape>(primitive)
+            ? "a resolution of 1 or more"
+            : shapes_with([](const ShapeRow& row) { return row.distance.has_value(); }));
+  if (d.points.empty() && !can_touch(general, primitive))
+    return fmt::format(
+        "general_body '{}' is a sphere, and primitive_body '{}' a mesh, whose distance is known "
+        "only near its surface; expected the mesh as general_body, with contact points nearer to "
+        "each other than the sphere is wide ('pitch' or 'count')",
+        d.general_body, d.primitive_body);
+  return value_fault(kPairContact, d.coefficients);
+}
+
+std::string markers_fault(const TactileDescription& sensor) {
+  return sensor.markers ? value_fault(kMarkers, *sensor.markers) : "";
+}
+
+std::string variation_fault(const Scene& scene, const RandomizationDescription& d) {
+  const SceneNumber& n = d.number;
+  std::string fault = varying_number_fault(scene, n);
+  const Attribute& row = number_kind(n.owner, n.field);
+  const bool bounded = !is_of_start(n) && n.field != Field::pos;
+  const double least = least_of(d.distribution);
+  if (fault.empty() && bounded && d.distribution.kind == Distribution::Kind::normal)
+    fault = "normal can draw a negative value; expected uniform, log_uniform or list";
+  if (fault.empty() && bounded) fault = row.fault(least);
+  if (fault.empty() && n.owner == NumberOwner::body && !(least > 0))
+    fault = "not all that may be drawn is positive";
+  return fault.empty() ? "" : "'" + name_of(n) + "' varies, but " + fault;
+}
+
+void check_scene(const Scene& scene) {
+  const auto check = [&](const Source& source, const std::string& of, const std::string& fault) {
+    if (!fault.empty()) throw InputError(source.prefix() + of + fault);
+  };
+  const Source whole{scene.path, 0};
+  check(whole, "", value_fault(kOption, scene));
+  check(whole, "", value_fault(kSolver, scene.solver));
+  for (const LinkDescription& link : scene.links) {
+    check(link.joint.source, "joint '" + link.joint.name + "': ", joint_fault(link.joint));
+    check(link.body.source, "body '" + link.body.name + "' is ", body_fault(link.body));
+  }
+  for (const MotorDescription& d : scene.motors)
+    check(d.source, "motor of joint '" + d.joint + "': ", motor_fault(scene, d));
+  for (const GroundContactDescription& d : scene.ground_contacts)
+    check(d.source, "", contact_fault(scene, d));
+  for (const PairContactDescription& d : scene.pair_contacts)
+    check(d.source, "", contact_fault(scene, d));
+  for (const TactileDescription& d : scene.sensors) {
+    check(d.source, "tactile sensor '" + d.name + "': ", value_fault(kTactile, d.coefficients));
+    if (d.markers) check(d.markers->source, "markers of '" + d.name + "': ", markers_fault(d));
+  }
+  for (const RandomizationDescription& d : scene.randomizations)
+    check(d.source, "", variation_fault(scene, d));
+}
+
+}  // namespace tangere

@@ -1,0 +1,225 @@
+// SPDX-License-Identifier: Apache-2.0
+// The table of all kinds of numbers, and the lookups that use it.
+#include "engine/scene/scene_number.hpp"
+
+#include <algorithm>
+
+#include "engine/scene/schema.hpp"
+
+namespace tangere {
+namespace {
+
+using Owner = NumberOwner;
+using Field = NumberField;
+
+constexpr const char* kOwners[] = {"contact", "ground", "tactile", "body", "joint", "motor"};
+
+bool is_turning(Field field) {
+  return field == Field::turning_damping || field == Field::turning_stiffness;
+}
+
+const char* owner_name(Owner owner) { return kOwners[static_cast<int>(owner)]; }
+
+const LinkDescription* link_of(const Scene& scene, const SceneNumber& n) {
+  for (const LinkDescription& link : scene.links)
+    if ((n.owner == Owner::body ? link.body.name : link.joint.name) == n.name) return &link;
+  return nullptr;
+}
+
+/// Finds the contact or the sensor that owns a number and calls f(coefficients, law).
+template <class Function>
+bool with_law(const Scene& scene, const SceneNumber& n, const Function& f) {
+  const auto use = [&](const auto& list, const auto& matches) {
+    const auto at = std::find_if(list.begin(), list.end(), matches);
+    if (at == list.end()) return false;
+    f(at->coefficients, at->law);
+    return true;
+  };
+  switch (n.owner) {
+    case Owner::contact:
+      return use(scene.pair_contacts, [&](const PairContactDescription& c) {
+        return c.first_name() == n.name && c.primitive_body == n.second_name;
+      });
+    case Owner::ground:
+      return use(scene.ground_contacts,
+                 [&](const GroundContactDescription& c) { return c.body == n.name; });
+    case Owner::tactile:
+      return use(scene.sensors, [&](const TactileDescription& t) { return t.name == n.name; });
+    default: return false;
+  }
+}
+
+const double* of_body(const BodyDescription& body, const SceneNumber& n) {
+  if (n.field == Field::density) return &body.density;
+  if (n.field != Field::mass)
+    // NOLINTNEXTLINE(cppcoreguidelines-pro-type-const-cast): returned as const
+    return size_number(const_cast<Shape&>(body.shape), size_index(n));
+  const auto* const abstract = std::get_if<AbstractShape>(&body.shape);
+  return abstract == nullptr ? nullptr : &abstract->mass;
+}
+
+const double* of_start(const Scene& scene, const SceneNumber& n) {
+  for (const InitialState& state : scene.initial) {
+    const std::vector<double>& x = n.field == Field::q ? state.q : state.v;
+    if (state.joint == n.name && n.component >= 0 && std::size_t(n.component) < x.size())
+      return &x[std::size_t(n.component)];
+  }
+  return nullptr;
+}
+
+const double* of_joint(const Scene& scene, const JointDescription& joint, const SceneNumber& n) {
+  const JointEffects* const turning = joint.turning ? &*joint.turning : nullptr;
+  switch (n.field) {
+    case Field::q:
+    case Field::v: return of_start(scene, n);
+    case Field::pos:
+      return n.component < 0 || n.component > 2 ? nullptr
+                                                : &joint.pose.position[std::size_t(n.component)];
+    case Field::turning_damping: return turning == nullptr ? nullptr : &turning->damping;
+    case Field::turning_stiffness: return turning == nullptr ? nullptr : &turning->stiffness;
+    case Field::damping: return &joint.damping;
+    case Field::armature: return &joint.armature;
+    case Field::stiffness: return &joint.stiffness;
+    default: return &joint.limit_stiffness;
+  }
+}
+
+/// Returns nullptr where the scene has no such number.
+const double* find_number(const Scene& scene, const SceneNumber& n) {
+  number_kind(n.owner, n.field);  // throws if there is no such kind
+  const double* found = nullptr;
+  if (n.owner == Owner::motor) {
+    for (const MotorDescription& motor : scene.motors)
+      if (motor.joint == n.name) found = n.field == Field::P ? &motor.P : &motor.D;
+    return found;
+  }
+  if (n.owner == Owner::body || n.owner == Owner::joint) {
+    const LinkDescription* const link = link_of(scene, n);
+    if (link == nullptr) return nullptr;
+    return n.owner == Owner::body ? of_body(link->body, n) : of_joint(scene, link->joint, n);
+  }
+  with_law(scene, n, [&](const ContactCoefficients& c, ContactLaw) {
+    found = &c[coefficient_index(n.field)];
+  });
+  return found;
+}
+
+[[noreturn]] void fail_to_find(const Scene& scene, const SceneNumber& number) {
+  throw InputError((scene.path.empty() ? "" : scene.path + ": ") + "the scene has no number '" +
+                   name_of(number) + "'");
+}
+const double& found_number(const Scene& scene, const SceneNumber& number) {
+  const double* const found = find_number(scene, number);
+  if (found == nullptr) fail_to_find(scene, number);
+  return *found;
+}
+
+}  // namespace
+
+std::uint32_t element_of(NumberOwner owner) {
+  constexpr std::uint32_t kElementOf[] = {kPairContact, kGroundContact,         kTactile,
+                                          kBody,        kJoint | kInitialJoint, kMotor};
+  return kElementOf[static_cast<int>(owner)];
+}
+
+const Attribute& number_kind(NumberOwner owner, NumberField field) {
+  // Dofs that turn may have effects of their own, which files give by the same attribute.
+  if (field == Field::turning_damping) field = Field::damping;
+  if (field == Field::turning_stiffness) field = Field::stiffness;
+  const Attribute* of_field = nullptr;
+  for (const Attribute& row : schema()) {
+    if (row.field != field) continue;
+    if ((row.of & element_of(owner)) != 0) return row;
+    of_field = &row;
+  }
+  int other = 0;
+  while (of_field != nullptr && (of_field->of & element_of(Owner(other))) == 0) ++other;
+  throw InputError(std::string("a ") + owner_name(owner) + " has no '" +
+                   (of_field == nullptr ? "?" : of_field->name) + "'; a " + kOwners[other] +
+                   " has one");
+}
+
+SceneNumber size_of_body(const std::string& body, int which) {
+  constexpr Field kFields[kSizeIndices] = {Field::radius, Field::length, Field::size,
+                                           Field::size,   Field::size,   Field::scale};
+  return {Owner::body, kFields[which], body, kFields[which] == Field::size ? which - 2 : 0};
+}
+
+int size_index(const SceneNumber& n) {
+  for (int which = 0; which < kSizeIndices; ++which)
+    if (size_of_body(n.name, which) == n) return which;
+  return -1;
+}
+
+SceneNumber first_number(const PairContactDescription& d) {
+  return {Owner::contact, Field::kn, d.first_name(), 0, d.primitive_body};
+}
+SceneNumber first_number(const GroundContactDescription& d) {
+  return {Owner::ground, Field::kn, d.body};
+}
+SceneNumber first_number(const TactileDescription& d) {
+  return {Owner::tactile, Field::kn, d.name};
+}
+
+std::string owner_of(const SceneNumber& n) {
+  std::string text = std::string(owner_name(n.owner)) + ' ' + n.name;
+  if (n.owner == Owner::contact) text.append(1, ' ').append(n.second_name);
+  return text;
+}
+
+std::string name_of(const SceneNumber& n) {
+  const Attribute& kind = number_kind(n.owner, n.field);
+  std::string text = owner_of(n) + (is_turning(n.field) ? " turning " : " ") + kind.name;
+  if (kind.has(kIndexed)) text.append(1, '[').append(std::to_string(n.component)).append(1, ']');
+  return text;
+}
+
+std::vector<Unit> units_of(const Scene& scene, const SceneNumber& n) {
+  const Attribute& kind = number_kind(n.owner, n.field);
+  if (n.owner != Owner::joint && n.owner != Owner::motor) {
+    bool linear = false;
+    with_law(scene, n, [&](const ContactCoefficients&, ContactLaw law) {
+      linear = law == ContactLaw::linear;
+    });
+    return {kind.unit_of(linear)};
+  }
+  const LinkDescription* const link = link_of(scene, n);
+  if (link == nullptr) fail_to_find(scene, n);
+  const JointType type = link->joint.type;
+  if (is_of_start(n)) {
+    const bool quaternion = std::string(coordinate_unit(type, n.component)) == "1";
+    if (n.field == Field::q && quaternion) return {Unit::one};
+    return {kind.unit_of(dof_turns(type, n.component))};
+  }
+  if (is_turning(n.field)) return {kind.other};
+  bool slides = false, turns = false;
+  for (int k = 0; k < dof_count(type); ++k) (dof_turns(type, k) ? turns : slides) = true;
+  // Dofs that turn may have a field of their own.
+  if (link->joint.turning && n.owner == Owner::joint) turns = false;
+  if (slides && turns && kind.other != Unit::one) return {kind.unit, kind.other};
+  return {kind.unit_of(turns)};
+}
+
+std::string unit_of(const Scene& scene, const SceneNumber& n) {
+  std::string text;
+  for (const Unit unit : units_of(scene, n))
+    text.append(text.empty() ? "" : ", ").append(to_string(unit));
+  return text;
+}
+
+double& number_in(Scene& scene, const SceneNumber& number) {
+  // NOLINTNEXTLINE(cppcoreguidelines-pro-type-const-cast): the scene is not const
+  return const_cast<double&>(found_number(scene, number));
+}
+
+double number_in(const Scene& scene, const SceneNumber& number) {
+  return found_number(scene, number);
+}
+
+int randomization_of(const Scene& scene, const SceneNumber& number) {
+  for (std::size_t k = scene.randomizations.size(); k-- > 0;)  // the last one applies
+    if (scene.randomizations[k].number == number) return static_cast<int>(k);
+  return -1;
+}
+
+}  // namespace tangere

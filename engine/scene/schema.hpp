@@ -1,0 +1,167 @@
+// SPDX-License-Identifier: Apache-2.0
+// The schema of scenes: one row for each attribute of a scene file. The reader, the writer, the
+// parameters, the checks of values and the tables of docs/scenes.md follow from it.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <type_traits>
+#include <variant>
+#include <vector>
+
+#include "engine/scene/effect_kind.hpp"
+#include "engine/scene/scene.hpp"
+#include "engine/scene/units.hpp"
+
+namespace tangere {
+
+/// Elements of a scene file as bits: a row may serve several.
+enum Element : std::uint32_t {
+  kOption = 1U << 0,
+  kSolver = 1U << 1,
+  kGround = 1U << 2,
+  kRobot = 1U << 3,
+  kLink = 1U << 4,
+  kJoint = 1U << 5,
+  kBody = 1U << 6,
+  kVisual = 1U << 7,
+  kCollision = 1U << 8,
+  kMotor = 1U << 9,
+  kGroundContact = 1U << 10,
+  kPairContact = 1U << 11,
+  kTactile = 1U << 12,
+  kImperfections = 1U << 13,
+  kMarkers = 1U << 14,
+  kEndEffector = 1U << 15,
+  kInitialJoint = 1U << 16,
+  kConstant = 1U << 17,
+  kPiecewise = 1U << 18,
+  kAt = 1U << 19,
+  kCsv = 1U << 20,
+  kRandom = 1U << 21,
+  kOutputs = 1U << 22,
+  kVaryJoint = 1U << 23,  ///< in <randomize>, like those below
+  kVaryMotor = 1U << 24,
+  kVaryGround = 1U << 25,
+  kVaryPair = 1U << 26,
+  kVaryTactile = 1U << 27,
+  kVaryBody = 1U << 28,
+};
+inline constexpr int kElements = 29;
+inline constexpr std::uint32_t kContacts = kGroundContact | kPairContact,
+                               kTouching = kContacts | kTactile,
+                               kVarying = kVaryJoint | kVaryMotor | kVaryGround | kVaryPair |
+                                          kVaryTactile | kVaryBody;
+/// The name in scene files.
+const char* to_string(Element element);
+
+/// Which values an attribute may have. Numbers are finite.
+enum class Bound : std::uint8_t { any, not_negative, positive, share, range, integer };
+
+/// Properties of rows.
+enum : std::uint8_t {
+  kInDefault = 1,  ///< may stand in <default>
+  kPicture = 2,    ///< for viewers only: accepted and not read
+  kLeftOver = 4,   ///< published scenes leave it on elements that do not use it: a warning
+  kVaries = 8,     ///< <randomize> may let it differ between environments
+  kGradient = 16,  ///< has a derivative
+  kIndexed = 32,   ///< the parameter has components
+};
+
+/// The member of a scene's structs that keeps a value; none: the reader places it.
+using Member = std::variant<
+    std::monostate, double Scene::*, double SolverOptions::*,
+    std::optional<double> SolverOptions::*, int SolverOptions::*, Vector3 GroundDescription::*,
+    Vector3 Pose::*, Quaternion Pose::*, double JointEffects::*, double BodyDescription::*,
+    std::array<double, 4> BodyDescription::*, double AbstractShape::*, double MotorDescription::*,
+    double ContactCoefficients::*, int TactileDescription::*, double SensorImperfections::*,
+    NormalAndShear SensorImperfections::*, double MarkersDescription::*,
+    Vector3 EndEffectorDescription::*, double EndEffectorDescription::*,
+    std::array<double, 4> EndEffectorDescription::*, double PiecewiseControl::*,
+    double RandomControl::*>;
+
+/// An attribute of one or several elements.
+struct Attribute {
+  std::uint32_t of = 0;  ///< elements
+  const char* name = "";
+  /// The value where a file gives none, as in a file; "": there is none; nullptr: must be given.
+  const char* usual = "";
+  Unit unit = Unit::one;   ///< of dofs that slide, and of laws other than linear
+  const char* text = "";   ///< one line of documentation
+  Unit other = Unit::one;  ///< of dofs that turn, and of law linear; one: the same
+  Bound bound = Bound::any;
+  double least = 0, most = 0;   ///< of bound range and integer
+  const char* words = nullptr;  ///< the values that it may have, between blanks; nullptr: no words
+  const char* types = nullptr;  ///< of the element that use it, between blanks; nullptr: all
+  Member member{};
+  std::uint8_t flags = 0;
+  std::optional<NumberField> field{};  ///< of the parameter that it is
+  std::optional<EffectKind> effect{};  ///< for which it calls where it is not zero
+
+  [[nodiscard]] bool has(int flag) const { return (flags & flag) != 0; }
+  [[nodiscard]] Unit unit_of(bool turns_or_linear) const {
+    return turns_or_linear && other != Unit::one ? other : unit;
+  }
+  /// Whether elements of a type use it.
+  [[nodiscard]] bool serves(std::string_view type) const;
+  /// Returns what is wrong with a value: `kn="-1"; expected zero or more`; "" if nothing is.
+  [[nodiscard]] std::string fault(double value) const;
+};
+
+std::span<const Attribute> schema();
+/// Splits a list of words between blanks.
+std::vector<std::string> words_of(const char* between_blanks);
+/// Returns the attribute of an element. Throws std::logic_error where the schema has none.
+const Attribute& attribute_of(Element element, std::string_view name);
+
+/// The kind of pair contacts for an effect of contacts or sensors.
+constexpr EffectKind pair_kind(EffectKind kind) {
+  constexpr int kFirst = static_cast<int>(EffectKind::pair_contact), kParts = 4;
+  return static_cast<EffectKind>(kFirst + (static_cast<int>(kind) - kFirst) % kParts);
+}
+/// Returns the coefficients of joints, contacts or sensors that call for an effect of theirs.
+std::vector<NumberField> coefficients_of(EffectKind kind);
+
+/// Calls f(row, member) for all attributes of an element whose values are members of T.
+template <class T, class F>
+void for_each_member(Element element, const F& f) {
+  for (const Attribute& row : schema()) {
+    if ((row.of & element) == 0) continue;
+    std::visit(
+        [&](auto member) {
+          if constexpr (requires(T & to) { to.*member; }) f(row, member);
+        },
+        row.member);
+  }
+}
+
+/// Returns what is wrong with the values that T keeps of an element; "" if nothing is. A zero
+/// stands for a value that is not given where the element has no default.
+template <class T>
+std::string value_fault(Element element, const T& of) {
+  std::string fault;
+  const auto check = [&](const Attribute& row, double value) {
+    const bool not_given = value == 0 && row.usual != nullptr && *row.usual == '\0';
+    if (fault.empty() && !not_given) fault = row.fault(value);
+  };
+  for_each_member<T>(element, [&](const Attribute& row, auto member) {
+    using Value = std::remove_cvref_t<decltype(of.*member)>;
+    if constexpr (std::is_arithmetic_v<Value>) {
+      check(row, of.*member);
+    } else if constexpr (std::is_same_v<Value, NormalAndShear>) {
+      check(row, (of.*member).normal), check(row, (of.*member).shear);
+    } else if constexpr (std::is_same_v<Value, std::optional<double>>) {
+      if (of.*member) check(row, *(of.*member));
+    } else {
+      for (const double x : of.*member) check(row, x);
+    }
+  });
+  return fault;
+}
+
+}  // namespace tangere

@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: Apache-2.0
+// The tables of attributes in docs/scenes.md are made from the schema. With TANGERE_WRITE_DOCS=1 in
+// the environment, this test writes them; else it compares.
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <gtest/gtest.h>
+
+#include <bit>
+#include <cstdlib>
+#include <fstream>
+#include <sstream>
+
+#include "engine/scene/schema.hpp"
+#include "engine/scene/shapes.hpp"
+
+namespace tangere {
+namespace {
+
+const std::string kPage = std::string(TANGERE_SOURCE_DIR) + "/docs/scenes.md";
+
+std::string page() {
+  std::ifstream in(kPage);
+  std::stringstream text;
+  text << in.rdbuf();
+  return text.str();
+}
+
+/// Returns "cylinder, capsule: "; "not fixed: " where few types are left out; "" for all.
+std::string types_text(const Attribute& a) {
+  if (a.types == nullptr) return "";
+  std::vector<std::string> all, left_out;
+  if ((a.of & kBody) != 0)
+    for (const ShapeRow& row : shape_rows()) all.emplace_back(row.name);
+  if ((a.of & kJoint) != 0)
+    for (int k = 0; k <= static_cast<int>(JointType::free); ++k)
+      all.emplace_back(to_string(static_cast<JointType>(k)));
+  for (const std::string& type : all)
+    if (!a.serves(type)) left_out.push_back(type);
+  const std::vector<std::string> types = words_of(a.types);
+  return !all.empty() && left_out.size() < types.size()
+             ? fmt::format("not {}: ", fmt::join(left_out, ", "))
+             : fmt::format("{}: ", fmt::join(types, ", "));
+}
+
+std::string unit_text(const Attribute& a) {
+  std::string text = a.unit == Unit::one ? "" : to_string(a.unit);
+  if (a.other != Unit::one) text += std::string(", ") + to_string(a.other);
+  return text;
+}
+
+std::string row_text(const Attribute& a) {
+  std::string text = types_text(a);
+  if (a.words != nullptr) text += fmt::format("{}; ", fmt::join(words_of(a.words), ", "));
+  return fmt::format("| `{}` | {} | {} | {}{} | {}{} |\n", a.name,
+                     a.usual == nullptr ? "needed" : a.usual, unit_text(a),
+                     a.has(kVaries) ? "v" : "", a.has(kGradient) ? "g" : "", text, a.text);
+}
+
+std::string table(Element element) {
+  std::string text = "| attribute | default | unit | | |\n|---|---|---|---|---|\n", pictures;
+  for (const Attribute& a : schema()) {
+    if ((a.of & element) == 0 || a.has(kLeftOver)) continue;
+    if (a.has(kPicture))
+      pictures += fmt::format("{}`{}`", pictures.empty() ? "" : ", ", a.name);
+    else
+      text += row_text(a);
+  }
+  return text + (pictures.empty() ? "" : "\nFor pictures: " + pictures + ".\n");
+}
+
+/// The page with every table anew, which stands between <!-- attributes NAME --> and <!-- end -->.
+std::string with_tables(const std::string& text) {
+  std::string out;
+  std::size_t at = 0;
+  for (int k = 0; k < kElements; ++k) {
+    const auto element = static_cast<Element>(1U << k);
+    const std::string begin = fmt::format("<!-- attributes {} {} -->\n", k, to_string(element));
+    const std::size_t from = text.find(begin, at);
+    if (from == std::string::npos) continue;
+    out += text.substr(at, from + begin.size() - at) + "\n" + table(element) + "\n";
+    at = text.find("<!-- end -->", from);
+  }
+  return out + text.substr(std::min(at, text.size()));
+}
+
+TEST(ScenePage, HasTheAttributesOfTheSchema) {
+  const std::string found = page(), expected = with_tables(found);
+  if (std::getenv("TANGERE_WRITE_DOCS") != nullptr) std::ofstream(kPage) << expected;
+  EXPECT_EQ(page(), expected)
+      << "TANGERE_WRITE_DOCS=1 io_test --gtest_filter='ScenePage.*' makes it";
+}
+
+/// Where a struct has a default of its own, it is the same.
+TEST(Schema, DefaultsAreThoseOfTheStructs) {
+  const auto check = [](Element element, const auto& of) {
+    using T = std::remove_cvref_t<decltype(of)>;
+    for_each_member<T>(element, [&](const Attribute& a, auto member) {
+      using Value = std::remove_cvref_t<decltype(of.*member)>;
+      if constexpr (std::is_arithmetic_v<Value>) {
+        if (a.usual == nullptr || *a.usual == '\0') return;
+        EXPECT_EQ(std::stod(a.usual), double(of.*member)) << a.name;
+      }
+    });
+  };
+  check(kSolver, SolverOptions{});
+  check(kJoint, JointEffects{});
+  check(kBody, BodyDescription{});
+  check(kMotor, MotorDescription{});
+  check(kTactile, ContactCoefficients{});
+  check(kImperfections, SensorImperfections{});
+  check(kRandom, RandomControl{});
+}
+
+/// The table of shapes says which sizes each has, the schema for which types an attribute is.
+TEST(Schema, SizesAreThoseOfTheShapes) {
+  for (const ShapeRow& row : shape_rows())
+    for (const char* const name : {"radius", "length", "size"}) {
+      bool has = false;
+      for (const NamedSize& size : named_sizes(row.make()))
+        has = has || name == std::string(size.name);
+      EXPECT_EQ(attribute_of(kBody, name).serves(row.name), has) << row.name << " " << name;
+    }
+}
+
+}  // namespace
+}  // namespace tangere
