@@ -190,7 +190,7 @@ int generate_task(const GenerateOptions& options, const Console& console, const 
   job.effects = effect_names(task.model());
   job.moving_bodies = task.model().moving_bodies();
   job.layout =
-      make_layout(options, task.model(), Stepper(task.model()), job.run, {}, info, plan, &task,
+      make_layout(options, task.model(), Stepper(task.model()), job.run, info, plan, &task,
                   {to_string(kind), policy.players(), variation.noise, variation.random_share});
   job.simulate = [&](const EpisodeOptions& run, EpisodeSink& sink, const ProgressCallback& progress,
                      const std::stop_token& stop) -> JobResult {
@@ -256,7 +256,7 @@ int generate(GenerateOptions options, const Console& console, const ProgramInfo&
   job.run = episode_options(options, model, controls);
   const Record record = record_of(options.record, model);
   refuse_memory(record, "a data set");
-  take(record, model, job.run);
+  job.run.record = record.asked;
   const GradientKind gradients = gradients_wanted(options, false);
   std::unique_ptr<RolloutLoss> loss;
   if (!options.loss.empty()) loss = make_loss(loss_named(options.loss), model, job.run.every);
@@ -271,7 +271,7 @@ int generate(GenerateOptions options, const Console& console, const ProgramInfo&
   job.unit = "environment step";
   job.effects = effect_names(model);
   job.moving_bodies = model.moving_bodies();
-  job.layout = make_layout(options, model, stepper, job.run, record, info, plan);
+  job.layout = make_layout(options, model, stepper, job.run, info, plan);
   job.simulate = [&](const EpisodeOptions& run, EpisodeSink& sink, const ProgressCallback& progress,
                      const std::stop_token& stop) -> JobResult {
     return {with_gradients(plan_of(run), sink,

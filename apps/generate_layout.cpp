@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 
+#include "engine/base/hash.hpp"
 #include "io/dataset/dataset_from_model.hpp"
 #include "io/files/name_list.hpp"
 #include "io/files/text_file.hpp"
@@ -17,30 +18,16 @@ namespace {
 std::string controls_named(const std::string& path) {
   if (path.empty()) return "of the scene";
   constexpr std::size_t kLargestTable = std::size_t{1} << 32;
-  std::uint64_t hash = 0xCBF29CE484222325ULL;  // FNV-1a
-  for (const char c : read_text_file(path, kLargestTable, "a csv file"))
-    hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001B3ULL;
-  return fmt::format("a table of checksum {:016x}", hash);
+  const std::string text = read_text_file(path, kLargestTable, "a csv file");
+  return fmt::format("a table of checksum {:016x}", hash_bytes(text));
 }
 
-/// Names what is recorded, for the files.
-void describe(const Record& record, const Model& model, const EpisodeOptions& run,
-              DatasetDescription& description) {
-  for (const AskedOutput& asked : record.asked) {
-    description.record.push_back(asked.name);
-    description.record_times.push_back(asked.times);
-  }
-  const std::vector<std::string> names(model.body_names().begin(), model.body_names().end());
-  for (const BodyRows& rows : run.bodies) {
-    const bool all = rows.bodies.empty();
-    const std::string one = all ? "" : names[static_cast<std::size_t>(rows.bodies.front())];
-    description.bodies.push_back(
-        {all ? "bodies" : body_output(one), all ? names : std::vector{one}});
-  }
-}
-
-std::vector<std::string> split_if_any(const std::string& list) {
-  return list.empty() ? std::vector<std::string>{} : split_names("--record", list);
+/// Names of a task's observations.
+std::vector<TimedName> split_if_any(const std::string& list) {
+  std::vector<TimedName> record;
+  if (!list.empty())
+    for (std::string& name : split_names("--record", list)) record.push_back({std::move(name), {}});
+  return record;
 }
 
 /// For a shell that reads the command again.
@@ -76,37 +63,19 @@ std::string command_of(const GenerateOptions& options, const EpisodeOptions& run
 
 }  // namespace
 
-void take(const Record& record, const Model& model, EpisodeOptions& run) {
-  const auto rows_of = [&](const char* name) -> RowOutput {
-    const AskedOutput* const asked = record.find(name);
-    return {record.asked.empty() || asked != nullptr, asked ? asked->times : OutputTimes{}};
-  };
-  run.fields = record.outputs.fields;
-  run.q = rows_of("q"), run.v = rows_of("v"), run.end_effectors = rows_of("variables");
-  if (const AskedOutput* const all = record.find("bodies")) run.bodies.push_back({{}, all->times});
-  for (int b = 0; b < model.nb(); ++b)  // in the order of the scene, whatever that of the words
-    if (const AskedOutput* const one =
-            record.find(body_output(model.body_names()[static_cast<std::size_t>(b)])))
-      run.bodies.push_back({{b}, one->times});
-}
-
 DatasetLayout make_layout(const GenerateOptions& options, const Model& model,
-                          const Stepper& stepper, const EpisodeOptions& run, const Record& record,
+                          const Stepper& stepper, const EpisodeOptions& run,
                           const ProgramInfo& info, const GradientPlan& gradients, const Task* task,
                           const PlayedBy& played_by) {
-  DatasetDescription description;
-  if (task != nullptr) description.task = task->spec();
+  DatasetLayout description;
+  if (task != nullptr) description.task.emplace(task->spec());
   description.played_by = played_by;
   description.set_name = options.name;
   description.controls = controls_named(options.controls);
   description.command = command_of(options, run, played_by.policy);
   description.shards = options.shards.value_or(0);
   description.compression = options.compress;
-  if (task == nullptr)
-    describe(record, model, run, description);
-  else
-    description.record = split_if_any(options.record);
-  description.fields = record.outputs.fields;
+  description.record = task == nullptr ? run.record : split_if_any(options.record);
   description.sparse = options.tactile == "sparse";
   description.gradients_of =
       options.loss.empty() ? options.gradients : options.gradients + " " + options.loss;

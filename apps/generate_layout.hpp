@@ -4,7 +4,6 @@
 
 #include "apps/command.hpp"
 #include "apps/generate_options.hpp"
-#include "apps/record.hpp"
 #include "engine/step/stepper.hpp"
 #include "io/dataset/dataset_layout.hpp"
 #include "tasks/gradients/episode_gradients.hpp"
@@ -12,12 +11,9 @@
 
 namespace tangere::apps {
 
-/// What of an episode's rows is computed: what the record asks for, or everything.
-void take(const Record& record, const Model& model, EpisodeOptions& run);
-
 /// `task`: null for a scene alone.
 DatasetLayout make_layout(const GenerateOptions& options, const Model& model,
-                          const Stepper& stepper, const EpisodeOptions& run, const Record& record,
+                          const Stepper& stepper, const EpisodeOptions& run,
                           const ProgramInfo& info, const GradientPlan& gradients,
                           const Task* task = nullptr, const PlayedBy& played_by = {});
 

@@ -1,20 +1,57 @@
 // SPDX-License-Identifier: Apache-2.0
-// tangere info: describes a data set without reading its numbers.
+// tangere info: describes a data set or a trajectory without reading its numbers.
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
+#include <filesystem>
 #include <nlohmann/json.hpp>
 
 #include "apps/arguments.hpp"
 #include "apps/command.hpp"
 #include "apps/scene_run.hpp"
 #include "io/dataset/dataset_files.hpp"
+#include "io/trajectory/trajectory_reader.hpp"
 
 namespace tangere::apps {
 namespace {
 
 constexpr std::size_t kLongValue = 200;  // bytes; only --json shows longer settings
 
+/// A trajectory: its channels.
+int info_of_run(const std::string& path, const TrajectorySummary& run, const Console& console) {
+  Json settings = Json::object(), channels = Json::array();
+  std::string text = "settings\n";
+  for (const auto& [name, value] : run.settings) {
+    settings[name] = value;
+    if (value.size() <= kLongValue) text += fmt::format("  {}: {}\n", name, value);
+  }
+  text += "channels: rows, then the shape of a row\n";
+  for (const Channel& channel : run.channels) {
+    const std::string shape = fmt::format("{}", fmt::join(channel.shape, ", ")),
+                      units = fmt::format("{}", fmt::join(channel.units, ", "));
+    text += fmt::format("  {} {} ({}){}\n", channel.name, channel.rows, shape,
+                        units.empty() || units.size() > kLongValue ? "" : " [" + units + "]");
+    channels.push_back({{"name", channel.name},
+                        {"rows", channel.rows},
+                        {"shape", channel.shape},
+                        {"names", channel.names},
+                        {"units", channel.units},
+                        {"frame", channel.frame},
+                        {"meaning", channel.meaning}});
+  }
+  console.print(text + fmt::format("{} bytes", std::filesystem::file_size(path)));
+  console.result({{"command", "info"},
+                  {"exit_code", static_cast<int>(kDone)},
+                  {"input", path},
+                  {"settings", settings},
+                  {"channels", channels}});
+  return kDone;
+}
+
 int info(const std::string& path, const Console& console) {
+  if (std::filesystem::is_regular_file(path))
+    if (const std::optional<TrajectorySummary> run = summarise_trajectory(path))
+      return info_of_run(path, *run, console);
   const DatasetFiles dataset = find_dataset(path);
   const DatasetSummary summary = summarise(dataset);
   Json settings = Json::object(), shapes = Json::object();
@@ -57,9 +94,12 @@ int info(const std::string& path, const Console& console) {
 Command add_info(CLI::App& program) {
   const auto input = std::make_shared<std::string>();
   const auto console = std::make_shared<Console>();
-  CLI::App& app = add_command(program, "info", "Say what a data set is: settings, shapes, counts",
+  CLI::App& app = add_command(program, "info",
+                              "Say what a data set or a trajectory holds: settings, shapes, counts",
                               "tangere info balls");
-  add_text(app, "DIR", *input, "", "Folder of shards, or one file of a data set").required();
+  add_text(app, "DIR", *input, "",
+           "Folder of shards, one file of a data set, or a file of 'tangere simulate'")
+      .required();
   add_console_options(app, *console);
   return {&app, [=](const ProgramInfo&) { return info(*input, *console); }, [] { return true; }};
 }

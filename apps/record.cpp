@@ -15,12 +15,11 @@ namespace tangere::apps {
 namespace {
 
 /// A word and what it means; throws for one that the scene does not have.
-AskedOutput asked_of(const std::string& word, const std::string& where, const Model& model) {
+TimedName asked_of(const std::string& word, const std::string& where, const Model& model) {
   const std::vector<std::string> sensors = sensor_names(model.scene());
-  AskedOutput asked;
+  TimedName asked;
   try {
-    TimedName split = split_times(word);
-    asked = {std::move(split.name), split.times};
+    asked = split_times(word);
   } catch (const InputError& error) {
     throw InputError(where + ": " + error.what());
   }
@@ -41,9 +40,9 @@ AskedOutput asked_of(const std::string& word, const std::string& where, const Mo
 
 }  // namespace
 
-const AskedOutput* Record::find(const std::string& name) const {
-  const auto found = std::find_if(asked.begin(), asked.end(),
-                                  [&](const AskedOutput& a) { return a.name == name; });
+const TimedName* Record::find(const std::string& name) const {
+  const auto found =
+      std::find_if(asked.begin(), asked.end(), [&](const TimedName& a) { return a.name == name; });
   return found == asked.end() ? nullptr : &*found;
 }
 
@@ -59,7 +58,7 @@ Record record_of(const std::string& option, const Model& model) {
   }
   if (words.empty()) return record;
   for (const std::string& word : words) {
-    AskedOutput asked = asked_of(word, record.where, model);
+    TimedName asked = asked_of(word, record.where, model);
     if (record.find(asked.name) != nullptr)
       throw InputError(
           fmt::format("{}: '{}' is listed twice; expected it once, at times of one kind",
@@ -72,15 +71,15 @@ Record record_of(const std::string& option, const Model& model) {
   if (outputs.end_effectors && model.end_effectors().empty())
     throw InputError(record.where + ": 'variables', but the scene has no end effectors");
   if (outputs.end_effectors) outputs.of_end_effectors = record.find("variables")->times;
-  const AskedOutput* const q = record.find("q");
-  const AskedOutput* const v = record.find("v");
+  const TimedName* const q = record.find("q");
+  const TimedName* const v = record.find("v");
   if (q != nullptr) outputs.states = q->times;
   if (v != nullptr) outputs.states = v->times;
   if (record.find("memory") != nullptr && !model.has_shear_springs())
     throw InputError(record.where + ": 'memory', but no contact or sensor of the scene has ks");
   outputs.fields.emplace();
   const std::vector<std::string> sensors = sensor_names(model.scene());
-  for (const AskedOutput& asked : record.asked)
+  for (const TimedName& asked : record.asked)
     if (std::optional<FieldOutput> field = find_output(sensors, asked.name)) {
       field->times = asked.times;
       outputs.fields->push_back(*field);
@@ -97,7 +96,7 @@ void take_memory(Record& record, const Model& model) {
   RolloutOutputs& outputs = record.outputs;
   outputs.memory = model.has_shear_springs();
   outputs.of_memory = outputs.states.given() ? outputs.states : OutputTimes{.final = true};
-  if (const AskedOutput* const asked = record.find("memory")) outputs.of_memory = asked->times;
+  if (const TimedName* const asked = record.find("memory")) outputs.of_memory = asked->times;
 }
 
 void refuse_memory(const Record& record, const std::string& who) {
@@ -109,9 +108,9 @@ void refuse_memory(const Record& record, const std::string& who) {
 }
 
 void take_bodies(Record& record, const Model& model) {
-  const AskedOutput* first = record.find("bodies");
+  const TimedName* first = record.find("bodies");
   RolloutOutputs& outputs = record.outputs;
-  for (const AskedOutput& asked : record.asked) {
+  for (const TimedName& asked : record.asked) {
     const std::optional<int> body = find_body_output(model.scene(), asked.name);
     if (!body) continue;
     if (outputs.bodies && outputs.chosen_bodies.empty())
@@ -128,8 +127,8 @@ void take_bodies(Record& record, const Model& model) {
   if (first != nullptr) outputs.of_bodies = first->times;
   std::sort(outputs.chosen_bodies.begin(), outputs.chosen_bodies.end());
   // A trajectory has one list of rows for both.
-  const AskedOutput* const q = record.find("q");
-  const AskedOutput* const v = record.find("v");
+  const TimedName* const q = record.find("q");
+  const TimedName* const v = record.find("v");
   if (q != nullptr && v != nullptr && q->times != v->times)
     throw InputError(fmt::format("{}: 'q{}' and 'v{}'; expected one interval of both", record.where,
                                  to_string(q->times), to_string(v->times)));

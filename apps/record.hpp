@@ -9,18 +9,12 @@
 
 namespace tangere::apps {
 
-/// What was asked for by name, with its times: "q/final", "bodies.box", "pad.sum/10".
-struct AskedOutput {
-  std::string name;  ///< without times
-  OutputTimes times;
-};
-
 struct Record {
-  std::vector<AskedOutput> asked;  ///< none: everything
+  std::vector<TimedName> asked;  ///< with times: "q/final", "bodies.box"; none: everything
   RolloutOutputs outputs;
   std::string where;  ///< "--record", or file, line and <outputs>; for messages
 
-  [[nodiscard]] const AskedOutput* find(const std::string& name) const;
+  [[nodiscard]] const TimedName* find(const std::string& name) const;
 };
 
 /// Returns what the option asks for; if it is empty, what the scene asks for. Throws InputError for

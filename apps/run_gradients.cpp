@@ -10,6 +10,7 @@
 #include "apps/memory.hpp"
 #include "apps/scene_run.hpp"
 #include "engine/derivative/number_gradients.hpp"
+#include "engine/derivative/tactile_point_numbers.hpp"
 
 namespace tangere::apps {
 
@@ -31,6 +32,76 @@ void GradientArguments::check() const {
   if (points && loss.empty())
     throw InputError("--point-gradients without --gradients; expected both");
 }
+
+namespace {
+
+/// A table for each sensor from (E, points of all, kPointNumbers).
+void add_points(const Scene& scene, const Model& model, std::span<const double> all,
+                std::size_t environments, Recording& recording) {
+  recording.groups.push_back(
+      {"gradients/grad_points",
+       {{"meaning",
+         "derivative of the loss by each tactile point's place in its body's axes and its own "
+         "coefficients"}}});
+  std::size_t next = 0;
+  for (std::size_t s = 0; s < model.sensors().size(); ++s) {
+    const auto points = static_cast<std::size_t>(model.sensors()[s].points),
+               width = points * std::size_t{kPointNumbers};
+    Channel channel{.name = "gradients/grad_points/" + model.sensors()[s].name,
+                    .shape = {points, std::uint64_t{kPointNumbers}},
+                    .rows = static_cast<std::int64_t>(environments)};
+    for (int k = 0; k < kPointNumbers; ++k) {
+      channel.names.emplace_back(point_number_name(k));
+      channel.units.emplace_back(point_number_unit(k, scene.sensors[s].law));
+    }
+    std::vector<double> numbers;
+    for (std::size_t e = 0; e < environments; ++e) {
+      const auto part = all.subspan(e * (all.size() / environments) + next, width);
+      numbers.insert(numbers.end(), part.begin(), part.end());
+    }
+    recording.tables.push_back({std::move(channel), std::move(numbers)});
+    next += width;
+  }
+}
+
+/// The gradients of a loss as tables whose rows are environments.
+Recording described(const LossGradient& g, const std::string& loss, const Model& model,
+                    std::int64_t steps) {
+  Recording recording;
+  recording.groups.push_back(
+      {"gradients", {{"loss", loss}, {"meaning", loss_meaning(loss_named(loss))}}});
+  const auto environments = static_cast<std::int64_t>(g.value.size());
+  const auto add = [&](const char* name, std::vector<std::uint64_t> shape,
+                       const std::vector<double>& numbers, const char* meaning,
+                       std::vector<std::string> names, std::vector<std::string> units) {
+    recording.tables.push_back({{.name = name,
+                                 .shape = std::move(shape),
+                                 .rows = environments,
+                                 .names = std::move(names),
+                                 .units = std::move(units),
+                                 .meaning = meaning},
+                                numbers});
+  };
+  const std::vector<std::string> u_names(model.u_names().begin(), model.u_names().end()),
+      v_names(model.v_names().begin(), model.v_names().end());
+  add("gradients/loss", {}, g.value, "the loss of each environment", {}, {});
+  if (!u_names.empty())
+    add("gradients/grad_u", {static_cast<std::uint64_t>(steps), u_names.size()}, g.u,
+        "derivative of the loss by the controls of every step", u_names, {});
+  add("gradients/grad_q", {v_names.size()}, g.q,
+      "by the initial positions, along the dofs of v; rotations on the right", v_names, {});
+  add("gradients/grad_v", {v_names.size()}, g.v, "by the initial velocities", v_names, {});
+  std::vector<std::string> names, units;
+  const NumberGradients parameters(model);
+  for (const NumberInfo& info : parameters.infos())
+    names.push_back(info.name), units.push_back(info.unit);
+  add("gradients/grad_numbers", {names.size()}, g.parameters,
+      "by the numbers of the scene, in the units given", names, units);
+  if (!g.points.empty()) add_points(model.scene(), model, g.points, g.value.size(), recording);
+  return recording;
+}
+
+}  // namespace
 
 RunGradients::RunGradients(const GradientArguments& arguments, const Batch& batch,
                            const Stepper& stepper, const RolloutOptions& rollout)
@@ -69,12 +140,7 @@ bool RunGradients::write(const ControlProgram& controls, const RolloutOptions& r
       signals.token());
   if (summary.stopped) return false;
   const LossGradient& g = summary.losses[0];
-  std::vector<std::string> names, units;
-  const NumberGradients parameters(start_->model());
-  for (const NumberInfo& info : parameters.infos())
-    names.push_back(info.name), units.push_back(info.unit);
-  output.write({name_, loss_meaning(loss_named(name_)), g.value, g.u, g.q, g.v, g.parameters, names,
-                units, g.points});
+  output.add(described(g, name_, start_->model(), rollout.steps));
   value_ = g.value;
   recomputed_steps_ = summary.recomputed_steps;
   return true;

@@ -11,9 +11,9 @@
 #include "apps/console.hpp"
 #include "engine/base/precision.hpp"
 #include "engine/rows/episode_sink.hpp"
+#include "engine/rows/run_facts.hpp"
 #include "engine/step/control.hpp"
 #include "engine/step/stepper.hpp"
-#include "io/trajectory/run_facts.hpp"
 #include "tasks/gradients/losses.hpp"
 #include "tasks/run/rollout.hpp"
 

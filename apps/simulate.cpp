@@ -23,7 +23,6 @@
 #include "apps/task_run.hpp"
 #include "io/files/nearest_name.hpp"
 #include "io/hdf5/reading_note.hpp"
-#include "io/trajectory/layout_from_model.hpp"
 #include "io/trajectory/saved_state.hpp"
 #include "io/trajectory/trajectory_file.hpp"
 #include "kernels/table/isa.hpp"
@@ -81,32 +80,15 @@ RolloutOutputs outputs_of(const SimulateArguments& options, const Model& model) 
 }
 
 /// `task`: null for a scene alone.
-TrajectoryLayout make_layout(const Batch& batch, const Stepper& stepper,
-                             const RolloutOptions& rollout, const ProgramInfo& info,
-                             const Task* task = nullptr, const std::string& policy = {}) {
-  RunDescription run;
-  if (task != nullptr) run.task = task->spec();
-  run.policy = policy;
-  run.fields = fields_of(batch.model(), rollout.outputs);
-  run.bodies = rollout.outputs.bodies;
-  run.end_effectors = rollout.outputs.end_effectors;
-  run.states = rollout.outputs.states;
-  run.of_bodies = rollout.outputs.of_bodies;
-  run.of_end_effectors = rollout.outputs.of_end_effectors;
-  run.chosen_bodies = rollout.outputs.chosen_bodies;
-  run.audit = rollout.outputs.audit;
-  run.memory = rollout.outputs.memory;
-  run.of_memory = rollout.outputs.of_memory;
-  run.steps = rollout.steps;
-  run.first_step = rollout.first_step;
-  run.every = rollout.every;
-  for (const SensorInfo& sensor : batch.model().sensors())
-    run.tactile_intervals.push_back(tactile_interval(sensor, rollout));
-  run.precision = to_string(rollout.precision);
-  run.command_line = info.command_line;
-  run.version = info.version;
-  run.instruction_set = kernels::active_isa_name();
-  return layout_from(batch, stepper, run);
+RunFacts facts_of(const Batch& batch, const Stepper& stepper, Precision precision,
+                  const ProgramInfo& info, const Task* task = nullptr) {
+  RunOrigin origin{.precision = to_string(precision),
+                   .version = info.version,
+                   .instruction_set = kernels::active_isa_name(),
+                   .command = info.command_line,
+                   .task = {}};
+  if (task != nullptr) origin.task = task->spec();
+  return run_facts(batch.model(), stepper, origin, batch.seed());
 }
 
 std::vector<Failure> failures_of(const RolloutSummary& summary) {
@@ -323,11 +305,12 @@ int simulate_task(const SimulateArguments& options, const Console& console, cons
   for (int b = 0; b < batch.blocks(); ++b) program.start(batch, b);
 
   const StopSignals signals;
-  const TrajectoryLayout layout =
-      make_layout(batch, steppers.front(), rollout, info, &task, to_string(kind));
-  TrajectoryFile output(options.output, layout, options.overwrite);
+  const RunFacts facts = facts_of(batch, steppers.front(), precision, info, &task);
+  Recording recording = rollout_recording(batch, steppers.front(), rollout, facts);
+  recording.facts.push_back({"policy", to_string(kind)});
+  TrajectoryFile output(options.output, recording, options.overwrite);
   return write_run(
-      options, console, batch, layout, rollout, output, signals,
+      options, console, batch, facts, rollout, output, signals,
       [&](const ProgressCallback& progress) {
         return run_rollout(batch, steppers, program, rollout, output, progress, signals.token());
       },
@@ -353,7 +336,7 @@ int simulate(const SimulateArguments& options, const Console& console, const Pro
   const Model model(
       read_scene_for(options.scene, options.allow_unknown, console, options.solver.asked()));
   warn_about_geometry(console, model);
-  if (options.gradients.wanted()) solver = for_gradients(model, solver);
+  solver.differentiable = options.gradients.wanted();
   Stepper stepper(model, solver);
   warn_about_steps(console, model, stepper);
   const Start start(options, stepper);
@@ -375,10 +358,11 @@ int simulate(const SimulateArguments& options, const Console& console, const Pro
   // Lives from before the file is created until it is gone or complete, so nothing half-written
   // stays.
   const StopSignals signals;
-  const TrajectoryLayout layout = make_layout(batch, steppers.front(), rollout, info);
-  TrajectoryFile output(options.output, layout, options.overwrite);
+  const RunFacts facts = facts_of(batch, steppers.front(), precision, info);
+  TrajectoryFile output(options.output, rollout_recording(batch, steppers.front(), rollout, facts),
+                        options.overwrite);
   return write_run(
-      options, console, batch, layout, rollout, output, signals,
+      options, console, batch, facts, rollout, output, signals,
       [&](const ProgressCallback& progress) {
         RolloutSummary summary =
             run_rollout(batch, steppers, controls, rollout, output, progress, signals.token());

@@ -14,6 +14,7 @@
 #include "io/dataset/dataset_merge.hpp"
 #include "io/dataset/dataset_writer.hpp"
 #include "io/dataset/shard_check.hpp"
+#include "io/files/part_file.hpp"
 #include "io/hdf5/h5.hpp"
 
 namespace tangere {
@@ -178,6 +179,182 @@ void merge(benchmark::State& state) {
 BENCHMARK(merge)
     ->RangeMultiplier(4)
     ->Range(1024, 65536)
+    ->Unit(benchmark::kMillisecond)
+    ->MeasureProcessCPUTime();
+
+/// A dataset of a shard in columns: rows of all episodes one after another, in chunks of about a
+/// megabyte that are written whole.
+class Column {
+ public:
+  Column(const h5::Id& file, const char* name, h5::Dims row) : row_(std::move(row)) {
+    for (const hsize_t n : row_) width_ *= n;
+    most_ = std::max<hsize_t>(1, (hsize_t{1} << 20) / (width_ * sizeof(float)));
+    h5::Dims none{0}, endless{H5S_UNLIMITED}, chunk{most_};
+    for (h5::Dims* dims : {&none, &endless, &chunk})
+      dims->insert(dims->end(), row_.begin(), row_.end());
+    const h5::Id space(H5Screate_simple(int(none.size()), none.data(), endless.data()));
+    const h5::Id creation = h5::without_times(H5P_DATASET_CREATE);
+    H5Pset_chunk(creation.get(), int(chunk.size()), chunk.data());
+    H5Pset_alloc_time(creation.get(), H5D_ALLOC_TIME_INCR);
+    H5Pset_fill_time(creation.get(), H5D_FILL_TIME_NEVER);
+    const h5::Id access(H5Pcreate(H5P_DATASET_ACCESS));
+    H5Pset_chunk_cache(access.get(), 0, 0, 1);
+    dataset_ = h5::Id(H5Dcreate2(file.get(), name, H5T_IEEE_F32LE, space.get(), H5P_DEFAULT,
+                                 creation.get(), access.get()));
+  }
+  void append(const float* numbers, std::size_t rows) {
+    while (rows > 0) {
+      const std::size_t count = std::min<std::size_t>(rows, most_ - held_.size() / width_);
+      if (count == most_) {
+        write(numbers, count);
+      } else {
+        held_.insert(held_.end(), numbers, numbers + count * width_);
+        if (held_.size() == most_ * width_) end();
+      }
+      numbers += count * width_, rows -= count;
+    }
+  }
+  void end() {
+    if (!held_.empty()) write(held_.data(), held_.size() / width_);
+    held_.clear();
+  }
+
+ private:
+  void write(const float* numbers, hsize_t rows) {
+    h5::Dims offset(row_.size() + 1, 0), count{rows}, size{written_ + rows};
+    for (h5::Dims* dims : {&count, &size}) dims->insert(dims->end(), row_.begin(), row_.end());
+    offset[0] = written_;
+    H5Dset_extent(dataset_.get(), size.data());
+    h5::write_box<float>(dataset_, offset, count, numbers);
+    written_ += rows;
+  }
+
+  h5::Dims row_;
+  hsize_t width_ = 1, most_ = 1, written_ = 0;
+  std::vector<float> held_;
+  h5::Id dataset_;
+};
+
+/// Writes one shard of the episodes above in columns, through the library alone, with the checksums
+/// of the writer of shards: read back, synced, renamed.
+void make_columns(const std::string& path, const DatasetLayout& l, const Block& block) {
+  PartFile part(path, false);
+  h5::Id file = h5::create_file(part.path(), part.written());
+  const EpisodeRows piece = block.rows(0);
+  const auto side = static_cast<hsize_t>(l.sensors[0].rows);
+  std::vector<Column> columns;
+  columns.emplace_back(file, "q", h5::Dims{l.q_names.size()});
+  columns.emplace_back(file, "v", h5::Dims{l.v_names.size()});
+  columns.emplace_back(file, "pad", h5::Dims{side, side, 3});
+  columns.emplace_back(file, "actions", h5::Dims{l.u_names.size()});
+  const std::size_t widths[] = {l.q_names.size(), l.v_names.size(), side * side * 3,
+                                l.u_names.size()};
+  ContentSum sum;
+  std::vector<std::int64_t> ends;
+  for (std::int64_t episode = 0; episode < l.episodes; ++episode) {
+    const auto e = static_cast<std::size_t>(episode % kBlock);
+    for (std::size_t k = 0; k < 4; ++k) {
+      const auto rows = static_cast<std::size_t>(k < 3 ? l.rows() + 1 : l.rows());
+      const float* const numbers =
+          (k < 3 ? std::get<std::span<const float>>(piece.observations[k]).data()
+                 : piece.actions.data()) +
+          e * rows * widths[k];
+      sum.add(episode, k, 0, std::int64_t(rows), widths[k] * sizeof(float), numbers);
+      columns[k].append(numbers, rows);
+    }
+    ends.push_back((episode + 1) * l.rows());
+  }
+  for (Column& column : columns) column.end();
+  columns.clear();
+  h5::Id list = h5::create_dataset<std::int64_t>(file, "episode_ends", {ends.size()});
+  h5::write_box<std::int64_t>(list, {0}, {ends.size()}, ends.data());
+  list.reset();
+  h5::write_scalar<std::uint64_t>(file, "content_sum", sum.value());
+  h5::close_file(file, part.path());
+  part.compare();
+  part.commit();
+}
+
+void columns(benchmark::State& state, std::int64_t episodes, std::int64_t rows, int side) {
+  const DatasetLayout l = layout_of(episodes, rows, side, "none");
+  const Block block(l);
+  std::uintmax_t bytes = 0;
+  for (auto _ : state) {
+    state.PauseTiming();
+    const Folder folder;
+    state.ResumeTiming();
+    make_columns(folder.path + "/shard.h5", l, block);
+    state.PauseTiming();
+    bytes = std::filesystem::file_size(folder.path + "/shard.h5");
+    state.ResumeTiming();
+  }
+  const double made = static_cast<double>(episodes) * static_cast<double>(state.iterations());
+  state.counters["episodes/s"] = benchmark::Counter(made, benchmark::Counter::kIsRate);
+  state.counters["of_size"] =
+      static_cast<double>(bytes) / (static_cast<double>(episodes) * l.episode_bytes());
+}
+void short_columns(benchmark::State& state) { columns(state, 4096, 5, 4); }
+void long_columns(benchmark::State& state) { columns(state, 256, 200, 16); }
+void large_columns(benchmark::State& state) { columns(state, 16, 20, 200); }
+BENCHMARK(short_columns)->Unit(benchmark::kMillisecond)->MeasureProcessCPUTime();
+BENCHMARK(long_columns)->Unit(benchmark::kMillisecond)->MeasureProcessCPUTime();
+BENCHMARK(large_columns)->Unit(benchmark::kMillisecond)->MeasureProcessCPUTime();
+
+/// Rows [first, first + rows) of a column as a virtual dataset of a demo.
+void add_view(const h5::Id& group, const char* name, const char* column, const h5::Dims& row,
+              hsize_t first, hsize_t rows, hsize_t all) {
+  h5::Dims dims{rows}, source{all}, offset(row.size() + 1, 0);
+  for (h5::Dims* d : {&dims, &source}) d->insert(d->end(), row.begin(), row.end());
+  offset[0] = first;
+  const h5::Id space(H5Screate_simple(int(dims.size()), dims.data(), nullptr)),
+      from(H5Screate_simple(int(source.size()), source.data(), nullptr));
+  H5Sselect_hyperslab(from.get(), H5S_SELECT_SET, offset.data(), nullptr, dims.data(), nullptr);
+  const h5::Id creation = h5::without_times(H5P_DATASET_CREATE);
+  H5Pset_virtual(creation.get(), space.get(), "shard.h5", column, from.get());
+  const h5::Id dataset(H5Dcreate2(group.get(), name, H5T_IEEE_F32LE, space.get(), H5P_DEFAULT,
+                                  creation.get(), H5P_DEFAULT));
+  if (dataset.get() < 0) std::abort();
+}
+
+/// Measures robomimic's file of such a shard through the library alone: the groups of each demo,
+/// and views of its actions, observations and next observations. There is no view for Minari.
+void merge_columns(benchmark::State& state) {
+  const std::int64_t episodes = state.range(0);
+  const DatasetLayout l = layout_of(episodes, 5, 4, "none");
+  const Folder folder;
+  make_columns(folder.path + "/shard.h5", l, Block(l));
+  const auto n = static_cast<hsize_t>(episodes), rows = static_cast<hsize_t>(l.rows());
+  std::uintmax_t bytes = 0;
+  for (auto _ : state) {
+    PartFile part(folder.path + "/robomimic.hdf5", true);
+    constexpr hsize_t kDescriptions = 1 << 16;
+    h5::Id file = h5::create_file(part.path(), part.written(), kDescriptions, true);
+    {
+      const h5::Id data = h5::create_group(file, "data");
+      for (hsize_t e = 0; e < n; ++e) {
+        const h5::Id demo = h5::create_group(data, "demo_" + std::to_string(e));
+        h5::write_scalar<std::int64_t>(demo, "num_samples", l.rows());
+        add_view(demo, "actions", "actions", {l.u_names.size()}, e * rows, rows, n * rows);
+        for (const hsize_t later : {0, 1}) {
+          const h5::Id below = h5::create_group(demo, later == 1 ? "next_obs" : "obs");
+          const hsize_t first = e * (rows + 1) + later, all = n * (rows + 1);
+          add_view(below, "q", "q", {l.q_names.size()}, first, rows, all);
+          add_view(below, "v", "v", {l.v_names.size()}, first, rows, all);
+          add_view(below, "pad", "pad", {4, 4, 3}, first, rows, all);
+        }
+      }
+    }
+    h5::close_file(file, part.path());
+    part.commit();
+    bytes = std::filesystem::file_size(folder.path + "/robomimic.hdf5");
+  }
+  const double made = static_cast<double>(episodes) * static_cast<double>(state.iterations());
+  state.counters["episodes/s"] = benchmark::Counter(made, benchmark::Counter::kIsRate);
+  state.counters["bytes/episode"] = static_cast<double>(bytes) / static_cast<double>(episodes);
+}
+BENCHMARK(merge_columns)
+    ->RangeMultiplier(4)
+    ->Range(1024, 16384)
     ->Unit(benchmark::kMillisecond)
     ->MeasureProcessCPUTime();
 

@@ -35,7 +35,7 @@ std::string to_string(const OutputTimes& times);
 /// The name and the times of a word of --record or <outputs>: "pad", "pad/10", "q/final".
 struct TimedName {
   std::string name;
-  OutputTimes times;
+  OutputTimes times = {};
 };
 /// Splits a word at its last '/'. Throws InputError where what follows is neither "final" nor a
 /// whole number from 1 to 10⁹.

@@ -311,7 +311,7 @@ struct SolverOptions {
   /// none sleeps.
   double sleep = 0;
   Source sleep_source{};
-  bool keep_inert_contacts = false;  ///< StepperOptions::keep_inert_contacts
+  bool keep_inert_contacts = false;  ///< as with StepperOptions::differentiable
 };
 
 struct Scene {

@@ -9,6 +9,7 @@
 #include <numbers>
 
 #include "engine/model/random.hpp"
+#include "engine/step/batch.hpp"
 
 namespace tangere {
 namespace {
@@ -104,7 +105,15 @@ void ControlProgram::check_covers(std::int64_t steps) const {
                                table->path, table->rows.size(), steps));
 }
 
+void ControlProgram::evaluate(std::int64_t step, const Batch& batch, std::span<double> u) const {
+  const std::size_t nu = as_size(nu_);
+  check_size("controls", u.size(), as_size(batch.environments()) * nu);
+  for (int e = 0; e < batch.environments(); ++e)
+    evaluate(step, batch.episode(e), u.subspan(as_size(e) * nu, nu));
+}
+
 void ControlProgram::evaluate(std::int64_t step, std::int64_t episode, std::span<double> u) const {
+  check_size("controls", u.size(), as_size(nu_));
   if (const auto* constant = std::get_if<ConstantControl>(&description_)) {
     std::copy(constant->values.begin(), constant->values.end(), u.begin());
   } else if (const auto* piecewise = std::get_if<PiecewiseControl>(&description_)) {

@@ -10,6 +10,8 @@
 
 namespace tangere {
 
+class Batch;
+
 /// u(step, environment) for a scene. It has no state, so any step of any environment can be
 /// evaluated alone.
 class ControlProgram {
@@ -25,6 +27,10 @@ class ControlProgram {
   /// random kind. A time of the piecewise kind within 1e-6 steps of a step's start counts as that
   /// start. Throws InputError beyond a table's last row.
   void evaluate(std::int64_t step, std::int64_t episode, std::span<double> u) const;
+
+  /// Computes the controls of all environments of a batch, (E, nu). Throws InputError as above, and
+  /// for an array of another length.
+  void evaluate(std::int64_t step, const Batch& batch, std::span<double> u) const;
 
   /// Number of steps that it describes: rows of a table, or the end of a piecewise program; -1 when
   /// open.

@@ -50,7 +50,7 @@ StepSettings step_settings(const Model& model, const StepperOptions& o) {
       .accuracy = accuracy,
       .spare = false,
       .bounded_energy = model.solver().bounded_energy,
-      .keep_inert_contacts = o.keep_inert_contacts || model.solver().keep_inert_contacts,
+      .keep_inert_contacts = o.differentiable || model.solver().keep_inert_contacts,
       .sleep = o.sleep.value_or(model.solver().sleep)};
   check_sleep(model, s.sleep);
   if (!(s.timestep > 0) || !std::isfinite(s.timestep))
@@ -59,8 +59,12 @@ StepSettings step_settings(const Model& model, const StepperOptions& o) {
   if (accuracy > 0)
     following =
         std::min(kLooser * following, std::clamp(kShareOfAccuracy * accuracy, kTightest, kLoosest));
+  if (o.differentiable) {
+    refuse_sleep(model, s);
+    following = kGradientTolerance;
+  }
   s.tolerance = o.tolerance.value_or(model.solver().tolerance.value_or(following));
-  s.spare = !o.tolerance && !model.solver().tolerance;
+  s.spare = !o.differentiable && !o.tolerance && !model.solver().tolerance;
   if (!(s.tolerance > 0) || !std::isfinite(s.tolerance))
     throw InputError("solver tolerance " + std::to_string(s.tolerance) +
                      "; expected a positive number");

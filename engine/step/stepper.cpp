@@ -404,11 +404,4 @@ Integrator integrator_in_force(const Model& model, const StepperOptions& options
   return step_settings(model, options).integrator;
 }
 
-StepperOptions for_gradients(const Model& model, StepperOptions options) {
-  refuse_sleep(model, step_settings(model, options));
-  if (!options.tolerance && !model.solver().tolerance) options.tolerance = kGradientTolerance;
-  options.keep_inert_contacts = true;
-  return options;
-}
-
 }  // namespace tangere

@@ -16,13 +16,6 @@ class BlockTape;
 /// Returns the scheme that a stepper of these options takes. Throws like its constructor.
 Integrator integrator_in_force(const Model& model, const StepperOptions& options);
 
-/// Tolerance of runs that gradients are taken of, where neither caller nor scene names one. A
-/// gradient is exact for states that solve their equations, so it is off by about as much.
-inline constexpr double kGradientTolerance = 1e-9;
-/// Returns the options with that tolerance, where none is named, and with all contacts. Throws
-/// InputError if bodies may sleep.
-StepperOptions for_gradients(const Model& model, StepperOptions options);
-
 /// Owns the scratch of one thread. Steps any batch of its model. Results do not depend on which
 /// Stepper ran.
 class Stepper {

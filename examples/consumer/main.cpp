@@ -8,10 +8,7 @@
 #include <exception>
 #include <vector>
 
-#include "engine/sense/readout.hpp"
-#include "engine/step/control.hpp"
-#include "engine/step/stepper.hpp"
-#include "io/scene/scene_reader.hpp"
+#include <tangere/tangere.hpp>
 
 int main(int argc, char** argv) {
   if (argc != 2) {
@@ -20,20 +17,18 @@ int main(int argc, char** argv) {
   }
   try {
     constexpr int kEnvironments = 16, kSteps = 100;
-    const tangere::Model model(tangere::read_scene(argv[1]).scene);
+    const tangere::Model model = tangere::load_model(argv[1]);
     if (model.sensors().empty()) throw tangere::InputError("the scene has no tactile sensor");
     tangere::Batch batch(model, kEnvironments, /*seed=*/1);
     tangere::Stepper stepper(model);
     tangere::Readout readout(model);
     const tangere::ControlProgram program(model, model.timestep(), batch.seed());
 
-    const auto nu = static_cast<std::size_t>(model.nu());
     const auto points = static_cast<std::size_t>(model.sensors()[0].points);
-    std::vector<double> controls(kEnvironments * nu), field(3 * points);
+    std::vector<double> controls(std::size_t(kEnvironments * model.nu())), field(3 * points);
     double peak = 0;
     for (int step = 0; step < kSteps; ++step) {
-      for (int e = 0; e < kEnvironments; ++e)
-        program.evaluate(step, batch.episode(e), {&controls[std::size_t(e) * nu], nu});
+      program.evaluate(step, batch, controls);
       stepper.step(batch, controls);
       for (int e = 0; e < kEnvironments; ++e) {
         readout.tactile(batch, e, /*sensor=*/0, field);

@@ -4,8 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "apps/program.hpp"
-#include "tasks/catalogue/task_list.hpp"
+#include <tangere/tangere.hpp>
 
 namespace {
 

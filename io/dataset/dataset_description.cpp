@@ -11,9 +11,10 @@
 #include <sstream>
 
 #include "engine/base/error.hpp"
+#include "engine/rows/sensor_layout.hpp"
 #include "io/dataset/learner_notes.hpp"
+#include "io/hdf5/h5_channels.hpp"
 #include "io/hdf5/h5_listing.hpp"
-#include "io/trajectory/sensor_description.hpp"
 
 namespace tangere {
 namespace {
@@ -26,7 +27,7 @@ constexpr std::size_t kLongText =
 
 void describe_task(const h5::Id& scene, const DatasetLayout& layout) {
   if (!layout.task) {
-    h5::write_attribute(scene, "task", "none: a scene alone, whose every reward is 0");
+    h5::write_attribute(scene, "task", kNoTask);
     return;
   }
   const TaskSpec& task = *layout.task;
@@ -42,16 +43,9 @@ void describe_task(const h5::Id& scene, const DatasetLayout& layout) {
   h5::write_attribute(scene, "action_meaning", task.action.meaning);
   h5::write_scalar<double>(scene, "action_low", task.action.low);
   h5::write_scalar<double>(scene, "action_high", task.action.high);
-  std::vector<std::string> units{"q_units", "v_units"}, meanings{"coordinates", "velocities"};
-  for (const TensorSpec& tensor : task.observations) {
-    units.push_back(tensor.unit);
-    meanings.push_back(tensor.meaning);
-  }
-  for (std::vector<std::string>* list : {&units, &meanings}) {
-    std::vector<std::string> stored;
-    for (const std::size_t k : layout.recorded()) stored.push_back((*list)[k]);
-    *list = std::move(stored);
-  }
+  std::vector<std::string> units, meanings;
+  for (const EpisodeChannel& channel : layout.channels())
+    if (channel.wanted) units.push_back(channel.unit), meanings.push_back(channel.meaning);
   h5::write_attribute(scene, "observation_units", std::span<const std::string>(units));
   h5::write_attribute(scene, "observation_meanings", std::span<const std::string>(meanings));
 }
@@ -62,16 +56,7 @@ void describe_run(const h5::Id& scene, const DatasetLayout& layout) {
   h5::write_attribute(scene, "text", layout.scene_text);
   h5::write_attribute(scene, "tables", layout.tables);
   h5::write_attribute(scene, "controls", layout.controls);
-  h5::write_scalar<std::uint64_t>(scene, "seed", layout.seed);
-  h5::write_scalar<std::int64_t>(scene, "steps", layout.steps);
-  h5::write_scalar<std::int64_t>(scene, "every", layout.every);
-  h5::write_scalar<double>(scene, "timestep", layout.timestep);
-  h5::write_attribute(scene, "timestep_unit", "s");
-  h5::write_attribute(scene, "integrator", layout.integrator);
-  h5::write_scalar<double>(scene, "tolerance", layout.tolerance);
-  h5::write_scalar<double>(scene, "accuracy", layout.accuracy);
-  if (layout.sleep > 0) h5::write_scalar<double>(scene, "sleep", layout.sleep);
-  h5::write_attribute(scene, "precision", layout.precision);
+  h5::write_attributes(scene, attributes_of(layout, layout.steps, layout.every));
   h5::write_attribute(scene, "compression", layout.compression);
   h5::write_attribute(scene, "tactile", layout.sparse ? "sparse" : "dense");
   h5::write_attribute(scene, "tangere_version", layout.version);
@@ -90,8 +75,13 @@ void describe_samples(const h5::Id& scene, const DatasetLayout& layout) {
     h5::write_attribute(scene, "samples", std::span<const std::string>(names));
     h5::write_list<std::int64_t>(scene, "sample_every", every);
   }
-  for (const BodyObservation& some : layout.bodies)
-    h5::write_attribute(scene, "names of " + some.name, std::span<const std::string>(some.bodies));
+  for (const EpisodeChannel& channel : layout.channels()) {
+    if (channel.kind != EpisodeChannel::Kind::bodies) continue;
+    std::vector<std::string> bodies;
+    for (const int b : channel.bodies)
+      bodies.push_back(layout.body_names[static_cast<std::size_t>(b)]);
+    h5::write_attribute(scene, "names of " + channel.name, std::span<const std::string>(bodies));
+  }
 }
 
 void describe_numbers(const h5::Id& scene, const DatasetLayout& layout) {
@@ -121,17 +111,20 @@ void describe_numbers(const h5::Id& scene, const DatasetLayout& layout) {
     h5::write_attribute(scene, "variable_frame", "world");
   }
   const h5::Id sensors = h5::create_group(scene, "sensors");
+  const std::vector<EpisodeChannel> channels = layout.channels();
   for (const SensorLayout& sensor : layout.sensors) {
     const h5::Id group = h5::create_group(sensors, sensor.name);
-    describe_reading(group, sensor, FieldForm::field);
-    describe_points(group, sensor);
+    h5::write_attributes(group, reading_attributes(sensor, FieldForm::field));
+    for (const Table& table : point_tables(sensor, "")) h5::write_table(group, table);
     std::vector<std::string> readings, components;
-    for (const FieldOutput of : layout.fields)
-      if (&layout.sensors[static_cast<std::size_t>(of.sensor)] == &sensor &&
-          of.form != FieldForm::field) {
-        readings.push_back(output_name(sensor.name, of.form));
-        components.push_back(components_text(sensor, of.form));
-      }
+    for (const EpisodeChannel& channel : channels) {
+      const FieldOutput of = channel.reading;
+      if (channel.kind != EpisodeChannel::Kind::reading || of.form == FieldForm::field ||
+          &layout.sensors[static_cast<std::size_t>(of.sensor)] != &sensor)
+        continue;
+      readings.push_back(channel.name);
+      components.push_back(components_text(sensor, of.form));
+    }
     if (readings.empty()) continue;
     h5::write_attribute(group, "readings", std::span<const std::string>(readings));
     h5::write_attribute(group, "reading_components", std::span<const std::string>(components));

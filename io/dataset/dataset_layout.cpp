@@ -21,8 +21,6 @@ std::int64_t blocks_of(std::int64_t episodes) {
   return (episodes + kBlockEpisodes - 1) / kBlockEpisodes;
 }
 
-constexpr const char* kEndEffectors = "variables";
-
 /// Checks lengths against the limits of the format of a group.
 void check_lengths(const std::vector<std::string>& observations) {
   constexpr std::size_t kLongest = 255, kShown = 32, kAll = 65000, kBesidesName = 16;
@@ -59,14 +57,6 @@ void check_set_name(const std::string& name) {
                                  name.substr(0, kLongest), kLongest));
 }
 
-template <class T>
-std::vector<T> chosen(const std::vector<T>& all, const std::vector<std::size_t>& places) {
-  std::vector<T> some;
-  some.reserve(places.size());
-  for (const std::size_t k : places) some.push_back(all[k]);
-  return some;
-}
-
 }  // namespace
 
 std::string DatasetLayout::dataset_id() const {
@@ -88,87 +78,45 @@ std::vector<std::string> DatasetLayout::action_names() const {
 }
 
 std::vector<std::string> DatasetLayout::observation_names() const {
-  return chosen(all_observation_names(), recorded());
-}
-
-std::vector<std::size_t> DatasetLayout::recorded() const {
-  const std::vector<std::string> names = all_observation_names();
-  std::vector<std::size_t> places;
-  for (std::size_t k = 0; k < names.size(); ++k)
-    if (const std::optional<OutputTimes> times = times_of(names[k]); times && !times->given())
-      places.push_back(k);
-  return places;
-}
-
-std::optional<OutputTimes> DatasetLayout::times_of(const std::string& name) const {
-  const auto at = std::find(record.begin(), record.end(), name);
-  if (at == record.end()) return record.empty() ? std::optional(OutputTimes{}) : std::nullopt;
-  return record_times.empty() ? OutputTimes{}
-                              : record_times[static_cast<std::size_t>(at - record.begin())];
-}
-
-std::vector<DatasetSample> DatasetLayout::samples() const {
-  const std::vector<std::string> names = all_observation_names();
-  const std::vector<std::vector<std::uint64_t>> shapes = all_shapes();
-  std::vector<DatasetSample> list;
-  for (std::size_t k = 0; k < names.size(); ++k) {
-    const std::optional<OutputTimes> times = times_of(names[k]);
-    if (!times || !times->given()) continue;
-    const OutputTimes by_row{times->every / every, times->final};
-    list.push_back({names[k], shapes[k], k, by_row, by_row.before(rows() + 1, rows())});
-  }
-  return list;
-}
-
-std::vector<std::string> DatasetLayout::all_observation_names() const {
-  std::vector<std::string> names{"q", "v"};
-  if (task) {
-    for (const TensorSpec& tensor : task->observations) names.push_back(tensor.name);
-    return names;
-  }
-  if (!end_effector_names.empty()) names.emplace_back(kEndEffectors);
-  for (const BodyObservation& some : bodies) names.push_back(some.name);
-  for (const FieldOutput of : fields)
-    names.push_back(output_name(sensors[static_cast<std::size_t>(of.sensor)].name, of.form));
+  std::vector<std::string> names;
+  for (const EpisodeChannel& channel : channels())
+    if (channel.wanted && !channel.times.given()) names.push_back(channel.name);
   return names;
 }
 
-std::vector<std::size_t> DatasetLayout::touch() const {
-  const auto perfect = [](const SensorLayout& sensor) { return sensor.imperfections.empty(); };
-  std::vector<std::string> names;
-  if (!task) {
-    for (const FieldOutput of : fields) {
-      const SensorLayout& sensor = sensors[static_cast<std::size_t>(of.sensor)];
-      if (perfect(sensor) || of.form == FieldForm::ideal || of.form == FieldForm::markers)
-        names.push_back(output_name(sensor.name, of.form));
-    }
-  } else if (std::all_of(sensors.begin(), sensors.end(), perfect)) {
-    for (const TensorSpec& tensor : task->observations)
-      if (tensor.touch) names.push_back(tensor.name);
-  }
-  const std::vector<std::string> stored = observation_names();
+std::vector<std::size_t> DatasetLayout::recorded() const {
+  const std::vector<EpisodeChannel> all = channels();
   std::vector<std::size_t> places;
-  for (std::size_t k = 0; k < stored.size(); ++k)
-    if (std::find(names.begin(), names.end(), stored[k]) != names.end()) places.push_back(k);
+  for (std::size_t k = 0; k < all.size(); ++k)
+    if (all[k].wanted && !all[k].times.given()) places.push_back(k);
+  return places;
+}
+
+std::vector<DatasetSample> DatasetLayout::samples() const {
+  const std::vector<EpisodeChannel> all = channels();
+  std::vector<DatasetSample> list;
+  for (std::size_t k = 0; k < all.size(); ++k)
+    if (all[k].wanted && all[k].times.given())
+      list.push_back(
+          {all[k].name, all[k].shape, k, all[k].times, all[k].times.before(rows() + 1, rows())});
+  return list;
+}
+
+std::vector<std::size_t> DatasetLayout::touch() const {
+  std::vector<std::size_t> places;
+  std::size_t stored = 0;
+  for (const EpisodeChannel& channel : channels()) {
+    if (!channel.wanted || channel.times.given()) continue;
+    if (channel.touch) places.push_back(stored);
+    ++stored;
+  }
   return places;
 }
 
 std::vector<std::vector<std::uint64_t>> DatasetLayout::observation_shapes() const {
-  return chosen(all_shapes(), recorded());
-}
-
-std::vector<std::vector<std::uint64_t>> DatasetLayout::all_shapes() const {
-  constexpr std::uint64_t kPoseAndTwist = 13;
-  std::vector<std::vector<std::uint64_t>> shapes{{q_names.size()}, {v_names.size()}};
-  if (task) {
-    for (const TensorSpec& tensor : task->observations)
-      shapes.emplace_back(tensor.shape.begin(), tensor.shape.end());
-    return shapes;
-  }
-  if (!end_effector_names.empty()) shapes.push_back({end_effector_names.size(), 3});
-  for (const BodyObservation& some : bodies) shapes.push_back({some.bodies.size(), kPoseAndTwist});
-  for (const FieldOutput of : fields)
-    shapes.push_back(reading_shape(sensors[static_cast<std::size_t>(of.sensor)], of.form));
+  std::vector<std::vector<std::uint64_t>> shapes;
+  for (const EpisodeChannel& channel : channels())
+    if (channel.wanted && !channel.times.given()) shapes.push_back(channel.shape);
   return shapes;
 }
 
@@ -220,7 +168,6 @@ std::int64_t DatasetLayout::shard_of(std::int64_t episode) const {
 }
 
 void DatasetLayout::check() const {
-  check_outputs(fields, sensors.size());
   check_set_name(set_name);
   if (shards > blocks_of(episodes))
     throw InputError(
@@ -231,20 +178,14 @@ void DatasetLayout::check() const {
         "{} episodes in {} shards; expected at most {} shards: a data set of fewer episodes, or of "
         "episodes with fewer rows",
         episodes, count, kMostShards));
-  const std::vector<std::string> all = all_observation_names();
-  for (std::size_t k = 0; k < record_times.size(); ++k)
-    if (record_times[k].every % every != 0)
-      throw InputError(fmt::format("'{}{}', and a row is every {} steps; expected a multiple of {}",
-                                   record.at(k), to_string(record_times[k]), every, every));
-  for (const std::string& name : record)
-    if (std::find(all.begin(), all.end(), name) == all.end())
+  std::vector<std::string> all;
+  for (const EpisodeChannel& channel : channels()) all.push_back(channel.name);
+  for (const TimedName& one : record)
+    if (std::find(all.begin(), all.end(), one.name) == all.end())
       throw InputError(
-          fmt::format("--record: unknown observation '{}'{}", name, suggestion(name, all)));
+          fmt::format("--record: unknown observation '{}'{}", one.name, suggestion(one.name, all)));
   check_lengths(all);
-  for (const SensorLayout& sensor : sensors)
-    if (sensor.name.empty() || sensor.name == "." || sensor.name.find('/') != std::string::npos)
-      throw InputError(fmt::format(
-          "sensor '{}': a dataset cannot have this name; expected one without '/'", sensor.name));
+  for (const SensorLayout& sensor : sensors) check_sensor_name(sensor.name);
   std::set<std::string> names;
   for (const std::string& name : all)
     if (!task && !names.insert(name).second)

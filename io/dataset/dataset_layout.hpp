@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
+#include "engine/rows/episode_channels.hpp"
 #include "engine/rows/episode_sink.hpp"
-#include "io/trajectory/trajectory_layout.hpp"
 
 namespace tangere {
 
@@ -33,12 +33,6 @@ struct PlayedBy {
   double random_share = 0;  ///< share of the episodes that the random policy plays
 };
 
-/// Poses and twists of bodies as an observation of (bodies, 13).
-struct BodyObservation {
-  std::string name;                 ///< "bodies", or "bodies.box"
-  std::vector<std::string> bodies;  ///< names
-};
-
 /// An observation that is not stored at every row. It lies below `samples` of a demo.
 struct DatasetSample {
   std::string name;
@@ -54,21 +48,18 @@ struct DatasetLayout : RunFacts {
   int every = 1;              ///< K: row j is the state after j K steps
   bool single = false;        ///< observations are float32, else float64
   std::vector<SensorLayout> sensors;
-  std::vector<BodyObservation> bodies;  ///< of a scene
-  std::vector<FieldOutput> fields;      ///< what a scene's episodes hold of them
+  std::vector<std::string> body_names;  ///< of a scene
   PlayedBy played_by;                   ///< of a task
   std::string set_name;         ///< the part of dataset_id() that is asked for; none: as below
   std::string tables = "none";  ///< checksum of the files that the text refers to
   std::string controls = "of the scene";  ///< or a table, named by its content
-  std::string command;  ///< makes this data set again; without threads, folder and the like
-  double shard_bytes = 1 << 30;  ///< upper limit of a shard, unless 16 episodes are more
-  std::int64_t shards = 0;       ///< number of shards; 0: as shard_bytes determines
+  double shard_bytes = 1 << 30;           ///< upper limit of a shard, unless 16 episodes are more
+  std::int64_t shards = 0;                ///< number of shards; 0: as shard_bytes determines
   std::string compression =
-      "none";           ///< or "deflate", "lz4", for observations with rows large enough
-  bool sparse = false;  ///< parts of large fields that are zero are left out
-  std::vector<std::string> record;        ///< observations to store; none: all of them
-  std::vector<OutputTimes> record_times;  ///< when, in steps, parallel to `record`; none: always
-  std::string gradients_of;  ///< the quantity that derivatives are of, in words; empty: none
+      "none";                     ///< or "deflate", "lz4", for observations with rows large enough
+  bool sparse = false;            ///< parts of large fields that are zero are left out
+  std::vector<TimedName> record;  ///< observations to store, with times in steps; none: all
+  std::string gradients_of;       ///< the quantity that derivatives are of, in words; empty: none
   std::vector<GradientArray> gradients;  ///< those stored with an episode
 
   /// The data set's name for Minari: "tangere/TASK/NAME-v0", where NAME is set_name, or else the
@@ -79,19 +70,18 @@ struct DatasetLayout : RunFacts {
   [[nodiscard]] std::int64_t rows() const { return steps / every; }
   /// Names of the numbers of an action.
   [[nodiscard]] std::vector<std::string> action_names() const;
-  /// All observations: q and v, then what a task observes, or "variables" (if there are end
-  /// effectors), `bodies` and what is read of the sensors.
-  [[nodiscard]] std::vector<std::string> all_observation_names() const;
-  /// Indices of the observations that are stored at every row in that list, and in pieces of
-  /// episodes, ascending.
+  /// All observations, in the order of pieces of episodes. Throws InputError for times that are no
+  /// multiple of K.
+  [[nodiscard]] std::vector<EpisodeChannel> channels() const {
+    return episode_channels(*this, sensors, body_names, record, every);
+  }
+  /// Indices in that list of the observations that are stored at every row, ascending.
   [[nodiscard]] std::vector<std::size_t> recorded() const;
   /// Those that are stored at other times, in the same order.
   [[nodiscard]] std::vector<DatasetSample> samples() const;
   /// Names of the stored observations below obs.
   [[nodiscard]] std::vector<std::string> observation_names() const;
-  /// Those of them that are touch, as indices: all numbers of a row are 0 where nothing is felt. Of
-  /// a sensor with imperfections only the ideal field and the markers are, and a task with such a
-  /// sensor has none.
+  /// Those of them that are touch, as indices.
   [[nodiscard]] std::vector<std::size_t> touch() const;
   /// Shapes of one row of each stored observation: {nq}, {nv}, {n, 3}, {rows, cols, 3} …
   [[nodiscard]] std::vector<std::vector<std::uint64_t>> observation_shapes() const;
@@ -108,11 +98,6 @@ struct DatasetLayout : RunFacts {
   /// file, when set_name has characters that Minari refuses, when there are more shards than blocks
   /// or than kMostShards, or when an observation to record does not exist.
   void check() const;
-
- private:
-  [[nodiscard]] std::vector<std::vector<std::uint64_t>> all_shapes() const;
-  /// When an observation is stored, in steps; none: not at all.
-  [[nodiscard]] std::optional<OutputTimes> times_of(const std::string& name) const;
 };
 
 }  // namespace tangere

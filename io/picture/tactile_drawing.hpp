@@ -5,7 +5,7 @@
 #include <array>
 #include <vector>
 
-#include "io/trajectory/trajectory_layout.hpp"
+#include "engine/rows/sensor_layout.hpp"
 
 namespace tangere {
 

@@ -318,4 +318,12 @@ SceneFile read_scene(const std::filesystem::path& path, const SceneReadOptions& 
                      options);
 }
 
+Model load_model(const std::filesystem::path& path, const SceneReadOptions& options,
+                 const SceneWarning& warn) {
+  const SceneFile file = read_scene(path, options);
+  for (const std::string& warning : file.warnings)
+    warn ? warn(warning) : fmt::print(stderr, "warning: {}\n", warning);
+  return Model(file.scene);
+}
+
 }  // namespace tangere

@@ -4,10 +4,11 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <string>
 #include <vector>
 
-#include "engine/model/scene.hpp"
+#include "engine/model/model.hpp"
 
 namespace tangere {
 
@@ -29,5 +30,12 @@ SceneFile read_scene(const std::filesystem::path& path, const SceneReadOptions& 
 /// looked for beside it.
 SceneFile parse_scene(const std::string& text, const std::string& name,
                       const SceneReadOptions& options = {});
+
+/// Receives each warning of a scene, without a line end.
+using SceneWarning = std::function<void(const std::string& text)>;
+/// Reads and compiles a scene. Warnings go to `warn`; without one, to stderr. Throws like
+/// read_scene() and Model.
+Model load_model(const std::filesystem::path& path, const SceneReadOptions& options = {},
+                 const SceneWarning& warn = {});
 
 }  // namespace tangere

@@ -16,6 +16,7 @@
 #include "engine/step/sleeping_trees.hpp"
 #include "io/hdf5/h5.hpp"
 #include "io/trajectory/memory_rows.hpp"
+#include "io/trajectory/row_steps.hpp"
 #include "io/trajectory/sleep_rows.hpp"
 
 namespace tangere {
@@ -90,40 +91,17 @@ void check_points(const SavedState& from, const ShearStateArrays& points) {
   }
 }
 
-/// Those of an open file of `steps` steps.
-std::vector<std::int64_t> steps_of_states(const h5::Id& file, std::int64_t steps) {
-  std::vector<std::int64_t> list;
-  if (!h5::has_link(file, "step")) {
-    const h5::Dims states = h5::dimensions(h5::open_dataset(file, "q"));
-    if (states.empty() || states[0] != static_cast<hsize_t>(steps) + 1)
-      throw IoError(fmt::format("{}: the states are damaged: expected {} rows of q",
-                                h5::place_of(file), steps + 1));
-    list.resize(static_cast<std::size_t>(steps) + 1);
-    std::iota(list.begin(), list.end(), std::int64_t{0});
-    return list;
-  }
-  return read_steps(h5::open_dataset(file, "step"), steps);
-}
-
 }  // namespace
 
-std::vector<std::int64_t> state_steps(const std::string& path) {
-  const h5::Id file = h5::open_file(path);
-  return steps_of_states(
-      file, within(path, "steps", h5::read_number<std::int64_t>(file, "steps"), 0, kMost));
-}
-
 SavedState read_state(const std::string& path, std::optional<std::int64_t> row) {
-  const h5::Id file = h5::open_file(path);
-  if (H5Aexists(file.get(), "format") <= 0 || h5::read_text(file, "format") != "tangere trajectory")
-    throw IoError(path + ": not a trajectory file of 'tangere simulate'");
+  const h5::Id file = open_trajectory(path);
   SavedState state;
   state.path = path;
   const auto number = [&](const char* name, std::int64_t least, std::int64_t most) {
     return within(path, name, h5::read_number<std::int64_t>(file, name), least, most);
   };
-  const std::int64_t steps = number("steps", 0, kMost);
-  const std::vector<std::int64_t> rows = steps_of_states(file, steps);
+  const std::int64_t steps = steps_of_run(file);
+  const std::vector<std::int64_t> rows = row_steps(file, "q");
   state.row = row.value_or(rows.empty() ? steps : rows.back());
   if (state.row < 0 || state.row > steps)
     throw InputError(fmt::format("row {} of {}; expected 0 to {}", state.row, path, steps));
@@ -166,7 +144,7 @@ SavedState read_state(const std::string& path, std::optional<std::int64_t> row) 
     state.previous_v = read_row(v, at - 1);
   }
   if (state.sleep > 0) state.sleepers = read_sleep(file, at, rows.size(), state.environments);
-  state.memory = read_memory(file, steps, state.environments, state.row, state.memory_rows);
+  state.memory = read_memory(file, state.environments, state.row, state.memory_rows);
   return state;
 }
 

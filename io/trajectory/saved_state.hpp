@@ -36,10 +36,6 @@ struct SavedState {
   std::vector<StepStatus> status;              ///< (E) of the step to this row; converged for row 0
 };
 
-/// Returns the steps of the run before each row of a trajectory's states: all from 0 on, or those
-/// that the file lists. Throws IoError for a file that is missing or damaged.
-std::vector<std::int64_t> state_steps(const std::string& path);
-
 /// Reads `row`, or the last one if it is not given. Throws IoError for a file that is missing,
 /// damaged or not a trajectory. Throws InputError for a row that does not exist, naming the rows
 /// that do.

@@ -1,29 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
-// Rows hardly differ from one to the next, so chunks of many rows compress well.
+// Shapes are checked here, numbers by Batch::set_sleep().
 #include "io/trajectory/sleep_rows.hpp"
 
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <functional>
-#include <limits>
-#include <numeric>
+#include <span>
 
 #include "engine/base/error.hpp"
 
 namespace tangere {
 namespace {
-
-constexpr hsize_t kChunk = 1U << 20;  // [bytes]
-
-h5::Storage storage_of(h5::Dims dims, std::size_t element) {
-  hsize_t environment = element;
-  for (std::size_t i = 2; i < dims.size(); ++i) environment *= dims[i];
-  if (dims[0] == 0 || environment == 0) return {};
-  dims[1] = std::clamp<hsize_t>(kChunk / environment, 1, dims[1]);
-  dims[0] = std::clamp<hsize_t>(kChunk / (environment * dims[1]), 1, dims[0]);
-  return {dims, true};
-}
 
 /// Row `at` of a dataset (rows, E, …): the numbers of all environments.
 template <class T>
@@ -45,85 +31,6 @@ std::vector<T> get(const h5::Id& group, const char* name, std::int64_t at, std::
 }
 
 }  // namespace
-
-template <class T>
-RowsInChunks<T>::RowsInChunks(const h5::Id& group, const char* name, const h5::Dims& dims,
-                              const char* meaning)
-    : dims_(dims) {
-  const h5::Storage storage = storage_of(dims, sizeof(T));
-  dataset_ = h5::create_dataset<T>(group, name, dims, storage);
-  h5::write_attribute(dataset_, "meaning", meaning);
-  if (!storage.chunk.empty()) chunk_rows_ = storage.chunk[0];
-  numbers_.resize(std::accumulate(dims.begin() + 1, dims.end(), chunk_rows_, std::multiplies<>()));
-}
-
-template <class T>
-std::span<T> RowsInChunks<T>::next_row() {
-  const std::size_t width = numbers_.size() / chunk_rows_;
-  return std::span(numbers_).subspan(held_ * width, width);
-}
-
-template <class T>
-void RowsInChunks<T>::add_row() {
-  ++held_;
-  if (held_ < chunk_rows_ && first_ + held_ < dims_[0]) return;
-  h5::Dims offset(dims_.size(), 0), count = dims_;
-  offset[0] = first_;
-  count[0] = held_;
-  if (!numbers_.empty()) h5::write_box<T>(dataset_, offset, count, numbers_.data());
-  first_ += held_;
-  held_ = 0;
-}
-
-SleepRows::SleepRows(const h5::Id& file, const TrajectoryLayout& layout) : layout_(layout) {
-  const auto R = static_cast<hsize_t>(layout.rows(layout.states)),
-             E = static_cast<hsize_t>(layout.environments);
-  const hsize_t trees = layout.trees.size(), nu = layout.u_names.size();
-  const h5::Id group = h5::create_group(file, "sleep");
-  h5::write_attribute(group, "trees", std::span<const std::string>(layout.trees));
-  h5::write_attribute(group, "meaning",
-                      "at each row of /q; a tree is a body, named, with all that joints connect "
-                      "it with");
-  island_ = {group,
-             "island",
-             {R, E, trees},
-             "-1: awake; else the lowest tree of those that fell asleep together"};
-  rested_ = {group, "rested", {R, E, trees}, "steps in a row in which the tree hardly moved"};
-  u_ = {
-      group, "u", {R, E, nu}, "controls of the last step before which some tree rested; NaN: none"};
-  clearance_ = {group,
-                "clearance",
-                {R, E},
-                "what awake bodies may move before one may reach a sleeping one [m]"};
-  resting_ = {group,
-              "resting",
-              {R, E},
-              "1: a tree that is awake rested in the last step; -1: nothing is known yet of this "
-              "environment"};
-}
-
-void SleepRows::write(const SleepRow& row) {
-  const std::size_t trees = layout_.trees.size(), nu = layout_.u_names.size();
-  const std::span<std::int32_t> islands = island_.next_row(), rested = rested_.next_row();
-  const std::span<double> u = u_.next_row(), clearance = clearance_.next_row();
-  const std::span<std::int8_t> resting = resting_.next_row();
-  std::fill(islands.begin(), islands.end(), -1);
-  std::fill(rested.begin(), rested.end(), 0);
-  std::fill(u.begin(), u.end(), std::numeric_limits<double>::quiet_NaN());
-  for (std::size_t e = 0; e < row.sleep.size(); ++e) {
-    const SleepState& s = row.sleep[e];
-    resting[e] = s.asleep.empty() ? std::int8_t{-1} : static_cast<std::int8_t>(s.resting);
-    clearance[e] = s.clearance;
-    const auto place = [e](const auto& all, std::size_t width) {
-      return all.begin() + static_cast<std::ptrdiff_t>(e * width);
-    };
-    std::copy(s.island.begin(), s.island.end(), place(islands, trees));
-    std::copy(s.rested.begin(), s.rested.end(), place(rested, trees));
-    std::copy(s.u.begin(), s.u.end(), place(u, nu));
-  }
-  island_.add_row(), rested_.add_row(), u_.add_row(), clearance_.add_row(), resting_.add_row();
-  ++written_;
-}
 
 std::optional<SavedSleep> read_sleep(const h5::Id& file, std::int64_t at, std::size_t rows,
                                      int environments) {

@@ -5,22 +5,9 @@
 #include <memory>
 #include <string>
 
-#include "engine/rows/row_sink.hpp"
-#include "io/trajectory/trajectory_layout.hpp"
+#include "engine/rows/channel.hpp"
 
 namespace tangere {
-
-/// Derivatives of a loss over the whole run, for every environment.
-struct GradientArrays {
-  std::string loss, meaning;
-  std::span<const double> value;                            ///< (E)
-  std::span<const double> u;                                ///< (E, T, nu)
-  std::span<const double> q, v;                             ///< (E, nv) by the initial state
-  std::span<const double> numbers;                          ///< (E, k) by the scene's numbers
-  std::span<const std::string> number_names, number_units;  ///< (k)
-  std::span<const double> points;  ///< (E, all tactile points, kPointNumbers) by their own numbers
-                                   ///< (engine/derivative/tactile_point_numbers.hpp); or empty
-};
 
 /// Writes `<output>.part` and gives it its name on commit(). Destroyed before that, it leaves
 /// nothing behind.
@@ -28,19 +15,13 @@ class TrajectoryFile : public RowSink {
  public:
   /// Creates every group, dataset and attribute. Throws IoError when the output exists (and
   /// `overwrite` is false), its folder is missing or not writable, or the disk has no room for the
-  /// uncompressed small datasets; InputError for sizes no file can hold.
-  TrajectoryFile(const std::string& output, const TrajectoryLayout& layout, bool overwrite);
+  /// uncompressed channels; InputError for sizes no file can hold and for two channels of a name.
+  TrajectoryFile(const std::string& output, const Recording& recording, bool overwrite);
   ~TrajectoryFile() override;
 
-  void write(const StateRow& row) override;
-  void write(const StepRow& row) override;
-  void write(const TactileRow& row) override;
-  void write(const ActionRow& row) override;
-  void write(const AuditRow& row) override;
-  void write(const MemoryRow& row) override;
-  void write(const SleepRow& row) override;
-  /// Called at most once. Sizes are those of the layout.
-  void write(const GradientArrays& gradients);
+  void write(std::int64_t step, std::size_t channel, const Numbers& numbers) override;
+  /// Adds groups and tables that are known when the run is over.
+  void add(const Recording& recording);
 
   /// Checks that every row came, closes, syncs and renames. Throws IoError.
   void commit();
@@ -49,5 +30,9 @@ class TrajectoryFile : public RowSink {
   struct Impl;
   std::unique_ptr<Impl> impl_;
 };
+
+/// Size of a recording without compression [bytes]: of all of it, or of its uncompressed channels
+/// alone. Throws InputError when it exceeds 2^63.
+std::uint64_t recorded_bytes(const Recording& recording, bool with_compressed = true);
 
 }  // namespace tangere

@@ -8,9 +8,12 @@
 #include <cmath>
 
 #include "engine/base/error.hpp"
+#include "engine/rows/sensor_layout.hpp"
 #include "io/files/nearest_name.hpp"
 #include "io/hdf5/h5.hpp"
-#include "io/trajectory/sensor_description.hpp"
+#include "io/hdf5/h5_channels.hpp"
+#include "io/hdf5/h5_listing.hpp"
+#include "io/trajectory/row_steps.hpp"
 
 namespace tangere {
 
@@ -25,15 +28,12 @@ struct TrajectoryReader::Impl {
   std::int64_t environments = 0, steps = 0, first_step = 0;
   double timestep = 0;
   std::vector<SensorLayout> sensors;
-  std::vector<std::vector<FieldForm>> forms;  // (sensors) what was recorded
-  std::vector<std::string> steps_of;          // (sensors) name of the list of steps
-  std::vector<std::string> sums;              // sensors of which only these were
+  std::vector<std::vector<FieldForm>> forms;      // (sensors) what was recorded
+  std::vector<std::vector<std::int64_t>> row_of;  // (sensors, frames) steps before each
+  std::vector<std::string> sums;                  // sensors of which only these were
   std::vector<std::int64_t> frames;
 
-  explicit Impl(const std::string& p) : path(p), file(h5::open_file(p)) {
-    if (H5Aexists(file.get(), "format") <= 0 ||
-        h5::read_text(file, "format") != "tangere trajectory")
-      throw IoError(path + ": not a trajectory file of 'tangere simulate'");
+  explicit Impl(const std::string& p) : path(p), file(open_trajectory(p)) {
     scene_name = h5::read_text(file, "scene_name");
     environments = h5::read_number<std::int64_t>(file, "environments");
     timestep = h5::read_number<double>(file, "timestep");
@@ -41,15 +41,8 @@ struct TrajectoryReader::Impl {
     first_step = h5::read_number<std::int64_t>(file, "first_step");
     if (!h5::has_link(file, "tactile")) return;
     const h5::Id group = h5::open_group(file, "tactile");
-    H5G_info_t info;
-    H5Gget_info(group.get(), &info);
-    for (hsize_t i = 0; i < info.nlinks; ++i) {
-      char name[1024];
-      if (H5Lget_name_by_idx(group.get(), ".", H5_INDEX_NAME, H5_ITER_INC, i, name, sizeof name,
-                             H5P_DEFAULT) < 0)
-        throw IoError(path + ": the list of sensors is damaged");
+    for (const std::string& name : h5::link_names(group))
       add_readings(h5::open_group(group, name), name);
-    }
   }
 
   /// Takes a field, or where there is none the ideal one, or pressure, shear or both. Of other
@@ -76,7 +69,10 @@ struct TrajectoryReader::Impl {
     found.erase(apart, found.end());
     add_sensor(group, name, found[0]);
     forms.push_back(found);
-    steps_of.push_back(h5::has_link(group, own_steps(found[0])) ? own_steps(found[0]) : "step");
+    row_of.push_back(row_steps(file, fmt::format("tactile/{}/{}", name, dataset_of(found[0]))));
+    if (std::ssize(row_of.back()) != frames.back())
+      throw IoError(fmt::format("{}: sensor '{}' has {} fields and {} steps: the file is damaged",
+                                path, name, frames.back(), row_of.back().size()));
     for (const FieldForm form : found) {
       h5::Dims dims = h5::dimensions(h5::open_dataset(group, dataset_of(form))),
                expected = h5::dimensions(h5::open_dataset(group, dataset_of(found[0])));
@@ -180,6 +176,16 @@ struct TrajectoryReader::Impl {
   }
 };
 
+std::optional<TrajectorySummary> summarise_trajectory(const std::string& path) {
+  const h5::Id file = h5::open_file(path);
+  if (!is_trajectory(file)) return {};
+  TrajectorySummary summary;
+  for (const std::string& name : h5::attribute_names(file))
+    summary.settings.emplace_back(name, h5::attribute_text(file, name));
+  summary.channels = h5::list_channels(file);
+  return summary;
+}
+
 TrajectoryReader::TrajectoryReader(const std::string& path) : impl_(std::make_unique<Impl>(path)) {}
 TrajectoryReader::~TrajectoryReader() = default;
 TrajectoryReader::TrajectoryReader(TrajectoryReader&&) noexcept = default;
@@ -218,10 +224,7 @@ bool TrajectoryReader::has_shear(std::size_t sensor) const {
 std::int64_t TrajectoryReader::frames(std::size_t sensor) const { return impl_->frames[sensor]; }
 
 std::int64_t TrajectoryReader::step(std::size_t sensor, std::int64_t frame) const {
-  std::int64_t value = 0;
-  h5::read_box<std::int64_t>(impl_->open(sensor, impl_->steps_of[sensor]),
-                             {static_cast<hsize_t>(frame)}, {1}, &value);
-  return value;
+  return impl_->row_of[sensor].at(static_cast<std::size_t>(frame));
 }
 
 std::vector<double> TrajectoryReader::force(std::size_t sensor, std::int64_t frame,

@@ -4,12 +4,22 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
-#include "io/trajectory/trajectory_layout.hpp"
+#include "engine/rows/sensor_layout.hpp"
 
 namespace tangere {
+
+/// What a trajectory file says besides numbers.
+struct TrajectorySummary {
+  std::vector<std::pair<std::string, std::string>> settings;  ///< by name
+  std::vector<Channel> channels;
+};
+/// Returns none for a file of another kind. Throws IoError for one that is damaged.
+std::optional<TrajectorySummary> summarise_trajectory(const std::string& path);
 
 class TrajectoryReader {
  public:

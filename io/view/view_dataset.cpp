@@ -145,61 +145,29 @@ class DatasetView {
       for (std::size_t k = 0; k < state.size(); ++k)
         episode.traces[k].values.push_back(static_cast<float>(state[k]));
     }
-    for (std::size_t s = 0; s < data_.sensors.size(); ++s)
-      if (sampled_[s])
-        add_samples(s, which, h5::open_group(demo, "samples"), episode);
-      else
-        add_fields(s, which, obs, end, episode);
+    for (std::size_t s = 0; s < data_.sensors.size(); ++s) add_fields(s, which, demo, episode);
     add_reward(which, demo, episode);
     data_.episodes.push_back(std::move(episode));
   }
 
-  void add_fields(std::size_t sensor, const Demo& which, const h5::Id& obs, const h5::Id& end,
-                  ViewEpisode& episode) {
+  /// Takes the newest field at each frame, once: rows of obs, then final_obs; of a sensor that is
+  /// not read at every row, its samples.
+  void add_fields(std::size_t sensor, const Demo& which, const h5::Id& demo, ViewEpisode& episode) {
     const ViewSensor& view = data_.sensors[sensor];
-    const h5::Id fields = h5::open_dataset(obs, readings_[sensor]),
-                 last = h5::open_dataset(end, readings_[sensor]);
+    const std::optional<SampleSaid>& sampled = sampled_[sensor];
     const std::size_t width = 3 * static_cast<std::size_t>(view.points);
-    for (const h5::Id* dataset : {&fields, &last}) {
-      const h5::Dims dims = h5::dimensions(*dataset);
+    const auto open = [&](const char* group, std::int64_t rows) {
+      h5::Id fields = h5::open_dataset(h5::open_group(demo, group), readings_[sensor]);
+      const h5::Dims dims = h5::dimensions(fields);
       std::size_t numbers = 1;
       for (std::size_t i = 1; i < dims.size(); ++i) numbers *= dims[i];
-      const auto rows = dataset == &last ? hsize_t{1} : static_cast<hsize_t>(which.rows);
-      if (dims.size() < 2 || dims[0] != rows || numbers != width)
+      if (dims.size() < 2 || dims[0] != static_cast<hsize_t>(rows) || numbers != width)
         throw IoError(fmt::format("{}: expected {} fields of {} points: the file is damaged",
-                                  h5::place_of(*dataset), rows, view.points));
-    }
-    ViewField field;
-    ViewTrace normal{"force [N]", view.name + " normal", "N", {}},
-        shear{"force [N]", view.name + " shear", "N", {}};
-    for (const std::int64_t row : episode.rows) {
-      const std::vector<double> force =
-          row < which.rows ? row_numbers(fields, row, width) : row_numbers(last, 0, width);
-      check_finite_field(force, fmt::format("{}: demo_{}: sensor '{}': row {}", which.file,
-                                            which.number, view.name, row));
-      const std::array<double, 2> sums = add_field(view, signs_[sensor], force, field);
-      field.at.push_back(static_cast<std::int32_t>(field.at.size()));
-      normal.values.push_back(static_cast<float>(sums[0]));
-      shear.values.push_back(static_cast<float>(sums[1]));
-    }
-    episode.fields.push_back(std::move(field));
-    episode.traces.push_back(std::move(normal));
-    episode.traces.push_back(std::move(shear));
-  }
-
-  /// Of a sensor that is not read at every row: the newest field at each frame, once.
-  void add_samples(std::size_t sensor, const Demo& which, const h5::Id& samples,
-                   ViewEpisode& episode) {
-    const ViewSensor& view = data_.sensors[sensor];
-    const SampleSaid& said = *sampled_[sensor];
-    const h5::Id fields = h5::open_dataset(samples, said.name);
-    const std::size_t width = 3 * static_cast<std::size_t>(view.points);
-    const h5::Dims dims = h5::dimensions(fields);
-    std::size_t numbers = 1;
-    for (std::size_t i = 1; i < dims.size(); ++i) numbers *= dims[i];
-    if (dims.size() < 2 || dims[0] != static_cast<hsize_t>(said.rows) || numbers != width)
-      throw IoError(fmt::format("{}: expected {} fields of {} points: the file is damaged",
-                                h5::place_of(fields), said.rows, view.points));
+                                  h5::place_of(fields), rows, view.points));
+      return fields;
+    };
+    const h5::Id fields = sampled ? open("samples", sampled->rows) : open("obs", which.rows),
+                 last = sampled ? h5::Id() : open("final_obs", 1);
     ViewField field;
     ViewTrace normal{"force [N]", view.name + " normal", "N", {}},
         shear{"force [N]", view.name + " shear", "N", {}};
@@ -207,17 +175,19 @@ class DatasetView {
     std::int32_t at = -1;
     std::array<double, 2> sums{};
     for (const std::int64_t row : episode.rows) {
-      const std::int64_t newest = said.times.before(row + 1, which.rows) - 1;
+      const std::int64_t newest = sampled ? sampled->times.before(row + 1, which.rows) - 1 : row;
       if (newest > taken) {
-        const std::vector<double> force = row_numbers(fields, newest, width);
+        const bool at_end = !sampled && row == which.rows;
+        const std::vector<double> force =
+            row_numbers(at_end ? last : fields, at_end ? 0 : newest, width);
         check_finite_field(force, fmt::format("{}: demo_{}: sensor '{}': row {}", which.file,
                                               which.number, view.name, newest));
         sums = add_field(view, signs_[sensor], force, field);
         taken = newest, ++at;
       }
       field.at.push_back(at);
-      normal.values.push_back(taken < 0 ? kNoValue : static_cast<float>(sums[0]));
-      shear.values.push_back(taken < 0 ? kNoValue : static_cast<float>(sums[1]));
+      normal.values.push_back(at < 0 ? kNoValue : static_cast<float>(sums[0]));
+      shear.values.push_back(at < 0 ? kNoValue : static_cast<float>(sums[1]));
     }
     episode.fields.push_back(std::move(field));
     episode.traces.push_back(std::move(normal));

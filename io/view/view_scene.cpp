@@ -12,10 +12,10 @@
 #include "engine/base/error.hpp"
 #include "engine/base/vector3.hpp"
 #include "engine/model/scene_number.hpp"
+#include "engine/rows/sensor_layout.hpp"
 #include "engine/sense/readout.hpp"
 #include "io/picture/tactile_drawing.hpp"
 #include "io/scene/scene_reader.hpp"
-#include "io/trajectory/layout_from_model.hpp"
 
 namespace tangere {
 namespace {

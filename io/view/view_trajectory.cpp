@@ -5,7 +5,8 @@
 #include <algorithm>
 
 #include "engine/base/error.hpp"
-#include "io/trajectory/saved_state.hpp"
+#include "io/hdf5/h5_channels.hpp"
+#include "io/trajectory/row_steps.hpp"
 #include "io/trajectory/trajectory_reader.hpp"
 #include "io/view/view_source.hpp"
 
@@ -20,7 +21,7 @@ class TrajectoryView {
   TrajectoryView(const std::string& path, const ViewOptions& options)
       : options_(options),
         path_(path),
-        file_(h5::open_file(path)),
+        file_(open_trajectory(path)),
         fields_(path),
         scene_(text("scene_text"),
                H5Aexists(file_.get(), "scene_path") > 0 ? text("scene_path") : text("scene_name"),
@@ -35,13 +36,12 @@ class TrajectoryView {
       throw IoError(
           fmt::format("{}: {} steps of {} environments after {} steps: the file is damaged", path,
                       steps_, fields_.environments(), first_step_));
-    state_steps_ = state_steps(path);
-    listed_ = h5::has_link(file_, "step");
+    state_steps_ = row_steps(file_, "q");
     if (state_steps_.empty())
       throw IoError(path + ": the run recorded no state, so nothing says where bodies are");
     check_shape(q, {rows(), environments(), q_names_.size()}, "q");
-    check_shape(h5::open_dataset(h5::open_group(file_, "solver"), "status"),
-                {listed_ ? rows() : rows() - 1, environments()}, "status");
+    for (const Channel& channel : h5::list_channels(file_))
+      if (is_curve(channel)) curves_.push_back({channel, row_steps(file_, channel.name)});
   }
 
   ViewData read() {
@@ -57,7 +57,8 @@ class TrajectoryView {
     if (!options_.episode && count < fields_.environments())
       data_.notes.push_back(
           fmt::format("The first {} of {} environments.", count, fields_.environments()));
-    const std::size_t traces = q_names_.size() + 2 * data_.sensors.size() + 2;
+    std::size_t traces = q_names_.size() + 2 * data_.sensors.size();
+    for (const Curve& curve : curves_) traces += curve.channel.width() / environments();
     data_.stride = stride_for(
         std::vector<std::int64_t>(static_cast<std::size_t>(count), std::ssize(state_steps_)),
         numbers_per_frame(data_.scene, data_.sensors, traces), options_);
@@ -66,6 +67,23 @@ class TrajectoryView {
   }
 
  private:
+  /// A channel that is drawn, and the steps of its rows.
+  struct Curve {
+    Channel channel;
+    std::vector<std::int64_t> steps;
+  };
+
+  /// Numbers of each environment in time, with names where there are several. Coordinates and
+  /// fields are drawn in their own way; what else is left out is a table whose rows are no times.
+  [[nodiscard]] bool is_curve(const Channel& channel) const {
+    const std::vector<std::uint64_t>& shape = channel.shape;
+    const std::string group = channel.name.substr(0, channel.name.find('/'));
+    for (const char* other : {"q", "tactile", "randomized", "gradients", "memory"})
+      if (group == other) return false;
+    if (shape.empty() || shape[0] != environments()) return false;
+    return shape.size() == 1 || (shape.size() == 2 && shape[1] == channel.names.size());
+  }
+
   [[nodiscard]] std::string text(const char* name) const {
     if (H5Aexists(file_.get(), name) <= 0)
       throw IoError(
@@ -133,8 +151,7 @@ class TrajectoryView {
         episode.traces[k].values.push_back(static_cast<float>(state[k]));
     }
     for (std::size_t s = 0; s < data_.sensors.size(); ++s) add_fields(s, environment, episode);
-    add_reward(environment, episode);
-    add_status(environment, episode);
+    for (const Curve& curve : curves_) add_curve(curve, environment, episode);
     data_.episodes.push_back(std::move(episode));
   }
 
@@ -165,48 +182,40 @@ class TrajectoryView {
     if (fields_.has_shear(index)) episode.traces.push_back(std::move(shear));
   }
 
-  /// The reward of the newest action at each frame.
-  void add_reward(std::int64_t environment, ViewEpisode& episode) {
-    if (!h5::has_link(file_, "task")) return;
-    const h5::Id task = h5::open_group(file_, "task");
-    if (!h5::has_link(task, "reward") || !h5::has_link(task, "step")) return;
-    const h5::Id reward = h5::open_dataset(task, "reward"), step = h5::open_dataset(task, "step");
-    const h5::Dims dims = h5::dimensions(step);
-    check_shape(reward, {dims.at(0), environments()}, "reward");
-    std::vector<std::int64_t> steps(dims.at(0));
-    std::vector<double> rewards(dims.at(0));
-    if (!steps.empty()) {
-      h5::read_box<std::int64_t>(step, {0}, {dims[0]}, steps.data());
-      h5::read_box<double>(reward, {0, static_cast<hsize_t>(environment)}, {dims[0], 1},
-                           rewards.data());
-    }
-    ViewTrace trace{"reward", "reward", "1", {}};
-    for (const std::int64_t row : episode.rows) {
-      const auto after = std::upper_bound(steps.begin(), steps.end(), row) - steps.begin();
-      trace.values.push_back(after == 0 ? kNoValue
-                                        : static_cast<float>(rewards[std::size_t(after - 1)]));
-    }
-    episode.traces.insert(episode.traces.begin(), std::move(trace));
-  }
-
-  /// The worst status of the steps since the frame before: a failure, else the largest value.
-  void add_status(std::int64_t environment, ViewEpisode& episode) {
-    const h5::Id status = h5::open_dataset(h5::open_group(file_, "solver"), "status");
-    std::vector<std::int8_t> values(rows() - (listed_ ? 0 : 1));
-    if (!values.empty())
-      h5::read_box<std::int8_t>(status, {0, static_cast<hsize_t>(environment)}, {values.size(), 1},
-                                values.data());
-    ViewTrace trace{"solver status", "status", "1", {}};
-    std::int64_t next = 0;
-    for (const std::int64_t row : frames_of(std::ssize(state_steps_), data_.stride)) {
-      std::int8_t worst = 0;
-      for (; next < row + (listed_ ? 1 : 0); ++next) {  // listed: of the step that ends at a row
-        const std::int8_t value = values[static_cast<std::size_t>(next)];
-        if (value < 0 ? worst >= 0 || value < worst : worst >= 0 && value > worst) worst = value;
+  /// The newest row at each frame; of the status the worst since the frame before: a failure, else
+  /// the largest value.
+  void add_curve(const Curve& curve, std::int64_t environment, ViewEpisode& episode) {
+    const Channel& channel = curve.channel;
+    const std::size_t width = channel.width() / environments(), rows = curve.steps.size();
+    h5::Id dataset = h5::open_dataset(file_, channel.name);
+    h5::Dims offset(channel.shape.size() + 1, 0), count{rows};
+    count.insert(count.end(), channel.shape.begin(), channel.shape.end());
+    check_shape(dataset, count, channel.name);
+    offset[1] = static_cast<hsize_t>(environment), count[1] = 1;
+    std::vector<double> values(rows * width);
+    if (!values.empty()) h5::read_box<double>(dataset, offset, count, values.data());
+    const bool status = channel.name == "solver/status";
+    std::string group = channel.name;
+    std::replace(group.begin(), group.end(), '/', ' ');
+    for (std::size_t k = 0; k < width; ++k) {
+      const std::string unit = k < channel.units.size() ? channel.units[k] : "1";
+      ViewTrace trace{channel.units.empty() ? group : fmt::format("{} [{}]", group, unit),
+                      channel.names.empty() ? group.substr(group.rfind(' ') + 1) : channel.names[k],
+                      unit,
+                      {}};
+      std::size_t next = 0;
+      for (const std::int64_t step : episode.rows) {
+        double value = kNoValue, worst = 0;
+        const std::size_t first = next;
+        for (; next < rows && curve.steps[next] <= step; ++next) {
+          const double x = values[next * width + k];
+          if (x < 0 ? worst >= 0 || x < worst : worst >= 0 && x > worst) worst = x;
+        }
+        if (next > 0) value = values[(next - 1) * width + k];
+        trace.values.push_back(static_cast<float>(!status ? value : first < next ? worst : 0));
       }
-      trace.values.push_back(static_cast<float>(worst));
+      episode.traces.push_back(std::move(trace));
     }
-    episode.traces.push_back(std::move(trace));
   }
 
   const ViewOptions& options_;
@@ -218,7 +227,7 @@ class TrajectoryView {
   std::int64_t steps_ = 0;
   std::int64_t first_step_ = 0;  // of a run that went on from another's state
   std::vector<std::int64_t> state_steps_;
-  bool listed_ = false;  // the file lists them
+  std::vector<Curve> curves_;
   std::vector<std::string> q_names_;
   std::vector<std::size_t> recorded_;  // (sensors) indices in the reader
 };

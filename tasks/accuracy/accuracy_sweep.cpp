@@ -154,7 +154,8 @@ class Sweep {
   [[nodiscard]] double tolerance_in_force(StepperOptions options) const {
     const Model& model = episodes_.start.model();
     options.sleep = 0;
-    return Stepper(model, of_gradients() ? for_gradients(model, options) : options).tolerance();
+    options.differentiable = of_gradients();
+    return Stepper(model, options).tolerance();
   }
   [[nodiscard]] bool of_gradients() const {
     return options_.quantity == AccuracyQuantity::gradient;

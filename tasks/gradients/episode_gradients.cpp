@@ -197,7 +197,7 @@ EpisodeGradients scene_jacobians(const Model& model, const ControlProgram& contr
   const std::size_t nu = as_size(model.nu()), nv = as_size(model.nv());
   check_remembers_nothing(model);
   const auto s = std::make_shared<Scratch>(
-      Scratch{Stepper(model, for_gradients(model, {})), StepJacobians(model),
+      Scratch{Stepper(model, {.differentiable = true}), StepJacobians(model),
               BlockTape(model, model.integrator(), run.every),
               std::vector<RowChain>(kBlock, RowChain(model.nv(), nu))});
   std::vector<double> held(nu * (2 * nv + nu));  // (nu, 2 nv + nu): controls are the action

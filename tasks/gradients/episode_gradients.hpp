@@ -19,7 +19,7 @@ namespace tangere {
 enum class GradientKind { none, returns, jacobians };
 const char* to_string(GradientKind kind);
 
-/// Plays up to 16 episodes again, with the tolerance of for_gradients(), and fills in their
+/// Plays up to 16 episodes again, with kGradientTolerance, and fills in their
 /// derivatives: one list of numbers per array, in the layout of EpisodeRows::gradients, all rows,
 /// zeros on entry. Holds the scratch of one thread.
 using EpisodeGradients = std::function<void(std::int64_t first_episode, int episodes,

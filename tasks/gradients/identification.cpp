@@ -361,7 +361,7 @@ FieldSequence simulate_fields(const Scene& scene, const RecordedRun& run) {
   check_run(run);
   const Model model(scene);
   Batch batch(model, 1);
-  Stepper stepper(model, for_gradients(model, {}));
+  Stepper stepper(model, {.differentiable = true});
   Readout readout(model);
   std::vector<double> u(std::size_t(model.nu()));
   FieldSequence out{run.every, {}};

@@ -80,7 +80,7 @@ SceneBlock::SceneBlock(const Model& model, const TapeOptions& options,
     : TapeBlock(model, options, static_cast<int>(losses.size()), plan_of(model, options)),
       options_(options),
       losses_(losses.begin(), losses.end()),
-      stepper_(model, for_gradients(model, options.stepper)),
+      stepper_(model, differentiable(options.stepper)),
       readout_(model, options.precision),
       reading_(model) {
   for (std::size_t s = 0; s < model.sensors().size(); ++s) {

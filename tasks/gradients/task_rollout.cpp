@@ -31,7 +31,7 @@ double ActionRecord::bytes(const Task& task) {
 TaskRollout::TaskRollout(const Task& task, const StepperOptions& options, Precision precision)
     : task_(task),
       worker_(task, precision),
-      stepper_(task.model(), for_gradients(task.model(), options)),
+      stepper_(task.model(), differentiable(options)),
       u_(kBlock * as_size(task.model().nu())),
       q_(as_size(task.model().nq())),
       v_(as_size(task.model().nv())) {}

@@ -15,8 +15,8 @@ constexpr std::size_t kEnergies = 3, kMomenta = 6, kPassed = 3;
 
 }  // namespace
 
-EnergyBalanceRecorder::EnergyBalanceRecorder(const Batch& batch, double h, RowSink& sink)
-    : batch_(batch), h_(h), sink_(sink), auditor_(batch.model()) {
+EnergyBalanceRecorder::EnergyBalanceRecorder(const Batch& batch, double h)
+    : batch_(batch), h_(h), auditor_(batch.model()) {
   const std::size_t e = as_size(batch.environments());
   before_.resize(e);
   sums_.resize(e);
@@ -46,15 +46,13 @@ void EnergyBalanceRecorder::set_row(int environment, const EnergyBalance& audit)
 void EnergyBalanceRecorder::start() {
   const std::vector<double> none(as_size(batch_.environments()) * as_size(batch_.model().nu()));
   for (int e = 0; e < batch_.environments(); ++e) set_row(e, audit(e, none));
-  sink_.write(AuditRow{0, energy_, momentum_, {}});
 }
 
 void EnergyBalanceRecorder::before(std::span<const double> u) {
   for (int e = 0; e < batch_.environments(); ++e) before_[as_size(e)] = audit(e, u);
 }
 
-void EnergyBalanceRecorder::after(std::int64_t step, std::span<const double> u,
-                                  const StepTally& tally) {
+void EnergyBalanceRecorder::after(std::span<const double> u, const StepTally& tally) {
   for (int e = 0; e < batch_.environments(); ++e) {
     const std::size_t i = as_size(e);
     StepEnergyBalance passed;
@@ -72,7 +70,6 @@ void EnergyBalanceRecorder::after(std::int64_t step, std::span<const double> u,
     sums.taken += passed.dissipated;
     sums.made += passed.integrator_error;
   }
-  sink_.write(AuditRow{step + 1, energy_, momentum_, passed_});
 }
 
 EnergyBalanceSummary EnergyBalanceRecorder::summary() const {

@@ -2,9 +2,9 @@
 // Records the energy balance of a rollout at both ends of every step of every environment.
 #pragma once
 
+#include <span>
 #include <vector>
 
-#include "engine/rows/row_sink.hpp"
 #include "engine/sense/energy_balance.hpp"
 #include "tasks/run/energy_balance_summary.hpp"
 #include "tasks/run/step_tally.hpp"
@@ -14,14 +14,21 @@ namespace tangere {
 class EnergyBalanceRecorder {
  public:
   /// `h`: of the steps [s].
-  EnergyBalanceRecorder(const Batch& batch, double h, RowSink& sink);
+  EnergyBalanceRecorder(const Batch& batch, double h);
 
-  /// Writes row 0.
+  /// Computes row 0.
   void start();
   /// Reads the batch before a step. `u`: (E, nu).
   void before(std::span<const double> u);
-  /// Writes the row after step `step`, which was taken but not counted yet.
-  void after(std::int64_t step, std::span<const double> u, const StepTally& tally);
+  /// Computes the row after a step that was taken but not counted yet.
+  void after(std::span<const double> u, const StepTally& tally);
+
+  /// (E, 3) kinetic, potential and elastic energy [J]; (E, 6) linear and angular momentum.
+  [[nodiscard]] std::span<const double> energy() const { return energy_; }
+  [[nodiscard]] std::span<const double> momentum() const { return momentum_; }
+  /// (E, 3) work of motors, dissipation and change by the scheme in the last step [J]. Zeros where
+  /// an environment took no step.
+  [[nodiscard]] std::span<const double> passed() const { return passed_; }
 
   [[nodiscard]] EnergyBalanceSummary summary() const;
   static double bytes(int environments);
@@ -32,10 +39,9 @@ class EnergyBalanceRecorder {
 
   const Batch& batch_;
   double h_;
-  RowSink& sink_;
   EnergyBalanceReader auditor_;
   std::vector<EnergyBalance> before_;               // (E)
-  std::vector<double> energy_, momentum_, passed_;  // as in AuditRow
+  std::vector<double> energy_, momentum_, passed_;  // as above
   struct Sums {
     double motors = 0, taken = 0, made = 0, work = 0, most = 0;
   };

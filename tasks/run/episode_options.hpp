@@ -4,27 +4,14 @@
 
 #include <cstdint>
 #include <functional>
-#include <optional>
 #include <vector>
 
 #include "engine/base/precision.hpp"
-#include "engine/model/field_form.hpp"
+#include "engine/model/output_times.hpp"
 #include "engine/rows/episode_sink.hpp"
 #include "tasks/run/step_counts.hpp"
 
 namespace tangere {
-
-/// Whether a scene's rows hold something, and when.
-struct RowOutput {
-  bool wanted = true;
-  OutputTimes times = {};  ///< in steps, a multiple of EpisodeOptions::every; none: in every row
-};
-/// Poses and twists of bodies in a scene's rows: (bodies, 13), each x y z qw qx qy qz, then angular
-/// and linear velocity, as Readout::bodies() gives them.
-struct BodyRows {
-  std::vector<int> bodies = {};  ///< none: every body
-  OutputTimes times = {};        ///< as in RowOutput
-};
 
 struct EpisodeOptions {
   std::int64_t episodes = 0;
@@ -32,10 +19,9 @@ struct EpisodeOptions {
   std::int64_t steps = 0;                 ///< of a scene's episode, a multiple of `every`
   int every = 1;  ///< K: steps for which a scene's action is held, and between observations
   std::uint64_t seed = 0;
-  /// Tactile outputs of a scene; none: the field of every sensor.
-  std::optional<std::vector<FieldOutput>> fields = {};
-  RowOutput q = {}, v = {}, end_effectors = {};  ///< of a scene
-  std::vector<BodyRows> bodies = {};             ///< of a scene, one observation each
+  /// What a scene's rows hold, by names with times in steps, as episode_channels() takes them;
+  /// none: everything except bodies.
+  std::vector<TimedName> record = {};
   Precision precision =
       Precision::f64;  ///< mixed: fields are computed in it, observations leave as float32
   int threads = 1;

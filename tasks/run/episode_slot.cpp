@@ -11,7 +11,9 @@
 namespace tangere {
 namespace {
 
-constexpr std::size_t kQ = 0, kV = 1, kThird = 2;  // names of observations
+using Kind = EpisodeChannel::Kind;
+
+constexpr std::size_t kQ = 0, kV = 1, kThird = 2;  // channels
 constexpr std::size_t kPose = 7;                   // numbers of a body
 
 }  // namespace
@@ -24,13 +26,14 @@ EpisodeSlot<T>::EpisodeSlot(const EpisodeSource& source, const EpisodeOptions& o
       stepper_(*source.model, source.solver),
       readout_(*source.model, options.precision),
       u_(kBlockEpisodes * as_size(source.model->nu())),
-      values_(source.widths.size()),
+      values_(source.channels.size()),
       actions_(kBlockEpisodes * as_size(piece_rows_) * source.action),
       rewards_(source.whole ? kBlockEpisodes * as_size(piece_rows_) : 0),
-      observations_(source.widths.size()) {
+      observations_(source.channels.size()) {
   for (std::size_t name = 0; name < values_.size(); ++name) {
-    values_[name].resize(kBlockEpisodes * taken_rows(name, piece_rows_) * source.widths[name]);
-    small_.resize(std::max(small_.size(), name < source.first_field ? source.widths[name] : 0));
+    values_[name].resize(kBlockEpisodes * taken_rows(name, piece_rows_) * width(name));
+    if (source.channels[name].kind != Kind::reading)
+      small_.resize(std::max(small_.size(), width(name)));
   }
 }
 
@@ -72,7 +75,7 @@ bool EpisodeSlot<T>::simulate(const std::function<bool()>& stopped,
   if (last()) collect();
   for (std::size_t name = 0; name < values_.size(); ++name)
     observations_[name] = std::span<const T>(values_[name])
-                              .first(as_size(batch_->environments()) * source_.widths[name] *
+                              .first(as_size(batch_->environments()) * width(name) *
                                      (taken_before(source_, name, next_row_) -
                                       taken_before(source_, name, first_row_)));
   return true;
@@ -80,16 +83,16 @@ bool EpisodeSlot<T>::simulate(const std::function<bool()>& stopped,
 
 template <class T>
 std::span<T> EpisodeSlot<T>::numbers(std::size_t name, int episode, int row) {
-  const std::size_t width = source_.widths[name], before = taken_before(source_, name, first_row_),
+  const std::size_t numbers = width(name), before = taken_before(source_, name, first_row_),
                     at = taken_before(source_, name, first_row_ + row) - before,
                     rows = taken_before(source_, name, first_row_ + rows_) - before;
-  return std::span(values_[name]).subspan((as_size(episode) * rows + at) * width, width);
+  return std::span(values_[name]).subspan((as_size(episode) * rows + at) * numbers, numbers);
 }
 
 /// Returns the most rows at which a name is taken among as many in a row.
 template <class T>
 std::size_t EpisodeSlot<T>::taken_rows(std::size_t name, int rows) const {
-  const RowOutput& taken = source_.taken[name];
+  const EpisodeChannel& taken = source_.channels[name];
   if (!taken.wanted) return 0;
   if (taken.times.final) return 1;
   const std::int64_t every = std::max<std::int64_t>(1, taken.times.every);
@@ -113,8 +116,8 @@ void EpisodeSlot<T>::observe(int row) {
   const bool takes_q = takes(kQ, row), takes_v = takes(kV, row);
   for (int e = 0; e < batch_->environments(); ++e) {
     if (!playing_[as_size(e)]) continue;
-    const std::span<double> q = std::span(small_).first(source_.widths[kQ]),
-                            v = std::span(small_).first(source_.widths[kV]);
+    const std::span<double> q = std::span(small_).first(width(kQ)),
+                            v = std::span(small_).first(width(kV));
     if (takes_q) batch_->get_q(e, q), put(kQ, e, row, q);
     if (takes_v) batch_->get_v(e, v), put(kV, e, row, v);
   }
@@ -128,13 +131,13 @@ void EpisodeSlot<T>::observe(int row) {
 template <class T>
 void EpisodeSlot<T>::observe_task(const TaskProgram& task, int row) {
   const EnvironmentData& data = task.data();
-  const std::size_t width = task.task().spec().observation_size();
+  const std::size_t all = task.task().spec().observation_size();
   for (int e = 0; e < batch_->environments(); ++e) {
     if (!playing_[as_size(e)]) continue;
-    std::span<const double> rest = std::span(data.observation).subspan(as_size(e) * width, width);
-    for (std::size_t name = kThird; name < source_.widths.size(); ++name) {
-      put(name, e, row, rest.first(source_.widths[name]));
-      rest = rest.subspan(source_.widths[name]);
+    std::span<const double> rest = std::span(data.observation).subspan(as_size(e) * all, all);
+    for (std::size_t name = kThird; name < source_.channels.size(); ++name) {
+      put(name, e, row, rest.first(width(name)));
+      rest = rest.subspan(width(name));
     }
     playing_[as_size(e)] = data.state[as_size(e)] == EnvironmentState::running;
   }
@@ -142,39 +145,39 @@ void EpisodeSlot<T>::observe_task(const TaskProgram& task, int row) {
 
 template <class T>
 void EpisodeSlot<T>::observe_scene(int row) {
-  if (source_.first_body > kThird && takes(kThird, row)) {
-    std::vector<double> positions(as_size(batch_->environments()) * source_.widths[kThird]);
-    const auto place = [&](int e) {
-      return std::span(positions).subspan(as_size(e) * source_.widths[kThird],
-                                          source_.widths[kThird]);
-    };
-    read_end_effectors(readout_, *batch_, 0, place);
-    for (int e = 0; e < batch_->environments(); ++e) put(kThird, e, row, place(e));
-  }
-  observe_bodies(row);
-  for (std::size_t name = source_.first_field; name < source_.widths.size(); ++name)
-    if (takes(name, row))
-      read_field<T>(readout_, *batch_, 0, source_.fields[name - source_.first_field],
+  for (std::size_t name = kThird; name < source_.channels.size(); ++name) {
+    const EpisodeChannel& channel = source_.channels[name];
+    if (!takes(name, row)) continue;
+    if (channel.kind == Kind::reading) {
+      read_field<T>(readout_, *batch_, 0, channel.reading,
                     [&](int e) { return numbers(name, e, row); });
+    } else if (channel.kind == Kind::bodies) {
+      observe_bodies(name, row);
+    } else {
+      std::vector<double> positions(as_size(batch_->environments()) * width(name));
+      const auto place = [&](int e) {
+        return std::span(positions).subspan(as_size(e) * width(name), width(name));
+      };
+      read_end_effectors(readout_, *batch_, 0, place);
+      for (int e = 0; e < batch_->environments(); ++e) put(name, e, row, place(e));
+    }
+  }
 }
 
 template <class T>
-void EpisodeSlot<T>::observe_bodies(int row) {
-  for (std::size_t name = source_.first_body; name < source_.first_field; ++name) {
-    if (!takes(name, row)) continue;
-    const std::size_t count = source_.widths[name] / kMotion;
-    std::vector<double> pose(kPose * count), twist((kMotion - kPose) * count);
-    for (int e = 0; e < batch_->environments(); ++e) {
-      readout_.bodies(*batch_, e, pose, twist, source_.bodies[name - source_.first_body].bodies);
-      const std::span<double> both = std::span(small_).first(source_.widths[name]);
-      for (std::size_t b = 0; b < count; ++b) {
-        const auto to = both.begin() + static_cast<std::ptrdiff_t>(kMotion * b);
-        std::copy_n(pose.begin() + static_cast<std::ptrdiff_t>(kPose * b), kPose, to);
-        std::copy_n(twist.begin() + static_cast<std::ptrdiff_t>((kMotion - kPose) * b),
-                    kMotion - kPose, to + kPose);
-      }
-      put(name, e, row, both);
+void EpisodeSlot<T>::observe_bodies(std::size_t name, int row) {
+  const std::vector<int>& bodies = source_.channels[name].bodies;
+  std::vector<double> pose(kPose * bodies.size()), twist((kMotion - kPose) * bodies.size());
+  for (int e = 0; e < batch_->environments(); ++e) {
+    readout_.bodies(*batch_, e, pose, twist, bodies);
+    const std::span<double> both = std::span(small_).first(width(name));
+    for (std::size_t b = 0; b < bodies.size(); ++b) {
+      const auto to = both.begin() + static_cast<std::ptrdiff_t>(kMotion * b);
+      std::copy_n(pose.begin() + static_cast<std::ptrdiff_t>(kPose * b), kPose, to);
+      std::copy_n(twist.begin() + static_cast<std::ptrdiff_t>((kMotion - kPose) * b),
+                  kMotion - kPose, to + kPose);
     }
+    put(name, e, row, both);
   }
 }
 
@@ -240,7 +243,7 @@ void EpisodeSlot<T>::collect() {
     if (!failed(batch_->status(e))) continue;
     FailedEpisode& failure = failures_.emplace_back();
     failure = {batch_->episode(e), step_of_failure(e), batch_->status(e),
-               std::vector<double>(source_.widths[kQ]), std::vector<double>(source_.widths[kV])};
+               std::vector<double>(width(kQ)), std::vector<double>(width(kV))};
     batch_->get_q(e, failure.q);
     batch_->get_v(e, failure.v);
   }

@@ -40,9 +40,10 @@ class EpisodeSlot {
 
  private:
   [[nodiscard]] std::span<T> numbers(std::size_t name, int episode, int row);
+  [[nodiscard]] std::size_t width(std::size_t name) const { return source_.channels[name].width(); }
   [[nodiscard]] std::size_t taken_rows(std::size_t name, int rows) const;
   [[nodiscard]] bool takes(std::size_t name, int row) const;
-  void observe_bodies(int row);
+  void observe_bodies(std::size_t name, int row);
   void put(std::size_t name, int episode, int row, std::span<const double> from);
   void observe(int row);
   void observe_scene(int row);

@@ -19,10 +19,10 @@ std::size_t number_bytes(const EpisodeOptions& options) {
 /// Bytes of one row of one episode in a slot's buffers.
 double row_bytes(const EpisodeSource& source, const EpisodeOptions& options) {
   double bytes = static_cast<double>(source.action + (source.whole ? 1 : 0)) * sizeof(float);
-  for (std::size_t name = 0; name < source.widths.size(); ++name)
-    if (source.taken[name].wanted && !source.taken[name].times.final)
-      bytes += static_cast<double>(source.widths[name] * number_bytes(options)) /
-               static_cast<double>(std::max<std::int64_t>(1, source.taken[name].times.every));
+  for (const EpisodeChannel& channel : source.channels)
+    if (channel.wanted && !channel.times.final)
+      bytes += static_cast<double>(channel.width() * number_bytes(options)) /
+               static_cast<double>(std::max<std::int64_t>(1, channel.times.every));
   return bytes;
 }
 
@@ -54,20 +54,12 @@ void check_held(const ControlProgram& controls, const EpisodeOptions& options, i
 
 }  // namespace
 
-/// Times in rows of those in steps.
-static OutputTimes in_rows(const std::string& what, const OutputTimes& times, int every) {
-  if (times.every % every != 0)
-    throw InputError(fmt::format("'{}{}', and a row is every {} steps; expected a multiple of {}",
-                                 what, to_string(times), every, every));
-  return {times.every / every, times.final};
-}
-
 bool is_taken(const EpisodeSource& source, std::size_t name, std::int64_t row) {
-  return source.taken[name].wanted && source.taken[name].times.at(row, source.rows);
+  return source.channels[name].wanted && source.channels[name].times.at(row, source.rows);
 }
 std::size_t taken_before(const EpisodeSource& source, std::size_t name, std::int64_t row) {
-  if (!source.taken[name].wanted) return 0;
-  return static_cast<std::size_t>(source.taken[name].times.before(row, source.rows));
+  if (!source.channels[name].wanted) return 0;
+  return static_cast<std::size_t>(source.channels[name].times.before(row, source.rows));
 }
 
 EpisodeSource shape_of(const Model& model, const EpisodeOptions& options) {
@@ -75,33 +67,7 @@ EpisodeSource shape_of(const Model& model, const EpisodeOptions& options) {
   s.model = &model;
   s.rows = action_rows(options);
   s.action = as_size(model.nu());
-  const auto add = [&](const std::string& what, std::size_t width, bool wanted,
-                       const OutputTimes& times) {
-    s.widths.push_back(width);
-    s.taken.push_back({wanted, in_rows(what, times, options.every)});
-  };
-  add("q", as_size(model.nq()), options.q.wanted, options.q.times);
-  add("v", as_size(model.nv()), options.v.wanted, options.v.times);
-  if (!model.end_effectors().empty())
-    add("variables", 3 * model.end_effectors().size(), options.end_effectors.wanted,
-        options.end_effectors.times);
-  s.first_body = s.widths.size();
-  s.bodies = options.bodies;
-  for (const BodyRows& some : s.bodies) {
-    for (const int body : some.bodies)
-      if (body < 0 || body >= model.nb())
-        throw InputError(fmt::format("rows of body {}; the scene has {} bodies", body, model.nb()));
-    add("bodies", kMotion * (some.bodies.empty() ? as_size(model.nb()) : some.bodies.size()), true,
-        some.times);
-  }
-  s.first_field = s.widths.size();
-  s.fields = options.fields ? *options.fields : whole_fields(model.scene());
-  check_outputs(s.fields, model.sensors().size());
-  for (const FieldOutput output : s.fields) {
-    const SensorInfo& sensor = model.sensors()[as_size(output.sensor)];
-    add(output_name(sensor.name, output.form), numbers_of(sensor.points, output.form), true,
-        output.times);
-  }
+  s.channels = episode_channels(model, nullptr, options.record, options.every);
   return s;
 }
 
@@ -110,10 +76,7 @@ EpisodeSource shape_of(const Task& task) {
   s.model = &task.model();
   s.rows = task.spec().horizon;
   s.action = task.spec().action.size();
-  s.widths = {as_size(task.model().nq()), as_size(task.model().nv())};
-  for (const TensorSpec& tensor : task.spec().observations) s.widths.push_back(tensor.size());
-  s.first_body = s.first_field = s.widths.size();
-  s.taken.resize(s.widths.size());
+  s.channels = episode_channels(task.model(), &task.spec(), {}, 1);
   s.whole = true;
   return s;
 }

@@ -7,6 +7,7 @@
 #include <memory>
 #include <vector>
 
+#include "engine/rows/episode_channels.hpp"
 #include "engine/step/control.hpp"
 #include "engine/step/stepper.hpp"
 #include "tasks/run/episode_options.hpp"
@@ -14,8 +15,6 @@
 
 namespace tangere {
 
-/// Numbers of a body in a row: its pose (7) and twist (6).
-inline constexpr std::size_t kMotion = 13;
 inline constexpr int kBlockEpisodes = 16;  // lanes of a block of a Batch: one stepper's work
 
 /// The program of a scene or a task, and the contents of its rows. The objects that it was made
@@ -23,16 +22,9 @@ inline constexpr int kBlockEpisodes = 16;  // lanes of a block of a Batch: one s
 struct EpisodeSource {
   const Model* model = nullptr;
   StepperOptions solver;
-  std::int64_t rows = 0;                        ///< R, actions of an episode, at most
-  std::size_t action = 0;                       ///< numbers in one action
-  std::vector<FieldOutput> fields;              ///< of a scene
-  std::vector<BodyRows> bodies;                 ///< of a scene
-  std::size_t first_body = 0, first_field = 0;  ///< indices of the first of each in widths
-  /// Numbers in a row of q and of v. Then, for a scene, of the end effectors if there are any, of
-  /// each of `bodies` and of each of `fields`; for a task, of each observation.
-  std::vector<std::size_t> widths;
-  /// Of each of these, at which rows it is taken: times in rows.
-  std::vector<RowOutput> taken;
+  std::int64_t rows = 0;                 ///< R, actions of an episode, at most
+  std::size_t action = 0;                ///< numbers in one action
+  std::vector<EpisodeChannel> channels;  ///< of a row, besides the action
   /// Episodes may end at any time. Their length is then known only at the end, so their blocks
   /// leave whole and in ascending order.
   bool whole = false;

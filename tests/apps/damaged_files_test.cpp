@@ -363,7 +363,7 @@ TEST(DamagedFile, ATrajectoryThatClaimsWhatNoRunHasIsRefused) {
         Claim{number(".", "first_step", -1), "'first_step' is -1; expected 0 to",
               "after -1 steps: the file is damaged"},
         Claim{number(".", "steps", kMost), "'steps' is 9223372036854775807; expected 0 to",
-              "9223372036854775807 steps of 1 environments"},
+              "'steps' is 9223372036854775807"},
         Claim{number(".", "steps", 3), "the states are damaged", "claims 4 fields of 3 steps"},
         Claim{number(".", "environments", (std::int64_t{1} << 32) + 1),
               "'environments' is 4294967297; expected 1 to 2147483647", "has the shape"},

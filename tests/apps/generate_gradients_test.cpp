@@ -124,7 +124,7 @@ TEST(GenerateGradients, JacobiansOfRowsAreThoseOfSteps) {
   const Model model(read_scene(kBox).scene);
   const ControlProgram program(model, model.timestep(), 0);
   Batch batch(model, 2, 0);
-  Stepper stepper(model, for_gradients(model, {}));
+  Stepper stepper(model, {.differentiable = true});
   BlockTape tape(model, stepper.integrator(), 1);
   StepJacobians jacobians(model);
   StepJacobian step;

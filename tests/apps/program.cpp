@@ -12,6 +12,7 @@
 #include <cerrno>
 #include <csignal>
 #include <fstream>
+#include <map>
 #include <stdexcept>
 #include <system_error>
 
@@ -116,21 +117,39 @@ Outcome run(const Folder& folder, const Words& arguments,
   return Program(folder, arguments, environment, streams).wait();
 }
 
-std::vector<std::string> undocumented_keys(const nlohmann::json& object) {
-  static const std::string page = file_bytes(TANGERE_SOURCE_DIR "/docs/command.md");
+const std::string& page_of(const std::string& subcommand) {
+  static std::map<std::string, std::string> pages;
+  if (!pages.contains(subcommand)) {
+    const std::string page = file_bytes(TANGERE_SOURCE_DIR "/docs/command.md");
+    const auto section = [&](const std::string& title) {
+      const std::size_t from = page.find("\n## " + title + "\n");
+      if (from == std::string::npos)
+        throw std::runtime_error("docs/command.md has no section '" + title + "'");
+      return page.substr(from, page.find("\n## ", from + 1) - from);
+    };
+    pages[subcommand] = section("What all subcommands share") + section(subcommand);
+  }
+  return pages[subcommand];
+}
+
+static std::vector<std::string> undocumented_keys(const nlohmann::json& object,
+                                                  const std::string& page) {
   std::vector<std::string> missing;
   for (const auto& [key, value] : object.items()) {
-    if (key == "effects" && value.is_object()) {  // whose keys are names of the scene's
-      for (const nlohmann::json& effect : value)
-        for (std::string& deeper : undocumented_keys(effect)) missing.push_back(std::move(deeper));
-      continue;
-    }
-    if (object.is_object() && page.find("`" + key + "`") == std::string::npos)
+    // The keys of this one are names of the scene's.
+    const bool named = key == "effects" && value.is_object();
+    if (!named && object.is_object() && page.find("`" + key + "`") == std::string::npos)
       missing.push_back(key);
     if (!value.is_structured()) continue;
-    for (std::string& deeper : undocumented_keys(value)) missing.push_back(std::move(deeper));
+    for (const nlohmann::json& part : named ? value : nlohmann::json::array({value}))
+      for (std::string& deeper : undocumented_keys(part, page))
+        missing.push_back(std::move(deeper));
   }
   return missing;
+}
+
+std::vector<std::string> undocumented_keys(const nlohmann::json& answer) {
+  return undocumented_keys(answer, page_of(answer.at("command")));
 }
 
 nlohmann::json run_json(const Folder& folder, const Words& words, int exit_code) {

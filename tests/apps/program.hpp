@@ -75,6 +75,9 @@ class Program {
   pid_t process_ = -1;
 };
 
+/// Returns the text of docs/command.md about a subcommand, with what all of them share.
+const std::string& page_of(const std::string& subcommand);
+
 /// Runs it to its end.
 Outcome run(const Folder& folder, const Words& arguments,
             const std::vector<std::string>& environment = {}, const Streams& streams = {});

@@ -87,10 +87,10 @@ std::vector<std::string> merged(const std::string& folder, bool copy) {
 }
 
 std::vector<std::string> trajectories(const std::string& folder) {
-  const TrajectoryLayout layout = testing::layout();
+  const Recording recording = testing::recording();
   const std::string path = folder + "/run.h5";
-  TrajectoryFile file(path, layout, true);
-  testing::write_run(file, layout);
+  TrajectoryFile file(path, recording, true);
+  testing::write_run(file, recording);
   file.commit();
   return {file_bytes(path)};
 }

@@ -9,7 +9,6 @@
 #include "io/dataset/dataset_from_model.hpp"
 #include "io/dataset/dataset_writer.hpp"
 #include "io/scene/scene_reader.hpp"
-#include "io/trajectory/layout_from_model.hpp"
 #include "io/trajectory/saved_state.hpp"
 #include "io/trajectory/trajectory_file.hpp"
 #include "io/view/view_page.hpp"
@@ -60,15 +59,10 @@ std::vector<std::string> viewed_trajectories(const std::string& folder) {
   Stepper stepper(viewed_model());
   RolloutOptions rollout;
   rollout.steps = kViewedSteps;
-  RunDescription run;
-  run.steps = kViewedSteps;
-  run.fields = fields_of(viewed_model(), rollout.outputs);
-  for (const SensorInfo& sensor : viewed_model().sensors())
-    run.tactile_intervals.push_back(tactile_interval(sensor, rollout));
-  run.precision = "double", run.command_line = "tangere simulate", run.version = "0",
-  run.instruction_set = "scalar";
+  const RunFacts facts =
+      run_facts(viewed_model(), stepper, {"double", "0", "scalar", "tangere simulate", {}}, 1);
   const std::string path = folder + "/run.h5";
-  TrajectoryFile file(path, layout_from(batch, stepper, run), true);
+  TrajectoryFile file(path, rollout_recording(batch, stepper, rollout, facts), true);
   run_rollout(batch, std::span(&stepper, 1), viewed_controls(), rollout, file);
   file.commit();
   return {file_bytes(path)};
@@ -77,7 +71,7 @@ std::vector<std::string> viewed_trajectories(const std::string& folder) {
 std::vector<std::string> viewed_shards(const std::string& folder) {
   EpisodeOptions run;
   run.episodes = kEnvironments, run.steps = kViewedSteps, run.every = 2;
-  DatasetDescription set;
+  DatasetLayout set;
   set.episodes = run.episodes, set.steps = run.steps, set.every = run.every;
   set.precision = "double", set.version = "0", set.instruction_set = "scalar";
   DatasetWriter writer({folder}, dataset_layout_from(viewed_model(), Stepper(viewed_model()), set));
@@ -105,10 +99,7 @@ void go_on(const std::string& path) {
     RolloutOptions rollout;
     rollout.steps = 1, rollout.first_step = saved.step;
     struct Nowhere : RowSink {
-      void write(const StateRow&) override {}
-      void write(const StepRow&) override {}
-      void write(const TactileRow&) override {}
-      void write(const ActionRow&) override {}
+      void write(std::int64_t, std::size_t, const Numbers&) override {}
     } nowhere;
     run_rollout(batch, std::span(&stepper, 1), viewed_controls(), rollout, nowhere);
   } catch (const InputError&) {

@@ -1,31 +1,27 @@
 // SPDX-License-Identifier: Apache-2.0
-// XXH3 of the bits of numbers and of texts.
+// Hashes of the bits of numbers and of texts.
 #pragma once
 
 #include <fmt/format.h>
-#include <xxhash.h>
 
-#include <memory>
 #include <span>
 #include <string>
 #include <string_view>
+
+#include "engine/base/hash.hpp"
 
 namespace tangere::testing {
 
 /// Hash of everything that was added, in its order. +0 and -0 differ.
 class Hash {
  public:
-  void add(std::span<const double> numbers) { add(numbers.data(), numbers.size_bytes()); }
-  void add(std::string_view text) { add(text.data(), text.size()); }
+  void add(std::span<const double> numbers) { value_ = hash_bytes(std::as_bytes(numbers), value_); }
+  void add(std::string_view text) { value_ = hash_bytes(text, value_); }
   /// Returns 16 hexadecimal digits.
   [[nodiscard]] std::string text() const { return fmt::format("{:016x}", value_); }
 
  private:
-  void add(const void* bytes, std::size_t count) {
-    value_ = XXH3_64bits_withSeed(bytes, count, value_);
-  }
-
-  XXH64_hash_t value_ = 0;
+  std::uint64_t value_ = 0;
 };
 
 /// Name of the rounding of a·b + c: "fused" (once, AVX2 and AVX-512) or "plain" (twice, SSE2 and

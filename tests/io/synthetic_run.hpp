@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "engine/rows/sensor_layout.hpp"
 #include "io/trajectory/trajectory_file.hpp"
 
 namespace tangere::testing {
@@ -39,48 +40,95 @@ class Folder {
   std::filesystem::path path_;
 };
 
-/// Two environments, one joint of 3 dofs, one body, a 3 × 4 sensor read every second step.
-inline TrajectoryLayout layout(std::int64_t steps = 5) {
-  TrajectoryLayout l;
-  l.steps = steps;
-  l.environments = 2;
-  l.q_names = l.v_names = {"a.x", "a.y", "a.z"};
-  l.q_units = {"m", "m", "m"};
-  l.v_units = {"m/s", "m/s", "m/s"};
-  l.u_names = {"a.x"};
-  l.u_units = {"1"};
-  l.body_names = {"box"};
+/// A 3 × 4 array of points on 2 × 3 mm.
+inline SensorLayout skin() {
   SensorLayout s;
   s.name = "skin";
   s.body = "box";
   s.rows = 3;
   s.cols = 4;
   s.points = 12;
-  s.every = 2;
   s.pressure_sign = -1;
-  s.corner0 = {0, 0, 0};
   s.corner1 = {0.002, 0.003, 0};
   s.axis0 = {1, 0, 0};
   s.axis1 = {0, 1, 0};
-  l.sensors = {s};
-  l.fields = {{0}};
-  l.statuses = {{0, "converged"}, {-1, "not converged"}};
-  l.randomized_names = {"joint a q[0]"};
-  l.randomized_units = {"m"};
-  l.randomized_values = {0.25, 0.75};
-  l.scene_name = "synthetic";
-  l.scene_path = "s.xml";
-  l.scene_text = "<tangere/>";
-  l.integrator = "BDF2";
-  l.timestep = 0.01;
-  l.tolerance = 1e-9;
-  l.every = 2;
-  l.seed = 18446744073709551615ULL;
-  l.precision = "double";
-  l.command_line = "tangere simulate s.xml";
-  l.version = "0.1.0";
-  l.instruction_set = "scalar";
-  return l;
+  return s;
+}
+
+/// Adds fields of a sensor, read every second step of two environments.
+inline void add_sensor(Recording& recording, const SensorLayout& sensor, std::int64_t steps) {
+  const std::string group = "tactile/" + sensor.name + "/";
+  Channel field{.name = group + "force", .shape = {2}, .rows = steps / 2};
+  for (const std::uint64_t n : reading_shape(sensor, FieldForm::field)) field.shape.push_back(n);
+  field.more = reading_attributes(sensor, FieldForm::field);
+  field.more.push_back({"every", std::int64_t{2}});
+  field.storage = Channel::Storage::by_environment;
+  recording.channels.push_back(field);
+  recording.channels.push_back(
+      {.name = group + "step", .type = NumberType::int64, .shape = {}, .rows = steps / 2});
+}
+
+/// Two environments, one joint of 3 dofs, one body, a 3 × 4 sensor read every second step.
+inline Recording recording(std::int64_t steps = 5,
+                           const std::vector<std::string>& end_effectors = {},
+                           const std::vector<SensorLayout>& sensors = {skin()}) {
+  Recording r;
+  r.facts = {{"command_line", "tangere simulate s.xml"},
+             {"environments", std::int64_t{2}},
+             {"first_episode", std::int64_t{0}},
+             {"first_step", std::int64_t{0}},
+             {"instruction_set", "scalar"},
+             {"integrator", "BDF2"},
+             {"precision", "double"},
+             {"quaternion_order", "w x y z"},
+             {"scene_name", "synthetic"},
+             {"scene_path", "s.xml"},
+             {"scene_text", "<tangere/>"},
+             {"seed", std::uint64_t{18446744073709551615ULL}},
+             {"steps", steps},
+             {"tangere_version", "0.1.0"},
+             {"timestep", 0.01},
+             {"tolerance", 1e-9}};
+  const std::vector<std::string> names = {"a.x", "a.y", "a.z"};
+  r.channels = {
+      {.name = "time", .shape = {}, .rows = steps + 1, .units = {"s"}},
+      {.name = "q", .shape = {2, 3}, .rows = steps + 1, .names = names, .units = {"m", "m", "m"}},
+      {.name = "v",
+       .shape = {2, 3},
+       .rows = steps + 1,
+       .names = names,
+       .units = {"m/s", "m/s", "m/s"}},
+      {.name = "bodies/pose",
+       .shape = {2, 1, 7},
+       .rows = steps + 1,
+       .names = {"x", "y", "z", "qw", "qx", "qy", "qz"},
+       .units = {"m", "m", "m", "1", "1", "1", "1"}},
+      {.name = "bodies/twist",
+       .shape = {2, 1, 6},
+       .rows = steps + 1,
+       .names = {"wx", "wy", "wz", "vx", "vy", "vz"},
+       .units = {"rad/s", "rad/s", "rad/s", "m/s", "m/s", "m/s"}}};
+  if (!end_effectors.empty())
+    r.channels.push_back({.name = "variables/position",
+                          .shape = {2, end_effectors.size(), 3},
+                          .rows = steps + 1,
+                          .names = end_effectors,
+                          .units = {"m"},
+                          .frame = "world"});
+  const std::vector<Channel> of_steps = {
+      {.name = "u", .shape = {2, 1}, .rows = steps, .names = {"a.x"}, .units = {"1"}},
+      {.name = "solver/iterations", .type = NumberType::int32, .shape = {2}, .rows = steps},
+      {.name = "solver/status", .type = NumberType::int8, .shape = {2}, .rows = steps},
+      {.name = "solver/residual", .shape = {2}, .rows = steps}};
+  r.channels.insert(r.channels.end(), of_steps.begin(), of_steps.end());
+  for (const SensorLayout& sensor : sensors) add_sensor(r, sensor, steps);
+  r.tables = {
+      {{.name = "randomized", .shape = {1}, .rows = 2, .names = {"joint a q[0]"}, .units = {"m"}},
+       std::vector<double>{0.25, 0.75}}};
+  for (const SensorLayout& sensor : sensors)
+    for (Table& table : point_tables(sensor, "tactile/" + sensor.name + "/"))
+      r.tables.push_back(std::move(table));
+  return r;
 }
 
 inline double number(int kind, std::int64_t row, std::size_t k) {
@@ -104,22 +152,31 @@ inline std::vector<double> field(std::int64_t frame, double force) {
   return x;
 }
 
-inline void write_run(RowSink& sink, const TrajectoryLayout& l, double force = 1e-3) {
-  for (std::int64_t t = 0; t <= l.steps; ++t) {
-    const auto q = numbers(1, t, 6), v = numbers(2, t, 6), pose = numbers(3, t, 14),
-               twist = numbers(4, t, 12);
-    const auto end_effectors = numbers(7, t, 2 * 3 * l.end_effector_names.size());
-    sink.write(StateRow{t, double(t) * l.timestep, q, v, pose, twist, end_effectors});
-    if (t == l.steps) break;
-    const auto u = numbers(5, t, 2), residual = numbers(6, t, 2);
-    const std::vector<std::int32_t> iterations = {static_cast<std::int32_t>(t), 7};
-    const std::vector<std::int8_t> status = {0, -1};
-    sink.write(StepRow{t, u, iterations, status, residual});
-    if ((t + 1) % 2 == 0) {
-      const auto f = field((t + 1) / 2 - 1, force);
-      sink.write(TactileRow{{0}, (t + 1) / 2 - 1, t + 1, f});
+/// Writes all rows of a recording. Channel k has the numbers of kind k.
+inline void write_run(RowSink& sink, const Recording& recording, double force = 1e-3) {
+  const std::int64_t steps = recording.channels.at(0).rows - 1;
+  for (std::int64_t t = 0; t <= steps; ++t)
+    for (std::size_t k = 0; k < recording.channels.size(); ++k) {
+      const Channel& channel = recording.channels[k];
+      const bool of_states = channel.rows > steps, of_sensor = channel.name.starts_with("tactile/");
+      if (of_sensor ? t == 0 || t % 2 != 0 : t == 0 && !of_states) continue;
+      const std::int64_t row = of_states ? t : t - 1;
+      const std::vector<std::int32_t> iterations = {static_cast<std::int32_t>(row), 7};
+      const std::vector<std::int8_t> status = {0, -1};
+      const double time = double(t) * 0.01;
+      if (channel.name == "time")
+        sink.write(t, k, std::span(&time, 1));
+      else if (channel.type == NumberType::int32)
+        sink.write(t, k, std::span(iterations));
+      else if (channel.type == NumberType::int8)
+        sink.write(t, k, std::span(status));
+      else if (channel.type == NumberType::int64)
+        sink.write(t, k, std::span<const std::int64_t>(&t, 1));
+      else
+        sink.write(t, k,
+                   std::span<const double>(of_sensor ? field(t / 2 - 1, force)
+                                                     : numbers(int(k), row, channel.width())));
     }
-  }
 }
 
 }  // namespace tangere::testing

@@ -157,7 +157,7 @@ TEST(Effects, StepsForGradientsTakeAllContacts) {
   const Scene scene = without(without(testing::scene_that_sleeps(), {EffectKind::sleeping}),
                               {EffectKind::pair_contact}, Way::zero);
   const Model model(scene);
-  const StepperOptions options = for_gradients(model, {});
+  const StepperOptions options{.differentiable = true};
   constexpr int kTaken = 40;
   Batch stepped(model, 3), taped(model, 3);
   Stepper a(model, options), b(model, options);

@@ -507,8 +507,8 @@ TEST(Sleep, DerivativesAndMemoryAreRefused) {
   const std::string no = "a body that sleeps has no derivatives";
   EXPECT_NE(refusal([&] { Adjoint(model, sleepy()); }).find(no), std::string::npos);
   EXPECT_NE(refusal([&] { Tangent(model, sleepy()); }).find(no), std::string::npos);
-  EXPECT_NE(refusal([&] { for_gradients(model, sleepy()); }).find(no), std::string::npos);
-  EXPECT_EQ(refusal([&] { for_gradients(model, sleepy(0)); }), "");
+  EXPECT_NE(refusal([&] { Stepper(model, differentiable(sleepy())); }).find(no), std::string::npos);
+  EXPECT_EQ(refusal([&] { Stepper(model, differentiable(sleepy(0))); }), "");
   Stepper stepper(model, sleepy());
   Batch batch(model, 1);
   BlockTape tape(model, Integrator::bdf1, 1);

@@ -54,10 +54,10 @@ TEST(StepTolerance, IsTheCallersThenTheScenes) {
   EXPECT_EQ(in_force(scene), Model(scene).following_tolerance(scene.integrator, scene.timestep));
   EXPECT_EQ(in_force(scene, {.integrator = Integrator::sdirk3, .timestep = 1e-2, .tolerance = {}}),
             Model(scene).following_tolerance(Integrator::sdirk3, 1e-2));
-  EXPECT_EQ(in_force(scene, for_gradients(Model(scene), {})), kGradientTolerance);
+  EXPECT_EQ(in_force(scene, {.differentiable = true}), kGradientTolerance);
   scene.solver.tolerance = 1e-7;
   EXPECT_EQ(in_force(scene), 1e-7);
-  EXPECT_EQ(in_force(scene, for_gradients(Model(scene), {})), 1e-7);
+  EXPECT_EQ(in_force(scene, {.differentiable = true}), 1e-7);
   EXPECT_EQ(in_force(scene, {.integrator = {}, .timestep = {}, .tolerance = 1e-6}), 1e-6);
 }
 

@@ -59,7 +59,6 @@ DatasetLayout layout_of(bool single, const std::string& compression, bool sparse
   list.rows = list.cols = 0;
   list.points = 1111;
   l.sensors = {image, list};
-  l.fields = {{0}, {1}};
   l.compression = compression;
   l.sparse = sparse;
   return l;

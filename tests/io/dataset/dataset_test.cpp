@@ -302,7 +302,6 @@ TEST(Dataset, NamesThatNoFileCanHoldAreRefused) {
   const auto complaint = [&](const std::string& name, const std::string& second) {
     DatasetLayout l = dataset_layout(1);
     l.sensors.push_back(l.sensors[0]);
-    l.fields.push_back({1});
     l.sensors[0].name = name;
     l.sensors[1].name = second;
     try {

@@ -57,7 +57,7 @@ TEST(LearnerNotes, SayScalesAndWhatIsPrivilegedOfWhatIsStored) {
   DatasetLayout l = of_task();
   EXPECT_EQ(json::parse(observation_scale(l)), json({{"goal", {0.1, 0.1, 0.3}}, {"tactile", 0.5}}));
   EXPECT_EQ(json::parse(privileged_observations(l)), json({"q", "v", "box"}));
-  l.record = {"v", "tactile"};
+  l.record = {{"v"}, {"tactile"}};
   EXPECT_EQ(json::parse(observation_scale(l)), json({{"tactile", 0.5}}));
   EXPECT_EQ(json::parse(privileged_observations(l)), json::array({"v"}));
   EXPECT_EQ(observation_scale(dataset_layout(20)), "{}");

@@ -247,8 +247,8 @@ TEST_F(ShardCheck, FindsFilesThatAreCutOrSomethingElse) {
   EXPECT_NE(complaint(), "");
   std::filesystem::remove(path_);
   EXPECT_NE(complaint(), "");
-  TrajectoryFile trajectory(path_, testing::layout(), false);
-  testing::write_run(trajectory, testing::layout());
+  TrajectoryFile trajectory(path_, testing::recording(), false);
+  testing::write_run(trajectory, testing::recording());
   trajectory.commit();
   EXPECT_NE(complaint(), "");
 }

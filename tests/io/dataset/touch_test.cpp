@@ -30,12 +30,13 @@ json touch_of(const DatasetLayout& layout) { return json::parse(touch_observatio
 
 TEST(Touch, IsEveryReadingOfASensorWithoutImperfections) {
   DatasetLayout l = dataset_layout(20);
-  l.fields = {{0, FieldForm::field}, {0, FieldForm::shear}, {0, FieldForm::ideal}};
+  const std::vector<TimedName> all = {{"q"}, {"v"}, {"skin"}, {"skin.shear"}, {"skin.ideal"}};
+  l.record = all;
   EXPECT_EQ(touch_of(l), json({"skin", "skin.shear", "skin.ideal"}));
-  l.record = {"q", "skin.shear"};
+  l.record = {{"q"}, {"skin.shear"}};
   EXPECT_EQ(touch_of(l), json({"skin.shear"}));
   EXPECT_THAT(l.touch(), ElementsAre(1)) << "the second of those that are stored";
-  l.record.clear();
+  l.record = all;
   l.sensors[0].imperfections = "noise=\"0.002\"";
   EXPECT_EQ(touch_of(l), json({"skin.ideal"}));
 }
@@ -51,7 +52,7 @@ TEST(Touch, IsWhatATaskDeclares) {
   task.observations.back().touch = true;
   l.task = task;
   EXPECT_EQ(touch_of(l), json({"flow"}));
-  l.record = {"goal"};
+  l.record = {{"goal"}};
   EXPECT_EQ(touch_of(l), json::array());
   l.record.clear();
   l.sensors[0].imperfections = "noise=\"0.002\"";

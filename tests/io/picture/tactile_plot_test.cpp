@@ -13,14 +13,14 @@ namespace {
 
 using testing::Folder;
 using ::testing::HasSubstr;
-using testing::layout;
 using ::testing::Not;
+using testing::recording;
 
 std::string picture(const Folder& folder, const PlotOptions& options, double force = 1e-3) {
-  const TrajectoryLayout l = layout();
+  const Recording r = recording();
   {
-    TrajectoryFile file(folder / "run.h5", l, true);
-    testing::write_run(file, l, force);
+    TrajectoryFile file(folder / "run.h5", r, true);
+    testing::write_run(file, r, force);
     file.commit();
   }
   std::string svg = render_tactile_svg(TrajectoryReader(folder / "run.h5"), options);
@@ -74,15 +74,14 @@ TEST(TactilePlot, NoContactIsSaid) {
 
 TEST(TactilePlot, DrawsTheFirstRectangularArrayAndNamesThemAll) {
   const Folder folder;
-  TrajectoryLayout l = layout(0);  // naming the sensors that can be drawn needs no field
-  SensorLayout rod = l.sensors[0], second = rod;
+  SensorLayout rod = testing::skin(), second = rod;
   rod.name = "rod";
   rod.rows = rod.cols = 0;
   second.name = "second";
-  l.sensors = {rod, l.sensors[0], second};
-  l.fields = {{0}, {1}, {2}};
-  TrajectoryFile file(folder / "run.h5", l, false);
-  testing::write_run(file, l);
+  // Naming the sensors that can be drawn needs no field.
+  const Recording r = recording(0, {}, {rod, testing::skin(), second});
+  TrajectoryFile file(folder / "run.h5", r, false);
+  testing::write_run(file, r);
   file.commit();
   const TrajectoryReader reader(folder / "run.h5");
   EXPECT_THAT(drawable_sensors(reader), ::testing::ElementsAre("second", "skin"));
@@ -103,7 +102,7 @@ TEST(TactilePlot, DrawsTheFirstRectangularArrayAndNamesThemAll) {
 
 /// Points around a body: down is -z of the body, right is y, whatever the points' own axes are.
 TEST(TactilePlot, AnImageHasItsPointsAtTheirPixelsAndShearAlongRowsAndColumns) {
-  SensorLayout s = layout().sensors[0];
+  SensorLayout s = testing::skin();
   s.rows = s.cols = 0;
   for (int k = 0; k < 5; ++k) {
     TactilePoint p;
@@ -127,13 +126,11 @@ TEST(TactilePlot, AnImageHasItsPointsAtTheirPixelsAndShearAlongRowsAndColumns) {
   EXPECT_FALSE(drawable(s));
 
   const Folder folder;
-  TrajectoryLayout l = layout(0);
   for (std::size_t k = 0; k < 4; ++k)
     s.list[k].pixel = {static_cast<int>(k / 2), static_cast<int>(k % 2)};
-  l.sensors = {s};
-  l.fields = {{0}};
-  TrajectoryFile file(folder / "run.h5", l, false);
-  testing::write_run(file, l);
+  const Recording r = recording(0, {}, {s});
+  TrajectoryFile file(folder / "run.h5", r, false);
+  testing::write_run(file, r);
   file.commit();
   const TrajectoryReader reader(folder / "run.h5");
   ASSERT_THAT(drawable_sensors(reader), ::testing::ElementsAre("skin"));

@@ -43,7 +43,7 @@ Effort run(const std::string& name) {
 TEST(NewtonEffort, InsertionTouchesWithoutSplits) {
   const Effort e = run("insertion");
   EXPECT_EQ(e.failures, 0);
-  EXPECT_LT(e.passes, 4.2);
+  EXPECT_LT(e.passes, 3.3);
   EXPECT_LE(e.splits, 2);
 }
 

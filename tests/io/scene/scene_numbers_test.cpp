@@ -11,9 +11,9 @@
 #include "engine/model/compiled_model.hpp"
 #include "engine/model/model.hpp"
 #include "engine/model/scene_number.hpp"
+#include "engine/rows/sensor_layout.hpp"
 #include "io/dataset/dataset_from_model.hpp"
 #include "io/scene/scene_reader.hpp"
-#include "io/trajectory/layout_from_model.hpp"
 
 namespace tangere {
 namespace {
@@ -174,13 +174,11 @@ TEST(SceneNumbers, HaveOneNameAndUnitFromTheSceneToTheFile) {
       EXPECT_EQ(info->value, row.value);
     }
     const Stepper stepper(model);
-    RunDescription run;
-    run.tactile_intervals = {1};
-    const TrajectoryLayout trajectory = layout_from(batch, stepper, run);
+    const RunFacts facts = run_facts(model, stepper, {}, 0);
     const DatasetLayout dataset = dataset_layout_from(model, stepper, {});
     const std::vector<std::string> name = {row.name}, unit = {row.unit};
-    EXPECT_EQ(trajectory.randomized_names, name);
-    EXPECT_EQ(trajectory.randomized_units, unit);
+    EXPECT_EQ(facts.randomized_names, name);
+    EXPECT_EQ(facts.randomized_units, unit);
     EXPECT_EQ(dataset.randomized_names, name);
     EXPECT_EQ(dataset.randomized_units, unit);
   }

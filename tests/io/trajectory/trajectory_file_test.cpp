@@ -20,13 +20,13 @@ namespace tangere {
 namespace {
 
 using testing::Folder;
-using testing::layout;
 using testing::number;
+using testing::recording;
 
-std::string write_file(const Folder& folder, const TrajectoryLayout& l = layout()) {
+std::string write_file(const Folder& folder, const Recording& r = recording()) {
   std::string path = folder / "run.h5";
-  TrajectoryFile file(path, l, false);
-  testing::write_run(file, l);
+  TrajectoryFile file(path, r, false);
+  testing::write_run(file, r);
   EXPECT_FALSE(std::filesystem::exists(path)) << "named before it was complete";
   file.commit();
   return path;
@@ -98,28 +98,25 @@ TEST(TrajectoryFile, HoldsEndEffectorsWhereThereAreAny) {
     EXPECT_FALSE(h5::has_link(without, "variables"));
   }
   const Folder other;
-  TrajectoryLayout l = layout();
-  const std::uint64_t bytes = l.bytes();
-  l.end_effector_names = {"tip", "heel"};
-  EXPECT_EQ(l.bytes() - bytes, 6U * 2 * 2 * 3 * 8);
-  const h5::Id f = h5::open_file(write_file(other, l));
+  const std::vector<std::string> names = {"tip", "heel"};
+  const Recording r = recording(5, names);
+  EXPECT_EQ(recorded_bytes(r) - recorded_bytes(recording()), 6U * 2 * 2 * 3 * 8);
+  const h5::Id f = h5::open_file(write_file(other, r));
   const h5::Id d = h5::open_dataset(f, "variables/position");
   ASSERT_EQ(h5::dimensions(d), (h5::Dims{6, 2, 2, 3}));
   std::vector<double> x(72);
   h5::read_box(d, {0, 0, 0, 0}, {6, 2, 2, 3}, x.data());
   for (std::size_t k = 0; k < 72; ++k)
-    EXPECT_EQ(x[k], number(7, std::int64_t(k / 12), k % 12)) << k;
-  EXPECT_EQ(h5::read_texts(d, "names"), l.end_effector_names);
+    EXPECT_EQ(x[k], number(5, std::int64_t(k / 12), k % 12)) << k;
+  EXPECT_EQ(h5::read_texts(d, "names"), names);
   EXPECT_EQ(h5::read_text(d, "units"), "m");
   EXPECT_EQ(h5::read_text(d, "frame"), "world");
 }
 
 TEST(TrajectoryFile, RefusesARowWithoutTheEndEffectorsItsLayoutHas) {
   const Folder folder;
-  TrajectoryLayout l = layout();
-  l.end_effector_names = {"tip"};
-  TrajectoryFile file(folder / "run.h5", l, false);
-  EXPECT_THROW(testing::write_run(file, layout()), IoError);
+  TrajectoryFile file(folder / "run.h5", recording(5, {"tip"}), false);
+  EXPECT_THROW(testing::write_run(file, recording()), IoError);
 }
 
 TEST(TrajectoryFile, ReaderGivesBackTheFields) {
@@ -146,7 +143,7 @@ TEST(TrajectoryFile, TheSameRunGivesTheSameBytes) {
 TEST(TrajectoryFile, UncommittedRunsLeaveNothing) {
   const Folder folder;
   {
-    TrajectoryFile file(folder / "run.h5", layout(), false);
+    TrajectoryFile file(folder / "run.h5", recording(), false);
     EXPECT_EQ(folder.entries(), 1U);  // the .part
   }
   EXPECT_EQ(folder.entries(), 0U);
@@ -155,23 +152,23 @@ TEST(TrajectoryFile, UncommittedRunsLeaveNothing) {
 TEST(TrajectoryFile, IncompleteRunsAreNotCommitted) {
   const Folder folder;
   {
-    TrajectoryFile file(folder / "run.h5", layout(), false);
-    testing::write_run(file, layout(4));  // a step short
+    TrajectoryFile file(folder / "run.h5", recording(), false);
+    testing::write_run(file, recording(4));  // a step short
     try {
       file.commit();
       ADD_FAILURE() << "an incomplete file was committed";
     } catch (const IoError& e) {
-      EXPECT_THAT(e.what(), ::testing::HasSubstr("5 states of 6"));
+      EXPECT_THAT(e.what(), ::testing::HasSubstr("5 rows of 6 of 'time'"));
     }
-    TrajectoryLayout sleeps = layout();
-    sleeps.trees = {"box"};
-    TrajectoryFile without(folder / "sleep.h5", sleeps, false);
-    testing::write_run(without, sleeps);  // without its rows of sleep
+    Recording more = recording();
+    more.channels.push_back({.name = "sleep/clearance", .shape = {2}, .rows = 6});
+    TrajectoryFile without(folder / "sleep.h5", more, false);
+    testing::write_run(without, recording());
     try {
       without.commit();
-      ADD_FAILURE() << "a file without its rows of sleep was committed";
+      ADD_FAILURE() << "a file without rows of a channel was committed";
     } catch (const IoError& e) {
-      EXPECT_THAT(e.what(), ::testing::HasSubstr("0 rows of sleep of 6"));
+      EXPECT_THAT(e.what(), ::testing::HasSubstr("0 rows of 6 of 'sleep/clearance'"));
     }
   }
   EXPECT_EQ(folder.entries(), 0U);
@@ -180,10 +177,10 @@ TEST(TrajectoryFile, IncompleteRunsAreNotCommitted) {
 TEST(TrajectoryFile, ExistingOutputsAreKeptUnlessOverwritten) {
   const Folder folder;
   write_file(folder);
-  EXPECT_THROW(TrajectoryFile(folder / "run.h5", layout(), false), IoError);
+  EXPECT_THROW(TrajectoryFile(folder / "run.h5", recording(), false), IoError);
   EXPECT_EQ(TrajectoryReader(folder / "run.h5").frames(0), 2);
-  TrajectoryFile again(folder / "run.h5", layout(7), true);
-  testing::write_run(again, layout(7));
+  TrajectoryFile again(folder / "run.h5", recording(7), true);
+  testing::write_run(again, recording(7));
   again.commit();
   EXPECT_EQ(TrajectoryReader(folder / "run.h5").frames(0), 3);
 }
@@ -192,7 +189,7 @@ TEST(TrajectoryFile, PlacesThatCannotBeWrittenAreNamed) {
   const Folder folder;
   const auto message = [&](const std::string& path) -> std::string {
     try {
-      TrajectoryFile file(path, layout(), true);
+      TrajectoryFile file(path, recording(), true);
     } catch (const IoError& e) {
       return e.what();
     }
@@ -207,10 +204,12 @@ TEST(TrajectoryFile, PlacesThatCannotBeWrittenAreNamed) {
 
 TEST(TrajectoryFile, AbsurdSizesAreRefusedBeforeAnythingIsWritten) {
   const Folder folder;
-  TrajectoryLayout l = layout(std::int64_t(1) << 60);
-  EXPECT_THROW(TrajectoryFile(folder / "run.h5", l, false), std::runtime_error);
-  l = layout(std::int64_t(1) << 45);
-  EXPECT_THROW(TrajectoryFile(folder / "run.h5", l, false), IoError);
+  EXPECT_THROW(TrajectoryFile(folder / "run.h5", recording(std::int64_t(1) << 60), false),
+               InputError);
+  EXPECT_THROW(TrajectoryFile(folder / "run.h5", recording(std::int64_t(1) << 45), false), IoError);
+  Recording twice = recording();
+  twice.channels.push_back(twice.channels[0]);
+  EXPECT_THROW(TrajectoryFile(folder / "run.h5", twice, false), InputError);
   EXPECT_EQ(folder.entries(), 0U);
 }
 
@@ -226,9 +225,9 @@ TEST(TrajectoryFile, AFullDiskIsAnErrorAndLeavesNothing) {
   setrlimit(RLIMIT_FSIZE, &small);
   std::string message;
   try {
-    const TrajectoryLayout l = layout(20000);
-    TrajectoryFile file(folder / "run.h5", l, false);
-    testing::write_run(file, l);
+    const Recording r = recording(20000);
+    TrajectoryFile file(folder / "run.h5", r, false);
+    testing::write_run(file, r);
     file.commit();
   } catch (const IoError& e) {
     message = e.what();

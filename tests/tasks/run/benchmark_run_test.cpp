@@ -11,6 +11,7 @@
 
 #include "io/scene/scene_reader.hpp"
 #include "tasks/run/checksum.hpp"
+#include "tests/tasks/recorded.hpp"
 #include "tests/tasks/task_check.hpp"
 
 namespace tangere {
@@ -110,23 +111,12 @@ TEST(BenchmarkRun, AChainFeelsEveryBitAndTheOrder) {
 }
 
 TEST(BenchmarkRun, StepsAndReadsWhatARolloutDoes) {
-  struct Fields : RowSink {
-    std::vector<std::vector<double>> fields;  // of every frame, (E, points, 3)
-    std::vector<double> q, v;                 // of the last row
-    void write(const StateRow& row) override {
-      q.assign(row.q.begin(), row.q.end());
-      v.assign(row.v.begin(), row.v.end());
-    }
-    void write(const StepRow&) override {}
-    void write(const TactileRow& row) override {
-      fields.emplace_back(row.numbers.begin(), row.numbers.end());
-    }
-  } sink;
   constexpr std::size_t kEnvironments = 3;
   const Model& model = small_ball();
   Batch batch(model, kEnvironments, kSeed);
   Stepper stepper(model);
   const ControlProgram controls(model, model.timestep(), kSeed);
+  testing::Recorded sink(rollout_recording(batch, stepper, {kSteps, kEvery}, {}));
   const RolloutSummary summary =
       run_rollout(batch, std::span(&stepper, 1), controls, {kSteps, kEvery}, sink);
   const BenchmarkResult result = result_of(kEnvironments, options(1));
@@ -134,7 +124,9 @@ TEST(BenchmarkRun, StepsAndReadsWhatARolloutDoes) {
   EXPECT_EQ(result.counts.newton_iterations, summary.counts.newton_iterations);
   EXPECT_EQ(result.tactile_points, kSteps / kEvery * std::int64_t{kEnvironments} * 32 * 32);
 
-  ASSERT_THAT(sink.fields, SizeIs(kSteps / kEvery));
+  const std::vector<testing::RecordedRow>& fields =
+      sink["tactile/" + std::string(model.sensors()[0].name) + "/force"];
+  ASSERT_THAT(fields, SizeIs(kSteps / kEvery));
   const auto part = [](const std::vector<double>& all, std::size_t e) {
     const std::size_t width = all.size() / kEnvironments;
     return std::vector<double>(&all[e * width], &all[e * width] + width);
@@ -142,11 +134,12 @@ TEST(BenchmarkRun, StepsAndReadsWhatARolloutDoes) {
   const auto touched = [](const auto& f) {
     return std::count(f.begin(), f.end(), 0.0) < std::ssize(f);
   };
-  EXPECT_TRUE(touched(sink.fields.back())) << "the pad does not touch: the test tests nothing";
+  EXPECT_TRUE(touched(fields.back().numbers)) << "the pad does not touch: the test tests nothing";
   for (std::size_t e = 0; e < kEnvironments; ++e) {
     std::uint64_t chain = e;
-    for (const std::vector<double>& field : sink.fields) chain = chain_bits(chain, part(field, e));
-    EXPECT_EQ(result.checksums[e], chain_bits(chain_bits(chain, part(sink.q, e)), part(sink.v, e)));
+    for (const testing::RecordedRow& row : fields) chain = chain_bits(chain, part(row.numbers, e));
+    EXPECT_EQ(result.checksums[e], chain_bits(chain_bits(chain, part(sink["q"].back().numbers, e)),
+                                              part(sink["v"].back().numbers, e)));
   }
 }
 

@@ -12,6 +12,7 @@
 #include "tasks/run/benchmark_run.hpp"
 #include "tasks/run/rollout.hpp"
 #include "tests/tasks/episode_by_hand.hpp"
+#include "tests/tasks/recorded.hpp"
 #include "tests/tasks/task_check.hpp"
 
 namespace tangere {
@@ -70,29 +71,25 @@ TEST_P(ImperfectSensors, EpisodesHaveTheBitsOfOneSteppedByHand) {
 }
 
 TEST_P(ImperfectSensors, ARolloutReadsWhatADataSetStores) {
-  struct Rows : RowSink {
-    std::vector<std::string> fields;
-    void write(const StateRow&) override {}
-    void write(const StepRow&) override {}
-    void write(const TactileRow& row) override {
-      const std::size_t width = row.numbers.size() / fields.size();
-      for (std::size_t e = 0; e < fields.size(); ++e)
-        fields[e] += testing::bytes_of(row.numbers.subspan(e * width, width));
-    }
-  } rows;
   const Model& model = imperfect_ball(GetParam());
   const auto stored = episodes(model, 2, 1 << 20);
   Batch batch(model, 20, kSeed);
   Stepper stepper(model);
-  rows.fields.resize(20);
   RolloutOptions o;
   o.steps = testing::kSteps;
   o.every = testing::kEvery;
+  testing::Recorded rows(rollout_recording(batch, stepper, o, {}));
   run_rollout(batch, std::span(&stepper, 1), ControlProgram(model, model.timestep(), kSeed), o,
               rows, {});
+  const std::vector<testing::RecordedRow>& fields =
+      rows["tactile/" + std::string(model.sensors()[0].name) + "/force"];
   for (int e = 0; e < 20; ++e) {
     const std::string& all = stored.at(e).observations.back();  // from row 0 on
-    const std::string& here = rows.fields[std::size_t(e)];
+    std::string here;
+    for (const testing::RecordedRow& row : fields) {
+      const std::size_t width = row.numbers.size() / 20;
+      here += testing::bytes_of(std::span(row.numbers).subspan(std::size_t(e) * width, width));
+    }
     ASSERT_EQ(all.size(), here.size() / testing::kRows * (testing::kRows + 1));
     EXPECT_EQ(all.substr(all.size() - here.size()), here) << e;
   }
@@ -120,15 +117,11 @@ TEST(ImperfectSensors, AMemoryKeepsToTheStepsOfItsScene) {
   StepperOptions half;
   half.timestep = model.timestep() / 2;
   Stepper stepper(model, half);
-  struct Nothing : RowSink {
-    void write(const StateRow&) override {}
-    void write(const StepRow&) override {}
-    void write(const TactileRow&) override {}
-  } nothing;
   RolloutOptions o;
   o.steps = 2;
   const ControlProgram controls(model, *half.timestep, 0);
   try {
+    testing::Recorded nothing;
     run_rollout(batch, std::span(&stepper, 1), controls, o, nothing, {});
     ADD_FAILURE();
   } catch (const InputError& error) {

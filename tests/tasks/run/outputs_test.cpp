@@ -7,6 +7,7 @@
 #include "kernels/table/kernel_table.hpp"
 #include "tasks/run/rollout.hpp"
 #include "tests/tasks/episode_by_hand.hpp"
+#include "tests/tasks/recorded.hpp"
 
 namespace tangere {
 namespace {
@@ -47,12 +48,12 @@ class Counting {
 };
 
 /// Runs 16 episodes and returns how many bytes of readings one gave.
-std::size_t run_with(const Model& model, std::optional<std::vector<FieldOutput>> fields) {
+std::size_t run_with(const Model& model, const std::vector<TimedName>& record) {
   EpisodeOptions o;
   o.episodes = 16;
   o.steps = 4;
   o.every = 2;
-  o.fields = std::move(fields);
+  o.record = record;
   const ControlProgram controls(model, model.timestep(), 0);
   Recorder recorder(2);
   run_episodes(model, {}, controls, o, recorder);
@@ -67,27 +68,19 @@ TEST(Outputs, FieldsThatNobodyAskedForAreNotRead) {
   const Model model(small_scene());
   const auto points = std::size_t(model.sensors()[0].points);
   const Counting counting;
-  EXPECT_EQ(run_with(model, std::vector<FieldOutput>{}), 0U);
+  const std::string sensor = std::string(model.sensors()[0].name);
+  EXPECT_EQ(run_with(model, {{"q"}}), 0U);
   EXPECT_EQ(whole_calls + pressure_calls, 0);
-  EXPECT_EQ(run_with(model, std::vector<FieldOutput>{{0, FieldForm::pressure}}),
-            3 * points * sizeof(double));
+  EXPECT_EQ(run_with(model, {{sensor + ".pressure"}}), 3 * points * sizeof(double));
   EXPECT_EQ(whole_calls, 0);
   EXPECT_GT(pressure_calls, 0);
   pressure_calls = 0;
-  EXPECT_EQ(run_with(model, std::vector<FieldOutput>{{0, FieldForm::sum}}), 3 * 6 * sizeof(double));
+  EXPECT_EQ(run_with(model, {{sensor + ".sum"}}), 3 * 6 * sizeof(double));
   EXPECT_EQ(pressure_calls, 0);
   EXPECT_GT(whole_calls, 0);
 }
 
 TEST(Outputs, ARolloutReadsNeitherFieldsNorBodiesThatNobodyAskedFor) {
-  struct Sizes : RowSink {
-    std::size_t bodies = 0, fields = 0;
-    void write(const StateRow& row) override {
-      bodies += row.body_pose.size() + row.body_twist.size() + row.end_effectors.size();
-    }
-    void write(const StepRow&) override {}
-    void write(const TactileRow& row) override { fields += row.numbers.size(); }
-  } sizes;
   const Model model(small_scene());
   Batch batch(model, 2);
   Stepper stepper(model);
@@ -95,36 +88,28 @@ TEST(Outputs, ARolloutReadsNeitherFieldsNorBodiesThatNobodyAskedFor) {
   RolloutOptions o{3, 1};
   o.outputs = {std::vector<FieldOutput>{}, false, false};
   const Counting counting;
-  run_rollout(batch, std::span(&stepper, 1), controls, o, sizes);
-  EXPECT_EQ(sizes.bodies + sizes.fields, 0U);
+  Recorded sink(rollout_recording(batch, stepper, o, {}));
+  run_rollout(batch, std::span(&stepper, 1), controls, o, sink);
+  for (const auto& [name, rows] : sink.all())
+    EXPECT_EQ(name.find_first_of("/"), name.starts_with("solver/") ? 6 : std::string::npos) << name;
   EXPECT_EQ(whole_calls + pressure_calls, 0);
   EXPECT_LT(rollout_bytes(model, 1, o.outputs), rollout_bytes(model, 1) / 2);
 }
 
+std::vector<std::int64_t> steps_of(const std::vector<RecordedRow>& rows) {
+  std::vector<std::int64_t> steps;
+  for (const RecordedRow& row : rows) steps.push_back(row.step);
+  return steps;
+}
+
 /// What a rollout of 12 steps hands on.
-struct Handed : RowSink {
-  int states = 0, poses = 0, steps = 0, fields = 0;
-  std::vector<std::int64_t> state_steps, field_steps;
-  std::vector<std::vector<double>> q, pose, numbers;
-  void write(const StateRow& row) override {
-    if (!row.q.empty()) state_steps.push_back(row.step), q.emplace_back(row.q.begin(), row.q.end());
-    if (!row.body_pose.empty()) pose.emplace_back(row.body_pose.begin(), row.body_pose.end());
-    states += row.q.empty() ? 0 : 1, poses += row.body_pose.empty() ? 0 : 1;
-  }
-  void write(const StepRow& row) override { steps += row.u.empty() ? 0 : 1; }
-  void write(const TactileRow& row) override {
-    ++fields, field_steps.push_back(row.step);
-    numbers.emplace_back(row.numbers.begin(), row.numbers.end());
-    EXPECT_EQ(row.frame, fields - 1);
-  }
-};
-Handed handed(const Model& model, const RolloutOutputs& outputs) {
-  Handed sink;
+Recorded handed(const Model& model, const RolloutOutputs& outputs) {
   Batch batch(model, 3);
   Stepper stepper(model);
   const ControlProgram controls(model, stepper.timestep(), 0);
   RolloutOptions o{12, 1};
   o.outputs = outputs;
+  Recorded sink(rollout_recording(batch, stepper, o, {}));
   run_rollout(batch, std::span(&stepper, 1), controls, o, sink);
   return sink;
 }
@@ -132,7 +117,7 @@ Handed handed(const Model& model, const RolloutOutputs& outputs) {
 TEST(Outputs, WhatIsTakenAtTimesOfItsOwnIsReadThenAndNeverElse) {
   const Model model(small_scene());
   const Counting counting;
-  const Handed all = handed(model, {});
+  const Recorded all = handed(model, {});
   const int of_all = whole_calls;
   ASSERT_GT(of_all, 0);
   RolloutOutputs some;
@@ -141,22 +126,23 @@ TEST(Outputs, WhatIsTakenAtTimesOfItsOwnIsReadThenAndNeverElse) {
   some.of_bodies = {6};
   some.chosen_bodies = {model.nb() - 1};
   whole_calls = 0;
-  const Handed few = handed(model, some);
+  const Recorded few = handed(model, some);
   EXPECT_EQ(12 * whole_calls, 3 * of_all);
-  EXPECT_THAT(few.field_steps, ElementsAre(4, 8, 12));
-  for (std::size_t k = 0; k < 3; ++k) EXPECT_EQ(few.numbers[k], all.numbers[4 * k + 3]);
-  EXPECT_THAT(few.state_steps, ElementsAre(12));
-  EXPECT_EQ(few.q[0], all.q[12]);
-  EXPECT_EQ(few.steps, 0) << "controls leave with every state alone";
-  ASSERT_EQ(few.poses, 3);
+  const std::string field = "tactile/" + std::string(model.sensors()[0].name) + "/force";
+  EXPECT_THAT(steps_of(few[field]), ElementsAre(4, 8, 12));
+  for (std::size_t k = 0; k < 3; ++k) EXPECT_EQ(few[field][k], all[field][4 * k + 3]);
+  EXPECT_THAT(few["q"], ElementsAre(all["q"][12]));
+  EXPECT_TRUE(few["u"].empty()) << "controls leave with every state alone";
+  ASSERT_EQ(few["bodies/pose"].size(), 3U);
   const std::size_t nb = std::size_t(model.nb());
   for (std::size_t k = 0; k < 3; ++k)
     for (std::size_t e = 0; e < 3; ++e)
       for (std::size_t i = 0; i < 7; ++i)
-        EXPECT_EQ(few.pose[k][7 * e + i], all.pose[6 * k][7 * (nb * e + nb - 1) + i]);
+        EXPECT_EQ(few["bodies/pose"][k].numbers[7 * e + i],
+                  all["bodies/pose"][6 * k].numbers[7 * (nb * e + nb - 1) + i]);
   some.fields = {{0, FieldForm::field, {0, true}}};
   whole_calls = 0;
-  EXPECT_THAT(handed(model, some).field_steps, ElementsAre(12));
+  EXPECT_THAT(steps_of(handed(model, some)[field]), ElementsAre(12));
   EXPECT_EQ(12 * whole_calls, of_all);
   EXPECT_LT(rollout_bytes(model, 1, some), rollout_bytes(model, 1));
 }
@@ -180,9 +166,9 @@ TEST(Outputs, EpisodesHoldWhatIsTakenAndComputeNothingElse) {
   const Counting counting;
   const auto all = played(o);
   const int of_all = whole_calls;
-  o.q.times = {4}, o.v.wanted = false;
-  o.bodies = {{{1}, {0, true}}, {{}, {}}};
-  o.fields = {{0, FieldForm::field, {8}}};
+  const std::string sensor = std::string(model.sensors()[0].name),
+                    body = body_output(model.body_names()[1]);
+  o.record = {{"q", {4}}, {body, {0, true}}, {"bodies"}, {sensor, {8}}};
   for (const std::size_t piece : {std::size_t(1), std::size_t(30000), std::size_t(1) << 25}) {
     o.piece_bytes = piece;
     whole_calls = 0;
@@ -196,19 +182,16 @@ TEST(Outputs, EpisodesHoldWhatIsTakenAndComputeNothingElse) {
         EXPECT_EQ(row(episode.observations[0], 3, k), row(whole.observations[0], 5, 2 * k));
       EXPECT_EQ(episode.observations[1], "");
       const std::size_t motion = 13 * sizeof(double);
-      ASSERT_EQ(episode.observations[bodies].size(), motion);
-      EXPECT_EQ(episode.observations[bodies],
-                row(episode.observations[bodies + 1], 5, 4).substr(motion, motion));
+      ASSERT_EQ(episode.observations[bodies + 1].size(), motion);
+      EXPECT_EQ(episode.observations[bodies + 1],
+                row(episode.observations[bodies], 5, 4).substr(motion, motion));
       for (std::size_t k = 0; k < 2; ++k)
         EXPECT_EQ(row(episode.observations[bodies + 2], 2, k),
                   row(whole.observations[bodies], 5, 4 * k));
     }
   }
-  o.fields = {{0, FieldForm::field, {3}}};
+  o.record = {{sensor, {3}}};
   EXPECT_THROW(played(o), InputError) << "a row is two steps";
-  o.fields.reset();
-  o.bodies = {{{model.nb()}, {}}};
-  EXPECT_THROW(played(o), InputError);
   RolloutOutputs nobody;
   nobody.chosen_bodies = {-1};
   EXPECT_THROW(handed(model, nobody), InputError);

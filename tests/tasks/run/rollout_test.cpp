@@ -10,11 +10,12 @@
 
 #include "engine/sense/readout.hpp"
 #include "io/scene/scene_reader.hpp"
+#include "tests/tasks/recorded.hpp"
 
 namespace tangere {
 namespace {
 
-using testing::ElementsAre;
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
 /// A pad that sinks onto a ball, with a sensor read every 2 steps and one without an interval.
@@ -49,60 +50,34 @@ Model pad_on_ball() {
                    .scene);
 }
 
-struct StoredState {
-  std::int64_t step;
-  double time;
-  std::vector<double> q, v, pose, twist, end_effectors;
-};
-struct StoredStep {
-  std::int64_t step;
-  std::vector<double> u;
-  std::vector<std::int32_t> iterations;
-  std::vector<std::int8_t> status;
-  std::vector<double> residual;
-};
-struct StoredField {
-  FieldOutput output;
-  std::int64_t frame, step;
-  std::vector<double> force;
-};
-
-template <class T>
-std::vector<T> copy(std::span<const T> values) {
-  return {values.begin(), values.end()};
-}
-
 /// Keeps everything, and the order in which it came: "q0 u0 q1 t1[0]1 …".
-class Memory : public RowSink {
+class Memory : public testing::Recorded {
  public:
-  void write(const StateRow& row) override {
-    order += "q" + std::to_string(row.step) + " ";
-    states.push_back({row.step, row.time, copy(row.q), copy(row.v), copy(row.body_pose),
-                      copy(row.body_twist), copy(row.end_effectors)});
-  }
-  void write(const StepRow& row) override {
-    order += "u" + std::to_string(row.step) + " ";
-    steps.push_back(
-        {row.step, copy(row.u), copy(row.iterations), copy(row.status), copy(row.residual)});
-  }
-  void write(const TactileRow& row) override {
-    order += "t" + std::to_string(row.output.sensor) + "[" + std::to_string(row.frame) + "]" +
-             std::to_string(row.step) + " ";
-    fields.push_back({row.output, row.frame, row.step, copy(row.numbers)});
+  void write(std::int64_t step, std::size_t channel, const Numbers& numbers) override {
+    Recorded::write(step, channel, numbers);
+    const std::string& of = name(channel);
+    if (of == "time") order += "q" + std::to_string(step) + " ";
+    if (of == "u") order += "u" + std::to_string(step - 1) + " ";
+    if (of.ends_with("/force"))
+      order += (of == "tactile/even/force" ? "t0[" : "t1[") +
+               std::to_string((*this)[of].size() - 1) + "]" + std::to_string(step) + " ";
   }
   std::string order;
-  std::vector<StoredState> states;
-  std::vector<StoredStep> steps;
-  std::vector<StoredField> fields;
 };
 
-class Rollout : public testing::Test {
+class Rollout : public ::testing::Test {
  protected:
   RolloutSummary run(Batch& batch, const RolloutOptions& options, RowSink& sink,
                      const ProgressCallback& progress = {}, const std::stop_token& stop = {}) {
     Stepper stepper(model_);
     const ControlProgram controls(model_, stepper.timestep(), 0, control_);
+    if (auto* const recorded = dynamic_cast<testing::Recorded*>(&sink))
+      recorded->expect(rollout_recording(batch, stepper, options, {}));
     return run_rollout(batch, std::span(&stepper, 1), controls, options, sink, progress, stop);
+  }
+
+  [[nodiscard]] const std::vector<double>& numbers(const char* channel, std::size_t row) const {
+    return memory_[channel].at(row).numbers;
   }
 
   Model model_ = pad_on_ball();
@@ -118,18 +93,12 @@ TEST_F(Rollout, RowsDoNotDependOnThreads) {
     std::vector<Stepper> steppers;
     for (int k = 0; k < threads; ++k) steppers.emplace_back(model_);
     const ControlProgram controls(model_, steppers[0].timestep(), 0, control_);
+    to.expect(rollout_recording(batch, steppers[0], {5, 0}, {}));
     const RolloutSummary summary = run_rollout(batch, steppers, controls, {5, 0}, to);
     EXPECT_EQ(summary.counts.simulation_steps, 350);
   }
   EXPECT_EQ(shared.order, alone.order);
-  ASSERT_EQ(shared.states.size(), alone.states.size());
-  for (std::size_t k = 0; k < alone.states.size(); ++k) {
-    EXPECT_EQ(shared.states[k].q, alone.states[k].q);
-    EXPECT_EQ(shared.states[k].pose, alone.states[k].pose);
-  }
-  ASSERT_EQ(shared.fields.size(), alone.fields.size());
-  for (std::size_t k = 0; k < alone.fields.size(); ++k)
-    EXPECT_EQ(shared.fields[k].force, alone.fields[k].force);
+  EXPECT_EQ(shared.all(), alone.all());
 }
 
 TEST_F(Rollout, GivesEveryRowInOrder) {
@@ -143,8 +112,8 @@ TEST_F(Rollout, GivesEveryRowInOrder) {
   EXPECT_TRUE(summary.failures.empty());
   EXPECT_GT(summary.seconds, 0);
   std::int64_t iterations = 0;
-  for (const StoredStep& step : memory_.steps)
-    for (std::int32_t i : step.iterations) iterations += i;
+  for (const testing::RecordedRow& row : memory_["solver/iterations"])
+    for (const double i : row.numbers) iterations += static_cast<std::int64_t>(i);
   EXPECT_EQ(summary.counts.newton_iterations, iterations);
   EXPECT_GT(iterations, 0);
 }
@@ -168,37 +137,38 @@ TEST_F(Rollout, RowsAreTheBatchStepByStep) {
   Readout readout(model_);
   std::vector<double> pose(14), twist(12), q(1), v(1), force(49 * 3), end_effectors(6);
   for (std::size_t t = 0;; ++t) {
-    const StoredState& row = memory_.states[t];
-    EXPECT_EQ(row.step, static_cast<std::int64_t>(t));
-    EXPECT_EQ(row.time, static_cast<double>(t) * 5e-3);
+    EXPECT_EQ(memory_["time"][t].step, static_cast<std::int64_t>(t));
+    EXPECT_EQ(numbers("time", t)[0], static_cast<double>(t) * 5e-3);
     for (int e = 0; e < kEnvironments; ++e) {
       const auto at = static_cast<std::size_t>(e);
       again.get_q(e, q);
       again.get_v(e, v);
-      EXPECT_EQ(row.q[at], q[0]);
-      EXPECT_EQ(row.v[at], v[0]);
+      EXPECT_EQ(numbers("q", t)[at], q[0]);
+      EXPECT_EQ(numbers("v", t)[at], v[0]);
       readout.bodies(again, e, pose, twist);
-      for (std::size_t i = 0; i < 14; ++i) EXPECT_EQ(row.pose[at * 14 + i], pose[i]);
-      for (std::size_t i = 0; i < 12; ++i) EXPECT_EQ(row.twist[at * 12 + i], twist[i]);
+      for (std::size_t i = 0; i < 14; ++i)
+        EXPECT_EQ(numbers("bodies/pose", t)[at * 14 + i], pose[i]);
+      for (std::size_t i = 0; i < 12; ++i)
+        EXPECT_EQ(numbers("bodies/twist", t)[at * 12 + i], twist[i]);
       readout.end_effectors(again, e, end_effectors);
-      ASSERT_EQ(row.end_effectors.size(), 6U * kEnvironments);
-      for (std::size_t i = 0; i < 6; ++i)
-        EXPECT_EQ(row.end_effectors[at * 6 + i], end_effectors[i]);
+      const std::vector<double>& positions = numbers("variables/position", t);
+      ASSERT_EQ(positions.size(), 6U * kEnvironments);
+      for (std::size_t i = 0; i < 6; ++i) EXPECT_EQ(positions[at * 6 + i], end_effectors[i]);
       EXPECT_NEAR(end_effectors[2], 0.0249 + q[0], 1e-15);
       if (t == 0) continue;
       readout.tactile(again, e, 1, force);
-      const StoredField& field = memory_.fields[2 * t - 1];
+      const std::vector<double>& field = numbers("tactile/open/force", t - 1);
       for (std::size_t i = 0; i < force.size(); ++i)
-        EXPECT_EQ(field.force[at * force.size() + i], force[i]);
+        EXPECT_EQ(field[at * force.size() + i], force[i]);
     }
     if (t == 5) break;
     const std::vector<double> u(kEnvironments, 0.1 * static_cast<double>(t + 1));
-    EXPECT_EQ(memory_.steps[t].u.size(), u.size());
-    for (std::size_t e = 0; e < u.size(); ++e) EXPECT_NEAR(memory_.steps[t].u[e], u[e], 1e-15);
-    stepper.step(again, memory_.steps[t].u);
+    EXPECT_EQ(numbers("u", t).size(), u.size());
+    for (std::size_t e = 0; e < u.size(); ++e) EXPECT_NEAR(numbers("u", t)[e], u[e], 1e-15);
+    stepper.step(again, numbers("u", t));
   }
   double touched = 0;
-  for (double f : memory_.fields.back().force) touched += std::abs(f);
+  for (const double f : memory_["tactile/open/force"].back().numbers) touched += std::abs(f);
   EXPECT_GT(touched, 0) << "the pad never came down on the ball, so nothing was compared";
 }
 
@@ -218,13 +188,13 @@ TEST_F(Rollout, AFailedEnvironmentIsARecordAndDisturbsNobody) {
   EXPECT_TRUE(failed(batch.status(1)));
   EXPECT_EQ(summary.steps, 5);
   EXPECT_EQ(summary.counts.simulation_steps, 2 * 5 + 1);
-  EXPECT_GT(memory_.steps[0].iterations[1], 0) << "it was given up without a try";
-  for (std::size_t t = 1; t < 5; ++t) EXPECT_EQ(memory_.steps[t].iterations[1], 0) << t;
+  EXPECT_GT(numbers("solver/iterations", 0)[1], 0) << "it was given up without a try";
+  for (std::size_t t = 1; t < 5; ++t) EXPECT_EQ(numbers("solver/iterations", t)[1], 0) << t;
   for (std::size_t t = 0; t < 5; ++t) {
-    EXPECT_TRUE(failed(static_cast<StepStatus>(memory_.steps[t].status[1]))) << t;
+    EXPECT_TRUE(failed(static_cast<StepStatus>(numbers("solver/status", t)[1]))) << t;
     for (const std::size_t e : {std::size_t{0}, std::size_t{2}}) {
-      EXPECT_EQ(memory_.states[t + 1].q[e], without.states[t + 1].q[e]);
-      EXPECT_EQ(memory_.steps[t].iterations[e], without.steps[t].iterations[e]);
+      EXPECT_EQ(numbers("q", t + 1)[e], without["q"][t + 1].numbers[e]);
+      EXPECT_EQ(numbers("solver/iterations", t)[e], without["solver/iterations"][t].numbers[e]);
     }
   }
 }
@@ -241,21 +211,20 @@ TEST_F(Rollout, StopsAfterTheStepInWhichItIsRequested) {
   EXPECT_THAT(seen, ElementsAre(1, 2, 3));
   EXPECT_TRUE(summary.stopped);
   EXPECT_EQ(summary.steps, 3);
-  EXPECT_EQ(memory_.states.back().step, 3);
+  EXPECT_EQ(memory_["q"].back().step, 3);
 }
 
 TEST_F(Rollout, PassesOnWhatTheSinkThrows) {
   class FullDisk : public Memory {
    public:
-    using Memory::write;
-    void write(const StateRow& row) override {
-      if (row.step == 2) throw IoError("disk full");
-      Memory::write(row);
+    void write(std::int64_t step, std::size_t channel, const Numbers& numbers) override {
+      if (step == 2 && name(channel) == "time") throw IoError("disk full");
+      Memory::write(step, channel, numbers);
     }
   } sink;
   Batch batch(model_, 1);
   EXPECT_THROW(run(batch, {5, 1}, sink), IoError);
-  EXPECT_EQ(sink.steps.size(), 2U);
+  EXPECT_EQ(sink["u"].size(), 2U);
 }
 
 TEST_F(Rollout, RefusesBeforeTheFirstRow) {

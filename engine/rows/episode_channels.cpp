@@ -1,0 +1,124 @@
+// SPDX-License-Identifier: Apache-2.0
+// The order of channels does not depend on that of the record, so that the same request gives the
+// same files.
+#include "engine/rows/episode_channels.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "engine/base/error.hpp"
+
+namespace tangere {
+namespace {
+
+using Kind = EpisodeChannel::Kind;
+
+bool perfect(const SensorLayout& sensor) { return sensor.imperfections.empty(); }
+
+class ChannelList {
+ public:
+  ChannelList(std::span<const TimedName> record, int every) : record_(record), every_(every) {}
+
+  [[nodiscard]] const TimedName* asked(const std::string& name) const {
+    const auto found = std::find_if(record_.begin(), record_.end(),
+                                    [&](const TimedName& one) { return one.name == name; });
+    return found == record_.end() ? nullptr : &*found;
+  }
+
+  EpisodeChannel& add(Kind kind, const std::string& name, std::vector<std::uint64_t> shape,
+                      const std::string& unit = {}, const std::string& meaning = {}) {
+    const TimedName* const one = asked(name);
+    const OutputTimes times = one != nullptr ? one->times : OutputTimes{};
+    if (times.every % every_ != 0)
+      throw InputError(fmt::format("'{}{}', and a row is every {} steps; expected a multiple of {}",
+                                   name, to_string(times), every_, every_));
+    return all_.emplace_back(EpisodeChannel{.kind = kind,
+                                            .name = name,
+                                            .shape = std::move(shape),
+                                            .unit = unit,
+                                            .meaning = meaning,
+                                            .wanted = record_.empty() || one != nullptr,
+                                            .times = {times.every / every_, times.final}});
+  }
+
+  void add_reading(std::span<const SensorLayout> sensors, FieldOutput reading) {
+    const SensorLayout& sensor = sensors[static_cast<std::size_t>(reading.sensor)];
+    EpisodeChannel& channel = add(Kind::reading, output_name(sensor.name, reading.form),
+                                  reading_shape(sensor, reading.form));
+    channel.reading = {reading.sensor, reading.form};
+    channel.touch =
+        perfect(sensor) || reading.form == FieldForm::ideal || reading.form == FieldForm::markers;
+  }
+
+  [[nodiscard]] std::vector<EpisodeChannel> take() { return std::move(all_); }
+
+ private:
+  std::span<const TimedName> record_;
+  int every_;
+  std::vector<EpisodeChannel> all_;
+};
+
+void add_bodies(ChannelList& list, std::span<const std::string> bodies) {
+  std::vector<int> all;
+  for (int b = 0; b < std::ssize(bodies); ++b) all.push_back(b);
+  if (list.asked("bodies") != nullptr)
+    list.add(Kind::bodies, "bodies", {bodies.size(), kMotion}).bodies = all;
+  for (const int b : all)
+    if (const std::string name = body_output(bodies[static_cast<std::size_t>(b)]);
+        list.asked(name) != nullptr)
+      list.add(Kind::bodies, name, {1, kMotion}).bodies = {b};
+}
+
+}  // namespace
+
+std::size_t EpisodeChannel::width() const {
+  std::size_t numbers = 1;
+  for (const std::uint64_t n : shape) numbers *= n;
+  return numbers;
+}
+
+std::vector<EpisodeChannel> episode_channels(const RunFacts& facts,
+                                             std::span<const SensorLayout> sensors,
+                                             std::span<const std::string> bodies,
+                                             std::span<const TimedName> record, int every) {
+  ChannelList list(record, every);
+  list.add(Kind::q, "q", {facts.q_names.size()}, "q_units", "coordinates");
+  list.add(Kind::v, "v", {facts.v_names.size()}, "v_units", "velocities");
+  if (facts.task) {
+    const bool all_perfect = std::all_of(sensors.begin(), sensors.end(), perfect);
+    for (const TensorSpec& tensor : facts.task->observations)
+      list.add(Kind::task, tensor.name, {tensor.shape.begin(), tensor.shape.end()}, tensor.unit,
+               tensor.meaning)
+          .touch = tensor.touch && all_perfect;
+    return list.take();
+  }
+  if (!facts.end_effector_names.empty())
+    list.add(Kind::end_effectors, "variables", {facts.end_effector_names.size(), 3});
+  add_bodies(list, bodies);
+  for (int s = 0; s < std::ssize(sensors); ++s)
+    if (record.empty()) list.add_reading(sensors, {s});
+  for (int s = 0; s < std::ssize(sensors) && !record.empty(); ++s)
+    for (const FieldForm form :
+         {FieldForm::field, FieldForm::pressure, FieldForm::shear, FieldForm::sum, FieldForm::ideal,
+          FieldForm::markers, FieldForm::flow})
+      if (list.asked(output_name(sensors[static_cast<std::size_t>(s)].name, form)) != nullptr)
+        list.add_reading(sensors, {s, form});
+  return list.take();
+}
+
+std::vector<EpisodeChannel> episode_channels(const Model& model, const TaskSpec* task,
+                                             std::span<const TimedName> record, int every) {
+  RunFacts facts;
+  facts.q_names = {model.q_names().begin(), model.q_names().end()};
+  facts.v_names = {model.v_names().begin(), model.v_names().end()};
+  for (const EndEffectorInfo& info : model.end_effectors())
+    facts.end_effector_names.push_back(info.name);
+  if (task != nullptr) facts.task.emplace(*task);
+  std::vector<SensorLayout> sensors;
+  for (std::size_t s = 0; s < model.sensors().size(); ++s)
+    sensors.push_back(sensor_layout(model.sensors()[s], model.scene().sensors[s], every));
+  return episode_channels(facts, sensors, model.body_names(), record, every);
+}
+
+}  // namespace tangere

@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the rows of episodes hold: one list for those who play episodes and for files of them.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "engine/model/field_form.hpp"
+#include "engine/rows/run_facts.hpp"
+#include "engine/rows/sensor_layout.hpp"
+
+namespace tangere {
+
+/// Numbers of a body in a row: its pose x y z qw qx qy qz, then its angular and linear velocity.
+inline constexpr std::size_t kMotion = 13;
+
+/// An observation of episodes.
+struct EpisodeChannel {
+  enum class Kind { q, v, end_effectors, bodies, reading, task };
+  Kind kind = Kind::task;
+  std::string name;                  ///< "q", "variables", "bodies.box", "pad.sum", a task's own
+  std::vector<std::uint64_t> shape;  ///< of a row
+  std::string unit, meaning;         ///< of a task's episodes
+  std::vector<int> bodies = {};      ///< of Kind::bodies
+  FieldOutput reading = {};          ///< of Kind::reading
+  bool wanted = true;
+  OutputTimes times = {};  ///< in rows; none: at every row
+  /// All its numbers are 0 where nothing is felt. A sensor with imperfections has only its ideal
+  /// field and its markers as touch, and a task with such a sensor has none.
+  bool touch = false;
+
+  [[nodiscard]] std::size_t width() const;  ///< numbers of a row
+};
+
+/// Returns the observations that episodes may have, those that are not recorded among them: q and
+/// v, then all that a task observes, or the end effectors (if any), and what `record` names of
+/// bodies and sensors of a scene. `facts`: names of coordinates and end effectors, and the task;
+/// `bodies`: names; `record`: names, with times in steps; none: everything except bodies.
+/// `every`: steps of a row. Throws InputError for times that are no multiple of it.
+std::vector<EpisodeChannel> episode_channels(const RunFacts& facts,
+                                             std::span<const SensorLayout> sensors,
+                                             std::span<const std::string> bodies,
+                                             std::span<const TimedName> record, int every);
+/// The same of a model; `task`: null for a scene.
+std::vector<EpisodeChannel> episode_channels(const Model& model, const TaskSpec* task,
+                                             std::span<const TimedName> record, int every);
+
+}  // namespace tangere

@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a rollout is asked for, and when its sensors are read.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "engine/base/precision.hpp"
+#include "engine/model/field_form.hpp"
+#include "engine/model/model.hpp"
+
+namespace tangere {
+
+/// What a rollout hands on besides q, v, controls and how steps went. The rest is not computed.
+struct RolloutOutputs {
+  std::optional<std::vector<FieldOutput>> fields;  ///< none: the field of every sensor
+  bool bodies = true, end_effectors = true;
+  bool audit = false;   ///< the books of energy and momentum
+  bool memory = false;  ///< what friction remembers
+  /// When q and v, bodies, end effectors and memory are taken; none: at every row. Where those of
+  /// `states` are given, controls leave no longer, and of steps those alone that end at a row of q.
+  OutputTimes states = {}, of_bodies = {}, of_end_effectors = {}, of_memory = {};
+  std::vector<int> chosen_bodies = {};  ///< ascending; none: every body
+};
+
+struct RolloutOptions {
+  std::int64_t steps = 0;
+  int every = 0;  ///< steps between fields; 0: the scene's `every`, or 1 if it has none
+  Precision precision = Precision::f64;  ///< of tactile fields
+  /// Steps taken before row 0 by the run that this one continues. Times, controls and intervals of
+  /// fields count them.
+  std::int64_t first_step = 0;
+  RolloutOutputs outputs = {};
+};
+
+/// Returns what is read of tactile fields. Throws InputError as check_outputs() does.
+std::vector<FieldOutput> fields_of(const Model& model, const RolloutOutputs& outputs);
+/// Steps between the fields of a sensor under these options, where a reading has no times of its
+/// own.
+int tactile_interval(const SensorInfo& sensor, const RolloutOptions& options);
+/// When a reading is taken: its own times, else the interval of its sensor.
+OutputTimes reading_times(const Model& model, FieldOutput output, const RolloutOptions& options);
+/// Number of readings that a rollout takes.
+std::int64_t tactile_frames(const Model& model, FieldOutput output, const RolloutOptions& options);
+
+/// Memory that a rollout allocates besides batch and stepper [bytes].
+double rollout_bytes(const Model& model, int environments, const RolloutOutputs& outputs = {});
+
+}  // namespace tangere
