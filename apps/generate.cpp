@@ -79,8 +79,8 @@ auto with_gradients(const GradientPlan& plan, EpisodeSink& sink, const Run& run)
   return run(adding);
 }
 
-/// Makes the missing shards. `signals` live from before the folder is made until it is gone or
-/// complete, so nothing half-written stays.
+/// Writes the missing shards. `signals` must exist from before the folder is created until it is
+/// complete or removed, so that no incomplete file remains.
 int make(const GenerateOptions& options, const Console& console, const Job& job,
          const StopSignals& signals) {
   if (options.dry_run) return dry_run(options, console, job, signals);
@@ -136,7 +136,7 @@ PolicyKind policy_kind(const GenerateOptions& options) {
   return PolicyKind::program;
 }
 
-/// A task's episodes as they are asked for.
+/// Options of a task's episodes.
 EpisodeOptions episode_options(const GenerateOptions& options, const Task& task) {
   EpisodeOptions run;
   run.episodes = options.episodes.value_or(0);

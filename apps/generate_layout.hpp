@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the files of a data set say, and which rows are computed for them.
+// Metadata of a data set's files, and the rows that are computed for them.
 #pragma once
 
 #include "apps/command.hpp"

@@ -171,7 +171,7 @@ int report(const SimulateArguments& options, const Console& console, const Batch
   return code;
 }
 
-/// Rows of a file that hold what friction remembers, for a message: " (row 60 does)".
+/// Rows of a file with shear state, for a message: " (row 60 does)".
 std::string rows_with_memory(const SavedState& saved) {
   constexpr std::size_t kListed = 5;
   const std::vector<std::int64_t>& rows = saved.memory_rows;
@@ -355,8 +355,8 @@ int simulate(const SimulateArguments& options, const Console& console, const Pro
   if (start.saved) restore_state(*start.saved, start.continues, batch);
   RunGradients gradients(options.gradients, batch, steppers.front(), rollout);
 
-  // Lives from before the file is created until it is gone or complete, so nothing half-written
-  // stays.
+  // Exists from before the file is created until it is complete or removed, so that no incomplete
+  // file remains.
   const StopSignals signals;
   const RunFacts facts = facts_of(batch, steppers.front(), precision, info);
   TrajectoryFile output(options.output, rollout_recording(batch, steppers.front(), rollout, facts),

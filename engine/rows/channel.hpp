@@ -38,7 +38,7 @@ struct Channel {
   NumberType type = NumberType::float64;
   std::vector<std::uint64_t> shape;  ///< of a row: {E, nq}; none: one number
   std::int64_t rows = 0;
-  /// Units along the last axis, each beside its name, or one of all numbers. Empty: not said.
+  /// Units along the last axis, each beside its name, or one of all numbers. Empty: unknown.
   std::vector<std::string> names = {}, units = {};
   std::string frame = {}, meaning = {};
   Attributes more = {};

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the rows of episodes hold: one list for those who play episodes and for files of them.
+// Channels of the rows of episodes: one list for the simulation and for the files.
 #pragma once
 
 #include <cstdint>
@@ -28,8 +28,8 @@ struct EpisodeChannel {
   FieldOutput reading = {};          ///< of Kind::reading
   bool wanted = true;
   OutputTimes times = {};  ///< in rows; none: at every row
-  /// All its numbers are 0 where nothing is felt. A sensor with imperfections has only its ideal
-  /// field and its markers as touch, and a task with such a sensor has none.
+  /// Touch: all its numbers are 0 without contact. Of a sensor with imperfections only the ideal
+  /// field and the markers are, and a task with such a sensor has none.
   bool touch = false;
 
   [[nodiscard]] std::size_t width() const;  ///< numbers of a row

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What files say of a run, whether their rows are steps of environments or episodes.
+// Metadata of a run that trajectory files and data sets share.
 #pragma once
 
 #include <cstdint>
@@ -16,7 +16,7 @@ namespace tangere {
 /// Attribute `task` of files of a scene alone.
 inline constexpr const char* kNoTask = "none: a scene alone, whose every reward is 0";
 
-/// What neither the model nor the stepper knows of a run.
+/// Metadata of a run that follow neither from the model nor from the stepper.
 struct RunOrigin {
   std::string precision, version, instruction_set;
   std::string command;           ///< as it was given, or one that makes a data set again
@@ -38,12 +38,12 @@ struct RunFacts : RunOrigin {
   std::uint64_t seed = 0;
 };
 
-/// What every kind of file says of a run by `stepper`. It names all end effectors.
+/// Metadata of a run by `stepper`, for all kinds of files, with the names of all end effectors.
 RunFacts run_facts(const Model& model, const Stepper& stepper, const RunOrigin& origin,
                    std::uint64_t seed);
 
 /// Facts of a run, or of episodes, of `steps` steps. `every`: steps of a row of a data set; of a
-/// trajectory the interval of fields that was asked for, 0: each sensor's own.
+/// trajectory the requested interval of fields, 0: each sensor's own.
 Attributes attributes_of(const RunFacts& facts, std::int64_t steps, std::int64_t every);
 
 }  // namespace tangere

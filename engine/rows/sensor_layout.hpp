@@ -43,7 +43,7 @@ void check_sensor_name(const std::string& name);
 std::vector<std::uint64_t> reading_shape(const SensorLayout& sensor, FieldForm form);
 /// Returns the name of a reading's dataset in a trajectory: "force" for a field, else the form's.
 const char* dataset_of(FieldForm form);
-/// Says what the numbers of a reading are: "f.axis0, f.axis1; f is the force on the body".
+/// Describes the components of a reading: "f.axis0, f.axis1; f is the force on the body".
 std::string components_text(const SensorLayout& sensor, FieldForm form);
 
 /// Returns units, body, pressure_sign, components, frame, imperfections and, for a rectangular

@@ -25,7 +25,7 @@ void describe_dataset(const h5::Id& file, const DatasetLayout& layout);
 /// for attributes that are damaged.
 std::uint64_t description_sum(const h5::Id& file);
 
-/// Returns all settings that decide which numbers a data set holds, in a fixed order, from a layout
+/// Returns all settings on which the numbers of a data set depend, in a fixed order, from a layout
 /// or from a file.
 std::vector<Setting> settings_of(const DatasetLayout& layout);
 std::vector<Setting> read_settings(const h5::Id& file);

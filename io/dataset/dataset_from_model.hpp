@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Completes the layout of a data set by what the model and the stepper know.
+// Completes the layout of a data set from the model and the stepper.
 #pragma once
 
 #include "engine/step/stepper.hpp"

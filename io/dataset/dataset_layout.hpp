@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// All that the shards of a data set say besides their numbers, and which episodes go into which
-// shard. It does not depend on threads, folders or the time, so the same request gives the same
-// bytes.
+// Metadata of the shards of a data set, and the assignment of episodes to shards. It does not
+// depend on threads, folders or the time, so equal options give equal bytes.
 #pragma once
 
 #include <cstdint>
@@ -17,17 +16,17 @@ namespace tangere {
 /// What to do with shards that exist already.
 enum class ExistingShards { refuse, replace, keep };
 
-/// What a file says of its data set, as text.
+/// A setting of a data set as text.
 struct Setting {
   std::string name, value;
 };
 
-/// Shards that a data set has at most: a damaged count must not fill the memory.
+/// Largest number of shards; bounds the memory for damaged counts.
 constexpr std::int64_t kMostShards = 1'000'000;
 
-/// Who plays the episodes of a task.
+/// The policy of the episodes of a task.
 struct PlayedBy {
-  std::string policy;                ///< as it was asked for: "scripted"
+  std::string policy;                ///< as requested: "scripted"
   std::vector<std::string> players;  ///< those that EpisodeEnd::policy counts; none: the policy
   double noise = 0;         ///< standard deviation of what is added to actions, in their unit
   double random_share = 0;  ///< share of the episodes that the random policy plays
@@ -48,10 +47,10 @@ struct DatasetLayout : RunFacts {
   int every = 1;              ///< K: row j is the state after j K steps
   bool single = false;        ///< observations are float32, else float64
   std::vector<SensorLayout> sensors;
-  std::vector<std::string> body_names;  ///< of a scene
-  PlayedBy played_by;                   ///< of a task
-  std::string set_name;         ///< the part of dataset_id() that is asked for; none: as below
-  std::string tables = "none";  ///< checksum of the files that the text refers to
+  std::vector<std::string> body_names;    ///< of a scene
+  PlayedBy played_by;                     ///< of a task
+  std::string set_name;                   ///< the requested part of dataset_id(); none: as below
+  std::string tables = "none";            ///< checksum of the files that the text refers to
   std::string controls = "of the scene";  ///< or a table, named by its content
   double shard_bytes = 1 << 30;           ///< upper limit of a shard, unless 16 episodes are more
   std::int64_t shards = 0;                ///< number of shards; 0: as shard_bytes determines

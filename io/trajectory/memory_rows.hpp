@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What friction remembers, in a trajectory file: /memory (docs/files.md).
+// The shear state in a trajectory file: /memory (docs/files.md).
 #pragma once
 
 #include <cstdint>
@@ -11,9 +11,8 @@
 
 namespace tangere {
 
-/// Returns what a file remembers of its environments at `row`; none: it does not
-/// hold that row.
-/// `rows`: set to those that it holds. Throws IoError where it is damaged.
+/// Returns the shear states of all environments at `row` of a file; no value: the file does not
+/// have that row. `rows`: set to the rows that it has. Throws IoError if it is damaged.
 std::optional<SavedMemory> read_memory(const h5::Id& file, int environments, std::int64_t row,
                                        std::vector<std::int64_t>& rows);
 

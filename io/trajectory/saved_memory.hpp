@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The memory of friction at one row of a trajectory file.
+// The shear state at one row of a trajectory file.
 #pragma once
 
 #include <vector>
@@ -8,7 +8,7 @@
 
 namespace tangere {
 
-/// What friction remembered at a row, as the file holds it.
+/// The shear state at a row as stored in the file.
 struct SavedMemory {
   std::vector<ShearSpringPlaces> contacts;
   std::vector<ShearState> environments;  ///< (E); points are rows of the file's arrays

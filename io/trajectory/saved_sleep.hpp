@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Who sleeps at one row of a trajectory file.
+// The sleep state at one row of a trajectory file.
 #pragma once
 
 #include <string>

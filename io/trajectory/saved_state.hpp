@@ -32,7 +32,7 @@ struct SavedState {
   std::vector<double> previous_q, previous_v;  ///< of row K - 1; empty if the file lacks it
   std::optional<SavedMemory> memory;           ///< none: the file does not hold it at row K
   std::vector<std::int64_t> memory_rows;       ///< those at which the file holds it
-  std::optional<SavedSleep> sleepers;          ///< none: the file does not hold who sleeps
+  std::optional<SavedSleep> sleepers;          ///< none: the file has no sleep state
   std::vector<StepStatus> status;              ///< (E) of the step to this row; converged for row 0
 };
 
@@ -42,11 +42,10 @@ struct SavedState {
 SavedState read_state(const std::string& path, std::optional<std::int64_t> row);
 
 /// Copies environment e of a saved state to environment e of a batch. With `continues` it also sets
-/// the row before, so that the next step continues BDF2, and the step, with which the noise of
-/// sensors goes on. What friction remembers is set where the file holds it, with `continues` also
-/// who sleeps. An environment that had failed stays failed. Throws InputError when the coordinates,
-/// the points that remember or the trees that sleep do not match the model, or the batch is larger
-/// than the file's.
+/// the row before, so that the next step continues BDF2, and the count of steps, which keys the
+/// noise of sensors. The shear state is set if the file has it, with `continues` also the sleep
+/// state. A failed environment stays failed. Throws InputError if the coordinates, the points with
+/// shear springs or the trees do not match the model, or the batch is larger than the file's.
 void restore_state(const SavedState& from, bool continues, Batch& batch);
 
 }  // namespace tangere

@@ -9,8 +9,8 @@
 
 namespace tangere {
 
-/// Reads row `at` of the `rows` rows of /q; none: the file does not hold who sleeps. Throws IoError
-/// where a shape is damaged; Batch::set_sleep() checks the numbers.
+/// Reads row `at` of the `rows` rows of /q; no value: the file has no sleep state. Throws IoError
+/// if a shape is damaged; Batch::set_sleep() checks the numbers.
 std::optional<SavedSleep> read_sleep(const h5::Id& file, std::int64_t at, std::size_t rows,
                                      int environments);
 

@@ -13,7 +13,7 @@
 
 namespace tangere {
 
-/// What a trajectory file says besides numbers.
+/// Metadata of a trajectory file.
 struct TrajectorySummary {
   std::vector<std::pair<std::string, std::string>> settings;  ///< by name
   std::vector<Channel> channels;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The functions of an instruction set's table that move what friction remembers.
+// The functions of an instruction set's table that update the shear state.
 #pragma once
 
 #include "kernels/numbers/one_lane.hpp"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Each add_…() declares channels and says how their rows are computed. Blocks are read on several
-// threads; rows leave from one, in ascending order.
+// Each add_…() declares channels and the function that computes their rows. Blocks are read on
+// several threads; one thread writes rows in ascending order.
 #include "tasks/run/recorder.hpp"
 
 #include <algorithm>

@@ -22,7 +22,7 @@ namespace tangere {
 class Recorder {
  public:
   enum class When {
-    step,    ///< after a step, before it is counted and a task sees it
+    step,    ///< after a step, before counts and the task's snapshot
     action,  ///< after a task has seen the end of an action
     row      ///< after all of that, and before the first step
   };

@@ -91,7 +91,7 @@ RolloutSummary run_rollout(Batch& batch, std::span<Stepper> steppers, EpisodePro
     each_block([&](int b) { program.look(t, batch, b); });
     if ((t + 1) % program.steps_per_row() == 0) {
       each_block([&](int b) { program.judge(batch, b); });
-      // An opening is no action.
+      // A warm-up is no action.
       if (task != nullptr && t >= task->opening_steps())
         recorder.write(Recorder::When::action, t + 1);
     }

@@ -28,21 +28,21 @@ struct RolloutSummary {
   double seconds = 0;                         ///< wall clock of the whole rollout, sink included
 };
 
-/// Returns what a rollout of `batch` hands on, in the order of RowSink::write(). `facts` of a task
-/// name it. Throws InputError as check_outputs() does, for a body that is not there and for a
-/// sensor whose name cannot be a name in a file.
+/// Returns the channels of a rollout of `batch`, in the order of RowSink::write(). `facts` of a
+/// task name it. Throws InputError like check_outputs(), for an unknown body and for a sensor whose
+/// name cannot be a name in a file.
 Recording rollout_recording(const Batch& batch, const Stepper& stepper,
                             const RolloutOptions& options, const RunFacts& facts);
 
-/// Steps the batch and hands every row to the sink: the start, then after each step the channels of
-/// the step, those of a task's action that it ends, and those of the state that are due. What is
-/// not wanted is not computed. A tactile sensor is read after steps K, 2K, …, so field k comes from
-/// row (k + 1) K of q. An environment that failed earlier has 0 iterations and its last status and
-/// residual. `program` must have started every block; it takes all of them through a step in turn.
-/// `steppers`: one for each thread that steps and reads blocks, all of the same options; rows are
-/// the same for any number of them. Both `progress` and `stop` are used after each step.
-/// Throws InputError without a stepper and when steps < 1, every < 0 or first_step < 0. Passes on
-/// what the sink throws.
+/// Steps the batch and writes every row to the sink: the start, then after each step the channels
+/// of the step, those of a task's action that it ends, and those of the state that are due.
+/// Channels that are not requested are not computed. A tactile sensor is read after steps K, 2K, …,
+/// so field k comes from row (k + 1) K of q. An environment that failed earlier has 0 iterations
+/// and its last status and residual. `program` must have started every block; it takes all of them
+/// through a step in turn. `steppers`: one for each thread that steps and reads blocks, all of the
+/// same options; rows are the same for any number of them. Both `progress` and `stop` are used
+/// after each step. Throws InputError without a stepper and when steps < 1, every < 0 or first_step
+/// < 0. Rethrows exceptions of the sink.
 RolloutSummary run_rollout(Batch& batch, std::span<Stepper> steppers, EpisodeProgram& program,
                            const RolloutOptions& options, RowSink& sink,
                            const ProgressCallback& progress = {}, const std::stop_token& stop = {});

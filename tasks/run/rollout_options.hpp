@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a rollout is asked for, and when its sensors are read.
+// Options of a rollout, and the steps at which its sensors are read.
 #pragma once
 
 #include <cstdint>
@@ -12,14 +12,14 @@
 
 namespace tangere {
 
-/// What a rollout hands on besides q, v, controls and how steps went. The rest is not computed.
+/// Optional channels of a rollout besides q, v, controls and step results. Others are not computed.
 struct RolloutOutputs {
   std::optional<std::vector<FieldOutput>> fields;  ///< none: the field of every sensor
   bool bodies = true, end_effectors = true;
-  bool audit = false;   ///< the books of energy and momentum
-  bool memory = false;  ///< what friction remembers
-  /// When q and v, bodies, end effectors and memory are taken; none: at every row. Where those of
-  /// `states` are given, controls leave no longer, and of steps those alone that end at a row of q.
+  bool audit = false;   ///< balance of energy and momentum
+  bool memory = false;  ///< shear state
+  /// Rows at which q and v, bodies, end effectors and shear state are written; none: every row. If
+  /// `states` are given, controls are not written, and steps only if they end at a row of q.
   OutputTimes states = {}, of_bodies = {}, of_end_effectors = {}, of_memory = {};
   std::vector<int> chosen_bodies = {};  ///< ascending; none: every body
 };
