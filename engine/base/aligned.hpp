@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Memory for lanes: 64-byte aligned, so that every row of eight doubles is one cache line and one
+// Containers with 64-byte alignment, so that every row of eight doubles is one cache line and one
 // AVX-512 load.
 #pragma once
 

@@ -128,12 +128,12 @@ struct Adjoint::Impl {
     }
   }
 
-  /// What solves change of a memory.
+  /// The entries of a shear state that solves update.
   [[nodiscard]] std::span<const ShearEntry> without_kept(std::span<const ShearEntry> memory) const {
     return memory.subspan(std::size_t(kept_entries(compiled(model), memory)));
   }
 
-  /// Sets what a lane remembers where a solve begins and at its end.
+  /// Sets a lane's shear states at the start and the end of a solve.
   template <int L>
   static void set_memory(Lanes<L>& x, int lane, std::span<const ShearEntry> now,
                          std::span<const ShearEntry> after) {
@@ -182,7 +182,7 @@ struct Adjoint::Impl {
     }
   }
 
-  /// Reverses what the step did to memories that were due at its end.
+  /// Reverses the updates of sensor shear states that were due at the end of the step.
   template <int L>
   void reverse_readings(Lanes<L>& x, const GroupStepContext& g) {
     gather(x.work.v1, g.tape.state(g.step + 1) + model.nq() * kBlock, model.nv(), g.first);

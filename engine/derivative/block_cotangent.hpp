@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What losses think of the state of a block.
+// Cotangents of losses with respect to the state of one block.
 #pragma once
 
 #include <array>
@@ -17,8 +17,8 @@ struct BlockCotangent {
   AlignedVector<double> q, v;                    ///< (nv, 16) of the newest state
   AlignedVector<double> previous_q, previous_v;  ///< (nv, 16) of the state one step before it
   AlignedVector<double> u;  ///< (nu, 16) of the controls of the step reversed last
-  /// Of what friction remembers at the newest state: of each lane, three numbers for each of its
-  /// entries (engine/step/shear_state.hpp); or empty, zeros.
+  /// Of the shear state at the newest state: for each lane, three numbers for each of its entries
+  /// (engine/step/shear_state.hpp). Empty: zeros.
   std::array<std::vector<double>, 16> shear;
   /// (parameter_rows, 16), summed over steps (engine/derivative/number_gradients.hpp); or empty
   AlignedVector<double> parameters;

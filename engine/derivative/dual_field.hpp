@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// How a tactile field changes along a direction, in dual numbers, for skins whose friction does not
-// remember.
+// Directional derivative of a tactile field in dual numbers, for sensors without shear springs.
 #pragma once
 
 #include <span>
@@ -11,7 +10,7 @@
 
 namespace tangere {
 
-/// Computes what DualStage::field() says. `links`: poses and twists of all links.
+/// Computes the outputs of DualStage::field(). `links`: poses and twists of all links.
 /// `coefficients`: the sensor's.
 void read_dual_field(const CompiledModel& m, int sensor,
                      std::span<const kernels::LinkScratch<kernels::Dual<double>>> links,

@@ -28,7 +28,7 @@ struct DualStage::Impl {
   std::vector<Parameter> origin;      ///< for every row: where its number comes from
   std::vector<int> number;            ///< for every row: the index of its number, -1: none
   std::vector<double> block;          ///< (rows, 16)
-  std::vector<double> inertia;        ///< tangents of masses, moments and inertias, (n_links, 10)
+  std::vector<double> inertia;        ///< tangents of mass, mass · centre, inertia; (n_links, 10)
   bool heavier = false;               ///< some of `inertia` are not zero
   bool frozen = false;
   std::vector<double> tangents;  ///< tangents of the rows, kept while frozen
@@ -42,7 +42,7 @@ struct DualStage::Impl {
   std::vector<std::vector<D>> points, references;
   std::vector<kernels::CandidateList<D>> lists;
   std::vector<D> faces;
-  // What friction remembers: anchors of all points, and those in the order of the kernels.
+  // Shear state: anchors of all points, and those in the order of the kernels.
   std::vector<kernels::Anchor<D>> anchors;
   std::vector<std::vector<D>> listed_anchors;  ///< of each pair
   std::vector<D> ground_anchors;
@@ -169,7 +169,7 @@ struct DualStage::Impl {
     }
   }
 
-  /// Returns a contact that remembers at the poses of all links.
+  /// Returns a contact with shear springs at the poses of all links.
   [[nodiscard]] kernels::LoadedTouch<D> touch(
       const kernels::ShearSpringContact& of, const std::vector<kernels::LinkPose<D>>& poses) const {
     const auto pose = [&](int link) {
@@ -189,7 +189,7 @@ struct DualStage::Impl {
         : of.ground  ? loaded(grounds[std::size_t(of.grounded)].parameters)
                     : kernels::LawParameters<D>{sensor_laws[std::size_t(of.sensor)], of.contact.law,
                                                 of.contact.ramp};
-    // Tangents of sizes are not carried: no gradient is taken by sizes where friction remembers.
+    // No tangents of sizes: gradients by sizes are refused for contacts with shear springs.
     D radius(0.0);
     if (of.ground)
       radius =
@@ -525,8 +525,8 @@ void DualStage::field(int sensor, const double* column, std::span<const double> 
   read_dual_field(i.m, sensor, i.links, coefficients, column, numbers, points, field, field_dot);
 }
 
-/// The field of an elastic sensor: the law at the state `centre` with twist r, and what is
-/// remembered there.
+/// Field of a sensor with shear springs: the contact law at the state `centre` with twist r and its
+/// shear state.
 void DualStage::elastic_field(int sensor, const Coefficients<D>& law, std::span<double> field,
                               std::span<double> field_dot) {
   Impl& i = *impl_;

@@ -35,11 +35,11 @@ class DualStage {
   /// v.
   void choose_faces();
 
-  /// What friction remembers where a solve begins, three numbers for each point that remembers.
+  /// Shear state at the start of a solve, three numbers for each point with a shear spring.
   std::vector<DualNumber> remembered;
   /// Sets the anchors of solves from this centre. Call after choose_faces() and set_numbers().
   void recall();
-  /// Replaces what is remembered by that at the end of such a solve, at q and v.
+  /// Replaces `remembered` by the shear state at the end of such a solve, at q and v.
   void advance(const std::vector<DualNumber>& q, const std::vector<DualNumber>& v);
 
   /// The same for sensors that keep anchors, where they are due after `steps` steps of an episode.

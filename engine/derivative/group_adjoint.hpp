@@ -19,7 +19,7 @@ struct AdjointWorkspace {
 
   AlignedVector<Row> shear;
   std::vector<LossRows<L>> losses;
-  // One stage: the system, and what it hands on in all lanes before some are picked.
+  // One stage: the linear system and its results in all lanes, before the mask is applied.
   Row *rhs, *lambda, *nu, *mass_lambda, *target, *difference, *q_centre, *v_centre;
   Row *q_older, *v_older;  ///< (nv) for each state that a stage may depend on, one after another
   Row* numbers = nullptr;  ///< (parameter_numbers), or null
@@ -29,9 +29,9 @@ struct AdjointWorkspace {
 };
 
 /// Reverses solves whose states are in the workspace: q0, v0 where the solve began, q_before,
-/// v_before one step earlier, q1 its result, x_inner its inner stages; what friction remembers in
-/// remembered.now and after. tau, target and the block of
-/// parameters are as in the step.
+/// v_before one step earlier, q1 its result, x_inner its inner stages; the shear states before and
+/// after the solve in remembered.now and remembered.after. tau, target and the block of parameters
+/// are as in the step.
 class GroupAdjoint {
  public:
   explicit GroupAdjoint(const CompiledModel& model) : model_(model) {}

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Hands cotangents of the motion of one body relative to another on to their links, in one lane:
+// Pulls cotangents of the relative motion of two bodies back to their links, in one lane:
 //   δ̄₂ = Adᵀ ε̄, δ̄₁ = -ε̄, V̄₂ = Adᵀ W̄, V̄₁ = -W̄  (engine/derivative/readout_pullback.cpp)
 #pragma once
 

@@ -16,8 +16,8 @@ struct LossPoint {
   int environment;               ///< of the batch
   std::span<const double> q, v;  ///< (nq), (nv)
   std::span<const double> u;     ///< (nu) controls of the step that follows; empty after the last
-  std::span<const double> end_effectors;  ///< (n, 3) end effectors [m]; empty unless asked for
-  /// Fields of every sensor [N]; empty unless asked for.
+  std::span<const double> end_effectors;  ///< (n, 3) end effectors [m]; empty unless requested
+  /// Fields of every sensor [N]; empty unless requested.
   std::span<const CompactFrame<double>* const> fields;
 };
 

@@ -36,7 +36,7 @@ void NumberGradients::add(const SceneNumber& number, Terms terms, int body) {
 void NumberGradients::add_coefficients(SceneNumber of, int row) {
   for (int k = 0; k < kCoefficients; ++k) {
     of.field = coefficient_field(k);
-    // Where it is zero there is no memory to take a derivative of.
+    // With ks = 0 there is no shear state, so no derivative.
     const Scene& scene = model_.scene();
     if (of.field == Field::ks && number_in(scene, of) == 0 && randomization_of(scene, of) < 0)
       continue;
@@ -72,7 +72,7 @@ bool size_matters(const CompiledModel& m, int body) {
          std::any_of(m.sensors.begin(), m.sensors.end(), feels);
 }
 
-/// Whether friction remembers where a body touches.
+/// Whether some contact of a body has shear springs.
 bool is_remembered(const CompiledModel& m, int body) {
   return std::any_of(m.shear_springs.begin(), m.shear_springs.end(), [body](const auto& of) {
     return of.contact.body1 == body || of.contact.body2 == body;

@@ -16,7 +16,7 @@ namespace tangere {
 struct NumberInfo {
   SceneNumber number;
   std::string name, unit;  ///< name_of(), unit_of()
-  double value;            ///< in the scene; environments may differ where <randomize> says so
+  double value;            ///< in the scene; <randomize> may vary it by environment
 };
 
 /// Coefficients of contacts and sensors, densities (or masses) and sizes of bodies, damping and
@@ -43,7 +43,7 @@ class NumberGradients {
     double coefficient;
   };
   using Terms = std::vector<Term>;
-  using Masses = std::array<double, 10>;  ///< rows of a link's mass, moment and inertia
+  using Masses = std::array<double, 10>;  ///< a link's mass, mass times centre, inertia
   struct Entry {
     Terms terms;
     int body = -1;  ///< if ≥ 0, the masses of this body vary by environment and are not in `terms`

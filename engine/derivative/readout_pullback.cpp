@@ -48,7 +48,7 @@ struct ReadoutPullback::Impl {
   AlignedVector<double> own;  ///< (tiles, kPointNumbers, 64)
   ImperfectField imperfections;
   ElasticField elastic;
-  std::array<std::vector<double>, kBlock> memory;  ///< cotangents of what friction remembers
+  std::array<std::vector<double>, kBlock> memory;  ///< cotangents of the shear state
   std::vector<double> whole, ideal;                ///< (points, 3) of an imperfect sensor
 
   explicit Impl(const Model& m)
@@ -149,7 +149,7 @@ struct ReadoutPullback::Impl {
     }
   }
 
-  /// Hands one shape's sums, in the axes of a pad, on to its link and the sensor's.
+  /// Adds one shape's sums, in the axes of a pad, to the cotangents of its link and the sensor's.
   void hand_on(const kernels::TouchCotangent<double>& c, int sensor_link, const Frame<double>& pad,
                int body_link, int group, int lane) {
     const LinkPose<double> one = reader.link(sensor_link, group, lane),

@@ -11,17 +11,17 @@
 
 namespace tangere {
 
-/// Throws InputError (file:line) where a sensor of the scene has a memory
-/// (SensorInfo::past_states), for runs that take derivatives of fields.
+/// Throws InputError (file:line) if a reading of some sensor depends on earlier states
+/// (SensorInfo::past_states). Derivatives of such readings are not implemented.
 void check_has_no_lag(const Model& model);
 
 /// Throws InputError if some sensor has ks: its points have no derivatives of their own.
 void check_has_plain_points(const Model& model);
 
-/// Owns the scratch of one thread. Allocates when made, and when it meets more tiles at once than
-/// before. Fields of sensors with memory throw InputError. For each state call place(); then for
-/// each loss clear(), any number of fields and end effectors, and finish(). Fields are computed
-/// anew in double. The way they were read does not matter.
+/// Owns the scratch of one thread. Allocates in the constructor, and whenever a call has more tiles
+/// than any before. Fields of sensors with lag throw InputError. For each state call place(); then
+/// for each loss clear(), any number of fields and end effectors, and finish(). Fields are
+/// recomputed in double, independent of the precision in which they were read.
 class ReadoutPullback {
  public:
   explicit ReadoutPullback(const Model& model);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Hands one lane after another to the kernels, and their sums on to the links.
+// Calls the kernels lane by lane and adds their sums to the cotangents of the links.
 #include "engine/derivative/shear_adjoint.hpp"
 
 #include "engine/derivative/link_cotangents.hpp"
@@ -19,7 +19,7 @@ using kernels::Vec6;
 
 namespace {
 
-/// Hands cotangents of the motion of body 2 relative to body 1 on to the two links.
+/// Pulls cotangents of the motion of body 2 relative to body 1 back to the two links.
 template <int L>
 void hand_on(const ShearSpringContact& of, const AlignedVector<LinkPose<Row<L>>>& poses,
              const Vec6<double>& displacement, const Vec6<double>& twist, int lane,
@@ -76,7 +76,7 @@ void ShearAdjoint<L>::add_to_state(const CompiledModel& m, const kernels::Kernel
       if (has(lanes, l)) q_bar[i][l] += by_q[i][l], v_bar[i][l] += by_v[i][l];
 }
 
-/// Pulls back through all contacts: what is remembered at the end, or the forces along a slip.
+/// Pulls back through all contacts: the final shear state, or the forces along a slip.
 template <int L>
 void ShearAdjoint<L>::pull_back(const CompiledModel& m, const kernels::KernelTable& table,
                                 BasicWorkspace<L>& w, LaneBits lanes, bool of_forces,

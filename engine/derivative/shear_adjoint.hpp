@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// What friction remembers, in reverse through one solve (docs/shear.md). Cotangents of the memory
-// after the solve become those of the memory and the state before it, in three parts:
-//   (i)   what is remembered at the end depends on the state there: its share is added to (q̄, v̄)
-//         before the stages are reversed;
+// Adjoint of the shear state through one solve (docs/shear.md). Turns cotangents of the shear state
+// after the solve into those of the shear state and the state before it, in three parts:
+//   (i)   the final shear state depends on the final state: this part is added to (q̄, v̄) before
+//         the stages are reversed;
 //   (iii) the forces of every stage depend on the anchors, with the weight of λ;
-//   both reach the anchors, which follow from the state and the memory where the solve began.
+//   both reach the anchors, which follow from state and shear state at the start of the solve.
 #pragma once
 
 #include <array>
@@ -25,14 +25,14 @@ struct LossRows {
   Rows q_inner, v_inner;    ///< of inner stages, (nv) each, one after another
   Rows tau, target;         ///< out: of forces known when the step begins, and of motors' targets
   Rows parameters;          ///< out: (parameter_rows), or null
-  /// Of what friction remembers, three numbers for each entry: in, after the solve; out, before it.
+  /// Of the shear state, three numbers for each entry. In: after the solve; out: before it.
   std::array<std::vector<double>, L> memory, memory_before;
   /// The same of sensors that keep anchors, for whole steps: solves do not change them.
   std::array<std::vector<double>, L> kept;
 };
 
-/// What a lane's sensors that keep anchors remembered before and after a step. `steps`: of its
-/// episode until its end; -1: it took none.
+/// One lane's anchors of sensors with shear_interval > 0, before and after a step. `steps`: number
+/// of steps of the episode at the end of the step; -1: the lane took no step.
 struct TapedReading {
   std::int64_t steps = -1;
   std::span<const ShearEntry> before, after;
@@ -44,8 +44,8 @@ class ShearAdjoint {
  public:
   ShearAdjoint(const CompiledModel& model, int losses);
 
-  /// Begins a solve whose stages are about to be reversed, last first. Anchors follow from
-  /// begin_shear().
+  /// Prepares the reversal of one solve, last stage first. begin_shear() must have computed the
+  /// anchors.
   void begin(const CompiledModel& model);
   /// Part (i), once the last stage is assembled.
   void reverse_end(const CompiledModel& model, const kernels::KernelTable& table,
@@ -54,8 +54,8 @@ class ShearAdjoint {
   void reverse_forces(const CompiledModel& model, const kernels::KernelTable& table,
                       BasicWorkspace<L>& w, LaneBits lanes, const kernels::Row<L>* q,
                       const kernels::Row<L>* lambda, LossRows<L>& loss, int number);
-  /// Reverses what the end of a step, at q1, v1, did to the memory of sensors that keep anchors:
-  /// LossRows::kept becomes that before the step.
+  /// Reverses update_sensor_shear_state() at the end of a step (q1, v1): turns LossRows::kept from
+  /// cotangents after the step into those before it.
   void reverse_readings(const CompiledModel& model, const kernels::KernelTable& table,
                         BasicWorkspace<L>& w, const std::array<TapedReading, L>& readings,
                         std::vector<LossRows<L>>& losses);

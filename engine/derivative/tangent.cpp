@@ -223,7 +223,7 @@ struct Tangent::Impl {
     return end;
   }
 
-  /// Sets what friction remembers, with its tangents: three numbers for each entry, or none, zeros.
+  /// Sets the shear state and its tangents: three numbers for each entry; empty: zeros.
   void set_memory(std::span<const ShearEntry> memory, const std::vector<double>& dot) {
     std::fill(stage.remembered.begin(), stage.remembered.end(), D(0.0));
     for (std::size_t k = 0; k < memory.size(); ++k)
@@ -232,7 +232,7 @@ struct Tangent::Impl {
             D(memory[k].s[c], dot.empty() ? 0 : dot[3 * k + c]);
   }
 
-  /// Returns the tangents of what friction remembers.
+  /// Returns the tangents of the shear state.
   [[nodiscard]] std::vector<double> memory_dot(std::span<const ShearEntry> memory) const {
     std::vector<double> out;
     for (const ShearEntry& e : memory)

@@ -17,7 +17,7 @@ namespace tangere {
 struct StateTangent {
   std::vector<double> q, v;
   std::vector<double> previous_q, previous_v;  ///< of the state one step before
-  /// Of what friction remembers, three numbers for each of its entries; or empty, zeros.
+  /// Of the shear state, three numbers for each of its entries. Empty: zeros.
   std::vector<double> shear = {};
 };
 

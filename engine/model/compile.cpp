@@ -109,7 +109,7 @@ class Compiler {
     m_.body_names.push_back(d.body.name);
   }
 
-  /// Whether something in the scene asks for the distance to a body.
+  /// Whether a contact or sensor of the scene needs the distance to a body.
   [[nodiscard]] bool is_touched(std::size_t body) const {
     const std::string& name = m_.scene.links[body].body.name;
     const auto of_contact = [&](const PairContactDescription& d) {
@@ -167,7 +167,7 @@ class Compiler {
         throw InputError(d.source.prefix() + "body '" + d.name + "': " + error.what());
       }
       const kernels::DistanceGrid& view = grid->view;
-      // A wall of less than a cell is not resolved: what the spline has there says nothing.
+      // A wall thinner than a cell is not resolved: the spline's values there are meaningless.
       const double deepest = -*std::ranges::min_element(grid->coefficients);
       m_.bodies[b].inscribed = deepest > 0.5 * view.cell ? deepest : 0;
       m_.bodies[b].grid = &view;
@@ -267,10 +267,10 @@ class Compiler {
   /// them, and a point that slides over the edge of a chosen face loses its force at once.
   static constexpr int kCorners = 8;
 
-  /// Lets a convex body meet a cuboid face by face. Points just beyond the face's edges still touch
-  /// it: where equal boxes stand flush, rounding would otherwise decide about each corner. A
-  /// thousandth of the smaller body is far above rounding and what stacks sway, and far below what
-  /// contact points resolve.
+  /// Sets up contact of a convex body with single faces of a cuboid. Points beyond the face's edges
+  /// by up to a thousandth of the smaller body still touch it: otherwise rounding would decide
+  /// whether corners of flush boxes touch. This is far above rounding and the sway of stacks, and
+  /// far below the spacing of contact points.
   static void meet_faces(kernels::PairContact& pair, const CompiledBody& body) {
     constexpr double kOverhang = 1e-3;
     pair.faced = true;

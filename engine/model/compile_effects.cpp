@@ -32,7 +32,7 @@ std::string counted(std::size_t n, const std::string& one, const std::string& ma
   return std::to_string(n) + " " + (n == 1 ? one : many);
 }
 
-/// Whether some friction remembers. CompiledModel::memories are made later.
+/// Whether some contact has shear springs. CompiledModel::shear_springs are filled later.
 bool remembers(const CompiledModel& m) {
   const auto any = [](const auto& all) {
     return std::any_of(all.begin(), all.end(),
@@ -41,8 +41,8 @@ bool remembers(const CompiledModel& m) {
   return any(m.pairs) || any(m.grounds) || any(m.sensors);
 }
 
-/// Returns "cuboid: products, flat faces; …" with each shape once, and once more where only some of
-/// its contacts remember, then how many bodies move.
+/// Returns "cuboid: products, flat faces; …" with each shape once, and once more if only some of
+/// its contacts have shear springs, then the number of moving bodies.
 std::string pair_variant(const CompiledModel& m, const kernels::LinkPair& links) {
   struct Kind {
     PrimitiveShape shape;

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a scene requires, as `inspect` reports it: the last steps of compile().
+// Effects and stages of a compiled model, as `inspect` reports them: the last steps of compile().
 #pragma once
 
 #include "engine/model/compiled_model.hpp"
 
 namespace tangere {
 
-/// Decides which effects are on, and why. Fills `effects`.
+/// Fills `effects`: which effects are on, and the reason.
 void decide_effects(CompiledModel& m);
 
 /// Lists the stages of a step, what each works on and which variant of its kernel it runs. Fills

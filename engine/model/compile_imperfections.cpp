@@ -15,7 +15,7 @@ namespace {
 
 constexpr double kWeightLeftOut = 1e-3;  // of a low-pass
 constexpr int kMostPastStates = 4096;
-constexpr int kMostRandomPoints = (1 << 24) - 64;  // whose random numbers have keys
+constexpr int kMostRandomPoints = (1 << 24) - 64;  // limit of the random keys
 
 std::string where_of(const TactileDescription& d) {
   return fmt::format("{}imperfections of '{}': ", d.imperfections.source.prefix(), d.name);

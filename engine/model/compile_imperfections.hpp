@@ -6,9 +6,9 @@
 
 namespace tangere {
 
-/// Fills what a sensor and its description to users say of imperfections. Its points are
-/// set. `timestep`: of the scene [s]. Throws InputError (file:line)
-/// for values that are out of range.
+/// Fills the members of a sensor, and of its SensorInfo, that describe imperfections. The points of
+/// the sensor must be set. `timestep`: of the scene [s]. Throws InputError (file:line) for values
+/// out of range.
 void compile_imperfections(const TactileDescription& description, double timestep,
                            CompiledSensor& sensor, SensorInfo& info);
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Turns what a scene says of a gel's markers into compliances.
+// Compiles the gel markers of a sensor: compliance, bulge and lateral spread.
 #pragma once
 
 #include "engine/model/compiled_model.hpp"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Every contact that remembers gets a range of point numbers. The memory of an environment is
-// sorted by them.
+// Every contact with shear springs gets a range of point numbers. The shear state of an environment
+// is sorted by them.
 #include "engine/model/compile_shear_springs.hpp"
 
 #include <cmath>

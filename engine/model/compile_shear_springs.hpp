@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which contacts remember, and where their points are kept.
+// Finds contacts and sensors with shear springs (k_s > 0) and numbers their points.
 #pragma once
 
 #include "kernels/step/model_view.hpp"
@@ -8,8 +8,8 @@ namespace tangere {
 
 struct CompiledModel;
 
-/// Fills CompiledModel::memories from the contacts and sensors whose k_s is not zero or varies.
-/// Everything else of the model is compiled.
+/// Fills CompiledModel::shear_springs from the contacts and sensors whose k_s is not zero or
+/// varies. Call it last: it reads all other members.
 void compile_shear_springs(CompiledModel& model);
 
 /// Returns a frame whose third axis is the normal.

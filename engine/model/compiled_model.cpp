@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What kernels see of the arrays.
+// Sets the ModelView of the kernels from the arrays.
 #include "engine/model/compiled_model.hpp"
 
 #include <algorithm>

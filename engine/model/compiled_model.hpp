@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The arrays behind a Model. They are private to the engine: kernels see them through ModelView,
-// and no one else has access.
+// The arrays of a Model. They are private to the engine; kernels read them through ModelView.
 #pragma once
 
 #include <array>
@@ -30,7 +29,7 @@ struct CompiledBody {
   kernels::Vec3<double> centre{};  ///< centre of mass, body frame [m]
   double mass = 0;                 ///< [kg]
   int size_row = -1;               ///< ≥ 0: size is read from three rows of the block instead
-  /// Of a mesh that can be touched, or whose contact points are far apart.
+  /// Distance grid of a mesh that is touchable, or whose contact points are far apart; else null.
   const kernels::DistanceGrid* grid = nullptr;
   double inscribed = 0;  ///< of a mesh with a grid: radius of the largest ball in it at scale 1 [m]
 };
@@ -87,7 +86,7 @@ struct CompiledSensor {
   double axes[9] = {};  ///< rows axis0, axis1, -(axis0 × axis1), pad axes
   kernels::ContactParameters parameters{};
   ContactLaw law = ContactLaw::clamped;
-  std::vector<int> targets;  ///< bodies that it can feel
+  std::vector<int> targets;  ///< sensed bodies
   bool sizes_vary = false;   ///< some of their sizes vary
   SensorImperfections imperfections{};
   bool imperfect = false;            ///< some imperfection is on
@@ -97,12 +96,12 @@ struct CompiledSensor {
   /// matter.
   std::uint64_t name_bits = 0;
   int delay = 0;  ///< [steps]
-  /// (n) weights of the ideal fields `delay`, delay + 1, … steps ago; empty without memory.
+  /// (n) weights of the ideal fields `delay`, delay + 1, … steps ago; empty without lag.
   std::vector<double> weights{};
   std::array<LateralSpread, 2> spread{};  ///< from row to row, and from column to column
-  bool elastic = false;                   ///< its friction remembers
-  /// Steps from one advance of that memory to the next. It keeps the anchors b and a of each point
-  /// then, in this order all b, all a. 0: it advances at every step and keeps s.
+  bool elastic = false;                   ///< its points have shear springs (k_s)
+  /// Steps between updates of the shear state. If > 0, the state stores the anchors b and a of each
+  /// point (first all b, then all a). 0: updated at every step; the state stores s.
   int shear_interval = 0;
   /// Points of an elastic sensor in the order of the tiles of its contacts.
   std::vector<int> in_field;          ///< (n) number in the field
@@ -125,8 +124,8 @@ struct CompiledEndEffector {
 };
 
 /// Rows of a block: q, v, the state one step before, the varying numbers, then earlier states for
-/// sensors with memory: `past_states` times q and v; the state after n steps of the episode is in
-/// place n % past_states.
+/// sensors with lag: a ring buffer of `past_states` times q and v, in which the state after n steps
+/// of the episode is at n % past_states.
 struct BlockLayout {
   int q = 0, v = 0, previous_q = 0, previous_v = 0, parameters = 0, rows = 0;
   int past = 0, past_states = 0;
@@ -170,13 +169,13 @@ struct VaryingPlace {
   std::vector<VaryingNumber> numbers;
 };
 
-/// What friction remembers of a point takes this much (ShearEntry).
+/// Size of a ShearEntry [bytes].
 inline constexpr std::size_t kRememberedBytes = 32;
 
 struct CompiledModel {
   Scene scene;
-  /// Where links, bodies and the ground are measured from, in the world [m]. It is the world's
-  /// origin but for scenes far from it, whose positions would be rounded. Outputs add it.
+  /// Origin of internal coordinates in the world [m], zero unless the scene is far from the world's
+  /// origin, where positions would lose digits. Outputs add it.
   kernels::Vec3<double> origin{0, 0, 0};
   bool moved = false;  ///< origin is not the world's
   [[nodiscard]] kernels::Vec3<double> in_world(const kernels::Vec3<double>& p) const {
@@ -195,18 +194,18 @@ struct CompiledModel {
   std::vector<kernels::ShearSpringContact> shear_springs;
   /// Bodies whose contact points are far apart for each other (contact_resolution.hpp).
   std::vector<std::array<int, 2>> coarse_pairs;
-  int shear_spring_points = 0;  ///< of all `memories`
-  /// The same with the points of a sensor counted once, not for every body that it feels.
+  int shear_spring_points = 0;  ///< points of all `shear_springs`
+  /// The same with the points of a sensor counted once, not once for every sensed body.
   int taped_points = 0;
   int ground_anchors = 0;  ///< points of those on the ground
-  /// The first of shear_spring_points are those of sensors whose memory does not advance at every
-  /// step. Steps do not touch their entries.
+  /// Number of points of sensors with shear_interval > 0; they come first among
+  /// shear_spring_points. Steps do not change their entries.
   int kept_points = 0;
-  /// Steps between advances of a contact's memory; 0: one at every step.
+  /// Steps between updates of a contact's shear state; 0: updated at every step.
   [[nodiscard]] int shear_interval(const kernels::ShearSpringContact& of) const {
     return of.sensor < 0 ? 0 : sensors[std::size_t(of.sensor)].shear_interval;
   }
-  /// How many of the points that remember are a contact's.
+  /// Number of shear-state entries that a contact may have.
   [[nodiscard]] int shear_rows(const kernels::ShearSpringContact& of) const {
     return of.contact.n_points * (shear_interval(of) > 0 ? 2 : 1);
   }

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// How well the grid of a mesh resolves its surface, so that a wall thinner than its cells is not
-// lost in silence.
+// Error of a mesh's distance grid at the surface. It is large where walls are thinner than cells.
 #pragma once
 
 #include "engine/scene/scene.hpp"

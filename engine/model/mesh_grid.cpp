@@ -5,8 +5,8 @@
 // is missed and none is counted twice.
 //
 // The coefficients solve (c[i-1] + 4 c[i] + c[i+1])/6 = d[i] along each axis in turn. Beyond the
-// last nodes they go on along a straight line. That is felt a few cells far, so the grid reaches
-// kPadding cells beyond the mesh.
+// last nodes they are extrapolated linearly. The extrapolation affects a few cells, so the grid
+// extends kPadding cells beyond the mesh.
 #include "engine/model/mesh_grid.hpp"
 
 #include <fmt/format.h>

@@ -39,8 +39,8 @@ std::shared_ptr<const MeshGrid> shared_mesh_grid(const MeshShape& mesh);
 /// `mesh.resolution` where the mesh has none. Throws InputError where the finest grid does not.
 std::shared_ptr<const MeshGrid> fitting_mesh_grid(const MeshShape& mesh);
 
-/// Returns a grid of few cells for checks that only tell whether a place is deep inside: three
-/// across the mesh's smallest width, at least 16 and at most 64 along its longest side.
+/// Returns a grid of few cells for checks of deep overlap: three across the mesh's smallest width,
+/// at least 16 and at most 64 along its longest side.
 std::shared_ptr<const MeshGrid> coarse_mesh_grid(const MeshShape& mesh);
 
 }  // namespace tangere

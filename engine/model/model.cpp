@@ -64,7 +64,7 @@ std::span<const std::string> Model::body_names() const { return compiled_->body_
 
 std::size_t Model::state_bytes_per_environment() const {
   // Rows of the block, then status, iterations, residual, the history flag and the steps so far,
-  // and all that friction can remember.
+  // and the largest shear state.
   return sizeof(double) * compiled_->layout.rows + sizeof(std::int8_t) + sizeof(std::int32_t) +
          sizeof(double) + 1 + sizeof(std::int64_t) +
          kRememberedBytes * std::size_t(compiled_->taped_points);

@@ -31,14 +31,15 @@ class Model {
   [[nodiscard]] int moving_bodies() const;  ///< bodies that are not fixed in the world
   [[nodiscard]] double mass(int body) const;  ///< [kg]
   [[nodiscard]] double timestep() const;      ///< [s]
-  /// The scene's scheme, or SDIRK3 where its accuracy asks for one (keeping_accuracy()).
+  /// The scene's scheme; SDIRK3 if the scene has an accuracy that its scheme cannot keep
+  /// (keeping_accuracy()).
   [[nodiscard]] Integrator integrator() const;
   [[nodiscard]] const SolverOptions& solver() const;
   /// The tolerance that leaves errors well below those of a step [s] of this scheme
   /// (docs/solver.md). In force where neither scene nor caller names one.
   [[nodiscard]] double following_tolerance(Integrator integrator, double timestep) const;
   [[nodiscard]] std::span<const double> initial_q() const;  ///< (nq) where the scene starts
-  /// Whether friction of some contact or sensor remembers (docs/shear.md).
+  /// Whether some contact or sensor has shear springs (k_s, docs/shear.md).
   [[nodiscard]] bool has_shear_springs() const;
   [[nodiscard]] std::span<const SensorInfo> sensors() const;
   [[nodiscard]] std::span<const EndEffectorInfo> end_effectors()
@@ -56,7 +57,7 @@ class Model {
   [[nodiscard]] std::span<const std::string> u_units()
       const;  ///< "1": controls are dimensionless for force motors
   [[nodiscard]] std::span<const std::string> body_names() const;
-  [[nodiscard]] std::size_t state_bytes_per_environment() const;  ///< memory in a Batch
+  [[nodiscard]] std::size_t state_bytes_per_environment() const;  ///< in a Batch
 
   /// Whether both are the same compiled scene, not only equal ones.
   friend bool operator==(const Model& a, const Model& b) { return a.compiled_ == b.compiled_; }

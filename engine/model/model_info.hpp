@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a compiled scene says of its sensors, contacts, meshes and stages.
+// Descriptions of the sensors, contacts, meshes and stages of a model.
 #pragma once
 
 #include <array>
@@ -40,7 +40,7 @@ struct MeshInfo {
   std::string body;
   std::array<int, 3> cells{};  ///< of its grid, x y z
   double cell = 0;             ///< edge of a cell [m]
-  std::size_t bytes = 0;       ///< memory of the grid; bodies with the same mesh share one
+  std::size_t bytes = 0;       ///< size of the grid; bodies with the same mesh share one
   /// Of the distance on the surface [m], and the share of the area where the grid is too coarse
   /// for it (engine/model/mesh_fit.hpp says by what).
   double error = 0, unresolved = 0;

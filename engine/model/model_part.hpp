@@ -28,13 +28,14 @@ struct ModelPart {
       v;  ///< (nq), (nv) coordinates and dofs of the part: their number in the whole
 };
 
-/// Returns the trees that are not left out. Contacts with those that are go, too. `tree`: of each
-/// link. `left_out`: (trees) 1: is left out; not all of them. Friction must not remember.
+/// Returns the sub-model without the trees that are marked in `left_out` and without contacts with
+/// them. `tree`: tree of each link. `left_out`: (trees) 1: left out; at least one must be 0. The
+/// model must have no shear springs.
 std::unique_ptr<ModelPart> part_of(const CompiledModel& whole, std::span<const int> tree,
                                    std::span<const std::uint8_t> left_out);
 
-/// Returns the model without the contacts that never push (pushes), which is the model of
-/// a scene that does not name them. Null where all push, and where friction remembers.
+/// Returns the model without contacts that can never exert a force (can_exert_force()). Null if all
+/// can, and for models with shear springs.
 std::unique_ptr<ModelPart> without_inert_contacts(const CompiledModel& whole);
 
 }  // namespace tangere

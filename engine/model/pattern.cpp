@@ -26,7 +26,7 @@ void couple(Structure& s, const std::vector<int>& dofs) {
     for (int j : dofs) s[i][j] = 1;
 }
 
-/// A symmetric structure as a graph of dofs, each with a row of bits: who is its neighbour.
+/// A symmetric structure as a graph of dofs, each with a row of bits: its neighbours.
 class Graph {
  public:
   explicit Graph(const Structure& s)

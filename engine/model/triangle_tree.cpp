@@ -127,7 +127,7 @@ double TriangleTree::squared_distance(const Vec3<double>& at, int& nearest) cons
     }
     const double left = to_box(nodes_[std::size_t(node.first)].box),
                  right = to_box(nodes_[std::size_t(node.first) + 1].box);
-    const bool swapped = right < left;  // the nearer one is looked at first
+    const bool swapped = right < left;  // visit the nearer one first
     stack[std::size_t(waiting++)] = {std::max(left, right), node.first + (swapped ? 0 : 1)};
     stack[std::size_t(waiting++)] = {std::min(left, right), node.first + (swapped ? 1 : 0)};
   }

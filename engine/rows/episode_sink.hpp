@@ -49,7 +49,7 @@ struct EpisodeRows {
   int rows = 0;
   int action_rows = 0;             ///< `rows`, or one less when the last row is among them
   std::span<const float> actions;  ///< (episodes, action_rows, nu) in [-1, 1]
-  /// q and v, then the observations of a task, or the end effectors (if any), bodies (if asked for)
+  /// q and v, then the observations of a task, or the end effectors (if any), bodies (if requested)
   /// and sensors of a scene. Each is (episodes, rows at which it is taken, width).
   std::span<const Observation> observations;
   std::span<const float> rewards = {};  ///< (episodes, action_rows); tasks only
@@ -80,7 +80,7 @@ struct FailedEpisode {
 /// scene.
 struct EpisodeSteps {
   std::int64_t taken = 0;        ///< of the simulation, without those that failed
-  std::int64_t tunnelled = 0;    ///< in which a body came through another (StepStatus::tunnelled)
+  std::int64_t tunnelled = 0;    ///< steps with status StepStatus::tunnelled
   std::int64_t overlapping = 0;  ///< after which bodies overlap (StepStatus::overlapping)
 
   EpisodeSteps& operator+=(const EpisodeSteps& other) {

@@ -16,14 +16,14 @@ namespace tangere {
 struct StateRow {
   std::int64_t step;          ///< t
   double time;                ///< t h [s]
-  std::span<const double> q;  ///< (E, nq); empty if not asked for at this row
+  std::span<const double> q;  ///< (E, nq); empty if not requested at this row
   std::span<const double> v;  ///< (E, nv); as q
-  /// (E, nb, 7) x y z qw qx qy qz of each body frame in the world, or of those that are asked for;
-  /// empty if none is, or not at this row.
+  /// (E, nb, 7) x y z qw qx qy qz of all body frames in the world, or of the requested ones; empty
+  /// if none is requested at this row.
   std::span<const double> body_pose;
   /// (E, nb, 6) angular, then linear velocity of its origin, world axes; as the poses.
   std::span<const double> body_twist;
-  /// (E, n, 3) world positions of the end effectors [m]; empty if n = 0 or not asked for.
+  /// (E, n, 3) world positions of the end effectors [m]; empty if n = 0 or not requested.
   std::span<const double> end_effectors = {};
 };
 
@@ -31,7 +31,7 @@ struct StateRow {
 struct StepRow {
   std::int64_t step;  ///< t
   std::span<const double>
-      u;  ///< (E, nu) controls as given, before clipping; empty if not asked for
+      u;  ///< (E, nu) controls as given, before clipping; empty if not requested
   std::span<const std::int32_t> iterations;  ///< (E) Newton passes, sub-steps included
   std::span<const std::int8_t> status;       ///< (E) StepStatus
   std::span<const double> residual;          ///< (E) scaled residual at acceptance, dimensionless
@@ -56,7 +56,7 @@ struct ActionRow {
   std::span<const std::uint8_t> terminated, truncated, success;
 };
 
-/// The books of row t of a trajectory, for all environments (engine/sense/energy_balance.hpp).
+/// Energy balance at row t of a trajectory, for all environments (engine/sense/energy_balance.hpp).
 struct AuditRow {
   std::int64_t step;                 ///< t
   std::span<const double> energy;    ///< (E, 3) of motion, of height, held [J]
@@ -66,7 +66,7 @@ struct AuditRow {
   std::span<const double> passed;
 };
 
-/// What friction remembers at row t of a trajectory, for all environments.
+/// Shear state at row t of a trajectory, for all environments.
 struct MemoryRow {
   std::int64_t step;                   ///< t
   std::span<const ShearState> memory;  ///< (E)
@@ -87,8 +87,8 @@ class RowSink {
   virtual void write(const StepRow& row) = 0;
   virtual void write(const TactileRow& row) = 0;
   virtual void write(const ActionRow&) {}  ///< tasks only
-  virtual void write(const AuditRow&) {}   ///< only if it was asked for
-  virtual void write(const MemoryRow&) {}  ///< only if it was asked for
+  virtual void write(const AuditRow&) {}   ///< only if requested
+  virtual void write(const MemoryRow&) {}  ///< only if requested
   virtual void write(const SleepRow&) {}   ///< only with q and v
 };
 

@@ -19,12 +19,12 @@ struct TensorSpec {
   std::vector<std::size_t> shape;  ///< row-major
   std::string unit;                ///< "m", "N", "1" …
   std::string meaning;
-  /// Typical sizes of the numbers, one for all or one per place on the last axis, in their unit. A
-  /// network sees the numbers divided by them. Empty: 1.
+  /// Typical magnitudes, one for all numbers or one per index of the last axis, in their unit.
+  /// Inputs of networks are divided by them. Empty: 1.
   std::vector<double> scale = {};
   double low = -kUnbounded, high = kUnbounded;  ///< bounds of every number
   bool privileged = false;                      ///< a robot could not measure it
-  bool touch = false;  ///< what pads feel: all numbers are 0 where nothing is felt
+  bool touch = false;                           ///< tactile: all numbers are 0 without contact
 
   [[nodiscard]] std::size_t size() const;
 };
@@ -39,7 +39,7 @@ struct TaskSpec {
   std::vector<TensorSpec> observations;
   int steps_per_action = 1;  ///< simulation steps of an environment step
   int control_every = 0;     ///< simulation steps between requests for controls; 0: once per action
-  /// Steps of an action after which the task looks at the state: ascending, the last one is
+  /// Steps within an action after which a Snapshot is taken: ascending; the last one is
   /// steps_per_action.
   std::vector<int> snapshots;
   int horizon = 1;  ///< actions of an episode, after which it is truncated
@@ -48,8 +48,8 @@ struct TaskSpec {
   bool restarts = false;   ///< every action starts from a state that the task gives
   int settling_steps = 0;  ///< a reset ends with this many steps of `settling_timestep` [s]
   double settling_timestep = 0;
-  int task_state = 0;  ///< numbers that an episode keeps for the task: a goal, a force
-  /// What the task looks at besides q and v.
+  int task_state = 0;  ///< count of numbers that the task keeps per episode: a goal, a force
+  /// Readings in a Snapshot besides q and v.
   bool reads_end_effectors = false, reads_tactile = false;
 
   [[nodiscard]] std::size_t observation_size() const;

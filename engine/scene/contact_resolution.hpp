@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Contacts whose points are too far apart to feel the other body: what lies between contact points
-// is not felt (docs/contact.md).
+// Contacts whose points are too far apart to resolve the other body: geometry between contact
+// points exerts no force (docs/contact.md).
 #pragma once
 
 #include <cstddef>
@@ -26,8 +26,8 @@ struct CoarseContact {
   bool rims;            ///< it fits between no points, but those in the rims of faces may miss it
 };
 
-/// Which width of primitive_body a gap is compared with: the smallest, or the second, because a
-/// plate that lies on points is felt, and a post's second width is its thickness.
+/// Width of primitive_body that a gap is compared with: the smallest or the second smallest. A
+/// plate that lies on points is resolved though it is thin; a post's second width is its thickness.
 enum class ComparedWidth { smallest, second };
 
 /// Returns the contacts whose primitive_body fits between the points of general_body, unless a

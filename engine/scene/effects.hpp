@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The effects that a scene can call for: one table says of each whether a scene has it on, which
-// lines call for it. `inspect`, the measurement of what effects cost and the tests all go by it, so
-// that none of them can forget one. tasks/effects/ablation.hpp makes the scene without an effect.
+// Table of the physical effects: for each, whether a scene has it on and the lines that request it.
+// `inspect`, the measurement of costs and the tests iterate over this table;
+// tasks/effects/ablation.hpp makes the scene without an effect.
 #pragma once
 
 #include <cstdint>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What is read of a tactile field: all of it, its pressure, its shear, its flow, its sum, or how it
-// moves markers. What nobody asks for is neither computed nor stored.
+// Quantities of a tactile field: the whole field, pressure, shear, flow, sum, or displacements of
+// markers. Only requested quantities are computed and stored.
 #pragma once
 
 #include <array>
@@ -56,8 +56,8 @@ inline FieldOutput undivided(FieldOutput of) {
 std::string output_name(const std::string& sensor, FieldForm form);
 /// Returns the names of a scene's sensors, in file order.
 std::vector<std::string> sensor_names(const Scene& scene);
-/// Whether a name is that of an output which is not read of a sensor: q, v, variables (places of
-/// end effectors), bodies (their poses and twists) or memory (what friction remembers).
+/// Whether a name is that of an output of no sensor: q, v, variables (positions of end effectors),
+/// bodies (poses and twists) or memory (the shear state).
 bool is_plain_output(const std::string& name);
 /// Returns the reading of this name; none where no sensor has it.
 std::optional<FieldOutput> find_output(std::span<const std::string> sensors,
@@ -74,9 +74,9 @@ bool has_output(const Scene& scene, const std::string& word);
 std::string reason_against(const Scene& scene, const FieldOutput& output);
 /// Throws InputError for a sensor that is not there and for an output that is listed twice.
 void check_outputs(std::span<const FieldOutput> outputs, std::size_t sensors);
-/// Returns the field of every sensor: what a scene gives where nothing else is asked for.
+/// Returns the field of every sensor: the outputs of a scene without <outputs>.
 std::vector<FieldOutput> whole_fields(const Scene& scene);
-/// Returns what the scene's <outputs> ask of its sensors, with their times; without <outputs>, the
+/// Returns the sensor outputs of the scene's <outputs>, with their times; without <outputs>, the
 /// field of every sensor.
 std::vector<FieldOutput> asked_fields(const Scene& scene);
 /// Returns all names of outputs, the plain ones included.

@@ -10,7 +10,7 @@ namespace tangere {
 /// When an output is taken. Rows are counted from 0: row t follows t steps of this run, and
 /// `first` + t steps of the runs that it continues.
 struct OutputTimes {
-  std::int64_t every = 0;  ///< at steps that are a multiple of it; 0: as often as the run says
+  std::int64_t every = 0;  ///< at steps that are a multiple of it; 0: at every row of the run
   bool final = false;      ///< at the last row alone
 
   [[nodiscard]] bool given() const { return every > 0 || final; }

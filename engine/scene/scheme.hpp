@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Time-stepping schemes as values. A scheme is a row of numbers that the step, the tape, the
-// adjoint and the tangent read. Which scheme takes a step that another cannot take is said here
-// too.
+// Time-stepping schemes as rows of coefficients, which step, tape, adjoint and tangent read, and
+// the fallback schemes for steps that a scheme cannot take.
 //
 // A step of length h from (q₀, v₀) has one implicit solve per stage, for the displacement x from
 // q₀:
@@ -75,7 +74,7 @@ class Integrator {
   static const Integrator bdf1, bdf2, sdirk2, sdirk3;
   static const Integrator sdirk4;              ///< not in the table
   static const Integrator default_integrator;  ///< of scenes that name none
-  /// What others are compared with, and what tells how far that is wrong.
+  /// Reference scheme of accuracy measurements, and a second one that estimates its error.
   static const Integrator reference, second_reference;
 
   [[nodiscard]] const Scheme& scheme() const { return *scheme_; }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Decides by names and joints alone, so that readers, compilers and warnings agree.
+// Uses names and joints only, so that the reader, the compiler and warnings agree.
 #include "engine/scene/sensed_bodies.hpp"
 
 #include <fmt/format.h>

@@ -363,7 +363,7 @@ std::string slenderness_fault(const Shape& shape) {
   return slenderness_fault(row, least, most);
 }
 
-// --- what others ask of a shape ---
+// --- queries ---
 
 std::vector<NamedSize> named_sizes(const Shape& shape) {
   Shape copy = shape;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Counts are those of the state alone, whatever the last step decided.
+// Counts are functions of the state alone; the active sets of the last step are not used.
 #include "engine/sense/contact_state.hpp"
 
 #include <algorithm>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The field of a sensor whose friction remembers: the law at the state and the memory after the
-// last step (docs/shear.md).
+// Field of a sensor with shear springs: the contact law at the state and shear state after the last
+// step (docs/shear.md).
 #pragma once
 
 #include <span>
@@ -16,17 +16,19 @@ class ElasticField {
  public:
   explicit ElasticField(const Model& model);
 
-  /// Computes the field, (points, 3) [N], in an environment whose group the reader has moved.
+  /// Computes the field, (points, 3) [N], of one environment. PadReader::move() must have been
+  /// called for its group.
   void read(const PadReader& reader, const Batch& batch, int environment, int sensor,
             std::span<double> field);
 
-  /// What a cotangent of the field comes to, by one body that the sensor touches.
+  /// Contribution of one touched body to the cotangents.
   struct Share {
     const kernels::ShearSpringContact* of;
     kernels::TouchCotangent<double> motion;  ///< body 1's axes and origin
   };
-  /// Returns what a cotangent of the field comes to, valid until the next call, and adds to
-  /// `memory`, three numbers for each entry of the environment's memory.
+  /// Pulls a cotangent of the field back: returns the contribution of each touched body, valid
+  /// until the next call, and adds the cotangent of the shear state to `memory`, three numbers for
+  /// each entry of the environment.
   std::span<const Share> pull_back(const PadReader& reader, const Batch& batch, int environment,
                                    int sensor, std::span<const double> cotangent,
                                    std::span<double> memory);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The books themselves are those that steps are looked at with (engine/step/lane_energy.hpp).
+// Energies are those of the step checks (engine/step/lane_energy.hpp).
 #include "engine/sense/energy_balance.hpp"
 
 #include "engine/step/lane_energy.hpp"

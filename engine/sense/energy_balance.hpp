@@ -23,7 +23,7 @@ struct EnergyBalance {
   [[nodiscard]] double energy() const { return kinetic + potential + elastic; }
 };
 
-/// What passed in a step, by the trapezoid rule over its two ends [J].
+/// Work and dissipation in one step, by the trapezoid rule over its two ends [J].
 struct StepEnergyBalance {
   double motor_work = 0;        ///< work of the motors
   double dissipated = 0;        ///< by damping and friction

@@ -149,7 +149,7 @@ void ImperfectField::share(const CompiledSensor& s, int components, std::span<do
 
 namespace {
 
-/// Whether something happens to each point by itself. Memory, spread and crosstalk do not.
+/// Whether an imperfection acts on single points. Lag, spread and crosstalk do not.
 bool spoils_points(const SensorImperfections& of) {
   constexpr NormalAndShear kNone{};
   return of.gain != 0 || of.sensor_gain != 0 || of.dead != 0 || !(of.bias == kNone) ||

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The imperfections of sensors, at the one place where fields are read: what a sensor says for an
-// ideal field, and the derivative of that, forward and in reverse
-// (engine/scene/sensor_imperfections.hpp has the equations).
+// Applies the imperfections of a sensor to an ideal field, with tangent and pullback
+// (equations in engine/scene/sensor_imperfections.hpp).
 #pragma once
 
 #include <span>
@@ -58,11 +57,11 @@ class ImperfectField {
   std::vector<double> before_, shared_;  // fields before crosstalk; ideal ones after it
 };
 
-/// Throws InputError for a sensor with memory: its reading has no derivative by one state alone.
+/// Throws InputError for a sensor with lag: its reading depends on more than one state.
 void check_has_no_lag(const Model& model, int sensor);
 
-/// Computes the ideal field of a sensor, (points, 3), in a lane of the group whose touches were
-/// found.
+/// Computes the ideal field of a sensor, (points, 3), in one lane of a group, after
+/// PadReader::find_touches().
 void read_ideal(PadReader& reader, const CompiledSensor& sensor, int group, int lane,
                 std::span<double> field);
 

@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a camera behind a gel sees of markers that are printed on its surface: where each of them is
-// pushed. With the ideal field f of the sensor, its shear f_s (along axis0 and axis1) and the force
-// p with which it is pressed, a marker at point i moves along axis0 and axis1 by
+// Displacements of markers on the surface of a gel, as a camera behind the gel measures them. With
+// the ideal field f of the sensor, its shear f_s (along axis0 and axis1) and its pressing force p,
+// a marker at point i moves along axis0 and axis1 by
 //
 //   u_i = Σ_j S_ij (f_s,j - t/2 ∇p_j) / k_s [m]          (docs/sensors.md)
 //
 // k_s = G 𝒜/t is the shear stiffness of the gel under one point, t its thickness, S its lateral
-// spread. The relation is linear, so its derivative is itself, and its transpose pulls cotangents
-// back to those of the field.
+// spread. The map is linear: it is its own tangent map, and its transpose is the pullback.
 #pragma once
 
 #include <memory>

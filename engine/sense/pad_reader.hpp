@@ -22,10 +22,11 @@ class PadReader {
   /// Returns a link's pose and twist in lane `lane` of a group; those of the world for link -1.
   [[nodiscard]] kernels::LinkPose<double> link(int link, int group, int lane) const;
 
-  /// Finds every shape that the sensor can feel, in its pad's axes, in the group moved last.
+  /// Computes pose and motion of every sensed shape in the pad's axes, in the group of the last
+  /// move().
   void find_touches(const Batch& batch, int block, int group, int sensor);
-  /// Returns the arguments for one environment of a group whose touches were found. The only output
-  /// that is set is the list of tiles, `active`.
+  /// Returns the kernel arguments for one environment of a group after find_touches(). Of the
+  /// outputs, only the list of tiles, `active`, is set.
   template <class Real>
   kernels::TactileArgs<Real> arguments(int sensor, int group, int lane);
   /// Returns the arguments for one group (double) or both (float).
@@ -38,7 +39,7 @@ class PadReader {
   using Rows = AlignedVector<kernels::LaneRow>;
   static constexpr int kGroups = kernels::kBlock / kernels::kGroup;
 
-  /// Returns the shapes that a sensor can feel, with the sizes of one lane.
+  /// Returns the shapes that a sensor senses, with the sizes of one lane.
   const kernels::TouchShape* shapes(int sensor, int group, int lane);
 
   struct Pad {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Earlier states of one environment side by side, so that a sensor with memory reads as many of
-// them at once as others read environments.
+// Copies earlier states of one environment into the lanes of a block, so that a sensor with lag
+// reads 16 of them at once.
 #pragma once
 
 #include "engine/model/compiled_model.hpp"

@@ -48,7 +48,7 @@ struct Readout::Impl {
   std::vector<double> elastic_field;              // (points, 3)
   std::vector<double> one_reading, block_readings, of_tiles;
   std::vector<double> earlier;     // fields of small pads in the states of `past`
-  std::optional<PastStates> past;  // of sensors with memory
+  std::optional<PastStates> past;  // for sensors with lag
 
   Impl(const Model& m, Precision p)
       : model(m), precision(p), reader(m), imperfections(m), elastic(m) {
@@ -131,7 +131,7 @@ struct Readout::Impl {
     return count;
   }
 
-  /// Writes the touched tiles of an environment whose touches were found. Returns their number and
+  /// Writes the touched tiles of an environment, after find_touches(). Returns their number and
   /// lists them in reader.active.
   template <class T>
   int write_touched(int environment, FieldOutput of, T* dense) {
@@ -158,7 +158,7 @@ struct Readout::Impl {
     return {reader.active.data(), count};
   }
 
-  /// Whether memory of friction is part of a reading. Pressure is that of a skin without friction.
+  /// Whether a reading depends on the shear state. Pressure does not.
   [[nodiscard]] bool is_elastic(FieldOutput of) const {
     return sensor_of(of.sensor).elastic && of.form != FieldForm::pressure;
   }
@@ -177,8 +177,8 @@ struct Readout::Impl {
       for (double& x : field) x = static_cast<double>(static_cast<float>(x));
   }
 
-  /// Computes the field of a sensor with memory: the mean of earlier ideal fields with the sensor's
-  /// weights. It depends on states alone, so it does not matter who reads when.
+  /// Computes the field of a sensor with lag: the weighted mean of earlier ideal fields. It depends
+  /// on stored states alone, not on the times of earlier readings.
   void read_past(const Batch& batch, int environment, FieldOutput of, std::span<double> field) {
     const CompiledSensor& s = sensor_of(of.sensor);
     std::fill(field.begin(), field.end(), 0.0);
@@ -228,7 +228,7 @@ struct Readout::Impl {
     make_imperfect(batch, environment, of, field);
   }
 
-  /// Computes the ideal field of a sensor whose friction remembers, or some of its components.
+  /// Computes the ideal field of a sensor with shear springs, or some of its components.
   void read_elastic(const Batch& batch, int environment, FieldOutput of, std::span<double> field) {
     const FieldPart part = part_of(of.form);
     const auto width = std::size_t(part.count);
@@ -238,7 +238,7 @@ struct Readout::Impl {
       field[k] = whole[k / width * 3 + std::size_t(part.first) + k % width];
   }
 
-  /// The same into memory of the readout. Of a sum: the field.
+  /// The same into scratch of the readout. For a sum: the field.
   std::span<const double> read_imperfect(const Batch& batch, int environment, FieldOutput of) {
     const FieldForm form = of.form == FieldForm::sum ? FieldForm::field : of.form;
     const std::span<double> field =
@@ -247,7 +247,7 @@ struct Readout::Impl {
     return field;
   }
 
-  /// Writes where the ideal field of a sensor whose touches were found pushes its markers.
+  /// Writes the marker displacements of the ideal field, after find_touches().
   template <class T>
   void write_markers(const Batch& batch, int environment, int sensor, T* to) {
     std::optional<MarkerMap>& map = markers[std::size_t(sensor)];

@@ -17,7 +17,7 @@ namespace tangere {
 /// Tactile fields are in [N]: f·axis0, f·axis1, -f·(axis0 × axis1), where f is the force on the
 /// sensor's body. They are exactly zero where nothing touches, unless the sensor is imperfect:
 /// then every reading of it but FieldForm::ideal has its imperfections, and the same reading taken
-/// twice in a step has the same noise. They feel every body that can move relative to the sensor.
+/// twice in a step has the same noise. Every body that can move relative to the sensor is sensed.
 /// Every way of reading gives the same numbers: those of the readout's precision, converted where T
 /// is the other type. T is float or double. A flow is that of the shear in T. FieldForm::markers
 /// throws InputError for a sensor without markers. Every function throws InputError for a batch or

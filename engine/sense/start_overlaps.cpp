@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Looks at every contact point once, by the plain distance of the shape that it may touch.
+// Evaluates the signed distance of the touched shape at every contact point.
 #include "engine/sense/start_overlaps.hpp"
 
 #include <fmt/format.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The memory of frames. The readout decides what is written to it.
+// Storage of frames, which Readout fills.
 #include "engine/sense/tactile_frame.hpp"
 
 #include <numeric>

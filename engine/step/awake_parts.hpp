@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What steps some trees of a model while the others sleep: a model of them, its step and its
-// scratch. A lane that sleeps elsewhere has another part, so no lane pays for bodies that are awake
-// in its neighbours, and its bits depend on its own bodies alone.
+// Sub-models of the awake trees, each with its step and scratch. Lanes with different sleeping
+// trees use different sub-models, so the work and the bits of a lane depend on its own trees alone.
 #pragma once
 
 #include <algorithm>
@@ -42,15 +41,15 @@ struct AwakePart {
   }
 };
 
-/// The parts that were used last. A part is made when some lane first needs it, which takes memory;
-/// bodies fall asleep and wake rarely.
+/// Cache of the most recently used sub-models. A sub-model is built, with heap allocations, the
+/// first time a lane needs it.
 class AwakeParts {
  public:
   AwakeParts(const CompiledModel& model, const StepSettings& settings)
       : model_(model), settings_(settings) {}
 
-  /// Returns the part without the trees in `asleep`, which are not all. It is valid until the next
-  /// call. `tree`: of each link.
+  /// Returns the sub-model without the trees that are marked in `asleep`; at least one is awake.
+  /// Valid until the next call. `tree`: tree of each link.
   AwakePart& without(std::span<const std::uint8_t> asleep, std::span<const int> tree) {
     const auto found = std::ranges::find_if(
         parts_, [&](const auto& p) { return std::ranges::equal(p->asleep, asleep); });

@@ -169,8 +169,8 @@ void Batch::fill_past_states(std::size_t lane) {
     own[(layout.past + k) * kBlock] = own[(layout.q + k % numbers) * kBlock];
 }
 
-/// Scales quaternions to length one. The state one step before becomes the same state, and those
-/// that sensors remember.
+/// Scales quaternions to length one. Copies the state to the state one step before and to the past
+/// states of sensors with lag.
 void Batch::complete_state(std::size_t lane) {
   const CompiledModel& m = compiled(model_);
   double* const own = column(lane);

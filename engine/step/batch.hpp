@@ -19,9 +19,9 @@ namespace tangere {
 enum class StepStatus : std::int8_t {
   converged = 0,
   split = 1,             ///< converged in parts, or by SDIRK2 because a body turned too far
-  accuracy_not_met = 2,  ///< converged, but a part of h/256 missed the accuracy that was asked for,
-                         ///< created energy or turned a body too far
-  tunnelled = 3,         ///< converged, but a body came through another that it touches
+  accuracy_not_met = 2,  ///< converged, but a part of h/256 missed the requested accuracy, created
+                         ///< energy or rotated a body too far
+  tunnelled = 3,         ///< converged, but a body passed through one of its contact partners
   damped = 4,            ///< converged by BDF1 or in parts: the scheme would have created energy
   overlapping = 5,     ///< converged, but bodies of a contact overlap and none of its points is as
                        ///< deep (engine/step/interpenetration.hpp)
@@ -51,7 +51,7 @@ struct BlockState {
 class Batch {
  public:
   /// Makes `environments` states drawn from the scene's <initial> and <randomize>, keyed by
-  /// (seed, first_episode + e). Throws InputError when environments < 1 or memory does not suffice.
+  /// (seed, first_episode + e). Throws InputError when environments < 1 or allocation fails.
   Batch(const Model& model, int environments, std::uint64_t seed = 0,
         std::int64_t first_episode = 0);
 
@@ -68,8 +68,8 @@ class Batch {
   void hold(int environment, bool held = true) { held_[lane(environment)] = held ? 1 : 0; }
   [[nodiscard]] bool held(int environment) const { return held_[lane(environment)] != 0; }
 
-  /// Steps that an environment has taken since its episode began. Steps that fail do not count.
-  /// Noise of sensors goes by it.
+  /// Steps that an environment has taken since its episode began. Failed steps do not count. It
+  /// keys the noise of sensors.
   [[nodiscard]] std::int64_t steps(int environment) const { return steps_[lane(environment)]; }
   /// Sets this count, for a run that goes on from a stored state, in [0, 2^48).
   void set_steps(int environment, std::int64_t steps) { steps_[lane(environment)] = steps; }
@@ -77,16 +77,16 @@ class Batch {
   /// Copy one environment's coordinates out of its lane: (nq), (nv).
   void get_q(int environment, std::span<double> q) const;
   void get_v(int environment, std::span<double> v) const;
-  /// Sets a state and drops the integrator's history, so the next step is a start. Sensors with
-  /// memory have always seen this state. Quaternions are normalised.
+  /// Sets a state and drops the integrator's history, so the next step is a start. All past states
+  /// of sensors with lag become this state. Quaternions are normalised.
   void set_state(int environment, std::span<const double> q, std::span<const double> v);
   /// Sets the two newest states of a BDF2 run: (q, v) now and one step before. The next step
   /// continues the run.
   void set_state(int environment, std::span<const double> q, std::span<const double> v,
                  std::span<const double> previous_q, std::span<const double> previous_v);
 
-  /// What the friction of an environment remembers (docs/shear.md). It is empty when an episode
-  /// begins and after set_state().
+  /// Shear state of an environment: elastic displacements of its touching points (docs/shear.md).
+  /// Empty at the start of an episode and after set_state().
   [[nodiscard]] const ShearState& shear_state(int environment) const {
     return shear_[lane(environment)];
   }
@@ -97,18 +97,18 @@ class Batch {
   /// and the scene has them.
   void set_shear_state(int environment, std::span<const ShearEntry> memory);
 
-  /// Who sleeps in an environment (docs/sleeping.md): nobody, where no stepper with sleep stepped
-  /// it. reset() and every set_ function wake all bodies.
+  /// Sleep state of an environment (docs/sleeping.md). Empty unless a stepper with sleep enabled
+  /// stepped it. reset() and every set_ function wake all bodies.
   [[nodiscard]] const SleepState& sleep(int environment) const { return sleep_[lane(environment)]; }
   [[nodiscard]] std::span<const SleepState> sleeps() const {
     return {sleep_.data(), std::size_t(environments_)};
   }
-  /// Sets it, for a run that goes on from a stored state; an empty one wakes all. The earlier state
-  /// of trees that sleep becomes that of now. Throws InputError unless it is one of this scene.
+  /// Sets it, to resume from a stored state; an empty one wakes all bodies. For sleeping trees the
+  /// state one step before is set to the present one. Throws InputError unless it fits the scene.
   void set_sleep(int environment, const SleepState& state);
 
   /// Sets the newest state alone, for differences. Quaternions are taken as they are; history,
-  /// status and what friction remembers are kept.
+  /// status and shear state are kept.
   void displace_state(int environment, std::span<const double> q, std::span<const double> v);
 
   /// Freezes an environment as a failed step would. Throws InputError when `status` is not a
@@ -174,7 +174,7 @@ class Batch {
   std::uint64_t seed_;
   std::size_t block_stride_;  // doubles per block
   AlignedVector<double> data_;
-  // Per lane, padding lanes included, so that a block can be handed to a thread whole.
+  // Per lane, padding lanes included, so that threads can work on whole blocks.
   std::vector<StepStatus> status_;
   std::vector<std::int32_t> iterations_;
   std::vector<double> residual_;
@@ -183,7 +183,7 @@ class Batch {
   std::vector<std::int64_t> episode_, steps_;
   std::vector<ShearState> shear_;
   std::vector<SleepState> sleep_;
-  // What bodies may move until overlaps must be checked again [m] (interpenetration.hpp); 0: now.
+  // Distance that bodies may move until the next overlap check [m] (interpenetration.hpp); 0: now.
   std::vector<double> clearance_;
 };
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The norm of residuals (kernels/step/norms.hpp) of each component of a scene: bodies that neither
-// joints nor contacts connect. The worst of them counts. One norm for all would hide what a light
-// body lacks behind the forces on a heavy one that it never meets.
+// Maximum over the components of a scene of the residual norm (kernels/step/norms.hpp). A component
+// is a set of bodies that joints and contacts connect. One norm for the whole scene would scale the
+// residual of a light body by the forces on a heavy one that it never touches.
 #pragma once
 
 #include <cmath>

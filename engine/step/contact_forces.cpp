@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Groups contacts, and sums over them. What sensors feel is what is asked for, and may be light
-// beside the forces that carry a body, so it is a group of its own. The other forces count because
-// they move bodies that will be felt.
+// Groups contacts, and sums over them. Sensor contacts form their own group, because their forces
+// can be small beside load-bearing ones. The others count because they move sensed bodies.
 #include "engine/step/contact_forces.hpp"
 
 #include <algorithm>
@@ -14,9 +13,9 @@ using kernels::Vec3;
 
 namespace {
 
-// Share of the bodies' weight below which forces need not be right: those of a graze, and those
-// that no sensor feels where sensors feel others. A light ball that settles on stiff ground under a
-// heavy pad would otherwise take the parts.
+// Floors of the scale, as shares of the bodies' weight: of all contacts, and of contacts without
+// sensors in components with sensors. Otherwise a light ball that settles on stiff ground under a
+// heavy pad would determine the substeps.
 constexpr double kGraze = 0.01, kUnfelt = 0.05;
 
 /// A ball around some points.

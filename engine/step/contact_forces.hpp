@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// How far apart two sets of contact forces are, of bodies that joints and contacts connect.
+// Relative difference of two sets of contact forces, per group of connected contacts.
 #pragma once
 
 #include <vector>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Checks of the state at the end of whole steps: bodies of a contact that came through each other,
-// at whatever speed, and bodies that overlap where no contact point is as deep.
+// Checks of the state at the end of whole steps: bodies of a contact that passed through each other
+// over any number of steps, and bodies that overlap deeper than any contact point.
 #pragma once
 
 #include <vector>

@@ -1,21 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0
-// Sensors whose memory advances only at steps at which they are due to be read (docs/shear.md).
-// They keep the anchors b and a of each point from one of these steps to the next, so no earlier
-// state is needed. A point without anchors begins unsheared where it is found.
+// Sensors whose shear state is updated only at the steps at which they are read (docs/shear.md).
+// They store the anchors b and a of each point between reads, so no earlier state is needed. A
+// point without anchors starts with s = 0 at its present position.
 #pragma once
 
 #include "engine/step/shear_lane.hpp"
 
 namespace tangere {
 
-/// Whether the memory of a contact advances after `steps` ≥ 0 steps of an episode.
+/// Whether the shear state of a contact is updated after `steps` ≥ 0 steps of an episode.
 inline bool is_due(const CompiledModel& m, const kernels::ShearSpringContact& of,
                    std::int64_t steps) {
   const int every = m.shear_interval(of);
   return every > 0 && steps >= 0 && steps % every == 0;
 }
 
-/// Returns what is remembered of a contact's points.
+/// Returns the shear-state entries of a contact's points.
 inline std::span<const ShearEntry> entries_of(std::span<const ShearEntry> memory,
                                               const CompiledModel& m,
                                               const kernels::ShearSpringContact& of) {
@@ -33,7 +33,7 @@ inline std::ptrdiff_t kept_entries(const CompiledModel& m, std::span<const Shear
          memory.begin();
 }
 
-/// The points among all that remember of which b, and of which a, of a contact is kept.
+/// Ranges of point numbers under which b and a of a contact's points are stored.
 inline PointRange b_range(const kernels::ShearSpringContact& of) { return of; }
 inline PointRange a_range(const kernels::ShearSpringContact& of) {
   return {of.first + of.contact.n_points, of.contact.n_points};

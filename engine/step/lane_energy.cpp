@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// One lane in doubles: steps that are looked at so closely are few.
+// One lane at a time in doubles: few steps need it.
 #include "engine/step/lane_energy.hpp"
 
 #include <algorithm>
@@ -136,8 +136,8 @@ struct LaneAt {
     return {{V.a.x[lane], V.a.y[lane], V.a.z[lane]}, {V.l.x[lane], V.l.y[lane], V.l.z[lane]}};
   }
 
-  /// Returns the power that a touching point takes: what its force does to the motion, less what
-  /// its spring gives back.
+  /// Returns the power that a touching point dissipates: the negative power of its force less the
+  /// rate of energy stored in its spring.
   static double taken_at(const kernels::LawParameters<double>& law,
                          const kernels::PointContact<double>& p) {
     return p.d < 0 ? -dot(p.force, p.u) - law.kn * p.d * p.rate : 0;

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// The energy of one environment, to find steps that create some.
+// Mechanical energy of one environment, for the check that a step creates none.
 //
 //   E = Σ (m v² + 2 ω·(c × v) + ω·Jω)/2 + I_a v²/2 - Σ gravity·(m p + R c)
 //       + Σ k (q - rest)²/2 + Σ k_l (q beyond a limit)²/2 + Σ f (e - f/2P) + Σ k_n d²/2
 //       + Σ k_s |s|²/2
-// with c the moment and J the inertia of a link about its origin, e the distance of a position
-// motor from its target, f = clip(P e, range), and s the elastic displacement of a contact point
-// whose friction has a spring. Damping and slip only take energy away, and gravity, springs,
-// limits, motors whose target stays and contacts whose faces stay give back what they hold. So E
-// can only rise by the work of forces that are known at the start of the step.
+// with c the mass times centre of mass and J the inertia of a link about its origin, e the distance
+// of a position motor from its target, f = clip(P e, range), and s the elastic displacement of a
+// contact point with a shear spring. Damping and slip only dissipate energy; gravity, springs,
+// limits, motors with constant target and contacts with constant faces are conservative. So E can
+// rise only by the work of forces that are known at the start of the step.
 #pragma once
 
 #include "engine/step/workspace.hpp"
@@ -34,13 +34,13 @@ double energy_of_contacts(const CompiledModel& model, const kernels::KernelTable
                           BasicWorkspace<L>& w,
                           const AlignedVector<kernels::LinkPose<kernels::Row<L>>>& poses, int lane);
 
-/// Computes what the tangential springs of contacts hold in one lane [J]: Σ k_s |s|²/2 over the
+/// Computes the energy of the shear springs of contacts in one lane [J]: Σ k_s |s|²/2 over the
 /// points of `memory`. Sensors act on no body, so their springs are left out.
 template <int L>
 double energy_of_friction(const CompiledModel& model, const BasicWorkspace<L>& w,
                           const ShearState& memory, int lane);
 
-/// The books of one environment: what it holds, and what passes through motors and damping.
+/// Energy balance of one environment: stored energy, and power of motors and damping.
 struct LaneBooks {
   double motion = 0;  ///< energy of moving bodies and armatures [J]
   double height = 0;  ///< -Σ gravity·(m p + R c) [J]
@@ -49,8 +49,8 @@ struct LaneBooks {
   double taken = 0;   ///< power that damping and friction take [W]
 };
 
-/// Keeps the books of the state q0, v0 in a workspace that has its poses (poses_before), faces and
-/// what motors do. Friction that remembers counts as if it did not. Overwrites its `search`.
+/// Computes the energy balance at q0, v0 of a workspace whose poses_before, faces and motor forces
+/// are set. Shear springs are ignored. Overwrites its `search`.
 LaneBooks lane_books(const CompiledModel& model, const kernels::KernelTable& table,
                      SingleWorkspace& w);
 

@@ -23,7 +23,7 @@ class PivotedFactors {
   template <int L>
   void solve(int lane, const kernels::Row<L>* b, kernels::Row<L>* out);
 
-  /// Returns the memory that this takes [bytes].
+  /// Returns the size of its buffers [bytes].
   static std::size_t bytes(int lanes, int n);
 
  private:

@@ -14,8 +14,8 @@
 
 namespace tangere {
 
-/// Returns the lanes in which some ball joint turned so far in a step of length h by a scheme that
-/// its momentum should be looked at. The step ended in the workspace's v1.
+/// Returns the lanes in which some ball joint rotated far enough in a step of length h by a scheme
+/// that its momentum has to be checked. The step ended in the workspace's v1.
 template <int L>
 LaneBits far_turners(const CompiledModel& model, const Scheme& scheme, const BasicWorkspace<L>& w,
                      LaneBits lanes, double h);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// One lane of a workspace as the kernels of memory take it: its contacts at a state, its points,
-// and what it remembers of them.
+// One lane of a workspace as arguments of kernels/shear: contacts at a state, points, and their
+// shear state.
 #pragma once
 
 #include <algorithm>
@@ -76,7 +76,7 @@ kernels::ShearSpringTouch touch_of(const CompiledModel& m, const BasicWorkspace<
   return t;
 }
 
-/// Points among all that remember.
+/// Range of points with shear springs.
 struct PointRange {
   int first, count;
   PointRange(int begin, int number) : first(begin), count(number) {}
@@ -84,10 +84,10 @@ struct PointRange {
       : first(of.first), count(of.contact.n_points) {}
 };
 
-/// Writes (3, stride) numbers of points, up to the end of the last vector: those of the entries
-/// that they have in a memory, else zeros. `index`: number of each point in its contact, rising;
-/// null: all points in order. `number`(entry, c): component c of an entry. `next`: any place in the
-/// memory; contacts are found soonest one after the other. It moves on to the end of this one.
+/// Writes (3, stride) numbers of points, up to the end of the last vector: those of their entries
+/// in a shear state, else zeros. `index`: ascending number of each point in its contact; null: all
+/// points in order. `number`(entry, c): component c of an entry. `next`: start of the search in the
+/// shear state, any index; set to the end of this contact, so contacts in order are found fastest.
 template <class Number>
 void shear_of_points(std::span<const ShearEntry> memory, const PointRange& of, const int* index,
                      int count, int stride, const Number& number, double* out, std::size_t& next) {
@@ -108,7 +108,7 @@ void shear_of_points(std::span<const ShearEntry> memory, const PointRange& of, c
       for (int c = 0; c < 3; ++c) out[c * stride + k] = number(next, c);
   }
 }
-/// Writes what is remembered of points.
+/// Writes the elastic displacements of points.
 inline void shear_of_points(std::span<const ShearEntry> memory, const PointRange& of,
                             const int* index, int count, int stride, double* out,
                             std::size_t& next) {

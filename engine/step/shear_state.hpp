@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What friction remembers between steps (docs/shear.md): the elastic displacement of every point
-// that touches, for contacts with a tangential stiffness. All else that the law needs follows from
-// the state.
+// Shear state: the elastic displacement of every touching point of contacts with a tangential
+// stiffness k_s (docs/shear.md). All other inputs of the contact law follow from q and v.
 #pragma once
 
 #include <cstdint>
@@ -9,7 +8,7 @@
 
 namespace tangere {
 
-/// One point that touches. Points of all contacts that remember are numbered through.
+/// One touching point. Points of all contacts with shear springs are numbered consecutively.
 struct ShearEntry {
   std::int32_t point;
   double s[3];  ///< elastic displacement, axes of the link that carries the point [m]

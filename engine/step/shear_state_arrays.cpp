@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Names the points that remember, and puts them in an order that users know.
+// Names of points with shear springs, and their order in files.
 #include "engine/step/shear_state_arrays.hpp"
 
 #include <algorithm>

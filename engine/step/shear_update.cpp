@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Hands one environment after another to the kernels of memory.
+// Calls the kernels of kernels/shear, one environment after the other.
 #include "engine/step/shear_update.hpp"
 
 #include <algorithm>
@@ -14,7 +14,7 @@ using kernels::ShearSpringPoints;
 
 namespace {
 
-/// Appends what is remembered of the points that touch at the end.
+/// Appends the shear-state entries of the points that touch at the end.
 template <int L>
 void advance_points(const CompiledModel& m, const kernels::KernelTable& table, BasicWorkspace<L>& w,
                     const ShearSpringContact& of, int lane, const int* index,
@@ -29,7 +29,7 @@ void advance_points(const CompiledModel& m, const kernels::KernelTable& table, B
   }
 }
 
-/// The first point on the ground among all that remember; there are CompiledModel::ground_anchors.
+/// Number of the first ground point with a shear spring; there are CompiledModel::ground_anchors.
 int first_on_ground(const CompiledModel& m) {
   const auto first = std::find_if(m.shear_springs.begin(), m.shear_springs.end(),
                                   [](const ShearSpringContact& of) { return of.ground; });
@@ -45,8 +45,8 @@ void find_touches(const CompiledModel& m, const kernels::KernelTable& table, Bas
   table.stage<L>().touches_at(m.view, poses.data(), touches.data());
 }
 
-/// Fills rows (points on the ground, 3) with what is remembered of them. Returns false, and leaves
-/// them alone, where no lane remembers any.
+/// Fills rows (points on the ground, 3) with their elastic displacements. Returns false, and leaves
+/// the rows unchanged, if no lane has an entry for any of them.
 template <int L>
 bool put_ground(const CompiledModel& m, int first, const std::array<ShearState, L>& now,
                 Row<L>* rows) {

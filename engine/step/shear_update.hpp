@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The memory of friction in the lanes of a workspace: anchors when a solve begins and lists are
-// made, the memory after it when it has found its root.
+// Shear state in the lanes of a workspace: computes anchors at the start of a solve and after each
+// detection, and the updated shear state after convergence.
 #pragma once
 
 #include <span>
@@ -24,12 +24,12 @@ template <int L>
 void update_shear_state(const CompiledModel& model, const kernels::KernelTable& table,
                         BasicWorkspace<L>& w, LaneBits lanes);
 
-/// A lane whose step is done, at q0, v0.
+/// A lane after its step, with the state in q0, v0.
 struct ReadingLane {
   std::int64_t steps = -1;      ///< of its episode until then; -1: it took none
-  ShearState* shear = nullptr;  ///< all that it remembers
+  ShearState* shear = nullptr;  ///< of the lane's environment
 };
-/// Advances the memory of sensors that are due to be read. `lanes`: (L).
+/// Updates the shear state of sensors that are due to be read. `lanes`: (L).
 template <int L>
 void update_sensor_shear_state(const CompiledModel& model, const kernels::KernelTable& table,
                                BasicWorkspace<L>& w, std::span<const ReadingLane> lanes);

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Who rests, who could touch whom, who falls asleep and who wakes.
+// Rest counters, pairs of trees that could touch, falling asleep and waking.
 //
-// Whether awake bodies come near sleeping ones is looked at when they have moved as far as the last
-// look found to be safe (SleepState::clearance), not in every step.
+// Distances between awake and sleeping bodies are queried only when the awake ones have moved by
+// the clearance that the last query found (SleepState::clearance).
 #include "engine/step/sleep.hpp"
 
 #include <algorithm>
@@ -36,7 +36,7 @@ constexpr double kFallTimes = 2;
 /// eight different parts that are awake, they are stepped one after the other. With more than a
 /// third each that takes longer than all of the model in all lanes at once.
 constexpr int kFewestPerAwake = 3;
-/// A look tells up to this many times the distance that is needed now, by factors of kFiner.
+/// Distance queries search up to kFarLook times the needed distance, in steps of kFiner.
 constexpr double kFarLook = 64, kFiner = 4;
 
 /// From the sum of a quaternion's changes to an angle: θ = 4 asin(|Δq|/2) ≤ π/√2 |Δq| up to a half

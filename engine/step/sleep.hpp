@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// Decides which bodies sleep, by what their own environment did and by nothing else
-// (docs/sleeping.md). With w_i the greatest distance of a tree's points from the axis of
+// Sleeping criterion. It depends on the state of the environment alone (docs/sleeping.md). With w_i
+// the greatest distance of a tree's points from the axis of
 // coordinate i, or 1 where the joint slides, no point of the tree moves further in a step than
 //   m = Σ w_i |Δq_i|
-// A tree rests where m ≤ share · size / n, n = max(20, 2 √(size/|gravity|) / h) steps, and may
-// sleep when it rested for n steps. It does when all trees that it could touch may, too, and at
-// most a third of the dofs of the environment stays awake.
+// A tree is at rest if m ≤ share · size / n, n = max(20, 2 √(size/|gravity|) / h) steps, and may
+// sleep after n steps of rest. It falls asleep if all trees that it could touch may sleep too, and
+// at most a third of the dofs of the environment then stays awake.
 #pragma once
 
 #include <span>
@@ -31,8 +31,8 @@ class Sleep {
   [[nodiscard]] int trees() const { return static_cast<int>(steps_.size()); }
   [[nodiscard]] std::span<const int> tree_of_link() const { return tree_; }
 
-  /// Makes room in a state that is empty. Trees whose controls are not those of the last step
-  /// wake, or have not rested.
+  /// Allocates an empty state. Wakes trees whose controls differ from those of the last step, and
+  /// resets their rest counters.
   void wake_on_control_change(SleepState& state, std::span<const double> u) const;
 
   /// Computes m of each tree, (trees, L) [m], from the state in `rows` to that in the workspace.
@@ -41,22 +41,22 @@ class Sleep {
   void movements(const double* rows, const BasicWorkspace<L>& w, std::span<const int> q,
                  kernels::Row<L>* out) const;
 
-  /// Notes how far awake bodies moved in this step, at most [m], where some sleep. Returns true
-  /// where none of them can come within reach of a sleeping one in the next step, by the last look.
+  /// Adds `moved`, a bound on the displacement of awake bodies in this step [m], if some body
+  /// sleeps. Returns true if, by the last distance query, no awake body can reach a sleeping one in
+  /// the next step.
   bool no_awake_body_in_reach(SleepState& state, double moved) const;
-  /// Looks, and wakes the bodies that awake ones may reach in the next step. `q`: (nq) coordinates
-  /// at the end of this step. `moved`: the largest m in this step [m]. Returns true if one of them
-  /// is touched already: the step must then be taken again, with it awake. Overwrites q0 of
-  /// `single`.
+  /// Queries distances and wakes the bodies that awake ones may reach in the next step. `q`: (nq)
+  /// coordinates at the end of this step. `moved`: the largest m in this step [m]. Returns true if
+  /// a sleeping body is touched already: the step must then be repeated with it awake. Overwrites
+  /// q0 of `single`.
   bool wake_touched(const kernels::KernelTable& table, const SleepingLane& at,
                     std::span<const double> q, double moved, SingleWorkspace& single);
 
-  /// Counts the steps of rest after one that is in the block. `moved`: m of tree t at t · stride,
-  /// of those that are awake. `plainly`: the step was neither split nor taken again. Returns
-  /// whether settle() may let some tree fall asleep; while its neighbours keep it awake, it is
-  /// asked again after as many steps.
+  /// Updates the rest counters after a step whose result is in the block. `moved`: m of awake tree
+  /// t at t · stride. `plainly`: the step was neither split nor repeated. Returns whether
+  /// put_to_sleep() may succeed for some tree: after n, 2n, 3n … steps of rest.
   bool update_rest_counters(SleepState& state, const double* moved, int stride, bool plainly) const;
-  /// Lets trees fall asleep. Overwrites q0 of `single`.
+  /// Puts trees to sleep that satisfy the criterion. Overwrites q0 of `single`.
   void put_to_sleep(const kernels::KernelTable& table, const SleepingLane& at,
                     SingleWorkspace& single);
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which bodies of an environment sleep (docs/sleeping.md), and what decides when they fall asleep
-// and when they wake. A tree is a body with all that joints connect it with, the world left out.
+// Sleep state of one environment: sleeping trees, rest counters and reach (docs/sleeping.md). A
+// tree is a body with all bodies that joints connect it with, the world excluded.
 #pragma once
 
 #include <cstdint>
@@ -20,7 +20,7 @@ struct SleepState {
   bool resting = false;    ///< some tree that is awake has rested in the last step
   std::int64_t slept = 0;  ///< steps that bodies slept since the episode began, summed over bodies
 
-  /// Wakes every body and forgets how long bodies have rested.
+  /// Wakes every body and resets the rest counters.
   void wake() {
     const std::int64_t so_far = slept;
     *this = {};

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Names of what falls asleep together, for files that hold who sleeps.
+// Names of kinematic trees, for files that store the sleep state.
 #pragma once
 
 #include <string>

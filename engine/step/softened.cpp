@@ -9,7 +9,7 @@
 //
 // A share that finds no root is replaced by the geometric mean of it and the last one that did. A
 // root on the way need not be exact. The last one, at s = 1, meets the tolerance and is a root of
-// the stage as it is, so derivatives need not know how it was found.
+// the unchanged stage, so derivatives do not depend on the path.
 //
 // Lanes have shares of their own and are searched together. A lane's bits do not depend on the
 // others.

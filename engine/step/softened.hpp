@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Roots of stages whose contacts are too stiff to be found from the first guess (docs/solver.md).
+// Continuation in contact stiffness, for stages whose root Newton's method does not find from the
+// first guess (docs/solver.md).
 #pragma once
 
 #include "engine/step/newton.hpp"

@@ -1,14 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// Looks at solved steps that a scheme does not promise to be right: bodies that came through each
-// other, energy from nowhere, and bodies that turn too far for it (rotation_defect.hpp).
+// Checks of converged steps: tunnelling, created energy, and rotations too large for the scheme
+// (rotation_defect.hpp).
 //
-// A scheme of order two or three takes the forces of a step for smooth. Across a touch, a release
-// or the limit of a joint they are not, and the bodies can leave with more than they came with. The
-// energy of a step (lane_energy.hpp) is compared with that of its start where some component's
-// velocities changed by a fair share:
+// Schemes of order two or three assume smooth forces. Across an impact, a release or a joint limit
+// forces are not smooth, and kinetic energy can grow. The energy after a step (lane_energy.hpp) is
+// compared with that before it if the velocities of some component changed by a large share:
 //   ‖D^½ (v₁ - v₀)‖ > kJump max(‖D^½ v₀‖, ‖D^½ v₁‖)   and   > h |gravity| √(3 mass)
-// which costs next to nothing and is false in smooth motion once the step is short enough. So
-// orders are kept.
+// The test is cheap, and false in smooth motion for short steps, so orders of convergence are kept.
 #include "engine/step/step_checks.hpp"
 
 #include <algorithm>

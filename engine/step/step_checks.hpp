@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Looks at solved steps (GroupStep::solve_and_check).
+// Checks of solved steps: tunnelling, velocity jumps, energy gain, rotation
+// (GroupStep::solve_and_check).
 #pragma once
 
 #include <vector>
@@ -11,8 +12,8 @@
 
 namespace tangere {
 
-/// Lanes that found a root. Those in which a body came through another, that created energy, or in
-/// which a body turned too far for the scheme should not be taken.
+/// Lanes that converged, and among them those to reject: a body passed through another, energy was
+/// created, or a body rotated too far for the scheme.
 struct CheckedSolve {
   LaneBits found = 0, tunnelled = 0, energy_created = 0, over_rotated = 0;
   [[nodiscard]] LaneBits accepted() const {
@@ -20,12 +21,12 @@ struct CheckedSolve {
   }
 };
 
-/// The solve that is looked at began at q0, v0 of the workspace and ended in q1, v1.
+/// The checked solve started at q0, v0 of the workspace and ended in q1, v1.
 class StepChecks {
  public:
   StepChecks(const CompiledModel& model, const StepSettings& settings);
 
-  /// Notes lanes in which a body came through another that it touches.
+  /// Marks lanes in which a body passed through one of its contact partners.
   template <int L>
   void find_tunnelling(const kernels::KernelTable& table, BasicWorkspace<L>& w, LaneBits lanes,
                        NewtonReport& report) const;
@@ -47,7 +48,7 @@ class StepChecks {
   void find_poses(const kernels::KernelTable& table, BasicWorkspace<L>& w) const;
 
   const CompiledModel& model_;
-  bool bounded_energy_, cut_;  ///< as the settings say; steps are cut to keep an accuracy
+  bool bounded_energy_, cut_;  ///< StepSettings::bounded_energy; accuracy > 0
   TunnellingCheck tunnelling_;
   std::vector<double> component_mass_;  ///< [kg] without densities that vary
 };

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Chooses between what the caller and what the scene asks for, and checks it.
+// Merges the options of caller and scene, and checks them.
 #include "engine/step/step_settings.hpp"
 
 #include <algorithm>
@@ -10,9 +10,9 @@ namespace tangere {
 
 namespace {
 
-/// Parts that keep an accuracy are solved to this share of it, so that what is measured is the
-/// error of the scheme. What solves leave adds up over the steps, and no estimate sees it. So they
-/// are at most `kLooser` times as loose as those of plain steps.
+/// Substeps that keep an accuracy are solved to this share of it, so that the estimate measures the
+/// error of the scheme. Residuals of solves accumulate over steps and enter no estimate. So their
+/// tolerance is at most `kLooser` times that of plain steps.
 constexpr double kShareOfAccuracy = 0.01, kTightest = 1e-9, kLoosest = 1e-4, kLooser = 10;
 
 void check_accuracy(const StepperOptions& o, double accuracy) {

@@ -13,8 +13,8 @@ struct StepSettings {
   double tolerance;
   int max_iterations;
   double accuracy = 0;  ///< relative, of the parts of a step; 0: every step is one part
-  /// Solves may end unchecked where they promise to meet the tolerance, and stages share factors.
-  /// False where the tolerance was named.
+  /// Skip the final residual evaluation where quadratic convergence predicts that the tolerance is
+  /// met, and share factors between stages. False with an explicit tolerance.
   bool spare = false;
   /// Steps that create energy are taken by BDF1 or in parts, and those in which bodies turn too far
   /// by SDIRK2 or in parts.

@@ -23,7 +23,7 @@ using kernels::kBlock;
 using kernels::kGroup;
 using kernels::Row;
 
-/// Keeps a lane's state, which a step is about to replace, for sensors with memory.
+/// Stores a lane's state before a step replaces it, for sensors with lag.
 static void remember(const BlockLayout& layout, double* column, std::int64_t steps) {
   const int numbers = layout.previous_q - layout.q;
   const int place = layout.past + numbers * static_cast<int>(steps % layout.past_states);
@@ -85,11 +85,10 @@ struct Sleeping {
 struct Stepper::Impl {
   Model model;
   StepSettings settings;
-  /// Without the contacts that never push; null where nothing is to be left out. Sleep looks at
-  /// all contacts.
+  /// The model without inert contacts; null if there are none. Sleep uses all contacts.
   std::unique_ptr<ModelPart> without_inert;
   ModelStepper machine;
-  /// With all of them, for derivatives by their numbers: made when a tape first asks for it.
+  /// With all of them, for derivatives by their parameters. Built when the first tape is written.
   std::unique_ptr<ModelStepper> with_all_contacts;
   std::vector<int> all_q, all_v;  ///< 0, 1, …
   std::unique_ptr<Sleeping> sleeping;
@@ -122,7 +121,7 @@ struct Stepper::Impl {
             by.single, all_q, all_v};
   }
 
-  /// Sets what the motors of the live lanes do; takes out lanes with controls that are not finite.
+  /// Sets the motor forces and targets of the live lanes; clears lanes with non-finite controls.
   template <int L>
   void set_motors_of(Batch& batch, BasicWorkspace<L>& w, GroupOfBlock& g, int lane,
                      std::span<const double> controls) {
@@ -139,7 +138,7 @@ struct Stepper::Impl {
   }
 
   /// Steps the live lanes of a group. `lane`: the one that is in lane 0 of a workspace of one.
-  /// Returns lanes that must be stepped again, because an awake body touches one that slept.
+  /// Returns lanes whose step must be repeated, because an awake body touches a sleeping one.
   template <int L>
   LaneBits step_lanes(Batch& batch, const SteppedModel& stepped, BasicWorkspace<L>& w,
                       const GroupOfBlock& g, int lane, BlockTape* tape) {
@@ -208,9 +207,9 @@ struct Stepper::Impl {
     return again << lane;
   }
 
-  /// Checks the states that lanes have stepped to for bodies that came through each other or
-  /// overlap, where bodies have moved far enough to do so since the last check. `first`: the lane
-  /// of the group that is lane 0 of the L.
+  /// Checks new states for bodies that passed through each other or overlap, in lanes in which
+  /// bodies have moved farther than the clearance of the last check. `first`: the lane of the group
+  /// that is lane 0 of the L.
   template <int L>
   void check_overlaps(Batch& batch, const GroupOfBlock& g, int first, LaneBits stepped,
                       SingleWorkspace& w) {
@@ -320,7 +319,7 @@ struct Stepper::Impl {
     return touched;
   }
 
-  /// Lets bodies of lanes that have stepped fall asleep.
+  /// Updates rest counters of stepped lanes and puts bodies to sleep.
   template <int L>
   void put_to_sleep(Batch& batch, const GroupOfBlock& g, int lane, LaneBits lanes) {
     const double* const moved = sleeping->moved_rows<L>()->lane;

@@ -49,7 +49,7 @@ class Stepper {
   void step_block(Batch& batch, int block, std::span<const double> controls,
                   BlockTape* tape = nullptr);
 
-  /// Memory that a stepper of this model takes [bytes].
+  /// Size of the scratch of a stepper of this model [bytes].
   static std::size_t workspace_bytes(const Model& model);
 
  private:

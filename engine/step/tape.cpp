@@ -18,7 +18,7 @@ int BlockTape::rows(const Model& model, Integrator integrator) {
 }
 
 std::size_t BlockTape::bytes(const Model& model, Integrator integrator, std::int64_t steps) {
-  // Friction remembers at most all points of its contacts; those of a sensor touch one body each.
+  // Upper bound of entries: all points of contacts; points of a sensor touch one body each.
   const std::size_t memory = std::size_t(compiled(model).taped_points) * sizeof(ShearEntry);
   return std::size_t(steps + 2) * kBlock *
          (std::size_t(rows(model, integrator)) * sizeof(double) + memory);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the reverse sweep needs to know of one block's rollout: its states, and the solves of steps
+// Tape of one block's rollout for the reverse sweep: states, inner stages, and the solves of steps
 // that were not plain steps of the scheme.
 #pragma once
 
@@ -22,7 +22,7 @@ struct TapedSolve {
   double h;                   ///< [s]
   std::vector<double> q, v;   ///< its result: (nq), (nv)
   std::vector<double> inner;  ///< inner stages relative to the solve's start, (inner_stages, nv)
-  ShearState memory;          ///< what friction remembers after it
+  ShearState memory;          ///< shear state after it
 };
 
 /// The solves of one environment's step, first to last.
@@ -60,7 +60,7 @@ class BlockTape {
   [[nodiscard]] const double* inner(std::int64_t step) const {
     return state(step + 1) + std::size_t(nq_ + nv_) * 16;
   }
-  /// What friction remembers after `step` steps.
+  /// Shear state after `step` steps.
   [[nodiscard]] std::span<const ShearEntry> memory(std::int64_t step, int lane) const;
   /// The solves of one environment's step; null for a plain step.
   [[nodiscard]] const TapedStep* special(std::int64_t step, int lane) const;
@@ -72,7 +72,7 @@ class BlockTape {
   [[nodiscard]] std::int64_t episode_step(std::int64_t step, int lane) const {
     return before_[std::size_t(lane)] + std::min(step, taken_[std::size_t(lane)]);
   }
-  /// Memory of a block's tape for this many steps [bytes].
+  /// Size of a block's tape for this many steps [bytes].
   static std::size_t bytes(const Model& model, Integrator integrator, std::int64_t steps);
 
  private:
@@ -91,8 +91,7 @@ class BlockTape {
   std::vector<TapedStep> special_;    // rising steps
   std::vector<std::int64_t> taken_;   // (16)
   std::vector<std::int64_t> before_;  // (16) steps of the episodes before the tape began
-  // What friction remembers, and where each lane's part ends: (steps + 1, 16). Empty where nothing
-  // remembers.
+  // Shear states, and the end of each lane's part: (steps + 1, 16). Empty without shear springs.
   ShearState memory_;
   std::vector<std::size_t> memory_end_;
 };

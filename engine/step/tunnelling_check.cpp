@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// A wall is a body of a pair. The other body has come through it when its middle changes sides of a
-// plane that halves the wall along one of its axes, well within the wall's other widths: deep in a
-// convex wall, where contacts at rest never are. In parts of a step only those are compared in
-// which links move against each other by more than half of what is thinnest.
+// A slab is one body of a pair. The other body has tunnelled if its centre crosses the mid plane of
+// the slab along one of its axes, well within the slab's other widths. Contacts at rest never reach
+// that depth. In substeps only pairs whose links move relative to each other by more than half of
+// their smallest width are tested.
 #include "engine/step/tunnelling_check.hpp"
 
 #include <algorithm>
@@ -24,7 +24,7 @@ using kernels::Vec3;
 
 namespace {
 
-/// Of the wall's half widths: what crosses its plane farther out may go past it.
+/// Share of the slab's half widths: crossings of its mid plane farther out may pass beside it.
 constexpr double kWithin = 0.7;
 
 double component(const Vec3<double>& a, int k) { return k == 0 ? a.x : k == 1 ? a.y : a.z; }
@@ -39,16 +39,16 @@ Vec3<double> TunnellingCheck::half_of(PrimitiveShape shape, const Vec3<double>& 
   return hull.straight + hull.round;
 }
 
-/// Returns how far from a wall's middle the middle of the other body is surely inside [m], along an
-/// axis of half width `half`. What goes past the edge of a cuboid keeps its own width away from it,
-/// and what is pressed into a face does not come as deep. In other shapes kWithin of the widths is
-/// inside, because 2 kWithin² < 1.
+/// Returns the distance from a slab's centre within which the other body's centre is surely inside
+/// [m], along an axis of half width `half`. A body that passes beside the edge of a cuboid stays
+/// its own width away from it, and one that is pressed into a face stays shallower. In other shapes
+/// kWithin of the widths is inside, because 2 kWithin² < 1.
 double TunnellingCheck::within_of(const Slab& wall, double half) {
   if (wall.shape != PrimitiveShape::cuboid) return kWithin * half;
   return std::max(kWithin * half, half - wall.other_wide);
 }
 
-/// Returns half the widths of a wall in an environment.
+/// Returns half the widths of a slab in an environment.
 Vec3<double> TunnellingCheck::half_in(const Slab& wall, const double* column) {
   if (wall.size_row < 0) return wall.half;
   return half_of(wall.shape, kernels::load_vector<double>({}, wall.size_row, column, 0));
@@ -73,8 +73,8 @@ void TunnellingCheck::add(int link, const Frame<double>& at, PrimitiveShape shap
   }
 }
 
-/// Puts balls around the walls and middles of every gate: their centres are means, so that a gate
-/// of two bodies has the bodies' own.
+/// Computes balls around the slabs and centres of every pair of links. Ball centres are means, so
+/// for two bodies they are the bodies' own centres.
 void TunnellingCheck::bound_slab_pairs() {
   const auto for_sides = [&](const auto& f) {
     for (const Slab& wall : slabs_) {
@@ -96,7 +96,7 @@ void TunnellingCheck::bound_slab_pairs() {
   });
 }
 
-/// Says for every pair of links that has a wall how much room its walls and middles take.
+/// Computes, for every pair of links with a slab, the radii around its slabs and centres.
 void TunnellingCheck::bound_link_pairs() {
   const auto length = [](const Vec3<double>& a) { return std::sqrt(dot(a, a)); };
   for (std::size_t g = 0; g < model_.link_pairs.size(); ++g) {
@@ -181,7 +181,7 @@ TunnellingCheck::TunnellingCheck(const CompiledModel& m) : model_(m), arm_(m.lin
           wide(p.shape, p.size));
   }
   bound_slab_pairs();
-  // passed() looks at a gate once.
+  // tunnelled() visits each pair of links once.
   std::stable_sort(slabs_.begin(), slabs_.end(), [](const Slab& a, const Slab& b) {
     return a.link_pair_bound < b.link_pair_bound;
   });
@@ -219,12 +219,11 @@ LaneBits TunnellingCheck::far_movers(const Row<L>* x, Row<L>* way) const {
   return far;
 }
 
-// With d the vector from a wall to a middle, d moves in the wall's axes by no more than the ways of
-// both and |d| times the angle by which the wall turned. A line of this length that ends |d| away
-// comes within the wall only if |d| is no longer than both together. A way is a sum over joints of
-// what they slide, and of their angle times an arm: taken back from the root on, every joint turns
-// the rest as it is where the solve ended. Here it is over all joints of the scene. Where the last
-// evaluation was spared, kinematics ran once more, so |d| is that of the end.
+// Bound. Let d be the vector from the slab's centre to the other centre, at the end of the solve.
+// In the slab's axes d moved by at most travel₁ + travel₂ + |d| · rotation of the slab. It can have
+// crossed the slab only if |d| ≤ this displacement + radius_sum. travel is a sum over joints of
+// slide, and of angle times arm; here over all joints of the scene. If the final evaluation was
+// skipped, kinematics ran once more, so |d| is that at the end.
 template <int L>
 LaneBits TunnellingCheck::out_of_reach(const BasicWorkspace<L>& w, LaneBits lanes) const {
   if (slabs_.empty()) return lanes;
@@ -259,7 +258,7 @@ LaneBits TunnellingCheck::out_of_reach(const BasicWorkspace<L>& w, LaneBits lane
   return lanes;
 }
 
-/// Returns the place of the other body's middle in a wall's axes.
+/// Returns the other body's centre in a slab's axes.
 template <int L>
 Vec3<double> TunnellingCheck::middle_in(const Slab& wall,
                                         const AlignedVector<LinkPose<Row<L>>>& poses, int lane) {

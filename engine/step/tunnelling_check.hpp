@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Finds bodies that came through each other within a step, which a look at its end alone misses.
+// Tunnelling check: finds bodies that passed through each other between two states.
 #pragma once
 
 #include <cmath>
@@ -19,27 +19,26 @@ class TunnellingCheck {
   template <int L>
   [[nodiscard]] LaneBits far_movers(const kernels::Row<L>* x, kernels::Row<L>* way) const;
 
-  /// Returns those of `lanes` in which nothing came near enough to come through: where the solve
-  /// ended, the links of every pair are farther apart than what moved could have bridged. Looks at
-  /// what kinematics() left there.
+  /// Returns those of `lanes` in which no tunnelling is possible: at the end of the solve the links
+  /// of every pair are farther apart than their displacement. Reads the results of kinematics().
   template <int L>
   [[nodiscard]] LaneBits out_of_reach(const BasicWorkspace<L>& w, LaneBits lanes) const;
 
-  /// Whether in one lane the middle of a body came through the middle plane of another that it
-  /// touches, between these poses of the links.
+  /// Whether in one lane, between these poses of the links, the centre of a body crossed the mid
+  /// plane of one of its contact partners.
   template <int L>
   [[nodiscard]] bool tunnelled(const AlignedVector<kernels::LinkPose<kernels::Row<L>>>& before,
                                const AlignedVector<kernels::LinkPose<kernels::Row<L>>>& after,
                                int lane) const;
 
-  /// Whether between two states of an environment, however far apart, the middle of a convex body
-  /// came through the middle plane of another. `column`: its numbers in the block, for sizes that
-  /// vary.
+  /// Whether between two states of an environment, any number of steps apart, the centre of a
+  /// convex body crossed the mid plane of another. `column`: the environment's column of the block,
+  /// for sizes that vary.
   [[nodiscard]] bool changed_sides(const AlignedVector<kernels::LinkPose<kernels::Row<1>>>& before,
                                    const AlignedVector<kernels::LinkPose<kernels::Row<1>>>& after,
                                    const double* column) const;
-  /// Returns how far bodies may move against each other until one can change sides [m]: the least
-  /// distance of a middle from the part of a middle plane that it would have to come through.
+  /// Returns a lower bound on the relative displacement before some body can change sides [m]: the
+  /// least distance of a centre from the part of a mid plane that it would have to cross.
   [[nodiscard]] double clearance(const AlignedVector<kernels::LinkPose<kernels::Row<1>>>& poses,
                                  const double* column) const;
 
@@ -73,7 +72,7 @@ class TunnellingCheck {
                                          const kernels::Vec3<double>& from,
                                          const kernels::Vec3<double>& to);
 
-  /// A ball around all walls and middles of one link, in its axes.
+  /// A ball around all slabs and centres of one link, in its axes.
   struct Ball {
     kernels::Vec3<double> centre{};
     double radius = 0;
@@ -91,8 +90,8 @@ class TunnellingCheck {
       const LinkPairBound& gate, const AlignedVector<kernels::LinkPose<kernels::Row<L>>>& before,
       const AlignedVector<kernels::LinkPose<kernels::Row<L>>>& after, int lane);
 
-  /// A pair of links, and the largest sum of a wall's half diagonal and of the distances of wall
-  /// and middle from the balls' centres (LinkPair) [m].
+  /// A pair of links, and the largest sum of a slab's half diagonal and of the distances of slab
+  /// and centre from the balls' centres (LinkPair) [m].
   struct RadiusBound {
     std::size_t link_pair;
     double radius_sum;
@@ -100,7 +99,7 @@ class TunnellingCheck {
 
   const CompiledModel& model_;
   std::vector<Slab> slabs_;
-  std::vector<RadiusBound> bounds_;  ///< of every pair of links with a wall
+  std::vector<RadiusBound> bounds_;  ///< of every pair of links with a slab
   bool bounded_ = true;              ///< whether the arms of all links are known
   std::vector<int> sliders_;         ///< in q: the sliding dofs of links that others turn
   std::vector<LinkPairBound> link_pair_bounds_;

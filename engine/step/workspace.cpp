@@ -13,7 +13,7 @@ using kernels::Row;
 
 namespace {
 
-/// Walks over all rows: counts them (base = nullptr) or hands them out.
+/// Visits all rows: counts them (base = nullptr) or assigns their addresses.
 template <int L>
 std::size_t lay_out(const CompiledModel& m, BasicWorkspace<L>& w, Row<L>* base) {
   using LaneRow = Row<L>;
@@ -60,7 +60,7 @@ std::size_t lay_out(const CompiledModel& m, BasicWorkspace<L>& w, Row<L>* base) 
 
 }  // namespace
 
-/// Makes room for what friction remembers.
+/// Allocates the buffers of the shear state.
 template <int L>
 void BasicWorkspace<L>::make_memory(const CompiledModel& m) {
   for (auto& list : lists) list.own_index = nullptr, list.own_anchors = nullptr;

@@ -37,13 +37,13 @@ inline void put_lanes(const double* from, LaneBits lanes, double* to) {
 /// The largest number of inner stages of a scheme in the table.
 inline constexpr int kInnerStages = 1;
 
-/// What friction remembers in the lanes of a group, and scratch. Empty where nothing remembers.
+/// Shear states of the lanes of a group, and scratch. Empty without shear springs.
 template <int L>
 struct ShearLanes {
   using Poses = AlignedVector<kernels::LinkPose<kernels::Row<L>>>;
   std::array<ShearState, L> now, after;  ///< where a solve begins, and at its end
   Poses start, end;                      ///< (n_links) poses there
-  /// (n_shear_springs) of each contact that remembers: the touched shape in body 1, and W.
+  /// (n_shear_springs) of each contact with shear springs: the touched shape in body 1, and W.
   Poses start_touches, end_touches;
   AlignedVector<kernels::Row<L>> ground;  ///< (points on the ground, 4)
   std::vector<int> grounded;              ///< those of them that touch in some lane
@@ -68,11 +68,11 @@ struct BasicWorkspace {
   AlignedVector<double> own_points;  ///< the lists' points, lane by lane
   std::vector<typename kernels::Stage<L>::List> lists;
   LaneBits in_rows = 0;  ///< lanes whose lists are also in the rows
-  LaneRow* references;   ///< (n_link_pairs, 12) memory of the lists' references
+  LaneRow* references;   ///< (n_link_pairs, 12) storage of the lists' references
   std::vector<unsigned> near_lanes;
-  std::vector<unsigned char> apart;         ///< (n_link_pairs) memory of stage.apart
+  std::vector<unsigned char> apart;         ///< (n_link_pairs) storage of stage.apart
   std::vector<unsigned char> apart_before;  ///< the same before the last search
-  std::vector<unsigned char> coupled;       ///< (1) memory of stage.coupled
+  std::vector<unsigned char> coupled;       ///< (1) storage of stage.coupled
   LaneBits asked = 0;  ///< lanes that were searched since the lists were cleared
   kernels::NearPairs<L> near;
   kernels::Stage<L> stage;
@@ -80,7 +80,7 @@ struct BasicWorkspace {
   // The group's states: now, one step before, and the result of the present solve.
   LaneRow *q0, *v0, *q_before, *v_before, *q1, *v1;
   LaneRow* faces_after;  ///< (n_pairs, 3) as stage.faces, but where the solve ended
-  /// (n_links) where a solve began and ended, of steps that are looked at more closely.
+  /// (n_links) poses at the start and end of a solve, for the checks that need them.
   AlignedVector<kernels::LinkPose<LaneRow>> poses_before, poses_after;
   /// Wrenches of contacts, (link pairs + grounded links, 6), of parts whose error is estimated.
   std::array<LaneRow*, 4> wrenches;

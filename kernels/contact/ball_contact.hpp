@@ -41,7 +41,7 @@ struct GrownShape {
   template <class F>
   auto with(const F& f) const {
     return with_distance<N>(shape, size, [&]<class Shape>(const Shape& of) {
-      // A mesh knows its distance only near its surface (engine/model/compile.cpp refuses it).
+      // A mesh has a distance only near its surface (engine/model/compile.cpp refuses it).
       if constexpr (Shape::kShape == PrimitiveShape::mesh) {
         return f(PlaneDistance<N>{});
       } else {

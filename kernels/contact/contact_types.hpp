@@ -8,7 +8,7 @@
 
 namespace tangere {
 
-/// Normal force N(d, ḋ) of a penalty contact, d < 0 the penetration [m] (SCENES: laws and signs).
+/// Normal force N(d, ḋ) of a penalty contact, d < 0 the penetration [m] (docs/contact.md).
 enum class ContactLaw : std::uint8_t {
   clamped,  ///< max(0, (-kn + kd ḋ) d), eq. 1 of the paper without adhesion
   paper,    ///< (-kn + kd ḋ) d, eq. 1 to the letter: pulls when ḋ > kn/kd
@@ -21,10 +21,10 @@ enum class ContactLaw : std::uint8_t {
 template <class N>
 struct Coefficients {
   N kn;       ///< normal stiffness [N/m]
-  N kt;       ///< tangential damping [N s/m]
+  N kt;       ///< tangential damping [N s/m]; not a stiffness
   N mu;       ///< friction coefficient [-]
   N damping;  ///< k_d [N s/m²]; law linear: c [N s/m]
-  N ks{};     ///< tangential stiffness [N/m]; 0: friction has no memory
+  N ks{};     ///< tangential stiffness [N/m]; 0: no shear springs
 
   [[gnu::always_inline]] constexpr N& operator[](std::size_t k) { return this->*kOrder[k]; }
   [[gnu::always_inline]] constexpr const N& operator[](std::size_t k) const {
@@ -37,7 +37,7 @@ struct Coefficients {
                                                 &Coefficients::ks};
 };
 inline constexpr int kCoefficients = 5;
-/// The first of them, of which tactile points have factors.
+/// The first 4 coefficients can be scaled per tactile point.
 inline constexpr int kPointCoefficients = 4;
 /// The factor of a point that scales coefficient k. That of kt scales ks too.
 constexpr std::size_t factor_index(std::size_t k) { return k < kPointCoefficients ? k : 1; }

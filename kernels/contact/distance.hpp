@@ -73,7 +73,7 @@ constexpr auto by_pad(const F& f, ShapeList<S...>) {
   return std::array{f.template operator()<typename S<double>::template Pad<P>>()...};
 }
 
-/// Whether a shape looks the same from every side.
+/// Whether a shape is invariant under rotations.
 inline bool is_ball(PrimitiveShape shape) {
   return with_distance<double>(shape, Vec3<double>{1, 1, 1}, []<class Shape>(const Shape&) {
     return Shape::kBending == Bending::ball;

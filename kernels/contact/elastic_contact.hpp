@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// Friction that remembers: a tangential spring at every touching point, beside the damper of
-// kernels/contact/contact_law.hpp (docs/shear.md has the law and where it comes from).
+// Contact law with shear springs: a tangential spring at every touching point, in parallel with the
+// damper of kernels/contact/contact_law.hpp (derivation: docs/shear.md).
 //
-// A point keeps two anchors since the last accepted state: b in body 1, where the surfaces met, and
-// a in the touched shape, which lags behind by the elastic displacement s. With G = (Q, c) the
+// A point has two anchors since the last accepted state: b in body 1, where the surfaces touched,
+// and a in the touched shape, which lags behind by the elastic displacement s. With G = (Q, c) the
 // shape in body 1, P = I - n nᵀ and x the place where the force acts:
 //   A = c + Q a,  r = b - A,  η = n·r,  s = β P r,  w = k_s s + k_t v_t
 //   λ = 1 if |w| ≤ μ B, else μ B/|w|,   f = N n - λ w
@@ -24,7 +24,7 @@
 
 namespace tangere::kernels {
 
-/// What a point remembers, as the law takes it.
+/// Anchors of a point and the distance g at the last accepted state.
 template <class N>
 struct Anchor {
   Vec3<N> b;  ///< body 1's axes [m]

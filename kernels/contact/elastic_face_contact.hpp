@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Points whose friction remembers against faces: the sums of kernels/contact/face_contact.hpp with
-// a spring.
+// Points with shear springs against faces: the sums of kernels/contact/face_contact.hpp with the
+// additional terms of the spring.
 //
 // Symbols are those of that file and of kernels/contact/elastic_contact.hpp. The damper has s =
 // λ k_t and t = w/|w|. With k = λ β k_s the spring adds to δf

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Points whose friction remembers against a sphere: the sums of kernels/contact/sphere_contact.hpp
-// with a spring.
+// Points with shear springs against a sphere: the sums of kernels/contact/sphere_contact.hpp with
+// the additional terms of the spring.
 //
 // Symbols are those of that file and of kernels/contact/elastic_contact.hpp. The damper has s =
 // λ k_t and t = w/|w|. The anchor is A = c + a with a in body 1's axes, so δr = δD - θ × a. With

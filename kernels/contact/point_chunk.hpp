@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
-// A few contact points that go together through the law and into the sums of their pair.
+// Evaluates the contact law for a chunk of points and adds it to the sums of their pair.
 //
 // A family of shapes provides a Motion (numbers only, the same for all points), its Place (ξ, or ξ
-// with what the point remembers), Point, Pass and Sums, and
+// with the point's anchors), Point, Pass and Sums, and
 //   find_distance(motion, place, point, pass)
 //       distance and normal; returns where the point touches
 //   find_slide(motion, point, pass)          velocities
 //   find_force<Derivatives>(…)
 //       force and what its derivative needs; returns where the point slips
 //   add_chunk<Derivatives>(sums, chunk)      the chunk's points in order
-// Families: kernels/contact/sphere_contact.hpp, kernels/contact/face_contact.hpp, and both where
-// friction remembers: kernels/contact/elastic_sphere_contact.hpp, elastic_face_contact.hpp.
+// Families: kernels/contact/sphere_contact.hpp, kernels/contact/face_contact.hpp, and both with
+// shear springs: kernels/contact/elastic_sphere_contact.hpp, elastic_face_contact.hpp.
 #pragma once
 
 #include <utility>
@@ -31,8 +31,8 @@ struct PointChunk {
   int count = 0, slips = 0;
 };
 
-/// Evaluates the law at `count` ≤ kPoints places. Each pass waits for one root, so roots of
-/// different points overlap.
+/// Evaluates the law at `count` ≤ kPoints places, pass by pass. Each pass depends on one square
+/// root, so the latencies of the roots of different points overlap.
 template <bool Derivatives, class Motion, class N>
 void fill_chunk(const Motion& z, const LawParameters<N>& law, const typename Motion::Place* place,
                 int count, PointChunk<typename Motion::Point>& chunk) {
@@ -51,8 +51,8 @@ void fill_chunk(const Motion& z, const LawParameters<N>& law, const typename Mot
   }
 }
 
-// The sums below live in registers. They are inlined by force, because GCC's own limits on inlining
-// would make that a matter of chance.
+// The sums below must stay in registers. Inlining is forced, because GCC's heuristics do not
+// guarantee it.
 template <class N>
 [[gnu::always_inline]] inline void add_outer(Mat3<N>& sum, const Vec3<N>& a, const Vec3<N>& b) {
   const N x[3] = {a.x, a.y, a.z}, y[3] = {b.x, b.y, b.z};

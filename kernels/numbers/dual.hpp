@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Forward-mode dual numbers, value + ε part. They are the second of three routes by which every
 // derivative is checked.
-//   f(a + ε a') = f(a) + ε f'(a) a'. Comparisons and select() look at the value alone.
+//   f(a + ε a') = f(a) + ε f'(a) a'. Comparisons and select() use the value alone.
 #pragma once
 
 #include "kernels/numbers/inverse_sqrt.hpp"

@@ -46,7 +46,7 @@ template <class N>
 struct RotationVector {
   Vec3<N> phi;
   N e;
-  N e1;  ///< 2 de/d|φ|²; zero unless asked for
+  N e1;  ///< 2 de/d|φ|²; zero unless requested
 };
 
 template <bool Slope, class N>

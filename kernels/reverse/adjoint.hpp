@@ -242,7 +242,7 @@ void adjoint_turning_history(const StageArgs<N>& a, const AdjointArgs<N>& d, con
   }
 }
 
-/// Hands ν and M λ on to the states that the stage depends on.
+/// Adds the contributions of ν and M λ to the cotangents of the states that the stage depends on.
 template <class N>
 void adjoint_history(const ModelView& model, const StageArgs<N>& a, const AdjointArgs<N>& d) {
   const StageHistory<N>& h = d.history;

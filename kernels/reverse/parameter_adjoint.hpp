@@ -182,7 +182,7 @@ void subtract_inertia(const Vec6<N>& twist, const Vec6<N>& x, N* out) {
   out[9] -= t.z * w.z;
 }
 
-/// Adds the derivatives by mass, moment and inertia of every link, ten numbers each.
+/// Adds the derivatives by mass, mass · centre and inertia of every link, ten numbers each.
 template <class N>
 void inertia_parameters(const ModelView& model, const StageArgs<N>& a, const LinkAdjoint<N>* links,
                         N* out) {

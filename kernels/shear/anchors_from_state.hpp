@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// Anchors follow from an accepted state and from what friction remembers there, s (zero at points
-// that do not touch). With x, n, d the place, normal and distance at that state and G = (Q, c):
+// Anchors from an accepted state and its shear state s (zero at points that do not touch). With x,
+// n, d the place, normal and distance at that state and G = (Q, c):
 //   b = x,  a = Qᵀ(x - s - c),  g = max(d, 0)
-// Reverse, with y = Q ā: x̄ = b̄ + y, s̄ = -y, ρ̄ -= y, θ̄ -= (x - s) × y, d̄ = ḡ where d ≥ 0, and on
-// through x, n and d:
+// Reverse, with y = Q ā: x̄ = b̄ + y, s̄ = -y, ρ̄ -= y, θ̄ -= (x - s) × y, d̄ = ḡ where d ≥ 0, and
+// on through x, n and d:
 //   a pair, x = ξ - d n:       d̄ -= n·x̄, n̄ -= d x̄;  ρ̄ -= d̄ n + H n̄, θ̄ += x × ρ̄ + n × (I - dH) n̄
 //   the ground, x = ξ_c - r n: n̄ -= r x̄;            ρ̄ -= d̄ n,       θ̄ += ξ_c × ρ̄ + n × n̄
 #pragma once
@@ -73,7 +73,7 @@ template <class Shape, class N>
   p.curvature = N(0.0);
 }
 
-/// Adds what cotangents of d, n and x come to, by (θ; ρ) of body 2.
+/// Pulls cotangents of d, n and x back to (θ; ρ) of body 2 and adds them.
 template <class Shape, class N>
 void pull_back_touch_point(const LoadedTouch<N>& t, const PointContact<N>& p, const Vec3<N>& xi,
                            N d, Vec3<N> n, const Vec3<N>& x, Vec6<N>& out) {
@@ -141,7 +141,7 @@ Anchor<Lanes<A>> load_anchors(const ShearSpringPoints& points, int k) {
       [&](int i) { return load_lanes<A>(points.anchors + i * points.stride + k); });
 }
 
-/// Turns what is remembered, in rows 3 to 5 of the anchors, into anchors.
+/// Converts the elastic displacements s, in rows 3 to 5 of the anchors, to anchors a.
 template <class A>
 void recall(const ShearSpringTouch& touch, const ShearSpringPoints& points) {
   using N = Lanes<A>;

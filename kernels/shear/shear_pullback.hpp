@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Reverse mode through the memory of a step. From cotangents f̄ of forces, x̄ of where they act and
-// s̄' of what is remembered after the step, with B the friction bound divided by μ and t = w/|w|:
+// Pullback of the shear update of a step. From cotangents f̄ of forces, x̄ of their points of
+// application and s̄' of the shear state after the step, with B the friction bound divided by μ and
+// t = w/|w|:
 //   stick: w̄ = -f̄, s̄ = s̄'
 //   slip:  B̄ = -μ t·f̄ + (s·s̄') μ/|w|,  w̄ = -λ (f̄ - t (t·f̄)) - (s·s̄') λ t/|w|,  s̄ = λ s̄'
 //          μ̄ = B (-t·f̄ + s·s̄'/|w|)

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What is done for all environments of a group at once: where each contact that remembers is, and
-// the memory of the points on the ground. N are the numbers of the group's lanes.
+// Shear state for all environments of a group at once: poses of contacts with shear springs, and
+// anchors and updates of points on the ground. N are the numbers of the group's lanes.
 #pragma once
 
 #include "kernels/shear/update_shear_state.hpp"
@@ -9,8 +9,9 @@
 
 namespace tangere::kernels {
 
-/// Computes the touched shape in body 1 and W, in body 1's axes, of every contact that remembers.
-/// Neighbours that join the same links share the motion of these. `links`: (n_links).
+/// Computes the pose of the touched shape in body 1 and W, in body 1's axes, of every contact with
+/// shear springs. Consecutive contacts of the same links share the relative motion. `links`:
+/// (n_links).
 template <class N>
 void find_touches(const ModelView& m, const LinkPose<N>* links, LinkPose<N>* out) {
   const LinkPose<N> still = {{diagonal(N(1.0)), zero3<N>()}, zero6<N>()};
@@ -49,7 +50,7 @@ Vec3<N> place_of(const ShearSpringContact& of, int k) {
 }
 
 /// Computes the anchors of all points on the ground, one contact after the other. `s`: (points, 3)
-/// what is remembered, body 1's axes; null: zeros. `anchors`: (points, kAnchorNumbers).
+/// elastic displacements, body 1's axes; null: zeros. `anchors`: (points, kAnchorNumbers).
 template <class N>
 void recall_ground(const ModelView& m, const LinkPose<N>* touches, const N* s, N* anchors,
                    const double* block, int group) {

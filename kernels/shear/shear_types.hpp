@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the engine and the kernels of memory exchange. All of it is of one environment.
+// Arguments of the shear-state kernels, all of one environment.
 #pragma once
 
 #include "kernels/contact/elastic_contact.hpp"
@@ -8,7 +8,7 @@
 
 namespace tangere::kernels {
 
-/// A contact that remembers, at one state.
+/// A contact with shear springs at one state.
 struct ShearSpringTouch {
   const ShearSpringContact* of;
   Vec3<double> size;    ///< of the touched shape, as in PairContact
@@ -41,12 +41,12 @@ struct ShearPullback {
   const double* remembered;  ///< (3, stride) s where the step began
   const double* s_bar;       ///< (3, stride) of s' at its end; or null: zeros
   const double* f_bar;       ///< (3, stride) of forces, body 1's axes; or null: those of `slip`
-  /// The slip Y along λ (kernels/reverse/adjoint.hpp), whose power -Yᵀw the forces do. Then motion
-  /// at the end is left alone, because the matrix of the step has its share.
+  /// The slip Y along λ (kernels/reverse/adjoint.hpp), with power -Yᵀw of the forces. Then no
+  /// derivatives by the final motion are added, because the matrix of the step contains them.
   const Vec6<double>* slip;
   double* s_out;  ///< (3, stride) added to: of s where the step began
   ShearCotangentSums* out;
-  // Of sensors that keep anchors from reading to reading; null elsewhere.
+  // Of sensors with shear_interval > 0; else null.
   const double* anchor_bar = nullptr;  ///< (6, stride) of b and a that follow at the end
   const double* kept = nullptr;  ///< (stride) 1: its anchor was kept, not found at `start`; else 0
   double* anchor_out = nullptr;  ///< (6, stride) of b and a of kept anchors, at points that touch

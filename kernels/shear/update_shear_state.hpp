@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The memory after an accepted step, s' = λ s at the points that touch, and the forces there.
+// Shear state after an accepted step, s' = λ s at the touching points, and the forces there.
 #pragma once
 
 #include "kernels/shear/anchors_from_state.hpp"

@@ -30,18 +30,18 @@ struct Stage {
     Row<L>* reference;  ///< (12) pose of link 2 in link 1 at which the list was made; pairs of the
                         ///< same links share it
     double margin;
-    // What friction remembers of the points; null in pairs without memory.
+    // Anchors of the points; null in pairs without shear springs.
     int* own_index;       ///< (L, stride) of each lane's points in PairContact::points
     double* own_anchors;  ///< (L, kAnchorNumbers, stride)
     Row<L>* anchors;      ///< (stride, kAnchorNumbers)
   };
   List* lists;  ///< (n_pairs)
-  /// (n_link_pairs) 1: when it was looked at last, nothing of the links could touch in any lane.
-  /// Their lists are not read.
+  /// (n_link_pairs) 1: by the last detection, the links cannot touch in any lane. Their lists are
+  /// not read.
   unsigned char* apart;
   /// 0: the last Jacobian has zeros in all lanes wherever contacts alone couple dofs.
   unsigned char* coupled;
-  Row<L>* ground_anchors;  ///< (points that remember, kAnchorNumbers)
+  Row<L>* ground_anchors;  ///< (points with shear springs, kAnchorNumbers)
   Row<L>* faces;           ///< (n_pairs, 3) faces that count in this solve (kernels/step/faces.hpp)
   std::byte* scratch;      ///< scratch_bytes(model)
   /// (n_link_pairs) square of the distance from LinkPair::points_middle to shapes_middle [m²], of

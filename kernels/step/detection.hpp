@@ -29,8 +29,8 @@ void store_frame(const Frame<N>& x, N* rows) {
   rows[9] = x.p.x, rows[10] = x.p.y, rows[11] = x.p.z;
 }
 
-/// Finds the pairs whose points may be near: tests the ball that holds all points against the
-/// shape, unless the balls around all points and all shapes of the links tell already.
+/// Finds the pairs whose points may be near: tests the ball around all points of a body against the
+/// shape, unless the balls around all points and all shapes of the links already exclude contact.
 template <class N, int L>
 void near_pairs(const ModelView& model, const StageArgs<N>& a, NearPairs<L>& out) {
   const auto view = [](Row<L>* p) { return reinterpret_cast<N*>(p); };

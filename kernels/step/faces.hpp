@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// Chooses the faces of a touched cuboid that a convex body meets, once per solve, at the pose where
-// the solve starts. Nothing is remembered between solves.
+// Chooses the faces of a cuboid that a convex body may touch, once per solve, at the pose at which
+// the solve starts. No state is kept between solves.
 //
 // In the cuboid's axes, with y the centre of the body, s the half edges and p_k the body's half
 // width along axis k, the face on the body's side of axis k is
 //   g_k = |y_k| - p_k - s_k
-// away from the body. Chosen are all faces with g_k ≥ -touch: the body has not come through them
-// yet. If there is none, it is the one of least penetration. A body that reaches around the cuboid
-// has none at all: where its own axes show less than half of that penetration, an edge of the
-// cuboid meets a face of the body, and points are measured one by one.
+// away from the body. Chosen are all faces with g_k ≥ -touch, which the body does not penetrate. If
+// there is none, it is the face of least penetration. If the penetration along the body's own axes
+// is less than half of that, an edge of the cuboid touches a face of the body: then no face is
+// chosen, and each point takes its own distance.
 #pragma once
 
 #include "kernels/contact/ball_contact.hpp"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What acts on the dofs of a joint: damping, armature, springs, limits and position motors, with
-// their derivatives. Per dof
+// Forces on the dofs of a joint: damping, armature, springs, limits and position motors, with their
+// derivatives. Per dof
 //
 //   f = -c v - I_a a - k (q - rest) + k_l max(0, lo - q) - k_l max(0, q - hi)
 //       + clip(P (u - q) - D v, range)
@@ -10,8 +10,8 @@
 // J_r⁻ᵀ(φ) φ = φ); limits J_r⁻ᵀ(φ) f(φ), f per component; motor clip(P ψ - D ω). By the right
 // tangent θ: ∂φ/∂θ = J_r⁻¹(φ), ∂ψ/∂θ = -J_r⁻ᵀ(ψ).
 //
-// Flags of the link decide, outside the lanes, what is evaluated. At a bound of a limit the
-// derivative is that of its inside. At a bound of a motor's range it is that of the unclipped
+// Flags of the link select, outside the lanes, the terms that are evaluated. At a bound of a limit
+// the derivative is that of its inside. At a bound of a motor's range it is that of the unclipped
 // force.
 #pragma once
 

@@ -2,8 +2,8 @@
 // Sparse LU without pivoting in lanes, on the scene's pattern, and a solve that checks its result.
 //
 // The elimination is interpreted: all lanes share one list of slots. Without pivoting a factor can
-// be useless. Each solve is therefore refined once and judged in the scaling S = diag(|a_ii|^-1/2),
-// which removes all units:
+// be inaccurate. Each solve is therefore refined once, and its backward error is tested in the
+// scaling S = diag(|a_ii|^-1/2), which removes all units:
 //   accepted if β = ‖S(b - Ax)‖∞ / (‖SAS‖∞ ‖S⁻¹x‖∞ + ‖Sb‖∞) ≤ 1e-13 and the correction ≤ 1e-6
 //       ‖S⁻¹x‖∞
 #pragma once

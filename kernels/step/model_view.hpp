@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A compiled scene as kernels see it: plain arrays of constants, no names, no ownership.
+// View of a compiled scene for kernels: plain arrays of constants, no names, no ownership.
 #pragma once
 
 #include <cstdint>
@@ -52,8 +52,8 @@ struct Link {
   double mass;                  ///< [kg]
   Vec3<double> mass_times_com;  ///< mass times centre of mass, link axes [kg m]
   Mat3<double> inertia;         ///< about the link's origin, link axes [kg m²]
-  int inertia_row = -1;  ///< ≥ 0: mass, moment and inertia (xx xy xz yy yz zz) are read from ten
-                         ///< rows of the block instead
+  int inertia_row = -1;  ///< ≥ 0: mass, mass · centre and inertia (xx xy xz yy yz zz) are read
+                         ///< from ten rows of the block instead
   int place_row = -1;    ///< ≥ 0: frame.p is read from three rows of the block instead
 };
 
@@ -95,7 +95,7 @@ struct ParameterRows {
 };
 
 using ContactParameters = Coefficients<Parameter>;
-/// Whether friction with these coefficients remembers.
+/// Whether a contact with these coefficients has shear springs.
 inline bool has_shear_spring(const ContactParameters& p) {
   return p.ks.value != 0 || p.ks.row >= 0;
 }
@@ -134,7 +134,7 @@ struct PairContact {
   bool faced = false;   ///< a convex body on a cuboid: its faces are chosen per solve (faces.hpp)
   Hull hull{};          ///< body 1, if faced
   double overhang = 0;  ///< how far beyond a chosen face's edges a point still touches it [m]
-  int memory = -1;      ///< ≥ 0: index of what its friction remembers (ModelView::memories)
+  int memory = -1;      ///< ≥ 0: index into the contacts with shear springs
   const DistanceGrid* grid = nullptr;  ///< of a mesh
   /// > 0: body 1 is a ball of this radius, and `points` is its centre (ball_contact.hpp) [m].
   double ball_radius = 0;
@@ -180,15 +180,15 @@ struct GroundContact {
   int first_anchor = -1;  ///< of its points among Stage::ground_anchors
 };
 
-/// Points whose friction remembers (kernels/contact/elastic_contact.hpp), against one shape: those
-/// of a pair of bodies, of a body on the ground, or of a tactile sensor.
+/// Points with shear springs (kernels/contact/elastic_contact.hpp) against one shape: those of a
+/// pair of bodies, of a body on the ground, or of a tactile sensor.
 struct ShearSpringContact {
   PairContact contact;  ///< the ground is a plane that is fixed in the world
   bool ground = false;
   int grounded = -1;  ///< index into ModelView::grounds, or -1
   double radius = 0;  ///< as in GroundContact
   int radius_row = -1;
-  int first = 0;    ///< of its points among all that remember
+  int first = 0;    ///< number of its first point among all points with shear springs
   int pair = -1;    ///< index into ModelView::pairs, or -1
   int sensor = -1;  ///< index of the sensor, or -1
   int number = 0;   ///< row of its first coefficient (ParameterRows)

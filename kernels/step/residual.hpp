@@ -148,8 +148,8 @@ void pair_motion(const LinkPair& pair, const StageArgs<N>& a, ContactScratch<N>&
   o.W = pair.link1 < 0 ? o.Z : o.Z - a.links[pair.link1].V;
 }
 
-/// Returns how much nearer any point of body 1 may have come to a shape since the lists were made,
-/// beyond the margin. With G = (R, p) of the links, a point ξ is at Rᵀ(ξ - p) in body 2, and so in
+/// Returns a bound on the approach of any point of body 1 to a shape since the lists were built,
+/// minus the margin. With G = (R, p) of the links, a point ξ is at Rᵀ(ξ - p) in body 2, and so in
 /// every shape that is fixed there.
 template <class N>
 N list_excess(const LinkPair& pair, const CandidateList<N>& list, const Frame<N>& now) {
@@ -192,7 +192,8 @@ N balls_overlap(const LinkPair& pair, int link_pair, const StageArgs<N>& a, doub
   return N(reach * reach) - a.between[link_pair];
 }
 
-/// Adds the points of a capsule one candidate after the other: its ends bend in two directions.
+/// Adds the candidate points one by one, for shapes whose Hessian has no special form: capsules,
+/// ellipsoids, meshes and balls.
 template <bool Derivatives, class Shape, class N>
 void add_candidates(const Shape& shape, const LawParameters<N>& law, const CandidateList<N>& list,
                     int lone, const Frame<N>& frame, const Vec6<N>& W, PairSums<N>& sums) {
@@ -208,7 +209,7 @@ void add_candidates(const Shape& shape, const LawParameters<N>& law, const Candi
   }
 }
 
-/// The same where friction remembers.
+/// The same with shear springs.
 template <bool Derivatives, class Shape, class N>
 [[gnu::noinline]] void add_elastic(const Shape& shape, const LawParameters<N>& law,
                                    const CandidateList<N>& list, int lone, const Frame<N>& frame,
@@ -234,7 +235,7 @@ bool has_candidates(const CandidateList<N>& list, int lone) {
   return (lone < 0 ? list.count : list.own_count) > 0;
 }
 
-/// Takes the law as the stage asks for it.
+/// Scales law parameters by the stage's continuation factors.
 template <class N>
 void soften(const StageArgs<N>& a, LawParameters<N>& law) {
   law.kn = law.kn * a.normal_share;
@@ -266,7 +267,7 @@ void start(PairSums<N>& sums) {
 }
 
 /// Computes the sums over all shapes of two links. Flat and bent faces share their sums, which are
-/// about body 1's origin; those whose friction remembers share sums of their own.
+/// about body 1's origin; those with shear springs share sums of their own.
 template <bool Derivatives, class N>
 void sum_link_pair(const ModelView& model, const LinkPair& links, const StageArgs<N>& a,
                    ContactScratch<N>& o) {
@@ -297,7 +298,7 @@ void sum_link_pair(const ModelView& model, const LinkPair& links, const StageArg
           add_sphere<Derivatives, SphereSums>(motion, law, list, a.lone, o.W, o.sums);
         }
       } else if constexpr (Shape<N>::kSums == PointSumForm::points) {
-        constexpr bool kBall = std::is_same_v<Shape<N>, GrownShape<N>>;  // never remembers
+        constexpr bool kBall = std::is_same_v<Shape<N>, GrownShape<N>>;  // no shear springs
         if constexpr (!kBall)
           if (elastic)
             return add_elastic<Derivatives>(shape, law, list, a.lone, frame(), o.W, o.sums);

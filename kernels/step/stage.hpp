@@ -23,7 +23,7 @@ struct LinkScratch {
   Vec6<N> F;           ///< wrench through the joint: inertial minus external, of the whole subtree
   Mat3<N> chart;       ///< spherical: J = J_r(x)
   Mat3<N> chart_rate;  ///< spherical: V_x = (c₀/h) J + D(x, ẋ)
-  N mass;              ///< composite of the subtree: mass, moment, inertia about this origin
+  N mass;  ///< composite of the subtree: mass, mass · centre, inertia about this origin
   Vec3<N> moment;
   Mat3<N> inertia;
   Mat3<N> bias;  ///< composite B: B m = (bias m.a; -2 momentum × m.a)
@@ -54,7 +54,7 @@ struct CandidateList {
   const double* own;   ///< (3, stride) candidates of the lane that is evaluated alone, padded to
                        ///< multiples of eight with far points
   int own_count, stride;
-  const N* anchors;           ///< (count, kAnchorNumbers) of the points, or null without memory
+  const N* anchors;           ///< (count, kAnchorNumbers); null without shear springs
   const double* own_anchors;  ///< (kAnchorNumbers, stride) of `own`
 };
 
@@ -83,8 +83,8 @@ struct StageArgs {
   const CandidateList<N>* candidates;  ///< (n_pairs) those of links that are apart are not
                                        ///< set, but the margin of the first
   unsigned char* apart;                ///< (n_link_pairs) as in Stage; null: none is
-  unsigned char* coupled;              ///< as in Stage; null: nobody asks
-  const N* ground_anchors;             ///< (points that remember, kAnchorNumbers)
+  unsigned char* coupled;              ///< as in Stage; null: not computed
+  const N* ground_anchors;             ///< (points with shear springs, kAnchorNumbers)
   const N* faces;  ///< (n_pairs, 3) faces that count in this solve (kernels/step/faces.hpp)
   int lone;  ///< the only lane whose result matters; its contacts are summed across points. -1: all
              ///< lanes matter
@@ -212,7 +212,7 @@ Vec3<N> ground_point(const GroundContact& ground, int k) {
       return {{p[0], t[3 * k]}, {p[1], t[3 * k + 1]}, {p[2], t[3 * k + 2]}};
   return {N(p[0]), N(p[1]), N(p[2])};
 }
-/// Mass, moment and inertia of a link's own bodies.
+/// Mass, mass · centre and inertia of a link's own bodies.
 template <class N>
 struct LinkInertia {
   N mass;

@@ -257,7 +257,7 @@ NearShapes near_shapes(const TactileArgs<typename P::Real>& a) {
   return near;
 }
 
-/// Tells which shapes may touch eight tiles, for 64 tiles at a time.
+/// Finds the shapes that may touch each group of eight tiles, for 64 tiles at a time.
 template <class P>
 class NearEights {
  public:
@@ -284,7 +284,7 @@ class NearEights {
  private:
   const TactileArgs<typename P::Real>& a_;
   NearShapes near_;
-  bool many_ = a_.pad->tiles() > 2 * kGroup;  // else looking costs as much as it saves
+  bool many_ = a_.pad->tiles() > 2 * kGroup;  // else the test costs as much as it saves
   unsigned bit_ = 0;
   unsigned eights_[64];
 };

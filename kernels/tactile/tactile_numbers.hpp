@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The number types of tactile points, and forces in the axes of a field. Fields in reverse see this
-// file, not how a field is computed, so that a change there does not recompile them.
+// The number types of tactile points, and forces in the axes of a field. Reverse kernels include
+// this file but not tactile.hpp, so a change there does not recompile them.
 #pragma once
 
 #include "kernels/numbers/lanes_f32.hpp"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A pad as the tactile kernels see it, and the arguments of those kernels. Plain arrays, no
+// View of a pad for the tactile kernels, and the arguments of those kernels. Plain arrays, no
 // ownership.
 //
 // Flat pads use the axes axis0, axis1 and axis0 × axis1, made orthonormal. The origin is in the

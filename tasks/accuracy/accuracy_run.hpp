@@ -33,7 +33,8 @@ struct AccuracySetting {
   int parts = 1;  ///< steps between samples
   double tolerance = 1e-9;
   double accuracy = 0;  ///< of the parts of a step; 0: every step is one part
-  /// The tolerance is left to the engine, which then spares evaluations; `tolerance` says which.
+  /// No explicit tolerance: the engine uses its default and may skip final evaluations; `tolerance`
+  /// is the value in force.
   bool follows = false;
 
   bool operator==(const AccuracySetting&) const = default;
@@ -55,7 +56,7 @@ struct AccuracyOutcome {
   bool stopped = false;
 };
 
-/// Runs end before any sample of a block where their `stop` asks for it.
+/// If `stop` is requested, runs end before the next sample of a block.
 class AccuracyRun {
  public:
   virtual ~AccuracyRun() = default;
@@ -81,7 +82,7 @@ std::vector<double> relative_errors(std::span<const double> squared_distance,
 /// Steps of the finest reference in a timestep of the scene.
 inline constexpr int kFinestParts = 128;
 
-/// Memory of the reference, if a tenth of the points is touched; of gradients also that of tapes
+/// Memory of the reference, if a tenth of the points is touched; for gradients including tapes
 /// [bytes].
 double accuracy_bytes(const FixedEpisodes& episodes, AccuracyQuantity quantity, int threads);
 

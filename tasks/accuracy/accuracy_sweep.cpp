@@ -28,8 +28,7 @@ constexpr std::array kTolerances = {1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e
 constexpr int kPasses = 3;
 constexpr double kEnoughSeconds = 0.3;  // of CPU time, after which a pass is not repeated
 constexpr double kBlur = 10, kFineEnough = 40;
-/// A second look is worth its time at settings that are so much faster than the best that is sure,
-/// and at so many of them.
+/// Confirmation runs: least speedup over the best confirmed setting, and largest count.
 constexpr double kWorthALook = 1.1;
 constexpr int kMostLooks = 3;
 
@@ -89,7 +88,7 @@ class Sweep {
       AccuracySetting setting{Integrator::reference, episodes_.every * per_step,
                               kReferenceTolerance};
       const AccuracyOutcome made = run_->make_reference(setting, listener_.stop);
-      // An unfinished reference is worth nothing. What came before was judged too coarse.
+      // Discard an unfinished reference. The ones before it were too inaccurate.
       if (made.stopped) return false;
       std::array<AccuracyOutcome, 3> others;  // SDIRK2; itself with twice and four times the step
       for (std::size_t k = 0; k < others.size(); ++k) {
@@ -140,7 +139,7 @@ class Sweep {
     r.status = status_of(worse, episodes_.start.environments());
   }
 
-  /// Looks where the reference is as wrong as in the middle of the environments.
+  /// Measures vibration in the environment with the median reference error.
   void look_for_vibration() {
     if (episodes_.start.model().sensors().empty() || report_.reference.environments == 0) return;
     const double middle = quantile(errors_of_environments_, 0.5);
@@ -161,8 +160,8 @@ class Sweep {
     return options_.quantity == AccuracyQuantity::gradient;
   }
 
-  /// Fills in the tolerance of a setting whose steps and accuracy are known. Whole steps take the
-  /// one that follows them, also where the scene names another.
+  /// Sets the tolerance of a setting from its steps and accuracy. Whole steps use the default for
+  /// their length, even if the scene has an explicit one.
   void give_tolerance(AccuracySetting& setting) const {
     const double step = episodes_.interval() / setting.parts;
     std::optional<double> tolerance = options_.tolerance;
@@ -247,7 +246,7 @@ class Sweep {
     for (const Integrator integrator : integrators()) {
       const AccuracyPoint *coarse = nullptr, *fine = nullptr;
       for (const AccuracyPoint& p : report_.points) {  // ever finer
-        // Errors near the reference's own say nothing, unless coarser steps share the most of them.
+        // Skip errors near the reference's own, unless coarser steps have most of the same error.
         const bool clear = !p.blurred || report_.reference.shares_errors();
         if (p.setting.integrator != integrator || p.setting.accuracy > 0 || !clear ||
             p.precision != Precision::f64 || !std::isfinite(p.median) || !(p.median > 0))
@@ -386,7 +385,7 @@ class Sweep {
   std::unique_ptr<AccuracyRun> run_;
   AccuracyReport report_;
   std::vector<double> errors_of_environments_;
-  int failed_again_ = 0;  ///< environments in which the reference of the second look failed
+  int failed_again_ = 0;  ///< environments in which the reference of the confirmation run failed
 };
 
 }  // namespace

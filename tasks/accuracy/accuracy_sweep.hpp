@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Sweeps scheme, step, precision and tolerance over fixed episodes, and says which of them is the
-// cheapest that is accurate enough.
+// Sweeps scheme, step, precision and tolerance over fixed episodes, and finds the cheapest setting
+// that meets an error target.
 #pragma once
 
 #include <optional>
@@ -27,8 +27,8 @@ struct AccuracyPoint {
   Precision precision = Precision::f64;  ///< of fields
   double step = 0;                       ///< [s]
   double error = 0;  ///< not exceeded in 95 % of the environments; infinite if more than 5 % failed
-  /// 95 % of all environments like these do not exceed it, with 95 % confidence; the largest error
-  /// where there are fewer than 59 environments, which cannot tell.
+  /// Upper bound of the 95 % quantile with 95 % confidence. With fewer than 59 environments there
+  /// is no such bound; it is then the largest error.
   double bound = 0;
   double median = 0;  ///< of the errors of environments
   /// Of cut steps: share of the environments whose error is 0.3 to 3 times the accuracy; else NaN.
@@ -37,7 +37,7 @@ struct AccuracyPoint {
   double split = 0;        ///< share of steps; NaN for gradients, which do not count them
   double rate = 0;         ///< simulated seconds per CPU second, over all environments
   bool blurred = false;    ///< error at most ten times the reference's own
-  /// Of every environment, then of those of the second look; as in AccuracyOutcome.
+  /// Of every environment, then of those of the confirmation run; as in AccuracyOutcome.
   std::vector<double> errors{};
   int failed = 0;      ///< environments
   std::string status;  ///< "ok", or why environments failed
@@ -47,14 +47,13 @@ struct AccuracyReference {
   AccuracySetting setting;
   StepCounts counts;  ///< of its steps
   double step = 0;    ///< [s]
-  /// Not exceeded in 95 % of the environments: the larger of the distance to SDIRK2 at the same
-  /// step and of what its distances to itself with twice and four times the step say
-  /// (richardson()).
+  /// 95 % quantile over environments of the larger of two estimates: the distance to SDIRK2 at the
+  /// same step, and Richardson extrapolation from twice and four times the step (richardson()).
   double error = 0;
   double scheme_distance = 0, step_distance = 0;  ///< to SDIRK2, and to itself with twice the step
   /// That its own steps have on these episodes (richardson()).
   double order = 0;
-  int environments = 0;  ///< of which the reference says something
+  int environments = 0;  ///< with a valid reference
   int failed = 0;        ///< environments in which the reference or SDIRK2 failed
   std::string status;    ///< "ok", or why
 
@@ -82,26 +81,26 @@ struct AccuracyReport {
   /// Index of the cheapest point whose bound and the reference's error together meet the target;
   /// -1: none does.
   int advice = -1;
-  bool resolved = false;  ///< the reference is accurate enough to judge by
+  bool resolved = false;  ///< the error of the reference is small enough for the comparison
   Vibration vibration;    ///< where it is not
   bool stopped = false;
 };
 
-/// Told as the sweep goes on.
+/// Callbacks during a sweep.
 struct AccuracyListener {
   std::stop_token stop;                                         ///< ends it before any sample
   std::function<void(const AccuracyReference&)> reference;      ///< each attempt, ever finer
   std::function<void(std::span<const AccuracyPoint>)> setting;  ///< in every precision
-  std::function<void()> second_look{};                          ///< settings are told once more
+  std::function<void()> second_look{};                          ///< before the confirmation run
 };
 
 /// Makes episodes of the same kind with random numbers that no others have; none when stopped.
 using FreshEpisodes = std::function<std::optional<FixedEpisodes>()>;
 
-/// A stop leaves what there is by then. Settings that meet the target, are not sure to do so, and
-/// are faster than those that are sure are played again in `fresh` episodes, at most three of them;
-/// all their environments together then judge them. Throws InputError when nothing touches in any
-/// environment, or nothing moves.
+/// A requested stop returns the points measured so far. At most three settings whose error meets
+/// the target but whose bound does not, and that are faster than all whose bound does, are run
+/// again on `fresh` episodes; their errors are then over all environments. Throws InputError if
+/// nothing touches in any environment, or nothing moves.
 AccuracyReport accuracy_sweep(const FixedEpisodes& episodes, const AccuracyOptions& options,
                               const AccuracyListener& listener, const FreshEpisodes& fresh = {});
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Episodes whose starts and controls are fixed, so that they can be played again with any scheme
-// and any step.
+// Episodes with fixed initial states and controls, which any scheme can repeat with any step
+// length.
 #pragma once
 
 #include <optional>
@@ -64,10 +64,10 @@ struct FixedEpisodes {
 FixedEpisodes scene_episodes(const Batch& start, const ControlProgram& controls, std::int64_t steps,
                              int every);
 
-/// Episodes of a task from `start`, whose states are replaced. The controls are those that the
-/// policy asks for at the scene's own scheme and step. For a task whose actions restart, an episode
-/// is its opening, or its first action if it has none. `stop` ends it before any step, and
-/// nothing is returned. Throws like scene_episodes.
+/// Episodes of a task from `start`, whose states are replaced. The controls are those of the policy
+/// at the scene's own scheme and step. For a task whose actions restart, an episode is its warm-up,
+/// or its first action if it has none. If `stop` is requested, returns no value. Throws like
+/// scene_episodes.
 std::optional<FixedEpisodes> task_episodes(const Batch& start, const Task& task,
                                            const Policy& policy, int every,
                                            const std::stop_token& stop = {});

@@ -14,7 +14,7 @@ class GradientRun : public AccuracyRun {
                                  const std::stop_token& stop) override;
   AccuracyOutcome compare(const AccuracySetting& setting, const std::stop_token& stop) override;
 
-  /// Memory of tapes and of the derivatives by every step of the finest reference [bytes].
+  /// Size of tapes and of the derivatives by every step of the finest reference [bytes].
   static double bytes(const FixedEpisodes& episodes, int threads);
 
  private:

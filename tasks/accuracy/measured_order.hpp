@@ -22,9 +22,9 @@ struct RichardsonEstimate {
 /// nearer to a limit, and the error is then 2.4 times the distance to 2 h.
 RichardsonEstimate richardson(double to_twice, double to_four_times);
 
-/// Returns what of the scene can be of first order in the step with every scheme, in words:
-/// friction with ks, whose springs advance once per step (where points slip or land), and motors
-/// with timing="start", whose force holds for a step.
+/// Returns descriptions of the laws in the scene that are first order in the step length with every
+/// scheme: friction with ks, whose shear state is updated once per step (where points slip or
+/// land), and motors with timing="start", whose force is constant over a step.
 std::vector<std::string> first_order_laws(const Scene& scene);
 
 }  // namespace tangere

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// A field is only read, so its pitch changes no motion: one run is felt by all pads at once. A
-// point's force is linear in kn, kt and damping together, so instead of coefficients that go with
-// the area of a point, the sum of a pad is multiplied by that area over the scene's.
+// Fields do not act on the motion, so pads of all pitches read one run. A point's force is linear
+// in (kn, kt, damping), so instead of scaling coefficients with the area of a point, the sum over a
+// pad is multiplied by that area divided by the scene's.
 #include "tasks/accuracy/pitch_sweep.hpp"
 
 #include <algorithm>
@@ -49,7 +49,7 @@ std::array<double, 2> pitch_of(const RectArray& a) {
   return {std::abs(step_along(a, a.axis0, a.rows)), std::abs(step_along(a, a.axis1, a.cols))};
 }
 
-/// The array whose points stand for the same area: each for a cell around it.
+/// The array of points that covers the same area, each point with a cell around it.
 RectArray recut(const RectArray& a, double factor) {
   RectArray to = a;
   to.rows = points_along(a.rows, factor);
@@ -76,7 +76,7 @@ Scene with_pitch(Scene scene, double factor) {
   return scene;
 }
 
-/// All sensors at one pitch, and what they felt.
+/// All sensors at one pitch, and their readings.
 class Rung {
  public:
   Rung(const Batch& start, double factor)
@@ -113,7 +113,7 @@ class Rung {
   [[nodiscard]] std::array<double, 2> pitch(std::size_t s) const { return pitch_of(array(s)); }
   [[nodiscard]] double read_seconds(std::size_t s) const { return read_seconds_[s]; }
 
-  /// Takes the states of a block and feels them: once as fields, which is timed, once as sums.
+  /// Reads all sensors at the states of a block: as fields, which is timed, and as sums.
   void feel(const Batch& at, int block, std::size_t s) {
     const int first = block * kBlock, lanes = lanes_of(at, block);
     std::vector<double> q(as_size(model_.nq())), v(as_size(model_.nv()));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the pitch of a pad's points buys: the same motion is felt by coarser and finer pads.
+// Error and cost of tactile fields over the pitch of a pad's points, for one motion.
 #pragma once
 
 #include <array>

@@ -7,14 +7,14 @@
 namespace tangere {
 
 struct Vibration {
-  int sensor = -1;       ///< -1: no sensor feels a force
+  int sensor = -1;       ///< -1: no sensor reads a force
   double frequency = 0;  ///< strongest one above half a swing between samples [Hz]
   double share = 0;      ///< of the force's energy that lies above that
 };
 
-/// Steps one environment with `parts` steps between samples and looks at the net force on
-/// each sensor after every step, at most the last 8192. Where `stop` asks for it, or the
-/// environment fails, the steps before that count.
+/// Steps one environment with `parts` steps between samples and analyses the net force on each
+/// sensor after every step, at most the last 8192. If `stop` is requested or the environment fails,
+/// the steps before count.
 Vibration strongest_vibration(const FixedEpisodes& episodes, int environment, Integrator integrator,
                               int parts, double tolerance, const std::stop_token& stop = {});
 

@@ -26,7 +26,7 @@ class BallRolling : public Task {
         pad_v_(dof("pad_joint")),
         ball_v_(dof("ball_joint")) {}
 
-  /// Stores the goal in the memory.
+  /// Stores the goal in the task state.
   void start(const TaskStart& s) const override {
     for (std::uint32_t k = 0; k < 2; ++k)
       s.task_state[k] = s.q[ball_q_ + k] + task_uniform(s.seed, s.episode, 0, k, -kReach, kReach);

@@ -22,10 +22,10 @@ constexpr int kPushActions = 10;  // length of a random push [actions], 0.25 s
 constexpr double kAngleUnit = std::numbers::pi / 36, kLengthUnit = 0.01, kGap = 0.02;
 constexpr double kPosition = 0.01, kAngle = 0.1, kEffort = 0.1;  // weights
 constexpr double kMostDrive = 0.999;  // |a| beyond it counts as this much effort, |u| = 3.8
-constexpr double kNear = 0.03, kAligned = 0.1;  // a success is nearer than this [m], [rad]
-// Memory: the goal's x, y, yaw; the push on the box, in units of its motors.
+constexpr double kNear = 0.03, kAligned = 0.1;  // bounds of success [m], [rad]
+// Task state: the goal's x, y, yaw; the push on the box, in units of its motors.
 constexpr std::size_t kGoal = 0, kPush = 3;
-constexpr std::size_t kTip = 0, kFace = 3;  // in Moment::end_effectors
+constexpr std::size_t kTip = 0, kFace = 3;  // in Snapshot::end_effectors
 
 Scene without_randomisation(Scene scene) {
   scene.randomizations.clear();

@@ -17,11 +17,11 @@ struct PushState {
   std::array<double, 3> goal{};
 };
 
-/// How the script pushes. Skins and grounds with other friction ask for other values.
+/// Gains of the script. They depend on the friction of skin and ground.
 struct PushGains {
-  double swing, cone;  ///< the face looks past the goal by `swing` rad per rad of its yaw, at most
-                       ///< `cone` [rad]
-  double rate, fastest;            ///< approach to the goal [1/s], [m/s]
+  double swing, cone;    ///< the face aims past the goal by `swing` rad per rad of its yaw, at most
+                         ///< `cone` [rad]
+  double rate, fastest;  ///< approach to the goal [1/s], [m/s]
   double turn_rate, fastest_turn;  ///< of the hand [1/s], [rad/s]
   double lead, most_lead;          ///< lead of the hand: per rad that the box lacks, at most [rad]
   double sideways;                 ///< largest angle between push and the box's x axis [rad]

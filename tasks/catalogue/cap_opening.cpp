@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Cap opening: three fingers turn a cap by an eighth of a turn. They do not know its damping,
-// radius and place (Xu et al., fourth experiment).
+// Cap opening: three fingers turn a cap by an eighth of a turn. Its damping, radius and position
+// are not observed (Xu et al., fourth experiment).
 //   reward = -0.5 for each finger that does not touch - min(θ - π/4, 0)² - 0.005 |a|²,
 //   +50 if θ > π/4 (the episode ends), -50 if a fingertip is above 50 mm (the episode ends)
 // θ: angle of the cap. a: the action; the target of each angle is the angle plus 0.06 rad times a.
@@ -33,8 +33,8 @@ constexpr double kSmallest = 0.02, kLargest = 0.08;        // radius of the cap 
 constexpr double kOffset = 0.02;  // largest offset of its axis, along x and y [m]
 constexpr double kLeast = 1e-3;   // least distance of a tip from the cap at the start [m]
 
-/// Returns the scene with the cap's damping, radius and place as its varying numbers, in this
-/// order. The task itself decides how an episode starts.
+/// Returns the scene with the cap's damping, radius and position as its varying parameters, in this
+/// order. The task draws their values.
 Scene with_cap_varying(Scene scene) {
   std::erase_if(scene.randomizations, [](const RandomizationDescription& d) {
     const bool starts_or_stands = is_of_start(d.number) || d.number.field == NumberField::pos;
@@ -91,7 +91,8 @@ class CapOpening : public Task {
     }
   }
 
-  /// The memory belongs to the script: which fingers press, then radius and place of the cap.
+  /// The task state is used by the script: which fingers press, then radius and position of the
+  /// cap.
   void begin_action(const TaskView& view, std::span<double> memory) const override {
     for (std::size_t f = 0; f < kFingers; ++f)
       memory[f] = script_.presses(angles(view, f), cap(memory, f), memory[f] != 0) ? 1 : 0;
@@ -187,7 +188,7 @@ class CapOpening : public Task {
                       "its own of {} × {}",
                       path, tip.name, kPoints, kSide, kSide));
   }
-  /// Returns the cap as a finger sees it. The fingers stand a third of a turn apart.
+  /// Returns the cap in a finger's frame. The fingers are 120° apart.
   static CapSeen cap(std::span<const double> memory, std::size_t finger) {
     const double turn = 2 * std::numbers::pi / kFingers * static_cast<double>(finger),
                  c = std::cos(turn), s = std::sin(turn);
@@ -243,7 +244,7 @@ TaskSpec declare_cap_opening(CapObservation observation, Friction friction) {
   spec.horizon = kActions;
   spec.task_state = kFingers + 3;
   spec.reads_end_effectors = true;
-  spec.reads_tactile = true;  // the reward asks which fingers touch
+  spec.reads_tactile = true;  // the reward depends on touching fingers
   if (observation == CapObservation::tactile) {
     spec.observations.push_back(
         {"tactile",

@@ -13,7 +13,7 @@ namespace tangere {
 /// Angles of a finger: swing, upper, lower [rad].
 using FingerAngles = std::array<double, 3>;
 
-/// A cap as a finger sees it: its radius, and the place of its axis relative to the axis around
+/// A cap in a finger's frame: its radius, and the position of its axis relative to the axis around
 /// which the fingers stand, along the finger's radius and to its left [m].
 struct CapSeen {
   double radius = 0, out = 0, left = 0;

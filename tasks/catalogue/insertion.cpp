@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Insertion: the hand lowers a box onto a hole but misses it. The pads feel the box hit the rim,
-// and the hand corrects its pose (Xu et al., fifth experiment). Every attempt starts anew above the
-// hole with the error e = (x, y, yaw), which the action changes.
+// Insertion: the hand lowers a box onto a hole with a pose error. The pads read the impact on the
+// rim, and the policy corrects the pose (Xu et al., fifth experiment). Every attempt restarts above
+// the hole with the error e = (x, y, yaw), which the action changes.
 //   reward = 10 if the box is in the hole (the episode ends), else -|e_xy|²/(6 mm)² - (e_yaw/10°)²
 #include <algorithm>
 #include <array>
@@ -33,8 +33,8 @@ constexpr int kPatience = 3;  // attempts between turns of the script, at least
 // normal damping relaxes in this time [m].
 constexpr double kLeastShare = 0.25, kLargestShare = 0.67, kRelaxation = 5e-3, kDepth = 3e-4;
 constexpr double kLift = 6e-3;  // targets start this far above the grip, end as far below [m]
-// Memory: e before the current action, e in it, height of the grip [m], gripping force as a share
-// of 20 N, yaw that actions have added [rad], which a script may know.
+// Task state: e before the current action, e in it, height of the grip [m], gripping force as a
+// share of 20 N, sum of the yaw of actions [rad], for the script.
 constexpr std::size_t kBefore = 0, kNow = 3, kHeight = 6, kGrip = 7, kTurned = 8;
 
 constexpr int kSkinNumbers = kPointCoefficients + 1;  // kn, kt, mu, damping, ks
@@ -243,7 +243,7 @@ class Insertion : public Task {
   }
   [[nodiscard]] bool slides() const { return moved_.front() == 0; }
   [[nodiscard]] bool turns() const { return moved_.back() == 2; }
-  /// e in the current action: e before it plus the change that it asks for.
+  /// e in the current action: e before it plus the commanded change.
   [[nodiscard]] std::array<double, 3> off(const TaskView& view) const {
     std::array<double, 3> e{view.task_state[kBefore], view.task_state[kBefore + 1],
                             view.task_state[kBefore + 2]};
@@ -281,10 +281,10 @@ class Insertion : public Task {
   Vector3 rest_{};                          // rest position of the box's joint
 };
 
-/// Infers from the rim's forces where the box is off. Off in x, the rim pushes one finger up more
-/// than the other. Off in y, the box turns about the grip. The script then moves the box the other
-/// way, by the mean offset that misses the hole. A turned box stands on two opposite corners. That
-/// feels the same for both directions, so the script tries one, then the other.
+/// Estimates the error from the rim's forces. An error in x loads one finger more than the other.
+/// An error in y turns the box about the grip. The script then moves the box back by the mean
+/// offset that misses the hole. A box with a yaw error stands on two opposite corners, with the
+/// same forces for both signs, so the script tries one, then the other.
 void Insertion::scripted(const TaskView& view, std::span<const double> o,
                          std::span<double> action) const {
   std::array<double, kPads> up{};

@@ -25,7 +25,7 @@ constexpr double kLevel = 0.02, kLifted = 5e-3;    // [rad], [m]
 constexpr double kSuccess = 100, kTilt = 10;       // of the reward
 constexpr double kOpen = -0.025, kClosed = 0, kHeight = 0.03;  // targets of fingers and hand [m]
 constexpr double kTooLittle = 1e-6;                            // less shear counts as none [N]
-// Memory: where the hand grasps, where it grasped before [m], height of the bar at rest [m].
+// Task state: position of the grasp and of the one before [m], height of the bar at rest [m].
 constexpr std::size_t kPlace = 0, kBefore = 1, kRest = 2;
 
 /// 0 before step `from`, 1 from step `from + length` on, linear in between.

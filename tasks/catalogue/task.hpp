@@ -16,17 +16,17 @@ namespace tangere {
 /// The state of an environment at one time.
 struct Snapshot {
   std::span<const double> q, v;           ///< (nq), (nv)
-  std::span<const double> end_effectors;  ///< (n, 3) positions [m], if the task looks at them
+  std::span<const double> end_effectors;  ///< (n, 3) positions [m], if TaskSpec requests them
   std::span<const double>
-      tactile;  ///< (points, 3) [N] of every sensor in turn, if the task looks at them
+      tactile;  ///< (points, 3) [N] of every sensor in turn, if TaskSpec requests them
 };
 
-/// What a task may look at.
+/// Inputs of the functions of a task.
 struct TaskView {
   std::uint64_t seed = 0;
   std::int64_t episode = 0;
   std::int64_t actions = 0;            ///< taken in this episode so far
-  std::span<const double> task_state;  ///< (memory)
+  std::span<const double> task_state;  ///< (task_state)
   std::span<const double> action;      ///< the current or the last action; empty before the first
   std::span<const Snapshot>
       snapshots;  ///< of that action, as declared; before an action only its start
@@ -40,28 +40,28 @@ struct TaskStart {
   std::int64_t episode = 0;
   std::span<double> q, v;        ///< (nq), (nv)
   std::span<double> varying;     ///< what the scene randomises, in its order; states have no effect
-  std::span<double> task_state;  ///< (memory), zeros
+  std::span<double> task_state;  ///< (task_state), zeros
 };
 
-/// Judgement of a state.
+/// Reward and end of an action.
 struct StepOutcome {
   double reward = 0;
   bool terminated = false;  ///< the episode ends here, and not because time ran out
   bool success = false;
 };
 
-/// Accumulates derivatives by a moment. Those by q are by displacements along the dofs of v, with
-/// rotations on the right (docs/dynamics.md); the others are by component. What the task does not
-/// look at is empty.
+/// Accumulates cotangents of a Snapshot. Those of q are along the dofs of v, with rotations on the
+/// right (docs/dynamics.md); the others are by component. Quantities that the task does not request
+/// are empty.
 struct SnapshotCotangent {
   std::span<double> q, v;           ///< (nv), (nv)
   std::span<double> end_effectors;  ///< (n, 3)
-  std::span<double> tactile;        ///< as in Moment
+  std::span<double> tactile;        ///< as in Snapshot
 };
 struct ViewCotangent {
-  std::span<const SnapshotCotangent> snapshots;  ///< parallel to TaskView::moments
+  std::span<const SnapshotCotangent> snapshots;  ///< parallel to TaskView::snapshots
   std::span<double> action;
-  std::span<double> task_state = {};  ///< (memory)
+  std::span<double> task_state = {};  ///< (task_state)
 };
 
 class Task {
@@ -74,12 +74,13 @@ class Task {
 
   [[nodiscard]] const TaskSpec& spec() const { return spec_; }
   [[nodiscard]] const Model& model() const { return model_; }
-  [[nodiscard]] std::size_t tactile_size() const;  ///< numbers of Moment::tactile
+  [[nodiscard]] std::size_t tactile_size() const;  ///< numbers in Snapshot::tactile
   [[nodiscard]] std::size_t end_effectors_size() const;
 
   /// Starts an episode as drawn, unless a task overrides this.
   virtual void start(const TaskStart& start) const;
-  /// Runs before an action's first step and updates the memory, which holds for all its steps.
+  /// Called before an action's first step. Updates the task state, which is constant during the
+  /// action.
   virtual void begin_action(const TaskView& view, std::span<double> memory) const;
   /// For a task that restarts: sets the state in which the action begins. On entry q and v are the
   /// state after the last action.
@@ -93,26 +94,26 @@ class Task {
   /// Adds `weight` times the derivative of the reward to `out`. A choice between cases has no
   /// derivative. Only gradients of returns need it; the default throws InputError.
   virtual void reward_vjp(const TaskView& view, double weight, const ViewCotangent& out) const;
-  /// Adds ∂(weight · o)/∂(moments, action, memory), where o is the result of observe(view, o) and
-  /// `weight` is (observation). Noise counts as given. At a choice between cases or a threshold it
-  /// is the derivative of the case at hand, at a clamp that of its inside. Gradients through
+  /// Adds ∂(weight · o)/∂(snapshots, action, task state), where o is the result of observe(view, o)
+  /// and `weight` is (observation). Noise counts as given. At a choice between cases or a threshold
+  /// it is the derivative of the case at hand, at a clamp that of its inside. Gradients through
   /// observations need it (tasks/gradients/task_tape.hpp); the default throws InputError.
   virtual void observe_vjp(const TaskView& view, std::span<const double> weight,
                            const ViewCotangent& out) const;
-  /// Adds ∂(weight · u)/∂(action, memory, q and v of the action's start), where u is the result of
-  /// controls(view, step, u) and `weight` is (nu). Only gradients need it; the default throws
+  /// Adds ∂(weight · u)/∂(action, task state, q and v of the action's start), where u is the result
+  /// of controls(view, step, u) and `weight` is (nu). Only gradients need it; the default throws
   /// InputError.
   virtual void controls_vjp(const TaskView& view, int step, std::span<const double> weight,
                             const ViewCotangent& out) const;
 
-  /// Reverses begin_action. On entry `memory` holds derivatives by the memory after begin_action,
-  /// on return by the memory before it, view.memory. Adds derivatives by the action and by q and v
-  /// of its start to `out`. The default assumes that nothing written has a derivative.
+  /// Pullback of begin_action. On entry, the cotangents of the task state are those after
+  /// begin_action; on return, those before it (view.task_state). Adds cotangents of the action and
+  /// of q and v of its start to `out`. The default assumes that begin_action has zero derivative.
   virtual void begin_action_vjp(const TaskView& view, std::span<double> memory,
                                 const ViewCotangent& out) const;
-  /// Reverses place: adds ∂(q̄·q + v̄·v)/∂(action, memory, q and v after the last action), where q̄
-  /// is `q` and v̄ is `v`, both (nv). A task that restarts must override it; the default throws
-  /// InputError.
+  /// Pullback of restart_state: adds ∂(q̄·q + v̄·v)/∂(action, task state, q and v after the last
+  /// action), where q̄ is `q` and v̄ is `v`, both (nv). A task that restarts must override it; the
+  /// default throws InputError.
   virtual void restart_state_vjp(const TaskView& view, std::span<const double> q,
                                  std::span<const double> v, const ViewCotangent& out) const;
 

@@ -22,8 +22,7 @@ bool is_memory(EffectKind kind) {
          kind == EffectKind::tactile_memory;
 }
 
-/// Whether memory of friction goes with an effect: with a contact or sensor, its friction or its
-/// memory.
+/// Whether removing an effect also removes shear springs: contacts, sensors, friction, ks.
 bool takes_memory(const Model& model, const Effect& effect) {
   const EffectKind kind = effect.kind;
   const bool friction = kind == EffectKind::pair_friction || kind == EffectKind::ground_friction ||
@@ -35,8 +34,9 @@ bool takes_memory(const Model& model, const Effect& effect) {
   });
 }
 
-/// Memory moves on once per step, that of sensors too, and is felt in every pass, so models with
-/// and without it are compared in as many passes as both need. What feedback does is a contact.
+/// Parts of the step that an effect changes. The shear state is updated once per step but read in
+/// every residual evaluation, so models with and without it are compared with equal numbers of
+/// evaluations. Feedback is a contact.
 TimedParts parts_of(const Model& model, const Effect& effect) {
   constexpr int kAllPasses = 1000;
   const bool reads = is_of_sensors(effect.kind);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What each effect of a scene costs: the time of a step with it against the time without it, from
-// the same states. docs/effects.md says how to read the figures.
+// Cost of each effect of a scene: time of a step with the effect relative to the time without it,
+// from the same states. docs/effects.md explains the figures.
 #pragma once
 
 #include <cstddef>
@@ -26,12 +26,12 @@ struct EffectCost {
   EffectInfo effect;
   /// State and fields of one environment that go with the effect [bytes].
   std::int64_t bytes = 0;
-  /// Of a step; 0 for an effect that is off, none where `note` says why.
+  /// Of a step; 0 for an effect that is off; no value: not measured, `note` has the reason.
   std::optional<MeasuredShare> measured{};
-  std::string note{};          ///< why it is not measured, or what else to know; may be ""
+  std::string note{};          ///< reason why it is not measured, or a remark; may be ""
   double seconds_without = 0;  ///< a step of one environment without the effect [s]
-  /// Evaluations of the residual per step from the same states, to the same tolerance of a residual
-  /// whose scale may have lost a force (docs/solver.md).
+  /// Residual evaluations per step from the same states, to the same tolerance. The scale of the
+  /// residual may lack the force of the removed effect (docs/solver.md).
   double passes_without = 0;
 };
 

@@ -29,7 +29,7 @@ struct RecordedStates {
   std::vector<std::vector<double>> numbers;  ///< (randomized numbers, E): the values drawn
 };
 
-/// Steps of a run whose controls have no end, and the most that are played of any.
+/// Steps of a run with open-ended controls, and the largest number of steps of any run.
 inline constexpr std::int64_t kOpenRunSteps = 200, kMostRunSteps = 1000;
 
 /// Plays a batch of a scene by its own controls and records instants in the middles of equal

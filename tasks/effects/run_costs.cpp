@@ -120,7 +120,7 @@ std::vector<RunCost> measure_run_costs(TimedModel& timed, const StepTimes& times
     add("rows of variables", asked("variables"), kPlace * double(model.end_effectors().size()),
         [&] { return first_block([&](int e) { readout.end_effectors(*end, e, places); }); });
   const Asked nobody{0, "--audit"};
-  // Both ends of every step: energies, momenta, and what passed.
+  // Energies and momenta at both ends of every step, and the work in between.
   add("audit", nobody, 3 + 6 + 3, [&] {
     return first_block([&](int e) {
       auditor.read(*end, e, controls.subspan(as_size(e) * nu, nu));

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a run adds to a step because somebody asks for it: rows of states, books, derivatives.
-// Readings of sensors are effects of the scene (effect_costs.hpp).
+// Cost per step of optional outputs of a run: rows of states, energy balance, derivatives. Readings
+// of sensors are effects of the scene (effect_costs.hpp).
 #pragma once
 
 #include <string>
@@ -14,7 +14,7 @@ namespace tangere {
 struct RunCost {
   std::string name;        ///< "audit"
   std::string asked_by;    ///< the option or line, in words
-  bool on = false;         ///< the scene's <outputs>, or their absence, ask for it in simulate
+  bool on = false;         ///< whether simulate computes it by the scene's <outputs> or default
   double seconds = 0;      ///< for one environment and step [s]
   double share = 0;        ///< the same over a step with its readings
   std::int64_t bytes = 0;  ///< that it stores for one environment and step

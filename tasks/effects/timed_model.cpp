@@ -118,7 +118,7 @@ TimedStep TimedModel::time_step(int instant) {
       step.failures += failed(batch_.status(e)) ? 1 : 0;
     }
     if ((e + 1) % kLanesOfGroup != 0 && e + 1 < batch_.environments()) continue;
-    groups += most > 0 ? 1 : 0;  // groups whose environments have all failed take no passes
+    groups += most > 0 ? 1 : 0;  // groups with failed environments only need no evaluations
     step.group_passes += std::exchange(most, 0);
   }
   step.seconds /= std::max(1, step.steps);

@@ -31,7 +31,7 @@ class TimedModel {
   void solve_to(double tolerance);
   /// Takes one step of all environments from an instant, and times the step alone.
   TimedStep time_step(int instant);
-  /// Readings that the scene asks for: its <outputs>, else the field of every sensor.
+  /// Readings of the scene's <outputs>; without them, the field of every sensor.
   [[nodiscard]] std::span<const FieldOutput> readings() const { return outputs_; }
   /// Steps of a run for each taking of a reading, on average.
   [[nodiscard]] double interval(std::size_t reading) const;

@@ -25,7 +25,7 @@ const char* to_string(GradientKind kind);
 using EpisodeGradients = std::function<void(std::int64_t first_episode, int episodes,
                                             std::vector<std::vector<double>>& out)>;
 
-/// What is stored and who computes it. `make` is called once per thread.
+/// The stored results and the factory of their computation. `make` is called once per thread.
 struct GradientPlan {
   std::vector<GradientArray> arrays;
   std::int64_t rows = 0;  ///< of an episode, at most

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tactile fields of a run, in memory.
+// In-memory sequence of the tactile fields of a run.
 #pragma once
 
 #include <cstdint>

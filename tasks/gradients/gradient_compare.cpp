@@ -49,7 +49,7 @@ std::vector<std::size_t> chosen(std::vector<std::size_t> all, std::size_t wanted
   return all;
 }
 
-/// Says at which change of an input two runs differ.
+/// Prefixes sentences with the change of an input at which two runs differ.
 std::vector<std::string> with_change(std::vector<std::string> texts, double change) {
   for (std::string& text : texts)
     text = fmt::format("changed by {:.1e} to both sides, {}", change, text);

@@ -28,7 +28,7 @@ struct Comparison {
   std::vector<std::size_t> among;                     ///< entries that can be moved
   std::function<Difference(std::size_t)> difference;  ///< by entry
   std::function<std::string(std::size_t)> entry_name;
-  /// What runs on both sides of the input decide differently, in sentences.
+  /// Active-set differences between the runs on both sides of the input, in sentences.
   std::function<std::vector<std::string>(std::size_t)> decisions;
 };
 
@@ -90,7 +90,7 @@ class GradientChecker {
   using MoveScene = std::function<void(Scene&, std::vector<double>& varying, double e)>;
   [[nodiscard]] Difference difference(double scale, const MoveInput& move) const;
   [[nodiscard]] Difference difference_of_scene(const MoveScene& move) const;
-  /// What the runs on both sides decide differently at the smallest change at which they do.
+  /// Active-set differences between the runs on both sides, at the smallest change that has any.
   [[nodiscard]] std::vector<std::string> decisions(double scale, const MoveInput& move) const;
   [[nodiscard]] std::vector<std::string> decisions_of_scene(const MoveScene& move) const;
 

@@ -30,8 +30,7 @@ void check(const TapeOptions& options) {
                      " threads; expected at least 1");
 }
 
-/// Losses of fields cannot have sensors with memory. Points of sensors with ks have no derivatives
-/// of their own.
+/// Refuses losses of fields of sensors with lag, and derivatives by points of sensors with ks.
 void check_memories(const Model& model, const TapeOptions& options,
                     std::span<const RolloutLoss* const> losses) {
   const auto reads_fields = [&](const RolloutLoss* loss) {

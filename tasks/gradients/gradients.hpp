@@ -42,12 +42,12 @@ GradientSummary rollout_gradients(const Batch& start, const StepControls& contro
                                   const TapeOptions& options,
                                   std::span<const RolloutLoss* const> losses);
 
-/// Plays episodes of a seed in blocks of 16 on all threads. `actions` chooses every action and may
-/// look at anything; derivatives are by the actions, at the values that it chose. The bits depend
-/// neither on the number of threads, nor on the other episodes, nor on tape_bytes. `stop` ends it
-/// before any action. Throws InputError for an action that is not finite, for numbers of episodes,
-/// actions or threads out of range, for a tape_bytes that does not hold the checkpoints, and for a
-/// task that restarts without a derivative of its restarts.
+/// Runs episodes of a seed in blocks of 16 on all threads. `actions` chooses every action from the
+/// full view; derivatives are by the actions, at the chosen values. The bits depend neither on the
+/// number of threads, nor on the other episodes, nor on tape_bytes. A requested `stop` takes effect
+/// before the next action. Throws InputError for an action that is not finite, for numbers of
+/// episodes, actions or threads out of range, for a tape_bytes that does not hold the checkpoints,
+/// and for a task that restarts without a derivative of its restarts.
 TaskGradients task_gradients(const Task& task, const TaskActions& actions, std::uint64_t seed,
                              EpisodeRange episodes, const TapeOptions& options,
                              const std::stop_token& stop = {});

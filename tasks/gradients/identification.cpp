@@ -287,7 +287,7 @@ void judge_information(const Matrix& F, const Matrix& J, Identification& out) {
                         out.inseparable.end());
 }
 
-/// Judges the end of a fit.
+/// Sets the result flags of a finished fit.
 void judge(const Problem& problem, const Fit& fit, double stated_noise, Identification& out) {
   const Matrix& J = fit.J;
   out.points = fit.points;
@@ -302,8 +302,7 @@ void judge(const Problem& problem, const Fit& fit, double stated_noise, Identifi
   judge_information(F, J, out);
 }
 
-/// Whether a fit is to take the place of the best one so far. Of fits that end alike the first that
-/// has come to an end stays.
+/// Whether a fit replaces the best one so far. Of equal fits the first converged one stays.
 bool is_better(const FitEnds& fit, const Identification& best) {
   if (best.points.empty()) return true;
   const double misfit = best.points.back().misfit;
@@ -311,7 +310,7 @@ bool is_better(const FitEnds& fit, const Identification& best) {
          (fit.converged && !best.converged && fit.misfit <= (1 + kAlike) * misfit);
 }
 
-/// Finds the number that was not sought and whose change would make up best for what is left.
+/// Finds the parameter outside the fit whose change would reduce the residual most.
 void find_suspect(const Problem& problem, Identification& out) {
   ResidualTest& test = out.residual;
   if (!test.tested) return;

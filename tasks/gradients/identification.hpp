@@ -32,7 +32,7 @@ struct RecordedRun {
 /// fails.
 FieldSequence simulate_fields(const Scene& scene, const RecordedRun& run);
 
-/// Memory of a fit of `numbers` numbers to such a run [bytes].
+/// Memory of a fit of `numbers` parameters to such a run [bytes].
 double identification_bytes(const Model& model, const RecordedRun& run, std::size_t numbers);
 
 /// Adds independent normal noise to every number of every field.
@@ -61,8 +61,8 @@ struct IdentificationOptions {
       numbers;              ///< sought numbers by name_of(); positive, fitted as logarithms
   int max_iterations = 60;  ///< rollouts with gradients, rejected steps included
   double tolerance = 1e-2;  ///< ends at a step worth this many standard deviations
-  /// Most fits. One begins at the scene's values. Others begin at these times random factors of ¼
-  /// to 4, until what a fit leaves is noise and its numbers can be told apart.
+  /// Largest number of fits. The first starts at the scene's values, others at these times random
+  /// factors of ¼ to 4, until the residual of a fit is noise and its parameters are identifiable.
   int starts = 6;
   std::uint64_t seed = 1;  ///< of the factors
   double noise = 0;        ///< stated standard deviation of a recorded number [N]; 0: not stated
@@ -94,8 +94,8 @@ struct Identification {
   std::vector<double> information;  ///< (n, n) Fisher: JᵀJ / noise², J by logarithms
   std::vector<double> correlation;  ///< (n, n) of the estimates
   double condition = 0;  ///< largest eigenvalue of the information over the smallest, at most 1/ε
-  /// Indices of numbers that the fields do not tell apart, or do not show: those of the weakest
-  /// direction if it is no direction at all, and those whose deviation exceeds kMostDeviation.
+  /// Indices of parameters that the fields do not identify: those of the weakest direction if its
+  /// information vanishes, and those whose standard deviation exceeds kMostDeviation.
   std::vector<int> inseparable;
   double gradient_difference =
       0;  ///< at the start, |adjoint − Jᵀr| / |Jᵀr|; J from central differences
@@ -104,7 +104,7 @@ struct Identification {
 
   static constexpr double kMostDeviation = 0.5;
   [[nodiscard]] const std::vector<double>& values() const { return points.back().values; }
-  /// Whether it came to an end, with numbers that can be told apart, and left noise.
+  /// Whether it converged, its parameters are identifiable, and its residual is noise.
   [[nodiscard]] bool passed() const {
     return converged && inseparable.empty() && residual.is_noise();
   }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// One residual of many points cannot tell a wrong model from noise. Sums over a touched area can,
-// because there noise averages out.
+// The residual of single points does not separate model error from noise. Sums over a touched area
+// do, because noise averages out.
 #include "tasks/gradients/residual_test.hpp"
 
 #include <algorithm>

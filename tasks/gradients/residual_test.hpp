@@ -27,9 +27,9 @@ struct ResidualTest {
   double score = 0;  ///< the largest of all, in standard deviations of independent noise
   /// Mean square of all residuals over the stated variance of the noise; 0 where none is stated.
   double chi_square = 0;
-  /// The number that was not sought and whose change would fit best, and that relative change. With
-  /// J its column of the Jacobian less its projection on those of the sought ones, and σ the noise,
-  /// J·r/(σ |J|) is its score.
+  /// The parameter outside the fit whose change would reduce the residual most, and that relative
+  /// change. With J its column of the Jacobian less its projection on those of the fitted ones, and
+  /// σ the noise, J·r/(σ |J|) is its score.
   std::string suspect;
   double suspect_score = 0, suspect_change = 0;
 

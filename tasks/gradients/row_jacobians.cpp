@@ -30,8 +30,8 @@ std::span<const double> of_lane(const std::vector<double>& all, int lane) {
   return std::span(all).subspan(as_size(lane) * width, width);
 }
 
-/// Rows of derivatives by (q, v, action, memory): calls reverse(weight, out) with a weight of 1 for
-/// each of `count` numbers in turn.
+/// Rows of derivatives by (q, v, action, task state): calls reverse(weight, out) with a weight of 1
+/// for each of `count` numbers in turn.
 template <class Reverse>
 std::vector<double> reversed_rows(const Task& task, std::size_t count, const Reverse& reverse) {
   const std::size_t nv = as_size(task.model().nv()), width = task.spec().action.size(),
@@ -155,8 +155,8 @@ void ActionJacobians::evaluate(TaskRollout& rollout, const ActionRecord& r, std:
   for (int l = 0; l < rollout.lanes(); ++l) compose(rollout, r, action, l);
 }
 
-/// Turns derivatives by the first state, the action and the memory into derivatives at the point
-/// where the action was chosen.
+/// Pulls derivatives by the first state, the action and the task state back to the state in which
+/// the action was chosen.
 void ActionJacobians::compose(TaskRollout& rollout, const ActionRecord& r, std::int64_t action,
                               int lane) {
   RowJacobian chain;
@@ -191,7 +191,7 @@ void ActionJacobians::compose(TaskRollout& rollout, const ActionRecord& r, std::
     for (std::size_t k = 0; k < state_; ++k)
       for (std::size_t i = 0; i < state_; ++i) add_row(i, k, chain.state[i * state_ + k]);
   }
-  // The memory that the action found counts as given.
+  // The task state before the action counts as constant.
   const std::vector<double> kept = by_memory;
   rows = memory_rows(task_, rollout.view(r, action, lane, of_lane(r.found, lane), {&seen, 1}));
   for (std::size_t k = 0; k < memory_; ++k)

@@ -35,15 +35,15 @@ class RowChain {
   std::vector<double> now_, before_, next_;  // (2 nv, columns)
 };
 
-/// Derivatives of what a task writes where an action begins, a row for each number, by (q, v,
-/// action, memory) of `view`: of the controls from `step` on, of the state after a restart, and of
-/// the memory after begin_action.
+/// Jacobians at the start of an action, one row per output, by (q, v, action, task state) of
+/// `view`: of the controls from `step` on, of the state after a restart, and of the task state
+/// after begin_action.
 std::vector<double> control_rows(const Task& task, const TaskView& view, int step);
 std::vector<double> restart_rows(const Task& task, const TaskView& view);
 std::vector<double> memory_rows(const Task& task, const TaskView& view);
 
-/// Jacobian of an action of a task from where it was chosen, through the update of the memory, the
-/// restart, the controls and the steps.
+/// Jacobian of an action of a task from the state in which it was chosen, through the update of the
+/// task state, the restart, the controls and the steps.
 class ActionJacobians {
  public:
   ActionJacobians(const Task& task, const StepperOptions& options);
@@ -61,7 +61,7 @@ class ActionJacobians {
   StepJacobians steps_;
   std::size_t state_, width_, memory_;
   std::vector<RowChain> chains_;               // (16)
-  std::vector<std::vector<double>> controls_;  // (16) of (nu, 2 nv + action + memory)
+  std::vector<std::vector<double>> controls_;  // (16) of (nu, 2 nv + action + task state)
   std::vector<RowJacobian> rows_;              // (16)
 };
 

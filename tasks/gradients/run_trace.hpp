@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the steps of neighbouring rollouts decided: which points touch, which limits act, how a step
-// ended. A derivative exists where neighbours decide alike.
+// Active sets of the steps of a rollout: touching points, active limits, status of each step. A
+// rollout is differentiable where neighbouring rollouts have the same active sets.
 #pragma once
 
 #include <cstdint>
@@ -21,7 +21,7 @@ class RunTrace {
   /// differs in numbers.
   void add(const Batch& batch);
   /// Returns one sentence for each contact, limit, sensor and status in which an environment of
-  /// this trace and one of another first decided differently; none where they decided alike.
+  /// this trace first differs from one of another; none if they agree.
   [[nodiscard]] std::vector<std::string> differences(int environment, const RunTrace& other,
                                                      int environment_of_other) const;
 

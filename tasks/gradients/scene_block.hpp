@@ -18,8 +18,7 @@ class LossReading {
  public:
   explicit LossReading(const Model& model);
 
-  /// Sets a sensor's field that has been read already. The frame must live until evaluate() is
-  /// done.
+  /// Sets a sensor's field that has been read already. The frame must outlive the next evaluate().
   void set_field(std::size_t sensor, const CompactFrame<double>& frame) {
     fields_[sensor] = &frame;
   }

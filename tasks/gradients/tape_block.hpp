@@ -20,7 +20,7 @@ namespace tangere {
 struct TapePlan {
   std::int64_t tapes = 1;    ///< of a rollout
   std::int64_t steps = 1;    ///< on each; the last one may have fewer
-  std::int64_t segment = 1;  ///< tapes between two checkpoints, which are in memory at a time
+  std::int64_t segment = 1;  ///< tapes between two checkpoints, all in memory at once
   [[nodiscard]] bool whole() const { return segment == tapes; }
 };
 
@@ -40,7 +40,7 @@ class TapeBlock {
   virtual ~TapeBlock() = default;
   TapeBlock(TapeBlock&&) noexcept = default;
 
-  /// Sets the counts to 0. `stop`: asked before every step.
+  /// Sets the counts to 0. `stop`: checked before every step.
   void begin(std::stop_token stop);
   [[nodiscard]] bool stopped() const { return stopped_; }
   [[nodiscard]] std::int64_t newton_iterations() const { return newton_iterations_; }
@@ -54,8 +54,7 @@ class TapeBlock {
   void take_tape(Batch& batch, int block);
   /// Sets all cotangents to zero after the last tape. May be called again to go back again.
   void start_back();
-  /// Reverses the last tape that is not reversed yet. A segment whose steps are on no tape is taken
-  /// again.
+  /// Reverses the last tape that is not reversed yet. Recomputes its segment if it is not on tape.
   void reverse_tape(Batch& batch, int block);
   /// Takes the steps of tape number k. Clears `tape`, if any, and records them on it.
   virtual void take_steps(std::int64_t k, BlockTape* tape) = 0;

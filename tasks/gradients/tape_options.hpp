@@ -67,8 +67,8 @@ struct GradientSummary : GradientCounts {
 };
 
 /// The value is the sum of rewards until the end. A derivative by a component of an action beyond
-/// its bounds is 0. The initial state is that at the first action: the reset (settling, an opening)
-/// and all random draws count as given.
+/// its bounds is 0. The initial state is that at the first action: the reset (settling, warm-up)
+/// and all random draws count as constant.
 struct TaskGradients : GradientCounts, LossGradient {
   std::vector<std::int64_t> length;  ///< (E) actions until the end
   std::vector<double> action;        ///< (E, A, action) as chosen; zeros after the end

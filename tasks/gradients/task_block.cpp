@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Each action has a tape of its own. It begins at x and finds the memory m. It leaves m⁺, with K
-// steps and moments in between:
+// Each action has a tape of its own. With the state x and the task state m before the action, m⁺
+// the task state during it, and K steps with snapshots:
 //   r = judge(moments, m⁺, a);  o = observe(moments, m⁺, a)
 //   x_(k+1) = step(x_k, controls(x_0, m⁺, a));  x_0 = place(x, m⁺, a);  m⁺ = begin_action(x, m, a)
 #include "tasks/gradients/task_block.hpp"
@@ -96,7 +96,7 @@ TaskBlock::TaskBlock(const Task& task, const TapeOptions& options, std::int64_t 
 }
 
 double TaskBlock::bytes(const Task& task, const TapeOptions& o, std::int64_t blocks) {
-  // Cotangents of moments, and what an opening has shown, take as much as moments.
+  // Cotangents of snapshots, and snapshots of a warm-up, have the size of snapshots.
   const double moments = (task.spec().warm_up ? 3 : 2) * BlockWorker::bytes(task);
   return std::min(double(blocks) * bytes_with(task, o, o.length), o.tape_bytes) +
          double(blocks) * (moments + 2 * double(Stepper::workspace_bytes(task.model())));
@@ -181,7 +181,7 @@ void TaskBlock::reverse(std::int64_t action, const ActionCotangents& by,
       if (asked >= spec.low && asked <= spec.high)
         by_action[as_size(l) * spec.size() + k] = part(by_action_, l)[k];
     }
-    for (std::vector<double>* x : {&shown_, &shown_q_, &shown_v_})  // it has been passed on
+    for (std::vector<double>* x : {&shown_, &shown_q_, &shown_v_})  // already added
       std::ranges::fill(part(*x, l), 0.0);
   }
 }
@@ -214,8 +214,8 @@ void TaskBlock::reverse_steps(std::int64_t action, const BlockTape& tape) {
   reverse_start(r, action);
 }
 
-/// Adds what the reward, the observation and the state after an action pass on to the moments, the
-/// memory and the action.
+/// Pulls cotangents of the reward, the observation and the state after an action back to the
+/// snapshots, the task state and the action.
 void TaskBlock::reverse_outcome(const ActionRecord& r, std::int64_t action) {
   clear_moments();
   for (int l = 0; l < lanes(); ++l) {
@@ -246,7 +246,7 @@ void TaskBlock::reverse_shown(const TaskView& view, int lane, const ViewCotangen
   }
 }
 
-/// Adds cotangents of a moment, whose states the batch shows, to those of the state.
+/// Adds cotangents of a snapshot, whose state is in the batch, to those of the state.
 void TaskBlock::add_moment(std::size_t moment) {
   const MomentRows& m = moments_[moment];
   BlockCotangent& c = adjoint_.loss(0);
@@ -291,8 +291,8 @@ void TaskBlock::reverse_controls(const ActionRecord& r, std::int64_t action, int
   std::fill(by_u_.begin(), by_u_.end(), 0.0);
 }
 
-/// Goes back to where the action was chosen, through a restart and through the update of the
-/// memory.
+/// Pulls cotangents back through the restart and the update of the task state to the state in which
+/// the action was chosen.
 void TaskBlock::reverse_start(const ActionRecord& r, std::int64_t action) {
   BlockCotangent& c = adjoint_.loss(0);
   const std::size_t nv = as_size(task_.model().nv());
@@ -312,7 +312,7 @@ void TaskBlock::reverse_start(const ActionRecord& r, std::int64_t action) {
         placed_v[i] += at(c.v, i);
         q[i] = v[i] = at(c.q, i) = at(c.v, i) = at(c.previous_q, i) = at(c.previous_v, i) = 0;
       }
-      c.shear[as_size(l)].clear();  // friction remembers nothing of before
+      c.shear[as_size(l)].clear();  // a restart clears the shear state
       const SnapshotCotangent to{q, v, {}, {}};
       task_.restart_state_vjp(rollout_.view(r, action, l, part(r.task_state, l), {&seen, 1}),
                               placed_q, placed_v, {{&to, 1}, by_action, memory});

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The tape of up to sixteen episodes of a task, one action after the other. Derivatives enter by
-// rewards, observations and states; they pass through steps, controls, restarts and the task's
-// memory, and leave by actions. A return is the case in which each reward has the derivative 1.
+// Tape of up to sixteen episodes of a task, one action after the other. Pulls cotangents of
+// rewards, observations and states back through steps, controls, restarts and the task state to
+// actions. For a return, the cotangent of each reward is 1.
 #pragma once
 
 #include <array>
@@ -22,14 +22,14 @@ class TaskBlock : public TapeBlock {
   /// One of `blocks` that hold tapes at once, within options.tape_bytes together. options.length is
   /// the final number of actions. Throws InputError when not even checkpoints fit.
   TaskBlock(const Task& task, const TapeOptions& options, std::int64_t blocks);
-  /// Memory of all these blocks [bytes].
+  /// Size of all these blocks [bytes].
   static double bytes(const Task& task, const TapeOptions& options, std::int64_t blocks);
 
   /// Resets one episode per lane.
   void start(std::uint64_t seed, EpisodeRange episodes);
   /// Moves the state in which a lane's first action begins.
   void displace(int lane, std::span<const double> q, std::span<const double> v);
-  /// Takes `actions`, (lanes, action), in the lanes whose episodes go on.
+  /// Takes `actions`, (lanes, action), in the lanes whose episodes have not ended.
   void step(std::span<const double> actions);
   /// Whether a lane took the last action.
   [[nodiscard]] bool took(int lane) const { return took_[static_cast<std::size_t>(lane)]; }
@@ -52,7 +52,7 @@ class TaskBlock : public TapeBlock {
   [[nodiscard]] int lanes() const { return rollout_.lanes(); }
 
  private:
-  /// Rows of lanes: what is seen of one moment, or derivatives by it.
+  /// Rows of lanes: the numbers of one snapshot, or their cotangents.
   struct MomentRows {
     std::vector<double> q, v, end_effectors, tactile;  // (16, width)
   };
@@ -81,13 +81,13 @@ class TaskBlock : public TapeBlock {
   std::array<bool, kernels::kBlock> took_{};
   std::array<ShearState, kernels::kBlock> start_memory_;  // what friction remembered at the reset
   std::vector<MomentRows> opening_;  // what the task saw of an opening before its last moment
-  // Cotangents of the action reversed last: of its moments, its first state, its controls, itself.
+  // Cotangents for the action reversed last: of its snapshots, first state, controls, and itself.
   std::vector<MomentRows> moments_;
   std::vector<SnapshotCotangent> to_moments_;
   std::vector<double> start_q_, start_v_, by_u_, by_action_;  // (16, nv), …, (16, nu), (16, action)
-  std::vector<double> by_memory_;  // (16, memory) of the memory after begin_action
-  /// Sums of derivatives by what a lane has shown since its last action that is not reversed yet.
-  /// An episode that has ended goes on showing its last state.
+  std::vector<double> by_memory_;                             // (16, task state) after begin_action
+  /// Cotangents accumulated for the observations, positions and velocities of a lane after its last
+  /// unreversed action. An ended episode repeats its last state.
   std::vector<double> shown_, shown_q_, shown_v_;  // (16, observation), (16, nv), (16, nv)
   std::vector<double> by_reward_;                  // (16)
 };

@@ -21,7 +21,7 @@ using TaskActions = std::function<void(const TaskView& view, std::span<const dou
 /// The start of an action, for every lane.
 struct ActionRecord {
   std::vector<double> q, v;  ///< (16, nq), (16, nv) when it was chosen, before a task restarts
-  std::vector<double> found, task_state;      ///< (16, memory) before and after begin_action
+  std::vector<double> found, task_state;      ///< (16, task state) before and after begin_action
   std::vector<double> chosen, action;         ///< (16, action): as chosen, as taken
   std::array<bool, kernels::kBlock> taken{};  ///< false: the episode had ended
 
@@ -38,15 +38,15 @@ class TaskRollout {
   void start(std::uint64_t seed, std::span<const std::int64_t> episodes);
   /// Starts a lane's first action from another state. The history of a scheme of two steps stays.
   void displace(int lane, std::span<const double> q, std::span<const double> v);
-  /// Looks at the states in which the first actions begin, as the batch has them now.
+  /// Records snapshots of the present states of the batch, in which the first actions begin.
   void record_start();
   /// What the task saw when it reset a lane, until the first action begins.
   [[nodiscard]] TaskView start_view(int lane) const;
   /// Observes a lane's reset again.
   void observe_start(int lane);
 
-  [[nodiscard]] bool running() const;  ///< whether some episode goes on
-  /// Chooses the next action of every running lane into record.asked. Throws InputError for one
+  [[nodiscard]] bool running() const;  ///< whether some episode has not ended
+  /// Computes the next action of every running lane, stored in `record`. Throws InputError for one
   /// that is not finite.
   void choose(const TaskActions& actions, ActionRecord& record);
   /// Begins record.asked and fills in the rest of the record.
@@ -78,7 +78,7 @@ class TaskRollout {
   [[nodiscard]] Integrator integrator() const { return stepper_.integrator(); }
   [[nodiscard]] const VectorCounts& counts() const { return counts_; }
 
-  /// What the task saw when it took action number `action`. The caller gives `memory` and `now`.
+  /// The view in which action number `action` was taken. The caller gives task state and snapshots.
   [[nodiscard]] TaskView view(const ActionRecord& record, std::int64_t action, int lane,
                               std::span<const double> memory, std::span<const Snapshot> now) const;
   /// A lane's first state of an action, from its tape.

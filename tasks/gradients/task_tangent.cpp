@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// An action changes by its numbers, by the memory and by the state in which it begins.
+// Tangents of an action by its numbers, the task state and the state in which it begins.
 #include "tasks/gradients/task_tangent.hpp"
 
 #include <algorithm>
@@ -120,8 +120,7 @@ TaskView TaskTangent::start_view() {
   return view;
 }
 
-/// Products of `rows` with the changes of the state, the action and the memory where an action
-/// begins.
+/// Products of `rows` with the tangents of state, action and task state at the start of an action.
 std::vector<double> TaskTangent::times(const std::vector<double>& rows,
                                        const StateTangent& start) const {
   std::vector<double> change;
@@ -133,13 +132,13 @@ std::vector<double> TaskTangent::times(const std::vector<double>& rows,
   return products;
 }
 
-/// What the task sees where an action begins.
+/// The view at the start of an action.
 TaskView TaskTangent::view_of_action(std::size_t action, const std::vector<double>& memory,
                                      const Snapshot& first) const {
   return rollout_.view(records_[action], std::int64_t(action), 0, first_lane(memory), {&first, 1});
 }
 
-/// Computes the memory that the action keeps, and the state from which it starts.
+/// Computes the task state during the action, and its initial state.
 void TaskTangent::begin(std::size_t action) {
   const ActionRecord& r = records_[action];
   const Snapshot seen{first_lane(r.q), first_lane(r.v), {}, {}};

@@ -16,9 +16,9 @@
 
 namespace tangere {
 
-/// A change of what a task looks at, in the order of TaskView. That of q is along the dofs.
+/// Tangent of a TaskView, in its order. That of q is along the dofs.
 struct ViewTangent {
-  std::vector<std::vector<double>> q, v, end_effectors, tactile;  ///< per moment
+  std::vector<std::vector<double>> q, v, end_effectors, tactile;  ///< per snapshot
   std::vector<double> memory, action;
 };
 
@@ -32,13 +32,14 @@ class TaskTangent {
   /// Begins anew with changes of the state at the first action, (nv) each; an empty span means
   /// none.
   void start(std::span<const double> q, std::span<const double> v);
-  /// How what the task sees at the reset changes, after start(), and the view itself, which is
-  /// valid until the next call. Its one moment is the state at the first action. For a task that
-  /// does not restart. `numbers`: as in take().
+  /// Returns the view at the reset, after start(), and its tangent; valid until the next call. Its
+  /// one snapshot is the state at the first action. For a task that does not restart. `numbers`: as
+  /// in take().
   ViewTangent seen_at_start(std::span<const double> numbers);
   [[nodiscard]] TaskView start_view();
-  /// Takes the next action, whose numbers change by `change`, and the scene's by `numbers` (as rows
-  /// of BlockCotangent::parameters, or empty). Returns how its reward changes.
+  /// Takes the next action, with tangent `change` of its numbers and `numbers` of the scene's
+  /// parameters (rows as in BlockCotangent::parameters, or empty). Returns the tangent of its
+  /// reward.
   double take(std::span<const double> change, std::span<const double> numbers);
   /// How what the task saw in the action taken last changes, and the view itself.
   [[nodiscard]] const ViewTangent& seen() const { return seen_; }

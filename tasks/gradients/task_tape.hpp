@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Back-propagation through time of a task whose actions a caller chooses: one call per action
-// forward, one call per action back, each for all environments. What the caller does between two
-// actions (a policy) it differentiates itself:
+// Back-propagation through time of a task with actions from the caller: one call per action
+// forward, one call per action back, each for all environments. The caller differentiates its
+// policy itself:
 //   (o_(t+1), r_t) = step(a_t),   a_t = policy(o_t)
 //   ā_t = reverse(ō_(t+1), r̄_t),  ō_t += (∂policy/∂o)ᵀ ā_t
 #pragma once
@@ -18,7 +18,7 @@ namespace tangere {
 /// E environments of one task. Environment e plays episode first + e, once. Its bits are those of a
 /// VectorTask that solves to the same tolerance; they depend neither on E, nor on threads, nor on
 /// tape_bytes, nor on the other environments. An environment whose episode has ended, or whose
-/// simulation has failed, keeps its last state and shows it again.
+/// simulation has failed, keeps its last state and observation.
 class TaskTape {
  public:
   /// Makes E environments and resets them. `task` must outlive this object. options.points is not
@@ -30,14 +30,14 @@ class TaskTape {
   TaskTape(TaskTape&&) noexcept;
   TaskTape& operator=(TaskTape&&) noexcept;
 
-  /// Starts episodes first_episode … first_episode + E - 1 of a seed and forgets what is on tape.
+  /// Starts episodes first_episode … first_episode + E - 1 of a seed and clears the tape.
   void reset(std::uint64_t seed, std::int64_t first_episode);
   /// Moves the state in which an environment's first action begins: q (nq) with quaternions of unit
   /// length, v (nv). It observes again. Throws InputError after the first step.
   void displace(int environment, std::span<const double> q, std::span<const double> v);
-  /// Takes one action of every environment whose episode goes on, (E, action), clipped to its
-  /// bounds, and records it. Actions of the other environments are ignored. Throws InputError for
-  /// an action of theirs that is not finite, for one more than `length`, and after reverse().
+  /// Takes one action of every environment whose episode has not ended, (E, action), clipped to its
+  /// bounds, and records it. Actions of ended environments are ignored. Throws InputError for an
+  /// action that is not finite, for more than `length` actions, and after reverse().
   void step(std::span<const double> actions);
   /// Throws what step() would throw for these actions, and takes none.
   void check_step(std::span<const double> actions) const;
@@ -59,7 +59,7 @@ class TaskTape {
   /// Status of the simulation. A failure truncates the episode, with the reward of the last state
   /// that was found.
   [[nodiscard]] StepStatus status(int environment) const;
-  /// What a policy with access to the state looks at: the current q, v and memory of the task.
+  /// View for a policy with access to the state: the current q, v and task state.
   [[nodiscard]] TaskView view(int environment) const;
 
   /// Reverses the last step that is not reversed yet; the first call begins at the last step.
@@ -70,12 +70,12 @@ class TaskTape {
   /// step is reversed, and when a task has no Task::observe_vjp or restart_state_vjp that it would
   /// need; then only reset() is possible.
   void reverse(const ActionCotangents& by, std::span<double> by_action);
-  /// Ends the reverse pass. Derivatives by the observation of the reset and by the states at the
-  /// first action come in (rewards have no meaning); those of the whole by these states go out:
-  /// (E, nv) each, positions along the dofs of v, and (E, NumberGradients::count()) by the scene's
-  /// numbers if they were asked for. Empty spans out are skipped. The reset and all random draws
-  /// count as given, with what was seen in an opening before its last moment. Throws InputError
-  /// while steps are left to reverse, and at a second call.
+  /// Ends the reverse pass. In: cotangents of the observation at the reset and of the states at the
+  /// first action (rewards are ignored). Out: cotangents of these states, (E, nv) each, positions
+  /// along the dofs of v, and (E, NumberGradients::count()) of the scene's parameters if requested.
+  /// Empty output spans are skipped. The reset, all random draws and snapshots of a warm-up before
+  /// its last one count as constant. Throws InputError while steps are left to reverse, and at a
+  /// second call.
   void reverse_start(const ActionCotangents& by, std::span<double> by_q, std::span<double> by_v,
                      std::span<double> by_parameter = {});
   /// Begins another reverse pass over the same steps, from the last one.
@@ -83,7 +83,7 @@ class TaskTape {
 
   /// Simulation steps taken again from checkpoints since this object was made, counted by block.
   [[nodiscard]] std::int64_t recomputed_steps() const;
-  /// Memory that a TaskTape takes [bytes].
+  /// Size of a TaskTape [bytes].
   static double bytes(const Task& task, int environments, const TapeOptions& options = {});
 
  private:

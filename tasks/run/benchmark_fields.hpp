@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Memory for the tactile fields of a benchmark: one frame per output and environment, reused for
+// Buffers for the tactile fields of a benchmark: one frame per output and environment, reused for
 // every reading.
 #pragma once
 

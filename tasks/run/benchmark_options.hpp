@@ -10,7 +10,7 @@ namespace tangere {
 /// How tactile fields are read.
 enum class FrameKind {
   none,     ///< not at all
-  dense,    ///< every point of a sensor, (points, 3) [N], in memory of each environment
+  dense,    ///< every point of a sensor, (points, 3) [N], in a buffer per environment
   compact,  ///< only the 8×8 tiles that something touches
 };
 const char* to_string(FrameKind value);

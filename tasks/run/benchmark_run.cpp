@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // A thread steps a block through the whole episode. The block's state stays in that thread's cache,
-// and no thread waits for another between steps.
+// and threads do not synchronise between steps.
 #include "tasks/run/benchmark_run.hpp"
 
 #include <algorithm>
@@ -42,7 +42,7 @@ struct BlockTally {
   std::vector<FailedEnvironment> failures;
 };
 
-/// Episodes that can be run again and again, and all memory for them.
+/// Repeatable episodes and all their buffers.
 class Benchmark {
  public:
   using MakeProgram = std::function<std::unique_ptr<EpisodeProgram>()>;

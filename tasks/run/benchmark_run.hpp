@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Times whole episodes: a scene with its controls and every tactile field read, or a task with its
-// policy and every action judged. Nothing is written. Threads take blocks of environments, which
-// never wait for each other.
+// Times whole episodes: a scene with its controls and readings of every tactile field, or a task
+// with its policy, rewards and observations. Nothing is written. Threads take blocks of
+// environments without synchronisation between blocks.
 #pragma once
 
 #include <cstdint>

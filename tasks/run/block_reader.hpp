@@ -62,8 +62,8 @@ void read_all_fields(Readout& readout, const Batch& batch, int block, FieldForm 
   }
 }
 
-/// Throws InputError where a sensor has a memory, which counts steps of the scene, and steps have
-/// another length [s].
+/// Throws InputError if a sensor has lag, which counts in steps of the scene's length, and the step
+/// length [s] differs from it.
 inline void check_sensor_memory(const Model& model, double timestep) {
   for (std::size_t s = 0; s < model.sensors().size(); ++s)
     if (model.sensors()[s].past_states > 0 && timestep != model.timestep())

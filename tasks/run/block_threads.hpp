@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Spreads blocks of environments over threads, for work whose blocks share nothing but the model.
+// Distributes independent blocks of environments over threads.
 #pragma once
 
 #include <tbb/blocked_range.h>

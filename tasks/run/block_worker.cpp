@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Takes a block through an action: starts episodes or takes actions, then K steps with looks in
-// between, then rewards and observations.
+// Advances a block by one action: starts episodes or takes actions, then K steps with snapshots,
+// then rewards and observations.
 #include "tasks/run/block_worker.hpp"
 
 #include <algorithm>
@@ -195,7 +195,7 @@ void BlockWorker::start(Batch& batch, EnvironmentData& data, int environment) {
   }
 }
 
-/// Settles one environment alone, so that the others' steps do not wait for it.
+/// Settles one environment in a batch of its own, so that others take no extra steps.
 void BlockWorker::settle_start(const Batch& batch, EnvironmentData& data, int environment) {
   const Model& model = task_.model();
   if (!settling_ || settling_->seed() != batch.seed()) settling_.emplace(model, 1, batch.seed());

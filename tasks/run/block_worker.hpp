@@ -21,8 +21,8 @@ enum class EnvironmentState : std::uint8_t {
   over,
 };
 
-/// What a VectorTask knows of its environments besides their states, (E, width) each. Only one
-/// thread uses a block's part.
+/// Data of a VectorTask's environments besides their states, (E, width) each. Only one thread uses
+/// a block's part.
 struct EnvironmentData {
   EnvironmentData(const Task& task, int environments);
   static double bytes(const Task& task);  ///< per environment
@@ -49,16 +49,16 @@ class BlockWorker {
   void act(Batch& batch, Stepper& stepper, EnvironmentData& data, int block,
            std::span<const double> actions, VectorCounts& counts);
 
-  // The parts of act(), for callers that step the batch themselves: begin; for every step k ask,
-  // step, look; then conclude.
+  // The parts of act(), for callers that step the batch themselves: begin; for every step k
+  // compute_controls, step, record_snapshot; then conclude.
   void begin(Batch& batch, EnvironmentData& data, int block, std::span<const double> actions);
   /// Writes the controls for step k into data.u.
   void compute_controls(const Batch& batch, EnvironmentData& data, int block, int step) const;
   void record_snapshot(const Batch& batch, int block, int step, VectorCounts& counts);
-  /// Replaces steps and looks if every environment starts and there is no opening.
+  /// Replaces steps and snapshots if every environment starts and there is no warm-up.
   void record_start(const Batch& batch, int block);
   void conclude(Batch& batch, EnvironmentData& data, int block, VectorCounts& counts);
-  /// What was seen of a lane of the block looked at last: each of the task's moments.
+  /// Snapshots of a lane of the block that was read last.
   [[nodiscard]] std::span<const Snapshot> snapshots(int lane) const;
 
   static double bytes(const Task& task);
@@ -78,11 +78,11 @@ class BlockWorker {
   std::optional<Stepper> settling_stepper_;
   std::optional<Batch> settling_;                        // one environment
   std::vector<double> varying_;                          // values of the environment that starts
-  std::vector<double> q_, v_, end_effectors_, tactile_;  // (moments, 16, width)
-  std::vector<Snapshot> moments_;                        // (16, moments): views of them
+  std::vector<double> q_, v_, end_effectors_, tactile_;  // (snapshots, 16, width)
+  std::vector<Snapshot> moments_;                        // (16, snapshots): views of them
 };
 
-/// Returns what a task may look at between two actions of an environment.
+/// Returns the view of a task between two actions of an environment.
 TaskView view_of(const Batch& batch, const EnvironmentData& data, int environment);
 
 }  // namespace tangere

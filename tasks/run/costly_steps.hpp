@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Says of a run that its steps took far more work than steps usually take.
+// Warning about runs whose steps needed far more Newton iterations than usual.
 #pragma once
 
 #include <string>

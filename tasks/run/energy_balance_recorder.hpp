@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Keeps the books of a rollout: both ends of every step of every environment.
+// Records the energy balance of a rollout at both ends of every step of every environment.
 #pragma once
 
 #include <vector>
@@ -18,7 +18,7 @@ class EnergyBalanceRecorder {
 
   /// Writes row 0.
   void start();
-  /// Looks at the batch before a step. `u`: (E, nu).
+  /// Reads the batch before a step. `u`: (E, nu).
   void before(std::span<const double> u);
   /// Writes the row after step `step`, which was taken but not counted yet.
   void after(std::int64_t step, std::span<const double> u, const StepTally& tally);

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// The sum of the books of energy that a rollout keeps.
+// Summary of the energy balance of a rollout.
 #pragma once
 
 namespace tangere {
 
-/// What the books of a run come to.
+/// Totals over all steps and environments of a run.
 struct EnergyBalanceSummary {
   double motors = 0, taken = 0, made = 0;  ///< sums over environments and steps [J]
   /// The largest |sum of what the scheme made| of an environment, as a share of what it had: the

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What many episodes are asked for, and what they come to.
+// Options and summary of run_episodes().
 #pragma once
 
 #include <cstdint>

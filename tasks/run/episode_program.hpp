@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// An episode as a program: how a block of 16 starts, which controls each step takes, what is looked
-// at, and how a row is judged. There is one program for scenes and one for tasks. The code that
-// plays episodes (the rollout, the player of data sets, the benchmark) knows only this interface.
+// Interface of an episode: start of a block of 16, controls of each step, snapshots, and result of
+// a row. There is one implementation for scenes and one for tasks. The code that runs episodes
+// (rollouts, data sets, benchmarks) depends on this interface alone.
 #pragma once
 
 #include <cstdint>
@@ -73,7 +73,7 @@ class SceneProgram : public EpisodeProgram {
 class TaskProgram : public EpisodeProgram {
  public:
   enum class AtEnd {
-    hold,   ///< an environment whose episode is over keeps its last state
+    hold,   ///< an environment whose episode has ended keeps its last state
     again,  ///< it starts another one, as in a VectorTask
   };
   /// Plays the environments of `data`, which programs of several threads may share. `in_turn`: the
@@ -100,7 +100,7 @@ class TaskProgram : public EpisodeProgram {
   [[nodiscard]] VectorCounts counts(const StepTally& /*tally*/) const override { return counts_; }
   void clear_counts() { counts_ = {}; }
 
-  /// Simulation steps of a whole episode, opening included.
+  /// Simulation steps of a whole episode, warm-up included.
   static std::int64_t steps(const TaskSpec& spec);
 
  private:

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The flow graph. A block owns its slot from the limiter to its last piece, so the limiter bounds
-// the memory. No piece waits for another block, because the sink has a place for each.
+// The flow graph. A block owns its slot from the limiter to its last chunk, so the limiter bounds
+// the memory. Chunks of different blocks are independent, because the sink has a place for each.
 #include "tasks/run/episodes.hpp"
 
 #include <fmt/format.h>

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// Plays many episodes on many threads. Blocks of 16 episodes pass through simulate, encode and
-// write. A limiter bounds how many are on their way.
+// Runs many episodes on many threads. Blocks of 16 episodes pass through simulate, encode and
+// write. A limiter bounds the number of blocks in flight.
 //
 //   blocks -> limiter -> simulate -> encode -> write (one at a time) -> the limiter's next block
 //                           ^                    |
 //                           +---- next rows -----+
 //
-// The blocks of a task are one piece each and wait before write for the blocks before them.
+// The blocks of a task are one chunk each and are written in ascending order.
 #pragma once
 
 #include <cstdint>
@@ -21,18 +21,18 @@
 
 namespace tangere {
 
-/// Simulates episodes 0 … episodes - 1, or those of `ranges`, and hands them to the sink. Draws for
-/// an episode are keyed by (seed, episode), so neither `threads` nor `blocks_in_flight` changes a
-/// bit. Throws InputError when a number is out of its range, when steps is no multiple of every,
+/// Simulates episodes 0 … episodes - 1, or those of `ranges`, and writes them to the sink. Draws
+/// for an episode are keyed by (seed, episode), so neither `threads` nor `blocks_in_flight` changes
+/// a bit. Throws InputError when a number is out of its range, when steps is no multiple of every,
 /// and when the controls are too short, were laid out for another timestep, or change while an
 /// action is held. `progress` gets environment steps after each row of each block; `stop` ends the
-/// run without finishing a block. Passes on what the sink throws, after all threads have ended.
+/// run without finishing a block. Rethrows exceptions of the sink after all threads have ended.
 EpisodeSummary run_episodes(const Model& model, const StepperOptions& solver,
                             const ControlProgram& controls, const EpisodeOptions& options,
                             EpisodeSink& sink, const ProgressCallback& progress = {},
                             const std::stop_token& stop = {});
-/// Does the same for a task's episodes. Many threads ask the policy. Each block is one piece, and
-/// blocks are in ascending order.
+/// The same for a task's episodes. Many threads call the policy. Each block is one chunk; blocks
+/// are written in ascending order.
 EpisodeSummary run_episodes(const Task& task, const Policy& policy, const EpisodeOptions& options,
                             EpisodeSink& sink, const ProgressCallback& progress = {},
                             const std::stop_token& stop = {});
@@ -50,7 +50,7 @@ int action_interval(const Model& model, int every);
 /// Threads that this process may run at once.
 int available_threads();
 
-/// Memory that a run takes [bytes].
+/// Memory of a run [bytes].
 double episode_bytes(const Model& model, const EpisodeOptions& options);
 double episode_bytes(const Task& task, const EpisodeOptions& options);
 

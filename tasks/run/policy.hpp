@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Who chooses the actions of data sets and benchmarks: policies that need no learning, or a program
-// from outside, which is asked for many environments at once.
+// Policies of data sets and benchmarks: built-in ones, or an external program that computes actions
+// for many environments at once.
 #pragma once
 
 #include <cstdint>
@@ -19,11 +19,11 @@ enum class PolicyKind {
   hold,      ///< zeros
   csv,       ///< row j of a table for action j of every episode; the last row after its end
   scripted,  ///< the task's own solution
-  program,   ///< one from outside, which sees what the task observes
+  program,   ///< external, a function of the task's observations
 };
 const char* to_string(PolicyKind kind);
 
-/// What spreads the states and actions of scripted episodes, so that a learner sees more of them.
+/// Random variation of scripted episodes, which widens the distribution of states and actions.
 struct PolicyVariation {
   /// Standard deviation of a normal number that is added to every number of a scripted action, in
   /// the action's unit. The sum is kept within the action's bounds. Keyed by (seed, episode,
@@ -33,14 +33,14 @@ struct PolicyVariation {
   double random_share = 0;
 };
 
-/// What a program is asked: the next actions of n environments.
+/// Inputs of an external policy for the next actions of n environments.
 struct PolicyQuestion {
   std::span<const std::int64_t> episodes;  ///< (n) their numbers
   std::span<const std::int64_t> actions;   ///< (n) actions taken in them so far
   std::span<const double> observations;    ///< (n, observation)
 };
-/// Writes (n, action). Many threads may call it at once. An episode is always asked about with the
-/// same neighbours, those of its block of 16 whose episodes go on, whatever the number of threads.
+/// Writes (n, action). Many threads may call it at once. The environments of a call are those of
+/// one block of 16 whose episodes have not ended, for any number of threads.
 using PolicyAnswer = std::function<void(const PolicyQuestion&, std::span<double> actions)>;
 
 class Policy {

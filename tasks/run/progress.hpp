@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The two ways in which long runs speak with their callers: progress goes out through a callback,
-// and a std::stop_token that is requested to stop ends the run before its next step.
+// Progress callback of long runs. A std::stop_token whose stop is requested ends a run before its
+// next step.
 #pragma once
 
 #include <cstdint>

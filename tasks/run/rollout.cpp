@@ -35,7 +35,7 @@ std::size_t bodies_in(const Model& model, const RolloutOutputs& outputs) {
                                        : outputs.chosen_bodies.size();
 }
 
-/// Copies a batch row by row into dense arrays and hands them on.
+/// Copies rows of a batch into dense arrays and writes them to the sink.
 class Recorder {
  private:
   [[nodiscard]] std::span<double> part(std::span<double> all, int environment) const {
@@ -156,8 +156,7 @@ void check(std::span<const Stepper> steppers, const RolloutOptions& options) {
                      "; expected 0 or more");
 }
 
-/// Writes the result of the action that ends with step `step`, unless the step belongs to an
-/// opening.
+/// Writes the result of the action that ends with step `step`, unless it is part of a warm-up.
 void write_action(EpisodeProgram& program, std::int64_t step, RowSink& sink) {
   const TaskProgram* const task = program.judged();
   if (task == nullptr || step < task->opening_steps()) return;

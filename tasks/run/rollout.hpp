@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Runs a batch once: takes controls and writes every row. It is serial; tasks/run/episodes.hpp runs
-// many episodes on many threads.
+// Runs one batch: computes controls, steps all blocks, one thread per stepper, and writes every
+// row. tasks/run/episodes.hpp runs many episodes as blocks on many threads.
 #pragma once
 
 #include <cstdint>
@@ -18,14 +18,14 @@
 
 namespace tangere {
 
-/// What a rollout hands on besides q, v, controls and how steps went. The rest is not computed.
+/// Optional outputs of a rollout besides q, v, controls and step results. Others are not computed.
 struct RolloutOutputs {
   std::optional<std::vector<FieldOutput>> fields;  ///< none: the field of every sensor
   bool bodies = true, end_effectors = true;
-  bool audit = false;   ///< the books of energy and momentum
-  bool memory = false;  ///< what friction remembers
-  /// When q and v, bodies, end effectors and memory are taken; none: at every row. Where those of
-  /// `states` are given, controls leave no longer, and of steps those alone that end at a row of q.
+  bool audit = false;   ///< balance of energy and momentum
+  bool memory = false;  ///< shear state
+  /// Rows at which q and v, bodies, end effectors and shear state are written; none: every row. If
+  /// `states` are given, controls are not written, and steps only if they end at a row of q.
   OutputTimes states = {}, of_bodies = {}, of_end_effectors = {}, of_memory = {};
   std::vector<int> chosen_bodies = {};  ///< ascending; none: every body
 };
@@ -43,22 +43,22 @@ struct RolloutOptions {
 struct RolloutSummary {
   std::int64_t steps = 0;  ///< done; fewer than requested if the caller stopped it
   StepCounts counts;       ///< of environments' steps, failing ones included
-  std::optional<EnergyBalanceSummary> audit;  ///< if it was asked for
+  std::optional<EnergyBalanceSummary> audit;  ///< if requested
   std::vector<FailedEnvironment> failures;    ///< in the order in which they failed
   bool stopped = false;                       ///< before its end
   double seconds = 0;                         ///< wall clock of the whole rollout, sink included
 };
 
-/// Steps the batch and hands every row to the sink: row 0 of the state, then for each step its
+/// Steps the batch and writes every row to the sink: row 0 of the state, then for each step its
 /// StepRow, the ActionRow if it ends a task's action, the StateRow after it, the MemoryRow and the
-/// tactile rows due. A row of which nothing is wanted does not leave. A tactile sensor is read
+/// tactile rows due. Rows without requested quantities are not written. A tactile sensor is read
 /// after steps K, 2K, …, so field k comes from row (k + 1) K of q. In a StepRow, an environment
 /// that failed earlier has 0 iterations and its last status and residual. `program` must have
 /// started every block; it takes all of them through a step in turn. `steppers`: one for each
 /// thread that steps and reads blocks, all of the same options; rows are the same for any number of
 /// them. Both `progress` and `stop` are used after each step.
-/// Throws InputError without a stepper and when steps < 1, every < 0 or first_step < 0. Passes on
-/// what the sink throws.
+/// Throws InputError without a stepper and when steps < 1, every < 0 or first_step < 0. Rethrows
+/// exceptions of the sink.
 RolloutSummary run_rollout(Batch& batch, std::span<Stepper> steppers, EpisodeProgram& program,
                            const RolloutOptions& options, RowSink& sink,
                            const ProgressCallback& progress = {}, const std::stop_token& stop = {});

@@ -13,12 +13,11 @@ struct StepCounts {
   std::int64_t simulation_steps = 0;
   std::int64_t newton_iterations = 0;
   std::int64_t split_steps = 0;
-  std::int64_t accuracy_not_met_steps =
-      0;                               ///< with parts that missed the accuracy that was asked for
-  std::int64_t tunnelled_steps = 0;    ///< in which a body came through another
-  std::int64_t damped_steps = 0;       ///< that would have created energy
-  std::int64_t overlapping_steps = 0;  ///< after which bodies of a contact overlap unnoticed
-  std::int64_t bodies_asleep = 0;      ///< summed over simulation_steps
+  std::int64_t accuracy_not_met_steps = 0;  ///< with parts that missed the requested accuracy
+  std::int64_t tunnelled_steps = 0;         ///< in which a body passed through another
+  std::int64_t damped_steps = 0;            ///< that would have created energy
+  std::int64_t overlapping_steps = 0;       ///< after which bodies of a contact overlap unnoticed
+  std::int64_t bodies_asleep = 0;           ///< summed over simulation_steps
 
   /// Counts the step that an environment has just taken.
   void count(const Batch& batch, int environment) {
@@ -33,7 +32,7 @@ struct StepCounts {
     bodies_asleep += batch.sleep(environment).bodies;
   }
 
-  /// Steps whose motion is not that of the bodies in the scene, because contacts missed each other.
+  /// Steps with wrong motion, because contacts were missed: tunnelled or overlapping.
   [[nodiscard]] std::int64_t missed_contacts() const { return tunnelled_steps + overlapping_steps; }
 
   StepCounts& operator+=(const StepCounts& other) {

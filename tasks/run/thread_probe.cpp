@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The threads wait until the last has started: a limit is on how many live at one time.
+// The threads block until the last has started, because limits are on concurrent threads.
 #include "tasks/run/thread_probe.hpp"
 
 #include <fmt/format.h>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Threads that the system refuses end oneTBB in std::terminate, in the middle of a run. So they are
-// asked for beforehand.
+// Checks before a run that the system can start the requested threads. oneTBB calls std::terminate
+// if it cannot.
 #pragma once
 
 namespace tangere {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The clocks by which steps and runs are timed. Other processes do not disturb them as they do the
+// CPU clocks of threads and of the process, which are less sensitive to other processes than the
 // wall clock.
 #pragma once
 

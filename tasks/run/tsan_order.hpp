@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tells the thread sanitizer what oneTBB orders. The distribution's library is not built with the
-// sanitizer, so it would report every hand-over as a race. In other builds this does nothing. It
-// states no more than oneTBB promises (a task starts after what spawned it, a graph's message
-// arrives after it was sent, waiting ends after all tasks), so real races are still found.
+// Annotates the happens-before relations of oneTBB for the thread sanitizer. The distribution's
+// library is not built with the sanitizer, which would report false races. In other builds this
+// does nothing. Only guarantees of oneTBB are annotated (a task starts after its spawn, a graph's
+// message arrives after it was sent, waiting ends after all tasks), so real races are still found.
 #pragma once
 
 #include <utility>
@@ -59,7 +59,7 @@ class TsanOrder {
   static void arrive() { tsan_acquire(&begin_); }
   void end() const { tsan_acquire(&end_); }
 
-  /// Lives while a task runs. `mine`: data that tasks hand on and never use at the same time.
+  /// Scope of a task. `mine`: data that tasks pass to each other and never use concurrently.
   class Task {
    public:
     Task(const TsanOrder& order, const void* mine) : order_(order), mine_(mine) {

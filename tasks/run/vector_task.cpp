@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A thread takes a block of 16 environments through one action: it starts new episodes, steps,
-// looks and judges.
+// A thread advances a block of 16 environments by one action: it starts new episodes, steps, takes
+// snapshots, and computes rewards and observations.
 #include "tasks/run/vector_task.hpp"
 
 #include <algorithm>
@@ -43,7 +43,7 @@ struct VectorTask::Impl {
     run({});
   }
 
-  /// An environment that is over is left alone, so that is what the others are for the time being.
+  /// Marks all other environments as over, so that only `which` restart.
   void restart(std::span<const std::uint8_t> which) {
     const std::vector<EnvironmentState> states = data.state;
     const std::vector<double> rewards = data.reward;

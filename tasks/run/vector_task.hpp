@@ -44,7 +44,7 @@ class VectorTask {
   /// InputError when `which` has another size.
   void restart(std::span<const std::uint8_t> which);
   /// Takes one action of every environment, (E, action). An environment whose episode ended in the
-  /// step before ignores its action and shows the start of its next episode, with reward 0. Actions
+  /// step before ignores its action and starts its next episode, with reward 0. Actions
   /// are clipped to their bounds. An action that is not a number fails its environment.
   void step(std::span<const double> actions);
 
@@ -70,14 +70,14 @@ class VectorTask {
   /// Status of the simulation. A failure truncates the episode, with the reward of the last state
   /// that was found, or 0 where the action makes that no number.
   [[nodiscard]] StepStatus status(int environment) const;
-  /// What a policy with access to the state looks at: the current q, v and memory of the task.
+  /// View for a policy with access to the state: the current q, v and task state.
   [[nodiscard]] TaskView view(int environment) const;
   /// Of the steps since the last reset(seed), over all environments.
   [[nodiscard]] VectorCounts counts() const;
   /// The states themselves.
   [[nodiscard]] const Batch& batch() const;
 
-  /// Memory that a VectorTask takes [bytes].
+  /// Size of a VectorTask [bytes].
   static double bytes(const Task& task, int environments, int threads);
 
  private:

@@ -24,7 +24,7 @@ Energies energies_of(const StressHistory& h) {
   for (int k = 0; k < h.frames(); ++k) {
     const double energy = h.kinetic_energy(k) + h.height_energy(k) - floor;
     if (k == 0) found.start = energy;
-    // A comparison with NaN is false, so it is looked for by itself.
+    // Comparisons with NaN are false, so it is tested separately.
     if (!std::isfinite(energy)) return {found.start, energy, energy};
     found.least = std::min(found.least, energy);
     found.largest = std::max(found.largest, energy);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a hard case is judged by: one small function a criterion. Each returns one number that
-// should be at most the case's bound. Bodies count from 0 in file order.
+// Criteria of hard cases. Each is a function that returns one number, which should not exceed the
+// bound of the case. Bodies are numbered from 0 in file order.
 #pragma once
 
 #include <functional>
@@ -9,7 +9,7 @@
 
 namespace tangere {
 
-/// Judges what one environment did.
+/// A number from the history of one environment.
 using Criterion = std::function<double(const StressHistory&)>;
 
 /// The largest energy of motion and height over the start's. Energy counts from the least height
@@ -46,8 +46,8 @@ Criterion slide_error(int body);
 Criterion stop_error(int body, int points);
 /// The error of the way that the body falls freely from rest, as a share: g t²/2.
 Criterion fall_error(int body);
-/// The largest speed of the body over sqrt(kn/m) depth, with which a spring that starts at that
-/// depth [m] lets it go.
+/// The largest speed of the body divided by sqrt(kn/m) depth, the speed at which a spring
+/// compressed by that depth [m] releases it.
 Criterion release_speed(int body, double depth);
 /// The error of the body's speed at the end, as a share: `share` of that at the start.
 Criterion speed_error(int body, double share);

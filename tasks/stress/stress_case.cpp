@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The table of hard cases. A row puts into numbers what the comment in its scene file says.
+// The table of hard cases: one criterion and bound per row. The scene file describes the case.
 #include "tasks/stress/stress_case.hpp"
 
 namespace tangere {
@@ -163,7 +163,7 @@ Cases closed_forms() {
   return cases;
 }
 
-/// Friction that remembers holds what dampers let creep.
+/// Cases in which shear springs hold a body that tangential dampers let creep.
 Cases held() {
   Cases cases;
   add(cases, {"way after the first second [m]", creep_after(1, 5e-3), 1e-6, 10},

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where the bodies of one environment were at its start and after every step, and the sums that
-// mechanics says something about.
+// Poses of the bodies of one environment at the start and after every step, with energy, momentum
+// and other conserved sums.
 #pragma once
 
 #include <vector>

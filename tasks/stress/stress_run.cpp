@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A block of environments is played to its end and judged before its histories are dropped, so
-// memory does not grow with the environments.
+// A block of environments is run to its end and evaluated before its histories are released, so
+// memory does not grow with the number of environments.
 #include "tasks/stress/stress_run.hpp"
 
 #include <algorithm>
@@ -36,7 +36,7 @@ struct BlockOutcome {
   double worst = -HUGE_VAL;  ///< of the environments that did not fail; NaN where one has no number
   StepCounts counts{};
   int most_evaluations = 0;
-  bool silent = false;  ///< an environment misses the bound and no status of it says anything
+  bool silent = false;  ///< an environment misses the bound and none of its steps has a flag
   std::vector<FailedEnvironment> failures{};
 };
 
@@ -70,7 +70,7 @@ struct Play {
           histories[l].add(w.readout, batch, e);
     };
     record();
-    // Those with a step that says that it may be wrong.
+    // Environments with a step whose status indicates a possible error.
     std::vector<bool> flagged(as_size(lanes));
     for (std::int64_t k = 0; k < steps; ++k) {
       if (stop.stop_requested()) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Plays hard cases over schemes and steps and judges each.
+// Runs hard cases over schemes and step lengths and evaluates their criteria.
 #pragma once
 
 #include <cstdint>
@@ -17,8 +17,8 @@ namespace tangere {
 /// What a setting of a case came to.
 enum class StressVerdict {
   holds,    ///< the criterion is met
-  flagged,  ///< not met, and it was said: by a status, by a warning, or by refusing the scene
-  fails,    ///< not met, and nothing was said
+  flagged,  ///< not met, and reported: by a status, a warning, or an error for the scene
+  fails,    ///< not met, and not reported
 };
 const char* to_string(StressVerdict value);
 

@@ -11,7 +11,7 @@ struct CuboidPad;
 
 /// Cuboid with half edges s. Inside, d is the distance to the nearest face (ties: the first of x,
 /// y, z; at y_k = 0 outward is +). Outside, it is the distance to the nearest face, edge or corner.
-/// H = 0 inside. Balls alone look for contact outside (kernels/contact/ball_contact.hpp).
+/// H = 0 inside. Only ball contacts evaluate it outside (kernels/contact/ball_contact.hpp).
 template <class N>
 struct CuboidDistance {
   static constexpr Bending kBending = Bending::flat;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The distance to a mesh as kernels see it: numbers on a grid, no ownership. spline.hpp evaluates
-// them, engine/model/mesh_grid.hpp makes them.
+// View of the spline coefficients of a mesh's signed distance on a grid; no ownership. spline.hpp
+// evaluates them, engine/model/mesh_grid.hpp computes them.
 #pragma once
 
 namespace tangere::kernels {
@@ -22,7 +22,7 @@ struct DistanceGrid {
   /// it, from which φ can fall to 0 within kSagBlock cells.
   const float* sags;
   int cells[3];
-  int row, plane;          ///< distance in memory from one z and one y to the next
+  int row, plane;          ///< strides of z and y
   double origin[3];        ///< lowest corner of the first cell [m]
   double cell;             ///< its edge [m]
   double slope;            ///< no smaller than any |∇φ| where φ > 0

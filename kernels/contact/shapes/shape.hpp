@@ -4,7 +4,7 @@
 // everywhere, also where the distance has a kink (centre, axis, edge, corner).
 //
 // A shape is a template S<N> with
-//   kShape, kBending, kSums      what it is, what its Hessian looks like, how its points are summed
+//   kShape, kBending, kSums      its kind, the form of its Hessian, the family of its point sums
 //   Pad<P>                       its distance under a pad, relative to a tile
 //   of(size)                     the shape of a size as in PairContact
 //   evaluate(y, …)               d and n; ball and flat: also κ; rod: also κ and e
@@ -33,10 +33,10 @@ struct Distance {
   Vec3<N> n;
 };
 
-/// The form of the Hessian inside a shape, the only place where contact looks.
+/// The form of the Hessian inside a shape. Contact evaluates it only there.
 enum class Bending {
   flat,  ///< H = 0
-  ball,  ///< H = κ (I - n nᵀ), and the shape looks the same from every side: it needs no
+  ball,  ///< H = κ (I - n nᵀ), and the shape is invariant under rotations: it needs no
          ///< orientation
   rod,  ///< H = κ (I - n nᵀ - e z zᵀ), z the shape's axis; e = 1 where the surface is straight
         ///< along z, else 0
