@@ -542,7 +542,7 @@ TEST(Imperfections, ValuesOutOfRangeAreRefused) {
       EXPECT_NE(std::string(error.what()).find(text), std::string::npos) << error.what();
     }
   };
-  refused([](auto& i) { i.noise.shear = -1; }, Pad::flat, "noise=\"-1\"; expected a number from 0");
+  refused([](auto& i) { i.noise.shear = -1; }, Pad::flat, "noise=\"-1\"; expected zero or more");
   refused([](auto& i) { i.bias.normal = NAN; }, Pad::flat, "bias");
   refused([](auto& i) { i.saturation.normal = INFINITY; }, Pad::flat, "saturation");
   refused([](auto& i) { i.dead = 1.5; }, Pad::flat, "dead=\"1.5\"; expected a number from 0 to 1");
