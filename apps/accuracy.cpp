@@ -26,7 +26,7 @@ namespace tangere::apps {
 namespace {
 
 constexpr int kComparedEnvironments = 64;  // the fewest full blocks that bound 95 % of all
-constexpr int kMoreEnvironments = 2;       // times as many for a second look
+constexpr int kMoreEnvironments = 2;       // factor for the confirmation run
 constexpr std::uint64_t kOtherSeed = 0x5ec0'11d1'00c0'0000;
 
 struct AccuracyArguments {

@@ -16,7 +16,7 @@
 namespace tangere::apps {
 namespace {
 
-constexpr double kKept = 3;  // times the accuracy that was asked for, which an error may reach
+constexpr double kKept = 3;        // largest ratio of error to requested accuracy
 constexpr double kNotable = 0.01;  // share of a force's energy that is worth a sentence
 
 /// "1.9", or "at most 0.5" where it may be less.
@@ -32,7 +32,7 @@ std::string setting_text(const AccuracySetting& setting, double step) {
                      setting.tolerance);
 }
 
-/// Whether an error is at most kKept times the accuracy that was asked for, if one was.
+/// Whether an error is at most kKept times the requested accuracy, if there is one.
 bool kept(const AccuracyPoint& p) {
   return p.setting.accuracy == 0 || p.error <= kKept * p.setting.accuracy;
 }
@@ -96,7 +96,7 @@ std::string first_order_text(const AccuracyReport& report, const Model& model) {
                    ".";
 }
 
-/// Why the reference cannot judge, and what helps.
+/// The reason why the reference is too inaccurate, and remedies.
 std::string unresolved_text(const AccuracySubject& subject, const AccuracyReport& report,
                             const Model& model) {
   const AccuracyReference& r = report.reference;
@@ -121,7 +121,7 @@ std::string unresolved_text(const AccuracySubject& subject, const AccuracyReport
   return text;
 }
 
-/// Says where cut steps miss the accuracy that was asked for.
+/// Lists the requested accuracies that cut steps miss.
 std::string unkept_text(const AccuracyReport& report) {
   std::string missed;
   for (const AccuracyPoint& p : report.points)

@@ -27,10 +27,10 @@ std::string reference_row(const AccuracyReference& reference, int environments);
 std::string accuracy_head();
 /// One setting, in every precision.
 std::string accuracy_row(std::span<const AccuracyPoint> points);
-/// The order that the schemes have on the scene, what keeps them from theirs, and where cut steps
-/// miss what is asked for. Empty where no order was measured.
+/// Measured orders of the schemes, laws that reduce them, and accuracies that cut steps miss. Empty
+/// if no order was measured.
 std::string order_text(const AccuracyReport& report, const Model& model);
-/// One or two sentences: what to use, or why nothing can be said.
+/// One or two sentences: the advised setting, or the reason why there is none.
 std::string advice_text(const AccuracySubject& subject, const AccuracyReport& report,
                         const Model& model);
 

@@ -80,8 +80,8 @@ void add_whole_numbers(CLI::App& command, const std::string& flags, std::vector<
 void add_positive_number(CLI::App& command, const std::string& flags, std::optional<double>& value,
                          const std::string& description);
 
-/// Does the same for an amount of memory in bytes: a positive number and B, kB, MB, GB, TB (powers
-/// of 1000) or KiB, MiB, GiB, TiB (of 1024).
+/// The same for a size in bytes: a positive number and B, kB, MB, GB, TB (powers of 1000) or KiB,
+/// MiB, GiB, TiB (of 1024).
 void add_memory_size(CLI::App& command, const std::string& flags, std::optional<double>& bytes,
                      const std::string& description);
 

@@ -192,7 +192,7 @@ int measure(const BenchArguments& options, const Console& console, BenchSetting&
   return report(options, console, setting, model, more, entries);
 }
 
-/// The scene with the scheme, step and tolerance that are asked for.
+/// The scene with the scheme, step and tolerance of the options.
 Scene scene_of(const BenchArguments& options, const Console& console, const SolverOptions& asked) {
   Scene scene = read_scene_for(options.scene, options.allow_unknown, console, asked);
   if (!options.solver.integrator.empty())

@@ -11,7 +11,7 @@ class App;
 
 namespace tangere::apps {
 
-/// What the program knows about itself, for files and people.
+/// Name, version and build of the program.
 struct ProgramInfo {
   std::string version;       ///< "0.1.0"
   std::string command_line;  ///< as typed

@@ -25,7 +25,7 @@ namespace {
 constexpr std::int64_t kDefaultSteps = 100;
 constexpr int kDefaultEntries = 24;
 constexpr double kTolerance =
-    1e-12;  // differences of rollouts see no error below the solve's residual
+    1e-12;  // differences of rollouts do not resolve errors below the solve's residual
 
 struct GradcheckArguments {
   std::string scene, loss, controls, policy;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What `tangere identify` says of a fit: a table, a JSON object and a picture.
+// Output of `tangere identify`: a table, a JSON object and a picture of a fit.
 #pragma once
 
 #include <optional>
@@ -22,8 +22,8 @@ struct IdentifyReport {
   Identification fit;
 };
 
-/// A fit that has not come to an end, whose numbers cannot be told apart or that leaves more than
-/// noise has failed.
+/// A fit has failed if it did not converge, its parameters are not identifiable, or its residual is
+/// more than noise.
 ExitCode exit_code(const IdentifyReport& report);
 
 /// Prints the numbers, their deviations and what is left of the fields, and the JSON object.

@@ -55,7 +55,7 @@ std::vector<std::string> randomized_units(const Scene& scene) {
   return units;
 }
 
-/// Steps of a scene's own run; -1 if the scene does not say.
+/// Steps of a scene's own run; -1 if the scene does not define them.
 std::int64_t steps_of(const Model& model) {
   return ControlProgram(model, model.timestep(), 0).steps();
 }

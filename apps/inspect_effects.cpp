@@ -47,11 +47,11 @@ int elements_of(const EffectCosts& costs, EffectKind kind) {
       }));
 }
 
-/// Whether people see the row: a kind with one element is that element, and elements that are not
-/// timed one by one are left to --json.
+/// Whether the table has the row: a kind with one element has no second row, and elements that are
+/// not timed one by one are in --json only.
 bool is_shown(const EffectCosts& costs, const EffectCost& cost) {
   const int elements = elements_of(costs, cost.effect.effect.kind);
-  // What no contact or sensor can have needs no row: that there is none is said once.
+  // Without contacts or sensors, their parts need no rows.
   if (elements == 0 && is_part(cost.effect.effect.kind)) return false;
   if (cost.effect.effect.element < 0) return elements != 1;
   return times_elements(cost.effect.effect.kind, elements);

@@ -13,8 +13,8 @@ namespace tangere::apps {
 
 /// A table for each sensor; for one that is left out, why.
 std::string pitch_table(std::span<const PitchSweep> sweeps, const Model& model);
-/// A sentence for each sensor, with the coarsest pad whose force stays within `target`; "" where
-/// nothing was swept.
+/// A sentence for each sensor, with the coarsest pad whose force error is at most `target`; "" if
+/// no pad was swept.
 std::string pitch_advice(std::span<const PitchSweep> sweeps, const Model& model, double target);
 Json pitches_json(std::span<const PitchSweep> sweeps, const Model& model);
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// One socket is the program's input and output. A dead program is then an error of a call, not a
-// signal, and one descriptor tells of both directions.
+// One socket is the program's input and output. So a program that has ended causes an error of a
+// call, not a signal, and one descriptor serves both directions.
 #include "apps/policy_program.hpp"
 
 #include <fmt/format.h>
@@ -215,7 +215,7 @@ void PolicyProgram::wait_for(short events, double deadline) {
   pollfd waiting{socket_.get(), events, 0};
   while (!stopping()) {
     const int ready = poll(&waiting, 1, kLookForStop);
-    if (ready > 0 && now() <= deadline) return;  // what comes bit by bit comes to an end, too
+    if (ready > 0 && now() <= deadline) return;  // the deadline also limits partial reads
     if (ready < 0 && errno != EINTR)
       throw IoError(fmt::format("cannot wait for {}: {}", who(), std::strerror(errno)));
     late_ = now() > deadline;
@@ -228,7 +228,7 @@ void PolicyProgram::wait_for(short events, double deadline) {
   stopped_ = true;
 }
 
-/// Returns false if nobody reads any longer.
+/// Returns false if the other end is closed.
 bool PolicyProgram::write(const char* bytes, std::size_t count, double deadline) {
   while (count > 0 && !stopped_) {
     const ssize_t sent = send(socket_.get(), bytes, count, MSG_NOSIGNAL | MSG_DONTWAIT);
@@ -244,7 +244,7 @@ bool PolicyProgram::write(const char* bytes, std::size_t count, double deadline)
   return true;
 }
 
-/// Returns false at the end of what the program says, or when the run is to stop.
+/// Returns false at the end of the program's output, or when the run is to stop.
 bool PolicyProgram::read(char* bytes, std::size_t count, double deadline) {
   while (count > 0) {
     const ssize_t received = recv(socket_.get(), bytes, count, MSG_DONTWAIT);

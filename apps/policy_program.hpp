@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Another program that chooses the actions of a task: `generate --program CMD`. It is started once
-// and asked through its standard input and output; docs/policies.md describes the bytes.
+// External policy program (`generate --program CMD`). It is started once and exchanges messages
+// through its standard input and output; docs/policies.md defines the protocol.
 #pragma once
 
 #include <signal.h>
@@ -19,10 +19,10 @@ namespace tangere::apps {
 
 class PolicyProgram {
  public:
-  /// Starts `command` with the shell, tells it the task and reads its name. `timeout` [s] is for
-  /// this and for every answer. Once `stop` returns true nothing is awaited any longer: then the
-  /// name may be missing, and actions are zeros. Throws IoError if the program cannot be started,
-  /// ends, or does not answer in time, InputError if it says something else than a name.
+  /// Starts `command` with the shell, sends the task and reads the policy's name. `timeout` [s]
+  /// applies to this and to every answer. After `stop` no answer is awaited: the name may then be
+  /// missing, and actions are zeros. Throws IoError if the program cannot be started, ends, or does
+  /// not answer in time, InputError if it does not send a name.
   PolicyProgram(const Task& task, std::uint64_t seed, const std::string& version,
                 const std::string& command, double timeout, std::function<bool()> stop);
   /// Closes its input. A program that does not end by itself within some seconds is killed, and in
@@ -33,8 +33,9 @@ class PolicyProgram {
 
   /// What it calls itself.
   [[nodiscard]] const std::string& name() const { return name_; }
-  /// Asks it; threads take turns. Throws IoError if it has ended or is late, InputError if its
-  /// answer has another size or a number that is not finite.
+  /// Sends a question and reads the answer; calls of threads are serialised. Throws IoError if the
+  /// program has ended or is late, InputError if its answer has another size or a number that is
+  /// not finite.
   void answer(const PolicyQuestion& question, std::span<double> actions);
 
  private:

@@ -92,8 +92,8 @@ int run(const Command& command, const std::string& name, int argc, char** argv) 
   return code;
 }
 
-/// The message for people on stderr and, where JSON was asked for, the object that a program waits
-/// for: the parser may have stopped before it came to --json.
+/// Prints the message on stderr and, with --json, the error object. The arguments are searched for
+/// --json, because the parser may have stopped before it.
 int report(const Program& program, int argc, char** argv, ExitCode code, const std::string& what) {
   Console console;
   console.json = asks_for_json(argc, argv);
@@ -122,8 +122,8 @@ int guarded(const Program& program, int argc, char** argv, const std::function<i
   }
 }
 
-/// Reports what nobody could catch: memory that ran out while an error was being reported, or a
-/// failure in a thread of a library. Nothing here allocates.
+/// Reports uncaught exceptions: allocation failures during error reporting, or failures in threads
+/// of a library. Does not allocate.
 [[noreturn]] void end_uncaught() noexcept {
   const char* reason = "a failure that it could not handle";
   int code = kInputOutput;
@@ -145,7 +145,7 @@ int guarded(const Program& program, int argc, char** argv, const std::function<i
 
 bool came_to_its_end = false;
 
-/// HDF5 calls exit(-1), without a word, where memory runs out at some places.
+/// HDF5 calls exit(-1) without a message after some allocation failures.
 void end_by_library() {
   if (came_to_its_end) return;
   std::fputs("tangere: a library ended the program; most likely memory ran out\n", stderr);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// fork before any thread starts. The child tells what it reads through shared memory, which is
-// still there when it is not.
+// fork before any thread starts. The child writes the object that it reads to shared memory, which
+// outlives it.
 #include "apps/reader_process.hpp"
 
 #include <fmt/format.h>
@@ -57,7 +57,7 @@ void pass_on(int signal, siginfo_t* info, void*) {
   if (child > 0 && info->si_code <= 0) kill(child, signal);
 }
 
-/// While this lives, signals that would end this process go to the child.
+/// RAII: signals that would end this process are forwarded to the child.
 class PassSignals {
  public:
   PassSignals() {
@@ -86,7 +86,7 @@ class PassSignals {
   struct sigaction previous_[2]{}, child_{};
 };
 
-/// Memory that parent and child see both; empty where there is none to have.
+/// Memory shared by parent and child; empty if it cannot be allocated.
 std::span<char> shared_note() {
   void* const memory =
       mmap(nullptr, kNoteBytes, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
@@ -96,7 +96,7 @@ std::span<char> shared_note() {
 
 [[noreturn]] void be_child(pid_t parent, const std::function<int()>& command, std::span<char> note,
                            std::chrono::seconds limit) {
-  prctl(PR_SET_PDEATHSIG, SIGKILL);  // who kills the command means all of it
+  prctl(PR_SET_PDEATHSIG, SIGKILL);  // the child ends with its parent
   if (getppid() != parent) _exit(kInputOutput);
   h5::note_reading_in(note);
   h5::end_endless_calls(limit);

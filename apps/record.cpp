@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Words become readings of sensors, bodies and times. '.' says which part, '/' says when, and a
-// comma parts them, so no word needs quotes in a shell.
+// Parses names of outputs: sensors, bodies and times. '.' selects a part, '/' a time, and commas
+// separate names, so none needs quotes in a shell.
 #include "apps/record.hpp"
 
 #include <fmt/format.h>

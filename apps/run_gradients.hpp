@@ -31,8 +31,8 @@ struct GradientArguments {
 
 class RunGradients {
  public:
-  /// Keeps the start of a run that follows. Throws InputError for a loss that is not known or does
-  /// not fit, and where memory is short.
+  /// Stores the initial state of the run. Throws InputError for an unknown or unsuitable loss, and
+  /// if memory does not suffice.
   RunGradients(const GradientArguments& arguments, const Batch& batch, const Stepper& stepper,
                const RolloutOptions& rollout);
   [[nodiscard]] bool wanted() const { return start_.has_value(); }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Options that commands share: one range, one unit and one name each. A description that is given
-// says what the option means for its command, and the default.
+// Options that commands share: one range, one unit and one name each. A command may give a
+// description with its default.
 #pragma once
 
 #include <cstdint>
@@ -40,12 +40,12 @@ void add_sleep_option(CLI::App& app, bool& sleep);
 void add_allow_unknown_option(CLI::App& app, bool& allow);
 /// Adds --controls, a table that drives a scene or a task.
 void add_controls_option(CLI::App& app, std::string& controls);
-/// Adds --policy of commands that ask no program and play the script otherwise.
+/// Adds --policy of commands without --program, whose default is the script.
 void add_policy_option(CLI::App& app, std::string& policy);
 /// Adds --integrator. `usual`: the default.
 void add_integrator_option(CLI::App& app, std::string& integrator, const std::string& usual);
 
-/// What a command line asks of the solver.
+/// Solver options of a command line.
 struct SolverArguments {
   std::string integrator;  ///< "": the scene's
   std::optional<double> timestep, tolerance, accuracy;

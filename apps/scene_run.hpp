@@ -29,8 +29,8 @@ Integrator integrator_named(const std::string& name);
 /// Throws InputError for an unknown loss.
 LossKind loss_named(const std::string& name);
 
-/// Says how many steps were split, and how many missed the accuracy, let a body through, were
-/// damped or let bodies overlap, if any did.
+/// Numbers of steps by status: split, accuracy_not_met, tunnelled, damped, overlapping; "" if all
+/// are zero.
 std::string split_text(const StepCounts& counts);
 /// The same five numbers, as "split_steps", "accuracy_not_met_steps", "tunnelled_steps",
 /// "damped_steps" and
@@ -43,8 +43,8 @@ Json split_json(const StepCounts& counts);
 Json steps_json(const std::optional<EpisodeSteps>& steps);
 std::string missed_text(const std::optional<EpisodeSteps>& steps);
 
-/// Says how many of the scene's bodies slept, on average over all steps of environments; empty if
-/// none may sleep. The text ends in a line break.
+/// Mean number of sleeping bodies over all steps of environments; empty if sleep is disabled. The
+/// text ends in a line break.
 std::string sleep_text(double sleep, int moving_bodies, const StepCounts& counts);
 /// The same mean; null if no body may sleep. `sleep`: Stepper::sleep().
 Json mean_asleep(double sleep, const StepCounts& counts);
@@ -53,8 +53,8 @@ Json mean_asleep(double sleep, const StepCounts& counts);
 Scene read_scene_for(const std::string& path, bool allow_unknown, const Console& console,
                      const SolverOptions& asked = {});
 
-/// What the command line asks of the solver: an accuracy in place of the scene's, a tolerance, and
-/// whether bodies sleep, where the scene names none.
+/// Applies solver options of the command line: accuracy in place of the scene's; tolerance and
+/// sleep if the scene has none.
 void apply_solver_options(SolverOptions& of_scene, const SolverOptions& asked);
 
 /// The controls of the table at `path`, or the scene's own if `path` is empty.
@@ -64,23 +64,23 @@ ControlProgram make_controls(const std::string& path, std::uint64_t seed, const 
 /// --steps, or the number of steps that the controls last. Throws InputError if neither is given.
 std::int64_t step_count(const std::optional<std::int64_t>& asked, const ControlProgram& controls);
 
-/// Warns of meshes whose grids are too coarse, and of bodies that start deep inside one another or
-/// too far away.
+/// Warns of meshes whose grids are too coarse, and of bodies that overlap deeply or are too far
+/// from the origin at the start.
 void warn_about_geometry(const Console& console, const Model& model);
-/// Warns of contacts whose touches are too short for the steps; where steps are cut to keep an
-/// accuracy, of laws whose errors their estimate does not see.
+/// Warns of contacts whose impacts are too short for the steps and, with an accuracy, of laws whose
+/// errors the estimate does not include.
 void warn_about_steps(const Console& console, const Model& model, const Stepper& stepper);
-/// Says on stderr that steps were costly, if they were, and returns it; null if not, or if steps
-/// were cut to keep an accuracy.
+/// Prints a warning on stderr if steps were costly, and returns it; null if not, or with an
+/// accuracy.
 Json note_costly_steps(const Console& console, Integrator integrator, double accuracy,
                        const StepCounts& counts);
 
-/// Returns the exit code of a run: kSomeFailed where environments failed, or where contacts missed
-/// bodies, which it says on stderr with the counts.
+/// Returns the exit code of a run: kSomeFailed if environments failed, or if steps are tunnelled or
+/// overlapping, whose counts it prints on stderr.
 ExitCode exit_code(const Console& console, bool failed, const StepCounts& counts);
 
-/// What the JSON object of a command that writes a file says of its run: "seed", the solver's
-/// settings, "precision" and "instruction_set".
+/// Members of the JSON object of a command that writes a file: "seed", the solver's settings,
+/// "precision" and "instruction_set".
 Json settings_json(const RunFacts& facts);
 
 /// Prints notes on sensors that are not read after every step.

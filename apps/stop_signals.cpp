@@ -45,7 +45,7 @@ void end(int signal) {
   remove_parts();
   for (const LastWords& words : last_words) {
     if (words.signal != signal) continue;
-    // A stream that nobody reads changes nothing any more.
+    // A closed stream has no effect here.
     static_cast<void>(!write(STDERR_FILENO, words.text.data(), words.text.size()));
     static_cast<void>(!write(STDOUT_FILENO, words.object.data(), words.object.size()));
     _exit(words.code);

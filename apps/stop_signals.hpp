@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Lets Ctrl-C and a scheduler's SIGTERM end a run between two steps, where nothing is half-written,
-// and every other work at once, with its half-written files removed.
+// Handles SIGINT and SIGTERM: runs end between two steps with complete files; other work ends at
+// once and its incomplete files are removed.
 #pragma once
 
 #include <array>
@@ -16,17 +16,17 @@ namespace tangere::apps {
 /// The line for programs that goes with a code and a message; empty without --json.
 using ObjectOfError = std::function<std::string(ExitCode code, const std::string& what)>;
 
-/// From now on SIGINT and SIGTERM (unless the parent ignored them) remove the .part of every output
-/// and end the process with kInterrupted or kTerminated, a message and what `object` gives for
-/// them. So do crashes, with kUsage: HDF5 uses some memory without checking that it got it. In a
-/// `child` whose parent explains crashes they only remove the .parts. Exceeding a file-size limit
-/// fails the write instead of raising SIGXFSZ.
+/// Installs handlers: SIGINT and SIGTERM (unless the parent ignored them) remove the .part of every
+/// output and end the process with kInterrupted or kTerminated, a message and the error object of
+/// `object`. So do crashes, with kUsage, because HDF5 does not check all allocations. In a `child`,
+/// whose parent reports crashes, they only remove the .parts. Exceeding a file-size limit fails the
+/// write instead of raising SIGXFSZ.
 void end_by_signals(const ObjectOfError& object, bool child);
-/// From now on SIGINT and SIGTERM change nothing any more: the result has been told.
+/// Ignores SIGINT and SIGTERM from now on, because the result has been printed.
 void ignore_signals();
 
-/// While an object lives, SIGINT and SIGTERM are remembered instead of ending the program (unless
-/// the parent ignored them).
+/// During the lifetime of this object, SIGINT and SIGTERM request a stop instead of ending the
+/// program (unless the parent ignored them).
 class StopSignals {
  public:
   StopSignals();
@@ -34,7 +34,7 @@ class StopSignals {
   StopSignals(const StopSignals&) = delete;
   StopSignals& operator=(const StopSignals&) = delete;
 
-  /// Asks to stop from the first SIGINT or SIGTERM on.
+  /// Stop is requested from the first SIGINT or SIGTERM on.
   [[nodiscard]] std::stop_token token() const;
   /// The first SIGINT or SIGTERM that came; 0 if none came.
   [[nodiscard]] int received() const;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What commands that write a file say of the task that was played.
+// Output of commands that write a file about the task of the run.
 #pragma once
 
 #include <cstdint>

@@ -18,8 +18,8 @@ namespace tangere::apps {
 std::unique_ptr<Task> find_task(const std::string& word, const Console& console,
                                 const SolverOptions& asked = {});
 
-/// Says that the <outputs> of a task's scene are for runs of that scene, if it has some. `instead`:
-/// what happens to the task ("stores what it observes").
+/// Prints that the <outputs> of a task's scene apply to runs of the scene only, if it has some.
+/// `instead`: what the command does for a task ("stores what it observes").
 void note_outputs_of(const Console& console, const Task& task, const std::string& instead);
 
 /// The policy called `name`, or `fallback` if that is empty. With a table it is csv. Throws

@@ -17,7 +17,7 @@ class TextOutput {
   /// An empty path stands for no output. Throws IoError like PartFile.
   TextOutput(const std::string& path, bool overwrite);
   [[nodiscard]] bool wanted() const { return file_.has_value(); }
-  /// Writes the text and says so; does nothing if no output is wanted.
+  /// Writes the text and prints a line about it; does nothing without an output path.
   void write(const std::string& text, const Console& console);
 
  private:

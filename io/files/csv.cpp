@@ -18,8 +18,8 @@
 namespace tangere {
 namespace {
 
-// Longer lines do not occur in tables of controls. The limit also keeps a device that never ends a
-// line from filling the memory.
+// Longer lines do not occur in tables of controls. The limit also bounds the memory for input
+// without line ends.
 constexpr std::streamsize kLongestLine = 1 << 20;
 
 std::string_view trim(std::string_view text) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Decides who may write into a folder: one process alone, or several that share it. The lock leaves
-// no file behind, and a killed process loses it.
+// Lock of an output folder, exclusive or shared between processes. The lock leaves no file behind
+// and is released when the process ends, also when it is killed.
 #pragma once
 
 #include <functional>

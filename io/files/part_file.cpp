@@ -94,8 +94,8 @@ void sync_folder(const std::string& folder) {
 std::array<std::atomic<const char*>, 64> parts_held{};
 static_assert(std::atomic<const char*>::is_always_lock_free, "the handler may not wait");
 
-/// While it lives, no signal that may be handled interrupts this thread: a .part is in the list
-/// exactly while it is there.
+/// RAII: blocks signals in this thread, so that a .part is in the list exactly while the file
+/// exists.
 class NoSignals {
  public:
   NoSignals() {
@@ -126,7 +126,7 @@ int rename_to(const std::string& from, const std::string& to, bool overwrite) {
   if (!overwrite) {
     if (renameat2(AT_FDCWD, from.c_str(), AT_FDCWD, to.c_str(), RENAME_NOREPLACE) == 0) return 0;
     if (errno != EINVAL && errno != ENOSYS) return errno;
-    struct stat info {};  // the file system has no such rename; look first
+    struct stat info {};  // the file system has no such rename: test first
     if (lstat(to.c_str(), &info) == 0) return EEXIST;
   }
   return rename(from.c_str(), to.c_str()) == 0 ? 0 : errno;
@@ -170,7 +170,7 @@ PartFile::PartFile(std::string output, bool overwrite)
       throw IoError(
           fmt::format("cannot write '{}': another process is writing '{}'", output_, path_));
     }
-    if (error != 0 && !is_new) {  // a file system without locks: it cannot be told whose it is
+    if (error != 0 && !is_new) {  // a file system without locks: the owner is unknown
       close(descriptor);
       throw IoError(fmt::format("cannot write '{}': '{}' exists; remove it if no run is writing it",
                                 output_, path_));

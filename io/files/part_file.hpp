@@ -17,8 +17,9 @@ struct NamedBytes {
   BytesOf what;
 };
 
-/// The file `<output>.part`, in the folder of the output, held exclusively while this lives.
-/// A .part that a killed run left behind is taken over; one that another process is writing is not.
+/// The file `<output>.part`, in the folder of the output, locked exclusively for the lifetime of
+/// this object. A .part of a killed run is replaced; one that another process is writing is an
+/// error.
 class PartFile {
  public:
   /// Creates the .part, empty. Throws IoError, having created nothing, when the output exists and
@@ -46,7 +47,8 @@ class PartFile {
   [[nodiscard]] std::uint64_t size() const { return written_->size(); }
   /// Whoever writes into the file without this object adds there what it writes.
   [[nodiscard]] WrittenBytes* written() { return &*written_; }
-  /// Reads the file back. Throws IoError that says where it is not what was written.
+  /// Reads the file back. Throws IoError with the first offset at which it differs from what was
+  /// written.
   void compare() { written_->compare_all(); }
   /// Compares, forces the bytes to the disk and renames the .part to the output. Throws IoError;
   /// InputError when the output has become an input.
@@ -59,8 +61,8 @@ class PartFile {
   std::optional<WrittenBytes> written_;
 };
 
-/// Removes the .part of every PartFile that lives, of 64 at most. A handler of signals may call it
-/// before it ends the process.
+/// Removes the .part of every existing PartFile, of at most 64. Signal handlers may call it before
+/// they end the process.
 void remove_parts() noexcept;
 
 /// Writes a whole text file, or leaves what was there.

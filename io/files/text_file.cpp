@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Uses the system's own calls, because a stream does not say why a read failed.
+// Uses system calls, because streams do not report the reason of a failed read.
 #include "io/files/text_file.hpp"
 
 #include <fcntl.h>

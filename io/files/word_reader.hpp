@@ -30,8 +30,8 @@ class WordReader {
   [[noreturn]] void fail(const std::string& message) const;
 
   /// These return word k of the line: as a finite number; as a position, at most a million because
-  /// no simulation is accurate beyond that; as a whole number, where `expected` says what is
-  /// wanted. They fail if the word is something else.
+  /// no simulation is accurate beyond that; as an integer, with `expected` for the message. They
+  /// fail if the word is not of this kind.
   [[nodiscard]] double number(std::size_t k) const;
   [[nodiscard]] double position(std::size_t k) const;
   [[nodiscard]] long integer(std::string_view word, const char* expected) const;

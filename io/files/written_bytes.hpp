@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a file should hold. A disk may say that it wrote and not have written, so every output is
-// read back and compared with this before it gets its name.
+// Checksums of the bytes written to a file. Every output is read back and compared with them before
+// it is renamed, because a successful write does not guarantee stored data.
 #pragma once
 
 #include <cstdint>
@@ -19,9 +19,8 @@ struct BytesOf {
   std::int64_t number = -1;  ///< appended to the name; negative: nothing is
 };
 
-/// Checksums of the bytes that were handed over for a file, piece by piece. Later bytes replace
-/// earlier ones. Where nothing was handed over, the file has zeros. All functions throw IoError
-/// when the file cannot be read.
+/// Checksums of the bytes written to a file, range by range. Later writes replace earlier ones.
+/// Ranges without a write are zeros. All functions throw IoError when the file cannot be read.
 class WrittenBytes {
  public:
   /// For an empty file, which `descriptor` can read. It is not closed here. `path`: for messages.

@@ -17,7 +17,7 @@ using Face = std::vector<Vector3>;
 /// none.
 std::vector<Face> faces_of(const Shape& shape, double half_space, std::size_t most = 12000);
 
-/// Triangles whose corners, anticlockwise seen from outside, have the normals of the surface [m].
+/// Triangles [m], counter-clockwise from outside, with the surface normals at their corners.
 struct RoundSurface {
   std::vector<Vector3> vertices, normals;
   std::vector<std::array<int, 3>> triangles;

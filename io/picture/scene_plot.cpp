@@ -123,7 +123,7 @@ class Picture {
           places.push_back(eye_(at.back()));
         }
         const Vector3 out = cross(at[1] - at[0], at[2] - at[0]);
-        if (!(eye_.nearness(unit(out)) > 1e-6)) continue;  // it looks away, or is seen on edge
+        if (!(eye_.nearness(unit(out)) > 1e-6)) continue;  // back face, or edge on
         const double bright = 0.72 + 0.28 * dot(light, unit(out));
         const auto tone = [&](int c) {
           return std::clamp(static_cast<int>(255 * bright * body.rgba[std::size_t(c)]), 0, 255);
@@ -211,7 +211,7 @@ class Picture {
     return out + label({where.x + 8, where.y - 8}, d.name, kJoint);
   }
 
-  /// Points that look away are paler.
+  /// Points on back faces are paler.
   std::string sensor(std::size_t which) {
     const TactileDescription& d = scene_.sensors[which];
     const auto names = model_.body_names();

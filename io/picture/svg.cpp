@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Writes SVG by hand, because a library would take more to learn than these functions.
+// Writes SVG text. These few functions are simpler than the interface of a library.
 #include "io/picture/svg.hpp"
 
 #include <fmt/format.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Decides where a picture of a tactile field puts each point, and how the point's shear is drawn.
+// Layout of pictures of tactile fields: position of each point and direction of its shear arrow.
 #pragma once
 
 #include <array>

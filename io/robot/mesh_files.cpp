@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// package:// stands for a folder that ROS would find by its package index. Here it is looked for
-// above the robot's file, where it nearly always is.
+// package:// names a folder of the ROS package index. Here it is searched above the robot's file,
+// where it nearly always is.
 #include "io/robot/mesh_files.hpp"
 
 #include <fmt/format.h>

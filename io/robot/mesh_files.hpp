@@ -14,10 +14,10 @@ struct RobotMesh {
 };
 
 /// Finds, reads and scales the file `name`: relative to `folder`, absolute, file://, or
-/// package://NAME/…, whose NAME is looked for as a folder above the robot's file. Returns nothing,
-/// and lists it, if scenes cannot have such a shape. Fails at the node if the file is not there or
-/// broken. In `other_folder`, beside the robot's file, it is looked for last: with the folders of
-/// its name, then without.
+/// package://NAME/…, where NAME is searched as a folder above the robot's file. Returns no value,
+/// and lists it, if scenes cannot have such a shape. Fails at the node if the file is missing or
+/// damaged. `other_folder`, beside the robot's file, is searched last: with the folders of the
+/// name, then without.
 std::optional<RobotMesh> read_robot_mesh(const RobotNode& node, const std::string& name,
                                          const std::string& folder, const Vector3& scale,
                                          const std::optional<std::string>& other_folder = {});

@@ -15,9 +15,9 @@ struct MeshSolid {
   std::array<double, 6> inertia{};  ///< xx xy xz yy yz zz about the centre [m⁵]
 };
 
-/// Sums the pyramids between the middle of all faces and each face, as MuJoCo does where a mesh
-/// does not say inertia="exact": all count, whichever way a face looks. So the surface may be open,
-/// and what several pyramids share counts several times. For a convex surface it is the volume.
+/// Sums the absolute volumes of the pyramids between the mean of all faces and each face, as MuJoCo
+/// does for meshes without inertia="exact". The surface may be open, and overlapping pyramids count
+/// several times. For a convex surface it is the volume.
 MeshSolid solid_of(const MeshShape& faces);
 
 }  // namespace tangere

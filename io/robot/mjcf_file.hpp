@@ -72,7 +72,7 @@ class MjcfFile {
   InertiaFrom inertia_from = InertiaFrom::automatic;
   bool balance_inertia = false;
   double total_mass = 0;  ///< to which all masses are scaled [kg]; 0: they are not
-  bool has_limits = true, has_springs = true, has_dampers = true;  ///< as <flag> says
+  bool has_limits = true, has_springs = true, has_dampers = true;  ///< by <flag>
   bool free_base = false;   ///< bodies of the world without joints move freely
   bool align_free = false;  ///< free joints are aligned with the inertia of their bodies
   std::array<int, 2> inertia_groups{0, 5};
@@ -88,7 +88,7 @@ class MjcfFile {
     return degrees ? x * 3.14159265358979323846 / 180 : x;
   }
 
-  /// Reads <default>, whose classes inherit from those around them.
+  /// Reads <default>; nested classes inherit from enclosing ones.
   void read_defaults(const RobotNode& node, const std::string& parent);
   /// The node with the defaults of its own class, or of `inherited` if it names none.
   [[nodiscard]] RobotNode with_class(const RobotNode& node, const std::string& inherited);

@@ -63,7 +63,7 @@ struct Robot {
   /// By motor of the scene: the control that a keyframe gives it. No value without a keyframe.
   std::optional<std::vector<double>> controls;
   Remarks idle;     ///< left out, and of no effect on the motion
-  Remarks changed;  ///< said in another way
+  Remarks changed;  ///< expressed differently
   Remarks lost;     ///< left out although it changes the motion
 };
 

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a robot's file does not say is chosen here: how stiff limits are, which links touch, where
-// skins lie.
+// Chooses what robot files do not define: stiffness of limits, contact pairs, poses of skins.
 #include "io/robot/robot_import.hpp"
 
 #include <fmt/format.h>
@@ -74,7 +73,7 @@ void stiffen_limits(Robot& robot) {
   }
 }
 
-/// A control with which a motor that no keyframe knows leaves its joint where it starts.
+/// A control with which a motor without keyframe value keeps its joint at the start.
 double resting_control(const Scene& scene, const MotorDescription& motor) {
   if (motor.control != MotorControl::position) return 0;
   for (const InitialState& s : scene.initial)

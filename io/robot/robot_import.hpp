@@ -11,8 +11,8 @@
 
 namespace tangere {
 
-/// A tactile skin on a link. `layout`: the text of a file with the root <sensor>, whose sensors get
-/// the link's body and a place.
+/// A tactile skin on a link. `layout`: the text of a file with the root <sensor>, whose sensors are
+/// attached to the link's body with a pose.
 struct PadRequest {
   std::string link;         ///< or a site of MJCF
   std::string layout_name;  ///< for messages and comments
@@ -52,7 +52,7 @@ struct ImportedScene {
   std::size_t links = 0, joints = 0, motors = 0, sensors = 0;  ///< joints: those that move
   std::size_t end_effectors = 0;
   std::vector<std::string> idle;     ///< left out, and of no effect on the motion
-  std::vector<std::string> changed;  ///< said in another way
+  std::vector<std::string> changed;  ///< expressed differently
   std::vector<std::string> lost;     ///< left out although it changes the motion
   std::vector<std::string> warnings;
 };

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// One element of a robot file. A table says of every attribute and child whether it is read, left
-// out without an effect, or left out although it matters; nothing else passes.
+// One element of a robot file. A table classifies every attribute and child: read, ignored without
+// an effect, or ignored with an effect. Unknown ones are errors.
 #pragma once
 
 #include <tinyxml2.h>

@@ -79,8 +79,8 @@ std::string children_text(const tinyxml2::XMLElement& sensor) {
   return text;
 }
 
-/// Returns the bodies that a skin on `link` must not feel, as an attribute: those that touch
-/// nothing in the file, and those of links that the file excludes from contact with this one.
+/// Returns the attribute `ignores` of a skin on `link`: bodies without contact in the file, and
+/// those of links that the file excludes from contact with this one.
 std::string ignores_text(const Robot& robot, const LinkDescription& link) {
   std::vector<std::string> names = robot.untouched;
   const auto add_link = [&](const std::string& name) {

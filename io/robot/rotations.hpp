@@ -24,7 +24,8 @@ Quaternion from_euler(const Vector3& angles, const std::string& sequence);
 Quaternion from_rpy(const Vector3& angles);
 /// The smallest turn that takes z to a direction. For -z, half a turn about x.
 Quaternion from_z(const Vector3& direction);
-/// The frame with this x axis, whose y axis is the part of `y` across x. Both have a length.
+/// The frame with this x axis, and the component of `y` orthogonal to it as y axis. Neither vector
+/// is zero.
 Quaternion from_axes(const Vector3& x, const Vector3& y);
 
 }  // namespace tangere

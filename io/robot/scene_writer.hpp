@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Writes what was read of a robot as a scene file for people: one element a line, in SI, each with
-// a comment that says where it comes from.
+// Writes an imported robot as a readable scene file: one element a line, in SI, each with a comment
+// that names its origin.
 #pragma once
 
 #include <string>

@@ -321,7 +321,7 @@ class UrdfReader {
                                     joint.child, other.joint.name, joint.joint.name));
   }
 
-  /// Holds the joints that move nothing that has mass: no force could say how they move.
+  /// Fixes joints that move no mass: their mass matrix would be singular.
   void hold_weightless() {
     std::vector<LinkDescription>& links = robot_.scene.links;
     std::vector<char> heavy(links.size());
@@ -465,8 +465,8 @@ class UrdfReader {
   const RobotNode& root_;
   Robot& robot_;
   bool free_base_;
-  // As the <compiler> of MuJoCo says: where meshes may lie, whether moments that no solid has are
-  // balanced, and the sum of all masses [kg] (0: the file's).
+  // By <compiler> of MuJoCo: folder of meshes, whether impossible inertias are balanced, and the
+  // sum of all masses [kg] (0: the file's).
   std::optional<std::string> mesh_folder_;
   bool balances_ = false;
   double total_mass_ = 0;

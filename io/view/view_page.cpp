@@ -59,8 +59,8 @@ Json packed_triangles(std::span<const std::array<int, 3>> triangles) {
   return packed(corners);
 }
 
-/// What page/solids.js draws a shape from. It knows the shapes that are listed here; others are
-/// sent as triangles.
+/// Parameters from which page/solids.js draws a shape. Shapes not listed here are sent as
+/// triangles.
 struct DrawnFrom {
   Json operator()(const SphereShape&) const { return Json::object(); }
   Json operator()(const CuboidShape&) const { return Json::object(); }

@@ -9,7 +9,7 @@
 namespace tangere {
 
 /// The data block of a page: JSON, in which an array of numbers is {"base64": …} of float32, or of
-/// int32 where "type" says so, little-endian (docs/view.md). It does not contain "</".
+/// int32 if "type" is so, little-endian (docs/view.md). It does not contain "</".
 std::string view_json(const ViewData& data);
 
 /// The page: what lies in io/view/page, with the data block in its place.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Looks at what a path is before it is read.
+// Detects the kind of a path before reading it.
 #include "io/view/view_reader.hpp"
 
 #include <filesystem>
@@ -15,7 +15,7 @@ ViewData read_view(const std::string& path, const ViewOptions& options) {
   {
     const h5::Id file = h5::open_file(path);
     if (H5Aexists(file.get(), "format") > 0) format = h5::read_text(file, "format");
-    // The merged file of a data set says what it is in /scene.
+    // The merged file of a data set has its format in /scene.
     if (format.empty() && h5::has_link(file, "data") && h5::has_link(file, "scene"))
       format = "tangere dataset";
   }

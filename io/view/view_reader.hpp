@@ -9,8 +9,8 @@
 namespace tangere {
 
 /// Reads a trajectory file of `simulate`, a folder of shards, or one file of a data set.
-/// Coordinates become poses by the scene that the file holds. Frames are thinned evenly, so that
-/// the page stays below options.bytes; `notes` and `stride` say so. Throws IoError for a file that
+/// Coordinates become poses by the scene in the file. Frames are thinned evenly, so that the page
+/// stays below options.bytes; then `notes` and `stride` are set. Throws IoError for a file that
 /// is missing, damaged, of another format, without a scene, without q, or without rows, and
 /// InputError for an episode that it does not have.
 ViewData read_view(const std::string& path, const ViewOptions& options);

@@ -107,7 +107,7 @@ ViewScene::ViewScene(const std::string& text, const std::string& name, const std
     : path_(path) {
   try {
     scene_ = parse_scene(text, options.scene.empty() ? name : options.scene).scene;
-    scene_.randomizations.clear();  // every episode says what it drew
+    scene_.randomizations.clear();  // every episode stores its drawn values
     scene_.initial.clear();         // and where it was
     plain_ = std::make_unique<Posed>(scene_);
   } catch (const InputError& error) {
