@@ -48,6 +48,7 @@ set(public_headers
   engine/scene/effects.hpp
   engine/scene/sensed_bodies.hpp
   engine/scene/field_form.hpp
+  engine/scene/imperfection_checks.hpp
   engine/model/model.hpp
   engine/model/model_info.hpp
   engine/scene/number_address.hpp

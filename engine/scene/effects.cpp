@@ -9,6 +9,7 @@
 #include <iterator>
 #include <type_traits>
 
+#include "engine/scene/imperfection_checks.hpp"
 #include "engine/scene/scene_number.hpp"
 #include "engine/scene/schema.hpp"
 

@@ -4,6 +4,7 @@
 
 #include <stdexcept>
 
+#include "engine/scene/imperfection_checks.hpp"
 #include "engine/scene/scene_number.hpp"
 #include "engine/step/sleeping_trees.hpp"
 
