@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // Each action has a tape of its own. With the state x and the task state m before the action, m⁺
 // the task state during it, and K steps with snapshots:
-//   r = judge(moments, m⁺, a);  o = observe(moments, m⁺, a)
-//   x_(k+1) = step(x_k, controls(x_0, m⁺, a));  x_0 = place(x, m⁺, a);  m⁺ = begin_action(x, m, a)
+//   r = evaluate(snapshots, m⁺, a);  o = observe(snapshots, m⁺, a)
+//   x_(k+1) = step(x_k, controls(x_0, m⁺, a))
+//   x_0 = restart_state(x, m⁺, a);  m⁺ = begin_action(x, m, a)
 #include "tasks/gradients/task_block.hpp"
 
 #include <fmt/format.h>
