@@ -234,8 +234,8 @@ void TaskBlock::clear_moments() {
   for (MomentRows& m : moments_) clear({&m.q, &m.v, &m.end_effectors, &m.tactile});
 }
 
-/// Adds what a lane's observation and the state that it shows pass on. An observation that has no
-/// weight needs no derivative.
+/// Pulls cotangents of a lane's observation and state back and adds them. An observation with zero
+/// cotangent needs no derivative.
 void TaskBlock::reverse_shown(const TaskView& view, int lane, const ViewCotangent& to) {
   const std::span<const double> weight = part(shown_, lane);
   if (std::any_of(weight.begin(), weight.end(), [](double w) { return w != 0; }))
@@ -337,7 +337,7 @@ std::span<const SnapshotCotangent> TaskBlock::cotangents(int lane) {
   return to_moments_;
 }
 
-/// Makes the batch show the states in which the first actions began.
+/// Copies the states in which the first actions began into the batch.
 void TaskBlock::show_start() {
   const EnvironmentData& data = rollout_.data();
   const std::size_t nq = as_size(model_.nq()), nv = as_size(model_.nv());
