@@ -324,8 +324,8 @@ struct DualStage::Impl {
     }
   }
 
-  /// Computes what the tangents of masses add to g, which is linear in masses. Contacts, motors and
-  /// effects are left out.
+  /// Computes the contribution of the tangents of masses to g, which is linear in masses. Contacts,
+  /// motors and effects are left out.
   void weigh(const kernels::StageArgs<D>& a, std::vector<D>& g) {
     std::vector<kernels::Link> light = bodies;
     for (std::size_t k = 0; k < light.size(); ++k) {

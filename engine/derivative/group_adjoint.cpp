@@ -86,7 +86,7 @@ void GroupAdjoint::solve(const StageContext<L>& s) const {
   }
 }
 
-/// Returns what a stage depends on besides its centre: the state one step before, then the earlier
+/// Returns the states on which a stage depends besides its centre: the one before, then the earlier
 /// stages.
 template <int L>
 kernels::StageHistory<Row<L>> GroupAdjoint::history_of(const StageContext<L>& s,
@@ -167,7 +167,7 @@ void GroupAdjoint::find_inner_velocities(const StageContext<L>& s, const Scheme&
   }
 }
 
-/// Computes the coordinates of the stage in hand.
+/// Computes the coordinates of the current stage.
 template <int L>
 void GroupAdjoint::find_stage(const StageContext<L>& s) const {
   const kernels::Stage<L>& stage = s.w.stage;

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// One step of a group in reverse. The stages of its scheme are taken backwards. Each is assembled
-// and factored anew at its accepted state, then solved transposed for every loss
-// (docs/gradients.md).
+// Adjoint of one step of a group. Stages are reversed last to first: each is assembled and factored
+// at its accepted state, then the transposed system is solved for every loss (docs/gradients.md).
 #pragma once
 
 #include <memory>
@@ -25,7 +24,7 @@ struct AdjointWorkspace {
   Row* numbers = nullptr;  ///< (parameter_numbers), or null
   Row sound;
   ShearAdjoint<L> shear_adjoint;
-  AlignedVector<Row> q_stage;  ///< (nq) coordinates of the stage in hand
+  AlignedVector<Row> q_stage;  ///< (nq) coordinates of the current stage
 };
 
 /// Reverses solves whose states are in the workspace: q0, v0 where the solve began, q_before,

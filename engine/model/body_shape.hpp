@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The shape of a compiled body: its distance, its widths, and what is outside of it.
+// The shape of a compiled body: its distance function, widths and outward directions.
 #pragma once
 
 #include "engine/model/compiled_model.hpp"

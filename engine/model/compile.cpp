@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// compile(scene): names become indices, fixed joints fold into what they are attached to, joints
-// become elementary links.
+// compile(scene): names become indices, fixed joints are folded into their parents, joints become
+// elementary links.
 #include "engine/model/compile.hpp"
 
 #include <algorithm>

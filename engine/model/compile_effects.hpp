@@ -9,8 +9,7 @@ namespace tangere {
 /// Fills `effects`: which effects are on, and the reason.
 void decide_effects(CompiledModel& m);
 
-/// Lists the stages of a step, what each works on and which variant of its kernel it runs. Fills
-/// `stages`.
+/// Fills `stages`: the stages of a step, with the elements and the kernel variant of each.
 void list_stages(CompiledModel& m);
 
 }  // namespace tangere

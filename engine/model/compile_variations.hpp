@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Densities, sizes and places that vary by environment, and what follows from them: the last steps
-// of compile(), and an update for each episode of a batch.
+// Densities, sizes and positions that vary by environment, and the rows derived from them: the last
+// steps of compile(), and an update for each episode of a batch.
 #pragma once
 
 #include "engine/model/compiled_model.hpp"

@@ -9,8 +9,7 @@
 
 namespace tangere {
 
-/// Dofs sorted by what they are connected with: those of component c are dofs[begin[c]] …
-/// dofs[begin[c + 1] - 1].
+/// Dofs sorted by component: those of component c are dofs[begin[c]] … dofs[begin[c + 1] - 1].
 struct Components {
   std::vector<int> dofs, begin;
 };

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// How a skin spreads what acts at a point over its neighbours on a grid: weights along both axes,
+// Lateral spread of forces in a skin over the points of a grid, with weights along both axes
 //   S_ij = K(|i - j|) / Σ_i K(|i - j|),   K(k) = exp(-k² pitch² / (2 spread²)),
-// so what a point gives away sums to what it had, at edges too.
+// so Σ_i S_ij = 1: the sum of forces is conserved, at edges too.
 #pragma once
 
 #include <string>

@@ -27,8 +27,8 @@ struct MeshGrid {
 };
 
 /// Returns the distance to a closed mesh with `mesh.resolution` cells along its longest side.
-/// Throws InputError, which names the place, where the surface overlaps itself, so that its parts
-/// lie inside of what it encloses.
+/// Throws InputError with the position if the surface overlaps itself, so that parts of it lie
+/// inside.
 std::shared_ptr<const MeshGrid> make_mesh_grid(const MeshShape& mesh);
 
 /// Returns the grid of an equal mesh that some model of this process holds, or makes one. May be

@@ -48,7 +48,7 @@ struct MeshInfo {
   static constexpr double kMostUnresolved = 0.1;
 };
 
-/// A stage of the step that the scene calls for, what it works on and the variant of its kernel.
+/// A stage of the scene's step, its elements and its kernel variant.
 struct StageInfo {
   std::string name, of, variant;
 };

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Filters the arrays of a model and numbers anew what refers to links, dofs and contacts.
+// Filters the arrays of a model and renumbers references to links, dofs and contacts.
 #include "engine/model/model_part.hpp"
 
 #include <algorithm>

@@ -23,7 +23,7 @@ inline bool can_exert_force(const kernels::ContactParameters& p) {
 /// A part of a model. Rows of the batch's blocks that parameters name are those of the whole model,
 /// which must outlive its parts.
 struct ModelPart {
-  CompiledModel model;  ///< what a step reads: links, dofs and contacts of the part
+  CompiledModel model;  ///< the members that a step reads: links, dofs and contacts of the part
   std::vector<int> q,
       v;  ///< (nq), (nv) coordinates and dofs of the part: their number in the whole
 };

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Random numbers that depend on what they are for, never on when they are drawn: any environment,
-// step or thread can be repeated alone. The generator is Philox4x32-10 (Salmon, Moraes, Dror, Shaw:
-// "Parallel random numbers: as easy as 1, 2, 3", 2011). Ten rounds of multiplication and exclusive
-// or turn a counter and a key into 128 random bits.
+// Counter-based random numbers, keyed by their purpose and independent of the order of draws: any
+// environment or step can be repeated alone. The generator is Philox4x32-10 (Salmon, Moraes, Dror,
+// Shaw: "Parallel random numbers: as easy as 1, 2, 3", 2011). Ten rounds of multiplication and
+// exclusive or turn a counter and a key into 128 random bits.
 #pragma once
 
 #include <array>
@@ -21,8 +21,8 @@ inline constexpr std::array<std::uint32_t, 2> kPhiloxKeyStep{0x9E3779B9, 0xBB67A
 std::array<std::uint32_t, 4> philox4x32(std::array<std::uint32_t, 4> counter,
                                         std::array<std::uint32_t, 2> key);
 
-/// What a number is drawn for, so that no two uses share one. Part of every stored seed's meaning:
-/// never renumber.
+/// Purpose of a number, so that no two uses share one. Stored seeds depend on the values: never
+/// renumber.
 enum class Purpose : std::uint8_t {
   initial_state = 0,  ///< <randomize> of a joint's starting coordinates or velocities
   contact = 1,        ///< <randomize> of a contact's coefficients
@@ -30,7 +30,7 @@ enum class Purpose : std::uint8_t {
   control = 3,        ///< knots of a random control
   joint = 4,          ///< <randomize> of a joint's effects or a motor's gains
   body = 5,           ///< <randomize> of a body
-  task = 6,           ///< what a task draws at a reset or during an episode
+  task = 6,           ///< draws of a task at a reset or during an episode
   policy = 7,         ///< actions of a policy that draws them
   sensor_noise = 8,   ///< noise of a tactile point in a step
   sensor_point = 9,   ///< gain and bias of a tactile point

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Takes bodies as if they were free: what holds them makes their touches longer or shorter.
+// Treats bodies as free; joints and other contacts would change the duration of an impact.
 #include "engine/model/short_touches.hpp"
 
 #include <fmt/format.h>

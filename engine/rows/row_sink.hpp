@@ -61,8 +61,8 @@ struct AuditRow {
   std::int64_t step;                 ///< t
   std::span<const double> energy;    ///< (E, 3) of motion, of height, held [J]
   std::span<const double> momentum;  ///< (E, 6) linear [kg m/s], angular [kg m²/s]
-  /// (E, 3) what motors did, what damping and friction took, and what the scheme made in the step
-  /// before this row [J]; empty at row 0. Zeros where an environment took no step.
+  /// (E, 3) work of motors, dissipation by damping and friction, and error of the integrator in the
+  /// step before this row [J]; empty at row 0. Zeros if an environment took no step.
   std::span<const double> passed;
 };
 

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a task declares: its arrays with names, shapes, units and bounds, and its timing. Buffers,
-// files and the command's tables follow from it. It is description only; what a task does is in
-// tasks/catalogue/task.hpp.
+// Declaration of a task: arrays with names, shapes, units and bounds, and timing. Buffers, files
+// and the command's tables follow from it. The functions of a task are in tasks/catalogue/task.hpp.
 #pragma once
 
 #include <cstddef>

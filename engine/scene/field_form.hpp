@@ -45,7 +45,7 @@ struct FieldOutput {
   friend bool operator==(const FieldOutput&, const FieldOutput&) = default;
 };
 
-/// Returns what a reading is computed from: a flow is a shear that is divided.
+/// Returns the output from which a reading is computed: for a flow the shear, else itself.
 inline FieldOutput undivided(FieldOutput of) {
   if (of.form == FieldForm::flow) of.form = FieldForm::shear;
   return of;

@@ -12,7 +12,8 @@ namespace tangere {
 bool is_imperfect(const SensorImperfections& imperfections);
 /// Whether a reading depends on earlier states.
 bool has_lag(const SensorImperfections& imperfections);
-/// Returns "noise 0.002 0.001 N, dead 0.01": what is on, normal before shear where they differ.
+/// Returns "noise 0.002 0.001 N, dead 0.01": nonzero coefficients, normal before shear if they
+/// differ.
 std::string text_of(const SensorImperfections& imperfections);
 /// Throws InputError (file:line) for a value that is negative, not finite or too large. `sensor`:
 /// its name. `grid`: whether its points have neighbours.

@@ -23,7 +23,7 @@ namespace tangere {
 
 inline constexpr int kMostStages = 5;
 
-/// What an earlier stage of a step contributes to a later one.
+/// Weights of an earlier stage in a later one.
 struct InnerWeight {
   double r, s;
 };

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a real tactile sensor adds to the field that physics gives. With the ideal field x of a
-// sensor, a reading y is, number by number, in this order (docs/sensors.md):
+// Imperfections of real tactile sensors. From the ideal field x a reading y is computed, number by
+// number, in this order (docs/sensors.md):
 //   x₀ = (1 - a) x + a Σ_k l_k x(t - k h)   a: hysteresis; l_k ~ exp(-k h / hysteresis_time)
 //   x₁ = Σ_k w_k x₀(t - delay - k h)    w_k ~ β^k, Σ w_k = 1, β = exp(-h / low_pass)
 //   x₂ = S x₁                           S_ij ~ exp(-|p_i - p_j|² / (2 spread²)), Σ_i S_ij = 1

@@ -106,8 +106,8 @@ std::string shapes_with(const std::function<bool(const ShapeRow&)>& has);
 /// Returns the name with its article: "a cuboid", "an abstract".
 std::string with_article(const char* shape_name);
 
-/// Returns what is wrong with a shape whose sizes range from `least` to `most` [m]; "" if nothing
-/// is.
+/// Returns an error text for a shape whose sizes range from `least` to `most` [m]; "" if they are
+/// valid.
 std::string slenderness_fault(const ShapeRow& row, double least, double most);
 std::string slenderness_fault(const Shape& shape);
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Energy and momentum of an environment, and what motors, damping and friction do to them. What a
-// step changes beyond that, its scheme made.
+// Energy and momentum of an environment, work of motors, and dissipation by damping and friction.
+// The remaining change of energy in a step is the error of the integrator.
 #pragma once
 
 #include <array>

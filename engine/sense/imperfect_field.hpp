@@ -12,7 +12,7 @@
 
 namespace tangere {
 
-/// What the random numbers of a reading are keyed by.
+/// Key of the random numbers of a reading.
 struct ReadingKey {
   std::uint64_t seed;
   std::int64_t episode, step;

@@ -27,8 +27,8 @@ class MarkerMap {
 
   /// Computes displacements, (points, 2) [m], from the ideal field, (points, 3) [N].
   void displace(std::span<const double> field, std::span<double> displacement);
-  /// Adds to the cotangent of the field, (points, 3), what that of the displacements, (points, 2),
-  /// makes of it.
+  /// Pulls the cotangent of the displacements, (points, 2), back to the field and adds it, (points,
+  /// 3).
   void pull_back(std::span<const double> of_displacement, std::span<double> of_field);
 
  private:

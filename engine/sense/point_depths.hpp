@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// How deep the points of a contact are in what they touch.
+// Penetration depths of the points of a contact.
 #pragma once
 
 #include "engine/sense/pad_reader.hpp"

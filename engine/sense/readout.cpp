@@ -40,7 +40,7 @@ struct Readout::Impl {
   AlignedVector<double> wide;
   AlignedVector<float> single;
   std::vector<kernels::Frame<double>> in_body;  // (sensors) pad axes in the body
-  // Of imperfect sensors: what they do, their reading, and those of a block of small pads.
+  // Of imperfect sensors: imperfections, reading, and readings of a block of small pads.
   ImperfectField imperfections;
   ElasticField elastic;
   std::vector<std::optional<MarkerMap>> markers;  // (sensors) of those that have them
@@ -162,7 +162,7 @@ struct Readout::Impl {
   [[nodiscard]] bool is_elastic(FieldOutput of) const {
     return sensor_of(of.sensor).elastic && of.form != FieldForm::pressure;
   }
-  /// Whether a reading is not simply what the kernels compute.
+  /// Whether a reading needs more than the kernels' field.
   [[nodiscard]] bool imperfect(FieldOutput of) const {
     return of.form == FieldForm::markers || is_elastic(of) ||
            (of.form != FieldForm::ideal && sensor_of(of.sensor).imperfect);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Checks of what a Readout is given.
+// Checks of the arguments of Readout.
 #pragma once
 
 #include <algorithm>

@@ -18,7 +18,7 @@ namespace tangere {
 /// How the last step of an environment ended. Values are written to files: never renumber.
 enum class StepStatus : std::int8_t {
   converged = 0,
-  split = 1,             ///< converged in parts, or by SDIRK2 because a body turned too far
+  split = 1,             ///< converged in parts, or by SDIRK2 because a body rotated too far
   accuracy_not_met = 2,  ///< converged, but a part of h/256 missed the requested accuracy, created
                          ///< energy or rotated a body too far
   tunnelled = 3,         ///< converged, but a body passed through one of its contact partners
@@ -71,7 +71,7 @@ class Batch {
   /// Steps that an environment has taken since its episode began. Failed steps do not count. It
   /// keys the noise of sensors.
   [[nodiscard]] std::int64_t steps(int environment) const { return steps_[lane(environment)]; }
-  /// Sets this count, for a run that goes on from a stored state, in [0, 2^48).
+  /// Sets this count, to resume from a stored state, in [0, 2^48).
   void set_steps(int environment, std::int64_t steps) { steps_[lane(environment)] = steps; }
 
   /// Copy one environment's coordinates out of its lane: (nq), (nv).
@@ -93,8 +93,8 @@ class Batch {
   [[nodiscard]] std::span<const ShearState> shear_states() const {
     return {shear_.data(), std::size_t(environments_)};
   }
-  /// Sets it, for a run that goes on from a stored state. Throws InputError unless the points rise
-  /// and the scene has them.
+  /// Sets it, to resume from a stored state. Throws InputError unless the points are ascending and
+  /// exist in the scene.
   void set_shear_state(int environment, std::span<const ShearEntry> memory);
 
   /// Sleep state of an environment (docs/sleeping.md). Empty unless a stepper with sleep enabled

@@ -68,7 +68,7 @@ class Interpenetration::Lane {
        const double* column)
       : m_(m), poses_(poses), column_(column) {}
 
-  /// What is known of the overlap of two bodies [m].
+  /// Bounds of the overlap of two bodies [m].
   struct Overlap {
     double least, most;  ///< bounds of δ; negative where bodies are apart
     bool sure = true;    ///< `most` is a bound

@@ -16,8 +16,8 @@ namespace tangere {
 /// inside each other.
 inline constexpr double kOverlapShare = 0.25;
 
-/// Checks of one thread. A state is checked only if bodies have moved, since the last check, by
-/// what was then missing to an overlap or to a change of sides (Batch: clearance).
+/// Scratch of one thread. A state is checked only if bodies have moved farther since the last check
+/// than the clearance that it found, to an overlap or a change of sides (stored in Batch).
 class Interpenetration {
  public:
   explicit Interpenetration(const CompiledModel& model);
@@ -31,7 +31,7 @@ class Interpenetration {
   template <int L>
   [[nodiscard]] kernels::Row<L> motions(const double* rows);
 
-  /// What a check found, and how far bodies may move until the next one must be made [m].
+  /// Result of a check, and the distance that bodies may move until the next one [m].
   struct Finding {
     bool tunnelled = false, overlapping = false;
     double clearance = 0;

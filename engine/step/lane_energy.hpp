@@ -27,8 +27,8 @@ LaneEnergy energy_of_bodies(const CompiledModel& model, const BasicWorkspace<L>&
                             const AlignedVector<kernels::LinkPose<kernels::Row<L>>>& poses,
                             const kernels::Row<L>* q, const kernels::Row<L>* v, int lane);
 
-/// Computes what the contacts of one lane hold [J], by the faces in the workspace. Overwrites its
-/// `search`.
+/// Computes the normal energy of the contacts of one lane [J], with the faces in the workspace.
+/// Overwrites its `search`.
 template <int L>
 double energy_of_contacts(const CompiledModel& model, const kernels::KernelTable& table,
                           BasicWorkspace<L>& w,

@@ -37,8 +37,9 @@ inline double force_at_start(const CompiledModel& m, const CompiledMotor& motor,
                     motor.low, motor.high);
 }
 
-/// Sets what the motors of one lane do: forces known at the start of the step, and the targets of
-/// the others. `state`: the lane's column of its block. Returns false when a control is not finite.
+/// Sets the motors of one lane: forces of those that are evaluated at the start of the step,
+/// targets of the others. `state`: the lane's column of its block. Returns false if a control is
+/// not finite.
 template <int L>
 bool set_motors(const CompiledModel& m, BasicWorkspace<L>& w, int lane, const double* state,
                 std::span<const double> u) {

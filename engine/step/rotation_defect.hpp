@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// The angular momentum that a scheme makes from nothing where bodies turn far in a step.
+// Error of a scheme in angular momentum, for bodies that rotate far in a step.
 //
-// A scheme adds up angular velocities in axes that turn with the body. What it does to the momentum
-// P = R J ω of a body, in axes that stay, follows from its own equations (engine/scene/scheme.hpp):
-// with T = J a + ω × Jω the torque of a stage, and ΔR its turn since the start of the step,
+// A scheme integrates angular velocities in body axes. Its change of the momentum P = R J ω of a
+// body, in fixed axes, follows from its equations (engine/scene/scheme.hpp): with T = J a + ω × Jω
+// the torque of a stage, and ΔR its rotation since the start of the step,
 //   (c₀ ΔP + (s_before ΔP_before + Σ s_inner ΔP_j)/s_divisor)/h - ΔR T,  ΔP = ΔR Jω - Jω₀
-// should be zero. Solved for ΔP stage by stage, it is the momentum by which the step is off. It is
-// zero where the axis of turning stays, and of the scheme's order in the angle of turning.
+// should be zero. Solved for ΔP stage by stage, it is the error of momentum of the step. It is zero
+// for a constant axis of rotation, and of the scheme's order in the angle of rotation.
 #pragma once
 
 #include "engine/scene/scheme.hpp"

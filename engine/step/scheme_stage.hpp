@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a stage of a scheme begins with, in a workspace's rows, by the equations at the head of
-// engine/scene/scheme.hpp.
+// Sets centre, c₀, r, s and first guess of a stage in a workspace's rows (equations in
+// engine/scene/scheme.hpp).
 #pragma once
 
 #include "engine/scene/scheme.hpp"

@@ -37,8 +37,8 @@ class StepChecks {
   template <int L>
   LaneBits energy_gains(const kernels::KernelTable& table, BasicWorkspace<L>& w, LaneBits lanes,
                         double h) const;
-  /// Returns the lanes in which a body turned too far for the scheme of the solve. Where something
-  /// touches, the scheme is left to damp what it meets.
+  /// Returns the lanes in which a body rotated too far for the scheme of the solve. Bodies in
+  /// contact are not checked, because the scheme may damp them.
   template <int L>
   LaneBits over_rotations(const Scheme& scheme, const kernels::KernelTable& table,
                           BasicWorkspace<L>& w, LaneBits lanes, double h) const;

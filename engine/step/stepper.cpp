@@ -49,7 +49,7 @@ struct GroupOfBlock {
   LaneBits live = 0, history = 0;
 };
 
-/// What steps a group: the whole model, or the part of it that is awake.
+/// Model, step and scratch of a group: the whole model, or its awake sub-model.
 struct SteppedModel {
   const CompiledModel& model;
   const GroupStep& step;
@@ -57,7 +57,7 @@ struct SteppedModel {
   std::span<const int> q, v;  ///< number of its coordinates and dofs in the whole model
 };
 
-/// What a stepper has besides, if bodies may sleep.
+/// Extra state used only when sleeping is enabled.
 struct Sleeping {
   Sleep rules;
   AwakeParts parts;

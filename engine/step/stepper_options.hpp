@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a caller may change about steps.
+// Options of a Stepper.
 #pragma once
 
 #include <optional>
@@ -8,7 +8,7 @@
 
 namespace tangere {
 
-/// What a caller may change about the solve. Defaults come from the scene.
+/// Options of a Stepper. Defaults are those of the scene.
 struct StepperOptions {
   std::optional<Integrator> integrator;
   std::optional<double> timestep;   ///< [s]
@@ -19,8 +19,8 @@ struct StepperOptions {
   /// Bodies sleep that have moved by less than this share of their size for a while
   /// (docs/sleeping.md), below 1. 0: none does.
   std::optional<double> sleep{};
-  /// Steps without a tape take contacts that can never push, too. So they have the bits of steps
-  /// with one.
+  /// Steps without a tape include contacts that can never exert a force, and so have the bits of
+  /// steps with a tape.
   bool keep_inert_contacts = false;
 };
 

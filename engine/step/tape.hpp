@@ -38,7 +38,7 @@ class BlockTape {
   /// Makes room for `steps` steps, with the inner stages of schemes that have some.
   BlockTape(const Model& model, Integrator integrator, std::int64_t steps);
 
-  /// Begins anew with the states of a block. Steps are counted from here on.
+  /// Clears the tape and stores the states of a block as step 0.
   void start(const Batch& batch, int block);
   /// Adds the present states of a block. Lanes that have failed or are held keep theirs.
   void append(const Batch& batch, int block);
@@ -47,8 +47,8 @@ class BlockTape {
   [[nodiscard]] double* next_inner();
   void add(TapedStep step) { special_.push_back(std::move(step)); }
 
-  /// Copies the states after `step` steps into a block, and how many steps they are into their
-  /// episodes, for reading. What the block needs to go on is not restored.
+  /// Copies the states after `step` steps, and their steps since the start of the episodes, into a
+  /// block, for reading. History is not restored.
   void show(std::int64_t step, Batch& batch, int block) const;
 
   [[nodiscard]] std::int64_t steps() const { return steps_; }

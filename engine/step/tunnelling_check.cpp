@@ -273,7 +273,7 @@ bool TunnellingCheck::came_through(const Slab& wall, const Vec3<double>& half,
                                    const Vec3<double>& from, const Vec3<double>& to) {
   const double thin = std::min({half.x, half.y, half.z});
   for (int axis = 0; axis < 3; ++axis) {
-    // The middle of a hollow body may be beside what it is made of.
+    // The centre of a hollow body may lie outside its material.
     if (!wall.other_convex() && component(half, axis) > thin) continue;
     const double a = component(from, axis), b = component(to, axis);
     if (!(a * b < 0)) continue;

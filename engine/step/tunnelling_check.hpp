@@ -14,8 +14,8 @@ class TunnellingCheck {
  public:
   explicit TunnellingCheck(const CompiledModel& model);
 
-  /// Returns the lanes in which some link moved so far against another that it could have come
-  /// through a body of a pair. `x`: displacements of the step, (nv). `way`: scratch, (nv).
+  /// Returns the lanes in which some link moved far enough relative to another to pass through a
+  /// body of a pair. `x`: displacements of the step, (nv). `way`: scratch, (nv).
   template <int L>
   [[nodiscard]] LaneBits far_movers(const kernels::Row<L>* x, kernels::Row<L>* way) const;
 
@@ -77,7 +77,7 @@ class TunnellingCheck {
     kernels::Vec3<double> centre{};
     double radius = 0;
   };
-  /// Two links, half of what is thinnest between them [m], and the balls of both.
+  /// Two links, half the smallest thickness of their bodies [m], and the balls of both.
   struct LinkPairBound {
     int link, other;
     double half;

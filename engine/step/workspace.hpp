@@ -92,7 +92,7 @@ struct BasicWorkspace {
   LaneRow *x_inner, *v_inner;
   // Newton: direction, its starting point, vector of the natural test.
   LaneRow *delta, *base, *test;
-  LaneRow *x_guess, *x_softened;  ///< where a stage begins; where it goes on with softer contacts
+  LaneRow *x_guess, *x_softened;  ///< first guess of a stage, and with softened contacts
   LaneRow sound;
   PivotedFactors pivoted;  ///< for lanes whose plain LU is useless
   ShearLanes<L> remembered;

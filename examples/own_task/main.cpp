@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A task of one's own in a program of one's own: press a ball with a force that differs from
-// episode to episode. The program knows all that `tangere` knows, and this task.
+// A user-defined task in a user's program: press a ball with a force that differs from episode to
+// episode. The program has all subcommands of `tangere`, and this task.
 #include <algorithm>
 #include <cmath>
 

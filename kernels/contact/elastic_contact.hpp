@@ -86,7 +86,7 @@ template <class N>
   return e;
 }
 
-/// λ, what it does to the damper, and 1/|w| where the point slips, else 0.
+/// λ, its factor on the damper, and 1/|w| if the point slips, else 0.
 template <class N>
 struct Grip {
   N hold, inverse_w;

@@ -124,7 +124,7 @@ void clear(FaceSums<N>& s) {
   }
 }
 
-/// What the three passes of a chunk hand to each other.
+/// Intermediate results of the three passes of a chunk.
 template <class N>
 struct FacePass {
   Vec3<N> xi, n, x, vt, a;

@@ -96,7 +96,7 @@ void clear(SphereSums<N>& s) {
   }
 }
 
-/// What the three passes of a chunk hand to each other.
+/// Intermediate results of the three passes of a chunk.
 template <class N>
 struct SpherePass {
   Vec3<N> vt, turned;

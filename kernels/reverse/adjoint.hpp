@@ -19,7 +19,7 @@
 
 namespace tangere::kernels {
 
-/// What the sweeps pass on per link, in the link's axes.
+/// Intermediate results of the sweeps per link, in the link's axes.
 template <class N>
 struct LinkAdjoint {
   Vec6<N> twist;  ///< Λ
@@ -162,7 +162,7 @@ void adjoint_targets(const ModelView& model, const StageArgs<N>& a, const Link& 
   }
 }
 
-/// Adds what acts on the dofs of one joint to the sweep's Cᵀ λ and M λ.
+/// Adds the joint effects of one joint to the sweep's Cᵀ λ and M λ.
 template <JointKind K, class N>
 void adjoint_effects(const ModelView& model, const StageArgs<N>& a, const AdjointArgs<N>& d,
                      const Link& link, N* by_v) {

@@ -94,8 +94,7 @@ PlaceCotangent<N> pull_back_motion(const LawParameters<N>& law, const PointConta
   return {x_bar, rho, -minus_d_bar};
 }
 
-/// Returns what a cotangent x̄ of x₂ = ξ - d n contributes alone: x̄, ρ̄ = n (n·x̄) + d H x̄ and
-/// d̄ = -n·x̄.
+/// Pulls back a cotangent x̄ of x₂ = ξ - d n: x̄, ρ̄ = n (n·x̄) + d H x̄ and d̄ = -n·x̄.
 template <class Shape, class N>
 PlaceCotangent<N> pull_back_place(const PointContact<N>& p, const Vec3<N>& x_bar) {
   const N along = dot(p.n, x_bar);

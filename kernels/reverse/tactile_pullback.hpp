@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A tactile field in reverse: turns cotangents of its touched tiles into those of every shape's
-// displacement and twist, eight points at a time, in double. The field itself is computed anew;
-// none of it is stored.
+// Pullback of a tactile field: from cotangents of its touched tiles to those of every shape's
+// displacement and twist, eight points at a time, in double. The field is recomputed, not stored.
 #pragma once
 
 #include "kernels/reverse/point_pullback.hpp"
@@ -9,7 +8,7 @@
 
 namespace tangere::kernels {
 
-/// What the sums of one shape over a pad need.
+/// Inputs of the sums of one shape over a pad.
 template <class N>
 struct PadMotion {
   Mat3<N> Q;

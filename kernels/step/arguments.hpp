@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the engine and the kernels of a step exchange: rows, poses, cotangents.
+// Arguments of the kernels of a step: rows, poses, cotangents.
 #pragma once
 
 #include <cstddef>

@@ -23,7 +23,7 @@ constexpr int dofs(JointKind k) {
 }
 constexpr int coordinates(JointKind k) { return k == JointKind::spherical ? 4 : dofs(k); }
 
-/// What acts on a joint's dofs besides inertia and contacts. Bits of Link::effects.
+/// Forces on a joint's dofs besides inertia and contacts. Bits of Link::effects.
 enum JointEffect : std::uint8_t {
   kDamping = 1,
   kArmature = 2,
@@ -240,7 +240,7 @@ struct Pattern {
   const int* diagonal;       ///< (n) slot of U(i, i)
   const int* factor_column;  ///< (factor_entries) elimination step j of each slot
   PatternPart whole;
-  PatternPart apart;  ///< what is left where no contact couples dofs
+  PatternPart apart;  ///< the pattern without contacts that couple dofs
 };
 
 /// work[target + r] -= L(i, k) work[source + r] for r < length.

@@ -3,7 +3,7 @@
 // axes).
 //
 //   V = V_p + S q̇,  A = A_p + S q̈ + V × (S q̇),  F = I A + V ×* I V - w_ext,  F_p += X* F
-//   g = Sᵀ F - τ - what acts on the dofs (kernels/step/joint_effects.hpp)
+//   g = Sᵀ F - τ - joint effects (kernels/step/joint_effects.hpp)
 // The base accelerates at -gravity, so gravity needs no term of its own.
 #pragma once
 

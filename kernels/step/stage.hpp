@@ -150,7 +150,7 @@ N project(const Link& link, int k, const Vec6<N>& f) {
   return along_axis<K>(link, k, slides(K) ? f.l : f.a);
 }
 
-// Transforms between a link and its parent. They leave out what the joint never does.
+// Transforms between a link and its parent, without components that are zero for its joint.
 template <class N>
 Vec6<N> motion_to_child(const Link& link, const Frame<N>& x, const Vec6<N>& v) {
   const Vec3<N> l = link.has_offset && !link.parent_never_rotates ? v.l + cross(v.a, x.p) : v.l;

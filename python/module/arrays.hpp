@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Arrays between Python and C++. What Python hands in is converted once to the type and order that
-// C++ reads. What C++ hands out is a new NumPy array, which also speaks DLPack.
+// Arrays between Python and C++. Inputs are converted once to the type and order that C++ reads.
+// Outputs are new NumPy arrays, which also support DLPack.
 #pragma once
 
 #include <fmt/format.h>
@@ -41,8 +41,8 @@ struct Argument : nb::ndarray<const T, nb::c_contig, nb::device::cpu> {
 template <class T>
 using Array = nb::ndarray<nb::numpy, T>;
 
-/// Returns a new array, and the place where C++ fills it. Its numbers are not set. Throws
-/// InputError where there is no memory for it.
+/// Returns a new array and its data pointer. Its numbers are not set. Throws InputError if
+/// allocation fails.
 template <class T>
 Array<T> new_array(const Shape& shape, std::span<T>& numbers) {
   std::size_t size = 1;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Whole numbers from Python. One that does not fit its type is an InputError that says so: nanobind
-// would answer with the signatures of all constructors.
+// Integers from Python. One that does not fit its type is an InputError; nanobind would print the
+// signatures of all constructors.
 #pragma once
 
 #include <fmt/format.h>

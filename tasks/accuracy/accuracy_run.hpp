@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Plays fixed episodes with one setting after another and compares what is sampled with a
-// reference.
+// Runs fixed episodes with one setting after another and compares samples with a reference.
 #pragma once
 
 #include <array>
@@ -15,7 +14,7 @@
 
 namespace tangere {
 
-/// What is compared.
+/// The compared quantity.
 enum class AccuracyQuantity {
   tactile,  ///< the fields of all sensors; error relative to the norm of the reference's
   state,    ///< q; error relative to the range that each coordinate covers
@@ -43,7 +42,7 @@ struct AccuracySetting {
 /// The two precisions in which fields are read, as indices below.
 inline constexpr std::array kPrecisions = {Precision::f64, Precision::mixed};
 
-/// What a setting costs and how far it is off. An environment that failed has an infinite error.
+/// Cost and error of a setting. A failed environment has an infinite error.
 struct AccuracyOutcome {
   /// (precisions, E) ‖x - x_ref‖/‖x_ref‖ over samples; NaN where the reference is zero throughout,
   /// or failed.
@@ -67,8 +66,8 @@ class AccuracyRun {
   virtual AccuracyOutcome compare(const AccuracySetting& setting, const std::stop_token& stop) = 0;
 };
 
-/// `episodes` must outlive what is returned. Throws InputError for tactile without a sensor, and
-/// when the system refuses so many threads. Runs with gradients throw what GradientRollouts throws.
+/// `episodes` must outlive the result. Throws InputError for tactile without a sensor, and if the
+/// threads cannot be started. Runs with gradients throw like GradientRollouts.
 std::unique_ptr<AccuracyRun> make_accuracy_run(const FixedEpisodes& episodes,
                                                AccuracyQuantity quantity, int threads);
 

@@ -11,9 +11,9 @@
 
 namespace tangere {
 
-/// A rectangular pad read with another number of points. A point stands for a cell around it: cells
-/// cover what the scene's cover, and kn, kt and damping of a point go with their area. So all pads
-/// are equally stiff.
+/// A rectangular pad read with another number of points. Each point represents a cell around it:
+/// the cells cover the same area as the scene's, and kn, kt and damping of a point are proportional
+/// to the area of its cell. So all pads are equally stiff.
 struct PitchPoint {
   int rows = 1, cols = 1;
   std::array<double, 2> pitch{};  ///< along axis0 and axis1 [m]; 0 where there is one point

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Finds the oscillation that samples miss: which sensor shows it and how fast it is.
+// Finds oscillations of sensor forces between samples: sensor, frequency and share of energy.
 #pragma once
 
 #include "tasks/accuracy/fixed_episodes.hpp"

@@ -208,7 +208,7 @@ class Insertion : public Task {
   static constexpr std::array<double, 3> kHalf{0.0175, 0.025, 0.03};  // half edges of the box [m]
   static constexpr double kApart = -0.0177;  // position of the fingers: 0.2 mm from the box [m]
 
-  /// What the pads read at steps 6 and 44, noise included.
+  /// Readings of the pads at steps 6 and 44, noise included.
   struct Readings {
     static constexpr std::size_t kNumbers = 3 * kPads * kPoints;
     std::array<double, kNumbers> read{}, first{};

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// A task: a scene plus rules for how an episode starts, what an action does, what is observed, the
-// reward, and when the episode ends. Every function is pure: it reads and fills numbers of one
-// environment. So each can be called alone, from any thread, and differentiated.
+// Interface of a task: a scene with initial states, actions, observations, rewards and ends of
+// episodes. Every function is pure: it reads and fills numbers of one environment, and can be
+// called from any thread and differentiated.
 #pragma once
 
 #include <cstdint>
@@ -39,7 +39,7 @@ struct TaskStart {
   std::uint64_t seed = 0;
   std::int64_t episode = 0;
   std::span<double> q, v;        ///< (nq), (nv)
-  std::span<double> varying;     ///< what the scene randomises, in its order; states have no effect
+  std::span<double> varying;     ///< values of <randomize>, in order; states have no effect
   std::span<double> task_state;  ///< (task_state), zeros
 };
 

@@ -15,14 +15,14 @@ namespace tangere {
 /// Names of all tasks, those meant for experiments first.
 std::vector<std::string> task_names();
 bool is_task(const std::string& name);
-/// Returns what a task declares. Throws InputError for an unknown name.
+/// Returns the declaration of a task. Throws InputError for an unknown name.
 TaskSpec task_spec(const std::string& name);
 /// Makes the task of that name on its scene (spec.scene, as read from its file). The task's own
 /// distributions replace what the file randomises. Throws InputError for an unknown name and for a
 /// scene that does not belong to the task.
 std::unique_ptr<Task> make_task(const std::string& name, const Scene& scene);
 
-/// A task of another program: what it declares, and how to make it on its scene.
+/// A task of another program: its declaration, and its factory for a scene.
 struct OwnTask {
   std::function<TaskSpec()> declare;
   std::function<std::unique_ptr<Task>(const Scene&)> make;
@@ -48,13 +48,13 @@ TaskSpec with_friction(TaskSpec spec, Friction friction);
 TaskSpec declare_stable_grasp(Friction friction);
 std::unique_ptr<Task> make_stable_grasp(const Scene& scene, Friction friction);
 
-/// What the task observes of the box besides the goal: touch, its pose, or nothing.
+/// Observations of the box besides the goal: touch, its pose, or none.
 enum class PushObservation { tactile, privileged, reduced };
 TaskSpec declare_box_pushing(PushObservation observation, Friction friction);
 std::unique_ptr<Task> make_box_pushing(const Scene& scene, PushObservation observation,
                                        Friction friction);
 
-/// What the task observes besides angles and fingertips: touch or nothing.
+/// Observations besides angles and fingertips: touch or none.
 enum class CapObservation { tactile, blind };
 TaskSpec declare_cap_opening(CapObservation observation, Friction friction);
 std::unique_ptr<Task> make_cap_opening(const Scene& scene, CapObservation observation,

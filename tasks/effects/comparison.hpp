@@ -8,7 +8,7 @@
 
 namespace tangere {
 
-/// What is timed of a pair of models.
+/// The timed parts of a pair of models.
 struct TimedParts {
   bool steps = true;
   bool readings = false;
@@ -22,7 +22,7 @@ struct TimedParts {
 /// A difference of two times, as a share of the first model's step.
 struct MeasuredShare {
   double share = 0;   ///< from lower quartiles over the rounds at every instant
-  double spread = 0;  ///< standard deviation of the share when rounds are drawn anew
+  double spread = 0;  ///< standard deviation of the share by bootstrap over rounds
 };
 
 /// A model's own times, per environment.
@@ -31,10 +31,10 @@ struct StepTimes {
   double reading = 0;  ///< all sensors, each in one of its `every` steps [s]
   double passes = 0;   ///< evaluations of the residual per step
   double stages = 1;   ///< evaluations of a step that accepts every first guess
-  /// What such steps take over `step`.
+  /// Time of a step that accepts every first guess, divided by `step`.
   double first_pass = 1;
-  /// The same times the evaluations that steps need, per evaluation of such a step. Above 1,
-  /// because a step predicts and searches once.
+  /// First-pass cost scaled by evaluations per step. Above 1, because a step predicts and searches
+  /// once.
   double of_first_pass = 1;
 
   [[nodiscard]] double whole() const { return step + reading; }

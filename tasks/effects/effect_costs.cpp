@@ -83,8 +83,8 @@ StepperOptions uncut(const Model& model) {
   return options;
 }
 
-/// Steps that create energy are taken again (docs/solver.md), and those of another model, from
-/// states that are not its own, often do. So models are compared without that.
+/// Steps that create energy are repeated (docs/solver.md), which is frequent for a modified model
+/// at states of the original one. So models are compared without this check.
 Scene taken_once(Scene scene) {
   scene.solver.bounded_energy = false;
   return scene;
@@ -126,7 +126,7 @@ struct Measurement {
   }
 };
 
-/// What is on only over a run, and acts on whole runs. `cost`: of the effect, not measured yet.
+/// Measures sleep, which acts over whole runs. `cost`: of the effect, not measured yet.
 void measure_sleep(const Measurement& m, const EffectCostOptions& options, EffectCost& cost) {
   const SleepGain gain =
       measure_sleep_gain(m.model, options.environments, options.seed, kLeastRounds);

@@ -43,9 +43,9 @@ struct EffectCosts {
   std::int64_t planned_steps = -1;  ///< of the scene's controls; -1: they have no end
   bool uncut = false;               ///< the scene's accuracy cuts steps; whole ones were timed
   StepTimes times{};                ///< of the scene as it is
-  MeasuredShare itself{};           ///< the scene against itself: what chance alone shows
+  MeasuredShare itself{};           ///< the scene against itself: noise of the measurement
   std::vector<EffectCost> effects;  ///< parallel to Model::effects()
-  std::vector<RunCost> of_runs;     ///< what a run adds to steps
+  std::vector<RunCost> of_runs;     ///< cost of optional outputs
 };
 
 /// Whether the elements of a kind are timed one by one: up to 12 contacts or sensors, or up to 4 of

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the scene's <outputs> thin is weighed by how often it is taken.
+// Outputs that <outputs> thins are weighted by their frequency.
 #include "tasks/effects/run_costs.hpp"
 
 #include <fmt/format.h>
@@ -56,7 +56,7 @@ double lower_quartile_of(int rounds, const Work& work) {
   return *quarter;
 }
 
-/// The way back of one step of the first block, for one loss.
+/// Reverses one step of the first block, for one loss.
 class StepBack {
  public:
   StepBack(const Model& model, const StepperOptions& options)

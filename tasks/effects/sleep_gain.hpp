@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What sleep saves of a scene's steps. Single steps from recorded states cannot show it: bodies
+// Gain of sleep over a whole run. Single steps from recorded states cannot show it, because bodies
 // fall asleep along a run.
 #pragma once
 

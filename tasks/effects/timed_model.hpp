@@ -15,8 +15,8 @@ namespace tangere {
 /// One step of all environments from an instant.
 struct TimedStep {
   double seconds = 0;  ///< of one environment: CPU time of this thread
-  /// Evaluations of the residual: mean over the environments, and over groups of lanes, which go on
-  /// until their slowest lane is done.
+  /// Evaluations of the residual: mean over the environments, and over groups of lanes, which
+  /// iterate until their slowest lane converges.
   double passes = 0, group_passes = 0;
   int steps = 0, failures = 0;  ///< of environments; failures found no solution
 };
@@ -47,7 +47,7 @@ class TimedModel {
   }
   [[nodiscard]] const StepperOptions& options() const { return options_; }
   [[nodiscard]] std::int64_t run_steps() const { return recorded_.steps; }
-  /// What the last step, reading or show() left.
+  /// The batch after the last step, reading or show().
   [[nodiscard]] const Batch& batch() const { return batch_; }
 
   [[nodiscard]] int instants() const { return static_cast<int>(starts_.size()); }

@@ -14,8 +14,8 @@
 
 namespace tangere {
 
-/// What is stored with each episode: derivatives of a return or a loss, or derivatives of every
-/// row's state by the row before.
+/// Derivatives stored with each episode: of a return or a loss, or of every row's state by the row
+/// before.
 enum class GradientKind { none, returns, jacobians };
 const char* to_string(GradientKind kind);
 

@@ -65,7 +65,7 @@ class GradientChecker {
 
   /// Returns the function's value for each of `inputs`, all in one batch; NaN where a step finds no
   /// solution. Uses the scene `other`, or the unchanged scene if that is null. `varying`: values of
-  /// what the scene randomises, in its order. Adds the states of the runs to `trace`, if any.
+  /// <randomize>, in its order. Adds the states of the runs to `trace`, if any.
   [[nodiscard]] virtual std::vector<double> values(const Scene* other,
                                                    const std::vector<CheckInputs>& inputs,
                                                    const std::vector<double>& varying,

@@ -74,8 +74,8 @@ double numbers_of(const Model& model, const TapeOptions& o, double width) {
          double(point_count(model, o)) + 1;
 }
 
-/// Takes all blocks forward and back on all threads, `run` one of them with a worker of a thread;
-/// fills in what a summary counts. The same bits for any number of threads.
+/// Runs and reverses all blocks on all threads; `run` processes one block with a thread's worker.
+/// Fills the counts of the summary. The same bits for any number of threads.
 template <class Worker, class Run>
 void run_blocks(BlockThreads& threads, std::vector<Worker>& workers, int blocks,
                 const std::stop_token& stop, GradientCounts& out, const Run& run) {

@@ -256,7 +256,7 @@ void add_weakest(const Eigen::SelfAdjointEigenSolver<Matrix>& modes, std::vector
     if (std::abs(modes.eigenvectors()(k, 0)) > kShare) to.push_back(static_cast<int>(k));
 }
 
-/// Fills in what follows from the information F: how well the numbers are known.
+/// Computes deviations and correlations of the parameters from the information F.
 void judge_information(const Matrix& F, const Matrix& J, Identification& out) {
   const Eigen::Index n = F.cols();
   const Eigen::SelfAdjointEigenSolver<Matrix> modes(F);

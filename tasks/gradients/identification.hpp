@@ -87,9 +87,9 @@ struct Identification {
   std::vector<FitPoint> points;  ///< the start first
   bool converged = false;
   double noise = 0;  ///< standard deviation of a residual at the end [N]
-  /// Of the logarithms, from the inverse of the information. Where what is left is not noise, times
-  /// √(1 + residual.excess): as far as numbers are off if the part of the model's error that they
-  /// have taken up is as large as the part that is left. Infinite where nothing bounds it.
+  /// Standard deviations of the logarithms, from the inverse of the information. If the residual is
+  /// not noise, times √(1 + residual.excess), which assumes that the model error absorbed by the
+  /// parameters is as large as the remaining one. Infinite for unidentifiable parameters.
   std::vector<double> deviation;
   std::vector<double> information;  ///< (n, n) Fisher: JᵀJ / noise², J by logarithms
   std::vector<double> correlation;  ///< (n, n) of the estimates

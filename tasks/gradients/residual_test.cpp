@@ -28,7 +28,7 @@ double normalised_sum(const double* fitted, const double* recorded, int points, 
   return touched < kFewestPoints || squares == 0 ? std::nan("") : sum / std::sqrt(squares);
 }
 
-/// Squared norms of what is left, of the recorded fields, and the count of their numbers.
+/// Squared norms of the residual and of the recorded fields, and their count of numbers.
 struct Squares {
   double left = 0, recorded = 0, count = 0;
 };

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Whether what a fit leaves of recorded fields can be noise. A model that is wrong leaves forces
-// that neighbouring points and readings have in common.
+// Tests whether the residual of a fit to recorded fields is noise. Model errors leave residuals
+// that are correlated between neighbouring points and readings.
 #pragma once
 
 #include <string>
@@ -14,15 +14,15 @@ namespace tangere {
 /// of one reading: z = Σ r/√(Σ r²). Independent errors with symmetric distributions give z mean 0
 /// and mean square 1, whatever their sizes are.
 struct ResidualTest {
-  /// False: what is left is below kLeast of the recorded fields, which are not known better, or
-  /// there are too few sums.
+  /// False: the residual is below kLeast of the recorded fields, their assumed accuracy, or there
+  /// are too few sums.
   bool tested = false;
   double spread = 1;       ///< mean of z²
   double persistence = 0;  ///< mean of z times z of the next reading
   double mean = 0;         ///< of z, of that sensor and component in which it is largest
   std::string sensor;      ///< of that mean
-  /// Squared size of what the model misses, in variances of noise: Σ (z² - 1), at least 0; or what
-  /// the suspect's change makes, if it is larger.
+  /// Squared model error in variances of noise: Σ (z² - 1), at least 0; or that of the suspect's
+  /// change, if it is larger.
   double excess = 0;
   double score = 0;  ///< the largest of all, in standard deviations of independent noise
   /// Mean square of all residuals over the stated variance of the noise; 0 where none is stated.

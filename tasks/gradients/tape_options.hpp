@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What tapes of rollouts and episodes record, the derivatives that enter on the way back, and those
-// that leave.
+// Options of tapes of rollouts and episodes, input cotangents of the reverse pass, and gradients.
 #pragma once
 
 #include <cstdint>
@@ -30,12 +29,12 @@ struct TapeOptions {
   /// Also by tactile points' own numbers (engine/derivative/tactile_point_numbers.hpp); only losses
   /// of a scene have these derivatives.
   bool points = false;
-  /// Limit for the states on tapes [bytes]: of each thread, or of a TaskTape. What is longer is run
-  /// again from checkpoints, with the same bits.
+  /// Limit for the states on tapes [bytes]: of each thread, or of a TaskTape. Longer rollouts are
+  /// recomputed from checkpoints, with the same bits.
   double tape_bytes = 1e9;
 };
 
-/// Derivatives of a loss by what an action leads to; empty spans mean zeros.
+/// Cotangents of the results of an action; empty spans mean zeros.
 struct ActionCotangents {
   std::span<const double> observation = {};  ///< (E, observation)
   std::span<const double> reward = {};       ///< (E)

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // Each action has a tape of its own. With the state x and the task state m before the action, m⁺
 // the task state during it, and K steps with snapshots:
-//   r = judge(moments, m⁺, a);  o = observe(moments, m⁺, a)
-//   x_(k+1) = step(x_k, controls(x_0, m⁺, a));  x_0 = place(x, m⁺, a);  m⁺ = begin_action(x, m, a)
+//   r = evaluate(snapshots, m⁺, a);  o = observe(snapshots, m⁺, a)
+//   x_(k+1) = step(x_k, controls(x_0, m⁺, a))
+//   x_0 = restart_state(x, m⁺, a);  m⁺ = begin_action(x, m, a)
 #include "tasks/gradients/task_block.hpp"
 
 #include <fmt/format.h>
@@ -233,8 +234,8 @@ void TaskBlock::clear_moments() {
   for (MomentRows& m : moments_) clear({&m.q, &m.v, &m.end_effectors, &m.tactile});
 }
 
-/// Adds what a lane's observation and the state that it shows pass on. An observation that has no
-/// weight needs no derivative.
+/// Pulls cotangents of a lane's observation and state back and adds them. An observation with zero
+/// cotangent needs no derivative.
 void TaskBlock::reverse_shown(const TaskView& view, int lane, const ViewCotangent& to) {
   const std::span<const double> weight = part(shown_, lane);
   if (std::any_of(weight.begin(), weight.end(), [](double w) { return w != 0; }))
@@ -336,7 +337,7 @@ std::span<const SnapshotCotangent> TaskBlock::cotangents(int lane) {
   return to_moments_;
 }
 
-/// Makes the batch show the states in which the first actions began.
+/// Copies the states in which the first actions began into the batch.
 void TaskBlock::show_start() {
   const EnvironmentData& data = rollout_.data();
   const std::size_t nq = as_size(model_.nq()), nv = as_size(model_.nv());

@@ -38,8 +38,8 @@ class TaskBlock : public TapeBlock {
   /// Reverses action number `action` and fills derivatives by it, (lanes, action). All spans hold
   /// the block's lanes, in their order.
   void reverse(std::int64_t action, const ActionCotangents& by, std::span<double> by_action);
-  /// Ends the way back: takes derivatives by what the reset has shown, and fills those by the first
-  /// states and the scene's numbers. Skips empty spans.
+  /// Ends the reverse pass: takes cotangents of the results of the reset, and fills those of the
+  /// first states and the scene's parameters. Skips empty spans.
   void reverse_reset(const ActionCotangents& by, std::span<double> by_q, std::span<double> by_v,
                      std::span<double> by_parameter);
 
@@ -71,7 +71,7 @@ class TaskBlock : public TapeBlock {
   void reverse_start(const ActionRecord& r, std::int64_t action);
   void show_start();
   void finish_return(std::int64_t to, TaskGradients& out);
-  /// A lane's cotangents of all moments, until the next call.
+  /// A lane's cotangents of all snapshots, valid until the next call.
   [[nodiscard]] std::span<const SnapshotCotangent> cotangents(int lane);
 
   const Task& task_;
@@ -79,8 +79,8 @@ class TaskBlock : public TapeBlock {
   TaskRollout rollout_;
   std::vector<ActionRecord> records_;  // (actions)
   std::array<bool, kernels::kBlock> took_{};
-  std::array<ShearState, kernels::kBlock> start_memory_;  // what friction remembered at the reset
-  std::vector<MomentRows> opening_;  // what the task saw of an opening before its last moment
+  std::array<ShearState, kernels::kBlock> start_memory_;  // shear states at the reset
+  std::vector<MomentRows> opening_;  // snapshots of a warm-up before its last one
   // Cotangents for the action reversed last: of its snapshots, first state, controls, and itself.
   std::vector<MomentRows> moments_;
   std::vector<SnapshotCotangent> to_moments_;

@@ -40,7 +40,7 @@ class TaskRollout {
   void displace(int lane, std::span<const double> q, std::span<const double> v);
   /// Records snapshots of the present states of the batch, in which the first actions begin.
   void record_start();
-  /// What the task saw when it reset a lane, until the first action begins.
+  /// The view at the reset of a lane, valid until the first action begins.
   [[nodiscard]] TaskView start_view(int lane) const;
   /// Observes a lane's reset again.
   void observe_start(int lane);
@@ -63,7 +63,7 @@ class TaskRollout {
   /// The action's first state is entry 0 of `tape`.
   void recompute_controls(const ActionRecord& record, std::int64_t action, int step,
                           const BlockTape& tape);
-  /// Reads again what the task saw during the action on `tape`.
+  /// Recomputes the snapshots of the action on `tape`.
   void recompute_snapshots(const BlockTape& tape);
 
   [[nodiscard]] const Task& task() const { return task_; }

@@ -29,8 +29,7 @@ class TaskTangent {
   /// bounds.
   TaskTangent(TaskRollout& rollout, std::span<const double> actions, const StepperOptions& options);
 
-  /// Begins anew with changes of the state at the first action, (nv) each; an empty span means
-  /// none.
+  /// Restarts with tangents of the state at the first action, (nv) each; an empty span: zeros.
   void start(std::span<const double> q, std::span<const double> v);
   /// Returns the view at the reset, after start(), and its tangent; valid until the next call. Its
   /// one snapshot is the state at the first action. For a task that does not restart. `numbers`: as
@@ -41,7 +40,7 @@ class TaskTangent {
   /// parameters (rows as in BlockCotangent::parameters, or empty). Returns the tangent of its
   /// reward.
   double take(std::span<const double> change, std::span<const double> numbers);
-  /// How what the task saw in the action taken last changes, and the view itself.
+  /// Tangent of the view of the last action.
   [[nodiscard]] const ViewTangent& seen() const { return seen_; }
   [[nodiscard]] TaskView view() const;
 
@@ -71,7 +70,7 @@ class TaskTangent {
   StateTangent state_;
   ViewTangent seen_;
   std::vector<double> memory_,
-      action_;  // changes of the memory after begin_action and of the current action
+      action_;  // tangents of the task state after begin_action, and of the action
 };
 
 }  // namespace tangere

@@ -85,7 +85,7 @@ struct TaskTape::Impl {
     phase = then;
   }
 
-  /// Copies what a block shows to the arrays of all environments.
+  /// Copies results of a block to the arrays of all environments.
   void show(const TaskBlock& block, int b) {
     const EnvironmentData& data = block.rollout().data();
     const std::size_t first = as_size(b) * kBlock;

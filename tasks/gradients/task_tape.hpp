@@ -63,10 +63,10 @@ class TaskTape {
   [[nodiscard]] TaskView view(int environment) const;
 
   /// Reverses the last step that is not reversed yet; the first call begins at the last step.
-  /// Derivatives of a loss by what that step returned come in; an empty span means zeros.
-  /// ∂L/∂actions (E, action) goes out: all of it that passes through this step and later ones. It
-  /// is 0 for a component beyond its bounds and for an environment that did not take the action.
-  /// What an ended episode goes on showing counts for its last action. Throws InputError when every
+  /// In: cotangents of the results of that step; an empty span means zeros. Out: ∂L/∂actions (E,
+  /// action) through this step and later ones. It is 0 for a component beyond its bounds and for an
+  /// environment that did not take the action. Cotangents of the repeated last observation of an
+  /// ended episode count for its last action. Throws InputError when every
   /// step is reversed, and when a task has no Task::observe_vjp or restart_state_vjp that it would
   /// need; then only reset() is possible.
   void reverse(const ActionCotangents& by, std::span<double> by_action);
@@ -81,7 +81,7 @@ class TaskTape {
   /// Begins another reverse pass over the same steps, from the last one.
   void begin_reverse();
 
-  /// Simulation steps taken again from checkpoints since this object was made, counted by block.
+  /// Simulation steps recomputed from checkpoints since construction, counted by block.
   [[nodiscard]] std::int64_t recomputed_steps() const;
   /// Size of a TaskTape [bytes].
   static double bytes(const Task& task, int environments, const TapeOptions& options = {});

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a benchmark plays, how often, and which fields it reads.
+// Options of a benchmark: steps, repetitions and fields.
 #pragma once
 
 #include "engine/base/precision.hpp"

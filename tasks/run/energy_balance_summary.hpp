@@ -7,8 +7,8 @@ namespace tangere {
 /// Totals over all steps and environments of a run.
 struct EnergyBalanceSummary {
   double motors = 0, taken = 0, made = 0;  ///< sums over environments and steps [J]
-  /// The largest |sum of what the scheme made| of an environment, as a share of what it had: the
-  /// largest energy of motion and held, what motors did, or what was taken, whichever is most.
+  /// The largest |sum of integrator errors| of an environment, divided by the largest of: kinetic +
+  /// elastic energy, work of motors, dissipation.
   double worst_share = 0;
   int worst_environment = 0;
 };

@@ -32,7 +32,7 @@ struct EpisodeOptions {
   std::int64_t steps = 0;                 ///< of a scene's episode, a multiple of `every`
   int every = 1;  ///< K: steps for which a scene's action is held, and between observations
   std::uint64_t seed = 0;
-  /// What is read of a scene's tactile fields; none: the field of every sensor.
+  /// Tactile outputs of a scene; none: the field of every sensor.
   std::optional<std::vector<FieldOutput>> fields = {};
   RowOutput q = {}, v = {}, end_effectors = {};  ///< of a scene
   std::vector<BodyRows> bodies = {};             ///< of a scene, one observation each

@@ -54,8 +54,8 @@ void TaskProgram::start(Batch& batch, int block) {
   worker(block).conclude(batch, *data_, block, counts_);
 }
 
-/// One question about the environments that go on. Those that the random policy plays are not part
-/// of it.
+/// One call of the policy for all environments that have not ended, except those with the random
+/// policy.
 void TaskProgram::choose_together(const Batch& batch, int block) {
   const std::size_t width = task_.spec().action.size(), seen = task_.spec().observation_size();
   std::array<TaskView, kBlock> views;

@@ -18,8 +18,8 @@ namespace tangere {
 class TaskProgram;
 struct StepTally;
 
-/// Steps count from the start of the episodes, including their opening. Every step calls
-/// controls(), steps, and calls look(). After the last step of the opening and of each row, judge()
+/// Steps count from the start of the episodes, including their warm-up. Every step calls
+/// controls(), steps, and calls look(). After the last step of the warm-up and of each row, judge()
 /// follows. Different blocks of a batch may be in different threads, each with a program of its
 /// own.
 class EpisodeProgram {
@@ -113,7 +113,7 @@ class TaskProgram : public EpisodeProgram {
   const Task& task_;
   const Policy& policy_;
   std::shared_ptr<EnvironmentData> data_;
-  std::vector<BlockWorker> workers_;   // each holds what it last saw of its block
+  std::vector<BlockWorker> workers_;   // each with the last snapshots of its block
   std::vector<double> actions_;        // (E, action)
   std::vector<double> seen_, chosen_;  // (16, observation), (16, action) for one question
   AtEnd at_end_;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Sizes of rows follow from what is taken at them.
+// Computes sizes of rows from their contents.
 #include "tasks/run/episode_source.hpp"
 
 #include <fmt/format.h>

@@ -18,8 +18,8 @@ namespace tangere {
 inline constexpr std::size_t kMotion = 13;
 inline constexpr int kBlockEpisodes = 16;  // lanes of a block of a Batch: one stepper's work
 
-/// What is played: the program of a scene or a task, and what its rows hold. The objects that it
-/// was made from must outlive it.
+/// The program of a scene or a task, and the contents of its rows. The objects that it was made
+/// from must outlive it.
 struct EpisodeSource {
   const Model* model = nullptr;
   StepperOptions solver;

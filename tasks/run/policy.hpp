@@ -62,7 +62,7 @@ class Policy {
   /// Index in players() of the one that plays an episode. It depends on seed and episode alone.
   [[nodiscard]] int player(std::uint64_t seed, std::int64_t episode) const;
 
-  /// The next action of an environment that shows `view` and `observation`.
+  /// Computes the next action of an environment from `view` and `observation`.
   void act(const TaskView& view, std::span<const double> observation,
            std::span<double> action) const;
   /// The same for n environments, at most a block: (n, observation) in, (n, action) out.

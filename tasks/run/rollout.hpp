@@ -69,7 +69,7 @@ RolloutSummary run_rollout(Batch& batch, std::span<Stepper> steppers,
                            RowSink& sink, const ProgressCallback& progress = {},
                            const std::stop_token& stop = {});
 
-/// Returns what is read of tactile fields. Throws InputError as check_outputs() does.
+/// Returns the tactile outputs. Throws InputError like check_outputs().
 std::vector<FieldOutput> fields_of(const Model& model, const RolloutOutputs& outputs);
 /// Steps between the fields of a sensor under these options, where a reading has no times of its
 /// own.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What steps took, in the same numbers for rollouts, episodes, benchmarks, cases and tasks.
+// Counts of steps and evaluations, for rollouts, episodes, benchmarks, cases and tasks.
 #pragma once
 
 #include <cstdint>
@@ -48,7 +48,7 @@ struct StepCounts {
   }
 };
 
-/// What the environments of a task did, in actions and in steps.
+/// Counts of actions, steps and episodes of a task's environments.
 struct VectorCounts {
   std::int64_t environment_steps = 0;  ///< actions taken, without those of openings
   StepCounts steps;                    ///< of the simulation, without those that failed

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Counts what steps took and which environments failed in them, in one way for rollouts, episodes,
-// benchmarks and gradients.
+// Counts evaluations of steps and failed environments, for rollouts, episodes, benchmarks and
+// gradients.
 #pragma once
 
 #include <algorithm>

@@ -25,8 +25,8 @@ struct ByReference {
 template <class Function>
 ByReference(const Function*) -> ByReference<Function>;
 
-/// Orders what this thread did so far before what others do after tsan_acquire() of the same
-/// address.
+/// Release: everything before it in this thread happens before everything after tsan_acquire() of
+/// the same address in other threads.
 inline void tsan_release([[maybe_unused]] const void* address) {
 #if defined(__SANITIZE_THREAD__)
   __tsan_release(const_cast<void*>(address));

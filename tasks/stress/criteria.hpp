@@ -24,8 +24,8 @@ double momentum_change(const StressHistory& history);
 double largest_sink(const StressHistory& history);
 /// The largest distance of any body from its start [m].
 double largest_shift(const StressHistory& history);
-/// The largest distance of any body from where it was `start` [s] after the run began, at any later
-/// time [m]. Where a body sinks by more than `fall` [m], what was built fell: its sink.
+/// The largest displacement of any body from its position at time `start` [s], at any later time
+/// [m]. If a body sinks by more than `fall` [m], the sink.
 Criterion creep_after(double start, double fall);
 /// How far body `moving` gets below body `fixed` at any time [m]. Negative: never below.
 Criterion sinks_below(int moving, int fixed);

@@ -27,7 +27,7 @@ constexpr double kNoGain = 1 + 1e-9;  // of energy, for BDF1
 constexpr double kSlightGain = 1.01;  // for the other schemes
 constexpr double kRelaxation = 5e-3;  // kt over ks of a contact that is given ks [s]
 
-/// What the cases of a family share.
+/// Common properties of a family of cases.
 struct Family {
   std::string criterion;
   Criterion measure;
@@ -37,7 +37,7 @@ struct Family {
   Schemes schemes = all();
 };
 
-/// What a case has of its own.
+/// Properties of one case.
 struct Row {
   std::string name;
   std::string scene{};  ///< file below scenes/hard/ without ".xml"; "": the name

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The hard cases: which scene, how long, which schemes and steps, what is measured, and how much
-// of it is good.
+// Hard cases: scene, duration, schemes, step lengths, criterion and bound.
 #pragma once
 
 #include <span>

@@ -176,7 +176,7 @@ void judge(const BlockOutcome& out, StressRow& row) {
     row.reason = to_string(StepStatus::damped);
 }
 
-/// What a run of the same steps warns of; "" if of nothing.
+/// Warnings of a run with the same steps; "" if there are none.
 std::string warning_of(const Scene& scene, const StressRow& row) {
   if (row.accuracy > 0) return "";
   if (!row.of->measure) return costly_steps(row.integrator, row.counts);
@@ -186,7 +186,7 @@ std::string warning_of(const Scene& scene, const StressRow& row) {
   return "";
 }
 
-/// Fills in what a setting came to. False when it was stopped.
+/// Fills in the result of a setting. False if it was stopped.
 bool measure(const Scene& scene, int threads, const std::stop_token& stop, StressRow& row) {
   const Setting setting{row.integrator, row.step, row.accuracy};
   const auto out = play(varied(scene, row.of->variant), *row.of, setting, threads, stop);

@@ -14,7 +14,7 @@
 
 namespace tangere {
 
-/// What a setting of a case came to.
+/// Result of a setting of a case.
 enum class StressVerdict {
   holds,    ///< the criterion is met
   flagged,  ///< not met, and reported: by a status, a warning, or an error for the scene
@@ -52,7 +52,7 @@ struct StressReport {
   bool stopped = false;
 };
 
-/// A scene, and what was warned of when it was read.
+/// A scene, and the warnings of its reader.
 struct StressScene {
   Scene scene;
   std::vector<std::string> warnings{};

@@ -3,7 +3,7 @@
 // chosen (kernels/step/faces.hpp), and all points of the body are measured against their planes:
 //   d = max n·y - s_n over the chosen faces, where |y_k| ≤ s_k + overhang along all other axes,
 //       else no contact
-// so d goes on below the far side, and n does not turn on the edges of a face that is chosen alone.
+// so d continues below the far side, and n is constant over a face that is the only chosen one.
 // If no face is chosen, d is that to the nearest face, point by point, as in CuboidDistance.
 #pragma once
 

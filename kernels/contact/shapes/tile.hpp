@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A shape against the points of one tile of a pad: what the files of shapes need to compute their
-// brackets.
+// A shape against the points of one tile of a pad: common inputs of the shapes' brackets.
 #pragma once
 
 #include "kernels/contact/contact_types.hpp"
