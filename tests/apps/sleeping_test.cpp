@@ -80,8 +80,8 @@ TEST(Sleeping, TheSceneMayAskForIt) {
   }
   text.replace(text.find("2e-3"), 4, "1.5");
   const Outcome outcome = run(folder, {"inspect", folder.write("wrong.xml", text)});
-  EXPECT_THAT(outcome.err,
-              AllOf(HasSubstr("wrong.xml" + line), HasSubstr("sleep 1.5"), HasSubstr("below 1")));
+  EXPECT_THAT(outcome.err, AllOf(HasSubstr("wrong.xml" + line), HasSubstr("sleep=\"1.5\""),
+                                 HasSubstr("below 1")));
 }
 
 TEST(Sleeping, WhatDoesNotGoTogetherIsRefused) {
