@@ -31,8 +31,8 @@ struct Extent {
   std::int64_t episodes = 0, kept = 0;
 };
 
-/// What this process would make. Opens and creates nothing. A million shards take a second, so
-/// nothing is asked of each that is known of all.
+/// The shards and episodes that this process would write. Opens and creates nothing. A million
+/// shards take a second, so common properties are not recomputed for each.
 Extent extent_of(const GenerateOptions& options, const DatasetLayout& layout,
                  const DatasetOutput& output) {
   Extent extent;

@@ -36,7 +36,7 @@ struct Job {
 /// Returns what --gradients and its companions request. Throws InputError for options that do not
 /// go together.
 GradientKind gradients_wanted(const GenerateOptions& options, bool of_task);
-/// Memory for the tapes of one thread [bytes].
+/// Size of the tapes of one thread [bytes].
 double tape_bytes(const GenerateOptions& options, int threads);
 
 /// Which shards this process makes, and what happens to existing ones. Prints a note if the process

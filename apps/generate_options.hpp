@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a command line of `tangere generate` asks for.
+// Options of `tangere generate`.
 #pragma once
 
 #include <cstdint>

@@ -38,7 +38,7 @@ std::string limit_of(const EpisodeSummary& summary, const Job& job) {
   return simulation >= encoding ? "simulation" : preparation_of(job);
 }
 
-/// What is said of shards, of which others may replace some after merging.
+/// Shard summary. Other processes may replace shards after the merge.
 struct Shards {
   std::vector<std::string> paths;
   std::uintmax_t bytes = 0;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What `tangere generate` says of the shards that it made.
+// Output of `tangere generate` about its shards.
 #pragma once
 
 #include "apps/console.hpp"
@@ -8,11 +8,12 @@
 
 namespace tangere::apps {
 
-/// Merges a complete data set, says what was made and returns the exit code.
+/// Merges a complete data set, prints a summary and returns the exit code.
 int report_shards(const GenerateOptions& options, const Console& console, const Job& job,
                   const JobResult& done, DatasetWriter& output);
 
-/// Says that a signal stopped the run, and returns the exit code. `asked`: episodes.
+/// Prints that a signal stopped the run, and returns the exit code. `asked`: number of requested
+/// episodes.
 int report_stopped(const GenerateOptions& options, const Console& console, int signal,
                    std::int64_t episodes, std::int64_t asked, const DatasetWriter& output);
 

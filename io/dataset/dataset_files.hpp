@@ -45,7 +45,7 @@ struct DatasetReport {
 };
 DatasetReport examine_dataset(const DatasetFiles& dataset);
 
-/// What a file says of itself, without its numbers.
+/// Metadata of a file.
 struct DatasetSummary {
   std::int64_t demos = 0, failed = 0, rows = 0, successes = 0;
   bool has_success = false;

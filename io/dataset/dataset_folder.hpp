@@ -13,19 +13,19 @@
 
 namespace tangere {
 
-/// How long a process that shares a folder waits until another one has merged, and how long a
-/// process waits to be alone while others read it, or while a killed one ends.
+/// Timeouts: of a process that shares a folder, for the merge of another one; and of a process that
+/// needs exclusive access, for readers and for killed processes to end.
 struct FolderPatience {
   LockPatience to_share = LockPatience::seconds(10), to_be_alone = LockPatience::seconds(1);
 };
 
 class DatasetFolder {
  public:
-  /// Creates the folder if it is missing, and locks out other processes. With `shared` it locks out
-  /// only those that want the folder alone. Removes what a killed run or merge left unfinished,
-  /// except shards of others that share the folder. Throws IoError if the path is no folder, cannot
-  /// be written, is held by another process, or is not shared and has shards that it should not
-  /// have; InputError if a file that it is to replace is an input (io/files/input_files.hpp).
+  /// Creates the folder if it is missing, and locks it exclusively, with `shared` as a shared lock.
+  /// Removes incomplete files of a killed run or merge, except shards of others that share the
+  /// folder. Throws IoError if the path is no folder, cannot be written, is locked by another
+  /// process, or is not shared and has unexpected shards; InputError if a file to replace is an
+  /// input (io/files/input_files.hpp).
   DatasetFolder(std::string path, ExistingShards existing, bool shared = false,
                 FolderPatience patience = {});
   /// Removes the folder if it was created here and is empty.

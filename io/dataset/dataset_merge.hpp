@@ -14,7 +14,7 @@ namespace tangere {
 
 struct MergeOptions {
   bool copy = false;       ///< numbers too, not links to the shards
-  bool overwrite = false;  ///< replace what an earlier merge made
+  bool overwrite = false;  ///< replace the results of an earlier merge
   /// Asked between demos; true ends the merge, which then leaves nothing. Empty: never.
   std::function<bool()> stop = {};
 };
@@ -26,7 +26,7 @@ struct MergeResult {
   std::vector<std::string> minari_left_out;  ///< observations too large for Minari's metadata
   std::int64_t demos = 0, failed = 0, train = 0, valid = 0;
   std::optional<std::int64_t> successes;  ///< demos that solved their task; none for a scene alone
-  std::optional<std::int64_t> touching;   ///< demos that feel something; none: no touch is stored
+  std::optional<std::int64_t> touching;   ///< demos with contact; none: no touch is stored
   std::optional<EpisodeSteps> steps;      ///< of all episodes; none: an older version made a shard
   std::uint64_t bytes = 0;                ///< of the file
   bool stopped = false;                   ///< nothing was written, all else is empty

@@ -16,12 +16,12 @@
 
 namespace tangere {
 
-/// What the attributes of a demo's group say.
+/// Attributes of a demo's group.
 struct DemoFacts {
   std::int64_t rows = 0;                 ///< R
   std::optional<EpisodeEnd> end;         ///< of a task
   std::vector<double> randomized;        ///< as many as the layout has names
-  std::optional<std::int64_t> touching;  ///< rows of obs in which something is felt; none: untold
+  std::optional<std::int64_t> touching;  ///< rows of obs with contact; none: not stored
 };
 
 /// The same facts as attributes of the group. all() refers to the given facts and to this object.

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a learner is told besides numbers: the environment that a data set was played in, sizes to
-// divide observations by, what a robot could not measure, and what it feels. All of it is JSON
-// text, which robomimic and Minari store as it is.
+// Metadata for learners: the environment of a data set, scales of observations, and which of them
+// are privileged or touch. It is JSON text, which robomimic and Minari store unchanged.
 #pragma once
 
 #include <optional>
@@ -12,7 +11,7 @@
 
 namespace tangere {
 
-/// Returns the name under which Gymnasium knows a task: "box_pushing" → "tangere/BoxPushing-v0".
+/// Returns the Gymnasium name of a task: "box_pushing" → "tangere/BoxPushing-v0".
 std::string environment_id(const std::string& task);
 
 /// `env_args` of robomimic: {"env_name", "type", "env_kwargs", "env_version"}. For a scene alone

@@ -21,8 +21,8 @@ class PlacedFile {
   /// Writes what was added. Gaps of less than eight bytes become zeros.
   void flush();
 
-  /// Tells the library where the file ends and, unless `root` is h5::kNowhere, where its group "/"
-  /// is.
+  /// Sets the end of the file in the library and, unless `root` is h5::kNowhere, the address of its
+  /// group "/".
   void end_at(std::uint64_t end, std::uint64_t root = h5::kNowhere);
 
  private:

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Work on a piece of episodes that any thread can do before the single writing thread gets it:
-// checksums, compressed chunks, and the rows in which something is felt.
+// Work on a piece of episodes before the single writing thread: checksums, compressed chunks, and
+// rows with contact. Runs on any thread.
 #pragma once
 
 #include <array>
@@ -51,7 +51,7 @@ struct PreparedChunk {
 
 struct PreparedPiece {
   std::vector<ContentSum> sums;        ///< per episode
-  std::vector<std::int64_t> touching;  ///< per episode: rows of obs in which something is felt
+  std::vector<std::int64_t> touching;  ///< per episode: rows of obs with contact
   std::vector<PreparedChunk> chunks;
 };
 

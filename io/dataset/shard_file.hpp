@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // One HDF5 file of a data set. Its bytes do not depend on the order in which blocks finish. The
-// library writes what the file says of the data set; the thousands of demos are laid out here.
+// library writes the metadata; the bytes of the demos are laid out here.
 #pragma once
 
 #include <cstdint>
@@ -39,8 +39,8 @@ class ShardFile {
   void commit();
 
  private:
-  /// A chunk stays in memory until its block has a place. If memory is full, it goes to disk at
-  /// once.
+  /// A chunk stays in memory until the address of its block is known. If memory is full, it is
+  /// written at once.
   struct Chunk {
     h5::FileChunk place;
     std::vector<unsigned char> bytes;

@@ -32,16 +32,16 @@ using Dims = std::vector<hsize_t>;
 /// Creates a file, replacing what is at `path`. Readable by HDF5 1.8 and later; two runs that write
 /// the same numbers write the same bytes. Descriptions of objects are put together in blocks of
 /// `description_block` bytes: large ones suit files of many objects. With `views` the file may have
-/// virtual datasets, and reading it needs HDF5 1.10. `written` learns what is written; null:
-/// nobody.
+/// virtual datasets, and reading it needs HDF5 1.10. `written`: records checksums of all writes;
+/// may be null.
 Id create_file(const std::string& path, WrittenBytes* written = nullptr,
                hsize_t description_block = 2048, bool views = false);
 /// A file that is never on disk.
 Id create_memory_file();
 /// Opens a file for reading. Devices, pipes and folders are refused. Links and views may name files
 /// of the same folder only, and datasets with external raw storage cannot be opened. With `forget`
-/// the library does not keep descriptions of closed objects, because searching tens of thousands of
-/// them is slow.
+/// the library does not cache descriptions of closed objects, because searching tens of thousands
+/// of them is slow.
 Id open_file(const std::string& path, bool forget = false);
 /// Opens a file for reading and writing, as create_file left it.
 Id change_file(const std::string& path, WrittenBytes* written = nullptr);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The callbacks of a driver as the library wants them: C functions on a struct that begins with
-// its own. Features are those of the library's POSIX driver, so that files have the same bytes,
-// except the sieve, which keeps numbers back until nobody knows any more whose they are.
+// Callbacks of a file driver: C functions on a struct that begins with the library's own. Features
+// are those of the library's POSIX driver, so that files have the same bytes. The sieve buffer is
+// off: it delays writes, so errors could not be attributed.
 #include "io/hdf5/h5_driver.hpp"
 
 #include <fcntl.h>
@@ -155,8 +155,8 @@ herr_t handle(H5FD_t* file, hid_t, void** out) {
   return 0;
 }
 
-/// What lies beyond the end reads as zeros, as the library expects. A failed read is told to the
-/// library: unlike a failed write it leaves nothing half done.
+/// Bytes beyond the end read as zeros, as the library expects. A failed read is reported to the
+/// library: unlike a failed write it leaves no inconsistent state.
 herr_t read(H5FD_t* file, H5FD_mem_t, hid_t, haddr_t address, size_t size, void* buffer) {
   CheckedFile* f = ours(file);
   auto* to = static_cast<unsigned char*>(buffer);

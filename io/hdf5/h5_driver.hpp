@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// How the library reaches a file that is being written. Its own driver reports a failed write to
-// the library, which then can neither close the file nor forget it, and crashes on the second try.
-// This one keeps the first failure to itself, tells the library that all went well, and answers
-// when it is asked: a file is closed in the ordinary way, and then thrown away.
+// File driver of the library for files being written. With the library's own driver, a failed write
+// leaves a file that can neither be closed nor released, and a second attempt crashes. This driver
+// stores the first failure, reports success to the library, and returns the failure on request, so
+// the file is closed normally and then discarded.
 #pragma once
 
 #include <hdf5.h>
@@ -28,8 +28,8 @@ struct WriteFailure {
 /// compares what it reads with it; null: with nothing. Throws IoError when the library refuses it.
 void use_checked_driver(hid_t access, WrittenBytes* written);
 
-/// While this lives, numbers that are written are those of an object, or of one in a group: so they
-/// are called in messages.
+/// RAII label: names the dataset, or the group that contains it, in errors of writes made in this
+/// scope.
 class NumbersOf {
  public:
   explicit NumbersOf(hid_t object, const char* child = nullptr) noexcept;
@@ -44,7 +44,7 @@ int last_open_error() noexcept;
 /// The failures of an open file; null when another driver opened it.
 std::shared_ptr<const WriteFailure> write_failure(hid_t file);
 
-/// Whether any file of this process had a failure. Costs nothing to ask.
+/// Whether a write to any file of this process has failed. Reads one flag.
 bool any_write_failure() noexcept;
 
 }  // namespace tangere::h5

@@ -9,7 +9,7 @@
 
 namespace tangere::h5 {
 
-/// What the library's error stack says, innermost cause first; the operating system's words if any.
+/// Text of the library's error stack, innermost cause first; the operating system's message if any.
 std::string last_reason();
 /// Names of an object and of its file; "" where it has none.
 std::string object_name(hid_t object);

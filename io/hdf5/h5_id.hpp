@@ -26,14 +26,14 @@ class Id {
   [[nodiscard]] hid_t get() const { return id_; }
   /// Closes without a report. close_file reports what could not be written.
   void reset() noexcept;
-  /// Forgets an identifier that was closed elsewhere.
+  /// Releases an identifier that was closed elsewhere.
   void release() noexcept { id_ = -1; }
 
  private:
   hid_t id_ = -1;
 };
 
-/// While this object lives, the library does not print its errors.
+/// RAII: suppresses the library's error output.
 class Quiet {
  public:
   Quiet();

@@ -6,11 +6,11 @@
 
 namespace tangere::h5 {
 
-/// Lets the program read such chunks from now on. Thread-safe.
+/// Registers the filter that reads such chunks. Thread-safe.
 void allow_lz4();
 
-/// While this lives, chunks that this thread reads have to unpack to so many bytes; 0: to any
-/// number. The library takes a shorter chunk for a whole one and reads beyond its end.
+/// RAII: chunks that this thread reads must unpack to exactly this number of bytes; 0: any. The
+/// library does not check this and reads beyond the end of shorter chunks.
 class ExpectedChunk {
  public:
   explicit ExpectedChunk(std::uint64_t bytes);

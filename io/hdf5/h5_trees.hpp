@@ -41,8 +41,8 @@ using Spill = std::function<void(const Bytes&)>;
 
 /// Appends a group of any number of members, in any order. Returns the address of the group. Its
 /// count of links is 0 until it is linked; with `root` it is 1, for the group "/". With `spill`,
-/// bytes are handed on as they are made, except the last ones, which include the group itself. The
-/// bytes left in `out` follow those handed on.
+/// bytes are written as they are made, except the last ones, which include the group itself. The
+/// bytes left in `out` follow the written ones.
 std::uint64_t add_large_group(Bytes& out, std::uint64_t base, std::string_view prefix,
                               std::vector<FileMember> members, bool root = false,
                               const Spill& spill = {});

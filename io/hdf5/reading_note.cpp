@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// No allocation and nothing that takes long: objects of large files are noted one by one. The
-// memory begins with the file, and the object follows.
+// Does not allocate, and is fast: objects of large files are recorded one by one. The memory begins
+// with the file, and the object follows.
 #include "io/hdf5/reading_note.hpp"
 
 #include <algorithm>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which object of which file is being read, kept where another process can look it up after a
-// crash of the library; and an end to calls that never return.
+// Records the file and object being read in memory that another process can read after a crash of
+// the library, and ends calls that never return.
 #pragma once
 
 #include <sys/time.h>
@@ -11,11 +11,11 @@
 
 namespace tangere::h5 {
 
-/// From now on what is read is noted in this memory, which has to stay. Empty: nowhere.
+/// Sets the memory for the record, which must stay valid. Empty: no record.
 void note_reading_in(std::span<char> memory) noexcept;
 
-/// Notes the file that was opened last, and the group, dataset or attribute that was asked for
-/// last: "'<file>', object '<object>'", cut at the end of the memory, with a zero behind it.
+/// Records the file that was opened last, and the group, dataset or attribute that was requested
+/// last: "'<file>', object '<object>'", truncated to the memory and zero-terminated.
 void note_file(std::string_view path) noexcept;
 void note_object(std::string_view name) noexcept;
 
@@ -23,7 +23,7 @@ void note_object(std::string_view name) noexcept;
 void note_call_begins() noexcept;
 void note_call_ends() noexcept;
 
-/// While this lives, calls read or write numbers of datasets, which may take long.
+/// RAII: calls in this scope transfer the numbers of datasets, and have a longer time limit.
 class LongCall {
  public:
   LongCall() noexcept;
@@ -40,8 +40,8 @@ constexpr int kTicksOfNumbers = 5;
 /// files.
 void end_endless_calls(std::chrono::milliseconds computing) noexcept;
 
-/// While this lives, nothing is noted and no call is ended: the process computes in threads, whose
-/// time would count, and reads only what it wrote itself.
+/// RAII: suspends record and time limits in this scope, in which the process computes in threads,
+/// whose CPU time would count, and reads only its own files.
 class NotReading {
  public:
   NotReading() noexcept;
