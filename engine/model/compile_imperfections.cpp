@@ -9,6 +9,7 @@
 #include <cmath>
 
 #include "engine/model/lateral_spread.hpp"
+#include "engine/scene/imperfection_checks.hpp"
 
 namespace tangere {
 namespace {

@@ -58,7 +58,7 @@ const JointEffects& joint_effects_of_dof(const JointDescription& d, int k) {
   return d.turning && dof_turns(d.type, k) ? *d.turning : d;
 }
 
-/// How kernels keep an effect and know of it, in the order of effect_field().
+/// Flag and storage of an effect in kernels, in the order of effect_field().
 struct EffectOfDof {
   kernels::Parameter kernels::DofEffects::*number;
   kernels::JointEffect flag;

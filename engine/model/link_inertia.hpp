@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Mass and inertia of a body, and its contribution to its link.
+// Contribution of a body to the mass and inertia of its link.
 #pragma once
 
 #include "engine/model/compiled_model.hpp"
@@ -7,7 +7,7 @@
 
 namespace tangere {
 
-/// Returns what a body with these properties adds to its link.
+/// Returns the contribution of a body with these properties to its link.
 InertiaRows inertia_rows(const CompiledBody& body, const MassProperties& properties);
 /// Returns the derivative of that for a change `by` of the properties.
 InertiaRows inertia_slopes(const CompiledBody& body, const MassProperties& properties,

@@ -9,6 +9,7 @@
 #include <iterator>
 #include <type_traits>
 
+#include "engine/scene/imperfection_checks.hpp"
 #include "engine/scene/scene_number.hpp"
 #include "engine/scene/schema.hpp"
 
@@ -181,8 +182,8 @@ EffectInfo find_elements(const Scene& scene, int element) {
 
 // --- imperfections, markers and feedback of sensors ---
 
-/// `source_of` returns the line of a sensor that calls for the effect; none: it is without it.
-/// `text_of_one` says what a sensor has, `off` that it has nothing.
+/// `source_of` returns the line of a sensor that requests the effect; no value: it has none.
+/// `text_of_one` describes the effect of one sensor; `off` is the text without it.
 template <class SourceOf, class TextOf>
 EffectInfo find_in_sensors(const Scene& scene, int element, const SourceOf& source_of,
                            const TextOf& text_of_one, const char* off) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Table of the physical effects: for each, whether a scene has it on, the lines that request it,
-// and how to remove it. `inspect`, the measurement of costs and the tests iterate over this table.
+// Table of the physical effects: for each, whether a scene has it on and the lines that request it.
+// `inspect`, the measurement of costs and the tests iterate over this table;
+// tasks/effects/ablation.hpp makes the scene without an effect.
 #pragma once
 
 #include <cstdint>

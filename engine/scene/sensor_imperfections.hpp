@@ -12,10 +12,6 @@
 //       largest multiple of Q up to the saturation
 #pragma once
 
-#include <array>
-#include <span>
-#include <string>
-
 #include "engine/base/error.hpp"
 
 namespace tangere {
@@ -43,17 +39,5 @@ struct SensorImperfections {
   NormalAndShear quantisation;  ///< readings are multiples of it [N]; 0: not rounded
   Source source;
 };
-
-/// Whether any coefficient is not 0.
-bool is_imperfect(const SensorImperfections& imperfections);
-/// Whether a reading depends on earlier states.
-bool has_lag(const SensorImperfections& imperfections);
-/// Returns "noise 0.002 0.001 N, dead 0.01": nonzero coefficients, normal before shear if they
-/// differ.
-std::string text_of(const SensorImperfections& imperfections);
-/// Throws InputError (file:line) for a value that is negative, not finite or too large. `sensor`:
-/// its name. `grid`: whether its points have neighbours.
-void check_imperfections(const SensorImperfections& imperfections, const std::string& sensor,
-                         bool grid);
 
 }  // namespace tangere

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "engine/scene/field_form.hpp"
+#include "engine/scene/imperfection_checks.hpp"
 #include "engine/scene/sensed_bodies.hpp"
 #include "io/files/name_list.hpp"
 #include "io/files/nearest_name.hpp"

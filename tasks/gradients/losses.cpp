@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <numeric>
 
+#include "engine/scene/imperfection_checks.hpp"
 #include "engine/sense/marker_map.hpp"
 #include "engine/step/displacement.hpp"
 

@@ -454,7 +454,6 @@ std::string listed(const Names& rooms) {
 std::vector<Violation> check_circles(const Tree& tree) {
   // Of a listed pair, one is a part of the other in a file of its own.
   static const std::set<Names> allowed{
-      {"engine/scene/scene", "engine/scene/schema", "engine/scene/sensor_imperfections"},
       {"io/picture/scene_plot", "io/picture/projection"},
       {"io/robot/robot_import", "io/robot/robot_pads"},
       {"io/robot/robot_node", "io/robot/mjcf_include"},

@@ -2,7 +2,7 @@
 // Tests <imperfections> of a sensor: units, defaults, and errors with line and nearest name.
 #include <gmock/gmock.h>
 
-#include "engine/scene/sensor_imperfections.hpp"
+#include "engine/scene/imperfection_checks.hpp"
 #include "io/scene/scene_reader.hpp"
 #include "tests/io/scene/scene_text.hpp"
 

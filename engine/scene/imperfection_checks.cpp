@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Text and checks of a sensor's imperfections; the schema lists them.
-#include "engine/scene/sensor_imperfections.hpp"
+// Both numbers of a value are checked and printed, normal before shear.
+#include "engine/scene/imperfection_checks.hpp"
 
 #include <fmt/format.h>
 
