@@ -7,6 +7,7 @@
 #include <algorithm>
 
 #include "engine/base/error.hpp"
+#include "engine/scene/imperfection_checks.hpp"
 
 namespace tangere {
 namespace {

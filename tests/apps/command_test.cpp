@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests what every subcommand promises: help with an example that works, one JSON object, exit
-// codes that say whose mistake it is, messages that name the nearest word, and nothing half-written
-// left.
+// Tests of every subcommand: help with an example that works, one JSON object, exit codes by kind
+// of mistake, messages with the nearest word, no half-written files.
 #include <gmock/gmock.h>
 
 #include <iomanip>
