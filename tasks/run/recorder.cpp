@@ -9,6 +9,7 @@
 
 #include "engine/base/as_size.hpp"
 #include "engine/rows/sensor_layout.hpp"
+#include "engine/scene/scene_number.hpp"
 #include "engine/step/sleeping_trees.hpp"
 #include "kernels/numbers/block.hpp"
 #include "tasks/run/block_reader.hpp"
