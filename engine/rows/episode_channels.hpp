@@ -8,9 +8,9 @@
 #include <string>
 #include <vector>
 
-#include "engine/scene/field_form.hpp"
 #include "engine/rows/run_facts.hpp"
 #include "engine/rows/sensor_layout.hpp"
+#include "engine/scene/field_form.hpp"
 
 namespace tangere {
 

@@ -7,9 +7,9 @@
 #include <string>
 #include <vector>
 
-#include "engine/scene/field_form.hpp"
 #include "engine/model/model.hpp"
 #include "engine/rows/channel.hpp"
+#include "engine/scene/field_form.hpp"
 
 namespace tangere {
 

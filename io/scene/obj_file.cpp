@@ -17,7 +17,7 @@ using WordList = std::vector<std::string_view>;
 
 /// Names, normals, textures, groups, materials, levels of detail, curves, points and lines: nothing
 /// of the surface. The last row has words that no standard names and that programs write.
-const WordList kSkipped = {
+const WordList kSkippedWords = {
     "vt",       "vn",         "vp",        "o",      "g",      "s",      "mg",    "l",
     "p",        "usemtl",     "mtllib",    "usemap", "maplib", "lod",    "bevel", "c_interp",
     "d_interp", "shadow_obj", "trace_obj", "ctech",  "stech",  "cstype", "deg",   "bmat",
@@ -67,7 +67,7 @@ RawMesh read_obj(const std::string& path) {
           fmt::format("'{}', a free-form surface or another file; expected a surface of "
                       "vertices and faces",
                       words[0]));
-    } else if (!contains(kSkipped, words[0])) {
+    } else if (!contains(kSkippedWords, words[0])) {
       file.fail(fmt::format("'{}'; expected v, f or another element of an OBJ file",
                             words[0].substr(0, 40)));
     }

@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "engine/base/precision.hpp"
-#include "engine/scene/output_times.hpp"
 #include "engine/rows/episode_sink.hpp"
+#include "engine/scene/output_times.hpp"
 #include "tasks/run/step_counts.hpp"
 
 namespace tangere {

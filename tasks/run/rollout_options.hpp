@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "engine/base/precision.hpp"
-#include "engine/scene/field_form.hpp"
 #include "engine/model/model.hpp"
+#include "engine/scene/field_form.hpp"
 
 namespace tangere {
 
