@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The kinds of effects that a scene can call for (effects.hpp).
+// The kinds of effects (effects.hpp).
 #pragma once
 
 #include <cstdint>

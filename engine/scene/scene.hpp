@@ -106,7 +106,7 @@ struct MeshShape {
   /// Instead of `resolution`: how far the distance may be off on the surface, as MeshFit::error at
   /// the mesh's scale [m]; 0: `resolution` counts.
   double error = 0;
-  double scale = 1;  ///< of all lengths above; what is above is at scale 1
+  double scale = 1;  ///< of all lengths above, which are given at scale 1
 };
 /// A body given by its mass, inertia and contact points alone. It has no distance. Its centre of
 /// mass is the body frame's origin.
@@ -168,7 +168,7 @@ struct TactilePoint {
   std::array<double, kPointCoefficients> factors{1, 1, 1, 1};
 };
 
-/// Markers that are printed on a gel, one at every point: what a camera behind it sees
+/// Markers on a gel, one at every point, whose displacements a camera behind it measures
 /// (engine/sense/marker_map.hpp).
 struct MarkersDescription {
   double stiffness = 0;  ///< of the gel under a point against shear [N/m]; 0: the sensor's ks
@@ -185,12 +185,12 @@ struct TactileDescription {
   RectArray array;
   std::vector<TactilePoint> points;  ///< a curved pad, in field order; empty: `array` is used
   int every = 0;                     ///< read every k-th step; 0: not given, the caller chooses
-  /// Whether what its friction remembers advances at steps that are multiples of `every` alone,
-  /// which is given then, and not at every step.
+  /// Whether the shear state is updated only at steps that are multiples of `every`, which must
+  /// then be given, instead of every step.
   bool remembers_readings = false;
   std::optional<int> pressure_sign;  ///< +1 or -1; found from the geometry when not given
   Source source;
-  /// Bodies that it feels, or does not feel, by name (sensed_bodies.hpp); one of the two at most.
+  /// Names of bodies that it senses, or ignores (sensed_bodies.hpp); at most one list is given.
   std::vector<std::string> feels{}, ignores{};
   SensorImperfections imperfections{};          ///< of its readings; none to begin with
   std::optional<MarkersDescription> markers{};  ///< none: it has none
@@ -289,13 +289,13 @@ struct RandomizationDescription {
   Source source;
 };
 
-/// What runs of the scene compute and store (engine/scene/field_form.hpp).
+/// Outputs that runs of the scene compute and store (engine/scene/field_form.hpp).
 struct OutputsDescription {
   std::vector<std::string> record;  ///< names of outputs
   Source source;
 };
 
-/// SolverOptions::sleep where bodies shall sleep and nobody says how still they must be.
+/// Default of SolverOptions::sleep when sleep is enabled without a value.
 inline constexpr double kUsualSleep = 1e-3;
 
 struct SolverOptions {
@@ -305,7 +305,7 @@ struct SolverOptions {
   int max_iterations = 20;  ///< Newton passes before a step is split
   /// Relative accuracy of the parts into which a step is cut. None or 0: every step is one part.
   std::optional<double> accuracy{};
-  /// Steps that would create energy are taken again by BDF1 or in parts (docs/solver.md).
+  /// Steps that would create energy are repeated by BDF1 or in parts (docs/solver.md).
   bool bounded_energy = true;
   /// Share of its size that a body may move and still rest, until it sleeps (docs/sleeping.md). 0:
   /// none sleeps.
@@ -353,11 +353,11 @@ inline constexpr int kSizeIndices = 6;
 /// Whether contact points may touch the shape, and whether it has contact points itself.
 bool has_distance(const Shape& shape);
 bool has_contact_points(const Shape& shape);
-/// Whether the shape looks the same from every side. The ground then touches its lowest point.
+/// Whether the shape is invariant under rotations. The ground then touches its lowest point.
 bool is_ball(const Shape& shape);
 /// Whether a body of the first shape can touch one of the second: with its contact points, or a
-/// sphere with its surface. A mesh knows its distance only near its own surface, so it touches
-/// spheres and is not touched by them.
+/// sphere with its surface. A mesh has a distance only near its own surface, so it touches spheres
+/// and is not touched by them.
 bool can_touch(const Shape& general, const Shape& primitive);
 /// Whether xx xy xz yy yz zz can be the inertia of a body with volume: principal moments are
 /// positive, and none is as large as the sum of the other two.

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What is wrong with a scene, told from the scene alone. The reader asks for each element as it
-// appears, compile() for a whole scene, so that scenes that a program builds meet the same checks.
+// Validation of a scene. The reader checks each element as it appears, and compile() checks a whole
+// scene, so that scenes built by programs pass the same checks.
 #pragma once
 
 #include <string>
@@ -9,8 +9,8 @@
 
 namespace tangere {
 
-/// Return what is wrong with a part of a scene: what was found, and what was expected; "" if
-/// nothing is. Names that the scene does not have are not their concern.
+/// Return an error text for a part of a scene, with the value found and what was expected; "" if it
+/// is valid. Unknown names are not checked.
 std::string joint_fault(const JointDescription& joint);
 std::string body_fault(const BodyDescription& body);
 /// `motor` may be one of the scene's, or the one that follows them.

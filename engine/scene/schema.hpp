@@ -109,7 +109,7 @@ struct Attribute {
   }
   /// Whether elements of a type use it.
   [[nodiscard]] bool serves(std::string_view type) const;
-  /// Returns what is wrong with a value: `kn="-1"; expected zero or more`; "" if nothing is.
+  /// Returns an error text for a value: `kn="-1"; expected zero or more`; "" if it is valid.
   [[nodiscard]] std::string fault(double value) const;
 };
 
@@ -124,7 +124,7 @@ constexpr EffectKind pair_kind(EffectKind kind) {
   constexpr int kFirst = static_cast<int>(EffectKind::pair_contact), kParts = 4;
   return static_cast<EffectKind>(kFirst + (static_cast<int>(kind) - kFirst) % kParts);
 }
-/// Returns the coefficients of joints, contacts or sensors that call for an effect of theirs.
+/// Returns the coefficients of joints, contacts or sensors that enable an effect.
 std::vector<NumberField> coefficients_of(EffectKind kind);
 
 /// Calls f(row, member) for all attributes of an element whose values are members of T.
@@ -140,8 +140,8 @@ void for_each_member(Element element, const F& f) {
   }
 }
 
-/// Returns what is wrong with the values that T keeps of an element; "" if nothing is. A zero
-/// stands for a value that is not given where the element has no default.
+/// Returns an error text for the values of an element in T; "" if they are valid. For an attribute
+/// without default, zero means that it is not given.
 template <class T>
 std::string value_fault(Element element, const T& of) {
   std::string fault;

@@ -35,7 +35,7 @@ std::uint64_t scramble(std::uint64_t x) {
   return x ^ (x >> 31);
 }
 
-/// What decides in which masks a demo is.
+/// Properties by which a demo is assigned to masks.
 struct MaskedDemo {
   std::int64_t number = 0;
   std::optional<EpisodeEnd> end;  // of a task
@@ -81,7 +81,7 @@ class Merger {
     return result_;
   }
 
-  /// What ends a merge that was asked to stop.
+  /// Thrown to end a merge on request.
   struct Stopped {};
 
  private:
@@ -217,7 +217,7 @@ class Merger {
     result_.steps = steps_;
   }
 
-  /// Filter keys of robomimic: demos to train on and to validate, those that feel something, those
+  /// Filter keys of robomimic: demos to train on and to validate, those with contact, those
   /// that solved the task, and, if several policies played, the demos of each.
   void write_masks() {
     std::vector<std::pair<std::uint64_t, std::size_t>> order;

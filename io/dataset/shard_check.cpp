@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Reads a shard through a fresh handle and compares it with what the file says of itself.
+// Reads a shard through a fresh handle and compares its numbers with its metadata.
 #include "io/dataset/shard_check.hpp"
 
 #include <fmt/format.h>
@@ -142,7 +142,7 @@ class ShardChecker {
       fail(error.what());
     }
   }
-  /// Whether there are as many as the file says: a claim alone must not become a loop.
+  /// Whether there are as many as stored in the file; bounds the loops over them.
   [[nodiscard]] bool count_episodes(const h5::Id& data, const h5::Id& failed) {
     const auto demos = static_cast<std::int64_t>(h5::link_count(data));
     const auto lost = static_cast<std::int64_t>(h5::link_count(failed));

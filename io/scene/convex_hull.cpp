@@ -36,7 +36,7 @@ double square(const GridPlace& a) {
 struct HullFace {
   std::array<int, 3> corners;
   std::array<int, 3> beyond;  ///< the face across the edge from corner k to the next
-  std::vector<int> outside;   ///< points that this face sees, each kept by one face
+  std::vector<int> outside;   ///< points above this face, each assigned to one face
   bool gone = false;
 };
 
@@ -91,7 +91,7 @@ class HullBuilder {
   [[nodiscard]] const GridPlace& at(int point) const { return places_[std::size_t(point)]; }
   [[nodiscard]] HullFace& face(int f) { return faces_[std::size_t(f)]; }
 
-  /// Six times the volume between a face and a point: above 0 if the face sees the point.
+  /// Six times the signed volume between a face and a point: above 0 if the point is outside.
   [[nodiscard]] Whole height(const HullFace& f, int point) const {
     const GridPlace& a = at(f.corners[0]);
     return product(normal_of(difference(at(f.corners[1]), a), difference(at(f.corners[2]), a)),
@@ -133,7 +133,7 @@ class HullBuilder {
     return true;
   }
 
-  /// Gives each point to a face, of those from `first` on, that sees it. Others are inside.
+  /// Assigns each point to a face, of those from `first` on, that it is above. Others are inside.
   void share(const std::vector<int>& points, std::size_t first) {
     for (const int p : points)
       for (std::size_t f = first; f < faces_.size(); ++f)
@@ -143,7 +143,7 @@ class HullBuilder {
         }
   }
 
-  /// Replaces all faces that see the farthest point of face `f` by a cone to it.
+  /// Replaces all faces below the farthest point of face `f` by a cone to it.
   void grow(int f) {
     const std::vector<int>& outside = face(f).outside;
     const int apex = *std::max_element(outside.begin(), outside.end(), [&](int p, int q) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The smallest convex surface around points: what stands for a mesh whose own surface is open.
+// Convex hull of points, which replaces the surface of an open mesh.
 #pragma once
 
 #include <vector>

@@ -8,10 +8,10 @@
 
 namespace tangere {
 
-/// Takes away walls inside of a closed surface: what two triangles have in common that face each
-/// other in one place, as where blocks lie flush on each other. It encloses nothing, but the
-/// distance to it would be zero. What is left of such triangles is cut anew, and the surface stays
-/// closed. Returns "", or which walls are left: their share of the area, and a place.
+/// Removes walls inside of a closed surface: overlaps of two coincident triangles with opposite
+/// normals, as between blocks that lie flush on each other. They enclose nothing, but the distance
+/// to them would be zero. The rest of such triangles is cut, and the surface stays closed. Returns
+/// "", or a text about remaining walls: their share of the area, and a position.
 std::string remove_walls(MeshShape& mesh);
 
 }  // namespace tangere

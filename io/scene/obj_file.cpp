@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// An OBJ file has one element a line. Its first word says which.
+// An OBJ file has one element a line, whose kind is its first word.
 #include "io/scene/obj_file.hpp"
 
 #include <fmt/format.h>

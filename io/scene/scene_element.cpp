@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Values are checked in the unit of the file, so that messages show what it says.
+// Values are checked in the unit of the file, so that messages show its numbers.
 #include "io/scene/scene_element.hpp"
 
 #include <algorithm>

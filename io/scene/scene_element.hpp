@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// An element of a scene file, read as the schema says: which attributes it may have, their
-// defaults, bounds and units.
+// An element of a scene file, read by the schema: allowed attributes, defaults, bounds and units.
 #pragma once
 
 #include "engine/scene/schema.hpp"

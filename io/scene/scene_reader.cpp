@@ -206,7 +206,7 @@ void read_root(const SceneNode& root, Scene& scene) {
     for (const SceneNode& s : sections)
       if (s.name() == name) read(s);
   };
-  // What the user's file says itself takes the place of what files that it includes say.
+  // Elements of the user's file replace those of included files.
   const auto once = [&](const char* name, auto&& read) {
     const auto own = [&](const SceneNode& s) { return &s.context() == &root.context(); };
     const bool by_itself = std::any_of(sections.begin(), sections.end(), [&](const SceneNode& s) {

@@ -26,8 +26,8 @@ struct SceneFile {
 /// impossible.
 SceneFile read_scene(const std::filesystem::path& path, const SceneReadOptions& options = {});
 
-/// Does the same for text in memory. `name` stands for the file in messages, and csv files are
-/// looked for beside it.
+/// The same for text in memory. `name` stands for the file in messages, and csv files are searched
+/// beside it.
 SceneFile parse_scene(const std::string& text, const std::string& name,
                       const SceneReadOptions& options = {});
 

@@ -124,7 +124,7 @@ void read_parts(const SceneNode& node, TactileDescription& sensor) {
   }
 }
 
-/// Lets the points of a sensor touch what they feel: a pair with every body that it feels.
+/// Adds contacts of the points of a sensor: a pair with every sensed body.
 void add_feedback(Scene& scene, const SceneNode& node, const TactileDescription& d) {
   if (d.coefficients.ks != 0)
     node.fail(

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Computes a checksum of what a scene takes from other files (meshes, lists of points, tables). It
-// depends on their content, because names can stay while files change.
+// Computes a checksum of the contents of a scene's other files (meshes, lists of points, tables).
 #pragma once
 
 #include <string>

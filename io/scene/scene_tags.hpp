@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What is checked of a scene's text before it is parsed as XML.
+// Checks of a scene's text before it is parsed as XML.
 #pragma once
 
 #include <string>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Warns of sensors that read zero for ever, or forces that nothing exerts, and of those that do not
-// feel what touches their body.
+// Warns of sensors whose readings are always zero, or are forces without contact, and of those that
+// do not sense what touches their body.
 #include "io/scene/scene_warnings.hpp"
 
 #include <fmt/format.h>
@@ -66,14 +66,14 @@ class SensorWarnings {
     return -1;
   }
 
-  /// Whether a body could be felt. Where it is not, the sensor's lists say so.
+  /// Whether a body could be sensed. If it is not, the sensor's lists exclude it.
   [[nodiscard]] bool has_a_distance(const std::string& body) const {
     const auto link =
         std::ranges::find_if(scene_.links, [&](const auto& l) { return l.body.name == body; });
     return link != scene_.links.end() && has_distance(link->body.shape);
   }
 
-  /// The body that a contact lets touch the sensor's; "" for none.
+  /// The other body of a contact with the sensor's; "" for none.
   [[nodiscard]] std::string other_of(const PairContactDescription& c) const {
     const bool first = group_of(c.general_body) == own_,
                second = group_of(c.primitive_body) == own_;
@@ -105,8 +105,8 @@ class SensorWarnings {
                     listed(unfelt), unfelt.size() == 1 ? "it has" : "they have"));
   }
 
-  /// Bodies stop at the surface of the sensor's own body, so points well below it feel nothing, and
-  /// points far above it feel what nothing stops.
+  /// Bodies stop at the surface of the sensor's own body, so points well below it read zero, and
+  /// points far above it read forces without contact.
   void warn_of_place() {
     const auto link = std::find_if(scene_.links.begin(), scene_.links.end(),
                                    [&](const auto& l) { return l.body.name == sensor_.body; });
@@ -135,7 +135,7 @@ class SensorWarnings {
                       least, wide));
   }
 
-  /// Of an array its corners, which say where all points are at most, and what is between them.
+  /// For an array its corners, which bound all points, and some between them.
   [[nodiscard]] std::vector<TactilePoint> some_points() const {
     if (!sensor_.points.empty()) return sensor_.points;
     TactileDescription coarse = sensor_;
@@ -154,7 +154,7 @@ class SensorWarnings {
   const TactileDescription& sensor_;
   const SceneNode& root_;
   int own_;
-  std::set<int> felt_;  // groups of bodies that it feels
+  std::set<int> felt_;  // groups of sensed bodies
 };
 
 }  // namespace

@@ -21,7 +21,7 @@
 namespace tangere {
 namespace {
 
-/// Reads a file of the format that its name says: .stl, .ply, or an OBJ file.
+/// Reads a file of the format of its extension: .stl, .ply, else OBJ.
 RawMesh read_triangles(const std::string& path) {
   std::string end = std::filesystem::path(path).extension().string();
   for (char& c : end) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));

@@ -10,7 +10,7 @@
 
 namespace tangere {
 
-/// What a surface file has.
+/// Contents of a surface file.
 struct FileSurface {
   MeshShape faces;             ///< cut into triangles, equal corners welded; closed or open
   std::vector<double> points;  ///< (n, 3) all positions, of faces or not
@@ -19,9 +19,9 @@ struct FileSurface {
 };
 
 /// Reads an OBJ file, or an STL or PLY file where the path ends in .stl or .ply, in its own unit.
-/// Corners that differ by rounding become one where the surface would be open, and walls inside
-/// where parts lie flush on each other are taken away. Throws IoError if the file cannot be read,
-/// InputError with file:line if it is not of its format or has no vertices.
+/// Vertices that differ by rounding are merged if the surface would otherwise be open, and inner
+/// walls of flush parts are removed. Throws IoError if the file cannot be read, InputError with
+/// file:line if it is not of its format or has no vertices.
 FileSurface read_faces(const std::string& path);
 
 /// Does the same with triangles that are read already. `name` stands in front of the fault.

@@ -125,7 +125,7 @@ std::vector<TactilePoint> mesh_points(const MeshShape& mesh, double pitch, std::
   for (const std::array<int, 3>& t : mesh.triangles) {
     const Vector3 a = vertex(t[0]), ab = vertex(t[1]) - a, ac = vertex(t[2]) - a, bc = ac - ab;
     const Vector3 area = cross(ab, ac);
-    if (!(dot(area, area) > 0)) continue;  // a point without area feels nothing
+    if (!(dot(area, area) > 0)) continue;  // a point without area has no force
     const double longest = std::sqrt(std::max({dot(ab, ab), dot(ac, ac), dot(bc, bc)})),
                  cuts = std::ceil(longest / pitch);
     if (cuts * cuts + double(points.size()) > double(most)) return {};

@@ -14,7 +14,7 @@ namespace tangere {
 /// normals point outward. No image.
 std::vector<TactilePoint> hemisphere_points(double radius, int count);
 
-/// Gives each point of a hemisphere a pixel of its own. Equal areas of the hemisphere are equal
+/// Assigns a pixel to each point of a hemisphere. Equal areas of the hemisphere are equal
 /// areas of the image, and the pole is its middle. x increases down the rows, y along the columns.
 /// A point whose pixel is taken gets the nearest free pixel. rows × cols must be at least the
 /// number of points.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Skins that are far from as stiff as what touches.
+// Sensors whose stiffness per area differs by orders from that of the contacts.
 #pragma once
 
 #include "engine/scene/scene.hpp"

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The parser's own messages name neither what was found nor what was expected, so they are said
-// anew.
+// The parser's messages contain neither what was found nor what was expected, so they are replaced.
 #include "io/scene/xml_document.hpp"
 
 #include <fmt/format.h>

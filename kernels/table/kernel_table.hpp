@@ -70,14 +70,14 @@ struct StageKernels {
   void (*pull_back_poses)(const ModelView&, const Stage<L>&, const Row<L>* q, const Row<L>* v,
                           const Row<L>* zero, std::byte* scratch, MotionCotangent<Row<L>>* links,
                           Row<L>* q_bar, Row<L>* v_bar);
-  /// Computes the touched shape in body 1 and the twist W of each contact that remembers,
+  /// Computes the touched shape in body 1 and the twist W of each contact with shear springs,
   /// (n_shear_springs), from poses and twists of the links.
   void (*touches_at)(const ModelView&, const LinkPose<Row<L>>* links, LinkPose<Row<L>>* out);
-  /// Computes Stage::ground_anchors from what is remembered (body 1's axes, or null) and from the
-  /// touches where a solve begins.
+  /// Computes Stage::ground_anchors from elastic displacements (body 1's axes, or null) and from
+  /// the touches where a solve begins.
   void (*recall_ground)(const ModelView&, const Stage<L>&, const LinkPose<Row<L>>* touches,
                         const Row<L>* s);
-  /// Computes what is remembered where a solve ends, (points, 4): s', then 1 at points that touch,
+  /// Computes the shear state at the end of a solve, (points, 4): s', then 1 at points that touch,
   /// else 0. s' is only set where a point touches.
   void (*advance_ground)(const ModelView&, const Stage<L>&, const LinkPose<Row<L>>* touches,
                          Row<L>* kept);
@@ -112,9 +112,9 @@ struct KernelTable {
   void (*pull_back_field)(const TactilePullback&);
   /// Computes how a field changes with motion.
   void (*field_tangent)(const TactileTangent&);
-  /// Turns what friction remembers, in rows 3 to 5 of the anchors, into anchors.
+  /// Converts elastic displacements, in rows 3 to 5 of the anchors, to anchors.
   void (*recall)(const ShearSpringTouch&, const ShearSpringPoints&);
-  /// Computes what is remembered at the end of a step, (4, stride): s in body 1's axes, then 1 at
+  /// Computes the shear state at the end of a step, (4, stride): s in body 1's axes, then 1 at
   /// points that touch, else 0; and the forces there, (3, stride), or null.
   void (*advance)(const ShearSpringTouch& end, const ShearSpringPoints&, double* s, double* force);
   /// Reverses both.

@@ -143,7 +143,7 @@ Fields zeros_of(EffectKind kind, Ablation way) {
     for (int k = 0; k < kCoefficients; ++k) fields.push_back(coefficient_field(k));
   } else if (kind == Kind::pair_friction || kind == Kind::ground_friction ||
              kind == Kind::tactile_shear) {
-    fields.push_back(Field::ks);  // what friction remembers goes with it
+    fields.push_back(Field::ks);  // the shear springs go with it
     if (way != Ablation::removed) std::erase(fields, Field::mu);
   }
   return fields;
