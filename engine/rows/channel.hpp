@@ -19,13 +19,13 @@ using Numbers =
 enum class NumberType { float64, float32, int64, int32, int8 };
 
 /// A named fact about a run, a group of channels or a channel.
-struct Attribute {
+struct RunAttribute {
   std::string name;
   std::variant<std::string, std::vector<std::string>, std::int64_t, std::uint64_t, double,
                std::vector<double>, std::vector<std::int64_t>, std::vector<std::int8_t>>
       value;
 };
-using Attributes = std::vector<Attribute>;
+using Attributes = std::vector<RunAttribute>;
 
 /// Numbers that a run stores row by row.
 struct Channel {

@@ -102,7 +102,7 @@ std::size_t bytes_of(NumberType type) {
 }
 
 void write_attributes(const Id& object, const Attributes& attributes) {
-  for (const Attribute& attribute : attributes)
+  for (const RunAttribute& attribute : attributes)
     std::visit([&](const auto& value) { write_value(object, attribute.name, value); },
                attribute.value);
 }

@@ -352,7 +352,7 @@ void Recorder::add_readings() {
     Channel channel{.name = group + dataset_of(output.form), .shape = {environments_}};
     for (const std::uint64_t n : reading_shape(layout, output.form)) channel.shape.push_back(n);
     channel.more = {{"every", times.final ? options_.first_step + options_.steps : times.every}};
-    for (Attribute& one : reading_attributes(layout, output.form))
+    for (RunAttribute& one : reading_attributes(layout, output.form))
       channel.more.push_back(std::move(one));
     if (output.form != FieldForm::sum) channel.storage = Channel::Storage::by_environment;
     const Source source{When::row, times, false, 1, [this, output](auto, int) {
