@@ -113,7 +113,7 @@ int report_shards(const GenerateOptions& options, const Console& console, const 
               {"bytes", shards.bytes},
               {"kept", output.kept()},
               {"kept_failed", output.kept_failed()},
-              {"kept_passed_steps", output.kept_steps().tunnelled},
+              {"kept_tunnelled_steps", output.kept_steps().tunnelled},
               {"kept_overlapping_steps", output.kept_steps().overlapping},
               {"episodes", summary.episodes},
               {"rows", summary.rows},

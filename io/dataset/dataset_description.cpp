@@ -192,7 +192,7 @@ std::uint64_t hash_group(std::uint64_t hash, const h5::Id& group, const std::str
   return hash;
 }
 
-constexpr const char *kTaken = "simulation_steps", *kPassed = "tunnelled_steps",
+constexpr const char *kTaken = "simulation_steps", *kTunnelled = "tunnelled_steps",
                      *kOverlapping = "overlapping_steps";
 
 /// A count that a file may claim: sums over as many shards as there may be do not overflow.
@@ -309,7 +309,7 @@ std::vector<GradientSaid> gradients_said(const h5::Id& scene) {
 
 void write_steps(const h5::Id& file, const EpisodeSteps& steps) {
   h5::write_scalar<std::int64_t>(file, kTaken, steps.taken);
-  h5::write_scalar<std::int64_t>(file, kPassed, steps.tunnelled);
+  h5::write_scalar<std::int64_t>(file, kTunnelled, steps.tunnelled);
   h5::write_scalar<std::int64_t>(file, kOverlapping, steps.overlapping);
 }
 
@@ -318,7 +318,9 @@ std::optional<EpisodeSteps> steps_said(const h5::Id& file) {
   EpisodeSteps steps;
   steps.taken =
       step_count_said(file, kTaken, std::numeric_limits<std::int64_t>::max() / kMostShards);
-  steps.tunnelled = step_count_said(file, kPassed, steps.taken);
+  // Shards of earlier programs have another name for it.
+  const char* const tunnelled = H5Aexists(file.get(), kTunnelled) > 0 ? kTunnelled : "passed_steps";
+  steps.tunnelled = step_count_said(file, tunnelled, steps.taken);
   steps.overlapping = step_count_said(file, kOverlapping, steps.taken - steps.tunnelled);
   return steps;
 }

@@ -182,7 +182,7 @@ TEST(GenerateShards, KeptShardsWhoseContactsMissedEndWithTheSameCode) {
     const json answer = answer_of(outcome);
     EXPECT_EQ(answer.at("overlapping_steps"), made);
     EXPECT_EQ(answer.at("kept_overlapping_steps"), kept);
-    EXPECT_EQ(answer.at("kept_passed_steps"), 0);
+    EXPECT_EQ(answer.at("kept_tunnelled_steps"), 0);
   };
   expect(run(folder, words), 128, 0);
   const auto whole = bytes(folder, "set");
