@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 # Copies the public headers: ${source}/apps/tangere.hpp and all that it includes. In the copies
 # "engine/…" is <tangere/engine/…>, so users have one folder of ours on their include path.
+cmake_policy(VERSION 3.25)
 set(folder "$ENV{DESTDIR}${CMAKE_INSTALL_PREFIX}/${destination}")
 file(REMOVE_RECURSE "${folder}")
 set(waiting apps/tangere.hpp)

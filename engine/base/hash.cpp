@@ -2,6 +2,7 @@
 // xxHash is compiled in as a header.
 #include "engine/base/hash.hpp"
 
+#define XXH_INLINE_ALL
 #include <xxhash.h>
 
 namespace tangere {

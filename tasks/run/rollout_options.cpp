@@ -10,7 +10,7 @@
 namespace tangere {
 namespace {
 
-constexpr int kMotionWidth = 13, kPositionWidth = 3;
+constexpr int kMotionWidth = 13, kEndEffectorWidth = 3;
 
 /// Numbers of one environment in the largest reading.
 std::size_t largest_reading(const Model& model, const RolloutOutputs& outputs) {
@@ -56,7 +56,7 @@ double rollout_bytes(const Model& model, int environments, const RolloutOutputs&
       model.nq() + model.nv() + model.nu() +
       double{kMotionWidth} * static_cast<double>(bodies_in(model, outputs)) +
       static_cast<double>((outputs.end_effectors ? model.end_effectors().size() : 0) *
-                              kPositionWidth +
+                              kEndEffectorWidth +
                           largest_reading(model, outputs));
   constexpr double kFlags = sizeof(std::int32_t) + sizeof(std::int8_t);
   return environments * (numbers * sizeof(double) + kFlags) +
