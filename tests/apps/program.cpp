@@ -127,7 +127,8 @@ const std::string& page_of(const std::string& subcommand) {
         throw std::runtime_error("docs/command.md has no section '" + title + "'");
       return page.substr(from, page.find("\n## ", from + 1) - from);
     };
-    pages[subcommand] = section("What all subcommands share") + section(subcommand);
+    pages[subcommand] = section("What all subcommands share");
+    if (!subcommand.empty()) pages[subcommand] += section(subcommand);
   }
   return pages[subcommand];
 }
@@ -149,7 +150,9 @@ static std::vector<std::string> undocumented_keys(const nlohmann::json& object,
 }
 
 std::vector<std::string> undocumented_keys(const nlohmann::json& answer) {
-  return undocumented_keys(answer, page_of(answer.at("command")));
+  // Nothing is known of the subcommand where a program's options are wrong.
+  const nlohmann::json& command = answer.at("command");
+  return undocumented_keys(answer, page_of(command.is_null() ? "" : command.get<std::string>()));
 }
 
 nlohmann::json run_json(const Folder& folder, const Words& words, int exit_code) {

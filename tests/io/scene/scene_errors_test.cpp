@@ -201,7 +201,7 @@ INSTANTIATE_TEST_SUITE_P(
             ":21: ",
             {"'pad' is a plane", "no contact points"}},
         Bad{"primitive_body=\"ball\"", "primitive_body=\"pad\"", ":21: ", {"against itself"}},
-        Bad{"type=\"rect_array\"", "type=\"hemisphere\"", ":24: ", {"radius"}},
+        Bad{"type=\"rect_array\"", "type=\"hemisphere\"", ":24: ", {"'count' is missing"}},
         Bad{"type=\"rect_array\"",
             "type=\"hemisphere\" radius=\"0\" count=\"9\"",
             ":24: ",

@@ -464,7 +464,7 @@ TEST_F(SurfaceFiles, ScenesSayWhatIsWrongWithTheirBodies) {
   EXPECT_THAT(scene_error(R"(<body name="a" type="abstract" mass="1" inertia="1 1"/>)"),
               HasSubstr("inertia has 2 numbers; expected 3"));
   EXPECT_THAT(scene_error(R"(<body name="a" type="abstract" mass="1" inertia="1 1 3"/>)"),
-              HasSubstr("and inertia=\"1 0 0 1 0 3\"; expected positive moments"));
+              HasSubstr("mass 0.001 and inertia=\"1e-07 0 0 1e-07 0 3e-07\"; expected positive"));
   EXPECT_THAT(scene_error(R"(<body name="a" type="abstract" mass="1" inertia="1 2 0 1 0 1"/>)"),
               HasSubstr("no solid body"));
 }
