@@ -54,9 +54,9 @@ const Words kCompiler = {{"angle"},
                          {"convexhull", Fate::idle, "meshes are not replaced by hulls"},
                          {"exactmeshinertia", Fate::idle, "masses of meshes are volume integrals"},
                          {"fitaabb", Fate::idle, "no primitive is fitted to a mesh"},
-                         {"usethread", Fate::idle, kSolver},
-                         {"saveinertial", Fate::idle, kSolver},
-                         {"conflict", Fate::idle, kSolver}};
+                         {"usethread", Fate::idle, kSolverSetting},
+                         {"saveinertial", Fate::idle, kSolverSetting},
+                         {"conflict", Fate::idle, kSolverSetting}};
 
 Words solver_words() {
   Words words = {{"timestep"},
@@ -74,13 +74,13 @@ Words solver_words() {
         "iterations",     "ls_iterations",  "noslip_iterations", "ccd_iterations",
         "sdf_iterations", "sdf_initpoints", "apirate",           "sleep_tolerance",
         "mpr_tolerance",  "mpr_iterations"})
-    words.push_back({name, Fate::idle, kSolver});
+    words.push_back({name, Fate::idle, kSolverSetting});
   return words;
 }
 
 void read_compiler(MjcfFile& file, const RobotNode& node) {
   node.check(kCompiler);
-  static_cast<void>(node.parts({{"lengthrange", Fate::idle, kSolver}}));
+  static_cast<void>(node.parts({{"lengthrange", Fate::idle, kSolverSetting}}));
   if (node.has("angle")) file.degrees = node.choice("angle", {"degree", "radian"}) == 0;
   if (node.has("assetdir")) file.mesh_folder = node.text("assetdir");
   if (node.has("meshdir")) file.mesh_folder = node.text("meshdir");
@@ -117,7 +117,7 @@ void read_flag(MjcfFile& file, const RobotNode& flag, const std::string& name,
   if (!is({"gravity", "spring", "damper", "passive", "actuation", "limit", "contact", "constraint",
            "equality", "clampctrl", "frictionloss"}) ||
       value == "enable")
-    return flag.idle(text + kSolver);
+    return flag.idle(text + kSolverSetting);
   if (is({"contact", "equality", "frictionloss"}))
     return flag.idle(text + "a scene has none but those that it names");
   if (is({"actuation", "clampctrl"})) return flag.lost(text + "switches forces");

@@ -68,8 +68,8 @@ Words joint_words() {
           {"margin", Fate::idle, "of MuJoCo's limits; here limits are springs"},
           {"solreflimit", Fate::idle, "of MuJoCo's limits; here limits are springs"},
           {"solimplimit", Fate::idle, "of MuJoCo's limits; here limits are springs"},
-          {"solreffriction", Fate::idle, kSolver},
-          {"solimpfriction", Fate::idle, kSolver}};
+          {"solreffriction", Fate::idle, kSolverSetting},
+          {"solimpfriction", Fate::idle, kSolverSetting}};
 }
 
 std::map<std::string, Words> all_words() {
@@ -124,13 +124,13 @@ std::map<std::string, Words> all_words() {
                  {"vertex"},
                  {"builtin"},
                  {"params"},
-                 {"content_type", Fate::idle, kSolver},
+                 {"content_type", Fate::idle, kSolverSetting},
                  {"face"},
                  {"normal", Fate::idle, kSight},
                  {"texcoord", Fate::idle, kSight},
                  {"smoothnormal", Fate::idle, kSight},
                  {"maxhullvert", Fate::idle, "meshes are not replaced by hulls"},
-                 {"octree_maxdepth", Fate::idle, kSolver},
+                 {"octree_maxdepth", Fate::idle, kSolverSetting},
                  {"material", Fate::idle, kSight}};
   all["material"] = {{"name"}, {"class"}, {"rgba"}};
   for (const char* name : {"texture", "texrepeat", "texuniform", "emission", "specular",

@@ -11,7 +11,7 @@ namespace tangere {
 
 // Reasons that several tables give.
 inline constexpr const char* kSight = "for pictures only";
-inline constexpr const char* kSolver = "a setting of MuJoCo's solver";
+inline constexpr const char* kSolverSetting = "a setting of MuJoCo's solver";
 
 /// The attributes of <joint>, <geom>, <site>, <mesh>, <material>, <general>, <motor>, <position> or
 /// <velocity>.

@@ -95,9 +95,9 @@ const Words kCompiler = {{"meshdir"},
                          {"convexhull", Fate::idle, "meshes are not replaced by hulls"},
                          {"exactmeshinertia", Fate::idle, "meshes of URDF have no mass"},
                          {"fitaabb", Fate::idle, "no primitive is fitted to a mesh"},
-                         {"usethread", Fate::idle, kSolver},
-                         {"saveinertial", Fate::idle, kSolver},
-                         {"conflict", Fate::idle, kSolver}};
+                         {"usethread", Fate::idle, kSolverSetting},
+                         {"saveinertial", Fate::idle, kSolverSetting},
+                         {"conflict", Fate::idle, kSolverSetting}};
 
 /// The child of this name, the last if there are several; none if it is missing.
 std::optional<RobotNode> last_of(const std::vector<RobotNode>& parts, const std::string& name) {
@@ -200,7 +200,7 @@ class UrdfReader {
 
   void read_compiler(const RobotNode& node) {
     node.check(kCompiler);
-    static_cast<void>(node.parts({{"lengthrange", Fate::idle, kSolver}}));
+    static_cast<void>(node.parts({{"lengthrange", Fate::idle, kSolverSetting}}));
     mesh_folder_ = node.text("meshdir", node.text("assetdir", "."));
     balances_ = node.flag("balanceinertia", false);
     total_mass_ = std::max(node.number("settotalmass", 0.0), 0.0);
@@ -217,7 +217,7 @@ class UrdfReader {
                    {"wind", Fate::zero, "moves the air"}};
     for (const char* name : {"integrator", "solver", "cone", "jacobian", "iterations", "tolerance",
                              "impratio", "noslip_iterations", "ls_iterations"})
-      words.push_back({name, Fate::idle, kSolver});
+      words.push_back({name, Fate::idle, kSolverSetting});
     node.check(words);
     static_cast<void>(node.parts({{"flag", Fate::lost, "switches forces or contacts"}}));
     Scene& scene = robot_.scene;
