@@ -22,9 +22,9 @@ const std::vector<std::string> kSought = {"tactile pad kn", "tactile pad kt", "t
                                           "body ball density"};
 
 /// The shipped scene with a pad of 20 × 20 points, and its recording.
-class Recording {
+class RecordedBall {
  public:
-  Recording()
+  RecordedBall()
       : scene(read_scene(TANGERE_SOURCE_DIR "/scenes/identify_ball.xml").scene),
         program_(coarse(scene), scene.timestep, 0) {
     run = {[this](std::int64_t t, int e, std::span<double> u) { program_.evaluate(t, e, u); },
@@ -49,7 +49,7 @@ class Recording {
   ControlProgram program_;
 };
 
-Identification fit(const Recording& r, const FieldSequence& recorded,
+Identification fit(const RecordedBall& r, const FieldSequence& recorded,
                    const std::vector<double>& factors, int starts = 6, double noise = 0) {
   std::vector<double> start = r.truth;
   for (std::size_t k = 0; k < start.size(); ++k) start[k] *= factors[k];
@@ -61,7 +61,7 @@ Identification fit(const Recording& r, const FieldSequence& recorded,
 }
 
 TEST(Identification, FindsSkinAndMassWithinOnePercent) {
-  const Recording r;
+  const RecordedBall r;
   const std::vector<std::vector<double>> factors = {
       {0.5, 2, 0.5, 2}, {2, 0.5, 2, 0.5}, {0.7, 0.6, 1.8, 1.5}};
   for (std::size_t seed = 0; seed < factors.size(); ++seed) {
@@ -82,7 +82,7 @@ TEST(Identification, FindsSkinAndMassWithinOnePercent) {
 
 /// Without noise only the tolerance of the steps limits the result.
 TEST(Identification, IsExactWithoutNoise) {
-  const Recording r;
+  const RecordedBall r;
   const Identification found = fit(r, r.clean, {1.5, 0.8, 0.8, 1.3});
   EXPECT_TRUE(found.converged);
   for (std::size_t k = 0; k < r.truth.size(); ++k)
@@ -95,7 +95,7 @@ TEST(Identification, IsExactWithoutNoise) {
 const std::vector<double> kAstray = {0.125, 0.125, 0.125, 8};
 
 TEST(Identification, AFalseMinimumIsNoticedAndOtherStartsAreTried) {
-  const Recording r;
+  const RecordedBall r;
   FieldSequence recorded = r.clean;
   add_noise(recorded, 0.01 * r.peak, 1);
   const Identification several = fit(r, recorded, kAstray);
@@ -111,7 +111,7 @@ TEST(Identification, AFalseMinimumIsNoticedAndOtherStartsAreTried) {
 
 /// With 5 % noise no single residual shows the other damping, which moves the density by 4.7 %.
 TEST(Identification, AWrongModelIsToldByItsResidual) {
-  const Recording r;
+  const RecordedBall r;
   const std::string wrong = "joint pad_joint damping";
   const std::vector<double> damping = {1.1 * numbers_of(r.scene, {{wrong}})[0]};
   FieldSequence recorded = simulate_fields(with_numbers(r.scene, {{wrong}}, damping), r.run);
@@ -129,7 +129,7 @@ TEST(Identification, AWrongModelIsToldByItsResidual) {
 }
 
 TEST(Identification, StatedNoiseThatIsTooSmallIsNoticed) {
-  const Recording r;
+  const RecordedBall r;
   FieldSequence recorded = r.clean;
   add_noise(recorded, 0.01 * r.peak, 1);
   const Identification found = fit(r, recorded, {1, 1, 1, 1}, 1, 0.005 * r.peak);
@@ -180,7 +180,7 @@ TEST(Identification, NumbersThatNoFieldTellsApartAreNamed) {
 }
 
 TEST(Identification, MisfitIsHalfTheSquaresOfAllPoints) {
-  const Recording r;
+  const RecordedBall r;
   FieldSequence recorded = r.clean;
   add_noise(recorded, 0.1 * r.peak, 3);
   const Scene other = with_numbers(r.scene, kSought, std::vector<double>{5, 0.4, 0.6, 1600});
@@ -200,7 +200,7 @@ TEST(Identification, MisfitIsHalfTheSquaresOfAllPoints) {
 }
 
 TEST(Identification, RefusesWhatCannotBeFitted) {
-  const Recording r;
+  const RecordedBall r;
   const auto message = [&](const Scene& scene, const FieldSequence& recorded,
                            std::vector<std::string> numbers) {
     IdentificationOptions options;
