@@ -18,6 +18,7 @@
 #include "io/scene/scene_reader.hpp"
 #include "kernels/numbers/block.hpp"
 #include "kernels/table/isa.hpp"
+#include "tasks/effects/ablation.hpp"
 #include "tasks/effects/effect_costs.hpp"
 
 namespace tangere {
@@ -130,7 +131,7 @@ void effect_on(benchmark::State& state, const Case& of, Effect effect) {
 }
 
 /// With its coefficient at zero, or limits never met, over removed.
-void effect_idle(benchmark::State& state, const Case& of, Effect effect, Way way) {
+void effect_idle(benchmark::State& state, const Case& of, Effect effect, Ablation way) {
   Recorded& r = recorded(of, Place::run);
   const Scene& scene = r.model.scene();
   for (auto _ : state) {
@@ -313,13 +314,13 @@ void add_all() {
           extra);
     for (const EffectInfo& info : effects_of(read)) {
       const EffectKind kind = info.effect.kind;
-      if (!info.on || info.effect.element >= 0 || !has_way(kind, Way::removed)) continue;
+      if (!info.on || info.effect.element >= 0 || !has_way(kind, Ablation::removed)) continue;
       if (element_owner(kind) == NumberOwner::tactile) continue;
       add(scene + "/on/" + info.name, effect_on, of, info.effect);
-      if (has_way(kind, Way::zero))
-        add(scene + "/zero/" + info.name, effect_idle, of, info.effect, Way::zero);
-      if (has_way(kind, Way::idle))
-        add(scene + "/never_met/" + info.name, effect_idle, of, info.effect, Way::idle);
+      if (has_way(kind, Ablation::zero))
+        add(scene + "/zero/" + info.name, effect_idle, of, info.effect, Ablation::zero);
+      if (has_way(kind, Ablation::idle))
+        add(scene + "/never_met/" + info.name, effect_idle, of, info.effect, Ablation::idle);
       if (kind == EffectKind::pair_contact || (kind == EffectKind::ground_contact && of.lifted))
         add(scene + "/away/" + info.name, contacts_away, of, info.effect);
     }
