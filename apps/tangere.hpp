@@ -5,6 +5,7 @@
 
 // Scenes, models, steps and readings.
 #include "engine/sense/energy_balance.hpp"
+#include "engine/sense/flow_map.hpp"
 #include "engine/sense/readout.hpp"
 #include "engine/step/control.hpp"
 #include "engine/step/shear_state_arrays.hpp"
@@ -19,13 +20,19 @@
 #include "tasks/run/policy.hpp"
 #include "tasks/run/vector_task.hpp"
 
-// Gradients.
+// Gradients and identification.
+#include "engine/derivative/number_gradients.hpp"
+#include "engine/derivative/tactile_point_numbers.hpp"
 #include "tasks/gradients/gradients.hpp"
+#include "tasks/gradients/identification.hpp"
 #include "tasks/gradients/losses.hpp"
 #include "tasks/gradients/task_tape.hpp"
 
 // Runs, data sets and their files.
+#include "io/dataset/dataset_from_model.hpp"
 #include "io/dataset/dataset_writer.hpp"
+#include "io/dataset/shard_check.hpp"
 #include "io/trajectory/trajectory_file.hpp"
+#include "tasks/effects/ablation.hpp"
 #include "tasks/run/episodes.hpp"
 #include "tasks/run/rollout.hpp"

@@ -239,12 +239,12 @@ void Batch::set_shear_state(int environment, std::span<const ShearEntry> memory)
   int last = -1;
   for (const ShearEntry& e : memory) {
     if (e.point <= last || e.point >= points)
-      throw InputError("memory of friction: point " + std::to_string(e.point) + " after point " +
+      throw InputError("shear state: point " + std::to_string(e.point) + " after point " +
                        std::to_string(last) + "; expected rising numbers below " +
                        std::to_string(points));
     for (const double s : e.s)
       if (!std::isfinite(s))
-        throw InputError("memory of friction: point " + std::to_string(e.point) + " is not finite");
+        throw InputError("shear state: point " + std::to_string(e.point) + " is not finite");
     last = e.point;
   }
   shear_[lane].assign(memory.begin(), memory.end());

@@ -319,7 +319,8 @@ std::optional<EpisodeSteps> steps_said(const h5::Id& file) {
   steps.taken =
       step_count_said(file, kTaken, std::numeric_limits<std::int64_t>::max() / kMostShards);
   // Shards of earlier programs have another name for it.
-  const char* const tunnelled = H5Aexists(file.get(), kTunnelled) > 0 ? kTunnelled : "passed_steps";
+  const char* const tunnelled =
+      H5Aexists(file.get(), "passed_steps") > 0 ? "passed_steps" : kTunnelled;
   steps.tunnelled = step_count_said(file, tunnelled, steps.taken);
   steps.overlapping = step_count_said(file, kOverlapping, steps.taken - steps.tunnelled);
   return steps;

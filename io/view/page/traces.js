@@ -4,7 +4,8 @@ const kInks = ["#3b82d6", "#e0702f", "#2f9e68", "#b85bc2", "#c9a227", "#d84a5f",
   "#8a7a6a"];
 const kMostNamed = 8, kMostLines = 4, kLine = 15;  // names, their lines, height of one
 const kWidest = "-8.88e-8";  // a value
-const kStatus = ["converged", "split", "coarse", "passed"];  // what is negative failed
+// Negative: failed.
+const kStatus = ["converged", "split", "inaccurate", "tunnelled", "damped", "overlapping"];
 
 class TracePanel {
   constructor(group, canvas, seek) {
