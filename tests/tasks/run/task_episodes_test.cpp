@@ -36,6 +36,7 @@ class Keeper : public EpisodeSink {
     EXPECT_EQ(callers_++, 0) << "two threads in the sink";
     EXPECT_GT(piece.first_episode, last_);
     last_ = piece.first_episode;
+    episodes_ = piece.episodes;
     if (fail_at == last_) throw IoError("the disk is full");
     for (int e = 0; e < piece.episodes; ++e) {
       const EpisodeEnd& end = piece.ends[static_cast<std::size_t>(e)];
@@ -69,12 +70,12 @@ class Keeper : public EpisodeSink {
   template <class T>
   void add(std::string& to, std::span<const T> all, int episode, std::int64_t rows,
            std::int64_t used) const {
-    const std::size_t each =
-        all.size() / static_cast<std::size_t>(std::min<std::int64_t>(16, kEpisodes - last_));
+    const std::size_t each = all.size() / static_cast<std::size_t>(episodes_);
     const std::size_t width = each / static_cast<std::size_t>(rows);
     to.append(reinterpret_cast<const char*>(all.data() + static_cast<std::size_t>(episode) * each),
               static_cast<std::size_t>(used) * width * sizeof(T));
   }
+  int episodes_ = 0;  // of the piece that is written
   std::int64_t last_ = -1;
   std::atomic<int> callers_{0};
 };
