@@ -326,8 +326,8 @@ Mat3<N> trace_less(const Mat3<N>& m) {
   return diagonal(m.m[0][0] + m.m[1][1] + m.m[2][2]) - m;
 }
 
-/// Adds wrench, stiffness and damping of all faces with the same motion. Left to itself GCC makes it a
-/// call in some callers: 1 to 3 % of the time of a step of eight environments.
+/// Adds wrench, stiffness and damping of all faces with the same motion. Without the attribute GCC
+/// makes it a call in some callers: 1 to 3 % of the time of a step of eight environments.
 template <bool Derivatives, class N>
 [[gnu::always_inline]] inline void add_finished(const Vec6<N>& W, const FaceSums<N>& s,
                                                 PairSums<N>& out) {
