@@ -70,7 +70,7 @@ Record record_of(const std::string& option, const Model& model) {
   outputs.end_effectors = record.find("variables") != nullptr;
   if (outputs.end_effectors && model.end_effectors().empty())
     throw InputError(record.where + ": 'variables', but the scene has no end effectors");
-  if (outputs.end_effectors) outputs.of_end_effectors = record.find("variables")->times;
+  if (outputs.end_effectors) outputs.end_effector_times = record.find("variables")->times;
   const TimedName* const q = record.find("q");
   const TimedName* const v = record.find("v");
   if (q != nullptr) outputs.states = q->times;
@@ -95,8 +95,8 @@ Record record_of(const std::string& option, const Model& model) {
 void take_memory(Record& record, const Model& model) {
   RolloutOutputs& outputs = record.outputs;
   outputs.memory = model.has_shear_springs();
-  outputs.of_memory = outputs.states.given() ? outputs.states : OutputTimes{.final = true};
-  if (const TimedName* const asked = record.find("memory")) outputs.of_memory = asked->times;
+  outputs.shear_times = outputs.states.given() ? outputs.states : OutputTimes{.final = true};
+  if (const TimedName* const asked = record.find("memory")) outputs.shear_times = asked->times;
 }
 
 void refuse_memory(const Record& record, const std::string& who) {
@@ -124,7 +124,7 @@ void take_bodies(Record& record, const Model& model) {
     outputs.bodies = true;
     outputs.chosen_bodies.push_back(*body);
   }
-  if (first != nullptr) outputs.of_bodies = first->times;
+  if (first != nullptr) outputs.body_times = first->times;
   std::sort(outputs.chosen_bodies.begin(), outputs.chosen_bodies.end());
   // A trajectory has one list of rows for both.
   const TimedName* const q = record.find("q");

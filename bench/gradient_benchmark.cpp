@@ -169,9 +169,9 @@ class Loop {
     tape_.emplace(*task_, kEnvironments, options);
     const std::size_t e = kEnvironments, seen = task_->spec().observation_size(),
                       width = task_->spec().action.size();
-    by_observation_.assign(e * seen, 1e-3);
-    by_reward_.assign(e, 1.0);
-    by_action_.resize(e * width);
+    observation_bar_.assign(e * seen, 1e-3);
+    reward_bar_.assign(e, 1.0);
+    action_bar_.resize(e * width);
     for (int t = 0; t < kActions; ++t) {
       std::vector<double>& a = actions_.emplace_back(e * width);
       for (int i = 0; i < kEnvironments; ++i)
@@ -196,8 +196,8 @@ class Loop {
     const double begin = cpu_seconds();
     for (const auto& a : actions_) tape_->step(a);
     const double middle = cpu_seconds();
-    for (int t = 0; t < kActions; ++t) tape_->reverse({by_observation_, by_reward_}, by_action_);
-    benchmark::DoNotOptimize(by_action_.data());
+    for (int t = 0; t < kActions; ++t) tape_->reverse({observation_bar_, reward_bar_}, action_bar_);
+    benchmark::DoNotOptimize(action_bar_.data());
     return {middle - begin, cpu_seconds() - begin};
   }
 
@@ -219,7 +219,7 @@ class Loop {
   VectorTask vector_;
   std::optional<TaskTape> tape_;
   std::vector<std::vector<double>> actions_;
-  std::vector<double> by_observation_, by_reward_, by_action_;
+  std::vector<double> observation_bar_, reward_bar_, action_bar_;
   double taken_ = 0;
 };
 

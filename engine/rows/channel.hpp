@@ -30,9 +30,9 @@ using Attributes = std::vector<RunAttribute>;
 /// Numbers that a run stores row by row.
 struct Channel {
   enum class Storage {
-    plain,          ///< uncompressed
-    compressed,     ///< in chunks of many rows
-    by_environment  ///< compressed, a chunk for each row and environment
+    plain,           ///< uncompressed
+    compressed,      ///< in chunks of many rows
+    per_environment  ///< compressed, a chunk for each row and environment
   };
   std::string name;  ///< path in a file: "q", "bodies/pose", "tactile/pad/force"
   NumberType type = NumberType::float64;

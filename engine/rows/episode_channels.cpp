@@ -20,7 +20,7 @@ class ChannelList {
  public:
   ChannelList(std::span<const TimedName> record, int every) : record_(record), every_(every) {}
 
-  [[nodiscard]] const TimedName* asked(const std::string& name) const {
+  [[nodiscard]] const TimedName* requested(const std::string& name) const {
     const auto found = std::find_if(record_.begin(), record_.end(),
                                     [&](const TimedName& one) { return one.name == name; });
     return found == record_.end() ? nullptr : &*found;
@@ -28,7 +28,7 @@ class ChannelList {
 
   EpisodeChannel& add(Kind kind, const std::string& name, std::vector<std::uint64_t> shape,
                       const std::string& unit = {}, const std::string& meaning = {}) {
-    const TimedName* const one = asked(name);
+    const TimedName* const one = requested(name);
     const OutputTimes times = one != nullptr ? one->times : OutputTimes{};
     if (times.every % every_ != 0)
       throw InputError(fmt::format("'{}{}', and a row is every {} steps; expected a multiple of {}",
@@ -62,11 +62,11 @@ class ChannelList {
 void add_bodies(ChannelList& list, std::span<const std::string> bodies) {
   std::vector<int> all;
   for (int b = 0; b < std::ssize(bodies); ++b) all.push_back(b);
-  if (list.asked("bodies") != nullptr)
+  if (list.requested("bodies") != nullptr)
     list.add(Kind::bodies, "bodies", {bodies.size(), kMotion}).bodies = all;
   for (const int b : all)
     if (const std::string name = body_output(bodies[static_cast<std::size_t>(b)]);
-        list.asked(name) != nullptr)
+        list.requested(name) != nullptr)
       list.add(Kind::bodies, name, {1, kMotion}).bodies = {b};
 }
 
@@ -102,7 +102,7 @@ std::vector<EpisodeChannel> episode_channels(const RunFacts& facts,
     for (const FieldForm form :
          {FieldForm::field, FieldForm::pressure, FieldForm::shear, FieldForm::sum, FieldForm::ideal,
           FieldForm::markers, FieldForm::flow})
-      if (list.asked(output_name(sensors[static_cast<std::size_t>(s)].name, form)) != nullptr)
+      if (list.requested(output_name(sensors[static_cast<std::size_t>(s)].name, form)) != nullptr)
         list.add_reading(sensors, {s, form});
   return list.take();
 }

@@ -129,11 +129,11 @@ const Attribute& number_kind(NumberOwner owner, NumberField field) {
   const Attribute* of_field = nullptr;
   for (const Attribute& row : schema()) {
     if (row.field != field) continue;
-    if ((row.of & element_of(owner)) != 0) return row;
+    if ((row.elements & element_of(owner)) != 0) return row;
     of_field = &row;
   }
   int other = 0;
-  while (of_field != nullptr && (of_field->of & element_of(Owner(other))) == 0) ++other;
+  while (of_field != nullptr && (of_field->elements & element_of(Owner(other))) == 0) ++other;
   throw InputError(std::string("a ") + owner_name(owner) + " has no '" +
                    (of_field == nullptr ? "?" : of_field->name) + "'; a " + kOwners[other] +
                    " has one");
@@ -191,12 +191,12 @@ std::vector<Unit> units_of(const Scene& scene, const SceneNumber& n) {
     if (n.field == Field::q && quaternion) return {Unit::one};
     return {kind.unit_of(dof_turns(type, n.component))};
   }
-  if (is_turning(n.field)) return {kind.other};
+  if (is_turning(n.field)) return {kind.other_unit};
   bool slides = false, turns = false;
   for (int k = 0; k < dof_count(type); ++k) (dof_turns(type, k) ? turns : slides) = true;
   // Dofs that turn may have a field of their own.
   if (link->joint.turning && n.owner == Owner::joint) turns = false;
-  if (slides && turns && kind.other != Unit::one) return {kind.unit, kind.other};
+  if (slides && turns && kind.other_unit != Unit::one) return {kind.unit, kind.other_unit};
   return {kind.unit_of(turns)};
 }
 

@@ -50,7 +50,7 @@ constexpr void set(Attribute& a, Between x) {
   a.bound = x.bound, a.least = x.least, a.most = x.most;
 }
 constexpr void set(Attribute& a, Flags flags) { a.flags |= static_cast<std::uint8_t>(flags.value); }
-constexpr void set(Attribute& a, Or unit) { a.other = unit.value; }
+constexpr void set(Attribute& a, Or unit) { a.other_unit = unit.value; }
 constexpr void set(Attribute& a, Types types) { a.types = types.value; }
 constexpr void set(Attribute& a, Words words) { a.words = words.value; }
 constexpr void set(Attribute& a, NumberField field) { a.field = field; }
@@ -70,8 +70,8 @@ constexpr Attribute row(std::uint32_t of, const char* name, const char* usual, U
 constexpr Attribute picture(std::uint32_t of, const char* name, int flags = 0) {
   return row(of, name, kNone, U::one, "", Flags{kPicture | flags});
 }
-constexpr Attribute left_over(std::uint32_t of, const char* name) {
-  return row(of, name, kNone, U::one, "", Types{""}, Flags{kLeftOver});
+constexpr Attribute ignored(std::uint32_t of, const char* name) {
+  return row(of, name, kNone, U::one, "", Types{""}, Flags{kIgnored});
 }
 template <class... Columns>
 constexpr Attribute shape(const char* types, const char* name, const char* usual, Unit unit,
@@ -84,8 +84,8 @@ constexpr Attribute layout(const char* types, const char* name, Unit unit, const
   return row(kTactile, name, kNeeded, unit, text, Types{types}, columns...);
 }
 template <class Value, class... Columns>
-constexpr Attribute flaw(const char* name, Value I::*member, Unit unit, const char* text,
-                         Columns... columns) {
+constexpr Attribute imperfection(const char* name, Value I::*member, Unit unit, const char* text,
+                                 Columns... columns) {
   return row(kImperfections, name, "0", unit, text, member, B::not_negative,
              E::sensor_imperfections, columns...);
 }
@@ -114,7 +114,7 @@ constexpr Attribute kSchema[] = {
         Words{"bounded free"}),
     row(kSolver, "sleep", "", U::one, "share of its size that a resting body moves; 0.001 is usual",
         &SolverOptions::sleep, B::share, E::sleeping),
-    left_over(kSolver, "max_ls"),
+    ignored(kSolver, "max_ls"),
 
     row(kGround, "pos", "0 0 0", U::m, "a point of the ground", &GroundDescription::position),
     row(kGround, "normal", "0 0 1", U::one, "points out of the ground"),
@@ -124,7 +124,7 @@ constexpr Attribute kSchema[] = {
 
     row(kRobot | kLink, "name", kNeeded, U::one, "its name"),
     row(kLink, "parent", "", U::one, "the link before it on which a link of <robot> hangs"),
-    left_over(kLink, "design_params"),
+    ignored(kLink, "design_params"),
 
     row(kJoint, "name", kNeeded, U::one, "its name"),
     row(kJoint, "type", kNeeded, U::one, "see below"),
@@ -148,10 +148,10 @@ constexpr Attribute kSchema[] = {
     coefficient(kJoint, "lim_stiffness", F::lim_stiffness, &J::limit_stiffness, U::N_per_m,
                 E::joint_limits, "force per distance outside lim", Or{U::N_m_per_rad},
                 Types{kMoving}),
-    left_over(kJoint | kBody, "mu"),
-    left_over(kBody, "damping"),
-    left_over(kJoint | kBody, "format"),
-    left_over(kJoint | kBody, "contacts"),
+    ignored(kJoint | kBody, "mu"),
+    ignored(kBody, "damping"),
+    ignored(kJoint | kBody, "format"),
+    ignored(kJoint | kBody, "contacts"),
 
     row(kBody, "name", "", U::one, "that of its link if left out"),
     row(kBody, "type", kNeeded, U::one, "see below"),
@@ -219,7 +219,7 @@ constexpr Attribute kSchema[] = {
         Flags{kInDefault | kParameter}),
     row(kMotor, "timing", "end", U::one, "start: the force is that of the step's start",
         Types{"position"}, Words{"end start"}, Flags{kInDefault}),
-    left_over(kMotor, "name"),
+    ignored(kMotor, "name"),
 
     row(kGroundContact, "body", kNeeded, U::one, "its points touch the ground"),
     row(kPairContact, "general_body", kNeeded, U::one, "its points touch"),
@@ -263,36 +263,39 @@ constexpr Attribute kSchema[] = {
     layout("rect_array", "rect_pos1", U::m, "the opposite corner"),
     layout("rect_array", "axis0", U::one, "along the rows of points"),
     layout("rect_array", "axis1", U::one, "along the columns"),
-    layout("rect_array cylinder hemisphere", "resolution", U::one, "rows and columns",
-           Between{B::integer, 1, 4096}),
+    layout("rect_array cylinder hemisphere", "resolution", U::one,
+           "rows, cols; hemisphere: optional", Between{B::integer, 1, 4096}),
     layout("abstract", "spec", U::one, "file of points beside the scene"),
     layout("hemisphere cylinder", "radius", U::m, "of the surface", B::positive),
     layout("hemisphere", "count", U::one, "number of points", Between{B::integer, 1, kMostPoints}),
     layout("cylinder", "length", U::m, "along z", B::positive),
     layout("mesh", "filename", U::one, "OBJ, STL or PLY beside the scene"),
     layout("mesh", "pitch", U::m, "longest edge of a triangle", B::positive),
-    layout("mesh", "scale", U::one, "of the file"),
+    row(kTactile, "scale", "1 1 1", U::one, "of the file", Types{"mesh"}),
     row(kTactile, "pos", "0 0 0", U::m, "place in the body's frame", &Pose::position),
     row(kTactile, "quat", "1 0 0 0", U::one, "w x y z", &Pose::orientation),
 
-    flaw("hysteresis", &I::hysteresis, U::one, "share of the answer that is late",
-         Between{B::range, 0, 1}),
-    flaw("hysteresis_time", &I::hysteresis_time, U::s, "time constant with which it comes",
-         Between{B::range, 0, 1e3}),
-    flaw("low_pass", &I::low_pass, U::s, "time constant", Between{B::range, 0, 1e3}),
-    flaw("delay", &I::delay, U::s, "", Between{B::range, 0, 1e3}),
-    flaw("spread", &I::spread, U::m, "distance over which a force spreads",
-         Between{B::range, 0, 1e3}),
-    flaw("crosstalk", &I::crosstalk, U::one, "share of a point that each neighbour gets",
-         Between{B::range, 0, 0.25}),
-    flaw("gain", &I::gain, U::one, "deviation from point to point", Between{B::range, 0, 1}),
-    flaw("sensor_gain", &I::sensor_gain, U::one, "deviation from episode to episode",
-         Between{B::range, 0, 1}),
-    flaw("bias", &I::bias, U::N, "deviation from point to point"),
-    flaw("noise", &I::noise, U::N, "deviation from step to step"),
-    flaw("dead", &I::dead, U::one, "probability that a point reads 0", Between{B::range, 0, 1}),
-    flaw("saturation", &I::saturation, U::N, "largest reading; 0: none"),
-    flaw("quantisation", &I::quantisation, U::N, "readings are multiples of it; 0: not rounded"),
+    imperfection("hysteresis", &I::hysteresis, U::one, "share of the answer that is late",
+                 Between{B::range, 0, 1}),
+    imperfection("hysteresis_time", &I::hysteresis_time, U::s, "time constant with which it comes",
+                 Between{B::range, 0, 1e3}),
+    imperfection("low_pass", &I::low_pass, U::s, "time constant", Between{B::range, 0, 1e3}),
+    imperfection("delay", &I::delay, U::s, "", Between{B::range, 0, 1e3}),
+    imperfection("spread", &I::spread, U::m, "distance over which a force spreads",
+                 Between{B::range, 0, 1e3}),
+    imperfection("crosstalk", &I::crosstalk, U::one, "share of a point that each neighbour gets",
+                 Between{B::range, 0, 0.25}),
+    imperfection("gain", &I::gain, U::one, "deviation from point to point",
+                 Between{B::range, 0, 1}),
+    imperfection("sensor_gain", &I::sensor_gain, U::one, "deviation from episode to episode",
+                 Between{B::range, 0, 1}),
+    imperfection("bias", &I::bias, U::N, "deviation from point to point"),
+    imperfection("noise", &I::noise, U::N, "deviation from step to step"),
+    imperfection("dead", &I::dead, U::one, "probability that a point reads 0",
+                 Between{B::range, 0, 1}),
+    imperfection("saturation", &I::saturation, U::N, "largest reading; 0: none"),
+    imperfection("quantisation", &I::quantisation, U::N,
+                 "readings are multiples of it; 0: not rounded"),
     row(kMarkers, "stiffness", kNone, U::N_per_m, "of the gel under a point against shear",
         &MarkersDescription::stiffness, B::positive),
     row(kMarkers, "thickness", kNone, U::m, "of the gel", &MarkersDescription::thickness,
@@ -383,7 +386,7 @@ const char* to_string(Element element) {
 
 const Attribute& attribute_of(Element element, std::string_view name) {
   for (const Attribute& a : kSchema)
-    if ((a.of & element) != 0 && name == a.name) return a;
+    if ((a.elements & element) != 0 && name == a.name) return a;
   throw std::logic_error(fmt::format("<{}> has no attribute {}", to_string(element), name));
 }
 

@@ -67,7 +67,7 @@ enum class Bound : std::uint8_t { any, not_negative, positive, share, range, int
 enum : std::uint8_t {
   kInDefault = 1,  ///< may stand in <default>
   kPicture = 2,    ///< for viewers only: accepted and not read
-  kLeftOver = 4,   ///< published scenes leave it on elements that do not use it: a warning
+  kIgnored = 4,    ///< published scenes have it on elements that do not use it: a warning
   kVaries = 8,     ///< <randomize> may let it differ between environments
   kGradient = 16,  ///< has a derivative
   kIndexed = 32,   ///< the parameter has components
@@ -87,13 +87,13 @@ using Member = std::variant<
 
 /// An attribute of one or several elements.
 struct Attribute {
-  std::uint32_t of = 0;  ///< elements
+  std::uint32_t elements = 0;  ///< Element bits
   const char* name = "";
   /// The value where a file gives none, as in a file; "": there is none; nullptr: must be given.
-  const char* usual = "";
-  Unit unit = Unit::one;   ///< of dofs that slide, and of laws other than linear
-  const char* text = "";   ///< one line of documentation
-  Unit other = Unit::one;  ///< of dofs that turn, and of law linear; one: the same
+  const char* default_text = "";
+  Unit unit = Unit::one;        ///< of dofs that slide, and of laws other than linear
+  const char* text = "";        ///< one line of documentation
+  Unit other_unit = Unit::one;  ///< of dofs that turn, and of law linear; one: the same
   Bound bound = Bound::any;
   double least = 0, most = 0;   ///< of bound range and integer
   const char* words = nullptr;  ///< the values that it may have, between blanks; nullptr: no words
@@ -105,7 +105,7 @@ struct Attribute {
 
   [[nodiscard]] bool has(int flag) const { return (flags & flag) != 0; }
   [[nodiscard]] Unit unit_of(bool turns_or_linear) const {
-    return turns_or_linear && other != Unit::one ? other : unit;
+    return turns_or_linear && other_unit != Unit::one ? other_unit : unit;
   }
   /// Whether elements of a type use it.
   [[nodiscard]] bool serves(std::string_view type) const;
@@ -131,7 +131,7 @@ std::vector<NumberField> coefficients_of(EffectKind kind);
 template <class T, class F>
 void for_each_member(Element element, const F& f) {
   for (const Attribute& row : schema()) {
-    if ((row.of & element) == 0) continue;
+    if ((row.elements & element) == 0) continue;
     std::visit(
         [&](auto member) {
           if constexpr (requires(T & to) { to.*member; }) f(row, member);
@@ -146,7 +146,7 @@ template <class T>
 std::string value_fault(Element element, const T& of) {
   std::string fault;
   const auto check = [&](const Attribute& row, double value) {
-    const bool not_given = value == 0 && row.usual != nullptr && *row.usual == '\0';
+    const bool not_given = value == 0 && row.default_text != nullptr && *row.default_text == '\0';
     if (fault.empty() && !not_given) fault = row.fault(value);
   };
   for_each_member<T>(element, [&](const Attribute& row, auto member) {

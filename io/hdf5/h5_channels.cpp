@@ -29,7 +29,7 @@ Storage storage_of(const Channel& channel) {
   Dims dims = dims_of(channel);
   const hsize_t element = bytes_of(channel.type), row = channel.width() * element;
   if (row == 0 || dims[0] == 0) return {};
-  if (channel.storage == Channel::Storage::by_environment) {
+  if (channel.storage == Channel::Storage::per_environment) {
     dims[0] = dims[1] = 1;
     return {dims, true};
   }

@@ -35,7 +35,7 @@ std::string members_text(Element element, const T& of, std::string_view type = {
       value = numbers_text({(of.*member).begin(), (of.*member).end()});
     else
       value = number_text(of.*member);
-    if (row.serves(type) && (row.usual == nullptr || value != row.usual))
+    if (row.serves(type) && (row.default_text == nullptr || value != row.default_text))
       text += fmt::format(" {}=\"{}\"", row.name, value);
   });
   return text;

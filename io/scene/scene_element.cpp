@@ -10,7 +10,7 @@ namespace tangere {
 void SceneElement::check(std::string_view type) const {
   std::vector<std::string> used, pictures, idle;
   for (const Attribute& a : schema()) {
-    if ((a.of & of_) == 0) continue;
+    if ((a.elements & of_) == 0) continue;
     (a.has(kPicture) ? pictures : a.serves(type) ? used : idle).emplace_back(a.name);
   }
   check_attributes(used, pictures, idle);
@@ -19,26 +19,26 @@ void SceneElement::check(std::string_view type) const {
 void SceneElement::check_default() const {
   std::vector<std::string> used, idle;
   for (const Attribute& a : schema()) {
-    if ((a.of & of_) == 0) continue;
+    if ((a.elements & of_) == 0) continue;
     if (a.has(kInDefault)) used.emplace_back(a.name);
-    if (a.has(kLeftOver)) idle.emplace_back(a.name);
+    if (a.has(kIgnored)) idle.emplace_back(a.name);
   }
   check_attributes(used, {}, idle);
 }
 
 bool SceneElement::is_there(const Attribute& row) const {
   if (has(row.name)) return true;
-  if (row.usual == nullptr) static_cast<void>(text(row.name));  // fails
-  return *row.usual != '\0';
+  if (row.default_text == nullptr) static_cast<void>(text(row.name));  // fails
+  return *row.default_text != '\0';
 }
 
 std::vector<double> SceneElement::values(const Attribute& row, std::size_t count,
                                          bool turns_or_linear) const {
   std::vector<double> x;
-  if (has(row.name) || row.usual == nullptr || *row.usual == '\0') {
+  if (has(row.name) || row.default_text == nullptr || *row.default_text == '\0') {
     x = SceneNode::numbers(row.name, count);  // fails if it is missing
   } else {
-    std::istringstream usual(row.usual);
+    std::istringstream usual(row.default_text);
     for (double value; usual >> value;) x.push_back(value);
   }
   const double factor = context().factor(row.unit_of(turns_or_linear));
@@ -65,7 +65,7 @@ Vector3 SceneElement::vector(const char* name) const {
 
 std::size_t SceneElement::word(const char* name) const {
   const std::vector<std::string> words = words_of(row(name).words);
-  const char* const usual = row(name).usual;
+  const char* const usual = row(name).default_text;
   if (!has(name) && usual != nullptr)
     return std::size_t(std::ranges::find(words, usual) - words.begin());
   return std::size_t(choice(name, words));

@@ -186,7 +186,7 @@ void read_defaults(const SceneNode& section) {
        elements_in(section, kJoint | kBody | kTouching | kMotor | kEndEffector)) {
     node.check_default();
     for (const Attribute& a : schema())
-      if ((a.of & node.of()) != 0 && a.has(kInDefault) && node.has(a.name))
+      if ((a.elements & node.of()) != 0 && a.has(kInDefault) && node.has(a.name))
         section.context().defaults[node.name()][a.name] = {node.text(a.name), node.source().line};
   }
 }

@@ -86,7 +86,7 @@ NumberField read_field(const SceneNode& node, NumberOwner owner) {
   std::vector<std::string> names;
   std::vector<NumberField> fields;
   for (const Attribute& row : schema()) {
-    if ((row.of & element_of(owner)) == 0 || !row.has(kVaries) || row.has(kIndexed)) continue;
+    if ((row.elements & element_of(owner)) == 0 || !row.has(kVaries) || row.has(kIndexed)) continue;
     names.emplace_back(row.name);
     fields.push_back(*row.field);
   }

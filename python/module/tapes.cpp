@@ -55,27 +55,28 @@ class Tape {
     for (std::size_t i = 0; i < to.size(); ++i) to[i] = from[i] * factor_[i % factor_.size()];
     return array;
   }
-  Array<double> reverse(const Argument<double>& by_observation, const Argument<double>& by_reward) {
-    const std::vector<double> o = unscaled(by_observation);
-    const std::span<const double> r = numbers_of(by_reward, {count()}, "derivatives by rewards");
-    std::span<double> by_action;
-    auto array = new_array<double>({count(), spec().action.size()}, by_action);
+  Array<double> reverse(const Argument<double>& observation_bar,
+                        const Argument<double>& reward_bar) {
+    const std::vector<double> o = unscaled(observation_bar);
+    const std::span<const double> r = numbers_of(reward_bar, {count()}, "derivatives by rewards");
+    std::span<double> action_bar;
+    auto array = new_array<double>({count(), spec().action.size()}, action_bar);
     const InUse::Turn turn(in_use_);
     const nb::gil_scoped_release free;
-    tape_.reverse({o, r}, by_action);
+    tape_.reverse({o, r}, action_bar);
     return array;
   }
-  nb::tuple reverse_start(const Argument<double>& by_observation) {
-    const std::vector<double> o = unscaled(by_observation);
+  nb::tuple reverse_start(const Argument<double>& observation_bar) {
+    const std::vector<double> o = unscaled(observation_bar);
     std::span<double> q, v;
     const std::size_t nv = as_size(task_->model().nv());
-    auto by_q = new_array<double>({count(), nv}, q), by_v = new_array<double>({count(), nv}, v);
+    auto q_bar = new_array<double>({count(), nv}, q), v_bar = new_array<double>({count(), nv}, v);
     {
       const InUse::Turn turn(in_use_);
       const nb::gil_scoped_release free;
       tape_.reverse_start({o}, q, v);
     }
-    return nb::make_tuple(by_q, by_v);
+    return nb::make_tuple(q_bar, v_bar);
   }
   void begin_reverse() {
     const InUse::Turn turn(in_use_);
@@ -93,9 +94,9 @@ class Tape {
   [[nodiscard]] std::int64_t taken() const { return tape_.taken(); }
 
  private:
-  std::vector<double> unscaled(const Argument<double>& by_observation) {
+  std::vector<double> unscaled(const Argument<double>& observation_bar) {
     const auto given =
-        numbers_of(by_observation, {count(), factor_.size()}, "derivatives by observations");
+        numbers_of(observation_bar, {count(), factor_.size()}, "derivatives by observations");
     std::vector<double> o(given.begin(), given.end());
     for (std::size_t i = 0; i < o.size(); ++i) o[i] *= factor_[i % factor_.size()];
     return o;
@@ -166,13 +167,13 @@ void add_tapes(nb::module_& m) {
           "v",
           [](Tape& t) { return t.per_environment<double>(&TaskTape::v, as_size(t.model().nv())); },
           "(E, nv) velocities now.")
-      .def("reverse", &Tape::reverse, "by_observation"_a, "by_reward"_a,
+      .def("reverse", &Tape::reverse, "observation_bar"_a, "reward_bar"_a,
            "Reverses the last step that is not reversed yet: takes derivatives of a loss by its\n"
            "observations (E, n) and rewards (E), returns those by its actions (E, action), all "
            "that\n"
            "passes through this step and later ones. 0 beyond an action's bounds.")
-      .def("reverse_start", &Tape::reverse_start, "by_observation"_a,
-           nb::sig("def reverse_start(self, by_observation: numpy.typing.ArrayLike) -> "
+      .def("reverse_start", &Tape::reverse_start, "observation_bar"_a,
+           nb::sig("def reverse_start(self, observation_bar: numpy.typing.ArrayLike) -> "
                    "tuple[numpy.typing.NDArray[numpy.float64], "
                    "numpy.typing.NDArray[numpy.float64]]"),
            "Ends the reverse pass: takes derivatives by the first observations (E, n), returns\n"

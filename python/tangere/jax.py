@@ -277,9 +277,9 @@ class _Host:
             self.show(out)
 
     def reverse(self, _: Any, out: Any, token: Any, *by: Any) -> None:
-        by_token, by_rows, by_reward = (np.asarray(array) for array in by)
+        token_bar, rows_bar, reward_bar = (np.asarray(array) for array in by)
         with self.lock:
-            (run, taken), passing = np.asarray(token), by_token[0]
+            (run, taken), passing = np.asarray(token), token_bar[0]
             if run != self.run:
                 raise _core.InputError(
                     "derivatives of a run whose tape has begun another one; take one tape for each "
@@ -291,10 +291,10 @@ class _Host:
                 passing = self.passing = self.passing % (1 << 24) + 1
                 self.left = int(taken)
                 for _ in range(self.tape.taken - self.left):  # on which the loss does not hang
-                    self.tape.reverse(np.zeros_like(by_rows), np.zeros_like(by_reward))
+                    self.tape.reverse(np.zeros_like(rows_bar), np.zeros_like(reward_bar))
             if passing != self.passing or self.left != taken:
                 raise _core.InputError("two ways back over one tape at the same time")
-            np.asarray(out[1])[...] = self.tape.reverse(by_rows, by_reward)
+            np.asarray(out[1])[...] = self.tape.reverse(rows_bar, reward_bar)
             np.asarray(out[0])[...] = (passing, 0)
             self.left = int(taken) - 1
 

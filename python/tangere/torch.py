@@ -109,7 +109,7 @@ class _Run:
         self.left: int | None = None  # the step reversed last; None: nothing is reversed
         self.passing = False
 
-    def reverse(self, step: int, by_rows: np.ndarray, by_reward: np.ndarray) -> np.ndarray:
+    def reverse(self, step: int, rows_bar: np.ndarray, reward_bar: np.ndarray) -> np.ndarray:
         if self.tape is None:
             raise _core.InputError(
                 "backward() through a tape that was reset; call it before reset()"
@@ -122,9 +122,9 @@ class _Run:
             torch.autograd.Variable._execution_engine.queue_callback(self._end)
         left = self.taken if self.left is None else self.left
         for _ in range(left - 1 - step):  # later steps on which the loss does not hang
-            self.tape.reverse(np.zeros_like(by_rows), np.zeros_like(by_reward))
+            self.tape.reverse(np.zeros_like(rows_bar), np.zeros_like(reward_bar))
         self.left = step
-        return self.tape.reverse(by_rows, by_reward)
+        return self.tape.reverse(rows_bar, reward_bar)
 
     def _end(self) -> None:
         self.passing = False
@@ -144,17 +144,17 @@ class _Step(torch.autograd.Function):  # type: ignore[misc]
 
     @staticmethod
     @torch.autograd.function.once_differentiable  # type: ignore[untyped-decorator]
-    def backward(ctx: Any, by_rows: Any, by_reward: Any, by_token: Any) -> Any:
+    def backward(ctx: Any, rows_bar: Any, reward_bar: Any, token_bar: Any) -> Any:
         try:
             _ = ctx.saved_tensors
         except RuntimeError:
             raise _core.InputError(
                 "a second backward() through the same steps; give the first one retain_graph=True"
             ) from None
-        by_action = ctx.run.reverse(
-            ctx.step, by_rows.to(torch.float64).numpy(), by_reward.to(torch.float64).numpy()
+        action_bar = ctx.run.reverse(
+            ctx.step, rows_bar.to(torch.float64).numpy(), reward_bar.to(torch.float64).numpy()
         )
-        return torch.from_numpy(by_action).to(ctx.dtype), by_token, None, None
+        return torch.from_numpy(action_bar).to(ctx.dtype), token_bar, None, None
 
 
 @dataclass

@@ -77,22 +77,22 @@ TaskBlock::TaskBlock(const Task& task, const TapeOptions& options, std::int64_t 
       options_(options),
       rollout_(task, options.stepper, options.precision),
       records_(as_size(options.length), ActionRecord(task)),
-      to_moments_(task.spec().snapshots.size()),
+      snapshot_cotangents_(task.spec().snapshots.size()),
       start_q_(lane_rows(as_size(task.model().nv()))),
       start_v_(start_q_),
-      by_u_(lane_rows(as_size(task.model().nu()))),
-      by_action_(lane_rows(task.spec().action.size())),
-      by_memory_(lane_rows(as_size(task.spec().task_state))),
+      u_bar_(lane_rows(as_size(task.model().nu()))),
+      action_bar_(lane_rows(task.spec().action.size())),
+      task_state_bar_(lane_rows(as_size(task.spec().task_state))),
       shown_(lane_rows(task.spec().observation_size())),
       shown_q_(start_q_),
       shown_v_(start_q_),
-      by_reward_(kBlock) {
+      reward_bar_(kBlock) {
   if (task_.spec().reads_tactile) check_has_no_lag(task_.model());
   const auto end_effectors = lane_rows(task.end_effectors_size()),
              tactile = lane_rows(task.tactile_size());
-  moments_.assign(to_moments_.size(), {start_q_, start_v_, end_effectors, tactile});
+  snapshots_bar_.assign(snapshot_cotangents_.size(), {start_q_, start_v_, end_effectors, tactile});
   if (task_.spec().warm_up)
-    opening_.assign(moments_.size() - 1,
+    warm_up_.assign(snapshots_bar_.size() - 1,
                     {lane_rows(as_size(task.model().nq())), start_v_, end_effectors, tactile});
 }
 
@@ -110,16 +110,16 @@ void TaskBlock::start(std::uint64_t seed, EpisodeRange episodes) {
   start_forward();
   took_.fill(false);
   for (int l = 0; l < lanes(); ++l) {
-    start_memory_[as_size(l)] = rollout_.batch().shear_state(l);
+    start_shear_[as_size(l)] = rollout_.batch().shear_state(l);
     const std::span<const Snapshot> seen = rollout_.start_view(l).snapshots;
-    for (std::size_t m = 0; m < opening_.size(); ++m) {
+    for (std::size_t m = 0; m < warm_up_.size(); ++m) {
       const auto keep = [l](std::span<const double> from, std::vector<double>& to) {
         std::copy(from.begin(), from.end(), part(to, l).begin());
       };
-      keep(seen[m].q, opening_[m].q);
-      keep(seen[m].v, opening_[m].v);
-      keep(seen[m].end_effectors, opening_[m].end_effectors);
-      keep(seen[m].tactile, opening_[m].tactile);
+      keep(seen[m].q, warm_up_[m].q);
+      keep(seen[m].v, warm_up_[m].v);
+      keep(seen[m].end_effectors, warm_up_[m].end_effectors);
+      keep(seen[m].tactile, warm_up_[m].tactile);
     }
   }
 }
@@ -156,21 +156,21 @@ void TaskBlock::retake_steps(std::int64_t action, bool from_checkpoint, BlockTap
 
 void TaskBlock::begin_reverse() {
   start_back();
-  clear({&by_memory_, &shown_, &shown_q_, &shown_v_});
+  clear({&task_state_bar_, &shown_, &shown_q_, &shown_v_});
 }
 
-void TaskBlock::add_shown(const ActionCotangents& by) {
+void TaskBlock::add_to_shown(const ActionCotangents& by) {
   add_rows(by.observation, shown_);
   add_rows(by.q, shown_q_);
   add_rows(by.v, shown_v_);
 }
 
 void TaskBlock::reverse(std::int64_t action, const ActionCotangents& by,
-                        std::span<double> by_action) {
-  add_shown(by);
-  clear({&by_reward_});
-  add_rows(by.reward, by_reward_);
-  std::fill(by_action.begin(), by_action.end(), 0.0);
+                        std::span<double> action_bar) {
+  add_to_shown(by);
+  clear({&reward_bar_});
+  add_rows(by.reward, reward_bar_);
+  std::fill(action_bar.begin(), action_bar.end(), 0.0);
   if (action >= taken_) return;  // no lane took it
   reverse_tape(rollout_.batch(), 0);
   const ActionRecord& r = records_[as_size(action)];
@@ -180,7 +180,7 @@ void TaskBlock::reverse(std::int64_t action, const ActionCotangents& by,
     for (std::size_t k = 0; k < spec.size(); ++k) {
       const double asked = part(r.chosen, l)[k];
       if (asked >= spec.low && asked <= spec.high)
-        by_action[as_size(l) * spec.size() + k] = part(by_action_, l)[k];
+        action_bar[as_size(l) * spec.size() + k] = part(action_bar_, l)[k];
     }
     for (std::vector<double>* x : {&shown_, &shown_q_, &shown_v_})  // already added
       std::ranges::fill(part(*x, l), 0.0);
@@ -193,22 +193,22 @@ void TaskBlock::reverse_steps(std::int64_t action, const BlockTape& tape) {
   const ActionRecord& r = records_[as_size(action)];
   const std::vector<int>& looks = task_.spec().snapshots;
   const int every = task_.spec().control_every;
-  clear({&start_q_, &start_v_, &by_u_, &by_action_});
+  clear({&start_q_, &start_v_, &u_bar_, &action_bar_});
   rollout_.recompute_snapshots(tape);
   reverse_outcome(r, action);
   std::size_t next = looks.size();
   for (int t = task_.spec().steps_per_action; t > 0; --t) {
     if (next > 0 && looks[next - 1] == t) {
       tape.show(t, rollout_.batch(), 0);
-      add_moment(--next);
+      add_snapshot(--next);
     }
     if (t % every == 0 || t == task_.spec().steps_per_action)
       rollout_.recompute_controls(r, action, (t - 1) / every * every, tape);
     adjoint_.reverse_step(rollout_.batch(), 0, tape, t - 1, rollout_.u());
     for (int l = 0; l < lanes(); ++l) {
-      const std::span<double> by_u = part(by_u_, l);
-      for (std::size_t k = 0; k < by_u.size(); ++k)
-        by_u[k] += adjoint_.loss(0).u[k * kBlock + as_size(l)];
+      const std::span<double> u_bar = part(u_bar_, l);
+      for (std::size_t k = 0; k < u_bar.size(); ++k)
+        u_bar[k] += adjoint_.loss(0).u[k * kBlock + as_size(l)];
     }
     if ((t - 1) % every == 0) reverse_controls(r, action, t - 1, tape);
   }
@@ -218,25 +218,25 @@ void TaskBlock::reverse_steps(std::int64_t action, const BlockTape& tape) {
 /// Pulls cotangents of the reward, the observation and the state after an action back to the
 /// snapshots, the task state and the action.
 void TaskBlock::reverse_outcome(const ActionRecord& r, std::int64_t action) {
-  clear_moments();
+  clear_snapshots();
   for (int l = 0; l < lanes(); ++l) {
     if (!r.taken[as_size(l)]) continue;
     const TaskView view =
         rollout_.view(r, action + 1, l, part(r.task_state, l), rollout_.snapshots(l));
-    const ViewCotangent to{cotangents(l), part(by_action_, l), part(by_memory_, l)};
-    const double weight = by_reward_[as_size(l)];
+    const ViewCotangent to{cotangents(l), part(action_bar_, l), part(task_state_bar_, l)};
+    const double weight = reward_bar_[as_size(l)];
     if (weight != 0) task_.reward_vjp(view, weight, to);
-    reverse_shown(view, l, to);
+    reverse_observation(view, l, to);
   }
 }
 
-void TaskBlock::clear_moments() {
-  for (MomentRows& m : moments_) clear({&m.q, &m.v, &m.end_effectors, &m.tactile});
+void TaskBlock::clear_snapshots() {
+  for (SnapshotRows& m : snapshots_bar_) clear({&m.q, &m.v, &m.end_effectors, &m.tactile});
 }
 
 /// Pulls cotangents of a lane's observation and state back and adds them. An observation with zero
 /// cotangent needs no derivative.
-void TaskBlock::reverse_shown(const TaskView& view, int lane, const ViewCotangent& to) {
+void TaskBlock::reverse_observation(const TaskView& view, int lane, const ViewCotangent& to) {
   const std::span<const double> weight = part(shown_, lane);
   if (std::any_of(weight.begin(), weight.end(), [](double w) { return w != 0; }))
     task_.observe_vjp(view, weight, to);
@@ -248,8 +248,8 @@ void TaskBlock::reverse_shown(const TaskView& view, int lane, const ViewCotangen
 }
 
 /// Adds cotangents of a snapshot, whose state is in the batch, to those of the state.
-void TaskBlock::add_moment(std::size_t moment) {
-  const MomentRows& m = moments_[moment];
+void TaskBlock::add_snapshot(std::size_t moment) {
+  const SnapshotRows& m = snapshots_bar_[moment];
   BlockCotangent& c = adjoint_.loss(0);
   for (int l = 0; l < lanes(); ++l) {
     const std::span<const double> q = part(m.q, l), v = part(m.v, l);
@@ -266,8 +266,8 @@ void TaskBlock::add_moment(std::size_t moment) {
 }
 
 void TaskBlock::add_fields(std::size_t moment, int lane) {
-  const std::span<const double> end_effectors = part(moments_[moment].end_effectors, lane);
-  std::span<const double> fields = part(moments_[moment].tactile, lane);
+  const std::span<const double> end_effectors = part(snapshots_bar_[moment].end_effectors, lane);
+  std::span<const double> fields = part(snapshots_bar_[moment].tactile, lane);
   for (std::size_t k = 0; 3 * k < end_effectors.size(); ++k)
     pullback_.end_effector(lane, static_cast<int>(k), end_effectors.subspan(3 * k, 3));
   const auto sensors = task_.model().sensors();
@@ -287,9 +287,9 @@ void TaskBlock::reverse_controls(const ActionRecord& r, std::int64_t action, int
     const Snapshot first = rollout_.first_moment(tape, l);
     const SnapshotCotangent to{part(start_q_, l), part(start_v_, l), {}, {}};
     task_.controls_vjp(rollout_.view(r, action, l, part(r.task_state, l), {&first, 1}), step,
-                       part(by_u_, l), {{&to, 1}, part(by_action_, l), part(by_memory_, l)});
+                       part(u_bar_, l), {{&to, 1}, part(action_bar_, l), part(task_state_bar_, l)});
   }
-  std::fill(by_u_.begin(), by_u_.end(), 0.0);
+  std::fill(u_bar_.begin(), u_bar_.end(), 0.0);
 }
 
 /// Pulls cotangents back through the restart and the update of the task state to the state in which
@@ -303,8 +303,8 @@ void TaskBlock::reverse_start(const ActionRecord& r, std::int64_t action) {
       return rows[i * kBlock + as_size(l)];
     };
     const std::span<double> q = part(start_q_, l), v = part(start_v_, l),
-                            memory = part(by_memory_, l);
-    const std::span<double> by_action = part(by_action_, l);
+                            memory = part(task_state_bar_, l);
+    const std::span<double> action_bar = part(action_bar_, l);
     const Snapshot seen{part(r.q, l), part(r.v, l), {}, {}};
     if (task_.spec().restarts) {
       std::vector<double> placed_q(q.begin(), q.end()), placed_v(v.begin(), v.end());
@@ -316,11 +316,11 @@ void TaskBlock::reverse_start(const ActionRecord& r, std::int64_t action) {
       c.shear[as_size(l)].clear();  // a restart clears the shear state
       const SnapshotCotangent to{q, v, {}, {}};
       task_.restart_state_vjp(rollout_.view(r, action, l, part(r.task_state, l), {&seen, 1}),
-                              placed_q, placed_v, {{&to, 1}, by_action, memory});
+                              placed_q, placed_v, {{&to, 1}, action_bar, memory});
     }
     const SnapshotCotangent to{q, v, {}, {}};
     task_.begin_action_vjp(rollout_.view(r, action, l, part(r.found, l), {&seen, 1}), memory,
-                           {{&to, 1}, by_action, {}});
+                           {{&to, 1}, action_bar, {}});
     for (std::size_t i = 0; i < nv; ++i) {
       at(c.q, i) += q[i];
       at(c.v, i) += v[i];
@@ -329,16 +329,16 @@ void TaskBlock::reverse_start(const ActionRecord& r, std::int64_t action) {
 }
 
 std::span<const SnapshotCotangent> TaskBlock::cotangents(int lane) {
-  for (std::size_t m = 0; m < moments_.size(); ++m) {
-    MomentRows& rows = moments_[m];
-    to_moments_[m] = {part(rows.q, lane), part(rows.v, lane), part(rows.end_effectors, lane),
-                      part(rows.tactile, lane)};
+  for (std::size_t m = 0; m < snapshots_bar_.size(); ++m) {
+    SnapshotRows& rows = snapshots_bar_[m];
+    snapshot_cotangents_[m] = {part(rows.q, lane), part(rows.v, lane),
+                               part(rows.end_effectors, lane), part(rows.tactile, lane)};
   }
-  return to_moments_;
+  return snapshot_cotangents_;
 }
 
 /// Copies the states in which the first actions began into the batch.
-void TaskBlock::show_start() {
+void TaskBlock::add_start_to_shown() {
   const EnvironmentData& data = rollout_.data();
   const std::size_t nq = as_size(model_.nq()), nv = as_size(model_.nv());
   for (int l = 0; l < lanes(); ++l) {
@@ -348,23 +348,24 @@ void TaskBlock::show_start() {
     };
     rollout_.batch().displace_state(l, first(records_[0].q, data.q, nq),
                                     first(records_[0].v, data.v, nv));
-    rollout_.batch().set_shear_state(l, start_memory_[as_size(l)]);
+    rollout_.batch().set_shear_state(l, start_shear_[as_size(l)]);
   }
   rollout_.record_start();
 }
 
-void TaskBlock::reverse_reset(const ActionCotangents& by, std::span<double> by_q,
-                              std::span<double> by_v, std::span<double> by_parameter) {
-  add_shown(by);
-  show_start();
-  clear_moments();
+void TaskBlock::reverse_reset(const ActionCotangents& by, std::span<double> q_bar,
+                              std::span<double> v_bar, std::span<double> parameter_bar) {
+  add_to_shown(by);
+  add_start_to_shown();
+  clear_snapshots();
   const std::vector<double> no_action(task_.spec().action.size());
-  std::vector<double> by_no_action(no_action.size()), by_memory(as_size(task_.spec().task_state));
+  std::vector<double> by_no_action(no_action.size()),
+      task_state_bar(as_size(task_.spec().task_state));
   for (int l = 0; l < lanes(); ++l) {
     TaskView view = rollout_.start_view(l);
     std::vector<Snapshot> seen(view.snapshots.begin(), view.snapshots.end());
-    for (std::size_t m = 0; m < opening_.size(); ++m) {
-      const MomentRows& kept = opening_[m];
+    for (std::size_t m = 0; m < warm_up_.size(); ++m) {
+      const SnapshotRows& kept = warm_up_[m];
       seen[m] = {part(kept.q, l), part(kept.v, l), part(kept.end_effectors, l),
                  part(kept.tactile, l)};
     }
@@ -372,15 +373,15 @@ void TaskBlock::reverse_reset(const ActionCotangents& by, std::span<double> by_q
     view.action = no_action;
     if (taken_ > 0) view.task_state = part(records_[0].found, l);
     view.snapshots = seen;
-    reverse_shown(view, l, {cotangents(l).last(seen.size()), by_no_action, by_memory});
+    reverse_observation(view, l, {cotangents(l).last(seen.size()), by_no_action, task_state_bar});
   }
-  add_moment(moments_.size() - 1);
+  add_snapshot(snapshots_bar_.size() - 1);
   for (int l = 0; l < lanes(); ++l) {
     const auto own = [&](std::span<double> all) {
       const std::size_t width = all.size() / as_size(lanes());
       return all.subspan(as_size(l) * width, width);
     };
-    get_start(0, rollout_.batch(), l, own(by_q), own(by_v), own(by_parameter), {});
+    get_start(0, rollout_.batch(), l, own(q_bar), own(v_bar), own(parameter_bar), {});
   }
 }
 
@@ -410,15 +411,15 @@ void TaskBlock::play(std::uint64_t seed, EpisodeRange episodes, const TaskAction
   begin_reverse();
   const std::size_t width = task_.spec().action.size(), row = as_size(options_.length) * width;
   const std::vector<double> ones(as_size(count), 1.0);
-  std::vector<double> by_action(as_size(count) * width);
+  std::vector<double> action_bar(as_size(count) * width);
   for (std::int64_t a = taken_ - 1; a >= 0 && may_go_on(); --a) {
-    reverse(a, {.reward = ones}, by_action);
+    reverse(a, {.reward = ones}, action_bar);
     for (int l = 0; l < count; ++l) {
       if (!records_[as_size(a)].taken[as_size(l)]) continue;
       const std::size_t at = as_size(to + l) * row + as_size(a) * width;
       std::ranges::copy(part(records_[as_size(a)].chosen, l),
                         out.action.begin() + std::ptrdiff_t(at));
-      std::ranges::copy(number_row(by_action, l, width), out.u.begin() + std::ptrdiff_t(at));
+      std::ranges::copy(number_row(action_bar, l, width), out.u.begin() + std::ptrdiff_t(at));
     }
   }
   if (!stopped()) finish_return(to, out);

@@ -37,11 +37,11 @@ class TaskBlock : public TapeBlock {
   void begin_reverse();
   /// Reverses action number `action` and fills derivatives by it, (lanes, action). All spans hold
   /// the block's lanes, in their order.
-  void reverse(std::int64_t action, const ActionCotangents& by, std::span<double> by_action);
+  void reverse(std::int64_t action, const ActionCotangents& by, std::span<double> action_bar);
   /// Ends the reverse pass: takes cotangents of the results of the reset, and fills those of the
   /// first states and the scene's parameters. Skips empty spans.
-  void reverse_reset(const ActionCotangents& by, std::span<double> by_q, std::span<double> by_v,
-                     std::span<double> by_parameter);
+  void reverse_reset(const ActionCotangents& by, std::span<double> q_bar, std::span<double> v_bar,
+                     std::span<double> parameter_bar);
 
   /// Plays up to 16 episodes and reverses their returns. Writes results to places `to`, to + 1 … of
   /// `out`, and failures with these places as their numbers.
@@ -53,23 +53,23 @@ class TaskBlock : public TapeBlock {
 
  private:
   /// Rows of lanes: the numbers of one snapshot, or their cotangents.
-  struct MomentRows {
+  struct SnapshotRows {
     std::vector<double> q, v, end_effectors, tactile;  // (16, width)
   };
   void take_steps(std::int64_t action, BlockTape* tape) override;
   void retake_steps(std::int64_t action, bool from_checkpoint, BlockTape& tape) override;
   void reverse_steps(std::int64_t action, const BlockTape& tape) override;
   void take(ActionRecord& record);
-  void add_shown(const ActionCotangents& by);
-  void clear_moments();
+  void add_to_shown(const ActionCotangents& by);
+  void clear_snapshots();
   void reverse_outcome(const ActionRecord& r, std::int64_t action);
-  void reverse_shown(const TaskView& view, int lane, const ViewCotangent& to);
-  void add_moment(std::size_t moment);
+  void reverse_observation(const TaskView& view, int lane, const ViewCotangent& to);
+  void add_snapshot(std::size_t moment);
   void add_fields(std::size_t moment, int lane);
   void reverse_controls(const ActionRecord& r, std::int64_t action, int step,
                         const BlockTape& tape);
   void reverse_start(const ActionRecord& r, std::int64_t action);
-  void show_start();
+  void add_start_to_shown();
   void finish_return(std::int64_t to, TaskGradients& out);
   /// A lane's cotangents of all snapshots, valid until the next call.
   [[nodiscard]] std::span<const SnapshotCotangent> cotangents(int lane);
@@ -79,17 +79,18 @@ class TaskBlock : public TapeBlock {
   TaskRollout rollout_;
   std::vector<ActionRecord> records_;  // (actions)
   std::array<bool, kernels::kBlock> took_{};
-  std::array<ShearState, kernels::kBlock> start_memory_;  // shear states at the reset
-  std::vector<MomentRows> opening_;  // snapshots of a warm-up before its last one
+  std::array<ShearState, kernels::kBlock> start_shear_;  // shear states at the reset
+  std::vector<SnapshotRows> warm_up_;  // snapshots of a warm-up before its last one
   // Cotangents for the action reversed last: of its snapshots, first state, controls, and itself.
-  std::vector<MomentRows> moments_;
-  std::vector<SnapshotCotangent> to_moments_;
-  std::vector<double> start_q_, start_v_, by_u_, by_action_;  // (16, nv), …, (16, nu), (16, action)
-  std::vector<double> by_memory_;                             // (16, task state) after begin_action
+  std::vector<SnapshotRows> snapshots_bar_;
+  std::vector<SnapshotCotangent> snapshot_cotangents_;
+  std::vector<double> start_q_, start_v_, u_bar_,
+      action_bar_;                      // (16, nv), …, (16, nu), (16, action)
+  std::vector<double> task_state_bar_;  // (16, task state) after begin_action
   /// Cotangents accumulated for the observations, positions and velocities of a lane after its last
   /// unreversed action. An ended episode repeats its last state.
   std::vector<double> shown_, shown_q_, shown_v_;  // (16, observation), (16, nv), (16, nv)
-  std::vector<double> by_reward_;                  // (16)
+  std::vector<double> reward_bar_;                 // (16)
 };
 
 }  // namespace tangere

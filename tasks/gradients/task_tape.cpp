@@ -202,10 +202,10 @@ void TaskTape::step(std::span<const double> actions) {
   ++i.taken;
 }
 
-void TaskTape::reverse(const ActionCotangents& by, std::span<double> by_action) {
+void TaskTape::reverse(const ActionCotangents& by, std::span<double> action_bar) {
   Impl& i = *impl_;
   i.check_cotangents(by);
-  expect_numbers(by_action.size(), i.e * i.width, false, "derivatives by actions");
+  expect_numbers(action_bar.size(), i.e * i.width, false, "derivatives by actions");
   i.check_sound();
   if (i.to_reverse() == 0)
     throw InputError(fmt::format(
@@ -213,18 +213,18 @@ void TaskTape::reverse(const ActionCotangents& by, std::span<double> by_action) 
         i.taken));
   if (i.phase == Phase::forward) i.begin_reverse();
   i.each(Phase::back, [&](TaskBlock& block, int b) {
-    block.reverse(i.left - 1, i.of(by, b), i.of(by_action, b));
+    block.reverse(i.left - 1, i.of(by, b), i.of(action_bar, b));
   });
   --i.left;
 }
 
-void TaskTape::reverse_start(const ActionCotangents& by, std::span<double> by_q,
-                             std::span<double> by_v, std::span<double> by_parameter) {
+void TaskTape::reverse_start(const ActionCotangents& by, std::span<double> q_bar,
+                             std::span<double> v_bar, std::span<double> parameter_bar) {
   Impl& i = *impl_;
   i.check_cotangents(by);
-  expect_numbers(by_q.size(), i.e * i.nv, true, "derivatives by the first q");
-  expect_numbers(by_v.size(), i.e * i.nv, true, "derivatives by the first v");
-  expect_numbers(by_parameter.size(), i.e * i.numbers, true, "derivatives by the scene's numbers");
+  expect_numbers(q_bar.size(), i.e * i.nv, true, "derivatives by the first q");
+  expect_numbers(v_bar.size(), i.e * i.nv, true, "derivatives by the first v");
+  expect_numbers(parameter_bar.size(), i.e * i.numbers, true, "derivatives by the scene's numbers");
   i.check_sound();
   if (i.phase == Phase::done)
     throw InputError("a second end of a reverse pass; expected begin_reverse() or reset()");
@@ -235,7 +235,7 @@ void TaskTape::reverse_start(const ActionCotangents& by, std::span<double> by_q,
                     i.to_reverse(), i.taken));
   if (i.phase == Phase::forward) i.begin_reverse();
   i.each(Phase::done, [&](TaskBlock& block, int b) {
-    block.reverse_reset(i.of(by, b), i.of(by_q, b), i.of(by_v, b), i.of(by_parameter, b));
+    block.reverse_reset(i.of(by, b), i.of(q_bar, b), i.of(v_bar, b), i.of(parameter_bar, b));
   });
 }
 

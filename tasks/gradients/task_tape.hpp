@@ -69,15 +69,15 @@ class TaskTape {
   /// ended episode count for its last action. Throws InputError when every
   /// step is reversed, and when a task has no Task::observe_vjp or restart_state_vjp that it would
   /// need; then only reset() is possible.
-  void reverse(const ActionCotangents& by, std::span<double> by_action);
+  void reverse(const ActionCotangents& by, std::span<double> action_bar);
   /// Ends the reverse pass. In: cotangents of the observation at the reset and of the states at the
   /// first action (rewards are ignored). Out: cotangents of these states, (E, nv) each, positions
   /// along the dofs of v, and (E, NumberGradients::count()) of the scene's parameters if requested.
   /// Empty output spans are skipped. The reset, all random draws and snapshots of a warm-up before
   /// its last one count as constant. Throws InputError while steps are left to reverse, and at a
   /// second call.
-  void reverse_start(const ActionCotangents& by, std::span<double> by_q, std::span<double> by_v,
-                     std::span<double> by_parameter = {});
+  void reverse_start(const ActionCotangents& by, std::span<double> q_bar, std::span<double> v_bar,
+                     std::span<double> parameter_bar = {});
   /// Begins another reverse pass over the same steps, from the last one.
   void begin_reverse();
 

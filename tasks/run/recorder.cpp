@@ -61,7 +61,7 @@ Recorder::Recorder(const Batch& batch, std::span<const Stepper> steppers,
   add_solver();
   if (options.outputs.audit) add_audit();
   if (steppers.front().sleep() > 0) add_sleep();
-  if (options.outputs.memory) add_shear(options.outputs.of_memory);
+  if (options.outputs.memory) add_shear(options.outputs.shear_times);
   add_readings();
   add_randomized();
   if (task != nullptr) add_task();
@@ -230,7 +230,7 @@ void Recorder::add_motion() {
     const Attributes bodies{{"bodies", names}};
     recording_.groups.push_back({"bodies", {{"names", names}}});
     const auto at = [&](Read read) {
-      return Source{When::row, outputs.of_bodies, true, 1, std::move(read)};
+      return Source{When::row, outputs.body_times, true, 1, std::move(read)};
     };
     add({.name = "bodies/pose",
          .shape = {environments_, names.size(), kPoseWidth},
@@ -251,18 +251,18 @@ void Recorder::add_motion() {
          .frame = "world axes; velocity of the body frame's origin",
          .more = bodies},
         at([this](auto, int) { return std::span<const double>(twist_); }));  // read with the poses
-    if (outputs.of_bodies.given()) add_steps("bodies/step", kStepsOfRow, at({}));
+    if (outputs.body_times.given()) add_steps("bodies/step", kStepsOfRow, at({}));
   }
   if (!outputs.end_effectors || model_.end_effectors().empty()) return;
   std::vector<std::string> names;
   for (const EndEffectorInfo& info : model_.end_effectors()) names.push_back(info.name);
-  const Source source{When::row, outputs.of_end_effectors, true, 1, [this](auto, int) {
+  const Source source{When::row, outputs.end_effector_times, true, 1, [this](auto, int) {
                         for (int b = 0; b < batch_.blocks(); ++b)
                           read_end_effectors(readouts_[0], batch_, b,
                                              [this](int e) { return part(end_effectors_, e); });
                         return std::span<const double>(end_effectors_);
                       }};
-  if (outputs.of_end_effectors.given()) add_steps("variables/step", kStepsOfRow, source);
+  if (outputs.end_effector_times.given()) add_steps("variables/step", kStepsOfRow, source);
   add({.name = "variables/position",
        .shape = {environments_, names.size(), kPositionWidth},
        .names = names,
@@ -354,7 +354,7 @@ void Recorder::add_readings() {
     channel.more = {{"every", times.final ? options_.first_step + options_.steps : times.every}};
     for (RunAttribute& one : reading_attributes(layout, output.form))
       channel.more.push_back(std::move(one));
-    if (output.form != FieldForm::sum) channel.storage = Channel::Storage::by_environment;
+    if (output.form != FieldForm::sum) channel.storage = Channel::Storage::per_environment;
     const Source source{When::row, times, false, 1, [this, output](auto, int) {
                           const std::span<double> numbers =
                               std::span(reading_).first(environments_ * numbers_in(model_, output));

@@ -20,7 +20,7 @@ struct RolloutOutputs {
   bool memory = false;  ///< shear state
   /// Rows at which q and v, bodies, end effectors and shear state are written; none: every row. If
   /// `states` are given, controls are not written, and steps only if they end at a row of q.
-  OutputTimes states = {}, of_bodies = {}, of_end_effectors = {}, of_memory = {};
+  OutputTimes states = {}, body_times = {}, end_effector_times = {}, shear_times = {};
   std::vector<int> chosen_bodies = {};  ///< ascending; none: every body
 };
 

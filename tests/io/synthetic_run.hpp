@@ -62,7 +62,7 @@ inline void add_sensor(Recording& recording, const SensorLayout& sensor, std::in
   for (const std::uint64_t n : reading_shape(sensor, FieldForm::field)) field.shape.push_back(n);
   field.more = reading_attributes(sensor, FieldForm::field);
   field.more.push_back({"every", std::int64_t{2}});
-  field.storage = Channel::Storage::by_environment;
+  field.storage = Channel::Storage::per_environment;
   recording.channels.push_back(field);
   recording.channels.push_back(
       {.name = group + "step", .type = NumberType::int64, .shape = {}, .rows = steps / 2});

@@ -204,7 +204,7 @@ TEST(SceneNumbers, NoKindIsForgotten) {
     if (!kind.field) continue;
     for (const auto owner : {NumberOwner::contact, NumberOwner::ground, NumberOwner::tactile,
                              NumberOwner::body, NumberOwner::joint, NumberOwner::motor}) {
-      if ((kind.of & element_of(owner)) == 0) continue;
+      if ((kind.elements & element_of(owner)) == 0) continue;
       const std::string of = owner_of({owner, *kind.field, ""});
       const bool indexed = kind.has(kIndexed);
       const auto is_of = [&](const Row& row) {

@@ -29,9 +29,9 @@ std::string page() {
 std::string types_text(const Attribute& a) {
   if (a.types == nullptr) return "";
   std::vector<std::string> all, left_out;
-  if ((a.of & kBody) != 0)
+  if ((a.elements & kBody) != 0)
     for (const ShapeRow& row : shape_rows()) all.emplace_back(row.name);
-  if ((a.of & kJoint) != 0)
+  if ((a.elements & kJoint) != 0)
     for (int k = 0; k <= static_cast<int>(JointType::free); ++k)
       all.emplace_back(to_string(static_cast<JointType>(k)));
   for (const std::string& type : all)
@@ -44,7 +44,7 @@ std::string types_text(const Attribute& a) {
 
 std::string unit_text(const Attribute& a) {
   std::string text = a.unit == Unit::one ? "" : to_string(a.unit);
-  if (a.other != Unit::one) text += std::string(", ") + to_string(a.other);
+  if (a.other_unit != Unit::one) text += std::string(", ") + to_string(a.other_unit);
   return text;
 }
 
@@ -52,14 +52,14 @@ std::string row_text(const Attribute& a) {
   std::string text = types_text(a);
   if (a.words != nullptr) text += fmt::format("{}; ", fmt::join(words_of(a.words), ", "));
   return fmt::format("| `{}` | {} | {} | {}{} | {}{} |\n", a.name,
-                     a.usual == nullptr ? "needed" : a.usual, unit_text(a),
+                     a.default_text == nullptr ? "needed" : a.default_text, unit_text(a),
                      a.has(kVaries) ? "v" : "", a.has(kGradient) ? "g" : "", text, a.text);
 }
 
 std::string table(Element element) {
   std::string text = "| attribute | default | unit | | |\n|---|---|---|---|---|\n", pictures;
   for (const Attribute& a : schema()) {
-    if ((a.of & element) == 0 || a.has(kLeftOver)) continue;
+    if ((a.elements & element) == 0 || a.has(kIgnored)) continue;
     if (a.has(kPicture))
       pictures += fmt::format("{}`{}`", pictures.empty() ? "" : ", ", a.name);
     else
@@ -97,8 +97,8 @@ TEST(Schema, DefaultsAreThoseOfTheStructs) {
     for_each_member<T>(element, [&](const Attribute& a, auto member) {
       using Value = std::remove_cvref_t<decltype(of.*member)>;
       if constexpr (std::is_arithmetic_v<Value>) {
-        if (a.usual == nullptr || *a.usual == '\0') return;
-        EXPECT_EQ(std::stod(a.usual), double(of.*member)) << a.name;
+        if (a.default_text == nullptr || *a.default_text == '\0') return;
+        EXPECT_EQ(std::stod(a.default_text), double(of.*member)) << a.name;
       }
     });
   };

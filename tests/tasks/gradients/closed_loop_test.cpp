@@ -131,15 +131,15 @@ class ClosedLoop {
   /// Goes back through the episode played last.
   LoopInputs gradient(const LoopInputs& at) {
     LoopInputs g{Numbers(at.w.size()), Numbers(at.b.size()), Numbers(nv_), Numbers(nv_)};
-    Numbers by_o = end_o_, by_action(width_);
+    Numbers by_o = end_o_, action_bar(width_);
     const Numbers one{1};
     ActionCotangents by{by_o, one, end_q_, end_v_};
     for (std::size_t t = n_; t-- > 0;) {
-      tape_.reverse(by, by_action);
+      tape_.reverse(by, action_bar);
       by.q = by.v = {};
       std::fill(by_o.begin(), by_o.end(), 0.0);
       for (std::size_t k = 0; k < width_; ++k) {
-        const double inner = by_action[k] * kSway * (1 - squashed_[t][k] * squashed_[t][k]);
+        const double inner = action_bar[k] * kSway * (1 - squashed_[t][k] * squashed_[t][k]);
         g.b[k] += inner;
         for (std::size_t j = 0; j < seen_; ++j) {
           g.w[k * seen_ + j] += inner * observed_[t][j];

@@ -84,7 +84,7 @@ struct Pushes {
 };
 
 /// Sums over the steps that hold an action; zero for controls that are not optimised.
-std::vector<double> by_actions(const Pushes& p, std::span<const double> by_steps) {
+std::vector<double> actions_bar(const Pushes& p, std::span<const double> by_steps) {
   const std::size_t nu = std::size_t(p.model.nu()), steps = std::size_t(kActions * kHeld);
   std::vector<double> out(p.actions.size());
   for (std::size_t e = 0; e < kEnvironments; ++e)
@@ -138,7 +138,7 @@ TEST(Descent, FiftyAdamStepsHalveTheDistanceOfAPushedBox) {
         Batch(p.model, kEnvironments, 1),
         [&](std::int64_t t, int e, std::span<double> u) { p.controls(t, e, u); }, options, losses);
     ASSERT_TRUE(g.failures.empty());
-    adam.step(p.actions, by_actions(p, g.losses[0].u));
+    adam.step(p.actions, actions_bar(p, g.losses[0].u));
   }
   const double after = mean_distance(p, loss);
   RecordProperty("mean_distance_before", std::to_string(before));
@@ -217,19 +217,19 @@ TEST(Descent, BackPropagationThroughTimeTrainsAPolicyThatPushes) {
     }
     after = sum;
     if (k == 0) before = sum;
-    std::vector<double> down(weights.size()), by_observation, by_action(kEnvironments * kWidth);
-    const std::vector<double> by_reward(kEnvironments, -1.0 / kEnvironments);
+    std::vector<double> down(weights.size()), observation_bar, action_bar(kEnvironments * kWidth);
+    const std::vector<double> reward_bar(kEnvironments, -1.0 / kEnvironments);
     for (std::size_t t = kActions; t-- > 0;) {
-      tape.reverse({by_observation, by_reward}, by_action);
-      by_observation.assign(kEnvironments * seen, 0.0);
+      tape.reverse({observation_bar, reward_bar}, action_bar);
+      observation_bar.assign(kEnvironments * seen, 0.0);
       for (std::size_t e = 0; e < kEnvironments; ++e)
         for (std::size_t i = 0; i < kWidth; ++i) {
           const double squashed = actions[t][e * kWidth + i];
-          const double inner = by_action[e * kWidth + i] * kMost * (1 - squashed * squashed);
+          const double inner = action_bar[e * kWidth + i] * kMost * (1 - squashed * squashed);
           for (std::size_t j = 0; j < inputs; ++j)
             down[i * inputs + j] += inner * observed[t][e * inputs + j];
           for (std::size_t j = 0; j < seen; ++j)
-            by_observation[e * seen + j] += inner * kScale * weights[i * inputs + j];
+            observation_bar[e * seen + j] += inner * kScale * weights[i * inputs + j];
         }
     }
     adam.step(weights, down);

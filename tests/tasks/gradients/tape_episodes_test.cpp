@@ -184,29 +184,29 @@ void check_by_differences(Watching how) {
       for (const double y : x) square += y * y;
       return std::sqrt(square);
     };
-    const Row by_action = rows_of(swept.by_action, kEnvironments, std::size_t(e), kActions),
-              by_q = rows_of(swept.by_q, kEnvironments, std::size_t(e), 1),
-              by_v = rows_of(swept.by_v, kEnvironments, std::size_t(e), 1);
-    EXPECT_GT(norm(by_action), 0);
+    const Row action_bar = rows_of(swept.action_bar, kEnvironments, std::size_t(e), kActions),
+              q_bar = rows_of(swept.q_bar, kEnvironments, std::size_t(e), 1),
+              v_bar = rows_of(swept.v_bar, kEnvironments, std::size_t(e), 1);
+    EXPECT_GT(norm(action_bar), 0);
     for (std::size_t t = 0; t < std::size_t(kActions); ++t)
       for (std::size_t k = 0; k < width; ++k) {
-        compare(by_action[t * width + k], "action " + std::to_string(t) + " " + std::to_string(k),
-                norm(by_action), [&](double h) {
+        compare(action_bar[t * width + k], "action " + std::to_string(t) + " " + std::to_string(k),
+                norm(action_bar), [&](double h) {
                   Row moved = given;
                   moved[(t * kEnvironments + std::size_t(e)) * width + k] += h;
                   return watched_sum(tape, e, q, v, moved, kActions);
                 });
         if (e == 3 && t > 2) {
-          EXPECT_EQ(by_action[t * width + k], 0) << "after the failure";
+          EXPECT_EQ(action_bar[t * width + k], 0) << "after the failure";
         }
       }
     for (std::size_t i = 0; i < 3; ++i) {  // the pad's; the ball stands on stiff ground
-      compare(by_q[i], "q " + std::to_string(i), norm(by_q), [&](double h) {
+      compare(q_bar[i], "q " + std::to_string(i), norm(q_bar), [&](double h) {
         Row moved = q;
         displace(task.model(), moved, int(i), h);
         return watched_sum(tape, e, moved, v, given, kActions);
       });
-      compare(by_v[i], "v " + std::to_string(i), norm(by_v), [&](double h) {
+      compare(v_bar[i], "v " + std::to_string(i), norm(v_bar), [&](double h) {
         Row moved = v;
         moved[i] += h;
         return watched_sum(tape, e, q, moved, given, kActions);
@@ -300,8 +300,8 @@ TEST(TapeEpisodes, NeighboursThatFailOrReceiveNoNumbersChangeNothing) {
     EXPECT_TRUE(failed(broken.status(3)));
     for (std::size_t e = 0; e < 18; ++e)
       if (e != 3 && e != 5) expect_same_rows(of_whole, 18, e, of_broken, 18, e, 6);
-    EXPECT_TRUE(std::isnan(rows_of(of_broken.by_action, 18, 5, 6)[0]));
-    for (const double x : rows_of(of_broken.by_action, 18, 3, 6)) EXPECT_TRUE(std::isfinite(x));
+    EXPECT_TRUE(std::isnan(rows_of(of_broken.action_bar, 18, 5, 6)[0]));
+    for (const double x : rows_of(of_broken.action_bar, 18, 3, 6)) EXPECT_TRUE(std::isfinite(x));
   }
 }
 
@@ -333,14 +333,14 @@ TEST(TapeEpisodes, EndedEpisodesKeepWhatTheyShow) {
   const auto go_back = [&](bool at_the_end) {
     Row all;
     for (std::int64_t t = kActions; t-- > 0;) {
-      Row by_o(kEpisodes * 520), by_action(kEpisodes * 3), by_q(kEpisodes * 12);
+      Row by_o(kEpisodes * 520), action_bar(kEpisodes * 3), q_bar(kEpisodes * 12);
       for (std::size_t e = 0; e < kEpisodes; ++e)
         if (t + 1 == (at_the_end ? kActions : last[e])) {
           for (std::size_t k = 0; k < 520; ++k) by_o[e * 520 + k] = keyed(std::int64_t(e), 0, k);
-          for (std::size_t k = 0; k < 12; ++k) by_q[e * 12 + k] = keyed(std::int64_t(e), 1, k);
+          for (std::size_t k = 0; k < 12; ++k) q_bar[e * 12 + k] = keyed(std::int64_t(e), 1, k);
         }
-      tape.reverse({.observation = by_o, .q = by_q}, by_action);
-      all.insert(all.end(), by_action.begin(), by_action.end());
+      tape.reverse({.observation = by_o, .q = q_bar}, action_bar);
+      all.insert(all.end(), action_bar.begin(), action_bar.end());
     }
     return all;
   };
@@ -358,11 +358,11 @@ TEST(TapeEpisodes, AnActionBeyondItsBoundsHasNoDerivativeOnTape) {
   TaskTape tape(*task, 3, tape_options(0), kTapeSeed);
   const Row actions{0.5, 0.6, -0.7}, ones(3, 1);
   tape.step(actions);
-  Row by_action(3);
-  tape.reverse({.reward = ones}, by_action);
-  EXPECT_NE(by_action[0], 0) << "on the bound it is that of its inside";
-  EXPECT_EQ(by_action[1], 0);
-  EXPECT_EQ(by_action[2], 0);
+  Row action_bar(3);
+  tape.reverse({.reward = ones}, action_bar);
+  EXPECT_NE(action_bar[0], 0) << "on the bound it is that of its inside";
+  EXPECT_EQ(action_bar[1], 0);
+  EXPECT_EQ(action_bar[2], 0);
 }
 
 TEST(TapeEpisodes, MemoryGrowsByBlocksUpToTheLimitOfTapes) {
@@ -394,10 +394,10 @@ TEST(TapeEpisodes, MisuseIsRefused) {
   EXPECT_THROW(TaskTape(*task, 1, tape_options(3, 0)), InputError);
   EXPECT_THROW(TaskTape(*task, 1, tape_options(3, 1, NAN)), InputError);
   TaskTape tape(*task, 2, tape_options(2), kTapeSeed);
-  Row actions(2), by_action(2), two(2), wrong(3);
+  Row actions(2), action_bar(2), two(2), wrong(3);
   const Row q(tape.q().begin(), tape.q().begin() + task->model().nq()),
       v(std::size_t(task->model().nv()));
-  expect_refusal([&] { tape.reverse({}, by_action); }, "one more reverse");
+  expect_refusal([&] { tape.reverse({}, action_bar); }, "one more reverse");
   expect_refusal([&] { tape.step(wrong); }, "3 numbers of actions; expected 2");
   actions[1] = INFINITY;
   expect_refusal([&] { tape.step(actions); }, "number 0 of action 0 of environment 1 is inf");
@@ -409,21 +409,21 @@ TEST(TapeEpisodes, MisuseIsRefused) {
   expect_refusal([&] { tape.reverse_start({}, {}, {}); }, "1 of 1 actions left");
   tape.step(actions);  // refused calls have left no trace
   expect_refusal([&] { tape.step(actions); }, "action 2 on a tape of 2 actions");
-  expect_refusal([&] { tape.reverse({wrong}, by_action); }, "3 numbers of derivatives by obs");
-  expect_refusal([&] { tape.reverse({{}, wrong}, by_action); }, "derivatives by rewards");
+  expect_refusal([&] { tape.reverse({wrong}, action_bar); }, "3 numbers of derivatives by obs");
+  expect_refusal([&] { tape.reverse({{}, wrong}, action_bar); }, "derivatives by rewards");
   expect_refusal([&] { tape.reverse({}, wrong); }, "derivatives by actions");
-  expect_refusal([&] { tape.reverse({.q = wrong}, by_action); }, "derivatives by q");
-  expect_refusal([&] { tape.reverse({.v = wrong}, by_action); }, "derivatives by v");
-  tape.reverse({.reward = two}, by_action);
+  expect_refusal([&] { tape.reverse({.q = wrong}, action_bar); }, "derivatives by q");
+  expect_refusal([&] { tape.reverse({.v = wrong}, action_bar); }, "derivatives by v");
+  tape.reverse({.reward = two}, action_bar);
   expect_refusal([&] { tape.step(actions); }, "has been reversed");
-  tape.reverse({.reward = two}, by_action);
-  expect_refusal([&] { tape.reverse({.reward = two}, by_action); }, "one more reverse");
+  tape.reverse({.reward = two}, action_bar);
+  expect_refusal([&] { tape.reverse({.reward = two}, action_bar); }, "one more reverse");
   expect_refusal([&] { tape.reverse_start({}, wrong, {}); }, "derivatives by the first q");
   expect_refusal([&] { tape.reverse_start({}, {}, {}, wrong); }, "the scene's numbers");
   tape.reverse_start({}, {}, {});
   expect_refusal([&] { tape.reverse_start({}, {}, {}); }, "a second end");
   tape.begin_reverse();
-  tape.reverse({.reward = two}, by_action);
+  tape.reverse({.reward = two}, action_bar);
   tape.reset(1, 0);
   tape.step(actions);
 }
@@ -431,13 +431,13 @@ TEST(TapeEpisodes, MisuseIsRefused) {
 TEST(TapeEpisodes, ATaskWithoutADerivativeOfItsObservationsIsNamed) {
   const Watched task(small_ball(), Watching::without_derivative);
   TaskTape tape(task, 20, tape_options(2, 2), kTapeSeed);
-  Row ones(20, 1), by_o(80, 1), by_action(60);
+  Row ones(20, 1), by_o(80, 1), action_bar(60);
   tape.step(scripted_actions(tape));
-  tape.reverse({.reward = ones}, by_action);  // rewards need none
+  tape.reverse({.reward = ones}, action_bar);  // rewards need none
   tape.begin_reverse();
-  expect_refusal([&] { tape.reverse({by_o}, by_action); },
+  expect_refusal([&] { tape.reverse({by_o}, action_bar); },
                  "task watched has no derivative of its observations; expected Task::observe_vjp");
-  expect_refusal([&] { tape.reverse({.reward = ones}, by_action); }, "has failed halfway");
+  expect_refusal([&] { tape.reverse({.reward = ones}, action_bar); }, "has failed halfway");
   expect_refusal([&] { tape.begin_reverse(); }, "has failed halfway");
   expect_refusal([&] { tape.step(Row(60)); }, "has failed halfway");
   tape.reset(kTapeSeed, 0);

@@ -63,7 +63,7 @@ inline Numbers scripted_actions(const TaskTape& tape) {
 
 /// All that comes out of an episode and back.
 struct Swept {
-  Numbers observations, rewards, by_action, by_q, by_v, by_parameter;  // (step, E, …), (E, …)
+  Numbers observations, rewards, action_bar, q_bar, v_bar, parameter_bar;  // (step, E, …), (E, …)
   std::vector<std::uint8_t> alive, flags;
   bool operator==(const Swept&) const = default;
 };
@@ -98,17 +98,17 @@ inline Swept sweep_of(TaskTape& tape, std::int64_t actions, const Incoming& inco
       by_r[i] = incoming(int(i), step, seen);
     }
   };
-  out.by_action.resize(std::size_t(actions) * e * width);
+  out.action_bar.resize(std::size_t(actions) * e * width);
   for (std::int64_t t = actions; t-- > 0;) {
     arrive(t + 1);
     tape.reverse({by_o, by_r},
-                 std::span(out.by_action).subspan(std::size_t(t) * e * width, e * width));
+                 std::span(out.action_bar).subspan(std::size_t(t) * e * width, e * width));
   }
   arrive(0);
-  out.by_q.resize(e * nv);
-  out.by_v.resize(e * nv);
-  out.by_parameter.resize(e * numbers);
-  tape.reverse_start({by_o}, out.by_q, out.by_v, out.by_parameter);
+  out.q_bar.resize(e * nv);
+  out.v_bar.resize(e * nv);
+  out.parameter_bar.resize(e * numbers);
+  tape.reverse_start({by_o}, out.q_bar, out.v_bar, out.parameter_bar);
   return out;
 }
 
@@ -127,10 +127,10 @@ inline Numbers rows_of(const Numbers& all, std::size_t environments, std::size_t
 /// Expects that environments have the same rows in both, and the same derivatives.
 inline void expect_same_rows(const Swept& a, std::size_t in_a, std::size_t e_a, const Swept& b,
                              std::size_t in_b, std::size_t e_b, std::size_t steps) {
-  for (const auto part : {&Swept::observations, &Swept::rewards, &Swept::by_action})
+  for (const auto part : {&Swept::observations, &Swept::rewards, &Swept::action_bar})
     EXPECT_EQ(rows_of(a.*part, in_a, e_a, steps), rows_of(b.*part, in_b, e_b, steps))
         << "environments " << e_a << ", " << e_b;
-  for (const auto part : {&Swept::by_q, &Swept::by_v})
+  for (const auto part : {&Swept::q_bar, &Swept::v_bar})
     EXPECT_EQ(rows_of(a.*part, in_a, e_a, 1), rows_of(b.*part, in_b, e_b, 1))
         << "environments " << e_a << ", " << e_b;
 }

@@ -63,18 +63,18 @@ TEST_P(EveryTape, WithRewardsAloneItIsTheGradientOfTheReturn) {
           a[k] = std::clamp(0.8 * a[k], -0.4, 0.4) + 0.05 * keyed(view.episode, view.actions, k);
       },
       kTapeSeed, {0, kEpisodes}, options);
-  Numbers by_action, value(kEpisodes);
+  Numbers action_bar, value(kEpisodes);
   for (std::size_t e = 0; e < kEpisodes; ++e) {
-    const Numbers own = rows_of(swept.by_action, kEpisodes, e, std::size_t(actions));
-    by_action.insert(by_action.end(), own.begin(), own.end());
+    const Numbers own = rows_of(swept.action_bar, kEpisodes, e, std::size_t(actions));
+    action_bar.insert(action_bar.end(), own.begin(), own.end());
     for (const double r : rows_of(swept.rewards, kEpisodes, e, std::size_t(actions))) value[e] += r;
   }
   EXPECT_EQ(value, g.value);
-  EXPECT_EQ(by_action, g.u);
-  EXPECT_EQ(swept.by_q, g.q);
-  EXPECT_EQ(swept.by_v, g.v);
-  EXPECT_EQ(swept.by_parameter, g.parameters);
-  EXPECT_GT(std::inner_product(by_action.begin(), by_action.end(), by_action.begin(), 0.0), 0);
+  EXPECT_EQ(action_bar, g.u);
+  EXPECT_EQ(swept.q_bar, g.q);
+  EXPECT_EQ(swept.v_bar, g.v);
+  EXPECT_EQ(swept.parameter_bar, g.parameters);
+  EXPECT_GT(std::inner_product(action_bar.begin(), action_bar.end(), action_bar.begin(), 0.0), 0);
   EXPECT_EQ(tape.recomputed_steps(), 0);
   EXPECT_GT(g.newton_iterations, 0);
 
@@ -103,7 +103,7 @@ TEST_P(EveryTape, GoingBackIsTheTransposeOfGoingForward) {
   options.precision = Precision::f64;
   TaskTape tape(*task, 1, options);
   // The first episode that goes on for all actions, from a state without symmetry.
-  Numbers q, v, played, by_action(n * width);
+  Numbers q, v, played, action_bar(n * width);
   std::int64_t episode = -1;
   do {
     ASSERT_LT(++episode, 20);
@@ -129,16 +129,16 @@ TEST_P(EveryTape, GoingBackIsTheTransposeOfGoingForward) {
   };
   const auto by_o = [&](std::size_t t) { return weights(seen, std::int64_t(t), 10); };
   const auto by_r = [&](std::size_t t) { return weights(1, 1000 + std::int64_t(t), 1); };
-  const auto by_q = [&](std::size_t t) { return weights(nv, 2000 + std::int64_t(t), 10); };
-  const auto by_v = [&](std::size_t t) { return weights(nv, 3000 + std::int64_t(t), 1); };
+  const auto q_bar = [&](std::size_t t) { return weights(nv, 2000 + std::int64_t(t), 10); };
+  const auto v_bar = [&](std::size_t t) { return weights(nv, 3000 + std::int64_t(t), 1); };
   for (std::size_t t = n; t-- > 0;) {
-    const Numbers to_q = by_q(t + 1), to_v = by_v(t + 1);
+    const Numbers to_q = q_bar(t + 1), to_v = v_bar(t + 1);
     const Numbers to_o = by_o(t + 1), to_r = by_r(t + 1);
-    tape.reverse({to_o, to_r, to_q, to_v}, std::span(by_action).subspan(t * width, width));
+    tape.reverse({to_o, to_r, to_q, to_v}, std::span(action_bar).subspan(t * width, width));
   }
   const bool opens = task->spec().warm_up;
   Numbers first_q(nv), first_v(nv), by_number(numbers);
-  const Numbers to_q = by_q(0), to_v = by_v(0);
+  const Numbers to_q = q_bar(0), to_v = v_bar(0);
   const Numbers to_o = opens ? Numbers{} : by_o(0);
   tape.reverse_start({to_o, {}, to_q, to_v}, first_q, first_v, by_number);
 
@@ -167,9 +167,9 @@ TEST_P(EveryTape, GoingBackIsTheTransposeOfGoingForward) {
     forward += by_r(t + 1)[0] * tangent.take(std::span(da).subspan(t * width, width), rows);
     forward += dot(by_o(t + 1), observed(tangent.view(), tangent.seen()));
     forward +=
-        dot(by_q(t + 1), tangent.seen().q.back()) + dot(by_v(t + 1), tangent.seen().v.back());
+        dot(q_bar(t + 1), tangent.seen().q.back()) + dot(v_bar(t + 1), tangent.seen().v.back());
   }
-  const double parts[] = {dot(by_action, da), dot(first_q, dq), dot(first_v, dv),
+  const double parts[] = {dot(action_bar, da), dot(first_q, dq), dot(first_v, dv),
                           dot(by_number, dn)};
   double back = 0, size = 0;
   for (const double part : parts) back += part, size += std::abs(part);

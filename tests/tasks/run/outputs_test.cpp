@@ -123,7 +123,7 @@ TEST(Outputs, WhatIsTakenAtTimesOfItsOwnIsReadThenAndNeverElse) {
   RolloutOutputs some;
   some.fields = {{0, FieldForm::field, {4}}};
   some.states = {0, true};
-  some.of_bodies = {6};
+  some.body_times = {6};
   some.chosen_bodies = {model.nb() - 1};
   whole_calls = 0;
   const Recorded few = handed(model, some);
