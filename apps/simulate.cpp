@@ -204,7 +204,7 @@ struct Start {
     if (!saved) return;
     if (model.has_shear_springs() && !saved->memory)
       console.note(fmt::format(
-          "row {} of {} does not hold what friction remembers{}: contacts with ks begin unsheared; "
+          "row {} of {} does not hold the shear state{}: contacts with ks begin unsheared; "
           "simulate stores it at its last row, and with --record memory at every row",
           saved->row, saved->path, rows_with_memory(*saved)));
     if (!continues)

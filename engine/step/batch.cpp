@@ -263,7 +263,7 @@ void Batch::set_sleep(int environment, const SleepState& state) {
        std::ranges::max(state.rested) == std::numeric_limits<int>::max() ||
        std::isnan(state.clearance) ||
        !std::ranges::all_of(state.u, [](double x) { return std::isfinite(x); })))
-    throw InputError("who sleeps in environment " + std::to_string(environment) +
+    throw InputError("sleep state of environment " + std::to_string(environment) +
                      "; expected islands and steps of rest of " + std::to_string(trees) +
                      " trees and " + std::to_string(m.nu) + " finite controls");
   SleepState& own = sleep_[lane];

@@ -72,7 +72,7 @@ LaneBits GroupStep::run(const Scheme& scheme, const kernels::KernelTable& table,
                                inside_split ? kSplitIterations : settings_.max_iterations,
                                inside_split ? kSplitHalvings : kHalvings,
                                inside_split ? kSplitPatience : kPatience, settings_.spare};
-  // Where an accuracy is asked for, shorter parts are the better way to a root.
+  // With an accuracy, shorter parts are tried before softening.
   const bool softens = inside_split || settings_.accuracy == 0;
   factors = {};
   choose_faces(model_, table, w);
@@ -86,7 +86,7 @@ LaneBits GroupStep::run(const Scheme& scheme, const kernels::KernelTable& table,
     lanes = found;
     if (lost != 0) lanes |= solve_from_softer(model_, table, w, lost, limits, factors, report);
     if (k == scheme.inner_stages()) break;
-    // Who names a tolerance gets what Newton steps come to, which is far below it.
+    // With an explicit tolerance, each stage starts from a fresh factorisation.
     if (!settings_.spare) factors.begin_anew();
     std::copy_n(w.stage.x, n, w.x_inner + k * n);
     std::copy_n(w.stage.v, n, w.v_inner + k * n);
@@ -99,8 +99,8 @@ LaneBits GroupStep::run(const Scheme& scheme, const kernels::KernelTable& table,
   return resolved;
 }
 
-/// Notes lanes in which a body came through a cuboid that it touches: the face that it met when the
-/// solve started, no other, is opposite to the only one that it meets at the end.
+/// Marks lanes in which a body passed through a cuboid that it touches: its only face at the start
+/// of the solve is opposite to its only face at the end.
 template <int L>
 void GroupStep::watch_faces(const kernels::KernelTable& table, BasicWorkspace<L>& w, LaneBits lanes,
                             NewtonReport& report) const {
@@ -184,7 +184,7 @@ void GroupStep::log_inner(const BasicWorkspace<L>& w, int lane, const Scheme& sc
     log.inner[i * kernels::kBlock + lane] = w.x_inner[i][lane];
 }
 
-/// Solves a step of length h, and looks at what it came to.
+/// Solves a step of length h and checks the result.
 template <int L>
 CheckedSolve GroupStep::solve_and_check(const Scheme& scheme, const kernels::KernelTable& table,
                                         BasicWorkspace<L>& w, LaneBits lanes, double h,
@@ -259,7 +259,7 @@ bool GroupStep::take_part(const kernels::KernelTable& table, SingleWorkspace& w,
   return take();
 }
 
-/// Splits a step of length h of one lane of a group. The other lanes wait.
+/// Splits a step of length h of one lane of a group. The other lanes are masked.
 template <int L>
 bool GroupStep::split_lane(const kernels::KernelTable& table, BasicWorkspace<L>& w, int lane,
                            double h, SingleWorkspace& alone, NewtonReport& report,

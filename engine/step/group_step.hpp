@@ -12,7 +12,7 @@
 
 namespace tangere {
 
-/// What a tape needs to know about a step besides its result.
+/// Solves of a step that a tape stores besides its result.
 struct SolveLog {
   /// Steps of lanes that are not one plain step of the scheme.
   std::array<std::vector<TapedSolve>, kernels::kGroup> special;

@@ -9,7 +9,7 @@
 //       point's
 //   tolerance test: r is at most the tolerance
 // One test alone stalls at first touches. The natural test stalls where a factor from before the
-// touch says nothing about the forces after it, the residual test where the residual must first
+// touch does not describe the forces after it, the residual test where the residual must first
 // rise for a long way. The rounding floor in r comes from the last point at which a direction was
 // computed.
 //
@@ -28,7 +28,7 @@
 // The stages of a step have the same c₀. A later one takes chord steps by the factor of the stage
 // before from its start, under the same condition, with kNextStage times the share.
 //
-// Where the tolerance need not be checked (NewtonLimits::spare), a chord step that should meet it
+// With NewtonLimits::skip_final_evaluation, a chord step that is predicted to meet the tolerance
 // ends the search.
 //
 // Whether an evaluation includes the Jacobian is a guess that affects cost, never results. g alone
@@ -154,8 +154,8 @@ struct Search {
     on_trial &= ~(1U << l);
   }
 
-  /// Judges the trials at the present x. Lanes that hold an accepted, unconverged point wait from
-  /// then on.
+  /// Tests the trials at the present x. Lanes with an accepted, unconverged point then wait for a
+  /// direction.
   void judge() {
     LaneRow residual, test_norm{};
     scaled_residual(model, table, w, residual);
@@ -212,7 +212,7 @@ struct Search {
     }
   }
 
-  /// Chord steps pass by the natural test alone: what their factor leaves decides about the next.
+  /// Chord steps need the natural test alone: their contraction rate determines the next step.
   [[nodiscard]] bool descends(int l, double test_norm, double residual) const {
     const double share = 1 - (secants[l] > 0 ? kSecantDecrease : kDecrease) * alpha[l];
     return test_norm <= share * delta_norm[l] || (!has(chord, l) && residual <= share * last[l]);

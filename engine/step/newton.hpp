@@ -13,12 +13,12 @@ struct NewtonLimits {
   double tolerance;    ///< on the scaled residual
   int max_iterations;  ///< largest number of Newton directions
   int max_halvings;    ///< per direction
-  int patience;        ///< directions in a row that may bring no new lowest residual
-  /// The last evaluation is spared where the contraction so far promises that it would pass.
+  int patience;        ///< consecutive directions without a new lowest residual before giving up
+  /// Skip the last evaluation if the measured contraction predicts that it meets the tolerance.
   bool skip_final_evaluation;
 };
 
-/// What the stages of one step hand on to each other.
+/// Factors and contraction rates that later stages of a step reuse.
 template <int L>
 struct StageFactors {
   bool weighted = false;          ///< the norm's weights are those of this step
@@ -42,10 +42,10 @@ struct NewtonReport {
   std::array<int, kernels::kGroup> iterations{};  ///< evaluations of the residual, accumulated
   /// Scaled residual at the last accepted point; the expected one where its evaluation was spared.
   std::array<double, kernels::kGroup> residual{};
-  LaneBits softened = 0;        ///< lanes whose root was approached from softer contacts
-  LaneBits tunnelled = 0;       ///< lanes in which a body came through another that it touches
+  LaneBits softened = 0;        ///< lanes whose root was found by softening
+  LaneBits tunnelled = 0;       ///< lanes in which a body passed through a contact partner
   LaneBits energy_created = 0;  ///< lanes in which a part created energy, however short it was
-  LaneBits over_rotated = 0;    ///< lanes in which a part turned too far, however short it was
+  LaneBits over_rotated = 0;    ///< lanes in which a body rotated too far in a shortest part
 };
 
 /// Solves g(x) = 0 for the lanes in `lanes`, from the x in the stage. On return the stage's x and v

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Cuts a step into parts whose errors keep the accuracy that was asked for.
+// Cuts a step into parts whose estimated errors keep the requested accuracy.
 //
 // The estimates e and e_v of the errors of displacement and velocity (engine/scene/scheme.hpp) say
 // how far the start and the stages are from one smooth motion. Stiff contacts pull most of either
@@ -12,13 +12,11 @@
 //       (contact_forces.hpp)
 //   M (c₀/h)² e, in the scale of the solver's tolerance: the share of all acting forces that would
 //       displace by e in a stage
-// A contact or a limit that acts at the start and not at the end is seen by none of these: no force
-// changes where the end is. There the momentum that it gave counts. The error of the velocity is
-// (c₀/h) δ_v, and its share is that of the velocity at the start or at the end, or of what gravity
-// changes in the part, whichever is largest.
-// A step begins with a part of its whole length whatever was before it, so it depends on its state
-// alone. Lanes have parts of their own lengths and are solved side by side, until the last has
-// arrived.
+// A contact or a limit that acts at the start and not at the end changes none of these forces. For
+// it the error of its impulse counts: (c₀/h) δ_v relative to the largest of the velocity at the
+// start, at the end, and the change by gravity in the part. A step begins with a part of its whole
+// length, so it depends on its state alone. Lanes have parts of different lengths and are solved
+// together until the last has arrived.
 #include "engine/step/step_parts.hpp"
 
 #include <algorithm>
@@ -78,7 +76,7 @@ void GroupStep::weigh_velocity(const kernels::KernelTable& table, BasicWorkspace
 }
 
 /// Returns the lanes in which a limit of a component acts at the start and not at the end. Limits
-/// of ball joints are not looked at. `base`: the end, as displacements. component < 0: any of them.
+/// of ball joints are ignored. `base`: the end, as displacements. component < 0: any of them.
 template <int L>
 LaneBits GroupStep::left_limits(const BasicWorkspace<L>& w, LaneBits lanes, int component) const {
   LaneBits left = 0;
@@ -140,8 +138,8 @@ Row<L> GroupStep::estimated_error(const kernels::KernelTable& table, BasicWorksp
   kernel.contact_wrenches(model_.view, s, end);
   Row<L> error{};
   scaled_residual(model_, table, w, error);
-  // Where the first guess of every stage was a root there is no factor. The stages then felt no
-  // change of the forces, but did not see the start, and what changed since then is the error.
+  // If the first guess of every stage was a root, there is no factor: forces were constant over the
+  // stages, and their change since the start is the error.
   const LaneBits guessed = lanes & ~factors.any, left = left_limits(w, lanes & factors.any, -1);
   if (contact_forces_.none() && (guessed | left) == 0) return error;
   solve_by_factor(model_, table, w, factors, w.delta);
@@ -210,8 +208,8 @@ void GroupStep::advance_in_parts(const kernels::KernelTable& table, BasicWorkspa
     for (int l = 0; l < L; ++l) {
       if (!has(open, l)) continue;
       const LaneBits bit = 1U << l;
-      // A body that came through another is the worst error that there is. One that turned too far
-      // is off by more than the displacement shows.
+      // Tunnelling is rejected at any estimate; rotations too large for the scheme have an error
+      // that the estimate of displacements does not include.
       const bool sound = has(solved & ~(through | turned), l);
       const double ratio = sound ? kSafety * error[l] / settings_.accuracy : HUGE_VAL;
       std::vector<TapedSolve>* solves = log == nullptr ? nullptr : &log->special[std::size_t(l)];
@@ -235,7 +233,7 @@ void GroupStep::advance_in_parts(const kernels::KernelTable& table, BasicWorkspa
              std::exchange(report.energy_created, kNoLane)) != 0)
           coarse |= bit;
       } else {
-        open &= ~bit;  // its status says why
+        open &= ~bit;  // its status has the reason
         continue;
       }
       at[l].take(ratio);

@@ -25,7 +25,7 @@ class StepParts {
     halved_ += std::isfinite(wanted) ? std::clamp(static_cast<int>(wanted), 1, kMostHalvings) : 1;
     halved_ = std::min(halved_, kFinest);
   }
-  /// A part was taken. The next is twice as long where its estimate promises that it will do.
+  /// Call after an accepted part. Doubles the next length if the estimate predicts acceptance.
   void take(double ratio) {
     done_ += units();
     if (halved_ > 0 && ratio < kDouble && done_ % (2 * units()) == 0) --halved_;

@@ -33,7 +33,7 @@ void check_sleep(const Model& model, double sleep) {
   if (sleep > 0 && model.has_shear_springs())
     throw InputError(
         model.solver().sleep_source.prefix() +
-        "bodies cannot sleep in a scene with ks: what friction remembers of them would stand "
+        "bodies cannot sleep in a scene with ks: the shear state of their contacts would stand "
         "still, too; expected contacts and sensors without ks, or no sleep");
 }
 

@@ -27,7 +27,8 @@ constexpr std::int64_t kMostPoints = 1'000'000;
 std::string reason_against_sweep(const TactileDescription& sensor) {
   if (!sensor.points.empty()) return "its points are a list, which has no pitch";
   if (sensor.array.rows * sensor.array.cols == 1) return "it has one point";
-  if (sensor.coefficients.ks > 0) return "its friction remembers, so a reading is not of the state";
+  if (sensor.coefficients.ks > 0)
+    return "it has ks, so a reading depends on the shear state as well";
   return {};
 }
 

@@ -183,7 +183,7 @@ void check_remembers_nothing(const Model& model) {
   if (model.has_shear_springs())
     throw InputError("scene '" + model.scene().name +
                      "' has contacts with ks; expected none: the derivative of a state by the one "
-                     "before leaves out what friction remembers");
+                     "before leaves out the shear state");
 }
 
 EpisodeGradients scene_jacobians(const Model& model, const ControlProgram& controls,

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What friction remembers goes through files: a run that goes on from one is the run that was not
+// The shear state goes through files: a run that goes on from one is the run that was not
 // interrupted, to the bit, and a memory that does not fit is refused.
 #include <gmock/gmock.h>
 #include <hdf5.h>
@@ -110,7 +110,7 @@ TEST(MemoryFiles, SayWhatARowLacks) {
   simulate(folder, "first.h5", {"--steps", "60"});
   const Words onward{"--state-from", "first.h5", "--steps", "1"};
   const std::string told = simulate(folder, "on.h5", onward + Words{"--row", "50"});
-  EXPECT_THAT(told, HasSubstr("row 50 of first.h5 does not hold what friction remembers (row 60 "
+  EXPECT_THAT(told, HasSubstr("row 50 of first.h5 does not hold the shear state (row 60 "
                               "does): contacts with ks begin unsheared"));
   EXPECT_THAT(array_of(folder.path("on.h5"), "memory/step").values, ElementsAre(1));
   // Where rows of q are thinned, each of them can be continued.

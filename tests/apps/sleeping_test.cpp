@@ -175,7 +175,7 @@ TEST(Sleeping, ADamagedRecordOfSleepStartsNoRun) {
       folder,
       Words{"simulate", kBoxes, "-o", "second.h5", "--state-from", "first.h5", "--sleep"} + kShort);
   EXPECT_EQ(outcome.exit_code, 2);
-  EXPECT_THAT(outcome.err, HasSubstr("who sleeps in environment 0; expected islands"));
+  EXPECT_THAT(outcome.err, HasSubstr("sleep state of environment 0; expected islands"));
 }
 
 }  // namespace

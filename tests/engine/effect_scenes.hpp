@@ -64,7 +64,7 @@ inline Scene scene_that_sleeps() {
   return s;
 }
 
-/// The same with friction that remembers, which is not to be had together with sleep.
+/// The same with shear springs, which is not to be had together with sleep.
 inline Scene scene_that_remembers() {
   Scene s = scene_that_sleeps();
   s.solver.sleep = 0;

@@ -26,7 +26,7 @@ std::vector<Target> hdf5_targets();
 /// viewed_trajectory, viewed_shard: files of a real scene, as `view` and `simulate --state-from`
 /// read them.
 std::vector<Target> viewed_targets();
-/// The scene of those files: a pad with flaws and friction that remembers, on a ball whose radius
+/// The scene of those files: a pad with flaws and shear springs, on a ball whose radius
 /// varies.
 std::string small_scene();
 /// All of them.

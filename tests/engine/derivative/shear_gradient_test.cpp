@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests gradients through friction that remembers: the adjoint against differences of whole runs,
+// Tests gradients through shear springs: the adjoint against differences of whole runs,
 // for every scheme, with points that stick, slip, leave and touch again.
 #include <gtest/gtest.h>
 
@@ -279,7 +279,7 @@ TEST_P(ShearGradient, WaitingSkinsMatchTangents) {
 INSTANTIATE_TEST_SUITE_P(Schemes, ShearGradient, ::testing::ValuesIn(testing::all_integrators()),
                          [](const auto& scheme) { return std::string(to_string(scheme.param)); });
 
-/// Points whose friction remembers touch meshes.
+/// Points with shear springs touch meshes.
 TEST(ShearOnMeshes, ContactsMatchDifferences) {
   int compared = 0;
   for (unsigned seed = 1; seed <= 5; ++seed) {

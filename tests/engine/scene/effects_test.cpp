@@ -315,7 +315,7 @@ TEST(Effects, BytesGoWithTheEffect) {
   EXPECT_EQ(state_without(EffectKind::joint_damping), state - sizeof(double));
   EXPECT_LT(bytes_of(without(scene, {EffectKind::pair_contact})).second, workspace);
   EXPECT_LT(bytes_of(without(scene, {EffectKind::feedback})).second, workspace);
-  // What friction remembers takes nothing where none does.
+  // The shear state takes nothing where none does.
   Scene forgetful = scenes_of_all_effects().back(), plain = scene;
   for (const EffectKind kind :
        {EffectKind::pair_memory, EffectKind::ground_memory, EffectKind::tactile_memory}) {

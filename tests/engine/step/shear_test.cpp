@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests friction that remembers against closed forms: what is held stands still, what slips does so
+// Tests shear springs against closed forms: what is held stands still, what slips does so
 // by Coulomb's law, a mass is dragged as a spring and a slider would, and energy does not grow.
 #include <gtest/gtest.h>
 

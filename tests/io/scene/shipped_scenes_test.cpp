@@ -151,7 +151,7 @@ TEST(ShippedScenes, TheFingerPushesOneBoxOfTen) {
       }
 }
 
-/// With the paper's friction and with friction that remembers.
+/// With the paper's friction and with shear springs.
 class PapersScenes : public ::testing::TestWithParam<const char*> {
  protected:
   static std::string suffix() { return GetParam(); }

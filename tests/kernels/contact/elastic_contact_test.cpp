@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests the kernels of friction that remembers against dual numbers: stiffness and damping of a
+// Tests the kernels of shear springs against dual numbers: stiffness and damping of a
 // point, of a point on the ground, and the memory of a step in reverse. Points stick, slip and
 // touch for the first time.
 #include <gtest/gtest.h>

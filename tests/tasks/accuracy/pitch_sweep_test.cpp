@@ -92,7 +92,7 @@ TEST(PitchSweep, SaysWhyASensorIsLeftOut) {
   const std::string ball = R"(type="sphere" radius="0.01")";
   for (const auto& [sensor, reason] :
        {std::pair(R"(resolution="1 1" kn="3")", "it has one point"),
-        std::pair(R"(resolution="9 9" kn="3" ks="1" mu="0.5")", "its friction remembers")}) {
+        std::pair(R"(resolution="9 9" kn="3" ks="1" mu="0.5")", "it has ks")}) {
     const auto sweeps = sweep_pitches(pressed_plate(ball, sensor), 1e-2, {});
     ASSERT_THAT(sweeps, SizeIs(1));
     EXPECT_THAT(sweeps[0].left_out, HasSubstr(reason));

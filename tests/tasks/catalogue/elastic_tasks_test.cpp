@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests tasks whose friction remembers against those of the paper: the same scenes but for what
+// Tests tasks with shear springs against those of the paper: the same scenes but for what
 // friction and damping are, and skins as docs/skin.md says.
 #include <gmock/gmock.h>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests friction that remembers against a real skin: shear loops that a probe recorded
+// Tests shear springs against a real skin: shear loops that a probe recorded
 // (tests/data/skin_loops) are fitted by identify(), and the fit is compared with a cycle that it
 // has not seen.
 #include <gmock/gmock.h>
