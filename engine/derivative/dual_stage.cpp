@@ -39,7 +39,7 @@ struct DualStage::Impl {
   std::vector<kernels::ContactScratch<D>> contacts;
   std::vector<kernels::JointColumns<D>> columns;
   std::vector<std::vector<double>> ground_tangents;  ///< of the points in the ground
-  std::vector<std::vector<D>> points, references;
+  std::vector<std::vector<D>> points, references, areas;
   std::vector<kernels::CandidateList<D>> lists;
   std::vector<D> faces;
   // Shear state: anchors of all points, and those in the order of the kernels.
@@ -84,7 +84,8 @@ struct DualStage::Impl {
         number.push_back(which < 0 ? -1 : which + i);
       }
     };
-    for (auto& p : pairs) side_by_side(p.size_row, 3, &p.size.x, view.rows.solid(p.body2));
+    for (auto& p : pairs)
+      side_by_side(p.size_row, 3, &p.size.x, p.body2 < 0 ? -1 : view.rows.solid(p.body2));
     for (auto& g : grounds)
       if (g.radius > 0) side_by_side(g.radius_row, 1, &g.radius, view.rows.solid(g.body));
     for (auto& g : grounds)
@@ -110,6 +111,8 @@ struct DualStage::Impl {
       references.emplace_back(12, D(0.0));
       lists.push_back({points.back().data(), 0, references.back().data(), 1e9, nullptr, 0, 0,
                        nullptr, nullptr});
+      areas.emplace_back(p.weights == nullptr ? 0 : std::size_t(p.n_points));
+      if (p.weights != nullptr) lists.back().weights = areas.back().data();
       listed_anchors.emplace_back();
       if (p.memory < 0) continue;
       listed_anchors.back().assign(std::size_t(kernels::kAnchorNumbers * p.n_points), D(0.0));
@@ -220,6 +223,7 @@ struct DualStage::Impl {
   [[nodiscard]] kernels::LawParameters<D> law_of(const kernels::ShearSpringContact& of, int i,
                                                  const kernels::LoadedTouch<D>& t) const {
     kernels::LawParameters<D> law = t.law;
+    if (of.contact.weights != nullptr) kernels::set_weighted(t.law, D(of.contact.weights[i]), law);
     if (of.sensor < 0) return law;
     const std::vector<double>& factors = m.sensors[std::size_t(of.sensor)].point_factors;
     if (factors.empty()) return law;
@@ -314,6 +318,7 @@ struct DualStage::Impl {
           list[std::size_t(3 * count)] = {p[0], moves.x};
           list[std::size_t(3 * count + 1)] = {p[1], moves.y};
           list[std::size_t(3 * count + 2)] = {p[2], moves.z};
+          if (pair.weights != nullptr) areas[std::size_t(at)][std::size_t(count)] = pair.weights[i];
           if (pair.memory >= 0)
             put_anchor(m.shear_springs[std::size_t(pair.memory)].first + i,
                        &listed_anchors[std::size_t(at)][std::size_t(7 * count)]);

@@ -33,26 +33,38 @@ void NumberGradients::add(const SceneNumber& number, Terms terms, int body) {
   entries_.push_back({std::move(terms), body});
 }
 
-void NumberGradients::add_coefficients(SceneNumber of, int row) {
+void NumberGradients::add_coefficients(SceneNumber of, std::initializer_list<int> rows) {
   for (int k = 0; k < kCoefficients; ++k) {
     of.field = coefficient_field(k);
     // With ks = 0 there is no shear state, so no derivative.
     const Scene& scene = model_.scene();
     if (of.field == Field::ks && number_in(scene, of) == 0 && randomization_of(scene, of) < 0)
       continue;
-    add(of, {{row + k, 1}});
+    Terms terms;
+    for (const int row : rows) terms.push_back({row + k, 1});
+    add(of, std::move(terms));
   }
 }
 
 void NumberGradients::add_contacts() {
   const CompiledModel& m = compiled(model_);
   const kernels::ParameterRows& rows = m.view.rows;
+  // Both halves of a contact of surfaces have its coefficients.
+  const auto& pairs = m.scene.pair_contacts;
+  for (int k = 0; k < static_cast<int>(pairs.size()); ++k) {
+    const auto at = std::size_t(k);
+    if (pairs[at].second_half) continue;
+    if (at + 1 < pairs.size() && pairs[at + 1].second_half) {
+      add_coefficients(first_number(pairs[at]), {rows.pair(k), rows.pair(k + 1)});
+    } else {
+      add_coefficients(first_number(pairs[at]), {rows.pair(k)});
+    }
+  }
   int k = 0;
-  for (const auto& c : m.scene.pair_contacts) add_coefficients(first_number(c), rows.pair(k++));
+  for (const auto& c : m.scene.ground_contacts)
+    add_coefficients(first_number(c), {rows.ground(k++)});
   k = 0;
-  for (const auto& c : m.scene.ground_contacts) add_coefficients(first_number(c), rows.ground(k++));
-  k = 0;
-  for (const auto& t : m.scene.sensors) add_coefficients(first_number(t), rows.sensor(k++));
+  for (const auto& t : m.scene.sensors) add_coefficients(first_number(t), {rows.sensor(k++)});
 }
 
 namespace {

@@ -49,7 +49,8 @@ class NumberGradients {
     int body = -1;  ///< if ≥ 0, the masses of this body vary by environment and are not in `terms`
   };
   void add(const SceneNumber& number, Terms terms, int body = -1);
-  void add_coefficients(SceneNumber of, int row);
+  /// `rows`: of the first coefficient, for each contact that has it.
+  void add_coefficients(SceneNumber of, std::initializer_list<int> rows);
   void add_contacts();
   void add_bodies();
   void add_joints();

@@ -57,6 +57,7 @@ class Compiler {
     coarse_pairs();
     mesh_distances();
     thin_walls();
+    place_ground();
     pair_contacts();
     ground_contacts();
     group_contacts(m_);
@@ -139,9 +140,10 @@ class Compiler {
   /// Adds the pairs with a mesh whose walls are thinner than the other's points are apart.
   void thin_walls() {
     for (const PairContactDescription& d : m_.scene.pair_contacts) {
+      if (!d.points.empty()) continue;
       const CompiledBody& touched =
           m_.bodies[std::size_t(bodies_.find("body", d.primitive_body, d.source))];
-      if (touched.grid == nullptr || !d.points.empty()) continue;
+      if (touched.grid == nullptr) continue;
       const int general = bodies_.find("body", d.general_body, d.source);
       const double gap = contact_point_gap(m_.scene.links[std::size_t(general)].body.shape);
       if (gap > 0 && gap >= 2 * touched.inscribed * touched.size.x) add_coarse_pair(d);
@@ -210,11 +212,19 @@ class Compiler {
     return storage.back().data();  // moving a vector keeps its buffer
   }
 
+  void place_ground() {
+    const GroundDescription d = m_.scene.ground.value_or(GroundDescription{});
+    const Vec3<double> at = vec3_of(d.position);
+    ground_.shape = PrimitiveShape::plane;
+    ground_.frame = ground_frame(m_.moved ? at - m_.origin : at, vec3_of(d.normal));
+  }
+
   void pair_contacts() {
     for (const PairContactDescription& d : m_.scene.pair_contacts) {
       const int b1 = bodies_.find("body", d.general_body, d.source);
-      const int b2 = bodies_.find("body", d.primitive_body, d.source);
-      const CompiledBody &first = m_.bodies[b1], &second = m_.bodies[b2];
+      const int b2 = d.on_ground ? -1 : bodies_.find("body", d.primitive_body, d.source);
+      const CompiledBody &first = m_.bodies[b1],
+                         &second = d.on_ground ? ground_ : m_.bodies[std::size_t(b2)];
       const Shape& general = m_.scene.links[b1].body.shape;
       const bool ball = d.points.empty() && is_ball(general);
       if (first.link == second.link)
@@ -232,7 +242,8 @@ class Compiler {
         points[k] = p.x, points[k + 1] = p.y, points[k + 2] = p.z;
         reach = std::max(reach, std::sqrt(dot(p, p)));
       }
-      std::vector<double> tiles = sort_into_tiles(points, kernels::kContactTile);
+      std::vector<int> order;
+      std::vector<double> tiles = sort_into_tiles(points, kernels::kContactTile, &order);
       kernels::PairContact pair{};
       pair.link1 = first.link;
       pair.link2 = second.link;
@@ -253,6 +264,11 @@ class Compiler {
           pair.n_points <= kCorners)
         meet_faces(pair, first);
       pair.points = keep(m_.point_storage, std::move(points));
+      if (d.by_area()) {
+        std::vector<double> areas;
+        for (const int k : order) areas.push_back(d.areas[std::size_t(k)]);
+        pair.weights = keep(m_.point_storage, std::move(areas));
+      }
       lay_out_tiles(m_, pair, tiles);
       contacts_.add("contact", d.first_name() + " " + d.primitive_body,
                     static_cast<int>(m_.pairs.size()), d.source);
@@ -435,6 +451,13 @@ class Compiler {
                                             : m_.layout.v + m_.joints[i].v + k;
   }
 
+  /// Lets a coefficient of a contact vary: both halves of a contact of surfaces have it.
+  void vary_pair(std::size_t k, NumberField field, int row) {
+    m_.pairs[k].parameters[coefficient_index(field)].row = row;
+    if (k + 1 < m_.pairs.size() && m_.scene.pair_contacts[k + 1].second_half)
+      vary_pair(k + 1, field, row);
+  }
+
   /// Makes a row of the block the source of a number.
   void vary(const RandomizationDescription& d, int row) {
     const SceneNumber& n = d.number;
@@ -446,7 +469,7 @@ class Compiler {
     };
     switch (n.owner) {
       case NumberOwner::contact:
-        coefficient(m_.pairs[at(contacts_, "contact", n.name + " " + n.second_name)].parameters);
+        vary_pair(at(contacts_, "contact", n.name + " " + n.second_name), n.field, row);
         break;
       case NumberOwner::ground:
         coefficient(m_.grounds[at(grounds_, "ground contact", n.name)].parameters);
@@ -470,6 +493,7 @@ class Compiler {
   NameIndex links_, joints_, bodies_, sensors_, contacts_, grounds_;
   std::vector<std::pair<int, int>> touching_;
   double reach_of_moved_ = 0;  ///< of a scene that is far away [m]
+  CompiledBody ground_;        ///< the ground, as a plane that is fixed in the world
 };
 
 }  // namespace

@@ -86,6 +86,12 @@ void lay_out_tiles(CompiledModel& m, kernels::PairContact& pair, const std::vect
                            : 0;
   m.tile_storage.push_back(std::move(points));
   pair.tile_points = m.tile_storage.back().data();
+  if (pair.weights != nullptr) {
+    AlignedVector<double> weights(std::size_t(pair.n_tiles) * kTile);
+    std::copy_n(pair.weights, pair.n_points, weights.begin());
+    m.tile_storage.push_back(std::move(weights));
+    pair.tile_weights = m.tile_storage.back().data();
+  }
   m.tile_storage.push_back(std::move(bounds));
   pair.tile_bounds = m.tile_storage.back().data();
 }

@@ -277,7 +277,8 @@ std::vector<std::string> coarse_contact_lines(const Scene& scene) {
         "is {:.3g} m across, so it can come between them, or out from under them, unnoticed; "
         "expected {}",
         c.source.prefix(), c.general_body, coarse.gap, c.primitive_body, coarse.width,
-        finer + both + other_way));
+        finer + both + other_way + (finer.empty() && other_way.empty() ? "" : ", or ") +
+            "<surface_contact>, in which whole surfaces touch"));
   }
   return lines;
 }
@@ -352,7 +353,7 @@ std::vector<std::string> polygonal_rolling_lines(const Scene& scene) {
     lines.push_back(fmt::format(
         "{}<{}>: '{}' touches {} with {} points{}, so it rolls over a polygon whose corners stand "
         "out by {:.2g} m, and it sinks in by {:.2g} m; to roll as a round body it needs a {} of "
-        "{:.0f} or more",
+        "{:.0f} or more, or <surface_contact>, in which whole surfaces touch",
         contact.source.prefix(), element, body, on, p.points, p.around ? " around" : "", p.corners,
         depth, p.attribute, std::ceil(p.enough)));
   };

@@ -238,8 +238,15 @@ struct PairContactDescription {
   Source source;
   /// A tactile sensor of general_body whose points touch instead of the body's own; empty: none.
   std::string sensor = {};
-  std::vector<double> points = {};  ///< its points (n, 3), in the frame of general_body [m]
+  /// Its points (n, 3), in the frame of general_body [m]; empty: the body's own.
+  std::vector<double> points = {};
+  /// (n) areas for which `points` stand [m²]: all coefficients but mu count per area. Empty: they
+  /// count per point.
+  std::vector<double> areas = {};
+  bool on_ground = false;    ///< `points` touch the ground; primitive_body is "ground"
+  bool second_half = false;  ///< with the contact before it, one contact of two surfaces
 
+  [[nodiscard]] bool by_area() const { return !areas.empty(); }
   /// The first part of the contact's name; the second is primitive_body.
   [[nodiscard]] std::string first_name() const {
     return sensor.empty() ? general_body : "tactile " + sensor;

@@ -158,6 +158,8 @@ std::string contact_fault(const Scene& scene, const GroundContactDescription& d)
 std::string contact_fault(const Scene& scene, const PairContactDescription& d) {
   if (d.general_body == d.primitive_body)
     return "body '" + d.general_body + "' against itself; expected two bodies";
+  if (d.on_ground && !scene.ground)
+    return "the scene has no <ground> for '" + d.general_body + "' to touch";
   const LinkDescription *const one = link_with_body(scene, d.general_body),
                                *const two = link_with_body(scene, d.primitive_body);
   if (one == nullptr || two == nullptr) return "";
@@ -175,10 +177,14 @@ std::string contact_fault(const Scene& scene, const PairContactDescription& d) {
   if (d.points.empty() && !can_touch(general, primitive))
     return fmt::format(
         "general_body '{}' is a sphere, and primitive_body '{}' a mesh, whose distance is known "
-        "only near its surface; expected the mesh as general_body, with contact points nearer to "
-        "each other than the sphere is wide ('pitch' or 'count')",
+        "only near its surface; expected <surface_contact>, in which the sphere has points, or the "
+        "mesh as general_body"
+        " with points nearer to each other than the sphere is wide",
         d.general_body, d.primitive_body);
-  return value_fault(kPairContact, d.coefficients);
+  if (d.areas.size() != (d.by_area() ? d.points.size() / 3 : 0))
+    return fmt::format("'{}' has {} areas for {} points; expected as many", d.first_name(),
+                       d.areas.size(), d.points.size() / 3);
+  return value_fault(d.by_area() ? kSurfaceContact : kPairContact, d.coefficients);
 }
 
 std::string markers_fault(const TactileDescription& sensor) {

@@ -181,7 +181,11 @@ std::vector<Unit> units_of(const Scene& scene, const SceneNumber& n) {
     with_law(scene, n, [&](const ContactCoefficients&, ContactLaw law) {
       linear = law == ContactLaw::linear;
     });
-    return {kind.unit_of(linear)};
+    const bool area =
+        n.owner == Owner::contact && std::ranges::any_of(scene.pair_contacts, [&](const auto& c) {
+          return c.by_area() && first_number(c).name == n.name && c.primitive_body == n.second_name;
+        });
+    return {area ? attribute_of(kSurfaceContact, kind.name).unit : kind.unit_of(linear)};
   }
   const LinkDescription* const link = link_of(scene, n);
   if (link == nullptr) fail_to_find(scene, n);

@@ -239,10 +239,31 @@ constexpr Attribute kSchema[] = {
                 Or{U::N_s_per_m}),
     coefficient(kTouching, "ks", F::ks, &C::ks, U::N_per_m, E::pair_memory, "tangential stiffness",
                 Flags{kGradient}),
+    row(kSurfaceContact, "body1", kNeeded, U::one, "its surface touches"),
+    row(kSurfaceContact, "body2", kNeeded, U::one, "that of this body, or \"ground\""),
+    coefficient(kSurfaceContact, "kn", F::kn, &C::kn, U::N_per_m3, E::pair_contact,
+                "normal stiffness by area", Flags{kGradient}),
+    coefficient(kSurfaceContact, "kt", F::kt, &C::kt, U::N_s_per_m3, E::pair_friction,
+                "tangential damping by area", Flags{kGradient}),
+    coefficient(kSurfaceContact, "mu", F::mu, &C::mu, U::one, E::pair_friction,
+                "friction coefficient", Flags{kGradient}),
+    coefficient(kSurfaceContact, "damping", F::damping, &C::damping, U::N_s_per_m4, E::pair_damping,
+                "normal damping by area", Flags{kGradient}),
+    coefficient(kSurfaceContact, "ks", F::ks, &C::ks, U::N_per_m3, E::pair_memory,
+                "tangential stiffness by area", Flags{kGradient}),
+    row(kSurfaceContact, "law", "clamped", U::one, "see contact.md", Words{"clamped paper"},
+        Flags{kInDefault}),
+    row(kSurfaceContact, "pitch", kNone, U::m,
+        "distance of neighbouring points; follows sizes, kn and weight if left out", B::positive,
+        Flags{kInDefault}),
     row(kGroundContact, "law", "linear", U::one, "see contact.md",
         Words{"clamped paper linear published"}, Flags{kInDefault}),
     row(kPairContact, "law", "clamped", U::one, "see contact.md",
         Words{"clamped paper linear published"}, Flags{kInDefault}),
+    row(kTactile, "per", "point", U::one,
+        "area: coefficients but mu count per area, as those of "
+        "surface_contact",
+        Types{"rect_array"}, Words{"point area"}),
     row(kTactile, "law", "clamped", U::one, "see contact.md", Words{"clamped paper"},
         Flags{kInDefault}),
     row(kContacts, "ramp", kNone, U::m, "law linear: depth over which damping fades in",
@@ -332,6 +353,8 @@ constexpr Attribute kSchema[] = {
     row(kVaryGround, "body", kNeeded, U::one, "of the contact"),
     row(kVaryPair, "general_body", kNeeded, U::one, "of the contact"),
     row(kVaryPair, "primitive_body", kNeeded, U::one, "of the contact"),
+    row(kVarySurface, "body1", kNeeded, U::one, "of the contact"),
+    row(kVarySurface, "body2", kNeeded, U::one, "of the contact"),
     row(kVarying, "field", kNeeded, U::one, "an attribute that varies"),
     row(kVaryJoint, "q", kNone, U::one, "index of the coordinate that varies"),
     row(kVaryJoint, "v", kNone, U::one, "index of the velocity that varies"),
@@ -373,7 +396,9 @@ constexpr const char* kElementNames[] = {"option",
                                          "ground_contact",
                                          "general_primitive_contact",
                                          "tactile",
-                                         "body"};
+                                         "body",
+                                         "surface_contact",
+                                         "surface_contact"};
 static_assert(std::size(kElementNames) == kElements);
 
 }  // namespace
@@ -394,7 +419,8 @@ std::vector<NumberField> coefficients_of(EffectKind kind) {
   std::vector<NumberField> fields;
   const EffectKind of = kind < E::pair_contact ? kind : pair_kind(kind);
   for (const Attribute& a : kSchema)
-    if (a.field && a.effect == of) fields.push_back(*a.field);
+    if (a.field && a.effect == of && std::ranges::count(fields, *a.field) == 0)
+      fields.push_back(*a.field);
   return fields;
 }
 

@@ -51,12 +51,14 @@ enum Element : std::uint32_t {
   kVaryPair = 1U << 26,
   kVaryTactile = 1U << 27,
   kVaryBody = 1U << 28,
+  kSurfaceContact = 1U << 29,
+  kVarySurface = 1U << 30,  ///< in <randomize>
 };
-inline constexpr int kElements = 29;
+inline constexpr int kElements = 31;
 inline constexpr std::uint32_t kContacts = kGroundContact | kPairContact,
                                kTouching = kContacts | kTactile,
                                kVarying = kVaryJoint | kVaryMotor | kVaryGround | kVaryPair |
-                                          kVaryTactile | kVaryBody;
+                                          kVaryTactile | kVaryBody | kVarySurface;
 /// The name in scene files.
 const char* to_string(Element element);
 

@@ -58,7 +58,8 @@ static void search_pair(const CompiledModel& model, const kernels::KernelTable& 
     list.own_count[l] = table.find_candidates(
         {&model.pairs[k], size_of<L>(model.pairs[k], w.stage, l), pose, list.margin,
          list.own + 3 * list.stride * l, list.stride, faces_of<L>(w.stage, k, l),
-         list.own_index == nullptr ? nullptr : list.own_index + list.stride * l});
+         list.own_index == nullptr ? nullptr : list.own_index + list.stride * l,
+         list.own_weights == nullptr ? nullptr : list.own_weights + list.stride * l});
     if (list.own_index != nullptr) set_list_anchors(model, table, w, static_cast<int>(k), l);
   }
 }

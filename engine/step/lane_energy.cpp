@@ -146,14 +146,17 @@ struct LaneAt {
   /// Adds what damping and friction take at points of a pair, one array a component.
   void add_taken(const kernels::PairContact& pair, const Vec3<double>& half,
                  const Vec3<double>& faces, const Frame<double>& link2_in_1,
-                 const std::array<const double*, 3>& points, int count) {
+                 const std::array<const double*, 3>& points, const double* areas, int count) {
     const Frame<double> at = compose(link2_in_1, pair.frame2);
     const auto W = motion_to_parent(link2_in_1, twist(pair.link2)) - twist(pair.link1);
     const auto law = kernels::load_law<double>(pair.parameters, pair.law, pair.ramp, block(), 0);
     kernels::with_touched<double>(pair, half, faces, [&]<class Shape>(const Shape& shape) {
-      for (int i = 0; i < count; ++i)
-        books->taken += taken_at(law, point_contact(shape, law, at.R, at.p, W.a, W.l,
+      auto own = law;
+      for (int i = 0; i < count; ++i) {
+        if (areas != nullptr) kernels::set_weighted(law, areas[i], own);
+        books->taken += taken_at(own, point_contact(shape, own, at.R, at.p, W.a, W.l,
                                                     {points[0][i], points[1][i], points[2][i]}));
+      }
     });
   }
 
@@ -192,15 +195,16 @@ struct LaneAt {
     pose[9] = at.p.x, pose[10] = at.p.y, pose[11] = at.p.z;
     const auto& list = w.lists[k];
     double *x = found, *y = x + list.stride, *z = y + list.stride;
-    const int count =
-        table.find_candidates({&pair, half, pose, list.margin, x, list.stride, faces, nullptr});
+    double* const areas = pair.weights == nullptr ? nullptr : z + list.stride;
+    const int count = table.find_candidates(
+        {&pair, half, pose, list.margin, x, list.stride, faces, nullptr, areas});
     double square = 0;
-    if (books != nullptr) add_taken(pair, half, faces, link2_in_1, {x, y, z}, count);
+    if (books != nullptr) add_taken(pair, half, faces, link2_in_1, {x, y, z}, areas, count);
     kernels::with_touched<double>(pair, half, faces, [&]<class Shape>(const Shape& shape) {
       for (int i = 0; i < count; ++i) {
         const Vec3<double> arm = Vec3<double>{x[i], y[i], z[i]} - at.p;
         const double d = std::min(kernels::distance_at(shape, transposed_times(at.R, arm)).d, 0.0);
-        square += d * d;
+        square += areas == nullptr ? d * d : areas[i] * d * d;
       }
     });
     sum.moving += 0.5 * number(pair.parameters.kn) * square;
@@ -263,8 +267,10 @@ double energy_of_friction(const CompiledModel& model, const BasicWorkspace<L>& w
   for (const kernels::ShearSpringContact& contact : model.shear_springs) {  // by rising point
     double square = 0;
     const int end = contact.first + model.shear_rows(contact);
+    const double* const areas = contact.contact.weights;
     for (; e < memory.size() && memory[e].point < end; ++e)
-      for (const double s : memory[e].s) square += s * s;
+      for (const double s : memory[e].s)
+        square += areas == nullptr ? s * s : areas[memory[e].point - contact.first] * s * s;
     if (contact.sensor < 0 && square > 0)
       sum += 0.5 * number_of<L>(contact.contact.parameters.ks, w.stage, lane) * square;
   }

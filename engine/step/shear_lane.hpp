@@ -136,8 +136,11 @@ inline void add_to_entries(std::span<const ShearEntry> memory, const PointRange&
 template <int L>
 kernels::ShearSpringPoints listed(const typename kernels::Stage<L>::List& list, int lane) {
   return {list.own + 3 * list.stride * lane,
-          list.own_anchors + kernels::kAnchorNumbers * list.stride * lane, nullptr,
-          list.own_count[lane], list.stride};
+          list.own_anchors + kernels::kAnchorNumbers * list.stride * lane,
+          nullptr,
+          list.own_count[lane],
+          list.stride,
+          list.own_weights == nullptr ? nullptr : list.own_weights + list.stride * lane};
 }
 
 /// Calls f(contact, numbers of its points or null, points) for every pair of one lane whose anchors

@@ -53,6 +53,8 @@ std::size_t lay_out(const CompiledModel& m, BasicWorkspace<L>& w, Row<L>* base) 
     rows(list.points, 3 * list.stride);
     list.anchors = nullptr;
     if (m.pairs[k].memory >= 0) rows(list.anchors, kernels::kAnchorNumbers * list.stride);
+    list.weights = nullptr;
+    if (m.pairs[k].weights != nullptr) rows(list.weights, list.stride);
   }
   rows(s.ground_anchors, kernels::kAnchorNumbers * m.ground_anchors);
   return used;
@@ -126,19 +128,23 @@ BasicWorkspace<L>::BasicWorkspace(const CompiledModel& m, int inner)
   memory.assign(lay_out<L>(m, *this, nullptr), LaneRow{});
   lay_out<L>(m, *this, memory.data());
   std::size_t own = 0;
-  for (const auto& list : lists) own += std::size_t(L * 3 * list.stride);
+  const auto numbers = [&](std::size_t k) { return m.pairs[k].weights == nullptr ? 3 : 4; };
+  for (std::size_t k = 0; k < lists.size(); ++k)
+    own += std::size_t(L * numbers(k) * lists[k].stride);
   own_points.resize(own);
   own = 0;
-  for (auto& list : lists) {
+  for (std::size_t k = 0; k < lists.size(); ++k) {
+    auto& list = lists[k];
     list.own = own_points.data() + own;
-    own += std::size_t(L * 3 * list.stride);
+    list.own_weights = numbers(k) == 4 ? list.own + L * 3 * list.stride : nullptr;
+    own += std::size_t(L * numbers(k) * list.stride);
   }
   make_memory(m);
   poses_before.resize(m.links.size());
   poses_after.resize(m.links.size());
   int most = 0;
   for (const auto& list : lists) most = std::max(most, list.stride);
-  search.resize(3 * std::size_t(most));
+  search.resize(4 * std::size_t(most));
   std::size_t bytes = 0;  // the largest of all instruction sets, any of which may be chosen later
   for (const kernels::KernelTable* table : kernels::available_kernels())
     bytes = std::max(bytes, table->stage<L>().scratch_bytes(m.view));

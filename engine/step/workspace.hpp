@@ -65,7 +65,7 @@ struct BasicWorkspace {
   using Rows = AlignedVector<LaneRow>;
   Rows memory;  ///< every row below, in one allocation
   AlignedVector<std::byte> scratch;
-  AlignedVector<double> own_points;  ///< the lists' points, lane by lane
+  AlignedVector<double> own_points;  ///< the lists' points and their areas
   std::vector<typename kernels::Stage<L>::List> lists;
   LaneBits in_rows = 0;  ///< lanes whose lists are also in the rows
   LaneRow* references;   ///< (n_link_pairs, 12) storage of the lists' references

@@ -183,7 +183,7 @@ void read_ground(Scene& scene, const SceneElement& node) {
 
 void read_defaults(const SceneNode& section) {
   for (const SceneElement& node :
-       elements_in(section, kJoint | kBody | kTouching | kMotor | kEndEffector)) {
+       elements_in(section, kJoint | kBody | kTouching | kSurfaceContact | kMotor | kEndEffector)) {
     node.check_default();
     for (const Attribute& a : schema())
       if ((a.elements & node.of()) != 0 && a.has(kInDefault) && node.has(a.name))

@@ -154,7 +154,19 @@ void read_coefficient_variation(const Scene& scene, const SceneElement& node,
       node.fail("no such contact is declared in <contact>");
   };
   SceneNumber& n = d.number;
-  if (node.of() == kVaryPair) {
+  if (node.of() == kVarySurface) {
+    n.owner = NumberOwner::contact;
+    const std::string one = node.text("body1"), two = node.text("body2");
+    declared(scene.pair_contacts, [&](const PairContactDescription& c) {
+      const auto connects = [&](const std::string& a, const std::string& b) {
+        return c.general_body == a && c.primitive_body == b;
+      };
+      if (!c.by_area() || c.second_half || !(connects(one, two) || connects(two, one)))
+        return false;
+      n.name = c.general_body, n.second_name = c.primitive_body;
+      return true;
+    });
+  } else if (node.of() == kVaryPair) {
     find_body(scene, node, "general_body");
     find_body(scene, node, "primitive_body");
     n.owner = NumberOwner::contact;

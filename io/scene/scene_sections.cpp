@@ -11,6 +11,7 @@
 #include "engine/scene/contact_resolution.hpp"
 #include "engine/scene/scene_faults.hpp"
 #include "engine/scene/shapes.hpp"
+#include "engine/scene/surface_contact.hpp"
 
 namespace tangere {
 
@@ -83,6 +84,7 @@ void warn_of_coarse_points(const Scene& scene, const SceneNode& root) {
         ->body.shape;
   };
   for (const PairContactDescription& c : scene.pair_contacts) {
+    if (c.by_area()) continue;
     const bool both_ways =
         std::any_of(scene.pair_contacts.begin(), scene.pair_contacts.end(), [&](const auto& other) {
           return other.general_body == c.primitive_body && other.primitive_body == c.general_body;
@@ -98,10 +100,27 @@ void warn_of_coarse_points(const Scene& scene, const SceneNode& root) {
     for (const std::string& line : lines) root.context().warnings.push_back(line);
 }
 
+static void read_surface_contact(Scene& scene, const SceneElement& node) {
+  SurfaceContactDescription d;
+  d.source = node.source();
+  find_body(scene, node, "body1");
+  d.body1 = node.text("body1");
+  d.body2 = node.text("body2");
+  if (d.body2 != kGroundName) find_body(scene, node, "body2");
+  d.law = static_cast<ContactLaw>(node.word("law"));
+  node.read(d.coefficients);
+  if (node.has("pitch")) d.pitch = node.number("pitch");
+  node.refuse(contact_fault(scene, d));
+  const std::string warning = add_surface_contact(scene, d);
+  if (!warning.empty()) node.context().warnings.push_back(warning);
+}
+
 void read_contacts(Scene& scene, const SceneNode& section) {
-  for (const SceneElement& node : elements_in(section, kContacts)) {
+  for (const SceneElement& node : elements_in(section, kContacts | kSurfaceContact)) {
     node.check();
-    if (node.of() == kGroundContact) {
+    if (node.of() == kSurfaceContact) {
+      read_surface_contact(scene, node);
+    } else if (node.of() == kGroundContact) {
       GroundContactDescription d;
       d.source = node.source();
       find_body(scene, node, "body");

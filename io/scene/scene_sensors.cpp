@@ -56,6 +56,22 @@ RectArray read_array(const SceneElement& node) {
   return array;
 }
 
+/// Turns coefficients by area into those of the array's points, each of which stands for a cell.
+void share_area(const SceneElement& node, TactileDescription& d) {
+  const RectArray& a = d.array;
+  const Vector3 way = a.corner1 - a.corner0;
+  const double cell =
+      std::abs(dot(way, a.axis0) * dot(way, a.axis1)) / ((a.rows - 1.0) * (a.cols - 1.0));
+  if (!(cell > 0) || !std::isfinite(cell))
+    node.fail(
+        fmt::format("per=\"area\" with {} x {} points; expected rows and columns that cover "
+                    "an area",
+                    a.rows, a.cols));
+  const double length = node.context().length;  // the file's area [m²] is its square
+  for (std::size_t k = 0; k < kCoefficients; ++k)
+    if (scales_with_area(k)) d.coefficients[k] *= cell / (length * length);
+}
+
 std::vector<TactilePoint> read_spec(const SceneElement& node) {
   std::vector<TactilePoint> points = read_beside(node, "spec", read_tactile_points);
   for (TactilePoint& p : points) p.position = scaled(p.position, node.context().length);
@@ -204,6 +220,7 @@ void read_sensors(Scene& scene, const SceneNode& section) {
     }
     if (type == "rect_array") {
       d.array = read_array(node);
+      if (node.word("per") == 1) share_area(node, d);
     } else {
       d.points = read_points(node, type);
     }

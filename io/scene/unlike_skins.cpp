@@ -98,16 +98,28 @@ class Densities {
   std::map<std::string, double> found_;
 };
 
+/// A contact's stiffness per area [N/m³].
+struct Pressed {
+  double stiffness;
+  bool known;  ///< not an estimate
+};
+Pressed pressed_by(const TactileDescription& d, const PairContactDescription& c, bool own,
+                   const Shape& shape, Densities& estimates) {
+  if (c.by_area()) return {c.coefficients.kn, true};
+  const double density = own && d.points.empty() ? points_on_face(shape, d.array) : 0;
+  if (density > 0) return {c.coefficients.kn * density, true};
+  return {c.coefficients.kn * estimates.of(c.general_body, shape), false};
+}
+
 /// The warning of a sensor and a contact of its body, or "".
 std::string unlike(const Scene& scene, const TactileDescription& d, double felt,
                    const PairContactDescription& c, Densities& estimates) {
   const bool own = c.general_body == d.body;
   const Shape* const shape = shape_of(scene, c.general_body);
-  if ((!own && c.primitive_body != d.body) || !c.points.empty() || shape == nullptr) return "";
-  double density = own && d.points.empty() ? points_on_face(*shape, d.array) : 0;
-  const bool known = density > 0;
-  if (!known) density = estimates.of(c.general_body, *shape);
-  const double pressed = c.coefficients.kn * density;
+  if ((!own && c.primitive_body != d.body) || shape == nullptr || c.second_half ||
+      (!c.points.empty() && !c.by_area()))
+    return "";
+  const auto [pressed, known] = pressed_by(d, c, own, *shape, estimates);
   if (!(pressed > 0)) return "";
   const double share = felt / pressed, most = known ? kUnlike : kUnlikeByEstimate;
   if (share < most && share > 1 / most) return "";

@@ -24,6 +24,14 @@ struct LawParameters : Coefficients<N> {
   N friction_tangent = N(1.0);
 };
 
+/// The law of a point that stands for an area `weight` [m²], from coefficients by area.
+template <class N>
+[[gnu::always_inline]] inline void set_weighted(const LawParameters<N>& law, const N& weight,
+                                                LawParameters<N>& out) {
+  for (std::size_t k = 0; k < kCoefficients; ++k)
+    out[k] = scales_with_area(k) ? weight * law[k] : law[k];
+}
+
 /// How a b + c is rounded. Contacts of bodies round twice. Tactile points round once where lanes
 /// fuse.
 struct Rounded {

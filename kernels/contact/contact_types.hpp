@@ -41,6 +41,8 @@ inline constexpr int kCoefficients = 5;
 inline constexpr int kPointCoefficients = 4;
 /// The factor of a point that scales coefficient k. That of kt scales ks too.
 constexpr std::size_t factor_index(std::size_t k) { return k < kPointCoefficients ? k : 1; }
+/// Whether coefficient k of a contact by area counts per area: all but mu.
+constexpr bool scales_with_area(std::size_t k) { return k != 2; }
 
 /// Applies f to each coefficient, in order.
 template <class N, class F>

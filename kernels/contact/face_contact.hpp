@@ -159,8 +159,8 @@ void find_velocity(const FaceMotion<Shape, N>& z, FacePass<N>& pass) {
 }
 
 template <template <class> class Shape, class N>
-void find_slide(const FaceMotion<Shape, N>& z, const typename FaceMotion<Shape, N>::Point&,
-                FacePass<N>& pass) {
+void find_slide(const FaceMotion<Shape, N>& z, const LawParameters<N>&,
+                const typename FaceMotion<Shape, N>::Point&, FacePass<N>& pass) {
   find_velocity(z, pass);
   pass.square = dot(pass.vt, pass.vt);
   pass.inverse_speed = inverse_sqrt(pass.square);

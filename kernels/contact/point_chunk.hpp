@@ -5,7 +5,7 @@
 // with the point's anchors), Point, Pass and Sums, and
 //   find_distance(motion, place, point, pass)
 //       distance and normal; returns where the point touches
-//   find_slide(motion, point, pass)          velocities
+//   find_slide(motion, law, point, pass)     velocities
 //   find_force<Derivatives>(…)
 //       force and what its derivative needs; returns where the point slips
 //   add_chunk<Derivatives>(sums, chunk)      the chunk's points in order
@@ -32,21 +32,27 @@ struct PointChunk {
 };
 
 /// Evaluates the law at `count` ≤ kPoints places, pass by pass. Each pass depends on one square
-/// root, so the latencies of the roots of different points overlap.
+/// root, so the latencies of the roots of different points overlap. `weights`: areas of the places
+/// [m²], by which coefficients count; null: they count per point.
 template <bool Derivatives, class Motion, class N>
 void fill_chunk(const Motion& z, const LawParameters<N>& law, const typename Motion::Place* place,
-                int count, PointChunk<typename Motion::Point>& chunk) {
+                const N* weights, int count, PointChunk<typename Motion::Point>& chunk) {
   typename Motion::Pass pass[PointChunk<typename Motion::Point>::kPoints];
   chunk.count = chunk.slips = 0;
   for (int i = 0; i < count; ++i) {
     chunk.touch[i] = find_distance(z, place[i], chunk.point[i], pass[i]);
     if (any(chunk.touch[i])) chunk.touching[chunk.count++] = i;
   }
-  for (int c = 0; c < chunk.count; ++c)
-    find_slide(z, chunk.point[chunk.touching[c]], pass[chunk.touching[c]]);
+  LawParameters<N> own = law;
   for (int c = 0; c < chunk.count; ++c) {
     const int i = chunk.touching[c];
-    chunk.slip[i] = find_force<Derivatives>(z, law, pass[i], chunk.point[i]);
+    if (weights != nullptr) set_weighted(law, weights[i], own);
+    find_slide(z, own, chunk.point[i], pass[i]);
+  }
+  for (int c = 0; c < chunk.count; ++c) {
+    const int i = chunk.touching[c];
+    if (weights != nullptr) set_weighted(law, weights[i], own);
+    chunk.slip[i] = find_force<Derivatives>(z, own, pass[i], chunk.point[i]);
     if (any(chunk.slip[i])) chunk.slipping[chunk.slips++] = i;
   }
 }

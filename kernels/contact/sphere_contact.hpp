@@ -123,7 +123,8 @@ void find_velocity(const SphereMotion<N>& z, const SpherePoint<N>& out, SpherePa
 
 /// Computes ḋ, v_t and 1/|v_t|.
 template <class N>
-void find_slide(const SphereMotion<N>& z, const SpherePoint<N>& out, SpherePass<N>& pass) {
+void find_slide(const SphereMotion<N>& z, const LawParameters<N>&, const SpherePoint<N>& out,
+                SpherePass<N>& pass) {
   find_velocity(z, out, pass);
   pass.square = dot(pass.vt, pass.vt);
   pass.inverse_speed = inverse_sqrt(pass.square);

@@ -47,17 +47,25 @@ Vec3<N> stretch_share(const Solid& body, const Vec3<N>& xi, const Vec3<N>& xi_ba
   });
 }
 
-/// Adds one point of a pair, if it touches. `slip`: Y.
+/// Adds one point of a pair, if it touches. `slip`: Y. `law`: that of the point, whose coefficients
+/// but mu are `area` times those of the pair; null: they are those of the pair.
 template <class Shape, class N>
 void add_point(const Shape& shape, const Frame<N>& at, const Vec6<N>& W,
-               const LawParameters<N>& law, const Solid& body, const Vec6<N>& slip,
+               const LawParameters<N>& law, const N* area, const Solid& body, const Vec6<N>& slip,
                const Vec3<N>& xi, ContactCotangent<N>& sum) {
   const PointContact<N> p = point_contact(shape, law, at.R, at.p, W.a, W.l, xi);
   const auto touching = p.d < N(0.0);
   if (!any(touching)) return;
   const N gate = select(touching, N(1.0), N(0.0));
   const Vec3<N> f_bar = gate * (slip.l + cross(slip.a, p.x2));
-  pull_back_law(law, p, f_bar, sum.law);
+  if (area == nullptr) {
+    pull_back_law(law, p, f_bar, sum.law);
+  } else {
+    Coefficients<N> own = {N(0.0), N(0.0), N(0.0), N(0.0)};
+    pull_back_law(law, p, f_bar, own);
+    for (std::size_t k = 0; k < kCoefficients; ++k)
+      sum.law[k] = scales_with_area(k) ? mul_add(*area, own[k], sum.law[k]) : sum.law[k] + own[k];
+  }
   TouchCotangent<N> unused;
   unused.twist = unused.displacement = zero6<N>();
   const PlaceCotangent<N> of_force = pull_back_motion<Shape>(law, p, W.a, f_bar, unused);
@@ -75,14 +83,12 @@ template <class Shape, class N>
 void pair_adjoint(const Shape& shape, const Frame<N>& at, const Vec6<N>& W,
                   const LawParameters<N>& law, const Solid& body, const CandidateList<N>& list,
                   int lone, const Vec6<N>& slip, ContactCotangent<N>& sum) {
-  const auto add = [&](const Vec3<N>& xi) { add_point(shape, at, W, law, body, slip, xi, sum); };
-  if (lone < 0) {
-    for (int k = 0; k < list.count; ++k)
-      add({list.points[3 * k], list.points[3 * k + 1], list.points[3 * k + 2]});
-  } else {
-    const double *x = list.own, *y = x + list.stride, *z = y + list.stride;
-    for (int k = 0; k < list.own_count; ++k) add({N(x[k]), N(y[k]), N(z[k])});
-  }
+  LawParameters<N> own = law;
+  for_each_place(list, lone, [&](int k, const Vec3<N>& xi) {
+    set_point_law(law, list, lone, k, own);
+    const N area = list.weights == nullptr ? N(1.0) : area_at(list, lone, k);
+    add_point(shape, at, W, own, list.weights == nullptr ? nullptr : &area, body, slip, xi, sum);
+  });
 }
 
 template <class N>
@@ -109,7 +115,7 @@ void link_pair_parameters(const ModelView& model, const StageArgs<N>& a, const L
                    sum);
     });
     subtract_law(sum.law, out + model.rows.pair(k));
-    subtract(sum.size, out + model.rows.solid(pair.body2));
+    if (pair.body2 >= 0) subtract(sum.size, out + model.rows.solid(pair.body2));
     subtract(sum.stretch, out + model.rows.solid(pair.body1));
   }
 }

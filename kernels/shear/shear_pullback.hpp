@@ -62,14 +62,16 @@ AnchorCotangent<N> pull_back_anchor(const LoadedTouch<N>& t, const ElasticPoint<
 
 /// Reverses one point at the end of a step: adds to motion and coefficients, and returns the
 /// cotangent of its anchor. f̄ and s̄' are zero where nothing touches. x̄ is of where the force acts.
+/// `law` is that of the point, `scale` times that of its contact.
 template <class Shape, class N>
 Anchor<N> pull_back_elastic(const LoadedTouch<N>& t, const LawParameters<N>& law,
-                            const ElasticPoint<N>& p, const Vec3<N>& xi, const Anchor<N>& anchor,
-                            const Vec3<N>& f_bar, const Vec3<N>& x_bar, const Vec3<N>& s_bar,
-                            TouchCotangent<N>& out) {
+                            const Coefficients<N>& scale, const ElasticPoint<N>& p,
+                            const Vec3<N>& xi, const Anchor<N>& anchor, const Vec3<N>& f_bar,
+                            const Vec3<N>& x_bar, const Vec3<N>& s_bar, TouchCotangent<N>& out) {
   const SpringCotangent<N> spring = pull_back_spring(law, p, f_bar, s_bar);
   const AnchorCotangent<N> of = pull_back_anchor(t, p, anchor, spring.s);
-  for (std::size_t i = 0; i < kCoefficients; ++i) out.law[i] = out.law[i] + spring.law[i];
+  for (std::size_t i = 0; i < kCoefficients; ++i)
+    out.law[i] = mul_add(scale[i], spring.law[i], out.law[i]);
   const Vec3<N> slide = law.kt * spring.w;
   const N along_n = dot(p.n, f_bar);
   const N rate =
@@ -119,8 +121,8 @@ void pull_back_memory(const ShearPullback& m) {
         f_bar = (-gate) * (y.l + cross(y.a, p.x2));
         x_bar = cross(y.a, p.force);
       }
-      Anchor<N> bar =
-          pull_back_elastic<Shape>(end, law, p, xi, anchor, f_bar, x_bar, s_bar, of_end);
+      Anchor<N> bar = pull_back_elastic<Shape>(end, law, coefficient_scales<A>(m.points, k), p, xi,
+                                               anchor, f_bar, x_bar, s_bar, of_end);
       if (m.kept != nullptr) {
         const N kept = load_lanes<A>(m.kept + k), found = one - kept;
         store3(kept * bar.b, m.anchor_out, stride, k);

@@ -26,6 +26,7 @@ struct ShearSpringPoints {
   /// (kPointCoefficients, stride) factors of coefficients (factor_index()); null: all 1.
   const double* factors;
   int count, stride;
+  const double* weights = nullptr;  ///< (stride) as PairContact::weights; null: none has any
 };
 
 /// Cotangents of one contact of one environment, body 1's axes and origin.

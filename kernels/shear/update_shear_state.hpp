@@ -6,14 +6,28 @@
 
 namespace tangere::kernels {
 
-/// The law of eight points with factors of their own.
+/// Returns by what the coefficients of eight points are multiplied: factors of their own, or areas.
+template <class A>
+Coefficients<Lanes<A>> coefficient_scales(const ShearSpringPoints& points, int k) {
+  Coefficients<Lanes<A>> scale;
+  for (std::size_t i = 0; i < kCoefficients; ++i) {
+    scale[i] = Lanes<A>(1.0);
+    if (points.factors != nullptr)
+      scale[i] = load_lanes<A>(points.factors + int(factor_index(i)) * points.stride + k);
+    if (points.weights != nullptr && scales_with_area(i))
+      scale[i] = load_lanes<A>(points.weights + k);
+  }
+  return scale;
+}
+
+/// The law of eight points.
 template <class A>
 LawParameters<Lanes<A>> law_at(const LoadedTouch<Lanes<A>>& t, const ShearSpringPoints& points,
                                int k) {
   LawParameters<Lanes<A>> law = t.law;
-  if (points.factors == nullptr) return law;
-  for (std::size_t i = 0; i < kCoefficients; ++i)
-    law[i] = law[i] * load_lanes<A>(points.factors + int(factor_index(i)) * points.stride + k);
+  if (points.factors == nullptr && points.weights == nullptr) return law;
+  const Coefficients<Lanes<A>> scale = coefficient_scales<A>(points, k);
+  for (std::size_t i = 0; i < kCoefficients; ++i) law[i] = law[i] * scale[i];
   return law;
 }
 

@@ -34,6 +34,9 @@ struct Stage {
     int* own_index;       ///< (L, stride) of each lane's points in PairContact::points
     double* own_anchors;  ///< (L, kAnchorNumbers, stride)
     Row<L>* anchors;      ///< (stride, kAnchorNumbers)
+    // Areas of the points; null in pairs whose coefficients count per point.
+    double* own_weights;  ///< (L, stride)
+    Row<L>* weights;      ///< (stride)
   };
   List* lists;  ///< (n_pairs)
   /// (n_link_pairs) 1: by the last detection, the links cannot touch in any lane. Their lists are
@@ -106,8 +109,9 @@ struct CandidateSearch {
   double margin;       ///< points nearer than this to the surface, or inside, are candidates [m]
   double* points;      ///< (3, stride)
   int stride;
-  Vec3<double> faces;  ///< of this lane (kernels/step/faces.hpp)
-  int* index;          ///< out: (stride) of the points in PairContact::points; or null
+  Vec3<double> faces;         ///< of this lane (kernels/step/faces.hpp)
+  int* index;                 ///< out: (stride) of the points in PairContact::points; or null
+  double* weights = nullptr;  ///< out: (stride) of the points; null where the pair has none
 };
 
 /// World pose and body twist of a link.

@@ -103,6 +103,8 @@ int search_shape(const CandidateSearch& s, Shape shape) {
         append(place.x, in, x + count);
         append(place.y, in, y + count);
         append(place.z, in, z + count);
+        if (s.weights != nullptr)
+          append(load_lanes<A>(pair.tile_weights + tile * kContactTile + k), in, s.weights + count);
         if (s.index != nullptr) {
           int* to = s.index + count;
           for (unsigned left = in; left != 0; left &= left - 1)
@@ -112,7 +114,10 @@ int search_shape(const CandidateSearch& s, Shape shape) {
       }
     }
   }
-  for (int k = count; k % kGroup != 0; ++k) x[k] = y[k] = z[k] = kFarAway;
+  for (int k = count; k % kGroup != 0; ++k) {
+    x[k] = y[k] = z[k] = kFarAway;
+    if (s.weights != nullptr) s.weights[k] = 0;
+  }
   return count;
 }
 
@@ -136,6 +141,10 @@ void transpose_rows(GroupStage::List& list) {
       for (int k = 0; k < list.own_count[l]; ++k) list.points[3 * k + c][l] = from[k];
       for (int k = list.own_count[l]; k < list.count; ++k) list.points[3 * k + c][l] = kFarAway;
     }
+  if (list.weights != nullptr)
+    for (int l = 0; l < kGroup; ++l)
+      for (int k = 0; k < list.count; ++k)
+        list.weights[k][l] = k < list.own_count[l] ? list.own_weights[l * list.stride + k] : 0;
   if (list.anchors == nullptr) return;
   for (int l = 0; l < kGroup; ++l)
     for (int c = 0; c < kAnchorNumbers; ++c) {

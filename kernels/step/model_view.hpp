@@ -125,6 +125,10 @@ struct PairContact {
                               ///< kContactTile points, padded with far points
   const double* tile_bounds;  ///< (ceil(n_tiles/8), 4, 8) centres and radii of the tiles, padded
                               ///< with far tiles
+  /// (n_points) area for which each point stands [m²]: coefficients count per area. Null: they
+  /// count per point.
+  const double* weights;
+  const double* tile_weights;  ///< (n_tiles, 32) the same tile by tile, padded with zeros
   int n_points, n_tiles;
   Vec3<double> middle;         ///< centre of a ball that holds all points, link1's axes
   double extent;               ///< its radius [m]

@@ -192,21 +192,38 @@ N balls_overlap(const LinkPair& pair, int link_pair, const StageArgs<N>& a, doub
   return N(reach * reach) - a.between[link_pair];
 }
 
+/// Calls f(k, ξ) for the candidate points, one after the other.
+template <class N, class F>
+void for_each_place(const CandidateList<N>& list, int lone, const F& f) {
+  if (lone < 0) {
+    for (int k = 0; k < list.count; ++k)
+      f(k, Vec3<N>{list.points[3 * k], list.points[3 * k + 1], list.points[3 * k + 2]});
+  } else {
+    const double *x = list.own, *y = x + list.stride, *z = y + list.stride;
+    for (int k = 0; k < list.own_count; ++k) f(k, Vec3<N>{N(x[k]), N(y[k]), N(z[k])});
+  }
+}
+template <class N>
+N area_at(const CandidateList<N>& list, int lone, int k) {
+  return lone < 0 ? list.weights[k] : N(list.own_weights[k]);
+}
+/// Sets the law of candidate k. `out` must hold `law` at first.
+template <class N>
+void set_point_law(const LawParameters<N>& law, const CandidateList<N>& list, int lone, int k,
+                   LawParameters<N>& out) {
+  if (list.weights != nullptr) set_weighted(law, area_at(list, lone, k), out);
+}
+
 /// Adds the candidate points one by one, for shapes whose Hessian has no special form: capsules,
 /// ellipsoids, meshes and balls.
 template <bool Derivatives, class Shape, class N>
 void add_candidates(const Shape& shape, const LawParameters<N>& law, const CandidateList<N>& list,
                     int lone, const Frame<N>& frame, const Vec6<N>& W, PairSums<N>& sums) {
-  const auto add = [&](const Vec3<N>& xi) {
-    accumulate<Derivatives>(sums, shape, law, frame.R, frame.p, W.a, W.l, xi);
-  };
-  if (lone < 0) {
-    for (int k = 0; k < list.count; ++k)
-      add({list.points[3 * k], list.points[3 * k + 1], list.points[3 * k + 2]});
-  } else {
-    const double *x = list.own, *y = x + list.stride, *z = y + list.stride;
-    for (int k = 0; k < list.own_count; ++k) add({N(x[k]), N(y[k]), N(z[k])});
-  }
+  LawParameters<N> own = law;
+  for_each_place(list, lone, [&](int k, const Vec3<N>& xi) {
+    set_point_law(law, list, lone, k, own);
+    accumulate<Derivatives>(sums, shape, own, frame.R, frame.p, W.a, W.l, xi);
+  });
 }
 
 /// The same with shear springs.
@@ -214,20 +231,16 @@ template <bool Derivatives, class Shape, class N>
 [[gnu::noinline]] void add_elastic(const Shape& shape, const LawParameters<N>& law,
                                    const CandidateList<N>& list, int lone, const Frame<N>& frame,
                                    const Vec6<N>& W, PairSums<N>& sums) {
-  for (int k = 0, count = lone < 0 ? list.count : list.own_count; k < count; ++k) {
+  LawParameters<N> own = law;
+  for_each_place(list, lone, [&](int k, const Vec3<N>& xi) {
     const auto number = [&](int i) {
       return lone < 0 ? list.anchors[kAnchorNumbers * k + i]
                       : N(list.own_anchors[i * list.stride + k]);
     };
-    Vec3<N> xi;
-    if (lone < 0) {
-      load_place(list, k, xi);
-    } else {
-      xi = {N(list.own[k]), N(list.own[list.stride + k]), N(list.own[2 * list.stride + k])};
-    }
-    accumulate_elastic<Derivatives>(sums, shape, law, frame.R, frame.p, W.a, W.l, xi,
+    set_point_law(law, list, lone, k, own);
+    accumulate_elastic<Derivatives>(sums, shape, own, frame.R, frame.p, W.a, W.l, xi,
                                     load_anchor<N>(number));
-  }
+  });
 }
 
 template <class N>
@@ -291,9 +304,8 @@ void sum_link_pair(const ModelView& model, const LinkPair& links, const StageArg
         const Vec3<N> centre = o.link2_in_1.R * broadcast<N>(pair.frame2.p) + o.link2_in_1.p;
         const SphereMotion<N> motion = sphere_motion(centre, o.W, shape.radius);
         if (elastic) {
-          add_sphere<Derivatives, ElasticSphereSums>(
-              ElasticSphereMotion<N>{motion, frame().R, law.kt, law.ks}, law, list, a.lone, o.W,
-              o.sums);
+          add_sphere<Derivatives, ElasticSphereSums>(ElasticSphereMotion<N>{motion, frame().R}, law,
+                                                     list, a.lone, o.W, o.sums);
         } else {
           add_sphere<Derivatives, SphereSums>(motion, law, list, a.lone, o.W, o.sums);
         }
@@ -308,7 +320,7 @@ void sum_link_pair(const ModelView& model, const LinkPair& links, const StageArg
         if (elastic) {
           if (!any_elastic) elastic_faces.start(a.lone);
           any_elastic = true;
-          elastic_faces.add(ElasticFaceMotion<Shape, N>{motion, law.kt, law.ks}, law, list, a.lone);
+          elastic_faces.add(ElasticFaceMotion<Shape, N>{motion}, law, list, a.lone);
         } else {
           if (!any_face) faces.start(a.lone);
           any_face = true;

@@ -54,8 +54,10 @@ struct CandidateList {
   const double* own;   ///< (3, stride) candidates of the lane that is evaluated alone, padded to
                        ///< multiples of eight with far points
   int own_count, stride;
-  const N* anchors;           ///< (count, kAnchorNumbers); null without shear springs
-  const double* own_anchors;  ///< (kAnchorNumbers, stride) of `own`
+  const N* anchors;                     ///< (count, kAnchorNumbers); null without shear springs
+  const double* own_anchors;            ///< (kAnchorNumbers, stride) of `own`
+  const N* weights = nullptr;           ///< (count) as PairContact::weights; null: none has any
+  const double* own_weights = nullptr;  ///< (stride) of `own`
 };
 
 /// The dofs of a joint that moves a body of a pair: S and Ψ̇ of each, in body 1's axes.

@@ -66,7 +66,9 @@ struct StageView {
             l.own_count[lane],
             l.stride,
             view(l.anchors),
-            l.own_anchors == nullptr ? nullptr : l.own_anchors + kAnchorNumbers * l.stride * lane};
+            l.own_anchors == nullptr ? nullptr : l.own_anchors + kAnchorNumbers * l.stride * lane,
+            view(l.weights),
+            l.own_weights == nullptr ? nullptr : l.own_weights + l.stride * lane};
       }
     }
     return lists;

@@ -4,6 +4,8 @@
 #pragma once
 
 #include "engine/scene/scene.hpp"
+#include "engine/scene/shapes.hpp"
+#include "engine/scene/surface_contact.hpp"
 #include "tests/kernels/random_numbers.hpp"
 
 namespace tangere::testing {
@@ -58,8 +60,18 @@ inline Scene random_tree(unsigned seed, int links) {
   return s;
 }
 
+/// Lets the coefficients of a contact count per area: the body's own points stand for areas around
+/// `scale`.
+inline void count_by_area(PairContactDescription& contact, const Shape& shape, double scale,
+                          Random& random) {
+  contact.points = contact_points(shape);
+  for (std::size_t k = 0; k < contact.points.size() / 3; ++k)
+    contact.areas.push_back(scale * random.uniform(0.5, 2));
+}
+
 /// The same, but every body touches every other body that can move relative to
-/// it, and the ground is in reach. A half-space is fixed in the world or to the first link.
+/// it, and the ground is in reach. A half-space is fixed in the world or to the first link. The
+/// contacts of the second body, one of them with the ground, count by area.
 inline Scene random_contacts(unsigned seed, int links, ContactLaw law) {
   Scene s = random_tree(seed, links);
   Random random(seed + 1000);
@@ -90,6 +102,17 @@ inline Scene random_contacts(unsigned seed, int links, ContactLaw law) {
       if (moves_with[a] != moves_with[b])
         s.pair_contacts.push_back(
             {first.name, s.links[b].body.name, coefficients(), law, 1e-5, {}});
+  }
+  const std::string by_area = s.links.size() > 1 ? s.links[1].body.name : "";
+  Random areas(seed + 2000);
+  for (PairContactDescription& c : s.pair_contacts)
+    if (c.general_body == by_area && !is_ball(s.links[1].body.shape))
+      count_by_area(c, s.links[1].body.shape, 1, areas);
+  if (s.links.size() > 1 && moves_with[1] >= 0 && !is_ball(s.links[1].body.shape)) {
+    PairContactDescription ground{by_area, kGroundName, coefficients(), law, 1e-5, {}};
+    ground.on_ground = true;
+    count_by_area(ground, s.links[1].body.shape, 1, areas);
+    s.pair_contacts.push_back(ground);
   }
   s.links.push_back(wall);
   return s;

@@ -33,6 +33,10 @@ class StageBuffers {
       references_.emplace_back(12, N(0.0));
       lists_.push_back({points_.back().data(), p.n_points, references_.back().data(), 1e9, nullptr,
                         0, 0, nullptr, nullptr});
+      areas_.emplace_back();
+      for (int k = 0; k < p.n_points && p.weights != nullptr; ++k)
+        areas_.back().push_back(N(p.weights[k]));
+      if (p.weights != nullptr) lists_.back().weights = areas_.back().data();
     }
   }
 
@@ -99,7 +103,7 @@ class StageBuffers {
   std::vector<kernels::ContactScratch<N>> contacts_;
   std::vector<kernels::JointColumns<N>> columns_;
   std::vector<N> excess_;
-  std::vector<std::vector<N>> points_, references_;
+  std::vector<std::vector<N>> points_, references_, areas_;
   std::vector<kernels::CandidateList<N>> lists_;
 };
 

@@ -31,6 +31,10 @@ void list_everything(const CompiledModel& m, BasicWorkspace<L>& w) {
     list.margin = 1e9;
     for (int i = 0; i < 3 * m.pairs[k].n_points; ++i)
       for (double& x : list.points[i].lane) x = m.pairs[k].points[i];
+    if (const double* const areas = m.pairs[k].weights; areas != nullptr)
+      for (int i = 0; i < m.pairs[k].n_points; ++i)
+        for (int l = 0; l < L; ++l)
+          list.weights[i][l] = list.own_weights[l * list.stride + i] = areas[i];
     for (int l = 0; l < L; ++l) {
       list.own_count[l] = m.pairs[k].n_points;
       for (int i = 0; i < list.stride; ++i)

@@ -18,6 +18,9 @@
 namespace tangere {
 namespace {
 
+/// Coefficients count per point.
+constexpr const double* kByPoint = nullptr;
+
 using namespace kernels;
 using D = Dual<double>;
 using testing::lift;
@@ -365,9 +368,9 @@ void expect_same_sums(const Motion& motion, const State& s, const std::vector<Ve
   clear<false>(forces);
   PointChunk<typename Motion::Point> chunk;
   for (std::size_t k = 0; k < xi.size(); k += 6) {
-    fill_chunk<true>(motion, s.law, &xi[k], 6, chunk);
+    fill_chunk<true>(motion, s.law, &xi[k], kByPoint, 6, chunk);
     add_chunk<true>(sums, chunk);
-    fill_chunk<false>(motion, s.law, &xi[k], 6, chunk);
+    fill_chunk<false>(motion, s.law, &xi[k], kByPoint, 6, chunk);
     add_chunk<false>(forces, chunk);
   }
   const Vec6<double> W = {s.omega, s.v};

@@ -18,6 +18,9 @@
 namespace tangere::kernels {
 namespace {
 
+/// Coefficients count per point.
+constexpr const double* kByPoint = nullptr;
+
 using D = Dual<double>;
 using testing::lift;
 using testing::Random;
@@ -154,8 +157,8 @@ TEST_P(Elastic, MemoryInReverseMatchesDualNumbers) {
       const Anchor<double> anchor = recalled(shape, start, x.xi, x.s);
       const ElasticPoint<double> p = meet_elastic(shape, end, end.law, x.xi, anchor);
       ASSERT_LT(p.d, 0);
-      const Anchor<double> bar =
-          pull_back_elastic<Shape>(end, end.law, p, x.xi, anchor, f_bar, x_bar, s_bar, of_end);
+      const Anchor<double> bar = pull_back_elastic<Shape>(end, end.law, {1, 1, 1, 1, 1}, p, x.xi,
+                                                          anchor, f_bar, x_bar, s_bar, of_end);
       of_s = pull_back_recall(shape, start, x.xi, x.s, bar, of_start);
     });
     for (int way = 0; way < 5; ++way) {
@@ -278,10 +281,10 @@ int expect_same_sums(const Motion& motion, const Several& points, const Finish& 
   PointChunk<typename Motion::Point> chunk;
   int slips = 0;
   for (std::size_t k = 0; k < points.places.size(); k += 6) {
-    fill_chunk<true>(motion, points.of.law, &points.places[k], 6, chunk);
+    fill_chunk<true>(motion, points.of.law, &points.places[k], kByPoint, 6, chunk);
     add_chunk<true>(sums, chunk);
     slips += chunk.slips;
-    fill_chunk<false>(motion, points.of.law, &points.places[k], 6, chunk);
+    fill_chunk<false>(motion, points.of.law, &points.places[k], kByPoint, 6, chunk);
     add_chunk<false>(forces, chunk);
   }
   finish(sums, finished, std::true_type{});
@@ -303,13 +306,12 @@ TEST(Elastic, SumsInProductsAreTheGeneralSums) {
           kind, kSize, [&]<template <class> class Shape>(const Shape<double>& shape) {
             if constexpr (Shape<double>::kSums == PointSumForm::about_centre) {
               const ElasticSphereMotion<double> motion = {
-                  sphere_motion(x.end.p, x.twist, shape.radius), x.end.R, x.law.kt, x.law.ks};
+                  sphere_motion(x.end.p, x.twist, shape.radius), x.end.R};
               slips += expect_same_sums(motion, points, [&](const auto& sums, auto& to, auto with) {
                 add_finished<with()>(motion, x.twist, sums, to);
               });
             } else if constexpr (Shape<double>::kSums == PointSumForm::faces) {
-              const ElasticFaceMotion<Shape, double> motion = {
-                  {x.end, x.twist, shape}, x.law.kt, x.law.ks};
+              const ElasticFaceMotion<Shape, double> motion = {{x.end, x.twist, shape}};
               slips += expect_same_sums(motion, points, [&](const auto& sums, auto& to, auto with) {
                 add_finished<with()>(x.twist, sums, to);
               });
