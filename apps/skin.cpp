@@ -76,8 +76,9 @@ int skin(const SkinArguments& a, const Console& console) {
   const double pitch = *a.pitch, contact_pitch = a.contact_pitch.value_or(pitch);
   const Json tactile = coefficients(s, pitch), contact = coefficients(s, contact_pitch);
   constexpr double kPerSquareMillimetre = 1e-6;
-  console.print(fmt::format("<tactile {}/>\n<general_primitive_contact {}/>", attributes(tactile),
-                            attributes(contact)));
+  const Json surface = coefficients(s, 1);  // of an area
+  console.print(fmt::format("<tactile {}/>\n<general_primitive_contact {}/>\n<surface_contact {}/>",
+                            attributes(tactile), attributes(contact), attributes(surface)));
   console.note(fmt::format(
       "per mm² of skin: kn {:.4g} N/m, ks {:.4g} N/m. Young's modulus {:.4g} Pa acts as {:.4g} Pa "
       "under contacts narrower than the skin is thick and as up to {:.4g} Pa under wide ones; {} "
@@ -93,7 +94,8 @@ int skin(const SkinArguments& a, const Console& console) {
                   {"pitch", pitch},
                   {"contact_pitch", contact_pitch},
                   {"tactile", tactile},
-                  {"contact", contact}});
+                  {"contact", contact},
+                  {"surface_contact", surface}});
   return kDone;
 }
 

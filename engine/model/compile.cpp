@@ -17,6 +17,7 @@
 #include "engine/model/components.hpp"
 #include "engine/model/contact_tiles.hpp"
 #include "engine/model/group_contacts.hpp"
+#include "engine/model/inner_faces.hpp"
 #include "engine/model/link_inertia.hpp"
 #include "engine/scene/contact_resolution.hpp"
 #include "engine/scene/frames.hpp"
@@ -41,7 +42,13 @@ constexpr int kMostDofs = 3072;
 
 class Compiler {
  public:
-  explicit Compiler(const Scene& scene) { m_.scene = scene; }
+  explicit Compiler(const Scene& scene) {
+    m_.scene = scene;
+    // The coefficients of a contact of surfaces are those of its first half.
+    std::vector<PairContactDescription>& pairs = m_.scene.pair_contacts;
+    for (std::size_t k = 1; k < pairs.size(); ++k)
+      if (pairs[k].second_half) pairs[k].coefficients = pairs[k - 1].coefficients;
+  }
 
   CompiledModel run() {
     check_scene(m_.scene);
@@ -65,6 +72,7 @@ class Compiler {
     sensors();
     end_effectors();
     randomizations();
+    find_inner_faces(m_);
     bound_links(m_);
     symbolic();
     return std::move(m_);

@@ -244,7 +244,9 @@ struct PairContactDescription {
   /// count per point.
   std::vector<double> areas = {};
   bool on_ground = false;    ///< `points` touch the ground; primitive_body is "ground"
-  bool second_half = false;  ///< with the contact before it, one contact of two surfaces
+  /// With the contact before it, one contact of two surfaces, whose coefficients are those of the
+  /// first.
+  bool second_half = false;
 
   [[nodiscard]] bool by_area() const { return !areas.empty(); }
   /// The first part of the contact's name; the second is primitive_body.

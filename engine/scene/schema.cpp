@@ -260,10 +260,8 @@ constexpr Attribute kSchema[] = {
         Words{"clamped paper linear published"}, Flags{kInDefault}),
     row(kPairContact, "law", "clamped", U::one, "see contact.md",
         Words{"clamped paper linear published"}, Flags{kInDefault}),
-    row(kTactile, "per", "point", U::one,
-        "area: coefficients but mu count per area, as those of "
-        "surface_contact",
-        Types{"rect_array"}, Words{"point area"}),
+    row(kTactile, "per", "point", U::one, "area: all but mu count per area", Types{"rect_array"},
+        Words{"point area"}),
     row(kTactile, "law", "clamped", U::one, "see contact.md", Words{"clamped paper"},
         Flags{kInDefault}),
     row(kContacts, "ramp", kNone, U::m, "law linear: depth over which damping fades in",

@@ -23,6 +23,7 @@ namespace {
 
 constexpr double kMostPoints = 20000;   // of one surface, unless the scene gives a pitch
 constexpr double kAcrossBody = 8;       // pitches across the second smallest width of a body
+constexpr double kAcrossPlace = 0.7;    // pitch in half widths of the place of contact
 constexpr double kUsualGravity = 9.81;  // where the scene has none [m/s²]
 
 int body_index(const Scene& scene, const std::string& name) {
@@ -139,7 +140,8 @@ SurfacePitch fitting_pitch(const Scene& scene, const SurfaceContactDescription& 
   const double narrow =
       std::min(ascending_widths(other)[1] / kAcrossBody, ascending_widths(own)[1] / kAcrossBody);
   const double touching = half_width(own, other, d.coefficients.kn, lighter_weight(scene, d));
-  SurfacePitch pitch{std::min(narrow, touching), std::min(narrow, touching), touching, false};
+  SurfacePitch pitch{std::min(narrow, kAcrossPlace * touching),
+                     std::min(narrow, kAcrossPlace * touching), touching, false};
   // A line of contact with a face is not resolved along the line.
   if (straight_length(own) > 0 && std::isinf(roundness(other)))
     pitch.along = std::min(narrow, straight_length(own) / kAcrossBody);

@@ -10,6 +10,8 @@
 
 #include "engine/model/model.hpp"
 #include "engine/scene/shapes.hpp"
+#include "engine/scene/surface_contact.hpp"
+#include "engine/scene/surface_points.hpp"
 #include "io/files/text_file.hpp"
 #include "io/robot/mjcf_reader.hpp"
 #include "io/robot/robot_pads.hpp"
@@ -151,6 +153,11 @@ bool moves(const Scene& scene, const std::string& name) {
   return true;
 }
 
+std::string contact_text(const std::string& body1, const std::string& body2) {
+  return fmt::format("    <surface_contact body1=\"{}\" body2=\"{}\"/>\n", attribute_text(body1),
+                     attribute_text(body2));
+}
+
 std::string contacts_text(Robot& robot, const std::vector<TouchRequest>& requests,
                           const std::string& file) {
   std::string text;
@@ -166,25 +173,15 @@ std::string contacts_text(Robot& robot, const std::vector<TouchRequest>& request
       if (!moves(robot.scene, request.first))
         throw InputError(fmt::format("{}: link '{}' stands in the world", what, request.first));
       if (!robot.scene.ground) robot.scene.ground = GroundDescription{};
-      for (const std::string& body : first)
-        text += fmt::format("    <ground_contact body=\"{}\"/>\n", attribute_text(body));
+      for (const std::string& body : first) text += contact_text(body, kGroundName);
       continue;
     }
     for (const std::string& a : first)
       for (const std::string& b : shapes_of(robot, request.second, what, file)) {
-        const auto fits = [&](const std::string& points, const std::string& touched) {
-          return can_touch(shape_of(points), shape_of(touched));
-        };
-        if (!fits(a, b) && !fits(b, a))
+        if (!has_surface(shape_of(a)) && !has_surface(shape_of(b)))
           throw InputError(
-              fmt::format("{}: neither of '{}' and '{}' has points that could touch "
-                          "the other",
-                          what, a, b));
-        // A sphere touches with its whole surface, the other body only with some points.
-        const bool straight = fits(a, b) && !(is_ball(shape_of(b)) && fits(b, a));
-        text += fmt::format(
-            "    <general_primitive_contact general_body=\"{}\" primitive_body=\"{}\"/>\n",
-            attribute_text(straight ? a : b), attribute_text(straight ? b : a));
+              fmt::format("{}: neither of '{}' and '{}' has a surface with an end", what, a, b));
+        text += contact_text(a, b);
       }
   }
   return text;
@@ -286,9 +283,8 @@ ImportedScene import_robot(const fs::path& path, const fs::path& output,
   sections.contacts = contacts_text(robot, options.touches, name);
   if (!sections.contacts.empty())
     sections.defaults =
-        "    <!-- a guess, per contact point: set them for your materials -->\n"
-        "    <general_primitive_contact kn=\"500\" kt=\"5\" mu=\"1\" damping=\"1\"/>\n"
-        "    <ground_contact kn=\"500\" kt=\"5\" mu=\"1\" damping=\"1\"/>\n";
+        "    <!-- a guess, per area: set them for your materials -->\n"
+        "    <surface_contact kn=\"1e8\" kt=\"1e6\" mu=\"1\" damping=\"1e8\"/>\n";
   sections.sensors = pads_text(robot, options.pads, name);
   sections.places = end_effectors_text(robot, options.end_effectors, name);
   list_sites(robot, options);

@@ -32,7 +32,14 @@ struct ElasticFaceMotion : FaceMotion<Shape, N> {
   using Sums = ElasticFaceSums<N>;
   template <class M>
   using Of = ElasticFaceMotion<Shape, M>;
+  N kt, ks;
 };
+
+template <template <class> class Shape, class N>
+ElasticFaceMotion<Shape, N> with_law(const ElasticFaceMotion<Shape, N>& z,
+                                     const LawParameters<N>& law) {
+  return {static_cast<const FaceMotion<Shape, N>&>(z), law.kt, law.ks};
+}
 
 /// The numbers of the spring follow those of FacePoint: those of the derivative, then those that
 /// only slipping points set.
@@ -87,13 +94,13 @@ auto find_distance(const ElasticFaceMotion<Shape, N>& z, const ElasticPlace<N>& 
 }
 
 template <template <class> class Shape, class N>
-void find_slide(const ElasticFaceMotion<Shape, N>& z, const LawParameters<N>& law,
+void find_slide(const ElasticFaceMotion<Shape, N>& z,
                 const typename ElasticFaceMotion<Shape, N>::Point&, ElasticFacePass<N>& pass) {
   const FaceMotion<Shape, N>& plain = z;
   find_velocity(plain, pass);
   const Anchor<N> anchor = pass.place->anchor();
   pass.A = z.frame.p + z.frame.R * anchor.a;
-  pass.spring = stretched(law.ks, law.kt, pass.d, pass.n, pass.vt, anchor.b - pass.A, anchor.gap);
+  pass.spring = stretched(z.ks, z.kt, pass.d, pass.n, pass.vt, anchor.b - pass.A, anchor.gap);
 }
 
 /// Adds the spring to what differentiate_face() has set. `k`: λ β k_s, `first`: λ k_s β'_d, both

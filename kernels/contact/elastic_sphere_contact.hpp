@@ -34,7 +34,13 @@ struct ElasticSphereMotion : SphereMotion<N> {
   template <class M>
   using Of = ElasticSphereMotion<M>;
   Mat3<N> Q;
+  N kt, ks;
 };
+
+template <class N>
+ElasticSphereMotion<N> with_law(const ElasticSphereMotion<N>& z, const LawParameters<N>& law) {
+  return {static_cast<const SphereMotion<N>&>(z), z.Q, law.kt, law.ks};
+}
 
 /// The numbers of the spring follow those of SpherePoint: those of the derivative, then those that
 /// only slipping points set.
@@ -89,13 +95,13 @@ auto find_distance(const ElasticSphereMotion<N>& z, const ElasticPlace<N>& place
 }
 
 template <class N>
-void find_slide(const ElasticSphereMotion<N>& z, const LawParameters<N>& law,
-                const ElasticSpherePoint<N>& out, ElasticSpherePass<N>& pass) {
+void find_slide(const ElasticSphereMotion<N>& z, const ElasticSpherePoint<N>& out,
+                ElasticSpherePass<N>& pass) {
   find_velocity(static_cast<const SphereMotion<N>&>(z), out, pass);
   const Anchor<N> anchor = pass.place->anchor();
   pass.a = z.Q * anchor.a;
   pass.spring =
-      stretched(law.ks, law.kt, pass.d, out.n, pass.vt, anchor.b - z.centre - pass.a, anchor.gap);
+      stretched(z.ks, z.kt, pass.d, out.n, pass.vt, anchor.b - z.centre - pass.a, anchor.gap);
 }
 
 /// Adds the spring to what differentiate_sphere() has set. `k`: λ β k_s, `stiffness`: λ k_s, both

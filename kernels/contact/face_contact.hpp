@@ -46,6 +46,11 @@ struct FaceMotion {
   [[no_unique_address]] Shape<N> shape;
 };
 
+template <template <class> class Shape, class N>
+const FaceMotion<Shape, N>& with_law(const FaceMotion<Shape, N>& z, const LawParameters<N>&) {
+  return z;
+}
+
 /// What one point adds to the sums. All are exact zeros if it does not touch. The struct consists
 /// of numbers only, in this order: those of the value, those of the derivative, those that only
 /// slipping points set, those that only bent faces set.
@@ -159,8 +164,8 @@ void find_velocity(const FaceMotion<Shape, N>& z, FacePass<N>& pass) {
 }
 
 template <template <class> class Shape, class N>
-void find_slide(const FaceMotion<Shape, N>& z, const LawParameters<N>&,
-                const typename FaceMotion<Shape, N>::Point&, FacePass<N>& pass) {
+void find_slide(const FaceMotion<Shape, N>& z, const typename FaceMotion<Shape, N>::Point&,
+                FacePass<N>& pass) {
   find_velocity(z, pass);
   pass.square = dot(pass.vt, pass.vt);
   pass.inverse_speed = inverse_sqrt(pass.square);

@@ -5,7 +5,8 @@
 // with the point's anchors), Point, Pass and Sums, and
 //   find_distance(motion, place, point, pass)
 //       distance and normal; returns where the point touches
-//   find_slide(motion, law, point, pass)     velocities
+//   find_slide(motion, point, pass)          velocities
+//   with_law(motion, law)                    the motion with a point's own coefficients
 //   find_force<Derivatives>(…)
 //       force and what its derivative needs; returns where the point slips
 //   add_chunk<Derivatives>(sums, chunk)      the chunk's points in order
@@ -31,28 +32,43 @@ struct PointChunk {
   int count = 0, slips = 0;
 };
 
+/// Evaluates the law at the touching points of a chunk, which stand for `areas` [m²]. It is a call
+/// of its own: inlined, it would slow down points whose coefficients count per point.
+template <bool Derivatives, class Motion, class N>
+[[gnu::noinline]] void fill_by_area(const Motion& z, const LawParameters<N>& law, const N* areas,
+                                    const typename Motion::Place* place,
+                                    PointChunk<typename Motion::Point>& chunk) {
+  for (int c = 0; c < chunk.count; ++c) {
+    const int i = chunk.touching[c];
+    LawParameters<N> own = law;
+    set_weighted(law, areas[i], own);
+    const Motion moved = with_law(z, own);
+    typename Motion::Pass pass;
+    find_distance(moved, place[i], chunk.point[i], pass);
+    find_slide(moved, chunk.point[i], pass);
+    chunk.slip[i] = find_force<Derivatives>(moved, own, pass, chunk.point[i]);
+    if (any(chunk.slip[i])) chunk.slipping[chunk.slips++] = i;
+  }
+}
+
 /// Evaluates the law at `count` ≤ kPoints places, pass by pass. Each pass depends on one square
-/// root, so the latencies of the roots of different points overlap. `weights`: areas of the places
-/// [m²], by which coefficients count; null: they count per point.
+/// root, so the latencies of the roots of different points overlap. `areas`: for which the places
+/// stand [m²]: coefficients count per area; null: they count per point.
 template <bool Derivatives, class Motion, class N>
 void fill_chunk(const Motion& z, const LawParameters<N>& law, const typename Motion::Place* place,
-                const N* weights, int count, PointChunk<typename Motion::Point>& chunk) {
+                const N* areas, int count, PointChunk<typename Motion::Point>& chunk) {
   typename Motion::Pass pass[PointChunk<typename Motion::Point>::kPoints];
   chunk.count = chunk.slips = 0;
   for (int i = 0; i < count; ++i) {
     chunk.touch[i] = find_distance(z, place[i], chunk.point[i], pass[i]);
     if (any(chunk.touch[i])) chunk.touching[chunk.count++] = i;
   }
-  LawParameters<N> own = law;
+  if (areas != nullptr) return fill_by_area<Derivatives>(z, law, areas, place, chunk);
+  for (int c = 0; c < chunk.count; ++c)
+    find_slide(z, chunk.point[chunk.touching[c]], pass[chunk.touching[c]]);
   for (int c = 0; c < chunk.count; ++c) {
     const int i = chunk.touching[c];
-    if (weights != nullptr) set_weighted(law, weights[i], own);
-    find_slide(z, own, chunk.point[i], pass[i]);
-  }
-  for (int c = 0; c < chunk.count; ++c) {
-    const int i = chunk.touching[c];
-    if (weights != nullptr) set_weighted(law, weights[i], own);
-    chunk.slip[i] = find_force<Derivatives>(z, own, pass[i], chunk.point[i]);
+    chunk.slip[i] = find_force<Derivatives>(z, law, pass[i], chunk.point[i]);
     if (any(chunk.slip[i])) chunk.slipping[chunk.slips++] = i;
   }
 }

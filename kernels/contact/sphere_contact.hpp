@@ -46,6 +46,11 @@ SphereMotion<N> sphere_motion(const Vec3<N>& centre, const Vec6<N>& W, const N& 
   return {centre, -(W.l + cross(W.a, centre)), (-radius) * W.a, radius};
 }
 
+template <class N>
+const SphereMotion<N>& with_law(const SphereMotion<N>& z, const LawParameters<N>&) {
+  return z;
+}
+
 /// What one point adds to the sums. All are exact zeros if it does not touch. The struct consists
 /// of numbers only: first those that every touching point sets, then those that fewer points set.
 template <class N>
@@ -123,8 +128,7 @@ void find_velocity(const SphereMotion<N>& z, const SpherePoint<N>& out, SpherePa
 
 /// Computes ḋ, v_t and 1/|v_t|.
 template <class N>
-void find_slide(const SphereMotion<N>& z, const LawParameters<N>&, const SpherePoint<N>& out,
-                SpherePass<N>& pass) {
+void find_slide(const SphereMotion<N>& z, const SpherePoint<N>& out, SpherePass<N>& pass) {
   find_velocity(z, out, pass);
   pass.square = dot(pass.vt, pass.vt);
   pass.inverse_speed = inverse_sqrt(pass.square);

@@ -109,6 +109,9 @@ struct Hull {
   double radius;  ///< of a ball around its centre that holds it [m]
 };
 
+/// The bit of the face at the upper (end > 0) or lower end of an axis of a cuboid.
+constexpr unsigned face_bit(int axis, double end) { return 1U << (2 * axis + (end > 0 ? 0 : 1)); }
+
 /// Points of body 1 against the distance function of body 2.
 struct PairContact {
   int link1, link2;      ///< -1: fixed in the world; then frame1/frame2 are world frames
@@ -135,7 +138,9 @@ struct PairContact {
   double reach;                ///< largest |point| [m]: bounds how far a rotation moves a point
   int size_row = -1;           ///< ≥ 0: size is read from three rows of the block instead
   int body1 = -1, body2 = -1;  ///< indices into ModelView::solids
-  bool faced = false;   ///< a convex body on a cuboid: its faces are chosen per solve (faces.hpp)
+  bool faced = false;  ///< a convex body on a cuboid: its faces are chosen per solve (faces.hpp)
+  /// Faces of a cuboid that are inside of the solid, as bits (face_bit()): they do not count.
+  unsigned inner_faces = 0;
   Hull hull{};          ///< body 1, if faced
   double overhang = 0;  ///< how far beyond a chosen face's edges a point still touches it [m]
   int memory = -1;      ///< ≥ 0: index into the contacts with shear springs

@@ -42,8 +42,8 @@ void add_rows(const Motion& motion, const LawParameters<N>& law, const Candidate
     const int count = list.count - k < Chunk::kPoints ? list.count - k : Chunk::kPoints;
     typename Motion::Place place[Chunk::kPoints];
     for (int i = 0; i < count; ++i) load_place(list, k + i, place[i]);
-    const N* const weights = list.weights == nullptr ? nullptr : list.weights + k;
-    fill_chunk<Derivatives>(motion, law, place, weights, count, chunk);
+    const N* const areas = list.weights == nullptr ? nullptr : list.weights + k;
+    fill_chunk<Derivatives>(motion, law, place, areas, count, chunk);
     add_chunk<Derivatives>(sums, chunk);
   }
 }
@@ -86,10 +86,10 @@ void add_own_points(const Motion& motion, const LawParameters<Lanes<A>>& law, co
               count = rest < kRows ? rest : kRows;
     typename Motion::Place place[kRows];
     for (int i = 0; i < count; ++i) load_own_place<A>(list, first + i * kGroup, place[i]);
-    const auto* const weights = list.own_weights == nullptr
-                                    ? nullptr
-                                    : reinterpret_cast<const Lanes<A>*>(list.own_weights + first);
-    fill_chunk<Derivatives>(motion, law, place, weights, count, rows);
+    const auto* const areas = list.own_weights == nullptr
+                                  ? nullptr
+                                  : reinterpret_cast<const Lanes<A>*>(list.own_weights + first);
+    fill_chunk<Derivatives>(motion, law, place, areas, count, rows);
     for (int c = 0; c < rows.count; ++c) add_row<Derivatives>(rows, rows.touching[c], sums, chunk);
   }
 }

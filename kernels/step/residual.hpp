@@ -304,8 +304,9 @@ void sum_link_pair(const ModelView& model, const LinkPair& links, const StageArg
         const Vec3<N> centre = o.link2_in_1.R * broadcast<N>(pair.frame2.p) + o.link2_in_1.p;
         const SphereMotion<N> motion = sphere_motion(centre, o.W, shape.radius);
         if (elastic) {
-          add_sphere<Derivatives, ElasticSphereSums>(ElasticSphereMotion<N>{motion, frame().R}, law,
-                                                     list, a.lone, o.W, o.sums);
+          add_sphere<Derivatives, ElasticSphereSums>(
+              ElasticSphereMotion<N>{motion, frame().R, law.kt, law.ks}, law, list, a.lone, o.W,
+              o.sums);
         } else {
           add_sphere<Derivatives, SphereSums>(motion, law, list, a.lone, o.W, o.sums);
         }
@@ -320,7 +321,7 @@ void sum_link_pair(const ModelView& model, const LinkPair& links, const StageArg
         if (elastic) {
           if (!any_elastic) elastic_faces.start(a.lone);
           any_elastic = true;
-          elastic_faces.add(ElasticFaceMotion<Shape, N>{motion}, law, list, a.lone);
+          elastic_faces.add(ElasticFaceMotion<Shape, N>{motion, law.kt, law.ks}, law, list, a.lone);
         } else {
           if (!any_face) faces.start(a.lone);
           any_face = true;

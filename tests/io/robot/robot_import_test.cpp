@@ -322,8 +322,10 @@ TEST(RobotImport, AddsSkinsMotorsAndContacts) {
   EXPECT_EQ(scene.motors[0].P, 400);
   EXPECT_EQ(scene.motors[0].high, 40);
   EXPECT_EQ(scene.motors[1].control, MotorControl::force);
-  EXPECT_EQ(scene.pair_contacts.size(), 1U);
-  EXPECT_EQ(scene.ground_contacts.size(), 1U);
+  // Fingers with faces touch each other with the points of both.
+  ASSERT_EQ(scene.pair_contacts.size(), 3U);
+  EXPECT_TRUE(scene.pair_contacts[1].second_half);
+  EXPECT_TRUE(scene.pair_contacts[2].on_ground);
   EXPECT_GT(scene.pair_contacts[0].coefficients[0], 0);
   ASSERT_TRUE(scene.links[2].joint.limits.has_value());
   EXPECT_EQ(scene.links[2].joint.limit_stiffness, 40 / 1e-3);  // the effort, a millimetre deep

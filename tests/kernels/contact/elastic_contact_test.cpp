@@ -306,12 +306,13 @@ TEST(Elastic, SumsInProductsAreTheGeneralSums) {
           kind, kSize, [&]<template <class> class Shape>(const Shape<double>& shape) {
             if constexpr (Shape<double>::kSums == PointSumForm::about_centre) {
               const ElasticSphereMotion<double> motion = {
-                  sphere_motion(x.end.p, x.twist, shape.radius), x.end.R};
+                  sphere_motion(x.end.p, x.twist, shape.radius), x.end.R, x.law.kt, x.law.ks};
               slips += expect_same_sums(motion, points, [&](const auto& sums, auto& to, auto with) {
                 add_finished<with()>(motion, x.twist, sums, to);
               });
             } else if constexpr (Shape<double>::kSums == PointSumForm::faces) {
-              const ElasticFaceMotion<Shape, double> motion = {{x.end, x.twist, shape}};
+              const ElasticFaceMotion<Shape, double> motion = {
+                  {x.end, x.twist, shape}, x.law.kt, x.law.ks};
               slips += expect_same_sums(motion, points, [&](const auto& sums, auto& to, auto with) {
                 add_finished<with()>(x.twist, sums, to);
               });
