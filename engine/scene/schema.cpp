@@ -261,7 +261,7 @@ constexpr Attribute kSchema[] = {
     row(kPairContact, "law", "clamped", U::one, "see contact.md",
         Words{"clamped paper linear published"}, Flags{kInDefault}),
     row(kTactile, "per", "point", U::one, "area: all but mu count per area", Types{"rect_array"},
-        Words{"point area"}),
+        Words{"point area"}, Flags{kInDefault}),
     row(kTactile, "law", "clamped", U::one, "see contact.md", Words{"clamped paper"},
         Flags{kInDefault}),
     row(kContacts, "ramp", kNone, U::m, "law linear: depth over which damping fades in",

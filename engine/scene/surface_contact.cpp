@@ -71,18 +71,23 @@ double straight_length(const Shape* shape) {
   return 0;
 }
 
-/// The weight of the lighter of two bodies that can move [N]; 0 where both are fixed.
+/// The weight of the lighter of two bodies that can move, or of those that lie free if one does [N]; 0
+/// where both are fixed.
 double lighter_weight(const Scene& scene, const SurfaceContactDescription& d) {
   const double g = std::sqrt(dot(scene.gravity, scene.gravity));
-  double least = HUGE_VAL;
+  double free = HUGE_VAL, moving = HUGE_VAL;
   for (const std::string& name : {d.body1, d.body2}) {
-    const int k = body_index(scene, name);
-    if (k < 0 || moving_link(scene, k) < 0) continue;
+    const int k = body_index(scene, name), mover = k < 0 ? -1 : moving_link(scene, k);
+    if (mover < 0) continue;
     const BodyDescription& body = scene.links[std::size_t(k)].body;
     const double mass = mass_properties(body.shape, body.density).mass;
-    if (mass > 0) least = std::min(least, mass);
+    if (!(mass > 0)) continue;
+    const JointType type = scene.links[std::size_t(mover)].joint.type;
+    double& least = type == JointType::free || type == JointType::free2d ? free : moving;
+    least = std::min(least, mass);
   }
-  return std::isinf(least) ? 0 : least * (g > 0 ? g : kUsualGravity);
+  const double mass = std::isinf(free) ? moving : free;
+  return std::isinf(mass) ? 0 : mass * (g > 0 ? g : kUsualGravity);
 }
 
 /// Half width of the place of contact of two shapes under a force [m]; infinite between faces.
