@@ -71,8 +71,8 @@ double straight_length(const Shape* shape) {
   return 0;
 }
 
-/// The weight of the lighter of two bodies that can move, or of those that lie free if one does [N]; 0
-/// where both are fixed.
+/// The weight of the lighter of two bodies that can move, or of those that lie free if one does
+/// [N]; 0 where both are fixed.
 double lighter_weight(const Scene& scene, const SurfaceContactDescription& d) {
   const double g = std::sqrt(dot(scene.gravity, scene.gravity));
   double free = HUGE_VAL, moving = HUGE_VAL;

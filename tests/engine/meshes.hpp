@@ -7,6 +7,7 @@
 #include <cmath>
 #include <functional>
 #include <map>
+#include <vector>
 
 #include "engine/scene/scene.hpp"
 
@@ -114,6 +115,29 @@ inline MeshShape capsule_mesh(double radius, double half, int around) {
     mesh.triangles.push_back({low, next, j});
     mesh.triangles.push_back({high, (all - 1) * around + j, (all - 1) * around + next});
     for (int k = 0; k + 1 < all; ++k) {
+      const int a = k * around + j, b = k * around + next;
+      mesh.triangles.push_back({a, b, b + around});
+      mesh.triangles.push_back({a, b + around, a + around});
+    }
+  }
+  return mesh;
+}
+
+/// A body of revolution about z, from a profile (z, radius), anticlockwise in the plane (radius,
+/// z). It is closed at both ends.
+inline MeshShape turned_mesh(const std::vector<std::array<double, 2>>& profile, int around) {
+  MeshShape mesh;
+  for (const auto& [z, r] : profile)
+    for (int j = 0; j < around; ++j)
+      mesh.vertices.insert(mesh.vertices.end(), {r * std::cos(2 * M_PI * j / around),
+                                                 r * std::sin(2 * M_PI * j / around), z});
+  const int rings = static_cast<int>(profile.size()), low = rings * around, high = low + 1;
+  mesh.vertices.insert(mesh.vertices.end(), {0, 0, profile.front()[0], 0, 0, profile.back()[0]});
+  for (int j = 0; j < around; ++j) {
+    const int next = (j + 1) % around;
+    mesh.triangles.push_back({low, next, j});
+    mesh.triangles.push_back({high, (rings - 1) * around + j, (rings - 1) * around + next});
+    for (int k = 0; k + 1 < rings; ++k) {
       const int a = k * around + j, b = k * around + next;
       mesh.triangles.push_back({a, b, b + around});
       mesh.triangles.push_back({a, b + around, a + around});

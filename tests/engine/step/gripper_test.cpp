@@ -20,28 +20,6 @@ namespace {
 
 using testing::Random;
 
-/// A body of revolution about z, from a profile (z, radius) upwards. It is closed at both ends.
-MeshShape turned_mesh(const std::vector<std::array<double, 2>>& profile, int around) {
-  MeshShape mesh;
-  for (const auto& [z, r] : profile)
-    for (int j = 0; j < around; ++j)
-      mesh.vertices.insert(mesh.vertices.end(), {r * std::cos(2 * M_PI * j / around),
-                                                 r * std::sin(2 * M_PI * j / around), z});
-  const int rings = static_cast<int>(profile.size()), low = rings * around, high = low + 1;
-  mesh.vertices.insert(mesh.vertices.end(), {0, 0, profile.front()[0], 0, 0, profile.back()[0]});
-  for (int j = 0; j < around; ++j) {
-    const int next = (j + 1) % around;
-    mesh.triangles.push_back({low, next, j});
-    mesh.triangles.push_back({high, (rings - 1) * around + j, (rings - 1) * around + next});
-    for (int k = 0; k + 1 < rings; ++k) {
-      const int a = k * around + j, b = k * around + next;
-      mesh.triangles.push_back({a, b, b + around});
-      mesh.triangles.push_back({a, b + around, a + around});
-    }
-  }
-  return mesh;
-}
-
 /// A prism along z over a polygon that is star-shaped about the origin, anticlockwise.
 MeshShape prism_mesh(const std::vector<std::array<double, 2>>& polygon, double half) {
   MeshShape mesh;
@@ -64,23 +42,24 @@ struct Object {
   MeshShape mesh;
 };
 std::vector<Object> objects() {
-  return {
-      {"box of 8 corners", testing::cuboid_mesh({0.02, 0.03, 0.015})},
-      {"cube", testing::cuboid_mesh({0.02, 0.02, 0.02})},
-      {"plate", testing::cuboid_mesh({0.03, 0.03, 0.006})},
-      {"wedge", prism_mesh({{-0.02, -0.015}, {0.03, -0.015}, {-0.02, 0.02}}, 0.02)},
-      {"hexagonal bar", prism_mesh({{0.02, 0},
-                                    {0.01, 0.0173},
-                                    {-0.01, 0.0173},
-                                    {-0.02, 0},
-                                    {-0.01, -0.0173},
-                                    {0.01, -0.0173}},
-                                   0.03)},
-      {"bolt", turned_mesh({{-0.03, 0.008}, {0.01, 0.008}, {0.0101, 0.016}, {0.022, 0.016}}, 16)},
-      {"bottle", turned_mesh({{-0.04, 0.018}, {0.01, 0.018}, {0.022, 0.008}, {0.04, 0.008}}, 24)},
-      {"egg", testing::ellipsoid_mesh(2, {0.018, 0.022, 0.03})},
-      {"ring", testing::torus_mesh(0.022, 0.008, 24, 12)},
-      {"capsule", testing::capsule_mesh(0.012, 0.02, 16)}};
+  return {{"box of 8 corners", testing::cuboid_mesh({0.02, 0.03, 0.015})},
+          {"cube", testing::cuboid_mesh({0.02, 0.02, 0.02})},
+          {"plate", testing::cuboid_mesh({0.03, 0.03, 0.006})},
+          {"wedge", prism_mesh({{-0.02, -0.015}, {0.03, -0.015}, {-0.02, 0.02}}, 0.02)},
+          {"hexagonal bar", prism_mesh({{0.02, 0},
+                                        {0.01, 0.0173},
+                                        {-0.01, 0.0173},
+                                        {-0.02, 0},
+                                        {-0.01, -0.0173},
+                                        {0.01, -0.0173}},
+                                       0.03)},
+          {"bolt", testing::turned_mesh(
+                       {{-0.03, 0.008}, {0.01, 0.008}, {0.0101, 0.016}, {0.022, 0.016}}, 16)},
+          {"bottle", testing::turned_mesh(
+                         {{-0.04, 0.018}, {0.01, 0.018}, {0.022, 0.008}, {0.04, 0.008}}, 24)},
+          {"egg", testing::ellipsoid_mesh(2, {0.018, 0.022, 0.03})},
+          {"ring", testing::torus_mesh(0.022, 0.008, 24, 12)},
+          {"capsule", testing::capsule_mesh(0.012, 0.02, 16)}};
 }
 
 /// Plates of 0.1 kg that move along y, and an object between them.
