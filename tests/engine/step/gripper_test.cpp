@@ -132,7 +132,7 @@ std::vector<Fall> close_on(const MeshShape& mesh, double force, int steps, int p
 }
 
 TEST(Gripper, HoldsOrLetsGoAsTheClosedFormSays) {
-  constexpr int kPoses = 24;
+  constexpr int kPoses = 8;
   for (const Object& object : objects()) {
     SCOPED_TRACE(object.name);
     const double mass = mass_properties(Shape{object.mesh}, 600).mass, weight = mass * 9.81;
