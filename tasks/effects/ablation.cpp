@@ -149,12 +149,26 @@ Fields zeros_of(EffectKind kind, Ablation way) {
   return fields;
 }
 
+/// The first of the elements that an effect is of, and how many they are: both halves of a contact
+/// of surfaces are one.
+template <class Element>
+std::pair<std::size_t, std::size_t> meant_elements(const std::vector<Element>& all, int element) {
+  if (element < 0) return {0, all.size()};
+  auto first = std::size_t(element);
+  std::size_t count = 1;
+  if constexpr (std::is_same_v<Element, PairContactDescription>) {
+    if (all[first].second_half) --first;
+    if (first + 1 < all.size() && all[first + 1].second_half) ++count;
+  }
+  return {first, count};
+}
+
 /// Removes an effect of contacts or sensors: coefficients, or the elements themselves.
 template <class Element>
 void drop_elements(Scene& scene, std::vector<Element>& all, const Effect& effect, Ablation way) {
   const Fields fields = zeros_of(effect.kind, way);
-  for (std::size_t k = 0; k < all.size(); ++k) {
-    if (!is_meant(effect.element, k)) continue;
+  const auto [first, count] = meant_elements(all, effect.element);
+  for (std::size_t k = first; k < first + count; ++k) {
     if constexpr (std::is_same_v<Element, TactileDescription>) {
       // Markers that took the sensor's ks as their stiffness keep it.
       if (all[k].markers && all[k].markers->stiffness == 0)
@@ -164,10 +178,7 @@ void drop_elements(Scene& scene, std::vector<Element>& all, const Effect& effect
     keep_constant(scene, first_number(all[k]), fields);
   }
   if (is_part(effect.kind) || way != Ablation::removed) return;
-  if (effect.element < 0)
-    all.clear();
-  else
-    all.erase(all.begin() + effect.element);
+  all.erase(all.begin() + std::ptrdiff_t(first), all.begin() + std::ptrdiff_t(first + count));
 }
 
 void drop_of_elements(Scene& scene, const Effect& effect, Ablation way) {

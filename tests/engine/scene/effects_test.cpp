@@ -8,6 +8,7 @@
 #include <map>
 #include <set>
 
+#include "engine/scene/surface_contact.hpp"
 #include "engine/step/control.hpp"
 #include "engine/step/stepper.hpp"
 #include "engine/step/tape.hpp"
@@ -281,6 +282,24 @@ TEST(Effects, VelocityProductsFollowFromTheJoints) {
     EXPECT_FALSE(has_way(products.kind, way));
   EXPECT_THROW(without(scene, products), InputError);
   EXPECT_THROW(without(scene, {EffectKind::tactile, 2}), InputError);
+}
+
+TEST(Effects, BothHalvesOfAContactOfSurfacesGoTogether) {
+  Scene scene = scenes_of_all_effects().front();
+  const auto before = static_cast<int>(scene.pair_contacts.size());
+  add_surface_contact(scene, {"box", "slider", {1e6, 1, 0.5, 1}, ContactLaw::clamped, {}, {}});
+  add_surface_contact(scene, {"pad", "box", {2e6, 1, 0.5, 1}, ContactLaw::clamped, {}, {}});
+  ASSERT_EQ(scene.pair_contacts.size(), std::size_t(before + 4));
+  for (const int element : {before, before + 1}) {
+    const Scene less = without(scene, {EffectKind::pair_contact, element});
+    ASSERT_EQ(less.pair_contacts.size(), std::size_t(before + 2));
+    EXPECT_FALSE(less.pair_contacts[std::size_t(before)].second_half);
+    EXPECT_EQ(less.pair_contacts[std::size_t(before)].coefficients.kn, 2e6);
+    EXPECT_TRUE(less.pair_contacts[std::size_t(before) + 1].second_half);
+    const Scene frictionless = without(scene, {EffectKind::pair_friction, element});
+    for (const int half : {before, before + 1})
+      EXPECT_EQ(frictionless.pair_contacts[std::size_t(half)].coefficients.kt, 0);
+  }
 }
 
 /// State and workspace of a scene [bytes].
