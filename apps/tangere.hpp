@@ -4,6 +4,7 @@
 #pragma once
 
 // Scenes, models, steps and readings.
+#include "engine/scene/surface_contact.hpp"
 #include "engine/sense/energy_balance.hpp"
 #include "engine/sense/flow_map.hpp"
 #include "engine/sense/readout.hpp"

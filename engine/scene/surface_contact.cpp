@@ -104,19 +104,6 @@ double half_width(const Shape* one, const Shape* two, double stiffness, double f
   return std::sqrt(2 * radius * std::min(depth, radius));
 }
 
-/// Which of two bodies has points. Edges and corners go between the points of a face, so both of
-/// two shapes with faces have some. A round shape resolves its contacts alone: of two, the one with
-/// the smaller surface.
-std::pair<bool, bool> covered_surfaces(const Shape* one, const Shape* two) {
-  const bool first = one != nullptr && has_surface(*one),
-             second = two != nullptr && has_surface(*two);
-  if (!first || !second) return {first, second};
-  const bool round1 = !std::isinf(roundness(one)), round2 = !std::isinf(roundness(two));
-  if (!round1 && !round2) return {true, true};
-  const bool by_first = round1 && round2 ? surface_area(*one) <= surface_area(*two) : round1;
-  return {by_first, !by_first};
-}
-
 /// The points of a body, as a contact with another one. `share`: of the stiffness.
 PairContactDescription half_contact(const Scene& scene, const SurfaceContactDescription& d,
                                     bool first, double share) {
@@ -128,7 +115,7 @@ PairContactDescription half_contact(const Scene& scene, const SurfaceContactDesc
   pair.law = d.law;
   pair.source = d.source;
   const SurfacePitch pitch =
-      d.pitch ? SurfacePitch{*d.pitch, *d.pitch, 0, false} : fitting_pitch(scene, d, first);
+      d.pitch ? SurfacePitch{*d.pitch, *d.pitch, 0} : fitting_pitch(scene, d, first);
   SurfacePoints points =
       surface_points(*shape_of(scene, pair.general_body), pitch.across, pitch.along);
   for (double& area : points.areas) area *= share;
@@ -145,8 +132,8 @@ SurfacePitch fitting_pitch(const Scene& scene, const SurfaceContactDescription& 
   const double narrow =
       std::min(ascending_widths(other)[1] / kAcrossBody, ascending_widths(own)[1] / kAcrossBody);
   const double touching = half_width(own, other, d.coefficients.kn, lighter_weight(scene, d));
-  SurfacePitch pitch{std::min(narrow, kAcrossPlace * touching),
-                     std::min(narrow, kAcrossPlace * touching), touching, false};
+  const double across = std::min(narrow, kAcrossPlace * touching);
+  SurfacePitch pitch{across, across, across};
   // A line of contact with a face is not resolved along the line.
   if (straight_length(own) > 0 && std::isinf(roundness(other)))
     pitch.along = std::min(narrow, straight_length(own) / kAcrossBody);
@@ -154,10 +141,33 @@ SurfacePitch fitting_pitch(const Scene& scene, const SurfaceContactDescription& 
   if (count > kMostPoints) {
     const double grown = std::sqrt(count / kMostPoints);
     pitch.across *= grown, pitch.along *= grown;
-    pitch.coarse = pitch.across > touching;
+    pitch.bounded = true;
+    pitch.coarse = pitch.across > std::min(touching, kAcrossBody / 2 * narrow);
   }
   return pitch;
 }
+
+namespace {
+
+/// Shares of the stiffness at the points of body1 and body2. Edges and corners go between the points
+/// of a face, so both of two shapes with faces have points. A round shape resolves its contacts
+/// alone: of two, the one with the smaller surface. A body that would need too many points has none
+/// where the other one does not.
+std::array<double, 2> shares(const Scene& scene, const SurfaceContactDescription& d) {
+  const Shape *const one = shape_of(scene, d.body1), *const two = shape_of(scene, d.body2);
+  const bool first = one != nullptr && has_surface(*one),
+             second = two != nullptr && has_surface(*two);
+  if (!first || !second) return {first ? 1.0 : 0.0, second ? 1.0 : 0.0};
+  const bool round1 = !std::isinf(roundness(one)), round2 = !std::isinf(roundness(two));
+  const bool smaller = surface_area(*one) <= surface_area(*two);
+  const bool few1 = d.pitch || !fitting_pitch(scene, d, true).bounded,
+             few2 = d.pitch || !fitting_pitch(scene, d, false).bounded;
+  if (few1 == few2 && !round1 && !round2) return {0.5, 0.5};
+  const bool by_first = few1 != few2 ? few1 : round1 && round2 ? smaller : round1;
+  return {by_first ? 1.0 : 0.0, by_first ? 0.0 : 1.0};
+}
+
+}  // namespace
 
 std::string contact_fault(const Scene& scene, const SurfaceContactDescription& d) {
   if (d.body1 == d.body2) return "body '" + d.body1 + "' against itself; expected two bodies";
@@ -202,21 +212,20 @@ std::string contact_fault(const Scene& scene, const SurfaceContactDescription& d
 std::string add_surface_contact(Scene& scene, const SurfaceContactDescription& d) {
   if (const std::string fault = contact_fault(scene, d); !fault.empty())
     throw InputError(d.source.prefix() + "<surface_contact>: " + fault);
-  const auto [one, two] = covered_surfaces(shape_of(scene, d.body1), shape_of(scene, d.body2));
+  const std::array<double, 2> share = shares(scene, d);
   std::string warning;
   for (const bool first : {true, false}) {
-    if (first ? !one : !two) continue;
-    scene.pair_contacts.push_back(half_contact(scene, d, first, one && two ? 0.5 : 1));
-    scene.pair_contacts.back().second_half = !first && one;
+    if (!(share[first ? 0 : 1] > 0)) continue;
+    scene.pair_contacts.push_back(half_contact(scene, d, first, share[first ? 0 : 1]));
+    scene.pair_contacts.back().second_half = !first && share[0] > 0;
     const SurfacePitch pitch = fitting_pitch(scene, d, first);
-    if (!d.pitch && pitch.coarse)
-      warning = fmt::format(
-          "{}<surface_contact>: '{}' and '{}' touch in a place that is {:.2g} m wide under the "
-          "lighter body's weight, and {} points of '{}' are {:.2g} m apart: it rolls over a "
-          "polygon; expected a smaller kn, or a pitch of {:.2g}",
-          d.source.prefix(), d.body1, d.body2, 2 * pitch.touching,
-          scene.pair_contacts.back().areas.size(), first ? d.body1 : d.body2, pitch.across,
-          pitch.touching);
+    if (d.pitch || !pitch.coarse) continue;
+    warning = fmt::format(
+        "{}<surface_contact>: the {} points of '{}' are {:.2g} m apart; under the lighter body's "
+        "weight its contact with '{}' is uneven unless they are {:.2g} m apart; expected a smaller "
+        "kn, or a pitch of {:.2g}",
+        d.source.prefix(), scene.pair_contacts.back().areas.size(), first ? d.body1 : d.body2,
+        pitch.across, first ? d.body2 : d.body1, pitch.wanted, pitch.wanted);
   }
   return warning;
 }

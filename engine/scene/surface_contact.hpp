@@ -29,8 +29,9 @@ struct SurfaceContactDescription {
 /// Distances of neighbouring points of one surface.
 struct SurfacePitch {
   double across, along;  ///< as surface_points() takes them [m]
-  double touching;       ///< half width of the place of contact under the lighter body's weight [m]
-  bool coarse;           ///< the number of points is bounded, so `touching` is not resolved
+  double wanted;         ///< `across` without the bound on the number of points [m]
+  bool bounded = false;  ///< `wanted` would take too many points
+  bool coarse = false;   ///< so the place of contact, or the other body, is not resolved
 };
 
 /// Returns distances at which points of a body resolve its contact with another one, or the ground:

@@ -315,6 +315,33 @@ TEST(SurfaceContact, CreatesNoEnergyWhereBodiesTumbleAndRock) {
   }
 }
 
+TEST(SurfaceContact, ABodyThatWouldNeedTooManyPointsHasNone) {
+  for (const Shape& large : {Shape{CuboidShape{{1, 1, 0.05}}}, Shape{CylinderShape{1, 0.5}}}) {
+    SCOPED_TRACE(shape_name(large));
+    const bool drum = std::holds_alternative<CylinderShape>(large);
+    Scene s;
+    s.timestep = 1e-3;
+    s.gravity = {0, 0, -9.81};
+    s.links = {testing::link("large", JointType::fixed, {0, 0, drum ? -0.5 : -0.025}, large, 500),
+               testing::link("die", JointType::free, {0.0013, 0.0021, 0.005},
+                             CuboidShape{{0.01, 0.01, 0.01}}, 1000)};
+    if (drum) s.links[0].body.pose.orientation = kAlongX;
+    EXPECT_EQ(
+        add_surface_contact(s, {"large", "die", {1e8, 1e6, 0.5, 1e8}, ContactLaw::clamped, {}, {}}),
+        "");
+    ASSERT_EQ(s.pair_contacts.size(), 1U);
+    EXPECT_EQ(s.pair_contacts[0].general_body, "die");
+    const Model model(s);
+    Batch batch(model, 1);
+    settle(model, batch, 1);
+    const std::vector<double> q = q_of(batch);
+    // On the plate it sinks in by m g/(K A), on the drum along a line.
+    EXPECT_NEAR(q[2], -1000 * 0.01 * 9.81 / 1e8, drum ? 2e-5 : 1e-8);
+    for (const std::size_t k : {0, 1}) EXPECT_NEAR(q[k], 0, drum ? 1e-4 : 1e-8);
+    for (const std::size_t k : {4, 5, 6}) EXPECT_NEAR(q[k], 0, drum ? 5e-3 : 1e-6);
+  }
+}
+
 TEST(SurfaceContact, NothingTripsOverTheSeamOfFlushBoxes) {
   const double r = 0.02, stiffness = 1e8;
   Scene s;

@@ -157,7 +157,8 @@ TEST(SurfaceContactFile, ATooStiffContactOfABallIsTold) {
                                        "kn=\"1e14\"/>\n"),
                           "s.xml")
                   .warnings,
-              ElementsAre(AllOf(HasSubstr("s.xml:11: <surface_contact>: 'rod' and 'ground'"),
+              ElementsAre(AllOf(HasSubstr("s.xml:11: <surface_contact>: the "),
+                                HasSubstr("points of 'rod' are"),
                                 HasSubstr("expected a smaller kn, or a pitch of"))));
 }
 
