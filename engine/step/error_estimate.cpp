@@ -29,13 +29,11 @@ using kernels::Row;
 
 namespace {
 
-/// Sets the residual to M (c₀/h)² e at the end of the parts just solved.
+/// Sets up the stage so that its residual is M (c₀/h)² e at the end of the parts just solved.
 template <int L>
-void weigh_displacement(const CompiledModel& model, const Scheme& scheme,
-                        const kernels::KernelTable& table, BasicWorkspace<L>& w, LaneBits lanes,
-                        const Row<L>& h, NewtonReport& report) {
+void weigh_displacement(const Scheme& scheme, int n, const Row<L>& h, BasicWorkspace<L>& w) {
   const std::vector<double>& estimate = scheme.estimate;
-  const int n = model.nv, inner = scheme.inner_stages();
+  const int inner = scheme.inner_stages();
   kernels::Stage<L>& s = w.stage;
   for (int i = 0; i < n; ++i)
     for (int l = 0; l < L; ++l) {
@@ -43,16 +41,13 @@ void weigh_displacement(const CompiledModel& model, const Scheme& scheme,
       for (int k = 0; k < inner; ++k) e += estimate[std::size_t(1 + k)] * w.x_inner[k * n + i][l];
       s.s[i][l] += s.c0_over_h[l] * s.c0_over_h[l] / s.inverse_h[l] * e;
     }
-  evaluate_elsewhere(model, table, w, lanes, report);
 }
 
-/// Sets the residual to -M e_v/(h estimate[0]), at the start.
+/// Sets up the stage so that its residual is -M e_v/(h estimate[0]), at the start.
 template <int L>
-void weigh_velocity(const CompiledModel& model, const Scheme& scheme,
-                    const kernels::KernelTable& table, BasicWorkspace<L>& w, LaneBits lanes,
-                    const Row<L>& h, NewtonReport& report) {
+void weigh_velocity(const Scheme& scheme, int n, const Row<L>& h, BasicWorkspace<L>& w) {
   const std::vector<double>& estimate = scheme.estimate;
-  const int n = model.nv, inner = scheme.inner_stages();
+  const int inner = scheme.inner_stages();
   kernels::Stage<L>& s = w.stage;
   for (int i = 0; i < n; ++i)
     for (int l = 0; l < L; ++l) {
@@ -66,7 +61,6 @@ void weigh_velocity(const CompiledModel& model, const Scheme& scheme,
       s.s[i][l] = -change / (estimate.front() * h[l] * s.inverse_h[l]) -
                   s.c0_over_h[l] / s.inverse_h[l] * v0;
     }
-  evaluate_elsewhere(model, table, w, lanes, report);
 }
 
 /// Returns the lanes in which a limit of some dofs acts at the start and not at the end. Limits of
@@ -128,7 +122,8 @@ Row<L> ErrorEstimate::error(const kernels::KernelTable& table, BasicWorkspace<L>
   const auto& kernel = table.stage<L>();
   const auto [start, end, by_displacement, by_velocity] = w.wrenches;
   std::copy_n(s.x, n, w.base);
-  weigh_displacement(model_, scheme_, table, w, lanes, h, report);
+  weigh_displacement(scheme_, n, h, w);
+  evaluate_elsewhere(model_, table, w, lanes, report);
   kernel.contact_wrenches(model_.view, s, end);
   Row<L> error{};
   scaled_residual(model_, table, w, error);
@@ -138,7 +133,8 @@ Row<L> ErrorEstimate::error(const kernels::KernelTable& table, BasicWorkspace<L>
                  left = left_limits(model_, w, lanes & factors.any, model_.component_dofs);
   if (contact_forces_.none() && (guessed | left) == 0) return error;
   solve_by_factor(model_, table, w, factors, w.delta);
-  weigh_velocity(model_, scheme_, table, w, lanes, h, report);
+  weigh_velocity(scheme_, n, h, w);
+  evaluate_elsewhere(model_, table, w, lanes, report);
   kernel.contact_wrenches(model_.view, s, start);
   const LaneBits touched =
       lanes & (contact_forces_.touching<L>(start) | contact_forces_.touching<L>(end));
