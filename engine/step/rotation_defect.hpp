@@ -14,7 +14,7 @@
 
 namespace tangere {
 
-/// Returns the lanes in which a step of length h made more momentum, of some ball joint that rotated
+/// Returns the lanes in which a step of length h made more momentum, of some ball joint that turned
 /// far, than 3e-5 of the body's per radian, and more than half a percent of what its torque made.
 /// The step ended in the workspace's v1.
 template <int L>

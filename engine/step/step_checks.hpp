@@ -28,8 +28,8 @@ class StepChecks {
   /// Returns a Failure of each lane, or 0, after a solve by a scheme over a time h [s] that started
   /// at q0, v0 of the workspace and ended in q1, v1 in the lanes `found`. The others have kNoRoot,
   /// and so have lanes of `softened` whose velocities jumped: forces that no search could follow
-  /// from the first guess and that throw bodies about are not smooth, which a scheme of higher order
-  /// relies on. Shorter parts resolve them.
+  /// from the first guess and that throw bodies about are not smooth, as schemes of higher order
+  /// assume. Shorter parts resolve them.
   template <int L>
   std::array<unsigned, L> failures(const Scheme& scheme, const kernels::KernelTable& table,
                                    BasicWorkspace<L>& w, LaneBits found, LaneBits softened,
