@@ -19,17 +19,13 @@
 
 namespace tangere {
 
-const Scheme* Scheme::energy_fallback() const {
-  return order > 1 ? &Integrator::bdf1.scheme() : nullptr;
-}
-
-const Scheme& Scheme::rotation_fallback() const {
-  return order > 1 ? substep_scheme() : Integrator::sdirk2.scheme();
+const Scheme& Scheme::fallback() const {
+  return order > 1 ? Integrator::bdf1.scheme() : Integrator::sdirk2.scheme();
 }
 
 int Scheme::most_inner_stages() const {
   return std::max({inner_stages(), start == nullptr ? 0 : start->inner_stages(),
-                   substep_scheme().inner_stages(), rotation_fallback().inner_stages()});
+                   substep_scheme().inner_stages(), fallback().inner_stages()});
 }
 
 namespace {

@@ -54,11 +54,10 @@ struct Scheme {
   [[nodiscard]] int inner_stages() const { return static_cast<int>(stages.size()) - 1; }
   [[nodiscard]] bool needs_history() const { return start != nullptr; }
   [[nodiscard]] const Scheme& substep_scheme() const { return parts == nullptr ? *this : *parts; }
-  /// The scheme of steps to which this one would add energy; null: it adds none.
-  [[nodiscard]] const Scheme* energy_fallback() const;
-  /// The scheme of steps in which bodies turn too far for this one.
-  [[nodiscard]] const Scheme& rotation_fallback() const;
-  /// The largest number of inner stages of this scheme, its start, its parts and its turns.
+  /// The scheme of steps that this one cannot take: of order 1 if this one is of a higher order and
+  /// would add energy, else SDIRK2, for bodies that rotate too far.
+  [[nodiscard]] const Scheme& fallback() const;
+  /// The largest number of inner stages of this scheme, its start, its parts and its fallback.
   [[nodiscard]] int most_inner_stages() const;
 };
 

@@ -17,9 +17,7 @@ void set_floors(const CompiledModel& m, BasicWorkspace<L>& w, LaneBits lanes) {
   const kernels::Pattern& p = m.view.pattern;
   for (int c = 0; c < m.components(); ++c) {
     kernels::Row<L> sum{};
-    for (int k = m.component_begin[std::size_t(c)]; k < m.component_begin[std::size_t(c) + 1];
-         ++k) {
-      const int i = m.component_dofs[std::size_t(k)];
+    for (const int i : dofs_of_component(m, c)) {
       const double scale =
           4 * std::numeric_limits<double>::epsilon() * m.unknown_scale[std::size_t(i)];
       const kernels::Row<L>& diagonal = w.stage.A[p.slot[i * p.n + i]];
@@ -44,9 +42,7 @@ void worst_scaled_residuals(const CompiledModel& m, const BasicWorkspace<L>& w, 
   out = Row{};
   for (int c = 0; c < m.components(); ++c) {
     Row residual{}, motion{}, mass{}, force{};
-    for (int k = m.component_begin[std::size_t(c)]; k < m.component_begin[std::size_t(c) + 1];
-         ++k) {
-      const int i = m.component_dofs[std::size_t(k)];
+    for (const int i : dofs_of_component(m, c)) {
       for (int l = 0; l < L; ++l) {
         const double r = s.inverse_weight[i][l] * s.g[i][l], v = s.weight[i][l] * s.v[i][l],
                      f = s.inverse_weight[i][l] * s.force_scale[i][l];

@@ -40,8 +40,7 @@ Ball around(const std::vector<Ball>& balls) {
 ContactForces::ContactForces(const CompiledModel& m) : floor_(2 * std::size_t(m.components())) {
   std::vector<int> component(std::size_t(m.nv));
   for (int c = 0; c < m.components(); ++c)
-    for (int k = m.component_begin[std::size_t(c)]; k < m.component_begin[std::size_t(c) + 1]; ++k)
-      component[std::size_t(m.component_dofs[std::size_t(k)])] = c;
+    for (const int i : dofs_of_component(m, c)) component[std::size_t(i)] = c;
   const auto component_of = [&](int link) {
     return component[std::size_t(m.links[std::size_t(link)].v)];
   };

@@ -42,10 +42,6 @@ struct NewtonReport {
   std::array<int, kernels::kGroup> iterations{};  ///< evaluations of the residual, accumulated
   /// Scaled residual at the last accepted point; the expected one where its evaluation was spared.
   std::array<double, kernels::kGroup> residual{};
-  LaneBits softened = 0;        ///< lanes whose root was found by softening
-  LaneBits tunnelled = 0;       ///< lanes in which a body passed through a contact partner
-  LaneBits energy_created = 0;  ///< lanes in which a part created energy, however short it was
-  LaneBits over_rotated = 0;    ///< lanes in which a body rotated too far in a shortest part
 };
 
 /// Solves g(x) = 0 for the lanes in `lanes`, from the x in the stage. On return the stage's x and v

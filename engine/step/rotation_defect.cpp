@@ -120,12 +120,24 @@ struct TurningBody {
   }
 };
 
+/// Whether some ball joint of one lane is off after a step of length h.
+template <int L>
+bool is_over_rotated(const CompiledModel& model, const Scheme& scheme, const BasicWorkspace<L>& w,
+                     double h, int lane) {
+  return std::ranges::any_of(model.links, [&](const Link& link) {
+    if (link.kind != JointKind::spherical || !link.has_mass) return false;
+    const double turn = std::sqrt(fastest(link, w, lane)) * h;
+    if (!(turn > far_turn(scheme))) return false;
+    return TurningBody<L>{scheme, w, link, inertia_of(model, link, w, lane), h, lane, model.nv}
+        .is_off(turn);
+  });
+}
+
 }  // namespace
 
 template <int L>
-LaneBits far_turners(const CompiledModel& model, const Scheme& scheme, const BasicWorkspace<L>& w,
-                     LaneBits lanes, double h) {
-  const double far = far_turn(scheme) / h;
+LaneBits over_rotated(const CompiledModel& model, const Scheme& scheme, const BasicWorkspace<L>& w,
+                      LaneBits lanes, const Row<L>& h) {
   Row<L> most{};  // squares of rates at the end: a step from fast to slow turning began as an end
   for (const Link& link : model.links) {
     if (link.kind != JointKind::spherical || !link.has_mass) continue;
@@ -136,31 +148,17 @@ LaneBits far_turners(const CompiledModel& model, const Scheme& scheme, const Bas
     }
   }
   LaneBits found = 0;
-  for (int l = 0; l < L; ++l)
-    if (most[l] > far * far) found |= 1U << l;
-  return found & lanes;
-}
-
-template <int L>
-bool turned_too_far(const CompiledModel& model, const Scheme& scheme, const BasicWorkspace<L>& w,
-                    double h, int lane) {
-  for (const Link& link : model.links) {
-    if (link.kind != JointKind::spherical || !link.has_mass) continue;
-    const double turn = std::sqrt(fastest(link, w, lane)) * h;
-    if (!(turn > far_turn(scheme))) continue;
-    const TurningBody<L> body{scheme, w, link, inertia_of(model, link, w, lane), h, lane, model.nv};
-    if (body.is_off(turn)) return true;
+  for (int l = 0; l < L; ++l) {
+    const double far = far_turn(scheme) / h[l];
+    if (has(lanes, l) && most[l] > far * far && is_over_rotated(model, scheme, w, h[l], l))
+      found |= 1U << l;
   }
-  return false;
+  return found;
 }
 
-#define TANGERE_FOR_LANES(L)                                                                   \
-  template LaneBits far_turners(const CompiledModel&, const Scheme&, const BasicWorkspace<L>&, \
-                                LaneBits, double);                                             \
-  template bool turned_too_far(const CompiledModel&, const Scheme&, const BasicWorkspace<L>&,  \
-                               double, int);
-TANGERE_FOR_LANES(kernels::kGroup)
-TANGERE_FOR_LANES(1)
-#undef TANGERE_FOR_LANES
+template LaneBits over_rotated(const CompiledModel&, const Scheme&, const Workspace&, LaneBits,
+                               const Row<kGroup>&);
+template LaneBits over_rotated(const CompiledModel&, const Scheme&, const SingleWorkspace&,
+                               LaneBits, const Row<1>&);
 
 }  // namespace tangere

@@ -14,16 +14,11 @@
 
 namespace tangere {
 
-/// Returns the lanes in which some ball joint rotated far enough in a step of length h by a scheme
-/// that its momentum has to be checked. The step ended in the workspace's v1.
-template <int L>
-LaneBits far_turners(const CompiledModel& model, const Scheme& scheme, const BasicWorkspace<L>& w,
-                     LaneBits lanes, double h);
-
-/// Whether in one lane a solved step of length h made more momentum, of some ball joint that turned
+/// Returns the lanes in which a step of length h made more momentum, of some ball joint that turned
 /// far, than 3e-5 of the body's per radian, and more than half a percent of what its torque made.
+/// The step ended in the workspace's v1.
 template <int L>
-bool turned_too_far(const CompiledModel& model, const Scheme& scheme, const BasicWorkspace<L>& w,
-                    double h, int lane);
+LaneBits over_rotated(const CompiledModel& model, const Scheme& scheme, const BasicWorkspace<L>& w,
+                      LaneBits lanes, const kernels::Row<L>& h);
 
 }  // namespace tangere

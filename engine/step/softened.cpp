@@ -126,7 +126,6 @@ LaneBits solve_from_softer(const CompiledModel& model, const kernels::KernelTabl
     if (has(open & ~found, l)) report.status[l] = StepStatus::not_converged;
   }
   factors.lanes &= ~(open & ~found);
-  report.softened |= found;
   return found;
 }
 

@@ -1,52 +1,41 @@
 // SPDX-License-Identifier: Apache-2.0
-// Checks of solved steps: tunnelling, velocity jumps, energy gain, rotation
-// (GroupStep::solve_and_check).
+// Checks of the roots of attempts (engine/step/attempt.hpp): tunnelling, velocity jumps, energy
+// gain, rotation.
 #pragma once
 
+#include <array>
 #include <vector>
 
-#include "engine/step/newton.hpp"
 #include "engine/step/step_settings.hpp"
 #include "engine/step/tunnelling_check.hpp"
-#include "engine/step/workspace.hpp"
 
 namespace tangere {
 
-/// Lanes that converged, and among them those to reject: a body passed through another, energy was
-/// created, or a body rotated too far for the scheme.
-struct CheckedSolve {
-  LaneBits found = 0, tunnelled = 0, energy_created = 0, over_rotated = 0;
-  [[nodiscard]] LaneBits accepted() const {
-    return found & ~(tunnelled | energy_created | over_rotated);
-  }
+/// Why an attempt at a step is rejected, as bits.
+enum Failure : unsigned {
+  kNoRoot = 1,
+  kTunnelled = 2,      ///< a body passed through one of its contact partners
+  kEnergyCreated = 4,  ///< of attempts that are not kTunnelled
+  kOverRotated = 8,    ///< a body rotated too far for the scheme, of attempts with neither of these
+  kInaccurate = 16,    ///< the estimated error is larger than the accuracy allows
+  kAnyFailure = 31
 };
 
-/// The checked solve started at q0, v0 of the workspace and ended in q1, v1.
 class StepChecks {
  public:
   StepChecks(const CompiledModel& model, const StepSettings& settings);
 
-  /// Marks lanes in which a body passed through one of its contact partners.
+  /// Returns a Failure of each lane, or 0, after a solve by a scheme over a time h [s] that started
+  /// at q0, v0 of the workspace and ended in q1, v1 in the lanes `found`. The others have kNoRoot,
+  /// and so have lanes of `softened` whose velocities jumped: forces that no search could follow
+  /// from the first guess and that throw bodies about are not smooth, as schemes of higher order
+  /// assume. Shorter parts resolve them.
   template <int L>
-  void find_tunnelling(const kernels::KernelTable& table, BasicWorkspace<L>& w, LaneBits lanes,
-                       NewtonReport& report) const;
-  /// Returns the lanes whose velocities jumped.
-  template <int L>
-  LaneBits velocity_jumps(const BasicWorkspace<L>& w, LaneBits lanes, double h) const;
-  /// Returns the lanes whose solve created energy.
-  template <int L>
-  LaneBits energy_gains(const kernels::KernelTable& table, BasicWorkspace<L>& w, LaneBits lanes,
-                        double h) const;
-  /// Returns the lanes in which a body rotated too far for the scheme of the solve. Bodies in
-  /// contact are not checked, because the scheme may damp them.
-  template <int L>
-  LaneBits over_rotations(const Scheme& scheme, const kernels::KernelTable& table,
-                          BasicWorkspace<L>& w, LaneBits lanes, double h) const;
+  std::array<unsigned, L> failures(const Scheme& scheme, const kernels::KernelTable& table,
+                                   BasicWorkspace<L>& w, LaneBits found, LaneBits softened,
+                                   const kernels::Row<L>& h) const;
 
  private:
-  template <int L>
-  void find_poses(const kernels::KernelTable& table, BasicWorkspace<L>& w) const;
-
   const CompiledModel& model_;
   bool bounded_energy_, cut_;  ///< StepSettings::bounded_energy; accuracy > 0
   TunnellingCheck tunnelling_;

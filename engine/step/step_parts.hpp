@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // How far one environment has come in a step that is cut into parts: h/2ⁿ long, each beginning at a
-// multiple of its length.
+// multiple of its length. A step begins with a part of its whole length, so it depends on its state
+// alone.
 #pragma once
 
 #include <algorithm>
@@ -10,10 +11,13 @@ namespace tangere {
 
 class StepParts {
  public:
-  static constexpr int kFinest = 8;  ///< the shortest part: h / 2^8
+  static constexpr int kFinest = 8;  ///< the largest n of a step that keeps an accuracy
+
+  /// `finest`: the largest n, at most kFinest.
+  explicit StepParts(int finest = 0) : finest_(finest) {}
 
   [[nodiscard]] bool finished() const { return done_ == kUnits; }
-  [[nodiscard]] bool finest() const { return halved_ == kFinest; }
+  [[nodiscard]] bool finest() const { return halved_ == finest_; }
   [[nodiscard]] bool whole() const { return halved_ == 0; }
   /// Length of the next part, in steps.
   [[nodiscard]] double length() const { return std::ldexp(1.0, -halved_); }
@@ -23,7 +27,7 @@ class StepParts {
   void shorten(double ratio) {
     const double wanted = std::ceil(std::log2(ratio) / kPower);
     halved_ += std::isfinite(wanted) ? std::clamp(static_cast<int>(wanted), 1, kMostHalvings) : 1;
-    halved_ = std::min(halved_, kFinest);
+    halved_ = std::min(halved_, finest_);
   }
   /// Call after an accepted part. Doubles the next length if the estimate predicts acceptance.
   void take(double ratio) {
@@ -41,6 +45,7 @@ class StepParts {
 
   [[nodiscard]] int units() const { return kUnits >> halved_; }
 
+  int finest_;
   int done_ = 0;    // of kUnits
   int halved_ = 0;  // the next part is h / 2^halved_
 };

@@ -6,6 +6,7 @@
 #include <array>
 #include <cstdint>
 #include <cstring>
+#include <span>
 #include <vector>
 
 #include "engine/base/aligned.hpp"
@@ -32,6 +33,13 @@ inline void put_lanes(const double* from, LaneBits lanes, double* to) {
   }
   for (int l = 0; l < L; ++l)
     if (has(lanes, l)) to[l] = from[l];
+}
+
+/// Returns the dofs of a component of a scene.
+inline std::span<const int> dofs_of_component(const CompiledModel& model, int component) {
+  const std::size_t c = std::size_t(component), begin = std::size_t(model.component_begin[c]);
+  return std::span(model.component_dofs)
+      .subspan(begin, std::size_t(model.component_begin[c + 1]) - begin);
 }
 
 /// The largest number of inner stages of a scheme in the table.
