@@ -149,10 +149,10 @@ SurfacePitch fitting_pitch(const Scene& scene, const SurfaceContactDescription& 
 
 namespace {
 
-/// Shares of the stiffness at the points of body1 and body2. Edges and corners go between the points
-/// of a face, so both of two shapes with faces have points. A round shape resolves its contacts
-/// alone: of two, the one with the smaller surface. A body that would need too many points has none
-/// where the other one does not.
+/// Shares of the stiffness at the points of body1 and body2. Edges and corners go between the
+/// points of a face, so both of two shapes with faces have points. A round shape resolves its
+/// contacts alone: of two, the one with the smaller surface. A body that would need too many points
+/// has none where the other one does not.
 std::array<double, 2> shares(const Scene& scene, const SurfaceContactDescription& d) {
   const Shape *const one = shape_of(scene, d.body1), *const two = shape_of(scene, d.body2);
   const bool first = one != nullptr && has_surface(*one),
