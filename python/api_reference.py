@@ -56,8 +56,11 @@ def nodes_of(package: Path, module: str) -> Iterator[tuple[str, Node]]:
         tree = parse(package / f"{module}.py")
         listed = names_of(tree)
         own = {node.name: node for node in tree.body if isinstance(node, Node)}
-        if listed and "generate" in listed:
-            own |= {n.name: n for n in parse(package / "_generate.py").body if isinstance(n, Node)}
+        for part in tree.body if listed else []:  # what is written in a private module
+            path = package / f"{getattr(part, 'module', None)}.py"
+            if isinstance(part, ast.ImportFrom) and part.level == 1 and path.name.startswith("_"):
+                if path.exists():
+                    own = {n.name: n for n in parse(path).body if isinstance(n, Node)} | own
         for name in listed or [name for name in own if public(name)]:
             yield name, own[name]
         return

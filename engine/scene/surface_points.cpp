@@ -238,7 +238,11 @@ SurfacePoints points_of(const MeshShape& mesh, double pitch, double) {
 }  // namespace
 
 bool has_surface(const Shape& shape) {
-  return std::visit([](const auto& s) { return requires { points_of(s, 1.0, 1.0); }; }, shape);
+  return std::visit(
+      [](const auto& s) {
+        return requires { points_of(s, 1.0, 1.0); };
+      },
+      shape);
 }
 
 SurfacePoints surface_points(const Shape& shape, double pitch, double along) {

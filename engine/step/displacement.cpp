@@ -38,4 +38,20 @@ void add_along_dofs(const Model& model, std::span<const double> q, std::span<con
   }
 }
 
+void add_by_coordinates(const Model& model, std::span<const double> q,
+                        std::span<const double> by_dofs, std::span<double> out) {
+  for (const kernels::Link& link : compiled(model).links) {
+    const double *a = &q[std::size_t(link.q)], *w = &by_dofs[std::size_t(link.v)];
+    double* to = &out[std::size_t(link.q)];
+    if (link.kind != kernels::JointKind::spherical) {
+      for (int k = 0; k < kernels::dofs(link.kind); ++k) to[k] += w[k];
+      continue;
+    }
+    to[0] += 2 * (-a[1] * w[0] - a[2] * w[1] - a[3] * w[2]);
+    to[1] += 2 * (a[0] * w[0] - a[3] * w[1] + a[2] * w[2]);
+    to[2] += 2 * (a[3] * w[0] + a[0] * w[1] - a[1] * w[2]);
+    to[3] += 2 * (-a[2] * w[0] + a[1] * w[1] + a[0] * w[2]);
+  }
+}
+
 }  // namespace tangere

@@ -24,4 +24,5 @@ NB_MODULE(_core, m) {
   add_tasks(m);
   add_environments(m);
   add_tapes(m);
+  add_scene_tapes(m);
 }

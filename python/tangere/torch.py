@@ -9,6 +9,8 @@
         total = total + reward
     (-total.mean()).backward()
 
+`Simulation` does the same for any scene, with rewards of the caller.
+
 The derivatives are analytic (docs/gradients.md). Draws, resets and which point is touched count as
 given. `import tangere` does not import this module; it needs PyTorch.
 """
@@ -24,7 +26,12 @@ import numpy as np
 import torch
 
 from . import _core
+from ._simulation import Simulation, State
 from ._tape import Observations, TapeBase, check_rollout
+from ._torch_run import Run
+
+
+__all__ = ["Check", "Rollout", "Simulation", "State", "Tape", "gradcheck", "rollout"]
 
 
 class Tape(TapeBase):
@@ -61,13 +68,13 @@ class Tape(TapeBase):
         super().__init__(task, num_envs, actions, flatten, scene, threads=threads, **options)
         self.dtype = dtype
         self._token: torch.Tensor | None = None
-        self._run = _Run(self.tape)
+        self._run = Run(self.tape)
 
     def reset(self, seed: int = 0, first_episode: int = 0) -> Observations:
         """Starts the episodes; returns the first observations, which have no derivative."""
         self.tape.reset(seed, first_episode)
         self._run.tape = None
-        self._run = _Run(self.tape)
+        self._run = Run(self.tape)
         self._token = torch.zeros((), dtype=torch.float64)
         return self._split(torch.from_numpy(self.tape.observations()).to(self.dtype))
 
@@ -98,36 +105,6 @@ class Tape(TapeBase):
     def state(self) -> tuple[np.ndarray, np.ndarray]:
         """q (E, nq) and v (E, nv) now, without derivatives."""
         return self.tape.q(), self.tape.v()
-
-
-class _Run:
-    """One pass over a tape, and the order in which its steps may be reversed."""
-
-    def __init__(self, tape: _core.TaskTape):
-        self.tape: _core.TaskTape | None = tape  # None: the tape has begun another run
-        self.taken = 0
-        self.left: int | None = None  # the step reversed last; None: nothing is reversed
-        self.passing = False
-
-    def reverse(self, step: int, rows_bar: np.ndarray, reward_bar: np.ndarray) -> np.ndarray:
-        if self.tape is None:
-            raise _core.InputError(
-                "backward() through a tape that was reset; call it before reset()"
-            )
-        if not self.passing or (self.left is not None and step >= self.left):
-            # Another backward: it must not go on with what the one before has left.
-            if self.left is not None:
-                self.tape.begin_reverse()
-            self.left, self.passing = None, True
-            torch.autograd.Variable._execution_engine.queue_callback(self._end)
-        left = self.taken if self.left is None else self.left
-        for _ in range(left - 1 - step):  # later steps on which the loss does not hang
-            self.tape.reverse(np.zeros_like(rows_bar), np.zeros_like(reward_bar))
-        self.left = step
-        return self.tape.reverse(rows_bar, reward_bar)
-
-    def _end(self) -> None:
-        self.passing = False
 
 
 class _Step(torch.autograd.Function):  # type: ignore[misc]

@@ -224,8 +224,7 @@ TEST(BallContact, SaysWhatItCannotDo) {
   MeshShape touched = testing::ellipsoid_mesh(1, {0.1, 0.1, 0.1});
   touched.resolution = 8;
   const Scene mesh = ball_at({0, 0, 0.2}, touched);
-  EXPECT_NE(message(mesh).find("expected <surface_contact>"), std::string::npos)
-      << message(mesh);
+  EXPECT_NE(message(mesh).find("expected <surface_contact>"), std::string::npos) << message(mesh);
   Scene varying = ball_at({0, 0, 0.2}, PlaneShape{});
   RandomizationDescription radius;
   radius.number = size_of_body("ball", 0);

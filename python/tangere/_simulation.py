@@ -1,0 +1,184 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Any scene as a differentiable function in PyTorch."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+
+from . import _core
+from ._torch_run import Run
+
+
+@dataclass
+class State:
+    """A batch of states. All tensors are differentiable by what led to them."""
+
+    q: torch.Tensor  #: (E, nq) coordinates; quaternions w x y z
+    v: torch.Tensor  #: (E, nv) velocities
+    readings: dict[str, torch.Tensor]  #: sensor → (E, rows, cols, 3) [N]; "variables" → (E, n, 3)
+    status: np.ndarray  #: (E) int8, StepStatus of the last steps
+    step: int  #: calls of step() that led to it
+    _token: torch.Tensor
+
+    def __getitem__(self, name: str) -> torch.Tensor:
+        return self.readings[name]
+
+
+class Simulation:
+    """A scene in E environments, recorded for the way back.
+
+        sim = tangere.torch.Simulation("scene.xml", num_envs=64, steps=100, every=5)
+        s = sim.reset(seed=1)
+        for t in range(100):
+            s = sim.step(s, controls[t])
+            loss = loss + ((s["pad"] - wanted[t]) ** 2).sum() + s.v.square().sum()
+        loss.backward()
+
+    Gradients go to the controls, and to `q`, `v` and `numbers` of reset() if they require them.
+
+    Parameters
+    ----------
+    scene: a file, or a `tangere.Scene`.
+    num_envs: E. Environment e has draw e of a seed.
+    steps: calls of step() after a reset(), at most.
+    every: steps of the simulation in each, with the same controls.
+    numbers: names of numbers of the scene, such as "contact pad ball kn" or "body ball density",
+        that environments may have of their own (docs/gradients.md).
+    threads: None for all cores. Scripts should also call torch.set_num_threads(1).
+    precision: of tactile fields, "double" or "mixed".
+    tape_bytes: limit for the tapes [bytes]. Longer runs are played again from checkpoints.
+    dtype: of states. Controls may have any floating type.
+    """
+
+    def __init__(
+        self,
+        scene: _core.Scene | str | Path,
+        num_envs: int = 1,
+        steps: int = 100,
+        *,
+        every: int = 1,
+        numbers: Sequence[str] = (),
+        threads: int | None = None,
+        precision: str = "double",
+        tape_bytes: float = 1e9,
+        dtype: torch.dtype = torch.float64,
+    ):
+        self.scene = scene if isinstance(scene, _core.Scene) else _core.Scene(scene)
+        self.num_envs, self.steps, self.every, self.dtype = num_envs, steps, every, dtype
+        self.numbers = list(numbers)
+        self.tape = _core.SceneTape(
+            self.scene,
+            num_envs,
+            steps,
+            every,
+            self.numbers,
+            threads=threads,
+            precision=precision,
+            tape_bytes=tape_bytes,
+        )
+        self.model = self.tape.model
+        self._run = Run(self.tape)
+
+    def reset(
+        self,
+        seed: int = 0,
+        *,
+        q: torch.Tensor | None = None,
+        v: torch.Tensor | None = None,
+        numbers: torch.Tensor | None = None,
+    ) -> State:
+        """Starts anew. `q` (E, nq), `v` (E, nv) and `numbers` (E, names), in SI units, take the
+        place of what the scene draws; one row stands for all environments. Quaternions of `q` have
+        length one, and derivatives by them no part that changes it. Raises InputError for other
+        shapes."""
+        self._run.tape = None
+        self._run = Run(self.tape)
+        given = [None if x is None else self._rows(x) for x in (q, v, numbers)]
+        rows, token = _Start.apply(*given, self._run, seed, self.dtype)
+        return self._state(rows, token)
+
+    def step(self, state: State, controls: torch.Tensor) -> State:
+        """Takes `every` steps with the controls (E, nu), or (nu) for all environments. `state` is
+        the one that the last call returned: a tape has one line of steps. Raises InputError for
+        another state or shape, for controls that are not finite, and under torch.no_grad() after
+        recorded steps."""
+        if self._run.taken != state.step or self._run.tape is None:
+            raise _core.InputError(
+                f"a state after {state.step} calls of step(), and {self._run.taken} were taken; "
+                "expected the last one"
+            )
+        if state._token.requires_grad and not torch.is_grad_enabled():
+            raise _core.InputError(
+                "step() under no_grad() after steps that are recorded; call reset()"
+            )
+        controls = self._rows(torch.as_tensor(controls))
+        return self._state(*_Step.apply(controls, state._token, self._run, self.dtype))
+
+    def _rows(self, x: torch.Tensor) -> torch.Tensor:
+        x = torch.as_tensor(x)
+        return x.expand(self.num_envs, -1) if x.ndim == 1 else x
+
+    def _state(self, rows: torch.Tensor, token: torch.Tensor) -> State:
+        parts: dict[str, torch.Tensor] = {}
+        first = 0
+        for t in self.tape.spec.observations:
+            last = first + int(np.prod(t.shape))
+            parts[t.name] = rows[:, first:last].reshape(self.num_envs, *t.shape)
+            first = last
+        q, v = parts.pop("state.q"), parts.pop("state.v")
+        return State(q, v, parts, self.tape.status(), self._run.taken, token)
+
+
+def _numpy(x: Any) -> Any:
+    return None if x is None else x.detach().to("cpu", torch.float64).numpy()
+
+
+class _Start(torch.autograd.Function):  # type: ignore[misc]
+    """The start of a run, whose token passes from step to step."""
+
+    @staticmethod
+    def forward(ctx: Any, q: Any, v: Any, numbers: Any, run: Any, seed: Any, dtype: Any) -> Any:
+        run.tape.reset(seed, _numpy(q), _numpy(v), _numpy(numbers))
+        ctx.run, ctx.given = run, [None if x is None else x.dtype for x in (q, v, numbers)]
+        rows = torch.from_numpy(run.tape.observations()).to(dtype)
+        return rows, torch.zeros((), dtype=torch.float64)
+
+    @staticmethod
+    @torch.autograd.function.once_differentiable  # type: ignore[untyped-decorator]
+    def backward(ctx: Any, rows_bar: Any, token_bar: Any) -> Any:
+        bars = ctx.run.reverse_start(rows_bar.to("cpu", torch.float64).numpy())
+        out = [
+            None if kind is None else torch.from_numpy(bar).to(kind)
+            for kind, bar in zip(ctx.given, bars)
+        ]
+        return (*out, None, None, None)
+
+
+class _Step(torch.autograd.Function):  # type: ignore[misc]
+    """One call of step()."""
+
+    @staticmethod
+    def forward(ctx: Any, controls: Any, token: Any, run: Any, dtype: Any) -> Any:
+        run.tape.step(_numpy(controls))
+        ctx.run, ctx.step, ctx.dtype = run, run.taken, controls.dtype
+        ctx.save_for_backward(token)  # PyTorch frees it after a backward() that keeps no graph
+        run.taken += 1
+        return torch.from_numpy(run.tape.observations()).to(dtype), token.clone()
+
+    @staticmethod
+    @torch.autograd.function.once_differentiable  # type: ignore[untyped-decorator]
+    def backward(ctx: Any, rows_bar: Any, token_bar: Any) -> Any:
+        try:
+            _ = ctx.saved_tensors
+        except RuntimeError:
+            raise _core.InputError(
+                "a second backward() through the same steps; give the first one retain_graph=True"
+            ) from None
+        bar = ctx.run.reverse(ctx.step, rows_bar.to("cpu", torch.float64).numpy())
+        return torch.from_numpy(bar).to(ctx.dtype), token_bar, None, None

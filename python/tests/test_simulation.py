@@ -1,0 +1,187 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Any scene as a differentiable function: against differences, and what is refused."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+torch = pytest.importorskip("torch", reason="PyTorch is not installed")
+
+import tangere  # noqa: E402
+import tangere.torch as tt  # noqa: E402
+
+SCENES = {
+    # A scene, the numbers by which gradients are taken, a loss of a state.
+    "ball": ("rolling_ball_small.xml", ["contact pad ball kn", "body ball density"]),
+    "rod": ("grip_rod.xml", ["contact rod left_finger kn", "contact rod ground mu"]),
+}
+
+CHAIN = """<tangere model="chain"><option unit="m-kg" gravity="0 0 -9.8" timestep="5e-3"
+integrator="SDIRK2"/><robot><link name="arm"><joint name="arm" type="revolute" axis="0 1 0"
+pos="0 0 1" damping="0.02"/><body name="arm" type="capsule" radius="0.02" length="0.2"
+pos="0.1 0 0" density="800"/><link name="hand"><joint name="hand" type="spherical"
+pos="0.2 0 0" damping="0.01"/><body name="hand" type="cuboid" size="0.1 0.04 0.03"
+pos="0.05 0 0" density="900"/></link></link></robot>
+<actuator><motor joint="arm" ctrl="force" ctrl_range="-2 2"/></actuator>
+<variable><endeffector joint="hand" pos="0.1 0 0"/></variable></tangere>"""
+
+
+def scene(name):
+    if name == "chain":
+        return tangere.Scene.from_text(CHAIN), ["body hand density", "joint arm damping"]
+    file, numbers = SCENES[name]
+    return tangere.Scene(Path(tangere.__file__).parent / "scenes" / file), numbers
+
+
+def loss_of(s):
+    total = s.v.square().sum() + 10 * (s.q * torch.arange(1.0, s.q.shape[1] + 1)).sum()
+    for reading in s.readings.values():
+        total = total + 100 * reading.square().sum()
+    return total
+
+
+def rolled(sim, u, q, v, numbers):
+    s = sim.reset(q=q, v=v, numbers=numbers)
+    total = loss_of(s)
+    for t in range(u.shape[0]):
+        s = sim.step(s, u[t])
+        total = total + loss_of(s)
+    return total
+
+
+@pytest.mark.parametrize("name", ["chain", "ball", "rod"])
+def test_gradients_agree_with_differences(name):
+    of, numbers = scene(name)
+    sim = tt.Simulation(of, num_envs=2, steps=6, every=2, numbers=numbers, threads=1)
+    first = sim.reset(seed=3)
+    q0, v0 = first.q.clone(), first.v.clone()
+    if name == "ball":
+        q0[:, 2] -= 0.0155  # the pad touches the ball
+    if name == "rod":
+        q0[:, 3] += 1e-4  # the rod is in the ground, not just on it; its x points down
+    generator = torch.Generator().manual_seed(1)
+
+    def draw(*shape):
+        return torch.randn(*shape, generator=generator, dtype=torch.float64)
+
+    given = {
+        "u": 0.2 * draw(6, 2, sim.model.nu),
+        "q": q0,
+        "v": v0 + 0.01 * draw(*v0.shape),
+        "numbers": torch.from_numpy(sim.tape.numbers()),
+    }
+    at = {key: x.requires_grad_() for key, x in given.items()}
+    rolled(sim, **at).backward()
+    for key, x in at.items():
+        along = draw(*x.shape)
+        if key == "numbers":
+            along = along * x.detach()
+        if key == "q":  # quaternions keep their length
+            along[:, -4:] = 0
+            along *= 0.01
+        errors = []
+        for step in (1e-5, 1e-6, 1e-7, 1e-8):  # contacts have kinks that large steps cross
+            sides = []
+            with torch.no_grad():
+                for sign in (1, -1):
+                    moved = {k: y.detach() for k, y in at.items()}
+                    moved[key] = moved[key] + sign * step * along
+                    sides.append(float(rolled(sim, **moved)))
+            difference = (sides[0] - sides[1]) / (2 * step)
+            analytic = float((x.grad * along).sum())
+            errors.append(abs(difference - analytic) / max(abs(difference), abs(analytic)))
+        # The rod's height meets a kink at every point that comes to touch.
+        bound = {"q": 1e-3, "numbers": 1e-4}.get(key, 3e-6) if name == "rod" else 3e-6
+        assert min(errors) < bound, (key, errors)
+
+
+def test_derivatives_by_quaternions_are_along_the_sphere():
+    sim = tt.Simulation(scene("chain")[0], num_envs=1, steps=3)
+    q = sim.reset().q.detach()
+    turned = torch.tensor([0.9, 0.1, -0.3, 0.2], dtype=torch.float64)
+    q[0, 1:] = turned / turned.norm()
+    q.requires_grad_()
+    s = sim.reset(q=q)
+    for _ in range(3):
+        s = sim.step(s, torch.tensor([0.1], dtype=torch.float64))
+    (s["variables"].square().sum() + s.q[:, 1:].sum()).backward()
+    assert abs(float((q.grad[0, 1:] * q.detach()[0, 1:]).sum())) < 1e-12
+    # A turn about z of the hand, on the right: δq = q ⊗ (0, θ)/2.
+    w, x, y, z = q.detach()[0, 1:].tolist()
+    along = 0.5 * torch.tensor([-z, y, -x, w], dtype=torch.float64)
+
+    def at(e):
+        with torch.no_grad():
+            moved = q.detach().clone()
+            moved[0, 1:] += e * along
+            moved[0, 1:] /= moved[0, 1:].norm()
+            s = sim.reset(q=moved)
+            for _ in range(3):
+                s = sim.step(s, torch.tensor([0.1], dtype=torch.float64))
+            return float(s["variables"].square().sum() + s.q[:, 1:].sum())
+
+    difference = (at(1e-5) - at(-1e-5)) / 2e-5
+    assert abs(float((q.grad[0, 1:] * along).sum()) - difference) < 1e-8
+
+
+def test_bits_do_not_depend_on_the_batch_or_on_gradients():
+    of = scene("rod")[0]
+    u = torch.full((5, 3), 0.5, dtype=torch.float64)
+
+    def last(num_envs, threads, recorded):
+        sim = tt.Simulation(of, num_envs=num_envs, steps=5, every=3, threads=threads)
+        controls = u.clone().requires_grad_(recorded)
+        s = sim.reset(seed=1)
+        for t in range(5):
+            s = sim.step(s, controls[t])
+        return s.q[0].detach().numpy(), s["left_finger"][0].detach().numpy()
+
+    q, field = last(1, 1, False)
+    for other in (last(1, 1, True), last(17, 2, True)):
+        np.testing.assert_array_equal(other[0], q)
+        np.testing.assert_array_equal(other[1], field)
+
+
+def test_environments_have_numbers_of_their_own():
+    of, numbers = scene("chain")
+    sim = tt.Simulation(of, num_envs=2, steps=4, numbers=numbers)
+    given = torch.tensor([[900.0, 0.02], [1800.0, 0.2]], dtype=torch.float64)
+    s = sim.reset(numbers=given)
+    np.testing.assert_array_equal(sim.tape.numbers(), given.numpy())
+    for _ in range(4):
+        s = sim.step(s, torch.zeros(1))
+    assert not torch.equal(s.q[0], s.q[1])
+    s = sim.reset()  # the scene's own
+    np.testing.assert_array_equal(sim.tape.numbers(), [[900.0, 0.02]] * 2)
+
+
+def test_what_cannot_be_done_is_refused():
+    of, _ = scene("chain")
+    with pytest.raises(tangere.InputError, match="no number of the scene is named 'weight'"):
+        tt.Simulation(of, numbers=["weight"])
+    text = CHAIN.replace("<actuator>", "<!--").replace("</actuator>", "-->")
+    with pytest.raises(tangere.InputError, match="no motor"):
+        tt.Simulation(tangere.Scene.from_text(text))
+    sim = tt.Simulation(of, num_envs=2, steps=2)
+    first = sim.reset()
+    u = torch.zeros(1, requires_grad=True)
+    second = sim.step(first, u)
+    with pytest.raises(tangere.InputError, match="expected the last one"):
+        sim.step(first, u)
+    with torch.no_grad(), pytest.raises(tangere.InputError, match="no_grad"):
+        sim.step(second, u)
+    with pytest.raises(tangere.InputError, match="controls of shape"):
+        sim.step(second, torch.zeros(2, 3))
+    with pytest.raises(tangere.InputError, match="q of shape"):
+        sim.reset(q=torch.zeros(2, 3))
+    s = sim.reset()
+    for _ in range(2):
+        s = sim.step(s, u)
+    with pytest.raises(tangere.InputError, match="2 actions"):
+        sim.step(s, u)
+    s.v.sum().backward()
+    with pytest.raises(tangere.InputError, match="second backward"):
+        s.v.sum().backward()
