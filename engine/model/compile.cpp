@@ -148,12 +148,14 @@ class Compiler {
   /// Adds the pairs with a mesh whose walls are thinner than the other's points are apart.
   void thin_walls() {
     for (const PairContactDescription& d : m_.scene.pair_contacts) {
-      if (!d.points.empty()) continue;
+      if ((!d.points.empty() && !d.by_area()) || d.on_ground) continue;
       const CompiledBody& touched =
           m_.bodies[std::size_t(bodies_.find("body", d.primitive_body, d.source))];
       if (touched.grid == nullptr) continue;
       const int general = bodies_.find("body", d.general_body, d.source);
-      const double gap = contact_point_gap(m_.scene.links[std::size_t(general)].body.shape);
+      const double gap = d.by_area()
+                             ? d.spacing
+                             : contact_point_gap(m_.scene.links[std::size_t(general)].body.shape);
       if (gap > 0 && gap >= 2 * touched.inscribed * touched.size.x) add_coarse_pair(d);
     }
   }

@@ -6,9 +6,10 @@
 
 namespace tangere {
 
-/// Sets PairContact::inner_faces of contacts by area: the faces of the touched cuboid that another
-/// cuboid on its link covers, which the same body touches as well. Without them a body that slides
-/// over the seam of flush cuboids is pushed along, not up, by faces inside the solid.
+/// Sets PairContact::beyond of contacts by area, where another cuboid on the link of the touched
+/// one, which the same body touches as well, covers one of its faces. So a body that slides over
+/// the seam of flush cuboids is not pushed along by faces inside the solid. A cuboid inside another
+/// one loses its contact.
 void find_inner_faces(CompiledModel& m);
 
 }  // namespace tangere

@@ -210,10 +210,15 @@ std::vector<CoarseContact> coarse_contacts(const Scene& scene, ComparedWidth com
     const LinkDescription *const one = link_with(scene, c.general_body), *const two = link_with(
                                                                              scene,
                                                                              c.primitive_body);
-    if (one == nullptr || two == nullptr || !c.points.empty() || !may_push(scene, c)) continue;
+    if (one == nullptr || two == nullptr || !may_push(scene, c)) continue;
+    if (!c.points.empty() && !c.by_area()) continue;
     const Shape &points = one->body.shape, &touched = two->body.shape;
     const double width = width_of(touched, compared);
     if (width == 0) continue;
+    if (c.by_area()) {
+      if (c.spacing >= width * (1 - kAsWide)) found.push_back({k, c.spacing, width, false});
+      continue;
+    }
     const auto [place, is_new] = gaps.try_emplace(one, 0.0);
     if (is_new) place->second = contact_point_gap(points);
     const double gap = place->second;
@@ -238,7 +243,10 @@ std::vector<CoarseContact> coarse_contacts(const Scene& scene, ComparedWidth com
 
 std::vector<std::string> coarse_contact_lines(const Scene& scene) {
   constexpr std::size_t kMostLines = 5;
-  const std::vector<CoarseContact> found = coarse_contacts(scene, ComparedWidth::second);
+  std::vector<CoarseContact> found = coarse_contacts(scene, ComparedWidth::second);
+  std::erase_if(found, [&](const CoarseContact& c) {  // those that surface_contact.cpp warns of
+    return scene.pair_contacts[c.contact].by_area();
+  });
   std::vector<std::string> lines;
   for (const CoarseContact& coarse : found) {
     if (lines.size() == kMostLines) {

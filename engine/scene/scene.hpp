@@ -243,6 +243,7 @@ struct PairContactDescription {
   /// (n) areas for which `points` stand [m²]: all coefficients but mu count per area. Empty: they
   /// count per point.
   std::vector<double> areas = {};
+  double spacing = 0;      ///< distance of neighbouring points that have areas, at most [m]
   bool on_ground = false;  ///< `points` touch the ground; primitive_body is "ground"
   /// With the contact before it, one contact of two surfaces, whose coefficients are those of the
   /// first.

@@ -21,10 +21,15 @@ namespace tangere {
 
 namespace {
 
-constexpr double kMostPoints = 20000;   // of one surface, unless the scene gives a pitch
-constexpr double kAcrossBody = 8;       // pitches across the second smallest width of a body
-constexpr double kAcrossPlace = 0.7;    // pitch in half widths of the place of contact
-constexpr double kUsualGravity = 9.81;  // where the scene has none [m/s²]
+constexpr double kMostPoints = 20000;       // of one surface, about, unless the scene gives a pitch
+constexpr double kMostGivenPoints = 1e6;    // with a pitch that the scene gives
+constexpr double kAcrossBody = 8;           // pitches across the second smallest width of a body
+constexpr double kAcrossThin = 2.5;         // pitches of a round body across the other's smallest
+constexpr double kAcrossPlace = 0.7;        // pitch in half widths of the place of contact
+constexpr double kAlongRod = 16;            // rings of a rod that lies on a face
+constexpr double kFine = 1.5, kUneven = 4;  // pitches over the wanted one: near enough, uneven
+constexpr double kThin = 4;                 // least thickness, in depths under the lighter weight
+constexpr double kUsualGravity = 9.81;      // where the scene has none [m/s²]
 
 int body_index(const Scene& scene, const std::string& name) {
   for (std::size_t k = 0; k < scene.links.size(); ++k)
@@ -90,10 +95,14 @@ double lighter_weight(const Scene& scene, const SurfaceContactDescription& d) {
   return std::isinf(mass) ? 0 : mass * (g > 0 ? g : kUsualGravity);
 }
 
-/// Half width of the place of contact of two shapes under a force [m]; infinite between faces.
-double half_width(const Shape* one, const Shape* two, double stiffness, double force) {
+/// The place of contact of two shapes under a force [m]; infinitely wide and not deep between
+/// faces.
+struct Place {
+  double half_width = HUGE_VAL, depth = 0;
+};
+Place place_of(const Shape* one, const Shape* two, double stiffness, double force) {
   const double radius = 1 / (1 / roundness(one) + 1 / roundness(two));
-  if (std::isinf(radius) || !(force > 0)) return HUGE_VAL;
+  if (std::isinf(radius) || !(force > 0)) return {};
   double line = 0;  // no longer than the other body is wide
   for (const auto& [round, other] : {std::pair{one, two}, {two, one}})
     if (straight_length(round) > 0 && std::isinf(roundness(other)))
@@ -101,7 +110,7 @@ double half_width(const Shape* one, const Shape* two, double stiffness, double f
   const double depth =
       line > 0 ? std::pow(force / (stiffness * line * 4 / 3 * std::sqrt(2 * radius)), 2.0 / 3)
                : std::sqrt(force / (std::numbers::pi * stiffness * radius));
-  return std::sqrt(2 * radius * std::min(depth, radius));
+  return {std::sqrt(2 * radius * std::min(depth, radius)), depth};
 }
 
 /// The points of a body, as a contact with another one. `share`: of the stiffness.
@@ -114,8 +123,8 @@ PairContactDescription half_contact(const Scene& scene, const SurfaceContactDesc
   pair.coefficients = d.coefficients;
   pair.law = d.law;
   pair.source = d.source;
-  const SurfacePitch pitch =
-      d.pitch ? SurfacePitch{*d.pitch, *d.pitch, 0} : fitting_pitch(scene, d, first);
+  const SurfacePitch pitch = fitting_pitch(scene, d, first);
+  pair.spacing = std::max(pitch.across, pitch.along);
   SurfacePoints points =
       surface_points(*shape_of(scene, pair.general_body), pitch.across, pitch.along);
   for (double& area : points.areas) area *= share;
@@ -129,48 +138,93 @@ PairContactDescription half_contact(const Scene& scene, const SurfaceContactDesc
 SurfacePitch fitting_pitch(const Scene& scene, const SurfaceContactDescription& d, bool first) {
   const Shape* const own = shape_of(scene, first ? d.body1 : d.body2);
   const Shape* const other = shape_of(scene, first ? d.body2 : d.body1);
-  const double narrow =
-      std::min(ascending_widths(other)[1] / kAcrossBody, ascending_widths(own)[1] / kAcrossBody);
-  const double touching = half_width(own, other, d.coefficients.kn, lighter_weight(scene, d));
+  const std::array<double, 3> mine = ascending_widths(own), its = ascending_widths(other);
+  const bool round = !std::isinf(roundness(own)), on_face = std::isinf(roundness(other));
+  double narrow = std::min(mine[1], its[1]) / kAcrossBody;
+  if (round && on_face) narrow = std::min(narrow, its[0] / kAcrossThin);
+  const double touching =
+      place_of(own, other, d.coefficients.kn, lighter_weight(scene, d)).half_width;
   const double across = std::min(narrow, kAcrossPlace * touching);
   SurfacePitch pitch{across, across, across};
-  // A line of contact with a face is not resolved along the line.
-  if (straight_length(own) > 0 && std::isinf(roundness(other)))
-    pitch.along = std::min(narrow, straight_length(own) / kAcrossBody);
-  const double count = surface_area(*own) / (pitch.across * pitch.along);
-  if (count > kMostPoints) {
-    const double grown = std::sqrt(count / kMostPoints);
-    pitch.across *= grown, pitch.along *= grown;
-    pitch.bounded = true;
-    pitch.coarse = pitch.across > std::min(touching, kAcrossBody / 2 * narrow);
+  if (straight_length(own) > 0 && on_face)  // along a line of contact less is to be resolved
+    pitch.along = std::min(narrow, straight_length(own) / kAlongRod);
+  if (d.pitch) {
+    pitch.across = pitch.along = *d.pitch;
+  } else {
+    while (expected_points(*own, pitch.across, pitch.along) > kMostPoints) {
+      pitch.across *= 1.05, pitch.along *= 1.05;
+      pitch.bounded = true;
+    }
   }
+  pitch.coarse = pitch.across > kUneven * pitch.wanted;
   return pitch;
 }
 
 namespace {
 
 /// Shares of the stiffness at the points of body1 and body2. Edges and corners go between the
-/// points of a face, so both of two shapes with faces have points. A round shape resolves its
-/// contacts alone: of two, the one with the smaller surface. A body that would need too many points
-/// has none where the other one does not.
+/// points of a surface, so both bodies have points where one has faces. Of two round bodies, the
+/// one with the smaller surface has them. A body whose points would be too far apart has none where
+/// the other one's are not.
 std::array<double, 2> shares(const Scene& scene, const SurfaceContactDescription& d) {
   const Shape *const one = shape_of(scene, d.body1), *const two = shape_of(scene, d.body2);
   const bool first = one != nullptr && has_surface(*one),
              second = two != nullptr && has_surface(*two);
   if (!first || !second) return {first ? 1.0 : 0.0, second ? 1.0 : 0.0};
-  const bool round1 = !std::isinf(roundness(one)), round2 = !std::isinf(roundness(two));
-  const bool smaller = surface_area(*one) <= surface_area(*two);
-  const bool few1 = d.pitch || !fitting_pitch(scene, d, true).bounded,
-             few2 = d.pitch || !fitting_pitch(scene, d, false).bounded;
-  if (few1 == few2 && !round1 && !round2) return {0.5, 0.5};
-  const bool by_first = few1 != few2 ? few1 : round1 && round2 ? smaller : round1;
-  return {by_first ? 1.0 : 0.0, by_first ? 0.0 : 1.0};
+  const auto alone = [](bool by_first) {
+    return std::array{by_first ? 1.0 : 0.0, by_first ? 0.0 : 1.0};
+  };
+  const auto is_fine = [](const SurfacePitch& p) { return p.across <= kFine * p.wanted; };
+  const bool fine1 = is_fine(fitting_pitch(scene, d, true)),
+             fine2 = is_fine(fitting_pitch(scene, d, false));
+  if (fine1 != fine2) return alone(fine1);
+  if (!std::isinf(roundness(one)) && !std::isinf(roundness(two)))
+    return alone(surface_area(*one) <= surface_area(*two));
+  return {0.5, 0.5};
+}
+
+/// What is wrong with a pitch that the scene gives; "" if nothing is.
+std::string pitch_fault(const Scene& scene, const SurfaceContactDescription& d) {
+  for (const std::string& name : {d.body1, d.body2}) {
+    const Shape* const shape = shape_of(scene, name);
+    if (!d.pitch || shape == nullptr || !has_surface(*shape)) continue;
+    const double count = expected_points(*shape, *d.pitch, *d.pitch);
+    if (!(count <= kMostGivenPoints))
+      return fmt::format("pitch=\"{}\" gives '{}' about {:.2g} points; expected {:.2g} or more",
+                         *d.pitch, name, count, *d.pitch * std::sqrt(count / kMostGivenPoints));
+  }
+  return "";
+}
+
+/// A warning where a body is so thin, and the contact so soft, that the other one may come out on
+/// the far side under its weight; "" if not.
+std::string thin_warning(const Scene& scene, const SurfaceContactDescription& d) {
+  const Shape *const one = shape_of(scene, d.body1), *const two = shape_of(scene, d.body2);
+  const double depth = place_of(one, two, d.coefficients.kn, lighter_weight(scene, d)).depth;
+  for (const std::string& name : {d.body1, d.body2}) {
+    const double thin = ascending_widths(shape_of(scene, name))[0];
+    if (depth > 0 && thin < kThin * depth)
+      return fmt::format(
+          "{}<surface_contact>: '{}' is {:.2g} m thin, and the lighter of '{}' and '{}' sinks in "
+          "by "
+          "{:.2g} m under its weight, so it may come out on the other side; expected a kn of "
+          "{:.1g} "
+          "or more",
+          d.source.prefix(), name, thin, d.body1, d.body2, depth,
+          d.coefficients.kn * std::pow(kThin * depth / thin, 2));
+  }
+  return "";
 }
 
 }  // namespace
 
 std::string contact_fault(const Scene& scene, const SurfaceContactDescription& d) {
   if (d.body1 == d.body2) return "body '" + d.body1 + "' against itself; expected two bodies";
+  for (const PairContactDescription& c : scene.pair_contacts)
+    if (c.by_area() &&
+        std::minmax(c.general_body, c.primitive_body) == std::minmax(d.body1, d.body2))
+      return fmt::format("'{}' and '{}' touch already (line {}); expected one contact of them",
+                         d.body1, d.body2, c.source.line);
   bool covered = false;
   for (const std::string& name : {d.body1, d.body2}) {
     const Shape* const shape = shape_of(scene, name);
@@ -206,28 +260,30 @@ std::string contact_fault(const Scene& scene, const SurfaceContactDescription& d
     return fmt::format("kn=\"{}\"; expected a positive stiffness by area [N/m^3]{}",
                        d.coefficients.kn, such);
   }
+  if (std::string fault = pitch_fault(scene, d); !fault.empty()) return fault;
   return value_fault(kSurfaceContact, d.coefficients);
 }
 
-std::string add_surface_contact(Scene& scene, const SurfaceContactDescription& d) {
+std::vector<std::string> add_surface_contact(Scene& scene, const SurfaceContactDescription& d) {
   if (const std::string fault = contact_fault(scene, d); !fault.empty())
     throw InputError(d.source.prefix() + "<surface_contact>: " + fault);
   const std::array<double, 2> share = shares(scene, d);
-  std::string warning;
+  std::vector<std::string> warnings;
   for (const bool first : {true, false}) {
     if (!(share[first ? 0 : 1] > 0)) continue;
     scene.pair_contacts.push_back(half_contact(scene, d, first, share[first ? 0 : 1]));
     scene.pair_contacts.back().second_half = !first && share[0] > 0;
     const SurfacePitch pitch = fitting_pitch(scene, d, first);
-    if (d.pitch || !pitch.coarse) continue;
-    warning = fmt::format(
+    if (!pitch.coarse) continue;
+    warnings.push_back(fmt::format(
         "{}<surface_contact>: the {} points of '{}' are {:.2g} m apart; under the lighter body's "
         "weight its contact with '{}' is uneven unless they are {:.2g} m apart; expected a smaller "
         "kn, or a pitch of {:.2g}",
         d.source.prefix(), scene.pair_contacts.back().areas.size(), first ? d.body1 : d.body2,
-        pitch.across, first ? d.body2 : d.body1, pitch.wanted, pitch.wanted);
+        pitch.across, first ? d.body2 : d.body1, pitch.wanted, pitch.wanted));
   }
-  return warning;
+  if (std::string thin = thin_warning(scene, d); !thin.empty()) warnings.push_back(std::move(thin));
+  return warnings;
 }
 
 }  // namespace tangere

@@ -257,6 +257,32 @@ SurfacePoints surface_points(const Shape& shape, double pitch, double along) {
       shape);
 }
 
+double expected_points(const Shape& shape, double pitch, double along) {
+  constexpr double kRims = 4;  // more cells between two rims
+  const auto cells = [](double length, double p) { return std::max(2.0, length / p) + kRims; };
+  const auto disc = [&](double r) {
+    return kPi * r * r / (pitch * pitch) + 3 * 2 * kPi * r / pitch;
+  };
+  if (const auto* const s = std::get_if<CuboidShape>(&shape)) {
+    const double x = cells(s->size[0], pitch), y = cells(s->size[1], pitch),
+                 z = cells(s->size[2], pitch);
+    return 2 * (x * y + y * z + x * z);
+  }
+  if (const auto* const s = std::get_if<CylinderShape>(&shape))
+    return (2 * kPi * s->radius / pitch + kLeastAround) * cells(s->length, along) +
+           2 * disc(s->radius);
+  if (const auto* const s = std::get_if<CapsuleShape>(&shape))
+    return (2 * kPi * s->radius / pitch + kLeastAround) * (s->length / along + 1) +
+           4 * kPi * s->radius * s->radius / (pitch * pitch);
+  if (const auto* const s = std::get_if<EllipsoidShape>(&shape)) {
+    const double x = s->size[0], y = s->size[1], z = s->size[2];
+    return kLeastOnBall + kPi * std::max({x * y, y * z, x * z}) / (pitch * pitch);
+  }
+  if (const auto* const mesh = std::get_if<MeshShape>(&shape))
+    return double(mesh->triangles.size()) + 1.5 * surface_area(shape) / (pitch * pitch);
+  return kLeastOnBall + surface_area(shape) / (pitch * pitch);
+}
+
 double surface_area(const Shape& shape) {
   double area = 0;
   if (const auto* const mesh = std::get_if<MeshShape>(&shape)) {

@@ -22,6 +22,9 @@ bool has_surface(const Shape& shape);
 /// Returns the area of a shape's surface [m²], an ellipsoid's to 1 %. The shape must have one.
 double surface_area(const Shape& shape);
 
+/// Returns about how many points surface_points() makes.
+double expected_points(const Shape& shape, double pitch, double along);
+
 /// Returns points whose neighbours are about `pitch` apart, and `along` apart along the axis of a
 /// cylinder or capsule [m], both positive. No point is on an edge: each is in the middle of its
 /// cell. Cells shrink towards the edges of cuboids and the rims of cylinders, so that the outermost

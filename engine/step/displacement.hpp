@@ -17,9 +17,9 @@ void displace(const Model& model, std::span<double> q, int dof, double e);
 void add_along_dofs(const Model& model, std::span<const double> q, std::span<const double> by_q,
                     std::span<double> out);
 
-/// Turns derivatives along the dofs of v, (nv), into derivatives by coordinates at q and adds them to
-/// `out`, (nq). Those by the four coordinates of a quaternion have no part along the quaternion, which
-/// would change its length.
+/// Turns derivatives along the dofs of v, (nv), into derivatives by coordinates at q and adds them
+/// to `out`, (nq). Those by the four coordinates of a quaternion have no part along the quaternion,
+/// which would change its length.
 void add_by_coordinates(const Model& model, std::span<const double> q,
                         std::span<const double> by_dofs, std::span<double> out);
 

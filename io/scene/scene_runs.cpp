@@ -147,6 +147,21 @@ void read_body_variation(const Scene& scene, const SceneElement& node,
   }
 }
 
+/// Points of a contact of surfaces follow the kn of the scene. Warns where far larger ones are
+/// drawn.
+void warn_of_stiffer_draws(const Scene& scene, const SceneElement& node,
+                           const RandomizationDescription& d) {
+  if (d.number.field != NumberField::kn) return;
+  const double given = number_in(scene, d.number);
+  double most = std::max(d.distribution.a, d.distribution.b);
+  for (const double x : d.distribution.values) most = std::max(most, x);
+  if (most > 4 * given)
+    node.warn(
+        fmt::format("kn of '{}' and '{}' is up to {:.2g}, and their points are as near as {:.2g} "
+                    "needs; expected the largest in the contact, or a pitch",
+                    d.number.name, d.number.second_name, most, given));
+}
+
 void read_coefficient_variation(const Scene& scene, const SceneElement& node,
                                 RandomizationDescription& d) {
   const auto declared = [&](const auto& list, const auto& matches) {
@@ -173,7 +188,7 @@ void read_coefficient_variation(const Scene& scene, const SceneElement& node,
     n.name = node.text("general_body");
     n.second_name = node.text("primitive_body");
     declared(scene.pair_contacts, [&](const PairContactDescription& c) {
-      return c.first_name() == n.name && c.primitive_body == n.second_name;
+      return !c.by_area() && c.first_name() == n.name && c.primitive_body == n.second_name;
     });
   } else if (node.of() == kVaryGround) {
     find_body(scene, node, "body");
@@ -259,6 +274,7 @@ void read_randomize(Scene& scene, const SceneNode& section) {
     }
     d.distribution = read_distribution(scene, node, d.number);
     node.refuse(variation_fault(scene, d));
+    if (node.of() == kVarySurface) warn_of_stiffer_draws(scene, node, d);
     for (const RandomizationDescription& other : scene.randomizations)
       if (other.number == d.number) node.fail("'" + name_of(d.number) + "' already varies");
     scene.randomizations.push_back(std::move(d));

@@ -77,6 +77,24 @@ void warn_of_dense_meshes(const Scene& scene, const SceneNode& root) {
   }
 }
 
+/// Warns where bodies of a contact of surfaces touch by another contact as well.
+static void warn_of_second_contact(const Scene& scene, const SceneNode& root,
+                                   const PairContactDescription& c) {
+  const auto same_pair = [&](const PairContactDescription& other) {
+    return !other.by_area() && std::minmax(other.general_body, other.primitive_body) ==
+                                   std::minmax(c.general_body, c.primitive_body);
+  };
+  const bool twice = std::ranges::any_of(scene.pair_contacts, same_pair) ||
+                     (c.on_ground && std::ranges::any_of(scene.ground_contacts, [&](const auto& g) {
+                        return g.body == c.general_body;
+                      }));
+  if (twice && !c.second_half)
+    root.context().warnings.push_back(
+        fmt::format("{}<surface_contact>: '{}' and '{}' touch by another contact as well, so the "
+                    "forces of both add up; expected one of them",
+                    c.source.prefix(), c.general_body, c.primitive_body));
+}
+
 void warn_of_coarse_points(const Scene& scene, const SceneNode& root) {
   const auto shape_of = [&](const std::string& body) -> const Shape& {
     return std::find_if(scene.links.begin(), scene.links.end(),
@@ -84,7 +102,10 @@ void warn_of_coarse_points(const Scene& scene, const SceneNode& root) {
         ->body.shape;
   };
   for (const PairContactDescription& c : scene.pair_contacts) {
-    if (c.by_area()) continue;
+    if (c.by_area()) {
+      warn_of_second_contact(scene, root, c);
+      continue;
+    }
     const bool both_ways =
         std::any_of(scene.pair_contacts.begin(), scene.pair_contacts.end(), [&](const auto& other) {
           return other.general_body == c.primitive_body && other.primitive_body == c.general_body;
@@ -103,6 +124,8 @@ void warn_of_coarse_points(const Scene& scene, const SceneNode& root) {
 static void read_surface_contact(Scene& scene, const SceneElement& node) {
   SurfaceContactDescription d;
   d.source = node.source();
+  if (node.text("body1") == kGroundName && node.text("body2") != kGroundName)
+    node.fail("body1=\"ground\"; expected the ground as body2");
   find_body(scene, node, "body1");
   d.body1 = node.text("body1");
   d.body2 = node.text("body2");
@@ -111,8 +134,8 @@ static void read_surface_contact(Scene& scene, const SceneElement& node) {
   node.read(d.coefficients);
   if (node.has("pitch")) d.pitch = node.number("pitch");
   node.refuse(contact_fault(scene, d));
-  const std::string warning = add_surface_contact(scene, d);
-  if (!warning.empty()) node.context().warnings.push_back(warning);
+  for (std::string& warning : add_surface_contact(scene, d))
+    node.context().warnings.push_back(std::move(warning));
 }
 
 void read_contacts(Scene& scene, const SceneNode& section) {

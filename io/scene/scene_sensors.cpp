@@ -163,12 +163,15 @@ void add_feedback(Scene& scene, const SceneNode& node, const TactileDescription&
   for (const int other : felt) {
     const BodyDescription& touched = scene.links[std::size_t(other)].body;
     for (const PairContactDescription& c : scene.pair_contacts)
-      if (c.points.empty() && c.general_body == d.body && c.primitive_body == touched.name)
+      if (c.sensor.empty() && !c.second_half &&
+          ((c.general_body == d.body && c.primitive_body == touched.name) ||
+           (c.by_area() && c.general_body == touched.name && c.primitive_body == d.body)))
         node.context().warnings.push_back(fmt::format(
-            "{}<general_primitive_contact>: '{}' and '{}' touch by the body's points and by those "
+            "{}<{}>: '{}' and '{}' touch by the body's points and by those "
             "of its tactile sensor '{}', which has feedback. Where both lie, the contact is as "
             "many times stiffer, and the field shows its own share alone",
-            c.source.prefix(), d.body, touched.name, d.name));
+            c.source.prefix(), c.by_area() ? "surface_contact" : "general_primitive_contact",
+            d.body, touched.name, d.name));
     pair.primitive_body = touched.name;
     scene.pair_contacts.push_back(pair);
   }

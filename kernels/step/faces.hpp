@@ -41,7 +41,7 @@ GrownShape<N> grown_shape(const PairContact& pair, const Vec3<N>& size) {
 template <class N, class F>
 auto with_touched(const PairContact& pair, const Vec3<N>& size, const Vec3<N>& faces, const F& f) {
   if (pair.faced) return f(CuboidFace<N>::of(size, faces, pair.overhang));
-  if (pair.inner_faces != 0) return f(CuboidFace<N>::without(size, pair.inner_faces));
+  if (pair.covered) return f(CuboidFace<N>::continued(size, pair.beyond));
   if (pair.ball_radius > 0) return f(grown_shape(pair, size));
   return with_distance<N>(pair.shape, size, f, pair.grid);
 }

@@ -109,9 +109,6 @@ struct Hull {
   double radius;  ///< of a ball around its centre that holds it [m]
 };
 
-/// The bit of the face at the upper (end > 0) or lower end of an axis of a cuboid.
-constexpr unsigned face_bit(int axis, double end) { return 1U << (2 * axis + (end > 0 ? 0 : 1)); }
-
 /// Points of body 1 against the distance function of body 2.
 struct PairContact {
   int link1, link2;      ///< -1: fixed in the world; then frame1/frame2 are world frames
@@ -139,11 +136,13 @@ struct PairContact {
   int size_row = -1;           ///< ≥ 0: size is read from three rows of the block instead
   int body1 = -1, body2 = -1;  ///< indices into ModelView::solids
   bool faced = false;  ///< a convex body on a cuboid: its faces are chosen per solve (faces.hpp)
-  /// Faces of a cuboid that are inside of the solid, as bits (face_bit()): they do not count.
-  unsigned inner_faces = 0;
-  Hull hull{};          ///< body 1, if faced
-  double overhang = 0;  ///< how far beyond a chosen face's edges a point still touches it [m]
-  int memory = -1;      ///< ≥ 0: index into the contacts with shear springs
+  /// How far another cuboid of the link goes on beyond the upper and lower faces of each axis of a
+  /// cuboid, x y z [m]; 0: it does not.
+  double beyond[6] = {};
+  bool covered = false;  ///< some of these are not 0
+  Hull hull{};           ///< body 1, if faced
+  double overhang = 0;   ///< how far beyond a chosen face's edges a point still touches it [m]
+  int memory = -1;       ///< ≥ 0: index into the contacts with shear springs
   const DistanceGrid* grid = nullptr;  ///< of a mesh
   /// > 0: body 1 is a ball of this radius, and `points` is its centre (ball_contact.hpp) [m].
   double ball_radius = 0;

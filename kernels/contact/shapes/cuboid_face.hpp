@@ -5,7 +5,7 @@
 //       else no contact
 // so d continues below the far side, and n is constant over a face that is the only chosen one.
 // If no face is chosen, d is that to the nearest face, point by point, as in CuboidDistance.
-// The same rule leaves out the faces of a cuboid that lie flush on another one of its link.
+// The same planes serve a cuboid that lies flush on another one of its link.
 #pragma once
 
 #include "kernels/contact/shapes/plane.hpp"
@@ -37,12 +37,13 @@ struct CuboidFace {
             {reach(half.x, side.x), reach(half.y, side.y), reach(half.z, side.z)}};
   }
 
-  /// A cuboid without some of its faces, as bits: axis k, upper end 2 k, lower end 2 k + 1. Beyond
-  /// them is no contact: there another cuboid goes on.
-  static CuboidFace without(const Vec3<N>& half, unsigned faces) {
-    const auto plane = [&](const N& s, int bit) { return ((faces >> bit) & 1U) != 0 ? N(1e9) : s; };
-    const auto reach = [&](const N& s, int bit) {
-      return ((faces >> bit) & 3U) != 0 ? s : N(kPlaneReach);
+  /// A cuboid that another one goes on from some of its faces by `beyond` [m]: of axis k the upper
+  /// face is number 2 k, the lower one 2 k + 1. Their planes are moved out so far. Beyond the faces
+  /// is no contact: there the other cuboid is touched.
+  static CuboidFace continued(const Vec3<N>& half, const double* beyond) {
+    const auto plane = [&](const N& s, int face) { return s + N(beyond[face]); };
+    const auto reach = [&](const N& s, int face) {
+      return beyond[face] > 0 || beyond[face + 1] > 0 ? s : N(kPlaneReach);
     };
     return {{plane(half.x, 0), plane(half.y, 2), plane(half.z, 4)},
             {plane(half.x, 1), plane(half.y, 3), plane(half.z, 5)},

@@ -128,13 +128,13 @@ Scene on_slope(const Shape& shape, const Quaternion& turn, double height, double
   s.ground = GroundDescription{};
   s.links = {testing::link("roll", JointType::free, {0, 0, height}, shape, 500)};
   s.links[0].body.pose.orientation = turn;
-  EXPECT_EQ(add_surface_contact(s, {"roll",
-                                    "ground",
-                                    {stiffness, stiffness / 100, 0.8, stiffness / 10},
-                                    ContactLaw::clamped,
-                                    {},
-                                    {}}),
-            "");
+  EXPECT_TRUE(add_surface_contact(s, {"roll",
+                                      "ground",
+                                      {stiffness, stiffness / 100, 0.8, stiffness / 10},
+                                      ContactLaw::clamped,
+                                      {},
+                                      {}})
+                  .empty());
   return s;
 }
 
@@ -241,9 +241,9 @@ TEST(SurfaceContact, ABallComesToRestInABowlThatIsAMesh) {
   s.gravity = {0, 0, -9.81};
   s.links = {testing::link("bowl", JointType::fixed, {0, 0, 0}, mesh_of(bowl, 48), 1000),
              testing::link("ball", JointType::free, {0.025, 0.01, 0.03}, SphereShape{0.015}, 500)};
-  EXPECT_EQ(
-      add_surface_contact(s, {"ball", "bowl", {1e8, 1e5, 0.3, 1e9}, ContactLaw::clamped, {}, {}}),
-      "");
+  EXPECT_TRUE(
+      add_surface_contact(s, {"ball", "bowl", {1e8, 1e5, 0.3, 1e9}, ContactLaw::clamped, {}, {}})
+          .empty());
   const Model model(s);
   Batch batch(model, 1);
   settle(model, batch, 3);
@@ -326,9 +326,9 @@ TEST(SurfaceContact, ABodyThatWouldNeedTooManyPointsHasNone) {
                testing::link("die", JointType::free, {0.0013, 0.0021, 0.005},
                              CuboidShape{{0.01, 0.01, 0.01}}, 1000)};
     if (drum) s.links[0].body.pose.orientation = kAlongX;
-    EXPECT_EQ(
-        add_surface_contact(s, {"large", "die", {1e8, 1e6, 0.5, 1e8}, ContactLaw::clamped, {}, {}}),
-        "");
+    EXPECT_TRUE(
+        add_surface_contact(s, {"large", "die", {1e8, 1e6, 0.5, 1e8}, ContactLaw::clamped, {}, {}})
+            .empty());
     ASSERT_EQ(s.pair_contacts.size(), 1U);
     EXPECT_EQ(s.pair_contacts[0].general_body, "die");
     const Model model(s);
@@ -353,7 +353,7 @@ TEST(SurfaceContact, NothingTripsOverTheSeamOfFlushBoxes) {
       testing::link("ball", JointType::free, {-0.05, 0, r}, SphereShape{r}, 500)};
   const ContactCoefficients law = {stiffness, stiffness / 100, 0.8, 10 * stiffness};
   for (const char* const box : {"left", "right"})
-    add_surface_contact(s, {"ball", box, law, ContactLaw::clamped, 2.5e-4, {}});
+    add_surface_contact(s, {"ball", box, law, ContactLaw::clamped, 5e-4, {}});
   const Model model(s);
   Stepper stepper(model, testing::options(Integrator::bdf2, 1e-3, 1e-9));
   Batch batch(model, 1);

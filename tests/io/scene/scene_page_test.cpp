@@ -69,18 +69,16 @@ std::string table(Element element) {
 }
 
 /// The page with every table anew, which stands between <!-- attributes NAME --> and <!-- end -->.
-std::string with_tables(const std::string& text) {
-  std::string out;
-  std::size_t at = 0;
+std::string with_tables(std::string text) {
   for (int k = 0; k < kElements; ++k) {
     const auto element = static_cast<Element>(1U << k);
     const std::string begin = fmt::format("<!-- attributes {} {} -->\n", k, to_string(element));
-    const std::size_t from = text.find(begin, at);
+    const std::size_t from = text.find(begin);
     if (from == std::string::npos) continue;
-    out += text.substr(at, from + begin.size() - at) + "\n" + table(element) + "\n";
-    at = text.find("<!-- end -->", from);
+    const std::size_t first = from + begin.size();
+    text.replace(first, text.find("<!-- end -->", from) - first, "\n" + table(element) + "\n");
   }
-  return out + text.substr(std::min(at, text.size()));
+  return text;
 }
 
 TEST(ScenePage, HasTheAttributesOfTheSchema) {

@@ -111,7 +111,7 @@ TEST(ShippedScenes, AreAllRunHere) {
       "box_pushing",   "box_pushing_elastic", "cap_opening",  "cap_opening_elastic",
       "identify_ball", "insertion",           "mug",          "insertion_elastic",
       "rolling_ball",  "rolling_ball_small",  "stable_grasp", "stable_grasp_elastic",
-      "ten_boxes"};
+      "ten_boxes",     "grip_rod"};
   EXPECT_EQ(found, run) << "a scene without a test of what it does, or a test without a scene";
 }
 
@@ -209,6 +209,23 @@ TEST(ShippedScenes, TheMugIsFeltAndLifted) {
       }
     }
     EXPECT_GT(r.body(r.steps - 1, e, "mug", 2) - r.body(0, e, "mug", 2), 0.02);
+  }
+}
+
+TEST(ShippedScenes, TheRodIsFeltAndLifted) {
+  const SceneRun r("grip_rod");
+  EXPECT_EQ(r.steps, 500);
+  EXPECT_EQ(r.failed, 0);
+  for (int e = 0; e < kEnvironments; ++e) {
+    for (int s = 0; s < 2; ++s) {
+      EXPECT_EQ(r.touch(1, e, s).points, 0) << "open";
+      // The fingers press with 4 N, and the skins have the material of the contact.
+      EXPECT_NEAR(r.touch(r.steps - 1, e, s).pressure, 4, 0.2);
+    }
+    EXPECT_NEAR(r.body(r.steps - 1, e, "rod", 2) - r.body(0, e, "rod", 2), 0.04, 1e-3);
+    const int before = r.steps - 51;
+    EXPECT_NEAR(r.body(r.steps - 1, e, "rod", 2), r.body(before, e, "rod", 2), 1e-6)
+        << "it slides out of the fingers";
   }
 }
 
