@@ -242,6 +242,14 @@ class VectorTaskEnv(VectorEnv):
         """q (E, nq), v (E, nv) and the task's memory, (E, n): privileged, float64, SI units."""
         return self._env.state()
 
+    def randomized(self) -> dict[str, np.ndarray]:
+        """Name → (E): what <randomize> drew for the episodes, such as "tactile pad kt": privileged.
+
+        In SI units. Numbers of the starting state are those of the scene; a task may start
+        elsewhere.
+        """
+        return self._env.randomized()
+
     def counts(self) -> dict[str, int]:
         """As Environments.counts(), since the last reset by seed."""
         return self._env.counts()
@@ -347,6 +355,10 @@ class TaskEnv(gymnasium.Env):
         """q, v and the task's memory: privileged, float64, SI units."""
         q, v, memory = self._vector.state()
         return q[0], v[0], memory[0]
+
+    def randomized(self) -> dict[str, float]:
+        """Name → what <randomize> drew for the episode, as in `VectorTaskEnv`."""
+        return {name: float(values[0]) for name, values in self._vector.randomized().items()}
 
     def _one(self, obs: Observation) -> Observation:
         return obs[0] if self._vector.flatten else {key: value[0] for key, value in obs.items()}

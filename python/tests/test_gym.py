@@ -7,6 +7,7 @@ import warnings
 from pathlib import Path
 
 import gymnasium
+import h5py
 import numpy as np
 import pytest
 from gymnasium.envs.registration import EnvSpec
@@ -51,6 +52,23 @@ def test_a_spec_in_a_file_makes_the_environment():
     env = gymnasium.make(EnvSpec.from_json(env_spec_json("box_pushing", normalise=False)))
     assert isinstance(env.unwrapped, tangere.TaskEnv)
     assert env.unwrapped.task.name == "box_pushing"
+
+
+def test_randomized_numbers_are_those_of_a_data_set(generate):
+    folder = generate("stable_grasp", "--episodes", "3", "--seed", "4")
+    env = tangere.make_vec("stable_grasp", 3, threads=1)
+    env.reset(seed=4)
+    drawn = env.randomized()
+    one = tangere.make_env("stable_grasp")
+    one.reset(seed=4)
+    assert one.randomized() == {name: values[0] for name, values in drawn.items()}
+    with h5py.File(folder / "shard-00000.h5") as file:
+        names = list(file["scene"].attrs["randomized_names"])
+        assert names == list(drawn) and "body block_3 density" in names
+        for e in range(3):
+            stored = file[f"data/demo_{e}"].attrs["randomized"]
+            np.testing.assert_array_equal(stored, [values[e] for values in drawn.values()])
+    assert tangere.make_env("box_pushing").randomized() == {}
 
 
 def test_spaces_hold_what_comes():
