@@ -19,10 +19,12 @@ from gymnasium.vector.utils import batch_space
 
 from . import _core
 from ._arrays import numbers
+from ._picture import View
 
 # KEY → array, or with `flatten` one array.
 Observation = Any
 Autoreset = Literal["next_step", "same_step", "disabled"]
+RenderMode = Literal["rgb_array"] | None
 _MODES = {
     "next_step": AutoresetMode.NEXT_STEP,
     "same_step": AutoresetMode.SAME_STEP,
@@ -112,6 +114,7 @@ class VectorTaskEnv(VectorEnv):
         "disabled": the environment stands still until `reset(options={"reset_mask": m})`.
     keys: the observations to show; None for all that the task declares.
     scene: another scene than the one of the task, or the path of its file.
+    render_mode: "rgb_array" for pictures by `render`.
     """
 
     def __init__(
@@ -127,7 +130,7 @@ class VectorTaskEnv(VectorEnv):
         autoreset: Autoreset = "next_step",
         keys: Sequence[str] | None = None,
         scene: _core.Scene | str | Path | None = None,
-        render_mode: None = None,
+        render_mode: RenderMode = None,
     ) -> None:
         if isinstance(keys, str):
             raise _core.InputError(f"keys {keys!r}; expected a list, such as [{keys!r}]")
@@ -136,9 +139,8 @@ class VectorTaskEnv(VectorEnv):
             raise _core.InputError(f"num_envs {num_envs!r}; expected a whole number from 1 on")
         if autoreset not in _MODES:
             raise _core.InputError(f"autoreset {autoreset!r}; expected one of {sorted(_MODES)}")
-        if render_mode is not None:
-            raise _core.InputError("there is no render_mode; see `tangere plot` for pictures")
-        self.metadata = {"autoreset_mode": _MODES[autoreset], "render_modes": []}
+        if render_mode not in (None, "rgb_array"):
+            raise _core.InputError(f"render_mode {render_mode!r}; expected None or 'rgb_array'")
         self.task = _core.task_spec(task)
         names = [tensor.name for tensor in self.task.observations]
         unknown = [key for key in keys or () if key not in names]
@@ -158,6 +160,13 @@ class VectorTaskEnv(VectorEnv):
             autoreset=autoreset == "next_step",
         )
         self._seed, self._first_episode, self._fresh = seed, first_episode, True
+        self.render_mode = render_mode
+        self._views: dict[int, View] = {}
+        self.metadata = {
+            "autoreset_mode": _MODES[autoreset],
+            "render_modes": ["rgb_array"],
+            "render_fps": 1 / (self.model.timestep * self.task.steps_per_action),
+        }
         action = self.task.action
         self.single_action_space = spaces.Box(action.low, action.high, action.shape, np.float32)
         self.action_space = batch_space(self.single_action_space, num_envs)
@@ -196,6 +205,7 @@ class VectorTaskEnv(VectorEnv):
             self._seed = self._seed if seed is None else _checked(seed)
             self._first_episode = self._first_episode if first is None else int(first)
             self._env.reset(self._seed, self._first_episode)
+            self._views.clear()
         else:
             self._env.restart(np.ones(self.num_envs, bool))
         self._fresh = False
@@ -250,6 +260,20 @@ class VectorTaskEnv(VectorEnv):
         """
         return self._env.randomized()
 
+    def render(self) -> tuple[np.ndarray, ...] | None:
+        """A picture (384, 512, 3) uint8 of every environment; None without `render_mode`.
+
+        Bodies and the ground, seen from the side and above without perspective. Fields of sensors
+        are not shown.
+        """
+        if self.render_mode is None:
+            return None
+        poses, episodes = self._env.bodies()[0], self._env.episodes()
+        for e in range(self.num_envs):
+            if e not in self._views or self._views[e].episode != episodes[e]:
+                self._views[e] = View(self._env, e, poses[e])
+        return tuple(self._views[e].draw(poses[e]) for e in range(self.num_envs))
+
     def counts(self) -> dict[str, int]:
         """As Environments.counts(), since the last reset by seed."""
         return self._env.counts()
@@ -277,7 +301,7 @@ class TaskEnv(gymnasium.Env):
     `reset(seed=s)` starts episode `first_episode` of seed s, `reset()` the next one.
     """
 
-    metadata = {"render_modes": []}
+    metadata = {"render_modes": ["rgb_array"]}
 
     def __init__(
         self,
@@ -289,7 +313,7 @@ class TaskEnv(gymnasium.Env):
         flatten: bool = False,
         keys: Sequence[str] | None = None,
         scene: _core.Scene | str | Path | None = None,
-        render_mode: None = None,
+        render_mode: RenderMode = None,
     ):
         self._vector = VectorTaskEnv(
             task,
@@ -308,6 +332,8 @@ class TaskEnv(gymnasium.Env):
         self.action_space = self._vector.single_action_space
         self.observation_space = self._vector.single_observation_space
         self._over = True
+        self.render_mode = render_mode
+        self.metadata = {k: v for k, v in self._vector.metadata.items() if k != "autoreset_mode"}
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -359,6 +385,11 @@ class TaskEnv(gymnasium.Env):
     def randomized(self) -> dict[str, float]:
         """Name → what <randomize> drew for the episode, as in `VectorTaskEnv`."""
         return {name: float(values[0]) for name, values in self._vector.randomized().items()}
+
+    def render(self) -> np.ndarray | None:
+        """A picture (384, 512, 3) uint8, as in `VectorTaskEnv`; None without `render_mode`."""
+        pictures = self._vector.render()
+        return None if pictures is None else pictures[0]
 
     def _one(self, obs: Observation) -> Observation:
         return obs[0] if self._vector.flatten else {key: value[0] for key, value in obs.items()}
