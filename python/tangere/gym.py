@@ -399,8 +399,18 @@ class TaskEnv(gymnasium.Env):
         return {key: value[0].item() for key, value in info.items() if not key.startswith("_")}
 
 
-def make_vec(task: str, num_envs: int = 1, **arguments: Any) -> VectorTaskEnv:
-    """Many environments of one task; `arguments` are those of `VectorTaskEnv`."""
+def make_vec(
+    task: str, num_envs: int = 1, *, max_episode_steps: int | None = None, **arguments: Any
+) -> VectorTaskEnv:
+    """Many environments of one task; `arguments` are those of `VectorTaskEnv`.
+
+    `max_episode_steps` comes from `gymnasium.make_vec`; it can only be the task's horizon.
+    """
+    horizon = _core.task_spec(task).horizon
+    if max_episode_steps not in (None, horizon):
+        raise _core.InputError(
+            f"max_episode_steps {max_episode_steps!r}; the horizon of task {task!r} is {horizon}"
+        )
     return VectorTaskEnv(task, num_envs, **arguments)
 
 
@@ -417,7 +427,7 @@ def env_spec_json(task: str, **arguments: Any) -> str:
             "entry_point": "tangere.gym:make_env",
             "reward_threshold": None,
             "nondeterministic": False,
-            "max_episode_steps": None,
+            "max_episode_steps": _core.task_spec(task).horizon,
             "order_enforce": True,
             "disable_env_checker": False,
             "kwargs": {"task": task, **arguments},
@@ -435,5 +445,6 @@ def register_tasks() -> None:
                 gym_id(task),
                 entry_point="tangere.gym:make_env",
                 vector_entry_point="tangere.gym:make_vec",
+                max_episode_steps=_core.task_spec(task).horizon,
                 kwargs={"task": task},
             )

@@ -51,7 +51,21 @@ def test_ids_are_registered():
 def test_a_spec_in_a_file_makes_the_environment():
     env = gymnasium.make(EnvSpec.from_json(env_spec_json("box_pushing", normalise=False)))
     assert isinstance(env.unwrapped, tangere.TaskEnv)
-    assert env.unwrapped.task.name == "box_pushing"
+    assert env.unwrapped.task.name == "box_pushing" and env.spec.max_episode_steps == 100
+
+
+def test_the_limit_of_steps_is_the_horizon():
+    for task in tangere.task_names():
+        horizon = tangere.task_spec(task).horizon
+        assert gymnasium.spec(tangere.gym_id(task)).max_episode_steps == horizon
+    env = gymnasium.make("tangere/BoxPushing-v0")
+    env.reset(seed=0)
+    ends = [env.step(np.zeros(3))[2:4] for _ in range(env.spec.max_episode_steps)]
+    assert ends == [(False, False)] * 99 + [(False, True)]
+    vector = gymnasium.make_vec("tangere/BoxPushing-v0", 2, threads=1)
+    assert vector.spec.max_episode_steps == 100
+    with pytest.raises(tangere.InputError, match="max_episode_steps 7; the horizon of task 'box_"):
+        gymnasium.make_vec("tangere/BoxPushing-v0", 2, max_episode_steps=7)
 
 
 def test_randomized_numbers_are_those_of_a_data_set(generate):
