@@ -176,6 +176,11 @@ class VectorTaskEnv(VectorEnv):
         self.observation_space = batch_space(self.single_observation_space, num_envs)
 
     @property
+    def autoreset_mode(self) -> AutoresetMode:
+        """What follows the end of an episode, as `metadata["autoreset_mode"]`."""
+        return self.metadata["autoreset_mode"]
+
+    @property
     def observation_scale(self) -> dict[str, float | list[float]]:
         """KEY → what its observations are divided by, in SI units."""
         return {t.name: observation_scale(t) for t in self.task.observations}

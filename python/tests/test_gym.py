@@ -167,7 +167,7 @@ def play(env, steps):
 
 def test_next_step_shows_the_start_a_step_later():
     env = tangere.make_vec(SHORT, 4, threads=1)
-    assert env.metadata["autoreset_mode"] is AutoresetMode.NEXT_STEP
+    assert env.metadata["autoreset_mode"] is env.autoreset_mode is AutoresetMode.NEXT_STEP
     env.reset(seed=0)
     rows = play(env, 8)
     for (_, _, before, _), (_, reward, _, info) in zip(rows, rows[1:]):
@@ -183,7 +183,7 @@ def test_same_step_shows_the_last_observation_beside_the_start():
     ones, twos = tangere.make_vec(SHORT, 4, threads=1), tangere.make_vec(
         SHORT, 4, threads=1, autoreset="same_step"
     )
-    assert twos.metadata["autoreset_mode"] is AutoresetMode.SAME_STEP
+    assert twos.metadata["autoreset_mode"] is twos.autoreset_mode is AutoresetMode.SAME_STEP
     ones.reset(seed=0), twos.reset(seed=0)
     action = ones.scripted_action()
     a, b = ones.step(action), twos.step(action)
