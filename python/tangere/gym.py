@@ -7,7 +7,9 @@ the task declares, [-1, 1] for every task but `dummy`. Rewards are float64.
 
 from __future__ import annotations
 
+import copyreg
 import json
+import warnings
 from pathlib import Path
 from typing import Any, Literal, Sequence
 
@@ -89,7 +91,36 @@ def _checked(seed: Any) -> int:
     return int(seed)
 
 
-class VectorTaskEnv(VectorEnv):
+def _scene_as_read(path: str, text: str) -> _core.Scene:
+    """The scene of a pickle: read from its file again."""
+    if not Path(path).is_file():
+        return _core.Scene.from_text(text, path)
+    with warnings.catch_warnings():  # they came when the scene was read first
+        warnings.simplefilter("ignore", UserWarning)
+        scene = _core.Scene(path, allow_unknown=True)
+    if scene.text != text:
+        raise _core.InputError(f"{path}: the file is not as it was when its scene was pickled")
+    return scene
+
+
+copyreg.pickle(_core.Scene, lambda scene: (_scene_as_read, (scene.path, scene.text)))
+
+
+class _Remade:
+    """Environments of which pickles and copies are made anew from the constructor's arguments.
+
+    A copy plays no episode until its first reset. What was set besides the constructor is kept.
+    """
+
+    _arguments: dict[str, Any]
+    _made: set[str]  # names of what the constructor sets
+
+    def __getstate__(self) -> dict[str, Any]:
+        kept = {key: value for key, value in self.__dict__.items() if key not in self._made}
+        return {"arguments": self._arguments, "kept": kept}
+
+
+class VectorTaskEnv(_Remade, VectorEnv):
     """Many environments of one task, stepped in C++ on all cores with one call a step.
 
     Environment e plays episodes first_episode + e, first_episode + e + E, … of a seed: an episode
@@ -132,6 +163,9 @@ class VectorTaskEnv(VectorEnv):
         scene: _core.Scene | str | Path | None = None,
         render_mode: RenderMode = None,
     ) -> None:
+        arguments = {k: v for k, v in locals().items() if k not in ("self", "__class__")}
+        before = set(self.__dict__)
+        self._arguments = arguments
         if isinstance(keys, str):
             raise _core.InputError(f"keys {keys!r}; expected a list, such as [{keys!r}]")
         seed = _system_seed() if seed is None else _checked(seed)
@@ -174,6 +208,11 @@ class VectorTaskEnv(VectorEnv):
             self.task, self.keys, normalise, flatten
         )
         self.observation_space = batch_space(self.single_observation_space, num_envs)
+        self._made = {*self.__dict__, "_made"} - before
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        VectorTaskEnv.__init__(self, **state["arguments"])
+        self.__dict__.update(state["kept"])
 
     @property
     def autoreset_mode(self) -> AutoresetMode:
@@ -300,7 +339,7 @@ class VectorTaskEnv(VectorEnv):
         return info | {f"_{key}": every.copy() for key in info}
 
 
-class TaskEnv(gymnasium.Env):
+class TaskEnv(_Remade, gymnasium.Env):
     """One environment of a task, for evaluation. The episodes are those of `VectorTaskEnv`.
 
     `reset(seed=s)` starts episode `first_episode` of seed s, `reset()` the next one.
@@ -320,6 +359,9 @@ class TaskEnv(gymnasium.Env):
         scene: _core.Scene | str | Path | None = None,
         render_mode: RenderMode = None,
     ):
+        arguments = {k: v for k, v in locals().items() if k not in ("self", "__class__")}
+        before = set(self.__dict__)
+        self._arguments = arguments
         self._vector = VectorTaskEnv(
             task,
             1,
@@ -339,6 +381,11 @@ class TaskEnv(gymnasium.Env):
         self._over = True
         self.render_mode = render_mode
         self.metadata = {k: v for k, v in self._vector.metadata.items() if k != "autoreset_mode"}
+        self._made = {*self.__dict__, "_made"} - before
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        TaskEnv.__init__(self, **state["arguments"])
+        self.__dict__.update(state["kept"])
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None

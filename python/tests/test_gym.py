@@ -3,6 +3,9 @@
 
 from __future__ import annotations
 
+import copy
+import functools
+import pickle
 import warnings
 from pathlib import Path
 
@@ -66,6 +69,71 @@ def test_the_limit_of_steps_is_the_horizon():
     assert vector.spec.max_episode_steps == 100
     with pytest.raises(tangere.InputError, match="max_episode_steps 7; the horizon of task 'box_"):
         gymnasium.make_vec("tangere/BoxPushing-v0", 2, max_episode_steps=7)
+
+
+def unpickled(env):
+    return pickle.loads(pickle.dumps(env))
+
+
+@pytest.mark.parametrize("copied", [unpickled, copy.deepcopy])
+def test_a_copy_is_made_anew(copied):
+    arguments = {"seed": 3, "first_episode": 2, "normalise": False, "keys": ["goal"]}
+    one, many = tangere.make_env("box_pushing", **arguments), tangere.make_vec(
+        "box_pushing", 2, threads=1, autoreset="same_step", **arguments
+    )
+    for env in (one, many, gymnasium.make("tangere/BoxPushing-v0", **arguments)):
+        twin = copied(env)
+        first, again = env.reset(), twin.reset()
+        same(first[0], again[0])
+        same(first[1], again[1])
+        assert twin.observation_space == env.observation_space and "tactile" not in again[0]
+        env.step(env.action_space.sample())
+        later = copied(env)  # it plays no episode yet
+        same(later.reset()[0], first[0])
+    assert twin.spec.id == "tangere/BoxPushing-v0" and twin.unwrapped.spec.kwargs["seed"] == 3
+    assert copied(many).autoreset_mode is AutoresetMode.SAME_STEP
+    with pytest.raises(tangere.InputError, match="call reset"):
+        copied(one).step(np.zeros(3))
+
+
+class Scored(tangere.TaskEnv):
+    def __init__(self, weight):
+        self.before = weight
+        super().__init__("box_pushing", seed=1, keys=["goal"])
+        self.weight = weight
+
+
+def test_a_class_of_ones_own_is_copied_too():
+    env = Scored(2.5)
+    twin = unpickled(env)
+    assert isinstance(twin, Scored) and twin.weight == twin.before == 2.5
+    same(twin.reset()[0], env.reset()[0])
+
+
+def test_a_scene_is_copied_with_its_file(tmp_path):
+    text = tangere.gym.task_scene("dummy").text
+    path = tmp_path / "scene.xml"
+    path.write_text(text, encoding="utf-8")
+    read, written = tangere.Scene(path), tangere.Scene.from_text(text, "own")
+    assert unpickled(read).path == str(path) and unpickled(read).text == text
+    assert copy.deepcopy(written).text == text and unpickled(written).path == "own"
+    env = unpickled(tangere.make_env("dummy", scene=written))
+    assert env.model.scene.text == text
+    kept = pickle.dumps(read)
+    path.write_text(text.replace("kt", "kt ", 1), encoding="utf-8")
+    with pytest.raises(tangere.InputError, match="scene.xml: the file is not as it was"):
+        pickle.loads(kept)
+
+
+def test_processes_of_their_own_play_environments():
+    make = functools.partial(copy.deepcopy, tangere.make_env("box_pushing", keys=["goal"]))
+    env = gymnasium.vector.AsyncVectorEnv([make, make], context="spawn")
+    try:
+        goal = env.reset(seed=[5, 6])[0]["goal"]
+    finally:
+        env.close()
+    expected = [tangere.make_env("box_pushing").reset(seed=s)[0]["goal"] for s in (5, 6)]
+    np.testing.assert_array_equal(goal, expected)
 
 
 def test_randomized_numbers_are_those_of_a_data_set(generate):
