@@ -12,6 +12,7 @@
 
 #include "engine/step/control.hpp"
 #include "kernels/numbers/block.hpp"
+#include "python/module/batch_arrays.hpp"
 #include "python/module/module.hpp"
 #include "python/module/options.hpp"
 #include "tasks/run/block_reader.hpp"
@@ -190,14 +191,17 @@ Array<double> PythonBatch::end_effectors() {
 
 nb::tuple PythonBatch::bodies() {
   const InUse::Turn turn(in_use_);
-  const std::size_t n = as_size(model().nb());
-  std::span<double> pose, twist;
-  const auto poses = new_array<double>({count(), n, 7}, pose);
-  const auto twists = new_array<double>({count(), n, 6}, twist);
-  for (int e = 0; e < environments(); ++e)
-    workers_[0].readout.bodies(batch_, e, pose.subspan(as_size(e) * 7 * n, 7 * n),
-                               twist.subspan(as_size(e) * 6 * n, 6 * n));
-  return nb::make_tuple(poses, twists);
+  return body_arrays(workers_[0].readout, batch_);
+}
+
+nb::tuple PythonBatch::faces(const Whole<int>& environment, double half_space) {
+  const InUse::Turn turn(in_use_);
+  return face_arrays(batch_, environment.value("env"), half_space);
+}
+
+nb::dict PythonBatch::randomized() {
+  const InUse::Turn turn(in_use_);
+  return randomized_arrays(batch_);
 }
 
 Array<std::int8_t> PythonBatch::status() {
@@ -433,6 +437,9 @@ void add_batches(nb::module_& m) {
                    "numpy.typing.NDArray[numpy.float64]]"),
            "Poses (E, nb, 7), x y z qw qx qy qz in the world, and twists (E, nb, 6), angular then\n"
            "linear velocity in world axes.")
+      .def("faces", &PythonBatch::faces, "env"_a, "half_space"_a = 0.0, nb::sig(kFacesSignature),
+           kFacesText)
+      .def("randomized", &PythonBatch::randomized, nb::sig(kRandomizedSignature), kRandomizedText)
       .def("step", &PythonBatch::step, "u"_a,
            "Takes one step. `u`: (E, nu) controls, or (nu) for all environments; clipped to the\n"
            "motors' ranges. InputError: another shape.")

@@ -43,6 +43,8 @@ class PythonBatch {
   [[nodiscard]] Array<double> v();
   [[nodiscard]] Array<double> end_effectors();
   nb::tuple bodies();
+  nb::tuple faces(const Whole<int>& environment, double half_space);
+  nb::dict randomized();
   [[nodiscard]] Array<std::int8_t> status();
   void set_state(const Argument<double>& q, const Argument<double>& v,
                  const nb::object& environments);

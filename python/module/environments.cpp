@@ -5,6 +5,7 @@
 #include <nanobind/stl/vector.h>
 
 #include "python/module/arrays.hpp"
+#include "python/module/batch_arrays.hpp"
 #include "python/module/module.hpp"
 #include "python/module/observations.hpp"
 #include "python/module/options.hpp"
@@ -23,6 +24,7 @@ class Environments {
                const VectorOptions& options)
       : task_(make_task(task, scene)),
         vector_(*task_, environments, options),
+        readout_(task_->model()),
         policies_{Policy(*task_, PolicyKind::scripted), Policy(*task_, PolicyKind::random)} {}
 
   void reset(const Whole<std::uint64_t>& seed, const Whole<std::int64_t>& first_episode) {
@@ -72,6 +74,18 @@ class Environments {
     }
     return nb::make_tuple(arrays[0], arrays[1], arrays[2]);
   }
+  nb::tuple bodies() {
+    const InUse::Turn turn(in_use_);
+    return body_arrays(readout_, vector_.batch());
+  }
+  nb::tuple faces(const Whole<int>& environment, double half_space) {
+    const InUse::Turn turn(in_use_);
+    return face_arrays(vector_.batch(), environment.value("env"), half_space);
+  }
+  nb::dict randomized() {
+    const InUse::Turn turn(in_use_);
+    return randomized_arrays(vector_.batch());
+  }
   Array<std::int8_t> status() {
     std::span<std::int8_t> numbers;
     auto array = new_array<std::int8_t>({count()}, numbers);
@@ -107,6 +121,7 @@ class Environments {
  private:
   std::unique_ptr<Task> task_;
   VectorTask vector_;
+  Readout readout_;
   Policy policies_[2];
   InUse in_use_;
 };
@@ -170,6 +185,13 @@ void add_environments(nb::module_& m) {
            nb::sig("def state(self) -> tuple[numpy.typing.NDArray[numpy.float64], "
                    "numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]"),
            "q (E, nq), v (E, nv) and the task's memory (E, memory): what a robot cannot see.")
+      .def("bodies", &Environments::bodies,
+           nb::sig("def bodies(self) -> tuple[numpy.typing.NDArray[numpy.float64], "
+                   "numpy.typing.NDArray[numpy.float64]]"),
+           "Poses (E, nb, 7) and twists (E, nb, 6), as Batch.bodies().")
+      .def("faces", &Environments::faces, "env"_a, "half_space"_a = 0.0, nb::sig(kFacesSignature),
+           kFacesText)
+      .def("randomized", &Environments::randomized, nb::sig(kRandomizedSignature), kRandomizedText)
       .def("counts", &Environments::counts, nb::sig("def counts(self) -> dict[str, int]"),
            "Since the last reset: environment_steps, simulation_steps, newton_iterations, and "
            "steps\n"

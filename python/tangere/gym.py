@@ -7,7 +7,9 @@ the task declares, [-1, 1] for every task but `dummy`. Rewards are float64.
 
 from __future__ import annotations
 
+import copyreg
 import json
+import warnings
 from pathlib import Path
 from typing import Any, Literal, Sequence
 
@@ -19,10 +21,12 @@ from gymnasium.vector.utils import batch_space
 
 from . import _core
 from ._arrays import numbers
+from ._picture import View
 
 # KEY → array, or with `flatten` one array.
 Observation = Any
 Autoreset = Literal["next_step", "same_step", "disabled"]
+RenderMode = Literal["rgb_array"] | None
 _MODES = {
     "next_step": AutoresetMode.NEXT_STEP,
     "same_step": AutoresetMode.SAME_STEP,
@@ -87,7 +91,36 @@ def _checked(seed: Any) -> int:
     return int(seed)
 
 
-class VectorTaskEnv(VectorEnv):
+def _scene_as_read(path: str, text: str) -> _core.Scene:
+    """The scene of a pickle: read from its file again."""
+    if not Path(path).is_file():
+        return _core.Scene.from_text(text, path)
+    with warnings.catch_warnings():  # they came when the scene was read first
+        warnings.simplefilter("ignore", UserWarning)
+        scene = _core.Scene(path, allow_unknown=True)
+    if scene.text != text:
+        raise _core.InputError(f"{path}: the file is not as it was when its scene was pickled")
+    return scene
+
+
+copyreg.pickle(_core.Scene, lambda scene: (_scene_as_read, (scene.path, scene.text)))
+
+
+class _Remade:
+    """Environments of which pickles and copies are made anew from the constructor's arguments.
+
+    A copy plays no episode until its first reset. What was set besides the constructor is kept.
+    """
+
+    _arguments: dict[str, Any]
+    _made: set[str]  # names of what the constructor sets
+
+    def __getstate__(self) -> dict[str, Any]:
+        kept = {key: value for key, value in self.__dict__.items() if key not in self._made}
+        return {"arguments": self._arguments, "kept": kept}
+
+
+class VectorTaskEnv(_Remade, VectorEnv):
     """Many environments of one task, stepped in C++ on all cores with one call a step.
 
     Environment e plays episodes first_episode + e, first_episode + e + E, … of a seed: an episode
@@ -112,6 +145,7 @@ class VectorTaskEnv(VectorEnv):
         "disabled": the environment stands still until `reset(options={"reset_mask": m})`.
     keys: the observations to show; None for all that the task declares.
     scene: another scene than the one of the task, or the path of its file.
+    render_mode: "rgb_array" for pictures by `render`.
     """
 
     def __init__(
@@ -127,8 +161,11 @@ class VectorTaskEnv(VectorEnv):
         autoreset: Autoreset = "next_step",
         keys: Sequence[str] | None = None,
         scene: _core.Scene | str | Path | None = None,
-        render_mode: None = None,
+        render_mode: RenderMode = None,
     ) -> None:
+        arguments = {k: v for k, v in locals().items() if k not in ("self", "__class__")}
+        before = set(self.__dict__)
+        self._arguments = arguments
         if isinstance(keys, str):
             raise _core.InputError(f"keys {keys!r}; expected a list, such as [{keys!r}]")
         seed = _system_seed() if seed is None else _checked(seed)
@@ -136,9 +173,8 @@ class VectorTaskEnv(VectorEnv):
             raise _core.InputError(f"num_envs {num_envs!r}; expected a whole number from 1 on")
         if autoreset not in _MODES:
             raise _core.InputError(f"autoreset {autoreset!r}; expected one of {sorted(_MODES)}")
-        if render_mode is not None:
-            raise _core.InputError("there is no render_mode; see `tangere plot` for pictures")
-        self.metadata = {"autoreset_mode": _MODES[autoreset], "render_modes": []}
+        if render_mode not in (None, "rgb_array"):
+            raise _core.InputError(f"render_mode {render_mode!r}; expected None or 'rgb_array'")
         self.task = _core.task_spec(task)
         names = [tensor.name for tensor in self.task.observations]
         unknown = [key for key in keys or () if key not in names]
@@ -158,6 +194,13 @@ class VectorTaskEnv(VectorEnv):
             autoreset=autoreset == "next_step",
         )
         self._seed, self._first_episode, self._fresh = seed, first_episode, True
+        self.render_mode = render_mode
+        self._views: dict[int, View] = {}
+        self.metadata = {
+            "autoreset_mode": _MODES[autoreset],
+            "render_modes": ["rgb_array"],
+            "render_fps": 1 / (self.model.timestep * self.task.steps_per_action),
+        }
         action = self.task.action
         self.single_action_space = spaces.Box(action.low, action.high, action.shape, np.float32)
         self.action_space = batch_space(self.single_action_space, num_envs)
@@ -165,6 +208,16 @@ class VectorTaskEnv(VectorEnv):
             self.task, self.keys, normalise, flatten
         )
         self.observation_space = batch_space(self.single_observation_space, num_envs)
+        self._made = {*self.__dict__, "_made"} - before
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        VectorTaskEnv.__init__(self, **state["arguments"])
+        self.__dict__.update(state["kept"])
+
+    @property
+    def autoreset_mode(self) -> AutoresetMode:
+        """What follows the end of an episode, as `metadata["autoreset_mode"]`."""
+        return self.metadata["autoreset_mode"]
 
     @property
     def observation_scale(self) -> dict[str, float | list[float]]:
@@ -196,6 +249,7 @@ class VectorTaskEnv(VectorEnv):
             self._seed = self._seed if seed is None else _checked(seed)
             self._first_episode = self._first_episode if first is None else int(first)
             self._env.reset(self._seed, self._first_episode)
+            self._views.clear()
         else:
             self._env.restart(np.ones(self.num_envs, bool))
         self._fresh = False
@@ -242,6 +296,28 @@ class VectorTaskEnv(VectorEnv):
         """q (E, nq), v (E, nv) and the task's memory, (E, n): privileged, float64, SI units."""
         return self._env.state()
 
+    def randomized(self) -> dict[str, np.ndarray]:
+        """Name → (E): what <randomize> drew for the episodes, such as "tactile pad kt": privileged.
+
+        In SI units. Numbers of the starting state are those of the scene; a task may start
+        elsewhere.
+        """
+        return self._env.randomized()
+
+    def render(self) -> tuple[np.ndarray, ...] | None:
+        """A picture (384, 512, 3) uint8 of every environment; None without `render_mode`.
+
+        Bodies and the ground, seen from the side and above without perspective. Fields of sensors
+        are not shown.
+        """
+        if self.render_mode is None:
+            return None
+        poses, episodes = self._env.bodies()[0], self._env.episodes()
+        for e in range(self.num_envs):
+            if e not in self._views or self._views[e].episode != episodes[e]:
+                self._views[e] = View(self._env, e, poses[e])
+        return tuple(self._views[e].draw(poses[e]) for e in range(self.num_envs))
+
     def counts(self) -> dict[str, int]:
         """As Environments.counts(), since the last reset by seed."""
         return self._env.counts()
@@ -263,13 +339,13 @@ class VectorTaskEnv(VectorEnv):
         return info | {f"_{key}": every.copy() for key in info}
 
 
-class TaskEnv(gymnasium.Env):
+class TaskEnv(_Remade, gymnasium.Env):
     """One environment of a task, for evaluation. The episodes are those of `VectorTaskEnv`.
 
     `reset(seed=s)` starts episode `first_episode` of seed s, `reset()` the next one.
     """
 
-    metadata = {"render_modes": []}
+    metadata = {"render_modes": ["rgb_array"]}
 
     def __init__(
         self,
@@ -281,8 +357,11 @@ class TaskEnv(gymnasium.Env):
         flatten: bool = False,
         keys: Sequence[str] | None = None,
         scene: _core.Scene | str | Path | None = None,
-        render_mode: None = None,
+        render_mode: RenderMode = None,
     ):
+        arguments = {k: v for k, v in locals().items() if k not in ("self", "__class__")}
+        before = set(self.__dict__)
+        self._arguments = arguments
         self._vector = VectorTaskEnv(
             task,
             1,
@@ -300,6 +379,13 @@ class TaskEnv(gymnasium.Env):
         self.action_space = self._vector.single_action_space
         self.observation_space = self._vector.single_observation_space
         self._over = True
+        self.render_mode = render_mode
+        self.metadata = {k: v for k, v in self._vector.metadata.items() if k != "autoreset_mode"}
+        self._made = {*self.__dict__, "_made"} - before
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        TaskEnv.__init__(self, **state["arguments"])
+        self.__dict__.update(state["kept"])
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -348,6 +434,15 @@ class TaskEnv(gymnasium.Env):
         q, v, memory = self._vector.state()
         return q[0], v[0], memory[0]
 
+    def randomized(self) -> dict[str, float]:
+        """Name → what <randomize> drew for the episode, as in `VectorTaskEnv`."""
+        return {name: float(values[0]) for name, values in self._vector.randomized().items()}
+
+    def render(self) -> np.ndarray | None:
+        """A picture (384, 512, 3) uint8, as in `VectorTaskEnv`; None without `render_mode`."""
+        pictures = self._vector.render()
+        return None if pictures is None else pictures[0]
+
     def _one(self, obs: Observation) -> Observation:
         return obs[0] if self._vector.flatten else {key: value[0] for key, value in obs.items()}
 
@@ -356,8 +451,18 @@ class TaskEnv(gymnasium.Env):
         return {key: value[0].item() for key, value in info.items() if not key.startswith("_")}
 
 
-def make_vec(task: str, num_envs: int = 1, **arguments: Any) -> VectorTaskEnv:
-    """Many environments of one task; `arguments` are those of `VectorTaskEnv`."""
+def make_vec(
+    task: str, num_envs: int = 1, *, max_episode_steps: int | None = None, **arguments: Any
+) -> VectorTaskEnv:
+    """Many environments of one task; `arguments` are those of `VectorTaskEnv`.
+
+    `max_episode_steps` comes from `gymnasium.make_vec`; it can only be the task's horizon.
+    """
+    horizon = _core.task_spec(task).horizon
+    if max_episode_steps not in (None, horizon):
+        raise _core.InputError(
+            f"max_episode_steps {max_episode_steps!r}; the horizon of task {task!r} is {horizon}"
+        )
     return VectorTaskEnv(task, num_envs, **arguments)
 
 
@@ -374,7 +479,7 @@ def env_spec_json(task: str, **arguments: Any) -> str:
             "entry_point": "tangere.gym:make_env",
             "reward_threshold": None,
             "nondeterministic": False,
-            "max_episode_steps": None,
+            "max_episode_steps": _core.task_spec(task).horizon,
             "order_enforce": True,
             "disable_env_checker": False,
             "kwargs": {"task": task, **arguments},
@@ -392,5 +497,6 @@ def register_tasks() -> None:
                 gym_id(task),
                 entry_point="tangere.gym:make_env",
                 vector_entry_point="tangere.gym:make_vec",
+                max_episode_steps=_core.task_spec(task).horizon,
                 kwargs={"task": task},
             )

@@ -98,9 +98,13 @@ class VecEnv(BaseVecEnv):  # type: ignore[misc]
         """Nothing is left to close."""
         self.env.close()
 
+    def get_images(self) -> Sequence[np.ndarray | None]:
+        """A picture of every environment, as `render_mode="rgb_array"` gives it; None without."""
+        return self.env.render() or [None] * self.num_envs
+
     def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
         """An attribute of the vector environment, which is the same for every environment."""
-        value = None if attr_name == "render_mode" else getattr(self.env, attr_name)
+        value = getattr(self.env, attr_name)
         return [value for _ in self._get_indices(indices)]
 
     def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:

@@ -308,3 +308,48 @@ def test_whole_numbers_of_numpy_count(model):
     assert (batch.envs, batch.seed) == (2, 2**64 - 1)
     with pytest.raises(TypeError):
         tangere.Batch(model, envs=2.0)
+
+
+def test_faces_bound_the_bodies():
+    """Volumes by the divergence theorem; the square of the ground."""
+    shapes = {
+        "cuboid": ('size="0.1 0.2 0.3"', 0.006, 1e-12),
+        "sphere": ('radius="0.1"', 4 / 3 * np.pi * 1e-3, 0.03),
+        "cylinder": ('radius="0.1" length="0.2"', np.pi * 2e-3, 0.03),
+        "capsule": ('radius="0.1" length="0.2"', np.pi * 2e-3 + 4 / 3 * np.pi * 1e-3, 0.03),
+        "ellipsoid": ('size="0.2 0.4 0.6"', 4 / 3 * np.pi * 6e-3, 0.03),
+    }
+    links = "".join(
+        f'<link name="{kind}"><joint name="{kind}" type="free3d" pos="{k} 0 1"/>'
+        f'<body name="{kind}" type="{kind}" {size} density="1000" rgba="0.1 0.2 0.3 1"/></link>'
+        for k, (kind, (size, _, _)) in enumerate(shapes.items())
+    )
+    text = (
+        '<tangere><option unit="m-kg" timestep="1e-3" integrator="BDF1"/>'
+        f'<ground pos="0 0 0.5" normal="0 0 1"/><robot>{links}</robot></tangere>'
+    )
+    batch = tangere.Batch(tangere.Model(tangere.Scene.from_text(text)), envs=2)
+    corners, body, rgba = batch.faces(1, half_space=2)
+    assert corners.shape[1:] == (3, 3) and body.dtype == np.int32
+    for k, (kind, (_, volume, error)) in enumerate(shapes.items()):
+        a, b, c = np.moveaxis(corners[body == k], 1, 0)
+        assert (a * np.cross(b, c)).sum() / 6 == pytest.approx(volume, rel=error), kind
+        np.testing.assert_array_equal(rgba[body == k], [[0.1, 0.2, 0.3, 1]] * len(a))
+    ground = corners[body == -1]
+    assert ground[..., :2].max() == 2 and (ground[..., 2] == 0.5).all()
+    assert np.cross(ground[0, 1] - ground[0, 0], ground[0, 2] - ground[0, 0])[2] > 0
+    for wrong in ((2, 0), (-1, 0), (0, -1), (0, np.inf)):
+        with pytest.raises(tangere.InputError, match="expected 0"):
+            batch.faces(*wrong)
+
+
+def test_faces_have_the_sizes_that_an_episode_drew():
+    env = tangere.make_vec("cap_opening", 2, threads=1)
+    env.reset(seed=1)
+    radii = env.randomized()["body cap radius"]
+    assert radii[0] != radii[1]
+    cap = env.model.body_names.index("cap")
+    for e in range(2):
+        corners, body, _ = env._env.faces(e)
+        found = np.linalg.norm(corners[body == cap][..., :2], axis=-1).max()
+        assert found == pytest.approx(radii[e], rel=1e-12)

@@ -3,10 +3,14 @@
 
 from __future__ import annotations
 
+import copy
+import functools
+import pickle
 import warnings
 from pathlib import Path
 
 import gymnasium
+import h5py
 import numpy as np
 import pytest
 from gymnasium.envs.registration import EnvSpec
@@ -50,7 +54,103 @@ def test_ids_are_registered():
 def test_a_spec_in_a_file_makes_the_environment():
     env = gymnasium.make(EnvSpec.from_json(env_spec_json("box_pushing", normalise=False)))
     assert isinstance(env.unwrapped, tangere.TaskEnv)
-    assert env.unwrapped.task.name == "box_pushing"
+    assert env.unwrapped.task.name == "box_pushing" and env.spec.max_episode_steps == 100
+
+
+def test_the_limit_of_steps_is_the_horizon():
+    for task in tangere.task_names():
+        horizon = tangere.task_spec(task).horizon
+        assert gymnasium.spec(tangere.gym_id(task)).max_episode_steps == horizon
+    env = gymnasium.make("tangere/BoxPushing-v0")
+    env.reset(seed=0)
+    ends = [env.step(np.zeros(3))[2:4] for _ in range(env.spec.max_episode_steps)]
+    assert ends == [(False, False)] * 99 + [(False, True)]
+    vector = gymnasium.make_vec("tangere/BoxPushing-v0", 2, threads=1)
+    assert vector.spec.max_episode_steps == 100
+    with pytest.raises(tangere.InputError, match="max_episode_steps 7; the horizon of task 'box_"):
+        gymnasium.make_vec("tangere/BoxPushing-v0", 2, max_episode_steps=7)
+
+
+def unpickled(env):
+    return pickle.loads(pickle.dumps(env))
+
+
+@pytest.mark.parametrize("copied", [unpickled, copy.deepcopy])
+def test_a_copy_is_made_anew(copied):
+    arguments = {"seed": 3, "first_episode": 2, "normalise": False, "keys": ["goal"]}
+    one, many = tangere.make_env("box_pushing", **arguments), tangere.make_vec(
+        "box_pushing", 2, threads=1, autoreset="same_step", **arguments
+    )
+    for env in (one, many, gymnasium.make("tangere/BoxPushing-v0", **arguments)):
+        twin = copied(env)
+        first, again = env.reset(), twin.reset()
+        same(first[0], again[0])
+        same(first[1], again[1])
+        assert twin.observation_space == env.observation_space and "tactile" not in again[0]
+        env.step(env.action_space.sample())
+        later = copied(env)  # it plays no episode yet
+        same(later.reset()[0], first[0])
+    assert twin.spec.id == "tangere/BoxPushing-v0" and twin.unwrapped.spec.kwargs["seed"] == 3
+    assert copied(many).autoreset_mode is AutoresetMode.SAME_STEP
+    with pytest.raises(tangere.InputError, match="call reset"):
+        copied(one).step(np.zeros(3))
+
+
+class Scored(tangere.TaskEnv):
+    def __init__(self, weight):
+        self.before = weight
+        super().__init__("box_pushing", seed=1, keys=["goal"])
+        self.weight = weight
+
+
+def test_a_class_of_ones_own_is_copied_too():
+    env = Scored(2.5)
+    twin = unpickled(env)
+    assert isinstance(twin, Scored) and twin.weight == twin.before == 2.5
+    same(twin.reset()[0], env.reset()[0])
+
+
+def test_a_scene_is_copied_with_its_file(tmp_path):
+    text = tangere.gym.task_scene("dummy").text
+    path = tmp_path / "scene.xml"
+    path.write_text(text, encoding="utf-8")
+    read, written = tangere.Scene(path), tangere.Scene.from_text(text, "own")
+    assert unpickled(read).path == str(path) and unpickled(read).text == text
+    assert copy.deepcopy(written).text == text and unpickled(written).path == "own"
+    env = unpickled(tangere.make_env("dummy", scene=written))
+    assert env.model.scene.text == text
+    kept = pickle.dumps(read)
+    path.write_text(text.replace("kt", "kt ", 1), encoding="utf-8")
+    with pytest.raises(tangere.InputError, match="scene.xml: the file is not as it was"):
+        pickle.loads(kept)
+
+
+def test_processes_of_their_own_play_environments():
+    make = functools.partial(copy.deepcopy, tangere.make_env("box_pushing", keys=["goal"]))
+    env = gymnasium.vector.AsyncVectorEnv([make, make], context="spawn")
+    try:
+        goal = env.reset(seed=[5, 6])[0]["goal"]
+    finally:
+        env.close()
+    expected = [tangere.make_env("box_pushing").reset(seed=s)[0]["goal"] for s in (5, 6)]
+    np.testing.assert_array_equal(goal, expected)
+
+
+def test_randomized_numbers_are_those_of_a_data_set(generate):
+    folder = generate("stable_grasp", "--episodes", "3", "--seed", "4")
+    env = tangere.make_vec("stable_grasp", 3, threads=1)
+    env.reset(seed=4)
+    drawn = env.randomized()
+    one = tangere.make_env("stable_grasp")
+    one.reset(seed=4)
+    assert one.randomized() == {name: values[0] for name, values in drawn.items()}
+    with h5py.File(folder / "shard-00000.h5") as file:
+        names = list(file["scene"].attrs["randomized_names"])
+        assert names == list(drawn) and "body block_3 density" in names
+        for e in range(3):
+            stored = file[f"data/demo_{e}"].attrs["randomized"]
+            np.testing.assert_array_equal(stored, [values[e] for values in drawn.values()])
+    assert tangere.make_env("box_pushing").randomized() == {}
 
 
 def test_spaces_hold_what_comes():
@@ -135,7 +235,7 @@ def play(env, steps):
 
 def test_next_step_shows_the_start_a_step_later():
     env = tangere.make_vec(SHORT, 4, threads=1)
-    assert env.metadata["autoreset_mode"] is AutoresetMode.NEXT_STEP
+    assert env.metadata["autoreset_mode"] is env.autoreset_mode is AutoresetMode.NEXT_STEP
     env.reset(seed=0)
     rows = play(env, 8)
     for (_, _, before, _), (_, reward, _, info) in zip(rows, rows[1:]):
@@ -151,7 +251,7 @@ def test_same_step_shows_the_last_observation_beside_the_start():
     ones, twos = tangere.make_vec(SHORT, 4, threads=1), tangere.make_vec(
         SHORT, 4, threads=1, autoreset="same_step"
     )
-    assert twos.metadata["autoreset_mode"] is AutoresetMode.SAME_STEP
+    assert twos.metadata["autoreset_mode"] is twos.autoreset_mode is AutoresetMode.SAME_STEP
     ones.reset(seed=0), twos.reset(seed=0)
     action = ones.scripted_action()
     a, b = ones.step(action), twos.step(action)

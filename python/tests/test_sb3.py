@@ -87,3 +87,22 @@ def test_the_example_learns_and_plays(monkeypatch, capsys):
 
     rate = ppo.main(["--steps", "2048", "--episodes", "16"])
     assert 0 <= rate <= 1 and f"{rate:.3f} of 16 episodes solved" in capsys.readouterr().out
+
+
+def test_gymnasiums_environments_are_made_by_name():
+    from stable_baselines3.common.env_util import make_vec_env
+
+    env = make_vec_env("tangere/BoxPushing-v0", n_envs=2, seed=1)
+    goal = env.reset()["goal"]
+    one = tangere.make_env("box_pushing")
+    np.testing.assert_array_equal(goal, [one.reset(seed=s)[0]["goal"] for s in (1, 2)])
+    assert [image.shape for image in env.get_images()] == [(384, 512, 3)] * 2
+
+
+def test_pictures_are_those_of_the_environments():
+    env = sb3.VecEnv("box_pushing", 2, threads=1, seed=1, render_mode="rgb_array")
+    assert env.render_mode == "rgb_array"
+    env.reset()
+    np.testing.assert_array_equal(env.get_images(), env.env.render())
+    assert env.render().shape == (768, 512, 3)  # one above the other
+    assert sb3.VecEnv("box_pushing", 2).get_images() == [None, None]
