@@ -26,6 +26,7 @@ constexpr double kMostGivenPoints = 1e6;    // with a pitch that the scene gives
 constexpr double kAcrossBody = 8;           // pitches across the second smallest width of a body
 constexpr double kAcrossThin = 2.5;         // pitches of a round body across the other's smallest
 constexpr double kAcrossPlace = 0.7;        // pitch in half widths of the place of contact
+constexpr double kAcrossFace = 1.4;         // the same of faces on which a rod lies
 constexpr double kAlongRod = 16;            // rings of a rod that lies on a face
 constexpr double kFine = 1.5, kUneven = 4;  // pitches over the wanted one: near enough, uneven
 constexpr double kThin = 4;                 // least thickness, in depths under the lighter weight
@@ -57,6 +58,15 @@ std::array<double, 3> ascending_widths(const Shape* shape) {
   }
   std::ranges::sort(w);
   return w;
+}
+
+/// The smallest width of a shape [m]; of a mesh the mean thickness of its walls, if that is less.
+/// That of a plate is twice its volume over its area.
+double thickness(const Shape* shape) {
+  double least = ascending_widths(shape)[0];
+  if (shape != nullptr && std::holds_alternative<MeshShape>(*shape))
+    least = std::min(least, 2 * volume_of(*shape) / surface_area(*shape));
+  return least;
 }
 
 /// Radius by which a shape is round [m]; infinite for one with faces.
@@ -141,10 +151,12 @@ SurfacePitch fitting_pitch(const Scene& scene, const SurfaceContactDescription& 
   const std::array<double, 3> mine = ascending_widths(own), its = ascending_widths(other);
   const bool round = !std::isinf(roundness(own)), on_face = std::isinf(roundness(other));
   double narrow = std::min(mine[1], its[1]) / kAcrossBody;
-  if (round && on_face) narrow = std::min(narrow, its[0] / kAcrossThin);
+  if (round && on_face) narrow = std::min(narrow, thickness(other) / kAcrossThin);
   const double touching =
       place_of(own, other, d.coefficients.kn, lighter_weight(scene, d)).half_width;
-  const double across = std::min(narrow, kAcrossPlace * touching);
+  // Where a rod lies on a face, its own points resolve the line.
+  const double share = !round && straight_length(other) > 0 ? kAcrossFace : kAcrossPlace;
+  const double across = std::min(narrow, share * touching);
   SurfacePitch pitch{across, across, across};
   if (straight_length(own) > 0 && on_face)  // along a line of contact less is to be resolved
     pitch.along = std::min(narrow, straight_length(own) / kAlongRod);
@@ -202,7 +214,7 @@ std::string thin_warning(const Scene& scene, const SurfaceContactDescription& d)
   const Shape *const one = shape_of(scene, d.body1), *const two = shape_of(scene, d.body2);
   const double depth = place_of(one, two, d.coefficients.kn, lighter_weight(scene, d)).depth;
   for (const std::string& name : {d.body1, d.body2}) {
-    const double thin = ascending_widths(shape_of(scene, name))[0];
+    const double thin = thickness(shape_of(scene, name));
     if (depth > 0 && thin < kThin * depth)
       return fmt::format(
           "{}<surface_contact>: '{}' is {:.2g} m thin, and the lighter of '{}' and '{}' sinks in "

@@ -67,17 +67,20 @@ TEST(SurfaceContactFile, BecomesPointsWithAreas) {
       "s.xml");
   EXPECT_THAT(file.warnings, IsEmpty());
   const auto& pairs = file.scene.pair_contacts;
-  ASSERT_EQ(pairs.size(), 3U);
+  ASSERT_EQ(pairs.size(), 4U);
   for (const PairContactDescription& c : pairs) EXPECT_EQ(3 * c.areas.size(), c.points.size());
   const auto area = [&](int k) {
     return std::accumulate(pairs[std::size_t(k)].areas.begin(), pairs[std::size_t(k)].areas.end(),
                            0.0);
   };
-  EXPECT_EQ(pairs[0].general_body, "rod") << "the box would need too many points";
-  EXPECT_NEAR(area(0), 2 * M_PI * 0.01 * 0.09, 1e-9);
-  EXPECT_TRUE(pairs[1].on_ground);
-  EXPECT_NEAR(area(1), 2 * (0.1 * 0.06 + 0.1 * 0.04 + 0.06 * 0.04), 1e-9);
-  EXPECT_EQ(pairs[2].general_body, "box") << "a plane has no points";
+  const double box = 2 * (0.1 * 0.06 + 0.1 * 0.04 + 0.06 * 0.04);
+  EXPECT_EQ(pairs[0].general_body, "rod");
+  EXPECT_NEAR(area(0), 0.5 * 2 * M_PI * 0.01 * 0.09, 1e-9) << "both have half of the stiffness";
+  EXPECT_TRUE(pairs[1].second_half);
+  EXPECT_NEAR(area(1), 0.5 * box, 1e-9);
+  EXPECT_TRUE(pairs[2].on_ground);
+  EXPECT_NEAR(area(2), box, 1e-9);
+  EXPECT_EQ(pairs[3].general_body, "box") << "a plane has no points";
   EXPECT_EQ(unit_of(file.scene, first_number(pairs[0])), "N/m^3");
 }
 
