@@ -21,7 +21,7 @@ namespace tangere {
 
 namespace {
 
-constexpr double kMostPoints = 20000;       // of one surface, about, unless the scene gives a pitch
+constexpr double kDefaultPoints = 20000;       // of one surface, about, unless the scene gives a pitch
 constexpr double kMostGivenPoints = 1e6;    // with a pitch that the scene gives
 constexpr double kAcrossBody = 8;           // pitches across the second smallest width of a body
 constexpr double kAcrossThin = 2.5;         // pitches of a round body across the other's smallest
@@ -163,7 +163,7 @@ SurfacePitch fitting_pitch(const Scene& scene, const SurfaceContactDescription& 
   if (d.pitch) {
     pitch.across = pitch.along = *d.pitch;
   } else {
-    while (expected_points(*own, pitch.across, pitch.along) > kMostPoints) {
+    while (expected_points(*own, pitch.across, pitch.along) > kDefaultPoints) {
       pitch.across *= 1.05, pitch.along *= 1.05;
       pitch.bounded = true;
     }
