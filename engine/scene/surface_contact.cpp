@@ -21,7 +21,7 @@ namespace tangere {
 
 namespace {
 
-constexpr double kDefaultPoints = 20000;       // of one surface, about, unless the scene gives a pitch
+constexpr double kDefaultPoints = 20000;    // of one surface, about, unless the scene gives a pitch
 constexpr double kMostGivenPoints = 1e6;    // with a pitch that the scene gives
 constexpr double kAcrossBody = 8;           // pitches across the second smallest width of a body
 constexpr double kAcrossThin = 2.5;         // pitches of a round body across the other's smallest
