@@ -99,10 +99,10 @@ std::array<double, 2> reach_along_y(const MeshShape& mesh, const Quaternion& tur
 }
 
 /// How far an object has fallen, how fast it falls [m, m/s], and the gap between the plates [m].
-struct Fall {
+struct GripOutcome {
   double way, speed, gap;
 };
-std::vector<Fall> close_on(const MeshShape& mesh, double force, int steps, int poses) {
+std::vector<GripOutcome> close_on(const MeshShape& mesh, double force, int steps, int poses) {
   const Scene scene = gripper(mesh, force);
   const Model model(scene);
   Stepper stepper(model);
@@ -118,7 +118,7 @@ std::vector<Fall> close_on(const MeshShape& mesh, double force, int steps, int p
   }
   std::vector<double> u;
   for (int e = 0; e < poses; ++e) u.insert(u.end(), {1.0, 1.0});
-  std::vector<Fall> falls(std::size_t(poses), Fall{});
+  std::vector<GripOutcome> falls(std::size_t(poses), GripOutcome{});
   for (int k = 0; k < steps; ++k) {
     stepper.step(batch, u);
     for (int e = 0; e < poses; ++e) EXPECT_NE(batch.status(e), StepStatus::tunnelled);
@@ -138,12 +138,12 @@ TEST(Gripper, HoldsOrLetsGoAsTheClosedFormSays) {
     const double mass = mass_properties(Shape{object.mesh}, 600).mass, weight = mass * 9.81;
     const double enough = weight / (2 * 0.5);
     int lost = 0, kept = 0, through = 0;
-    for (const Fall& f : close_on(object.mesh, 4 * enough, 1000, kPoses)) {
+    for (const GripOutcome& f : close_on(object.mesh, 4 * enough, 1000, kPoses)) {
       // It may turn until it lies flat between the plates.
       if (f.way > 0.15 || std::abs(f.speed) > 5e-3) ++lost;
       if (f.gap < 0.008) ++through;
     }
-    for (const Fall& f : close_on(object.mesh, 0.25 * enough, 500, kPoses)) {
+    for (const GripOutcome& f : close_on(object.mesh, 0.25 * enough, 500, kPoses)) {
       // It falls with 3/4 of the acceleration of free fall: 0.92 m in half a second.
       if (f.way < 0.5) ++kept;
       if (f.gap < 0.008 && f.way < 0.1) ++through;
