@@ -50,7 +50,7 @@ std::string rod_over_box(const std::string& contact, const std::string& units = 
          contact + "</contact>" + more + "</tangere>";
 }
 
-std::string refusal(const std::string& contact) {
+std::string refused_contact(const std::string& contact) {
   try {
     parse_scene(rod_over_box(contact), "s.xml");
   } catch (const InputError& error) {
@@ -123,7 +123,7 @@ TEST(SurfaceContactFile, UnitsOfCentimetresAndGrams) {
 
 TEST(SurfaceContactFile, WhatCannotTouchIsRefusedWithItsLine) {
   const auto contact = [](const std::string& attributes) {
-    return refusal("<surface_contact " + attributes + "/>\n");
+    return refused_contact("<surface_contact " + attributes + "/>\n");
   };
   EXPECT_THAT(contact("body1=\"rod\" body2=\"rod\" kn=\"1\""),
               AllOf(HasSubstr("s.xml:11: "), HasSubstr("body 'rod' against itself")));
@@ -138,8 +138,8 @@ TEST(SurfaceContactFile, WhatCannotTouchIsRefusedWithItsLine) {
   EXPECT_THAT(contact("body1=\"rod\" body2=\"box\" kn=\"1\" law=\"linear\""), HasSubstr("law"));
   EXPECT_THAT(contact("body1=\"rod\" body2=\"box\" kn=\"1\" pitch=\"0\""), HasSubstr("pitch"));
   EXPECT_THAT(contact("body1=\"rod\" body2=\"box\" kn=\"1\" mu=\"-1\""), HasSubstr("mu"));
-  EXPECT_THAT(refusal("<surface_contact body1=\"rod\" body2=\"box\" kn=\"1e8\"/>\n"
-                      "<surface_contact body1=\"box\" body2=\"rod\" kn=\"1e8\"/>\n"),
+  EXPECT_THAT(refused_contact("<surface_contact body1=\"rod\" body2=\"box\" kn=\"1e8\"/>\n"
+                              "<surface_contact body1=\"box\" body2=\"rod\" kn=\"1e8\"/>\n"),
               HasSubstr("'box' and 'rod' touch already (line 11)"));
   EXPECT_THAT(contact("body1=\"ground\" body2=\"rod\" kn=\"1\""),
               HasSubstr("expected the ground as body2"));
