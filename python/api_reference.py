@@ -20,7 +20,9 @@ from typing import Iterator
 PAGE = Path(__file__).parents[1] / "docs/python_api.md"
 WIDTH = 100
 # In the order of the page; the compiled part is shown as tangere, from where it is used.
-MODULES = ("tangere", "gym", "torch", "jax", "data", "policy", "lerobot", "robomimic", "sb3")
+MODULES = (
+    "tangere", "gym", "scene_env", "torch", "jax", "data", "policy", "lerobot", "robomimic", "sb3",
+)  # fmt: skip
 HEAD = """# Python: every name
 
 This page has every public class and function of the package with its docstring. [Python](python.md)

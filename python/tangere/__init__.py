@@ -8,10 +8,11 @@
 
     env = tangere.make_vec("box_pushing", num_envs=256)      # Gymnasium's vector interface
 
-`tangere.gym` has the environments, `tangere.torch` and `tangere.jax` gradients through PyTorch and
-JAX, `tangere.data` data sets for learning, `tangere.policy` policies that the command asks.
-`tangere.lerobot`, `tangere.robomimic` and `tangere.sb3` connect to the libraries of these names.
-All but `tangere.gym` and `tangere.policy` need packages that `import tangere` does not import.
+`tangere.gym` has the environments, `tangere.scene_env` those of a task written in Python,
+`tangere.torch` and `tangere.jax` gradients through PyTorch and JAX, `tangere.data` data sets for
+learning, `tangere.policy` policies that the command asks. `tangere.lerobot`, `tangere.robomimic`
+and `tangere.sb3` connect to the libraries of these names. All but `tangere.gym`,
+`tangere.scene_env` and `tangere.policy` need packages that `import tangere` does not import.
 """
 
 from __future__ import annotations
@@ -37,6 +38,7 @@ from ._core import (
     task_spec,
 )
 from .gym import TaskEnv, VectorTaskEnv, gym_id, make_env, make_vec, register_tasks
+from .scene_env import SceneEnv, VectorSceneEnv, register_scene_env
 
 __all__ = [
     "Batch",
@@ -46,18 +48,21 @@ __all__ = [
     "Model",
     "Run",
     "Scene",
+    "SceneEnv",
     "Sensor",
     "StepStatus",
     "TaskEnv",
     "TaskSpec",
     "TaskTape",
     "TensorSpec",
+    "VectorSceneEnv",
     "VectorTaskEnv",
     "__version__",
     "gym_id",
     "instruction_set",
     "make_env",
     "make_vec",
+    "register_scene_env",
     "scenes",
     "task_names",
     "task_spec",

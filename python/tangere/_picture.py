@@ -88,8 +88,10 @@ class View:
     it goes back and stays there.
     """
 
-    def __init__(self, env: _core.Environments, e: int, poses: Numbers):
-        self.episode = int(env.episodes()[e])
+    def __init__(
+        self, env: _core.Environments | _core.Batch, e: int, poses: Numbers, episode: int
+    ):
+        self.episode = episode
         corners, body, rgba = env.faces(e)  # half-spaces and the ground without a size
         bounded = np.abs(_areas(corners)).max(1) > 0
         world = _posed(corners[bounded], body[bounded], poses)

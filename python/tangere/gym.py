@@ -91,6 +91,16 @@ def _checked(seed: Any) -> int:
     return int(seed)
 
 
+def _check_choices(num_envs: Any, autoreset: Any, render_mode: Any) -> None:
+    """Raises InputError for arguments of a vector environment that are not among those known."""
+    if not isinstance(num_envs, (int, np.integer)) or num_envs < 1:
+        raise _core.InputError(f"num_envs {num_envs!r}; expected a whole number from 1 on")
+    if autoreset not in _MODES:
+        raise _core.InputError(f"autoreset {autoreset!r}; expected one of {sorted(_MODES)}")
+    if render_mode not in (None, "rgb_array"):
+        raise _core.InputError(f"render_mode {render_mode!r}; expected None or 'rgb_array'")
+
+
 def _scene_as_read(path: str, text: str) -> _core.Scene:
     """The scene of a pickle: read from its file again."""
     if not Path(path).is_file():
@@ -169,12 +179,7 @@ class VectorTaskEnv(_Remade, VectorEnv):
         if isinstance(keys, str):
             raise _core.InputError(f"keys {keys!r}; expected a list, such as [{keys!r}]")
         seed = _system_seed() if seed is None else _checked(seed)
-        if not isinstance(num_envs, (int, np.integer)) or num_envs < 1:
-            raise _core.InputError(f"num_envs {num_envs!r}; expected a whole number from 1 on")
-        if autoreset not in _MODES:
-            raise _core.InputError(f"autoreset {autoreset!r}; expected one of {sorted(_MODES)}")
-        if render_mode not in (None, "rgb_array"):
-            raise _core.InputError(f"render_mode {render_mode!r}; expected None or 'rgb_array'")
+        _check_choices(num_envs, autoreset, render_mode)
         self.task = _core.task_spec(task)
         names = [tensor.name for tensor in self.task.observations]
         unknown = [key for key in keys or () if key not in names]
@@ -315,7 +320,7 @@ class VectorTaskEnv(_Remade, VectorEnv):
         poses, episodes = self._env.bodies()[0], self._env.episodes()
         for e in range(self.num_envs):
             if e not in self._views or self._views[e].episode != episodes[e]:
-                self._views[e] = View(self._env, e, poses[e])
+                self._views[e] = View(self._env, e, poses[e], int(episodes[e]))
         return tuple(self._views[e].draw(poses[e]) for e in range(self.num_envs))
 
     def counts(self) -> dict[str, int]:
@@ -339,53 +344,21 @@ class VectorTaskEnv(_Remade, VectorEnv):
         return info | {f"_{key}": every.copy() for key in info}
 
 
-class TaskEnv(_Remade, gymnasium.Env):
-    """One environment of a task, for evaluation. The episodes are those of `VectorTaskEnv`.
+class SingleEnv(gymnasium.Env):
+    """The one environment of a vector of one, whose autoreset is disabled.
 
     `reset(seed=s)` starts episode `first_episode` of seed s, `reset()` the next one.
     """
 
     metadata = {"render_modes": ["rgb_array"]}
 
-    def __init__(
-        self,
-        task: str,
-        *,
-        seed: int | None = None,
-        first_episode: int = 0,
-        normalise: bool = True,
-        flatten: bool = False,
-        keys: Sequence[str] | None = None,
-        scene: _core.Scene | str | Path | None = None,
-        render_mode: RenderMode = None,
-    ):
-        arguments = {k: v for k, v in locals().items() if k not in ("self", "__class__")}
-        before = set(self.__dict__)
-        self._arguments = arguments
-        self._vector = VectorTaskEnv(
-            task,
-            1,
-            threads=1,
-            seed=seed,
-            first_episode=first_episode,
-            normalise=normalise,
-            flatten=flatten,
-            autoreset="disabled",
-            keys=keys,
-            scene=scene,
-            render_mode=render_mode,
-        )
-        self.task = self._vector.task
-        self.action_space = self._vector.single_action_space
-        self.observation_space = self._vector.single_observation_space
+    def __init__(self, vector: Any) -> None:
+        self._vector = vector
+        self.action_space = vector.single_action_space
+        self.observation_space = vector.single_observation_space
         self._over = True
-        self.render_mode = render_mode
-        self.metadata = {k: v for k, v in self._vector.metadata.items() if k != "autoreset_mode"}
-        self._made = {*self.__dict__, "_made"} - before
-
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        TaskEnv.__init__(self, **state["arguments"])
-        self.__dict__.update(state["kept"])
+        self.render_mode = vector.render_mode
+        self.metadata = {k: v for k, v in vector.metadata.items() if k != "autoreset_mode"}
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -416,14 +389,69 @@ class TaskEnv(_Remade, gymnasium.Env):
         )
 
     @property
-    def observation_scale(self) -> dict[str, float | list[float]]:
-        """KEY → what its observations are divided by, in SI units."""
-        return self._vector.observation_scale
-
-    @property
     def model(self) -> _core.Model:
         """The compiled scene."""
         return self._vector.model
+
+    def render(self) -> np.ndarray | None:
+        """A picture (384, 512, 3) uint8, as in `VectorTaskEnv`; None without `render_mode`."""
+        pictures = self._vector.render()
+        return None if pictures is None else pictures[0]
+
+    def _one(self, obs: Observation) -> Observation:
+        return obs[0] if self._vector.flatten else {key: value[0] for key, value in obs.items()}
+
+    @staticmethod
+    def _info(info: dict[str, Any]) -> dict[str, Any]:
+        return {key: value[0].item() for key, value in info.items() if not key.startswith("_")}
+
+
+class TaskEnv(_Remade, SingleEnv):
+    """One environment of a task, for evaluation. The episodes are those of `VectorTaskEnv`.
+
+    `reset(seed=s)` starts episode `first_episode` of seed s, `reset()` the next one.
+    """
+
+    def __init__(
+        self,
+        task: str,
+        *,
+        seed: int | None = None,
+        first_episode: int = 0,
+        normalise: bool = True,
+        flatten: bool = False,
+        keys: Sequence[str] | None = None,
+        scene: _core.Scene | str | Path | None = None,
+        render_mode: RenderMode = None,
+    ):
+        arguments = {k: v for k, v in locals().items() if k not in ("self", "__class__")}
+        before = set(self.__dict__)
+        self._arguments = arguments
+        vector = VectorTaskEnv(
+            task,
+            1,
+            threads=1,
+            seed=seed,
+            first_episode=first_episode,
+            normalise=normalise,
+            flatten=flatten,
+            autoreset="disabled",
+            keys=keys,
+            scene=scene,
+            render_mode=render_mode,
+        )
+        SingleEnv.__init__(self, vector)
+        self.task = vector.task
+        self._made = {*self.__dict__, "_made"} - before
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        TaskEnv.__init__(self, **state["arguments"])
+        self.__dict__.update(state["kept"])
+
+    @property
+    def observation_scale(self) -> dict[str, float | list[float]]:
+        """KEY → what its observations are divided by, in SI units."""
+        return self._vector.observation_scale
 
     def scripted_action(self) -> np.ndarray:
         """(na): what the task's own script does here. It may look at the whole state."""
@@ -437,18 +465,6 @@ class TaskEnv(_Remade, gymnasium.Env):
     def randomized(self) -> dict[str, float]:
         """Name → what <randomize> drew for the episode, as in `VectorTaskEnv`."""
         return {name: float(values[0]) for name, values in self._vector.randomized().items()}
-
-    def render(self) -> np.ndarray | None:
-        """A picture (384, 512, 3) uint8, as in `VectorTaskEnv`; None without `render_mode`."""
-        pictures = self._vector.render()
-        return None if pictures is None else pictures[0]
-
-    def _one(self, obs: Observation) -> Observation:
-        return obs[0] if self._vector.flatten else {key: value[0] for key, value in obs.items()}
-
-    @staticmethod
-    def _info(info: dict[str, Any]) -> dict[str, Any]:
-        return {key: value[0].item() for key, value in info.items() if not key.startswith("_")}
 
 
 def make_vec(

@@ -20,6 +20,7 @@ from stable_baselines3.common.vec_env import VecEnv as BaseVecEnv
 
 from . import _core
 from .gym import Observation, VectorTaskEnv, _checked
+from .scene_env import VectorSceneEnv
 
 
 class VecEnv(BaseVecEnv):  # type: ignore[misc]
@@ -32,18 +33,22 @@ class VecEnv(BaseVecEnv):  # type: ignore[misc]
 
     Parameters
     ----------
-    task: a name of `tangere.task_names()`.
+    task: a name of `tangere.task_names()`, or a subclass of `tangere.VectorSceneEnv`.
     num_envs: E.
-    arguments: those of `tangere.VectorTaskEnv`, such as threads, seed, keys, flatten. With
-        `flatten=True` observations are one array, for "MlpPolicy".
+    arguments: those of `tangere.VectorTaskEnv` or of the subclass, such as threads, seed, flatten.
+        With `flatten=True` observations are one array, for "MlpPolicy".
     """
 
-    def __init__(self, task: str, num_envs: int, **arguments: Any):
+    def __init__(self, task: str | type[VectorSceneEnv], num_envs: int, **arguments: Any):
         if "autoreset" in arguments:
             raise _core.InputError(
                 f"autoreset {arguments['autoreset']!r}; Stable-Baselines3 has same_step alone"
             )
-        self.env = VectorTaskEnv(task, num_envs, autoreset="same_step", **arguments)
+        self.env = (
+            VectorTaskEnv(task, num_envs, autoreset="same_step", **arguments)
+            if isinstance(task, str)
+            else task(num_envs, autoreset="same_step", **arguments)
+        )
         self._seed: int | None = None
         self._actions: np.ndarray | None = None
         super().__init__(

@@ -106,3 +106,18 @@ def test_pictures_are_those_of_the_environments():
     np.testing.assert_array_equal(env.get_images(), env.env.render())
     assert env.render().shape == (768, 512, 3)  # one above the other
     assert sb3.VecEnv("box_pushing", 2).get_images() == [None, None]
+
+
+def test_a_task_of_ones_own_is_stepped():
+    class Bare(tangere.VectorSceneEnv):
+        scene = tangere.scenes()["rolling_ball_small"]
+        horizon = 3
+
+        def reward(self, actions):
+            return -self.batch.q[:, 2]
+
+    env = sb3.VecEnv(Bare, 2, threads=1, seed=1)
+    env.reset()
+    ends = [env.step(np.full((2, 3), -0.1)) for _ in range(3)]
+    assert [list(e[2]) for e in ends] == [[False] * 2, [False] * 2, [True] * 2]
+    assert ends[2][3][0]["TimeLimit.truncated"] and set(ends[2][3][1]) >= {"terminal_observation"}

@@ -1,0 +1,393 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Tasks of one's own: a scene with rewards and ends written in Python, many at once or one.
+
+    class Press(tangere.VectorSceneEnv):
+        scene, steps_per_action, horizon = "press.xml", 10, 50
+
+        def observe(self):
+            return {"touch": self.batch.tactile("pad.sum"), "v": self.batch.v}
+
+        def reward(self, actions):
+            return -np.abs(self.batch.tactile("pad.sum")[:, 2] - 1)
+
+    env = Press(num_envs=256)
+    tangere.register_scene_env("Press-v0", Press)      # for gymnasium.make and make_vec
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, Sequence
+
+import gymnasium
+import numpy as np
+from gymnasium import spaces
+from gymnasium.vector import VectorEnv
+from gymnasium.vector.utils import batch_space
+from numpy.typing import NDArray
+
+from . import _core
+from ._arrays import numbers
+from ._picture import View
+from .gym import _MODES, Autoreset, Observation, RenderMode, SingleEnv, _Remade
+from .gym import _check_choices, _checked, _system_seed
+
+Indices = NDArray[np.int64]
+
+
+class VectorSceneEnv(_Remade, VectorEnv):
+    """Many environments of a task of one's own. A subclass defines it by these members.
+
+    Class attributes: `scene` (a file or a `tangere.Scene`), `steps_per_action` (simulation steps
+    with the same controls), `horizon` (actions after which an episode is truncated), `actions`
+    (numbers of an action; None: those of the controls), `action_low` and `action_high` (one number,
+    or one per number of an action; actions are clipped to them).
+
+    Methods, for all environments at once: `reward` is obligatory; `observe`, `controls`,
+    `terminated`, `success` and `restart` have defaults. They read `self.batch` (`tangere.Batch`),
+    `self.lengths` (E), the actions since the start of each episode, and `self.episodes` (E).
+
+    Environment e plays episodes first_episode + e, first_episode + e + E, … of a seed. Scene draws
+    (`<randomize>`) and `uniform` are the same for an episode, whatever the number of environments
+    and threads. `info` has `success`, `starting`, `episode_id` and `status`, (E) each; a negative
+    `status` says that the simulation failed: the environment stands still, its episode is
+    truncated, and `reward` is what the method returns for the last state. Observations are float32
+    in the units that `observe` returns, rewards float64.
+
+    Parameters
+    ----------
+    num_envs: E.
+    threads: None for all cores.
+    seed, first_episode: which episodes the first reset starts, unless it is given a seed. None: a
+        seed from the system.
+    flatten: one array (E, n) instead of a dict, in the order of `observe`.
+    autoreset: "next_step", "same_step" or "disabled", as in `VectorTaskEnv`. When disabled, a step
+        after the end of an episode raises InputError.
+    scene: another scene than that of the class.
+    render_mode: "rgb_array" for pictures by `render`.
+    """
+
+    scene: _core.Scene | str | Path
+    steps_per_action: int = 1
+    horizon: int = 100
+    actions: int | None = None
+    action_low: float | Sequence[float] = -1.0
+    action_high: float | Sequence[float] = 1.0
+    batch: _core.Batch  #: the environments' states
+    lengths: NDArray[np.int64]  #: (E) actions since the start of each episode
+    episodes: NDArray[np.int64]  #: (E) numbers of the episodes
+    _ended: NDArray[np.bool_]
+    _starting: NDArray[np.bool_]
+
+    def __init__(
+        self,
+        num_envs: int = 1,
+        *,
+        threads: int | None = None,
+        seed: int | None = None,
+        first_episode: int = 0,
+        flatten: bool = False,
+        autoreset: Autoreset = "next_step",
+        scene: _core.Scene | str | Path | None = None,
+        render_mode: RenderMode = None,
+    ) -> None:
+        arguments = {k: v for k, v in locals().items() if k not in ("self", "__class__")}
+        before = set(self.__dict__)
+        self._arguments = arguments
+        _check_choices(num_envs, autoreset, render_mode)
+        self.num_envs, self.flatten, self.render_mode = num_envs, flatten, render_mode
+        self._mode, self._threads, self._fresh = autoreset, threads, True
+        self._seed = _system_seed() if seed is None else _checked(seed)
+        self._first_episode = first_episode
+        self.model = _core.Model(self._scene(scene))
+        for name in ("steps_per_action", "horizon"):
+            if not isinstance(getattr(self, name), (int, np.integer)) or getattr(self, name) < 1:
+                raise self._fault(f"{name} {getattr(self, name)!r}", "a whole number from 1 on")
+        self.metadata = {
+            "autoreset_mode": _MODES[autoreset],
+            "render_modes": ["rgb_array"],
+            "render_fps": 1 / (self.model.timestep * self.steps_per_action),
+        }
+        shape = (self.model.nu if self.actions is None else self.actions,)
+        try:
+            low, high = (np.broadcast_to(b, shape) for b in (self.action_low, self.action_high))
+        except ValueError:
+            lengths = f"{np.size(self.action_low)} and {np.size(self.action_high)}"
+            raise self._fault(f"{lengths} bounds of actions", f"1 or {shape[0]}") from None
+        self._low, self._high = low.astype(np.float64), high.astype(np.float64)
+        self.single_action_space = spaces.Box(
+            low.astype(np.float32), high.astype(np.float32), dtype=np.float32
+        )
+        self.action_space = batch_space(self.single_action_space, num_envs)
+        self._start_all()
+        seen = self._arrays()
+        boxes: dict[str, spaces.Space[Any]] = {
+            key: spaces.Box(-np.inf, np.inf, array.shape[1:], np.float32)
+            for key, array in seen.items()
+        }
+        self._shapes = {key: array.shape for key, array in seen.items()}
+        width = sum(array[0].size for array in seen.values())
+        self.single_observation_space = (
+            spaces.Box(-np.inf, np.inf, (width,), np.float32) if flatten else spaces.Dict(boxes)
+        )
+        self.observation_space = batch_space(self.single_observation_space, num_envs)
+        self._made = {*self.__dict__, "_made"} - before
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        type(self).__init__(self, **state["arguments"])
+        self.__dict__.update(state["kept"])
+
+    # What a subclass defines
+
+    def observe(self) -> dict[str, Any]:
+        """KEY → (E, …). By default q, v and the sum of every sensor, in SI units."""
+        sums = {s.name: self.batch.tactile(f"{s.name}.sum") for s in self.model.sensors}
+        return {"q": self.batch.q, "v": self.batch.v} | sums
+
+    def controls(self, actions: NDArray[np.float64]) -> Any:
+        """(E, nu) of actions (E, na). By default the actions themselves."""
+        return actions
+
+    def reward(self, actions: NDArray[np.float64]) -> Any:
+        """(E) after the actions (E, na)."""
+        raise NotImplementedError(f"{type(self).__name__} has no reward(actions)")
+
+    def terminated(self) -> Any:
+        """(E) bool: the task ends the episode. By default it never does."""
+        return np.zeros(self.num_envs, bool)
+
+    def success(self) -> Any:
+        """(E) bool: the task is solved in this state. By default where it is terminated."""
+        return self._row("terminated", self.terminated(), bool)
+
+    def restart(self, envs: Indices) -> None:
+        """Begins episodes of the environments `envs`, whose states the scene has drawn: for goals
+        (`uniform`) or other states (`batch.set_state`). By default nothing more."""
+
+    # What it may use
+
+    def uniform(self, envs: Indices, low: Any, high: Any) -> NDArray[np.float64]:
+        """(len(envs), …): draws between `low` and `high`, numbers or arrays of one shape. An
+        episode's first draw, second draw, … are the same in any environment."""
+        low, high = np.broadcast_arrays(np.asarray(low, float), np.asarray(high, float))
+        draws = np.empty((len(envs), *low.shape))
+        for row, e in enumerate(envs):
+            random = self._random.get(int(e))
+            if random is None:
+                random = np.random.default_rng((self._seed, int(self.episodes[e])))
+                self._random[int(e)] = random
+            draws[row] = random.uniform(low, high)
+        return draws
+
+    # Gymnasium's interface
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Observation, dict[str, Any]]:
+        """Starts episodes: the first ones of `seed`, or without it the next ones.
+
+        `options`: "reset_mask" (E) bool starts those alone; "first_episode" goes with a seed.
+        """
+        options = dict(options or {})
+        mask = options.pop("reset_mask", None)
+        first = options.pop("first_episode", None)
+        if options:
+            raise _core.InputError(f"options {list(options)}; known: reset_mask, first_episode")
+        if mask is not None:
+            if seed is not None or first is not None:
+                raise _core.InputError("reset_mask goes with neither seed nor first_episode")
+            mask = np.asarray(mask, bool)
+            if mask.shape != (self.num_envs,):
+                raise self._fault(f"reset_mask of shape {mask.shape}", f"({self.num_envs},)")
+            self._start_next(mask)
+        elif seed is not None or first is not None:
+            self._seed = self._seed if seed is None else _checked(seed)
+            self._first_episode = self._first_episode if first is None else int(first)
+            self._start_all()
+        elif not self._fresh:
+            self._start_next(np.ones(self.num_envs, bool))
+        self._fresh = False
+        return self._observe(), self._info()
+
+    def step(
+        self, actions: Any
+    ) -> tuple[Observation, NDArray[Any], NDArray[Any], NDArray[Any], dict[str, Any]]:
+        """Takes one action of every environment, (E, na) or (na) for all, clipped to its bounds.
+
+        Returns observations, rewards (E) float64, terminated, truncated (E) bool, info. Everything
+        is new at every step. Raises InputError for actions, controls, rewards or ends of another
+        shape, and for rewards that are not finite.
+        """
+        actions = numbers(actions)
+        one, many = self._low.shape, (self.num_envs, *self._low.shape)
+        if actions.shape not in (one, many):
+            raise _core.InputError(f"actions of shape {actions.shape}; expected {many} or {one}")
+        ended = self._ended.copy()
+        if self._mode == "disabled" and ended.any():
+            first = np.flatnonzero(ended)[:5].tolist()
+            raise self._fault(
+                f"step() after the end of episodes in environments {first}",
+                "reset(options={'reset_mask': mask}) before it",
+            )
+        self._fresh = False
+        actions = np.clip(np.broadcast_to(actions, many), self._low, self._high)
+        controls = np.asarray(self.controls(actions), np.float64)
+        if controls.shape not in ((self.num_envs, self.model.nu), (self.model.nu,)):
+            expected = f"({self.num_envs}, {self.model.nu})"
+            raise self._fault(f"controls() of shape {controls.shape}", expected)
+        steps = self.steps_per_action
+        u = np.broadcast_to(controls, (steps, self.num_envs, self.model.nu))
+        self.batch.run(u, every=steps)
+        self.lengths += 1
+        self._starting[:] = False
+        if ended.any():  # autoreset "next_step": these actions were not theirs
+            self._start_next(ended)
+        reward = np.where(ended, 0.0, self._row("reward", self.reward(actions), np.float64))
+        if not np.isfinite(reward).all():
+            e = int(np.flatnonzero(~np.isfinite(reward))[0])
+            raise self._fault(f"reward() {reward[e]} in environment {e}", "a finite number")
+        terminated = self._row("terminated", self.terminated(), bool) & ~ended
+        failed = self.batch.status < 0
+        truncated = ((self.lengths >= self.horizon) | failed) & ~terminated & ~ended
+        self._ended = terminated | truncated
+        info = self._info()
+        if self._mode == "same_step" and self._ended.any():
+            info = self._start_at_once(info)
+        return self._observe(), reward, terminated, truncated, info
+
+    def render(self) -> tuple[NDArray[np.uint8], ...] | None:
+        """A picture (384, 512, 3) uint8 of every environment, as in `VectorTaskEnv`."""
+        if self.render_mode is None:
+            return None
+        poses = self.batch.bodies()[0]
+        for e in range(self.num_envs):
+            if e not in self._views or self._views[e].episode != self.episodes[e]:
+                self._views[e] = View(self.batch, e, poses[e], int(self.episodes[e]))
+        return tuple(self._views[e].draw(poses[e]) for e in range(self.num_envs))
+
+    def randomized(self) -> dict[str, NDArray[np.float64]]:
+        """Name → (E): what `<randomize>` drew for the episodes, as `Batch.randomized`."""
+        return self.batch.randomized()
+
+    def _scene(self, other: _core.Scene | str | Path | None) -> _core.Scene:
+        scene = getattr(self, "scene", None) if other is None else other
+        if scene is None:
+            raise self._fault("no scene", "a class attribute `scene`, or the argument")
+        return scene if isinstance(scene, _core.Scene) else _core.Scene(scene)
+
+    def _fault(self, what: str, expected: str) -> _core.InputError:
+        return _core.InputError(f"{type(self).__name__}: {what}; expected {expected}")
+
+    def _start_all(self) -> None:
+        self.batch = _core.Batch(
+            self.model, self.num_envs, self._seed, self._first_episode, self._threads
+        )
+        self.episodes = self._first_episode + np.arange(self.num_envs)
+        self.lengths = np.zeros(self.num_envs, np.int64)
+        self._ended = np.zeros(self.num_envs, bool)
+        self._starting = np.zeros(self.num_envs, bool)
+        self._random: dict[int, np.random.Generator] = {}
+        self._views: dict[int, View] = {}
+        self._begin(np.ones(self.num_envs, bool))
+
+    def _start_next(self, which: NDArray[np.bool_]) -> None:
+        envs = np.flatnonzero(which)
+        if len(envs):
+            self.episodes[envs] += self.num_envs
+            self.batch.reset(envs, self.episodes[envs].tolist())
+            self._begin(which)
+
+    def _begin(self, which: NDArray[np.bool_]) -> None:
+        envs = np.flatnonzero(which)
+        self._ended[envs], self._starting[envs], self.lengths[envs] = False, True, 0
+        for e in envs:
+            self._random.pop(int(e), None)
+        self.restart(envs)
+
+    def _start_at_once(self, final: dict[str, Any]) -> dict[str, Any]:
+        """Starts the next episodes where one has ended; info of the starts and of the ends."""
+        last, ended = self._observe(), self._ended.copy()
+        self._start_next(ended)
+        info = self._info()
+        info["final_info"], info["_final_info"] = final, ended
+        info["final_obs"], info["_final_obs"] = np.empty(self.num_envs, object), ended.copy()
+        for e in np.flatnonzero(ended):
+            info["final_obs"][e] = last[e] if self.flatten else {k: v[e] for k, v in last.items()}
+        return info
+
+    def _row(self, name: str, value: Any, kind: Any) -> NDArray[Any]:
+        row = np.array(numbers(value), kind)
+        if row.shape != (self.num_envs,):
+            raise self._fault(f"{name}() of shape {row.shape}", f"({self.num_envs},)")
+        return row
+
+    def _arrays(self) -> dict[str, NDArray[np.float32]]:
+        arrays = {k: np.array(numbers(a), np.float32) for k, a in self.observe().items()}
+        for key, array in arrays.items():
+            if array.ndim < 1 or len(array) != self.num_envs:
+                raise self._fault(f"observe()[{key!r}] of shape {array.shape}",
+                                  f"({self.num_envs}, …)")  # fmt: skip
+        return arrays
+
+    def _observe(self) -> Observation:
+        arrays = self._arrays()
+        shapes = {key: array.shape for key, array in arrays.items()}
+        if shapes != self._shapes:
+            raise self._fault(f"observe() of shapes {shapes}", f"{self._shapes}")
+        if not self.flatten:
+            return arrays
+        return np.concatenate([a.reshape(self.num_envs, -1) for a in arrays.values()], axis=1)
+
+    def _info(self) -> dict[str, Any]:
+        every = np.ones(self.num_envs, bool)
+        info = {
+            "success": self._row("success", self.success(), bool),
+            "starting": self._starting.copy(),
+            "episode_id": self.episodes.copy(),
+            "status": self.batch.status,
+        }
+        return info | {f"_{key}": every.copy() for key in info}
+
+
+class SceneEnv(SingleEnv):
+    """One environment of a task of one's own, with the episodes of its vector.
+
+    Parameters
+    ----------
+    task: the subclass of `VectorSceneEnv`.
+    arguments: those of `VectorSceneEnv`, without num_envs and autoreset.
+    """
+
+    def __init__(self, task: type[VectorSceneEnv], **arguments: Any) -> None:
+        given: dict[str, Any] = {"threads": 1, "autoreset": "disabled"} | arguments
+        super().__init__(task(1, **given))
+
+    def randomized(self) -> dict[str, float]:
+        """Name → what `<randomize>` drew for the episode, as `Batch.randomized`."""
+        return {name: float(values[0]) for name, values in self._vector.randomized().items()}
+
+
+def register_scene_env(name: str, task: type[VectorSceneEnv], **arguments: Any) -> None:
+    """Registers a task with Gymnasium under an id, such as "Press-v0".
+
+    `gymnasium.make(name)` is one environment, `gymnasium.make_vec(name, E)` many at once.
+    `arguments` of the environments become defaults.
+    """
+    gymnasium.register(
+        name,
+        entry_point="tangere.scene_env:SceneEnv",
+        vector_entry_point="tangere.scene_env:_make_vec",
+        max_episode_steps=task.horizon,
+        kwargs={"task": task, **arguments},
+    )
+
+
+def _make_vec(
+    task: type[VectorSceneEnv], num_envs: int = 1, max_episode_steps: Any = None, **arguments: Any
+) -> VectorSceneEnv:
+    if max_episode_steps not in (None, task.horizon):
+        raise _core.InputError(
+            f"max_episode_steps {max_episode_steps!r}; the horizon of {task.__name__} is "
+            f"{task.horizon}"
+        )
+    return task(num_envs, **arguments)

@@ -1,0 +1,216 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Tasks of one's own: a twin of a task of the catalogue, Gymnasium's contract, episodes, faults."""
+
+from __future__ import annotations
+
+import pickle
+import warnings
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+
+import tangere
+
+
+class Rolling(tangere.VectorSceneEnv):
+    """The task ball_rolling_small of the catalogue, but for its goals."""
+
+    scene = tangere.scenes()["rolling_ball_small"]
+    steps_per_action, horizon = 5, 8
+
+    def restart(self, envs):
+        if not hasattr(self, "goal"):
+            self.goal = np.zeros((self.num_envs, 2))
+        self.goal[envs] = self.batch.q[envs][:, 3:5] + self.uniform(envs, [-0.01] * 2, 0.01)
+
+    def observe(self):
+        return {"pad": self.batch.q[:, :3], "goal": self.goal - self.batch.q[:, 3:5],
+                "tactile": self.batch.tactile("pad")}  # fmt: skip
+
+    def reward(self, actions):
+        distance = self.goal - self.batch.q[:, 3:5]
+        return -(distance**2).sum(1) / 1e-4 - 0.01 * (actions**2).sum(1)
+
+
+class Leaves(Rolling):
+    """Ends early where the ball is near its goal in x."""
+
+    def terminated(self):
+        return (abs(self.goal[:, 0] - self.batch.q[:, 3]) < 4e-3) & (self.lengths >= 3)
+
+
+def actions(count, envs):
+    return np.random.default_rng(1).uniform([-1, -1, -1], [1, 1, 0], (count, envs, 3))
+
+
+def test_the_twin_of_a_task_has_its_numbers():
+    twin = Rolling(4, threads=1, seed=3)
+    task = tangere.make_vec("ball_rolling_small", 4, threads=1, seed=3, normalise=False)
+    twin.reset()
+    seen = task.reset()[0]
+    twin.goal[:] = task.state()[2]
+    felt = 0
+    for action in actions(7, 4):
+        action[:, 2] = -0.3
+        ours, theirs = twin.step(action), task.step(action)
+        np.testing.assert_allclose(ours[1], theirs[1], rtol=1e-12)
+        for key in seen:
+            np.testing.assert_allclose(ours[0][key], theirs[0][key], rtol=1e-6, atol=1e-12)
+        felt = max(felt, np.abs(ours[0]["tactile"]).max())
+    assert felt > 0
+
+
+def test_gymnasiums_checker_passes():
+    tangere.register_scene_env("TestRolling-v0", Rolling, seed=5)
+    env = gymnasium.make("TestRolling-v0")
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message=".*Box observation space m.*imum value is")
+        check_env(env.unwrapped, skip_render_check=True)
+    assert env.spec.max_episode_steps == 8
+    many = gymnasium.make_vec("TestRolling-v0", 3)
+    assert isinstance(many, Rolling) and many.num_envs == 3
+    with pytest.raises(tangere.InputError, match="max_episode_steps 9; the horizon of Rolling is"):
+        gymnasium.make_vec("TestRolling-v0", 3, max_episode_steps=9)
+
+
+def episodes(envs, mode, count):
+    """Episode → its starting goal, observations after every action, rewards and last end."""
+    env = Leaves(envs, threads=1, seed=2, autoreset=mode)
+    obs, info = env.reset()
+    found = {int(e): [obs["goal"][k]] for k, e in enumerate(info["episode_id"])}
+    done = set()
+    while not set(range(count)) <= done:
+        # The action of a state, so that it does not depend on the environment.
+        now = env.goal - env.batch.q[:, 3:5]
+        step = env.step(np.concatenate([2 * now, np.full((envs, 1), -0.2)], 1))
+        obs, reward, terminated, truncated, info = step
+        mask = np.zeros(envs, bool)
+        for k, e in enumerate(info["episode_id"]):
+            ended = bool(terminated[k] or truncated[k])
+            if mode == "same_step" and ended:
+                last = int(info["final_info"]["episode_id"][k])
+                found[last] += [info["final_obs"][k]["goal"], reward[k], bool(terminated[k])]
+                done.add(last)
+                found[int(e)] = [obs["goal"][k]]
+            elif int(e) not in found:  # "next_step": the start is shown in place of a step
+                assert info["starting"][k] and reward[k] == 0 and not ended
+                found[int(e)] = [obs["goal"][k]]
+            else:
+                found[int(e)] += [obs["goal"][k], reward[k]]
+                if ended:
+                    found[int(e)].append(bool(terminated[k]))
+                    done.add(int(e))
+                    mask[k] = True
+        if mode == "disabled" and mask.any():
+            with pytest.raises(tangere.InputError, match=r"Leaves: step\(\) after the end of"):
+                env.step([0, 0, 0])
+            obs, info = env.reset(options={"reset_mask": mask})
+            for k in np.flatnonzero(mask):
+                found[int(info["episode_id"][k])] = [obs["goal"][k]]
+    return [found[e] for e in range(count)]
+
+
+def test_episodes_depend_on_neither_environments_nor_mode():
+    reference = episodes(5, "next_step", 10)
+    ends = [episode[-1] for episode in reference]
+    assert True in ends and False in ends  # some leave, some run out of time
+    assert {len(e) for e in reference if e[-1]} == {8} and len(reference[ends.index(False)]) == 18
+    cases = ((2, "next_step"), (3, "same_step"), (4, "disabled"), (1, "same_step"))
+    for envs, mode in cases:
+        for ours, theirs in zip(episodes(envs, mode, 10), reference, strict=True):
+            for a, b in zip(ours, theirs, strict=True):
+                np.testing.assert_array_equal(a, b)
+
+
+def test_a_reset_starts_the_first_or_the_next_episodes():
+    env = Rolling(3, threads=1, seed=4)
+    first = env.reset()[0]["goal"]
+    again, info = env.reset()
+    assert list(info["episode_id"]) == [3, 4, 5] and not np.array_equal(first, again["goal"])
+    np.testing.assert_array_equal(env.reset(seed=4)[0]["goal"], first)
+    later = env.reset(seed=4, options={"first_episode": 3})[0]
+    np.testing.assert_array_equal(later["goal"], again["goal"])
+    assert len(np.unique(first)) == 6  # x and y, and environments, have draws of their own
+
+
+def test_a_copy_is_made_anew():
+    env = Rolling(2, threads=1, seed=7)
+    copied = pickle.loads(pickle.dumps(env))
+    np.testing.assert_array_equal(copied.reset()[0]["tactile"], env.reset()[0]["tactile"])
+    step, other = (e.step([0.1, 0, -0.3]) for e in (env, copied))
+    np.testing.assert_array_equal(step[1], other[1])
+
+
+def test_pictures_and_flat_observations():
+    env = Rolling(2, threads=1, seed=1, flatten=True, render_mode="rgb_array")
+    obs, _ = env.reset()
+    assert obs.shape == env.observation_space.shape == (2, 5 + 32 * 32 * 3)
+    pictures = env.render()
+    assert len(pictures) == 2 and pictures[0].shape == (384, 512, 3) and pictures[0].std() > 0
+    single = tangere.SceneEnv(Rolling, seed=1, flatten=True, render_mode="rgb_array")
+    np.testing.assert_array_equal(single.reset()[0], obs[0])
+    np.testing.assert_array_equal(single.render(), pictures[0])
+
+
+def test_defaults_are_the_state_and_the_sums_of_sensors():
+    class Bare(tangere.VectorSceneEnv):
+        scene = tangere.scenes()["rolling_ball_small"]
+
+        def reward(self, actions):
+            return np.zeros(self.num_envs)
+
+    env = Bare(2, threads=1)
+    assert list(env.reset()[0]) == ["q", "v", "pad"] and env.single_action_space.shape == (3,)
+    assert not env.step([0, 0, 0])[2].any()
+
+
+class FailsAt(Rolling):
+    def controls(self, actions):
+        return np.where(self.lengths[:, None] >= 2, np.nan, actions)
+
+
+def test_a_failed_simulation_is_truncated_and_goes_on_with_the_next_episode():
+    env = FailsAt(2, threads=1, seed=1)
+    env.reset()
+    ends = [env.step([0, 0, -0.1]) for _ in range(4)]
+    assert [bool(e[3].all()) for e in ends] == [False, False, True, False]
+    assert (ends[2][4]["status"] < 0).all() and np.isfinite(ends[2][1]).all()
+    assert (ends[3][4]["status"] >= 0).all() and list(ends[3][4]["episode_id"]) == [2, 3]
+
+
+def with_(**members):
+    return type("Mine", (Rolling,), members)
+
+
+@pytest.mark.parametrize(
+    ("members", "message"),
+    [
+        ({"scene": None}, "Mine: no scene; expected a class attribute `scene`"),
+        ({"horizon": 0}, "Mine: horizon 0; expected a whole number from 1 on"),
+        ({"action_low": (-1, -2)}, "Mine: 2 and 1 bounds of actions; expected 1 or 3"),
+        ({"observe": lambda s: {"q": s.batch.q[0]}}, r"\['q'\] of shape \(5|8|10,\); expected"),
+        ({"reward": lambda s, a: 0.0}, r"Mine: reward\(\) of shape \(\); expected \(2,\)"),
+        ({"reward": lambda s, a: np.full(2, np.nan)}, r"reward\(\) nan in environment 0; expec"),
+        ({"terminated": lambda s: [True]}, r"Mine: terminated\(\) of shape \(1,\); expected"),
+        ({"controls": lambda s, a: a[:, :2]}, r"controls\(\) of shape \(2, 2\); expected \(2, 3\)"),
+    ],
+)
+def test_faults_name_the_class_the_value_and_what_was_expected(members, message):
+    with pytest.raises(tangere.InputError, match=message):
+        env = with_(**members)(2, threads=1)
+        env.reset()
+        env.step(np.zeros(3))
+
+
+def test_other_faults():
+    env = Rolling(2, threads=1)
+    with pytest.raises(tangere.InputError, match=r"actions of shape \(4,\); expected \(2, 3\) or"):
+        env.step(np.zeros(4))
+    with pytest.raises(tangere.InputError, match=r"reset_mask of shape \(3,\); expected \(2,\)"):
+        env.reset(options={"reset_mask": [True] * 3})
+    with pytest.raises(tangere.InputError, match="options .'x'.; known: reset_mask"):
+        env.reset(options={"x": 1})
+    with pytest.raises(tangere.InputError, match="num_envs 0"):
+        Rolling(0)
