@@ -128,7 +128,8 @@ const Attribute& number_kind(NumberOwner owner, NumberField field) {
   if (field == Field::turning_stiffness) field = Field::stiffness;
   const Attribute* of_field = nullptr;
   for (const Attribute& row : schema()) {
-    if (row.field != field) continue;
+    // Numbers of a <surface_contact> are those of a contact, whose rows come first.
+    if (row.field != field || row.elements == kSurfaceContact) continue;
     if ((row.elements & element_of(owner)) != 0) return row;
     of_field = &row;
   }
