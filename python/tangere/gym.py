@@ -101,6 +101,33 @@ def _check_choices(num_envs: Any, autoreset: Any, render_mode: Any) -> None:
         raise _core.InputError(f"render_mode {render_mode!r}; expected None or 'rgb_array'")
 
 
+def _reset_options(
+    seed: Any, options: dict[str, Any] | None
+) -> tuple[np.ndarray | None, int | None]:
+    """The mask (E) of environments to start and the first episode, from the options of a reset."""
+    options = dict(options or {})
+    mask = options.pop("reset_mask", None)
+    first = options.pop("first_episode", None)
+    if options:
+        raise _core.InputError(f"options {list(options)}; known: reset_mask, first_episode")
+    if mask is not None and (seed is not None or first is not None):
+        raise _core.InputError("reset_mask goes with neither seed nor first_episode")
+    return None if mask is None else np.asarray(mask, bool), None if first is None else int(first)
+
+
+def _finals(last: Observation, final: dict[str, Any], ended: np.ndarray) -> dict[str, Any]:
+    """What info has of the ends of episodes, besides that of the starts which follow at once."""
+    obs = np.empty(len(ended), object)
+    for e in np.flatnonzero(ended):
+        obs[e] = {k: v[e] for k, v in last.items()} if isinstance(last, dict) else last[e]
+    return {
+        "final_info": final,
+        "_final_info": ended,
+        "final_obs": obs,
+        "_final_obs": ended.copy(),
+    }
+
+
 def _scene_as_read(path: str, text: str) -> _core.Scene:
     """The scene of a pickle: read from its file again."""
     if not Path(path).is_file():
@@ -241,18 +268,12 @@ class VectorTaskEnv(_Remade, VectorEnv):
 
         `options`: "reset_mask" (E) bool starts those alone; "first_episode" goes with a seed.
         """
-        options = dict(options or {})
-        mask = options.pop("reset_mask", None)
-        first = options.pop("first_episode", None)
-        if options:
-            raise _core.InputError(f"options {list(options)}; known: reset_mask, first_episode")
+        mask, first = _reset_options(seed, options)
         if mask is not None:
-            if seed is not None or first is not None:
-                raise _core.InputError("reset_mask goes with neither seed nor first_episode")
-            self._env.restart(np.asarray(mask, bool))
+            self._env.restart(mask)
         elif seed is not None or first is not None or self._fresh:
             self._seed = self._seed if seed is None else _checked(seed)
-            self._first_episode = self._first_episode if first is None else int(first)
+            self._first_episode = self._first_episode if first is None else first
             self._env.reset(self._seed, self._first_episode)
             self._views.clear()
         else:
@@ -284,13 +305,7 @@ class VectorTaskEnv(_Remade, VectorEnv):
         if self._mode == "same_step" and ended.any():
             last, final = self._observe(), info
             self._env.restart(ended)
-            info = self._info()
-            info["final_info"], info["_final_info"] = final, ended
-            info["final_obs"], info["_final_obs"] = np.empty(self.num_envs, object), ended.copy()
-            for e in np.flatnonzero(ended):
-                info["final_obs"][e] = (
-                    last[e] if self.flatten else {k: v[e] for k, v in last.items()}
-                )
+            info = self._info() | _finals(last, final, ended)
         return self._observe(), reward, terminated, truncated, info
 
     def scripted_action(self) -> np.ndarray:

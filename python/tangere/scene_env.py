@@ -30,7 +30,7 @@ from . import _core
 from ._arrays import numbers
 from ._picture import View
 from .gym import _MODES, Autoreset, Observation, RenderMode, SingleEnv, _Remade
-from .gym import _check_choices, _checked, _system_seed
+from .gym import _check_choices, _checked, _finals, _reset_options, _system_seed
 
 Indices = NDArray[np.int64]
 
@@ -188,21 +188,14 @@ class VectorSceneEnv(_Remade, VectorEnv):
 
         `options`: "reset_mask" (E) bool starts those alone; "first_episode" goes with a seed.
         """
-        options = dict(options or {})
-        mask = options.pop("reset_mask", None)
-        first = options.pop("first_episode", None)
-        if options:
-            raise _core.InputError(f"options {list(options)}; known: reset_mask, first_episode")
+        mask, first = _reset_options(seed, options)
         if mask is not None:
-            if seed is not None or first is not None:
-                raise _core.InputError("reset_mask goes with neither seed nor first_episode")
-            mask = np.asarray(mask, bool)
             if mask.shape != (self.num_envs,):
                 raise self._fault(f"reset_mask of shape {mask.shape}", f"({self.num_envs},)")
             self._start_next(mask)
         elif seed is not None or first is not None:
             self._seed = self._seed if seed is None else _checked(seed)
-            self._first_episode = self._first_episode if first is None else int(first)
+            self._first_episode = self._first_episode if first is None else first
             self._start_all()
         elif not self._fresh:
             self._start_next(np.ones(self.num_envs, bool))
@@ -252,7 +245,9 @@ class VectorSceneEnv(_Remade, VectorEnv):
         self._ended = terminated | truncated
         info = self._info()
         if self._mode == "same_step" and self._ended.any():
-            info = self._start_at_once(info)
+            last, ends = self._observe(), self._ended.copy()
+            self._start_next(ends)
+            info = self._info() | _finals(last, info, ends)
         return self._observe(), reward, terminated, truncated, info
 
     def render(self) -> tuple[NDArray[np.uint8], ...] | None:
@@ -303,17 +298,6 @@ class VectorSceneEnv(_Remade, VectorEnv):
         for e in envs:
             self._random.pop(int(e), None)
         self.restart(envs)
-
-    def _start_at_once(self, final: dict[str, Any]) -> dict[str, Any]:
-        """Starts the next episodes where one has ended; info of the starts and of the ends."""
-        last, ended = self._observe(), self._ended.copy()
-        self._start_next(ended)
-        info = self._info()
-        info["final_info"], info["_final_info"] = final, ended
-        info["final_obs"], info["_final_obs"] = np.empty(self.num_envs, object), ended.copy()
-        for e in np.flatnonzero(ended):
-            info["final_obs"][e] = last[e] if self.flatten else {k: v[e] for k, v in last.items()}
-        return info
 
     def _row(self, name: str, value: Any, kind: Any) -> NDArray[Any]:
         row = np.array(numbers(value), kind)
