@@ -40,8 +40,9 @@ GrownShape<N> grown_shape(const PairContact& pair, const Vec3<N>& size) {
 /// Calls f with the distance of a pair's touched shape.
 template <class N, class F>
 auto with_touched(const PairContact& pair, const Vec3<N>& size, const Vec3<N>& faces, const F& f) {
-  if (pair.faced) return f(CuboidFace<N>::of(size, faces, pair.overhang));
-  if (pair.covered) return f(CuboidFace<N>::continued(size, pair.beyond));
+  if (pair.faced || pair.covered)  // one call of f, because its code is inlined
+    return f(pair.faced ? CuboidFace<N>::of(size, faces, pair.overhang)
+                        : CuboidFace<N>::continued(size, pair.beyond));
   if (pair.ball_radius > 0) return f(grown_shape(pair, size));
   return with_distance<N>(pair.shape, size, f, pair.grid);
 }
