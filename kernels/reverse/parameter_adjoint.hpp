@@ -80,9 +80,10 @@ void add_point(const Shape& shape, const Frame<N>& at, const Vec6<N>& W,
 }
 
 template <class Shape, class N>
-void pair_adjoint(const Shape& shape, const Frame<N>& at, const Vec6<N>& W,
-                  const LawParameters<N>& law, const Solid& body, const CandidateList<N>& list,
-                  int lone, const Vec6<N>& slip, ContactCotangent<N>& sum) {
+[[gnu::noinline]] void pair_adjoint(const Shape& shape, const Frame<N>& at, const Vec6<N>& W,
+                                    const LawParameters<N>& law, const Solid& body,
+                                    const CandidateList<N>& list, int lone, const Vec6<N>& slip,
+                                    ContactCotangent<N>& sum) {
   LawParameters<N> own = law;
   for_each_place(list, lone, [&](int k, const Vec3<N>& xi) {
     set_point_law(law, list, lone, k, own);
