@@ -1,6 +1,7 @@
-// SPDX-License-Identifier: Apache-2.0 A face is covered where its corners lie in the other cuboid,
-// and so does a place outside of it. Its plane is then that of the other cuboid's far side, so a
-// place inside of both is as deep as in the solid that they make.
+// SPDX-License-Identifier: Apache-2.0
+// A face is covered where its corners lie in the other cuboid, and so does a place outside of it.
+// Its plane is then that of the other cuboid's far side, so a place inside of both is as deep as in
+// the solid that they make.
 #include "engine/model/inner_faces.hpp"
 
 #include <algorithm>

@@ -208,7 +208,7 @@ void add_scene_tapes(nb::module_& m) {
           "InputError: a number is out of range, or a name is unknown.")
       .def("reset", &SceneTape::reset, "seed"_a = 0, "q"_a = nb::none(), "v"_a = nb::none(),
            "numbers"_a = nb::none(),
-           "Starts anew and forgets what is on tape. `q` (E, nq), `v` (E, nv) and `numbers`\n"
+           "Starts anew and clears the tape. `q` (E, nq), `v` (E, nv) and `numbers`\n"
            "(E, names) take the place of what the scene draws; one row stands for all.")
       .def("step", &SceneTape::step, "controls"_a, "Takes the controls (E, nu) of `every` steps.")
       .def("observations", &SceneTape::observations,

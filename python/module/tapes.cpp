@@ -137,7 +137,7 @@ void add_tapes(nb::module_& m) {
           "'double'. `tape_bytes`: limit for the tapes [bytes]; longer episodes are\n"
           "played again from checkpoints on the way back. InputError: a number is out of range.")
       .def("reset", &Tape::reset, "seed"_a, "first_episode"_a = 0,
-           "Starts episodes and forgets what is on tape.")
+           "Starts episodes and clears the tape.")
       .def("step", &Tape::step, "actions"_a,
            "Takes one action (E, action) of every environment whose episode goes on. InputError:\n"
            "another shape, an action that is not finite, or one too many.")

@@ -114,6 +114,9 @@ class VectorSceneEnv(_Remade, VectorEnv):
         except ValueError:
             lengths = f"{np.size(self.action_low)} and {np.size(self.action_high)}"
             raise self._fault(f"{lengths} bounds of actions", f"1 or {shape[0]}") from None
+        if not (low < high).all():
+            bounds = f"action_low {self.action_low!r} and action_high {self.action_high!r}"
+            raise self._fault(bounds, "the first below the second")
         self._low, self._high = low.astype(np.float64), high.astype(np.float64)
         self.single_action_space = spaces.Box(
             low.astype(np.float32), high.astype(np.float32), dtype=np.float32
@@ -209,7 +212,7 @@ class VectorSceneEnv(_Remade, VectorEnv):
 
         Returns observations, rewards (E) float64, terminated, truncated (E) bool, info. Everything
         is new at every step. Raises InputError for actions, controls, rewards or ends of another
-        shape, and for rewards that are not finite.
+        shape, and for rewards or observations that are not finite.
         """
         actions = numbers(actions)
         one, many = self._low.shape, (self.num_envs, *self._low.shape)
@@ -306,8 +309,15 @@ class VectorSceneEnv(_Remade, VectorEnv):
         return row
 
     def _arrays(self) -> dict[str, NDArray[np.float32]]:
-        arrays = {k: np.array(numbers(a), np.float32) for k, a in self.observe().items()}
+        seen = self.observe()
+        if not isinstance(seen, dict) or not seen:
+            raise self._fault(f"observe() {type(seen).__name__}", "a dict KEY → (E, …)")
+        arrays = {k: np.array(numbers(a), np.float32) for k, a in seen.items()}
         for key, array in arrays.items():
+            # A sum costs less than a test of each number, and is not finite where one is not.
+            if not np.isfinite(array.sum()) and not np.isfinite(array).all():
+                what = f"observe()[{key!r}] with numbers that are not finite"
+                raise self._fault(what, "finite ones")
             if array.ndim < 1 or len(array) != self.num_envs:
                 raise self._fault(f"observe()[{key!r}] of shape {array.shape}",
                                   f"({self.num_envs}, …)")  # fmt: skip
