@@ -11,6 +11,7 @@
 #include "engine/derivative/link_cotangents.hpp"
 #include "engine/derivative/number_gradients.hpp"
 #include "engine/derivative/tactile_point_numbers.hpp"
+#include "engine/scene/frames.hpp"
 #include "engine/sense/dense_tiles.hpp"
 #include "engine/sense/elastic_field.hpp"
 #include "engine/sense/imperfect_field.hpp"
@@ -264,6 +265,32 @@ void ReadoutPullback::end_effector(int lane, int end_effector, std::span<const d
   const Vec3<double> f =
       transposed_times(at.world.R, Vec3<double>{cotangent[0], cotangent[1], cotangent[2]});
   add_to_lane<kGroup>(i.link(group, v.link)->pose, {cross(v.point, f), f}, lane % kGroup, 1);
+  i.used[std::size_t(group)] = true;
+}
+
+// With the link's world pose (R, p) and twist (w, u) in its own axes, and the body's origin c in the
+// link: x = p + R c, q = that of R R_b, ω = R w, ẋ = R (u + w × c). A displacement (θ, ρ) of the
+// link in its own axes turns q by ½ (0, Rθ) ⊗ q.
+void ReadoutPullback::body(int lane, int body, std::span<const double> pose,
+                           std::span<const double> twist) {
+  Impl& i = *impl_;
+  const CompiledBody& b = compiled(i.model).bodies[std::size_t(body)];
+  if (b.link < 0) return;
+  const int group = lane / kGroup;
+  const LinkPose<double> at = i.reader.link(b.link, group, lane % kGroup);
+  const auto in_link = [&](const double* x) {
+    return transposed_times(at.world.R, Vec3<double>{x[0], x[1], x[2]});
+  };
+  const Vec3<double> c = b.frame.p, rate = at.V.l + cross(at.V.a, c);
+  const Vec3<double> x = in_link(&pose[0]), omega = in_link(&twist[0]), v = in_link(&twist[3]);
+  const kernels::Quat<double> q = quaternion_of(compose(at.world, b.frame).R);
+  const Vec3<double> imaginary{q.x, q.y, q.z}, bar{pose[4], pose[5], pose[6]};
+  const Vec3<double> turn = 0.5 * (q.w * bar - pose[3] * imaginary + cross(imaginary, bar));
+  const Vec3<double> angle = transposed_times(at.world.R, turn) + cross(c, x) +
+                             cross(at.V.a, omega) + cross(rate, v);
+  kernels::MotionCotangent<LaneRow>* const to = i.link(group, b.link);
+  add_to_lane<kGroup>(to->pose, {angle, x}, lane % kGroup, 1);
+  add_to_lane<kGroup>(to->twist, {omega + cross(c, v), v}, lane % kGroup, 1);
   i.used[std::size_t(group)] = true;
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The readings of a batch in reverse: turns cotangents of tactile fields and end effectors into
-// those of the state.
+// The readings of a batch in reverse: turns cotangents of tactile fields, end effectors and bodies
+// into those of the state.
 #pragma once
 
 #include <memory>
@@ -45,6 +45,9 @@ class ReadoutPullback {
                    std::span<double> parameters = {}, std::span<double> points = {});
   /// Takes the cotangent of an end effector's world position, (3).
   void end_effector(int lane, int end_effector, std::span<const double> cotangent);
+  /// Takes the cotangents of a body's pose (7) and twist (6), as Readout::bodies() returns them. The
+  /// part of a quaternion's cotangent along the quaternion has no effect.
+  void body(int lane, int body, std::span<const double> pose, std::span<const double> twist);
   /// Adds the collected cotangents to q and v of `out`, in all lanes.
   void finish(BlockCotangent& out);
 

@@ -36,7 +36,7 @@ void TaskSpec::check() const {
   for (std::size_t i = 1; i < snapshots.size(); ++i)
     if (snapshots[i] <= snapshots[i - 1]) fail("the steps after which it looks must ascend");
   if (!action.scale.empty()) fail("an action has bounds, not a scale");
-  if (action.size() == 0 || observation_size() == 0) fail("expected an action and an observation");
+  if (action.name.empty() || observation_size() == 0) fail("expected an action and an observation");
   for (const TensorSpec& tensor : observations) {
     if (tensor.name.empty() || tensor.name.find('/') != std::string::npos || tensor.name == "q" ||
         tensor.name == "v")

@@ -49,7 +49,8 @@ struct TaskSpec {
   double settling_timestep = 0;
   int task_state = 0;  ///< count of numbers that the task keeps per episode: a goal, a force
   /// Readings in a Snapshot besides q and v.
-  bool reads_end_effectors = false, reads_tactile = false;
+  bool reads_end_effectors = false, reads_tactile = false, reads_bodies = false;
+  std::vector<int> sensors = {};  ///< that are read, by index; none: all of the scene
 
   [[nodiscard]] std::size_t observation_size() const;
   /// Throws InputError when something is missing or contradicts something else.

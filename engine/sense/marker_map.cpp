@@ -14,12 +14,10 @@ namespace tangere {
 
 struct MarkerMap::Impl {
   CompiledMarkers of;
-  std::vector<double> moved, scratch;  // (points, 2)
 
-  explicit Impl(const CompiledMarkers& markers)
-      : of(markers),
-        moved(2 * std::size_t(of.rows) * std::size_t(of.cols)),
-        scratch(moved.size()) {}
+  [[nodiscard]] std::size_t size() const {
+    return 2 * std::size_t(of.rows) * std::size_t(of.cols);
+  }
 
   /// Calls f(point, component, point ahead, point behind, 1/(distance of the two)) for all places
   /// and axes with a difference.
@@ -37,7 +35,11 @@ struct MarkerMap::Impl {
         along(j, of.cols, of.pitch[1], 1, i * of.cols + j, 1);
       }
   }
-  void spread(bool back) { spread_field(of.spread, of.rows, of.cols, 2, back, moved, scratch); }
+  void spread(bool back, std::vector<double>& moved) const {
+    thread_local std::vector<double> scratch;
+    scratch.resize(std::max(scratch.size(), moved.size()));
+    spread_field(of.spread, of.rows, of.cols, 2, back, moved, scratch);
+  }
 };
 
 MarkerMap::MarkerMap(const Model& model, int sensor) {
@@ -45,38 +47,41 @@ MarkerMap::MarkerMap(const Model& model, int sensor) {
   if (!d.markers)
     throw InputError("sensor '" + d.name + "' has no <markers>; expected them in its <tactile>");
   impl_ = std::make_unique<Impl>(
-      compile_markers(d, model.sensors()[std::size_t(sensor)].pressure_sign));
+      Impl{compile_markers(d, model.sensors()[std::size_t(sensor)].pressure_sign)});
 }
 MarkerMap::~MarkerMap() = default;
 MarkerMap::MarkerMap(MarkerMap&&) noexcept = default;
 MarkerMap& MarkerMap::operator=(MarkerMap&&) noexcept = default;
 
-void MarkerMap::displace(std::span<const double> field, std::span<double> displacement) {
-  Impl& m = *impl_;
+void MarkerMap::displace(std::span<const double> field, std::span<double> displacement) const {
+  const Impl& m = *impl_;
+  thread_local std::vector<double> moved;  // (points, 2)
+  moved.resize(m.size());
   const double press = m.of.pressure_sign * m.of.bulge;
-  for (std::size_t k = 0; k < m.moved.size(); ++k)
-    m.moved[k] = m.of.compliance * field[k / 2 * 3 + k % 2];
+  for (std::size_t k = 0; k < moved.size(); ++k)
+    moved[k] = m.of.compliance * field[k / 2 * 3 + k % 2];
   if (press != 0)
     m.for_differences([&](std::size_t point, std::size_t axis, std::size_t ahead,
                           std::size_t behind, double per_distance) {
-      m.moved[2 * point + axis] -=
+      moved[2 * point + axis] -=
           press * per_distance * (field[3 * ahead + 2] - field[3 * behind + 2]);
     });
-  m.spread(false);
-  std::copy(m.moved.begin(), m.moved.end(), displacement.begin());
+  m.spread(false, moved);
+  std::copy(moved.begin(), moved.end(), displacement.begin());
 }
 
-void MarkerMap::pull_back(std::span<const double> of_displacement, std::span<double> of_field) {
-  Impl& m = *impl_;
+void MarkerMap::pull_back(std::span<const double> of_displacement, std::span<double> of_field) const {
+  const Impl& m = *impl_;
   const double press = m.of.pressure_sign * m.of.bulge;
-  std::copy(of_displacement.begin(), of_displacement.end(), m.moved.begin());
-  m.spread(true);
-  for (std::size_t k = 0; k < m.moved.size(); ++k)
-    of_field[k / 2 * 3 + k % 2] += m.of.compliance * m.moved[k];
+  thread_local std::vector<double> moved;  // (points, 2)
+  moved.assign(of_displacement.begin(), of_displacement.end());
+  m.spread(true, moved);
+  for (std::size_t k = 0; k < moved.size(); ++k)
+    of_field[k / 2 * 3 + k % 2] += m.of.compliance * moved[k];
   if (press == 0) return;
   m.for_differences([&](std::size_t point, std::size_t axis, std::size_t ahead, std::size_t behind,
                         double per_distance) {
-    const double x = press * per_distance * m.moved[2 * point + axis];
+    const double x = press * per_distance * moved[2 * point + axis];
     of_field[3 * ahead + 2] -= x;
     of_field[3 * behind + 2] += x;
   });

@@ -16,7 +16,7 @@
 
 namespace tangere {
 
-/// Owns the scratch of one thread. Allocates only when made.
+/// Several threads may use it at once. Each thread allocates scratch at its first call.
 class MarkerMap {
  public:
   /// Throws InputError where the sensor has no markers.
@@ -26,10 +26,10 @@ class MarkerMap {
   MarkerMap& operator=(MarkerMap&&) noexcept;
 
   /// Computes displacements, (points, 2) [m], from the ideal field, (points, 3) [N].
-  void displace(std::span<const double> field, std::span<double> displacement);
+  void displace(std::span<const double> field, std::span<double> displacement) const;
   /// Pulls the cotangent of the displacements, (points, 2), back to the field and adds it, (points,
   /// 3).
-  void pull_back(std::span<const double> of_displacement, std::span<double> of_field);
+  void pull_back(std::span<const double> of_displacement, std::span<double> of_field) const;
 
  private:
   struct Impl;

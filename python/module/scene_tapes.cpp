@@ -5,6 +5,7 @@
 #include <nanobind/stl/vector.h>
 
 #include "engine/derivative/number_gradients.hpp"
+#include "engine/derivative/tactile_point_numbers.hpp"
 #include "engine/scene/scene_number.hpp"
 #include "engine/step/displacement.hpp"
 #include "python/module/arrays.hpp"
@@ -44,62 +45,92 @@ Scene with_varying(Scene scene, const std::vector<std::string>& names) {
   return scene;
 }
 
-class SceneTape {
- public:
-  SceneTape(const Scene& scene, const std::vector<std::string>& names, int every, int environments,
-            const TapeOptions& options)
-      : names_(names),
-        task_(with_varying(scene, names), every, static_cast<int>(options.length)),
-        tape_(task_, environments, options) {
-    const NumberGradients numbers(model());
-    for (const std::string& name : names)
+/// What SceneTape keeps of its arguments: a change of points compiles the scene again.
+struct TapeArguments {
+  Scene scene;
+  std::vector<std::string> parameters;
+  std::optional<std::vector<std::string>> readings;
+  int every;
+  int environments;
+  TapeOptions options;
+};
+
+/// A compiled scene, its tape, and where its parameters are.
+struct TapedScene {
+  TapedScene(const Scene& scene, const TapeArguments& a)
+      : task(with_varying(scene, a.parameters), a.every, static_cast<int>(a.options.length),
+             a.readings),
+        tape(task, a.environments, a.options) {
+    const NumberGradients numbers(task.model());
+    for (const std::string& name : a.parameters)
       for (int k = 0; k < numbers.count(); ++k)
         if (numbers.infos()[as_size(k)].name == name) {
-          rows_.push_back(as_size(k));
-          varying_.push_back(
-              as_size(randomization_of(model().scene(), numbers.infos()[as_size(k)].number)));
+          rows.push_back(as_size(k));
+          varying.push_back(
+              as_size(randomization_of(task.model().scene(), numbers.infos()[as_size(k)].number)));
         }
-    numbers_ = as_size(numbers.count());
+    number_count = as_size(numbers.count());
+  }
+
+  SceneTask task;
+  TaskTape tape;
+  std::size_t number_count = 0;            ///< by which there are derivatives
+  std::vector<std::size_t> rows, varying;  ///< (parameters) among these, and among what varies
+};
+
+class SceneTape {
+ public:
+  explicit SceneTape(TapeArguments arguments)
+      : arguments_(std::move(arguments)),
+        taped_(std::make_unique<TapedScene>(arguments_.scene, arguments_)) {
+    draw_numbers(0, {});
+    first_q_.assign(tape().q().begin(), tape().q().end());
   }
 
   void reset(const Whole<std::uint64_t>& seed, const std::optional<Argument<double>>& q,
              const std::optional<Argument<double>>& v,
-             const std::optional<Argument<double>>& numbers) {
+             const std::optional<Argument<double>>& parameters,
+             const std::optional<Argument<double>>& points) {
     const std::uint64_t draw = seed.value("seed");
-    std::vector<double> q0, v0, given;
+    std::vector<double> q0, v0, given, moved;
     if (q) q0 = rows_of(*q, count(), nq(), "q");
     if (v) v0 = rows_of(*v, count(), nv(), "v");
-    if (numbers) given = rows_of(*numbers, count(), names_.size(), "numbers");
+    if (parameters) given = rows_of(*parameters, count(), names().size(), "parameters");
+    if (points) {
+      const auto all = numbers_of(*points, {point_count(), kPointNumbers}, "points");
+      moved.assign(all.begin(), all.end());
+    }
     const InUse::Turn turn(in_use_);
     const nb::gil_scoped_release free;
+    move_points(moved);
     draw_numbers(draw, given);
-    tape_.reset(draw, 0);
+    tape().reset(draw, 0);
     for (std::size_t e = 0; e < count() && (q || v); ++e) {
       const auto own = [&](const std::vector<double>& all, std::span<const double> drawn,
                            std::size_t n) {
         return all.empty() ? drawn.subspan(e * n, n) : std::span(all).subspan(e * n, n);
       };
-      const auto qe = own(q0, tape_.q(), nq()), ve = own(v0, tape_.v(), nv());
+      const auto qe = own(q0, tape().q(), nq()), ve = own(v0, tape().v(), nv());
       const std::vector<double> at(qe.begin(), qe.end()), rate(ve.begin(), ve.end());
-      tape_.displace(static_cast<int>(e), at, rate);
+      tape().displace(static_cast<int>(e), at, rate);
     }
-    first_q_.assign(tape_.q().begin(), tape_.q().end());
+    first_q_.assign(tape().q().begin(), tape().q().end());
   }
   void step(const Argument<double>& controls) {
     const std::vector<double> rows = rows_of(controls, count(), as_size(model().nu()), "controls");
     const InUse::Turn turn(in_use_);
     const nb::gil_scoped_release free;
-    tape_.step(rows);
+    tape().step(rows);
   }
   Array<double> observations() {
     const InUse::Turn turn(in_use_);
-    return array_of<double>({count(), width()}, tape_.observations());
+    return array_of<double>({count(), width()}, tape().observations());
   }
   Array<std::int8_t> status() {
     const InUse::Turn turn(in_use_);
     std::vector<std::int8_t> all;
-    for (int e = 0; e < tape_.environments(); ++e)
-      all.push_back(static_cast<std::int8_t>(tape_.status(e)));
+    for (int e = 0; e < tape().environments(); ++e)
+      all.push_back(static_cast<std::int8_t>(tape().status(e)));
     return array_of<std::int8_t>({count()}, std::span<const std::int8_t>(all));
   }
   Array<double> reverse(const Argument<double>& observation_bar) {
@@ -108,75 +139,122 @@ class SceneTape {
     auto array = new_array<double>({count(), as_size(model().nu())}, action_bar);
     const InUse::Turn turn(in_use_);
     const nb::gil_scoped_release free;
-    tape_.reverse({o}, action_bar);
+    tape().reverse({o}, action_bar);
     return array;
   }
   nb::tuple reverse_start(const Argument<double>& observation_bar) {
     const auto o = numbers_of(observation_bar, {count(), width()}, "derivatives by readings");
-    std::span<double> q, v, numbers;
+    std::span<double> q, v, parameters, points;
     auto q_bar = new_array<double>({count(), nq()}, q),
          v_bar = new_array<double>({count(), nv()}, v),
-         number_bar = new_array<double>({count(), names_.size()}, numbers);
+         parameter_bar = new_array<double>({count(), names().size()}, parameters),
+         point_bar = new_array<double>({point_count(), kPointNumbers}, points);
     {
       const InUse::Turn turn(in_use_);
       const nb::gil_scoped_release free;
-      std::vector<double> along(v.size()), all(names_.empty() ? 0 : count() * numbers_);
-      tape_.reverse_start({o}, along, v, all);
+      const std::size_t numbers = taped_->number_count;
+      std::vector<double> along(v.size()), all(names().empty() ? 0 : count() * numbers),
+          each(arguments_.options.points ? count() * points.size() : 0);
+      tape().reverse_start({o}, along, v, all, each);
       std::ranges::fill(q, 0.0);
+      std::ranges::fill(points, 0.0);
       for (std::size_t e = 0; e < count(); ++e) {
         add_by_coordinates(model(), std::span(first_q_).subspan(e * nq(), nq()),
                            std::span<const double>(along).subspan(e * nv(), nv()),
                            q.subspan(e * nq(), nq()));
-        for (std::size_t k = 0; k < names_.size(); ++k)
-          numbers[e * names_.size() + k] = all[e * numbers_ + rows_[k]];
+        for (std::size_t k = 0; k < names().size(); ++k)
+          parameters[e * names().size() + k] = all[e * numbers + taped_->rows[k]];
+        if (!each.empty()) add_points(e, std::span(each).subspan(e * points.size()), points);
       }
     }
-    return nb::make_tuple(q_bar, v_bar, number_bar);
+    return nb::make_tuple(q_bar, v_bar, parameter_bar, point_bar);
   }
   void begin_reverse() {
     const InUse::Turn turn(in_use_);
-    tape_.begin_reverse();
+    tape().begin_reverse();
   }
-  /// (E, names) numbers of each environment in SI units.
-  Array<double> numbers() {
+  /// (E, names) parameters of each environment in SI units.
+  Array<double> parameters() {
     const InUse::Turn turn(in_use_);
     std::vector<double> all;
     for (std::size_t e = 0; e < count(); ++e)
-      for (const std::size_t k : varying_) all.push_back(drawn_[e * varying_count() + k]);
-    return array_of<double>({count(), names_.size()}, std::span<const double>(all));
+      for (const std::size_t k : taped_->varying) all.push_back(drawn_[e * varying_count() + k]);
+    return array_of<double>({count(), names().size()}, std::span<const double>(all));
   }
 
-  [[nodiscard]] const TaskSpec& spec() const { return task_.spec(); }
-  [[nodiscard]] const Model& model() const { return task_.model(); }
-  [[nodiscard]] std::size_t count() const { return as_size(tape_.environments()); }
-  [[nodiscard]] std::int64_t taken() const { return tape_.taken(); }
+  [[nodiscard]] const TaskSpec& spec() const { return taped_->task.spec(); }
+  [[nodiscard]] const Model& model() const { return taped_->task.model(); }
+  [[nodiscard]] std::size_t count() const { return as_size(arguments_.environments); }
+  [[nodiscard]] std::int64_t taken() const { return taped_->tape.taken(); }
+  [[nodiscard]] std::size_t point_count() const {
+    return arguments_.options.points ? as_size(tactile_points(model())) : 0;
+  }
 
  private:
+  [[nodiscard]] TaskTape& tape() { return taped_->tape; }
+  [[nodiscard]] const std::vector<std::string>& names() const { return arguments_.parameters; }
   [[nodiscard]] std::size_t nq() const { return as_size(model().nq()); }
   [[nodiscard]] std::size_t nv() const { return as_size(model().nv()); }
   [[nodiscard]] std::size_t width() const { return spec().observation_size(); }
   [[nodiscard]] std::size_t varying_count() const { return model().scene().randomizations.size(); }
 
+  /// Compiles the scene again where the points' own numbers, (points, 7) or empty for none, differ
+  /// from those of the last reset.
+  void move_points(std::vector<double> moved) {
+    if (std::ranges::all_of(moved, [](double x) { return x == 0; })) moved.clear();
+    if (moved == moved_) return;
+    Scene scene = arguments_.scene;
+    std::span<const double> left = moved;
+    for (std::size_t s = 0; s < scene.sensors.size() && !left.empty(); ++s) {
+      const std::size_t numbers = kPointNumbers * as_size(model().sensors()[s].points);
+      add_to_points(scene.sensors[s], left.first(numbers));
+      left = left.subspan(numbers);
+    }
+    taped_ = std::make_unique<TapedScene>(scene, arguments_);
+    moved_ = std::move(moved);
+  }
+
+  /// Adds an environment's derivatives by its points' own numbers to those by the change of the
+  /// scene's. That change is of factors, so it is in proportion to a coefficient that varies.
+  void add_points(std::size_t environment, std::span<const double> own,
+                  std::span<double> points) const {
+    const Scene& scene = model().scene();
+    std::size_t at = 0;
+    for (std::size_t s = 0; s < scene.sensors.size(); ++s) {
+      std::array<double, kPointNumbers> scale;
+      scale.fill(1);
+      for (int k = 0; k < kPointNumbers - 3; ++k) {
+        const SceneNumber number{NumberOwner::tactile, coefficient_field(k),
+                                 scene.sensors[s].name};
+        const int varying = randomization_of(scene, number);
+        const double nominal = scene.sensors[s].coefficients[as_size(k)];
+        if (varying >= 0 && nominal != 0)
+          scale[as_size(3 + k)] =
+              drawn_[environment * varying_count() + as_size(varying)] / nominal;
+      }
+      for (int p = 0; p < model().sensors()[s].points; ++p)
+        for (std::size_t k = 0; k < scale.size(); ++k, ++at) points[at] += scale[k] * own[at];
+    }
+  }
+
   /// Draws all numbers that vary, and sets those that are given, (E, names) or empty.
   void draw_numbers(std::uint64_t seed, const std::vector<double>& given) {
     if (varying_count() == 0) return;
     drawn_.clear();
-    const Batch batch(model(), tape_.environments(), seed);
-    for (int e = 0; e < tape_.environments(); ++e)
+    const Batch batch(model(), arguments_.environments, seed);
+    for (int e = 0; e < arguments_.environments; ++e)
       for (std::size_t k = 0; k < varying_count(); ++k)
         drawn_.push_back(batch.randomized_value(e, static_cast<int>(k)));
     for (std::size_t e = 0; e < count() && !given.empty(); ++e)
-      for (std::size_t k = 0; k < names_.size(); ++k)
-        drawn_[e * varying_count() + varying_[k]] = given[e * names_.size() + k];
-    task_.set_varying(drawn_);
+      for (std::size_t k = 0; k < names().size(); ++k)
+        drawn_[e * varying_count() + taped_->varying[k]] = given[e * names().size() + k];
+    taped_->task.set_varying(drawn_);
   }
 
-  std::vector<std::string> names_;
-  SceneTask task_;
-  TaskTape tape_;
-  std::size_t numbers_ = 0;
-  std::vector<std::size_t> rows_, varying_;  ///< (names) in derivatives, and among what varies
+  TapeArguments arguments_;
+  std::unique_ptr<TapedScene> taped_;
   std::vector<double> drawn_, first_q_;
+  std::vector<double> moved_;  ///< (points, 7) of the compiled scene; empty: none
   InUse in_use_;
 };
 
@@ -190,7 +268,8 @@ void add_scene_tapes(nb::module_& m) {
       .def(
           "__init__",
           [](SceneTape* self, const Scene& scene, const Whole<int>& envs, const Whole<int>& steps,
-             const Whole<int>& every, const std::vector<std::string>& numbers,
+             const Whole<int>& every, const std::optional<std::vector<std::string>>& readings,
+             const std::vector<std::string>& parameters, bool points,
              const std::optional<Whole<int>>& threads, const std::string& precision,
              double tape_bytes) {
             TapeOptions options;
@@ -198,23 +277,32 @@ void add_scene_tapes(nb::module_& m) {
             options.length = steps.value("steps");
             options.threads = threads_of(threads);
             options.tape_bytes = tape_bytes;
-            options.parameters = !numbers.empty();
-            new (self) SceneTape(scene, numbers, every.value("every"), envs.value("envs"), options);
+            options.parameters = !parameters.empty();
+            options.points = points;
+            new (self) SceneTape(
+                {scene, parameters, readings, every.value("every"), envs.value("envs"), options});
           },
-          "scene"_a, "envs"_a, "steps"_a, "every"_a = 1, "numbers"_a = std::vector<std::string>{},
+          "scene"_a, "envs"_a, "steps"_a, "every"_a = 1, "readings"_a = nb::none(),
+          "parameters"_a = std::vector<std::string>{}, "points"_a = false,
           "threads"_a = nb::none(), "precision"_a = "double", "tape_bytes"_a = 1e9,
-          "`steps`: calls of step() at most. `every`: steps of the simulation in each. `numbers`:\n"
-          "names of numbers of the scene (Model.numbers) that environments may have of their own.\n"
+          "`steps`: calls of step() at most. `every`: steps of the simulation in each. `readings`:\n"
+          "names, such as pad, pad.sum, bodies.box, variables or an end effector; None: all end\n"
+          "effectors and fields. `parameters`: names of numbers of the scene that environments may\n"
+          "have of their own. `points`: whether there are derivatives by points of sensors.\n"
           "InputError: a number is out of range, or a name is unknown.")
       .def("reset", &SceneTape::reset, "seed"_a = 0, "q"_a = nb::none(), "v"_a = nb::none(),
-           "numbers"_a = nb::none(),
-           "Starts anew and clears the tape. `q` (E, nq), `v` (E, nv) and `numbers`\n"
-           "(E, names) take the place of what the scene draws; one row stands for all.")
+           "parameters"_a = nb::none(), "points"_a = nb::none(),
+           "Starts anew and clears the tape. `q` (E, nq), `v` (E, nv) and `parameters`\n"
+           "(E, names) take the place of what the scene draws; one row stands for all. `points`\n"
+           "(points of all sensors, 7) moves points of sensors: x, y, z [m] in their body's frame,\n"
+           "and kn, kt, mu, damping are added to their own. The scene is compiled again where it\n"
+           "differs from that of the last reset.")
       .def("step", &SceneTape::step, "controls"_a, "Takes the controls (E, nu) of `every` steps.")
       .def("observations", &SceneTape::observations,
            "(E, n) float64: q, v, end effectors and fields, one after the other.")
       .def("status", &SceneTape::status, "(E) int8: StepStatus of the last steps.")
-      .def("numbers", &SceneTape::numbers, "(E, names) numbers of the environments, in SI units.")
+      .def("parameters", &SceneTape::parameters,
+           "(E, names) parameters of the environments, in SI units.")
       .def(
           "reverse", &SceneTape::reverse, "observation_bar"_a,
           "Reverses the last step() that is not reversed yet: takes derivatives of a loss by what\n"
@@ -223,13 +311,16 @@ void add_scene_tapes(nb::module_& m) {
            nb::sig("def reverse_start(self, observation_bar: numpy.typing.ArrayLike) -> "
                    "tuple[numpy.typing.NDArray[numpy.float64], "
                    "numpy.typing.NDArray[numpy.float64], "
+                   "numpy.typing.NDArray[numpy.float64], "
                    "numpy.typing.NDArray[numpy.float64]]"),
            "Ends the reverse pass: takes derivatives by the first readings (E, n), returns those\n"
-           "by q (E, nq), v (E, nv) and numbers (E, names) of the start.")
+           "by q (E, nq), v (E, nv), parameters (E, names) of the start, and by points (n, 7).")
       .def("begin_reverse", &SceneTape::begin_reverse, "Begins another reverse pass.")
       .def_prop_ro("taken", &SceneTape::taken, "Calls of step() on the tape.")
-      .def_prop_ro("spec", &SceneTape::spec)
-      .def_prop_ro("model", &SceneTape::model)
+      // Copies: a reset with other points makes others.
+      .def_prop_ro("spec", [](const SceneTape& s) { return TaskSpec(s.spec()); })
+      .def_prop_ro("model", [](const SceneTape& s) { return Model(s.model()); })
+      .def_prop_ro("points", &SceneTape::point_count, "Of all sensors; 0 without their derivatives.")
       .def_prop_ro("envs", &SceneTape::count);
 }
 

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,6 +12,7 @@ import numpy as np
 import torch
 
 from . import _core
+from ._tape import SimulationBase, split_rows
 from ._torch_run import Run
 
 
@@ -21,7 +22,7 @@ class State:
 
     q: torch.Tensor  #: (E, nq) coordinates; quaternions w x y z
     v: torch.Tensor  #: (E, nv) velocities
-    readings: dict[str, torch.Tensor]  #: sensor → (E, rows, cols, 3) [N]; "variables" → (E, n, 3)
+    readings: dict[str, torch.Tensor]  #: name of `read` → (E, …)
     status: np.ndarray  #: (E) int8, StepStatus of the last steps
     step: int  #: calls of step() that led to it
     _token: torch.Tensor
@@ -30,7 +31,7 @@ class State:
         return self.readings[name]
 
 
-class Simulation:
+class Simulation(SimulationBase):
     """A scene in E environments, recorded for the way back.
 
         sim = tangere.torch.Simulation("scene.xml", num_envs=64, steps=100, every=5)
@@ -40,7 +41,8 @@ class Simulation:
             loss = loss + ((s["pad"] - wanted[t]) ** 2).sum() + s.v.square().sum()
         loss.backward()
 
-    Gradients go to the controls, and to `q`, `v` and `numbers` of reset() if they require them.
+    Gradients go to the controls, and to `q`, `v`, `parameters` and `points` of reset() if they
+    require them.
 
     Parameters
     ----------
@@ -48,8 +50,13 @@ class Simulation:
     num_envs: E. Environment e has draw e of a seed.
     steps: calls of step() after a reset(), at most.
     every: steps of the simulation in each, with the same controls.
-    numbers: names of numbers of the scene, such as "contact pad ball kn" or "body ball density",
+    read: names of what s[name] holds, for each environment: "pad" (rows, cols, 3) [N], "pad.sum"
+        (6), "pad.pressure", "pad.shear", "pad.flow", "pad.markers" of sensors; "bodies" (nb, 13) or
+        "bodies.box" (13): x y z, quaternion w x y z, angular and linear velocity; "variables"
+        (n, 3), the end effectors, or one by its name (3). None: end effectors and all fields.
+    parameters: names of numbers of the scene, such as "contact pad ball kn" or "body ball density",
         that environments may have of their own (docs/gradients.md).
+    points: whether reset() may move points of sensors.
     threads: None for all cores. Scripts should also call torch.set_num_threads(1).
     precision: of tactile fields, "double" or "mixed".
     tape_bytes: limit for the tapes [bytes]. Longer runs are played again from checkpoints.
@@ -63,26 +70,17 @@ class Simulation:
         steps: int = 100,
         *,
         every: int = 1,
-        numbers: Sequence[str] = (),
+        read: Sequence[str] | None = None,
+        parameters: Sequence[str] = (),
+        points: bool = False,
         threads: int | None = None,
         precision: str = "double",
         tape_bytes: float = 1e9,
         dtype: torch.dtype = torch.float64,
     ):
-        self.scene = scene if isinstance(scene, _core.Scene) else _core.Scene(scene)
-        self.num_envs, self.steps, self.every, self.dtype = num_envs, steps, every, dtype
-        self.numbers = list(numbers)
-        self.tape = _core.SceneTape(
-            self.scene,
-            num_envs,
-            steps,
-            every,
-            self.numbers,
-            threads=threads,
-            precision=precision,
-            tape_bytes=tape_bytes,
-        )
-        self.model = self.tape.model
+        options = dict(threads=threads, precision=precision, tape_bytes=tape_bytes)
+        super().__init__(scene, num_envs, steps, every, read, parameters, points=points, **options)
+        self.dtype = dtype
         self._run = Run(self.tape)
 
     def reset(
@@ -91,15 +89,21 @@ class Simulation:
         *,
         q: torch.Tensor | None = None,
         v: torch.Tensor | None = None,
-        numbers: torch.Tensor | None = None,
+        parameters: torch.Tensor | None = None,
+        points: Mapping[str, torch.Tensor] | None = None,
     ) -> State:
-        """Starts anew. `q` (E, nq), `v` (E, nv) and `numbers` (E, names), in SI units, take the
+        """Starts anew. `q` (E, nq), `v` (E, nv) and `parameters` (E, names), in SI units, take the
         place of what the scene draws; one row stands for all environments. Quaternions of `q` have
-        length one, and derivatives by them no part that changes it. Raises InputError for other
-        shapes."""
+        length one, and derivatives by them no part that changes it.
+
+        `points`: sensor → (points, 7), zeros for the points of the scene: it is added to their
+        places x y z [m] in the body's frame and to their own kn, kt, mu and damping. The scene is
+        compiled again where it differs from the last reset(). Raises InputError for other shapes
+        and names, and for points of a sensor with ks."""
         self._run.tape = None
         self._run = Run(self.tape)
-        given = [None if x is None else self._rows(x) for x in (q, v, numbers)]
+        given = [None if x is None else self._rows(x) for x in (q, v, parameters)]
+        given.append(None if points is None else torch.cat(self._point_rows(points, torch.zeros)))
         rows, token = _Start.apply(*given, self._run, seed, self.dtype)
         return self._state(rows, token)
 
@@ -120,17 +124,16 @@ class Simulation:
         controls = self._rows(torch.as_tensor(controls))
         return self._state(*_Step.apply(controls, state._token, self._run, self.dtype))
 
+    def parameters(self) -> torch.Tensor:
+        """(E, names) of the run, in SI units: what reset() drew or was given."""
+        return torch.from_numpy(self.tape.parameters())
+
     def _rows(self, x: torch.Tensor) -> torch.Tensor:
         x = torch.as_tensor(x)
         return x.expand(self.num_envs, -1) if x.ndim == 1 else x
 
     def _state(self, rows: torch.Tensor, token: torch.Tensor) -> State:
-        parts: dict[str, torch.Tensor] = {}
-        first = 0
-        for t in self.tape.spec.observations:
-            last = first + int(np.prod(t.shape))
-            parts[t.name] = rows[:, first:last].reshape(self.num_envs, *t.shape)
-            first = last
+        parts = split_rows(rows, self._observations)
         q, v = parts.pop("state.q"), parts.pop("state.v")
         return State(q, v, parts, self.tape.status(), self._run.taken, token)
 
@@ -143,9 +146,12 @@ class _Start(torch.autograd.Function):  # type: ignore[misc]
     """The start of a run, whose token passes from step to step."""
 
     @staticmethod
-    def forward(ctx: Any, q: Any, v: Any, numbers: Any, run: Any, seed: Any, dtype: Any) -> Any:
-        run.tape.reset(seed, _numpy(q), _numpy(v), _numpy(numbers))
-        ctx.run, ctx.given = run, [None if x is None else x.dtype for x in (q, v, numbers)]
+    def forward(
+        ctx: Any, q: Any, v: Any, parameters: Any, points: Any, run: Any, seed: Any, dtype: Any
+    ) -> Any:
+        given = (q, v, parameters, points)
+        run.tape.reset(seed, *map(_numpy, given))
+        ctx.run, ctx.given = run, [None if x is None else x.dtype for x in given]
         rows = torch.from_numpy(run.tape.observations()).to(dtype)
         return rows, torch.zeros((), dtype=torch.float64)
 

@@ -44,7 +44,7 @@ def loss_of(s):
 
 
 def rolled(sim, u, q, v, numbers):
-    s = sim.reset(q=q, v=v, numbers=numbers)
+    s = sim.reset(q=q, v=v, parameters=numbers)
     total = loss_of(s)
     for t in range(u.shape[0]):
         s = sim.step(s, u[t])
@@ -55,7 +55,7 @@ def rolled(sim, u, q, v, numbers):
 @pytest.mark.parametrize("name", ["chain", "ball", "rod"])
 def test_gradients_agree_with_differences(name):
     of, numbers = scene(name)
-    sim = tt.Simulation(of, num_envs=2, steps=6, every=2, numbers=numbers, threads=1)
+    sim = tt.Simulation(of, num_envs=2, steps=6, every=2, parameters=numbers, threads=1)
     first = sim.reset(seed=3)
     q0, v0 = first.q.clone(), first.v.clone()
     if name == "ball":
@@ -71,7 +71,7 @@ def test_gradients_agree_with_differences(name):
         "u": 0.2 * draw(6, 2, sim.model.nu),
         "q": q0,
         "v": v0 + 0.01 * draw(*v0.shape),
-        "numbers": torch.from_numpy(sim.tape.numbers()),
+        "numbers": sim.parameters(),
     }
     at = {key: x.requires_grad_() for key, x in given.items()}
     rolled(sim, **at).backward()
@@ -147,21 +147,21 @@ def test_bits_do_not_depend_on_the_batch_or_on_gradients():
 
 def test_environments_have_numbers_of_their_own():
     of, numbers = scene("chain")
-    sim = tt.Simulation(of, num_envs=2, steps=4, numbers=numbers)
+    sim = tt.Simulation(of, num_envs=2, steps=4, parameters=numbers)
     given = torch.tensor([[900.0, 0.02], [1800.0, 0.2]], dtype=torch.float64)
-    s = sim.reset(numbers=given)
-    np.testing.assert_array_equal(sim.tape.numbers(), given.numpy())
+    s = sim.reset(parameters=given)
+    np.testing.assert_array_equal(sim.parameters(), given.numpy())
     for _ in range(4):
         s = sim.step(s, torch.zeros(1))
     assert not torch.equal(s.q[0], s.q[1])
     s = sim.reset()  # the scene's own
-    np.testing.assert_array_equal(sim.tape.numbers(), [[900.0, 0.02]] * 2)
+    np.testing.assert_array_equal(sim.parameters(), [[900.0, 0.02]] * 2)
 
 
 def test_what_cannot_be_done_is_refused():
     of, _ = scene("chain")
     with pytest.raises(tangere.InputError, match="no number of the scene is named 'weight'"):
-        tt.Simulation(of, numbers=["weight"])
+        tt.Simulation(of, parameters=["weight"])
     text = CHAIN.replace("<actuator>", "<!--").replace("</actuator>", "-->")
     with pytest.raises(tangere.InputError, match="no motor"):
         tt.Simulation(tangere.Scene.from_text(text))

@@ -1,20 +1,91 @@
 // SPDX-License-Identifier: Apache-2.0
-// Observations are copies of a snapshot, so their derivatives are copies of the weights.
+// Observations are copies of a snapshot or forms of its fields, so their derivatives are copies of
+// the weights or pullbacks of these forms.
 #include "tasks/catalogue/scene_task.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 
+#include "engine/base/as_size.hpp"
+#include "engine/derivative/tactile_point_numbers.hpp"
+#include "engine/rows/episode_channels.hpp"
 #include "engine/step/displacement.hpp"
 
 namespace tangere {
 
 namespace {
 
-TaskSpec declared(const Scene& scene, int steps, int horizon) {
+constexpr std::size_t kPose = 7, kTwist = 6;
+
+/// What one name of a reading stands for.
+struct NamedReading {
+  std::optional<FieldOutput> field = {};
+  int first_body = 0, bodies = 0;
+  int first_end_effector = 0, end_effectors = 0;
+};
+
+std::vector<std::string> known_names(const Model& model) {
+  std::vector<std::string> names = output_names(model.scene());
+  std::erase_if(names, [&](const std::string& name) {
+    const auto field = find_output(sensor_names(model.scene()), name);
+    return name == "q" || name == "v" || name == "memory" ||
+           (field && !reason_against(model.scene(), *field).empty());
+  });
+  for (const EndEffectorInfo& e : model.end_effectors()) names.push_back(e.name);
+  return names;
+}
+
+NamedReading reading_named(const Model& model, const std::string& name) {
+  const auto& end_effectors = model.end_effectors();
+  if (const auto field = find_output(sensor_names(model.scene()), name)) return {.field = field};
+  if (name == "bodies") return {.bodies = model.nb()};
+  if (const auto body = find_body_output(model.scene(), name))
+    return {.first_body = *body, .bodies = 1};
+  if (name == "variables" && !end_effectors.empty())
+    return {.end_effectors = static_cast<int>(end_effectors.size())};
+  for (std::size_t k = 0; k < end_effectors.size(); ++k)
+    if (end_effectors[k].name == name)
+      return {.first_end_effector = static_cast<int>(k), .end_effectors = 1};
+  throw InputError(fmt::format("the scene has no reading '{}'; expected one of {}", name,
+                               fmt::join(known_names(model), ", ")));
+}
+
+std::vector<std::string> default_readings(const Model& model) {
+  std::vector<std::string> names = sensor_names(model.scene());
+  if (!model.end_effectors().empty()) names.insert(names.begin(), "variables");
+  return names;
+}
+
+TensorSpec field_spec(const SensorInfo& sensor, FieldOutput output) {
+  TensorSpec spec{output_name(sensor.name, output.form), {6}, "N, m", "reading of a sensor"};
+  spec.touch = true;
+  if (output.form == FieldForm::sum) return spec;
+  spec.unit = output.form == FieldForm::markers ? "m" : output.form == FieldForm::flow ? "1" : "N";
+  spec.shape = {as_size(sensor.points)};
+  if (sensor.rows > 0) spec.shape = {as_size(sensor.rows), as_size(sensor.cols)};
+  if (const int components = components_of(output.form); components > 1)
+    spec.shape.push_back(as_size(components));
+  return spec;
+}
+
+TensorSpec spec_of(const Model& model, const std::string& name, const NamedReading& reading) {
+  if (reading.field)
+    return field_spec(model.sensors()[as_size(reading.field->sensor)], *reading.field);
+  TensorSpec spec{name, {kMotion}, "m, 1, rad/s, m/s", "pose and twist of a body"};
+  if (reading.bodies > 0) {
+    if (name == "bodies") spec.shape = {as_size(reading.bodies), kMotion};
+    return spec;
+  }
+  spec = {name, {3}, "m", "place of an end effector"};
+  if (name == "variables") spec.shape = {as_size(reading.end_effectors), 3};
+  return spec;
+}
+
+TaskSpec declared(const Scene& scene, int steps, int horizon,
+                  const std::optional<std::vector<std::string>>& readings) {
   const Model model(scene);
-  if (model.nu() == 0)
-    throw InputError((scene.path.empty() ? "" : scene.path + ": ") +
-                     "the scene has no motor; expected controls by which it can be moved");
   TaskSpec spec;
   spec.name = "scene";
   spec.summary = "A scene without a reward.";
@@ -23,16 +94,15 @@ TaskSpec declared(const Scene& scene, int steps, int horizon) {
   spec.action = {"controls", {std::size_t(model.nu())}, "1", "controls of the motors"};
   spec.observations = {{"state.q", {std::size_t(model.nq())}, "m, rad, 1", "coordinates"},
                        {"state.v", {std::size_t(model.nv())}, "m/s, rad/s", "velocities"}};
-  if (const std::size_t n = model.end_effectors().size(); n > 0) {
-    spec.observations.push_back({"variables", {n, 3}, "m", "places of end effectors"});
-    spec.reads_end_effectors = true;
-  }
-  for (const SensorInfo& s : model.sensors()) {
-    std::vector<std::size_t> shape = {std::size_t(s.points), 3};
-    if (s.rows > 0) shape = {std::size_t(s.rows), std::size_t(s.cols), 3};
-    spec.observations.push_back({s.name, std::move(shape), "N", "field of a sensor"});
-    spec.observations.back().touch = true;
-    spec.reads_tactile = true;
+  for (const std::string& name : readings ? *readings : default_readings(model)) {
+    const NamedReading reading = reading_named(model, name);
+    spec.observations.push_back(spec_of(model, name, reading));
+    spec.reads_bodies |= reading.bodies > 0;
+    spec.reads_end_effectors |= reading.end_effectors > 0;
+    spec.reads_tactile |= reading.field.has_value();
+    if (reading.field && std::ranges::find(spec.sensors, reading.field->sensor) ==
+                             spec.sensors.end())
+      spec.sensors.push_back(reading.field->sensor);
   }
   spec.steps_per_action = steps;
   spec.snapshots = {steps};
@@ -42,8 +112,29 @@ TaskSpec declared(const Scene& scene, int steps, int horizon) {
 
 }  // namespace
 
-SceneTask::SceneTask(const Scene& scene, int steps, int horizon)
-    : Task(scene, declared(scene, steps, horizon)) {}
+SceneTask::SceneTask(const Scene& scene, int steps, int horizon,
+                     const std::optional<std::vector<std::string>>& readings)
+    : Task(scene, declared(scene, steps, horizon, readings)) {
+  for (const std::string& name : readings ? *readings : default_readings(model())) {
+    const NamedReading reading = reading_named(model(), name);
+    if (reading.field) {
+      std::size_t first = 0;
+      for (const int s : sensors()) {
+        if (s == reading.field->sensor) break;
+        first += 3 * as_size(model().sensors()[as_size(s)].points);
+      }
+      readings_.emplace_back(
+          Field{FormMap(model(), *reading.field), first,
+                as_size(first_tactile_point(model(), reading.field->sensor))});
+    } else if (reading.bodies > 0) {
+      for (int b = 0; b < reading.bodies; ++b)
+        readings_.emplace_back(Motion{as_size(reading.first_body + b)});
+    } else {
+      readings_.emplace_back(Positions{3 * as_size(reading.first_end_effector),
+                                       3 * as_size(reading.end_effectors)});
+    }
+  }
+}
 
 void SceneTask::start(const TaskStart& start) const {
   const std::size_t k = start.varying.size(), first = std::size_t(start.episode) * k;
@@ -62,19 +153,57 @@ void SceneTask::controls_vjp(const TaskView&, int, std::span<const double> weigh
 
 void SceneTask::observe(const TaskView& view, std::span<double> observation) const {
   const Snapshot& now = view.now();
-  auto to = observation.begin();
-  for (const auto& part : {now.q, now.v, now.end_effectors, now.tactile})
-    to = std::ranges::copy(part, to).out;
+  const std::size_t twists = kPose * as_size(model().nb());
+  std::span<double> left = observation;
+  const auto put = [&left](std::span<const double> numbers) {
+    std::ranges::copy(numbers, left.begin());
+    left = left.subspan(numbers.size());
+  };
+  put(now.q);
+  put(now.v);
+  for (const Reading& reading : readings_) {
+    if (const auto* field = std::get_if<Field>(&reading)) {
+      field->map.evaluate(now.tactile.subspan(field->first, field->map.field_size()),
+                          left.first(field->map.size()));
+      left = left.subspan(field->map.size());
+    } else if (const auto* motion = std::get_if<Motion>(&reading)) {
+      put(now.bodies.subspan(kPose * motion->body, kPose));
+      put(now.bodies.subspan(twists + kTwist * motion->body, kTwist));
+    } else {
+      const auto& of = std::get<Positions>(reading);
+      put(now.end_effectors.subspan(of.first, of.count));
+    }
+  }
 }
 
 void SceneTask::observe_vjp(const TaskView& view, std::span<const double> weight,
                             const ViewCotangent& out) const {
   const Snapshot& now = view.now();
   const SnapshotCotangent& bar = out.snapshots.back();
+  const std::size_t twists = kPose * as_size(model().nb());
+  const auto add = [&weight](std::span<double> to) {
+    for (std::size_t i = 0; i < to.size(); ++i) to[i] += weight[i];
+    weight = weight.subspan(to.size());
+  };
   add_along_dofs(model(), now.q, weight.first(now.q.size()), bar.q);
-  std::size_t at = now.q.size();
-  for (const auto& part : {bar.v, bar.end_effectors, bar.tactile}) {
-    for (double& x : part) x += weight[at++];
+  weight = weight.subspan(now.q.size());
+  add(bar.v);
+  for (const Reading& reading : readings_) {
+    if (const auto* field = std::get_if<Field>(&reading)) {
+      const std::size_t size = field->map.field_size();
+      const std::span<double> points =
+          out.points.empty() ? out.points : out.points.subspan(kPointNumbers * field->point);
+      field->map.pull_back(now.tactile.subspan(field->first, size),
+                           weight.first(field->map.size()), bar.tactile.subspan(field->first, size),
+                           points);
+      weight = weight.subspan(field->map.size());
+    } else if (const auto* motion = std::get_if<Motion>(&reading)) {
+      add(bar.bodies.subspan(kPose * motion->body, kPose));
+      add(bar.bodies.subspan(twists + kTwist * motion->body, kTwist));
+    } else {
+      const auto& of = std::get<Positions>(reading);
+      add(bar.end_effectors.subspan(of.first, of.count));
+    }
   }
 }
 

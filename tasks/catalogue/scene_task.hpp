@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
-// A scene as a task that rewards nothing: an action is the controls of some steps, and everything
-// that the scene reads is observed. So a tape of a task (tasks/gradients/task_tape.hpp) is also one
-// of any scene.
+// A scene as a task that rewards nothing: an action is the controls of some steps, and chosen
+// readings are observed. So a tape of a task (tasks/gradients/task_tape.hpp) is also one of any
+// scene.
 #pragma once
 
+#include <optional>
 #include <string>
+#include <variant>
 #include <vector>
 
+#include "engine/sense/form_map.hpp"
 #include "tasks/catalogue/task.hpp"
 
 namespace tangere {
@@ -14,10 +17,15 @@ namespace tangere {
 class SceneTask : public Task {
  public:
   /// `steps`: of the simulation for each action. `horizon`: actions of an episode. Observations are
-  /// q (nq), v (nv), the end effectors (n, 3) if there are any, and the field of each sensor (rows,
-  /// columns, 3) in the order of the scene. Throws InputError for a scene that cannot be compiled,
-  /// and for one without motors.
-  SceneTask(const Scene& scene, int steps, int horizon);
+  /// "state.q" (nq), "state.v" (nv) and `readings` by name, in their order:
+  /// - "pad", "pad.pressure", "pad.sum" … of sensors (engine/scene/field_form.hpp);
+  /// - "variables" (n, 3), the end effectors, or one by its name (3);
+  /// - "bodies" (nb, 13), or "bodies.box" (13): x y z, qw qx qy qz, angular, linear velocity.
+  /// Without `readings`: all end effectors, then the field of every sensor. Throws InputError for a
+  /// scene that cannot be compiled, and for a reading that it does not have or that does not follow
+  /// from the field of its sensor.
+  SceneTask(const Scene& scene, int steps, int horizon,
+            const std::optional<std::vector<std::string>>& readings = {});
 
   /// Sets the numbers of <randomize> instead of drawing them, in order, for episodes 0 to
   /// rows.size()/k - 1, where k is their count. Empty: they are drawn. No episode may be played at
@@ -35,6 +43,20 @@ class SceneTask : public Task {
                     const ViewCotangent& out) const override;
 
  private:
+  struct Field {
+    FormMap map;
+    std::size_t first;  ///< number of its sensor's field in Snapshot::tactile
+    std::size_t point;  ///< its sensor's first among the points of all sensors
+  };
+  struct Motion {
+    std::size_t body;
+  };
+  struct Positions {
+    std::size_t first, count;  ///< numbers of Snapshot::end_effectors
+  };
+  using Reading = std::variant<Field, Motion, Positions>;
+
+  std::vector<Reading> readings_;
   std::vector<double> varying_;
 };
 

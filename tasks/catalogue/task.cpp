@@ -4,7 +4,10 @@
 
 #include <fmt/format.h>
 
+#include <numeric>
+
 #include "engine/model/random.hpp"
+#include "engine/rows/episode_channels.hpp"
 
 namespace tangere {
 namespace {
@@ -23,15 +26,26 @@ std::size_t place_of(const Scene& scene, const std::string& name, int (*count)(J
 }  // namespace
 
 Task::Task(const Scene& scene, TaskSpec spec)
-    : model_((spec.check(), scene)), spec_(std::move(spec)) {
+    : model_((spec.check(), scene)), spec_(std::move(spec)), sensors_(spec_.sensors) {
   if (spec_.control_every == 0) spec_.control_every = spec_.steps_per_action;
+  for (const int sensor : sensors_)
+    if (sensor < 0 || sensor >= std::ssize(model_.sensors()))
+      throw InputError(fmt::format("task '{}' reads sensor {}; the scene has {}", spec_.name, sensor,
+                                   model_.sensors().size()));
+  if (!spec_.reads_tactile || !sensors_.empty()) return;
+  sensors_.resize(model_.sensors().size());
+  std::iota(sensors_.begin(), sensors_.end(), 0);
 }
 
 std::size_t Task::tactile_size() const {
   std::size_t numbers = 0;
-  for (const SensorInfo& sensor : model_.sensors())
-    numbers += 3 * static_cast<std::size_t>(sensor.points);
-  return spec_.reads_tactile ? numbers : 0;
+  for (const int sensor : sensors_)
+    numbers += 3 * static_cast<std::size_t>(model_.sensors()[static_cast<std::size_t>(sensor)].points);
+  return numbers;
+}
+
+std::size_t Task::bodies_size() const {
+  return spec_.reads_bodies ? kMotion * static_cast<std::size_t>(model_.nb()) : 0;
 }
 
 std::size_t Task::end_effectors_size() const {

@@ -17,8 +17,11 @@ namespace tangere {
 struct Snapshot {
   std::span<const double> q, v;           ///< (nq), (nv)
   std::span<const double> end_effectors;  ///< (n, 3) positions [m], if TaskSpec requests them
-  std::span<const double>
-      tactile;  ///< (points, 3) [N] of every sensor in turn, if TaskSpec requests them
+  /// (points, 3) [N] of each of Task::sensors() in turn, if TaskSpec requests them
+  std::span<const double> tactile;
+  /// (nb, 7) poses, then (nb, 6) twists of the bodies, as Readout::bodies() returns them, if
+  /// TaskSpec requests them
+  std::span<const double> bodies = {};
 };
 
 /// Inputs of the functions of a task.
@@ -57,11 +60,15 @@ struct SnapshotCotangent {
   std::span<double> q, v;           ///< (nv), (nv)
   std::span<double> end_effectors;  ///< (n, 3)
   std::span<double> tactile;        ///< as in Snapshot
+  std::span<double> bodies = {};    ///< as in Snapshot
 };
 struct ViewCotangent {
   std::span<const SnapshotCotangent> snapshots;  ///< parallel to TaskView::snapshots
   std::span<double> action;
   std::span<double> task_state = {};  ///< (task_state)
+  /// (tactile points, kPointNumbers) of observations that use places of points themselves; empty
+  /// unless requested
+  std::span<double> points = {};
 };
 
 class Task {
@@ -74,8 +81,11 @@ class Task {
 
   [[nodiscard]] const TaskSpec& spec() const { return spec_; }
   [[nodiscard]] const Model& model() const { return model_; }
+  /// Sensors in Snapshot::tactile: TaskSpec::sensors, or all of the scene.
+  [[nodiscard]] std::span<const int> sensors() const { return sensors_; }
   [[nodiscard]] std::size_t tactile_size() const;  ///< numbers in Snapshot::tactile
   [[nodiscard]] std::size_t end_effectors_size() const;
+  [[nodiscard]] std::size_t bodies_size() const;
 
   /// Starts an episode as drawn, unless a task overrides this.
   virtual void start(const TaskStart& start) const;
@@ -130,6 +140,7 @@ class Task {
  private:
   Model model_;
   TaskSpec spec_;
+  std::vector<int> sensors_;
 };
 
 /// Returns a number in [low, high] for an episode. `step` and `index` distinguish the numbers of a

@@ -47,7 +47,9 @@ TapeOptions checked(const Task& task, std::int64_t episodes, const TapeOptions& 
   if (episodes < 1 || options.threads < 1)
     throw InputError(fmt::format("gradients of {} episodes on {} threads; expected at least 1",
                                  episodes, options.threads));
-  return options_for(task, options, "gradients");
+  TapeOptions o = options_for(task, options, "gradients");
+  o.points = false;
+  return o;
 }
 
 /// Numbers of one gradient of an environment, without points.

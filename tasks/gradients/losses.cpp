@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <numeric>
+#include <optional>
 
 #include "engine/scene/imperfection_checks.hpp"
 #include "engine/sense/marker_map.hpp"
@@ -83,11 +84,13 @@ class Markers : public RolloutLoss {
   Markers(const Model& model, int every) : model_(model), every_(every) {
     bool any = false;
     for (const TactileDescription& d : model.scene().sensors) {
+      maps_.emplace_back();
       if (!d.markers) continue;
       any = true;
       if (is_imperfect(d.imperfections) || !d.points.empty())
         throw InputError(d.source.prefix() + "loss 'markers': sensor '" + d.name +
                          "' is imperfect or a list of points; expected an ideal rect_array");
+      maps_.back().emplace(model, static_cast<int>(maps_.size()) - 1);
     }
     if (!any) throw InputError("loss 'markers': no sensor of the scene has <markers>");
   }
@@ -98,14 +101,13 @@ class Markers : public RolloutLoss {
     double squares = 0;
     for (std::size_t s = 0; s < at.fields.size(); ++s) {
       const SensorInfo& info = model_.sensors()[s];
-      if (!model_.scene().sensors[s].markers) continue;
+      if (!maps_[s]) continue;
       const auto points = static_cast<std::size_t>(info.points);
       std::vector<double> field(3 * points), moved(2 * points), cotangent(3 * points);
       at.fields[s]->expand(field);
-      MarkerMap map(model_, static_cast<int>(s));  // losses serve many threads, a map one
-      map.displace(field, moved);
+      maps_[s]->displace(field, moved);
       for (const double x : moved) squares += x * x;
-      map.pull_back(moved, cotangent);
+      maps_[s]->pull_back(moved, cotangent);
       add_to_tiles(*at.fields[s], info, cotangent, out.fields[s]);
     }
     return 0.5 * squares;
@@ -128,6 +130,7 @@ class Markers : public RolloutLoss {
 
   Model model_;
   int every_;
+  std::vector<std::optional<MarkerMap>> maps_;  // (sensors) of those that have markers
 };
 
 class EndEffectors : public RolloutLoss {

@@ -12,6 +12,7 @@
 #include <numeric>
 
 #include "engine/base/as_size.hpp"
+#include "engine/rows/episode_channels.hpp"
 #include "tasks/run/number_row.hpp"
 
 namespace tangere {
@@ -67,7 +68,6 @@ TapeOptions options_for(const Task& task, TapeOptions o, const char* what) {
   if (o.length == 0) o.length = task.spec().horizon;
   if (!(o.tape_bytes > 0))
     throw InputError(fmt::format("tapes of {} bytes; expected a positive number", o.tape_bytes));
-  o.points = false;
   return o;
 }
 
@@ -89,11 +89,12 @@ TaskBlock::TaskBlock(const Task& task, const TapeOptions& options, std::int64_t 
       reward_bar_(kBlock) {
   if (task_.spec().reads_tactile) check_has_no_lag(task_.model());
   const auto end_effectors = lane_rows(task.end_effectors_size()),
-             tactile = lane_rows(task.tactile_size());
-  snapshots_bar_.assign(snapshot_cotangents_.size(), {start_q_, start_v_, end_effectors, tactile});
+             tactile = lane_rows(task.tactile_size()), bodies = lane_rows(task.bodies_size());
+  snapshots_bar_.assign(snapshot_cotangents_.size(),
+                        {start_q_, start_v_, end_effectors, tactile, bodies});
   if (task_.spec().warm_up)
     warm_up_.assign(snapshots_bar_.size() - 1,
-                    {lane_rows(as_size(task.model().nq())), start_v_, end_effectors, tactile});
+                    {lane_rows(as_size(task.model().nq())), start_v_, end_effectors, tactile, bodies});
 }
 
 double TaskBlock::bytes(const Task& task, const TapeOptions& o, std::int64_t blocks) {
@@ -120,6 +121,7 @@ void TaskBlock::start(std::uint64_t seed, EpisodeRange episodes) {
       keep(seen[m].v, warm_up_[m].v);
       keep(seen[m].end_effectors, warm_up_[m].end_effectors);
       keep(seen[m].tactile, warm_up_[m].tactile);
+      keep(seen[m].bodies, warm_up_[m].bodies);
     }
   }
 }
@@ -223,7 +225,8 @@ void TaskBlock::reverse_outcome(const ActionRecord& r, std::int64_t action) {
     if (!r.taken[as_size(l)]) continue;
     const TaskView view =
         rollout_.view(r, action + 1, l, part(r.task_state, l), rollout_.snapshots(l));
-    const ViewCotangent to{cotangents(l), part(action_bar_, l), part(task_state_bar_, l)};
+    const ViewCotangent to{cotangents(l), part(action_bar_, l), part(task_state_bar_, l),
+                           part(adjoint_.loss(0).points, l)};
     const double weight = reward_bar_[as_size(l)];
     if (weight != 0) task_.reward_vjp(view, weight, to);
     reverse_observation(view, l, to);
@@ -231,7 +234,7 @@ void TaskBlock::reverse_outcome(const ActionRecord& r, std::int64_t action) {
 }
 
 void TaskBlock::clear_snapshots() {
-  for (SnapshotRows& m : snapshots_bar_) clear({&m.q, &m.v, &m.end_effectors, &m.tactile});
+  for (SnapshotRows& m : snapshots_bar_) clear({&m.q, &m.v, &m.end_effectors, &m.tactile, &m.bodies});
 }
 
 /// Pulls cotangents of a lane's observation and state back and adds them. An observation with zero
@@ -258,23 +261,28 @@ void TaskBlock::add_snapshot(std::size_t moment) {
       c.v[i * kBlock + as_size(l)] += v[i];
     }
   }
-  if (m.end_effectors.empty() && m.tactile.empty()) return;
+  if (m.end_effectors.empty() && m.tactile.empty() && m.bodies.empty()) return;
   pullback_.place(rollout_.batch(), 0);
   pullback_.clear();
-  for (int l = 0; l < lanes(); ++l) add_fields(moment, l);
+  for (int l = 0; l < lanes(); ++l) add_readings(moment, l);
   pullback_.finish(c);
 }
 
-void TaskBlock::add_fields(std::size_t moment, int lane) {
-  const std::span<const double> end_effectors = part(snapshots_bar_[moment].end_effectors, lane);
+void TaskBlock::add_readings(std::size_t moment, int lane) {
+  const std::span<const double> end_effectors = part(snapshots_bar_[moment].end_effectors, lane),
+                                bodies = part(snapshots_bar_[moment].bodies, lane);
   std::span<const double> fields = part(snapshots_bar_[moment].tactile, lane);
   for (std::size_t k = 0; 3 * k < end_effectors.size(); ++k)
     pullback_.end_effector(lane, static_cast<int>(k), end_effectors.subspan(3 * k, 3));
-  const auto sensors = task_.model().sensors();
-  for (std::size_t s = 0; s < sensors.size() && !fields.empty(); ++s) {
-    const std::size_t numbers = 3 * as_size(sensors[s].points);
-    pullback_.dense_field(lane, static_cast<int>(s), fields.first(numbers),
-                          adjoint_.loss(0).parameters);
+  const std::size_t nb = bodies.size() / kMotion;
+  for (std::size_t b = 0; b < nb; ++b)
+    pullback_.body(lane, static_cast<int>(b), bodies.subspan(7 * b, 7),
+                   bodies.subspan(7 * nb + 6 * b, 6));
+  BlockCotangent& c = adjoint_.loss(0);
+  for (const int s : task_.sensors()) {
+    const std::size_t numbers = 3 * as_size(task_.model().sensors()[as_size(s)].points);
+    pullback_.dense_field(lane, s, fields.first(numbers), c.parameters,
+                          c.points_of(task_.model(), s, lane));
     fields = fields.subspan(numbers);
   }
 }
@@ -332,7 +340,8 @@ std::span<const SnapshotCotangent> TaskBlock::cotangents(int lane) {
   for (std::size_t m = 0; m < snapshots_bar_.size(); ++m) {
     SnapshotRows& rows = snapshots_bar_[m];
     snapshot_cotangents_[m] = {part(rows.q, lane), part(rows.v, lane),
-                               part(rows.end_effectors, lane), part(rows.tactile, lane)};
+                               part(rows.end_effectors, lane), part(rows.tactile, lane),
+                               part(rows.bodies, lane)};
   }
   return snapshot_cotangents_;
 }
@@ -354,7 +363,8 @@ void TaskBlock::add_start_to_shown() {
 }
 
 void TaskBlock::reverse_reset(const ActionCotangents& by, std::span<double> q_bar,
-                              std::span<double> v_bar, std::span<double> parameter_bar) {
+                              std::span<double> v_bar, std::span<double> parameter_bar,
+                              std::span<double> point_bar) {
   add_to_shown(by);
   add_start_to_shown();
   clear_snapshots();
@@ -367,13 +377,14 @@ void TaskBlock::reverse_reset(const ActionCotangents& by, std::span<double> q_ba
     for (std::size_t m = 0; m < warm_up_.size(); ++m) {
       const SnapshotRows& kept = warm_up_[m];
       seen[m] = {part(kept.q, l), part(kept.v, l), part(kept.end_effectors, l),
-                 part(kept.tactile, l)};
+                 part(kept.tactile, l), part(kept.bodies, l)};
     }
     view.actions = 0;
     view.action = no_action;
     if (taken_ > 0) view.task_state = part(records_[0].found, l);
     view.snapshots = seen;
-    reverse_observation(view, l, {cotangents(l).last(seen.size()), by_no_action, task_state_bar});
+    reverse_observation(view, l, {cotangents(l).last(seen.size()), by_no_action, task_state_bar,
+                                 part(adjoint_.loss(0).points, l)});
   }
   add_snapshot(snapshots_bar_.size() - 1);
   for (int l = 0; l < lanes(); ++l) {
@@ -381,7 +392,7 @@ void TaskBlock::reverse_reset(const ActionCotangents& by, std::span<double> q_ba
       const std::size_t width = all.size() / as_size(lanes());
       return all.subspan(as_size(l) * width, width);
     };
-    get_start(0, rollout_.batch(), l, own(q_bar), own(v_bar), own(parameter_bar), {});
+    get_start(0, rollout_.batch(), l, own(q_bar), own(v_bar), own(parameter_bar), own(point_bar));
   }
 }
 

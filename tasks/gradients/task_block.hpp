@@ -13,7 +13,7 @@
 
 namespace tangere {
 
-/// Options for a task: with the final number of actions, without points. `what` is for messages.
+/// Options for a task: with the final number of actions. `what` is for messages.
 /// Throws InputError for numbers out of range.
 TapeOptions options_for(const Task& task, TapeOptions options, const char* what);
 
@@ -39,9 +39,9 @@ class TaskBlock : public TapeBlock {
   /// the block's lanes, in their order.
   void reverse(std::int64_t action, const ActionCotangents& by, std::span<double> action_bar);
   /// Ends the reverse pass: takes cotangents of the results of the reset, and fills those of the
-  /// first states and the scene's parameters. Skips empty spans.
+  /// first states, the scene's parameters and its sensors' points. Skips empty spans.
   void reverse_reset(const ActionCotangents& by, std::span<double> q_bar, std::span<double> v_bar,
-                     std::span<double> parameter_bar);
+                     std::span<double> parameter_bar, std::span<double> point_bar);
 
   /// Plays up to 16 episodes and reverses their returns. Writes results to places `to`, to + 1 … of
   /// `out`, and failures with these places as their numbers.
@@ -54,7 +54,7 @@ class TaskBlock : public TapeBlock {
  private:
   /// Rows of lanes: the numbers of one snapshot, or their cotangents.
   struct SnapshotRows {
-    std::vector<double> q, v, end_effectors, tactile;  // (16, width)
+    std::vector<double> q, v, end_effectors, tactile, bodies;  // (16, width)
   };
   void take_steps(std::int64_t action, BlockTape* tape) override;
   void retake_steps(std::int64_t action, bool from_checkpoint, BlockTape& tape) override;
@@ -65,7 +65,7 @@ class TaskBlock : public TapeBlock {
   void reverse_outcome(const ActionRecord& r, std::int64_t action);
   void reverse_observation(const TaskView& view, int lane, const ViewCotangent& to);
   void add_snapshot(std::size_t moment);
-  void add_fields(std::size_t moment, int lane);
+  void add_readings(std::size_t moment, int lane);
   void reverse_controls(const ActionRecord& r, std::int64_t action, int step,
                         const BlockTape& tape);
   void reverse_start(const ActionRecord& r, std::int64_t action);

@@ -54,6 +54,9 @@ TaskTangent::TaskTangent(TaskRollout& rollout, std::span<const double> actions,
       readout_(task_.model()),
       memory_(as_size(task_.spec().task_state)),
       action_(task_.spec().action.size()) {
+  if (task_.bodies_size() > 0)
+    throw InputError("task " + task_.spec().name +
+                     " reads bodies, which have no forward derivatives; expected end effectors");
   for (std::size_t a = 0; a * action_.size() < actions.size(); ++a) {
     ActionRecord& r = records_.emplace_back(task_);
     const auto own = actions.subspan(a * action_.size(), action_.size());
@@ -185,11 +188,9 @@ void TaskTangent::look(const BlockTape& tape, int step, std::size_t moment,
           product(std::span(jacobian).subspan(i * nv, nv), state_.q));
   }
   if (task_.tactile_size() == 0) return;
-  const auto sensors = task_.model().sensors();
-  for (std::size_t s = 0; s < sensors.size(); ++s) {
-    std::vector<double> change(3 * as_size(sensors[s].points));
-    tangent_.field(rollout_.batch(), 0, 0, tape, step, static_cast<int>(s), numbers, {}, state_,
-                   change);
+  for (const int s : task_.sensors()) {
+    std::vector<double> change(3 * as_size(task_.model().sensors()[as_size(s)].points));
+    tangent_.field(rollout_.batch(), 0, 0, tape, step, s, numbers, {}, state_, change);
     seen.tactile[moment].insert(seen.tactile[moment].end(), change.begin(), change.end());
   }
 }

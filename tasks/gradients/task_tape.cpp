@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "engine/base/as_size.hpp"
+#include "engine/derivative/tactile_point_numbers.hpp"
 #include "tasks/gradients/task_block.hpp"
 #include "tasks/run/block_threads.hpp"
 
@@ -24,6 +25,7 @@ TapeOptions checked(const Task& task, int environments, const TapeOptions& o) {
   if (environments < 1 || o.threads < 1)
     throw InputError(fmt::format("a tape of {} environments on {} threads; expected at least 1",
                                  environments, o.threads));
+  if (o.points) check_has_plain_points(task.model());
   return options_for(task, o, "a tape");
 }
 
@@ -49,6 +51,7 @@ struct TaskTape::Impl {
         width(t.spec().action.size()),
         seen(t.spec().observation_size()),
         numbers(options.parameters ? as_size(NumberGradients(t.model()).count()) : 0),
+        point_numbers(options.points ? as_size(tactile_points(t.model()) * kPointNumbers) : 0),
         observation(e * seen),
         reward(e),
         q(e * nq),
@@ -152,7 +155,7 @@ struct TaskTape::Impl {
 
   const Task& task;
   const TapeOptions options;
-  const std::size_t e, nq, nv, width, seen, numbers;  // numbers of one environment
+  const std::size_t e, nq, nv, width, seen, numbers, point_numbers;  // of one environment
   std::vector<double> observation, reward, q, v;
   std::vector<std::uint8_t> alive, terminated, truncated, success;
   std::vector<StepStatus> status;
@@ -219,12 +222,14 @@ void TaskTape::reverse(const ActionCotangents& by, std::span<double> action_bar)
 }
 
 void TaskTape::reverse_start(const ActionCotangents& by, std::span<double> q_bar,
-                             std::span<double> v_bar, std::span<double> parameter_bar) {
+                             std::span<double> v_bar, std::span<double> parameter_bar,
+                             std::span<double> point_bar) {
   Impl& i = *impl_;
   i.check_cotangents(by);
   expect_numbers(q_bar.size(), i.e * i.nv, true, "derivatives by the first q");
   expect_numbers(v_bar.size(), i.e * i.nv, true, "derivatives by the first v");
   expect_numbers(parameter_bar.size(), i.e * i.numbers, true, "derivatives by the scene's numbers");
+  expect_numbers(point_bar.size(), i.e * i.point_numbers, true, "derivatives by tactile points");
   i.check_sound();
   if (i.phase == Phase::done)
     throw InputError("a second end of a reverse pass; expected begin_reverse() or reset()");
@@ -235,7 +240,8 @@ void TaskTape::reverse_start(const ActionCotangents& by, std::span<double> q_bar
                     i.to_reverse(), i.taken));
   if (i.phase == Phase::forward) i.begin_reverse();
   i.each(Phase::done, [&](TaskBlock& block, int b) {
-    block.reverse_reset(i.of(by, b), i.of(q_bar, b), i.of(v_bar, b), i.of(parameter_bar, b));
+    block.reverse_reset(i.of(by, b), i.of(q_bar, b), i.of(v_bar, b), i.of(parameter_bar, b),
+                        i.of(point_bar, b));
   });
 }
 

@@ -21,9 +21,9 @@ namespace tangere {
 /// simulation has failed, keeps its last state and observation.
 class TaskTape {
  public:
-  /// Makes E environments and resets them. `task` must outlive this object. options.points is not
-  /// used. Throws InputError for numbers of environments, actions or threads out of range, and for
-  /// a tape_bytes that does not hold the checkpoints.
+  /// Makes E environments and resets them. `task` must outlive this object. Throws
+  /// InputError for numbers of environments, actions or threads out of range, for a tape_bytes that
+  /// does not hold the checkpoints, and for points where a sensor has ks.
   TaskTape(const Task& task, int environments, const TapeOptions& options = {},
            std::uint64_t seed = 0, std::int64_t first_episode = 0);
   ~TaskTape();
@@ -72,12 +72,13 @@ class TaskTape {
   void reverse(const ActionCotangents& by, std::span<double> action_bar);
   /// Ends the reverse pass. In: cotangents of the observation at the reset and of the states at the
   /// first action (rewards are ignored). Out: cotangents of these states, (E, nv) each, positions
-  /// along the dofs of v, and (E, NumberGradients::count()) of the scene's parameters if requested.
+  /// along the dofs of v, and, if options request them, (E, NumberGradients::count()) of the scene's
+  /// parameters and (E, tactile_points(), kPointNumbers) of points of sensors.
   /// Empty output spans are skipped. The reset, all random draws and snapshots of a warm-up before
   /// its last one count as constant. Throws InputError while steps are left to reverse, and at a
   /// second call.
   void reverse_start(const ActionCotangents& by, std::span<double> q_bar, std::span<double> v_bar,
-                     std::span<double> parameter_bar = {});
+                     std::span<double> parameter_bar = {}, std::span<double> point_bar = {});
   /// Begins another reverse pass over the same steps, from the last one.
   void begin_reverse();
 

@@ -49,14 +49,15 @@ void read_field(Readout& readout, const Batch& batch, int block, FieldOutput out
   readout.read_block(batch, block, output, std::span<const std::span<T>>(places));
 }
 
-/// Reads the fields of all sensors in one form, one after the other: (points of all sensors, 3).
+/// Reads the fields of some sensors in one form, one after the other: (points of all of them, 3).
 template <class T, class Place>
-void read_all_fields(Readout& readout, const Batch& batch, int block, FieldForm form,
-                     const Place& place) {
+void read_fields(Readout& readout, const Batch& batch, int block, std::span<const int> sensors,
+                 FieldForm form, const Place& place) {
   std::size_t offset = 0;
-  for (std::size_t s = 0; s < batch.model().sensors().size(); ++s) {
-    const std::size_t numbers = 3 * static_cast<std::size_t>(batch.model().sensors()[s].points);
-    read_field<T>(readout, batch, block, {static_cast<int>(s), form},
+  for (const int s : sensors) {
+    const std::size_t numbers =
+        3 * static_cast<std::size_t>(batch.model().sensors()[static_cast<std::size_t>(s)].points);
+    read_field<T>(readout, batch, block, {s, form},
                   [&](int e) { return place(e).subspan(offset, numbers); });
     offset += numbers;
   }

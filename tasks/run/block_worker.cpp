@@ -83,10 +83,11 @@ BlockWorker::BlockWorker(const Task& task, Precision precision)
   v_.resize(moments * kBlock * as_size(task.model().nv()));
   end_effectors_.resize(moments * kBlock * task.end_effectors_size());
   tactile_.resize(moments * kBlock * task.tactile_size());
+  bodies_.resize(moments * kBlock * task.bodies_size());
   for (int lane = 0; lane < kBlock; ++lane)
     for (std::size_t m = 0; m < moments; ++m)
       moments_.push_back({part(q_, m, lane), part(v_, m, lane), part(end_effectors_, m, lane),
-                          part(tactile_, m, lane)});
+                          part(tactile_, m, lane), part(bodies_, m, lane)});
   if (spec.settling_steps == 0) return;
   StepperOptions options;
   options.timestep = spec.settling_timestep;
@@ -95,7 +96,8 @@ BlockWorker::BlockWorker(const Task& task, Precision precision)
 
 double BlockWorker::bytes(const Task& task) {
   const std::size_t numbers = as_size(task.model().nq()) + as_size(task.model().nv()) +
-                              task.end_effectors_size() + task.tactile_size();
+                              task.end_effectors_size() + task.tactile_size() +
+                              task.bodies_size();
   return static_cast<double>(task.spec().snapshots.size() * kBlock * numbers * sizeof(double));
 }
 
@@ -240,8 +242,13 @@ void BlockWorker::read_snapshot(const Batch& batch, int block, std::size_t momen
   read_states(batch, block, place(q_), place(v_));
   if (task_.end_effectors_size() > 0)
     read_end_effectors(readout_, batch, block, place(end_effectors_));
-  if (task_.spec().reads_tactile)
-    read_all_fields<double>(readout_, batch, block, FieldForm::field, place(tactile_));
+  read_fields<double>(readout_, batch, block, task_.sensors(), FieldForm::field, place(tactile_));
+  if (task_.bodies_size() == 0) return;
+  const std::size_t poses = 7 * as_size(task_.model().nb());
+  for (int e = first; e < first + lanes_of(batch, block); ++e) {
+    const std::span<double> own = part(bodies_, moment, e - first);
+    readout_.bodies(batch, e, own.first(poses), own.subspan(poses));
+  }
 }
 
 void BlockWorker::conclude_one(Batch& batch, EnvironmentData& data, int environment,

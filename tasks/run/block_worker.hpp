@@ -78,7 +78,7 @@ class BlockWorker {
   std::optional<Stepper> settling_stepper_;
   std::optional<Batch> settling_;                        // one environment
   std::vector<double> varying_;                          // values of the environment that starts
-  std::vector<double> q_, v_, end_effectors_, tactile_;  // (snapshots, 16, width)
+  std::vector<double> q_, v_, end_effectors_, tactile_, bodies_;  // (snapshots, 16, width)
   std::vector<Snapshot> moments_;                        // (16, snapshots): views of them
 };
 
