@@ -30,6 +30,7 @@ using kernels::Vec6;
 namespace {
 
 constexpr int kGroups = kBlock / kGroup;
+constexpr int kStiffness = 0, kDamping = 3;  // coefficients of the normal force
 
 }  // namespace
 
@@ -44,6 +45,7 @@ struct ReadoutPullback::Impl {
   AlignedVector<LaneRow> rows;  ///< q, v, zeros, rates, q̄, v̄ of one group
   AlignedVector<std::byte> scratch;
   std::vector<kernels::TouchCotangent<double>> touches;
+  std::vector<kernels::Touch<double>> frictionless;
   std::vector<int> tiles;  ///< tiles of a whole field that are not zero
   std::vector<double> of_tiles;
   AlignedVector<double> own;  ///< (tiles, kPointNumbers, 64)
@@ -62,8 +64,7 @@ struct ReadoutPullback::Impl {
       bytes = std::max(bytes, t->pullback_bytes(c.view));
     for (const CompiledSensor& s : c.sensors) {
       targets = std::max(targets, s.targets.size());
-      if (s.imperfect || s.elastic)
-        whole.resize(std::max(whole.size(), 3 * std::size_t(s.points())));
+      whole.resize(std::max(whole.size(), 3 * std::size_t(s.points())));
     }
     ideal.resize(whole.size());
     scratch.resize(bytes);
@@ -77,7 +78,7 @@ struct ReadoutPullback::Impl {
 
   /// Adds the derivatives by the points' own numbers, turned from pad axes to the body's.
   void hand_on_points(const CompiledSensor& s, std::span<const int> touched,
-                      std::span<double> points) const {
+                      std::span<double> points, bool pressure) const {
     const kernels::PadTiles pad = s.tiles();
     const kernels::Mat3<double> turn =
         transpose(compiled(model).bodies[std::size_t(s.body)].frame.R) * s.pad.R;
@@ -88,7 +89,8 @@ struct ReadoutPullback::Impl {
         const Vec3<double> place = turn * Vec3<double>{number(0), number(1), number(2)};
         double* to = &points[std::size_t(point * kPointNumbers)];
         to[0] += place.x, to[1] += place.y, to[2] += place.z;
-        for (int k = 3; k < kPointNumbers; ++k) to[k] += number(k);
+        for (int k = 0; k < kPointCoefficients; ++k)
+          if (!pressure || k == kStiffness || k == kDamping) to[3 + k] += number(3 + k);
       });
   }
 
@@ -127,7 +129,7 @@ struct ReadoutPullback::Impl {
 
   void pull_back(int lane, int sensor, std::span<const int> touched,
                  std::span<const double> cotangents, std::span<double> parameters,
-                 std::span<double> points);
+                 std::span<double> points, bool pressure = false);
 
   /// Pulls the cotangent in `whole` of an elastic sensor's field back.
   void pull_back_elastic(int lane, const CompiledSensor& s, std::span<double> parameters,
@@ -198,19 +200,25 @@ void ReadoutPullback::clear() {
 
 void ReadoutPullback::Impl::pull_back(int lane, int sensor, std::span<const int> touched,
                                       std::span<const double> cotangents,
-                                      std::span<double> parameters, std::span<double> points) {
+                                      std::span<double> parameters, std::span<double> points,
+                                      bool pressure) {
   if (touched.empty()) return;
   const int group = lane / kGroup, in_group = lane % kGroup;
   find_touches(group, sensor);
   const CompiledModel& m = compiled(model);
   const CompiledSensor& s = m.sensors[std::size_t(sensor)];
-  const auto a = reader.arguments<double>(sensor, group, in_group);
+  auto a = reader.arguments<double>(sensor, group, in_group);
+  if (pressure) {
+    frictionless.assign(a.touches, a.touches + a.n_touches);
+    for (kernels::Touch<double>& t : frictionless) t.law.kt = t.law.mu = 0;
+    a.touches = frictionless.data();
+  }
   if (!points.empty()) own.assign(touched.size() * kPointNumbers * kernels::kTactileTile, 0.0);
   kernels::active_kernels().pull_back_field(
       {a.pad, a.law, a.n_touches, a.shapes, a.touches, static_cast<int>(touched.size()),
        touched.data(), cotangents.data(), !parameters.empty(),
        points.empty() ? nullptr : own.data(), touches.data()});
-  if (!points.empty()) hand_on_points(s, touched, points);
+  if (!points.empty()) hand_on_points(s, touched, points, pressure);
   used[std::size_t(group)] = true;
   const int row = m.view.rows.sensor(sensor);
   for (std::size_t k = 0; k < s.targets.size(); ++k) {
@@ -218,7 +226,8 @@ void ReadoutPullback::Impl::pull_back(int lane, int sensor, std::span<const int>
     hand_on(c, s.link, s.pad, m.bodies[std::size_t(s.targets[k])].link, group, in_group);
     if (parameters.empty()) continue;
     const auto add = [&](int at, double x) { parameters[std::size_t(at * kBlock + lane)] += x; };
-    for (int n = 0; n < kCoefficients; ++n) add(row + n, c.law[std::size_t(n)]);
+    for (int n = 0; n < kCoefficients; ++n)
+      if (!pressure || n == kStiffness || n == kDamping) add(row + n, c.law[std::size_t(n)]);
     const int size = m.view.rows.solid(s.targets[k]);
     add(size, c.size.x), add(size + 1, c.size.y), add(size + 2, c.size.z);
   }
@@ -256,6 +265,22 @@ void ReadoutPullback::dense_field(int lane, int sensor, std::span<const double> 
   impl_->pull_back(lane, sensor, impl_->tiles, impl_->of_tiles, parameters, points);
 }
 
+void ReadoutPullback::pressure(int lane, int sensor, std::span<const double> cotangents,
+                               std::span<double> parameters, std::span<double> points) {
+  Impl& i = *impl_;
+  check_has_no_lag(i.model, sensor);
+  const CompiledSensor& s = compiled(i.model).sensors[std::size_t(sensor)];
+  if (s.imperfect)
+    throw InputError("derivatives by the pressure of the imperfect sensor '" +
+                     i.model.sensors()[std::size_t(sensor)].name +
+                     "' are not known; expected those by its field");
+  const std::span<double> field = std::span(i.whole).first(3 * cotangents.size());
+  std::fill(field.begin(), field.end(), 0.0);
+  for (std::size_t k = 0; k < cotangents.size(); ++k) field[3 * k + 2] = cotangents[k];
+  i.gather(s, field);
+  i.pull_back(lane, sensor, i.tiles, i.of_tiles, parameters, points, true);
+}
+
 void ReadoutPullback::end_effector(int lane, int end_effector, std::span<const double> cotangent) {
   Impl& i = *impl_;
   const CompiledEndEffector& v = compiled(i.model).end_effectors[std::size_t(end_effector)];
@@ -286,8 +311,8 @@ void ReadoutPullback::body(int lane, int body, std::span<const double> pose,
   const kernels::Quat<double> q = quaternion_of(compose(at.world, b.frame).R);
   const Vec3<double> imaginary{q.x, q.y, q.z}, bar{pose[4], pose[5], pose[6]};
   const Vec3<double> turn = 0.5 * (q.w * bar - pose[3] * imaginary + cross(imaginary, bar));
-  const Vec3<double> angle = transposed_times(at.world.R, turn) + cross(c, x) +
-                             cross(at.V.a, omega) + cross(rate, v);
+  const Vec3<double> angle =
+      transposed_times(at.world.R, turn) + cross(c, x) + cross(at.V.a, omega) + cross(rate, v);
   kernels::MotionCotangent<LaneRow>* const to = i.link(group, b.link);
   add_to_lane<kGroup>(to->pose, {angle, x}, lane % kGroup, 1);
   add_to_lane<kGroup>(to->twist, {omega + cross(c, v), v}, lane % kGroup, 1);

@@ -43,6 +43,10 @@ class ReadoutPullback {
   /// The same for `cotangents` of the whole field, (points, 3).
   void dense_field(int lane, int sensor, std::span<const double> cotangents,
                    std::span<double> parameters = {}, std::span<double> points = {});
+  /// The same for `cotangents` of the pressure, (points): the force without friction. Throws
+  /// InputError for an imperfect sensor.
+  void pressure(int lane, int sensor, std::span<const double> cotangents,
+                std::span<double> parameters = {}, std::span<double> points = {});
   /// Takes the cotangent of an end effector's world position, (3).
   void end_effector(int lane, int end_effector, std::span<const double> cotangent);
   /// Takes the cotangents of a body's pose (7) and twist (6), as Readout::bodies() returns them. The

@@ -8,6 +8,8 @@
 #include <string>
 #include <vector>
 
+#include "engine/scene/field_form.hpp"
+
 namespace tangere {
 
 /// An array of numbers that an environment receives or returns.
@@ -50,7 +52,9 @@ struct TaskSpec {
   int task_state = 0;  ///< count of numbers that the task keeps per episode: a goal, a force
   /// Readings in a Snapshot besides q and v.
   bool reads_end_effectors = false, reads_tactile = false, reads_bodies = false;
-  std::vector<int> sensors = {};  ///< that are read, by index; none: all of the scene
+  /// With reads_tactile: fields and pressures that are read, in order; none: the field of every
+  /// sensor.
+  std::vector<FieldOutput> fields = {};
 
   [[nodiscard]] std::size_t observation_size() const;
   /// Throws InputError when something is missing or contradicts something else.

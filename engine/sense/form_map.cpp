@@ -75,6 +75,8 @@ struct FormMap::Impl {
       throw InputError(output_name(m.sensors()[std::size_t(of.sensor)].name, of.form) +
                        ": the sensor is imperfect, and this form is of its ideal field; expected a "
                        "form of its reading");
+    if (of.form == FieldForm::pressure)
+      throw InputError("a pressure leaves friction out, so it does not follow from the field");
     pad = s.tiles();
     in_body = relative(compiled(m).bodies[std::size_t(s.body)].frame, s.pad);
     pressure_sign = m.sensors()[std::size_t(of.sensor)].pressure_sign;
@@ -154,9 +156,7 @@ void FormMap::evaluate(std::span<const double> field, std::span<double> form) co
   switch (m.output.form) {
     case FieldForm::field:
     case FieldForm::ideal: std::copy(field.begin(), field.end(), form.begin()); return;
-    case FieldForm::pressure:
-      for (std::size_t k = 0; k < form.size(); ++k) form[k] = field[3 * k + 2];
-      return;
+    case FieldForm::pressure: return;  // refused by the constructor
     case FieldForm::shear:
       for (std::size_t k = 0; k < form.size(); ++k) form[k] = field[k / 2 * 3 + k % 2];
       return;
@@ -178,12 +178,9 @@ void FormMap::pull_back(std::span<const double> field, std::span<const double> f
     case FieldForm::ideal:
       for (std::size_t i = 0; i < form_bar.size(); ++i) field_bar[i] += form_bar[i];
       return;
-    case FieldForm::pressure:
-      for (std::size_t k = 0; k < form_bar.size(); ++k) field_bar[3 * k + 2] += form_bar[k];
-      return;
+    case FieldForm::pressure: return;  // refused by the constructor
     case FieldForm::shear:
-      for (std::size_t k = 0; k < form_bar.size(); ++k)
-        field_bar[k / 2 * 3 + k % 2] += form_bar[k];
+      for (std::size_t k = 0; k < form_bar.size(); ++k) field_bar[k / 2 * 3 + k % 2] += form_bar[k];
       return;
     case FieldForm::sum: m.pull_back_sum(field, form_bar, field_bar, point_bar); return;
     case FieldForm::markers: m.markers->pull_back(form_bar, field_bar); return;

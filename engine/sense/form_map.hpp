@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Forms of a field as functions of the field of their sensor (engine/scene/field_form.hpp), and
-// their pullbacks. Pressure, shear and markers are linear; a flow is a quotient. Of a sum, with a
+// their pullbacks. Shear and markers are linear; a flow is a quotient. Of a sum, with a
 // point's place x_i and its pressing force p_i = max(0, sign f_3,i):
 //
 //   F = Σ_i R_iᵀ f_i,  c = Σ_i p_i x_i / P,  P = Σ_i p_i,  ∂c/∂p_i = (x_i - c)/P,  ∂c/∂x_i = p_i/P
@@ -19,7 +19,8 @@ namespace tangere {
 class FormMap {
  public:
   /// Throws InputError for a sensor or body that does not exist, for markers of a sensor without
-  /// them, and for `ideal` and `markers` of an imperfect sensor: its field does not determine them.
+  /// them, for `ideal` and `markers` of an imperfect sensor, and for `pressure`, which leaves friction
+  /// out: the field does not determine them.
   FormMap(const Model& model, FieldOutput output);
   ~FormMap();
   FormMap(FormMap&&) noexcept;
@@ -29,8 +30,7 @@ class FormMap {
   [[nodiscard]] std::size_t size() const;        ///< numbers_of(points, form)
 
   /// Computes the form, (size), from the field, (field_size) [N]. The bits are those of
-  /// Readout::read_block(), unless a sum is of a pad whose axes are not perpendicular: that one
-  /// differs by rounding.
+  /// Readout::read_block(), but the sum of a pad whose axes are not perpendicular differs by rounding.
   void evaluate(std::span<const double> field, std::span<double> form) const;
   /// Adds to `field_bar`, (field_size), the pullback of `form_bar`, (size), at `field`. A flow
   /// changes with the first point of the largest shear. Points that do not press have no derivative

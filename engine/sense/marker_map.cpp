@@ -15,9 +15,7 @@ namespace tangere {
 struct MarkerMap::Impl {
   CompiledMarkers of;
 
-  [[nodiscard]] std::size_t size() const {
-    return 2 * std::size_t(of.rows) * std::size_t(of.cols);
-  }
+  [[nodiscard]] std::size_t size() const { return 2 * std::size_t(of.rows) * std::size_t(of.cols); }
 
   /// Calls f(point, component, point ahead, point behind, 1/(distance of the two)) for all places
   /// and axes with a difference.
@@ -70,7 +68,8 @@ void MarkerMap::displace(std::span<const double> field, std::span<double> displa
   std::copy(moved.begin(), moved.end(), displacement.begin());
 }
 
-void MarkerMap::pull_back(std::span<const double> of_displacement, std::span<double> of_field) const {
+void MarkerMap::pull_back(std::span<const double> of_displacement,
+                          std::span<double> of_field) const {
   const Impl& m = *impl_;
   const double press = m.of.pressure_sign * m.of.bulge;
   thread_local std::vector<double> moved;  // (points, 2)

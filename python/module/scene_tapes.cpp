@@ -122,6 +122,11 @@ class SceneTape {
     const nb::gil_scoped_release free;
     tape().step(rows);
   }
+  void check_step(const Argument<double>& controls) {
+    const std::vector<double> rows = rows_of(controls, count(), as_size(model().nu()), "controls");
+    const InUse::Turn turn(in_use_);
+    tape().check_step(rows);
+  }
   Array<double> observations() {
     const InUse::Turn turn(in_use_);
     return array_of<double>({count(), width()}, tape().observations());
@@ -224,8 +229,7 @@ class SceneTape {
       std::array<double, kPointNumbers> scale;
       scale.fill(1);
       for (int k = 0; k < kPointNumbers - 3; ++k) {
-        const SceneNumber number{NumberOwner::tactile, coefficient_field(k),
-                                 scene.sensors[s].name};
+        const SceneNumber number{NumberOwner::tactile, coefficient_field(k), scene.sensors[s].name};
         const int varying = randomization_of(scene, number);
         const double nominal = scene.sensors[s].coefficients[as_size(k)];
         if (varying >= 0 && nominal != 0)
@@ -283,21 +287,26 @@ void add_scene_tapes(nb::module_& m) {
                 {scene, parameters, readings, every.value("every"), envs.value("envs"), options});
           },
           "scene"_a, "envs"_a, "steps"_a, "every"_a = 1, "readings"_a = nb::none(),
-          "parameters"_a = std::vector<std::string>{}, "points"_a = false,
-          "threads"_a = nb::none(), "precision"_a = "double", "tape_bytes"_a = 1e9,
-          "`steps`: calls of step() at most. `every`: steps of the simulation in each. `readings`:\n"
+          "parameters"_a = std::vector<std::string>{}, "points"_a = false, "threads"_a = nb::none(),
+          "precision"_a = "double", "tape_bytes"_a = 1e9,
+          "`steps`: calls of step() at most. `every`: steps of the simulation in each. "
+          "`readings`:\n"
           "names, such as pad, pad.sum, bodies.box, variables or an end effector; None: all end\n"
-          "effectors and fields. `parameters`: names of numbers of the scene that environments may\n"
+          "effectors and fields. `parameters`: names of numbers of the scene that environments "
+          "may\n"
           "have of their own. `points`: whether there are derivatives by points of sensors.\n"
           "InputError: a number is out of range, or a name is unknown.")
-      .def("reset", &SceneTape::reset, "seed"_a = 0, "q"_a = nb::none(), "v"_a = nb::none(),
-           "parameters"_a = nb::none(), "points"_a = nb::none(),
-           "Starts anew and clears the tape. `q` (E, nq), `v` (E, nv) and `parameters`\n"
-           "(E, names) take the place of what the scene draws; one row stands for all. `points`\n"
-           "(points of all sensors, 7) moves points of sensors: x, y, z [m] in their body's frame,\n"
-           "and kn, kt, mu, damping are added to their own. The scene is compiled again where it\n"
-           "differs from that of the last reset.")
+      .def(
+          "reset", &SceneTape::reset, "seed"_a = 0, "q"_a = nb::none(), "v"_a = nb::none(),
+          "parameters"_a = nb::none(), "points"_a = nb::none(),
+          "Starts anew and clears the tape. `q` (E, nq), `v` (E, nv) and `parameters`\n"
+          "(E, names) take the place of what the scene draws; one row stands for all. `points`\n"
+          "(points of all sensors, 7) moves points of sensors: x, y, z [m] in their body's frame,\n"
+          "and kn, kt, mu, damping are added to their own. The scene is compiled again where it\n"
+          "differs from that of the last reset.")
       .def("step", &SceneTape::step, "controls"_a, "Takes the controls (E, nu) of `every` steps.")
+      .def("check_step", &SceneTape::check_step, "controls"_a,
+           "Raises InputError if step() would do so for these controls; takes no step.")
       .def("observations", &SceneTape::observations,
            "(E, n) float64: q, v, end effectors and fields, one after the other.")
       .def("status", &SceneTape::status, "(E) int8: StepStatus of the last steps.")
@@ -320,7 +329,8 @@ void add_scene_tapes(nb::module_& m) {
       // Copies: a reset with other points makes others.
       .def_prop_ro("spec", [](const SceneTape& s) { return TaskSpec(s.spec()); })
       .def_prop_ro("model", [](const SceneTape& s) { return Model(s.model()); })
-      .def_prop_ro("points", &SceneTape::point_count, "Of all sensors; 0 without their derivatives.")
+      .def_prop_ro("points", &SceneTape::point_count,
+                   "Of all sensors; 0 without their derivatives.")
       .def_prop_ro("envs", &SceneTape::count);
 }
 

@@ -9,14 +9,14 @@
 
     value, gradient = jax.jit(jax.value_and_grad(loss))(params)
 
+`Simulation` does the same for any scene, with losses of the caller.
+
 The derivatives are analytic (docs/gradients.md). Draws, resets and which point is touched count as
 given. It runs on JAX's CPU backend. `import tangere` does not import this module; it needs JAX.
 """
 
 from __future__ import annotations
 
-import operator
-import threading
 from functools import partial
 from pathlib import Path
 from typing import Any, Callable, NamedTuple
@@ -24,10 +24,13 @@ from typing import Any, Callable, NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jax.experimental.buffer_callback import buffer_callback
 
 from . import _core
+from ._jax_host import Host, call, checked_dtype, integer, known
+from ._jax_simulation import Simulation
 from ._tape import Observations, TapeBase, check_rollout
+
+__all__ = ["Rollout", "Simulation", "State", "Tape", "rollout"]
 
 
 class State(NamedTuple):
@@ -81,8 +84,7 @@ class Tape(TapeBase):
         dtype: Any = jnp.float32,
         scene: _core.Scene | str | Path | None = None,
     ):
-        if np.dtype(dtype) not in (np.float32, _real()):
-            raise _core.InputError(f"{dtype}; expected float32, or float64 with jax_enable_x64")
+        checked_dtype(dtype)
         options = dict(scaled=normalise, precision=precision, tape_bytes=tape_bytes)
         super().__init__(task, num_envs, actions, flatten, scene, threads=threads, **options)
         self._host = _Host(self.tape, dtype)
@@ -93,9 +95,9 @@ class Tape(TapeBase):
         Integers may be traced: a function under jit takes another seed without being compiled
         again.
         """
-        given = [_integer(seed, "seed"), _integer(first_episode, "first_episode")]
+        given = [integer(seed, "seed"), integer(first_episode, "first_episode")]
         host = self._host
-        token, rows, _, alive, success = _call(host.reset, host.shown, *given, effect=True)
+        token, rows, _, alive, success = call(host.reset, host.shown, *given, effect=True)
         return State(token, alive, success), self._split(rows)
 
     def step(self, state: State, actions: jax.Array) -> tuple[State, Observations, jax.Array]:
@@ -111,10 +113,7 @@ class Tape(TapeBase):
         if actions.shape != expected.shape:
             raise _core.InputError(f"actions of shape {actions.shape}; expected {expected.shape}")
         actions = actions.astype(expected.dtype)
-        token, given = _known(state.token), _known(actions)
-        if token is not None and given is not None:
-            with self._host.lock:
-                self._host.check(token, given)
+        self._host.check_known(state.token, actions)
         token, rows, reward, alive, success = _step(self._host, state.token, actions)
         return State(token, alive, success), self._split(rows), reward
 
@@ -140,7 +139,7 @@ class Tape(TapeBase):
             (state, last), (seen, rewards, alive) = jax.lax.scan(
                 take, start, jnp.arange(self.actions, dtype=jnp.int32)
             )
-            _known(state.token)  # waits for the end, where nothing traces
+            known(state.token)  # waits for the end, where nothing traces
         except RuntimeError:
             if self._host.failure is None:
                 raise
@@ -171,137 +170,30 @@ def rollout(
     return tape.play(lambda _, t: actions[:, t], seed, first_episode)
 
 
-def _real() -> Any:
-    """float64, or float32 where JAX has no other."""
-    return jnp.zeros((), float).dtype
-
-
-def _known(value: Any) -> np.ndarray | None:
-    """The numbers of an array, also where derivatives are taken; None where jit traces it."""
-    while isinstance(value, jax.core.Tracer) and hasattr(value, "primal"):
-        value = value.primal
-    return None if isinstance(value, jax.core.Tracer) else np.asarray(value)
-
-
-def _integer(value: Any, name: str) -> jax.Array:
-    if isinstance(value, jax.core.Tracer) and value.shape == () and value.dtype.kind in "iu":
-        return value
-    largest = np.iinfo(jnp.zeros((), int).dtype).max
-    if not 0 <= operator.index(value) <= largest:
-        raise _core.InputError(f"{name} {value}; expected 0 to {largest} (see jax_enable_x64)")
-    return jnp.asarray(operator.index(value))
-
-
-def _call(callback: Any, results: Any, *arguments: Any, effect: bool = False) -> Any:
-    """Calls Python in the midst of a computation, at the place that data dependence gives it.
-
-    The callback writes into buffers of XLA. Callbacks that get arrays of JAX instead wait for
-    ever where one core computes: the copy of their arguments waits for the thread they run on.
-    """
-
-    @jax.custom_batching.custom_vmap  # type: ignore[untyped-decorator]
-    def call(*given: Any) -> Any:
-        return buffer_callback(callback, results, has_side_effect=effect)(*given)
-
-    @call.def_vmap  # type: ignore[untyped-decorator]
-    def refuse_vmap(*_: Any) -> Any:
-        raise _core.InputError("vmap over a tape; its batch are the num_envs environments")
-
-    if effect:  # JAX has no derivatives around effects; integers have none anyway
-        return call(*arguments)
-    smooth = jax.custom_jvp(call)
-
-    @smooth.defjvp  # type: ignore[untyped-decorator]
-    def refuse_jvp(*_: Any) -> Any:
-        raise _core.InputError(
-            "forward-mode or second derivatives through a tape; it has first ones in reverse mode"
-        )
-
-    return smooth(*arguments)
-
-
-class _Host:
-    """The side of the simulator. XLA may call it from any thread, so a lock guards each call.
-
-    A token (run, action) of float32 passes from step to step, so that XLA takes them in order. On
-    the way back its derivative has the number of the pass, 0 where a pass begins. What does not
-    follow the order of one run is found by these two.
-    """
-
+class _Host(Host):
     def __init__(self, tape: _core.TaskTape, dtype: Any):
-        self.tape, self.lock = tape, threading.Lock()
-        self.run = self.passing = 0  # up to 2**24, which float32 has
-        self.failure: _core.InputError | None = None  # of a step
-        self.left: int | None = None  # actions not yet reversed; None: nothing is reversed
-        real = _real()
-        n = sum(int(np.prod(t.shape)) for t in tape.spec.observations)
-        envs, shape = tape.envs, jax.ShapeDtypeStruct
-        self.token, flags = shape((2,), np.float32), [shape((envs,), bool)] * 2
-        self.shown = [self.token, shape((envs, n), dtype), shape((envs,), real), *flags]
-        self.actions = shape((envs, *tape.spec.action.shape), real)
+        super().__init__(tape, dtype)
+        shape = jax.ShapeDtypeStruct
+        flags = [shape((tape.envs,), bool)] * 2
+        self.shown = [self.token, self.rows, shape((tape.envs,), self.real), *flags]
 
-    def show(self, out: Any) -> None:
+    def results(self) -> tuple[Any, ...]:
         tape = self.tape
-        token = (self.run, tape.taken)
-        found = (token, tape.observations(), tape.rewards(), tape.alive(), tape.success())
-        for to, value in zip(out, found):
-            np.asarray(to)[...] = value
+        return tape.observations(), tape.rewards(), tape.alive(), tape.success()
 
     def reset(self, _: Any, out: Any, *given: Any) -> None:
         with self.lock:
-            self.run, self.left = self.run % (1 << 24) + 1, None
+            self.begin_run()
             seed, first_episode = (int(np.asarray(number)) for number in given)
             if seed < 0:
                 raise _core.InputError(f"seed {seed}; expected at least 0")
             self.tape.reset(seed, first_episode)
             self.show(out)
 
-    def check(self, token: Any, actions: Any) -> None:
-        """Raises InputError for a step that cannot follow."""
-        if tuple(token) != (self.run, self.tape.taken):
-            raise _core.InputError(
-                "a step from a state that is not the last one of its tape; take one step from "
-                "each state, and one tape for each run of a computation"
-            )
-        self.tape.check_step(actions)
-
-    def step(self, _: Any, out: Any, token: Any, actions: Any) -> None:
-        with self.lock:
-            given = np.asarray(actions)
-            try:
-                self.check(np.asarray(token), given)
-                self.tape.step(given)
-            except _core.InputError as error:
-                self.failure = error
-                raise
-            self.show(out)
-
-    def reverse(self, _: Any, out: Any, token: Any, *by: Any) -> None:
-        token_bar, rows_bar, reward_bar = (np.asarray(array) for array in by)
-        with self.lock:
-            (run, taken), passing = np.asarray(token), token_bar[0]
-            if run != self.run:
-                raise _core.InputError(
-                    "derivatives of a run whose tape has begun another one; take one tape for each "
-                    "run of a computation"
-                )
-            if passing == 0:
-                if self.left is not None:
-                    self.tape.begin_reverse()
-                passing = self.passing = self.passing % (1 << 24) + 1
-                self.left = int(taken)
-                for _ in range(self.tape.taken - self.left):  # on which the loss does not hang
-                    self.tape.reverse(np.zeros_like(rows_bar), np.zeros_like(reward_bar))
-            if passing != self.passing or self.left != taken:
-                raise _core.InputError("two ways back over one tape at the same time")
-            np.asarray(out[1])[...] = self.tape.reverse(rows_bar, reward_bar)
-            np.asarray(out[0])[...] = (passing, 0)
-            self.left = int(taken) - 1
-
 
 @partial(jax.custom_vjp, nondiff_argnums=(0,))
 def _step(host: _Host, token: Any, actions: Any) -> Any:
-    return _call(host.step, host.shown, token, actions)
+    return call(host.step, host.shown, token, actions)
 
 
 def _forward(host: _Host, token: Any, actions: Any) -> Any:
@@ -310,7 +202,7 @@ def _forward(host: _Host, token: Any, actions: Any) -> Any:
 
 
 def _backward(host: _Host, token: Any, by: Any) -> Any:
-    return tuple(_call(host.reverse, [host.token, host.actions], token, *by[:3]))
+    return tuple(call(host.reverse, [host.token, host.actions], token, *by[:3]))
 
 
 _step.defvjp(_forward, _backward)

@@ -162,9 +162,12 @@ def test_what_cannot_be_done_is_refused():
     of, _ = scene("chain")
     with pytest.raises(tangere.InputError, match="no number of the scene is named 'weight'"):
         tt.Simulation(of, parameters=["weight"])
-    text = CHAIN.replace("<actuator>", "<!--").replace("</actuator>", "-->")
-    with pytest.raises(tangere.InputError, match="no motor"):
-        tt.Simulation(tangere.Scene.from_text(text))
+    with pytest.raises(tangere.InputError, match="no reading 'pad'; expected one of variables"):
+        tt.Simulation(of, read=["pad"])
+    with pytest.raises(tangere.InputError, match="points=True"):
+        tt.Simulation(of).reset(points={})
+    with pytest.raises(tangere.InputError, match="expected sensors of"):
+        tt.Simulation(of, points=True).reset(points={"pad": torch.zeros(1, 7)})
     sim = tt.Simulation(of, num_envs=2, steps=2)
     first = sim.reset()
     u = torch.zeros(1, requires_grad=True)
@@ -185,3 +188,52 @@ def test_what_cannot_be_done_is_refused():
     s.v.sum().backward()
     with pytest.raises(tangere.InputError, match="second backward"):
         s.v.sum().backward()
+
+
+def test_a_scene_without_motors_has_gradients_by_its_start():
+    text = CHAIN.replace("<actuator>", "<!--").replace("</actuator>", "-->")
+    sim = tt.Simulation(tangere.Scene.from_text(text), num_envs=2, steps=5)
+    q = sim.reset().q.clone().requires_grad_()
+    s = sim.reset(q=q)
+    for _ in range(5):
+        s = sim.step(s, torch.zeros(0))
+    s.q[:, 0].sum().backward()
+    assert float(q.grad[0, 0]) > 0.5  # of the angle after 25 ms by the first one
+
+
+def test_readings_are_those_of_a_batch():
+    file = tangere.Scene(tangere.scenes()["grip_rod"])
+    names = ["left_finger.sum", "right_finger.pressure", "left_finger.flow", "bodies", "bodies.rod"]
+    sim = tt.Simulation(file, num_envs=2, steps=40, every=4, read=names, threads=1)
+    s = sim.reset(seed=1)
+    for _ in range(40):
+        s = sim.step(s, torch.tensor([0.0, 0.8, 0.8]))
+    batch = tangere.Batch(sim.model, 2)
+    batch.set_state(s.q.numpy(), s.v.numpy())
+    assert list(s.readings) == names
+    for name in names[:3]:
+        largest = float(s[name].abs().max())  # a batch reads in mixed precision
+        np.testing.assert_allclose(s[name], batch.tactile(name), rtol=0, atol=1e-5 * largest)
+        assert largest > 0
+    poses = np.concatenate(batch.bodies(), 2)
+    np.testing.assert_array_equal(s["bodies"], poses)
+    np.testing.assert_array_equal(s["bodies.rod"], poses[:, 3])
+
+
+def test_points_move():
+    scene = tangere.Scene(tangere.scenes()["rolling_ball_small"])
+    sim = tt.Simulation(scene, num_envs=2, steps=2, read=["pad"], points=True)
+    q = sim.reset(seed=1).q.clone()
+    q[:, 2] -= 0.0155
+    still = sim.reset(seed=1, q=q)["pad"]
+    assert float(still.abs().max()) > 0
+    deeper = torch.zeros(1024, 7, dtype=torch.float64)
+    deeper[:, 2] = -1e-4
+    field = sim.reset(seed=1, q=q, points={"pad": deeper})["pad"]
+    assert field.shape == still.shape == (2, 32, 32, 3)
+    touched = still[..., 2].abs() > 0
+    assert bool((field[..., 2].abs() > still[..., 2].abs())[touched].all())
+    torch.testing.assert_close(sim.reset(seed=1, q=q)["pad"], still, rtol=0, atol=0)
+    elastic = tangere.Scene(tangere.scenes()["insertion_elastic"])
+    with pytest.raises(tangere.InputError, match="has ks"):
+        tt.Simulation(elastic, points=True)

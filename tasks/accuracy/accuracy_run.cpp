@@ -6,7 +6,6 @@
 #include <atomic>
 #include <cmath>
 #include <limits>
-#include <numeric>
 
 #include "engine/base/as_size.hpp"
 #include "engine/step/stepper.hpp"
@@ -84,8 +83,8 @@ class SampleRun : public AccuracyRun {
       workers.push_back({Readout(model), Readout(model, Precision::mixed),
                          std::vector<double>(kBlock * width), std::vector<float>(kBlock * width)});
     reference.resize(environments() * as_size(episodes.samples));
-    sensors.resize(model.sensors().size());
-    std::iota(sensors.begin(), sensors.end(), 0);
+    for (std::size_t s = 0; s < model.sensors().size(); ++s)
+      fields.push_back({static_cast<int>(s), FieldForm::ideal});
   }
 
   AccuracyOutcome make_reference(const AccuracySetting& setting,
@@ -118,7 +117,7 @@ class SampleRun : public AccuracyRun {
   std::size_t width;
   BlockThreads threads;
   std::vector<Worker> workers;
-  std::vector<int> sensors;                                 // all of the scene
+  std::vector<FieldOutput> fields;                          // ideal, of every sensor
   std::vector<SparseSample> reference;                      // (E, samples)
   std::vector<double> norm;                                 // (E) squared, over samples
   std::vector<double> weight;                               // (width) of the state
@@ -136,8 +135,7 @@ class SampleRun : public AccuracyRun {
 
   template <class T>
   void read_fields(Readout& readout, const Batch& batch, int block, std::vector<T>& to) const {
-    tangere::read_fields<T>(readout, batch, block, sensors, FieldForm::ideal,
-                            [&](int e) { return lane(to, e); });
+    tangere::read_fields<T>(readout, batch, block, fields, [&](int e) { return lane(to, e); });
   }
 
   void read(Worker& w, const Batch& batch, int block, bool both, BlockOutcome& out) const {

@@ -52,6 +52,12 @@ NamedReading reading_named(const Model& model, const std::string& name) {
                                fmt::join(known_names(model), ", ")));
 }
 
+/// What is read of a sensor to compute an output.
+FieldOutput read_for(const FieldOutput& output) {
+  const bool pressure = output.form == FieldForm::pressure;
+  return {output.sensor, pressure ? FieldForm::pressure : FieldForm::field};
+}
+
 std::vector<std::string> default_readings(const Model& model) {
   std::vector<std::string> names = sensor_names(model.scene());
   if (!model.end_effectors().empty()) names.insert(names.begin(), "variables");
@@ -100,9 +106,10 @@ TaskSpec declared(const Scene& scene, int steps, int horizon,
     spec.reads_bodies |= reading.bodies > 0;
     spec.reads_end_effectors |= reading.end_effectors > 0;
     spec.reads_tactile |= reading.field.has_value();
-    if (reading.field && std::ranges::find(spec.sensors, reading.field->sensor) ==
-                             spec.sensors.end())
-      spec.sensors.push_back(reading.field->sensor);
+    if (!reading.field) continue;
+    if (const FieldOutput source = read_for(*reading.field);
+        std::ranges::find(spec.fields, source) == spec.fields.end())
+      spec.fields.push_back(source);
   }
   spec.steps_per_action = steps;
   spec.snapshots = {steps};
@@ -118,20 +125,21 @@ SceneTask::SceneTask(const Scene& scene, int steps, int horizon,
   for (const std::string& name : readings ? *readings : default_readings(model())) {
     const NamedReading reading = reading_named(model(), name);
     if (reading.field) {
-      std::size_t first = 0;
-      for (const int s : sensors()) {
-        if (s == reading.field->sensor) break;
-        first += 3 * as_size(model().sensors()[as_size(s)].points);
+      const FieldOutput source = read_for(*reading.field);
+      Field field{{}, 0, 0, as_size(first_tactile_point(model(), source.sensor))};
+      for (const FieldOutput& other : fields()) {
+        field.size = numbers_of(model().sensors()[as_size(other.sensor)].points, other.form);
+        if (other == source) break;
+        field.first += field.size;
       }
-      readings_.emplace_back(
-          Field{FormMap(model(), *reading.field), first,
-                as_size(first_tactile_point(model(), reading.field->sensor))});
+      if (source.form != FieldForm::pressure) field.map.emplace(model(), *reading.field);
+      readings_.emplace_back(std::move(field));
     } else if (reading.bodies > 0) {
       for (int b = 0; b < reading.bodies; ++b)
         readings_.emplace_back(Motion{as_size(reading.first_body + b)});
     } else {
-      readings_.emplace_back(Positions{3 * as_size(reading.first_end_effector),
-                                       3 * as_size(reading.end_effectors)});
+      readings_.emplace_back(
+          Positions{3 * as_size(reading.first_end_effector), 3 * as_size(reading.end_effectors)});
     }
   }
 }
@@ -163,9 +171,13 @@ void SceneTask::observe(const TaskView& view, std::span<double> observation) con
   put(now.v);
   for (const Reading& reading : readings_) {
     if (const auto* field = std::get_if<Field>(&reading)) {
-      field->map.evaluate(now.tactile.subspan(field->first, field->map.field_size()),
-                          left.first(field->map.size()));
-      left = left.subspan(field->map.size());
+      const auto read = now.tactile.subspan(field->first, field->size);
+      if (!field->map) {
+        put(read);
+        continue;
+      }
+      field->map->evaluate(read, left.first(field->map->size()));
+      left = left.subspan(field->map->size());
     } else if (const auto* motion = std::get_if<Motion>(&reading)) {
       put(now.bodies.subspan(kPose * motion->body, kPose));
       put(now.bodies.subspan(twists + kTwist * motion->body, kTwist));
@@ -190,13 +202,16 @@ void SceneTask::observe_vjp(const TaskView& view, std::span<const double> weight
   add(bar.v);
   for (const Reading& reading : readings_) {
     if (const auto* field = std::get_if<Field>(&reading)) {
-      const std::size_t size = field->map.field_size();
+      const auto to = bar.tactile.subspan(field->first, field->size);
+      if (!field->map) {
+        add(to);
+        continue;
+      }
       const std::span<double> points =
           out.points.empty() ? out.points : out.points.subspan(kPointNumbers * field->point);
-      field->map.pull_back(now.tactile.subspan(field->first, size),
-                           weight.first(field->map.size()), bar.tactile.subspan(field->first, size),
-                           points);
-      weight = weight.subspan(field->map.size());
+      field->map->pull_back(now.tactile.subspan(field->first, field->size),
+                            weight.first(field->map->size()), to, points);
+      weight = weight.subspan(field->map->size());
     } else if (const auto* motion = std::get_if<Motion>(&reading)) {
       add(bar.bodies.subspan(kPose * motion->body, kPose));
       add(bar.bodies.subspan(twists + kTwist * motion->body, kTwist));

@@ -44,9 +44,9 @@ class SceneTask : public Task {
 
  private:
   struct Field {
-    FormMap map;
-    std::size_t first;  ///< number of its sensor's field in Snapshot::tactile
-    std::size_t point;  ///< its sensor's first among the points of all sensors
+    std::optional<FormMap> map;  ///< none: of a pressure
+    std::size_t first, size;     ///< numbers of Snapshot::tactile
+    std::size_t point;           ///< its sensor's first among the points of all sensors
   };
   struct Motion {
     std::size_t body;

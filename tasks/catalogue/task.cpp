@@ -4,8 +4,6 @@
 
 #include <fmt/format.h>
 
-#include <numeric>
-
 #include "engine/model/random.hpp"
 #include "engine/rows/episode_channels.hpp"
 
@@ -26,21 +24,20 @@ std::size_t place_of(const Scene& scene, const std::string& name, int (*count)(J
 }  // namespace
 
 Task::Task(const Scene& scene, TaskSpec spec)
-    : model_((spec.check(), scene)), spec_(std::move(spec)), sensors_(spec_.sensors) {
+    : model_((spec.check(), scene)), spec_(std::move(spec)), fields_(spec_.fields) {
   if (spec_.control_every == 0) spec_.control_every = spec_.steps_per_action;
-  for (const int sensor : sensors_)
-    if (sensor < 0 || sensor >= std::ssize(model_.sensors()))
-      throw InputError(fmt::format("task '{}' reads sensor {}; the scene has {}", spec_.name, sensor,
-                                   model_.sensors().size()));
-  if (!spec_.reads_tactile || !sensors_.empty()) return;
-  sensors_.resize(model_.sensors().size());
-  std::iota(sensors_.begin(), sensors_.end(), 0);
+  check_outputs(fields_, model_.sensors().size());
+  for (const FieldOutput& output : fields_)
+    if (output.form != FieldForm::field && output.form != FieldForm::pressure)
+      throw InputError(fmt::format("task '{}' reads the {} of a sensor; expected field or pressure",
+                                   spec_.name, to_string(output.form)));
+  if (spec_.reads_tactile && fields_.empty()) fields_ = whole_fields(scene);
 }
 
 std::size_t Task::tactile_size() const {
   std::size_t numbers = 0;
-  for (const int sensor : sensors_)
-    numbers += 3 * static_cast<std::size_t>(model_.sensors()[static_cast<std::size_t>(sensor)].points);
+  for (const FieldOutput& output : fields_)
+    numbers += numbers_of(model_.sensors()[std::size_t(output.sensor)].points, output.form);
   return numbers;
 }
 

@@ -17,7 +17,7 @@ namespace tangere {
 struct Snapshot {
   std::span<const double> q, v;           ///< (nq), (nv)
   std::span<const double> end_effectors;  ///< (n, 3) positions [m], if TaskSpec requests them
-  /// (points, 3) [N] of each of Task::sensors() in turn, if TaskSpec requests them
+  /// (points, 3) or (points, 1) [N] of each of Task::fields() in turn, if TaskSpec requests them
   std::span<const double> tactile;
   /// (nb, 7) poses, then (nb, 6) twists of the bodies, as Readout::bodies() returns them, if
   /// TaskSpec requests them
@@ -81,8 +81,8 @@ class Task {
 
   [[nodiscard]] const TaskSpec& spec() const { return spec_; }
   [[nodiscard]] const Model& model() const { return model_; }
-  /// Sensors in Snapshot::tactile: TaskSpec::sensors, or all of the scene.
-  [[nodiscard]] std::span<const int> sensors() const { return sensors_; }
+  /// What Snapshot::tactile holds: TaskSpec::fields, or the field of every sensor.
+  [[nodiscard]] std::span<const FieldOutput> fields() const { return fields_; }
   [[nodiscard]] std::size_t tactile_size() const;  ///< numbers in Snapshot::tactile
   [[nodiscard]] std::size_t end_effectors_size() const;
   [[nodiscard]] std::size_t bodies_size() const;
@@ -140,7 +140,7 @@ class Task {
  private:
   Model model_;
   TaskSpec spec_;
-  std::vector<int> sensors_;
+  std::vector<FieldOutput> fields_;
 };
 
 /// Returns a number in [low, high] for an episode. `step` and `index` distinguish the numbers of a

@@ -93,8 +93,8 @@ TaskBlock::TaskBlock(const Task& task, const TapeOptions& options, std::int64_t 
   snapshots_bar_.assign(snapshot_cotangents_.size(),
                         {start_q_, start_v_, end_effectors, tactile, bodies});
   if (task_.spec().warm_up)
-    warm_up_.assign(snapshots_bar_.size() - 1,
-                    {lane_rows(as_size(task.model().nq())), start_v_, end_effectors, tactile, bodies});
+    warm_up_.assign(snapshots_bar_.size() - 1, {lane_rows(as_size(task.model().nq())), start_v_,
+                                                end_effectors, tactile, bodies});
 }
 
 double TaskBlock::bytes(const Task& task, const TapeOptions& o, std::int64_t blocks) {
@@ -234,7 +234,8 @@ void TaskBlock::reverse_outcome(const ActionRecord& r, std::int64_t action) {
 }
 
 void TaskBlock::clear_snapshots() {
-  for (SnapshotRows& m : snapshots_bar_) clear({&m.q, &m.v, &m.end_effectors, &m.tactile, &m.bodies});
+  for (SnapshotRows& m : snapshots_bar_)
+    clear({&m.q, &m.v, &m.end_effectors, &m.tactile, &m.bodies});
 }
 
 /// Pulls cotangents of a lane's observation and state back and adds them. An observation with zero
@@ -279,10 +280,14 @@ void TaskBlock::add_readings(std::size_t moment, int lane) {
     pullback_.body(lane, static_cast<int>(b), bodies.subspan(7 * b, 7),
                    bodies.subspan(7 * nb + 6 * b, 6));
   BlockCotangent& c = adjoint_.loss(0);
-  for (const int s : task_.sensors()) {
-    const std::size_t numbers = 3 * as_size(task_.model().sensors()[as_size(s)].points);
-    pullback_.dense_field(lane, s, fields.first(numbers), c.parameters,
-                          c.points_of(task_.model(), s, lane));
+  for (const FieldOutput& output : task_.fields()) {
+    const int s = output.sensor;
+    const std::size_t numbers = numbers_of(task_.model().sensors()[as_size(s)].points, output.form);
+    const std::span<double> points = c.points_of(task_.model(), s, lane);
+    if (output.form == FieldForm::pressure)
+      pullback_.pressure(lane, s, fields.first(numbers), c.parameters, points);
+    else
+      pullback_.dense_field(lane, s, fields.first(numbers), c.parameters, points);
     fields = fields.subspan(numbers);
   }
 }
@@ -383,8 +388,9 @@ void TaskBlock::reverse_reset(const ActionCotangents& by, std::span<double> q_ba
     view.action = no_action;
     if (taken_ > 0) view.task_state = part(records_[0].found, l);
     view.snapshots = seen;
-    reverse_observation(view, l, {cotangents(l).last(seen.size()), by_no_action, task_state_bar,
-                                 part(adjoint_.loss(0).points, l)});
+    reverse_observation(view, l,
+                        {cotangents(l).last(seen.size()), by_no_action, task_state_bar,
+                         part(adjoint_.loss(0).points, l)});
   }
   add_snapshot(snapshots_bar_.size() - 1);
   for (int l = 0; l < lanes(); ++l) {

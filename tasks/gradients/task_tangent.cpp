@@ -54,9 +54,12 @@ TaskTangent::TaskTangent(TaskRollout& rollout, std::span<const double> actions,
       readout_(task_.model()),
       memory_(as_size(task_.spec().task_state)),
       action_(task_.spec().action.size()) {
-  if (task_.bodies_size() > 0)
+  const bool pressure = std::ranges::any_of(
+      task_.fields(), [](const FieldOutput& o) { return o.form == FieldForm::pressure; });
+  if (task_.bodies_size() > 0 || pressure)
     throw InputError("task " + task_.spec().name +
-                     " reads bodies, which have no forward derivatives; expected end effectors");
+                     " reads bodies or pressures, which have no forward derivatives; expected end "
+                     "effectors and fields");
   for (std::size_t a = 0; a * action_.size() < actions.size(); ++a) {
     ActionRecord& r = records_.emplace_back(task_);
     const auto own = actions.subspan(a * action_.size(), action_.size());
@@ -188,7 +191,8 @@ void TaskTangent::look(const BlockTape& tape, int step, std::size_t moment,
           product(std::span(jacobian).subspan(i * nv, nv), state_.q));
   }
   if (task_.tactile_size() == 0) return;
-  for (const int s : task_.sensors()) {
+  for (const FieldOutput& output : task_.fields()) {
+    const int s = output.sensor;
     std::vector<double> change(3 * as_size(task_.model().sensors()[as_size(s)].points));
     tangent_.field(rollout_.batch(), 0, 0, tape, step, s, numbers, {}, state_, change);
     seen.tactile[moment].insert(seen.tactile[moment].end(), change.begin(), change.end());

@@ -49,15 +49,15 @@ void read_field(Readout& readout, const Batch& batch, int block, FieldOutput out
   readout.read_block(batch, block, output, std::span<const std::span<T>>(places));
 }
 
-/// Reads the fields of some sensors in one form, one after the other: (points of all of them, 3).
+/// Reads some fields, one after the other: numbers_of(points, form) of each.
 template <class T, class Place>
-void read_fields(Readout& readout, const Batch& batch, int block, std::span<const int> sensors,
-                 FieldForm form, const Place& place) {
+void read_fields(Readout& readout, const Batch& batch, int block,
+                 std::span<const FieldOutput> outputs, const Place& place) {
   std::size_t offset = 0;
-  for (const int s : sensors) {
-    const std::size_t numbers =
-        3 * static_cast<std::size_t>(batch.model().sensors()[static_cast<std::size_t>(s)].points);
-    read_field<T>(readout, batch, block, {s, form},
+  for (const FieldOutput& output : outputs) {
+    const std::size_t numbers = numbers_of(
+        batch.model().sensors()[static_cast<std::size_t>(output.sensor)].points, output.form);
+    read_field<T>(readout, batch, block, output,
                   [&](int e) { return place(e).subspan(offset, numbers); });
     offset += numbers;
   }

@@ -96,8 +96,7 @@ BlockWorker::BlockWorker(const Task& task, Precision precision)
 
 double BlockWorker::bytes(const Task& task) {
   const std::size_t numbers = as_size(task.model().nq()) + as_size(task.model().nv()) +
-                              task.end_effectors_size() + task.tactile_size() +
-                              task.bodies_size();
+                              task.end_effectors_size() + task.tactile_size() + task.bodies_size();
   return static_cast<double>(task.spec().snapshots.size() * kBlock * numbers * sizeof(double));
 }
 
@@ -242,7 +241,7 @@ void BlockWorker::read_snapshot(const Batch& batch, int block, std::size_t momen
   read_states(batch, block, place(q_), place(v_));
   if (task_.end_effectors_size() > 0)
     read_end_effectors(readout_, batch, block, place(end_effectors_));
-  read_fields<double>(readout_, batch, block, task_.sensors(), FieldForm::field, place(tactile_));
+  read_fields<double>(readout_, batch, block, task_.fields(), place(tactile_));
   if (task_.bodies_size() == 0) return;
   const std::size_t poses = 7 * as_size(task_.model().nb());
   for (int e = first; e < first + lanes_of(batch, block); ++e) {

@@ -76,10 +76,10 @@ class BlockWorker {
   const Task& task_;
   Readout readout_;
   std::optional<Stepper> settling_stepper_;
-  std::optional<Batch> settling_;                        // one environment
-  std::vector<double> varying_;                          // values of the environment that starts
+  std::optional<Batch> settling_;  // one environment
+  std::vector<double> varying_;    // values of the environment that starts
   std::vector<double> q_, v_, end_effectors_, tactile_, bodies_;  // (snapshots, 16, width)
-  std::vector<Snapshot> moments_;                        // (16, snapshots): views of them
+  std::vector<Snapshot> moments_;                                 // (16, snapshots): views of them
 };
 
 /// Returns the view of a task between two actions of an environment.

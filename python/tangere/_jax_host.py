@@ -1,0 +1,156 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Calls of the simulator in the midst of a computation of JAX, in the order of one run."""
+
+from __future__ import annotations
+
+import operator
+import threading
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax.experimental.buffer_callback import buffer_callback
+
+from . import _core
+
+
+def real() -> Any:
+    """float64, or float32 where JAX has no other."""
+    return jnp.zeros((), float).dtype
+
+
+def checked_dtype(dtype: Any) -> Any:
+    if np.dtype(dtype) not in (np.float32, real()):
+        raise _core.InputError(f"{dtype}; expected float32, or float64 with jax_enable_x64")
+    return dtype
+
+
+def known(value: Any) -> np.ndarray | None:
+    """The numbers of an array, also where derivatives are taken; None where jit traces it."""
+    while isinstance(value, jax.core.Tracer) and hasattr(value, "primal"):
+        value = value.primal
+    return None if isinstance(value, jax.core.Tracer) else np.asarray(value)
+
+
+def integer(value: Any, name: str) -> jax.Array:
+    if isinstance(value, jax.core.Tracer) and value.shape == () and value.dtype.kind in "iu":
+        return value
+    largest = np.iinfo(jnp.zeros((), int).dtype).max
+    if not 0 <= operator.index(value) <= largest:
+        raise _core.InputError(f"{name} {value}; expected 0 to {largest} (see jax_enable_x64)")
+    return jnp.asarray(operator.index(value))
+
+
+def call(callback: Any, results: Any, *arguments: Any, effect: bool = False) -> Any:
+    """Calls Python in the midst of a computation, at the place that data dependence gives it.
+
+    The callback writes into buffers of XLA. Callbacks that get arrays of JAX instead wait for
+    ever where one core computes: the copy of their arguments waits for the thread they run on.
+    """
+
+    @jax.custom_batching.custom_vmap  # type: ignore[untyped-decorator]
+    def plain(*given: Any) -> Any:
+        return buffer_callback(callback, results, has_side_effect=effect)(*given)
+
+    @plain.def_vmap  # type: ignore[untyped-decorator]
+    def refuse_vmap(*_: Any) -> Any:
+        raise _core.InputError("vmap over a tape; its batch are the num_envs environments")
+
+    if effect:  # JAX has no derivatives around effects; integers have none anyway
+        return plain(*arguments)
+    smooth = jax.custom_jvp(plain)
+
+    @smooth.defjvp  # type: ignore[untyped-decorator]
+    def refuse_jvp(*_: Any) -> Any:
+        raise _core.InputError(
+            "forward-mode or second derivatives through a tape; it has first ones in reverse mode"
+        )
+
+    return smooth(*arguments)
+
+
+class Host:
+    """The side of the simulator. XLA may call it from any thread, so a lock guards each call.
+
+    A token (run, action) of float32 passes from step to step, so that XLA takes them in order. On
+    the way back its derivative has the number of the pass, 0 where a pass begins. What does not
+    follow the order of one run is found by these two.
+    """
+
+    def __init__(self, tape: Any, dtype: Any):
+        self.tape, self.lock = tape, threading.Lock()
+        self.run = self.passing = 0  # up to 2**24, which float32 has
+        self.failure: _core.InputError | None = None  # of a step
+        self.left: int | None = None  # actions not yet reversed; None: nothing is reversed
+        self.real = real()
+        n = sum(int(np.prod(t.shape)) for t in tape.spec.observations)
+        shape = jax.ShapeDtypeStruct
+        self.token, self.rows = shape((2,), np.float32), shape((tape.envs, n), dtype)
+        self.actions = shape((tape.envs, *tape.spec.action.shape), self.real)
+
+    def results(self) -> tuple[Any, ...]:
+        """What a step returns after the token. A subclass defines it."""
+        raise NotImplementedError
+
+    def show(self, out: Any) -> None:
+        for to, value in zip(out, ((self.run, self.tape.taken), *self.results())):
+            np.asarray(to)[...] = value
+
+    def begin_run(self) -> None:
+        self.run, self.left = self.run % (1 << 24) + 1, None
+
+    def check(self, token: Any, actions: Any) -> None:
+        """Raises InputError for a step that cannot follow."""
+        if tuple(token) != (self.run, self.tape.taken):
+            raise _core.InputError(
+                "a step from a state that is not the last one of its tape; take one step from "
+                "each state, and one tape for each run of a computation"
+            )
+        self.tape.check_step(actions)
+
+    def check_known(self, token: Any, actions: Any) -> None:
+        """The same as soon as the numbers are known, that is without jit."""
+        token, actions = known(token), known(actions)
+        if token is not None and actions is not None:
+            with self.lock:
+                self.check(token, actions)
+
+    def step(self, _: Any, out: Any, token: Any, actions: Any) -> None:
+        with self.lock:
+            given = np.asarray(actions)
+            try:
+                self.check(np.asarray(token), given)
+                self.tape.step(given)
+            except _core.InputError as error:
+                self.failure = error
+                raise
+            self.show(out)
+
+    def reverse(self, _: Any, out: Any, token: Any, token_bar: Any, *bars: Any) -> None:
+        with self.lock:
+            given = [np.asarray(bar) for bar in bars]
+            taken = int(np.asarray(token)[1])
+            passing = self._pass(np.asarray(token), np.asarray(token_bar), given)
+            np.asarray(out[1])[...] = self.tape.reverse(*given)
+            np.asarray(out[0])[...] = (passing, 0)
+            self.left = taken - 1
+
+    def _pass(self, token: Any, token_bar: Any, bars: Any) -> Any:
+        """The number of the pass that comes to a step, which it begins where none is under way."""
+        (run, taken), passing = token, token_bar[0]
+        if run != self.run:
+            raise _core.InputError(
+                "derivatives of a run whose tape has begun another one; take one tape for each "
+                "run of a computation"
+            )
+        if passing == 0:
+            if self.left is not None:
+                self.tape.begin_reverse()
+            passing = self.passing = self.passing % (1 << 24) + 1
+            self.left = int(taken)
+            for _ in range(self.tape.taken - self.left):  # on which the loss does not hang
+                self.tape.reverse(*[np.zeros_like(bar) for bar in bars])
+        if passing != self.passing or self.left != taken:
+            raise _core.InputError("two ways back over one tape at the same time")
+        return passing
