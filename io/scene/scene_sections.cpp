@@ -139,7 +139,7 @@ static void read_surface_contact(Scene& scene, const SceneElement& node) {
 }
 
 void read_contacts(Scene& scene, const SceneNode& section) {
-  for (const SceneElement& node : elements_in(section, kContacts | kSurfaceContact)) {
+  for (const SceneElement& node : elements_in(section)) {
     node.check();
     if (node.of() == kSurfaceContact) {
       read_surface_contact(scene, node);

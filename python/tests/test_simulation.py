@@ -31,7 +31,7 @@ pos="0.05 0 0" density="900"/></link></link></robot>
 
 def scene(name):
     if name == "chain":
-        return tangere.Scene.from_text(CHAIN), ["body hand density", "joint arm damping"]
+        return tangere.Scene.from_string(CHAIN), ["body hand density", "joint arm damping"]
     file, numbers = SCENES[name]
     return tangere.Scene(Path(tangere.__file__).parent / "scenes" / file), numbers
 
@@ -164,7 +164,7 @@ def test_what_cannot_be_done_is_refused():
         tt.Simulation(of, numbers=["weight"])
     text = CHAIN.replace("<actuator>", "<!--").replace("</actuator>", "-->")
     with pytest.raises(tangere.InputError, match="no motor"):
-        tt.Simulation(tangere.Scene.from_text(text))
+        tt.Simulation(tangere.Scene.from_string(text))
     sim = tt.Simulation(of, num_envs=2, steps=2)
     first = sim.reset()
     u = torch.zeros(1, requires_grad=True)
