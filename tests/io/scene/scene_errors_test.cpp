@@ -359,7 +359,7 @@ TEST(SceneError, UnknownNamesBecomeWarningsWhenAllowed) {
 }
 
 /// Lines of a text that a program made are those of the program.
-TEST(SceneErrors, NameTheOriginOfAMadeLine) {
+TEST(SceneError, NameTheOriginOfAMadeLine) {
   const std::string text = with("radius=\"0.02\"", "radus=\"0.02\" mu=\"1\"");
   SceneReadOptions options;
   for (int line = 1; line < 14; ++line) options.origins.push_back({"press.py", 100 + line});
