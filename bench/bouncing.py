@@ -57,7 +57,7 @@ def play(scheme: str, step: float, accuracy: float, kn: float) -> tuple[float, f
     density = MASS / (4 / 3 * np.pi * RADIUS**3)
     text = SCENE.format(gravity=GRAVITY, step=step, scheme=scheme, height=HEIGHT, radius=RADIUS,
                         density=density, kn=kn)
-    model = tangere.Model(tangere.Scene.from_text(text, "bouncing"))
+    model = tangere.Model(tangere.Scene.from_string(text, "bouncing"))
     steps = round(SECONDS / step)
     run, seconds = timed(model, BALLS, np.zeros((steps, BALLS, 0)), accuracy)
     return float(np.mean((energy(run, kn) - BALLS * MASS * GRAVITY * HEIGHT) ** 2)), seconds

@@ -66,7 +66,7 @@ class Pair:
         silence(model)
         text = re.sub(r' lim="[^"]*" lim_stiffness="[^"]*"', "", text)
         text = re.sub(r"<initial>.*?</initial>", "", text, flags=re.S)
-        self.ours = tangere.Model(tangere.Scene.from_text(text, name))
+        self.ours = tangere.Model(tangere.Scene.from_string(text, name))
         joints = [j for j in attributes(text, "joint") if j.get("type", "fixed") != "fixed"]
         names = [model.joint(j).name for j in range(model.njnt)]
         types = [TYPES[int(t)] for t in model.jnt_type]

@@ -81,7 +81,7 @@ def scene(scheme: str, step: float, kn: float) -> str:
 
 def play(scheme: str, step: float, kn: float, accuracy: float) -> tuple[float, float, float]:
     """Error [m^2/s^2], the same after the first second, and the CPU time [s]."""
-    model = tangere.Model(tangere.Scene.from_text(scene(scheme, step, kn), "rolling"))
+    model = tangere.Model(tangere.Scene.from_string(scene(scheme, step, kn), "rolling"))
     steps = round(SECONDS / step)
     controls = np.broadcast_to(DIRECTION, (steps, 1, 3)).copy()
     run, seconds = timed(model, 1, controls, accuracy)

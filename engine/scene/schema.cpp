@@ -127,7 +127,9 @@ constexpr Attribute kSchema[] = {
     ignored(kLink, "design_params"),
 
     row(kJoint, "name", kNeeded, U::one, "its name"),
-    row(kJoint, "type", kNeeded, U::one, "see below"),
+    row(kJoint, "type", kNeeded, U::one, "see below",
+        Words{"fixed revolute prismatic planar free2d translational spherical spherical-euler "
+              "spherical-exp free3d free3d-euler free3d-exp"}),
     row(kJoint, "pos", "0 0 0", U::m, "place in the parent joint's frame", &Pose::position, F::pos,
         Flags{kVaries | kIndexed}),
     row(kJoint, "quat", "1 0 0 0", U::one, "w x y z, made of length 1", &Pose::orientation),
@@ -399,9 +401,33 @@ constexpr const char* kElementNames[] = {"option",
                                          "surface_contact"};
 static_assert(std::size(kElementNames) == kElements);
 
+constexpr Holder kHolders[] = {
+    {"tangere", kOption | kSolver | kGround | kOutputs},
+    {"default", kJoint | kBody | kTouching | kSurfaceContact | kMotor | kEndEffector, true},
+    {"robot", kLink, true},
+    {"actuator", kMotor, true},
+    {"contact", kContacts | kSurfaceContact, true},
+    {"sensor", kTactile, true},
+    {"variable", kEndEffector, true},
+    {"initial", kInitialJoint, true},
+    {"control", kConstant | kPiecewise | kCsv | kRandom, true},
+    {"randomize", kVarying, true},
+    {"link", kJoint | kBody | kLink},
+    {"body", kVisual | kCollision},
+    {"tactile", kImperfections | kMarkers},
+    {"piecewise", kAt},
+};
+
 }  // namespace
 
 std::span<const Attribute> schema() { return kSchema; }
+std::span<const Holder> holders() { return kHolders; }
+
+std::uint32_t elements_inside(std::string_view holder) {
+  const auto found =
+      std::ranges::find_if(kHolders, [&](const Holder& h) { return holder == h.name; });
+  return found == std::end(kHolders) ? 0 : found->elements;
+}
 
 const char* to_string(Element element) {
   return kElementNames[std::countr_zero(static_cast<std::uint32_t>(element))];

@@ -62,6 +62,17 @@ inline constexpr std::uint32_t kContacts = kGroundContact | kPairContact,
 /// The name in scene files.
 const char* to_string(Element element);
 
+/// A part of a scene file that holds elements: the root, a section, or an element.
+struct Holder {
+  const char* name;
+  std::uint32_t elements;  ///< Element bits of what it holds
+  bool section = false;    ///< stands in the root and has no attributes
+};
+/// All of them: the root <tangere>, then the sections, then elements that hold others.
+std::span<const Holder> holders();
+/// Returns the Element bits of what the holder of this name holds; 0 if there is none.
+std::uint32_t elements_inside(std::string_view holder);
+
 /// Which values an attribute may have. Numbers are finite.
 enum class Bound : std::uint8_t { any, not_negative, positive, share, range, integer };
 

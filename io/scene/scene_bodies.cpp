@@ -60,7 +60,7 @@ std::vector<double> read_collision(const SceneElement& node) {
 /// the body's frame, or those of its child <collision>.
 void read_contact_places(const SceneNode& node, std::vector<double>& out) {
   if (node.has("contacts")) out = read_points_beside(node);
-  for (const SceneNode& child : node.children({"visual", "collision"})) {
+  for (const SceneNode& child : children_of(node)) {
     const SceneElement part(child, child.name() == "visual" ? kVisual : kCollision);
     part.check();
     if (part.of() == kVisual) continue;

@@ -71,17 +71,30 @@ std::size_t SceneElement::word(const char* name) const {
   return std::size_t(choice(name, words));
 }
 
-std::vector<SceneElement> elements_in(const SceneNode& section, std::uint32_t kinds) {
-  section.check_attributes({});
-  std::vector<std::string> names;
-  std::vector<Element> found;
+static std::vector<Element> elements_of(std::uint32_t bits) {
+  std::vector<Element> out;
   for (int k = 0; k < kElements; ++k)
-    if (const auto element = static_cast<Element>(1U << k); (kinds & element) != 0)
-      found.push_back(element), names.emplace_back(to_string(element));
+    if ((bits & 1U << k) != 0) out.push_back(static_cast<Element>(1U << k));
+  return out;
+}
+
+std::vector<std::string> element_names(std::uint32_t elements) {
+  std::vector<std::string> names;
+  for (const Element element : elements_of(elements)) names.emplace_back(to_string(element));
+  return names;
+}
+
+std::vector<SceneNode> children_of(const SceneNode& node) {
+  return node.children(element_names(elements_inside(node.name())));
+}
+
+std::vector<SceneElement> elements_in(const SceneNode& section) {
+  section.check_attributes({});
+  const std::vector<Element> kinds = elements_of(elements_inside(section.name()));
   std::vector<SceneElement> out;
-  for (const SceneNode& node : section.children(names))
-    out.emplace_back(node,
-                     found[std::size_t(std::ranges::find(names, node.name()) - names.begin())]);
+  for (const SceneNode& node : children_of(section))
+    for (const Element kind : kinds)
+      if (node.name() == to_string(kind)) out.emplace_back(node, kind);
   return out;
 }
 

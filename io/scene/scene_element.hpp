@@ -43,8 +43,12 @@ class SceneElement : public SceneNode {
   Element of_;
 };
 
-/// The elements of these kinds in a section, which has no attributes.
-std::vector<SceneElement> elements_in(const SceneNode& section, std::uint32_t kinds);
+/// The names of these elements in scene files.
+std::vector<std::string> element_names(std::uint32_t elements);
+/// The children that the schema allows in an element.
+std::vector<SceneNode> children_of(const SceneNode& node);
+/// The elements in a section, which has no attributes.
+std::vector<SceneElement> elements_in(const SceneNode& section);
 
 template <class T>
 void SceneElement::read(T& to, bool turns_or_linear, std::string_view type) const {

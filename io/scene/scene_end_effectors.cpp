@@ -9,7 +9,7 @@
 namespace tangere {
 
 void read_end_effectors(Scene& scene, const SceneNode& section) {
-  for (const SceneElement& node : elements_in(section, kEndEffector)) {
+  for (const SceneElement& node : elements_in(section)) {
     node.check();
     EndEffectorDescription d;
     d.source = node.source();

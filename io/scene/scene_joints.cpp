@@ -119,7 +119,7 @@ int control_count(const Scene& scene) {
 }
 
 void read_actuators(Scene& scene, const SceneNode& section) {
-  for (const SceneElement& node : elements_in(section, kMotor)) {
+  for (const SceneElement& node : elements_in(section)) {
     MotorDescription motor;
     motor.source = node.source();
     const JointType type = scene.links[std::size_t(find_joint(scene, node, "joint"))].joint.type;

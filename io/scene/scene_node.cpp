@@ -20,6 +20,11 @@ constexpr const char* kAllow = " (--allow-unknown ignores it)";
 
 void SceneContext::use_centimetres_and_grams() { length = kUnits[static_cast<int>(Unit::m)].in_si; }
 
+Source SceneContext::source(int line) const {
+  const bool made = line >= 1 && std::size_t(line) <= origins.size();
+  return made ? origins[std::size_t(line) - 1] : Source{file, line};
+}
+
 double SceneContext::factor(Unit unit) const {
   return length == 1 ? 1 : kUnits[static_cast<int>(unit)].in_si;
 }
@@ -32,7 +37,8 @@ void SceneNode::fail_at(const char* attribute, const std::string& message) const
   const SceneContext::Default* given =
       find_own(attribute) == nullptr ? find_default(attribute) : nullptr;
   if (include_ != nullptr && include_->Attribute(attribute) != nullptr)
-    fail(fmt::format("{} (from the <include>, line {})", message, include_->GetLineNum()));
+    fail(fmt::format("{} (from the <include>, line {})", message,
+                     context_->includer->source(include_->GetLineNum()).line));
   fail(given == nullptr ? message
                         : fmt::format("{} (from <default>, line {})", message, given->line));
 }
@@ -94,7 +100,7 @@ void SceneNode::add_children(const std::vector<std::string>& known,
           child.fail(
               fmt::format("the <include> of line {} gives attributes to this one; expected "
                           "them here",
-                          include->GetLineNum()));
+                          context_->includer->source(include->GetLineNum()).line));
         const IncludedFile& file = include_file(child, *this);
         const bool gives = e->FirstAttribute()->Next() != nullptr;  // more than the file's name
         SceneNode(*file.root, *file.context).add_children(known, gives ? e : nullptr, out);
@@ -107,8 +113,9 @@ void SceneNode::add_children(const std::vector<std::string>& known,
     } else if (const tinyxml2::XMLText* t = n->ToText()) {
       const std::string text = t->Value();
       if (!std::all_of(text.begin(), text.end(), [](unsigned char c) { return std::isspace(c); }))
-        context_->outermost().warnings.push_back(fmt::format(
-            "{}:{}: stray text inside <{}> is ignored", context_->file, n->GetLineNum(), name()));
+        context_->outermost().warnings.push_back(
+            fmt::format("{}stray text inside <{}> is ignored",
+                        context_->source(n->GetLineNum()).prefix(), name()));
     }
   }
 }

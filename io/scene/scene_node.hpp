@@ -8,6 +8,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -24,6 +25,8 @@ struct IncludedFile;
 struct SceneContext {
   std::string file;
   bool allow_unknown = false;
+  /// Of text that a program made: where each of its lines comes from. Empty: from the file.
+  std::span<const Source> origins = {};
   std::vector<std::string> warnings;
   /// A value from <default> and the number of its line.
   struct Default {
@@ -45,6 +48,8 @@ struct SceneContext {
     return includer == nullptr ? *this : includer->outermost();
   }
 
+  /// Where a line of the text comes from.
+  [[nodiscard]] Source source(int line) const;
   /// Factor from the scene's units to SI.
   [[nodiscard]] double factor(Unit unit) const;
 };
@@ -58,7 +63,7 @@ class SceneNode {
       : element_(&element), context_(&context), include_(include) {}
 
   [[nodiscard]] std::string name() const { return element_->Name(); }
-  [[nodiscard]] Source source() const { return {context_->file, element_->GetLineNum()}; }
+  [[nodiscard]] Source source() const { return context_->source(element_->GetLineNum()); }
   [[nodiscard]] SceneContext& context() const { return *context_; }
   [[nodiscard]] const tinyxml2::XMLElement& element() const { return *element_; }
   [[noreturn]] void fail(const std::string& message) const;

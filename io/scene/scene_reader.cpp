@@ -25,10 +25,7 @@ constexpr std::uintmax_t kLargestFile = 64U
 constexpr int kDeepestTree = 200;
 constexpr const char* kSceneRoots = "the root <redmax> or <tangere>";
 
-const std::vector<std::string> kJointTypes = {
-    "fixed",     "revolute",        "prismatic",     "planar", "free2d",       "translational",
-    "spherical", "spherical-euler", "spherical-exp", "free3d", "free3d-euler", "free3d-exp"};
-constexpr JointType kJointTypeOf[] = {
+constexpr JointType kJointTypeOf[] = {  // of the words of its attribute `type`
     JointType::fixed,     JointType::revolute,      JointType::prismatic, JointType::planar,
     JointType::free2d,    JointType::translational, JointType::spherical, JointType::spherical,
     JointType::spherical, JointType::free,          JointType::free,      JointType::free};
@@ -39,7 +36,7 @@ class TreeReader {
 
   void read_robot(const SceneNode& robot) {
     SceneElement(robot, kRobot).check();
-    for (const SceneNode& link : robot.children({"link"})) read_link(link, parent_of(link), 0);
+    for (const SceneNode& link : children_of(robot)) read_link(link, parent_of(link), 0);
   }
 
   /// Gives bodies without a name that of their link, with a number behind it if another body has
@@ -81,7 +78,7 @@ class TreeReader {
     std::vector<SceneNode> inner;
     int joints = 0, bodies = 0;
     bool in_world = false;  // whether the body's pose is given in the world
-    for (const SceneNode& child : node.children({"joint", "body", "link"})) {
+    for (const SceneNode& child : children_of(node)) {
       if (child.name() == "joint") {
         if (++joints > 1) child.fail("a second joint in link '" + link.name + "'; expected one");
         link.joint = read_joint(child, parent);
@@ -116,7 +113,7 @@ class TreeReader {
     joint.source = node.source();
     joint.name = node.text("name");
     unique("joint", joint.name, node);
-    joint.type = kJointTypeOf[node.choice("type", kJointTypes)];
+    joint.type = kJointTypeOf[node.word("type")];
     node.check(to_string(joint.type));
     if (joint.type == JointType::revolute || joint.type == JointType::prismatic) {
       joint.axis0 = node.direction("axis");
@@ -182,8 +179,7 @@ void read_ground(Scene& scene, const SceneElement& node) {
 }
 
 void read_defaults(const SceneNode& section) {
-  for (const SceneElement& node :
-       elements_in(section, kJoint | kBody | kTouching | kSurfaceContact | kMotor | kEndEffector)) {
+  for (const SceneElement& node : elements_in(section)) {
     node.check_default();
     for (const Attribute& a : schema())
       if ((a.elements & node.of()) != 0 && a.has(kInDefault) && node.has(a.name))
@@ -199,9 +195,11 @@ void read_root(const SceneNode& root, Scene& scene) {
                    : ""));
   root.check_attributes({"model", "name"});
   scene.name = root.text("model", root.text("name", "scene"));
-  const std::vector<SceneNode> sections = root.children(
-      {"option", "solver_option", "ground", "default", "robot", "actuator", "sensor", "contact",
-       "variable", "virtual", "initial", "control", "randomize", "outputs"});
+  std::vector<std::string> known = element_names(elements_inside(holders().front().name));
+  known.emplace_back("virtual");
+  for (const Holder& holder : holders())
+    if (holder.section) known.emplace_back(holder.name);
+  const std::vector<SceneNode> sections = root.children(known);
   const auto each = [&](const char* name, auto&& read) {
     for (const SceneNode& s : sections)
       if (s.name() == name) read(s);
@@ -262,6 +260,7 @@ SceneFile parse_scene(const std::string& text, const std::string& name,
   SceneContext context;
   context.file = name;
   context.allow_unknown = options.allow_unknown;
+  context.origins = options.origins;
   const tinyxml2::XMLElement& root = parse_xml(document, text, name, kSceneRoots, context.warnings);
   SceneFile out;
   read_root(SceneNode(root, context), out.scene);

@@ -14,6 +14,9 @@ namespace tangere {
 
 struct SceneReadOptions {
   bool allow_unknown = false;  ///< unknown elements and attributes become warnings
+  /// Of text that a program made: where each of its lines comes from, for messages. Empty: from
+  /// the text itself.
+  std::vector<Source> origins{};
 };
 
 struct SceneFile {

@@ -36,7 +36,7 @@ std::vector<double> read_controls(const Scene& scene, const SceneNode& node) {
 PiecewiseControl read_piecewise(const Scene& scene, const SceneElement& node) {
   PiecewiseControl control;
   node.read(control);
-  for (const SceneNode& child : node.children({"at"})) {
+  for (const SceneNode& child : children_of(node)) {
     const SceneElement at(child, kAt);
     at.check();
     const double time = at.number("time");
@@ -210,7 +210,7 @@ void read_coefficient_variation(const Scene& scene, const SceneElement& node,
 }  // namespace
 
 void read_initial(Scene& scene, const SceneNode& section) {
-  for (const SceneElement& node : elements_in(section, kInitialJoint)) {
+  for (const SceneElement& node : elements_in(section)) {
     node.check();
     const int joint = find_joint(scene, node, "name");
     const JointType type = scene.links[std::size_t(joint)].joint.type;
@@ -235,8 +235,7 @@ void read_initial(Scene& scene, const SceneNode& section) {
 }
 
 void read_control(Scene& scene, const SceneNode& section) {
-  const std::vector<SceneElement> kinds =
-      elements_in(section, kConstant | kPiecewise | kCsv | kRandom);
+  const std::vector<SceneElement> kinds = elements_in(section);
   if (kinds.size() != 1)
     section.fail(fmt::format("{} ways to drive the scene; expected one", kinds.size()));
   const SceneElement& node = kinds.front();
@@ -259,7 +258,7 @@ void read_control(Scene& scene, const SceneNode& section) {
 }
 
 void read_randomize(Scene& scene, const SceneNode& section) {
-  for (const SceneElement& node : elements_in(section, kVarying)) {
+  for (const SceneElement& node : elements_in(section)) {
     node.check();
     RandomizationDescription d;
     d.source = node.source();

@@ -25,6 +25,7 @@ int find_named(const Scene& scene, const SceneNode& node, const char* attribute,
                Name&& name_of) {
   const std::string wanted = node.text(attribute);
   std::vector<std::string> names;
+  if (attribute == std::string_view("body2")) names.emplace_back(kGroundName);
   for (std::size_t i = 0; i < scene.links.size(); ++i) {
     names.push_back(name_of(scene.links[i]));
     if (names.back() == wanted) return static_cast<int>(i);
@@ -139,7 +140,7 @@ static void read_surface_contact(Scene& scene, const SceneElement& node) {
 }
 
 void read_contacts(Scene& scene, const SceneNode& section) {
-  for (const SceneElement& node : elements_in(section, kContacts | kSurfaceContact)) {
+  for (const SceneElement& node : elements_in(section)) {
     node.check();
     if (node.of() == kSurfaceContact) {
       read_surface_contact(scene, node);

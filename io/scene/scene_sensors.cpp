@@ -122,7 +122,7 @@ std::vector<TactilePoint> read_points(const SceneElement& node, const std::strin
 /// Reads what <tactile> holds, each at most once.
 void read_parts(const SceneNode& node, TactileDescription& sensor) {
   bool imperfections = false;
-  for (const SceneNode& part : node.children({"imperfections", "markers"})) {
+  for (const SceneNode& part : children_of(node)) {
     const bool marks = part.name() == "markers";
     if (marks ? sensor.markers.has_value() : imperfections)
       part.fail("a second time in one <tactile>; expected one");
@@ -196,7 +196,7 @@ std::vector<std::string> body_names(const SceneNode& node, const char* attribute
 }  // namespace
 
 void read_sensors(Scene& scene, const SceneNode& section) {
-  for (const SceneElement& node : elements_in(section, kTactile)) {
+  for (const SceneElement& node : elements_in(section)) {
     TactileDescription d;
     d.source = node.source();
     find_body(scene, node, "body");

@@ -20,6 +20,8 @@ NB_MODULE(_core, m) {
   if (const char* const why = tangere::kernels::isa_error(); *why != '\0')
     throw nb::import_error(why);
   add_scenes(m);
+  add_scene_schema(m);
+  add_robots(m);
   add_batches(m);
   add_tasks(m);
   add_environments(m);

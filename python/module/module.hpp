@@ -8,6 +8,8 @@ namespace tangere::python {
 
 // One function for each file of this folder: it adds its classes to the module.
 void add_scenes(nanobind::module_& m);
+void add_scene_schema(nanobind::module_& m);
+void add_robots(nanobind::module_& m);
 void add_batches(nanobind::module_& m);
 void add_tasks(nanobind::module_& m);
 void add_environments(nanobind::module_& m);

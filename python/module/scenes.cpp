@@ -1,13 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 // Scene and Model in Python.
 #include <nanobind/stl/filesystem.h>
+#include <nanobind/stl/pair.h>
 #include <nanobind/stl/string.h>
+#include <nanobind/stl/string_view.h>
 #include <nanobind/stl/vector.h>
 
 #include "engine/model/model.hpp"
 #include "engine/scene/field_form.hpp"
 #include "engine/scene/scheme.hpp"
 #include "engine/step/shear_state_arrays.hpp"
+#include "io/files/nearest_name.hpp"
+#include "io/files/part_file.hpp"
 #include "io/scene/scene_reader.hpp"
 #include "python/module/arrays.hpp"
 #include "python/module/module.hpp"
@@ -18,10 +22,11 @@ namespace {
 
 using nb::literals::operator""_a;
 
-/// What the reader overlooked must reach the user: each warning is a UserWarning.
-Scene told(SceneFile file) {
+/// What the reader overlooked must reach the user: each warning is a UserWarning of the frame that
+/// calls, or one `depth` further out.
+Scene told(SceneFile file, int depth = 1) {
   for (const std::string& warning : file.warnings)
-    if (PyErr_WarnEx(PyExc_UserWarning, warning.c_str(), 1) < 0) throw nb::python_error();
+    if (PyErr_WarnEx(PyExc_UserWarning, warning.c_str(), depth) < 0) throw nb::python_error();
   return std::move(file.scene);
 }
 
@@ -41,11 +46,13 @@ void add_scene(nb::module_& m) {
           "message has file and line. OSError: it cannot be read. `allow_unknown` turns unknown\n"
           "elements and attributes into warnings.")
       .def_static(
-          "from_text",
-          [](const std::string& text, const std::string& name) {
-            return told(parse_scene(text, name));
+          "from_string",
+          [](const std::string& text, const std::string& name, bool allow_unknown) {
+            return told(parse_scene(text, name, {allow_unknown}));
           },
-          "text"_a, "name"_a = "scene", "Reads a scene from text; `name` stands for the file.")
+          "text"_a, "name"_a = "scene", "allow_unknown"_a = false,
+          "Reads a scene from text. `name` stands for the file: messages have it, and what the\n"
+          "scene names, such as meshes, is looked for beside it. Raises what Scene raises.")
       .def_ro("name", &Scene::name)
       .def_ro("path", &Scene::path, "The file that it was read from.")
       .def_ro("text", &Scene::text, "The file as read.")
@@ -147,10 +154,37 @@ void add_model(nb::module_& m) {
       });
 }
 
+/// For texts that Python writes; files are written whole or not at all.
+void add_texts(nb::module_& m) {
+  m.def(
+      "parse_scene",
+      [](const std::string& text, const std::string& name,
+         const std::vector<std::pair<std::string, int>>& origins) {
+        SceneReadOptions options;
+        for (const auto& [file, line] : origins) options.origins.push_back({file, line});
+        return told(parse_scene(text, name, options), 3);  // behind two functions of the package
+      },
+      "text"_a, "name"_a, "origins"_a,
+      "Reads a scene from text that a program made. `origins`: for each line the file and the "
+      "line\n"
+      "from which it comes, which messages name.");
+  m.def(
+      "write_text", &write_text_atomically, "path"_a, "text"_a, "overwrite"_a,
+      "Writes a file, whole or not at all. IoError: it cannot, or the file exists and `overwrite`\n"
+      "is False.");
+  m.def(
+      "suggestion",
+      [](const std::string& wrong, const std::vector<std::string>& names) {
+        return suggestion(wrong, names);
+      },
+      "wrong"_a, "names"_a, "What messages add after a name that is not known: the nearest one.");
+}
+
 }  // namespace
 
 void add_scenes(nb::module_& m) {
   add_scene(m);
+  add_texts(m);
   add_sensor(m);
   add_model(m);
 }

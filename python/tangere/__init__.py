@@ -8,11 +8,13 @@
 
     env = tangere.make_vec("box_pushing", num_envs=256)      # Gymnasium's vector interface
 
+`tangere.scene_builder` builds scenes without files, `tangere.robots` makes them of robots.
 `tangere.gym` has the environments, `tangere.scene_env` those of a task written in Python,
 `tangere.torch` and `tangere.jax` gradients through PyTorch and JAX, `tangere.data` data sets for
 learning, `tangere.policy` policies that the command asks. `tangere.lerobot`, `tangere.robomimic`
-and `tangere.sb3` connect to the libraries of these names. All but `tangere.gym`,
-`tangere.scene_env` and `tangere.policy` need packages that `import tangere` does not import.
+and `tangere.sb3` connect to the libraries of these names. All but `tangere.scene_builder`,
+`tangere.robots`, `tangere.gym`, `tangere.scene_env` and `tangere.policy` need packages that
+`import tangere` does not import.
 """
 
 from __future__ import annotations
@@ -38,6 +40,8 @@ from ._core import (
     task_spec,
 )
 from .gym import TaskEnv, VectorTaskEnv, gym_id, make_env, make_vec, register_tasks
+from .robots import import_robot
+from .scene_builder import SceneBuilder
 from .scene_env import SceneEnv, VectorSceneEnv, register_scene_env
 
 __all__ = [
@@ -48,6 +52,7 @@ __all__ = [
     "Model",
     "Run",
     "Scene",
+    "SceneBuilder",
     "SceneEnv",
     "Sensor",
     "StepStatus",
@@ -59,6 +64,7 @@ __all__ = [
     "VectorTaskEnv",
     "__version__",
     "gym_id",
+    "import_robot",
     "instruction_set",
     "make_env",
     "make_vec",

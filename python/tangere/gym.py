@@ -131,7 +131,7 @@ def _finals(last: Observation, final: dict[str, Any], ended: np.ndarray) -> dict
 def _scene_as_read(path: str, text: str) -> _core.Scene:
     """The scene of a pickle: read from its file again."""
     if not Path(path).is_file():
-        return _core.Scene.from_text(text, path)
+        return _core.Scene.from_string(text, path)
     with warnings.catch_warnings():  # they came when the scene was read first
         warnings.simplefilter("ignore", UserWarning)
         scene = _core.Scene(path, allow_unknown=True)

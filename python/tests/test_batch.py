@@ -141,7 +141,7 @@ def test_mistakes_say_what_was_expected(model, tmp_path):
         (lambda: tangere.Batch(model, threads=0), "0 threads"),
         (lambda: tangere.Batch(model, precision="half"), "precision 'half'"),
         (lambda: tangere.task_spec("box_pushin"), "no task is named 'box_pushin'"),
-        (lambda: tangere.Scene.from_text("<tangere><robo/></tangere>", "a.xml"), "a.xml:1"),
+        (lambda: tangere.Scene.from_string("<tangere><robo/></tangere>", "a.xml"), "a.xml:1"),
     ]:
         with pytest.raises(tangere.InputError, match=message):
             call()
@@ -158,7 +158,7 @@ def test_what_a_scene_reader_overlooks_is_a_warning(model):
     path = tangere.scenes()["rolling_ball_small"].parent
     assert "colour" in text and path.is_dir()
     with pytest.raises(tangere.InputError, match="colour"):
-        tangere.Scene.from_text(text)
+        tangere.Scene.from_string(text)
 
 
 def test_a_failed_environment_is_told(model):
@@ -328,7 +328,7 @@ def test_faces_bound_the_bodies():
         '<tangere><option unit="m-kg" timestep="1e-3" integrator="BDF1"/>'
         f'<ground pos="0 0 0.5" normal="0 0 1"/><robot>{links}</robot></tangere>'
     )
-    batch = tangere.Batch(tangere.Model(tangere.Scene.from_text(text)), envs=2)
+    batch = tangere.Batch(tangere.Model(tangere.Scene.from_string(text)), envs=2)
     corners, body, rgba = batch.faces(1, half_space=2)
     assert corners.shape[1:] == (3, 3) and body.dtype == np.int32
     for k, (kind, (_, volume, error)) in enumerate(shapes.items()):

@@ -53,7 +53,8 @@ def test_the_reference_is_made_of_the_docstrings():
         "docs/python_api.md is not current; run python/api_reference.py"
     )
     for name in tangere.__all__:  # nothing of the package is left out
-        places = (f"tangere.{name}", f"tangere.gym.{name}", f"tangere.scene_env.{name}")
+        modules = ("", "gym.", "scene_env.", "scene_builder.", "robots.")
+        places = [f"tangere.{module}{name}" for module in modules]
         assert any(p in text for p in places) or name in ("__version__", "instruction_set"), name
 
 

@@ -114,7 +114,7 @@ def test_a_scene_is_copied_with_its_file(tmp_path):
     text = tangere.gym.task_scene("dummy").text
     path = tmp_path / "scene.xml"
     path.write_text(text, encoding="utf-8")
-    read, written = tangere.Scene(path), tangere.Scene.from_text(text, "own")
+    read, written = tangere.Scene(path), tangere.Scene.from_string(text, "own")
     assert unpickled(read).path == str(path) and unpickled(read).text == text
     assert copy.deepcopy(written).text == text and unpickled(written).path == "own"
     env = unpickled(tangere.make_env("dummy", scene=written))

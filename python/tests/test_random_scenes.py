@@ -17,7 +17,7 @@ E, STEPS, EVERY = 2, 4, 2
 
 def simulation(kind, scene, **options):
     return kind(
-        tangere.Scene.from_text(scene.text),
+        tangere.Scene.from_string(scene.text),
         E,
         STEPS,
         every=EVERY,

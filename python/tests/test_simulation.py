@@ -31,7 +31,7 @@ pos="0.05 0 0" density="900"/></link></link></robot>
 
 def scene(name):
     if name == "chain":
-        return tangere.Scene.from_text(CHAIN), ["body hand density", "joint arm damping"]
+        return tangere.Scene.from_string(CHAIN), ["body hand density", "joint arm damping"]
     file, numbers = SCENES[name]
     return tangere.Scene(Path(tangere.__file__).parent / "scenes" / file), numbers
 
@@ -192,7 +192,7 @@ def test_what_cannot_be_done_is_refused():
 
 def test_a_scene_without_motors_has_gradients_by_its_start():
     text = CHAIN.replace("<actuator>", "<!--").replace("</actuator>", "-->")
-    sim = tt.Simulation(tangere.Scene.from_text(text), num_envs=2, steps=5)
+    sim = tt.Simulation(tangere.Scene.from_string(text), num_envs=2, steps=5)
     q = sim.reset().q.clone().requires_grad_()
     s = sim.reset(q=q)
     for _ in range(5):

@@ -25,11 +25,19 @@ env = tangere.make_vec("box_pushing", 2)
 obs, reward, terminated, truncated, info = env.step(env.scripted_action())
 mean: float = float(reward.mean())
 names: list[str] = tangere.task_names()
+b = tangere.SceneBuilder("a", timestep=np.float32(0.1), gravity=np.zeros(3))
+link = b.robot.link("a").link("b")
+link.joint("b", "prismatic", axis=(0, 0, 1), lim=[-1, 1])
+b.sensor.tactile("b", "rect_array", feels=["a"], feedback=True).imperfections(noise=0.1)
+scene: tangere.Scene = b.scene()
 """
 WRONG = {
     "tangere.Batch('a.xml')": "arg-type",
     "tangere.make_vec('box_pushing', 2).step()": "call-arg",
     "tangere.task_spec('box_pushing').horizont": "attr-defined",
+    "tangere.SceneBuilder().robot.link('a').body('spere')": "arg-type",
+    "tangere.SceneBuilder().robot.link('a').body('sphere', radus=1)": "arg-type",
+    "tangere.SceneBuilder().robot.link('a').boddy('sphere')": "attr-defined",
     "x: int = tangere.task_names()": "assignment",
 }
 

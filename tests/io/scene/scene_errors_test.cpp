@@ -358,5 +358,26 @@ TEST(SceneError, UnknownNamesBecomeWarningsWhenAllowed) {
               ::testing::HasSubstr("s.xml:2: <option>: unknown attribute 'colour'"));
 }
 
+/// Lines of a text that a program made are those of the program.
+TEST(SceneError, NameTheOriginOfAMadeLine) {
+  const std::string text = with("radius=\"0.02\"", "radus=\"0.02\" mu=\"1\"");
+  SceneReadOptions options;
+  for (int line = 1; line < 14; ++line) options.origins.push_back({"press.py", 100 + line});
+  try {
+    parse_scene(text, "s.xml", options);
+    FAIL();
+  } catch (const InputError& e) {
+    EXPECT_THAT(e.what(), ::testing::StartsWith("press.py:113: <body>: unknown attribute 'radus'"));
+  }
+  options.allow_unknown = true;
+  options.origins.resize(12);  // what is left keeps its own lines
+  try {
+    parse_scene(text, "s.xml", options);
+    FAIL();
+  } catch (const InputError& e) {
+    EXPECT_THAT(e.what(), ::testing::StartsWith("s.xml:13: <body>: attribute 'radius' is missing"));
+  }
+}
+
 }  // namespace
 }  // namespace tangere

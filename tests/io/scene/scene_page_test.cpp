@@ -8,10 +8,12 @@
 #include <bit>
 #include <cstdlib>
 #include <fstream>
+#include <set>
 #include <sstream>
 
 #include "engine/scene/schema.hpp"
 #include "engine/scene/shapes.hpp"
+#include "io/scene/scene_element.hpp"
 
 namespace tangere {
 namespace {
@@ -50,7 +52,9 @@ std::string unit_text(const Attribute& a) {
 
 std::string row_text(const Attribute& a) {
   std::string text = types_text(a);
-  if (a.words != nullptr) text += fmt::format("{}; ", fmt::join(words_of(a.words), ", "));
+  const std::vector<std::string> words =
+      a.words == nullptr ? std::vector<std::string>{} : words_of(a.words);
+  if (!words.empty() && words.size() < 10) text += fmt::format("{}; ", fmt::join(words, ", "));
   return fmt::format("| `{}` | {} | {} | {}{} | {}{} |\n", a.name,
                      a.default_text == nullptr ? "needed" : a.default_text, unit_text(a),
                      a.has(kVaries) ? "v" : "", a.has(kGradient) ? "g" : "", text, a.text);
@@ -118,6 +122,20 @@ TEST(Schema, SizesAreThoseOfTheShapes) {
         has = has || name == std::string(size.name);
       EXPECT_EQ(attribute_of(kBody, name).serves(row.name), has) << row.name << " " << name;
     }
+}
+
+/// Every element that has attributes stands somewhere, and one name in one place is one element.
+TEST(Schema, EveryElementHasAHolder) {
+  std::uint32_t all = 0;
+  for (const Holder& holder : holders()) {
+    const std::vector<std::string> names = element_names(holder.elements);
+    EXPECT_EQ(std::set<std::string>(names.begin(), names.end()).size(), names.size());
+    EXPECT_EQ(elements_inside(holder.name), holder.elements) << holder.name;
+    all |= holder.elements;
+    if (holder.section && std::string(holder.name) == to_string(kRobot)) all |= kRobot;
+  }
+  EXPECT_EQ(all, (1U << kElements) - 1);
+  EXPECT_EQ(elements_inside("joint"), 0U);
 }
 
 }  // namespace

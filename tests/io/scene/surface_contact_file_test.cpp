@@ -129,6 +129,8 @@ TEST(SurfaceContactFile, WhatCannotTouchIsRefusedWithItsLine) {
               AllOf(HasSubstr("s.xml:11: "), HasSubstr("body 'rod' against itself")));
   EXPECT_THAT(contact("body1=\"rod\" body2=\"bx\" kn=\"1\""),
               AllOf(HasSubstr("no body has this name"), HasSubstr("'box'")));
+  EXPECT_THAT(contact("body1=\"rod\" body2=\"grund\" kn=\"1\""),
+              HasSubstr("did you mean 'ground'"));
   EXPECT_THAT(contact("body1=\"rod\" body2=\"abstract\" kn=\"1\""),
               HasSubstr("'abstract' is an abstract body, which has no surface"));
   EXPECT_THAT(contact("body1=\"wall\" body2=\"ground\" kn=\"1\""), HasSubstr("have no end"));
