@@ -90,7 +90,7 @@ class SceneTape {
   void reset(const Whole<std::uint64_t>& seed, const std::optional<Argument<double>>& q,
              const std::optional<Argument<double>>& v,
              const std::optional<Argument<double>>& parameters,
-             const std::optional<Argument<double>>& points) {
+             const std::optional<Argument<double>>& points, bool record) {
     const std::uint64_t draw = seed.value("seed");
     std::vector<double> q0, v0, given, moved;
     if (q) q0 = rows_of(*q, count(), nq(), "q");
@@ -104,15 +104,11 @@ class SceneTape {
     const nb::gil_scoped_release free;
     move_points(moved);
     draw_numbers(draw, given);
-    tape().reset(draw, 0);
-    for (std::size_t e = 0; e < count() && (q || v); ++e) {
-      const auto own = [&](const std::vector<double>& all, std::span<const double> drawn,
-                           std::size_t n) {
-        return all.empty() ? drawn.subspan(e * n, n) : std::span(all).subspan(e * n, n);
-      };
-      const auto qe = own(q0, tape().q(), nq()), ve = own(v0, tape().v(), nv());
-      const std::vector<double> at(qe.begin(), qe.end()), rate(ve.begin(), ve.end());
-      tape().displace(static_cast<int>(e), at, rate);
+    tape().reset(draw, 0, record);
+    if (q || v) {
+      if (!q) q0.assign(tape().q().begin(), tape().q().end());
+      if (!v) v0.assign(tape().v().begin(), tape().v().end());
+      tape().displace(q0, v0);
     }
     first_q_.assign(tape().q().begin(), tape().q().end());
   }
@@ -128,8 +124,12 @@ class SceneTape {
     tape().check_step(rows);
   }
   Array<double> observations() {
+    std::span<double> to;
+    auto array = new_array<double>({count(), width()}, to);
     const InUse::Turn turn(in_use_);
-    return array_of<double>({count(), width()}, tape().observations());
+    const nb::gil_scoped_release free;
+    tape().get_observations(to);
+    return array;
   }
   Array<std::int8_t> status() {
     const InUse::Turn turn(in_use_);
@@ -289,26 +289,24 @@ void add_scene_tapes(nb::module_& m) {
           "scene"_a, "envs"_a, "steps"_a, "every"_a = 1, "readings"_a = nb::none(),
           "parameters"_a = std::vector<std::string>{}, "points"_a = false, "threads"_a = nb::none(),
           "precision"_a = "double", "tape_bytes"_a = 1e9,
-          "`steps`: calls of step() at most. `every`: steps of the simulation in each. "
-          "`readings`:\n"
-          "names, such as pad, pad.sum, bodies.box, variables or an end effector; None: all end\n"
-          "effectors and fields. `parameters`: names of numbers of the scene that environments "
-          "may\n"
-          "have of their own. `points`: whether there are derivatives by points of sensors.\n"
-          "InputError: a number is out of range, or a name is unknown.")
+          "`steps`: calls of step() at most. `every`: steps of the simulation in each.\n"
+          "`readings`: names, such as pad, pad.sum, bodies.box, variables or an end effector;\n"
+          "None: all end effectors and fields. `parameters`: names of numbers of the scene that\n"
+          "environments may have of their own. `points`: whether there are derivatives by points\n"
+          "of sensors. InputError: a number is out of range, or a name is unknown.")
       .def(
           "reset", &SceneTape::reset, "seed"_a = 0, "q"_a = nb::none(), "v"_a = nb::none(),
-          "parameters"_a = nb::none(), "points"_a = nb::none(),
+          "parameters"_a = nb::none(), "points"_a = nb::none(), "record"_a = true,
           "Starts anew and clears the tape. `q` (E, nq), `v` (E, nv) and `parameters`\n"
           "(E, names) take the place of what the scene draws; one row stands for all. `points`\n"
           "(points of all sensors, 7) moves points of sensors: x, y, z [m] in their body's frame,\n"
           "and kn, kt, mu, damping are added to their own. The scene is compiled again where it\n"
-          "differs from that of the last reset.")
+          "differs from that of the last reset. Without `record` nothing can be reversed.")
       .def("step", &SceneTape::step, "controls"_a, "Takes the controls (E, nu) of `every` steps.")
       .def("check_step", &SceneTape::check_step, "controls"_a,
            "Raises InputError if step() would do so for these controls; takes no step.")
       .def("observations", &SceneTape::observations,
-           "(E, n) float64: q, v, end effectors and fields, one after the other.")
+           "(E, n) float64: q, v and the readings, one after the other.")
       .def("status", &SceneTape::status, "(E) int8: StepStatus of the last steps.")
       .def("parameters", &SceneTape::parameters,
            "(E, names) parameters of the environments, in SI units.")

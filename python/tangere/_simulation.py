@@ -13,7 +13,7 @@ import torch
 
 from . import _core
 from ._tape import SimulationBase, split_rows
-from ._torch_run import Run
+from ._torch_run import Line, Run
 
 
 @dataclass
@@ -26,6 +26,7 @@ class State:
     status: np.ndarray  #: (E) int8, StepStatus of the last steps
     step: int  #: calls of step() that led to it
     _token: torch.Tensor
+    _run: Run
 
     def __getitem__(self, name: str) -> torch.Tensor:
         return self.readings[name]
@@ -81,7 +82,8 @@ class Simulation(SimulationBase):
         options = dict(threads=threads, precision=precision, tape_bytes=tape_bytes)
         super().__init__(scene, num_envs, steps, every, read, parameters, points=points, **options)
         self.dtype = dtype
-        self._run = Run(self.tape)
+        self._line = Line(self.tape)
+        self._run: Run | None = None
 
     def reset(
         self,
@@ -98,13 +100,14 @@ class Simulation(SimulationBase):
 
         `points`: sensor → (points, 7), zeros for the points of the scene: it is added to their
         places x y z [m] in the body's frame and to their own kn, kt, mu and damping. The scene is
-        compiled again where it differs from the last reset(). Raises InputError for other shapes
-        and names, and for points of a sensor with ks."""
-        self._run.tape = None
-        self._run = Run(self.tape)
+        compiled again where it differs from the last reset(). Under torch.no_grad() no step is
+        recorded. Raises InputError for other shapes and names, and for points of a sensor with
+        ks."""
         given = [None if x is None else self._rows(x) for x in (q, v, parameters)]
         given.append(None if points is None else torch.cat(self._point_rows(points, torch.zeros)))
-        rows, token = _Start.apply(*given, self._run, seed, self.dtype)
+        given_numbers, recorded = [_numpy(x) for x in given], torch.is_grad_enabled()
+        self._run = Run(self._line, seed, *given_numbers, recorded, recorded=recorded)
+        rows, token = _Start.apply(*given, self._run, self.dtype)
         return self._state(rows, token)
 
     def step(self, state: State, controls: torch.Tensor) -> State:
@@ -112,17 +115,25 @@ class Simulation(SimulationBase):
         the one that the last call returned: a tape has one line of steps. Raises InputError for
         another state or shape, for controls that are not finite, and under torch.no_grad() after
         recorded steps."""
-        if self._run.taken != state.step or self._run.tape is None:
+        run = state._run
+        if run is not self._run or run.taken != state.step:
+            taken = 0 if self._run is None else self._run.taken
             raise _core.InputError(
-                f"a state after {state.step} calls of step(), and {self._run.taken} were taken; "
-                "expected the last one"
+                f"a state after {state.step} calls of step(), and {taken} were taken since the "
+                "last reset(); expected the last one"
             )
+        if not run.current:
+            raise _core.InputError("step() after backward() through another run; call reset()")
         if state._token.requires_grad and not torch.is_grad_enabled():
             raise _core.InputError(
                 "step() under no_grad() after steps that are recorded; call reset()"
             )
         controls = self._rows(torch.as_tensor(controls))
-        return self._state(*_Step.apply(controls, state._token, self._run, self.dtype))
+        if controls.requires_grad and torch.is_grad_enabled() and not run.recorded:
+            raise _core.InputError(
+                "controls with a gradient after a reset() under no_grad(), which records nothing"
+            )
+        return self._state(*_Step.apply(controls, state._token, run, self.dtype))
 
     def parameters(self) -> torch.Tensor:
         """(E, names) of the run, in SI units: what reset() drew or was given."""
@@ -135,7 +146,9 @@ class Simulation(SimulationBase):
     def _state(self, rows: torch.Tensor, token: torch.Tensor) -> State:
         parts = split_rows(rows, self._observations)
         q, v = parts.pop("state.q"), parts.pop("state.v")
-        return State(q, v, parts, self.tape.status(), self._run.taken, token)
+        assert self._run is not None
+        status = self.tape.status()
+        return State(q, v, parts, status, self._run.taken, token, self._run)
 
 
 def _numpy(x: Any) -> Any:
@@ -147,12 +160,11 @@ class _Start(torch.autograd.Function):  # type: ignore[misc]
 
     @staticmethod
     def forward(
-        ctx: Any, q: Any, v: Any, parameters: Any, points: Any, run: Any, seed: Any, dtype: Any
+        ctx: Any, q: Any, v: Any, parameters: Any, points: Any, run: Any, dtype: Any
     ) -> Any:
         given = (q, v, parameters, points)
-        run.tape.reset(seed, *map(_numpy, given))
         ctx.run, ctx.given = run, [None if x is None else x.dtype for x in given]
-        rows = torch.from_numpy(run.tape.observations()).to(dtype)
+        rows = torch.from_numpy(run.observations()).to(dtype)
         return rows, torch.zeros((), dtype=torch.float64)
 
     @staticmethod
@@ -163,7 +175,7 @@ class _Start(torch.autograd.Function):  # type: ignore[misc]
             None if kind is None else torch.from_numpy(bar).to(kind)
             for kind, bar in zip(ctx.given, bars)
         ]
-        return (*out, None, None, None)
+        return (*out, None, None)
 
 
 class _Step(torch.autograd.Function):  # type: ignore[misc]
@@ -171,11 +183,10 @@ class _Step(torch.autograd.Function):  # type: ignore[misc]
 
     @staticmethod
     def forward(ctx: Any, controls: Any, token: Any, run: Any, dtype: Any) -> Any:
-        run.tape.step(_numpy(controls))
         ctx.run, ctx.step, ctx.dtype = run, run.taken, controls.dtype
+        run.step(_numpy(controls))
         ctx.save_for_backward(token)  # PyTorch frees it after a backward() that keeps no graph
-        run.taken += 1
-        return torch.from_numpy(run.tape.observations()).to(dtype), token.clone()
+        return torch.from_numpy(run.observations()).to(dtype), token.clone()
 
     @staticmethod
     @torch.autograd.function.once_differentiable  # type: ignore[untyped-decorator]

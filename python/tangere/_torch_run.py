@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The order in which the steps of a tape are reversed by PyTorch."""
+"""The order in which the steps of a tape are taken and reversed by PyTorch."""
 
 from __future__ import annotations
 
@@ -11,46 +11,85 @@ import torch
 from . import _core
 
 
-class Run:
-    """One pass over a `TaskTape` or `SceneTape`, and the order in which its steps are reversed."""
+class Line:
+    """A `TaskTape` or `SceneTape`, which holds one run at a time, and that run."""
 
     def __init__(self, tape: Any):
-        self.tape: Any = tape  # None: the tape has begun another run
+        self.tape = tape
+        self.run: Run | None = None
+
+
+class Run:
+    """One pass over a tape, and the order in which its steps are reversed.
+
+    It keeps its start and its inputs, and is played again if it is reversed after the tape has begun
+    another run.
+    """
+
+    def __init__(self, line: Line, *start: Any, recorded: bool = True):
+        line.tape.reset(*start)
+        line.run = self
+        self._line = line
+        self._start = [x.copy() if isinstance(x, np.ndarray) else x for x in start]
+        self._inputs: list[np.ndarray] = []
+        self.recorded = recorded
         self.taken = 0
         self.left: int | None = None  # the step reversed last; None: nothing is reversed
         self.passing = False
+
+    @property
+    def current(self) -> bool:
+        """Whether the tape holds this run."""
+        return self._line.run is self
+
+    def observations(self) -> np.ndarray:
+        return self._line.tape.observations()
+
+    def rewards(self) -> np.ndarray:
+        return self._line.tape.rewards()
+
+    def step(self, inputs: np.ndarray) -> None:
+        self._line.tape.step(inputs)
+        if self.recorded:
+            self._inputs.append(inputs.copy())  # the caller may change its own
+        self.taken += 1
 
     def reverse(self, step: int, *bars: np.ndarray) -> np.ndarray:
         """Reverses a step, and later ones on which the loss does not depend."""
         self._begin(again=self.left is not None and step >= self.left)
         self._skip_to(step + 1, *bars)
         self.left = step
-        return self.tape.reverse(*bars)
+        return self._line.tape.reverse(*bars)
 
     def reverse_start(self, rows_bar: np.ndarray) -> Any:
         """Reverses what is left, then the start."""
         self._begin(again=False)
         self._skip_to(0, rows_bar)
         self.left = 0
-        return self.tape.reverse_start(rows_bar)
+        return self._line.tape.reverse_start(rows_bar)
 
     def _begin(self, again: bool) -> None:
-        if self.tape is None:
+        if self.passing and not self.current:
             raise _core.InputError(
-                "backward() through a tape that was reset; call it before reset()"
+                "two runs of one tape that are reversed by turns; expected one after the other"
             )
         if self.passing and not again:
             return
-        # Another backward: it must not go on with what the one before has left.
-        if self.left is not None:
-            self.tape.begin_reverse()
+        if not self.current:
+            self._line.tape.reset(*self._start)
+            for inputs in self._inputs:
+                self._line.tape.step(inputs)
+            self._line.run = self
+        elif self.left is not None:
+            # Another backward: it must not go on with what the one before has left.
+            self._line.tape.begin_reverse()
         self.left, self.passing = None, True
         torch.autograd.Variable._execution_engine.queue_callback(self._end)
 
     def _skip_to(self, step: int, *bars: np.ndarray) -> None:
         left = self.taken if self.left is None else self.left
         for _ in range(left - step):
-            self.tape.reverse(*[np.zeros_like(bar) for bar in bars])
+            self._line.tape.reverse(*[np.zeros_like(bar) for bar in bars])
 
     def _end(self) -> None:
         self.passing = False

@@ -18,6 +18,7 @@ given. `import tangere` does not import this module; it needs PyTorch.
 from __future__ import annotations
 
 import copy
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -28,10 +29,19 @@ import torch
 from . import _core
 from ._simulation import Simulation, State
 from ._tape import Observations, TapeBase, check_rollout
-from ._torch_run import Run
+from ._torch_run import Line, Run
 
 
-__all__ = ["Check", "Rollout", "Simulation", "State", "Tape", "gradcheck", "rollout"]
+__all__ = [
+    "Check",
+    "Rollout",
+    "Simulation",
+    "State",
+    "Tape",
+    "check_gradient",
+    "gradcheck",
+    "rollout",
+]
 
 
 class Tape(TapeBase):
@@ -68,13 +78,12 @@ class Tape(TapeBase):
         super().__init__(task, num_envs, actions, flatten, scene, threads=threads, **options)
         self.dtype = dtype
         self._token: torch.Tensor | None = None
-        self._run = Run(self.tape)
+        self._line = Line(self.tape)
+        self._run: Run | None = None
 
     def reset(self, seed: int = 0, first_episode: int = 0) -> Observations:
         """Starts the episodes; returns the first observations, which have no derivative."""
-        self.tape.reset(seed, first_episode)
-        self._run.tape = None
-        self._run = Run(self.tape)
+        self._run = Run(self._line, seed, first_episode)
         self._token = torch.zeros((), dtype=torch.float64)
         return self._split(torch.from_numpy(self.tape.observations()).to(self.dtype))
 
@@ -87,12 +96,14 @@ class Tape(TapeBase):
         as `tangere.TaskTape.step` does, and under torch.no_grad() after recorded steps, where the
         chain of derivatives would be cut.
         """
-        if self._token is None:
+        if self._token is None or self._run is None:
             raise _core.InputError("step() without episodes; call reset() first")
         if self._token.requires_grad and not torch.is_grad_enabled():
             raise _core.InputError(
                 "step() under no_grad() after steps that are recorded; call reset()"
             )
+        if not self._run.current:
+            raise _core.InputError("step() after backward() through another run; call reset()")
         actions = torch.as_tensor(actions)
         rows, reward, self._token = _Step.apply(actions, self._token, self._run, self.dtype)
         return self._split(rows), reward, torch.from_numpy(self.tape.alive())
@@ -112,12 +123,11 @@ class _Step(torch.autograd.Function):  # type: ignore[misc]
 
     @staticmethod
     def forward(ctx: Any, actions: Any, token: Any, run: Any, dtype: Any) -> Any:
-        run.tape.step(actions.detach().to("cpu", torch.float64).numpy())
         ctx.run, ctx.step, ctx.dtype = run, run.taken, actions.dtype
+        run.step(actions.detach().to("cpu", torch.float64).numpy())
         ctx.save_for_backward(token)  # PyTorch frees it after a backward() that keeps no graph
-        run.taken += 1
-        rows = torch.from_numpy(run.tape.observations()).to(dtype)
-        return rows, torch.from_numpy(run.tape.rewards()), token.clone()
+        rows = torch.from_numpy(run.observations()).to(dtype)
+        return rows, torch.from_numpy(run.rewards()), token.clone()
 
     @staticmethod
     @torch.autograd.function.once_differentiable  # type: ignore[untyped-decorator]
@@ -183,6 +193,62 @@ class Check:
     error: float  #: |analytic - difference| / max(|analytic|, |difference|)
 
 
+def check_gradient(
+    loss: Callable[[], torch.Tensor],
+    tensors: Iterable[torch.Tensor],
+    *,
+    directions: int = 3,
+    seed: int = 0,
+    steps: tuple[float, ...] = (1e-5, 1e-6, 1e-7, 1e-8),
+) -> list[Check]:
+    """Compares the derivative of `loss()` by tensors that it uses with central differences.
+
+        checks = check_gradient(lambda: loss(sim, u, mass), [u, mass])
+        assert max(c.error for c in checks) < 1e-6
+
+    `tensors` are float64 and require gradients; they are changed in place and restored. A
+    direction is random in the space of all of them; its part in each tensor has the size of that
+    tensor, or 1 where it is zero. Of the `steps` the best one counts, because contacts have kinks
+    that large steps cross, and small steps lose digits. A quaternion must stay one: compute it from
+    a tensor that may move freely.
+    """
+    moved = list(tensors)
+    gradient = torch.autograd.grad(loss(), moved, allow_unused=True)
+    generator = torch.Generator().manual_seed(seed)
+    checks = []
+    for k in range(directions):
+        along = []
+        for x in moved:
+            size = float(x.detach().square().mean().sqrt()) or 1.0
+            along.append(size * torch.randn(x.shape, generator=generator, dtype=x.dtype))
+        parts = [(g * d).sum() for g, d in zip(gradient, along) if g is not None]
+        analytic = float(sum(parts))
+        tried = [_check(k, loss, moved, along, analytic, step) for step in steps]
+        checks.append(min(tried, key=lambda check: check.error))
+    return checks
+
+
+def _check(
+    direction: int,
+    loss: Callable[[], torch.Tensor],
+    moved: list[torch.Tensor],
+    along: list[torch.Tensor],
+    analytic: float,
+    step: float,
+) -> Check:
+    kept, values = [x.detach().clone() for x in moved], []
+    with torch.no_grad():
+        for sign in (1, -1):
+            for x, start, d in zip(moved, kept, along):
+                x.copy_(start + sign * step * d)
+            values.append(float(loss()))
+        for x, start in zip(moved, kept):
+            x.copy_(start)
+    difference = (values[0] - values[1]) / (2 * step)
+    error = abs(analytic - difference) / max(abs(analytic), abs(difference), 1e-300)
+    return Check(direction, analytic, difference, step, error)
+
+
 def gradcheck(
     task: str,
     policy: torch.nn.Module,
@@ -193,14 +259,12 @@ def gradcheck(
     directions: int = 3,
     steps: tuple[float, ...] = (1e-5, 1e-6, 1e-7, 1e-8),
 ) -> list[Check]:
-    """Compares the derivative of the mean return by a policy's weights with differences.
+    """Compares the derivative of a task's mean return by a policy's weights with differences.
 
-    `policy` maps flattened observations (E, n) to actions (E, na), in float64. Each direction is a
-    random one in the space of all weights; of the `steps` the best one counts, because contacts
-    have kinks that large steps cross and small steps lose digits. It works on a copy of the policy.
+    `policy` maps flattened observations (E, n) to actions (E, na). It works on a copy of the
+    policy, in float64. Directions and steps are those of `check_gradient`.
     """
     policy = copy.deepcopy(policy).double()
-    weights = list(policy.parameters())
 
     def mean_return() -> torch.Tensor:
         tape = Tape(task, num_envs, actions, flatten=True, precision="double", dtype=torch.float64)
@@ -210,22 +274,5 @@ def gradcheck(
             total = total + reward
         return total.mean()
 
-    gradient = torch.autograd.grad(mean_return(), weights)
-    generator = torch.Generator().manual_seed(seed)
-    checks = []
-    for k in range(directions):
-        along = [torch.randn(w.shape, generator=generator, dtype=w.dtype) for w in weights]
-        analytic = float(sum((g * d).sum() for g, d in zip(gradient, along)))
-        tried: list[Check] = []
-        for step in steps:
-            values = []
-            for sign in (1, -2, 1):
-                with torch.no_grad():
-                    for w, d in zip(weights, along):
-                        w += sign * step * d
-                    values.append(float(mean_return()))
-            difference = (values[0] - values[1]) / (2 * step)
-            error = abs(analytic - difference) / max(abs(analytic), abs(difference), 1e-300)
-            tried.append(Check(k, analytic, difference, step, error))
-        checks.append(min(tried, key=lambda check: check.error))
-    return checks
+    weights = list(policy.parameters())
+    return check_gradient(mean_return, weights, directions=directions, seed=seed, steps=steps)

@@ -237,3 +237,40 @@ def test_points_move():
     elastic = tangere.Scene(tangere.scenes()["insertion_elastic"])
     with pytest.raises(tangere.InputError, match="has ks"):
         tt.Simulation(elastic, points=True)
+
+
+def test_a_users_loss_is_checked_in_one_call():
+    of, names = scene("chain")
+    sim = tt.Simulation(of, num_envs=2, steps=4, every=2, parameters=names)
+    u = torch.full((4, 1), 0.3, dtype=torch.float64, requires_grad=True)
+    parameters = sim.parameters().requires_grad_()
+
+    def loss(u=u, parameters=parameters):
+        s, total = sim.reset(parameters=parameters), 0
+        for t in range(4):
+            s = sim.step(s, u[t])
+            total = total + s["variables"].square().sum()
+        return total
+
+    checks = tt.check_gradient(loss, [u, parameters])
+    assert len(checks) == 3 and max(c.error for c in checks) < 1e-6, checks
+    assert float(u.detach()[0, 0]) == 0.3
+
+    def wrong():
+        return loss() + (u - u.detach()).sum()  # a derivative of 1 by each, but no value
+
+    assert min(c.error for c in tt.check_gradient(wrong, [u, parameters])) > 1e-3
+    small = torch.tensor([900.0, 0.02], dtype=torch.float64, requires_grad=True)
+    assert torch.autograd.gradcheck(loss, (u, small), eps=1e-6, atol=1e-7, rtol=1e-4)
+
+
+def test_nothing_is_recorded_without_gradients():
+    sim = tt.Simulation(scene("chain")[0], num_envs=2, steps=2)
+    u = torch.zeros(1, requires_grad=True)
+    recorded = sim.step(sim.reset(), u)
+    with torch.no_grad():
+        first = sim.reset()
+        s = sim.step(first, u)
+    assert torch.equal(s.q, recorded.q) and not s.q.requires_grad
+    with pytest.raises(tangere.InputError, match="records nothing"):
+        sim.step(s, u)

@@ -57,15 +57,16 @@ bool TapeBlock::may_go_on() {
   return !stopped_;
 }
 
-void TapeBlock::start_forward() {
+void TapeBlock::start_forward(bool record) {
+  recording_ = record;
   checkpoints_.clear();
   taken_ = left_ = 0;
 }
 
 void TapeBlock::take_tape(Batch& batch, int block) {
-  if (!plan_.whole() && taken_ % plan_.segment == 0)
+  if (recording_ && !plan_.whole() && taken_ % plan_.segment == 0)
     checkpoints_.push_back(batch.save_block(block));
-  take_steps(taken_, plan_.whole() ? &tapes_[as_size(taken_)] : nullptr);
+  take_steps(taken_, recording_ && plan_.whole() ? &tapes_[as_size(taken_)] : nullptr);
   ++taken_;
 }
 

@@ -49,7 +49,8 @@ class TapeBlock {
  protected:
   TapeBlock(const Model& model, const TapeOptions& options, int losses, const TapePlan& plan);
 
-  void start_forward();
+  /// `record`: whether the steps that follow can be reversed.
+  void start_forward(bool record = true);
   /// Takes the steps of the next tape, after a checkpoint where one is due.
   void take_tape(Batch& batch, int block);
   /// Sets all cotangents to zero after the last tape. May be called again to go back again.
@@ -83,6 +84,7 @@ class TapeBlock {
   std::stop_token stop_;
   bool stopped_ = false;
   std::int64_t recomputed_steps_ = 0;
+  bool recording_ = true;
 };
 
 }  // namespace tangere

@@ -104,11 +104,11 @@ double TaskBlock::bytes(const Task& task, const TapeOptions& o, std::int64_t blo
          double(blocks) * (moments + 2 * double(Stepper::workspace_bytes(task.model())));
 }
 
-void TaskBlock::start(std::uint64_t seed, EpisodeRange episodes) {
+void TaskBlock::start(std::uint64_t seed, EpisodeRange episodes, bool record) {
   std::vector<std::int64_t> numbers(as_size(episodes.end - episodes.first));
   std::iota(numbers.begin(), numbers.end(), episodes.first);
   rollout_.start(seed, numbers);
-  start_forward();
+  start_forward(record);
   took_.fill(false);
   for (int l = 0; l < lanes(); ++l) {
     start_shear_[as_size(l)] = rollout_.batch().shear_state(l);
@@ -126,10 +126,12 @@ void TaskBlock::start(std::uint64_t seed, EpisodeRange episodes) {
   }
 }
 
-void TaskBlock::displace(int lane, std::span<const double> q, std::span<const double> v) {
-  rollout_.displace(lane, q, v);
+void TaskBlock::displace(std::span<const double> q, std::span<const double> v) {
+  const std::size_t nq = as_size(model_.nq()), nv = as_size(model_.nv());
+  for (int l = 0; l < lanes(); ++l)
+    rollout_.displace(l, q.subspan(as_size(l) * nq, nq), v.subspan(as_size(l) * nv, nv));
   rollout_.record_start();
-  rollout_.observe_start(lane);
+  for (int l = 0; l < lanes(); ++l) rollout_.observe_start(l);
 }
 
 void TaskBlock::step(std::span<const double> actions) {

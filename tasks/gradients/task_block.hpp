@@ -25,10 +25,10 @@ class TaskBlock : public TapeBlock {
   /// Size of all these blocks [bytes].
   static double bytes(const Task& task, const TapeOptions& options, std::int64_t blocks);
 
-  /// Resets one episode per lane.
-  void start(std::uint64_t seed, EpisodeRange episodes);
-  /// Moves the state in which a lane's first action begins.
-  void displace(int lane, std::span<const double> q, std::span<const double> v);
+  /// Resets one episode per lane. `record`: whether its actions can be reversed.
+  void start(std::uint64_t seed, EpisodeRange episodes, bool record = true);
+  /// Moves the states in which the first actions begin, (lanes, nq) and (lanes, nv).
+  void displace(std::span<const double> q, std::span<const double> v);
   /// Takes `actions`, (lanes, action), in the lanes whose episodes have not ended.
   void step(std::span<const double> actions);
   /// Whether a lane took the last action.

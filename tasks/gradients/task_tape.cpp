@@ -82,6 +82,7 @@ struct TaskTape::Impl {
   /// Calls body(block, its index) for every block. If it throws, only a reset helps.
   template <class Body>
   void each(Phase then, const Body& body) {
+    observation_is_current = false;
     phase = Phase::broken;
     threads.for_each(static_cast<int>(blocks.size()), scratch,
                      [&](char&, int b) { body(blocks[as_size(b)], b); });
@@ -95,7 +96,6 @@ struct TaskTape::Impl {
     const auto copy = [&](const auto& from, auto& to, std::size_t row) {
       std::copy(from.begin(), from.end(), to.begin() + static_cast<std::ptrdiff_t>(first * row));
     };
-    copy(data.observation, observation, seen);
     copy(data.q, q, nq);
     copy(data.v, v, nv);
     copy(data.terminated, terminated, 1);
@@ -109,11 +109,18 @@ struct TaskTape::Impl {
     }
   }
 
-  void reset(std::uint64_t seed, std::int64_t first) {
+  /// Copies a block's observations to those of all environments.
+  void copy_observations(std::size_t b, std::span<double> to) const {
+    std::ranges::copy(blocks[b].rollout().data().observation,
+                      to.begin() + static_cast<std::ptrdiff_t>(b * kBlock * seen));
+  }
+
+  void reset(std::uint64_t seed, std::int64_t first, bool record) {
     taken = left = 0;
+    recording = record;
     each(Phase::forward, [&](TaskBlock& block, int b) {
       const std::int64_t own = first + std::int64_t{b} * kBlock;
-      block.start(seed, {own, own + std::int64_t(lanes(b))});
+      block.start(seed, {own, own + std::int64_t(lanes(b))}, record);
       show(block, b);
     });
   }
@@ -149,6 +156,7 @@ struct TaskTape::Impl {
 
   void begin_reverse() {
     check_sound();
+    if (!recording) throw InputError("the reverse of a run without a record; expected reset()");
     each(Phase::back, [](TaskBlock& block, int) { block.begin_reverse(); });
     left = taken;
   }
@@ -156,41 +164,42 @@ struct TaskTape::Impl {
   const Task& task;
   const TapeOptions options;
   const std::size_t e, nq, nv, width, seen, numbers, point_numbers;  // of one environment
-  std::vector<double> observation, reward, q, v;
+  mutable std::vector<double> observation;  // copied when observations() is called
+  mutable bool observation_is_current = false;
+  std::vector<double> reward, q, v;
   std::vector<std::uint8_t> alive, terminated, truncated, success;
   std::vector<StepStatus> status;
   std::vector<TaskBlock> blocks;
   std::vector<char> scratch;  // by the thread's index in the arena; what threads need is in blocks
   BlockThreads threads;
   Phase phase = Phase::forward;
+  bool recording = true;
   std::int64_t taken = 0, left = 0;  // steps; of these, to reverse
 };
 
 TaskTape::TaskTape(const Task& task, int environments, const TapeOptions& options,
                    std::uint64_t seed, std::int64_t first_episode)
     : impl_(std::make_unique<Impl>(task, environments, options)) {
-  impl_->reset(seed, first_episode);
+  impl_->reset(seed, first_episode, true);
 }
 TaskTape::~TaskTape() = default;
 TaskTape::TaskTape(TaskTape&&) noexcept = default;
 TaskTape& TaskTape::operator=(TaskTape&&) noexcept = default;
 
-void TaskTape::reset(std::uint64_t seed, std::int64_t first_episode) {
-  impl_->reset(seed, first_episode);
+void TaskTape::reset(std::uint64_t seed, std::int64_t first_episode, bool record) {
+  impl_->reset(seed, first_episode, record);
 }
 
-void TaskTape::displace(int environment, std::span<const double> q, std::span<const double> v) {
+void TaskTape::displace(std::span<const double> q, std::span<const double> v) {
   Impl& i = *impl_;
   if (i.phase != Phase::forward || i.taken > 0)
-    throw InputError("a first state after the first step; expected reset() before it");
-  if (environment < 0 || environment >= environments())
-    throw InputError(
-        fmt::format("environment {} of a tape; expected 0 to {}", environment, environments() - 1));
-  expect_numbers(q.size(), i.nq, false, "q");
-  expect_numbers(v.size(), i.nv, false, "v");
-  TaskBlock& block = i.blocks[as_size(environment / kBlock)];
-  block.displace(environment % kBlock, q, v);
-  i.show(block, environment / kBlock);
+    throw InputError("first states after the first step; expected reset() before them");
+  expect_numbers(q.size(), i.e * i.nq, false, "q");
+  expect_numbers(v.size(), i.e * i.nv, false, "v");
+  i.each(Phase::forward, [&](TaskBlock& block, int b) {
+    block.displace(i.of(q, b), i.of(v, b));
+    i.show(block, b);
+  });
 }
 
 void TaskTape::check_step(std::span<const double> actions) const { impl_->check_actions(actions); }
@@ -250,7 +259,19 @@ void TaskTape::begin_reverse() { impl_->begin_reverse(); }
 const Task& TaskTape::task() const { return impl_->task; }
 int TaskTape::environments() const { return static_cast<int>(impl_->e); }
 std::int64_t TaskTape::taken() const { return impl_->taken; }
-std::span<const double> TaskTape::observations() const { return impl_->observation; }
+std::span<const double> TaskTape::observations() const {
+  const Impl& i = *impl_;
+  for (std::size_t b = 0; b < i.blocks.size() && !i.observation_is_current; ++b)
+    i.copy_observations(b, i.observation);
+  i.observation_is_current = true;
+  return i.observation;
+}
+void TaskTape::get_observations(std::span<double> to) {
+  Impl& i = *impl_;
+  expect_numbers(to.size(), i.e * i.seen, false, "observations");
+  i.threads.for_each(static_cast<int>(i.blocks.size()), i.scratch,
+                     [&](char&, int b) { i.copy_observations(as_size(b), to); });
+}
 std::span<const double> TaskTape::rewards() const { return impl_->reward; }
 std::span<const std::uint8_t> TaskTape::alive() const { return impl_->alive; }
 std::span<const std::uint8_t> TaskTape::terminated() const { return impl_->terminated; }

@@ -30,11 +30,12 @@ class TaskTape {
   TaskTape(TaskTape&&) noexcept;
   TaskTape& operator=(TaskTape&&) noexcept;
 
-  /// Starts episodes first_episode … first_episode + E - 1 of a seed and clears the tape.
-  void reset(std::uint64_t seed, std::int64_t first_episode);
-  /// Moves the state in which an environment's first action begins: q (nq) with quaternions of unit
-  /// length, v (nv). It observes again. Throws InputError after the first step.
-  void displace(int environment, std::span<const double> q, std::span<const double> v);
+  /// Starts episodes first_episode … first_episode + E - 1 of a seed and clears the tape. `record`:
+  /// whether its steps can be reversed; without it they are a little faster.
+  void reset(std::uint64_t seed, std::int64_t first_episode, bool record = true);
+  /// Moves the states in which the first actions begin: q (E, nq) with quaternions of unit length, v
+  /// (E, nv). They are observed again. Throws InputError after the first step.
+  void displace(std::span<const double> q, std::span<const double> v);
   /// Takes one action of every environment whose episode has not ended, (E, action), clipped to its
   /// bounds, and records it. Actions of ended environments are ignored. Throws InputError for an
   /// action that is not finite, for more than `length` actions, and after reverse().
@@ -47,7 +48,9 @@ class TaskTape {
   [[nodiscard]] std::int64_t taken() const;  ///< steps since the reset
   /// Views of the results of the last reset or step. They stay valid as long as the object;
   /// reverse() does not change them.
-  [[nodiscard]] std::span<const double> observations() const;      ///< (E, observation)
+  [[nodiscard]] std::span<const double> observations() const;  ///< (E, observation)
+  /// Copies the same into an array of the caller, (E, observation), on all threads.
+  void get_observations(std::span<double> to);
   [[nodiscard]] std::span<const double> rewards() const;           ///< (E), 0 if not alive
   [[nodiscard]] std::span<const std::uint8_t> alive() const;       ///< (E) 1: the action was taken
   [[nodiscard]] std::span<const std::uint8_t> terminated() const;  ///< (E) the episode has ended

@@ -104,7 +104,7 @@ class ClosedLoop {
       displace(task_.model(), q, int(i), at.q[i]);
       v[i] += at.v[i];
     }
-    tape_.displace(0, q, v);
+    tape_.displace(q, v);
     first_q_ = q;
     first_v_ = v;
     observed_.clear();

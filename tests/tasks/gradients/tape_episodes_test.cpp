@@ -120,7 +120,10 @@ double watched_sum(TaskTape& tape, int e, const Row& q, const Row& v, const Row&
   const std::size_t seen = tape.task().spec().observation_size(),
                     width = tape.task().spec().action.size();
   tape.reset(kTapeSeed, 0);
-  tape.displace(e, q, v);
+  Row all_q(tape.q().begin(), tape.q().end()), all_v(tape.v().begin(), tape.v().end());
+  std::copy(q.begin(), q.end(), all_q.begin() + std::ptrdiff_t(std::size_t(e) * q.size()));
+  std::copy(v.begin(), v.end(), all_v.begin() + std::ptrdiff_t(std::size_t(e) * v.size()));
+  tape.displace(all_q, all_v);
   double sum = 0;
   const auto add = [&](std::int64_t step) {
     for (std::size_t k = 0; k < seen; ++k)
@@ -395,17 +398,15 @@ TEST(TapeEpisodes, MisuseIsRefused) {
   EXPECT_THROW(TaskTape(*task, 1, tape_options(3, 1, NAN)), InputError);
   TaskTape tape(*task, 2, tape_options(2), kTapeSeed);
   Row actions(2), action_bar(2), two(2), wrong(3);
-  const Row q(tape.q().begin(), tape.q().begin() + task->model().nq()),
-      v(std::size_t(task->model().nv()));
+  const Row q(tape.q().begin(), tape.q().end()), v(2 * std::size_t(task->model().nv()));
   expect_refusal([&] { tape.reverse({}, action_bar); }, "one more reverse");
   expect_refusal([&] { tape.step(wrong); }, "3 numbers of actions; expected 2");
   actions[1] = INFINITY;
   expect_refusal([&] { tape.step(actions); }, "number 0 of action 0 of environment 1 is inf");
   actions[1] = 0;
-  expect_refusal([&] { tape.displace(2, q, v); }, "environment 2 of a tape; expected 0 to 1");
-  expect_refusal([&] { tape.displace(0, q, {}); }, "0 numbers of v");
+  expect_refusal([&] { tape.displace(q, {}); }, "0 numbers of v");
   tape.step(actions);
-  expect_refusal([&] { tape.displace(0, q, v); }, "after the first step");
+  expect_refusal([&] { tape.displace(q, v); }, "after the first step");
   expect_refusal([&] { tape.reverse_start({}, {}, {}); }, "1 of 1 actions left");
   tape.step(actions);  // refused calls have left no trace
   expect_refusal([&] { tape.step(actions); }, "action 2 on a tape of 2 actions");
@@ -426,6 +427,11 @@ TEST(TapeEpisodes, MisuseIsRefused) {
   tape.reverse({.reward = two}, action_bar);
   tape.reset(1, 0);
   tape.step(actions);
+  const Row seen(tape.observations().begin(), tape.observations().end());
+  tape.reset(1, 0, false);
+  tape.step(actions);
+  EXPECT_EQ(Row(tape.observations().begin(), tape.observations().end()), seen);
+  expect_refusal([&] { tape.reverse({}, action_bar); }, "without a record");
 }
 
 TEST(TapeEpisodes, ATaskWithoutADerivativeOfItsObservationsIsNamed) {

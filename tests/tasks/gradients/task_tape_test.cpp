@@ -113,7 +113,7 @@ TEST_P(EveryTape, GoingBackIsTheTransposeOfGoingForward) {
     if (std::string(name).starts_with("stable_grasp"))
       for (const auto& [dof, by] : {std::pair{6, 2e-4}, std::pair{7, 3e-4}, std::pair{11, 4e-3}})
         displace(task->model(), q, dof, by);
-    tape.displace(0, q, v);
+    tape.displace(q, v);
     played.clear();
     for (std::size_t t = 0; t < n; ++t) {
       const Numbers a = scripted_actions(tape);
