@@ -123,7 +123,7 @@ Run PythonBatch::run_as(std::span<const double> u, std::size_t steps, std::size_
   };
   const std::size_t frames = steps / every, nq = as_size(model().nq()), nv = as_size(model().nv()),
                     nu = as_size(model().nu());
-  Run run;
+  Run run{model(), double(every) * workers_[0].stepper.timestep(), randomized(), {}, {}, {}, {}};
   std::span<double> q, v;
   run.q = new_array<double>({frames, count(), nq}, q);
   run.v = new_array<double>({frames, count(), nv}, v);
@@ -357,6 +357,13 @@ static void add_run(nb::module_& m) {
           "fields", [](const Run& r) { return r.readings; },
           nb::for_getter(nb::sig("def fields(self) -> dict[str, numpy.typing.NDArray]")),
           "What was asked for by name: (F, E, …), as Batch.tactile() returns it.")
+      .def_ro("model", &Run::model)
+      .def_ro("interval", &Run::interval, "Between two frames [s].")
+      .def_prop_ro(
+          "randomized", [](const Run& r) { return r.randomized; },
+          nb::for_getter(
+              nb::sig("def randomized(self) -> dict[str, numpy.typing.NDArray[numpy.float64]]")),
+          "As Batch.randomized().")
       .def_prop_ro(
           "status", [](const Run& r) { return r.status; }, nb::rv_policy::automatic,
           "(E) int8: of the last step; negative where an environment failed.");

@@ -26,6 +26,9 @@ struct BatchOptions {
 
 /// What a run leaves, F = steps / every frames: (F, E, …).
 struct Run {
+  Model model;
+  double interval;  ///< between frames [s]
+  nb::dict randomized;
   Array<double> q, v;
   std::map<std::string, nb::object> readings;
   Array<std::int8_t> status;  ///< (E) of the last step

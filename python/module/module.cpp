@@ -27,4 +27,5 @@ NB_MODULE(_core, m) {
   add_environments(m);
   add_tapes(m);
   add_scene_tapes(m);
+  add_views(m);
 }

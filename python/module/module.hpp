@@ -15,5 +15,6 @@ void add_tasks(nanobind::module_& m);
 void add_environments(nanobind::module_& m);
 void add_tapes(nanobind::module_& m);
 void add_scene_tapes(nanobind::module_& m);
+void add_views(nanobind::module_& m);
 
 }  // namespace tangere::python

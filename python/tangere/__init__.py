@@ -39,6 +39,8 @@ from ._core import (
     task_names,
     task_spec,
 )
+from ._rollout import rollout
+from ._view import Page, view
 from .gym import TaskEnv, VectorTaskEnv, gym_id, make_env, make_vec, register_tasks
 from .robots import import_robot
 from .scene_builder import SceneBuilder
@@ -50,6 +52,7 @@ __all__ = [
     "InputError",
     "IoError",
     "Model",
+    "Page",
     "Run",
     "Scene",
     "SceneBuilder",
@@ -69,9 +72,11 @@ __all__ = [
     "make_env",
     "make_vec",
     "register_scene_env",
+    "rollout",
     "scenes",
     "task_names",
     "task_spec",
+    "view",
 ]
 
 __version__: str = getattr(_core, "__version__")  # stubs leave such names out
