@@ -11,6 +11,7 @@ void add_scenes(nanobind::module_& m);
 void add_batches(nanobind::module_& m);
 void add_tasks(nanobind::module_& m);
 void add_environments(nanobind::module_& m);
+void add_episode_writer(nanobind::module_& m);
 void add_tapes(nanobind::module_& m);
 void add_scene_tapes(nanobind::module_& m);
 
