@@ -48,7 +48,7 @@ def generate(
             f"policy {policy!r} of {task.__name__}; expected a function or 'random'"
         )
     if episodes < 1:
-        raise _core.InputError(f"{episodes} episodes; expected at least 1")
+        raise _core.InputError(f"{episodes} episodes; expected 1 or more")
     env = task(min(num_envs, episodes), threads=threads, seed=seed, autoreset="disabled")
     spec, kind = _spec(env), "program" if callable(policy) else "random"
     where = f"{task.__module__}:{task.__qualname__}"
