@@ -65,7 +65,7 @@ def generate(
         which is called with all environments that play at once.
     name: of the function, for the files. None: its `__name__`.
     normalise: of the function's observations; a class has no scales.
-    num_envs: environments of a class that play at once; they change no byte. None: 256.
+    num_envs: environments of a class that play at once; they change no byte. None: 128.
     options: more words of the command, such as ("--compress", "deflate", "--overwrite"). A class
         has those of storage: --overwrite, --resume, --compress, --tactile, --name and --shards.
 
@@ -127,7 +127,7 @@ def _of_class(
 ) -> dict[str, Any]:  # fmt: skip
     if not issubclass(task, scene_env.VectorSceneEnv):
         raise _core.InputError(f"{task.__name__}; expected a subclass of tangere.VectorSceneEnv")
-    envs = 256 if num_envs is None else num_envs
+    envs = 128 if num_envs is None else num_envs
     return _scene_data.generate(
         task, output, episodes, num_envs=envs, options=options, **arguments
     )

@@ -257,15 +257,18 @@ class _Player:
                     "another name of the observation",
                 )
         for key, rows in self.rows.items():
-            values = (state | self.obs)[key]
-            rows[at] = values if len(envs) == len(values) else values[envs]
+            rows[at] = self._part((state | self.obs)[key], envs)
+
+    def _part(self, values: NDArray[Any], envs: Indices) -> NDArray[Any]:
+        """Without a copy where it is the whole."""
+        return values if len(envs) == self.env.num_envs else values[envs]
 
     def _chosen(self, at: tuple[Indices, Indices], envs: Indices) -> NDArray[np.float64]:
         """(n, na) of the environments that play."""
         if self.policy is None:
             return self.actions[at].astype(np.float64)
         env = self.env
-        seen = {key: values[envs] for key, values in self.obs.items()}
+        seen = {key: self._part(values, envs) for key, values in self.obs.items()}
         chosen = self.policy(seen, env.episodes[envs], env.lengths[envs])
         actions = np.asarray(numbers(chosen), np.float64)
         if actions.shape[:1] != (len(envs),) or actions.size != len(envs) * self.width:

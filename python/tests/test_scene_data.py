@@ -83,9 +83,7 @@ def test_the_twin_of_a_task_has_its_data_set(twins):
             for member in members:
                 if isinstance(demo[member], h5py.Dataset):
                     assert twin[member].dtype == demo[member].dtype
-                    np.testing.assert_allclose(
-                        twin[member][()], demo[member][()], rtol=1e-6, atol=1e-12, err_msg=member
-                    )
+                    np.testing.assert_array_equal(twin[member][()], demo[member][()], member)
         felt = [demo.attrs["touching"] for demo in b["data"].values()]
         assert max(felt) > 0
         for key in ("simulation_steps", "tunnelled_steps", "overlapping_steps"):
