@@ -57,6 +57,8 @@ DatasetLayout layout_of(const Model& model, const TaskSpec& task, std::int64_t e
   return dataset_layout_from(model, Stepper(model), layout);
 }
 
+/// Keeps the GIL while it calls HDF5. h5py may share the library, whose calls then end in Python:
+/// two threads that hold one lock each and need the other one would wait for ever.
 class EpisodeWriter {
  public:
   EpisodeWriter(const Model& model, const std::string& folder, DatasetLayout layout,
@@ -140,7 +142,6 @@ void EpisodeWriter::write(const Whole<std::int64_t>& first, const Argument<float
   std::vector<FailedEpisode> failed;
   for (const auto& [episode, step, status, q, v] : failures)
     failed.push_back({episode, step, static_cast<StepStatus>(status), q, v});
-  const nb::gil_scoped_release free;
   writer.write(piece);
   writer.finish(piece.first_episode, failed, {steps[0], steps[1], steps[2]});
 }
@@ -152,12 +153,9 @@ nb::dict EpisodeWriter::finish() {
   made["shards"] = writer.shards();
   made["kept"] = writer.kept();
   MergeResult merged;
-  {
-    const nb::gil_scoped_release free;
-    MergeOptions replace;
-    replace.overwrite = true;  // links of an earlier run may lead to other shards
-    if (writer.complete()) merged = merge_dataset(find_dataset(folder_), replace);
-  }
+  MergeOptions replace;
+  replace.overwrite = true;  // links of an earlier run may lead to other shards
+  if (writer.complete()) merged = merge_dataset(find_dataset(folder_), replace);
   if (!writer.obstacle().empty()) made["not_merged"] = writer.obstacle();
   close();
   made["merged"] = merged.file;

@@ -75,7 +75,7 @@ def generate(
     if callable(policy) and name is None:
         name = getattr(policy, "__name__", "<lambda>")
         if name == "<lambda>":
-            raise _core.InputError("a function as policy without a name; expected `name`, for the files")
+            raise _core.InputError("a function as policy without a name; expected `name`")
     if isinstance(what, type):
         return _of_class(what, output, episodes, options, policy=policy, name=name, seed=seed,
                          threads=threads, num_envs=num_envs)  # fmt: skip

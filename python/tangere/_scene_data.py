@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import heapq
 from collections import deque
-from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import closing
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -51,19 +50,19 @@ def generate(
         raise _core.InputError(f"{episodes} episodes; expected 1 or more")
     env = task(min(num_envs, episodes), threads=threads, seed=seed, autoreset="disabled")
     spec, kind = _spec(env), "program" if callable(policy) else "random"
+    player = name if name and callable(policy) else kind
     where = f"{task.__module__}:{task.__qualname__}"
     lasting = [word for word in options if word not in _EXISTING]
-    again = f"tangere.data.generate({where}, OUTPUT, {episodes}, policy={name or kind}, seed={seed}"
+    again = f"tangere.data.generate({where}, OUTPUT, {episodes}, policy={player}, seed={seed}"
     again += f", options={lasting})" if lasting else ")"
     writer = _core.EpisodeWriter(
-        env.model, spec, str(output), episodes, seed, kind, name or kind, where, again,
+        env.model, spec, str(output), episodes, seed, kind, player, where, again,
         **_storage(options, spec.name),
     )  # fmt: skip
     with closing(writer):
-        with ThreadPoolExecutor(1) as pool:
-            player = _Player(env, policy if callable(policy) else None, writer, pool)
-            player.play()
-        said = {"task": spec.name, "policy": kind} | player.said()
+        run = _Run(env, policy if callable(policy) else None, writer)
+        run.play()
+        said = {"task": spec.name, "policy": kind} | run.said()
         return said | dict(writer.finish())
 
 
@@ -139,16 +138,15 @@ class _Block:
     failures: list[tuple[int, int, int, list[float], list[float]]] = field(default_factory=list)
 
 
-class _Player:
+class _Run:
     """Plays the missing episodes of a data set. A slot has the rows of one episode."""
 
     def __init__(
-        self, env: VectorSceneEnv, policy: Choose | None, writer: _core.EpisodeWriter,
-        pool: ThreadPoolExecutor,
-    ) -> None:  # fmt: skip
-        self.env, self.policy, self.writer, self.pool = env, policy, writer, pool
+        self, env: VectorSceneEnv, policy: Choose | None, writer: _core.EpisodeWriter
+    ) -> None:
+        self.env, self.policy, self.writer = env, policy, writer
         self.width = len(env._low)
-        # Twice as many as are played: some are written, or wait for a longer episode before them.
+        # Twice as many as are played, because some wait for a longer episode before them.
         places = 2 * -(-env.num_envs // _BLOCK)
         slots, most = places * _BLOCK, env.horizon
         state = {"q": (env.model.nq,), "v": (env.model.nv,)}
@@ -158,9 +156,9 @@ class _Player:
             self.actions = np.empty((slots, most, self.width), np.float32)
             self.rewards = np.empty((slots, most), np.float32)
         except MemoryError:
-            numbers = sum(int(np.prod(s)) for s in shapes.values()) + self.width + 1
+            of_row = 4 * (sum(int(np.prod(s)) for s in shapes.values()) + self.width + 1)
             raise _core.InputError(
-                f"no memory for {slots} episodes of {4 * most * numbers} bytes; expected a smaller "
+                f"no memory for {slots} episodes of {most * of_row} bytes; expected a smaller "
                 "num_envs, horizon or observation"
             ) from None
         self.randomized = np.empty((slots, len(env.randomized())))
@@ -170,7 +168,6 @@ class _Player:
         self.left, self.more = self._blocks(), True
         self.open: deque[_Block] = deque()  # ascending
         self.free = [place * _BLOCK for place in range(places)]  # a heap
-        self.job: Future[list[int]] | None = None  # writes blocks, returns their slots
         self.failed: list[dict[str, Any]] = []
         self.steps = np.zeros(len(_COUNTS), np.int64)
         self.episodes, self.taken, self.solved, self.total = 0, 0, 0, 0.0
@@ -192,7 +189,6 @@ class _Player:
                 self._end(np.flatnonzero(ended & (self.slot >= 0)), terminated, info)
                 waits = (self.slot < 0) & self.more & bool(self.free)
                 self._start(np.flatnonzero(ended | waits))
-        self._settle()
 
     def said(self) -> dict[str, Any]:
         """Counts of what was played; rates are over episodes that did not fail."""
@@ -215,8 +211,6 @@ class _Player:
     def _next(self) -> tuple[int, int] | None:
         """Slot and number of the next episode. None: all are begun, or no slot is free."""
         if not self.open or self.open[-1].begun == self.open[-1].count:
-            if not self.free:
-                self._settle()
             found = next(self.left, None) if self.free else None
             self.more = found is not None or not self.free
             if found is None:
@@ -302,22 +296,11 @@ class _Player:
                 state = q[e].tolist(), v[e].tolist()
                 block.failures.append((int(env.episodes[e]), step, int(info["status"][e]), *state))
         self.slot[envs] = -1
-        whole = []
         while self.open and self.open[0].ended == self.open[0].count:
-            whole.append(self.open.popleft())
-        if whole:
-            self._settle()
-            self.job = self.pool.submit(lambda: [self._write(block) for block in whole])
+            self._write(self.open.popleft())
 
-    def _settle(self) -> None:
-        """Waits until what is being written is written, and frees its slots."""
-        if self.job is not None:
-            for slot in self.job.result():
-                heapq.heappush(self.free, slot)
-            self.job = None
-
-    def _write(self, block: _Block) -> int:
-        """In the thread of the pool. Returns the first slot."""
+    def _write(self, block: _Block) -> None:
+        """Writes a whole block and frees its slots."""
         part = slice(block.slot, block.slot + block.count)
         block.failures.sort()
         self.writer.write(
@@ -337,4 +320,4 @@ class _Player:
         self.taken += int(self.lengths[part][whole].sum())
         self.solved += int(self.success[part][whole].sum())
         self.total += float(self.returns[part][whole].sum())
-        return block.slot
+        heapq.heappush(self.free, block.slot)

@@ -142,6 +142,18 @@ def test_environments_and_threads_change_no_byte(tmp_path, policy):
     assert lengths.min() == 1 and lengths.max() == 9
 
 
+def test_environments_wait_for_a_long_episode_before_theirs(tmp_path):
+    class Long(Leaves):
+        def restart(self, envs):
+            super().restart(envs)
+            self.last[envs] = np.where(self.episodes[envs] % 20, 1, 9)
+
+    for envs in (1, 16):
+        generate(Long, tmp_path / str(envs), 100, policy=push, seed=2, num_envs=envs)
+    one, many = ((tmp_path / str(envs) / "shard-00000.h5").read_bytes() for envs in (1, 16))
+    assert one == many and len(Episodes(tmp_path / "16")) == 99  # 40 fails
+
+
 def test_rows_are_those_of_the_environment(tmp_path):
     """Also failed episodes, which are no demos."""
     asked = []
@@ -308,9 +320,7 @@ def test_shards_that_are_complete_stay(tmp_path):
 
 def test_storage_is_that_of_the_command(twins, tmp_path):
     words = ("--compress", "deflate", "--tactile", "sparse", "--name", "small")
-    said = generate(
-        Twin, tmp_path / "set", 20, policy=roll, seed=3, num_envs=7, options=words
-    )
+    said = generate(Twin, tmp_path / "set", 20, policy=roll, seed=3, num_envs=7, options=words)
     assert said["minari_id"] == "tangere/Twin/small-v0"
     with h5py.File(said["shards"][0]) as file:
         with h5py.File(twins[1][1]["shards"][0]) as plain:
@@ -341,10 +351,10 @@ def zeros(obs, episodes, actions):
          r"actions of shape \(20, 2\); expected \(20, 3\)"),
         ({"policy": lambda o, e, a: np.full((len(e), 3), np.nan), "name": "x"},
          "the policy gives nan as number 0 of action 0 of episode 0; expected a finite number"),
-        ({"options": ["--gradients", "return"]}, "'--gradients' with 'return'; expected --overwri"),
+        ({"options": ["--gradients", "x"]}, "'--gradients' with 'x'; expected --overwrite"),
         ({"options": ["--compress", "zip"]}, "'--compress' with 'zip'; expected"),
         ({"options": ["--shards", "3"]}, "3 shards of 20 episodes; expected at most 2"),
-        ({"what": with_(observe=lambda s: {"actions": s.last})}, r"\['actions'\], the name of anot"),
+        ({"what": with_(observe=lambda s: {"dones": s.last})}, r"\['dones'\], the name of another"),
         ({"what": with_(observe=lambda s: {"a/b": s.last})}, "observation 'a/b'; expected another"),
         ({"what": with_(units={"x": "m"})}, r"Mine: units \['x'\]; expected some of \['left'"),
         ({"what": with_(touch=["action"])}, r"Mine: touch \['action'\]; expected some of"),
@@ -356,7 +366,7 @@ def zeros(obs, episodes, actions):
 def test_faults_name_the_value_and_leave_nothing(tmp_path, given, message):
     words = {"what": Leaves, "output": tmp_path / "set", "episodes": 20, "policy": zeros}
     with pytest.raises(tangere.InputError, match=message):
-        generate(**({**words, **given}))
+        generate(**{**words, **given})
     assert not list(tmp_path.iterdir())
 
 
