@@ -61,12 +61,8 @@ DatasetLayout layout_of(const Model& model, const TaskSpec& task, std::int64_t e
 /// two threads that hold one lock each and need the other one would wait for ever.
 class EpisodeWriter {
  public:
-  EpisodeWriter(const Model& model, const std::string& folder, DatasetLayout layout,
-                ExistingShards existing)
-      : nq_(as_size(model.nq())),
-        nv_(as_size(model.nv())),
-        folder_(folder),
-        layout_(std::move(layout)) {
+  EpisodeWriter(const std::string& folder, DatasetLayout layout, ExistingShards existing)
+      : folder_(folder), layout_(std::move(layout)) {
     writer_.emplace(DatasetOutput{folder, existing, {}}, layout_);
     for (const EpisodeChannel& channel : layout_.channels())
       shapes_.emplace_back(channel.shape.begin(), channel.shape.end());
@@ -93,7 +89,6 @@ class EpisodeWriter {
     return *writer_;
   }
 
-  std::size_t nq_, nv_;
   std::string folder_;
   DatasetLayout layout_;
   std::vector<Shape> shapes_;  // of a row of each observation
@@ -111,6 +106,11 @@ void EpisodeWriter::write(const Whole<std::int64_t>& first, const Argument<float
   const std::size_t n = lengths.size(), most = as_size(layout_.rows());
   EpisodeRows piece;
   piece.first_episode = first.value("first_episode");
+  constexpr std::size_t kBlock = 16;
+  if (piece.first_episode < 0 || piece.first_episode % std::int64_t{kBlock} != 0 || n < 1 ||
+      n > kBlock || piece.first_episode + std::int64_t(n) > layout_.episodes)
+    throw InputError(fmt::format("{} episodes from {} on; expected a block of {} of 0 to {}", n,
+                                 piece.first_episode, kBlock, layout_.episodes - 1));
   piece.episodes = static_cast<int>(n);
   piece.rows = static_cast<int>(most) + 1;
   piece.action_rows = static_cast<int>(most);
@@ -188,7 +188,7 @@ void add_episode_writer(nb::module_& m) {
             layout.sparse = sparse;
             layout.set_name = set_name;
             layout.shards = shards.value("shards");
-            new (self) EpisodeWriter(model, folder, std::move(layout), existing_named(existing));
+            new (self) EpisodeWriter(folder, std::move(layout), existing_named(existing));
           },
           "model"_a, "task"_a, "folder"_a, "episodes"_a, "seed"_a, "policy"_a, "player"_a,
           "python_class"_a, "command"_a, "existing"_a = "refuse", "compression"_a = "none",

@@ -388,3 +388,33 @@ def test_a_folder_is_held_by_one_run(tmp_path):
         return zeros(obs, episodes, actions)
 
     generate(Leaves, tmp_path / "set", 2, policy=nested)
+
+
+def test_blocks_have_their_place_and_shape(tmp_path):
+    core, model = tangere._core, tangere.Model(tangere.Scene(Twin.scene))
+    action, seen = core.TensorSpec("action", (3,), "1"), core.TensorSpec("x", (2,), "m")
+    task = core.TaskSpec("Mine", model.scene.path, "never", action, [seen], 5, 4)
+    writer = core.EpisodeWriter(
+        model, task, str(tmp_path / "set"), 20, 0, "random", "random", "here:Mine", "again"
+    )
+    rows = [np.zeros((4, 5, n), np.float32) for n in (model.nq, model.nv, 2)]
+    block = {
+        "first_episode": 16, "actions": np.zeros((4, 4, 3)), "observations": rows,
+        "rewards": np.zeros((4, 4)), "randomized": np.zeros((4, 4)), "lengths": [4, 4, 4, 4],
+        "returns": np.zeros(4), "terminated": [False] * 4, "success": [False] * 4,
+        "failures": [], "steps": (80, 0, 0),
+    }  # fmt: skip
+    for given, message in (
+        ({"first_episode": 8}, "4 episodes from 8 on; expected a block of 16 of 0 to 19"),
+        ({"first_episode": 32}, "4 episodes from 32 on"),
+        ({"lengths": [4, 4, 5, 4]}, "an episode of 5 actions; expected 1 to 4"),
+        ({"observations": rows[:2]}, "2 observations; expected 3"),
+        ({"rewards": np.zeros((4, 5))}, r"rewards of shape \(4, 5\); expected \(4, 4\)"),
+    ):
+        with pytest.raises(tangere.InputError, match=message):
+            writer.write(**{**block, **given})
+    writer.write(**block)
+    writer.close()
+    assert not (tmp_path / "set").exists()
+    with pytest.raises(tangere.InputError, match="a data set that is closed"):
+        writer.missing()
