@@ -11,7 +11,6 @@
 
 #include <algorithm>
 #include <bit>
-#include <cctype>
 #include <cerrno>
 #include <chrono>
 #include <cmath>
@@ -23,6 +22,7 @@
 
 #include "apps/console.hpp"
 #include "engine/base/error.hpp"
+#include "io/dataset/dataset_layout.hpp"
 #include "kernels/numbers/block.hpp"
 
 namespace tangere::apps {
@@ -32,25 +32,12 @@ static_assert(std::endian::native == std::endian::little,
               "the protocol's numbers are little-endian");
 
 constexpr const char* kProtocol = "tangere policy 1";
-constexpr std::size_t kLongestLine = 4096, kLongestName = 64;
+constexpr std::size_t kLongestLine = 4096;
 constexpr int kLookForStop = 100;  // [ms]
 constexpr double kTimeToEnd = 5;   // [s]
-constexpr const char* kTaken[] = {
-    "train",          "valid",          "success", "train_success", "valid_success", "touching",
-    "train_touching", "valid_touching", "random",  "hold",          "csv",           "scripted"};
 
 double now() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
-}
-
-/// Names are masks of a data set and parts of its id.
-void check_name(const std::string& who, const std::string& name) {
-  const auto fits = [](unsigned char c) { return std::isalnum(c) != 0 || c == '-' || c == '_'; };
-  if (name.empty() || name.size() > kLongestName || !std::all_of(name.begin(), name.end(), fits) ||
-      std::find(std::begin(kTaken), std::end(kTaken), name) != std::end(kTaken))
-    throw InputError(fmt::format(
-        "{} calls itself '{}'; expected 1 to {} letters, digits, - and _, and no name of a mask",
-        who, name.substr(0, kLongestName), kLongestName));
 }
 
 /// Whether the shell has nothing to do but to start one program.
@@ -160,7 +147,7 @@ void PolicyProgram::introduce(std::uint64_t seed, const std::string& version) {
                     who(), heard.substr(0, 200), kProtocol));
   name_ = reply["name"].get<std::string>();
   normalise_ = reply.value("normalise", true);
-  check_name(who(), name_);
+  check_policy_name(who(), name_);
 }
 
 void PolicyProgram::answer(const PolicyQuestion& question, std::span<double> actions) {

@@ -34,6 +34,7 @@ void describe_task(const h5::Id& scene, const DatasetLayout& layout) {
   const PlayedBy& by = layout.played_by;
   const std::vector<std::string> players = by.players.empty() ? std::vector{by.policy} : by.players;
   h5::write_attribute(scene, "task", task.name);
+  if (!layout.python_class.empty()) h5::write_attribute(scene, "python_class", layout.python_class);
   h5::write_attribute(scene, "policy", by.policy);
   h5::write_attribute(scene, "policies", std::span<const std::string>(players));
   h5::write_scalar<double>(scene, "policy_noise", by.noise);

@@ -59,6 +59,19 @@ void check_set_name(const std::string& name) {
 
 }  // namespace
 
+void check_policy_name(const std::string& who, const std::string& name) {
+  constexpr std::size_t kLongest = 64;
+  constexpr const char* kTaken[] = {
+      "train",          "valid",          "success", "train_success", "valid_success", "touching",
+      "train_touching", "valid_touching", "random",  "hold",          "csv",           "scripted"};
+  if (name.empty() || name.size() > kLongest ||
+      !std::all_of(name.begin(), name.end(), fits_minari) ||
+      std::find(std::begin(kTaken), std::end(kTaken), name) != std::end(kTaken))
+    throw InputError(fmt::format(
+        "{} calls itself '{}'; expected 1 to {} letters, digits, - and _, and no name of a mask",
+        who, name.substr(0, kLongest), kLongest));
+}
+
 std::string DatasetLayout::dataset_id() const {
   std::string name = set_name;
   if (name.empty() && task)

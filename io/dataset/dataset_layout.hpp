@@ -24,6 +24,10 @@ struct Setting {
 /// Largest number of shards; bounds the memory for damaged counts.
 constexpr std::int64_t kMostShards = 1'000'000;
 
+/// Throws InputError unless `name` can name a policy that `who` brings, because it becomes a mask
+/// and a part of the data set's id.
+void check_policy_name(const std::string& who, const std::string& name);
+
 /// The policy of the episodes of a task.
 struct PlayedBy {
   std::string policy;                ///< as requested: "scripted"
@@ -49,6 +53,7 @@ struct DatasetLayout : RunFacts {
   std::vector<SensorLayout> sensors;
   std::vector<std::string> body_names;    ///< of a scene
   PlayedBy played_by;                     ///< of a task
+  std::string python_class;               ///< of a task written in Python: "MODULE:CLASS"
   std::string set_name;                   ///< the requested part of dataset_id(); none: as below
   std::string tables = "none";            ///< checksum of the files that the text refers to
   std::string controls = "of the scene";  ///< or a table, named by its content

@@ -31,7 +31,8 @@ std::string environment_id(const std::string& task) {
 
 std::string robomimic_environment(const DatasetLayout& layout) {
   Json arguments = Json::object();
-  if (layout.task) arguments["task"] = layout.task->name;
+  if (layout.task)
+    arguments["task"] = layout.python_class.empty() ? layout.task->name : layout.python_class;
   Json environment = {
       {"env_name", layout.task ? environment_id(layout.task->name) : layout.scene_name},
       {"type", kGymnasium},
@@ -40,17 +41,21 @@ std::string robomimic_environment(const DatasetLayout& layout) {
   return text_of(environment);
 }
 
-std::string gymnasium_environment(const std::string& task) {
-  return text_of({{"id", environment_id(task)},
-                  {"entry_point", "tangere.gym:make_env"},
-                  {"reward_threshold", nullptr},
-                  {"nondeterministic", false},
-                  {"max_episode_steps", nullptr},
-                  {"order_enforce", true},
-                  {"disable_env_checker", false},
-                  {"kwargs", {{"task", task}, {"normalise", false}}},
-                  {"additional_wrappers", Json::array()},
-                  {"vector_entry_point", nullptr}});
+std::string gymnasium_environment(const std::string& task, const std::string& python_class) {
+  const bool in_python = !python_class.empty();
+  Json arguments = {{"task", in_python ? python_class : task}};
+  if (!in_python) arguments["normalise"] = false;
+  return text_of(
+      {{"id", environment_id(task)},
+       {"entry_point", in_python ? "tangere.scene_env:SceneEnv" : "tangere.gym:make_env"},
+       {"reward_threshold", nullptr},
+       {"nondeterministic", false},
+       {"max_episode_steps", nullptr},
+       {"order_enforce", true},
+       {"disable_env_checker", false},
+       {"kwargs", arguments},
+       {"additional_wrappers", Json::array()},
+       {"vector_entry_point", nullptr}});
 }
 
 std::string observation_scale(const DatasetLayout& layout) {

@@ -19,8 +19,8 @@ std::string environment_id(const std::string& task);
 std::string robomimic_environment(const DatasetLayout& layout);
 
 /// `env_spec` of Minari: Gymnasium's EnvSpec of a task whose observations are those of the files,
-/// in SI units.
-std::string gymnasium_environment(const std::string& task);
+/// in SI units. `python_class`: DatasetLayout::python_class.
+std::string gymnasium_environment(const std::string& task, const std::string& python_class = "");
 
 /// {KEY: number, or list over the last axis} of every stored observation that declares a scale, in
 /// the observation's unit. Other observations have the scale 1.

@@ -93,6 +93,8 @@ MinariView::MinariView(const std::string& folder, const h5::Id& shard, const Dem
   seed_ = h5::read_number<std::uint64_t>(scene, "seed");
   if (members.of_task) {
     task_ = h5::read_text(scene, "task");
+    if (H5Aexists(scene.get(), "python_class") > 0)
+      python_class_ = h5::read_text(scene, "python_class");
     const std::vector<std::string> players = h5::read_texts(scene, "policies");
     if (!players.empty()) policy_ = players.front();  // a program by its own name
     low_ = bound(h5::read_number<double>(scene, "action_low"));
@@ -165,7 +167,7 @@ std::string MinariView::metadata(std::uint64_t bytes) const {
       {"requirements", Json::array({"tangere>=" + version_})},
   };
   if (!task_.empty()) {
-    const std::string environment = gymnasium_environment(task_);
+    const std::string environment = gymnasium_environment(task_, python_class_);
     metadata["env_spec"] = environment;
     metadata["eval_env_spec"] = environment;
   }

@@ -38,8 +38,9 @@ class MinariView {
 
   DemoMembers members_;  // without those
   std::vector<std::string> left_out_;
-  std::string id_, folder_, to_folder_;            // the last: the way back from the view
-  std::string command_, version_, task_, policy_;  // the last two are empty for a scene alone
+  std::string id_, folder_, to_folder_;  // the last: the way back from the view
+  std::string command_, version_;
+  std::string task_, python_class_, policy_;  // empty for a scene alone
   std::string low_ = "-1.0", high_ = "1.0";
   std::optional<GrownFile> file_;
   std::vector<h5::FileMember> episodes_;

@@ -5,6 +5,7 @@
 #include "engine/sense/readout.hpp"
 #include "engine/step/batch.hpp"
 #include "python/module/arrays.hpp"
+#include "tasks/run/step_counts.hpp"
 
 namespace tangere::python {
 
@@ -18,7 +19,17 @@ nb::tuple body_arrays(Readout& readout, const Batch& batch);
 /// not there and for a half edge that is negative or not finite.
 nb::tuple face_arrays(const Batch& batch, int environment, double half_space);
 
-// Their signatures and docstrings.
+/// Names of counts in Python.
+inline constexpr std::pair<const char*, std::int64_t StepCounts::*> kCountNames[] = {
+    {"simulation_steps", &StepCounts::simulation_steps},
+    {"newton_iterations", &StepCounts::newton_iterations},
+    {"split_steps", &StepCounts::split_steps},
+    {"accuracy_not_met_steps", &StepCounts::accuracy_not_met_steps},
+    {"tunnelled_steps", &StepCounts::tunnelled_steps},
+    {"damped_steps", &StepCounts::damped_steps},
+    {"overlapping_steps", &StepCounts::overlapping_steps}};
+
+// Signatures and docstrings of what both show.
 inline constexpr const char* kFacesSignature =
     "def faces(self, env: int, half_space: float = 0.0) -> "
     "tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.int32], "

@@ -26,6 +26,7 @@ PythonBatch::PythonBatch(const Model& model, int environments, const BatchOption
     : batch_(model, environments, options.seed, options.first_episode),
       shear_arrays_(shear_state_arrays(model)),
       precision_(options.precision),
+      counts_(as_size(environments)),
       threads_(options.threads) {
   for (int i = 0; i < options.threads; ++i)
     workers_.push_back({Stepper(model, options.stepper), Readout(model, options.precision)});
@@ -35,9 +36,16 @@ void PythonBatch::step(const Argument<double>& u) {
   const std::vector<double> controls = rows_of(u, count(), as_size(model().nu()), "controls");
   const InUse::Turn turn(in_use_);
   const nb::gil_scoped_release free;
-  threads_.for_each(batch_.blocks(), workers_, [&](Worker& worker, int block) {
-    worker.stepper.step_block(batch_, block, controls);
-  });
+  threads_.for_each(batch_.blocks(), workers_,
+                    [&](Worker& worker, int block) { take_step(worker, block, controls); });
+}
+
+/// Takes one step of a block, (E, nu) controls, and counts it for those that found a solution.
+void PythonBatch::take_step(Worker& worker, int block, std::span<const double> u) {
+  worker.stepper.step_block(batch_, block, u);
+  const int first = block * kernels::kBlock;
+  for (int e = first; e < std::min(first + kernels::kBlock, environments()); ++e)
+    if (!failed(batch_.status(e))) counts_[as_size(e)].count(batch_, e);
 }
 
 FieldOutput PythonBatch::reading_named(const std::string& name) const {
@@ -148,7 +156,7 @@ Run PythonBatch::run_as(std::span<const double> u, std::size_t steps, std::size_
     const nb::gil_scoped_release free;
     threads_.for_each(batch_.blocks(), workers_, [&](Worker& worker, int block) {
       for (std::size_t t = 0; t < steps; ++t) {
-        worker.stepper.step_block(batch_, block, u.subspan(t * count() * nu, count() * nu));
+        take_step(worker, block, u.subspan(t * count() * nu, count() * nu));
         if ((t + 1) % every != 0) continue;
         const std::size_t frame = t / every;
         read_states(
@@ -202,6 +210,18 @@ nb::tuple PythonBatch::faces(const Whole<int>& environment, double half_space) {
 nb::dict PythonBatch::randomized() {
   const InUse::Turn turn(in_use_);
   return randomized_arrays(batch_);
+}
+
+nb::dict PythonBatch::counts() {
+  const InUse::Turn turn(in_use_);
+  nb::dict counts;
+  for (const auto& [name, count_of] : kCountNames) {
+    std::span<std::int64_t> numbers;
+    auto array = new_array<std::int64_t>({count()}, numbers);
+    for (std::size_t e = 0; e < count(); ++e) numbers[e] = counts_[e].*count_of;
+    counts[name] = array;
+  }
+  return counts;
 }
 
 Array<std::int8_t> PythonBatch::status() {
@@ -329,7 +349,10 @@ void PythonBatch::reset(const nb::object& environments,
   std::vector<std::int64_t> numbers;
   for (std::size_t k = 0; k < list.size(); ++k)
     numbers.push_back(episodes ? (*episodes)[k].value("episode") : batch_.episode(list[k]));
-  for (std::size_t k = 0; k < list.size(); ++k) batch_.reset(list[k], numbers[k]);
+  for (std::size_t k = 0; k < list.size(); ++k) {
+    batch_.reset(list[k], numbers[k]);
+    counts_[as_size(list[k])] = {};
+  }
 }
 
 Array<double> PythonBatch::scene_controls(const Whole<std::int64_t>& count_of_steps) {
@@ -447,6 +470,11 @@ void add_batches(nb::module_& m) {
       .def("faces", &PythonBatch::faces, "env"_a, "half_space"_a = 0.0, nb::sig(kFacesSignature),
            kFacesText)
       .def("randomized", &PythonBatch::randomized, nb::sig(kRandomizedSignature), kRandomizedText)
+      .def("counts", &PythonBatch::counts,
+           nb::sig("def counts(self) -> dict[str, numpy.typing.NDArray[numpy.int64]]"),
+           "Name → (E) int64, of the episode so far, without steps that failed: simulation_steps,\n"
+           "newton_iterations, and steps by their status: split_steps, accuracy_not_met_steps,\n"
+           "tunnelled_steps, damped_steps and overlapping_steps.")
       .def("step", &PythonBatch::step, "u"_a,
            "Takes one step. `u`: (E, nu) controls, or (nu) for all environments; clipped to the\n"
            "motors' ranges. InputError: another shape.")

@@ -13,6 +13,7 @@
 #include "python/module/arrays.hpp"
 #include "python/module/whole_number.hpp"
 #include "tasks/run/block_threads.hpp"
+#include "tasks/run/step_counts.hpp"
 
 namespace tangere::python {
 
@@ -48,6 +49,7 @@ class PythonBatch {
   nb::tuple bodies();
   nb::tuple faces(const Whole<int>& environment, double half_space);
   nb::dict randomized();
+  nb::dict counts();
   [[nodiscard]] Array<std::int8_t> status();
   void set_state(const Argument<double>& q, const Argument<double>& v,
                  const nb::object& environments);
@@ -74,6 +76,7 @@ class PythonBatch {
 
   [[nodiscard]] Array<double> coordinates(int width, GetCoordinates get);
   [[nodiscard]] std::size_t count() const { return as_size(environments()); }
+  void take_step(Worker& worker, int block, std::span<const double> u);
   [[nodiscard]] FieldOutput reading_named(const std::string& name) const;
   [[nodiscard]] Shape shape_of_reading(FieldOutput output) const;
   [[nodiscard]] std::vector<int> listed(const nb::object& environments) const;
@@ -87,7 +90,8 @@ class PythonBatch {
   Batch batch_;
   ShearStateArrays shear_arrays_;
   Precision precision_;
-  std::vector<Worker> workers_;  // by the thread's index in the arena
+  std::vector<StepCounts> counts_;  // of each environment's episode
+  std::vector<Worker> workers_;     // by the thread's index in the arena
   BlockThreads threads_;
   InUse in_use_;
 };

@@ -104,13 +104,7 @@ class Environments {
     const VectorCounts c = vector_.counts();
     nb::dict d;
     d["environment_steps"] = c.environment_steps;
-    d["simulation_steps"] = c.steps.simulation_steps;
-    d["newton_iterations"] = c.steps.newton_iterations;
-    d["split_steps"] = c.steps.split_steps;
-    d["accuracy_not_met_steps"] = c.steps.accuracy_not_met_steps;
-    d["tunnelled_steps"] = c.steps.tunnelled_steps;
-    d["damped_steps"] = c.steps.damped_steps;
-    d["overlapping_steps"] = c.steps.overlapping_steps;
+    for (const auto& [name, count] : kCountNames) d[name] = c.steps.*count;
     return d;
   }
 

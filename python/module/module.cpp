@@ -25,6 +25,7 @@ NB_MODULE(_core, m) {
   add_batches(m);
   add_tasks(m);
   add_environments(m);
+  add_episode_writer(m);
   add_tapes(m);
   add_scene_tapes(m);
   add_views(m);

@@ -13,6 +13,7 @@ void add_robots(nanobind::module_& m);
 void add_batches(nanobind::module_& m);
 void add_tasks(nanobind::module_& m);
 void add_environments(nanobind::module_& m);
+void add_episode_writer(nanobind::module_& m);
 void add_tapes(nanobind::module_& m);
 void add_scene_tapes(nanobind::module_& m);
 void add_views(nanobind::module_& m);

@@ -13,6 +13,15 @@ using nb::literals::operator""_a;
 
 void add_tasks(nb::module_& m) {
   nb::class_<TensorSpec>(m, "TensorSpec", "An array of numbers that a task receives or returns.")
+      .def(
+          "__init__",
+          [](TensorSpec* self, const std::string& name, const std::vector<std::size_t>& shape,
+             const std::string& unit, const std::string& meaning, double low, double high,
+             bool privileged, bool touch) {
+            new (self) TensorSpec{name, shape, unit, meaning, {}, low, high, privileged, touch};
+          },
+          "name"_a, "shape"_a, "unit"_a = "", "meaning"_a = "", "low"_a = -TensorSpec::kUnbounded,
+          "high"_a = TensorSpec::kUnbounded, "privileged"_a = false, "touch"_a = false)
       .def_ro("name", &TensorSpec::name)
       .def_prop_ro(
           "shape", [](const TensorSpec& t) { return nb::tuple(nb::cast(t.shape)); },
@@ -31,6 +40,23 @@ void add_tasks(nb::module_& m) {
                            t.unit);
       });
   nb::class_<TaskSpec>(m, "TaskSpec", "What a task declares.")
+      .def(
+          "__init__",
+          [](TaskSpec* self, const std::string& name, const std::string& scene,
+             const std::string& success, const TensorSpec& action,
+             const std::vector<TensorSpec>& observations, int steps_per_action, int horizon) {
+            auto* const spec = new (self) TaskSpec;
+            spec->name = name;
+            spec->scene = scene;
+            spec->success = success;
+            spec->action = action;
+            spec->observations = observations;
+            spec->steps_per_action = steps_per_action;
+            spec->snapshots = {steps_per_action};
+            spec->horizon = horizon;
+          },
+          "name"_a, "scene"_a, "success"_a, "action"_a, "observations"_a, "steps_per_action"_a,
+          "horizon"_a)
       .def_ro("name", &TaskSpec::name)
       .def_ro("summary", &TaskSpec::summary)
       .def_ro("scene", &TaskSpec::scene, "Its file among tangere.scenes().")

@@ -16,9 +16,9 @@ import subprocess
 import sys
 import tempfile
 from pathlib import Path
-from typing import Any
+from typing import Any, Sequence
 
-from . import _core, policy as policies
+from . import _core, _scene_data, scene_env, policy as policies
 
 _PROGRAM = '"$TANGERE_PYTHON" -m tangere.policy'  # the same text, so the same bytes of a data set
 
@@ -51,23 +51,39 @@ def generate(
     normalise: bool = True,
     seed: int = 0,
     threads: int | None = None,
+    num_envs: int | None = None,
     options: tuple[str, ...] | list[str] = (),
 ) -> dict[str, Any]:
     """Makes a data set as `tangere generate` does, and returns what it says with --json.
 
     Parameters
     ----------
-    what: a task's name, or the path of a scene.
+    what: a task's name, the path of a scene, or a class of `tangere.VectorSceneEnv`.
     output: folder of the data set.
     policy: a name, such as "random", or for a task a function as `tangere.policy.serve` takes.
-        None: the script of the task, the controls of a scene.
-    name: of the function, for the files.
-    normalise: of the function's observations.
-    options: more words of the command, such as ("--compress", "deflate", "--overwrite").
+        None: the script of the task, the controls of a scene. A class has "random" or a function,
+        which is called with all environments that play at once.
+    name: of the function, for the files. None: its `__name__`.
+    normalise: of the function's observations; a class has no scales.
+    num_envs: environments of a class that play at once; they change no byte. None: 128.
+    options: more words of the command, such as ("--compress", "deflate", "--overwrite"). A class
+        has those of storage: --overwrite, --resume, --compress, --tactile, --name and --shards.
 
     Raises InputError and IoError as the command does, with its message, and passes on what the
     function raises. In both cases no half-written file has its final name.
     """
+    if callable(policy) and name is None:
+        name = getattr(policy, "__name__", "<lambda>")
+        if name == "<lambda>":
+            raise _core.InputError("a function as policy without a name; expected `name`")
+    if isinstance(what, type):
+        return _of_class(what, output, episodes, options, policy=policy, name=name, seed=seed,
+                         threads=threads, num_envs=num_envs)  # fmt: skip
+    if num_envs is not None:
+        raise _core.InputError(
+            f"num_envs {num_envs} with {str(what)!r}; expected a class of tangere.VectorSceneEnv, "
+            "or threads"
+        )
     words = [str(command_path()), "generate", str(what), "--output", str(output), "--json"]
     words += ["--episodes", str(episodes), "--seed", str(seed), "--quiet", *options]
     if threads is not None:
@@ -76,8 +92,7 @@ def generate(
         words += ["--policy", policy] if policy is not None else []
         run = subprocess.run(words, stdin=subprocess.DEVNULL, capture_output=True, text=True)
         return _result(run.returncode, run.stdout, run.stderr)
-    if name is None:
-        raise _core.InputError("a function as policy without a name; expected a name for the files")
+    assert name is not None
     with tempfile.TemporaryDirectory() as folder, socket.socket(socket.AF_UNIX) as listener:
         address = str(Path(folder) / "policy")
         listener.bind(address)
@@ -104,6 +119,18 @@ def generate(
             process.wait()
             out.seek(0), err.seek(0)
             return _result(process.returncode, out.read(), err.read())
+
+
+def _of_class(
+    task: type, output: str | Path, episodes: int, options: Sequence[str], *, num_envs: int | None,
+    **arguments: Any,
+) -> dict[str, Any]:  # fmt: skip
+    if not issubclass(task, scene_env.VectorSceneEnv):
+        raise _core.InputError(f"{task.__name__}; expected a subclass of tangere.VectorSceneEnv")
+    envs = 128 if num_envs is None else num_envs
+    return _scene_data.generate(
+        task, output, episodes, num_envs=envs, options=options, **arguments
+    )
 
 
 def _converse(

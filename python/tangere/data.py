@@ -85,9 +85,7 @@ class Episodes:
     def _describe(self, file: h5py.File) -> None:
         scene = file["scene"].attrs
         self.keys = [str(key) for key in scene["observations"]]
-        self.task = str(scene["task"])
-        if self.task not in _core.task_names():
-            self.task = ""
+        self.task = str(scene["task"]) if "success" in scene else ""  # of a scene alone
         self.scale: dict[str, Any] = {key: 1.0 for key in self.keys}
         self.privileged = [key for key in ("q", "v") if key in self.keys]
         self.touch: list[str] = []

@@ -22,6 +22,7 @@ from typing import Any, Sequence
 import gymnasium
 import numpy as np
 from gymnasium import spaces
+from gymnasium.envs.registration import load_env_creator
 from gymnasium.vector import VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
@@ -41,7 +42,9 @@ class VectorSceneEnv(_Remade, VectorEnv):
     Class attributes: `scene` (a file or a `tangere.Scene`), `steps_per_action` (simulation steps
     with the same controls), `horizon` (actions after which an episode is truncated), `actions`
     (numbers of an action; None: those of the controls), `action_low` and `action_high` (one number,
-    or one per number of an action; actions are clipped to them).
+    or one per number of an action; actions are clipped to them). For data sets alone: `units` (KEY
+    → unit of an observation, "action" → that of the actions), `privileged` (KEYs that a robot could
+    not measure), `touch` (KEYs whose numbers are all 0 without contact).
 
     Methods, for all environments at once: `reward` is obligatory; `observe`, `controls`,
     `terminated`, `success` and `restart` have defaults. They read `self.batch` (`tangere.Batch`),
@@ -73,6 +76,9 @@ class VectorSceneEnv(_Remade, VectorEnv):
     actions: int | None = None
     action_low: float | Sequence[float] = -1.0
     action_high: float | Sequence[float] = 1.0
+    units: dict[str, str] = {}
+    privileged: Sequence[str] = ()
+    touch: Sequence[str] = ()
     batch: _core.Batch  #: the environments' states
     lengths: NDArray[np.int64]  #: (E) actions since the start of each episode
     episodes: NDArray[np.int64]  #: (E) numbers of the episodes
@@ -286,17 +292,19 @@ class VectorSceneEnv(_Remade, VectorEnv):
         self._starting = np.zeros(self.num_envs, bool)
         self._random: dict[int, np.random.Generator] = {}
         self._views: dict[int, View] = {}
-        self._begin(np.ones(self.num_envs, bool))
+        self._begin(np.arange(self.num_envs))
 
     def _start_next(self, which: NDArray[np.bool_]) -> None:
         envs = np.flatnonzero(which)
-        if len(envs):
-            self.episodes[envs] += self.num_envs
-            self.batch.reset(envs, self.episodes[envs].tolist())
-            self._begin(which)
+        self._start(envs, self.episodes[envs] + self.num_envs)
 
-    def _begin(self, which: NDArray[np.bool_]) -> None:
-        envs = np.flatnonzero(which)
+    def _start(self, envs: Indices, episodes: NDArray[np.int64]) -> None:
+        if len(envs):
+            self.episodes[envs] = episodes
+            self.batch.reset(envs, episodes.tolist())
+            self._begin(envs)
+
+    def _begin(self, envs: Indices) -> None:
         self._ended[envs], self._starting[envs], self.lengths[envs] = False, True, 0
         for e in envs:
             self._random.pop(int(e), None)
@@ -348,13 +356,14 @@ class SceneEnv(SingleEnv):
 
     Parameters
     ----------
-    task: the subclass of `VectorSceneEnv`.
+    task: the subclass of `VectorSceneEnv`, or "MODULE:CLASS" of it, as data sets name it.
     arguments: those of `VectorSceneEnv`, without num_envs and autoreset.
     """
 
-    def __init__(self, task: type[VectorSceneEnv], **arguments: Any) -> None:
+    def __init__(self, task: type[VectorSceneEnv] | str, **arguments: Any) -> None:
         given: dict[str, Any] = {"threads": 1, "autoreset": "disabled"} | arguments
-        super().__init__(task(1, **given))
+        made: Any = load_env_creator(task) if isinstance(task, str) else task
+        super().__init__(made(1, **given))
 
     def randomized(self) -> dict[str, float]:
         """Name → what `<randomize>` drew for the episode, as `Batch.randomized`."""

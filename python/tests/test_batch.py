@@ -173,6 +173,29 @@ def test_a_failed_environment_is_told(model):
     assert batch.status.tolist() == [0, 0]
 
 
+def test_steps_are_counted_by_their_status(model):
+    one = tangere.Batch(model, envs=20, seed=1, threads=1)
+    many = tangere.Batch(model, envs=20, seed=1, threads=2)
+    u = np.random.default_rng(0).uniform(-1, 0.3, (150, 20, 3))
+    u[100:, 4] = np.nan
+    named = {"damped_steps": "damped", "split_steps": "split", "overlapping_steps": "overlapping"}
+    by_status = {name: np.zeros(20, np.int64) for name in named}
+    many.run(u, every=150)
+    for controls in u:
+        one.step(controls)
+        for name, status in named.items():
+            by_status[name] += one.status == getattr(tangere.StepStatus, status)
+    for name, wanted in by_status.items():
+        np.testing.assert_array_equal(many.counts()[name], wanted)
+        np.testing.assert_array_equal(one.counts()[name], wanted)
+    assert by_status["damped_steps"].max() > 0 and many.status[4] < 0
+    np.testing.assert_array_equal(many.counts()["simulation_steps"], many.steps)
+    assert many.steps[4] == 100 and many.counts()["newton_iterations"].min() >= 100
+    many.reset([3], [7])
+    zero = {name: int(counts[3]) for name, counts in many.counts().items()}
+    assert set(zero.values()) == {0} and many.counts()["simulation_steps"][5] == 150
+
+
 def test_the_gil_is_free_and_one_thread_has_the_batch(model):
     batch = tangere.Batch(model, envs=64, threads=1)
     u = batch.scene_controls(300)

@@ -53,6 +53,19 @@ TEST(LearnerNotes, NameTheEnvironment) {
     EXPECT_TRUE(spec.at(key).is_null()) << key;
 }
 
+TEST(LearnerNotes, NameTheClassOfATaskInPython) {
+  DatasetLayout l = of_task();
+  l.task->name = "Lift";
+  l.python_class = "robots.tasks:Lift";
+  EXPECT_EQ(json::parse(robomimic_environment(l)).at("env_name"), "tangere/Lift-v0");
+  EXPECT_EQ(json::parse(robomimic_environment(l)).at("env_kwargs"),
+            json({{"task", "robots.tasks:Lift"}}));
+  const json spec = json::parse(gymnasium_environment("Lift", l.python_class));
+  EXPECT_EQ(spec.at("id"), "tangere/Lift-v0");
+  EXPECT_EQ(spec.at("entry_point"), "tangere.scene_env:SceneEnv");
+  EXPECT_EQ(spec.at("kwargs"), json({{"task", "robots.tasks:Lift"}}));
+}
+
 TEST(LearnerNotes, SayScalesAndWhatIsPrivilegedOfWhatIsStored) {
   DatasetLayout l = of_task();
   EXPECT_EQ(json::parse(observation_scale(l)), json({{"goal", {0.1, 0.1, 0.3}}, {"tactile", 0.5}}));
