@@ -204,6 +204,12 @@ nb::dict PythonBatch::randomized() {
   return randomized_arrays(batch_);
 }
 
+void PythonBatch::set_randomized(const NamedValues& values, const nb::object& environments) {
+  const std::vector<int> list = listed(environments);
+  const InUse::Turn turn(in_use_);
+  python::set_randomized(batch_, values, list);
+}
+
 Array<std::int8_t> PythonBatch::status() {
   const InUse::Turn turn(in_use_);
   return array_of<std::int8_t>({count()}, batch_.statuses());
@@ -440,6 +446,8 @@ void add_batches(nb::module_& m) {
       .def("faces", &PythonBatch::faces, "env"_a, "half_space"_a = 0.0, nb::sig(kFacesSignature),
            kFacesText)
       .def("randomized", &PythonBatch::randomized, nb::sig(kRandomizedSignature), kRandomizedText)
+      .def("set_randomized", &PythonBatch::set_randomized, "values"_a, "envs"_a = nb::none(),
+           nb::sig(kSetRandomizedSignature), kSetRandomizedText)
       .def("step", &PythonBatch::step, "u"_a,
            "Takes one step. `u`: (E, nu) controls, or (nu) for all environments; clipped to the\n"
            "motors' ranges. InputError: another shape.")

@@ -10,6 +10,7 @@
 #include "python/module/arrays.hpp"
 #include "python/module/module.hpp"
 #include "python/module/options.hpp"
+#include "python/module/varying_numbers.hpp"
 #include "tasks/catalogue/scene_task.hpp"
 #include "tasks/gradients/task_tape.hpp"
 
@@ -19,31 +20,6 @@ using nb::literals::operator""_a;
 
 namespace {
 
-/// The number of a scene that has a name and a derivative.
-SceneNumber number_named(const Scene& scene, const std::string& name) {
-  std::vector<std::string> names;
-  const NumberGradients numbers{Model(scene)};
-  for (const NumberInfo& info : numbers.infos()) {
-    if (info.name == name) return info.number;
-    names.push_back(info.name);
-  }
-  throw InputError(fmt::format("no number of the scene is named '{}'; expected one of {}", name,
-                               fmt::join(names, ", ")));
-}
-
-/// Lets the named numbers vary by environment.
-Scene with_varying(Scene scene, const std::vector<std::string>& names) {
-  for (const std::string& name : names) {
-    const SceneNumber number = number_named(scene, name);
-    if (randomization_of(scene, number) >= 0) continue;
-    RandomizationDescription d;
-    d.number = number;
-    d.distribution = {Distribution::Kind::list, 0, 0, {number_in(scene, number)}};
-    scene.randomizations.push_back(std::move(d));
-  }
-  return scene;
-}
-
 class SceneTape {
  public:
   SceneTape(const Scene& scene, const std::vector<std::string>& names, int every, int environments,
@@ -52,13 +28,13 @@ class SceneTape {
         task_(with_varying(scene, names), every, static_cast<int>(options.length)),
         tape_(task_, environments, options) {
     const NumberGradients numbers(model());
-    for (const std::string& name : names)
-      for (int k = 0; k < numbers.count(); ++k)
-        if (numbers.infos()[as_size(k)].name == name) {
-          rows_.push_back(as_size(k));
-          varying_.push_back(
-              as_size(randomization_of(model().scene(), numbers.infos()[as_size(k)].number)));
-        }
+    for (const std::string& name : names) {
+      const auto at = std::ranges::find(numbers.infos(), name, &NumberInfo::name);
+      if (at == numbers.infos().end())
+        throw InputError(fmt::format("'{}' has no derivative; expected another number", name));
+      rows_.push_back(as_size(at - numbers.infos().begin()));
+      varying_.push_back(as_size(randomization_of(model().scene(), at->number)));
+    }
     numbers_ = as_size(numbers.count());
   }
 
@@ -204,8 +180,8 @@ void add_scene_tapes(nb::module_& m) {
           "scene"_a, "envs"_a, "steps"_a, "every"_a = 1, "numbers"_a = std::vector<std::string>{},
           "threads"_a = nb::none(), "precision"_a = "double", "tape_bytes"_a = 1e9,
           "`steps`: calls of step() at most. `every`: steps of the simulation in each. `numbers`:\n"
-          "names of numbers of the scene (Model.numbers) that environments may have of their own.\n"
-          "InputError: a number is out of range, or a name is unknown.")
+          "names of numbers of the scene (Scene.vary) that environments may have of their own.\n"
+          "InputError: a number is out of range, or a name is unknown or has no derivative.")
       .def("reset", &SceneTape::reset, "seed"_a = 0, "q"_a = nb::none(), "v"_a = nb::none(),
            "numbers"_a = nb::none(),
            "Starts anew and clears the tape. `q` (E, nq), `v` (E, nv) and `numbers`\n"
