@@ -58,6 +58,9 @@ void add_scene(nb::module_& m) {
           "Batch.set_randomized() sets others; what <randomize> draws is drawn as before. `text`\n"
           "stays that of the file. InputError: a name is unknown. Model raises InputError for a\n"
           "number on which something depends that cannot follow it.")
+      .def_prop_ro("varying", &varying_names,
+                   "Names of the numbers that differ between environments: those that <randomize>\n"
+                   "draws, then those of vary().")
       .def_ro("name", &Scene::name)
       .def_ro("path", &Scene::path, "The file that it was read from.")
       .def_ro("text", &Scene::text, "The file as read.")

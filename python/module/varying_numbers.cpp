@@ -17,22 +17,22 @@ std::vector<std::string> names_of(const std::vector<SceneNumber>& numbers) {
   return names;
 }
 
+[[noreturn]] void fail_to_find(const std::string& name, const std::vector<std::string>& variable) {
+  throw InputError(fmt::format("no number of the scene that may vary is named '{}'{}", name,
+                               suggestion(name, variable)));
+}
+
 /// The index in Scene::randomizations of the parameter that has a name.
 int varying_named(const Scene& scene, const std::string& name) {
-  std::vector<std::string> varying;
-  for (const RandomizationDescription& d : scene.randomizations) {
-    varying.push_back(name_of(d.number));
-    if (varying.back() == name) return randomization_of(scene, d.number);
-  }
+  for (const RandomizationDescription& d : scene.randomizations)
+    if (name_of(d.number) == name) return randomization_of(scene, d.number);
   const std::vector<std::string> variable = names_of(variable_numbers(scene));
   if (std::ranges::count(variable, name) > 0)
     throw InputError(
         fmt::format("'{}' is the same in all environments; expected a number that varies by "
                     "<randomize> or Scene.vary()",
                     name));
-  varying.insert(varying.end(), variable.begin(), variable.end());
-  throw InputError(fmt::format("no number of the scene that may vary is named '{}'{}", name,
-                               suggestion(name, varying)));
+  fail_to_find(name, variable);
 }
 
 }  // namespace
@@ -42,23 +42,27 @@ Scene with_varying(Scene scene, const std::vector<std::string>& names) {
   const std::vector<std::string> variable = names_of(numbers);
   for (const std::string& name : names) {
     const auto at = std::ranges::find(variable, name);
-    if (at == variable.end())
-      throw InputError(fmt::format("no number of the scene that may vary is named '{}'{}", name,
-                                   suggestion(name, variable)));
+    if (at == variable.end()) fail_to_find(name, variable);
     let_vary(scene, numbers[as_size(at - variable.begin())]);
   }
   return scene;
 }
 
+std::vector<std::string> varying_names(const Scene& scene) {
+  std::vector<std::string> names;
+  for (const RandomizationDescription& d : scene.randomizations) names.push_back(name_of(d.number));
+  return names;
+}
+
 nb::dict randomized_arrays(const Batch& batch) {
-  const Scene& scene = batch.model().scene();
+  const std::vector<std::string> names = varying_names(batch.model().scene());
   nb::dict values;
-  for (std::size_t k = 0; k < scene.randomizations.size(); ++k) {
+  for (std::size_t k = 0; k < names.size(); ++k) {
     std::span<double> numbers;
     auto array = new_array<double>({as_size(batch.environments())}, numbers);
     for (int e = 0; e < batch.environments(); ++e)
       numbers[as_size(e)] = batch.randomized_value(e, static_cast<int>(k));
-    values[name_of(scene.randomizations[k].number).c_str()] = array;
+    values[names[k].c_str()] = array;
   }
   return values;
 }

@@ -16,6 +16,8 @@ namespace tangere::python {
 /// a name that no such number has.
 Scene with_varying(Scene scene, const std::vector<std::string>& names);
 
+/// Returns the names of what varies.
+std::vector<std::string> varying_names(const Scene& scene);
 /// Returns name → (E): the values of what varies.
 nb::dict randomized_arrays(const Batch& batch);
 

@@ -133,6 +133,17 @@ def test_what_cannot_be_set_is_refused(free, values, message):
         batch.set_randomized({"contact pad ball kn": 5}, envs=[3])
 
 
+def test_a_copy_of_a_scene_varies_as_it_does(scene):
+    drawn = ["joint ball_joint q[0]", "joint ball_joint q[1]", "contact pad ball kn"]
+    drawn.append("tactile pad kt")
+    assert scene.varying == drawn
+    more = scene.vary(["body ball radius", "contact pad ball kn", "ground ball mu"])
+    assert more.varying == [*drawn, "body ball radius", "ground ball mu"]
+    assert more.text == scene.text
+    for of in (more, tangere.Scene.from_text(scene.text).vary(["body ball radius"])):
+        assert pickle.loads(pickle.dumps(of)).varying == of.varying
+
+
 def test_what_cannot_vary_is_refused(scene):
     with pytest.raises(tangere.InputError, match="named 'body bal mass'; did you mean"):
         scene.vary(["body bal mass"])
