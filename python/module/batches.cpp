@@ -224,6 +224,12 @@ nb::dict PythonBatch::counts() {
   return counts;
 }
 
+void PythonBatch::set_randomized(const NamedValues& values, const nb::object& environments) {
+  const std::vector<int> list = listed(environments);
+  const InUse::Turn turn(in_use_);
+  python::set_randomized(batch_, values, list);
+}
+
 Array<std::int8_t> PythonBatch::status() {
   const InUse::Turn turn(in_use_);
   return array_of<std::int8_t>({count()}, batch_.statuses());
@@ -475,6 +481,8 @@ void add_batches(nb::module_& m) {
            "Name → (E) int64, of the episode so far, without steps that failed: simulation_steps,\n"
            "newton_iterations, and steps by their status: split_steps, accuracy_not_met_steps,\n"
            "tunnelled_steps, damped_steps and overlapping_steps.")
+      .def("set_randomized", &PythonBatch::set_randomized, "values"_a, "envs"_a = nb::none(),
+           nb::sig(kSetRandomizedSignature), kSetRandomizedText)
       .def("step", &PythonBatch::step, "u"_a,
            "Takes one step. `u`: (E, nu) controls, or (nu) for all environments; clipped to the\n"
            "motors' ranges. InputError: another shape.")

@@ -9,6 +9,7 @@
 #include "python/module/module.hpp"
 #include "python/module/observations.hpp"
 #include "python/module/options.hpp"
+#include "python/module/varying_numbers.hpp"
 #include "tasks/catalogue/task_list.hpp"
 #include "tasks/run/policy.hpp"
 

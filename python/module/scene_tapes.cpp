@@ -11,6 +11,7 @@
 #include "python/module/arrays.hpp"
 #include "python/module/module.hpp"
 #include "python/module/options.hpp"
+#include "python/module/varying_numbers.hpp"
 #include "tasks/catalogue/scene_task.hpp"
 #include "tasks/gradients/task_tape.hpp"
 
@@ -19,31 +20,6 @@ namespace tangere::python {
 using nb::literals::operator""_a;
 
 namespace {
-
-/// The number of a scene that has a name and a derivative.
-SceneNumber number_named(const Scene& scene, const std::string& name) {
-  std::vector<std::string> names;
-  const NumberGradients numbers{Model(scene)};
-  for (const NumberInfo& info : numbers.infos()) {
-    if (info.name == name) return info.number;
-    names.push_back(info.name);
-  }
-  throw InputError(fmt::format("no number of the scene is named '{}'; expected one of {}", name,
-                               fmt::join(names, ", ")));
-}
-
-/// Lets the named numbers vary by environment.
-Scene with_varying(Scene scene, const std::vector<std::string>& names) {
-  for (const std::string& name : names) {
-    const SceneNumber number = number_named(scene, name);
-    if (randomization_of(scene, number) >= 0) continue;
-    RandomizationDescription d;
-    d.number = number;
-    d.distribution = {Distribution::Kind::list, 0, 0, {number_in(scene, number)}};
-    scene.randomizations.push_back(std::move(d));
-  }
-  return scene;
-}
 
 /// What SceneTape keeps of its arguments: a change of points compiles the scene again.
 struct TapeArguments {
@@ -62,13 +38,13 @@ struct TapedScene {
              a.readings),
         tape(task, a.environments, a.options) {
     const NumberGradients numbers(task.model());
-    for (const std::string& name : a.parameters)
-      for (int k = 0; k < numbers.count(); ++k)
-        if (numbers.infos()[as_size(k)].name == name) {
-          rows.push_back(as_size(k));
-          varying.push_back(
-              as_size(randomization_of(task.model().scene(), numbers.infos()[as_size(k)].number)));
-        }
+    for (const std::string& name : a.parameters) {
+      const auto at = std::ranges::find(numbers.infos(), name, &NumberInfo::name);
+      if (at == numbers.infos().end())
+        throw InputError(fmt::format("'{}' has no derivative; expected another number", name));
+      rows.push_back(as_size(at - numbers.infos().begin()));
+      varying.push_back(as_size(randomization_of(task.model().scene(), at->number)));
+    }
     number_count = as_size(numbers.count());
   }
 
@@ -293,7 +269,8 @@ void add_scene_tapes(nb::module_& m) {
           "`readings`: names, such as pad, pad.sum, bodies.box, variables or an end effector;\n"
           "None: all end effectors and fields. `parameters`: names of numbers of the scene that\n"
           "environments may have of their own. `points`: whether there are derivatives by points\n"
-          "of sensors. InputError: a number is out of range, or a name is unknown.")
+          "of sensors. InputError: a number is out of range, or a name is unknown or has no\n"
+          "derivative.")
       .def(
           "reset", &SceneTape::reset, "seed"_a = 0, "q"_a = nb::none(), "v"_a = nb::none(),
           "parameters"_a = nb::none(), "points"_a = nb::none(), "record"_a = true,

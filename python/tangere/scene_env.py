@@ -171,7 +171,8 @@ class VectorSceneEnv(_Remade, VectorEnv):
 
     def restart(self, envs: Indices) -> None:
         """Begins episodes of the environments `envs`, whose states the scene has drawn: for goals
-        (`uniform`) or other states (`batch.set_state`). By default nothing more."""
+        (`uniform`), numbers (`batch.set_randomized`) or other states (`batch.set_state`). By
+        default nothing more."""
 
     # What it may use
 
@@ -270,7 +271,7 @@ class VectorSceneEnv(_Remade, VectorEnv):
         return tuple(self._views[e].draw(poses[e]) for e in range(self.num_envs))
 
     def randomized(self) -> dict[str, NDArray[np.float64]]:
-        """Name → (E): what `<randomize>` drew for the episodes, as `Batch.randomized`."""
+        """Name → (E): the numbers of the episodes that vary, as `Batch.randomized`."""
         return self.batch.randomized()
 
     def _scene(self, other: _core.Scene | str | Path | None) -> _core.Scene:
@@ -366,7 +367,7 @@ class SceneEnv(SingleEnv):
         super().__init__(made(1, **given))
 
     def randomized(self) -> dict[str, float]:
-        """Name → what `<randomize>` drew for the episode, as `Batch.randomized`."""
+        """Name → the numbers of the episode that vary, as `Batch.randomized`."""
         return {name: float(values[0]) for name, values in self._vector.randomized().items()}
 
 
