@@ -291,9 +291,9 @@ void add_scene_tapes(nb::module_& m) {
             options.parameters = !parameters.empty();
             options.points = points;
             new (self) SceneTape(
-                {scene, parameters, readings, every.value("every"), envs.value("envs"), options});
+                {scene, parameters, readings, every.value("every"), envs.value("num_envs"), options});
           },
-          "scene"_a, "envs"_a, "steps"_a, "every"_a = 1, "readings"_a = nb::none(),
+          "scene"_a, "num_envs"_a, "steps"_a, "every"_a = 1, "readings"_a = nb::none(),
           "parameters"_a = std::vector<std::string>{}, "points"_a = false, "threads"_a = nb::none(),
           "precision"_a = "double", "tape_bytes"_a = 1e9,
           "`steps`: calls of step() at most. `every`: steps of the simulation in each.\n"
@@ -338,7 +338,7 @@ void add_scene_tapes(nb::module_& m) {
       .def_prop_ro("model", [](const SceneTape& s) { return Model(s.model()); })
       .def_prop_ro("points", &SceneTape::point_count,
                    "Of all sensors; 0 without their derivatives.")
-      .def_prop_ro("envs", &SceneTape::count);
+      .def_prop_ro("num_envs", &SceneTape::count);
 }
 
 }  // namespace tangere::python

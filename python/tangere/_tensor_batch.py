@@ -51,7 +51,7 @@ class RecordedBatch:
 
     def __init__(self, state: Any, batch: _core.Batch):
         self._state, self._batch = state, batch
-        self.model, self.envs = batch.model, batch.envs
+        self.model, self.num_envs = batch.model, batch.num_envs
 
     q = property(lambda self: self._state.q)
     v = property(lambda self: self._state.v)

@@ -43,7 +43,7 @@ def test_numbers_with_a_tie_are_drawn_together():
             + element.format('ground_contact body="ball"', 'uniform="0.4 0.8"')
             + element.format('tactile name="pad"', 'uniform="0.8 1.6"')
         ),
-        envs=20,
+        num_envs=20,
     )
     drawn = batch.randomized()
     first = drawn["contact pad ball mu"]
@@ -59,11 +59,11 @@ def test_set_numbers_have_the_bits_of_drawn_ones(free, threads):
         '<body name="ball" field="radius" uniform="0.019 0.02"/>'
         '<tactile name="pad" field="mu" uniform="1 3"/>'
     )
-    expected = tangere.Batch(model, envs=20, seed=3, threads=threads)
+    expected = tangere.Batch(model, num_envs=20, seed=3, threads=threads)
     drawn = expected.randomized()
-    batch = tangere.Batch(free, envs=20, seed=3, threads=threads)
+    batch = tangere.Batch(free, num_envs=20, seed=3, threads=threads)
     batch.set_randomized({name: drawn[name] for name in FREE[1:]})
-    alone = tangere.Batch(free, envs=1, seed=3, first_episode=17)
+    alone = tangere.Batch(free, num_envs=1, seed=3, first_episode=17)
     alone.set_randomized({name: drawn[name][17] for name in FREE[1:]})
     one = played(alone)
     for found, whole, single in zip(played(batch), played(expected), one):
@@ -96,7 +96,7 @@ def test_a_field_is_read_with_the_new_numbers(scene, free):
     text = scene.text.replace('kt="0.01" mu="2"', 'kt="0.01" mu="0.02"')
     slippery = tangere.Scene.from_string(text)
     batches = [
-        tangere.Batch(model, envs=2, seed=1, precision="double")
+        tangere.Batch(model, num_envs=2, seed=1, precision="double")
         for model in (free, tangere.Model(slippery))
     ]
     for batch in batches:
@@ -123,7 +123,7 @@ def test_a_field_is_read_with_the_new_numbers(scene, free):
     ],
 )
 def test_what_cannot_be_set_is_refused(free, values, message):
-    batch = tangere.Batch(free, envs=3)
+    batch = tangere.Batch(free, num_envs=3)
     before = batch.randomized()
     with pytest.raises(tangere.InputError, match=message):
         batch.set_randomized(values)
