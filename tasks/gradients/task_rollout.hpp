@@ -77,8 +77,8 @@ class TaskRollout {
     return worker_.snapshots(lane);
   }
   [[nodiscard]] Integrator integrator() const { return integrator_; }
-  /// Steps with a stepper of the caller from now on: made for the same model and options, used by no
-  /// other thread at the same time. So many rollouts share the scratch of a thread.
+  /// Steps with a stepper of the caller from now on: made for the same model and options, used by
+  /// no other thread at the same time. So many rollouts share the scratch of a thread.
   void use(Stepper& stepper) { shared_ = &stepper; }
   [[nodiscard]] const VectorCounts& counts() const { return counts_; }
 
