@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import operator
 import threading
+from functools import partial
 from typing import Any
 
 import jax
@@ -77,6 +78,9 @@ class Host:
     the way back its derivative has the number of the pass, 0 where a pass begins. What does not
     follow the order of one run is found by these two.
     """
+
+    differentiable = 2  #: of what a step returns: the token, the rows …
+    shown: list[Any]  #: shapes of what a step returns
 
     def __init__(self, tape: Any, dtype: Any):
         self.tape, self.lock = tape, threading.Lock()
@@ -154,3 +158,22 @@ class Host:
         if passing != self.passing or self.left != taken:
             raise _core.InputError("two ways back over one tape at the same time")
         return passing
+
+
+@partial(jax.custom_vjp, nondiff_argnums=(0,))
+def take_step(host: Host, token: Any, inputs: Any) -> Any:
+    """One step of a tape, differentiable by its inputs."""
+    return call(host.step, host.shown, token, inputs)
+
+
+def _forward(host: Host, token: Any, inputs: Any) -> Any:
+    shown = take_step(host, token, inputs)
+    return shown, shown[0]  # the token after the step, so that the way back cannot come before it
+
+
+def _backward(host: Host, token: Any, by: Any) -> Any:
+    bars = by[: host.differentiable]
+    return tuple(call(host.reverse, [host.token, host.actions], token, *bars))
+
+
+take_step.defvjp(_forward, _backward)

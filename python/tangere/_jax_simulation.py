@@ -14,7 +14,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from . import _core
-from ._jax_host import Host, call, checked_dtype, integer
+from ._jax_host import Host, call, checked_dtype, integer, take_step
 from ._tape import SimulationBase, split_rows
 
 
@@ -99,7 +99,7 @@ class Simulation(SimulationBase):
         one, or XLA may begin the way back too early, which is an InputError, too."""
         rows = self._rows(controls, self._host.actions, "controls")
         self._host.check_known(state.token, rows)
-        return self._state(_step(self._host, state.token, rows))
+        return self._state(take_step(self._host, state.token, rows))
 
     def parameters(self) -> np.ndarray:
         """(E, names) of the run, in SI units: what reset() drew or was given."""
@@ -175,20 +175,3 @@ def _start_backward(host: _Host, kept: Any, by: Any) -> Any:
 
 
 _start.defvjp(_start_forward, _start_backward)
-
-
-@partial(jax.custom_vjp, nondiff_argnums=(0,))
-def _step(host: _Host, token: Any, controls: Any) -> Any:
-    return call(host.step, host.shown, token, controls)
-
-
-def _step_forward(host: _Host, token: Any, controls: Any) -> Any:
-    shown = _step(host, token, controls)
-    return shown, shown[0]  # the token after the step, so that the way back cannot come before it
-
-
-def _step_backward(host: _Host, token: Any, by: Any) -> Any:
-    return tuple(call(host.reverse, [host.token, host.actions], token, *by[:2]))
-
-
-_step.defvjp(_step_forward, _step_backward)

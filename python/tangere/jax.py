@@ -17,7 +17,6 @@ given. It runs on JAX's CPU backend. `import tangere` does not import this modul
 
 from __future__ import annotations
 
-from functools import partial
 from pathlib import Path
 from typing import Any, Callable, NamedTuple
 
@@ -26,7 +25,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from . import _core
-from ._jax_host import Host, call, checked_dtype, integer, known
+from ._jax_host import Host, call, checked_dtype, integer, known, take_step
 from ._jax_simulation import Simulation
 from ._tape import Observations, TapeBase, check_rollout
 
@@ -114,7 +113,7 @@ class Tape(TapeBase):
             raise _core.InputError(f"actions of shape {actions.shape}; expected {expected.shape}")
         actions = actions.astype(expected.dtype)
         self._host.check_known(state.token, actions)
-        token, rows, reward, alive, success = _step(self._host, state.token, actions)
+        token, rows, reward, alive, success = take_step(self._host, state.token, actions)
         return State(token, alive, success), self._split(rows), reward
 
     def play(
@@ -171,6 +170,8 @@ def rollout(
 
 
 class _Host(Host):
+    differentiable = 3  # with the reward
+
     def __init__(self, tape: _core.TaskTape, dtype: Any):
         super().__init__(tape, dtype)
         shape = jax.ShapeDtypeStruct
@@ -189,20 +190,3 @@ class _Host(Host):
                 raise _core.InputError(f"seed {seed}; expected at least 0")
             self.tape.reset(seed, first_episode)
             self.show(out)
-
-
-@partial(jax.custom_vjp, nondiff_argnums=(0,))
-def _step(host: _Host, token: Any, actions: Any) -> Any:
-    return call(host.step, host.shown, token, actions)
-
-
-def _forward(host: _Host, token: Any, actions: Any) -> Any:
-    shown = _step(host, token, actions)
-    return shown, shown[0]  # the token after the step, so that the way back cannot come before it
-
-
-def _backward(host: _Host, token: Any, by: Any) -> Any:
-    return tuple(call(host.reverse, [host.token, host.actions], token, *by[:3]))
-
-
-_step.defvjp(_forward, _backward)
