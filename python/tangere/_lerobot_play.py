@@ -10,8 +10,8 @@ from typing import Any, Callable, Protocol
 import numpy as np
 
 from . import _core, gym, scene_env
+from ._closed_loop import TEST_SEED, play_episodes
 from ._lerobot_features import Feature
-from ._success import TEST_SEED, success_summary
 
 Frames = dict[str, np.ndarray]
 
@@ -114,13 +114,12 @@ def play(
         policy = Checkpoint(policy, origin["text"])
     num_envs = min(num_envs, episodes)
     env = _environment(chosen, num_envs, threads)
-    played = [
-        _play_together(env, policy, features, seed, first)
-        for first in range(0, episodes, num_envs)
-    ]
-    solved, returns, actions = (np.concatenate(part)[:episodes] for part in zip(*played))
+    start = getattr(policy, "reset", lambda: None)
+    found = play_episodes(
+        env, lambda obs: policy(_frames(env, obs, features)), start, episodes, seed
+    )
     named = chosen if isinstance(chosen, str) else chosen.__name__
-    return {"task": named, "seed": seed} | success_summary(solved, returns, actions)
+    return {"task": named, "seed": seed} | found
 
 
 def _environment(
@@ -131,24 +130,6 @@ def _environment(
     if task not in _core.task_names():
         raise _core.InputError(f"task {task!r} is not of the catalogue; expected its class")
     return gym.make_vec(task, num_envs, threads=threads, normalise=False)
-
-
-def _play_together(
-    env: Any, policy: FramePolicy, features: list[Feature], seed: int, first: int
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Episodes first, first + 1, …: whether each was solved, its return, its actions; each (E)."""
-    obs, _ = env.reset(seed=seed, options={"first_episode": first})
-    if callable(reset := getattr(policy, "reset", None)):
-        reset()
-    over, solved = np.zeros((2, env.num_envs), bool)
-    returns, actions = np.zeros(env.num_envs), np.zeros(env.num_envs, int)
-    while not over.all():  # an environment whose episode is over plays others, which do not count
-        obs, reward, terminated, truncated, info = env.step(policy(_frames(env, obs, features)))
-        returns += np.where(over, 0, reward)
-        actions += ~over
-        solved |= ~over & info["success"]
-        over |= terminated | truncated
-    return solved, returns, actions
 
 
 def _frames(env: Any, obs: Frames, features: list[Feature]) -> Frames:

@@ -21,7 +21,7 @@ import robomimic.utils.env_utils as env_utils
 from robomimic.envs.env_base import EnvBase, EnvType
 
 from . import _core
-from ._success import TEST_SEED, success_summary
+from ._closed_loop import TEST_SEED, success_summary
 from .gym import TaskEnv, gym_id
 
 
