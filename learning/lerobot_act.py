@@ -90,7 +90,9 @@ def rows_of(data: Path, chunk: int) -> dict[str, torch.Tensor]:
     )
     batches = list(loader)
     wanted = [name for name in batches[0] if name.startswith(("observation", "action"))]
-    return {name: torch.cat([batch[name] for batch in batches]) for name in wanted}
+    rows = {name: torch.cat([batch[name] for batch in batches]) for name in wanted}
+    rows["action"] = rows["action"].reshape(len(rows["action"]), chunk, -1)  # of one number, too
+    return rows
 
 
 def train(asked: argparse.Namespace) -> None:
