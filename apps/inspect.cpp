@@ -42,6 +42,10 @@ const char* control_name(const Scene& scene) {
   return kNames[scene.control->index()];
 }
 
+std::string names_line(std::string_view what, std::span<const std::string> names) {
+  return fmt::format("{} ({}): {}\n", what, names.size(), fmt::join(names, ", "));
+}
+
 std::vector<std::string> randomized_names(const Scene& scene) {
   std::vector<std::string> names;
   for (const RandomizationDescription& d : scene.randomizations) names.push_back(name_of(d.number));
@@ -53,6 +57,26 @@ std::vector<std::string> randomized_units(const Scene& scene) {
   for (const RandomizationDescription& d : scene.randomizations)
     units.push_back(unit_of(scene, d.number));
   return units;
+}
+
+std::vector<std::string> randomized_ties(const Scene& scene) {
+  std::vector<std::string> ties;
+  for (const RandomizationDescription& d : scene.randomizations) ties.push_back(d.tie);
+  return ties;
+}
+
+/// A line for each tie, with the numbers that are drawn together.
+std::string ties_text(const Scene& scene) {
+  std::string text;
+  for (std::size_t k = 0; k < scene.randomizations.size(); ++k) {
+    const std::string& tie = scene.randomizations[k].tie;
+    if (tie.empty() || drawn_with(scene, k) != k) continue;
+    std::vector<std::string> names;
+    for (const RandomizationDescription& d : scene.randomizations)
+      if (d.tie == tie) names.push_back(name_of(d.number));
+    text += names_line(fmt::format("  drawn together as '{}'", tie), names);
+  }
+  return text;
 }
 
 /// Steps of a scene's own run; -1 if the scene does not define them.
@@ -142,15 +166,12 @@ Json as_json(const Model& model) {
           {"steps", steps < 0 ? Json() : Json(steps)},
           {"randomized", randomized_names(scene)},
           {"randomized_units", randomized_units(scene)},
+          {"randomized_ties", randomized_ties(scene)},
           {"effects", effects_json(model.effects())},
           {"stages", list_of(model.stages(), stage_json)},
           {"state_bytes_per_environment", model.state_bytes_per_environment()},
           {"workspace_bytes", Stepper::workspace_bytes(model)},
           {"instruction_set", kernels::active_isa_name()}};
-}
-
-std::string names_line(const char* what, std::span<const std::string> names) {
-  return fmt::format("{} ({}): {}\n", what, names.size(), fmt::join(names, ", "));
 }
 
 std::string bodies_text(const Model& model) {
@@ -211,6 +232,7 @@ std::string as_text(const Model& model) {
   text += fmt::format("driven by: {}{}\n", control_name(scene),
                       steps < 0 ? "" : fmt::format(", {} steps", steps));
   text += names_line("varying between environments", randomized_names(scene));
+  text += ties_text(scene);
   text += '\n' + joint_effects_text(scene) + '\n' + motors_text(scene);
   text += fmt::format("\ncontacts ({})\n", model.contacts().size());
   for (const ContactInfo& c : model.contacts())

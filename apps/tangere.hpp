@@ -5,6 +5,7 @@
 
 // Scenes, models, steps and readings.
 #include "engine/scene/surface_contact.hpp"
+#include "engine/scene/variable_numbers.hpp"
 #include "engine/sense/energy_balance.hpp"
 #include "engine/sense/flow_map.hpp"
 #include "engine/sense/readout.hpp"

@@ -6,7 +6,7 @@ import numpy as np
 import tangere
 
 model = tangere.Model(tangere.Scene(tangere.scenes()["rolling_ball_small"]))
-batch = tangere.Batch(model, envs=16, seed=1)
+batch = tangere.Batch(model, num_envs=16, seed=1)
 force = np.zeros((200, 16, model.nu))  # x, y, z for 1 s [N]
 force[:, :, 2] = np.linspace(0, -0.5, 16)  # from no push to 0.5 N down
 run = batch.run(force, every=10, fields=["pad", "pad.sum"])

@@ -69,7 +69,7 @@ def nodes_of(package: Path, module: str) -> Iterator[tuple[str, Node]]:
         return
     tree = parse(package / "__init__.py")
     found: dict[str, Node] = {}
-    for part in ("_core.pyi", "__init__.py"):
+    for part in ("_core.pyi", "_rollout.py", "_view.py", "__init__.py"):
         found |= {n.name: n for n in parse(package / part).body if isinstance(n, Node)}
     for name in names_of(tree) or []:
         if name in found:  # those of tangere.gym are there

@@ -293,9 +293,9 @@ void ReadoutPullback::end_effector(int lane, int end_effector, std::span<const d
   i.used[std::size_t(group)] = true;
 }
 
-// With the link's world pose (R, p) and twist (w, u) in its own axes, and the body's origin c in the
-// link: x = p + R c, q = that of R R_b, ω = R w, ẋ = R (u + w × c). A displacement (θ, ρ) of the
-// link in its own axes turns q by ½ (0, Rθ) ⊗ q.
+// With the link's world pose (R, p) and twist (w, u) in its own axes, and the body's origin c in
+// the link: x = p + R c, q = that of R R_b, ω = R w, ẋ = R (u + w × c). A displacement (θ, ρ) of
+// the link in its own axes turns q by ½ (0, Rθ) ⊗ q.
 void ReadoutPullback::body(int lane, int body, std::span<const double> pose,
                            std::span<const double> twist) {
   Impl& i = *impl_;

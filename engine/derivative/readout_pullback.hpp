@@ -49,8 +49,8 @@ class ReadoutPullback {
                 std::span<double> parameters = {}, std::span<double> points = {});
   /// Takes the cotangent of an end effector's world position, (3).
   void end_effector(int lane, int end_effector, std::span<const double> cotangent);
-  /// Takes the cotangents of a body's pose (7) and twist (6), as Readout::bodies() returns them. The
-  /// part of a quaternion's cotangent along the quaternion has no effect.
+  /// Takes the cotangents of a body's pose (7) and twist (6), as Readout::bodies() returns them.
+  /// The part of a quaternion's cotangent along the quaternion has no effect.
   void body(int lane, int body, std::span<const double> pose, std::span<const double> twist);
   /// Adds the collected cotangents to q and v of `out`, in all lanes.
   void finish(BlockCotangent& out);

@@ -449,6 +449,7 @@ class Compiler {
     int next = m_.layout.parameters;
     for (const RandomizationDescription& d : m_.scene.randomizations) {
       if (!is_of_start(d.number)) vary(d, next);
+      m_.drawn_with.push_back(tangere::drawn_with(m_.scene, m_.randomized_row.size()));
       m_.randomized_row.push_back(is_of_start(d.number) ? state_row(d) : next++);
     }
     m_.layout.past = add_derived_rows(m_, next);

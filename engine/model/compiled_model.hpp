@@ -231,6 +231,8 @@ struct CompiledModel {
   PatternStorage pattern;
   BlockLayout layout;
   std::vector<int> randomized_row;  ///< parallel to scene.randomizations: row of a block
+  /// Parallel to scene.randomizations: the entry whose random number draws it (scene_number.hpp).
+  std::vector<std::size_t> drawn_with;
   kernels::ModelView view{};
 
   std::vector<SensorInfo> sensor_info;

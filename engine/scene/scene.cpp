@@ -54,6 +54,16 @@ const char* to_string(ContactLaw value) {
   return "unknown";
 }
 
+const char* to_string(Distribution::Kind value) {
+  switch (value) {
+    case Distribution::Kind::uniform: return "uniform";
+    case Distribution::Kind::log_uniform: return "log_uniform";
+    case Distribution::Kind::normal: return "normal";
+    case Distribution::Kind::list: return "list";
+  }
+  return "unknown";
+}
+
 const char* law_name(ContactLaw law, std::optional<double> ramp) {
   return law == ContactLaw::linear && ramp == 0 ? "published" : to_string(law);
 }

@@ -297,6 +297,9 @@ struct RandomizationDescription {
   SceneNumber number;
   Distribution distribution;
   Source source;
+  /// Numbers with the same tie are drawn by one random number: they have the same kind of
+  /// distribution, and lists of one length. "": drawn alone.
+  std::string tie{};
 };
 
 /// Outputs that runs of the scene compute and store (engine/scene/field_form.hpp).
@@ -349,6 +352,7 @@ struct Scene {
 /// The name users write and read: "free", "clamped" …
 const char* to_string(JointType value);
 const char* to_string(ContactLaw value);
+const char* to_string(Distribution::Kind value);  ///< as in scene files
 /// The same, but "published" for law linear with ramp 0.
 const char* law_name(ContactLaw law, std::optional<double> ramp);
 /// Returns "sphere", "cuboid" …

@@ -104,6 +104,22 @@ std::string varying_number_fault(const Scene& scene, const SceneNumber& n) {
   }
 }
 
+/// What keeps a number from being drawn with the first one of its tie.
+std::string tie_fault(const Scene& scene, const RandomizationDescription& d) {
+  const auto first = std::ranges::find(scene.randomizations, d.tie, &RandomizationDescription::tie);
+  if (d.tie.empty() || first == scene.randomizations.end()) return "";
+  const Distribution &own = d.distribution, &other = first->distribution;
+  const auto fault = [&](const std::string& found, const std::string& expected) {
+    return fmt::format("tie=\"{}\" has {}; expected {} as '{}' with the same tie", d.tie, found,
+                       expected, name_of(first->number));
+  };
+  if (own.kind != other.kind) return fault(to_string(own.kind), to_string(other.kind));
+  const auto length = [](const Distribution& of) {
+    return fmt::format("a list of {}", of.values.size());
+  };
+  return own.values.size() == other.values.size() ? "" : fault(length(own), length(other));
+}
+
 }  // namespace
 
 std::string joint_fault(const JointDescription& joint) {
@@ -191,17 +207,21 @@ std::string markers_fault(const TactileDescription& sensor) {
   return sensor.markers ? value_fault(kMarkers, *sensor.markers) : "";
 }
 
+std::string varying_value_fault(const SceneNumber& n, double value) {
+  const Attribute& row = number_kind(n.owner, n.field);
+  if (std::string fault = row.fault(value); !fault.empty()) return fault;
+  return n.owner == NumberOwner::body && !(value > 0)
+             ? fmt::format("{}=\"{}\"; expected a positive number", row.name, value)
+             : "";
+}
+
 std::string variation_fault(const Scene& scene, const RandomizationDescription& d) {
   const SceneNumber& n = d.number;
-  std::string fault = varying_number_fault(scene, n);
-  const Attribute& row = number_kind(n.owner, n.field);
+  std::string fault = first_of(varying_number_fault(scene, n), tie_fault(scene, d));
   const bool bounded = !is_of_start(n) && n.field != Field::pos;
-  const double least = least_of(d.distribution);
   if (fault.empty() && bounded && d.distribution.kind == Distribution::Kind::normal)
     fault = "normal can draw a negative value; expected uniform, log_uniform or list";
-  if (fault.empty() && bounded) fault = row.fault(least);
-  if (fault.empty() && n.owner == NumberOwner::body && !(least > 0))
-    fault = "not all that may be drawn is positive";
+  if (fault.empty() && bounded) fault = varying_value_fault(n, least_of(d.distribution));
   return fault.empty() ? "" : "'" + name_of(n) + "' varies, but " + fault;
 }
 

@@ -227,4 +227,11 @@ int randomization_of(const Scene& scene, const SceneNumber& number) {
   return -1;
 }
 
+std::size_t drawn_with(const Scene& scene, std::size_t k) {
+  const std::string& tie = scene.randomizations[k].tie;
+  std::size_t first = tie.empty() ? k : 0;
+  while (scene.randomizations[first].tie != tie) ++first;
+  return first;
+}
+
 }  // namespace tangere

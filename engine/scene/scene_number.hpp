@@ -68,5 +68,8 @@ double number_in(const Scene& scene, const SceneNumber& number);
 /// Returns the index in Scene::randomizations that the number follows; -1: it keeps the scene's
 /// value.
 int randomization_of(const Scene& scene, const SceneNumber& number);
+/// Returns the index in Scene::randomizations whose random number draws entry k: the first one with
+/// the same tie, or k.
+std::size_t drawn_with(const Scene& scene, std::size_t k);
 
 }  // namespace tangere

@@ -366,6 +366,7 @@ constexpr Attribute kSchema[] = {
     row(kVarying, "log_uniform", kNone, U::one, "low high, both positive"),
     row(kVarying, "normal", kNone, U::one, "mean deviation; only q, v and pos"),
     row(kVarying, "list", kNone, U::one, "values that are equally likely"),
+    row(kVarying, "tie", kNone, U::one, "a word; numbers with the same are drawn together"),
 };
 
 constexpr const char* kElementNames[] = {"option",

@@ -14,13 +14,13 @@
 
 namespace tangere {
 
-/// One form of one sensor's field. Several threads may use it at once. Each thread allocates scratch
-/// at its first call.
+/// One form of one sensor's field. Several threads may use it at once. Each thread allocates
+/// scratch at its first call.
 class FormMap {
  public:
-  /// Throws InputError for a sensor or body that does not exist, for markers of a sensor without
-  /// them, for `ideal` and `markers` of an imperfect sensor, and for `pressure`, which leaves friction
-  /// out: the field does not determine them.
+  /// Throws InputError for a sensor that does not exist, for markers of a sensor without
+  /// them, for `ideal` and `markers` of an imperfect sensor, and for `pressure`, which leaves
+  /// friction out: the field does not determine them.
   FormMap(const Model& model, FieldOutput output);
   ~FormMap();
   FormMap(FormMap&&) noexcept;
@@ -30,12 +30,13 @@ class FormMap {
   [[nodiscard]] std::size_t size() const;        ///< numbers_of(points, form)
 
   /// Computes the form, (size), from the field, (field_size) [N]. The bits are those of
-  /// Readout::read_block(), but the sum of a pad whose axes are not perpendicular differs by rounding.
+  /// Readout::read_block(), but the sum of a pad whose axes are not perpendicular differs by
+  /// rounding.
   void evaluate(std::span<const double> field, std::span<double> form) const;
   /// Adds to `field_bar`, (field_size), the pullback of `form_bar`, (size), at `field`. A flow
   /// changes with the first point of the largest shear. Points that do not press have no derivative
-  /// of the centre of pressure. `point_bar`: (points, kPointNumbers), to which the derivatives of the
-  /// centre by the places of points, at a given field, are added, or empty.
+  /// of the centre of pressure. `point_bar`: (points, kPointNumbers), to which the derivatives of
+  /// the centre by the places of points, at a given field, are added, or empty.
   void pull_back(std::span<const double> field, std::span<const double> form_bar,
                  std::span<double> field_bar, std::span<double> point_bar = {}) const;
 

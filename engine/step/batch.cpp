@@ -10,7 +10,9 @@
 #include "engine/model/compile_variations.hpp"
 #include "engine/model/model_part.hpp"
 #include "engine/model/random.hpp"
+#include "engine/scene/scene_faults.hpp"
 #include "engine/scene/scene_number.hpp"
+#include "engine/scene/shapes.hpp"
 
 namespace tangere {
 
@@ -30,6 +32,33 @@ Purpose purpose_of(const SceneNumber& number) {
     case NumberOwner::tactile: break;
   }
   return Purpose::tactile;
+}
+
+/// Draws randomised number k of an episode.
+double drawn_number(const CompiledModel& m, std::uint64_t seed, std::int64_t episode,
+                    std::size_t k) {
+  const std::size_t with = m.drawn_with[k];
+  const Purpose purpose = purpose_of(m.scene.randomizations[with].number);
+  return draw(m.scene.randomizations[k].distribution,
+              RandomKey{seed, episode, 0, purpose, static_cast<std::uint32_t>(with)});
+}
+
+[[noreturn]] void refuse_start(const RandomizationDescription& d) {
+  throw InputError("'" + name_of(d.number) + "' is of the starting state; expected a parameter");
+}
+
+/// What is wrong with the sizes of the bodies, where number(row) is the number in a row.
+template <class Number>
+std::string sizes_fault(const CompiledModel& m, const Number& number) {
+  for (const VaryingSize& size : m.varying_sizes) {
+    const BodyDescription& body = m.scene.links[std::size_t(size.body)].body;
+    if (row_of(body.shape).slenderness == 0) continue;  // meshes are not copied
+    Shape shape = body.shape;
+    for (const VaryingNumber& n : size.numbers) *size_number(shape, n.which) = number(n.row);
+    if (const std::string fault = slenderness_fault(shape); !fault.empty())
+      return "body '" + body.name + "' would be " + fault;
+  }
+  return "";
 }
 
 }  // namespace
@@ -112,13 +141,11 @@ void Batch::draw_episode(std::size_t lane) {
   for (int i = 0; i < m.nq; ++i) own[(m.layout.q + i) * kBlock] = m.initial_q[std::size_t(i)];
   for (int i = 0; i < m.nv; ++i) own[(m.layout.v + i) * kBlock] = m.initial_v[std::size_t(i)];
   for (std::size_t k = 0; k < m.scene.randomizations.size(); ++k) {
-    const RandomizationDescription& d = m.scene.randomizations[k];
     const int row = m.randomized_row[k];
     if (!padding) {
-      own[row * kBlock] = draw(d.distribution, RandomKey{seed_, episode_[lane], 0,
-                                                         purpose_of(d.number), std::uint32_t(k)});
+      own[row * kBlock] = drawn_number(m, seed_, episode_[lane], k);
     } else if (row >= m.layout.parameters) {
-      own[row * kBlock] = number_in(m.scene, d.number);
+      own[row * kBlock] = number_in(m.scene, m.scene.randomizations[k].number);
     }
   }
   update_derived_rows(m, own);
@@ -331,23 +358,59 @@ bool Batch::is_parameter(int k) const {
 }
 
 double Batch::randomized_value(int environment, int k) const {
-  const RandomizationDescription& d = randomization(k);
+  const CompiledModel& m = compiled(model_);
   if (is_parameter(k)) {
-    const int row = compiled(model_).randomized_row[std::size_t(k)];
+    const int row = m.randomized_row[std::size_t(k)];
     return column(lane(environment))[std::size_t(row) * kBlock];
   }
-  return draw(d.distribution,
-              RandomKey{seed_, episode(environment), 0, purpose_of(d.number), std::uint32_t(k)});
+  return drawn_number(m, seed_, episode(environment), std::size_t(k));
 }
 
 void Batch::set_randomized_value(int environment, int k, double value) {
   const std::size_t lane = this->lane(environment);
   const CompiledModel& m = compiled(model_);
-  if (!is_parameter(k))
-    throw InputError("'" + name_of(randomization(k).number) +
-                     "' is of the starting state; expected a parameter");
+  if (!is_parameter(k)) refuse_start(randomization(k));
   column(lane)[std::size_t(m.randomized_row[std::size_t(k)]) * kBlock] = value;
-  update_derived_rows(m, column(lane));
+  complete_numbers(lane);
+}
+
+void Batch::set_randomized_values(std::span<const int> environments, std::span<const int> numbers,
+                                  std::span<const double> values) {
+  const CompiledModel& m = compiled(model_);
+  const std::size_t count = numbers.size();
+  check_size("values", values.size(), environments.size() * count);
+  std::vector<int> rows;
+  for (const int k : numbers) {
+    if (!is_parameter(k)) refuse_start(randomization(k));
+    rows.push_back(m.randomized_row[std::size_t(k)]);
+  }
+  for (std::size_t i = 0; i < environments.size(); ++i) {  // all are checked before one is set
+    const double* const now = column(lane(environments[i]));
+    const std::span<const double> own = values.subspan(i * count, count);
+    std::string fault;
+    for (std::size_t j = 0; j < count && fault.empty(); ++j) {
+      const SceneNumber& number = randomization(numbers[j]).number;
+      fault = varying_value_fault(number, own[j]);
+      if (!fault.empty()) fault = "'" + name_of(number) + "' cannot be " + fault;
+    }
+    if (fault.empty())
+      fault = sizes_fault(m, [&](int row) {
+        const auto at = std::ranges::find(rows, row);
+        return at == rows.end() ? now[row * kBlock] : own[std::size_t(at - rows.begin())];
+      });
+    if (!fault.empty())
+      throw InputError("environment " + std::to_string(environments[i]) + ": " + fault);
+  }
+  for (std::size_t i = 0; i < environments.size(); ++i) {
+    const std::size_t lane = this->lane(environments[i]);
+    for (std::size_t j = 0; j < count; ++j) column(lane)[rows[j] * kBlock] = values[i * count + j];
+    complete_numbers(lane);
+  }
+}
+
+/// Computes what depends on the numbers of an environment that were set.
+void Batch::complete_numbers(std::size_t lane) {
+  update_derived_rows(compiled(model_), column(lane));
   sleep_[lane].wake();
   clearance_[lane] = 0;
 }

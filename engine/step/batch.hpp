@@ -144,9 +144,15 @@ class Batch {
   [[nodiscard]] double randomized_value(int environment, int k) const;
   /// Whether randomised number k is a parameter, not one of the starting state.
   [[nodiscard]] bool is_parameter(int k) const;
-  /// Sets randomised number k of an environment until its next reset. Throws InputError for a
-  /// number of the starting state.
+  /// Sets randomised number k of an environment until its next reset. Readings and steps use it
+  /// from now on; the state, its history and status stay. The value is not checked. Throws
+  /// InputError for a number of the starting state.
   void set_randomized_value(int environment, int k, double value);
+  /// Sets some of them in some environments, and checks them: `values` (environments, numbers) in
+  /// SI. Throws InputError, and sets none, for a number of the starting state, for a value that the
+  /// scene could not have, and for sizes of a body that are too unlike.
+  void set_randomized_values(std::span<const int> environments, std::span<const int> numbers,
+                             std::span<const double> values);
 
   /// First row of a block. Row r of lane l is block(b)[r * 16 + l]. For the stepper and the tests.
   double* block(int b) { return data_.data() + first_row(b); }
@@ -166,6 +172,7 @@ class Batch {
   void complete_state(std::size_t lane);
   void fill_past_states(std::size_t lane);
   void draw_episode(std::size_t lane);
+  void complete_numbers(std::size_t lane);
   [[nodiscard]] double* column(std::size_t lane);
   [[nodiscard]] const double* column(std::size_t lane) const;
 

@@ -57,13 +57,14 @@ PiecewiseControl read_piecewise(const Scene& scene, const SceneElement& node) {
 /// Reads exactly one of uniform, log_uniform, normal, list, with numbers times `scale`.
 Distribution read_distribution(const SceneNode& node, double scale) {
   Distribution d;
-  const char* const kinds[] = {"uniform", "log_uniform", "normal", "list"};
   int found = 0;
   for (int k = 0; k < 4; ++k) {
-    if (!node.has(kinds[k])) continue;
+    const auto kind = static_cast<Distribution::Kind>(k);
+    const char* const name = to_string(kind);
+    if (!node.has(name)) continue;
     ++found;
-    d.kind = static_cast<Distribution::Kind>(k);
-    std::vector<double> x = node.numbers(kinds[k], k < 3 ? 2 : 0);
+    d.kind = kind;
+    std::vector<double> x = node.numbers(name, k < 3 ? 2 : 0);
     for (double& value : x) value *= scale;
     if (k == 3) {
       if (x.empty()) node.fail("list=\"\"; expected one value or more");
@@ -72,7 +73,7 @@ Distribution read_distribution(const SceneNode& node, double scale) {
     }
     d.a = x[0];
     d.b = x[1];
-    if (k < 2 && !(d.a <= d.b)) node.fail(fmt::format("{}: expected low, then high", kinds[k]));
+    if (k < 2 && !(d.a <= d.b)) node.fail(fmt::format("{}: expected low, then high", name));
     if (k == 1 && !(d.a > 0)) node.fail("log_uniform: expected positive bounds");
     if (k == 2 && !(d.b >= 0))
       node.fail("normal: expected mean, then a standard deviation of zero or more");
@@ -160,6 +161,23 @@ void warn_of_stiffer_draws(const Scene& scene, const SceneElement& node,
         fmt::format("kn of '{}' and '{}' is up to {:.2g}, and their points are as near as {:.2g} "
                     "needs; expected the largest in the contact, or a pitch",
                     d.number.name, d.number.second_name, most, given));
+}
+
+/// Warns of ties that only one number has, which is then drawn alone.
+void warn_of_single_ties(const Scene& scene, const std::vector<SceneElement>& elements) {
+  for (std::size_t k = 0; k < elements.size(); ++k) {
+    const std::string& tie = scene.randomizations[k].tie;
+    if (tie.empty() ||
+        std::ranges::count(scene.randomizations, tie, &RandomizationDescription::tie) > 1)
+      continue;
+    std::vector<std::string> others;
+    for (const RandomizationDescription& d : scene.randomizations)
+      if (!d.tie.empty() && d.tie != tie) others.push_back(d.tie);
+    elements[k].warn(
+        fmt::format("tie=\"{}\" of '{}' alone ties nothing; expected another number "
+                    "with it{}",
+                    tie, name_of(scene.randomizations[k].number), suggestion(tie, others)));
+  }
 }
 
 void read_coefficient_variation(const Scene& scene, const SceneElement& node,
@@ -258,7 +276,8 @@ void read_control(Scene& scene, const SceneNode& section) {
 }
 
 void read_randomize(Scene& scene, const SceneNode& section) {
-  for (const SceneElement& node : elements_in(section)) {
+  const std::vector<SceneElement> elements = elements_in(section);
+  for (const SceneElement& node : elements) {
     node.check();
     RandomizationDescription d;
     d.source = node.source();
@@ -272,12 +291,14 @@ void read_randomize(Scene& scene, const SceneNode& section) {
       read_coefficient_variation(scene, node, d);
     }
     d.distribution = read_distribution(scene, node, d.number);
+    if (node.has("tie")) d.tie = node.text("tie");
     node.refuse(variation_fault(scene, d));
     if (node.of() == kVarySurface) warn_of_stiffer_draws(scene, node, d);
     for (const RandomizationDescription& other : scene.randomizations)
       if (other.number == d.number) node.fail("'" + name_of(d.number) + "' already varies");
     scene.randomizations.push_back(std::move(d));
   }
+  warn_of_single_ties(scene, elements);
 }
 
 }  // namespace tangere

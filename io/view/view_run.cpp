@@ -7,7 +7,7 @@
 #include <algorithm>
 
 #include "engine/base/checks.hpp"
-#include "io/view/view_source.hpp"
+#include "io/view/view_frames.hpp"
 
 namespace tangere {
 namespace {

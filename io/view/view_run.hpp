@@ -25,7 +25,8 @@ struct ViewRun {
 };
 
 /// Frames are thinned evenly as in read_view(). Throws InputError for another number of values and
-/// for a sensor that the model does not have, and IoError where a file that the scene names is gone.
+/// for a sensor that the model does not have, and IoError where a file that the scene names is
+/// gone.
 ViewData view_run(const Model& model, const ViewRun& run, const ViewOptions& options = {});
 
 }  // namespace tangere

@@ -86,17 +86,4 @@ nb::tuple face_arrays(const Batch& batch, int environment, double half_space) {
                         array_of<double>({count, 4}, std::span<const double>(all.rgba)));
 }
 
-nb::dict randomized_arrays(const Batch& batch) {
-  const Scene& scene = batch.model().scene();
-  nb::dict values;
-  for (std::size_t k = 0; k < scene.randomizations.size(); ++k) {
-    std::span<double> numbers;
-    auto array = new_array<double>({as_size(batch.environments())}, numbers);
-    for (int e = 0; e < batch.environments(); ++e)
-      numbers[as_size(e)] = batch.randomized_value(e, static_cast<int>(k));
-    values[name_of(scene.randomizations[k].number).c_str()] = array;
-  }
-  return values;
-}
-
 }  // namespace tangere::python

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What batches and environments of a task both show: poses, the faces of bodies, drawn numbers.
+// What batches and environments of a task both show: poses and the faces of bodies.
 #pragma once
 
 #include "engine/sense/readout.hpp"
@@ -40,13 +40,5 @@ inline constexpr const char* kFacesText =
     "and its colour (T, 4). An abstract body is the hull of its contact points. A half-space is\n"
     "a square with the half edge `half_space` [m]. The ground is such a square, of body -1, in\n"
     "the world's frame. InputError: no such environment, or no such length.";
-inline constexpr const char* kRandomizedSignature =
-    "def randomized(self) -> dict[str, numpy.typing.NDArray[numpy.float64]]";
-inline constexpr const char* kRandomizedText =
-    "Name → (E): what <randomize> lets vary, such as 'tactile pad kt', in SI units. Numbers of\n"
-    "the starting state are those that the episode drew.";
-
-/// Returns name → (E): the values of what <randomize> lets vary.
-nb::dict randomized_arrays(const Batch& batch);
 
 }  // namespace tangere::python

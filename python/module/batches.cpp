@@ -224,6 +224,12 @@ nb::dict PythonBatch::counts() {
   return counts;
 }
 
+void PythonBatch::set_randomized(const NamedValues& values, const nb::object& environments) {
+  const std::vector<int> list = listed(environments);
+  const InUse::Turn turn(in_use_);
+  python::set_randomized(batch_, values, list);
+}
+
 Array<std::int8_t> PythonBatch::status() {
   const InUse::Turn turn(in_use_);
   return array_of<std::int8_t>({count()}, batch_.statuses());
@@ -407,7 +413,7 @@ static void make_batch(PythonBatch* self, const Model& model, const Whole<int>& 
   options.stepper.tolerance = tolerance;
   options.stepper.accuracy = accuracy;
   options.stepper.sleep = sleep;
-  new (self) PythonBatch(model, envs.value("envs"), options);
+  new (self) PythonBatch(model, envs.value("num_envs"), options);
 }
 
 static void add_statuses(nb::module_& m) {
@@ -439,7 +445,7 @@ void add_batches(nb::module_& m) {
       "Many environments of one model, stepped together on all cores. Results are new arrays.\n"
       "The same seed gives the same bits for any number of environments and threads. One Python\n"
       "thread uses a batch at a time.")
-      .def("__init__", &make_batch, "model"_a, "envs"_a = 1, "seed"_a = 0, "first_episode"_a = 0,
+      .def("__init__", &make_batch, "model"_a, "num_envs"_a = 1, "seed"_a = 0, "first_episode"_a = 0,
            "threads"_a = nb::none(), "precision"_a = "mixed", "timestep"_a = nb::none(),
            "tolerance"_a = nb::none(), "accuracy"_a = nb::none(), "sleep"_a = nb::none(),
            "Draws `envs` starting states: environment e is episode first_episode + e of `seed`.\n"
@@ -451,7 +457,7 @@ void add_batches(nb::module_& m) {
            "none\n"
            "sleeps): None for the scene's. InputError: a number is out of range.")
       .def_prop_ro("model", &PythonBatch::model)
-      .def_prop_ro("envs", &PythonBatch::environments, "E")
+      .def_prop_ro("num_envs", &PythonBatch::environments, "E")
       .def_prop_ro("threads", &PythonBatch::threads)
       .def_prop_ro("seed", &PythonBatch::seed)
       .def_prop_ro("q", &PythonBatch::q, nb::rv_policy::automatic,
@@ -475,6 +481,8 @@ void add_batches(nb::module_& m) {
            "Name → (E) int64, of the episode so far, without steps that failed: simulation_steps,\n"
            "newton_iterations, and steps by their status: split_steps, accuracy_not_met_steps,\n"
            "tunnelled_steps, damped_steps and overlapping_steps.")
+      .def("set_randomized", &PythonBatch::set_randomized, "values"_a, "envs"_a = nb::none(),
+           nb::sig(kSetRandomizedSignature), kSetRandomizedText)
       .def("step", &PythonBatch::step, "u"_a,
            "Takes one step. `u`: (E, nu) controls, or (nu) for all environments; clipped to the\n"
            "motors' ranges. InputError: another shape.")

@@ -11,6 +11,7 @@
 #include "engine/step/shear_state_arrays.hpp"
 #include "engine/step/stepper.hpp"
 #include "python/module/arrays.hpp"
+#include "python/module/varying_numbers.hpp"
 #include "python/module/whole_number.hpp"
 #include "tasks/run/block_threads.hpp"
 #include "tasks/run/step_counts.hpp"
@@ -50,6 +51,7 @@ class PythonBatch {
   nb::tuple faces(const Whole<int>& environment, double half_space);
   nb::dict randomized();
   nb::dict counts();
+  void set_randomized(const NamedValues& values, const nb::object& environments);
   [[nodiscard]] Array<std::int8_t> status();
   void set_state(const Argument<double>& q, const Argument<double>& v,
                  const nb::object& environments);

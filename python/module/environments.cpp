@@ -9,6 +9,7 @@
 #include "python/module/module.hpp"
 #include "python/module/observations.hpp"
 #include "python/module/options.hpp"
+#include "python/module/varying_numbers.hpp"
 #include "tasks/catalogue/task_list.hpp"
 #include "tasks/run/policy.hpp"
 
@@ -141,9 +142,9 @@ void add_environments(nb::module_& m) {
             VectorOptions options{seed.value("seed"), first_episode.value("first_episode"),
                                   threads_of(threads)};
             options.autoreset = autoreset;
-            new (self) Environments(task, scene, envs.value("envs"), options);
+            new (self) Environments(task, scene, envs.value("num_envs"), options);
           },
-          "task"_a, "scene"_a, "envs"_a, "seed"_a = 0, "first_episode"_a = 0,
+          "task"_a, "scene"_a, "num_envs"_a, "seed"_a = 0, "first_episode"_a = 0,
           "threads"_a = nb::none(), "autoreset"_a = true,
           "Makes E environments and starts their episodes. InputError: no such task, or the scene\n"
           "does not belong to it.")
@@ -194,7 +195,7 @@ void add_environments(nb::module_& m) {
            "overlapping_steps.")
       .def_prop_ro("spec", &Environments::spec)
       .def_prop_ro("model", &Environments::model)
-      .def_prop_ro("envs", &Environments::count);
+      .def_prop_ro("num_envs", &Environments::count);
 }
 
 }  // namespace tangere::python

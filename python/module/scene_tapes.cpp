@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // A tape of any scene in Python. tangere/simulation.py makes a differentiable function of it.
+#include <nanobind/stl/map.h>
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
@@ -11,6 +12,7 @@
 #include "python/module/arrays.hpp"
 #include "python/module/module.hpp"
 #include "python/module/options.hpp"
+#include "python/module/varying_numbers.hpp"
 #include "tasks/catalogue/scene_task.hpp"
 #include "tasks/gradients/task_tape.hpp"
 
@@ -19,31 +21,6 @@ namespace tangere::python {
 using nb::literals::operator""_a;
 
 namespace {
-
-/// The number of a scene that has a name and a derivative.
-SceneNumber number_named(const Scene& scene, const std::string& name) {
-  std::vector<std::string> names;
-  const NumberGradients numbers{Model(scene)};
-  for (const NumberInfo& info : numbers.infos()) {
-    if (info.name == name) return info.number;
-    names.push_back(info.name);
-  }
-  throw InputError(fmt::format("no number of the scene is named '{}'; expected one of {}", name,
-                               fmt::join(names, ", ")));
-}
-
-/// Lets the named numbers vary by environment.
-Scene with_varying(Scene scene, const std::vector<std::string>& names) {
-  for (const std::string& name : names) {
-    const SceneNumber number = number_named(scene, name);
-    if (randomization_of(scene, number) >= 0) continue;
-    RandomizationDescription d;
-    d.number = number;
-    d.distribution = {Distribution::Kind::list, 0, 0, {number_in(scene, number)}};
-    scene.randomizations.push_back(std::move(d));
-  }
-  return scene;
-}
 
 /// What SceneTape keeps of its arguments: a change of points compiles the scene again.
 struct TapeArguments {
@@ -62,13 +39,13 @@ struct TapedScene {
              a.readings),
         tape(task, a.environments, a.options) {
     const NumberGradients numbers(task.model());
-    for (const std::string& name : a.parameters)
-      for (int k = 0; k < numbers.count(); ++k)
-        if (numbers.infos()[as_size(k)].name == name) {
-          rows.push_back(as_size(k));
-          varying.push_back(
-              as_size(randomization_of(task.model().scene(), numbers.infos()[as_size(k)].number)));
-        }
+    for (const std::string& name : a.parameters) {
+      const auto at = std::ranges::find(numbers.infos(), name, &NumberInfo::name);
+      if (at == numbers.infos().end())
+        throw InputError(fmt::format("'{}' has no derivative; expected another number", name));
+      rows.push_back(as_size(at - numbers.infos().begin()));
+      varying.push_back(as_size(randomization_of(task.model().scene(), at->number)));
+    }
     number_count = as_size(numbers.count());
   }
 
@@ -83,14 +60,15 @@ class SceneTape {
   explicit SceneTape(TapeArguments arguments)
       : arguments_(std::move(arguments)),
         taped_(std::make_unique<TapedScene>(arguments_.scene, arguments_)) {
-    draw_numbers(0, {});
+    draw_numbers(0, {}, {});
     first_q_.assign(tape().q().begin(), tape().q().end());
   }
 
   void reset(const Whole<std::uint64_t>& seed, const std::optional<Argument<double>>& q,
              const std::optional<Argument<double>>& v,
              const std::optional<Argument<double>>& parameters,
-             const std::optional<Argument<double>>& points, bool record) {
+             const std::optional<Argument<double>>& points,
+             const std::optional<NamedValues>& randomized, bool record) {
     const std::uint64_t draw = seed.value("seed");
     std::vector<double> q0, v0, given, moved;
     if (q) q0 = rows_of(*q, count(), nq(), "q");
@@ -100,10 +78,11 @@ class SceneTape {
       const auto all = numbers_of(*points, {point_count(), kPointNumbers}, "points");
       moved.assign(all.begin(), all.end());
     }
+    const std::vector<std::vector<double>> drawn = rows_of_varying(randomized);
     const InUse::Turn turn(in_use_);
     const nb::gil_scoped_release free;
     move_points(moved);
-    draw_numbers(draw, given);
+    draw_numbers(draw, given, drawn);
     tape().reset(draw, 0, record);
     if (q || v) {
       if (!q) q0.assign(tape().q().begin(), tape().q().end());
@@ -241,14 +220,42 @@ class SceneTape {
     }
   }
 
-  /// Draws all numbers that vary, and sets those that are given, (E, names) or empty.
-  void draw_numbers(std::uint64_t seed, const std::vector<double>& given) {
+  /// Returns (E) of each number that varies; empty where it is drawn. Throws InputError for a name
+  /// that does not vary.
+  std::vector<std::vector<double>> rows_of_varying(const std::optional<NamedValues>& values) const {
+    std::vector<std::vector<double>> rows(varying_count());
+    if (!values) return rows;
+    const std::vector<std::string> varying = varying_names(model().scene());
+    for (const auto& [name, given] : *values) {
+      const auto at = std::ranges::find(varying, name);
+      if (at == varying.end())
+        throw InputError(fmt::format("no number of the scene that varies is named '{}'; expected "
+                                     "one of {}",
+                                     name, fmt::join(varying, ", ")));
+      std::vector<double>& row = rows[as_size(at - varying.begin())];
+      if (given.size() == 1) {
+        row.assign(count(), given.data()[0]);
+      } else {
+        const auto all = numbers_of(given, {count()}, name.c_str());
+        row.assign(all.begin(), all.end());
+      }
+    }
+    return rows;
+  }
+
+  /// Draws all numbers that vary, and sets those that are given: parameters, (E, names) or empty,
+  /// and others, each (E) or empty.
+  void draw_numbers(std::uint64_t seed, const std::vector<double>& given,
+                    const std::vector<std::vector<double>>& others) {
     if (varying_count() == 0) return;
     drawn_.clear();
     const Batch batch(model(), arguments_.environments, seed);
     for (int e = 0; e < arguments_.environments; ++e)
       for (std::size_t k = 0; k < varying_count(); ++k)
         drawn_.push_back(batch.randomized_value(e, static_cast<int>(k)));
+    for (std::size_t k = 0; k < others.size(); ++k)
+      for (std::size_t e = 0; e < others[k].size(); ++e)
+        drawn_[e * varying_count() + k] = others[k][e];
     for (std::size_t e = 0; e < count() && !given.empty(); ++e)
       for (std::size_t k = 0; k < names().size(); ++k)
         drawn_[e * varying_count() + taped_->varying[k]] = given[e * names().size() + k];
@@ -284,19 +291,21 @@ void add_scene_tapes(nb::module_& m) {
             options.parameters = !parameters.empty();
             options.points = points;
             new (self) SceneTape(
-                {scene, parameters, readings, every.value("every"), envs.value("envs"), options});
+                {scene, parameters, readings, every.value("every"), envs.value("num_envs"), options});
           },
-          "scene"_a, "envs"_a, "steps"_a, "every"_a = 1, "readings"_a = nb::none(),
+          "scene"_a, "num_envs"_a, "steps"_a, "every"_a = 1, "readings"_a = nb::none(),
           "parameters"_a = std::vector<std::string>{}, "points"_a = false, "threads"_a = nb::none(),
           "precision"_a = "double", "tape_bytes"_a = 1e9,
           "`steps`: calls of step() at most. `every`: steps of the simulation in each.\n"
           "`readings`: names, such as pad, pad.sum, bodies.box, variables or an end effector;\n"
           "None: all end effectors and fields. `parameters`: names of numbers of the scene that\n"
           "environments may have of their own. `points`: whether there are derivatives by points\n"
-          "of sensors. InputError: a number is out of range, or a name is unknown.")
+          "of sensors. InputError: a number is out of range, or a name is unknown or has no\n"
+          "derivative.")
       .def(
           "reset", &SceneTape::reset, "seed"_a = 0, "q"_a = nb::none(), "v"_a = nb::none(),
-          "parameters"_a = nb::none(), "points"_a = nb::none(), "record"_a = true,
+          "parameters"_a = nb::none(), "points"_a = nb::none(), "randomized"_a = nb::none(),
+          "record"_a = true,
           "Starts anew and clears the tape. `q` (E, nq), `v` (E, nv) and `parameters`\n"
           "(E, names) take the place of what the scene draws; one row stands for all. `points`\n"
           "(points of all sensors, 7) moves points of sensors: x, y, z [m] in their body's frame,\n"
@@ -329,7 +338,7 @@ void add_scene_tapes(nb::module_& m) {
       .def_prop_ro("model", [](const SceneTape& s) { return Model(s.model()); })
       .def_prop_ro("points", &SceneTape::point_count,
                    "Of all sensors; 0 without their derivatives.")
-      .def_prop_ro("envs", &SceneTape::count);
+      .def_prop_ro("num_envs", &SceneTape::count);
 }
 
 }  // namespace tangere::python

@@ -15,6 +15,7 @@
 #include "io/scene/scene_reader.hpp"
 #include "python/module/arrays.hpp"
 #include "python/module/module.hpp"
+#include "python/module/varying_numbers.hpp"
 #include "python/module/whole_number.hpp"
 
 namespace tangere::python {
@@ -53,6 +54,20 @@ void add_scene(nb::module_& m) {
           "text"_a, "name"_a = "scene", "allow_unknown"_a = false,
           "Reads a scene from text. `name` stands for the file: messages have it, and what the\n"
           "scene names, such as meshes, is looked for beside it. Raises what Scene raises.")
+      .def(
+          "vary",
+          [](const Scene& s, const std::vector<std::string>& names) {
+            return with_varying(s, names);
+          },
+          "names"_a,
+          "A copy in which environments may have other values of the named numbers, such as\n"
+          "'contact pad ball kn' or 'body ball density'. They have the scene's values until\n"
+          "Batch.set_randomized() sets others; what <randomize> draws is drawn as before. `text`\n"
+          "stays that of the file. InputError: a name is unknown. Model raises InputError for a\n"
+          "number on which something depends that cannot follow it.")
+      .def_prop_ro("varying", &varying_names,
+                   "Names of the numbers that differ between environments: those that <randomize>\n"
+                   "draws, then those of vary().")
       .def_ro("name", &Scene::name)
       .def_ro("path", &Scene::path, "The file that it was read from.")
       .def_ro("text", &Scene::text, "The file as read.")

@@ -126,10 +126,10 @@ void add_tapes(nb::module_& m) {
             options.length = actions.value("actions");
             options.threads = threads_of(threads);
             options.tape_bytes = tape_bytes;
-            new (self) Tape(task, scene, envs.value("envs"), options, seed.value("seed"),
+            new (self) Tape(task, scene, envs.value("num_envs"), options, seed.value("seed"),
                             first_episode.value("first_episode"), scaled);
           },
-          "task"_a, "scene"_a, "envs"_a, "actions"_a = 0, "seed"_a = 0, "first_episode"_a = 0,
+          "task"_a, "scene"_a, "num_envs"_a, "actions"_a = 0, "seed"_a = 0, "first_episode"_a = 0,
           "threads"_a = nb::none(), "scaled"_a = true, "precision"_a = "mixed",
           "tape_bytes"_a = 1e9,
           "`actions`: of an episode, at most; 0: the task's horizon. `scaled`: observations are\n"
@@ -182,7 +182,7 @@ void add_tapes(nb::module_& m) {
       .def_prop_ro("taken", &Tape::taken, "Actions on the tape.")
       .def_prop_ro("spec", &Tape::spec)
       .def_prop_ro("model", &Tape::model)
-      .def_prop_ro("envs", &Tape::count);
+      .def_prop_ro("num_envs", &Tape::count);
 }
 
 }  // namespace tangere::python

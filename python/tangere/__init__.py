@@ -2,7 +2,7 @@
 """Tangere simulates what tactile skins feel: thousands of environments at once, on CPUs.
 
     model = tangere.Model(tangere.Scene(tangere.scenes()["rolling_ball"]))
-    batch = tangere.Batch(model, envs=256)
+    batch = tangere.Batch(model, num_envs=256)
     batch.step([0.0, 0.0, -0.5])
     batch.tactile("pad")                    # (256, 200, 200, 3) float32 [N]
 

@@ -86,8 +86,8 @@ class Host:
         self.real = real()
         n = sum(int(np.prod(t.shape)) for t in tape.spec.observations)
         shape = jax.ShapeDtypeStruct
-        self.token, self.rows = shape((2,), np.float32), shape((tape.envs, n), dtype)
-        self.actions = shape((tape.envs, *tape.spec.action.shape), self.real)
+        self.token, self.rows = shape((2,), np.float32), shape((tape.num_envs, n), dtype)
+        self.actions = shape((tape.num_envs, *tape.spec.action.shape), self.real)
 
     def results(self) -> tuple[Any, ...]:
         """What a step returns after the token. A subclass defines it."""

@@ -122,7 +122,7 @@ class Simulation(SimulationBase):
 class _Host(Host):
     def __init__(self, tape: _core.SceneTape, dtype: Any):
         super().__init__(tape, dtype)
-        shape, model, envs = jax.ShapeDtypeStruct, tape.model, tape.envs
+        shape, model, envs = jax.ShapeDtypeStruct, tape.model, tape.num_envs
         self.shown = [self.token, self.rows, shape((envs,), np.int8)]
         names = tape.parameters().shape[1]
         self.starts = {

@@ -51,8 +51,11 @@ def rollout(
         said = ", ".join(f"{name} has {count}" for name, count in given.items() if count)
         raise _core.InputError(f"environments: {said}; expected one number of them")
     envs = counts.pop() if counts else 1
-    shapes = {"q": (q, (envs, model.nq)), "v": (v, (envs, model.nv))}
-    shapes["controls"] = (u if u.ndim != 2 else u[:, None], (*u.shape[:1], envs, model.nu))
+    shapes: dict[str, tuple[Any, tuple[int, ...]]] = {
+        "q": (q, (envs, model.nq)),
+        "v": (v, (envs, model.nv)),
+        "controls": (u if u.ndim != 2 else u[:, None], (*u.shape[:1], envs, model.nu)),
+    }
     full = []
     for name, (array, shape) in shapes.items():
         try:

@@ -242,7 +242,7 @@ class _Run:
 
     def _keep(self, at: tuple[Indices, Indices], envs: Indices) -> None:
         """Stores what is observed now in rows `at`."""
-        batch = self.env.batch
+        batch = self.env._batch
         state = {"q": batch.q.astype(np.float32), "v": batch.v.astype(np.float32)}
         for key in _STATE:
             if key in self.obs and not np.array_equal(self.obs[key], state[key]):
@@ -284,7 +284,7 @@ class _Run:
         self._keep((slots, env.lengths[envs]), envs)
         self.lengths[slots], self.terminated[slots] = env.lengths[envs], terminated[envs]
         self.success[slots] = info["success"][envs]
-        counts, q, v = env.batch.counts(), env.batch.q, env.batch.v
+        counts, q, v = env._batch.counts(), env._batch.q, env._batch.v
         steps = np.stack([counts[name] for name in _COUNTS], 1)
         blocks = {block.slot: block for block in self.open}
         for e, slot in zip(envs, slots, strict=True):

@@ -93,10 +93,13 @@ class Simulation(SimulationBase):
         v: torch.Tensor | None = None,
         parameters: torch.Tensor | None = None,
         points: Mapping[str, torch.Tensor] | None = None,
+        randomized: Mapping[str, Any] | None = None,
     ) -> State:
         """Starts anew. `q` (E, nq), `v` (E, nv) and `parameters` (E, names), in SI units, take the
         place of what the scene draws; one row stands for all environments. Quaternions of `q` have
-        length one, and derivatives by them no part that changes it.
+        length one, and derivatives by them no part that changes it. `randomized`: name → value or
+        (E), of numbers that vary, in place of what the scene draws and without derivatives, as
+        `Batch.randomized()` gives them.
 
         `points`: sensor → (points, 7), zeros for the points of the scene: it is added to their
         places x y z [m] in the body's frame and to their own kn, kt, mu and damping. The scene is
@@ -106,7 +109,8 @@ class Simulation(SimulationBase):
         given = [None if x is None else self._rows(x) for x in (q, v, parameters)]
         given.append(None if points is None else torch.cat(self._point_rows(points, torch.zeros)))
         given_numbers, recorded = [_numpy(x) for x in given], torch.is_grad_enabled()
-        self._run = Run(self._line, seed, *given_numbers, recorded, recorded=recorded)
+        drawn = None if randomized is None else dict(randomized)
+        self._run = Run(self._line, seed, *given_numbers, drawn, recorded, recorded=recorded)
         rows, token = _Start.apply(*given, self._run, self.dtype)
         return self._state(rows, token)
 

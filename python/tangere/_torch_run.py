@@ -22,8 +22,8 @@ class Line:
 class Run:
     """One pass over a tape, and the order in which its steps are reversed.
 
-    It keeps its start and its inputs, and is played again if it is reversed after the tape has begun
-    another run.
+    It keeps its start and its inputs, and is played again if it is reversed after the tape has
+    begun another run.
     """
 
     def __init__(self, line: Line, *start: Any, recorded: bool = True):

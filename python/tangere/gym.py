@@ -128,19 +128,23 @@ def _finals(last: Observation, final: dict[str, Any], ended: np.ndarray) -> dict
     }
 
 
-def _scene_as_read(path: str, text: str) -> _core.Scene:
-    """The scene of a pickle: read from its file again."""
-    if not Path(path).is_file():
-        return _core.Scene.from_string(text, path)
-    with warnings.catch_warnings():  # they came when the scene was read first
-        warnings.simplefilter("ignore", UserWarning)
-        scene = _core.Scene(path, allow_unknown=True)
-    if scene.text != text:
-        raise _core.InputError(f"{path}: the file is not as it was when its scene was pickled")
-    return scene
+def _scene_as_read(path: str, text: str, varying: list[str]) -> _core.Scene:
+    """The scene of a pickle: read from its file again, then with the numbers of `Scene.vary`."""
+    if Path(path).is_file():
+        with warnings.catch_warnings():  # they came when the scene was read first
+            warnings.simplefilter("ignore", UserWarning)
+            scene = _core.Scene(path, allow_unknown=True)
+        if scene.text != text:
+            raise _core.InputError(f"{path}: the file is not as it was when its scene was pickled")
+    else:
+        scene = _core.Scene.from_string(text, path)
+    drawn = set(scene.varying)
+    return scene.vary([name for name in varying if name not in drawn])
 
 
-copyreg.pickle(_core.Scene, lambda scene: (_scene_as_read, (scene.path, scene.text)))
+copyreg.pickle(
+    _core.Scene, lambda scene: (_scene_as_read, (scene.path, scene.text, scene.varying))
+)
 
 
 class _Remade:

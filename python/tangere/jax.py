@@ -174,8 +174,8 @@ class _Host(Host):
     def __init__(self, tape: _core.TaskTape, dtype: Any):
         super().__init__(tape, dtype)
         shape = jax.ShapeDtypeStruct
-        flags = [shape((tape.envs,), bool)] * 2
-        self.shown = [self.token, self.rows, shape((tape.envs,), self.real), *flags]
+        flags = [shape((tape.num_envs,), bool)] * 2
+        self.shown = [self.token, self.rows, shape((tape.num_envs,), self.real), *flags]
 
     def results(self) -> tuple[Any, ...]:
         tape = self.tape

@@ -16,8 +16,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any, Sequence
+from typing import Any, Literal, Sequence
 
 import gymnasium
 import numpy as np
@@ -44,7 +45,8 @@ class VectorSceneEnv(_Remade, VectorEnv):
     (numbers of an action; None: those of the controls), `action_low` and `action_high` (one number,
     or one per number of an action; actions are clipped to them). For data sets alone: `units` (KEY
     → unit of an observation, "action" → that of the actions), `privileged` (KEYs that a robot could
-    not measure), `touch` (KEYs whose numbers are all 0 without contact).
+    not measure), `touch` (KEYs whose numbers are all 0 without contact). `arrays`: "torch" where
+    the methods compute with tensors, for `tangere.torch.EnvTape`; `batch` returns tensors then.
 
     Methods, for all environments at once: `reward` is obligatory; `observe`, `controls`,
     `terminated`, `success` and `restart` have defaults. They read `self.batch` (`tangere.Batch`),
@@ -79,9 +81,11 @@ class VectorSceneEnv(_Remade, VectorEnv):
     units: dict[str, str] = {}
     privileged: Sequence[str] = ()
     touch: Sequence[str] = ()
-    batch: _core.Batch  #: the environments' states
+    arrays: Literal["numpy", "torch"] = "numpy"
+    batch: Any  #: the environments' states: a `tangere.Batch`, or one that returns tensors
     lengths: NDArray[np.int64]  #: (E) actions since the start of each episode
     episodes: NDArray[np.int64]  #: (E) numbers of the episodes
+    _given: Callable[[NDArray[np.float64]], Any] = staticmethod(lambda actions: actions)
     _ended: NDArray[np.bool_]
     _starting: NDArray[np.bool_]
 
@@ -167,11 +171,12 @@ class VectorSceneEnv(_Remade, VectorEnv):
 
     def success(self) -> Any:
         """(E) bool: the task is solved in this state. By default where it is terminated."""
-        return self._row("terminated", self.terminated(), bool)
+        return self.flags("terminated")
 
     def restart(self, envs: Indices) -> None:
         """Begins episodes of the environments `envs`, whose states the scene has drawn: for goals
-        (`uniform`) or other states (`batch.set_state`). By default nothing more."""
+        (`uniform`), numbers (`batch.set_randomized`) or other states (`batch.set_state`). By
+        default nothing more."""
 
     # What it may use
 
@@ -233,23 +238,24 @@ class VectorSceneEnv(_Remade, VectorEnv):
             )
         self._fresh = False
         actions = np.clip(np.broadcast_to(actions, many), self._low, self._high)
-        controls = np.asarray(self.controls(actions), np.float64)
+        given = self._given(actions)
+        controls = np.asarray(numbers(self.controls(given)), np.float64)
         if controls.shape not in ((self.num_envs, self.model.nu), (self.model.nu,)):
             expected = f"({self.num_envs}, {self.model.nu})"
             raise self._fault(f"controls() of shape {controls.shape}", expected)
         steps = self.steps_per_action
         u = np.broadcast_to(controls, (steps, self.num_envs, self.model.nu))
-        self.batch.run(u, every=steps)
+        self._batch.run(u, every=steps)
         self.lengths += 1
         self._starting[:] = False
         if ended.any():  # autoreset "next_step": these actions were not theirs
             self._start_next(ended)
-        reward = np.where(ended, 0.0, self._row("reward", self.reward(actions), np.float64))
+        reward = np.where(ended, 0.0, self._row("reward", self.reward(given), np.float64))
         if not np.isfinite(reward).all():
             e = int(np.flatnonzero(~np.isfinite(reward))[0])
             raise self._fault(f"reward() {reward[e]} in environment {e}", "a finite number")
-        terminated = self._row("terminated", self.terminated(), bool) & ~ended
-        failed = self.batch.status < 0
+        terminated = self.flags("terminated") & ~ended
+        failed = self._batch.status < 0
         truncated = ((self.lengths >= self.horizon) | failed) & ~terminated & ~ended
         self._ended = terminated | truncated
         info = self._info()
@@ -263,15 +269,24 @@ class VectorSceneEnv(_Remade, VectorEnv):
         """A picture (384, 512, 3) uint8 of every environment, as in `VectorTaskEnv`."""
         if self.render_mode is None:
             return None
-        poses = self.batch.bodies()[0]
+        poses = self._batch.bodies()[0]
         for e in range(self.num_envs):
             if e not in self._views or self._views[e].episode != self.episodes[e]:
-                self._views[e] = View(self.batch, e, poses[e], int(self.episodes[e]))
+                self._views[e] = View(self._batch, e, poses[e], int(self.episodes[e]))
         return tuple(self._views[e].draw(poses[e]) for e in range(self.num_envs))
 
+    @property
+    def bounds(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """(na) each: least and largest actions."""
+        return self._low, self._high
+
+    def flags(self, name: Literal["terminated", "success"]) -> NDArray[np.bool_]:
+        """(E): what the method of that name returns now. Raises InputError for another shape."""
+        return self._row(name, getattr(self, name)(), bool)
+
     def randomized(self) -> dict[str, NDArray[np.float64]]:
-        """Name → (E): what `<randomize>` drew for the episodes, as `Batch.randomized`."""
-        return self.batch.randomized()
+        """Name → (E): the numbers of the episodes that vary, as `Batch.randomized`."""
+        return self._batch.randomized()
 
     def _scene(self, other: _core.Scene | str | Path | None) -> _core.Scene:
         scene = getattr(self, "scene", None) if other is None else other
@@ -283,9 +298,14 @@ class VectorSceneEnv(_Remade, VectorEnv):
         return _core.InputError(f"{type(self).__name__}: {what}; expected {expected}")
 
     def _start_all(self) -> None:
-        self.batch = _core.Batch(
+        self._batch = _core.Batch(
             self.model, self.num_envs, self._seed, self._first_episode, self._threads
         )
+        self.batch = self._batch
+        if self.arrays == "torch":  # which not everybody has
+            from ._tensor_batch import TensorBatch, tensors
+
+            self.batch, self._given = TensorBatch(self._batch), tensors
         self.episodes = self._first_episode + np.arange(self.num_envs)
         self.lengths = np.zeros(self.num_envs, np.int64)
         self._ended = np.zeros(self.num_envs, bool)
@@ -301,7 +321,7 @@ class VectorSceneEnv(_Remade, VectorEnv):
     def _start(self, envs: Indices, episodes: NDArray[np.int64]) -> None:
         if len(envs):
             self.episodes[envs] = episodes
-            self.batch.reset(envs, episodes.tolist())
+            self._batch.reset(envs, episodes.tolist())
             self._begin(envs)
 
     def _begin(self, envs: Indices) -> None:
@@ -343,10 +363,10 @@ class VectorSceneEnv(_Remade, VectorEnv):
     def _info(self) -> dict[str, Any]:
         every = np.ones(self.num_envs, bool)
         info = {
-            "success": self._row("success", self.success(), bool),
+            "success": self.flags("success"),
             "starting": self._starting.copy(),
             "episode_id": self.episodes.copy(),
-            "status": self.batch.status,
+            "status": self._batch.status,
         }
         return info | {f"_{key}": every.copy() for key in info}
 
@@ -366,7 +386,7 @@ class SceneEnv(SingleEnv):
         super().__init__(made(1, **given))
 
     def randomized(self) -> dict[str, float]:
-        """Name → what `<randomize>` drew for the episode, as `Batch.randomized`."""
+        """Name → the numbers of the episode that vary, as `Batch.randomized`."""
         return {name: float(values[0]) for name, values in self._vector.randomized().items()}
 
 

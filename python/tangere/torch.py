@@ -9,7 +9,7 @@
         total = total + reward
     (-total.mean()).backward()
 
-`Simulation` does the same for any scene, with rewards of the caller.
+`Simulation` does the same for any scene, with rewards of the caller, `EnvTape` for a task in Python.
 
 The derivatives are analytic (docs/gradients.md). Draws, resets and which point is touched count as
 given. `import tangere` does not import this module; it needs PyTorch.
@@ -27,6 +27,7 @@ import numpy as np
 import torch
 
 from . import _core
+from ._env_tape import EnvTape
 from ._simulation import Simulation, State
 from ._tape import Observations, TapeBase, check_rollout
 from ._torch_run import Line, Run
@@ -34,6 +35,7 @@ from ._torch_run import Line, Run
 
 __all__ = [
     "Check",
+    "EnvTape",
     "Rollout",
     "Simulation",
     "State",

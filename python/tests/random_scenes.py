@@ -58,8 +58,9 @@ def random_scene(seed: int) -> RandomScene:
     text = f"""<tangere model="random_{seed}">
 <option unit="m-kg" gravity="0 0 -9.8" timestep="2e-3" integrator="{integrator}"/>
 <solver_option tol="1e-13"/><ground pos="0 0 0" normal="0 0 1"/>
-<robot><link name="arm"><joint name="lift" type="prismatic" axis="0 0 1" pos="0 0 0.0485" damping="3"
-stiffness="20"/><body name="arm" type="cuboid" size="0.02 0.02 0.02" pos="0 0 0.1" density="500"/>
+<robot><link name="arm"><joint name="lift" type="prismatic" axis="0 0 1" pos="0 0 0.0485"
+damping="3" stiffness="20"/><body name="arm" type="cuboid" size="0.02 0.02 0.02" pos="0 0 0.1"
+density="500"/>
 <link name="hand"><joint name="turn" type="revolute" axis="{axis[0]} 1 {axis[1]}" damping="0.01"/>
 <body name="pad" type="cuboid" size="0.06 0.06 0.02" density="500"/></link></link></robot>
 <robot><link name="object"><joint name="object" type="{joint}" pos="0 0 0.0195"/>

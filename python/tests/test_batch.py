@@ -21,7 +21,7 @@ def model():
 def test_numbers_are_those_of_a_data_set(model, generate):
     folder = generate(str(tangere.scenes()["rolling_ball_small"]), "--episodes", "3",
                       "--every", "5", "--steps", "200", "--seed", "4")  # fmt: skip
-    batch = tangere.Batch(model, envs=3, seed=4)
+    batch = tangere.Batch(model, num_envs=3, seed=4)
     start = batch.q
     run = batch.run(batch.scene_controls(200), every=5, fields=["pad"])
     with h5py.File(folder / "shard-00000.h5") as file:
@@ -37,8 +37,8 @@ def test_numbers_are_those_of_a_data_set(model, generate):
 
 
 def test_a_run_is_its_steps(model):
-    one = tangere.Batch(model, envs=5, seed=2, threads=1, precision="double")
-    many = tangere.Batch(model, envs=5, seed=2, threads=3, precision="double")
+    one = tangere.Batch(model, num_envs=5, seed=2, threads=1, precision="double")
+    many = tangere.Batch(model, num_envs=5, seed=2, threads=3, precision="double")
     u = one.scene_controls(200)
     run = many.run(u, every=100, fields=["pad", "pad.sum", "pad.pressure", "pad.shear"])
     for t in range(200):
@@ -61,13 +61,13 @@ def test_a_run_is_its_steps(model):
 
 def test_an_episode_is_the_same_in_any_batch(model):
     u = np.array([0.125, 0.0, -0.25])
-    wide = tangere.Batch(model, envs=20, seed=7)
-    alone = tangere.Batch(model, envs=1, seed=7, first_episode=18)
+    wide = tangere.Batch(model, num_envs=20, seed=7)
+    alone = tangere.Batch(model, num_envs=1, seed=7, first_episode=18)
     for _ in range(10):
         wide.step(u)
         alone.step(u.astype(np.float32))  # these numbers are the same in both types
     np.testing.assert_array_equal(wide.q[18], alone.q[0])
-    again = tangere.Batch(model, envs=2, seed=7)
+    again = tangere.Batch(model, num_envs=2, seed=7)
     again.reset(envs=[1], episodes=[18])
     for _ in range(10):
         again.step(u)
@@ -76,7 +76,7 @@ def test_an_episode_is_the_same_in_any_batch(model):
 
 
 def test_states_can_be_set(model):
-    batch = tangere.Batch(model, envs=3)
+    batch = tangere.Batch(model, num_envs=3)
     q, v = batch.q, batch.v
     q[1, 2] += 0.001
     batch.set_state(q, v)
@@ -91,7 +91,7 @@ def test_states_can_be_set(model):
 
 
 def test_any_array_of_numbers_is_taken(model):
-    batches = [tangere.Batch(model, envs=4) for _ in range(4)]
+    batches = [tangere.Batch(model, num_envs=4) for _ in range(4)]
     u = np.linspace(-0.4, 0.4, 12).reshape(4, 3).round(3)
     given = [u, np.asfortranarray(u), u.tolist(), np.repeat(u, 2, axis=1)[:, ::2]]
     for batch, controls in zip(batches, given, strict=True):
@@ -100,7 +100,7 @@ def test_any_array_of_numbers_is_taken(model):
 
 
 def test_a_field_fills_an_array(model):
-    batch = tangere.Batch(model, envs=2)
+    batch = tangere.Batch(model, num_envs=2)
     batch.run(batch.scene_controls(200))
     out = np.full((2, 32, 32, 3), np.nan, np.float32)
     assert batch.tactile("pad", out=out) is out
@@ -114,7 +114,7 @@ def test_a_field_fills_an_array(model):
 
 
 def test_bodies_and_end_effectors(model):
-    batch = tangere.Batch(model, envs=2)
+    batch = tangere.Batch(model, num_envs=2)
     pose, twist = batch.bodies()
     assert pose.shape == (2, model.nb, 7) and twist.shape == (2, model.nb, 6)
     np.testing.assert_allclose(np.linalg.norm(pose[..., 3:], axis=-1), 1, atol=1e-12)
@@ -122,7 +122,7 @@ def test_bodies_and_end_effectors(model):
 
 
 def test_mistakes_say_what_was_expected(model, tmp_path):
-    batch = tangere.Batch(model, envs=2)
+    batch = tangere.Batch(model, num_envs=2)
     for call, message in [
         (lambda: batch.step(np.zeros((2, 2))), r"controls of shape \(2, 2\); expected \(2, 3\)"),
         (lambda: batch.step(np.zeros(4)), r"controls of shape \(4\); expected \(3\)"),
@@ -137,7 +137,7 @@ def test_mistakes_say_what_was_expected(model, tmp_path):
         (lambda: batch.set_state(np.zeros(model.nq), np.zeros(model.nv)), "unit quaternion"),
         (lambda: model.mass(model.nb), f"body {model.nb}; expected 0 to {model.nb - 1}"),
         (lambda: model.mass(-1), "body -1"),
-        (lambda: tangere.Batch(model, envs=0), "0 environments"),
+        (lambda: tangere.Batch(model, num_envs=0), "0 environments"),
         (lambda: tangere.Batch(model, threads=0), "0 threads"),
         (lambda: tangere.Batch(model, precision="half"), "precision 'half'"),
         (lambda: tangere.task_spec("box_pushin"), "no task is named 'box_pushin'"),
@@ -162,7 +162,7 @@ def test_what_a_scene_reader_overlooks_is_a_warning(model):
 
 
 def test_a_failed_environment_is_told(model):
-    batch = tangere.Batch(model, envs=2)
+    batch = tangere.Batch(model, num_envs=2)
     u = np.zeros((2, 3))
     u[1, 0] = np.nan
     batch.step(u)
@@ -174,8 +174,8 @@ def test_a_failed_environment_is_told(model):
 
 
 def test_steps_are_counted_by_their_status(model):
-    one = tangere.Batch(model, envs=20, seed=1, threads=1)
-    many = tangere.Batch(model, envs=20, seed=1, threads=2)
+    one = tangere.Batch(model, num_envs=20, seed=1, threads=1)
+    many = tangere.Batch(model, num_envs=20, seed=1, threads=2)
     u = np.random.default_rng(0).uniform(-1, 0.3, (150, 20, 3))
     u[100:, 4] = np.nan
     named = {"damped_steps": "damped", "split_steps": "split", "overlapping_steps": "overlapping"}
@@ -197,7 +197,7 @@ def test_steps_are_counted_by_their_status(model):
 
 
 def test_the_gil_is_free_and_one_thread_has_the_batch(model):
-    batch = tangere.Batch(model, envs=64, threads=1)
+    batch = tangere.Batch(model, num_envs=64, threads=1)
     u = batch.scene_controls(300)
     refused = []
     runner = threading.Thread(target=batch.run, args=(u,))
@@ -253,7 +253,7 @@ def test_what_friction_remembers_goes_on():
     down = pad[1, 0] - pad[0, 0]  # rows go up the finger, 1.5 mm apart
     np.testing.assert_allclose(down, [0, 0, 0.0015], atol=1e-12)
     np.testing.assert_allclose(np.diff(pad, axis=0), np.full((12, 10, 3), down), atol=1e-12)
-    batch = tangere.Batch(model, envs=19, seed=3, precision="double")
+    batch = tangere.Batch(model, num_envs=19, seed=3, precision="double")
     assert batch.shear_state.shape == (19, 334, 3) and not batch.shear_state.any()
     u = batch.scene_controls(120)
     batch.run(u[:90])
@@ -264,7 +264,7 @@ def test_what_friction_remembers_goes_on():
     assert (felt[touched] > 0).all()
     whole = batch.run(u[90:], fields=["pad"])
     end = batch.shear_state
-    other = tangere.Batch(model, envs=19, seed=3, precision="double")
+    other = tangere.Batch(model, num_envs=19, seed=3, precision="double")
     q, v, memory = middle
     other.set_state(q, v)
     other.set_shear_state(memory)
@@ -297,7 +297,7 @@ def test_what_friction_remembers_goes_on():
 
 def test_a_scene_without_springs_has_no_memory(model):
     assert model.shear_state_arrays == {} and "memory" not in model.readings
-    assert tangere.Batch(model, envs=2).shear_state.shape == (2, 0, 3)
+    assert tangere.Batch(model, num_envs=2).shear_state.shape == (2, 0, 3)
 
 
 @pytest.mark.parametrize(
@@ -314,7 +314,7 @@ def test_a_scene_without_springs_has_no_memory(model):
         (lambda b, m: b.scene_controls(10**12), r"no memory for an array \(1000000000000, 3, 3\)"),
         (lambda b, m: b.scene_controls(10**30), "steps 10{30}; expected"),
         (lambda b, m: m.mass(2**40), "body 1099511627776; expected"),
-        (lambda b, m: tangere.Batch(m, envs=2**31), "envs 2147483648; expected"),
+        (lambda b, m: tangere.Batch(m, num_envs=2**31), "envs 2147483648; expected"),
         (lambda b, m: tangere.Batch(m, seed=-1), "seed -1; expected a whole number from 0 to"),
         (lambda b, m: tangere.Batch(m, threads=2**33), "threads 8589934592; expected"),
         (lambda b, m: tangere.make_vec("box_pushing", 2**40), "envs 1099511627776; expected"),
@@ -322,15 +322,15 @@ def test_a_scene_without_springs_has_no_memory(model):
 )
 def test_numbers_that_do_not_fit_are_told_in_one_line(model, call, said):
     with pytest.raises(tangere.InputError, match=said) as error:
-        call(tangere.Batch(model, envs=3), model)
+        call(tangere.Batch(model, num_envs=3), model)
     assert "\n" not in str(error.value)
 
 
 def test_whole_numbers_of_numpy_count(model):
-    batch = tangere.Batch(model, envs=np.int32(2), seed=np.uint64(2**64 - 1), threads=np.int8(1))
-    assert (batch.envs, batch.seed) == (2, 2**64 - 1)
+    batch = tangere.Batch(model, num_envs=np.int32(2), seed=np.uint64(2**64 - 1), threads=np.int8(1))
+    assert (batch.num_envs, batch.seed) == (2, 2**64 - 1)
     with pytest.raises(TypeError):
-        tangere.Batch(model, envs=2.0)
+        tangere.Batch(model, num_envs=2.0)
 
 
 def test_faces_bound_the_bodies():
@@ -351,7 +351,7 @@ def test_faces_bound_the_bodies():
         '<tangere><option unit="m-kg" timestep="1e-3" integrator="BDF1"/>'
         f'<ground pos="0 0 0.5" normal="0 0 1"/><robot>{links}</robot></tangere>'
     )
-    batch = tangere.Batch(tangere.Model(tangere.Scene.from_string(text)), envs=2)
+    batch = tangere.Batch(tangere.Model(tangere.Scene.from_string(text)), num_envs=2)
     corners, body, rgba = batch.faces(1, half_space=2)
     assert corners.shape[1:] == (3, 3) and body.dtype == np.int32
     for k, (kind, (_, volume, error)) in enumerate(shapes.items()):

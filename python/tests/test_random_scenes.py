@@ -35,13 +35,15 @@ def start(sim, seed):
     q = sim.reset(seed=seed).q.numpy().copy()
     q[:, :5] += random.uniform(-2e-4, 2e-4, (E, 5))
     q[:, 1] += random.uniform(-0.02, 0.02, E)
+    lift, turn = (random.uniform(-x, x, (STEPS, E)) for x in (0.2, 0.05))
+    names = len(sim.parameter_names)
     return {
-        "u": np.stack([random.uniform(-0.2, 0.2, (STEPS, E)), random.uniform(-0.05, 0.05, (STEPS, E))], 2),
+        "u": np.stack([lift, turn], 2),
         "q": q,
         "v": random.uniform(-0.01, 0.01, (E, sim.model.nv)),
-        "parameters": sim.parameters().numpy() * random.uniform(0.9, 1.1, (E, len(sim.parameter_names))),
+        "parameters": sim.parameters().numpy() * random.uniform(0.9, 1.1, (E, names)),
         "points": np.zeros((30, 7)),
-    }  # fmt: skip
+    }
 
 
 def loss_of(s):

@@ -25,7 +25,7 @@ def run(scene: tangere.Scene) -> list[np.ndarray]:
     """What 20 steps with the scene's controls give."""
     model = tangere.Model(scene)
     sensors = [s.name for s in model.sensors]
-    batch = tangere.Batch(model, envs=2, seed=3)
+    batch = tangere.Batch(model, num_envs=2, seed=3)
     run = batch.run(batch.scene_controls(20), every=5, fields=sensors)
     return [run.q, run.v, *(run.fields[name] for name in sensors)]
 
@@ -94,7 +94,7 @@ def test_a_gripper_from_nothing_lifts_a_rod(tmp_path):
     b = gripper()
     model = tangere.Model(b.scene())
     assert (model.nq, model.nu, model.scene.name) == (10, 3, "grip")
-    batch = tangere.Batch(model, envs=2)
+    batch = tangere.Batch(model, num_envs=2)
     batch.run(batch.scene_controls(300))
     np.testing.assert_allclose(batch.bodies()[0][:, 3, 2], 0.032, atol=2e-3)
     np.testing.assert_allclose(batch.tactile("left.sum")[:, 1], 4, rtol=0.05)  # of 0.8 · 5 N

@@ -160,8 +160,10 @@ def test_environments_have_numbers_of_their_own():
 
 def test_what_cannot_be_done_is_refused():
     of, _ = scene("chain")
-    with pytest.raises(tangere.InputError, match="no number of the scene is named 'weight'"):
+    with pytest.raises(tangere.InputError, match="that may vary is named 'weight'"):
         tt.Simulation(of, parameters=["weight"])
+    with pytest.raises(tangere.InputError, match=" armature' has no derivative"):
+        tt.Simulation(of, parameters=["joint arm armature"])
     with pytest.raises(tangere.InputError, match="no reading 'pad'; expected one of variables"):
         tt.Simulation(of, read=["pad"])
     with pytest.raises(tangere.InputError, match="points=True"):

@@ -18,7 +18,7 @@ ROOT = Path(__file__).parents[2]
 RIGHT = """
 import numpy as np
 import tangere
-batch = tangere.Batch(tangere.Model(tangere.Scene("a.xml")), envs=2)
+batch = tangere.Batch(tangere.Model(tangere.Scene("a.xml")), num_envs=2)
 batch.step(np.zeros(3))
 force: float = float(batch.tactile("pad")[0, 1, 2, 2])
 env = tangere.make_vec("box_pushing", 2)

@@ -194,8 +194,10 @@ void drop_varying(Scene& scene, Ablation way) {
   if (way == Ablation::removed)
     std::erase_if(scene.randomizations, [](const auto& d) { return !is_of_start(d.number); });
   for (RandomizationDescription& d : scene.randomizations)
-    if (!is_of_start(d.number))
+    if (!is_of_start(d.number)) {
       d.distribution = {Distribution::Kind::list, 0, 0, {number_in(scene, d.number)}};
+      d.tie.clear();
+    }
 }
 
 /// Removes outputs of sensors and markers that are gone.

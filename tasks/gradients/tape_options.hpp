@@ -26,8 +26,8 @@ struct TapeOptions {
   Precision precision = Precision::f64;  ///< of tactile fields; derivatives are in double
   /// Also by the scene's numbers (engine/derivative/number_gradients.hpp).
   bool parameters = false;
-  /// Also by tactile points' own numbers (engine/derivative/tactile_point_numbers.hpp); gradients of
-  /// returns leave these out.
+  /// Also by tactile points' own numbers (engine/derivative/tactile_point_numbers.hpp); gradients
+  /// of returns leave these out.
   bool points = false;
   /// Limit for the states on tapes [bytes]: of each thread, or of a TaskTape. Longer rollouts are
   /// recomputed from checkpoints, with the same bits.

@@ -33,8 +33,8 @@ class TaskTape {
   /// Starts episodes first_episode … first_episode + E - 1 of a seed and clears the tape. `record`:
   /// whether its steps can be reversed; without it they are a little faster.
   void reset(std::uint64_t seed, std::int64_t first_episode, bool record = true);
-  /// Moves the states in which the first actions begin: q (E, nq) with quaternions of unit length, v
-  /// (E, nv). They are observed again. Throws InputError after the first step.
+  /// Moves the states in which the first actions begin: q (E, nq) with quaternions of unit length,
+  /// v (E, nv). They are observed again. Throws InputError after the first step.
   void displace(std::span<const double> q, std::span<const double> v);
   /// Takes one action of every environment whose episode has not ended, (E, action), clipped to its
   /// bounds, and records it. Actions of ended environments are ignored. Throws InputError for an
@@ -75,8 +75,8 @@ class TaskTape {
   void reverse(const ActionCotangents& by, std::span<double> action_bar);
   /// Ends the reverse pass. In: cotangents of the observation at the reset and of the states at the
   /// first action (rewards are ignored). Out: cotangents of these states, (E, nv) each, positions
-  /// along the dofs of v, and, if options request them, (E, NumberGradients::count()) of the scene's
-  /// parameters and (E, tactile_points(), kPointNumbers) of points of sensors.
+  /// along the dofs of v, and, if options request them, (E, NumberGradients::count()) of the
+  /// scene's parameters and (E, tactile_points(), kPointNumbers) of points of sensors.
   /// Empty output spans are skipped. The reset, all random draws and snapshots of a warm-up before
   /// its last one count as constant. Throws InputError while steps are left to reverse, and at a
   /// second call.

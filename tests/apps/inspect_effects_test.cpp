@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// inspect --effects: what it prints, draws and follows. Times are never compared.
+// inspect --effects: what it prints, draws and follows; ties in inspect. Times are never compared.
 #include <gmock/gmock.h>
 
 #include <nlohmann/json.hpp>
@@ -13,6 +13,19 @@ namespace {
 
 using nlohmann::json;
 using ::testing::HasSubstr;
+
+TEST(Inspect, ListsNumbersThatAreDrawnTogether) {
+  const Folder folder;
+  std::string text = file_bytes(scene("rolling_ball_small.xml"));
+  text.insert(text.find("</randomize>"),
+              "<tactile name=\"pad\" field=\"mu\" uniform=\"1 2\" tie=\"rubber\"/>"
+              "<ground_contact body=\"ball\" field=\"mu\" uniform=\"1 2\" tie=\"rubber\"/>");
+  folder.write("ball.xml", text);
+  const json answer = json::parse(run(folder, {"inspect", "ball.xml", "--json"}).out);
+  EXPECT_EQ(answer.at("randomized_ties"), json({"", "", "", "", "rubber", "rubber"}));
+  EXPECT_THAT(run(folder, {"inspect", "ball.xml"}).out,
+              HasSubstr("  drawn together as 'rubber' (2): tactile pad mu, ground ball mu\n"));
+}
 
 TEST(InspectEffects, DrawsWhereTheTimeGoesAndFollowsOutputs) {
   const Folder folder;

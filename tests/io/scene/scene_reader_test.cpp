@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "engine/model/model.hpp"
+#include "engine/scene/scene_number.hpp"
 #include "io/scene/scene_reader.hpp"
 #include "tests/io/scene/scene_text.hpp"
 
@@ -84,6 +85,25 @@ TEST(SceneReader, ExtensionsComeThrough) {
   EXPECT_EQ(s.randomizations[0].number.field, NumberField::q);
   EXPECT_EQ(s.randomizations[1].distribution.kind, Distribution::Kind::log_uniform);
   EXPECT_EQ(s.text, kScene);
+}
+
+TEST(SceneReader, NumbersWithOneTieAreDrawnTogether) {
+  const auto tied = [](const std::string& one, const std::string& other) {
+    const std::string text = with("q=\"0\" uniform", "q=\"0\" tie=\"" + one + "\" uniform",
+                                  with("log_uniform", "tie=\"" + other + "\" uniform"));
+    return parse_scene(text, "s.xml");
+  };
+  const SceneFile grip = tied("grip", "grip"), apart = tied("grip", "grips");
+  EXPECT_EQ(grip.scene.randomizations[1].tie, "grip");
+  EXPECT_EQ(drawn_with(grip.scene, 1), 0U);
+  EXPECT_EQ(drawn_with(apart.scene, 1), 1U);
+  EXPECT_EQ(drawn_with(parse_scene(kScene, "s.xml").scene, 1), 1U);
+  EXPECT_THAT(grip.warnings, ::testing::IsEmpty());
+  ASSERT_EQ(apart.warnings.size(), 2U);
+  EXPECT_EQ(
+      apart.warnings[0],
+      "s.xml:36: <joint>: tie=\"grip\" of 'joint ball_joint q[0]' alone ties nothing; expected "
+      "another number with it; did you mean 'grips'?");
 }
 
 TEST(SceneReader, DefaultsOfTheDialect) {

@@ -1,0 +1,137 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Gradients through time of tasks of one's own."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import torch
+
+from . import _core
+from ._simulation import Simulation, State
+from ._tensor_batch import RecordedBatch, TensorBatch
+from .scene_env import VectorSceneEnv
+
+
+class EnvTape:
+    """A batch of episodes of a `tangere.VectorSceneEnv`, recorded for the way back.
+
+        tape = tangere.torch.EnvTape(Press, num_envs=64)
+        obs, total = tape.reset(seed=1), 0
+        for t in range(Press.horizon):
+            obs, reward, alive = tape.step(policy(obs["touch"]))
+            total = total + reward
+        (-total.mean()).backward()
+
+    The class has `arrays = "torch"`, and its methods compute with tensors. Starts, goals and drawn
+    numbers count as given, and so do ends of episodes.
+
+    Parameters
+    ----------
+    task: the class.
+    num_envs: E; environment e plays episode first_episode + e of a seed, once.
+    actions: of an episode, at most; None for the task's horizon.
+    read: readings that the task does not use in its first states, beside those that it does.
+    flatten: observations as one tensor (E, n) instead of a dict of (E, …).
+    threads, precision, tape_bytes: as for `Simulation`.
+    dtype: of observations; states and rewards are float64.
+    arguments: of the class.
+    """
+
+    def __init__(
+        self,
+        task: type[VectorSceneEnv],
+        num_envs: int,
+        actions: int | None = None,
+        *,
+        read: Sequence[str] = (),
+        flatten: bool = False,
+        threads: int | None = None,
+        precision: str = "mixed",
+        tape_bytes: float = 1e9,
+        dtype: torch.dtype = torch.float32,
+        **arguments: Any,
+    ):
+        if task.arrays != "torch":
+            raise _core.InputError(f'{task.__name__}: arrays "{task.arrays}"; expected "torch"')
+        self.env = task(num_envs, threads=threads, seed=0, **arguments)
+        self.num_envs, self.flatten, self.dtype = num_envs, flatten, dtype
+        self.actions = actions or self.env.horizon
+        self._low, self._high = (torch.from_numpy(x.copy()) for x in self.env.bounds)
+        self.simulation = Simulation(
+            self.env.model.scene,
+            num_envs,
+            self.actions,
+            every=self.env.steps_per_action,
+            read=[*dict.fromkeys([*self._names(), *read])],
+            threads=threads,
+            precision=precision,
+            tape_bytes=tape_bytes,
+        )
+        self._state: State | None = None
+
+    def reset(self, seed: int = 0, first_episode: int = 0) -> Any:
+        """Starts the episodes; returns the first observations, which have no derivative."""
+        self.env.reset(seed=seed, options={"first_episode": first_episode})
+        batch = self._batch()
+        q, v = torch.from_numpy(batch.q), torch.from_numpy(batch.v)
+        self._take(self.simulation.reset(q=q, v=v, randomized=batch.randomized()))
+        self._ended = np.zeros(self.num_envs, bool)
+        self._success = np.zeros(self.num_envs, bool)
+        return self._observe()
+
+    def step(self, actions: torch.Tensor) -> tuple[Any, torch.Tensor, torch.Tensor]:
+        """Takes one action (E, na), or (na) for all, of every environment, clipped to its bounds.
+
+        Returns observations, rewards (E) float64 (0 where the episode had ended) and alive (E)
+        bool, whether the action counted. A component beyond its bounds has derivative 0. Raises
+        InputError as `Simulation.step` and the environments do.
+        """
+        if self._state is None:
+            raise _core.InputError("step() without episodes; call reset() first")
+        actions = torch.as_tensor(actions).to(torch.float64)
+        shape = (self.num_envs, *self._low.shape)
+        if actions.shape not in (shape, shape[1:]):
+            raise _core.InputError(f"actions of shape {tuple(actions.shape)}; expected {shape}")
+        actions = torch.minimum(torch.maximum(actions, self._low), self._high).expand(shape)
+        controls = torch.as_tensor(self.env.controls(actions))
+        self._take(self.simulation.step(self._state, controls))
+        alive = ~self._ended
+        self.env.lengths += 1
+        reward = torch.as_tensor(self.env.reward(actions)).to(torch.float64)
+        if reward.shape != (self.num_envs,):
+            said = f"{type(self.env).__name__}: reward() of shape {tuple(reward.shape)}"
+            raise _core.InputError(f"{said}; expected ({self.num_envs},)")
+        reward = torch.where(torch.from_numpy(alive), reward, torch.zeros_like(reward))
+        failed = self._state.status < 0
+        self._success[alive] = (self.env.flags("success") & ~failed)[alive]
+        self._ended = self._ended | self.env.flags("terminated") | failed
+        return self._observe(), reward, torch.from_numpy(alive)
+
+    @property
+    def success(self) -> torch.Tensor:
+        """(E) bool: the task was solved after the last action that counted."""
+        return torch.from_numpy(self._success.copy())
+
+    def _batch(self) -> _core.Batch:
+        return self.env._batch
+
+    def _take(self, state: State) -> None:
+        self._state = state
+        self.env.batch = RecordedBatch(state, self._batch())
+
+    def _names(self) -> list[str]:
+        """The readings that the task uses in its first states."""
+        batch = self.env.batch = TensorBatch(self._batch())
+        action = torch.zeros((self.num_envs, *self._low.shape), dtype=torch.float64)
+        self.env.observe(), self.env.controls(action), self.env.reward(action)
+        self.env.terminated(), self.env.success()
+        return batch.names
+
+    def _observe(self) -> Any:
+        seen = {k: torch.as_tensor(x).to(self.dtype) for k, x in self.env.observe().items()}
+        if not self.flatten:
+            return seen
+        return torch.cat([x.reshape(self.num_envs, -1) for x in seen.values()], 1)

@@ -1,0 +1,158 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Gradients through time of a task in Python, against those of its twin in C++ and differences."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+torch = pytest.importorskip("torch", reason="PyTorch is not installed")
+
+import tangere  # noqa: E402
+import tangere.torch as tt  # noqa: E402
+
+
+class Rolling(tangere.VectorSceneEnv):
+    """The task ball_rolling_small of the catalogue, but for its goals."""
+
+    scene = tangere.scenes()["rolling_ball_small"]
+    steps_per_action, horizon, arrays = 5, 8, "torch"
+
+    def restart(self, envs):
+        if not hasattr(self, "goal"):
+            self.goal = torch.zeros((self.num_envs, 2), dtype=torch.float64)
+        drawn = torch.from_numpy(self.uniform(envs, [-0.01] * 2, 0.01))
+        self.goal[envs] = self.batch.q[envs][:, 3:5] + drawn
+
+    def observe(self):
+        distance = self.goal - self.batch.q[:, 3:5]
+        return {"pad": self.batch.q[:, :3], "goal": distance, "tactile": self.batch.tactile("pad")}
+
+    def reward(self, actions):
+        distance = self.goal - self.batch.q[:, 3:5]
+        return -distance.square().sum(1) / 1e-4 - 0.01 * actions.square().sum(1)
+
+    def terminated(self):
+        return self.batch.q[:, 2] < -0.0158  # the pad is deep in the ball
+
+
+def policy(obs, weights):
+    touch = 1e3 * obs["tactile"].reshape(len(obs["pad"]), -1, 3).sum(1)
+    features = torch.cat([100 * obs["pad"], 100 * obs["goal"], touch], 1).double()
+    return 0.3 * torch.tanh(features @ weights) + torch.tensor([0.0, 0.0, -0.6])
+
+
+def played(tape, weights, actions, seed=3):
+    obs, total, alive_steps = tape.reset(seed), 0, 0
+    for _ in range(actions):
+        obs, reward, alive = tape.step(policy(obs, weights))
+        total = total + reward
+        alive_steps = alive_steps + int(alive.sum())
+    return total, alive_steps
+
+
+def weights():
+    random = torch.Generator().manual_seed(2)
+    return (0.1 * torch.randn(8, 3, generator=random, dtype=torch.float64)).requires_grad_()
+
+
+def test_a_closed_loop_has_the_gradient_of_its_twin():
+    class Endless(Rolling):
+        def terminated(self):
+            return torch.zeros(self.num_envs, dtype=torch.bool)
+
+    ours = tt.EnvTape(Endless, 4, precision="double", dtype=torch.float64, threads=1)
+    options = dict(normalise=False, precision="double", dtype=torch.float64, threads=1)
+    theirs = tt.Tape("ball_rolling_small", 4, 8, **options)
+    theirs.reset(3)
+    goals = [theirs.tape.observations()[e][3:5] + theirs.state()[0][e][3:5] for e in range(4)]
+    ours.reset(3)
+    np.testing.assert_array_equal(ours.env._batch.q, theirs.state()[0])
+
+    def with_goals(seed):
+        obs = type(ours).reset(ours, seed)
+        ours.env.goal[:] = torch.from_numpy(np.array(goals))
+        obs["goal"] = ours.env.observe()["goal"]
+        return obs
+
+    ours.reset = with_goals
+    w = weights()
+    value, _ = played(ours, w, 8)
+    (gradient,) = torch.autograd.grad(value.sum(), w)
+    expected, _ = played(theirs, w, 8)
+    (twin,) = torch.autograd.grad(expected.sum(), w)
+    torch.testing.assert_close(value, expected, rtol=1e-9, atol=1e-9)
+    torch.testing.assert_close(gradient, twin, rtol=1e-8, atol=1e-10)
+    assert float(gradient.abs().max()) > 1e-3
+
+
+def test_ends_and_differences():
+    tape = tt.EnvTape(Rolling, 3, precision="double", dtype=torch.float64, threads=1)
+    w = weights()
+    _, steps = played(tape, w, 8)
+    assert 0 < steps < 24  # some episodes end early
+    checks = tt.check_gradient(lambda: played(tape, w, 8)[0].mean(), [w], directions=2)
+    assert max(c.error for c in checks) < 1e-5, checks
+
+
+def test_the_rewards_are_those_of_the_environment():
+    env = Rolling(3, threads=1, seed=3, autoreset="disabled")
+    tape = tt.EnvTape(Rolling, 3, threads=1)
+    seen, obs = env.reset(seed=3)[0], tape.reset(3)
+    for _ in range(3):
+        np.testing.assert_allclose(seen["goal"], obs["goal"], atol=1e-7)
+        seen, rewards, terminated, _, _ = env.step([0.1, 0.0, -0.05])
+        obs, reward, alive = tape.step(torch.tensor([0.1, 0.0, -0.05]))
+        assert not terminated.any() and alive.all()
+        np.testing.assert_allclose(rewards, reward, rtol=1e-4)  # solved to other tolerances
+
+
+def test_numbers_that_vary_are_those_of_the_episodes():
+    class Heavy(Rolling):
+        scene = tangere.Scene(tangere.scenes()["rolling_ball_small"]).vary(["body ball density"])
+
+        def restart(self, envs):
+            super().restart(envs)
+            drawn = self.uniform(envs, 1, 100)
+            self.batch.set_randomized({"body ball density": drawn}, envs=envs)
+
+    tape = tt.EnvTape(Heavy, 3, threads=1)
+    tape.reset(1)
+    drawn = tape.env.randomized()
+    assert np.ptp(drawn["body ball density"]) > 1
+    twin = tangere.Batch(tape.env.model, 3, seed=1)
+    drawn = {name: x for name, x in drawn.items() if not name.startswith("joint")}
+    twin.set_randomized(drawn)
+    twin.set_state(tape.env._batch.q, tape.env._batch.v)
+    for _ in range(4):
+        tape.step(torch.tensor([0.2, 0.0, -1.0]))
+    for _ in range(20):
+        twin.step([0.2, 0.0, -1.0])
+    np.testing.assert_allclose(tape.env.batch.q.numpy(), twin.q, atol=1e-6)
+    assert np.ptp(twin.q[:, 3]) > 0
+
+
+def test_what_is_missing_is_named():
+    class Plain(Rolling):
+        arrays = "numpy"
+
+    with pytest.raises(tangere.InputError, match='arrays "numpy"; expected "torch"'):
+        tt.EnvTape(Plain, 2)
+
+    class Late(Rolling):
+        def reward(self, actions):
+            if self.lengths[0] > 1:
+                return self.batch.tactile("pad.sum")[:, 2]
+            return actions.sum(1)
+
+    tape = tt.EnvTape(Late, 2, threads=1)
+    tape.reset()
+    tape.step(torch.zeros(3))
+    with pytest.raises(tangere.InputError, match="'pad.sum', which the task did not read"):
+        tape.step(torch.zeros(3))
+    tape = tt.EnvTape(Late, 2, threads=1, read=["pad.sum"])
+    tape.reset()
+    for _ in range(3):
+        tape.step(torch.zeros(3))
+    with pytest.raises(tangere.InputError, match=r"actions of shape \(2, 2\)"):
+        tape.step(torch.zeros(2, 2))
