@@ -240,3 +240,48 @@ def test_a_checkpoint_of_lerobot_plays(pushes, tmp_path):
         lerobot.Checkpoint(tmp_path)
     with pytest.raises(tangere.InputError, match="the policy reads 'observation.environment"):
         lerobot.play(tmp_path / "state_act", tmp_path / "image", 2)
+
+
+class Press(tangere.VectorSceneEnv):
+    """An action presses a pad onto a ball; with touch in the last row the task is solved."""
+
+    scene, steps_per_action, horizon, actions = tangere.scenes()["rolling_ball_small"], 10, 8, 1
+    touch = ["pad"]
+
+    def controls(self, actions):
+        return np.concatenate([np.zeros((self.num_envs, 2)), -0.2 * np.abs(actions)], axis=1)
+
+    def observe(self):
+        return {"pad": self.batch.tactile("pad"), "time": self.lengths[:, None] / self.horizon}
+
+    def reward(self, actions):
+        return -np.abs(actions[:, 0])
+
+    def success(self):
+        return np.abs(self.batch.tactile("pad")).max((1, 2, 3)) > 0
+
+
+def test_a_task_in_python_is_exported_and_played(tmp_path):
+    import tangere.data
+
+    def always(obs, episodes, actions):
+        return np.ones((len(episodes), 1))
+
+    said = tangere.data.generate(Press, tmp_path / "set", 4, policy=always)
+    assert said["success_rate"] == 1
+    lerobot.export(tmp_path / "set", tmp_path / "out", touch="state", privileged=True)
+    model = tangere.Model(tangere.Scene(Press.scene))
+    shown = []
+
+    def on(frames):
+        shown.append(frames)
+        return np.ones((len(frames["observation.state"]), 1))
+
+    found = lerobot.play(on, tmp_path / "out", 3, task=Press, seed=7)
+    assert found["task"] == "Press" and found["successes"] == 3 and found["mean_return"] == -8
+    assert {name: rows.shape for name, rows in shown[0].items()} == {
+        "observation.state": (3, 1 + 3),
+        "observation.environment_state": (3, 363 + model.nq + model.nv),
+    }
+    with pytest.raises(tangere.InputError, match="expected its class"):
+        lerobot.play(on, tmp_path / "out", 2)
