@@ -157,6 +157,19 @@ def test_the_card_says_what_is_there(pushes, tmp_path):
         assert part in text, part
 
 
+def test_the_package_datasets_reads_the_folder(pushes, tmp_path):
+    datasets = pytest.importorskip("datasets", reason="datasets is not installed")
+    for touch in (None, "state", "image"):
+        folder = tmp_path / str(touch)
+        lerobot.export(pushes, folder, touch=touch)
+        read = datasets.load_dataset(str(folder), cache_dir=str(tmp_path / "cache"), split="train")
+        info = json.loads((folder / "meta/info.json").read_text())
+        assert len(read) == info["total_frames"] and set(read[0]) == set(info["features"])
+    file = rows_of(folder, "observation.images.tactile")[40]
+    shown = np.asarray(read[40]["observation.images.tactile"])
+    np.testing.assert_array_equal(shown, unpacked(file["bytes"]))
+
+
 class Recorded:
     """The actions of a data set as a policy, which compares what it is shown at each start."""
 
