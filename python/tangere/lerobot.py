@@ -26,7 +26,7 @@ import numpy as np
 
 from . import _core
 from ._lerobot_card import card
-from ._lerobot_features import BOOKKEEPING, Feature, Touch, features_of
+from ._lerobot_features import BOOKKEEPING, ENVIRONMENT, STATE, Feature, Touch, features_of
 from ._lerobot_files import CHUNK, FrameWriter, new_folder, write_json, write_task, write_text
 from ._lerobot_play import Checkpoint, FramePolicy, play
 from .data import Episodes
@@ -216,6 +216,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     print(
         f"wrote {done.output}: {done.episodes} episodes, {done.frames} frames, {done.files} files"
     )
+    read = (STATE, ENVIRONMENT, "observation.images.")
+    fields = [n for n in done.features if n.startswith("observation.") and not n.startswith(read)]
+    if fields:
+        print(
+            f"note: policies of lerobot do not read {', '.join(fields)}; see --touch",
+            file=sys.stderr,
+        )
     if abs(done.seconds_per_action * done.fps - 1) > 1e-6:
         print(
             f"note: an action lasts {done.seconds_per_action:g} s; frames are stamped as "

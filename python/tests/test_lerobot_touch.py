@@ -144,6 +144,16 @@ def test_touch_that_cannot_be_written_is_refused(generate, pushes, tmp_path, cap
     assert "without a reading" in capsys.readouterr().err and not (tmp_path / "out").exists()
 
 
+def test_the_command_names_what_policies_do_not_read(pushes, tmp_path, capsys):
+    for words, note in (
+        ([], "note: policies of lerobot do not read observation.tactile; see --touch\n"),
+        (["--touch", "state"], ""),
+        (["--touch", "image", "--privileged"], ""),
+    ):
+        assert lerobot.main([str(pushes), str(tmp_path / "out"), "--overwrite", *words]) == 0
+        assert capsys.readouterr().err == note
+
+
 def test_the_card_says_what_is_there(pushes, tmp_path):
     lerobot.export(pushes, tmp_path / "out", touch="image", license="cc0-1.0")
     _, head, text = (tmp_path / "out/README.md").read_text().split("---\n", 2)
