@@ -9,6 +9,9 @@ if(NOT TARGET xtl)
   set_property(TARGET xsimd PROPERTY INTERFACE_LINK_LIBRARIES "")
 endif()
 find_package(HDF5 REQUIRED COMPONENTS C)
+if(HDF5_USE_STATIC_LIBRARIES)  # FindHDF5 does not say what the archive needs
+  set_property(TARGET hdf5::hdf5 APPEND PROPERTY INTERFACE_LINK_LIBRARIES sz z ${CMAKE_DL_LIBS})
+endif()
 # Debian 12's libdeflate and liblz4 have no CMake files, so io links them by their plain names.
 find_path(LIBDEFLATE_INCLUDE_DIR libdeflate.h REQUIRED)
 find_library(LIBDEFLATE_LIBRARY deflate REQUIRED)

@@ -21,7 +21,7 @@ HEAD = '''# SPDX-License-Identifier: Apache-2.0
 
 from __future__ import annotations
 
-from typing import Literal, Never
+from typing import Literal, NoReturn
 
 from ._scene_element import Element, Holder, Value
 
@@ -76,7 +76,7 @@ def method_of(element: dict[str, Any], holder: str) -> Iterator[str]:
     if rest:
         yield "        *,"
     yield from (f"        {a['name']}: {optional(type_of(a))} = None," for a in rest)
-    yield from ["        **unknown: Never,", f"    ) -> {kind}:"]
+    yield from ["        **unknown: NoReturn,", f"    ) -> {kind}:"]
     does = "Sets attributes of" if holder == "tangere" else "Adds"
     yield from [f'        """{does} `<{name}>`.', "", "        Parameters", "        ----------"]
     yield from (f"        {a['name']}: {text_of(a)}" for a in [*first, *rest])

@@ -445,9 +445,10 @@ void add_batches(nb::module_& m) {
       "Many environments of one model, stepped together on all cores. Results are new arrays.\n"
       "The same seed gives the same bits for any number of environments and threads. One Python\n"
       "thread uses a batch at a time.")
-      .def("__init__", &make_batch, "model"_a, "num_envs"_a = 1, "seed"_a = 0, "first_episode"_a = 0,
-           "threads"_a = nb::none(), "precision"_a = "mixed", "timestep"_a = nb::none(),
-           "tolerance"_a = nb::none(), "accuracy"_a = nb::none(), "sleep"_a = nb::none(),
+      .def("__init__", &make_batch, "model"_a, "num_envs"_a = 1, "seed"_a = 0,
+           "first_episode"_a = 0, "threads"_a = nb::none(), "precision"_a = "mixed",
+           "timestep"_a = nb::none(), "tolerance"_a = nb::none(), "accuracy"_a = nb::none(),
+           "sleep"_a = nb::none(),
            "Draws `envs` starting states: environment e is episode first_episode + e of `seed`.\n"
            "`threads`: None for all cores. `precision`: of tactile fields; 'mixed' returns "
            "float32,\n"

@@ -229,9 +229,10 @@ class SceneTape {
     for (const auto& [name, given] : *values) {
       const auto at = std::ranges::find(varying, name);
       if (at == varying.end())
-        throw InputError(fmt::format("no number of the scene that varies is named '{}'; expected "
-                                     "one of {}",
-                                     name, fmt::join(varying, ", ")));
+        throw InputError(
+            fmt::format("no number of the scene that varies is named '{}'; expected "
+                        "one of {}",
+                        name, fmt::join(varying, ", ")));
       std::vector<double>& row = rows[as_size(at - varying.begin())];
       if (given.size() == 1) {
         row.assign(count(), given.data()[0]);
@@ -290,8 +291,8 @@ void add_scene_tapes(nb::module_& m) {
             options.tape_bytes = tape_bytes;
             options.parameters = !parameters.empty();
             options.points = points;
-            new (self) SceneTape(
-                {scene, parameters, readings, every.value("every"), envs.value("num_envs"), options});
+            new (self) SceneTape({scene, parameters, readings, every.value("every"),
+                                  envs.value("num_envs"), options});
           },
           "scene"_a, "num_envs"_a, "steps"_a, "every"_a = 1, "readings"_a = nb::none(),
           "parameters"_a = std::vector<std::string>{}, "points"_a = false, "threads"_a = nb::none(),

@@ -25,8 +25,7 @@ _PROGRAM = '"$TANGERE_PYTHON" -m tangere.policy'  # the same text, so the same b
 
 def command_path() -> Path:
     """The command `tangere` of this installation or build. Raises IoError if there is none."""
-    places = [os.environ.get("TANGERE_PROGRAM"), Path(sys.executable).parent / "tangere"]
-    places += [_in_build(), shutil.which("tangere")]
+    places = [os.environ.get("TANGERE_PROGRAM"), *_beside_package(), shutil.which("tangere")]
     for place in places:
         if place and os.access(place, os.X_OK) and not Path(place).is_dir():
             return Path(place)
@@ -35,10 +34,12 @@ def command_path() -> Path:
     )
 
 
-def _in_build() -> Path:
+def _beside_package() -> list[Path]:
+    """Where a wheel and a build have the command."""
     import tangere
 
-    return Path(tangere.__path__[0]).parents[1] / "tangere"
+    package = Path(tangere.__path__[0])
+    return [package / "bin" / "tangere", package.parents[1] / "tangere"]
 
 
 def generate(

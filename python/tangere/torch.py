@@ -9,7 +9,7 @@
         total = total + reward
     (-total.mean()).backward()
 
-`Simulation` does the same for any scene, with rewards of the caller, `EnvTape` for a task in Python.
+`Simulation` does it for any scene, with rewards of the caller, `EnvTape` for a task in Python.
 
 The derivatives are analytic (docs/gradients.md). Draws, resets and which point is touched count as
 given. `import tangere` does not import this module; it needs PyTorch.

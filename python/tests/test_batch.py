@@ -327,7 +327,8 @@ def test_numbers_that_do_not_fit_are_told_in_one_line(model, call, said):
 
 
 def test_whole_numbers_of_numpy_count(model):
-    batch = tangere.Batch(model, num_envs=np.int32(2), seed=np.uint64(2**64 - 1), threads=np.int8(1))
+    numbers = dict(num_envs=np.int32(2), seed=np.uint64(2**64 - 1), threads=np.int8(1))
+    batch = tangere.Batch(model, **numbers)
     assert (batch.num_envs, batch.seed) == (2, 2**64 - 1)
     with pytest.raises(TypeError):
         tangere.Batch(model, num_envs=2.0)

@@ -191,7 +191,9 @@ double gradient_bytes(const Task& task, std::int64_t episodes, const TapeOptions
   const TapeOptions o = checked(task, episodes, asked);
   const auto width = double(task.spec().action.size());
   const double results = numbers_of(task.model(), o, 2 * width) + 1;  // actions and lengths, too
-  return 8 * results * double(episodes) + o.threads * TaskBlock::bytes(task, o, 1);
+  return 8 * results * double(episodes) +
+         o.threads *
+             (TaskBlock::bytes(task, o, 1) + double(Stepper::workspace_bytes(task.model())));
 }
 
 }  // namespace tangere

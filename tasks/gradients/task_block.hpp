@@ -22,7 +22,7 @@ class TaskBlock : public TapeBlock {
   /// One of `blocks` that hold tapes at once, within options.tape_bytes together. options.length is
   /// the final number of actions. Throws InputError when not even checkpoints fit.
   TaskBlock(const Task& task, const TapeOptions& options, std::int64_t blocks);
-  /// Size of all these blocks [bytes].
+  /// Size of all these blocks without steppers [bytes].
   static double bytes(const Task& task, const TapeOptions& options, std::int64_t blocks);
 
   /// Resets one episode per lane. `record`: whether its actions can be reversed.
@@ -48,6 +48,8 @@ class TaskBlock : public TapeBlock {
   void play(std::uint64_t seed, EpisodeRange episodes, const TaskActions& actions, std::int64_t to,
             TaskGradients& out, std::vector<FailedEnvironment>& failures);
 
+  /// As TaskRollout::use().
+  void use(Stepper& stepper) { rollout_.use(stepper); }
   [[nodiscard]] const TaskRollout& rollout() const { return rollout_; }
   [[nodiscard]] int lanes() const { return rollout_.lanes(); }
 

@@ -31,10 +31,17 @@ double ActionRecord::bytes(const Task& task) {
 TaskRollout::TaskRollout(const Task& task, const StepperOptions& options, Precision precision)
     : task_(task),
       worker_(task, precision),
-      stepper_(task.model(), differentiable(options)),
+      options_(differentiable(options)),
+      integrator_(integrator_in_force(task.model(), options_)),
       u_(kBlock * as_size(task.model().nu())),
       q_(as_size(task.model().nq())),
       v_(as_size(task.model().nv())) {}
+
+Stepper& TaskRollout::stepper() {
+  if (shared_ != nullptr) return *shared_;
+  if (!own_) own_ = std::make_unique<Stepper>(task_.model(), options_);
+  return *own_;
+}
 
 void TaskRollout::start(std::uint64_t seed, std::span<const std::int64_t> episodes) {
   const auto count = static_cast<int>(episodes.size());
@@ -47,7 +54,7 @@ void TaskRollout::start(std::uint64_t seed, std::span<const std::int64_t> episod
   if (task_.spec().warm_up) {
     for (int k = 0; k < task_.spec().steps_per_action; ++k) {
       worker_.compute_controls(*batch_, *data_, 0, k);
-      stepper_.step_block(*batch_, 0, data_->u);
+      stepper().step_block(*batch_, 0, data_->u);
       worker_.record_snapshot(*batch_, 0, k, counts_);
     }
   } else {
@@ -113,7 +120,7 @@ void TaskRollout::take_steps(BlockTape* tape) {
   if (tape != nullptr) tape->start(*batch_, 0);
   for (int k = 0; k < task_.spec().steps_per_action; ++k) {
     worker_.compute_controls(*batch_, *data_, 0, k);
-    stepper_.step_block(*batch_, 0, data_->u, tape);
+    stepper().step_block(*batch_, 0, data_->u, tape);
     worker_.record_snapshot(*batch_, 0, k, counts_);
   }
 }
@@ -143,7 +150,7 @@ void TaskRollout::retake_steps(const ActionRecord& r, std::int64_t action, Block
   const auto u = std::span(u_).first(as_size(lanes()) * as_size(task_.model().nu()));
   for (int k = 0; k < task_.spec().steps_per_action; ++k) {
     if (k % every == 0) recompute_controls(r, action, k, tape);
-    stepper_.step_block(*batch_, 0, u, &tape);
+    stepper().step_block(*batch_, 0, u, &tape);
   }
 }
 

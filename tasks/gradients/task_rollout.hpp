@@ -5,6 +5,7 @@
 
 #include <array>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <vector>
 
@@ -29,7 +30,7 @@ struct ActionRecord {
   static double bytes(const Task& task);
 };
 
-/// Owns the scratch of one thread. The steps are those of a VectorTask, bit for bit.
+/// The steps are those of a VectorTask, bit for bit.
 class TaskRollout {
  public:
   TaskRollout(const Task& task, const StepperOptions& options, Precision precision);
@@ -75,7 +76,10 @@ class TaskRollout {
   [[nodiscard]] std::span<const Snapshot> snapshots(int lane) const {
     return worker_.snapshots(lane);
   }
-  [[nodiscard]] Integrator integrator() const { return stepper_.integrator(); }
+  [[nodiscard]] Integrator integrator() const { return integrator_; }
+  /// Steps with a stepper of the caller from now on: made for the same model and options, used by
+  /// no other thread at the same time. So many rollouts share the scratch of a thread.
+  void use(Stepper& stepper) { shared_ = &stepper; }
   [[nodiscard]] const VectorCounts& counts() const { return counts_; }
 
   /// The view in which action number `action` was taken. The caller gives task state and snapshots.
@@ -85,9 +89,14 @@ class TaskRollout {
   [[nodiscard]] Snapshot first_moment(const BlockTape& tape, int lane);
 
  private:
+  [[nodiscard]] Stepper& stepper();
+
   const Task& task_;
   BlockWorker worker_;
-  Stepper stepper_;
+  StepperOptions options_;
+  Integrator integrator_;
+  std::unique_ptr<Stepper> own_;  // made when needed
+  Stepper* shared_ = nullptr;
   std::optional<Batch> batch_;
   std::optional<EnvironmentData> data_;
   VectorCounts counts_, recounted_;

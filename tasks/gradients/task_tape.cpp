@@ -57,13 +57,14 @@ struct TaskTape::Impl {
         q(e * nq),
         v(e * nv),
         status(e),
-        scratch(as_size(options.threads)),
         threads(options.threads) {
     for (std::vector<std::uint8_t>* flags : {&alive, &terminated, &truncated, &success})
       flags->resize(e);
     const std::int64_t count = blocks_of(environments);
     blocks.reserve(as_size(count));
     for (std::int64_t b = 0; b < count; ++b) blocks.emplace_back(t, options, count);
+    for (int k = 0; k < options.threads; ++k)
+      steppers.emplace_back(t.model(), differentiable(options.stepper));
   }
 
   [[nodiscard]] std::size_t lanes(int b) const {
@@ -84,8 +85,10 @@ struct TaskTape::Impl {
   void each(Phase then, const Body& body) {
     observation_is_current = false;
     phase = Phase::broken;
-    threads.for_each(static_cast<int>(blocks.size()), scratch,
-                     [&](char&, int b) { body(blocks[as_size(b)], b); });
+    threads.for_each(static_cast<int>(blocks.size()), steppers, [&](Stepper& stepper, int b) {
+      blocks[as_size(b)].use(stepper);
+      body(blocks[as_size(b)], b);
+    });
     phase = then;
   }
 
@@ -170,7 +173,7 @@ struct TaskTape::Impl {
   std::vector<std::uint8_t> alive, terminated, truncated, success;
   std::vector<StepStatus> status;
   std::vector<TaskBlock> blocks;
-  std::vector<char> scratch;  // by the thread's index in the arena; what threads need is in blocks
+  std::vector<Stepper> steppers;  // by the thread's index in the arena
   BlockThreads threads;
   Phase phase = Phase::forward;
   bool recording = true;
@@ -269,8 +272,8 @@ std::span<const double> TaskTape::observations() const {
 void TaskTape::get_observations(std::span<double> to) {
   Impl& i = *impl_;
   expect_numbers(to.size(), i.e * i.seen, false, "observations");
-  i.threads.for_each(static_cast<int>(i.blocks.size()), i.scratch,
-                     [&](char&, int b) { i.copy_observations(as_size(b), to); });
+  i.threads.for_each(static_cast<int>(i.blocks.size()), i.steppers,
+                     [&](Stepper&, int b) { i.copy_observations(as_size(b), to); });
 }
 std::span<const double> TaskTape::rewards() const { return impl_->reward; }
 std::span<const std::uint8_t> TaskTape::alive() const { return impl_->alive; }
@@ -294,6 +297,7 @@ std::int64_t TaskTape::recomputed_steps() const {
 double TaskTape::bytes(const Task& task, int environments, const TapeOptions& options) {
   const std::size_t shown = task.spec().observation_size() + 2 * as_size(task.model().nv());
   return TaskBlock::bytes(task, checked(task, environments, options), blocks_of(environments)) +
+         options.threads * double(Stepper::workspace_bytes(task.model())) +
          double(environments) * (2 * 8.0 * double(shown) + EnvironmentData::bytes(task));
 }
 
