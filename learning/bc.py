@@ -18,6 +18,7 @@ import numpy as np
 import torch
 from protocol import TEST_SEED, Played, play, provenance, source, wilson
 from torch import nn
+from tracking import Log, add_log
 
 import tangere
 from tangere.data import Episodes, Windows
@@ -52,6 +53,7 @@ def train(windows: Windows, clone: Clone, asked: argparse.Namespace) -> None:
     optimiser = torch.optim.AdamW(clone.parameters(), lr=asked.rate, weight_decay=1e-4)
     steps = asked.epochs * -(-len(windows) // asked.batch)
     schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimiser, steps)
+    log = Log(asked.log)
     for epoch in range(asked.epochs):
         for rows in windows.batches(asked.batch, seed=asked.seed * 1000 + epoch):
             past = rows["past_actions"] if asked.recall else rows["past_actions"][:, :0]
@@ -62,6 +64,7 @@ def train(windows: Windows, clone: Clone, asked: argparse.Namespace) -> None:
             loss.backward()
             optimiser.step()
             schedule.step()
+        log(epoch + 1, loss=loss)
 
 
 def closed_loop(windows: Windows, clone: Clone, asked: argparse.Namespace) -> Played:
@@ -109,6 +112,7 @@ def settings() -> argparse.Namespace:
     parser.add_argument("--threads", type=int, default=None, help="of the simulation")
     parser.add_argument("--device", default="cpu", help="where the network is: cpu, cuda")
     parser.add_argument("--json", action="store_true")
+    add_log(parser)
     return parser.parse_args()
 
 

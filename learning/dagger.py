@@ -27,6 +27,7 @@ import numpy as np
 import torch
 from protocol import TEST_SEED, Played, play, provenance, source, wilson
 from torch import nn
+from tracking import Log, add_log
 
 import tangere
 from tangere.data import Episodes
@@ -156,6 +157,7 @@ def settings() -> argparse.Namespace:
     parser.add_argument("--episodes", type=int, default=1000, help="to play")
     parser.add_argument("--threads", type=int, default=None, help="of the simulation")
     parser.add_argument("--json", action="store_true")
+    add_log(parser)
     return parser.parse_args()
 
 
@@ -173,6 +175,7 @@ def trained(asked: argparse.Namespace, episodes: Episodes, keys: list[str]):
                                threads=asked.threads)  # fmt: skip
         later = max(0, asked.rounds - asked.alone)
         visited = Rows(later * asked.visits, task.horizon, inputs, actions)
+    log = Log(asked.log)
     for k in range(asked.rounds):
         solved = None
         if env is not None and k >= asked.alone:
@@ -181,6 +184,7 @@ def trained(asked: argparse.Namespace, episodes: Episodes, keys: list[str]):
             sources = [stored, visited]
         loss = learn(clone, optimiser, schedule, sources, asked, draw)
         curve.append([k, loss, solved])
+        log(k + 1, loss=loss, **({} if solved is None else {"success": solved}))
         said = "" if solved is None else f", {solved:.3f} of its visits were solved"
         print(f"round {k}: loss {loss:.4f}{said}", file=sys.stderr, flush=True)
     return clone, stored, curve

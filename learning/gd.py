@@ -34,6 +34,7 @@ import numpy as np
 import torch
 from protocol import CHOICE_EPISODES, CHOICE_SEED, TEST_SEED, merit, play, provenance
 from torch import nn
+from tracking import Log, add_log
 
 import tangere
 import tangere.torch
@@ -126,6 +127,7 @@ def settings() -> argparse.Namespace:
     parser.add_argument("--goals", type=int, default=1000, help="to test on")
     parser.add_argument("--threads", type=int, default=None)
     parser.add_argument("--json", action="store_true")
+    add_log(parser)
     return parser.parse_args()
 
 
@@ -148,8 +150,10 @@ def main() -> None:
     still = {"flatten": True, "autoreset": "disabled", "threads": asked.threads}
     choice = tangere.make_vec(asked.task, CHOICE_EPISODES, **still)
     best, kept, curve, chosen = (-np.inf,), None, [], []
+    log = Log(asked.log)
     for k in range(asked.updates):
         curve.append(update(tape, policy, gains, asked.limit, 1 + asked.seed, k * asked.envs))
+        log(k + 1, train_return=curve[-1])
         norm = nn.utils.clip_grad_norm_(policy.parameters(), 1.0)
         if torch.isfinite(norm):  # an update that overflowed teaches nothing
             optimiser.step()
@@ -162,6 +166,7 @@ def main() -> None:
             continue
         played = play(choice, CHOICE_SEED, player(shown, gains)).summary()
         chosen.append([k + 1, played["return"], played["position_m"], played["yaw_rad"]])
+        log(k + 1, **played)
         if merit(played) > best:
             best, kept = merit(played), copy.deepcopy(shown)
         elif asked.back and kept is not None and not merit(played)[0] > asked.back * best[0]:

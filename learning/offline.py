@@ -30,6 +30,7 @@ import numpy as np
 import torch
 from protocol import TEST_SEED, play, provenance, source
 from torch import nn
+from tracking import Log, add_log
 
 import tangere
 from tangere.data import Episodes
@@ -99,6 +100,7 @@ class Learner:
             self.optimisers["policy"], updates // POLICY_EVERY[method]
         )
         self.updates = 0
+        self.losses: dict[str, torch.Tensor] = {}  # of the last update
 
     def act(self, obs: torch.Tensor) -> torch.Tensor:
         return torch.tanh(self.policy(obs))
@@ -145,6 +147,7 @@ class Learner:
         self._descend("twin", (a - target).square().mean() + (b - target).square().mean())
 
     def _descend(self, name: str, loss: torch.Tensor) -> None:
+        self.losses[name] = loss.detach()
         self.optimisers[name].zero_grad()
         loss.backward()
         self.optimisers[name].step()
@@ -169,6 +172,7 @@ def settings() -> argparse.Namespace:
     parser.add_argument("--episodes", type=int, default=1000, help="to play")
     parser.add_argument("--threads", type=int, default=None)
     parser.add_argument("--json", action="store_true")
+    add_log(parser)
     return parser.parse_args()
 
 
@@ -187,9 +191,12 @@ def main() -> None:
     begin, clock = time.process_time(), time.perf_counter()
     learner = Learner(asked.method, rows["obs"].shape[1], rows["action"].shape[1], asked.rate,
                       asked.updates)  # fmt: skip
+    log = Log(asked.log)
     for k in range(asked.updates):
         chosen = torch.from_numpy(draw.integers(len(rows["reward"]), size=asked.batch))
         learner.update({name: values[chosen] for name, values in rows.items()})
+        if k % 100 == 99:
+            log(k + 1, **learner.losses)
         if k % 2000 == 1999:
             print(f"update {k + 1}", file=sys.stderr, flush=True)
     cost = {"train_cpu_s": time.process_time() - begin,

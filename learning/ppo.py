@@ -32,6 +32,7 @@ import numpy as np
 import torch
 from protocol import CHOICE_EPISODES, CHOICE_SEED, TEST_SEED, merit, play, provenance
 from torch import nn
+from tracking import Log, add_log
 
 import tangere
 
@@ -328,6 +329,7 @@ def settings() -> argparse.Namespace:
     parser.add_argument("--episodes", type=int, default=1000, help="to test on")
     parser.add_argument("--choices", type=int, default=5, help="policies to choose from")
     parser.add_argument("--json", action="store_true")
+    add_log(parser)
     for name, value in COMMON.items():
         flag = isinstance(value, bool)
         kind = {"action": argparse.BooleanOptionalAction} if flag else {"type": type(value)}
@@ -354,6 +356,7 @@ def main() -> None:
     collector, draw = Collector(asked, agent, eyes), np.random.default_rng(asked.seed)
     choice = tangere.make_vec(asked.task, CHOICE_EPISODES, autoreset="disabled",
                               threads=asked.threads)  # fmt: skip
+    log = Log(asked.log)
     updates, curve, chosen = asked.steps // (asked.envs * asked.length), [], []
     best, kept = (-np.inf,), (agent, eyes)
     grown = (1 - asked.last_gamma) / (1 - asked.gamma) if asked.last_gamma else 1.0
@@ -366,10 +369,12 @@ def main() -> None:
         steps = (k + 1) * asked.envs * asked.length
         if ended:
             curve.append([steps, *np.mean(ended, axis=0).round(4).tolist()])
+            log(steps, train_return=curve[-1][1], train_success=curve[-1][2])
         if (k + 1) * asked.choices // updates == k * asked.choices // updates:
             continue
         played = play(choice, CHOICE_SEED, Actor(agent, eyes, asked.squash)).summary()
         chosen.append([steps, played["return"], played["success"]])
+        log(steps, **played)
         if merit(played) > best:
             best = merit(played)
             kept = copy.deepcopy((agent, eyes))

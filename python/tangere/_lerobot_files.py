@@ -4,8 +4,10 @@
     data/chunk-000/file-000.parquet           a row a frame: features, then time stamp and indices
     meta/episodes/chunk-000/file-000.parquet  a row an episode: where it lies, and its statistics
     meta/tasks.parquet                        the text of the task
+    README.md                                 the card
 
-Statistics are per place on a feature's last axis. Those of all frames come from those of the
+A picture is a PNG file in its row. Statistics are per place on a feature's last axis, those of a
+picture per colour, from 0 to 1, and (3, 1, 1). Those of all frames come from those of the
 episodes, n frames with mean m and sum of squared deviations s each, one after the other:
 
     n = n1 + n2,   m = m1 + (m2 - m1) n2/n,   s = s1 + s2 + (m2 - m1)^2 n1 n2/n
@@ -17,8 +19,9 @@ import fcntl
 import json
 import os
 import shutil
+import struct
+import zlib
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Iterator
 
@@ -27,40 +30,13 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from . import _core
+from ._lerobot_features import BOOKKEEPING, Feature
 
 CHUNK = 1000  # files of a folder
-BOOKKEEPING = {
-    "timestamp": "float32",
-    "frame_index": "int64",
-    "episode_index": "int64",
-    "index": "int64",
-    "task_index": "int64",
-}
 _GROUP_BYTES = 1 << 25  # of rows that are written at once
 _GROUP_EPISODES = 1000  # rows of the table of episodes that are written at once
 _SAMPLE = 4_000_000  # numbers of a feature that its quantiles are taken from
 _QUANTILES = {"q01": 0.01, "q10": 0.1, "q50": 0.5, "q90": 0.9, "q99": 0.99}
-
-
-@dataclass
-class Feature:
-    """A column: the arrays of the data set that it is made of, and what info.json says of it."""
-
-    name: str
-    keys: list[str]
-    shape: tuple[int, ...]
-    dtype: str = "float32"
-    names: list[str] | None = None
-
-    def rows(self, arrays: dict[str, np.ndarray]) -> np.ndarray:
-        """(rows, *shape)."""
-        parts = [np.asarray(arrays[key]).astype(self.dtype, copy=False) for key in self.keys]
-        if len(parts) > 1:
-            parts = [np.concatenate([part.reshape(len(part), -1) for part in parts], axis=1)]
-        return parts[0].reshape(len(parts[0]), *self.shape)
-
-    def described(self) -> dict[str, Any]:
-        return {"dtype": self.dtype, "shape": list(self.shape), "names": self.names}
 
 
 class Statistics:
@@ -74,10 +50,12 @@ class Statistics:
         width = feature.shape[-1]
         self._min, self._max = np.full(width, np.inf), np.full(width, -np.inf)
         self._mean, self._square = np.zeros(width), np.zeros(width)
+        self._unit = 255.0 if feature.is_picture else 1.0
+        self._shape = (-1, 1, 1) if feature.is_picture else (-1,)
 
     def add(self, rows: np.ndarray) -> dict[str, np.ndarray]:
         """Takes the frames of an episode, (n, *shape), and returns its own statistics."""
-        flat = rows.reshape(-1, rows.shape[-1]).astype(np.float64)
+        flat = rows.reshape(-1, rows.shape[-1]).astype(np.float64) / self._unit
         low, high, mean = flat.min(0), flat.max(0), flat.mean(0)
         square = ((flat - mean) ** 2).sum(0)
         before, count = self._numbers, len(flat)
@@ -88,28 +66,24 @@ class Statistics:
         sample = rows[-self._frames % self._stride :: self._stride]
         self._sample.append(sample.reshape(-1, rows.shape[-1]).copy())
         self._frames += len(rows)
-        return _named(low, high, mean, np.sqrt(square / count), len(rows), flat)
+        return self._named(low, high, mean, np.sqrt(square / count), len(rows), flat)
 
-    def result(self) -> dict[str, list[float]]:
+    def result(self) -> dict[str, list[Any]]:
         """Those of all frames. Quantiles are of evenly spaced frames if there are many numbers."""
         std = np.sqrt(self._square / self._numbers)
-        sample = np.concatenate(self._sample).astype(np.float64)
-        found = _named(self._min, self._max, self._mean, std, self._frames, sample)
+        sample = np.concatenate(self._sample).astype(np.float64) / self._unit
+        found = self._named(self._min, self._max, self._mean, std, self._frames, sample)
         return {name: values.tolist() for name, values in found.items()}
 
-
-def _named(
-    low: np.ndarray, high: np.ndarray, mean: np.ndarray, std: np.ndarray, count: int,
-    flat: np.ndarray,
-) -> dict[str, np.ndarray]:  # fmt: skip
-    quantiles = np.quantile(flat, list(_QUANTILES.values()), axis=0)
-    return {
-        "min": low,
-        "max": high,
-        "mean": mean,
-        "std": std,
-        "count": np.asarray([count]),
-    } | dict(zip(_QUANTILES, quantiles, strict=True))
+    def _named(
+        self, low: np.ndarray, high: np.ndarray, mean: np.ndarray, std: np.ndarray, count: int,
+        flat: np.ndarray,
+    ) -> dict[str, np.ndarray]:  # fmt: skip
+        quantiles = np.quantile(flat, list(_QUANTILES.values()), axis=0)
+        found = {"min": low, "max": high, "mean": mean, "std": std}
+        found |= dict(zip(_QUANTILES, quantiles, strict=True))
+        shaped = {name: values.reshape(self._shape) for name, values in found.items()}
+        return shaped | {"count": np.asarray([count])}
 
 
 class Table:
@@ -159,7 +133,7 @@ class FrameWriter:
         self.episodes, self.frames, self.files = 0, 0, 0
         self._features = features + [Feature(n, [n], (1,), d) for n, d in BOOKKEEPING.items()]
         self._statistics = {f.name: Statistics(f, frames) for f in self._features}
-        self._schema = pa.schema([(f.name, _arrow_type(f)) for f in self._features])
+        self._schema = _schema(self._features)
         self._table: Table | None = None
         self._episodes: Table | None = None
 
@@ -221,7 +195,7 @@ class FrameWriter:
             self._episodes = Table(path, batch.schema, _GROUP_BYTES, _GROUP_EPISODES)
         self._episodes.add(batch)
 
-    def close(self) -> dict[str, dict[str, list[float]]]:
+    def close(self) -> dict[str, dict[str, list[Any]]]:
         """Ends the files and returns the statistics of each feature."""
         self._end_file()
         if self._episodes is not None:
@@ -234,8 +208,29 @@ class FrameWriter:
         self._table = None
 
 
+def _schema(features: list[Feature]) -> pa.Schema:
+    """With pictures it says so to the package `datasets`, for which they are bytes otherwise."""
+    schema = pa.schema([(f.name, _arrow_type(f)) for f in features])
+    if not any(f.is_picture for f in features):
+        return schema
+    said = {"info": {"features": {f.name: _hub_type(f) for f in features}}}
+    return schema.with_metadata({"huggingface": json.dumps(said)})
+
+
+def _hub_type(feature: Feature) -> dict[str, Any]:
+    if feature.is_picture:
+        return {"_type": "Image"}
+    said: dict[str, Any] = {"dtype": feature.dtype, "_type": "Value"}
+    for size in reversed(feature.shape if feature.shape != (1,) else ()):
+        length = size if len(feature.shape) == 1 else -1
+        said = {"feature": said, "length": length, "_type": "Sequence"}
+    return said
+
+
 def _arrow_type(feature: Feature) -> pa.DataType:
     """Numbers as a plain column, vectors as lists of fixed size, fields as nested lists."""
+    if feature.is_picture:
+        return pa.struct([("bytes", pa.binary()), ("path", pa.string())])
     plain = {"float32": pa.float32(), "int64": pa.int64(), "bool": pa.bool_()}[feature.dtype]
     if feature.shape == (1,):
         return plain
@@ -247,6 +242,9 @@ def _arrow_type(feature: Feature) -> pa.DataType:
 
 
 def _arrow_array(rows: np.ndarray, feature: Feature) -> pa.Array:
+    if feature.is_picture:
+        files = [{"bytes": png(picture), "path": None} for picture in rows]
+        return pa.array(files, _arrow_type(feature))
     values = pa.array(np.ascontiguousarray(rows).reshape(-1))
     if feature.shape == (1,):
         return values
@@ -256,6 +254,21 @@ def _arrow_array(rows: np.ndarray, feature: Feature) -> pa.Array:
         ends = np.arange(0, len(values) + 1, size, dtype=np.int32)
         values = pa.ListArray.from_arrays(pa.array(ends), values)
     return values
+
+
+def png(picture: np.ndarray) -> bytes:
+    """A PNG file of a picture (height, width, 3) uint8: no library for it is needed otherwise."""
+    height, width = picture.shape[:2]
+    lines = np.zeros((height, 1 + 3 * width), np.uint8)  # a line begins with its filter: none
+    lines[:, 1:] = picture.reshape(height, -1)
+
+    def chunk(kind: bytes, data: bytes) -> bytes:
+        end = struct.pack(">I", zlib.crc32(kind + data))
+        return struct.pack(">I", len(data)) + kind + data + end
+
+    header = struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)  # 8 bits of red, green, blue
+    parts = [(b"IHDR", header), (b"IDAT", zlib.compress(lines.tobytes())), (b"IEND", b"")]
+    return b"\x89PNG\r\n\x1a\n" + b"".join(chunk(*part) for part in parts)
 
 
 def write_task(folder: Path, task: str) -> None:
@@ -281,9 +294,12 @@ def write_task(folder: Path, task: str) -> None:
 
 
 def write_json(path: Path, value: Any) -> None:
+    write_text(path, json.dumps(value, indent=4, ensure_ascii=False, allow_nan=False) + "\n")
+
+
+def write_text(path: Path, text: str) -> None:
     with open(path, "x", encoding="utf-8") as file:
-        json.dump(value, file, indent=4, ensure_ascii=False, allow_nan=False)
-        file.write("\n")
+        file.write(text)
         _sync(file)
 
 

@@ -67,6 +67,8 @@ class Episodes:
                     self.command = str(file.attrs["command"])
                     self._mapped = "mask" not in file  # else its numbers lie in other files
                     self._describe(file)
+                    sensors = file["scene"].get("sensors", {})
+                    self.sensors = {name: dict(sensors[name].attrs) for name in sensors}
                 for name, demo in file["data"].items():
                     rows = int(demo.attrs["num_samples"])
                     found.append((int(name.removeprefix("demo_")), name, number, rows))

@@ -25,13 +25,15 @@ from typing import Sequence
 import numpy as np
 
 from . import _core
-from ._lerobot_files import BOOKKEEPING, CHUNK, Feature, FrameWriter, new_folder, write_json
-from ._lerobot_files import write_task
+from ._lerobot_card import card
+from ._lerobot_features import BOOKKEEPING, ENVIRONMENT, STATE, Feature, Touch, features_of
+from ._lerobot_files import CHUNK, FrameWriter, new_folder, write_json, write_task, write_text
+from ._lerobot_play import Checkpoint, FramePolicy, play
 from .data import Episodes
 
+__all__ = ["Checkpoint", "Exported", "FramePolicy", "export", "main", "play"]
+
 _VERSION = "v3.0"
-_RESERVED = {*BOOKKEEPING, "success"}  # columns and arrays that are not observations
-_RESERVED_FIELDS = {"state", "environment_state"}  # what vectors are joined to
 
 
 @dataclass
@@ -54,8 +56,10 @@ def export(
     mask: str | None = None,
     only_success: bool = False,
     privileged: bool = False,
+    touch: Touch | None = None,
     task: str | None = None,
     fps: int | None = None,
+    license: str = "unknown",
     overwrite: bool = False,
     file_megabytes: float = 100,
 ) -> Exported:
@@ -68,10 +72,16 @@ def export(
     only_success: leave out episodes that did not succeed.
     privileged: observations that a robot could not measure come along, as
         `observation.environment_state`.
+    touch: how fields of sensors are written. "state": means over blocks of points, at most 600
+        numbers of a reading, as `observation.environment_state`. "image": one picture for each pad,
+        `observation.images.KEY`, whose colours are the components. With both, the mean of each pad
+        and component joins `observation.state`, and so does whatever else is no vector. None: in
+        their shape as `observation.KEY`, which policies of lerobot do not read.
     task: the text of the task, which language-conditioned policies read. None: the name of the
         task and what its success means.
     fps: frames a second. None: actions a second, rounded to a whole number, which the format
         wants. Time stamps are multiples of 1/fps.
+    license: of the data, as README.md names it, such as "cc-by-4.0".
     overwrite: replace a data set that is there.
     file_megabytes: a file of frames ends with the episode that brings it beyond this size.
 
@@ -93,7 +103,7 @@ def export(
         raise _core.InputError(f"fps {fps!r}; expected a whole number, 1 or above")
     if not file_megabytes > 0:
         raise _core.InputError(f"file_megabytes {file_megabytes}; expected a positive number")
-    features = _features(episodes, chosen[0], privileged)
+    features = features_of(episodes, chosen, privileged, touch)
     text = task if task is not None else _task_text(episodes)
     output = Path(output)
     if Path(episodes.path).resolve().is_relative_to(output.resolve()):
@@ -135,55 +145,17 @@ def export(
             "observation_scale": episodes.scale,
             "privileged": episodes.privileged,
             "touch": episodes.touch,
+            "task": episodes.task,
+            "text": text,
+            "columns": [feature.recipe() for feature in features],
         }
+        successes = len(solved & set(chosen))
+        write_text(folder / "README.md", card(episodes, features, info, text, successes, license))
         write_json(folder / "meta/stats.json", statistics)
         write_json(folder / "meta/tangere.json", origin)
         write_json(folder / "meta/info.json", info)
     names = [feature.name for feature in features]
     return Exported(str(output), len(chosen), frames, writer.files, fps, seconds, names)
-
-
-def _features(episodes: Episodes, first: int, privileged: bool) -> list[Feature]:
-    """Columns. Vectors become one state, as policies of lerobot expect; fields keep their shape."""
-    arrays, said = episodes[first], episodes.attributes
-    shapes = {key: np.shape(arrays[key])[1:] for key in episodes.keys}
-
-    for key in episodes.keys:
-        if key in _RESERVED or (key in _RESERVED_FIELDS and len(shapes[key]) > 1):
-            raise _core.InputError(
-                f"{episodes.path}: an observation is called {key!r}, which the format has for "
-                "something else; expected another name of the sensor"
-            )
-
-    def names_of(key: str) -> list[str]:
-        if key in ("q", "v"):
-            return [str(name) for name in said[f"{key}_names"]]
-        if shapes[key] == (1,):
-            return [key]
-        return [f"{key}{''.join(f'[{i}]' for i in at)}" for at in np.ndindex(*shapes[key])]
-
-    def joined(name: str, keys: Sequence[str]) -> list[Feature]:
-        names = [n for key in keys for n in names_of(key)]
-        return [Feature(name, list(keys), (len(names),), names=names)] if keys else []
-
-    seen = [key for key in episodes.keys if key not in episodes.privileged]
-    features = joined("observation.state", [key for key in seen if len(shapes[key]) == 1])
-    features += [
-        Feature(f"observation.{key}", [key], shapes[key]) for key in seen if len(shapes[key]) > 1
-    ]
-    if privileged:
-        features += joined("observation.environment_state", episodes.privileged)
-    action = [str(name) for name in said["action_names"]]
-    features.append(Feature("action", ["actions"], (len(action),), names=action))
-    features.append(Feature("next.reward", ["rewards"], (1,)))
-    features.append(Feature("next.done", ["dones"], (1,), "bool"))
-    if episodes.task:
-        features.append(Feature("next.success", ["success"], (1,), "bool"))
-    names = [feature.name for feature in features]
-    twice = {name for name in names if names.count(name) > 1}
-    if twice:
-        raise _core.InputError(f"{episodes.path}: two observations would be called {twice.pop()}")
-    return features
 
 
 def _task_text(episodes: Episodes) -> str:
@@ -206,9 +178,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "--privileged", action="store_true",
         help="also write what a robot could not measure, as observation.environment_state",
     )  # fmt: skip
+    parser.add_argument(
+        "--touch", choices=["state", "image"],
+        help="write fields of sensors as policies of lerobot read them: as numbers of "
+        "observation.environment_state, or as pictures",
+    )  # fmt: skip
     parser.add_argument("--task", metavar="TEXT", help="text of the task for language policies")
     parser.add_argument(
         "--fps", type=int, metavar="N", help="frames a second [default: actions a second, rounded]"
+    )
+    parser.add_argument(
+        "--license", default="unknown", metavar="NAME", help="of the data, named in README.md"
     )
     parser.add_argument("--overwrite", action="store_true", help="replace a data set of this name")
     parser.add_argument("--json", action="store_true", help="print one JSON object")
@@ -236,6 +216,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     print(
         f"wrote {done.output}: {done.episodes} episodes, {done.frames} frames, {done.files} files"
     )
+    read = (STATE, ENVIRONMENT, "observation.images.")
+    fields = [n for n in done.features if n.startswith("observation.") and not n.startswith(read)]
+    if fields:
+        print(
+            f"note: policies of lerobot do not read {', '.join(fields)}; see --touch",
+            file=sys.stderr,
+        )
     if abs(done.seconds_per_action * done.fps - 1) > 1e-6:
         print(
             f"note: an action lasts {done.seconds_per_action:g} s; frames are stamped as "

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import math
 import sys
 from copy import deepcopy
 from typing import Any, NoReturn, Sequence
@@ -22,9 +21,8 @@ import robomimic.utils.env_utils as env_utils
 from robomimic.envs.env_base import EnvBase, EnvType
 
 from . import _core
+from ._closed_loop import TEST_SEED, success_summary
 from .gym import TaskEnv, gym_id
-
-TEST_SEED = 1000003  # of the episodes that `python -m tangere.robomimic` plays
 
 
 class EnvTangere(EnvBase):  # type: ignore[misc]
@@ -292,21 +290,11 @@ def evaluate(
         meta["env_name"], seed=seed, first_episode=first_episode, **meta["env_kwargs"]
     )
     played = [run_rollout(policy, env, env.horizon) for _ in range(episodes)]
-    solved = int(sum(run["Success_Rate"] for run in played))
-    rate, z = solved / episodes, 1.96
-    middle = (rate + z * z / (2 * episodes)) / (1 + z * z / episodes)
-    half = z * math.sqrt(rate * (1 - rate) / episodes + z * z / (4 * episodes**2))
-    half /= 1 + z * z / episodes
-    return {
-        "task": env.serialize()["env_kwargs"]["task"],
-        "episodes": episodes,
-        "seed": seed,
-        "successes": solved,
-        "success_rate": rate,
-        "interval": [middle - half, middle + half],
-        "mean_return": float(np.mean([run["Return"] for run in played])),
-        "mean_actions": float(np.mean([run["Horizon"] for run in played])),
-    }
+    solved, returns, actions = (
+        [run[name] for run in played] for name in ("Success_Rate", "Return", "Horizon")
+    )
+    found = {"task": env.serialize()["env_kwargs"]["task"], "seed": seed}
+    return found | success_summary(solved, returns, actions)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

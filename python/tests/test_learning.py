@@ -376,3 +376,22 @@ def test_the_figure_has_a_line_for_each_run(monkeypatch, tmp_path):
     # Two updates of 1600 actions end at the right; -500 of -800 to 0 is 90 of 240 high.
     assert lines[0].get("points").split()[0] == "320.0,180.0"
     assert lines[0].get("points").split()[1].startswith("580.0,")
+
+
+def test_curves_are_logged_for_tensorboard(generate, tmp_path, monkeypatch):
+    import tracking
+
+    monkeypatch.setitem(sys.modules, "torch.utils.tensorboard", None)
+    with pytest.raises(SystemExit, match="--log here needs the package tensorboard"):
+        tracking.Log("here")
+    tracking.Log(None)(1, loss=2.0)
+    monkeypatch.undo()
+    pytest.importorskip("tensorboard", reason="tensorboard is not installed")
+    from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
+
+    data = generate("stable_grasp", "--episodes", "20", "--seed", "1")
+    run("bc.py", str(data), "--epochs", "3", "--episodes", "16", "--log", str(tmp_path / "log"))
+    written = EventAccumulator(str(tmp_path / "log")).Reload()
+    losses = written.Scalars("loss")
+    assert [point.step for point in losses] == [1, 2, 3]
+    assert losses[0].value > losses[2].value > 0

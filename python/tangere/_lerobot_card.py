@@ -1,0 +1,111 @@
+# SPDX-License-Identifier: Apache-2.0
+"""README.md of a LeRobot data set: what is in it, and where `datasets.load_dataset` finds it."""
+
+from __future__ import annotations
+
+import json
+from typing import Any, Sequence
+
+from ._lerobot_features import Feature
+from .data import Episodes
+
+
+def card(
+    episodes: Episodes, features: Sequence[Feature], info: dict[str, Any], text: str,
+    successes: int, license: str,
+) -> str:  # fmt: skip
+    """The text of the file. `info` is that of meta/info.json."""
+    said = episodes.attributes
+    seconds = float(said["timestep"]) * int(said["every"])
+    title = episodes.task or str(said["name"])
+    tags = ["LeRobot", "tangere", "tactile", "simulation", title]
+    solved = f" Success ends {successes} of them." if episodes.task else ""
+    lines = [
+        "---",
+        f"license: {json.dumps(license)}",
+        "task_categories: [robotics]",
+        f"tags: {json.dumps(tags, ensure_ascii=False)}",
+        "configs:",
+        "- config_name: default",
+        "  data_files: data/*/*.parquet",
+        "---",
+        f"# {title}",
+        "",
+        f"{text}. Simulated by Tangere, written as LeRobotDataset {info['codebase_version']}.",
+        "",
+        f"- {info['total_episodes']} episodes with {info['total_frames']} frames.{solved}",
+        f"- A frame is one action, which lasts {seconds:g} s. Time stamps are multiples of "
+        f"1/{info['fps']} s. A step of the simulation takes {float(said['timestep']):g} s.",
+        "- Numbers are float32 in SI units. Pictures are PNG.",
+        "",
+        "## Columns",
+        "",
+        *_columns(episodes, features),
+    ]
+    if episodes.sensors:
+        lines += ["", "## Sensors", "", *_sensors(episodes)]
+    lines += [
+        "",
+        "## Origin",
+        "",
+        f"- Command: `{episodes.command}`",
+        f"- Tangere {said['tangere_version']}, instruction set {said['instruction_set']}",
+        "- `meta/tangere.json` has the demo of each episode, scales of observations, and how each "
+        "column is made.",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _columns(episodes: Episodes, features: Sequence[Feature]) -> list[str]:
+    said = episodes.attributes
+    keys = [str(key) for key in said["observations"]]
+    units, meanings = (
+        dict(zip(keys, map(str, said.get(f"observation_{name}", []))))
+        for name in ("units", "meanings")
+    )
+    about = {
+        "action": f"{said.get('action_meaning', 'controls')} [{said.get('action_unit', '1')}]",
+        "next.reward": "reward of the action",
+        "next.done": "true in the last frame of an episode",
+        "next.success": "true in the last frame of an episode that ended in success",
+    }
+    lines = []
+    for feature in features:
+        lines.append(
+            f"- `{feature.name}`, {tuple(feature.shape)} {feature.dtype}"
+            + (f": {about[feature.name]}" if feature.name in about else "")
+        )
+        for key in feature.keys if feature.name not in about else []:
+            what = f"`{key}`"
+            if key in feature.blocks:
+                mean = any(name.startswith(f"{key}.mean") for name in feature.names or [])
+                block = f"over blocks of {feature.blocks[key]} points along each side"
+                what += f", means {'over each pad' if mean else block}"
+            if feature.is_picture:
+                ranges = ", ".join(f"{x:g}" for x in feature.range)
+                what += f", pad {feature.pad}: 0, 128 and 255 are -range, 0 and range, ({ranges})"
+            unit = units.get(key) or ("" if key in ("q", "v") else _unit_of_sensor(episodes, key))
+            if unit and not unit.endswith("_units"):
+                what += f" [{unit}]"
+            lines.append(f"  - {what}" + (f": {meanings[key]}" if meanings.get(key) else ""))
+    return lines
+
+
+def _unit_of_sensor(episodes: Episodes, key: str) -> str:
+    return str(episodes.sensors.get(key, {}).get("units", ""))
+
+
+def _sensors(episodes: Episodes) -> list[str]:
+    lines = []
+    for name, about in episodes.sensors.items():
+        size = about.get("resolution")
+        grid = f"{int(size[0])} × {int(size[1])} points" if size is not None else "a list of points"
+        corners = ""
+        if "corner0" in about:
+            ends = (", ".join(f"{x:g}" for x in about[c]) for c in ("corner0", "corner1"))
+            corners = " from ({}) to ({}) m".format(*ends)
+        lines.append(
+            f"- `{name}` on body `{about['body']}`: {grid}{corners}; components "
+            f"{about['components']} [{about['units']}]; in the frame {about['frame']}"
+        )
+    return lines
