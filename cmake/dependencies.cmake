@@ -9,8 +9,16 @@ if(NOT TARGET xtl)
   set_property(TARGET xsimd PROPERTY INTERFACE_LINK_LIBRARIES "")
 endif()
 find_package(HDF5 REQUIRED COMPONENTS C)
-if(HDF5_USE_STATIC_LIBRARIES)  # FindHDF5 does not say what the archive needs
-  set_property(TARGET hdf5::hdf5 APPEND PROPERTY INTERFACE_LINK_LIBRARIES sz z ${CMAKE_DL_LIBS})
+# The archive of HDF5 becomes part of the Python module (python/CMakeLists.txt) once its names for the standard streams
+# are our own.
+if(HDF5_USE_STATIC_LIBRARIES)
+  set(hdf5_archive ${PROJECT_BINARY_DIR}/libhdf5.a)
+  execute_process(COMMAND ${CMAKE_OBJCOPY} --redefine-sym stdin=tangere_stdin --redefine-sym stdout=tangere_stdout
+    --redefine-sym stderr=tangere_stderr ${HDF5_C_LIBRARY_hdf5} ${hdf5_archive} COMMAND_ERROR_IS_FATAL ANY)
+  add_library(tangere_hdf5_streams STATIC cmake/hdf5_streams.cpp)
+  set_target_properties(tangere_hdf5_streams PROPERTIES POSITION_INDEPENDENT_CODE ON)
+  set_target_properties(hdf5::hdf5 PROPERTIES IMPORTED_LOCATION ${hdf5_archive}
+    INTERFACE_LINK_LIBRARIES "${hdf5_archive};tangere_hdf5_streams;sz;z;${CMAKE_DL_LIBS}")
 endif()
 # Debian 12's libdeflate and liblz4 have no CMake files, so io links them by their plain names.
 find_path(LIBDEFLATE_INCLUDE_DIR libdeflate.h REQUIRED)

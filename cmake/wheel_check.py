@@ -60,6 +60,22 @@ def check_files(folder: Path) -> None:
 
     tangere.data.generate("box_pushing", folder / "b", 2, policy=still, name="still")
     subprocess.run(["tangere", "validate", folder / "b"], check=True, capture_output=True)
+    check_own_task(folder / "c")
+
+
+def check_own_task(folder: Path) -> None:
+    """The module itself writes and reads data sets."""
+    import tangere.data
+
+    class Press(tangere.VectorSceneEnv):
+        scene, horizon = tangere.scenes()["rolling_ball_small"], 3
+
+        def reward(self, actions):
+            return -(actions**2).sum(1)
+
+    tangere.data.generate(Press, folder, 2, policy="random")
+    subprocess.run(["tangere", "validate", folder], check=True, capture_output=True)
+    assert "episode 1" in tangere.view(folder).html
 
 
 def check_libraries() -> None:
