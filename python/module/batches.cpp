@@ -407,6 +407,8 @@ static void make_batch(PythonBatch* self, const Model& model, const Whole<int>& 
   BatchOptions options;
   options.seed = seed.value("seed");
   options.first_episode = first_episode.value("first_episode");
+  if (options.first_episode < 0)
+    throw InputError(fmt::format("first_episode {}; expected 0 or more", options.first_episode));
   options.threads = threads_of(threads);
   options.precision = precision_named(precision);
   options.stepper.timestep = timestep;

@@ -45,6 +45,15 @@ def actions(count, envs):
     return np.random.default_rng(1).uniform([-1, -1, -1], [1, 1, 0], (count, envs, 3))
 
 
+def test_episodes_count_from_zero():
+    scene = tangere.Scene.from_string(
+        '<tangere model="still"><robot><link name="a"><joint name="a" type="prismatic" axis="0 0 1"/>'
+        '<body name="a" type="sphere" radius="1"/></link></robot></tangere>'
+    )
+    with pytest.raises(tangere.InputError, match="first_episode -1; expected 0 or more"):
+        Rolling(2, scene=scene, first_episode=-1)
+
+
 def test_the_twin_of_a_task_has_its_numbers():
     twin = Rolling(4, threads=1, seed=3)
     task = tangere.make_vec("ball_rolling_small", 4, threads=1, seed=3, normalise=False)
