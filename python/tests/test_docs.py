@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import ast
 import importlib.util
+import json
 import re
 import runpy
 import subprocess
@@ -94,3 +95,24 @@ def test_the_example_draws_a_round_touch(capsys):
     runpy.run_path(str(ROOT / "examples/press.py"))
     lines = capsys.readouterr().out.splitlines()
     assert lines[0].startswith("push down") and "@" in "".join(lines[2:])
+
+
+def test_the_notebook_runs_from_top_to_bottom(tmp_path, monkeypatch, capsys, command):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("TANGERE_PROGRAM", str(command))
+    notebook = json.loads((ROOT / "examples/first_touch.ipynb").read_text())
+    names: dict = {"__name__": "first_touch"}
+    shown = []
+    for cell in (c for c in notebook["cells"] if c["cell_type"] == "code"):
+        assert cell["outputs"] == [] and cell["execution_count"] is None  # stripped
+        body = ast.parse("".join(cell["source"])).body
+        last = body.pop() if isinstance(body[-1], ast.Expr) else None
+        exec(compile(ast.Module(body, []), "first_touch.ipynb", "exec"), names)
+        if last is not None:
+            value = ast.Expression(last.value)
+            shown.append(eval(compile(value, "first_touch.ipynb", "eval"), names))
+    shown = [value for value in shown if value is not None]  # of print
+    assert shown[0] == (20, 64, 32, 32, 3) and shown[-1][-3:] == (32, 32, 3)
+    assert any("<iframe" in page._repr_html_() for page in shown if hasattr(page, "html"))
+    said = capsys.readouterr().out
+    assert "@" in said and "32 episodes" in said and ("derivative" in said or "PyTorch" in said)
