@@ -321,7 +321,8 @@ class VectorSceneEnv(_Remade, VectorEnv):
         steps, count, nu = self.steps_per_action, self.num_envs, self.model.nu
         controls = np.asarray(self.controls(actions), np.float64)
         if controls.shape not in ((steps, count, nu), (count, nu), (nu,)):
-            raise self._fault(f"controls() of shape {controls.shape}", f"({count}, {nu})")
+            expected = f"({count}, {nu}) or ({steps}, {count}, {nu})"
+            raise self._fault(f"controls() of shape {controls.shape}", expected)
         if len(envs):
             self.simulate(np.broadcast_to(controls, (steps, count, nu)), envs)
 

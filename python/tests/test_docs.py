@@ -36,6 +36,26 @@ def test_every_block_of_the_page_runs(command, tmp_path):
     assert run_blocks("docs/python.md", names) >= 5
 
 
+def test_the_page_of_a_gripper_leads_to_a_training(tmp_path, monkeypatch, capsys):
+    pytest.importorskip("torch", reason="PyTorch is not installed")
+    monkeypatch.chdir(tmp_path)
+    page = (ROOT / "docs/own_gripper.md").read_text()
+    blocks = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
+    (tmp_path / "lift_egg.py").write_text(blocks[0] + "\n\n" + blocks[1])
+    assert sum(bool(line.strip()) for line in "".join(blocks[:2]).splitlines()) <= 60
+    assert run_blocks("docs/own_gripper.md", {"__name__": "lift_egg"}) == 4
+    rates = ast.literal_eval(capsys.readouterr().out)
+    assert len(rates) == 2 and all(0 < rate < 0.6 for rate in rates.values()), rates
+    assert (tmp_path / "lift_egg.html").stat().st_size > 1e5
+    command = re.search(r"learning/ppo.py (lift_egg.py:\S+)", page)
+    short = ["--steps", "480", "--envs", "16", "--choices", "1", "--episodes", "20", "--json"]
+    done = subprocess.run(
+        [sys.executable, str(ROOT / "learning/ppo.py"), command[1], *short, "--length", "30"],
+        check=True, capture_output=True, text=True,
+    )  # fmt: skip
+    assert json.loads(done.stdout)["test"]["episodes"] == 20
+
+
 def test_every_block_of_the_page_of_learning_runs(generate, capsys):
     data = generate("stable_grasp", "--episodes", "20", "--seed", "1")
     assert run_blocks("docs/learning.md", {"DATA": str(data)}) == 2
