@@ -1,23 +1,28 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A task written in Python against its C++ brother, on one thread: steps and data sets.
+"""Tasks written in Python against their C++ brothers, on one thread: steps and data sets.
 
     PYTHONPATH=build/release/python build/venv/bin/python bench/python_task.py
 
 Alternates between the two on equal work: `ball_rolling_small`, with a field of 32 × 32 points in
-every observation. Prints CPU milliseconds of a step of 1024 environments and their ratio. Then the
-same function plays 512 episodes: in the Python task without storing, and into data sets of both.
-Prints seconds, CPU seconds (writing and the C++ command included) and what the median of five runs
-makes of them.
+every observation, and `stable_grasp`, with random shifts. Prints CPU milliseconds of a step of 1024
+environments and their ratio. Then the same function plays 512 episodes of the first task: in Python
+without storing, and into data sets of both. Prints seconds, CPU seconds (writing and the C++
+command included) and what the median of five runs makes of them.
 """
 
 import resource
+import sys
 import tempfile
 import time
+from pathlib import Path
 
 import numpy as np
 
 import tangere
 import tangere.data
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "examples"))
+from stable_grasp import StableGrasp  # noqa: E402
 
 ENVS, EPISODES, AT_ONCE = 1024, 512, 128
 
@@ -47,15 +52,21 @@ def cpu(env, actions) -> float:
     return 1e3 * (time.process_time() - begin)
 
 
-ours = Rolling(ENVS, threads=1, seed=1)
-theirs = tangere.make_vec("ball_rolling_small", ENVS, threads=1, seed=1)
-ours.reset(), theirs.reset()
-times = []
-for _ in range(60):
-    actions = np.random.default_rng(len(times)).uniform(-0.3, 0.1, (ENVS, 3))
-    times.append((cpu(ours, actions), cpu(theirs, actions)))
-mine, brother = np.median(times[20:], axis=0)  # pads touch
-print(f"Python {mine:.2f} ms, C++ {brother:.2f} ms: {brother / mine:.2f} of its rate")
+def compare(kind, brother, low, high, count, skipped):
+    """Prints the times of a step with uniform actions, (na) bounds. The first ones do not count."""
+    words = {"threads": 1, "seed": 1}
+    ours, theirs = kind(ENVS, **words), tangere.make_vec(brother, ENVS, **words)
+    ours.reset(), theirs.reset()
+    times = []
+    for _ in range(count):
+        actions = np.random.default_rng(len(times)).uniform(low, high, (ENVS, len(low)))
+        times.append((cpu(ours, actions), cpu(theirs, actions)))
+    mine, other = np.mean(times[skipped:], axis=0)
+    print(f"{brother}: Python {mine:.2f} ms, C++ {other:.2f} ms: {other / mine:.2f} of its rate")
+
+
+compare(Rolling, "ball_rolling_small", [-0.3] * 3, [0.1] * 3, 60, 20)  # then pads touch
+compare(StableGrasp, "stable_grasp", [-0.5], [0.5], 20, 0)
 
 
 def choose(obs, episodes, actions):

@@ -2,8 +2,10 @@
 """Proximal policy optimisation of any task, with memory by a flag.
 
     python learning/ppo.py stable_grasp --seed 0
+    python learning/ppo.py examples/stable_grasp.py:StableGrasp
 
-With r = π(a|o)/π_old(a|o) and the advantage A of generalised advantage estimation, minibatches of
+A task is one of the catalogue, or a class of `tangere.VectorSceneEnv` in a file or a module. With
+r = π(a|o)/π_old(a|o) and the advantage A of generalised advantage estimation, minibatches of
 
     L = mean( max(-A r, -A clip(r, 1 ± ε)) ) + ½ c_v mean (V - R)² ,
     A_t = δ_t + γ λ (1 - end_t) A_{t+1},   δ_t = ρ_t + γ V_{t+1} - V_t,   R = A + V
@@ -16,7 +18,8 @@ means act in tests.
 With `--last_gamma` the horizon 1 / (1 - γ) grows or shrinks by the same factor at every update, to
 that of this γ at the end. `--imitate s`: in the first share s of all updates the policy plays, but
 learns what the script would have done where it came to, |mean - a_script|² in place of the first
-term of L. `TASKS` has the settings of each task; every one is an option as well.
+term of L. A class needs `scripted_action()` for it. `TASKS` has the settings of each task; every one
+is an option as well.
 """
 
 from __future__ import annotations
@@ -30,7 +33,15 @@ from typing import Any
 
 import numpy as np
 import torch
-from protocol import CHOICE_EPISODES, CHOICE_SEED, TEST_SEED, merit, play, provenance
+from protocol import (
+    CHOICE_EPISODES,
+    CHOICE_SEED,
+    TEST_SEED,
+    make_vec,
+    merit,
+    play,
+    provenance,
+)
 from torch import nn
 from tracking import Log, add_log
 
@@ -40,7 +51,7 @@ COMMON = {
     "steps": 2_000_000, "envs": 256, "length": 32, "passes": 4, "minibatch": 512, "rate": 3e-4,
     "gamma": 0.99, "last_gamma": 0.0, "imitate": 0.0, "trace": 0.95, "clip": 0.2, "value": 0.5,
     "entropy": 0.0, "norm": 0.5,
-    "deviation": 1.0, "recurrent": False, "squash": False,
+    "deviation": 1.0, "recurrent": False, "squash": False, "convolve": True,
 }  # fmt: skip
 INSERTION = {"steps": 40_960, "envs": 64, "minibatch": 256, "deviation": 0.2, "imitate": 0.5,
              "recurrent": True}
@@ -55,8 +66,8 @@ TASKS: dict[str, dict[str, Any]] = {
     "insertion": INSERTION | {"steps": 102_400, "deviation": 0.5, "imitate": 0.0},
     "insertion_translation": INSERTION,
     "insertion_rotation": INSERTION | {"steps": 122_880, "deviation": 0.5, "imitate": 0.3},
-    "box_pushing": {"squash": True, "passes": 10, "minibatch": 1024, "rate": 1e-3,
-                    "deviation": 0.5},
+    "box_pushing": {"squash": True, "convolve": False, "passes": 10, "minibatch": 1024,
+                    "rate": 1e-3, "deviation": 0.5},
 }  # fmt: skip
 MOST_DRIVE = 0.999  # |a| of a squashed action, as in the reward of box pushing
 
@@ -86,23 +97,30 @@ class Running:
 class Eyes:
     """Observations of the task as two normalised arrays: an image (E, c, h, w) and the rest (E, n).
 
-    Flow and fields become channels if the task is seen by a convolution, else numbers. In images of
-    20 × 20 pixels and more, the forces of 2 × 2 pixels are summed: most of those pixels are empty.
-    Of a field that is seen as n numbers each counts 4/√n, so that it does not outweigh the goal.
+    Flow and fields become channels if the task is seen by a convolution, else numbers: those that
+    have the size of the first one, of 6 × 6 pixels and more. In images of 20 × 20 pixels and more,
+    the forces of 2 × 2 pixels are summed: most of those pixels are empty. Of a field that is seen
+    as n numbers each counts 4/√n, so that it does not outweigh the goal. `shapes`: those of the
+    observations, by name.
     """
 
-    def __init__(self, spec: tangere.TaskSpec, convolve: bool, device: str = "cpu"):
+    def __init__(self, shapes: dict[str, tuple[int, ...]], convolve: bool, device: str = "cpu"):
         self.device = device
-        self.channels_last = {t.name: t.shape[-1] == 3 for t in spec.observations}
-        images = [t for t in spec.observations if convolve and len(t.shape) >= 3]
-        self.images = [t.name for t in images]
-        self.flat = [t.name for t in spec.observations if t.name not in self.images]
-        sizes = {t.name: int(np.prod(t.shape)) for t in spec.observations}
+        self.channels_last = {name: shape[-1:] == (3,) for name, shape in shapes.items()}
+        pixels = {
+            name: shape[-3:-1] if self.channels_last[name] else shape[-2:]
+            for name, shape in shapes.items()
+            if convolve and len(shape) >= 3
+        }
+        large = [name for name, size in pixels.items() if min(size) >= 6]
+        self.images = [name for name in large if pixels[name] == pixels[large[0]]]
+        self.flat = [name for name in shapes if name not in self.images]
+        sizes = {name: int(np.prod(shape)) for name, shape in shapes.items()}
         self.share = np.concatenate(
             [np.full(sizes[n], min(1, 4 / sizes[n] ** 0.5), np.float32) for n in self.flat]
             or [np.zeros(0, np.float32)]
         )
-        zeros = {t.name: np.zeros((1, *t.shape), np.float32) for t in spec.observations}
+        zeros = {name: np.zeros((1, *shape), np.float32) for name, shape in shapes.items()}
         image, rest = self._arrays(zeros)
         self.shapes = (image.shape[1:], rest.shape[1:])
         self.running = (Running(self.shapes[0]), Running(self.shapes[1]))
@@ -209,7 +227,7 @@ class Actor:
         if t == 0:
             at = self.eyes.device
             self.state = torch.zeros(env.num_envs, 64, device=at)
-            self.past = torch.zeros(env.num_envs, *env.task.action.shape, device=at)
+            self.past = torch.zeros(env.action_space.shape, device=at)
         with torch.no_grad():
             self.past, _, self.state = self.agent(*self.eyes(obs), self.state, self.past)
         return driven(self.past, self.squash)
@@ -225,12 +243,12 @@ class Collector:
 
     def __init__(self, asked: argparse.Namespace, agent: Agent, eyes: Eyes):
         self.asked, self.agent, self.eyes = asked, agent, eyes
-        self.env = tangere.make_vec(asked.task, asked.envs, seed=1 + asked.seed,
-                                    autoreset="same_step", threads=asked.threads)  # fmt: skip
+        self.env = make_vec(asked.task, asked.envs, seed=1 + asked.seed, autoreset="same_step",
+                            threads=asked.threads)  # fmt: skip
         obs, _ = self.env.reset()
         self.obs = eyes(obs, learn=True)
         self.state = torch.zeros(asked.envs, 64, device=eyes.device)
-        self.past = torch.zeros(asked.envs, *self.env.task.action.shape, device=eyes.device)
+        self.past = torch.zeros(self.env.action_space.shape, device=eyes.device)
         self.begins = torch.ones(asked.envs, dtype=torch.bool, device=eyes.device)
         self.discounted, self.returns = np.zeros(asked.envs), np.zeros(asked.envs)
         self.scale = Running((1,))
@@ -322,12 +340,14 @@ def improve(agent: Agent, optimiser, batch, first: torch.Tensor, asked, draw: np
 
 def settings() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("task", choices=tangere.task_names())
+    parser.add_argument("task", help="a name, or FILE.py:CLASS or MODULE:CLASS of your own")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--threads", type=int, default=None)
     parser.add_argument("--device", default="cpu", help="where the networks are: cpu, cuda")
     parser.add_argument("--episodes", type=int, default=1000, help="to test on")
     parser.add_argument("--choices", type=int, default=5, help="policies to choose from")
+    parser.add_argument("--without", action="append", default=[], metavar="KEY",
+                        help="an observation that the policy does not see")  # fmt: skip
     parser.add_argument("--json", action="store_true")
     add_log(parser)
     for name, value in COMMON.items():
@@ -343,19 +363,29 @@ def settings() -> argparse.Namespace:
     return asked
 
 
+def seen_shapes(env: Any, asked: argparse.Namespace) -> dict[str, tuple[int, ...]]:
+    """Shapes of what the policy sees, by name."""
+    shapes = {name: box.shape for name, box in env.single_observation_space.items()}
+    for name in asked.without:
+        if shapes.pop(name, None) is None or not shapes:
+            raise SystemExit(f"ppo.py: --without {name}; the policy sees {list(shapes)}")
+    if asked.imitate and not hasattr(env, "scripted_action"):
+        raise SystemExit(f"ppo.py: --imitate {asked.imitate}; {asked.task} has no scripted_action()")
+    return shapes
+
+
 def main() -> None:
     asked = settings()
     torch.set_num_threads(1)
     torch.manual_seed(asked.seed)
     begin, clock = time.process_time(), time.perf_counter()
-    spec = tangere.task_spec(asked.task)
-    eyes = Eyes(spec, not asked.task.startswith("box_pushing"), asked.device)
-    agent = Agent(eyes.shapes, spec.action.shape[0], asked.deviation, asked.recurrent)
+    choice = make_vec(asked.task, CHOICE_EPISODES, autoreset="disabled", threads=asked.threads)
+    eyes = Eyes(seen_shapes(choice, asked), asked.convolve, asked.device)
+    agent = Agent(eyes.shapes, choice.single_action_space.shape[0], asked.deviation,
+                  asked.recurrent)  # fmt: skip
     agent.to(asked.device)
     optimiser = torch.optim.Adam(agent.parameters(), lr=asked.rate, eps=1e-5)
     collector, draw = Collector(asked, agent, eyes), np.random.default_rng(asked.seed)
-    choice = tangere.make_vec(asked.task, CHOICE_EPISODES, autoreset="disabled",
-                              threads=asked.threads)  # fmt: skip
     log = Log(asked.log)
     updates, curve, chosen = asked.steps // (asked.envs * asked.length), [], []
     best, kept = (-np.inf,), (agent, eyes)
@@ -383,7 +413,7 @@ def main() -> None:
               file=sys.stderr, flush=True)  # fmt: skip
     cost = {"train_cpu_s": time.process_time() - begin,
             "train_wall_s": time.perf_counter() - clock}  # fmt: skip
-    env = tangere.make_vec(asked.task, asked.episodes, autoreset="disabled", threads=asked.threads)
+    env = make_vec(asked.task, asked.episodes, autoreset="disabled", threads=asked.threads)
     result = play(env, TEST_SEED, Actor(*kept, asked.squash)).summary()
     if asked.json:
         print(json.dumps({"program": "ppo", "settings": vars(asked),

@@ -10,7 +10,9 @@ test episodes are the same for every policy. A result is one JSON object a run (
 
 from __future__ import annotations
 
+import importlib
 import platform
+import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Callable, Sequence
@@ -28,7 +30,26 @@ PLACE_UNIT, YAW_UNIT = 0.1, 0.276  # [m], [rad]: what costs 1 in the reward of b
 # t_{0.975, k-1} for k = 2 … 10 runs, from a table of Student's distribution.
 _STUDENT = (12.706, 4.303, 3.182, 2.776, 2.571, 2.447, 2.365, 2.306, 2.262)
 
-Choose = Callable[[tangere.gym.VectorTaskEnv, Any, int], np.ndarray]
+Env = tangere.gym.VectorTaskEnv | tangere.VectorSceneEnv
+Choose = Callable[[Env, Any, int], np.ndarray]
+
+
+def make_vec(task: str, num_envs: int, **options: Any) -> Env:
+    """Environments of a task: a name of the catalogue, or FILE.py:CLASS or MODULE:CLASS of a
+    `tangere.VectorSceneEnv`. Ends the program if there is none."""
+    if task in tangere.task_names():
+        return tangere.make_vec(task, num_envs, **options)
+    module, _, name = task.rpartition(":")
+    if module.endswith(".py"):
+        sys.path.insert(0, str(Path(module).parent.resolve()))
+        module = Path(module).stem
+    kind = getattr(importlib.import_module(module), name, None) if module and name else None
+    if not isinstance(kind, type) or not issubclass(kind, tangere.VectorSceneEnv):
+        raise SystemExit(
+            f"task {task!r}; expected one of {', '.join(tangere.task_names())}, or FILE.py:CLASS or "
+            "MODULE:CLASS of a tangere.VectorSceneEnv"
+        )
+    return kind(num_envs, **options)
 
 
 @dataclass
@@ -54,9 +75,7 @@ class Played:
         return means
 
 
-def play(
-    env: tangere.gym.VectorTaskEnv, seed: int, choose: Choose, first_episode: int = 0
-) -> Played:
+def play(env: Env, seed: int, choose: Choose, first_episode: int = 0) -> Played:
     """Plays episodes of a seed to their ends. `env` has autoreset="disabled".
 
     `choose(env, obs, t)` returns action t of every environment, (E, na).
@@ -66,7 +85,7 @@ def play(
     solved = np.zeros(env.num_envs, bool)
     returns = np.zeros(env.num_envs)
     actions = np.zeros(env.num_envs, int)
-    for t in range(env.task.horizon):
+    for t in range(horizon(env)):
         obs, reward, terminated, truncated, info = env.step(choose(env, obs, t))
         returns += np.where(over, 0, reward)
         actions += ~over
@@ -74,8 +93,14 @@ def play(
         over |= terminated | truncated
         if over.all():
             break
-    position, yaw = box_errors(env) if env.task.name.startswith("box_pushing") else (None, None)
+    is_box = hasattr(env, "task") and env.task.name.startswith("box_pushing")
+    position, yaw = box_errors(env) if is_box else (None, None)
     return Played(solved, returns, actions, position, yaw)
+
+
+def horizon(env: Env) -> int:
+    """Actions after which an episode is truncated."""
+    return env.task.horizon if hasattr(env, "task") else env.horizon
 
 
 def merit(played: dict[str, float]) -> tuple[float, ...]:

@@ -45,7 +45,7 @@ void PythonBatch::take_step(Worker& worker, int block, std::span<const double> u
   worker.stepper.step_block(batch_, block, u);
   const int first = block * kernels::kBlock;
   for (int e = first; e < std::min(first + kernels::kBlock, environments()); ++e)
-    if (!failed(batch_.status(e))) counts_[as_size(e)].count(batch_, e);
+    if (!batch_.held(e) && !failed(batch_.status(e))) counts_[as_size(e)].count(batch_, e);
 }
 
 FieldOutput PythonBatch::reading_named(const std::string& name) const {
@@ -108,7 +108,8 @@ nb::object PythonBatch::tactile(const std::string& reading, const nb::object& ou
 }
 
 Run PythonBatch::run(const Argument<double>& u, const Whole<int>& interval,
-                     const std::vector<std::string>& readings) {
+                     const std::vector<std::string>& readings, const nb::object& environments) {
+  const std::vector<int> moving = listed(environments);
   if (u.ndim() == 0 || u.shape(0) == 0)
     throw InputError("controls without a step; expected (T, E, nu)");
   const std::size_t steps = u.shape(0), nu = as_size(model().nu());
@@ -117,13 +118,30 @@ Run PythonBatch::run(const Argument<double>& u, const Whole<int>& interval,
     throw InputError(
         fmt::format("{} steps with a frame every {}; expected a multiple of it", steps, every));
   const auto controls = numbers_of(u, {steps, count(), nu}, "controls");
-  return precision_ == Precision::f64 ? run_as<double>(controls, steps, as_size(every), readings)
-                                      : run_as<float>(controls, steps, as_size(every), readings);
+  return precision_ == Precision::f64
+             ? run_as<double>(controls, steps, as_size(every), readings, moving)
+             : run_as<float>(controls, steps, as_size(every), readings, moving);
 }
+
+/// Holds all environments but those listed, until it goes out of scope.
+struct PythonBatch::Waiting {
+  Waiting(Batch& batch, const std::vector<int>& moving) : batch_(batch) {
+    for (int e = 0; e < batch.environments(); ++e) batch.hold(e);
+    for (const int e : moving) batch.hold(e, false);
+  }
+  Waiting(const Waiting&) = delete;
+  Waiting& operator=(const Waiting&) = delete;
+  ~Waiting() {
+    for (int e = 0; e < batch_.environments(); ++e) batch_.hold(e, false);
+  }
+
+ private:
+  Batch& batch_;
+};
 
 template <class T>
 Run PythonBatch::run_as(std::span<const double> u, std::size_t steps, std::size_t every,
-                        const std::vector<std::string>& readings) {
+                        const std::vector<std::string>& readings, const std::vector<int>& moving) {
   struct Asked {
     FieldOutput output;
     std::size_t width;
@@ -154,6 +172,7 @@ Run PythonBatch::run_as(std::span<const double> u, std::size_t steps, std::size_
   {
     const InUse::Turn turn(in_use_);
     const nb::gil_scoped_release free;
+    const Waiting others(batch_, moving);
     threads_.for_each(batch_.blocks(), workers_, [&](Worker& worker, int block) {
       for (std::size_t t = 0; t < steps; ++t) {
         take_step(worker, block, u.subspan(t * count() * nu, count() * nu));
@@ -489,10 +508,13 @@ void add_batches(nb::module_& m) {
       .def("step", &PythonBatch::step, "u"_a,
            "Takes one step. `u`: (E, nu) controls, or (nu) for all environments; clipped to the\n"
            "motors' ranges. InputError: another shape.")
-      .def("run", &PythonBatch::run, "u"_a, "every"_a = 1, "fields"_a = std::vector<std::string>(),
-           "Takes T steps with the controls `u`, (T, E, nu), in one call. Keeps the state after\n"
-           "every `every` steps, and the readings named in `fields`. InputError: another shape, T\n"
-           "is no multiple of `every`, or there is no such reading.")
+      .def(
+          "run", &PythonBatch::run, "u"_a, "every"_a = 1, "fields"_a = std::vector<std::string>(),
+          "envs"_a = nb::none(),
+          "Takes T steps with the controls `u`, (T, E, nu), in one call. Keeps the state after\n"
+          "every `every` steps, and the readings named in `fields`. `envs`: the environments that\n"
+          "are stepped (indices, or a mask (E)), None for all; the others stand still.\n"
+          "InputError: another shape, T is no multiple of `every`, no such reading or environment.")
       .def("tactile", &PythonBatch::tactile, "reading"_a, "out"_a = nb::none(),
            nb::sig("def tactile(self, reading: str, out: numpy.typing.NDArray | None = None) -> "
                    "numpy.typing.NDArray"),

@@ -42,7 +42,7 @@ class PythonBatch {
 
   void step(const Argument<double>& u);
   Run run(const Argument<double>& u, const Whole<int>& interval,
-          const std::vector<std::string>& readings);
+          const std::vector<std::string>& readings, const nb::object& environments);
   nb::object tactile(const std::string& reading, const nb::object& out);
   [[nodiscard]] Array<double> q();
   [[nodiscard]] Array<double> v();
@@ -69,6 +69,7 @@ class PythonBatch {
   [[nodiscard]] std::uint64_t seed() const { return batch_.seed(); }
 
  private:
+  struct Waiting;
   struct Worker {
     Stepper stepper;
     Readout readout;
@@ -87,7 +88,7 @@ class PythonBatch {
   nb::object read(FieldOutput output, const nb::object& out);
   template <class T>
   Run run_as(std::span<const double> u, std::size_t steps, std::size_t every,
-             const std::vector<std::string>& readings);
+             const std::vector<std::string>& readings, const std::vector<int>& moving);
 
   Batch batch_;
   ShearStateArrays shear_arrays_;

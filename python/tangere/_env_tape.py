@@ -26,7 +26,8 @@ class EnvTape:
         (-total.mean()).backward()
 
     The class has `arrays = "torch"`, and its methods compute with tensors. Starts, goals and drawn
-    numbers count as given, and so do ends of episodes.
+    numbers count as given, and so do ends of episodes. A class with `warm_up`, with controls that
+    change within an action or with a `simulate` of its own is refused.
 
     Parameters
     ----------
@@ -56,6 +57,9 @@ class EnvTape:
     ):
         if task.arrays != "torch":
             raise _core.InputError(f'{task.__name__}: arrays "{task.arrays}"; expected "torch"')
+        if task.warm_up or task.simulate is not VectorSceneEnv.simulate:
+            what = "a warm_up" if task.warm_up else "a simulate() of its own"
+            raise _core.InputError(f"{task.__name__}: {what}, which a tape does not record")
         self.env = task(num_envs, threads=threads, seed=0, **arguments)
         self.num_envs, self.flatten, self.dtype = num_envs, flatten, dtype
         self.actions = actions or self.env.horizon
@@ -97,6 +101,11 @@ class EnvTape:
             raise _core.InputError(f"actions of shape {tuple(actions.shape)}; expected {shape}")
         actions = torch.minimum(torch.maximum(actions, self._low), self._high).expand(shape)
         controls = torch.as_tensor(self.env.controls(actions))
+        if controls.ndim > 2:
+            raise _core.InputError(
+                f"{type(self.env).__name__}: controls() that change within an action; a tape has "
+                f"one for all steps, (E, {self.env.model.nu})"
+            )
         self._take(self.simulation.step(self._state, controls))
         alive = ~self._ended
         self.env.lengths += 1

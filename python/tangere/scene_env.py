@@ -43,14 +43,17 @@ class VectorSceneEnv(_Remade, VectorEnv):
     Class attributes: `scene` (a file or a `tangere.Scene`), `steps_per_action` (simulation steps
     with the same controls), `horizon` (actions after which an episode is truncated), `actions`
     (numbers of an action; None: those of the controls), `action_low` and `action_high` (one number,
-    or one per number of an action; actions are clipped to them). For data sets alone: `units` (KEY
-    → unit of an observation, "action" → that of the actions), `privileged` (KEYs that a robot could
-    not measure), `touch` (KEYs whose numbers are all 0 without contact). `arrays`: "torch" where
-    the methods compute with tensors, for `tangere.torch.EnvTape`; `batch` returns tensors then.
+    or one per number of an action; actions are clipped to them), `warm_up` (whether an episode
+    begins with an action of zeros, which does not count: the first observation is of the state
+    after it). For data sets alone: `units` (KEY → unit of an observation, "action" → that of the
+    actions), `privileged` (KEYs that a robot could not measure), `touch` (KEYs whose numbers are
+    all 0 without contact). `arrays`: "torch" where the methods compute with tensors, for
+    `tangere.torch.EnvTape`; `batch` returns tensors then.
 
     Methods, for all environments at once: `reward` is obligatory; `observe`, `controls`,
-    `terminated`, `success` and `restart` have defaults. They read `self.batch` (`tangere.Batch`),
-    `self.lengths` (E), the actions since the start of each episode, and `self.episodes` (E).
+    `simulate`, `terminated`, `success` and `restart` have defaults. They read `self.batch`
+    (`tangere.Batch`), `self.lengths` (E), the actions since the start of each episode, and
+    `self.episodes` (E).
 
     Environment e plays episodes first_episode + e, first_episode + e + E, … of a seed. Scene draws
     (`<randomize>`) and `uniform` are the same for an episode, whatever the number of environments
@@ -66,8 +69,7 @@ class VectorSceneEnv(_Remade, VectorEnv):
     seed, first_episode: which episodes the first reset starts, unless it is given a seed. None: a
         seed from the system.
     flatten: one array (E, n) instead of a dict, in the order of `observe`.
-    autoreset: "next_step", "same_step" or "disabled", as in `VectorTaskEnv`. When disabled, a step
-        after the end of an episode raises InputError.
+    autoreset: "next_step", "same_step" or "disabled", as in `VectorTaskEnv`.
     scene: another scene than that of the class.
     render_mode: "rgb_array" for pictures by `render`.
     """
@@ -78,6 +80,7 @@ class VectorSceneEnv(_Remade, VectorEnv):
     actions: int | None = None
     action_low: float | Sequence[float] = -1.0
     action_high: float | Sequence[float] = 1.0
+    warm_up: bool = False
     units: dict[str, str] = {}
     privileged: Sequence[str] = ()
     touch: Sequence[str] = ()
@@ -88,6 +91,7 @@ class VectorSceneEnv(_Remade, VectorEnv):
     _given: Callable[[NDArray[np.float64]], Any] = staticmethod(lambda actions: actions)
     _ended: NDArray[np.bool_]
     _starting: NDArray[np.bool_]
+    _terminated: NDArray[np.bool_]
 
     def __init__(
         self,
@@ -128,6 +132,7 @@ class VectorSceneEnv(_Remade, VectorEnv):
             bounds = f"action_low {self.action_low!r} and action_high {self.action_high!r}"
             raise self._fault(bounds, "the first below the second")
         self._low, self._high = low.astype(np.float64), high.astype(np.float64)
+        self._zeros = np.clip(np.zeros(shape), self._low, self._high)
         self.single_action_space = spaces.Box(
             low.astype(np.float32), high.astype(np.float32), dtype=np.float32
         )
@@ -158,8 +163,16 @@ class VectorSceneEnv(_Remade, VectorEnv):
         return {"q": self.batch.q, "v": self.batch.v} | sums
 
     def controls(self, actions: NDArray[np.float64]) -> Any:
-        """(E, nu) of actions (E, na). By default the actions themselves."""
+        """(E, nu) of actions (E, na), or (steps_per_action, E, nu) where they change within an
+        action. By default the actions themselves. Some environments may stand still: set arrays of
+        the task in `simulate`."""
         return actions
+
+    def simulate(self, controls: NDArray[np.float64], envs: Indices) -> None:
+        """Takes the steps of an action of the environments `envs` with the controls
+        (steps_per_action, E, nu), as `batch.run` does. A task that reads something within an action
+        takes them itself, with `every` and `fields`, and keeps the rows of `envs`."""
+        self.batch.run(controls, every=len(controls), envs=envs)
 
     def reward(self, actions: NDArray[np.float64]) -> Any:
         """(E) after the actions (E, na)."""
@@ -220,6 +233,7 @@ class VectorSceneEnv(_Remade, VectorEnv):
         self, actions: Any
     ) -> tuple[Observation, NDArray[Any], NDArray[Any], NDArray[Any], dict[str, Any]]:
         """Takes one action of every environment, (E, na) or (na) for all, clipped to its bounds.
+        One whose episode has ended starts the next one instead, or stands still (`autoreset`).
 
         Returns observations, rewards (E) float64, terminated, truncated (E) bool, info. Everything
         is new at every step. Raises InputError for actions, controls, rewards or ends of another
@@ -230,34 +244,28 @@ class VectorSceneEnv(_Remade, VectorEnv):
         if actions.shape not in (one, many):
             raise _core.InputError(f"actions of shape {actions.shape}; expected {many} or {one}")
         ended = self._ended.copy()
-        if self._mode == "disabled" and ended.any():
-            first = np.flatnonzero(ended)[:5].tolist()
-            raise self._fault(
-                f"step() after the end of episodes in environments {first}",
-                "reset(options={'reset_mask': mask}) before it",
-            )
         self._fresh = False
-        actions = np.clip(np.broadcast_to(actions, many), self._low, self._high)
-        given = self._given(actions)
-        controls = np.asarray(numbers(self.controls(given)), np.float64)
-        if controls.shape not in ((self.num_envs, self.model.nu), (self.model.nu,)):
-            expected = f"({self.num_envs}, {self.model.nu})"
-            raise self._fault(f"controls() of shape {controls.shape}", expected)
-        steps = self.steps_per_action
-        u = np.broadcast_to(controls, (steps, self.num_envs, self.model.nu))
-        self._batch.run(u, every=steps)
-        self.lengths += 1
         self._starting[:] = False
-        if ended.any():  # autoreset "next_step": these actions were not theirs
-            self._start_next(ended)
-        reward = np.where(ended, 0.0, self._row("reward", self.reward(given), np.float64))
+        actions = np.clip(np.broadcast_to(actions, many), self._low, self._high)
+        moving = ~ended
+        if self._mode == "next_step":
+            self._start_next(ended, warm_up=False)
+            actions[ended] = self._zeros
+            moving |= self.warm_up
+        self._act(actions, np.flatnonzero(moving))
+        self.lengths[~ended] += 1
+        reward = self._row("reward", self.reward(self._given(actions)), np.float64)
+        reward = np.where(ended, 0.0, reward)
         if not np.isfinite(reward).all():
             e = int(np.flatnonzero(~np.isfinite(reward))[0])
             raise self._fault(f"reward() {reward[e]} in environment {e}", "a finite number")
         terminated = self.flags("terminated") & ~ended
         failed = self._batch.status < 0
         truncated = ((self.lengths >= self.horizon) | failed) & ~terminated & ~ended
-        self._ended = terminated | truncated
+        if self._mode == "disabled":  # those that stand still stay as they ended
+            terminated |= ended & self._terminated
+            truncated |= ended & ~self._terminated
+        self._terminated, self._ended = terminated.copy(), terminated | truncated
         info = self._info()
         if self._mode == "same_step" and self._ended.any():
             last, ends = self._observe(), self._ended.copy()
@@ -310,19 +318,32 @@ class VectorSceneEnv(_Remade, VectorEnv):
         self.lengths = np.zeros(self.num_envs, np.int64)
         self._ended = np.zeros(self.num_envs, bool)
         self._starting = np.zeros(self.num_envs, bool)
+        self._terminated = np.zeros(self.num_envs, bool)
         self._random: dict[int, np.random.Generator] = {}
         self._views: dict[int, View] = {}
-        self._begin(np.arange(self.num_envs))
+        self._start(np.arange(self.num_envs), self.episodes.copy())
 
-    def _start_next(self, which: NDArray[np.bool_]) -> None:
+    def _start_next(self, which: NDArray[np.bool_], warm_up: bool = True) -> None:
         envs = np.flatnonzero(which)
-        self._start(envs, self.episodes[envs] + self.num_envs)
+        self._start(envs, self.episodes[envs] + self.num_envs, warm_up)
 
-    def _start(self, envs: Indices, episodes: NDArray[np.int64]) -> None:
+    def _start(self, envs: Indices, episodes: NDArray[np.int64], warm_up: bool = True) -> None:
         if len(envs):
             self.episodes[envs] = episodes
             self._batch.reset(envs, episodes.tolist())
             self._begin(envs)
+            if self.warm_up and warm_up:
+                self._act(np.tile(self._zeros, (self.num_envs, 1)), envs)
+
+    def _act(self, actions: NDArray[np.float64], envs: Indices) -> None:
+        """Takes the actions (E, na) of some environments; the others stand still."""
+        steps, count, nu = self.steps_per_action, self.num_envs, self.model.nu
+        controls = np.asarray(numbers(self.controls(self._given(actions))), np.float64)
+        if controls.shape not in ((steps, count, nu), (count, nu), (nu,)):
+            expected = f"({count}, {nu}) or ({steps}, {count}, {nu})"
+            raise self._fault(f"controls() of shape {controls.shape}", expected)
+        if len(envs):
+            self.simulate(np.broadcast_to(controls, (steps, count, nu)), envs)
 
     def _begin(self, envs: Indices) -> None:
         self._ended[envs], self._starting[envs], self.lengths[envs] = False, True, 0

@@ -59,6 +59,26 @@ def test_a_run_is_its_steps(model):
     np.testing.assert_allclose(np.abs(run.fields["pad.sum"][1, :, 2]), np.abs(pressed), rtol=1e-9)
 
 
+def test_a_run_of_some_environments_leaves_the_others(model):
+    batch, whole = (tangere.Batch(model, num_envs=11, seed=2) for _ in range(2))
+    u = whole.scene_controls(60)
+    start, q = batch.q, whole.run(u[:30]).q[-1]
+    some = np.array([0, 3, 10])
+    others = np.setdiff1d(np.arange(11), some)
+    run = batch.run(u[:30], every=30, fields=["pad"], envs=some)
+    np.testing.assert_array_equal(run.q[0], batch.q)
+    np.testing.assert_array_equal(batch.q[some], q[some])
+    np.testing.assert_array_equal(batch.q[others], start[others])
+    assert list(batch.counts()["simulation_steps"]) == [30 * (e in some) for e in range(11)]
+    assert list(batch.steps) == [30 * (e in some) for e in range(11)]
+    batch.run(u[:30], envs=~np.isin(np.arange(11), some))
+    np.testing.assert_array_equal(batch.q, q)
+    batch.run(u[30:])  # all of them move again, with the state one step before
+    np.testing.assert_array_equal(batch.q, whole.run(u[30:]).q[-1])
+    with pytest.raises(tangere.InputError, match="environment 11; expected 0 to 10"):
+        batch.run(u, envs=[11])
+
+
 def test_an_episode_is_the_same_in_any_batch(model):
     u = np.array([0.125, 0.0, -0.25])
     wide = tangere.Batch(model, num_envs=20, seed=7)

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import ast
 import importlib.util
+import json
 import re
 import runpy
 import subprocess
@@ -33,6 +34,26 @@ def test_every_block_of_the_page_runs(command, tmp_path):
     pytest.importorskip("jax", reason="JAX is not installed")
     names = {"TANGERE": str(command), "DATA": str(tmp_path / "data")}
     assert run_blocks("docs/python.md", names) >= 5
+
+
+def test_the_page_of_a_gripper_leads_to_a_training(tmp_path, monkeypatch, capsys):
+    pytest.importorskip("torch", reason="PyTorch is not installed")
+    monkeypatch.chdir(tmp_path)
+    page = (ROOT / "docs/own_gripper.md").read_text()
+    blocks = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
+    (tmp_path / "lift_egg.py").write_text(blocks[0] + "\n\n" + blocks[1])
+    assert sum(bool(line.strip()) for line in "".join(blocks[:2]).splitlines()) <= 60
+    assert run_blocks("docs/own_gripper.md", {"__name__": "lift_egg"}) == 4
+    rates = ast.literal_eval(capsys.readouterr().out)
+    assert len(rates) == 2 and all(0 < rate < 0.6 for rate in rates.values()), rates
+    assert (tmp_path / "lift_egg.html").stat().st_size > 1e5
+    command = re.search(r"learning/ppo.py (lift_egg.py:\S+)", page)
+    short = ["--steps", "480", "--envs", "16", "--choices", "1", "--episodes", "20", "--json"]
+    done = subprocess.run(
+        [sys.executable, str(ROOT / "learning/ppo.py"), command[1], *short, "--length", "30"],
+        check=True, capture_output=True, text=True,
+    )  # fmt: skip
+    assert json.loads(done.stdout)["test"]["episodes"] == 20
 
 
 def test_every_block_of_the_page_of_learning_runs(generate, capsys):
@@ -94,3 +115,24 @@ def test_the_example_draws_a_round_touch(capsys):
     runpy.run_path(str(ROOT / "examples/press.py"))
     lines = capsys.readouterr().out.splitlines()
     assert lines[0].startswith("push down") and "@" in "".join(lines[2:])
+
+
+def test_the_notebook_runs_from_top_to_bottom(tmp_path, monkeypatch, capsys, command):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("TANGERE_PROGRAM", str(command))
+    notebook = json.loads((ROOT / "examples/first_touch.ipynb").read_text())
+    names: dict = {"__name__": "first_touch"}
+    shown = []
+    for cell in (c for c in notebook["cells"] if c["cell_type"] == "code"):
+        assert cell["outputs"] == [] and cell["execution_count"] is None  # stripped
+        body = ast.parse("".join(cell["source"])).body
+        last = body.pop() if isinstance(body[-1], ast.Expr) else None
+        exec(compile(ast.Module(body, []), "first_touch.ipynb", "exec"), names)
+        if last is not None:
+            value = ast.Expression(last.value)
+            shown.append(eval(compile(value, "first_touch.ipynb", "eval"), names))
+    shown = [value for value in shown if value is not None]  # of print
+    assert shown[0] == (20, 64, 32, 32, 3) and shown[-1][-3:] == (32, 32, 3)
+    assert any("<iframe" in page._repr_html_() for page in shown if hasattr(page, "html"))
+    said = capsys.readouterr().out
+    assert "@" in said and "32 episodes" in said and ("derivative" in said or "PyTorch" in said)

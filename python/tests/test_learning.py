@@ -52,6 +52,61 @@ def test_ppo_learns_to_hold_a_ball(memory):
     assert found["test"]["return"] > -15
 
 
+OWN_TASK = """
+import numpy as np
+import tangere
+
+
+class Hold(tangere.VectorSceneEnv):
+    \"\"\"Keeps a ball at its start: the pad pushes where it was told to.\"\"\"
+
+    scene, steps_per_action, horizon, actions = tangere.scenes()["rolling_ball_small"], 5, 4, 1
+
+    def controls(self, actions):
+        return np.pad(actions * 0.1, ((0, 0), (2, 0)))
+
+    def restart(self, envs):
+        if not hasattr(self, "wanted"):
+            self.wanted = np.zeros((self.num_envs, 1))
+        self.wanted[envs] = self.uniform(envs, [-0.8], 0.8)
+
+    def observe(self):
+        return {"wanted": self.wanted, "pad": self.batch.tactile("pad")}
+
+    def reward(self, actions):
+        return -abs(actions - self.wanted)[:, 0]
+
+    def success(self):
+        return self.lengths == self.horizon
+"""
+
+
+def test_ppo_learns_a_task_of_a_file(tmp_path):
+    (tmp_path / "own_task.py").write_text(OWN_TASK)
+    words = ["ppo.py", f"{tmp_path}/own_task.py:Hold", "--steps", "10240", "--envs", "32",
+             "--length", "16", "--deviation", "0.3", "--rate", "3e-3", "--choices", "2",
+             "--episodes", "50", "--threads", "1", "--gamma", "0.5"]  # fmt: skip
+    found = run(*words, "--without", "pad")
+    assert found["test"]["return"] > -0.8 > found["curve"][0][1], found  # 4 actions: -1.6 at first
+    assert found["test"]["success"] == 1 and found["test"]["episodes"] == 50
+    for wrong, message in ((["--without", "wanted", "--without", "pad"], "--without pad; the"),
+                           (["--imitate", "0.5"], "Hold has no scripted_action()")):  # fmt: skip
+        done = subprocess.run([sys.executable, str(LEARNING / "ppo.py"), *words[1:], *wrong],
+                              capture_output=True, text=True)  # fmt: skip
+        assert done.returncode == 1 and message in done.stderr, done.stderr
+    with pytest.raises(SystemExit, match="'nothing'; expected one of ball_rolling.*FILE.py:CLASS"):
+        protocol.make_vec("nothing", 1)
+
+
+def test_images_have_one_size():
+    shapes = {"small": (4, 4, 3), "left": (20, 20, 3), "right": (20, 20, 3), "flow": (2, 13, 10),
+              "points": (30, 3), "force": (6,)}  # fmt: skip
+    eyes = ppo.Eyes(shapes, convolve=True)
+    assert eyes.images == ["left", "right"] and eyes.flat == ["small", "flow", "points", "force"]
+    assert eyes.shapes == ((6, 10, 10), (48 + 260 + 90 + 6,))
+    assert ppo.Eyes(shapes, convolve=False).images == []
+
+
 def test_ppo_imitates_the_script():
     found = run("ppo.py", "dummy", "--steps", "8192", "--envs", "16", "--length", "64", "--rate",
                 "3e-3", "--choices", "1", "--episodes", "50", "--threads", "1", "--imitate", "1",
@@ -201,7 +256,7 @@ def collected(task: str, *options: str):
     asked.threads = 1
     torch.manual_seed(0)
     spec = tangere.task_spec(task)
-    eyes = ppo.Eyes(spec, convolve=not task.startswith("box_pushing"))
+    eyes = ppo.Eyes({t.name: t.shape for t in spec.observations}, asked.convolve)
     agent = ppo.Agent(eyes.shapes, spec.action.shape[0], asked.deviation, asked.recurrent)
     collector = ppo.Collector(asked, agent, eyes)
     return asked, agent, collector, collector.collect()
@@ -256,7 +311,8 @@ def test_images_of_fields_sum_the_forces_of_four_pixels():
     spec = tangere.task_spec("cap_opening")
     field = np.random.default_rng(0).normal(size=(2, 3, 20, 20, 3)).astype(np.float32)
     zeros = {t.name: np.zeros((2, *t.shape), np.float32) for t in spec.observations}
-    image, rest = ppo.Eyes(spec, convolve=True)._arrays(zeros | {"tactile": field})
+    shapes = {t.name: t.shape for t in spec.observations}
+    image, rest = ppo.Eyes(shapes, convolve=True)._arrays(zeros | {"tactile": field})
     assert image.shape == (2, 9, 10, 10) and rest.shape == (2, 18)
     np.testing.assert_allclose(
         image[1, 3 + 2, 4, 7], field[1, 1, 8:10, 14:16, 2].sum(), rtol=1e-5
