@@ -8,15 +8,20 @@ lower, hold, open. What the pads feel while they lift says where to grasp next. 
 rule that reads the turning of the bar from this shear, and prints how many it lifts level.
 """
 
+from typing import Any
+
 import numpy as np
+from numpy.typing import NDArray
 
 import tangere
+
+Array = NDArray[Any]
 
 PADS, BLOCKS, STEPS, LIFTED = ["left_pad", "right_pad"], 11, 180, 60
 DENSITIES = [f"body block_{b} density" for b in range(BLOCKS)]
 
 
-def ramp(first: int, length: int) -> np.ndarray:
+def ramp(first: int, length: int) -> Array:
     """(STEPS): 0 before step `first`, 1 from step first + length on, linear in between."""
     return np.clip((np.arange(1, STEPS + 1) - first) / length, 0, 1)
 
@@ -37,7 +42,7 @@ class StableGrasp(tangere.VectorSceneEnv):
     moved, lift = ramp(0, 10), 0.03 * (ramp(30, 50) - ramp(100, 50))  # [1], [m]
     fingers = -0.025 * (1 - ramp(10, 10) + ramp(160, 20))  # [m]
 
-    def restart(self, envs):
+    def restart(self, envs: Array) -> None:
         if not hasattr(self, "place"):
             self.place, self.rest = np.zeros((2, self.num_envs))  # of the grasp, of the bar [m]
             self.flow = np.zeros((self.num_envs, 4, 13, 10), np.float32)
@@ -53,7 +58,7 @@ class StableGrasp(tangere.VectorSceneEnv):
         settling.run(np.tile([0, 0, 0, 0, -0.025, -0.025], (50, len(envs), 1)))
         self.batch.set_state(settling.q, settling.v, envs)
 
-    def densities(self, envs):
+    def densities(self, envs: Array) -> Array:
         """(n, BLOCKS) [kg/m³] of bars that balance somewhere between the second and the last but
         one block: both sides have the same moment about that place."""
         centre, density, total = self.uniform(envs, [1, 600, 3000], [BLOCKS - 1, 700, 7000]).T
@@ -70,14 +75,14 @@ class StableGrasp(tangere.VectorSceneEnv):
         sums = np.where(side < 0, right[:, None], (rest - right)[:, None])
         return np.where(side == 0, density[:, None], share * sums)
 
-    def controls(self, actions):  # hand x, y, z, turn; fingers
+    def controls(self, actions: Array) -> Array:  # hand x, y, z, turn; fingers
         place = np.clip(self.place + 0.05 * actions[:, 0], -0.11, 0.11)
         u = np.zeros((STEPS, self.num_envs, 6))
         u[..., 1] = self.place + self.moved[:, None] * (place - self.place)
         u[..., 2], u[..., 4:] = self.lift[:, None], self.fingers[:, None, None]
         return u
 
-    def simulate(self, controls, envs):
+    def simulate(self, controls: Array, envs: Array) -> None:
         begins = envs[self.lengths[envs] == 0]
         self.rest[begins] = self.batch.q[begins, -5]
         run = self.batch.run(controls, every=LIFTED, fields=PADS, envs=envs)
@@ -90,16 +95,16 @@ class StableGrasp(tangere.VectorSceneEnv):
         self.height[envs] = run.q[0, envs, -5]
         self.place[envs] = controls[-1, envs, 1]
 
-    def observe(self):
+    def observe(self) -> dict[str, Array]:
         return {"flow": self.flow}
 
-    def terminated(self):
+    def terminated(self) -> Any:
         return (self.lengths > 0) & (self.tilt < 0.02) & (self.height - self.rest > 5e-3)
 
-    def reward(self, actions):
+    def reward(self, actions: Array) -> Array:
         return np.where(self.terminated(), 100, -10 * self.tilt)
 
-    def turning(self):
+    def turning(self) -> Any:
         """(E, 1) the action towards the heavier side: shear is proportional to the velocity of the
         bar in the grip, so the centre of mass is ω/v Σ r²/n away."""
         up = np.array([1, -1])[:, None, None]  # rows of the left pad go up, of the right pad down
@@ -115,6 +120,6 @@ if __name__ == "__main__":
     env = StableGrasp(64, seed=1, autoreset="disabled")
     env.reset()
     for _ in range(env.horizon):
-        *_, info = env.step(env.turning())
+        info = env.step(env.turning())[-1]
     grasps = env.lengths.mean()
     print(f"{info['success'].sum()} of {env.num_envs} bars lifted level, {grasps:.2f} grasps each")

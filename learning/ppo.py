@@ -18,8 +18,8 @@ means act in tests.
 With `--last_gamma` the horizon 1 / (1 - γ) grows or shrinks by the same factor at every update, to
 that of this γ at the end. `--imitate s`: in the first share s of all updates the policy plays, but
 learns what the script would have done where it came to, |mean - a_script|² in place of the first
-term of L. A class needs `scripted_action()` for it. `TASKS` has the settings of each task; every one
-is an option as well.
+term of L. A class needs `scripted_action()` for it. `TASKS` has the settings of each task; every
+one is an option as well.
 """
 
 from __future__ import annotations
@@ -370,7 +370,7 @@ def seen_shapes(env: Any, asked: argparse.Namespace) -> dict[str, tuple[int, ...
         if shapes.pop(name, None) is None or not shapes:
             raise SystemExit(f"ppo.py: --without {name}; the policy sees {list(shapes)}")
     if asked.imitate and not hasattr(env, "scripted_action"):
-        raise SystemExit(f"ppo.py: --imitate {asked.imitate}; {asked.task} has no scripted_action()")
+        raise SystemExit(f"ppo.py: --imitate: {asked.task} has no scripted_action()")
     return shapes
 
 

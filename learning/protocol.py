@@ -46,8 +46,8 @@ def make_vec(task: str, num_envs: int, **options: Any) -> Env:
     kind = getattr(importlib.import_module(module), name, None) if module and name else None
     if not isinstance(kind, type) or not issubclass(kind, tangere.VectorSceneEnv):
         raise SystemExit(
-            f"task {task!r}; expected one of {', '.join(tangere.task_names())}, or FILE.py:CLASS or "
-            "MODULE:CLASS of a tangere.VectorSceneEnv"
+            f"task {task!r}; expected one of {', '.join(tangere.task_names())}, or FILE.py:CLASS "
+            "or MODULE:CLASS of a tangere.VectorSceneEnv"
         )
     return kind(num_envs, **options)
 

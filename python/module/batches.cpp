@@ -457,6 +457,12 @@ static void add_statuses(nb::module_& m) {
       .value("singular", StepStatus::singular, "The Jacobian could not be factored.");
 }
 
+constexpr const char* kRunText =
+    "Takes T steps with the controls `u`, (T, E, nu), in one call. Keeps the state after every\n"
+    "`every` steps, and the readings named in `fields`. `envs`: the environments that are stepped\n"
+    "(indices, or a mask (E)), None for all; the others stand still. InputError: another shape, T\n"
+    "is no multiple of `every`, or there is no such reading or environment.";
+
 void add_batches(nb::module_& m) {
   add_statuses(m);
 
@@ -508,13 +514,8 @@ void add_batches(nb::module_& m) {
       .def("step", &PythonBatch::step, "u"_a,
            "Takes one step. `u`: (E, nu) controls, or (nu) for all environments; clipped to the\n"
            "motors' ranges. InputError: another shape.")
-      .def(
-          "run", &PythonBatch::run, "u"_a, "every"_a = 1, "fields"_a = std::vector<std::string>(),
-          "envs"_a = nb::none(),
-          "Takes T steps with the controls `u`, (T, E, nu), in one call. Keeps the state after\n"
-          "every `every` steps, and the readings named in `fields`. `envs`: the environments that\n"
-          "are stepped (indices, or a mask (E)), None for all; the others stand still.\n"
-          "InputError: another shape, T is no multiple of `every`, no such reading or environment.")
+      .def("run", &PythonBatch::run, "u"_a, "every"_a = 1, "fields"_a = std::vector<std::string>(),
+           "envs"_a = nb::none(), kRunText)
       .def("tactile", &PythonBatch::tactile, "reading"_a, "out"_a = nb::none(),
            nb::sig("def tactile(self, reading: str, out: numpy.typing.NDArray | None = None) -> "
                    "numpy.typing.NDArray"),

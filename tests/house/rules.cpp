@@ -201,7 +201,7 @@ Tree read_tree(const fs::path& root) {
   const auto add = [&](const fs::path& path) {
     const std::string name = path.lexically_relative(root).generic_string();
     if (!is_cpp(name) && !is_script(name) &&
-        !ends_with_any(name, {".md", ".txt", ".xml", ".json", ".svg", ".png", ".csv"}))
+        !ends_with_any(name, {".md", ".txt", ".xml", ".json", ".ipynb", ".svg", ".png", ".csv"}))
       return;
     std::ifstream file(path, std::ios::binary);
     tree[name] = std::string(std::istreambuf_iterator<char>(file), {});
