@@ -52,7 +52,8 @@ def actions(count, envs):
 
 def test_episodes_count_from_zero():
     scene = tangere.Scene.from_string(
-        '<tangere model="still"><robot><link name="a"><joint name="a" type="prismatic" axis="0 0 1"/>'
+        '<tangere model="still"><robot><link name="a">'
+        '<joint name="a" type="prismatic" axis="0 0 1"/>'
         '<body name="a" type="sphere" radius="1"/></link></robot></tangere>'
     )
     with pytest.raises(tangere.InputError, match="first_episode -1; expected 0 or more"):
