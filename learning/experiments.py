@@ -57,7 +57,7 @@ EXPERIMENTS = [
     Experiment("gd-touch", f"{THROUGH_TIME} --envs 64 --updates 1200 --back 1.5", 5, 430,
                "GD, goal and touch", "0.058 m, 0.074"),
     Experiment("gd-touch-short", "gd.py box_pushing --touch 0.05 --limit 10 --back 1.5", 5, 60,
-               "GD, goal and touch, 16 episodes an update", "0.058 m, 0.074"),
+               "GD, goal and touch, short", "0.058 m, 0.074"),
     Experiment("ppo-box", "ppo.py box_pushing", 5, 180, "PPO, goal and touch", "0.123 m, 0.241"),
     Experiment("gd-privileged", "gd.py box_pushing_privileged", 5, 60,
                "GD, goal and box", "0.037 m, 0.043"),
