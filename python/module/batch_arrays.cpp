@@ -86,4 +86,17 @@ nb::tuple face_arrays(const Batch& batch, int environment, double half_space) {
                         array_of<double>({count, 4}, std::span<const double>(all.rgba)));
 }
 
+void check_state(const Model& model, std::span<const double> q, std::span<const double> v) {
+  const auto finite = [](double x) { return std::isfinite(x); };
+  if (!std::ranges::all_of(q, finite) || !std::ranges::all_of(v, finite))
+    throw InputError("a state that is not finite; expected numbers");
+  const auto names = model.q_names();
+  for (std::size_t i = 0; i < q.size(); ++i) {
+    if (!names[i % names.size()].ends_with(".qw")) continue;
+    if (std::ranges::all_of(q.subspan(i, 4), [](double x) { return std::abs(x) < 1e-6; }))
+      throw InputError(fmt::format("{} and its three neighbours are 0; expected a unit quaternion",
+                                   names[i % names.size()]));
+  }
+}
+
 }  // namespace tangere::python

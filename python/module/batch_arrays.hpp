@@ -19,6 +19,9 @@ nb::tuple body_arrays(Readout& readout, const Batch& batch);
 /// not there and for a half edge that is negative or not finite.
 nb::tuple face_arrays(const Batch& batch, int environment, double half_space);
 
+/// Throws InputError for rows of q and v that are not finite, and for quaternions without length.
+void check_state(const Model& model, std::span<const double> q, std::span<const double> v);
+
 /// Names of counts in Python.
 inline constexpr std::pair<const char*, std::int64_t StepCounts::*> kCountNames[] = {
     {"simulation_steps", &StepCounts::simulation_steps},

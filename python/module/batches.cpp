@@ -283,29 +283,13 @@ std::vector<int> PythonBatch::listed(const nb::object& environments) const {
   return list;
 }
 
-/// Throws InputError for rows of q and v that are not finite, and for quaternions without length.
-void PythonBatch::check_state(std::span<const double> q, std::span<const double> v) const {
-  const auto finite = [](double x) { return std::isfinite(x); };
-  if (!std::all_of(q.begin(), q.end(), finite) || !std::all_of(v.begin(), v.end(), finite))
-    throw InputError("a state that is not finite; expected numbers");
-  const auto names = model().q_names();
-  for (std::size_t i = 0; i < q.size(); ++i) {
-    if (!names[i % names.size()].ends_with(".qw")) continue;
-    const std::span<const double> quaternion = q.subspan(i, 4);
-    if (std::all_of(quaternion.begin(), quaternion.end(),
-                    [](double x) { return std::abs(x) < 1e-6; }))
-      throw InputError(fmt::format("{} and its three neighbours are 0; expected a unit quaternion",
-                                   names[i % names.size()]));
-  }
-}
-
 void PythonBatch::set_state(const Argument<double>& q, const Argument<double>& v,
                             const nb::object& environments) {
   const std::vector<int> list = listed(environments);
   const std::size_t nq = as_size(model().nq()), nv = as_size(model().nv());
   const std::vector<double> qs = rows_of(q, list.size(), nq, "q"),
                             vs = rows_of(v, list.size(), nv, "v");
-  check_state(qs, vs);
+  check_state(model(), qs, vs);
   const InUse::Turn turn(in_use_);
   for (std::size_t k = 0; k < list.size(); ++k)
     batch_.set_state(list[k], std::span(qs).subspan(k * nq, nq), std::span(vs).subspan(k * nv, nv));

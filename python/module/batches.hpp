@@ -83,7 +83,6 @@ class PythonBatch {
   [[nodiscard]] FieldOutput reading_named(const std::string& name) const;
   [[nodiscard]] Shape shape_of_reading(FieldOutput output) const;
   [[nodiscard]] std::vector<int> listed(const nb::object& environments) const;
-  void check_state(std::span<const double> q, std::span<const double> v) const;
   template <class T>
   nb::object read(FieldOutput output, const nb::object& out);
   template <class T>

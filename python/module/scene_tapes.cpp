@@ -5,11 +5,15 @@
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
+#include <cmath>
+#include <numeric>
+
 #include "engine/derivative/number_gradients.hpp"
 #include "engine/derivative/tactile_point_numbers.hpp"
 #include "engine/scene/scene_number.hpp"
 #include "engine/step/displacement.hpp"
 #include "python/module/arrays.hpp"
+#include "python/module/batch_arrays.hpp"
 #include "python/module/module.hpp"
 #include "python/module/options.hpp"
 #include "python/module/varying_numbers.hpp"
@@ -40,6 +44,8 @@ struct TapedScene {
         tape(task, a.environments, a.options) {
     const NumberGradients numbers(task.model());
     for (const std::string& name : a.parameters) {
+      if (std::ranges::count(a.parameters, name) > 1)
+        throw InputError(fmt::format("parameter '{}' is listed twice; expected it once", name));
       const auto at = std::ranges::find(numbers.infos(), name, &NumberInfo::name);
       if (at == numbers.infos().end())
         throw InputError(fmt::format("'{}' has no derivative; expected another number", name));
@@ -77,6 +83,8 @@ class SceneTape {
     if (points) {
       const auto all = numbers_of(*points, {point_count(), kPointNumbers}, "points");
       moved.assign(all.begin(), all.end());
+      if (!std::ranges::all_of(moved, [](double x) { return std::isfinite(x); }))
+        throw InputError("points by numbers that are not finite; expected finite ones");
     }
     const std::vector<std::vector<double>> drawn = rows_of_varying(randomized);
     const InUse::Turn turn(in_use_);
@@ -87,6 +95,8 @@ class SceneTape {
     if (q || v) {
       if (!q) q0.assign(tape().q().begin(), tape().q().end());
       if (!v) v0.assign(tape().v().begin(), tape().v().end());
+      check_state(model(), q0, v0);
+      normalise_quaternions(q0);
       tape().displace(q0, v0);
     }
     first_q_.assign(tape().q().begin(), tape().q().end());
@@ -192,6 +202,12 @@ class SceneTape {
     for (std::size_t s = 0; s < scene.sensors.size() && !left.empty(); ++s) {
       const std::size_t numbers = kPointNumbers * as_size(model().sensors()[s].points);
       add_to_points(scene.sensors[s], left.first(numbers));
+      for (const TactilePoint& point : scene.sensors[s].points)
+        if (std::ranges::any_of(point.factors, [](double x) { return x < 0; }))
+          throw InputError(
+              fmt::format("a point of '{}' with a negative coefficient; expected a "
+                          "change that leaves 0 or more",
+                          scene.sensors[s].name));
       left = left.subspan(numbers);
     }
     taped_ = std::make_unique<TapedScene>(scene, arguments_);
@@ -244,13 +260,35 @@ class SceneTape {
     return rows;
   }
 
+  /// Throws InputError for a parameter that the scene could not have.
+  void check_drawn(Batch& batch) const {
+    std::vector<int> environments(count()), numbers;
+    std::iota(environments.begin(), environments.end(), 0);
+    for (int k = 0; k < static_cast<int>(varying_count()); ++k)
+      if (batch.is_parameter(k)) numbers.push_back(k);
+    std::vector<double> values;
+    for (std::size_t e = 0; e < count(); ++e)
+      for (const int k : numbers) values.push_back(drawn_[e * varying_count() + as_size(k)]);
+    batch.set_randomized_values(environments, numbers, values);
+  }
+
+  void normalise_quaternions(std::span<double> q) const {
+    const auto names = model().q_names();
+    for (std::size_t i = 0; i < q.size(); ++i) {
+      if (!names[i % names.size()].ends_with(".qw")) continue;
+      const double length = std::hypot(std::hypot(q[i], q[i + 1]), std::hypot(q[i + 2], q[i + 3]));
+      if (std::abs(length - 1) < 1e-15) continue;
+      for (std::size_t k = 0; k < 4; ++k) q[i + k] /= length;
+    }
+  }
+
   /// Draws all numbers that vary, and sets those that are given: parameters, (E, names) or empty,
   /// and others, each (E) or empty.
   void draw_numbers(std::uint64_t seed, const std::vector<double>& given,
                     const std::vector<std::vector<double>>& others) {
     if (varying_count() == 0) return;
     drawn_.clear();
-    const Batch batch(model(), arguments_.environments, seed);
+    Batch batch(model(), arguments_.environments, seed);
     for (int e = 0; e < arguments_.environments; ++e)
       for (std::size_t k = 0; k < varying_count(); ++k)
         drawn_.push_back(batch.randomized_value(e, static_cast<int>(k)));
@@ -260,6 +298,7 @@ class SceneTape {
     for (std::size_t e = 0; e < count() && !given.empty(); ++e)
       for (std::size_t k = 0; k < names().size(); ++k)
         drawn_[e * varying_count() + taped_->varying[k]] = given[e * names().size() + k];
+    if (!given.empty() || !others.empty()) check_drawn(batch);
     taped_->task.set_varying(drawn_);
   }
 

@@ -25,7 +25,8 @@ class EnvTape:
             total = total + reward
         (-total.mean()).backward()
 
-    The class has `arrays = "torch"`, and its methods compute with tensors. Starts, goals and drawn
+    The class has `arrays = "torch"`, and its methods compute with tensors. Each runs once when the
+    tape is made, which shows what it reads. Starts, goals and drawn
     numbers count as given, and so do ends of episodes. A class with `warm_up`, with controls that
     change within an action or with a `simulate` of its own is refused.
 
@@ -63,6 +64,9 @@ class EnvTape:
         self.env = task(num_envs, threads=threads, seed=0, **arguments)
         self.num_envs, self.flatten, self.dtype = num_envs, flatten, dtype
         self.actions = actions or self.env.horizon
+        if not 1 <= self.actions <= self.env.horizon:
+            horizon = self.env.horizon
+            raise _core.InputError(f"actions {actions}; expected 1 to the horizon {horizon}")
         self._low, self._high = (torch.from_numpy(x.copy()) for x in self.env.bounds)
         self.simulation = Simulation(
             self.env.model.scene,
@@ -78,8 +82,16 @@ class EnvTape:
 
     def reset(self, seed: int = 0, first_episode: int = 0) -> Any:
         """Starts the episodes; returns the first observations, which have no derivative."""
+        for name, value in vars(self.env).items():  # what a task remembers of an earlier run
+            if isinstance(value, torch.Tensor) and value.requires_grad:
+                setattr(self.env, name, value.detach().clone())
         self.env.reset(seed=seed, options={"first_episode": first_episode})
         batch = self._batch()
+        if np.any(batch.shear_state):
+            raise _core.InputError(
+                f"{type(self.env).__name__}: restart() leaves shear in springs (ks), with which a "
+                "tape cannot begin; expected states without it"
+            )
         q, v = torch.from_numpy(batch.q), torch.from_numpy(batch.v)
         self._take(self.simulation.reset(q=q, v=v, randomized=batch.randomized()))
         self._ended = np.zeros(self.num_envs, bool)
@@ -99,7 +111,8 @@ class EnvTape:
         shape = (self.num_envs, *self._low.shape)
         if actions.shape not in (shape, shape[1:]):
             raise _core.InputError(f"actions of shape {tuple(actions.shape)}; expected {shape}")
-        actions = torch.minimum(torch.maximum(actions, self._low), self._high).expand(shape)
+        actions = torch.minimum(torch.maximum(actions, self._low), self._high)
+        actions = actions.expand(shape).contiguous()
         controls = torch.as_tensor(self.env.controls(actions))
         if controls.ndim > 2:
             raise _core.InputError(
@@ -113,6 +126,9 @@ class EnvTape:
         if reward.shape != (self.num_envs,):
             said = f"{type(self.env).__name__}: reward() of shape {tuple(reward.shape)}"
             raise _core.InputError(f"{said}; expected ({self.num_envs},)")
+        if not bool(torch.isfinite(reward[torch.from_numpy(alive)]).all()):
+            said = f"{type(self.env).__name__}: reward() {reward.tolist()[:5]}"
+            raise _core.InputError(f"{said}; expected finite numbers")
         reward = torch.where(torch.from_numpy(alive), reward, torch.zeros_like(reward))
         failed = self._state.status < 0
         self._success[alive] = (self.env.flags("success") & ~failed)[alive]
@@ -141,6 +157,10 @@ class EnvTape:
 
     def _observe(self) -> Any:
         seen = {k: torch.as_tensor(x).to(self.dtype) for k, x in self.env.observe().items()}
+        for key, x in seen.items():
+            if not bool(torch.isfinite(x).all()):
+                said = f"{type(self.env).__name__}: observe()[{key!r}]"
+                raise _core.InputError(f"{said} with numbers that are not finite")
         if not self.flatten:
             return seen
         return torch.cat([x.reshape(self.num_envs, -1) for x in seen.values()], 1)

@@ -82,8 +82,11 @@ class Simulation(SimulationBase):
         parameters: jax.Array | None = None,
         points: Mapping[str, jax.Array] | None = None,
     ) -> State:
-        """Starts anew, as `tangere.torch.Simulation.reset` does. The seed may be traced."""
-        moved = None if points is None else jnp.concatenate(self._point_rows(points, jnp.zeros))
+        """Starts anew, as `tangere.torch.Simulation.reset` does, but without `randomized`. The seed
+        may be traced."""
+        moved = None if points is None else jnp.concatenate(
+            self._point_rows(points, jnp.zeros, jnp.asarray)
+        )
         named = {"q": q, "v": v, "parameters": parameters, "points": moved}
         given = {
             name: self._rows(x, self._host.starts[name], name)
@@ -107,7 +110,7 @@ class Simulation(SimulationBase):
 
     def _rows(self, x: Any, expected: Any, name: str) -> jax.Array:
         x = jnp.asarray(x)
-        if x.ndim == 1 and x.shape == expected.shape[1:]:
+        if x.shape in (expected.shape[1:], (1, *expected.shape[1:])):
             x = jnp.broadcast_to(x, expected.shape)
         if x.shape != expected.shape:
             raise _core.InputError(f"{name} of shape {x.shape}; expected {expected.shape}")

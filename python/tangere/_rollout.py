@@ -64,6 +64,8 @@ def rollout(
             raise _core.InputError(
                 f"{name} of shape {np.shape(array)}; expected {shape}"
             ) from None
+    if not np.isfinite(u).all():
+        raise _core.InputError("controls that are not finite; expected numbers")
     batch = _core.Batch(model, envs, threads=threads, precision=precision)
     batch.set_state(full[0], full[1])
     return batch.run(full[2], every=every, fields=list(read))

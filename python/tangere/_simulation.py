@@ -107,7 +107,10 @@ class Simulation(SimulationBase):
         recorded. Raises InputError for other shapes and names, and for points of a sensor with
         ks."""
         given = [None if x is None else self._rows(x) for x in (q, v, parameters)]
-        given.append(None if points is None else torch.cat(self._point_rows(points, torch.zeros)))
+        if points is not None:
+            given.append(torch.cat(self._point_rows(points, torch.zeros, torch.as_tensor)))
+        else:
+            given.append(None)
         given_numbers, recorded = [_numpy(x) for x in given], torch.is_grad_enabled()
         drawn = None if randomized is None else dict(randomized)
         self._run = Run(self._line, seed, *given_numbers, drawn, recorded, recorded=recorded)
@@ -124,7 +127,7 @@ class Simulation(SimulationBase):
             taken = 0 if self._run is None else self._run.taken
             raise _core.InputError(
                 f"a state after {state.step} calls of step(), and {taken} were taken since the "
-                "last reset(); expected the last one"
+                "last reset() of this simulation; expected its last state"
             )
         if not run.current:
             raise _core.InputError("step() after backward() through another run; call reset()")
@@ -145,7 +148,7 @@ class Simulation(SimulationBase):
 
     def _rows(self, x: torch.Tensor) -> torch.Tensor:
         x = torch.as_tensor(x)
-        return x.expand(self.num_envs, -1) if x.ndim == 1 else x
+        return x.expand(self.num_envs, -1) if x.ndim == 1 or (x.ndim == 2 and len(x) == 1) else x
 
     def _state(self, rows: torch.Tensor, token: torch.Tensor) -> State:
         parts = split_rows(rows, self._observations)

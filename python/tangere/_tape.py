@@ -72,15 +72,16 @@ class SimulationBase:
             self.scene, num_envs, steps, every, names, self.parameter_names, **options
         )
         self._observations = self.tape.spec.observations  # an array whose points move stays one
+        self._sensors = {s.name: s.points for s in self.tape.model.sensors}
 
     @property
     def model(self) -> _core.Model:
         """The compiled scene, with the points of the last reset()."""
         return self.tape.model
 
-    def _point_rows(self, points: Mapping[str, Any], zeros: Any) -> list[Any]:
+    def _point_rows(self, points: Mapping[str, Any], zeros: Any, convert: Any) -> list[Any]:
         """Changes of the points of all sensors, (points, 7) each, from those of some."""
-        sensors = {s.name: s.points for s in _core.Model(self.scene).sensors}
+        sensors = self._sensors
         unknown = sorted(set(points) - set(sensors))
         if unknown:
             raise _core.InputError(f"points of {unknown}; expected sensors of {sorted(sensors)}")
@@ -91,7 +92,8 @@ class SimulationBase:
             own = points.get(name)
             if own is None:
                 own = zeros((count, 7))
-            elif tuple(own.shape) != (count, 7):
+            own = convert(own)
+            if tuple(own.shape) != (count, 7):
                 raise _core.InputError(
                     f"points of {name} of shape {tuple(own.shape)}; expected ({count}, 7)"
                 )

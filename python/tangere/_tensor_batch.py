@@ -53,8 +53,9 @@ class RecordedBatch:
         self._state, self._batch = state, batch
         self.model, self.num_envs = batch.model, batch.num_envs
 
-    q = property(lambda self: self._state.q)
-    v = property(lambda self: self._state.v)
+    # New tensors, as a batch returns new arrays: a task may change them in place.
+    q = property(lambda self: self._state.q.clone())
+    v = property(lambda self: self._state.v.clone())
     status = property(lambda self: torch.from_numpy(self._state.status))
 
     def tactile(self, reading: str) -> torch.Tensor:
@@ -67,6 +68,12 @@ class RecordedBatch:
     def end_effectors(self) -> torch.Tensor:
         return self._read("variables")
 
+    def __getattr__(self, name: str) -> Any:
+        raise _core.InputError(
+            f"batch.{name} of a recorded task; expected q, v, status, tactile(), bodies(), "
+            "end_effectors() or randomized()"
+        )
+
     def randomized(self) -> Any:
         return tensors(self._batch.randomized())
 
@@ -76,4 +83,4 @@ class RecordedBatch:
                 f"'{name}', which the task did not read when the tape was made; expected it in "
                 f"read=, beside {list(self._state.readings)}"
             )
-        return self._state[name]
+        return self._state[name].clone()

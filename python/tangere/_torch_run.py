@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import copy
 from typing import Any
 
 import numpy as np
@@ -30,7 +31,7 @@ class Run:
         line.tape.reset(*start)
         line.run = self
         self._line = line
-        self._start = [x.copy() if isinstance(x, np.ndarray) else x for x in start]
+        self._start = copy.deepcopy(start)  # the caller may change its own
         self._inputs: list[np.ndarray] = []
         self.recorded = recorded
         self.taken = 0
@@ -51,7 +52,7 @@ class Run:
     def step(self, inputs: np.ndarray) -> None:
         self._line.tape.step(inputs)
         if self.recorded:
-            self._inputs.append(inputs.copy())  # the caller may change its own
+            self._inputs.append(inputs.copy())
         self.taken += 1
 
     def reverse(self, step: int, *bars: np.ndarray) -> np.ndarray:

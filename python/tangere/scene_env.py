@@ -113,6 +113,8 @@ class VectorSceneEnv(_Remade, VectorEnv):
         self._mode, self._threads, self._fresh = autoreset, threads, True
         self._seed = _system_seed() if seed is None else _checked(seed)
         self._first_episode = first_episode
+        if self.arrays not in ("numpy", "torch"):
+            raise self._fault(f"arrays {self.arrays!r}", '"numpy" or "torch"')
         self.model = _core.Model(self._scene(scene))
         for name in ("steps_per_action", "horizon"):
             if not isinstance(getattr(self, name), (int, np.integer)) or getattr(self, name) < 1:

@@ -197,7 +197,7 @@ class Check:
 
 def check_gradient(
     loss: Callable[[], torch.Tensor],
-    tensors: Iterable[torch.Tensor],
+    tensors: torch.Tensor | Iterable[torch.Tensor],
     *,
     directions: int = 3,
     seed: int = 0,
@@ -214,8 +214,10 @@ def check_gradient(
     that large steps cross, and small steps lose digits. A quaternion must stay one: compute it from
     a tensor that may move freely.
     """
-    moved = list(tensors)
+    moved = [tensors] if isinstance(tensors, torch.Tensor) else list(tensors)
     gradient = torch.autograd.grad(loss(), moved, allow_unused=True)
+    if all(g is None for g in gradient):
+        raise _core.InputError("the loss uses none of the tensors; expected some of them")
     generator = torch.Generator().manual_seed(seed)
     checks = []
     for k in range(directions):

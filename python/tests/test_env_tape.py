@@ -156,3 +156,53 @@ def test_what_is_missing_is_named():
         tape.step(torch.zeros(3))
     with pytest.raises(tangere.InputError, match=r"actions of shape \(2, 2\)"):
         tape.step(torch.zeros(2, 2))
+
+
+def test_a_task_may_remember():
+    class Progress(Rolling):
+        def restart(self, envs):
+            super().restart(envs)
+            if not hasattr(self, "last"):
+                self.last = torch.zeros((self.num_envs, 3), dtype=torch.float64)
+            self.last[envs] = 0.0
+
+        def reward(self, actions):
+            here = self.batch.q
+            here[:, 3:5] -= self.goal  # its own copy
+            change, self.last = actions - self.last, actions
+            return super().reward(actions) - change.square().sum(1) - here[:, 3].abs()
+
+    tape, w = tt.EnvTape(Progress, 3, threads=1), torch.full((3,), 0.3, requires_grad=True)
+    gradients = []
+    for _ in range(2):
+        tape.reset(1)
+        w.grad = None
+        sum(tape.step(w * torch.tensor([1.0, 1.0, -0.1]))[1].sum() for _ in range(3)).backward()
+        gradients.append(w.grad.clone())
+    assert torch.equal(*gradients) and float(gradients[0].abs().max()) > 0
+
+
+def test_what_a_tape_cannot_begin_with_is_refused():
+    class Gripped(tangere.VectorSceneEnv):
+        scene = tangere.scenes()["grip_rod"]
+        horizon, arrays = 3, "torch"
+
+        def restart(self, envs):
+            self.batch.run(np.tile([0.0, 0.8, 0.8], (60, self.num_envs, 1)), every=60)
+
+        def reward(self, actions):
+            return self.batch.q[:, 0]
+
+    with pytest.raises(tangere.InputError, match="leaves shear in springs"):
+        tt.EnvTape(Gripped, 2, threads=1).reset()
+
+    class Broken(Rolling):
+        def reward(self, actions):
+            return self.batch.q[:, 3] * float("nan")
+
+    tape = tt.EnvTape(Broken, 2, threads=1)
+    tape.reset()
+    with pytest.raises(tangere.InputError, match="expected finite numbers"):
+        tape.step(torch.zeros(3))
+    with pytest.raises(tangere.InputError, match="actions 9; expected 1 to the horizon 8"):
+        tt.EnvTape(Rolling, 2, 9)

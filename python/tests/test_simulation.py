@@ -174,7 +174,7 @@ def test_what_cannot_be_done_is_refused():
     first = sim.reset()
     u = torch.zeros(1, requires_grad=True)
     second = sim.step(first, u)
-    with pytest.raises(tangere.InputError, match="expected the last one"):
+    with pytest.raises(tangere.InputError, match="expected its last state"):
         sim.step(first, u)
     with torch.no_grad(), pytest.raises(tangere.InputError, match="no_grad"):
         sim.step(second, u)
@@ -276,3 +276,52 @@ def test_nothing_is_recorded_without_gradients():
     assert torch.equal(s.q, recorded.q) and not s.q.requires_grad
     with pytest.raises(tangere.InputError, match="records nothing"):
         sim.step(s, u)
+
+
+def test_what_a_scene_could_not_have_is_refused():
+    sim = tt.Simulation(
+        scene("ball")[0], num_envs=2, steps=2, read=["pad"], points=True,
+        parameters=["contact pad ball kn"],
+    )  # fmt: skip
+    q = sim.reset().q.clone()
+    with pytest.raises(tangere.InputError, match="not finite"):
+        sim.reset(q=q * float("nan"))
+    flat = q.clone()
+    flat[:, -4:] = 0
+    with pytest.raises(tangere.InputError, match="expected a unit quaternion"):
+        sim.reset(q=flat)
+    long = q.clone()
+    long[:, -4:] *= 2
+    torch.testing.assert_close(sim.reset(q=long).q, q)
+    for bad in (-5.0, float("nan")):
+        with pytest.raises(tangere.InputError, match="contact pad ball kn"):
+            sim.reset(parameters=torch.tensor([bad]))
+    with pytest.raises(tangere.InputError, match="listed twice"):
+        tt.Simulation(scene("ball")[0], parameters=["body ball density"] * 2)
+    moved = torch.zeros(1024, 7)
+    moved[3, 0] = float("nan")
+    with pytest.raises(tangere.InputError, match="not finite"):
+        sim.reset(points={"pad": moved})
+    moved[3] = torch.tensor([0, 0, 0, -2.0, 0, 0, 0])
+    with pytest.raises(tangere.InputError, match="a point of 'pad' with a negative coefficient"):
+        sim.reset(points={"pad": moved})
+    assert torch.equal(sim.reset(q=q[:1], points={"pad": np.zeros((1024, 7))}).q[1], q[0])
+
+
+def test_a_late_run_has_the_numbers_that_it_began_with():
+    sim = tt.Simulation(scene("ball")[0], num_envs=2, steps=1, every=5, read=["pad"])
+    u = torch.tensor([0.0, 0.1, -1.0], dtype=torch.float64, requires_grad=True)
+    drawn = np.array([2.0, 3.0])
+
+    def loss():
+        s = sim.step(sim.reset(1, randomized={"contact pad ball kn": drawn}), u)
+        return s.q.square().sum()
+
+    (expected,) = torch.autograd.grad(loss(), u)
+    late = loss()
+    drawn[:] = 9
+    sim.reset(2)
+    assert torch.equal(torch.autograd.grad(late, u)[0], expected)
+    with pytest.raises(tangere.InputError, match="uses none of the tensors"):
+        tt.check_gradient(loss, torch.zeros(3, dtype=torch.float64, requires_grad=True))
+    assert len(tt.check_gradient(loss, u, directions=1)) == 1
