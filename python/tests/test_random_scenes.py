@@ -76,8 +76,7 @@ def direction(sim, key, x, random):
     if key == "parameters":
         along *= x
     if key == "q":
-        along *= 1e-3
-        along[:, -4:] = 0  # a quaternion keeps its length
+        along *= 1e-3  # of quaternions, too: a reset makes their length one
     if key == "points":
         along *= [1e-4, 1e-4, 1e-4, 100, 0.5, 0.6, 50]
     return along
