@@ -56,6 +56,8 @@ class EnvTape:
         dtype: torch.dtype = torch.float32,
         **arguments: Any,
     ):
+        if not (isinstance(task, type) and issubclass(task, VectorSceneEnv)):
+            raise _core.InputError(f"task {task!r}; expected a subclass of VectorSceneEnv")
         if task.arrays != "torch":
             raise _core.InputError(f'{task.__name__}: arrays "{task.arrays}"; expected "torch"')
         if task.warm_up or task.simulate is not VectorSceneEnv.simulate:

@@ -64,6 +64,9 @@ class SimulationBase:
         parameters: Sequence[str],
         **options: Any,
     ):
+        for name, given in (("read", read), ("parameters", parameters)):
+            if isinstance(given, str):
+                raise _core.InputError(f"{name} {given!r}; expected a list of names")
         self.scene = scene if isinstance(scene, _core.Scene) else _core.Scene(scene)
         self.num_envs, self.steps, self.every = num_envs, steps, every
         self.parameter_names = list(parameters)

@@ -136,6 +136,8 @@ def test_what_is_missing_is_named():
     class Plain(Rolling):
         arrays = "numpy"
 
+    with pytest.raises(tangere.InputError, match="expected a subclass of VectorSceneEnv"):
+        tt.EnvTape("ball_rolling", 2)
     with pytest.raises(tangere.InputError, match='arrays "numpy"; expected "torch"'):
         tt.EnvTape(Plain, 2)
 

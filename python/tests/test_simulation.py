@@ -166,6 +166,8 @@ def test_what_cannot_be_done_is_refused():
         tt.Simulation(of, parameters=["joint arm armature"])
     with pytest.raises(tangere.InputError, match="no reading 'pad'; expected one of variables"):
         tt.Simulation(of, read=["pad"])
+    with pytest.raises(tangere.InputError, match="read 'pad'; expected a list of names"):
+        tt.Simulation(of, read="pad")
     with pytest.raises(tangere.InputError, match="points=True"):
         tt.Simulation(of).reset(points={})
     with pytest.raises(tangere.InputError, match="expected sensors of"):
