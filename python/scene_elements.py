@@ -4,7 +4,7 @@
     PYTHONPATH=FOLDER_OF_CORE python python/scene_elements.py OUTPUT
 
 Each element that holds others becomes a class, each element inside it a method, and each attribute
-an argument, so that editors, help() and type checkers know them all. The build runs it.
+an argument, so that editors, help() and type checkers have them all. The build runs it.
 """
 
 from __future__ import annotations

@@ -84,7 +84,7 @@ class EnvTape:
 
     def reset(self, seed: int = 0, first_episode: int = 0) -> Any:
         """Starts the episodes; returns the first observations, which have no derivative."""
-        for name, value in vars(self.env).items():  # what a task remembers of an earlier run
+        for name, value in vars(self.env).items():  # with gradients of an earlier run
             if isinstance(value, torch.Tensor) and value.requires_grad:
                 setattr(self.env, name, value.detach().clone())
         self.env.reset(seed=seed, options={"first_episode": first_episode})

@@ -160,7 +160,7 @@ def test_what_is_missing_is_named():
         tape.step(torch.zeros(2, 2))
 
 
-def test_a_task_may_remember():
+def test_a_task_may_keep_tensors():
     class Progress(Rolling):
         def restart(self, envs):
             super().restart(envs)
