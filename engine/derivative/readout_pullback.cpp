@@ -179,6 +179,10 @@ void check_has_no_lag(const Model& model) {
     check_has_no_lag(model, static_cast<int>(s));
 }
 
+void check_has_no_lag(const Model& model, std::span<const FieldOutput> outputs) {
+  for (const FieldOutput& output : outputs) check_has_no_lag(model, output.sensor);
+}
+
 ReadoutPullback::ReadoutPullback(const Model& model) : impl_(std::make_unique<Impl>(model)) {}
 ReadoutPullback::~ReadoutPullback() = default;
 ReadoutPullback::ReadoutPullback(ReadoutPullback&&) noexcept = default;

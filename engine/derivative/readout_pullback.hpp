@@ -14,6 +14,8 @@ namespace tangere {
 /// Throws InputError (file:line) if a reading of some sensor depends on earlier states
 /// (SensorInfo::past_states). Derivatives of such readings are not implemented.
 void check_has_no_lag(const Model& model);
+/// The same for the sensors of these outputs alone.
+void check_has_no_lag(const Model& model, std::span<const FieldOutput> outputs);
 
 /// Throws InputError if some sensor has ks: its points have no derivatives of their own.
 void check_has_plain_points(const Model& model);

@@ -327,3 +327,18 @@ def test_a_late_run_has_the_numbers_that_it_began_with():
     with pytest.raises(tangere.InputError, match="uses none of the tensors"):
         tt.check_gradient(loss, torch.zeros(3, dtype=torch.float64, requires_grad=True))
     assert len(tt.check_gradient(loss, u, directions=1)) == 1
+
+
+def test_a_sensor_with_lag_may_be_there_but_not_be_read():
+    end = 'axis0="0 0 1" axis1="1 0 0" resolution="20 20"'
+    text = tangere.scenes()["grip_rod"].read_text()
+    assert text.count(end + "/>") == 1
+    late = f'{end}><imperfections low_pass="0.01"/></tactile>'
+    slow = tangere.Scene.from_string(text.replace(end + "/>", late))
+    with pytest.raises(tangere.InputError, match="right_finger"):
+        tt.Simulation(slow, steps=2)
+    sim = tt.Simulation(slow, steps=2, read=["left_finger.sum"])
+    u = torch.zeros(3, requires_grad=True)
+    s = sim.step(sim.reset(), u)
+    s.v.sum().backward()
+    assert torch.isfinite(u.grad).all()

@@ -87,7 +87,7 @@ TaskBlock::TaskBlock(const Task& task, const TapeOptions& options, std::int64_t 
       shown_q_(start_q_),
       shown_v_(start_q_),
       reward_bar_(kBlock) {
-  if (task_.spec().reads_tactile) check_has_no_lag(task_.model());
+  check_has_no_lag(task_.model(), task_.fields());
   const auto end_effectors = lane_rows(task.end_effectors_size()),
              tactile = lane_rows(task.tactile_size()), bodies = lane_rows(task.bodies_size());
   snapshots_bar_.assign(snapshot_cotangents_.size(),

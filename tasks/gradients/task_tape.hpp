@@ -31,7 +31,7 @@ class TaskTape {
   TaskTape& operator=(TaskTape&&) noexcept;
 
   /// Starts episodes first_episode … first_episode + E - 1 of a seed and clears the tape. `record`:
-  /// whether its steps can be reversed; without it they are a little faster.
+  /// whether its steps can be reversed; without it no state is kept.
   void reset(std::uint64_t seed, std::int64_t first_episode, bool record = true);
   /// Moves the states in which the first actions begin: q (E, nq) with quaternions of unit length,
   /// v (E, nv). They are observed again. Throws InputError after the first step.
