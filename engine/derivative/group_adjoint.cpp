@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "engine/step/detection.hpp"
+#include "engine/step/factors.hpp"
 #include "engine/step/scheme_stage.hpp"
 #include "engine/step/shear_update.hpp"
 
@@ -65,12 +66,12 @@ void GroupAdjoint::assemble(const StageContext<L>& s) const {
   BasicWorkspace<L>& w = s.w;
   const kernels::StageKernels<L>& kernel = s.table.template stage<L>();
   kernel.kinematics(model_.view, w.stage);
-  clear_candidates(w);
+  clear_candidates(model_, w);
   find_candidates(model_, s.table, w, s.lanes);
   if constexpr (L > 1)
     if (s.lone() < 0) lists_to_rows(model_, s.table, w, s.lanes);
   kernel.evaluate(model_.view, w.stage, s.lone());
-  kernel.factor(model_.view, w.stage, nullptr);
+  factor(model_, s.table, w, s.lanes, kNoLane);
 }
 
 /// Computes λ from the right-hand side. Lanes whose factor is useless get a pivoted one.
@@ -78,10 +79,10 @@ template <int L>
 void GroupAdjoint::solve(const StageContext<L>& s) const {
   BasicWorkspace<L>& w = s.w;
   AdjointWorkspace<L>& a = s.a;
-  s.table.template stage<L>().solve_transposed(model_.view, w.stage, a.rhs, a.lambda, &a.sound);
+  solve_watched<true>(model_, s.table, w, s.lanes, a.rhs, a.lambda, a.sound);
   for (int l = 0; l < L; ++l) {
     if (!has(s.lanes, l) || a.sound[l] > 0) continue;
-    w.pivoted.factor(model_.view.pattern, w.stage.A, l, true);
+    factor_pivoted(model_, w, l, true);
     w.pivoted.solve(l, a.rhs, a.lambda);
   }
 }
@@ -192,7 +193,7 @@ void GroupAdjoint::reverse_stages(const StageContext<L>& s, const Scheme& scheme
   const int last = scheme.inner_stages();
   for (const LossRows<L>& o : s.a.losses)
     for (Row<L>* rows : {o.q_inner, o.v_inner}) clear(rows, last * model_.nv);
-  choose_faces(model_, s.table, w);
+  start_solve(model_, s.table, w, s.lanes);
   begin_shear(model_, s.table, w);
   s.a.shear_adjoint.begin(model_);
   find_inner_velocities(s, scheme, h);

@@ -74,6 +74,7 @@ class Compiler {
     randomizations();
     find_inner_faces(m_);
     bound_links(m_);
+    find_link_balls(m_);
     symbolic();
     return std::move(m_);
   }
@@ -498,7 +499,10 @@ class Compiler {
     }
   }
 
-  void symbolic() { m_.pattern = analyse_pattern(m_.links, m_.nv, touching_); }
+  void symbolic() {
+    m_.pattern = prefers_blocks(m_.links, touching_) ? block_pattern(m_.links, m_.nv)
+                                                     : analyse_pattern(m_.links, m_.nv, touching_);
+  }
 
   CompiledModel m_;
   NameIndex links_, joints_, bodies_, sensors_, contacts_, grounds_;

@@ -165,7 +165,8 @@ void list_stages(CompiledModel& m) {
   add("Jacobian", counted(std::size_t(m.pattern.entries), "entry", "entries"),
       "composite inertia, one block per contact");
   add("factor and solve", counted(std::size_t(m.pattern.factor_entries), "entry", "entries"),
-      m.pattern.factor_entries == m.pattern.entries
+      m.pattern.slot.empty() ? "and blocks of trees that touch"
+      : m.pattern.factor_entries == m.pattern.entries
           ? "no fill"
           : std::to_string(m.pattern.factor_entries - m.pattern.entries) + " filled in");
   if (remembers(m))

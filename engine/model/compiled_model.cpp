@@ -44,6 +44,7 @@ void point_view(CompiledModel& m) {
   v.n_grounded = static_cast<int>(m.grounded.size());
   v.link_pairs = m.link_pairs.data();
   v.grounded = m.grounded.data();
+  v.link_balls = m.link_balls.empty() ? nullptr : m.link_balls.data();
   v.pair_order = m.pair_order.data();
   v.ground_order = m.ground_order.data();
   v.n_solids = static_cast<int>(m.solids.size());

@@ -211,6 +211,7 @@ struct CompiledModel {
   }
   std::vector<kernels::LinkPair> link_pairs;
   std::vector<kernels::GroundedLink> grounded;
+  std::vector<kernels::LinkBall> link_balls;  ///< (links); empty in scenes of few link pairs
   std::vector<int> pair_order, ground_order;  ///< members of link_pairs and grounded, side by side
   std::vector<std::vector<double>> point_storage;           ///< what pairs and grounds point into
   std::vector<std::shared_ptr<const MeshGrid>> mesh_grids;  ///< what bodies' grids are in

@@ -61,7 +61,7 @@ namespace {
 /// Returns the radius of a ball around a pair's shape frame outside of which nothing touches; none
 /// where there is no such ball, or where it depends on the environment.
 double radius_of(const kernels::PairContact& pair) {
-  if (!row_of(pair.shape).bounded || pair.size_row >= 0 || pair.faced) return INFINITY;
+  if (!row_of(pair.shape).bounded || pair.size_row >= 0) return INFINITY;
   if (pair.shape == PrimitiveShape::mesh) {
     double square = 0;
     for (int i = 0; i < 3; ++i) {
@@ -90,21 +90,57 @@ void bound_pair(const CompiledModel& m, kernels::LinkPair& links) {
     high = {std::max(high.x, at.x), std::max(high.y, at.y), std::max(high.z, at.z)};
   }
   double of_points = 0, of_shapes = 0, of_balls = 0;
+  bool faced = false;
   bound(points.data(), static_cast<int>(points.size() / 3), links.points_middle, of_points);
   links.shapes_middle = 0.5 * (low + high);
   for (const int k : members) {
     const kernels::PairContact& pair = m.pairs[std::size_t(k)];
     const kernels::Vec3<double> arm = pair.frame2.p - links.shapes_middle;
-    of_shapes = std::max(of_shapes, std::sqrt(dot(arm, arm)) + radius_of(pair));
+    of_shapes = std::max(of_shapes, std::sqrt(dot(arm, arm)) + radius_of(pair) + 2 * pair.overhang);
     of_balls = std::max(of_balls, pair.ball_radius);
+    faced = faced || pair.faced;
   }
-  links.apart = of_points + (of_balls + of_shapes) * (1 + 1e-9) + 1e-9;  // rounded up as in bound()
+  const auto rounded_up = [](double x) { return x * (1 + 1e-9) + 1e-9; };  // as in bound()
+  links.points_radius = of_points + rounded_up(of_balls);
+  links.shapes_radius = rounded_up(of_shapes);
+  // A chosen face has no bound in depth.
+  links.apart = faced ? INFINITY : of_points + rounded_up(of_balls + of_shapes);
+}
+
+/// Grows a ball so that it holds another one.
+void hold(kernels::LinkBall& ball, const kernels::Vec3<double>& centre, double radius) {
+  if (ball.radius < 0) {
+    ball = {centre, radius};
+    return;
+  }
+  const kernels::Vec3<double> arm = centre - ball.centre;
+  const double way = std::sqrt(dot(arm, arm));
+  if (way + radius <= ball.radius) return;
+  if (!(radius < INFINITY) || way + ball.radius <= radius) {
+    ball = {centre, radius};
+    return;
+  }
+  const double both = 0.5 * (way + radius + ball.radius);
+  ball.centre = ball.centre + ((both - ball.radius) / way) * arm;
+  ball.radius = both * (1 + 1e-9);
 }
 
 }  // namespace
 
 void bound_links(CompiledModel& m) {
   for (kernels::LinkPair& links : m.link_pairs) bound_pair(m, links);
+}
+
+void find_link_balls(CompiledModel& m) {
+  m.link_balls.clear();
+  if (m.link_pairs.size() < kManyLinkPairs) return;
+  m.link_balls.assign(m.links.size(), {{0, 0, 0}, -1});
+  for (const kernels::LinkPair& links : m.link_pairs) {
+    if (links.link1 >= 0)
+      hold(m.link_balls[std::size_t(links.link1)], links.points_middle, links.points_radius);
+    if (links.link2 >= 0)
+      hold(m.link_balls[std::size_t(links.link2)], links.shapes_middle, links.shapes_radius);
+  }
 }
 
 void group_contacts(CompiledModel& m) {
@@ -124,7 +160,8 @@ void group_contacts(CompiledModel& m) {
     const kernels::PairContact& first = m.pairs[std::size_t(m.pair_order[std::size_t(pairs[g])])];
     kernels::LinkPair links = {first.link1, first.link2, pairs[g], pairs[g + 1] - pairs[g],
                                0,           0,           false,    first.frame2.p,
-                               false,       {},          {},       INFINITY};
+                               false,       {},          {},       INFINITY,
+                               INFINITY,    INFINITY};
     links.ball = links.count == 1 && kernels::is_ball(first.shape);
     double pitch = INFINITY;
     for (int i = pairs[g]; i < pairs[g + 1]; ++i) {

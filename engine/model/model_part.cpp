@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "engine/model/components.hpp"
+#include "engine/model/group_contacts.hpp"
 
 namespace tangere {
 
@@ -26,6 +27,7 @@ class Filter {
     pairs();
     grounds();
     components();
+    find_link_balls(m_);
     m_.solids = whole.solids;
     for (const CompiledSensor& s : whole.sensors) {  // only their links matter for a step
       m_.sensors.emplace_back();
@@ -35,7 +37,9 @@ class Filter {
     m_.origin = whole.origin;
     m_.moved = whole.moved;
     m_.fall_time = whole.fall_time;
-    m_.pattern = analyse_pattern(m_.links, m_.nv, touching_);
+    // As in the whole, whose bits its steps have.
+    m_.pattern = whole.pattern.slot.empty() ? block_pattern(m_.links, m_.nv)
+                                            : analyse_pattern(m_.links, m_.nv, touching_);
     m_.view = whole.view;
     point_view(m_);
   }

@@ -11,8 +11,6 @@ namespace tangere {
 
 namespace {
 
-using Structure = std::vector<std::vector<char>>;
-
 /// Returns the dofs that move a body: those of its link and of every ancestor.
 std::vector<int> support(const std::vector<kernels::Link>& links, int link) {
   std::vector<int> dofs;
@@ -98,8 +96,8 @@ class Graph {
   std::vector<long> fill_;
 };
 
-/// Eliminates at every step the dof that creates fewest new entries; the lowest index on ties.
-/// Returns the order.
+}  // namespace
+
 std::vector<int> minimum_fill(const Structure& s) {
   Graph graph(s);
   std::vector<int> order;
@@ -114,6 +112,8 @@ std::vector<int> minimum_fill(const Structure& s) {
   }
   return order;
 }
+
+namespace {
 
 /// Columns of a row that follow each other.
 struct Stretch {
@@ -201,6 +201,26 @@ PatternPartStorage part_of(const Structure& s, const Structure& f, const Pattern
 
 }  // namespace
 
+namespace {
+
+/// Of more pairs of trees with contacts than this for each tree, most cannot touch at the same
+/// time: a box in a pile touches about six others.
+constexpr int kMostPairsOfTree = 4;
+
+/// Returns the first dof of every tree, then their number.
+std::vector<int> first_dofs(const std::vector<kernels::Link>& links) {
+  std::vector<int> first;
+  int end = 0;
+  for (const kernels::Link& link : links) {
+    if (link.parent < 0) first.push_back(link.v);
+    end = link.v + kernels::dofs(link.kind);
+  }
+  first.push_back(end);
+  return first;
+}
+
+}  // namespace
+
 PatternStorage analyse_pattern(const std::vector<kernels::Link>& links, int nv,
                                const std::vector<std::pair<int, int>>& touching) {
   Structure alone(nv, std::vector<char>(nv, 0));
@@ -222,6 +242,8 @@ PatternStorage analyse_pattern(const std::vector<kernels::Link>& links, int nv,
       p.slot[std::size_t(i) * nv + j] = p.entries++;
       p.entry_column.push_back(j);
     }
+
+  for (int i = 0; i < nv; ++i) p.diagonal_entry.push_back(p.slot[std::size_t(i) * (nv + 1)]);
 
   p.permutation = minimum_fill(s);
   Structure f = permuted(s, p.permutation), fill_alone = permuted(alone, p.permutation);
@@ -248,6 +270,47 @@ PatternStorage analyse_pattern(const std::vector<kernels::Link>& links, int nv,
   return p;
 }
 
+PatternStorage block_pattern(const std::vector<kernels::Link>& links, int nv) {
+  PatternStorage p;
+  p.n = nv;
+  p.tree_dof = first_dofs(links);
+  const int trees = static_cast<int>(p.tree_dof.size()) - 1;
+  int largest = 0;
+  for (int t = 0; t < trees; ++t) {
+    const int size = p.tree_dof[t + 1] - p.tree_dof[t];
+    for (int i = 0; i < size; ++i) {
+      p.tree.push_back(t);
+      p.diagonal_entry.push_back(p.entries + i * (size + 1));
+    }
+    p.entries += size * size;
+    largest = std::max(largest, size);
+  }
+  p.factor_entries = p.entries;
+  p.ordinals.resize(std::size_t(largest) * largest);
+  std::iota(p.ordinals.begin(), p.ordinals.end(), 0);
+  return p;
+}
+
+bool prefers_blocks(const std::vector<kernels::Link>& links,
+                    const std::vector<std::pair<int, int>>& touching) {
+  std::vector<int> root(links.size());
+  for (std::size_t i = 0; i < links.size(); ++i) {
+    root[i] = links[i].parent < 0 ? static_cast<int>(i) : root[std::size_t(links[i].parent)];
+    if (i > 0 && root[i] < root[i - 1]) return false;  // dofs of a tree are not adjacent
+  }
+  std::vector<std::pair<int, int>> coupled;
+  for (const auto& [first, second] : touching) {
+    if (first < 0 || second < 0) continue;
+    const int a = root[std::size_t(first)], b = root[std::size_t(second)];
+    if (a != b) coupled.emplace_back(std::min(a, b), std::max(a, b));
+  }
+  std::sort(coupled.begin(), coupled.end());
+  const auto distinct = std::unique(coupled.begin(), coupled.end()) - coupled.begin();
+  const auto trees = std::count_if(links.begin(), links.end(),
+                                   [](const kernels::Link& link) { return link.parent < 0; });
+  return distinct > kMostPairsOfTree * trees;
+}
+
 kernels::PatternPart PatternPartStorage::view() const {
   return {entry_first.data(), entry_end.data(),  factor_first.data(), factor_end.data(),
           lower_begin.data(), lower_slot.data(), run_begin.data(),    runs.data()};
@@ -256,7 +319,12 @@ kernels::PatternPart PatternPartStorage::view() const {
 kernels::Pattern PatternStorage::view() const {
   return {n,
           entries,
-          slot.data(),
+          diagonal_entry.data(),
+          tree_dof.empty() ? 0 : static_cast<int>(tree_dof.size()) - 1,
+          tree.data(),
+          tree_dof.data(),
+          ordinals.data(),
+          slot.empty() ? nullptr : slot.data(),
           entry_column.data(),
           factor_entries,
           permutation.data(),

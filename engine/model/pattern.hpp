@@ -21,14 +21,30 @@ struct PatternPartStorage {
 /// The storage behind kernels::Pattern.
 struct PatternStorage {
   int n = 0, entries = 0, factor_entries = 0;
+  std::vector<int> diagonal_entry, tree, tree_dof, ordinals;
   std::vector<int> slot, entry_column, permutation, scatter, diagonal;
   std::vector<int> row_begin, factor_column;
   PatternPartStorage whole, apart;
   [[nodiscard]] kernels::Pattern view() const;
 };
 
+/// A symmetric structure: row by row, not 0 where there is an entry.
+using Structure = std::vector<std::vector<char>>;
+
+/// Eliminates at every step the index that creates fewest new entries; the lowest on ties. Returns
+/// the order.
+std::vector<int> minimum_fill(const Structure& s);
+
 /// Finds a minimum-fill elimination of the structure that the tree and all contacts make.
 PatternStorage analyse_pattern(const std::vector<kernels::Link>& links, int nv,
                                const std::vector<std::pair<int, int>>& touching);
+
+/// Returns the pattern in blocks of trees.
+PatternStorage block_pattern(const std::vector<kernels::Link>& links, int nv);
+
+/// Returns whether A should be stored in blocks: contacts are declared between so many trees that a
+/// pattern of all of them has far more entries than those that touch at a time.
+bool prefers_blocks(const std::vector<kernels::Link>& links,
+                    const std::vector<std::pair<int, int>>& touching);
 
 }  // namespace tangere

@@ -119,7 +119,9 @@ std::string coefficient_text(const Scene& scene, const Element& d, Field field) 
   number.field = field;
   const char* const name = number_kind(number.owner, field).name;
   if (varies(scene, number, field)) return fmt::format("{} varies", name);
-  const std::string unit = unit_of(scene, number);
+  bool by_area = false;
+  if constexpr (std::is_same_v<Element, PairContactDescription>) by_area = d.by_area();
+  const std::string unit = to_string(coefficient_unit(number.owner, field, d.law, by_area));
   return fmt::format("{} {}{}", name, d.coefficients[coefficient_index(field)],
                      unit == "1" ? "" : " " + unit);
 }
@@ -165,8 +167,10 @@ EffectInfo find_elements(const Scene& scene, int element) {
   const auto& all = elements<Of>(scene);
   EffectInfo info;
   std::size_t on = 0;
-  for (std::size_t k = 0; k < all.size(); ++k) {
-    if ((element >= 0 && std::size_t(element) != k) || !element_on(scene, all[k], K)) continue;
+  const std::size_t first = element < 0 ? 0 : std::size_t(element),
+                    end = element < 0 ? all.size() : first + 1;
+  for (std::size_t k = first; k < end; ++k) {
+    if (!element_on(scene, all[k], K)) continue;
     ++on;
     add_source(info, all[k].source);
   }

@@ -175,18 +175,22 @@ std::string name_of(const SceneNumber& n) {
   return text;
 }
 
+Unit coefficient_unit(Owner owner, Field field, ContactLaw law, bool by_area) {
+  const Attribute& kind = number_kind(owner, field);
+  return by_area ? attribute_of(kSurfaceContact, kind.name).unit
+                 : kind.unit_of(law == ContactLaw::linear);
+}
+
 std::vector<Unit> units_of(const Scene& scene, const SceneNumber& n) {
   const Attribute& kind = number_kind(n.owner, n.field);
   if (n.owner != Owner::joint && n.owner != Owner::motor) {
-    bool linear = false;
-    with_law(scene, n, [&](const ContactCoefficients&, ContactLaw law) {
-      linear = law == ContactLaw::linear;
-    });
+    ContactLaw law{};
+    with_law(scene, n, [&](const ContactCoefficients&, ContactLaw own) { law = own; });
     const bool area =
         n.owner == Owner::contact && std::ranges::any_of(scene.pair_contacts, [&](const auto& c) {
           return c.by_area() && first_number(c).name == n.name && c.primitive_body == n.second_name;
         });
-    return {area ? attribute_of(kSurfaceContact, kind.name).unit : kind.unit_of(linear)};
+    return {coefficient_unit(n.owner, n.field, law, area)};
   }
   const LinkDescription* const link = link_of(scene, n);
   if (link == nullptr) fail_to_find(scene, n);

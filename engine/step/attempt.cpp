@@ -38,7 +38,7 @@ LaneBits solve_stages(const CompiledModel& model, const StepSettings& settings, 
       split ? kSplitHalvings : kHalvings, split ? kSplitPatience : kPatience, settings.spare};
   // With an accuracy, shorter parts are tried before softening.
   const bool softens = split || settings.accuracy == 0;
-  choose_faces(model, table, w);
+  start_solve(model, table, w, lanes);
   begin_shear(model, table, w);
   for (int k = 0; k <= inner; ++k) {
     set_stage(model, *a.scheme, k, a.h, w);

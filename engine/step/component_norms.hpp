@@ -20,7 +20,7 @@ void set_floors(const CompiledModel& m, BasicWorkspace<L>& w, LaneBits lanes) {
     for (const int i : dofs_of_component(m, c)) {
       const double scale =
           4 * std::numeric_limits<double>::epsilon() * m.unknown_scale[std::size_t(i)];
-      const kernels::Row<L>& diagonal = w.stage.A[p.slot[i * p.n + i]];
+      const kernels::Row<L>& diagonal = w.stage.A[p.diagonal_entry[i]];
       for (int l = 0; l < L; ++l) {
         const double ratio = w.stage.c0_over_h[l],
                      e = scale * (diagonal[l] * w.stage.inverse_weight[i][l] -

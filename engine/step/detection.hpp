@@ -14,11 +14,22 @@ template <int L>
 void find_candidates(const CompiledModel& model, const kernels::KernelTable& kernels,
                      BasicWorkspace<L>& w, LaneBits lanes);
 
-/// Chooses the faces that count in the solve which starts at q0 (kernels/step/faces.hpp). Call it
-/// before the first stage. Overwrites the stage's v.
+/// Prepares detection for the solve of `lanes` which starts at q0: finds the link pairs that are
+/// considered (broad_phase.hpp), and the faces that count (kernels/step/faces.hpp). Call it before
+/// the first stage. Overwrites the stage's v.
 template <int L>
-void choose_faces(const CompiledModel& model, const kernels::KernelTable& kernels,
-                  BasicWorkspace<L>& w);
+void start_solve(const CompiledModel& model, const kernels::KernelTable& kernels,
+                 BasicWorkspace<L>& w, LaneBits lanes);
+
+/// Calls f(g) for the numbers of the link pairs that are considered.
+template <int L, class F>
+void for_each_considered(const CompiledModel& model, const BasicWorkspace<L>& w, const F& f) {
+  if (w.stage.considered == nullptr) {
+    for (std::size_t g = 0; g < model.link_pairs.size(); ++g) f(g);
+  } else {
+    for (int i = 0; i < w.stage.n_considered; ++i) f(std::size_t(w.stage.considered[i]));
+  }
+}
 
 /// Copies the lists of `lanes` into rows, for evaluations of more than one lane.
 void lists_to_rows(const CompiledModel& model, const kernels::KernelTable& kernels, Workspace& w,
@@ -26,6 +37,6 @@ void lists_to_rows(const CompiledModel& model, const kernels::KernelTable& kerne
 
 /// Empties every list. Call before the first stage of a group.
 template <int L>
-void clear_candidates(BasicWorkspace<L>& w);
+void clear_candidates(const CompiledModel& model, BasicWorkspace<L>& w);
 
 }  // namespace tangere

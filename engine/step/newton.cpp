@@ -46,6 +46,7 @@
 
 #include "engine/step/component_norms.hpp"
 #include "engine/step/detection.hpp"
+#include "engine/step/factors.hpp"
 
 namespace tangere {
 
@@ -160,7 +161,7 @@ struct Search {
     LaneRow residual, test_norm{};
     scaled_residual(model, table, w, residual);
     if ((factors.lanes & searching) != 0) {
-      kernel().solve(model.view, w.stage, w.stage.g, w.test);
+      solve(model, table, w, factors.lanes & searching, w.stage.g, w.test);
       for (int l = 0; l < L; ++l)
         if (has(factors.pivoted & searching, l)) w.pivoted.solve(l, w.stage.g, w.test);
       weighted_norms(w.test, test_norm);
@@ -273,10 +274,9 @@ struct Search {
     const LaneBits accepted = std::exchange(waiting, 0);
     if (!with_jacobian) kernel().evaluate(model.view, w.stage, lone(accepted));
     set_floor(accepted);
-    const LaneRow accept = row_of(accepted);
     // Lanes that have ended keep their factors for the next stage.
-    kernel().factor(model.view, w.stage, (factors.lanes & ~accepted) == 0 ? nullptr : &accept);
-    kernel().solve_watched(model.view, w.stage, w.stage.g, w.test, &w.sound);
+    factor(model, table, w, accepted, factors.lanes);
+    solve_watched<false>(model, table, w, accepted, w.stage.g, w.test, w.sound);
     for (int l = 0; l < L; ++l) {
       if (!has(accepted, l)) continue;
       factors.lanes |= 1U << l;
@@ -285,7 +285,7 @@ struct Search {
       factors.pivoted &= ~(1U << l);
       if (w.sound[l] > 0) continue;
       factors.pivoted |= 1U << l;
-      w.pivoted.factor(model.view.pattern, w.stage.A, l, false);
+      factor_pivoted(model, w, l, false);
       w.pivoted.solve(l, w.stage.g, w.test);
     }
     LaneRow norm;
@@ -356,7 +356,7 @@ void evaluate_elsewhere(const CompiledModel& model, const kernels::KernelTable& 
 template <int L>
 void solve_by_factor(const CompiledModel& model, const kernels::KernelTable& table,
                      BasicWorkspace<L>& w, const StageFactors<L>& factors, kernels::Row<L>* out) {
-  table.stage<L>().solve(model.view, w.stage, w.stage.g, out);
+  solve(model, table, w, factors.any, w.stage.g, out);
   for (int l = 0; l < L; ++l)
     if (has(factors.pivoted & factors.any, l)) w.pivoted.solve(l, w.stage.g, out);
 }

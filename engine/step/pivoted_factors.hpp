@@ -4,27 +4,26 @@
 
 #include <memory>
 
-#include "kernels/step/model_view.hpp"
+#include "engine/step/block_factors.hpp"
 
 namespace tangere {
 
 class PivotedFactors {
  public:
-  /// Makes room for `lanes` matrices of (n, n).
-  PivotedFactors(int lanes, int n);
+  explicit PivotedFactors(int lanes);
   ~PivotedFactors();
   PivotedFactors(PivotedFactors&&) noexcept;
   PivotedFactors& operator=(PivotedFactors&&) noexcept;
 
-  /// Factors the matrix of lane `lane` whose entries on the pattern are `A`, or its transpose.
+  /// Factors the matrix of lane `lane` whose entries on the pattern, or in `blocks`, are `A`, or
+  /// its
+  /// transpose. Allocates the matrices of the lane on its first use.
   template <int L>
-  void factor(const kernels::Pattern& pattern, const kernels::Row<L>* A, int lane, bool transposed);
+  void factor(const kernels::Pattern& pattern, const BlockEntries& blocks, const kernels::Row<L>* A,
+              int lane, bool transposed);
   /// Solves lane `lane` of `out`, (n), from that of `b`, by its latest factor.
   template <int L>
   void solve(int lane, const kernels::Row<L>* b, kernels::Row<L>* out);
-
-  /// Returns the size of its buffers [bytes].
-  static std::size_t bytes(int lanes, int n);
 
  private:
   struct Numbers;

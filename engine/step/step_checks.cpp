@@ -13,6 +13,7 @@
 #include <cmath>
 
 #include "engine/model/model_part.hpp"
+#include "engine/step/detection.hpp"
 #include "engine/step/lane_energy.hpp"
 #include "engine/step/rotation_defect.hpp"
 
@@ -26,6 +27,23 @@ constexpr double kJump = 0.05;
 /// The share of the moving energy that a step may create.
 constexpr double kMayCreate = 1e-3;
 
+/// Returns the lanes in which the only face at the end of the solve is opposite to that at its
+/// start.
+template <int L>
+LaneBits passed_pair(const BasicWorkspace<L>& w, std::size_t pair) {
+  LaneBits passed = 0;
+  for (int l = 0; l < L; ++l) {
+    double along = 0, all = 0;
+    for (std::size_t i = 3 * pair; i < 3 * pair + 3; ++i) {
+      const double before = w.stage.faces[i][l], after = w.faces_after[i][l];
+      along += before * after;
+      all += std::abs(before) + std::abs(after);
+    }
+    if (along == -1 && all == 2) passed |= 1U << l;
+  }
+  return passed;
+}
+
 /// Returns the lanes in which a body passed through a cuboid that it touches: its only face at the
 /// start of the solve is opposite to its only face at the end.
 template <int L>
@@ -34,18 +52,13 @@ LaneBits passed_faces(const CompiledModel& model, const kernels::KernelTable& ta
   if (!model.view.faced) return kNoLane;
   LaneBits passed = 0;
   table.stage<L>().choose_faces(model.view, w.stage, w.faces_after);
-  for (std::size_t k = 0; k < model.pairs.size(); ++k) {
-    if (!can_exert_force(model.pairs[k].parameters)) continue;
-    for (int l = 0; l < L; ++l) {
-      double along = 0, all = 0;
-      for (std::size_t i = 3 * k; i < 3 * k + 3; ++i) {
-        const double before = w.stage.faces[i][l], after = w.faces_after[i][l];
-        along += before * after;
-        all += std::abs(before) + std::abs(after);
-      }
-      if (along == -1 && all == 2) passed |= lanes & (1U << l);
+  for_each_considered(model, w, [&](std::size_t g) {
+    const kernels::LinkPair& links = model.link_pairs[g];
+    for (int member = links.first; member < links.first + links.count; ++member) {
+      const std::size_t k = std::size_t(model.pair_order[std::size_t(member)]);
+      if (can_exert_force(model.pairs[k].parameters)) passed |= lanes & passed_pair(w, k);
     }
-  }
+  });
   return passed;
 }
 

@@ -60,16 +60,14 @@ void TunnellingCheck::add(int link, const Frame<double>& at, PrimitiveShape shap
   const Vec3<double> half = half_of(shape, size);
   if (!(half.x > 0 && half.y > 0 && half.z > 0)) return;  // a plane has one side
   const double thin = std::min({half.x, half.y, half.z});
-  const auto same = [&](const LinkPairBound& g) {
-    return std::minmax(g.link, g.other) == std::minmax(link, other);
-  };
-  const auto gate = std::find_if(link_pair_bounds_.begin(), link_pair_bounds_.end(), same);
-  slabs_.push_back({link, other, at, half, shape, size_row, middle, other_wide,
-                    std::size_t(gate - link_pair_bounds_.begin())});
-  if (gate == link_pair_bounds_.end()) {
+  const auto [at_bound, is_new] =
+      bound_of_links_.try_emplace(std::minmax(link, other), link_pair_bounds_.size());
+  const std::size_t bound = at_bound->second;
+  slabs_.push_back({link, other, at, half, shape, size_row, middle, other_wide, bound});
+  if (is_new) {
     link_pair_bounds_.push_back({link, other, thin});
   } else {
-    gate->half = std::min(gate->half, thin);
+    link_pair_bounds_[bound].half = std::min(link_pair_bounds_[bound].half, thin);
   }
 }
 
@@ -102,9 +100,12 @@ void TunnellingCheck::bound_link_pairs() {
   for (std::size_t g = 0; g < model_.link_pairs.size(); ++g) {
     const kernels::LinkPair& links = model_.link_pairs[g];
     RadiusBound bound{g, -1};
-    for (const Slab& wall : slabs_) {
+    const auto found = bound_of_links_.find(std::minmax(links.link1, links.link2));
+    if (found == bound_of_links_.end()) continue;
+    const auto [first, end] =
+        std::ranges::equal_range(slabs_, found->second, {}, &Slab::link_pair_bound);
+    for (const Slab& wall : std::ranges::subrange(first, end)) {
       const bool of_shapes = wall.link == links.link2 && wall.other == links.link1;
-      if (!of_shapes && (wall.link != links.link1 || wall.other != links.link2)) continue;
       const Vec3<double>& at = of_shapes ? links.shapes_middle : links.points_middle;
       const Vec3<double>& other = of_shapes ? links.points_middle : links.shapes_middle;
       bound.radius_sum =
@@ -227,6 +228,7 @@ LaneBits TunnellingCheck::far_movers(const Row<L>* x, Row<L>* way) const {
 template <int L>
 LaneBits TunnellingCheck::out_of_reach(const BasicWorkspace<L>& w, LaneBits lanes) const {
   if (slabs_.empty()) return lanes;
+  if (w.stage.considered != nullptr) return kNoLane;  // `between` is not that of all pairs
   if (!bounded_ || std::any_of(bounds_.begin(), bounds_.end(), [&](const RadiusBound& bound) {
         return w.apart[bound.link_pair] == 0;
       }))

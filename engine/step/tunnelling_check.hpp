@@ -3,6 +3,8 @@
 #pragma once
 
 #include <cmath>
+#include <map>
+#include <utility>
 #include <vector>
 
 #include "engine/step/workspace.hpp"
@@ -103,6 +105,7 @@ class TunnellingCheck {
   bool bounded_ = true;              ///< whether the arms of all links are known
   std::vector<int> sliders_;         ///< in q: the sliding dofs of links that others turn
   std::vector<LinkPairBound> link_pair_bounds_;
+  std::map<std::pair<int, int>, std::size_t> bound_of_links_;  ///< (lower link, higher link)
   std::vector<double> arm_;  ///< (links) from a link's origin to any middle that it moves [m]
 };
 

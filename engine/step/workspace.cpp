@@ -3,6 +3,7 @@
 #include "engine/step/workspace.hpp"
 
 #include <algorithm>
+#include <utility>
 
 #include "kernels/contact/elastic_contact.hpp"
 
@@ -12,6 +13,25 @@ using kernels::kGroup;
 using kernels::Row;
 
 namespace {
+
+/// Visits the rows of a list.
+template <class List, class Rows>
+void list_rows(const kernels::PairContact& pair, List& list, const Rows& rows) {
+  rows(list.points, 3 * list.stride);
+  if (pair.memory >= 0) rows(list.anchors, kernels::kAnchorNumbers * list.stride);
+  if (pair.weights != nullptr) rows(list.weights, list.stride);
+}
+
+/// Returns the size of a list's own points and areas.
+template <class List>
+std::size_t own_numbers(const kernels::PairContact& pair, const List& list) {
+  return std::size_t((pair.weights == nullptr ? 3 : 4) * list.stride);
+}
+template <int L, class List>
+void set_own(const kernels::PairContact& pair, double* own, List& list) {
+  list.own = own;
+  list.own_weights = pair.weights == nullptr ? nullptr : own + L * 3 * list.stride;
+}
 
 /// Visits all rows: counts them (base = nullptr) or assigns their addresses.
 template <int L>
@@ -27,9 +47,10 @@ std::size_t lay_out(const CompiledModel& m, BasicWorkspace<L>& w, Row<L>* base) 
   for (LaneRow** p : {&s.x, &s.r, &s.s, &s.tau, &s.target, &s.v, &s.g, &s.force_scale,
                       &s.mass_diagonal, &s.weight, &s.inverse_weight})
     rows(*p, m.nv);
-  rows(s.A, m.pattern.entries);
-  rows(s.LU, m.pattern.factor_entries);
-  rows(s.work, std::max(m.pattern.factor_entries, 5 * m.nv));
+  const bool in_blocks = m.pattern.slot.empty();
+  rows(s.A, in_blocks ? 0 : m.pattern.entries);
+  rows(s.LU, in_blocks ? 0 : m.pattern.factor_entries);
+  rows(s.work, in_blocks ? m.nv : std::max(m.pattern.factor_entries, 5 * m.nv));
   rows(s.excess, 1);
   rows(s.faces, 3 * static_cast<int>(m.pairs.size()));
   rows(w.faces_after, 3 * static_cast<int>(m.pairs.size()));
@@ -50,11 +71,8 @@ std::size_t lay_out(const CompiledModel& m, BasicWorkspace<L>& w, Row<L>* base) 
   for (std::size_t k = 0; k < w.lists.size(); ++k) {
     typename kernels::Stage<L>::List& list = w.lists[k];
     list.stride = (m.pairs[k].n_points + kGroup - 1) / kGroup * kGroup + kGroup;
-    rows(list.points, 3 * list.stride);
-    list.anchors = nullptr;
-    if (m.pairs[k].memory >= 0) rows(list.anchors, kernels::kAnchorNumbers * list.stride);
-    list.weights = nullptr;
-    if (m.pairs[k].weights != nullptr) rows(list.weights, list.stride);
+    list.points = list.anchors = list.weights = nullptr;
+    if (m.view.link_balls == nullptr) list_rows(m.pairs[k], list, rows);
   }
   rows(s.ground_anchors, kernels::kAnchorNumbers * m.ground_anchors);
   return used;
@@ -100,6 +118,19 @@ void BasicWorkspace<L>::make_memory(const CompiledModel& m) {
 }
 
 template <int L>
+void BasicWorkspace<L>::make_list(const CompiledModel& m, std::size_t pair) {
+  auto& list = lists[pair];
+  if (list.own != nullptr) return;
+  std::size_t used = 0;
+  const auto count = [&](LaneRow*&, int n) { used += std::size_t(n); };
+  list_rows(m.pairs[pair], list, count);
+  LaneRow* at = later_rows.emplace_back(used).data();
+  list_rows(m.pairs[pair], list, [&](LaneRow*& p, int n) { p = std::exchange(at, at + n); });
+  AlignedVector<double>& own = later_points.emplace_back(L * own_numbers(m.pairs[pair], list));
+  set_own<L>(m.pairs[pair], own.data(), list);
+}
+
+template <int L>
 std::size_t BasicWorkspace<L>::bytes(const CompiledModel& m) {
   BasicWorkspace w(m);
   const std::size_t remembered =
@@ -111,33 +142,33 @@ std::size_t BasicWorkspace<L>::bytes(const CompiledModel& m) {
   const std::size_t watched =
       2 * poses * sizeof(kernels::LinkPose<LaneRow>) + w.search.size() * sizeof(double);
   return remembered + watched + w.memory.size() * sizeof(LaneRow) +
-         w.own_points.size() * sizeof(double) + w.scratch.size() + PivotedFactors::bytes(L, m.nv);
+         w.own_points.size() * sizeof(double) + w.scratch.size();
 }
 
 template <int L>
 BasicWorkspace<L>::BasicWorkspace(const CompiledModel& m, int inner)
     : lists(m.pairs.size()),
       near_lanes(m.pairs.size()),
-      apart(m.link_pairs.size(), 0),
+      apart(m.link_pairs.size(), m.link_balls.empty() ? 0 : 1),
       apart_before(apart),
       coupled(1, 1),
       near{},
+      broad_phase(m),
       stage{},
       inner_stages(inner),
-      pivoted(L, m.nv) {
+      pivoted(L),
+      block_factors(m.view.pattern, L) {
   memory.assign(lay_out<L>(m, *this, nullptr), LaneRow{});
   lay_out<L>(m, *this, memory.data());
-  std::size_t own = 0;
-  const auto numbers = [&](std::size_t k) { return m.pairs[k].weights == nullptr ? 3 : 4; };
-  for (std::size_t k = 0; k < lists.size(); ++k)
-    own += std::size_t(L * numbers(k) * lists[k].stride);
-  own_points.resize(own);
-  own = 0;
-  for (std::size_t k = 0; k < lists.size(); ++k) {
-    auto& list = lists[k];
-    list.own = own_points.data() + own;
-    list.own_weights = numbers(k) == 4 ? list.own + L * 3 * list.stride : nullptr;
-    own += std::size_t(L * numbers(k) * list.stride);
+  if (m.link_balls.empty()) {
+    std::size_t own = 0;
+    for (std::size_t k = 0; k < lists.size(); ++k) own += L * own_numbers(m.pairs[k], lists[k]);
+    own_points.resize(own);
+    own = 0;
+    for (std::size_t k = 0; k < lists.size(); ++k) {
+      set_own<L>(m.pairs[k], own_points.data() + own, lists[k]);
+      own += L * own_numbers(m.pairs[k], lists[k]);
+    }
   }
   make_memory(m);
   poses_before.resize(m.links.size());

@@ -6,11 +6,14 @@
 #include <array>
 #include <cstdint>
 #include <cstring>
+#include <deque>
 #include <span>
 #include <vector>
 
 #include "engine/base/aligned.hpp"
 #include "engine/model/compiled_model.hpp"
+#include "engine/step/block_factors.hpp"
+#include "engine/step/broad_phase.hpp"
 #include "engine/step/pivoted_factors.hpp"
 #include "engine/step/shear_state.hpp"
 #include "engine/step/touching_sensor_points.hpp"
@@ -69,11 +72,16 @@ struct BasicWorkspace {
   explicit BasicWorkspace(const CompiledModel& model, int inner_stages = kInnerStages);
   static std::size_t bytes(const CompiledModel& model);
   void make_memory(const CompiledModel& model);
+  /// Allocates the list of a pair that is considered for the first time, in scenes of many pairs.
+  void make_list(const CompiledModel& model, std::size_t pair);
 
   using Rows = AlignedVector<LaneRow>;
   Rows memory;  ///< every row below, in one allocation
   AlignedVector<std::byte> scratch;
   AlignedVector<double> own_points;  ///< the lists' points and their areas
+  // The same of lists that make_list() allocated.
+  std::deque<Rows> later_rows;
+  std::deque<AlignedVector<double>> later_points;
   std::vector<typename kernels::Stage<L>::List> lists;
   LaneBits in_rows = 0;  ///< lanes whose lists are also in the rows
   LaneRow* references;   ///< (n_link_pairs, 12) storage of the lists' references
@@ -83,6 +91,7 @@ struct BasicWorkspace {
   std::vector<unsigned char> coupled;       ///< (1) storage of stage.coupled
   LaneBits asked = 0;  ///< lanes that were searched since the lists were cleared
   kernels::NearPairs<L> near;
+  BroadPhase<L> broad_phase;
   kernels::Stage<L> stage;
 
   // The group's states: now, one step before, and the result of the present solve.
@@ -103,6 +112,10 @@ struct BasicWorkspace {
   LaneRow *x_guess, *x_softened;  ///< first guess of a stage, and with softened contacts
   LaneRow sound;
   PivotedFactors pivoted;  ///< for lanes whose plain LU is useless
+  // Of scenes whose A is stored in blocks.
+  BlockEntries block_entries;
+  Rows blocks;  ///< storage of stage.A
+  BlockFactors block_factors;
   ShearLanes<L> remembered;
   AlignedVector<double> own_anchors;
   std::vector<int> own_index;

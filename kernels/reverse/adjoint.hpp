@@ -116,14 +116,14 @@ Vec6<N> adjoint_slip(const LinkPair& pair, const ContactScratch<N>& o,
 /// Adds the share of contacts to V̄: w₁ depends on W = Ad V₂ - V₁.
 template <class N>
 void adjoint_contacts(const ModelView& model, const StageArgs<N>& a, const AdjointArgs<N>& d) {
-  for (int k = 0; k < model.n_link_pairs; ++k) {
+  for_each_link_pair(model, a, [&](int k) {
     const LinkPair& pair = model.link_pairs[k];
     const ContactScratch<N>& o = a.contacts[k];
-    if (!o.near) continue;
+    if (!o.near) return;
     const Vec6<N> w = transposed_damping(o.sums, adjoint_slip(pair, o, d.links));
     if (pair.link1 >= 0) d.links[pair.link1].by_v -= w;
     if (pair.link2 >= 0) d.links[pair.link2].by_v += wrench_to_child(o.link2_in_1, w);
-  }
+  });
   for (int k = 0; k < model.n_grounded; ++k) {
     const ContactScratch<N>& o = a.contacts[model.n_link_pairs + k];
     if (!o.near) continue;

@@ -157,9 +157,10 @@ ContactCotangent<N> ground_adjoint(const ModelView& model, const StageArgs<N>& a
 template <class N>
 void contact_parameters(const ModelView& model, const StageArgs<N>& a, const LinkAdjoint<N>* links,
                         N* out) {
-  for (int k = 0; k < model.n_link_pairs; ++k)
+  for_each_link_pair(model, a, [&](int k) {
     if (a.contacts[k].near)
       link_pair_parameters(model, a, model.link_pairs[k], a.contacts[k], links, out);
+  });
   for (int k = 0; k < model.n_grounded; ++k) {
     const GroundedLink& grounded = model.grounded[k];
     if (!a.contacts[model.n_link_pairs + k].near) continue;

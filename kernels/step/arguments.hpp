@@ -42,6 +42,13 @@ struct Stage {
   /// (n_link_pairs) 1: by the last detection, the links cannot touch in any lane. Their lists are
   /// not read.
   unsigned char* apart;
+  /// (n_considered) ascending link pairs that may touch in this solve in some lane. The others are
+  /// apart. Null: all link pairs are considered.
+  const int* considered = nullptr;
+  int n_considered = 0;
+  /// Of scenes with link balls: (n_links, 3) their centres in the world where the solve starts [m],
+  /// (n_links) how far these may move from there, and how far they did in kinematics() [m].
+  Row<L>*ball_starts = nullptr, *ball_slack = nullptr, *ball_moves = nullptr;
   /// 0: the last Jacobian has zeros in all lanes wherever contacts alone couple dofs.
   unsigned char* coupled;
   Row<L>* ground_anchors;  ///< (points with shear springs, kAnchorNumbers)
@@ -51,6 +58,10 @@ struct Stage {
   /// links that are apart.
   Row<L>* between;
   Row<L>*v, *g, *force_scale, *mass_diagonal, *A, *LU, *work, *excess;
+  /// (n_trees, n_trees) first entry of A of each block that is stored, row by row; null: not in
+  /// blocks. All stored entries, in blocks.
+  const int* block_first = nullptr;
+  int block_entries = 0;
   Row<L>*weight, *inverse_weight;  ///< (nv) D^½ and D^-½, D the mass diagonal
   /// 1: the Jacobian is that of g. 0: it takes friction of slipping points by its secant.
   Row<L> friction_tangent = Row<L>::all(1);

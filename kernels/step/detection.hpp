@@ -34,12 +34,12 @@ void store_frame(const Frame<N>& x, N* rows) {
 template <class N, int L>
 void near_pairs(const ModelView& model, const StageArgs<N>& a, NearPairs<L>& out) {
   const auto view = [](Row<L>* p) { return reinterpret_cast<N*>(p); };
-  for (int g = 0; g < model.n_link_pairs; ++g) {
+  for_each_link_pair(model, a, [&](int g) {
     const LinkPair& links = model.link_pairs[g];
     const bool was_apart = is_apart(a, g);
     const double margin = a.candidates[model.pair_order[links.first]].margin;
     a.apart[g] = lane_bits(balls_overlap(links, g, a, margin) > N(0.0)) == 0 ? 1 : 0;
-    if (a.apart[g] != 0) continue;
+    if (a.apart[g] != 0) return;
     if (was_apart) pair_motion(links, a, a.contacts[g]);
     const Frame<N>& x = a.contacts[g].link2_in_1;
     store_frame(x, view(out.link_poses + 12 * g));
@@ -57,7 +57,7 @@ void near_pairs(const ModelView& model, const StageArgs<N>& a, NearPairs<L>& out
       if (out.lanes[k] != 0)
         store_frame(compose(x, broadcast<N>(pair.frame2)), view(out.shape_poses + 12 * k));
     }
-  }
+  });
 }
 
 /// Appends the lanes in `which`. It may write up to eight numbers, however many are appended.

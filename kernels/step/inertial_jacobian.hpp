@@ -191,12 +191,13 @@ void joint_wrenches(const Link& link, const LinkScratch<N>& o, const N& c0_over_
 template <JointKind K, class N>
 void ancestor_entries(const ModelView& model, const StageArgs<N>& a, int up, int d,
                       const Vec6<N>& by_x, const Vec6<N>& by_a, const Vec3<N>& row) {
-  const int n = model.nv;
   const Link& ancestor = model.links[up];
   const LinkScratch<N>& p = a.links[up];
+  const EntryRows<N> column = entries_at(model, a, ancestor.v, d),
+                     row_of_dof = entries_at(model, a, d, ancestor.v);
   N q[3], v[3], x[3];
   for (int j = 0; j < dofs(K); ++j) {
-    a.A[model.pattern.slot[(ancestor.v + j) * n + d]] = project<K>(ancestor, j, by_x);
+    column(j, 0) = project<K>(ancestor, j, by_x);
     v[j] = a.c0_over_h * project<K>(ancestor, j, by_a);
     q[j] = N(0.0);
     if (slides(K) && ancestor.never_rotates) continue;
@@ -205,7 +206,7 @@ void ancestor_entries(const ModelView& model, const StageArgs<N>& a, int up, int
     q[j] = dot(row, p.psi_dot[j].a) + dot(by_a, p.psi_ddot[j]);
   }
   combine<K>(p, a.c0_over_h, q, v, x);
-  for (int j = 0; j < dofs(K); ++j) a.A[model.pattern.slot[d * n + ancestor.v + j]] = x[j];
+  for (int j = 0; j < dofs(K); ++j) row_of_dof(0, j) = x[j];
 }
 
 /// Adds the rows and columns that a joint's dofs have with the ancestors of its link.
@@ -238,15 +239,14 @@ template <JointKind K, class N>
 void joint_jacobian(const ModelView& model, const StageArgs<N>& a, int i) {
   const Link& link = model.links[i];
   LinkScratch<N>& o = a.links[i];
-  const int n = model.nv;
+  const EntryRows<N> entry = entries_at(model, a, link.v, link.v);
   if (!link.never_rotates) joint_rates<K>(link, o);
   JointWrenches<N> w;
   joint_wrenches<K>(link, o, a.c0_over_h, w);
   for (int j = 0; j < dofs(K); ++j) {
     const int d = link.v + j;
     a.mass_diagonal[d] = project<K>(link, j, w.by_a[j]);
-    for (int k = 0; k < dofs(K); ++k)
-      a.A[model.pattern.slot[d * n + link.v + k]] = project<K>(link, j, w.by_x[k]);
+    for (int k = 0; k < dofs(K); ++k) entry(j, k) = project<K>(link, j, w.by_x[k]);
   }
   if (link.effects != 0) add_effect_entries<K>(model, a, link);
   if (link.parent < 0) return;

@@ -98,8 +98,8 @@ void add_block(const ModelView& model, const StageArgs<N>& a, const JointColumns
                const Link& column, const Vec6<N>* wrench, bool positive) {
   const int first = model.links[row.link].v;
   const N sign(positive ? 1.0 : -1.0);
+  const EntryRows<N> entries = entries_at(model, a, first, column.v);
   for (int k = 0; k < dofs(column.kind); ++k) {
-    const int* slot = model.pattern.slot + first * model.nv + column.v + k;
     for (int j = 0; j < dofs(K); ++j) {
       const Vec6<N>& S = row.S[j];
       const Vec6<N>& w = wrench[k];
@@ -110,7 +110,7 @@ void add_block(const ModelView& model, const StageArgs<N>& a, const JointColumns
       } else {
         x = slides(K) ? dot(S.l, w.l) : dot(S, w);
       }
-      N& entry = a.A[slot[j * model.nv]];
+      N& entry = entries(j, k);
       entry = mul_add(sign, x, entry);
     }
   }
@@ -148,24 +148,25 @@ void contact_jacobian(const ModelView& model, const StageArgs<N>& a, int body1, 
 /// Computes A at the x of the last residual<true>().
 template <class N>
 void jacobian(const ModelView& model, const StageArgs<N>& a) {
-  for (int e = 0; e < model.pattern.entries; ++e) a.A[e] = N(0.0);
+  const int entries = a.block_first != nullptr ? a.block_entries : model.pattern.entries;
+  for (int e = 0; e < entries; ++e) a.A[e] = N(0.0);
   composite_sweep(model, a);
   for (int i = 0; i < model.n_links; ++i)
     with_kind(model.links[i].kind, [&]<JointKind K>() { joint_jacobian<K>(model, a, i); });
   bool coupled = false;
-  for (int k = 0; k < model.n_link_pairs; ++k) {
+  for_each_link_pair(model, a, [&](int k) {
     const LinkPair& pair = model.link_pairs[k];
-    if (!a.contacts[k].near) continue;
+    if (!a.contacts[k].near) return;
     coupled = coupled || (pair.link1 >= 0 && pair.link2 >= 0);
     contact_jacobian(model, a, pair.link1, pair.link2, a.contacts[k],
                      pair.link2 < 0 ? nullptr : &a.contacts[k].Z);
-  }
+  });
   if (a.coupled != nullptr) *a.coupled = coupled ? 1 : 0;
   for (int k = 0; k < model.n_grounded; ++k) {
     const ContactScratch<N>& o = a.contacts[model.n_link_pairs + k];
     if (o.near) contact_jacobian<N>(model, a, model.grounded[k].link, -1, o, nullptr);
   }
-  without_negative_zeros(a.A, model.pattern.entries);
+  without_negative_zeros(a.A, entries);
 }
 
 }  // namespace tangere::kernels

@@ -194,12 +194,12 @@ template <JointKind K, class N>
 template <JointKind K, class N>
 void add_by_v(const ModelView& model, const StageArgs<N>& a, const Link& link, int j,
               const N& by_v) {
-  const int* slot = model.pattern.slot + (link.v + j) * model.nv + link.v;
+  const EntryRows<N> entry = entries_at(model, a, link.v + j, link.v);
   if constexpr (K != JointKind::spherical) {
-    a.A[slot[j]] = mul_add(a.c0_over_h, by_v, a.A[slot[j]]);
+    entry(0, j) = mul_add(a.c0_over_h, by_v, entry(0, j));
   } else {
     const LinkScratch<N>& o = a.links[&link - model.links];
-    for (int k = 0; k < 3; ++k) a.A[slot[k]] = mul_add(o.chart_rate.m[j][k], by_v, a.A[slot[k]]);
+    for (int k = 0; k < 3; ++k) entry(0, k) = mul_add(o.chart_rate.m[j][k], by_v, entry(0, k));
   }
 }
 
@@ -212,14 +212,14 @@ template <JointKind K, class N>
     a.mass_diagonal[link.v + j] += load.armature[j];
     add_by_v<K>(model, a, link, j, load.by_v[j]);
     if (!(link.effects & kPositionDependent)) continue;
-    const int* slot = model.pattern.slot + (link.v + j) * model.nv + link.v;
+    const EntryRows<N> entry = entries_at(model, a, link.v + j, link.v);
     if constexpr (K != JointKind::spherical) {
-      a.A[slot[j]] += load.by_q[j];
+      entry(0, j) += load.by_q[j];
     } else {
       const Mat3<N>& chart = a.links[&link - model.links].chart;
       for (int k = 0; k < 3; ++k)
         for (int i = 0; i < 3; ++i)
-          a.A[slot[k]] = mul_add(load.by_turn.m[j][i], chart.m[i][k], a.A[slot[k]]);
+          entry(0, k) = mul_add(load.by_turn.m[j][i], chart.m[i][k], entry(0, k));
     }
   }
 }

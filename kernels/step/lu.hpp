@@ -144,7 +144,7 @@ void solve_watched(const Pattern& p, const PatternPart& part, const N* A, const 
   for (int i = 0; i < n; ++i) x[i] = x[i] + correction[i];
   defect<Transposed>(p, part, A, x, b, residual);
   for (int i = 0; i < n; ++i) {
-    const N diagonal = abs(A[p.slot[i * n + i]]);
+    const N diagonal = abs(A[p.diagonal_entry[i]]);
     const N safe = select(diagonal > zero, diagonal, one);
     scale[i] = inverse_sqrt(safe);
     inverse_scale[i] = safe * scale[i];

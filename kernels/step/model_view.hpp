@@ -167,6 +167,13 @@ struct LinkPair {
   /// Infinite: no ball holds the shapes, or their faces.
   Vec3<double> points_middle, shapes_middle;
   double apart;
+  double points_radius, shapes_radius;  ///< of these two balls, also where there are faces [m]
+};
+
+/// A ball that holds everything of a link that touches other links.
+struct LinkBall {
+  Vec3<double> centre;  ///< link axes [m]
+  double radius;        ///< [m]; < 0: it touches no other; infinite: no ball holds it
 };
 
 /// A body against the half-space below the ground: points of the body, or a sphere's lowest point.
@@ -232,11 +239,19 @@ struct PatternPart {
   const struct EliminationRun* runs;
 };
 
-/// Structure of matrices over dofs, shared by all environments and steps.
+/// Structure of matrices over dofs. A scene of few trees has one for all environments and steps. In
+/// a scene of many trees, A is stored in blocks, one for each tree and two for each two trees that
+/// contacts couple at present (Stage::block_first); then only the first rows below are set.
 struct Pattern {
-  int n;                    ///< dofs
-  int entries;              ///< stored entries of G_q, C and A
-  const int* slot;          ///< (n, n): index of entry (i, j), -1 where always zero
+  int n;                      ///< dofs
+  int entries;                ///< stored entries of G_q, C and A; in blocks: of trees alone
+  const int* diagonal_entry;  ///< (n): index of entry (i, i)
+  int n_trees;
+  const int* tree;      ///< (n) of each dof; dofs of a tree are adjacent
+  const int* tree_dof;  ///< (n_trees + 1) first dof
+  const int*
+      ordinals;  ///< 0, 1, … (largest number of dofs of a tree)²: places in a block, row by row
+  const int* slot;  ///< (n, n): index of entry (i, j), -1 where always zero; null: in blocks
   const int* entry_column;  ///< (entries) row by row
   // LU: entries of A are scattered to factor slots, then eliminated by interpreting these lists.
   // Factor slots go row by row in elimination order: L(i, ·), U(i, i), U(i, ·). The entries to the
@@ -269,6 +284,8 @@ struct ModelView {
   bool faced;  ///< some pair is
   const LinkPair* link_pairs;
   const GroundedLink* grounded;
+  /// (n_links); null in scenes of few link pairs, whose pairs are all considered.
+  const LinkBall* link_balls;
   const int *pair_order, *ground_order;  ///< (n_pairs), (n_grounds): members side by side
   int n_solids;
   const Solid* solids;  ///< (n_solids) all bodies of the scene

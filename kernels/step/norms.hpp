@@ -30,7 +30,7 @@ N rounding_floor(const Pattern& p, const N* A, const N* weight, const N* inverse
   const N inertia = c0_over_h * c0_over_h;
   for (int i = 0; i < p.n; ++i) {
     const N e = N(4 * std::numeric_limits<double>::epsilon() * unknown_scale[i]) *
-                (A[p.slot[i * p.n + i]] * inverse_weight[i] - inertia * weight[i]);
+                (A[p.diagonal_entry[i]] * inverse_weight[i] - inertia * weight[i]);
     sum = mul_add(e, e, sum);
   }
   return sum;

@@ -192,6 +192,29 @@ N balls_overlap(const LinkPair& pair, int link_pair, const StageArgs<N>& a, doub
   return N(reach * reach) - a.between[link_pair];
 }
 
+/// Whether a ball holds what touches other links.
+inline bool has_ball(const LinkBall& ball) {
+  return ball.radius >= 0 && ball.radius <= std::numeric_limits<double>::max();
+}
+template <class N>
+Vec3<N> ball_centre(const ModelView& model, const StageArgs<N>& a, int link) {
+  const Frame<N>& world = a.links[link].world;
+  return world.R * broadcast<N>(model.link_balls[link].centre) + world.p;
+}
+
+/// Computes how far the balls of links moved since the solve started. Pairs of links that are not
+/// considered cannot touch while no ball moves by more than its slack.
+template <class N>
+void ball_motions(const ModelView& model, const StageArgs<N>& a) {
+  for (int i = 0; i < model.n_links; ++i) {
+    if (!has_ball(model.link_balls[i])) continue;
+    const N* start = a.ball_starts + 3 * i;
+    const Vec3<N> way = ball_centre(model, a, i) - Vec3<N>{start[0], start[1], start[2]};
+    a.ball_moves[i] = sqrt(dot(way, way));
+    a.excess[0] = max(a.excess[0], a.ball_moves[i] - a.ball_slack[i]);
+  }
+}
+
 /// Calls f(k, ξ) for the candidate points, one after the other.
 template <class N, class F>
 void for_each_place(const CandidateList<N>& list, int lone, const F& f) {
@@ -390,15 +413,15 @@ bool near(const ModelView& model, int k, const StageArgs<N>& a) {
 /// from the links' F.
 template <bool Derivatives, class N>
 void contact_sweep(const ModelView& model, const StageArgs<N>& a) {
-  for (int k = 0; k < model.n_link_pairs; ++k) {
+  for_each_link_pair(model, a, [&](int k) {
     const LinkPair& pair = model.link_pairs[k];
     ContactScratch<N>& o = a.contacts[k];
     o.near = near(model, k, a);
-    if (!o.near) continue;
+    if (!o.near) return;
     sum_link_pair<Derivatives>(model, pair, a, o);
     if (pair.link1 >= 0) a.links[pair.link1].F -= o.sums.wrench;
     if (pair.link2 >= 0) a.links[pair.link2].F += wrench_to_child(o.link2_in_1, o.sums.wrench);
-  }
+  });
   for (int k = 0; k < model.n_grounded; ++k) {
     ContactScratch<N>& o = a.contacts[model.n_link_pairs + k];
     o.near = sum_grounded<Derivatives>(model, model.grounded[k], a, o.sums);
@@ -444,25 +467,26 @@ template <class N>
 void kinematics(const ModelView& model, const StageArgs<N>& a) {
   outward_sweep(model, a);
   a.excess[0] = N(0.0);
-  for (int k = 0; k < model.n_link_pairs; ++k) {
+  if (a.considered != nullptr) ball_motions(model, a);
+  for_each_link_pair(model, a, [&](int k) {
     const LinkPair& pair = model.link_pairs[k];
     if (is_apart(a, k)) {
       a.excess[0] = max(a.excess[0], balls_overlap(pair, k, a, 0));
-      continue;
+      return;
     }
     const CandidateList<N>& list = a.candidates[model.pair_order[pair.first]];
     pair_motion(pair, a, a.contacts[k]);
     a.excess[0] = max(a.excess[0], list_excess(pair, list, a.contacts[k].link2_in_1));
-  }
+  });
 }
 
 /// Chooses the faces of every pair that is faced, at the relative poses of its links, to
 /// (n_pairs, 3).
 template <class N>
 void choose_faces(const ModelView& model, const StageArgs<N>& a, N* out) {
-  for (int g = 0; g < model.n_link_pairs; ++g) {
+  for_each_link_pair(model, a, [&](int g) {
     const LinkPair& links = model.link_pairs[g];
-    if (!links.faced) continue;
+    if (!links.faced) return;
     for (int i = links.first; i < links.first + links.count; ++i) {
       const int k = model.pair_order[i];
       const PairContact& pair = model.pairs[k];
@@ -472,12 +496,12 @@ void choose_faces(const ModelView& model, const StageArgs<N>& a, N* out) {
       const Vec3<N> side = chosen_faces(pair, at, half);
       out[3 * k] = side.x, out[3 * k + 1] = side.y, out[3 * k + 2] = side.z;
     }
-  }
+  });
 }
 
-/// The same at the pose of `a`, whose rates do not matter. Overwrites the scratch and v.
+/// Computes the poses of links at the pose of `a`, whose rates do not matter. Overwrites v.
 template <class N>
-void choose_faces_at(const ModelView& model, const StageArgs<N>& a, N* out) {
+void place_links(const ModelView& model, const StageArgs<N>& a) {
   for (int i = 0; i < model.n_links; ++i) {
     const Link& link = model.links[i];
     LinkScratch<N>& o = a.links[i];
@@ -485,10 +509,30 @@ void choose_faces_at(const ModelView& model, const StageArgs<N>& a, N* out) {
     joint_motion(link, a, o, rate, acceleration);
     o.world = link.parent < 0 ? o.local : compose(link, a.links[link.parent].world, o.local);
   }
-  for (int g = 0; g < model.n_link_pairs; ++g)
+}
+
+/// The same as choose_faces() at the pose of `a`, whose rates do not matter. Overwrites the scratch
+/// and v.
+template <class N>
+void choose_faces_at(const ModelView& model, const StageArgs<N>& a, N* out) {
+  place_links(model, a);
+  for_each_link_pair(model, a, [&](int g) {
     if (model.link_pairs[g].faced)
       a.contacts[g].link2_in_1 = link_pair_pose(model.link_pairs[g], a);
+  });
   choose_faces(model, a, out);
+}
+
+/// Computes the centres of the links' balls in the world at the pose of `a`, (n_links, 3). Those of
+/// links without a ball are not set. Overwrites the scratch and v.
+template <class N>
+void place_balls(const ModelView& model, const StageArgs<N>& a, N* out) {
+  place_links(model, a);
+  for (int i = 0; i < model.n_links; ++i) {
+    if (!has_ball(model.link_balls[i])) continue;
+    const Vec3<N> at = ball_centre(model, a, i);
+    out[3 * i] = at.x, out[3 * i + 1] = at.y, out[3 * i + 2] = at.z;
+  }
 }
 
 /// Computes g at the x of kinematics() and leaves everything that the Jacobian needs in the
@@ -498,14 +542,14 @@ void residual(const ModelView& model, const StageArgs<N>& a) {
   inertial_wrenches(model, a);
   contact_sweep<Derivatives>(model, a);
   inward_sweep(model, a);
-  for (int k = 0; k < model.n_link_pairs; ++k) {
+  for_each_link_pair(model, a, [&](int k) {
     const ContactScratch<N>& o = a.contacts[k];
-    if (!o.near) continue;
+    if (!o.near) return;
     const LinkPair& pair = model.link_pairs[k];
     add_force_scale(model, a, pair.link1, o.sums.wrench);
     if (pair.link2 >= 0)
       add_force_scale(model, a, pair.link2, wrench_to_child(o.link2_in_1, o.sums.wrench));
-  }
+  });
   for (int k = 0; k < model.n_grounded; ++k) {
     const ContactScratch<N>& o = a.contacts[model.n_link_pairs + k];
     if (o.near) add_force_scale(model, a, model.grounded[k].link, o.sums.wrench);
@@ -517,13 +561,17 @@ void residual(const ModelView& model, const StageArgs<N>& a) {
 /// grounded links, each on its first link, about that link's origin and in its axes.
 template <class N>
 void contact_wrenches(const ModelView& model, const StageArgs<N>& a, N* out) {
-  for (int k = 0; k < model.n_link_pairs + model.n_grounded; ++k) {
+  const auto copy = [&](int k) {
     const ContactScratch<N>& o = a.contacts[k];
     const Vec6<N> wrench = o.near ? o.sums.wrench : zero6<N>();
     N* row = out + 6 * k;
     row[0] = wrench.a.x, row[1] = wrench.a.y, row[2] = wrench.a.z;
     row[3] = wrench.l.x, row[4] = wrench.l.y, row[5] = wrench.l.z;
-  }
+  };
+  if (a.considered != nullptr)
+    for (int i = 0; i < 6 * model.n_link_pairs; ++i) out[i] = N(0.0);
+  for_each_link_pair(model, a, copy);
+  for (int k = 0; k < model.n_grounded; ++k) copy(model.n_link_pairs + k);
 }
 
 }  // namespace tangere::kernels

@@ -85,8 +85,12 @@ struct StageArgs {
   const CandidateList<N>* candidates;  ///< (n_pairs) those of links that are apart are not
                                        ///< set, but the margin of the first
   unsigned char* apart;                ///< (n_link_pairs) as in Stage; null: none is
-  unsigned char* coupled;              ///< as in Stage; null: not computed
-  const N* ground_anchors;             ///< (points with shear springs, kAnchorNumbers)
+  const int* considered = nullptr;     ///< as in Stage
+  int n_considered = 0;
+  const N *ball_starts = nullptr, *ball_slack = nullptr;  ///< as in Stage
+  N* ball_moves = nullptr;
+  unsigned char* coupled;   ///< as in Stage; null: not computed
+  const N* ground_anchors;  ///< (points with shear springs, kAnchorNumbers)
   const N* faces;  ///< (n_pairs, 3) faces that count in this solve (kernels/step/faces.hpp)
   int lone;  ///< the only lane whose result matters; its contacts are summed across points. -1: all
              ///< lanes matter
@@ -100,10 +104,40 @@ struct StageArgs {
   N* force_scale;    ///< (nv) sum of the magnitudes of actuator, damping and contact forces
   N* mass_diagonal;  ///< (nv)
   N* A;              ///< (entries)
-  N* excess;         ///< (1) how far some pair moved beyond its list's margin [m]; > 0: rebuild the
-                     ///< list and evaluate again
-  N* between;        ///< (n_link_pairs) as in Stage
+  const int* block_first = nullptr;  ///< as in Stage
+  int block_entries = 0;             ///< as in Stage
+  N* excess;   ///< (1) how far some pair moved beyond its list's margin [m]; > 0: rebuild the
+               ///< list and evaluate again
+  N* between;  ///< (n_link_pairs) as in Stage
 };
+
+/// Calls f(k) for every link pair that is considered.
+template <class N, class F>
+void for_each_link_pair(const ModelView& model, const StageArgs<N>& a, const F& f) {
+  if (a.considered == nullptr) {
+    for (int k = 0; k < model.n_link_pairs; ++k) f(k);
+  } else {
+    for (int i = 0; i < a.n_considered; ++i) f(a.considered[i]);
+  }
+}
+
+/// Entries of A from (i, k) on: (j, l) is row i + j, column k + l, of the same trees as i and k.
+template <class N>
+struct EntryRows {
+  N* A;
+  const int* slot;
+  int stride;
+  N& operator()(int j, int l) const { return A[slot[j * stride + l]]; }
+};
+template <class N>
+EntryRows<N> entries_at(const ModelView& model, const StageArgs<N>& a, int i, int k) {
+  const Pattern& p = model.pattern;
+  if (p.slot != nullptr) return {a.A, p.slot + i * p.n + k, p.n};
+  const int row = p.tree[i], column = p.tree[k], first = p.tree_dof[column],
+            width = p.tree_dof[column + 1] - first;
+  return {a.A + a.block_first[row * p.n_trees + column],
+          p.ordinals + (i - p.tree_dof[row]) * width + (k - first), width};
+}
 
 /// Calls `f` with the kind of a joint as a template argument, so that asking for the kind costs
 /// nothing.

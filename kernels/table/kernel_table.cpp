@@ -31,6 +31,8 @@ template <class Arch>
 void add_reading_pullback_kernels(KernelTable& k);
 template <class Arch>
 void add_shear_kernels(KernelTable& k);
+template <class Arch>
+void add_block_kernels(KernelTable& k);
 
 namespace {
 
@@ -50,6 +52,7 @@ KernelTable table_of(const char* name) {
   add_tactile_kernels<Arch, float>(k);
   add_reading_pullback_kernels<Arch>(k);
   add_shear_kernels<Arch>(k);
+  add_block_kernels<Arch>(k);
   return k;
 }
 

@@ -7,6 +7,7 @@
 
 #include "kernels/shear/shear_types.hpp"
 #include "kernels/step/arguments.hpp"
+#include "kernels/step/block_lu_types.hpp"
 #include "kernels/tactile/tactile_types.hpp"
 
 namespace tangere::kernels {
@@ -22,6 +23,10 @@ struct StageKernels {
   /// The same at q. `zero`: (nv) zeros. Overwrites v and what kinematics() left.
   void (*choose_faces_at)(const ModelView&, const Stage<L>&, const Row<L>* q, const Row<L>* zero,
                           Row<L>* out);
+  /// Computes the centres of the links' balls at q, (n_links, 3) [m]. `zero`, and what is
+  /// overwritten: as in choose_faces_at().
+  void (*place_balls)(const ModelView&, const Stage<L>&, const Row<L>* q, const Row<L>* zero,
+                      Row<L>* out);
   /// Computes poses and twists of all links at (q, v). `zero`: (nv) zeros. Overwrites the stage's
   /// `work`.
   void (*poses_at)(const ModelView&, const Stage<L>&, const Row<L>* q, const Row<L>* v,
@@ -119,6 +124,17 @@ struct KernelTable {
   void (*advance)(const ShearSpringTouch& end, const ShearSpringPoints&, double* s, double* force);
   /// Reverses both.
   void (*pull_back_memory)(const ShearPullback&);
+  /// Factors a matrix in blocks, in place. `work`: a block of the two largest nodes.
+  void (*factor_blocks)(const BlockPlan&, double* LU, double* work);
+  /// Solves x = A⁻¹ b, padded vectors that may be the same. `work`: the largest node.
+  void (*solve_blocks)(const BlockPlan&, const double* LU, const double* b, double* x,
+                       double* work);
+  /// The same, refined once; and x = A⁻ᵀ b. Return whether the result can be trusted. `work`: five
+  /// vectors and the largest node.
+  bool (*solve_blocks_watched)(const BlockPlan&, const double* A, const double* LU, const double* b,
+                               double* x, double* work);
+  bool (*solve_blocks_transposed)(const BlockPlan&, const double* A, const double* LU,
+                                  const double* b, double* x, double* work);
 
   template <int L>
   [[nodiscard]] const StageKernels<L>& stage() const {

@@ -50,7 +50,9 @@ struct StageView {
                                           Scratch& scratch) {
     auto* lists = scratch.template take<CandidateList<N>>(m.n_pairs);
     const int lane = lone < 0 ? 0 : lone;
-    for (int g = 0; g < m.n_link_pairs; ++g) {
+    const bool all = s.considered == nullptr;
+    for (int at = 0, end = all ? m.n_link_pairs : s.n_considered; at < end; ++at) {
+      const int g = all ? at : s.considered[at];
       const int first = m.pair_order[m.link_pairs[g].first];
       lists[first].margin = s.lists[first].margin;
       if (s.apart[g] != 0) continue;
@@ -77,6 +79,17 @@ struct StageView {
   static StageArgs<N> arguments(const ModelView& m, const StageOf& s, int lone) {
     Scratch scratch{s.scratch};
     return arguments(m, s, lone, scratch);
+  }
+
+  /// Presents the stage's model at q, without rates.
+  static StageArgs<N> at_rest(const ModelView& m, const StageOf& s, const RowOf* q,
+                              const RowOf* zero) {
+    StageArgs<N> a = arguments(m, s, -1);
+    a.centre = view(q);
+    a.x = a.r = a.s = view(zero);
+    a.c0_over_h = N(0.0);
+    a.inverse_h = N(1.0);
+    return a;
   }
 
   static StageArgs<N> arguments(const ModelView& m, const StageOf& s, int lone, Scratch& scratch) {
@@ -108,6 +121,13 @@ struct StageView {
     a.force_scale = view(s.force_scale);
     a.mass_diagonal = view(s.mass_diagonal);
     a.A = view(s.A);
+    a.block_first = s.block_first;
+    a.block_entries = s.block_entries;
+    a.considered = s.considered;
+    a.n_considered = s.n_considered;
+    a.ball_starts = view(s.ball_starts);
+    a.ball_slack = view(s.ball_slack);
+    a.ball_moves = view(s.ball_moves);
     a.excess = view(s.excess);
     a.between = view(s.between);
     return a;

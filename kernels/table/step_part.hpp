@@ -30,12 +30,11 @@ void add_step_kernels(StageKernels<L>& k) {
   };
   k.choose_faces_at = [](const ModelView& m, const Stage<L>& s, const Row<L>* q, const Row<L>* zero,
                          Row<L>* out) {
-    StageArgs<N> a = View::arguments(m, s, -1);
-    a.centre = View::view(q);
-    a.x = a.r = a.s = View::view(zero);
-    a.c0_over_h = N(0.0);
-    a.inverse_h = N(1.0);
-    kernels::choose_faces_at(m, a, View::view(out));
+    kernels::choose_faces_at(m, View::at_rest(m, s, q, zero), View::view(out));
+  };
+  k.place_balls = [](const ModelView& m, const Stage<L>& s, const Row<L>* q, const Row<L>* zero,
+                     Row<L>* out) {
+    kernels::place_balls(m, View::at_rest(m, s, q, zero), View::view(out));
   };
   k.poses_at = [](const ModelView& m, const Stage<L>& s, const Row<L>* q, const Row<L>* v,
                   const Row<L>* zero, LinkPose<Row<L>>* out) {

@@ -60,7 +60,7 @@ TEST(Passing, WhatIsOutOfReachDidNotPass) {
       for (const double way : kWays) {
         const auto m = compile(spread_trees(seed, kSpreads[seed % 3]));
         Workspace w(*m);
-        clear_candidates(w);  // all count as apart
+        clear_candidates(*m, w);  // all count as apart
         const TunnellingCheck passing(*m);
         for (int l = 0; l < kGroup; ++l) displace(*m, 100 * seed + unsigned(l), way, l, w);
         for (double& x : w.stage.c0_over_h.lane) x = 1;

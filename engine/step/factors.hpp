@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+// Factors and solves of the lanes of a group: all at once on the scene's pattern, or lane by lane
+// in blocks.
+#pragma once
+
+#include "engine/step/workspace.hpp"
+
+namespace tangere {
+
+inline bool in_blocks(const CompiledModel& m) { return m.view.pattern.slot == nullptr; }
+
+/// Factors A of the lanes in `lanes`. Lanes in `kept` keep their factors.
+template <int L>
+void factor(const CompiledModel& m, const kernels::KernelTable& table, BasicWorkspace<L>& w,
+            LaneBits lanes, LaneBits kept) {
+  if (in_blocks(m)) {
+    for (int l = 0; l < L; ++l)
+      if (has(lanes, l))
+        w.block_factors.factor(table, m.view.pattern, w.block_entries, w.stage.A, l);
+    return;
+  }
+  kernels::Row<L> accept;
+  for (int l = 0; l < L; ++l) accept[l] = has(lanes, l) ? 1 : 0;
+  table.stage<L>().factor(m.view, w.stage, (kept & ~lanes) == 0 ? nullptr : &accept);
+}
+
+/// Solves out = A⁻¹ b by the present factors of `lanes`.
+template <int L>
+void solve(const CompiledModel& m, const kernels::KernelTable& table, BasicWorkspace<L>& w,
+           LaneBits lanes, const kernels::Row<L>* b, kernels::Row<L>* out) {
+  if (!in_blocks(m)) return table.stage<L>().solve(m.view, w.stage, b, out);
+  for (int l = 0; l < L; ++l)
+    if (has(lanes, l)) w.block_factors.solve(table, l, b, out);
+}
+
+/// Solves out = A⁻¹ b, or A⁻ᵀ b, refined once, in `lanes`. sound[l] = 1 where the result can be
+/// trusted.
+template <bool Transposed, int L>
+void solve_watched(const CompiledModel& m, const kernels::KernelTable& table, BasicWorkspace<L>& w,
+                   LaneBits lanes, const kernels::Row<L>* b, kernels::Row<L>* out,
+                   kernels::Row<L>& sound) {
+  if (!in_blocks(m)) {
+    const kernels::StageKernels<L>& k = table.stage<L>();
+    return (Transposed ? k.solve_transposed : k.solve_watched)(m.view, w.stage, b, out, &sound);
+  }
+  for (int l = 0; l < L; ++l)
+    if (has(lanes, l))
+      sound[l] = w.block_factors.solve_watched(table, Transposed, l, b, out) ? 1 : 0;
+}
+
+/// Factors A of one lane, or Aᵀ, with row exchanges.
+template <int L>
+void factor_pivoted(const CompiledModel& m, BasicWorkspace<L>& w, int lane, bool transposed) {
+  w.pivoted.factor(m.view.pattern, w.block_entries, w.stage.A, lane, transposed);
+}
+
+}  // namespace tangere
