@@ -10,6 +10,7 @@ test episodes are the same for every policy. A result is one JSON object a run (
 
 from __future__ import annotations
 
+import argparse
 import importlib
 import platform
 import sys
@@ -32,6 +33,14 @@ _STUDENT = (12.706, 4.303, 3.182, 2.776, 2.571, 2.447, 2.365, 2.306, 2.262)
 
 Env = tangere.gym.VectorTaskEnv | tangere.VectorSceneEnv
 Choose = Callable[[Env, Any, int], np.ndarray]
+
+
+def add_choice(parser: argparse.ArgumentParser) -> None:
+    """`--choice`: settings are compared in other episodes than those of the test."""
+    parser.add_argument(
+        "--choice", dest="play_seed", action="store_const", const=CHOICE_SEED, default=TEST_SEED,
+        help="play the episodes by which settings are chosen, not those of the test",
+    )  # fmt: skip
 
 
 def make_vec(task: str, num_envs: int, **options: Any) -> Env:

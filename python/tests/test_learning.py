@@ -158,9 +158,10 @@ def test_clones_learn_from_a_data_set(generate):
     assert found["data"]["command"].startswith("tangere generate insertion_translation")
 
 
-def test_a_clone_may_see_the_state(generate, monkeypatch):
+@pytest.mark.parametrize("choice", [[], ["--choice"]])
+def test_a_clone_may_see_the_state(generate, monkeypatch, choice):
     data = generate("box_pushing", "--episodes", "4", "--seed", "1")
-    monkeypatch.setattr(sys, "argv", ["bc.py", str(data), "--state", "--episodes", "3"])
+    monkeypatch.setattr(sys, "argv", ["bc.py", str(data), "--state", "--episodes", "3", *choice])
     asked = bc.settings()
     windows = bc.Windows(str(data), ["goal", "q"], split=None)
     shown = []
@@ -171,7 +172,8 @@ def test_a_clone_may_see_the_state(generate, monkeypatch):
 
     bc.closed_loop(windows, clone, asked)
     env = tangere.make_vec("box_pushing", 3)
-    obs, _ = env.reset(seed=protocol.TEST_SEED)
+    seed = protocol.CHOICE_SEED if choice else protocol.TEST_SEED
+    obs, _ = env.reset(seed=seed)
     start = np.concatenate([obs["goal"], env.state()[0] / bc.STATE_UNIT], axis=1)
     np.testing.assert_allclose(shown[0], start, rtol=1e-5, atol=1e-6)
     row = windows[0]["obs"]
