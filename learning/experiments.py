@@ -48,15 +48,15 @@ DERIVED = "box_pushing --episodes 150 --seed 1 --noise 0.3 --gradients jacobians
 CAPS = "cap_opening --episodes 300 --seed 1"
 GRASPS = "stable_grasp --episodes 1000 --seed 1"
 INSERTIONS = "insertion --episodes 5000 --seed 1"
-THROUGH_TIME = "gd.py box_pushing --touch 0.05 --limit 30"
+THROUGH_TIME = "gd.py box_pushing --touch 0.05"
 CLONED = "dagger.py out/learning/pushes --rounds 60 --updates 100"
 CAPPED = "bc.py out/learning/caps --epochs 20 --before 3 --width 512"
 
 # In the order in which they are made: what is worth most and costs least comes first.
 EXPERIMENTS = [
-    Experiment("gd-touch", f"{THROUGH_TIME} --envs 64 --updates 1200 --back 1.5", 5, 430,
+    Experiment("gd-touch", f"{THROUGH_TIME} --limit 3 --back 1.5 --envs 64 --updates 1200", 5, 290,
                "GD, goal and touch", "0.058 m, 0.074"),
-    Experiment("gd-touch-short", "gd.py box_pushing --touch 0.05 --limit 10 --back 1.5", 5, 60,
+    Experiment("gd-touch-short", f"{THROUGH_TIME} --limit 10 --back 1.5", 5, 60,
                "GD, goal and touch, short", "0.058 m, 0.074"),
     Experiment("ppo-box", "ppo.py box_pushing", 5, 180, "PPO, goal and touch", "0.123 m, 0.241"),
     Experiment("gd-privileged", "gd.py box_pushing_privileged", 5, 60,
@@ -114,12 +114,19 @@ def stored(experiment: Experiment, seed: int) -> dict[str, Any] | None:
 
 
 def commit() -> str:
-    """The commit that is checked out, with "-dirty" if files differ from it; "" without git."""
-    try:
+    """The commit that is checked out, with "-dirty" if files other than results differ from it; ""
+    without git."""
+
+    def git(*words: str) -> str:
         return subprocess.run(
-            ["git", "describe", "--always", "--dirty", "--abbrev=12"],
-            cwd=ROOT, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=True,
+            ["git", *words], cwd=ROOT, stdin=subprocess.DEVNULL, capture_output=True, text=True,
+            check=True,
         ).stdout.strip()  # fmt: skip
+
+    try:
+        name = git("describe", "--always", "--abbrev=12")
+        changed = git("diff", "--name-only", "HEAD", "--", ".", ":!learning/results")
+        return name + ("-dirty" if changed else "")
     except (OSError, subprocess.CalledProcessError):
         return ""
 

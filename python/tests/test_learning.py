@@ -7,6 +7,7 @@ import copy
 import dataclasses
 import importlib
 import json
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -387,6 +388,26 @@ def test_a_result_of_another_command_or_data_set_is_stale(monkeypatch, tmp_path)
         assert not report.stored(dataclasses.replace(each, **other))
     experiments.result_of(each, 0).write_text("{}")  # one that does not say
     assert experiments.stored(each, 0) is None
+
+
+def test_results_do_not_make_a_tree_dirty(monkeypatch, tmp_path):
+    if shutil.which("git") is None:
+        pytest.skip("git is not installed")
+    monkeypatch.setattr(experiments, "ROOT", tmp_path)
+    assert experiments.commit() == ""
+    (tmp_path / "learning/results").mkdir(parents=True)
+    files = [tmp_path / "learning/results/a.json", tmp_path / "learning/gd.py"]
+    user = ("-c", "user.name=a", "-c", "user.email=a@b.c")
+    for file in files:
+        file.write_text("1")
+    for words in (["init", "-q"], ["add", "."], [*user, "commit", "-qm", "first"]):
+        subprocess.run(["git", *words], cwd=tmp_path, check=True)
+    clean = experiments.commit()
+    assert 7 <= len(clean) <= 12
+    files[0].write_text("2")
+    assert experiments.commit() == clean
+    files[1].write_text("2")
+    assert experiments.commit() == clean + "-dirty"
 
 
 def test_the_page_says_what_the_results_say():
