@@ -6,7 +6,7 @@
 
 A number is the mean over runs. ± is half of a 95 % interval: Student's over the runs; for rates of
 success the larger of that and Wilson's over the episodes of a test, which all runs share. An error
-of one run has no interval.
+of one run has no interval. † marks a row whose settings were compared in the test episodes.
 """
 
 from __future__ import annotations
@@ -18,7 +18,9 @@ from typing import Any, Sequence
 import numpy as np
 import experiments
 from experiments import EXPERIMENTS, Experiment
-from protocol import student, wilson
+from protocol import CHOICE_EPISODES, student, wilson
+
+import tangere
 
 PAGE = Path(__file__).parent / "README.md"
 FIGURE = Path(__file__).parent / "results" / "box_pushing.svg"
@@ -67,6 +69,13 @@ def steps(runs: list[dict[str, Any]]) -> str:
     return f"{runs[0]['steps'] / 1e6:.2f} M"
 
 
+def choosing(runs: list[dict[str, Any]]) -> str:
+    """Actions of the episodes by which the best policy of a run is chosen: at most, because
+    episodes may end before the horizon."""
+    horizon = tangere.task_spec(runs[0]["settings"]["task"]).horizon
+    return f"{len(runs[0]['choice']) * CHOICE_EPISODES * horizon / 1e6:.2f} M"
+
+
 def table(head: str, beginnings: tuple[str, ...], row) -> str:
     """A row for each experiment that has results and whose name begins so; "" without any."""
     columns = head.count("|") - 1
@@ -76,7 +85,8 @@ def table(head: str, beginnings: tuple[str, ...], row) -> str:
             continue
         runs = stored(experiment)
         if runs:
-            cells = [experiment.row, *row(runs), f"{len(runs)}", experiment.paper]
+            name = experiment.row + (" †" if experiment.seen else "")
+            cells = [name, *row(runs), f"{len(runs)}", experiment.paper]
             lines.append("| " + " | ".join(cells[:columns]).rstrip() + " |")
     return "\n".join(lines) + "\n" if len(lines) > 2 else ""
 
@@ -102,6 +112,14 @@ def missing() -> str:
     return wrapped(f"Not run yet: {', '.join(names)}.") + "\n" if names else ""
 
 
+def unclean() -> str:
+    """A sentence with the runs of a tree that differed from its commit; "" if there are none."""
+    dirty = {e.name: sum(r["commit"].endswith("-dirty") for r in stored(e)) for e in EXPERIMENTS}
+    names = [f"`{name}` ({count})" for name, count in dirty.items() if count]
+    said = "Runs of a tree that differed from its commit, perhaps by other results alone:"
+    return wrapped(f"{said} {', '.join(names)}.") + "\n" if names else ""
+
+
 def wrapped(text: str, width: int = 100) -> str:
     lines = [""]
     for word in text.split(" "):
@@ -115,14 +133,14 @@ def tables() -> str:
     """What stands in the README between the two marks."""
     of_pushing = ("gd-", "ppo-box")
     pushed = table(
-        "| box pushing | place | yaw [rad] | success | actions | CPU | runs |", of_pushing,
+        "| box pushing | place | yaw [rad] | success | actions | choice | CPU | runs |", of_pushing,
         lambda runs: [mean(tested(runs, "position_m"), " m"), mean(tested(runs, "yaw_rad")),
-                      rate(runs), steps(runs), cost(runs)],
+                      rate(runs), steps(runs), choosing(runs), cost(runs)],
     )  # fmt: skip
     reinforced = table(
-        "| PPO | success | actions until it | actions | CPU | runs | paper |",
+        "| PPO | success | actions until it | actions | choice | CPU | runs | paper |",
         tuple(e.name for e in EXPERIMENTS if e.name.startswith("ppo-") and e.name != "ppo-box"),
-        lambda runs: [rate(runs), until(runs), steps(runs), cost(runs)],
+        lambda runs: [rate(runs), until(runs), steps(runs), choosing(runs), cost(runs)],
     )  # fmt: skip
     cloned = table(
         "| clone | success | script | rows | CPU | runs |", ("bc-",),
@@ -140,7 +158,7 @@ def tables() -> str:
     ))  # fmt: skip
     picture = "![Return against actions of training](results/box_pushing.svg)\n" if figure() else ""
     parts = (pushed, published(of_pushing), picture, reinforced, cloned, offline, matched,
-             missing())  # fmt: skip
+             unclean(), missing())  # fmt: skip
     return "\n" + "\n".join(filter(None, parts)) + "\n"
 
 

@@ -35,7 +35,7 @@ class Window:
 
     def __init__(self, rate: float) -> None:
         self._game, self._rate = _pygame(), rate
-        self._clock = self._game.time.Clock()
+        self._clock, self._shown = self._game.time.Clock(), False
 
     def show(self, pictures: Sequence[NDArray[np.uint8]]) -> None:
         """Shows pictures (HEIGHT, WIDTH, 3) in rows, smaller where there are more than two in a
@@ -47,13 +47,15 @@ class Window:
             whole = self._game.image.frombuffer(picture.tobytes(), (WIDTH, HEIGHT), "RGB")
             part = self._game.transform.smoothscale(whole, (width, height))
             screen.blit(part, (k % columns * width, k // columns * height))
+        self._shown = True
         self._game.event.pump()
         self._clock.tick(self._rate)
         self._game.display.flip()
 
     def close(self) -> None:
-        """Closes it, if it is open."""
-        self._game.display.quit()
+        """Closes it, if it is open and was used."""
+        if self._shown:
+            self._game.display.quit()
 
     def _screen(self, size: tuple[int, int]) -> Any:
         """The window of that size [pixels]; opens it, or another one in its place."""

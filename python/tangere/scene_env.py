@@ -297,7 +297,8 @@ class VectorSceneEnv(_Remade, VectorEnv):
         row = self._row(name, getattr(self, name)())
         if row.dtype != bool:
             e = int(np.argmax((row != 0) & (row != 1)))
-            raise self._fault(f"{name}() of {row.dtype}, {row.tolist()[e]!r} in environment {e}", "bool")
+            found = f"{row.dtype}, {row.tolist()[e]!r} in environment {e}"
+            raise self._fault(f"{name}() of {found}", "bool")
         return row.copy()
 
     def randomized(self) -> dict[str, NDArray[np.float64]]:

@@ -97,6 +97,11 @@ def test_ppo_learns_a_task_of_a_file(tmp_path):
         assert done.returncode == 1 and message in done.stderr, done.stderr
     with pytest.raises(SystemExit, match="'nothing'; expected one of ball_rolling.*FILE.py:CLASS"):
         protocol.make_vec("nothing", 1)
+    file = f"{tmp_path}/own_task.py"
+    with pytest.raises(SystemExit, match=r"own_task.py has \['Hold'\] .*, not 'Held'"):
+        protocol.make_vec(f"{file}:Held", 1)
+    with pytest.raises(SystemExit, match="there is no file .*own_tusk.py"):
+        protocol.make_vec(f"{tmp_path}/own_tusk.py:Hold", 1)
 
 
 def test_images_have_one_size():
@@ -437,6 +442,14 @@ def test_the_report_has_means_and_intervals(monkeypatch, tmp_path):
     lines = report.table("| what | place | runs | paper |", ("gd-",), lambda r: ["x"]).splitlines()
     assert lines == ["| what | place | runs | paper |", "|---|---|---|---|",
                      "| a row | x | 3 | 0.1 m |"]  # fmt: skip
+    monkeypatch.setattr(report, "EXPERIMENTS", [dataclasses.replace(each, seen=True)])
+    marked = report.table("| what | place | runs | paper |", ("gd-",), lambda r: ["x"])
+    assert marked.endswith("| a row † | x | 3 | 0.1 m |\n")
+    run = {"settings": {"task": "cap_opening"}, "choice": [[1, 0.0, 0.0]] * 5}
+    assert report.choosing([run]) == "0.30 M"  # 5 × 300 episodes × 200 actions
+    for seed, commit in enumerate(("a-dirty", "b", "c-dirty")):
+        experiments.result_of(each, seed).write_text(json.dumps(result | {"commit": commit}))
+    assert report.unclean().replace("\n", " ").endswith("other results alone: `gd-x` (2). ")
 
 
 def test_the_figure_has_a_line_for_each_run(monkeypatch, tmp_path):

@@ -126,5 +126,5 @@ def test_without_render_mode_there_is_no_picture():
     assert tangere.make_env("box_pushing").render() is None
     assert tangere.make_vec("box_pushing", 2).render() is None
     for make in (tangere.make_env, lambda *a, **k: tangere.make_vec(*a, 2, **k)):
-        with pytest.raises(tangere.InputError, match="render_mode 'ansi'; expected None or one of "):
+        with pytest.raises(tangere.InputError, match="render_mode 'ansi'; expected None or one "):
             make("box_pushing", render_mode="ansi")

@@ -187,7 +187,8 @@ def test_elements_are_found_and_changed():
 
 def test_one_of_several_elements_is_not_found_by_chance():
     b = gripper()
-    bodies = [e for e in b._all() if e.tag == "body" and e.attributes.get("size") == "0.02 0.01 0.02"]
+    size = "0.02 0.01 0.02"
+    bodies = [e for e in b._all() if e.tag == "body" and e.attributes.get("size") == size]
     assert len(bodies) == 2
     with pytest.raises(tangere.InputError) as refused:
         b.find("body", size=(0.02, 0.01, 0.02))

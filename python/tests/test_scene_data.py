@@ -172,7 +172,7 @@ def test_a_state_beyond_float32_is_a_failure_and_no_warning(tmp_path):
     assert list(info["status"] < 0) == [False, True]
     assert (obs["v"][1] == np.finfo(np.float32).max).all() and np.isfinite(obs["v"]).all()
     env.batch.set_state(env.batch.q, np.full(env.model.nv, 1e200))
-    with pytest.raises(tangere.InputError, match=r"observe\(\)\['v'\] with numbers that are not fi"):
+    with pytest.raises(tangere.InputError, match=r"observe\(\)\['v'\] with numbers that are not"):
         env._observe()
 
 

@@ -91,7 +91,8 @@ def test_a_window_has_many_environments(pygame, make):
 def test_the_window_goes_at_the_rate_of_the_simulation(pygame):
     env = Press(1, render_mode="human")
     rates = []
-    env._rendering._window._clock = type("Clock", (), {"tick": lambda _, rate: rates.append(rate)})()
+    clock = type("Clock", (), {"tick": lambda _, rate: rates.append(rate)})
+    env._rendering._window._clock = clock()
     env.reset()
     env.step(np.zeros(3))
     env.render()
