@@ -446,7 +446,7 @@ def test_the_report_has_means_and_intervals(monkeypatch, tmp_path):
     marked = report.table("| what | place | runs | paper |", ("gd-",), lambda r: ["x"])
     assert marked.endswith("| a row † | x | 3 | 0.1 m |\n")
     run = {"settings": {"task": "cap_opening"}, "choice": [[1, 0.0, 0.0]] * 5}
-    assert report.choosing([run]) == "0.30 M"  # 5 × 300 episodes × 200 actions
+    assert report.choosing([run]) == "0.30"  # million: 5 × 300 episodes × 200 actions
     for seed, commit in enumerate(("a-dirty", "b", "c-dirty")):
         experiments.result_of(each, seed).write_text(json.dumps(result | {"commit": commit}))
     assert report.unclean().replace("\n", " ").endswith("other results alone: `gd-x` (2). ")
