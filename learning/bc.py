@@ -16,7 +16,7 @@ import time
 
 import numpy as np
 import torch
-from protocol import TEST_SEED, Played, play, provenance, source, wilson
+from protocol import Played, add_choice, play, provenance, source, wilson
 from torch import nn
 from tracking import Log, add_log
 
@@ -92,7 +92,7 @@ def closed_loop(windows: Windows, clone: Clone, asked: argparse.Namespace) -> Pl
         past[:] = [*past, action][len(past) + 1 - windows.before :] if windows.before else []
         return action
 
-    return play(env, TEST_SEED, choose)
+    return play(env, asked.play_seed, choose)
 
 
 def settings() -> argparse.Namespace:
@@ -112,6 +112,7 @@ def settings() -> argparse.Namespace:
     parser.add_argument("--threads", type=int, default=None, help="of the simulation")
     parser.add_argument("--device", default="cpu", help="where the network is: cpu, cuda")
     parser.add_argument("--json", action="store_true")
+    add_choice(parser)
     add_log(parser)
     return parser.parse_args()
 
@@ -141,7 +142,7 @@ def main() -> None:
     env = tangere.make_vec(
         task.name, asked.episodes, autoreset="disabled", threads=asked.threads
     )
-    script = play(env, TEST_SEED, lambda env, _obs, _t: env.scripted_action()).summary()
+    script = play(env, asked.play_seed, lambda env, _obs, _t: env.scripted_action()).summary()
     result = closed_loop(windows, clone, asked).summary()
     if asked.json:
         print(json.dumps({"program": "bc", "settings": vars(asked),

@@ -25,7 +25,7 @@ import time
 
 import numpy as np
 import torch
-from protocol import TEST_SEED, Played, play, provenance, source, wilson
+from protocol import Played, add_choice, play, provenance, source, wilson
 from torch import nn
 from tracking import Log, add_log
 
@@ -157,6 +157,7 @@ def settings() -> argparse.Namespace:
     parser.add_argument("--episodes", type=int, default=1000, help="to play")
     parser.add_argument("--threads", type=int, default=None, help="of the simulation")
     parser.add_argument("--json", action="store_true")
+    add_choice(parser)
     add_log(parser)
     return parser.parse_args()
 
@@ -205,8 +206,8 @@ def main() -> None:
             "train_wall_s": time.perf_counter() - clock}  # fmt: skip
     env = tangere.make_vec(episodes.task, asked.episodes, autoreset="disabled",
                            threads=asked.threads)  # fmt: skip
-    script = play(env, TEST_SEED, lambda env, _obs, _t: env.scripted_action()).summary()
-    result = play(env, TEST_SEED, Player(clone, keys)).summary()
+    script = play(env, asked.play_seed, lambda env, _obs, _t: env.scripted_action()).summary()
+    result = play(env, asked.play_seed, Player(clone, keys)).summary()
     rows = int(stored.there.sum())
     if asked.json:
         print(json.dumps({"program": "dagger", "settings": vars(asked), **provenance(), **cost,

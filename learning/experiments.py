@@ -40,6 +40,7 @@ class Experiment:
     row: str  #: what the table says it is
     paper: str = ""  #: what the paper has there
     data: str = ""  #: arguments of `tangere generate`; the data set is out/learning/NAME
+    seen: bool = False  #: its settings were compared in the test episodes, or nobody noted in which
 
 
 PUSHES = "box_pushing --episodes 5000 --seed 1"
@@ -48,36 +49,39 @@ DERIVED = "box_pushing --episodes 150 --seed 1 --noise 0.3 --gradients jacobians
 CAPS = "cap_opening --episodes 300 --seed 1"
 GRASPS = "stable_grasp --episodes 1000 --seed 1"
 INSERTIONS = "insertion --episodes 5000 --seed 1"
-THROUGH_TIME = "gd.py box_pushing --touch 0.05 --limit 30"
+THROUGH_TIME = "gd.py box_pushing --touch 0.05"
 CLONED = "dagger.py out/learning/pushes --rounds 60 --updates 100"
 CAPPED = "bc.py out/learning/caps --epochs 20 --before 3 --width 512"
 
 # In the order in which they are made: what is worth most and costs least comes first.
 EXPERIMENTS = [
-    Experiment("gd-touch", f"{THROUGH_TIME} --envs 64 --updates 1200 --back 1.5", 5, 430,
-               "GD, goal and touch", "0.058 m, 0.074"),
-    Experiment("gd-touch-short", "gd.py box_pushing --touch 0.05 --limit 10 --back 1.5", 5, 60,
-               "GD, goal and touch, short", "0.058 m, 0.074"),
-    Experiment("ppo-box", "ppo.py box_pushing", 5, 180, "PPO, goal and touch", "0.123 m, 0.241"),
+    Experiment("gd-touch", f"{THROUGH_TIME} --limit 3 --back 1.5 --envs 64 --updates 1200", 5, 290,
+               "GD, goal and touch", "0.058, 0.074"),
+    Experiment("gd-touch-short", f"{THROUGH_TIME} --limit 10 --back 1.5", 5, 60,
+               "GD, goal and touch, short", "0.058, 0.074"),
+    Experiment("ppo-box", "ppo.py box_pushing", 5, 180, "PPO, goal and touch", "0.123, 0.241",
+               seen=True),
     Experiment("gd-privileged", "gd.py box_pushing_privileged", 5, 60,
-               "GD, goal and box", "0.037 m, 0.043"),
-    Experiment("gd-reduced", "gd.py box_pushing_reduced", 5, 60, "GD, goal", "0.126 m, 0.255"),
-    Experiment("ppo-rotation", "ppo.py insertion_rotation", 5, 140, "insertion, yaw",
-               "100 %, 1.53"),
-    Experiment("ppo-translation", "ppo.py insertion_translation", 5, 50, "insertion, x and y",
-               "100 %, 2.33"),
+               "GD, goal and box", "0.037, 0.043"),
+    Experiment("gd-reduced", "gd.py box_pushing_reduced", 5, 60, "GD, goal", "0.126, 0.255"),
+    Experiment("ppo-rotation", "ppo.py insertion_rotation", 5, 140,
+               "insertion, yaw, imitates 3/10", "100 %, 1.53", seen=True),
+    Experiment("ppo-translation", "ppo.py insertion_translation", 5, 50,
+               "insertion, x and y, imitates 1/2", "100 %, 2.33", seen=True),
     Experiment("ppo-insertion", "ppo.py insertion", 5, 170, "insertion, all", "83 %, 4.81"),
     Experiment("ppo-grasp", "ppo.py stable_grasp", 5, 90, "stable grasp, flow", "98.5 %, 2.1"),
-    Experiment("ppo-cap-blind", "ppo.py cap_opening_blind", 3, 470, "cap, blind", "59.7 %"),
-    Experiment("ppo-cap", "ppo.py cap_opening", 5, 300, "cap, touch", "87.3 %"),
+    Experiment("ppo-cap-blind", "ppo.py cap_opening_blind", 3, 470,
+               "cap, blind, imitates 3/10", "59.7 %", seen=True),
+    Experiment("ppo-cap", "ppo.py cap_opening", 5, 300,
+               "cap, touch, imitates 4/5", "87.3 %", seen=True),
     Experiment("bc-push", CLONED, 3, 450, "box pushing, goal and touch, visits",
-               data=f"pushes {PUSHES}"),
+               data=f"pushes {PUSHES}", seen=True),
     Experiment("bc-push-blind", f"{CLONED} --without tactile", 3, 350, "box pushing, goal, visits",
-               data=f"pushes {PUSHES}"),
+               data=f"pushes {PUSHES}", seen=True),
     Experiment("bc-grasp", "bc.py out/learning/grasps", 3, 10, "stable grasp, flow",
                data=f"grasps {GRASPS}"),
     Experiment("bc-insertion", "bc.py out/learning/insertions --epochs 60 --before 4 --recall", 3,
-               200, "insertion, flow", data=f"insertions {INSERTIONS}"),
+               200, "insertion, flow", data=f"insertions {INSERTIONS}", seen=True),
     Experiment("bc-cap", CAPPED, 3, 200, "cap, touch", data=f"caps {CAPS}"),
     Experiment("bc-cap-blind", f"{CAPPED} --without tactile", 3, 60, "cap, blind",
                data=f"caps {CAPS}"),
@@ -114,12 +118,19 @@ def stored(experiment: Experiment, seed: int) -> dict[str, Any] | None:
 
 
 def commit() -> str:
-    """The commit that is checked out, with "-dirty" if files differ from it; "" without git."""
-    try:
+    """The commit that is checked out, with "-dirty" if files other than results differ from it; ""
+    without git."""
+
+    def git(*words: str) -> str:
         return subprocess.run(
-            ["git", "describe", "--always", "--dirty", "--abbrev=12"],
-            cwd=ROOT, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=True,
+            ["git", *words], cwd=ROOT, stdin=subprocess.DEVNULL, capture_output=True, text=True,
+            check=True,
         ).stdout.strip()  # fmt: skip
+
+    try:
+        name = git("describe", "--always", "--abbrev=12")
+        changed = git("diff", "--name-only", "HEAD", "--", ".", ":!learning/results")
+        return name + ("-dirty" if changed else "")
     except (OSError, subprocess.CalledProcessError):
         return ""
 

@@ -10,6 +10,7 @@ test episodes are the same for every policy. A result is one JSON object a run (
 
 from __future__ import annotations
 
+import argparse
 import importlib
 import platform
 import sys
@@ -34,22 +35,40 @@ Env = tangere.gym.VectorTaskEnv | tangere.VectorSceneEnv
 Choose = Callable[[Env, Any, int], np.ndarray]
 
 
+def add_choice(parser: argparse.ArgumentParser) -> None:
+    """`--choice`: settings are compared in other episodes than those of the test."""
+    parser.add_argument(
+        "--choice", dest="play_seed", action="store_const", const=CHOICE_SEED, default=TEST_SEED,
+        help="play the episodes by which settings are chosen, not those of the test",
+    )  # fmt: skip
+
+
 def make_vec(task: str, num_envs: int, **options: Any) -> Env:
     """Environments of a task: a name of the catalogue, or FILE.py:CLASS or MODULE:CLASS of a
     `tangere.VectorSceneEnv`. Ends the program if there is none."""
     if task in tangere.task_names():
         return tangere.make_vec(task, num_envs, **options)
-    module, _, name = task.rpartition(":")
-    if module.endswith(".py"):
-        sys.path.insert(0, str(Path(module).parent.resolve()))
-        module = Path(module).stem
-    kind = getattr(importlib.import_module(module), name, None) if module and name else None
-    if not isinstance(kind, type) or not issubclass(kind, tangere.VectorSceneEnv):
+    where, _, name = task.rpartition(":")
+    if not where or not name:
         raise SystemExit(
             f"task {task!r}; expected one of {', '.join(tangere.task_names())}, or FILE.py:CLASS "
             "or MODULE:CLASS of a tangere.VectorSceneEnv"
         )
-    return kind(num_envs, **options)
+    module = where
+    if where.endswith(".py"):
+        if not Path(where).is_file():
+            raise SystemExit(f"task {task!r}; there is no file {where}")
+        sys.path.insert(0, str(Path(where).parent.resolve()))
+        module = Path(where).stem
+    kinds = {
+        key: kind for key, kind in vars(importlib.import_module(module)).items()
+        if isinstance(kind, type) and issubclass(kind, tangere.VectorSceneEnv)
+    }  # fmt: skip
+    if name not in kinds:
+        raise SystemExit(
+            f"task {task!r}; {where} has {list(kinds)} of tangere.VectorSceneEnv, not {name!r}"
+        )
+    return kinds[name](num_envs, **options)
 
 
 @dataclass

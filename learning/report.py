@@ -6,7 +6,7 @@
 
 A number is the mean over runs. ± is half of a 95 % interval: Student's over the runs; for rates of
 success the larger of that and Wilson's over the episodes of a test, which all runs share. An error
-of one run has no interval.
+of one run has no interval. † marks a row whose settings were compared in the test episodes.
 """
 
 from __future__ import annotations
@@ -18,7 +18,9 @@ from typing import Any, Sequence
 import numpy as np
 import experiments
 from experiments import EXPERIMENTS, Experiment
-from protocol import student, wilson
+from protocol import CHOICE_EPISODES, student, wilson
+
+import tangere
 
 PAGE = Path(__file__).parent / "README.md"
 FIGURE = Path(__file__).parent / "results" / "box_pushing.svg"
@@ -60,11 +62,19 @@ def until(runs: list[dict[str, Any]]) -> str:
 
 
 def cost(runs: list[dict[str, Any]]) -> str:
-    return f"{np.mean([run['train_cpu_s'] for run in runs]):.0f} s"
+    return f"{np.mean([run['train_cpu_s'] for run in runs]):.0f}"
 
 
 def steps(runs: list[dict[str, Any]]) -> str:
-    return f"{runs[0]['steps'] / 1e6:.2f} M"
+    """Actions of the training [million]."""
+    return f"{runs[0]['steps'] / 1e6:.2f}"
+
+
+def choosing(runs: list[dict[str, Any]]) -> str:
+    """Actions of the episodes by which the best policy of a run is chosen [million]: at most,
+    because episodes may end before the horizon."""
+    horizon = tangere.task_spec(runs[0]["settings"]["task"]).horizon
+    return f"{len(runs[0]['choice']) * CHOICE_EPISODES * horizon / 1e6:.2f}"
 
 
 def table(head: str, beginnings: tuple[str, ...], row) -> str:
@@ -76,7 +86,8 @@ def table(head: str, beginnings: tuple[str, ...], row) -> str:
             continue
         runs = stored(experiment)
         if runs:
-            cells = [experiment.row, *row(runs), f"{len(runs)}", experiment.paper]
+            name = experiment.row + (" †" if experiment.seen else "")
+            cells = [name, *row(runs), f"{len(runs)}", experiment.paper]
             lines.append("| " + " | ".join(cells[:columns]).rstrip() + " |")
     return "\n".join(lines) + "\n" if len(lines) > 2 else ""
 
@@ -88,11 +99,11 @@ def turned(text: str) -> str:
     return "\n".join([*lines[:1], "|" + "---|" * len(rows), *lines[1:]]) + "\n" if rows else ""
 
 
-def published(beginnings: tuple[str, ...]) -> str:
+def published(what: str, beginnings: tuple[str, ...]) -> str:
     """A list of the paper's numbers for the experiments that table() shows; "" without any."""
     shown = [e for e in EXPERIMENTS if e.name.startswith(beginnings) and e.paper and stored(e)]
-    lines = [f"- {e.row}: {e.paper}" for e in shown]
-    return "\n".join(["Place and yaw in the paper:", "", *lines, ""]) if shown else ""
+    lines = [f"- {e.row.partition(', imitates')[0]}: {e.paper}" for e in shown]  # that is ours
+    return "\n".join([f"{what} in the paper:", "", *lines, ""]) if shown else ""
 
 
 def missing() -> str:
@@ -100,6 +111,14 @@ def missing() -> str:
     names = [f"`{e.name}` ({e.seeds - len(stored(e))})" for e in EXPERIMENTS
              if len(stored(e)) < e.seeds]  # fmt: skip
     return wrapped(f"Not run yet: {', '.join(names)}.") + "\n" if names else ""
+
+
+def unclean() -> str:
+    """A sentence with the runs of a tree that differed from its commit; "" if there are none."""
+    dirty = {e.name: sum(r["commit"].endswith("-dirty") for r in stored(e)) for e in EXPERIMENTS}
+    names = [f"`{name}` ({count})" for name, count in dirty.items() if count]
+    said = "Runs of a tree that differed from its commit, perhaps by other results alone:"
+    return wrapped(f"{said} {', '.join(names)}.") + "\n" if names else ""
 
 
 def wrapped(text: str, width: int = 100) -> str:
@@ -114,33 +133,38 @@ def wrapped(text: str, width: int = 100) -> str:
 def tables() -> str:
     """What stands in the README between the two marks."""
     of_pushing = ("gd-", "ppo-box")
+    of_tasks = tuple(
+        e.name for e in EXPERIMENTS if e.name.startswith("ppo-") and e.name not in of_pushing
+    )
     pushed = table(
-        "| box pushing | place | yaw [rad] | success | actions | CPU | runs |", of_pushing,
-        lambda runs: [mean(tested(runs, "position_m"), " m"), mean(tested(runs, "yaw_rad")),
-                      rate(runs), steps(runs), cost(runs)],
+        "| box pushing | place [m] | yaw [rad] | success | actions [M] | choice [M] | CPU [s] "
+        "| runs |", of_pushing,
+        lambda runs: [mean(tested(runs, "position_m")), mean(tested(runs, "yaw_rad")),
+                      rate(runs), steps(runs), choosing(runs), cost(runs)],
     )  # fmt: skip
     reinforced = table(
-        "| PPO | success | actions until it | actions | CPU | runs | paper |",
-        tuple(e.name for e in EXPERIMENTS if e.name.startswith("ppo-") and e.name != "ppo-box"),
-        lambda runs: [rate(runs), until(runs), steps(runs), cost(runs)],
+        "| PPO | success | actions until it | actions [M] | choice [M] | CPU [s] | runs |",
+        of_tasks,
+        lambda runs: [rate(runs), until(runs), steps(runs), choosing(runs), cost(runs)],
     )  # fmt: skip
     cloned = table(
-        "| clone | success | script | rows | CPU | runs |", ("bc-",),
+        "| clone | success | script | rows | CPU [s] | runs |", ("bc-",),
         lambda runs: [rate(runs), f"{100 * runs[0]['script']['success']:.1f} %",
                       f"{runs[0]['rows']}", cost(runs)],
     )  # fmt: skip
     offline = table(
-        "| mixed data | score | success | CPU | runs |", ("offline-",),
+        "| mixed data | score | success | CPU [s] | runs |", ("offline-",),
         lambda runs: [mean(tested(runs, "score"), "", 1), rate(runs), cost(runs)],
     )  # fmt: skip
     matched = turned(table(
-        "| episodes | " + " | ".join(str(n) for n in MATCHED) + " | CPU | runs |", ("match-",),
+        "| episodes | " + " | ".join(str(n) for n in MATCHED) + " | CPU [s] | runs |", ("match-",),
         lambda runs: [*(mean([dict(map(tuple, run["curve"]))[n] for run in runs])
                         for n in MATCHED), cost(runs)],
     ))  # fmt: skip
     picture = "![Return against actions of training](results/box_pushing.svg)\n" if figure() else ""
-    parts = (pushed, published(of_pushing), picture, reinforced, cloned, offline, matched,
-             missing())  # fmt: skip
+    parts = (pushed, published("Place [m] and yaw [rad]", of_pushing), picture, reinforced,
+             published("Success, and actions until it", of_tasks), cloned, offline, matched,
+             unclean(), missing())  # fmt: skip
     return "\n" + "\n".join(filter(None, parts)) + "\n"
 
 

@@ -231,6 +231,16 @@ void Batch::get_v(int environment, std::span<double> v) const {
   for (int i = 0; i < m.nv; ++i) v[i] = column[std::size_t(m.layout.v + i) * kBlock];
 }
 
+std::span<const double> Batch::q_lanes(int block) const {
+  const CompiledModel& m = compiled(model_);
+  return {this->block(block) + as_size(m.layout.q) * kBlock, as_size(m.nq) * kBlock};
+}
+
+std::span<const double> Batch::v_lanes(int block) const {
+  const CompiledModel& m = compiled(model_);
+  return {this->block(block) + as_size(m.layout.v) * kBlock, as_size(m.nv) * kBlock};
+}
+
 void Batch::set_state(int environment, std::span<const double> q, std::span<const double> v) {
   const std::size_t lane = this->lane(environment);
   write_state(lane, q, v);

@@ -77,6 +77,12 @@ class Batch {
   /// Copy one environment's coordinates out of its lane: (nq), (nv).
   void get_q(int environment, std::span<double> q) const;
   void get_v(int environment, std::span<double> v) const;
+  /// The coordinates themselves, in the lanes of a block: (nq, 16) and (nv, 16), where lane l is
+  /// environment 16 block + l. Lanes beyond the last environment are padding. The addresses stay
+  /// the same as long as the batch is neither moved nor destroyed; those of two blocks in a row are
+  /// at one distance. The values change with the state.
+  [[nodiscard]] std::span<const double> q_lanes(int block) const;
+  [[nodiscard]] std::span<const double> v_lanes(int block) const;
   /// Sets a state and drops the integrator's history, so the next step is a start. All past states
   /// of sensors with lag become this state. Quaternions are normalised.
   void set_state(int environment, std::span<const double> q, std::span<const double> v);

@@ -206,6 +206,16 @@ Array<double> PythonBatch::coordinates(int width, GetCoordinates get) {
 Array<double> PythonBatch::q() { return coordinates(model().nq(), &Batch::get_q); }
 Array<double> PythonBatch::v() { return coordinates(model().nv(), &Batch::get_v); }
 
+/// Without a turn: the addresses never change.
+View PythonBatch::view(nb::handle owner, GetLanes get) const {
+  constexpr std::size_t kLanes = kernels::kBlock;
+  const std::span<const double> first = (batch_.*get)(0);
+  const std::ptrdiff_t next =
+      batch_.blocks() > 1 ? (batch_.*get)(1).data() - first.data() : std::ssize(first);
+  return View(first.data(), {as_size(batch_.blocks()), kLanes, first.size() / kLanes}, owner,
+              {next, 1, std::ptrdiff_t{kLanes}});
+}
+
 Array<double> PythonBatch::end_effectors() {
   const InUse::Turn turn(in_use_);
   const std::size_t n = model().end_effectors().size();
@@ -441,6 +451,25 @@ static void add_statuses(nb::module_& m) {
       .value("singular", StepStatus::singular, "The Jacobian could not be factored.");
 }
 
+static void add_coordinates(nb::class_<PythonBatch>& batch) {
+  batch
+      .def_prop_ro("q", &PythonBatch::q, nb::rv_policy::automatic,
+                   "(E, nq) coordinates: m, rad, quaternions w x y z.")
+      .def_prop_ro("v", &PythonBatch::v, nb::rv_policy::automatic,
+                   "(E, nv) velocities: m/s, rad/s.")
+      .def_prop_ro(
+          "q_view", [](nb::handle_t<PythonBatch> b) { return nb::cast<PythonBatch&>(b).q_view(b); },
+          nb::rv_policy::automatic,
+          "(B, 16, nq) float64, read only: the coordinates where the engine has them, without a\n"
+          "copy. Environment e is q_view[e // 16, e % 16]; places behind the last environment are\n"
+          "padding. The numbers change whenever the state does: by step(), run(), set_state() and\n"
+          "reset(). Do not read a view while another thread steps the batch. A view keeps the\n"
+          "batch's memory alive.")
+      .def_prop_ro(
+          "v_view", [](nb::handle_t<PythonBatch> b) { return nb::cast<PythonBatch&>(b).v_view(b); },
+          nb::rv_policy::automatic, "(B, 16, nv) float64, read only: the velocities, as q_view.");
+}
+
 constexpr const char* kRunText =
     "Takes T steps with the controls `u`, (T, E, nu), in one call. Keeps the state after every\n"
     "`every` steps, and the readings named in `fields`. `envs`: the environments that are stepped\n"
@@ -451,11 +480,13 @@ void add_batches(nb::module_& m) {
   add_statuses(m);
 
   add_run(m);
-  nb::class_<PythonBatch>(
+  nb::class_<PythonBatch> batch(
       m, "Batch",
       "Many environments of one model, stepped together on all cores. Results are new arrays.\n"
       "The same seed gives the same bits for any number of environments and threads. One Python\n"
-      "thread uses a batch at a time.")
+      "thread uses a batch at a time.");
+  add_coordinates(batch);
+  batch
       .def("__init__", &make_batch, "model"_a, "num_envs"_a = 1, "seed"_a = 0,
            "first_episode"_a = 0, "threads"_a = nb::none(), "precision"_a = "mixed",
            "timestep"_a = nb::none(), "tolerance"_a = nb::none(), "accuracy"_a = nb::none(),
@@ -472,10 +503,6 @@ void add_batches(nb::module_& m) {
       .def_prop_ro("num_envs", &PythonBatch::environments, "E")
       .def_prop_ro("threads", &PythonBatch::threads)
       .def_prop_ro("seed", &PythonBatch::seed)
-      .def_prop_ro("q", &PythonBatch::q, nb::rv_policy::automatic,
-                   "(E, nq) coordinates: m, rad, quaternions w x y z.")
-      .def_prop_ro("v", &PythonBatch::v, nb::rv_policy::automatic,
-                   "(E, nv) velocities: m/s, rad/s.")
       .def_prop_ro("status", &PythonBatch::status, nb::rv_policy::automatic,
                    "(E) int8, values of StepStatus: how the last step of each environment ended;\n"
                    "negative where it has failed and stands still.")

@@ -36,6 +36,9 @@ struct Run {
   Array<std::int8_t> status;  ///< (E) of the last step
 };
 
+/// Numbers of a batch in place: blocks, lanes, numbers.
+using View = nb::ndarray<nb::numpy, const double, nb::ndim<3>>;
+
 class PythonBatch {
  public:
   PythonBatch(const Model& model, int environments, const BatchOptions& options);
@@ -46,6 +49,8 @@ class PythonBatch {
   nb::object tactile(const std::string& reading, const nb::object& out);
   [[nodiscard]] Array<double> q();
   [[nodiscard]] Array<double> v();
+  [[nodiscard]] View q_view(nb::handle owner) const { return view(owner, &Batch::q_lanes); }
+  [[nodiscard]] View v_view(nb::handle owner) const { return view(owner, &Batch::v_lanes); }
   [[nodiscard]] Array<double> end_effectors();
   nb::tuple bodies();
   nb::tuple faces(const Whole<int>& environment, double half_space);
@@ -76,8 +81,10 @@ class PythonBatch {
   };
 
   using GetCoordinates = void (Batch::*)(int, std::span<double>) const;
+  using GetLanes = std::span<const double> (Batch::*)(int) const;
 
   [[nodiscard]] Array<double> coordinates(int width, GetCoordinates get);
+  [[nodiscard]] View view(nb::handle owner, GetLanes get) const;
   [[nodiscard]] std::size_t count() const { return as_size(environments()); }
   void take_step(Worker& worker, int block, std::span<const double> u);
   [[nodiscard]] FieldOutput reading_named(const std::string& name) const;

@@ -7,6 +7,7 @@
 
 #include <cmath>
 #include <numeric>
+#include <utility>
 
 #include "engine/derivative/number_gradients.hpp"
 #include "engine/derivative/tactile_point_numbers.hpp"
@@ -53,11 +54,13 @@ struct TapedScene {
       varying.push_back(as_size(randomization_of(task.model().scene(), at->number)));
     }
     number_count = as_size(numbers.count());
+    if (a.options.points) point_count = as_size(tactile_points(task.model()));
   }
 
   SceneTask task;
   TaskTape tape;
   std::size_t number_count = 0;            ///< by which there are derivatives
+  std::size_t point_count = 0;             ///< of all sensors, by which there are derivatives
   std::vector<std::size_t> rows, varying;  ///< (parameters) among these, and among what varies
 };
 
@@ -76,6 +79,7 @@ class SceneTape {
              const std::optional<Argument<double>>& points,
              const std::optional<NamedValues>& randomized, bool record) {
     const std::uint64_t draw = seed.value("seed");
+    const InUse::Turn turn(in_use_);
     std::vector<double> q0, v0, given, moved;
     if (q) q0 = rows_of(*q, count(), nq(), "q");
     if (v) v0 = rows_of(*v, count(), nv(), "v");
@@ -87,7 +91,6 @@ class SceneTape {
         throw InputError("points by numbers that are not finite; expected finite ones");
     }
     const std::vector<std::vector<double>> drawn = rows_of_varying(randomized);
-    const InUse::Turn turn(in_use_);
     const nb::gil_scoped_release free;
     move_points(moved);
     draw_numbers(draw, given, drawn);
@@ -102,20 +105,20 @@ class SceneTape {
     first_q_.assign(tape().q().begin(), tape().q().end());
   }
   void step(const Argument<double>& controls) {
-    const std::vector<double> rows = rows_of(controls, count(), as_size(model().nu()), "controls");
     const InUse::Turn turn(in_use_);
+    const std::vector<double> rows = rows_of(controls, count(), as_size(model().nu()), "controls");
     const nb::gil_scoped_release free;
     tape().step(rows);
   }
   void check_step(const Argument<double>& controls) {
-    const std::vector<double> rows = rows_of(controls, count(), as_size(model().nu()), "controls");
     const InUse::Turn turn(in_use_);
+    const std::vector<double> rows = rows_of(controls, count(), as_size(model().nu()), "controls");
     tape().check_step(rows);
   }
   Array<double> observations() {
+    const InUse::Turn turn(in_use_);
     std::span<double> to;
     auto array = new_array<double>({count(), width()}, to);
-    const InUse::Turn turn(in_use_);
     const nb::gil_scoped_release free;
     tape().get_observations(to);
     return array;
@@ -128,15 +131,16 @@ class SceneTape {
     return array_of<std::int8_t>({count()}, std::span<const std::int8_t>(all));
   }
   Array<double> reverse(const Argument<double>& observation_bar) {
+    const InUse::Turn turn(in_use_);
     const auto o = numbers_of(observation_bar, {count(), width()}, "derivatives by readings");
     std::span<double> action_bar;
     auto array = new_array<double>({count(), as_size(model().nu())}, action_bar);
-    const InUse::Turn turn(in_use_);
     const nb::gil_scoped_release free;
     tape().reverse({o}, action_bar);
     return array;
   }
   nb::tuple reverse_start(const Argument<double>& observation_bar) {
+    const InUse::Turn turn(in_use_);
     const auto o = numbers_of(observation_bar, {count(), width()}, "derivatives by readings");
     std::span<double> q, v, parameters, points;
     auto q_bar = new_array<double>({count(), nq()}, q),
@@ -144,7 +148,6 @@ class SceneTape {
          parameter_bar = new_array<double>({count(), names().size()}, parameters),
          point_bar = new_array<double>({point_count(), kPointNumbers}, points);
     {
-      const InUse::Turn turn(in_use_);
       const nb::gil_scoped_release free;
       const std::size_t numbers = taped_->number_count;
       std::vector<double> along(v.size()), all(names().empty() ? 0 : count() * numbers),
@@ -176,16 +179,20 @@ class SceneTape {
     return array_of<double>({count(), names().size()}, std::span<const double>(all));
   }
 
-  [[nodiscard]] const TaskSpec& spec() const { return taped_->task.spec(); }
-  [[nodiscard]] const Model& model() const { return taped_->task.model(); }
-  [[nodiscard]] std::size_t count() const { return as_size(arguments_.environments); }
-  [[nodiscard]] std::int64_t taken() const { return taped_->tape.taken(); }
-  [[nodiscard]] std::size_t point_count() const {
-    return arguments_.options.points ? as_size(tactile_points(model())) : 0;
+  /// Returns what `get` returns of the scene of now, as a copy: a reset with other points compiles
+  /// another one.
+  template <class Get>
+  auto current(Get get) {
+    const InUse::Turn turn(in_use_);
+    return get(std::as_const(*taped_));
   }
+  [[nodiscard]] std::size_t count() const { return as_size(arguments_.environments); }
 
  private:
   [[nodiscard]] TaskTape& tape() { return taped_->tape; }
+  [[nodiscard]] const TaskSpec& spec() const { return taped_->task.spec(); }
+  [[nodiscard]] const Model& model() const { return taped_->task.model(); }
+  [[nodiscard]] std::size_t point_count() const { return taped_->point_count; }
   [[nodiscard]] const std::vector<std::string>& names() const { return arguments_.parameters; }
   [[nodiscard]] std::size_t nq() const { return as_size(model().nq()); }
   [[nodiscard]] std::size_t nv() const { return as_size(model().nv()); }
@@ -372,12 +379,24 @@ void add_scene_tapes(nb::module_& m) {
            "Ends the reverse pass: takes derivatives by the first readings (E, n), returns those\n"
            "by q (E, nq), v (E, nv), parameters (E, names) of the start, and by points (n, 7).")
       .def("begin_reverse", &SceneTape::begin_reverse, "Begins another reverse pass.")
-      .def_prop_ro("taken", &SceneTape::taken, "Calls of step() on the tape.")
-      // Copies: a reset with other points makes others.
-      .def_prop_ro("spec", [](const SceneTape& s) { return TaskSpec(s.spec()); })
-      .def_prop_ro("model", [](const SceneTape& s) { return Model(s.model()); })
-      .def_prop_ro("points", &SceneTape::point_count,
-                   "Of all sensors; 0 without their derivatives.")
+      .def_prop_ro(
+          "taken",
+          [](SceneTape& s) {
+            return s.current([](const TapedScene& t) { return t.tape.taken(); });
+          },
+          "Calls of step() on the tape.")
+      .def_prop_ro("spec",
+                   [](SceneTape& s) {
+                     return s.current([](const TapedScene& t) { return TaskSpec(t.task.spec()); });
+                   })
+      .def_prop_ro("model",
+                   [](SceneTape& s) {
+                     return s.current([](const TapedScene& t) { return Model(t.task.model()); });
+                   })
+      .def_prop_ro(
+          "points",
+          [](SceneTape& s) { return s.current([](const TapedScene& t) { return t.point_count; }); },
+          "Of all sensors; 0 without their derivatives.")
       .def_prop_ro("num_envs", &SceneTape::count);
 }
 

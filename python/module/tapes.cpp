@@ -91,7 +91,10 @@ class Tape {
   [[nodiscard]] const TaskSpec& spec() const { return task_->spec(); }
   [[nodiscard]] const Model& model() const { return task_->model(); }
   [[nodiscard]] std::size_t count() const { return as_size(tape_.environments()); }
-  [[nodiscard]] std::int64_t taken() const { return tape_.taken(); }
+  [[nodiscard]] std::int64_t taken() {
+    const InUse::Turn turn(in_use_);
+    return tape_.taken();
+  }
 
  private:
   std::vector<double> unscaled(const Argument<double>& observation_bar) {

@@ -11,3 +11,10 @@ import numpy as np
 def numbers(value: Any) -> np.ndarray:
     """The numbers of any array. Those of a PyTorch tensor come without its gradients."""
     return np.asarray(value.detach().cpu() if hasattr(value, "detach") else value)
+
+
+def singles(values: Any) -> np.ndarray:
+    """A new array of float32. A number that is too large for it becomes infinite, without NumPy's
+    warning: the caller says what is wrong."""
+    with np.errstate(over="ignore"):
+        return np.array(values, np.float32)

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import _core
-from ._arrays import numbers
+from ._arrays import numbers, singles
 from .policy import Choose
 from .scene_env import Indices, VectorSceneEnv
 
@@ -243,7 +243,8 @@ class _Run:
     def _keep(self, at: tuple[Indices, Indices], envs: Indices) -> None:
         """Stores what is observed now in rows `at`."""
         batch = self.env._batch
-        state = {"q": batch.q.astype(np.float32), "v": batch.v.astype(np.float32)}
+        # Where the simulation has failed, a state may be out of float32's range. It is not written.
+        state = {name: np.nan_to_num(singles(getattr(batch, name))) for name in _STATE}
         for key in _STATE:
             if key in self.obs and not np.array_equal(self.obs[key], state[key]):
                 raise self.env._fault(

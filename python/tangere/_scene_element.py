@@ -19,6 +19,7 @@ Value: TypeAlias = Union[
 ]  # fmt: skip
 Origin: TypeAlias = tuple[str, int]  # a file and a line
 E = TypeVar("E", bound="Element")
+_LISTED = 8  # elements in a message, at most
 _PACKAGE = str(Path(__file__).parent)
 
 
@@ -98,18 +99,26 @@ class Holder(Element):
         self._add(Element, "include", {"file": str(file), **attributes})
 
     def find(self, tag: str, **attributes: Value) -> Element:
-        """The first element of a kind that has these attributes, however deep inside this one:
-        `find("joint", name="lift")`. Raises InputError if there is none."""
+        """The element of a kind that has these attributes, however deep inside this one:
+        `find("joint", name="lift")`. Raises InputError if there is none, or more than one."""
         wanted = self._texts(attributes)
         of_tag = [e for e in self._all() if e.tag == tag]
-        for element in of_tag:
-            if wanted.items() <= element.attributes.items():
-                return element
+        found = [e for e in of_tag if wanted.items() <= e.attributes.items()]
+        if len(found) == 1:
+            return found[0]
+        sought = f"{Element(tag, wanted, self.origin)} inside <{self.tag}>"
+        if found:
+            listed = "".join(f"\n  {_at(e.origin)}{e}" for e in found[:_LISTED])
+            more = f"\n  and {len(found) - _LISTED} more" if len(found) > _LISTED else ""
+            raise _core.InputError(
+                f"{len(found)} elements are {sought}; expected one, by more attributes, or in a "
+                f"holder that has one:{listed}{more}"
+            )
         near = ""
         if len(wanted) == 1:
             ((name, value),) = wanted.items()
             near = _core.suggestion(value, [e.attributes.get(name, "") for e in of_tag])
-        raise _core.InputError(f"no {Element(tag, wanted, self.origin)} inside <{self.tag}>{near}")
+        raise _core.InputError(f"no {sought}{near}")
 
     def clear(self) -> None:
         """Takes out everything that the element holds."""

@@ -11,6 +11,9 @@ import torch
 from . import _core
 
 
+_VIEWS = ("q_view", "v_view")  # PyTorch has no memory that is read only
+
+
 def tensors(value: Any) -> Any:
     """Arrays, also in tuples and dicts, as tensors that share their memory."""
     if isinstance(value, np.ndarray):
@@ -28,6 +31,8 @@ class TensorBatch:
         self.names: list[str] = []
 
     def __getattr__(self, name: str) -> Any:
+        if name in _VIEWS:
+            raise _core.InputError(f"batch.{name} of a task with tensors; expected {name[0]}")
         value = getattr(self._batch, name)
         if not callable(value):
             return tensors(value)

@@ -21,12 +21,11 @@ from gymnasium.vector.utils import batch_space
 
 from . import _core
 from ._arrays import numbers
-from ._picture import View
+from ._rendering import MODES, RenderMode, Rendering
 
 # KEY → array, or with `flatten` one array.
 Observation = Any
 Autoreset = Literal["next_step", "same_step", "disabled"]
-RenderMode = Literal["rgb_array"] | None
 _MODES = {
     "next_step": AutoresetMode.NEXT_STEP,
     "same_step": AutoresetMode.SAME_STEP,
@@ -91,14 +90,12 @@ def _checked(seed: Any) -> int:
     return int(seed)
 
 
-def _check_choices(num_envs: Any, autoreset: Any, render_mode: Any) -> None:
+def _check_choices(num_envs: Any, autoreset: Any) -> None:
     """Raises InputError for arguments of a vector environment that are not among those known."""
     if not isinstance(num_envs, (int, np.integer)) or num_envs < 1:
         raise _core.InputError(f"num_envs {num_envs!r}; expected a whole number from 1 on")
     if autoreset not in _MODES:
         raise _core.InputError(f"autoreset {autoreset!r}; expected one of {sorted(_MODES)}")
-    if render_mode not in (None, "rgb_array"):
-        raise _core.InputError(f"render_mode {render_mode!r}; expected None or 'rgb_array'")
 
 
 def _reset_options(
@@ -186,7 +183,8 @@ class VectorTaskEnv(_Remade, VectorEnv):
         "disabled": the environment stands still until `reset(options={"reset_mask": m})`.
     keys: the observations to show; None for all that the task declares.
     scene: another scene than the one of the task, or the path of its file.
-    render_mode: "rgb_array" for pictures by `render`.
+    render_mode: "rgb_array" for pictures by `render`; "human" for a window, which every reset and
+        step draws anew, at most `metadata["render_fps"]` times a second. It needs pygame.
     """
 
     def __init__(
@@ -210,7 +208,7 @@ class VectorTaskEnv(_Remade, VectorEnv):
         if isinstance(keys, str):
             raise _core.InputError(f"keys {keys!r}; expected a list, such as [{keys!r}]")
         seed = _system_seed() if seed is None else _checked(seed)
-        _check_choices(num_envs, autoreset, render_mode)
+        _check_choices(num_envs, autoreset)
         self.task = _core.task_spec(task)
         names = [tensor.name for tensor in self.task.observations]
         unknown = [key for key in keys or () if key not in names]
@@ -231,12 +229,12 @@ class VectorTaskEnv(_Remade, VectorEnv):
         )
         self._seed, self._first_episode, self._fresh = seed, first_episode, True
         self.render_mode = render_mode
-        self._views: dict[int, View] = {}
         self.metadata = {
             "autoreset_mode": _MODES[autoreset],
-            "render_modes": ["rgb_array"],
+            "render_modes": [*MODES],
             "render_fps": 1 / (self.model.timestep * self.task.steps_per_action),
         }
+        self._rendering = Rendering(render_mode, self.metadata["render_fps"])
         action = self.task.action
         self.single_action_space = spaces.Box(action.low, action.high, action.shape, np.float32)
         self.action_space = batch_space(self.single_action_space, num_envs)
@@ -279,10 +277,11 @@ class VectorTaskEnv(_Remade, VectorEnv):
             self._seed = self._seed if seed is None else _checked(seed)
             self._first_episode = self._first_episode if first is None else first
             self._env.reset(self._seed, self._first_episode)
-            self._views.clear()
+            self._rendering.clear()
         else:
             self._env.restart(np.ones(self.num_envs, bool))
         self._fresh = False
+        self._rendering.show(self._env, self._env.episodes())
         return self._observe(), self._info()
 
     def step(
@@ -310,6 +309,7 @@ class VectorTaskEnv(_Remade, VectorEnv):
             last, final = self._observe(), info
             self._env.restart(ended)
             info = self._info() | _finals(last, final, ended)
+        self._rendering.show(self._env, self._env.episodes())
         return self._observe(), reward, terminated, truncated, info
 
     def scripted_action(self) -> np.ndarray:
@@ -329,18 +329,17 @@ class VectorTaskEnv(_Remade, VectorEnv):
         return self._env.randomized()
 
     def render(self) -> tuple[np.ndarray, ...] | None:
-        """A picture (384, 512, 3) uint8 of every environment; None without `render_mode`.
+        """A picture (384, 512, 3) uint8 of every environment. None without `render_mode`, and with
+        "human", which shows the first 16 environments in a window.
 
         Bodies and the ground, seen from the side and above without perspective. Fields of sensors
-        are not shown.
+        are not shown. Raises IoError where no window can be opened.
         """
-        if self.render_mode is None:
-            return None
-        poses, episodes = self._env.bodies()[0], self._env.episodes()
-        for e in range(self.num_envs):
-            if e not in self._views or self._views[e].episode != episodes[e]:
-                self._views[e] = View(self._env, e, poses[e], int(episodes[e]))
-        return tuple(self._views[e].draw(poses[e]) for e in range(self.num_envs))
+        return self._rendering.render(self._env, self._env.episodes())
+
+    def close_extras(self, **_: Any) -> None:
+        """Closes the window; `close` calls it."""
+        self._rendering.close()
 
     def counts(self) -> dict[str, int]:
         """As Environments.counts(), since the last reset by seed."""
@@ -369,7 +368,7 @@ class SingleEnv(gymnasium.Env):
     `reset(seed=s)` starts episode `first_episode` of seed s, `reset()` the next one.
     """
 
-    metadata = {"render_modes": ["rgb_array"]}
+    metadata = {"render_modes": [*MODES]}
 
     def __init__(self, vector: Any) -> None:
         self._vector = vector
@@ -413,9 +412,13 @@ class SingleEnv(gymnasium.Env):
         return self._vector.model
 
     def render(self) -> np.ndarray | None:
-        """A picture (384, 512, 3) uint8, as in `VectorTaskEnv`; None without `render_mode`."""
+        """A picture (384, 512, 3) uint8, or None, as in `VectorTaskEnv`."""
         pictures = self._vector.render()
         return None if pictures is None else pictures[0]
+
+    def close(self) -> None:
+        """Closes the window of render_mode "human"."""
+        self._vector.close()
 
     def _one(self, obs: Observation) -> Observation:
         return obs[0] if self._vector.flatten else {key: value[0] for key, value in obs.items()}

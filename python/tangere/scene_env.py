@@ -29,9 +29,9 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from . import _core
-from ._arrays import numbers
-from ._picture import View
-from .gym import _MODES, Autoreset, Observation, RenderMode, SingleEnv, _Remade
+from ._arrays import numbers, singles
+from ._rendering import MODES, RenderMode, Rendering
+from .gym import _MODES, Autoreset, Observation, SingleEnv, _Remade
 from .gym import _check_choices, _checked, _finals, _reset_options, _system_seed
 
 Indices = NDArray[np.int64]
@@ -71,7 +71,7 @@ class VectorSceneEnv(_Remade, VectorEnv):
     flatten: one array (E, n) instead of a dict, in the order of `observe`.
     autoreset: "next_step", "same_step" or "disabled", as in `VectorTaskEnv`.
     scene: another scene than that of the class.
-    render_mode: "rgb_array" for pictures by `render`.
+    render_mode: "rgb_array" or "human", as in `VectorTaskEnv`.
     """
 
     scene: _core.Scene | str | Path
@@ -108,7 +108,7 @@ class VectorSceneEnv(_Remade, VectorEnv):
         arguments = {k: v for k, v in locals().items() if k not in ("self", "__class__")}
         before = set(self.__dict__)
         self._arguments = arguments
-        _check_choices(num_envs, autoreset, render_mode)
+        _check_choices(num_envs, autoreset)
         self.num_envs, self.flatten, self.render_mode = num_envs, flatten, render_mode
         self._mode, self._threads, self._fresh = autoreset, threads, True
         self._seed = _system_seed() if seed is None else _checked(seed)
@@ -121,9 +121,10 @@ class VectorSceneEnv(_Remade, VectorEnv):
                 raise self._fault(f"{name} {getattr(self, name)!r}", "a whole number from 1 on")
         self.metadata = {
             "autoreset_mode": _MODES[autoreset],
-            "render_modes": ["rgb_array"],
+            "render_modes": [*MODES],
             "render_fps": 1 / (self.model.timestep * self.steps_per_action),
         }
+        self._rendering = Rendering(render_mode, self.metadata["render_fps"])
         shape = (self.model.nu if self.actions is None else self.actions,)
         try:
             low, high = (np.broadcast_to(b, shape) for b in (self.action_low, self.action_high))
@@ -181,11 +182,11 @@ class VectorSceneEnv(_Remade, VectorEnv):
         raise NotImplementedError(f"{type(self).__name__} has no reward(actions)")
 
     def terminated(self) -> Any:
-        """(E) bool: the task ends the episode. By default it never does."""
+        """(E) bool, of no other type: the task ends the episode. By default it never does."""
         return np.zeros(self.num_envs, bool)
 
     def success(self) -> Any:
-        """(E) bool: the task is solved in this state. By default where it is terminated."""
+        """(E) bool, too: the task is solved in this state. By default where it is terminated."""
         return self.flags("terminated")
 
     def restart(self, envs: Indices) -> None:
@@ -229,6 +230,7 @@ class VectorSceneEnv(_Remade, VectorEnv):
         elif not self._fresh:
             self._start_next(np.ones(self.num_envs, bool))
         self._fresh = False
+        self._rendering.show(self._batch, self.episodes)
         return self._observe(), self._info()
 
     def step(
@@ -256,7 +258,7 @@ class VectorSceneEnv(_Remade, VectorEnv):
             moving |= self.warm_up
         self._act(actions, np.flatnonzero(moving))
         self.lengths[~ended] += 1
-        reward = self._row("reward", self.reward(self._given(actions)), np.float64)
+        reward = self._row("reward", self.reward(self._given(actions))).astype(np.float64)
         reward = np.where(ended, 0.0, reward)
         if not np.isfinite(reward).all():
             e = int(np.flatnonzero(~np.isfinite(reward))[0])
@@ -273,17 +275,16 @@ class VectorSceneEnv(_Remade, VectorEnv):
             last, ends = self._observe(), self._ended.copy()
             self._start_next(ends)
             info = self._info() | _finals(last, info, ends)
+        self._rendering.show(self._batch, self.episodes)
         return self._observe(), reward, terminated, truncated, info
 
     def render(self) -> tuple[NDArray[np.uint8], ...] | None:
-        """A picture (384, 512, 3) uint8 of every environment, as in `VectorTaskEnv`."""
-        if self.render_mode is None:
-            return None
-        poses = self._batch.bodies()[0]
-        for e in range(self.num_envs):
-            if e not in self._views or self._views[e].episode != self.episodes[e]:
-                self._views[e] = View(self._batch, e, poses[e], int(self.episodes[e]))
-        return tuple(self._views[e].draw(poses[e]) for e in range(self.num_envs))
+        """A picture (384, 512, 3) uint8 of every environment, or None, as in `VectorTaskEnv`."""
+        return self._rendering.render(self._batch, self.episodes)
+
+    def close_extras(self, **_: Any) -> None:
+        """Closes the window; `close` calls it."""
+        self._rendering.close()
 
     @property
     def bounds(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -291,8 +292,14 @@ class VectorSceneEnv(_Remade, VectorEnv):
         return self._low, self._high
 
     def flags(self, name: Literal["terminated", "success"]) -> NDArray[np.bool_]:
-        """(E): what the method of that name returns now. Raises InputError for another shape."""
-        return self._row(name, getattr(self, name)(), bool)
+        """(E): what the method of that name returns now. Raises InputError for another shape or
+        type."""
+        row = self._row(name, getattr(self, name)())
+        if row.dtype != bool:
+            e = int(np.argmax((row != 0) & (row != 1)))
+            found = f"{row.dtype}, {row.tolist()[e]!r} in environment {e}"
+            raise self._fault(f"{name}() of {found}", "bool")
+        return row.copy()
 
     def randomized(self) -> dict[str, NDArray[np.float64]]:
         """Name → (E): the numbers of the episodes that vary, as `Batch.randomized`."""
@@ -322,7 +329,7 @@ class VectorSceneEnv(_Remade, VectorEnv):
         self._starting = np.zeros(self.num_envs, bool)
         self._terminated = np.zeros(self.num_envs, bool)
         self._random: dict[int, np.random.Generator] = {}
-        self._views: dict[int, View] = {}
+        self._rendering.clear()
         self._start(np.arange(self.num_envs), self.episodes.copy())
 
     def _start_next(self, which: NDArray[np.bool_], warm_up: bool = True) -> None:
@@ -353,8 +360,8 @@ class VectorSceneEnv(_Remade, VectorEnv):
             self._random.pop(int(e), None)
         self.restart(envs)
 
-    def _row(self, name: str, value: Any, kind: Any) -> NDArray[Any]:
-        row = np.array(numbers(value), kind)
+    def _row(self, name: str, value: Any) -> NDArray[Any]:
+        row = numbers(value)
         if row.shape != (self.num_envs,):
             raise self._fault(f"{name}() of shape {row.shape}", f"({self.num_envs},)")
         return row
@@ -363,15 +370,18 @@ class VectorSceneEnv(_Remade, VectorEnv):
         seen = self.observe()
         if not isinstance(seen, dict) or not seen:
             raise self._fault(f"observe() {type(seen).__name__}", "a dict KEY → (E, …)")
-        arrays = {k: np.array(numbers(a), np.float32) for k, a in seen.items()}
+        arrays = {k: singles(numbers(a)) for k, a in seen.items()}
         for key, array in arrays.items():
-            # A sum costs less than a test of each number, and is not finite where one is not.
-            if not np.isfinite(array.sum()) and not np.isfinite(array).all():
-                what = f"observe()[{key!r}] with numbers that are not finite"
-                raise self._fault(what, "finite ones")
             if array.ndim < 1 or len(array) != self.num_envs:
                 raise self._fault(f"observe()[{key!r}] of shape {array.shape}",
                                   f"({self.num_envs}, …)")  # fmt: skip
+            # A sum costs less than a test of each number, and is not finite where one is not.
+            if not np.isfinite(array.sum()):
+                failed = self._batch.status < 0  # also because a state is out of float32's range
+                array[failed] = np.nan_to_num(array[failed])
+                if not np.isfinite(array).all():
+                    what = f"observe()[{key!r}] with numbers that are not finite in float32"
+                    raise self._fault(what, "finite ones")
         return arrays
 
     def _observe(self) -> Observation:

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import gc
+import sys
 import threading
 import warnings
 
@@ -108,6 +110,62 @@ def test_states_can_be_set(model):
     assert batch.q is not batch.q
     q[:] = 0
     assert not np.array_equal(batch.q, q)
+
+
+def test_views_are_the_state_in_place(model):
+    batch = tangere.Batch(model, num_envs=37, seed=5)
+    views = {"q": batch.q_view, "v": batch.v_view}
+    widths = {"q": model.nq, "v": model.nv}
+
+    def check():
+        for name, view in views.items():
+            assert view.shape == (3, 16, widths[name]) and view.dtype == np.float64
+            rows = view.reshape(48, -1)[:37]
+            np.testing.assert_array_equal(rows, getattr(batch, name))
+            assert view[2, 3, 1] == getattr(batch, name)[35, 1]
+        assert np.isfinite(batch.q).all() and np.isfinite(batch.v).all()
+
+    check()
+    first = views["q"].copy()
+    batch.run(batch.scene_controls(60), every=60)
+    assert (views["q"] != first).any()  # the same memory, other numbers
+    check()
+    assert np.shares_memory(views["q"], batch.q_view) and np.shares_memory(batch.v_view, views["v"])
+    assert not np.shares_memory(views["q"], views["v"])
+    assert not np.shares_memory(views["q"], batch.q)
+    q = batch.q
+    q[36, 0] = 0.25
+    batch.set_state(q[36], batch.v[36], envs=[36])
+    assert views["q"][2, 4, 0] == 0.25
+    batch.reset()
+    check()
+    np.testing.assert_array_equal(views["q"].reshape(48, -1)[:37], first.reshape(48, -1)[:37])
+
+
+def test_a_view_can_not_be_written_and_outlives_its_batch(model):
+    batch = tangere.Batch(model, num_envs=20, seed=5)
+    view, q = batch.q_view, batch.q
+    assert not view.flags.writeable
+    for write in (lambda: view.__setitem__(0, 1.0), lambda: view.setflags(write=True),
+                  lambda: np.add(view, 1, out=view)):  # fmt: skip
+        with pytest.raises(ValueError):
+            write()
+    with pytest.raises(AttributeError):
+        batch.q_view = q
+    part = view[1, :4, 2]  # a view of the view
+    held = sys.getrefcount(batch)
+    del view
+    gc.collect()
+    assert sys.getrefcount(batch) == held  # by the part
+    del part
+    gc.collect()
+    assert sys.getrefcount(batch) == held - 1
+    view = batch.q_view
+    del batch
+    gc.collect()
+    others = [tangere.Batch(model, num_envs=20, seed=6) for _ in range(8)]  # in freed memory
+    assert (others[0].q != q).any()
+    np.testing.assert_array_equal(view.reshape(32, -1)[:20], q)
 
 
 def test_any_array_of_numbers_is_taken(model):

@@ -29,7 +29,8 @@ def run_blocks(page: str, names: dict[str, str]) -> int:
     return len(blocks)
 
 
-def test_every_block_of_the_page_runs(command, tmp_path):
+def test_every_block_of_the_page_runs(command, tmp_path, monkeypatch):
+    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
     pytest.importorskip("torch", reason="PyTorch is not installed")
     pytest.importorskip("jax", reason="JAX is not installed")
     names = {"TANGERE": str(command), "DATA": str(tmp_path / "data")}

@@ -158,6 +158,9 @@ def test_what_is_missing_is_named():
         tape.step(torch.zeros(3))
     with pytest.raises(tangere.InputError, match=r"actions of shape \(2, 2\)"):
         tape.step(torch.zeros(2, 2))
+    for name in ("q", "v"):  # a tensor could be written
+        with pytest.raises(tangere.InputError, match=f"batch.{name}_view .* expected {name}$"):
+            getattr(Rolling(2, threads=1).batch, f"{name}_view")
 
 
 def test_a_task_may_keep_tensors():

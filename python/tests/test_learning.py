@@ -7,6 +7,7 @@ import copy
 import dataclasses
 import importlib
 import json
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -96,6 +97,11 @@ def test_ppo_learns_a_task_of_a_file(tmp_path):
         assert done.returncode == 1 and message in done.stderr, done.stderr
     with pytest.raises(SystemExit, match="'nothing'; expected one of ball_rolling.*FILE.py:CLASS"):
         protocol.make_vec("nothing", 1)
+    file = f"{tmp_path}/own_task.py"
+    with pytest.raises(SystemExit, match=r"own_task.py has \['Hold'\] .*, not 'Held'"):
+        protocol.make_vec(f"{file}:Held", 1)
+    with pytest.raises(SystemExit, match="there is no file .*own_tusk.py"):
+        protocol.make_vec(f"{tmp_path}/own_tusk.py:Hold", 1)
 
 
 def test_images_have_one_size():
@@ -158,9 +164,10 @@ def test_clones_learn_from_a_data_set(generate):
     assert found["data"]["command"].startswith("tangere generate insertion_translation")
 
 
-def test_a_clone_may_see_the_state(generate, monkeypatch):
+@pytest.mark.parametrize("choice", [[], ["--choice"]])
+def test_a_clone_may_see_the_state(generate, monkeypatch, choice):
     data = generate("box_pushing", "--episodes", "4", "--seed", "1")
-    monkeypatch.setattr(sys, "argv", ["bc.py", str(data), "--state", "--episodes", "3"])
+    monkeypatch.setattr(sys, "argv", ["bc.py", str(data), "--state", "--episodes", "3", *choice])
     asked = bc.settings()
     windows = bc.Windows(str(data), ["goal", "q"], split=None)
     shown = []
@@ -171,7 +178,8 @@ def test_a_clone_may_see_the_state(generate, monkeypatch):
 
     bc.closed_loop(windows, clone, asked)
     env = tangere.make_vec("box_pushing", 3)
-    obs, _ = env.reset(seed=protocol.TEST_SEED)
+    seed = protocol.CHOICE_SEED if choice else protocol.TEST_SEED
+    obs, _ = env.reset(seed=seed)
     start = np.concatenate([obs["goal"], env.state()[0] / bc.STATE_UNIT], axis=1)
     np.testing.assert_allclose(shown[0], start, rtol=1e-5, atol=1e-6)
     row = windows[0]["obs"]
@@ -387,6 +395,26 @@ def test_a_result_of_another_command_or_data_set_is_stale(monkeypatch, tmp_path)
     assert experiments.stored(each, 0) is None
 
 
+def test_results_do_not_make_a_tree_dirty(monkeypatch, tmp_path):
+    if shutil.which("git") is None:
+        pytest.skip("git is not installed")
+    monkeypatch.setattr(experiments, "ROOT", tmp_path)
+    assert experiments.commit() == ""
+    (tmp_path / "learning/results").mkdir(parents=True)
+    files = [tmp_path / "learning/results/a.json", tmp_path / "learning/gd.py"]
+    user = ("-c", "user.name=a", "-c", "user.email=a@b.c")
+    for file in files:
+        file.write_text("1")
+    for words in (["init", "-q"], ["add", "."], [*user, "commit", "-qm", "first"]):
+        subprocess.run(["git", *words], cwd=tmp_path, check=True)
+    clean = experiments.commit()
+    assert 7 <= len(clean) <= 12
+    files[0].write_text("2")
+    assert experiments.commit() == clean
+    files[1].write_text("2")
+    assert experiments.commit() == clean + "-dirty"
+
+
 def test_the_page_says_what_the_results_say():
     page = report.PAGE.read_text()
     between = page.split(report.BEGIN)[1].split(report.END)[0]
@@ -414,6 +442,14 @@ def test_the_report_has_means_and_intervals(monkeypatch, tmp_path):
     lines = report.table("| what | place | runs | paper |", ("gd-",), lambda r: ["x"]).splitlines()
     assert lines == ["| what | place | runs | paper |", "|---|---|---|---|",
                      "| a row | x | 3 | 0.1 m |"]  # fmt: skip
+    monkeypatch.setattr(report, "EXPERIMENTS", [dataclasses.replace(each, seen=True)])
+    marked = report.table("| what | place | runs | paper |", ("gd-",), lambda r: ["x"])
+    assert marked.endswith("| a row † | x | 3 | 0.1 m |\n")
+    run = {"settings": {"task": "cap_opening"}, "choice": [[1, 0.0, 0.0]] * 5}
+    assert report.choosing([run]) == "0.30"  # million: 5 × 300 episodes × 200 actions
+    for seed, commit in enumerate(("a-dirty", "b", "c-dirty")):
+        experiments.result_of(each, seed).write_text(json.dumps(result | {"commit": commit}))
+    assert report.unclean().replace("\n", " ").endswith("other results alone: `gd-x` (2). ")
 
 
 def test_the_figure_has_a_line_for_each_run(monkeypatch, tmp_path):

@@ -157,7 +157,7 @@ def test_the_reader_checks_what_is_built():
         lambda b: b.find("motor", joint="left").set(ctrl_range=(np.nan, 1))
     )
     assert "2 ways to drive the scene" in fault(lambda b: b.control.constant(0))
-    said = fault(lambda b: b.find("body", size=(0.02, 0.01, 0.02)).set(mass=0))
+    said = fault(lambda b: b.robot.find("link", name="left").find("body").set(mass=0))
     assert said.startswith(f"{__file__}:") and "joint 'left' moves nothing that has mass" in said
     assert "link name 'rod' is used twice" in fault(lambda b: b.robot.link("rod"))
     for value in (1j, {"a": 1}, [[1], [1, 2]], [True, False], ["a", 1], object()):
@@ -183,6 +183,24 @@ def test_elements_are_found_and_changed():
     assert repr(b.find("motor", joint="right")).startswith('<motor joint="right" ctrl="force"')
     with pytest.raises(tangere.InputError, match="no <joint name=\"lft\"> .*did you mean 'left'"):
         b.robot.find("joint", name="lft")
+
+
+def test_one_of_several_elements_is_not_found_by_chance():
+    b = gripper()
+    size = "0.02 0.01 0.02"
+    bodies = [e for e in b._all() if e.tag == "body" and e.attributes.get("size") == size]
+    assert len(bodies) == 2
+    with pytest.raises(tangere.InputError) as refused:
+        b.find("body", size=(0.02, 0.01, 0.02))
+    said = str(refused.value).splitlines()
+    assert said[0].startswith('2 elements are <body size="0.02 0.01 0.02"> inside <tangere>; expec')
+    assert said[1:] == [f"  {e.origin[0]}:{e.origin[1]}: {e}" for e in bodies]
+    many = SceneBuilder("many")
+    for k in range(11):
+        many.robot.link(f"link{k}")
+    with pytest.raises(tangere.InputError, match="(?s)11 elements are <link> .*link7.*and 3 more$"):
+        many.find("link")
+    assert many.find("link", name="link3").attributes["name"] == "link3"
 
 
 def test_text_that_is_no_scene_is_refused():

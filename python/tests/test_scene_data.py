@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import json
 import subprocess
+import warnings
 from concurrent.futures import ThreadPoolExecutor
 
 import gymnasium
@@ -140,6 +141,39 @@ def test_environments_and_threads_change_no_byte(tmp_path, policy):
         assert said == made[0][0] and files == made[0][1]
     lengths = Episodes(tmp_path / "1").lengths
     assert lengths.min() == 1 and lengths.max() == 9
+
+
+class Bursts(tangere.VectorSceneEnv):
+    """In every third episode velocities leave the range of float32, and the simulation fails."""
+
+    scene, horizon = Twin.scene, 4
+
+    def simulate(self, controls, envs):
+        if len(bursting := envs[(self.episodes[envs] % 3 == 1) & (self.lengths[envs] == 2)]):
+            v = np.full((len(bursting), self.model.nv), 1e200)
+            self.batch.set_state(self.batch.q[bursting], v, envs=bursting)
+        super().simulate(controls, envs)
+
+    def reward(self, actions):
+        return np.zeros(self.num_envs)
+
+
+def test_a_state_beyond_float32_is_a_failure_and_no_warning(tmp_path):
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        said = generate(Bursts, tmp_path / "set", 9, policy="random", seed=1, num_envs=4)
+    assert [f["episode"] for f in said["failed"]] == [1, 4, 7] and said["rows"] == 6 * 4
+    assert {f["reason"] for f in said["failed"]} == {"non_finite"}
+    episodes = Episodes(tmp_path / "set")
+    assert len(episodes) == 6 and all(np.isfinite(e["v"]).all() for e in episodes)
+    env = Bursts(2, seed=1)
+    for _ in range(3):
+        obs, *_, info = env.step(np.zeros(3))
+    assert list(info["status"] < 0) == [False, True]
+    assert (obs["v"][1] == np.finfo(np.float32).max).all() and np.isfinite(obs["v"]).all()
+    env.batch.set_state(env.batch.q, np.full(env.model.nv, 1e200))
+    with pytest.raises(tangere.InputError, match=r"observe\(\)\['v'\] with numbers that are not"):
+        env._observe()
 
 
 def test_environments_wait_for_a_long_episode_before_theirs(tmp_path):

@@ -268,6 +268,14 @@ def with_(**members):
         ({"reward": lambda s, a: 0.0}, r"Mine: reward\(\) of shape \(\); expected \(2,\)"),
         ({"reward": lambda s, a: np.full(2, np.nan)}, r"reward\(\) nan in environment 0; expec"),
         ({"terminated": lambda s: [True]}, r"Mine: terminated\(\) of shape \(1,\); expected"),
+        (
+            {"terminated": lambda s: np.array([0.0, 0.3])},
+            r"Mine: terminated\(\) of float64, 0.3 in environment 1; expected bool",
+        ),
+        (
+            {"success": lambda s: 2 * s.episodes},
+            r"Mine: success\(\) of int64, 2 in environment 1; expected bool",
+        ),
         ({"controls": lambda s, a: a[:, :2]}, r"controls\(\) of shape \(2, 2\); expected \(2, 3\)"),
     ],
 )

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import threading
 from pathlib import Path
 
 import numpy as np
@@ -222,6 +223,36 @@ def test_readings_are_those_of_a_batch():
     poses = np.concatenate(batch.bodies(), 2)
     np.testing.assert_array_equal(s["bodies"], poses)
     np.testing.assert_array_equal(s["bodies.rod"], poses[:, 3])
+
+
+def test_another_thread_reads_no_scene_that_is_compiled_anew():
+    tape = tt.Simulation(scene("ball")[0], num_envs=2, steps=2, read=["pad"], points=True).tape
+    count, enough = tape.points, threading.Event()
+
+    def move():
+        for k in range(200):
+            if not enough.is_set():
+                tape.reset(points=np.full((count, 7), 1e-9 * (k + 1)))
+
+    runner = threading.Thread(target=move)
+    runner.start()
+    uses = {
+        "model": lambda: tape.model, "spec": lambda: tape.spec, "taken": lambda: tape.taken,
+        "points": lambda: tape.points, "status": tape.status,
+        "check_step": lambda: tape.check_step(np.zeros(3)),
+    }  # fmt: skip
+    refused = set()
+    while runner.is_alive() and len(refused) < len(uses):
+        for name, use in uses.items():
+            try:
+                use()
+            except tangere.InputError as error:
+                assert "in use by another thread" in str(error)
+                refused.add(name)
+    enough.set()
+    runner.join()
+    assert refused == set(uses)
+    assert tape.points == count and tape.model.nq == 10
 
 
 def test_points_move():

@@ -235,6 +235,32 @@ TEST(Batch, SecondSceneRunsInEveryScheme) {
   }
 }
 
+TEST(Batch, LanesAreTheStateInPlace) {
+  const Model model(varied());
+  Stepper stepper(model);
+  Batch batch(model, 37, 5);
+  std::vector<std::span<const double>> q, v;
+  for (int b = 0; b < batch.blocks(); ++b) {
+    q.push_back(batch.q_lanes(b));
+    v.push_back(batch.v_lanes(b));
+    ASSERT_EQ(std::ssize(q.back()), 16 * model.nq());
+    ASSERT_EQ(std::ssize(v.back()), 16 * model.nv());
+  }
+  EXPECT_EQ(q[2].data() - q[1].data(), q[1].data() - q[0].data());
+  for (int k = 0; k < 3; ++k) {
+    testing::step_all(stepper, batch, testing::rolling_ball_control(k));
+    for (int e = 0; e < batch.environments(); ++e) {
+      const std::vector<double> qs = q_of(batch, e), vs = v_of(batch, e);
+      for (std::size_t i = 0; i < qs.size(); ++i)
+        ASSERT_EQ(q[std::size_t(e) / 16][i * 16 + std::size_t(e) % 16], qs[i]) << e << ' ' << i;
+      for (std::size_t i = 0; i < vs.size(); ++i)
+        ASSERT_EQ(v[std::size_t(e) / 16][i * 16 + std::size_t(e) % 16], vs[i]) << e << ' ' << i;
+    }
+  }
+  EXPECT_THROW((void)batch.q_lanes(3), InputError);
+  EXPECT_THROW((void)batch.v_lanes(-1), InputError);
+}
+
 TEST(Batch, ImpossibleSizesAreRefused) {
   const Model model(varied());
   EXPECT_THROW(Batch(model, 0), InputError);
