@@ -170,7 +170,7 @@ class VectorSceneEnv(_Remade, VectorEnv):
         the task in `simulate`."""
         return actions
 
-    def simulate(self, controls: NDArray[np.float64], envs: Indices) -> None:
+    def simulate(self, controls: Any, envs: Indices) -> None:
         """Takes the steps of an action of the environments `envs` with the controls
         (steps_per_action, E, nu), as `batch.run` does. A task that reads something within an action
         takes them itself, with `every` and `fields`, and keeps the rows of `envs`."""
@@ -339,13 +339,18 @@ class VectorSceneEnv(_Remade, VectorEnv):
 
     def _act(self, actions: NDArray[np.float64], envs: Indices) -> None:
         """Takes the actions (E, na) of some environments; the others stand still."""
-        steps, count, nu = self.steps_per_action, self.num_envs, self.model.nu
         controls = np.asarray(numbers(self.controls(self._given(actions))), np.float64)
-        if controls.shape not in ((steps, count, nu), (count, nu), (nu,)):
-            expected = f"({count}, {nu}) or ({steps}, {count}, {nu})"
-            raise self._fault(f"controls() of shape {controls.shape}", expected)
+        shape = self.shape_of_controls(controls)
         if len(envs):
-            self.simulate(np.broadcast_to(controls, (steps, count, nu)), envs)
+            self.simulate(self._given(np.array(np.broadcast_to(controls, shape))), envs)
+
+    def shape_of_controls(self, controls: Any) -> tuple[int, int, int]:
+        """(steps_per_action, E, nu). Raises InputError where controls() returned another shape."""
+        steps, count, nu = self.steps_per_action, self.num_envs, self.model.nu
+        if tuple(controls.shape) not in ((steps, count, nu), (count, nu), (nu,)):
+            expected = f"({count}, {nu}) or ({steps}, {count}, {nu})"
+            raise self._fault(f"controls() of shape {tuple(controls.shape)}", expected)
+        return steps, count, nu
 
     def _begin(self, envs: Indices) -> None:
         self._ended[envs], self._starting[envs], self.lengths[envs] = False, True, 0

@@ -44,7 +44,7 @@ def loss_of(s):
 
 
 def rolled(sim, u, q, v, numbers):
-    s = sim.reset(q=q, v=v, parameters=numbers)
+    s = sim.reset(q=q, v=v, parameters=dict(zip(sim.tape.parameters, numbers.T, strict=True)))
     total = loss_of(s)
     for t in range(u.shape[0]):
         s = sim.step(s, u[t])
@@ -55,7 +55,8 @@ def rolled(sim, u, q, v, numbers):
 @pytest.mark.parametrize("name", ["chain", "ball", "rod"])
 def test_gradients_agree_with_differences(name):
     of, numbers = scene(name)
-    sim = tt.Simulation(of, num_envs=2, steps=6, every=2, parameters=numbers, threads=1)
+    sim = tt.Simulation(of, num_envs=2, steps=6, every=2, threads=1)
+    named = sim.parameters(*numbers)
     first = sim.reset(seed=3)
     q0, v0 = first.q.clone(), first.v.clone()
     if name == "ball":
@@ -71,7 +72,7 @@ def test_gradients_agree_with_differences(name):
         "u": 0.2 * draw(6, 2, sim.model.nu),
         "q": q0,
         "v": v0 + 0.01 * draw(*v0.shape),
-        "numbers": sim.parameters(),
+        "numbers": torch.stack(list(named.values()), 1),
     }
     at = {key: x.requires_grad_() for key, x in given.items()}
     rolled(sim, **at).backward()
@@ -147,23 +148,34 @@ def test_bits_do_not_depend_on_the_batch_or_on_gradients():
 
 def test_environments_have_numbers_of_their_own():
     of, numbers = scene("chain")
-    sim = tt.Simulation(of, num_envs=2, steps=4, parameters=numbers)
-    given = torch.tensor([[900.0, 0.02], [1800.0, 0.2]], dtype=torch.float64)
+    sim = tt.Simulation(of, num_envs=2, steps=4)
+    own = sim.parameters(*numbers)
+    given = {"body hand density": torch.tensor([900.0, 1800.0]), "joint arm damping": 0.2}
     s = sim.reset(parameters=given)
-    np.testing.assert_array_equal(sim.parameters(), given.numpy())
+    now = sim.parameters()
+    assert list(now) == numbers
+    assert now[numbers[0]].tolist() == [900, 1800] and now[numbers[1]].tolist() == [0.2, 0.2]
+    assert sim.units == {numbers[0]: "kg/m^3", numbers[1]: "N m s/rad"}
     for _ in range(4):
         s = sim.step(s, torch.zeros(1))
     assert not torch.equal(s.q[0], s.q[1])
-    s = sim.reset()  # the scene's own
-    np.testing.assert_array_equal(sim.parameters(), [[900.0, 0.02]] * 2)
+    sim.reset()  # the scene's own
+    assert {name: x.tolist() for name, x in own.items()} == {
+        numbers[0]: [900.0] * 2,
+        numbers[1]: [0.02] * 2,
+    }
+    for name, x in sim.parameters().items():
+        assert torch.equal(x, own[name])
 
 
 def test_what_cannot_be_done_is_refused():
     of, _ = scene("chain")
     with pytest.raises(tangere.InputError, match="that may vary is named 'weight'"):
-        tt.Simulation(of, parameters=["weight"])
+        tt.Simulation(of).parameters("weight")
     with pytest.raises(tangere.InputError, match=" armature' has no derivative"):
-        tt.Simulation(of, parameters=["joint arm armature"])
+        tt.Simulation(of).parameters("joint arm armature")
+    with pytest.raises(tangere.InputError, match="expected names that parameters"):
+        tt.Simulation(of).reset(parameters={"joint arm damping": 1})
     with pytest.raises(tangere.InputError, match="no reading 'pad'; expected one of variables"):
         tt.Simulation(of, read=["pad"])
     with pytest.raises(tangere.InputError, match="read 'pad'; expected a list of names"):
@@ -182,6 +194,8 @@ def test_what_cannot_be_done_is_refused():
         sim.step(second, u)
     with pytest.raises(tangere.InputError, match="controls of shape"):
         sim.step(second, torch.zeros(2, 3))
+    with pytest.raises(tangere.InputError, match=r"expected \(2, 1\) or \(1, 2, 1\)"):
+        sim.step(second, torch.zeros(3, 2, 1))
     with pytest.raises(tangere.InputError, match="q of shape"):
         sim.reset(q=torch.zeros(2, 3))
     s = sim.reset()
@@ -245,12 +259,12 @@ def test_points_move():
 
 def test_a_users_loss_is_checked_in_one_call():
     of, names = scene("chain")
-    sim = tt.Simulation(of, num_envs=2, steps=4, every=2, parameters=names)
+    sim = tt.Simulation(of, num_envs=2, steps=4, every=2)
     u = torch.full((4, 1), 0.3, dtype=torch.float64, requires_grad=True)
-    parameters = sim.parameters().requires_grad_()
+    parameters = torch.stack(list(sim.parameters(*names).values()), 1).requires_grad_()
 
     def loss(u=u, parameters=parameters):
-        s, total = sim.reset(parameters=parameters), 0
+        s, total = sim.reset(parameters=dict(zip(names, parameters.T, strict=True))), 0
         for t in range(4):
             s = sim.step(s, u[t])
             total = total + s["variables"].square().sum()
@@ -281,10 +295,8 @@ def test_nothing_is_recorded_without_gradients():
 
 
 def test_what_a_scene_could_not_have_is_refused():
-    sim = tt.Simulation(
-        scene("ball")[0], num_envs=2, steps=2, read=["pad"], points=True,
-        parameters=["contact pad ball kn"],
-    )  # fmt: skip
+    sim = tt.Simulation(scene("ball")[0], num_envs=2, steps=2, read=["pad"], points=True)
+    sim.parameters("contact pad ball kn")
     q = sim.reset().q.clone()
     with pytest.raises(tangere.InputError, match="not finite"):
         sim.reset(q=q * float("nan"))
@@ -297,9 +309,11 @@ def test_what_a_scene_could_not_have_is_refused():
     torch.testing.assert_close(sim.reset(q=long).q, q)
     for bad in (-5.0, float("nan")):
         with pytest.raises(tangere.InputError, match="contact pad ball kn"):
-            sim.reset(parameters=torch.tensor([bad]))
-    with pytest.raises(tangere.InputError, match="listed twice"):
-        tt.Simulation(scene("ball")[0], parameters=["body ball density"] * 2)
+            sim.reset(parameters={"contact pad ball kn": bad})
+        with pytest.raises(tangere.InputError, match="contact pad ball kn"):
+            sim.step(sim.reset(), torch.zeros(3), {"contact pad ball kn": bad})
+    with pytest.raises(tangere.InputError, match=r"of shape \(3,\); expected \(2,\) or \(\)"):
+        sim.reset(parameters={"contact pad ball kn": torch.ones(3)})
     moved = torch.zeros(1024, 7)
     moved[3, 0] = float("nan")
     with pytest.raises(tangere.InputError, match="not finite"):
