@@ -125,9 +125,8 @@ class Simulation(SimulationBase):
         start = [host_numbers(x) for x in given[:4]]
         recorded = torch.is_grad_enabled()
         self._run = Run(self._line, seed, *start, numbers or None, recorded, recorded=recorded)
-        return self._state(
-            *_Start.apply(self._run, self.dtype, tuple(named), *given), self.tape.varying()
-        )
+        rows, token = _Start.apply(self._run, self.dtype, tuple(named), *given)
+        return self._state(rows, token, self.tape.varying())
 
     def step(
         self,

@@ -100,9 +100,8 @@ class SimulationBase:
         self.scene = scene if isinstance(scene, _core.Scene) else _core.Scene(scene)
         self.num_envs, self.steps, self.every = num_envs, steps, every
         names = None if read is None else list(read)
-        options = dict(threads=threads, precision=precision, tape_bytes=tape_bytes)
         self.tape = _core.SceneTape(
-            self.scene, num_envs, steps, every, names, points=points, **options
+            self.scene, num_envs, steps, every, names, points, threads, precision, tape_bytes
         )
         self._observations = self.tape.spec.observations  # an array whose points move stays one
         self._sensors = {s.name: s.points for s in self.tape.model.sensors}

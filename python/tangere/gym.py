@@ -161,7 +161,50 @@ class _Remade:
         return {"arguments": self._arguments, "kept": kept}
 
 
-class VectorTaskEnv(_Remade, VectorEnv):
+class EpisodesEnv(_Remade, VectorEnv):
+    """Vector environments whose episodes are those of a seed, one after the other."""
+
+    _seed: int
+    _first_episode: int
+    _fresh: bool  # made, and no episode has begun since
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Observation, dict[str, Any]]:
+        """Starts episodes: the first ones of `seed`, or without it the next ones.
+
+        `options`: "reset_mask" (E) bool starts those alone; "first_episode" goes with a seed.
+        """
+        mask, first = _reset_options(seed, options)
+        if mask is not None:
+            if mask.shape != (self.num_envs,):
+                raise _core.InputError(
+                    f"reset_mask of shape {mask.shape}; expected ({self.num_envs},)"
+                )
+            self._start_next(mask)
+        elif seed is not None or first is not None:
+            self._seed = self._seed if seed is None else _checked(seed)
+            self._first_episode = self._first_episode if first is None else first
+            self._start_all()
+        elif not self._fresh:
+            self._start_next(np.ones(self.num_envs, bool))
+        self._fresh = False
+        return self._observe(), self._info()
+
+    def _start_all(self) -> None:
+        raise NotImplementedError
+
+    def _start_next(self, which: np.ndarray) -> None:
+        raise NotImplementedError
+
+    def _observe(self) -> Observation:
+        raise NotImplementedError
+
+    def _info(self) -> dict[str, Any]:
+        raise NotImplementedError
+
+
+class VectorTaskEnv(EpisodesEnv):
     """Many environments of one task, stepped in C++ on all cores with one call a step.
 
     Environment e plays episodes first_episode + e, first_episode + e + E, … of a seed: an episode
@@ -265,25 +308,12 @@ class VectorTaskEnv(_Remade, VectorEnv):
         """The compiled scene."""
         return self._env.model
 
-    def reset(
-        self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[Observation, dict[str, Any]]:
-        """Starts episodes: the first ones of `seed`, or without it the next ones.
+    def _start_all(self) -> None:
+        self._env.reset(self._seed, self._first_episode)
+        self._views.clear()
 
-        `options`: "reset_mask" (E) bool starts those alone; "first_episode" goes with a seed.
-        """
-        mask, first = _reset_options(seed, options)
-        if mask is not None:
-            self._env.restart(mask)
-        elif seed is not None or first is not None or self._fresh:
-            self._seed = self._seed if seed is None else _checked(seed)
-            self._first_episode = self._first_episode if first is None else first
-            self._env.reset(self._seed, self._first_episode)
-            self._views.clear()
-        else:
-            self._env.restart(np.ones(self.num_envs, bool))
-        self._fresh = False
-        return self._observe(), self._info()
+    def _start_next(self, which: np.ndarray) -> None:
+        self._env.restart(which)
 
     def step(
         self, actions: Any

@@ -24,20 +24,19 @@ import gymnasium
 import numpy as np
 from gymnasium import spaces
 from gymnasium.envs.registration import load_env_creator
-from gymnasium.vector import VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from . import _core
 from ._arrays import numbers
 from ._picture import View
-from .gym import _MODES, Autoreset, Observation, RenderMode, SingleEnv, _Remade
-from .gym import _check_choices, _checked, _finals, _reset_options, _system_seed
+from .gym import _MODES, Autoreset, EpisodesEnv, Observation, RenderMode, SingleEnv
+from .gym import _check_choices, _checked, _finals, _system_seed
 
 Indices = NDArray[np.int64]
 
 
-class VectorSceneEnv(_Remade, VectorEnv):
+class VectorSceneEnv(EpisodesEnv):
     """Many environments of a task of one's own. A subclass defines it by these members.
 
     Class attributes: `scene` (a file or a `tangere.Scene`), `steps_per_action` (simulation steps
@@ -209,27 +208,6 @@ class VectorSceneEnv(_Remade, VectorEnv):
         return draws
 
     # Gymnasium's interface
-
-    def reset(
-        self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[Observation, dict[str, Any]]:
-        """Starts episodes: the first ones of `seed`, or without it the next ones.
-
-        `options`: "reset_mask" (E) bool starts those alone; "first_episode" goes with a seed.
-        """
-        mask, first = _reset_options(seed, options)
-        if mask is not None:
-            if mask.shape != (self.num_envs,):
-                raise self._fault(f"reset_mask of shape {mask.shape}", f"({self.num_envs},)")
-            self._start_next(mask)
-        elif seed is not None or first is not None:
-            self._seed = self._seed if seed is None else _checked(seed)
-            self._first_episode = self._first_episode if first is None else first
-            self._start_all()
-        elif not self._fresh:
-            self._start_next(np.ones(self.num_envs, bool))
-        self._fresh = False
-        return self._observe(), self._info()
 
     def step(
         self, actions: Any
