@@ -384,7 +384,8 @@ def test_simulations_take_what_those_of_pytorch_take():
         expected = total(theirs, leaves[0], dict(zip(p, leaves[1:])))
         expected.backward()
         np.testing.assert_allclose(value, expected.item(), rtol=1e-13)
-        for bar, x in zip((bars[0], *bars[1].values()), leaves, strict=True):
+        in_order = [bars[0], *(bars[1][name] for name in p)]
+        for bar, x in zip(in_order, leaves, strict=True):
             np.testing.assert_allclose(bar, x.grad, rtol=1e-9)
 
         def scanned(p):
