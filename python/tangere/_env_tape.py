@@ -111,7 +111,7 @@ class EnvTape:
         actions = torch.minimum(torch.maximum(actions, self._low), self._high)
         actions = actions.expand(shape).contiguous()
         controls = torch.as_tensor(self.env.controls(actions))
-        controls = controls.expand(self.env.shape_of_controls(controls))
+        controls = controls.expand(self.env._shape_of_controls(controls))
         before = self._recorded.taken
         self.env.simulate(controls, np.arange(self.num_envs))
         if self._recorded.taken - before != self.env.steps_per_action:
@@ -149,7 +149,7 @@ class EnvTape:
         action = torch.zeros((self.num_envs, *self._low.shape), dtype=torch.float64)
         self.env.observe()
         controls = torch.as_tensor(self.env.controls(action))
-        controls = controls.expand(self.env.shape_of_controls(controls)).to(torch.float64)
+        controls = controls.expand(self.env._shape_of_controls(controls)).to(torch.float64)
         self.env.simulate(controls, np.arange(self.num_envs))
         self.env.reward(action), self.env.terminated(), self.env.success(), self.env.observe()
         return batch.names, math.gcd(self.env.steps_per_action, *batch.strides)

@@ -60,26 +60,7 @@ class TapeBase:
 
 
 class SimulationBase:
-    """A scene in E environments, recorded for the way back.
-
-    Parameters
-    ----------
-    scene: a file, or a `tangere.Scene`.
-    num_envs: E. Environment e has draw e of a seed.
-    steps: calls of step() after a reset(), at most.
-    every: steps of the simulation in each.
-    read: names of what s[name] holds, for each environment: "pad" (rows, cols, 3) [N], "pad.sum"
-        (6), "pad.pressure", "pad.shear", "pad.flow", "pad.markers" of sensors; "bodies" (nb, 13) or
-        "bodies.box" (13): x y z, quaternion w x y z, angular and linear velocity; "variables"
-        (n, 3), the end effectors, or one by its name (3); "shear_state" (points, 3) [m] of contacts
-        with ks. None: end effectors and all fields.
-    points: whether reset() may move points of sensors.
-    threads: None for all cores.
-    precision: of tactile fields, "double" or "mixed".
-    tape_bytes: limit for the tapes [bytes]. Longer runs are played again from checkpoints.
-    dtype: of states. None: float64 in PyTorch, float32 in JAX, where float64 needs
-        jax_enable_x64. Controls may have any floating type.
-    """
+    """A scene in E environments, recorded for the way back: what does not depend on the library."""
 
     def __init__(
         self,
@@ -95,6 +76,26 @@ class SimulationBase:
         tape_bytes: float = 1e9,
         dtype: Any = None,
     ):
+        """Compiles the scene.
+
+        Parameters
+        ----------
+        scene: a file, or a `tangere.Scene`.
+        num_envs: E. Environment e has draw e of a seed.
+        steps: calls of step() after a reset(), at most.
+        every: steps of the simulation in each.
+        read: names of what s[name] holds, for each environment: "pad" (rows, cols, 3) [N], "pad.sum"
+            (6), "pad.pressure", "pad.shear", "pad.flow", "pad.markers" of sensors; "bodies" (nb, 13) or
+            "bodies.box" (13): x y z, quaternion w x y z, angular and linear velocity; "variables"
+            (n, 3), the end effectors, or one by its name (3); "shear_state" (points, 3) [m] of contacts
+            with ks. None: end effectors and all fields.
+        points: whether reset() may move points of sensors.
+        threads: None for all cores.
+        precision: of tactile fields, "double" or "mixed".
+        tape_bytes: limit for the tapes [bytes]. Longer runs are played again from checkpoints.
+        dtype: of states. None: float64 in PyTorch, float32 in JAX, where float64 needs
+            jax_enable_x64. Controls may have any floating type.
+        """
         if isinstance(read, str):
             raise _core.InputError(f"read {read!r}; expected a list of names")
         self.scene = scene if isinstance(scene, _core.Scene) else _core.Scene(scene)

@@ -30,8 +30,9 @@ from numpy.typing import NDArray
 from . import _core
 from ._arrays import numbers
 from ._picture import View
-from .gym import _MODES, Autoreset, EpisodesEnv, Observation, RenderMode, SingleEnv
-from .gym import _check_choices, _checked, _finals, _system_seed
+from ._vector_env import MODES, Autoreset, EpisodesEnv, Observation, RenderMode
+from ._vector_env import check_choices, checked_seed, final_info, system_seed
+from .gym import SingleEnv
 
 Indices = NDArray[np.int64]
 
@@ -107,10 +108,10 @@ class VectorSceneEnv(EpisodesEnv):
         arguments = {k: v for k, v in locals().items() if k not in ("self", "__class__")}
         before = set(self.__dict__)
         self._arguments = arguments
-        _check_choices(num_envs, autoreset, render_mode)
+        check_choices(num_envs, autoreset, render_mode)
         self.num_envs, self.flatten, self.render_mode = num_envs, flatten, render_mode
         self._mode, self._threads, self._fresh = autoreset, threads, True
-        self._seed = _system_seed() if seed is None else _checked(seed)
+        self._seed = system_seed() if seed is None else checked_seed(seed)
         self._first_episode = first_episode
         if self.arrays not in ("numpy", "torch"):
             raise self._fault(f"arrays {self.arrays!r}", '"numpy" or "torch"')
@@ -119,7 +120,7 @@ class VectorSceneEnv(EpisodesEnv):
             if not isinstance(getattr(self, name), (int, np.integer)) or getattr(self, name) < 1:
                 raise self._fault(f"{name} {getattr(self, name)!r}", "a whole number from 1 on")
         self.metadata = {
-            "autoreset_mode": _MODES[autoreset],
+            "autoreset_mode": MODES[autoreset],
             "render_modes": ["rgb_array"],
             "render_fps": 1 / (self.model.timestep * self.steps_per_action),
         }
@@ -250,7 +251,7 @@ class VectorSceneEnv(EpisodesEnv):
         if self._mode == "same_step" and self._ended.any():
             last, ends = self._observe(), self._ended.copy()
             self._start_next(ends)
-            info = self._info() | _finals(last, info, ends)
+            info = self._info() | final_info(last, info, ends)
         return self._observe(), reward, terminated, truncated, info
 
     def render(self) -> tuple[NDArray[np.uint8], ...] | None:
@@ -318,11 +319,11 @@ class VectorSceneEnv(EpisodesEnv):
     def _act(self, actions: NDArray[np.float64], envs: Indices) -> None:
         """Takes the actions (E, na) of some environments; the others stand still."""
         controls = np.asarray(numbers(self.controls(self._given(actions))), np.float64)
-        shape = self.shape_of_controls(controls)
+        shape = self._shape_of_controls(controls)
         if len(envs):
             self.simulate(self._given(np.array(np.broadcast_to(controls, shape))), envs)
 
-    def shape_of_controls(self, controls: Any) -> tuple[int, int, int]:
+    def _shape_of_controls(self, controls: Any) -> tuple[int, int, int]:
         """(steps_per_action, E, nu). Raises InputError where controls() returned another shape."""
         steps, count, nu = self.steps_per_action, self.num_envs, self.model.nu
         if tuple(controls.shape) not in ((steps, count, nu), (count, nu), (nu,)):
