@@ -112,13 +112,12 @@ class EnvTape:
         actions = actions.expand(shape).contiguous()
         controls = torch.as_tensor(self.env.controls(actions))
         controls = controls.expand(self.env._shape_of_controls(controls))
-        before = self._recorded.taken
+        before, expected = self._recorded.taken, self.env.steps_per_action
         self.env.simulate(controls, np.arange(self.num_envs))
-        if self._recorded.taken - before != self.env.steps_per_action:
-            raise _core.InputError(
-                f"{type(self.env).__name__}: simulate() took {self._recorded.taken - before} steps; "
-                f"expected {self.env.steps_per_action}"
-            )
+        taken = self._recorded.taken - before
+        if taken != expected:
+            said = f"{type(self.env).__name__}: simulate() took {taken} steps"
+            raise _core.InputError(f"{said}; expected {expected}")
         alive = ~self._ended
         self.env.lengths += 1
         reward = torch.as_tensor(self.env.reward(actions)).to(torch.float64)

@@ -117,10 +117,10 @@ class Simulation(SimulationBase):
         begin the way back too early, which is an InputError, too."""
         x, to = jnp.asarray(controls), self._host.actions
         envs, every, nu = to.shape
-        one = x.ndim == 3
-        rows = self._rows(x, jax.ShapeDtypeStruct((every, envs, nu) if one else (envs, nu), to.dtype),
-                          "controls")  # fmt: skip
-        rows = jnp.swapaxes(rows, 0, 1) if one else jnp.broadcast_to(rows[:, None], to.shape)
+        shape = (every, envs, nu) if x.ndim == 3 else (envs, nu)
+        rows = self._rows(x, jax.ShapeDtypeStruct(shape, to.dtype), "controls")
+        rows = jnp.swapaxes(rows, 0, 1) if x.ndim == 3 else rows[:, None]
+        rows = jnp.broadcast_to(rows, to.shape)
         self._check_parameters(parameters)
         self._host.check_known(state.token, rows)
         inputs = {"controls": rows, "parameters": self._named(parameters)}

@@ -148,7 +148,10 @@ class Simulation(SimulationBase):
                 "last reset() of this simulation; expected its last state"
             )
         if not run.current:
-            raise _core.InputError("step() after backward() through another run; call reset()")
+            raise _core.InputError(
+                "step() of a run that the tape does not hold any more, since parameters() or a "
+                "backward() through another run; call reset()"
+            )
         if state._token.requires_grad and not torch.is_grad_enabled():
             raise _core.InputError(
                 "step() under no_grad() after steps that are recorded; call reset()"

@@ -88,15 +88,15 @@ class RecordedBatch:
         self, u: Any, every: int = 1, fields: Sequence[str] = (), envs: Any = None
     ) -> TensorRun:
         stride = self._simulation.every
-        if envs is not None and len(np.arange(self.num_envs)[envs]) != self.num_envs:
+        count = self.num_envs if envs is None else len(np.arange(self.num_envs)[envs])
+        if count != self.num_envs:
             raise _core.InputError(
-                f"batch.run() of {len(np.arange(self.num_envs)[envs])} of {self.num_envs} "
-                "environments; a tape takes steps of all"
+                f"batch.run() of {count} of {self.num_envs} environments; a tape takes steps of all"
             )
         if len(u) % stride or every % stride or len(u) % every:
             raise _core.InputError(
-                f"batch.run() of {len(u)} steps with every={every}; expected multiples of {stride}, "
-                "the steps that the task took at a time when the tape was made"
+                f"batch.run() of {len(u)} steps with every={every}; expected multiples of "
+                f"{stride}, the steps that the task took at a time when the tape was made"
             )
         frames = []
         for first in range(0, len(u), stride):

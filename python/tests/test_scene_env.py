@@ -105,7 +105,7 @@ def test_gymnasiums_checker_passes():
     assert env.spec.max_episode_steps == 8
     many = gymnasium.make_vec("TestRolling-v0", 3)
     assert isinstance(many, BallRolling) and many.num_envs == 3
-    with pytest.raises(tangere.InputError, match="max_episode_steps 9; the horizon of BallRolling is"):
+    with pytest.raises(tangere.InputError, match="max_episode_steps 9; the horizon of BallR"):
         gymnasium.make_vec("TestRolling-v0", 3, max_episode_steps=9)
 
 
