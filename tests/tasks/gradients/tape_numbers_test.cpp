@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests what a tape takes besides actions: numbers of the scene from a step on, and the springs with
-// which it begins, with derivatives against differences.
+// Tests what a tape takes besides actions: numbers of the scene from a step on, and the springs
+// with which it begins, with derivatives against differences.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -9,6 +9,7 @@
 #include "engine/scene/scene_number.hpp"
 #include "engine/scene/variable_numbers.hpp"
 #include "engine/step/shear_state_arrays.hpp"
+#include "engine/step/stepper.hpp"
 #include "io/scene/scene_reader.hpp"
 #include "tasks/catalogue/scene_task.hpp"
 #include "tests/tasks/gradients/tape_sweep.hpp"
@@ -64,19 +65,22 @@ class TapeNumbers : public ::testing::Test {
   /// A state in which the fingers hold the rod, and actions that let it slip a little.
   Given start() {
     Given g;
-    const SceneTask closing(gripped_rod(), 60, 1, {{"shear_state"}});
-    TaskTape first(closing, kEnvironments, testing::tape_options(1));
+    const Model& model = task_.model();
+    const ShearStateArrays arrays = shear_state_arrays(model);
+    const std::size_t nq = std::size_t(model.nq()), nv = std::size_t(model.nv()),
+                      points = 3 * arrays.count();
+    Batch batch(model, kEnvironments, testing::kTapeSeed);
+    Stepper stepper(model);
     Numbers close;
-    for (std::size_t i = 0; i < 60UL * kEnvironments; ++i)
-      close.insert(close.end(), {0.0, 0.8, 0.8});
-    first.step(close);
-    g.q.assign(first.q().begin(), first.q().end());
-    g.v.assign(first.v().begin(), first.v().end());
-    const std::size_t points = 3 * shear_state_arrays(task_.model()).count(),
-                      row = first.observations().size() / kEnvironments;
+    for (int e = 0; e < kEnvironments; ++e) close.insert(close.end(), {0.0, 0.8, 0.8});
+    for (int t = 0; t < 60; ++t) stepper.step(batch, close);
+    g.q.resize(kEnvironments * nq);
+    g.v.resize(kEnvironments * nv);
+    g.shear.resize(kEnvironments * points);
     for (std::size_t e = 0; e < kEnvironments; ++e) {
-      const auto own = first.observations().subspan((e + 1) * row - points, points);
-      g.shear.insert(g.shear.end(), own.begin(), own.end());
+      batch.get_q(int(e), std::span(g.q).subspan(e * nq, nq));
+      batch.get_v(int(e), std::span(g.v).subspan(e * nv, nv));
+      arrays.write(batch.shear_state(int(e)), std::span(g.shear).subspan(e * points, points));
     }
     for (std::size_t i = 0; i < std::size_t(kActions) * kEnvironments * 4; ++i)
       g.actions.insert(g.actions.end(), {1e-4 * double(i % 7), 0.8, 0.799});
