@@ -149,8 +149,8 @@ class Simulation(SimulationBase):
             )
         if not run.current:
             raise _core.InputError(
-                "step() of a run that the tape does not hold any more, since parameters() or a "
-                "backward() through another run; call reset()"
+                "step() of a run that the tape does not hold any more, since parameters(), a reset() "
+                "that failed or a backward() through another run; call reset()"
             )
         if state._token.requires_grad and not torch.is_grad_enabled():
             raise _core.InputError(

@@ -57,6 +57,7 @@ class Run:
     """
 
     def __init__(self, line: Line, *start: Any, recorded: bool = True):
+        line.run = None  # a reset that fails may have ended the run before
         line.tape.reset(*start)
         line.run = self
         self._line = line

@@ -3,8 +3,8 @@
 
 from __future__ import annotations
 
+import importlib
 import pickle
-import sys
 import warnings
 from pathlib import Path
 
@@ -16,8 +16,13 @@ from gymnasium.utils.env_checker import check_env
 
 import tangere
 
-sys.path.insert(0, str(Path(__file__).parents[2] / "examples"))
-import stable_grasp  # noqa: E402
+
+@pytest.fixture
+def stable_grasp(monkeypatch):
+    """The example, which needs PyTorch."""
+    pytest.importorskip("torch", reason="PyTorch is not installed")
+    monkeypatch.syspath_prepend(Path(__file__).parents[2] / "examples")
+    return importlib.import_module("stable_grasp")
 
 
 class Leaves(BallRolling):
@@ -55,7 +60,7 @@ def test_the_twin_of_a_task_has_its_numbers():
 
 
 @pytest.mark.parametrize("mode", ["next_step", "same_step"])
-def test_the_twin_of_stable_grasp_has_its_numbers(mode):
+def test_the_twin_of_stable_grasp_has_its_numbers(mode, stable_grasp):
     """But for the densities, which each draws in its own way. Sums in another order differ by
     rounding: observations are float32, rewards up to 100."""
     task = tangere.make_vec("stable_grasp", 5, threads=1, seed=3, autoreset=mode)
@@ -85,7 +90,7 @@ def test_the_twin_of_stable_grasp_has_its_numbers(mode):
     assert solved > 3 and begun > 0
 
 
-def test_drawn_bars_balance_at_a_drawn_place():
+def test_drawn_bars_balance_at_a_drawn_place(stable_grasp):
     env = stable_grasp.StableGrasp(40, threads=1, seed=5)
     blocks = np.stack([env.randomized()[name] for name in stable_grasp.DENSITIES], 1)
     place = (blocks * (np.arange(11) + 0.5)).sum(1) / blocks.sum(1)  # from the right end [blocks]

@@ -528,6 +528,52 @@ def test_what_transforms_cannot_do_is_named():
             transformed(u[None].expand(2, 2, 3).clone())
 
 
+def test_a_reset_that_fails_ends_the_run():
+    sim, u = ball(steps=3), torch.zeros(3, dtype=torch.float64, requires_grad=True)
+    s = sim.step(sim.reset(), u)
+    flat = s.q.detach().clone()
+    flat[:, -4:] = 0
+    with pytest.raises(tangere.InputError, match="unit quaternion"):
+        sim.reset(q=flat)
+    with pytest.raises(tangere.InputError, match="a reset.. that failed"):
+        sim.step(s, u)
+    s.v.sum().backward()  # it is played again
+    assert float(u.grad.abs().max()) > 0
+
+
+def test_gradcheck_of_what_steps_and_resets_take():
+    chain = tt.Simulation(scene("chain")[0], num_envs=2, steps=3, every=2)
+    name = "joint arm damping"
+    damping = chain.parameters(name)[name]
+
+    def swung(u, damping):
+        s = chain.reset()
+        for t in range(3):
+            s = chain.step(s, u[t], {name: damping[t]})
+        return s["variables"], s.bodies
+
+    each = damping.expand(3, 2).clone().requires_grad_()
+    u = torch.full((3, 2, 2, 1), 0.3, dtype=torch.float64, requires_grad=True)  # of each step
+    assert torch.autograd.gradcheck(swung, (u, each), eps=1e-6, atol=1e-7, rtol=1e-4)
+
+    rod = tt.Simulation(scene("rod")[0], 1, 40, every=2, read=["shear_state", "left_finger.sum"])
+    grip = torch.tensor([0.0, 0.8, 0.8], dtype=torch.float64)
+    with torch.no_grad():
+        s = rod.reset()
+        for _ in range(40):
+            s = rod.step(s, grip)
+    springs = s.shear_state
+    assert float(springs.abs().max()) > 1e-5
+
+    def held(scale):
+        first = rod.reset(q=s.q, v=s.v, shear_state=scale * springs)
+        return rod.step(first, grip)["left_finger.sum"][:, :3].square().sum()
+
+    scale = torch.ones((), dtype=torch.float64, requires_grad=True)
+    assert torch.autograd.gradcheck(held, scale, eps=1e-6, atol=1e-9, rtol=1e-4)
+    assert float(torch.autograd.grad(held(scale), scale)[0]) != 0
+
+
 def test_numbers_without_derivatives():
     sim = ball(steps=1, points=True, read=["pad"])
     drawn = {"contact pad ball kn": np.array([2.0, 3.0])}
