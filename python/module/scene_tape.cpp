@@ -259,18 +259,18 @@ SceneTape::Posed& SceneTape::posed(const Argument<double>& q, const Argument<dou
                                    const Argument<double>& varying) {
   std::vector<double> qs = rows_of(q, count(), nq(), "q");
   const std::vector<double> vs = rows_of(v, count(), nv(), "v");
-  // A state may be older than the last parameters, which come after the numbers that it knows.
+  // A state may be older than the last parameters, whose columns come last.
   const std::size_t columns =
       varying.ndim() == 2 ? std::min(varying.shape(1), varying_count()) : varying_count();
   const auto numbers = numbers_of(varying, {count(), columns}, "numbers that vary");
   check_state(model(), qs, vs);
   normalise_quaternions(qs);
   if (!posed_) posed_.emplace(model(), arguments_.environments);
-  const std::size_t known = numbers.size() / count();
+
   for (std::size_t e = 0; e < count(); ++e) {
     std::vector<double> all(now_.begin() + std::ptrdiff_t(e * varying_count()),
                             now_.begin() + std::ptrdiff_t((e + 1) * varying_count()));
-    std::ranges::copy(numbers.subspan(e * known, known), all.begin());
+    std::ranges::copy(numbers.subspan(e * columns, columns), all.begin());
     posed_->batch.set_all_randomized(static_cast<int>(e), all);
     posed_->batch.set_state(static_cast<int>(e), std::span(qs).subspan(e * nq(), nq()),
                             std::span(vs).subspan(e * nv(), nv()));
@@ -363,7 +363,7 @@ void SceneTape::add_points(std::size_t environment, std::span<const double> own,
   }
 }
 
-/// Derivatives by points know the coefficients of the start alone.
+/// Derivatives by points are for the coefficients of the start alone.
 void SceneTape::refuse_sensors(const NamedValues& values) const {
   if (point_count() == 0) return;
   for (const auto& [name, value] : values)

@@ -40,7 +40,7 @@ class State:
     @property
     def bodies(self) -> jax.Array:
         """(E, nb, 13) x y z, quaternion w x y z, angular and linear velocity of every body. They
-        are computed from q and v when asked for, unless `read` names them."""
+        are computed from q and v where they are used, unless `read` names them."""
         if "bodies" in self.readings:
             return self.readings["bodies"]
         return _bodies(self.host, self.q, self.v, self.varying)

@@ -34,7 +34,7 @@ class State:
     @property
     def bodies(self) -> torch.Tensor:
         """(E, nb, 13) x y z, quaternion w x y z, angular and linear velocity of every body. They
-        are computed from q and v when asked for, unless `read` names them."""
+        are computed from q and v where they are used, unless `read` names them."""
         if "bodies" in self.readings:
             return self.readings["bodies"]
         refuse_transforms(self.q, self.v)
@@ -149,8 +149,8 @@ class Simulation(SimulationBase):
             )
         if not run.current:
             raise _core.InputError(
-                "step() of a run that the tape does not hold any more, since parameters(), a reset() "
-                "that failed or a backward() through another run; call reset()"
+                "step() of a run that the tape does not hold any more, since parameters(), a "
+                "reset() that failed or a backward() through another run; call reset()"
             )
         if state._token.requires_grad and not torch.is_grad_enabled():
             raise _core.InputError(

@@ -35,7 +35,7 @@ class TensorRun:
 
 class TensorBatch:
     """A `tangere.Batch` whose results are tensors. `names`: the readings that were read of it;
-    `strides`: numbers of steps that were taken without a look between."""
+    `strides`: numbers of steps between two readings."""
 
     def __init__(self, batch: _core.Batch):
         self._batch = batch

@@ -217,9 +217,9 @@ def test_what_a_tape_cannot_do_is_refused():
 
 
 def test_grasps_are_trained_through_time():
-    """A task with a warm-up and steps of its own controls, which looks within its actions."""
+    """A task with a warm-up, controls for each step and a reading within its actions."""
     made = tt.EnvTape(StableGrasp, 3, 2, dtype=torch.float64, precision="double", threads=1)
-    assert made.simulation.every == 60  # of 180: it looks once, after 60 steps
+    assert made.simulation.every == 60  # of 180: it reads once, after 60 steps
     w = torch.full((520, 1), 1e-3, dtype=torch.float64, requires_grad=True)
 
     def mean_return():
