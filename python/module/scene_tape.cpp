@@ -125,6 +125,7 @@ void SceneTape::start(const TapeStart& given, bool record) {
     shear = numbers_of(*given.shear_state, {count(), shear_points(), 3}, "shear_state");
     check_finite(shear, "shear_state");
   }
+  sheared_ = !shear.empty();
   tape().reset(seed_, 0, record);
   given_.clear();
   expect_reverse();
@@ -222,7 +223,7 @@ nb::tuple SceneTape::reverse_start(const Argument<double>& observation_bar) {
   std::span<double> q, v, points, shear;
   auto q_bar = new_array<double>({count(), nq()}, q), v_bar = new_array<double>({count(), nv()}, v),
        point_bar = new_array<double>({point_count(), kPointNumbers}, points),
-       shear_bar = new_array<double>({count(), shear_points(), 3}, shear);
+       shear_bar = new_array<double>({sheared_ ? count() : 0, shear_points(), 3}, shear);
   std::vector<double> along(v.size()), all(names == 0 ? 0 : count() * taped_->number_count),
       each(arguments_.options.points ? count() * points.size() : 0);
   {

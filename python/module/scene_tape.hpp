@@ -110,6 +110,7 @@ class SceneTape {
   std::uint64_t seed_ = 0;
   std::vector<double> drawn_, now_;  ///< (E, varying_count()) at the start, in the last step
   std::vector<double> first_q_;
+  bool sheared_ = false;                         ///< the run starts with a given shear state
   std::vector<std::vector<std::string>> given_;  ///< names that each step was given
   std::size_t left_ = 0;                         ///< steps to reverse
   std::vector<double> carried_;  ///< (E, names) derivatives by what later steps were not given

@@ -67,12 +67,11 @@ void add_calls(nb::class_<SceneTape>& c) {
         "Reverses the last step() that is not reversed yet: takes derivatives of a loss by what\n"
         "it read (E, n), returns those by its controls (E, every, nu) and by the parameters that\n"
         "it was given (E, names), while they held.");
-  c.def(
-      "reverse_start", &SceneTape::reverse_start, "observation_bar"_a,
-      nb::sig(signature("reverse_start", kBar, 3).c_str()),
-      "Ends the reverse pass: takes derivatives by the first readings (E, n), returns those by\n"
-      "q (E, nq), v (E, nv), shear state (E, points, 3), points (n, 7) and parameters (E, names)\n"
-      "of the start.");
+  c.def("reverse_start", &SceneTape::reverse_start, "observation_bar"_a,
+        nb::sig(signature("reverse_start", kBar, 3).c_str()),
+        "Ends the reverse pass: takes derivatives by the first readings (E, n), returns those by\n"
+        "q (E, nq), v (E, nv), shear state (E, points, 3) if it was given, points (n, 7) and\n"
+        "parameters (E, names) of the start.");
   c.def("begin_reverse", &SceneTape::begin_reverse, "Begins another reverse pass.");
   c.def("add_parameters", &SceneTape::add_parameters, "names"_a,
         "Numbers of the scene that environments may have of their own, with derivatives. Names\n"

@@ -88,8 +88,11 @@ class EnvTape:
                 setattr(self.env, name, value.detach().clone())
         self.env.reset(seed=seed, options={"first_episode": first_episode})
         batch = self._batch()
-        start = {name: torch.from_numpy(getattr(batch, name)) for name in ("q", "v", "shear_state")}
-        state = self.simulation.reset(**start, randomized=batch.randomized())
+        start, springs = {"q": batch.q, "v": batch.v}, batch.shear_state
+        if springs.any():
+            start["shear_state"] = springs
+        given = {name: torch.from_numpy(x) for name, x in start.items()}
+        state = self.simulation.reset(**given, randomized=batch.randomized())
         self._recorded = self.env.batch = RecordedBatch(self.simulation, state, batch)
         self._ended = np.zeros(self.num_envs, bool)
         self._success = np.zeros(self.num_envs, bool)
