@@ -7,7 +7,8 @@ Alternates between the two on equal work: `ball_rolling_small`, with a field of 
 every observation, and `stable_grasp`, with random shifts. Prints CPU milliseconds of a step of 1024
 environments and their ratio. Then the same function plays 512 episodes of the first task: in Python
 without storing, and into data sets of both. Prints seconds, CPU seconds (writing and the C++
-command included) and what the median of five runs makes of them.
+command included) and what the median of five runs makes of them. It needs PyTorch, with which
+`stable_grasp` computes.
 """
 
 import resource

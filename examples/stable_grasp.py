@@ -5,12 +5,15 @@
 
 An action moves the grasp along the bar. It is 180 targets of the hand: close, hold, lift, hold,
 lower, hold, open. What the pads feel while they lift says where to grasp next. Plays 64 bars by a
-rule that reads the turning of the bar from this shear, and prints how many it lifts level.
+rule that reads the turning of the bar from this shear, and prints how many it lifts level. The task
+computes with tensors, so a policy is also trained through time (tangere.torch.EnvTape). It needs
+PyTorch.
 """
 
 from typing import Any
 
 import numpy as np
+import torch
 from numpy.typing import NDArray
 
 import tangere
@@ -37,19 +40,21 @@ class StableGrasp(tangere.VectorSceneEnv):
     scene = scene()
     steps_per_action, horizon, actions = STEPS, 9, 1
     warm_up = True  # a first grasp at the middle
-    touch = ("flow",)
+    touch, arrays = ("flow",), "torch"
 
-    moved, lift = ramp(0, 10), 0.03 * (ramp(30, 50) - ramp(100, 50))  # [1], [m]
-    fingers = -0.025 * (1 - ramp(10, 10) + ramp(160, 20))  # [m]
+    moved = torch.from_numpy(ramp(0, 10))[:, None]
+    lift = torch.from_numpy(0.03 * (ramp(30, 50) - ramp(100, 50)))[:, None]  # [m]
+    fingers = torch.from_numpy(-0.025 * (1 - ramp(10, 10) + ramp(160, 20)))[:, None, None]  # [m]
 
     def restart(self, envs: Array) -> None:
         if not hasattr(self, "place"):
-            self.place, self.rest = np.zeros((2, self.num_envs))  # of the grasp, of the bar [m]
-            self.flow = np.zeros((self.num_envs, 4, 13, 10), np.float32)
-            self.tilt, self.height = np.zeros((2, self.num_envs))  # while lifted [rad], [m]
-        self.place[envs] = 0
+            zeros = torch.zeros(self.num_envs, dtype=torch.float64)
+            self.place, self.rest = zeros, zeros  # of the grasp, of the bar [m]
+            self.flow = torch.zeros(self.num_envs, 4, 13, 10)
+            self.tilt, self.height = zeros, zeros  # while lifted [rad], [m]
+        self.keep(envs, place=torch.zeros(len(envs), dtype=torch.float64))
         densities = dict(zip(DENSITIES, self.densities(envs).T, strict=True))
-        q = self.batch.q[envs]
+        q = self.batch.q[envs].numpy()
         q[:, 1] = 0
         self.batch.set_randomized(densities, envs)
         settling = tangere.Batch(self.model, len(envs), threads=self.batch.threads, timestep=0.05)
@@ -75,40 +80,52 @@ class StableGrasp(tangere.VectorSceneEnv):
         sums = np.where(side < 0, right[:, None], (rest - right)[:, None])
         return np.where(side == 0, density[:, None], share * sums)
 
-    def controls(self, actions: Array) -> Array:  # hand x, y, z, turn; fingers
-        place = np.clip(self.place + 0.05 * actions[:, 0], -0.11, 0.11)
-        u = np.zeros((STEPS, self.num_envs, 6))
-        u[..., 1] = self.place + self.moved[:, None] * (place - self.place)
-        u[..., 2], u[..., 4:] = self.lift[:, None], self.fingers[:, None, None]
-        return u
+    def controls(self, actions: torch.Tensor) -> torch.Tensor:  # hand x, y, z, turn; fingers
+        place = torch.clamp(self.place + 0.05 * actions[:, 0], -0.11, 0.11)
+        along = (self.place + self.moved * (place - self.place))[..., None]
+        still, count = torch.zeros_like(along), self.num_envs
+        lift, fingers = self.lift.expand(-1, count)[..., None], self.fingers.expand(-1, count, 2)
+        return torch.cat([still, along, lift, still, fingers], 2)
 
-    def simulate(self, controls: Array, envs: Array) -> None:
+    def simulate(self, controls: torch.Tensor, envs: Array) -> None:
         begins = envs[self.lengths[envs] == 0]
-        self.rest[begins] = self.batch.q[begins, -5]
+        self.keep(begins, rest=self.batch.q[begins, -5])
         run = self.batch.run(controls, every=LIFTED, fields=PADS, envs=envs)
-        shear = np.stack([run.fields[pad][0, envs, ..., :2] for pad in PADS], 1)
-        largest = np.sqrt((shear**2).sum(-1).max((1, 2, 3)))[:, None, None, None, None]
-        flow = np.where(largest > 1e-6, shear / np.maximum(largest, 1e-6), 0)
-        self.flow[envs] = np.moveaxis(flow, -1, 2).reshape(-1, 4, 13, 10)
-        w, x, y, z = run.q[0, envs, -4:].T
-        self.tilt[envs] = abs(np.arcsin(np.clip(2 * (y * z + w * x), -1, 1)))
-        self.height[envs] = run.q[0, envs, -5]
-        self.place[envs] = controls[-1, envs, 1]
+        shear = torch.stack([run.fields[pad][0, envs, ..., :2] for pad in PADS], 1)
+        largest = shear.square().sum(-1).amax((1, 2, 3)).clamp(min=1e-12).sqrt()
+        largest = largest[:, None, None, None, None]
+        flow = torch.where(largest > 1e-6, shear / largest, torch.zeros_like(shear))
+        w, x, y, z = run.q[0, envs, -4:].unbind(1)
+        self.keep(
+            envs,
+            flow=flow.moveaxis(-1, 2).reshape(-1, 4, 13, 10),
+            tilt=torch.asin(torch.clamp(2 * (y * z + w * x), -1, 1)).abs(),
+            height=run.q[0, envs, -5],
+            place=controls[-1, envs, 1],
+        )
 
-    def observe(self) -> dict[str, Array]:
+    def keep(self, envs: Array, **rows: torch.Tensor) -> None:
+        """Sets rows of tensors of the task, with their gradients."""
+        for name, of_envs in rows.items():
+            all_rows = getattr(self, name).to(of_envs.dtype)
+            setattr(self, name, all_rows.index_put((torch.from_numpy(envs),), of_envs))
+
+    def observe(self) -> dict[str, torch.Tensor]:
         return {"flow": self.flow}
 
     def terminated(self) -> Any:
-        return (self.lengths > 0) & (self.tilt < 0.02) & (self.height - self.rest > 5e-3)
+        lifted = (self.tilt < 0.02) & (self.height - self.rest > 5e-3)
+        return torch.from_numpy(self.lengths > 0) & lifted
 
-    def reward(self, actions: Array) -> Array:
-        return np.where(self.terminated(), 100, -10 * self.tilt)
+    def reward(self, actions: torch.Tensor) -> torch.Tensor:
+        return torch.where(self.terminated(), torch.full_like(self.tilt, 100), -10 * self.tilt)
 
     def turning(self) -> Any:
         """(E, 1) the action towards the heavier side: shear is proportional to the velocity of the
         bar in the grip, so the centre of mass is ω/v Σ r²/n away."""
         up = np.array([1, -1])[:, None, None]  # rows of the left pad go up, of the right pad down
-        fz, fy = up * self.flow[:, 0::2], -self.flow[:, 1::2]
+        felt = self.flow.numpy()
+        fz, fy = up * felt[:, 0::2], -felt[:, 1::2]
         z = up * (np.arange(13) - 6)[:, None] * 1.5e-3
         y = np.broadcast_to((4.5 - np.arange(10)) * 1.5e-3, z.shape[:1] + (13, 10))
         moment, weight = ((y * fz - z * fy).sum((1, 2, 3)), fz.mean((1, 2, 3)))

@@ -158,6 +158,19 @@ def code(lines: list[str]) -> list[str]:
     return ["```python", *lines, "```", ""]
 
 
+def members_of(package: Path, node: ast.ClassDef) -> list[ast.FunctionDef]:
+    """The functions of a class, and those that it takes over from private modules."""
+    own = [n for n in node.body if isinstance(n, ast.FunctionDef)]
+    names = {base.id for base in node.bases if isinstance(base, ast.Name)}
+    for path in sorted(package.glob("_*.py")) if names else []:
+        for other in parse(path).body:
+            if isinstance(other, ast.ClassDef) and other.name in names:
+                known = {n.name for n in own}
+                more = [n for n in members_of(package, other) if n.name not in known]
+                own += [n for n in more if n.name != "__init__" or ast.get_docstring(n)]
+    return own
+
+
 def page(package: Path) -> tuple[str, list[str]]:
     """The text of the page, and public names without a docstring."""
     shown, silent = [HEAD], []
@@ -181,7 +194,7 @@ def page(package: Path) -> tuple[str, list[str]]:
                 shown += code(signature(node, "", prefix))
                 describe(prefix + name, node)
                 continue
-            members = [n for n in node.body if isinstance(n, ast.FunctionDef)]
+            members = members_of(package, node)
             made = next((n for n in members if n.name == "__init__"), None)
             if made:
                 shown += code(signature(made, name, prefix))

@@ -51,7 +51,8 @@ struct TaskSpec {
   double settling_timestep = 0;
   int task_state = 0;  ///< count of numbers that the task keeps per episode: a goal, a force
   /// Readings in a Snapshot besides q and v.
-  bool reads_end_effectors = false, reads_tactile = false, reads_bodies = false;
+  bool reads_end_effectors = false, reads_tactile = false, reads_bodies = false,
+       reads_shear_state = false;
   /// With reads_tactile: fields and pressures that are read, in order; none: the field of every
   /// sensor.
   std::vector<FieldOutput> fields = {};

@@ -384,6 +384,19 @@ void Batch::set_randomized_value(int environment, int k, double value) {
   complete_numbers(lane);
 }
 
+void Batch::set_all_randomized(int environment, std::span<const double> values) {
+  check_size("values", values.size(), compiled(model_).randomized_row.size());
+  std::vector<int> changed;
+  std::vector<double> to;
+  for (int k = 0; k < static_cast<int>(values.size()); ++k) {
+    const double value = values[std::size_t(k)];
+    if (!is_parameter(k) || randomized_value(environment, k) == value) continue;
+    changed.push_back(k);
+    to.push_back(value);
+  }
+  if (!changed.empty()) set_randomized_values({&environment, 1}, changed, to);
+}
+
 void Batch::set_randomized_values(std::span<const int> environments, std::span<const int> numbers,
                                   std::span<const double> values) {
   const CompiledModel& m = compiled(model_);

@@ -154,6 +154,9 @@ class Batch {
   /// from now on; the state, its history and status stay. The value is not checked. Throws
   /// InputError for a number of the starting state.
   void set_randomized_value(int environment, int k, double value);
+  /// Sets all that are parameters in an environment: `values` (their count) in order. One that has
+  /// its value already stays, with what depends on it. Throws as set_randomized_values().
+  void set_all_randomized(int environment, std::span<const double> values);
   /// Sets some of them in some environments, and checks them: `values` (environments, numbers) in
   /// SI. Throws InputError, and sets none, for a number of the starting state, for a value that the
   /// scene could not have, and for sizes of a body that are too unlike.

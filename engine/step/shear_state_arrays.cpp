@@ -25,17 +25,22 @@ std::string name_of_contact(const CompiledModel& m, const kernels::ShearSpringCo
 
 void ShearStateArrays::write(std::span<const ShearEntry> memory, std::span<double> array) const {
   std::fill(array.begin(), array.end(), 0.0);
-  for (const ShearEntry& e : memory)
-    std::copy_n(e.s, 3, &array[3 * std::size_t(row_of[std::size_t(e.point)])]);
+  for (const ShearEntry& e : memory) std::copy_n(e.s, 3, &array[first_of(e)]);
+}
+
+ShearState ShearStateArrays::read_all(std::span<const double> array) const {
+  ShearState memory;
+  for (std::size_t point = 0; point < count(); ++point) {
+    memory.push_back({static_cast<std::int32_t>(point), {}});
+    std::copy_n(&array[first_of(memory.back())], 3, memory.back().s);
+  }
+  return memory;
 }
 
 ShearState ShearStateArrays::read(std::span<const double> array) const {
-  ShearState memory;
-  for (std::size_t point = 0; point < count(); ++point) {
-    const double* const s = &array[3 * std::size_t(row_of[point])];
-    if (s[0] == 0 && s[1] == 0 && s[2] == 0) continue;
-    memory.push_back({static_cast<std::int32_t>(point), {s[0], s[1], s[2]}});
-  }
+  ShearState memory = read_all(array);
+  std::erase_if(memory,
+                [](const ShearEntry& e) { return e.s[0] == 0 && e.s[1] == 0 && e.s[2] == 0; });
   return memory;
 }
 

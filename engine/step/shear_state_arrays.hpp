@@ -34,6 +34,12 @@ struct ShearStateArrays {
   void write(std::span<const ShearEntry> memory, std::span<double> array) const;
   /// Returns the shear state of an array, (points, 3). Rows of zeros get no entry.
   [[nodiscard]] ShearState read(std::span<const double> array) const;
+  /// The same with entries for all rows.
+  [[nodiscard]] ShearState read_all(std::span<const double> array) const;
+  /// Where an entry's first number is in an array.
+  [[nodiscard]] std::size_t first_of(const ShearEntry& entry) const {
+    return 3 * std::size_t(row_of[std::size_t(entry.point)]);
+  }
 };
 
 /// Returns those of a model; without contacts if it has no shear springs.

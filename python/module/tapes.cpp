@@ -74,7 +74,7 @@ class Tape {
     {
       const InUse::Turn turn(in_use_);
       const nb::gil_scoped_release free;
-      tape_.reverse_start({o}, q, v);
+      tape_.reverse_start({o}, {q, v});
     }
     return nb::make_tuple(q_bar, v_bar);
   }

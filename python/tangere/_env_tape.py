@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -10,7 +11,7 @@ import numpy as np
 import torch
 
 from . import _core
-from ._simulation import Simulation, State
+from ._simulation import Simulation
 from ._tensor_batch import RecordedBatch, TensorBatch
 from .scene_env import VectorSceneEnv
 
@@ -26,9 +27,9 @@ class EnvTape:
         (-total.mean()).backward()
 
     The class has `arrays = "torch"`, and its methods compute with tensors. Each runs once when the
-    tape is made, which shows what it reads. Starts, goals and drawn
-    numbers count as given, and so do ends of episodes. A class with `warm_up`, with controls that
-    change within an action or with a `simulate` of its own is refused.
+    tape is made, which shows what it reads and how many steps it takes at a time. Starts, goals and
+    drawn numbers count as given, also what a `warm_up` does, and so do ends of episodes. A tape
+    begins with the springs (ks) as `restart` leaves them; a scheme of two steps begins anew.
 
     Parameters
     ----------
@@ -60,9 +61,6 @@ class EnvTape:
             raise _core.InputError(f"task {task!r}; expected a subclass of VectorSceneEnv")
         if task.arrays != "torch":
             raise _core.InputError(f'{task.__name__}: arrays "{task.arrays}"; expected "torch"')
-        if task.warm_up or task.simulate is not VectorSceneEnv.simulate:
-            what = "a warm_up" if task.warm_up else "a simulate() of its own"
-            raise _core.InputError(f"{task.__name__}: {what}, which a tape does not record")
         self.env = task(num_envs, threads=threads, seed=0, **arguments)
         self.num_envs, self.flatten, self.dtype = num_envs, flatten, dtype
         self.actions = actions or self.env.horizon
@@ -70,17 +68,18 @@ class EnvTape:
             horizon = self.env.horizon
             raise _core.InputError(f"actions {actions}; expected 1 to the horizon {horizon}")
         self._low, self._high = (torch.from_numpy(x.copy()) for x in self.env.bounds)
+        names, stride = self._noted()
         self.simulation = Simulation(
             self.env.model.scene,
             num_envs,
-            self.actions,
-            every=self.env.steps_per_action,
-            read=[*dict.fromkeys([*self._names(), *read])],
+            self.actions * self.env.steps_per_action // stride,
+            every=stride,
+            read=[*dict.fromkeys([*names, *read])],
             threads=threads,
             precision=precision,
             tape_bytes=tape_bytes,
         )
-        self._state: State | None = None
+        self._recorded: RecordedBatch | None = None
 
     def reset(self, seed: int = 0, first_episode: int = 0) -> Any:
         """Starts the episodes; returns the first observations, which have no derivative."""
@@ -89,13 +88,12 @@ class EnvTape:
                 setattr(self.env, name, value.detach().clone())
         self.env.reset(seed=seed, options={"first_episode": first_episode})
         batch = self._batch()
-        if np.any(batch.shear_state):
-            raise _core.InputError(
-                f"{type(self.env).__name__}: restart() leaves shear in springs (ks), with which a "
-                "tape cannot begin; expected states without it"
-            )
-        q, v = torch.from_numpy(batch.q), torch.from_numpy(batch.v)
-        self._take(self.simulation.reset(q=q, v=v, randomized=batch.randomized()))
+        start, springs = {"q": batch.q, "v": batch.v}, batch.shear_state
+        if springs.any():
+            start["shear_state"] = springs
+        given = {name: torch.from_numpy(x) for name, x in start.items()}
+        state = self.simulation.reset(**given, randomized=batch.randomized())
+        self._recorded = self.env.batch = RecordedBatch(self.simulation, state, batch)
         self._ended = np.zeros(self.num_envs, bool)
         self._success = np.zeros(self.num_envs, bool)
         return self._observe()
@@ -107,7 +105,7 @@ class EnvTape:
         bool, whether the action counted. A component beyond its bounds has derivative 0. Raises
         InputError as `Simulation.step` and the environments do.
         """
-        if self._state is None:
+        if self._recorded is None:
             raise _core.InputError("step() without episodes; call reset() first")
         actions = torch.as_tensor(actions).to(torch.float64)
         shape = (self.num_envs, *self._low.shape)
@@ -116,12 +114,13 @@ class EnvTape:
         actions = torch.minimum(torch.maximum(actions, self._low), self._high)
         actions = actions.expand(shape).contiguous()
         controls = torch.as_tensor(self.env.controls(actions))
-        if controls.ndim > 2:
-            raise _core.InputError(
-                f"{type(self.env).__name__}: controls() that change within an action; a tape has "
-                f"one for all steps, (E, {self.env.model.nu})"
-            )
-        self._take(self.simulation.step(self._state, controls))
+        controls = controls.expand(self.env._shape_of_controls(controls))
+        before, expected = self._recorded.taken, self.env.steps_per_action
+        self.env.simulate(controls, np.arange(self.num_envs))
+        taken = self._recorded.taken - before
+        if taken != expected:
+            said = f"{type(self.env).__name__}: simulate() took {taken} steps"
+            raise _core.InputError(f"{said}; expected {expected}")
         alive = ~self._ended
         self.env.lengths += 1
         reward = torch.as_tensor(self.env.reward(actions)).to(torch.float64)
@@ -132,7 +131,7 @@ class EnvTape:
             said = f"{type(self.env).__name__}: reward() {reward.tolist()[:5]}"
             raise _core.InputError(f"{said}; expected finite numbers")
         reward = torch.where(torch.from_numpy(alive), reward, torch.zeros_like(reward))
-        failed = self._state.status < 0
+        failed = self._recorded.status.numpy() < 0
         self._success[alive] = (self.env.flags("success") & ~failed)[alive]
         self._ended = self._ended | self.env.flags("terminated") | failed
         return self._observe(), reward, torch.from_numpy(alive)
@@ -145,17 +144,17 @@ class EnvTape:
     def _batch(self) -> _core.Batch:
         return self.env._batch
 
-    def _take(self, state: State) -> None:
-        self._state = state
-        self.env.batch = RecordedBatch(state, self._batch())
-
-    def _names(self) -> list[str]:
-        """The readings that the task uses in its first states."""
+    def _noted(self) -> tuple[list[str], int]:
+        """The readings that the task uses in its first action, and the steps that it takes at a
+        time."""
         batch = self.env.batch = TensorBatch(self._batch())
         action = torch.zeros((self.num_envs, *self._low.shape), dtype=torch.float64)
-        self.env.observe(), self.env.controls(action), self.env.reward(action)
-        self.env.terminated(), self.env.success()
-        return batch.names
+        self.env.observe()
+        controls = torch.as_tensor(self.env.controls(action))
+        controls = controls.expand(self.env._shape_of_controls(controls)).to(torch.float64)
+        self.env.simulate(controls, np.arange(self.num_envs))
+        self.env.reward(action), self.env.terminated(), self.env.success(), self.env.observe()
+        return batch.names, math.gcd(self.env.steps_per_action, *batch.strides)
 
     def _observe(self) -> Any:
         seen = {k: torch.as_tensor(x).to(self.dtype) for k, x in self.env.observe().items()}

@@ -43,6 +43,10 @@ def integer(value: Any, name: str) -> jax.Array:
     return jnp.asarray(operator.index(value))
 
 
+def shapes_of(arrays: Any) -> list[Any]:
+    return [jax.ShapeDtypeStruct(x.shape, x.dtype) for x in arrays]
+
+
 def call(callback: Any, results: Any, *arguments: Any, effect: bool = False) -> Any:
     """Calls Python in the midst of a computation, at the place that data dependence gives it.
 
@@ -104,6 +108,14 @@ class Host:
     def begin_run(self) -> None:
         self.run, self.left = self.run % (1 << 24) + 1, None
 
+    def take(self, inputs: Any) -> None:
+        """Takes a step of the tape with its inputs, here its actions."""
+        self.tape.step(inputs)
+
+    def spread(self, bars: Any, to: Any) -> None:
+        """Writes what the tape's reverse() returned to arrays of the form of a step's inputs."""
+        to[...] = bars
+
     def check(self, token: Any, actions: Any) -> None:
         """Raises InputError for a step that cannot follow."""
         if tuple(token) != (self.run, self.tape.taken):
@@ -120,23 +132,24 @@ class Host:
             with self.lock:
                 self.check(token, actions)
 
-    def step(self, _: Any, out: Any, token: Any, actions: Any) -> None:
+    def step(self, form: Any, _: Any, out: Any, token: Any, *inputs: Any) -> None:
         with self.lock:
-            given = np.asarray(actions)
+            given = [np.asarray(x) for x in inputs]
             try:
-                self.check(np.asarray(token), given)
-                self.tape.step(given)
+                self.check(np.asarray(token), given[0])
+                self.take(jax.tree_util.tree_unflatten(form, given))
             except _core.InputError as error:
                 self.failure = error
                 raise
             self.show(out)
 
-    def reverse(self, _: Any, out: Any, token: Any, token_bar: Any, *bars: Any) -> None:
+    def reverse(self, form: Any, _: Any, out: Any, token: Any, token_bar: Any, *bars: Any) -> None:
         with self.lock:
             given = [np.asarray(bar) for bar in bars]
             taken = int(np.asarray(token)[1])
             passing = self._pass(np.asarray(token), np.asarray(token_bar), given)
-            np.asarray(out[1])[...] = self.tape.reverse(*given)
+            to = [np.asarray(x) for x in out[1:]]
+            self.spread(self.tape.reverse(*given), jax.tree_util.tree_unflatten(form, to))
             np.asarray(out[0])[...] = (passing, 0)
             self.left = taken - 1
 
@@ -162,18 +175,24 @@ class Host:
 
 @partial(jax.custom_vjp, nondiff_argnums=(0,))
 def take_step(host: Host, token: Any, inputs: Any) -> Any:
-    """One step of a tape, differentiable by its inputs."""
-    return call(host.step, host.shown, token, inputs)
+    """One step of a tape, differentiable by its inputs: arrays of any form, the actions first."""
+    leaves, form = jax.tree_util.tree_flatten(inputs)
+    return call(partial(host.step, form), host.shown, token, *leaves)
 
 
 def _forward(host: Host, token: Any, inputs: Any) -> Any:
     shown = take_step(host, token, inputs)
-    return shown, shown[0]  # the token after the step, so that the way back cannot come before it
+    # The token after the step, so that the way back cannot come before it.
+    return shown, (shown[0], inputs)
 
 
-def _backward(host: Host, token: Any, by: Any) -> Any:
+def _backward(host: Host, kept: Any, by: Any) -> Any:
+    token, inputs = kept
     bars = by[: host.differentiable]
-    return tuple(call(host.reverse, [host.token, host.actions], token, *bars))
+    leaves, form = jax.tree_util.tree_flatten(inputs)
+    results = [host.token, *shapes_of(leaves)]
+    token_bar, *input_bars = call(partial(host.reverse, form), results, token, *bars)
+    return token_bar, jax.tree_util.tree_unflatten(form, input_bars)
 
 
 take_step.defvjp(_forward, _backward)

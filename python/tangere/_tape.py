@@ -27,6 +27,14 @@ def split_rows(rows: Any, observations: Sequence[_core.TensorSpec]) -> dict[str,
     return parts
 
 
+def shear_state_of(readings: Mapping[str, Any]) -> Any:
+    if "shear_state" not in readings:
+        raise _core.InputError(
+            f"shear_state of a state with the readings {list(readings)}; expected it in read="
+        )
+    return readings["shear_state"]
+
+
 class TapeBase:
     """Holds a `tangere.TaskTape` and splits what it shows."""
 
@@ -52,30 +60,95 @@ class TapeBase:
 
 
 class SimulationBase:
-    """Holds a `tangere.SceneTape` and the names of what goes in and out."""
+    """A scene in E environments, recorded for the way back: what does not depend on the library."""
 
     def __init__(
         self,
         scene: _core.Scene | str | Path,
-        num_envs: int,
-        steps: int,
-        every: int,
-        read: Sequence[str] | None,
-        parameters: Sequence[str],
-        **options: Any,
+        num_envs: int = 1,
+        steps: int = 100,
+        *,
+        every: int = 1,
+        read: Sequence[str] | None = None,
+        points: bool = False,
+        threads: int | None = None,
+        precision: str = "double",
+        tape_bytes: float = 1e9,
+        dtype: Any = None,
     ):
-        for name, given in (("read", read), ("parameters", parameters)):
-            if isinstance(given, str):
-                raise _core.InputError(f"{name} {given!r}; expected a list of names")
+        """Compiles the scene.
+
+        Parameters
+        ----------
+        scene: a file, or a `tangere.Scene`.
+        num_envs: E. Environment e has draw e of a seed.
+        steps: calls of step() after a reset(), at most.
+        every: steps of the simulation in each.
+        read: names of what s[name] holds, for each environment: "pad" (rows, cols, 3) [N],
+            "pad.sum" (6), "pad.pressure", "pad.shear", "pad.flow", "pad.markers" of sensors;
+            "bodies" (nb, 13) or "bodies.box" (13): x y z, quaternion w x y z, angular and linear
+            velocity; "variables" (n, 3), the end effectors, or one by its name (3); "shear_state"
+            (points, 3) [m] of contacts with ks. None: end effectors and all fields.
+        points: whether reset() may move points of sensors.
+        threads: None for all cores.
+        precision: of tactile fields, "double" or "mixed".
+        tape_bytes: limit for the tapes [bytes]. Longer runs are played again from checkpoints.
+        dtype: of states. None: float64 in PyTorch, float32 in JAX, where float64 needs
+            jax_enable_x64. Controls may have any floating type.
+        """
+        if isinstance(read, str):
+            raise _core.InputError(f"read {read!r}; expected a list of names")
         self.scene = scene if isinstance(scene, _core.Scene) else _core.Scene(scene)
         self.num_envs, self.steps, self.every = num_envs, steps, every
-        self.parameter_names = list(parameters)
         names = None if read is None else list(read)
         self.tape = _core.SceneTape(
-            self.scene, num_envs, steps, every, names, self.parameter_names, **options
+            self.scene, num_envs, steps, every, names, points, threads, precision, tape_bytes
         )
         self._observations = self.tape.spec.observations  # an array whose points move stays one
         self._sensors = {s.name: s.points for s in self.tape.model.sensors}
+        self._begin(dtype)
+
+    def _begin(self, dtype: Any) -> None:
+        """What a subclass adds to the constructor."""
+        raise NotImplementedError
+
+    def _made_anew(self) -> None:
+        """The scene was compiled with other parameters, which ended the run on the tape."""
+        raise NotImplementedError
+
+    @property
+    def units(self) -> dict[str, str]:
+        """Name → unit of the numbers that parameters() has named."""
+        return dict(zip(self.tape.parameters, self.tape.units))
+
+    def _parameters(self, names: tuple[str, ...]) -> dict[str, np.ndarray]:
+        """Name → (E): numbers that get derivatives, as they are now."""
+        if any(name not in self.tape.parameters for name in names):
+            self.tape.add_parameters(list(names))
+            self._made_anew()
+        columns = dict(zip(self.model.scene.varying, self.tape.varying().T))
+        return {name: columns[name].copy() for name in names or self.tape.parameters}
+
+    def _rows_of(self, given: Mapping[str, Any] | None, convert: Any, fill: Any) -> dict[str, Any]:
+        """Name → (E) of what reset() or step() was given by name. fill(x) makes (E) of ()."""
+        rows = {}
+        for name, x in (given or {}).items():
+            x = convert(x)
+            x = fill(x) if tuple(x.shape) in ((), (1,)) else x
+            if tuple(x.shape) != (self.num_envs,):
+                raise _core.InputError(
+                    f"{name} of shape {tuple(x.shape)}; expected ({self.num_envs},) or ()"
+                )
+            rows[name] = x
+        return rows
+
+    def _check_parameters(self, given: Mapping[str, Any] | None) -> None:
+        unknown = sorted(set(given or ()) - set(self.tape.parameters))
+        if unknown:
+            raise _core.InputError(
+                f"parameters {unknown}; expected names that parameters() was called with: "
+                f"{self.tape.parameters}"
+            )
 
     @property
     def model(self) -> _core.Model:

@@ -11,26 +11,19 @@ import copyreg
 import json
 import warnings
 from pathlib import Path
-from typing import Any, Literal, Sequence
+from typing import Any, Sequence
 
 import gymnasium
 import numpy as np
 from gymnasium import spaces
-from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 
 from . import _core
 from ._arrays import numbers
 from ._rendering import MODES, RenderMode, Rendering
-
-# KEY → array, or with `flatten` one array.
-Observation = Any
-Autoreset = Literal["next_step", "same_step", "disabled"]
-_MODES = {
-    "next_step": AutoresetMode.NEXT_STEP,
-    "same_step": AutoresetMode.SAME_STEP,
-    "disabled": AutoresetMode.DISABLED,
-}
+from ._vector_env import AUTORESET, Autoreset, EpisodesEnv, Observation, Remade
+from ._vector_env import check_choices, checked_seed, final_info, system_seed
 
 
 def gym_id(task: str) -> str:
@@ -75,56 +68,6 @@ def observation_space(
     return spaces.Box(low, high)
 
 
-def _system_seed() -> int:
-    return int(np.random.default_rng().integers(2**63))
-
-
-def _checked(seed: Any) -> int:
-    if isinstance(seed, (list, tuple, np.ndarray)):
-        raise _core.InputError(
-            "one seed for each environment; expected one number, because an environment's "
-            "episode already differs from the others' (docs/python.md)"
-        )
-    if not isinstance(seed, (int, np.integer)) or not 0 <= seed < 2**64:
-        raise _core.InputError(f"seed {seed!r}; expected a whole number from 0 to 2^64 - 1")
-    return int(seed)
-
-
-def _check_choices(num_envs: Any, autoreset: Any) -> None:
-    """Raises InputError for arguments of a vector environment that are not among those known."""
-    if not isinstance(num_envs, (int, np.integer)) or num_envs < 1:
-        raise _core.InputError(f"num_envs {num_envs!r}; expected a whole number from 1 on")
-    if autoreset not in _MODES:
-        raise _core.InputError(f"autoreset {autoreset!r}; expected one of {sorted(_MODES)}")
-
-
-def _reset_options(
-    seed: Any, options: dict[str, Any] | None
-) -> tuple[np.ndarray | None, int | None]:
-    """The mask (E) of environments to start and the first episode, from the options of a reset."""
-    options = dict(options or {})
-    mask = options.pop("reset_mask", None)
-    first = options.pop("first_episode", None)
-    if options:
-        raise _core.InputError(f"options {list(options)}; known: reset_mask, first_episode")
-    if mask is not None and (seed is not None or first is not None):
-        raise _core.InputError("reset_mask goes with neither seed nor first_episode")
-    return None if mask is None else np.asarray(mask, bool), None if first is None else int(first)
-
-
-def _finals(last: Observation, final: dict[str, Any], ended: np.ndarray) -> dict[str, Any]:
-    """What info has of the ends of episodes, besides that of the starts which follow at once."""
-    obs = np.empty(len(ended), object)
-    for e in np.flatnonzero(ended):
-        obs[e] = {k: v[e] for k, v in last.items()} if isinstance(last, dict) else last[e]
-    return {
-        "final_info": final,
-        "_final_info": ended,
-        "final_obs": obs,
-        "_final_obs": ended.copy(),
-    }
-
-
 def _scene_as_read(path: str, text: str, varying: list[str]) -> _core.Scene:
     """The scene of a pickle: read from its file again, then with the numbers of `Scene.vary`."""
     if Path(path).is_file():
@@ -144,21 +87,7 @@ copyreg.pickle(
 )
 
 
-class _Remade:
-    """Environments of which pickles and copies are made anew from the constructor's arguments.
-
-    A copy plays no episode until its first reset. What was set besides the constructor is kept.
-    """
-
-    _arguments: dict[str, Any]
-    _made: set[str]  # names of what the constructor sets
-
-    def __getstate__(self) -> dict[str, Any]:
-        kept = {key: value for key, value in self.__dict__.items() if key not in self._made}
-        return {"arguments": self._arguments, "kept": kept}
-
-
-class VectorTaskEnv(_Remade, VectorEnv):
+class VectorTaskEnv(EpisodesEnv):
     """Many environments of one task, stepped in C++ on all cores with one call a step.
 
     Environment e plays episodes first_episode + e, first_episode + e + E, … of a seed: an episode
@@ -207,8 +136,8 @@ class VectorTaskEnv(_Remade, VectorEnv):
         self._arguments = arguments
         if isinstance(keys, str):
             raise _core.InputError(f"keys {keys!r}; expected a list, such as [{keys!r}]")
-        seed = _system_seed() if seed is None else _checked(seed)
-        _check_choices(num_envs, autoreset)
+        seed = system_seed() if seed is None else checked_seed(seed)
+        check_choices(num_envs, autoreset)
         self.task = _core.task_spec(task)
         names = [tensor.name for tensor in self.task.observations]
         unknown = [key for key in keys or () if key not in names]
@@ -230,7 +159,7 @@ class VectorTaskEnv(_Remade, VectorEnv):
         self._seed, self._first_episode, self._fresh = seed, first_episode, True
         self.render_mode = render_mode
         self.metadata = {
-            "autoreset_mode": _MODES[autoreset],
+            "autoreset_mode": AUTORESET[autoreset],
             "render_modes": [*MODES],
             "render_fps": 1 / (self.model.timestep * self.task.steps_per_action),
         }
@@ -263,26 +192,15 @@ class VectorTaskEnv(_Remade, VectorEnv):
         """The compiled scene."""
         return self._env.model
 
-    def reset(
-        self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[Observation, dict[str, Any]]:
-        """Starts episodes: the first ones of `seed`, or without it the next ones.
+    def _start_all(self) -> None:
+        self._env.reset(self._seed, self._first_episode)
+        self._rendering.clear()
 
-        `options`: "reset_mask" (E) bool starts those alone; "first_episode" goes with a seed.
-        """
-        mask, first = _reset_options(seed, options)
-        if mask is not None:
-            self._env.restart(mask)
-        elif seed is not None or first is not None or self._fresh:
-            self._seed = self._seed if seed is None else _checked(seed)
-            self._first_episode = self._first_episode if first is None else first
-            self._env.reset(self._seed, self._first_episode)
-            self._rendering.clear()
-        else:
-            self._env.restart(np.ones(self.num_envs, bool))
-        self._fresh = False
+    def _start_next(self, which: np.ndarray) -> None:
+        self._env.restart(which)
+
+    def _show(self) -> None:
         self._rendering.show(self._env, self._env.episodes())
-        return self._observe(), self._info()
 
     def step(
         self, actions: Any
@@ -308,8 +226,8 @@ class VectorTaskEnv(_Remade, VectorEnv):
         if self._mode == "same_step" and ended.any():
             last, final = self._observe(), info
             self._env.restart(ended)
-            info = self._info() | _finals(last, final, ended)
-        self._rendering.show(self._env, self._env.episodes())
+            info = self._info() | final_info(last, final, ended)
+        self._show()
         return self._observe(), reward, terminated, truncated, info
 
     def scripted_action(self) -> np.ndarray:
@@ -428,7 +346,7 @@ class SingleEnv(gymnasium.Env):
         return {key: value[0].item() for key, value in info.items() if not key.startswith("_")}
 
 
-class TaskEnv(_Remade, SingleEnv):
+class TaskEnv(Remade, SingleEnv):
     """One environment of a task, for evaluation. The episodes are those of `VectorTaskEnv`.
 
     `reset(seed=s)` starts episode `first_episode` of seed s, `reset()` the next one.

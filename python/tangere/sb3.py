@@ -19,7 +19,8 @@ import numpy as np
 from stable_baselines3.common.vec_env import VecEnv as BaseVecEnv
 
 from . import _core
-from .gym import Observation, VectorTaskEnv, _checked
+from ._vector_env import Observation, checked_seed
+from .gym import VectorTaskEnv
 from .scene_env import VectorSceneEnv
 
 
@@ -60,7 +61,7 @@ class VecEnv(BaseVecEnv):  # type: ignore[misc]
 
         None: the next reset goes on with the next episodes.
         """
-        self._seed = None if seed is None else _checked(seed)
+        self._seed = None if seed is None else checked_seed(seed)
         return [self._seed] * self.num_envs
 
     def set_options(self, options: Any = None) -> None:

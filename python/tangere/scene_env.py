@@ -24,20 +24,20 @@ import gymnasium
 import numpy as np
 from gymnasium import spaces
 from gymnasium.envs.registration import load_env_creator
-from gymnasium.vector import VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from . import _core
 from ._arrays import numbers, singles
 from ._rendering import MODES, RenderMode, Rendering
-from .gym import _MODES, Autoreset, Observation, SingleEnv, _Remade
-from .gym import _check_choices, _checked, _finals, _reset_options, _system_seed
+from ._vector_env import AUTORESET, Autoreset, EpisodesEnv, Observation
+from ._vector_env import check_choices, checked_seed, final_info, system_seed
+from .gym import SingleEnv
 
 Indices = NDArray[np.int64]
 
 
-class VectorSceneEnv(_Remade, VectorEnv):
+class VectorSceneEnv(EpisodesEnv):
     """Many environments of a task of one's own. A subclass defines it by these members.
 
     Class attributes: `scene` (a file or a `tangere.Scene`), `steps_per_action` (simulation steps
@@ -108,10 +108,10 @@ class VectorSceneEnv(_Remade, VectorEnv):
         arguments = {k: v for k, v in locals().items() if k not in ("self", "__class__")}
         before = set(self.__dict__)
         self._arguments = arguments
-        _check_choices(num_envs, autoreset)
+        check_choices(num_envs, autoreset)
         self.num_envs, self.flatten, self.render_mode = num_envs, flatten, render_mode
         self._mode, self._threads, self._fresh = autoreset, threads, True
-        self._seed = _system_seed() if seed is None else _checked(seed)
+        self._seed = system_seed() if seed is None else checked_seed(seed)
         self._first_episode = first_episode
         if self.arrays not in ("numpy", "torch"):
             raise self._fault(f"arrays {self.arrays!r}", '"numpy" or "torch"')
@@ -120,7 +120,7 @@ class VectorSceneEnv(_Remade, VectorEnv):
             if not isinstance(getattr(self, name), (int, np.integer)) or getattr(self, name) < 1:
                 raise self._fault(f"{name} {getattr(self, name)!r}", "a whole number from 1 on")
         self.metadata = {
-            "autoreset_mode": _MODES[autoreset],
+            "autoreset_mode": AUTORESET[autoreset],
             "render_modes": [*MODES],
             "render_fps": 1 / (self.model.timestep * self.steps_per_action),
         }
@@ -171,7 +171,7 @@ class VectorSceneEnv(_Remade, VectorEnv):
         the task in `simulate`."""
         return actions
 
-    def simulate(self, controls: NDArray[np.float64], envs: Indices) -> None:
+    def simulate(self, controls: Any, envs: Indices) -> None:
         """Takes the steps of an action of the environments `envs` with the controls
         (steps_per_action, E, nu), as `batch.run` does. A task that reads something within an action
         takes them itself, with `every` and `fields`, and keeps the rows of `envs`."""
@@ -211,27 +211,8 @@ class VectorSceneEnv(_Remade, VectorEnv):
 
     # Gymnasium's interface
 
-    def reset(
-        self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[Observation, dict[str, Any]]:
-        """Starts episodes: the first ones of `seed`, or without it the next ones.
-
-        `options`: "reset_mask" (E) bool starts those alone; "first_episode" goes with a seed.
-        """
-        mask, first = _reset_options(seed, options)
-        if mask is not None:
-            if mask.shape != (self.num_envs,):
-                raise self._fault(f"reset_mask of shape {mask.shape}", f"({self.num_envs},)")
-            self._start_next(mask)
-        elif seed is not None or first is not None:
-            self._seed = self._seed if seed is None else _checked(seed)
-            self._first_episode = self._first_episode if first is None else first
-            self._start_all()
-        elif not self._fresh:
-            self._start_next(np.ones(self.num_envs, bool))
-        self._fresh = False
+    def _show(self) -> None:
         self._rendering.show(self._batch, self.episodes)
-        return self._observe(), self._info()
 
     def step(
         self, actions: Any
@@ -274,8 +255,8 @@ class VectorSceneEnv(_Remade, VectorEnv):
         if self._mode == "same_step" and self._ended.any():
             last, ends = self._observe(), self._ended.copy()
             self._start_next(ends)
-            info = self._info() | _finals(last, info, ends)
-        self._rendering.show(self._batch, self.episodes)
+            info = self._info() | final_info(last, info, ends)
+        self._show()
         return self._observe(), reward, terminated, truncated, info
 
     def render(self) -> tuple[NDArray[np.uint8], ...] | None:
@@ -346,13 +327,18 @@ class VectorSceneEnv(_Remade, VectorEnv):
 
     def _act(self, actions: NDArray[np.float64], envs: Indices) -> None:
         """Takes the actions (E, na) of some environments; the others stand still."""
-        steps, count, nu = self.steps_per_action, self.num_envs, self.model.nu
         controls = np.asarray(numbers(self.controls(self._given(actions))), np.float64)
-        if controls.shape not in ((steps, count, nu), (count, nu), (nu,)):
-            expected = f"({count}, {nu}) or ({steps}, {count}, {nu})"
-            raise self._fault(f"controls() of shape {controls.shape}", expected)
+        shape = self._shape_of_controls(controls)
         if len(envs):
-            self.simulate(np.broadcast_to(controls, (steps, count, nu)), envs)
+            self.simulate(self._given(np.array(np.broadcast_to(controls, shape))), envs)
+
+    def _shape_of_controls(self, controls: Any) -> tuple[int, int, int]:
+        """(steps_per_action, E, nu). Raises InputError where controls() returned another shape."""
+        steps, count, nu = self.steps_per_action, self.num_envs, self.model.nu
+        if tuple(controls.shape) not in ((steps, count, nu), (count, nu), (nu,)):
+            expected = f"({count}, {nu}) or ({steps}, {count}, {nu})"
+            raise self._fault(f"controls() of shape {tuple(controls.shape)}", expected)
+        return steps, count, nu
 
     def _begin(self, envs: Indices) -> None:
         self._ended[envs], self._starting[envs], self.lengths[envs] = False, True, 0

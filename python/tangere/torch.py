@@ -30,7 +30,7 @@ from . import _core
 from ._env_tape import EnvTape
 from ._simulation import Simulation, State
 from ._tape import Observations, TapeBase, check_rollout
-from ._torch_run import Line, Run
+from ._torch_run import Line, Run, host_numbers, refuse_transforms
 
 
 __all__ = [
@@ -107,6 +107,7 @@ class Tape(TapeBase):
         if not self._run.current:
             raise _core.InputError("step() after backward() through another run; call reset()")
         actions = torch.as_tensor(actions)
+        refuse_transforms(actions)
         rows, reward, self._token = _Step.apply(actions, self._token, self._run, self.dtype)
         return self._split(rows), reward, torch.from_numpy(self.tape.alive())
 
@@ -126,7 +127,7 @@ class _Step(torch.autograd.Function):  # type: ignore[misc]
     @staticmethod
     def forward(ctx: Any, actions: Any, token: Any, run: Any, dtype: Any) -> Any:
         ctx.run, ctx.step, ctx.dtype = run, run.taken, actions.dtype
-        run.step(actions.detach().to("cpu", torch.float64).numpy())
+        run.step(host_numbers(actions))
         ctx.save_for_backward(token)  # PyTorch frees it after a backward() that keeps no graph
         rows = torch.from_numpy(run.observations()).to(dtype)
         return rows, torch.from_numpy(run.rewards()), token.clone()
@@ -140,9 +141,7 @@ class _Step(torch.autograd.Function):  # type: ignore[misc]
             raise _core.InputError(
                 "a second backward() through the same steps; give the first one retain_graph=True"
             ) from None
-        action_bar = ctx.run.reverse(
-            ctx.step, rows_bar.to(torch.float64).numpy(), reward_bar.to(torch.float64).numpy()
-        )
+        action_bar = ctx.run.reverse(ctx.step, host_numbers(rows_bar), host_numbers(reward_bar))
         return torch.from_numpy(action_bar).to(ctx.dtype), token_bar, None, None
 
 

@@ -19,6 +19,7 @@ class RandomScene:
     parameters: list[str]
     read: list[str]
     points: bool  #: derivatives by points of the skin are known: it has no ks
+    springs: bool  #: some contact or the skin has ks
 
 
 def _body(shape: str, random: np.random.Generator) -> str:
@@ -76,4 +77,5 @@ damping="50" {skin} feedback="{"true" if feedback else "false"}">
     parameters = ["body object density", "body arm size[0]", "joint turn damping", "motor turn P"]
     parameters += [] if feedback else ["contact object pad kn", "tactile pad kt", "tactile pad mu"]
     read = ["pad", "pad.sum", "pad.markers", "pad.shear", "pad.pressure", "bodies", "tip"]
-    return RandomScene(text, parameters, read, not skin)
+    read += ["shear_state"] if springs or skin else []
+    return RandomScene(text, parameters, read, not skin, springs or bool(skin))

@@ -3,34 +3,24 @@
 
 from __future__ import annotations
 
+import sys
+from pathlib import Path
+
 import numpy as np
 import pytest
+from ball_rolling import BallRolling
 
 torch = pytest.importorskip("torch", reason="PyTorch is not installed")
 
 import tangere  # noqa: E402
 import tangere.torch as tt  # noqa: E402
 
+sys.path.insert(0, str(Path(__file__).parents[2] / "examples"))
+from stable_grasp import StableGrasp  # noqa: E402
 
-class Rolling(tangere.VectorSceneEnv):
-    """The task ball_rolling_small of the catalogue, but for its goals."""
 
-    scene = tangere.scenes()["rolling_ball_small"]
-    steps_per_action, horizon, arrays = 5, 8, "torch"
-
-    def restart(self, envs):
-        if not hasattr(self, "goal"):
-            self.goal = torch.zeros((self.num_envs, 2), dtype=torch.float64)
-        drawn = torch.from_numpy(self.uniform(envs, [-0.01] * 2, 0.01))
-        self.goal[envs] = self.batch.q[envs][:, 3:5] + drawn
-
-    def observe(self):
-        distance = self.goal - self.batch.q[:, 3:5]
-        return {"pad": self.batch.q[:, :3], "goal": distance, "tactile": self.batch.tactile("pad")}
-
-    def reward(self, actions):
-        distance = self.goal - self.batch.q[:, 3:5]
-        return -distance.square().sum(1) / 1e-4 - 0.01 * actions.square().sum(1)
+class Rolling(BallRolling):
+    arrays = "torch"
 
     def terminated(self):
         return self.batch.q[:, 2] < -0.0158  # the pad is deep in the ball
@@ -187,19 +177,35 @@ def test_a_task_may_keep_tensors():
     assert torch.equal(*gradients) and float(gradients[0].abs().max()) > 0
 
 
-def test_what_a_tape_cannot_begin_with_is_refused():
-    class Gripped(tangere.VectorSceneEnv):
-        scene = tangere.scenes()["grip_rod"]
-        horizon, arrays = 3, "torch"
+def test_what_a_tape_cannot_do_is_refused():
+    class Short(Rolling):
+        def simulate(self, controls, envs):
+            self.batch.run(controls[:4], every=4, envs=envs)
 
-        def restart(self, envs):
-            self.batch.run(np.tile([0.0, 0.8, 0.8], (60, self.num_envs, 1)), every=60)
+    tape = tt.EnvTape(Short, 2, threads=1)
+    tape.reset()
+    with pytest.raises(tangere.InputError, match="simulate.. took 4 steps; expected 5"):
+        tape.step(torch.zeros(3))
 
-        def reward(self, actions):
-            return self.batch.q[:, 0]
+    class Some(Rolling):
+        def simulate(self, controls, envs):
+            self.batch.run(controls, every=5, envs=envs[:1])
 
-    with pytest.raises(tangere.InputError, match="leaves shear in springs"):
-        tt.EnvTape(Gripped, 2, threads=1).reset()
+    tape = tt.EnvTape(Some, 2, threads=1)
+    tape.reset()
+    with pytest.raises(tangere.InputError, match="of 1 of 2 environments; a tape takes steps of"):
+        tape.step(torch.zeros(3))
+
+    class Later(Rolling):
+        def simulate(self, controls, envs):
+            for part in [controls] if self.lengths[0] == 0 else [controls[:2], controls[2:]]:
+                self.batch.run(part, every=len(part), envs=envs)
+
+    tape = tt.EnvTape(Later, 2, threads=1)
+    tape.reset()
+    tape.step(torch.zeros(3))
+    with pytest.raises(tangere.InputError, match="of 2 steps with every=2; expected multiples of"):
+        tape.step(torch.zeros(3))
 
     class Broken(Rolling):
         def reward(self, actions):
@@ -211,3 +217,69 @@ def test_what_a_tape_cannot_begin_with_is_refused():
         tape.step(torch.zeros(3))
     with pytest.raises(tangere.InputError, match="actions 9; expected 1 to the horizon 8"):
         tt.EnvTape(Rolling, 2, 9)
+
+
+def test_grasps_are_trained_through_time():
+    """A task with a warm-up, controls for each step and a reading within its actions."""
+    made = tt.EnvTape(StableGrasp, 3, 2, dtype=torch.float64, precision="double", threads=1)
+    assert made.simulation.every == 60  # of 180: it reads once, after 60 steps
+    w = torch.full((520, 1), 1e-3, dtype=torch.float64, requires_grad=True)
+
+    def mean_return():
+        obs, total = made.reset(1), 0
+        for _ in range(2):
+            obs, reward, _ = made.step(torch.tanh(obs["flow"].reshape(3, -1) @ w + 0.1))
+            total = total + reward
+        return total.mean()
+
+    checks = tt.check_gradient(mean_return, [w], directions=2, steps=(1e-4, 1e-5, 1e-6))
+    assert max(abs(c.analytic) for c in checks) > 1e-3
+    assert max(c.error for c in checks) < 1e-4, checks
+    env = StableGrasp(3, seed=1, threads=1, autoreset="disabled")
+    seen = env.reset(seed=1)[0]["flow"]
+    np.testing.assert_allclose(made.reset(1)["flow"], seen, atol=1e-6)  # after the warm-up
+    _, reward, _ = made.step(torch.full((3, 1), 0.1))
+    np.testing.assert_allclose(reward, env.step([0.1])[1], rtol=1e-3)
+
+    tape, actions = tt.EnvTape(StableGrasp, 16, 1, threads=1), torch.zeros(16, 1)
+    optimiser = torch.optim.Adam([actions.requires_grad_()], 0.1)
+    tilts = []
+    for _ in range(8):
+        tape.reset(1)
+        tape.step(actions)
+        tilts.append(tape.env.tilt.mean())
+        optimiser.zero_grad()
+        tilts[-1].backward()
+        optimiser.step()
+    assert tilts[-1] < 0.85 * tilts[0], tilts
+
+
+def test_a_tape_begins_with_loaded_springs():
+    class Gripped(tangere.VectorSceneEnv):
+        scene = tangere.scenes()["grip_rod"]
+        steps_per_action, horizon, arrays = 4, 3, "torch"
+
+        def restart(self, envs):
+            self.batch.run(np.tile([0.0, 0.8, 0.8], (60, self.num_envs, 1)), every=60)
+
+        def reward(self, actions):
+            return self.batch.q[:, 0] + 1e3 * self.batch.shear_state.square().sum((1, 2))
+
+    tape = tt.EnvTape(Gripped, 2, threads=1, precision="double", dtype=torch.float64)
+    actions = torch.tensor([[0.1, 0.8, 0.7]], dtype=torch.float64).expand(2, 3).clone()
+    actions.requires_grad_()
+
+    def total():
+        tape.reset(1)
+        return sum(tape.step(actions)[1] for _ in range(3)).sum()
+
+    assert max(c.error for c in tt.check_gradient(total, actions, directions=2)) < 1e-5
+    tape.reset(1)
+    start, batch = tape.env._batch, tangere.Batch(tape.env.model, 2, threads=1)
+    assert np.abs(start.shear_state).max() > 1e-5
+    batch.set_state(start.q, start.v)  # begins the scheme of two steps anew, as a tape does
+    batch.set_shear_state(start.shear_state)
+    for _ in range(3):
+        tape.step(actions.detach())
+        batch.run(np.tile(actions.detach()[0].numpy(), (4, 2, 1)), every=4)
+        np.testing.assert_allclose(tape.env.batch.q, batch.q, rtol=1e-5, atol=1e-7)

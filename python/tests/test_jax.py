@@ -6,6 +6,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from functools import partial
 
 import numpy as np
 import pytest
@@ -350,3 +351,55 @@ def test_mistakes_are_told():
         with pytest.raises(tangere.InputError, match="jax_enable_x64"):
             tj.Tape("dummy", 1, dtype=dtype)
     assert tj.rollout("dummy", np.zeros((1, 2, 1), int)).rewards.shape == (1, 2)  # arrays, too
+
+
+def test_simulations_take_what_those_of_pytorch_take():
+    torch = pytest.importorskip("torch", reason="PyTorch is not installed")
+    import tangere.torch as tt
+
+    scene = tangere.Scene(tangere.scenes()["rolling_ball_small"])
+    jax.config.update("jax_enable_x64", True)
+    try:
+        options = dict(num_envs=2, steps=3, every=2, read=["pad"], threads=1)
+        ours = tj.Simulation(scene, **options, dtype=jnp.float64)
+        theirs = tt.Simulation(scene, **options)
+        p = ours.parameters("tactile pad kn", "body ball density")
+        theirs.parameters(*p)
+        assert ours.units == theirs.units
+        q = theirs.reset(seed=1).q.numpy().copy()
+        q[:, 2] -= 0.0155
+        drawn = {"contact pad ball kn": np.array([5.0, 6.0])}
+        u = 0.2 * np.random.default_rng(1).standard_normal((3, 2, 2, 3))  # one for each step
+
+        def total(sim, u, p):
+            s = sim.reset(q=q if sim is ours else torch.from_numpy(q), randomized=drawn)
+            total = 0
+            for t in range(3):
+                s = sim.step(s, u[t], p if t != 1 else None)
+                total = total + (s.bodies**2).sum() + 1e3 * (s["pad"] ** 2).sum()
+            return total
+
+        value, bars = jax.jit(jax.value_and_grad(partial(total, ours), argnums=(0, 1)))(u, p)
+        leaves = [torch.from_numpy(np.array(x)).requires_grad_() for x in (u, *p.values())]
+        expected = total(theirs, leaves[0], dict(zip(p, leaves[1:])))
+        expected.backward()
+        np.testing.assert_allclose(value, expected.item(), rtol=1e-13)
+        in_order = [bars[0], *(bars[1][name] for name in p)]
+        for bar, x in zip(in_order, leaves, strict=True):
+            np.testing.assert_allclose(bar, x.grad, rtol=1e-9)
+
+        def scanned(p):
+            def take(s, u):
+                s = ours.step(s, u, p)
+                return s, (s.bodies**2).sum()
+
+            return jax.lax.scan(take, ours.reset(seed=1), u)[1].sum()
+
+        by_density = jax.jit(jax.grad(scanned))(p)["body ball density"]
+        assert np.isfinite(by_density).all()
+        with pytest.raises(tangere.InputError, match="expected names that parameters"):
+            ours.reset(parameters=drawn)
+        with pytest.raises(tangere.InputError, match="vmap"):
+            jax.vmap(lambda q: ours.reset(q=q).q.sum())(q[None])
+    finally:
+        jax.config.update("jax_enable_x64", False)

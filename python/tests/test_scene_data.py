@@ -12,38 +12,27 @@ import gymnasium
 import h5py
 import numpy as np
 import pytest
+from ball_rolling import NAME as TWIN
+from ball_rolling import BallRolling
 from gymnasium.envs.registration import EnvSpec
 
 import tangere
 from tangere.data import Episodes, Windows, generate
 
-TWIN = "ball_rolling_small"
+class Twin(BallRolling):
+    """`goals` are those that the task of the catalogue draws."""
 
-
-class Twin(tangere.VectorSceneEnv):
-    """The task ball_rolling_small of the catalogue; `goals` are those that it draws."""
-
-    scene = tangere.scenes()["rolling_ball_small"]
-    steps_per_action, horizon = 5, tangere.task_spec(TWIN).horizon
+    horizon = tangere.task_spec(TWIN).horizon
     units = {"pad": "m", "goal": "m", "tactile": "N", "action": "1"}
     touch = ("tactile",)
     goals = np.zeros((0, 2))
 
     def restart(self, envs):
-        if not hasattr(self, "goal"):
-            self.goal = np.zeros((self.num_envs, 2))
+        super().restart(envs)
         self.goal[envs] = self.goals[self.episodes[envs]]
 
-    def observe(self):
-        return {"pad": self.batch.q[:, :3], "goal": self.goal - self.batch.q[:, 3:5],
-                "tactile": self.batch.tactile("pad")}  # fmt: skip
-
-    def reward(self, actions):
-        distance = self.goal - self.batch.q[:, 3:5]
-        return -(distance**2).sum(1) / 1e-4 - 0.01 * (actions**2).sum(1)
-
     def success(self):
-        left = np.linalg.norm(self.goal - self.batch.q[:, 3:5], axis=1)
+        left = np.linalg.norm(self.distance(), axis=1)
         return (self.lengths == self.horizon) & (left < 2e-3)
 
 

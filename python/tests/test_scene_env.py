@@ -3,51 +3,33 @@
 
 from __future__ import annotations
 
+import importlib
 import pickle
-import sys
 import warnings
 from pathlib import Path
 
 import gymnasium
 import numpy as np
 import pytest
+from ball_rolling import BallRolling, uniform_actions
 from gymnasium.utils.env_checker import check_env
 
 import tangere
 
-sys.path.insert(0, str(Path(__file__).parents[2] / "examples"))
-import stable_grasp  # noqa: E402
+
+@pytest.fixture
+def stable_grasp(monkeypatch):
+    """The example, which needs PyTorch."""
+    pytest.importorskip("torch", reason="PyTorch is not installed")
+    monkeypatch.syspath_prepend(Path(__file__).parents[2] / "examples")
+    return importlib.import_module("stable_grasp")
 
 
-class Rolling(tangere.VectorSceneEnv):
-    """The task ball_rolling_small of the catalogue, but for its goals."""
-
-    scene = tangere.scenes()["rolling_ball_small"]
-    steps_per_action, horizon = 5, 8
-
-    def restart(self, envs):
-        if not hasattr(self, "goal"):
-            self.goal = np.zeros((self.num_envs, 2))
-        self.goal[envs] = self.batch.q[envs][:, 3:5] + self.uniform(envs, [-0.01] * 2, 0.01)
-
-    def observe(self):
-        return {"pad": self.batch.q[:, :3], "goal": self.goal - self.batch.q[:, 3:5],
-                "tactile": self.batch.tactile("pad")}  # fmt: skip
-
-    def reward(self, actions):
-        distance = self.goal - self.batch.q[:, 3:5]
-        return -(distance**2).sum(1) / 1e-4 - 0.01 * (actions**2).sum(1)
-
-
-class Leaves(Rolling):
+class Leaves(BallRolling):
     """Ends early where the ball is near its goal in x."""
 
     def terminated(self):
         return (abs(self.goal[:, 0] - self.batch.q[:, 3]) < 4e-3) & (self.lengths >= 3)
-
-
-def actions(count, envs):
-    return np.random.default_rng(1).uniform([-1, -1, -1], [1, 1, 0], (count, envs, 3))
 
 
 def test_episodes_count_from_zero():
@@ -57,17 +39,17 @@ def test_episodes_count_from_zero():
         '<body name="a" type="sphere" radius="1"/></link></robot></tangere>'
     )
     with pytest.raises(tangere.InputError, match="first_episode -1; expected 0 or more"):
-        Rolling(2, scene=scene, first_episode=-1)
+        BallRolling(2, scene=scene, first_episode=-1)
 
 
 def test_the_twin_of_a_task_has_its_numbers():
-    twin = Rolling(4, threads=1, seed=3)
+    twin = BallRolling(4, threads=1, seed=3)
     task = tangere.make_vec("ball_rolling_small", 4, threads=1, seed=3, normalise=False)
     twin.reset()
     seen = task.reset()[0]
     twin.goal[:] = task.state()[2]
     felt = 0
-    for action in actions(7, 4):
+    for action in uniform_actions(7, 4):
         action[:, 2] = -0.3
         ours, theirs = twin.step(action), task.step(action)
         np.testing.assert_allclose(ours[1], theirs[1], rtol=1e-12)
@@ -78,7 +60,7 @@ def test_the_twin_of_a_task_has_its_numbers():
 
 
 @pytest.mark.parametrize("mode", ["next_step", "same_step"])
-def test_the_twin_of_stable_grasp_has_its_numbers(mode):
+def test_the_twin_of_stable_grasp_has_its_numbers(mode, stable_grasp):
     """But for the densities, which each draws in its own way. Sums in another order differ by
     rounding: observations are float32, rewards up to 100."""
     task = tangere.make_vec("stable_grasp", 5, threads=1, seed=3, autoreset=mode)
@@ -108,7 +90,7 @@ def test_the_twin_of_stable_grasp_has_its_numbers(mode):
     assert solved > 3 and begun > 0
 
 
-def test_drawn_bars_balance_at_a_drawn_place():
+def test_drawn_bars_balance_at_a_drawn_place(stable_grasp):
     env = stable_grasp.StableGrasp(40, threads=1, seed=5)
     blocks = np.stack([env.randomized()[name] for name in stable_grasp.DENSITIES], 1)
     place = (blocks * (np.arange(11) + 0.5)).sum(1) / blocks.sum(1)  # from the right end [blocks]
@@ -120,15 +102,15 @@ def test_drawn_bars_balance_at_a_drawn_place():
 
 
 def test_gymnasiums_checker_passes():
-    tangere.register_scene_env("TestRolling-v0", Rolling, seed=5)
+    tangere.register_scene_env("TestRolling-v0", BallRolling, seed=5)
     env = gymnasium.make("TestRolling-v0")
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", message=".*Box observation space m.*imum value is")
         check_env(env.unwrapped, skip_render_check=True)
     assert env.spec.max_episode_steps == 8
     many = gymnasium.make_vec("TestRolling-v0", 3)
-    assert isinstance(many, Rolling) and many.num_envs == 3
-    with pytest.raises(tangere.InputError, match="max_episode_steps 9; the horizon of Rolling is"):
+    assert isinstance(many, BallRolling) and many.num_envs == 3
+    with pytest.raises(tangere.InputError, match="max_episode_steps 9; the horizon of BallR"):
         gymnasium.make_vec("TestRolling-v0", 3, max_episode_steps=9)
 
 
@@ -196,7 +178,7 @@ def test_an_environment_without_autoreset_stands_still_after_its_end():
 
 
 def test_a_reset_starts_the_first_or_the_next_episodes():
-    env = Rolling(3, threads=1, seed=4)
+    env = BallRolling(3, threads=1, seed=4)
     first = env.reset()[0]["goal"]
     again, info = env.reset()
     assert list(info["episode_id"]) == [3, 4, 5] and not np.array_equal(first, again["goal"])
@@ -207,7 +189,7 @@ def test_a_reset_starts_the_first_or_the_next_episodes():
 
 
 def test_a_copy_is_made_anew():
-    env = Rolling(2, threads=1, seed=7)
+    env = BallRolling(2, threads=1, seed=7)
     copied = pickle.loads(pickle.dumps(env))
     np.testing.assert_array_equal(copied.reset()[0]["tactile"], env.reset()[0]["tactile"])
     step, other = (e.step([0.1, 0, -0.3]) for e in (env, copied))
@@ -215,12 +197,12 @@ def test_a_copy_is_made_anew():
 
 
 def test_pictures_and_flat_observations():
-    env = Rolling(2, threads=1, seed=1, flatten=True, render_mode="rgb_array")
+    env = BallRolling(2, threads=1, seed=1, flatten=True, render_mode="rgb_array")
     obs, _ = env.reset()
     assert obs.shape == env.observation_space.shape == (2, 5 + 32 * 32 * 3)
     pictures = env.render()
     assert len(pictures) == 2 and pictures[0].shape == (384, 512, 3) and pictures[0].std() > 0
-    single = tangere.SceneEnv(Rolling, seed=1, flatten=True, render_mode="rgb_array")
+    single = tangere.SceneEnv(BallRolling, seed=1, flatten=True, render_mode="rgb_array")
     np.testing.assert_array_equal(single.reset()[0], obs[0])
     np.testing.assert_array_equal(single.render(), pictures[0])
 
@@ -237,7 +219,7 @@ def test_defaults_are_the_state_and_the_sums_of_sensors():
     assert not env.step([0, 0, 0])[2].any()
 
 
-class FailsAt(Rolling):
+class FailsAt(BallRolling):
     def controls(self, actions):
         return np.where(self.lengths[:, None] >= 2, np.nan, actions)
 
@@ -252,7 +234,7 @@ def test_a_failed_simulation_is_truncated_and_goes_on_with_the_next_episode():
 
 
 def with_(**members):
-    return type("Mine", (Rolling,), members)
+    return type("Mine", (BallRolling,), members)
 
 
 @pytest.mark.parametrize(
@@ -287,7 +269,7 @@ def test_faults_name_the_class_the_value_and_what_was_expected(members, message)
 
 
 def test_other_faults():
-    env = Rolling(2, threads=1)
+    env = BallRolling(2, threads=1)
     with pytest.raises(tangere.InputError, match=r"actions of shape \(4,\); expected \(2, 3\) or"):
         env.step(np.zeros(4))
     with pytest.raises(tangere.InputError, match=r"reset_mask of shape \(3,\); expected \(2,\)"):
@@ -295,4 +277,4 @@ def test_other_faults():
     with pytest.raises(tangere.InputError, match="options .'x'.; known: reset_mask"):
         env.reset(options={"x": 1})
     with pytest.raises(tangere.InputError, match="num_envs 0"):
-        Rolling(0)
+        BallRolling(0)

@@ -45,7 +45,7 @@ def loss_of(s):
 
 
 def rolled(sim, u, q, v, numbers):
-    s = sim.reset(q=q, v=v, parameters=numbers)
+    s = sim.reset(q=q, v=v, parameters=dict(zip(sim.tape.parameters, numbers.T, strict=True)))
     total = loss_of(s)
     for t in range(u.shape[0]):
         s = sim.step(s, u[t])
@@ -56,7 +56,8 @@ def rolled(sim, u, q, v, numbers):
 @pytest.mark.parametrize("name", ["chain", "ball", "rod"])
 def test_gradients_agree_with_differences(name):
     of, numbers = scene(name)
-    sim = tt.Simulation(of, num_envs=2, steps=6, every=2, parameters=numbers, threads=1)
+    sim = tt.Simulation(of, num_envs=2, steps=6, every=2, threads=1)
+    named = sim.parameters(*numbers)
     first = sim.reset(seed=3)
     q0, v0 = first.q.clone(), first.v.clone()
     if name == "ball":
@@ -72,7 +73,7 @@ def test_gradients_agree_with_differences(name):
         "u": 0.2 * draw(6, 2, sim.model.nu),
         "q": q0,
         "v": v0 + 0.01 * draw(*v0.shape),
-        "numbers": sim.parameters(),
+        "numbers": torch.stack(list(named.values()), 1),
     }
     at = {key: x.requires_grad_() for key, x in given.items()}
     rolled(sim, **at).backward()
@@ -148,23 +149,34 @@ def test_bits_do_not_depend_on_the_batch_or_on_gradients():
 
 def test_environments_have_numbers_of_their_own():
     of, numbers = scene("chain")
-    sim = tt.Simulation(of, num_envs=2, steps=4, parameters=numbers)
-    given = torch.tensor([[900.0, 0.02], [1800.0, 0.2]], dtype=torch.float64)
+    sim = tt.Simulation(of, num_envs=2, steps=4)
+    own = sim.parameters(*numbers)
+    given = {"body hand density": torch.tensor([900.0, 1800.0]), "joint arm damping": 0.2}
     s = sim.reset(parameters=given)
-    np.testing.assert_array_equal(sim.parameters(), given.numpy())
+    now = sim.parameters()
+    assert list(now) == numbers
+    assert now[numbers[0]].tolist() == [900, 1800] and now[numbers[1]].tolist() == [0.2, 0.2]
+    assert sim.units == {numbers[0]: "kg/m^3", numbers[1]: "N m s/rad"}
     for _ in range(4):
         s = sim.step(s, torch.zeros(1))
     assert not torch.equal(s.q[0], s.q[1])
-    s = sim.reset()  # the scene's own
-    np.testing.assert_array_equal(sim.parameters(), [[900.0, 0.02]] * 2)
+    sim.reset()  # the scene's own
+    assert {name: x.tolist() for name, x in own.items()} == {
+        numbers[0]: [900.0] * 2,
+        numbers[1]: [0.02] * 2,
+    }
+    for name, x in sim.parameters().items():
+        assert torch.equal(x, own[name])
 
 
 def test_what_cannot_be_done_is_refused():
     of, _ = scene("chain")
     with pytest.raises(tangere.InputError, match="that may vary is named 'weight'"):
-        tt.Simulation(of, parameters=["weight"])
+        tt.Simulation(of).parameters("weight")
     with pytest.raises(tangere.InputError, match=" armature' has no derivative"):
-        tt.Simulation(of, parameters=["joint arm armature"])
+        tt.Simulation(of).parameters("joint arm armature")
+    with pytest.raises(tangere.InputError, match="expected names that parameters"):
+        tt.Simulation(of).reset(parameters={"joint arm damping": 1})
     with pytest.raises(tangere.InputError, match="no reading 'pad'; expected one of variables"):
         tt.Simulation(of, read=["pad"])
     with pytest.raises(tangere.InputError, match="read 'pad'; expected a list of names"):
@@ -183,6 +195,8 @@ def test_what_cannot_be_done_is_refused():
         sim.step(second, u)
     with pytest.raises(tangere.InputError, match="controls of shape"):
         sim.step(second, torch.zeros(2, 3))
+    with pytest.raises(tangere.InputError, match=r"expected \(2, 1\) or \(1, 2, 1\)"):
+        sim.step(second, torch.zeros(3, 2, 1))
     with pytest.raises(tangere.InputError, match="q of shape"):
         sim.reset(q=torch.zeros(2, 3))
     s = sim.reset()
@@ -276,12 +290,12 @@ def test_points_move():
 
 def test_a_users_loss_is_checked_in_one_call():
     of, names = scene("chain")
-    sim = tt.Simulation(of, num_envs=2, steps=4, every=2, parameters=names)
+    sim = tt.Simulation(of, num_envs=2, steps=4, every=2)
     u = torch.full((4, 1), 0.3, dtype=torch.float64, requires_grad=True)
-    parameters = sim.parameters().requires_grad_()
+    parameters = torch.stack(list(sim.parameters(*names).values()), 1).requires_grad_()
 
     def loss(u=u, parameters=parameters):
-        s, total = sim.reset(parameters=parameters), 0
+        s, total = sim.reset(parameters=dict(zip(names, parameters.unbind(-1), strict=True))), 0
         for t in range(4):
             s = sim.step(s, u[t])
             total = total + s["variables"].square().sum()
@@ -312,10 +326,8 @@ def test_nothing_is_recorded_without_gradients():
 
 
 def test_what_a_scene_could_not_have_is_refused():
-    sim = tt.Simulation(
-        scene("ball")[0], num_envs=2, steps=2, read=["pad"], points=True,
-        parameters=["contact pad ball kn"],
-    )  # fmt: skip
+    sim = tt.Simulation(scene("ball")[0], num_envs=2, steps=2, read=["pad"], points=True)
+    sim.parameters("contact pad ball kn")
     q = sim.reset().q.clone()
     with pytest.raises(tangere.InputError, match="not finite"):
         sim.reset(q=q * float("nan"))
@@ -328,9 +340,11 @@ def test_what_a_scene_could_not_have_is_refused():
     torch.testing.assert_close(sim.reset(q=long).q, q)
     for bad in (-5.0, float("nan")):
         with pytest.raises(tangere.InputError, match="contact pad ball kn"):
-            sim.reset(parameters=torch.tensor([bad]))
-    with pytest.raises(tangere.InputError, match="listed twice"):
-        tt.Simulation(scene("ball")[0], parameters=["body ball density"] * 2)
+            sim.reset(parameters={"contact pad ball kn": bad})
+        with pytest.raises(tangere.InputError, match="contact pad ball kn"):
+            sim.step(sim.reset(), torch.zeros(3), {"contact pad ball kn": bad})
+    with pytest.raises(tangere.InputError, match=r"of shape \(3,\); expected \(2,\) or \(\)"):
+        sim.reset(parameters={"contact pad ball kn": torch.ones(3)})
     moved = torch.zeros(1024, 7)
     moved[3, 0] = float("nan")
     with pytest.raises(tangere.InputError, match="not finite"):
@@ -373,3 +387,234 @@ def test_a_sensor_with_lag_may_be_there_but_not_be_read():
     s = sim.step(sim.reset(), u)
     s.v.sum().backward()
     assert torch.isfinite(u.grad).all()
+
+
+def pressed(sim, **given):
+    """A run in which the pad presses on the ball, from its first state on."""
+    q = sim.reset(seed=1).q.detach().clone()
+    q[:, 2] -= 0.0155
+    return sim.reset(seed=1, q=q, **given)
+
+
+def ball(**options):
+    return tt.Simulation(scene("ball")[0], num_envs=2, threads=1, **options)
+
+
+def test_steps_take_parameters_by_name():
+    sim = ball(steps=4, every=2, read=["pad", "pad.sum"])
+    p = sim.parameters("tactile pad kn", "body ball radius")
+    assert {name: x.shape for name, x in p.items()} == dict.fromkeys(p, (2,))
+    assert sim.units == {"tactile pad kn": "N/m", "body ball radius": "m"}
+    u = torch.tensor([0.0, 0.2, -0.5], dtype=torch.float64)
+    for x in p.values():
+        x.requires_grad_()
+
+    def total(at_start, at_steps):
+        s, total = pressed(sim, parameters=at_start), 0
+        for t in range(4):
+            s = sim.step(s, u, at_steps(t))
+            total = total + 1e3 * s["pad"].square().sum() + s.q.square().sum()
+        return total
+
+    def gradient(at_start, at_steps):
+        value = total(at_start, at_steps)
+        bars = torch.autograd.grad(value, [*p.values()])
+        return torch.stack([value.detach(), *(x.abs().sum() for x in bars)])
+
+    once = gradient(p, lambda t: None)
+    torch.testing.assert_close(gradient(p, lambda t: p), once, rtol=1e-12, atol=0)
+    kept = {name: x.detach() for name, x in p.items()}
+    # The start reads nothing that the loss uses, so that the first step has all of it.
+    torch.testing.assert_close(gradient(kept, lambda t: p if t == 0 else None), once)
+    # A step may bring some of them; the others are those of before.
+    some = gradient(p, lambda t: {"tactile pad kn": p["tactile pad kn"]} if t == 2 else None)
+    torch.testing.assert_close(some, once, rtol=1e-12, atol=0)
+    shared = torch.tensor(p["body ball radius"][0].item(), requires_grad=True, dtype=torch.float64)
+    value = total(None, lambda t: {"body ball radius": shared})
+    (by_shared,) = torch.autograd.grad(value, shared)
+    expected = torch.autograd.grad(total(None, lambda t: p), p["body ball radius"])[0].sum()
+    torch.testing.assert_close(by_shared, expected, rtol=1e-12, atol=0)
+
+
+def test_numbers_may_change_from_step_to_step_on_any_tape():
+    def gradients(tape_bytes):
+        sim = ball(steps=6, every=5, read=["pad.sum"], tape_bytes=tape_bytes)
+        name = "contact pad ball kn"
+        kn = sim.parameters(name)[name]
+        each = (kn * torch.linspace(1, 2, 6, dtype=torch.float64)[:, None]).requires_grad_()
+        u = torch.full((6, 3), -0.2, dtype=torch.float64, requires_grad=True)
+        s, total = pressed(sim), 0
+        for t in range(6):
+            s = sim.step(s, u[t], {name: each[t]} if t != 3 else None)
+            total = total + s["pad.sum"][:, :3].square().sum() + 1e3 * s.q.square().sum()
+        return torch.autograd.grad(total, [each, u])
+
+    whole, again = gradients(1e9), gradients(6e5)
+    assert all(torch.equal(a, b) for a, b in zip(whole, again))
+    assert not whole[0][3].any() and bool((whole[0][[0, 1, 2, 4, 5]] != 0).all())
+
+
+def test_parameters_may_be_named_in_the_midst_of_a_run():
+    sim, u = ball(steps=3, every=5, read=["pad"]), torch.tensor([0.0, 0.1, -1.0])
+    s = sim.step(pressed(sim), u)
+    p = sim.parameters("tactile pad kt")
+    p["tactile pad kt"].requires_grad_()
+    last = sim.step(s, u, p)
+    last["pad"].square().sum().backward()
+    assert float(p["tactile pad kt"].grad.abs().min()) > 0
+    batch = tangere.Batch(sim.model, 2)
+    batch.set_state(s.q.detach().numpy(), s.v.detach().numpy())
+    np.testing.assert_array_equal(s.bodies.detach(), np.concatenate(batch.bodies(), 2))
+
+
+def test_bodies_need_not_be_named():
+    of = scene("chain")[0]
+    named, other = (
+        tt.Simulation(of, num_envs=18, steps=3, read=read) for read in (["bodies"], [])
+    )
+    weights = torch.linspace(-1, 1, 26, dtype=torch.float64).reshape(2, 13)
+    results = []
+    for sim in (named, other):
+        u = torch.full((3, 1), 0.4, dtype=torch.float64, requires_grad=True)
+        q = sim.reset().q.clone().requires_grad_()
+        states = [sim.reset(q=q)]
+        for t in range(3):
+            states.append(sim.step(states[-1], u[t]))
+        bodies = torch.stack([s.bodies for s in states])  # also of states that are over
+        total = (weights * bodies).square().sum()
+        results.append([bodies.detach(), *torch.autograd.grad(total, [u, q])])
+    assert "bodies" not in states[0].readings
+    for ours, theirs in zip(*results):
+        torch.testing.assert_close(ours, theirs, rtol=1e-12, atol=1e-14)
+
+
+def test_a_run_goes_on_from_the_springs_of_another():
+    rod = scene("rod")[0]
+    first, second = (
+        tt.Simulation(rod, num_envs=2, steps=3, every=every, read=["shear_state", "left_finger"])
+        for every in (25, 2)
+    )
+    u = torch.tensor([[0.0, 0.8, 0.8], [0.01, 0.8, 0.79]], dtype=torch.float64, requires_grad=True)
+
+    def total(carried=True):
+        s = first.reset(seed=1)
+        for _ in range(3):
+            s = first.step(s, u[0])
+        state = {"q": s.q, "v": s.v, "shear_state": s.shear_state if carried else None}
+        s = second.reset(**state)
+        assert torch.equal(s.shear_state, state["shear_state"]) if carried else True
+        s = second.step(s, u[1])
+        return 1e3 * s["left_finger"].square().sum() + 1e6 * s.shear_state.square().sum()
+
+    assert float(total().detach()) != float(total(carried=False).detach())
+    checks = tt.check_gradient(total, u)
+    assert max(c.error for c in checks) < 1e-4, checks  # points come to slip nearby
+    s = tt.Simulation(rod, steps=1).reset()
+    with pytest.raises(tangere.InputError, match="shear_state .* expected it in read="):
+        s.shear_state
+    with pytest.raises(tangere.InputError, match="expected one of .*"):
+        ball(read=["shear_state"])
+    with pytest.raises(tangere.InputError, match=r"shear_state of shape .*; expected \(2, "):
+        second.reset(shear_state=torch.zeros(2, 3))
+
+
+def test_each_step_may_have_controls_of_its_own():
+    u = 0.3 * torch.randn(2, 5, 2, 3, generator=torch.Generator().manual_seed(1)).double()
+    u.requires_grad_()
+    results = []
+    for every in (5, 1):
+        sim = ball(steps=10 // every, every=every, read=["pad.sum"])
+        s = pressed(sim)
+        for t in range(2):
+            for part in [u[t]] if every == 5 else u[t]:
+                s = sim.step(s, part)
+        total = s.q.square().sum() + s["pad.sum"].square().sum()
+        results.append([s.q.detach(), *torch.autograd.grad(total, u)])
+    torch.testing.assert_close(*results, rtol=1e-12, atol=0)
+
+
+def test_what_transforms_cannot_do_is_named():
+    sim = ball(steps=1)
+    u = torch.zeros(2, 3, dtype=torch.float64)
+
+    def loss(u):
+        return sim.step(sim.reset(), u).bodies.sum()
+
+    expected = "expected backward.. or torch.autograd.grad.. .* num_envs for a batch"
+    with torch.autograd.forward_ad.dual_level():
+        dual = torch.autograd.forward_ad.make_dual(u, torch.ones_like(u))
+        with pytest.raises(tangere.InputError, match=expected):
+            loss(dual)
+        with pytest.raises(tangere.InputError, match=expected):
+            sim.reset(q=dual)
+        with pytest.raises(tangere.InputError, match=expected):
+            tt.rollout("dummy", torch.autograd.forward_ad.make_dual(u[:, :1, None], u[:, :1, None]))
+    with pytest.raises(tangere.InputError, match=expected):
+        torch.autograd.functional.jacobian(
+            lambda u: sim.step(sim.reset(), u).q[:, 0], u, vectorize=True
+        )
+    func = pytest.importorskip("torch.func" if hasattr(torch, "func") else "functorch")
+    for transformed in (func.vmap(loss), func.grad(loss), lambda u: func.jvp(loss, (u,), (u,))):
+        with pytest.raises(tangere.InputError, match=expected):
+            transformed(u[None].expand(2, 2, 3).clone())
+
+
+def test_a_reset_that_fails_ends_the_run():
+    sim, u = ball(steps=3), torch.zeros(3, dtype=torch.float64, requires_grad=True)
+    s = sim.step(sim.reset(), u)
+    flat = s.q.detach().clone()
+    flat[:, -4:] = 0
+    with pytest.raises(tangere.InputError, match="unit quaternion"):
+        sim.reset(q=flat)
+    with pytest.raises(tangere.InputError, match="a reset.. that failed"):
+        sim.step(s, u)
+    s.v.sum().backward()  # it is played again
+    assert float(u.grad.abs().max()) > 0
+
+
+def test_gradcheck_of_what_steps_and_resets_take():
+    chain = tt.Simulation(scene("chain")[0], num_envs=2, steps=3, every=2)
+    name = "joint arm damping"
+    damping = chain.parameters(name)[name]
+
+    def swung(u, damping):
+        s = chain.reset()
+        for t in range(3):
+            s = chain.step(s, u[t], {name: damping[t]})
+        return s["variables"], s.bodies
+
+    each = damping.expand(3, 2).clone().requires_grad_()
+    u = torch.full((3, 2, 2, 1), 0.3, dtype=torch.float64, requires_grad=True)  # of each step
+    assert torch.autograd.gradcheck(swung, (u, each), eps=1e-6, atol=1e-7, rtol=1e-4)
+
+    rod = tt.Simulation(scene("rod")[0], 1, 40, every=2, read=["shear_state", "left_finger.sum"])
+    grip = torch.tensor([0.0, 0.8, 0.8], dtype=torch.float64)
+    with torch.no_grad():
+        s = rod.reset()
+        for _ in range(40):
+            s = rod.step(s, grip)
+    springs = s.shear_state
+    assert float(springs.abs().max()) > 1e-5
+
+    def held(scale):
+        first = rod.reset(q=s.q, v=s.v, shear_state=scale * springs)
+        return rod.step(first, grip)["left_finger.sum"][:, :3].square().sum()
+
+    scale = torch.ones((), dtype=torch.float64, requires_grad=True)
+    assert torch.autograd.gradcheck(held, scale, eps=1e-6, atol=1e-9, rtol=1e-4)
+    assert float(torch.autograd.grad(held(scale), scale)[0]) != 0
+
+
+def test_numbers_without_derivatives():
+    sim = ball(steps=1, points=True, read=["pad"])
+    drawn = {"contact pad ball kn": np.array([2.0, 3.0])}
+    sim.reset(randomized=drawn)
+    column = sim.model.scene.varying.index("contact pad ball kn")
+    assert sim.tape.varying()[:, column].tolist() == [2, 3]
+    with pytest.raises(tangere.InputError, match="is of the starting state; expected a parameter"):
+        sim.reset(randomized={sim.model.scene.varying[0]: 1.0})
+    with pytest.raises(tangere.InputError, match="that varies is named 'mass'"):
+        sim.reset(randomized={"mass": 1.0})
+    s = sim.reset()
+    with pytest.raises(tangere.InputError, match="in a step of a simulation with points=True"):
+        sim.step(s, torch.zeros(3), sim.parameters("tactile pad kn"))

@@ -12,6 +12,7 @@
 #include "engine/derivative/tactile_point_numbers.hpp"
 #include "engine/rows/episode_channels.hpp"
 #include "engine/step/displacement.hpp"
+#include "engine/step/shear_state_arrays.hpp"
 
 namespace tangere {
 
@@ -24,7 +25,10 @@ struct NamedReading {
   std::optional<FieldOutput> field = {};
   int first_body = 0, bodies = 0;
   int first_end_effector = 0, end_effectors = 0;
+  bool shear_state = false;
 };
+
+constexpr const char* kShearState = "shear_state";
 
 std::vector<std::string> known_names(const Model& model) {
   std::vector<std::string> names = output_names(model.scene());
@@ -34,6 +38,7 @@ std::vector<std::string> known_names(const Model& model) {
            (field && !reason_against(model.scene(), *field).empty());
   });
   for (const EndEffectorInfo& e : model.end_effectors()) names.push_back(e.name);
+  if (shear_state_arrays(model).count() > 0) names.emplace_back(kShearState);
   return names;
 }
 
@@ -48,6 +53,7 @@ NamedReading reading_named(const Model& model, const std::string& name) {
   for (std::size_t k = 0; k < end_effectors.size(); ++k)
     if (end_effectors[k].name == name)
       return {.first_end_effector = static_cast<int>(k), .end_effectors = 1};
+  if (name == kShearState && shear_state_arrays(model).count() > 0) return {.shear_state = true};
   throw InputError(fmt::format("the scene has no reading '{}'; expected one of {}", name,
                                fmt::join(known_names(model), ", ")));
 }
@@ -84,6 +90,8 @@ TensorSpec spec_of(const Model& model, const std::string& name, const NamedReadi
     if (name == "bodies") spec.shape = {as_size(reading.bodies), kMotion};
     return spec;
   }
+  if (reading.shear_state)
+    return {name, {shear_state_arrays(model).count(), 3}, "m", "displacement of springs"};
   spec = {name, {3}, "m", "place of an end effector"};
   if (name == "variables") spec.shape = {as_size(reading.end_effectors), 3};
   return spec;
@@ -97,7 +105,7 @@ TaskSpec declared(const Scene& scene, int steps, int horizon,
   spec.summary = "A scene without a reward.";
   spec.scene = scene.path.empty() ? scene.name : scene.path;
   spec.success = "never";
-  spec.action = {"controls", {std::size_t(model.nu())}, "1", "controls of the motors"};
+  spec.action = {"controls", {as_size(steps), as_size(model.nu())}, "1", "controls of the motors"};
   spec.observations = {{"state.q", {std::size_t(model.nq())}, "m, rad, 1", "coordinates"},
                        {"state.v", {std::size_t(model.nv())}, "m/s, rad/s", "velocities"}};
   for (const std::string& name : readings ? *readings : default_readings(model)) {
@@ -106,12 +114,14 @@ TaskSpec declared(const Scene& scene, int steps, int horizon,
     spec.reads_bodies |= reading.bodies > 0;
     spec.reads_end_effectors |= reading.end_effectors > 0;
     spec.reads_tactile |= reading.field.has_value();
+    spec.reads_shear_state |= reading.shear_state;
     if (!reading.field) continue;
     if (const FieldOutput source = read_for(*reading.field);
         std::ranges::find(spec.fields, source) == spec.fields.end())
       spec.fields.push_back(source);
   }
   spec.steps_per_action = steps;
+  spec.control_every = 1;
   spec.snapshots = {steps};
   spec.horizon = horizon;
   return spec;
@@ -137,6 +147,8 @@ SceneTask::SceneTask(const Scene& scene, int steps, int horizon,
     } else if (reading.bodies > 0) {
       for (int b = 0; b < reading.bodies; ++b)
         readings_.emplace_back(Motion{as_size(reading.first_body + b)});
+    } else if (reading.shear_state) {
+      readings_.emplace_back(Shear{});
     } else {
       readings_.emplace_back(
           Positions{3 * as_size(reading.first_end_effector), 3 * as_size(reading.end_effectors)});
@@ -150,13 +162,14 @@ void SceneTask::start(const TaskStart& start) const {
   std::copy_n(varying_.begin() + std::ptrdiff_t(first), k, start.varying.begin());
 }
 
-void SceneTask::controls(const TaskView& view, int, std::span<double> u) const {
-  std::ranges::copy(view.action, u.begin());
+void SceneTask::controls(const TaskView& view, int step, std::span<double> u) const {
+  std::ranges::copy(view.action.subspan(as_size(step) * u.size(), u.size()), u.begin());
 }
 
-void SceneTask::controls_vjp(const TaskView&, int, std::span<const double> weight,
+void SceneTask::controls_vjp(const TaskView&, int step, std::span<const double> weight,
                              const ViewCotangent& out) const {
-  for (std::size_t k = 0; k < weight.size(); ++k) out.action[k] += weight[k];
+  const auto to = out.action.subspan(as_size(step) * weight.size(), weight.size());
+  for (std::size_t k = 0; k < weight.size(); ++k) to[k] += weight[k];
 }
 
 void SceneTask::observe(const TaskView& view, std::span<double> observation) const {
@@ -181,6 +194,8 @@ void SceneTask::observe(const TaskView& view, std::span<double> observation) con
     } else if (const auto* motion = std::get_if<Motion>(&reading)) {
       put(now.bodies.subspan(kPose * motion->body, kPose));
       put(now.bodies.subspan(twists + kTwist * motion->body, kTwist));
+    } else if (std::holds_alternative<Shear>(reading)) {
+      put(now.shear_state);
     } else {
       const auto& of = std::get<Positions>(reading);
       put(now.end_effectors.subspan(of.first, of.count));
@@ -215,6 +230,8 @@ void SceneTask::observe_vjp(const TaskView& view, std::span<const double> weight
     } else if (const auto* motion = std::get_if<Motion>(&reading)) {
       add(bar.bodies.subspan(kPose * motion->body, kPose));
       add(bar.bodies.subspan(twists + kTwist * motion->body, kTwist));
+    } else if (std::holds_alternative<Shear>(reading)) {
+      add(bar.shear_state);
     } else {
       const auto& of = std::get<Positions>(reading);
       add(bar.end_effectors.subspan(of.first, of.count));

@@ -16,11 +16,13 @@ namespace tangere {
 
 class SceneTask : public Task {
  public:
-  /// `steps`: of the simulation for each action. `horizon`: actions of an episode. Observations are
+  /// `steps`: of the simulation for each action, (steps, nu) controls. `horizon`: actions of an
+  /// episode. Observations are
   /// "state.q" (nq), "state.v" (nv) and `readings` by name, in their order:
   /// - "pad", "pad.pressure", "pad.sum" … of sensors (engine/scene/field_form.hpp);
   /// - "variables" (n, 3), the end effectors, or one by its name (3);
-  /// - "bodies" (nb, 13), or "bodies.box" (13): x y z, qw qx qy qz, angular, linear velocity.
+  /// - "bodies" (nb, 13), or "bodies.box" (13): x y z, qw qx qy qz, angular, linear velocity;
+  /// - "shear_state" (points, 3), of contacts with ks (engine/step/shear_state_arrays.hpp).
   /// Without `readings`: all end effectors, then the field of every sensor. Throws InputError for a
   /// scene that cannot be compiled, and for a reading that it does not have or that does not follow
   /// from the field of its sensor.
@@ -54,7 +56,8 @@ class SceneTask : public Task {
   struct Positions {
     std::size_t first, count;  ///< numbers of Snapshot::end_effectors
   };
-  using Reading = std::variant<Field, Motion, Positions>;
+  struct Shear {};
+  using Reading = std::variant<Field, Motion, Positions, Shear>;
 
   std::vector<Reading> readings_;
   std::vector<double> varying_;

@@ -6,6 +6,7 @@
 
 #include "engine/model/random.hpp"
 #include "engine/rows/episode_channels.hpp"
+#include "engine/step/shear_state_arrays.hpp"
 
 namespace tangere {
 namespace {
@@ -43,6 +44,10 @@ std::size_t Task::tactile_size() const {
 
 std::size_t Task::bodies_size() const {
   return spec_.reads_bodies ? kMotion * static_cast<std::size_t>(model_.nb()) : 0;
+}
+
+std::size_t Task::shear_state_size() const {
+  return spec_.reads_shear_state ? 3 * shear_state_arrays(model_).count() : 0;
 }
 
 std::size_t Task::end_effectors_size() const {

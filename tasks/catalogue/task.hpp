@@ -22,6 +22,8 @@ struct Snapshot {
   /// (nb, 7) poses, then (nb, 6) twists of the bodies, as Readout::bodies() returns them, if
   /// TaskSpec requests them
   std::span<const double> bodies = {};
+  /// (points, 3) shear state [m] (engine/step/shear_state_arrays.hpp), if TaskSpec requests it
+  std::span<const double> shear_state = {};
 };
 
 /// Inputs of the functions of a task.
@@ -57,10 +59,11 @@ struct StepOutcome {
 /// right (docs/dynamics.md); the others are by component. Quantities that the task does not request
 /// are empty.
 struct SnapshotCotangent {
-  std::span<double> q, v;           ///< (nv), (nv)
-  std::span<double> end_effectors;  ///< (n, 3)
-  std::span<double> tactile;        ///< as in Snapshot
-  std::span<double> bodies = {};    ///< as in Snapshot
+  std::span<double> q, v;              ///< (nv), (nv)
+  std::span<double> end_effectors;     ///< (n, 3)
+  std::span<double> tactile;           ///< as in Snapshot
+  std::span<double> bodies = {};       ///< as in Snapshot
+  std::span<double> shear_state = {};  ///< as in Snapshot
 };
 struct ViewCotangent {
   std::span<const SnapshotCotangent> snapshots;  ///< parallel to TaskView::snapshots
@@ -86,6 +89,7 @@ class Task {
   [[nodiscard]] std::size_t tactile_size() const;  ///< numbers in Snapshot::tactile
   [[nodiscard]] std::size_t end_effectors_size() const;
   [[nodiscard]] std::size_t bodies_size() const;
+  [[nodiscard]] std::size_t shear_state_size() const;
 
   /// Starts an episode as drawn, unless a task overrides this.
   virtual void start(const TaskStart& start) const;

@@ -41,6 +41,14 @@ struct ActionCotangents {
   std::span<const double> q = {}, v = {};    ///< (E, nv) by the state after it, q along the dofs
 };
 
+/// Results of a reverse pass by the start of episodes; empty spans are skipped.
+struct StartCotangents {
+  std::span<double> q, v;              ///< (E, nv) by the states at the first action, q along dofs
+  std::span<double> parameters = {};   ///< (E, NumberGradients::count())
+  std::span<double> points = {};       ///< (E, tactile_points(), kPointNumbers)
+  std::span<double> shear_state = {};  ///< (E, points, 3), by entries that the start has
+};
+
 /// Gradient of one loss or of the return, for every environment or episode. An environment that
 /// fails contributes its states until then and stands still afterwards.
 struct LossGradient {

@@ -77,6 +77,7 @@ TaskBlock::TaskBlock(const Task& task, const TapeOptions& options, std::int64_t 
       options_(options),
       rollout_(task, options.stepper, options.precision),
       records_(as_size(options.length), ActionRecord(task)),
+      shear_arrays_(shear_state_arrays(task.model())),
       snapshot_cotangents_(task.spec().snapshots.size()),
       start_q_(lane_rows(as_size(task.model().nv()))),
       start_v_(start_q_),
@@ -89,12 +90,13 @@ TaskBlock::TaskBlock(const Task& task, const TapeOptions& options, std::int64_t 
       reward_bar_(kBlock) {
   check_has_no_lag(task_.model(), task_.fields());
   const auto end_effectors = lane_rows(task.end_effectors_size()),
-             tactile = lane_rows(task.tactile_size()), bodies = lane_rows(task.bodies_size());
+             tactile = lane_rows(task.tactile_size()), bodies = lane_rows(task.bodies_size()),
+             shear_state = lane_rows(task.shear_state_size());
   snapshots_bar_.assign(snapshot_cotangents_.size(),
-                        {start_q_, start_v_, end_effectors, tactile, bodies});
+                        {start_q_, start_v_, end_effectors, tactile, bodies, shear_state});
   if (task_.spec().warm_up)
     warm_up_.assign(snapshots_bar_.size() - 1, {lane_rows(as_size(task.model().nq())), start_v_,
-                                                end_effectors, tactile, bodies});
+                                                end_effectors, tactile, bodies, shear_state});
 }
 
 double TaskBlock::bytes(const Task& task, const TapeOptions& o, std::int64_t blocks) {
@@ -110,6 +112,7 @@ void TaskBlock::start(std::uint64_t seed, EpisodeRange episodes, bool record) {
   rollout_.start(seed, numbers);
   start_forward(record);
   took_.fill(false);
+  first_varying_.clear();
   for (int l = 0; l < lanes(); ++l) {
     start_shear_[as_size(l)] = rollout_.batch().shear_state(l);
     const std::span<const Snapshot> seen = rollout_.start_view(l).snapshots;
@@ -122,22 +125,33 @@ void TaskBlock::start(std::uint64_t seed, EpisodeRange episodes, bool record) {
       keep(seen[m].end_effectors, warm_up_[m].end_effectors);
       keep(seen[m].tactile, warm_up_[m].tactile);
       keep(seen[m].bodies, warm_up_[m].bodies);
+      keep(seen[m].shear_state, warm_up_[m].shear_state);
     }
   }
 }
 
-void TaskBlock::displace(std::span<const double> q, std::span<const double> v) {
-  const std::size_t nq = as_size(model_.nq()), nv = as_size(model_.nv());
-  for (int l = 0; l < lanes(); ++l)
-    rollout_.displace(l, q.subspan(as_size(l) * nq, nq), v.subspan(as_size(l) * nv, nv));
+void TaskBlock::displace(std::span<const double> q, std::span<const double> v,
+                         std::span<const double> shear_state) {
+  for (int l = 0; l < lanes(); ++l) {
+    rollout_.displace(l, number_row(q, l, as_size(model_.nq())),
+                      number_row(v, l, as_size(model_.nv())));
+    if (shear_state.empty()) continue;
+    // Every point has an entry, so that there are derivatives by displacements of zero.
+    start_shear_[as_size(l)] =
+        shear_arrays_.read_all(number_row(shear_state, l, 3 * shear_arrays_.count()));
+    rollout_.batch().set_shear_state(l, start_shear_[as_size(l)]);
+  }
   rollout_.record_start();
   for (int l = 0; l < lanes(); ++l) rollout_.observe_start(l);
 }
 
-void TaskBlock::step(std::span<const double> actions) {
+void TaskBlock::step(std::span<const double> actions, std::span<const double> varying) {
   took_.fill(false);
   if (!rollout_.running()) return;
   ActionRecord& r = records_[as_size(taken_)];
+  if (!varying.empty() && first_varying_.empty()) first_varying_ = rollout_.varying();
+  r.varying.assign(varying.begin(), varying.end());
+  if (!varying.empty()) rollout_.set_varying(varying);
   std::copy(actions.begin(), actions.end(), r.chosen.begin());
   take(r);
 }
@@ -153,7 +167,15 @@ void TaskBlock::take_steps(std::int64_t, BlockTape* tape) {
   rollout_.conclude();
 }
 
+/// Sets the numbers of <randomize> that an action had; -1: those of the start.
+void TaskBlock::restore_varying(std::int64_t action) {
+  if (first_varying_.empty()) return;
+  while (action >= 0 && records_[as_size(action)].varying.empty()) --action;
+  rollout_.set_varying(action < 0 ? first_varying_ : records_[as_size(action)].varying);
+}
+
 void TaskBlock::retake_steps(std::int64_t action, bool from_checkpoint, BlockTape& tape) {
+  restore_varying(action);
   if (!from_checkpoint) rollout_.recompute_restart(records_[as_size(action)], action);
   rollout_.retake_steps(records_[as_size(action)], action, tape);
 }
@@ -169,15 +191,26 @@ void TaskBlock::add_to_shown(const ActionCotangents& by) {
   add_rows(by.v, shown_v_);
 }
 
+/// Moves the derivatives by the scene's numbers since they were set to `bar`, (lanes, numbers).
+void TaskBlock::take_parameters(std::span<double> bar) {
+  BlockCotangent& c = adjoint_.loss(0);
+  const std::size_t width = as_size(parameters_.count());
+  for (int l = 0; l < lanes() && !bar.empty(); ++l)
+    parameters_.gradient(c, rollout_.batch(), l, number_row(bar, l, width));
+  std::ranges::fill(c.parameters, 0.0);
+}
+
 void TaskBlock::reverse(std::int64_t action, const ActionCotangents& by,
-                        std::span<double> action_bar) {
+                        std::span<double> action_bar, std::span<double> parameter_bar) {
   add_to_shown(by);
   clear({&reward_bar_});
   add_rows(by.reward, reward_bar_);
   std::fill(action_bar.begin(), action_bar.end(), 0.0);
+  std::ranges::fill(parameter_bar, 0.0);
   if (action >= taken_) return;  // no lane took it
   reverse_tape(rollout_.batch(), 0);
   const ActionRecord& r = records_[as_size(action)];
+  if (!r.varying.empty()) take_parameters(parameter_bar);
   const TensorSpec& spec = task_.spec().action;
   for (int l = 0; l < lanes(); ++l) {
     if (!r.taken[as_size(l)]) continue;
@@ -198,6 +231,7 @@ void TaskBlock::reverse_steps(std::int64_t action, const BlockTape& tape) {
   const std::vector<int>& looks = task_.spec().snapshots;
   const int every = task_.spec().control_every;
   clear({&start_q_, &start_v_, &u_bar_, &action_bar_});
+  restore_varying(action);
   rollout_.recompute_snapshots(tape);
   reverse_outcome(r, action);
   std::size_t next = looks.size();
@@ -237,7 +271,7 @@ void TaskBlock::reverse_outcome(const ActionRecord& r, std::int64_t action) {
 
 void TaskBlock::clear_snapshots() {
   for (SnapshotRows& m : snapshots_bar_)
-    clear({&m.q, &m.v, &m.end_effectors, &m.tactile, &m.bodies});
+    clear({&m.q, &m.v, &m.end_effectors, &m.tactile, &m.bodies, &m.shear_state});
 }
 
 /// Pulls cotangents of a lane's observation and state back and adds them. An observation with zero
@@ -264,11 +298,23 @@ void TaskBlock::add_snapshot(std::size_t moment) {
       c.v[i * kBlock + as_size(l)] += v[i];
     }
   }
+  for (int l = 0; l < lanes() && !m.shear_state.empty(); ++l)
+    add_shear_state(part(m.shear_state, l), l);
   if (m.end_effectors.empty() && m.tactile.empty() && m.bodies.empty()) return;
   pullback_.place(rollout_.batch(), 0);
   pullback_.clear();
   for (int l = 0; l < lanes(); ++l) add_readings(moment, l);
   pullback_.finish(c);
+}
+
+/// Adds cotangents of a lane's shear state, whose entries are in the batch. A point without an
+/// entry has the constant 0.
+void TaskBlock::add_shear_state(std::span<const double> bar, int lane) {
+  const ShearState& entries = rollout_.batch().shear_state(lane);
+  std::vector<double>& to = adjoint_.loss(0).shear[as_size(lane)];
+  to.resize(3 * entries.size());
+  for (std::size_t k = 0; k < to.size(); ++k)
+    to[k] += bar[shear_arrays_.first_of(entries[k / 3]) + k % 3];
 }
 
 void TaskBlock::add_readings(std::size_t moment, int lane) {
@@ -346,9 +392,9 @@ void TaskBlock::reverse_start(const ActionRecord& r, std::int64_t action) {
 std::span<const SnapshotCotangent> TaskBlock::cotangents(int lane) {
   for (std::size_t m = 0; m < snapshots_bar_.size(); ++m) {
     SnapshotRows& rows = snapshots_bar_[m];
-    snapshot_cotangents_[m] = {part(rows.q, lane), part(rows.v, lane),
-                               part(rows.end_effectors, lane), part(rows.tactile, lane),
-                               part(rows.bodies, lane)};
+    snapshot_cotangents_[m] = {
+        part(rows.q, lane),       part(rows.v, lane),      part(rows.end_effectors, lane),
+        part(rows.tactile, lane), part(rows.bodies, lane), part(rows.shear_state, lane)};
   }
   return snapshot_cotangents_;
 }
@@ -369,9 +415,8 @@ void TaskBlock::add_start_to_shown() {
   rollout_.record_start();
 }
 
-void TaskBlock::reverse_reset(const ActionCotangents& by, std::span<double> q_bar,
-                              std::span<double> v_bar, std::span<double> parameter_bar,
-                              std::span<double> point_bar) {
+void TaskBlock::reverse_reset(const ActionCotangents& by, const StartCotangents& out) {
+  restore_varying(-1);
   add_to_shown(by);
   add_start_to_shown();
   clear_snapshots();
@@ -383,8 +428,8 @@ void TaskBlock::reverse_reset(const ActionCotangents& by, std::span<double> q_ba
     std::vector<Snapshot> seen(view.snapshots.begin(), view.snapshots.end());
     for (std::size_t m = 0; m < warm_up_.size(); ++m) {
       const SnapshotRows& kept = warm_up_[m];
-      seen[m] = {part(kept.q, l), part(kept.v, l), part(kept.end_effectors, l),
-                 part(kept.tactile, l), part(kept.bodies, l)};
+      seen[m] = {part(kept.q, l),       part(kept.v, l),      part(kept.end_effectors, l),
+                 part(kept.tactile, l), part(kept.bodies, l), part(kept.shear_state, l)};
     }
     view.actions = 0;
     view.action = no_action;
@@ -400,7 +445,12 @@ void TaskBlock::reverse_reset(const ActionCotangents& by, std::span<double> q_ba
       const std::size_t width = all.size() / as_size(lanes());
       return all.subspan(as_size(l) * width, width);
     };
-    get_start(0, rollout_.batch(), l, own(q_bar), own(v_bar), own(parameter_bar), own(point_bar));
+    get_start(0, rollout_.batch(), l, own(out.q), own(out.v), own(out.parameters), own(out.points));
+    const std::span<double> shear = own(out.shear_state);
+    std::ranges::fill(shear, 0.0);
+    const std::vector<double>& bar = adjoint_.loss(0).shear[as_size(l)];
+    for (std::size_t k = 0; k < bar.size() && !shear.empty(); ++k)
+      shear[shear_arrays_.first_of(start_shear_[as_size(l)][k / 3]) + k % 3] = bar[k];
   }
 }
 
@@ -432,7 +482,7 @@ void TaskBlock::play(std::uint64_t seed, EpisodeRange episodes, const TaskAction
   const std::vector<double> ones(as_size(count), 1.0);
   std::vector<double> action_bar(as_size(count) * width);
   for (std::int64_t a = taken_ - 1; a >= 0 && may_go_on(); --a) {
-    reverse(a, {.reward = ones}, action_bar);
+    reverse(a, {.reward = ones}, action_bar, {});
     for (int l = 0; l < count; ++l) {
       if (!records_[as_size(a)].taken[as_size(l)]) continue;
       const std::size_t at = as_size(to + l) * row + as_size(a) * width;

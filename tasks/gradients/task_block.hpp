@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "engine/rows/episode_sink.hpp"
+#include "engine/step/shear_state_arrays.hpp"
 #include "tasks/gradients/tape_block.hpp"
 #include "tasks/gradients/task_rollout.hpp"
 
@@ -27,21 +28,24 @@ class TaskBlock : public TapeBlock {
 
   /// Resets one episode per lane. `record`: whether its actions can be reversed.
   void start(std::uint64_t seed, EpisodeRange episodes, bool record = true);
-  /// Moves the states in which the first actions begin, (lanes, nq) and (lanes, nv).
-  void displace(std::span<const double> q, std::span<const double> v);
-  /// Takes `actions`, (lanes, action), in the lanes whose episodes have not ended.
-  void step(std::span<const double> actions);
+  /// Moves the states in which the first actions begin, (lanes, nq), (lanes, nv) and, unless empty,
+  /// (lanes, points, 3) shear states.
+  void displace(std::span<const double> q, std::span<const double> v,
+                std::span<const double> shear_state);
+  /// Takes `actions`, (lanes, action), in the lanes whose episodes have not ended. `varying`: as in
+  /// TaskTape::step().
+  void step(std::span<const double> actions, std::span<const double> varying);
   /// Whether a lane took the last action.
   [[nodiscard]] bool took(int lane) const { return took_[static_cast<std::size_t>(lane)]; }
 
   void begin_reverse();
   /// Reverses action number `action` and fills derivatives by it, (lanes, action). All spans hold
-  /// the block's lanes, in their order.
-  void reverse(std::int64_t action, const ActionCotangents& by, std::span<double> action_bar);
+  /// the block's lanes, in their order. `parameter_bar`: as in TaskTape::reverse().
+  void reverse(std::int64_t action, const ActionCotangents& by, std::span<double> action_bar,
+               std::span<double> parameter_bar);
   /// Ends the reverse pass: takes cotangents of the results of the reset, and fills those of the
-  /// first states, the scene's parameters and its sensors' points. Skips empty spans.
-  void reverse_reset(const ActionCotangents& by, std::span<double> q_bar, std::span<double> v_bar,
-                     std::span<double> parameter_bar, std::span<double> point_bar);
+  /// start. Skips empty spans.
+  void reverse_reset(const ActionCotangents& by, const StartCotangents& out);
 
   /// Plays up to 16 episodes and reverses their returns. Writes results to places `to`, to + 1 … of
   /// `out`, and failures with these places as their numbers.
@@ -56,18 +60,21 @@ class TaskBlock : public TapeBlock {
  private:
   /// Rows of lanes: the numbers of one snapshot, or their cotangents.
   struct SnapshotRows {
-    std::vector<double> q, v, end_effectors, tactile, bodies;  // (16, width)
+    std::vector<double> q, v, end_effectors, tactile, bodies, shear_state;  // (16, width)
   };
   void take_steps(std::int64_t action, BlockTape* tape) override;
   void retake_steps(std::int64_t action, bool from_checkpoint, BlockTape& tape) override;
   void reverse_steps(std::int64_t action, const BlockTape& tape) override;
   void take(ActionRecord& record);
+  void restore_varying(std::int64_t action);
+  void take_parameters(std::span<double> bar);
   void add_to_shown(const ActionCotangents& by);
   void clear_snapshots();
   void reverse_outcome(const ActionRecord& r, std::int64_t action);
   void reverse_observation(const TaskView& view, int lane, const ViewCotangent& to);
   void add_snapshot(std::size_t moment);
   void add_readings(std::size_t moment, int lane);
+  void add_shear_state(std::span<const double> bar, int lane);
   void reverse_controls(const ActionRecord& r, std::int64_t action, int step,
                         const BlockTape& tape);
   void reverse_start(const ActionRecord& r, std::int64_t action);
@@ -82,6 +89,8 @@ class TaskBlock : public TapeBlock {
   std::vector<ActionRecord> records_;  // (actions)
   std::array<bool, kernels::kBlock> took_{};
   std::array<ShearState, kernels::kBlock> start_shear_;  // shear states at the reset
+  ShearStateArrays shear_arrays_;
+  std::vector<double> first_varying_;  // (lanes, <randomize>) before an action brought values
   std::vector<SnapshotRows> warm_up_;  // snapshots of a warm-up before its last one
   // Cotangents for the action reversed last: of its snapshots, first state, controls, and itself.
   std::vector<SnapshotRows> snapshots_bar_;

@@ -24,7 +24,8 @@ ActionRecord::ActionRecord(const Task& task) {
 
 double ActionRecord::bytes(const Task& task) {
   const std::size_t numbers = as_size(task.model().nq()) + as_size(task.model().nv()) +
-                              2 * as_size(task.spec().task_state) + 2 * task.spec().action.size();
+                              2 * as_size(task.spec().task_state) + 2 * task.spec().action.size() +
+                              task.model().scene().randomizations.size();
   return static_cast<double>(numbers * kBlock * sizeof(double) + sizeof(ActionRecord));
 }
 
@@ -67,6 +68,19 @@ void TaskRollout::displace(int lane, std::span<const double> q, std::span<const 
   batch_->displace_state(lane, q, v);
   std::copy(q.begin(), q.end(), number_row(data_->q, lane, q.size()).begin());
   std::copy(v.begin(), v.end(), number_row(data_->v, lane, v.size()).begin());
+}
+
+std::vector<double> TaskRollout::varying() const {
+  const auto count = static_cast<int>(task_.model().scene().randomizations.size());
+  std::vector<double> values;
+  for (int l = 0; l < lanes(); ++l)
+    for (int k = 0; k < count; ++k) values.push_back(batch_->randomized_value(l, k));
+  return values;
+}
+
+void TaskRollout::set_varying(std::span<const double> values) {
+  const std::size_t count = task_.model().scene().randomizations.size();
+  for (int l = 0; l < lanes(); ++l) batch_->set_all_randomized(l, number_row(values, l, count));
 }
 
 void TaskRollout::record_start() { worker_.record_start(*batch_, 0); }

@@ -25,6 +25,8 @@ struct ActionRecord {
   std::vector<double> found, task_state;      ///< (16, task state) before and after begin_action
   std::vector<double> chosen, action;         ///< (16, action): as chosen, as taken
   std::array<bool, kernels::kBlock> taken{};  ///< false: the episode had ended
+  /// (lanes, <randomize>) values that it brings; empty: those before it
+  std::vector<double> varying;
 
   explicit ActionRecord(const Task& task);
   static double bytes(const Task& task);
@@ -39,6 +41,9 @@ class TaskRollout {
   void start(std::uint64_t seed, std::span<const std::int64_t> episodes);
   /// Starts a lane's first action from another state. The history of a scheme of two steps stays.
   void displace(int lane, std::span<const double> q, std::span<const double> v);
+  /// Values of the scene's <randomize>, (lanes, their count); states have no effect.
+  [[nodiscard]] std::vector<double> varying() const;
+  void set_varying(std::span<const double> values);
   /// Records snapshots of the present states of the batch, in which the first actions begin.
   void record_start();
   /// The view at the reset of a lane, valid until the first action begins.

@@ -52,6 +52,7 @@ struct TaskTape::Impl {
         seen(t.spec().observation_size()),
         numbers(options.parameters ? as_size(NumberGradients(t.model()).count()) : 0),
         point_numbers(options.points ? as_size(tactile_points(t.model()) * kPointNumbers) : 0),
+        sheared(3 * shear_state_arrays(t.model()).count()),
         observation(e * seen),
         reward(e),
         q(e * nq),
@@ -166,7 +167,7 @@ struct TaskTape::Impl {
 
   const Task& task;
   const TapeOptions options;
-  const std::size_t e, nq, nv, width, seen, numbers, point_numbers;  // of one environment
+  const std::size_t e, nq, nv, width, seen, numbers, point_numbers, sheared;  // of one environment
   mutable std::vector<double> observation;  // copied when observations() is called
   mutable bool observation_is_current = false;
   std::vector<double> reward, q, v;
@@ -193,33 +194,39 @@ void TaskTape::reset(std::uint64_t seed, std::int64_t first_episode, bool record
   impl_->reset(seed, first_episode, record);
 }
 
-void TaskTape::displace(std::span<const double> q, std::span<const double> v) {
+void TaskTape::displace(std::span<const double> q, std::span<const double> v,
+                        std::span<const double> shear_state) {
   Impl& i = *impl_;
   if (i.phase != Phase::forward || i.taken > 0)
     throw InputError("first states after the first step; expected reset() before them");
   expect_numbers(q.size(), i.e * i.nq, false, "q");
   expect_numbers(v.size(), i.e * i.nv, false, "v");
+  expect_numbers(shear_state.size(), i.e * i.sheared, true, "the shear state");
   i.each(Phase::forward, [&](TaskBlock& block, int b) {
-    block.displace(i.of(q, b), i.of(v, b));
+    block.displace(i.of(q, b), i.of(v, b), i.of(shear_state, b));
     i.show(block, b);
   });
 }
 
 void TaskTape::check_step(std::span<const double> actions) const { impl_->check_actions(actions); }
 
-void TaskTape::step(std::span<const double> actions) {
+void TaskTape::step(std::span<const double> actions, std::span<const double> varying) {
   Impl& i = *impl_;
   i.check_actions(actions);
+  const std::size_t count = i.task.model().scene().randomizations.size();
+  expect_numbers(varying.size(), i.e * count, true, "numbers that vary");
   i.each(Phase::forward, [&](TaskBlock& block, int b) {
-    block.step(i.of(actions, b));
+    block.step(i.of(actions, b), i.of(varying, b));
     i.show(block, b);
   });
   ++i.taken;
 }
 
-void TaskTape::reverse(const ActionCotangents& by, std::span<double> action_bar) {
+void TaskTape::reverse(const ActionCotangents& by, std::span<double> action_bar,
+                       std::span<double> parameter_bar) {
   Impl& i = *impl_;
   i.check_cotangents(by);
+  expect_numbers(parameter_bar.size(), i.e * i.numbers, true, "derivatives by the scene's numbers");
   expect_numbers(action_bar.size(), i.e * i.width, false, "derivatives by actions");
   i.check_sound();
   if (i.to_reverse() == 0)
@@ -228,20 +235,20 @@ void TaskTape::reverse(const ActionCotangents& by, std::span<double> action_bar)
         i.taken));
   if (i.phase == Phase::forward) i.begin_reverse();
   i.each(Phase::back, [&](TaskBlock& block, int b) {
-    block.reverse(i.left - 1, i.of(by, b), i.of(action_bar, b));
+    block.reverse(i.left - 1, i.of(by, b), i.of(action_bar, b), i.of(parameter_bar, b));
   });
   --i.left;
 }
 
-void TaskTape::reverse_start(const ActionCotangents& by, std::span<double> q_bar,
-                             std::span<double> v_bar, std::span<double> parameter_bar,
-                             std::span<double> point_bar) {
+void TaskTape::reverse_start(const ActionCotangents& by, const StartCotangents& out) {
   Impl& i = *impl_;
   i.check_cotangents(by);
-  expect_numbers(q_bar.size(), i.e * i.nv, true, "derivatives by the first q");
-  expect_numbers(v_bar.size(), i.e * i.nv, true, "derivatives by the first v");
-  expect_numbers(parameter_bar.size(), i.e * i.numbers, true, "derivatives by the scene's numbers");
-  expect_numbers(point_bar.size(), i.e * i.point_numbers, true, "derivatives by tactile points");
+  expect_numbers(out.q.size(), i.e * i.nv, true, "derivatives by the first q");
+  expect_numbers(out.v.size(), i.e * i.nv, true, "derivatives by the first v");
+  expect_numbers(out.parameters.size(), i.e * i.numbers, true,
+                 "derivatives by the scene's numbers");
+  expect_numbers(out.points.size(), i.e * i.point_numbers, true, "derivatives by tactile points");
+  expect_numbers(out.shear_state.size(), i.e * i.sheared, true, "derivatives by the shear state");
   i.check_sound();
   if (i.phase == Phase::done)
     throw InputError("a second end of a reverse pass; expected begin_reverse() or reset()");
@@ -252,8 +259,8 @@ void TaskTape::reverse_start(const ActionCotangents& by, std::span<double> q_bar
                     i.to_reverse(), i.taken));
   if (i.phase == Phase::forward) i.begin_reverse();
   i.each(Phase::done, [&](TaskBlock& block, int b) {
-    block.reverse_reset(i.of(by, b), i.of(q_bar, b), i.of(v_bar, b), i.of(parameter_bar, b),
-                        i.of(point_bar, b));
+    block.reverse_reset(i.of(by, b), {i.of(out.q, b), i.of(out.v, b), i.of(out.parameters, b),
+                                      i.of(out.points, b), i.of(out.shear_state, b)});
   });
 }
 

@@ -34,12 +34,17 @@ class TaskTape {
   /// whether its steps can be reversed; without it no state is kept.
   void reset(std::uint64_t seed, std::int64_t first_episode, bool record = true);
   /// Moves the states in which the first actions begin: q (E, nq) with quaternions of unit length,
-  /// v (E, nv). They are observed again. Throws InputError after the first step.
-  void displace(std::span<const double> q, std::span<const double> v);
+  /// v (E, nv) and, unless empty, shear states (E, points, 3)
+  /// (engine/step/shear_state_arrays.hpp). They are observed again. Throws InputError after the
+  /// first step.
+  void displace(std::span<const double> q, std::span<const double> v,
+                std::span<const double> shear_state = {});
   /// Takes one action of every environment whose episode has not ended, (E, action), clipped to its
   /// bounds, and records it. Actions of ended environments are ignored. Throws InputError for an
-  /// action that is not finite, for more than `length` actions, and after reverse().
-  void step(std::span<const double> actions);
+  /// action that is not finite, for more than `length` actions, and after reverse(). `varying`:
+  /// values of the scene's <randomize> from this action on, (E, their count), which the scene could
+  /// have; states among them have no effect. Empty: as before.
+  void step(std::span<const double> actions, std::span<const double> varying = {});
   /// Throws what step() would throw for these actions, and takes none.
   void check_step(std::span<const double> actions) const;
 
@@ -71,17 +76,16 @@ class TaskTape {
   /// environment that did not take the action. Cotangents of the repeated last observation of an
   /// ended episode count for its last action. Throws InputError when every
   /// step is reversed, and when a task has no Task::observe_vjp or restart_state_vjp that it would
-  /// need; then only reset() is possible.
-  void reverse(const ActionCotangents& by, std::span<double> action_bar);
+  /// need; then only reset() is possible. `parameter_bar`, (E, NumberGradients::count()) or empty:
+  /// derivatives by the scene's numbers that the step brought, while they held; 0 without them.
+  void reverse(const ActionCotangents& by, std::span<double> action_bar,
+               std::span<double> parameter_bar = {});
   /// Ends the reverse pass. In: cotangents of the observation at the reset and of the states at the
-  /// first action (rewards are ignored). Out: cotangents of these states, (E, nv) each, positions
-  /// along the dofs of v, and, if options request them, (E, NumberGradients::count()) of the
-  /// scene's parameters and (E, tactile_points(), kPointNumbers) of points of sensors.
-  /// Empty output spans are skipped. The reset, all random draws and snapshots of a warm-up before
-  /// its last one count as constant. Throws InputError while steps are left to reverse, and at a
-  /// second call.
-  void reverse_start(const ActionCotangents& by, std::span<double> q_bar, std::span<double> v_bar,
-                     std::span<double> parameter_bar = {}, std::span<double> point_bar = {});
+  /// first action (rewards are ignored). Out: cotangents of these states and, if options request
+  /// them, of the scene's numbers while those of the start held and of points of sensors. The
+  /// reset, all random draws and snapshots of a warm-up before its last one count as constant.
+  /// Throws InputError while steps are left to reverse, and at a second call.
+  void reverse_start(const ActionCotangents& by, const StartCotangents& out);
   /// Begins another reverse pass over the same steps, from the last one.
   void begin_reverse();
 

@@ -84,10 +84,12 @@ BlockWorker::BlockWorker(const Task& task, Precision precision)
   end_effectors_.resize(moments * kBlock * task.end_effectors_size());
   tactile_.resize(moments * kBlock * task.tactile_size());
   bodies_.resize(moments * kBlock * task.bodies_size());
+  shear_.resize(moments * kBlock * task.shear_state_size());
+  if (!shear_.empty()) shear_arrays_ = shear_state_arrays(task.model());
   for (int lane = 0; lane < kBlock; ++lane)
     for (std::size_t m = 0; m < moments; ++m)
       moments_.push_back({part(q_, m, lane), part(v_, m, lane), part(end_effectors_, m, lane),
-                          part(tactile_, m, lane), part(bodies_, m, lane)});
+                          part(tactile_, m, lane), part(bodies_, m, lane), part(shear_, m, lane)});
   if (spec.settling_steps == 0) return;
   StepperOptions options;
   options.timestep = spec.settling_timestep;
@@ -96,7 +98,8 @@ BlockWorker::BlockWorker(const Task& task, Precision precision)
 
 double BlockWorker::bytes(const Task& task) {
   const std::size_t numbers = as_size(task.model().nq()) + as_size(task.model().nv()) +
-                              task.end_effectors_size() + task.tactile_size() + task.bodies_size();
+                              task.end_effectors_size() + task.tactile_size() + task.bodies_size() +
+                              task.shear_state_size();
   return static_cast<double>(task.spec().snapshots.size() * kBlock * numbers * sizeof(double));
 }
 
@@ -242,6 +245,8 @@ void BlockWorker::read_snapshot(const Batch& batch, int block, std::size_t momen
   if (task_.end_effectors_size() > 0)
     read_end_effectors(readout_, batch, block, place(end_effectors_));
   read_fields<double>(readout_, batch, block, task_.fields(), place(tactile_));
+  for (int e = first; shear_arrays_ && e < first + lanes_of(batch, block); ++e)
+    shear_arrays_->write(batch.shear_state(e), part(shear_, moment, e - first));
   if (task_.bodies_size() == 0) return;
   const std::size_t poses = 7 * as_size(task_.model().nb());
   for (int e = first; e < first + lanes_of(batch, block); ++e) {

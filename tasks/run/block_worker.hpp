@@ -9,6 +9,7 @@
 
 #include "engine/base/precision.hpp"
 #include "engine/sense/readout.hpp"
+#include "engine/step/shear_state_arrays.hpp"
 #include "engine/step/stepper.hpp"
 #include "tasks/catalogue/task.hpp"
 #include "tasks/run/step_counts.hpp"
@@ -78,8 +79,9 @@ class BlockWorker {
   std::optional<Stepper> settling_stepper_;
   std::optional<Batch> settling_;  // one environment
   std::vector<double> varying_;    // values of the environment that starts
-  std::vector<double> q_, v_, end_effectors_, tactile_, bodies_;  // (snapshots, 16, width)
-  std::vector<Snapshot> moments_;                                 // (16, snapshots): views of them
+  std::vector<double> q_, v_, end_effectors_, tactile_, bodies_, shear_;  // (snapshots, 16, width)
+  std::optional<ShearStateArrays> shear_arrays_;                          // if they are read
+  std::vector<Snapshot> moments_;  // (16, snapshots): views of them
 };
 
 /// Returns the view of a task between two actions of an environment.

@@ -19,4 +19,9 @@ std::span<const T> number_row(const std::vector<T>& all, int environment, std::s
   return std::span(all).subspan(as_size(environment) * width, width);
 }
 
+template <class T>
+std::span<T> number_row(std::span<T> all, int environment, std::size_t width) {
+  return all.subspan(as_size(environment) * width, width);
+}
+
 }  // namespace tangere

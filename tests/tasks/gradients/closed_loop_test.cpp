@@ -147,7 +147,7 @@ class ClosedLoop {
         }
       }
     }
-    tape_.reverse_start({by_o}, g.q, g.v);
+    tape_.reverse_start({by_o}, {g.q, g.v});
     return g;
   }
 

@@ -408,7 +408,7 @@ TEST(TapeEpisodes, MisuseIsRefused) {
   expect_refusal([&] { tape.displace(q, {}); }, "0 numbers of v");
   tape.step(actions);
   expect_refusal([&] { tape.displace(q, v); }, "after the first step");
-  expect_refusal([&] { tape.reverse_start({}, {}, {}); }, "1 of 1 actions left");
+  expect_refusal([&] { tape.reverse_start({}, {}); }, "1 of 1 actions left");
   tape.step(actions);  // refused calls have left no trace
   expect_refusal([&] { tape.step(actions); }, "action 2 on a tape of 2 actions");
   expect_refusal([&] { tape.reverse({wrong}, action_bar); }, "3 numbers of derivatives by obs");
@@ -420,10 +420,12 @@ TEST(TapeEpisodes, MisuseIsRefused) {
   expect_refusal([&] { tape.step(actions); }, "has been reversed");
   tape.reverse({.reward = two}, action_bar);
   expect_refusal([&] { tape.reverse({.reward = two}, action_bar); }, "one more reverse");
-  expect_refusal([&] { tape.reverse_start({}, wrong, {}); }, "derivatives by the first q");
-  expect_refusal([&] { tape.reverse_start({}, {}, {}, wrong); }, "the scene's numbers");
-  tape.reverse_start({}, {}, {});
-  expect_refusal([&] { tape.reverse_start({}, {}, {}); }, "a second end");
+  expect_refusal([&] { tape.reverse_start({}, {.q = wrong, .v = {}}); },
+                 "derivatives by the first q");
+  expect_refusal([&] { tape.reverse_start({}, {.q = {}, .v = {}, .parameters = wrong}); },
+                 "the scene's numbers");
+  tape.reverse_start({}, {});
+  expect_refusal([&] { tape.reverse_start({}, {}); }, "a second end");
   tape.begin_reverse();
   tape.reverse({.reward = two}, action_bar);
   tape.reset(1, 0);

@@ -108,7 +108,7 @@ inline Swept sweep_of(TaskTape& tape, std::int64_t actions, const Incoming& inco
   out.q_bar.resize(e * nv);
   out.v_bar.resize(e * nv);
   out.parameter_bar.resize(e * numbers);
-  tape.reverse_start({by_o}, out.q_bar, out.v_bar, out.parameter_bar);
+  tape.reverse_start({by_o}, {out.q_bar, out.v_bar, out.parameter_bar});
   return out;
 }
 

@@ -140,7 +140,7 @@ TEST_P(EveryTape, GoingBackIsTheTransposeOfGoingForward) {
   Numbers first_q(nv), first_v(nv), by_number(numbers);
   const Numbers to_q = q_bar(0), to_v = v_bar(0);
   const Numbers to_o = opens ? Numbers{} : by_o(0);
-  tape.reverse_start({to_o, {}, to_q, to_v}, first_q, first_v, by_number);
+  tape.reverse_start({to_o, {}, to_q, to_v}, {first_q, first_v, by_number});
 
   TaskRollout rollout(*task, stepper, Precision::f64);
   rollout.start(kTapeSeed, {&episode, 1});
