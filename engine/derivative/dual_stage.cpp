@@ -72,8 +72,6 @@ struct DualStage::Impl {
       kernels::DofEffects& e = effects[std::size_t(dof)];
       for (int k = 0; k < kernels::kDofNumbers; ++k)
         row(e.*kernels::kDofParameters[k], view.rows.dof(dof, k));
-      row(e.armature, -1);
-      row(e.limit_stiffness, -1);
     }
     // `first`: row of the block that holds the first number, or -1: the numbers are `values`.
     const auto side_by_side = [this](int& first, int count, const double* values, int which) {
@@ -90,9 +88,13 @@ struct DualStage::Impl {
       if (g.radius > 0) side_by_side(g.radius_row, 1, &g.radius, view.rows.solid(g.body));
     for (auto& g : grounds)
       g.point_tangents = ground_tangents.emplace_back(std::size_t(3 * g.n_points)).data();
-    for (kernels::Link& link : bodies) {
+    for (std::size_t k = 0; k < bodies.size(); ++k) {
+      kernels::Link& link = bodies[k];
       link.inertia_row = -1;
-      if (link.place_row >= 0) side_by_side(link.place_row, 3, nullptr, -1);
+      link.has_offset = true;  // numbers that are zero may have tangents
+      link.effects |= kernels::kArmature | kernels::kSpring | kernels::kLimit;
+      side_by_side(link.place_row, kernels::kPlaceNumbers, &link.frame.p.x,
+                   view.rows.place(static_cast<int>(k)));
     }
     view.links = bodies.data();
     view.pairs = pairs.data();
@@ -488,6 +490,13 @@ void DualStage::update_sensor_shear_state(const std::vector<D>& q, const std::ve
 }
 
 void DualStage::rates() { kernels::kinematics(impl_->view, impl_->arguments(*this)); }
+
+kernels::Vec3<D> DualStage::in_world(int link, const kernels::Vec3<double>& point) const {
+  const kernels::Vec3<D> at = kernels::broadcast<D>(point);
+  if (link < 0) return at;
+  const kernels::Frame<D>& pose = impl_->links[std::size_t(link)].world;
+  return pose.R * at + pose.p;
+}
 
 void DualStage::freeze_numbers(bool frozen) {
   Impl& i = *impl_;

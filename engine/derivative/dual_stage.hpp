@@ -48,8 +48,11 @@ class DualStage {
 
   /// Computes v and g, with the tangents of masses included.
   void residual();
-  /// Computes v alone.
+  /// Computes v alone, and the poses of links.
   void rates();
+  /// Returns where a point of a link (-1: the world) is, at the poses computed last.
+  [[nodiscard]] kernels::Vec3<DualNumber> in_world(int link,
+                                                   const kernels::Vec3<double>& point) const;
 
   /// Computes how the field of a sensor, (points, 3), changes at the state centre ⊕ 0 with twist r
   /// (c0_over_h = 0, inverse_h = 1). `numbers`: tangents as rows of BlockCotangent::parameters; or

@@ -42,7 +42,7 @@ struct ReadoutPullback::Impl {
   std::vector<int> met;  ///< (kGroups) sensor whose shapes the reader holds; -1: none
   std::array<AlignedVector<kernels::MotionCotangent<LaneRow>>, kGroups> links;
   std::array<bool, kGroups> used{};
-  AlignedVector<LaneRow> rows;  ///< q, v, zeros, rates, q̄, v̄ of one group
+  AlignedVector<LaneRow> rows;  ///< q, v, zeros, rates, q̄, v̄, places of one group
   AlignedVector<std::byte> scratch;
   std::vector<kernels::TouchCotangent<double>> touches;
   std::vector<kernels::Touch<double>> frictionless;
@@ -58,7 +58,7 @@ struct ReadoutPullback::Impl {
       : model(m), reader(m), met(kGroups, -1), imperfections(m), elastic(m) {
     const CompiledModel& c = compiled(m);
     for (auto& l : links) l.resize(c.links.size());
-    rows.resize(std::size_t(c.nq + 5 * c.nv));
+    rows.resize(std::size_t(c.nq + 5 * c.nv) + kernels::kPlaceNumbers * c.links.size());
     std::size_t bytes = 0, targets = 0;
     for (const kernels::KernelTable* t : kernels::available_kernels())
       bytes = std::max(bytes, t->pullback_bytes(c.view));
@@ -333,7 +333,8 @@ void ReadoutPullback::finish(BlockCotangent& out) {
     for (std::size_t k = 0; k < to.size(); ++k) to[k] += i.memory[l][k];
   }
   LaneRow *q = i.rows.data(), *v = q + m.nq, *zero = v + m.nv, *rates = zero + m.nv,
-          *q_bar = rates + m.nv, *v_bar = q_bar + m.nv;
+          *q_bar = rates + m.nv, *v_bar = q_bar + m.nv, *places = v_bar + m.nv;
+  const int place_count = out.parameters.empty() ? 0 : kernels::kPlaceNumbers * m.view.n_links;
   for (int g = 0; g < kGroups; ++g) {
     if (!i.used[std::size_t(g)]) continue;
     const auto load = [&](LaneRow* to, int first, int count) {
@@ -344,15 +345,18 @@ void ReadoutPullback::finish(BlockCotangent& out) {
     };
     load(q, m.layout.q, m.nq);
     load(v, m.layout.v, m.nv);
-    std::fill(q_bar, v_bar + m.nv, LaneRow{});
+    std::fill(q_bar, places + place_count, LaneRow{});
     kernels::active_kernels().pull_back_links(
         m.view, {q, v, zero, rates, i.batch->block(i.block), g}, i.scratch.data(),
-        i.links[std::size_t(g)].data(), q_bar, v_bar);
-    for (int k = 0; k < m.nv; ++k)
-      for (int l = 0; l < kGroup; ++l) {
-        out.q[std::size_t(k * kBlock + g * kGroup + l)] += q_bar[k][l];
-        out.v[std::size_t(k * kBlock + g * kGroup + l)] += v_bar[k][l];
-      }
+        i.links[std::size_t(g)].data(), q_bar, v_bar, place_count > 0 ? places : nullptr);
+    const auto add = [g](double* to, const LaneRow* from, int count) {
+      for (int k = 0; k < count; ++k)
+        for (int l = 0; l < kGroup; ++l) to[k * kBlock + g * kGroup + l] += from[k][l];
+    };
+    add(out.q.data(), q_bar, m.nv);
+    add(out.v.data(), v_bar, m.nv);
+    if (place_count > 0)
+      add(&out.parameters[std::size_t(m.view.rows.places * kBlock)], places, place_count);
   }
 }
 

@@ -46,7 +46,7 @@ ShearAdjoint<L>::ShearAdjoint(const CompiledModel& m, int losses) {
   slip_.resize(m.links.size());
   at_touches_.resize(m.shear_springs.size());
   slip_touches_.resize(m.shear_springs.size());
-  rows_.resize(2 * std::size_t(m.nv));
+  rows_.resize(2 * std::size_t(m.nv) + kernels::kPlaceNumbers * m.links.size());
   std::size_t bytes = 0, stride = 0;
   for (const kernels::KernelTable* table : kernels::available_kernels())
     bytes = std::max(bytes, table->pullback_bytes(m.view));
@@ -65,15 +65,21 @@ void ShearAdjoint<L>::begin(const CompiledModel& m) {
 template <int L>
 void ShearAdjoint<L>::add_to_state(const CompiledModel& m, const kernels::KernelTable& table,
                                    BasicWorkspace<L>& w, LaneBits lanes, const Row<L>* q,
-                                   const Row<L>* v, Cotangents& links, Row<L>* q_bar,
-                                   Row<L>* v_bar) {
+                                   const Row<L>* v, Cotangents& links, Row<L>* q_bar, Row<L>* v_bar,
+                                   Row<L>* parameters) {
   std::fill(rows_.begin(), rows_.end(), Row<L>{});
-  Row<L>*const by_q = rows_.data(), *const by_v = by_q + m.nv;
+  Row<L>*const by_q = rows_.data(), *const by_v = by_q + m.nv, *const by_place = by_v + m.nv;
   table.stage<L>().pull_back_poses(m.view, w.stage, q, v, w.zero, scratch_.data(), links.data(),
-                                   by_q, by_v);
-  for (int i = 0; i < m.nv; ++i)
-    for (int l = 0; l < L; ++l)
-      if (has(lanes, l)) q_bar[i][l] += by_q[i][l], v_bar[i][l] += by_v[i][l];
+                                   by_q, by_v, parameters == nullptr ? nullptr : by_place);
+  const auto add = [&](Row<L>* to, const Row<L>* from, int count) {
+    for (int i = 0; i < count; ++i)
+      for (int l = 0; l < L; ++l)
+        if (has(lanes, l)) to[i][l] += from[i][l];
+  };
+  add(q_bar, by_q, m.nv);
+  add(v_bar, by_v, m.nv);
+  if (parameters != nullptr)
+    add(parameters + m.view.rows.places, by_place, kernels::kPlaceNumbers * m.view.n_links);
 }
 
 /// Pulls back through all contacts: the final shear state, or the forces along a slip.
@@ -130,7 +136,7 @@ void ShearAdjoint<L>::reverse_end(const CompiledModel& m, const kernels::KernelT
   table.stage<L>().poses_at(m.view, w.stage, w.q1, w.stage.v, w.zero, at_.data());
   table.stage<L>().touches_at(m.view, at_.data(), at_touches_.data());
   pull_back(m, table, w, lanes, false, loss, number);
-  add_to_state(m, table, w, lanes, w.q1, w.stage.v, end_, loss.q, loss.v);
+  add_to_state(m, table, w, lanes, w.q1, w.stage.v, end_, loss.q, loss.v, loss.parameters);
 }
 
 /// Pulls one contact of one lane back.
@@ -197,7 +203,7 @@ void ShearAdjoint<L>::reverse_readings(const CompiledModel& m, const kernels::Ke
       }
       bar = kept_before_;
     }
-    add_to_state(m, table, w, lanes, w.q1, w.v1, end_, loss.q, loss.v);
+    add_to_state(m, table, w, lanes, w.q1, w.v1, end_, loss.q, loss.v, loss.parameters);
   }
 }
 
@@ -218,7 +224,7 @@ void ShearAdjoint<L>::finish(const CompiledModel& m, const kernels::KernelTable&
                              BasicWorkspace<L>& w, LaneBits lanes, LossRows<L>& loss, int number) {
   if (m.shear_springs.empty()) return;
   add_to_state(m, table, w, lanes, w.q0, w.v0, start_[std::size_t(number)], loss.q_centre,
-               loss.v_centre);
+               loss.v_centre, loss.parameters);
 }
 
 template class ShearAdjoint<kGroup>;

@@ -72,10 +72,11 @@ class ShearAdjoint {
   void pull_back_reading(const CompiledModel& model, const kernels::KernelTable& table,
                          BasicWorkspace<L>& w, const kernels::ShearSpringContact& of, int lane,
                          const TapedReading& reading, LossRows<L>& loss);
+  /// `parameters`: as in LossRows.
   void add_to_state(const CompiledModel& model, const kernels::KernelTable& table,
                     BasicWorkspace<L>& w, LaneBits lanes, const kernels::Row<L>* q,
                     const kernels::Row<L>* v, Cotangents& links, kernels::Row<L>* q_bar,
-                    kernels::Row<L>* v_bar);
+                    kernels::Row<L>* v_bar, kernels::Row<L>* parameters);
 
   std::vector<Cotangents> start_;  ///< of each loss: (n_links) where the solve began
   Cotangents end_;

@@ -232,6 +232,15 @@ struct Tangent::Impl {
             D(memory[k].s[c], dot.empty() ? 0 : dot[3 * k + c]);
   }
 
+  /// Places the stage at a state of the tape.
+  void stand(const double* row, const StateTangent& state) {
+    stage.centre = with_tangent(m(), row, kBlock, state.q);
+    const Duals v = with_tangent(row + m().nq * kBlock, kBlock, state.v);
+    for (std::size_t k = 0; k < v.size(); ++k) stage.x[k] = stage.s[k] = D(0.0), stage.r[k] = v[k];
+    stage.c0_over_h = 0;
+    stage.inverse_h = 1;
+  }
+
   /// Returns the tangents of the shear state.
   [[nodiscard]] std::vector<double> memory_dot(std::span<const ShearEntry> memory) const {
     std::vector<double> out;
@@ -333,13 +342,7 @@ void Tangent::field(const Batch& batch, int block, int lane, const BlockTape& ta
   Impl& i = *impl_;
   const CompiledModel& m = i.m();
   check_has_no_lag(i.model, sensor);
-  const double* row = tape.state(step) + lane;
-  i.stage.centre = with_tangent(m, row, kBlock, state.q);
-  const Duals v = with_tangent(row + m.nq * kBlock, kBlock, state.v);
-  for (std::size_t k = 0; k < v.size(); ++k)
-    i.stage.x[k] = i.stage.s[k] = D(0.0), i.stage.r[k] = v[k];
-  i.stage.c0_over_h = 0;
-  i.stage.inverse_h = 1;
+  i.stand(tape.state(step) + lane, state);
   const CompiledSensor& s = m.sensors[std::size_t(sensor)];
   std::vector<double> field(s.imperfect ? field_dot.size() : 0);
   i.set_memory(tape.memory(step, lane), state.shear);
@@ -348,6 +351,20 @@ void Tangent::field(const Batch& batch, int block, int lane, const BlockTape& ta
   const ReadingKey key = {batch.seed(), batch.episode(block * kBlock + lane),
                           tape.episode_step(step, lane)};
   i.imperfections.push_forward(s, key, field, field_dot);
+}
+
+void Tangent::end_effectors(const Batch& batch, int block, int lane, const BlockTape& tape,
+                            std::int64_t step, std::span<const double> numbers_dot,
+                            const StateTangent& state, std::span<double> change) {
+  Impl& i = *impl_;
+  i.stand(tape.state(step) + lane, state);
+  i.stage.set_numbers(batch.block(block) + lane, numbers_dot);
+  i.stage.rates();
+  double* to = change.data();
+  for (const CompiledEndEffector& of : i.m().end_effectors) {
+    const Vec3<D> x = i.stage.in_world(of.link, of.point);
+    *to++ = x.x.epsilon, *to++ = x.y.epsilon, *to++ = x.z.epsilon;
+  }
 }
 
 }  // namespace tangere

@@ -40,6 +40,12 @@ class Tangent {
              int sensor, std::span<const double> numbers_dot, std::span<const double> points_dot,
              const StateTangent& state, std::span<double> field_dot);
 
+  /// Computes how the places of the end effectors, (end effectors, 3), change with a state of the
+  /// tape and with the scene's numbers.
+  void end_effectors(const Batch& batch, int block, int lane, const BlockTape& tape,
+                     std::int64_t step, std::span<const double> numbers_dot,
+                     const StateTangent& state, std::span<double> change);
+
  private:
   struct Impl;
   std::unique_ptr<Impl> impl_;

@@ -184,19 +184,12 @@ class Directions {
       bar.field(k).spread(bar.field_bar(k), of_tiles);
       sum += std::inner_product(change.begin(), change.end(), of_tiles.begin(), 0.0);
     }
-    if (s_.loss.reads_end_effectors(t))
-      sum += along_end_effectors(batch, look.readout, bar.end_effectors_bar(), state);
-    return sum;
-  }
-
-  static double along_end_effectors(const Batch& batch, Readout& readout,
-                                    std::span<const double> x_bar, const StateTangent& state) {
-    const auto nv = state.q.size();
-    std::vector<double> jacobian(x_bar.size() * nv);
-    readout.end_effector_jacobian(batch, 0, jacobian);
-    double sum = 0;
-    for (std::size_t i = 0; i < x_bar.size(); ++i)
-      for (std::size_t k = 0; k < nv; ++k) sum += x_bar[i] * jacobian[i * nv + k] * state.q[k];
+    if (s_.loss.reads_end_effectors(t)) {
+      const std::span<const double> x_bar = bar.end_effectors_bar();
+      std::vector<double> change(x_bar.size());
+      tangent.end_effectors(batch, 0, 0, *tape_, t, rows, state, change);
+      sum += std::inner_product(change.begin(), change.end(), x_bar.begin(), 0.0);
+    }
     return sum;
   }
 

@@ -51,7 +51,6 @@ TaskTangent::TaskTangent(TaskRollout& rollout, std::span<const double> actions,
     : rollout_(rollout),
       task_(rollout.task()),
       tangent_(task_.model(), options),
-      readout_(task_.model()),
       memory_(as_size(task_.spec().task_state)),
       action_(task_.spec().action.size()) {
   const bool pressure = std::ranges::any_of(
@@ -182,14 +181,10 @@ void TaskTangent::look(const BlockTape& tape, int step, std::size_t moment,
   seen.q[moment] = state_.q;
   seen.v[moment] = state_.v;
   tape.show(step, rollout_.batch(), 0);
-  const std::size_t nv = state_.q.size();
-  if (task_.end_effectors_size() > 0) {
-    std::vector<double> jacobian(task_.end_effectors_size() * nv);
-    readout_.end_effector_jacobian(rollout_.batch(), 0, jacobian);
-    for (std::size_t i = 0; i < task_.end_effectors_size(); ++i)
-      seen.end_effectors[moment].push_back(
-          product(std::span(jacobian).subspan(i * nv, nv), state_.q));
-  }
+  seen.end_effectors[moment].resize(task_.end_effectors_size());
+  if (task_.end_effectors_size() > 0)
+    tangent_.end_effectors(rollout_.batch(), 0, 0, tape, step, numbers, state_,
+                           seen.end_effectors[moment]);
   if (task_.tactile_size() == 0) return;
   for (const FieldOutput& output : task_.fields()) {
     const int s = output.sensor;

@@ -33,7 +33,7 @@ inline void expect_tangent(const Model& model, const StepperOptions& options, co
   StateTangent state{draw(nv), draw(nv), std::vector<double>(nv), std::vector<double>(nv)};
   const NumberGradients numbers(model);
   std::vector<double> change = draw(std::size_t(numbers.count()));
-  for (std::size_t k = 0; k < change.size(); ++k) change[k] *= numbers.infos()[k].value;
+  for (std::size_t k = 0; k < change.size(); ++k) change[k] *= size_of(numbers.infos()[k]);
   double reverse = 0, forward = 0;
   for (std::size_t i = 0; i < nv; ++i)
     reverse += adjoint.q[i] * state.q[i] + adjoint.v[i] * state.v[i];
