@@ -28,6 +28,10 @@ class DualStage {
   /// (parameter_numbers), in the order of kernels/step/arguments.hpp; empty: zeros.
   void set_numbers(const double* column, std::span<const double> tangents = {});
 
+  /// Sets the tangents of every point's own numbers of a sensor with shear springs, (points,
+  /// kPointNumbers); empty: zeros.
+  void set_points(int sensor, std::span<const double> tangents);
+
   /// While frozen, the numbers' tangents count as zero.
   void freeze_numbers(bool frozen);
 

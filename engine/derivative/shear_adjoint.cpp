@@ -19,6 +19,18 @@ using kernels::Vec6;
 
 namespace {
 
+/// Returns the numbers of a sensor's points among those of all; empty for other contacts.
+std::span<double> points_of(const CompiledModel& m, const ShearSpringContact& of,
+                            std::span<double> all) {
+  if (of.sensor < 0 || all.empty()) return {};
+  const auto numbers = [](const CompiledSensor& s) {
+    return kernels::kPointNumbers * std::size_t(s.points());
+  };
+  std::size_t first = 0;
+  for (int s = 0; s < of.sensor; ++s) first += numbers(m.sensors[std::size_t(s)]);
+  return all.subspan(first, numbers(m.sensors[std::size_t(of.sensor)]));
+}
+
 /// Pulls cotangents of the motion of body 2 relative to body 1 back to the two links.
 template <int L>
 void hand_on(const ShearSpringContact& of, const AlignedVector<LinkPose<Row<L>>>& poses,
@@ -53,7 +65,7 @@ ShearAdjoint<L>::ShearAdjoint(const CompiledModel& m, int losses) {
   scratch_.resize(bytes);
   for (const ShearSpringContact& of : m.shear_springs)
     stride = std::max(stride, std::size_t(of.contact.n_points + 2 * kGroup));
-  numbers_.resize(18 * stride);
+  numbers_.resize((18 + kernels::kPointNumbers) * stride);
 }
 
 template <int L>
@@ -80,6 +92,21 @@ void ShearAdjoint<L>::add_to_state(const CompiledModel& m, const kernels::Kernel
   add(v_bar, by_v, m.nv);
   if (parameters != nullptr)
     add(parameters + m.view.rows.places, by_place, kernels::kPlaceNumbers * m.view.n_links);
+}
+
+/// Pulls one contact back. `points`: of a sensor's points, or empty. `own`: scratch.
+template <int L>
+void ShearAdjoint<L>::pull_back_points(const CompiledModel& m, const kernels::KernelTable& table,
+                                       const BasicWorkspace<L>& w, kernels::ShearPullback& pullback,
+                                       std::span<double> points, double* own) {
+  if (!points.empty()) {
+    std::fill_n(own, kernels::kPointNumbers * pullback.points.stride, 0.0);
+    pullback.own = own;
+  }
+  table.pull_back_memory(pullback);
+  if (points.empty()) return;
+  const CompiledSensor& sensor = m.sensors[std::size_t(pullback.end->of->sensor)];
+  w.remembered.felt.add_to_points(m, sensor, pullback.points, own, points);
 }
 
 /// Pulls back through all contacts: the final shear state, or the forces along a slip.
@@ -112,8 +139,16 @@ void ShearAdjoint<L>::pull_back(const CompiledModel& m, const kernels::KernelTab
       Vec6<double> slip{};
       if (of_forces) slip = touch_of(m, w, of, slip_touches_, l).twist;
       kernels::ShearCotangentSums sums{};
-      table.pull_back_memory({&start, &end, points, remembered, of_forces ? nullptr : s_bar,
-                              nullptr, of_forces ? &slip : nullptr, s_out, &sums});
+      kernels::ShearPullback pullback = {&start,
+                                         &end,
+                                         points,
+                                         remembered,
+                                         of_forces ? nullptr : s_bar,
+                                         nullptr,
+                                         of_forces ? &slip : nullptr,
+                                         s_out,
+                                         &sums};
+      pull_back_points(m, table, w, pullback, points_of(m, of, loss.points[lane]), s_out + rows);
       if (!of_forces) hand_on<L>(of, at_, sums.end.displacement, sums.end.twist, l, end_);
       hand_on<L>(of, w.remembered.start, sums.start, Vec6<double>{}, l,
                  start_[std::size_t(number)]);
@@ -163,7 +198,8 @@ void ShearAdjoint<L>::pull_back_reading(const CompiledModel& m, const kernels::K
   pullback.anchor_bar = anchor_bar;
   pullback.kept = felt.scratch() + 6 * points.stride;
   pullback.anchor_out = anchor_out;
-  table.pull_back_memory(pullback);
+  pull_back_points(m, table, w, pullback, points_of(m, of, loss.points[std::size_t(lane)]),
+                   anchor_out + 2 * rows);
   sums.end.displacement += sums.start;
   hand_on<L>(of, at_, sums.end.displacement, sums.end.twist, lane, end_);
   if (loss.parameters != nullptr)

@@ -10,7 +10,9 @@
 
 #include "engine/derivative/number_gradients.hpp"
 #include "engine/derivative/tactile_point_numbers.hpp"
+#include "engine/scene/scene_faults.hpp"
 #include "engine/scene/scene_number.hpp"
+#include "engine/scene/variable_numbers.hpp"
 #include "engine/step/displacement.hpp"
 #include "python/module/arrays.hpp"
 #include "python/module/batch_arrays.hpp"
@@ -36,11 +38,35 @@ struct TapeArguments {
   TapeOptions options;
 };
 
+/// Whether a number that has a derivative is the same in all environments: contact points follow
+/// from a size, and <randomize> does not know every number.
+bool is_shared(const Scene& scene, const std::string& name) {
+  for (const SceneNumber& number : variable_numbers(scene)) {
+    if (name_of(number) != name) continue;
+    if (number.owner != NumberOwner::body || number.field == NumberField::density) return false;
+    try {
+      Scene other = scene;
+      let_vary(other, number);
+      static_cast<void>(Model(other));
+      return false;
+    } catch (const InputError&) {
+      return true;
+    }
+  }
+  const NumberGradients numbers{Model(scene)};
+  return std::ranges::count(numbers.infos(), name, &NumberInfo::name) > 0;
+}
+
+std::vector<std::string> own_names(const Scene& scene, std::vector<std::string> names) {
+  std::erase_if(names, [&](const std::string& name) { return is_shared(scene, name); });
+  return names;
+}
+
 /// A compiled scene, its tape, and where its parameters are.
 struct TapedScene {
   TapedScene(const Scene& scene, const TapeArguments& a)
-      : task(with_varying(scene, a.parameters), a.every, static_cast<int>(a.options.length),
-             a.readings),
+      : task(with_varying(scene, own_names(scene, a.parameters)), a.every,
+             static_cast<int>(a.options.length), a.readings),
         tape(task, a.environments, a.options) {
     const NumberGradients numbers(task.model());
     for (const std::string& name : a.parameters) {
@@ -50,15 +76,18 @@ struct TapedScene {
       if (at == numbers.infos().end())
         throw InputError(fmt::format("'{}' has no derivative; expected another number", name));
       rows.push_back(as_size(at - numbers.infos().begin()));
-      varying.push_back(as_size(randomization_of(task.model().scene(), at->number)));
+      varying.push_back(randomization_of(task.model().scene(), at->number));
+      addresses.push_back(at->number);
     }
     number_count = as_size(numbers.count());
   }
 
   SceneTask task;
   TaskTape tape;
-  std::size_t number_count = 0;            ///< by which there are derivatives
-  std::vector<std::size_t> rows, varying;  ///< (parameters) among these, and among what varies
+  std::size_t number_count = 0;   ///< by which there are derivatives
+  std::vector<std::size_t> rows;  ///< (parameters) among these
+  std::vector<int> varying;       ///< (parameters) among what varies; -1: the same in all
+  std::vector<SceneNumber> addresses;
 };
 
 class SceneTape {
@@ -89,7 +118,7 @@ class SceneTape {
     const std::vector<std::vector<double>> drawn = rows_of_varying(randomized);
     const InUse::Turn turn(in_use_);
     const nb::gil_scoped_release free;
-    move_points(moved);
+    compile_with(moved, shared_values(given));
     draw_numbers(draw, given, drawn);
     tape().reset(draw, 0, record);
     if (q || v) {
@@ -172,7 +201,7 @@ class SceneTape {
     const InUse::Turn turn(in_use_);
     std::vector<double> all;
     for (std::size_t e = 0; e < count(); ++e)
-      for (const std::size_t k : taped_->varying) all.push_back(drawn_[e * varying_count() + k]);
+      for (std::size_t k = 0; k < names().size(); ++k) all.push_back(parameter(e, k));
     return array_of<double>({count(), names().size()}, std::span<const double>(all));
   }
 
@@ -192,12 +221,48 @@ class SceneTape {
   [[nodiscard]] std::size_t width() const { return spec().observation_size(); }
   [[nodiscard]] std::size_t varying_count() const { return model().scene().randomizations.size(); }
 
-  /// Compiles the scene again where the points' own numbers, (points, 7) or empty for none, differ
-  /// from those of the last reset.
-  void move_points(std::vector<double> moved) {
+  [[nodiscard]] double parameter(std::size_t environment, std::size_t k) const {
+    const int at = taped_->varying[k];
+    return at < 0 ? number_in(model().scene(), taped_->addresses[k])
+                  : drawn_[environment * varying_count() + as_size(at)];
+  }
+
+  /// Returns the values of parameters that are the same in all environments, from (E, names) or
+  /// empty. Throws InputError where they differ.
+  std::vector<double> shared_values(const std::vector<double>& given) const {
+    std::vector<double> shared;
+    for (std::size_t k = 0; k < names().size() && !given.empty(); ++k) {
+      if (taped_->varying[k] >= 0) continue;
+      shared.push_back(given[k]);
+      for (std::size_t e = 1; e < count(); ++e)
+        if (const double other = given[e * names().size() + k]; other != shared.back())
+          throw InputError(
+              fmt::format("'{}' of {} and {}; expected one value: it is the same in "
+                          "all environments",
+                          names()[k], shared.back(), other));
+    }
+    return shared;
+  }
+
+  /// Sets the scene's own numbers to `shared`, in order.
+  void set_shared(Scene& scene, const std::vector<double>& shared) const {
+    std::size_t next = 0;
+    for (std::size_t k = 0; k < names().size() && next < shared.size(); ++k) {
+      if (taped_->varying[k] >= 0) continue;
+      const SceneNumber& number = taped_->addresses[k];
+      if (const std::string fault = varying_value_fault(number, shared[next]); !fault.empty())
+        throw InputError("'" + names()[k] + "': " + fault);
+      number_in(scene, number) = shared[next++];
+    }
+  }
+
+  /// Compiles the scene again where the points' own numbers, (points, 7) or empty for none, or
+  /// `shared` differ from those of the last reset.
+  void compile_with(std::vector<double> moved, const std::vector<double>& shared) {
     if (std::ranges::all_of(moved, [](double x) { return x == 0; })) moved.clear();
-    if (moved == moved_) return;
+    if (moved == moved_ && shared == shared_) return;
     Scene scene = arguments_.scene;
+    set_shared(scene, shared);
     std::span<const double> left = moved;
     for (std::size_t s = 0; s < scene.sensors.size() && !left.empty(); ++s) {
       const std::size_t numbers = kPointNumbers * as_size(model().sensors()[s].points);
@@ -212,6 +277,7 @@ class SceneTape {
     }
     taped_ = std::make_unique<TapedScene>(scene, arguments_);
     moved_ = std::move(moved);
+    shared_ = shared;
   }
 
   /// Adds an environment's derivatives by its points' own numbers to those by the change of the
@@ -297,7 +363,8 @@ class SceneTape {
         drawn_[e * varying_count() + k] = others[k][e];
     for (std::size_t e = 0; e < count() && !given.empty(); ++e)
       for (std::size_t k = 0; k < names().size(); ++k)
-        drawn_[e * varying_count() + taped_->varying[k]] = given[e * names().size() + k];
+        if (const int at = taped_->varying[k]; at >= 0)
+          drawn_[e * varying_count() + as_size(at)] = given[e * names().size() + k];
     if (!given.empty() || !others.empty()) check_drawn(batch);
     taped_->task.set_varying(drawn_);
   }
@@ -305,7 +372,8 @@ class SceneTape {
   TapeArguments arguments_;
   std::unique_ptr<TapedScene> taped_;
   std::vector<double> drawn_, first_q_;
-  std::vector<double> moved_;  ///< (points, 7) of the compiled scene; empty: none
+  std::vector<double> moved_;   ///< (points, 7) of the compiled scene; empty: none
+  std::vector<double> shared_;  ///< parameters that are the same in all; empty: the scene's
   InUse in_use_;
 };
 

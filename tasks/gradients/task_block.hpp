@@ -81,7 +81,7 @@ class TaskBlock : public TapeBlock {
   TaskRollout rollout_;
   std::vector<ActionRecord> records_;  // (actions)
   std::array<bool, kernels::kBlock> took_{};
-  std::array<ShearState, kernels::kBlock> start_shear_;  // shear states at the reset
+  BlockTape start_;                    // states at the reset
   std::vector<SnapshotRows> warm_up_;  // snapshots of a warm-up before its last one
   // Cotangents for the action reversed last: of its snapshots, first state, controls, and itself.
   std::vector<SnapshotRows> snapshots_bar_;

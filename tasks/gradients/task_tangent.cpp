@@ -53,12 +53,12 @@ TaskTangent::TaskTangent(TaskRollout& rollout, std::span<const double> actions,
       tangent_(task_.model(), options),
       memory_(as_size(task_.spec().task_state)),
       action_(task_.spec().action.size()) {
-  const bool pressure = std::ranges::any_of(
-      task_.fields(), [](const FieldOutput& o) { return o.form == FieldForm::pressure; });
-  if (task_.bodies_size() > 0 || pressure)
+  const bool other = std::ranges::any_of(
+      task_.fields(), [](const FieldOutput& o) { return o.form != FieldForm::field; });
+  if (task_.bodies_size() > 0 || other)
     throw InputError("task " + task_.spec().name +
-                     " reads bodies or pressures, which have no forward derivatives; expected end "
-                     "effectors and fields");
+                     " reads bodies, pressures or ideal fields, which have no forward derivatives; "
+                     "expected end effectors and fields");
   for (std::size_t a = 0; a * action_.size() < actions.size(); ++a) {
     ActionRecord& r = records_.emplace_back(task_);
     const auto own = actions.subspan(a * action_.size(), action_.size());
