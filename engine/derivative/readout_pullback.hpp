@@ -16,10 +16,10 @@ namespace tangere {
 void check_has_no_lag(const Model& model, std::span<const FieldOutput> outputs);
 
 /// Owns the scratch of one thread. Allocates in the constructor, and whenever a call has more tiles
-/// than any before. For each state call place(); then for each loss clear(), any number of fields and
-/// end effectors, and finish(). Fields are recomputed in double, independent of the precision in
-/// which they were read. What sensors with lag read of earlier states goes to BlockCotangent::past:
-/// the batch must hold these states (BlockTape::show).
+/// than any before. For each state call place(); then for each loss clear(), any number of fields
+/// and end effectors, and finish(). Fields are recomputed in double, independent of the precision
+/// in which they were read. What sensors with lag read of earlier states goes to
+/// BlockCotangent::past: the batch must hold these states (BlockTape::show).
 class ReadoutPullback {
  public:
   explicit ReadoutPullback(const Model& model);
@@ -33,7 +33,8 @@ class ReadoutPullback {
   /// Takes the cotangents of a sensor's field in lane `lane` of the block: `tiles` of 8 × 8 points
   /// (CompactFrame::tiles) with `cotangents` (tiles, 3, 8, 8). Points outside the tiles, or where
   /// nothing touches, have no derivative. `parameters`: (parameter_rows, 16) of the loss, to which
-  /// derivatives by the sensor's coefficients and the sizes of what touches it are added, or empty.
+  /// derivatives by the sensor's coefficients and the sizes of what touches it are added, or empty;
+  /// finish() adds those by places of joints to BlockCotangent::parameters.
   /// `points`: (points, kPointNumbers) of the sensor, to which derivatives by every point's own
   /// numbers are added (engine/derivative/tactile_point_numbers.hpp), or empty.
   void field(int lane, int sensor, std::span<const int> tiles, std::span<const double> cotangents,

@@ -30,17 +30,18 @@ class Tangent {
 
   /// Advances the tangent of the state after `step` steps by one step, as environment `lane` of the
   /// block took it. `u`, `u_dot`: (nu) its controls and how they change. `numbers_dot`: how the
-  /// scene's numbers change, as rows of BlockCotangent::parameters, or empty. `points_dot`: those of
-  /// every sensor's points, (points, kPointNumbers) (engine/derivative/tactile_point_numbers.hpp),
-  /// or empty: the shear state depends on them.
+  /// scene's numbers change, as rows of BlockCotangent::parameters, or empty. `points_dot`: how
+  /// every sensor's points change, (points, kPointNumbers)
+  /// (engine/derivative/tactile_point_numbers.hpp), or empty: the shear state depends on them.
   void step(const Batch& batch, int block, int lane, const BlockTape& tape, std::int64_t step,
             std::span<const double> u, std::span<const double> u_dot,
             std::span<const double> numbers_dot, StateTangent& state,
             std::span<const std::vector<double>> points_dot = {});
 
-  /// Computes how a sensor's reading, (points, 3), changes with a state of the tape, with the scene's
-  /// numbers and with every point's own numbers. `points_dot`: (points, kPointNumbers), or empty. For a
-  /// sensor with lag, `batch` must hold the state and the earlier ones (BlockTape::show).
+  /// Computes how a sensor's reading, (points, 3), changes with a state of the tape, with the
+  /// scene's numbers and with every point's own numbers. `points_dot`: (points, kPointNumbers), or
+  /// empty. For a sensor with lag, `batch` must hold the state and the earlier ones
+  /// (BlockTape::show).
   void field(const Batch& batch, int block, int lane, const BlockTape& tape, std::int64_t step,
              int sensor, std::span<const double> numbers_dot, std::span<const double> points_dot,
              const StateTangent& state, std::span<double> field_dot);

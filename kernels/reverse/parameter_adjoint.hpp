@@ -288,8 +288,8 @@ void contact_places(const ModelView& model, const StageArgs<N>& a, const LinkAdj
   }
 }
 
-/// Computes the derivatives by Link::frame.p of every link. A move ε of a subtree in the axes of its
-/// first link, without turning it, changes Λ, V and A there by Λ_p × ε, V_p × ε and A_p × ε.
+/// Computes the derivatives by Link::frame.p of every link. A move ε of a subtree in the axes of
+/// its first link, without turning it, changes Λ, V and A there by Λ_p × ε, V_p × ε and A_p × ε.
 template <class N>
 void place_parameters(const ModelView& model, const StageArgs<N>& a, const LinkAdjoint<N>* links,
                       N* out) {

@@ -81,7 +81,8 @@ void add_own(const OwnCotangent<Lanes<A>>& own, const Coefficients<double>& of_s
 
 /// Reverses one point at the end of a step: adds to motion and coefficients, and returns the
 /// cotangent of its anchor. f̄ and s̄' are zero where nothing touches. x̄ is of where the force acts.
-/// `law` is that of the point, `scale` times that of its contact. `own`: ξ̄ is added to, the law set.
+/// `law` is that of the point, `scale` times that of its contact. `own`: ξ̄ is added to, its law is
+/// set.
 template <class Shape, class N>
 Anchor<N> pull_back_elastic(const LoadedTouch<N>& t, const LawParameters<N>& law,
                             const Coefficients<N>& scale, const ElasticPoint<N>& p,
