@@ -531,8 +531,8 @@ TEST(Record, ASensorWithMemoryKeepsToItsTimestepAndHasAGradient) {
 TEST(Record, ALateSensorHasGradientsByThreeRoutes) {
   const Folder folder;
   folder.write("ball.xml", imperfect_ball("delay=\"0.007\" low_pass=\"0.01\" noise=\"1e-3\""));
-  const json found = run_json(folder, {"gradcheck", "ball.xml", "--loss", "tactile", "--steps",
-                                       "90", "--entries", "4"});
+  const json found = run_json(
+      folder, {"gradcheck", "ball.xml", "--loss", "tactile", "--steps", "90", "--entries", "4"});
   EXPECT_LT(found.at("max_relative_error").get<double>(), 1e-6);
   const auto gradient = [&](const Words& more) {
     EXPECT_EQ(run(folder, Words{"simulate", "ball.xml", "-o", "x.h5", "--steps", "90", "--envs",
