@@ -113,6 +113,9 @@ struct Adjoint::Impl {
         const auto rest = bar.begin() + (bar.empty() ? 0 : 3 * kept_entries(m, after));
         x.adjoint.losses[k].kept[std::size_t(l)].assign(bar.begin(), rest);
         x.adjoint.losses[k].memory[std::size_t(l)].assign(rest, bar.end());
+        const std::size_t count = losses[k].points.size() / kBlock;
+        x.adjoint.losses[k].points[std::size_t(l)] =
+            std::span(losses[k].points).subspan(count * std::size_t(g.first + l), count);
       }
     }
     w.stage.block = rows.data() + g.first;
@@ -243,6 +246,7 @@ struct Adjoint::Impl {
       c.previous_q[at] = o.q_before[i][lane];
       c.previous_v[at] = o.v_before[i][lane];
     }
+    if (!c.past.empty()) go_back(c, column);
     if (!m.shear_springs.empty()) {
       std::vector<double>& memory = c.shear[std::size_t(column)];
       const std::vector<double>& rest = o.memory_before[std::size_t(lane)];
@@ -253,6 +257,17 @@ struct Adjoint::Impl {
     if (o.parameters == nullptr) return;
     for (int i = 0; i < parameter_rows(model); ++i)
       c.parameters[std::size_t(i * kBlock + column)] += o.parameters[i][lane];
+  }
+
+  /// Adds the cotangents of the state one step before, and moves those of earlier ones up.
+  void go_back(BlockCotangent& c, int column) const {
+    const std::size_t state = 2 * std::size_t(model.nv()) * kBlock;
+    for (std::size_t i = 0; i < std::size_t(model.nv()); ++i) {
+      c.q[i * kBlock + std::size_t(column)] += c.past[i * kBlock + std::size_t(column)];
+      c.v[i * kBlock + std::size_t(column)] += c.past[state / 2 + i * kBlock + std::size_t(column)];
+    }
+    for (std::size_t k = std::size_t(column); k < c.past.size(); k += kBlock)
+      c.past[k] = k + state < c.past.size() ? c.past[k + state] : 0;
   }
 
   /// Reverses a step that was not taken: both states are the same.
@@ -283,7 +298,8 @@ const BlockCotangent& Adjoint::loss(int k) const { return impl_->losses[std::siz
 
 void Adjoint::clear() {
   for (BlockCotangent& c : impl_->losses)
-    for (auto* x : {&c.q, &c.v, &c.previous_q, &c.previous_v, &c.u, &c.parameters, &c.points})
+    for (auto* x :
+         {&c.q, &c.v, &c.previous_q, &c.previous_v, &c.past, &c.u, &c.parameters, &c.points})
       std::fill(x->begin(), x->end(), 0.0);
   for (BlockCotangent& c : impl_->losses)
     for (std::vector<double>& lane : c.shear) lane.clear();

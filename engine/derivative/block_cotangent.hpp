@@ -16,6 +16,9 @@ namespace tangere {
 struct BlockCotangent {
   AlignedVector<double> q, v;                    ///< (nv, 16) of the newest state
   AlignedVector<double> previous_q, previous_v;  ///< (nv, 16) of the state one step before it
+  /// (past states, 2, nv, 16) of q and v of the states 1, 2 … steps before the newest, which
+  /// sensors with lag read. Empty: zeros.
+  AlignedVector<double> past{};
   AlignedVector<double> u;  ///< (nu, 16) of the controls of the step reversed last
   /// Of the shear state at the newest state: for each lane, three numbers for each of its entries
   /// (engine/step/shear_state.hpp). Empty: zeros.

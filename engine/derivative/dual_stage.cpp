@@ -47,7 +47,8 @@ struct DualStage::Impl {
   std::vector<std::vector<D>> listed_anchors;  ///< of each pair
   std::vector<D> ground_anchors;
   std::vector<Coefficients<D>> sensor_laws;
-  std::vector<kernels::Vec3<double>> felt_sizes;  ///< of each body in this environment
+  std::vector<std::vector<double>> point_tangents;  ///< of each sensor; empty: zeros
+  std::vector<kernels::Vec3<double>> felt_sizes;    ///< of each body in this environment
 
   explicit Impl(const CompiledModel& model)
       : m(model),
@@ -72,8 +73,6 @@ struct DualStage::Impl {
       kernels::DofEffects& e = effects[std::size_t(dof)];
       for (int k = 0; k < kernels::kDofNumbers; ++k)
         row(e.*kernels::kDofParameters[k], view.rows.dof(dof, k));
-      row(e.armature, -1);
-      row(e.limit_stiffness, -1);
     }
     // `first`: row of the block that holds the first number, or -1: the numbers are `values`.
     const auto side_by_side = [this](int& first, int count, const double* values, int which) {
@@ -90,9 +89,13 @@ struct DualStage::Impl {
       if (g.radius > 0) side_by_side(g.radius_row, 1, &g.radius, view.rows.solid(g.body));
     for (auto& g : grounds)
       g.point_tangents = ground_tangents.emplace_back(std::size_t(3 * g.n_points)).data();
-    for (kernels::Link& link : bodies) {
+    for (std::size_t k = 0; k < bodies.size(); ++k) {
+      kernels::Link& link = bodies[k];
       link.inertia_row = -1;
-      if (link.place_row >= 0) side_by_side(link.place_row, 3, nullptr, -1);
+      link.has_offset = true;  // numbers that are zero may have tangents
+      link.effects |= kernels::kArmature | kernels::kSpring | kernels::kLimit;
+      side_by_side(link.place_row, kernels::kPlaceNumbers, &link.frame.p.x,
+                   view.rows.place(static_cast<int>(k)));
     }
     view.links = bodies.data();
     view.pairs = pairs.data();
@@ -121,6 +124,7 @@ struct DualStage::Impl {
     anchors.resize(std::size_t(m.shear_spring_points));
     ground_anchors.assign(std::size_t(kernels::kAnchorNumbers * m.ground_anchors), D(0.0));
     sensor_laws.resize(m.sensors.size());
+    point_tangents.resize(m.sensors.size());
     felt_sizes.resize(m.bodies.size());
   }
 
@@ -226,9 +230,15 @@ struct DualStage::Impl {
     if (of.contact.weights != nullptr) kernels::set_weighted(t.law, D(of.contact.weights[i]), law);
     if (of.sensor < 0) return law;
     const std::vector<double>& factors = m.sensors[std::size_t(of.sensor)].point_factors;
-    if (factors.empty()) return law;
-    const double* own = &factors[std::size_t(kPointCoefficients * i)];
-    for (std::size_t k = 0; k < kCoefficients; ++k) law[k] = D(own[factor_index(k)]) * law[k];
+    if (!factors.empty()) {
+      const double* own = &factors[std::size_t(kPointCoefficients * i)];
+      for (std::size_t k = 0; k < kCoefficients; ++k) law[k] = D(own[factor_index(k)]) * law[k];
+    }
+    const double* own = own_tangents(of, i);
+    if (own == nullptr) return law;
+    for (std::size_t k = 0; k < kPointCoefficients; ++k) law[k] += D(0.0, own[3 + k]);
+    if (t.law.kt.value != 0)  // a point's ks keeps its ratio to kt
+      law.ks += D(0.0, own[3 + factor_index(kCoefficients - 1)] * t.law.ks.value / t.law.kt.value);
     return law;
   }
 
@@ -279,9 +289,21 @@ struct DualStage::Impl {
     return out;
   }
 
-  static kernels::Vec3<D> place(const kernels::ShearSpringContact& of, int i) {
+  /// Returns the tangents of a sensor's point i of its own numbers, or null.
+  [[nodiscard]] const double* own_tangents(const kernels::ShearSpringContact& of, int i) const {
+    if (of.sensor < 0 || point_tangents[std::size_t(of.sensor)].empty()) return nullptr;
+    const CompiledSensor& s = m.sensors[std::size_t(of.sensor)];
+    return &point_tangents[std::size_t(of.sensor)]
+                          [std::size_t(kernels::kPointNumbers * s.in_field[std::size_t(i)])];
+  }
+  [[nodiscard]] kernels::Vec3<D> place(const kernels::ShearSpringContact& of, int i) const {
     const double* p = of.contact.points + 3 * i;
-    return {D(p[0]), D(p[1]), D(p[2])};
+    const double* t = own_tangents(of, i);
+    if (t == nullptr) return {D(p[0]), D(p[1]), D(p[2])};
+    const int body = m.sensors[std::size_t(of.sensor)].body;
+    const kernels::Vec3<double> moves =
+        m.bodies[std::size_t(body)].frame.R * kernels::Vec3<double>{t[0], t[1], t[2]};
+    return {{p[0], moves.x}, {p[1], moves.y}, {p[2], moves.z}};
   }
 
   /// Lists the points that touch at the poses of kinematics(). The others add nothing to values or
@@ -423,6 +445,10 @@ void DualStage::set_numbers(const double* column, std::span<const double> tangen
   i.heavier = std::any_of(i.inertia.begin(), i.inertia.end(), [](double t) { return t != 0; });
 }
 
+void DualStage::set_points(int sensor, std::span<const double> tangents) {
+  impl_->point_tangents[std::size_t(sensor)].assign(tangents.begin(), tangents.end());
+}
+
 void DualStage::choose_faces() {
   Impl& i = *impl_;
   const std::vector<D> zero(v.size(), D(0.0));
@@ -445,7 +471,7 @@ void DualStage::recall() {
       for (int k = 0; k < of.contact.n_points; ++k) {
         const D* kept = &remembered[3 * std::size_t(of.first + k)];
         i.anchors[std::size_t(of.first + k)] = kernels::recalled(
-            shape, t, Impl::place(of, k), kernels::Vec3<D>{kept[0], kept[1], kept[2]});
+            shape, t, i.place(of, k), kernels::Vec3<D>{kept[0], kept[1], kept[2]});
       }
     });
   }
@@ -460,7 +486,7 @@ void DualStage::advance(const std::vector<D>& q, const std::vector<D>& twist) {
     const kernels::LoadedTouch<D> t = i.touch(of, poses);
     i.with_touched_shape(of, [&](const auto& shape) {
       for (int k = 0; k < of.contact.n_points; ++k) {
-        const auto p = kernels::meet_elastic(shape, t, i.law_of(of, k, t), Impl::place(of, k),
+        const auto p = kernels::meet_elastic(shape, t, i.law_of(of, k, t), i.place(of, k),
                                              i.anchors[std::size_t(of.first + k)]);
         D* kept = &remembered[3 * std::size_t(of.first + k)];
         const kernels::Vec3<D> next = p.d < D(0.0) ? p.hold * p.s : kernels::zero3<D>();
@@ -478,7 +504,7 @@ void DualStage::update_sensor_shear_state(const std::vector<D>& q, const std::ve
     if (!is_due(i.m, of, steps)) continue;
     i.meet_felt(of, poses, remembered, [&](const auto& shape, const auto& t, int k, const auto& p) {
       kernels::Anchor<D> after = {kernels::zero3<D>(), kernels::zero3<D>(), D(0.0)};
-      if (p.d < D(0.0)) after = kernels::recalled(shape, t, Impl::place(of, k), p.hold * p.s);
+      if (p.d < D(0.0)) after = kernels::recalled(shape, t, i.place(of, k), p.hold * p.s);
       D* const b = &remembered[3 * std::size_t(of.first + k)];
       D* const a = b + 3 * of.contact.n_points;
       b[0] = after.b.x, b[1] = after.b.y, b[2] = after.b.z;
@@ -488,6 +514,13 @@ void DualStage::update_sensor_shear_state(const std::vector<D>& q, const std::ve
 }
 
 void DualStage::rates() { kernels::kinematics(impl_->view, impl_->arguments(*this)); }
+
+kernels::Vec3<D> DualStage::in_world(int link, const kernels::Vec3<double>& point) const {
+  const kernels::Vec3<D> at = kernels::broadcast<D>(point);
+  if (link < 0) return at;
+  const kernels::Frame<D>& pose = impl_->links[std::size_t(link)].world;
+  return pose.R * at + pose.p;
+}
 
 void DualStage::freeze_numbers(bool frozen) {
   Impl& i = *impl_;
@@ -526,7 +559,10 @@ void DualStage::field(int sensor, const double* column, std::span<const double> 
     ++number;
     return D(p.row < 0 ? p.value : column[p.row * kBlock], tangent);
   });
-  if (felt.elastic) return elastic_field(sensor, coefficients, field, field_dot);
+  if (felt.elastic) {
+    set_points(sensor, points);
+    return elastic_field(sensor, coefficients, field, field_dot);
+  }
   read_dual_field(i.m, sensor, i.links, coefficients, column, numbers, points, field, field_dot);
 }
 

@@ -28,6 +28,10 @@ class DualStage {
   /// (parameter_numbers), in the order of kernels/step/arguments.hpp; empty: zeros.
   void set_numbers(const double* column, std::span<const double> tangents = {});
 
+  /// Sets the tangents of every point's own numbers of a sensor with shear springs, (points,
+  /// kPointNumbers); empty: zeros.
+  void set_points(int sensor, std::span<const double> tangents);
+
   /// While frozen, the numbers' tangents count as zero.
   void freeze_numbers(bool frozen);
 
@@ -48,8 +52,11 @@ class DualStage {
 
   /// Computes v and g, with the tangents of masses included.
   void residual();
-  /// Computes v alone.
+  /// Computes v alone, and the poses of links.
   void rates();
+  /// Returns where a point of a link (-1: the world) is, at the poses computed last.
+  [[nodiscard]] kernels::Vec3<DualNumber> in_world(int link,
+                                                   const kernels::Vec3<double>& point) const;
 
   /// Computes how the field of a sensor, (points, 3), changes at the state centre ⊕ 0 with twist r
   /// (c0_over_h = 0, inverse_h = 1). `numbers`: tangents as rows of BlockCotangent::parameters; or

@@ -88,7 +88,7 @@ struct FieldTangent::Impl {
     ideal_field(s, every, of_tiles);
     for (const int tile : every)
       expand_tile<3>(pad, tile, of_tiles.data() + 3 * kernels::kTactileTile * tile, field.data());
-    read_ideal(reader, s, lane / kGroup, lane % kGroup, ideal);
+    read_ideal(reader, s, reader.arguments<double>(s.number, lane / kGroup, lane % kGroup), ideal);
     imperfections.push_forward(s, key_of(*batch, kBlock * block + lane),
                                std::span(ideal).first(field.size()), field);
     for (std::size_t k = 0; k < tiles.size(); ++k)

@@ -187,16 +187,31 @@ void NumberGradients::add_joints() {
     const int n = dof_count(d.type),
               slides = d.turning ? n - (d.type == JointType::free ? 3 : 1) : n;
     if (n == 0) continue;
-    add({Owner::joint, Field::damping, d.name}, of_dofs(i, kernels::kDofDamping, 0, slides));
-    if (d.stiffness > 0)
-      add({Owner::joint, Field::stiffness, d.name}, of_dofs(i, kernels::kDofStiffness, 0, slides));
-    if (!d.turning) continue;
-    add({Owner::joint, Field::turning_damping, d.name},
-        of_dofs(i, kernels::kDofDamping, slides, n));
-    if (d.turning->stiffness > 0)
-      add({Owner::joint, Field::turning_stiffness, d.name},
-          of_dofs(i, kernels::kDofStiffness, slides, n));
+    const auto add_effect = [&](Field field, int which, int first, int end) {
+      add({Owner::joint, field, d.name}, of_dofs(i, which, first, end));
+    };
+    add_effect(Field::damping, kernels::kDofDamping, 0, slides);
+    add_effect(Field::armature, kernels::kDofArmature, 0, slides);
+    add_effect(Field::stiffness, kernels::kDofStiffness, 0, slides);
+    if (d.limits) add_effect(Field::lim_stiffness, kernels::kDofLimitStiffness, 0, slides);
+    if (d.turning) {
+      add_effect(Field::turning_damping, kernels::kDofDamping, slides, n);
+      add_effect(Field::turning_stiffness, kernels::kDofStiffness, slides, n);
+    }
+    add_place(i);
   }
+}
+
+/// A joint's place moves its first link, in the axes of the parent joint.
+void NumberGradients::add_place(std::size_t joint) {
+  const CompiledModel& m = compiled(model_);
+  const LinkDescription& d = model_.scene().links[joint];
+  const kernels::Mat3<double> R =
+      d.parent < 0 ? kernels::diagonal(1.0) : m.joints[std::size_t(d.parent)].frame.R;
+  const int row = m.view.rows.place(m.joints[joint].first_link);
+  for (int axis = 0; axis < 3; ++axis)
+    add({Owner::joint, Field::pos, d.joint.name, axis},
+        {{row, R.m[0][axis]}, {row + 1, R.m[1][axis]}, {row + 2, R.m[2][axis]}});
 }
 
 void NumberGradients::add_motors() {

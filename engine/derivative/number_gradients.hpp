@@ -19,8 +19,8 @@ struct NumberInfo {
   double value;            ///< in the scene; <randomize> may vary it by environment
 };
 
-/// Coefficients of contacts and sensors, densities (or masses) and sizes of bodies, damping and
-/// stiffness of joints, gains of position motors. Each appears once: a number that a scene gives
+/// Coefficients of contacts and sensors, densities (or masses) and sizes of bodies, effects and
+/// places of joints, gains of position motors. Each appears once: a number that a scene gives
 /// for a whole joint has one derivative. Every gradient by them has their order.
 class NumberGradients {
  public:
@@ -54,6 +54,7 @@ class NumberGradients {
   void add_contacts();
   void add_bodies();
   void add_joints();
+  void add_place(std::size_t joint);
   void add_motors();
   /// Terms of number `which` of the dofs `first` … `end` - 1 of a joint.
   [[nodiscard]] Terms of_dofs(std::size_t joint, int which, int first, int end) const;

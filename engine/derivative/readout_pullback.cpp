@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <array>
+#include <memory>
 
 #include "engine/derivative/link_cotangents.hpp"
 #include "engine/derivative/number_gradients.hpp"
@@ -16,6 +17,7 @@
 #include "engine/sense/elastic_field.hpp"
 #include "engine/sense/imperfect_field.hpp"
 #include "engine/sense/pad_reader.hpp"
+#include "engine/sense/past_states.hpp"
 
 namespace tangere {
 
@@ -42,7 +44,7 @@ struct ReadoutPullback::Impl {
   std::vector<int> met;  ///< (kGroups) sensor whose shapes the reader holds; -1: none
   std::array<AlignedVector<kernels::MotionCotangent<LaneRow>>, kGroups> links;
   std::array<bool, kGroups> used{};
-  AlignedVector<LaneRow> rows;  ///< q, v, zeros, rates, q̄, v̄ of one group
+  AlignedVector<LaneRow> rows;  ///< q, v, zeros, rates, q̄, v̄, places of one group
   AlignedVector<std::byte> scratch;
   std::vector<kernels::TouchCotangent<double>> touches;
   std::vector<kernels::Touch<double>> frictionless;
@@ -52,13 +54,18 @@ struct ReadoutPullback::Impl {
   ImperfectField imperfections;
   ElasticField elastic;
   std::array<std::vector<double>, kBlock> memory;  ///< cotangents of the shear state
-  std::vector<double> whole, ideal;                ///< (points, 3) of an imperfect sensor
+  std::vector<double> whole, ideal, expanded;      ///< (points, 3) of one sensor
+  /// For each lane, (1 + past states, 2, nv) cotangents of the present and of earlier states, by
+  /// sensors with lag; empty: zeros.
+  std::array<std::vector<double>, kBlock> lagging;
+  struct Past;
+  std::unique_ptr<Past> past;  ///< made when a sensor with lag is pulled back
 
   explicit Impl(const Model& m)
       : model(m), reader(m), met(kGroups, -1), imperfections(m), elastic(m) {
     const CompiledModel& c = compiled(m);
     for (auto& l : links) l.resize(c.links.size());
-    rows.resize(std::size_t(c.nq + 5 * c.nv));
+    rows.resize(std::size_t(c.nq + 5 * c.nv) + kernels::kPlaceNumbers * c.links.size());
     std::size_t bytes = 0, targets = 0;
     for (const kernels::KernelTable* t : kernels::available_kernels())
       bytes = std::max(bytes, t->pullback_bytes(c.view));
@@ -67,6 +74,7 @@ struct ReadoutPullback::Impl {
       whole.resize(std::max(whole.size(), 3 * std::size_t(s.points())));
     }
     ideal.resize(whole.size());
+    expanded.resize(whole.size());
     scratch.resize(bytes);
     touches.resize(targets);
   }
@@ -111,21 +119,67 @@ struct ReadoutPullback::Impl {
         tiles.push_back(tile);
   }
 
-  /// Turns the cotangent of an imperfect sensor's reading, in `whole`, into that of its ideal
-  /// field.
-  void pull_back_imperfections(const CompiledSensor& s, int lane) {
-    const std::span<double> cotangent = std::span(whole).first(3 * std::size_t(s.points()));
-    const std::span<double> field = std::span(ideal).first(cotangent.size());
-    if (!(s.imperfections.saturation == NormalAndShear{})) {
-      find_touches(lane / kGroup, s.number);
-      if (s.elastic) {
-        elastic.read(reader, *batch, kBlock * block + lane, s.number, field);
-      } else {
-        read_ideal(reader, s, lane / kGroup, lane % kGroup, field);
-      }
-    }
-    imperfections.pull_back(s, key_of(*batch, kBlock * block + lane), field, cotangent);
+  /// The kernels' arguments for a lane whose touches were found. A pressure leaves friction out.
+  kernels::TactileArgs<double> arguments(const CompiledSensor& s, int lane, bool pressure) {
+    auto a = reader.arguments<double>(s.number, lane / kGroup, lane % kGroup);
+    if (!pressure) return a;
+    frictionless.assign(a.touches, a.touches + a.n_touches);
+    for (kernels::Touch<double>& t : frictionless) t.law.kt = t.law.mu = 0;
+    a.touches = frictionless.data();
+    return a;
   }
+
+  /// Computes the ideal field, (points, 3), or the ideal pressure, (points), in one lane.
+  void read(const CompiledSensor& s, int lane, bool pressure, std::span<double> to) {
+    find_touches(lane / kGroup, s.number);
+    if (!pressure && s.elastic)
+      return elastic.read(reader, *batch, kBlock * block + lane, s.number, to);
+    if (!pressure) return read_ideal(reader, s, arguments(s, lane, false), to);
+    const auto all = std::span(expanded).first(3 * to.size());
+    read_ideal(reader, s, arguments(s, lane, true), all);
+    for (std::size_t k = 0; k < to.size(); ++k) to[k] = all[3 * k + 2];
+  }
+
+  /// Pulls the cotangent in `whole` of a sensor's reading back: of its field or of its pressure.
+  void pull_back_reading(int lane, const CompiledSensor& s, bool pressure,
+                         std::span<double> parameters, std::span<double> points) {
+    const FieldPart part = part_of(pressure ? FieldForm::pressure : FieldForm::field);
+    const std::size_t numbers = std::size_t(part.count) * std::size_t(s.points());
+    const std::span<double> cotangent = std::span(whole).first(numbers),
+                            field = std::span(ideal).first(numbers);
+    const bool lags = s.past_states() > 0;
+    if (!(s.imperfections.saturation == NormalAndShear{}))
+      lags ? read_past(s, lane, pressure, field) : read(s, lane, pressure, field);
+    imperfections.pull_back(s, key_of(*batch, kBlock * block + lane), part, field, cotangent);
+    lags ? pull_back_past(lane, s, pressure, cotangent, parameters, points)
+         : pull_back_ideal(lane, s, pressure, cotangent, parameters, points);
+  }
+
+  /// Pulls the cotangent of the ideal field, (points, 3), or of the ideal pressure, (points), back.
+  void pull_back_ideal(int lane, const CompiledSensor& s, bool pressure,
+                       std::span<const double> cotangent, std::span<double> parameters,
+                       std::span<double> points) {
+    if (!pressure && s.elastic) {
+      std::copy(cotangent.begin(), cotangent.end(), whole.begin());
+      return pull_back_elastic(lane, s, parameters, points);
+    }
+    if (pressure) {
+      const std::span<double> field = std::span(expanded).first(3 * cotangent.size());
+      std::fill(field.begin(), field.end(), 0.0);
+      for (std::size_t k = 0; k < cotangent.size(); ++k) field[3 * k + 2] = cotangent[k];
+      cotangent = field;
+    }
+    gather(s, cotangent);
+    pull_back(lane, s.number, tiles, of_tiles, parameters, points, pressure);
+  }
+
+  template <class F>
+  void for_past(int lane, const CompiledSensor& s, const F& f);
+  void read_past(const CompiledSensor& s, int lane, bool pressure, std::span<double> to);
+  void pull_back_past(int lane, const CompiledSensor& s, bool pressure,
+                      std::span<const double> cotangent, std::span<double> parameters,
+                      std::span<double> points);
+  void add_past(BlockCotangent& out) const;
 
   void pull_back(int lane, int sensor, std::span<const int> touched,
                  std::span<const double> cotangents, std::span<double> parameters,
@@ -135,14 +189,14 @@ struct ReadoutPullback::Impl {
   void pull_back_elastic(int lane, const CompiledSensor& s, std::span<double> parameters,
                          std::span<double> points) {
     const CompiledModel& m = compiled(model);
-    if (!points.empty()) check_has_plain_points(model);
     const int environment = kBlock * block + lane, group = lane / kGroup;
     std::vector<double>& remembered = memory[std::size_t(lane)];
     remembered.resize(3 * batch->shear_state(environment).size());
     used[std::size_t(group)] = true;
-    for (const ElasticField::Share& share : elastic.pull_back(
-             reader, *batch, environment, s.number,
-             std::span<const double>(whole).first(3 * std::size_t(s.points())), remembered)) {
+    for (const ElasticField::Share& share :
+         elastic.pull_back(reader, *batch, environment, s.number,
+                           std::span<const double>(whole).first(3 * std::size_t(s.points())),
+                           remembered, points)) {
       const CompiledBody& body = m.bodies[std::size_t(share.of->contact.body2)];
       hand_on(share.motion, s.link, {kernels::diagonal(1.0), {0, 0, 0}}, body.link, group,
               lane % kGroup);
@@ -166,21 +220,98 @@ struct ReadoutPullback::Impl {
   }
 };
 
-void check_has_plain_points(const Model& model) {
-  for (const CompiledSensor& s : compiled(model).sensors)
-    if (s.elastic)
-      throw InputError("tactile sensor '" + model.scene().sensors[std::size_t(s.number)].name +
-                       "' has ks: derivatives by the numbers of single points are not known; "
-                       "expected none of them to be asked for");
-}
-
-void check_has_no_lag(const Model& model) {
-  for (std::size_t s = 0; s < model.sensors().size(); ++s)
-    check_has_no_lag(model, static_cast<int>(s));
-}
-
 void check_has_no_lag(const Model& model, std::span<const FieldOutput> outputs) {
   for (const FieldOutput& output : outputs) check_has_no_lag(model, output.sensor);
+}
+
+/// Earlier states of one environment in the lanes of a block, and how they are pulled back.
+struct ReadoutPullback::Impl::Past {
+  PastStates states;
+  ReadoutPullback pullback;
+  BlockCotangent cotangent;
+  std::vector<double> scaled;
+
+  explicit Past(const Model& m) : states(m), pullback(m), scaled(pullback.impl_->whole.size()) {
+    for (auto* x : {&cotangent.q, &cotangent.v}) x->resize(std::size_t(m.nv() * kBlock));
+  }
+  [[nodiscard]] Impl& then() { return *pullback.impl_; }
+};
+
+/// Calls f(k, n) after the states delay + k … delay + k + n - 1 steps ago were placed in the first
+/// lanes of `past`, for all states that a reading depends on.
+template <class F>
+void ReadoutPullback::Impl::for_past(int lane, const CompiledSensor& s, const F& f) {
+  if (!past) past = std::make_unique<Past>(model);
+  const int all = static_cast<int>(s.weights.size());
+  for (int first = 0; first < all; first += kBlock) {
+    const int count = std::min(kBlock, all - first);
+    past->states.recall(*batch, kBlock * block + lane, s.delay + first, count);
+    past->pullback.place(past->states.lanes(), 0);
+    f(first, count);
+  }
+}
+
+/// Computes the field after delay and low-pass, or the pressure.
+void ReadoutPullback::Impl::read_past(const CompiledSensor& s, int lane, bool pressure,
+                                      std::span<double> to) {
+  std::fill(to.begin(), to.end(), 0.0);
+  for_past(lane, s, [&](int first, int count) {
+    const auto one = std::span(past->scaled).first(to.size());
+    for (int k = 0; k < count; ++k) {
+      past->then().read(s, k, pressure, one);
+      const double weight = s.weights[std::size_t(first + k)];
+      for (std::size_t i = 0; i < to.size(); ++i) to[i] += weight * one[i];
+    }
+  });
+}
+
+/// Pulls the cotangent of what read_past() computes back to every state that it depends on. States
+/// before an episode are its first one.
+void ReadoutPullback::Impl::pull_back_past(int lane, const CompiledSensor& s, bool pressure,
+                                           std::span<const double> cotangent,
+                                           std::span<double> parameters, std::span<double> points) {
+  const std::size_t nv = std::size_t(model.nv()), at = std::size_t(lane),
+                    states = 1 + std::size_t(compiled(model).layout.past_states);
+  std::vector<double>& to = lagging[at];
+  to.resize(states * 2 * nv);
+  const std::int64_t steps = batch->steps(kBlock * block + lane);
+  for_past(lane, s, [&](int first, int count) {
+    BlockCotangent& c = past->cotangent;
+    for (auto* x : {&c.q, &c.v}) std::fill(x->begin(), x->end(), 0.0);
+    c.parameters.assign(parameters.size(), 0.0);
+    past->pullback.clear();
+    const auto scaled = std::span(past->scaled).first(cotangent.size());
+    for (int k = 0; k < count; ++k) {
+      const double weight = s.weights[std::size_t(first + k)];
+      for (std::size_t i = 0; i < scaled.size(); ++i) scaled[i] = weight * cotangent[i];
+      past->then().pull_back_ideal(k, s, pressure, scaled, c.parameters, points);
+    }
+    past->pullback.finish(c);
+    for (std::size_t k = 0; k < std::size_t(count); ++k) {
+      const auto ago = std::min<std::int64_t>(s.delay + first + int(k), steps);
+      double* const state = &to[std::size_t(ago) * 2 * nv];
+      for (std::size_t i = 0; i < nv; ++i)
+        state[i] += c.q[i * kBlock + k], state[nv + i] += c.v[i * kBlock + k];
+      for (std::size_t row = 0; row < parameters.size(); row += kBlock)
+        parameters[row + at] += c.parameters[row + k];
+    }
+  });
+}
+
+/// Adds `lagging`.
+void ReadoutPullback::Impl::add_past(BlockCotangent& out) const {
+  const std::size_t nv = std::size_t(model.nv());
+  for (std::size_t l = 0; l < kBlock; ++l) {
+    const std::vector<double>& from = lagging[l];
+    if (from.empty()) continue;
+    if (out.past.empty()) out.past.resize((from.size() - 2 * nv) * kBlock);
+    for (std::size_t i = 0; i < nv; ++i) {
+      out.q[i * kBlock + l] += from[i];
+      out.v[i * kBlock + l] += from[nv + i];
+    }
+    for (std::size_t i = 2 * nv; i < from.size(); ++i)
+      out.past[(i - 2 * nv) * kBlock + l] += from[i];
+  }
 }
 
 ReadoutPullback::ReadoutPullback(const Model& model) : impl_(std::make_unique<Impl>(model)) {}
@@ -200,6 +331,7 @@ void ReadoutPullback::clear() {
     std::fill(group.begin(), group.end(), kernels::MotionCotangent<LaneRow>{});
   impl_->used.fill(false);
   for (std::vector<double>& lane : impl_->memory) lane.clear();
+  for (std::vector<double>& lane : impl_->lagging) lane.clear();
 }
 
 void ReadoutPullback::Impl::pull_back(int lane, int sensor, std::span<const int> touched,
@@ -211,12 +343,7 @@ void ReadoutPullback::Impl::pull_back(int lane, int sensor, std::span<const int>
   find_touches(group, sensor);
   const CompiledModel& m = compiled(model);
   const CompiledSensor& s = m.sensors[std::size_t(sensor)];
-  auto a = reader.arguments<double>(sensor, group, in_group);
-  if (pressure) {
-    frictionless.assign(a.touches, a.touches + a.n_touches);
-    for (kernels::Touch<double>& t : frictionless) t.law.kt = t.law.mu = 0;
-    a.touches = frictionless.data();
-  }
+  const auto a = arguments(s, lane, pressure);
   if (!points.empty()) own.assign(touched.size() * kPointNumbers * kernels::kTactileTile, 0.0);
   kernels::active_kernels().pull_back_field(
       {a.pad, a.law, a.n_touches, a.shapes, a.touches, static_cast<int>(touched.size()),
@@ -240,7 +367,6 @@ void ReadoutPullback::Impl::pull_back(int lane, int sensor, std::span<const int>
 void ReadoutPullback::field(int lane, int sensor, std::span<const int> tiles,
                             std::span<const double> cotangents, std::span<double> parameters,
                             std::span<double> points) {
-  check_has_no_lag(impl_->model, sensor);
   const CompiledSensor& s = compiled(impl_->model).sensors[std::size_t(sensor)];
   if (!s.imperfect && !s.elastic)
     return impl_->pull_back(lane, sensor, tiles, cotangents, parameters, points);
@@ -249,40 +375,27 @@ void ReadoutPullback::field(int lane, int sensor, std::span<const int> tiles,
   for (std::size_t k = 0; k < tiles.size(); ++k)
     expand_tile<3>(pad, tiles[k], cotangents.data() + 3 * kernels::kTactileTile * k,
                    impl_->whole.data());
-  if (s.imperfect) impl_->pull_back_imperfections(s, lane);
-  if (s.elastic) return impl_->pull_back_elastic(lane, s, parameters, points);
-  impl_->gather(s, impl_->whole);
-  impl_->pull_back(lane, sensor, impl_->tiles, impl_->of_tiles, parameters, points);
+  impl_->pull_back_reading(lane, s, false, parameters, points);
 }
 
 void ReadoutPullback::dense_field(int lane, int sensor, std::span<const double> cotangents,
                                   std::span<double> parameters, std::span<double> points) {
-  check_has_no_lag(impl_->model, sensor);
-  const CompiledSensor& s = compiled(impl_->model).sensors[std::size_t(sensor)];
-  if (s.imperfect || s.elastic) {
-    std::copy(cotangents.begin(), cotangents.end(), impl_->whole.begin());
-    if (s.imperfect) impl_->pull_back_imperfections(s, lane);
-    if (s.elastic) return impl_->pull_back_elastic(lane, s, parameters, points);
-    cotangents = impl_->whole;
-  }
-  impl_->gather(s, cotangents);
-  impl_->pull_back(lane, sensor, impl_->tiles, impl_->of_tiles, parameters, points);
+  std::copy(cotangents.begin(), cotangents.end(), impl_->whole.begin());
+  impl_->pull_back_reading(lane, compiled(impl_->model).sensors[std::size_t(sensor)], false,
+                           parameters, points);
 }
 
 void ReadoutPullback::pressure(int lane, int sensor, std::span<const double> cotangents,
                                std::span<double> parameters, std::span<double> points) {
-  Impl& i = *impl_;
-  check_has_no_lag(i.model, sensor);
-  const CompiledSensor& s = compiled(i.model).sensors[std::size_t(sensor)];
-  if (s.imperfect)
-    throw InputError("derivatives by the pressure of the imperfect sensor '" +
-                     i.model.sensors()[std::size_t(sensor)].name +
-                     "' are not known; expected those by its field");
-  const std::span<double> field = std::span(i.whole).first(3 * cotangents.size());
-  std::fill(field.begin(), field.end(), 0.0);
-  for (std::size_t k = 0; k < cotangents.size(); ++k) field[3 * k + 2] = cotangents[k];
-  i.gather(s, field);
-  i.pull_back(lane, sensor, i.tiles, i.of_tiles, parameters, points, true);
+  std::copy(cotangents.begin(), cotangents.end(), impl_->whole.begin());
+  impl_->pull_back_reading(lane, compiled(impl_->model).sensors[std::size_t(sensor)], true,
+                           parameters, points);
+}
+
+void ReadoutPullback::ideal_field(int lane, int sensor, std::span<const double> cotangents,
+                                  std::span<double> parameters, std::span<double> points) {
+  impl_->pull_back_ideal(lane, compiled(impl_->model).sensors[std::size_t(sensor)], false,
+                         cotangents, parameters, points);
 }
 
 void ReadoutPullback::end_effector(int lane, int end_effector, std::span<const double> cotangent) {
@@ -332,8 +445,10 @@ void ReadoutPullback::finish(BlockCotangent& out) {
     to.resize(i.memory[l].size());
     for (std::size_t k = 0; k < to.size(); ++k) to[k] += i.memory[l][k];
   }
+  i.add_past(out);
   LaneRow *q = i.rows.data(), *v = q + m.nq, *zero = v + m.nv, *rates = zero + m.nv,
-          *q_bar = rates + m.nv, *v_bar = q_bar + m.nv;
+          *q_bar = rates + m.nv, *v_bar = q_bar + m.nv, *places = v_bar + m.nv;
+  const int place_count = out.parameters.empty() ? 0 : kernels::kPlaceNumbers * m.view.n_links;
   for (int g = 0; g < kGroups; ++g) {
     if (!i.used[std::size_t(g)]) continue;
     const auto load = [&](LaneRow* to, int first, int count) {
@@ -344,15 +459,18 @@ void ReadoutPullback::finish(BlockCotangent& out) {
     };
     load(q, m.layout.q, m.nq);
     load(v, m.layout.v, m.nv);
-    std::fill(q_bar, v_bar + m.nv, LaneRow{});
+    std::fill(q_bar, places + place_count, LaneRow{});
     kernels::active_kernels().pull_back_links(
         m.view, {q, v, zero, rates, i.batch->block(i.block), g}, i.scratch.data(),
-        i.links[std::size_t(g)].data(), q_bar, v_bar);
-    for (int k = 0; k < m.nv; ++k)
-      for (int l = 0; l < kGroup; ++l) {
-        out.q[std::size_t(k * kBlock + g * kGroup + l)] += q_bar[k][l];
-        out.v[std::size_t(k * kBlock + g * kGroup + l)] += v_bar[k][l];
-      }
+        i.links[std::size_t(g)].data(), q_bar, v_bar, place_count > 0 ? places : nullptr);
+    const auto add = [g](double* to, const LaneRow* from, int count) {
+      for (int k = 0; k < count; ++k)
+        for (int l = 0; l < kGroup; ++l) to[k * kBlock + g * kGroup + l] += from[k][l];
+    };
+    add(out.q.data(), q_bar, m.nv);
+    add(out.v.data(), v_bar, m.nv);
+    if (place_count > 0)
+      add(&out.parameters[std::size_t(m.view.rows.places * kBlock)], places, place_count);
   }
 }
 

@@ -11,19 +11,15 @@
 
 namespace tangere {
 
-/// Throws InputError (file:line) if a reading of some sensor depends on earlier states
-/// (SensorInfo::past_states). Derivatives of such readings are not implemented.
-void check_has_no_lag(const Model& model);
-/// The same for the sensors of these outputs alone.
+/// Throws InputError (file:line) if one of these sensors has lag: its reading depends on earlier
+/// states (SensorInfo::past_states).
 void check_has_no_lag(const Model& model, std::span<const FieldOutput> outputs);
 
-/// Throws InputError if some sensor has ks: its points have no derivatives of their own.
-void check_has_plain_points(const Model& model);
-
 /// Owns the scratch of one thread. Allocates in the constructor, and whenever a call has more tiles
-/// than any before. Fields of sensors with lag throw InputError. For each state call place(); then
-/// for each loss clear(), any number of fields and end effectors, and finish(). Fields are
-/// recomputed in double, independent of the precision in which they were read.
+/// than any before. For each state call place(); then for each loss clear(), any number of fields
+/// and end effectors, and finish(). Fields are recomputed in double, independent of the precision
+/// in which they were read. What sensors with lag read of earlier states goes to
+/// BlockCotangent::past: the batch must hold these states (BlockTape::show).
 class ReadoutPullback {
  public:
   explicit ReadoutPullback(const Model& model);
@@ -37,7 +33,8 @@ class ReadoutPullback {
   /// Takes the cotangents of a sensor's field in lane `lane` of the block: `tiles` of 8 × 8 points
   /// (CompactFrame::tiles) with `cotangents` (tiles, 3, 8, 8). Points outside the tiles, or where
   /// nothing touches, have no derivative. `parameters`: (parameter_rows, 16) of the loss, to which
-  /// derivatives by the sensor's coefficients and the sizes of what touches it are added, or empty.
+  /// derivatives by the sensor's coefficients and the sizes of what touches it are added, or empty;
+  /// finish() adds those by places of joints to BlockCotangent::parameters.
   /// `points`: (points, kPointNumbers) of the sensor, to which derivatives by every point's own
   /// numbers are added (engine/derivative/tactile_point_numbers.hpp), or empty.
   void field(int lane, int sensor, std::span<const int> tiles, std::span<const double> cotangents,
@@ -45,10 +42,12 @@ class ReadoutPullback {
   /// The same for `cotangents` of the whole field, (points, 3).
   void dense_field(int lane, int sensor, std::span<const double> cotangents,
                    std::span<double> parameters = {}, std::span<double> points = {});
-  /// The same for `cotangents` of the pressure, (points): the force without friction. Throws
-  /// InputError for an imperfect sensor.
+  /// The same for `cotangents` of the pressure, (points): the force without friction.
   void pressure(int lane, int sensor, std::span<const double> cotangents,
                 std::span<double> parameters = {}, std::span<double> points = {});
+  /// The same for `cotangents` of the field without the sensor's imperfections, (points, 3).
+  void ideal_field(int lane, int sensor, std::span<const double> cotangents,
+                   std::span<double> parameters = {}, std::span<double> points = {});
   /// Takes the cotangent of an end effector's world position, (3).
   void end_effector(int lane, int end_effector, std::span<const double> cotangent);
   /// Takes the cotangents of a body's pose (7) and twist (6), as Readout::bodies() returns them.

@@ -19,6 +19,18 @@ using kernels::Vec6;
 
 namespace {
 
+/// Returns the numbers of a sensor's points among those of all; empty for other contacts.
+std::span<double> points_of(const CompiledModel& m, const ShearSpringContact& of,
+                            std::span<double> all) {
+  if (of.sensor < 0 || all.empty()) return {};
+  const auto numbers = [](const CompiledSensor& s) {
+    return kernels::kPointNumbers * std::size_t(s.points());
+  };
+  std::size_t first = 0;
+  for (int s = 0; s < of.sensor; ++s) first += numbers(m.sensors[std::size_t(s)]);
+  return all.subspan(first, numbers(m.sensors[std::size_t(of.sensor)]));
+}
+
 /// Pulls cotangents of the motion of body 2 relative to body 1 back to the two links.
 template <int L>
 void hand_on(const ShearSpringContact& of, const AlignedVector<LinkPose<Row<L>>>& poses,
@@ -46,14 +58,14 @@ ShearAdjoint<L>::ShearAdjoint(const CompiledModel& m, int losses) {
   slip_.resize(m.links.size());
   at_touches_.resize(m.shear_springs.size());
   slip_touches_.resize(m.shear_springs.size());
-  rows_.resize(2 * std::size_t(m.nv));
+  rows_.resize(2 * std::size_t(m.nv) + kernels::kPlaceNumbers * m.links.size());
   std::size_t bytes = 0, stride = 0;
   for (const kernels::KernelTable* table : kernels::available_kernels())
     bytes = std::max(bytes, table->pullback_bytes(m.view));
   scratch_.resize(bytes);
   for (const ShearSpringContact& of : m.shear_springs)
     stride = std::max(stride, std::size_t(of.contact.n_points + 2 * kGroup));
-  numbers_.resize(18 * stride);
+  numbers_.resize((18 + kernels::kPointNumbers) * stride);
 }
 
 template <int L>
@@ -65,15 +77,36 @@ void ShearAdjoint<L>::begin(const CompiledModel& m) {
 template <int L>
 void ShearAdjoint<L>::add_to_state(const CompiledModel& m, const kernels::KernelTable& table,
                                    BasicWorkspace<L>& w, LaneBits lanes, const Row<L>* q,
-                                   const Row<L>* v, Cotangents& links, Row<L>* q_bar,
-                                   Row<L>* v_bar) {
+                                   const Row<L>* v, Cotangents& links, Row<L>* q_bar, Row<L>* v_bar,
+                                   Row<L>* parameters) {
   std::fill(rows_.begin(), rows_.end(), Row<L>{});
-  Row<L>*const by_q = rows_.data(), *const by_v = by_q + m.nv;
+  Row<L>*const by_q = rows_.data(), *const by_v = by_q + m.nv, *const by_place = by_v + m.nv;
   table.stage<L>().pull_back_poses(m.view, w.stage, q, v, w.zero, scratch_.data(), links.data(),
-                                   by_q, by_v);
-  for (int i = 0; i < m.nv; ++i)
-    for (int l = 0; l < L; ++l)
-      if (has(lanes, l)) q_bar[i][l] += by_q[i][l], v_bar[i][l] += by_v[i][l];
+                                   by_q, by_v, parameters == nullptr ? nullptr : by_place);
+  const auto add = [&](Row<L>* to, const Row<L>* from, int count) {
+    for (int i = 0; i < count; ++i)
+      for (int l = 0; l < L; ++l)
+        if (has(lanes, l)) to[i][l] += from[i][l];
+  };
+  add(q_bar, by_q, m.nv);
+  add(v_bar, by_v, m.nv);
+  if (parameters != nullptr)
+    add(parameters + m.view.rows.places, by_place, kernels::kPlaceNumbers * m.view.n_links);
+}
+
+/// Pulls one contact back. `points`: of a sensor's points, or empty. `own`: scratch.
+template <int L>
+void ShearAdjoint<L>::pull_back_points(const CompiledModel& m, const kernels::KernelTable& table,
+                                       const BasicWorkspace<L>& w, kernels::ShearPullback& pullback,
+                                       std::span<double> points, double* own) {
+  if (!points.empty()) {
+    std::fill_n(own, kernels::kPointNumbers * pullback.points.stride, 0.0);
+    pullback.own = own;
+  }
+  table.pull_back_memory(pullback);
+  if (points.empty()) return;
+  const CompiledSensor& sensor = m.sensors[std::size_t(pullback.end->of->sensor)];
+  w.remembered.felt.add_to_points(m, sensor, pullback.points, own, points);
 }
 
 /// Pulls back through all contacts: the final shear state, or the forces along a slip.
@@ -106,8 +139,16 @@ void ShearAdjoint<L>::pull_back(const CompiledModel& m, const kernels::KernelTab
       Vec6<double> slip{};
       if (of_forces) slip = touch_of(m, w, of, slip_touches_, l).twist;
       kernels::ShearCotangentSums sums{};
-      table.pull_back_memory({&start, &end, points, remembered, of_forces ? nullptr : s_bar,
-                              nullptr, of_forces ? &slip : nullptr, s_out, &sums});
+      kernels::ShearPullback pullback = {&start,
+                                         &end,
+                                         points,
+                                         remembered,
+                                         of_forces ? nullptr : s_bar,
+                                         nullptr,
+                                         of_forces ? &slip : nullptr,
+                                         s_out,
+                                         &sums};
+      pull_back_points(m, table, w, pullback, points_of(m, of, loss.points[lane]), s_out + rows);
       if (!of_forces) hand_on<L>(of, at_, sums.end.displacement, sums.end.twist, l, end_);
       hand_on<L>(of, w.remembered.start, sums.start, Vec6<double>{}, l,
                  start_[std::size_t(number)]);
@@ -130,7 +171,7 @@ void ShearAdjoint<L>::reverse_end(const CompiledModel& m, const kernels::KernelT
   table.stage<L>().poses_at(m.view, w.stage, w.q1, w.stage.v, w.zero, at_.data());
   table.stage<L>().touches_at(m.view, at_.data(), at_touches_.data());
   pull_back(m, table, w, lanes, false, loss, number);
-  add_to_state(m, table, w, lanes, w.q1, w.stage.v, end_, loss.q, loss.v);
+  add_to_state(m, table, w, lanes, w.q1, w.stage.v, end_, loss.q, loss.v, loss.parameters);
 }
 
 /// Pulls one contact of one lane back.
@@ -157,7 +198,8 @@ void ShearAdjoint<L>::pull_back_reading(const CompiledModel& m, const kernels::K
   pullback.anchor_bar = anchor_bar;
   pullback.kept = felt.scratch() + 6 * points.stride;
   pullback.anchor_out = anchor_out;
-  table.pull_back_memory(pullback);
+  pull_back_points(m, table, w, pullback, points_of(m, of, loss.points[std::size_t(lane)]),
+                   anchor_out + 2 * rows);
   sums.end.displacement += sums.start;
   hand_on<L>(of, at_, sums.end.displacement, sums.end.twist, lane, end_);
   if (loss.parameters != nullptr)
@@ -197,7 +239,7 @@ void ShearAdjoint<L>::reverse_readings(const CompiledModel& m, const kernels::Ke
       }
       bar = kept_before_;
     }
-    add_to_state(m, table, w, lanes, w.q1, w.v1, end_, loss.q, loss.v);
+    add_to_state(m, table, w, lanes, w.q1, w.v1, end_, loss.q, loss.v, loss.parameters);
   }
 }
 
@@ -218,7 +260,7 @@ void ShearAdjoint<L>::finish(const CompiledModel& m, const kernels::KernelTable&
                              BasicWorkspace<L>& w, LaneBits lanes, LossRows<L>& loss, int number) {
   if (m.shear_springs.empty()) return;
   add_to_state(m, table, w, lanes, w.q0, w.v0, start_[std::size_t(number)], loss.q_centre,
-               loss.v_centre);
+               loss.v_centre, loss.parameters);
 }
 
 template class ShearAdjoint<kGroup>;

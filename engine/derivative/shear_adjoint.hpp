@@ -25,6 +25,8 @@ struct LossRows {
   Rows q_inner, v_inner;    ///< of inner stages, (nv) each, one after another
   Rows tau, target;         ///< out: of forces known when the step begins, and of motors' targets
   Rows parameters;          ///< out: (parameter_rows), or null
+  /// Out: of every tactile point's own numbers, (tactile points, kPointNumbers), or empty.
+  std::array<std::span<double>, L> points{};
   /// Of the shear state, three numbers for each entry. In: after the solve; out: before it.
   std::array<std::vector<double>, L> memory, memory_before;
   /// The same of sensors that keep anchors, for whole steps: solves do not change them.
@@ -69,13 +71,17 @@ class ShearAdjoint {
   void pull_back(const CompiledModel& model, const kernels::KernelTable& table,
                  BasicWorkspace<L>& w, LaneBits lanes, bool of_forces, LossRows<L>& loss,
                  int number);
+  void pull_back_points(const CompiledModel& model, const kernels::KernelTable& table,
+                        const BasicWorkspace<L>& w, kernels::ShearPullback& pullback,
+                        std::span<double> points, double* own);
   void pull_back_reading(const CompiledModel& model, const kernels::KernelTable& table,
                          BasicWorkspace<L>& w, const kernels::ShearSpringContact& of, int lane,
                          const TapedReading& reading, LossRows<L>& loss);
+  /// `parameters`: as in LossRows.
   void add_to_state(const CompiledModel& model, const kernels::KernelTable& table,
                     BasicWorkspace<L>& w, LaneBits lanes, const kernels::Row<L>* q,
                     const kernels::Row<L>* v, Cotangents& links, kernels::Row<L>* q_bar,
-                    kernels::Row<L>* v_bar);
+                    kernels::Row<L>* v_bar, kernels::Row<L>* parameters);
 
   std::vector<Cotangents> start_;  ///< of each loss: (n_links) where the solve began
   Cotangents end_;

@@ -9,6 +9,7 @@
 #include "engine/derivative/dual_stage.hpp"
 #include "engine/derivative/number_gradients.hpp"
 #include "engine/sense/imperfect_field.hpp"
+#include "engine/sense/past_states.hpp"
 #include "engine/step/group_step.hpp"
 #include "engine/step/motor_force.hpp"
 #include "engine/step/rotation_log.hpp"
@@ -232,6 +233,24 @@ struct Tangent::Impl {
             D(memory[k].s[c], dot.empty() ? 0 : dot[3 * k + c]);
   }
 
+  /// The tangent of an earlier state. States before the first one are constants.
+  [[nodiscard]] StateTangent past_of(const StateTangent& now, std::int64_t ago) const {
+    if (ago == 0) return now;
+    const auto nv = std::ptrdiff_t(m().nv);
+    std::vector<double> then(2 * std::size_t(nv));
+    if (std::size_t(ago) <= now.past.size()) then = now.past[std::size_t(ago) - 1];
+    return {{then.begin(), then.begin() + nv}, {then.begin() + nv, then.end()}, {}, {}};
+  }
+
+  /// Places the stage at a state of the tape.
+  void stand(const double* row, const StateTangent& state) {
+    stage.centre = with_tangent(m(), row, kBlock, state.q);
+    const Duals v = with_tangent(row + m().nq * kBlock, kBlock, state.v);
+    for (std::size_t k = 0; k < v.size(); ++k) stage.x[k] = stage.s[k] = D(0.0), stage.r[k] = v[k];
+    stage.c0_over_h = 0;
+    stage.inverse_h = 1;
+  }
+
   /// Returns the tangents of the shear state.
   [[nodiscard]] std::vector<double> memory_dot(std::span<const ShearEntry> memory) const {
     std::vector<double> out;
@@ -293,7 +312,8 @@ Tangent::~Tangent() = default;
 
 void Tangent::step(const Batch& batch, int block, int lane, const BlockTape& tape,
                    std::int64_t step, std::span<const double> u, std::span<const double> u_dot,
-                   std::span<const double> numbers_dot, StateTangent& state) {
+                   std::span<const double> numbers_dot, StateTangent& state,
+                   std::span<const std::vector<double>> points_dot) {
   Impl& i = *impl_;
   const CompiledModel& m = i.m();
   const auto rows = [&](std::int64_t t) { return tape.state(t) + lane; };
@@ -306,6 +326,9 @@ void Tangent::step(const Batch& batch, int block, int lane, const BlockTape& tap
                   before = dual(step - 1, state.previous_q, state.previous_v);
   const double* column = batch.block(block) + lane;
   i.stage.set_numbers(column, numbers_dot);
+  for (std::size_t s = 0; s < m.sensors.size(); ++s)
+    i.stage.set_points(static_cast<int>(s),
+                       points_dot.empty() ? std::span<const double>() : points_dot[s]);
   i.set_motors(start, u, u_dot, numbers_dot, column);
   i.set_memory(tape.memory(step, lane), state.shear);
   DualState end = start;
@@ -319,6 +342,12 @@ void Tangent::step(const Batch& batch, int block, int lane, const BlockTape& tap
   if (m.kept_points > 0 && tape.took(step, lane))
     i.stage.update_sensor_shear_state(end.q, end.v, tape.episode_step(step + 1, lane));
   state.shear = i.memory_dot(tape.memory(step + 1, lane));
+  if (const auto past = std::size_t(m.layout.past_states); past > 0) {
+    std::vector<double> earlier = state.q;
+    earlier.insert(earlier.end(), state.v.begin(), state.v.end());
+    state.past.insert(state.past.begin(), std::move(earlier));
+    if (state.past.size() > past) state.past.pop_back();
+  }
   state.previous_q = std::move(state.q);
   state.previous_v = std::move(state.v);
   state.q = tangent_of(m, end.q);
@@ -331,23 +360,51 @@ void Tangent::field(const Batch& batch, int block, int lane, const BlockTape& ta
                     std::span<const double> points_dot, const StateTangent& state,
                     std::span<double> field_dot) {
   Impl& i = *impl_;
-  const CompiledModel& m = i.m();
-  check_has_no_lag(i.model, sensor);
-  const double* row = tape.state(step) + lane;
-  i.stage.centre = with_tangent(m, row, kBlock, state.q);
-  const Duals v = with_tangent(row + m.nq * kBlock, kBlock, state.v);
-  for (std::size_t k = 0; k < v.size(); ++k)
-    i.stage.x[k] = i.stage.s[k] = D(0.0), i.stage.r[k] = v[k];
-  i.stage.c0_over_h = 0;
-  i.stage.inverse_h = 1;
-  const CompiledSensor& s = m.sensors[std::size_t(sensor)];
+  const CompiledSensor& s = i.m().sensors[std::size_t(sensor)];
   std::vector<double> field(s.imperfect ? field_dot.size() : 0);
-  i.set_memory(tape.memory(step, lane), state.shear);
-  i.stage.set_numbers(batch.block(block) + lane, numbers_dot);
-  i.stage.field(sensor, batch.block(block) + lane, numbers_dot, points_dot, field, field_dot);
+  const double* const column = batch.block(block) + lane;
+  i.stage.set_numbers(column, numbers_dot);
+  const auto read = [&](const double* row, const StateTangent& at, std::span<double> ideal,
+                        std::span<double> dot) {
+    i.stand(row, at);
+    i.stage.field(sensor, column, numbers_dot, points_dot, ideal, dot);
+  };
+  if (s.past_states() == 0) {
+    i.set_memory(tape.memory(step, lane), state.shear);
+    read(tape.state(step) + lane, state, field, field_dot);
+  } else {
+    std::fill(field_dot.begin(), field_dot.end(), 0.0);
+    std::vector<double> ideal(field.size()), dot(field.size());
+    PastStates past(i.model);
+    const int environment = block * kBlock + lane;
+    for (std::size_t k = 0; k < s.weights.size(); ++k) {
+      const int ago = s.delay + static_cast<int>(k);
+      past.recall(batch, environment, ago, 1);
+      read(past.lanes().block(0) + i.m().layout.q * kBlock,
+           i.past_of(state, std::min<std::int64_t>(ago, batch.steps(environment))), ideal, dot);
+      for (std::size_t n = 0; n < field.size(); ++n) {
+        field[n] += s.weights[k] * ideal[n];
+        field_dot[n] += s.weights[k] * dot[n];
+      }
+    }
+  }
   const ReadingKey key = {batch.seed(), batch.episode(block * kBlock + lane),
                           tape.episode_step(step, lane)};
   i.imperfections.push_forward(s, key, field, field_dot);
+}
+
+void Tangent::end_effectors(const Batch& batch, int block, int lane, const BlockTape& tape,
+                            std::int64_t step, std::span<const double> numbers_dot,
+                            const StateTangent& state, std::span<double> change) {
+  Impl& i = *impl_;
+  i.stand(tape.state(step) + lane, state);
+  i.stage.set_numbers(batch.block(block) + lane, numbers_dot);
+  i.stage.rates();
+  double* to = change.data();
+  for (const CompiledEndEffector& of : i.m().end_effectors) {
+    const Vec3<D> x = i.stage.in_world(of.link, of.point);
+    *to++ = x.x.epsilon, *to++ = x.y.epsilon, *to++ = x.z.epsilon;
+  }
 }
 
 }  // namespace tangere

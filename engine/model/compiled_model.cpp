@@ -56,7 +56,8 @@ void point_view(CompiledModel& m) {
   rows.links = rows.ground(v.n_grounds);
   rows.dofs = rows.link(v.n_links);
   rows.solids = rows.dof(v.nv, 0);
-  rows.sensors = rows.solid(v.n_solids);
+  rows.places = rows.solid(v.n_solids);
+  rows.sensors = rows.place(v.n_links);
   rows.count = rows.sensor(static_cast<int>(m.sensors.size()));
   v.pattern = m.pattern.view();
 }

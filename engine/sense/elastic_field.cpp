@@ -21,6 +21,7 @@ ElasticField::ElasticField(const Model& model) : model_(model), felt_(compiled(m
   remembered_.resize(3 * most);
   s_.resize(4 * most);
   force_.resize(3 * most);
+  own_.resize(kernels::kPointNumbers * most);
   if (compiled(model).kept_points > 0) anchors_.resize(6 * most);
   if (most > 0) shares_.reserve(compiled(model).bodies.size());
 }
@@ -75,11 +76,9 @@ void ElasticField::read(const PadReader& reader, const Batch& batch, int environ
                    });
 }
 
-std::span<const ElasticField::Share> ElasticField::pull_back(const PadReader& reader,
-                                                             const Batch& batch, int environment,
-                                                             int sensor,
-                                                             std::span<const double> cotangent,
-                                                             std::span<double> memory) {
+std::span<const ElasticField::Share> ElasticField::pull_back(
+    const PadReader& reader, const Batch& batch, int environment, int sensor,
+    std::span<const double> cotangent, std::span<double> memory, std::span<double> points_bar) {
   const CompiledSensor& s = compiled(model_).sensors[std::size_t(sensor)];
   shares_.clear();
   for_each_touched(reader, batch, environment, sensor,
@@ -106,7 +105,13 @@ std::span<const ElasticField::Share> ElasticField::pull_back(const PadReader& re
                        pullback.kept = felt_.scratch() + 6 * points.stride;
                        pullback.anchor_out = anchors_.data();
                      }
+                     if (!points_bar.empty()) {
+                       std::fill(own_.begin(), own_.end(), 0.0);
+                       pullback.own = own_.data();
+                     }
                      kernels::active_kernels().pull_back_memory(pullback);
+                     if (!points_bar.empty())
+                       felt_.add_to_points(compiled(model_), s, points, own_.data(), points_bar);
                      sums.end.displacement += sums.start;
                      shares_.push_back({&of, sums.end});
                      if (keeps) {

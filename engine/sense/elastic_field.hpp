@@ -28,10 +28,11 @@ class ElasticField {
   };
   /// Pulls a cotangent of the field back: returns the contribution of each touched body, valid
   /// until the next call, and adds the cotangent of the shear state to `memory`, three numbers for
-  /// each entry of the environment.
+  /// each entry of the environment, and those of the points' own numbers to `points_bar`,
+  /// (points, kPointNumbers) or empty.
   std::span<const Share> pull_back(const PadReader& reader, const Batch& batch, int environment,
                                    int sensor, std::span<const double> cotangent,
-                                   std::span<double> memory);
+                                   std::span<double> memory, std::span<double> points_bar);
 
  private:
   template <class F>
@@ -41,7 +42,7 @@ class ElasticField {
   TouchingSensorPoints felt_;
   std::vector<Share> shares_;
   AlignedVector<double> remembered_, s_, force_;  // (3, stride), (4, stride), (3, stride)
-  AlignedVector<double> anchors_;                 // (6, stride)
+  AlignedVector<double> anchors_, own_;           // (6, stride), (kPointNumbers, stride)
 };
 
 }  // namespace tangere

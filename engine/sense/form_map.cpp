@@ -70,11 +70,6 @@ struct FormMap::Impl {
     const std::string reason = reason_against(m.scene(), of);
     if (!reason.empty()) throw InputError(reason);
     const CompiledSensor& s = compiled(m).sensors[std::size_t(of.sensor)];
-    const bool needs_ideal = of.form == FieldForm::ideal || of.form == FieldForm::markers;
-    if (needs_ideal && s.imperfect)
-      throw InputError(output_name(m.sensors()[std::size_t(of.sensor)].name, of.form) +
-                       ": the sensor is imperfect, and this form is of its ideal field; expected a "
-                       "form of its reading");
     if (of.form == FieldForm::pressure)
       throw InputError("a pressure leaves friction out, so it does not follow from the field");
     pad = s.tiles();

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Forms of a field as functions of the field of their sensor (engine/scene/field_form.hpp), and
-// their pullbacks. Shear and markers are linear; a flow is a quotient. Of a sum, with a
-// point's place x_i and its pressing force p_i = max(0, sign f_3,i):
+// their pullbacks. `ideal` and `markers` are functions of the ideal field. Shear and markers are
+// linear; a flow is a quotient. Of a sum, with a point's place x_i and its pressing force
+// p_i = max(0, sign f_3,i):
 //
 //   F = Σ_i R_iᵀ f_i,  c = Σ_i p_i x_i / P,  P = Σ_i p_i,  ∂c/∂p_i = (x_i - c)/P,  ∂c/∂x_i = p_i/P
 #pragma once
@@ -18,9 +19,8 @@ namespace tangere {
 /// scratch at its first call.
 class FormMap {
  public:
-  /// Throws InputError for a sensor that does not exist, for markers of a sensor without
-  /// them, for `ideal` and `markers` of an imperfect sensor, and for `pressure`, which leaves
-  /// friction out: the field does not determine them.
+  /// Throws InputError for a sensor that does not exist, for markers of a sensor without them, and
+  /// for `pressure`, which leaves friction out: the field does not determine it.
   FormMap(const Model& model, FieldOutput output);
   ~FormMap();
   FormMap(FormMap&&) noexcept;

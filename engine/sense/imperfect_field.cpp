@@ -199,40 +199,41 @@ void ImperfectField::push_forward(const CompiledSensor& s, const ReadingKey& key
   if (!s.imperfect) return;
   spread(s, 3, false, change);
   share(s, 3, change);
-  scale_by_slope(s, key, ideal, change);
+  scale_by_slope(s, key, {}, ideal, change);
 }
 
-void ImperfectField::pull_back(const CompiledSensor& s, const ReadingKey& key,
+void ImperfectField::pull_back(const CompiledSensor& s, const ReadingKey& key, FieldPart part,
                                std::span<const double> ideal, std::span<double> cotangent) {
   if (!s.imperfect) return;
-  scale_by_slope(s, key, ideal, cotangent);
-  share(s, 3, cotangent);
-  spread(s, 3, true, cotangent);
+  scale_by_slope(s, key, part, ideal, cotangent);
+  share(s, part.count, cotangent);
+  spread(s, part.count, true, cotangent);
 }
 
 /// Multiplies each number by the derivative of its reading by its field after crosstalk.
-void ImperfectField::scale_by_slope(const CompiledSensor& s, const ReadingKey& key,
+void ImperfectField::scale_by_slope(const CompiledSensor& s, const ReadingKey& key, FieldPart part,
                                     std::span<const double> ideal, std::span<double> change) {
   const SensorImperfections& of = s.imperfections;
   const bool limited = !(of.saturation == NormalAndShear{});
   const std::span<double> shared = std::span(shared_).first(limited ? ideal.size() : 0);
   std::copy_n(ideal.begin(), shared.size(), shared.begin());
   if (limited) {
-    spread(s, 3, false, shared);
-    share(s, 3, shared);
+    spread(s, part.count, false, shared);
+    share(s, part.count, shared);
   }
   Draws draws(s, key);
   Run x{};
   for_runs(s.points(), [&](int first, int end) {
     draws.draw(first);
-    for (int c = 0; c < 3; ++c) {
-      const auto k = std::size_t(3 * first + c);
-      const double limit = largest_reading(of, c);
-      for (int l = 0; l < end - first && limit != 0; ++l) x[l] = shared[k + std::size_t(3 * l)];
-      if (limit != 0) draws.add_to(c, x);
+    for (int c = 0; c < part.count; ++c) {
+      const auto k = std::size_t(part.count * first + c);
+      const auto at = [&](int l) { return k + std::size_t(part.count * l); };
+      const double limit = largest_reading(of, part.first + c);
+      for (int l = 0; l < end - first && limit != 0; ++l) x[l] = shared[at(l)];
+      if (limit != 0) draws.add_to(part.first + c, x);
       for (int l = 0; l < end - first; ++l) {
         const bool flat = draws.alive()[l] == 0 || (limit != 0 && std::abs(x[l]) > limit);
-        double& changes = change[k + std::size_t(3 * l)];
+        double& changes = change[at(l)];
         changes = flat ? 0 : draws.gain()[l] * changes;
       }
     }
@@ -248,11 +249,10 @@ void check_has_no_lag(const Model& model, int sensor) {
                    "', which has low_pass, hysteresis or delay; expected a sensor without them");
 }
 
-void read_ideal(PadReader& reader, const CompiledSensor& sensor, int group, int lane,
-                std::span<double> field) {
-  auto a = reader.arguments<double>(sensor.number, group, lane);
-  a.dense = field.data();
-  const int count = kernels::active_kernels().tactile(a);
+void read_ideal(PadReader& reader, const CompiledSensor& sensor,
+                kernels::TactileArgs<double> arguments, std::span<double> field) {
+  arguments.dense = field.data();
+  const int count = kernels::active_kernels().tactile(arguments);
   clear_tiles_between<double>(sensor.tiles(), {reader.active.data(), std::size_t(count)}, 3,
                               field.data());
 }

@@ -40,19 +40,19 @@ class ImperfectField {
   void apply(const CompiledSensor& sensor, const ReadingKey& key, FieldPart part,
              std::span<double> field);
 
-  /// Turn a change of the ideal field, (points, 3), into that of the reading, and the cotangent of
-  /// the reading into that of the ideal field. Dead and saturated numbers have no derivative;
-  /// rounding passes derivatives straight through. `ideal`: the ideal field, used only where the
-  /// sensor saturates.
+  /// Turn a change of the ideal field after delay and low-pass, (points, 3), into that of the
+  /// reading, and the cotangent of the reading, (points, part.count), into that of this field. Dead
+  /// and saturated numbers have no derivative; rounding passes derivatives straight through.
+  /// `ideal`: the field, used only where the sensor saturates.
   void push_forward(const CompiledSensor& sensor, const ReadingKey& key,
                     std::span<const double> ideal, std::span<double> change);
-  void pull_back(const CompiledSensor& sensor, const ReadingKey& key, std::span<const double> ideal,
-                 std::span<double> cotangent);
+  void pull_back(const CompiledSensor& sensor, const ReadingKey& key, FieldPart part,
+                 std::span<const double> ideal, std::span<double> cotangent);
 
  private:
   void spread(const CompiledSensor& sensor, int components, bool back, std::span<double> field);
   void share(const CompiledSensor& sensor, int components, std::span<double> field);
-  void scale_by_slope(const CompiledSensor& sensor, const ReadingKey& key,
+  void scale_by_slope(const CompiledSensor& sensor, const ReadingKey& key, FieldPart part,
                       std::span<const double> ideal, std::span<double> change);
   std::vector<double> before_, shared_;  // fields before crosstalk; ideal ones after it
 };
@@ -60,9 +60,9 @@ class ImperfectField {
 /// Throws InputError for a sensor with lag: its reading depends on more than one state.
 void check_has_no_lag(const Model& model, int sensor);
 
-/// Computes the ideal field of a sensor, (points, 3), in one lane of a group, after
-/// PadReader::find_touches().
-void read_ideal(PadReader& reader, const CompiledSensor& sensor, int group, int lane,
-                std::span<double> field);
+/// Computes the ideal field of a sensor, (points, 3), after PadReader::find_touches(). `arguments`:
+/// those of the reader for one lane of a group.
+void read_ideal(PadReader& reader, const CompiledSensor& sensor,
+                kernels::TactileArgs<double> arguments, std::span<double> field);
 
 }  // namespace tangere

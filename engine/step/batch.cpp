@@ -169,6 +169,7 @@ void Batch::reset(int environment, std::int64_t episode) {
 
 void Batch::displace_state(int environment, std::span<const double> q, std::span<const double> v) {
   displace(lane(environment), q, v);
+  if (steps(environment) == 0) fill_past_states(lane(environment));
 }
 
 void Batch::displace(std::size_t lane, std::span<const double> q, std::span<const double> v) {

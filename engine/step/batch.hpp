@@ -114,7 +114,8 @@ class Batch {
   void set_sleep(int environment, const SleepState& state);
 
   /// Sets the newest state alone, for differences. Quaternions are taken as they are; history,
-  /// status and shear state are kept.
+  /// status and shear state are kept. Before the first step of an episode it is also the earlier
+  /// states that sensors with lag read.
   void displace_state(int environment, std::span<const double> q, std::span<const double> v);
 
   /// Freezes an environment as a failed step would. Throws InputError when `status` is not a

@@ -20,8 +20,11 @@ int BlockTape::rows(const Model& model, Integrator integrator) {
 std::size_t BlockTape::bytes(const Model& model, Integrator integrator, std::int64_t steps) {
   // Upper bound of entries: all points of contacts; points of a sensor touch one body each.
   const std::size_t memory = std::size_t(compiled(model).taped_points) * sizeof(ShearEntry);
+  const std::size_t past = std::size_t(compiled(model).layout.past_states) *
+                           std::size_t(model.nq() + model.nv()) * sizeof(double);
   return std::size_t(steps + 2) * kBlock *
-         (std::size_t(rows(model, integrator)) * sizeof(double) + memory);
+             (std::size_t(rows(model, integrator)) * sizeof(double) + memory) +
+         kBlock * past;
 }
 
 BlockTape::BlockTape(const Model& model, Integrator integrator, std::int64_t steps)
@@ -49,6 +52,8 @@ void BlockTape::start(const Batch& batch, int block) {
   }
   copy(batch, block, layout.previous_q, slot(-1));
   copy(batch, block, layout.q, slot(0));
+  const double* const rows = batch.block(block);
+  past_.assign(rows + layout.past * kBlock, rows + layout.rows * kBlock);
   memory_.clear();
   memory_end_.clear();
   keep_memory(batch, block);
@@ -88,6 +93,21 @@ void BlockTape::show(std::int64_t step, Batch& batch, int block) const {
   for (int l = 0; l < kBlock && block * kBlock + l < batch.environments(); ++l) {
     batch.set_steps(block * kBlock + l, episode_step(step, l));
     batch.set_shear_state(block * kBlock + l, memory(step, l));
+    if (!past_.empty()) show_past(step, l, batch.block(block) + l);
+  }
+}
+
+/// Earlier states are on the tape, or those that the block had when it began.
+void BlockTape::show_past(std::int64_t step, int lane, double* column) const {
+  const BlockLayout& layout = compiled(model_).layout;
+  const std::int64_t states = layout.past_states, now = episode_step(step, lane);
+  for (std::int64_t ago = 1; ago <= states; ++ago) {
+    const std::int64_t then = now - ago, on_tape = then - before_[std::size_t(lane)];
+    const auto first = ((then % states + states) % states) * (nq_ + nv_);
+    const double* const from =
+        (on_tape >= 0 ? state(on_tape) : &past_[std::size_t(first) * kBlock]);
+    for (int k = 0; k < nq_ + nv_; ++k)
+      column[(layout.past + first + k) * kBlock] = from[k * kBlock + lane];
   }
 }
 

@@ -48,7 +48,8 @@ class BlockTape {
   void add(TapedStep step) { special_.push_back(std::move(step)); }
 
   /// Copies the states after `step` steps, and their steps since the start of the episodes, into a
-  /// block, for reading. History is not restored.
+  /// block, for reading, with the earlier states that sensors with lag read. The state one step
+  /// before is not restored.
   void show(std::int64_t step, Batch& batch, int block) const;
 
   [[nodiscard]] std::int64_t steps() const { return steps_; }
@@ -82,6 +83,7 @@ class BlockTape {
   }
   void copy(const Batch& batch, int block, int first_row, double* to) const;
   void keep_memory(const Batch& batch, int block);
+  void show_past(std::int64_t step, int lane, double* column) const;
 
   Model model_;
   int nq_, nv_;
@@ -91,6 +93,7 @@ class BlockTape {
   std::vector<TapedStep> special_;    // rising steps
   std::vector<std::int64_t> taken_;   // (16)
   std::vector<std::int64_t> before_;  // (16) steps of the episodes before the tape began
+  std::vector<double> past_;          // rows of earlier states in the block when the tape began
   // Shear states, and the end of each lane's part: (steps + 1, 16). Empty without shear springs.
   ShearState memory_;
   std::vector<std::size_t> memory_end_;

@@ -61,4 +61,18 @@ kernels::ShearSpringPoints TouchingSensorPoints::find(const CompiledSensor& sens
   return points;
 }
 
+void TouchingSensorPoints::add_to_points(const CompiledModel& m, const CompiledSensor& sensor,
+                                         const kernels::ShearSpringPoints& listed,
+                                         const double* own, std::span<double> points) const {
+  const kernels::Mat3<double>& R = m.bodies[std::size_t(sensor.body)].frame.R;
+  for (int k = 0; k < listed.count; ++k) {
+    const auto number = [&](int i) { return own[i * listed.stride + k]; };
+    const Vec3<double> place = transposed_times(R, Vec3<double>{number(0), number(1), number(2)});
+    const auto point = std::size_t(sensor.in_field[std::size_t(index_[std::size_t(k)])]);
+    double* const to = &points[kernels::kPointNumbers * point];
+    to[0] += place.x, to[1] += place.y, to[2] += place.z;
+    for (int i = 3; i < kernels::kPointNumbers; ++i) to[i] += number(i);
+  }
+}
+
 }  // namespace tangere

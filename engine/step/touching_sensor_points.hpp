@@ -2,6 +2,7 @@
 // The points of an elastic sensor that touch one body.
 #pragma once
 
+#include <span>
 #include <vector>
 
 #include "engine/base/aligned.hpp"
@@ -21,6 +22,11 @@ class TouchingSensorPoints {
                                   const kernels::ShearSpringTouch& touch);
   /// Numbers of the points in their contact, rising.
   [[nodiscard]] const int* index() const { return index_.data(); }
+  /// Adds cotangents of the listed points' own numbers, (kPointNumbers, stride) with places in the
+  /// link's axes, to those of all points of the sensor, (points, kPointNumbers) in its body's axes.
+  void add_to_points(const CompiledModel& model, const CompiledSensor& sensor,
+                     const kernels::ShearSpringPoints& listed, const double* own,
+                     std::span<double> points) const;
   /// Scratch of kKeptNumbers rows as long as those of the list.
   [[nodiscard]] double* scratch() { return scratch_.data(); }
   static constexpr int kKeptNumbers = 7;

@@ -5,6 +5,7 @@
 // ∂δ/∂q_i = X S_i, ∂V/∂q_i = X Ψ̇_i, ∂V/∂v_i = X S_i, with Ψ̇ = V_p × S. So δ̄ and V̄ travel up the
 // tree as wrenches, and
 //   q̄_i = Sᵀ δ̄ + Ψ̇ᵀ V̄ = Sᵀ (δ̄ - V_p ×* V̄);   v̄_i = Sᵀ V̄
+// A move of the link's place is one along three more dofs that slide.
 #pragma once
 
 #include "kernels/step/link_poses.hpp"
@@ -18,11 +19,11 @@ struct LinkMotion {
   Vec6<N> Vp, V;
 };
 
-/// Adds to q̄ and v̄, (nv) each. Overwrites `links`, (n_links). `scratch`: (n_links). The state is
-/// that of link_poses().
+/// Adds to q̄ and v̄, (nv) each, and to `places`, (n_links, 3) of Link::frame.p, or null. Overwrites
+/// `links`, (n_links). `scratch`: (n_links). The state is that of link_poses().
 template <class N>
 void pull_back_links(const ModelView& model, const StageArgs<N>& a, LinkMotion<N>* scratch,
-                     MotionCotangent<N>* links, N* q_bar, N* v_bar) {
+                     MotionCotangent<N>* links, N* q_bar, N* v_bar, N* places) {
   for (int i = 0; i < model.n_links; ++i) {
     const Link& link = model.links[i];
     LinkScratch<N> one;
@@ -44,6 +45,11 @@ void pull_back_links(const ModelView& model, const StageArgs<N>& a, LinkMotion<N
         v_bar[link.v + k] += project<K>(link, k, c.twist);
       }
     });
+    if (places != nullptr) {
+      const Vec3<N> moved = o.local.R * by_q.l;
+      N* const place = places + kPlaceNumbers * i;
+      place[0] += moved.x, place[1] += moved.y, place[2] += moved.z;
+    }
     if (link.parent < 0) continue;
     links[link.parent].pose += wrench_to_parent(link, o.local, c.pose);
     links[link.parent].twist += wrench_to_parent(link, o.local, c.twist);

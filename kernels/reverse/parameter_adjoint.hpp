@@ -205,8 +205,15 @@ void inertia_parameters(const ModelView& model, const StageArgs<N>& a, const Lin
   }
 }
 
-/// Adds the derivatives by damping, stiffness, P and D of a joint's dofs. A ball joint has one
-/// stiffness, that of its first dof.
+/// How far q is outside of the limits, with the sign of the force.
+template <class N>
+N beyond_limits(const DofEffects& e, const N& q) {
+  N unused;
+  return limit_force(e, N(1.0), q, unused);
+}
+
+/// Adds the derivatives by the parameters of a joint's dofs. A ball joint has one stiffness, that
+/// of its first dof.
 template <JointKind K, class N>
 void joint_parameters(const ModelView& model, const StageArgs<N>& a, const Link& link,
                       const N* lambda, N* out) {
@@ -219,23 +226,30 @@ void joint_parameters(const ModelView& model, const StageArgs<N>& a, const Link&
     out[kDofNumbers * k + kDofP] += inside * lambda[link.v + k] * error;
     out[kDofNumbers * k + kDofD] -= inside * lambda[link.v + k] * v;
   };
-  for (int k = 0; k < dofs(K); ++k)
-    out[kDofNumbers * k + kDofDamping] -= lambda[link.v + k] * a.v[link.v + k];
+  for (int k = 0; k < dofs(K); ++k) {
+    const N &of = lambda[link.v + k], &v = a.v[link.v + k];
+    out[kDofNumbers * k + kDofDamping] -= of * v;
+    out[kDofNumbers * k + kDofArmature] -=
+        of * mul_add(a.c0_over_h, v, a.inverse_h * a.s[link.v + k]);
+  }
   if constexpr (K != JointKind::spherical) {
     for (int k = 0; k < dofs(K); ++k) {
       const N q = c[k] + x[k];
-      if (link.effects & kSpring)
-        out[kDofNumbers * k + kDofStiffness] += lambda[link.v + k] * (N(e[k].rest) - q);
+      const N& of = lambda[link.v + k];
+      out[kDofNumbers * k + kDofStiffness] += of * (N(e[k].rest) - q);
+      out[kDofNumbers * k + kDofLimitStiffness] += of * beyond_limits(e[k], q);
       if (link.effects & kPositionServo) motor(k, u[k] - q);
     }
   } else {
     const Quat<N> q = Quat<N>{c[0], c[1], c[2], c[3]} * quaternion_exp(Vec3<N>{x[0], x[1], x[2]});
-    if (link.effects & kSpring) {
-      const Quat<N> rest = quaternion_exp(Vec3<N>{N(e[0].rest), N(e[1].rest), N(e[2].rest)});
-      const Vec3<N> phi = rotation_vector<false>(conjugate(rest) * q).phi;
-      out[kDofStiffness] -=
-          dot(phi, Vec3<N>{lambda[link.v], lambda[link.v + 1], lambda[link.v + 2]});
-    }
+    const Vec3<N> of = {lambda[link.v], lambda[link.v + 1], lambda[link.v + 2]};
+    const Quat<N> rest = quaternion_exp(Vec3<N>{N(e[0].rest), N(e[1].rest), N(e[2].rest)});
+    out[kDofStiffness] -= dot(rotation_vector<false>(conjugate(rest) * q).phi, of);
+    const RotationVector<N> at = rotation_vector<true>(q);
+    const Vec3<N> by_force = transposed_times(inverse_left_jacobian(at), of);
+    out[kDofLimitStiffness] += by_force.x * beyond_limits(e[0], at.phi.x);
+    out[kDofNumbers + kDofLimitStiffness] += by_force.y * beyond_limits(e[1], at.phi.y);
+    out[2 * kDofNumbers + kDofLimitStiffness] += by_force.z * beyond_limits(e[2], at.phi.z);
     if (link.effects & kPositionServo) {
       const Vec3<N> psi =
           rotation_vector<false>(conjugate(q) * quaternion_exp(Vec3<N>{u[0], u[1], u[2]})).phi;
@@ -244,7 +258,61 @@ void joint_parameters(const ModelView& model, const StageArgs<N>& a, const Link&
   }
 }
 
-/// Adds all derivatives to `out`, in the order of ParameterRows.
+/// Sets in `out`, (n_links, 3), what moving each link alone along its axes does through contacts.
+/// ε, the motion of body 2 in body 1's axes, changes w₁ by K ε + D (ε × Z), and Ad Λ₂ by ε × Ad Λ₂.
+template <class N>
+void contact_places(const ModelView& model, const StageArgs<N>& a, const LinkAdjoint<N>* links,
+                    N* out) {
+  const auto by_place = [](const PairSums<N>& sums, const Vec6<N>& y) {
+    return transposed_times(sums.k[0][1], y.a) + transposed_times(sums.k[1][1], y.l);
+  };
+  const auto subtract = [out](int link, const Vec3<N>& x) {
+    N* const to = out + kPlaceNumbers * link;
+    to[0] -= x.x, to[1] -= x.y, to[2] -= x.z;
+  };
+  for (int k = 0; k < model.n_link_pairs; ++k) {
+    const LinkPair& pair = model.link_pairs[k];
+    const ContactScratch<N>& o = a.contacts[k];
+    if (!o.near) continue;
+    const Vec6<N> y = adjoint_slip(pair, o, links);
+    const Vec3<N> second = pair.link1 < 0 ? y.a : y.a + links[pair.link1].twist.a;  // of Ad Λ₂
+    const Vec3<N> e = by_place(o.sums, y) + cross(o.Z.a, transposed_damping(o.sums, y).l) +
+                      cross(second, o.sums.wrench.l);
+    if (pair.link1 >= 0) subtract(pair.link1, -e);
+    if (pair.link2 >= 0) subtract(pair.link2, transposed_times(o.link2_in_1.R, e));
+  }
+  for (int k = 0; k < model.n_grounded; ++k) {
+    const ContactScratch<N>& o = a.contacts[model.n_link_pairs + k];
+    if (!o.near) continue;
+    const int link = model.grounded[k].link;
+    subtract(link, by_place(o.sums, links[link].twist));
+  }
+}
+
+/// Computes the derivatives by Link::frame.p of every link. A move ε of a subtree in the axes of
+/// its first link, without turning it, changes Λ, V and A there by Λ_p × ε, V_p × ε and A_p × ε.
+template <class N>
+void place_parameters(const ModelView& model, const StageArgs<N>& a, const LinkAdjoint<N>* links,
+                      N* out) {
+  contact_places(model, a, links, out);
+  for (int i = model.n_links - 1; i >= 0; --i) {
+    const Link& link = model.links[i];
+    const LinkScratch<N>& s = a.links[i];
+    N* const own = out + kPlaceNumbers * i;
+    Vec3<N> sum = {own[0], own[1], own[2]};
+    if (link.parent >= 0) {
+      const Vec3<N> up = s.local.R * sum;
+      add3(out + kPlaceNumbers * link.parent, up);
+      const LinkAdjoint<N>& o = links[i];
+      const Vec6<N> lambda = motion_to_child(link, s.local, links[link.parent].twist);
+      sum -= cross(s.F.l, lambda.a) + cross(o.by_a.l, s.Ap.a) + cross(o.by_v.l, s.Vp.a);
+    }
+    sum = s.local.R * sum;
+    own[0] = sum.x, own[1] = sum.y, own[2] = sum.z;
+  }
+}
+
+/// Adds all derivatives to `out`, zeros at first, in the order of ParameterRows.
 template <class N>
 void parameter_products(const ModelView& model, const StageArgs<N>& a, const AdjointArgs<N>& d,
                         N* out) {
@@ -256,6 +324,7 @@ void parameter_products(const ModelView& model, const StageArgs<N>& a, const Adj
       joint_parameters<K>(model, a, link, d.lambda, out + model.rows.dof(link.v, 0));
     });
   }
+  place_parameters(model, a, d.links, out + model.rows.places);
 }
 
 }  // namespace tangere::kernels

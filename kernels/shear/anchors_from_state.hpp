@@ -6,6 +6,7 @@
 // on through x, n and d:
 //   a pair, x = ξ - d n:       d̄ -= n·x̄, n̄ -= d x̄;  ρ̄ -= d̄ n + H n̄, θ̄ += x × ρ̄ + n × (I - dH) n̄
 //   the ground, x = ξ_c - r n: n̄ -= r x̄;            ρ̄ -= d̄ n,       θ̄ += ξ_c × ρ̄ + n × n̄
+// Moving the point is moving the shape the other way, then both: ξ̄ = x̄ - ρ̄.
 #pragma once
 
 #include "kernels/reverse/point_pullback.hpp"
@@ -73,16 +74,16 @@ template <class Shape, class N>
   p.curvature = N(0.0);
 }
 
-/// Pulls cotangents of d, n and x back to (θ; ρ) of body 2 and adds them.
+/// Pulls cotangents of d, n and x back to (θ; ρ) of body 2 and adds them. Returns ξ̄.
 template <class Shape, class N>
-void pull_back_touch_point(const LoadedTouch<N>& t, const PointContact<N>& p, const Vec3<N>& xi,
-                           N d, Vec3<N> n, const Vec3<N>& x, Vec6<N>& out) {
+Vec3<N> pull_back_touch_point(const LoadedTouch<N>& t, const PointContact<N>& p, const Vec3<N>& xi,
+                              N d, Vec3<N> n, const Vec3<N>& x, Vec6<N>& out) {
   if (t.ground) {
     n -= t.radius * x;
     const Vec3<N> rho = -d * p.n;
     out.l += rho;
     out.a += cross(xi, rho) + cross(p.n, n);
-    return;
+    return x - rho;
   }
   d = d - dot(p.n, x);
   n -= p.d * x;
@@ -94,6 +95,7 @@ void pull_back_touch_point(const LoadedTouch<N>& t, const PointContact<N>& p, co
   }
   out.l += rho;
   out.a += cross(p.x2, rho) + cross(p.n, turned);
+  return x - rho;
 }
 
 template <class N>
@@ -110,18 +112,19 @@ Anchor<N> recalled(const Shape& shape, const LoadedTouch<N>& t, const Vec3<N>& x
   return {p.x2, transposed_times(t.Q, p.x2 - s - t.c), max(p.d, N(0.0))};
 }
 
-/// Adds to (θ; ρ) of body 2 and returns s̄.
+/// Adds to (θ; ρ) of body 2 and to ξ̄, and returns s̄.
 template <class Shape, class N>
 Vec3<N> pull_back_recall(const Shape& shape, const LoadedTouch<N>& t, const Vec3<N>& xi,
-                         const Vec3<N>& remembered, const Anchor<N>& bar, Vec6<N>& out) {
+                         const Vec3<N>& remembered, const Anchor<N>& bar, Vec6<N>& out,
+                         Vec3<N>& xi_bar) {
   const N zero(0.0);
   PointContact<N> p;
   find_place(shape, t, xi, p);
   const Vec3<N> y = t.Q * bar.a, at = p.x2 - s_of(p, remembered);
   out.l -= y;
   out.a -= cross(at, y);
-  pull_back_touch_point<Shape>(t, p, xi, select(p.d > zero, bar.gap, zero), zero3<N>(), bar.b + y,
-                               out);
+  xi_bar += pull_back_touch_point<Shape>(t, p, xi, select(p.d > zero, bar.gap, zero), zero3<N>(),
+                                         bar.b + y, out);
   return select(p.d < zero, -y, zero3<N>());
 }
 

@@ -60,16 +60,38 @@ AnchorCotangent<N> pull_back_anchor(const LoadedTouch<N>& t, const ElasticPoint<
   return o;
 }
 
+/// Cotangents of a point's own place and coefficients.
+template <class N>
+struct OwnCotangent {
+  Vec3<N> xi;
+  Coefficients<N> law;
+};
+/// Adds eight points. A point's ks keeps its ratio to kt.
+template <class A>
+void add_own(const OwnCotangent<Lanes<A>>& own, const Coefficients<double>& of_sensor, double* rows,
+             int stride) {
+  using N = Lanes<A>;
+  const N ratio(of_sensor.kt == 0 ? 0 : of_sensor.ks / of_sensor.kt);
+  const N numbers[kPointNumbers] = {
+      own.xi.x,   own.xi.y,       own.xi.z, own.law.kn, mul_add(ratio, own.law.ks, own.law.kt),
+      own.law.mu, own.law.damping};
+  for (int i = 0; i < kPointNumbers; ++i)
+    store_lanes(load_lanes<A>(rows + i * stride) + numbers[i], rows + i * stride);
+}
+
 /// Reverses one point at the end of a step: adds to motion and coefficients, and returns the
 /// cotangent of its anchor. f̄ and s̄' are zero where nothing touches. x̄ is of where the force acts.
-/// `law` is that of the point, `scale` times that of its contact.
+/// `law` is that of the point, `scale` times that of its contact. `own`: ξ̄ is added to, its law is
+/// set.
 template <class Shape, class N>
 Anchor<N> pull_back_elastic(const LoadedTouch<N>& t, const LawParameters<N>& law,
                             const Coefficients<N>& scale, const ElasticPoint<N>& p,
                             const Vec3<N>& xi, const Anchor<N>& anchor, const Vec3<N>& f_bar,
-                            const Vec3<N>& x_bar, const Vec3<N>& s_bar, TouchCotangent<N>& out) {
+                            const Vec3<N>& x_bar, const Vec3<N>& s_bar, TouchCotangent<N>& out,
+                            OwnCotangent<N>& own) {
   const SpringCotangent<N> spring = pull_back_spring(law, p, f_bar, s_bar);
   const AnchorCotangent<N> of = pull_back_anchor(t, p, anchor, spring.s);
+  own.law = spring.law;
   for (std::size_t i = 0; i < kCoefficients; ++i)
     out.law[i] = mul_add(scale[i], spring.law[i], out.law[i]);
   const Vec3<N> slide = law.kt * spring.w;
@@ -84,7 +106,8 @@ Anchor<N> pull_back_elastic(const LoadedTouch<N>& t, const LawParameters<N>& law
   out.twist.l -= u;
   out.displacement.l -= of.r;
   out.displacement.a -= cross(p.x2 - p.arm, of.r);
-  pull_back_touch_point<Shape>(t, p, xi, d, n, cross(t.omega, u) + x_bar, out.displacement);
+  own.xi +=
+      pull_back_touch_point<Shape>(t, p, xi, d, n, cross(t.omega, u) + x_bar, out.displacement);
   return of.anchor;
 }
 
@@ -110,27 +133,30 @@ void pull_back_memory(const ShearPullback& m) {
       if (!any(touching)) continue;
       const N gate = select(touching, one, zero);
       Vec3<N> f_bar = zero3<N>(), x_bar = zero3<N>(), s_bar = zero3<N>();
+      OwnCotangent<N> own;
+      own.xi = zero3<N>();
       if (m.s_bar != nullptr) s_bar = gate * load3<A>(m.s_bar, stride, k);
       if (m.f_bar != nullptr) f_bar = gate * load3<A>(m.f_bar, stride, k);
       if (m.anchor_bar != nullptr) {
         const Anchor<N> after = {gate * load3<A>(m.anchor_bar, stride, k),
                                  gate * load3<A>(m.anchor_bar + 3 * stride, stride, k), zero};
-        s_bar += pull_back_recall(shape, end, xi, p.hold * p.s, after, of_end.displacement);
+        s_bar += pull_back_recall(shape, end, xi, p.hold * p.s, after, of_end.displacement, own.xi);
       }
       if (m.slip != nullptr) {
         f_bar = (-gate) * (y.l + cross(y.a, p.x2));
         x_bar = cross(y.a, p.force);
       }
       Anchor<N> bar = pull_back_elastic<Shape>(end, law, coefficient_scales<A>(m.points, k), p, xi,
-                                               anchor, f_bar, x_bar, s_bar, of_end);
+                                               anchor, f_bar, x_bar, s_bar, of_end, own);
       if (m.kept != nullptr) {
         const N kept = load_lanes<A>(m.kept + k), found = one - kept;
         store3(kept * bar.b, m.anchor_out, stride, k);
         store3(kept * bar.a, m.anchor_out + 3 * stride, stride, k);
         bar = {found * bar.b, found * bar.a, found * bar.gap};
       }
-      const Vec3<N> s =
-          pull_back_recall(shape, start, xi, load3<A>(m.remembered, stride, k), bar, of_start);
+      const Vec3<N> s = pull_back_recall(shape, start, xi, load3<A>(m.remembered, stride, k), bar,
+                                         of_start, own.xi);
+      if (m.own != nullptr) add_own<A>(own, m.end->law, m.own + k, stride);
       store3(load3<A>(m.s_out, stride, k) + s, m.s_out, stride, k);
     }
   });

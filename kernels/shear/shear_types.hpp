@@ -51,6 +51,9 @@ struct ShearPullback {
   const double* anchor_bar = nullptr;  ///< (6, stride) of b and a that follow at the end
   const double* kept = nullptr;  ///< (stride) 1: its anchor was kept, not found at `start`; else 0
   double* anchor_out = nullptr;  ///< (6, stride) of b and a of kept anchors, at points that touch
+  /// (kPointNumbers, stride) added to: of every point's own place, body 1's axes, and coefficients;
+  /// or null.
+  double* own = nullptr;
 };
 
 }  // namespace tangere::kernels

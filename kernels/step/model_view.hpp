@@ -72,25 +72,36 @@ struct DofEffects {
   double force_low, force_high;  ///< range of the motor's force; infinite: none
 };
 
-/// Parameters of a link (mass, moment, inertia xx xy xz yy yz zz), of a solid (its size as contacts
-/// see it, with masses held fixed) and of a dof that have a derivative.
-inline constexpr int kInertiaNumbers = 10, kSizeNumbers = 3;
-enum DofNumber : int { kDofDamping, kDofStiffness, kDofP, kDofD, kDofNumbers };
+/// Parameters of a link (mass, moment, inertia xx xy xz yy yz zz; Link::frame.p), of a solid (its
+/// size as contacts see it, with masses held fixed) and of a dof that have a derivative.
+inline constexpr int kInertiaNumbers = 10, kSizeNumbers = 3, kPlaceNumbers = 3;
+enum DofNumber : int {
+  kDofDamping,
+  kDofStiffness,
+  kDofP,
+  kDofD,
+  kDofArmature,
+  kDofLimitStiffness,
+  kDofNumbers
+};
 /// Where a dof's effects keep these parameters.
 inline constexpr Parameter DofEffects::*kDofParameters[kDofNumbers] = {
-    &DofEffects::damping, &DofEffects::stiffness, &DofEffects::P, &DofEffects::D};
+    &DofEffects::damping, &DofEffects::stiffness, &DofEffects::P,
+    &DofEffects::D,       &DofEffects::armature,  &DofEffects::limit_stiffness};
 
 /// The row of each parameter among the derivatives by parameters: coefficients of pairs, of ground
-/// contacts, parameters of links, of dofs, of solids, coefficients of sensors. The compiler of
-/// models sets it. Kernels compute the rows before `sensors`.
+/// contacts, inertia of links, parameters of dofs, of solids, places of links, coefficients of
+/// sensors. The compiler of models sets it. Kernels compute the rows before `sensors`.
 struct ParameterRows {
-  int grounds = 0, links = 0, dofs = 0, solids = 0, sensors = 0;  ///< first row of each kind
+  int grounds = 0, links = 0, dofs = 0, solids = 0, places = 0,
+      sensors = 0;  ///< first row of each kind
   int count = 0;
   [[nodiscard]] int pair(int k) const { return kCoefficients * k; }
   [[nodiscard]] int ground(int k) const { return grounds + kCoefficients * k; }
   [[nodiscard]] int link(int k) const { return links + kInertiaNumbers * k; }
   [[nodiscard]] int dof(int k, int which) const { return dofs + kDofNumbers * k + which; }
   [[nodiscard]] int solid(int k) const { return solids + kSizeNumbers * k; }
+  [[nodiscard]] int place(int k) const { return places + kPlaceNumbers * k; }
   [[nodiscard]] int sensor(int k) const { return sensors + kCoefficients * k; }
 };
 

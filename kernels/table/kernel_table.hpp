@@ -70,11 +70,12 @@ struct StageKernels {
   /// evaluate().
   void (*parameter_products)(const ModelView&, const Stage<L>&, const StageAdjoint<L>&, int lone,
                              Row<L>* out);
-  /// Adds cotangents of the links' poses and twists at (q, v) to those of q and v, (nv). Overwrites
-  /// those of links, (n_links), and the stage's `work`. `scratch`: pullback_bytes(model).
+  /// Adds cotangents of the links' poses and twists at (q, v) to those of q and v, (nv), and of the
+  /// links' places, (n_links, 3), or null. Overwrites those of links, (n_links), and the stage's
+  /// `work`. `scratch`: pullback_bytes(model).
   void (*pull_back_poses)(const ModelView&, const Stage<L>&, const Row<L>* q, const Row<L>* v,
                           const Row<L>* zero, std::byte* scratch, MotionCotangent<Row<L>>* links,
-                          Row<L>* q_bar, Row<L>* v_bar);
+                          Row<L>* q_bar, Row<L>* v_bar, Row<L>* places);
   /// Computes the touched shape in body 1 and the twist W of each contact with shear springs,
   /// (n_shear_springs), from poses and twists of the links.
   void (*touches_at)(const ModelView&, const LinkPose<Row<L>>* links, LinkPose<Row<L>>* out);
@@ -108,10 +109,11 @@ struct KernelTable {
   /// Compute the fields of eight and of sixteen environments.
   void (*tactile_block)(const TactileBlockArgs<double>&);
   void (*tactile_block_mixed)(const TactileBlockArgs<float>&);
-  /// Adds the cotangents of links, (n_links), to those of q and v, (nv). Overwrites those of links.
-  /// `scratch`: pullback_bytes(model).
+  /// Adds the cotangents of links, (n_links), to those of q and v, (nv), and of the links' places,
+  /// (n_links, 3), or null. Overwrites those of links. `scratch`: pullback_bytes(model).
   void (*pull_back_links)(const ModelView&, const GroupState&, std::byte* scratch,
-                          MotionCotangent<LaneRow>* links, LaneRow* q_bar, LaneRow* v_bar);
+                          MotionCotangent<LaneRow>* links, LaneRow* q_bar, LaneRow* v_bar,
+                          LaneRow* places);
   std::size_t (*pullback_bytes)(const ModelView&);
   /// Computes a field in reverse.
   void (*pull_back_field)(const TactilePullback&);

@@ -60,22 +60,24 @@ void add_adjoint_kernels(StageKernels<L>& k) {
   };
   k.pull_back_poses = [](const ModelView& m, const Stage<L>& s, const Row<L>* q, const Row<L>* v,
                          const Row<L>* zero, std::byte* scratch, MotionCotangent<Row<L>>* links,
-                         Row<L>* q_bar, Row<L>* v_bar) {
-    kernels::pull_back_links(
-        m, View::state_of(s, q, v, zero), reinterpret_cast<LinkMotion<N>*>(scratch),
-        reinterpret_cast<MotionCotangent<N>*>(links), View::view(q_bar), View::view(v_bar));
+                         Row<L>* q_bar, Row<L>* v_bar, Row<L>* places) {
+    kernels::pull_back_links(m, View::state_of(s, q, v, zero),
+                             reinterpret_cast<LinkMotion<N>*>(scratch),
+                             reinterpret_cast<MotionCotangent<N>*>(links), View::view(q_bar),
+                             View::view(v_bar), View::view(places));
   };
 }
 
 template <class Arch>
 void add_reading_pullback_kernels(KernelTable& k) {
   k.pull_back_links = [](const ModelView& m, const GroupState& s, std::byte* scratch,
-                         MotionCotangent<LaneRow>* links, LaneRow* q_bar, LaneRow* v_bar) {
+                         MotionCotangent<LaneRow>* links, LaneRow* q_bar, LaneRow* v_bar,
+                         LaneRow* places) {
     using N = Lanes<Arch>;
     using View = StageView<N, kGroup>;
     kernels::pull_back_links(m, at_state<N>(s), reinterpret_cast<LinkMotion<N>*>(scratch),
                              reinterpret_cast<MotionCotangent<N>*>(links), View::view(q_bar),
-                             View::view(v_bar));
+                             View::view(v_bar), View::view(places));
   };
   k.pullback_bytes = [](const ModelView& m) -> std::size_t {
     return sizeof(LinkMotion<Lanes<Arch>>) * std::size_t(m.n_links);

@@ -11,7 +11,9 @@
 #include "engine/derivative/number_gradients.hpp"
 #include "engine/derivative/tactile_point_numbers.hpp"
 #include "engine/rows/episode_channels.hpp"
+#include "engine/scene/scene_faults.hpp"
 #include "engine/scene/scene_number.hpp"
+#include "engine/scene/variable_numbers.hpp"
 #include "engine/step/displacement.hpp"
 #include "engine/step/shear_state_arrays.hpp"
 #include "kernels/numbers/block.hpp"
@@ -45,11 +47,35 @@ Scene with_points(Scene scene, const Model& model, std::span<const double> moved
   return scene;
 }
 
+/// Whether a number that has a derivative is the same in all environments: contact points follow
+/// from a size, and <randomize> does not know every number.
+bool is_shared(const Scene& scene, const std::string& name) {
+  for (const SceneNumber& number : variable_numbers(scene)) {
+    if (name_of(number) != name) continue;
+    if (number.owner != NumberOwner::body || number.field == NumberField::density) return false;
+    try {
+      Scene other = scene;
+      let_vary(other, number);
+      static_cast<void>(Model(other));
+      return false;
+    } catch (const InputError&) {
+      return true;
+    }
+  }
+  const NumberGradients numbers{Model(scene)};
+  return std::ranges::count(numbers.infos(), name, &NumberInfo::name) > 0;
+}
+
+std::vector<std::string> own_names(const Scene& scene, std::vector<std::string> names) {
+  std::erase_if(names, [&](const std::string& name) { return is_shared(scene, name); });
+  return names;
+}
+
 }  // namespace
 
 SceneTape::Taped::Taped(const Scene& scene, const TapeArguments& a)
-    : task(with_varying(scene, a.parameters), a.every, static_cast<int>(a.options.length),
-           a.readings),
+    : task(with_varying(scene, own_names(scene, a.parameters)), a.every,
+           static_cast<int>(a.options.length), a.readings),
       tape(task, a.environments, a.options),
       shear_points(shear_state_arrays(task.model()).count()) {
   const NumberGradients numbers(task.model());
@@ -59,20 +85,29 @@ SceneTape::Taped::Taped(const Scene& scene, const TapeArguments& a)
       throw InputError(fmt::format("'{}' has no derivative; expected another number", name));
     rows.push_back(as_size(at - numbers.infos().begin()));
     units.push_back(at->unit);
+    if (randomization_of(task.model().scene(), at->number) < 0) shared.emplace(name, at->number);
   }
   number_count = as_size(numbers.count());
 }
 
-SceneTape::SceneTape(TapeArguments arguments) { compile(std::move(arguments), {}); }
+SceneTape::SceneTape(TapeArguments arguments) { compile(std::move(arguments), {}, {}); }
 
-void SceneTape::compile(TapeArguments arguments, std::vector<double> moved) {
-  auto taped = std::make_unique<Taped>(
-      moved.empty() ? arguments.scene : with_points(arguments.scene, model(), moved), arguments);
+void SceneTape::compile(TapeArguments arguments, std::vector<double> moved, SharedNumbers shared) {
+  Scene scene = arguments.scene;
+  for (const auto& [name, value] : shared) {
+    const SceneNumber& number = taped_->shared.at(name);
+    if (const std::string fault = varying_value_fault(number, value); !fault.empty())
+      throw InputError("'" + name + "': " + fault);
+    number_in(scene, number) = value;
+  }
+  if (!moved.empty()) scene = with_points(std::move(scene), model(), moved);
+  auto taped = std::make_unique<Taped>(scene, arguments);
   posed_.reset();
   numbers_.reset();
   taped_ = std::move(taped);
   arguments_ = std::move(arguments);
   moved_ = std::move(moved);
+  shared_ = std::move(shared);
   draw_numbers();
   start({}, true);
 }
@@ -91,7 +126,7 @@ void SceneTape::add_parameters(const std::vector<std::string>& names) {
   if (with.parameters.size() == arguments_.parameters.size()) return;
   with.options.parameters = true;
   const nb::gil_scoped_release free;
-  compile(std::move(with), moved_);
+  compile(std::move(with), moved_, shared_);
 }
 
 void SceneTape::reset(const Whole<std::uint64_t>& seed, const TapeStart& given,
@@ -107,7 +142,8 @@ void SceneTape::reset(const Whole<std::uint64_t>& seed, const TapeStart& given,
   }
   const nb::gil_scoped_release free;
   seed_ = draw;
-  if (moved != moved_) compile(arguments_, moved);
+  const SharedNumbers shared = given.numbers ? shared_in(*given.numbers) : SharedNumbers{};
+  if (moved != moved_ || shared != shared_) compile(arguments_, moved, shared);
   draw_numbers();
   if (given.numbers) set_numbers(merged(*given.numbers, given.q && given.v));
   drawn_ = now_;
@@ -147,6 +183,12 @@ void SceneTape::step(const Argument<double>& controls, const std::optional<Named
   std::vector<std::string> names;
   if (numbers) {
     refuse_sensors(*numbers);
+    for (const auto& [name, value] : shared_in(*numbers))
+      if (value != number_in(model().scene(), taped_->shared.at(name)))
+        throw InputError(
+            fmt::format("'{}' of {} in a step; expected it in reset(): it is the same "
+                        "in all environments and steps",
+                        name, value));
     set_numbers(merged(*numbers, false));
     for (const auto& [name, value] : *numbers) names.push_back(name);
   }
@@ -373,12 +415,38 @@ void SceneTape::refuse_sensors(const NamedValues& values) const {
           "'{}' in a step of a simulation with points=True; expected it in reset()", name));
 }
 
+/// Those of the values that are the same in all environments. Throws InputError where they differ.
+SharedNumbers SceneTape::shared_in(const NamedValues& values) const {
+  SharedNumbers shared;
+  for (const auto& [name, given] : values) {
+    if (!taped_->shared.contains(name)) continue;
+    const auto all = given.size() == 1 ? std::span<const double>(given.data(), 1)
+                                       : numbers_of(given, {count()}, name.c_str());
+    for (const double other : all)
+      if (other != all[0])
+        throw InputError(
+            fmt::format("'{}' of {} and {}; expected one value: it is the same in "
+                        "all environments",
+                        name, all[0], other));
+    shared.emplace(name, all[0]);
+  }
+  return shared;
+}
+
+SharedNumbers SceneTape::shared() const {
+  SharedNumbers all;
+  for (const auto& [name, number] : taped_->shared)
+    all.emplace(name, number_in(model().scene(), number));
+  return all;
+}
+
 /// The numbers of now with some of them changed, (E, varying_count()). `placed`: numbers of the
 /// starting state are allowed, because q and v are given.
 std::vector<double> SceneTape::merged(const NamedValues& values, bool placed) const {
   std::vector<double> all = now_;
   const std::vector<std::string> varying = varying_names(model().scene());
   for (const auto& [name, given] : values) {
+    if (taped_->shared.contains(name)) continue;
     const auto at = std::ranges::find(varying, name);
     if (at == varying.end())
       throw InputError(

@@ -2,6 +2,7 @@
 // A tape of any scene: what tangere.torch.Simulation and tangere.jax.Simulation call.
 #pragma once
 
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -34,6 +35,10 @@ struct TapeStart {
   std::optional<NamedValues> numbers;
 };
 
+/// Parameters that are the same in all environments, and their values: the scene is compiled with
+/// them.
+using SharedNumbers = std::map<std::string, double>;
+
 class SceneTape {
  public:
   explicit SceneTape(TapeArguments arguments);
@@ -65,6 +70,7 @@ class SceneTape {
   [[nodiscard]] const Model& model() const { return taped_->task.model(); }
   [[nodiscard]] const std::vector<std::string>& parameters() const { return arguments_.parameters; }
   [[nodiscard]] std::vector<std::string> units() const;
+  [[nodiscard]] SharedNumbers shared() const;
   [[nodiscard]] std::size_t count() const { return as_size(arguments_.environments); }
   [[nodiscard]] std::int64_t taken() const { return taped_->tape.taken(); }
   [[nodiscard]] std::size_t point_count() const;
@@ -77,8 +83,9 @@ class SceneTape {
     SceneTask task;
     TaskTape tape;
     std::size_t number_count, shear_points;
-    std::vector<std::size_t> rows;   ///< (parameters) among numbers with derivatives
-    std::vector<std::string> units;  ///< (parameters)
+    std::vector<std::size_t> rows;              ///< (parameters) among numbers with derivatives
+    std::vector<std::string> units;             ///< (parameters)
+    std::map<std::string, SceneNumber> shared;  ///< parameters that are the same in all
   };
   /// States whose bodies are read.
   struct Posed {
@@ -97,7 +104,7 @@ class SceneTape {
   [[nodiscard]] Shape controls_shape() const {
     return {count(), as_size(arguments_.every), as_size(model().nu())};
   }
-  void compile(TapeArguments arguments, std::vector<double> moved);
+  void compile(TapeArguments arguments, std::vector<double> moved, SharedNumbers shared);
   void start(const TapeStart& start, bool record);
   void expect_reverse();
   void add_points(std::size_t environment, std::span<const double> own,
@@ -106,6 +113,7 @@ class SceneTape {
   void draw_numbers();
   void set_numbers(std::vector<double> numbers);
   void refuse_sensors(const NamedValues& values) const;
+  [[nodiscard]] SharedNumbers shared_in(const NamedValues& values) const;
   void normalise_quaternions(std::span<double> q) const;
   std::vector<double> collect(std::span<const double> all, const std::vector<std::string>& given);
   Posed& posed(const Argument<double>& q, const Argument<double>& v,
@@ -123,6 +131,7 @@ class SceneTape {
   std::size_t left_ = 0;                         ///< steps to reverse
   std::vector<double> carried_;  ///< (E, names) derivatives by what later steps were not given
   std::vector<double> moved_;    ///< (points, 7) of the compiled scene; empty: none
+  SharedNumbers shared_;  ///< of the compiled scene; others are those of the arguments' scene
   InUse in_use_;
 };
 

@@ -127,6 +127,9 @@ void add_scene_tapes(nb::module_& m) {
   current(
       "units", [](Self s) { return s.units(); }, "Units of `parameters`.");
   current(
+      "shared", [](Self s) { return s.shared(); },
+      "Name → value of those parameters that are the same in all environments.");
+  current(
       "points", [](Self s) { return s.point_count(); },
       "Of all sensors; 0 without their derivatives.");
   current(

@@ -127,6 +127,8 @@ class SimulationBase:
             self.tape.add_parameters(list(names))
             self._made_anew()
         columns = dict(zip(self.model.scene.varying, self.tape.varying().T))
+        for name, value in self.tape.shared.items():  # the same in all environments
+            columns[name] = np.full(self.num_envs, value)
         return {name: columns[name].copy() for name in names or self.tape.parameters}
 
     def _rows_of(self, given: Mapping[str, Any] | None, convert: Any, fill: Any) -> dict[str, Any]:

@@ -11,6 +11,7 @@
 #include "engine/base/as_size.hpp"
 #include "engine/derivative/tactile_point_numbers.hpp"
 #include "engine/rows/episode_channels.hpp"
+#include "engine/scene/imperfection_checks.hpp"
 #include "engine/step/displacement.hpp"
 #include "engine/step/shear_state_arrays.hpp"
 
@@ -59,9 +60,11 @@ NamedReading reading_named(const Model& model, const std::string& name) {
 }
 
 /// What is read of a sensor to compute an output.
-FieldOutput read_for(const FieldOutput& output) {
-  const bool pressure = output.form == FieldForm::pressure;
-  return {output.sensor, pressure ? FieldForm::pressure : FieldForm::field};
+FieldOutput read_for(const Model& model, const FieldOutput& output) {
+  if (output.form == FieldForm::pressure) return {output.sensor, FieldForm::pressure};
+  const bool of_ideal = output.form == FieldForm::ideal || output.form == FieldForm::markers,
+             imperfect = is_imperfect(model.scene().sensors[as_size(output.sensor)].imperfections);
+  return {output.sensor, of_ideal && imperfect ? FieldForm::ideal : FieldForm::field};
 }
 
 std::vector<std::string> default_readings(const Model& model) {
@@ -116,7 +119,7 @@ TaskSpec declared(const Scene& scene, int steps, int horizon,
     spec.reads_tactile |= reading.field.has_value();
     spec.reads_shear_state |= reading.shear_state;
     if (!reading.field) continue;
-    if (const FieldOutput source = read_for(*reading.field);
+    if (const FieldOutput source = read_for(model, *reading.field);
         std::ranges::find(spec.fields, source) == spec.fields.end())
       spec.fields.push_back(source);
   }
@@ -135,7 +138,7 @@ SceneTask::SceneTask(const Scene& scene, int steps, int horizon,
   for (const std::string& name : readings ? *readings : default_readings(model())) {
     const NamedReading reading = reading_named(model(), name);
     if (reading.field) {
-      const FieldOutput source = read_for(*reading.field);
+      const FieldOutput source = read_for(model(), *reading.field);
       Field field{{}, 0, 0, as_size(first_tactile_point(model(), source.sensor))};
       for (const FieldOutput& other : fields()) {
         field.size = numbers_of(model().sensors()[as_size(other.sensor)].points, other.form);

@@ -29,9 +29,11 @@ Task::Task(const Scene& scene, TaskSpec spec)
   if (spec_.control_every == 0) spec_.control_every = spec_.steps_per_action;
   check_outputs(fields_, model_.sensors().size());
   for (const FieldOutput& output : fields_)
-    if (output.form != FieldForm::field && output.form != FieldForm::pressure)
-      throw InputError(fmt::format("task '{}' reads the {} of a sensor; expected field or pressure",
-                                   spec_.name, to_string(output.form)));
+    if (output.form != FieldForm::field && output.form != FieldForm::pressure &&
+        output.form != FieldForm::ideal)
+      throw InputError(
+          fmt::format("task '{}' reads the {} of a sensor; expected field, pressure or ideal",
+                      spec_.name, to_string(output.form)));
   if (spec_.reads_tactile && fields_.empty()) fields_ = whole_fields(scene);
 }
 

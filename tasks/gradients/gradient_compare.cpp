@@ -23,7 +23,7 @@ namespace {
 /// directions, so a sweep fills a block of environments.
 constexpr int kSweepLevels = 8;
 /// Scales of changes. Positions use 1 (m or rad); velocities and controls change more.
-constexpr double kVelocityScale = 10, kControlScale = 10;
+constexpr double kVelocityScale = 10, kControlScale = 10, kPlaceScale = 0.01;
 constexpr double kLargest = 1e-3;      // step size, times the input's scale
 constexpr std::size_t kExplained = 2;  // kinks of an input
 constexpr double kNoInfluence =
@@ -129,18 +129,20 @@ void compare_along(CheckedInput& c, std::span<const double> gradient,
   c.tangent_error = finite_error(std::abs(dot - along) / (c.scale * norm_of(direction)));
 }
 
-/// A gradient by relative changes of a scene's numbers. `varying`: values of what the scene
-/// randomises, in its order.
+/// A gradient by relative changes of a scene's numbers. Places change by parts of 1 cm. `varying`:
+/// values of what the scene randomises, in its order.
 struct RelativeGradient {
-  std::vector<double> has, gradient;  ///< values in the environment; gradient times values
-  std::vector<std::size_t>
-      given;  ///< indices of values that are not zero, which a relative change moves
+  std::vector<double> has, gradient;  ///< values in the environment, or 1 cm; gradient times these
+  std::vector<std::size_t> given;     ///< indices where these are not zero
 
   RelativeGradient(const NumberGradients& parameters, const Scene& scene,
                    std::span<const double> varying, std::span<const double> absolute) {
     for (std::size_t k = 0; k < absolute.size(); ++k) {
-      const int random = randomization_of(scene, parameters.infos()[k].number);
-      has.push_back(random < 0 ? parameters.infos()[k].value : varying[std::size_t(random)]);
+      const NumberInfo& info = parameters.infos()[k];
+      const int random = randomization_of(scene, info.number);
+      has.push_back(info.number.field == NumberField::pos ? kPlaceScale
+                    : random < 0                          ? info.value
+                                                          : varying[std::size_t(random)]);
       gradient.push_back(absolute[k] * has[k]);
       if (has[k] != 0) given.push_back(k);
     }
@@ -247,14 +249,14 @@ void GradientChecker::check_velocities() {
       });
 }
 
-/// Takes relative changes of the environment's own values, because units differ.
+/// Takes relative changes, because units differ.
 void GradientChecker::check_numbers() {
   const RelativeGradient r(parameters_, model_.scene(), varying_, by_numbers_);
-  const auto move = [this](std::size_t k) {
-    return [this, k](Scene& scene, std::vector<double>& varying, double e) {
+  const auto move = [&](std::size_t k) {
+    return [&, k](Scene& scene, std::vector<double>& varying, double e) {
       const SceneNumber& number = parameters_.infos()[k].number;
       const int random = randomization_of(scene, number);
-      (random < 0 ? number_in(scene, number) : varying[std::size_t(random)]) *= 1 + e;
+      (random < 0 ? number_in(scene, number) : varying[std::size_t(random)]) += e * r.has[k];
     };
   };
   add({"numbers", r.gradient, r.given, [&](std::size_t k) { return difference_of_scene(move(k)); },

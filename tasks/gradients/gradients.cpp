@@ -30,19 +30,6 @@ void check(const TapeOptions& options) {
                      " threads; expected at least 1");
 }
 
-/// Refuses losses of fields of sensors with lag, and derivatives by points of sensors with ks.
-void check_memories(const Model& model, const TapeOptions& options,
-                    std::span<const RolloutLoss* const> losses) {
-  const auto reads_fields = [&](const RolloutLoss* loss) {
-    for (std::int64_t step = 0; step <= options.length; ++step)
-      if (loss->reads_fields(step)) return true;
-    return false;
-  };
-  if (!std::any_of(losses.begin(), losses.end(), reads_fields)) return;
-  check_has_no_lag(model);
-  if (options.points) check_has_plain_points(model);
-}
-
 TapeOptions checked(const Task& task, std::int64_t episodes, const TapeOptions& options) {
   if (episodes < 1 || options.threads < 1)
     throw InputError(fmt::format("gradients of {} episodes on {} threads; expected at least 1",
@@ -114,7 +101,6 @@ struct GradientRollouts::Impl {
 GradientRollouts::GradientRollouts(const Model& model, const TapeOptions& options,
                                    std::span<const RolloutLoss* const> losses) {
   check(options);
-  check_memories(model, options, losses);
   impl_ = std::make_unique<Impl>(model, options, losses);
 }
 GradientRollouts::~GradientRollouts() = default;

@@ -159,7 +159,7 @@ class Directions {
       tape_->show(t, batch, 0);
       sum += change_at(batch, look, tangent, t, state, u_dot, d.numbers, points);
       if (t == s_.options.length) break;
-      tangent.step(batch, 0, 0, *tape_, t, s_.u(s_.at, t), u_dot, d.numbers, state);
+      tangent.step(batch, 0, 0, *tape_, t, s_.u(s_.at, t), u_dot, d.numbers, state, points);
     }
     return sum;
   }
@@ -184,19 +184,12 @@ class Directions {
       bar.field(k).spread(bar.field_bar(k), of_tiles);
       sum += std::inner_product(change.begin(), change.end(), of_tiles.begin(), 0.0);
     }
-    if (s_.loss.reads_end_effectors(t))
-      sum += along_end_effectors(batch, look.readout, bar.end_effectors_bar(), state);
-    return sum;
-  }
-
-  static double along_end_effectors(const Batch& batch, Readout& readout,
-                                    std::span<const double> x_bar, const StateTangent& state) {
-    const auto nv = state.q.size();
-    std::vector<double> jacobian(x_bar.size() * nv);
-    readout.end_effector_jacobian(batch, 0, jacobian);
-    double sum = 0;
-    for (std::size_t i = 0; i < x_bar.size(); ++i)
-      for (std::size_t k = 0; k < nv; ++k) sum += x_bar[i] * jacobian[i * nv + k] * state.q[k];
+    if (s_.loss.reads_end_effectors(t)) {
+      const std::span<const double> x_bar = bar.end_effectors_bar();
+      std::vector<double> change(x_bar.size());
+      tangent.end_effectors(batch, 0, 0, *tape_, t, rows, state, change);
+      sum += std::inner_product(change.begin(), change.end(), x_bar.begin(), 0.0);
+    }
     return sum;
   }
 
@@ -230,24 +223,13 @@ bool reads_fields(const RolloutLoss& loss, const CheckOptions& options) {
   return false;
 }
 
-/// Whether points of fields are checked: those of sensors with ks have no derivatives of their own.
-bool checks_points(const Model& model, const RolloutLoss& loss, const CheckOptions& options) {
-  const Scene& scene = model.scene();
-  const auto is_plain = [&](const TactileDescription& d) {
-    const SceneNumber ks = {NumberOwner::tactile, NumberField::ks, d.name};
-    return d.coefficients.ks == 0 && randomization_of(scene, ks) < 0;
-  };
-  return reads_fields(loss, options) &&
-         std::all_of(scene.sensors.begin(), scene.sensors.end(), is_plain);
-}
-
 LossGradient gradient_of(const Batch& start, const StepControls& controls, const RolloutLoss& loss,
                          const CheckOptions& options) {
   TapeOptions wanted;
   wanted.length = options.length;
   wanted.stepper = options.stepper;
   wanted.parameters = true;
-  wanted.points = checks_points(start.model(), loss, options);
+  wanted.points = reads_fields(loss, options);
   const RolloutLoss* const losses[] = {&loss};
   return rollout_gradients(start, controls, wanted, losses).losses[0];
 }
@@ -323,7 +305,7 @@ class LossChecker : public GradientChecker {
       for (double& x : moved) x *= e;
       TactileDescription& sensor = scene.sensors[std::size_t(change.sensor)];
       const double* has = &coefficients[std::size_t(4 * change.sensor)];
-      sensor.coefficients = {has[0], has[1], has[2], has[3]};
+      for (std::size_t k = 0; k < kPointCoefficients; ++k) sensor.coefficients[k] = has[k];
       add_to_points(sensor, moved);
     };
   }
@@ -351,7 +333,7 @@ GradientCheck check_gradient(const Batch& start, const StepControls& controls,
   const LossGradient g = gradient_of(start, controls, loss, options);
   LossChecker checker(s, g);
   checker.check();
-  if (checks_points(start.model(), loss, options)) checker.points();
+  if (reads_fields(loss, options)) checker.points();
   checker.explain();
   return checker.result();
 }

@@ -78,6 +78,7 @@ TaskBlock::TaskBlock(const Task& task, const TapeOptions& options, std::int64_t 
       rollout_(task, options.stepper, options.precision),
       records_(as_size(options.length), ActionRecord(task)),
       shear_arrays_(shear_state_arrays(task.model())),
+      start_(task.model(), Integrator::bdf1, 0),
       snapshot_cotangents_(task.spec().snapshots.size()),
       start_q_(lane_rows(as_size(task.model().nv()))),
       start_v_(start_q_),
@@ -88,7 +89,8 @@ TaskBlock::TaskBlock(const Task& task, const TapeOptions& options, std::int64_t 
       shown_q_(start_q_),
       shown_v_(start_q_),
       reward_bar_(kBlock) {
-  check_has_no_lag(task_.model(), task_.fields());
+  // A restart is the earlier states of a reading, whose steps go on.
+  if (task.spec().restarts) check_has_no_lag(task.model(), task.fields());
   const auto end_effectors = lane_rows(task.end_effectors_size()),
              tactile = lane_rows(task.tactile_size()), bodies = lane_rows(task.bodies_size()),
              shear_state = lane_rows(task.shear_state_size());
@@ -110,6 +112,7 @@ void TaskBlock::start(std::uint64_t seed, EpisodeRange episodes, bool record) {
   std::vector<std::int64_t> numbers(as_size(episodes.end - episodes.first));
   std::iota(numbers.begin(), numbers.end(), episodes.first);
   rollout_.start(seed, numbers);
+  start_.start(rollout_.batch(), 0);
   start_forward(record);
   took_.fill(false);
   first_varying_.clear();
@@ -141,6 +144,7 @@ void TaskBlock::displace(std::span<const double> q, std::span<const double> v,
         shear_arrays_.read_all(number_row(shear_state, l, 3 * shear_arrays_.count()));
     rollout_.batch().set_shear_state(l, start_shear_[as_size(l)]);
   }
+  start_.start(rollout_.batch(), 0);
   rollout_.record_start();
   for (int l = 0; l < lanes(); ++l) rollout_.observe_start(l);
 }
@@ -334,6 +338,8 @@ void TaskBlock::add_readings(std::size_t moment, int lane) {
     const std::span<double> points = c.points_of(task_.model(), s, lane);
     if (output.form == FieldForm::pressure)
       pullback_.pressure(lane, s, fields.first(numbers), c.parameters, points);
+    else if (output.form == FieldForm::ideal)
+      pullback_.ideal_field(lane, s, fields.first(numbers), c.parameters, points);
     else
       pullback_.dense_field(lane, s, fields.first(numbers), c.parameters, points);
     fields = fields.subspan(numbers);
@@ -401,17 +407,7 @@ std::span<const SnapshotCotangent> TaskBlock::cotangents(int lane) {
 
 /// Copies the states in which the first actions began into the batch.
 void TaskBlock::add_start_to_shown() {
-  const EnvironmentData& data = rollout_.data();
-  const std::size_t nq = as_size(model_.nq()), nv = as_size(model_.nv());
-  for (int l = 0; l < lanes(); ++l) {
-    const auto first = [&](const std::vector<double>& recorded, const std::vector<double>& now,
-                           std::size_t width) {
-      return taken_ > 0 ? std::span(part(recorded, l)) : number_row(now, l, width);
-    };
-    rollout_.batch().displace_state(l, first(records_[0].q, data.q, nq),
-                                    first(records_[0].v, data.v, nv));
-    rollout_.batch().set_shear_state(l, start_shear_[as_size(l)]);
-  }
+  start_.show(0, rollout_.batch(), 0);
   rollout_.record_start();
 }
 

@@ -91,6 +91,7 @@ class TaskBlock : public TapeBlock {
   std::array<ShearState, kernels::kBlock> start_shear_;  // shear states at the reset
   ShearStateArrays shear_arrays_;
   std::vector<double> first_varying_;  // (lanes, <randomize>) before an action brought values
+  BlockTape start_;                    // states at the reset
   std::vector<SnapshotRows> warm_up_;  // snapshots of a warm-up before its last one
   // Cotangents for the action reversed last: of its snapshots, first state, controls, and itself.
   std::vector<SnapshotRows> snapshots_bar_;

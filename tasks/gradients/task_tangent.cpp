@@ -51,15 +51,14 @@ TaskTangent::TaskTangent(TaskRollout& rollout, std::span<const double> actions,
     : rollout_(rollout),
       task_(rollout.task()),
       tangent_(task_.model(), options),
-      readout_(task_.model()),
       memory_(as_size(task_.spec().task_state)),
       action_(task_.spec().action.size()) {
-  const bool pressure = std::ranges::any_of(
-      task_.fields(), [](const FieldOutput& o) { return o.form == FieldForm::pressure; });
-  if (task_.bodies_size() > 0 || pressure)
+  const bool other = std::ranges::any_of(
+      task_.fields(), [](const FieldOutput& o) { return o.form != FieldForm::field; });
+  if (task_.bodies_size() > 0 || other)
     throw InputError("task " + task_.spec().name +
-                     " reads bodies or pressures, which have no forward derivatives; expected end "
-                     "effectors and fields");
+                     " reads bodies, pressures or ideal fields, which have no forward derivatives; "
+                     "expected end effectors and fields");
   for (std::size_t a = 0; a * action_.size() < actions.size(); ++a) {
     ActionRecord& r = records_.emplace_back(task_);
     const auto own = actions.subspan(a * action_.size(), action_.size());
@@ -182,14 +181,10 @@ void TaskTangent::look(const BlockTape& tape, int step, std::size_t moment,
   seen.q[moment] = state_.q;
   seen.v[moment] = state_.v;
   tape.show(step, rollout_.batch(), 0);
-  const std::size_t nv = state_.q.size();
-  if (task_.end_effectors_size() > 0) {
-    std::vector<double> jacobian(task_.end_effectors_size() * nv);
-    readout_.end_effector_jacobian(rollout_.batch(), 0, jacobian);
-    for (std::size_t i = 0; i < task_.end_effectors_size(); ++i)
-      seen.end_effectors[moment].push_back(
-          product(std::span(jacobian).subspan(i * nv, nv), state_.q));
-  }
+  seen.end_effectors[moment].resize(task_.end_effectors_size());
+  if (task_.end_effectors_size() > 0)
+    tangent_.end_effectors(rollout_.batch(), 0, 0, tape, step, numbers, state_,
+                           seen.end_effectors[moment]);
   if (task_.tactile_size() == 0) return;
   for (const FieldOutput& output : task_.fields()) {
     const int s = output.sensor;

@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "engine/derivative/tangent.hpp"
-#include "engine/sense/readout.hpp"
 #include "tasks/gradients/gradient_compare.hpp"
 #include "tasks/gradients/row_jacobians.hpp"
 #include "tasks/gradients/task_rollout.hpp"
@@ -63,7 +62,6 @@ class TaskTangent {
   TaskRollout& rollout_;
   const Task& task_;
   Tangent tangent_;
-  Readout readout_;
   std::vector<ActionRecord> records_;
   std::vector<BlockTape> tapes_;
   std::size_t taken_ = 0;

@@ -25,7 +25,6 @@ TapeOptions checked(const Task& task, int environments, const TapeOptions& o) {
   if (environments < 1 || o.threads < 1)
     throw InputError(fmt::format("a tape of {} environments on {} threads; expected at least 1",
                                  environments, o.threads));
-  if (o.points) check_has_plain_points(task.model());
   return options_for(task, o, "a tape");
 }
 

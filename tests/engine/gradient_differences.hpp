@@ -49,7 +49,7 @@ inline int check_gradient(const Model& model, const StepperOptions& o, const Run
   std::vector<double> a = adjoint.parameters,
                       b = difference.parameters;  // by their relative changes: units differ
   for (std::size_t k = 0; k < a.size(); ++k) {
-    const double size = parameters.infos()[k].value;
+    const double size = size_of(parameters.infos()[k]);
     a[k] *= size, b[k] *= size;
   }
   const double scale = norm(b);

@@ -115,6 +115,11 @@ inline double loss_of_run(const Model& model, const StepperOptions& options, con
   return losses_of_runs(model, options, {in}, loss)[0];
 }
 
+/// The scale of a number's changes: its value, or 1 cm of a place, which may be zero.
+inline double size_of(const NumberInfo& info) {
+  return info.number.field == NumberField::pos ? 0.01 : info.value;
+}
+
 /// Gradient: q₀ (nv), v₀ (nv), u (steps, nu).
 struct RunGradient {
   std::vector<double> q, v, u, parameters;
@@ -242,7 +247,7 @@ inline RunGradient differences_of_run(const Model& model, const StepperOptions& 
     g.u.push_back(difference() / 10);
   const NumberGradients parameters(model);
   for (int k = 0; k < parameters.count(); ++k) {
-    const double size = parameters.infos()[std::size_t(k)].value;
+    const double size = size_of(parameters.infos()[std::size_t(k)]);
     if (size == 0) {  // at a bound of the scene's numbers: one-sided
       g.parameters.push_back(NAN);
       continue;

@@ -19,10 +19,13 @@ using LossChange =
                          const std::vector<double>& rows, const StateTangent& state)>;
 
 /// Expects the change of a loss along random directions, of start, controls and numbers of the
-/// scene, to be that by the adjoint.
+/// scene, to be that by the adjoint. `points_dot`: that of every sensor's points, or empty;
+/// `by_points`: by the adjoint, times this.
 inline void expect_tangent(const Model& model, const StepperOptions& options, const RunInput& in,
                            const RunGradient& adjoint, Random& random,
-                           const LossChange& loss_change) {
+                           const LossChange& loss_change,
+                           std::span<const std::vector<double>> points_dot = {},
+                           double by_points = 0) {
   const auto steps = static_cast<int>(in.u.size());
   const auto draw = [&](std::size_t count) {
     std::vector<double> x(count);
@@ -33,8 +36,8 @@ inline void expect_tangent(const Model& model, const StepperOptions& options, co
   StateTangent state{draw(nv), draw(nv), std::vector<double>(nv), std::vector<double>(nv)};
   const NumberGradients numbers(model);
   std::vector<double> change = draw(std::size_t(numbers.count()));
-  for (std::size_t k = 0; k < change.size(); ++k) change[k] *= numbers.infos()[k].value;
-  double reverse = 0, forward = 0;
+  for (std::size_t k = 0; k < change.size(); ++k) change[k] *= size_of(numbers.infos()[k]);
+  double reverse = by_points, forward = 0;
   for (std::size_t i = 0; i < nv; ++i)
     reverse += adjoint.q[i] * state.q[i] + adjoint.v[i] * state.v[i];
   for (std::size_t k = 0; k < change.size(); ++k) reverse += adjoint.parameters[k] * change[k];
@@ -48,11 +51,12 @@ inline void expect_tangent(const Model& model, const StepperOptions& options, co
   for (const auto& u : in.u) stepper.step_block(batch, 0, u, &tape);
   Tangent tangent(model, options);
   for (int t = 0; t <= steps; ++t) {
+    tape.show(t, batch, 0);
     forward += loss_change(tangent, batch, tape, t, rows, state);
     if (t == steps) break;
     const std::vector<double> u_dot = draw(nu);
     for (std::size_t k = 0; k < nu; ++k) reverse += adjoint.u[std::size_t(t) * nu + k] * u_dot[k];
-    tangent.step(batch, 0, 0, tape, t, in.u[std::size_t(t)], u_dot, rows, state);
+    tangent.step(batch, 0, 0, tape, t, in.u[std::size_t(t)], u_dot, rows, state, points_dot);
   }
   EXPECT_NEAR(reverse, forward, 1e-9 * (std::abs(forward) + adjoint.norm()));
 }

@@ -10,6 +10,8 @@
 #include "engine/derivative/tangent.hpp"
 #include "engine/sense/readout.hpp"
 #include "engine/step/tape.hpp"
+#include "tests/engine/field_loss.hpp"
+#include "tests/engine/gradient_differences.hpp"
 #include "tests/engine/pad_scene.hpp"
 
 namespace tangere {
@@ -149,24 +151,114 @@ TEST_P(ImperfectGradient, ThreeRoutesAndDifferencesAgree) {
 INSTANTIATE_TEST_SUITE_P(Pads, ImperfectGradient,
                          ::testing::Values(Pad::flat, Pad::skewed, Pad::curved));
 
-TEST(ImperfectGradient, SensorsWithMemoryAreRefused) {
-  Scene scene = scene_with(Pad::flat, 0);
-  scene.sensors[0].imperfections.delay = 0.01;
+/// A pad on a moving shape, with everything that makes a reading late. It starts pressed in.
+Scene late_scene(Pad pad) {
+  Scene s = scene_with(pad, 0);
+  SensorImperfections& i = s.sensors[0].imperfections;
+  i.delay = 1.5 * s.timestep, i.low_pass = 1.2 * s.timestep;
+  i.hysteresis = 0.3, i.hysteresis_time = 2 * s.timestep;
+  i.dead = 0, i.saturation = {0.5, 0.3};
+  return s;
+}
+
+/// Readings depend on the states of the steps before, and those of the first steps on the start.
+TEST(LateReading, ThreeRoutesAgree) {
+  constexpr int kLateSteps = 7;
+  for (const Pad pad : {Pad::flat, Pad::curved}) {
+    const Scene scene = late_scene(pad);
+    const Model model(scene);
+    ASSERT_GT(model.sensors()[0].past_states, 4);
+    const StepperOptions options = testing::options(Integrator::bdf1, scene.timestep, 1e-13);
+    Random random(4);
+    const PadState s = testing::random_pad_state(model, random);
+    testing::RunInput in = testing::random_input(model, 3, kLateSteps);
+    in.q = s.q;
+    for (std::size_t i = 0; i < in.v.size(); ++i) in.v[i] = 0.1 * s.v[i];
+    const testing::FieldLoss loss(model, kLateSteps, 7);
+    std::vector<double> by_points;
+    const testing::RunGradient adjoint =
+        testing::adjoint_of_fields(model, options, in, loss, &by_points);
+    EXPECT_GT(testing::norm(adjoint.q), 1e-3);
+    const auto along = [&](const std::function<void(testing::RunInput&, double)>& change) {
+      return testing::best_difference(
+          [&](double e) {
+            testing::RunInput other = in;
+            change(other, e);
+            return testing::field_loss_of_run(model, options, other, loss);
+          },
+          1e-6);
+    };
+    testing::RunGradient difference;
+    for (int i = 0; i < model.nv(); ++i) {
+      difference.q.push_back(
+          along([&](testing::RunInput& x, double e) { x.q = testing::moved(model, x.q, i, e); }));
+      difference.v.push_back(
+          along([&](testing::RunInput& x, double e) { x.v[std::size_t(i)] += 1e2 * e; }) / 1e2);
+    }
+    int compared =
+        testing::compare(adjoint.q, difference.q, testing::norm(difference.q), 1e-5, "q");
+    compared += testing::compare(adjoint.v, difference.v, testing::norm(difference.v), 1e-5, "v");
+    EXPECT_GT(compared, model.nv());
+    EXPECT_GT(testing::norm(difference.v), 1e-4);
+    testing::expect_tangent(model, options, in, adjoint, random, testing::change_of_fields(loss));
+  }
+}
+
+/// A sensor without imperfections reads what its ideal field is; the cotangent of a pressure of an
+/// imperfect one goes through its flaws.
+TEST(ImperfectGradient, PressuresMatchDifferences) {
+  for (const Pad pad : {Pad::flat, Pad::curved}) {
+    const Model model(late_scene(pad));
+    Random random(5);
+    const auto points = std::size_t(model.sensors()[0].points), nv = std::size_t(model.nv());
+    const Numbers weights = random_numbers(random, points, 1);
+    int compared = 0;
+    for (int trial = 0; trial < 4; ++trial) {
+      const PadState s = testing::random_pad_state(model, random);
+      const auto value = [&](const PadState& at) {
+        Batch batch(model, 1);
+        batch.set_state(0, at.q, at.v);
+        DenseFrame<double> frame(model, 0, FieldForm::pressure);
+        Readout(model).read(batch, 0, frame);
+        return std::inner_product(weights.begin(), weights.end(), frame.values().begin(), 0.0);
+      };
+      Batch batch(model, 1);
+      batch.set_state(0, s.q, s.v);
+      ReadoutPullback pullback(model);
+      BlockCotangent c;
+      for (auto* x : {&c.q, &c.v}) x->assign(nv * kBlock, 0.0);
+      pullback.place(batch, 0);
+      pullback.clear();
+      pullback.pressure(0, 0, weights);
+      pullback.finish(c);
+      double norm = 0;
+      for (std::size_t i = 0; i < nv; ++i) norm += c.q[i * kBlock] * c.q[i * kBlock];
+      for (std::size_t i = 0; i < nv; ++i) {
+        const auto moved = [&](double e) {
+          return value({testing::moved(model, s.q, int(i), e), s.v});
+        };
+        const double difference = testing::best_difference(moved, 1e-6);
+        if (!std::isfinite(difference) || norm == 0) continue;
+        ++compared;
+        EXPECT_NEAR(c.q[i * kBlock], difference, 1e-4 * std::sqrt(norm)) << trial << " " << i;
+      }
+    }
+    EXPECT_GT(compared, 10);
+  }
+}
+
+/// The tangent along one direction of one state refuses a reading of several.
+TEST(ImperfectGradient, FieldTangentsOfLateSensorsAreRefused) {
+  Scene scene = late_scene(Pad::flat);
   scene.sensors[0].imperfections.source = {"x.xml", 3};
   const Model model(scene);
   Random random(11);
   Read at(model, testing::random_pad_state(model, random));
-  const Numbers zero(std::size_t(model.nv()));
-  Numbers field(at.frame.dense_size());
-  EXPECT_THROW(
-      Tangent(model).field(at.batch, 0, kLane, at.tape, 0, 0, {}, {}, {zero, zero, {}, {}}, field),
-      InputError);
-  ReadoutPullback pullback(model);
-  pullback.place(at.batch, 0);
-  pullback.clear();
-  EXPECT_THROW(pullback.dense_field(kLane, 0, field), InputError);
+  Numbers change(at.frame.values().size());
+  FieldTangent tangent(model);
+  tangent.place(at.batch, 0);
   try {
-    check_has_no_lag(model);
+    tangent.field(0, at.frame.tiles(), change);
     ADD_FAILURE();
   } catch (const InputError& error) {
     EXPECT_EQ(std::string(error.what()),

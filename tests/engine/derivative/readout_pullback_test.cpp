@@ -95,7 +95,7 @@ TEST_P(FieldPullback, MatchesDifferences) {
   const auto [shape, law, pad] = GetParam();
   const Model model(testing::pad_scene(shape, law, pad));
   Random random(7);
-  int compared = 0, sizes = 0;
+  int compared = 0, sizes = 0, places = 0;
   std::size_t touched = 0;
   for (unsigned trial = 0; trial < 6; ++trial) {
     const State s = testing::random_pad_state(model, random);
@@ -135,9 +135,11 @@ TEST_P(FieldPullback, MatchesDifferences) {
       const NumberInfo& info = parameters.infos()[std::size_t(k)];
       const bool of_size =
           info.name.rfind("body thing", 0) == 0 && info.number.field != NumberField::density;
-      if (info.name.rfind("tactile", 0) != 0 && !of_size) continue;
+      const bool of_place = info.number.field == NumberField::pos;
+      if (info.name.rfind("tactile", 0) != 0 && !of_size && !of_place) continue;
       sizes += of_size && gradient[std::size_t(k)] != 0;
-      const double size = info.value, g = gradient[std::size_t(k)] * size;
+      places += of_place && gradient[std::size_t(k)] != 0;
+      const double size = testing::size_of(info), g = gradient[std::size_t(k)] * size;
       compare(
           [&](double e) {
             Scene scene = model.scene();
@@ -155,6 +157,7 @@ TEST_P(FieldPullback, MatchesDifferences) {
   EXPECT_GT(touched, 6U);
   EXPECT_GT(compared, model.nv() * 6);
   EXPECT_TRUE(shape == PrimitiveShape::plane || sizes > 3) << sizes;
+  EXPECT_GT(places, 6);
 }
 
 INSTANTIATE_TEST_SUITE_P(

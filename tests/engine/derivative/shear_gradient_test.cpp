@@ -5,8 +5,9 @@
 
 #include <algorithm>
 
-#include "engine/derivative/readout_pullback.hpp"
+#include "engine/derivative/tactile_point_numbers.hpp"
 #include "engine/scene/scene_number.hpp"
+#include "tests/engine/field_loss.hpp"
 #include "tests/engine/gradient_differences.hpp"
 #include "tests/engine/gradient_tangent.hpp"
 #include "tests/engine/meshes.hpp"
@@ -16,6 +17,9 @@
 namespace tangere {
 namespace {
 
+using testing::adjoint_of_fields;
+using testing::field_loss_of_run;
+using testing::FieldLoss;
 using testing::random_input;
 using testing::RunGradient;
 using testing::RunInput;
@@ -43,89 +47,6 @@ Scene elastic_skin() {
   for (auto& c : s.ground_contacts) c.coefficients.ks = 200;
   for (auto& t : s.sensors) t.coefficients.ks = 0.5 * t.coefficients.kn;
   return s;
-}
-
-/// Σ_t weight(t)·(fields of all sensors after t steps), with random weights.
-struct FieldLoss {
-  Model model;
-  std::vector<std::vector<double>> weights;  ///< of each step: all fields one after another
-
-  FieldLoss(const Model& m, int steps, unsigned seed) : model(m) {
-    testing::Random random(seed);
-    std::size_t numbers = 0;
-    for (const SensorInfo& s : m.sensors()) numbers += 3 * std::size_t(s.points);
-    weights.resize(std::size_t(steps) + 1);
-    for (auto& w : weights)
-      for (std::size_t k = 0; k < numbers; ++k) w.push_back(random.normal());
-  }
-  [[nodiscard]] std::span<const double> of(std::size_t step, std::size_t sensor) const {
-    std::size_t first = 0;
-    for (std::size_t s = 0; s < sensor; ++s) first += 3 * std::size_t(model.sensors()[s].points);
-    return std::span(weights[step]).subspan(first, 3 * std::size_t(model.sensors()[sensor].points));
-  }
-  [[nodiscard]] double value(Readout& readout, const Batch& batch, std::size_t step) const {
-    double sum = 0;
-    for (std::size_t s = 0; s < model.sensors().size(); ++s) {
-      const std::span<const double> w = of(step, s);
-      std::vector<double> field(w.size());
-      readout.tactile(batch, 0, static_cast<int>(s), std::span<double>(field));
-      for (std::size_t k = 0; k < w.size(); ++k) sum += w[k] * field[k];
-    }
-    return sum;
-  }
-};
-
-double field_loss_of_run(const Model& model, const StepperOptions& options, const RunInput& in,
-                         const FieldLoss& loss) {
-  Batch batch(model, 1);
-  batch.set_state(0, in.q, in.v);
-  Stepper stepper(model, options);
-  Readout readout(model);
-  double sum = loss.value(readout, batch, 0);
-  for (std::size_t t = 0; t < in.u.size(); ++t) {
-    stepper.step(batch, in.u[t]);
-    if (failed(batch.status(0))) return NAN;
-    sum += loss.value(readout, batch, t + 1);
-  }
-  return sum;
-}
-
-RunGradient adjoint_of_fields(const Model& model, const StepperOptions& options, const RunInput& in,
-                              const FieldLoss& loss) {
-  Batch batch(model, 1);
-  batch.set_state(0, in.q, in.v);
-  Stepper stepper(model, options);
-  const int steps = static_cast<int>(in.u.size());
-  BlockTape tape(model, stepper.integrator(), steps);
-  tape.start(batch, 0);
-  for (const auto& u : in.u) stepper.step_block(batch, 0, u, &tape);
-  Adjoint adjoint(model, options, {1, true});
-  adjoint.clear();
-  ReadoutPullback pullback(model);
-  Batch shown(model, 1);
-  RunGradient g;
-  g.u.resize(std::size_t(steps * model.nu()));
-  for (int t = steps; t >= 0; --t) {
-    tape.show(t, shown, 0);
-    pullback.place(shown, 0);
-    pullback.clear();
-    for (std::size_t s = 0; s < model.sensors().size(); ++s)
-      pullback.dense_field(0, static_cast<int>(s), loss.of(std::size_t(t), s),
-                           adjoint.loss(0).parameters, {});
-    pullback.finish(adjoint.loss(0));
-    if (t == 0) break;
-    adjoint.reverse_step(batch, 0, tape, t - 1, in.u[std::size_t(t - 1)]);
-    for (int k = 0; k < model.nu(); ++k)
-      g.u[std::size_t((t - 1) * model.nu() + k)] = adjoint.loss(0).u[std::size_t(k) * 16];
-  }
-  for (int i = 0; i < model.nv(); ++i) {
-    g.q.push_back(adjoint.loss(0).q[std::size_t(i) * 16]);
-    g.v.push_back(adjoint.loss(0).v[std::size_t(i) * 16]);
-  }
-  const NumberGradients parameters(model);
-  g.parameters.resize(std::size_t(parameters.count()));
-  parameters.gradient(adjoint.loss(0), batch, 0, g.parameters);
-  return g;
 }
 
 class ShearGradient : public ::testing::TestWithParam<Integrator> {};
@@ -217,18 +138,18 @@ void expect_fields_match(const Scene& scene, Integrator scheme) {
   const NumberGradients parameters(model);
   for (int k = 0; k < parameters.count(); ++k) {
     const NumberInfo& of = parameters.infos()[std::size_t(k)];
-    if (of.value == 0) continue;
+    const double size = testing::size_of(of);
+    if (size == 0) continue;
     const double numeric = testing::best_difference(
         [&](double e) {
           Scene other = model.scene();
-          number_in(other, of.number) += e * of.value;
+          number_in(other, of.number) += e * size;
           return field_loss_of_run(Model(other), options, in, loss);
         },
         1e-4);
     if (!std::isfinite(numeric)) continue;
     ++compared;
-    EXPECT_NEAR(adjoint.parameters[std::size_t(k)] * of.value, numeric,
-                1e-5 * (1 + std::abs(numeric)))
+    EXPECT_NEAR(adjoint.parameters[std::size_t(k)] * size, numeric, 1e-5 * (1 + std::abs(numeric)))
         << of.name;
   }
   EXPECT_GT(compared, 60);
@@ -260,20 +181,80 @@ TEST_P(ShearGradient, WaitingSkinsMatchTangents) {
   const RunGradient adjoint = adjoint_of_fields(model, options, in, loss);
   testing::Random random(11);
   std::size_t remembered = 0;
+  const testing::LossChange of_fields = testing::change_of_fields(loss);
   const auto loss_change = [&](Tangent& tangent, const Batch& batch, const BlockTape& tape, int t,
                                const std::vector<double>& rows, const StateTangent& state) {
     remembered += tape.memory(t, 0).size() / 2;
-    double sum = 0;
-    for (std::size_t s = 0; s < model.sensors().size(); ++s) {
-      const std::span<const double> w = loss.of(std::size_t(t), s);
-      std::vector<double> field_dot(w.size());
-      tangent.field(batch, 0, 0, tape, t, static_cast<int>(s), rows, {}, state, field_dot);
-      for (std::size_t k = 0; k < w.size(); ++k) sum += w[k] * field_dot[k];
-    }
-    return sum;
+    return of_fields(tangent, batch, tape, t, rows, state);
   };
   testing::expect_tangent(model, options, in, adjoint, random, loss_change);
   EXPECT_GT(remembered, 30U);
+}
+
+/// Random changes of one number of all points of a sensor: positions by parts of a millimetre,
+/// coefficients by parts of the sensor's.
+std::vector<double> point_change(const Scene& scene, std::size_t sensor, int number,
+                                 std::size_t points, testing::Random& random) {
+  std::vector<double> own(points * kPointNumbers);
+  const double size =
+      number < 3 ? 1e-3 : scene.sensors[sensor].coefficients[std::size_t(number - 3)];
+  for (std::size_t i = 0; i < points; ++i)
+    own[kPointNumbers * i + std::size_t(number)] = size * random.normal();
+  return own;
+}
+
+/// Derivatives by the places and coefficients of a skin's points, which also act through the shear
+/// state: by the adjoint, by differences and in dual numbers.
+void expect_points_match(const Scene& scene, Integrator scheme) {
+  const Model model(scene);
+  const StepperOptions options = testing::options(scheme, scene.timestep, 1e-13);
+  const RunInput in = pressed_input(model);
+  const FieldLoss loss(model, kShearSteps, 7);
+  std::vector<double> by_points;
+  const RunGradient adjoint = adjoint_of_fields(model, options, in, loss, &by_points);
+  testing::Random random(13);
+  std::vector<std::vector<double>> points_dot;
+  double reverse = 0;
+  std::size_t first = 0;
+  int compared = 0;
+  for (std::size_t s = 0; s < model.sensors().size(); ++s) {
+    const auto points = std::size_t(model.sensors()[s].points);
+    std::vector<double>& along = points_dot.emplace_back(points * kPointNumbers);
+    for (int number = 0; number < kPointNumbers; ++number) {
+      const std::vector<double> own = point_change(scene, s, number, points, random);
+      double product = 0;
+      for (std::size_t i = 0; i < own.size(); ++i) {
+        product += own[i] * by_points[first + i];
+        along[i] += own[i];
+      }
+      reverse += product;
+      const double numeric = testing::best_difference(
+          [&](double e) {
+            Scene other = scene;
+            std::vector<double> moved = own;
+            for (double& x : moved) x *= e;
+            add_to_points(other.sensors[s], moved);
+            return field_loss_of_run(Model(other), options, in, loss);
+          },
+          1e-4);
+      if (!std::isfinite(numeric)) continue;
+      ++compared;
+      EXPECT_NEAR(product, numeric, 1e-5 * std::abs(numeric))
+          << s << " " << point_number_name(number);
+    }
+    first += points * kPointNumbers;
+  }
+  EXPECT_GT(compared, 5 * static_cast<int>(model.sensors().size()));
+  testing::expect_tangent(model, options, in, adjoint, random,
+                          testing::change_of_fields(loss, points_dot), points_dot, reverse);
+}
+
+TEST_P(ShearGradient, PointsMatchDifferencesAndTangents) {
+  expect_points_match(elastic_skin(), GetParam());
+}
+
+TEST_P(ShearGradient, PointsOfWaitingSkinsMatchDifferencesAndTangents) {
+  expect_points_match(skin_that_waits(), GetParam());
 }
 
 INSTANTIATE_TEST_SUITE_P(Schemes, ShearGradient, ::testing::ValuesIn(testing::all_integrators()),

@@ -70,7 +70,8 @@ void compare(const Scene& scene, Random& random, std::map<std::string, int>& see
   std::vector<std::string> names;
   for (int k = 0; k < parameters.count(); ++k) {
     const NumberInfo& info = parameters.infos()[std::size_t(k)];
-    if (info.unit != "m" && info.number.field != NumberField::scale) continue;
+    const bool of_size = info.unit == "m" && info.number.owner == NumberOwner::body;
+    if (!of_size && info.number.field != NumberField::scale) continue;
     const double difference = testing::best_difference(
         [&](double e) {
           Scene other = scene;

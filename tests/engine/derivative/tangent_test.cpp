@@ -71,7 +71,8 @@ Products products(const Model& model, const StepperOptions& options, const RunIn
               {}};
   const NumberGradients parameters(model);
   std::vector<double> change;
-  for (const NumberInfo& info : parameters.infos()) change.push_back(info.value * random.normal());
+  for (const NumberInfo& info : parameters.infos())
+    change.push_back(testing::size_of(info) * random.normal());
   parameters.spread(change, batch, 0, d.numbers);
   for (int t = 0; t < steps; ++t) d.u.push_back(normals(random, std::size_t(m.nu)));
 

@@ -124,11 +124,20 @@ TEST(FormMap, RefusesWhatAFieldDoesNotDetermine) {
   EXPECT_THROW(FormMap(t.model, {3, FieldForm::field}), InputError);
   EXPECT_THROW(FormMap(t.model, {1, FieldForm::markers}), InputError);
   EXPECT_THROW(FormMap(t.model, {0, FieldForm::pressure}), InputError);
+}
+
+/// Markers of an imperfect sensor are those of its ideal field.
+TEST(FormMap, MarkersAreOfTheIdealField) {
+  const Touching t;
   std::string imperfect = kScene;
   imperfect.replace(imperfect.find("<markers"), 0, "<imperfections noise=\"0.1\"/>");
   const Model noisy(parse_scene(imperfect, "forms").scene);
-  EXPECT_THROW(FormMap(noisy, {0, FieldForm::markers}), InputError);
-  EXPECT_NO_THROW(FormMap(noisy, {0, FieldForm::sum}));
+  const FormMap plain(t.model, {0, FieldForm::markers}), map(noisy, {0, FieldForm::markers});
+  std::vector<double> field(plain.field_size()), expected(plain.size()), moved(map.size());
+  for (std::size_t i = 0; i < field.size(); ++i) field[i] = 1e-3 * double(i % 7);
+  plain.evaluate(field, expected);
+  map.evaluate(field, moved);
+  EXPECT_EQ(moved, expected);
 }
 
 }  // namespace

@@ -100,7 +100,7 @@ Step random_step(Random& random, PrimitiveShape shape, bool ground) {
 /// Tangents of everything that a step depends on.
 struct Change {
   Vec6<double> start{}, end{}, twist{};
-  Vec3<double> s{};
+  Vec3<double> s{}, xi{};
   Coefficients<double> law{};
 };
 
@@ -119,7 +119,7 @@ struct Outcome {
 };
 template <class N>
 Outcome<N> outcome(const Step& x, const Change& c) {
-  const Vec3<N> xi = lift<N>(x.xi, {0, 0, 0});
+  const Vec3<N> xi = lift<N>(x.xi, c.xi);
   const Vec6<N> twist = {lift<N>(x.twist.a, c.twist.a), lift<N>(x.twist.l, c.twist.l)};
   const LoadedTouch<N> start = touch<N>(x, displaced<N>(x.start, c.start), twist, c.law),
                        end = touch<N>(x, displaced<N>(x.end, c.end), twist, c.law);
@@ -153,15 +153,16 @@ TEST_P(Elastic, MemoryInReverseMatchesDualNumbers) {
     TouchCotangent<double> of_end{};
     Vec6<double> of_start{};
     Vec3<double> of_s{};
+    OwnCotangent<double> own{};
     with_distance<double>(x.shape, kSize, [&]<class Shape>(const Shape& shape) {
       const Anchor<double> anchor = recalled(shape, start, x.xi, x.s);
       const ElasticPoint<double> p = meet_elastic(shape, end, end.law, x.xi, anchor);
       ASSERT_LT(p.d, 0);
       const Anchor<double> bar = pull_back_elastic<Shape>(end, end.law, {1, 1, 1, 1, 1}, p, x.xi,
-                                                          anchor, f_bar, x_bar, s_bar, of_end);
-      of_s = pull_back_recall(shape, start, x.xi, x.s, bar, of_start);
+                                                          anchor, f_bar, x_bar, s_bar, of_end, own);
+      of_s = pull_back_recall(shape, start, x.xi, x.s, bar, of_start, own.xi);
     });
-    for (int way = 0; way < 5; ++way) {
+    for (int way = 0; way < 6; ++way) {
       Change c;
       if (way == 0) c.start = random.motion(1);
       if (way == 1) c.end = random.motion(1);
@@ -169,9 +170,10 @@ TEST_P(Elastic, MemoryInReverseMatchesDualNumbers) {
       if (way == 3) c.s = random.vector(1);
       if (way == 4)
         for (std::size_t i = 0; i < kCoefficients; ++i) c.law[i] = random.normal();
+      if (way == 5) c.xi = random.vector(1);
       const Outcome<D> o = outcome<D>(x, c);
       double reverse = dot(of_start, c.start) + dot(of_end.displacement, c.end) +
-                       dot(of_end.twist, c.twist) + dot(of_s, c.s);
+                       dot(of_end.twist, c.twist) + dot(of_s, c.s) + dot(own.xi, c.xi);
       for (std::size_t i = 0; i < kCoefficients; ++i) reverse += of_end.law[i] * c.law[i];
       const double forward =
           dot(f_bar, epsilon(o.force)) + dot(s_bar, epsilon(o.s)) + dot(x_bar, epsilon(o.place));

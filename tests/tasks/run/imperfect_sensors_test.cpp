@@ -189,16 +189,19 @@ TEST(ImperfectSensors, GradientsOfATaskAgreeByThreeRoutes) {
   expect_right(check);
 }
 
-TEST(ImperfectSensors, GradientsOfReadingsWithMemoryAreRefused) {
-  const Model& model = imperfect_ball(true);
-  const auto tactile = make_loss(LossKind::tactile, model, 5),
-             end = make_loss(LossKind::final_state, model, 5);
-  TapeOptions options;
-  options.length = 10;
-  const RolloutLoss* const fields[] = {tactile.get()};
-  const RolloutLoss* const states[] = {end.get()};
-  EXPECT_THROW(GradientRollouts(model, options, fields), InputError);
-  EXPECT_NO_THROW(GradientRollouts(model, options, states));
+/// Readings with lag depend on earlier states, on the tape and before it.
+TEST(ImperfectSensors, GradientsOfReadingsWithMemoryAgreeByThreeRoutes) {
+  const Model model(with_imperfections(testing::small_scene(), true, 0));
+  const ControlProgram program(model, model.timestep(), 3);
+  CheckOptions options;
+  options.length = 100;
+  options.entries = 3;
+  options.settled = 1e-6;
+  options.stepper.tolerance = 1e-12;
+  expect_right(check_gradient(
+      Batch(model, 1, 3),
+      [&](std::int64_t step, int e, std::span<double> u) { program.evaluate(step, e, u); },
+      *make_loss(LossKind::tactile, model, 5), options));
 }
 
 }  // namespace
