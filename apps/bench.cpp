@@ -35,6 +35,7 @@ constexpr int kDefaultEnvironments = 256;  // 16 blocks: several per thread on u
 struct BenchArguments {
   std::string scene, frames, policy, precision = "mixed", record, svg, csv;
   std::vector<int> threads;
+  bool pinned = false;
   std::optional<std::int64_t> steps;
   std::optional<int> environments, every, repeat;
   std::optional<std::uint64_t> seed;
@@ -234,6 +235,7 @@ int bench_task(const BenchArguments& options, const Console& console, const Task
   const int most_threads = *std::max_element(threads.begin(), threads.end());
   note_idle_threads(console, setting.environments, most_threads);
   setting.options.threads = most_threads;
+  setting.options.pinned = options.pinned;
   check_size(task.model(), setting.environments,
              benchmark_bytes(task, setting.environments, setting.options));
   const Batch start(task.model(), setting.environments, options.seed.value_or(0));
@@ -277,6 +279,7 @@ int bench(const BenchArguments& options, const Console& console) {
     note_empty_sensors(console, model, setting.options.rollout);
   note_idle_threads(console, setting.environments, most_threads);
   setting.options.threads = most_threads;
+  setting.options.pinned = options.pinned;
   check_size(model, setting.environments,
              benchmark_bytes(model, setting.environments, setting.options));
   const Batch start(model, setting.environments, seed);
@@ -313,6 +316,7 @@ Command add_bench(CLI::App& program) {
            "Policy of a task: random, hold or scripted [default: random]");
   add_whole_numbers(app, "--threads", o.threads, 1, kMostThreads,
                     "Thread counts to measure [default: 1,2,4,... up to the processors here]");
+  add_flag(app, "--pin", o.pinned, "Keep each thread on a processor of its own");
   add_precision_option(app, o.precision, " with points in float [default: mixed]");
   add_every_option(app, o.every);
   add_text(app, "--frames", o.frames, "NAME",

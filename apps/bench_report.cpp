@@ -100,6 +100,7 @@ Json bench_entry(const BenchSetting& setting, const BenchRun& run) {
           {"precision", to_string(setting.options.precision)},
           {"isa", setting.isa},
           {"repeat", setting.options.repeat},
+          {"pinned", setting.options.pinned},
           {"seconds", best.seconds},
           {"cpu_seconds", best.cpu_seconds},
           {"env_steps_per_second", rate(r.environment_steps, best.seconds)},

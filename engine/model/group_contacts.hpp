@@ -19,7 +19,7 @@ void group_contacts(CompiledModel& m);
 void bound_links(CompiledModel& m);
 
 /// Scenes with fewer pairs of links consider all of them in every step.
-inline constexpr std::size_t kManyLinkPairs = 64;
+inline constexpr std::size_t kManyLinkPairs = 128;
 /// Puts a ball around all contact points and all shapes of every link, in scenes of many link
 /// pairs. Call after bound_links().
 void find_link_balls(CompiledModel& m);

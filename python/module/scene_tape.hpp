@@ -59,8 +59,8 @@ class SceneTape {
   nb::tuple reverse_bodies(const Argument<double>& q, const Argument<double>& v,
                            const Argument<double>& varying, const Argument<double>& body_bar);
 
-  /// Returns what `get` returns of the tape of now, as a copy: a reset or new parameters may compile
-  /// another scene.
+  /// Returns what `get` returns of the tape of now, as a copy: a reset or new parameters may
+  /// compile another scene.
   template <class Get>
   auto current(Get get) {
     const InUse::Turn turn(in_use_);

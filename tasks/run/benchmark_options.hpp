@@ -20,7 +20,8 @@ struct BenchmarkOptions {
   FrameKind frames = FrameKind::dense;   ///< for a scene
   Precision precision = Precision::f64;  ///< of the fields; a scene's mixed fields are float
   int threads = 1;
-  int repeat = 3;  ///< timed passes over the whole episode
+  int repeat = 3;       ///< timed passes over the whole episode
+  bool pinned = false;  ///< each thread stays on a processor of its own
 };
 
 }  // namespace tangere

@@ -8,6 +8,8 @@
 #include <atomic>
 #include <chrono>
 #include <ctime>
+#include <mutex>
+#include <optional>
 #include <string>
 
 #include "engine/base/as_size.hpp"
@@ -28,10 +30,10 @@ double cpu_seconds() {
   return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
 }
 
-/// Scratch of one thread.
+/// Scratch of one thread, which allocates it: its pages lie in the memory next to the thread.
 struct Worker {
-  Stepper stepper;
-  Readout readout;
+  std::optional<Stepper> stepper;
+  std::optional<Readout> readout;
   std::unique_ptr<EpisodeProgram> program;
 };
 
@@ -60,16 +62,15 @@ class Benchmark {
         fields_(start.model(), start.environments(), options, frames_),
         tallies_(as_size(start.blocks())),
         checksums_(as_size(start.environments())),
-        threads_(options.threads) {
-    for (int i = 0; i < options.threads; ++i)
-      workers_.push_back(
-          {Stepper(start.model()), Readout(start.model(), options.precision), make_program()});
-  }
+        make_program_(make_program),
+        workers_(as_size(options.threads)),
+        threads_(options.threads, options.pinned) {}
 
   BenchmarkResult run() {
     BenchmarkResult result;
     pass(true);
     report(result);
+    for (Worker& worker : workers_) program_of(worker);  // of threads that had no block
     while (!stopped_ && std::ssize(result.times) < options_.repeat) {
       const BenchmarkTime time = pass(false);
       if (!stopped_) result.times.push_back(time);
@@ -83,7 +84,7 @@ class Benchmark {
   BenchmarkTime pass(bool checked) {
     batch_ = start_;
     for (Worker& worker : workers_)
-      if (TaskProgram* const task = worker.program->judged()) task->clear_counts();
+      if (TaskProgram* const task = judged(worker)) task->clear_counts();
     if (data_ != nullptr) {
       data_->restart(batch_);
       threads_.for_each(batch_.blocks(), workers_, [&](Worker& w, int b) { start_block(b, w); });
@@ -105,7 +106,7 @@ class Benchmark {
     }
     result.environment_steps = result.counts.simulation_steps;
     for (const Worker& worker : workers_)
-      if (const TaskProgram* const task = worker.program->judged()) {
+      if (const TaskProgram* const task = judged(worker)) {
         result.environment_steps += task->counts().environment_steps;
         result.counts += task->counts().steps;
       }
@@ -114,8 +115,23 @@ class Benchmark {
     result.checksums = checksums_;
   }
 
+  static TaskProgram* judged(const Worker& worker) {
+    return worker.program == nullptr ? nullptr : worker.program->judged();
+  }
+
+  /// Allocates the worker of a thread on its first block.
+  EpisodeProgram& program_of(Worker& worker) {
+    if (worker.program == nullptr) {
+      const std::lock_guard lock(making_);
+      worker.stepper.emplace(start_.model());
+      worker.readout.emplace(start_.model(), options_.precision);
+      worker.program = make_program_();
+    }
+    return *worker.program;
+  }
+
   void start_block(int block, Worker& worker) {
-    EpisodeProgram& program = *worker.program;
+    EpisodeProgram& program = program_of(worker);
     program.start(batch_, block);
     if (program.opening_steps() == 0) return;
     for (int t = 0; t < program.opening_steps(); ++t) take_step(t, block, worker);
@@ -124,12 +140,12 @@ class Benchmark {
 
   void take_step(std::int64_t t, int block, Worker& worker) {
     worker.program->controls(t, batch_, block, u_);
-    worker.stepper.step_block(batch_, block, u_);
+    worker.stepper->step_block(batch_, block, u_);
     worker.program->look(t, batch_, block);
   }
 
   void run_block(int block, Worker& worker, bool checked) {
-    EpisodeProgram& program = *worker.program;
+    EpisodeProgram& program = program_of(worker);
     const int first = block * kBlock, last = first + lanes_of(batch_, block);
     BlockTally tally;
     StepTally steps(batch_, first, last - first);
@@ -170,7 +186,7 @@ class Benchmark {
       const SensorInfo& sensor = sensors[as_size(of.sensor)];
       if (!reading_times(batch_.model(), of, options_.rollout).at(done, options_.rollout.steps))
         continue;
-      fields_.read(worker.readout, batch_, first / kBlock, k);
+      fields_.read(*worker.readout, batch_, first / kBlock, k);
       for (int e = first; e < last; ++e) {
         if (!steps.live(e)) continue;
         tally.tactile_points += sensor.points;
@@ -213,6 +229,8 @@ class Benchmark {
   BenchmarkFields fields_;
   std::vector<BlockTally> tallies_;
   std::vector<std::uint64_t> checksums_;
+  const MakeProgram make_program_;
+  std::mutex making_;
   std::vector<Worker> workers_;  // by the thread's index in the arena
   std::atomic<bool> stopped_{false};
   BlockThreads threads_;

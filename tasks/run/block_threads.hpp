@@ -8,7 +8,9 @@
 #include <tbb/task_arena.h>
 
 #include <cstddef>
+#include <optional>
 
+#include "tasks/run/pinned_threads.hpp"
 #include "tasks/run/thread_probe.hpp"
 #include "tasks/run/tsan_order.hpp"
 
@@ -17,9 +19,11 @@ namespace tangere {
 /// A number of threads, of which the caller's is one.
 class BlockThreads {
  public:
-  /// Throws InputError when the system refuses so many threads.
-  explicit BlockThreads(int threads) : threads_(threads), arena_(threads) {
+  /// `pinned`: each thread stays on a processor of its own. Throws InputError when the system
+  /// refuses so many threads.
+  explicit BlockThreads(int threads, bool pinned = false) : threads_(threads), arena_(threads) {
     require_threads(threads);
+    if (pinned) pinned_.emplace(arena_);
   }
 
   /// Calls body(workers[k], block) for every block. A thread that becomes free takes the next
@@ -27,7 +31,7 @@ class BlockThreads {
   /// use a worker at once. Passes on what body throws.
   template <class Workers, class Body>
   void for_each(int blocks, Workers& workers, const Body& body) {
-    if (threads_ == 1) {
+    if (threads_ == 1 && !pinned_) {
       for (int b = 0; b < blocks; ++b) body(workers[0], b);
       return;
     }
@@ -47,12 +51,14 @@ class BlockThreads {
                         tbb::simple_partitioner{});
     });
     order_.end();
+    if (pinned_) pinned_->check();
   }
 
  private:
   int threads_;
   TsanOrder order_;
   tbb::task_arena arena_;
+  std::optional<PinnedThreads> pinned_;
 };
 
 }  // namespace tangere

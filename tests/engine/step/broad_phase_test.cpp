@@ -102,7 +102,7 @@ TEST(BroadPhase, ABallThatMovedBeyondItsSlackIsWithinReachOfMore) {
 TEST(BroadPhase, AFastBoxMeetsWhatWasOutOfReach) {
   std::vector<std::vector<double>> ends;
   for (const bool all_pairs : {true, false}) {
-    const Model model(row_of_boxes(10, all_pairs));
+    const Model model(row_of_boxes(12, all_pairs));
     Batch batch(model, 3);
     for (int e = 0; e < 3; ++e) {
       std::vector<double> v(std::size_t(model.nv()), 0.0);

@@ -10,7 +10,9 @@
 #include <string>
 
 #include "io/scene/scene_reader.hpp"
+#include "tasks/run/block_threads.hpp"
 #include "tasks/run/checksum.hpp"
+#include "tasks/run/pinned_threads.hpp"
 #include "tests/tasks/recorded.hpp"
 #include "tests/tasks/task_check.hpp"
 
@@ -54,6 +56,33 @@ TEST(BenchmarkRun, ChecksumsDoNotDependOnThreads) {
     EXPECT_EQ(more.checksum(), one.checksum()) << threads << " threads";
     EXPECT_THAT(more.checksums, ElementsAreArray(one.checksums)) << threads << " threads";
     EXPECT_EQ(more.counts.newton_iterations, one.counts.newton_iterations);
+  }
+}
+
+TEST(BenchmarkRun, PinnedThreadsTakeTheSameSteps) {
+  BenchmarkOptions pinned = options(1);
+  pinned.pinned = true;
+  const std::vector<int> before = usable_processors();
+  const BenchmarkResult plain = result_of(40, options(1));
+  for (const int threads : {1, 2, 5}) {
+    pinned.threads = threads;
+    EXPECT_EQ(result_of(40, pinned).checksum(), plain.checksum()) << threads << " threads";
+    EXPECT_EQ(usable_processors(), before) << "this thread may run where it could";
+  }
+}
+
+TEST(BenchmarkRun, APinnedThreadRunsOnOneProcessor) {
+  const std::vector<int> all = usable_processors();
+  for (const int threads : {1, 3}) {
+    BlockThreads pinned(threads, true);
+    std::vector<std::vector<int>> of(static_cast<std::size_t>(threads));
+    pinned.for_each(64, of, [](std::vector<int>& own, int) {
+      const std::vector<int> now = usable_processors();
+      EXPECT_THAT(now, SizeIs(1));
+      own.push_back(now[0]);
+    });
+    for (std::size_t k = 0; k < of.size(); ++k)
+      for (const int processor : of[k]) EXPECT_EQ(processor, all[k % all.size()]);
   }
 }
 
