@@ -194,6 +194,8 @@ struct TactileDescription {
   std::vector<std::string> feels{}, ignores{};
   SensorImperfections imperfections{};          ///< of its readings; none to begin with
   std::optional<MarkersDescription> markers{};  ///< none: it has none
+  /// Area of a point whose coefficients the file gives by area [m²]; 0: it gives those of a point.
+  double cell = 0;
 };
 
 /// Lists the points of a sensor in field order: those of an array row by row, with its axes. The

@@ -50,6 +50,10 @@ struct SceneContext {
 
   /// Where a line of the text comes from.
   [[nodiscard]] Source source(int line) const;
+  /// Returns an area [m²] in the scene's own unit.
+  [[nodiscard]] double area(double square_metres) const {
+    return square_metres / (length * length);
+  }
   /// Factor from the scene's units to SI.
   [[nodiscard]] double factor(Unit unit) const;
 };

@@ -97,7 +97,12 @@ NumberField read_field(const SceneNode& node, NumberOwner owner) {
 /// Reads a distribution in the unit of a number.
 Distribution read_distribution(const Scene& scene, const SceneNode& node, const SceneNumber& n) {
   const std::vector<Unit> units = units_of(scene, n);
-  return read_distribution(node, units.size() == 1 ? node.context().factor(units[0]) : 1);
+  double factor = units.size() == 1 ? node.context().factor(units[0]) : 1;
+  for (const TactileDescription& sensor : scene.sensors)
+    if (n.owner == NumberOwner::tactile && sensor.name == n.name && sensor.cell > 0 &&
+        scales_with_area(std::size_t(coefficient_index(n.field))))
+      factor *= node.context().area(sensor.cell);
+  return read_distribution(node, factor);
 }
 
 /// Reads damping, armature, stiffness, lim_stiffness of a joint, or P, D of its motor.

@@ -67,9 +67,9 @@ void share_area(const SceneElement& node, TactileDescription& d) {
         fmt::format("per=\"area\" with {} x {} points; expected rows and columns that cover "
                     "an area",
                     a.rows, a.cols));
-  const double length = node.context().length;  // the file's area [m²] is its square
+  d.cell = cell;
   for (std::size_t k = 0; k < kCoefficients; ++k)
-    if (scales_with_area(k)) d.coefficients[k] *= cell / (length * length);
+    if (scales_with_area(k)) d.coefficients[k] *= node.context().area(cell);
 }
 
 std::vector<TactilePoint> read_spec(const SceneElement& node) {

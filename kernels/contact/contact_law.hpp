@@ -160,7 +160,7 @@ void pull_back_normal_force(const LawParameters<N>& p, const N& d, const N& rate
 /// f_t = -scale v_t, with what its derivative needs.
 template <class N>
 struct Friction {
-  N scale;            ///< k_t when sticking, μ B / |v_t| when slipping
+  N scale;            ///< k_t when sticking, μ B / |v_t| when slipping, 0 without a force N
   N slip;             ///< 1 when slipping and its derivative counts, else 0
   Vec3<N> direction;  ///< v_t / |v_t| where slip is 1, else 0
 };
@@ -174,7 +174,8 @@ Friction<N> friction(const LawParameters<N>& p, const NormalForce<N>& normal, co
   const auto slipping = p.kt * (square * inverse_speed) > limit;  // false at v_t = 0
   const N inverse = select(slipping, inverse_speed, zero);
   Friction<N> f;
-  f.scale = select(slipping, limit * inverse, p.kt);
+  // Without a force N there is no friction at any v_t, so its derivative is 0 at v_t = 0 as well.
+  f.scale = select(slipping, limit * inverse, select(limit > zero, p.kt, zero));
   f.slip = select(slipping, p.friction_tangent, zero);
   f.direction = (f.slip * inverse) * vt;
   return f;

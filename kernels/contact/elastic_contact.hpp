@@ -100,7 +100,8 @@ template <class N>
   const auto slipping = e.square * e.inverse_size > limit;  // false at w = 0
   Grip<N> g;
   g.inverse_w = select(slipping, e.inverse_size, zero);
-  g.hold = select(slipping, limit * g.inverse_w, N(1.0));
+  // As in friction(): without a force N nothing holds, at w = 0 as well.
+  g.hold = select(slipping, limit * g.inverse_w, select(limit > zero, N(1.0), zero));
   g.damper.scale = g.hold * law.kt;
   g.damper.slip = select(slipping, law.friction_tangent, zero);
   g.damper.direction = (g.damper.slip * g.inverse_w) * e.w;

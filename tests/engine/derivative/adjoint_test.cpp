@@ -32,7 +32,43 @@ bool is_cut(const Scene& scene, Integrator scheme, unsigned seed) {
   return testing::loss_of_run(model, options, in, loss) != plain;
 }
 
+/// A ball that leaves the ground straight up: its damping clamps the force while it still touches.
+Scene hopping_ball(Integrator scheme, double ks) {
+  Scene s;
+  s.name = "hop";
+  s.integrator = scheme;
+  s.timestep = 2e-3;
+  s.ground = GroundDescription{};
+  s.links = {testing::link("ball", JointType::free, {0, 0, 0.0095}, SphereShape{0.01}, 1000)};
+  s.ground_contacts.push_back({"ball", {1e3, 1, 0.6, 2, ks}, ContactLaw::linear, 1e-5, {}});
+  return s;
+}
+
 class AdjointScheme : public ::testing::TestWithParam<Integrator> {};
+
+/// Without a normal force there is no friction at any speed, so at rest its derivative is 0 too.
+TEST_P(AdjointScheme, BallsThatLetGoAtRestMatchDifferences) {
+  for (const double ks : {0.0, 50.0}) {
+    const Model model(hopping_ball(GetParam(), ks));
+    const StepperOptions options = testing::options(GetParam(), 2e-3, 1e-13);
+    const StateLoss loss(model, 5, 2);
+    RunInput in;
+    in.q = testing::q_of(Batch(model, 1));
+    in.v.assign(std::size_t(model.nv()), 0.0);
+    in.u.resize(5);
+    const RunGradient g = testing::adjoint_of_run(model, options, {in}, loss, 0);
+    for (int i = 0; i < model.nv(); ++i) {
+      const double difference = testing::best_difference(
+          [&](double e) {
+            RunInput moved = in;
+            moved.v[std::size_t(i)] += e;
+            return testing::loss_of_run(model, options, moved, loss);
+          },
+          1e-4);
+      EXPECT_NEAR(g.v[std::size_t(i)], difference, 1e-6 * g.norm()) << "dof " << i << ", ks " << ks;
+    }
+  }
+}
 
 TEST_P(AdjointScheme, TreesMatchDifferences) {
   int compared = 0;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Tests that every number has one identity: its name in <randomize>, its name and unit, its place
 // in the scene, its row in a block and in a gradient, and its description in files.
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -221,6 +222,31 @@ TEST(SceneNumbers, NoKindIsForgotten) {
 }
 
 /// A sensor, a joint, a motor and a body may have one name, but no two numbers may.
+/// Draws of a skin whose coefficients count per area do so as well, in any unit; mu has no area.
+TEST(SceneNumbers, DrawsOfASkinByAreaAreByArea) {
+  for (const char* unit : {"m-kg", "cm-g"}) {
+    const Scene scene = parse_scene(fmt::format(R"(<tangere model="skin">
+<option unit="{}" gravity="0 0 -9.8" timestep="5e-3" integrator="BDF2"/>
+<robot><link name="pad"><joint name="pad" type="prismatic" axis="0 0 1"/>
+<body name="pad" type="cuboid" size="4 4 1" density="1"/></link></robot>
+<sensor><tactile name="pad" body="pad" type="rect_array" rect_pos0="-1 -1 -0.5"
+rect_pos1="1 1 -0.5" axis0="1 0 0" axis1="0 1 0" resolution="5 9" per="area" kn="7" kt="3" mu="0.5"
+damping="2"/></sensor>
+<randomize><tactile name="pad" field="kn" uniform="7 14"/>
+<tactile name="pad" field="damping" list="2 4"/><tactile name="pad" field="mu" list="0.5"/>
+</randomize></tangere>)",
+                                                unit),
+                                    "skin.xml")
+                            .scene;
+    const ContactCoefficients& own = scene.sensors[0].coefficients;
+    ASSERT_THAT(scene.randomizations, SizeIs(3));
+    EXPECT_DOUBLE_EQ(scene.randomizations[0].distribution.a, own.kn) << unit;
+    EXPECT_DOUBLE_EQ(scene.randomizations[0].distribution.b, 2 * own.kn) << unit;
+    EXPECT_DOUBLE_EQ(scene.randomizations[1].distribution.values[0], own.damping) << unit;
+    EXPECT_DOUBLE_EQ(scene.randomizations[2].distribution.values[0], own.mu) << unit;
+  }
+}
+
 TEST(SceneNumbers, NoTwoHaveOneName) {
   std::string lines;
   std::size_t count = 0;
