@@ -2,6 +2,7 @@
 // The datasets of a demo in the order of the file, and the bytes that describe them.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <optional>
@@ -73,6 +74,11 @@ class DemoFormat {
   }
   /// The observations that are touch, ascending.
   [[nodiscard]] const std::vector<std::size_t>& touch() const { return touch_; }
+  /// Whether a dataset has the rows of such an observation below obs.
+  [[nodiscard]] bool is_touch(std::size_t dataset) const {
+    return std::any_of(touch_.begin(), touch_.end(),
+                       [&](std::size_t name) { return obs(name) == dataset; });
+  }
   /// Index of an observation in pieces of episodes.
   [[nodiscard]] std::size_t source(std::size_t name) const { return sources_[name]; }
   [[nodiscard]] std::size_t source_of_gradient(std::size_t k) const { return gradient_sources_[k]; }

@@ -10,6 +10,7 @@
 
 #include "io/dataset/dataset_description.hpp"
 #include "io/dataset/learner_notes.hpp"
+#include "io/dataset/shard_check.hpp"
 
 namespace tangere {
 namespace {
