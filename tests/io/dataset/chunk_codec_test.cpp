@@ -20,6 +20,7 @@ namespace tangere {
 namespace {
 
 using ::tangere::testing::Folder;
+using ::testing::HasSubstr;
 
 constexpr std::int64_t kRows = 37;
 
@@ -165,15 +166,21 @@ TEST(ChunkCodec, TilesOfZerosAreNotThere) {
   EXPECT_LT(static_cast<std::int64_t>(there), rows * 3 * 4) << "of 3 by 4 tiles";
 }
 
-/// Bytes of files of this process that have no name any more.
-double spilled_bytes() {
-  double bytes = 0;
+/// Spill files of this process. They have no name any more.
+std::vector<std::filesystem::path> spill_files() {
+  std::vector<std::filesystem::path> files;
   for (const auto& entry : std::filesystem::directory_iterator("/proc/self/fd")) {
     std::error_code gone;
     const std::string target = std::filesystem::read_symlink(entry.path(), gone);
-    if (!gone && target.ends_with(".spill.part (deleted)"))
-      bytes += static_cast<double>(std::filesystem::file_size(entry.path()));
+    if (!gone && target.ends_with(".spill.part (deleted)")) files.push_back(entry.path());
   }
+  return files;
+}
+
+double spilled_bytes() {
+  double bytes = 0;
+  for (const auto& file : spill_files())
+    bytes += static_cast<double>(std::filesystem::file_size(file));
   return bytes;
 }
 
@@ -212,7 +219,7 @@ TEST(ChunkCodec, BlocksThatWaitTakeBoundedMemoryAndChangeNoByte) {
   const std::vector<std::int64_t> descending(ascending.rbegin(), ascending.rend());
   for (const bool sparse : {false, true}) {
     const Folder folder;
-    DatasetLayout l = layout_of(true, sparse ? "none" : "deflate", sparse);
+    DatasetLayout l = layout_of(true, sparse ? "none" : "lz4", sparse);
     l.episodes = 112;
     double spilled = 0, none = 0;
     // 20 MB each, none of which goes away.
@@ -224,6 +231,32 @@ TEST(ChunkCodec, BlocksThatWaitTakeBoundedMemoryAndChangeNoByte) {
     EXPECT_GT(spilled, static_cast<double>(std::filesystem::file_size(waited)) - (66 << 20));
     EXPECT_TRUE(file_bytes(waited) == file_bytes(straight)) << sparse;
   }
+}
+
+TEST(ChunkCodec, WhatTheDiskChangesWhileBlocksWaitIsFound) {
+  const Folder folder;
+  DatasetLayout l = layout_of(true, "none", true);
+  l.episodes = 80;
+  const auto all = static_cast<int>(l.rows()) + 1;
+  {
+    DatasetWriter writer({folder / "set"}, l);
+    for (const std::int64_t first : {64, 48, 32, 16}) {
+      writer.write(Piece<float>(l, first, 0, all, true).rows());
+      writer.finish(first, {}, {});
+    }
+    writer.write(Piece<float>(l, 0, 0, all, true).rows());
+    ASSERT_EQ(spill_files().size(), 1U);
+    std::fstream(spill_files()[0], std::ios::binary | std::ios::in | std::ios::out)
+        .seekp(1000)
+        .put('x');
+    try {
+      writer.finish(0, {}, {});
+      FAIL() << "a byte of a chunk was changed";
+    } catch (const IoError& error) {
+      EXPECT_THAT(error.what(), HasSubstr(".spill.part' is damaged: bytes "));
+    }
+  }
+  EXPECT_FALSE(std::filesystem::exists(folder / "set")) << "no half shard";
 }
 
 TEST(ChunkCodec, RowsThatWaitBesideChunksAreBoundedAsWell) {
