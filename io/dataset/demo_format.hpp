@@ -86,7 +86,7 @@ class DemoFormat {
   [[nodiscard]] const std::vector<std::uint64_t>& shape(std::size_t dataset) const {
     return shapes_[dataset];
   }
-  /// Bytes of all datasets of an uncompressed demo, each rounded up to a multiple of eight.
+  /// Bytes of the contiguous datasets of a demo, each rounded up to a multiple of eight.
   [[nodiscard]] std::size_t data_bytes(std::int64_t rows) const;
   /// Bytes of a demo's description, equal for all demos.
   [[nodiscard]] std::size_t header_bytes() const { return header_bytes_; }

@@ -232,7 +232,7 @@ TEST(GenerateGradients, AreTheSameBesideAnyObservations) {
                     "--every", "5",          "--gradients", "jacobians"};
   const std::vector<std::pair<std::string, Words>> ways{{"deflate", {"--compress", "deflate"}},
                                                         {"lz4", {"--compress", "lz4"}},
-                                                        {"sparse", {"--tactile", "sparse"}},
+                                                        {"dense", {"--tactile", "dense"}},
                                                         {"some", {"--record", "q"}}};
   for (const auto& [what, words] :
        {std::pair{std::string("task"), task}, std::pair{std::string("scene"), scene}}) {

@@ -233,6 +233,16 @@ TEST(ChunkCodec, BlocksThatWaitTakeBoundedMemoryAndChangeNoByte) {
   }
 }
 
+TEST(ChunkCodec, MoreContiguousNumbersBesideChunksThanTheDiskHoldsAreRefused) {
+  const Folder folder;
+  for (const bool sparse : {false, true}) {
+    DatasetLayout l = layout_of(true, sparse ? "none" : "deflate", sparse);
+    l.steps = std::int64_t{1} << 40;
+    EXPECT_THROW(DatasetWriter({folder / "set"}, l), IoError);
+    EXPECT_EQ(folder.entries(), 0U);
+  }
+}
+
 TEST(ChunkCodec, WhatTheDiskChangesWhileBlocksWaitIsFound) {
   const Folder folder;
   DatasetLayout l = layout_of(true, "none", true);
