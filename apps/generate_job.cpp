@@ -85,6 +85,14 @@ GradientKind gradient_kind_named(const std::string& name) {
                      {GradientKind::none, GradientKind::returns, GradientKind::jacobians});
 }
 
+/// Whether a data set takes more than its numbers, or what makes it smaller.
+const char* size_compared(const DatasetLayout& layout) {
+  if (!has_chunks(layout)) return "at least";
+  if (!has_tiles(layout)) return "before compression";
+  if (layout.compression == "none") return "before tiles of zeros are left out";
+  return "before tiles of zeros are left out and the others compressed";
+}
+
 }  // namespace
 
 GradientKind gradients_wanted(const GenerateOptions& options, bool of_task) {
@@ -150,18 +158,6 @@ Merged merge_if_complete(const GenerateOptions& options, DatasetWriter& output) 
     merged.line += fmt::format(" (too large for it: {})", fmt::join(result.minari_left_out, ", "));
   return merged;
 }
-
-namespace {
-
-/// Whether a data set takes more than its numbers, or what makes it smaller.
-const char* size_compared(const DatasetLayout& layout) {
-  if (!has_chunks(layout)) return "at least";
-  if (!has_tiles(layout)) return "before compression";
-  if (layout.compression == "none") return "before tiles of zeros are left out";
-  return "before tiles of zeros are left out and the others compressed";
-}
-
-}  // namespace
 
 int dry_run(const GenerateOptions& options, const Console& console, const Job& job,
             const StopSignals& signals) {
