@@ -310,8 +310,8 @@ void add_storage_options(CLI::App& app, GenerateOptions& o) {
       "Compression of large observations: none, deflate, or lz4, which needs a plug-in to read "
       "[default: none]");
   add_text(app, "--tactile", o.tactile, "KIND",
-           "Storage of large fields: dense, or sparse, which leaves out tiles of zeros [default: "
-           "dense]");
+           "Storage of large fields: sparse, which leaves out tiles of zeros, or dense [default: "
+           "sparse]");
   add_text(
       app, "--record", o.record, "LIST",
       "Observations to store, separated by commas: q, v, variables, bodies or bodies.NAME, a "

@@ -12,6 +12,7 @@
 #include "apps/scene_run.hpp"
 #include "apps/workers.hpp"
 #include "engine/base/error.hpp"
+#include "io/dataset/chunk_codec.hpp"
 #include "io/dataset/dataset_merge.hpp"
 
 namespace tangere::apps {
@@ -82,6 +83,14 @@ double free_bytes_at(const std::string& path) {
 GradientKind gradient_kind_named(const std::string& name) {
   return named_value("gradients", name,
                      {GradientKind::none, GradientKind::returns, GradientKind::jacobians});
+}
+
+/// Whether a data set takes more than its numbers, or what makes it smaller.
+const char* size_compared(const DatasetLayout& layout) {
+  if (!has_chunks(layout)) return "at least";
+  if (!has_tiles(layout)) return "before compression";
+  if (layout.compression == "none") return "before tiles of zeros are left out";
+  return "before tiles of zeros are left out and the others compressed";
 }
 
 }  // namespace
@@ -165,14 +174,14 @@ int dry_run(const GenerateOptions& options, const Console& console, const Job& j
   const double seconds = steps / rate;
   console.print(fmt::format(
       "would make {} episodes of {} steps, {} rows each, in {} (kept: {})\n{:.0f} bytes each, "
-      "{:.0f} in all at least; "
+      "{:.0f} in all {}; "
       "free on the disk: {:.0f}\nmemory for {} threads: {:.0f} bytes\nabout {:.0f} s of "
       "simulation, at {:.0f} env-steps/s "
       "as measured now, without output\neffects: {}\nnothing was written",
       extent.episodes, job.layout.steps, job.layout.rows(),
       extent.shards.size() == 1 ? "1 shard" : fmt::format("{} shards", extent.shards.size()),
-      extent.kept, of_one, bytes, free, job.run.threads, job.memory_bytes, seconds, rate,
-      fmt::join(job.effects, ", ")));
+      extent.kept, of_one, bytes, size_compared(job.layout), free, job.run.threads,
+      job.memory_bytes, seconds, rate, fmt::join(job.effects, ", ")));
   console.result({{"command", "generate"},
                   {"exit_code", static_cast<int>(kDone)},
                   {"dry_run", true},

@@ -53,7 +53,7 @@ std::string command_of(const GenerateOptions& options, const EpisodeOptions& run
   if (options.accuracy) command += fmt::format(" --accuracy {}", *options.accuracy);
   if (options.sleep) command += " --sleep";
   if (options.compress != "none") command += " --compress " + options.compress;
-  if (options.tactile != "dense") command += " --tactile " + options.tactile;
+  if (options.tactile != "sparse") command += " --tactile " + options.tactile;
   if (!options.record.empty()) command += " --record " + options.record;
   if (options.shards) command += fmt::format(" --shards {}", *options.shards);
   if (options.gradients != "none") command += " --gradients " + options.gradients;

@@ -9,6 +9,7 @@
 #include <filesystem>
 
 #include "apps/scene_run.hpp"
+#include "io/dataset/chunk_codec.hpp"
 
 namespace tangere::apps {
 namespace {
@@ -24,7 +25,7 @@ std::vector<Failure> failures_of(const EpisodeSummary& summary) {
 std::string preparation_of(const Job& job) {
   std::vector<std::string> kinds;
   if (!job.layout.gradients.empty()) kinds.emplace_back("gradients");
-  if (job.layout.sparse) kinds.emplace_back("tiles");
+  if (has_tiles(job.layout)) kinds.emplace_back("tiles");
   if (job.layout.compression != "none") kinds.emplace_back("compression");
   return kinds.empty() ? "checksums" : fmt::format("{}", fmt::join(kinds, " and "));
 }

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "io/dataset/chunk_codec.hpp"
+#include "io/dataset/content_sum.hpp"
 #include "io/dataset/dataset_merge.hpp"
 #include "io/dataset/dataset_writer.hpp"
 #include "io/dataset/shard_check.hpp"

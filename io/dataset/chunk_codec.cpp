@@ -25,12 +25,19 @@ constexpr std::int64_t kMostRows = 64;
 constexpr std::size_t kLeastRowBytes =
     256;  // for smaller rows a chunk's index would cost more than compression gains
 constexpr std::size_t kLeastLastBytes = 8 << 10, kLeastTiledBytes = 8 << 10;
-// Points along a side of a field's tile, twice as many for large fields; points in a tile of a
-// curved pad. Tiles that nothing touches are left out.
+// Most points along a side of a field's tile, twice as many for large fields; most points in a tile
+// of a curved pad. Tiles that nothing touches are left out.
 constexpr std::uint64_t kTileSide = 16, kLargeSide = 128, kTilePoints = 256;
 
 std::size_t numbers_of(const std::vector<std::uint64_t>& shape) {
   return std::accumulate(shape.begin(), shape.end(), std::size_t{1}, std::multiplies<>());
+}
+
+/// Points of a tile along a side of `points`: as few tiles as have at most `most` each, of equal
+/// size, so that little of the last one lies outside.
+std::uint64_t tile_side(std::uint64_t points, std::uint64_t most) {
+  const std::uint64_t tiles = std::max<std::uint64_t>(1, (points + most - 1) / most);
+  return (points + tiles - 1) / tiles;
 }
 
 std::int64_t power_of_two_below(double most) {
@@ -119,7 +126,7 @@ ChunkPlan chunk_plan(const DatasetLayout& layout, const std::vector<std::uint64_
                                : *std::max_element(shape.begin(), shape.end()) < kLargeSide
                                    ? kTileSide
                                    : 2 * kTileSide;
-    for (std::size_t k = 0; k < tiled; ++k) plan.tile[k] = std::min(shape[k], side);
+    for (std::size_t k = 0; k < tiled; ++k) plan.tile[k] = tile_side(shape[k], side);
   } else if (layout.compression == "none" || row_bytes < kLeastRowBytes) {
     return plan;
   }
@@ -152,6 +159,12 @@ bool has_chunks(const DatasetLayout& layout) {
   const std::vector<ChunkPlan> plans = chunk_plans(layout);
   return std::any_of(plans.begin(), plans.end(),
                      [](const ChunkPlan& plan) { return plan.rows > 0; });
+}
+
+bool has_tiles(const DatasetLayout& layout) {
+  const std::vector<ChunkPlan> plans = chunk_plans(layout);
+  return std::any_of(plans.begin(), plans.end(),
+                     [](const ChunkPlan& plan) { return plan.may_be_absent; });
 }
 
 std::vector<h5::FileFilter> file_filters(const std::string& compression, std::size_t number_bytes) {

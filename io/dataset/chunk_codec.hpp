@@ -29,6 +29,8 @@ struct ChunkPlan {
 std::vector<ChunkPlan> chunk_plans(const DatasetLayout& layout);
 /// Whether any observation is cut. The size of an episode is then not known in advance.
 bool has_chunks(const DatasetLayout& layout);
+/// Whether any observation is cut into tiles, of which those of zeros are left out.
+bool has_tiles(const DatasetLayout& layout);
 
 /// The filters that a file declares for chunks of numbers of `number_bytes` each.
 std::vector<h5::FileFilter> file_filters(const std::string& compression, std::size_t number_bytes);

@@ -13,8 +13,9 @@
 
 namespace tangere {
 
-/// `format_version` of shards: written, and required in checks and merges.
-inline constexpr std::int64_t kDatasetFormat = 5;
+/// `format_version` of shards that are written. Checks and merges also read the one before, whose
+/// checksum of numbers is another (ContentSum).
+inline constexpr std::int64_t kDatasetFormat = 6, kWholeRowsFormat = 5;
 /// `format` of all of them.
 inline constexpr const char* kFormatName = "tangere dataset";
 

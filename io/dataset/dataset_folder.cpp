@@ -108,7 +108,8 @@ void DatasetFolder::clean() {
     const PartFile stale(part.substr(0, part.size() - kPart.size()), true);
   };
   if (!shared_)
-    for (const std::string& part : files_ending(fmt::format(".h5{}", kPart))) remove(part);
+    for (const char* kind : {".h5", ".h5.spill"})
+      for (const std::string& part : files_ending(fmt::format("{}{}", kind, kPart))) remove(part);
   // Nobody merges while this process holds the folder, so these files are from a merge that was
   // killed. At most, another process cleans up after it, too.
   for (const std::string& part : merged_files(std::string(kPart))) {

@@ -61,7 +61,7 @@ struct DatasetLayout : RunFacts {
   std::int64_t shards = 0;                ///< number of shards; 0: as shard_bytes determines
   std::string compression =
       "none";                     ///< or "deflate", "lz4", for observations with rows large enough
-  bool sparse = false;            ///< parts of large fields that are zero are left out
+  bool sparse = true;             ///< parts of large fields that are zero are left out
   std::vector<TimedName> record;  ///< observations to store, with times in steps; none: all
   std::string gradients_of;       ///< the quantity that derivatives are of, in words; empty: none
   std::vector<GradientArray> gradients;  ///< those stored with an episode

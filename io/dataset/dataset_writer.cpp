@@ -152,8 +152,11 @@ struct DatasetWriter::Impl {
   }
 
   void check_space(double episodes) const {
-    if (has_chunks(layout)) return;  // sizes are not known in advance
-    const double needed = layout.episode_bytes() * episodes, available = folder.free_bytes();
+    // The size of chunks is not known in advance, and neither is the length of a task's episode.
+    const double of_episode =
+        has_chunks(layout) ? static_cast<double>(format.data_bytes(layout.task ? 1 : layout.rows()))
+                           : layout.episode_bytes();
+    const double needed = of_episode * episodes, available = folder.free_bytes();
     if (needed > available)
       throw IoError(fmt::format("{}: needs at least {:.0f} bytes and the disk has {:.0f} free",
                                 output.folder, needed, available));

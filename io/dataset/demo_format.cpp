@@ -111,7 +111,8 @@ std::int64_t DemoFormat::chunk_rows(std::size_t dataset, std::int64_t rows) cons
 std::size_t DemoFormat::data_bytes(std::int64_t rows) const {
   std::size_t bytes = 0;
   for (std::size_t k = 0; k < datasets(); ++k)
-    bytes += h5::aligned(static_cast<std::size_t>(rows_of(k, rows)) * row_bytes_[k]);
+    if (chunk_rows(k, rows) == 0)
+      bytes += h5::aligned(static_cast<std::size_t>(rows_of(k, rows)) * row_bytes_[k]);
   return bytes;
 }
 

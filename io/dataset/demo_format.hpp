@@ -2,6 +2,7 @@
 // The datasets of a demo in the order of the file, and the bytes that describe them.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <optional>
@@ -73,6 +74,11 @@ class DemoFormat {
   }
   /// The observations that are touch, ascending.
   [[nodiscard]] const std::vector<std::size_t>& touch() const { return touch_; }
+  /// Whether a dataset has the rows of such an observation below obs.
+  [[nodiscard]] bool is_touch(std::size_t dataset) const {
+    return std::any_of(touch_.begin(), touch_.end(),
+                       [&](std::size_t name) { return obs(name) == dataset; });
+  }
   /// Index of an observation in pieces of episodes.
   [[nodiscard]] std::size_t source(std::size_t name) const { return sources_[name]; }
   [[nodiscard]] std::size_t source_of_gradient(std::size_t k) const { return gradient_sources_[k]; }
@@ -80,7 +86,7 @@ class DemoFormat {
   [[nodiscard]] const std::vector<std::uint64_t>& shape(std::size_t dataset) const {
     return shapes_[dataset];
   }
-  /// Bytes of all datasets of an uncompressed demo, each rounded up to a multiple of eight.
+  /// Bytes of the contiguous datasets of a demo, each rounded up to a multiple of eight.
   [[nodiscard]] std::size_t data_bytes(std::int64_t rows) const;
   /// Bytes of a demo's description, equal for all demos.
   [[nodiscard]] std::size_t header_bytes() const { return header_bytes_; }

@@ -62,16 +62,15 @@ struct Cells {
   std::size_t tile_height = 1, tile_width = 1;
   std::size_t rank = 0;  ///< of the tiles: 0 whole rows, 1 parts of a list, 2 of an image
 
-  Cells(const std::vector<std::uint64_t>& shape, const std::vector<std::uint64_t>& tile,
-        std::size_t row_bytes)
+  Cells(const std::vector<std::uint64_t>& shape, const ChunkPlan& plan, std::size_t row_bytes)
       : bytes(row_bytes) {
-    if (shape == tile) return;
+    if (!plan.may_be_absent) return;
     rank = shape.size() - 1;
     width = shape[rank - 1];
-    tile_width = tile[rank - 1];
+    tile_width = plan.tile[rank - 1];
     if (rank == 2) {
       height = shape[0];
-      tile_height = tile[0];
+      tile_height = plan.tile[0];
     }
     bytes = row_bytes / (height * width);
   }
@@ -84,85 +83,116 @@ struct Cells {
   }
 };
 
-/// Cuts the tile that begins at row r, column c, from each of `rows` rows. Cells outside are zero.
-void cut_tile(const Cells& cells, const unsigned char* data, std::size_t rows, std::size_t r,
-              std::size_t c, std::vector<unsigned char>& out) {
-  const std::size_t high = std::min(cells.tile_height, cells.height - r),
-                    wide = std::min(cells.tile_width, cells.width - c);
-  if (wide < cells.tile_width || high < cells.tile_height)
-    std::fill(out.begin(), out.end(), static_cast<unsigned char>(0));
-  for (std::size_t row = 0; row < rows; ++row)
-    for (std::size_t k = 0; k < high; ++k)
-      std::memcpy(out.data() + row * cells.tile_bytes() + k * cells.tile_width * cells.bytes,
-                  data + row * cells.row_bytes() + ((r + k) * cells.width + c) * cells.bytes,
-                  wide * cells.bytes);
+/// What a piece has of a row of one dataset.
+struct RowContent {
+  RowSum sum;
+  bool any = false;  ///< a number other than 0
+};
+
+/// Whether one of the numbers is not 0.
+bool any_of_type(bool single, std::span<const unsigned char> bytes) {
+  const auto numbers = [&]<class T>(T) {
+    return std::span(reinterpret_cast<const T*>(bytes.data()), bytes.size() / sizeof(T));
+  };
+  return single ? any_number(numbers(float{})) : any_number(numbers(double{}));
 }
 
-bool all_zero(const std::vector<unsigned char>& bytes) {
-  return bytes.empty() ||
-         (bytes[0] == 0 && std::memcmp(bytes.data(), bytes.data() + 1, bytes.size() - 1) == 0);
-}
-
+/// Cuts rows of datasets into chunks. Every number is read once; tiles of zeros are not read again.
 class Cutter {
  public:
   Cutter(const DatasetLayout& layout, const DemoFormat& format, std::vector<PreparedChunk>& chunks)
       : layout_(layout), format_(format), chunks_(chunks) {}
 
-  /// `each`: rows of a chunk.
-  void cut(int episode, std::size_t dataset, const PieceSlice& slice, std::int64_t each) {
-    const Cells cells(format_.shape(dataset), format_.plan(dataset).tile, slice.rows.row_bytes);
+  /// Whole rows, `each` of them in a chunk.
+  void cut_rows(int episode, std::size_t dataset, const PieceSlice& slice, std::int64_t each) {
+    const std::size_t bytes = slice.rows.row_bytes;
     for (std::int64_t row = 0; row < slice.rows.rows; row += each) {
-      const unsigned char* const data = slice.data + as_size(row) * cells.row_bytes();
       const std::size_t used = as_size(std::min(each, slice.rows.rows - row));
-      for (std::size_t r = 0; r < cells.height; r += cells.tile_height)
-        for (std::size_t c = 0; c < cells.width; c += cells.tile_width)
-          add({episode, dataset, cells.first(slice.first + row, r, c), {}}, cells, data, used,
-              as_size(each));
+      chunks_.push_back({episode,
+                         dataset,
+                         {static_cast<std::uint64_t>(slice.first + row), 0, 0},
+                         compressed(layout_, slice.data + as_size(row) * bytes, used * bytes,
+                                    as_size(each) * bytes)});
     }
   }
 
- private:
-  void add(PreparedChunk chunk, const Cells& cells, const unsigned char* data, std::size_t used,
-           std::size_t each) {
-    const std::size_t r = cells.rank == 2 ? chunk.first[1] : 0,
-                      c = chunk.first[cells.rank == 2 ? 2 : 1];
-    if (cells.rank > 0) {
-      tile_.resize(used * cells.tile_bytes());
-      cut_tile(cells, data, used, r, c, tile_);
-      if (format_.plan(chunk.dataset).may_be_absent && all_zero(tile_)) return;
-      data = tile_.data();
+  /// Tiles of `each` rows that are not all zero. Returns the content of the rows.
+  const std::vector<RowContent>& cut_tiles(int episode, std::size_t dataset,
+                                           const PieceSlice& slice, std::int64_t each) {
+    const Cells cells(format_.shape(dataset), format_.plan(dataset), slice.rows.row_bytes);
+    content_.assign(as_size(slice.rows.rows), {});
+    for (std::int64_t row = 0; row < slice.rows.rows; row += each) {
+      const std::span<RowContent> content =
+          std::span(content_)
+              .subspan(as_size(row))
+              .first(as_size(std::min(each, slice.rows.rows - row)));
+      const unsigned char* const data = slice.data + as_size(row) * cells.row_bytes();
+      mark_tiles(cells, data, content.size());
+      auto mark = marked_.begin();
+      for (std::size_t r = 0; r < cells.height; r += cells.tile_height)
+        for (std::size_t c = 0; c < cells.width; c += cells.tile_width)
+          if (*mark++ != 0) {
+            cut_tile(cells, data, r, c, content);
+            chunks_.push_back({episode, dataset, cells.first(slice.first + row, r, c),
+                               compressed(layout_, tile_.data(), tile_.size(),
+                                          as_size(each) * cells.tile_bytes())});
+          }
     }
-    chunk.bytes = compressed(layout_, data, used * cells.tile_bytes(), each * cells.tile_bytes());
-    chunks_.push_back(std::move(chunk));
+    return content_;
+  }
+
+ private:
+  /// Marks the tiles that are not zero in one of the rows.
+  void mark_tiles(const Cells& cells, const unsigned char* data, std::size_t rows) {
+    const std::size_t across = (cells.width + cells.tile_width - 1) / cells.tile_width,
+                      down = (cells.height + cells.tile_height - 1) / cells.tile_height,
+                      line = cells.width * cells.bytes, part = cells.tile_width * cells.bytes;
+    marked_.assign(across * down, 0);
+    for (std::size_t k = 0; k < rows * cells.height; ++k) {
+      const std::span<const unsigned char> whole(data + k * line, line);
+      char* const mark = marked_.data() + k % cells.height / cells.tile_height * across;
+      if (!any_bit(whole)) continue;
+      for (std::size_t tile = 0; tile < across; ++tile)
+        if (mark[tile] == 0)
+          mark[tile] =
+              any_bit(whole.subspan(tile * part).first(std::min(part, line - tile * part))) ? 1 : 0;
+    }
+  }
+
+  /// Cuts the tile that begins at row r, column c, from each row. Cells outside are zero.
+  void cut_tile(const Cells& cells, const unsigned char* data, std::size_t r, std::size_t c,
+                std::span<RowContent> content) {
+    const std::size_t high = std::min(cells.tile_height, cells.height - r),
+                      wide = std::min(cells.tile_width, cells.width - c) * cells.bytes;
+    tile_.assign(content.size() * cells.tile_bytes(), 0);
+    unsigned char* out = tile_.data();
+    for (std::size_t row = 0; row < content.size(); ++row, out += cells.tile_bytes()) {
+      for (std::size_t k = 0; k < high; ++k) {
+        const std::size_t at = ((r + k) * cells.width + c) * cells.bytes;
+        const std::span<const unsigned char> cut(data + row * cells.row_bytes() + at, wide);
+        std::memcpy(out + k * cells.tile_width * cells.bytes, cut.data(), wide);
+        content[row].sum.add(at, cut);
+      }
+      content[row].any =
+          content[row].any || any_of_type(format_.single(), {out, cells.tile_bytes()});
+    }
   }
 
   const DatasetLayout& layout_;
   const DemoFormat& format_;
   std::vector<PreparedChunk>& chunks_;
+  std::vector<RowContent> content_;
+  std::vector<char> marked_;
   std::vector<unsigned char> tile_;
 };
 
-/// Whether one of the numbers is not 0.
-template <class T>
-bool any(const unsigned char* bytes, std::size_t count) {
-  const auto* const numbers = reinterpret_cast<const T*>(bytes);
-  return std::any_of(numbers, numbers + count / sizeof(T), [](T x) { return x != T{0}; });
-}
-
-/// Rows of obs in which an observation that is touch is not all zero.
-std::int64_t touching_rows(const DemoFormat& format, const std::vector<PieceSlice>& slices) {
-  if (format.touch().empty()) return 0;
-  const auto felt = [&](std::int64_t row, std::size_t name) {
-    const PieceSlice& slice = slices[format.obs(name)];
-    const std::size_t bytes = slice.rows.row_bytes;
-    const unsigned char* const at = slice.data + as_size(row) * bytes;
-    return format.single() ? any<float>(at, bytes) : any<double>(at, bytes);
-  };
-  std::int64_t count = 0;
-  for (std::int64_t row = 0; row < slices[format.obs(format.touch()[0])].rows.rows; ++row)
-    count += std::any_of(format.touch().begin(), format.touch().end(),
-                         [&](std::size_t name) { return felt(row, name); });
-  return count;
+/// Marks rows of an observation in which not all numbers are 0.
+void mark_felt(const DemoFormat& format, const PieceSlice& slice, std::vector<char>& felt) {
+  for (std::size_t row = 0; row < felt.size(); ++row)
+    if (felt[row] == 0 &&
+        any_of_type(format.single(),
+                    slice.bytes().subspan(row * slice.rows.row_bytes, slice.rows.row_bytes)))
+      felt[row] = 1;
 }
 
 }  // namespace
@@ -206,18 +236,31 @@ PreparedPiece prepare_piece(const DatasetLayout& layout, const DemoFormat& forma
   for (int e = 0; e < piece.episodes; ++e) {
     const std::int64_t rows = rows_of_episode(layout, piece, e);
     const std::vector<PieceSlice> slices = slices_of(format, piece, e, rows);
-    prepared.touching.push_back(touching_rows(format, slices));
+    std::vector<char> felt;
     for (std::size_t dataset = 0; dataset < slices.size(); ++dataset) {
-      const PlacedRows& r = slices[dataset].rows;
+      const PieceSlice& slice = slices[dataset];
+      const PlacedRows& r = slice.rows;
       if (r.rows == 0) continue;
-      prepared.sums[as_size(e)].add(r.episode, r.name, r.first_row, r.rows, r.row_bytes,
-                                    slices[dataset].data);
+      const bool touch = format.is_touch(dataset);
+      if (touch) felt.resize(as_size(r.rows), 0);
       const std::int64_t each = format.chunk_rows(dataset, rows);
-      if (each == 0) continue;
-      if (slices[dataset].first % each != 0)
+      if (each > 0 && slice.first % each != 0)
         throw std::logic_error("a piece begins within a chunk");
-      cutter.cut(e, dataset, slices[dataset], each);
+      if (each > 0 && format.plan(dataset).may_be_absent) {
+        const std::vector<RowContent>& content = cutter.cut_tiles(e, dataset, slice, each);
+        for (std::size_t k = 0; k < content.size(); ++k) {
+          prepared.sums[as_size(e)].add(r.episode, r.name, r.first_row + std::int64_t(k),
+                                        r.row_bytes, content[k].sum);
+          if (touch && content[k].any) felt[k] = 1;
+        }
+        continue;
+      }
+      prepared.sums[as_size(e)].add(r.episode, r.name, r.first_row, r.rows, r.row_bytes,
+                                    slice.data);
+      if (touch) mark_felt(format, slice, felt);
+      if (each > 0) cutter.cut_rows(e, dataset, slice, each);
     }
+    prepared.touching.push_back(std::count(felt.begin(), felt.end(), 1));
   }
   return prepared;
 }

@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "engine/rows/episode_sink.hpp"
+#include "io/dataset/content_sum.hpp"
 #include "io/dataset/demo_format.hpp"
-#include "io/dataset/shard_check.hpp"
 
 namespace tangere {
 

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "engine/base/error.hpp"
+#include "io/dataset/content_sum.hpp"
 #include "io/dataset/dataset_description.hpp"
 #include "io/hdf5/h5.hpp"
 #include "io/hdf5/h5_listing.hpp"
@@ -19,27 +20,6 @@ namespace tangere {
 namespace {
 
 constexpr std::size_t kReadBytes = std::size_t{4} << 20;
-
-std::uint64_t mix(std::uint64_t hash, std::uint64_t word) {
-  hash = (hash ^ word) * 0x9E3779B97F4A7C15ULL;  // odd: invertible, so no bit of a word is lost
-  return hash ^ (hash >> 32);
-}
-
-/// Hashes four words side by side: four multiplications then take as long as one.
-std::uint64_t row_hash(std::uint64_t key, const unsigned char* bytes, std::size_t count) {
-  std::array<std::uint64_t, 4> hash{}, words{};
-  hash[0] = mix(key, count);  // count: zeros at the end change the hash
-  for (std::size_t lane = 1; lane < hash.size(); ++lane) hash[lane] = mix(hash[lane - 1], lane);
-  for (; count >= sizeof words; bytes += sizeof words, count -= sizeof words) {
-    std::memcpy(words.data(), bytes, sizeof words);
-    for (std::size_t lane = 0; lane < hash.size(); ++lane)
-      hash[lane] = mix(hash[lane], words[lane]);
-  }
-  words = {};
-  std::memcpy(words.data(), bytes, count);
-  for (std::size_t lane = 0; lane < hash.size(); ++lane) hash[lane] = mix(hash[lane], words[lane]);
-  return mix(mix(mix(hash[0], hash[1]), hash[2]), hash[3]);
-}
 
 constexpr std::int64_t kMostLooks = 1'000'000;  // for episodes that a damaged file only claims
 constexpr std::size_t kMostProblems = 100;      // of a shard; more lines would not help
@@ -60,6 +40,7 @@ class ShardChecker {
   }
 
   ShardReport check() {
+    summed_ = true;
     if (!is_of_this_format() || !is_described()) return {content_, problems_};
     const h5::Id data = h5::open_group(file_, "data"), failed = h5::open_group(file_, "failed");
     check_attributes(file_);
@@ -86,9 +67,11 @@ class ShardChecker {
     if (h5::read_text(file_, "format") != kFormatName) {
       fail("it is not a tangere data set");
     } else if (const std::int64_t version = number(file_, "format_version");
-               version != kDatasetFormat) {
-      fail(fmt::format("its format_version is {}; expected {} (generate the data set again)",
-                       version, kDatasetFormat));
+               version != kDatasetFormat && version != kWholeRowsFormat) {
+      fail(fmt::format("its format_version is {}; expected {} or {} (generate the data set again)",
+                       version, kWholeRowsFormat, kDatasetFormat));
+    } else {
+      sum_ = ContentSum(version == kWholeRowsFormat);
     }
     return problems_.empty();
   }
@@ -328,9 +311,10 @@ class ShardChecker {
   template <class T>
   void check_finite(const std::vector<T>& numbers, const std::string& name, std::int64_t first,
                     std::size_t width) {
+    if (!finite_ || not_finite_.size() >= kMostProblems) return;
     const auto bad =
         std::find_if(numbers.begin(), numbers.end(), [](T x) { return !std::isfinite(x); });
-    if (!finite_ || bad == numbers.end() || not_finite_.size() >= kMostProblems) return;
+    if (bad == numbers.end()) return;
     const auto at = static_cast<std::size_t>(bad - numbers.begin());
     not_finite_.push_back(fmt::format("{}: row {} has a number that is {}; expected finite numbers",
                                       name, first + static_cast<std::int64_t>(at / width), *bad));
@@ -357,14 +341,16 @@ class ShardChecker {
       buffer.resize(count[0] * width);
       h5::read_box(dataset, offset, count, buffer.data());
       check_finite(buffer, full, first + row, width);
-      for (std::size_t i = 0; touch && i < buffer.size(); ++i)
-        if (buffer[i] != T{0}) felt_[static_cast<std::size_t>(row) + i / width] = 1;
-      sum_.add(episode, index, first + row, static_cast<std::int64_t>(count[0]), width * sizeof(T),
-               buffer.data());
+      for (std::size_t i = 0; touch && i < count[0]; ++i)
+        if (any_number(std::span<const T>(buffer).subspan(i * width, width)))
+          felt_[static_cast<std::size_t>(row) + i] = 1;
+      if (summed_)
+        sum_.add(episode, index, first + row, static_cast<std::int64_t>(count[0]),
+                 width * sizeof(T), buffer.data());
     }
   }
 
-  bool finite_;
+  bool finite_, summed_ = false;
   std::vector<std::string> problems_, not_finite_;
   h5::Id file_, scene_;
   std::vector<std::string> names_, touch_;  // of observations; of those that are touch
@@ -379,15 +365,6 @@ class ShardChecker {
 };
 
 }  // namespace
-
-void ContentSum::add(std::int64_t episode, std::size_t name, std::int64_t first_row,
-                     std::int64_t rows, std::size_t row_bytes, const void* data) {
-  const auto* bytes = static_cast<const unsigned char*>(data);
-  const std::uint64_t dataset = mix(mix(0, static_cast<std::uint64_t>(episode)), name);
-  if (row_bytes == 0) return;
-  for (std::int64_t row = 0; row < rows; ++row, bytes += row_bytes)
-    sum_ += row_hash(mix(dataset, static_cast<std::uint64_t>(first_row + row)), bytes, row_bytes);
-}
 
 ShardReport examine_shard(const std::string& path) {
   try {

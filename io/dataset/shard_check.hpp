@@ -13,20 +13,6 @@
 
 namespace tangere {
 
-/// A checksum that does not depend on order: the sum over rows of a hash of (episode, name, row,
-/// bytes). Rows may be written in any order and read back in another.
-class ContentSum {
- public:
-  /// `name` numbers the dataset: 0 actions, then the observations. `rows` rows of `row_bytes` each.
-  void add(std::int64_t episode, std::size_t name, std::int64_t first_row, std::int64_t rows,
-           std::size_t row_bytes, const void* data);
-  void add(const ContentSum& other) { sum_ += other.sum_; }
-  [[nodiscard]] std::uint64_t value() const { return sum_; }
-
- private:
-  std::uint64_t sum_ = 0;
-};
-
 struct ShardContent {
   std::int64_t first_episode = 0;
   std::int64_t demos = 0, failed = 0;  ///< episodes below /data and below /failed

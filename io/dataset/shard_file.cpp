@@ -7,15 +7,18 @@
 
 #include <algorithm>
 #include <array>
+#include <filesystem>
 
 #include "io/dataset/dataset_description.hpp"
 #include "io/dataset/learner_notes.hpp"
+#include "io/dataset/shard_check.hpp"
 
 namespace tangere {
 namespace {
 
 constexpr std::int64_t kBlockEpisodes = 16;
 constexpr std::size_t kMostHeld = std::size_t{64} << 20;
+constexpr const char* kSpill = ".spill";
 
 template <class T>
 std::span<const unsigned char> bytes_of(std::span<const T> numbers) {
@@ -72,7 +75,7 @@ ShardFile::Block& ShardFile::block_of(const EpisodeRows& rows) {
                   demo.facts.randomized.begin());
     if (!format_.touch().empty()) demo.facts.touching = 0;
     demo.addresses.resize(format_.datasets(), h5::kNowhere);
-    demo.held.resize(format_.datasets());
+    demo.rows.resize(format_.datasets());
     demo.chunks.resize(format_.datasets());
   }
   if (!waits()) give_place(block, rows.first_episode);
@@ -122,7 +125,8 @@ void ShardFile::write_slices(Block& block, const EpisodeRows& rows, int episode)
       else if (rows.first_row == 0)
         placed_.add(demo.addresses[k], same, what);
     } else if (format_.chunk_rows(k, demo.facts.rows) == 0 && slice.rows.rows > 0) {
-      hold(demo, k, slice, what);
+      const std::span<const unsigned char> bytes = slice.bytes();
+      demo.rows[k].push_back(hold({bytes.begin(), bytes.end()}, what));
     }
   }
 }
@@ -138,45 +142,41 @@ std::span<const unsigned char> ShardFile::constant(std::size_t dataset, std::int
 
 void ShardFile::hold(Block& block, std::int64_t first_episode, std::vector<PreparedChunk>& chunks) {
   for (PreparedChunk& chunk : chunks) {
-    Chunk held{{chunk.first, 0, static_cast<std::uint32_t>(chunk.bytes.size())},
-               std::move(chunk.bytes)};
-    held_bytes_ += held.bytes.size();
-    if (held_bytes_ >
-        kMostHeld) {  // bounds the memory; the place then depends on the order of pieces
-      held_bytes_ -= held.bytes.size();
-      held.place.address = free_;
-      placed_.add(free_, held.bytes, {format_.title(chunk.dataset), first_episode + chunk.episode});
-      placed_.flush();
-      free_ = h5::aligned(free_ + held.bytes.size());
-      held.bytes = {};
-    }
+    const BytesOf what{format_.title(chunk.dataset), first_episode + chunk.episode};
+    const auto bytes = static_cast<std::uint32_t>(chunk.bytes.size());
     block.demos[static_cast<std::size_t>(chunk.episode)].chunks[chunk.dataset].push_back(
-        std::move(held));
+        {{chunk.first, 0, bytes}, hold(std::move(chunk.bytes), what)});
   }
 }
 
-/// Does the same for rows. If memory is full, the whole dataset gets its place.
-void ShardFile::hold(Demo& demo, std::size_t dataset, const PieceSlice& slice,
-                     const BytesOf& what) {
-  HeldRows& held = demo.held[dataset];
-  const std::span<const unsigned char> bytes = slice.bytes();
-  if (held.address == h5::kNowhere) {
-    if (held_bytes_ + bytes.size() <= kMostHeld) {
-      held.bytes.insert(held.bytes.end(), bytes.begin(), bytes.end());
-      held_bytes_ += bytes.size();
-      return;
-    }
-    held.address = free_;
-    const auto rows = static_cast<std::uint64_t>(format_.rows_of(dataset, demo.facts.rows));
-    free_ = h5::aligned(free_ + rows * slice.rows.row_bytes);
-    placed_.add(held.address, held.bytes, what);
-    placed_.flush();
-    held_bytes_ -= held.bytes.size();
-    held.bytes = {};
+/// The spill file loses its name at once, so that a run that is killed leaves nothing.
+ShardFile::Held ShardFile::hold(std::vector<unsigned char> bytes, const BytesOf& what) {
+  Held held;
+  held.size = bytes.size();
+  if (held_bytes_ + held.size <= kMostHeld) {
+    held_bytes_ += held.size;
+    held.bytes = std::move(bytes);
+    return held;
   }
-  placed_.add(held.address + static_cast<std::uint64_t>(slice.first) * slice.rows.row_bytes, bytes,
-              what);
-  placed_.flush();
+  if (!spill_) {
+    spill_.emplace(part_.output() + kSpill, true);
+    std::filesystem::remove(spill_->path());
+  }
+  held.spilled = spill_->size();
+  const NamedBytes all{bytes, what};
+  spill_->write_at(held.spilled, {&all, 1});
+  spilled_bytes_ += held.size;
+  return held;
+}
+
+/// Adds held bytes to the queue of the file.
+void ShardFile::place(std::uint64_t address, Held& held, const BytesOf& what) {
+  held_bytes_ -= held.bytes.size();
+  if (held.spilled == h5::kNowhere) return placed_.add(address, held.bytes, what);
+  std::vector<unsigned char>& bytes = read_back_.emplace_back(held.size);
+  spill_->read_at(held.spilled, bytes);
+  spilled_bytes_ -= held.size;
+  placed_.add(address, bytes, what);
 }
 
 void ShardFile::finish(std::int64_t first_episode, std::span<const FailedEpisode> failures,
@@ -218,10 +218,6 @@ void ShardFile::give_place_to_held(Block& block) {
     for (std::size_t k = 0; k < format_.datasets(); ++k) {
       demo.addresses[k] = at;
       const std::int64_t rows = format_.chunk_rows(k, demo.facts.rows);
-      if (demo.held[k].address != h5::kNowhere) {
-        demo.addresses[k] = demo.held[k].address;
-        continue;
-      }
       if (rows == 0) {
         at += h5::aligned(static_cast<std::uint64_t>(format_.rows_of(k, demo.facts.rows)) *
                           format_.row_bytes(k));
@@ -229,10 +225,8 @@ void ShardFile::give_place_to_held(Block& block) {
       }
       std::vector<h5::FileChunk> places;
       for (Chunk& chunk : demo.chunks[k]) {
-        if (!chunk.bytes.empty()) {
-          chunk.place.address = at;
-          at = h5::aligned(at + chunk.bytes.size());
-        }
+        chunk.place.address = at;
+        at = h5::aligned(at + chunk.held.size);
         places.push_back(chunk.place);
       }
       demo.addresses[k] = h5::add_chunk_index(index, first_index, places, format_.rank(k),
@@ -243,20 +237,23 @@ void ShardFile::give_place_to_held(Block& block) {
 }
 
 void ShardFile::write_held(Block& block, std::int64_t first_episode) {
-  for (std::size_t e = 0; e < block.demos.size(); ++e)
+  for (std::size_t e = 0; e < block.demos.size(); ++e) {
+    Demo& demo = block.demos[e];
     for (std::size_t k = 0; k < format_.datasets(); ++k) {
-      const Demo& demo = block.demos[e];
       const BytesOf what{format_.title(k), first_episode + static_cast<std::int64_t>(e)};
-      const std::span<const unsigned char> same = constant(k, demo.facts.rows);
-      if (format_.chunk_rows(k, demo.facts.rows) == 0)
-        placed_.add(demo.addresses[k],
-                    same.empty() ? std::span<const unsigned char>(demo.held[k].bytes) : same, what);
-      held_bytes_ -= demo.held[k].bytes.size();
-      for (const Chunk& chunk : demo.chunks[k]) {
-        held_bytes_ -= chunk.bytes.size();
-        placed_.add(chunk.place.address, chunk.bytes, what);
+      placed_.add(demo.addresses[k], constant(k, demo.facts.rows), what);
+      std::uint64_t at = demo.addresses[k];
+      for (Held& rows : demo.rows[k]) {
+        place(at, rows, what);
+        at += rows.size;
       }
+      for (Chunk& chunk : demo.chunks[k]) place(chunk.place.address, chunk.held, what);
     }
+    if (read_back_.empty()) continue;
+    placed_.flush();
+    read_back_.clear();
+  }
+  if (spilled_bytes_ == 0) spill_.reset();
 }
 
 void ShardFile::close_block(Block& block, std::int64_t first_episode, const h5::Bytes& indexes) {

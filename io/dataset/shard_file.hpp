@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -39,24 +40,23 @@ class ShardFile {
   void commit();
 
  private:
-  /// A chunk stays in memory until the address of its block is known. If memory is full, it is
-  /// written at once.
+  /// Bytes whose place in the file is not known before their block has its turn. They are in
+  /// memory, or in the spill file if memory is full.
+  struct Held {
+    std::vector<unsigned char> bytes;
+    std::uint64_t spilled = h5::kNowhere;  // address in the spill file
+    std::size_t size = 0;
+  };
   struct Chunk {
     h5::FileChunk place;
-    std::vector<unsigned char> bytes;
-  };
-  /// Numbers of a contiguous dataset in a block without a place. If they have an address, they are
-  /// on disk.
-  struct HeldRows {
-    std::vector<unsigned char> bytes;
-    std::uint64_t address = h5::kNowhere;
+    Held held;
   };
   struct Demo {
     DemoFacts facts;
     bool failed = false;
     ContentSum sum;
     std::vector<std::uint64_t> addresses;    // per dataset, once known
-    std::vector<HeldRows> held;              // per dataset
+    std::vector<std::vector<Held>> rows;     // per contiguous dataset, in order
     std::vector<std::vector<Chunk>> chunks;  // per dataset
   };
   struct Block {
@@ -74,7 +74,8 @@ class ShardFile {
   [[nodiscard]] std::span<const unsigned char> constant(std::size_t dataset,
                                                         std::int64_t rows) const;
   void hold(Block& block, std::int64_t first_episode, std::vector<PreparedChunk>& chunks);
-  void hold(Demo& demo, std::size_t dataset, const PieceSlice& slice, const BytesOf& what);
+  [[nodiscard]] Held hold(std::vector<unsigned char> bytes, const BytesOf& what);
+  void place(std::uint64_t address, Held& held, const BytesOf& what);
   void give_place_to_held(Block& block);
   void write_held(Block& block, std::int64_t first_episode);
   void close_block(Block& block, std::int64_t first_episode, const h5::Bytes& indexes);
@@ -85,8 +86,11 @@ class ShardFile {
   std::int64_t first_episode_, end_, unfinished_,
       next_;                 // unfinished blocks; the first one without a place
   bool cut_;                 // into chunks
-  std::size_t& held_bytes_;  // of chunks and rows, of all shards
+  std::size_t& held_bytes_;  // in memory, of all shards
   PartFile part_;
+  std::optional<PartFile> spill_;  // has no name
+  std::uint64_t spilled_bytes_ = 0;
+  std::vector<std::vector<unsigned char>> read_back_;  // from the spill file, until flush()
   PlacedFile placed_;
   h5::Id file_;
   std::uint64_t texts_ = 0, begin_ = 0;   // addresses of the texts of demos and of the first block

@@ -192,7 +192,7 @@ void add_episode_writer(nb::module_& m) {
           },
           "model"_a, "task"_a, "folder"_a, "episodes"_a, "seed"_a, "policy"_a, "player"_a,
           "python_class"_a, "command"_a, "existing"_a = "refuse", "compression"_a = "none",
-          "sparse"_a = false, "set_name"_a = "", "shards"_a = 0,
+          "sparse"_a = true, "set_name"_a = "", "shards"_a = 0,
           "Creates the folder. `policy`: as requested; `player`: the name of the one that plays.\n"
           "`python_class`: \"MODULE:CLASS\" of the task. `command`: what makes the data set "
           "again.\n"

@@ -24,7 +24,7 @@ __all__ = ["Episodes", "Windows", "generate"]
 Form = Literal["stored", "image", "points"]
 Scale = Literal["task", "standard", "none"]
 
-_CACHED_BYTES = 1 << 28  # of compressed data sets, which cannot be mapped
+_CACHED_BYTES = 1 << 28  # of arrays in chunks, which cannot be mapped
 _FLOOR = 0.05  # of a key's root mean square: the least standard deviation that is divided by
 
 
@@ -32,8 +32,9 @@ class Episodes:
     """The episodes of a data set: `episodes[i]["tactile"]` is (rows, …).
 
     `path` is a folder of `tangere generate`, whose shards are read, or one file: a shard or
-    robomimic.hdf5. Uncompressed shards are mapped, not read: an array is a view of the file. A
-    process opens the files for itself, so an object may go to the workers of a loader.
+    robomimic.hdf5. Contiguous arrays of shards are mapped, not read: an array is a view of the
+    file. Large fields in tiles and compressed ones are read, and up to 256 MB are kept. A process
+    opens the files for itself, so an object may go to the workers of a loader.
     """
 
     def __init__(self, path: str | Path):

@@ -56,13 +56,13 @@ TEST(GenerateCompress, KeepsEveryNumberInBothPrecisionsOnAnyThreads) {
     const std::string small = scene("rolling_ball_small.xml");
     const Words size{"--episodes", "20", "--steps",     "200",
                      "--every",    "5",  "--precision", precision};
-    generate(folder, small, "none", size);
+    generate(folder, small, "none", size + Words{"--tactile", "dense"});
     const json answer =
         generate(folder, small, "one", size + Words{"--compress", "deflate", "--threads", "1"});
     generate(folder, small, "three", size + Words{"--compress", "deflate", "--threads", "3"});
     EXPECT_EQ(answer.at("compress"), "deflate");
     EXPECT_THAT(answer.at("limited_by").get<std::string>(),
-                testing::AnyOf("simulation", "compression", "writing"));
+                testing::AnyOf("simulation", "tiles and compression", "writing"));
     EXPECT_EQ(sum(folder, "one"), sum(folder, "none"));
     EXPECT_EQ(sum(folder, "three"), sum(folder, "none"));
     EXPECT_TRUE(folder.read("three" + kShard) == folder.read("one" + kShard));
@@ -75,8 +75,11 @@ TEST(GenerateCompress, KeepsEveryNumberInBothPrecisionsOnAnyThreads) {
 
 TEST(GenerateCompress, ChunksAreOfAFewRowsAndSmallRowsStayAsTheyAre) {
   const Folder folder;
-  generate(folder, scene("rolling_ball_small.xml"), "set",
-           {"--episodes", "3", "--steps", "200", "--every", "5", "--compress", "deflate"});
+  const Words size{"--episodes", "3", "--steps", "200", "--every", "5", "--compress", "deflate"};
+  generate(folder, scene("rolling_ball_small.xml"), "tiles", size);
+  EXPECT_THAT(layout_of(folder, "tiles", "data/demo_1/obs/pad").chunk,
+              ElementsAre(8, 16, 16, 3));  // 24 KiB
+  generate(folder, scene("rolling_ball_small.xml"), "set", size + Words{"--tactile", "dense"});
   const Layout pad = layout_of(folder, "set", "data/demo_1/obs/pad");
   EXPECT_THAT(pad.chunk, ElementsAre(4, 32, 32, 3));  // 48 KiB
   EXPECT_THAT(pad.filters, ElementsAre(H5Z_FILTER_SHUFFLE, H5Z_FILTER_DEFLATE));
@@ -99,19 +102,17 @@ TEST(GenerateCompress, EveryKindHoldsTheSameNumbers) {
   const Folder folder;
   const Words size{"--episodes", "20", "--steps", "100", "--every", "5"};
   const std::string small = scene("rolling_ball_small.xml");
-  generate(folder, small, "plain", size);
+  generate(folder, small, "plain", size + Words{"--tactile", "dense"});
   for (const char* compress : {"none", "deflate", "lz4"}) {
-    const std::string set = std::string("sparse-") + compress;
+    const std::string set = std::string("tiles-") + compress;
     const json answer =
-        generate(folder, small, set,
-                 size + Words{"--compress", compress, "--tactile", "sparse", "--threads", "1"});
+        generate(folder, small, set, size + Words{"--compress", compress, "--threads", "1"});
     EXPECT_EQ(answer.at("tactile"), "sparse");
     EXPECT_EQ(sum(folder, set), sum(folder, "plain"));
     EXPECT_EQ(run(folder, {"validate", set}).exit_code, 0);
     EXPECT_THAT(layout_of(folder, set, "data/demo_1/obs/pad").chunk,
                 ElementsAre(testing::_, 16, 16, 3));
-    generate(folder, small, set + "2",
-             size + Words{"--compress", compress, "--tactile", "sparse", "--threads", "3"});
+    generate(folder, small, set + "2", size + Words{"--compress", compress, "--threads", "3"});
     EXPECT_TRUE(folder.read(set + kShard) == folder.read(set + "2" + kShard)) << compress;
     EXPECT_LT(std::filesystem::file_size(folder.path(set + kShard)),
               std::filesystem::file_size(folder.path("plain" + kShard)));
@@ -122,10 +123,10 @@ TEST(GenerateCompress, EveryKindHoldsTheSameNumbers) {
   EXPECT_THAT(layout_of(folder, "lz4", "data/demo_1/obs/pad").filters,
               ElementsAre(H5Z_FILTER_SHUFFLE, 32004));
   // Copied unchanged, and read through links.
-  EXPECT_EQ(run(folder, {"merge", "sparse-lz4", "--copy", "--overwrite"}).exit_code, 0);
-  EXPECT_EQ(run(folder, {"validate", "sparse-lz4/robomimic.hdf5"}).exit_code, 0);
-  EXPECT_EQ(run(folder, {"merge", "sparse-none", "--overwrite"}).exit_code, 0);
-  EXPECT_EQ(run(folder, {"validate", "sparse-none/robomimic.hdf5"}).exit_code, 0);
+  EXPECT_EQ(run(folder, {"merge", "tiles-lz4", "--copy", "--overwrite"}).exit_code, 0);
+  EXPECT_EQ(run(folder, {"validate", "tiles-lz4/robomimic.hdf5"}).exit_code, 0);
+  EXPECT_EQ(run(folder, {"merge", "tiles-none", "--overwrite"}).exit_code, 0);
+  EXPECT_EQ(run(folder, {"validate", "tiles-none/robomimic.hdf5"}).exit_code, 0);
 }
 
 TEST(GenerateCompress, RecordsWhatWasAskedFor) {

@@ -232,7 +232,7 @@ TEST(GenerateGradients, AreTheSameBesideAnyObservations) {
                     "--every", "5",          "--gradients", "jacobians"};
   const std::vector<std::pair<std::string, Words>> ways{{"deflate", {"--compress", "deflate"}},
                                                         {"lz4", {"--compress", "lz4"}},
-                                                        {"sparse", {"--tactile", "sparse"}},
+                                                        {"dense", {"--tactile", "dense"}},
                                                         {"some", {"--record", "q"}}};
   for (const auto& [what, words] :
        {std::pair{std::string("task"), task}, std::pair{std::string("scene"), scene}}) {
@@ -270,14 +270,16 @@ TEST(GenerateGradients, AreTheSameBesideAnyObservations) {
 /// The report names the requested work between simulation and disk, no more and no less.
 TEST(GenerateGradients, SayWhatTheyWereMadeWith) {
   const std::vector<std::pair<Words, std::string>> ways{
-      {{}, "checksums"},
-      {{"--tactile", "sparse"}, "tiles"},
-      {{"--compress", "lz4"}, "compression"},
-      {{"--tactile", "sparse", "--compress", "deflate"}, "tiles and compression"},
-      {{"--gradients", "jacobians"}, "gradients"},
-      {{"--gradients", "jacobians", "--tactile", "sparse"}, "gradients and tiles"},
-      {{"--gradients", "jacobians", "--compress", "deflate"}, "gradients and compression"},
-      {{"--gradients", "jacobians", "--tactile", "sparse", "--compress", "deflate"},
+      {{"--tactile", "dense"}, "checksums"},
+      {{}, "tiles"},
+      {{"--record", "q,pad.pressure"}, "checksums"},  // of 4 KiB a row
+      {{"--tactile", "dense", "--compress", "lz4"}, "compression"},
+      {{"--compress", "deflate"}, "tiles and compression"},
+      {{"--gradients", "jacobians", "--tactile", "dense"}, "gradients"},
+      {{"--gradients", "jacobians"}, "gradients and tiles"},
+      {{"--gradients", "jacobians", "--tactile", "dense", "--compress", "deflate"},
+       "gradients and compression"},
+      {{"--gradients", "jacobians", "--compress", "deflate"},
        "gradients and tiles and compression"}};
   const Folder folder;
   for (const auto& [more, name] : ways) {

@@ -375,6 +375,18 @@ TEST(GenerateShards, MistakesAreNamed) {
   EXPECT_THAT(folder.files(), IsEmpty());
 }
 
+TEST(GenerateShards, ADryRunSaysWhatItsSizeIsOf) {
+  const Folder folder;
+  for (const auto& [words, said] : std::vector<std::pair<Words, std::string>>{
+           {{"--record", "q"}, " in all at least;"},
+           {{"--tactile", "dense"}, " in all at least;"},
+           {{}, " in all before tiles of zeros are left out;"},
+           {{"--tactile", "dense", "--compress", "lz4"}, " in all before compression;"},
+           {{"--compress", "lz4"},
+            " in all before tiles of zeros are left out and the others compressed;"}})
+    EXPECT_THAT(run(folder, generate({"--dry-run"}) + words).out, HasSubstr(said));
+}
+
 TEST(GenerateShards, ADryRunSaysWhatWouldBeMadeAndMakesNothing) {
   const Folder folder;
   const Outcome outcome = run(folder, generate({"--dry-run", "--json"}));

@@ -50,7 +50,7 @@ TEST(Readers, OfThePageReadADataSet) {
                 .exit_code,
             0);
   ASSERT_EQ(run(folder, {"generate", scene("rolling_ball_small.xml"), "--output", "sparse",
-                         "--episodes", "4", "--tactile", "sparse", "--quiet"})
+                         "--episodes", "4", "--quiet"})
                 .exit_code,
             0);
   ASSERT_EQ(

@@ -149,7 +149,7 @@ TEST(Record, ADataSetHoldsTheFormsOfAWholeOne) {
   const Folder folder;
   const std::string ball = scene("rolling_ball_small.xml");
   const Words size{"generate", ball, "--episodes", "17", "--steps", "120", "--every", "20"};
-  run_json(folder, size + Words{"-o", "whole"});
+  run_json(folder, size + Words{"-o", "whole", "--tactile", "dense"});
   run_json(folder, size + Words{"-o", "some", "--record", "pad.sum,q,pad.shear,pad.pressure"});
   EXPECT_EQ(run(folder, size + Words{"-o", "some", "--record", "q,pad.shear,pad.pressure,pad.sum",
                                      "--resume"})
@@ -159,8 +159,7 @@ TEST(Record, ADataSetHoldsTheFormsOfAWholeOne) {
   EXPECT_THAT(
       run(folder, size + Words{"-o", "some", "--record", "q,pad.sum", "--resume"}).err,
       HasSubstr("observations: q, pad.pressure, pad.shear, pad.sum there, q, pad.sum here"));
-  run_json(folder,
-           size + Words{"-o", "sparse", "--record", "pad.shear,pad", "--tactile", "sparse"});
+  run_json(folder, size + Words{"-o", "tiles", "--record", "pad.shear,pad"});
   const std::string shard = "some/shard-00000.h5", demo = "data/demo_16/obs/";
   EXPECT_THAT(
       h5::read_texts(h5::open_group(h5::open_file(folder.path(shard)), "scene"), "observations"),
@@ -170,12 +169,12 @@ TEST(Record, ADataSetHoldsTheFormsOfAWholeOne) {
   const std::vector<double> whole = numbers(folder, "whole/shard-00000.h5", demo + "pad"),
                             shear = numbers(folder, shard, demo + "pad.shear");
   for (std::size_t k = 0; k < shear.size(); ++k) ASSERT_EQ(shear[k], whole[k / 2 * 3 + k % 2]) << k;
-  EXPECT_EQ(numbers(folder, "sparse/shard-00000.h5", demo + "pad.shear"), shear);
-  EXPECT_EQ(numbers(folder, "sparse/shard-00000.h5", demo + "pad"), whole);
+  EXPECT_EQ(numbers(folder, "tiles/shard-00000.h5", demo + "pad.shear"), shear);
+  EXPECT_EQ(numbers(folder, "tiles/shard-00000.h5", demo + "pad"), whole);
   EXPECT_THAT(h5::read_texts(h5::open_group(h5::open_file(folder.path(shard)), "scene/sensors/pad"),
                              "readings"),
               ElementsAre("pad.pressure", "pad.shear", "pad.sum"));
-  for (const char* set : {"some", "sparse"}) {
+  for (const char* set : {"some", "tiles"}) {
     EXPECT_EQ(run(folder, {"validate", set}).exit_code, 0) << set;
     EXPECT_EQ(run(folder, {"validate", std::string(set) + "/robomimic.hdf5"}).exit_code, 0) << set;
   }
@@ -304,11 +303,10 @@ TEST(Record, ADataSetSamplesWhatIsNotWantedInEveryRow) {
   const Folder folder;
   const std::string ball = scene("rolling_ball_small.xml");
   const Words size{"generate", ball, "--episodes", "17", "--steps", "120", "--every", "20"};
-  run_json(folder, size + Words{"-o", "whole", "--record", "q,v,pad,bodies"});
+  run_json(folder, size + Words{"-o", "whole", "--record", "q,v,pad,bodies", "--tactile", "dense"});
   const std::string words = "q,v/final,pad/60,pad.sum,bodies.ball/40";
   run_json(folder, size + Words{"-o", "some", "--record", words});
-  run_json(folder, size + Words{"-o", "packed", "--record", words, "--compress", "deflate",
-                                "--tactile", "sparse"});
+  run_json(folder, size + Words{"-o", "packed", "--record", words, "--compress", "deflate"});
   run_json(folder, size + Words{"-o", "end", "--record", "q/final"});
   const std::string of = "data/demo_16/";
   for (const char* set : {"some", "packed"}) {

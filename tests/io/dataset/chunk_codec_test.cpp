@@ -20,6 +20,7 @@ namespace tangere {
 namespace {
 
 using ::tangere::testing::Folder;
+using ::testing::HasSubstr;
 
 constexpr std::int64_t kRows = 37;
 
@@ -154,8 +155,8 @@ TEST(ChunkCodec, TilesOfZerosAreNotThere) {
   const h5::Id properties(H5Dget_create_plist(image.get()));
   h5::Dims chunk(4);
   ASSERT_EQ(H5Pget_chunk(properties.get(), 4, chunk.data()), 4);
-  EXPECT_EQ(chunk[1], 16U);
-  EXPECT_EQ(chunk[2], 16U);
+  EXPECT_EQ(chunk[1], 13U) << "three tiles of 37 points, of at most 16 each";
+  EXPECT_EQ(chunk[2], 13U) << "four tiles of 50 points";
   const auto rows =
       (kRows + static_cast<std::int64_t>(chunk[0]) - 1) / static_cast<std::int64_t>(chunk[0]);
   hsize_t there = 0;
@@ -165,18 +166,107 @@ TEST(ChunkCodec, TilesOfZerosAreNotThere) {
   EXPECT_LT(static_cast<std::int64_t>(there), rows * 3 * 4) << "of 3 by 4 tiles";
 }
 
-TEST(ChunkCodec, BlocksThatWaitTakeBoundedMemoryAndLoseNothing) {
-  const Folder folder;
-  DatasetLayout l = layout_of(true, "deflate", false);
-  l.episodes = 112;
+/// Spill files of this process. They have no name any more.
+std::vector<std::filesystem::path> spill_files() {
+  std::vector<std::filesystem::path> files;
+  for (const auto& entry : std::filesystem::directory_iterator("/proc/self/fd")) {
+    std::error_code gone;
+    const std::string target = std::filesystem::read_symlink(entry.path(), gone);
+    if (!gone && target.ends_with(".spill.part (deleted)")) files.push_back(entry.path());
+  }
+  return files;
+}
+
+double spilled_bytes() {
+  double bytes = 0;
+  for (const auto& file : spill_files())
+    bytes += static_cast<double>(std::filesystem::file_size(file));
+  return bytes;
+}
+
+/// Writes blocks in this order, in pieces of 16 rows and the rest. `gradient`: 64 × 64 numbers for
+/// each row.
+std::string write_blocks(const std::string& place, const DatasetLayout& l,
+                         const std::vector<std::int64_t>& order, bool noise, bool gradient,
+                         double* most_spilled) {
   const auto all = static_cast<int>(l.rows()) + 1;
-  DatasetWriter writer({folder / "set"}, l);
-  for (const std::int64_t first : {96, 80, 64, 48, 32, 16, 0}) {
-    writer.write(
-        Piece<float>(l, first, 0, all, true).rows());  // 20 MB each, none of which goes away
+  DatasetWriter writer({place}, l);
+  for (const std::int64_t first : order) {
+    std::vector<double> derivatives(gradient ? 16UL * static_cast<std::size_t>(l.rows()) * 64 * 64
+                                             : 0);
+    for (std::size_t k = 0; k < derivatives.size(); ++k)
+      derivatives[k] = static_cast<double>(first) + 1e-6 * static_cast<double>(k);
+    const std::span<const double> all_of_it(derivatives);
+    for (const int row : {0, 16}) {
+      const Piece<float> piece(l, first, row, row == 0 ? 16 : all - 16, noise);
+      EpisodeRows rows = piece.rows();
+      if (row > 0 && gradient) rows.gradients = {&all_of_it, 1};
+      writer.write(rows);
+    }
+    *most_spilled = std::max(*most_spilled, spilled_bytes());
     writer.finish(first, {}, {});
   }
-  EXPECT_EQ(check_shard(writer.shards().at(0)).demos, 112);
+  EXPECT_EQ(spilled_bytes(), 0) << "all of it has its place";
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(place), {}), 1) << "one shard";
+  EXPECT_EQ(check_shard(writer.shards().at(0)).demos, l.episodes);
+  return writer.shards().at(0);
+}
+
+/// Blocks that wait for an earlier one keep 64 MiB in memory, and the rest in a file without a
+/// name. The order changes no byte.
+TEST(ChunkCodec, BlocksThatWaitTakeBoundedMemoryAndChangeNoByte) {
+  const std::vector<std::int64_t> ascending{0, 16, 32, 48, 64, 80, 96};
+  const std::vector<std::int64_t> descending(ascending.rbegin(), ascending.rend());
+  for (const bool sparse : {false, true}) {
+    const Folder folder;
+    DatasetLayout l = layout_of(true, sparse ? "none" : "lz4", sparse);
+    l.episodes = 112;
+    double spilled = 0, none = 0;
+    // 20 MB each, none of which goes away.
+    const std::string waited =
+        write_blocks(folder / "waited", l, descending, true, false, &spilled);
+    const std::string straight =
+        write_blocks(folder / "straight", l, ascending, true, false, &none);
+    EXPECT_EQ(none, 0);
+    EXPECT_GT(spilled, static_cast<double>(std::filesystem::file_size(waited)) - (66 << 20));
+    EXPECT_TRUE(file_bytes(waited) == file_bytes(straight)) << sparse;
+  }
+}
+
+TEST(ChunkCodec, MoreContiguousNumbersBesideChunksThanTheDiskHoldsAreRefused) {
+  const Folder folder;
+  for (const bool sparse : {false, true}) {
+    DatasetLayout l = layout_of(true, sparse ? "none" : "deflate", sparse);
+    l.steps = std::int64_t{1} << 40;
+    EXPECT_THROW(DatasetWriter({folder / "set"}, l), IoError);
+    EXPECT_EQ(folder.entries(), 0U);
+  }
+}
+
+TEST(ChunkCodec, WhatTheDiskChangesWhileBlocksWaitIsFound) {
+  const Folder folder;
+  DatasetLayout l = layout_of(true, "none", true);
+  l.episodes = 80;
+  const auto all = static_cast<int>(l.rows()) + 1;
+  {
+    DatasetWriter writer({folder / "set"}, l);
+    for (const std::int64_t first : {64, 48, 32, 16}) {
+      writer.write(Piece<float>(l, first, 0, all, true).rows());
+      writer.finish(first, {}, {});
+    }
+    writer.write(Piece<float>(l, 0, 0, all, true).rows());
+    ASSERT_EQ(spill_files().size(), 1U);
+    std::fstream(spill_files()[0], std::ios::binary | std::ios::in | std::ios::out)
+        .seekp(1000)
+        .put('x');
+    try {
+      writer.finish(0, {}, {});
+      FAIL() << "a byte of a chunk was changed";
+    } catch (const IoError& error) {
+      EXPECT_THAT(error.what(), HasSubstr(".spill.part' is damaged: bytes "));
+    }
+  }
+  EXPECT_FALSE(std::filesystem::exists(folder / "set")) << "no half shard";
 }
 
 TEST(ChunkCodec, RowsThatWaitBesideChunksAreBoundedAsWell) {
@@ -189,36 +279,11 @@ TEST(ChunkCodec, RowsThatWaitBesideChunksAreBoundedAsWell) {
     l.gradients[0].by_names.push_back(std::to_string(k));
     l.gradients[0].by_units.emplace_back("1");
   }
-  const auto all = static_cast<int>(l.rows()) + 1;
-  const double block = 16.0 * static_cast<double>(l.rows()) * 64 * 64 * sizeof(double);  // 19 MB
-  DatasetWriter writer({folder / "set"}, l);
-  const auto part = [&] {
-    for (const auto& entry : std::filesystem::directory_iterator(folder / "set"))
-      if (entry.path().extension() == ".part") return static_cast<double>(entry.file_size());
-    return 0.0;
-  };
-  double waiting = 0;
-  for (const std::int64_t first : {96, 80, 64, 48, 32, 16, 0}) {
-    std::vector<double> gradient(16UL * static_cast<std::size_t>(l.rows()) *
-                                 l.gradients[0].width());
-    for (std::size_t k = 0; k < gradient.size(); ++k)
-      gradient[k] = static_cast<double>(first) + 1e-6 * static_cast<double>(k);
-    const std::span<const double> all_of_it(gradient);
-    // Uses two pieces; the derivatives come with the last one.
-    for (const int row : {0, 16}) {
-      const Piece<float> piece(l, first, row, row == 0 ? 16 : all - 16);
-      EpisodeRows rows = piece.rows();
-      if (row > 0) rows.gradients = {&all_of_it, 1};
-      writer.write(rows);
-    }
-    if (first == 0) break;
-    writer.finish(first, {}, {});
-    waiting += block;
-    EXPECT_GT(part() + (64 << 20), waiting) << "no more than 64 MiB are kept in memory";
-  }
-  writer.finish(0, {}, {});
-  EXPECT_EQ(check_shard(writer.shards().at(0)).demos, 112);
-  const h5::Id file = h5::open_file(writer.shards().at(0));
+  double spilled = 0;
+  const std::string shard =
+      write_blocks(folder / "set", l, {96, 80, 64, 48, 32, 16, 0}, false, true, &spilled);
+  EXPECT_GT(spilled, static_cast<double>(std::filesystem::file_size(shard)) - (66 << 20));
+  const h5::Id file = h5::open_file(shard);
   for (const int demo : {0, 20, 99}) {
     double number = 0;
     h5::read_box(h5::open_dataset(file, "data/demo_" + std::to_string(demo) + "/grad_wide"),

@@ -133,7 +133,7 @@ TEST(Dataset, SaysWhatItsNumbersAre) {
     return h5::read_numbers<std::int64_t>(object, name).at(0);
   };
   EXPECT_EQ(h5::read_text(file, "format"), "tangere dataset");
-  EXPECT_EQ(whole(file, "format_version"), 5);
+  EXPECT_EQ(whole(file, "format_version"), 6);
   EXPECT_EQ(whole(file, "first_episode"), 0);
   EXPECT_EQ(whole(file, "episodes"), 20);
   EXPECT_EQ(whole(file, "dataset_episodes"), 20);
