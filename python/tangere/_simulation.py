@@ -12,7 +12,7 @@ import torch
 
 from . import _core
 from ._tape import SimulationBase, shear_state_of, split_rows
-from ._torch_run import Line, Run, host_numbers, refuse_transforms
+from ._torch_run import Line, Run, first_derivatives, host_numbers, refuse_transforms
 
 
 @dataclass
@@ -221,7 +221,7 @@ class _Start(torch.autograd.Function):  # type: ignore[misc]
         return rows, torch.zeros((), dtype=torch.float64)
 
     @staticmethod
-    @torch.autograd.function.once_differentiable  # type: ignore[untyped-decorator]
+    @first_derivatives
     def backward(ctx: Any, rows_bar: Any, token_bar: Any) -> Any:
         *bars, numbers_bar = ctx.run.reverse_start(host_numbers(rows_bar))
         bars += ctx.run.columns(numbers_bar, ctx.names)
@@ -243,7 +243,7 @@ class _Step(torch.autograd.Function):  # type: ignore[misc]
         return torch.from_numpy(run.observations()).to(dtype), token.clone()
 
     @staticmethod
-    @torch.autograd.function.once_differentiable  # type: ignore[untyped-decorator]
+    @first_derivatives
     def backward(ctx: Any, rows_bar: Any, token_bar: Any) -> Any:
         try:
             _ = ctx.saved_tensors
@@ -267,7 +267,7 @@ class _Bodies(torch.autograd.Function):  # type: ignore[misc]
         return torch.from_numpy(tape.bodies(host_numbers(q), host_numbers(v), varying)).to(q.dtype)
 
     @staticmethod
-    @torch.autograd.function.once_differentiable  # type: ignore[untyped-decorator]
+    @first_derivatives
     def backward(ctx: Any, bar: Any) -> Any:
         q, v = ctx.saved_tensors
         numbers = [host_numbers(x) for x in (q, v)]
