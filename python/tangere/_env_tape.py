@@ -38,7 +38,9 @@ class EnvTape:
     actions: of an episode, at most; None for the task's horizon.
     read: readings that the task does not use in its first states, beside those that it does.
     flatten: observations as one tensor (E, n) instead of a dict of (E, …).
-    threads, precision, tape_bytes: as for `Simulation`.
+    threads, tape_bytes: as for `Simulation`.
+    precision: of tactile fields, "double", where gradients are exact, or "mixed", which is
+        quicker.
     dtype: of observations; states and rewards are float64.
     arguments: of the class.
     """
@@ -52,7 +54,7 @@ class EnvTape:
         read: Sequence[str] = (),
         flatten: bool = False,
         threads: int | None = None,
-        precision: str = "mixed",
+        precision: str = "double",
         tape_bytes: float = 1e9,
         dtype: torch.dtype = torch.float32,
         **arguments: Any,

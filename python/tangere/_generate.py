@@ -43,7 +43,7 @@ def _beside_package() -> list[Path]:
 
 
 def generate(
-    what: str | Path,
+    what: str | Path | type[scene_env.VectorSceneEnv],
     output: str | Path,
     episodes: int,
     *,
