@@ -13,7 +13,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from . import _core
-from ._jax_host import Host, call, checked_dtype, integer, shapes_of, take_step
+from ._jax_host import Host, call, checked_dtype, integer, known, shapes_of, take_step
 from ._tape import SimulationBase, shear_state_of, split_rows
 
 
@@ -106,7 +106,11 @@ class Simulation(SimulationBase):
         given["randomized"] = {k: jax.lax.stop_gradient(x) for k, x in numbers.items()}
         self._check_parameters(parameters)
         given["parameters"] = self._named(parameters)
-        return self._state(_start(self._host, given, integer(seed, "seed")))
+        number = integer(seed, "seed")
+        with self._host.named():
+            shown = _start(self._host, given, number)
+            known(shown[0])  # waits for the end, where nothing traces
+        return self._state(shown)
 
     def step(
         self, state: State, controls: jax.Array, parameters: Mapping[str, Any] | None = None
@@ -124,7 +128,10 @@ class Simulation(SimulationBase):
         self._check_parameters(parameters)
         self._host.check_known(state.token, rows)
         inputs = {"controls": rows, "parameters": self._named(parameters)}
-        return self._state(take_step(self._host, state.token, inputs))
+        with self._host.named():
+            shown = take_step(self._host, state.token, inputs)
+            known(shown[0])
+        return self._state(shown)
 
     def _named(self, given: Mapping[str, Any] | None) -> dict[str, jax.Array]:
         def convert(x: Any) -> jax.Array:
@@ -182,7 +189,7 @@ class _Host(Host):
             array[...] = bars[:, self.tape.parameters.index(name)]
 
     def reset(self, form: Any, _: Any, out: Any, seed: Any, *given: Any) -> None:
-        with self.lock:
+        with self.lock, self.failing():
             if int(np.asarray(seed)) < 0:
                 raise _core.InputError(f"seed {int(np.asarray(seed))}; expected at least 0")
             self.begin_run()
