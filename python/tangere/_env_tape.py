@@ -60,9 +60,12 @@ class EnvTape:
         **arguments: Any,
     ):
         if not (isinstance(task, type) and issubclass(task, VectorSceneEnv)):
-            raise _core.InputError(f"task {task!r}; expected a subclass of VectorSceneEnv")
+            raise _core.InputError(f"task {task!r}; expected a subclass of VectorSceneEnv itself")
         if task.arrays != "torch":
             raise _core.InputError(f'{task.__name__}: arrays "{task.arrays}"; expected "torch"')
+        for name in ("seed", "first_episode"):
+            if name in arguments:
+                raise _core.InputError(f"{name} of a tape; expected it in reset()")
         self.env = task(num_envs, threads=threads, seed=0, **arguments)
         self.num_envs, self.flatten, self.dtype = num_envs, flatten, dtype
         self.actions = actions or self.env.horizon
@@ -109,6 +112,10 @@ class EnvTape:
         """
         if self._recorded is None:
             raise _core.InputError("step() without episodes; call reset() first")
+        if (taken := int(self.env.lengths[0])) >= self.actions:
+            raise _core.InputError(
+                f"action {taken + 1} of an episode of actions={self.actions}; call reset()"
+            )
         actions = torch.as_tensor(actions).to(torch.float64)
         shape = (self.num_envs, *self._low.shape)
         if actions.shape not in (shape, shape[1:]):

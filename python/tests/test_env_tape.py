@@ -215,6 +215,13 @@ def test_what_a_tape_cannot_do_is_refused():
     tape.reset()
     with pytest.raises(tangere.InputError, match="expected finite numbers"):
         tape.step(torch.zeros(3))
+    tape = tt.EnvTape(Rolling, 2, 1, threads=1)
+    tape.reset()
+    tape.step(torch.zeros(3))
+    with pytest.raises(tangere.InputError, match="action 2 of an episode of actions=1; call reset"):
+        tape.step(torch.zeros(3))
+    with pytest.raises(tangere.InputError, match=r"seed of a tape; expected it in reset\(\)"):
+        tt.EnvTape(Rolling, 2, seed=3)
     with pytest.raises(tangere.InputError, match="actions 9; expected 1 to the horizon 8"):
         tt.EnvTape(Rolling, 2, 9)
 

@@ -423,4 +423,13 @@ def test_numbers_that_a_scene_cannot_have_are_named():
             jax.block_until_ready(jax.jit(wrong)(-1.0))
     with pytest.raises(tangere.InputError, match="a state that is not finite"):
         sim.reset(q=jnp.full(sim.model.nq, jnp.nan))
-    assert jnp.isfinite(sim.step(sim.reset(), rest).q).all()
+    s = sim.reset()
+    for _ in range(3):
+        s = sim.step(s, rest)
+    with pytest.raises(tangere.InputError, match="step.. after 3 calls of it; .* at most steps=3"):
+        sim.step(s, rest)
+    with pytest.raises(tangere.InputError, match=r"no reading 'foo'; .* has \['pad'\]"):
+        s["foo"]
+    with pytest.raises(tangere.InputError, match="a state of type NoneType; expected what reset"):
+        sim.step(None, rest)
+    assert repr(s) == "State(q (1, 10), v (1, 9), pad (1, 32, 32, 3))"

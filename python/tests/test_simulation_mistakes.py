@@ -43,6 +43,48 @@ def test_second_derivatives_are_refused(part):
         torch.autograd.grad(start.sum(), [*rest.values()], create_graph=True)
 
 
+@pytest.mark.parametrize("name", ["num_envs", "steps", "every"])
+@pytest.mark.parametrize("value", [0, -1, 1.5, "2"])
+def test_counts_are_whole_numbers(name, value):
+    with pytest.raises(tangere.InputError, match=f"^{name} {value!r}; expected a whole number"):
+        tt.Simulation(scene("ball")[0], **{name: value})
+
+
+def test_a_step_too_many_is_named_as_the_user_counts():
+    sim, rest = simulation(), torch.zeros(3)
+    s = sim.reset()
+    for _ in range(3):
+        s = sim.step(s, rest)
+    with pytest.raises(tangere.InputError, match="step.. after 3 calls of it; .* at most steps=3"):
+        sim.step(s, rest)
+
+
+def test_names_and_states_of_other_types_are_named():
+    sim, rest = simulation(), torch.zeros(3)
+    s = sim.reset()
+    with pytest.raises(tangere.InputError, match=r"no reading 'foo'; .* has \['pad'\]"):
+        s["foo"]
+    with pytest.raises(tangere.InputError, match="a state of type NoneType; expected what reset"):
+        sim.step(None, rest)
+    with pytest.raises(tangere.InputError, match=r"parameters\(\['x'\]\); expected parameters"):
+        sim.parameters(["x"])
+    assert repr(s) == "State(q (1, 10), v (1, 9), pad (1, 32, 32, 3))"
+
+
+def test_a_missing_derivative_says_why():
+    b = tangere.SceneBuilder("drop")
+    b.ground()
+    b.default.surface_contact(kn=2e8, kt=2e5, mu=0.8, damping=2e8, ks=1e8)
+    ball = b.robot.link("ball")
+    ball.joint("ball", "free3d", pos=(0, 0, 0.012))
+    ball.body("sphere", radius=0.012, density=800)
+    b.contact.surface_contact("ball", "ground")
+    sim = tt.Simulation(b.scene())
+    with pytest.raises(tangere.InputError, match="ball radius' has no derivative: a size .* ks"):
+        sim.parameters("body ball radius")
+    assert sim.parameters("body ball density")
+
+
 def test_the_program_that_the_page_names_runs():
     words = [sys.executable, BENCH, "--envs", "2", "--steps", "1", "--times", "1"]
     ran = subprocess.run(words, capture_output=True, text=True)
