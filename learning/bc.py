@@ -123,6 +123,11 @@ def main() -> None:
     torch.manual_seed(asked.seed)
 
     episodes = Episodes(asked.data)
+    if episodes.task not in tangere.task_names():
+        raise SystemExit(
+            f"{asked.data} is of {episodes.task or 'a scene alone'}; expected a data set of one of "
+            f"{tangere.task_names()}: the clone and the script play this task"
+        )
     shown = [key for key in episodes.keys if key not in ("q", "v")]
     keys = [key for key in shown if key not in asked.without]
     if not keys or len(keys) + len(asked.without) != len(shown):

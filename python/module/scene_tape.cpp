@@ -71,6 +71,18 @@ std::vector<std::string> own_names(const Scene& scene, std::vector<std::string> 
   return names;
 }
 
+/// Why a number that may vary has no derivative, where a rule says it (docs/gradients.md).
+std::string_view missing_derivative(const Scene& scene, const std::string& name) {
+  for (const SceneNumber& number : variable_numbers(scene)) {
+    if (name_of(number) != name) continue;
+    if (number.owner == NumberOwner::body && number.field >= NumberField::radius)
+      return ": a size has none where the body touches with ks, carries a sensor with feedback, or "
+             "nothing depends on the size";
+    if (number.field == NumberField::lim_stiffness) return ": its joint has no lim";
+  }
+  return "";
+}
+
 }  // namespace
 
 SceneTape::Taped::Taped(const Scene& scene, const TapeArguments& a)
@@ -82,7 +94,8 @@ SceneTape::Taped::Taped(const Scene& scene, const TapeArguments& a)
   for (const std::string& name : a.parameters) {
     const auto at = std::ranges::find(numbers.infos(), name, &NumberInfo::name);
     if (at == numbers.infos().end())
-      throw InputError(fmt::format("'{}' has no derivative; expected another number", name));
+      throw InputError(fmt::format("'{}' has no derivative{}; expected another number", name,
+                                   missing_derivative(scene, name)));
     rows.push_back(as_size(at - numbers.infos().begin()));
     units.push_back(at->unit);
     if (randomization_of(task.model().scene(), at->number) < 0) shared.emplace(name, at->number);

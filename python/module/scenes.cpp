@@ -56,10 +56,14 @@ void add_scene(nb::module_& m) {
           "scene names, such as meshes, is looked for beside it. Raises what Scene raises.")
       .def(
           "vary",
-          [](const Scene& s, const std::vector<std::string>& names) {
-            return with_varying(s, names);
+          [](const Scene& s, const nb::object& names) {
+            std::vector<std::string> given;
+            if (!nb::try_cast(names, given))
+              throw InputError(
+                  fmt::format("names {}; expected a list of names", nb::repr(names).c_str()));
+            return with_varying(s, given);
           },
-          "names"_a,
+          "names"_a, nb::sig("def vary(self, names: collections.abc.Sequence[str]) -> Scene"),
           "A copy in which environments may have other values of the named numbers, such as\n"
           "'contact pad ball kn' or 'body ball density'. They have the scene's values until\n"
           "Batch.set_randomized() sets others; what <randomize> draws is drawn as before. `text`\n"

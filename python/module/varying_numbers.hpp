@@ -41,8 +41,9 @@ inline constexpr const char* kSetRandomizedText =
     "environments listed in `envs` (indices, or a mask (E)), or of all. The next reading and the\n"
     "next step use them. q, v, the state one step before and the shear state stay; a failed\n"
     "environment stays failed. reset() draws the numbers again; those of Scene.vary() are the\n"
-    "scene's again. The bits are those of an environment that drew these values. InputError, and\n"
-    "none is set: another name or shape, a number of the starting state, or a value that the\n"
-    "scene could not have.";
+    "scene's again. The bits are those of an environment that drew these values. A `tie` of\n"
+    "<randomize> holds for draws alone: give every number of it that is to change. InputError,\n"
+    "and none is set: another name or shape, a number of the starting state, or a value that\n"
+    "the scene could not have.";
 
 }  // namespace tangere::python

@@ -38,7 +38,9 @@ class EnvTape:
     actions: of an episode, at most; None for the task's horizon.
     read: readings that the task does not use in its first states, beside those that it does.
     flatten: observations as one tensor (E, n) instead of a dict of (E, …).
-    threads, precision, tape_bytes: as for `Simulation`.
+    threads, tape_bytes: as for `Simulation`.
+    precision: of tactile fields, "double", where gradients are exact, or "mixed", which is
+        quicker.
     dtype: of observations; states and rewards are float64.
     arguments: of the class.
     """
@@ -52,15 +54,18 @@ class EnvTape:
         read: Sequence[str] = (),
         flatten: bool = False,
         threads: int | None = None,
-        precision: str = "mixed",
+        precision: str = "double",
         tape_bytes: float = 1e9,
         dtype: torch.dtype = torch.float32,
         **arguments: Any,
     ):
         if not (isinstance(task, type) and issubclass(task, VectorSceneEnv)):
-            raise _core.InputError(f"task {task!r}; expected a subclass of VectorSceneEnv")
+            raise _core.InputError(f"task {task!r}; expected a subclass of VectorSceneEnv itself")
         if task.arrays != "torch":
             raise _core.InputError(f'{task.__name__}: arrays "{task.arrays}"; expected "torch"')
+        for name in ("seed", "first_episode"):
+            if name in arguments:
+                raise _core.InputError(f"{name} of a tape; expected it in reset()")
         self.env = task(num_envs, threads=threads, seed=0, **arguments)
         self.num_envs, self.flatten, self.dtype = num_envs, flatten, dtype
         self.actions = actions or self.env.horizon
@@ -107,6 +112,10 @@ class EnvTape:
         """
         if self._recorded is None:
             raise _core.InputError("step() without episodes; call reset() first")
+        if (taken := int(self.env.lengths[0])) >= self.actions:
+            raise _core.InputError(
+                f"action {taken + 1} of an episode of actions={self.actions}; call reset()"
+            )
         actions = torch.as_tensor(actions).to(torch.float64)
         shape = (self.num_envs, *self._low.shape)
         if actions.shape not in (shape, shape[1:]):

@@ -18,7 +18,10 @@ import tempfile
 from pathlib import Path
 from typing import Any, Sequence
 
-from . import _core, _scene_data, scene_env, policy as policies
+import gymnasium
+
+from . import _core, _scene_data, policy as policies
+from .scene_env import VectorSceneEnv
 
 _PROGRAM = '"$TANGERE_PYTHON" -m tangere.policy'  # the same text, so the same bytes of a data set
 
@@ -43,7 +46,7 @@ def _beside_package() -> list[Path]:
 
 
 def generate(
-    what: str | Path,
+    what: str | Path | type[VectorSceneEnv],
     output: str | Path,
     episodes: int,
     *,
@@ -77,9 +80,16 @@ def generate(
         name = getattr(policy, "__name__", "<lambda>")
         if name == "<lambda>":
             raise _core.InputError("a function as policy without a name; expected `name`")
+    if isinstance(options, str):
+        raise _core.InputError(f"options {options!r}; expected a list, such as [{options!r}]")
     if isinstance(what, type):
         return _of_class(what, output, episodes, options, policy=policy, name=name, seed=seed,
                          threads=threads, num_envs=num_envs)  # fmt: skip
+    if str(what) in gymnasium.registry and not Path(what).exists():
+        raise _core.InputError(
+            f"{what!r}, an id of Gymnasium; expected a class of tangere.VectorSceneEnv, the path "
+            f"of a scene, or one of {_core.task_names()}"
+        )
     if num_envs is not None:
         raise _core.InputError(
             f"num_envs {num_envs} with {str(what)!r}; expected a class of tangere.VectorSceneEnv, "
@@ -126,7 +136,7 @@ def _of_class(
     task: type, output: str | Path, episodes: int, options: Sequence[str], *, num_envs: int | None,
     **arguments: Any,
 ) -> dict[str, Any]:  # fmt: skip
-    if not issubclass(task, scene_env.VectorSceneEnv):
+    if not issubclass(task, VectorSceneEnv):
         raise _core.InputError(f"{task.__name__}; expected a subclass of tangere.VectorSceneEnv")
     envs = 128 if num_envs is None else num_envs
     return _scene_data.generate(

@@ -5,6 +5,8 @@ from __future__ import annotations
 
 import operator
 import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import partial
 from typing import Any
 
@@ -89,7 +91,7 @@ class Host:
     def __init__(self, tape: Any, dtype: Any):
         self.tape, self.lock = tape, threading.Lock()
         self.run = self.passing = 0  # up to 2**24, which float32 has
-        self.failure: _core.InputError | None = None  # of a step
+        self.failure: _core.InputError | None = None  # of the last reset or step
         self.left: int | None = None  # actions not yet reversed; None: nothing is reversed
         self.real = real()
         n = sum(int(np.prod(t.shape)) for t in tape.spec.observations)
@@ -133,15 +135,31 @@ class Host:
                 self.check(token, actions)
 
     def step(self, form: Any, _: Any, out: Any, token: Any, *inputs: Any) -> None:
-        with self.lock:
+        with self.lock, self.failing():
             given = [np.asarray(x) for x in inputs]
-            try:
-                self.check(np.asarray(token), given[0])
-                self.take(jax.tree_util.tree_unflatten(form, given))
-            except _core.InputError as error:
-                self.failure = error
-                raise
+            self.check(np.asarray(token), given[0])
+            self.take(jax.tree_util.tree_unflatten(form, given))
             self.show(out)
+
+    @contextmanager
+    def failing(self) -> Iterator[None]:
+        """Keeps the error of a callback, of which JAX raises the text alone."""
+        try:
+            yield
+        except _core.InputError as error:
+            self.failure = error
+            raise
+
+    @contextmanager
+    def named(self) -> Iterator[None]:
+        """Raises the error of a callback instead of JAX's. What is inside waits for its end."""
+        self.failure = None
+        try:
+            yield
+        except RuntimeError:
+            if self.failure is None:
+                raise
+            raise self.failure from None
 
     def reverse(self, form: Any, _: Any, out: Any, token: Any, token_bar: Any, *bars: Any) -> None:
         with self.lock:

@@ -13,8 +13,9 @@ import jax.numpy as jnp
 import numpy as np
 
 from . import _core
-from ._jax_host import Host, call, checked_dtype, integer, shapes_of, take_step
-from ._tape import SimulationBase, shear_state_of, split_rows
+from ._jax_host import Host, call, checked_dtype, integer, known, shapes_of, take_step
+from ._tape import SimulationBase, check_count, check_state_type, reading_of
+from ._tape import shear_state_of, split_rows, state_text
 
 
 @partial(
@@ -22,7 +23,7 @@ from ._tape import SimulationBase, shear_state_of, split_rows
     data_fields=["q", "v", "readings", "status", "token", "varying"],
     meta_fields=["host"],
 )
-@dataclass
+@dataclass(repr=False)
 class State:
     """A batch of states. It is a pytree, differentiable by what led to it."""
 
@@ -35,7 +36,10 @@ class State:
     host: Any  #: only `Simulation` uses it
 
     def __getitem__(self, name: str) -> jax.Array:
-        return self.readings[name]
+        return reading_of(self.readings, name)
+
+    def __repr__(self) -> str:
+        return state_text(self)
 
     @property
     def bodies(self) -> jax.Array:
@@ -70,7 +74,8 @@ class Simulation(SimulationBase):
     """
 
     def _begin(self, dtype: Any) -> None:
-        self._host = _Host(self.tape, checked_dtype(jnp.float32 if dtype is None else dtype))
+        dtype = checked_dtype(jnp.float32 if dtype is None else dtype)
+        self._host = _Host(self.tape, dtype, self.steps)
 
     def _made_anew(self) -> None:
         self._host.made_anew()
@@ -106,7 +111,11 @@ class Simulation(SimulationBase):
         given["randomized"] = {k: jax.lax.stop_gradient(x) for k, x in numbers.items()}
         self._check_parameters(parameters)
         given["parameters"] = self._named(parameters)
-        return self._state(_start(self._host, given, integer(seed, "seed")))
+        number = integer(seed, "seed")
+        with self._host.named():
+            shown = _start(self._host, given, number)
+            known(shown[0])  # waits for the end, where nothing traces
+        return self._state(shown)
 
     def step(
         self, state: State, controls: jax.Array, parameters: Mapping[str, Any] | None = None
@@ -115,6 +124,7 @@ class Simulation(SimulationBase):
         controls that are not finite, one step too many, or a state that is not the last one. Where
         steps are not in a `jax.lax.scan`, a loss under jit must depend on the last one, or XLA may
         begin the way back too early, which is an InputError, too."""
+        check_state_type(state, State)
         x, to = jnp.asarray(controls), self._host.actions
         envs, every, nu = to.shape
         shape = (every, envs, nu) if x.ndim == 3 else (envs, nu)
@@ -124,7 +134,10 @@ class Simulation(SimulationBase):
         self._check_parameters(parameters)
         self._host.check_known(state.token, rows)
         inputs = {"controls": rows, "parameters": self._named(parameters)}
-        return self._state(take_step(self._host, state.token, inputs))
+        with self._host.named():
+            shown = take_step(self._host, state.token, inputs)
+            known(shown[0])
+        return self._state(shown)
 
     def _named(self, given: Mapping[str, Any] | None) -> dict[str, jax.Array]:
         def convert(x: Any) -> jax.Array:
@@ -148,8 +161,9 @@ class Simulation(SimulationBase):
 
 
 class _Host(Host):
-    def __init__(self, tape: _core.SceneTape, dtype: Any):
+    def __init__(self, tape: _core.SceneTape, dtype: Any, steps: int):
         super().__init__(tape, dtype)
+        self.steps = steps
         shape, model, envs = jax.ShapeDtypeStruct, tape.model, tape.num_envs
         self.starts = {
             "q": shape((envs, model.nq), self.real),
@@ -170,6 +184,10 @@ class _Host(Host):
     def results(self) -> tuple[Any, ...]:
         return self.tape.observations(), self.tape.status(), self.tape.varying()
 
+    def check(self, token: Any, actions: Any) -> None:
+        check_count(int(token[1]), self.steps)
+        super().check(token, actions)
+
     def take(self, inputs: Any) -> None:
         self.tape.step(inputs["controls"], inputs["parameters"] or None)
 
@@ -182,7 +200,7 @@ class _Host(Host):
             array[...] = bars[:, self.tape.parameters.index(name)]
 
     def reset(self, form: Any, _: Any, out: Any, seed: Any, *given: Any) -> None:
-        with self.lock:
+        with self.lock, self.failing():
             if int(np.asarray(seed)) < 0:
                 raise _core.InputError(f"seed {int(np.asarray(seed))}; expected at least 0")
             self.begin_run()

@@ -19,6 +19,7 @@ Value: TypeAlias = Union[
 ]  # fmt: skip
 Origin: TypeAlias = tuple[str, int]  # a file and a line
 E = TypeVar("E", bound="Element")
+_REFERRING = ("randomize", "initial")  # sections whose elements name other ones
 _LISTED = 8  # elements in a message, at most
 _PACKAGE = str(Path(__file__).parent)
 
@@ -50,6 +51,19 @@ class Element:
         for child in self.inside:
             yield child
             yield from child._all()
+
+    def _described(self) -> Iterator[tuple[Element, dict[str, str]]]:
+        """The elements inside, but not what refers to them, and their attributes with the names
+        that they have without one."""
+        for child in self.inside:
+            usual = None
+            if self.tag == "link" and child.tag == "body":
+                usual = self.attributes.get("name")
+            if self.tag == "sensor":
+                usual = child.attributes.get("body")
+            yield child, ({} if usual is None else {"name": usual}) | child.attributes
+            if child.tag not in _REFERRING:
+                yield from child._described()
 
     def _lines(self, indent: str = "") -> Iterator[tuple[str, Origin]]:
         """The lines of the element in a file, and where each comes from."""
@@ -100,10 +114,13 @@ class Holder(Element):
 
     def find(self, tag: str, **attributes: Value) -> Element:
         """The element of a kind that has these attributes, however deep inside this one:
-        `find("joint", name="lift")`. Raises InputError if there is none, or more than one."""
+        `find("joint", name="lift")`. A body without a name has that of its link, a sensor that of
+        its body. What `<randomize>` and `<initial>` hold is found from there alone:
+        `b.randomize.find("tactile", name="pad")`. Raises InputError if there is none, or more than
+        one."""
         wanted = self._texts(attributes)
-        of_tag = [e for e in self._all() if e.tag == tag]
-        found = [e for e in of_tag if wanted.items() <= e.attributes.items()]
+        of_tag = [(e, named) for e, named in self._described() if e.tag == tag]
+        found = [e for e, named in of_tag if wanted.items() <= named.items()]
         if len(found) == 1:
             return found[0]
         sought = f"{Element(tag, wanted, self.origin)} inside <{self.tag}>"
@@ -117,7 +134,8 @@ class Holder(Element):
         near = ""
         if len(wanted) == 1:
             ((name, value),) = wanted.items()
-            near = _core.suggestion(value, [e.attributes.get(name, "") for e in of_tag])
+            there = [named[name] for _, named in of_tag if name in named]
+            near = _core.suggestion(value, there) if there else ""
         raise _core.InputError(f"no {sought}{near}")
 
     def clear(self) -> None:

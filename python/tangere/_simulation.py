@@ -11,11 +11,12 @@ import numpy as np
 import torch
 
 from . import _core
-from ._tape import SimulationBase, shear_state_of, split_rows
-from ._torch_run import Line, Run, host_numbers, refuse_transforms
+from ._tape import SimulationBase, check_count, check_state_type, reading_of
+from ._tape import shear_state_of, split_rows, state_text
+from ._torch_run import Line, Run, first_derivatives, host_numbers, refuse_transforms
 
 
-@dataclass
+@dataclass(repr=False)
 class State:
     """A batch of states. All tensors are differentiable by what led to them."""
 
@@ -29,7 +30,10 @@ class State:
     _varying: np.ndarray  # (E, numbers) with which it was read
 
     def __getitem__(self, name: str) -> torch.Tensor:
-        return self.readings[name]
+        return reading_of(self.readings, name)
+
+    def __repr__(self) -> str:
+        return state_text(self)
 
     @property
     def bodies(self) -> torch.Tensor:
@@ -140,6 +144,7 @@ class Simulation(SimulationBase):
         these steps, in what is read after them, and in later ones until others are given. Raises
         InputError for another state or shape, for controls that are not finite, for numbers that
         the scene could not have, and under torch.no_grad() after recorded steps."""
+        check_state_type(state, State)
         run = state._run
         if run is not self._run or run.taken != state.step:
             taken = 0 if self._run is None else self._run.taken
@@ -147,6 +152,7 @@ class Simulation(SimulationBase):
                 f"a state after {state.step} calls of step(), and {taken} were taken since the "
                 "last reset() of this simulation; expected its last state"
             )
+        check_count(run.taken, self.steps)
         if not run.current:
             raise _core.InputError(
                 "step() of a run that the tape does not hold any more, since parameters(), a "
@@ -221,7 +227,7 @@ class _Start(torch.autograd.Function):  # type: ignore[misc]
         return rows, torch.zeros((), dtype=torch.float64)
 
     @staticmethod
-    @torch.autograd.function.once_differentiable  # type: ignore[untyped-decorator]
+    @first_derivatives
     def backward(ctx: Any, rows_bar: Any, token_bar: Any) -> Any:
         *bars, numbers_bar = ctx.run.reverse_start(host_numbers(rows_bar))
         bars += ctx.run.columns(numbers_bar, ctx.names)
@@ -243,7 +249,7 @@ class _Step(torch.autograd.Function):  # type: ignore[misc]
         return torch.from_numpy(run.observations()).to(dtype), token.clone()
 
     @staticmethod
-    @torch.autograd.function.once_differentiable  # type: ignore[untyped-decorator]
+    @first_derivatives
     def backward(ctx: Any, rows_bar: Any, token_bar: Any) -> Any:
         try:
             _ = ctx.saved_tensors
@@ -267,7 +273,7 @@ class _Bodies(torch.autograd.Function):  # type: ignore[misc]
         return torch.from_numpy(tape.bodies(host_numbers(q), host_numbers(v), varying)).to(q.dtype)
 
     @staticmethod
-    @torch.autograd.function.once_differentiable  # type: ignore[untyped-decorator]
+    @first_derivatives
     def backward(ctx: Any, bar: Any) -> Any:
         q, v = ctx.saved_tensors
         numbers = [host_numbers(x) for x in (q, v)]

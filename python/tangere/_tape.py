@@ -35,6 +35,32 @@ def shear_state_of(readings: Mapping[str, Any]) -> Any:
     return readings["shear_state"]
 
 
+def reading_of(readings: Mapping[str, Any], name: str) -> Any:
+    if name not in readings:
+        raise _core.InputError(f"no reading {name!r}; read= of the simulation has {list(readings)}")
+    return readings[name]
+
+
+def state_text(state: Any) -> str:
+    """The shapes of a state, for its repr."""
+    parts = {"q": state.q, "v": state.v, **state.readings}
+    return f"State({', '.join(f'{name} {tuple(x.shape)}' for name, x in parts.items())})"
+
+
+def check_state_type(state: Any, expected: type) -> None:
+    if not isinstance(state, expected):
+        raise _core.InputError(
+            f"a state of type {type(state).__name__}; expected what reset() or step() returned"
+        )
+
+
+def check_count(taken: int, steps: int) -> None:
+    if taken >= steps:
+        raise _core.InputError(
+            f"step() after {taken} calls of it; expected at most steps={steps} after a reset()"
+        )
+
+
 class TapeBase:
     """Holds a `tangere.TaskTape` and splits what it shows."""
 
@@ -98,6 +124,9 @@ class SimulationBase:
         """
         if isinstance(read, str):
             raise _core.InputError(f"read {read!r}; expected a list of names")
+        for name, value in {"num_envs": num_envs, "steps": steps, "every": every}.items():
+            if not isinstance(value, (int, np.integer)) or value < 1:
+                raise _core.InputError(f"{name} {value!r}; expected a whole number from 1 on")
         self.scene = scene if isinstance(scene, _core.Scene) else _core.Scene(scene)
         self.num_envs, self.steps, self.every = num_envs, steps, every
         names = None if read is None else list(read)
@@ -123,6 +152,9 @@ class SimulationBase:
 
     def _parameters(self, names: tuple[str, ...]) -> dict[str, np.ndarray]:
         """Name → (E): numbers that get derivatives, as they are now."""
+        for name in names:
+            if not isinstance(name, str):
+                raise _core.InputError(f"parameters({name!r}); expected parameters(name, …)")
         if any(name not in self.tape.parameters for name in names):
             self.tape.add_parameters(list(names))
             self._made_anew()

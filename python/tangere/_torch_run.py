@@ -4,6 +4,8 @@
 from __future__ import annotations
 
 import copy
+import functools
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -28,6 +30,22 @@ def refuse_transforms(*values: Any) -> None:
             "a simulation within forward mode, vmap or another transform of torch.func; expected "
             "backward() or torch.autograd.grad() for derivatives, and num_envs for a batch"
         )
+
+
+def first_derivatives(backward: Callable[..., Any]) -> Callable[..., Any]:
+    """A `backward` that refuses second derivatives. `once_differentiable` of PyTorch does not where
+    the derivatives that come in are constant: it returns a gradient that lacks them."""
+
+    @functools.wraps(backward)
+    def first(ctx: Any, *bars: Any) -> Any:
+        if torch.is_grad_enabled():
+            raise _core.InputError(
+                "create_graph=True, as for second derivatives, through a simulation; it has first "
+                "derivatives alone"
+            )
+        return backward(ctx, *bars)
+
+    return first
 
 
 def host_numbers(x: Any) -> Any:

@@ -50,6 +50,10 @@ def view(
     frames: of each, at most; more are thinned evenly.
     height: of the cell [pixels].
     """
+    if not isinstance(run, (_core.Run, str, Path)):
+        raise _core.InputError(
+            f"a run of type {type(run).__name__}; expected what Batch.run() returned, or a path"
+        )
     if not isinstance(run, _core.Run):
         if envs is not None:
             raise _core.InputError("envs of a file; expected a run of Batch.run()")

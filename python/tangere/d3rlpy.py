@@ -21,6 +21,7 @@ from d3rlpy.dataset import Episode, InfiniteBuffer, ReplayBuffer
 from . import _core, gym
 from ._closed_loop import TEST_SEED, play_episodes
 from .data import Episodes
+from .scene_env import VectorSceneEnv
 
 __all__ = ["play", "replay_buffer"]
 
@@ -64,11 +65,13 @@ def replay_buffer(
 
 
 def play(
-    algorithm: Any, task: str, episodes: int = 300, *, keys: Sequence[str] | None = None,
-    seed: int = TEST_SEED, num_envs: int = 64, threads: int | None = None,
+    algorithm: Any, task: str | type[VectorSceneEnv], episodes: int = 300, *,
+    keys: Sequence[str] | None = None, seed: int = TEST_SEED, num_envs: int = 64,
+    threads: int | None = None,
 ) -> dict[str, Any]:  # fmt: skip
     """Plays fresh episodes of a task by whatever has d3rlpy's `predict(observations)`.
 
+    task: a name of `tangere.task_names()`, or a class of `tangere.VectorSceneEnv`.
     keys: those of the replay buffer. seed: of the episodes; not that of the data set.
 
     Returns "task", "seed", "episodes", "successes", "success_rate", the bounds of its 95 % interval
@@ -76,17 +79,27 @@ def play(
     """
     if episodes < 1 or num_envs < 1:
         raise _core.InputError(f"episodes {episodes}, num_envs {num_envs}; expected at least 1")
-    seen = _core.task_spec(task).observations
-    hidden = [tensor.name for tensor in seen if tensor.privileged]
-    keys = _keys([tensor.name for tensor in seen], hidden, keys, f"task {task!r}")
-    env = gym.make_vec(task, min(num_envs, episodes), threads=threads)
+    env: Any
+    if isinstance(task, type) and issubclass(task, VectorSceneEnv):
+        env, name = task(min(num_envs, episodes), threads=threads), task.__name__
+        known, hidden = [*env._shapes], ["q", "v", *task.privileged]
+    elif isinstance(task, str):
+        seen, name = _core.task_spec(task).observations, task
+        known = [tensor.name for tensor in seen]
+        hidden = [tensor.name for tensor in seen if tensor.privileged]
+        env = gym.make_vec(task, min(num_envs, episodes), threads=threads)
+    else:
+        raise _core.InputError(
+            f"task {task!r}; expected the name of a task, or a class of tangere.VectorSceneEnv"
+        )
+    keys = _keys(known, hidden, keys, f"task {name!r}")
 
     def choose(obs: dict[str, np.ndarray]) -> Any:
         rows = [obs[key].reshape(env.num_envs, -1) for key in keys]
         return algorithm.predict(np.concatenate(rows, axis=1))
 
     found = play_episodes(env, choose, lambda: None, episodes, seed)
-    return {"task": task, "seed": seed} | found
+    return {"task": name, "seed": seed} | found
 
 
 def _keys(

@@ -133,16 +133,11 @@ class Tape(TapeBase):
             return (state, after), (seen, reward, state.alive)
 
         start = self.reset(seed, first_episode)
-        self._host.failure = None
-        try:
+        with self._host.named():
             (state, last), (seen, rewards, alive) = jax.lax.scan(
                 take, start, jnp.arange(self.actions, dtype=jnp.int32)
             )
             known(state.token)  # waits for the end, where nothing traces
-        except RuntimeError:
-            if self._host.failure is None:
-                raise
-            raise self._host.failure from None
         observations = jax.tree_util.tree_map(
             lambda rows, row: jnp.swapaxes(jnp.concatenate([rows, row[None]]), 0, 1), seen, last
         )

@@ -116,9 +116,12 @@ class VectorSceneEnv(EpisodesEnv):
         if self.arrays not in ("numpy", "torch"):
             raise self._fault(f"arrays {self.arrays!r}", '"numpy" or "torch"')
         self.model = _core.Model(self._scene(scene))
-        for name in ("steps_per_action", "horizon"):
-            if not isinstance(getattr(self, name), (int, np.integer)) or getattr(self, name) < 1:
-                raise self._fault(f"{name} {getattr(self, name)!r}", "a whole number from 1 on")
+        for name in ("steps_per_action", "horizon", "actions"):
+            value = getattr(self, name)
+            if name == "actions" and value is None:
+                continue
+            if not isinstance(value, (int, np.integer)) or value < 1:
+                raise self._fault(f"{name} {value!r}", "a whole number from 1 on")
         self.metadata = {
             "autoreset_mode": AUTORESET[autoreset],
             "render_modes": [*MODES],

@@ -30,7 +30,7 @@ from . import _core
 from ._env_tape import EnvTape
 from ._simulation import Simulation, State
 from ._tape import Observations, TapeBase, check_rollout
-from ._torch_run import Line, Run, host_numbers, refuse_transforms
+from ._torch_run import Line, Run, first_derivatives, host_numbers, refuse_transforms
 
 
 __all__ = [
@@ -133,7 +133,7 @@ class _Step(torch.autograd.Function):  # type: ignore[misc]
         return rows, torch.from_numpy(run.rewards()), token.clone()
 
     @staticmethod
-    @torch.autograd.function.once_differentiable  # type: ignore[untyped-decorator]
+    @first_derivatives
     def backward(ctx: Any, rows_bar: Any, reward_bar: Any, token_bar: Any) -> Any:
         try:
             _ = ctx.saved_tensors

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import tangere
+from ball_rolling import BallRolling
 
 d3rlpy = pytest.importorskip("d3rlpy", reason="d3rlpy is not installed")
 from tangere import d3rlpy as ours  # noqa: E402
@@ -41,3 +42,19 @@ def test_a_policy_is_trained_and_played(pushes, tmp_path):
     assert (found["episodes"], found["mean_actions"]) == (5, 100)
     with pytest.raises(tangere.InputError, match="keys \\['box'\\]"):
         ours.play(algorithm, "box_pushing", 5, keys=["box"])
+
+
+def test_a_task_in_python_is_played():
+    class Random:
+        def predict(self, rows):
+            self.width = rows.shape[1]
+            return np.zeros((len(rows), 3), np.float32)
+
+    algorithm = Random()
+    found = ours.play(algorithm, BallRolling, 3, num_envs=2)
+    assert (found["task"], found["episodes"], found["mean_actions"]) == ("BallRolling", 3, 8)
+    assert algorithm.width == 3 + 2 + 32 * 32 * 3
+    ours.play(algorithm, BallRolling, 1, keys=["goal"])
+    assert algorithm.width == 2
+    with pytest.raises(tangere.InputError, match="task 3; expected the name of a task, or a class"):
+        ours.play(algorithm, 3)

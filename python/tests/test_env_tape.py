@@ -51,7 +51,7 @@ def test_a_closed_loop_has_the_gradient_of_its_twin():
         def terminated(self):
             return torch.zeros(self.num_envs, dtype=torch.bool)
 
-    ours = tt.EnvTape(Endless, 4, precision="double", dtype=torch.float64, threads=1)
+    ours = tt.EnvTape(Endless, 4, dtype=torch.float64, threads=1)
     options = dict(normalise=False, precision="double", dtype=torch.float64, threads=1)
     theirs = tt.Tape("ball_rolling_small", 4, 8, **options)
     theirs.reset(3)
@@ -77,7 +77,7 @@ def test_a_closed_loop_has_the_gradient_of_its_twin():
 
 
 def test_ends_and_differences():
-    tape = tt.EnvTape(Rolling, 3, precision="double", dtype=torch.float64, threads=1)
+    tape = tt.EnvTape(Rolling, 3, dtype=torch.float64, threads=1)
     w = weights()
     _, steps = played(tape, w, 8)
     assert 0 < steps < 24  # some episodes end early
@@ -215,13 +215,20 @@ def test_what_a_tape_cannot_do_is_refused():
     tape.reset()
     with pytest.raises(tangere.InputError, match="expected finite numbers"):
         tape.step(torch.zeros(3))
+    tape = tt.EnvTape(Rolling, 2, 1, threads=1)
+    tape.reset()
+    tape.step(torch.zeros(3))
+    with pytest.raises(tangere.InputError, match="action 2 of an episode of actions=1; call reset"):
+        tape.step(torch.zeros(3))
+    with pytest.raises(tangere.InputError, match=r"seed of a tape; expected it in reset\(\)"):
+        tt.EnvTape(Rolling, 2, seed=3)
     with pytest.raises(tangere.InputError, match="actions 9; expected 1 to the horizon 8"):
         tt.EnvTape(Rolling, 2, 9)
 
 
 def test_grasps_are_trained_through_time():
     """A task with a warm-up, controls for each step and a reading within its actions."""
-    made = tt.EnvTape(StableGrasp, 3, 2, dtype=torch.float64, precision="double", threads=1)
+    made = tt.EnvTape(StableGrasp, 3, 2, dtype=torch.float64, threads=1)
     assert made.simulation.every == 60  # of 180: it reads once, after 60 steps
     w = torch.full((520, 1), 1e-3, dtype=torch.float64, requires_grad=True)
 
@@ -265,7 +272,7 @@ def test_a_tape_begins_with_loaded_springs():
         def reward(self, actions):
             return self.batch.q[:, 0] + 1e3 * self.batch.shear_state.square().sum((1, 2))
 
-    tape = tt.EnvTape(Gripped, 2, threads=1, precision="double", dtype=torch.float64)
+    tape = tt.EnvTape(Gripped, 2, threads=1, dtype=torch.float64)
     actions = torch.tensor([[0.1, 0.8, 0.7]], dtype=torch.float64).expand(2, 3).clone()
     actions.requires_grad_()
 

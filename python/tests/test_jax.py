@@ -403,3 +403,33 @@ def test_simulations_take_what_those_of_pytorch_take():
             jax.vmap(lambda q: ours.reset(q=q).q.sum())(q[None])
     finally:
         jax.config.update("jax_enable_x64", False)
+
+
+def test_numbers_that_a_scene_cannot_have_are_named():
+    sim = tj.Simulation(tangere.scenes()["rolling_ball_small"], 1, 3, read=["pad"], threads=1)
+    density = "body ball density"
+    sim.parameters(density)
+    expected = "'body ball density' cannot be density=\"-1\"; expected a positive number"
+    rest = jnp.zeros(3)
+    for wrong in (
+        lambda x: sim.reset(parameters={density: x}).q.sum(),
+        lambda x: sim.step(sim.reset(), rest, {density: x}).q.sum(),
+        lambda x: sim.reset(randomized={density: x}).q.sum(),
+    ):
+        for f in (wrong, jax.grad(wrong)):
+            with pytest.raises(tangere.InputError, match=expected):
+                f(-1.0)
+        with pytest.raises(RuntimeError, match=expected):
+            jax.block_until_ready(jax.jit(wrong)(-1.0))
+    with pytest.raises(tangere.InputError, match="a state that is not finite"):
+        sim.reset(q=jnp.full(sim.model.nq, jnp.nan))
+    s = sim.reset()
+    for _ in range(3):
+        s = sim.step(s, rest)
+    with pytest.raises(tangere.InputError, match="step.. after 3 calls of it; .* at most steps=3"):
+        sim.step(s, rest)
+    with pytest.raises(tangere.InputError, match=r"no reading 'foo'; .* has \['pad'\]"):
+        s["foo"]
+    with pytest.raises(tangere.InputError, match="a state of type NoneType; expected what reset"):
+        sim.step(None, rest)
+    assert repr(s) == "State(q (1, 10), v (1, 9), pad (1, 32, 32, 3))"

@@ -15,6 +15,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+from ball_rolling import BallRolling
 
 torch = pytest.importorskip("torch", reason="PyTorch is not installed")
 
@@ -31,6 +32,7 @@ import protocol  # noqa: E402
 import report  # noqa: E402
 
 import tangere  # noqa: E402
+import tangere.data  # noqa: E402
 import tangere.torch  # noqa: E402
 
 
@@ -162,6 +164,13 @@ def test_clones_learn_from_a_data_set(generate):
     found = run("bc.py", str(data), "--epochs", "20", "--episodes", "200")
     assert found["test"]["success"] > 0.5, found  # random actions: 0.35
     assert found["data"]["command"].startswith("tangere generate insertion_translation")
+
+
+def test_a_data_set_of_a_class_is_refused_by_name(tmp_path, monkeypatch):
+    tangere.data.generate(BallRolling, tmp_path / "own", 1, policy="random")
+    monkeypatch.setattr(sys, "argv", ["bc.py", str(tmp_path / "own")])
+    with pytest.raises(SystemExit, match="is of BallRolling; expected a data set of one of"):
+        bc.main()
 
 
 @pytest.mark.parametrize("choice", [[], ["--choice"]])

@@ -185,6 +185,20 @@ def test_elements_are_found_and_changed():
         b.robot.find("joint", name="lft")
 
 
+def test_elements_are_found_by_the_names_that_they_have_without_one():
+    b = gripper()
+    b.randomize.tactile("left", "mu", uniform=(0.3, 0.9))
+    b.initial.joint("left", q=0.001)
+    assert "name" not in b.find("tactile", name="left").attributes
+    assert b.find("body", name="rod") is b.robot.find("link", name="rod").find("body")
+    assert b.find("joint", name="left") is b.robot.find("joint", name="left")
+    assert b.randomize.find("tactile", name="left").attributes["field"] == "mu"
+    with pytest.raises(tangere.InputError, match="no <body name=\"rd\"> .*did you mean 'rod'"):
+        b.find("body", name="rd")
+    with pytest.raises(tangere.InputError, match='no <motor name="left"> inside <tangere>$'):
+        b.find("motor", name="left")
+
+
 def test_one_of_several_elements_is_not_found_by_chance():
     b = gripper()
     size = "0.02 0.01 0.02"

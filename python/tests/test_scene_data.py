@@ -441,3 +441,11 @@ def test_blocks_have_their_place_and_shape(tmp_path):
     assert not (tmp_path / "set").exists()
     with pytest.raises(tangere.InputError, match="a data set that is closed"):
         writer.missing()
+
+
+def test_words_and_ids_are_named(tmp_path):
+    with pytest.raises(tangere.InputError, match=r"options '--overwrite'; .* as \['--overwrite'\]"):
+        generate(Leaves, tmp_path / "set", 2, policy=zeros, options="--overwrite")
+    with pytest.raises(tangere.InputError, match="'tangere/BoxPushing-v0', an id .* a class of"):
+        generate("tangere/BoxPushing-v0", tmp_path / "set", 2)
+    assert not list(tmp_path.iterdir())

@@ -242,6 +242,9 @@ def with_(**members):
     [
         ({"scene": None}, "Mine: no scene; expected a class attribute `scene`"),
         ({"horizon": 0}, "Mine: horizon 0; expected a whole number from 1 on"),
+        ({"actions": 0}, "Mine: actions 0; expected a whole number from 1 on"),
+        ({"actions": -1}, "Mine: actions -1; expected a whole number from 1 on"),
+        ({"actions": 2.0}, "Mine: actions 2.0; expected a whole number from 1 on"),
         ({"action_low": (-1, -2)}, "Mine: 2 and 1 bounds of actions; expected 1 or 3"),
         ({"observe": lambda s: {"q": s.batch.q[0]}}, r"\['q'\] of shape \(5|8|10,\); expected"),
         ({"action_low": 1, "action_high": -1}, "action_low 1 and action_high -1; expected the"),

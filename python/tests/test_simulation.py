@@ -172,7 +172,7 @@ def test_what_cannot_be_done_is_refused():
     s = sim.reset()
     for _ in range(2):
         s = sim.step(s, u)
-    with pytest.raises(tangere.InputError, match="2 actions"):
+    with pytest.raises(tangere.InputError, match="at most steps=2"):
         sim.step(s, u)
     s.v.sum().backward()
     with pytest.raises(tangere.InputError, match="second backward"):

@@ -18,6 +18,7 @@ ROOT = Path(__file__).parents[2]
 RIGHT = """
 import numpy as np
 import tangere
+import tangere.data
 batch = tangere.Batch(tangere.Model(tangere.Scene("a.xml")), num_envs=2)
 batch.step(np.zeros(3))
 force: float = float(batch.tactile("pad")[0, 1, 2, 2])
@@ -30,6 +31,9 @@ link = b.robot.link("a").link("b")
 link.joint("b", "prismatic", axis=(0, 0, 1), lim=[-1, 1])
 b.sensor.tactile("b", "rect_array", feels=["a"], feedback=True).imperfections(noise=0.1)
 scene: tangere.Scene = b.scene()
+class Own(tangere.VectorSceneEnv):
+    pass
+tangere.data.generate(Own, "d", 3, policy="random")
 """
 WRONG = {
     "tangere.Batch('a.xml')": "arg-type",
@@ -38,6 +42,7 @@ WRONG = {
     "tangere.SceneBuilder().robot.link('a').body('spere')": "arg-type",
     "tangere.SceneBuilder().robot.link('a').body('sphere', radus=1)": "arg-type",
     "tangere.SceneBuilder().robot.link('a').boddy('sphere')": "attr-defined",
+    "import tangere.data; tangere.data.generate(str, 'd', 3)": "arg-type",
     "x: int = tangere.task_names()": "assignment",
 }
 

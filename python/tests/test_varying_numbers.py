@@ -50,6 +50,11 @@ def test_numbers_with_a_tie_are_drawn_together():
     assert len(set(first)) == 20
     np.testing.assert_array_equal(drawn["ground ball mu"], first)
     np.testing.assert_allclose(drawn["tactile pad mu"], 2 * first, rtol=1e-14)
+    batch.set_randomized({"contact pad ball mu": 0.5})  # the tie holds for draws alone
+    np.testing.assert_array_equal(batch.randomized()["ground ball mu"], first)
+    batch.reset()
+    again = batch.randomized()
+    np.testing.assert_array_equal(again["ground ball mu"], again["contact pad ball mu"])
 
 
 @pytest.mark.parametrize("threads", [1, 3])
@@ -151,7 +156,7 @@ def test_what_cannot_vary_is_refused(scene):
         scene.vary(["joint ball_joint q[0]"])
     with pytest.raises(tangere.InputError, match="'body pad size.* varies, but its contact points"):
         tangere.Model(scene.vary(["body pad size[0]"]))
-    with pytest.raises(TypeError):
+    with pytest.raises(tangere.InputError, match="names 'body ball density'; expected a list"):
         scene.vary("body ball density")
 
 

@@ -73,6 +73,8 @@ def test_a_run_becomes_a_page(tmp_path):
         tangere.view(run, envs=[3])
     with pytest.raises(tangere.IoError):
         tangere.view(tmp_path / "run.html")
+    with pytest.raises(tangere.InputError, match="type Model; expected what Batch.run"):
+        tangere.view(run.model)
 
 
 def test_a_data_set_becomes_a_page(generate):
