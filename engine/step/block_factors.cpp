@@ -53,7 +53,7 @@ int BlockEntries::entry(const Pattern& p, int i, int j) const {
 
 /// Plan and numbers of one lane.
 struct BlockFactors::Lane {
-  Structure coupled;              // (trees, trees) of the present plan
+  Structure coupled, present;     // (trees, trees) of the present plan; of the matrix to factor
   std::vector<int> order, place;  // elimination step → tree, and back
   std::vector<BlockNode> nodes;
   std::vector<std::size_t> diagonal, targets;
@@ -187,21 +187,19 @@ bool is_zero(const Row<L>* entries, int count, int lane) {
   return true;
 }
 
-/// Finds which trees are coupled in a lane. Returns whether this differs from `coupled`.
+/// Finds which trees are coupled in a lane.
 template <int L>
-bool find_coupled(const Pattern& p, const BlockEntries& entries, const Row<L>* A, int lane,
-                  Structure& coupled) {
-  Structure now(std::size_t(p.n_trees), std::vector<char>(std::size_t(p.n_trees), 0));
+void find_coupled(const Pattern& p, const BlockEntries& entries, const Row<L>* A, int lane,
+                  Structure& found) {
+  found.resize(std::size_t(p.n_trees));
+  for (std::vector<char>& row : found) row.assign(std::size_t(p.n_trees), 0);
   for (std::size_t k = 0; k < entries.coupling().size(); k += 2) {
     const BlockEntries::Block& block = entries.coupling()[k];
     const int count = size_of(p, block.row) * size_of(p, block.column);
     if (is_zero<L>(A + block.first, 2 * count, lane)) continue;
-    now[std::size_t(block.row)][std::size_t(block.column)] = 1;
-    now[std::size_t(block.column)][std::size_t(block.row)] = 1;
+    found[std::size_t(block.row)][std::size_t(block.column)] = 1;
+    found[std::size_t(block.column)][std::size_t(block.row)] = 1;
   }
-  if (now == coupled) return false;
-  coupled = std::move(now);
-  return true;
 }
 
 }  // namespace
@@ -210,7 +208,11 @@ template <int L>
 void BlockFactors::factor(const kernels::KernelTable& table, const Pattern& p,
                           const BlockEntries& entries, const Row<L>* A, int lane) {
   Lane& o = *lanes_[std::size_t(lane)];
-  if (find_coupled<L>(p, entries, A, lane, o.coupled)) o.make_plan(p);
+  find_coupled<L>(p, entries, A, lane, o.present);
+  if (o.present != o.coupled) {
+    std::swap(o.present, o.coupled);
+    o.make_plan(p);
+  }
   for (const MatrixBlock& block : o.blocks) {
     const int row = o.order[std::size_t(block.row)], column = o.order[std::size_t(block.column)];
     const BlockNode &rows = o.nodes[std::size_t(block.row)],
