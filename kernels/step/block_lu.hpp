@@ -176,7 +176,7 @@ void block_defect(const BlockPlan& p, const double* M, const double* x, const do
 }
 
 /// Returns the largest row sum of |S M S|; the largest column sum if transposed.
-template <bool Transposed>
+template <bool Transposed, class A>
 double scaled_block_norm(const BlockPlan& p, const double* M, const double* scale, double* sums) {
   for (std::size_t i = 0; i < p.vector; ++i) sums[i] = 0;
   for (int k = 0; k < p.n_blocks; ++k) {
@@ -220,7 +220,7 @@ bool solve_blocks_watched(const BlockPlan& p, const double* M, const double* LU,
       scale[node.at + std::size_t(i)] = 1 / root;
     }
   }
-  const double norm_a = scaled_block_norm<Transposed>(p, M, scale, sums);
+  const double norm_a = scaled_block_norm<Transposed, A>(p, M, scale, sums);
   double norm_r = 0, norm_b = 0, norm_x = 0, norm_d = 0;
   bool finite = true;
   for (std::size_t i = 0; i < p.vector; ++i) {
