@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// A plan is made where the set of blocks that are not zero changes, and kept else.
+// The plan of a lane is computed when the set of its blocks that are not zero changes.
 #include "engine/step/block_factors.hpp"
 
 #include <algorithm>
+#include <utility>
 
 #include "engine/model/pattern.hpp"
 
@@ -53,8 +54,8 @@ int BlockEntries::entry(const Pattern& p, int i, int j) const {
 
 /// Plan and numbers of one lane.
 struct BlockFactors::Lane {
-  Structure coupled, present;     // (trees, trees) of the present plan; of the matrix to factor
-  std::vector<int> order, place;  // elimination step → tree, and back
+  Structure coupled, present;  // (trees, trees) of the present plan; of the matrix to factor
+  std::vector<int> order;      // elimination step → tree
   std::vector<BlockNode> nodes;
   std::vector<std::size_t> diagonal, targets;
   std::vector<int> begin;
@@ -72,11 +73,9 @@ struct BlockFactors::Lane {
 
 void BlockFactors::Lane::order_nodes(const Pattern& p) {
   order = minimum_fill(coupled);
-  place.resize(order.size());
   nodes.clear();
   std::size_t at = 0;
   for (std::size_t k = 0; k < order.size(); ++k) {
-    place[std::size_t(order[k])] = static_cast<int>(k);
     const int size = size_of(p, order[k]), padded = kernels::padded_to_vectors(size);
     nodes.push_back({p.tree_dof[order[k]], size, padded, at});
     at += std::size_t(padded);
@@ -84,7 +83,8 @@ void BlockFactors::Lane::order_nodes(const Pattern& p) {
   plan.vector = at;
 }
 
-/// Finds the blocks of the factor: a pivot passes its later neighbours on to the first of them.
+/// Finds the blocks of the factor. The nodes that pivot k couples, beyond the first of them, are
+/// coupled with that first one (its parent in the elimination tree).
 void BlockFactors::Lane::fill() {
   const int n = static_cast<int>(nodes.size());
   std::vector<std::vector<int>> later(nodes.size());
@@ -100,8 +100,8 @@ void BlockFactors::Lane::fill() {
     std::sort(after.begin(), after.end());
     after.erase(std::unique(after.begin(), after.end()), after.end());
     if (after.size() > 1) {
-      std::vector<int>& heir = later[std::size_t(after.front())];
-      heir.insert(heir.end(), after.begin() + 1, after.end());
+      std::vector<int>& parent = later[std::size_t(after.front())];
+      parent.insert(parent.end(), after.begin() + 1, after.end());
     }
     const auto take = [&](const BlockNode& rows, const BlockNode& columns) {
       return std::exchange(at, at + std::size_t(rows.padded) * std::size_t(columns.size));

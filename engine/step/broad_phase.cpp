@@ -33,17 +33,17 @@ BroadPhase<L>::BroadPhase(const CompiledModel& model) : model_(&model) {
   const auto has_ball = [&](int link) {
     return link >= 0 && is_finite(model.link_balls[std::size_t(link)]);
   };
-  std::vector<std::vector<Neighbour>> of_link(links);
+  std::vector<std::vector<Neighbour>> lists(links);
   for (std::size_t g = 0; g < model.link_pairs.size(); ++g) {
     const int pair = static_cast<int>(g), a = model.link_pairs[g].link1,
               b = model.link_pairs[g].link2;
     if (!has_ball(a) || !has_ball(b)) {
       always_.push_back(pair);
     } else {
-      of_link[std::size_t(std::min(a, b))].push_back({std::max(a, b), pair});
+      lists[std::size_t(std::min(a, b))].push_back({std::max(a, b), pair});
     }
   }
-  for (std::vector<Neighbour>& list : of_link) {
+  for (std::vector<Neighbour>& list : lists) {
     std::sort(list.begin(), list.end(), [](const Neighbour& x, const Neighbour& y) {
       return x.link != y.link ? x.link < y.link : x.pair < y.pair;
     });

@@ -122,7 +122,7 @@ template <bool Transposed, class A>
 void solve_blocks(const BlockPlan& p, const double* LU, const double* b, double* x, double* work) {
   if (b != x)
     for (std::size_t i = 0; i < p.vector; ++i) x[i] = b[i];
-  const auto by_inverse = [&](int k) {
+  const auto multiply_inverse = [&](int k) {
     const BlockNode& node = p.nodes[k];
     if constexpr (Transposed) {
       times_transposed_block<false, A>(LU + p.diagonal[k], node, x + node.at, node.size, work);
@@ -133,7 +133,7 @@ void solve_blocks(const BlockPlan& p, const double* LU, const double* b, double*
   };
   for (int k = 0; k < p.n; ++k) {
     const BlockNode& node = p.nodes[k];
-    if constexpr (Transposed) by_inverse(k);
+    if constexpr (Transposed) multiply_inverse(k);
     for (int e = p.begin[k]; e < p.begin[k + 1]; ++e) {
       const EliminatedBlock& o = p.eliminated[e];
       const BlockNode& row = p.nodes[o.node];
@@ -155,7 +155,7 @@ void solve_blocks(const BlockPlan& p, const double* LU, const double* b, double*
         times_block<true, A>(LU + o.u, node, x + row.at, row.size, x + node.at);
       }
     }
-    if constexpr (!Transposed) by_inverse(k);
+    if constexpr (!Transposed) multiply_inverse(k);
   }
 }
 

@@ -533,10 +533,11 @@ TEST(Record, ALateSensorHasGradientsByThreeRoutes) {
       folder, {"gradcheck", "ball.xml", "--loss", "tactile", "--steps", "90", "--entries", "4"});
   EXPECT_LT(found.at("max_relative_error").get<double>(), 1e-6);
   const auto gradient = [&](const Words& more) {
-    const Outcome of = run(folder, Words{"simulate", "ball.xml", "-o", "x.h5", "--overwrite",
-                                         "--steps", "90", "--envs", "2", "--gradients", "tactile"} +
-                                       more);
-    EXPECT_EQ(of.exit_code, 0) << of.err;
+    const Outcome done =
+        run(folder, Words{"simulate", "ball.xml", "-o", "x.h5", "--overwrite", "--steps", "90",
+                          "--envs", "2", "--gradients", "tactile"} +
+                        more);
+    EXPECT_EQ(done.exit_code, 0) << done.err;
     return numbers(folder, "x.h5", "gradients/grad_q");
   };
   const std::vector<double> whole = gradient({});
