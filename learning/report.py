@@ -6,7 +6,7 @@
 
 A number is the mean over runs. ± is half of a 95 % interval: Student's over the runs; for rates of
 success the larger of that and Wilson's over the episodes of a test, which all runs share. An error
-of one run has no interval. † marks a row whose settings were compared in the test episodes.
+of one run has no interval.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from typing import Any, Sequence
 import numpy as np
 import experiments
 from experiments import EXPERIMENTS, Experiment
-from protocol import CHOICE_EPISODES, student, wilson
+from protocol import CHOICE_EPISODES, EARLIER_TEST_SEED, TEST_SEED, student, wilson
 
 import tangere
 
@@ -30,7 +30,7 @@ BEGIN, END = "<!-- made by report.py -->\n", "<!-- end of what report.py made --
 
 def stored(experiment: Experiment) -> list[dict[str, Any]]:
     """The results of an experiment that are there and not stale, by seed."""
-    found = [experiments.stored(experiment, seed) for seed in range(experiment.seeds)]
+    found = [experiments.stored(experiment, seed) for seed in experiments.seeds(experiment)]
     return [result for result in found if result is not None]
 
 
@@ -86,8 +86,7 @@ def table(head: str, beginnings: tuple[str, ...], row) -> str:
             continue
         runs = stored(experiment)
         if runs:
-            name = experiment.row + (" †" if experiment.seen else "")
-            cells = [name, *row(runs), f"{len(runs)}", experiment.paper]
+            cells = [experiment.row, *row(runs), f"{len(runs)}", experiment.paper]
             lines.append("| " + " | ".join(cells[:columns]).rstrip() + " |")
     return "\n".join(lines) + "\n" if len(lines) > 2 else ""
 
@@ -118,6 +117,15 @@ def unclean() -> str:
     dirty = {e.name: sum(r["commit"].endswith("-dirty") for r in stored(e)) for e in EXPERIMENTS}
     names = [f"`{name}` ({count})" for name, count in dirty.items() if count]
     said = "Runs of a tree that differed from its commit, perhaps by other results alone:"
+    return wrapped(f"{said} {', '.join(names)}.") + "\n" if names else ""
+
+
+def earlier() -> str:
+    """A sentence with the rows of the earlier test episodes; "" if there are none."""
+    seeds = {e.name: {r.get("test_seed", EARLIER_TEST_SEED) for r in stored(e)} for e in EXPERIMENTS
+             if not e.name.startswith("match-")}  # those are tested on rows
+    names = [f"`{name}`" for name, found in seeds.items() if found - {TEST_SEED}]
+    said = f"Tested in the earlier 1000 episodes (seed {EARLIER_TEST_SEED}):"
     return wrapped(f"{said} {', '.join(names)}.") + "\n" if names else ""
 
 
@@ -164,7 +172,7 @@ def tables() -> str:
     picture = "![Return against actions of training](results/box_pushing.svg)\n" if figure() else ""
     parts = (pushed, published("Place [m] and yaw [rad]", of_pushing), picture, reinforced,
              published("Success, and actions until it", of_tasks), cloned, offline, matched,
-             unclean(), missing())  # fmt: skip
+             earlier(), unclean(), missing())  # fmt: skip
     return "\n" + "\n".join(filter(None, parts)) + "\n"
 
 

@@ -451,13 +451,15 @@ def test_the_report_has_means_and_intervals(monkeypatch, tmp_path):
     lines = report.table("| what | place | runs | paper |", ("gd-",), lambda r: ["x"]).splitlines()
     assert lines == ["| what | place | runs | paper |", "|---|---|---|---|",
                      "| a row | x | 3 | 0.1 m |"]  # fmt: skip
-    monkeypatch.setattr(report, "EXPERIMENTS", [dataclasses.replace(each, seen=True)])
-    marked = report.table("| what | place | runs | paper |", ("gd-",), lambda r: ["x"])
-    assert marked.endswith("| a row † | x | 3 | 0.1 m |\n")
+    others = dataclasses.replace(each, first_seed=2)
+    assert list(experiments.seeds(others)) == [2, 3, 4] and len(report.stored(others)) == 1
+    assert report.earlier().endswith(": `gd-x`.\n")  # without "test_seed"
     run = {"settings": {"task": "cap_opening"}, "choice": [[1, 0.0, 0.0]] * 5}
     assert report.choosing([run]) == "0.30"  # million: 5 × 300 episodes × 200 actions
     for seed, commit in enumerate(("a-dirty", "b", "c-dirty")):
-        experiments.result_of(each, seed).write_text(json.dumps(result | {"commit": commit}))
+        made = result | {"commit": commit, "test_seed": protocol.TEST_SEED}
+        experiments.result_of(each, seed).write_text(json.dumps(made))
+    assert report.earlier() == ""
     assert report.unclean().replace("\n", " ").endswith("other results alone: `gd-x` (2). ")
 
 
@@ -466,7 +468,7 @@ def test_the_figure_has_a_line_for_each_run(monkeypatch, tmp_path):
     assert report.figure() == ""
     for name, program in (("gd-touch", "gd"), ("ppo-box", "ppo")):
         each = next(e for e in experiments.EXPERIMENTS if e.name == name)
-        for seed in range(2):
+        for seed in experiments.seeds(each)[:2]:
             result = {"program": program, "steps": 3200, "settings": {"updates": 2},
                       "choice": [[1, -500.0], [2, -400.0]],
                       "experiment": experiments.made_by(each)}  # fmt: skip
