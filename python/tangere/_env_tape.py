@@ -7,13 +7,14 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
+import gymnasium
 import numpy as np
 import torch
 
 from . import _core
 from ._simulation import Simulation
 from ._tensor_batch import RecordedBatch, TensorBatch
-from .scene_env import VectorSceneEnv
+from .scene_env import VectorSceneEnv, registered_task
 
 
 class EnvTape:
@@ -33,7 +34,7 @@ class EnvTape:
 
     Parameters
     ----------
-    task: the class.
+    task: the class, or its id of Gymnasium.
     num_envs: E; environment e plays episode first_episode + e of a seed, once.
     actions: of an episode, at most; None for the task's horizon.
     read: readings that the task does not use in its first states, beside those that it does.
@@ -47,7 +48,7 @@ class EnvTape:
 
     def __init__(
         self,
-        task: type[VectorSceneEnv],
+        task: str | type[VectorSceneEnv],
         num_envs: int,
         actions: int | None = None,
         *,
@@ -59,6 +60,9 @@ class EnvTape:
         dtype: torch.dtype = torch.float32,
         **arguments: Any,
     ):
+        if isinstance(task, str) and task in gymnasium.registry:
+            task, registered = registered_task(task)
+            arguments = registered | arguments
         if not (isinstance(task, type) and issubclass(task, VectorSceneEnv)):
             raise _core.InputError(f"task {task!r}; expected a subclass of VectorSceneEnv itself")
         if task.arrays != "torch":

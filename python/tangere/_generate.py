@@ -21,7 +21,7 @@ from typing import Any, Sequence
 import gymnasium
 
 from . import _core, _scene_data, policy as policies
-from .scene_env import VectorSceneEnv
+from .scene_env import VectorSceneEnv, registered_task
 
 _PROGRAM = '"$TANGERE_PYTHON" -m tangere.policy'  # the same text, so the same bytes of a data set
 
@@ -62,7 +62,8 @@ def generate(
 
     Parameters
     ----------
-    what: a task's name, the path of a scene, or a class of `tangere.VectorSceneEnv`.
+    what: a task's name, the path of a scene, a class of `tangere.VectorSceneEnv`, or the id with
+        which Gymnasium knows a task.
     output: folder of the data set.
     policy: a name, such as "random", or for a task a function as `tangere.policy.serve` takes.
         None: the script of the task, the controls of a scene. A class has "random" or a function,
@@ -82,13 +83,17 @@ def generate(
             raise _core.InputError("a function as policy without a name; expected `name`")
     if isinstance(options, str):
         raise _core.InputError(f"options {options!r}; expected a list, such as [{options!r}]")
+    registered, arguments = None, {}
+    if isinstance(what, str) and what in gymnasium.registry and not Path(what).exists():
+        registered = what
+        what, arguments = registered_task(what)
     if isinstance(what, type):
         return _of_class(what, output, episodes, options, policy=policy, name=name, seed=seed,
-                         threads=threads, num_envs=num_envs)  # fmt: skip
-    if str(what) in gymnasium.registry and not Path(what).exists():
+                         threads=threads, num_envs=num_envs, arguments=arguments,
+                         registered=registered)  # fmt: skip
+    if arguments:
         raise _core.InputError(
-            f"{what!r}, an id of Gymnasium; expected a class of tangere.VectorSceneEnv, the path "
-            f"of a scene, or one of {_core.task_names()}"
+            f"{registered!r} is registered with {arguments}, which the command does not take"
         )
     if num_envs is not None:
         raise _core.InputError(

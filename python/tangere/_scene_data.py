@@ -40,20 +40,29 @@ def generate(
     threads: int | None,
     num_envs: int,
     options: Sequence[str],
+    arguments: dict[str, Any],
+    registered: str | None,
 ) -> dict[str, Any]:
-    """`tangere.data.generate` of a task in Python. `name`: of the function `policy`."""
+    """`tangere.data.generate` of a task in Python.
+
+    `name`: of the function `policy`. `arguments`: of the class, `registered`: its id of Gymnasium.
+    """
     if not callable(policy) and policy != "random":
         raise _core.InputError(
             f"policy {policy!r} of {task.__name__}; expected a function or 'random'"
         )
     if episodes < 1:
         raise _core.InputError(f"{episodes} episodes; expected 1 or more")
-    env = task(min(num_envs, episodes), threads=threads, seed=seed, autoreset="disabled")
+    own = {"threads": threads, "seed": seed, "autoreset": "disabled"}
+    if repeated := [key for key in arguments if own.get(key) is not None]:
+        raise _core.InputError(f"{registered!r} is registered with {repeated}; expected none of it")
+    env = task(min(num_envs, episodes), **(own | arguments))
     spec, kind = _spec(env), "program" if callable(policy) else "random"
     player = name if name and callable(policy) else kind
     where = f"{task.__module__}:{task.__qualname__}"
     lasting = [word for word in options if word not in _EXISTING]
-    again = f"tangere.data.generate({where}, OUTPUT, {episodes}, policy={player}, seed={seed}"
+    what = repr(registered) if registered else where
+    again = f"tangere.data.generate({what}, OUTPUT, {episodes}, policy={player}, seed={seed}"
     again += f", options={lasting})" if lasting else ")"
     writer = _core.EpisodeWriter(
         env.model, spec, str(output), episodes, seed, kind, player, where, again,

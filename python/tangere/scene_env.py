@@ -436,3 +436,18 @@ def _make_vec(
             f"{task.horizon}"
         )
     return task(num_envs, **arguments)
+
+
+def registered_task(name: str) -> tuple[str | type[VectorSceneEnv], dict[str, Any]]:
+    """The task of an id of Gymnasium, a name of the catalogue or a class, and its arguments.
+
+    Raises InputError if the environment of that id is none of tangere.
+    """
+    arguments = dict(gymnasium.spec(name).kwargs)
+    task = arguments.pop("task", None)
+    if isinstance(task, type) and issubclass(task, VectorSceneEnv) or task in _core.task_names():
+        return task, arguments
+    raise _core.InputError(
+        f"{name!r} of Gymnasium is no environment of tangere; expected one that "
+        "register_scene_env() made, or a task of the catalogue"
+    )

@@ -446,6 +446,24 @@ def test_blocks_have_their_place_and_shape(tmp_path):
 def test_words_and_ids_are_named(tmp_path):
     with pytest.raises(tangere.InputError, match=r"options '--overwrite'; .* as \['--overwrite'\]"):
         generate(Leaves, tmp_path / "set", 2, policy=zeros, options="--overwrite")
-    with pytest.raises(tangere.InputError, match="'tangere/BoxPushing-v0', an id .* a class of"):
-        generate("tangere/BoxPushing-v0", tmp_path / "set", 2)
+    with pytest.raises(tangere.InputError, match="'CartPole-v1' of Gymnasium is no environment"):
+        generate("CartPole-v1", tmp_path / "set", 2)
     assert not list(tmp_path.iterdir())
+
+
+def test_ids_of_gymnasium_name_tasks(tmp_path, monkeypatch):
+    monkeypatch.setattr(gymnasium.envs.registration, "registry", dict(gymnasium.registry))
+    monkeypatch.setattr(gymnasium, "registry", gymnasium.envs.registration.registry)
+    tangere.register_scene_env("Leaves-v0", Leaves, scene=Leaves.scene)
+    said = generate("Leaves-v0", tmp_path / "id", 3, policy=push, seed=5)
+    assert said["episodes"] == 3
+    generate(Leaves, tmp_path / "class", 3, policy=push, seed=5)
+    with h5py.File(tmp_path / "id" / "robomimic.hdf5") as a:
+        with h5py.File(tmp_path / "class" / "robomimic.hdf5") as b:
+            assert a.attrs["command"].startswith("tangere.data.generate('Leaves-v0', OUTPUT, 3")
+            assert a.attrs["content_sum"] == b.attrs["content_sum"]
+    catalogue = generate("tangere/BoxPushing-v0", tmp_path / "push", 2, policy="random")
+    assert catalogue["task"] == "box_pushing"
+    tangere.register_scene_env("Seeded-v0", Leaves, seed=3)
+    with pytest.raises(tangere.InputError, match=r"'Seeded-v0' is registered with \['seed'\]"):
+        generate("Seeded-v0", tmp_path / "set", 2, policy="random")
