@@ -37,8 +37,8 @@ struct InMixed {
   static constexpr int kComponents = 3;
   static constexpr int kLanes = kLanesF;
   static constexpr double kSmallest = 1e-18;
-  static N load(const float* p) { return load_lanes_f<Arch>(p); }
-  static void store(const N& x, float* p) { store_lanes_f(x, p); }
+  static N load(const float* p) { return load_lanes<Arch>(p); }
+  static void store(const N& x, float* p) { store_lanes(x, p); }
   static const float* offsets(const PadTiles& pad) { return pad.offsets_f; }
   static const float* frames(const PadTiles& pad) { return pad.frames_f; }
   static const float* factors(const PadTiles& pad) { return pad.factors_f; }

@@ -14,7 +14,7 @@ template <class A>
 Lanes<A> widen(const LanesF<A>& x, int half) {
   alignas(64) float narrow[kLanesF];
   alignas(64) double wide[kGroup];
-  store_lanes_f(x, narrow);
+  store_lanes(x, narrow);
   for (int l = 0; l < kGroup; ++l) wide[l] = narrow[kGroup * half + l];
   return load_lanes<A>(wide);
 }

@@ -30,7 +30,7 @@ template <class A>
 #endif
   alignas(64) float all[kLanesF];
   __builtin_memcpy(all, from, sizeof all);
-  return load_lanes_f<A>(all);
+  return load_lanes<A>(all);
 }
 
 /// Returns number j of each block four times.
@@ -50,9 +50,9 @@ template <class A>
   }
 #endif
   alignas(64) float in[kLanesF], all[kLanesF];
-  store_lanes_f(x, in);
+  store_lanes(x, in);
   for (int l = 0; l < kLanesF; ++l) all[l] = in[l - l % 4 + j];
-  return load_lanes_f<A>(all);
+  return load_lanes<A>(all);
 }
 
 /// Exchanges whole blocks: block q of vector p becomes block p of vector q.
@@ -83,10 +83,10 @@ template <class A>
   }
 #endif
   alignas(64) float in[4][kLanesF], out[4][kLanesF];
-  for (int p = 0; p < 4; ++p) store_lanes_f(x[p], in[p]);
+  for (int p = 0; p < 4; ++p) store_lanes(x[p], in[p]);
   for (int p = 0; p < 4; ++p)
     for (int l = 0; l < kLanesF; ++l) out[l / 4][4 * p + l % 4] = in[p][l];
-  for (int p = 0; p < 4; ++p) x[p] = load_lanes_f<A>(out[p]);
+  for (int p = 0; p < 4; ++p) x[p] = load_lanes<A>(out[p]);
 }
 
 /// Transposes block by block: number k of block q of vector j becomes number j of block q of vector
@@ -124,10 +124,10 @@ template <class A>
   }
 #endif
   alignas(64) float in[4][kLanesF], out[4][kLanesF];
-  for (int j = 0; j < 4; ++j) store_lanes_f(x[j], in[j]);
+  for (int j = 0; j < 4; ++j) store_lanes(x[j], in[j]);
   for (int k = 0; k < 4; ++k)
     for (int l = 0; l < kLanesF; ++l) out[k][l] = in[l % 4][l - l % 4 + k];
-  for (int k = 0; k < 4; ++k) x[k] = load_lanes_f<A>(out[k]);
+  for (int k = 0; k < 4; ++k) x[k] = load_lanes<A>(out[k]);
 }
 
 /// Whether φ may be negative in one of the cells.
@@ -161,7 +161,7 @@ void sum_places_f(const DistanceGrid& g, const int (&cell)[kLanesF],
   using N = LanesF<A>;
   alignas(64) float of_y[2][4][kLanesF];
   for (int o = 0; o < 2; ++o)
-    for (int b = 0; b < 4; ++b) store_lanes_f(y.w[o][b], of_y[o][b]);
+    for (int b = 0; b < 4; ++b) store_lanes(y.w[o][b], of_y[o][b]);
 #pragma GCC unroll 1
   for (int j = 0; j < 4; ++j) {
     N sum[2][4];
@@ -223,7 +223,7 @@ template <class A>
   }
 #endif
   alignas(64) float all[kLanesF];
-  store_lanes_f(x, all);
+  store_lanes(x, all);
   for (int l = 0; l < kLanesF; ++l) out[l] = int(all[l]);
 }
 
