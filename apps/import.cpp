@@ -164,7 +164,7 @@ Command add_import(CLI::App& program) {
   ImportArguments& o = *options;
   CLI::App& app = add_command(program, "import", "Make a scene of a robot's URDF or MJCF file",
                               "tangere import gripper.urdf -o gripper.xml --pad "
-                              "left_finger=gelsight_mini@+y --motor left_slide=400,20");
+                              "left_finger=gelsight_mini_measured@+y --motor left_slide=400,20");
   add_text(app, "ROBOT", o.robot, "", "URDF file (root <robot>) or MJCF file (root <mujoco>)")
       .required();
   add_text(app, "-o,--output", o.output, "SCENE.xml", "Scene to write").required();

@@ -1,13 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // tangere skin: coefficients of a layer of rubber that is bonded to a stiff back, for points that
-// each stand for an area 𝒜 of it. With Young's modulus E, Poisson's ratio ν and thickness t,
-//   k_n = E' 𝒜/t,  k_s = G 𝒜/t,  G = E/(2(1 + ν))
-// where E' is E/(1 - ν²) under contacts narrower than t, and up to the confined modulus
-// E(1 - ν)/((1 + ν)(1 - 2ν)) under those that are much wider. With a time of relaxation τ
-//   k_t = k_s τ,  k_d = k_n τ/δ
-// so that the damper of the clamped law, k_d |d|, is k_n τ at the depth δ.
+// each stand for an area of it (engine/scene/skin_material.hpp).
+#include "engine/scene/skin_material.hpp"
+
 #include <fmt/format.h>
 
+#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "apps/arguments.hpp"
@@ -17,51 +15,42 @@
 namespace tangere::apps {
 namespace {
 
+/// Contact sizes χ for which the formula was compared with finite elements.
+constexpr double kLeastSize = 0.3, kMostSize = 1;
+
 struct SkinArguments {
-  std::optional<double> modulus, thickness, pitch, contact_pitch, poisson, time, depth, friction;
-  bool wide = false;
+  std::optional<double> modulus, thickness, pitch, contact_pitch, radius, press, time, depth,
+      friction;
 };
 
-/// A skin's coefficients per area, and what they follow from.
-struct Skin {
-  double shear;                              ///< G [Pa]
-  double narrow, wide;                       ///< E' under narrow and wide contacts [Pa]
-  double normal_stiffness, shear_stiffness;  ///< of an area [N/m per m²]
-  double time, depth, friction;              ///< τ [s], δ [m], μ
-};
-
-Skin skin_of(const SkinArguments& a) {
-  const auto required = [](const std::optional<double>& x, const char* option, const char* what) {
-    if (!x) throw InputError(fmt::format("{} is missing; expected {}", option, what));
-    return *x;
-  };
-  const double E = required(a.modulus, "--modulus", "Young's modulus of the skin [Pa]"),
-               t = required(a.thickness, "--thickness", "the skin's thickness [m]"),
-               nu = a.poisson.value_or(0.49);
-  required(a.pitch, "--pitch", "the distance between neighbouring points [m]");
-  if (nu >= 0.5)
-    throw InputError(fmt::format(
-        "--poisson {} has no confined modulus; expected a number below 0.5, such as 0.49", nu));
-  Skin s{};
-  s.shear = E / (2 * (1 + nu));
-  s.narrow = E / (1 - nu * nu);
-  s.wide = E * (1 - nu) / ((1 + nu) * (1 - 2 * nu));
-  s.normal_stiffness = (a.wide ? s.wide : s.narrow) / t;
-  s.shear_stiffness = s.shear / t;
-  s.time = a.time.value_or(5e-3);
-  s.depth = a.depth.value_or(0.1 * t);
-  s.friction = a.friction.value_or(0.6);
-  return s;
+double required(const std::optional<double>& x, const char* option, const char* what) {
+  if (!x) throw InputError(fmt::format("{} is missing; expected {}", option, what));
+  return *x;
 }
 
-/// Coefficients of points at a pitch.
-Json coefficients(const Skin& s, double pitch) {
-  const double area = pitch * pitch, kn = s.normal_stiffness * area, ks = s.shear_stiffness * area;
-  return {{"kn", kn},
-          {"kt", ks * s.time},
-          {"mu", s.friction},
-          {"damping", kn * s.time / s.depth},
-          {"ks", ks}};
+/// Returns c = K t/E of the contact that is given, or the usual one.
+double ratio_of(const SkinArguments& a, double thickness) {
+  if (a.radius.has_value() != a.press.has_value())
+    throw InputError(fmt::format("{} without {}; expected both: they say how large a contact is",
+                                 a.radius ? "--radius" : "--press",
+                                 a.radius ? "--press" : "--radius"));
+  if (!a.radius) return kUsualStiffnessRatio;
+  const double size = std::sqrt(*a.radius * *a.press) / thickness;
+  if (size < kLeastSize || size > kMostSize)
+    throw InputError(fmt::format(
+        "--radius {} and --press {} make a contact of {:.3g} times the thickness; expected {} to "
+        "{}, for which the stiffness is known",
+        *a.radius, *a.press, size, kLeastSize, kMostSize));
+  return stiffness_ratio(size);
+}
+
+/// The coefficients of points that stand for an area [m²].
+Json shared(const ContactCoefficients& by_area, double area, double friction) {
+  return {{"kn", by_area.kn * area},
+          {"kt", by_area.kt * area},
+          {"mu", friction},
+          {"damping", by_area.damping * area},
+          {"ks", by_area.ks * area}};
 }
 
 std::string attributes(const Json& c) {
@@ -72,25 +61,29 @@ std::string attributes(const Json& c) {
 }
 
 int skin(const SkinArguments& a, const Console& console) {
-  const Skin s = skin_of(a);
-  const double pitch = *a.pitch, contact_pitch = a.contact_pitch.value_or(pitch);
-  const Json tactile = coefficients(s, pitch), contact = coefficients(s, contact_pitch);
-  constexpr double kPerSquareMillimetre = 1e-6;
-  const Json surface = coefficients(s, 1);  // of an area
+  const double E = required(a.modulus, "--modulus", "Young's modulus of the skin [Pa]"),
+               t = required(a.thickness, "--thickness", "the skin's thickness [m]"),
+               pitch = required(a.pitch, "--pitch", "the distance between neighbouring points [m]"),
+               contact_pitch = a.contact_pitch.value_or(pitch), friction = a.friction.value_or(0.6),
+               ratio = ratio_of(a, t), stiffness = ratio * E / t;
+  const ContactCoefficients by_area =
+      skin_springs(stiffness, a.time.value_or(SkinMaterial{}.relaxation),
+                   a.depth.value_or(kUsualDampingDepth * t));
+  const Json tactile = shared(by_area, pitch * pitch, friction),
+             contact = shared(by_area, contact_pitch * contact_pitch, friction),
+             surface = shared(by_area, 1, friction);
   console.print(fmt::format("<tactile {}/>\n<general_primitive_contact {}/>\n<surface_contact {}/>",
                             attributes(tactile), attributes(contact), attributes(surface)));
+  constexpr double kPerSquareMillimetre = 1e-6;
   console.note(fmt::format(
-      "per mm² of skin: kn {:.4g} N/m, ks {:.4g} N/m. Young's modulus {:.4g} Pa acts as {:.4g} Pa "
-      "under contacts narrower than the skin is thick and as up to {:.4g} Pa under wide ones; {} "
-      "is "
-      "taken. Press the skin to know kn.",
-      s.normal_stiffness * kPerSquareMillimetre, s.shear_stiffness * kPerSquareMillimetre,
-      *a.modulus, s.narrow, s.wide, a.wide ? "the latter" : "the former"));
+      "per mm² of skin: kn {:.4g} N/m, ks {:.4g} N/m. kn by area is {:.3g} E/t; it is {:.3g} to "
+      "{:.3g} E/t under balls with √(R d) from 1 to {} of the thickness. Under contacts much wider "
+      "than the skin is thick ks is E/(3 t). Press the skin to know kn.",
+      by_area.kn * kPerSquareMillimetre, by_area.ks * kPerSquareMillimetre, ratio,
+      stiffness_ratio(kMostSize), stiffness_ratio(kLeastSize), kLeastSize));
   console.result({{"command", "skin"},
                   {"exit_code", static_cast<int>(kDone)},
-                  {"shear_modulus", s.shear},
-                  {"narrow_modulus", s.narrow},
-                  {"wide_modulus", s.wide},
+                  {"stiffness_ratio", ratio},
                   {"pitch", pitch},
                   {"contact_pitch", contact_pitch},
                   {"tactile", tactile},
@@ -111,13 +104,13 @@ Command add_skin(CLI::App& program) {
   add_positive_number(app, "--pitch", a->pitch, "Distance between neighbouring tactile points [m]");
   add_positive_number(app, "--contact-pitch", a->contact_pitch,
                       "The same of the body's contact points [m]; as --pitch if not given");
-  add_positive_number(app, "--poisson", a->poisson,
-                      "Poisson's ratio, below 0.5; 0.49 if not given");
+  add_positive_number(app, "--radius", a->radius,
+                      "Radius of the ball that presses [m]; with --press, for kn");
+  add_positive_number(app, "--press", a->press, "How far it is pressed in [m]");
   add_positive_number(app, "--time", a->time, "Time of relaxation [s]; 5e-3 if not given");
   add_positive_number(app, "--depth", a->depth,
                       "Depth at which damping acts so [m]; a tenth of the thickness if not given");
   add_positive_number(app, "--friction", a->friction, "Friction coefficient; 0.6 if not given");
-  add_flag(app, "--wide", a->wide, "Contacts are much wider than the skin is thick");
   add_console_options(app, *console);
   return {&app, [=](const ProgramInfo&) { return skin(*a, *console); }};
 }

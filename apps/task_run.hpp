@@ -43,7 +43,7 @@ void refuse_with_scene(const std::string& scene, const std::vector<GivenOption>&
 /// Returns the text of a scene that the program contains, those of tasks, the hard ones
 /// and layouts of sensors, by its path below scenes/; null for other names.
 const char* program_scene(const std::string& file);
-/// Names of the layouts of sensors among them: "digit" is sensors/digit.xml.
+/// Names of the layouts of sensors among them: "digit_guess" is sensors/digit_guess.xml.
 std::vector<std::string> program_sensors();
 
 }  // namespace tangere::apps

@@ -6,7 +6,6 @@
 
 #include "kernels/contact/pair_contact.hpp"
 #include "kernels/step/arguments.hpp"
-#include "kernels/step/link_poses.hpp"
 #include "kernels/tactile/tactile_types.hpp"
 
 namespace tangere {
@@ -56,31 +55,17 @@ void read_dual_field(const CompiledModel& m, int sensor,
                      std::span<double> field, std::span<double> field_dot) {
   const CompiledSensor& felt = m.sensors[std::size_t(sensor)];
   const kernels::PadTiles pad = felt.tiles();
-  const auto pose = [&](int link) {
-    return link < 0
-               ? kernels::LinkPose<D>{{kernels::diagonal(D(1.0)), kernels::zero3<D>()},
-                                      kernels::zero6<D>()}
-               : kernels::LinkPose<D>{links[std::size_t(link)].world, links[std::size_t(link)].V};
-  };
-  const auto tangent = [&](int first, int k) {
-    return numbers.empty() ? 0.0 : numbers[std::size_t(first + k)];
-  };
   const kernels::Mat3<double> turn =
       transpose(felt.pad.R) * m.bodies[std::size_t(felt.body)].frame.R;
   std::fill(field.begin(), field.end(), 0.0);
   std::fill(field_dot.begin(), field_dot.end(), 0.0);
-  const kernels::LinkPose<D> hand = pose(felt.link);
+  const kernels::LinkPose<D> hand = dual_pose(links, felt.link);
   for (const int number : felt.targets) {
     const CompiledBody& body = m.bodies[std::size_t(number)];
-    const kernels::LinkPose<D> other = pose(body.link);
+    const kernels::LinkPose<D> other = dual_pose(links, body.link);
     kernels::Touch<D> t;
     kernels::pad_touch(&hand, felt.pad, &other, body.frame, t);
-    const int first_size = m.view.rows.solid(number);
-    const kernels::Vec3<double> has =
-        kernels::load_vector<double>(body.size, body.size_row, column, 0);
-    const kernels::Vec3<D> size = {{has.x, tangent(first_size, 0)},
-                                   {has.y, tangent(first_size, 1)},
-                                   {has.z, tangent(first_size, 2)}};
+    const kernels::Vec3<D> size = dual_size(m, number, column, numbers);
     const auto add = [&](const auto& shape) {
       for (int k = 0; k < pad.tiles() * kernels::kTactileTile; ++k) {
         const PadPoint p = pad_point(pad, k / kernels::kTactileTile, k % kernels::kTactileTile);

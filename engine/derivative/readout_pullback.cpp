@@ -16,6 +16,7 @@
 #include "engine/sense/dense_tiles.hpp"
 #include "engine/sense/elastic_field.hpp"
 #include "engine/sense/imperfect_field.hpp"
+#include "engine/sense/layered_field.hpp"
 #include "engine/sense/pad_reader.hpp"
 #include "engine/sense/past_states.hpp"
 
@@ -53,6 +54,11 @@ struct ReadoutPullback::Impl {
   AlignedVector<double> own;  ///< (tiles, kPointNumbers, 64)
   ImperfectField imperfections;
   ElasticField elastic;
+  LayeredField layered;
+  struct {
+    std::vector<double> whole, normal, whole_bar, normal_bar;
+  } springs;  ///< (points, 3) of a sensor with a layer
+  std::vector<double> layer_bar;
   std::array<std::vector<double>, kBlock> memory;  ///< cotangents of the shear state
   std::vector<double> whole, ideal, expanded;      ///< (points, 3) of one sensor
   /// For each lane, (1 + past states, 2, nv) cotangents of the present and of earlier states, by
@@ -75,6 +81,10 @@ struct ReadoutPullback::Impl {
     }
     ideal.resize(whole.size());
     expanded.resize(whole.size());
+    for (auto* x : {&springs.whole, &springs.normal, &springs.whole_bar, &springs.normal_bar})
+      if (std::ranges::any_of(c.sensors,
+                              [](const CompiledSensor& s) { return s.layer != nullptr; }))
+        x->resize(whole.size());
     scratch.resize(bytes);
     touches.resize(targets);
   }
@@ -122,22 +132,84 @@ struct ReadoutPullback::Impl {
   /// The kernels' arguments for a lane whose touches were found. A pressure leaves friction out.
   kernels::TactileArgs<double> arguments(const CompiledSensor& s, int lane, bool pressure) {
     auto a = reader.arguments<double>(s.number, lane / kGroup, lane % kGroup);
-    if (!pressure) return a;
-    frictionless.assign(a.touches, a.touches + a.n_touches);
-    for (kernels::Touch<double>& t : frictionless) t.law.kt = t.law.mu = 0;
-    a.touches = frictionless.data();
+    if (pressure) without_friction(a, frictionless);
     return a;
   }
 
   /// Computes the ideal field, (points, 3), or the ideal pressure, (points), in one lane.
   void read(const CompiledSensor& s, int lane, bool pressure, std::span<double> to) {
     find_touches(lane / kGroup, s.number);
-    if (!pressure && s.elastic)
-      return elastic.read(reader, *batch, kBlock * block + lane, s.number, to);
-    if (!pressure) return read_ideal(reader, s, arguments(s, lane, false), to);
+    if (!pressure) return s.layer ? read_layered(s, lane, false, to) : read_springs(s, lane, to);
     const auto all = std::span(expanded).first(3 * to.size());
-    read_ideal(reader, s, arguments(s, lane, true), all);
+    s.layer ? read_layered(s, lane, true, all)
+            : read_ideal(reader, s, arguments(s, lane, true), all);
     for (std::size_t k = 0; k < to.size(); ++k) to[k] = all[3 * k + 2];
+  }
+
+  /// Computes the field of the springs, (points, 3).
+  void read_springs(const CompiledSensor& s, int lane, std::span<double> to) {
+    if (s.elastic)
+      elastic.read(reader, *batch, kBlock * block + lane, s.number, to);
+    else
+      read_ideal(reader, s, arguments(s, lane, false), to);
+  }
+
+  /// Computes the field of a sensor with a layer, (points, 3), for `layered`. A pressure leaves
+  /// friction out.
+  void read_layered(const CompiledSensor& s, int lane, bool pressure, std::span<double> to) {
+    const auto all = std::span(springs.whole).first(to.size()),
+               normal = std::span(springs.normal).first(to.size());
+    find_touches(lane / kGroup, s.number);
+    read_ideal(reader, s, arguments(s, lane, true), normal);
+    if (pressure)
+      std::copy(normal.begin(), normal.end(), all.begin());
+    else
+      read_springs(s, lane, all);
+    layered.read(s, arguments(s, lane, false), {all, normal}, to);
+  }
+
+  /// Pulls the cotangent of such a field back.
+  void pull_back_layered(int lane, const CompiledSensor& s, bool pressure,
+                         std::span<const double> cotangent, std::span<double> parameters,
+                         std::span<double> points) {
+    if (!points.empty())
+      throw InputError("derivatives by the points of tactile sensor '" +
+                       model.scene().sensors[std::size_t(s.number)].name +
+                       "', which has a layer; expected a sensor without <layer>");
+    const std::size_t numbers = 3 * std::size_t(s.points());
+    layer_bar.assign(cotangent.begin(), cotangent.end());
+    read_layered(s, lane, pressure, std::span(expanded).first(numbers));
+    LayeredField::Cotangents bar = {std::span(springs.whole_bar).first(numbers),
+                                    std::span(springs.normal_bar).first(numbers),
+                                    std::span(touches).first(s.targets.size())};
+    layered.pull_back(layer_bar, !parameters.empty(), bar);
+    const CompiledModel& m = compiled(model);
+    used[std::size_t(lane / kGroup)] = true;
+    const auto add = [&](int at, double x) {
+      if (!parameters.empty()) parameters[std::size_t(at * kBlock + lane)] += x;
+    };
+    add(m.view.rows.sensor(s.number), bar.stiffness);
+    for (std::size_t k = 0; k < s.targets.size(); ++k) {
+      hand_on(touches[k], s.link, s.pad, m.bodies[std::size_t(s.targets[k])].link, lane / kGroup,
+              lane % kGroup);
+      const int size = m.view.rows.solid(s.targets[k]);
+      add(size, touches[k].size.x), add(size + 1, touches[k].size.y),
+          add(size + 2, touches[k].size.z);
+    }
+    if (!pressure) pull_back_springs(lane, s, bar.whole, parameters);
+    for (std::size_t k = 0; pressure && k < numbers; ++k) bar.normal[k] += bar.whole[k];
+    gather(s, bar.normal);
+    pull_back(lane, s.number, tiles, of_tiles, parameters, {}, true);
+  }
+
+  void pull_back_springs(int lane, const CompiledSensor& s, std::span<const double> cotangent,
+                         std::span<double> parameters) {
+    if (s.elastic) {
+      std::copy(cotangent.begin(), cotangent.end(), whole.begin());
+      return pull_back_elastic(lane, s, parameters, {});
+    }
+    gather(s, cotangent);
+    pull_back(lane, s.number, tiles, of_tiles, parameters, {});
   }
 
   /// Pulls the cotangent in `whole` of a sensor's reading back: of its field or of its pressure.
@@ -159,6 +231,8 @@ struct ReadoutPullback::Impl {
   void pull_back_ideal(int lane, const CompiledSensor& s, bool pressure,
                        std::span<const double> cotangent, std::span<double> parameters,
                        std::span<double> points) {
+    if (!pressure && s.layer)
+      return pull_back_layered(lane, s, false, cotangent, parameters, points);
     if (!pressure && s.elastic) {
       std::copy(cotangent.begin(), cotangent.end(), whole.begin());
       return pull_back_elastic(lane, s, parameters, points);
@@ -168,6 +242,7 @@ struct ReadoutPullback::Impl {
       std::fill(field.begin(), field.end(), 0.0);
       for (std::size_t k = 0; k < cotangent.size(); ++k) field[3 * k + 2] = cotangent[k];
       cotangent = field;
+      if (s.layer) return pull_back_layered(lane, s, true, cotangent, parameters, points);
     }
     gather(s, cotangent);
     pull_back(lane, s.number, tiles, of_tiles, parameters, points, pressure);
@@ -367,7 +442,7 @@ void ReadoutPullback::field(int lane, int sensor, std::span<const int> tiles,
                             std::span<const double> cotangents, std::span<double> parameters,
                             std::span<double> points) {
   const CompiledSensor& s = compiled(impl_->model).sensors[std::size_t(sensor)];
-  if (!s.imperfect && !s.elastic)
+  if (!s.imperfect && !s.elastic && !s.layer)
     return impl_->pull_back(lane, sensor, tiles, cotangents, parameters, points);
   const kernels::PadTiles pad = s.tiles();
   std::fill(impl_->whole.begin(), impl_->whole.end(), 0.0);

@@ -19,6 +19,7 @@
 #include "engine/model/group_contacts.hpp"
 #include "engine/model/inner_faces.hpp"
 #include "engine/model/link_inertia.hpp"
+#include "engine/model/sensor_layer.hpp"
 #include "engine/scene/contact_resolution.hpp"
 #include "engine/scene/frames.hpp"
 #include "engine/scene/scene_faults.hpp"
@@ -347,6 +348,7 @@ class Compiler {
       sensor.body = b;
       sensor.number = static_cast<int>(i);
       compile_imperfections(d, m_.scene.timestep, sensor, info);
+      if (d.layer) sensor.layer = compile_sensor_layer(d, sensor, info.pressure_sign);
       if (d.markers) static_cast<void>(compile_markers(d, info.pressure_sign));  // checks them
       m_.layout.past_states = std::max(m_.layout.past_states, info.past_states);
       sensor.parameters = constants(d.coefficients);

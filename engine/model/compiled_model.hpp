@@ -57,6 +57,8 @@ struct CompiledMotor {
 /// Flat pads with at most this many points are read in all environments at once.
 inline constexpr int kSmallPad = 512;
 
+struct CompiledLayer;
+
 /// How far a force spreads along an axis of a grid. The force of point j moves to point i by the
 /// share kernel[|i - j|] scale[j]; the shares of a point sum to 1.
 struct LateralSpread {
@@ -98,8 +100,9 @@ struct CompiledSensor {
   int delay = 0;  ///< [steps]
   /// (n) weights of the ideal fields `delay`, delay + 1, … steps ago; empty without lag.
   std::vector<double> weights{};
-  std::array<LateralSpread, 2> spread{};  ///< from row to row, and from column to column
-  bool elastic = false;                   ///< its points have shear springs (k_s)
+  std::array<LateralSpread, 2> spread{};         ///< from row to row, and from column to column
+  bool elastic = false;                          ///< its points have shear springs (k_s)
+  std::shared_ptr<const CompiledLayer> layer{};  ///< couples its points; null: none
   /// Steps between updates of the shear state. If > 0, the state stores the anchors b and a of each
   /// point (first all b, then all a). 0: updated at every step; the state stores s.
   int shear_interval = 0;

@@ -29,10 +29,11 @@ enum class EffectKind : std::uint8_t {
   tactile_memory,
   sensor_imperfections,
   markers,
+  layer,
   feedback,
   varying_parameters,
   sleeping,
 };
-inline constexpr int kEffectKinds = 25;
+inline constexpr int kEffectKinds = 26;
 
 }  // namespace tangere

@@ -246,6 +246,20 @@ EffectInfo find_markers(const Scene& scene, int element) {
       marker_text, "no <markers>");
 }
 
+EffectInfo find_layer(const Scene& scene, int element) {
+  return find_in_sensors(
+      scene, element,
+      [](const TactileDescription& d) {
+        return d.layer ? std::optional(d.layer->source) : std::nullopt;
+      },
+      [](const TactileDescription& d) {
+        return d.material
+                   ? fmt::format("{} Pa, {} m thick", d.material->modulus, d.material->thickness)
+                   : std::string("no material");
+      },
+      "no <layer>");
+}
+
 EffectInfo find_feedback(const Scene& scene, int element) {
   const auto source_of = [&](const TactileDescription& d) {
     return contacts_of(scene, d) > 0 ? std::optional(d.source) : std::nullopt;
@@ -315,6 +329,7 @@ constexpr Row kTable[] = {
     {Kind::sensor_imperfections, "sensor imperfections", " imperfections", find_imperfections,
      Owner::tactile},
     {Kind::markers, "markers", " markers", find_markers, Owner::tactile},
+    {Kind::layer, "layer", " layer", find_layer, Owner::tactile},
     {Kind::feedback, "feedback", " feedback", find_feedback, Owner::tactile},
     {Kind::varying_parameters, "varying parameters", "", find_varying},
     {Kind::sleeping, "sleeping", "", find_sleeping},

@@ -177,6 +177,21 @@ struct MarkersDescription {
   Source source;
 };
 
+/// Material of a skin: a layer that is bonded to a stiff back (engine/scene/skin_material.hpp).
+struct SkinMaterial {
+  double modulus = 0;        ///< Young's modulus E [Pa]
+  double thickness = 0;      ///< t [m]
+  double relaxation = 5e-3;  ///< time in which it relaxes, τ [s]
+};
+
+/// A layer that couples the points of a skin (docs/layer.md).
+struct LayerDescription {
+  double poisson = 0.475;          ///< ν
+  double cell = 0;                 ///< side of a cell [m]; 0: follows the thickness
+  std::optional<double> margin{};  ///< from the cells to free sides [m]; none: no sides
+  Source source;
+};
+
 struct TactileDescription {
   std::string name;
   std::string body;
@@ -196,6 +211,10 @@ struct TactileDescription {
   std::optional<MarkersDescription> markers{};  ///< none: it has none
   /// Area of a point whose coefficients the file gives by area [m²]; 0: it gives those of a point.
   double cell = 0;
+  /// From which the file takes the coefficients that it does not give; none: it gives all.
+  std::optional<SkinMaterial> material{};
+  /// Couples its points; needs a material. None: every point is a spring of its own.
+  std::optional<LayerDescription> layer{};
 };
 
 /// Lists the points of a sensor in field order: those of an array row by row, with its axes. The

@@ -245,6 +245,8 @@ void check_scene(const Scene& scene) {
   for (const TactileDescription& d : scene.sensors) {
     check(d.source, "tactile sensor '" + d.name + "': ", value_fault(kTactile, d.coefficients));
     if (d.markers) check(d.markers->source, "markers of '" + d.name + "': ", markers_fault(d));
+    if (d.layer)
+      check(d.layer->source, "layer of '" + d.name + "': ", value_fault(kLayer, *d.layer));
   }
   for (const RandomizationDescription& d : scene.randomizations)
     check(d.source, "", variation_fault(scene, d));

@@ -262,8 +262,15 @@ constexpr Attribute kSchema[] = {
         Words{"clamped paper linear published"}, Flags{kInDefault}),
     row(kPairContact, "law", "clamped", U::one, "see contact.md",
         Words{"clamped paper linear published"}, Flags{kInDefault}),
-    row(kTactile, "per", "point", U::one, "area: all but mu count per area", Types{"rect_array"},
-        Words{"point area"}, Flags{kInDefault}),
+    row(kTactile, "per", "point", U::one, "area: all but mu count per area",
+        Types{"rect_array hemisphere cylinder"}, Words{"point area"}, Flags{kInDefault}),
+    row(kTactile, "modulus", kNone, U::Pa,
+        "Young's modulus of a skin: gives kn, kt, ks and damping by area, see skin.md",
+        Types{"rect_array hemisphere cylinder"}, &SkinMaterial::modulus, B::positive),
+    row(kTactile, "thickness", kNone, U::m, "of the skin, with modulus",
+        Types{"rect_array hemisphere cylinder"}, &SkinMaterial::thickness, B::positive),
+    row(kTactile, "relaxation", "0.005", U::s, "time in which the skin relaxes, with modulus",
+        Types{"rect_array hemisphere cylinder"}, &SkinMaterial::relaxation, B::not_negative),
     row(kTactile, "law", "clamped", U::one, "see contact.md", Words{"clamped paper"},
         Flags{kInDefault}),
     row(kContacts, "ramp", kNone, U::m, "law linear: depth over which damping fades in",
@@ -323,6 +330,13 @@ constexpr Attribute kSchema[] = {
         B::positive),
     row(kMarkers, "spread", kNone, U::m, "distance over which the surface moves along",
         &MarkersDescription::spread, B::positive),
+    row(kLayer, "poisson", "0.475", U::one, "Poisson's ratio, below 0.5",
+        &LayerDescription::poisson, Between{B::range, 0, 0.4999}),
+    row(kLayer, "cell", kNone, U::m, "side of a cell; a fifth of the thickness if left out",
+        &LayerDescription::cell, B::positive),
+    row(kLayer, "margin", kNone, U::m,
+        "from the outermost cells to the skin's free sides; no sides if left out",
+        &LayerDescription::margin, B::not_negative),
 
     row(kEndEffector, "name", "", U::one, "endeffector and its place in the file if left out"),
     row(kEndEffector, "joint", kNeeded, U::one, "it moves with this joint"),
@@ -399,7 +413,8 @@ constexpr const char* kElementNames[] = {"option",
                                          "tactile",
                                          "body",
                                          "surface_contact",
-                                         "surface_contact"};
+                                         "surface_contact",
+                                         "layer"};
 static_assert(std::size(kElementNames) == kElements);
 
 constexpr Holder kHolders[] = {
@@ -415,7 +430,7 @@ constexpr Holder kHolders[] = {
     {"randomize", kVarying, true},
     {"link", kJoint | kBody | kLink},
     {"body", kVisual | kCollision},
-    {"tactile", kImperfections | kMarkers},
+    {"tactile", kImperfections | kMarkers | kLayer},
     {"piecewise", kAt},
 };
 

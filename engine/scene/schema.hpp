@@ -53,8 +53,9 @@ enum Element : std::uint32_t {
   kVaryBody = 1U << 28,
   kSurfaceContact = 1U << 29,
   kVarySurface = 1U << 30,  ///< in <randomize>
+  kLayer = 1U << 31,
 };
-inline constexpr int kElements = 31;
+inline constexpr int kElements = 32;
 inline constexpr std::uint32_t kContacts = kGroundContact | kPairContact,
                                kTouching = kContacts | kTactile,
                                kVarying = kVaryJoint | kVaryMotor | kVaryGround | kVaryPair |
@@ -93,7 +94,8 @@ using Member = std::variant<
     Vector3 Pose::*, Quaternion Pose::*, double JointEffects::*, double BodyDescription::*,
     std::array<double, 4> BodyDescription::*, double AbstractShape::*, double MotorDescription::*,
     double ContactCoefficients::*, int TactileDescription::*, double SensorImperfections::*,
-    NormalAndShear SensorImperfections::*, double MarkersDescription::*,
+    NormalAndShear SensorImperfections::*, double MarkersDescription::*, double SkinMaterial::*,
+    double LayerDescription::*, std::optional<double> LayerDescription::*,
     Vector3 EndEffectorDescription::*, double EndEffectorDescription::*,
     std::array<double, 4> EndEffectorDescription::*, double PiecewiseControl::*,
     double RandomControl::*>;

@@ -65,4 +65,12 @@ void check_has_no_lag(const Model& model, int sensor);
 void read_ideal(PadReader& reader, const CompiledSensor& sensor,
                 kernels::TactileArgs<double> arguments, std::span<double> field);
 
+/// Leaves friction out of the kernels' arguments. `touches`: what they then point to.
+inline void without_friction(kernels::TactileArgs<double>& arguments,
+                             std::vector<kernels::Touch<double>>& touches) {
+  touches.assign(arguments.touches, arguments.touches + arguments.n_touches);
+  for (kernels::Touch<double>& t : touches) t.law.kt = t.law.mu = 0;
+  arguments.touches = touches.data();
+}
+
 }  // namespace tangere

@@ -16,6 +16,7 @@
 #include "engine/sense/elastic_field.hpp"
 #include "engine/sense/field_sum.hpp"
 #include "engine/sense/imperfect_field.hpp"
+#include "engine/sense/layered_field.hpp"
 #include "engine/sense/marker_map.hpp"
 #include "engine/sense/motion_reading.hpp"
 #include "engine/sense/pad_reader.hpp"
@@ -43,6 +44,9 @@ struct Readout::Impl {
   // Of imperfect sensors: imperfections, reading, and readings of a block of small pads.
   ImperfectField imperfections;
   ElasticField elastic;
+  LayeredField layered;
+  std::vector<double> normal_springs, all_springs, layer_field;  // (points, 3) of a layered sensor
+  std::vector<kernels::Touch<double>> frictionless;
   std::vector<std::optional<MarkerMap>> markers;  // (sensors) of those that have them
   std::vector<double> displacement;               // (points, 2)
   std::vector<double> elastic_field;              // (points, 3)
@@ -66,7 +70,10 @@ struct Readout::Impl {
         markers.back().emplace(m, s.number);
         displacement.resize(std::max(displacement.size(), std::size_t(2 * s.points())));
       }
-      if (!s.imperfect && !s.elastic && !marked) continue;
+      if (s.layer)
+        for (auto* x : {&normal_springs, &all_springs, &layer_field})
+          x->resize(std::max(x->size(), std::size_t(3 * s.points())));
+      if (!s.imperfect && !s.elastic && !s.layer && !marked) continue;
       one_reading.resize(std::max(one_reading.size(), std::size_t(3 * s.points())));
       of_tiles.resize(std::max(of_tiles.size(), std::size_t(s.n_tiles()) * 3 * kTactileTile));
       if (small(s))
@@ -164,7 +171,7 @@ struct Readout::Impl {
   }
   /// Whether a reading needs more than the kernels' field.
   [[nodiscard]] bool imperfect(FieldOutput of) const {
-    return of.form == FieldForm::markers || is_elastic(of) ||
+    return of.form == FieldForm::markers || is_elastic(of) || sensor_of(of.sensor).layer ||
            (of.form != FieldForm::ideal && sensor_of(of.sensor).imperfect);
   }
   /// Turns an ideal field into the reading of an imperfect sensor, in the readout's precision.
@@ -220,6 +227,8 @@ struct Readout::Impl {
                       std::span<double> field) {
     if (sensor_of(of.sensor).past_states() > 0) {
       read_past(batch, environment, of, field);
+    } else if (sensor_of(of.sensor).layer) {
+      read_layered(batch, environment, of, field);
     } else if (is_elastic(of)) {
       read_elastic(batch, environment, of, field);
     } else {
@@ -228,14 +237,44 @@ struct Readout::Impl {
     make_imperfect(batch, environment, of, field);
   }
 
+  /// Copies some components of a field.
+  static void take_part(std::span<const double> whole, const FieldPart& part,
+                        std::span<double> field) {
+    const auto width = std::size_t(part.count);
+    for (std::size_t k = 0; k < field.size(); ++k)
+      field[k] = whole[k / width * 3 + std::size_t(part.first) + k % width];
+  }
+
+  /// Computes the ideal field of a sensor with a layer, or some of its components, in double. The
+  /// pressure leaves friction out.
+  void read_layered(const Batch& batch, int environment, FieldOutput of, std::span<double> field) {
+    const CompiledSensor& s = sensor_of(of.sensor);
+    const std::size_t numbers = std::size_t(3 * s.points());
+    const auto normal = std::span(normal_springs).first(numbers),
+               all = std::span(all_springs).first(numbers),
+               whole = std::span(layer_field).first(numbers);
+    auto a =
+        reader.arguments<double>(of.sensor, environment % kBlock / kGroup, environment % kGroup);
+    const kernels::Touch<double>* const touches = a.touches;
+    without_friction(a, frictionless);
+    read_ideal(reader, s, a, normal);
+    a.touches = touches;
+    if (of.form == FieldForm::pressure)
+      std::copy(normal.begin(), normal.end(), all.begin());
+    else if (s.elastic)
+      elastic.read(reader, batch, environment, of.sensor, all);
+    else
+      read_ideal(reader, s, a, all);
+    layered.read(s, a, {all, normal}, whole);
+    take_part(whole, part_of(of.form), field);
+  }
+
   /// Computes the ideal field of a sensor with shear springs, or some of its components.
   void read_elastic(const Batch& batch, int environment, FieldOutput of, std::span<double> field) {
     const FieldPart part = part_of(of.form);
-    const auto width = std::size_t(part.count);
-    const auto whole = std::span(elastic_field).first(field.size() / width * 3);
+    const auto whole = std::span(elastic_field).first(field.size() / std::size_t(part.count) * 3);
     elastic.read(reader, batch, environment, of.sensor, whole);
-    for (std::size_t k = 0; k < field.size(); ++k)
-      field[k] = whole[k / width * 3 + std::size_t(part.first) + k % width];
+    take_part(whole, part, field);
   }
 
   /// The same into scratch of the readout. For a sum: the field.
@@ -256,7 +295,9 @@ struct Readout::Impl {
     const std::size_t points = std::size_t(sensor_of(sensor).points());
     const std::span<double> field = std::span(one_reading).first(3 * points),
                             moved = std::span(displacement).first(2 * points);
-    if (sensor_of(sensor).elastic)
+    if (sensor_of(sensor).layer)
+      read_layered(batch, environment, ideal, field);
+    else if (sensor_of(sensor).elastic)
       read_elastic(batch, environment, ideal, field);
     else
       fill(environment, ideal, field.data());
@@ -416,7 +457,7 @@ struct Readout::Impl {
   /// shapes differ in size between lanes.
   [[nodiscard]] bool together(const Batch& batch, int number, int sensor) const {
     return sensor_of(sensor).past_states() == 0 && !sensor_of(sensor).elastic &&
-           in_lanes(sensor, environments_of(batch, number));
+           !sensor_of(sensor).layer && in_lanes(sensor, environments_of(batch, number));
   }
   [[nodiscard]] bool in_lanes(int sensor, int environments) const {
     return small(sensor_of(sensor)) && !sensor_of(sensor).sizes_vary && environments >= kFewest;

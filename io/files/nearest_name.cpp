@@ -38,7 +38,10 @@ std::string nearest_name(std::string_view wrong, std::span<const std::string> ca
     const std::size_t d = edit_distance(wrong, c);
     if (d < best_distance) best = c, best_distance = d;
   }
-  return best;
+  if (!best.empty() || wrong.size() < 3) return best;
+  const auto begun =
+      std::ranges::find_if(candidates, [&](const std::string& c) { return c.starts_with(wrong); });
+  return begun == candidates.end() ? "" : *begun;
 }
 
 std::string suggestion(std::string_view wrong, std::span<const std::string> candidates) {

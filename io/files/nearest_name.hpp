@@ -8,8 +8,9 @@
 
 namespace tangere {
 
-/// Returns the candidate with the smallest edit distance; "" if none is near (more than about half
-/// of the word would change).
+/// Returns the candidate with the smallest edit distance. If none is near (more than about half of
+/// the word would change), the first that begins with a wrong word of three letters or more; else
+/// "".
 std::string nearest_name(std::string_view wrong, std::span<const std::string> candidates);
 
 /// Returns "; did you mean 'x'?" or "; expected one of a, b, c", or "" if there are no candidates.

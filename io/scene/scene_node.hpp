@@ -89,6 +89,8 @@ class SceneNode {
   [[nodiscard]] std::vector<SceneNode> children(const std::vector<std::string>& known) const;
 
   [[nodiscard]] bool has(const char* attribute) const { return find(attribute) != nullptr; }
+  /// Whether the element itself gives it, not <default>.
+  [[nodiscard]] bool gives(const char* attribute) const { return find_own(attribute) != nullptr; }
   [[nodiscard]] std::string text(const char* attribute) const;  ///< required
   [[nodiscard]] std::string text(const char* attribute, const std::string& fallback) const;
   /// Returns the index of the value among `words`.

@@ -4,10 +4,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "engine/scene/field_form.hpp"
 #include "engine/scene/imperfection_checks.hpp"
 #include "engine/scene/sensed_bodies.hpp"
+#include "engine/scene/skin_material.hpp"
 #include "io/files/name_list.hpp"
 #include "io/files/nearest_name.hpp"
 #include "io/scene/scene_sections.hpp"
@@ -56,9 +58,8 @@ RectArray read_array(const SceneElement& node) {
   return array;
 }
 
-/// Turns coefficients by area into those of the array's points, each of which stands for a cell.
-void share_area(const SceneElement& node, TactileDescription& d) {
-  const RectArray& a = d.array;
+/// Returns the area for which a point of an array stands [m²].
+double cell_of(const SceneElement& node, const RectArray& a) {
   const Vector3 way = a.corner1 - a.corner0;
   const double cell =
       std::abs(dot(way, a.axis0) * dot(way, a.axis1)) / ((a.rows - 1.0) * (a.cols - 1.0));
@@ -67,9 +68,47 @@ void share_area(const SceneElement& node, TactileDescription& d) {
         fmt::format("per=\"area\" with {} x {} points; expected rows and columns that cover "
                     "an area",
                     a.rows, a.cols));
+  return cell;
+}
+
+/// The same of a hemisphere 2 π r² or of a cylinder 2 π r l with n points.
+double cell_of(const SceneElement& node, const std::string& type, std::size_t n) {
+  const double r = node.number("radius");
+  return 2 * std::numbers::pi * r * (type == "hemisphere" ? r : node.number("length")) / double(n);
+}
+
+/// Turns coefficients by area into those of points that stand for `cell` [m²]. Those that the
+/// element does not give itself follow from its material, if it has one.
+void share_area(const SceneElement& node, double cell, TactileDescription& d) {
   d.cell = cell;
-  for (std::size_t k = 0; k < kCoefficients; ++k)
-    if (scales_with_area(k)) d.coefficients[k] *= node.context().area(cell);
+  const std::optional<ContactCoefficients> springs =
+      d.material ? std::optional(skin_springs(*d.material)) : std::nullopt;
+  static constexpr const char* kNames[] = {"kn", "kt", "mu", "damping", "ks"};
+  for (std::size_t k = 0; k < kCoefficients; ++k) {
+    if (!scales_with_area(k)) continue;
+    if (springs && !node.gives(kNames[k]))
+      d.coefficients[k] = (*springs)[k] * cell;
+    else
+      d.coefficients[k] *= node.context().area(cell);
+  }
+}
+
+/// Reads `modulus`, `thickness` and `relaxation`, if there are any.
+std::optional<SkinMaterial> read_material(const SceneElement& node, const std::string& type) {
+  if (!node.row("modulus").serves(type)) return std::nullopt;
+  if (!node.has("modulus")) {
+    for (const char* part : {"thickness", "relaxation"})
+      if (node.has(part)) node.fail(fmt::format("{} without modulus; expected both", part));
+    return std::nullopt;
+  }
+  if (!node.has("thickness")) node.fail("modulus without thickness; expected both");
+  if (node.has("per") && node.text("per") == "point")
+    node.fail(
+        "modulus and per=\"point\": a skin's coefficients count per area; expected one of "
+        "them");
+  SkinMaterial material;
+  node.read(material, false, type);
+  return material;
 }
 
 std::vector<TactilePoint> read_spec(const SceneElement& node) {
@@ -121,18 +160,21 @@ std::vector<TactilePoint> read_points(const SceneElement& node, const std::strin
 
 /// Reads what <tactile> holds, each at most once.
 void read_parts(const SceneNode& node, TactileDescription& sensor) {
-  bool imperfections = false;
+  std::vector<std::string> found;
   for (const SceneNode& part : children_of(node)) {
-    const bool marks = part.name() == "markers";
-    if (marks ? sensor.markers.has_value() : imperfections)
+    if (std::ranges::count(found, part.name()) > 0)
       part.fail("a second time in one <tactile>; expected one");
-    const SceneElement element(part, marks ? kMarkers : kImperfections);
+    found.push_back(part.name());
+    const bool marks = part.name() == "markers", couples = part.name() == "layer";
+    const SceneElement element(part, marks ? kMarkers : couples ? kLayer : kImperfections);
     element.check();
     if (marks) {
       element.read(sensor.markers.emplace());
       sensor.markers->source = part.source();
+    } else if (couples) {
+      element.read(sensor.layer.emplace());
+      sensor.layer->source = part.source();
     } else {
-      imperfections = true;
       element.read(sensor.imperfections);
       sensor.imperfections.source = part.source();
       check_imperfections(sensor.imperfections, sensor.name, sensor.points.empty());
@@ -223,10 +265,14 @@ void read_sensors(Scene& scene, const SceneNode& section) {
     }
     if (type == "rect_array") {
       d.array = read_array(node);
-      if (node.word("per") == 1) share_area(node, d);
     } else {
       d.points = read_points(node, type);
     }
+    d.material = read_material(node, type);
+    if (d.material || (node.word("per") == 1 && node.row("per").serves(type)))
+      share_area(node,
+                 d.points.empty() ? cell_of(node, d.array) : cell_of(node, type, d.points.size()),
+                 d);
     read_parts(node, d);
     for (const auto& [name, list] : {std::pair{"feels", &d.feels}, {"ignores", &d.ignores}})
       if (node.has(name)) *list = body_names(node, name);

@@ -256,16 +256,16 @@ def test_files_are_beside_the_folder(tmp_path):
 
 REQUESTS = {
     "hand.urdf": {
-        "--pad": (["finger=gelsight_mini@0,0,0.06", "tip=digit@0,0,0,0.1,0.2,0.3"],
-                  {"finger": ("gelsight_mini", (0, 0, 0.06)),
-                   "tip": ("digit", np.array([0, 0, 0, 0.1, 0.2, 0.3]))}),
+        "--pad": (["finger=gelsight_mini_measured@0,0,0.06", "tip=digit_guess@0,0,0,0.1,0.2,0.3"],
+                  {"finger": ("gelsight_mini_measured", (0, 0, 0.06)),
+                   "tip": ("digit_guess", np.array([0, 0, 0, 0.1, 0.2, 0.3]))}),
         "--motor": (["slide=force", "shoulder=30,2"], {"slide": "force", "shoulder": (30, 2)}),
         "--contact": (["finger=ground"], [("finger", "ground")]),
         "--end-effector": (["tip"], ["tip"]),
     },
     "gripper.urdf": {
-        "--pad": ([f"left_finger={ROOT}/scenes/sensors/digit.xml@-y"],
-                  {"left_finger": (ROOT / "scenes/sensors/digit.xml", "-y")}),
+        "--pad": ([f"left_finger={ROOT}/scenes/sensors/digit_guess.xml@-y"],
+                  {"left_finger": (ROOT / "scenes/sensors/digit_guess.xml", "-y")}),
         "--motor": (["left_slide=2000"], {"left_slide": 2000}),
         "--base": (["free"], "free"),
         "--drop": ([], True),
@@ -302,7 +302,7 @@ def test_a_robot_is_that_of_the_command(name, command, tmp_path):
 
 def test_a_robot_is_extended():
     with pytest.warns(UserWarning, match="motion differs by it: .*<mimic>"):
-        b = import_robot(ROBOTS / "gripper.urdf", pads={"left_finger": ("gelsight_mini", "-y")},
+        b = import_robot(ROBOTS / "gripper.urdf", pads={"left_finger": ("gelsight_mini_measured", "-y")},
                          motors={"left_slide": (2000, 100)}, drop=True)  # fmt: skip
     ball = b.robot.link("ball", parent="palm")
     ball.joint("ball", "free3d", pos=(0, 0, 0.1))
@@ -321,11 +321,11 @@ def test_requests_for_a_robot_are_checked():
             import_robot(ROBOTS / "hand.urdf", **options)
         return str(e.value)
 
-    assert "neither a file nor a layout of the program; did you mean 'digit'" in fault(
+    assert "neither a file nor a layout of the program; did you mean 'digit_guess'" in fault(
         pads={"tip": "digt"}
     )
-    assert "did you mean 'tip'" in fault(pads={"tipp": "digit"})
-    assert "(1, 2); expected x y z or" in fault(pads={"tip": ("digit", (1, 2))})
+    assert "did you mean 'tip'" in fault(pads={"tipp": "digit_guess"})
+    assert "(1, 2); expected x y z or" in fault(pads={"tip": ("digit_guess", (1, 2))})
     assert "'forc'; expected 'force', P or P, D" in fault(motors={"slide": "forc"})
     assert "a gain P above 0" in fault(motors={"slide": -1})
     assert "did you mean 'slide'" in fault(motors={"slid": "force"})

@@ -106,6 +106,11 @@ void drop_imperfections(Scene& scene, int element, Ablation way) {
   }
 }
 
+void drop_layer(Scene& scene, int element) {
+  for (std::size_t k = 0; k < scene.sensors.size(); ++k)
+    if (is_meant(element, k)) scene.sensors[k].layer.reset();
+}
+
 void drop_markers(Scene& scene, int element, Ablation way) {
   constexpr double kRigid = 1e300;  // [N/m] what markers have is a compliance
   for (std::size_t k = 0; k < scene.sensors.size(); ++k) {
@@ -222,6 +227,7 @@ void drop(Scene& scene, const Effect& effect, Ablation way) {
     case Kind::position_motors: drop_motors(scene, MotorControl::position, way); break;
     case Kind::sensor_imperfections: drop_imperfections(scene, effect.element, way); break;
     case Kind::markers: drop_markers(scene, effect.element, way); break;
+    case Kind::layer: drop_layer(scene, effect.element); break;
     case Kind::feedback: drop_feedback(scene, effect.element, way); break;
     case Kind::varying_parameters: drop_varying(scene, way); break;
     case Kind::sleeping: scene.solver.sleep = 0, scene.solver.sleep_source = {}; break;
@@ -234,7 +240,8 @@ void drop(Scene& scene, const Effect& effect, Ablation way) {
 
 bool has_way(EffectKind kind, Ablation way) {
   if (kind == Kind::velocity_products) return false;
-  if (way == Ablation::zero) return kind != Kind::gravity && kind != Kind::sleeping;
+  if (way == Ablation::zero)
+    return kind != Kind::gravity && kind != Kind::sleeping && kind != Kind::layer;
   return way == Ablation::removed || kind == Kind::joint_limits;
 }
 

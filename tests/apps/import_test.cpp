@@ -24,8 +24,8 @@ TEST(Import, AGripperAndAnObjectBecomeADataSet) {
   std::filesystem::copy(kGrasp, folder.path("grasp"), std::filesystem::copy_options::recursive);
   const Words command = {"import",  "grasp/gripper.urdf",
                          "-o",      "grasp/gripper.xml",
-                         "--pad",   "left_finger=gelsight_mini@-y",
-                         "--pad",   "right_finger=gelsight_mini@+y",
+                         "--pad",   "left_finger=gelsight_mini_measured@-y",
+                         "--pad",   "right_finger=gelsight_mini_measured@+y",
                          "--motor", "lift=2000,100",
                          "--motor", "left_slide=400,20",
                          "--motor", "right_slide=400,20"};
@@ -58,10 +58,11 @@ TEST(Import, WhatIsNoRequestIsSaid) {
     return outcome.err;
   };
   EXPECT_THAT(fault({"--pad", "tip"}), HasSubstr("--pad tip: expected LINK=LAYOUT"));
-  EXPECT_THAT(fault({"--pad", "tip=digt"}), HasSubstr("did you mean 'digit'"));
-  EXPECT_THAT(fault({"--pad", "tipp=digit"}), HasSubstr("did you mean 'tip'"));
-  EXPECT_THAT(fault({"--pad", "tip=digit@+x"}), HasSubstr("is no box"));
-  EXPECT_THAT(fault({"--pad", "tip=digit@1,2"}), HasSubstr("2 numbers behind '@'"));
+  EXPECT_THAT(fault({"--pad", "tip=digit_gues"}), HasSubstr("did you mean 'digit_guess'"));
+  EXPECT_THAT(fault({"--pad", "tip=digit"}), HasSubstr("did you mean 'digit_guess'"));
+  EXPECT_THAT(fault({"--pad", "tipp=digit_guess"}), HasSubstr("did you mean 'tip'"));
+  EXPECT_THAT(fault({"--pad", "tip=digit_guess@+x"}), HasSubstr("is no box"));
+  EXPECT_THAT(fault({"--pad", "tip=digit_guess@1,2"}), HasSubstr("2 numbers behind '@'"));
   EXPECT_THAT(fault({"--motor", "slid=force"}), HasSubstr("did you mean 'slide'"));
   EXPECT_THAT(fault({"--motor", "slide=-1"}), HasSubstr("a gain P above 0"));
   EXPECT_THAT(fault({"--motor", "loose=force"}),

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Two scenes that have every effect between them: tests of effects go through both.
+// Three scenes that have every effect between them: tests of effects go through all.
 #pragma once
 
 #include <utility>
@@ -74,9 +74,20 @@ inline Scene scene_that_remembers() {
   return s;
 }
 
+/// A pad whose points a layer couples, on a ball.
+inline Scene scene_with_layer() {
+  Scene s = rolling_ball(false, 12);
+  s.sensors[0].material = SkinMaterial{1e4, 0.02, 1e-3};
+  s.sensors[0].layer.emplace();
+  s.initial.push_back({"pad_joint", {0.002, 0.001, -0.0162}, {0.05, -0.02, -0.01}, {}});
+  s.control = ConstantControl{{0.1, -0.05, 0.1}};
+  return s;
+}
+
 /// Every kind of effect is on in one of them.
 inline const std::vector<Scene>& scenes_of_all_effects() {
-  static const std::vector<Scene> all = {scene_that_sleeps(), scene_that_remembers()};
+  static const std::vector<Scene> all = {scene_that_sleeps(), scene_with_layer(),
+                                         scene_that_remembers()};
   return all;
 }
 

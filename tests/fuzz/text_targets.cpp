@@ -67,7 +67,7 @@ std::vector<std::string> scenes(const std::string& folder) {
        {"rolling_ball_small", "box_pushing", "cap_opening", "insertion", "stable_grasp"})
     corpus.push_back(file_bytes(std::string(TANGERE_SOURCE_DIR "/scenes/") + name + ".xml"));
   // A scene of two files, of which the mutants change the first.
-  fs::copy(TANGERE_SOURCE_DIR "/scenes/sensors/fingertip.xml", fs::path(folder) / "tip.xml");
+  fs::copy(TANGERE_SOURCE_DIR "/scenes/sensors/fingertip_guess.xml", fs::path(folder) / "tip.xml");
   fs::copy(std::string(kScenes) + "included_ball.xml", fs::path(folder) / "included_ball.xml");
   corpus.push_back(file_bytes(std::string(kScenes) + "including.xml"));
   corpus.push_back(small_scene());

@@ -302,8 +302,8 @@ TEST(RobotImport, PackagesAreFoldersAboveTheRobot) {
 TEST(RobotImport, AddsSkinsMotorsAndContacts) {
   RobotOptions options;
   options.pads = {{"left_finger",
-                   "grid_16x16",
-                   file_bytes(TANGERE_SOURCE_DIR "/scenes/sensors/grid_16x16.xml"),
+                   "grid_16x16_guess",
+                   file_bytes(TANGERE_SOURCE_DIR "/scenes/sensors/grid_16x16_guess.xml"),
                    {},
                    "-y"}};
   options.motors = {{"left_slide", 400.0, 20.0}, {"right_slide"}};
@@ -392,8 +392,8 @@ TEST(RobotImport, SitesAreNamedPlaces) {
   RobotOptions options;
   options.end_effectors = {"tip", "b"};
   options.pads = {{"tip",
-                   "grid_16x16",
-                   file_bytes(TANGERE_SOURCE_DIR "/scenes/sensors/grid_16x16.xml"),
+                   "grid_16x16_guess",
+                   file_bytes(TANGERE_SOURCE_DIR "/scenes/sensors/grid_16x16_guess.xml"),
                    {{0.1, 0, 0}, {1, 0, 0, 0}},
                    ""}};
   const ImportedScene made = import(text, options);

@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: Apache-2.0
+// The coupled layer of a sensor, compiled (docs/layer.md).
+#pragma once
+
+#include <vector>
+
+#include "engine/model/layer_compliance.hpp"
+
+namespace tangere {
+
+struct CompiledLayer {
+  LayerGrid grid;
+  int side = 1;                    ///< points along the side of a cell
+  std::vector<int> cell_of_point;  ///< (points) row-major
+  LayerCompliance compliance;
+  double modulus = 0;     ///< E [Pa] where kn is `stiffness`; it changes in proportion to kn
+  double stiffness = 0;   ///< kn of the scene [N/m]
+  double relaxation = 0;  ///< τ [s]
+  double area = 0;        ///< for which a point stands [m²]
+  int outward = 1;        ///< 1 or -1: whether the pad's z points out of the skin
+};
+
+}  // namespace tangere

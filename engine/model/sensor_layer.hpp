@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: Apache-2.0
+// Compiles the coupled layer of a sensor (docs/layer.md).
+#pragma once
+
+#include <memory>
+
+#include "engine/model/compiled_model.hpp"
+
+namespace tangere {
+
+/// Cells of a layer, at most: their compliance has 8 bytes for each pair.
+inline constexpr int kMostLayerCells = 4096;
+
+/// Throws InputError (file:line) for a sensor that cannot have a layer. `sensor`: with its points,
+/// imperfections and body. `pressure_sign`: as in SensorInfo.
+std::shared_ptr<const CompiledLayer> compile_sensor_layer(const TactileDescription& d,
+                                                          const CompiledSensor& sensor,
+                                                          int pressure_sign);
+
+}  // namespace tangere

@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: Apache-2.0
+// Pressure of a soft layer whose points are coupled (docs/layer.md). The layer is cut into cells i of
+// m × m points s. With the depth δ_s of a shape below the pad's surface, along the pad's normal,
+//
+//   p_s = k max(0, δ_s - w_i),  P_i = Σ_{s∈i} p_s/m²,  w = C' P,  C' = C - I/k,  k = 1/C(0)
+//
+// where C is the compliance of engine/model/layer_compliance.hpp. Let n_i points of cell i press
+// (p_s > 0). Then P solves M P = δ̄ on cells with n_i > 0, where δ̄_i is the mean of δ_s over these
+// points and M = C' + diag(m²/(k n_i)), which is symmetric and positive definite. Newton's method
+// changes n_i until they agree with p.
+//
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "engine/model/compiled_layer.hpp"
+
+namespace tangere {
+
+/// Solves one sensor's layer at a time. Owns the scratch of one thread, which grows with the number
+/// of cells in contact.
+class GelLayer {
+ public:
+  /// Solves the layer for depths δ, (points) [m], with E = `modulus` [Pa]. Points with δ ≤ 0 do not
+  /// press. The functions below refer to this solution.
+  void solve(const CompiledLayer& layer, std::span<const double> depth, double modulus);
+
+  /// p, (points) [Pa]; 0 where a point does not press.
+  [[nodiscard]] std::span<const double> pressure() const { return pressure_; }
+  /// Linear systems that solve() needed.
+  [[nodiscard]] int systems() const { return systems_; }
+
+  /// Computes the cotangent of the depths, (points), from that of the pressures. Which points press
+  /// stays fixed. p is proportional to E.
+  void pull_back(std::span<const double> pressure_bar, std::span<double> depth_bar);
+  /// Computes how the pressures change with the depths, (points), at a given E.
+  void push_forward(std::span<const double> depth_dot, std::span<double> pressure_dot);
+
+ private:
+  bool update_pressing();
+  void set_up();
+  void factor();
+  void solve_system();
+  void yield_of(std::span<const int> cells);
+  void relax();
+  [[nodiscard]] double relaxed(int cell) const;
+  [[nodiscard]] double coupling(int i, int j) const;
+
+  const CompiledLayer* layer_ = nullptr;
+  double stiffness_ = 0;                     ///< k at E = 1 [1/m]
+  double modulus_ = 0;                       ///< E [Pa]
+  std::vector<double> depth_, pressure_;     ///< (points)
+  std::vector<char> presses_;                ///< (points)
+  std::vector<int> count_;                   ///< (cells) n_i
+  std::vector<int> near_, pressing_;         ///< cells with δ > 0, and with n_i > 0
+  std::vector<double> mean_, load_, yield_;  ///< (cells) δ̄, P at E = 1, w
+  std::vector<double> factor_, rhs_;         ///< (pressing, pressing) U with M = Uᵀ U; (pressing)
+  int systems_ = 0;
+};
+
+}  // namespace tangere

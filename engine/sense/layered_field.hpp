@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: Apache-2.0
+// Field of a sensor with a coupled layer (docs/layer.md). With the force N n and the friction T of
+// the springs at a point, and the layer's pressure p there, the force on the sensor's body is
+//   f = 𝒜 p (slant + T/N)
+// so that friction keeps its cone. Springs find which points touch; the layer shares out the load.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "engine/model/compiled_model.hpp"
+#include "engine/sense/gel_layer.hpp"
+#include "engine/sense/layer_depth.hpp"
+#include "kernels/numbers/dual.hpp"
+#include "kernels/tactile/tactile_types.hpp"
+
+namespace tangere {
+
+/// Fields of springs at the same state, each (points, 3) [N]: with friction, and without it.
+struct SpringFields {
+  std::span<const double> whole, normal;
+};
+
+/// Owns the scratch of one thread.
+class LayeredField {
+ public:
+  /// Computes the field, (points, 3) [N]. `touch`: the shapes in pad axes (PadReader::arguments()).
+  void read(const CompiledSensor& sensor, const kernels::TactileArgs<double>& touch,
+            const SpringFields& springs, std::span<double> field);
+
+  /// Derivatives of the last field that was read.
+  struct Cotangents {
+    std::span<double> whole, normal;                       ///< (points, 3) of the springs' fields
+    std::span<kernels::TouchCotangent<double>> touches{};  ///< pad axes and origin
+    double stiffness = 0;                                  ///< of the coefficient kn
+  };
+  /// Pulls the cotangent of the field back. Overwrites all of `out`. `sizes`: also by sizes of
+  /// shapes.
+  void pull_back(std::span<const double> field_bar, bool sizes, Cotangents& out);
+
+  /// Computes how the last field changes when the springs' fields and the shapes do: (points, 3).
+  /// `touches`, `sizes`: of the shapes, with dual numbers. `stiffness_dot`: of kn.
+  void push_forward(const SpringFields& springs_dot,
+                    std::span<const kernels::Touch<kernels::Dual<double>>> touches,
+                    std::span<const kernels::Vec3<kernels::Dual<double>>> sizes,
+                    double stiffness_dot, std::span<double> field_dot);
+
+  /// Linear systems that the last read() solved.
+  [[nodiscard]] int systems() const { return layer_.systems(); }
+
+ private:
+  struct Point {
+    int index, target;
+    kernels::Vec3<double> xi;  ///< pad axes [m]
+    double known;              ///< δ [m]
+    double normal;             ///< N [N]
+    LayerDepth<double> at;
+  };
+  void find_points(const kernels::TactileArgs<double>& touch, const SpringFields& springs);
+  [[nodiscard]] kernels::Vec3<double> in_field(const kernels::Vec3<double>& force) const;
+  [[nodiscard]] kernels::Vec3<double> to_pad(const double* field_bar) const;
+
+  const CompiledSensor* sensor_ = nullptr;
+  kernels::PadTiles pad_{};
+  double kn_ = 0;
+  std::vector<kernels::TouchShape> shapes_;
+  std::vector<kernels::Touch<double>> touches_;
+  std::vector<Point> points_;
+  std::vector<double> whole_, normal_;                // (points, 3)
+  std::vector<double> depth_, depth_bar_, load_bar_;  // (points)
+  std::vector<kernels::Vec3<double>> slant_bar_;      // parallel to points_
+  GelLayer layer_;
+};
+
+}  // namespace tangere
