@@ -21,16 +21,6 @@ using ::testing::HasSubstr;
 using testing::IsEmpty;
 using testing::Not;
 
-/// The subcommands that `tangere --help` lists.
-Words subcommands() {
-  const std::string help = run(Folder(), {"--help"}).out;
-  std::istringstream lines(help.substr(help.find("\nSubcommands:\n") + 14));
-  Words names;
-  for (std::string line; std::getline(lines, line) && line.starts_with("  ");)
-    names.push_back(line.substr(2, line.find(' ', 2) - 2));
-  return names;
-}
-
 /// `tangere simulate small.xml --output out.h5` and more.
 Words simulate(const Words& more = {}) {
   return Words{"simulate", scene("rolling_ball_small.xml"), "--output", "out.h5"} + more;
@@ -101,16 +91,6 @@ TEST(Command, ASkinOfRubberHasItsCoefficients) {
   EXPECT_THAT(outcome.err, HasSubstr("<tactile kn=\"87.73\" kt=\"0.1119\" mu=\"0.6\""));
   const double wide = 2e5 * 0.51 / (1.49 * 0.02);
   EXPECT_NEAR(answer.at("wide_modulus").get<double>(), wide, 1e-9 * wide);
-}
-
-TEST(Command, ThePageNamesEveryOption) {
-  const Folder folder;
-  for (const std::string& name : subcommands()) {
-    const std::string help = run(folder, {name, "--help"}).out;
-    const std::regex option("--[a-z-]+");
-    for (std::sregex_iterator at(help.begin(), help.end(), option), end; at != end; ++at)
-      EXPECT_THAT(page_of(name), HasSubstr("`" + at->str() + "`")) << name;
-  }
 }
 
 TEST(Command, TopLevelHelpNamesEverySubcommandAndExitCode) {
