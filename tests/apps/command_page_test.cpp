@@ -58,10 +58,10 @@ std::vector<Group> groups_of(const std::string& help) {
   return groups;
 }
 
-/// The text with options and elements of scenes as code.
+/// The text with options, elements of scenes and quoted commands as code.
 std::string with_code(const std::string& text) {
-  static const std::regex code("<[a-z]+>|--[a-z-]+");
-  return std::regex_replace(text, code, "`$&`");
+  static const std::regex code("<[a-z]+>|--[a-z-]+"), command("'(tangere [a-z]+)'");
+  return std::regex_replace(std::regex_replace(text, code, "`$&`"), command, "`$1`");
 }
 
 /// Returns "`-o`, `--output`" for "-o,--output F.h5 REQUIRED".
