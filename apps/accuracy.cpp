@@ -189,19 +189,22 @@ Command add_accuracy(CLI::App& program) {
       "tangere accuracy scenes/rolling_ball_small.xml --target 1e-2 --svg cost.svg");
   add_text(app, "SCENE", o.scene, "", "Scene file (XML), or the name of a task").required();
   add_text(app, "--quantity", o.quantity, "NAME",
-           "What is compared: tactile, state or gradient [default: tactile, or state without a "
-           "sensor]");
+           "What is compared: tactile (fields of all sensors, over their norm), state "
+           "(coordinates, over their ranges) or gradient (derivatives of the summed squares of all "
+           "fields by the controls) [default: tactile, or state without a sensor]");
   add_positive_number(app, "--target", o.target,
                       "Relative error that is good enough [default: 0.01]");
   add_envs_option(app, o.environments,
-                  "Environments, each with its own random numbers [default: 64]");
+                  "Environments, each with its own random numbers. Fewer than 59 cannot tell what "
+                  "95 % of all others do; then the worst of them counts. [default: 64]");
   add_steps_option(app, o.steps,
-                   "Length in steps of the scene [default: as many as the controls last]");
+                   "For a scene: length in its own steps [default: as many as the controls last]");
   add_controls_option(app, o.controls);
   add_policy_option(app, o.policy);
   add_positive_number(app, "--tol", o.tolerance,
-                      "Tolerance of every setting [default: the one that follows the step]");
-  add_threads_option(app, o.threads);
+                      "Tolerance of every setting [default: the one that follows scheme and step]");
+  add_threads_option(app, o.threads,
+                     "Threads [default: the processors here, at most one for 16 environments]");
   add_seed_option(app, o.seed);
   add_text(app, "--svg", o.svg, "F.svg", "Write a picture of cost against error");
   add_text(app, "--csv", o.csv, "F.csv", "Write a table of all figures");

@@ -58,10 +58,38 @@ void check_no_extras(const CLI::App& program, const CLI::App* command) {
   throw InputError("unknown subcommand '" + word + "'" + suggestion(word, commands));
 }
 
+/// Breaks descriptions into lines of at most 100 columns. Two or more spaces stand between a name
+/// and its description.
+class WrappedHelp : public CLI::Formatter {
+ public:
+  std::string make_option(const CLI::Option* option, bool is_positional) const override {
+    const std::size_t indent = get_column_width();
+    const std::string new_line = "\n" + std::string(indent, ' ');
+    std::string text = "  " + make_option_name(option, is_positional) + make_option_opts(option);
+    text += text.size() + 2 > indent ? new_line : std::string(indent - text.size(), ' ');
+    std::size_t column = indent;
+    std::istringstream words(option->get_description());
+    for (std::string word; words >> word; column += word.size()) {
+      if (column > indent) {
+        const bool fits = column + 1 + word.size() <= kColumns;
+        text += fits ? " " : new_line;
+        column = fits ? column + 1 : indent;
+      }
+      text += word;
+    }
+    return text + "\n";
+  }
+
+ private:
+  static constexpr std::size_t kColumns = 100;
+};
+
 }  // namespace
 
 Parser::Parser(const std::string& description, const std::string& name, const std::string& footer)
     : root_(std::make_unique<CLI::App>(description, name)) {
+  root_->formatter(std::make_shared<WrappedHelp>());
+  root_->set_help_flag("-h,--help", "Print this help on stdout and end with code 0");
   root_->footer(footer);
 }
 
@@ -212,12 +240,18 @@ AddedOption add_flag(CLI::App& command, const std::string& flags, bool& value,
   return AddedOption(*command.add_flag(flags, value, description));
 }
 
+void start_group(CLI::App& command, const std::string& title) {
+  command.option_defaults()->group(title);
+}
+
 void add_console_options(CLI::App& command, Console& console) {
+  start_group(command, "Options");
   add_flag(command, "--json", console.json,
-           "Print one JSON object on stdout; text for people goes to stderr");
-  const AddedOption quiet = add_flag(command, "-q,--quiet", console.quiet, "Print errors only");
+           "Print one JSON object on stdout, whatever happens; text for people goes to stderr");
+  const AddedOption quiet = add_flag(command, "-q,--quiet", console.quiet,
+                                     "Print errors only, and the JSON object if requested");
   add_flag(command, "-v,--verbose", console.verbose,
-           "Print details, and progress even where stderr is no terminal")
+           "Print details, and where stderr is no terminal a line of progress every ten seconds")
       .excludes(quiet);
 }
 

@@ -98,6 +98,9 @@ void add_texts(CLI::App& command, const std::string& flags, std::vector<std::str
 AddedOption add_flag(CLI::App& command, const std::string& flags, bool& value,
                      const std::string& description);
 
+/// Options that are added from here on stand below this title in --help.
+void start_group(CLI::App& command, const std::string& title);
+
 /// Adds --json, -q and -v, which all subcommands share.
 void add_console_options(CLI::App& command, Console& console);
 

@@ -310,32 +310,34 @@ Command add_bench(CLI::App& program) {
                   "--svg speed.svg");
   add_text(app, "SCENE", o.scene, "", "Scene file (XML), or the name of a task").required();
   add_envs_option(app, o.environments, "Environments, in blocks of 16 [default: 256]");
-  add_steps_option(
-      app, o.steps,
-      "Steps of the episode; for a task, actions [default: as many as the controls last]");
+  add_steps_option(app, o.steps,
+                   "Steps of the episode; for a task, actions [default: as many as the controls "
+                   "last, or the task's horizon]");
   add_text(app, "--policy", o.policy, "NAME",
            "Policy of a task: random, hold or scripted [default: random]");
-  add_whole_numbers(app, "--threads", o.threads, 1, kMostThreads,
-                    "Thread counts to measure [default: 1,2,4,... up to the processors here]");
-  add_flag(app, "--pin", o.pinned, "Keep each thread on a processor of its own");
-  add_precision_option(app, o.precision, " with points in float [default: mixed]");
+  add_whole_numbers(
+      app, "--threads", o.threads, 1, kMostThreads,
+      "Thread counts to measure, each once [default: 1,2,4,... up to the processors]");
+  add_flag(app, "--pin", o.pinned, "Keep thread k on the k-th processor that the process may use");
+  add_precision_option(app, o.precision, " (points and readings in float) [default: mixed]");
   add_every_option(app, o.every);
   add_text(app, "--frames", o.frames, "NAME",
-           "Fields to read: dense (every point), compact (touched tiles) or none [default: dense]");
-  add_text(
-      app, "--record", o.record, "LIST",
-      "Readings to take, separated by commas: a sensor's field (pad), pad.pressure, pad.shear, "
-      "pad.sum, pad.ideal, pad.markers or pad.flow; pad/10 every 10th step, pad/final at the end "
-      "[default: the scene's <outputs>, or all fields]");
+           "Fields to read: dense (every point), compact (tiles of 8 x 8 that something touches) "
+           "or none [default: dense]");
+  add_text(app, "--record", o.record, "LIST",
+           "Readings to take, separated by commas: a sensor's field (pad), pad.pressure, "
+           "pad.shear, pad.sum, pad.ideal, pad.markers or pad.flow, with times as in pad/10 or "
+           "pad/final. q alone takes none. [default: the scene's <outputs>, else all fields]");
   add_whole_number<int>(app, "--repeat", o.repeat, 1, kMostPasses,
-                        "Timed passes over the episode; the best counts [default: 3]");
+                        "Timed passes for each thread count [default: 3]");
   add_seed_option(app, o.seed);
   o.solver.add(app);
-  add_flag(
-      app, "--error", o.error,
-      "Say beside the speed how far the setting is from a reference, in up to 32 environments");
-  add_text(app, "--svg", o.svg, "F.svg", "Write a picture of speed against threads");
-  add_text(app, "--csv", o.csv, "F.csv", "Write a table of all figures");
+  add_flag(app, "--error", o.error,
+           "For a scene: print how far its setting is off a reference, in up to 32 environments; "
+           "takes many times as long as the timed passes; not with --sleep");
+  add_text(app, "--svg", o.svg, "F.svg",
+           "Write a picture of speed against threads, with the ideal line");
+  add_text(app, "--csv", o.csv, "F.csv", "Write a table, one row per thread count");
   add_overwrite_option(app, o.overwrite, "Replace the outputs if they exist");
   add_allow_unknown_option(app, o.allow_unknown);
   add_console_options(app, *console);

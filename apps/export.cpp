@@ -46,7 +46,7 @@ Command add_export(CLI::App& program) {
   add_text(app, "DIR", o.input, "", "Folder of shards, or one file of a data set").required();
   add_text(app, "--csv", o.output, "F.csv", "Table to write").required();
   add_whole_number<std::int64_t>(app, "--episode", o.what.episode, 0, 1'000'000'000,
-                                 "Write only this episode");
+                                 "That episode alone [default: all]");
   add_overwrite_option(app, o.what.overwrite);
   add_console_options(app, *console);
   return {&app, [=](const ProgramInfo&) { return export_table(*options, *console); },

@@ -287,61 +287,72 @@ int generate(GenerateOptions options, const Console& console, const ProgramInfo&
 void add_playing_options(CLI::App& app, GenerateOptions& o) {
   add_controls_option(app, o.controls);
   add_text(app, "--policy", o.policy, "NAME",
+<<<<<<< HEAD
            "Policy of a task: random, hold, csv (needs --controls), program (needs --program) or "
            "scripted [default: scripted]");
   add_text(
       app, "--program", o.program, "CMD",
       "Program that chooses the actions of a task, called through its standard input and output; "
       "Python: tangere.policy.serve");
+=======
+           "Policy of a task: random, hold, csv (with --controls), program (with --program) or "
+           "scripted [default: csv with --controls, program with --program, else scripted]");
+  add_text(app, "--program", o.program, "CMD",
+           "Program that chooses a task's actions over its standard input and output");
+>>>>>>> 87611b13483b39b194f452599d8ca3f6fa44aea0
   add_positive_number(app, "--program-timeout", o.program_timeout,
-                      "Seconds for its start and for every answer [default: 120]");
-  add_positive_number(
-      app, "--noise", o.noise,
-      "Standard deviation of noise on every number of an action of the script or the "
-      "program, in its unit [default: none]");
+                      "Longest time of its start and of every answer [s] [default: 120]");
+  add_positive_number(app, "--noise", o.noise,
+                      "With scripted or program: standard deviation of noise on every number of an "
+                      "action, in its unit [default: none]");
   add_text(app, "--mix", o.mix, "random=SHARE",
-           "Share of the episodes that random actions play instead [default: none]");
+           "With scripted or program: share of episodes with random actions [default: none]");
 }
 
 /// Options of what is stored, and how.
 void add_storage_options(CLI::App& app, GenerateOptions& o) {
-  add_text(
-      app, "--compress", o.compress, "NAME",
-      "Compression of large observations: none, deflate, or lz4, which needs a plug-in to read "
-      "[default: none]");
+  start_group(app, "What to store");
+  add_precision_option(app, o.precision, ", which stores float32 [default: mixed]");
+  add_text(app, "--compress", o.compress, "NAME",
+           "Compression of large observations: none, deflate, or lz4, which is faster but needs a "
+           "plug-in to read [default: none]");
   add_text(app, "--tactile", o.tactile, "KIND",
-           "Storage of large fields: sparse, which leaves out tiles of zeros, or dense [default: "
-           "sparse]");
-  add_text(
-      app, "--record", o.record, "LIST",
-      "Observations to store, separated by commas: q, v, variables, bodies or bodies.NAME, a "
-      "sensor's field (pad), pad.pressure, pad.shear, pad.sum, pad.ideal, pad.markers or pad.flow; "
-      "NAME/10 every 10th step, NAME/final at the end; the rest is not computed [default: the "
-      "scene's <outputs>, or all but bodies]");
+           "Storage of large fields: sparse (no tiles of zeros) or dense [default: sparse]");
+  add_text(app, "--record", o.record, "LIST",
+           "Observations to store, separated by commas: q, v, variables, bodies or bodies.NAME, a "
+           "sensor's field (pad), pad.pressure, pad.shear, pad.sum, pad.ideal, pad.markers or "
+           "pad.flow; pad/10 is every 10th step, q/final the end alone; of a task its observations "
+           "[default: the scene's <outputs>, or all but bodies]");
   add_text(app, "--gradients", o.gradients, "KIND",
-           "Derivatives to store: none, return (for a scene with --loss), or jacobians of each row "
-           "[default: none]");
+           "Derivatives beside the rows: none, return (of the task's, or of a scene's --loss) or "
+           "jacobians (of each row's state by the row before); not with --sleep [default: none]");
   add_text(app, "--loss", o.loss, "NAME",
            "Loss of a scene, with --gradients return: final, path, tactile, shear, variables or "
-           "markers");
+           "markers; fields count at rows");
   add_memory_size(
       app, "--tape-memory", o.tape_memory,
-      "With --gradients return: memory for the states that all threads keep [default: 1GB each]");
+      "With --gradients return: memory for the states that all threads keep; with less than all of "
+      "them steps are repeated from checkpoints, with the same bits [default: 1GB each]");
 }
 
 /// Options of the folder of shards.
 void add_shard_options(CLI::App& app, GenerateOptions& o) {
+  start_group(app, "Which files");
   add_text(app, "--name", o.name, "NAME",
-           "Last part of the data set's id for Minari [default: the policy; of a scene, none]");
+           "Last part of the data set's id for Minari: at most 100 letters, digits, hyphens and "
+           "underscores [default: the policy, with -noise and -random; for a scene, none]");
   add_whole_number<std::int64_t>(
       app, "--shards", o.shards, 1, kMostEpisodes,
-      "Number of shards [default: as many as keep each below a gigabyte]");
+      "Files of the data set, in blocks of 16 episodes [default: each below a gigabyte]");
   add_text(app, "--shard", o.shard, "k/S",
-           "Make only shard k of S, k from 0; other processes may make others");
+           "Make shard k of S alone, k from 0; other processes may make others at the same time "
+           "[default: all, or this process's share]");
   add_flag(app, "--resume", o.resume,
-           "Keep the shards in the folder if their settings are the same, and make the rest");
-  add_flag(app, "--no-merge", o.no_merge, "Do not merge the shards when all are there");
-  add_flag(app, "--dry-run", o.dry_run, "Say what would be made, and how long it may take");
+           "Keep the shards in the folder and make the rest, if their settings are the same");
+  add_flag(app, "--no-merge", o.no_merge,
+           "Make shards alone; else the last process that ends does what merge does");
+  add_flag(app, "--dry-run", o.dry_run,
+           "Print what would be made, and how long it may take. Nothing is written.");
   add_overwrite_option(app, o.overwrite, "Replace the shards in the folder");
 }
 
@@ -355,22 +366,25 @@ Command add_generate(CLI::App& program) {
       program, "generate", "Run many episodes of a scene or a task and write a data set",
       "tangere generate scenes/rolling_ball_small.xml --output balls --episodes 32 --seed 1");
   add_text(app, "SCENE", o.scene, "", "Scene file (XML), or the name of a task").required();
-  add_text(app, "-o,--output", o.output, "DIR", "Folder to write shards into").required();
+  start_group(app, "What to simulate");
+  add_text(app, "-o,--output", o.output, "DIR", "Folder for shards, made if its parent is there")
+      .required();
   add_whole_number<std::int64_t>(app, "--episodes", o.episodes, 1, kMostEpisodes,
                                  "Episodes to simulate")
       .required();
   add_playing_options(app, o);
-  add_steps_option(app, o.steps, "Steps of an episode [default: as many as the controls last]");
+  add_steps_option(
+      app, o.steps,
+      "Steps of an episode, a multiple of --every [default: as many as the controls last]");
   add_every_option(app, o.every,
                    "Store a row every N steps and hold its action [default: the sensors', or 1]");
   add_threads_option(app, o.threads, "Threads to run on [default: one per core]");
-  add_precision_option(app, o.precision, ", which stores float32 [default: mixed]");
   add_seed_option(app, o.seed, "Seed of all that varies between episodes [default: 0]");
   add_accuracy_option(app, o.accuracy);
   add_sleep_option(app, o.sleep);
+  add_allow_unknown_option(app, o.allow_unknown);
   add_storage_options(app, o);
   add_shard_options(app, o);
-  add_allow_unknown_option(app, o.allow_unknown);
   add_console_options(app, *console);
   return {&app, [=](const ProgramInfo& info) { return generate(*options, *console, info); },
           [options] { return meets_other_shards(*options); }};

@@ -245,21 +245,21 @@ Command add_gradcheck(CLI::App& program) {
            "Scene file (XML), or the name of a task, whose return is then the loss")
       .required();
   add_text(app, "--loss", o.loss, "NAME",
-           "Loss of a scene: final (last state), path (speeds), tactile or shear (fields), "
-           "variables (end effectors), markers (of gels) "
-           "[default: tactile, or final "
-           "where there is no sensor]");
+           "Loss of a scene: final (half squares of the last state), path (of all velocities), "
+           "tactile or shear (of fields), markers (of their displacements) or variables (of end "
+           "effectors at the end) [default: tactile, or final without a sensor]");
   add_steps_option(app, o.steps,
-                   "Steps of the rollout [default: as many as the controls last, 100 at most]");
+                   "For a scene: length of the rollout [default: as the controls, 100 at most]");
   add_whole_number<std::int64_t>(
       app, "--actions", o.actions, 1, kMostSteps,
       "For a task: most actions of the episode [default: as many as take 100 steps]");
   add_policy_option(app, o.policy);
-  add_whole_number<int>(app, "--every", o.every, 1, std::numeric_limits<int>::max(),
-                        "Read tactile fields every N steps [default: the scene's, or 1]");
+  add_whole_number<int>(
+      app, "--every", o.every, 1, std::numeric_limits<int>::max(),
+      "For a scene: read tactile fields every N steps [default: the first sensor's, or 1]");
   add_whole_number<int>(
       app, "--entries", o.entries, 0, std::numeric_limits<int>::max(),
-      "Derivatives of each input to compare with differences; 0: all [default: 24]");
+      "Most derivatives of each input to compare with differences; 0: all [default: 24]");
   add_positive_number(app, "--tolerance", o.tolerance,
                       "Largest error of a check that passes, of a gradient's norm [default: 1e-4]");
   add_controls_option(app, o.controls);

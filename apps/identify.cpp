@@ -181,22 +181,23 @@ Command add_identify(CLI::App& program) {
   CLI::App& app = add_command(
       program, "identify", "Find numbers of a scene from recorded tactile fields",
       "tangere identify scenes/identify_ball.xml --number 'tactile pad kn' --svg fit.svg");
-  add_text(app, "SCENE", a.scene, "", "Scene with the numbers where you would guess them")
+  add_text(app, "SCENE", a.scene, "",
+           "Scene file (XML) with the numbers where you would guess them")
       .required();
   add_text(app, "RECORDING", a.recording, "",
            "HDF5 file laid out like those of 'tangere simulate'; without one, a trial: recordings "
            "are simulated, and numbers start wrong by factors of up to 2");
-  add_texts(app, "--number", a.numbers, "NAME",
-            "Sought number, such as 'body ball density'; give it once for each");
+  add_texts(
+      app, "--number", a.numbers, "NAME",
+      "Sought number, such as \"tactile pad kn\" or \"body ball density\"; it has to be positive");
   add_whole_number<std::int64_t>(app, "--env", a.environment, 0, kMostEnvironments,
                                  "Environment of the recording, counted from 0 [default: 0]");
   add_text(app, "--controls", a.controls, "U.csv",
-           "Controls of the recorded run in place of the scene's");
-  add_steps_option(app, a.steps, "Steps of a trial [default: as long as the controls]");
-  add_positive_number(
-      app, "--noise", a.noise,
-      "Deviation of the noise over the fields' peak [default: of a trial 0.01; of a "
-      "recording not known]");
+           "Controls of the recorded run, one row per step [default: the scene's <control>]");
+  add_steps_option(app, a.steps, "Steps of a trial [default: as many as the controls last]");
+  add_positive_number(app, "--noise", a.noise,
+                      "Standard deviation of the noise over the fields' largest number, which a "
+                      "trial adds [default: 0.01 for a trial; for a recording, not known]");
   add_whole_number<int>(app, "--starts", a.starts, 1, 1000,
                         "Most starts, tried while a fit is not sure [default: 6]");
   add_whole_number<std::uint64_t>(app, "--seed", a.seed, 0, 1000000,

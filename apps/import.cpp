@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // tangere import: makes a scene of a robot's URDF or MJCF file.
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <charconv>
 #include <filesystem>
@@ -167,26 +168,29 @@ Command add_import(CLI::App& program) {
                               "left_finger=gelsight_mini_measured@+y --motor left_slide=400,20");
   add_text(app, "ROBOT", o.robot, "", "URDF file (root <robot>) or MJCF file (root <mujoco>)")
       .required();
-  add_text(app, "-o,--output", o.output, "SCENE.xml", "Scene to write").required();
+  add_text(app, "-o,--output", o.output, "SCENE.xml",
+           "Scene to write. Meshes are named relative to it.")
+      .required();
   add_texts(app, "--pad", o.pads, "LINK=LAYOUT",
-            "Put a skin on a link, or at a site of MJCF: a layout of the program or a file, at its "
-            "frame; with "
-            "@+x to @-z on a face of its box, with @x,y,z[,roll,pitch,yaw] there");
+            fmt::format("Put a skin on a link, or at a site of MJCF: {} or a file. @+x to @-z "
+                        "behind it puts it on a face of the link's box, @x,y,z or "
+                        "@x,y,z,roll,pitch,yaw there in the link's frame [m, rad].",
+                        fmt::join(program_sensors(), ", ")));
   add_texts(app, "--motor", o.motors, "JOINT=force|P,D",
-            "Drive a joint by force within the file's effort, or towards targets with gains P, D");
+            "Drive a joint by force within the file's effort, or towards targets with gains P and "
+            "D, within the effort if there is one");
   add_texts(app, "--contact", o.contacts, "LINK=LINK|ground",
             "Let the shapes of two links touch, or those of one the ground");
-  add_texts(app, "--end-effector", o.end_effectors, "LINK",
+  add_texts(app, "--end-effector", o.end_effectors, "LINK|SITE",
             "Store where a link, or a site of MJCF, is");
   add_text(app, "--keyframe", o.keyframe, "NAME",
-           "Of MJCF: start from this keyframe, with its controls; one without a name has its "
-           "number from 0");
+           "Of MJCF: start from this keyframe, with its controls; a name, or a number from 0");
   add_text(app, "--base", o.base, "fixed|free",
            "Whether the root link of URDF, or bodies of MJCF's world without joints, stand in the "
            "world or move freely [default: fixed]");
-  add_flag(app, "--drop", o.drop, "Leave out what changes the motion and scenes cannot say");
-  add_flag(app, "--allow-unknown", o.allow_unknown,
-           "Ignore unknown elements and attributes, with a warning for each");
+  add_flag(app, "--drop", o.drop,
+           "Leave out what changes the motion and scenes cannot say, which else is an error");
+  add_allow_unknown_option(app, o.allow_unknown);
   add_overwrite_option(app, o.overwrite);
   add_console_options(app, *console);
   return {&app, [=](const ProgramInfo&) { return run_import(*options, *console); }};

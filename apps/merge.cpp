@@ -75,7 +75,7 @@ Command add_merge(CLI::App& program) {
                   "tangere merge balls --overwrite");
   add_text(app, "DIR", *input, "", "Folder with all shards of a data set").required();
   add_flag(app, "--copy", options->copy,
-           "Copy all numbers, so that the file needs no shards beside it");
+           "Copy all numbers into the file, which then needs no shards beside it [default: links]");
   add_overwrite_option(app, options->overwrite, "Replace what an earlier merge wrote");
   add_console_options(app, *console);
   return {&app, [=](const ProgramInfo&) { return merge(*input, *options, *console); },

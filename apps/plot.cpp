@@ -102,20 +102,24 @@ Command add_plot(CLI::App& program) {
            "HDF5 file written by 'tangere simulate', or a scene file F.xml")
       .required();
   add_text(app, "-o,--output", o.output, "F.svg", "SVG file to write").required();
+  add_overwrite_option(app, o.overwrite);
+  start_group(app, "Of a trajectory");
   add_text(app, "--sensor", o.sensor, "NAME",
-           "Tactile sensor, a rectangular array or one with an image [default: the first by name]");
+           "Tactile sensor: a rectangular array, or a curved pad whose points have pixels "
+           "[default: the first of them by name]");
   add_whole_number<std::int64_t>(app, "--env", o.environment, 0, kMost,
                                  "Environment, counted from 0 [default: 0]");
   const AddedOption frame = add_whole_number<std::int64_t>(app, "--frame", o.frame, 0, kMost,
-                                                           "One frame, counted from 0");
+                                                           "One field, counted from 0");
   add_whole_number<int>(app, "--strip", o.strip, 1, kMostFrames,
-                        "Most frames in a row, spread over those with contact [default: 6]")
+                        "Most fields in a row, spread over those with contact [default: 6]")
       .excludes(frame);
-  add_whole_number<int>(app, "--turn", o.turn, -360, 360,
-                        "Of a scene: degrees about z from which it is seen [default: 30]");
+  start_group(app, "Of a scene");
+  add_whole_number<int>(
+      app, "--turn", o.turn, -360, 360,
+      "Degrees about z from which it is seen; at 0 x is right and y away [default: 30]");
   add_whole_number<int>(app, "--lift", o.lift, -90, 90,
-                        "Of a scene: degrees above the horizon [default: 25]");
-  add_overwrite_option(app, o.overwrite);
+                        "Degrees above the horizon from which it is seen [default: 25]");
   add_console_options(app, *console);
   return {&app, [=](const ProgramInfo&) { return plot(*options, *console); }, [] { return true; }};
 }

@@ -15,15 +15,14 @@
 namespace tangere::apps {
 
 void GradientArguments::add(CLI::App& app) {
-  add_text(
-      app, "--gradients", loss, "LOSS",
-      "Also write derivatives of a loss by controls, start and the scene's numbers: final, path, "
-      "tactile, shear, variables or markers");
+  add_text(app, "--gradients", loss, "LOSS",
+           "For a scene: also write derivatives of a loss by controls, start and the scene's "
+           "numbers: final, path, tactile, shear, variables or markers; not with --sleep");
   add_flag(app, "--point-gradients", points,
            "With --gradients: also by place and coefficients of every tactile point");
   add_memory_size(app, "--tape-memory", tape_memory,
-                  "With --gradients: memory for the states kept; a longer run repeats steps from "
-                  "checkpoints [default: 1GB]");
+                  "With --gradients: memory for the states kept, such as 2GiB; with less than all "
+                  "of them steps are repeated from checkpoints, with the same bits [default: 1GB]");
 }
 
 void GradientArguments::check() const {

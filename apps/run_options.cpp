@@ -44,43 +44,45 @@ void add_overwrite_option(CLI::App& app, bool& overwrite, const std::string& des
 
 void add_accuracy_option(CLI::App& app, std::optional<double>& accuracy) {
   add_positive_number(app, "--accuracy", accuracy,
-                      "Cut steps into parts that keep this relative accuracy, such as 0.01 "
-                      "[default: the scene's, or steps are not cut]");
+                      "Cut steps into parts that keep this relative accuracy, below 1, such as "
+                      "0.01 [default: the scene's, or steps are not cut]");
 }
 
 void add_sleep_option(CLI::App& app, bool& sleep) {
   add_flag(app, "--sleep", sleep,
-           "Let bodies sleep that have come to rest, until something touches or moves them");
+           "Let bodies sleep that have come to rest, until something touches or moves them "
+           "[default: the scene's, or none sleeps]");
 }
 
 void add_allow_unknown_option(CLI::App& app, bool& allow) {
   add_flag(app, "--allow-unknown", allow,
-           "Unknown elements and attributes of the scene are warnings, not errors");
+           "Unknown elements and attributes are warnings, not errors");
 }
 
 void add_controls_option(CLI::App& app, std::string& controls) {
   add_text(app, "--controls", controls, "U.csv",
-           "Table of controls, one row per step, in place of the scene's <control>; for a task, of "
-           "actions");
+           "Table of controls, one row per step, the same for all environments; for a task, of "
+           "actions [default: the scene's <control>, else zeros; for a task, none]");
 }
 
 void add_policy_option(CLI::App& app, std::string& policy) {
-  add_text(
-      app, "--policy", policy, "NAME",
-      "Policy of a task: random, hold, csv (needs --controls) or scripted [default: scripted]");
+  add_text(app, "--policy", policy, "NAME",
+           "Policy of a task: random, hold, csv (with --controls) or scripted [default: csv with "
+           "--controls, else scripted]");
 }
 
 void add_integrator_option(CLI::App& app, std::string& integrator, const std::string& usual) {
   add_text(app, "--integrator", integrator, "NAME",
-           fmt::format("{} [default: {}]", fmt::join(integrator_names(), ", "), usual));
+           fmt::format("Integration scheme: {} [default: {}]", fmt::join(integrator_names(), ", "),
+                       usual));
 }
 
 void SolverArguments::add(CLI::App& app) {
-  add_positive_number(app, "--timestep", timestep, "Step size in s [default: the scene's]");
+  add_positive_number(app, "--timestep", timestep, "Step size [s] [default: the scene's]");
   add_integrator_option(app, integrator, "the scene's");
   add_positive_number(
       app, "--tol", tolerance,
-      "Largest scaled residual of a step [default: the scene's, or what follows scheme and step]");
+      "Largest scaled residual of a step [default: the scene's, or that of scheme and step]");
   add_accuracy_option(app, accuracy);
   add_sleep_option(app, sleep);
 }

@@ -22,7 +22,7 @@ void add_envs_option(CLI::App& app, std::optional<int>& environments,
                      const std::string& description);
 void add_every_option(CLI::App& app, std::optional<int>& every,
                       const std::string& description =
-                          "Read tactile fields every N steps [default: the scene's, or 1]");
+                          "Read tactile fields every N steps [default: the sensor's, or 1]");
 void add_threads_option(CLI::App& app, std::optional<int>& threads,
                         const std::string& description = "Threads [default: the processors here]");
 void add_seed_option(

@@ -393,26 +393,28 @@ Command add_simulate(CLI::App& program) {
   add_policy_option(app, o.policy);
   add_steps_option(app, o.steps, "Steps to take [default: as many as the controls last]");
   add_envs_option(app, o.environments,
-                  "Environments stepped together [default: 1, or those of --state-from]");
-  add_text(
-      app, "--record", o.record, "LIST",
-      "What to compute and store besides q and v, separated by commas: bodies or bodies.NAME, "
-      "variables, memory (of friction), a sensor's field (pad), pad.pressure, pad.shear, pad.sum, "
-      "pad.ideal, pad.markers or pad.flow; NAME/10 every 10th step, NAME/final at the end, of q "
-      "and v too "
-      "[default: the scene's <outputs>, or all]");
+                  "Environments. Environment e draws what varies from (seed, e). [default: 1, or "
+                  "those of --state-from]");
+  add_text(app, "--record", o.record, "LIST",
+           "What to compute and store besides q, v, u and the solver's numbers, separated by "
+           "commas: bodies or bodies.NAME, variables, memory (of friction), a sensor's field "
+           "(pad), pad.pressure, pad.shear, pad.sum, pad.ideal, pad.markers or pad.flow; pad/10 is "
+           "every 10th step, q/final the end alone [default: the scene's <outputs>, else bodies, "
+           "variables and all fields]");
   add_flag(app, "--audit", o.audit,
-           "Also compute and store energy and momentum, what motors, damping and friction did, and "
-           "what the scheme made");
+           "Also compute and store energy and momentum, the work of motors, what damping and "
+           "friction took, and what the scheme made");
   add_every_option(app, o.every);
   add_text(app, "--state-from", o.state_from, "F.h5",
            "Start from a row of another run, environment e from its e");
   add_whole_number<std::int64_t>(app, "--row", o.row, 0, kMostSteps,
-                                 "Row of --state-from [default: the last]");
+                                 "Row of --state-from, counted from 0 [default: the last]");
   o.solver.add(app);
   o.gradients.add(app);
-  add_threads_option(app, o.threads, "Threads to run on [default: one per core]");
-  add_precision_option(app, o.precision, " with points in float [default: double]");
+  add_threads_option(
+      app, o.threads,
+      "Threads to run on; numbers are the same for any count [default: one per core]");
+  add_precision_option(app, o.precision, " (points in float) [default: double]");
   add_seed_option(
       app, o.seed,
       "Seed of all that varies between environments [default: 0, or that of --state-from]");

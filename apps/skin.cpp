@@ -103,14 +103,15 @@ Command add_skin(CLI::App& program) {
   add_positive_number(app, "--thickness", a->thickness, "Thickness of the skin [m]");
   add_positive_number(app, "--pitch", a->pitch, "Distance between neighbouring tactile points [m]");
   add_positive_number(app, "--contact-pitch", a->contact_pitch,
-                      "The same of the body's contact points [m]; as --pitch if not given");
+                      "Distance between contact points of the body [m] [default: as --pitch]");
   add_positive_number(app, "--radius", a->radius,
-                      "Radius of the ball that presses [m]; with --press, for kn");
-  add_positive_number(app, "--press", a->press, "How far it is pressed in [m]");
-  add_positive_number(app, "--time", a->time, "Time of relaxation [s]; 5e-3 if not given");
-  add_positive_number(app, "--depth", a->depth,
-                      "Depth at which damping acts so [m]; a tenth of the thickness if not given");
-  add_positive_number(app, "--friction", a->friction, "Friction coefficient; 0.6 if not given");
+                      "Radius of a ball that presses [m]; with --press, kn is that of its contact");
+  add_positive_number(app, "--press", a->press, "How far the ball is pressed in [m]");
+  add_positive_number(app, "--time", a->time, "Time of relaxation [s] [default: 0.005]");
+  add_positive_number(
+      app, "--depth", a->depth,
+      "Depth at which the normal damping relaxes in that time [m] [default: thickness / 10]");
+  add_positive_number(app, "--friction", a->friction, "Friction coefficient [default: 0.6]");
   add_console_options(app, *console);
   return {&app, [=](const ProgramInfo&) { return skin(*a, *console); }};
 }

@@ -85,11 +85,14 @@ Command add_stress(CLI::App& program) {
                   "tangere stress --case stack_equal --integrator BDF1");
   add_text(app, "--case", o.name, "NAME", "That case alone [default: all]");
   add_integrator_option(app, o.integrator, "those of each case");
-  add_positive_number(app, "--timestep", o.step, "Step size in s [default: those of each case]");
+  add_positive_number(app, "--timestep", o.step, "Step size [s] [default: those of each case]");
   add_positive_number(app, "--accuracy", o.accuracy,
-                      "Cut steps into parts that keep this relative accuracy [default: not cut]");
-  add_flag(app, "--quick", o.quick, "Short cases alone, each with one step: some seconds");
-  add_threads_option(app, o.threads);
+                      "Cut steps into parts that keep this relative accuracy, with schemes that "
+                      "estimate their error [default: steps are not cut]");
+  add_flag(app, "--quick", o.quick,
+           "Short cases alone, each with its first step: seconds in place of minutes");
+  add_threads_option(app, o.threads,
+                     "Threads. Cases of one environment use one. [default: the processors here]");
   add_console_options(app, *console);
   return {&app, [=](const ProgramInfo&) { return stress(*options, *console); }};
 }

@@ -70,14 +70,15 @@ Command add_view(CLI::App& program) {
   add_text(app, "-o,--output", o.output, "F.html", "Page to write").required();
   const AddedOption episode =
       add_whole_number<std::int64_t>(app, "--episode", o.what.episode, 0, 1'000'000'000,
-                                     "Show only this episode; of a trajectory, this environment");
+                                     "That episode alone; of a trajectory, that environment");
   add_whole_number<int>(app, "--episodes", o.episodes, 1, kMostEpisodes,
-                        "Show the first so many [default: 16]")
+                        "The first N episodes [default: 16]")
       .excludes(episode);
-  add_whole_number<int>(app, "--frames", o.frames, 2, kMostFrames,
-                        "Most frames of an episode [default: 1000]");
+  add_whole_number<int>(
+      app, "--frames", o.frames, 2, kMostFrames,
+      "Most frames of an episode; a page has at most 50 MB of them [default: 1000]");
   add_text(app, "--scene", o.what.scene, "SCENE.xml",
-           "Look for files that the stored scene names beside this one");
+           "Scene beside which the files named in it lie [default: the simulated one]");
   add_overwrite_option(app, o.overwrite);
   add_console_options(app, *console);
   return {&app, [=](const ProgramInfo&) { return view(*options, *console); }, [] { return true; }};

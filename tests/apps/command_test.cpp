@@ -21,16 +21,6 @@ using ::testing::HasSubstr;
 using testing::IsEmpty;
 using testing::Not;
 
-/// The subcommands that `tangere --help` lists.
-Words subcommands() {
-  const std::string help = run(Folder(), {"--help"}).out;
-  std::istringstream lines(help.substr(help.find("\nSubcommands:\n") + 14));
-  Words names;
-  for (std::string line; std::getline(lines, line) && line.starts_with("  ");)
-    names.push_back(line.substr(2, line.find(' ', 2) - 2));
-  return names;
-}
-
 /// `tangere simulate small.xml --output out.h5` and more.
 Words simulate(const Words& more = {}) {
   return Words{"simulate", scene("rolling_ball_small.xml"), "--output", "out.h5"} + more;
@@ -104,16 +94,6 @@ TEST(Command, ASkinOfRubberHasItsCoefficients) {
   EXPECT_NEAR(pressed.at("stiffness_ratio").get<double>(), 2.425, 0.005);
   EXPECT_NEAR(pressed.at("tactile").at("kn").get<double>(),
               pressed.at("stiffness_ratio").get<double>() / 2.3 * kn, 1e-9 * kn);
-}
-
-TEST(Command, ThePageNamesEveryOption) {
-  const Folder folder;
-  for (const std::string& name : subcommands()) {
-    const std::string help = run(folder, {name, "--help"}).out;
-    const std::regex option("--[a-z-]+");
-    for (std::sregex_iterator at(help.begin(), help.end(), option), end; at != end; ++at)
-      EXPECT_THAT(page_of(name), HasSubstr("`" + at->str() + "`")) << name;
-  }
 }
 
 TEST(Command, TopLevelHelpNamesEverySubcommandAndExitCode) {

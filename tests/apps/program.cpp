@@ -13,6 +13,7 @@
 #include <csignal>
 #include <fstream>
 #include <map>
+#include <sstream>
 #include <stdexcept>
 #include <system_error>
 
@@ -115,6 +116,15 @@ Outcome Program::wait() {
 Outcome run(const Folder& folder, const Words& arguments,
             const std::vector<std::string>& environment, const Streams& streams) {
   return Program(folder, arguments, environment, streams).wait();
+}
+
+Words subcommands() {
+  const std::string help = run(Folder(), {"--help"}).out;
+  std::istringstream lines(help.substr(help.find("\nSubcommands:\n") + 14));
+  Words names;
+  for (std::string line; std::getline(lines, line) && line.starts_with("  ");)
+    names.push_back(line.substr(2, line.find(' ', 2) - 2));
+  return names;
 }
 
 const std::string& page_of(const std::string& subcommand) {

@@ -82,6 +82,9 @@ const std::string& page_of(const std::string& subcommand);
 Outcome run(const Folder& folder, const Words& arguments,
             const std::vector<std::string>& environment = {}, const Streams& streams = {});
 
+/// The subcommands that `tangere --help` lists.
+Words subcommands();
+
 /// Names of an object's keys that docs/command.md does not mention, nested ones included.
 std::vector<std::string> undocumented_keys(const nlohmann::json& object);
 
