@@ -287,19 +287,10 @@ int generate(GenerateOptions options, const Console& console, const ProgramInfo&
 void add_playing_options(CLI::App& app, GenerateOptions& o) {
   add_controls_option(app, o.controls);
   add_text(app, "--policy", o.policy, "NAME",
-<<<<<<< HEAD
-           "Policy of a task: random, hold, csv (needs --controls), program (needs --program) or "
-           "scripted [default: scripted]");
-  add_text(
-      app, "--program", o.program, "CMD",
-      "Program that chooses the actions of a task, called through its standard input and output; "
-      "Python: tangere.policy.serve");
-=======
            "Policy of a task: random, hold, csv (with --controls), program (with --program) or "
            "scripted [default: csv with --controls, program with --program, else scripted]");
   add_text(app, "--program", o.program, "CMD",
            "Program that chooses a task's actions over its standard input and output");
->>>>>>> 87611b13483b39b194f452599d8ca3f6fa44aea0
   add_positive_number(app, "--program-timeout", o.program_timeout,
                       "Longest time of its start and of every answer [s] [default: 120]");
   add_positive_number(app, "--noise", o.noise,
