@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <utility>
 
+#include "engine/model/compiled_layer.hpp"
 #include "engine/scene/shapes.hpp"
 #include "kernels/contact/distance.hpp"
 
@@ -98,6 +99,9 @@ std::string effects_variant(std::uint8_t effects) {
 
 std::string field_variant(const CompiledSensor& s) {
   const std::string law = std::string("law ") + to_string(s.law);
+  if (s.layer)
+    return std::to_string(s.layer->grid.rows) + " × " + std::to_string(s.layer->grid.cols) +
+           " coupled cells of a layer; springs of law " + to_string(s.law);
   if (!s.index.empty()) return "tiles of curved points, lanes are points; " + law;
   return (s.points() <= kSmallPad ? "flat pad, lanes are environments; "
                                   : "flat tiles, lanes are points; ") +

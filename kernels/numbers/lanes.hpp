@@ -9,6 +9,7 @@
 #pragma once
 
 #include <cmath>
+#include <concepts>
 #include <cstddef>
 #include <type_traits>
 #include <xsimd/xsimd.hpp>
@@ -88,7 +89,6 @@ namespace detail {
 
 // Products of vector registers that round once. They are always inlined: sources of several
 // instruction sets contain them.
-#if defined(__AVX2__) && defined(__FMA__)
 #define TANGERE_FUSED(type, fused, negated)                                                      \
   [[gnu::always_inline]] inline type fuse(const type& a, const type& b, const type& c) {         \
     return fused(a, b, c);                                                                       \
@@ -96,10 +96,12 @@ namespace detail {
   [[gnu::always_inline]] inline type fuse_negated(const type& a, const type& b, const type& c) { \
     return negated(a, b, c);                                                                     \
   }
+#if defined(__AVX2__) && defined(__FMA__)
 using DoubleAvx2 = xsimd::batch<double, xsimd::avx2>;
 using FloatAvx2 = xsimd::batch<float, xsimd::avx2>;
 TANGERE_FUSED(DoubleAvx2, _mm256_fmadd_pd, _mm256_fnmadd_pd)
 TANGERE_FUSED(FloatAvx2, _mm256_fmadd_ps, _mm256_fnmadd_ps)
+#endif
 #if defined(__AVX512F__)
 using DoubleAvx512 = xsimd::batch<double, xsimd::avx512bw>;
 using FloatAvx512 = xsimd::batch<float, xsimd::avx512bw>;
@@ -107,14 +109,13 @@ TANGERE_FUSED(DoubleAvx512, _mm512_fmadd_pd, _mm512_fnmadd_pd)
 TANGERE_FUSED(FloatAvx512, _mm512_fmadd_ps, _mm512_fnmadd_ps)
 #endif
 #undef TANGERE_FUSED
-#endif
 
 // The same on one register. Functions on T serve the scalar build.
-template <class T>
+template <std::floating_point T>
 T fuse(T a, T b, T c) {
   return a * b + c;
 }
-template <class T>
+template <std::floating_point T>
 T fuse_negated(T a, T b, T c) {
   return c - a * b;
 }
@@ -130,7 +131,7 @@ xsimd::batch<T, xsimd::sse2> fuse_negated(const xsimd::batch<T, xsimd::sse2>& a,
                                           const xsimd::batch<T, xsimd::sse2>& c) {
   return c - a * b;
 }
-template <class T>
+template <std::floating_point T>
 T choose(bool m, T a, T b) {
   return m ? a : b;
 }
@@ -150,7 +151,7 @@ xsimd::batch<double, A> magnitude(const xsimd::batch<double, A>& a) {
   return xsimd::abs(a);
 }
 // maxpd and minpd return the second operand where either is NaN, as the comparison does.
-template <class T>
+template <std::floating_point T>
 T larger(T a, T b) {
   return a > b ? a : b;
 }
@@ -158,7 +159,7 @@ template <class T, class A>
 xsimd::batch<T, A> larger(const xsimd::batch<T, A>& a, const xsimd::batch<T, A>& b) {
   return xsimd::max(a, b);
 }
-template <class T>
+template <std::floating_point T>
 T smaller(T a, T b) {
   return a < b ? a : b;
 }

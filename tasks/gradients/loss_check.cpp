@@ -223,13 +223,20 @@ bool reads_fields(const RolloutLoss& loss, const CheckOptions& options) {
   return false;
 }
 
+/// Whether points of sensors are checked: a layer has no derivatives by them.
+bool checks_points(const Model& model, const RolloutLoss& loss, const CheckOptions& options) {
+  return reads_fields(loss, options) &&
+         std::ranges::none_of(model.scene().sensors,
+                              [](const TactileDescription& d) { return d.layer.has_value(); });
+}
+
 LossGradient gradient_of(const Batch& start, const StepControls& controls, const RolloutLoss& loss,
                          const CheckOptions& options) {
   TapeOptions wanted;
   wanted.length = options.length;
   wanted.stepper = options.stepper;
   wanted.parameters = true;
-  wanted.points = reads_fields(loss, options);
+  wanted.points = checks_points(start.model(), loss, options);
   const RolloutLoss* const losses[] = {&loss};
   return rollout_gradients(start, controls, wanted, losses).losses[0];
 }
@@ -333,7 +340,7 @@ GradientCheck check_gradient(const Batch& start, const StepControls& controls,
   const LossGradient g = gradient_of(start, controls, loss, options);
   LossChecker checker(s, g);
   checker.check();
-  if (reads_fields(loss, options)) checker.points();
+  if (checks_points(start.model(), loss, options)) checker.points();
   checker.explain();
   return checker.result();
 }

@@ -134,7 +134,7 @@ TEST(Schema, EveryElementHasAHolder) {
     all |= holder.elements;
     if (holder.section && std::string(holder.name) == to_string(kRobot)) all |= kRobot;
   }
-  EXPECT_EQ(all, (1U << kElements) - 1);
+  EXPECT_EQ(all, static_cast<std::uint32_t>((std::uint64_t{1} << kElements) - 1));
   EXPECT_EQ(elements_inside("joint"), 0U);
 }
 
