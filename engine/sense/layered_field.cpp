@@ -115,7 +115,8 @@ void LayeredField::read(const CompiledSensor& sensor, const kernels::TactileArgs
   whole_.assign(springs.whole.begin(), springs.whole.end());
   normal_.assign(springs.normal.begin(), springs.normal.end());
   find_points(touch, springs);
-  layer_.solve(layer, depth_, layer.modulus * (kn_ / layer.stiffness));
+  // Without stiffness springs find nothing that touches.
+  layer_.solve(layer, depth_, kn_ > 0 ? layer.modulus * (kn_ / layer.stiffness) : 0);
   std::fill(field.begin(), field.end(), 0.0);
   for (const Point& p : points_) {
     const double load = layer.area * layer_.pressure()[static_cast<std::size_t>(p.index)];
