@@ -26,10 +26,14 @@ kernels::Touch<double> values(const kernels::Touch<D>& t, const Coefficients<D>&
 void read_dual_layer(const CompiledModel& m, int sensor,
                      std::span<const kernels::LinkScratch<D>> links,
                      const Coefficients<D>& coefficients, const double* column,
-                     std::span<const double> numbers, const SpringFields& springs,
-                     const SpringFields& springs_dot, std::span<double> field,
-                     std::span<double> field_dot) {
+                     std::span<const double> numbers, const DualSprings& springs,
+                     std::span<double> field, std::span<double> field_dot) {
   const CompiledSensor& s = m.sensors[std::size_t(sensor)];
+  std::vector<double> whole(field_dot.size()), whole_dot(whole), normal(whole), normal_dot(whole);
+  Coefficients<D> smooth = coefficients;
+  smooth.kt = smooth.mu = D(0.0);
+  springs(coefficients, s.elastic, whole, whole_dot);
+  springs(smooth, false, normal, normal_dot);
   std::vector<kernels::Touch<D>> touches;
   std::vector<kernels::Touch<double>> touch_values;
   std::vector<kernels::TouchShape> shapes;
@@ -50,10 +54,10 @@ void read_dual_layer(const CompiledModel& m, int sensor,
   a.shapes = shapes.data();
   a.touches = touch_values.data();
   LayeredField layered;
-  std::vector<double> own(springs.whole.size());
-  layered.read(s, a, springs, own);
+  std::vector<double> own(whole.size());
+  layered.read(s, a, {whole, normal}, own);
   if (!field.empty()) std::copy(own.begin(), own.end(), field.begin());
-  layered.push_forward(springs_dot, touches, sizes, coefficients.kn.epsilon, field_dot);
+  layered.push_forward({whole_dot, normal_dot}, touches, sizes, coefficients.kn.epsilon, field_dot);
 }
 
 }  // namespace tangere

@@ -560,24 +560,16 @@ void DualStage::field(int sensor, const double* column, std::span<const double> 
     ++number;
     return D(p.row < 0 ? p.value : column[p.row * kBlock], tangent);
   });
+  if (felt.elastic) set_points(sensor, points);
   const auto springs = [&](const Coefficients<D>& law, bool elastic, std::span<double> value,
                            std::span<double> change) {
-    if (elastic) {
-      set_points(sensor, points);
-      return elastic_field(sensor, law, value, change);
-    }
+    if (elastic) return elastic_field(sensor, law, value, change);
     read_dual_field(i.m, sensor, i.links, law, column, numbers, points, value, change);
   };
   if (!felt.layer) return springs(coefficients, felt.elastic, field, field_dot);
   if (!points.empty())
     throw InputError("derivatives by points of a sensor with a layer; expected no <layer>");
-  std::vector<double> whole(field_dot.size()), whole_dot(whole), normal(whole), normal_dot(whole);
-  Coefficients<D> normal_law = coefficients;
-  normal_law.kt = normal_law.mu = D(0.0);
-  springs(coefficients, felt.elastic, whole, whole_dot);
-  springs(normal_law, false, normal, normal_dot);
-  read_dual_layer(i.m, sensor, i.links, coefficients, column, numbers, {whole, normal},
-                  {whole_dot, normal_dot}, field, field_dot);
+  read_dual_layer(i.m, sensor, i.links, coefficients, column, numbers, springs, field, field_dot);
 }
 
 /// Field of a sensor with shear springs: the contact law at the state `centre` with twist r and its

@@ -16,7 +16,7 @@
 #include "engine/sense/dense_tiles.hpp"
 #include "engine/sense/elastic_field.hpp"
 #include "engine/sense/imperfect_field.hpp"
-#include "engine/sense/layered_field.hpp"
+#include "engine/sense/layer_reading.hpp"
 #include "engine/sense/pad_reader.hpp"
 #include "engine/sense/past_states.hpp"
 
@@ -54,10 +54,7 @@ struct ReadoutPullback::Impl {
   AlignedVector<double> own;  ///< (tiles, kPointNumbers, 64)
   ImperfectField imperfections;
   ElasticField elastic;
-  LayeredField layered;
-  struct {
-    std::vector<double> whole, normal, whole_bar, normal_bar;
-  } springs;  ///< (points, 3) of a sensor with a layer
+  LayerReading layered;
   std::vector<double> layer_bar;
   std::array<std::vector<double>, kBlock> memory;  ///< cotangents of the shear state
   std::vector<double> whole, ideal, expanded;      ///< (points, 3) of one sensor
@@ -81,10 +78,6 @@ struct ReadoutPullback::Impl {
     }
     ideal.resize(whole.size());
     expanded.resize(whole.size());
-    for (auto* x : {&springs.whole, &springs.normal, &springs.whole_bar, &springs.normal_bar})
-      if (std::ranges::any_of(c.sensors,
-                              [](const CompiledSensor& s) { return s.layer != nullptr; }))
-        x->resize(whole.size());
     scratch.resize(bytes);
     touches.resize(targets);
   }
@@ -154,18 +147,10 @@ struct ReadoutPullback::Impl {
       read_ideal(reader, s, arguments(s, lane, false), to);
   }
 
-  /// Computes the field of a sensor with a layer, (points, 3), for `layered`. A pressure leaves
-  /// friction out.
+  /// Computes the field of a sensor with a layer, (points, 3). A pressure leaves friction out.
   void read_layered(const CompiledSensor& s, int lane, bool pressure, std::span<double> to) {
-    const auto all = std::span(springs.whole).first(to.size()),
-               normal = std::span(springs.normal).first(to.size());
     find_touches(lane / kGroup, s.number);
-    read_ideal(reader, s, arguments(s, lane, true), normal);
-    if (pressure)
-      std::copy(normal.begin(), normal.end(), all.begin());
-    else
-      read_springs(s, lane, all);
-    layered.read(s, arguments(s, lane, false), {all, normal}, to);
+    layered.read(reader, elastic, *batch, kBlock * block + lane, s, !pressure, to);
   }
 
   /// Pulls the cotangent of such a field back.
@@ -179,10 +164,8 @@ struct ReadoutPullback::Impl {
     const std::size_t numbers = 3 * std::size_t(s.points());
     layer_bar.assign(cotangent.begin(), cotangent.end());
     read_layered(s, lane, pressure, std::span(expanded).first(numbers));
-    LayeredField::Cotangents bar = {std::span(springs.whole_bar).first(numbers),
-                                    std::span(springs.normal_bar).first(numbers),
-                                    std::span(touches).first(s.targets.size())};
-    layered.pull_back(layer_bar, !parameters.empty(), bar);
+    LayeredField::Cotangents& bar = layered.pull_back(layer_bar, !parameters.empty(),
+                                                      std::span(touches).first(s.targets.size()));
     const CompiledModel& m = compiled(model);
     used[std::size_t(lane / kGroup)] = true;
     const auto add = [&](int at, double x) {

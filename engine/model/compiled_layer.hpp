@@ -2,16 +2,26 @@
 // The coupled layer of a sensor, compiled (docs/layer.md).
 #pragma once
 
+#include <array>
 #include <vector>
 
 #include "engine/model/layer_compliance.hpp"
 
 namespace tangere {
 
+/// Four cells around a point and their bilinear weights, which may be 0.
+struct CellWeights {
+  std::array<int, 4> cell{};
+  std::array<double, 4> weight{};
+};
+/// Returns those of the points of a grid of cells of side × side points, rows × cols of them.
+std::vector<CellWeights> cell_weights(const LayerGrid& grid, int side, int rows, int cols);
+
 struct CompiledLayer {
   LayerGrid grid;
-  int side = 1;                    ///< points along the side of a cell
-  std::vector<int> cell_of_point;  ///< (points) row-major
+  int side = 1;                      ///< points along the side of a cell
+  std::vector<int> cell_of_point;    ///< (points) row-major
+  std::vector<CellWeights> weights;  ///< (points) row-major
   LayerCompliance compliance;
   double modulus = 0;     ///< E [Pa] where kn is `stiffness`; it changes in proportion to kn
   double stiffness = 0;   ///< kn of the scene [N/m]

@@ -6,6 +6,9 @@
 #include <cmath>
 #include <cstdint>
 #include <numbers>
+#include <utility>
+
+#include "engine/model/compiled_layer.hpp"
 
 namespace tangere {
 namespace {
@@ -103,6 +106,28 @@ double layer_compliance(double thickness, double poisson, double wave_number) {
   const double numerator = kappa * (1 - e4) - 4 * xi * e2;
   const double denominator = kappa * (1 + e4) + (4 * xi * xi + 1 + kappa * kappa) * e2;
   return (1 - poisson) / (G * wave_number) * numerator / denominator;
+}
+
+/// Weights of the two cells around a point along one axis of n cells: their number and the share of
+/// the second.
+static std::pair<int, double> between(int point, int side, int n) {
+  const double at = std::clamp((point + 0.5) / side - 0.5, 0.0, n - 1.0);
+  const int first = std::min(static_cast<int>(at), std::max(0, n - 2));
+  return {first, at - first};
+}
+
+std::vector<CellWeights> cell_weights(const LayerGrid& grid, int side, int rows, int cols) {
+  std::vector<CellWeights> out;
+  for (int i = 0; i < rows; ++i)
+    for (int j = 0; j < cols; ++j) {
+      const auto [r, fr] = between(i, side, grid.rows);
+      const auto [c, fc] = between(j, side, grid.cols);
+      const int down = grid.rows > 1 ? grid.cols : 0, right = grid.cols > 1 ? 1 : 0,
+                first = r * grid.cols + c;
+      out.push_back({{first, first + right, first + down, first + down + right},
+                     {(1 - fr) * (1 - fc), (1 - fr) * fc, fr * (1 - fc), fr * fc}});
+    }
+  return out;
 }
 
 LayerCompliance compile_layer(const LayerGrid& grid) {

@@ -9,21 +9,37 @@
 #include "engine/base/error.hpp"
 #include "engine/model/compiled_layer.hpp"
 #include "engine/scene/frames.hpp"
+#include "engine/scene/skin_material.hpp"
 
 namespace tangere {
 namespace {
 
 constexpr double kUsualCell = 0.2;      // of the thickness
+constexpr double kLeastCell = 0.75;     // of the points' distance
 constexpr double kMostPitch = 1.0 / 3;  // of the points, by the thickness
+constexpr double kThickest = 4;         // thickness by the pad's longer side
+constexpr double kMostMargin = 6;       // by the thickness; sides farther away have no effect
 
 [[noreturn]] void fail(const TactileDescription& d, const std::string& message) {
   throw InputError(d.layer->source.prefix() + "<layer> of '" + d.name + "': " + message);
 }
 
 /// Returns the points of a cell's side: as many as come nearest to its size.
-int side_of(const TactileDescription& d, double pitch) {
+int cell_side(const TactileDescription& d, double pitch) {
   const double size = d.layer->cell > 0 ? d.layer->cell : kUsualCell * d.material->thickness;
+  if (d.layer->cell > 0 && !(size >= kLeastCell * pitch))
+    fail(d, fmt::format("cell=\"{}\"; expected at least the distance of the points, {:.3g} m", size,
+                        pitch));
+  const int least = std::min(d.array.rows, d.array.cols);
+  if (!(size <= least * pitch))
+    fail(d, fmt::format("cells of {:.3g} m; expected at most the pad's shorter side, {:.3g} m",
+                        size, least * pitch));
   return std::max(1, static_cast<int>(std::lround(size / pitch)));
+}
+
+std::optional<double> margin_of(const TactileDescription& d) {
+  if (!d.layer->margin) return std::nullopt;
+  return std::min(*d.layer->margin, kMostMargin * d.material->thickness);
 }
 
 }  // namespace
@@ -43,21 +59,28 @@ std::shared_ptr<const CompiledLayer> compile_sensor_layer(const TactileDescripti
     fail(d,
          fmt::format("points {:.3g} m apart; expected at most a third of the thickness, {:.3g} m",
                      pitch, kMostPitch * t));
+  const double longer = std::max(height * d.array.rows, width * d.array.cols);
+  if (!(t <= kThickest * longer))
+    fail(d, fmt::format("thickness of {:.3g} m; expected at most {} times the pad's longer side, "
+                        "{:.3g} m",
+                        t, kThickest, kThickest * longer));
   auto layer = std::make_shared<CompiledLayer>();
-  layer->side = side_of(d, std::sqrt(height * width));
+  layer->side = cell_side(d, std::sqrt(height * width));
   const auto cells = [&](int points) { return (points + layer->side - 1) / layer->side; };
   layer->grid = {
       cells(sensor.rows), cells(sensor.cols), layer->side * height, layer->side * width, t,
-      d.layer->poisson,   d.layer->margin};
+      d.layer->poisson,   margin_of(d)};
   if (layer->grid.cells() > kMostLayerCells)
     fail(d, fmt::format("{} × {} cells; expected at most {} of them: a larger cell",
                         layer->grid.rows, layer->grid.cols, kMostLayerCells));
   for (int i = 0; i < sensor.points(); ++i)
     layer->cell_of_point.push_back(i / sensor.cols / layer->side * layer->grid.cols +
                                    i % sensor.cols / layer->side);
+  layer->weights = cell_weights(layer->grid, layer->side, sensor.rows, sensor.cols);
   layer->compliance = compile_layer(layer->grid);
   layer->modulus = d.material->modulus;
-  layer->stiffness = d.coefficients.kn;
+  layer->stiffness =
+      d.coefficients.kn > 0 ? d.coefficients.kn : skin_springs(*d.material).kn * height * width;
   layer->relaxation = d.material->relaxation;
   layer->area = height * width;
   layer->outward = pressure_sign;

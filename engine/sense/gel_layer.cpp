@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The layer is solved with E = 1: its pressures are proportional to E. Sums run over cells in order,
-// and the factorisation adds rows to rows, so that results depend on the depths alone.
+// The layer is solved with E = 1: its pressures are proportional to E. Sums run over points and cells
+// in order, and the factorisation adds rows to rows, so that results depend on the depths alone.
 #include "engine/sense/gel_layer.hpp"
 
 #include <algorithm>
@@ -11,52 +11,66 @@ namespace {
 
 /// Newton iterations before relaxation takes over. Two to four are usual.
 constexpr int kMostSystems = 30;
-constexpr int kMostSweeps = 10000;
-constexpr double kRelaxed = 1e-15;  ///< largest change of a sweep, relative
+constexpr int kMostSweeps = 2000;
+constexpr double kRounding = 1e-13;  ///< relative, of depths and of a sweep's largest change
 
 }  // namespace
 
-/// Sets which points press at the present yield. Returns whether any changed.
-bool GelLayer::update_pressing() {
-  const std::vector<int>& cell = layer_->cell_of_point;
-  bool changed = false;
-  for (std::size_t s = 0; s < depth_.size(); ++s) {
-    if (!(depth_[s] > 0)) continue;
-    const auto i = static_cast<std::size_t>(cell[s]);
-    const char now = depth_[s] > yield_[i] ? 1 : 0;
-    count_[i] += now - presses_[s];
-    changed |= now != presses_[s];
-    presses_[s] = now;
-  }
-  return changed;
+std::size_t GelLayer::cell(int point) const {
+  return static_cast<std::size_t>(layer_->cell_of_point[static_cast<std::size_t>(point)]);
 }
 
 /// C' between two cells.
 double GelLayer::coupling(int i, int j) const {
-  const CompiledLayer& layer = *layer_;
-  const auto n = static_cast<std::size_t>(layer.grid.cells());
-  const double c = layer.compliance.table[static_cast<std::size_t>(i) * n + std::size_t(j)];
-  return i == j ? c - layer.compliance.own : c;
+  const auto n = static_cast<std::size_t>(layer_->grid.cells());
+  const double c = layer_->compliance.table[static_cast<std::size_t>(i) * n + std::size_t(j)];
+  return i == j ? c - layer_->compliance.own : c;
 }
 
-/// Computes w = C' P of some cells. P is zero outside `pressing_`.
-void GelLayer::yield_of(std::span<const int> cells) {
-  for (const int i : cells) {
+/// Computes C' x at the cells `to`, where x is zero outside `from`.
+void GelLayer::couple(const std::vector<int>& from, const std::vector<double>& x,
+                      const std::vector<int>& to, std::vector<double>& out) const {
+  for (const int i : to) {
     double sum = 0;
-    for (const int j : pressing_) sum += coupling(i, j) * load_[static_cast<std::size_t>(j)];
-    yield_[static_cast<std::size_t>(i)] = sum;
+    for (const int j : from) sum += coupling(i, j) * x[static_cast<std::size_t>(j)];
+    out[static_cast<std::size_t>(i)] = sum;
   }
+}
+
+/// Returns B x of a point, where x is `yield_`.
+double GelLayer::between_cells(int point) const {
+  const CellWeights& w = layer_->weights[static_cast<std::size_t>(point)];
+  double sum = 0;
+  for (std::size_t k = 0; k < w.cell.size(); ++k)
+    sum += w.weight[k] * yield_[static_cast<std::size_t>(w.cell[k])];
+  return sum;
+}
+
+/// Sets which points press at the present yield. Returns whether any changed by more than rounding.
+bool GelLayer::update_pressing() {
+  bool changed = false;
+  for (const int s : touching_) {
+    const double excess = depth_[static_cast<std::size_t>(s)] - yield_[cell(s)];
+    char& presses = presses_[static_cast<std::size_t>(s)];
+    const char now = excess > 0 ? 1 : 0;
+    if (now == presses || std::abs(excess) <= rounding_) continue;
+    count_[cell(s)] += now - presses;
+    presses = now;
+    changed = true;
+  }
+  return changed;
 }
 
 /// Lists the pressing cells, and sets their mean depths and the factor of M.
 void GelLayer::set_up() {
-  const std::vector<int>& cell = layer_->cell_of_point;
   pressing_.clear();
-  for (const int i : near_)
+  for (const int i : near_) {
+    mean_[static_cast<std::size_t>(i)] = 0;
     if (count_[static_cast<std::size_t>(i)] > 0) pressing_.push_back(i);
-  std::fill(mean_.begin(), mean_.end(), 0.0);
-  for (std::size_t s = 0; s < depth_.size(); ++s)
-    if (presses_[s] != 0) mean_[static_cast<std::size_t>(cell[s])] += depth_[s];
+  }
+  for (const int s : touching_)
+    if (presses_[static_cast<std::size_t>(s)] != 0)
+      mean_[cell(s)] += depth_[static_cast<std::size_t>(s)];
   for (const int i : pressing_)
     mean_[static_cast<std::size_t>(i)] /= count_[static_cast<std::size_t>(i)];
   factor();
@@ -64,13 +78,12 @@ void GelLayer::set_up() {
 
 /// Factors M of the pressing cells, right-looking: rows are added to rows.
 void GelLayer::factor() {
-  const CompiledLayer& layer = *layer_;
   const std::size_t n = pressing_.size();
   factor_.resize(n * n);
   for (std::size_t a = 0; a < n; ++a) {
     double* const u = &factor_[a * n];
     for (std::size_t b = a; b < n; ++b) u[b] = coupling(pressing_[a], pressing_[b]);
-    u[a] += layer.compliance.own * layer.side * layer.side /
+    u[a] += layer_->compliance.own * layer_->side * layer_->side /
             count_[static_cast<std::size_t>(pressing_[a])];
   }
   for (std::size_t a = 0; a < n; ++a) {
@@ -103,16 +116,16 @@ void GelLayer::solve_system() {
 
 /// Returns P of one cell where all others stay as they are: the root of
 /// k Σ max(0, δ - others - C' P)/m² - P, which falls with P.
-double GelLayer::relaxed(int cell) const {
-  const CompiledLayer& layer = *layer_;
-  const double own = coupling(cell, cell), others = yield_[static_cast<std::size_t>(cell)] -
-                                                    own * load_[static_cast<std::size_t>(cell)];
+double GelLayer::relaxed(int i) const {
+  const auto at = static_cast<std::size_t>(i);
+  const double own = coupling(i, i), others = yield_[at] - own * load_[at];
+  std::vector<double> free;
+  for (const int s : touching_)
+    if (cell(s) == at) free.push_back(depth_[static_cast<std::size_t>(s)] - others);
   const auto excess = [&](double p) {
     double sum = 0;
-    for (std::size_t s = 0; s < depth_.size(); ++s)
-      if (layer.cell_of_point[s] == cell && depth_[s] > 0)
-        sum += std::max(0.0, depth_[s] - others - own * p);
-    return stiffness_ * sum / (layer.side * layer.side) - p;
+    for (const double d : free) sum += std::max(0.0, d - own * p);
+    return stiffness_ * sum / (layer_->side * layer_->side) - p;
   };
   double low = 0, high = std::max(excess(0), 0.0);
   while (high > low) {
@@ -124,22 +137,46 @@ double GelLayer::relaxed(int cell) const {
 }
 
 /// Changes one cell after the other until nothing changes. The energy is convex, so this ends where
-/// Newton's method might go in circles.
+/// Newton's method may cycle.
 void GelLayer::relax() {
   std::fill(load_.begin(), load_.end(), 0.0);
-  pressing_ = near_;
   for (int sweep = 0; sweep < kMostSweeps; ++sweep) {
     double change = 0, most = 0;
     for (const int i : near_) {
-      yield_of({&i, 1});
+      couple(near_, load_, {i}, yield_);
       const double now = relaxed(i);
       change = std::max(change, std::abs(now - load_[static_cast<std::size_t>(i)]));
       most = std::max(most, now);
       load_[static_cast<std::size_t>(i)] = now;
     }
-    if (change <= kRelaxed * most) break;
+    if (change <= kRounding * most) break;
   }
-  yield_of(near_);
+  couple(near_, load_, near_, yield_);
+}
+
+/// Sets r, R and p from P and w.
+void GelLayer::share_loads() {
+  const int whole = layer_->side * layer_->side;
+  for (const int i : near_) sum_[static_cast<std::size_t>(i)] = 0;
+  for (const int s : touching_) {
+    const auto at = static_cast<std::size_t>(s);
+    left_[at] = std::max(0.0, depth_[at] - between_cells(s));
+    sum_[cell(s)] += left_[at];
+  }
+  for (const int s : touching_) {
+    const auto at = static_cast<std::size_t>(s);
+    const std::size_t i = cell(s);
+    const double own = sum_[i] > 0         ? whole * load_[i] * left_[at] / sum_[i]
+                       : presses_[at] != 0 ? stiffness_ * std::max(0.0, depth_[at] - yield_[i])
+                                           : 0;
+    pressure_[at] = modulus_ * own;
+  }
+}
+
+std::vector<double> GelLayer::loads() const {
+  std::vector<double> out;
+  for (const double p : load_) out.push_back(modulus_ * p);
+  return out;
 }
 
 void GelLayer::solve(const CompiledLayer& layer, std::span<const double> depth, double modulus) {
@@ -150,21 +187,31 @@ void GelLayer::solve(const CompiledLayer& layer, std::span<const double> depth, 
   depth_.assign(depth.begin(), depth.end());
   presses_.assign(depth.size(), 0);
   count_.assign(cells, 0);
-  for (auto* x : {&mean_, &load_, &yield_}) x->assign(cells, 0.0);
+  for (auto* x : {&left_, &pressure_}) x->assign(depth.size(), 0.0);
+  for (auto* x : {&mean_, &load_, &yield_, &sum_, &load_bar_, &yield_bar_}) x->assign(cells, 0.0);
+  touching_.clear(), near_.clear(), pressing_.clear();
+  std::vector<double>& marks = sum_;
+  double most = 0;
+  for (std::size_t s = 0; s < depth.size(); ++s) {
+    if (!(depth[s] > 0)) continue;
+    touching_.push_back(static_cast<int>(s));
+    most = std::max(most, depth[s]);
+    marks[cell(static_cast<int>(s))] = 1;
+    for (const int i : layer.weights[s].cell) marks[static_cast<std::size_t>(i)] = 1;
+  }
+  for (std::size_t i = 0; i < cells; ++i)
+    if (marks[i] > 0) near_.push_back(static_cast<int>(i));
+  rounding_ = kRounding * most;
   bool changed = update_pressing();
-  near_.clear();
-  for (int i = 0; i < layer.grid.cells(); ++i)
-    if (count_[static_cast<std::size_t>(i)] > 0) near_.push_back(i);
-  pressing_.clear();
   for (systems_ = 0; changed && systems_ < kMostSystems; ++systems_) {
     set_up();
     rhs_.clear();
     for (const int i : pressing_) rhs_.push_back(mean_[static_cast<std::size_t>(i)]);
     solve_system();
-    std::fill(load_.begin(), load_.end(), 0.0);
+    for (const int i : near_) load_[static_cast<std::size_t>(i)] = 0;
     for (std::size_t a = 0; a < rhs_.size(); ++a)
       load_[static_cast<std::size_t>(pressing_[a])] = rhs_[a];
-    yield_of(near_);
+    couple(pressing_, load_, near_, yield_);
     changed = update_pressing();
   }
   if (changed) {
@@ -172,50 +219,86 @@ void GelLayer::solve(const CompiledLayer& layer, std::span<const double> depth, 
     static_cast<void>(update_pressing());
     set_up();
   }
-  pressure_.assign(depth_.size(), 0.0);
-  for (std::size_t s = 0; s < depth_.size(); ++s)
-    if (presses_[s] != 0)
-      pressure_[s] = modulus * stiffness_ *
-                     (depth_[s] - yield_[static_cast<std::size_t>(layer.cell_of_point[s])]);
+  share_loads();
 }
 
-// p = E k (δ - w), w = C' P, M dP = dδ̄: δ̄_s = E k p̄_s - λ_i/n_i, M λ = C' a, a_i = E k Σ p̄_s.
+// With q = E p̄ and cells where R > 0: r̄_s = m² P_i/R_i (q_s - Σ q r/R_i), P̄_i = m² Σ q r/R_i,
+// w̄ = -Bᵀ r̄; elsewhere δ̄_s = k q_s, w̄_i = -k Σ q. Then P̄ += C' w̄, M λ = P̄, δ̄_s += λ_i/n_i.
 void GelLayer::pull_back(std::span<const double> pressure_bar, std::span<double> depth_bar) {
-  const std::vector<int>& cell = layer_->cell_of_point;
-  const double slope = modulus_ * stiffness_;
-  std::fill(load_.begin(), load_.end(), 0.0);  // a
-  for (std::size_t s = 0; s < depth_.size(); ++s)
-    if (presses_[s] != 0) load_[static_cast<std::size_t>(cell[s])] += slope * pressure_bar[s];
-  yield_of(pressing_);
+  const int whole = layer_->side * layer_->side;
+  std::fill(depth_bar.begin(), depth_bar.end(), 0.0);
+  for (const int i : near_)
+    load_bar_[static_cast<std::size_t>(i)] = yield_bar_[static_cast<std::size_t>(i)] = 0;
+  for (const int s : touching_) {
+    const std::size_t i = cell(s), at = static_cast<std::size_t>(s);
+    if (sum_[i] > 0) load_bar_[i] += modulus_ * pressure_bar[at] * left_[at] / sum_[i];
+  }
+  for (const int s : touching_) {
+    const std::size_t i = cell(s), at = static_cast<std::size_t>(s);
+    const double q = modulus_ * pressure_bar[at];
+    if (sum_[i] > 0) {
+      if (!(left_[at] > 0)) continue;
+      depth_bar[at] = whole * load_[i] / sum_[i] * (q - load_bar_[i]);
+      const CellWeights& w = layer_->weights[at];
+      for (std::size_t k = 0; k < w.cell.size(); ++k)
+        yield_bar_[static_cast<std::size_t>(w.cell[k])] -= w.weight[k] * depth_bar[at];
+    } else if (presses_[at] != 0) {
+      depth_bar[at] = stiffness_ * q;
+      yield_bar_[i] -= stiffness_ * q;
+    }
+  }
   rhs_.clear();
-  for (const int i : pressing_) rhs_.push_back(yield_[static_cast<std::size_t>(i)]);
+  for (const int i : pressing_) {
+    double sum = whole * load_bar_[static_cast<std::size_t>(i)];
+    for (const int j : near_) sum += coupling(i, j) * yield_bar_[static_cast<std::size_t>(j)];
+    rhs_.push_back(sum);
+  }
   solve_system();
   for (std::size_t a = 0; a < rhs_.size(); ++a)
-    load_[static_cast<std::size_t>(pressing_[a])] = rhs_[a];  // λ
-  for (std::size_t s = 0; s < depth_.size(); ++s) {
-    const auto i = static_cast<std::size_t>(cell[s]);
-    depth_bar[s] = presses_[s] == 0 ? 0 : slope * pressure_bar[s] - load_[i] / count_[i];
+    load_bar_[static_cast<std::size_t>(pressing_[a])] = rhs_[a];  // λ
+  for (const int s : touching_) {
+    const std::size_t i = cell(s), at = static_cast<std::size_t>(s);
+    if (presses_[at] != 0) depth_bar[at] += load_bar_[i] / count_[i];
   }
 }
 
 void GelLayer::push_forward(std::span<const double> depth_dot, std::span<double> pressure_dot) {
-  const std::vector<int>& cell = layer_->cell_of_point;
-  std::fill(load_.begin(), load_.end(), 0.0);
-  for (std::size_t s = 0; s < depth_.size(); ++s) {
-    const auto i = static_cast<std::size_t>(cell[s]);
-    if (presses_[s] != 0) load_[i] += depth_dot[s] / count_[i];
+  const int whole = layer_->side * layer_->side;
+  std::vector<double>&load_dot = load_bar_, &yield_dot = yield_bar_;
+  for (const int i : near_) load_dot[static_cast<std::size_t>(i)] = 0;
+  for (const int s : touching_) {
+    const std::size_t i = cell(s), at = static_cast<std::size_t>(s);
+    if (presses_[at] != 0) load_dot[i] += depth_dot[at] / count_[i];
   }
   rhs_.clear();
-  for (const int i : pressing_) rhs_.push_back(load_[static_cast<std::size_t>(i)]);
+  for (const int i : pressing_) rhs_.push_back(load_dot[static_cast<std::size_t>(i)]);
   solve_system();
+  for (const int i : near_) load_dot[static_cast<std::size_t>(i)] = 0;
   for (std::size_t a = 0; a < rhs_.size(); ++a)
-    load_[static_cast<std::size_t>(pressing_[a])] = rhs_[a];
-  yield_of(pressing_);
-  for (std::size_t s = 0; s < depth_.size(); ++s)
-    pressure_dot[s] =
-        presses_[s] == 0
-            ? 0
-            : modulus_ * stiffness_ * (depth_dot[s] - yield_[static_cast<std::size_t>(cell[s])]);
+    load_dot[static_cast<std::size_t>(pressing_[a])] = rhs_[a];
+  couple(pressing_, load_dot, near_, yield_dot);
+  std::vector<double> left_dot(depth_.size()), sum_dot(sum_.size());
+  for (const int s : touching_) {
+    const auto at = static_cast<std::size_t>(s);
+    if (!(left_[at] > 0)) continue;
+    const CellWeights& w = layer_->weights[at];
+    left_dot[at] = depth_dot[at];
+    for (std::size_t k = 0; k < w.cell.size(); ++k)
+      left_dot[at] -= w.weight[k] * yield_dot[static_cast<std::size_t>(w.cell[k])];
+    sum_dot[cell(s)] += left_dot[at];
+  }
+  std::fill(pressure_dot.begin(), pressure_dot.end(), 0.0);
+  for (const int s : touching_) {
+    const std::size_t i = cell(s), at = static_cast<std::size_t>(s);
+    double own = 0;
+    if (sum_[i] > 0)
+      own =
+          whole / sum_[i] *
+          (load_dot[i] * left_[at] + load_[i] * (left_dot[at] - left_[at] * sum_dot[i] / sum_[i]));
+    else if (presses_[at] != 0)
+      own = stiffness_ * (depth_dot[at] - yield_dot[i]);
+    pressure_dot[at] = modulus_ * own;
+  }
 }
 
 }  // namespace tangere

@@ -1,14 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 // Pressure of a soft layer whose points are coupled (docs/layer.md). The layer is cut into cells i of
-// m × m points s. With the depth δ_s of a shape below the pad's surface, along the pad's normal,
-//
-//   p_s = k max(0, δ_s - w_i),  P_i = Σ_{s∈i} p_s/m²,  w = C' P,  C' = C - I/k,  k = 1/C(0)
-//
-// where C is the compliance of engine/model/layer_compliance.hpp. Let n_i points of cell i press
-// (p_s > 0). Then P solves M P = δ̄ on cells with n_i > 0, where δ̄_i is the mean of δ_s over these
+// m × m points s. With the depth δ_s of a shape below the pad's surface, along the pad's normal, a
+// cell has the load
+//   P_i = k Σ max(0, δ_s - w_i)/m²,  w = C' P,  C' = C - I/k,  k = 1/C(0)
+// where C is the compliance of engine/model/layer_compliance.hpp. Let n_i points of cell i have
+// δ_s > w_i. Then P solves M P = δ̄ on cells with n_i > 0, where δ̄_i is the mean of δ_s over these
 // points and M = C' + diag(m²/(k n_i)), which is symmetric and positive definite. Newton's method
-// changes n_i until they agree with p.
-//
+// changes n_i until they agree with P. The points of a cell share its load by the depths that the
+// layer leaves, with w between cells by bilinear weights B:
+//   p_s = m² P_i r_s/R_i,  r = max(0, δ - B w),  R_i = Σ r_s over the cell
+// or p_s = k max(0, δ_s - w_i) where R_i is 0.
 #pragma once
 
 #include <span>
@@ -28,6 +29,8 @@ class GelLayer {
 
   /// p, (points) [Pa]; 0 where a point does not press.
   [[nodiscard]] std::span<const double> pressure() const { return pressure_; }
+  /// P, (cells) [Pa].
+  [[nodiscard]] std::vector<double> loads() const;
   /// Linear systems that solve() needed.
   [[nodiscard]] int systems() const { return systems_; }
 
@@ -42,20 +45,27 @@ class GelLayer {
   void set_up();
   void factor();
   void solve_system();
-  void yield_of(std::span<const int> cells);
+  void couple(const std::vector<int>& from, const std::vector<double>& x,
+              const std::vector<int>& to, std::vector<double>& out) const;
   void relax();
+  void share_loads();
   [[nodiscard]] double relaxed(int cell) const;
   [[nodiscard]] double coupling(int i, int j) const;
+  [[nodiscard]] double between_cells(int point) const;
+  [[nodiscard]] std::size_t cell(int point) const;
 
   const CompiledLayer* layer_ = nullptr;
-  double stiffness_ = 0;                     ///< k at E = 1 [1/m]
-  double modulus_ = 0;                       ///< E [Pa]
-  std::vector<double> depth_, pressure_;     ///< (points)
-  std::vector<char> presses_;                ///< (points)
-  std::vector<int> count_;                   ///< (cells) n_i
-  std::vector<int> near_, pressing_;         ///< cells with δ > 0, and with n_i > 0
-  std::vector<double> mean_, load_, yield_;  ///< (cells) δ̄, P at E = 1, w
-  std::vector<double> factor_, rhs_;         ///< (pressing, pressing) U with M = Uᵀ U; (pressing)
+  double stiffness_ = 0;                         ///< k at E = 1 [1/m]
+  double modulus_ = 0;                           ///< E [Pa]
+  double rounding_ = 0;                          ///< differences of depths that are rounding [m]
+  std::vector<int> touching_;                    ///< points with δ > 0
+  std::vector<double> depth_, left_, pressure_;  ///< (points) δ, r, p
+  std::vector<char> presses_;                    ///< (points) δ_s > w_i
+  std::vector<int> near_, pressing_;  ///< cells that touching points are in or near; with n_i > 0
+  std::vector<int> count_;            ///< (cells) n_i
+  std::vector<double> mean_, load_, yield_, sum_;  ///< (cells) δ̄, P at E = 1, w, R
+  std::vector<double> load_bar_, yield_bar_;       ///< (cells) cotangents, or tangents
+  std::vector<double> factor_, rhs_;  ///< (pressing, pressing) U with M = Uᵀ U; (pressing)
   int systems_ = 0;
 };
 

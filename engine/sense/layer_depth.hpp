@@ -32,33 +32,45 @@ kernels::Distance<N> distance_in_pad(const Shape& shape, const kernels::Touch<N>
 
 /// Distance at which find_underside() ends, by δ: layer_depth() takes one more step.
 inline constexpr double kClose = 1e-10;
+/// Distance at which it begins Newton's method, by the largest depth.
+inline constexpr double kNearby = 0.02;
 
-/// Returns δ of a point of the pad's plane z = 0, o = (0, 0, outward); none where the point is
-/// outside the shape or the shape has no underside. Newton's method from outside, which is monotone
-/// for convex shapes, between bounds.
+/// Returns δ of a point of the pad's plane z = 0, o = (0, 0, outward), at most `deepest`: that where
+/// the shape goes on below. None where the point is outside the shape. The lowest surface of several
+/// counts: steps of the distance lead to it from below, then Newton's method between bounds.
 template <class Shape>
 std::optional<double> find_underside(const Shape& shape, const kernels::Touch<double>& t,
-                                     const kernels::Vec3<double>& xi, double outward) {
+                                     const kernels::Vec3<double>& xi, double outward,
+                                     double deepest) {
   const auto at = [&](double depth) {
     return distance_in_pad(shape, t, {xi.x, xi.y, xi.z - outward * depth});
   };
-  const double here = at(0).d;
-  if (!(here < 0)) return std::nullopt;
-  double low = 0, high = -here;
-  for (int doubling = 0; at(high).d < 0; ++doubling, low = high, high *= 2)
-    if (doubling == 40) return std::nullopt;
-  double depth = high;
+  if (!(at(0).d < 0)) return std::nullopt;
+  double low = 0, high = deepest, depth = deepest;
+  for (int step = 0; step < 100; ++step) {
+    const double d = at(depth).d;
+    if (depth == deepest && d < 0) return deepest;
+    if (!(d > kNearby * deepest)) break;
+    high = depth;
+    depth = std::max(low, depth - d);
+  }
   for (int step = 0; step < 200; ++step) {
     const kernels::Distance<double> found = at(depth);
     if (std::abs(found.d) <= kClose * depth) break;
     (found.d > 0 ? high : low) = depth;
-    const double slope = -outward * found.n.z;
-    double next = depth - found.d / slope;
+    double next = depth - found.d / (-outward * found.n.z);
     if (!(next > low && next < high)) next = 0.5 * (low + high);
     if (next == depth) break;
     depth = next;
   }
   return depth;
+}
+
+/// Returns what stands for a shape that goes on below the layer: δ does not change with it.
+template <class N>
+LayerDepth<N> deepest_depth(const kernels::Vec3<double>& xi, double outward, double deepest) {
+  return {
+      N(deepest), {N(0.0), N(0.0), N(-outward)}, {N(xi.x), N(xi.y), N(xi.z - outward * deepest)}};
 }
 
 /// Returns depth and slant at a point whose δ is known. With dual numbers their derivatives follow

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/sense/layered_field.hpp"
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "engine/sense/dense_tiles.hpp"
 
@@ -61,47 +63,82 @@ Vec3<double> LayeredField::in_field(const Vec3<double>& f) const {
 }
 
 /// The transpose.
-Vec3<double> LayeredField::to_pad(const double* b) const {
-  if (!pad_.skewed) return {b[0], b[1], -b[2]};
+Vec3<double> LayeredField::to_pad(const Vec3<double>& b) const {
+  if (!pad_.skewed) return {b.x, b.y, -b.z};
   const double* const a = pad_.axes;
-  return {a[0] * b[0] + a[3] * b[1] + a[6] * b[2], a[1] * b[0] + a[4] * b[1] + a[7] * b[2],
-          a[2] * b[0] + a[5] * b[1] + a[8] * b[2]};
+  return {a[0] * b.x + a[3] * b.y + a[6] * b.z, a[1] * b.x + a[4] * b.y + a[7] * b.z,
+          a[2] * b.x + a[5] * b.y + a[8] * b.z};
 }
 
-/// Lists the points on which springs press, with the deepest shape at each.
-void LayeredField::find_points(const kernels::TactileArgs<double>& touch,
-                               const SpringFields& springs) {
+/// Whether a shape may touch a point of a tile. Of meshes the distance is known near the surface only.
+bool LayeredField::reaches(int target, int tile) const {
+  const kernels::TouchShape& s = shapes_[static_cast<std::size_t>(target)];
+  if (s.grid != nullptr) return true;
+  const Vec3<double> centre = {pad_.x[tile], pad_.y[tile], pad_.z[tile]};
+  return kernels::with_distance<double>(
+      s.shape, Vec3<double>{s.size[0], s.size[1], s.size[2]}, [&](const auto& shape) {
+        return !(distance_in_pad(shape, touches_[static_cast<std::size_t>(target)], centre).d >
+                 pad_.radius[tile]);
+      });
+}
+
+/// Lists a point that a shape presses, with the deepest of its shapes. `normal`: N of the springs.
+void LayeredField::add_point(int index, const Vec3<double>& xi, double normal) {
+  constexpr double kSteepest = 10;  // |slant|: 1/cos of 84°
   const CompiledLayer& layer = *sensor_->layer;
+  const double deepest = layer.grid.thickness;
+  Point best{index, -1, xi, 0, false, normal, {}};
+  for (std::size_t k = 0; k < shapes_.size(); ++k) {
+    const kernels::TouchShape& s = shapes_[k];
+    if (s.grid != nullptr && !(normal > 0)) continue;
+    kernels::with_distance<double>(
+        s.shape, Vec3<double>{s.size[0], s.size[1], s.size[2]},
+        [&](const auto& shape) {
+          const auto known = find_underside(shape, touches_[k], xi, layer.outward, deepest);
+          if (!known) return;
+          const bool below = *known == deepest;
+          const LayerDepth<double> at =
+              below ? deepest_depth<double>(xi, layer.outward, deepest)
+                    : layer_depth(shape, touches_[k], xi, layer.outward, *known, layer.relaxation);
+          const bool presses = at.depth > 0 && std::isfinite(at.depth) &&
+                               dot(at.slant, at.slant) < kSteepest * kSteepest;
+          if (presses && (best.target < 0 || at.depth > best.at.depth))
+            best.target = static_cast<int>(k), best.known = *known, best.deepest = below,
+            best.at = at;
+        },
+        s.grid);
+  }
+  if (best.target < 0) return;
+  depth_[static_cast<std::size_t>(index)] = best.at.depth;
+  points_.push_back(best);
+}
+
+void LayeredField::find_points(const SpringFields& springs) {
   points_.clear();
   depth_.assign(static_cast<std::size_t>(sensor_->points()), 0.0);
-  for (int tile = 0; tile < pad_.tiles(); ++tile)
+  if (!(kn_ > 0)) return;
+  for (int tile = 0; tile < pad_.tiles(); ++tile) {
+    bool reached = false;
+    for (std::size_t k = 0; k < shapes_.size() && !reached; ++k)
+      reached = reaches(static_cast<int>(k), tile);
+    if (!reached) continue;
+    const double* const offset = pad_.offsets + 2 * kernels::kTactileTile * pad_.kind[tile];
     for_points_of_tile(pad_, tile, [&](int slot, int index) {
       const Vec3<double> n = vector_at(springs.normal, index);
-      const double normal = std::sqrt(dot(n, n));
-      if (!(normal > 0)) return;
-      const double* const offset =
-          pad_.offsets + 2 * kernels::kTactileTile * pad_.kind[tile] + slot;
-      const Vec3<double> xi = {pad_.x[tile] + offset[0],
-                               pad_.y[tile] + offset[kernels::kTactileTile], 0};
-      Point best{index, -1, xi, 0, normal, {}};
-      for (int k = 0; k < touch.n_touches; ++k) {
-        const kernels::TouchShape& s = touch.shapes[k];
-        kernels::with_distance<double>(
-            s.shape, Vec3<double>{s.size[0], s.size[1], s.size[2]},
-            [&](const auto& shape) {
-              const auto known = find_underside(shape, touch.touches[k], xi, layer.outward);
-              if (!known) return;
-              const LayerDepth<double> at =
-                  layer_depth(shape, touch.touches[k], xi, layer.outward, *known, layer.relaxation);
-              if (at.depth > 0 && (best.target < 0 || at.depth > best.at.depth))
-                best.target = k, best.known = *known, best.at = at;
-            },
-            s.grid);
-      }
-      if (best.target < 0) return;
-      depth_[static_cast<std::size_t>(index)] = best.at.depth;
-      points_.push_back(best);
+      add_point(
+          index,
+          {pad_.x[tile] + offset[slot], pad_.y[tile] + offset[kernels::kTactileTile + slot], 0},
+          std::sqrt(dot(n, n)));
     });
+  }
+}
+
+LayeredField::Friction LayeredField::friction_at(const Point& p) const {
+  Friction f;
+  f.springs = vector_at(whole_, p.index) - vector_at(normal_, p.index);
+  f.normal = (1 / std::sqrt(dot(p.at.slant, p.at.slant))) * in_field(p.at.slant);
+  f.along = f.springs - dot(f.normal, f.springs) * f.normal;
+  return f;
 }
 
 void LayeredField::read(const CompiledSensor& sensor, const kernels::TactileArgs<double>& touch,
@@ -109,20 +146,39 @@ void LayeredField::read(const CompiledSensor& sensor, const kernels::TactileArgs
   sensor_ = &sensor;
   pad_ = sensor.tiles();
   const CompiledLayer& layer = *sensor.layer;
-  kn_ = touch.n_touches > 0 ? touch.touches[0].law.kn : layer.stiffness;
+  kn_ = touch.n_touches > 0 ? touch.touches[0].law.kn : 0;
   shapes_.assign(touch.shapes, touch.shapes + touch.n_touches);
   touches_.assign(touch.touches, touch.touches + touch.n_touches);
   whole_.assign(springs.whole.begin(), springs.whole.end());
   normal_.assign(springs.normal.begin(), springs.normal.end());
-  find_points(touch, springs);
-  // Without stiffness springs find nothing that touches.
-  layer_.solve(layer, depth_, kn_ > 0 ? layer.modulus * (kn_ / layer.stiffness) : 0);
+  find_points(springs);
+  layer_.solve(layer, depth_, layer.modulus * (kn_ / layer.stiffness));
   std::fill(field.begin(), field.end(), 0.0);
   for (const Point& p : points_) {
     const double load = layer.area * layer_.pressure()[static_cast<std::size_t>(p.index)];
-    const Vec3<double> friction = vector_at(whole_, p.index) - vector_at(normal_, p.index);
-    put(field, p.index, load * (in_field(p.at.slant) + (1 / p.normal) * friction));
+    Vec3<double> f = load * in_field(p.at.slant);
+    if (p.normal > 0) f += (load / p.normal) * friction_at(p).along;
+    put(field, p.index, f);
   }
+  // A state that is not finite is one in the springs' field.
+  for (std::size_t k = 0; k < field.size(); ++k)
+    if (!std::isfinite(whole_[k])) field[k] = std::numeric_limits<double>::quiet_NaN();
+}
+
+/// Returns depth and slant where a shape moves as its dual numbers say.
+LayerDepth<D> LayeredField::moved(const Point& p, const Touch<D>& touch,
+                                  const Vec3<D>& size) const {
+  const CompiledLayer& layer = *sensor_->layer;
+  if (p.deepest) return deepest_depth<D>(p.xi, layer.outward, p.known);
+  const kernels::TouchShape& s = shapes_[static_cast<std::size_t>(p.target)];
+  LayerDepth<D> out;
+  kernels::with_distance<D>(
+      s.shape, size,
+      [&](const auto& shape) {
+        out = layer_depth(shape, touch, p.xi, layer.outward, p.known, layer.relaxation);
+      },
+      s.grid);
+  return out;
 }
 
 void LayeredField::pull_back(std::span<const double> field_bar, bool sizes, Cotangents& out) {
@@ -135,89 +191,95 @@ void LayeredField::pull_back(std::span<const double> field_bar, bool sizes, Cota
   for (const Point& p : points_) {
     const auto at = static_cast<std::size_t>(p.index);
     const double load = layer.area * layer_.pressure()[at];
-    const Vec3<double> bar = vector_at(field_bar, p.index), n = vector_at(normal_, p.index),
-                       friction = vector_at(whole_, p.index) - n;
-    const double along_friction = dot(bar, friction) / p.normal;
-    const double load_bar = dot(bar, in_field(p.at.slant)) + along_friction;
+    const Vec3<double> bar = vector_at(field_bar, p.index);
+    double load_bar = dot(bar, in_field(p.at.slant));
+    Vec3<double> slant_bar = load * to_pad(bar);
+    if (p.normal > 0) {
+      const Friction f = friction_at(p);
+      const double share = load / p.normal, along = dot(bar, f.along) / p.normal,
+                   out_of_plane = dot(f.normal, bar), sticks_out = dot(f.normal, f.springs);
+      load_bar += along;
+      const Vec3<double> friction_bar = share * (bar - out_of_plane * f.normal);
+      put(out.whole, p.index, friction_bar);
+      put(out.normal, p.index,
+          -friction_bar - (share * along / p.normal) * vector_at(normal_, p.index));
+      const Vec3<double> m_bar = -share * (sticks_out * bar + out_of_plane * f.springs);
+      const double size = std::sqrt(dot(p.at.slant, p.at.slant));
+      slant_bar += (1 / size) * to_pad(m_bar) -
+                   (dot(m_bar, in_field(p.at.slant)) / (size * size * size)) * p.at.slant;
+    }
     load_bar_[at] = layer.area * load_bar;
-    slant_bar_.push_back(load * to_pad(&field_bar[3 * at]));
-    const Vec3<double> friction_bar = (load / p.normal) * bar;
-    put(out.whole, p.index, friction_bar);
-    put(out.normal, p.index, -friction_bar - (load * along_friction / (p.normal * p.normal)) * n);
+    slant_bar_.push_back(slant_bar);
     out.stiffness += load_bar * load / kn_;
   }
   layer_.pull_back(load_bar_, depth_bar_);
   for (kernels::TouchCotangent<double>& t : out.touches) t = {};
-  for (std::size_t i = 0; i < points_.size(); ++i) {
-    const Point& p = points_[i];
-    const auto target = static_cast<std::size_t>(p.target);
-    const double depth_bar = depth_bar_[static_cast<std::size_t>(p.index)];
-    kernels::TouchCotangent<double>& to = out.touches[target];
-    const kernels::TouchShape& s = shapes_[target];
-    const Vec3<double> size = {s.size[0], s.size[1], s.size[2]};
-    const auto change = [&](const Touch<D>& touch, const Vec3<D>& of_size) {
-      double sum = 0;
-      kernels::with_distance<D>(
-          s.shape, of_size,
-          [&](const auto& shape) {
-            sum = along(layer_depth(shape, touch, p.xi, layer.outward, p.known, layer.relaxation),
-                        depth_bar, slant_bar_[i]);
-          },
-          s.grid);
-      return sum;
-    };
-    double turn[3], shift[3], grow[3] = {};
-    for (int axis = 0; axis < 3; ++axis) {
-      const Vec3<D> same = lifted(size, {0, 0, 0});
-      turn[axis] = change(displaced(touches_[target], unit(axis), {0, 0, 0}), same);
-      shift[axis] = change(displaced(touches_[target], {0, 0, 0}, unit(axis)), same);
-      if (sizes)
-        grow[axis] =
-            change(displaced(touches_[target], {0, 0, 0}, {0, 0, 0}), lifted(size, unit(axis)));
-    }
-    to.displacement +=
-        kernels::Vec6<double>{{turn[0], turn[1], turn[2]}, {shift[0], shift[1], shift[2]}};
-    to.size += Vec3<double>{grow[0], grow[1], grow[2]};
-    const Vec3<double> rate = (depth_bar * layer.relaxation) * p.at.slant;
-    to.twist += kernels::Vec6<double>{cross(p.at.place, rate), rate};
-  }
+  for (std::size_t i = 0; i < points_.size(); ++i)
+    if (!points_[i].deepest) pull_back_point(points_[i], slant_bar_[i], sizes, out);
+}
+
+/// Adds the cotangents of the motion and of the size of the shape at a point.
+void LayeredField::pull_back_point(const Point& p, const Vec3<double>& slant_bar, bool sizes,
+                                   Cotangents& out) const {
+  const auto target = static_cast<std::size_t>(p.target);
+  const double depth_bar = depth_bar_[static_cast<std::size_t>(p.index)];
+  kernels::TouchCotangent<double>& to = out.touches[target];
+  const double* const own = shapes_[target].size;
+  const Vec3<double> size = {own[0], own[1], own[2]}, none = {0, 0, 0};
+  const auto change = [&](const Vec3<double>& turn, const Vec3<double>& shift,
+                          const Vec3<double>& grow) {
+    return along(moved(p, displaced(touches_[target], turn, shift), lifted(size, grow)), depth_bar,
+                 slant_bar);
+  };
+  const auto by_axes = [](const auto& f) {
+    return Vec3<double>{f(unit(0)), f(unit(1)), f(unit(2))};
+  };
+  to.displacement +=
+      kernels::Vec6<double>{by_axes([&](const Vec3<double>& e) { return change(e, none, none); }),
+                            by_axes([&](const Vec3<double>& e) { return change(none, e, none); })};
+  if (sizes) to.size += by_axes([&](const Vec3<double>& e) { return change(none, none, e); });
+  const Vec3<double> rate = (depth_bar * sensor_->layer->relaxation) * p.at.slant;
+  to.twist += kernels::Vec6<double>{cross(p.at.place, rate), rate};
 }
 
 void LayeredField::push_forward(const SpringFields& springs_dot, std::span<const Touch<D>> touches,
                                 std::span<const Vec3<D>> sizes, double stiffness_dot,
                                 std::span<double> field_dot) {
   const CompiledLayer& layer = *sensor_->layer;
-  std::vector<LayerDepth<D>> moved;
-  depth_bar_.assign(depth_.size(), 0.0);  // how depths change
-  load_bar_.resize(depth_.size());        // how pressures change
+  std::vector<Vec3<double>> slants_dot;
+  std::vector<double> depth_dot(depth_.size()), pressure_dot(depth_.size());
   for (const Point& p : points_) {
     const auto target = static_cast<std::size_t>(p.target);
-    const kernels::TouchShape& s = shapes_[target];
-    kernels::with_distance<D>(
-        s.shape, sizes[target],
-        [&](const auto& shape) {
-          moved.push_back(
-              layer_depth(shape, touches[target], p.xi, layer.outward, p.known, layer.relaxation));
-        },
-        s.grid);
-    depth_bar_[static_cast<std::size_t>(p.index)] = moved.back().depth.epsilon;
+    const LayerDepth<D> at = moved(p, touches[target], sizes[target]);
+    depth_dot[static_cast<std::size_t>(p.index)] = at.depth.epsilon;
+    slants_dot.push_back({at.slant.x.epsilon, at.slant.y.epsilon, at.slant.z.epsilon});
   }
-  layer_.push_forward(depth_bar_, load_bar_);
+  layer_.push_forward(depth_dot, pressure_dot);
   std::fill(field_dot.begin(), field_dot.end(), 0.0);
   for (std::size_t i = 0; i < points_.size(); ++i) {
     const Point& p = points_[i];
     const auto at = static_cast<std::size_t>(p.index);
+    const Vec3<double>& slant_dot = slants_dot[i];
     const double load = layer.area * layer_.pressure()[at],
-                 load_dot = layer.area * load_bar_[at] + load * stiffness_dot / kn_;
-    const Vec3<double> n = vector_at(normal_, p.index), friction = vector_at(whole_, p.index) - n,
-                       n_dot = vector_at(springs_dot.normal, p.index),
-                       friction_dot = vector_at(springs_dot.whole, p.index) - n_dot;
-    const Vec3<D>& slant = moved[i].slant;
-    const double inverse = 1 / p.normal, inverse_dot = -dot(n, n_dot) * inverse * inverse * inverse;
-    put(field_dot, p.index,
-        load_dot * (in_field(p.at.slant) + inverse * friction) +
-            load * (in_field({slant.x.epsilon, slant.y.epsilon, slant.z.epsilon}) +
-                    inverse * friction_dot + inverse_dot * friction));
+                 load_dot = layer.area * pressure_dot[at] + load * stiffness_dot / kn_;
+    Vec3<double> f = load_dot * in_field(p.at.slant) + load * in_field(slant_dot);
+    if (p.normal > 0) {
+      const Friction now = friction_at(p);
+      const Vec3<double> n = vector_at(normal_, p.index),
+                         n_dot = vector_at(springs_dot.normal, p.index),
+                         springs = vector_at(springs_dot.whole, p.index) - n_dot;
+      const double size = std::sqrt(dot(p.at.slant, p.at.slant));
+      const Vec3<double> m_dot =
+          (1 / size) * in_field(slant_dot) -
+          (dot(p.at.slant, slant_dot) / (size * size * size)) * in_field(p.at.slant);
+      const Vec3<double> along_dot =
+          springs - dot(now.normal, now.springs) * m_dot -
+          (dot(m_dot, now.springs) + dot(now.normal, springs)) * now.normal;
+      const double inverse = 1 / p.normal,
+                   inverse_dot = -dot(n, n_dot) * inverse * inverse * inverse;
+      f += (load_dot * inverse + load * inverse_dot) * now.along + (load * inverse) * along_dot;
+    }
+    put(field_dot, p.index, f);
   }
 }
 

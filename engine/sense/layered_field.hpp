@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // Field of a sensor with a coupled layer (docs/layer.md). With the force N n and the friction T of
-// the springs at a point, and the layer's pressure p there, the force on the sensor's body is
-//   f = 𝒜 p (slant + T/N)
-// so that friction keeps its cone. Springs find which points touch; the layer shares out the load.
+// the springs at a point, the layer's pressure p there, and the normal m = slant/|slant| of the
+// surface that presses, the force on the sensor's body is
+//   f = 𝒜 p (slant + T'/N),  T' = T - m (m·T)
+// so that friction has the cone of the layer's load. Where N is 0 there is no friction.
 #pragma once
 
 #include <span>
@@ -53,12 +54,25 @@ class LayeredField {
     int index, target;
     kernels::Vec3<double> xi;  ///< pad axes [m]
     double known;              ///< δ [m]
+    bool deepest;              ///< the shape goes on below the layer
     double normal;             ///< N [N]
     LayerDepth<double> at;
   };
-  void find_points(const kernels::TactileArgs<double>& touch, const SpringFields& springs);
+  /// Friction of one point: T, T' and m, in components of the field.
+  struct Friction {
+    kernels::Vec3<double> springs, along, normal;
+  };
+  void find_points(const SpringFields& springs);
+  void add_point(int index, const kernels::Vec3<double>& xi, double normal);
+  void pull_back_point(const Point& p, const kernels::Vec3<double>& slant_bar, bool sizes,
+                       Cotangents& out) const;
+  [[nodiscard]] bool reaches(int target, int tile) const;
+  [[nodiscard]] Friction friction_at(const Point& p) const;
+  [[nodiscard]] LayerDepth<kernels::Dual<double>> moved(
+      const Point& p, const kernels::Touch<kernels::Dual<double>>& touch,
+      const kernels::Vec3<kernels::Dual<double>>& size) const;
   [[nodiscard]] kernels::Vec3<double> in_field(const kernels::Vec3<double>& force) const;
-  [[nodiscard]] kernels::Vec3<double> to_pad(const double* field_bar) const;
+  [[nodiscard]] kernels::Vec3<double> to_pad(const kernels::Vec3<double>& field_bar) const;
 
   const CompiledSensor* sensor_ = nullptr;
   kernels::PadTiles pad_{};
@@ -66,9 +80,10 @@ class LayeredField {
   std::vector<kernels::TouchShape> shapes_;
   std::vector<kernels::Touch<double>> touches_;
   std::vector<Point> points_;
-  std::vector<double> whole_, normal_;                // (points, 3)
-  std::vector<double> depth_, depth_bar_, load_bar_;  // (points)
-  std::vector<kernels::Vec3<double>> slant_bar_;      // parallel to points_
+  std::vector<double> whole_, normal_;            // (points, 3)
+  std::vector<double> depth_;                     // (points)
+  std::vector<double> depth_bar_, load_bar_;      // (points) cotangents
+  std::vector<kernels::Vec3<double>> slant_bar_;  // parallel to points_
   GelLayer layer_;
 };
 

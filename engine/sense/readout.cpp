@@ -7,6 +7,7 @@
 #include <array>
 #include <numeric>
 #include <optional>
+#include <tuple>
 #include <type_traits>
 
 #include "engine/model/compiled_model.hpp"
@@ -16,7 +17,7 @@
 #include "engine/sense/elastic_field.hpp"
 #include "engine/sense/field_sum.hpp"
 #include "engine/sense/imperfect_field.hpp"
-#include "engine/sense/layered_field.hpp"
+#include "engine/sense/layer_reading.hpp"
 #include "engine/sense/marker_map.hpp"
 #include "engine/sense/motion_reading.hpp"
 #include "engine/sense/pad_reader.hpp"
@@ -36,20 +37,15 @@ struct Readout::Impl {
   Model model;
   Precision precision;
   PadReader reader;
-  // Fields in the precision of the readout when T is the other type: one field, or those of a
-  // block.
+  // Fields in the readout's precision when T is the other type: one field, or those of a block.
   AlignedVector<double> wide;
   AlignedVector<float> single;
   std::vector<kernels::Frame<double>> in_body;  // (sensors) pad axes in the body
-  // Of imperfect sensors: imperfections, reading, and readings of a block of small pads.
   ImperfectField imperfections;
   ElasticField elastic;
-  LayeredField layered;
-  std::vector<double> normal_springs, all_springs, layer_field;  // (points, 3) of a layered sensor
-  std::vector<kernels::Touch<double>> frictionless;
-  std::vector<std::optional<MarkerMap>> markers;  // (sensors) of those that have them
-  std::vector<double> displacement;               // (points, 2)
-  std::vector<double> elastic_field;              // (points, 3)
+  LayerReading layered;
+  std::vector<std::optional<MarkerMap>> markers;    // (sensors) of those that have them
+  std::vector<double> displacement, elastic_field;  // (points, 2), (points, 3)
   std::vector<double> one_reading, block_readings, of_tiles;
   std::vector<double> earlier;     // fields of small pads in the states of `past`
   std::optional<PastStates> past;  // for sensors with lag
@@ -60,25 +56,21 @@ struct Readout::Impl {
     for (const CompiledSensor& s : compiled(m).sensors) {
       const kernels::Frame<double>& body = compiled(m).bodies[std::size_t(s.body)].frame;
       in_body.push_back(relative(body, s.pad));
-      room = std::max({room, std::size_t(s.n_tiles()) * 3 * kTactileTile,
-                       small(s) ? std::size_t(kBlock * 3 * s.points()) : std::size_t(0)});
-      if (s.elastic)
-        elastic_field.resize(std::max(elastic_field.size(), std::size_t(3 * s.points())));
+      const auto points = std::size_t(s.points());
+      room = std::max(
+          {room, std::size_t(s.n_tiles()) * 3 * kTactileTile, small(s) ? 3 * kBlock * points : 0});
+      const auto grow = [](auto& x, std::size_t n) { x.resize(std::max(x.size(), n)); };
+      if (s.elastic || s.layer) grow(elastic_field, 3 * points);
       const bool marked = m.scene().sensors[std::size_t(s.number)].markers.has_value();
       markers.emplace_back();
       if (marked) {
         markers.back().emplace(m, s.number);
-        displacement.resize(std::max(displacement.size(), std::size_t(2 * s.points())));
+        grow(displacement, 2 * points);
       }
-      if (s.layer)
-        for (auto* x : {&normal_springs, &all_springs, &layer_field})
-          x->resize(std::max(x->size(), std::size_t(3 * s.points())));
       if (!s.imperfect && !s.elastic && !s.layer && !marked) continue;
-      one_reading.resize(std::max(one_reading.size(), std::size_t(3 * s.points())));
-      of_tiles.resize(std::max(of_tiles.size(), std::size_t(s.n_tiles()) * 3 * kTactileTile));
-      if (small(s))
-        block_readings.resize(
-            std::max(block_readings.size(), std::size_t(kBlock * 3 * s.points())));
+      grow(one_reading, 3 * points);
+      grow(of_tiles, std::size_t(s.n_tiles()) * 3 * kTactileTile);
+      if (small(s)) grow(block_readings, 3 * kBlock * points);
     }
     if (compiled(m).layout.past_states > 0) {
       earlier.resize(block_readings.size());
@@ -93,8 +85,7 @@ struct Readout::Impl {
   }
   template <class Real>
   Real* scratch() {
-    if constexpr (std::is_same_v<Real, double>) return wide.data();
-    if constexpr (std::is_same_v<Real, float>) return single.data();
+    return std::get<AlignedVector<Real>&>(std::tie(wide, single)).data();
   }
 
   /// Calls `body` with a zero of the type in which the readout computes.
@@ -165,13 +156,14 @@ struct Readout::Impl {
     return {reader.active.data(), count};
   }
 
-  /// Whether a reading depends on the shear state. Pressure does not.
+  /// Whether a reading depends on the shear state or on a layer. Pressure does not depend on shear.
   [[nodiscard]] bool is_elastic(FieldOutput of) const {
-    return sensor_of(of.sensor).elastic && of.form != FieldForm::pressure;
+    const CompiledSensor& s = sensor_of(of.sensor);
+    return s.layer != nullptr || (s.elastic && of.form != FieldForm::pressure);
   }
   /// Whether a reading needs more than the kernels' field.
   [[nodiscard]] bool imperfect(FieldOutput of) const {
-    return of.form == FieldForm::markers || is_elastic(of) || sensor_of(of.sensor).layer ||
+    return of.form == FieldForm::markers || is_elastic(of) ||
            (of.form != FieldForm::ideal && sensor_of(of.sensor).imperfect);
   }
   /// Turns an ideal field into the reading of an imperfect sensor, in the readout's precision.
@@ -227,8 +219,6 @@ struct Readout::Impl {
                       std::span<double> field) {
     if (sensor_of(of.sensor).past_states() > 0) {
       read_past(batch, environment, of, field);
-    } else if (sensor_of(of.sensor).layer) {
-      read_layered(batch, environment, of, field);
     } else if (is_elastic(of)) {
       read_elastic(batch, environment, of, field);
     } else {
@@ -237,44 +227,18 @@ struct Readout::Impl {
     make_imperfect(batch, environment, of, field);
   }
 
-  /// Copies some components of a field.
-  static void take_part(std::span<const double> whole, const FieldPart& part,
-                        std::span<double> field) {
-    const auto width = std::size_t(part.count);
-    for (std::size_t k = 0; k < field.size(); ++k)
-      field[k] = whole[k / width * 3 + std::size_t(part.first) + k % width];
-  }
-
-  /// Computes the ideal field of a sensor with a layer, or some of its components, in double. The
-  /// pressure leaves friction out.
-  void read_layered(const Batch& batch, int environment, FieldOutput of, std::span<double> field) {
-    const CompiledSensor& s = sensor_of(of.sensor);
-    const std::size_t numbers = std::size_t(3 * s.points());
-    const auto normal = std::span(normal_springs).first(numbers),
-               all = std::span(all_springs).first(numbers),
-               whole = std::span(layer_field).first(numbers);
-    auto a =
-        reader.arguments<double>(of.sensor, environment % kBlock / kGroup, environment % kGroup);
-    const kernels::Touch<double>* const touches = a.touches;
-    without_friction(a, frictionless);
-    read_ideal(reader, s, a, normal);
-    a.touches = touches;
-    if (of.form == FieldForm::pressure)
-      std::copy(normal.begin(), normal.end(), all.begin());
-    else if (s.elastic)
-      elastic.read(reader, batch, environment, of.sensor, all);
-    else
-      read_ideal(reader, s, a, all);
-    layered.read(s, a, {all, normal}, whole);
-    take_part(whole, part_of(of.form), field);
-  }
-
-  /// Computes the ideal field of a sensor with shear springs, or some of its components.
+  /// Computes the ideal field of a sensor with shear springs or a layer, or some of its components.
+  /// The pressure leaves friction out.
   void read_elastic(const Batch& batch, int environment, FieldOutput of, std::span<double> field) {
     const FieldPart part = part_of(of.form);
-    const auto whole = std::span(elastic_field).first(field.size() / std::size_t(part.count) * 3);
-    elastic.read(reader, batch, environment, of.sensor, whole);
-    take_part(whole, part, field);
+    const auto width = std::size_t(part.count);
+    const auto whole = std::span(elastic_field).first(field.size() / width * 3);
+    if (const CompiledSensor& s = sensor_of(of.sensor); s.layer)
+      layered.read(reader, elastic, batch, environment, s, of.form != FieldForm::pressure, whole);
+    else
+      elastic.read(reader, batch, environment, of.sensor, whole);
+    for (std::size_t k = 0; k < field.size(); ++k)
+      field[k] = whole[k / width * 3 + std::size_t(part.first) + k % width];
   }
 
   /// The same into scratch of the readout. For a sum: the field.
@@ -295,9 +259,7 @@ struct Readout::Impl {
     const std::size_t points = std::size_t(sensor_of(sensor).points());
     const std::span<double> field = std::span(one_reading).first(3 * points),
                             moved = std::span(displacement).first(2 * points);
-    if (sensor_of(sensor).layer)
-      read_layered(batch, environment, ideal, field);
-    else if (sensor_of(sensor).elastic)
+    if (is_elastic(ideal))
       read_elastic(batch, environment, ideal, field);
     else
       fill(environment, ideal, field.data());

@@ -188,6 +188,8 @@ void add_feedback(Scene& scene, const SceneNode& node, const TactileDescription&
     node.fail(
         "feedback and ks: a contact and the reading of its skin would each remember a touch "
         "in their own way; expected one of them");
+  if (d.layer)
+    node.fail("feedback and <layer>: the contact would have springs; expected one of them");
   PairContactDescription pair;
   for (const TactilePoint& p : tactile_points(d)) {
     if (p.factors != TactilePoint{}.factors)

@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/sense/layer_reading.hpp"
+
+#include "engine/sense/imperfect_field.hpp"
+
+namespace tangere {
+
+using kernels::kBlock;
+using kernels::kGroup;
+
+void LayerReading::read(PadReader& reader, ElasticField& elastic, const Batch& batch,
+                        int environment, const CompiledSensor& sensor, bool friction,
+                        std::span<double> field) {
+  whole_.resize(field.size());
+  normal_.resize(field.size());
+  const auto touched =
+      reader.arguments<double>(sensor.number, environment % kBlock / kGroup, environment % kGroup);
+  auto smooth = touched;
+  without_friction(smooth, frictionless_);
+  read_ideal(reader, sensor, smooth, normal_);
+  if (!friction)
+    whole_ = normal_;
+  else if (sensor.elastic)
+    elastic.read(reader, batch, environment, sensor.number, whole_);
+  else
+    read_ideal(reader, sensor, touched, whole_);
+  layered_.read(sensor, touched, {whole_, normal_}, field);
+}
+
+LayeredField::Cotangents& LayerReading::pull_back(
+    std::span<const double> field_bar, bool sizes,
+    std::span<kernels::TouchCotangent<double>> touches) {
+  whole_bar_.resize(field_bar.size());
+  normal_bar_.resize(field_bar.size());
+  bar_ = {whole_bar_, normal_bar_, touches};
+  layered_.pull_back(field_bar, sizes, bar_);
+  return bar_;
+}
+
+}  // namespace tangere

@@ -1,0 +1,64 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A sensor whose points a layer couples: readings, the builder and gradients."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+torch = pytest.importorskip("torch", reason="PyTorch is not installed")
+
+import tangere  # noqa: E402
+import tangere.torch as tt  # noqa: E402
+
+GEL = tangere.scenes()["gel_press"]
+
+
+def test_environments_have_gels_of_their_own():
+    sim = tt.Simulation(GEL, 3, 60, every=60, read=["gel", "gel.sum"])
+    with torch.no_grad():
+        s = sim.step(sim.reset(seed=1), torch.zeros(3, 3).index_fill(1, torch.tensor([2]), -0.0015))
+    field, total = s["gel"].numpy(), s["gel.sum"].numpy()
+    assert field.shape == (3, 48, 64, 3)
+    np.testing.assert_allclose(field[..., 2].sum((1, 2)), np.abs(total[:, 2]), rtol=1e-9)
+    assert len(np.unique(field[..., 2].max((1, 2)))) == 3  # kn is drawn, and E follows it
+
+
+def test_gradients_agree_with_differences():
+    sim = tt.Simulation(GEL, 2, 60, every=20, read=["gel"], threads=1)
+    draw = torch.Generator().manual_seed(1)
+    weights = torch.randn(3, generator=draw, dtype=torch.float64)
+    name = "tactile gel kn"
+
+    def loss(u, kn):
+        s, total = sim.reset(seed=3, parameters={name: kn}), 0
+        for t in range(3):
+            s = sim.step(s, u[t])
+            total = total + (s["gel"] * weights).sum()
+        return total
+
+    kn = sim.parameters(name)[name].detach().clone().requires_grad_()
+    u = torch.zeros(3, 2, 3, dtype=torch.float64)
+    u[:, :, 2] = torch.tensor([[-0.0005], [-0.001], [-0.0013]], dtype=torch.float64)
+    u.requires_grad_()
+    loss(u, kn).backward()
+    for x, size in ((u, 1e-4), (kn, 0.1 * float(kn.detach().max()))):
+        along = size * torch.randn(x.shape, generator=draw, dtype=torch.float64)
+        expected = float((x.grad * along).sum())
+        assert abs(expected) > 1e-6
+        errors = []
+        for step in (1e-2, 1e-3, 1e-4, 1e-5):  # points begin to press, which large steps cross
+            with torch.no_grad():
+                sides = [loss(*(y + sign * step * along if y is x else y for y in (u, kn)))
+                         for sign in (1, -1)]  # fmt: skip
+            errors.append(abs(float(sides[0] - sides[1]) / (2 * step) / expected - 1))
+        assert min(errors) < 1e-4, errors
+
+
+def test_the_builder_has_layers():
+    builder = tangere.SceneBuilder.from_file(GEL)
+    xml = builder.xml()
+    assert "<layer" in xml and "modulus" in xml
+    with pytest.raises(tangere.InputError, match="at most a third of the thickness"):
+        tangere.Model(tangere.SceneBuilder.from_string(
+            xml.replace('thickness="4e-3"', 'thickness="4e-4"'), GEL).scene())  # fmt: skip
