@@ -12,8 +12,8 @@ namespace tangere::apps {
 int report_shards(const GenerateOptions& options, const Console& console, const Job& job,
                   const JobResult& done, DatasetWriter& output);
 
-/// Prints that a signal stopped the run, and returns the exit code. `requested`: number of requested
-/// episodes.
+/// Prints that a signal stopped the run, and returns the exit code. `requested`: number of
+/// requested episodes.
 int report_stopped(const GenerateOptions& options, const Console& console, int signal,
                    std::int64_t episodes, std::int64_t requested, const DatasetWriter& output);
 

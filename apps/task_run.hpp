@@ -14,7 +14,8 @@
 namespace tangere::apps {
 
 /// Returns the task that `word` names, on its own scene; null if it names a file. Throws InputError
-/// with the nearest task for a plain word that is neither. `requested`: as in apply_solver_options().
+/// with the nearest task for a plain word that is neither. `requested`: as in
+/// apply_solver_options().
 std::unique_ptr<Task> find_task(const std::string& word, const Console& console,
                                 const SolverOptions& requested = {});
 

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+// Dual numbers go through the depths of points; the layer itself is linear in their changes.
 #include "engine/derivative/dual_layer.hpp"
 
 #include "kernels/step/arguments.hpp"

@@ -2,20 +2,11 @@
 // The coupled layer of a sensor, compiled (docs/layer.md).
 #pragma once
 
-#include <array>
 #include <vector>
 
 #include "engine/model/layer_compliance.hpp"
 
 namespace tangere {
-
-/// Four cells around a point and their bilinear weights, which may be 0.
-struct CellWeights {
-  std::array<int, 4> cell{};
-  std::array<double, 4> weight{};
-};
-/// Returns those of the points of a grid of cells of side × side points, rows × cols of them.
-std::vector<CellWeights> cell_weights(const LayerGrid& grid, int side, int rows, int cols);
 
 struct CompiledLayer {
   LayerGrid grid;

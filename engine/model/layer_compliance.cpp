@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+// The sum over wave vectors runs over one axis after the other.
 #include "engine/model/layer_compliance.hpp"
 
 #include <algorithm>
@@ -7,8 +8,6 @@
 #include <cstdint>
 #include <numbers>
 #include <utility>
-
-#include "engine/model/compiled_layer.hpp"
 
 namespace tangere {
 namespace {

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+// Refuses what the layer would not compute, and chooses its cells.
 #include "engine/model/sensor_layer.hpp"
 
 #include <fmt/format.h>

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The layer is solved with E = 1: its pressures are proportional to E. Sums run over points and cells
-// in order, and the factorisation adds rows to rows, so that results depend on the depths alone.
+// The layer is solved with E = 1: its pressures are proportional to E. Sums run over points and
+// cells in order, and the factorisation adds rows to rows, so that results depend on the depths
+// alone.
 #include "engine/sense/gel_layer.hpp"
 
 #include <algorithm>

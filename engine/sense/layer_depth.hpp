@@ -36,8 +36,9 @@ inline constexpr double kClose = 1e-10;
 inline constexpr double kNearby = 0.02;
 
 /// Returns δ of a point of the pad's plane z = 0, o = (0, 0, outward), at most `deepest`: that where
-/// the shape goes on below. None where the point is outside the shape. The lowest surface of several
-/// counts: steps of the distance lead to it from below, then Newton's method between bounds.
+/// the shape goes on below. None where the point is outside the shape. The lowest surface of
+/// several counts: steps of the distance lead to it from below, then Newton's method between
+/// bounds.
 template <class Shape>
 std::optional<double> find_underside(const Shape& shape, const kernels::Touch<double>& t,
                                      const kernels::Vec3<double>& xi, double outward,

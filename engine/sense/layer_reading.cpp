@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+// Both readings and their derivatives need the fields of the springs first.
 #include "engine/sense/layer_reading.hpp"
 
 #include "engine/sense/imperfect_field.hpp"

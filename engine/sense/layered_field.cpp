@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
+// Points are found by the shapes, tile by tile. Derivatives by motion and size go through dual
+// numbers, one direction after the other.
 #include "engine/sense/layered_field.hpp"
 
 #include <algorithm>
@@ -70,7 +72,7 @@ Vec3<double> LayeredField::to_pad(const Vec3<double>& b) const {
           a[2] * b.x + a[5] * b.y + a[8] * b.z};
 }
 
-/// Whether a shape may touch a point of a tile. Of meshes the distance is known near the surface only.
+/// Whether a shape may touch a point of a tile. A mesh knows its distance near the surface only.
 bool LayeredField::reaches(int target, int tile) const {
   const kernels::TouchShape& s = shapes_[static_cast<std::size_t>(target)];
   if (s.grid != nullptr) return true;

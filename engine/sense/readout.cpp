@@ -30,8 +30,7 @@ using kernels::kBlock;
 using kernels::kGroup;
 using kernels::kTactileTile;
 
-/// If fewer environments of a block are wanted, they are read one by one: the same bits, less work.
-constexpr int kFewest = 6;
+constexpr int kFewest = 6;  // fewer environments of a block are read one by one: less work
 
 struct Readout::Impl {
   Model model;

@@ -9,7 +9,6 @@
 #pragma once
 
 #include <cmath>
-#include <concepts>
 #include <cstddef>
 #include <type_traits>
 #include <xsimd/xsimd.hpp>
@@ -111,14 +110,10 @@ TANGERE_FUSED(FloatAvx512, _mm512_fmadd_ps, _mm512_fnmadd_ps)
 #undef TANGERE_FUSED
 
 // The same on one register. Functions on T serve the scalar build.
-template <std::floating_point T>
-T fuse(T a, T b, T c) {
-  return a * b + c;
-}
-template <std::floating_point T>
-T fuse_negated(T a, T b, T c) {
-  return c - a * b;
-}
+template <class T>
+requires std::is_floating_point_v<T> T fuse(T a, T b, T c) { return a * b + c; }
+template <class T>
+requires std::is_floating_point_v<T> T fuse_negated(T a, T b, T c) { return c - a * b; }
 template <class T>
 xsimd::batch<T, xsimd::sse2> fuse(const xsimd::batch<T, xsimd::sse2>& a,
                                   const xsimd::batch<T, xsimd::sse2>& b,
@@ -131,10 +126,8 @@ xsimd::batch<T, xsimd::sse2> fuse_negated(const xsimd::batch<T, xsimd::sse2>& a,
                                           const xsimd::batch<T, xsimd::sse2>& c) {
   return c - a * b;
 }
-template <std::floating_point T>
-T choose(bool m, T a, T b) {
-  return m ? a : b;
-}
+template <class T>
+requires std::is_floating_point_v<T> T choose(bool m, T a, T b) { return m ? a : b; }
 template <class T, class A>
 xsimd::batch<T, A> choose(const xsimd::batch_bool<T, A>& m, const xsimd::batch<T, A>& a,
                           const xsimd::batch<T, A>& b) {
@@ -151,18 +144,14 @@ xsimd::batch<double, A> magnitude(const xsimd::batch<double, A>& a) {
   return xsimd::abs(a);
 }
 // maxpd and minpd return the second operand where either is NaN, as the comparison does.
-template <std::floating_point T>
-T larger(T a, T b) {
-  return a > b ? a : b;
-}
+template <class T>
+requires std::is_floating_point_v<T> T larger(T a, T b) { return a > b ? a : b; }
 template <class T, class A>
 xsimd::batch<T, A> larger(const xsimd::batch<T, A>& a, const xsimd::batch<T, A>& b) {
   return xsimd::max(a, b);
 }
-template <std::floating_point T>
-T smaller(T a, T b) {
-  return a < b ? a : b;
-}
+template <class T>
+requires std::is_floating_point_v<T> T smaller(T a, T b) { return a < b ? a : b; }
 template <class T, class A>
 xsimd::batch<T, A> smaller(const xsimd::batch<T, A>& a, const xsimd::batch<T, A>& b) {
   return xsimd::min(a, b);

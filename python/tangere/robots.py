@@ -32,7 +32,7 @@ def import_robot(
     Parameters
     ----------
     path: of the file.
-    pads: skins by link, or by site of MJCF: a layout of the program such as "gelsight_mini_measured", or
+    pads: skins by link, or by site of MJCF: a layout of the program such as "digit_guess", or
         a file; as (layout, place) on a face of the link's box, "+x" to "-z", or at x y z [m] or
         x y z roll pitch yaw [m, rad] in the link's frame.
     motors: by joint: "force", within the file's effort, or gains P or (P, D) [N/m or N m/rad,

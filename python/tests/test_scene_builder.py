@@ -302,7 +302,7 @@ def test_a_robot_is_that_of_the_command(name, command, tmp_path):
 
 def test_a_robot_is_extended():
     with pytest.warns(UserWarning, match="motion differs by it: .*<mimic>"):
-        b = import_robot(ROBOTS / "gripper.urdf", pads={"left_finger": ("gelsight_mini_measured", "-y")},
+        b = import_robot(ROBOTS / "gripper.urdf", pads={"left_finger": ("digit_guess", "-y")},
                          motors={"left_slide": (2000, 100)}, drop=True)  # fmt: skip
     ball = b.robot.link("ball", parent="palm")
     ball.joint("ball", "free3d", pos=(0, 0, 0.1))

@@ -19,9 +19,9 @@ class TaskProgram;
 struct StepTally;
 
 /// Steps count from the start of the episodes, including their warm-up. Every step calls
-/// controls(), steps, and calls after_step(). After the last step of the warm-up and of each row, after_row()
-/// follows. Different blocks of a batch may be in different threads, each with a program of its
-/// own.
+/// controls(), steps, and calls after_step(). After the last step of the warm-up and of each row,
+/// after_row() follows. Different blocks of a batch may be in different threads, each with a
+/// program of its own.
 class EpisodeProgram {
  public:
   virtual ~EpisodeProgram() = default;

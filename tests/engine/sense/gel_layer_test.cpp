@@ -51,8 +51,8 @@ double force(const CompiledLayer& layer, const GelLayer& gel) {
   return sum * layer.grid.width * layer.grid.height / (layer.side * layer.side);
 }
 
-/// Largest violation of P = E k Σ max(0, δ - w)/m², w = C' P, and of P as the mean of p, relative to
-/// the largest load.
+/// Largest violation of P = E k Σ max(0, δ - w)/m², w = C' P, and of P as the mean of p, relative
+/// to the largest load.
 double residual(const CompiledLayer& layer, const Numbers& depth, const GelLayer& gel, double E) {
   const auto cells = static_cast<std::size_t>(layer.grid.cells());
   const double whole = layer.side * layer.side;

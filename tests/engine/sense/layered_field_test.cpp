@@ -52,8 +52,8 @@ double total(const Numbers& field, std::size_t component) {
   return sum;
 }
 
-/// Forces that were measured on such a sensor (Helmut et al., FEATS), and what the same gel, from E,
-/// ν and t alone, carries here.
+/// Forces that were measured on such a sensor (Helmut et al., FEATS), and what the same gel, from
+/// E, ν and t alone, carries here.
 TEST(LayeredField, CarriesTheMeasuredForces) {
   constexpr double kMeasured[][2] = {
       {0.5e-3, 1.6503}, {1e-3, 5.9641}, {1.5e-3, 13.5257}, {2e-3, 23.2532}};
@@ -70,8 +70,8 @@ TEST(LayeredField, DoesNotDependOnTheStiffnessOfItsSprings) {
   for (std::size_t i = 0; i < a.size(); ++i) EXPECT_NEAR(a[i], b[i], 1e-12);
 }
 
-/// A slide: the friction of every point is μ times its own pressing force. Under a ball the springs'
-/// friction lies in a plane that is a little off that of the surface below.
+/// A slide: the friction of every point is μ times its own pressing force. Under a ball the
+/// springs' friction lies in a plane that is a little off that of the surface below.
 TEST(LayeredField, FrictionKeepsItsCone) {
   const Numbers field = field_of(gel(0.5), {0, 0, -1e-3}, {0.3, 0, 0}),
                 none = field_of(gel(), {0, 0, -1e-3}, {0.3, 0, 0});

@@ -113,7 +113,8 @@ TEST(ShippedScenes, AreAllRunHere) {
                                      "mug",           "insertion_elastic",
                                      "rolling_ball",  "rolling_ball_small",
                                      "stable_grasp",  "stable_grasp_elastic",
-                                     "ten_boxes",     "grip_rod"};
+                                     "ten_boxes",     "grip_rod",
+                                     "gel_press"};
   EXPECT_EQ(found, run) << "a scene without a test of what it does, or a test without a scene";
 }
 
@@ -129,6 +130,18 @@ TEST(ShippedScenes, RollingBallRolls) {
         EXPECT_GT(r.touch(k, e, 0).pressure, 1e-3) << name << " step " << k;
       EXPECT_GT(r.q(r.at(0.8), e, "ball_joint.x") - r.q(0, e, "ball_joint.x"), 2e-3);
     }
+  }
+}
+
+TEST(ShippedScenes, AGelPressesABallAndRollsIt) {
+  const SceneRun r("gel_press");
+  EXPECT_EQ(r.steps, 300);
+  EXPECT_EQ(r.failed, 0);
+  for (int e = 0; e < kEnvironments; ++e) {
+    EXPECT_EQ(r.touch(0, e, 0).points, 0);
+    EXPECT_GT(r.touch(r.at(0.12), e, 0).pressure, 1);
+    EXPECT_GT(r.touch(r.at(0.12), e, 0).points, 100);
+    EXPECT_GT(r.q(r.at(0.3), e, "ball.x") - r.q(0, e, "ball.x"), 1e-3);
   }
 }
 

@@ -23,11 +23,13 @@ Scene pressed(const std::string& sensor, const std::string& defaults = "",
   const bool metres = unit == "m-kg";
   const auto length = [&](double x) { return std::to_string(metres ? x : 100 * x); };
   return parse_scene("<tangere><option unit=\"" + unit + "\"/><default>" + defaults +
-                         "</default><robot><link><joint type=\"fixed\"/><body name=\"plate\" "
+                         "</default><robot><link name=\"plate\"><joint name=\"fixed\" "
+                         "type=\"fixed\"/><body name=\"plate\" "
                          "type=\"cuboid\" size=\"" +
                          length(0.1) + " " + length(0.1) + " " + length(0.01) + "\" pos=\"0 0 " +
                          length(-0.005) +
-                         "\"/></link></robot><robot><link><joint name=\"slide\" type=\"prismatic\" "
+                         "\"/></link></robot><robot><link name=\"ball\"><joint name=\"slide\" "
+                         "type=\"prismatic\" "
                          "axis=\"0 0 "
                          "1\" pos=\"0 0 " +
                          length(7.5e-3) + "\"/><body name=\"ball\" type=\"sphere\" radius=\"" +
