@@ -15,15 +15,20 @@ inline bool is_due(const CompiledModel& m, const kernels::ShearSpringContact& of
   return every > 0 && steps >= 0 && steps % every == 0;
 }
 
-/// Returns the shear-state entries of a contact's points.
+/// Returns the entries of a range of points.
 inline std::span<const ShearEntry> entries_of(std::span<const ShearEntry> memory,
-                                              const CompiledModel& m,
-                                              const kernels::ShearSpringContact& of) {
+                                              const PointRange& points) {
   const auto from = [&](int point) {
     return std::lower_bound(memory.begin(), memory.end(), point,
                             [](const ShearEntry& e, int value) { return e.point < value; });
   };
-  return {from(of.first), from(of.first + m.shear_rows(of))};
+  return {from(points.first), from(points.first + points.count)};
+}
+/// Returns the shear-state entries of a contact's points.
+inline std::span<const ShearEntry> entries_of(std::span<const ShearEntry> memory,
+                                              const CompiledModel& m,
+                                              const kernels::ShearSpringContact& of) {
+  return entries_of(memory, {of.first, m.shear_rows(of)});
 }
 
 /// How many entries, the first ones, are of sensors that keep anchors.

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <span>
+#include <utility>
 
 #include "engine/step/workspace.hpp"
 #include "kernels/contact/elastic_contact.hpp"
@@ -76,6 +77,19 @@ kernels::ShearSpringTouch touch_of(const CompiledModel& m, const BasicWorkspace<
   return t;
 }
 
+/// The same where a solve begins. The poses of touched shapes are computed when first needed.
+template <int L>
+kernels::ShearSpringTouch start_touch_of(const CompiledModel& m, const kernels::KernelTable& table,
+                                         BasicWorkspace<L>& w,
+                                         const kernels::ShearSpringContact& of, int lane) {
+  ShearLanes<L>& lanes = w.remembered;
+  const auto k = static_cast<int>(&of - m.shear_springs.data());
+  if (!std::exchange(lanes.start_known[std::size_t(k)], 1))
+    table.stage<L>().touches_at(m.view, lanes.start.data(), k, k + 1, nullptr,
+                                lanes.start_touches.data());
+  return touch_of(m, w, of, lanes.start_touches, lane);
+}
+
 /// Range of points with shear springs.
 struct PointRange {
   int first, count;
@@ -84,18 +98,38 @@ struct PointRange {
       : first(of.first), count(of.contact.n_points) {}
 };
 
+/// Moves `next`, any index, to the first entry of points from `first` on. Contacts in order are
+/// found fastest.
+inline void find_entries(std::span<const ShearEntry> memory, int first, std::size_t& next) {
+  if (next > memory.size() || (next > 0 && memory[next - 1].point >= first)) next = 0;
+  while (next < memory.size() && memory[next].point < first) ++next;
+}
+
+/// Returns the entries, where a solve begins, of points from `first` on.
+template <int L>
+kernels::ShearEntries entries_from(ShearLanes<L>& lanes, int first, int lane) {
+  const ShearState& now = lanes.now[std::size_t(lane)];
+  std::size_t& next = lanes.next[std::size_t(lane)];
+  find_entries(now, first, next);
+  return {now.data() + next, now.data() + now.size()};
+}
+/// Lets the next search begin at the entries that are left.
+template <int L>
+void set_entries(ShearLanes<L>& lanes, int lane, const kernels::ShearEntries& left) {
+  lanes.next[std::size_t(lane)] = std::size_t(left.at - lanes.now[std::size_t(lane)].data());
+}
+
 /// Writes (3, stride) numbers of points, up to the end of the last vector: those of their entries
 /// in a shear state, else zeros. `index`: ascending number of each point in its contact; null: all
 /// points in order. `number`(entry, c): component c of an entry. `next`: start of the search in the
-/// shear state, any index; set to the end of this contact, so contacts in order are found fastest.
+/// shear state, any index; set to the end of this contact.
 template <class Number>
 void shear_of_points(std::span<const ShearEntry> memory, const PointRange& of, const int* index,
                      int count, int stride, const Number& number, double* out, std::size_t& next) {
   const std::size_t end =
       std::size_t((count + kernels::kGroup - 1) / kernels::kGroup) * std::size_t(kernels::kGroup);
   for (int c = 0; c < 3; ++c) std::fill_n(out + c * stride, end, 0.0);
-  if (next > memory.size() || (next > 0 && memory[next - 1].point >= of.first)) next = 0;
-  while (next < memory.size() && memory[next].point < of.first) ++next;
+  find_entries(memory, of.first, next);
   for (int k = 0; next < memory.size(); ++next) {
     const int point = memory[next].point - of.first;
     if (point >= of.count) return;
@@ -186,7 +220,7 @@ void for_each_touching_sensor(const CompiledModel& m, const kernels::KernelTable
     shear_of_points(w.remembered.now[std::size_t(lane)], of, felt.index(), points.count,
                     points.stride, points.anchors + 3 * points.stride,
                     w.remembered.next[std::size_t(lane)]);
-    table.recall(touch_of(m, w, of, w.remembered.start_touches, lane), points);
+    table.recall(start_touch_of(m, table, w, of, lane), points);
     f(of, felt.index(), points);
   }
 }

@@ -3,6 +3,7 @@
 #include "engine/step/shear_update.hpp"
 
 #include <algorithm>
+#include <utility>
 
 #include "engine/step/kept_anchors.hpp"
 
@@ -14,35 +15,106 @@ using kernels::ShearSpringPoints;
 
 namespace {
 
-/// Appends the shear-state entries of the points that touch at the end.
-template <int L>
-void advance_points(const CompiledModel& m, const kernels::KernelTable& table, BasicWorkspace<L>& w,
-                    const ShearSpringContact& of, int lane, const int* index,
-                    const ShearSpringPoints& points) {
-  double* const s = w.remembered.s.data();
-  table.advance(touch_of(m, w, of, w.remembered.end_touches, lane), points, s, nullptr);
-  ShearState& after = w.remembered.after[std::size_t(lane)];
-  const double* const touches = s + 3 * points.stride;
-  for (int k = 0; k < points.count; ++k) {
-    if (!(touches[k] > 0)) continue;
-    after.push_back({of.first + index[k], {s[k], s[points.stride + k], s[2 * points.stride + k]}});
+/// Writes the entries of one lane at the end of a step, one contact after the other. What the vector
+/// held before is room for them.
+class EntryWriter {
+ public:
+  explicit EntryWriter(ShearState& to) : to_(to) {}
+  /// Returns room for `count` entries and a vector of them.
+  ShearEntry* room(int count) {
+    const std::size_t needed = used_ + std::size_t(count + kernels::kGroup);
+    if (to_.size() < needed) to_.resize(needed);
+    return to_.data() + used_;
   }
-}
+  void set_end(const ShearEntry* end) { used_ = std::size_t(end - to_.data()); }
+  void finish() { to_.resize(used_); }
 
-/// Number of the first ground point with a shear spring; there are CompiledModel::ground_anchors.
-int first_on_ground(const CompiledModel& m) {
-  const auto first = std::find_if(m.shear_springs.begin(), m.shear_springs.end(),
-                                  [](const ShearSpringContact& of) { return of.ground; });
-  return first == m.shear_springs.end() ? 0 : first->first;
-}
+ private:
+  ShearState& to_;
+  std::size_t used_ = 0;
+};
 
-/// Computes poses at (q, v), and from them how every contact touches.
+/// Writes the entries of a pair's points.
 template <int L>
+void advance_pair(const CompiledModel& m, const kernels::KernelTable& table, BasicWorkspace<L>& w,
+                  const ShearSpringContact& of, int lane, EntryWriter& out) {
+  const auto& list = w.lists[std::size_t(of.pair)];
+  const ShearSpringPoints points = listed<L>(list, lane);
+  const kernels::ShearSpringTouch end = touch_of(m, w, of, w.remembered.end_touches, lane);
+  kernels::ShearUpdate update = {
+      nullptr, &end, points, list.own_index + list.stride * lane, {}, out.room(points.count)};
+  table.advance_entries(update);
+  out.set_end(update.after);
+}
+
+/// Writes the entries of a sensor's points that touch a body.
+template <int L>
+void advance_sensor(const CompiledModel& m, const kernels::KernelTable& table, BasicWorkspace<L>& w,
+                    const ShearSpringContact& of, int lane, EntryWriter& out) {
+  TouchingSensorPoints& felt = w.remembered.felt;
+  const kernels::ShearSpringTouch end = touch_of(m, w, of, w.remembered.end_touches, lane);
+  const ShearSpringPoints points = felt.find(m.sensors[std::size_t(of.sensor)], table, end);
+  if (points.count == 0) return;
+  const kernels::ShearSpringTouch start = start_touch_of(m, table, w, of, lane);
+  kernels::ShearUpdate update = {&start,
+                                 &end,
+                                 points,
+                                 felt.index(),
+                                 entries_from(w.remembered, of.first, lane),
+                                 out.room(points.count)};
+  table.advance_entries(update);
+  set_entries(w.remembered, lane, update.before);
+  out.set_end(update.after);
+}
+
+/// Writes the entries of points on the ground. `first`: number of the first of them.
+template <int L>
+void advance_grounded(const ShearLanes<L>& lanes, int first, int lane, EntryWriter& out) {
+  ShearEntry* to = out.room(static_cast<int>(lanes.grounded.size()));
+  for (const int k : lanes.grounded) {
+    const Row<L>* kept = &lanes.ground[4 * std::size_t(k)];
+    if (kept[3][lane] > 0) *to++ = {first + k, {kept[0][lane], kept[1][lane], kept[2][lane]}};
+  }
+  out.set_end(to);
+}
+
+/// Returns the first contact on the ground and the one past the last; they are adjacent.
+std::pair<int, int> ground_contacts(const CompiledModel& m) {
+  const auto on_ground = [](const ShearSpringContact& of) { return of.ground; };
+  const auto begin = std::ranges::find_if(m.shear_springs, on_ground),
+             end = std::find_if_not(begin, m.shear_springs.end(), on_ground);
+  return {static_cast<int>(begin - m.shear_springs.begin()),
+          static_cast<int>(end - m.shear_springs.begin())};
+}
+
+/// Lists the contacts that may touch at the end. `lanes`(contact): lanes in which it is considered.
+/// Computes how they touch at (q, v).
+template <int L, class Lanes>
 void find_touches(const CompiledModel& m, const kernels::KernelTable& table, BasicWorkspace<L>& w,
-                  const Row<L>* q, const Row<L>* v, typename ShearLanes<L>::Poses& poses,
-                  typename ShearLanes<L>::Poses& touches) {
-  table.stage<L>().poses_at(m.view, w.stage, q, v, w.zero, poses.data());
-  table.stage<L>().touches_at(m.view, poses.data(), touches.data());
+                  const Row<L>* q, const Row<L>* v, const Lanes& lanes) {
+  ShearLanes<L>& of_lanes = w.remembered;
+  const kernels::StageKernels<L>& kernel = table.stage<L>();
+  LaneBits* const near = of_lanes.near.data();
+  const int n = m.view.n_shear_springs;
+  for (int k = 0; k < n; ++k) near[k] = lanes(m.shear_springs[std::size_t(k)]);
+  kernel.poses_at(m.view, w.stage, q, v, w.zero, of_lanes.end.data());
+  kernel.clear_far_sensors(m.view, w.stage, of_lanes.end.data(), near);
+  kernel.touches_at(m.view, of_lanes.end.data(), 0, n, near, of_lanes.end_touches.data());
+  of_lanes.touching.clear();
+  for (int k = 0; k < n; ++k)
+    if (near[k] != 0) of_lanes.touching.push_back(k);
+}
+
+/// Returns the lanes in which a contact is considered at the end of a step: those in which a pair
+/// has candidates, all of the others' that are updated at every step.
+template <int L>
+LaneBits stepped_lanes(const CompiledModel& m, const BasicWorkspace<L>& w,
+                       const ShearSpringContact& of, LaneBits lanes) {
+  if (of.pair < 0) return m.shear_interval(of) > 0 ? kNoLane : lanes;
+  LaneBits listed = 0;
+  for (int l = 0; l < L; ++l)
+    listed |= w.lists[std::size_t(of.pair)].own_count[l] > 0 ? 1U << l : 0U;
+  return listed & lanes;
 }
 
 /// Fills rows (points on the ground, 3) with their elastic displacements. Returns false, and leaves
@@ -52,12 +124,10 @@ bool put_ground(const CompiledModel& m, int first, const std::array<ShearState, 
                 Row<L>* rows) {
   bool any = false;
   for (int l = 0; l < L; ++l)
-    for (const ShearEntry& e : now[std::size_t(l)]) {
-      const int point = e.point - first;
-      if (point < 0 || point >= m.ground_anchors) continue;
+    for (const ShearEntry& e : entries_of(now[std::size_t(l)], {first, m.ground_anchors})) {
       if (!any) std::fill_n(rows, 3 * m.ground_anchors, Row<L>{});
       any = true;
-      for (int c = 0; c < 3; ++c) rows[3 * point + c][l] = e.s[c];
+      for (int c = 0; c < 3; ++c) rows[3 * (e.point - first) + c][l] = e.s[c];
     }
   return any;
 }
@@ -79,10 +149,15 @@ template <int L>
 void begin_shear(const CompiledModel& m, const kernels::KernelTable& table, BasicWorkspace<L>& w) {
   if (m.shear_springs.empty()) return;
   ShearLanes<L>& lanes = w.remembered;
-  find_touches(m, table, w, w.q0, w.v0, lanes.start, lanes.start_touches);
+  table.stage<L>().poses_at(m.view, w.stage, w.q0, w.v0, w.zero, lanes.start.data());
+  std::fill(lanes.start_known.begin(), lanes.start_known.end(), 0);
   if (m.ground_anchors == 0) return;
+  const auto [begin, end] = ground_contacts(m);
+  table.stage<L>().touches_at(m.view, lanes.start.data(), begin, end, nullptr,
+                              lanes.start_touches.data());
+  std::fill(lanes.start_known.begin() + begin, lanes.start_known.begin() + end, 1);
   Row<L>* const s = lanes.ground.data();
-  const bool any = put_ground<L>(m, first_on_ground(m), lanes.now, s);
+  const bool any = put_ground<L>(m, m.shear_springs[std::size_t(begin)].first, lanes.now, s);
   table.stage<L>().recall_ground(m.view, w.stage, lanes.start_touches.data(), any ? s : nullptr);
 }
 
@@ -92,11 +167,10 @@ void set_list_anchors(const CompiledModel& m, const kernels::KernelTable& table,
   const auto& list = w.lists[std::size_t(k)];
   if (list.own_count[lane] == 0) return;
   const ShearSpringContact& of = m.shear_springs[std::size_t(m.pairs[std::size_t(k)].memory)];
-  const ShearSpringPoints points = listed<L>(list, lane);
-  shear_of_points(w.remembered.now[std::size_t(lane)], of, list.own_index + list.stride * lane,
-                  points.count, points.stride, points.anchors + 3 * points.stride,
-                  w.remembered.next[std::size_t(lane)]);
-  table.recall(touch_of(m, w, of, w.remembered.start_touches, lane), points);
+  const kernels::ShearEntries left = table.recall_entries(
+      start_touch_of(m, table, w, of, lane), listed<L>(list, lane),
+      list.own_index + list.stride * lane, entries_from(w.remembered, of.first, lane));
+  set_entries(w.remembered, lane, left);
 }
 
 template <int L>
@@ -104,27 +178,29 @@ void update_shear_state(const CompiledModel& m, const kernels::KernelTable& tabl
                         BasicWorkspace<L>& w, LaneBits lanes) {
   if (m.shear_springs.empty() || lanes == 0) return;
   ShearLanes<L>& of_lanes = w.remembered;
-  find_touches(m, table, w, w.q1, w.v1, of_lanes.end, of_lanes.end_touches);
+  find_touches(m, table, w, w.q1, w.v1,
+               [&](const ShearSpringContact& of) { return stepped_lanes(m, w, of, lanes); });
   if (m.ground_anchors > 0) {
     table.stage<L>().advance_ground(m.view, w.stage, of_lanes.end_touches.data(),
                                     of_lanes.ground.data());
     find_grounded<L>(of_lanes.ground, of_lanes.grounded);
   }
-  const int first = first_on_ground(m);
   for (int l = 0; l < L; ++l) {
     if (!has(lanes, l)) continue;
-    ShearState& after = of_lanes.after[std::size_t(l)];
-    after.clear();
-    const auto advance = [&](const ShearSpringContact& of, const int* index,
-                             const ShearSpringPoints& points) {
-      advance_points(m, table, w, of, l, index, points);
-    };
-    for_each_pair(m, w, l, advance);
-    for (const int k : of_lanes.grounded) {
-      const Row<L>* kept = &of_lanes.ground[4 * std::size_t(k)];
-      if (kept[3][l] > 0) after.push_back({first + k, {kept[0][l], kept[1][l], kept[2][l]}});
+    EntryWriter out(of_lanes.after[std::size_t(l)]);
+    bool on_ground = false;
+    for (const int k : of_lanes.touching) {
+      const ShearSpringContact& of = m.shear_springs[std::size_t(k)];
+      if (!has(of_lanes.near[std::size_t(k)], l)) continue;
+      if (of.pair >= 0) {
+        advance_pair(m, table, w, of, l, out);
+      } else if (of.sensor >= 0) {
+        advance_sensor(m, table, w, of, l, out);
+      } else if (!std::exchange(on_ground, true)) {
+        advance_grounded(of_lanes, of.first, l, out);
+      }
     }
-    for_each_touching_sensor(m, table, w, of_lanes.end_touches, l, advance);
+    out.finish();
   }
 }
 
@@ -132,23 +208,29 @@ template <int L>
 void update_sensor_shear_state(const CompiledModel& m, const kernels::KernelTable& table,
                                BasicWorkspace<L>& w, std::span<const ReadingLane> lanes) {
   ShearLanes<L>& of_lanes = w.remembered;
-  bool found = false;
+  const auto due = [&](const ShearSpringContact& of) {
+    LaneBits bits = 0;
+    for (int l = 0; l < L; ++l)
+      if (is_due(m, of, lanes[std::size_t(l)].steps)) bits |= 1U << l;
+    return bits;
+  };
+  LaneBits any = 0;
+  for (const ShearSpringContact& of : m.shear_springs) any |= due(of);
+  if (any == 0) return;
+  find_touches(m, table, w, w.q0, w.v0, due);
   for (int l = 0; l < L; ++l) {
+    if (!has(any, l)) continue;
     const ReadingLane& lane = lanes[std::size_t(l)];
-    const auto due = [&](const ShearSpringContact& of) { return is_due(m, of, lane.steps); };
-    if (std::none_of(m.shear_springs.begin(), m.shear_springs.end(), due)) continue;
-    if (!found) find_touches(m, table, w, w.q0, w.v0, of_lanes.end, of_lanes.end_touches);
-    found = true;
     ShearState &now = *lane.shear, &after = of_lanes.after[std::size_t(l)];
     after.clear();
     for (const ShearSpringContact& of : m.shear_springs) {
       if (m.shear_interval(of) == 0) break;  // those that keep anchors come first
-      if (due(of)) {
-        advance_anchors(m, table, touch_of(m, w, of, of_lanes.end_touches, l), now, of_lanes.felt,
-                        after);
-      } else {
+      if (!is_due(m, of, lane.steps)) {
         const auto kept = entries_of(now, m, of);
         after.insert(after.end(), kept.begin(), kept.end());
+      } else if (has(of_lanes.near[std::size_t(&of - m.shear_springs.data())], l)) {
+        advance_anchors(m, table, touch_of(m, w, of, of_lanes.end_touches, l), now, of_lanes.felt,
+                        after);
       }
     }
     after.insert(after.end(), now.begin() + kept_entries(m, now), now.end());

@@ -113,8 +113,11 @@ void BasicWorkspace<L>::make_memory(const CompiledModel& m) {
   remembered.end.resize(m.links.size());
   remembered.start_touches.resize(m.shear_springs.size());
   remembered.end_touches.resize(m.shear_springs.size());
+  remembered.start_known.resize(m.shear_springs.size());
+  remembered.near.resize(m.shear_springs.size());
+  remembered.touching.reserve(m.shear_springs.size());
   for (auto* lanes : {&remembered.now, &remembered.after})
-    for (ShearState& lane : *lanes) lane.reserve(std::size_t(m.taped_points));
+    for (ShearState& lane : *lanes) lane.reserve(std::size_t(m.taped_points + kGroup));
 }
 
 template <int L>

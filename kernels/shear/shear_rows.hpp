@@ -9,24 +9,62 @@
 
 namespace tangere::kernels {
 
-/// Computes the pose of the touched shape in body 1 and W, in body 1's axes, of every contact with
-/// shear springs. Consecutive contacts of the same links share the relative motion. `links`:
-/// (n_links).
+/// Poses and twists of the two links of a contact.
 template <class N>
-void find_touches(const ModelView& m, const LinkPose<N>* links, LinkPose<N>* out) {
-  const LinkPose<N> still = {{diagonal(N(1.0)), zero3<N>()}, zero6<N>()};
+struct ContactLinks {
+  LinkPose<N> still = {{diagonal(N(1.0)), zero3<N>()}, zero6<N>()};
+  const LinkPose<N>* links;
+  const PairContact* last = nullptr;
+
+  /// Whether the contact has other links than that of the last call.
+  bool differ(const PairContact& c) {
+    const bool same = last != nullptr && last->link1 == c.link1 && last->link2 == c.link2;
+    last = &c;
+    return !same;
+  }
+  const LinkPose<N>& at(int link) const { return link < 0 ? still : links[link]; }
+};
+
+/// Computes the pose of the touched shape in body 1 and W, in body 1's axes, of contacts `first` …
+/// `end` - 1 with shear springs. Those with lanes[k] = 0 are left out; null: none is. Consecutive
+/// contacts of the same links share the relative motion. `links`: (n_links).
+template <class N>
+void find_touches(const ModelView& m, const LinkPose<N>* links, int first, int end,
+                  const unsigned* lanes, LinkPose<N>* out) {
+  ContactLinks<N> two{.links = links};
   LinkPose<N> motion;  // link 2 in link 1, and W
-  for (int k = 0; k < m.n_shear_springs; ++k) {
+  for (int k = first; k < end; ++k) {
+    if (lanes != nullptr && lanes[k] == 0) continue;
     const PairContact& c = m.memories[k].contact;
-    const bool same = k > 0 && m.memories[k - 1].contact.link1 == c.link1 &&
-                      m.memories[k - 1].contact.link2 == c.link2;
-    if (!same) {
-      const LinkPose<N>& one = c.link1 < 0 ? still : links[c.link1];
-      const LinkPose<N>& two = c.link2 < 0 ? still : links[c.link2];
-      motion.world = relative(one.world, two.world);
-      motion.V = motion_to_parent(motion.world, two.V) - one.V;
+    if (two.differ(c)) {
+      const LinkPose<N>&one = two.at(c.link1), &other = two.at(c.link2);
+      motion.world = relative(one.world, other.world);
+      motion.V = motion_to_parent(motion.world, other.V) - one.V;
     }
     out[k] = {compose(motion.world, broadcast<N>(c.frame2)), motion.V};
+  }
+}
+
+/// Above rounding: some shapes test squares of distances, and no square is below zero [m].
+inline constexpr double kTouchMargin = 1e-9;
+
+/// Clears the lanes of sensors' contacts in which the ball around the sensor's points does not
+/// reach the shape. `lanes`: (n_shear_springs).
+template <class N>
+void clear_far_sensors(const ModelView& m, const LinkPose<N>* links, const double* block, int group,
+                       unsigned* lanes) {
+  ContactLinks<N> two{.links = links};
+  Frame<N> second;  // link 2 in link 1
+  for (int k = 0; k < m.n_shear_springs; ++k) {
+    if (lanes[k] == 0 || m.memories[k].sensor < 0) continue;
+    const PairContact& c = m.memories[k].contact;
+    if (two.differ(c)) second = relative(two.at(c.link1).world, two.at(c.link2).world);
+    const Vec3<N> in_2 = transposed_times(second.R, broadcast<N>(c.middle) - second.p);
+    const Vec3<N> y = transposed_times(broadcast<N>(c.frame2.R), in_2 - broadcast<N>(c.frame2.p));
+    const N reach(c.extent + kTouchMargin);
+    lanes[k] &= with_distance<N>(
+        c.shape, load_vector<N>(c.size, c.size_row, block, group),
+        [&](const auto& shape) { return lane_bits(nearer_than(shape, y, reach)); }, c.grid);
   }
 }
 

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "kernels/contact/elastic_contact.hpp"
+#include "kernels/shear/shear_entry.hpp"
 #include "kernels/step/model_view.hpp"
 #include "kernels/tactile/tactile_types.hpp"
 
@@ -27,6 +28,21 @@ struct ShearSpringPoints {
   const double* factors;
   int count, stride;
   const double* weights = nullptr;  ///< (stride) as PairContact::weights; null: none has any
+};
+
+/// Entries of a shear state, by rising point: those from the first of a contact's points on.
+struct ShearEntries {
+  const ShearEntry *at, *end;
+};
+
+/// The update of the shear state of one contact of one environment over a step.
+struct ShearUpdate {
+  const ShearSpringTouch* start;  ///< where the step began; null: the points have anchors
+  const ShearSpringTouch* end;
+  ShearSpringPoints points;
+  const int* index;     ///< (count) rising numbers of the points in the contact
+  ShearEntries before;  ///< read if the points have no anchors; moved behind those that are read
+  ShearEntry* after;  ///< room for `count` entries and a vector of them; moved behind those written
 };
 
 /// Cotangents of one contact of one environment, body 1's axes and origin.

@@ -76,9 +76,14 @@ struct StageKernels {
   void (*pull_back_poses)(const ModelView&, const Stage<L>&, const Row<L>* q, const Row<L>* v,
                           const Row<L>* zero, std::byte* scratch, MotionCotangent<Row<L>>* links,
                           Row<L>* q_bar, Row<L>* v_bar, Row<L>* places);
-  /// Computes the touched shape in body 1 and the twist W of each contact with shear springs,
-  /// (n_shear_springs), from poses and twists of the links.
-  void (*touches_at)(const ModelView&, const LinkPose<Row<L>>* links, LinkPose<Row<L>>* out);
+  /// Computes the touched shape in body 1 and the twist W of contacts `first` … `end` - 1 with shear
+  /// springs, (n_shear_springs), from poses and twists of the links. Contacts with lanes[k] = 0 are
+  /// left out; null: none is.
+  void (*touches_at)(const ModelView&, const LinkPose<Row<L>>* links, int first, int end,
+                     const unsigned* lanes, LinkPose<Row<L>>* out);
+  /// Clears the lanes of sensors' contacts in which no point can touch. `lanes`: (n_shear_springs).
+  void (*clear_far_sensors)(const ModelView&, const Stage<L>&, const LinkPose<Row<L>>* links,
+                            unsigned* lanes);
   /// Computes Stage::ground_anchors from elastic displacements (body 1's axes, or null) and from
   /// the touches where a solve begins.
   void (*recall_ground)(const ModelView&, const Stage<L>&, const LinkPose<Row<L>>* touches,
@@ -121,6 +126,12 @@ struct KernelTable {
   void (*field_tangent)(const TactileTangent&);
   /// Converts elastic displacements, in rows 3 to 5 of the anchors, to anchors.
   void (*recall)(const ShearSpringTouch&, const ShearSpringPoints&);
+  /// Computes anchors of listed points from the entries of a shear state. `index`: rising numbers of
+  /// the points in their contact. Returns the entries behind those of the last point.
+  ShearEntries (*recall_entries)(const ShearSpringTouch&, const ShearSpringPoints&,
+                                 const int* index, ShearEntries);
+  /// Computes a contact's entries at the end of a step: those of the points that touch there.
+  void (*advance_entries)(ShearUpdate&);
   /// Computes the shear state at the end of a step, (4, stride): s in body 1's axes, then 1 at
   /// points that touch, else 0; and the forces there, (3, stride), or null.
   void (*advance)(const ShearSpringTouch& end, const ShearSpringPoints&, double* s, double* force);
