@@ -12,6 +12,15 @@
 
 namespace tangere {
 
+/// Copies the numbers of one lane of rows.
+template <class Rows, class Numbers>
+void read_lane(const Rows& rows, int lane, Numbers& to) {
+  constexpr int kLanes = sizeof(Rows) / sizeof(Numbers);
+  const auto* const from = reinterpret_cast<const kernels::Row<kLanes>*>(&rows);
+  auto* const numbers = reinterpret_cast<double*>(&to);
+  for (std::size_t i = 0; i < sizeof(to) / sizeof(double); ++i) numbers[i] = from[i][lane];
+}
+
 /// Returns pose and twist of a link in one lane; link < 0: the world.
 template <int L>
 kernels::LinkPose<double> pose_of(const AlignedVector<kernels::LinkPose<kernels::Row<L>>>& poses,
@@ -19,10 +28,7 @@ kernels::LinkPose<double> pose_of(const AlignedVector<kernels::LinkPose<kernels:
   if (link < 0)
     return {{kernels::diagonal(1.0), kernels::zero3<double>()}, kernels::zero6<double>()};
   kernels::LinkPose<double> out;
-  static_assert(sizeof(kernels::LinkPose<kernels::Row<L>>) == L * sizeof(out));
-  const auto* const rows = reinterpret_cast<const kernels::Row<L>*>(&poses[std::size_t(link)]);
-  auto* const numbers = reinterpret_cast<double*>(&out);
-  for (std::size_t i = 0; i < sizeof(out) / sizeof(double); ++i) numbers[i] = rows[i][lane];
+  read_lane(poses[std::size_t(link)], lane, out);
   return out;
 }
 
@@ -31,45 +37,49 @@ double number_of(const kernels::Parameter& p, const kernels::Stage<L>& stage, in
   return p.row < 0 ? p.value : kernels::row_of(stage.block, p.row, stage.group)[lane];
 }
 
-/// Returns a contact of one environment. `at`: the touched shape in body 1, and W. `number`(p): the
-/// value of a kernels::Parameter there.
+/// Sets the numbers of a contact of one environment, all but its pose, twist and faces.
+/// `number`(p): the value of a kernels::Parameter there.
 template <class Number>
-kernels::ShearSpringTouch touch_at(const kernels::ShearSpringContact& of,
-                                   const kernels::LinkPose<double>& at, const Number& number) {
+void set_numbers(const kernels::ShearSpringContact& of, const Number& number,
+                 kernels::ShearSpringTouch& t) {
   const kernels::PairContact& c = of.contact;
-  kernels::ShearSpringTouch t{};
   t.of = &of;
   const auto size = [&](int i, double constant) {
     return c.size_row < 0 ? constant : number(kernels::Parameter{0, c.size_row + i});
   };
   t.size = {size(0, c.size.x), size(1, c.size.y), size(2, c.size.z)};
   t.radius = number(kernels::Parameter{of.radius, of.radius_row});
-  t.shape = at.world;
-  t.twist = at.V;
   t.law = transformed(c.parameters, number);
-  return t;
 }
 
-/// The same from the poses of its two links.
+/// Returns a contact from the poses of its two links.
 template <class Number>
 kernels::ShearSpringTouch touch_between(const kernels::ShearSpringContact& of,
                                         const kernels::LinkPose<double>& one,
                                         const kernels::LinkPose<double>& two,
                                         const Number& number) {
   const kernels::Frame<double> second = relative(one.world, two.world);
-  return touch_at(of, {compose(second, of.contact.frame2), motion_to_parent(second, two.V) - one.V},
-                  number);
+  kernels::ShearSpringTouch t{};
+  set_numbers(of, number, t);
+  t.shape = compose(second, of.contact.frame2);
+  t.twist = motion_to_parent(second, two.V) - one.V;
+  return t;
 }
 
-/// The same for one lane of a workspace. `touches`: (n_shear_springs), StageKernels::touches_at.
+/// Returns a contact in one lane of a workspace. `touches`: (n_shear_springs),
+/// StageKernels::touches_at.
 template <int L>
 kernels::ShearSpringTouch touch_of(const CompiledModel& m, const BasicWorkspace<L>& w,
                                    const kernels::ShearSpringContact& of,
                                    const AlignedVector<kernels::LinkPose<kernels::Row<L>>>& touches,
                                    int lane) {
-  kernels::ShearSpringTouch t =
-      touch_at(of, pose_of<L>(touches, static_cast<int>(&of - m.shear_springs.data()), lane),
-               [&](const kernels::Parameter& p) { return number_of<L>(p, w.stage, lane); });
+  kernels::ShearSpringTouch t;
+  set_numbers(
+      of, [&](const kernels::Parameter& p) { return number_of<L>(p, w.stage, lane); }, t);
+  const auto& at = touches[std::size_t(&of - m.shear_springs.data())];
+  read_lane(at.world, lane, t.shape);
+  read_lane(at.V, lane, t.twist);
+  t.faces = {};
   if (of.contact.faced) {
     const kernels::Row<L>* side = w.stage.faces + 3 * of.pair;
     t.faces = {side[0][lane], side[1][lane], side[2][lane]};

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "engine/step/detection.hpp"
 #include "engine/step/kept_anchors.hpp"
 
 namespace tangere {
@@ -53,7 +54,7 @@ void advance_sensor(const CompiledModel& m, const kernels::KernelTable& table, B
                     const ShearSpringContact& of, int lane, EntryWriter& out) {
   TouchingSensorPoints& felt = w.remembered.felt;
   const kernels::ShearSpringTouch end = touch_of(m, w, of, w.remembered.end_touches, lane);
-  const ShearSpringPoints points = felt.find(m.sensors[std::size_t(of.sensor)], table, end);
+  const ShearSpringPoints points = felt.find_near(m.sensors[std::size_t(of.sensor)], table, end);
   if (points.count == 0) return;
   const kernels::ShearSpringTouch start = start_touch_of(m, table, w, of, lane);
   kernels::ShearUpdate update = {&start,
@@ -87,34 +88,40 @@ std::pair<int, int> ground_contacts(const CompiledModel& m) {
           static_cast<int>(end - m.shear_springs.begin())};
 }
 
-/// Lists the contacts that may touch at the end. `lanes`(contact): lanes in which it is considered.
-/// Computes how they touch at (q, v).
-template <int L, class Lanes>
+/// Lists the contacts that may touch at the end, from the lanes in which each is considered
+/// (ShearLanes::near). Computes how they touch at (q, v).
+template <int L>
 void find_touches(const CompiledModel& m, const kernels::KernelTable& table, BasicWorkspace<L>& w,
-                  const Row<L>* q, const Row<L>* v, const Lanes& lanes) {
-  ShearLanes<L>& of_lanes = w.remembered;
+                  const Row<L>* q, const Row<L>* v) {
+  ShearLanes<L>& lanes = w.remembered;
   const kernels::StageKernels<L>& kernel = table.stage<L>();
-  LaneBits* const near = of_lanes.near.data();
   const int n = m.view.n_shear_springs;
-  for (int k = 0; k < n; ++k) near[k] = lanes(m.shear_springs[std::size_t(k)]);
-  kernel.poses_at(m.view, w.stage, q, v, w.zero, of_lanes.end.data());
-  kernel.clear_far_sensors(m.view, w.stage, of_lanes.end.data(), near);
-  kernel.touches_at(m.view, of_lanes.end.data(), 0, n, near, of_lanes.end_touches.data());
-  of_lanes.touching.clear();
+  kernel.poses_at(m.view, w.stage, q, v, w.zero, lanes.end.data());
+  kernel.clear_far_contacts(m.view, w.stage, lanes.end.data(), lanes.near.data());
+  kernel.touches_at(m.view, lanes.end.data(), 0, n, lanes.near.data(), lanes.end_touches.data());
+  lanes.touching.clear();
   for (int k = 0; k < n; ++k)
-    if (near[k] != 0) of_lanes.touching.push_back(k);
+    if (lanes.near[std::size_t(k)] != 0) lanes.touching.push_back(k);
 }
 
-/// Returns the lanes in which a contact is considered at the end of a step: those in which a pair
-/// has candidates, all of the others' that are updated at every step.
+/// Considers pairs with candidates, the ground, and sensors that are updated at every step.
 template <int L>
-LaneBits stepped_lanes(const CompiledModel& m, const BasicWorkspace<L>& w,
-                       const ShearSpringContact& of, LaneBits lanes) {
-  if (of.pair < 0) return m.shear_interval(of) > 0 ? kNoLane : lanes;
-  LaneBits listed = 0;
-  for (int l = 0; l < L; ++l)
-    listed |= w.lists[std::size_t(of.pair)].own_count[l] > 0 ? 1U << l : 0U;
-  return listed & lanes;
+void consider(const CompiledModel& m, BasicWorkspace<L>& w, LaneBits lanes) {
+  std::vector<LaneBits>& near = w.remembered.near;
+  for (std::size_t k = 0; k < near.size(); ++k) {
+    const ShearSpringContact& of = m.shear_springs[k];
+    near[k] = of.pair < 0 && m.shear_interval(of) == 0 ? lanes : kNoLane;
+  }
+  for_each_considered(m, w, [&](std::size_t g) {
+    if (w.apart[g] != 0) return;
+    const kernels::LinkPair& links = m.link_pairs[g];
+    for (int i = links.first; i < links.first + links.count; ++i) {
+      const int pair = m.pair_order[std::size_t(i)], k = m.pairs[std::size_t(pair)].memory;
+      if (k < 0) continue;
+      for (int l = 0; l < L; ++l)
+        if (w.lists[std::size_t(pair)].own_count[l] > 0) near[std::size_t(k)] |= lanes & (1U << l);
+    }
+  });
 }
 
 /// Fills rows (points on the ground, 3) with their elastic displacements. Returns false, and leaves
@@ -132,14 +139,19 @@ bool put_ground(const CompiledModel& m, int first, const std::array<ShearState, 
   return any;
 }
 
-/// Lists the points on the ground that touch in some lane. `kept`: as of advance_ground().
+/// Lists the points on the ground that touch in some lane, from what advance_ground() wrote.
 template <int L>
-void find_grounded(const AlignedVector<Row<L>>& kept, std::vector<int>& out) {
-  out.clear();
-  for (std::size_t k = 0; 4 * k < kept.size(); ++k) {
-    double touches = 0;
-    for (int l = 0; l < L; ++l) touches += kept[4 * k + 3][l];
-    if (touches > 0) out.push_back(static_cast<int>(k));
+void find_grounded(const CompiledModel& m, ShearLanes<L>& lanes) {
+  lanes.grounded.clear();
+  for (const int k : lanes.touching) {
+    const ShearSpringContact& of = m.shear_springs[std::size_t(k)];
+    if (!of.ground) continue;
+    const int first = m.grounds[std::size_t(of.grounded)].first_anchor;
+    for (int point = first; point < first + of.contact.n_points; ++point) {
+      double touches = 0;
+      for (int l = 0; l < L; ++l) touches += lanes.ground[4 * std::size_t(point) + 3][l];
+      if (touches > 0) lanes.grounded.push_back(point);
+    }
   }
 }
 
@@ -178,12 +190,14 @@ void update_shear_state(const CompiledModel& m, const kernels::KernelTable& tabl
                         BasicWorkspace<L>& w, LaneBits lanes) {
   if (m.shear_springs.empty() || lanes == 0) return;
   ShearLanes<L>& of_lanes = w.remembered;
-  find_touches(m, table, w, w.q1, w.v1,
-               [&](const ShearSpringContact& of) { return stepped_lanes(m, w, of, lanes); });
+  consider(m, w, lanes);
+  find_touches(m, table, w, w.q1, w.v1);
+  int first_on_ground = 0;
   if (m.ground_anchors > 0) {
+    first_on_ground = m.shear_springs[std::size_t(ground_contacts(m).first)].first;
     table.stage<L>().advance_ground(m.view, w.stage, of_lanes.end_touches.data(),
-                                    of_lanes.ground.data());
-    find_grounded<L>(of_lanes.ground, of_lanes.grounded);
+                                    of_lanes.near.data(), of_lanes.ground.data());
+    find_grounded(m, of_lanes);
   }
   for (int l = 0; l < L; ++l) {
     if (!has(lanes, l)) continue;
@@ -197,7 +211,7 @@ void update_shear_state(const CompiledModel& m, const kernels::KernelTable& tabl
       } else if (of.sensor >= 0) {
         advance_sensor(m, table, w, of, l, out);
       } else if (!std::exchange(on_ground, true)) {
-        advance_grounded(of_lanes, of.first, l, out);
+        advance_grounded(of_lanes, first_on_ground, l, out);
       }
     }
     out.finish();
@@ -215,9 +229,10 @@ void update_sensor_shear_state(const CompiledModel& m, const kernels::KernelTabl
     return bits;
   };
   LaneBits any = 0;
-  for (const ShearSpringContact& of : m.shear_springs) any |= due(of);
+  for (std::size_t k = 0; k < of_lanes.near.size(); ++k)
+    any |= of_lanes.near[k] = due(m.shear_springs[k]);
   if (any == 0) return;
-  find_touches(m, table, w, w.q0, w.v0, due);
+  find_touches(m, table, w, w.q0, w.v0);
   for (int l = 0; l < L; ++l) {
     if (!has(any, l)) continue;
     const ReadingLane& lane = lanes[std::size_t(l)];

@@ -9,6 +9,10 @@
 
 namespace tangere::kernels {
 
+/// How near points are that may touch [m]. Above rounding: some shapes test squares of distances,
+/// and no square is below zero.
+inline constexpr double kTouchMargin = 1e-9;
+
 /// A contact with shear springs at one state.
 struct ShearSpringTouch {
   const ShearSpringContact* of;

@@ -84,7 +84,9 @@ void advance_entries(ShearUpdate& u) {
     unsigned touching;
   } passes[kVectors];
   const ShearSpringPoints& points = u.points;
-  const LoadedTouch<N> end = loaded<N>(*u.end), start = loaded<N>(*(u.start ? u.start : u.end));
+  const LoadedTouch<N> end = loaded<N>(*u.end);
+  LoadedTouch<N> start;
+  if (u.start != nullptr) start = loaded<N>(*u.start);
   const bool own_law = points.factors != nullptr || points.weights != nullptr;
   with_shape<N>(*u.end, [&](const auto& shape) {
     for (int chunk = 0; chunk < points.count; chunk += kVectors * kGroup) {

@@ -81,17 +81,18 @@ struct StageKernels {
   /// left out; null: none is.
   void (*touches_at)(const ModelView&, const LinkPose<Row<L>>* links, int first, int end,
                      const unsigned* lanes, LinkPose<Row<L>>* out);
-  /// Clears the lanes of sensors' contacts in which no point can touch. `lanes`: (n_shear_springs).
-  void (*clear_far_sensors)(const ModelView&, const Stage<L>&, const LinkPose<Row<L>>* links,
-                            unsigned* lanes);
+  /// Clears the lanes of contacts with the ground and of sensors in which no point can touch.
+  /// `lanes`: (n_shear_springs).
+  void (*clear_far_contacts)(const ModelView&, const Stage<L>&, const LinkPose<Row<L>>* links,
+                             unsigned* lanes);
   /// Computes Stage::ground_anchors from elastic displacements (body 1's axes, or null) and from
   /// the touches where a solve begins.
   void (*recall_ground)(const ModelView&, const Stage<L>&, const LinkPose<Row<L>>* touches,
                         const Row<L>* s);
   /// Computes the shear state at the end of a solve, (points, 4): s', then 1 at points that touch,
-  /// else 0. s' is only set where a point touches.
+  /// else 0. s' is only set where a point touches. Contacts with lanes[k] = 0 are left out.
   void (*advance_ground)(const ModelView&, const Stage<L>&, const LinkPose<Row<L>>* touches,
-                         Row<L>* kept);
+                         const unsigned* lanes, Row<L>* kept);
 };
 
 struct KernelTable {

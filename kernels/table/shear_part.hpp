@@ -33,10 +33,10 @@ void add_shear_row_kernels(StageKernels<L>& k) {
     find_touches(m, reinterpret_cast<const LinkPose<N>*>(links), first, end, lanes,
                  reinterpret_cast<LinkPose<N>*>(out));
   };
-  k.clear_far_sensors = [](const ModelView& m, const Stage<L>& stage, const LinkPose<Row<L>>* links,
-                           unsigned* lanes) {
-    kernels::clear_far_sensors(m, reinterpret_cast<const LinkPose<N>*>(links), stage.block,
-                               stage.group, lanes);
+  k.clear_far_contacts = [](const ModelView& m, const Stage<L>& stage,
+                            const LinkPose<Row<L>>* links, unsigned* lanes) {
+    kernels::clear_far_contacts(m, reinterpret_cast<const LinkPose<N>*>(links), stage.block,
+                                stage.group, lanes);
   };
   k.recall_ground = [](const ModelView& m, const Stage<L>& stage, const LinkPose<Row<L>>* touches,
                        const Row<L>* s) {
@@ -44,8 +44,8 @@ void add_shear_row_kernels(StageKernels<L>& k) {
                            View::view(stage.ground_anchors), stage.block, stage.group);
   };
   k.advance_ground = [](const ModelView& m, const Stage<L>& stage, const LinkPose<Row<L>>* touches,
-                        Row<L>* kept) {
-    kernels::advance_ground(m, reinterpret_cast<const LinkPose<N>*>(touches),
+                        const unsigned* lanes, Row<L>* kept) {
+    kernels::advance_ground(m, reinterpret_cast<const LinkPose<N>*>(touches), lanes,
                             View::view(stage.ground_anchors), View::view(kept), stage.block,
                             stage.group);
   };

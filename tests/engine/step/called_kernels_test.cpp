@@ -58,7 +58,7 @@ using OfFaces = Kernels<&GroupTable::choose_faces, &LoneTable::choose_faces,
 using OfMemory =
     Kernels<&GroupTable::touches_at, &LoneTable::touches_at, &GroupTable::recall_ground,
             &LoneTable::recall_ground, &GroupTable::advance_ground, &LoneTable::advance_ground,
-            &GroupTable::clear_far_sensors, &LoneTable::clear_far_sensors, &KernelTable::recall,
+            &GroupTable::clear_far_contacts, &LoneTable::clear_far_contacts, &KernelTable::recall,
             &KernelTable::recall_entries, &KernelTable::advance, &KernelTable::advance_entries>;
 using OfFields =
     Kernels<&KernelTable::pad_touch, &KernelTable::tactile, &KernelTable::tactile_mixed,
