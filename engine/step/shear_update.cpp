@@ -3,6 +3,7 @@
 #include "engine/step/shear_update.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <utility>
 
 #include "engine/step/detection.hpp"
@@ -20,18 +21,19 @@ namespace {
 /// held before is room for them.
 class EntryWriter {
  public:
-  explicit EntryWriter(ShearState& to) : to_(to) {}
+  EntryWriter() = default;
+  explicit EntryWriter(ShearState& to) : to_(&to) {}
   /// Returns room for `count` entries and a vector of them.
   ShearEntry* room(int count) {
     const std::size_t needed = used_ + std::size_t(count + kernels::kGroup);
-    if (to_.size() < needed) to_.resize(needed);
-    return to_.data() + used_;
+    if (to_->size() < needed) to_->resize(needed);
+    return to_->data() + used_;
   }
-  void set_end(const ShearEntry* end) { used_ = std::size_t(end - to_.data()); }
-  void finish() { to_.resize(used_); }
+  void set_end(const ShearEntry* end) { used_ = std::size_t(end - to_->data()); }
+  void finish() { to_->resize(used_); }
 
  private:
-  ShearState& to_;
+  ShearState* to_ = nullptr;
   std::size_t used_ = 0;
 };
 
@@ -46,6 +48,35 @@ void advance_pair(const CompiledModel& m, const kernels::KernelTable& table, Bas
       nullptr, &end, points, list.own_index + list.stride * lane, {}, out.room(points.count)};
   table.advance_entries(update);
   out.set_end(update.after);
+}
+
+/// With fewer lanes, it takes less time to go through their own lists than through the rows.
+constexpr int kFewLanes = 3;
+
+/// Writes the entries of all pairs.
+template <int L>
+void advance_pairs(const CompiledModel& m, const kernels::KernelTable& table, BasicWorkspace<L>& w,
+                   std::array<EntryWriter, L>& out) {
+  for (const int k : w.remembered.touching) {
+    const ShearSpringContact& of = m.shear_springs[std::size_t(k)];
+    const LaneBits near = w.remembered.near[std::size_t(k)];
+    if (of.pair < 0) continue;
+    if constexpr (L > 1) {
+      if (std::popcount(near) >= kFewLanes) {
+        kernels::ShearListUpdate update = {
+            &of, &w.remembered.end_touches[std::size_t(k)], &w.stage, near, {}};
+        const auto& list = w.lists[std::size_t(of.pair)];
+        for (int l = 0; l < L; ++l)
+          if (has(near, l)) update.after[l] = out[std::size_t(l)].room(list.own_count[l]);
+        table.advance_list(update);
+        for (int l = 0; l < L; ++l)
+          if (has(near, l)) out[std::size_t(l)].set_end(update.after[l]);
+        continue;
+      }
+    }
+    for (int l = 0; l < L; ++l)
+      if (has(near, l)) advance_pair(m, table, w, of, l, out[std::size_t(l)]);
+  }
 }
 
 /// Writes the entries of a sensor's points that touch a body.
@@ -142,7 +173,6 @@ bool put_ground(const CompiledModel& m, int first, const std::array<ShearState, 
 /// Lists the points on the ground that touch in some lane, from what advance_ground() wrote.
 template <int L>
 void find_grounded(const CompiledModel& m, ShearLanes<L>& lanes) {
-  lanes.grounded.clear();
   for (const int k : lanes.touching) {
     const ShearSpringContact& of = m.shear_springs[std::size_t(k)];
     if (!of.ground) continue;
@@ -190,31 +220,31 @@ void update_shear_state(const CompiledModel& m, const kernels::KernelTable& tabl
                         BasicWorkspace<L>& w, LaneBits lanes) {
   if (m.shear_springs.empty() || lanes == 0) return;
   ShearLanes<L>& of_lanes = w.remembered;
+  if constexpr (L > 1)
+    if (std::popcount(lanes) >= kFewLanes) lists_to_rows(m, table, w, lanes);
   consider(m, w, lanes);
   find_touches(m, table, w, w.q1, w.v1);
   int first_on_ground = 0;
+  of_lanes.grounded.clear();
   if (m.ground_anchors > 0) {
     first_on_ground = m.shear_springs[std::size_t(ground_contacts(m).first)].first;
     table.stage<L>().advance_ground(m.view, w.stage, of_lanes.end_touches.data(),
                                     of_lanes.near.data(), of_lanes.ground.data());
     find_grounded(m, of_lanes);
   }
+  std::array<EntryWriter, L> out;
+  for (int l = 0; l < L; ++l) out[std::size_t(l)] = EntryWriter(of_lanes.after[std::size_t(l)]);
+  advance_pairs<L>(m, table, w, out);
   for (int l = 0; l < L; ++l) {
     if (!has(lanes, l)) continue;
-    EntryWriter out(of_lanes.after[std::size_t(l)]);
-    bool on_ground = false;
+    EntryWriter& to = out[std::size_t(l)];
+    advance_grounded(of_lanes, first_on_ground, l, to);
     for (const int k : of_lanes.touching) {
       const ShearSpringContact& of = m.shear_springs[std::size_t(k)];
-      if (!has(of_lanes.near[std::size_t(k)], l)) continue;
-      if (of.pair >= 0) {
-        advance_pair(m, table, w, of, l, out);
-      } else if (of.sensor >= 0) {
-        advance_sensor(m, table, w, of, l, out);
-      } else if (!std::exchange(on_ground, true)) {
-        advance_grounded(of_lanes, first_on_ground, l, out);
-      }
+      if (of.sensor >= 0 && has(of_lanes.near[std::size_t(k)], l))
+        advance_sensor(m, table, w, of, l, to);
     }
-    out.finish();
+    to.finish();
   }
 }
 

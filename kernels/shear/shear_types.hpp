@@ -4,7 +4,7 @@
 
 #include "kernels/contact/elastic_contact.hpp"
 #include "kernels/shear/shear_entry.hpp"
-#include "kernels/step/model_view.hpp"
+#include "kernels/step/arguments.hpp"
 #include "kernels/tactile/tactile_types.hpp"
 
 namespace tangere::kernels {
@@ -47,6 +47,15 @@ struct ShearUpdate {
   const int* index;     ///< (count) rising numbers of the points in the contact
   ShearEntries before;  ///< read if the points have no anchors; moved behind those that are read
   ShearEntry* after;  ///< room for `count` entries and a vector of them; moved behind those written
+};
+
+/// The same of a pair of bodies in all lanes of a group, from the rows of its list.
+struct ShearListUpdate {
+  const ShearSpringContact* of;
+  const LinkPose<LaneRow>* end;  ///< the touched shape in body 1, and W
+  const GroupStage* stage;
+  unsigned lanes;             ///< those whose entries are computed
+  ShearEntry* after[kGroup];  ///< of each of them as in ShearUpdate
 };
 
 /// Cotangents of one contact of one environment, body 1's axes and origin.

@@ -133,6 +133,8 @@ struct KernelTable {
                                  const int* index, ShearEntries);
   /// Computes a contact's entries at the end of a step: those of the points that touch there.
   void (*advance_entries)(ShearUpdate&);
+  /// The same of a pair in the lanes of a group, whose lists are in rows.
+  void (*advance_list)(ShearListUpdate&);
   /// Computes the shear state at the end of a step, (4, stride): s in body 1's axes, then 1 at
   /// points that touch, else 0; and the forces there, (3, stride), or null.
   void (*advance)(const ShearSpringTouch& end, const ShearSpringPoints&, double* s, double* force);

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "kernels/numbers/one_lane.hpp"
+#include "kernels/shear/advance_lists.hpp"
 #include "kernels/shear/shear_pullback.hpp"
 #include "kernels/shear/shear_rows.hpp"
 #include "kernels/table/kernel_table.hpp"
@@ -20,6 +21,7 @@ void add_shear_kernels(KernelTable& k) {
     return kernels::recall_entries<Arch>(touch, points, index, entries);
   };
   k.advance_entries = [](ShearUpdate& u) { kernels::advance_entries<Arch>(u); };
+  k.advance_list = [](ShearListUpdate& u) { kernels::advance_list<Arch>(u); };
   k.advance = [](const ShearSpringTouch& end, const ShearSpringPoints& points, double* s,
                  double* force) { kernels::advance<Arch>(end, points, s, force); };
   k.pull_back_memory = [](const ShearPullback& m) { kernels::pull_back_memory<Arch>(m); };
