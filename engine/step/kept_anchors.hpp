@@ -15,15 +15,6 @@ inline bool is_due(const CompiledModel& m, const kernels::ShearSpringContact& of
   return every > 0 && steps >= 0 && steps % every == 0;
 }
 
-/// Returns the entries of a range of points.
-inline std::span<const ShearEntry> entries_of(std::span<const ShearEntry> memory,
-                                              const PointRange& points) {
-  const auto from = [&](int point) {
-    return std::lower_bound(memory.begin(), memory.end(), point,
-                            [](const ShearEntry& e, int value) { return e.point < value; });
-  };
-  return {from(points.first), from(points.first + points.count)};
-}
 /// Returns the shear-state entries of a contact's points.
 inline std::span<const ShearEntry> entries_of(std::span<const ShearEntry> memory,
                                               const CompiledModel& m,

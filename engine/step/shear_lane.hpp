@@ -108,6 +108,16 @@ struct PointRange {
       : first(of.first), count(of.contact.n_points) {}
 };
 
+/// Returns the entries of a range of points.
+inline std::span<const ShearEntry> entries_of(std::span<const ShearEntry> memory,
+                                              const PointRange& points) {
+  const auto from = [&](int point) {
+    return std::lower_bound(memory.begin(), memory.end(), point,
+                            [](const ShearEntry& e, int value) { return e.point < value; });
+  };
+  return {from(points.first), from(points.first + points.count)};
+}
+
 /// Moves `next`, any index, to the first entry of points from `first` on. Contacts in order are
 /// found fastest.
 inline void find_entries(std::span<const ShearEntry> memory, int first, std::size_t& next) {
@@ -174,6 +184,15 @@ inline void add_to_entries(std::span<const ShearEntry> memory, const PointRange&
     if (memory[at].point != point) continue;
     for (int c = 0; c < 3; ++c) to[3 * at + std::size_t(c)] += numbers[c * points.stride + k];
   }
+}
+
+/// Returns the first contact on the ground and the one past the last; they are adjacent.
+inline std::pair<int, int> ground_contacts(const CompiledModel& m) {
+  const auto on_ground = [](const kernels::ShearSpringContact& of) { return of.ground; };
+  const auto begin = std::ranges::find_if(m.shear_springs, on_ground),
+             end = std::find_if_not(begin, m.shear_springs.end(), on_ground);
+  return {static_cast<int>(begin - m.shear_springs.begin()),
+          static_cast<int>(end - m.shear_springs.begin())};
 }
 
 /// Returns the listed points of one lane.

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Calls the kernels of kernels/shear, one environment after the other.
+// Calls the kernels of kernels/shear: for pairs in several lanes and for the ground all lanes at
+// once, else one environment after the other.
 #include "engine/step/shear_update.hpp"
 
 #include <algorithm>
@@ -17,8 +18,8 @@ using kernels::ShearSpringPoints;
 
 namespace {
 
-/// Writes the entries of one lane at the end of a step, one contact after the other. What the vector
-/// held before is room for them.
+/// Writes the entries of one lane at the end of a step, one contact after the other. What the
+/// vector held before is room for them.
 class EntryWriter {
  public:
   EntryWriter() = default;
@@ -110,15 +111,6 @@ void advance_grounded(const ShearLanes<L>& lanes, int first, int lane, EntryWrit
   out.set_end(to);
 }
 
-/// Returns the first contact on the ground and the one past the last; they are adjacent.
-std::pair<int, int> ground_contacts(const CompiledModel& m) {
-  const auto on_ground = [](const ShearSpringContact& of) { return of.ground; };
-  const auto begin = std::ranges::find_if(m.shear_springs, on_ground),
-             end = std::find_if_not(begin, m.shear_springs.end(), on_ground);
-  return {static_cast<int>(begin - m.shear_springs.begin()),
-          static_cast<int>(end - m.shear_springs.begin())};
-}
-
 /// Lists the contacts that may touch at the end, from the lanes in which each is considered
 /// (ShearLanes::near). Computes how they touch at (q, v).
 template <int L>
@@ -155,21 +147,6 @@ void consider(const CompiledModel& m, BasicWorkspace<L>& w, LaneBits lanes) {
   });
 }
 
-/// Fills rows (points on the ground, 3) with their elastic displacements. Returns false, and leaves
-/// the rows unchanged, if no lane has an entry for any of them.
-template <int L>
-bool put_ground(const CompiledModel& m, int first, const std::array<ShearState, L>& now,
-                Row<L>* rows) {
-  bool any = false;
-  for (int l = 0; l < L; ++l)
-    for (const ShearEntry& e : entries_of(now[std::size_t(l)], {first, m.ground_anchors})) {
-      if (!any) std::fill_n(rows, 3 * m.ground_anchors, Row<L>{});
-      any = true;
-      for (int c = 0; c < 3; ++c) rows[3 * (e.point - first) + c][l] = e.s[c];
-    }
-  return any;
-}
-
 /// Lists the points on the ground that touch in some lane, from what advance_ground() wrote.
 template <int L>
 void find_grounded(const CompiledModel& m, ShearLanes<L>& lanes) {
@@ -186,34 +163,6 @@ void find_grounded(const CompiledModel& m, ShearLanes<L>& lanes) {
 }
 
 }  // namespace
-
-template <int L>
-void begin_shear(const CompiledModel& m, const kernels::KernelTable& table, BasicWorkspace<L>& w) {
-  if (m.shear_springs.empty()) return;
-  ShearLanes<L>& lanes = w.remembered;
-  table.stage<L>().poses_at(m.view, w.stage, w.q0, w.v0, w.zero, lanes.start.data());
-  std::fill(lanes.start_known.begin(), lanes.start_known.end(), 0);
-  if (m.ground_anchors == 0) return;
-  const auto [begin, end] = ground_contacts(m);
-  table.stage<L>().touches_at(m.view, lanes.start.data(), begin, end, nullptr,
-                              lanes.start_touches.data());
-  std::fill(lanes.start_known.begin() + begin, lanes.start_known.begin() + end, 1);
-  Row<L>* const s = lanes.ground.data();
-  const bool any = put_ground<L>(m, m.shear_springs[std::size_t(begin)].first, lanes.now, s);
-  table.stage<L>().recall_ground(m.view, w.stage, lanes.start_touches.data(), any ? s : nullptr);
-}
-
-template <int L>
-void set_list_anchors(const CompiledModel& m, const kernels::KernelTable& table,
-                      BasicWorkspace<L>& w, int k, int lane) {
-  const auto& list = w.lists[std::size_t(k)];
-  if (list.own_count[lane] == 0) return;
-  const ShearSpringContact& of = m.shear_springs[std::size_t(m.pairs[std::size_t(k)].memory)];
-  const kernels::ShearEntries left = table.recall_entries(
-      start_touch_of(m, table, w, of, lane), listed<L>(list, lane),
-      list.own_index + list.stride * lane, entries_from(w.remembered, of.first, lane));
-  set_entries(w.remembered, lane, left);
-}
 
 template <int L>
 void update_shear_state(const CompiledModel& m, const kernels::KernelTable& table,
@@ -283,12 +232,6 @@ void update_sensor_shear_state(const CompiledModel& m, const kernels::KernelTabl
   }
 }
 
-template void begin_shear(const CompiledModel&, const kernels::KernelTable&, Workspace&);
-template void begin_shear(const CompiledModel&, const kernels::KernelTable&, SingleWorkspace&);
-template void set_list_anchors(const CompiledModel&, const kernels::KernelTable&, Workspace&, int,
-                               int);
-template void set_list_anchors(const CompiledModel&, const kernels::KernelTable&, SingleWorkspace&,
-                               int, int);
 template void update_shear_state(const CompiledModel&, const kernels::KernelTable&, Workspace&,
                                  LaneBits);
 template void update_shear_state(const CompiledModel&, const kernels::KernelTable&,

@@ -76,9 +76,9 @@ struct StageKernels {
   void (*pull_back_poses)(const ModelView&, const Stage<L>&, const Row<L>* q, const Row<L>* v,
                           const Row<L>* zero, std::byte* scratch, MotionCotangent<Row<L>>* links,
                           Row<L>* q_bar, Row<L>* v_bar, Row<L>* places);
-  /// Computes the touched shape in body 1 and the twist W of contacts `first` … `end` - 1 with shear
-  /// springs, (n_shear_springs), from poses and twists of the links. Contacts with lanes[k] = 0 are
-  /// left out; null: none is.
+  /// Computes the touched shape in body 1 and the twist W of contacts with shear springs, from
+  /// `first` up to but without `end`, (n_shear_springs), from poses and twists of the links.
+  /// Contacts with lanes[k] = 0 are left out; null: none is.
   void (*touches_at)(const ModelView&, const LinkPose<Row<L>>* links, int first, int end,
                      const unsigned* lanes, LinkPose<Row<L>>* out);
   /// Clears the lanes of contacts with the ground and of sensors in which no point can touch.
@@ -127,8 +127,8 @@ struct KernelTable {
   void (*field_tangent)(const TactileTangent&);
   /// Converts elastic displacements, in rows 3 to 5 of the anchors, to anchors.
   void (*recall)(const ShearSpringTouch&, const ShearSpringPoints&);
-  /// Computes anchors of listed points from the entries of a shear state. `index`: rising numbers of
-  /// the points in their contact. Returns the entries behind those of the last point.
+  /// Computes anchors of listed points from the entries of a shear state. `index`: rising numbers
+  /// of the points in their contact. Returns the entries behind those of the last point.
   ShearEntries (*recall_entries)(const ShearSpringTouch&, const ShearSpringPoints&,
                                  const int* index, ShearEntries);
   /// Computes a contact's entries at the end of a step: those of the points that touch there.
