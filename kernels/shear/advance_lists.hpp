@@ -48,8 +48,10 @@ void advance_rows(const Shape& shape, const LoadedTouch<Lanes<A>>& t, const Grou
   }
 }
 
-/// Transposes eight bytes of eight bits: bit l of byte i becomes bit i of byte l.
-inline std::uint64_t transposed_bits(std::uint64_t x) {
+/// Transposes eight bytes of eight bits: bit l of byte i becomes bit i of byte l. Each instruction
+/// set has its own.
+template <class A>
+std::uint64_t transposed_bits(std::uint64_t x) {
   const auto swap = [&x](int shift, std::uint64_t mask) {
     const std::uint64_t differ = (x ^ (x >> shift)) & mask;
     x ^= differ ^ (differ << shift);
@@ -88,7 +90,7 @@ void advance_list(ShearListUpdate& u) {
       advance_rows(shape, t, list, first, rows);
       if (rows.touching == 0) continue;
       for (auto& s : rows.s) transpose(s);
-      const std::uint64_t touching = transposed_bits(rows.touching);
+      const std::uint64_t touching = transposed_bits<A>(rows.touching);
       for (unsigned left = u.lanes; left != 0; left &= left - 1) {
         const int l = __builtin_ctz(left);
         const auto which = static_cast<unsigned>(touching >> (kGroup * l)) & 0xffU;
