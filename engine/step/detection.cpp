@@ -47,7 +47,7 @@ static void clear_lists(const CompiledModel& model, BasicWorkspace<L>& w, std::s
 
 template <int L>
 void clear_candidates(const CompiledModel& model, BasicWorkspace<L>& w) {
-  w.in_rows = w.asked = 0;
+  w.in_rows = w.searched = 0;
   for_each_considered(model, w, [&](std::size_t g) { clear_lists(model, w, g); });
 }
 
@@ -131,8 +131,8 @@ static void search_pair(const CompiledModel& model, const kernels::KernelTable& 
 template <int L>
 void find_candidates(const CompiledModel& model, const kernels::KernelTable& table,
                      BasicWorkspace<L>& w, LaneBits lanes) {
-  w.asked |= lanes;
-  if (in_blocks(model) && (w.asked & ~lanes) == 0) {
+  w.searched |= lanes;
+  if (in_blocks(model) && (w.searched & ~lanes) == 0) {
     w.block_entries.reset(model.view.pattern);
     store_blocks(w);
   }
@@ -144,7 +144,7 @@ void find_candidates(const CompiledModel& model, const kernels::KernelTable& tab
   for_each_considered(model, w, [&](std::size_t g) {
     if (w.apart[g] != 0) return;
     // Where no lane had a list, every lane needs one from now on.
-    const LaneBits searched = w.apart_before[g] != 0 ? w.asked : lanes;
+    const LaneBits searched = w.apart_before[g] != 0 ? w.searched : lanes;
     w.in_rows &= ~searched;
     kernels::Row<L>* reference = w.references + 12 * g;
     for (int i = 0; i < 12; ++i)

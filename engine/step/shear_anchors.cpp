@@ -29,7 +29,7 @@ static bool put_ground(const CompiledModel& m, int first, const std::array<Shear
 template <int L>
 void begin_shear(const CompiledModel& m, const kernels::KernelTable& table, BasicWorkspace<L>& w) {
   if (m.shear_springs.empty()) return;
-  ShearLanes<L>& lanes = w.remembered;
+  ShearLanes<L>& lanes = w.shear;
   table.stage<L>().poses_at(m.view, w.stage, w.q0, w.v0, w.zero, lanes.start.data());
   std::fill(lanes.start_known.begin(), lanes.start_known.end(), 0);
   if (m.ground_anchors == 0) return;
@@ -50,8 +50,8 @@ void set_list_anchors(const CompiledModel& m, const kernels::KernelTable& table,
   const ShearSpringContact& of = m.shear_springs[std::size_t(m.pairs[std::size_t(k)].memory)];
   const kernels::ShearEntries left = table.recall_entries(
       start_touch_of(m, table, w, of, lane), listed<L>(list, lane),
-      list.own_index + list.stride * lane, entries_from(w.remembered, of.first, lane));
-  set_entries(w.remembered, lane, left);
+      list.own_index + list.stride * lane, entries_from(w.shear, of.first, lane));
+  set_entries(w.shear, lane, left);
 }
 
 template void begin_shear(const CompiledModel&, const kernels::KernelTable&, Workspace&);

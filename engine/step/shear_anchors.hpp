@@ -6,7 +6,7 @@
 
 namespace tangere {
 
-/// Prepares a solve that begins at q0 with w.remembered.now: poses there, and anchors on the
+/// Prepares a solve that begins at q0 with w.shear.now: poses there, and anchors on the
 /// ground.
 template <int L>
 void begin_shear(const CompiledModel& model, const kernels::KernelTable& table,

@@ -44,7 +44,7 @@ void advance_pair(const CompiledModel& m, const kernels::KernelTable& table, Bas
                   const ShearSpringContact& of, int lane, EntryWriter& out) {
   const auto& list = w.lists[std::size_t(of.pair)];
   const ShearSpringPoints points = listed<L>(list, lane);
-  const kernels::ShearSpringTouch end = touch_of(m, w, of, w.remembered.end_touches, lane);
+  const kernels::ShearSpringTouch end = touch_of(m, w, of, w.shear.end_touches, lane);
   kernels::ShearUpdate update = {
       nullptr, &end, points, list.own_index + list.stride * lane, {}, out.room(points.count)};
   table.advance_entries(update);
@@ -58,14 +58,14 @@ constexpr int kFewLanes = 3;
 template <int L>
 void advance_pairs(const CompiledModel& m, const kernels::KernelTable& table, BasicWorkspace<L>& w,
                    std::array<EntryWriter, L>& out) {
-  for (const int k : w.remembered.touching) {
+  for (const int k : w.shear.touching) {
     const ShearSpringContact& of = m.shear_springs[std::size_t(k)];
-    const LaneBits near = w.remembered.near[std::size_t(k)];
+    const LaneBits near = w.shear.near[std::size_t(k)];
     if (of.pair < 0) continue;
     if constexpr (L > 1) {
       if (std::popcount(near) >= kFewLanes) {
         kernels::ShearListUpdate update = {
-            &of, &w.remembered.end_touches[std::size_t(k)], &w.stage, near, {}};
+            &of, &w.shear.end_touches[std::size_t(k)], &w.stage, near, {}};
         const auto& list = w.lists[std::size_t(of.pair)];
         for (int l = 0; l < L; ++l)
           if (has(near, l)) update.after[l] = out[std::size_t(l)].room(list.own_count[l]);
@@ -84,8 +84,8 @@ void advance_pairs(const CompiledModel& m, const kernels::KernelTable& table, Ba
 template <int L>
 void advance_sensor(const CompiledModel& m, const kernels::KernelTable& table, BasicWorkspace<L>& w,
                     const ShearSpringContact& of, int lane, EntryWriter& out) {
-  TouchingSensorPoints& felt = w.remembered.felt;
-  const kernels::ShearSpringTouch end = touch_of(m, w, of, w.remembered.end_touches, lane);
+  TouchingSensorPoints& felt = w.shear.felt;
+  const kernels::ShearSpringTouch end = touch_of(m, w, of, w.shear.end_touches, lane);
   const ShearSpringPoints points = felt.find_near(m.sensors[std::size_t(of.sensor)], table, end);
   if (points.count == 0) return;
   const kernels::ShearSpringTouch start = start_touch_of(m, table, w, of, lane);
@@ -93,10 +93,10 @@ void advance_sensor(const CompiledModel& m, const kernels::KernelTable& table, B
                                  &end,
                                  points,
                                  felt.index(),
-                                 entries_from(w.remembered, of.first, lane),
+                                 entries_from(w.shear, of.first, lane),
                                  out.room(points.count)};
   table.advance_entries(update);
-  set_entries(w.remembered, lane, update.before);
+  set_entries(w.shear, lane, update.before);
   out.set_end(update.after);
 }
 
@@ -116,7 +116,7 @@ void advance_grounded(const ShearLanes<L>& lanes, int first, int lane, EntryWrit
 template <int L>
 void find_touches(const CompiledModel& m, const kernels::KernelTable& table, BasicWorkspace<L>& w,
                   const Row<L>* q, const Row<L>* v) {
-  ShearLanes<L>& lanes = w.remembered;
+  ShearLanes<L>& lanes = w.shear;
   const kernels::StageKernels<L>& kernel = table.stage<L>();
   const int n = m.view.n_shear_springs;
   kernel.poses_at(m.view, w.stage, q, v, w.zero, lanes.end.data());
@@ -130,7 +130,7 @@ void find_touches(const CompiledModel& m, const kernels::KernelTable& table, Bas
 /// Considers pairs with candidates, the ground, and sensors that are updated at every step.
 template <int L>
 void consider(const CompiledModel& m, BasicWorkspace<L>& w, LaneBits lanes) {
-  std::vector<LaneBits>& near = w.remembered.near;
+  std::vector<LaneBits>& near = w.shear.near;
   for (std::size_t k = 0; k < near.size(); ++k) {
     const ShearSpringContact& of = m.shear_springs[k];
     near[k] = of.pair < 0 && m.shear_interval(of) == 0 ? lanes : kNoLane;
@@ -168,7 +168,7 @@ template <int L>
 void update_shear_state(const CompiledModel& m, const kernels::KernelTable& table,
                         BasicWorkspace<L>& w, LaneBits lanes) {
   if (m.shear_springs.empty() || lanes == 0) return;
-  ShearLanes<L>& of_lanes = w.remembered;
+  ShearLanes<L>& of_lanes = w.shear;
   if constexpr (L > 1)
     if (std::popcount(lanes) >= kFewLanes) lists_to_rows(m, table, w, lanes);
   consider(m, w, lanes);
@@ -200,7 +200,7 @@ void update_shear_state(const CompiledModel& m, const kernels::KernelTable& tabl
 template <int L>
 void update_sensor_shear_state(const CompiledModel& m, const kernels::KernelTable& table,
                                BasicWorkspace<L>& w, std::span<const ReadingLane> lanes) {
-  ShearLanes<L>& of_lanes = w.remembered;
+  ShearLanes<L>& of_lanes = w.shear;
   const auto due = [&](const ShearSpringContact& of) {
     LaneBits bits = 0;
     for (int l = 0; l < L; ++l)

@@ -8,7 +8,7 @@
 
 namespace tangere {
 
-/// Sets w.remembered.after of `lanes` from the solve's result in q1, v1.
+/// Sets w.shear.after of `lanes` from the solve's result in q1, v1.
 template <int L>
 void update_shear_state(const CompiledModel& model, const kernels::KernelTable& table,
                         BasicWorkspace<L>& w, LaneBits lanes);

@@ -104,19 +104,19 @@ void BasicWorkspace<L>::make_memory(const CompiledModel& m) {
     list.own_anchors = own_anchors.data() + kernels::kAnchorNumbers * at;
     at += std::size_t(L * list.stride);
   }
-  remembered.ground.resize(4 * std::size_t(m.ground_anchors));
-  remembered.grounded.reserve(std::size_t(m.ground_anchors));
-  remembered.ground_anchors.resize(most_on_ground * kernels::kAnchorNumbers);
-  remembered.s.resize(4 * most);
-  remembered.felt = TouchingSensorPoints(m);
-  remembered.start.resize(m.links.size());
-  remembered.end.resize(m.links.size());
-  remembered.start_touches.resize(m.shear_springs.size());
-  remembered.end_touches.resize(m.shear_springs.size());
-  remembered.start_known.resize(m.shear_springs.size());
-  remembered.near.resize(m.shear_springs.size());
-  remembered.touching.reserve(m.shear_springs.size());
-  for (auto* lanes : {&remembered.now, &remembered.after})
+  shear.ground.resize(4 * std::size_t(m.ground_anchors));
+  shear.grounded.reserve(std::size_t(m.ground_anchors));
+  shear.ground_anchors.resize(most_on_ground * kernels::kAnchorNumbers);
+  shear.s.resize(4 * most);
+  shear.felt = TouchingSensorPoints(m);
+  shear.start.resize(m.links.size());
+  shear.end.resize(m.links.size());
+  shear.start_touches.resize(m.shear_springs.size());
+  shear.end_touches.resize(m.shear_springs.size());
+  shear.start_known.resize(m.shear_springs.size());
+  shear_bytes.near.resize(m.shear_springs.size());
+  shear_bytes.touching.reserve(m.shear_springs.size());
+  for (auto* lanes : {&shear.now, &shear.after})
     for (ShearState& lane : *lanes) lane.reserve(std::size_t(m.taped_points + kGroup));
 }
 
@@ -136,15 +136,15 @@ void BasicWorkspace<L>::make_list(const CompiledModel& m, std::size_t pair) {
 template <int L>
 std::size_t BasicWorkspace<L>::bytes(const CompiledModel& m) {
   BasicWorkspace w(m);
-  const std::size_t remembered =
+  const std::size_t shear_bytes =
       2 * L * std::size_t(m.taped_points) * sizeof(ShearEntry) + w.own_index.size() * sizeof(int) +
-      w.own_anchors.size() * sizeof(double) + w.remembered.ground.size() * sizeof(LaneRow) +
-      w.remembered.ground_anchors.size() * sizeof(double);
+      w.own_anchors.size() * sizeof(double) + w.shear.ground.size() * sizeof(LaneRow) +
+      w.shear.ground_anchors.size() * sizeof(double);
   const std::size_t poses =
-      w.poses_before.size() + w.remembered.start.size() + w.remembered.start_touches.size();
+      w.poses_before.size() + w.shear.start.size() + w.shear.start_touches.size();
   const std::size_t watched =
       2 * poses * sizeof(kernels::LinkPose<LaneRow>) + w.search.size() * sizeof(double);
-  return remembered + watched + w.memory.size() * sizeof(LaneRow) +
+  return shear_bytes + watched + w.memory.size() * sizeof(LaneRow) +
          w.own_points.size() * sizeof(double) + w.scratch.size();
 }
 

@@ -93,7 +93,7 @@ struct BasicWorkspace {
   std::vector<unsigned char> apart;         ///< (n_link_pairs) storage of stage.apart
   std::vector<unsigned char> apart_before;  ///< the same before the last search
   std::vector<unsigned char> coupled;       ///< (1) storage of stage.coupled
-  LaneBits asked = 0;  ///< lanes that were searched since the lists were cleared
+  LaneBits searched = 0;  ///< lanes that were searched since the lists were cleared
   kernels::NearPairs<L> near;
   BroadPhase<L> broad_phase;
   kernels::Stage<L> stage;
@@ -120,7 +120,7 @@ struct BasicWorkspace {
   BlockEntries block_entries;
   Rows blocks;  ///< storage of stage.A
   BlockFactors block_factors;
-  ShearLanes<L> remembered;
+  ShearLanes<L> shear;
   AlignedVector<double> own_anchors;
   std::vector<int> own_index;
 };
