@@ -134,7 +134,7 @@ void ShearAdjoint<L>::pull_back(const CompiledModel& m, const kernels::KernelTab
             after, of, index, points.count, points.stride,
             [&](std::size_t entry, int c) { return bar[3 * entry + std::size_t(c)]; }, s_bar, next);
       std::fill(s_out, s_out + rows, 0.0);
-      const ShearSpringTouch start = touch_of(m, w, of, w.shear.start_touches, l),
+      const ShearSpringTouch start = start_touch_of(m, table, w, of, l),
                              end = touch_of(m, w, of, at_touches_, l);
       Vec6<double> slip{};
       if (of_forces) slip = touch_of(m, w, of, slip_touches_, l).twist;
@@ -168,7 +168,8 @@ void ShearAdjoint<L>::reverse_end(const CompiledModel& m, const kernels::KernelT
   if (m.shear_springs.empty()) return;
   std::fill(end_.begin(), end_.end(), MotionCotangent<Row<L>>{});
   table.stage<L>().poses_at(m.view, w.stage, w.q1, w.stage.v, w.zero, at_.data());
-  table.stage<L>().touches_at(m.view, at_.data(), at_touches_.data());
+  table.stage<L>().touches_at(m.view, at_.data(), 0, m.view.n_shear_springs, nullptr,
+                              at_touches_.data());
   pull_back(m, table, w, lanes, false, loss, number);
   add_to_state(m, table, w, lanes, w.q1, w.stage.v, end_, loss.q, loss.v, loss.parameters);
 }
@@ -218,7 +219,8 @@ void ShearAdjoint<L>::reverse_readings(const CompiledModel& m, const kernels::Ke
       if (is_due(m, of, readings[std::size_t(l)].steps)) lanes |= 1U << l;
   if (lanes == 0) return;
   table.stage<L>().poses_at(m.view, w.stage, w.q1, w.v1, w.zero, at_.data());
-  table.stage<L>().touches_at(m.view, at_.data(), at_touches_.data());
+  table.stage<L>().touches_at(m.view, at_.data(), 0, m.view.n_shear_springs, nullptr,
+                              at_touches_.data());
   for (LossRows<L>& loss : losses) {
     std::fill(end_.begin(), end_.end(), MotionCotangent<Row<L>>{});
     for (int l = 0; l < L; ++l) {
@@ -249,8 +251,10 @@ void ShearAdjoint<L>::reverse_forces(const CompiledModel& m, const kernels::Kern
   if (m.shear_springs.empty()) return;
   table.stage<L>().poses_at(m.view, w.stage, q, w.stage.v, w.zero, at_.data());
   table.stage<L>().poses_at(m.view, w.stage, q, lambda, w.zero, slip_.data());
-  table.stage<L>().touches_at(m.view, at_.data(), at_touches_.data());
-  table.stage<L>().touches_at(m.view, slip_.data(), slip_touches_.data());
+  table.stage<L>().touches_at(m.view, at_.data(), 0, m.view.n_shear_springs, nullptr,
+                              at_touches_.data());
+  table.stage<L>().touches_at(m.view, slip_.data(), 0, m.view.n_shear_springs, nullptr,
+                              slip_touches_.data());
   pull_back(m, table, w, lanes, true, loss, number);
 }
 

@@ -7,6 +7,7 @@
 
 #include "engine/step/detection.hpp"
 #include "engine/step/scheme_stage.hpp"
+#include "engine/step/shear_anchors.hpp"
 #include "engine/step/shear_update.hpp"
 #include "engine/step/softened.hpp"
 

@@ -5,7 +5,7 @@
 #include <algorithm>
 
 #include "engine/step/factors.hpp"
-#include "engine/step/shear_update.hpp"
+#include "engine/step/shear_anchors.hpp"
 
 namespace tangere {
 

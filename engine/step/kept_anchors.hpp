@@ -19,11 +19,7 @@ inline bool is_due(const CompiledModel& m, const kernels::ShearSpringContact& of
 inline std::span<const ShearEntry> entries_of(std::span<const ShearEntry> memory,
                                               const CompiledModel& m,
                                               const kernels::ShearSpringContact& of) {
-  const auto from = [&](int point) {
-    return std::lower_bound(memory.begin(), memory.end(), point,
-                            [](const ShearEntry& e, int value) { return e.point < value; });
-  };
-  return {from(of.first), from(of.first + m.shear_rows(of))};
+  return entries_of(memory, {of.first, m.shear_rows(of)});
 }
 
 /// How many entries, the first ones, are of sensors that keep anchors.

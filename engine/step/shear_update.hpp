@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Shear state in the lanes of a workspace: computes anchors at the start of a solve and after each
-// detection, and the updated shear state after convergence.
+// The shear state of the lanes of a workspace at the end of a solve.
 #pragma once
 
 #include <span>
@@ -9,17 +8,7 @@
 
 namespace tangere {
 
-/// Prepares a solve that begins at q0 with w.memory.now: poses there, and anchors on the ground.
-template <int L>
-void begin_shear(const CompiledModel& model, const kernels::KernelTable& table,
-                 BasicWorkspace<L>& w);
-
-/// Computes the anchors of the points that lane `lane` has listed for pair k.
-template <int L>
-void set_list_anchors(const CompiledModel& model, const kernels::KernelTable& table,
-                      BasicWorkspace<L>& w, int k, int lane);
-
-/// Sets w.memory.after of `lanes` from the solve's result in q1, v1.
+/// Sets w.shear.after of `lanes` from the solve's result in q1, v1.
 template <int L>
 void update_shear_state(const CompiledModel& model, const kernels::KernelTable& table,
                         BasicWorkspace<L>& w, LaneBits lanes);

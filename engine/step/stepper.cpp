@@ -183,9 +183,13 @@ struct Stepper::Impl {
       ++batch.steps_[e];
       if (!m.shear_springs.empty()) {
         ShearState& memory = batch.shear_[e];
-        const ShearState& now = w.shear.now[std::size_t(l)];
-        memory.resize(std::size_t(kept_entries(m, memory)));
-        memory.insert(memory.end(), now.begin(), now.end());
+        ShearState& now = w.shear.now[std::size_t(l)];
+        if (m.kept_points == 0) {
+          memory.swap(now);
+        } else {
+          memory.resize(std::size_t(kept_entries(m, memory)));
+          memory.insert(memory.end(), now.begin(), now.end());
+        }
         reading[std::size_t(l)] = {batch.steps_[e], &memory};
       }
       // One step back is too long for BDF2's history where a step had to be cut.

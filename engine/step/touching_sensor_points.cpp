@@ -13,13 +13,6 @@ using kernels::kAnchorNumbers;
 using kernels::kGroup;
 using kernels::Vec3;
 
-namespace {
-
-/// Above rounding: some shapes test squares of distances, and no square is below zero [m].
-constexpr double kMargin = 1e-9;
-
-}  // namespace
-
 TouchingSensorPoints::TouchingSensorPoints(const CompiledModel& m) {
   std::size_t most = 0;
   for (const CompiledSensor& s : m.sensors)
@@ -37,18 +30,25 @@ kernels::ShearSpringPoints TouchingSensorPoints::find(const CompiledSensor& sens
                                                       const kernels::KernelTable& table,
                                                       const kernels::ShearSpringTouch& touch) {
   const kernels::PairContact& c = touch.of->contact;
-  const int stride = static_cast<int>(index_.size());
-  kernels::ShearSpringPoints points = {places_.data(), anchors_.data(), nullptr, 0, stride};
   const Vec3<double> middle = transposed_times(touch.shape.R, c.middle - touch.shape.p);
   const bool near = kernels::with_distance<double>(
       c.shape, touch.size,
       [&](const auto& shape) -> bool { return nearer_than(shape, middle, c.extent); }, c.grid);
-  if (!near) return points;
+  if (near) return find_near(sensor, table, touch);
+  return {places_.data(), anchors_.data(), nullptr, 0, static_cast<int>(index_.size())};
+}
+
+kernels::ShearSpringPoints TouchingSensorPoints::find_near(const CompiledSensor& sensor,
+                                                           const kernels::KernelTable& table,
+                                                           const kernels::ShearSpringTouch& touch) {
+  const kernels::PairContact& c = touch.of->contact;
+  const int stride = static_cast<int>(index_.size());
+  kernels::ShearSpringPoints points = {places_.data(), anchors_.data(), nullptr, 0, stride};
   double pose[12];
   for (int i = 0; i < 9; ++i) pose[i] = touch.shape.R.m[i / 3][i % 3];
   pose[9] = touch.shape.p.x, pose[10] = touch.shape.p.y, pose[11] = touch.shape.p.z;
-  points.count = table.find_candidates(
-      {&c, touch.size, pose, kMargin, places_.data(), stride, touch.faces, index_.data()});
+  points.count = table.find_candidates({&c, touch.size, pose, kernels::kTouchMargin, places_.data(),
+                                        stride, touch.faces, index_.data()});
   if (sensor.point_factors.empty()) return points;
   points.factors = factors_.data();
   const int end = (points.count + kGroup - 1) / kGroup * kGroup;

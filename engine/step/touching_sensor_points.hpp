@@ -20,6 +20,10 @@ class TouchingSensorPoints {
   /// Lists the points that touch. Anchors are not set. The list is valid until the next call.
   kernels::ShearSpringPoints find(const CompiledSensor& sensor, const kernels::KernelTable& table,
                                   const kernels::ShearSpringTouch& touch);
+  /// The same, if a ball around the points is known to reach the shape.
+  kernels::ShearSpringPoints find_near(const CompiledSensor& sensor,
+                                       const kernels::KernelTable& table,
+                                       const kernels::ShearSpringTouch& touch);
   /// Numbers of the points in their contact, rising.
   [[nodiscard]] const int* index() const { return index_.data(); }
   /// Adds cotangents of the listed points' own numbers, (kPointNumbers, stride) with places in the

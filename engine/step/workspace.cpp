@@ -113,8 +113,11 @@ void BasicWorkspace<L>::make_memory(const CompiledModel& m) {
   shear.end.resize(m.links.size());
   shear.start_touches.resize(m.shear_springs.size());
   shear.end_touches.resize(m.shear_springs.size());
+  shear.start_known.resize(m.shear_springs.size());
+  shear_bytes.near.resize(m.shear_springs.size());
+  shear_bytes.touching.reserve(m.shear_springs.size());
   for (auto* lanes : {&shear.now, &shear.after})
-    for (ShearState& lane : *lanes) lane.reserve(std::size_t(m.taped_points));
+    for (ShearState& lane : *lanes) lane.reserve(std::size_t(m.taped_points + kGroup));
 }
 
 template <int L>

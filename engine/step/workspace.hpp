@@ -56,6 +56,10 @@ struct ShearLanes {
   Poses start, end;                      ///< (n_links) poses there
   /// (n_shear_springs) of each contact with shear springs: the touched shape in body 1, and W.
   Poses start_touches, end_touches;
+  std::vector<unsigned char> start_known;  ///< (n_shear_springs) 1: start_touches has it
+  /// (n_shear_springs) lanes in which points of a contact may touch at the end.
+  std::vector<LaneBits> near;
+  std::vector<int> touching;              ///< contacts with such lanes
   AlignedVector<kernels::Row<L>> ground;  ///< (points on the ground, 4)
   std::vector<int> grounded;              ///< those of them that touch in some lane
   AlignedVector<double> ground_anchors;   ///< (kAnchorNumbers, largest stride) of one lane

@@ -86,6 +86,15 @@ template <class N>
   return e;
 }
 
+/// Returns λ, from |w|², 1/|w| and μB. As in friction(): without a force N nothing holds, at w = 0
+/// as well.
+template <class N>
+[[gnu::always_inline]] inline N held(const N& square, const N& inverse_size, const N& limit) {
+  const N zero(0.0), one(1.0);
+  const auto slipping = square * inverse_size > limit;  // false at w = 0
+  return select(slipping, limit * inverse_size, select(limit > zero, one, zero));
+}
+
 /// λ, its factor on the damper, and 1/|w| if the point slips, else 0.
 template <class N>
 struct Grip {
@@ -97,11 +106,10 @@ template <class N>
                                               const NormalForce<N>& normal, const Spring<N>& e) {
   const N zero(0.0);
   const N limit = law.mu * normal.bound;
-  const auto slipping = e.square * e.inverse_size > limit;  // false at w = 0
+  const auto slipping = e.square * e.inverse_size > limit;
   Grip<N> g;
   g.inverse_w = select(slipping, e.inverse_size, zero);
-  // As in friction(): without a force N nothing holds, at w = 0 as well.
-  g.hold = select(slipping, limit * g.inverse_w, select(limit > zero, N(1.0), zero));
+  g.hold = held(e.square, e.inverse_size, limit);
   g.damper.scale = g.hold * law.kt;
   g.damper.slip = select(slipping, law.friction_tangent, zero);
   g.damper.direction = (g.damper.slip * g.inverse_w) * e.w;

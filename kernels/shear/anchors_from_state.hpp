@@ -10,7 +10,7 @@
 #pragma once
 
 #include "kernels/reverse/point_pullback.hpp"
-#include "kernels/shear/shear_types.hpp"
+#include "kernels/shear/shear_entries.hpp"
 #include "kernels/step/faces.hpp"
 
 namespace tangere::kernels {
@@ -129,37 +129,43 @@ Vec3<N> pull_back_recall(const Shape& shape, const LoadedTouch<N>& t, const Vec3
 }
 
 template <class A>
-Vec3<Lanes<A>> load3(const double* rows, int stride, int k) {
-  return {load_lanes<A>(rows + k), load_lanes<A>(rows + stride + k),
-          load_lanes<A>(rows + 2 * stride + k)};
-}
-template <class A>
-void store3(const Vec3<Lanes<A>>& x, double* rows, int stride, int k) {
-  store_lanes(x.x, rows + k), store_lanes(x.y, rows + stride + k);
-  store_lanes(x.z, rows + 2 * stride + k);
-}
-template <class A>
 Anchor<Lanes<A>> load_anchors(const ShearSpringPoints& points, int k) {
   return load_anchor<Lanes<A>>(
       [&](int i) { return load_lanes<A>(points.anchors + i * points.stride + k); });
 }
 
-/// Converts the elastic displacements s, in rows 3 to 5 of the anchors, to anchors a.
-template <class A>
-void recall(const ShearSpringTouch& touch, const ShearSpringPoints& points) {
+/// Computes anchors of points with elastic displacements `s_of`(k): those of points k … k + 7.
+template <class A, class Read>
+void recall(const ShearSpringTouch& touch, const ShearSpringPoints& points, const Read& s_of) {
   using N = Lanes<A>;
   const LoadedTouch<N> t = loaded<N>(touch);
   with_shape<N>(touch, [&](const auto& shape) {
     double* const anchors = points.anchors;
     const int stride = points.stride;
     for (int k = 0; k < points.count; k += kGroup) {
-      const Anchor<N> x = recalled(shape, t, load3<A>(points.places, stride, k),
-                                   load3<A>(anchors + 3 * stride, stride, k));
+      const Anchor<N> x = recalled(shape, t, load3<A>(points.places, stride, k), s_of(k));
       store3(x.b, anchors, stride, k);
       store3(x.a, anchors + 3 * stride, stride, k);
       store_lanes(x.gap, anchors + 6 * stride + k);
     }
   });
+}
+
+/// Converts the elastic displacements s, in rows 3 to 5 of the anchors, to anchors a.
+template <class A>
+void recall(const ShearSpringTouch& touch, const ShearSpringPoints& points) {
+  recall<A>(touch, points,
+            [&](int k) { return load3<A>(points.anchors + 3 * points.stride, points.stride, k); });
+}
+
+/// Computes anchors from the entries of a shear state. Returns those behind the last point's.
+template <class A>
+ShearEntries recall_entries(const ShearSpringTouch& touch, const ShearSpringPoints& points,
+                            const int* index, ShearEntries entries) {
+  recall<A>(touch, points, [&](int k) {
+    return read_entries<A>({touch.of->first, index + k}, points.count - k, entries);
+  });
+  return entries;
 }
 
 }  // namespace tangere::kernels

@@ -3,10 +3,15 @@
 #pragma once
 
 #include "kernels/contact/elastic_contact.hpp"
-#include "kernels/step/model_view.hpp"
+#include "kernels/shear/shear_entry.hpp"
+#include "kernels/step/arguments.hpp"
 #include "kernels/tactile/tactile_types.hpp"
 
 namespace tangere::kernels {
+
+/// How near points are that may touch [m]. Above rounding: some shapes test squares of distances,
+/// and no square is below zero.
+inline constexpr double kTouchMargin = 1e-9;
 
 /// A contact with shear springs at one state.
 struct ShearSpringTouch {
@@ -27,6 +32,30 @@ struct ShearSpringPoints {
   const double* factors;
   int count, stride;
   const double* weights = nullptr;  ///< (stride) as PairContact::weights; null: none has any
+};
+
+/// Entries of a shear state, by rising point: those from the first of a contact's points on.
+struct ShearEntries {
+  const ShearEntry *at, *end;
+};
+
+/// The update of the shear state of one contact of one environment over a step.
+struct ShearUpdate {
+  const ShearSpringTouch* start;  ///< where the step began; null: the points have anchors
+  const ShearSpringTouch* end;
+  ShearSpringPoints points;
+  const int* index;     ///< (count) rising numbers of the points in the contact
+  ShearEntries before;  ///< read if the points have no anchors; moved behind those that are read
+  ShearEntry* after;  ///< room for `count` entries and a vector of them; moved behind those written
+};
+
+/// The same of a pair of bodies in all lanes of a group, from the rows of its list.
+struct ShearListUpdate {
+  const ShearSpringContact* of;
+  const LinkPose<LaneRow>* end;  ///< the touched shape in body 1, and W
+  const GroupStage* stage;
+  unsigned lanes;             ///< those whose entries are computed
+  ShearEntry* after[kGroup];  ///< of each of them as in ShearUpdate
 };
 
 /// Cotangents of one contact of one environment, body 1's axes and origin.

@@ -70,4 +70,68 @@ void advance(const ShearSpringTouch& end, const ShearSpringPoints& points, doubl
   });
 }
 
+/// Computes the entries at the end of a step. Anchors of the points stay in registers unless they
+/// are given. Points go through it four vectors at a time, pass by pass, so that the latencies of
+/// different points overlap.
+template <class A>
+void advance_entries(ShearUpdate& u) {
+  using N = Lanes<A>;
+  constexpr int kVectors = 4;
+  struct Pass {
+    N d;
+    Vec3<N> n, x2, s;
+    N square, limit;
+    unsigned touching;
+  } passes[kVectors];
+  const ShearSpringPoints& points = u.points;
+  const LoadedTouch<N> end = loaded<N>(*u.end);
+  LoadedTouch<N> start;
+  if (u.start != nullptr) start = loaded<N>(*u.start);
+  const bool own_law = points.factors != nullptr || points.weights != nullptr;
+  with_shape<N>(*u.end, [&](const auto& shape) {
+    for (int chunk = 0; chunk < points.count; chunk += kVectors * kGroup) {
+      const auto each = [&](const auto& f) {
+        for (int i = 0; i < kVectors && chunk + i * kGroup < points.count; ++i)
+          f(chunk + i * kGroup, passes[i]);
+      };
+      const auto numbers = [&](int k) { return PointNumbers{u.end->of->first, u.index + k}; };
+      const auto place = [&](int k) { return load3<A>(points.places, points.stride, k); };
+      each([&](int k, Pass& pass) {
+        PointContact<N> p;
+        find_place(shape, end, place(k), p);
+        pass.touching = lane_bits(p.d < N(0.0));
+        pass.d = p.d, pass.n = p.n, pass.x2 = p.x2;
+      });
+      if (u.start != nullptr)
+        each([&](int k, Pass& pass) {
+          if (pass.touching != 0) pass.s = read_entries<A>(numbers(k), points.count - k, u.before);
+        });
+      each([&](int k, Pass& pass) {
+        if (pass.touching == 0) return;
+        LawParameters<N> own;
+        if (own_law) own = law_at<A>(end, points, k);
+        const LawParameters<N>& law = own_law ? own : end.law;
+        const Anchor<N> anchor = u.start == nullptr ? load_anchors<A>(points, k)
+                                                    : recalled(shape, start, place(k), pass.s);
+        PointContact<N> p;
+        p.d = pass.d, p.n = pass.n, p.x2 = pass.x2;
+        find_motion(law, end.omega, end.v, p);
+        const Spring<N> spring = stretched(law.ks, law.kt, p.d, p.n, p.vt,
+                                           anchor.b - (end.c + end.Q * anchor.a), anchor.gap);
+        pass.s = spring.s;
+        pass.square = spring.square;
+        pass.limit = law.mu * p.normal.bound;
+      });
+      each([&](int, Pass& pass) {
+        if (pass.touching != 0)
+          pass.s = held(pass.square, inverse_sqrt(pass.square), pass.limit) * pass.s;
+      });
+      each([&](int k, const Pass& pass) {
+        if (pass.touching != 0)
+          u.after = write_entries<A>(numbers(k), pass.s, pass.touching, u.after);
+      });
+    }
+  });
+}
+
 }  // namespace tangere::kernels

@@ -6,6 +6,7 @@
 #include "kernels/contact/distance.hpp"
 #include "kernels/contact/elastic_contact.hpp"
 #include "kernels/numbers/one_lane.hpp"
+#include "kernels/numbers/transpose.hpp"
 #include "kernels/step/arguments.hpp"
 #include "kernels/step/faces.hpp"
 #include "kernels/step/stage.hpp"
@@ -74,6 +75,22 @@ void append(const Lanes<A>& a, unsigned which, double* out) {
   for (; which != 0; which &= which - 1) *out++ = lanes[__builtin_ctz(which)];
 }
 
+/// Appends the numbers first + l of the lanes l in `which`. It may write up to eight.
+template <class A>
+void append_numbers(int first, unsigned which, int* out) {
+#if defined(__AVX512F__)
+  if constexpr (std::is_same_v<A, xsimd::avx512bw>) {
+    const __m512i all =
+        _mm512_add_epi32(_mm512_set1_epi32(first),
+                         _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 0, 0, 0, 0, 0, 0, 0, 0));
+    const __m512i kept = _mm512_maskz_compress_epi32(static_cast<__mmask16>(which), all);
+    _mm256_storeu_si256(reinterpret_cast<__m256i*>(out), _mm512_castsi512_si256(kept));
+    return;
+  }
+#endif
+  for (; which != 0; which &= which - 1) *out++ = first + __builtin_ctz(which);
+}
+
 /// Shape and pose are local copies. Otherwise the compiler would have to assume that storing to
 /// `points` can change them.
 template <class A, class Shape>
@@ -105,11 +122,7 @@ int search_shape(const CandidateSearch& s, Shape shape) {
         append(place.z, in, z + count);
         if (s.weights != nullptr)
           append(load_lanes<A>(pair.tile_weights + tile * kContactTile + k), in, s.weights + count);
-        if (s.index != nullptr) {
-          int* to = s.index + count;
-          for (unsigned left = in; left != 0; left &= left - 1)
-            *to++ = tile * kContactTile + k + __builtin_ctz(left);
-        }
+        if (s.index != nullptr) append_numbers<A>(tile * kContactTile + k, in, s.index + count);
         count += __builtin_popcount(in);
       }
     }
@@ -129,30 +142,33 @@ int search_candidates(const CandidateSearch& s) {
       [&]<class Shape>(const Shape& shape) { return search_shape<A, Shape>(s, shape); });
 }
 
+/// Copies numbers of the lanes' own points, (kGroup, Numbers, stride), to rows, (count, Numbers).
+/// Where a lane has no more points, rows hold `filler` or the padding of the lane's list.
+template <class A, int Numbers>
+void transpose_numbers(const GroupStage::List& list, const double* own, double filler,
+                       LaneRow* rows) {
+  for (int first = 0; first < list.count; first += kGroup)
+    for (int c = 0; c < Numbers; ++c) {
+      Lanes<A> x[kGroup];
+      for (int l = 0; l < kGroup; ++l)
+        x[l] = first < list.own_count[l]
+                   ? load_lanes<A>(own + (l * Numbers + c) * list.stride + first)
+                   : Lanes<A>(filler);
+      transpose(x);
+      for (int i = 0; i < kGroup; ++i) store_lanes(x[i], rows[Numbers * (first + i) + c].lane);
+    }
+}
+
 /// Makes rows of eight lanes from the lanes' own lists. Shorter lists end in far points.
 template <class A>
 void transpose_rows(GroupStage::List& list) {
   list.count = 0;
   for (int count : list.own_count) list.count = count > list.count ? count : list.count;
   if (list.count == 0) return;
-  for (int l = 0; l < kGroup; ++l)
-    for (int c = 0; c < 3; ++c) {
-      const double* from = list.own + (l * 3 + c) * list.stride;
-      for (int k = 0; k < list.own_count[l]; ++k) list.points[3 * k + c][l] = from[k];
-      for (int k = list.own_count[l]; k < list.count; ++k) list.points[3 * k + c][l] = kFarAway;
-    }
-  if (list.weights != nullptr)
-    for (int l = 0; l < kGroup; ++l)
-      for (int k = 0; k < list.count; ++k)
-        list.weights[k][l] = k < list.own_count[l] ? list.own_weights[l * list.stride + k] : 0;
-  if (list.anchors == nullptr) return;
-  for (int l = 0; l < kGroup; ++l)
-    for (int c = 0; c < kAnchorNumbers; ++c) {
-      const double* from = list.own_anchors + (l * kAnchorNumbers + c) * list.stride;
-      for (int k = 0; k < list.own_count[l]; ++k) list.anchors[kAnchorNumbers * k + c][l] = from[k];
-      for (int k = list.own_count[l]; k < list.count; ++k)
-        list.anchors[kAnchorNumbers * k + c][l] = 0;
-    }
+  transpose_numbers<A, 3>(list, list.own, kFarAway, list.points);
+  if (list.weights != nullptr) transpose_numbers<A, 1>(list, list.own_weights, 0, list.weights);
+  if (list.anchors != nullptr)
+    transpose_numbers<A, kAnchorNumbers>(list, list.own_anchors, 0, list.anchors);
 }
 
 }  // namespace tangere::kernels

@@ -76,17 +76,23 @@ struct StageKernels {
   void (*pull_back_poses)(const ModelView&, const Stage<L>&, const Row<L>* q, const Row<L>* v,
                           const Row<L>* zero, std::byte* scratch, MotionCotangent<Row<L>>* links,
                           Row<L>* q_bar, Row<L>* v_bar, Row<L>* places);
-  /// Computes the touched shape in body 1 and the twist W of each contact with shear springs,
-  /// (n_shear_springs), from poses and twists of the links.
-  void (*touches_at)(const ModelView&, const LinkPose<Row<L>>* links, LinkPose<Row<L>>* out);
+  /// Computes the touched shape in body 1 and the twist W of contacts with shear springs, from
+  /// `first` up to but without `end`, (n_shear_springs), from poses and twists of the links.
+  /// Contacts with lanes[k] = 0 are left out; null: none is.
+  void (*touches_at)(const ModelView&, const LinkPose<Row<L>>* links, int first, int end,
+                     const unsigned* lanes, LinkPose<Row<L>>* out);
+  /// Clears the lanes of contacts with the ground and of sensors in which no point can touch.
+  /// `lanes`: (n_shear_springs).
+  void (*clear_far_contacts)(const ModelView&, const Stage<L>&, const LinkPose<Row<L>>* links,
+                             unsigned* lanes);
   /// Computes Stage::ground_anchors from elastic displacements (body 1's axes, or null) and from
   /// the touches where a solve begins.
   void (*recall_ground)(const ModelView&, const Stage<L>&, const LinkPose<Row<L>>* touches,
                         const Row<L>* s);
   /// Computes the shear state at the end of a solve, (points, 4): s', then 1 at points that touch,
-  /// else 0. s' is only set where a point touches.
+  /// else 0. s' is only set where a point touches. Contacts with lanes[k] = 0 are left out.
   void (*advance_ground)(const ModelView&, const Stage<L>&, const LinkPose<Row<L>>* touches,
-                         Row<L>* kept);
+                         const unsigned* lanes, Row<L>* kept);
 };
 
 struct KernelTable {
@@ -121,6 +127,14 @@ struct KernelTable {
   void (*field_tangent)(const TactileTangent&);
   /// Converts elastic displacements, in rows 3 to 5 of the anchors, to anchors.
   void (*recall)(const ShearSpringTouch&, const ShearSpringPoints&);
+  /// Computes anchors of listed points from the entries of a shear state. `index`: rising numbers
+  /// of the points in their contact. Returns the entries behind those of the last point.
+  ShearEntries (*recall_entries)(const ShearSpringTouch&, const ShearSpringPoints&,
+                                 const int* index, ShearEntries);
+  /// Computes a contact's entries at the end of a step: those of the points that touch there.
+  void (*advance_entries)(ShearUpdate&);
+  /// The same of a pair in the lanes of a group, whose lists are in rows.
+  void (*advance_list)(ShearListUpdate&);
   /// Computes the shear state at the end of a step, (4, stride): s in body 1's axes, then 1 at
   /// points that touch, else 0; and the forces there, (3, stride), or null.
   void (*advance)(const ShearSpringTouch& end, const ShearSpringPoints&, double* s, double* force);

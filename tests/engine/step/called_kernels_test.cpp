@@ -58,7 +58,9 @@ using OfFaces = Kernels<&GroupTable::choose_faces, &LoneTable::choose_faces,
 using OfMemory =
     Kernels<&GroupTable::touches_at, &LoneTable::touches_at, &GroupTable::recall_ground,
             &LoneTable::recall_ground, &GroupTable::advance_ground, &LoneTable::advance_ground,
-            &KernelTable::recall, &KernelTable::advance>;
+            &GroupTable::clear_far_contacts, &LoneTable::clear_far_contacts, &KernelTable::recall,
+            &KernelTable::recall_entries, &KernelTable::advance, &KernelTable::advance_entries,
+            &KernelTable::advance_list>;
 using OfFields =
     Kernels<&KernelTable::pad_touch, &KernelTable::tactile, &KernelTable::tactile_mixed,
             &KernelTable::tactile_block, &KernelTable::tactile_block_mixed>;

@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: Apache-2.0
+// Anchors of points with shear springs, from the state in which a solve begins.
+#pragma once
+
+#include "engine/step/workspace.hpp"
+
+namespace tangere {
+
+/// Prepares a solve that begins at q0 with w.shear.now: poses there, and anchors on the
+/// ground.
+template <int L>
+void begin_shear(const CompiledModel& model, const kernels::KernelTable& table,
+                 BasicWorkspace<L>& w);
+
+/// Computes the anchors of the points that lane `lane` has listed for pair k.
+template <int L>
+void set_list_anchors(const CompiledModel& model, const kernels::KernelTable& table,
+                      BasicWorkspace<L>& w, int k, int lane);
+
+}  // namespace tangere
