@@ -230,7 +230,7 @@ LaneBits TunnellingCheck::out_of_reach(const BasicWorkspace<L>& w, LaneBits lane
   if (slabs_.empty()) return lanes;
   if (w.stage.considered != nullptr) return kNoLane;  // `between` is not that of all pairs
   if (!bounded_ || std::any_of(bounds_.begin(), bounds_.end(), [&](const RadiusBound& bound) {
-        return w.apart[bound.link_pair] == 0;
+        return w.candidates->apart[std::size_t(bound.link_pair)] == 0;
       }))
     return kNoLane;
   Row<L> slid{}, way{}, angle{};

@@ -42,6 +42,8 @@ void near_pairs(const ModelView& model, const StageArgs<N>& a, NearPairs<L>& out
     if (a.apart[g] != 0) return;
     if (was_apart) pair_motion(links, a, a.contacts[g]);
     const Frame<N>& x = a.contacts[g].link2_in_1;
+    const CandidateList<N>& list = a.candidates[model.pair_order[links.first]];
+    out.outrun[g] = was_apart ? ~0U : lane_bits(list_excess(links, list, x) > N(0.0));
     store_frame(x, view(out.link_poses + 12 * g));
     for (int i = 0; i < links.count; ++i) {
       const int k = model.pair_order[links.first + i];
@@ -100,6 +102,10 @@ int search_shape(const CandidateSearch& s, Shape shape) {
                                load_lanes<A>(p + 2 * kContactTile + k)};
         const unsigned in = near_shape(shape, pose, place, margin);
         if (in == 0) continue;
+        if (count + kGroup > s.stride) {  // no room: the points are only counted
+          count += __builtin_popcount(in);
+          continue;
+        }
         append(place.x, in, x + count);
         append(place.y, in, y + count);
         append(place.z, in, z + count);
@@ -114,7 +120,7 @@ int search_shape(const CandidateSearch& s, Shape shape) {
       }
     }
   }
-  for (int k = count; k % kGroup != 0; ++k) {
+  for (int k = count; k % kGroup != 0 && k < s.stride; ++k) {
     x[k] = y[k] = z[k] = kFarAway;
     if (s.weights != nullptr) s.weights[k] = 0;
   }
@@ -129,30 +135,40 @@ int search_candidates(const CandidateSearch& s) {
       [&]<class Shape>(const Shape& shape) { return search_shape<A, Shape>(s, shape); });
 }
 
-/// Makes rows of eight lanes from the lanes' own lists. Shorter lists end in far points.
+/// Makes rows of the lanes' own numbers, of which each point has `Numbers`. Rows of other lanes than
+/// `lanes` stay. They are filled up to `list.count` from `before` on, where they ended.
+template <class A, int Numbers>
+void transpose_numbers(const GroupStage::List& list, unsigned lanes, int before, const double* own,
+                       double filler, Row<kGroup>* rows) {
+  if (rows == nullptr) return;
+  const auto column = [&](int l, int c) { return own + (l * Numbers + c) * list.stride; };
+  int whole = 0;  // points that all lanes have, row by row
+  if (lanes == (1U << kGroup) - 1) {
+    whole = list.count;
+    for (const int own_count : list.own_count) whole = own_count < whole ? own_count : whole;
+    for (int k = 0; k < whole; ++k)
+      for (int c = 0; c < Numbers; ++c)
+        for (int l = 0; l < kGroup; ++l) rows[Numbers * k + c][l] = column(l, c)[k];
+  }
+  for (int l = 0; l < kGroup; ++l) {
+    const bool made = (lanes >> l & 1U) != 0;
+    const int end = list.own_count[l], rest = made || end > before ? end : before;
+    for (int c = 0; c < Numbers; ++c) {
+      for (int k = whole; k < end && made; ++k) rows[Numbers * k + c][l] = column(l, c)[k];
+      for (int k = rest; k < list.count; ++k) rows[Numbers * k + c][l] = filler;
+    }
+  }
+}
+
+/// Makes rows of eight lanes from the own lists of `lanes`. Shorter lists end in far points.
 template <class A>
-void transpose_rows(GroupStage::List& list) {
+void transpose_rows(GroupStage::List& list, unsigned lanes) {
+  const int before = list.count;
   list.count = 0;
-  for (int count : list.own_count) list.count = count > list.count ? count : list.count;
-  if (list.count == 0) return;
-  for (int l = 0; l < kGroup; ++l)
-    for (int c = 0; c < 3; ++c) {
-      const double* from = list.own + (l * 3 + c) * list.stride;
-      for (int k = 0; k < list.own_count[l]; ++k) list.points[3 * k + c][l] = from[k];
-      for (int k = list.own_count[l]; k < list.count; ++k) list.points[3 * k + c][l] = kFarAway;
-    }
-  if (list.weights != nullptr)
-    for (int l = 0; l < kGroup; ++l)
-      for (int k = 0; k < list.count; ++k)
-        list.weights[k][l] = k < list.own_count[l] ? list.own_weights[l * list.stride + k] : 0;
-  if (list.anchors == nullptr) return;
-  for (int l = 0; l < kGroup; ++l)
-    for (int c = 0; c < kAnchorNumbers; ++c) {
-      const double* from = list.own_anchors + (l * kAnchorNumbers + c) * list.stride;
-      for (int k = 0; k < list.own_count[l]; ++k) list.anchors[kAnchorNumbers * k + c][l] = from[k];
-      for (int k = list.own_count[l]; k < list.count; ++k)
-        list.anchors[kAnchorNumbers * k + c][l] = 0;
-    }
+  for (const int count : list.own_count) list.count = count > list.count ? count : list.count;
+  transpose_numbers<A, 3>(list, lanes, before, list.own, kFarAway, list.points);
+  transpose_numbers<A, 1>(list, lanes, before, list.own_weights, 0, list.weights);
+  transpose_numbers<A, kAnchorNumbers>(list, lanes, before, list.own_anchors, 0, list.anchors);
 }
 
 }  // namespace tangere::kernels
