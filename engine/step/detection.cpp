@@ -188,8 +188,8 @@ static void search_pair(const CompiledModel& model, const kernels::KernelTable& 
   }
 }
 
-/// Sets the pose of link pair g at which the lists of `lanes` are made. A lane without a pose has no
-/// lists.
+/// Sets the pose of link pair g at which the lists of `lanes` are made. A lane whose pose is not
+/// finite has no lists.
 template <int L>
 static void set_reference(BasicWorkspace<L>& w, std::size_t g, LaneBits lanes) {
   const kernels::Row<L>* const pose = w.near.link_poses + 12 * g;

@@ -135,8 +135,8 @@ int search_candidates(const CandidateSearch& s) {
       [&]<class Shape>(const Shape& shape) { return search_shape<A, Shape>(s, shape); });
 }
 
-/// Makes rows of the lanes' own numbers, of which each point has `Numbers`. Rows of other lanes than
-/// `lanes` stay. They are filled up to `list.count` from `before` on, where they ended.
+/// Makes rows of the own numbers of `lanes`, of which each point has `Numbers`. The rows of other
+/// lanes stay. They are filled up to `list.count` from `before` on, where they ended.
 template <class A, int Numbers>
 void transpose_numbers(const GroupStage::List& list, unsigned lanes, int before, const double* own,
                        double filler, Row<kGroup>* rows) {

@@ -19,8 +19,8 @@ namespace tangere::kernels {
 /// the lists, in the same order.
 inline constexpr int kFixedRows = 12;
 
-/// Calls f with the number of rows as a constant, if the factor of a part is full and small. Returns
-/// whether it is.
+/// Calls f with the number of rows as a constant, if the factor of a part is full and small.
+/// Returns whether it is.
 template <int n = kFixedRows, class F>
 bool with_fixed_rows(const Pattern& p, const PatternPart& part, const F& f) {
   if (n == kFixedRows && part.lower_begin[p.n] != p.n * (p.n - 1) / 2) return false;
