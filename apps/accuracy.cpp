@@ -133,7 +133,8 @@ int run_sweep(const AccuracyArguments& o, const Console& console, const Model& m
   if ((1 + kMoreEnvironments) * bytes < available_memory())
     fresh = [&] { return make(more, seed ^ kOtherSeed, listener.stop); };
   else
-    console.note(fmt::format("no second look: memory does not suffice for {} environments", more));
+    console.note(
+        fmt::format("no second comparison: memory does not suffice for {} environments", more));
   const AccuracyReport report = accuracy_sweep(*episodes, options, listener, fresh);
   if (report.stopped && report.points.empty())
     return report_stop(console, "accuracy", signals.received(), "before the first setting");

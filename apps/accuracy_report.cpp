@@ -129,7 +129,7 @@ std::string unkept_text(const AccuracyReport& report) {
       missed += fmt::format("{}{:g} reaches {}", missed.empty() ? "" : ", ", p.setting.accuracy,
                             percent(p.error));
   if (missed.empty()) return {};
-  return " Cut steps miss the accuracy that is asked for: " + missed + ".";
+  return " Cut steps miss the requested accuracy: " + missed + ".";
 }
 
 /// Adds a curve of the points whose settings belong to it: labelled by step in ms, or by accuracy.

@@ -194,8 +194,9 @@ int measure(const BenchArguments& options, const Console& console, BenchSetting&
 }
 
 /// The scene with the scheme, step and tolerance of the options.
-Scene scene_of(const BenchArguments& options, const Console& console, const SolverOptions& asked) {
-  Scene scene = read_scene_for(options.scene, options.allow_unknown, console, asked);
+Scene scene_of(const BenchArguments& options, const Console& console,
+               const SolverOptions& requested) {
+  Scene scene = read_scene_for(options.scene, options.allow_unknown, console, requested);
   if (!options.solver.integrator.empty())
     scene.integrator = integrator_named(options.solver.integrator);
   if (options.solver.timestep) scene.timestep = *options.solver.timestep;
@@ -256,11 +257,11 @@ int bench(const BenchArguments& options, const Console& console) {
   if (!options.solver.integrator.empty()) integrator_named(options.solver.integrator);
   if (options.frames == "none" && !options.record.empty())
     throw InputError("--frames none with --record; expected one of them");
-  const SolverOptions asked = options.solver.asked();
-  if (const std::unique_ptr<Task> task = find_task(options.scene, console, asked))
+  const SolverOptions requested = options.solver.requested();
+  if (const std::unique_ptr<Task> task = find_task(options.scene, console, requested))
     return bench_task(options, console, *task);
   refuse_with_scene(options.scene, {{"--policy", !options.policy.empty()}});
-  const Model model(scene_of(options, console, asked));
+  const Model model(scene_of(options, console, requested));
   if (options.error && model.solver().sleep > 0)
     throw InputError(model.solver().sleep_source.prefix() +
                      "--error where bodies may sleep; expected no sleep: errors are those of the "

@@ -129,10 +129,10 @@ PolicyKind policy_kind(const GenerateOptions& options) {
   if (!options.controls.empty())
     throw InputError("--controls with --program; expected one of them");
   if (options.gradients != "none")
-    throw InputError(fmt::format(
-        "--gradients {} with --program, which would be asked about every episode twice; expected "
-        "another policy",
-        options.gradients));
+    throw InputError(
+        fmt::format("--gradients {} with --program, which would see every episode twice; expected "
+                    "another policy",
+                    options.gradients));
   return PolicyKind::program;
 }
 
@@ -237,16 +237,16 @@ void check(GenerateOptions& options, const Console& console) {
 int generate(GenerateOptions options, const Console& console, const ProgramInfo& info) {
   check(options, console);
   // The same for the episodes and their gradients, which play them again.
-  SolverOptions asked{.accuracy = options.accuracy, .sleep = options.sleep ? kUsualSleep : 0};
-  if (options.gradients != "none") asked.tolerance = kGradientTolerance;
-  asked.keep_inert_contacts = options.gradients != "none";
-  if (const std::unique_ptr<Task> task = find_task(options.scene, console, asked))
+  SolverOptions requested{.accuracy = options.accuracy, .sleep = options.sleep ? kUsualSleep : 0};
+  if (options.gradients != "none") requested.tolerance = kGradientTolerance;
+  requested.keep_inert_contacts = options.gradients != "none";
+  if (const std::unique_ptr<Task> task = find_task(options.scene, console, requested))
     return generate_task(options, console, info, *task);
   refuse_with_scene(options.scene, {{"--policy", !options.policy.empty()},
                                     {"--program", !options.program.empty()},
                                     {"--noise", options.noise.has_value()},
                                     {"--mix", !options.mix.empty()}});
-  const Model model(read_scene_for(options.scene, options.allow_unknown, console, asked));
+  const Model model(read_scene_for(options.scene, options.allow_unknown, console, requested));
   warn_about_geometry(console, model);
   const Stepper stepper(model);
   warn_about_steps(console, model, stepper);
@@ -256,7 +256,7 @@ int generate(GenerateOptions options, const Console& console, const ProgramInfo&
   job.run = episode_options(options, model, controls);
   const Record record = record_of(options.record, model);
   refuse_memory(record, "a data set");
-  job.run.record = record.asked;
+  job.run.record = record.requested;
   const GradientKind gradients = gradients_wanted(options, false);
   std::unique_ptr<RolloutLoss> loss;
   if (!options.loss.empty()) loss = make_loss(loss_named(options.loss), model, job.run.every);
@@ -291,7 +291,7 @@ void add_playing_options(CLI::App& app, GenerateOptions& o) {
            "scripted [default: scripted]");
   add_text(
       app, "--program", o.program, "CMD",
-      "Program that chooses the actions of a task, asked through its standard input and output; "
+      "Program that chooses the actions of a task, called through its standard input and output; "
       "Python: tangere.policy.serve");
   add_positive_number(app, "--program-timeout", o.program_timeout,
                       "Seconds for its start and for every answer [default: 120]");

@@ -137,9 +137,9 @@ int report_shards(const GenerateOptions& options, const Console& console, const 
 }
 
 int report_stopped(const GenerateOptions& options, const Console& console, int signal,
-                   std::int64_t episodes, std::int64_t asked, const DatasetWriter& output) {
+                   std::int64_t episodes, std::int64_t requested, const DatasetWriter& output) {
   return report_stop(
-      console, "generate", signal, fmt::format("after {} of {} episodes", episodes, asked),
+      console, "generate", signal, fmt::format("after {} of {} episodes", episodes, requested),
       fmt::format("complete shards in '{}': {}", options.output, output.shards().size()),
       {{"shards", output.shards()}});
 }

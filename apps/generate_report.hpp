@@ -12,9 +12,9 @@ namespace tangere::apps {
 int report_shards(const GenerateOptions& options, const Console& console, const Job& job,
                   const JobResult& done, DatasetWriter& output);
 
-/// Prints that a signal stopped the run, and returns the exit code. `asked`: number of requested
+/// Prints that a signal stopped the run, and returns the exit code. `requested`: number of requested
 /// episodes.
 int report_stopped(const GenerateOptions& options, const Console& console, int signal,
-                   std::int64_t episodes, std::int64_t asked, const DatasetWriter& output);
+                   std::int64_t episodes, std::int64_t requested, const DatasetWriter& output);
 
 }  // namespace tangere::apps

@@ -82,13 +82,13 @@ std::string run_costs_text(const EffectCosts& costs) {
   for (const RunCost& c : costs.of_runs) width = std::max(width, c.name.size());
   std::string text = fmt::format(
       "\n  {} {} {} {:>7}  {}\n", padded("what a run adds", std::max<std::size_t>(width, 15)),
-      padded("share", 9, true), padded("time", 9, true), "bytes", "asked for by");
+      padded("share", 9, true), padded("time", 9, true), "bytes", "requested by");
   for (const RunCost& c : costs.of_runs)
     text +=
         fmt::format("  {} {} {} {:>7}  {}{}\n", padded(c.name, std::max<std::size_t>(width, 15)),
                     padded(fmt::format("{:.1f} %", 100 * c.share), 9, true),
                     padded(microseconds(c.seconds), 9, true), c.bytes,
-                    c.on ? "" : "not unless asked: ", c.asked_by);
+                    c.on ? "" : "not unless requested: ", c.requested_by);
   return text;
 }
 
@@ -191,7 +191,7 @@ Json run_costs_json(const EffectCosts& costs) {
   for (const RunCost& c : costs.of_runs)
     list.push_back({{"name", c.name},
                     {"on", c.on},
-                    {"asked_by", c.asked_by},
+                    {"requested_by", c.requested_by},
                     {"share", c.share},
                     {"seconds", c.seconds},
                     {"bytes", c.bytes}});
@@ -213,7 +213,7 @@ std::string effect_costs_svg(const EffectCosts& costs, const std::string& scene,
                   costs.environments, costs.instants, steps_text(costs), share_text(costs.itself))};
   shares.groups = {"effects of the scene, as shares of a step",
                    "part of a contact or sensor above it",
-                   "what a run adds to a step because it is asked to"};
+                   "what a run adds to a step because it is requested"};
   for (const EffectCost& c : costs.effects)
     if (c.effect.on && c.measured && is_shown(costs, c))
       shares.bars.push_back({c.effect.name, c.measured->share, c.measured->spread,

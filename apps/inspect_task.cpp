@@ -64,7 +64,7 @@ std::string task_text(const TaskSpec& spec) {
                   spec.summary, spec.success, tensor_text(spec.action), spec.observation_size());
   for (const TensorSpec& o : spec.observations) text += fmt::format("  {}\n", tensor_text(o));
   text += fmt::format(
-      "{} steps per action, controls {}, a look after step{} {}; at most {} actions\n",
+      "{} steps per action, controls {}, observed after step{} {}; at most {} actions\n",
       spec.steps_per_action,
       spec.control_every == 0   ? "once per action"
       : spec.control_every == 1 ? "at every step"

@@ -15,15 +15,15 @@ namespace tangere::apps {
 namespace {
 
 /// A word and what it means; throws for one that the scene does not have.
-TimedName asked_of(const std::string& word, const std::string& where, const Model& model) {
+TimedName requested_output(const std::string& word, const std::string& where, const Model& model) {
   const std::vector<std::string> sensors = sensor_names(model.scene());
-  TimedName asked;
+  TimedName requested;
   try {
-    asked = split_times(word);
+    requested = split_times(word);
   } catch (const InputError& error) {
     throw InputError(where + ": " + error.what());
   }
-  const std::string& name = asked.name;
+  const std::string& name = requested.name;
   const std::optional<FieldOutput> reading = find_output(sensors, name);
   const bool of_sensor = reading.has_value(),
              other = is_plain_output(name) || find_body_output(model.scene(), name);
@@ -35,15 +35,15 @@ TimedName asked_of(const std::string& word, const std::string& where, const Mode
   if (!of_sensor && !other)
     throw InputError(fmt::format("{}: unknown observation '{}'{}", where, name,
                                  suggestion(name, output_names(model.scene()))));
-  return asked;
+  return requested;
 }
 
 }  // namespace
 
 const TimedName* Record::find(const std::string& name) const {
-  const auto found =
-      std::find_if(asked.begin(), asked.end(), [&](const TimedName& a) { return a.name == name; });
-  return found == asked.end() ? nullptr : &*found;
+  const auto found = std::find_if(requested.begin(), requested.end(),
+                                  [&](const TimedName& a) { return a.name == name; });
+  return found == requested.end() ? nullptr : &*found;
 }
 
 Record record_of(const std::string& option, const Model& model) {
@@ -58,12 +58,12 @@ Record record_of(const std::string& option, const Model& model) {
   }
   if (words.empty()) return record;
   for (const std::string& word : words) {
-    TimedName asked = asked_of(word, record.where, model);
-    if (record.find(asked.name) != nullptr)
+    TimedName requested = requested_output(word, record.where, model);
+    if (record.find(requested.name) != nullptr)
       throw InputError(
           fmt::format("{}: '{}' is listed twice; expected it once, at times of one kind",
-                      record.where, asked.name));
-    record.asked.push_back(std::move(asked));
+                      record.where, requested.name));
+    record.requested.push_back(std::move(requested));
   }
   RolloutOutputs& outputs = record.outputs;
   outputs.bodies = record.find("bodies") != nullptr;
@@ -79,9 +79,9 @@ Record record_of(const std::string& option, const Model& model) {
     throw InputError(record.where + ": 'memory', but no contact or sensor of the scene has ks");
   outputs.fields.emplace();
   const std::vector<std::string> sensors = sensor_names(model.scene());
-  for (const TimedName& asked : record.asked)
-    if (std::optional<FieldOutput> field = find_output(sensors, asked.name)) {
-      field->times = asked.times;
+  for (const TimedName& requested : record.requested)
+    if (std::optional<FieldOutput> field = find_output(sensors, requested.name)) {
+      field->times = requested.times;
       outputs.fields->push_back(*field);
     }
   // The order of words does not make another data set.
@@ -96,7 +96,8 @@ void take_memory(Record& record, const Model& model) {
   RolloutOutputs& outputs = record.outputs;
   outputs.memory = model.has_shear_springs();
   outputs.shear_times = outputs.states.given() ? outputs.states : OutputTimes{.final = true};
-  if (const TimedName* const asked = record.find("memory")) outputs.shear_times = asked->times;
+  if (const TimedName* const requested = record.find("memory"))
+    outputs.shear_times = requested->times;
 }
 
 void refuse_memory(const Record& record, const std::string& who) {
@@ -110,17 +111,17 @@ void refuse_memory(const Record& record, const std::string& who) {
 void take_bodies(Record& record, const Model& model) {
   const TimedName* first = record.find("bodies");
   RolloutOutputs& outputs = record.outputs;
-  for (const TimedName& asked : record.asked) {
-    const std::optional<int> body = find_body_output(model.scene(), asked.name);
+  for (const TimedName& requested : record.requested) {
+    const std::optional<int> body = find_body_output(model.scene(), requested.name);
     if (!body) continue;
     if (outputs.bodies && outputs.chosen_bodies.empty())
       throw InputError(fmt::format("{}: 'bodies' and '{}'; expected all bodies, or names of some",
-                                   record.where, asked.name));
-    if (first != nullptr && asked.times != first->times)
+                                   record.where, requested.name));
+    if (first != nullptr && requested.times != first->times)
       throw InputError(fmt::format("{}: '{}{}' and '{}{}'; expected one interval of all bodies",
-                                   record.where, first->name, to_string(first->times), asked.name,
-                                   to_string(asked.times)));
-    first = &asked;
+                                   record.where, first->name, to_string(first->times),
+                                   requested.name, to_string(requested.times)));
+    first = &requested;
     outputs.bodies = true;
     outputs.chosen_bodies.push_back(*body);
   }

@@ -10,7 +10,7 @@
 namespace tangere::apps {
 
 struct Record {
-  std::vector<TimedName> asked;  ///< with times: "q/final", "bodies.box"; none: everything
+  std::vector<TimedName> requested;  ///< with times: "q/final", "bodies.box"; none: everything
   RolloutOutputs outputs;
   std::string where;  ///< "--record", or file, line and <outputs>; for messages
 

@@ -85,7 +85,7 @@ void SolverArguments::add(CLI::App& app) {
   add_sleep_option(app, sleep);
 }
 
-SolverOptions SolverArguments::asked() const {
+SolverOptions SolverArguments::requested() const {
   return {.accuracy = accuracy, .sleep = sleep ? kUsualSleep : 0};
 }
 

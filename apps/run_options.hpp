@@ -53,7 +53,7 @@ struct SolverArguments {
 
   void add(CLI::App& app);
   /// As in apply_solver_options(), where the scene's own come first.
-  [[nodiscard]] SolverOptions asked() const;
+  [[nodiscard]] SolverOptions requested() const;
 };
 
 }  // namespace tangere::apps

@@ -45,7 +45,7 @@ std::string split_text(const StepCounts& counts) {
   const auto add = [&](const char* what, std::int64_t count) {
     if (count > 0) text += fmt::format(", {}: {}", what, count);
   };
-  add("less accurate than asked", counts.accuracy_not_met_steps);
+  add("less accurate than requested", counts.accuracy_not_met_steps);
   add("a body came through another", counts.tunnelled_steps);
   add("damped because they created energy", counts.damped_steps);
   add("bodies overlap", counts.overlapping_steps);
@@ -84,17 +84,17 @@ std::string sleep_text(double sleep, int moving_bodies, const StepCounts& counts
   return fmt::format("bodies asleep: {:.2f} of {} on average\n", mean.get<double>(), moving_bodies);
 }
 
-void apply_solver_options(SolverOptions& of_scene, const SolverOptions& asked) {
-  if (asked.accuracy) of_scene.accuracy = asked.accuracy;
-  if (!of_scene.tolerance) of_scene.tolerance = asked.tolerance;
-  if (of_scene.sleep == 0) of_scene.sleep = asked.sleep;
-  of_scene.keep_inert_contacts |= asked.keep_inert_contacts;
+void apply_solver_options(SolverOptions& of_scene, const SolverOptions& requested) {
+  if (requested.accuracy) of_scene.accuracy = requested.accuracy;
+  if (!of_scene.tolerance) of_scene.tolerance = requested.tolerance;
+  if (of_scene.sleep == 0) of_scene.sleep = requested.sleep;
+  of_scene.keep_inert_contacts |= requested.keep_inert_contacts;
 }
 
 Scene read_scene_for(const std::string& path, bool allow_unknown, const Console& console,
-                     const SolverOptions& asked) {
+                     const SolverOptions& requested) {
   SceneFile file = read_scene(path, {allow_unknown});
-  apply_solver_options(file.scene.solver, asked);
+  apply_solver_options(file.scene.solver, requested);
   for (const std::string& warning : file.warnings) console.note("warning: " + warning);
   return std::move(file.scene);
 }
@@ -111,8 +111,9 @@ ControlProgram make_controls(const std::string& path, std::uint64_t seed, const 
   return {model, stepper.timestep(), seed};
 }
 
-std::int64_t step_count(const std::optional<std::int64_t>& asked, const ControlProgram& controls) {
-  const std::int64_t steps = asked.value_or(controls.steps());
+std::int64_t step_count(const std::optional<std::int64_t>& requested,
+                        const ControlProgram& controls) {
+  const std::int64_t steps = requested.value_or(controls.steps());
   if (steps < 0)
     throw InputError("the controls have no end, so the number of steps is not known; give --steps");
   controls.check_covers(steps);

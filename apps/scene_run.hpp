@@ -49,20 +49,21 @@ std::string sleep_text(double sleep, int moving_bodies, const StepCounts& counts
 /// The same mean; null if no body may sleep. `sleep`: Stepper::sleep().
 Json mean_asleep(double sleep, const StepCounts& counts);
 
-/// Reads a scene; its warnings go to the console. `asked`: as in apply_solver_options().
+/// Reads a scene; its warnings go to the console. `requested`: as in apply_solver_options().
 Scene read_scene_for(const std::string& path, bool allow_unknown, const Console& console,
-                     const SolverOptions& asked = {});
+                     const SolverOptions& requested = {});
 
 /// Applies solver options of the command line: accuracy in place of the scene's; tolerance and
 /// sleep if the scene has none.
-void apply_solver_options(SolverOptions& of_scene, const SolverOptions& asked);
+void apply_solver_options(SolverOptions& of_scene, const SolverOptions& requested);
 
 /// The controls of the table at `path`, or the scene's own if `path` is empty.
 ControlProgram make_controls(const std::string& path, std::uint64_t seed, const Model& model,
                              const Stepper& stepper, const Console& console);
 
 /// --steps, or the number of steps that the controls last. Throws InputError if neither is given.
-std::int64_t step_count(const std::optional<std::int64_t>& asked, const ControlProgram& controls);
+std::int64_t step_count(const std::optional<std::int64_t>& requested,
+                        const ControlProgram& controls);
 
 /// Warns of meshes whose grids are too coarse, and of bodies that overlap deeply or are too far
 /// from the origin at the start.

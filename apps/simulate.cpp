@@ -229,7 +229,7 @@ struct Start {
           "{} was made with sleep {:g}, this run has {:g} (0: no body sleeps): it goes on, but not "
           "with the bits of one long run",
           saved->path, saved->sleep, stepper.sleep()));
-    else if (saved->sleep > 0 && !saved->sleepers)
+    else if (saved->sleep > 0 && !saved->sleep_state)
       console.note(
           fmt::format("{} does not hold which bodies slept: the run goes on with all of "
                       "them awake, and not with the bits of one long run",
@@ -325,7 +325,8 @@ int simulate_task(const SimulateArguments& options, const Console& console, cons
 int simulate(const SimulateArguments& options, const Console& console, const ProgramInfo& info) {
   check_arguments(options);
   const Precision precision = precision_named(options.precision);
-  if (const std::unique_ptr<Task> task = find_task(options.scene, console, options.solver.asked()))
+  if (const std::unique_ptr<Task> task =
+          find_task(options.scene, console, options.solver.requested()))
     return simulate_task(options, console, info, *task, precision);
   refuse_with_scene(options.scene, {{"--policy", !options.policy.empty()}});
   StepperOptions solver{
@@ -334,7 +335,7 @@ int simulate(const SimulateArguments& options, const Console& console, const Pro
     solver.integrator = integrator_named(options.solver.integrator);
 
   const Model model(
-      read_scene_for(options.scene, options.allow_unknown, console, options.solver.asked()));
+      read_scene_for(options.scene, options.allow_unknown, console, options.solver.requested()));
   warn_about_geometry(console, model);
   solver.differentiable = options.gradients.wanted();
   Stepper stepper(model, solver);

@@ -35,7 +35,7 @@ std::array<LastWords, 5> last_words{{
     {SIGABRT, kUsage, "memory ran out in a library, or this is a mistake in tangere (SIGABRT)"},
 }};
 
-void remember(int signal) {
+void record_signal(int signal) {
   int none = 0;
   first_signal.compare_exchange_strong(none, signal);
   stop_source.request_stop();
@@ -98,7 +98,7 @@ StopSignals::StopSignals() {
   first_signal = 0;
   stop_source = {};
   for (std::size_t i = 0; i < kSignals.size(); ++i)
-    previous_[i] = handle(kSignals[i], remember, SA_RESTART);
+    previous_[i] = handle(kSignals[i], record_signal, SA_RESTART);
 }
 
 StopSignals::~StopSignals() {

@@ -81,7 +81,7 @@ Command add_stress(CLI::App& program) {
   const auto console = std::make_shared<Console>();
   StressArguments& o = *options;
   CLI::App& app =
-      add_command(program, "stress", "Play cases that are hard to simulate, and judge each",
+      add_command(program, "stress", "Play cases that are hard to simulate, and rate each",
                   "tangere stress --case stack_equal --integrator BDF1");
   add_text(app, "--case", o.name, "NAME", "That case alone [default: all]");
   add_integrator_option(app, o.integrator, "those of each case");

@@ -17,14 +17,14 @@
 namespace tangere::apps {
 
 std::unique_ptr<Task> find_task(const std::string& word, const Console& console,
-                                const SolverOptions& asked) {
+                                const SolverOptions& requested) {
   if (is_task(word)) {
     const TaskSpec spec = task_spec(word);
     const char* const text = program_scene(spec.scene);
     // A task of another program names a file.
     SceneFile file = text != nullptr ? parse_scene(text, spec.scene) : read_scene(spec.scene);
     for (const std::string& warning : file.warnings) console.note("warning: " + warning);
-    apply_solver_options(file.scene.solver, asked);
+    apply_solver_options(file.scene.solver, requested);
     return make_task(word, file.scene);
   }
   const bool plain = word.find('/') == std::string::npos && word.find('.') == std::string::npos;

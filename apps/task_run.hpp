@@ -14,9 +14,9 @@
 namespace tangere::apps {
 
 /// Returns the task that `word` names, on its own scene; null if it names a file. Throws InputError
-/// with the nearest task for a plain word that is neither. `asked`: as in apply_solver_options().
+/// with the nearest task for a plain word that is neither. `requested`: as in apply_solver_options().
 std::unique_ptr<Task> find_task(const std::string& word, const Console& console,
-                                const SolverOptions& asked = {});
+                                const SolverOptions& requested = {});
 
 /// Prints that the <outputs> of a task's scene apply to runs of the scene only, if it has some.
 /// `instead`: what the command does for a task ("stores what it observes").

@@ -212,7 +212,7 @@ void fields(benchmark::State& state, const Case& of, Place place) {
 /// Something of sensors that a scene may have besides their fields.
 struct Extra {
   const char* name;
-  bool asked;  ///< false: declared, but idle
+  bool requested;  ///< false: declared, but idle
   void (*add)(TactileDescription& sensor, double timestep);
   const char* form;  ///< what is read instead of the field; null: the field
 };
@@ -310,7 +310,7 @@ void add_all() {
     add(scene + "/fields_away", fields, of, Place::away);
     if (!of.beside.empty()) add(scene + "/fields_beside", fields, of, Place::beside);
     for (const Extra& extra : kExtras)
-      add(scene + (extra.asked ? "/reading/" : "/idle_reading/") + extra.name, sensor_extra, of,
+      add(scene + (extra.requested ? "/reading/" : "/idle_reading/") + extra.name, sensor_extra, of,
           extra);
     for (const EffectInfo& info : effects_of(read)) {
       const EffectKind kind = info.effect.kind;

@@ -48,17 +48,17 @@ def flat(obs: dict[str, np.ndarray], past: np.ndarray) -> torch.Tensor:
     return torch.from_numpy(np.concatenate([v.reshape(len(v), -1) for v in parts], axis=1))
 
 
-def train(windows: Windows, clone: Clone, asked: argparse.Namespace) -> None:
+def train(windows: Windows, clone: Clone, args: argparse.Namespace) -> None:
     """Least squares to the actions of the data set."""
-    optimiser = torch.optim.AdamW(clone.parameters(), lr=asked.rate, weight_decay=1e-4)
-    steps = asked.epochs * -(-len(windows) // asked.batch)
+    optimiser = torch.optim.AdamW(clone.parameters(), lr=args.rate, weight_decay=1e-4)
+    steps = args.epochs * -(-len(windows) // args.batch)
     schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimiser, steps)
-    log = Log(asked.log)
-    for epoch in range(asked.epochs):
-        for rows in windows.batches(asked.batch, seed=asked.seed * 1000 + epoch):
-            past = rows["past_actions"] if asked.recall else rows["past_actions"][:, :0]
-            seen = flat(rows["obs"], past).to(asked.device)
-            wanted = torch.from_numpy(rows["actions"][:, 0]).to(asked.device)
+    log = Log(args.log)
+    for epoch in range(args.epochs):
+        for rows in windows.batches(args.batch, seed=args.seed * 1000 + epoch):
+            past = rows["past_actions"] if args.recall else rows["past_actions"][:, :0]
+            seen = flat(rows["obs"], past).to(args.device)
+            wanted = torch.from_numpy(rows["actions"][:, 0]).to(args.device)
             loss = (clone(seen) - wanted).square().mean()
             optimiser.zero_grad()
             loss.backward()
@@ -67,32 +67,32 @@ def train(windows: Windows, clone: Clone, asked: argparse.Namespace) -> None:
         log(epoch + 1, loss=loss)
 
 
-def closed_loop(windows: Windows, clone: Clone, asked: argparse.Namespace) -> Played:
+def closed_loop(windows: Windows, clone: Clone, args: argparse.Namespace) -> Played:
     """The clone in the test episodes of its task."""
-    episodes = asked.episodes
+    episodes = args.episodes
     env = tangere.make_vec(
         windows.episodes.task, episodes, autoreset="disabled",
-        keys=[key for key in windows.keys if key != "q"], threads=asked.threads,
+        keys=[key for key in windows.keys if key != "q"], threads=args.threads,
     )  # fmt: skip
     history: list[dict[str, np.ndarray]] = []
     past: list[np.ndarray] = []
 
     def choose(env, obs, t):
-        if asked.state:
+        if args.state:
             obs = obs | {"q": env.state()[0].astype(np.float32)}
         if t == 0:
             history[:] = [obs] * (windows.before + 1)
             past[:] = [np.zeros((episodes, *env.task.action.shape), np.float32)] * windows.before
         history[:] = [*history[1:], obs]
         stacked = {k: np.stack([h[k] for h in history], axis=1) for k in windows.keys}
-        recalled = past if past and asked.recall else [np.zeros((episodes, 0), np.float32)]
+        recalled = past if past and args.recall else [np.zeros((episodes, 0), np.float32)]
         with torch.no_grad():
             seen = flat(stacked, np.stack(recalled, axis=1))
-            action = clone(seen.to(asked.device)).cpu().numpy()
+            action = clone(seen.to(args.device)).cpu().numpy()
         past[:] = [*past, action][len(past) + 1 - windows.before :] if windows.before else []
         return action
 
-    return play(env, asked.play_seed, choose)
+    return play(env, args.play_seed, choose)
 
 
 def settings() -> argparse.Namespace:
@@ -118,46 +118,46 @@ def settings() -> argparse.Namespace:
 
 
 def main() -> None:
-    asked = settings()
+    args = settings()
     torch.set_num_threads(1)
-    torch.manual_seed(asked.seed)
+    torch.manual_seed(args.seed)
 
-    episodes = Episodes(asked.data)
+    episodes = Episodes(args.data)
     if episodes.task not in tangere.task_names():
         raise SystemExit(
-            f"{asked.data} is of {episodes.task or 'a scene alone'}; expected a data set of one of "
+            f"{args.data} is of {episodes.task or 'a scene alone'}; expected a data set of one of "
             f"{tangere.task_names()}: the clone and the script play this task"
         )
     shown = [key for key in episodes.keys if key not in ("q", "v")]
-    keys = [key for key in shown if key not in asked.without]
-    if not keys or len(keys) + len(asked.without) != len(shown):
-        raise SystemExit(f"--without {asked.without}; the data set shows {shown}")
-    keys += ["q"] if asked.state else []
-    windows = Windows(episodes, keys, before=asked.before, only_success=not asked.all)
+    keys = [key for key in shown if key not in args.without]
+    if not keys or len(keys) + len(args.without) != len(shown):
+        raise SystemExit(f"--without {args.without}; the data set shows {shown}")
+    keys += ["q"] if args.state else []
+    windows = Windows(episodes, keys, before=args.before, only_success=not args.all)
     task = tangere.task_spec(windows.episodes.task)
     begin, clock = time.process_time(), time.perf_counter()
     first = windows[0]
     inputs = sum(v.size for v in first["obs"].values())
-    inputs += first["past_actions"].size if asked.recall else 0
-    clone = Clone(inputs, first["actions"].shape[1], asked.width, task.action.low, task.action.high)
-    clone.to(asked.device)
-    train(windows, clone, asked)
+    inputs += first["past_actions"].size if args.recall else 0
+    clone = Clone(inputs, first["actions"].shape[1], args.width, task.action.low, task.action.high)
+    clone.to(args.device)
+    train(windows, clone, args)
     cost = {"train_cpu_s": time.process_time() - begin,
             "train_wall_s": time.perf_counter() - clock}  # fmt: skip
     env = tangere.make_vec(
-        task.name, asked.episodes, autoreset="disabled", threads=asked.threads
+        task.name, args.episodes, autoreset="disabled", threads=args.threads
     )
-    script = play(env, asked.play_seed, lambda env, _obs, _t: env.scripted_action()).summary()
-    result = closed_loop(windows, clone, asked).summary()
-    if asked.json:
-        print(json.dumps({"program": "bc", "settings": vars(asked),
-                          **provenance(asked.device), **cost,
+    script = play(env, args.play_seed, lambda env, _obs, _t: env.scripted_action()).summary()
+    result = closed_loop(windows, clone, args).summary()
+    if args.json:
+        print(json.dumps({"program": "bc", "settings": vars(args),
+                          **provenance(args.device), **cost,
                           "task": task.name, "keys": keys, "data": source(windows.episodes.masks),
                           "rows": len(windows), "script": script, "test": result}))  # fmt: skip
         return
-    low, high = wilson(result["success"], asked.episodes)
+    low, high = wilson(result["success"], args.episodes)
     print(
-        f"{task.name} {'+'.join(keys)}, seed {asked.seed}: clone {result['success']:.3f} "
+        f"{task.name} {'+'.join(keys)}, seed {args.seed}: clone {result['success']:.3f} "
         f"({low:.3f} to {high:.3f}), script {script['success']:.3f}, ratio "
         f"{result['success'] / max(script['success'], 1e-9):.3f}; {len(windows)} rows, "
         f"{cost['train_cpu_s']:.0f} CPU s"

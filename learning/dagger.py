@@ -126,11 +126,11 @@ def visit(env, clone: Recurrent, keys: list[str], first_episode: int, into: Rows
     return played
 
 
-def learn(clone: Recurrent, optimiser, schedule, sources: list[Rows], asked, draw) -> float:
+def learn(clone: Recurrent, optimiser, schedule, sources: list[Rows], args, draw) -> float:
     """One round; returns the mean loss. Each source gives the same share of a minibatch."""
     total = 0.0
-    for _ in range(asked.updates):
-        parts = [rows.some(asked.batch // len(sources), draw) for rows in sources]
+    for _ in range(args.updates):
+        parts = [rows.some(args.batch // len(sources), draw) for rows in sources]
         seen, wanted, there = (torch.cat(part) for part in zip(*parts))
         off = (clone(seen)[0] - wanted).square().mean(-1)
         loss = (off * there).sum() / there.sum()
@@ -139,7 +139,7 @@ def learn(clone: Recurrent, optimiser, schedule, sources: list[Rows], asked, dra
         nn.utils.clip_grad_norm_(clone.parameters(), 1.0)
         optimiser.step()
         schedule.step()
-        total += float(loss.detach()) / asked.updates
+        total += float(loss.detach()) / args.updates
     return total
 
 
@@ -162,28 +162,28 @@ def settings() -> argparse.Namespace:
     return parser.parse_args()
 
 
-def trained(asked: argparse.Namespace, episodes: Episodes, keys: list[str]):
+def trained(args: argparse.Namespace, episodes: Episodes, keys: list[str]):
     """The clone, the rows of the data set; of each round its loss and what its visits solved."""
     task = tangere.task_spec(episodes.task)
     stored = stored_rows(episodes, keys, task)
     inputs, actions = stored.seen.shape[2], stored.wanted.shape[2]
     clone = Recurrent(inputs, task.action)
-    optimiser = torch.optim.AdamW(clone.parameters(), lr=asked.rate, weight_decay=1e-4)
-    schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimiser, asked.rounds * asked.updates)
-    draw, curve, sources, env = np.random.default_rng(asked.seed), [], [stored], None
-    if asked.visits:
-        env = tangere.make_vec(task.name, asked.visits, autoreset="disabled", keys=keys,
-                               threads=asked.threads)  # fmt: skip
-        later = max(0, asked.rounds - asked.alone)
-        visited = Rows(later * asked.visits, task.horizon, inputs, actions)
-    log = Log(asked.log)
-    for k in range(asked.rounds):
+    optimiser = torch.optim.AdamW(clone.parameters(), lr=args.rate, weight_decay=1e-4)
+    schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimiser, args.rounds * args.updates)
+    draw, curve, sources, env = np.random.default_rng(args.seed), [], [stored], None
+    if args.visits:
+        env = tangere.make_vec(task.name, args.visits, autoreset="disabled", keys=keys,
+                               threads=args.threads)  # fmt: skip
+        later = max(0, args.rounds - args.alone)
+        visited = Rows(later * args.visits, task.horizon, inputs, actions)
+    log = Log(args.log)
+    for k in range(args.rounds):
         solved = None
-        if env is not None and k >= asked.alone:
-            first = (asked.seed * asked.rounds + k) * asked.visits
+        if env is not None and k >= args.alone:
+            first = (args.seed * args.rounds + k) * args.visits
             solved = visit(env, clone, keys, first, visited).summary()["success"]
             sources = [stored, visited]
-        loss = learn(clone, optimiser, schedule, sources, asked, draw)
+        loss = learn(clone, optimiser, schedule, sources, args, draw)
         curve.append([k, loss, solved])
         log(k + 1, loss=loss, **({} if solved is None else {"success": solved}))
         said = "" if solved is None else f", {solved:.3f} of its visits were solved"
@@ -192,32 +192,32 @@ def trained(asked: argparse.Namespace, episodes: Episodes, keys: list[str]):
 
 
 def main() -> None:
-    asked = settings()
+    args = settings()
     torch.set_num_threads(1)
-    torch.manual_seed(asked.seed)
-    episodes = Episodes(asked.data)
+    torch.manual_seed(args.seed)
+    episodes = Episodes(args.data)
     shown = [k for k in episodes.keys if k not in ("q", "v", *episodes.privileged)]
-    keys = [key for key in shown if key not in asked.without]
-    if not episodes.task or not keys or len(keys) + len(asked.without) != len(shown):
-        raise SystemExit(f"--without {asked.without}; the data set of a task shows {shown}")
+    keys = [key for key in shown if key not in args.without]
+    if not episodes.task or not keys or len(keys) + len(args.without) != len(shown):
+        raise SystemExit(f"--without {args.without}; the data set of a task shows {shown}")
     begin, clock = time.process_time(), time.perf_counter()
-    clone, stored, curve = trained(asked, episodes, keys)
+    clone, stored, curve = trained(args, episodes, keys)
     cost = {"train_cpu_s": time.process_time() - begin,
             "train_wall_s": time.perf_counter() - clock}  # fmt: skip
-    env = tangere.make_vec(episodes.task, asked.episodes, autoreset="disabled",
-                           threads=asked.threads)  # fmt: skip
-    script = play(env, asked.play_seed, lambda env, _obs, _t: env.scripted_action()).summary()
-    result = play(env, asked.play_seed, Player(clone, keys)).summary()
+    env = tangere.make_vec(episodes.task, args.episodes, autoreset="disabled",
+                           threads=args.threads)  # fmt: skip
+    script = play(env, args.play_seed, lambda env, _obs, _t: env.scripted_action()).summary()
+    result = play(env, args.play_seed, Player(clone, keys)).summary()
     rows = int(stored.there.sum())
-    if asked.json:
-        print(json.dumps({"program": "dagger", "settings": vars(asked), **provenance(), **cost,
+    if args.json:
+        print(json.dumps({"program": "dagger", "settings": vars(args), **provenance(), **cost,
                           "task": episodes.task, "keys": keys, "data": source(episodes.masks),
                           "rows": rows, "curve": curve, "script": script,
                           "test": result}))  # fmt: skip
         return
-    low, high = wilson(result["success"], asked.episodes)
+    low, high = wilson(result["success"], args.episodes)
     print(
-        f"{episodes.task} {'+'.join(keys)}, seed {asked.seed}: clone {result['success']:.3f} "
+        f"{episodes.task} {'+'.join(keys)}, seed {args.seed}: clone {result['success']:.3f} "
         f"({low:.3f} to {high:.3f}), script {script['success']:.3f}, ratio "
         f"{result['success'] / max(script['success'], 1e-9):.3f}; {rows} rows, "
         f"{cost['train_cpu_s']:.0f} CPU s"

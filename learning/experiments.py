@@ -195,11 +195,11 @@ def main() -> None:
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="at once")
     parser.add_argument("--device", default="cpu", help="of networks that learn from batches")
     parser.add_argument("--list", action="store_true", help="say what there is and what it costs")
-    asked = parser.parse_args()
-    wanted = [e for e in EXPERIMENTS if e.name in asked.only]
-    runs = [(e, s) for e in wanted for s in seeds(e)[:asked.seeds]
+    args = parser.parse_args()
+    wanted = [e for e in EXPERIMENTS if e.name in args.only]
+    runs = [(e, s) for e in wanted for s in seeds(e)[:args.seeds]
             if stored(e, s) is None]  # fmt: skip
-    if asked.list:
+    if args.list:
         for e in wanted:
             missing = sum(run[0] is e for run in runs)
             stale = sum(run[0] is e and result_of(*run).exists() for run in runs)
@@ -207,12 +207,12 @@ def main() -> None:
                   f"{stale} of them stale: {e.command}")  # fmt: skip
         return
     print(f"{len(runs)} runs, about {sum(e.seconds for e, _ in runs) / 60:.0f} CPU minutes, "
-          f"{asked.jobs} at once", flush=True)  # fmt: skip
+          f"{args.jobs} at once", flush=True)  # fmt: skip
     RESULTS.mkdir(exist_ok=True)
     for experiment in {e.name: e for e, _ in runs}.values():
         make_data(experiment)
-    with ThreadPoolExecutor(asked.jobs) as pool:
-        made = list(pool.map(lambda run: make(*run, asked.device), runs))
+    with ThreadPoolExecutor(args.jobs) as pool:
+        made = list(pool.map(lambda run: make(*run, args.device), runs))
     if not all(made):
         raise SystemExit(f"{made.count(False)} of {len(made)} runs failed (reasons above)")
 

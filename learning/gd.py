@@ -132,44 +132,44 @@ def settings() -> argparse.Namespace:
 
 
 def main() -> None:
-    asked = settings()
+    args = settings()
     torch.set_num_threads(1)
-    torch.manual_seed(asked.seed)
+    torch.manual_seed(args.seed)
 
     begin, clock = time.process_time(), time.perf_counter()
-    tape = tangere.torch.Tape(asked.task, asked.envs, threads=asked.threads, flatten=True)
-    gains = touch_gains(tape.spec, asked.touch)
+    tape = tangere.torch.Tape(args.task, args.envs, threads=args.threads, flatten=True)
+    gains = touch_gains(tape.spec, args.touch)
     policy = small_policy(len(gains), tape.spec.action.shape[0])
     shown = copy.deepcopy(policy)
-    optimiser = torch.optim.Adam(policy.parameters(), lr=asked.rate, betas=(0.7, 0.95))
+    optimiser = torch.optim.Adam(policy.parameters(), lr=args.rate, betas=(0.7, 0.95))
     went_back: list[int] = []  # after which updates
     schedule = torch.optim.lr_scheduler.LambdaLR(
         optimiser,
-        lambda k: SLOWER ** len(went_back) * (1 - (1 - 1e-5 / asked.rate) * k / asked.updates),
+        lambda k: SLOWER ** len(went_back) * (1 - (1 - 1e-5 / args.rate) * k / args.updates),
     )
-    still = {"flatten": True, "autoreset": "disabled", "threads": asked.threads}
-    choice = tangere.make_vec(asked.task, CHOICE_EPISODES, **still)
+    still = {"flatten": True, "autoreset": "disabled", "threads": args.threads}
+    choice = tangere.make_vec(args.task, CHOICE_EPISODES, **still)
     best, kept, curve, chosen = (-np.inf,), None, [], []
-    log = Log(asked.log)
-    for k in range(asked.updates):
-        curve.append(update(tape, policy, gains, asked.limit, 1 + asked.seed, k * asked.envs))
+    log = Log(args.log)
+    for k in range(args.updates):
+        curve.append(update(tape, policy, gains, args.limit, 1 + args.seed, k * args.envs))
         log(k + 1, train_return=curve[-1])
         norm = nn.utils.clip_grad_norm_(policy.parameters(), 1.0)
         if torch.isfinite(norm):  # an update that overflowed teaches nothing
             optimiser.step()
         schedule.step()
         with torch.no_grad():
-            decay = asked.average if k else 0.0
+            decay = args.average if k else 0.0
             for mean, now in zip(shown.parameters(), policy.parameters()):
                 mean.copy_(decay * mean + (1 - decay) * now)
-        if (k + 1) % CHOICE_EVERY and k + 1 < asked.updates:
+        if (k + 1) % CHOICE_EVERY and k + 1 < args.updates:
             continue
         played = play(choice, CHOICE_SEED, player(shown, gains)).summary()
         chosen.append([k + 1, played["return"], played["position_m"], played["yaw_rad"]])
         log(k + 1, **played)
         if merit(played) > best:
             best, kept = merit(played), copy.deepcopy(shown)
-        elif asked.back and kept is not None and not merit(played)[0] > asked.back * best[0]:
+        elif args.back and kept is not None and not merit(played)[0] > args.back * best[0]:
             went_back.append(k + 1)
             policy.load_state_dict(kept.state_dict())
             shown.load_state_dict(kept.state_dict())
@@ -181,16 +181,16 @@ def main() -> None:
         raise SystemExit("no policy had a finite error; try a smaller --rate or --touch")
     trained = {"train_cpu_s": time.process_time() - begin,
                "train_wall_s": time.perf_counter() - clock}  # fmt: skip
-    goals = tangere.make_vec(asked.task, asked.goals, **still)
+    goals = tangere.make_vec(args.task, args.goals, **still)
     result = play(goals, TEST_SEED, player(kept, gains)).summary()
-    if asked.json:
-        print(json.dumps({"program": "gd", "settings": vars(asked), **provenance(), **trained,
-                          "steps": asked.updates * asked.envs * tape.actions,
+    if args.json:
+        print(json.dumps({"program": "gd", "settings": vars(args), **provenance(), **trained,
+                          "steps": args.updates * args.envs * tape.actions,
                           "curve": curve, "choice": chosen, "went_back": went_back,
                           "test": result}))  # fmt: skip
         return
     print(
-        f"{asked.task}, seed {asked.seed}: {result['position_m']:.3f} m, "
+        f"{args.task}, seed {args.seed}: {result['position_m']:.3f} m, "
         f"{result['yaw_rad']:.3f} rad, return {result['return']:.0f}, success "
         f"{result['success']:.2f}; {trained['train_cpu_s']:.0f} CPU s, "
         f"{trained['train_wall_s']:.0f} s on the clock"

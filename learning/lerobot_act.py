@@ -95,27 +95,27 @@ def rows_of(data: Path, chunk: int) -> dict[str, torch.Tensor]:
     return rows
 
 
-def train(asked: argparse.Namespace) -> None:
+def train(args: argparse.Namespace) -> None:
     """Leaves a checkpoint in the folder `output`."""
-    meta = LeRobotDatasetMetadata("local/data", root=asked.data)
+    meta = LeRobotDatasetMetadata("local/data", root=args.data)
     features = dataset_to_policy_features(meta.features)
     config = ACTConfig(
         input_features={n: f for n, f in features.items() if f.type is not FeatureType.ACTION},
         output_features={"action": features["action"]},
-        chunk_size=asked.chunk, n_action_steps=1, dim_model=asked.width, n_heads=4,
-        dim_feedforward=2 * asked.width, n_encoder_layers=2, use_vae=False, dropout=0.0,
+        chunk_size=args.chunk, n_action_steps=1, dim_model=args.width, n_heads=4,
+        dim_feedforward=2 * args.width, n_encoder_layers=2, use_vae=False, dropout=0.0,
         pretrained_backbone_weights=None, device="cpu", push_to_hub=False,
     )  # fmt: skip
     policy = ACTPolicy(config)
     before, after = make_pre_post_processors(config, dataset_stats=meta.stats)
-    rows = rows_of(asked.data, asked.chunk)
-    rows = blind(rows, touch_of(asked.data)) if asked.blind else rows
-    optimiser = torch.optim.AdamW(policy.parameters(), lr=asked.rate, weight_decay=1e-4)
-    schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimiser, asked.updates)
-    log = Log(asked.log)
+    rows = rows_of(args.data, args.chunk)
+    rows = blind(rows, touch_of(args.data)) if args.blind else rows
+    optimiser = torch.optim.AdamW(policy.parameters(), lr=args.rate, weight_decay=1e-4)
+    schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimiser, args.updates)
+    log = Log(args.log)
     policy.train()
-    for update in range(asked.updates):
-        which = torch.randint(len(rows["action"]), (asked.batch,))
+    for update in range(args.updates):
+        which = torch.randint(len(rows["action"]), (args.batch,))
         loss, _ = policy(before({name: part[which] for name, part in rows.items()}))
         optimiser.zero_grad()
         loss.backward()
@@ -126,21 +126,21 @@ def train(asked: argparse.Namespace) -> None:
             log(update + 1, loss=loss)
             print(f"update {update + 1}: loss {loss.item():.4f}", file=sys.stderr, flush=True)
     for part in (policy, before, after):
-        part.save_pretrained(asked.output)
+        part.save_pretrained(args.output)
 
 
 def main() -> None:
-    asked = settings()
-    torch.set_num_threads(asked.threads)
-    torch.manual_seed(asked.seed)
+    args = settings()
+    torch.set_num_threads(args.threads)
+    torch.manual_seed(args.seed)
     begin = time.process_time()
-    train(asked)
+    train(args)
     cost = time.process_time() - begin
-    policy: Any = tangere.lerobot.Checkpoint(asked.output)
-    if asked.blind:
-        policy = Blind(policy, touch_of(asked.data))
-    found = tangere.lerobot.play(policy, asked.data, asked.episodes, threads=asked.threads)
-    print(json.dumps(found | {"blind": asked.blind, "train_cpu_s": cost}))
+    policy: Any = tangere.lerobot.Checkpoint(args.output)
+    if args.blind:
+        policy = Blind(policy, touch_of(args.data))
+    found = tangere.lerobot.play(policy, args.data, args.episodes, threads=args.threads)
+    print(json.dumps(found | {"blind": args.blind, "train_cpu_s": cost}))
 
 
 if __name__ == "__main__":

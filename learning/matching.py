@@ -101,19 +101,19 @@ def settings() -> argparse.Namespace:
 
 
 def main() -> None:
-    asked = settings()
+    args = settings()
     torch.set_num_threads(1)
-    torch.manual_seed(asked.seed)
-    draw = np.random.default_rng(asked.seed)
+    torch.manual_seed(args.seed)
+    draw = np.random.default_rng(args.seed)
 
-    episodes = Episodes(asked.data)
+    episodes = Episodes(args.data)
     train, valid = episodes.mask("train"), episodes.mask("valid")
-    if max(asked.sizes) > len(train):
-        raise SystemExit(f"--sizes {asked.sizes}; there are {len(train)} episodes to learn from")
+    if max(args.sizes) > len(train):
+        raise SystemExit(f"--sizes {args.sizes}; there are {len(train)} episodes to learn from")
     begin, clock = time.process_time(), time.perf_counter()
     test = rows_of(episodes, valid)
     order = draw.permutation(train)
-    everything = rows_of(episodes, list(order[: max(asked.sizes)]))
+    everything = rows_of(episodes, list(order[: max(args.sizes)]))
     counts = np.cumsum(episodes.lengths[order])
     mean, unit = everything["z"].mean(0), everything["z"].std(0) + 1e-9
     size = everything["change"].std(0) + 1e-12
@@ -124,19 +124,19 @@ def main() -> None:
         return {name: torch.from_numpy(value).float() for name, value in values.items()}
 
     known, unseen, curve = scaled(everything), scaled(test), []
-    for number in asked.sizes:
+    for number in args.sizes:
         rows = {name: value[: counts[number - 1]] for name, value in known.items()}
-        model = fit(rows, asked.match, asked.updates, asked.batch, draw)
+        model = fit(rows, args.match, args.updates, args.batch, draw)
         with torch.no_grad():
             found, _ = model(unseen["z"], torch.zeros_like(unseen["z"]))
         error = float((found - unseen["change"]).square().mean().sqrt())
         curve.append([number, error])
-        if not asked.json:
+        if not args.json:
             print(f"{number} episodes: error {error:.4f}", flush=True)
     cost = {"train_cpu_s": time.process_time() - begin,
             "train_wall_s": time.perf_counter() - clock}  # fmt: skip
-    if asked.json:
-        print(json.dumps({"program": "matching", "settings": vars(asked), **provenance(), **cost,
+    if args.json:
+        print(json.dumps({"program": "matching", "settings": vars(args), **provenance(), **cost,
                           "data": source(episodes.masks), "curve": curve}))  # fmt: skip
         return
     print(f"{cost['train_cpu_s']:.0f} CPU s")

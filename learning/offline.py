@@ -177,23 +177,23 @@ def settings() -> argparse.Namespace:
 
 
 def main() -> None:
-    asked = settings()
+    args = settings()
     torch.set_num_threads(1)
-    torch.manual_seed(asked.seed)
+    torch.manual_seed(args.seed)
 
-    episodes = Episodes(asked.data)
+    episodes = Episodes(args.data)
     keys = [key for key in episodes.keys if key not in episodes.privileged]
     task = tangere.task_spec(episodes.task)
     if (task.action.low, task.action.high) != (-1.0, 1.0):
         raise SystemExit(f"{task.name}: actions are not within [-1, 1]")
     rows = rows_of(episodes, keys)
-    draw = np.random.default_rng(asked.seed)
+    draw = np.random.default_rng(args.seed)
     begin, clock = time.process_time(), time.perf_counter()
-    learner = Learner(asked.method, rows["obs"].shape[1], rows["action"].shape[1], asked.rate,
-                      asked.updates)  # fmt: skip
-    log = Log(asked.log)
-    for k in range(asked.updates):
-        chosen = torch.from_numpy(draw.integers(len(rows["reward"]), size=asked.batch))
+    learner = Learner(args.method, rows["obs"].shape[1], rows["action"].shape[1], args.rate,
+                      args.updates)  # fmt: skip
+    log = Log(args.log)
+    for k in range(args.updates):
+        chosen = torch.from_numpy(draw.integers(len(rows["reward"]), size=args.batch))
         learner.update({name: values[chosen] for name, values in rows.items()})
         if k % 100 == 99:
             log(k + 1, **learner.losses)
@@ -208,7 +208,7 @@ def main() -> None:
             return learner.act(torch.from_numpy(flat)).numpy()
 
     env = tangere.make_vec(
-        task.name, asked.episodes, autoreset="disabled", keys=keys, threads=asked.threads
+        task.name, args.episodes, autoreset="disabled", keys=keys, threads=args.threads
     )
     script = play(env, TEST_SEED, lambda env, _obs, _t: env.scripted_action()).summary()
     at_random = np.random.default_rng(TEST_SEED)
@@ -216,13 +216,13 @@ def main() -> None:
         -1, 1, (env.num_envs, *task.action.shape))).summary()  # fmt: skip
     result = play(env, TEST_SEED, clone).summary()
     score = 100 * (result["return"] - blind["return"]) / (script["return"] - blind["return"])
-    if asked.json:
-        print(json.dumps({"program": "offline", "settings": vars(asked), **provenance(), **cost,
+    if args.json:
+        print(json.dumps({"program": "offline", "settings": vars(args), **provenance(), **cost,
                           "task": task.name, "keys": keys, "data": source(episodes.masks),
                           "rows": len(rows["reward"]), "script": script, "random": blind,
                           "test": result | {"score": score}}))  # fmt: skip
         return
-    print(f"{task.name}, {asked.method}, seed {asked.seed}: score {score:.1f}, success "
+    print(f"{task.name}, {args.method}, seed {args.seed}: score {score:.1f}, success "
           f"{result['success']:.3f}, script {script['success']:.3f}; {len(rows['reward'])} rows, "
           f"{cost['train_cpu_s']:.0f} CPU s")  # fmt: skip
 

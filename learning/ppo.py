@@ -241,24 +241,24 @@ def driven(drawn: torch.Tensor, squash: bool) -> np.ndarray:
 class Collector:
     """Plays E environments and keeps what the next update needs, T actions at a time."""
 
-    def __init__(self, asked: argparse.Namespace, agent: Agent, eyes: Eyes):
-        self.asked, self.agent, self.eyes = asked, agent, eyes
-        self.env = make_vec(asked.task, asked.envs, seed=1 + asked.seed, autoreset="same_step",
-                            threads=asked.threads)  # fmt: skip
+    def __init__(self, args: argparse.Namespace, agent: Agent, eyes: Eyes):
+        self.args, self.agent, self.eyes = args, agent, eyes
+        self.env = make_vec(args.task, args.envs, seed=1 + args.seed, autoreset="same_step",
+                            threads=args.threads)  # fmt: skip
         obs, _ = self.env.reset()
         self.obs = eyes(obs, learn=True)
-        self.state = torch.zeros(asked.envs, 64, device=eyes.device)
+        self.state = torch.zeros(args.envs, 64, device=eyes.device)
         self.past = torch.zeros(self.env.action_space.shape, device=eyes.device)
-        self.begins = torch.ones(asked.envs, dtype=torch.bool, device=eyes.device)
-        self.discounted, self.returns = np.zeros(asked.envs), np.zeros(asked.envs)
+        self.begins = torch.ones(args.envs, dtype=torch.bool, device=eyes.device)
+        self.discounted, self.returns = np.zeros(args.envs), np.zeros(args.envs)
         self.scale = Running((1,))
-        self.gamma, self.imitating = asked.gamma, False
+        self.gamma, self.imitating = args.gamma, False
 
     @torch.no_grad()
     def collect(self) -> tuple[dict[str, torch.Tensor], torch.Tensor, list[tuple[float, bool]]]:
         """(T, E, …) by name, the memory before them, and (return, success) of ended episodes."""
-        asked, rows, first, ended_episodes = self.asked, [], self.state, []
-        for _ in range(asked.length):
+        args, rows, first, ended_episodes = self.args, [], self.state, []
+        for _ in range(args.length):
             self.state = self.state * ~self.begins[:, None]
             mean, value, after = self.agent(*self.obs, self.state, self.past)
             drawn = torch.randn(mean.shape).to(mean.device)  # the same on every device
@@ -269,7 +269,7 @@ class Collector:
             if self.imitating:
                 script = torch.from_numpy(self.env.scripted_action()).float()
                 row["script"] = script.to(self.eyes.device)
-            obs, reward, terminated, truncated, info = self.env.step(driven(action, asked.squash))
+            obs, reward, terminated, truncated, info = self.env.step(driven(action, args.squash))
             ended = terminated | truncated
             self.returns += reward
             self.discounted = self.discounted * self.gamma + reward
@@ -302,21 +302,21 @@ class Collector:
         for t in reversed(range(len(batch["value"]))):
             on = (~batch["end"][t]).float()
             delta = batch["reward"][t] + self.gamma * value * on - batch["value"][t]
-            advantage = delta + self.gamma * self.asked.trace * on * advantage
+            advantage = delta + self.gamma * self.args.trace * on * advantage
             value = batch["value"][t]
             found.append(advantage)
         return torch.stack(found[::-1])
 
 
-def improve(agent: Agent, optimiser, batch, first: torch.Tensor, asked, draw: np.random.Generator):
+def improve(agent: Agent, optimiser, batch, first: torch.Tensor, args, draw: np.random.Generator):
     """A few passes over the batch. With memory, minibatches are whole environments."""
     T, E = batch["value"].shape
     if agent.memory is None:  # every row on its own: T × E sequences of one action
         batch = {k: v.reshape(1, T * E, *v.shape[2:]) for k, v in batch.items()}
         first, T, E = first.new_zeros(T * E, 64), 1, T * E
     target = batch["advantage"] + batch["value"]
-    size = max(1, asked.minibatch // T)
-    for _ in range(asked.passes):
+    size = max(1, args.minibatch // T)
+    for _ in range(args.passes):
         order = torch.from_numpy(draw.permutation(E)).to(first.device)
         for chosen in order.split(size):
             part = {k: v[:, chosen] for k, v in batch.items()}
@@ -327,14 +327,14 @@ def improve(agent: Agent, optimiser, batch, first: torch.Tensor, asked, draw: np
             ratio = (chance - part["chance"]).exp()
             a = part["advantage"]
             a = (a - a.mean()) / (a.std() + 1e-8)
-            loss = torch.max(-a * ratio, -a * ratio.clamp(1 - asked.clip, 1 + asked.clip)).mean()
+            loss = torch.max(-a * ratio, -a * ratio.clamp(1 - args.clip, 1 + args.clip)).mean()
             if "script" in part:
                 loss = (mean - part["script"]).square().mean()
-            loss = loss + 0.5 * asked.value * (value - target[:, chosen]).square().mean()
-            loss = loss - asked.entropy * agent.log_deviation.sum()
+            loss = loss + 0.5 * args.value * (value - target[:, chosen]).square().mean()
+            loss = loss - args.entropy * agent.log_deviation.sum()
             optimiser.zero_grad()
             loss.backward()
-            nn.utils.clip_grad_norm_(agent.parameters(), asked.norm)
+            nn.utils.clip_grad_norm_(agent.parameters(), args.norm)
             optimiser.step()
 
 
@@ -354,55 +354,55 @@ def settings() -> argparse.Namespace:
         flag = isinstance(value, bool)
         kind = {"action": argparse.BooleanOptionalAction} if flag else {"type": type(value)}
         parser.add_argument(f"--{name}", default=None, **kind)
-    asked = parser.parse_args()
-    for name, value in (COMMON | TASKS.get(asked.task, {})).items():
-        if getattr(asked, name) is None:
-            setattr(asked, name, value)
-    if asked.steps < asked.envs * asked.length:
-        parser.error(f"--steps {asked.steps}; an update takes {asked.envs * asked.length}")
-    return asked
+    args = parser.parse_args()
+    for name, value in (COMMON | TASKS.get(args.task, {})).items():
+        if getattr(args, name) is None:
+            setattr(args, name, value)
+    if args.steps < args.envs * args.length:
+        parser.error(f"--steps {args.steps}; an update takes {args.envs * args.length}")
+    return args
 
 
-def seen_shapes(env: Any, asked: argparse.Namespace) -> dict[str, tuple[int, ...]]:
+def seen_shapes(env: Any, args: argparse.Namespace) -> dict[str, tuple[int, ...]]:
     """Shapes of what the policy sees, by name."""
     shapes = {name: box.shape for name, box in env.single_observation_space.items()}
-    for name in asked.without:
+    for name in args.without:
         if shapes.pop(name, None) is None or not shapes:
             raise SystemExit(f"ppo.py: --without {name}; the policy sees {list(shapes)}")
-    if asked.imitate and not hasattr(env, "scripted_action"):
-        raise SystemExit(f"ppo.py: --imitate: {asked.task} has no scripted_action()")
+    if args.imitate and not hasattr(env, "scripted_action"):
+        raise SystemExit(f"ppo.py: --imitate: {args.task} has no scripted_action()")
     return shapes
 
 
 def main() -> None:
-    asked = settings()
+    args = settings()
     torch.set_num_threads(1)
-    torch.manual_seed(asked.seed)
+    torch.manual_seed(args.seed)
     begin, clock = time.process_time(), time.perf_counter()
-    choice = make_vec(asked.task, CHOICE_EPISODES, autoreset="disabled", threads=asked.threads)
-    eyes = Eyes(seen_shapes(choice, asked), asked.convolve, asked.device)
-    agent = Agent(eyes.shapes, choice.single_action_space.shape[0], asked.deviation,
-                  asked.recurrent)  # fmt: skip
-    agent.to(asked.device)
-    optimiser = torch.optim.Adam(agent.parameters(), lr=asked.rate, eps=1e-5)
-    collector, draw = Collector(asked, agent, eyes), np.random.default_rng(asked.seed)
-    log = Log(asked.log)
-    updates, curve, chosen = asked.steps // (asked.envs * asked.length), [], []
+    choice = make_vec(args.task, CHOICE_EPISODES, autoreset="disabled", threads=args.threads)
+    eyes = Eyes(seen_shapes(choice, args), args.convolve, args.device)
+    agent = Agent(eyes.shapes, choice.single_action_space.shape[0], args.deviation,
+                  args.recurrent)  # fmt: skip
+    agent.to(args.device)
+    optimiser = torch.optim.Adam(agent.parameters(), lr=args.rate, eps=1e-5)
+    collector, draw = Collector(args, agent, eyes), np.random.default_rng(args.seed)
+    log = Log(args.log)
+    updates, curve, chosen = args.steps // (args.envs * args.length), [], []
     best, kept = (-np.inf,), (agent, eyes)
-    grown = (1 - asked.last_gamma) / (1 - asked.gamma) if asked.last_gamma else 1.0
+    grown = (1 - args.last_gamma) / (1 - args.gamma) if args.last_gamma else 1.0
     for k in range(updates):
-        optimiser.param_groups[0]["lr"] = asked.rate * (1 - k / updates)
-        collector.imitating = k < asked.imitate * updates
-        collector.gamma = 1 - (1 - asked.gamma) * (grown ** (k / updates))
+        optimiser.param_groups[0]["lr"] = args.rate * (1 - k / updates)
+        collector.imitating = k < args.imitate * updates
+        collector.gamma = 1 - (1 - args.gamma) * (grown ** (k / updates))
         batch, first, ended = collector.collect()
-        improve(agent, optimiser, batch, first, asked, draw)
-        steps = (k + 1) * asked.envs * asked.length
+        improve(agent, optimiser, batch, first, args, draw)
+        steps = (k + 1) * args.envs * args.length
         if ended:
             curve.append([steps, *np.mean(ended, axis=0).round(4).tolist()])
             log(steps, train_return=curve[-1][1], train_success=curve[-1][2])
-        if (k + 1) * asked.choices // updates == k * asked.choices // updates:
+        if (k + 1) * args.choices // updates == k * args.choices // updates:
             continue
-        played = play(choice, CHOICE_SEED, Actor(agent, eyes, asked.squash)).summary()
+        played = play(choice, CHOICE_SEED, Actor(agent, eyes, args.squash)).summary()
         chosen.append([steps, played["return"], played["success"]])
         log(steps, **played)
         if merit(played) > best:
@@ -413,16 +413,16 @@ def main() -> None:
               file=sys.stderr, flush=True)  # fmt: skip
     cost = {"train_cpu_s": time.process_time() - begin,
             "train_wall_s": time.perf_counter() - clock}  # fmt: skip
-    env = make_vec(asked.task, asked.episodes, autoreset="disabled", threads=asked.threads)
-    result = play(env, TEST_SEED, Actor(*kept, asked.squash)).summary()
-    if asked.json:
-        print(json.dumps({"program": "ppo", "settings": vars(asked),
-                          **provenance(asked.device), **cost,
-                          "steps": updates * asked.envs * asked.length,
+    env = make_vec(args.task, args.episodes, autoreset="disabled", threads=args.threads)
+    result = play(env, TEST_SEED, Actor(*kept, args.squash)).summary()
+    if args.json:
+        print(json.dumps({"program": "ppo", "settings": vars(args),
+                          **provenance(args.device), **cost,
+                          "steps": updates * args.envs * args.length,
                           "curve": curve[:: max(1, len(curve) // 100)], "choice": chosen,
                           "test": result}))  # fmt: skip
         return
-    print(f"{asked.task}, seed {asked.seed}: {result}; {cost['train_cpu_s']:.0f} CPU s, "
+    print(f"{args.task}, seed {args.seed}: {result}; {cost['train_cpu_s']:.0f} CPU s, "
           f"{cost['train_wall_s']:.0f} s on the clock")  # fmt: skip
 
 

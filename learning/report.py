@@ -219,8 +219,8 @@ def figure() -> str:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--write", action="store_true", help="into learning/README.md")
-    asked = parser.parse_args()
-    if not asked.write:
+    args = parser.parse_args()
+    if not args.write:
         print(tables(), end="")
         return
     page = PAGE.read_text()

@@ -140,8 +140,8 @@ struct Adjoint::Impl {
   template <int L>
   static void set_memory(Lanes<L>& x, int lane, std::span<const ShearEntry> now,
                          std::span<const ShearEntry> after) {
-    x.work.remembered.now[std::size_t(lane)].assign(now.begin(), now.end());
-    x.work.remembered.after[std::size_t(lane)].assign(after.begin(), after.end());
+    x.work.shear.now[std::size_t(lane)].assign(now.begin(), now.end());
+    x.work.shear.after[std::size_t(lane)].assign(after.begin(), after.end());
     for (LossRows<L>& o : x.adjoint.losses)
       o.memory_before[std::size_t(lane)].assign(3 * now.size(), 0.0);
   }

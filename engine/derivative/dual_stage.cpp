@@ -246,8 +246,8 @@ struct DualStage::Impl {
   template <class Shape>
   [[nodiscard]] kernels::Anchor<D> felt_anchor(const Shape& shape, const kernels::LoadedTouch<D>& t,
                                                const kernels::ShearSpringContact& of, int k,
-                                               const std::vector<D>& remembered) const {
-    const D* const b = &remembered[3 * std::size_t(of.first + k)];
+                                               const std::vector<D>& s_start) const {
+    const D* const b = &s_start[3 * std::size_t(of.first + k)];
     const kernels::Vec3<D> xi = place(of, k);
     if (m.shear_interval(of) == 0)
       return kernels::recalled(shape, t, xi, kernels::Vec3<D>{b[0], b[1], b[2]});
@@ -262,14 +262,14 @@ struct DualStage::Impl {
   /// Calls f(shape, touch, k, point) for every point of a sensor against one body.
   template <class F>
   void meet_felt(const kernels::ShearSpringContact& of,
-                 const std::vector<kernels::LinkPose<D>>& poses, const std::vector<D>& remembered,
+                 const std::vector<kernels::LinkPose<D>>& poses, const std::vector<D>& s_start,
                  const F& f) const {
     const kernels::LoadedTouch<D> t = touch(of, poses);
     with_touched_shape(of, [&](const auto& shape) {
       for (int k = 0; k < of.contact.n_points; ++k)
         f(shape, t, k,
           kernels::meet_elastic(shape, t, law_of(of, k, t), place(of, k),
-                                felt_anchor(shape, t, of, k, remembered)));
+                                felt_anchor(shape, t, of, k, s_start)));
     });
   }
 
@@ -405,7 +405,7 @@ struct DualStage::Impl {
 DualStage::DualStage(const CompiledModel& model) : impl_(std::make_unique<Impl>(model)) {
   centre.resize(std::size_t(model.nq));
   for (auto* p : {&x, &r, &s, &tau, &target, &v, &g}) p->assign(std::size_t(model.nv), D(0.0));
-  remembered.assign(3 * std::size_t(model.shear_spring_points), D(0.0));
+  s_start.assign(3 * std::size_t(model.shear_spring_points), D(0.0));
 }
 DualStage::~DualStage() = default;
 
@@ -469,7 +469,7 @@ void DualStage::recall() {
     const kernels::LoadedTouch<D> t = i.touch(of, poses);
     i.with_touched_shape(of, [&](const auto& shape) {
       for (int k = 0; k < of.contact.n_points; ++k) {
-        const D* kept = &remembered[3 * std::size_t(of.first + k)];
+        const D* kept = &s_start[3 * std::size_t(of.first + k)];
         i.anchors[std::size_t(of.first + k)] = kernels::recalled(
             shape, t, i.place(of, k), kernels::Vec3<D>{kept[0], kept[1], kept[2]});
       }
@@ -488,7 +488,7 @@ void DualStage::advance(const std::vector<D>& q, const std::vector<D>& twist) {
       for (int k = 0; k < of.contact.n_points; ++k) {
         const auto p = kernels::meet_elastic(shape, t, i.law_of(of, k, t), i.place(of, k),
                                              i.anchors[std::size_t(of.first + k)]);
-        D* kept = &remembered[3 * std::size_t(of.first + k)];
+        D* kept = &s_start[3 * std::size_t(of.first + k)];
         const kernels::Vec3<D> next = p.d < D(0.0) ? p.hold * p.s : kernels::zero3<D>();
         kept[0] = next.x, kept[1] = next.y, kept[2] = next.z;
       }
@@ -502,10 +502,10 @@ void DualStage::update_sensor_shear_state(const std::vector<D>& q, const std::ve
   const std::vector<kernels::LinkPose<D>> poses = i.poses_at(q, twist);
   for (const kernels::ShearSpringContact& of : i.m.shear_springs) {
     if (!is_due(i.m, of, steps)) continue;
-    i.meet_felt(of, poses, remembered, [&](const auto& shape, const auto& t, int k, const auto& p) {
+    i.meet_felt(of, poses, s_start, [&](const auto& shape, const auto& t, int k, const auto& p) {
       kernels::Anchor<D> after = {kernels::zero3<D>(), kernels::zero3<D>(), D(0.0)};
       if (p.d < D(0.0)) after = kernels::recalled(shape, t, i.place(of, k), p.hold * p.s);
-      D* const b = &remembered[3 * std::size_t(of.first + k)];
+      D* const b = &s_start[3 * std::size_t(of.first + k)];
       D* const a = b + 3 * of.contact.n_points;
       b[0] = after.b.x, b[1] = after.b.y, b[2] = after.b.z;
       a[0] = after.a.x, a[1] = after.a.y, a[2] = after.a.z;
@@ -578,7 +578,7 @@ void DualStage::elastic_field(int sensor, const Coefficients<D>& law, std::span<
   const std::vector<kernels::LinkPose<D>> poses = i.poses_at(centre, r);
   for (const kernels::ShearSpringContact& of : i.m.shear_springs) {
     if (of.sensor != sensor) continue;
-    i.meet_felt(of, poses, remembered, [&](const auto&, const auto&, int k, const auto& p) {
+    i.meet_felt(of, poses, s_start, [&](const auto&, const auto&, int k, const auto& p) {
       const D f[3] = {p.force.x, p.force.y, p.force.z};
       const double* axes = &felt.point_axes[9 * std::size_t(k)];
       const auto to = 3 * std::size_t(felt.in_field[std::size_t(k)]);

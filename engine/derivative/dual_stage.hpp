@@ -40,10 +40,10 @@ class DualStage {
   void choose_faces();
 
   /// Shear state at the start of a solve, three numbers for each point with a shear spring.
-  std::vector<DualNumber> remembered;
+  std::vector<DualNumber> s_start;
   /// Sets the anchors of solves from this centre. Call after choose_faces() and set_numbers().
   void recall();
-  /// Replaces `remembered` by the shear state at the end of such a solve, at q and v.
+  /// Replaces `s_start` by the shear state at the end of such a solve, at q and v.
   void advance(const std::vector<DualNumber>& q, const std::vector<DualNumber>& v);
 
   /// The same for sensors that keep anchors, where they are due after `steps` steps of an episode.

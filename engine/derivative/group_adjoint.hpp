@@ -29,7 +29,7 @@ struct AdjointWorkspace {
 
 /// Reverses solves whose states are in the workspace: q0, v0 where the solve began, q_before,
 /// v_before one step earlier, q1 its result, x_inner its inner stages; the shear states before and
-/// after the solve in remembered.now and remembered.after. tau, target and the block of parameters
+/// after the solve in shear.now and shear.after. tau, target and the block of parameters
 /// are as in the step.
 class GroupAdjoint {
  public:

@@ -190,13 +190,12 @@ struct ReadoutPullback::Impl {
                          std::span<double> points) {
     const CompiledModel& m = compiled(model);
     const int environment = kBlock * block + lane, group = lane / kGroup;
-    std::vector<double>& remembered = memory[std::size_t(lane)];
-    remembered.resize(3 * batch->shear_state(environment).size());
+    std::vector<double>& s_start = memory[std::size_t(lane)];
+    s_start.resize(3 * batch->shear_state(environment).size());
     used[std::size_t(group)] = true;
-    for (const ElasticField::Share& share :
-         elastic.pull_back(reader, *batch, environment, s.number,
-                           std::span<const double>(whole).first(3 * std::size_t(s.points())),
-                           remembered, points)) {
+    for (const ElasticField::Share& share : elastic.pull_back(
+             reader, *batch, environment, s.number,
+             std::span<const double>(whole).first(3 * std::size_t(s.points())), s_start, points)) {
       const CompiledBody& body = m.bodies[std::size_t(share.of->contact.body2)];
       hand_on(share.motion, s.link, {kernels::diagonal(1.0), {0, 0, 0}}, body.link, group,
               lane % kGroup);

@@ -106,7 +106,7 @@ void ShearAdjoint<L>::pull_back_points(const CompiledModel& m, const kernels::Ke
   table.pull_back_memory(pullback);
   if (points.empty()) return;
   const CompiledSensor& sensor = m.sensors[std::size_t(pullback.end->of->sensor)];
-  w.remembered.felt.add_to_points(m, sensor, pullback.points, own, points);
+  w.shear.felt.add_to_points(m, sensor, pullback.points, own, points);
 }
 
 /// Pulls back through all contacts: the final shear state, or the forces along a slip.
@@ -117,7 +117,7 @@ void ShearAdjoint<L>::pull_back(const CompiledModel& m, const kernels::KernelTab
   for (int l = 0; l < L; ++l) {
     if (!has(lanes, l)) continue;
     const std::size_t lane = std::size_t(l);
-    const ShearState &now = w.remembered.now[lane], &after = w.remembered.after[lane];
+    const ShearState &now = w.shear.now[lane], &after = w.shear.after[lane];
     const std::vector<double>& bar = loss.memory[lane];
     std::vector<double>& before = loss.memory_before[lane];
     before.resize(3 * now.size());
@@ -125,16 +125,16 @@ void ShearAdjoint<L>::pull_back(const CompiledModel& m, const kernels::KernelTab
     const auto one = [&](const ShearSpringContact& of, const int* index,
                          const ShearSpringPoints& points) {
       const std::size_t rows = 3 * std::size_t(points.stride);
-      double *const remembered = numbers_.data(), *const s_bar = remembered + rows,
+      double *const s_start = numbers_.data(), *const s_bar = s_start + rows,
                     *const s_out = s_bar + rows;
       std::size_t next = 0;
-      shear_of_points(now, of, index, points.count, points.stride, remembered, next);
+      shear_of_points(now, of, index, points.count, points.stride, s_start, next);
       if (!of_forces)
         shear_of_points(
             after, of, index, points.count, points.stride,
             [&](std::size_t entry, int c) { return bar[3 * entry + std::size_t(c)]; }, s_bar, next);
       std::fill(s_out, s_out + rows, 0.0);
-      const ShearSpringTouch start = touch_of(m, w, of, w.remembered.start_touches, l),
+      const ShearSpringTouch start = touch_of(m, w, of, w.shear.start_touches, l),
                              end = touch_of(m, w, of, at_touches_, l);
       Vec6<double> slip{};
       if (of_forces) slip = touch_of(m, w, of, slip_touches_, l).twist;
@@ -142,7 +142,7 @@ void ShearAdjoint<L>::pull_back(const CompiledModel& m, const kernels::KernelTab
       kernels::ShearPullback pullback = {&start,
                                          &end,
                                          points,
-                                         remembered,
+                                         s_start,
                                          of_forces ? nullptr : s_bar,
                                          nullptr,
                                          of_forces ? &slip : nullptr,
@@ -150,8 +150,7 @@ void ShearAdjoint<L>::pull_back(const CompiledModel& m, const kernels::KernelTab
                                          &sums};
       pull_back_points(m, table, w, pullback, points_of(m, of, loss.points[lane]), s_out + rows);
       if (!of_forces) hand_on<L>(of, at_, sums.end.displacement, sums.end.twist, l, end_);
-      hand_on<L>(of, w.remembered.start, sums.start, Vec6<double>{}, l,
-                 start_[std::size_t(number)]);
+      hand_on<L>(of, w.shear.start, sums.start, Vec6<double>{}, l, start_[std::size_t(number)]);
       if (loss.parameters != nullptr)
         for (std::size_t k = 0; k < kCoefficients; ++k)
           loss.parameters[std::size_t(of.number) + k][l] += sums.end.law[k];
@@ -179,7 +178,7 @@ template <int L>
 void ShearAdjoint<L>::pull_back_reading(const CompiledModel& m, const kernels::KernelTable& table,
                                         BasicWorkspace<L>& w, const ShearSpringContact& of,
                                         int lane, const TapedReading& reading, LossRows<L>& loss) {
-  TouchingSensorPoints& felt = w.remembered.felt;
+  TouchingSensorPoints& felt = w.shear.felt;
   const ShearSpringTouch touch = touch_of(m, w, of, at_touches_, lane);
   const ShearSpringPoints points = felt.find(m.sensors[std::size_t(of.sensor)], table, touch);
   if (points.count == 0) return;

@@ -226,10 +226,10 @@ struct Tangent::Impl {
 
   /// Sets the shear state and its tangents: three numbers for each entry; empty: zeros.
   void set_memory(std::span<const ShearEntry> memory, const std::vector<double>& dot) {
-    std::fill(stage.remembered.begin(), stage.remembered.end(), D(0.0));
+    std::fill(stage.s_start.begin(), stage.s_start.end(), D(0.0));
     for (std::size_t k = 0; k < memory.size(); ++k)
       for (std::size_t c = 0; c < 3; ++c)
-        stage.remembered[3 * std::size_t(memory[k].point) + c] =
+        stage.s_start[3 * std::size_t(memory[k].point) + c] =
             D(memory[k].s[c], dot.empty() ? 0 : dot[3 * k + c]);
   }
 
@@ -256,7 +256,7 @@ struct Tangent::Impl {
     std::vector<double> out;
     for (const ShearEntry& e : memory)
       for (std::size_t c = 0; c < 3; ++c)
-        out.push_back(stage.remembered[3 * std::size_t(e.point) + c].epsilon);
+        out.push_back(stage.s_start[3 * std::size_t(e.point) + c].epsilon);
     return out;
   }
 

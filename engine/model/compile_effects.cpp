@@ -33,7 +33,7 @@ std::string counted(std::size_t n, const std::string& one, const std::string& ma
 }
 
 /// Whether some contact has shear springs. CompiledModel::shear_springs are filled later.
-bool remembers(const CompiledModel& m) {
+bool has_shear_springs(const CompiledModel& m) {
   const auto any = [](const auto& all) {
     return std::any_of(all.begin(), all.end(),
                        [](const auto& x) { return kernels::has_shear_spring(x.parameters); });
@@ -46,7 +46,7 @@ bool remembers(const CompiledModel& m) {
 std::string pair_variant(const CompiledModel& m, const kernels::LinkPair& links) {
   struct Kind {
     PrimitiveShape shape;
-    bool remembers, ball;
+    bool elastic, ball;
     bool operator==(const Kind&) const = default;
   };
   std::vector<Kind> kinds;
@@ -57,10 +57,10 @@ std::string pair_variant(const CompiledModel& m, const kernels::LinkPair& links)
     if (std::find(kinds.begin(), kinds.end(), kind) == kinds.end()) kinds.push_back(kind);
   }
   std::string text;
-  for (const auto& [shape, remembers, ball] : kinds)
+  for (const auto& [shape, elastic, ball] : kinds)
     text += std::string(row_of(shape).name) + ": " +
             (ball ? "one point of a sphere's surface" : sums_of(shape)) +
-            (remembers ? ", remembers; " : "; ");
+            (remembers ? ", shear springs; " : "; ");
   if (links.link1 < 0 || links.link2 < 0) return text + "one body moves";
   return text + "both bodies move";
 }
@@ -169,7 +169,7 @@ void list_stages(CompiledModel& m) {
       : m.pattern.factor_entries == m.pattern.entries
           ? "no fill"
           : std::to_string(m.pattern.factor_entries - m.pattern.entries) + " filled in");
-  if (remembers(m))
+  if (has_shear_springs(m))
     add("memory of friction", "points that touch", "looked up before a solve, kept after a step");
   for (std::size_t i = 0; i < m.sensors.size(); ++i)
     add("field", m.sensor_info[i].name, field_variant(m.sensors[i]));

@@ -26,7 +26,7 @@ std::string where_of(const TactileDescription& d) {
 }
 
 [[noreturn]] void fail_of_states(const TactileDescription& d, double states, double h) {
-  fail(d, fmt::format("delay, low_pass and hysteresis look {} steps of {} s back; expected less "
+  fail(d, fmt::format("delay, low_pass and hysteresis reach {} steps of {} s back; expected less "
                       "than {}",
                       states, h, kMostPastStates));
 }
@@ -66,7 +66,7 @@ std::vector<double> one_after_other(const std::vector<double>& first,
 
 /// Turns delay, low-pass and hysteresis into weights of earlier steps. A delay that ends between
 /// two steps takes a share of both.
-void remember(const TactileDescription& d, double h, CompiledSensor& s) {
+void set_lag_weights(const TactileDescription& d, double h, CompiledSensor& s) {
   constexpr double kWhole = 1e-6;  // [steps] a part that is rounding
   const SensorImperfections& of = d.imperfections;
   const double steps = of.delay / h, delay = std::floor(steps + kWhole),
@@ -98,7 +98,7 @@ void compile_imperfections(const TactileDescription& d, double timestep, Compile
   info.imperfect = s.imperfect = true;
   s.imperfections = d.imperfections;
   s.name_bits = bits_of(d.name);
-  if (has_lag(d.imperfections)) remember(d, timestep, s);
+  if (has_lag(d.imperfections)) set_lag_weights(d, timestep, s);
   info.past_states = s.past_states();
   if (!has_grid(d)) return;
   s.grid_rows = d.array.rows, s.grid_cols = d.array.cols;

@@ -32,9 +32,9 @@ void TaskSpec::check() const {
                      horizon));
   if (control_every < 0 || settling_steps < 0 || task_state < 0) fail("a count is negative");
   if (snapshots.empty() || snapshots.front() < 1 || snapshots.back() != steps_per_action)
-    fail(fmt::format("it must look after its last step, {}", steps_per_action));
+    fail(fmt::format("it must observe after its last step, {}", steps_per_action));
   for (std::size_t i = 1; i < snapshots.size(); ++i)
-    if (snapshots[i] <= snapshots[i - 1]) fail("the steps after which it looks must ascend");
+    if (snapshots[i] <= snapshots[i - 1]) fail("the steps after which it observes must ascend");
   if (!action.scale.empty()) fail("an action has bounds, not a scale");
   if (action.name.empty() || observation_size() == 0) fail("expected an action and an observation");
   for (const TensorSpec& tensor : observations) {

@@ -47,8 +47,8 @@ struct EnergyBalanceReader::Impl {
     const auto& stage = table.stage<1>();
     if (m.view.faced) stage.choose_faces_at(m.view, w.stage, w.q0, w.zero, w.stage.faces);
     stage.poses_at(m.view, w.stage, w.q0, w.v0, w.zero, w.poses_before.data());
-    const LaneBooks books = lane_books(m, table, w);
-    return {books.motion, books.height, books.held, books.motors, books.taken, momentum(column)};
+    const EnergyTerms terms = energy_terms(m, table, w);
+    return {terms.motion, terms.height, terms.held, terms.motors, terms.taken, momentum(column)};
   }
 };
 

@@ -113,7 +113,7 @@ struct Ladder {
     for (int i = 0; i < model.nq; ++i) put_lanes<L>(w.q1[i].lane, lanes, w.q0[i].lane);
     for (int i = 0; i < model.nv; ++i) put_lanes<L>(w.v1[i].lane, lanes, w.v0[i].lane);
     for (int l = 0; l < L; ++l)
-      if (has(lanes, l)) w.remembered.now[std::size_t(l)].swap(w.remembered.after[std::size_t(l)]);
+      if (has(lanes, l)) w.shear.now[std::size_t(l)].swap(w.shear.after[std::size_t(l)]);
   }
 
   /// Logs the attempt of length h [s] that ended in q0, v0.
@@ -125,7 +125,7 @@ struct Ladder {
     } else {
       lane.solves->push_back({Integrator(*lane.scheme), h, column(w.q0, model.nq, l),
                               column(w.v0, model.nv, l), column(w.x_inner, inner, l),
-                              w.remembered.now[std::size_t(l)]});
+                              w.shear.now[std::size_t(l)]});
     }
   }
 
@@ -176,7 +176,7 @@ struct Ladder {
     alone.stage.block =
         w.stage.block == nullptr ? nullptr : w.stage.block + w.stage.group * kernels::kGroup + l;
     alone.stage.group = 0;
-    alone.remembered.now[0] = w.remembered.now[std::size_t(l)];
+    alone.shear.now[0] = w.shear.now[std::size_t(l)];
     NewtonReport one;
     one.status[0] = report.status[l];
     one.iterations[0] = report.iterations[l];
@@ -185,7 +185,7 @@ struct Ladder {
         Ladder<1>{model, settings, solver, table, alone, alone, one}.take_halves(h, depth, lane);
     copy_lane(alone.q0, 0, w.q0, l, model.nq);
     copy_lane(alone.v0, 0, w.v0, l, model.nv);
-    w.remembered.now[std::size_t(l)] = alone.remembered.now[0];
+    w.shear.now[std::size_t(l)] = alone.shear.now[0];
     report.status[l] = one.status[0];
     report.iterations[l] = one.iterations[0];
     report.residual[l] = one.residual[0];
@@ -198,7 +198,7 @@ struct Ladder {
     const bool has_root = lane.root != nullptr;
     const std::vector<double> q = column(w.q0, has_root ? model.nq : 0, 0),
                               v = column(w.v0, has_root ? model.nv : 0, 0);
-    const ShearState shear = has_root ? w.remembered.now[0] : ShearState{};
+    const ShearState shear = has_root ? w.shear.now[0] : ShearState{};
     const std::size_t logged = lane.solves == nullptr ? 0 : lane.solves->size();
     unsigned taken = 0;
     bool found = depth < kDeepest;
@@ -217,7 +217,7 @@ struct Ladder {
     if (!has_root) return false;
     for (std::size_t i = 0; i < q.size(); ++i) w.q0[i][0] = q[i];
     for (std::size_t i = 0; i < v.size(); ++i) w.v0[i][0] = v[i];
-    w.remembered.now[0] = shear;
+    w.shear.now[0] = shear;
     if (lane.solves != nullptr)
       lane.solves->erase(lane.solves->begin() + std::ptrdiff_t(logged), lane.solves->end());
     lane.scheme = lane.root;

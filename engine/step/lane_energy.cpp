@@ -33,7 +33,7 @@ struct LaneAt {
   const AlignedVector<LinkPose<Row<L>>>& poses;
   int lane;
   LaneEnergy sum{};
-  LaneBooks* books = nullptr;    ///< if not null, motors do work and hold nothing
+  EnergyTerms* terms = nullptr;  ///< if not null, motors do work and hold nothing
   std::uint64_t* low = nullptr;  ///< scratch of for_each_low_point()
 
   [[nodiscard]] const double* block() const {
@@ -63,7 +63,7 @@ struct LaneAt {
           0.5 * (mass * dot(slide, slide) + 2 * dot(turn, cross(c, slide)) + dot(turn, J * turn));
       const Frame<double> at = world(static_cast<int>(i));
       sum.total -= dot(model.view.gravity, mass * at.p + at.R * c);
-      if (books != nullptr) sum.total -= mass * dot(model.view.gravity, model.origin);
+      if (terms != nullptr) sum.total -= mass * dot(model.view.gravity, model.origin);
     }
   }
 
@@ -79,8 +79,8 @@ struct LaneAt {
     }
     if ((link.effects & kernels::kPositionServo) == 0) return;
     const double P = number(e.P);
-    if (books != nullptr) {
-      books->motors += rate * std::clamp(P * error - number(e.D) * rate, e.force_low, e.force_high);
+    if (terms != nullptr) {
+      terms->motors += rate * std::clamp(P * error - number(e.D) * rate, e.force_low, e.force_high);
       return;
     }
     const double force = std::clamp(P * error, e.force_low, e.force_high);
@@ -92,9 +92,9 @@ struct LaneAt {
     for (const kernels::Link& link : model.links)
       for (int k = link.v; k < link.v + kernels::dofs(link.kind); ++k) {
         const double rate = v[k][lane];
-        books->motors += w.stage.tau[k][lane] * rate;
+        terms->motors += w.stage.tau[k][lane] * rate;
         if ((link.effects & kernels::kDamping) != 0)
-          books->taken += number(model.dof_effects[std::size_t(k)].damping) * rate * rate;
+          terms->taken += number(model.dof_effects[std::size_t(k)].damping) * rate * rate;
       }
   }
 
@@ -107,7 +107,7 @@ struct LaneAt {
         const double energy =
             0.5 * number(model.dof_effects[std::size_t(link.v + k)].armature) * rate * rate;
         sum.moving += energy;
-        if (books != nullptr) books->motion += energy;
+        if (terms != nullptr) terms->motion += energy;
       }
       const auto rate = [&](int k) { return v[link.v + k][lane]; };
       const kernels::DofEffects* e = &model.dof_effects[std::size_t(link.v)];
@@ -156,7 +156,7 @@ struct LaneAt {
       auto own = law;
       for (int i = 0; i < count; ++i) {
         if (areas != nullptr) kernels::set_weighted(law, areas[i], own);
-        books->taken += taken_at(own, point_contact(shape, own, at.R, at.p, W.a, W.l,
+        terms->taken += taken_at(own, point_contact(shape, own, at.R, at.p, W.a, W.l,
                                                     {points[0][i], points[1][i], points[2][i]}));
       }
     });
@@ -173,7 +173,7 @@ struct LaneAt {
       kernels::PointContact<double> p;
       if (ground_contact(law, m, height, twist(ground.link), Vec3<double>{x[0], x[1], x[2]}, radius,
                          p))
-        books->taken += taken_at(law, p);
+        terms->taken += taken_at(law, p);
     });
   }
 
@@ -201,7 +201,7 @@ struct LaneAt {
     const int count = table.find_candidates(
         {&pair, half, pose, w.candidates->lists[k].margin, x, stride, faces, nullptr, areas});
     double square = 0;
-    if (books != nullptr) add_taken(pair, half, faces, link2_in_1, {x, y, z}, areas, count);
+    if (terms != nullptr) add_taken(pair, half, faces, link2_in_1, {x, y, z}, areas, count);
     kernels::with_touched<double>(pair, half, faces, [&]<class Shape>(const Shape& shape) {
       for (int i = 0; i < count; ++i) {
         const Vec3<double> arm = Vec3<double>{x[i], y[i], z[i]} - at.p;
@@ -225,7 +225,7 @@ struct LaneAt {
     for (const kernels::GroundContact& ground : model.grounds) {
       const Frame<double> at = world(ground.link);
       const double radius = kernels::ground_radius<double>(ground, block(), 0);
-      if (books != nullptr) add_taken(ground, at, radius);
+      if (terms != nullptr) add_taken(ground, at, radius);
       double square = 0;
       const Vec3<double> m = transposed_times(at.R, model.view.ground_normal);
       const double height = dot(model.view.ground_normal, at.p - model.view.ground_point);
@@ -281,18 +281,18 @@ double energy_of_friction(const CompiledModel& model, const BasicWorkspace<L>& w
   return sum;
 }
 
-LaneBooks lane_books(const CompiledModel& model, const kernels::KernelTable& table,
-                     SingleWorkspace& w) {
-  LaneBooks books;
-  LaneAt<1> at{model, w, w.poses_before, 0, {}, &books, w.low_points.data()};
+EnergyTerms energy_terms(const CompiledModel& model, const kernels::KernelTable& table,
+                         SingleWorkspace& w) {
+  EnergyTerms terms;
+  LaneAt<1> at{model, w, w.poses_before, 0, {}, &terms, w.low_points.data()};
   at.add_motion();
-  books.motion = at.sum.moving;
-  books.height = at.sum.total;
+  terms.motion = at.sum.moving;
+  terms.height = at.sum.total;
   at.add_powers(w.v0);
   at.add_joints(w.q0, w.v0);
   at.add_contacts(table, w.search.data());
-  books.held = at.sum.moving - books.motion;
-  return books;
+  terms.held = at.sum.moving - terms.motion;
+  return terms;
 }
 
 #define TANGERE_FOR_LANES(L)                                                                     \

@@ -41,7 +41,7 @@ double energy_of_friction(const CompiledModel& model, const BasicWorkspace<L>& w
                           const ShearState& memory, int lane);
 
 /// Energy balance of one environment: stored energy, and power of motors and damping.
-struct LaneBooks {
+struct EnergyTerms {
   double motion = 0;  ///< energy of moving bodies and armatures [J]
   double height = 0;  ///< -Σ gravity·(m p + R c) [J]
   double held = 0;    ///< by springs, limits and contacts [J]
@@ -51,8 +51,8 @@ struct LaneBooks {
 
 /// Computes the energy balance at q0, v0 of a workspace whose poses_before, faces and motor forces
 /// are set. Shear springs are ignored. Overwrites its `search`.
-LaneBooks lane_books(const CompiledModel& model, const kernels::KernelTable& table,
-                     SingleWorkspace& w);
+EnergyTerms energy_terms(const CompiledModel& model, const kernels::KernelTable& table,
+                         SingleWorkspace& w);
 
 /// Frame and body twist of a link in one lane.
 template <int L>

@@ -157,7 +157,7 @@ struct Search {
 
   /// Tests the trials at the present x. Lanes with an accepted, unconverged point then wait for a
   /// direction.
-  void judge() {
+  void test_trials() {
     LaneRow residual, test_norm{};
     scaled_residual(model, table, w, residual);
     if ((factors.lanes & searching) != 0) {
@@ -326,7 +326,7 @@ LaneBits solve_stage(const CompiledModel& model, const kernels::KernelTable& tab
   while (s.searching != 0) {
     s.evaluate(first);
     first = false;
-    s.judge();
+    s.test_trials();
     if (s.waiting != 0 && (s.with_jacobian || s.waiting == s.searching)) s.new_directions();
   }
   if (s.spared != 0) {  // v and candidates where they ended

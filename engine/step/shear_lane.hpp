@@ -159,7 +159,7 @@ template <int L, class F>
 void for_each_contact(const CompiledModel& m, BasicWorkspace<L>& w, int lane, const F& f) {
   for_each_pair(m, w, lane, f);
   const kernels::Row<L>* rows = w.stage.ground_anchors;
-  double* const anchors = w.remembered.ground_anchors.data();
+  double* const anchors = w.shear.ground_anchors.data();
   for (const kernels::ShearSpringContact& of : m.shear_springs) {
     if (!of.ground) continue;
     for (int k = 0; k < of.contact.n_points; ++k)
@@ -171,22 +171,21 @@ void for_each_contact(const CompiledModel& m, BasicWorkspace<L>& w, int lane, co
 }
 
 /// Calls f as for_each_contact() does for the points of elastic sensors that touch where `end`
-/// says. The anchors are those of w.remembered.now. Sensors that keep anchors are left out.
+/// says. The anchors are those of w.shear.now. Sensors that keep anchors are left out.
 template <int L, class F>
 void for_each_touching_sensor(const CompiledModel& m, const kernels::KernelTable& table,
                               BasicWorkspace<L>& w,
                               const AlignedVector<kernels::LinkPose<kernels::Row<L>>>& end,
                               int lane, const F& f) {
-  TouchingSensorPoints& felt = w.remembered.felt;
+  TouchingSensorPoints& felt = w.shear.felt;
   for (const kernels::ShearSpringContact& of : m.shear_springs) {
     if (of.sensor < 0 || m.shear_interval(of) > 0) continue;
     const kernels::ShearSpringPoints points =
         felt.find(m.sensors[std::size_t(of.sensor)], table, touch_of(m, w, of, end, lane));
     if (points.count == 0) continue;
-    shear_of_points(w.remembered.now[std::size_t(lane)], of, felt.index(), points.count,
-                    points.stride, points.anchors + 3 * points.stride,
-                    w.remembered.next[std::size_t(lane)]);
-    table.recall(touch_of(m, w, of, w.remembered.start_touches, lane), points);
+    shear_of_points(w.shear.now[std::size_t(lane)], of, felt.index(), points.count, points.stride,
+                    points.anchors + 3 * points.stride, w.shear.next[std::size_t(lane)]);
+    table.recall(touch_of(m, w, of, w.shear.start_touches, lane), points);
     f(of, felt.index(), points);
   }
 }

@@ -19,9 +19,9 @@ template <int L>
 void advance_points(const CompiledModel& m, const kernels::KernelTable& table, BasicWorkspace<L>& w,
                     const ShearSpringContact& of, int lane, const int* index,
                     const ShearSpringPoints& points) {
-  double* const s = w.remembered.s.data();
-  table.advance(touch_of(m, w, of, w.remembered.end_touches, lane), points, s, nullptr);
-  ShearState& after = w.remembered.after[std::size_t(lane)];
+  double* const s = w.shear.s.data();
+  table.advance(touch_of(m, w, of, w.shear.end_touches, lane), points, s, nullptr);
+  ShearState& after = w.shear.after[std::size_t(lane)];
   const double* const touches = s + 3 * points.stride;
   for (int k = 0; k < points.count; ++k) {
     if (!(touches[k] > 0)) continue;
@@ -78,7 +78,7 @@ void find_grounded(const AlignedVector<Row<L>>& kept, std::vector<int>& out) {
 template <int L>
 void begin_shear(const CompiledModel& m, const kernels::KernelTable& table, BasicWorkspace<L>& w) {
   if (m.shear_springs.empty()) return;
-  ShearLanes<L>& lanes = w.remembered;
+  ShearLanes<L>& lanes = w.shear;
   find_touches(m, table, w, w.q0, w.v0, lanes.start, lanes.start_touches);
   if (m.ground_anchors == 0) return;
   Row<L>* const s = lanes.ground.data();
@@ -93,17 +93,17 @@ void set_list_anchors(const CompiledModel& m, const kernels::KernelTable& table,
   if (list.own_count[lane] == 0) return;
   const ShearSpringContact& of = m.shear_springs[std::size_t(m.pairs[std::size_t(k)].memory)];
   const ShearSpringPoints points = listed<L>(list, lane);
-  shear_of_points(w.remembered.now[std::size_t(lane)], of, list.own_index + list.stride * lane,
+  shear_of_points(w.shear.now[std::size_t(lane)], of, list.own_index + list.stride * lane,
                   points.count, points.stride, points.anchors + 3 * points.stride,
-                  w.remembered.next[std::size_t(lane)]);
-  table.recall(touch_of(m, w, of, w.remembered.start_touches, lane), points);
+                  w.shear.next[std::size_t(lane)]);
+  table.recall(touch_of(m, w, of, w.shear.start_touches, lane), points);
 }
 
 template <int L>
 void update_shear_state(const CompiledModel& m, const kernels::KernelTable& table,
                         BasicWorkspace<L>& w, LaneBits lanes) {
   if (m.shear_springs.empty() || lanes == 0) return;
-  ShearLanes<L>& of_lanes = w.remembered;
+  ShearLanes<L>& of_lanes = w.shear;
   find_touches(m, table, w, w.q1, w.v1, of_lanes.end, of_lanes.end_touches);
   if (m.ground_anchors > 0) {
     table.stage<L>().advance_ground(m.view, w.stage, of_lanes.end_touches.data(),
@@ -131,7 +131,7 @@ void update_shear_state(const CompiledModel& m, const kernels::KernelTable& tabl
 template <int L>
 void update_sensor_shear_state(const CompiledModel& m, const kernels::KernelTable& table,
                                BasicWorkspace<L>& w, std::span<const ReadingLane> lanes) {
-  ShearLanes<L>& of_lanes = w.remembered;
+  ShearLanes<L>& of_lanes = w.shear;
   bool found = false;
   for (int l = 0; l < L; ++l) {
     const ReadingLane& lane = lanes[std::size_t(l)];

@@ -127,7 +127,7 @@ LaneBits energy_gains(const CompiledModel& model, const std::vector<double>& com
                      after = energy_of_bodies(model, w, w.poses_after, w.q1, w.v1, l);
     double gain = after.total - before.total;
     for (int i = 0; i < model.nv; ++i) gain -= w.stage.tau[i][l] * w.stage.x[i][l];
-    const ShearLanes<L>& memory = w.remembered;
+    const ShearLanes<L>& memory = w.shear;
     const double held = energy_of_contacts(model, table, w, w.poses_before, l) +
                         energy_of_friction(model, w, memory.now[std::size_t(l)], l),
                  holds = energy_of_contacts(model, table, w, w.poses_after, l) +

@@ -25,7 +25,7 @@ using kernels::kGroup;
 using kernels::Row;
 
 /// Stores a lane's state before a step replaces it, for sensors with lag.
-static void remember(const BlockLayout& layout, double* column, std::int64_t steps) {
+static void store_past_state(const BlockLayout& layout, double* column, std::int64_t steps) {
   const int numbers = layout.previous_q - layout.q;
   const int place = layout.past + numbers * static_cast<int>(steps % layout.past_states);
   for (int k = 0; k < numbers; ++k) column[(place + k) * kBlock] = column[(layout.q + k) * kBlock];
@@ -162,8 +162,7 @@ struct Stepper::Impl {
     if (!m.shear_springs.empty())
       for (int l = 0; l < L; ++l) {
         const ShearState& memory = batch.shear_[std::size_t(g.first + lane + l)];
-        w.remembered.now[std::size_t(l)].assign(memory.begin() + kept_entries(m, memory),
-                                                memory.end());
+        w.shear.now[std::size_t(l)].assign(memory.begin() + kept_entries(m, memory), memory.end());
       }
     w.stage.block = g.rows + lane;
     w.stage.group = 0;
@@ -192,11 +191,11 @@ struct Stepper::Impl {
       batch.iterations_[e] = report.iterations[l];
       batch.residual_[e] = report.residual[l];
       if (failed(report.status[l])) continue;
-      if (m.layout.past_states > 0) remember(m.layout, g.rows + lane + l, batch.steps_[e]);
+      if (m.layout.past_states > 0) store_past_state(m.layout, g.rows + lane + l, batch.steps_[e]);
       ++batch.steps_[e];
       if (!m.shear_springs.empty()) {
         ShearState& memory = batch.shear_[e];
-        const ShearState& now = w.remembered.now[std::size_t(l)];
+        const ShearState& now = w.shear.now[std::size_t(l)];
         memory.resize(std::size_t(kept_entries(m, memory)));
         memory.insert(memory.end(), now.begin(), now.end());
         reading[std::size_t(l)] = {batch.steps_[e], &memory};
@@ -296,7 +295,7 @@ struct Stepper::Impl {
       batch.status_[e] = StepStatus::converged;
       batch.iterations_[e] = 0;
       batch.residual_[e] = 0;
-      if (layout.past_states > 0) remember(layout, g.rows + l, batch.steps_[e]);
+      if (layout.past_states > 0) store_past_state(layout, g.rows + l, batch.steps_[e]);
       ++batch.steps_[e];
       batch.sleep_[e].slept += batch.sleep_[e].bodies;
     }

@@ -67,16 +67,16 @@ void BasicWorkspace<L>::make_memory(const CompiledModel& m) {
     most = std::max(most, std::size_t(stride));
     if (of.ground) most_on_ground = std::max(most_on_ground, std::size_t(stride));
   }
-  remembered.ground.resize(4 * std::size_t(m.ground_anchors));
-  remembered.grounded.reserve(std::size_t(m.ground_anchors));
-  remembered.ground_anchors.resize(most_on_ground * kernels::kAnchorNumbers);
-  remembered.s.resize(4 * most);
-  remembered.felt = TouchingSensorPoints(m);
-  remembered.start.resize(m.links.size());
-  remembered.end.resize(m.links.size());
-  remembered.start_touches.resize(m.shear_springs.size());
-  remembered.end_touches.resize(m.shear_springs.size());
-  for (auto* lanes : {&remembered.now, &remembered.after})
+  shear.ground.resize(4 * std::size_t(m.ground_anchors));
+  shear.grounded.reserve(std::size_t(m.ground_anchors));
+  shear.ground_anchors.resize(most_on_ground * kernels::kAnchorNumbers);
+  shear.s.resize(4 * most);
+  shear.felt = TouchingSensorPoints(m);
+  shear.start.resize(m.links.size());
+  shear.end.resize(m.links.size());
+  shear.start_touches.resize(m.shear_springs.size());
+  shear.end_touches.resize(m.shear_springs.size());
+  for (auto* lanes : {&shear.now, &shear.after})
     for (ShearState& lane : *lanes) lane.reserve(std::size_t(m.taped_points));
 }
 
@@ -90,16 +90,16 @@ void BasicWorkspace<L>::use(CandidateLists<L>& lists) {
 template <int L>
 std::size_t BasicWorkspace<L>::bytes(const CompiledModel& m) {
   BasicWorkspace w(m);
-  const std::size_t remembered = 2 * L * std::size_t(m.taped_points) * sizeof(ShearEntry) +
-                                 w.remembered.ground.size() * sizeof(LaneRow) +
-                                 w.remembered.ground_anchors.size() * sizeof(double);
+  const std::size_t shear_bytes = 2 * L * std::size_t(m.taped_points) * sizeof(ShearEntry) +
+                                  w.shear.ground.size() * sizeof(LaneRow) +
+                                  w.shear.ground_anchors.size() * sizeof(double);
   const std::size_t poses =
-      w.poses_before.size() + w.remembered.start.size() + w.remembered.start_touches.size();
+      w.poses_before.size() + w.shear.start.size() + w.shear.start_touches.size();
   const std::size_t watched =
       2 * poses * sizeof(kernels::LinkPose<LaneRow>) + w.search.size() * sizeof(double);
   // In scenes of many link pairs, few of the lists are ever made.
   const std::size_t listed = m.link_balls.empty() ? CandidateLists<L>::most_bytes(m) : 0;
-  return remembered + watched + listed + w.memory.size() * sizeof(LaneRow) + w.scratch.size();
+  return shear_bytes + watched + listed + w.memory.size() * sizeof(LaneRow) + w.scratch.size();
 }
 
 template <int L>

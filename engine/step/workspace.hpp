@@ -92,7 +92,7 @@ struct BasicWorkspace {
   BlockEntries block_entries;
   Rows blocks;  ///< storage of stage.A
   BlockFactors block_factors;
-  ShearLanes<L> remembered;
+  ShearLanes<L> shear;
 };
 using Workspace = BasicWorkspace<kernels::kGroup>;
 using SingleWorkspace = BasicWorkspace<1>;

@@ -7,12 +7,12 @@
 namespace tangere {
 
 DatasetLayout dataset_layout_from(const Model& model, const Stepper& stepper,
-                                  const DatasetLayout& asked) {
+                                  const DatasetLayout& requested) {
   const Scene& scene = model.scene();
-  DatasetLayout layout = asked;
-  static_cast<RunFacts&>(layout) = run_facts(model, stepper, asked, asked.seed);
+  DatasetLayout layout = requested;
+  static_cast<RunFacts&>(layout) = run_facts(model, stepper, requested, requested.seed);
   for (std::size_t i = 0; i < model.sensors().size(); ++i)
-    layout.sensors.push_back(sensor_layout(model.sensors()[i], scene.sensors[i], asked.every));
+    layout.sensors.push_back(sensor_layout(model.sensors()[i], scene.sensors[i], requested.every));
   layout.tables = tables_of(scene);
   layout.body_names.assign(model.body_names().begin(), model.body_names().end());
   return layout;

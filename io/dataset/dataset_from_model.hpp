@@ -7,8 +7,8 @@
 
 namespace tangere {
 
-/// Returns `asked` with the facts of a run of `model` by `stepper`, its bodies, sensors and tables.
+/// Returns `requested` with the facts of a run of `model` by `stepper`, its bodies, sensors and tables.
 DatasetLayout dataset_layout_from(const Model& model, const Stepper& stepper,
-                                  const DatasetLayout& asked);
+                                  const DatasetLayout& requested);
 
 }  // namespace tangere

@@ -15,7 +15,7 @@ namespace tangere {
 struct MergeOptions {
   bool copy = false;       ///< numbers too, not links to the shards
   bool overwrite = false;  ///< replace the results of an earlier merge
-  /// Asked between demos; true ends the merge, which then leaves nothing. Empty: never.
+  /// Called between demos; true ends the merge, which then leaves nothing. Empty: never.
   std::function<bool()> stop = {};
 };
 

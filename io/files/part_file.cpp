@@ -43,7 +43,7 @@ void check_folder(const std::string& output) {
     if (errno == ENOENT)
       throw IoError(fmt::format(
           "cannot write '{}': the folder '{}' does not exist; create it first", output, folder));
-    fail("look at the folder", folder, errno);
+    fail("read the folder", folder, errno);
   }
   if (!S_ISDIR(info.st_mode))
     throw IoError(fmt::format("cannot write '{}': '{}' is not a folder", output, folder));

@@ -118,7 +118,7 @@ void WrittenBytes::add(std::uint64_t offset, std::span<const unsigned char> byte
   if (bytes.empty()) return;
   compared_ = false;
   const std::uint64_t end = offset + bytes.size(), sum = sum_of(offset, bytes);
-  forget(offset, end);
+  clear_sums(offset, end);
   size_ = std::max(size_, end);
   auto name = names_.find(what.name);
   if (name == names_.end()) name = names_.emplace(what.name).first;
@@ -138,7 +138,7 @@ void WrittenBytes::add(std::uint64_t offset, std::span<const unsigned char> byte
 
 /// Of a piece that is partly in [begin, end), takes the sum of what the file has there away: if
 /// that is not what was written, the rest no longer fits either.
-void WrittenBytes::forget(std::uint64_t begin, std::uint64_t end) {
+void WrittenBytes::clear_sums(std::uint64_t begin, std::uint64_t end) {
   Reader reader(descriptor_, path_, 0);
   auto next = pieces_.upper_bound(begin);
   if (next != pieces_.begin() && std::prev(next)->second.end > begin) --next;
@@ -159,7 +159,7 @@ void WrittenBytes::forget(std::uint64_t begin, std::uint64_t end) {
 
 void WrittenBytes::end_at(std::uint64_t size) {
   compared_ = false;
-  if (size < size_) forget(size, size_);
+  if (size < size_) clear_sums(size, size_);
   size_ = size;
 }
 
@@ -202,7 +202,7 @@ void WrittenBytes::compare_all() {
   compare_unused(size_);
   struct stat info {};
   if (fstat(descriptor_, &info) != 0)
-    throw IoError(fmt::format("cannot look at '{}': {}", path_, std::strerror(errno)));
+    throw IoError(fmt::format("cannot read '{}': {}", path_, std::strerror(errno)));
   if (static_cast<std::uint64_t>(info.st_size) != size_)
     throw IoError(
         fmt::format("'{}' is damaged: it has {} bytes; expected {}", path_, info.st_size, size_));

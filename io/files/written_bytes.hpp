@@ -49,7 +49,7 @@ class WrittenBytes {
     const std::string* name;
     std::int64_t number;
   };
-  void forget(std::uint64_t begin, std::uint64_t end);
+  void clear_sums(std::uint64_t begin, std::uint64_t end);
   [[noreturn]] void tell_difference(std::uint64_t begin, std::uint64_t end, const std::string& name,
                                     std::int64_t number) const;
 

@@ -151,7 +151,7 @@ Id create_memory_file() {
   return file;
 }
 
-Id open_file(const std::string& path, bool forget) {
+Id open_file(const std::string& path, bool evict) {
   const Quiet quiet;
   note_file(path);
   require_regular_file(path, "an HDF5 file");
@@ -159,7 +159,7 @@ Id open_file(const std::string& path, bool forget) {
   const Id access(H5Pcreate(H5P_FILE_ACCESS));
   H5Pset_fclose_degree(access.get(), H5F_CLOSE_STRONG);
   H5Pset_file_locking(access.get(), false, true);  // read-only folders and network mounts
-  H5Pset_evict_on_close(access.get(), forget);
+  H5Pset_evict_on_close(access.get(), evict);
   Id file(H5Fopen(path.c_str(), H5F_ACC_RDONLY, access.get()));
   if (file.get() < 0) throw IoError(fmt::format("cannot read '{}': {}", path, last_reason()));
   return file;

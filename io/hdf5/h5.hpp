@@ -39,10 +39,10 @@ Id create_file(const std::string& path, WrittenBytes* written = nullptr,
 /// A file that is never on disk.
 Id create_memory_file();
 /// Opens a file for reading. Devices, pipes and folders are refused. Links and views may name files
-/// of the same folder only, and datasets with external raw storage cannot be opened. With `forget`
+/// of the same folder only, and datasets with external raw storage cannot be opened. With `evict`
 /// the library does not cache descriptions of closed objects, because searching tens of thousands
 /// of them is slow.
-Id open_file(const std::string& path, bool forget = false);
+Id open_file(const std::string& path, bool evict = false);
 /// Opens a file for reading and writing, as create_file left it.
 Id change_file(const std::string& path, WrittenBytes* written = nullptr);
 /// Gives a name to the object at an address of the file.

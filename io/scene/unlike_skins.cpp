@@ -47,11 +47,11 @@ double points_on_face(const Shape& shape, const RectArray& array) {
 /// Estimates how many of some points (n, 3) lie on an area [1/m²]: one on the square of the
 /// distance to its nearest neighbour, the median over 64 points at most. 0: fewer than two points.
 double points_by_distance(const std::vector<double>& points) {
-  const std::size_t n = points.size() / 3, looks = std::min<std::size_t>(n, 64);
+  const std::size_t n = points.size() / 3, samples = std::min<std::size_t>(n, 64);
   if (n < 2) return 0;
   std::vector<double> areas;
-  for (std::size_t look = 0; look < looks; ++look) {
-    const double* const p = &points[3 * (look * n / looks)];
+  for (std::size_t i = 0; i < samples; ++i) {
+    const double* const p = &points[3 * (i * n / samples)];
     double nearest = std::numeric_limits<double>::infinity();
     for (std::size_t k = 0; k < n; ++k) {
       const double* const q = &points[3 * k];
@@ -60,8 +60,8 @@ double points_by_distance(const std::vector<double>& points) {
     }
     areas.push_back(nearest);
   }
-  std::nth_element(areas.begin(), areas.begin() + static_cast<long>(looks / 2), areas.end());
-  return 1 / areas[looks / 2];  // 0 where all lie at one place
+  std::nth_element(areas.begin(), areas.begin() + static_cast<long>(samples / 2), areas.end());
+  return 1 / areas[samples / 2];  // 0 where all lie at one place
 }
 
 double points_of_sensor(const TactileDescription& d) {

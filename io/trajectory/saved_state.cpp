@@ -143,7 +143,7 @@ SavedState read_state(const std::string& path, std::optional<std::int64_t> row) 
     state.previous_q = read_row(q, at - 1);
     state.previous_v = read_row(v, at - 1);
   }
-  if (state.sleep > 0) state.sleepers = read_sleep(file, at, rows.size(), state.environments);
+  if (state.sleep > 0) state.sleep_state = read_sleep(file, at, rows.size(), state.environments);
   state.memory = read_memory(file, state.environments, state.row, state.memory_rows);
   return state;
 }
@@ -159,9 +159,9 @@ void restore_state(const SavedState& from, bool continues, Batch& batch) {
   const ShearStateArrays points = shear_state_arrays(model);
   const bool remembers = model.has_shear_springs() && from.memory;
   if (remembers) check_points(from, points);
-  const bool sleeps = continues && from.sleepers;
+  const bool sleeps = continues && from.sleep_state;
   if (sleeps)
-    check_names(from, "trees that may sleep", from.sleepers->trees, sleeping_trees(model));
+    check_names(from, "trees that may sleep", from.sleep_state->trees, sleeping_trees(model));
   std::vector<double> displacements(3 * points.count());
   for (int e = 0; e < batch.environments(); ++e) {
     const auto part = [e](const std::vector<double>& all, std::size_t width) {
@@ -180,7 +180,7 @@ void restore_state(const SavedState& from, bool continues, Batch& batch) {
         std::copy_n(entry.s, 3, &displacements[3 * static_cast<std::size_t>(entry.point)]);
       batch.set_shear_state(e, points.read(displacements));
     }
-    if (sleeps) batch.set_sleep(e, from.sleepers->environments[static_cast<std::size_t>(e)]);
+    if (sleeps) batch.set_sleep(e, from.sleep_state->environments[static_cast<std::size_t>(e)]);
     const StepStatus status = from.status[static_cast<std::size_t>(e)];
     if (failed(status)) batch.set_failed(e, status);
   }

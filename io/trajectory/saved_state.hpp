@@ -32,7 +32,7 @@ struct SavedState {
   std::vector<double> previous_q, previous_v;  ///< of row K - 1; empty if the file lacks it
   std::optional<SavedMemory> memory;           ///< none: the file does not hold it at row K
   std::vector<std::int64_t> memory_rows;       ///< those at which the file holds it
-  std::optional<SavedSleep> sleepers;          ///< none: the file has no sleep state
+  std::optional<SavedSleep> sleep_state;       ///< none: the file has no sleep state
   std::vector<StepStatus> status;              ///< (E) of the step to this row; converged for row 0
 };
 

@@ -99,28 +99,28 @@ Vec3<N> pull_back_touch_point(const LoadedTouch<N>& t, const PointContact<N>& p,
 }
 
 template <class N>
-Vec3<N> s_of(const PointContact<N>& p, const Vec3<N>& remembered) {
-  return select(p.d < N(0.0), remembered, zero3<N>());
+Vec3<N> s_of(const PointContact<N>& p, const Vec3<N>& s_start) {
+  return select(p.d < N(0.0), s_start, zero3<N>());
 }
 
 template <class Shape, class N>
 Anchor<N> recalled(const Shape& shape, const LoadedTouch<N>& t, const Vec3<N>& xi,
-                   const Vec3<N>& remembered) {
+                   const Vec3<N>& s_start) {
   PointContact<N> p;
   find_place(shape, t, xi, p);
-  const Vec3<N> s = s_of(p, remembered);
+  const Vec3<N> s = s_of(p, s_start);
   return {p.x2, transposed_times(t.Q, p.x2 - s - t.c), max(p.d, N(0.0))};
 }
 
 /// Adds to (θ; ρ) of body 2 and to ξ̄, and returns s̄.
 template <class Shape, class N>
 Vec3<N> pull_back_recall(const Shape& shape, const LoadedTouch<N>& t, const Vec3<N>& xi,
-                         const Vec3<N>& remembered, const Anchor<N>& bar, Vec6<N>& out,
+                         const Vec3<N>& s_start, const Anchor<N>& bar, Vec6<N>& out,
                          Vec3<N>& xi_bar) {
   const N zero(0.0);
   PointContact<N> p;
   find_place(shape, t, xi, p);
-  const Vec3<N> y = t.Q * bar.a, at = p.x2 - s_of(p, remembered);
+  const Vec3<N> y = t.Q * bar.a, at = p.x2 - s_of(p, s_start);
   out.l -= y;
   out.a -= cross(at, y);
   xi_bar += pull_back_touch_point<Shape>(t, p, xi, select(p.d > zero, bar.gap, zero), zero3<N>(),

@@ -154,8 +154,8 @@ void pull_back_memory(const ShearPullback& m) {
         store3(kept * bar.a, m.anchor_out + 3 * stride, stride, k);
         bar = {found * bar.b, found * bar.a, found * bar.gap};
       }
-      const Vec3<N> s = pull_back_recall(shape, start, xi, load3<A>(m.remembered, stride, k), bar,
-                                         of_start, own.xi);
+      const Vec3<N> s =
+          pull_back_recall(shape, start, xi, load3<A>(m.s_start, stride, k), bar, of_start, own.xi);
       if (m.own != nullptr) add_own<A>(own, m.end->law, m.own + k, stride);
       store3(load3<A>(m.s_out, stride, k) + s, m.s_out, stride, k);
     }

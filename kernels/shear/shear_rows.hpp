@@ -59,9 +59,9 @@ void recall_ground(const ModelView& m, const LinkPose<N>* touches, const N* s, N
     if (!of.ground) continue;
     const LoadedTouch<N> t = ground_touch(of, touches[i], block, group);
     for (int k = 0; k < of.contact.n_points; ++k, anchors += kAnchorNumbers) {
-      Vec3<N> remembered = zero3<N>();
-      if (s != nullptr) remembered = {s[0], s[1], s[2]}, s += 3;
-      const Anchor<N> x = recalled(PlaneDistance<N>{}, t, place_of<N>(of, k), remembered);
+      Vec3<N> s_start = zero3<N>();
+      if (s != nullptr) s_start = {s[0], s[1], s[2]}, s += 3;
+      const Anchor<N> x = recalled(PlaneDistance<N>{}, t, place_of<N>(of, k), s_start);
       anchors[0] = x.b.x, anchors[1] = x.b.y, anchors[2] = x.b.z;
       anchors[3] = x.a.x, anchors[4] = x.a.y, anchors[5] = x.a.z;
       anchors[6] = x.gap;

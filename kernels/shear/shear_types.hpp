@@ -39,9 +39,9 @@ struct ShearCotangentSums {
 struct ShearPullback {
   const ShearSpringTouch *start, *end;
   ShearSpringPoints points;
-  const double* remembered;  ///< (3, stride) s where the step began
-  const double* s_bar;       ///< (3, stride) of s' at its end; or null: zeros
-  const double* f_bar;       ///< (3, stride) of forces, body 1's axes; or null: those of `slip`
+  const double* s_start;  ///< (3, stride) s where the step began
+  const double* s_bar;    ///< (3, stride) of s' at its end; or null: zeros
+  const double* f_bar;    ///< (3, stride) of forces, body 1's axes; or null: those of `slip`
   /// The slip Y along λ (kernels/reverse/adjoint.hpp), with power -Yᵀw of the forces. Then no
   /// derivatives by the final motion are added, because the matrix of the step contains them.
   const Vec6<double>* slip;

@@ -142,7 +142,7 @@ struct PythonBatch::Waiting {
 template <class T>
 Run PythonBatch::run_as(std::span<const double> u, std::size_t steps, std::size_t every,
                         const std::vector<std::string>& readings, const std::vector<int>& moving) {
-  struct Asked {
+  struct Requested {
     FieldOutput output;
     std::size_t width;
     std::span<T> numbers;
@@ -156,15 +156,15 @@ Run PythonBatch::run_as(std::span<const double> u, std::size_t steps, std::size_
   std::span<std::int8_t> status;
   run.status = new_array<std::int8_t>({count()}, status);
   std::vector<StepStatus> statuses(count());
-  std::vector<Asked> asked;
+  std::vector<Requested> requested;
   for (const std::string& name : readings) {
     if (run.readings.contains(name))
       throw InputError(fmt::format("reading '{}' is listed twice; expected each once", name));
-    asked.push_back({reading_named(name), 0, {}});
-    Shape shape = shape_of_reading(asked.back().output);
+    requested.push_back({reading_named(name), 0, {}});
+    Shape shape = shape_of_reading(requested.back().output);
     shape.insert(shape.begin(), {frames, count()});
-    run.readings[name] = nb::cast(new_array<T>(shape, asked.back().numbers));
-    asked.back().width = asked.back().numbers.size() / (frames * count());
+    run.readings[name] = nb::cast(new_array<T>(shape, requested.back().numbers));
+    requested.back().width = requested.back().numbers.size() / (frames * count());
   }
   const auto row = [&](auto numbers, std::size_t frame, int e, std::size_t width) {
     return numbers.subspan((frame * count() + as_size(e)) * width, width);
@@ -181,7 +181,7 @@ Run PythonBatch::run_as(std::span<const double> u, std::size_t steps, std::size_
         read_states(
             batch_, block, [&](int e) { return row(q, frame, e, nq); },
             [&](int e) { return row(v, frame, e, nv); });
-        for (const Asked& a : asked)
+        for (const Requested& a : requested)
           read_field<T>(worker.readout, batch_, block, a.output,
                         [&](int e) { return row(a.numbers, frame, e, a.width); });
       }
@@ -398,7 +398,7 @@ static void add_run(nb::module_& m) {
       .def_prop_ro(
           "fields", [](const Run& r) { return r.readings; },
           nb::for_getter(nb::sig("def fields(self) -> dict[str, numpy.typing.NDArray]")),
-          "What was asked for by name: (F, E, …), as Batch.tactile() returns it.")
+          "What was requested by name: (F, E, …), as Batch.tactile() returns it.")
       .def_ro("model", &Run::model)
       .def_ro("interval", &Run::interval, "Between two frames [s].")
       .def_prop_ro(

@@ -9,9 +9,9 @@
 
 namespace tangere::python {
 
-int threads_of(const std::optional<Whole<int>>& asked) {
-  if (!asked) return tbb::info::default_concurrency();
-  const int threads = asked->value("threads");
+int threads_of(const std::optional<Whole<int>>& requested) {
+  if (!requested) return tbb::info::default_concurrency();
+  const int threads = requested->value("threads");
   if (threads < 1)
     throw InputError(fmt::format("{} threads; expected at least 1, or None", threads));
   return threads;

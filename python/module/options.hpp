@@ -11,7 +11,7 @@
 namespace tangere::python {
 
 /// Threads of a `threads` argument: as many as the process may use, for None.
-int threads_of(const std::optional<Whole<int>>& asked);
+int threads_of(const std::optional<Whole<int>>& requested);
 
 /// The precision of that name. Throws InputError for another name than "mixed" and "double".
 Precision precision_named(const std::string& name);

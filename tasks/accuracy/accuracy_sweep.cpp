@@ -215,11 +215,11 @@ class Sweep {
     point.rate = outcome.simulated_seconds / (outcome.step_seconds + outcome.read_seconds[p]);
     point.failed = static_cast<int>(outcome.failures.size());
     point.status = status_of(outcome, episodes_.start.environments());
-    judge(point);
+    set_errors(point);
     return point;
   }
 
-  void judge(AccuracyPoint& point) const {
+  void set_errors(AccuracyPoint& point) const {
     point.error = quantile(point.errors, 0.95);
     point.bound = sure_quantile(point.errors, 0.95);
     point.median = quantile(point.errors, 0.5);
@@ -322,7 +322,7 @@ class Sweep {
     point.errors.insert(point.errors.end(), more.begin(), more.end());
     if (point.failed == 0) point.status = status_of(seen, static_cast<int>(more.size()));
     point.failed += static_cast<int>(seen.failures.size());
-    judge(point);
+    set_errors(point);
   }
 
   bool measure_own() {

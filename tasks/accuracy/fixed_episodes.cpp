@@ -98,8 +98,8 @@ std::optional<FixedEpisodes> task_episodes(const Batch& start, const Task& task,
       for (int e = first; e < first + lanes; ++e)
         if (!batch.held(e) && !failed(batch.status(e)))
           episodes.samples_of[as_size(e)] = static_cast<int>((t + 1) / every);
-      program.look(t, batch, b);
-      if ((t + 1) % task.spec().steps_per_action == 0) program.judge(batch, b);
+      program.after_step(t, batch, b);
+      if ((t + 1) % task.spec().steps_per_action == 0) program.after_row(batch, b);
     }
   }
   return episodes;

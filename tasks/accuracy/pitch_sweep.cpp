@@ -115,7 +115,7 @@ class Rung {
   [[nodiscard]] double read_seconds(std::size_t s) const { return read_seconds_[s]; }
 
   /// Reads all sensors at the states of a block: as fields, which is timed, and as sums.
-  void feel(const Batch& at, int block, std::size_t s) {
+  void read_sensors(const Batch& at, int block, std::size_t s) {
     const int first = block * kBlock, lanes = lanes_of(at, block);
     std::vector<double> q(as_size(model_.nq())), v(as_size(model_.nv()));
     for (int e = first; e < first + lanes; ++e) {
@@ -150,7 +150,7 @@ class Rung {
   }
 
   /// Fills in the errors of a sensor. Environments without a force do not count.
-  void judge(std::size_t s, PitchPoint& point) const {
+  void set_errors(std::size_t s, PitchPoint& point) const {
     std::vector<double> force, centre;
     for (std::size_t i = index(s, 0); i < index(s + 1, 0); ++i) {
       if (!(square_[i] > 0)) continue;
@@ -246,7 +246,7 @@ class Pitches {
     const int first = b * kBlock, lanes = lanes_of(batch, b);
     const auto after_sample = [&](int) {
       for (const auto& rung : rungs_)
-        for (const std::size_t s : swept_) rung->feel(batch, b, s);
+        for (const std::size_t s : swept_) rung->read_sensors(batch, b, s);
       reads_ += lanes;
       for (int e = first; e < first + lanes; ++e) {
         if (batch.held(e) || failed(batch.status(e))) continue;
@@ -265,7 +265,7 @@ class Pitches {
     point.cols = rung.array(s).cols;
     point.pitch = rung.pitch(s);
     point.own = rung.factor() == 1;
-    rung.judge(s, point);
+    rung.set_errors(s, point);
     point.read_seconds =
         rung.read_seconds(s) / static_cast<double>(std::max<std::int64_t>(1, reads_));
     point.rate = static_cast<double>(samples_) * episodes_.interval() /

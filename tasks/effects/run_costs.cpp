@@ -22,11 +22,11 @@ constexpr double kPoseAndTwist = 13, kPlace = 3;
 constexpr std::int64_t kNumber = sizeof(double);
 
 /// How often a run of the scene takes a plain output, per step; 0: not at all.
-struct Asked {
+struct Requested {
   double per_step = 1;
   std::string by;
 };
-Asked asked_for(const Scene& scene, const std::string& name, std::int64_t steps) {
+Requested requested_rows(const Scene& scene, const std::string& name, std::int64_t steps) {
   const bool state = name == "q";  // simulate stores it in any case
   if (!scene.outputs) return {1, "no <outputs>: every row"};
   for (const std::string& word : scene.outputs->record) {
@@ -106,20 +106,22 @@ std::vector<RunCost> measure_run_costs(TimedModel& timed, const StepTimes& times
     for (int e = 0; e < count; ++e) of_one(e);
     return count;
   };
-  const auto add = [&](const char* name, const Asked& asked, double numbers, Work work) {
-    costs.push_back(
-        {name, asked.by, asked.per_step > 0, 0, asked.per_step, std::int64_t(numbers) * kNumber});
+  const auto add = [&](const char* name, const Requested& requested, double numbers, Work work) {
+    costs.push_back({name, requested.by, requested.per_step > 0, 0, requested.per_step,
+                     std::int64_t(numbers) * kNumber});
     works.push_back(std::move(work));
   };
-  const auto asked = [&](const char* name) { return asked_for(scene, name, timed.run_steps()); };
-  add("rows of q and v", asked("q"), double(nq + nv),
+  const auto requested = [&](const char* name) {
+    return requested_rows(scene, name, timed.run_steps());
+  };
+  add("rows of q and v", requested("q"), double(nq + nv),
       [&] { return first_block([&](int e) { end->get_q(e, q), end->get_v(e, v); }); });
-  add("rows of bodies", asked("bodies"), kPoseAndTwist * double(nb),
+  add("rows of bodies", requested("bodies"), kPoseAndTwist * double(nb),
       [&] { return first_block([&](int e) { readout.bodies(*end, e, pose, twist); }); });
   if (!places.empty())
-    add("rows of variables", asked("variables"), kPlace * double(model.end_effectors().size()),
+    add("rows of variables", requested("variables"), kPlace * double(model.end_effectors().size()),
         [&] { return first_block([&](int e) { readout.end_effectors(*end, e, places); }); });
-  const Asked nobody{0, "--audit"};
+  const Requested nobody{0, "--audit"};
   // Energies and momenta at both ends of every step, and the work in between.
   add("audit", nobody, 3 + 6 + 3, [&] {
     return first_block([&](int e) {

@@ -173,8 +173,8 @@ double gradient_bytes(const Model& model, int environments, const TapeOptions& o
          o.threads * (tape + 2 * double(Stepper::workspace_bytes(model)) + 8 * of_points);
 }
 
-double gradient_bytes(const Task& task, std::int64_t episodes, const TapeOptions& asked) {
-  const TapeOptions o = checked(task, episodes, asked);
+double gradient_bytes(const Task& task, std::int64_t episodes, const TapeOptions& requested) {
+  const TapeOptions o = checked(task, episodes, requested);
   const auto width = double(task.spec().action.size());
   const double results = numbers_of(task.model(), o, 2 * width) + 1;  // actions and lengths, too
   return 8 * results * double(episodes) +

@@ -288,7 +288,7 @@ void judge_information(const Matrix& F, const Matrix& J, Identification& out) {
 }
 
 /// Sets the result flags of a finished fit.
-void judge(const Problem& problem, const Fit& fit, double stated_noise, Identification& out) {
+void set_flags(const Problem& problem, const Fit& fit, double stated_noise, Identification& out) {
   const Matrix& J = fit.J;
   out.points = fit.points;
   out.converged = fit.converged;
@@ -488,7 +488,7 @@ Identification identify(const Scene& scene, const RecordedRun& run, const FieldS
     ends.converged = fit->converged;
     if (!is_better(ends, best)) continue;
     best = {};
-    judge(problem, *fit, options.noise, best);
+    set_flags(problem, *fit, options.noise, best);
     if (best.passed()) break;
   }
   if (best.points.empty())

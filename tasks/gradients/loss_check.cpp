@@ -36,8 +36,8 @@ struct Setting {
 std::vector<double> numbers(int n) { return std::vector<double>(std::size_t(n)); }
 
 /// A loss at the current state of one environment.
-struct Look {
-  explicit Look(const Model& model) : readout(model), reading(model) {}
+struct LossReader {
+  explicit LossReader(const Model& model) : readout(model), reading(model) {}
   double at(const Setting& s, const Batch& batch, int e, std::int64_t step,
             std::span<const double> u) {
     if (s.loss.reads_fields(step)) reading.read_fields(batch, readout, e);
@@ -64,12 +64,12 @@ std::vector<double> losses_of(const Setting& s, const Model& model,
     batch.set_shear_state(e, s.start.shear_state(0));
   }
   Stepper stepper(model, s.options.stepper);
-  Look look(model);
+  LossReader reader(model);
   std::vector<double> sums(inputs.size()), u(inputs.size() * nu);
   for (std::int64_t t = 0; t <= s.options.length; ++t) {
     for (std::size_t e = 0; e < inputs.size(); ++e) {
       const std::span<const double> own = s.u(inputs[e], t);
-      sums[e] += look.at(s, batch, static_cast<int>(e), t, own);
+      sums[e] += reader.at(s, batch, static_cast<int>(e), t, own);
       std::copy(own.begin(), own.end(), u.begin() + std::ptrdiff_t(e * nu));
     }
     if (trace != nullptr) trace->add(batch);
@@ -150,14 +150,14 @@ class Directions {
     StateTangent state{given(d.q), given(d.v), zero, zero};
     Tangent tangent(model, s_.options.stepper);
     Batch batch = s_.start;
-    Look look(model);
+    LossReader reader(model);
     double sum = 0;
     for (std::int64_t t = 0; t <= s_.options.length; ++t) {
       const std::span<const double> u_dot = d.u.empty() || t == s_.options.length
                                                 ? std::span<const double>(no_u)
                                                 : d.u.subspan(std::size_t(t) * nu, nu);
       tape_->show(t, batch, 0);
-      sum += change_at(batch, look, tangent, t, state, u_dot, d.numbers, points);
+      sum += change_at(batch, reader, tangent, t, state, u_dot, d.numbers, points);
       if (t == s_.options.length) break;
       tangent.step(batch, 0, 0, *tape_, t, s_.u(s_.at, t), u_dot, d.numbers, state, points);
     }
@@ -166,12 +166,12 @@ class Directions {
 
  private:
   /// The loss's own derivatives at a state, times the change of that state.
-  double change_at(const Batch& batch, Look& look, Tangent& tangent, std::int64_t t,
+  double change_at(const Batch& batch, LossReader& reader, Tangent& tangent, std::int64_t t,
                    const StateTangent& state, std::span<const double> u_dot,
                    std::span<const double> rows, const std::vector<std::vector<double>>& points) {
     const Model& model = batch.model();
-    look.at(s_, batch, 0, t, s_.u(s_.at, t));
-    const LossReading& bar = look.reading;
+    reader.at(s_, batch, 0, t, s_.u(s_.at, t));
+    const LossReading& bar = reader.reading;
     double sum = 0;
     for (std::size_t i = 0; i < state.q.size(); ++i)
       sum += bar.q_bar()[i] * state.q[i] + bar.v_bar()[i] * state.v[i];

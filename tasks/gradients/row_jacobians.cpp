@@ -198,8 +198,8 @@ void ActionJacobians::compose(TaskRollout& rollout, const ActionRecord& r, std::
     for (std::size_t i = 0; i < state_; ++i) add_row(i, k, kept[i * memory_ + k]);
   const TensorSpec& spec = task_.spec().action;
   for (std::size_t k = 0; k < width_; ++k) {
-    const double asked = of_lane(r.chosen, lane)[k];
-    for (std::size_t i = 0; i < state_ && (asked < spec.low || asked > spec.high); ++i)
+    const double requested = of_lane(r.chosen, lane)[k];
+    for (std::size_t i = 0; i < state_ && (requested < spec.low || requested > spec.high); ++i)
       out.others[i * width_ + k] = 0;
   }
 }

@@ -219,8 +219,8 @@ void TaskBlock::reverse(std::int64_t action, const ActionCotangents& by,
   for (int l = 0; l < lanes(); ++l) {
     if (!r.taken[as_size(l)]) continue;
     for (std::size_t k = 0; k < spec.size(); ++k) {
-      const double asked = part(r.chosen, l)[k];
-      if (asked >= spec.low && asked <= spec.high)
+      const double requested = part(r.chosen, l)[k];
+      if (requested >= spec.low && requested <= spec.high)
         action_bar[as_size(l) * spec.size() + k] = part(action_bar_, l)[k];
     }
     for (std::vector<double>* x : {&shown_, &shown_q_, &shown_v_})  // already added
@@ -232,15 +232,15 @@ void TaskBlock::reverse(std::int64_t action, const ActionCotangents& by,
 /// was chosen.
 void TaskBlock::reverse_steps(std::int64_t action, const BlockTape& tape) {
   const ActionRecord& r = records_[as_size(action)];
-  const std::vector<int>& looks = task_.spec().snapshots;
+  const std::vector<int>& snapshots = task_.spec().snapshots;
   const int every = task_.spec().control_every;
   clear({&start_q_, &start_v_, &u_bar_, &action_bar_});
   restore_varying(action);
   rollout_.recompute_snapshots(tape);
   reverse_outcome(r, action);
-  std::size_t next = looks.size();
+  std::size_t next = snapshots.size();
   for (int t = task_.spec().steps_per_action; t > 0; --t) {
-    if (next > 0 && looks[next - 1] == t) {
+    if (next > 0 && snapshots[next - 1] == t) {
       tape.show(t, rollout_.batch(), 0);
       add_snapshot(--next);
     }

@@ -106,13 +106,13 @@ void TaskRollout::choose(const TaskActions& actions, ActionRecord& r) {
   const std::size_t width = task_.spec().action.size(), seen = task_.spec().observation_size();
   for (int l = 0; l < lanes(); ++l) {
     if (data_->state[as_size(l)] != EnvironmentState::running) continue;
-    const std::span<double> asked = number_row(r.chosen, l, width);
-    actions(view_of(*batch_, *data_, l), number_row(data_->observation, l, seen), asked);
+    const std::span<double> requested = number_row(r.chosen, l, width);
+    actions(view_of(*batch_, *data_, l), number_row(data_->observation, l, seen), requested);
     for (std::size_t k = 0; k < width; ++k)
-      if (!std::isfinite(asked[k]))
+      if (!std::isfinite(requested[k]))
         throw InputError(
             fmt::format("number {} of action {} of episode {} is {}; expected a finite number", k,
-                        data_->length[as_size(l)], data_->episodes[as_size(l)], asked[k]));
+                        data_->length[as_size(l)], data_->episodes[as_size(l)], requested[k]));
   }
 }
 

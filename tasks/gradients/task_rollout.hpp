@@ -55,7 +55,7 @@ class TaskRollout {
   /// Computes the next action of every running lane, stored in `record`. Throws InputError for one
   /// that is not finite.
   void choose(const TaskActions& actions, ActionRecord& record);
-  /// Begins record.asked and fills in the rest of the record.
+  /// Begins record.requested and fills in the rest of the record.
   void begin(ActionRecord& record);
   /// Takes the steps of the action. Clears `tape`, if any, and records them on it.
   void take_steps(BlockTape* tape);

@@ -111,7 +111,7 @@ TaskView TaskTangent::view() const {
 ViewTangent TaskTangent::seen_at_start(std::span<const double> numbers) {
   std::fill(action_.begin(), action_.end(), 0.0);
   ViewTangent seen = unseen(1);
-  look(tapes_.front(), 0, 0, numbers, seen);
+  read_snapshot(tapes_.front(), 0, 0, numbers, seen);
   return seen;
 }
 
@@ -172,12 +172,12 @@ void TaskTangent::take_steps(std::size_t action, std::span<const double> numbers
     }
     tape.show(t, rollout_.batch(), 0);
     tangent_.step(rollout_.batch(), 0, 0, tape, t, rollout_.u().first(nu), u_dot, numbers, state_);
-    if (spec.snapshots[next] == t + 1) look(tape, t + 1, next++, numbers, seen_);
+    if (spec.snapshots[next] == t + 1) read_snapshot(tape, t + 1, next++, numbers, seen_);
   }
 }
 
-void TaskTangent::look(const BlockTape& tape, int step, std::size_t moment,
-                       std::span<const double> numbers, ViewTangent& seen) {
+void TaskTangent::read_snapshot(const BlockTape& tape, int step, std::size_t moment,
+                                std::span<const double> numbers, ViewTangent& seen) {
   seen.q[moment] = state_.q;
   seen.v[moment] = state_.v;
   tape.show(step, rollout_.batch(), 0);

@@ -50,8 +50,8 @@ class TaskTangent {
   struct OwnCotangent;
   void begin(std::size_t action);
   void take_steps(std::size_t action, std::span<const double> numbers);
-  void look(const BlockTape& tape, int step, std::size_t moment, std::span<const double> numbers,
-            ViewTangent& seen);
+  void read_snapshot(const BlockTape& tape, int step, std::size_t moment,
+                     std::span<const double> numbers, ViewTangent& seen);
   [[nodiscard]] double reward(std::size_t action) const;
   [[nodiscard]] TaskView view_of_action(std::size_t action, const std::vector<double>& memory,
                                         const Snapshot& first) const;

@@ -41,9 +41,9 @@ void expect_numbers(std::size_t found, std::size_t expected, bool may_be_empty, 
 }  // namespace
 
 struct TaskTape::Impl {
-  Impl(const Task& t, int environments, const TapeOptions& asked)
+  Impl(const Task& t, int environments, const TapeOptions& requested)
       : task(t),
-        options(checked(t, environments, asked)),
+        options(checked(t, environments, requested)),
         e(as_size(environments)),
         nq(as_size(t.model().nq())),
         nv(as_size(t.model().nv())),

@@ -84,7 +84,7 @@ class Benchmark {
   BenchmarkTime pass(bool checked) {
     batch_ = start_;
     for (Worker& worker : workers_)
-      if (TaskProgram* const task = judged(worker)) task->clear_counts();
+      if (TaskProgram* const task = task_program(worker)) task->clear_counts();
     if (data_ != nullptr) {
       data_->restart(batch_);
       threads_.for_each(batch_.blocks(), workers_, [&](Worker& w, int b) { start_block(b, w); });
@@ -106,7 +106,7 @@ class Benchmark {
     }
     result.environment_steps = result.counts.simulation_steps;
     for (const Worker& worker : workers_)
-      if (const TaskProgram* const task = judged(worker)) {
+      if (const TaskProgram* const task = task_program(worker)) {
         result.environment_steps += task->counts().environment_steps;
         result.counts += task->counts().steps;
       }
@@ -115,8 +115,8 @@ class Benchmark {
     result.checksums = checksums_;
   }
 
-  static TaskProgram* judged(const Worker& worker) {
-    return worker.program == nullptr ? nullptr : worker.program->judged();
+  static TaskProgram* task_program(const Worker& worker) {
+    return worker.program == nullptr ? nullptr : worker.program->task_program();
   }
 
   /// Allocates the worker of a thread on its first block.
@@ -135,13 +135,13 @@ class Benchmark {
     program.start(batch_, block);
     if (program.opening_steps() == 0) return;
     for (int t = 0; t < program.opening_steps(); ++t) take_step(t, block, worker);
-    program.judge(batch_, block);
+    program.after_row(batch_, block);
   }
 
   void take_step(std::int64_t t, int block, Worker& worker) {
     worker.program->controls(t, batch_, block, u_);
     worker.stepper->step_block(batch_, block, u_);
-    worker.program->look(t, batch_, block);
+    worker.program->after_step(t, batch_, block);
   }
 
   void run_block(int block, Worker& worker, bool checked) {
@@ -166,7 +166,7 @@ class Benchmark {
           read_fields(first, last, t + 1, steps, worker, checked, tally);
       }
       if (data_ == nullptr) continue;
-      program.judge(batch_, block);
+      program.after_row(batch_, block);
       if (checked) chain_action(first, last, row, tally);
     }
     if (data_ == nullptr) {

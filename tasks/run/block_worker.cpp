@@ -221,9 +221,9 @@ void BlockWorker::take_action(Batch& batch, EnvironmentData& data, int environme
   const TensorSpec& spec = task_.spec().action;
   const std::span<double> action = number_row(data.action, environment, spec.size());
   for (std::size_t k = 0; k < action.size(); ++k) {
-    const double asked = actions[as_size(environment) * spec.size() + k];
+    const double requested = actions[as_size(environment) * spec.size() + k];
     // clamp() lets NaN pass. The controls are then NaN, and the step reports it.
-    action[k] = std::clamp(asked, spec.low, spec.high);
+    action[k] = std::clamp(requested, spec.low, spec.high);
   }
   task_.begin_action(view_of(batch, data, environment),
                      number_row(data.task_state, environment, as_size(task_.spec().task_state)));

@@ -59,7 +59,7 @@ void TaskProgram::start(Batch& batch, int block) {
 void TaskProgram::choose_together(const Batch& batch, int block) {
   const std::size_t width = task_.spec().action.size(), seen = task_.spec().observation_size();
   std::array<TaskView, kBlock> views;
-  std::array<std::size_t, kBlock> asked{};
+  std::array<std::size_t, kBlock> requested{};
   std::size_t count = 0;
   const int first = block * kBlock;
   for (int e = first; e < first + lanes_of(batch, block); ++e) {
@@ -74,14 +74,14 @@ void TaskProgram::choose_together(const Batch& batch, int block) {
     std::copy(observation.begin(), observation.end(),
               seen_.begin() + static_cast<std::ptrdiff_t>(count * seen));
     views[count] = view;
-    asked[count++] = at;
+    requested[count++] = at;
   }
   if (count == 0) return;
   policy_.act(std::span(views).first(count), std::span(seen_).first(count * seen),
               std::span(chosen_).first(count * width));
   for (std::size_t i = 0; i < count; ++i)
     std::copy_n(chosen_.begin() + static_cast<std::ptrdiff_t>(i * width), width,
-                actions_.begin() + static_cast<std::ptrdiff_t>(asked[i] * width));
+                actions_.begin() + static_cast<std::ptrdiff_t>(requested[i] * width));
 }
 
 void TaskProgram::choose(const Batch& batch, int block) {
@@ -109,11 +109,11 @@ void TaskProgram::controls(std::int64_t step, Batch& batch, int block, std::span
               u.begin() + static_cast<std::ptrdiff_t>(first));
 }
 
-void TaskProgram::look(std::int64_t step, const Batch& batch, int block) {
+void TaskProgram::after_step(std::int64_t step, const Batch& batch, int block) {
   worker(block).record_snapshot(batch, block, static_cast<int>(step % steps_per_row()), counts_);
 }
 
-void TaskProgram::judge(Batch& batch, int block) {
+void TaskProgram::after_row(Batch& batch, int block) {
   worker(block).conclude(batch, *data_, block, counts_);
   if (at_end_ == AtEnd::again) data_->start_next(block * kBlock, lanes_of(batch, block));
 }

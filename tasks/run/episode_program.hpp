@@ -19,7 +19,7 @@ class TaskProgram;
 struct StepTally;
 
 /// Steps count from the start of the episodes, including their warm-up. Every step calls
-/// controls(), steps, and calls look(). After the last step of the warm-up and of each row, judge()
+/// controls(), steps, and calls after_step(). After the last step of the warm-up and of each row, after_row()
 /// follows. Different blocks of a batch may be in different threads, each with a program of its
 /// own.
 class EpisodeProgram {
@@ -34,11 +34,11 @@ class EpisodeProgram {
   /// Writes the controls of the block's environments into u, (E, nu), which holds those of the step
   /// before.
   virtual void controls(std::int64_t step, Batch& batch, int block, std::span<double> u) = 0;
-  virtual void look(std::int64_t /*step*/, const Batch& /*batch*/, int /*block*/) {}
-  virtual void judge(Batch& /*batch*/, int /*block*/) {}
+  virtual void after_step(std::int64_t /*step*/, const Batch& /*batch*/, int /*block*/) {}
+  virtual void after_row(Batch& /*batch*/, int /*block*/) {}
   /// Returns the task program whose rows have actions, rewards and an end. Null for a scene: its
   /// controls are its actions, its reward is 0, and its episodes last as long as requested.
-  [[nodiscard]] virtual TaskProgram* judged() { return nullptr; }
+  [[nodiscard]] virtual TaskProgram* task_program() { return nullptr; }
   /// Returns the counts of all steps so far. A task counts itself, and leaves out steps that fail.
   /// A scene's are those of the player's tally: each step is an action.
   [[nodiscard]] virtual VectorCounts counts(const StepTally& tally) const;
@@ -88,9 +88,9 @@ class TaskProgram : public EpisodeProgram {
   }
   void start(Batch& batch, int block) override;
   void controls(std::int64_t step, Batch& batch, int block, std::span<double> u) override;
-  void look(std::int64_t step, const Batch& batch, int block) override;
-  void judge(Batch& batch, int block) override;
-  [[nodiscard]] TaskProgram* judged() override { return this; }
+  void after_step(std::int64_t step, const Batch& batch, int block) override;
+  void after_row(Batch& batch, int block) override;
+  [[nodiscard]] TaskProgram* task_program() override { return this; }
 
   [[nodiscard]] const Task& task() const { return task_; }
   [[nodiscard]] const Policy& policy() const { return policy_; }

@@ -47,7 +47,7 @@ void EpisodeSlot<T>::begin(EpisodeRange range) {
   next_row_ = 0;
   if (program_->opening_steps() > 0) {
     static_cast<void>(take_steps(0, program_->opening_steps(), {}));
-    program_->judge(*batch_, 0);
+    program_->after_row(*batch_, 0);
   }
   randomized_.clear();
   for (int e = 0; e < episodes; ++e)
@@ -121,7 +121,7 @@ void EpisodeSlot<T>::observe(int row) {
     if (takes_q) batch_->get_q(e, q), put(kQ, e, row, q);
     if (takes_v) batch_->get_v(e, v), put(kV, e, row, v);
   }
-  if (const TaskProgram* const task = program_->judged()) {
+  if (const TaskProgram* const task = program_->task_program()) {
     observe_task(*task, row);
   } else {
     observe_scene(row);
@@ -188,8 +188,8 @@ bool EpisodeSlot<T>::act(int row, const std::function<bool()>& stopped) {
   program_->controls(first, *batch_, 0, u_);
   keep_action(row);
   if (!take_steps(first, steps, stopped)) return false;
-  program_->judge(*batch_, 0);
-  if (const TaskProgram* const task = program_->judged())
+  program_->after_row(*batch_, 0);
+  if (const TaskProgram* const task = program_->task_program())
     for (int e = 0; e < batch_->environments(); ++e)
       if (playing_[as_size(e)])
         rewards_[as_size(e) * as_size(action_rows_) + as_size(row)] =
@@ -201,14 +201,14 @@ bool EpisodeSlot<T>::act(int row, const std::function<bool()>& stopped) {
 template <class T>
 bool EpisodeSlot<T>::take_steps(std::int64_t from, std::int64_t count,
                                 const std::function<bool()>& stopped) {
-  const bool asked = from >= program_->opening_steps();
+  const bool requested = from >= program_->opening_steps();
   const std::size_t numbers = as_size(batch_->environments()) * as_size(batch_->model().nu());
   for (std::int64_t t = from; t < from + count; ++t) {
     if (stopped && stopped()) return false;
-    if (t > from || !asked) program_->controls(t, *batch_, 0, u_);
+    if (t > from || !requested) program_->controls(t, *batch_, 0, u_);
     stepper_.step(*batch_, std::span(u_).first(numbers));
     tally_->count(*batch_, t);
-    program_->look(t, *batch_, 0);
+    program_->after_step(t, *batch_, 0);
   }
   return true;
 }
@@ -216,7 +216,7 @@ bool EpisodeSlot<T>::take_steps(std::int64_t from, std::int64_t count,
 /// Keeps the action as taken, within its bounds.
 template <class T>
 void EpisodeSlot<T>::keep_action(int row) {
-  const TaskProgram* const task = program_->judged();
+  const TaskProgram* const task = program_->task_program();
   const std::size_t width = source_.action;
   for (int e = 0; e < batch_->environments(); ++e) {
     if (!playing_[as_size(e)]) continue;
@@ -232,7 +232,7 @@ void EpisodeSlot<T>::keep_action(int row) {
 /// Collects how the block's episodes ended.
 template <class T>
 void EpisodeSlot<T>::collect() {
-  if (const TaskProgram* const task = program_->judged()) {
+  if (const TaskProgram* const task = program_->task_program()) {
     const EnvironmentData& d = task->data();
     for (std::size_t e = 0; e < d.length.size(); ++e)
       ends_.push_back(
@@ -262,7 +262,7 @@ std::int64_t EpisodeSlot<T>::step_of_failure(int episode) const {
 
 template <class T>
 void EpisodeSlot<T>::add_to(EpisodeSummary& run) const {
-  const TaskProgram* const task = program_->judged();
+  const TaskProgram* const task = program_->task_program();
   run.episodes += batch_->environments();
   const VectorCounts counts = program_->counts(*tally_);
   run.environment_steps += counts.environment_steps;

@@ -78,7 +78,7 @@ RolloutSummary run_rollout(Batch& batch, std::span<Stepper> steppers, EpisodePro
     for (int b = 0; b < batch.blocks(); ++b) body(b);
   };
 
-  TaskProgram* const task = program.judged();
+  TaskProgram* const task = program.task_program();
   Recorder recorder(batch, steppers, options, task != nullptr ? &task->task().spec() : nullptr);
   recorder.begin(u, tally, task != nullptr ? &task->data() : nullptr, threads, sink);
   for (std::int64_t t = 0; t < options.steps; ++t) {
@@ -88,9 +88,9 @@ RolloutSummary run_rollout(Batch& batch, std::span<Stepper> steppers, EpisodePro
                      [&](Stepper& stepper, int b) { stepper.step_block(batch, b, u); });
     recorder.after_step(t + 1);
     tally.count(batch, t);
-    each_block([&](int b) { program.look(t, batch, b); });
+    each_block([&](int b) { program.after_step(t, batch, b); });
     if ((t + 1) % program.steps_per_row() == 0) {
-      each_block([&](int b) { program.judge(batch, b); });
+      each_block([&](int b) { program.after_row(batch, b); });
       // A warm-up is no action.
       if (task != nullptr && t >= task->opening_steps())
         recorder.write(Recorder::When::action, t + 1);

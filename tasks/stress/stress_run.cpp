@@ -90,12 +90,12 @@ struct Play {
       record();
     }
     for (std::size_t l = 0; l < histories.size(); ++l)
-      if (tally.live(first + static_cast<int>(l))) judge(histories[l], flagged[l], out);
+      if (tally.live(first + static_cast<int>(l))) add_outcome(histories[l], flagged[l], out);
     out.counts = tally.counts;
     out.failures = std::move(tally.failures);
   }
 
-  void judge(const StressHistory& history, bool flagged, BlockOutcome& out) const {
+  void add_outcome(const StressHistory& history, bool flagged, BlockOutcome& out) const {
     const double value = measure(history);
     if (!(value <= out.worst)) out.worst = std::isnan(out.worst) ? out.worst : value;
     if (!(value <= bound) && !flagged) out.silent = true;
@@ -148,7 +148,7 @@ double passes(const BlockOutcome& out) {
          static_cast<double>(out.counts.simulation_steps);
 }
 
-void judge(const BlockOutcome& out, StressRow& row) {
+void set_verdict(const BlockOutcome& out, StressRow& row) {
   row.evaluations = passes(out);
   row.most_evaluations = out.most_evaluations;
   row.counts = out.counts;
@@ -197,7 +197,7 @@ bool measure(const Scene& scene, int threads, const std::stop_token& stop, Stres
     if (!ordinary) return false;
     row.value = passes(*out) / passes(*ordinary);
   }
-  judge(*out, row);
+  set_verdict(*out, row);
   if (row.verdict == StressVerdict::fails)
     if (const std::string warning = warning_of(varied(scene, row.of->variant), row);
         !warning.empty()) {

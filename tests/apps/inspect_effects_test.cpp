@@ -43,7 +43,7 @@ TEST(InspectEffects, DrawsWhereTheTimeGoesAndFollowsOutputs) {
   EXPECT_EQ(answer.at("effects").at("tactile pad").at("bytes"), 6 * 8 + 8)
       << "a sum, and kt that varies";
   const json& runs = answer.at("run_costs");
-  EXPECT_THAT(runs[0].at("asked_by").get<std::string>(), HasSubstr("'q/10'"));
+  EXPECT_THAT(runs[0].at("requested_by").get<std::string>(), HasSubstr("'q/10'"));
   EXPECT_EQ(runs[1].at("on"), false) << "<outputs> leaves bodies out";
   EXPECT_EQ(run(folder, {"inspect", "ball.xml", "--effects", "--svg", "effects.svg"}).exit_code, 3)
       << "it exists";

@@ -58,10 +58,10 @@ TEST_P(MemoryGoesOn, FromARowOfAFileToTheBit) {
   const Words scheme{"--integrator", GetParam()}, drawn{"--envs", "19", "--seed", "3"};
   const std::string steps = GetParam() == "SDIRK3" && kSanitized ? "100" : "120";
   simulate(folder, "whole.h5", scheme + drawn + Words{"--steps", steps});
-  const Array remembered = array_of(folder.path("whole.h5"), "memory/s");
-  EXPECT_THAT(remembered.dims, ElementsAre(1, 19, kPoints, 3));
+  const Array s_start = array_of(folder.path("whole.h5"), "memory/s");
+  EXPECT_THAT(s_start.dims, ElementsAre(1, 19, kPoints, 3));
   for (std::size_t e = 0; e < 19; ++e) {
-    const auto from = remembered.values.begin() + std::ptrdiff_t(e * kPoints * 3);
+    const auto from = s_start.values.begin() + std::ptrdiff_t(e * kPoints * 3);
     EXPECT_GT(std::count_if(from, from + kPoints * 3, [](double s) { return s != 0; }), 100) << e;
   }
   const std::string rest = std::to_string(std::stoi(steps) - 90);

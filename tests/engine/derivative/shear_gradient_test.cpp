@@ -180,15 +180,15 @@ TEST_P(ShearGradient, WaitingSkinsMatchTangents) {
   const FieldLoss loss(model, kShearSteps, 7);
   const RunGradient adjoint = adjoint_of_fields(model, options, in, loss);
   testing::Random random(11);
-  std::size_t remembered = 0;
+  std::size_t s_start = 0;
   const testing::LossChange of_fields = testing::change_of_fields(loss);
   const auto loss_change = [&](Tangent& tangent, const Batch& batch, const BlockTape& tape, int t,
                                const std::vector<double>& rows, const StateTangent& state) {
-    remembered += tape.memory(t, 0).size() / 2;
+    s_start += tape.memory(t, 0).size() / 2;
     return of_fields(tangent, batch, tape, t, rows, state);
   };
   testing::expect_tangent(model, options, in, adjoint, random, loss_change);
-  EXPECT_GT(remembered, 30U);
+  EXPECT_GT(s_start, 30U);
 }
 
 /// Random changes of one number of all points of a sensor: positions by parts of a millimetre,

@@ -103,8 +103,8 @@ TEST(FixedEpisodes, OfATaskReplayItsControls) {
     for (int t = 0; t < steps / 5 * 5; ++t) {
       program.controls(t, played, 0, u);
       stepper.step_block(played, 0, u);
-      program.look(t, played, 0);
-      if ((t + 1) % task->spec().steps_per_action == 0) program.judge(played, 0);
+      program.after_step(t, played, 0);
+      if ((t + 1) % task->spec().steps_per_action == 0) program.after_row(played, 0);
       stepper.step_block(again, 0, episodes->controls_of(t / 5, 5, t % 5));
       if ((t + 1) % 5 != 0) continue;
       for (int e = 0; e < 3; ++e) {

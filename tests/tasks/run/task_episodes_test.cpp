@@ -115,7 +115,7 @@ TEST(TaskEpisodes, AreTheSameInTheSameOrderOnAnyNumberOfThreads) {
 }
 
 /// What a program was asked about an episode: its observations, in order.
-struct Asked {
+struct Requested {
   std::mutex mutex;
   std::map<std::int64_t, std::vector<double>> seen;
   std::map<std::int64_t, std::set<std::vector<std::int64_t>>> among;
@@ -126,7 +126,7 @@ TEST(TaskEpisodes, OfAProgramAreAskedForInBlocks) {
   constexpr std::int64_t kAsked = kSanitized ? 24 : 40;  // a block and a half
   const auto task = task_named("stable_grasp");          // episodes of one to nine actions
   const std::size_t width = task->spec().action.size(), size = task->spec().observation_size();
-  const auto played = [&](int threads, Keeper& keeper, Asked& asked) {
+  const auto played = [&](int threads, Keeper& keeper, Requested& asked) {
     const Policy policy(*task, "half", [&](const PolicyQuestion& question, std::span<double> to) {
       const std::lock_guard lock(asked.mutex);
       EXPECT_EQ(question.observations.size(), question.episodes.size() * size);
@@ -149,7 +149,7 @@ TEST(TaskEpisodes, OfAProgramAreAskedForInBlocks) {
     return run_episodes(*task, policy, options, keeper);
   };
   Keeper one, many;
-  Asked alone, together;
+  Requested alone, together;
   const EpisodeSummary summary = played(1, one, alone);
   played(3, many, together);
   EXPECT_TRUE(one.episodes == many.episodes);
