@@ -4,6 +4,7 @@
 // evaluated alone. ns/candidate divides once more, by the contact points near the touched body.
 #include <benchmark/benchmark.h>
 
+#include <algorithm>
 #include <vector>
 
 #include "engine/model/compiled_model.hpp"
@@ -96,7 +97,7 @@ void run(benchmark::State& state, double environments, const F& f,
     f(group);
     benchmark::ClobberMemory();
   }
-  const auto& list = group.work().lists[0];
+  const auto& list = group.work().own_candidates.lists[0];
   state.counters["ns/env"] =
       benchmark::Counter(double(state.iterations()) * environments * 1e-9,
                          benchmark::Counter::kIsRate | benchmark::Counter::kInvert);
@@ -112,11 +113,15 @@ void BM_Kinematics(benchmark::State& s) {
   run(s, kGroup, [](Group& g) { g.table().group.kinematics(g.view(), g.work().stage); });
 }
 void BM_FindCandidates(benchmark::State& s) {
-  run(s, kGroup, [](Group& g) { find_candidates(g.of_model(), g.table(), g.work(), kAllLanes); });
+  run(s, kGroup, [](Group& g) {
+    g.work().own_candidates.searched = 0;
+    find_candidates(g.of_model(), g.table(), g.work(), kAllLanes);
+  });
 }
 void BM_ListsToRows(benchmark::State& s) {
   run(s, kGroup, [](Group& g) {
-    g.work().in_rows = 0;
+    g.work().own_candidates.all_in_rows = 0;
+    std::ranges::fill(g.work().own_candidates.in_rows, kNoLane);
     lists_to_rows(g.of_model(), g.table(), g.work(), kAllLanes);
   });
 }
@@ -135,7 +140,7 @@ void BM_EvaluateOneLane(benchmark::State& s) {
 /// The same without contact; the difference to the above is the cost of contact.
 void BM_EvaluateWithoutCandidates(benchmark::State& s) {
   run(s, kGroup, [](Group& g) {
-    g.work().lists[0].count = 0;
+    g.work().own_candidates.lists[0].count = 0;
     g.table().group.evaluate(g.view(), g.work().stage, -1);
   });
 }

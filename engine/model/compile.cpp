@@ -332,6 +332,7 @@ class Compiler {
       ground.parameters = constants(d.coefficients);
       ground.n_points = static_cast<int>(points.size() / 3);
       ground.points = keep(m_.point_storage, std::move(points));
+      lay_out_tiles(m_, ground);
       grounds_.add("ground contact", d.body, static_cast<int>(m_.grounds.size()), d.source);
       m_.grounds.push_back(ground);
       m_.contact_info.push_back({d.body, "ground", ground.n_points, law_name(d.law, d.ramp)});

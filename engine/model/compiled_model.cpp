@@ -37,6 +37,9 @@ void point_view(CompiledModel& m) {
   v.effects = m.dof_effects.data();
   v.n_pairs = static_cast<int>(m.pairs.size());
   v.n_grounds = static_cast<int>(m.grounds.size());
+  v.most_ground_points = 0;
+  for (const kernels::GroundContact& g : m.grounds)
+    v.most_ground_points = std::max(v.most_ground_points, g.n_points);
   v.pairs = m.pairs.data();
   v.faced = std::any_of(m.pairs.begin(), m.pairs.end(), [](const auto& p) { return p.faced; });
   v.grounds = m.grounds.data();

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <numeric>
 
+#include "engine/model/group_contacts.hpp"
+
 namespace tangere {
 
 namespace {
@@ -94,6 +96,28 @@ void lay_out_tiles(CompiledModel& m, kernels::PairContact& pair, const std::vect
   }
   m.tile_storage.push_back(std::move(bounds));
   pair.tile_bounds = m.tile_storage.back().data();
+}
+
+void lay_out_tiles(CompiledModel& m, kernels::GroundContact& ground) {
+  if (ground.radius > 0 || ground.n_points <= kernels::kFewPoints) return;
+  std::vector<double> points(ground.points, ground.points + 3 * ground.n_points);
+  std::vector<int> order;
+  sort_into_tiles(points, kernels::kLowTile, &order);
+  const auto balls = [&](int size) {
+    AlignedVector<double> all;
+    for (int first = 0; first < ground.n_points; first += size) {
+      kernels::Vec3<double> middle;
+      double radius = 0;
+      bound(&points[std::size_t(3 * first)], std::min(size, ground.n_points - first), middle,
+            radius);
+      all.insert(all.end(), {middle.x, middle.y, middle.z, radius});
+    }
+    return m.tile_storage.emplace_back(std::move(all)).data();
+  };
+  ground.tiles = balls(kernels::kLowTile);
+  ground.blocks = balls(kernels::kLowTile * kernels::kLowBlock);
+  ground.in_tiles = m.order_storage.emplace_back(std::move(order)).data();
+  ground.n_tiles = (ground.n_points + kernels::kLowTile - 1) / kernels::kLowTile;
 }
 
 }  // namespace tangere

@@ -17,5 +17,7 @@ std::vector<double> sort_into_tiles(std::vector<double>& points, int tile,
 /// whole tiles and whole vectors. `pair` already has its points.
 void lay_out_tiles(CompiledModel& model, kernels::PairContact& pair,
                    const std::vector<double>& tiles);
+/// Stores the tiles of a body on the ground, if it has many points. Its points keep their order.
+void lay_out_tiles(CompiledModel& model, kernels::GroundContact& ground);
 
 }  // namespace tangere

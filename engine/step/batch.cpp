@@ -90,7 +90,7 @@ const char* to_string(StepStatus value) {
 }
 
 Batch::Batch(const Model& model, int environments, std::uint64_t seed, std::int64_t first_episode)
-    : model_(model), environments_(environments), blocks_(0), seed_(seed) {
+    : model_(model), environments_(environments), blocks_(0), seed_(seed), candidates_(0) {
   if (environments < 1)
     throw InputError("a batch of " + std::to_string(environments) +
                      " environments; expected at least 1");
@@ -110,6 +110,7 @@ Batch::Batch(const Model& model, int environments, std::uint64_t seed, std::int6
     shear_.resize(lanes);
     sleep_.resize(lanes);
     clearance_.assign(lanes, 0.0);
+    candidates_ = CandidateStore(lanes / kernels::kGroup);
   } catch (const std::exception&) {
     throw InputError(
         "no memory for " + std::to_string(environments) + " environments (" +

@@ -10,6 +10,7 @@
 #include "engine/base/aligned.hpp"
 #include "engine/base/checks.hpp"
 #include "engine/model/model.hpp"
+#include "engine/step/candidate_store.hpp"
 #include "engine/step/shear_state.hpp"
 #include "engine/step/sleep_state.hpp"
 
@@ -202,6 +203,7 @@ class Batch {
   std::vector<SleepState> sleep_;
   // Distance that bodies may move until the next overlap check [m] (interpenetration.hpp); 0: now.
   std::vector<double> clearance_;
+  CandidateStore candidates_;
 };
 
 }  // namespace tangere

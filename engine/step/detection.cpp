@@ -3,6 +3,8 @@
 #include "engine/step/detection.hpp"
 
 #include <algorithm>
+#include <cmath>
+#include <utility>
 
 #include "engine/step/factors.hpp"
 #include "engine/step/shear_anchors.hpp"
@@ -28,7 +30,8 @@ static void couple_trees(const CompiledModel& model, BasicWorkspace<L>& w,
     return model.view.pattern.tree[model.links[std::size_t(link)].v];
   };
   for (int i = links.first; i < links.first + links.count; ++i)
-    for (const int count : w.lists[std::size_t(model.pair_order[std::size_t(i)])].own_count)
+    for (const int count :
+         w.candidates->lists[std::size_t(model.pair_order[std::size_t(i)])].own_count)
       if (count > 0)
         return w.block_entries.couple(model.view.pattern, tree(links.link1), tree(links.link2));
 }
@@ -37,17 +40,23 @@ static void couple_trees(const CompiledModel& model, BasicWorkspace<L>& w,
 template <int L>
 static void clear_lists(const CompiledModel& model, BasicWorkspace<L>& w, std::size_t g) {
   const kernels::LinkPair& links = model.link_pairs[g];
-  w.apart[g] = 1;
+  w.candidates->apart[g] = 1;
   for (int i = links.first; i < links.first + links.count; ++i) {
-    auto& list = w.lists[std::size_t(model.pair_order[std::size_t(i)])];
+    const auto k = std::size_t(model.pair_order[std::size_t(i)]);
+    auto& list = w.candidates->lists[k];
     list.count = 0;
     for (int& count : list.own_count) count = 0;
+    w.candidates->in_rows[k] = 0;
   }
+}
+
+bool keeps_lists(const CompiledModel& model) {
+  return model.link_balls.empty() && !in_blocks(model) && model.shear_springs.empty();
 }
 
 template <int L>
 void clear_candidates(const CompiledModel& model, BasicWorkspace<L>& w) {
-  w.in_rows = w.searched = 0;
+  w.candidates->all_in_rows = w.candidates->searched = 0;
   for_each_considered(model, w, [&](std::size_t g) { clear_lists(model, w, g); });
 }
 
@@ -56,12 +65,7 @@ template <int L>
 static bool consider_pairs(const CompiledModel& model, BasicWorkspace<L>& w, LaneBits lanes) {
   const bool more = w.broad_phase.find(lanes, w.stage);
   for (const int g : w.broad_phase.dropped()) clear_lists(model, w, std::size_t(g));
-  for (const int g : w.broad_phase.added()) {
-    clear_lists(model, w, std::size_t(g));
-    const kernels::LinkPair& links = model.link_pairs[std::size_t(g)];
-    for (int i = links.first; i < links.first + links.count; ++i)
-      w.make_list(model, std::size_t(model.pair_order[std::size_t(i)]));
-  }
+  for (const int g : w.broad_phase.added()) clear_lists(model, w, std::size_t(g));
   return more;
 }
 
@@ -83,6 +87,32 @@ kernels::Vec3<double> faces_of(const kernels::Stage<L>& stage, std::size_t k, in
   return {side[0][lane], side[1][lane], side[2][lane]};
 }
 
+/// Returns the lanes in which three rows differ from others.
+template <int L>
+static LaneBits different(const kernels::Row<L>* a, const kernels::Row<L>* b) {
+  LaneBits lanes = 0;
+  for (int i = 0; i < 3; ++i)
+    for (int l = 0; l < L; ++l) lanes |= LaneBits(a[i][l] != b[i][l]) << l;
+  return lanes;
+}
+
+/// Calls f(now, then) for the three sizes, and for the three faces, of every pair in which they
+/// vary: in the stage and where the lists were made.
+template <int L, class F>
+static void for_each_varying(const CompiledModel& model, BasicWorkspace<L>& w, const F& f) {
+  CandidateLists<L>& c = *w.candidates;
+  for (std::size_t k = 0; k < model.pairs.size() && !c.sizes.empty(); ++k) {
+    if (model.pairs[k].size_row < 0) continue;
+    kernels::Row<L> size[3];
+    for (int i = 0; i < 3; ++i)
+      std::copy_n(kernels::row_of(w.stage.block, model.pairs[k].size_row + i, w.stage.group), L,
+                  size[i].lane);
+    f(size, c.sizes.data() + 3 * k);
+  }
+  for (std::size_t k = 0; k < model.pairs.size() && !c.faces.empty(); ++k)
+    if (model.pairs[k].faced) f(w.stage.faces + 3 * k, c.faces.data() + 3 * k);
+}
+
 template <int L>
 void start_solve(const CompiledModel& model, const kernels::KernelTable& table,
                  BasicWorkspace<L>& w, LaneBits lanes) {
@@ -93,6 +123,12 @@ void start_solve(const CompiledModel& model, const kernels::KernelTable& table,
   }
   if (model.view.faced)
     table.stage<L>().choose_faces_at(model.view, w.stage, w.q0, w.zero, w.stage.faces);
+  if (!keeps_lists(model)) return;
+  LaneBits changed = 0;
+  for_each_varying(model, w, [&](const kernels::Row<L>* now, const kernels::Row<L>* then) {
+    changed |= different<L>(now, then);
+  });
+  w.candidates->clear(changed);
 }
 
 /// Considers the link pairs that come within reach because balls of `lanes` moved beyond their
@@ -107,49 +143,91 @@ static void consider_more(const CompiledModel& model, const kernels::KernelTable
   table.stage<L>().kinematics(model.view, w.stage);
 }
 
+/// A list is valid while a lane moves up to its margin, and rounding must not make it shorter.
+constexpr double kWider = 1 + 1e-6;
+
+/// Searches the points of pair k in one lane, at a pose of the shape. The list grows until it has
+/// room.
+template <int L>
+static void search_lane(const CompiledModel& model, const kernels::KernelTable& table,
+                        BasicWorkspace<L>& w, std::size_t k, int lane, const double* pose) {
+  const kernels::PairContact& pair = model.pairs[k];
+  auto& list = w.candidates->lists[k];
+  if (list.stride == 0) w.candidates->reserve(model, k, 1);
+  for (;;) {
+    const auto own = [&](auto* numbers, int of_point) {
+      return numbers == nullptr ? nullptr : numbers + of_point * list.stride * lane;
+    };
+    const int count =
+        table.find_candidates({&pair, size_of<L>(pair, w.stage, lane), pose, kWider * list.margin,
+                               own(list.own, 3), list.stride, faces_of<L>(w.stage, k, lane),
+                               own(list.own_index, 1), own(list.own_weights, 1)});
+    if (count <= list.stride - kernels::kGroup) {
+      list.own_count[lane] = count;
+      break;
+    }
+    w.candidates->reserve(model, k, count);
+  }
+  if (list.own_index != nullptr) set_list_anchors(model, table, w, static_cast<int>(k), lane);
+}
+
 /// Searches the points of pair k in the lanes where they may be near.
 template <int L>
 static void search_pair(const CompiledModel& model, const kernels::KernelTable& table,
                         BasicWorkspace<L>& w, std::size_t k, LaneBits lanes) {
-  auto& list = w.lists[k];
   const kernels::Row<L>* row = w.near.shape_poses + 12 * k;
+  auto& list = w.candidates->lists[k];
   for (int l = 0; l < L; ++l) {
     if (!has(lanes, l)) continue;
+    if (list.own_count[l] != 0 || has(w.near.lanes[k], l)) w.candidates->in_rows[k] &= ~(1U << l);
     list.own_count[l] = 0;
     if (!has(w.near.lanes[k], l)) continue;
     double pose[12];
     for (int i = 0; i < 12; ++i) pose[i] = row[i][l];
-    list.own_count[l] = table.find_candidates(
-        {&model.pairs[k], size_of<L>(model.pairs[k], w.stage, l), pose, list.margin,
-         list.own + 3 * list.stride * l, list.stride, faces_of<L>(w.stage, k, l),
-         list.own_index == nullptr ? nullptr : list.own_index + list.stride * l,
-         list.own_weights == nullptr ? nullptr : list.own_weights + list.stride * l});
-    if (list.own_index != nullptr) set_list_anchors(model, table, w, static_cast<int>(k), l);
+    search_lane(model, table, w, k, l, pose);
+  }
+}
+
+/// Sets the pose of link pair g at which the lists of `lanes` are made. A lane whose pose is not
+/// finite has no lists.
+template <int L>
+static void set_reference(BasicWorkspace<L>& w, std::size_t g, LaneBits lanes) {
+  const kernels::Row<L>* const pose = w.near.link_poses + 12 * g;
+  kernels::Row<L>* const reference = w.candidates->references.data() + 12 * g;
+  for (int i = 0; i < 12; ++i) put_lanes<L>(pose[i].lane, lanes, reference[i].lane);
+  for (int l = 0; l < L; ++l) {
+    double sum = 0;
+    for (int i = 0; i < 12; ++i) sum += pose[i][l];
+    if (has(lanes, l) && !std::isfinite(sum)) w.candidates->searched &= ~(1U << l);
   }
 }
 
 template <int L>
 void find_candidates(const CompiledModel& model, const kernels::KernelTable& table,
                      BasicWorkspace<L>& w, LaneBits lanes) {
-  w.searched |= lanes;
-  if (in_blocks(model) && (w.searched & ~lanes) == 0) {
+  CandidateLists<L>& c = *w.candidates;
+  const LaneBits fresh = keeps_lists(model) ? lanes & ~c.searched : lanes;
+  c.searched |= lanes;
+  if (in_blocks(model) && (c.searched & ~lanes) == 0) {
     w.block_entries.reset(model.view.pattern);
     store_blocks(w);
   }
   if (model.link_pairs.empty()) return;
   consider_more(model, table, w, lanes);
-  w.in_rows &= ~lanes;
-  w.apart_before = w.apart;
+  c.all_in_rows &= ~lanes;
+  c.apart_before = c.apart;
+  for_each_varying(model, w, [&](const kernels::Row<L>* now, kernels::Row<L>* then) {
+    for (int i = 0; i < 3; ++i) put_lanes<L>(now[i].lane, lanes, then[i].lane);
+  });
   table.stage<L>().near_pairs(model.view, w.stage, w.near);
   for_each_considered(model, w, [&](std::size_t g) {
-    if (w.apart[g] != 0) return;
+    if (c.apart[g] != 0) return;
     // Where no lane had a list, every lane needs one from now on.
-    const LaneBits searched = w.apart_before[g] != 0 ? w.searched : lanes;
-    w.in_rows &= ~searched;
-    kernels::Row<L>* reference = w.references + 12 * g;
-    for (int i = 0; i < 12; ++i)
-      for (int l = 0; l < L; ++l)
-        if (has(searched, l)) reference[i][l] = w.near.link_poses[12 * g + std::size_t(i)][l];
+    const LaneBits searched =
+        c.apart_before[g] != 0 ? c.searched : fresh | (lanes & w.near.outrun[g]);
+    if (searched == 0) return;
+    c.all_in_rows &= ~searched;
+    set_reference(w, g, searched);
     const kernels::LinkPair& links = model.link_pairs[g];
     for (int i = links.first; i < links.first + links.count; ++i)
       search_pair(model, table, w, std::size_t(model.pair_order[std::size_t(i)]), searched);
@@ -160,14 +238,18 @@ void find_candidates(const CompiledModel& model, const kernels::KernelTable& tab
 
 void lists_to_rows(const CompiledModel& model, const kernels::KernelTable& table, Workspace& w,
                    LaneBits lanes) {
-  if ((lanes & ~w.in_rows) == 0) return;
+  CandidateLists<kernels::kGroup>& c = *w.candidates;
+  if ((lanes & ~c.all_in_rows) == 0) return;
   for_each_considered(model, w, [&](std::size_t g) {
-    if (w.apart[g] != 0) return;
+    if (c.apart[g] != 0) return;
     const kernels::LinkPair& links = model.link_pairs[g];
-    for (int i = links.first; i < links.first + links.count; ++i)
-      table.transpose_list(w.lists[std::size_t(model.pair_order[std::size_t(i)])]);
+    for (int i = links.first; i < links.first + links.count; ++i) {
+      const auto k = std::size_t(model.pair_order[std::size_t(i)]);
+      const LaneBits made = kAllLanes & ~std::exchange(c.in_rows[k], kAllLanes);
+      if (made != 0) table.transpose_list(c.lists[k], made);
+    }
   });
-  w.in_rows = kAllLanes;
+  c.all_in_rows = kAllLanes;
 }
 
 template void start_solve(const CompiledModel&, const kernels::KernelTable&, Workspace&, LaneBits);

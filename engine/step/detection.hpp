@@ -1,22 +1,24 @@
 // SPDX-License-Identifier: Apache-2.0
-// Finds the contact points that may touch during this step: once, at the predicted pose, with a
-// margin.
+// Finds the contact points that may touch: with a margin, so that a list is valid until bodies have
+// moved farther.
 #pragma once
 
 #include "engine/step/workspace.hpp"
 
 namespace tangere {
 
-/// Rebuilds the candidate lists of the lanes in `lanes` at the poses of kinematics(). Other lanes
-/// keep theirs. Membership never changes a result: points that do not touch add exact zeros. If a
-/// lane moves farther than its margin, the next kinematics() finds out and its lists are rebuilt.
+/// Lists the candidates of `lanes` at the poses of kinematics(), where a lane has no lists or has
+/// moved farther than their margin. Other lists stay. Membership never changes a result: points
+/// that do not touch add exact zeros. In scenes that do not keep lists, all lists of `lanes` are
+/// made.
 template <int L>
 void find_candidates(const CompiledModel& model, const kernels::KernelTable& kernels,
                      BasicWorkspace<L>& w, LaneBits lanes);
 
 /// Prepares detection for the solve of `lanes` which starts at q0: finds the link pairs that are
-/// considered (broad_phase.hpp), and the faces that count (kernels/step/faces.hpp). Call it before
-/// the first stage. Overwrites the stage's v.
+/// considered (broad_phase.hpp), and the faces that count (kernels/step/faces.hpp). Drops the lists
+/// of lanes whose sizes or faces have changed. Call it before the first stage. Overwrites the
+/// stage's v.
 template <int L>
 void start_solve(const CompiledModel& model, const kernels::KernelTable& kernels,
                  BasicWorkspace<L>& w, LaneBits lanes);
@@ -35,7 +37,12 @@ void for_each_considered(const CompiledModel& model, const BasicWorkspace<L>& w,
 void lists_to_rows(const CompiledModel& model, const kernels::KernelTable& kernels, Workspace& w,
                    LaneBits lanes);
 
-/// Empties every list. Call before the first stage of a group.
+/// Whether lists are kept from one step to the next: not those of contacts with shear springs,
+/// which hold the springs' anchors, nor those of scenes of many pairs or trees, which take much
+/// memory.
+bool keeps_lists(const CompiledModel& model);
+
+/// Empties every list.
 template <int L>
 void clear_candidates(const CompiledModel& model, BasicWorkspace<L>& w);
 

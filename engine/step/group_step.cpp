@@ -247,7 +247,11 @@ template <int L>
 void GroupStep::advance(const kernels::KernelTable& table, BasicWorkspace<L>& w,
                         SingleWorkspace& alone, LaneBits lanes, LaneBits history,
                         NewtonReport& report, SolveLog* log) const {
-  clear_candidates(model_, w);
+  if (keeps_lists(model_)) {
+    w.candidates->clear(~lanes);
+  } else {
+    clear_candidates(model_, w);
+  }
   const double h = settings_.timestep;
   const Scheme& scheme = settings_.integrator.scheme();
   const bool cut = settings_.accuracy > 0;

@@ -11,6 +11,7 @@
 #include "engine/step/state_difference.hpp"
 #include "kernels/contact/pair_contact.hpp"
 #include "kernels/step/faces.hpp"
+#include "kernels/step/low_points.hpp"
 
 namespace tangere {
 
@@ -33,6 +34,7 @@ struct LaneAt {
   int lane;
   LaneEnergy sum{};
   EnergyTerms* terms = nullptr;  ///< if not null, motors do work and hold nothing
+  std::uint64_t* low = nullptr;  ///< scratch of for_each_low_point()
 
   [[nodiscard]] const double* block() const {
     if (w.stage.block == nullptr) return nullptr;
@@ -166,13 +168,13 @@ struct LaneAt {
         kernels::load_law<double>(ground.parameters, ground.law, ground.ramp, block(), 0);
     const Vec3<double> m = transposed_times(at.R, model.view.ground_normal);
     const double height = dot(model.view.ground_normal, at.p - model.view.ground_point);
-    for (int k = 0; k < ground.n_points; ++k) {
+    for_each_low_point(ground, m, height, low, [&](int k) {
       const double* x = ground.points + 3 * k;
       kernels::PointContact<double> p;
       if (ground_contact(law, m, height, twist(ground.link), Vec3<double>{x[0], x[1], x[2]}, radius,
                          p))
         terms->taken += taken_at(law, p);
-    }
+    });
   }
 
   void add_pair(const kernels::KernelTable& table, std::size_t k, const Frame<double>& link2_in_1,
@@ -193,11 +195,11 @@ struct LaneAt {
     double pose[12];
     for (int i = 0; i < 9; ++i) pose[i] = at.R.m[i / 3][i % 3];
     pose[9] = at.p.x, pose[10] = at.p.y, pose[11] = at.p.z;
-    const auto& list = w.lists[k];
-    double *x = found, *y = x + list.stride, *z = y + list.stride;
-    double* const areas = pair.weights == nullptr ? nullptr : z + list.stride;
+    const int stride = search_stride(pair);
+    double *x = found, *y = x + stride, *z = y + stride;
+    double* const areas = pair.weights == nullptr ? nullptr : z + stride;
     const int count = table.find_candidates(
-        {&pair, half, pose, list.margin, x, list.stride, faces, nullptr, areas});
+        {&pair, half, pose, w.candidates->lists[k].margin, x, stride, faces, nullptr, areas});
     double square = 0;
     if (terms != nullptr) add_taken(pair, half, faces, link2_in_1, {x, y, z}, areas, count);
     kernels::with_touched<double>(pair, half, faces, [&]<class Shape>(const Shape& shape) {
@@ -225,13 +227,15 @@ struct LaneAt {
       const double radius = kernels::ground_radius<double>(ground, block(), 0);
       if (terms != nullptr) add_taken(ground, at, radius);
       double square = 0;
-      for (int k = 0; k < ground.n_points; ++k) {
+      const Vec3<double> m = transposed_times(at.R, model.view.ground_normal);
+      const double height = dot(model.view.ground_normal, at.p - model.view.ground_point);
+      for_each_low_point(ground, m, height, low, [&](int k) {
         const double* p = ground.points + 3 * k;
         const Vec3<double> place = at.R * Vec3<double>{p[0], p[1], p[2]} + at.p;
         const double d =
             std::min(dot(model.view.ground_normal, place - model.view.ground_point) - radius, 0.0);
         square += d * d;
-      }
+      });
       sum.moving += 0.5 * number(ground.parameters.kn) * square;
     }
   }
@@ -254,7 +258,7 @@ template <int L>
 double energy_of_contacts(const CompiledModel& model, const kernels::KernelTable& table,
                           BasicWorkspace<L>& w, const AlignedVector<LinkPose<Row<L>>>& poses,
                           int lane) {
-  LaneAt<L> at{model, w, poses, lane};
+  LaneAt<L> at{model, w, poses, lane, {}, nullptr, w.low_points.data()};
   at.add_contacts(table, w.search.data());
   return at.sum.moving;
 }
@@ -280,7 +284,7 @@ double energy_of_friction(const CompiledModel& model, const BasicWorkspace<L>& w
 EnergyTerms energy_terms(const CompiledModel& model, const kernels::KernelTable& table,
                          SingleWorkspace& w) {
   EnergyTerms terms;
-  LaneAt<1> at{model, w, w.poses_before, 0, {}, &terms};
+  LaneAt<1> at{model, w, w.poses_before, 0, {}, &terms, w.low_points.data()};
   at.add_motion();
   terms.motion = at.sum.moving;
   terms.height = at.sum.total;

@@ -102,7 +102,7 @@ struct Search {
   /// Computes poses at x. Finds candidates for lanes that have no list yet or outran theirs.
   void locate(bool first) {
     kernel().kinematics(model.view, w.stage);
-    LaneBits stale = first ? searching : 0;
+    LaneBits stale = first && !keeps_lists(model) ? searching : searching & ~w.candidates->searched;
     for (int l = 0; l < L; ++l)
       if (has(searching, l) && w.stage.excess[0][l] > 0) stale |= 1U << l;
     if (stale != 0) find_candidates(model, table, w, stale);

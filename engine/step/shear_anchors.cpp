@@ -45,7 +45,7 @@ void begin_shear(const CompiledModel& m, const kernels::KernelTable& table, Basi
 template <int L>
 void set_list_anchors(const CompiledModel& m, const kernels::KernelTable& table,
                       BasicWorkspace<L>& w, int k, int lane) {
-  const auto& list = w.lists[std::size_t(k)];
+  const auto& list = w.candidates->lists[std::size_t(k)];
   if (list.own_count[lane] == 0) return;
   const ShearSpringContact& of = m.shear_springs[std::size_t(m.pairs[std::size_t(k)].memory)];
   const kernels::ShearEntries left = table.recall_entries(

@@ -212,7 +212,7 @@ template <int L, class F>
 void for_each_pair(const CompiledModel& m, BasicWorkspace<L>& w, int lane, const F& f) {
   for (const kernels::ShearSpringContact& of : m.shear_springs) {
     if (of.pair < 0) continue;
-    const auto& list = w.lists[std::size_t(of.pair)];
+    const auto& list = w.candidates->lists[std::size_t(of.pair)];
     if (list.own_count[lane] > 0) f(of, list.own_index + list.stride * lane, listed<L>(list, lane));
   }
 }

@@ -42,7 +42,7 @@ class EntryWriter {
 template <int L>
 void advance_pair(const CompiledModel& m, const kernels::KernelTable& table, BasicWorkspace<L>& w,
                   const ShearSpringContact& of, int lane, EntryWriter& out) {
-  const auto& list = w.lists[std::size_t(of.pair)];
+  const auto& list = w.candidates->lists[std::size_t(of.pair)];
   const ShearSpringPoints points = listed<L>(list, lane);
   const kernels::ShearSpringTouch end = touch_of(m, w, of, w.shear.end_touches, lane);
   kernels::ShearUpdate update = {
@@ -66,7 +66,7 @@ void advance_pairs(const CompiledModel& m, const kernels::KernelTable& table, Ba
       if (std::popcount(near) >= kFewLanes) {
         kernels::ShearListUpdate update = {
             &of, &w.shear.end_touches[std::size_t(k)], &w.stage, near, {}};
-        const auto& list = w.lists[std::size_t(of.pair)];
+        const auto& list = w.candidates->lists[std::size_t(of.pair)];
         for (int l = 0; l < L; ++l)
           if (has(near, l)) update.after[l] = out[std::size_t(l)].room(list.own_count[l]);
         table.advance_list(update);
@@ -136,13 +136,14 @@ void consider(const CompiledModel& m, BasicWorkspace<L>& w, LaneBits lanes) {
     near[k] = of.pair < 0 && m.shear_interval(of) == 0 ? lanes : kNoLane;
   }
   for_each_considered(m, w, [&](std::size_t g) {
-    if (w.apart[g] != 0) return;
+    if (w.candidates->apart[g] != 0) return;
     const kernels::LinkPair& links = m.link_pairs[g];
     for (int i = links.first; i < links.first + links.count; ++i) {
       const int pair = m.pair_order[std::size_t(i)], k = m.pairs[std::size_t(pair)].memory;
       if (k < 0) continue;
       for (int l = 0; l < L; ++l)
-        if (w.lists[std::size_t(pair)].own_count[l] > 0) near[std::size_t(k)] |= lanes & (1U << l);
+        if (w.candidates->lists[std::size_t(pair)].own_count[l] > 0)
+          near[std::size_t(k)] |= lanes & (1U << l);
     }
   });
 }

@@ -233,7 +233,7 @@ bool Sleep::within(const kernels::KernelTable& table, const kernels::LinkPair& l
         double pose[12];
         for (int i = 0; i < 9; ++i) pose[i] = at.R.m[i / 3][i % 3];
         pose[9] = at.p.x, pose[10] = at.p.y, pose[11] = at.p.z;
-        const int stride = single.lists[std::size_t(&pair - model_.pairs.data())].stride;
+        const int stride = search_stride(pair);
         found = table.find_candidates({&pair, size, pose, reach + pair.overhang,
                                        single.search.data(), stride, Vec3<double>{}, nullptr}) > 0;
       });

@@ -9,6 +9,7 @@
 
 #include "engine/base/as_size.hpp"
 #include "engine/step/awake_parts.hpp"
+#include "engine/step/detection.hpp"
 #include "engine/step/interpenetration.hpp"
 #include "engine/step/kept_anchors.hpp"
 #include "engine/step/motor_force.hpp"
@@ -55,6 +56,13 @@ struct SteppedModel {
   const GroupStep& step;
   SingleWorkspace& alone;     ///< for splits of its steps
   std::span<const int> q, v;  ///< number of its coordinates and dofs in the whole model
+};
+
+/// Ends the use of a batch's lists.
+template <int L>
+struct KeptLists {
+  BasicWorkspace<L>& w;
+  ~KeptLists() { w.use(w.own_candidates); }
 };
 
 /// Extra state used only when sleeping is enabled.
@@ -158,6 +166,10 @@ struct Stepper::Impl {
       }
     w.stage.block = g.rows + lane;
     w.stage.group = 0;
+    const KeptLists<L> kept{w};
+    if (!sleeping && keeps_lists(stepped.model))
+      w.use(batch.candidates_.lists<L>(as_size(g.first / kGroup), stepped.model,
+                                       &stepped.model == &m));
     const LaneBits live = g.live >> lane;
     NewtonReport report;
     SolveLog log;

@@ -230,7 +230,7 @@ LaneBits TunnellingCheck::out_of_reach(const BasicWorkspace<L>& w, LaneBits lane
   if (slabs_.empty()) return lanes;
   if (w.stage.considered != nullptr) return kNoLane;  // `between` is not that of all pairs
   if (!bounded_ || std::any_of(bounds_.begin(), bounds_.end(), [&](const RadiusBound& bound) {
-        return w.apart[bound.link_pair] == 0;
+        return w.candidates->apart[std::size_t(bound.link_pair)] == 0;
       }))
     return kNoLane;
   Row<L> slid{}, way{}, angle{};
@@ -264,11 +264,14 @@ LaneBits TunnellingCheck::out_of_reach(const BasicWorkspace<L>& w, LaneBits lane
 template <int L>
 Vec3<double> TunnellingCheck::middle_in(const Slab& wall,
                                         const AlignedVector<LinkPose<Row<L>>>& poses, int lane) {
-  const auto world = [&](int link, const Frame<double>& x) {
-    return link < 0 ? x : compose(frame_in_lane<L>(poses[std::size_t(link)], lane), x);
+  const auto pose = [&](int link) {
+    return link < 0 ? Frame<double>{kernels::diagonal(1.0), {0, 0, 0}}
+                    : frame_in_lane<L>(poses[std::size_t(link)], lane);
   };
-  const Frame<double> middle = {kernels::diagonal(1.0), wall.middle};
-  return relative(world(wall.link, wall.at), world(wall.other, middle)).p;
+  const Frame<double> of_slab = pose(wall.link), of_other = pose(wall.other);
+  const Vec3<double> arm =
+      (of_other.R * wall.middle + of_other.p) - (of_slab.R * wall.at.p + of_slab.p);
+  return transposed_times(wall.at.R, transposed_times(of_slab.R, arm));
 }
 
 bool TunnellingCheck::came_through(const Slab& wall, const Vec3<double>& half,

@@ -1,12 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// Scratch of one thread for one step of a group of eight lanes, or of a single lane. Nothing in it
-// outlives the step.
+// Scratch of one thread for one step of a group of eight lanes, or of a single lane. Only lists of
+// candidates outlive the step.
 #pragma once
 
 #include <array>
 #include <cstdint>
-#include <cstring>
-#include <deque>
 #include <span>
 #include <vector>
 
@@ -14,29 +12,14 @@
 #include "engine/model/compiled_model.hpp"
 #include "engine/step/block_factors.hpp"
 #include "engine/step/broad_phase.hpp"
+#include "engine/step/candidate_lists.hpp"
+#include "engine/step/lane_bits.hpp"
 #include "engine/step/pivoted_factors.hpp"
 #include "engine/step/shear_state.hpp"
 #include "engine/step/touching_sensor_points.hpp"
 #include "kernels/table/kernel_table.hpp"
 
 namespace tangere {
-
-/// Bit l: lane l of the group.
-using LaneBits = unsigned;
-inline constexpr LaneBits kNoLane = 0;
-inline constexpr LaneBits kAllLanes = (1U << kernels::kGroup) - 1;
-inline bool has(LaneBits bits, int lane) { return ((bits >> lane) & 1U) != 0; }
-
-/// Copies the numbers of some lanes of a row. All of them are one vector.
-template <int L>
-inline void put_lanes(const double* from, LaneBits lanes, double* to) {
-  if (lanes == (1U << L) - 1) {
-    std::memcpy(to, from, L * sizeof(double));
-    return;
-  }
-  for (int l = 0; l < L; ++l)
-    if (has(lanes, l)) to[l] = from[l];
-}
 
 /// Returns the dofs of a component of a scene.
 inline std::span<const int> dofs_of_component(const CompiledModel& model, int component) {
@@ -76,24 +59,16 @@ struct BasicWorkspace {
   explicit BasicWorkspace(const CompiledModel& model, int inner_stages = kInnerStages);
   static std::size_t bytes(const CompiledModel& model);
   void make_memory(const CompiledModel& model);
-  /// Allocates the list of a pair that is considered for the first time, in scenes of many pairs.
-  void make_list(const CompiledModel& model, std::size_t pair);
+  /// Makes these the lists that solves read and search.
+  void use(CandidateLists<L>& lists);
 
   using Rows = AlignedVector<LaneRow>;
   Rows memory;  ///< every row below, in one allocation
   AlignedVector<std::byte> scratch;
-  AlignedVector<double> own_points;  ///< the lists' points and their areas
-  // The same of lists that make_list() allocated.
-  std::deque<Rows> later_rows;
-  std::deque<AlignedVector<double>> later_points;
-  std::vector<typename kernels::Stage<L>::List> lists;
-  LaneBits in_rows = 0;  ///< lanes whose lists are also in the rows
-  LaneRow* references;   ///< (n_link_pairs, 12) storage of the lists' references
-  std::vector<unsigned> near_lanes;
-  std::vector<unsigned char> apart;         ///< (n_link_pairs) storage of stage.apart
-  std::vector<unsigned char> apart_before;  ///< the same before the last search
-  std::vector<unsigned char> coupled;       ///< (1) storage of stage.coupled
-  LaneBits searched = 0;  ///< lanes that were searched since the lists were cleared
+  CandidateLists<L> own_candidates;
+  CandidateLists<L>* candidates;  ///< the lists in use: own_candidates, or those of a batch's group
+  std::vector<unsigned> near_lanes, outrun;  ///< storage of `near`
+  std::vector<unsigned char> coupled;        ///< (1) storage of stage.coupled
   kernels::NearPairs<L> near;
   BroadPhase<L> broad_phase;
   kernels::Stage<L> stage;
@@ -105,9 +80,10 @@ struct BasicWorkspace {
   AlignedVector<kernels::LinkPose<LaneRow>> poses_before, poses_after;
   /// Wrenches of contacts, (link pairs + grounded links, 6), of parts whose error is estimated.
   std::array<LaneRow*, 4> wrenches;
-  AlignedVector<double> search;  ///< (3, largest stride of a list)
-  LaneRow* zero;                 ///< (nv) zeros
-  LaneRow* floors;               ///< (components) stage.floor of each, where there are several
+  AlignedVector<double> search;           ///< (4, largest search_stride())
+  std::vector<std::uint64_t> low_points;  ///< scratch of for_each_low_point()
+  LaneRow* zero;                          ///< (nv) zeros
+  LaneRow* floors;  ///< (components) stage.floor of each, where there are several
   // Inner stages: x relative to q0, (nv) each, one after another.
   int inner_stages;
   LaneRow *x_inner, *v_inner;
@@ -121,8 +97,6 @@ struct BasicWorkspace {
   Rows blocks;  ///< storage of stage.A
   BlockFactors block_factors;
   ShearLanes<L> shear;
-  AlignedVector<double> own_anchors;
-  std::vector<int> own_index;
 };
 using Workspace = BasicWorkspace<kernels::kGroup>;
 using SingleWorkspace = BasicWorkspace<1>;

@@ -87,8 +87,9 @@ template <class Shape, class N>
   LawParameters<N> own = law;
   for_each_place(list, lone, [&](int k, const Vec3<N>& xi) {
     set_point_law(law, list, lone, k, own);
-    const N area = list.weights == nullptr ? N(1.0) : area_at(list, lone, k);
-    add_point(shape, at, W, own, list.weights == nullptr ? nullptr : &area, body, slip, xi, sum);
+    const bool weighted = has_areas(list, lone);
+    const N area = weighted ? area_at(list, lone, k) : N(1.0);
+    add_point(shape, at, W, own, weighted ? &area : nullptr, body, slip, xi, sum);
   });
 }
 
@@ -135,10 +136,10 @@ ContactCotangent<N> ground_adjoint(const ModelView& model, const StageArgs<N>& a
   const N radius = ground_radius<N>(ground, a.block, a.group);
   const bool ball = ground.radius > 0;
   ContactCotangent<N> sum = zero_contact<N>();
-  for (int i = 0; i < ground.n_points; ++i) {
+  for_each_low_point(ground, m, height, a.low_points, [&](int i) {
     const Vec3<N> centre = ground_point<N>(ground, i);
     PointContact<N> p;
-    if (!ground_contact(law, m, height, link.V, centre, radius, p)) continue;
+    if (!ground_contact(law, m, height, link.V, centre, radius, p)) return;
     const N gate = select(p.d < N(0.0), N(1.0), N(0.0));
     const Vec3<N> f_bar = (-gate) * (twist.l + cross(twist.a, p.x2));
     pull_back_law(law, p, f_bar, sum.law);
@@ -149,7 +150,7 @@ ContactCotangent<N> ground_adjoint(const ModelView& model, const StageArgs<N>& a
     } else {
       sum.stretch += stretch_share(model.solids[ground.body], centre, xi_bar + bar.d * m);
     }
-  }
+  });
   return sum;
 }
 

@@ -110,6 +110,8 @@ struct NearPairs {
   Row<L>* shape_poses;  ///< (n_pairs, 12) shape in body 1, for pairs that are near in some lane
   unsigned* lanes;      ///< (n_pairs) bit l: in lane l, points may be nearer to the shape than the
                         ///< list's margin
+  unsigned* outrun;  ///< (n_link_pairs) bit l: lane l moved farther than the margin of its lists,
+                     ///< or has none
 };
 
 /// One lane's search for points near a shape.
@@ -119,6 +121,7 @@ struct CandidateSearch {
   const double* pose;  ///< (12) shape in body 1: R row-major, then p
   double margin;       ///< points nearer than this to the surface, or inside, are candidates [m]
   double* points;      ///< (3, stride)
+  /// Room for points. Where more than stride - 8 are found, some may be missing.
   int stride;
   Vec3<double> faces;         ///< of this lane (kernels/step/faces.hpp)
   int* index;                 ///< out: (stride) of the points in PairContact::points; or null

@@ -43,6 +43,8 @@ void near_pairs(const ModelView& model, const StageArgs<N>& a, NearPairs<L>& out
     if (a.apart[g] != 0) return;
     if (was_apart) pair_motion(links, a, a.contacts[g]);
     const Frame<N>& x = a.contacts[g].link2_in_1;
+    const CandidateList<N>& list = a.candidates[model.pair_order[links.first]];
+    out.outrun[g] = was_apart ? ~0U : lane_bits(list_excess(links, list, x) > N(0.0));
     store_frame(x, view(out.link_poses + 12 * g));
     for (int i = 0; i < links.count; ++i) {
       const int k = model.pair_order[links.first + i];
@@ -117,6 +119,10 @@ int search_shape(const CandidateSearch& s, Shape shape) {
                                load_lanes<A>(p + 2 * kContactTile + k)};
         const unsigned in = near_shape(shape, pose, place, margin);
         if (in == 0) continue;
+        if (count + kGroup > s.stride) {  // no room: the points are only counted
+          count += __builtin_popcount(in);
+          continue;
+        }
         append(place.x, in, x + count);
         append(place.y, in, y + count);
         append(place.z, in, z + count);
@@ -127,7 +133,7 @@ int search_shape(const CandidateSearch& s, Shape shape) {
       }
     }
   }
-  for (int k = count; k % kGroup != 0; ++k) {
+  for (int k = count; k % kGroup != 0 && k < s.stride; ++k) {
     x[k] = y[k] = z[k] = kFarAway;
     if (s.weights != nullptr) s.weights[k] = 0;
   }
@@ -142,33 +148,40 @@ int search_candidates(const CandidateSearch& s) {
       [&]<class Shape>(const Shape& shape) { return search_shape<A, Shape>(s, shape); });
 }
 
-/// Copies numbers of the lanes' own points, (kGroup, Numbers, stride), to rows, (count, Numbers).
-/// Where a lane has no more points, rows hold `filler` or the padding of the lane's list.
+/// Makes rows of the own numbers of `lanes`, of which each point has `Numbers`. The rows of other
+/// lanes stay. They are filled up to `list.count` from `before` on, where they ended.
 template <class A, int Numbers>
-void transpose_numbers(const GroupStage::List& list, const double* own, double filler,
-                       LaneRow* rows) {
-  for (int first = 0; first < list.count; first += kGroup)
+void transpose_numbers(const GroupStage::List& list, unsigned lanes, int before, const double* own,
+                       double filler, Row<kGroup>* rows) {
+  if (rows == nullptr) return;
+  const auto column = [&](int l, int c) { return own + (l * Numbers + c) * list.stride; };
+  int whole = 0;  // points that all lanes have, row by row
+  if (lanes == (1U << kGroup) - 1) {
+    whole = list.count;
+    for (const int own_count : list.own_count) whole = own_count < whole ? own_count : whole;
+    for (int k = 0; k < whole; ++k)
+      for (int c = 0; c < Numbers; ++c)
+        for (int l = 0; l < kGroup; ++l) rows[Numbers * k + c][l] = column(l, c)[k];
+  }
+  for (int l = 0; l < kGroup; ++l) {
+    const bool made = (lanes >> l & 1U) != 0;
+    const int end = list.own_count[l], rest = made || end > before ? end : before;
     for (int c = 0; c < Numbers; ++c) {
-      Lanes<A> x[kGroup];
-      for (int l = 0; l < kGroup; ++l)
-        x[l] = first < list.own_count[l]
-                   ? load_lanes<A>(own + (l * Numbers + c) * list.stride + first)
-                   : Lanes<A>(filler);
-      transpose(x);
-      for (int i = 0; i < kGroup; ++i) store_lanes(x[i], rows[Numbers * (first + i) + c].lane);
+      for (int k = whole; k < end && made; ++k) rows[Numbers * k + c][l] = column(l, c)[k];
+      for (int k = rest; k < list.count; ++k) rows[Numbers * k + c][l] = filler;
     }
+  }
 }
 
-/// Makes rows of eight lanes from the lanes' own lists. Shorter lists end in far points.
+/// Makes rows of eight lanes from the own lists of `lanes`. Shorter lists end in far points.
 template <class A>
-void transpose_rows(GroupStage::List& list) {
+void transpose_rows(GroupStage::List& list, unsigned lanes) {
+  const int before = list.count;
   list.count = 0;
-  for (int count : list.own_count) list.count = count > list.count ? count : list.count;
-  if (list.count == 0) return;
-  transpose_numbers<A, 3>(list, list.own, kFarAway, list.points);
-  if (list.weights != nullptr) transpose_numbers<A, 1>(list, list.own_weights, 0, list.weights);
-  if (list.anchors != nullptr)
-    transpose_numbers<A, kAnchorNumbers>(list, list.own_anchors, 0, list.anchors);
+  for (const int count : list.own_count) list.count = count > list.count ? count : list.count;
+  transpose_numbers<A, 3>(list, lanes, before, list.own, kFarAway, list.points);
+  transpose_numbers<A, 1>(list, lanes, before, list.own_weights, 0, list.weights);
+  transpose_numbers<A, kAnchorNumbers>(list, lanes, before, list.own_anchors, 0, list.anchors);
 }
 
 }  // namespace tangere::kernels

@@ -8,14 +8,54 @@
 //       ‖S⁻¹x‖∞
 #pragma once
 
+#include <utility>
+
 #include "kernels/numbers/inverse_sqrt.hpp"
 #include "kernels/step/model_view.hpp"
 
 namespace tangere::kernels {
 
+/// Full factors of at most so many rows have loops of fixed length. Their operations are those of
+/// the lists, in the same order.
+inline constexpr int kFixedRows = 12;
+
+/// Calls f with the number of rows as a constant, if the factor of a part is full and small.
+/// Returns whether it is.
+template <int n = kFixedRows, class F>
+bool with_fixed_rows(const Pattern& p, const PatternPart& part, const F& f) {
+  if (n == kFixedRows && part.lower_begin[p.n] != p.n * (p.n - 1) / 2) return false;
+  if (p.n == n) {
+    f(std::make_integer_sequence<int, n>{});
+    return true;
+  }
+  if constexpr (n > 2) return with_fixed_rows<n - 1>(p, part, f);
+  return false;
+}
+
+/// Step k of the elimination of a full matrix of n rows.
+template <int n, int k, class N>
+void eliminate_column(N* work) {
+  const N inverse = 1.0 / work[k * n + k];
+  work[k * n + k] = inverse;
+  N row[n];
+  for (int j = k + 1; j < n; ++j) row[j] = work[k * n + j];
+  for (int i = k + 1; i < n; ++i) {
+    N* const to = work + i * n;
+    const N l = to[k] * inverse;
+    to[k] = l;
+#pragma GCC unroll 12
+    for (int j = k + 1; j < n; ++j) to[j] = mul_sub_from(l, row[j], to[j]);
+  }
+}
+
 /// Factors in place, with unit lower factor. U's diagonal is stored as its reciprocal.
 template <class N>
 void eliminate(const Pattern& p, const PatternPart& part, N* work) {
+  if (with_fixed_rows(
+          p, part, [&]<int... k>(std::integer_sequence<int, k...>) {
+            (eliminate_column<sizeof...(k), k>(work), ...);
+          }))
+    return;
   for (int k = 0; k < p.n; ++k) {
     const N inverse = 1.0 / work[p.diagonal[k]];
     work[p.diagonal[k]] = inverse;
@@ -60,10 +100,32 @@ N reduced(const Pattern& p, const N* LU, int begin, int end, const N& b, const N
   return even + odd;
 }
 
+/// The same of columns begin … end - 1 of a row of a full factor.
+template <int begin, int end, class N>
+N reduced_row(const N* row, const N& b, const N* work) {
+  N even = b, odd(0.0);
+#pragma GCC unroll 12
+  for (int s = begin; s < end; ++s)
+    ((s - begin) % 2 == 0 ? even : odd) =
+        mul_sub_from(row[s], work[s], (s - begin) % 2 == 0 ? even : odd);
+  return even + odd;
+}
+
 /// Solves x = A⁻¹ b from the factor, whose numbers lie in `part`. b and x are in dof order. `work`:
 /// (n).
 template <class N>
 void solve(const Pattern& p, const PatternPart& part, const N* LU, const N* b, N* x, N* work) {
+  if (with_fixed_rows(
+          p, part, [&]<int... k>(std::integer_sequence<int, k...>) {
+            constexpr int n = sizeof...(k), last = n - 1;
+            N y[n];
+            ((y[k] = reduced_row<0, k>(LU + n * k, b[p.permutation[k]], y)), ...);
+            ((y[last - k] = reduced_row<last - k + 1, n>(LU + n * (last - k), y[last - k], y) *
+                            LU[(n + 1) * (last - k)]),
+             ...);
+            for (int i = 0; i < n; ++i) x[p.permutation[i]] = y[i];
+          }))
+    return;
   for (int k = 0; k < p.n; ++k)
     work[k] = reduced(p, LU, part.factor_first[k], p.diagonal[k], b[p.permutation[k]], work);
   for (int k = p.n - 1; k >= 0; --k) {

@@ -202,9 +202,19 @@ struct GroundContact {
   int body = -1;        ///< index into ModelView::solids
   /// (n_points, 3) tangents of `points`, used by dual numbers alone; nullptr: points stay fixed.
   const double* point_tangents = nullptr;
+  // Of bodies with many points, tiles of neighbours (low_points.hpp); without, n_tiles is 0.
+  int n_tiles = 0;
+  const int* in_tiles = nullptr;  ///< (n_points) numbers of the points, tile by tile
+  /// (n_tiles, 4), (blocks, 4) centre and radius of a ball around each, link axes [m].
+  const double *tiles = nullptr, *blocks = nullptr;
   int memory = -1;        ///< as in PairContact
   int first_anchor = -1;  ///< of its points among Stage::ground_anchors
 };
+
+/// Points of a tile, and tiles of a block. A body with no more points than kFewPoints has no tiles.
+inline constexpr int kLowTile = 8, kLowBlock = 8, kFewPoints = 32;
+/// Far above the rounding of a point's height [m].
+inline constexpr double kAboveRounding = 1e-9;
 
 /// Points with shear springs (kernels/contact/elastic_contact.hpp) against one shape: those of a
 /// pair of bodies, of a body on the ground, or of a tactile sensor.
@@ -298,6 +308,7 @@ struct ModelView {
   /// (n_links); null in scenes of few link pairs, whose pairs are all considered.
   const LinkBall* link_balls;
   const int *pair_order, *ground_order;  ///< (n_pairs), (n_grounds): members side by side
+  int most_ground_points;                ///< largest number of points of a body on the ground
   int n_solids;
   const Solid* solids;  ///< (n_solids) all bodies of the scene
   ParameterRows rows;

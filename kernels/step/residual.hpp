@@ -10,6 +10,7 @@
 #include "kernels/contact/elastic_contact.hpp"
 #include "kernels/step/faces.hpp"
 #include "kernels/step/joint_effects.hpp"
+#include "kernels/step/low_points.hpp"
 #include "kernels/step/point_sums.hpp"
 #include "kernels/step/stage.hpp"
 
@@ -226,6 +227,11 @@ void for_each_place(const CandidateList<N>& list, int lone, const F& f) {
     for (int k = 0; k < list.own_count; ++k) f(k, Vec3<N>{N(x[k]), N(y[k]), N(z[k])});
   }
 }
+/// Whether the candidates have areas. Workspaces of one lane have no rows.
+template <class N>
+bool has_areas(const CandidateList<N>& list, int lone) {
+  return lone < 0 ? list.weights != nullptr : list.own_weights != nullptr;
+}
 template <class N>
 N area_at(const CandidateList<N>& list, int lone, int k) {
   return lone < 0 ? list.weights[k] : N(list.own_weights[k]);
@@ -234,7 +240,7 @@ N area_at(const CandidateList<N>& list, int lone, int k) {
 template <class N>
 void set_point_law(const LawParameters<N>& law, const CandidateList<N>& list, int lone, int k,
                    LawParameters<N>& out) {
-  if (list.weights != nullptr) set_weighted(law, area_at(list, lone, k), out);
+  if (has_areas(list, lone)) set_weighted(law, area_at(list, lone, k), out);
 }
 
 /// Adds the candidate points one by one, for shapes whose Hessian has no special form: capsules,
@@ -379,15 +385,17 @@ bool sum_grounded(const ModelView& model, const GroundedLink& grounded, const St
     if (ground.memory >= 0) {
       const Frame<N> in_body = relative(link.world, broadcast<N>(model.ground));
       const N* anchors = a.ground_anchors + kAnchorNumbers * ground.first_anchor;
-      for (int k = 0; k < ground.n_points; ++k)
+      for_each_low_point(ground, m, height, a.low_points, [&](int k) {
         near |= accumulate_elastic_ground<Derivatives>(
             sums, law, m, height, link.V, ground_point<N>(ground, k), radius, in_body,
             load_anchor<N>([&](int number) { return anchors[kAnchorNumbers * k + number]; }));
+      });
       continue;
     }
-    for (int k = 0; k < ground.n_points; ++k)
+    for_each_low_point(ground, m, height, a.low_points, [&](int k) {
       near |= accumulate_ground<Derivatives>(sums, law, m, height, link.V,
                                              ground_point<N>(ground, k), radius);
+    });
   }
   return near;
 }

@@ -95,9 +95,10 @@ struct StageArgs {
   int lone;  ///< the only lane whose result matters; its contacts are summed across points. -1: all
              ///< lanes matter
   // scratch
-  LinkScratch<N>* links;        ///< (n_links)
-  ContactScratch<N>* contacts;  ///< (n_link_pairs + n_grounded)
-  JointColumns<N>* columns;     ///< (2 n_links) motion columns of a pair
+  LinkScratch<N>* links;                ///< (n_links)
+  ContactScratch<N>* contacts;          ///< (n_link_pairs + n_grounded)
+  JointColumns<N>* columns;             ///< (2 n_links) motion columns of a pair
+  std::uint64_t* low_points = nullptr;  ///< scratch of for_each_low_point(); null: it has none
   // results
   N* v;              ///< (nv)
   N* g;              ///< (nv) residual [N, N m]

@@ -102,7 +102,7 @@ struct KernelTable {
   /// Fills `points`, padded to a multiple of eight. Returns their number without padding.
   int (*find_candidates)(const CandidateSearch&);
   /// Makes the rows of a list from its lanes' points.
-  void (*transpose_list)(GroupStage::List&);
+  void (*transpose_list)(GroupStage::List&, unsigned lanes);
   /// Computes poses and twists of all links, (n_links).
   void (*link_poses)(const ModelView&, const GroupState&, LinkPose<LaneRow>* out);
   /// Computes pose and twist of a shape against a pad, both given in their links (nullptr: the

@@ -39,7 +39,8 @@ void add_adjoint_kernels(StageKernels<L>& k) {
     return sizeof(LinkScratch<N>) * m.n_links +
            sizeof(ContactScratch<N>) * (m.n_link_pairs + m.n_grounded) +
            sizeof(CandidateList<N>) * m.n_pairs + sizeof(JointColumns<N>) * 2 * m.n_links +
-           sizeof(LinkAdjoint<N>) * m.n_links + 5 * alignof(N);
+           sizeof(LinkAdjoint<N>) * m.n_links +
+           sizeof(std::uint64_t) * low_words(m.most_ground_points) + 6 * alignof(N);
   };
   k.adjoint_rhs = [](const ModelView& m, const Stage<L>& s, const StageAdjoint<L>& d) {
     kernels::adjoint_rhs(m, StageView<N, L>::arguments(m, s, -1), adjoint_arguments<N>(d, nullptr));

@@ -4,6 +4,7 @@
 
 #include "kernels/contact/elastic_contact.hpp"
 #include "kernels/step/arguments.hpp"
+#include "kernels/step/low_points.hpp"
 #include "kernels/step/stage.hpp"
 
 namespace tangere::kernels {
@@ -97,6 +98,7 @@ struct StageView {
     a.links = scratch.template take<LinkScratch<N>>(m.n_links);
     a.contacts = scratch.template take<ContactScratch<N>>(m.n_link_pairs + m.n_grounded);
     a.columns = scratch.template take<JointColumns<N>>(2 * m.n_links);
+    a.low_points = scratch.template take<std::uint64_t>(low_words(m.most_ground_points));
     a.candidates = lists_of(m, s, lone, scratch);
     a.apart = s.apart;
     a.coupled = s.coupled;

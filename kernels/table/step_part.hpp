@@ -102,7 +102,9 @@ void add_group_kernels(KernelTable& k) {
   k.find_candidates = [](const CandidateSearch& search) -> int {
     return search_candidates<Arch>(search);
   };
-  k.transpose_list = [](GroupStage::List& list) { transpose_rows<Arch>(list); };
+  k.transpose_list = [](GroupStage::List& list, unsigned lanes) {
+    transpose_rows<Arch>(list, lanes);
+  };
   k.link_poses = [](const ModelView& m, const GroupState& s, LinkPose<LaneRow>* out) {
     using N = Lanes<Arch>;
     kernels::link_poses(m, at_state<N>(s), reinterpret_cast<LinkPose<N>*>(out));

@@ -5,6 +5,7 @@
 
 #include <array>
 #include <cmath>
+#include <utility>
 
 #include "engine/model/compile.hpp"
 #include "engine/step/detection.hpp"
@@ -22,7 +23,8 @@ using kernels::kGroup;
 
 struct Trajectory {
   std::vector<double> states;
-  int rows = 0;  // longest list seen
+  int rows = 0;      // longest list seen
+  int searches = 0;  // changes of the pose at which a lane's list was made
 };
 
 /// Eight balls at different places under a pad, stepped by hand so that the test can choose the
@@ -31,7 +33,7 @@ Trajectory run(double margin, const kernels::KernelTable& table) {
   const auto m = compile(testing::rolling_ball(false, 8));
   Workspace w(*m);
   SingleWorkspace alone(*m);
-  for (auto& list : w.lists) list.margin = margin;
+  for (auto& list : w.own_candidates.lists) list.margin = margin;
   const GroupStep step(*m, {Integrator::bdf2, 5e-3, 1e-9, 20});
   for (int i = 0; i < m->nq; ++i)
     for (int l = 0; l < kGroup; ++l) w.q0[i][l] = m->initial_q[std::size_t(i)];
@@ -42,6 +44,7 @@ Trajectory run(double margin, const kernels::KernelTable& table) {
   }
   Trajectory r;
   LaneBits history = 0;
+  std::array<double, kGroup> reference{};
   for (int t = 0; t < 40; ++t) {
     std::vector<double> q, v;
     for (int l = 0; l < kGroup; ++l) {
@@ -57,8 +60,12 @@ Trajectory run(double margin, const kernels::KernelTable& table) {
     std::copy(q0.begin(), q0.end(), w.q_before);
     std::copy(v0.begin(), v0.end(), w.v_before);
     history = kAllLanes;
-    r.rows =
-        std::max(r.rows, *std::max_element(w.lists[0].own_count, w.lists[0].own_count + kGroup));
+    for (int l = 0; l < kGroup; ++l) {
+      const double now = w.own_candidates.references[11][l];
+      if (std::exchange(reference[std::size_t(l)], now) != now) ++r.searches;
+    }
+    r.rows = std::max(r.rows, *std::max_element(w.own_candidates.lists[0].own_count,
+                                                w.own_candidates.lists[0].own_count + kGroup));
   }
   for (int i = 0; i < m->nq; ++i)
     for (int l = 0; l < kGroup; ++l) r.states.push_back(w.q0[i][l]);
@@ -70,8 +77,10 @@ TEST(Candidates, AnyMarginGivesTheSameBits) {
     SCOPED_TRACE(table->name);
     const Trajectory everything = run(1, *table);
     EXPECT_EQ(everything.rows, 2168);  // a metre of margin: every point is listed
+    EXPECT_EQ(everything.searches, kGroup) << "one list serves all steps";
     for (double margin : {1e-2, 1e-4, 1e-7}) {
       const Trajectory r = run(margin, *table);
+      EXPECT_TRUE(margin > 1e-3 || r.searches > 2 * kGroup) << "margin " << margin;
       EXPECT_EQ(r.states, everything.states) << "margin " << margin;
       EXPECT_LT(r.rows, 2168);
     }
@@ -109,7 +118,7 @@ Trajectory drop_bar(double margin, const kernels::KernelTable& table) {
   Workspace w(*m);
   SingleWorkspace alone(*m);
   if (margin > 0)
-    for (auto& list : w.lists) list.margin = margin;
+    for (auto& list : w.own_candidates.lists) list.margin = margin;
   const GroupStep step(*m, {Integrator::bdf1, 2e-3, 1e-9, 20});
   for (int l = 0; l < kGroup; ++l) {
     for (int i = 0; i < m->nq; ++i) w.q0[i][l] = m->initial_q[std::size_t(i)];
@@ -122,7 +131,7 @@ Trajectory drop_bar(double margin, const kernels::KernelTable& table) {
     step.advance(table, w, alone, kAllLanes, kNoLane, report);
     for (int l = 0; l < kGroup; ++l)
       EXPECT_FALSE(failed(report.status[l])) << "lane " << l << " step " << t;
-    for (const auto& list : w.lists)
+    for (const auto& list : w.own_candidates.lists)
       for (int count : list.own_count) r.rows += count;
   }
   for (int i = 0; i < m->nq; ++i)
@@ -157,7 +166,7 @@ Arrival arrive(double margin, LaneBits lanes, int poisoned, const kernels::Kerne
   Workspace w(*m);
   SingleWorkspace alone(*m);
   if (margin > 0)
-    for (auto& list : w.lists) list.margin = margin;
+    for (auto& list : w.own_candidates.lists) list.margin = margin;
   const double h = 2e-2;
   const GroupStep step(*m, {Integrator::bdf1, h, 1e-9, 20});
   double mass = 0;
@@ -176,10 +185,10 @@ Arrival arrive(double margin, LaneBits lanes, int poisoned, const kernels::Kerne
   NewtonReport report;
   step.advance(table, w, alone, lanes, kNoLane, report);
   Arrival r;
-  r.apart = w.apart[0] != 0;
+  r.apart = w.own_candidates.apart[0] != 0;
   for (int l = 0; l < kGroup; ++l) {
     for (int i = 0; i < m->nq; ++i) r.states.push_back(has(lanes, l) ? w.q0[i][l] : 0);
-    for (const auto& list : w.lists) r.listed[std::size_t(l)] += list.own_count[l];
+    for (const auto& list : w.own_candidates.lists) r.listed[std::size_t(l)] += list.own_count[l];
     r.passes[std::size_t(l)] = report.iterations[std::size_t(l)];
     EXPECT_TRUE(!has(lanes, l) || !failed(report.status[std::size_t(l)])) << "lane " << l;
   }
@@ -292,7 +301,7 @@ TEST(Candidates, ALaneThatOutrunsItsListSaysSo) {
   find_candidates(*m, table, w, kAllLanes);
   table.group.kinematics(m->view, w.stage);
   for (double x : w.stage.excess[0].lane) EXPECT_LE(x, 0);
-  w.stage.x[2][3] = -2 * w.lists[0].margin;
+  w.stage.x[2][3] = -2 * w.own_candidates.lists[0].margin;
   table.group.kinematics(m->view, w.stage);
   for (int l = 0; l < kGroup; ++l) {
     if (l == 3) {

@@ -26,23 +26,21 @@ constexpr double kStep = 0.004, kC0 = 1.5;
 template <int L>
 void list_everything(const CompiledModel& m, BasicWorkspace<L>& w) {
   for (std::size_t k = 0; k < m.pairs.size(); ++k) {
-    auto& list = w.lists[k];
-    list.count = m.pairs[k].n_points;
+    w.own_candidates.reserve(m, k, m.pairs[k].n_points);
+    auto& list = w.own_candidates.lists[k];
     list.margin = 1e9;
-    for (int i = 0; i < 3 * m.pairs[k].n_points; ++i)
-      for (double& x : list.points[i].lane) x = m.pairs[k].points[i];
-    if (const double* const areas = m.pairs[k].weights; areas != nullptr)
-      for (int i = 0; i < m.pairs[k].n_points; ++i)
-        for (int l = 0; l < L; ++l)
-          list.weights[i][l] = list.own_weights[l * list.stride + i] = areas[i];
     for (int l = 0; l < L; ++l) {
       list.own_count[l] = m.pairs[k].n_points;
+      if (const double* const areas = m.pairs[k].weights; areas != nullptr)
+        std::copy_n(areas, m.pairs[k].n_points, list.own_weights + l * list.stride);
       for (int i = 0; i < list.stride; ++i)
         for (int c = 0; c < 3; ++c)
           list.own[(l * 3 + c) * list.stride + i] =
               i < m.pairs[k].n_points ? m.pairs[k].points[3 * i + c] : kernels::kFarAway;
     }
+    if constexpr (L > 1) kernels::active_kernels().transpose_list(list, kAllLanes);
   }
+  std::ranges::fill(w.own_candidates.apart, 0);
 }
 
 template <int L>

@@ -77,7 +77,7 @@ TEST(Passing, WhatIsOutOfReachDidNotPass) {
           out_of_reach += has(spared, l) ? 1 : 0;
           of_these_far += has(spared & far, l) ? 1 : 0;
         }
-        std::ranges::fill(w.apart, 0);
+        std::ranges::fill(w.own_candidates.apart, 0);
         EXPECT_EQ(passing.out_of_reach<kGroup>(w, kAllLanes), kNoLane) << "near in some lane";
       }
     EXPECT_GT(passed, 20);

@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: Apache-2.0
+// Lists of contact candidates of a group of eight lanes, or of a single lane, and the poses, sizes
+// and faces at which they were made. The lists of a lane are valid as long as it has not moved
+// farther than their margin from there, and its sizes and faces are the same. So they may be kept
+// from one step to the next.
+#pragma once
+
+#include <vector>
+
+#include "engine/base/aligned.hpp"
+#include "engine/model/compiled_model.hpp"
+#include "engine/step/lane_bits.hpp"
+#include "kernels/step/arguments.hpp"
+
+namespace tangere {
+
+/// Returns the number of a pair's points, rounded up to whole vectors, and one vector more: a
+/// search for points writes no more.
+inline int search_stride(const kernels::PairContact& pair) {
+  return (pair.n_points + kernels::kGroup - 1) / kernels::kGroup * kernels::kGroup +
+         kernels::kGroup;
+}
+
+template <int L>
+class CandidateLists {
+ public:
+  using List = typename kernels::Stage<L>::List;
+
+  explicit CandidateLists(const CompiledModel& model);
+  CandidateLists(const CandidateLists&) = delete;
+  CandidateLists& operator=(const CandidateLists&) = delete;
+
+  /// Makes room for `points` candidates of a pair in every lane. Keeps what is listed; rows must be
+  /// made again if it grows.
+  void reserve(const CompiledModel& model, std::size_t pair, int points);
+  /// Empties the lists of `lanes`, which have none then.
+  void clear(LaneBits lanes);
+  /// Bytes of the lists of a scene if they hold all points of all pairs.
+  static std::size_t most_bytes(const CompiledModel& model);
+
+  std::vector<List> lists;
+  /// (n_link_pairs, 12) poses at which the lists were made.
+  AlignedVector<kernels::Row<L>> references;
+  /// (n_pairs, 3) faces and sizes with which they were made; of pairs where these vary.
+  AlignedVector<kernels::Row<L>> faces, sizes;
+  std::vector<unsigned char> apart;         ///< (n_link_pairs) as Stage::apart
+  std::vector<unsigned char> apart_before;  ///< the same before the last search
+  std::vector<LaneBits> in_rows;            ///< (n_pairs) lanes whose list is also in the rows
+  LaneBits all_in_rows = 0;                 ///< lanes of which all lists are
+  LaneBits searched = 0;                    ///< lanes that have lists, which may be empty
+
+ private:
+  struct Storage {
+    AlignedVector<double> numbers;
+    std::vector<int> index;
+  };
+  std::vector<Storage> storage_;  // of each list
+};
+
+}  // namespace tangere

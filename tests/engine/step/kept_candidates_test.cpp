@@ -1,0 +1,141 @@
+// SPDX-License-Identifier: Apache-2.0
+// Tests that lists of candidates which outlive a step change no bits, whatever happens to an
+// environment between two steps. A copy of a batch has no lists, so each step is also taken from a
+// copy.
+#include <gtest/gtest.h>
+
+#include <utility>
+
+#include "engine/model/compile.hpp"
+#include "engine/step/candidate_lists.hpp"
+#include "engine/step/candidate_store.hpp"
+#include "engine/step/detection.hpp"
+#include "engine/step/group_step.hpp"
+#include "engine/step/stepper.hpp"
+#include "engine/step/tape.hpp"
+#include "tests/engine/runs.hpp"
+#include "tests/engine/scenes.hpp"
+
+namespace tangere {
+namespace {
+
+constexpr int kEnvironments = 19;  // the last group has three lanes
+
+/// A pad on balls of different radii that turn under it.
+Scene balls_of_many_sizes() {
+  Scene s = testing::rolling_ball(false, 8);
+  s.ground_contacts.front().coefficients.kn = 500;
+  s.links[1].body.density = 500;
+  s.links[0].joint.pose.position = {0, 0, 0.0445};
+  s.randomizations.push_back({{NumberOwner::body, NumberField::radius, "ball"},
+                              {Distribution::Kind::uniform, 0.0185, 0.0205, {}},
+                              {}});
+  s.randomizations.push_back({{NumberOwner::contact, NumberField::mu, "pad", 0, "ball"},
+                              {Distribution::Kind::uniform, 0.2, 0.9, {}},
+                              {}});
+  return s;
+}
+
+/// Two boxes on a third, whose faces are chosen for each solve.
+Scene boxes() {
+  const auto box = [](const Vector3& size) { return CuboidShape{size, {2, 2, 2}}; };
+  Scene s;
+  s.name = "boxes";
+  s.timestep = 4e-3;
+  s.links = {
+      testing::link("base", JointType::fixed, {0, 0, -0.01}, box({0.2, 0.2, 0.02}), 1000),
+      testing::link("low", JointType::free, {0, 0, 0.0249}, box({0.05, 0.05, 0.05}), 1000),
+      testing::link("top", JointType::free, {0.02, 0, 0.0748}, box({0.05, 0.05, 0.05}), 1000)};
+  for (const auto& [a, b] : {std::pair{"low", "base"}, {"top", "low"}, {"low", "top"}})
+    s.pair_contacts.push_back({a, b, {1e4, 20, 0.5, 1e3}, ContactLaw::clamped, 1e-5, {}});
+  return s;
+}
+
+std::vector<double> numbers_of(const Batch& batch) {
+  std::vector<double> all;
+  for (int e = 0; e < batch.environments(); ++e) {
+    for (const double x : testing::q_of(batch, e)) all.push_back(x);
+    for (const double x : testing::v_of(batch, e)) all.push_back(x);
+    all.push_back(double(batch.status(e)));
+    all.push_back(batch.iterations(e));
+    all.push_back(batch.residual(e));
+  }
+  return all;
+}
+
+/// What happens to a batch before step t.
+void disturb(Batch& batch, const BlockState& saved, int t) {
+  const int e = 5 * t % batch.environments();
+  std::vector<double> q = testing::q_of(batch, e), v = testing::v_of(batch, e);
+  if (t % 5 == 1) v[2] -= 0.3, q[1] += 1e-3;
+  if (t % 5 == 1) batch.set_state(e, q, v);
+  if (t % 5 == 2) batch.reset(e, t);
+  if (t % 5 == 3 && !compiled(batch.model()).randomized_row.empty())
+    batch.set_randomized_value(e, 0, t % 2 == 0 ? 0.018 : 0.021);
+  if (t % 5 == 4) q[2] += 2e-4, batch.displace_state(e, q, v);
+  if (t % 9 == 3) batch.set_failed(e, StepStatus::singular);
+  if (t % 20 == 15) batch.restore_block(0, saved);
+  const bool lone = t % 20 >= 8 && t % 20 < 12;  // the others of the second group are held
+  for (int l = 8; l < 16; ++l) batch.hold(l, lone && l != 11);
+}
+
+void expect_same_bits(const Scene& scene, const std::vector<double>& control) {
+  const Model model(scene);
+  Stepper stepper(model), other(model);
+  BlockTape tape(model, stepper.integrator(), 4);
+  Batch batch(model, kEnvironments, 3);
+  std::vector<double> u;
+  for (int e = 0; e < kEnvironments; ++e) u.insert(u.end(), control.begin(), control.end());
+  const BlockState saved = batch.save_block(0);
+  for (int t = 0; t < 80; ++t) {
+    disturb(batch, saved, t);
+    Batch without = batch;
+    other.step(without, u);
+    for (int b = 0; b < batch.blocks(); ++b) {
+      const bool taped = t % 16 == 6;
+      if (taped) tape.start(batch, b);
+      stepper.step_block(batch, b, u, taped ? &tape : nullptr);
+    }
+    ASSERT_EQ(numbers_of(batch), numbers_of(without)) << "step " << t;
+  }
+}
+
+TEST(KeptCandidates, ChangeNoBitsWhereSizesVary) {
+  expect_same_bits(balls_of_many_sizes(), {0.05, 0, 0.1});
+}
+TEST(KeptCandidates, ChangeNoBitsWhereFacesAreChosen) { expect_same_bits(boxes(), {}); }
+
+TEST(KeptCandidates, AreDroppedWhereFacesChange) {
+  const auto m = compile(boxes());
+  Workspace w(*m);
+  SingleWorkspace alone(*m);
+  for (int i = 0; i < m->nq; ++i)
+    for (double& q : w.q0[i].lane) q = m->initial_q[std::size_t(i)];
+  const kernels::KernelTable& table = kernels::active_kernels();
+  NewtonReport report;
+  GroupStep(*m, {Integrator::bdf1, 1e-4, 1e-9, 20})
+      .advance(table, w, alone, kAllLanes, kNoLane, report);
+  start_solve(*m, table, w, kAllLanes);
+  EXPECT_EQ(w.own_candidates.searched, kAllLanes);
+  w.own_candidates.faces[2][5] *= -1;  // the lists of lane 5 are those of another face
+  start_solve(*m, table, w, kAllLanes);
+  EXPECT_EQ(w.own_candidates.searched, kAllLanes & ~(1U << 5));
+  for (const auto& list : w.own_candidates.lists) EXPECT_EQ(list.own_count[5], 0);
+}
+
+TEST(KeptCandidates, AreThoseOfTheirGroupAndNotOfACopy) {
+  const Model model(boxes());
+  const CompiledModel& m = compiled(model);
+  CandidateStore store(2);
+  auto& lists = store.lists<1>(1, m, true);
+  lists.searched = 1;
+  EXPECT_EQ(&store.lists<1>(1, m, true), &lists);
+  EXPECT_EQ(store.lists<1>(0, m, true).searched, kNoLane) << "another group";
+  EXPECT_EQ(store.lists<kernels::kGroup>(1, m, true).searched, kNoLane) << "not of a lane alone";
+  CandidateStore copy = store;
+  EXPECT_EQ(copy.lists<1>(1, m, true).searched, kNoLane);
+  EXPECT_EQ(store.lists<1>(1, m, false).searched, kNoLane) << "of another model";
+}
+
+}  // namespace
+}  // namespace tangere
