@@ -70,9 +70,9 @@ void advance(const ShearSpringTouch& end, const ShearSpringPoints& points, doubl
   });
 }
 
-/// Computes the entries at the end of a step. Anchors of the points stay in registers unless they
-/// are given. Points go through it four vectors at a time, pass by pass, so that the latencies of
-/// different points overlap.
+/// Computes the entries at the end of a step, with anchors that are given or found here. Points go
+/// through it four vectors at a time, pass by pass, so that the latencies of different points
+/// overlap.
 template <class A>
 void advance_entries(ShearUpdate& u) {
   using N = Lanes<A>;
@@ -80,6 +80,7 @@ void advance_entries(ShearUpdate& u) {
   struct Pass {
     N d;
     Vec3<N> n, x2, s;
+    Anchor<N> anchor;
     N square, limit;
     unsigned touching;
   } passes[kVectors];
@@ -108,11 +109,15 @@ void advance_entries(ShearUpdate& u) {
         });
       each([&](int k, Pass& pass) {
         if (pass.touching == 0) return;
+        pass.anchor = u.start == nullptr ? load_anchors<A>(points, k)
+                                         : recalled(shape, start, place(k), pass.s);
+      });
+      each([&](int k, Pass& pass) {
+        if (pass.touching == 0) return;
         LawParameters<N> own;
         if (own_law) own = law_at<A>(end, points, k);
         const LawParameters<N>& law = own_law ? own : end.law;
-        const Anchor<N> anchor = u.start == nullptr ? load_anchors<A>(points, k)
-                                                    : recalled(shape, start, place(k), pass.s);
+        const Anchor<N>& anchor = pass.anchor;
         PointContact<N> p;
         p.d = pass.d, p.n = pass.n, p.x2 = pass.x2;
         find_motion(law, end.omega, end.v, p);
