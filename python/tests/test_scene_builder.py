@@ -322,7 +322,7 @@ def test_requests_for_a_robot_are_checked():
         return str(e.value)
 
     assert "neither a file nor a layout of the program; did you mean 'digit_guess'" in fault(
-        pads={"tip": "digt"}
+        pads={"tip": "digit_gues"}
     )
     assert "did you mean 'tip'" in fault(pads={"tipp": "digit_guess"})
     assert "(1, 2); expected x y z or" in fault(pads={"tip": ("digit_guess", (1, 2))})
