@@ -83,7 +83,8 @@ def generate(
             raise _core.InputError("a function as policy without a name; expected `name`")
     if isinstance(options, str):
         raise _core.InputError(f"options {options!r}; expected a list, such as [{options!r}]")
-    registered, arguments = None, {}
+    registered: str | None = None
+    arguments: dict[str, Any] = {}
     if isinstance(what, str) and what in gymnasium.registry and not Path(what).exists():
         registered = what
         what, arguments = registered_task(what)
