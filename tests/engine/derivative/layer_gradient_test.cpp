@@ -24,9 +24,9 @@ using testing::PadState;
 using testing::Random;
 using Numbers = std::vector<double>;
 
-constexpr int kLane = 5;
+constexpr int kLayerLane = 5;
 
-Scene scene_with(PrimitiveShape shape, Pad pad) {
+Scene layer_scene(PrimitiveShape shape, Pad pad) {
   Scene s = testing::pad_scene(shape, ContactLaw::clamped, pad);
   s.sensors[0].material = SkinMaterial{1e5, 0.02, 0.01};
   s.sensors[0].layer = LayerDescription{0.45, 0.01, 0.002, {}};
@@ -34,23 +34,23 @@ Scene scene_with(PrimitiveShape shape, Pad pad) {
   return s;
 }
 
-struct Read {
+struct LayerRead {
   Batch batch;
   BlockTape tape;
 
-  Read(const Model& model, const PadState& s)
+  LayerRead(const Model& model, const PadState& s)
       : batch(model, kBlock, 9), tape(model, Integrator::bdf1, 1) {
-    batch.set_state(kLane, s.q, s.v);
+    batch.set_state(kLayerLane, s.q, s.v);
     tape.start(batch, 0);
   }
   [[nodiscard]] Numbers field() const {
     Numbers all(std::size_t(3 * batch.model().sensors()[0].points));
-    Readout(batch.model()).tactile(batch, kLane, 0, all);
+    Readout(batch.model()).tactile(batch, kLayerLane, 0, all);
     return all;
   }
 };
 
-Numbers random_numbers(Random& random, std::size_t n, double size) {
+Numbers layer_numbers(Random& random, std::size_t n, double size) {
   Numbers x(n);
   for (double& a : x) a = size * random.normal();
   return x;
@@ -61,7 +61,7 @@ class LayerGradient : public ::testing::TestWithParam<std::tuple<PrimitiveShape,
 /// By the state, by kn (of which E is a multiple) and by the size of the shape.
 TEST_P(LayerGradient, DualNumbersReverseAndDifferencesAgree) {
   const auto [shape, pad] = GetParam();
-  const Scene scene = scene_with(shape, pad);
+  const Scene scene = layer_scene(shape, pad);
   const Model model(scene);
   const CompiledModel& m = compiled(model);
   Random random(11);
@@ -71,45 +71,46 @@ TEST_P(LayerGradient, DualNumbersReverseAndDifferencesAgree) {
   int touching = 0, compared = 0;
   for (int trial = 0; trial < 12; ++trial) {
     const PadState s = testing::random_pad_state(model, random);
-    const Numbers dq = random_numbers(random, nv, 0.01), dv = random_numbers(random, nv, 1);
+    const Numbers dq = layer_numbers(random, nv, 0.01), dv = layer_numbers(random, nv, 1);
     Numbers dp(rows);
     dp[kn] = 20 * random.normal();
     for (std::size_t k = 0; k < 3; ++k) dp[size + k] = 1e-3 * random.normal();
-    Read at(model, s);
+    LayerRead at(model, s);
     const Numbers here = at.field();
     if (std::all_of(here.begin(), here.end(), [](double x) { return x == 0; })) continue;
     ++touching;
     Numbers duals(here.size());
-    Tangent(model).field(at.batch, 0, kLane, at.tape, 0, 0, dp, {}, {dq, dv, {}, {}}, duals);
+    Tangent(model).field(at.batch, 0, kLayerLane, at.tape, 0, 0, dp, {}, {dq, dv, {}, {}}, duals);
     const double length =
         std::sqrt(std::inner_product(duals.begin(), duals.end(), duals.begin(), 0.0));
 
-    const Numbers weights = random_numbers(random, duals.size(), 1);
+    const Numbers weights = layer_numbers(random, duals.size(), 1);
     ReadoutPullback pullback(model);
     BlockCotangent c;
     for (auto* x : {&c.q, &c.v}) x->assign(nv * kBlock, 0.0);
     c.parameters.assign(rows * kBlock, 0.0);
     pullback.place(at.batch, 0);
     pullback.clear();
-    pullback.dense_field(kLane, 0, weights, c.parameters);
+    pullback.dense_field(kLayerLane, 0, weights, c.parameters);
     pullback.finish(c);
     double back = 0;
     for (std::size_t i = 0; i < nv; ++i)
-      back += c.q[i * kBlock + kLane] * dq[i] + c.v[i * kBlock + kLane] * dv[i];
-    for (std::size_t i = 0; i < rows; ++i) back += c.parameters[i * kBlock + kLane] * dp[i];
+      back += c.q[i * kBlock + kLayerLane] * dq[i] + c.v[i * kBlock + kLayerLane] * dv[i];
+    for (std::size_t i = 0; i < rows; ++i) back += c.parameters[i * kBlock + kLayerLane] * dp[i];
     const double along = std::inner_product(weights.begin(), weights.end(), duals.begin(), 0.0);
     EXPECT_NEAR(along, back, 1e-10 * length * std::sqrt(double(weights.size())));
 
     // Differences by the state; a difference across a point that begins to press is one-sided.
     Numbers by_state(here.size());
-    Tangent(model).field(at.batch, 0, kLane, at.tape, 0, 0, {}, {}, {dq, dv, {}, {}}, by_state);
+    Tangent(model).field(at.batch, 0, kLayerLane, at.tape, 0, 0, {}, {}, {dq, dv, {}, {}},
+                         by_state);
     const auto moved = [&](double e) {
       PadState t = s;
       for (std::size_t i = 0; i < nv; ++i) {
         t.q = testing::moved(model, t.q, int(i), e * dq[i]);
         t.v[i] += e * dv[i];
       }
-      return Read(model, t).field();
+      return LayerRead(model, t).field();
     };
     const double e = 1e-5;
     const Numbers up = moved(e), down = moved(-e);
@@ -136,20 +137,21 @@ INSTANTIATE_TEST_SUITE_P(
 
 /// p is proportional to E, so by kn the normal force has the derivative N/kn.
 TEST(LayerGradient, NormalForcesAreProportionalToKn) {
-  const Model model(scene_with(PrimitiveShape::sphere, Pad::flat));
+  const Model model(layer_scene(PrimitiveShape::sphere, Pad::flat));
   const CompiledModel& m = compiled(model);
   Random random(11);
   double most = 0;
   for (int trial = 0; trial < 12; ++trial) {
     PadState s = testing::random_pad_state(model, random);
     std::fill(s.v.begin(), s.v.end(), 0.0);
-    Read at(model, s);
+    LayerRead at(model, s);
     Numbers dp(std::size_t(m.view.rows.count));
     dp[std::size_t(m.view.rows.sensor(0))] = 1;
     const Numbers here = at.field();
     Numbers duals(here.size());
     const Numbers none(std::size_t(model.nv()));
-    Tangent(model).field(at.batch, 0, kLane, at.tape, 0, 0, dp, {}, {none, none, {}, {}}, duals);
+    Tangent(model).field(at.batch, 0, kLayerLane, at.tape, 0, 0, dp, {}, {none, none, {}, {}},
+                         duals);
     for (std::size_t i = 2; i < here.size(); i += 3) {
       EXPECT_NEAR(duals[i], here[i] / 200, 1e-12 * std::abs(here[i]));
       most = std::max(most, std::abs(here[i]));
@@ -159,10 +161,10 @@ TEST(LayerGradient, NormalForcesAreProportionalToKn) {
 }
 
 TEST(LayerGradient, WhatHasNoDerivativeIsRefused) {
-  const Model model(scene_with(PrimitiveShape::sphere, Pad::flat));
+  const Model model(layer_scene(PrimitiveShape::sphere, Pad::flat));
   Random random(11);
   const PadState s = testing::random_pad_state(model, random);
-  const Read at(model, s);
+  const LayerRead at(model, s);
   ReadoutPullback pullback(model);
   pullback.place(at.batch, 0);
   pullback.clear();
@@ -176,12 +178,12 @@ TEST(LayerGradient, WhatHasNoDerivativeIsRefused) {
       return error.what();
     }
   };
-  EXPECT_THAT(fault([&] { pullback.dense_field(kLane, 0, cotangent, {}, points); }),
+  EXPECT_THAT(fault([&] { pullback.dense_field(kLayerLane, 0, cotangent, {}, points); }),
               ::testing::HasSubstr("'skin', which has a layer"));
   FieldTangent tangent(model);
   tangent.place(at.batch, 0);
   const Numbers none(std::size_t(model.nv()));
-  tangent.move(kLane, none, none);
+  tangent.move(kLayerLane, none, none);
   Numbers change(3 * 64);
   const std::vector<int> tiles = {0};
   EXPECT_THAT(fault([&] { tangent.field(0, tiles, change); }),

@@ -10,7 +10,7 @@
 namespace tangere {
 namespace {
 
-constexpr int kEnvironments = 64;
+constexpr int kNewtonEnvironments = 64;
 
 struct Effort {
   double passes = 0;  ///< evaluations of the residual per step and environment
@@ -19,23 +19,23 @@ struct Effort {
 
 Effort run(const std::string& name) {
   const Model model(read_scene(std::string(TANGERE_SOURCE_DIR) + "/scenes/" + name + ".xml").scene);
-  Batch batch(model, kEnvironments);
+  Batch batch(model, kNewtonEnvironments);
   Stepper stepper(model);
   const ControlProgram control(model, model.timestep(), 1);
   const std::size_t nu = std::size_t(model.nu());
-  std::vector<double> u(kEnvironments * nu);
+  std::vector<double> u(kNewtonEnvironments * nu);
   Effort effort;
   for (std::int64_t k = 0; k < control.steps(); ++k) {
-    for (int e = 0; e < kEnvironments; ++e)
+    for (int e = 0; e < kNewtonEnvironments; ++e)
       control.evaluate(k, e, std::span(u).subspan(std::size_t(e) * nu, nu));
     stepper.step(batch, u);
-    for (int e = 0; e < kEnvironments; ++e) {
+    for (int e = 0; e < kNewtonEnvironments; ++e) {
       effort.passes += batch.iterations(e);
       effort.splits += batch.status(e) == StepStatus::split ? 1 : 0;
     }
   }
   effort.failures = batch.failed_count();
-  effort.passes /= double(kEnvironments) * double(control.steps());
+  effort.passes /= double(kNewtonEnvironments) * double(control.steps());
   return effort;
 }
 
