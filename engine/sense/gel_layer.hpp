@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Pressure of a soft layer whose points are coupled (docs/layer.md). The layer is cut into cells i
-// of m × m points s. With the depth δ_s of a shape below the pad's surface, along the pad's normal, a
-// cell has the load
+// of m × m points s. With the depth δ_s of a shape below the pad's surface, along the pad's normal,
+// a cell has the load
 //   P_i = k Σ max(0, δ_s - w_i)/m²,  w = C' P,  C' = C - I/k,  k = 1/C(0)
 // where C is the compliance of engine/model/layer_compliance.hpp. Let n_i points of cell i have
 // δ_s > w_i. Then P solves M P = δ̄ on cells with n_i > 0, where δ̄_i is the mean of δ_s over these

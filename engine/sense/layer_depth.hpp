@@ -35,7 +35,7 @@ inline constexpr double kClose = 1e-10;
 /// Distance at which it begins Newton's method, by the largest depth.
 inline constexpr double kNearby = 0.02;
 
-/// Returns δ of a point of the pad's plane z = 0, o = (0, 0, outward), at most `deepest`: that where
+/// Returns δ of a point of the pad's plane z = 0, o = (0, 0, outward), at most `deepest`: δ where
 /// the shape goes on below. None where the point is outside the shape. The lowest surface of
 /// several counts: steps of the distance lead to it from below, then Newton's method between
 /// bounds.

@@ -141,7 +141,7 @@ TEST(ShippedScenes, AGelPressesABallAndRollsIt) {
     EXPECT_EQ(r.touch(0, e, 0).points, 0);
     EXPECT_GT(r.touch(r.at(0.12), e, 0).pressure, 1);
     EXPECT_GT(r.touch(r.at(0.12), e, 0).points, 100);
-    EXPECT_GT(r.q(r.at(0.3), e, "ball.x") - r.q(0, e, "ball.x"), 1e-3);
+    EXPECT_GT(r.q(r.at(0.48), e, "ball.x") - r.q(0, e, "ball.x"), 1e-3);
   }
 }
 
