@@ -124,7 +124,8 @@ TEST(SkinMaterial, TheStiffnessRatioIsThatOfTheLayerFormula) {
 TEST(SkinMaterial, TheMeasuredLayoutCarriesTheMeasuredForces) {
   constexpr double kMeasured[][2] = {{0.5, 1.6503}, {1.0, 5.9641}, {1.5, 13.5257}, {2.0, 23.2532}};
   const Model model(pressed(R"(<include file=")" TANGERE_SOURCE_DIR
-                            R"(/scenes/sensors/gelsight_mini_measured.xml" body="plate" pos="0 0 0.005"/>)"));
+                            R"(/scenes/sensors/gelsight_mini_measured.xml" body="plate" )"
+                            R"(pos="0 0 0.005"/>)"));
   Batch batch(model, 1, 0);
   Readout readout(model);
   std::vector<double> field(3 * std::size_t(model.sensors()[0].points));
