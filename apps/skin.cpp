@@ -78,7 +78,7 @@ int skin(const SkinArguments& a, const Console& console) {
   console.note(fmt::format(
       "per mm² of skin: kn {:.4g} N/m, ks {:.4g} N/m. kn by area is {:.3g} E/t; it is {:.3g} to "
       "{:.3g} E/t under balls with √(R d) from 1 to {} of the thickness. Under contacts much wider "
-      "than the skin is thick ks is E/(3 t). Press the skin to know kn.",
+      "than the skin is thick ks is E/(3 t). Measure kn with a press test.",
       by_area.kn * kPerSquareMillimetre, by_area.ks * kPerSquareMillimetre, ratio,
       stiffness_ratio(kMostSize), stiffness_ratio(kLeastSize), kLeastSize));
   console.result({{"command", "skin"},

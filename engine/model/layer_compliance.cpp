@@ -66,7 +66,7 @@ std::vector<double> spectrum(const LayerGrid& grid, const Axis& y, const Axis& x
 }
 
 /// C by offsets of `rows` × `cols` cells.
-std::vector<double> by_offset(const LayerGrid& grid, int rows, int cols) {
+std::vector<double> offset_table(const LayerGrid& grid, int rows, int cols) {
   const Axis y(grid.rows, rows, grid.height, grid.thickness),
       x(grid.cols, cols, grid.width, grid.thickness);
   const std::vector<double> sums = spectrum(grid, y, x);
@@ -137,7 +137,7 @@ LayerCompliance compile_layer(const LayerGrid& grid) {
   const std::optional<int> below = margin_cells(grid.height), beside = margin_cells(grid.width);
   const int rows = below ? 2 * grid.rows + *below : grid.rows,
             cols = beside ? 2 * grid.cols + *beside : grid.cols;
-  const std::vector<double> table = by_offset(grid, rows, cols);
+  const std::vector<double> table = offset_table(grid, rows, cols);
   LayerCompliance out{table[0],
                       std::vector<double>(std::size_t(grid.cells()) * std::size_t(grid.cells()))};
   const auto at = [&](int r, int c) { return table[std::size_t(r * cols + c)]; };

@@ -233,13 +233,13 @@ void LayeredField::pull_back_point(const Point& p, const Vec3<double>& slant_bar
     return along(moved(p, displaced(touches_[target], turn, shift), lifted(size, grow)), depth_bar,
                  slant_bar);
   };
-  const auto by_axes = [](const auto& f) {
+  const auto along_axes = [](const auto& f) {
     return Vec3<double>{f(unit(0)), f(unit(1)), f(unit(2))};
   };
-  to.displacement +=
-      kernels::Vec6<double>{by_axes([&](const Vec3<double>& e) { return change(e, none, none); }),
-                            by_axes([&](const Vec3<double>& e) { return change(none, e, none); })};
-  if (sizes) to.size += by_axes([&](const Vec3<double>& e) { return change(none, none, e); });
+  to.displacement += kernels::Vec6<double>{
+      along_axes([&](const Vec3<double>& e) { return change(e, none, none); }),
+      along_axes([&](const Vec3<double>& e) { return change(none, e, none); })};
+  if (sizes) to.size += along_axes([&](const Vec3<double>& e) { return change(none, none, e); });
   const Vec3<double> rate = (depth_bar * sensor_->layer->relaxation) * p.at.slant;
   to.twist += kernels::Vec6<double>{cross(p.at.place, rate), rate};
 }

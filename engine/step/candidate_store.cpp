@@ -7,8 +7,8 @@
 namespace tangere {
 
 struct CandidateStore::Group {
-  std::unique_ptr<CandidateLists<kernels::kGroup>> of_group;
-  std::unique_ptr<CandidateLists<1>> of_lane;
+  std::unique_ptr<CandidateLists<kernels::kGroup>> group_lists;
+  std::unique_ptr<CandidateLists<1>> lane_lists;
   bool whole = true;
 };
 
@@ -32,9 +32,9 @@ CandidateLists<L>& CandidateStore::lists(std::size_t group, const CompiledModel&
     return *of;
   };
   if constexpr (L == 1) {
-    return made(g.of_lane);
+    return made(g.lane_lists);
   } else {
-    return made(g.of_group);
+    return made(g.group_lists);
   }
 }
 
