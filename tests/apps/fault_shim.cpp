@@ -4,8 +4,9 @@
 // TANGERE_FAULT=kind:n fails the n-th call of a kind, counted from 1, with EIO (writes: ENOSPC,
 // threads: EAGAIN, and all later ones too, memory: ENOMEM). TANGERE_FAULT_COUNT=file writes there,
 // when the program ends, how many calls of that kind there were. Kinds: write, sync, rename, close,
-// truncate, open, read, thread, memory. Allocations by HDF5 itself are not among memory: it uses
-// about one in thirty without asking whether it got it (docs/failures.md). Two more kinds are those
+// truncate, open, read, thread, memory. Allocations by HDF5 and zlib are not among memory: HDF5 uses
+// about one in thirty without a check, and stores a chunk as it is where zlib gets no memory
+// (docs/failures.md). Two more kinds are those
 // of a disk that lies: the n-th write or truncation (lost) does nothing, or the n-th write puts
 // zeros in place of the bytes (zeros), and says that it succeeded.
 #include <dlfcn.h>
@@ -17,6 +18,7 @@
 #include <sys/uio.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
 #include <cerrno>
 #include <cstdarg>
@@ -25,6 +27,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
+#include <iterator>
 #include <new>
 
 extern "C" {
@@ -42,22 +45,29 @@ long failing = -1;  // -1: not loaded yet
 std::atomic<long> unshared{0};
 std::atomic<long>* calls = &unshared;  // of the program and of its child processes together
 
-std::uintptr_t hdf5_begin = 0, hdf5_end = 0;  // where HDF5's code lies, [begin, end)
+/// Code of a library whose allocations do not fail, [begin, end).
+struct Exempt {
+  const char* library;
+  std::uintptr_t begin = 0, end = 0;
+};
+Exempt exempt[] = {{"libhdf5"}, {"libz."}};
 
-/// Whether an allocation that returns to `caller` is one of HDF5's own.
-bool of_hdf5(void* caller) {
+/// Whether an allocation that returns to `caller` is one of an exempt library.
+bool is_exempt(void* caller) {
   const auto address = reinterpret_cast<std::uintptr_t>(caller);
-  return hdf5_begin <= address && address < hdf5_end;
+  return std::any_of(std::begin(exempt), std::end(exempt),
+                     [&](const Exempt& e) { return e.begin <= address && address < e.end; });
 }
 
-int find_hdf5(dl_phdr_info* library, std::size_t, void*) {
-  if (std::strstr(library->dlpi_name, "libhdf5") == nullptr) return 0;
-  for (int i = 0; i < library->dlpi_phnum; ++i) {
-    const ElfW(Phdr)& segment = library->dlpi_phdr[i];
-    if (segment.p_type != PT_LOAD || (segment.p_flags & PF_X) == 0) continue;
-    hdf5_begin = library->dlpi_addr + segment.p_vaddr;
-    hdf5_end = hdf5_begin + segment.p_memsz;
-    return 1;
+int find_exempt(dl_phdr_info* library, std::size_t, void*) {
+  for (Exempt& e : exempt) {
+    if (std::strstr(library->dlpi_name, e.library) == nullptr) continue;
+    for (int i = 0; i < library->dlpi_phnum; ++i) {
+      const ElfW(Phdr)& segment = library->dlpi_phdr[i];
+      if (segment.p_type != PT_LOAD || (segment.p_flags & PF_X) == 0) continue;
+      e.begin = library->dlpi_addr + segment.p_vaddr;
+      e.end = e.begin + segment.p_memsz;
+    }
   }
   return 0;
 }
@@ -83,7 +93,7 @@ __attribute__((constructor)) void load() {
   std::memcpy(kind, fault, static_cast<std::size_t>(colon - fault));
   void* const page =
       mmap(nullptr, sizeof *calls, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
-  dl_iterate_phdr(find_hdf5, nullptr);
+  dl_iterate_phdr(find_exempt, nullptr);
   if (page != MAP_FAILED) calls = new (page) std::atomic<long>(0);
   failing = std::atol(colon + 1);
 }
@@ -220,11 +230,12 @@ extern "C" int pthread_create(pthread_t* thread, const pthread_attr_t* how, void
              : call(thread, how, run, with);
 }
 
-#define FAULTY_MEMORY(name, parameters, arguments)                                                \
-  extern "C" void* name parameters {                                                              \
-    if (of_hdf5(__builtin_return_address(0)) || !fails("memory")) return __libc_##name arguments; \
-    errno = ENOMEM;                                                                               \
-    return nullptr;                                                                               \
+#define FAULTY_MEMORY(name, parameters, arguments)                  \
+  extern "C" void* name parameters {                                \
+    if (is_exempt(__builtin_return_address(0)) || !fails("memory")) \
+      return __libc_##name arguments;                               \
+    errno = ENOMEM;                                                 \
+    return nullptr;                                                 \
   }
 FAULTY_MEMORY(malloc, (std::size_t size), (size))
 FAULTY_MEMORY(calloc, (std::size_t count, std::size_t size), (count, size))
@@ -233,6 +244,7 @@ FAULTY_MEMORY(realloc, (void* pointer, std::size_t size), (pointer, size))
 extern "C" char* strdup(const char* text) {
   const std::size_t size = std::strlen(text) + 1;
   // NOLINTNEXTLINE(cppcoreguidelines-no-malloc): the malloc above
-  void* const copy = of_hdf5(__builtin_return_address(0)) ? __libc_malloc(size) : std::malloc(size);
+  void* const copy =
+      is_exempt(__builtin_return_address(0)) ? __libc_malloc(size) : std::malloc(size);
   return copy == nullptr ? nullptr : static_cast<char*>(std::memcpy(copy, text, size));
 }

@@ -39,7 +39,7 @@ void redirect(const std::string& path, int descriptor) {
 /// Runs in the child, between fork and exec.
 [[noreturn]] void become_program(const std::string& folder, std::vector<std::string> words,
                                  std::vector<std::string> environment, const std::string& out,
-                                 const std::string& err) {
+                                 const std::string& err, const std::optional<Limit>& limit) {
   // A test runner in the background may ignore them, and the program would inherit that.
   std::signal(SIGINT, SIG_DFL);
   std::signal(SIGTERM, SIG_DFL);
@@ -50,15 +50,21 @@ void redirect(const std::string& path, int descriptor) {
   std::vector<char*> argv;
   for (std::string& word : words) argv.push_back(word.data());
   argv.push_back(nullptr);
+  if (limit) {
+    rlimit limits{};
+    getrlimit(limit->resource, &limits);
+    limits.rlim_cur = limit->value;
+    if (setrlimit(limit->resource, &limits) != 0) _exit(126);
+  }
   execv(TANGERE_PROGRAM, argv.data());
   _exit(126);
 }
 
 pid_t start(const std::string& folder, const std::vector<std::string>& words,
             const std::vector<std::string>& environment, const std::string& out,
-            const std::string& err) {
+            const std::string& err, const std::optional<Limit>& limit) {
   const pid_t process = fork();
-  if (process == 0) become_program(folder, words, environment, out, err);
+  if (process == 0) become_program(folder, words, environment, out, err, limit);
   if (process < 0) throw std::system_error(errno, std::generic_category(), "fork");
   return process;
 }
@@ -84,11 +90,12 @@ std::string Folder::write(const std::string& name, const std::string& text) cons
 std::string Folder::read(const std::string& name) const { return file_bytes(root_ / name); }
 
 Program::Program(const Folder& folder, const Words& arguments,
-                 const std::vector<std::string>& environment, const Streams& streams)
+                 const std::vector<std::string>& environment, const Streams& streams,
+                 const std::optional<Limit>& limit)
     : scratch_(new_folder()),
       process_(start(folder.path(), Words{"tangere"} + arguments, environment,
                      streams.out.empty() ? (scratch_ / "out").string() : streams.out,
-                     streams.err.empty() ? (scratch_ / "err").string() : streams.err)) {}
+                     streams.err.empty() ? (scratch_ / "err").string() : streams.err, limit)) {}
 
 Program::~Program() {
   if (process_ > 0) {
@@ -114,8 +121,9 @@ Outcome Program::wait() {
 }
 
 Outcome run(const Folder& folder, const Words& arguments,
-            const std::vector<std::string>& environment, const Streams& streams) {
-  return Program(folder, arguments, environment, streams).wait();
+            const std::vector<std::string>& environment, const Streams& streams,
+            const std::optional<Limit>& limit) {
+  return Program(folder, arguments, environment, streams, limit).wait();
 }
 
 Words subcommands() {

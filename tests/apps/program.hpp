@@ -5,8 +5,10 @@
 
 #include <sys/types.h>
 
+#include <cstdint>
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <ostream>
 #include <string>
 #include <vector>
@@ -57,12 +59,19 @@ struct Streams {
   std::string out, err;
 };
 
+/// A limit of the program alone (setrlimit).
+struct Limit {
+  int resource;  ///< RLIMIT_…
+  std::uintmax_t value;
+};
+
 /// Runs `tangere ARGUMENTS` with the folder as its current one.
 class Program {
  public:
-  /// Starts it. `environment`: "NAME=value", added to this process's own.
+  /// Starts it. `environment`: "NAME=value", added to this process's own. `limit`: of the program.
   Program(const Folder& folder, const Words& arguments,
-          const std::vector<std::string>& environment = {}, const Streams& streams = {});
+          const std::vector<std::string>& environment = {}, const Streams& streams = {},
+          const std::optional<Limit>& limit = {});
   ~Program();
   Program(const Program&) = delete;
   Program& operator=(const Program&) = delete;
@@ -80,7 +89,8 @@ const std::string& page_of(const std::string& subcommand);
 
 /// Runs it to its end.
 Outcome run(const Folder& folder, const Words& arguments,
-            const std::vector<std::string>& environment = {}, const Streams& streams = {});
+            const std::vector<std::string>& environment = {}, const Streams& streams = {},
+            const std::optional<Limit>& limit = {});
 
 /// The subcommands that `tangere --help` lists.
 Words subcommands();

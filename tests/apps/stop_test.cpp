@@ -160,23 +160,6 @@ TEST(TwoRuns, OfOneOutputDoNotMeet) {
   EXPECT_THAT(folder.files(), IsEmpty());
 }
 
-/// What programs that start from now on may use.
-class Limit {
- public:
-  Limit(int what, rlim_t most) : what_(what) {
-    getrlimit(what_, &before_);
-    const rlimit limit{most, before_.rlim_max};
-    setrlimit(what_, &limit);
-  }
-  ~Limit() { setrlimit(what_, &before_); }
-  Limit(const Limit&) = delete;
-  Limit& operator=(const Limit&) = delete;
-
- private:
-  int what_;
-  rlimit before_{};
-};
-
 TEST(FileSizeLimit, FailsTheWriteOfEveryCommand) {
   const Folder folder;
   std::filesystem::copy_file(scene("rolling_ball_small.xml"), folder.path("s.xml"));
@@ -192,8 +175,8 @@ TEST(FileSizeLimit, FailsTheWriteOfEveryCommand) {
        {Words{"simulate", "s.xml", "-o", "out", "--steps", "10"}, Words{"view", "set", "-o", "out"},
         Words{"export", "set", "--csv", "out"}, Words{"plot", "run.h5", "-o", "out"},
         Words{"plot", "s.xml", "-o", "out"}, fit + Words{"--svg", "out"}, Words{"merge", "set"}}) {
-    const Limit small(RLIMIT_FSIZE, 2000);
-    const Outcome outcome = run(folder, words + Words{"--quiet"});
+    const Outcome outcome =
+        run(folder, words + Words{"--quiet"}, {}, {}, Limit{RLIMIT_FSIZE, 2000});
     EXPECT_EQ(outcome.exit_code, 3) << words.front() << outcome.err;
     EXPECT_THAT(outcome.err, HasSubstr("File too large")) << words.front();
     if (words.front() != "merge") {
@@ -202,7 +185,8 @@ TEST(FileSizeLimit, FailsTheWriteOfEveryCommand) {
   }
 }
 
-/// HDF5 uses some memory without checking that it got it.
+/// Libraries do not load, memory runs out in various places, or the run ends well. HDF5 uses some
+/// memory without checking that it got it.
 TEST(AddressSpaceLimit, EndsWithACodeAndAMessage) {
   const Folder folder;
   const Words words{"generate",   scene("rolling_ball_small.xml"),
@@ -211,9 +195,8 @@ TEST(AddressSpaceLimit, EndsWithACodeAndAMessage) {
                     "--steps",    "20",
                     "--every",    "5",
                     "--quiet",    "--overwrite"};
-  for (rlim_t kilobytes = 44'000; kilobytes <= 64'000; kilobytes += 1000) {
-    const Limit small(RLIMIT_AS, kilobytes * 1024);
-    const Outcome outcome = run(folder, words);
+  for (rlim_t kilobytes = 44'000; kilobytes <= 76'000; kilobytes += 1000) {
+    const Outcome outcome = run(folder, words, {}, {}, Limit{RLIMIT_AS, kilobytes * 1024});
     EXPECT_EQ(outcome.signal, 0) << kilobytes << " kB";
     EXPECT_TRUE(outcome.exit_code == 0 || !outcome.err.empty()) << kilobytes << " kB";
   }
