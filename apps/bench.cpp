@@ -324,10 +324,11 @@ Command add_bench(CLI::App& program) {
   add_text(app, "--frames", o.frames, "NAME",
            "Fields to read: dense (every point), compact (tiles of 8 x 8 that something touches) "
            "or none [default: dense]");
-  add_text(app, "--record", o.record, "LIST",
-           "Readings to take, separated by commas: a sensor's field (pad), pad.pressure, "
-           "pad.shear, pad.sum, pad.ideal, pad.markers or pad.flow, with times as in pad/10 or "
-           "pad/final. q alone takes none. [default: the scene's <outputs>, else all fields]");
+  add_text(
+      app, "--record", o.record, "LIST",
+      "Readings to take, separated by commas: a sensor's field (pad), pad.pressure, "
+      "pad.shear, pad.sum, pad.ideal, pad.markers, pad.surface or pad.flow, with times as in "
+      "pad/10 or pad/final. q alone takes none. [default: the scene's <outputs>, else all fields]");
   add_whole_number<int>(app, "--repeat", o.repeat, 1, kMostPasses,
                         "Timed passes for each thread count [default: 3]");
   add_seed_option(app, o.seed);

@@ -395,12 +395,14 @@ Command add_simulate(CLI::App& program) {
   add_envs_option(app, o.environments,
                   "Environments. Environment e draws what varies from (seed, e). [default: 1, or "
                   "those of --state-from]");
-  add_text(app, "--record", o.record, "LIST",
-           "What to compute and store besides q, v, u and the solver's numbers, separated by "
-           "commas: bodies or bodies.NAME, variables, memory (of friction), a sensor's field "
-           "(pad), pad.pressure, pad.shear, pad.sum, pad.ideal, pad.markers or pad.flow; pad/10 is "
-           "every 10th step, q/final the end alone [default: the scene's <outputs>, else bodies, "
-           "variables and all fields]");
+  add_text(
+      app, "--record", o.record, "LIST",
+      "What to compute and store besides q, v, u and the solver's numbers, separated by "
+      "commas: bodies or bodies.NAME, variables, memory (of friction), a sensor's field "
+      "(pad), pad.pressure, pad.shear, pad.sum, pad.ideal, pad.markers, pad.surface or pad.flow; "
+      "pad/10 is every 10th step, q/final the end alone [default: the scene's <outputs>, else "
+      "bodies, "
+      "variables and all fields]");
   add_flag(app, "--audit", o.audit,
            "Also compute and store energy and momentum, the work of motors, what damping and "
            "friction took, and what the scheme made");

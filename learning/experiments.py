@@ -25,6 +25,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from skins import SKINS
+
 ROOT = Path(__file__).parents[1]
 RESULTS = Path(__file__).parent / "results"
 
@@ -53,6 +55,10 @@ THROUGH_TIME = "gd.py box_pushing --touch 0.05"
 CLONED = "dagger.py out/learning/pushes --rounds 60 --updates 100"
 CAPPED = "bc.py out/learning/caps --epochs 20 --before 3 --width 512"
 
+OTHER_SKINS = {
+    skin: " ".join(f"--play-skin {other}" for other in SKINS if other != skin) for skin in SKINS
+}
+
 # In the order in which they are made: what is worth most and costs least comes first.
 EXPERIMENTS = [
     Experiment("gd-touch", f"{THROUGH_TIME} --limit 3 --back 1.5 --envs 64 --updates 1200", 5, 290,
@@ -75,6 +81,10 @@ EXPERIMENTS = [
                "cap, blind, imitates 3/10", "59.7 %", first_seed=5),
     Experiment("ppo-cap", "ppo.py cap_opening", 5, 300,
                "cap, touch, imitates 4/5", "87.3 %", first_seed=5),
+    *(Experiment(f"skin-{name}-{skin}", f"ppo.py {task} --skin {skin} {OTHER_SKINS[skin]}", 3,
+                 seconds, f"{task}, {skin}")
+      for name, task, seconds in (("grasp", "stable_grasp", 60), ("insertion", "insertion", 150))
+      for skin in ("springs", "layer")),
     Experiment("bc-push", CLONED, 3, 450, "box pushing, goal and touch, visits",
                data=f"pushes {PUSHES}", first_seed=5),
     Experiment("bc-push-blind", f"{CLONED} --without tactile", 3, 350, "box pushing, goal, visits",

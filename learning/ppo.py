@@ -42,6 +42,7 @@ from protocol import (
     play,
     provenance,
 )
+from skins import SKINS, skin_scene
 from torch import nn
 from tracking import Log, add_log
 
@@ -217,6 +218,11 @@ def log_likelihood(actions: torch.Tensor, mean: torch.Tensor, log_deviation: tor
     return (-0.5 * z.square() - log_deviation - 0.5 * np.log(2 * np.pi)).sum(-1)
 
 
+def with_skin(args: argparse.Namespace, skin: str) -> dict[str, Any]:
+    """Options of environments whose pads have a skin."""
+    return {} if skin == "springs" else {"scene": skin_scene(args.task, skin)}
+
+
 class Actor:
     """A policy's means in the test of protocol.py."""
 
@@ -244,7 +250,7 @@ class Collector:
     def __init__(self, args: argparse.Namespace, agent: Agent, eyes: Eyes):
         self.args, self.agent, self.eyes = args, agent, eyes
         self.env = make_vec(args.task, args.envs, seed=1 + args.seed, autoreset="same_step",
-                            threads=args.threads)  # fmt: skip
+                            threads=args.threads, **with_skin(args, args.skin))  # fmt: skip
         obs, _ = self.env.reset()
         self.obs = eyes(obs, learn=True)
         self.state = torch.zeros(args.envs, 64, device=eyes.device)
@@ -348,6 +354,10 @@ def settings() -> argparse.Namespace:
     parser.add_argument("--choices", type=int, default=5, help="policies to choose from")
     parser.add_argument("--without", action="append", default=[], metavar="KEY",
                         help="an observation that the policy does not see")  # fmt: skip
+    parser.add_argument("--skin", choices=SKINS, default="springs",
+                        help="of the pads, in training and choice")  # fmt: skip
+    parser.add_argument("--play-skin", choices=SKINS, action="append", default=[],
+                        help="of another test")  # fmt: skip
     parser.add_argument("--json", action="store_true")
     add_log(parser)
     for name, value in COMMON.items():
@@ -379,7 +389,8 @@ def main() -> None:
     torch.set_num_threads(1)
     torch.manual_seed(args.seed)
     begin, clock = time.process_time(), time.perf_counter()
-    choice = make_vec(args.task, CHOICE_EPISODES, autoreset="disabled", threads=args.threads)
+    choice = make_vec(args.task, CHOICE_EPISODES, autoreset="disabled", threads=args.threads,
+                      **with_skin(args, args.skin))  # fmt: skip
     eyes = Eyes(seen_shapes(choice, args), args.convolve, args.device)
     agent = Agent(eyes.shapes, choice.single_action_space.shape[0], args.deviation,
                   args.recurrent)  # fmt: skip
@@ -413,15 +424,21 @@ def main() -> None:
               file=sys.stderr, flush=True)  # fmt: skip
     cost = {"train_cpu_s": time.process_time() - begin,
             "train_wall_s": time.perf_counter() - clock}  # fmt: skip
-    env = make_vec(args.task, args.episodes, autoreset="disabled", threads=args.threads)
-    result = play(env, TEST_SEED, Actor(*kept, args.squash)).summary()
+    results = {}
+    for skin in dict.fromkeys([args.skin, *args.play_skin]):
+        env = make_vec(args.task, args.episodes, autoreset="disabled", threads=args.threads,
+                       **with_skin(args, skin))  # fmt: skip
+        results[skin] = play(env, TEST_SEED, Actor(*kept, args.squash)).summary()
+    result = results.pop(args.skin)
     if args.json:
         print(json.dumps({"program": "ppo", "settings": vars(args),
                           **provenance(args.device), **cost,
                           "steps": updates * args.envs * args.length,
                           "curve": curve[:: max(1, len(curve) // 100)], "choice": chosen,
-                          "test": result}))  # fmt: skip
+                          "test": result, "tests": results}))  # fmt: skip
         return
+    for skin, other in results.items():
+        print(f"with {skin}: {other}")
     print(f"{args.task}, seed {args.seed}: {result}; {cost['train_cpu_s']:.0f} CPU s, "
           f"{cost['train_wall_s']:.0f} s on the clock")  # fmt: skip
 

@@ -19,6 +19,7 @@ import numpy as np
 import experiments
 from experiments import EXPERIMENTS, Experiment
 from protocol import CHOICE_EPISODES, EARLIER_TEST_SEED, TEST_SEED, student, wilson
+from skins import SKINS
 
 import tangere
 
@@ -160,6 +161,11 @@ def tables() -> str:
         lambda runs: [rate(runs), f"{100 * runs[0]['script']['success']:.1f} %",
                       f"{runs[0]['rows']}", cost(runs)],
     )  # fmt: skip
+    skins = table(
+        "| trained on | " + " | ".join(SKINS) + " | runs |", ("skin-",),
+        lambda runs: [rate([run | {"test": run["tests"].get(skin, run["test"])} for run in runs])
+                      for skin in SKINS],
+    )  # fmt: skip
     offline = table(
         "| mixed data | score | success | CPU [s] | runs |", ("offline-",),
         lambda runs: [mean(tested(runs, "score"), "", 1), rate(runs), cost(runs)],
@@ -171,7 +177,7 @@ def tables() -> str:
     ))  # fmt: skip
     picture = "![Return against actions of training](results/box_pushing.svg)\n" if figure() else ""
     parts = (pushed, published("Place [m] and yaw [rad]", of_pushing), picture, reinforced,
-             published("Success, and actions until it", of_tasks), cloned, offline, matched,
+             published("Success, and actions until it", of_tasks), cloned, skins, offline, matched,
              earlier(), unclean(), missing())  # fmt: skip
     return "\n" + "\n".join(filter(None, parts)) + "\n"
 

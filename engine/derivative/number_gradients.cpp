@@ -33,13 +33,20 @@ void NumberGradients::add(const SceneNumber& number, Terms terms, int body) {
   entries_.push_back({std::move(terms), body});
 }
 
+/// Whether a coefficient has no derivative: with ks = 0 there is no shear state, and kn of a layer
+/// with markers is constant (compile_markers()).
+static bool is_constant(const Scene& scene, const SceneNumber& of) {
+  if (of.field == Field::ks) return number_in(scene, of) == 0 && randomization_of(scene, of) < 0;
+  return of.field == Field::kn && of.owner == Owner::tactile &&
+         std::any_of(scene.sensors.begin(), scene.sensors.end(), [&](const auto& sensor) {
+           return sensor.name == of.name && sensor.layer && sensor.markers;
+         });
+}
+
 void NumberGradients::add_coefficients(SceneNumber of, std::initializer_list<int> rows) {
   for (int k = 0; k < kCoefficients; ++k) {
     of.field = coefficient_field(k);
-    // With ks = 0 there is no shear state, so no derivative.
-    const Scene& scene = model_.scene();
-    if (of.field == Field::ks && number_in(scene, of) == 0 && randomization_of(scene, of) < 0)
-      continue;
+    if (is_constant(model_.scene(), of)) continue;
     Terms terms;
     for (const int row : rows) terms.push_back({row + k, 1});
     add(of, std::move(terms));

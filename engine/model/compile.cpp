@@ -339,6 +339,18 @@ class Compiler {
     }
   }
 
+  /// Throws InputError for markers that cannot be computed.
+  void check_markers(const TactileDescription& d, int pressure_sign) const {
+    static_cast<void>(compile_markers(d, pressure_sign));
+    SceneNumber kn = first_number(d);
+    kn.field = NumberField::kn;
+    if (d.layer && randomization_of(m_.scene, kn) >= 0)
+      throw InputError(
+          d.markers->source.prefix() + "markers of '" + d.name +
+          "': its kn varies, but the surface moves with the scene's modulus; expected a "
+          "constant kn, or no <markers>");
+  }
+
   void sensors() {
     for (std::size_t i = 0; i < m_.scene.sensors.size(); ++i) {
       const TactileDescription& d = m_.scene.sensors[i];
@@ -350,7 +362,7 @@ class Compiler {
       sensor.number = static_cast<int>(i);
       compile_imperfections(d, m_.scene.timestep, sensor, info);
       if (d.layer) sensor.layer = compile_sensor_layer(d, sensor, info.pressure_sign);
-      if (d.markers) static_cast<void>(compile_markers(d, info.pressure_sign));  // checks them
+      if (d.markers) check_markers(d, info.pressure_sign);
       m_.layout.past_states = std::max(m_.layout.past_states, info.past_states);
       sensor.parameters = constants(d.coefficients);
       for (const int t : sensed_bodies(m_.scene, d))

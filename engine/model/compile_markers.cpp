@@ -10,6 +10,13 @@ namespace tangere {
 
 CompiledMarkers compile_markers(const TactileDescription& d, int pressure_sign) {
   const MarkersDescription& of = *d.markers;
+  if (d.layer) {
+    if (of.stiffness > 0 || of.thickness > 0 || of.spread > 0)
+      throw InputError(of.source.prefix() + "markers of '" + d.name +
+                       "': stiffness, thickness or spread beside <layer>, whose material moves "
+                       "them; expected <markers/>");
+    return {};
+  }
   const std::string where = fmt::format("{}markers of '{}': ", of.source.prefix(), d.name);
   const double stiffness = of.stiffness > 0 ? of.stiffness : d.coefficients.ks;
   if (!(stiffness > 0))

@@ -16,7 +16,8 @@ struct CompiledMarkers {
   std::array<LateralSpread, 2> spread{};  ///< empty kernels: none
 };
 
-/// Throws InputError (file:line) for numbers that are out of range, where the shear stiffness is
+/// Returns nothing for a sensor with a layer, whose surface moves them. Throws InputError
+/// (file:line) for numbers that are out of range, where the shear stiffness is
 /// not known, and for what needs neighbours on a list of points.
 CompiledMarkers compile_markers(const TactileDescription& description, int pressure_sign);
 

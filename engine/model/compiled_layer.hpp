@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "engine/model/layer_compliance.hpp"
+#include "engine/model/surface_compliance.hpp"
 
 namespace tangere {
 
@@ -19,6 +20,9 @@ struct CompiledLayer {
   double relaxation = 0;  ///< τ [s]
   double area = 0;        ///< for which a point stands [m²]
   int outward = 1;        ///< 1 or -1: whether the pad's z points out of the skin
+  std::array<int, 2> direction{1, 1};          ///< 1 or -1: whether rows count along axis0, cols
+                                               ///< along axis1
+  std::optional<SurfaceCompliance> surface{};  ///< of a sensor with markers
 };
 
 }  // namespace tangere

@@ -18,6 +18,7 @@ namespace {
 constexpr double kUsualCell = 0.2;      // of the thickness
 constexpr double kLeastCell = 0.75;     // of the points' distance
 constexpr double kMostPitch = 1.0 / 3;  // of the points, by the thickness
+constexpr double kRounding = 1e-9;       // relative, of a pitch
 constexpr double kThickest = 4;         // thickness by the pad's longer side
 constexpr double kMostMargin = 6;       // by the thickness; sides farther away have no effect
 
@@ -56,7 +57,7 @@ std::shared_ptr<const CompiledLayer> compile_sensor_layer(const TactileDescripti
   const double height = std::abs(dot(way, d.array.axis0)) / (d.array.rows - 1),
                width = std::abs(dot(way, d.array.axis1)) / (d.array.cols - 1);
   const double t = d.material->thickness, pitch = std::max(height, width);
-  if (!(pitch <= kMostPitch * t))
+  if (!(pitch <= kMostPitch * t * (1 + kRounding)))
     fail(d,
          fmt::format("points {:.3g} m apart; expected at most a third of the thickness, {:.3g} m",
                      pitch, kMostPitch * t));
@@ -85,6 +86,8 @@ std::shared_ptr<const CompiledLayer> compile_sensor_layer(const TactileDescripti
   layer->relaxation = d.material->relaxation;
   layer->area = height * width;
   layer->outward = pressure_sign;
+  layer->direction = {dot(way, d.array.axis0) < 0 ? -1 : 1, dot(way, d.array.axis1) < 0 ? -1 : 1};
+  if (d.markers) layer->surface.emplace(layer->grid);
   return layer;
 }
 

@@ -12,7 +12,7 @@
 namespace tangere {
 namespace {
 
-using Kind = EpisodeChannel::Kind;
+using ChannelKind = EpisodeChannel::Kind;
 
 bool perfect(const SensorLayout& sensor) { return sensor.imperfections.empty(); }
 
@@ -26,7 +26,7 @@ class ChannelList {
     return found == record_.end() ? nullptr : &*found;
   }
 
-  EpisodeChannel& add(Kind kind, const std::string& name, std::vector<std::uint64_t> shape,
+  EpisodeChannel& add(ChannelKind kind, const std::string& name, std::vector<std::uint64_t> shape,
                       const std::string& unit = {}, const std::string& meaning = {}) {
     const TimedName* const one = requested(name);
     const OutputTimes times = one != nullptr ? one->times : OutputTimes{};
@@ -44,11 +44,10 @@ class ChannelList {
 
   void add_reading(std::span<const SensorLayout> sensors, FieldOutput reading) {
     const SensorLayout& sensor = sensors[static_cast<std::size_t>(reading.sensor)];
-    EpisodeChannel& channel = add(Kind::reading, output_name(sensor.name, reading.form),
+    EpisodeChannel& channel = add(ChannelKind::reading, output_name(sensor.name, reading.form),
                                   reading_shape(sensor, reading.form));
     channel.reading = {reading.sensor, reading.form};
-    channel.touch =
-        perfect(sensor) || reading.form == FieldForm::ideal || reading.form == FieldForm::markers;
+    channel.touch = perfect(sensor) || is_ideal(reading.form);
   }
 
   [[nodiscard]] std::vector<EpisodeChannel> take() { return std::move(all_); }
@@ -63,11 +62,11 @@ void add_bodies(ChannelList& list, std::span<const std::string> bodies) {
   std::vector<int> all;
   for (int b = 0; b < std::ssize(bodies); ++b) all.push_back(b);
   if (list.requested("bodies") != nullptr)
-    list.add(Kind::bodies, "bodies", {bodies.size(), kMotion}).bodies = all;
+    list.add(ChannelKind::bodies, "bodies", {bodies.size(), kMotion}).bodies = all;
   for (const int b : all)
     if (const std::string name = body_output(bodies[static_cast<std::size_t>(b)]);
         list.requested(name) != nullptr)
-      list.add(Kind::bodies, name, {1, kMotion}).bodies = {b};
+      list.add(ChannelKind::bodies, name, {1, kMotion}).bodies = {b};
 }
 
 }  // namespace
@@ -83,25 +82,25 @@ std::vector<EpisodeChannel> episode_channels(const RunFacts& facts,
                                              std::span<const std::string> bodies,
                                              std::span<const TimedName> record, int every) {
   ChannelList list(record, every);
-  list.add(Kind::q, "q", {facts.q_names.size()}, "q_units", "coordinates");
-  list.add(Kind::v, "v", {facts.v_names.size()}, "v_units", "velocities");
+  list.add(ChannelKind::q, "q", {facts.q_names.size()}, "q_units", "coordinates");
+  list.add(ChannelKind::v, "v", {facts.v_names.size()}, "v_units", "velocities");
   if (facts.task) {
     const bool all_perfect = std::all_of(sensors.begin(), sensors.end(), perfect);
     for (const TensorSpec& tensor : facts.task->observations)
-      list.add(Kind::task, tensor.name, {tensor.shape.begin(), tensor.shape.end()}, tensor.unit,
-               tensor.meaning)
+      list.add(ChannelKind::task, tensor.name, {tensor.shape.begin(), tensor.shape.end()},
+               tensor.unit, tensor.meaning)
           .touch = tensor.touch && all_perfect;
     return list.take();
   }
   if (!facts.end_effector_names.empty())
-    list.add(Kind::end_effectors, "variables", {facts.end_effector_names.size(), 3});
+    list.add(ChannelKind::end_effectors, "variables", {facts.end_effector_names.size(), 3});
   add_bodies(list, bodies);
   for (int s = 0; s < std::ssize(sensors); ++s)
     if (record.empty()) list.add_reading(sensors, {s});
   for (int s = 0; s < std::ssize(sensors) && !record.empty(); ++s)
     for (const FieldForm form :
          {FieldForm::field, FieldForm::pressure, FieldForm::shear, FieldForm::sum, FieldForm::ideal,
-          FieldForm::markers, FieldForm::flow})
+          FieldForm::markers, FieldForm::surface, FieldForm::flow})
       if (list.requested(output_name(sensors[static_cast<std::size_t>(s)].name, form)) != nullptr)
         list.add_reading(sensors, {s, form});
   return list.take();

@@ -73,6 +73,8 @@ std::string components_text(const SensorLayout& sensor, FieldForm form) {
     case FieldForm::pressure: return along + "; f is the force on the body without friction";
     case FieldForm::shear: return across + "; f is the force on the body";
     case FieldForm::markers: return "displacement of each marker along axis0, axis1";
+    case FieldForm::surface:
+      return "displacement of the surface along axis0, axis1 and out of the layer";
     case FieldForm::flow: return across + ", over their largest length in this reading";
     case FieldForm::sum: break;
   }
@@ -81,10 +83,10 @@ std::string components_text(const SensorLayout& sensor, FieldForm form) {
 
 Attributes reading_attributes(const SensorLayout& s, FieldForm form) {
   Attributes list{
-      {"units", form == FieldForm::sum       ? "N, N, N, m, m, m"
-                : form == FieldForm::markers ? "m"
-                : form == FieldForm::flow    ? "1"
-                                             : "N"},
+      {"units", form == FieldForm::sum    ? "N, N, N, m, m, m"
+                : is_displacement(form)   ? "m"
+                : form == FieldForm::flow ? "1"
+                                          : "N"},
       {"body", s.body},
       {"pressure_sign", std::int64_t{s.pressure_sign}},
       {"components", components_text(s, form)},
@@ -92,9 +94,7 @@ Attributes reading_attributes(const SensorLayout& s, FieldForm form) {
                 : s.rectangular()      ? "axis0, axis1 of the sensor, in the body's axes"
                                        : "axis0, axis1, normal of each point, in the body's axes"}};
   if (!s.imperfections.empty())
-    list.push_back({"imperfections", form == FieldForm::ideal || form == FieldForm::markers
-                                         ? "none"
-                                         : s.imperfections});
+    list.push_back({"imperfections", is_ideal(form) ? "none" : s.imperfections});
   if (!s.rectangular()) return list;
   list.push_back({"resolution", std::vector<std::int64_t>{s.rows, s.cols}});
   list.push_back({"corner0", numbers(s.corner0)});

@@ -213,6 +213,7 @@ EffectInfo find_in_sensors(const Scene& scene, int element, const SourceOf& sour
 /// Returns "stiffness 100 N/m, thickness 0.002 m".
 std::string marker_text(const TactileDescription& sensor) {
   const MarkersDescription& of = *sensor.markers;
+  if (sensor.layer) return "moved by the layer";
   std::string text = of.stiffness > 0
                          ? fmt::format("stiffness {} N/m", of.stiffness)
                          : fmt::format("stiffness of ks {} N/m", sensor.coefficients.ks);

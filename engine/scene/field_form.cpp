@@ -11,9 +11,9 @@
 namespace tangere {
 
 namespace {
-constexpr FieldForm kForms[] = {FieldForm::field, FieldForm::pressure, FieldForm::shear,
-                                FieldForm::sum,   FieldForm::ideal,    FieldForm::markers,
-                                FieldForm::flow};
+constexpr FieldForm kForms[] = {FieldForm::field,   FieldForm::pressure, FieldForm::shear,
+                                FieldForm::sum,     FieldForm::ideal,    FieldForm::markers,
+                                FieldForm::surface, FieldForm::flow};
 constexpr const char* kPlain[] = {"q", "v", "variables", "bodies", "memory"};
 constexpr const char* kBodyOutput = "bodies.";  // followed by the name of one
 }  // namespace
@@ -26,6 +26,7 @@ const char* to_string(FieldForm form) {
     case FieldForm::sum: return "sum";
     case FieldForm::ideal: return "ideal";
     case FieldForm::markers: return "markers";
+    case FieldForm::surface: return "surface";
     case FieldForm::flow: return "flow";
   }
   return "unknown";
@@ -34,7 +35,8 @@ const char* to_string(FieldForm form) {
 int components_of(FieldForm form) {
   switch (form) {
     case FieldForm::field:
-    case FieldForm::ideal: return 3;
+    case FieldForm::ideal:
+    case FieldForm::surface: return 3;
     case FieldForm::pressure: return 1;
     case FieldForm::shear:
     case FieldForm::flow:
@@ -43,6 +45,8 @@ int components_of(FieldForm form) {
   }
   return 0;
 }
+
+bool is_ideal(FieldForm form) { return form == FieldForm::ideal || is_displacement(form); }
 
 std::size_t numbers_of(int points, FieldForm form) {
   if (form == FieldForm::sum) return std::tuple_size_v<FieldSum>;
@@ -89,9 +93,13 @@ bool has_output(const Scene& scene, const std::string& word) {
 
 std::string reason_against(const Scene& scene, const FieldOutput& output) {
   const TactileDescription& sensor = scene.sensors[static_cast<std::size_t>(output.sensor)];
-  if (output.form != FieldForm::markers || sensor.markers) return "";
-  return sensor.source.prefix() + "sensor '" + sensor.name +
-         "' has no <markers>; expected them in its <tactile>";
+  const char* const missing = !is_displacement(output.form)                        ? nullptr
+                              : !sensor.markers                                    ? "<markers>"
+                              : output.form == FieldForm::surface && !sensor.layer ? "<layer>"
+                                                                                   : nullptr;
+  if (missing == nullptr) return "";
+  return sensor.source.prefix() + "sensor '" + sensor.name + "' has no " + missing +
+         "; expected it in its <tactile>";
 }
 
 void check_outputs(std::span<const FieldOutput> outputs, std::size_t sensors) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Quantities of a tactile field: the whole field, pressure, shear, flow, sum, or displacements of
-// markers. Only requested quantities are computed and stored.
+// markers and of the surface. Only requested quantities are computed and stored.
 #pragma once
 
 #include <array>
@@ -21,6 +21,7 @@ enum class FieldForm {
   sum,       ///< (6): force on the body [N], then where it presses [m], body axes
   ideal,     ///< the field without the sensor's imperfections
   markers,   ///< (points, 2) [m]: where the ideal field pushes them, along axis0 and axis1
+  surface,   ///< (points, 3) [m]: how a layer's surface moves, the third number out of the layer
   flow,      ///< (points, 2): the shear over its largest length on this sensor; 0 without shear
 };
 
@@ -29,10 +30,11 @@ enum class FieldForm {
 /// nothing presses.
 using FieldSum = std::array<double, 6>;
 
-/// The words of files and options: "field", "pressure", "shear", "sum", "ideal", "markers", "flow".
+/// The words of files and options: "field", "pressure", "shear", "sum", "ideal", "markers",
+/// "surface", "flow".
 const char* to_string(FieldForm form);
 
-/// Numbers of a point: 3, 1, 2, 3, 2, 2; 0 for a sum.
+/// Numbers of a point; 0 for a sum.
 int components_of(FieldForm form);
 /// Numbers of a whole reading.
 std::size_t numbers_of(int points, FieldForm form);
@@ -45,6 +47,14 @@ struct FieldOutput {
   friend bool operator==(const FieldOutput&, const FieldOutput&) = default;
 };
 
+/// Whether a reading is that of an ideal sensor, whatever the sensor's imperfections: the ideal
+/// field, and how it moves markers and the surface.
+bool is_ideal(FieldForm form);
+/// Whether a reading has displacements [m].
+inline bool is_displacement(FieldForm form) {
+  return form == FieldForm::markers || form == FieldForm::surface;
+}
+
 /// Returns the output from which a reading is computed: for a flow the shear, else itself.
 inline FieldOutput undivided(FieldOutput of) {
   if (of.form == FieldForm::flow) of.form = FieldForm::shear;
@@ -52,7 +62,7 @@ inline FieldOutput undivided(FieldOutput of) {
 }
 
 /// Returns "pad" for a field, else "pad.pressure", "pad.shear", "pad.sum", "pad.ideal",
-/// "pad.markers" or "pad.flow".
+/// "pad.markers", "pad.surface" or "pad.flow".
 std::string output_name(const std::string& sensor, FieldForm form);
 /// Returns the names of a scene's sensors, in file order.
 std::vector<std::string> sensor_names(const Scene& scene);

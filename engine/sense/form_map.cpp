@@ -76,7 +76,7 @@ struct FormMap::Impl {
     in_body = relative(compiled(m).bodies[std::size_t(s.body)].frame, s.pad);
     pressure_sign = m.sensors()[std::size_t(of.sensor)].pressure_sign;
     if (pad.skewed) turn = perpendicular_from_stored(pad);
-    if (of.form == FieldForm::markers) markers.emplace(m, of.sensor);
+    if (is_displacement(of.form)) markers.emplace(m, of.sensor);
   }
 
   [[nodiscard]] std::size_t points() const { return std::size_t(pad.rows) * std::size_t(pad.cols); }
@@ -156,7 +156,8 @@ void FormMap::evaluate(std::span<const double> field, std::span<double> form) co
       for (std::size_t k = 0; k < form.size(); ++k) form[k] = field[k / 2 * 3 + k % 2];
       return;
     case FieldForm::sum: m.sum(field, form); return;
-    case FieldForm::markers: m.markers->displace(field, form); return;
+    case FieldForm::markers:
+    case FieldForm::surface: m.markers->displace(field, form); return;
     case FieldForm::flow: {
       const ShearField<double> shear{field};
       normalised_flow({&shear, 1}, form);
@@ -178,7 +179,8 @@ void FormMap::pull_back(std::span<const double> field, std::span<const double> f
       for (std::size_t k = 0; k < form_bar.size(); ++k) field_bar[k / 2 * 3 + k % 2] += form_bar[k];
       return;
     case FieldForm::sum: m.pull_back_sum(field, form_bar, field_bar, point_bar); return;
-    case FieldForm::markers: m.markers->pull_back(form_bar, field_bar); return;
+    case FieldForm::markers:
+    case FieldForm::surface: m.markers->pull_back(field, form_bar, field_bar); return;
     case FieldForm::flow: {
       const ShearField<double> shear{field};
       const ShearCotangent to{field_bar, {}};

@@ -128,7 +128,9 @@ double GelLayer::relaxed(int i) const {
     for (const double d : free) sum += std::max(0.0, d - own * p);
     return stiffness_ * sum / (layer_->side * layer_->side) - p;
   };
-  double low = 0, high = std::max(excess(0), 0.0);
+  // It falls by 1 + k C' n/m² ≥ min(1, k C(i, i)) with P, where k C' may be negative at free sides.
+  const double fall = std::min(1.0, 1 + stiffness_ * own);
+  double low = 0, high = std::max(excess(0), 0.0) / fall;
   while (high > low) {
     const double middle = low + 0.5 * (high - low);
     if (middle <= low || middle >= high) break;

@@ -8,12 +8,16 @@
 #include <vector>
 
 #include "engine/model/compile_markers.hpp"
+#include "engine/model/compiled_model.hpp"
 #include "engine/sense/spread_field.hpp"
+#include "engine/sense/surface_map.hpp"
 
 namespace tangere {
 
 struct MarkerMap::Impl {
+  Model model;  // owns the sensor of `surface`
   CompiledMarkers of;
+  std::optional<SurfaceMap> surface;
 
   [[nodiscard]] std::size_t size() const { return 2 * std::size_t(of.rows) * std::size_t(of.cols); }
 
@@ -45,7 +49,8 @@ MarkerMap::MarkerMap(const Model& model, int sensor) {
   if (!d.markers)
     throw InputError("sensor '" + d.name + "' has no <markers>; expected them in its <tactile>");
   impl_ = std::make_unique<Impl>(
-      Impl{compile_markers(d, model.sensors()[std::size_t(sensor)].pressure_sign)});
+      Impl{model, compile_markers(d, model.sensors()[std::size_t(sensor)].pressure_sign), {}});
+  if (d.layer) impl_->surface.emplace(compiled(impl_->model).sensors[std::size_t(sensor)]);
 }
 MarkerMap::~MarkerMap() = default;
 MarkerMap::MarkerMap(MarkerMap&&) noexcept = default;
@@ -53,7 +58,15 @@ MarkerMap& MarkerMap::operator=(MarkerMap&&) noexcept = default;
 
 void MarkerMap::displace(std::span<const double> field, std::span<double> displacement) const {
   const Impl& m = *impl_;
-  thread_local std::vector<double> moved;  // (points, 2)
+  thread_local std::vector<double> moved;  // (points, 2), of a layer (points, 3)
+  if (m.surface) {
+    if (displacement.size() == field.size()) return m.surface->displace(field, displacement);
+    moved.resize(field.size());
+    m.surface->displace(field, moved);
+    for (std::size_t k = 0; k < displacement.size(); ++k)
+      displacement[k] = moved[k / 2 * 3 + k % 2];
+    return;
+  }
   moved.resize(m.size());
   const double press = m.of.pressure_sign * m.of.bulge;
   for (std::size_t k = 0; k < moved.size(); ++k)
@@ -68,21 +81,29 @@ void MarkerMap::displace(std::span<const double> field, std::span<double> displa
   std::copy(moved.begin(), moved.end(), displacement.begin());
 }
 
-void MarkerMap::pull_back(std::span<const double> of_displacement,
-                          std::span<double> of_field) const {
+void MarkerMap::pull_back(std::span<const double> field, std::span<const double> displacement_bar,
+                          std::span<double> field_bar) const {
   const Impl& m = *impl_;
   const double press = m.of.pressure_sign * m.of.bulge;
-  thread_local std::vector<double> moved;  // (points, 2)
-  moved.assign(of_displacement.begin(), of_displacement.end());
+  thread_local std::vector<double> moved;  // (points, 2), of a layer (points, 3)
+  if (m.surface) {
+    if (displacement_bar.size() == field.size())
+      return m.surface->pull_back(field, displacement_bar, field_bar);
+    moved.assign(field.size(), 0.0);
+    for (std::size_t k = 0; k < displacement_bar.size(); ++k)
+      moved[k / 2 * 3 + k % 2] = displacement_bar[k];
+    return m.surface->pull_back(field, moved, field_bar);
+  }
+  moved.assign(displacement_bar.begin(), displacement_bar.end());
   m.spread(true, moved);
   for (std::size_t k = 0; k < moved.size(); ++k)
-    of_field[k / 2 * 3 + k % 2] += m.of.compliance * moved[k];
+    field_bar[k / 2 * 3 + k % 2] += m.of.compliance * moved[k];
   if (press == 0) return;
   m.for_differences([&](std::size_t point, std::size_t axis, std::size_t ahead, std::size_t behind,
                         double per_distance) {
     const double x = press * per_distance * moved[2 * point + axis];
-    of_field[3 * ahead + 2] -= x;
-    of_field[3 * behind + 2] += x;
+    field_bar[3 * ahead + 2] -= x;
+    field_bar[3 * behind + 2] += x;
   });
 }
 

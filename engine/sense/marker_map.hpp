@@ -6,7 +6,8 @@
 //   u_i = Σ_j S_ij (f_s,j - t/2 ∇p_j) / k_s [m]          (docs/sensors.md)
 //
 // k_s = G 𝒜/t is the shear stiffness of the gel under one point, t its thickness, S its lateral
-// spread. The map is linear: it is its own tangent map, and its transpose is the pullback.
+// spread. The map is linear: it is its own tangent map, and its transpose is the pullback. Markers
+// of a sensor with a layer move along with its surface (engine/sense/surface_map.hpp).
 #pragma once
 
 #include <memory>
@@ -25,11 +26,13 @@ class MarkerMap {
   MarkerMap(MarkerMap&&) noexcept;
   MarkerMap& operator=(MarkerMap&&) noexcept;
 
-  /// Computes displacements, (points, 2) [m], from the ideal field, (points, 3) [N].
+  /// Computes displacements, (points, 2) [m], from the ideal field, (points, 3) [N]; of a layer
+  /// also (points, 3), with the motion out of it.
   void displace(std::span<const double> field, std::span<double> displacement) const;
-  /// Pulls the cotangent of the displacements, (points, 2), back to the field and adds it, (points,
-  /// 3).
-  void pull_back(std::span<const double> of_displacement, std::span<double> of_field) const;
+  /// Pulls the cotangent of displacements of either shape back to the field and adds it, (points,
+  /// 3). `field`: of a layer, which has no cotangent in cells without force.
+  void pull_back(std::span<const double> field, std::span<const double> displacement_bar,
+                 std::span<double> field_bar) const;
 
  private:
   struct Impl;

@@ -44,7 +44,7 @@ struct Readout::Impl {
   ElasticField elastic;
   LayerReading layered;
   std::vector<std::optional<MarkerMap>> markers;    // (sensors) of those that have them
-  std::vector<double> displacement, elastic_field;  // (points, 2), (points, 3)
+  std::vector<double> displacement, elastic_field;  // (points, 3)
   std::vector<double> one_reading, block_readings, of_tiles;
   std::vector<double> earlier;     // fields of small pads in the states of `past`
   std::optional<PastStates> past;  // for sensors with lag
@@ -64,7 +64,7 @@ struct Readout::Impl {
       markers.emplace_back();
       if (marked) {
         markers.back().emplace(m, s.number);
-        grow(displacement, 2 * points);
+        grow(displacement, 3 * points);
       }
       if (!s.imperfect && !s.elastic && !s.layer && !marked) continue;
       grow(one_reading, 3 * points);
@@ -162,7 +162,7 @@ struct Readout::Impl {
   }
   /// Whether a reading needs more than the kernels' field.
   [[nodiscard]] bool imperfect(FieldOutput of) const {
-    return of.form == FieldForm::markers || is_elastic(of) ||
+    return is_displacement(of.form) || is_elastic(of) ||
            (of.form != FieldForm::ideal && sensor_of(of.sensor).imperfect);
   }
   /// Turns an ideal field into the reading of an imperfect sensor, in the readout's precision.
@@ -249,27 +249,27 @@ struct Readout::Impl {
     return field;
   }
 
-  /// Writes the marker displacements of the ideal field, after find_touches().
+  /// Writes how markers or the surface move under the ideal field, after find_touches().
   template <class T>
-  void write_markers(const Batch& batch, int environment, int sensor, T* to) {
-    std::optional<MarkerMap>& map = markers[std::size_t(sensor)];
-    const FieldOutput ideal{sensor, FieldForm::ideal};
-    if (!map) throw InputError(reason_against(model.scene(), {sensor, FieldForm::markers}));
-    const std::size_t points = std::size_t(sensor_of(sensor).points());
-    const std::span<double> field = std::span(one_reading).first(3 * points),
-                            moved = std::span(displacement).first(2 * points);
+  void write_displacements(const Batch& batch, int environment, FieldOutput of, T* to) {
+    const FieldOutput ideal{of.sensor, FieldForm::ideal};
+    if (const std::string reason = reason_against(model.scene(), of); !reason.empty())
+      throw InputError(reason);
+    const int points = sensor_of(of.sensor).points();
+    const auto field = std::span(one_reading).first(numbers_of(points, ideal.form)),
+               moved = std::span(displacement).first(numbers_of(points, of.form));
     if (is_elastic(ideal))
       read_elastic(batch, environment, ideal, field);
     else
       fill(environment, ideal, field.data());
-    map->displace(field, moved);
+    markers[std::size_t(of.sensor)]->displace(field, moved);
     std::transform(moved.begin(), moved.end(), to, [](double x) { return static_cast<T>(x); });
   }
 
   /// Writes a reading of an imperfect sensor whose touches were found.
   template <class T>
   void write_imperfect(const Batch& batch, int environment, FieldOutput of, T* to) {
-    if (of.form == FieldForm::markers) return write_markers(batch, environment, of.sensor, to);
+    if (is_displacement(of.form)) return write_displacements(batch, environment, of, to);
     if constexpr (std::is_same_v<T, double>)
       if (of.form != FieldForm::sum) {
         const std::size_t numbers = numbers_of(sensor_of(of.sensor).points(), of.form);
@@ -433,7 +433,7 @@ struct Readout::Impl {
              const One& one) {
     const int environments = environments_of(batch, number);
     place_block(batch, number, of.sensor);
-    const bool derived = of.form == FieldForm::sum || of.form == FieldForm::markers;
+    const bool derived = of.form == FieldForm::sum || is_displacement(of.form);
     if (!derived && together(batch, number, of.sensor)) {
       const FieldOutput computed = undivided(of);
       imperfect(computed) ? fill_imperfect_block(batch, number, computed, dense)

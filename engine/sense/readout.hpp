@@ -20,9 +20,9 @@ namespace tangere {
 /// twice in a step has the same noise. Every body that can move relative to the sensor is sensed.
 /// Every way of reading gives the same numbers: those of the readout's precision, converted where T
 /// is the other type. T is float or double. A flow is that of the shear in T. FieldForm::markers
-/// throws InputError for a sensor without markers. Every function throws InputError for a batch or
-/// frame of another Model, for an environment, block, sensor or body that does not exist, and for
-/// an array of another length than its shape says.
+/// and surface throw InputError for a sensor without them. Every function throws InputError for a
+/// batch or frame of another Model, for an environment, block, sensor or body that does not exist,
+/// and for an array of another length than its shape says.
 class Readout {
  public:
   explicit Readout(const Model& model, Precision precision = Precision::f64);

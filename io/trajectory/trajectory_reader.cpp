@@ -53,7 +53,8 @@ struct TrajectoryReader::Impl {
          {FieldForm::field, FieldForm::ideal, FieldForm::pressure, FieldForm::shear})
       if (h5::has_link(group, dataset_of(form))) found.push_back(form);
     if (found.empty()) {
-      constexpr FieldForm kWithoutPicture[] = {FieldForm::sum, FieldForm::markers, FieldForm::flow};
+      constexpr FieldForm kWithoutPicture[] = {FieldForm::sum, FieldForm::markers,
+                                               FieldForm::surface, FieldForm::flow};
       if (std::none_of(std::begin(kWithoutPicture), std::end(kWithoutPicture),
                        [&](FieldForm form) { return h5::has_link(group, dataset_of(form)); }))
         throw IoError(
@@ -205,7 +206,7 @@ std::size_t TrajectoryReader::find_sensor(const std::string& name) const {
   }
   if (std::find(impl_->sums.begin(), impl_->sums.end(), name) != impl_->sums.end())
     throw InputError(impl_->path + ": of sensor '" + name +
-                     "' the run recorded only the sum, markers or flow");
+                     "' the run recorded only the sum, markers, surface or flow");
   if (names.empty())
     throw InputError(impl_->path + ": the run recorded no tactile field, pressure or shear");
   throw InputError(impl_->path + ": no sensor is named '" + name + "'" + suggestion(name, names));

@@ -534,7 +534,8 @@ void add_batches(nb::module_& m) {
            "shear, shear, normal force of each point [N]; 'pad.pressure' and 'pad.shear' parts of\n"
            "it; 'pad.sum' (E, 6): force [N] and where it presses [m], body axes; 'pad.flow' the\n"
            "shear over its largest length; 'pad.ideal' the field without imperfections;\n"
-           "'pad.markers' the displacement of markers [m]. `out`: an array to fill instead of a\n"
+           "'pad.markers' the displacement of markers [m], 'pad.surface' that of a layer's\n"
+           "surface [m]. `out`: an array to fill instead of a\n"
            "new one.")
       .def("set_state", &PythonBatch::set_state, "q"_a, "v"_a, "envs"_a = nb::none(),
            "Sets states: `q` (n, nq) or (nq), `v` (n, nv) or (nv), of the environments listed in\n"

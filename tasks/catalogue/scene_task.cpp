@@ -62,9 +62,8 @@ NamedReading reading_named(const Model& model, const std::string& name) {
 /// What is read of a sensor to compute an output.
 FieldOutput read_for(const Model& model, const FieldOutput& output) {
   if (output.form == FieldForm::pressure) return {output.sensor, FieldForm::pressure};
-  const bool of_ideal = output.form == FieldForm::ideal || output.form == FieldForm::markers,
-             imperfect = is_imperfect(model.scene().sensors[as_size(output.sensor)].imperfections);
-  return {output.sensor, of_ideal && imperfect ? FieldForm::ideal : FieldForm::field};
+  const bool imperfect = is_imperfect(model.scene().sensors[as_size(output.sensor)].imperfections);
+  return {output.sensor, is_ideal(output.form) && imperfect ? FieldForm::ideal : FieldForm::field};
 }
 
 std::vector<std::string> default_readings(const Model& model) {
@@ -77,7 +76,7 @@ TensorSpec field_spec(const SensorInfo& sensor, FieldOutput output) {
   TensorSpec spec{output_name(sensor.name, output.form), {6}, "N, m", "reading of a sensor"};
   spec.touch = true;
   if (output.form == FieldForm::sum) return spec;
-  spec.unit = output.form == FieldForm::markers ? "m" : output.form == FieldForm::flow ? "1" : "N";
+  spec.unit = is_displacement(output.form) ? "m" : output.form == FieldForm::flow ? "1" : "N";
   spec.shape = {as_size(sensor.points)};
   if (sensor.rows > 0) spec.shape = {as_size(sensor.rows), as_size(sensor.cols)};
   if (const int components = components_of(output.form); components > 1)

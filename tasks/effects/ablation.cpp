@@ -107,8 +107,14 @@ void drop_imperfections(Scene& scene, int element, Ablation way) {
 }
 
 void drop_layer(Scene& scene, int element) {
-  for (std::size_t k = 0; k < scene.sensors.size(); ++k)
-    if (is_meant(element, k)) scene.sensors[k].layer.reset();
+  for (std::size_t k = 0; k < scene.sensors.size(); ++k) {
+    TactileDescription& sensor = scene.sensors[k];
+    if (!is_meant(element, k)) continue;
+    sensor.layer.reset();
+    // Nothing else moves its markers.
+    if (sensor.markers && sensor.markers->stiffness == 0 && !(sensor.coefficients.ks > 0))
+      sensor.markers.reset();
+  }
 }
 
 void drop_markers(Scene& scene, int element, Ablation way) {
@@ -116,7 +122,7 @@ void drop_markers(Scene& scene, int element, Ablation way) {
   for (std::size_t k = 0; k < scene.sensors.size(); ++k) {
     std::optional<MarkersDescription>& markers = scene.sensors[k].markers;
     if (!is_meant(element, k) || !markers) continue;
-    if (way == Ablation::zero)
+    if (way == Ablation::zero && !scene.sensors[k].layer)
       markers->stiffness = kRigid;
     else
       markers.reset();
@@ -176,7 +182,7 @@ void drop_elements(Scene& scene, std::vector<Element>& all, const Effect& effect
   for (std::size_t k = first; k < first + count; ++k) {
     if constexpr (std::is_same_v<Element, TactileDescription>) {
       // Markers that took the sensor's ks as their stiffness keep it.
-      if (all[k].markers && all[k].markers->stiffness == 0)
+      if (all[k].markers && all[k].markers->stiffness == 0 && !all[k].layer)
         all[k].markers->stiffness = all[k].coefficients.ks;
     }
     for (const Field field : fields) all[k].coefficients[coefficient_index(field)] = 0;

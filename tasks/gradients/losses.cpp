@@ -107,7 +107,7 @@ class Markers : public RolloutLoss {
       at.fields[s]->expand(field);
       maps_[s]->displace(field, moved);
       for (const double x : moved) squares += x * x;
-      maps_[s]->pull_back(moved, cotangent);
+      maps_[s]->pull_back(field, moved, cotangent);
       add_to_tiles(*at.fields[s], info, cotangent, out.fields[s]);
     }
     return 0.5 * squares;

@@ -43,14 +43,40 @@ TEST(LayerCompliance, AThickLayerIsAHalfSpaceFarAway) {
 TEST(LayerCompliance, UniformPressureCompressesTheLayer) {
   for (const double nu : {0.0, 0.3, 0.475}) {
     const double M = (1 - nu) / ((1 + nu) * (1 - 2 * nu));
-    EXPECT_NEAR(layer_compliance(4, nu, 0), 4 / M, 1e-12 / M);
-    EXPECT_NEAR(layer_compliance(4, nu, 1e-4), 4 / M, 2e-3 / M) << nu;  // and is continuous there
+    EXPECT_NEAR(layer_compliance(4, nu, 0).normal, 4 / M, 1e-12 / M);
+    // and is continuous there
+    EXPECT_NEAR(layer_compliance(4, nu, 1e-4).normal, 4 / M, 2e-3 / M) << nu;
   }
 }
 
-/// Waves much shorter than the thickness: 2 (1 - ν²)/(E k).
+/// Uniform shear τ moves it by τ t/G along itself.
+TEST(LayerCompliance, UniformShearShearsTheLayer) {
+  const double G = 1 / (2 * 1.45);
+  for (const double k : {0.0, 1e-5}) {
+    const WaveCompliance c = layer_compliance(4, 0.45, k);
+    EXPECT_NEAR(c.across * G / 4, 1, 1e-8);
+    EXPECT_NEAR(c.along * G / 4, 1, 1e-8);
+    EXPECT_NEAR(c.coupling, 0, 1e-3);
+  }
+}
+
+/// Waves much shorter than the thickness, of a half-space: 2 (1 - ν²)/(E k) by pressure and by
+/// shear along them, 1/(G k) by shear across them, and -(1 - 2ν)/(2 G k) of coupling.
 TEST(LayerCompliance, ShortWavesDoNotReachTheBack) {
-  EXPECT_NEAR(layer_compliance(4, 0.475, 50) * 50, 2 * (1 - 0.475 * 0.475), 1e-12);
+  const double nu = 0.475, G = 1 / (2 * (1 + nu));
+  const WaveCompliance c = layer_compliance(4, nu, 50);
+  EXPECT_NEAR(c.normal * 50, 2 * (1 - nu * nu), 1e-12);
+  EXPECT_NEAR(c.along * 50, 2 * (1 - nu * nu), 1e-12);
+  EXPECT_NEAR(c.across * 50, 1 / G, 1e-12);
+  EXPECT_NEAR(c.coupling * 50, -(1 - 2 * nu) / (2 * G), 1e-12);
+}
+
+/// Of an incompressible layer and long waves: k² t³/(3 G), and k t²/(2 G) of coupling.
+TEST(LayerCompliance, LongWavesOfAnIncompressibleLayer) {
+  const double nu = 0.5 - 1e-9, G = 1 / (2 * (1 + nu)), t = 2, k = 1e-2;
+  const WaveCompliance c = layer_compliance(t, nu, k);
+  EXPECT_NEAR(c.normal / (k * k * t * t * t / (3 * G)), 1, 5e-3);
+  EXPECT_NEAR(c.coupling / (k * t * t / (2 * G)), 1, 5e-3);
 }
 
 TEST(LayerCompliance, PressureHereAndDisplacementThereAreReciprocal) {
@@ -63,20 +89,39 @@ TEST(LayerCompliance, PressureHereAndDisplacementThereAreReciprocal) {
   }
 }
 
-/// A free side lets cells beside it yield more, to pressure on them and on their neighbours; far
-/// from the sides nothing changes.
-TEST(LayerCompliance, SidesAreMirrors) {
+/// Pressure beside a free side pushes the gel out there: a press far from it, in cells, moves the
+/// surface at the side less than in a gel without sides, in which it bulges. Far from the sides
+/// nothing changes.
+TEST(LayerCompliance, SidesMatterNearThem) {
   LayerGrid g = grid(20, 0.8, 2, 0.475);
   const LayerCompliance none = compile_layer(g);
   g.margin = 0.0;
   const LayerCompliance sides = compile_layer(g);
-  const std::size_t corner = 0, middle = 10 * 20 + 10;
-  const auto own = [](const LayerCompliance& c, std::size_t i) { return c.table[401 * i]; };
-  EXPECT_GT(own(sides, corner), 1.5 * own(none, corner));
-  EXPECT_NEAR(own(sides, middle) / own(none, middle), 1, 1e-3);
+  const auto at = [](const LayerCompliance& c, std::size_t i, std::size_t j) {
+    return c.table[400 * i + j];
+  };
+  const std::size_t side = 10 * 20, beside = side + 5, middle = side + 10;
+  EXPECT_LT(at(none, side, beside), 0);
+  EXPECT_LT(std::abs(at(sides, side, beside)), 0.5 * std::abs(at(none, side, beside)));
+  EXPECT_NEAR(at(sides, middle, middle) / at(none, middle, middle), 1, 1e-3);
   g.margin = 12.0;  // far away
   const LayerCompliance far = compile_layer(g);
-  EXPECT_NEAR(own(far, corner) / own(none, corner), 1, 1e-3);
+  EXPECT_NEAR(at(far, 0, 0) / at(none, 0, 0), 1, 1e-3);
+}
+
+/// Loads do work, with sides and without, so that pressures are unique: xᵀ C x > 0.
+TEST(LayerCompliance, IsPositiveDefinite) {
+  LayerGrid g{6, 7, 0.8, 0.6, 3, 0.49};
+  for (const auto margin : {std::optional<double>(), std::optional(0.0), std::optional(0.7)}) {
+    g.margin = margin;
+    std::vector<double> c = compile_layer(g).table;
+    for (std::size_t i = 0; i < 42; ++i) {  // Cholesky
+      ASSERT_GT(c[43 * i], 1e-6 * c[0]) << i;
+      for (std::size_t j = i + 1; j < 42; ++j)
+        for (std::size_t k = i + 1; k < 42; ++k)
+          c[42 * j + k] -= c[42 * j + i] * c[42 * i + k] / c[43 * i];
+    }
+  }
 }
 
 }  // namespace

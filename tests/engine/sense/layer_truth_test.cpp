@@ -15,13 +15,14 @@ namespace {
 using Numbers = std::vector<double>;
 constexpr int kRows = 24, kCols = 32;  // taxels of 0.75 mm
 
-Numbers truth(const std::string& name) {
+/// `each`: numbers of a taxel.
+Numbers truth(const std::string& name, std::size_t each = 1) {
   std::ifstream file(std::string(TANGERE_TEST_DATA) + "/gel/" + name + ".txt");
   std::string line;
   std::getline(file, line);
   Numbers out;
   for (double x; file >> x;) out.push_back(x);
-  EXPECT_EQ(out.size(), std::size_t(kRows * kCols)) << name;
+  EXPECT_EQ(out.size(), each * kRows * kCols) << name;
   return out;
 }
 
@@ -112,6 +113,58 @@ TEST(LayerTruth, AFlatPunchIsCarriedByItsEdge) {
   const Errors e = errors(s, 0.25e-3, "punch4_0250");
   EXPECT_LT(e.field, 0.28);
   EXPECT_LT(std::abs(e.total), 0.12) << e.total;
+}
+
+/// Errors of the surface's motion at least two taxels from the contact: norms of the difference
+/// over those of the truth.
+struct MotionErrors {
+  double lateral, bulge;
+};
+
+MotionErrors motion_errors(Scene scene, double depth, const std::string& name) {
+  scene.sensors[0].markers.emplace();
+  const Model model(scene);
+  Batch batch(model, 1, 0);
+  batch.set_state(0, Numbers(std::size_t(model.nq()), -depth), Numbers(std::size_t(model.nv())));
+  Numbers points(std::size_t(3 * model.sensors()[0].points)), taxels(3 * kRows * kCols);
+  const std::span<double> to(points);
+  Readout(model).read_block(batch, 0, {0, FieldForm::surface}, {&to, 1});
+  for (std::size_t p = 0; p < points.size(); ++p) {  // means of 2 × 2 points
+    const std::size_t i = p / 3 / (2 * kCols) / 2, j = p / 3 % (2 * kCols) / 2;
+    taxels[3 * (i * kCols + j) + p % 3] += 250 * points[p];  // mm
+  }
+  const Numbers force = truth(name), right = truth(name + "_motion", 3);
+  const auto outside = [&](int i, int j) {
+    for (int a = std::max(0, i - 2); a <= std::min(kRows - 1, i + 2); ++a)
+      for (int b = std::max(0, j - 2); b <= std::min(kCols - 1, j + 2); ++b)
+        if (force[std::size_t(a * kCols + b)] != 0) return false;
+    return true;
+  };
+  double off[2] = {}, size[2] = {};
+  for (std::size_t k = 0; k < right.size(); ++k)
+    if (outside(int(k / 3) / kCols, int(k / 3) % kCols)) {
+      const std::size_t part = k % 3 == 2 ? 1 : 0;
+      off[part] += (taxels[k] - right[k]) * (taxels[k] - right[k]),
+          size[part] += right[k] * right[k];
+    }
+  return {std::sqrt(off[0] / size[0]), std::sqrt(off[1] / size[1])};
+}
+
+/// Without sides the bulges have errors of 0.4 to 0.5.
+TEST(LayerTruth, TheSurfaceMovesOutsideTheContact) {
+  Scene ball = gel({{SphereShape{7.5e-3}, {0, 0, 7.5e-3}}}, 0.75e-3);
+  Scene balls = gel(
+      {{SphereShape{3e-3}, {3.5e-3, 0, 3e-3}}, {SphereShape{3e-3}, {-3.5e-3, 0, 3e-3}}}, 0.75e-3);
+  const std::tuple<Scene*, double, const char*> rows[] = {{&ball, 0.5e-3, "ball75_0500"},
+                                                          {&ball, 1e-3, "ball75_1000"},
+                                                          {&balls, 0.5e-3, "balls3_0500"}};
+  for (const auto& [scene, depth, name] : rows) {
+    const MotionErrors e = motion_errors(*scene, depth, name);
+    EXPECT_LT(e.lateral, 0.18) << name;
+    EXPECT_LT(e.bulge, 0.32) << name;
+    RecordProperty(std::string(name) + "_lateral", std::to_string(e.lateral));
+    RecordProperty(std::string(name) + "_bulge", std::to_string(e.bulge));
+  }
 }
 
 /// Smaller cells are better.

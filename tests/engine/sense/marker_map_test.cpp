@@ -105,7 +105,7 @@ TEST(MarkerMap, PullsBackByItsTranspose) {
   for (double& x : f) x = random.uniform(-1, 1);
   for (double& x : u) x = random.uniform(-1, 1);
   const Numbers of_f = displaced(model, f);
-  MarkerMap(model, 0).pull_back(u, back);
+  MarkerMap(model, 0).pull_back(f, u, back);
   double one = 0, two = 0, size = 0;
   for (std::size_t k = 0; k < u.size(); ++k) one += u[k] * of_f[k];
   for (std::size_t k = 0; k < f.size(); ++k)

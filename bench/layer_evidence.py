@@ -1,0 +1,163 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""Fields of a soft layer and of springs against finite elements and a real sensor: the tables of
+docs/layer.md.
+
+    PYTHONPATH=build/release/python build/venv/bin/python bench/layer_evidence.py
+    … bench/layer_evidence.py --write     # puts them into the page
+
+Truth is tests/data/gel (its README is in tests/data): normal forces and motions on a gel of 20.75
+by 25.25 by 4 mm by finite elements. The forces of a GelSight Mini are those that Helmut et al.
+measured (FEATS, arXiv 2411.03315). Nothing is fitted but the stiffness of the springs, on one ball.
+"""
+
+from __future__ import annotations
+
+import argparse
+import warnings
+from pathlib import Path
+
+import numpy as np
+
+import tangere
+
+ROOT = Path(__file__).parents[1]
+PAGE, DATA = ROOT / "docs/layer.md", ROOT / "tests/data/gel"
+ROWS, COLS, TAXEL = 24, 32, 0.75e-3  # [m]
+PER = 2  # points along the side of a taxel
+SIZE, POINTS = (ROWS * TAXEL, COLS * TAXEL), (ROWS * PER, COLS * PER)
+E, NU, THICKNESS = 0.428e6, 0.475, 4e-3  # [Pa], [m] of the truth, and as FEATS identified
+SPRINGS = 2.8e8  # [N/m³]: fits the totals of the ball of 7.5 mm best
+MARGIN = 3.2e-3  # [m]: a GelSight Mini's gel has 20.75 × 25.25 mm
+MEASURED = {0.5e-3: 1.6503, 1e-3: 5.9641, 1.5e-3: 13.5257, 2e-3: 23.2532}  # depth [m]: force [N]
+
+BALL, BALLS = [("sphere", 'radius="0.0075"', 0.0, 0.0075)], [
+    ("sphere", 'radius="0.003"', x, 0.003) for x in (-0.0035, 0.0035)
+]
+PUNCH = [("cylinder", 'length="0.01" radius="0.004"', 0.0, 0.005)]
+CASES = [
+    ("ball of 7.5 mm", BALL, 0.25e-3, "ball75_0250"),
+    ("ball of 7.5 mm", BALL, 0.5e-3, "ball75_0500"),
+    ("ball of 7.5 mm", BALL, 1e-3, "ball75_1000"),
+    ("ball of 7.5 mm", BALL, 1.5e-3, "ball75_1500"),
+    ("two balls of 3 mm, 7 mm apart", BALLS, 0.5e-3, "balls3_0500"),
+    ("two balls of 3 mm, 7 mm apart", BALLS, 1e-3, "balls3_1000"),
+    ("flat punch of 4 mm", PUNCH, 0.25e-3, "punch4_0250"),
+]  # fmt: skip
+
+
+def gel(
+    bodies: list, skin: str, size: tuple[float, float], points: tuple[int, int]
+) -> tangere.Scene:
+    """Bodies that slide along z and touch a gel with their lowest points at q = 0."""
+    rows, cols = points
+    pitch = size[0] / rows, size[1] / cols
+    x, y = size[0] / 2 - pitch[0] / 2, size[1] / 2 - pitch[1] / 2
+    links = "".join(
+        f'<robot><link name="b{k}"><joint name="b{k}" type="prismatic" axis="0 0 1" '
+        f'pos="{at} 0 {height}"/><body name="b{k}" type="{shape}" {numbers} density="1000"/></link>'
+        "</robot>"
+        for k, (shape, numbers, at, height) in enumerate(bodies)
+    )
+    text = f"""<tangere><option unit="m-kg" gravity="0 0 0" timestep="1e-3"/>
+<robot><link name="plate"><joint name="plate" type="fixed" pos="0 0 -0.005"/>
+<body name="plate" type="cuboid" size="{size[0]} {size[1]} 0.01" density="1000"/></link></robot>
+{links}
+<sensor><tactile name="gel" body="plate" type="rect_array" rect_pos0="{-x} {-y} 0.005"
+ rect_pos1="{x} {y} 0.005" axis0="1 0 0" axis1="0 1 0" resolution="{rows} {cols}" mu="0" kt="0"
+ {skin}</tactile></sensor></tangere>"""
+    with warnings.catch_warnings():  # nothing but the sensor touches the bodies
+        warnings.simplefilter("ignore")
+        return tangere.Scene.from_string(text)
+
+
+def layer(cell: float, margin: float) -> str:
+    return (
+        f'modulus="{E}" thickness="{THICKNESS}"><layer poisson="{NU}" cell="{cell}" '
+        f'margin="{margin}"/><markers/>'
+    )
+
+
+def read(scene: tangere.Scene, depth: float, reading: str = "gel") -> np.ndarray:
+    """(rows, cols, 3) of the points."""
+    model = tangere.Model(scene)
+    batch = tangere.Batch(model, 1, precision="double")
+    batch.set_state(np.full(model.nq, -depth), np.zeros(model.nv))
+    return batch.tactile(reading)[0]
+
+
+def taxels(x: np.ndarray) -> np.ndarray:
+    """(ROWS, PER, COLS, PER, 3) of a gel of the truth's size: taxels of PER × PER points."""
+    return x.reshape(ROWS, PER, COLS, PER, 3)
+
+
+def error(found: np.ndarray, truth: np.ndarray) -> float:
+    return float(np.linalg.norm(found - truth) / np.linalg.norm(truth))
+
+
+def fields() -> str:
+    """The table of normal fields."""
+    lines = ["| body, depth | springs | cells of 0.75 mm | 0.375 mm |", "|---|---|---|---|"]
+    area = (TAXEL / PER) ** 2
+    for name, bodies, depth, data in CASES:
+        truth = np.loadtxt(DATA / f"{data}.txt", skiprows=1).reshape(ROWS, COLS)
+        cells = []
+        for skin in (f'kn="{SPRINGS * area}">', layer(0.75e-3, 1e-3), layer(0.375e-3, 1e-3)):
+            found = taxels(read(gel(bodies, skin, SIZE, POINTS), depth)).sum((1, 3))[..., 2]
+            total = found.sum() / truth.sum() - 1
+            cells.append(f"{100 * error(found, truth):.1f} % ({100 * total:+.0f} %)")
+        lines.append(f"| {name}, {1e3 * depth:g} mm | " + " | ".join(cells) + " |")
+    return "\n".join(lines)
+
+
+def motions() -> str:
+    """The table of the surface's motion, two taxels or more from the contact."""
+    lines = ["| body, depth | lateral | bulge |", "|---|---|---|"]
+    for name, bodies, depth, data in CASES:
+        path = DATA / f"{data}_motion.txt"
+        if not path.exists():
+            continue
+        truth = 1e-3 * np.loadtxt(path, skiprows=1).reshape(ROWS, COLS, 3)
+        near = np.loadtxt(DATA / f"{data}.txt", skiprows=1).reshape(ROWS, COLS) != 0
+        padded = np.pad(near, 2)
+        near = np.any([padded[i:i + ROWS, j:j + COLS] for i in range(5) for j in range(5)], 0)
+        scene = gel(bodies, layer(0.75e-3, 1e-3), SIZE, POINTS)
+        found = taxels(read(scene, depth, "gel.surface")).mean((1, 3))
+        parts = (f"{100 * error(found[~near][:, p], truth[~near][:, p]):.0f} %"
+                 for p in ([0, 1], [2]))  # fmt: skip
+        lines.append(f"| {name}, {1e3 * depth:g} mm | " + " | ".join(parts) + " |")
+    return "\n".join(lines)
+
+
+def forces() -> str:
+    """The table of a GelSight Mini's forces."""
+    lines = ["| depth | measured | layer | error |", "|---|---|---|---|"]
+    for depth, force in MEASURED.items():
+        scene = gel(BALL, layer(0.8e-3, MARGIN), (0.0186, 0.0143), (47, 36))
+        found = float(read(scene, depth)[..., 2].sum())
+        lines.append(f"| {1e3 * depth:g} mm | {force:.3f} N | {found:.3f} N | "
+                     f"{100 * (found / force - 1):+.1f} % |")  # fmt: skip
+    return "\n".join(lines)
+
+
+TABLES = {"fields": fields, "motions": motions, "forces": forces}
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--write", action="store_true", help="put the tables into docs/layer.md")
+    write = parser.parse_args().write
+    page = PAGE.read_text()
+    for name, make in TABLES.items():
+        table = make()
+        print(table + "\n")
+        begin = f"<!-- {name}: made by bench/layer_evidence.py -->\n"
+        end = f"\n<!-- end of {name} -->"
+        before, _, rest = page.partition(begin)
+        page = before + begin + "\n" + table + "\n" + rest[rest.index(end):]
+    if write:
+        PAGE.write_text(page)
+
+
+if __name__ == "__main__":
+    main()
