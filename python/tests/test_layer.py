@@ -55,6 +55,35 @@ def test_gradients_agree_with_differences():
         assert min(errors) < 1e-4, errors
 
 
+def test_the_surface_moves_with_gradients():
+    text = GEL.read_text().replace("/>\n    </tactile>", "/><markers/>\n    </tactile>")
+    varies = '<tactile name="gel" field="kn" uniform="2e8 3e8"/>'
+    assert "<markers/>" in text and varies in text
+    with pytest.raises(tangere.InputError, match="its kn varies"):
+        tangere.Model(tangere.Scene.from_string(text, str(GEL)))
+    scene = tangere.Scene.from_string(text.replace(varies, ""), str(GEL))
+    sim = tt.Simulation(scene, 1, 60, every=60, read=["gel.surface", "gel.markers"], threads=1)
+    weights = torch.randn(48, 64, 3, generator=torch.Generator().manual_seed(2), dtype=torch.float64)
+
+    def surface(u):
+        s = sim.step(sim.reset(seed=3), u)
+        assert torch.equal(s["gel.markers"], s["gel.surface"][..., :2])
+        return s["gel.surface"]
+
+    u = torch.zeros(1, 3, dtype=torch.float64).index_fill(1, torch.tensor([2]), -0.0013)
+    u.requires_grad_()
+    moved = surface(u)
+    assert moved[..., 2].min() < -1e-4 and moved[..., 2].max() > 0  # down beneath the ball, and up
+    (1e4 * (moved * weights).sum()).backward()
+    errors = []
+    for step in (1e-6, 1e-7, 1e-8):
+        with torch.no_grad():
+            sides = [(1e4 * (surface(u + sign * step * torch.eye(3)[2:]) * weights).sum())
+                     for sign in (1, -1)]  # fmt: skip
+        errors.append(abs(float(sides[0] - sides[1]) / (2 * step) / float(u.grad[0, 2]) - 1))
+    assert min(errors) < 1e-4, errors
+
+
 def test_the_builder_has_layers():
     builder = tangere.SceneBuilder.from_file(GEL)
     xml = builder.xml()

@@ -106,6 +106,15 @@ def test_ppo_learns_a_task_of_a_file(tmp_path):
         protocol.make_vec(f"{tmp_path}/own_tusk.py:Hold", 1)
 
 
+def test_every_skin_is_one_of_every_task_with_pads():
+    from skins import SKINS, skin_scene
+
+    for task in ("stable_grasp", "insertion"):
+        for skin in SKINS:
+            env = tangere.make_vec(task, 1, threads=1, scene=skin_scene(task, skin))
+            assert len(env.model.sensors) == 2
+
+
 def test_images_have_one_size():
     shapes = {"small": (4, 4, 3), "left": (20, 20, 3), "right": (20, 20, 3), "flow": (2, 13, 10),
               "points": (30, 3), "force": (6,)}  # fmt: skip
