@@ -57,8 +57,8 @@ class Compiler {
     move_near();
     if (m_.nv == 0)
       throw InputError(where() + "nothing in the scene can move: every joint is fixed");
-    check_masses(m_);
     compile_joint_effects(m_);
+    check_masses(m_);
     compile_motors(m_, joints_);
     compile_initial_state(m_, joints_);
     unknown_scales();

@@ -15,6 +15,7 @@ namespace tangere {
 using kernels::Frame;
 using kernels::JointKind;
 using kernels::Link;
+using kernels::Mat3;
 using kernels::Vec3;
 
 namespace {
@@ -250,19 +251,67 @@ void vary_joint(CompiledModel& m, int joint, const RandomizationDescription& d, 
   }
 }
 
-void check_masses(const CompiledModel& m) {
-  std::vector<char> carried(m.links.size(), 0);
-  for (std::size_t i = m.links.size(); i-- > 0;) {
-    if (m.links[i].has_mass) carried[i] = 1;
-    if (carried[i] != 0 && m.links[i].parent >= 0) carried[std::size_t(m.links[i].parent)] = 1;
+namespace {
+
+/// Mass, mass times centre, and inertia about the origin, of a link and all that it carries.
+struct Composite {
+  double mass = 0;
+  Vec3<double> moment{0, 0, 0};
+  Mat3<double> inertia{};
+
+  /// Adds what a link carries, which is placed in this one's frame.
+  void add(const Composite& of, const kernels::Frame<double>& frame) {
+    const Vec3<double> p = frame.p, h = frame.R * of.moment;
+    // -Σ m [x + p]² = I - [h][p] - [p][h] - m [p]²
+    inertia = inertia + frame.R * of.inertia * transpose(frame.R) -
+              (skew(h) * skew(p) + skew(p) * skew(h) + of.mass * (skew(p) * skew(p)));
+    moment += h + of.mass * p;
+    mass += of.mass;
   }
+};
+
+/// Those of all links where joints are at rest.
+std::vector<Composite> composites(const CompiledModel& m) {
+  std::vector<Composite> out;
+  for (const kernels::Link& link : m.links)
+    out.push_back({link.mass, link.mass_times_com, link.inertia});
+  for (std::size_t i = m.links.size(); i-- > 0;)
+    if (m.links[i].parent >= 0) out[std::size_t(m.links[i].parent)].add(out[i], m.links[i].frame);
+  return out;
+}
+
+/// Whether a joint that turns moves a moment of inertia.
+bool turns_inertia(const CompiledModel& m, const kernels::Link& link, const Composite& of) {
+  constexpr double kRounding = 1e-13;  // relative
+  const Mat3<double>& I = of.inertia;
+  const double least = kRounding * (I.m[0][0] + I.m[1][1] + I.m[2][2]);
+  if (link.kind == kernels::JointKind::revolute)
+    return dot(link.axis, I * link.axis) > least ||
+           m.dof_effects[std::size_t(link.v)].armature.value > 0;
+  return link.kind != kernels::JointKind::spherical ||
+         is_inertia({I.m[0][0] - least, I.m[0][1], I.m[0][2], I.m[1][1] - least, I.m[1][2],
+                     I.m[2][2] - least});
+}
+
+}  // namespace
+
+void check_masses(const CompiledModel& m) {
+  const std::vector<Composite> carried = composites(m);
+  const auto fail = [&](std::size_t joint, const std::string& text) {
+    const JointDescription& d = m.scene.links[joint].joint;
+    throw InputError(d.source.prefix() + "joint '" + d.name + "' " + text);
+  };
   for (std::size_t i = 0; i < m.joints.size(); ++i) {
     const CompiledJoint& joint = m.joints[i];
-    if (joint.link_count == 0 || carried[std::size_t(joint.link)] != 0) continue;
-    const JointDescription& d = m.scene.links[i].joint;
-    throw InputError(d.source.prefix() + "joint '" + d.name +
-                     "' moves nothing that has mass; expected a body with mass on it " +
-                     "or on a joint that it carries");
+    for (int k = 0; k < joint.link_count; ++k) {
+      const auto link = std::size_t(joint.link + k);
+      if (!(carried[link].mass > 0))
+        fail(i, "moves nothing that has mass; expected a body with mass on it or on a joint that it "
+                "carries");
+      if (!turns_inertia(m, m.links[link], carried[link]))
+        fail(i, "turns points of mass alone, about themselves; expected a body with an inertia on it "
+                "or on a joint that it carries");
+    }
   }
 }
 

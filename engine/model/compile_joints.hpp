@@ -25,7 +25,8 @@ void compile_initial_state(CompiledModel& m, const NameIndex& joints);
 /// InputError where that is not possible.
 void vary_joint(CompiledModel& m, int joint, const RandomizationDescription& d, int row);
 
-/// Throws InputError where nothing with mass moves with a joint: its mass matrix would be singular.
+/// Throws InputError where a joint moves nothing with mass, or turns points of mass about
+/// themselves: its mass matrix would be singular. Joints are at rest in this check.
 void check_masses(const CompiledModel& m);
 
 }  // namespace tangere

@@ -68,13 +68,19 @@ const char* law_name(ContactLaw law, std::optional<double> ramp) {
   return law == ContactLaw::linear && ramp == 0 ? "published" : to_string(law);
 }
 
-bool is_inertia(const std::array<double, 6>& inertia) {
+/// Whether a symmetric matrix is positive definite: its leading minors are positive.
+static bool is_positive(const std::array<double, 6>& matrix) {
+  const auto& [a, ab, ac, b, bc, c] = matrix;
+  const double third = a * (b * c - bc * bc) - ab * (ab * c - bc * ac) + ac * (ab * bc - b * ac);
+  return a > 0 && a * b - ab * ab > 0 && third > 0;
+}
+
+bool is_inertia(const std::array<double, 6>& inertia) { return is_positive(inertia); }
+
+bool is_solid_inertia(const std::array<double, 6>& inertia) {
   const auto& [xx, xy, xz, yy, yz, zz] = inertia;
-  // ∫ρ x xᵀ = ½ tr(I) 1 - I must be positive definite: its leading minors must be positive.
-  const double half = 0.5 * (xx + yy + zz), a = half - xx, b = half - yy, c = half - zz;
-  const double second = a * b - xy * xy;
-  const double third = a * (b * c - yz * yz) - xy * (xy * c + yz * xz) - xz * (xy * yz + b * xz);
-  return a > 0 && second > 0 && third > 0;
+  const double half = 0.5 * (xx + yy + zz);  // ∫ρ x xᵀ = ½ tr(I) 1 - I
+  return is_positive({half - xx, -xy, -xz, half - yy, -yz, half - zz});
 }
 
 int position_count(JointType type) {

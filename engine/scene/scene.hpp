@@ -394,9 +394,11 @@ bool is_ball(const Shape& shape);
 /// sphere with its surface. A mesh has a distance only near its own surface, so it touches spheres
 /// and is not touched by them.
 bool can_touch(const Shape& general, const Shape& primitive);
-/// Whether xx xy xz yy yz zz can be the inertia of a body with volume: principal moments are
-/// positive, and none is as large as the sum of the other two.
+/// Whether the principal moments of xx xy xz yy yz zz are positive.
 bool is_inertia(const std::array<double, 6>& inertia);
+/// Whether it can be the inertia of a body with volume: besides, no principal moment is as large as
+/// the sum of the other two.
+bool is_solid_inertia(const std::array<double, 6>& inertia);
 
 /// Numbers of configuration coordinates and of velocity dofs of a joint type: free has 7 and 6.
 int position_count(JointType type);

@@ -134,13 +134,12 @@ std::string joint_fault(const JointDescription& joint) {
 std::string body_fault(const BodyDescription& body) {
   if (const auto* const abstract = std::get_if<AbstractShape>(&body.shape)) {
     const auto& [xx, xy, xz, yy, yz, zz] = abstract->inertia;
-    const bool weightless = std::ranges::all_of(abstract->inertia, [](double x) { return x == 0; });
-    if (abstract->mass == 0 ? !weightless : !is_inertia(abstract->inertia))
+    const bool none = std::ranges::all_of(abstract->inertia, [](double x) { return x == 0; });
+    if (!none && (abstract->mass == 0 || !is_inertia(abstract->inertia)))
       return fmt::format(
-          "no solid body of mass {} and inertia=\"{} {} {} {} {} {}\"; expected "
-          "positive moments, each at most the sum of the other two, or zeros with "
-          "mass 0",
-          abstract->mass, xx, xy, xz, yy, yz, zz);
+          "inertia=\"{} {} {} {} {} {}\" of mass {}; expected positive principal moments, or zeros: "
+          "of a point, or of mass 0",
+          xx, xy, xz, yy, yz, zz, abstract->mass);
   }
   return slenderness_fault(body.shape);
 }

@@ -60,7 +60,7 @@ bool is_surface_file(const std::string& path) {
   std::string ending = fs::path(path).extension().string();
   std::transform(ending.begin(), ending.end(), ending.begin(),
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return ending == ".obj" || ending == ".stl" || ending == ".ply";
+  return ending == ".obj" || ending == ".stl" || ending == ".ply" || ending == ".dae";
 }
 
 /// Makes the mesh of a surface. `name`: of the file, for the list of what is left out.
@@ -99,7 +99,7 @@ std::optional<RobotMesh> read_robot_mesh(const RobotNode& node, const std::strin
   const MeshFile file{find_mesh(node, name, folder, other_folder), scale};
   if (!is_surface_file(file.path)) {
     node.lost(
-        fmt::format("<{}>: the shape of \"{}\", which is no OBJ, STL or PLY file; convert it "
+        fmt::format("<{}>: the shape of \"{}\", which is no OBJ, STL, PLY or DAE file; convert it "
                     "to one of these",
                     node.name(), name));
     return std::nullopt;

@@ -113,7 +113,7 @@ double make_possible(std::array<double, 6>& inertia) {
   double no = 0, yes = 2;
   for (int k = 0; k < 40; ++k) {
     const double middle = 0.5 * (no + yes);
-    (is_inertia(with(middle)) ? yes : no) = middle;
+    (is_solid_inertia(with(middle)) ? yes : no) = middle;
   }
   inertia = with(yes + kNearly);
   return yes;
@@ -123,7 +123,7 @@ double make_possible(std::array<double, 6>& inertia) {
 
 std::optional<RobotPiece> inertial_piece(Robot& robot, double mass, std::array<double, 6> inertia,
                                          const Pose& pose, const std::string& origin,
-                                         const Source& source) {
+                                         const Source& source, bool may_be_point) {
   if (!(mass >= 0))
     throw InputError(
         fmt::format("{}{}: mass {} kg; expected 0 or more", source.prefix(), origin, mass));
@@ -132,7 +132,9 @@ std::optional<RobotPiece> inertial_piece(Robot& robot, double mass, std::array<d
     if (!none) robot.lost.add(source, origin + ": an inertia without a mass; it is left out");
     return std::nullopt;
   }
-  if (none) {
+  if (none && may_be_point) {
+    robot.changed.add(source, origin + ": a mass without an inertia, which is a point on its link");
+  } else if (none) {
     const double radius = std::cbrt(3 * mass / (4 * 3.14159265358979323846 * kWeight));
     const double moment = kBallMoment * mass * radius * radius;
     inertia = {moment, 0, 0, moment, 0, moment};
@@ -140,11 +142,14 @@ std::optional<RobotPiece> inertial_piece(Robot& robot, double mass, std::array<d
   } else if (!is_inertia(inertia)) {
     if (make_possible(inertia) > kNearly)
       robot.lost.add(source, origin +
-                                 ": no solid has this inertia (a principal moment is above the sum "
-                                 "of the others, or not above 0); all moments are raised until one "
-                                 "has");
+                                 ": a principal moment of the inertia is below 0; all moments are "
+                                 "raised until a solid has them");
     else
-      robot.changed.add(source, origin + ": the inertia of a thin plate or rod, raised by 1e-6");
+      robot.changed.add(source, origin + ": the inertia of a thin rod, raised by 1e-6");
+  } else if (!is_solid_inertia(inertia)) {
+    robot.changed.add(source, origin +
+                                  ": no solid has this inertia (a principal moment is above the sum "
+                                  "of the others); it is taken as it is");
   }
   RobotPiece piece;
   piece.shape = AbstractShape{mass, inertia, {}};
@@ -174,7 +179,7 @@ void scale_masses(Scene& scene, double total) {
 }
 
 bool balance_inertia(std::array<double, 6>& inertia) {
-  if (is_inertia(inertia)) return false;
+  if (is_solid_inertia(inertia)) return false;
   const double mean = (inertia[0] + inertia[3] + inertia[5]) / 3;
   inertia = {mean, 0, 0, mean, 0, mean};
   return true;

@@ -113,11 +113,12 @@ int add_link(Robot& robot, RobotNames& names, const std::string& name, int paren
              const std::string& origin, const Source& source);
 
 /// A piece that is a mass alone. `inertia`: xx xy xz yy yz zz in the frame `pose` at the centre of
-/// mass. Where no solid has it, another takes its place, and the robot lists that. Without a mass
-/// there is no piece. Throws InputError at `source` if the mass is negative.
+/// mass. Where a principal moment is not positive, another inertia takes its place, and the robot
+/// lists that. `may_be_point`: an inertia of zeros is kept. Without a mass there is no piece. Throws
+/// InputError at `source` if the mass is negative.
 std::optional<RobotPiece> inertial_piece(Robot& robot, double mass, std::array<double, 6> inertia,
                                          const Pose& pose, const std::string& origin,
-                                         const Source& source);
+                                         const Source& source, bool may_be_point = false);
 
 /// Scales all masses so that they add up to `total` [kg].
 void scale_masses(Scene& scene, double total);

@@ -362,8 +362,9 @@ class UrdfReader {
                         joint.source);
       joint = rest;
     }
-    const int index = add_link(robot_, names_, name, parent, std::move(joint), pieces_of(node),
-                               origin, node.source());
+    const bool carried = joint.type == JointType::fixed && has_inertia(parent);
+    const int index = add_link(robot_, names_, name, parent, std::move(joint),
+                               pieces_of(node, carried), origin, node.source());
     for (Joint& next : joints_) {
       if (next.parent != name) continue;
       next.used = true;
@@ -375,7 +376,20 @@ class UrdfReader {
     }
   }
 
-  [[nodiscard]] std::vector<RobotPiece> pieces_of(const RobotNode& node) const {
+  /// Whether a link or one of its pieces has moments of inertia.
+  [[nodiscard]] bool has_inertia(int link) const {
+    const std::vector<LinkDescription>& links = robot_.scene.links;
+    for (std::size_t k = 0; k < links.size(); ++k) {
+      const bool own = static_cast<int>(k) == link,
+                 piece = links[k].parent == link && robot_.pieces.contains(links[k].name);
+      const auto* const mass = std::get_if<AbstractShape>(&links[k].body.shape);
+      if ((own || piece) && mass != nullptr && is_inertia(mass->inertia)) return true;
+    }
+    return false;
+  }
+
+  /// `carried`: the link is fixed to one with an inertia, so its own mass may be a point.
+  [[nodiscard]] std::vector<RobotPiece> pieces_of(const RobotNode& node, bool carried) const {
     std::vector<RobotPiece> pieces;
     const std::vector<RobotNode> parts = node.parts(kLinkChildren);
     for (const RobotNode& part : parts) {
@@ -401,7 +415,7 @@ class UrdfReader {
       inertial->changed("<inertial>: all moments are their mean, as balanceinertia says");
     if (auto piece =
             inertial_piece(robot_, mass.number("value"), I, read_origin(last_of(inside, "origin")),
-                           "<inertial>", inertial->source()))
+                           "<inertial>", inertial->source(), carried))
       pieces.push_back(std::move(*piece));
     return pieces;
   }

@@ -14,6 +14,7 @@
 #include "engine/base/error.hpp"
 #include "io/files/word_reader.hpp"
 #include "io/scene/closed_surface.hpp"
+#include "io/scene/collada_file.hpp"
 #include "io/scene/convex_hull.hpp"
 #include "io/scene/inner_walls.hpp"
 #include "io/scene/obj_file.hpp"
@@ -21,12 +22,13 @@
 namespace tangere {
 namespace {
 
-/// Reads a file of the format of its extension: .stl, .ply, else OBJ.
+/// Reads a file of the format of its extension: .stl, .ply, .dae, else OBJ.
 RawMesh read_triangles(const std::string& path) {
   std::string end = std::filesystem::path(path).extension().string();
   for (char& c : end) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
   if (end == ".stl") return read_stl(path);
   if (end == ".ply") return read_ply(path);
+  if (end == ".dae") return read_collada(path);
   return read_obj(path);
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Reads files that bodies are made of: closed surfaces (OBJ, STL, PLY) and lists of contact points.
+// Reads files that bodies are made of: closed surfaces (OBJ, STL, PLY, COLLADA), contact points.
 #pragma once
 
 #include <string>
@@ -18,7 +18,8 @@ struct FileSurface {
   std::string fault;           ///< why the faces are no closed surface with a volume, with the file
 };
 
-/// Reads an OBJ file, or an STL or PLY file where the path ends in .stl or .ply, in its own unit.
+/// Reads an OBJ file, or an STL or PLY file where the path ends in .stl or .ply, in its own unit, or
+/// a COLLADA file where it ends in .dae, in metres.
 /// Vertices that differ by rounding are merged if the surface would otherwise be open, and inner
 /// walls of flush parts are removed. Throws IoError if the file cannot be read, InputError with
 /// file:line if it is not of its format or has no vertices.

@@ -207,15 +207,20 @@ TEST(RobotImport, InertiasThatNoSolidHasAreMendedAndListed) {
     return import_link("<inertial><mass value=\"1\"/><inertia " + numbers + "/></inertial>");
   };
   EXPECT_THAT(inertial("ixx=\"1\" iyy=\"1\" izz=\"1.9\"").lost, IsEmpty());
-  const ImportedScene bad = inertial("ixx=\"1\" iyy=\"1\" izz=\"5\"");
-  EXPECT_THAT(bad.lost, ElementsAre(HasSubstr("<inertial>: no solid has this inertia")));
-  // 1 + x + 1 + x = 5 + x
-  EXPECT_NEAR(inertia_of(bad)[0], 4, 1e-4);
-  EXPECT_NEAR(inertia_of(bad)[5], 8, 1e-4);
-  const ImportedScene plate = inertial("ixx=\"1\" iyy=\"1\" izz=\"2\"");
-  EXPECT_THAT(plate.lost, IsEmpty());
-  EXPECT_THAT(plate.changed, Contains(HasSubstr("the inertia of a thin plate")));
-  EXPECT_NEAR(inertia_of(plate)[5], 2, 1e-4);
+  const ImportedScene odd = inertial("ixx=\"1\" iyy=\"1\" izz=\"5\"");
+  EXPECT_THAT(odd.lost, IsEmpty());
+  EXPECT_THAT(odd.changed, Contains(HasSubstr("<inertial>: no solid has this inertia")));
+  EXPECT_EQ(inertia_of(odd)[0], 1);
+  EXPECT_EQ(inertia_of(odd)[5], 5);
+  const ImportedScene bad = inertial("ixx=\"1\" iyy=\"1\" izz=\"-1\"");
+  EXPECT_THAT(bad.lost, ElementsAre(HasSubstr("a principal moment of the inertia is below 0")));
+  // -1 + x + 1 + x = 1 + x
+  EXPECT_NEAR(inertia_of(bad)[0], 2, 1e-4);
+  EXPECT_NEAR(inertia_of(bad)[5], 0, 1e-4);
+  const ImportedScene rod = inertial("ixx=\"1\" iyy=\"1\" izz=\"-8e-28\"");
+  EXPECT_THAT(rod.lost, IsEmpty());
+  EXPECT_THAT(rod.changed, Contains(HasSubstr("the inertia of a thin rod")));
+  EXPECT_NEAR(inertia_of(rod)[5], 0, 1e-4);
   const ImportedScene point =
       import_link("<inertial><mass value=\"4.18879020478639\"/></inertial>");
   EXPECT_THAT(point.lost, ElementsAre(HasSubstr("a mass without an inertia")));
@@ -277,8 +282,12 @@ TEST(RobotImport, MeshesAreReadWhereAGeomNeedsThem) {
   const testing::Folder folder;
   std::ofstream(folder / "flat.obj") << "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
   EXPECT_THAT(made(geom, folder / "flat.obj").lost, ElementsAre(HasSubstr("the flat surface of")));
-  std::ofstream(folder / "mesh.dae") << "<COLLADA/>";
-  EXPECT_THAT(made(geom, folder / "mesh.dae").lost, ElementsAre(HasSubstr("no OBJ, STL or PLY")));
+  std::ofstream(folder / "mesh.msh") << "1";
+  EXPECT_THAT(made(geom, folder / "mesh.msh").lost,
+              ElementsAre(HasSubstr("no OBJ, STL, PLY or DAE")));
+  const ImportedScene box = import_robot(kRobots + "dae_box.urdf", "scene.xml", {});
+  EXPECT_THAT(box.lost, IsEmpty());
+  EXPECT_THAT(box.text, HasSubstr("box.dae\""));
 }
 
 TEST(RobotImport, PackagesAreFoldersAboveTheRobot) {

@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: Apache-2.0
+// Imported mechanisms move as their closed forms say (tests/data/README.md).
+#include <gmock/gmock.h>
+
+#include <cmath>
+#include <fstream>
+#include <sstream>
+
+#include "engine/sense/readout.hpp"
+#include "engine/step/stepper.hpp"
+#include "io/robot/robot_import.hpp"
+#include "io/scene/scene_reader.hpp"
+
+namespace tangere {
+namespace {
+
+using ::testing::IsEmpty;
+const std::string kFolder = TANGERE_TEST_DATA "/robots/";
+
+/// Rows of a table of numbers below one line of names.
+struct Table {
+  std::vector<std::string> names;
+  std::vector<std::vector<double>> rows;
+};
+
+Table read_table(const std::string& path) {
+  Table out;
+  std::ifstream file(path);
+  for (std::string line; std::getline(file, line);) {
+    std::istringstream words(line);
+    std::vector<double> row;
+    for (std::string word; std::getline(words, word, ',');)
+      if (out.rows.empty() && line.starts_with("time"))
+        out.names.push_back(word);
+      else
+        row.push_back(std::stod(word));
+    if (!row.empty()) out.rows.push_back(row);
+  }
+  return out;
+}
+
+/// Largest difference of a body's place from the table, up to 0.5 s [m].
+double largest_error(Scene scene, const Table& truth) {
+  scene.integrator = Integrator::sdirk2;
+  scene.timestep = 2.5e-4;
+  const Model model(scene);
+  Batch batch(model, 1);
+  Stepper stepper(model);
+  const auto bodies = std::size_t(model.nb());
+  std::vector<double> pose(7 * bodies), twist(6 * bodies);
+  double worst = 0, time = 0;
+  std::size_t compared = 0;
+  for (const std::vector<double>& row : truth.rows) {
+    if (row[0] > 0.5) break;
+    for (; time < row[0] - 1e-9; time += scene.timestep) stepper.step(batch, {});
+    Readout(model).bodies(batch, 0, pose, twist);
+    for (std::size_t b = 0; b < bodies; ++b)
+      for (std::size_t c = 0; c < truth.names.size(); ++c)
+        if (truth.names[c] == model.body_names()[b] + ".x") {
+          for (std::size_t k = 0; k < 3; ++k)
+            worst = std::max(worst, std::abs(pose[7 * b + k] - row[c + k]));
+          ++compared;
+        }
+  }
+  EXPECT_GT(compared, 10U);
+  return worst;
+}
+
+/// Moments that no solid has, and a point of mass on a fixed joint.
+TEST(RobotMotion, OddInertiasMoveAsTheyAreWritten) {
+  const ImportedScene made = import_robot(kFolder + "odd_inertia.urdf", "scene.xml", {});
+  EXPECT_THAT(made.lost, IsEmpty());
+  EXPECT_LT(largest_error(parse_scene(made.text, "scene.xml").scene,
+                          read_table(kFolder + "odd_inertia.csv")),
+            5e-5);
+}
+
+}  // namespace
+}  // namespace tangere
