@@ -54,10 +54,11 @@ RobotPlace find_place(const Robot& robot, const std::string& name, const std::st
                                robot.sites.empty() ? "" : " or site", suggestion(name, names)));
 }
 
-std::string RobotNames::free_name(const std::string& wanted) {
-  if (names_.insert(wanted).second) return wanted;
+std::string RobotNames::free_name(const std::string& requested) {
+  if (names_.insert(requested).second) return requested;
   for (int k = 2;; ++k)
-    if (std::string name = fmt::format("{}_{}", wanted, k); names_.insert(name).second) return name;
+    if (std::string name = fmt::format("{}_{}", requested, k); names_.insert(name).second)
+      return name;
 }
 
 int add_link(Robot& robot, RobotNames& names, const std::string& name, int parent,
@@ -147,9 +148,10 @@ std::optional<RobotPiece> inertial_piece(Robot& robot, double mass, std::array<d
     else
       robot.changed.add(source, origin + ": the inertia of a thin rod, raised by 1e-6");
   } else if (!is_solid_inertia(inertia)) {
-    robot.changed.add(source, origin +
-                                  ": no solid has this inertia (a principal moment is above the sum "
-                                  "of the others); it is taken as it is");
+    robot.changed.add(source,
+                      origin +
+                          ": no solid has this inertia (a principal moment is above the sum "
+                          "of the others); it is taken as it is");
   }
   RobotPiece piece;
   piece.shape = AbstractShape{mass, inertia, {}};
