@@ -309,7 +309,7 @@ void Adjoint::reverse_step(const Batch& batch, int block, const BlockTape& tape,
                            std::span<const double> controls) {
   impl_->restore(batch, block, tape, step);
   const std::size_t nu = std::size_t(batch.model().nu());
-  const std::span<const double> of_block = controls.subspan(std::size_t(block * kBlock) * nu);
+  const std::span<const double> block_controls = controls.subspan(std::size_t(block * kBlock) * nu);
   for (int first = 0; first < kBlock; first += kGroup) {
     GroupStepContext g{tape, step, first};
     for (int l = 0; l < kGroup; ++l) {
@@ -324,9 +324,9 @@ void Adjoint::reverse_step(const Batch& batch, int block, const BlockTape& tape,
     if ((g.live & (g.live - 1)) == 0) {
       g.first += __builtin_ctz(g.live);
       g.live = 1;
-      impl_->reverse<1>(g, of_block);
+      impl_->reverse<1>(g, block_controls);
     } else {
-      impl_->reverse<kGroup>(g, of_block);
+      impl_->reverse<kGroup>(g, block_controls);
     }
   }
 }

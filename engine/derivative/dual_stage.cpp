@@ -543,30 +543,32 @@ void DualStage::residual() {
   i.put_ground_anchors();
   kernels::residual<false>(i.view, a);
   if (!i.heavier || i.frozen) return;
-  std::vector<D> of_mass(g.size());
-  i.weigh(a, of_mass);
-  for (std::size_t k = 0; k < g.size(); ++k) g[k].epsilon += of_mass[k].value;
+  std::vector<D> mass_product(g.size());
+  i.weigh(a, mass_product);
+  for (std::size_t k = 0; k < g.size(); ++k) g[k].epsilon += mass_product[k].value;
 }
 
 void DualStage::field(int sensor, const double* column, std::span<const double> numbers,
                       std::span<const double> points, std::span<double> field,
                       std::span<double> field_dot) {
   Impl& i = *impl_;
-  const CompiledSensor& felt = i.m.sensors[std::size_t(sensor)];
+  const CompiledSensor& compiled_sensor = i.m.sensors[std::size_t(sensor)];
   kernels::kinematics(i.view, i.arguments(*this));
   auto number = std::size_t(i.m.view.rows.sensor(sensor));
-  const Coefficients<D> coefficients = transformed(felt.parameters, [&](const Parameter& p) {
-    const double tangent = numbers.empty() ? 0.0 : numbers[number];
-    ++number;
-    return D(p.row < 0 ? p.value : column[p.row * kBlock], tangent);
-  });
-  if (felt.elastic) set_points(sensor, points);
+  const Coefficients<D> coefficients =
+      transformed(compiled_sensor.parameters, [&](const Parameter& p) {
+        const double tangent = numbers.empty() ? 0.0 : numbers[number];
+        ++number;
+        return D(p.row < 0 ? p.value : column[p.row * kBlock], tangent);
+      });
+  if (compiled_sensor.elastic) set_points(sensor, points);
   const auto springs = [&](const Coefficients<D>& law, bool elastic, std::span<double> value,
                            std::span<double> change) {
     if (elastic) return elastic_field(sensor, law, value, change);
     read_dual_field(i.m, sensor, i.links, law, column, numbers, points, value, change);
   };
-  if (!felt.layer) return springs(coefficients, felt.elastic, field, field_dot);
+  if (!compiled_sensor.layer)
+    return springs(coefficients, compiled_sensor.elastic, field, field_dot);
   if (!points.empty())
     throw InputError("derivatives by points of a sensor with a layer; expected no <layer>");
   read_dual_layer(i.m, sensor, i.links, coefficients, column, numbers, springs, field, field_dot);
@@ -577,7 +579,7 @@ void DualStage::field(int sensor, const double* column, std::span<const double> 
 void DualStage::elastic_field(int sensor, const Coefficients<D>& law, std::span<double> field,
                               std::span<double> field_dot) {
   Impl& i = *impl_;
-  const CompiledSensor& felt = i.m.sensors[std::size_t(sensor)];
+  const CompiledSensor& compiled_sensor = i.m.sensors[std::size_t(sensor)];
   i.sensor_laws[std::size_t(sensor)] = law;
   std::fill(field.begin(), field.end(), 0.0);
   std::fill(field_dot.begin(), field_dot.end(), 0.0);
@@ -586,8 +588,8 @@ void DualStage::elastic_field(int sensor, const Coefficients<D>& law, std::span<
     if (of.sensor != sensor) continue;
     i.meet_felt(of, poses, s_start, [&](const auto&, const auto&, int k, const auto& p) {
       const D f[3] = {p.force.x, p.force.y, p.force.z};
-      const double* axes = &felt.point_axes[9 * std::size_t(k)];
-      const auto to = 3 * std::size_t(felt.in_field[std::size_t(k)]);
+      const double* axes = &compiled_sensor.point_axes[9 * std::size_t(k)];
+      const auto to = 3 * std::size_t(compiled_sensor.in_field[std::size_t(k)]);
       for (std::size_t c = 0; c < 3; ++c)
         for (std::size_t e = 0; e < 3; ++e) {
           if (!field.empty()) field[to + c] += axes[3 * c + e] * f[e].value;

@@ -270,7 +270,7 @@ struct PairContactDescription {
   /// first.
   bool second_half = false;
 
-  [[nodiscard]] bool by_area() const { return !areas.empty(); }
+  [[nodiscard]] bool per_area() const { return !areas.empty(); }
   /// The first part of the contact's name; the second is primitive_body.
   [[nodiscard]] std::string first_name() const {
     return sensor.empty() ? general_body : "tactile " + sensor;

@@ -183,8 +183,8 @@ std::array<double, 2> shares(const Scene& scene, const SurfaceContactDescription
   const bool first = one != nullptr && has_surface(*one),
              second = two != nullptr && has_surface(*two);
   if (!first || !second) return {first ? 1.0 : 0.0, second ? 1.0 : 0.0};
-  const auto alone = [](bool by_first) {
-    return std::array{by_first ? 1.0 : 0.0, by_first ? 0.0 : 1.0};
+  const auto alone = [](bool first_only) {
+    return std::array{first_only ? 1.0 : 0.0, first_only ? 0.0 : 1.0};
   };
   const auto is_fine = [](const SurfacePitch& p) { return p.across <= kFine * p.wanted; };
   const bool fine1 = is_fine(fitting_pitch(scene, d, true)),
@@ -233,7 +233,7 @@ std::string thin_warning(const Scene& scene, const SurfaceContactDescription& d)
 std::string contact_fault(const Scene& scene, const SurfaceContactDescription& d) {
   if (d.body1 == d.body2) return "body '" + d.body1 + "' against itself; expected two bodies";
   for (const PairContactDescription& c : scene.pair_contacts)
-    if (c.by_area() &&
+    if (c.per_area() &&
         std::minmax(c.general_body, c.primitive_body) == std::minmax(d.body1, d.body2))
       return fmt::format("'{}' and '{}' touch already (line {}); expected one contact of them",
                          d.body1, d.body2, c.source.line);

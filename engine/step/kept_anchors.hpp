@@ -81,15 +81,15 @@ inline void set_anchors(const kernels::KernelTable& table, const kernels::ShearS
 /// Appends the anchors after a step that ends at `touch`, from those before it.
 inline void advance_anchors(const CompiledModel& m, const kernels::KernelTable& table,
                             const kernels::ShearSpringTouch& touch,
-                            std::span<const ShearEntry> before, TouchingSensorPoints& felt,
+                            std::span<const ShearEntry> before, TouchingSensorPoints& sensor_points,
                             ShearState& after) {
   const kernels::ShearSpringContact& of = *touch.of;
   const kernels::ShearSpringPoints points =
-      felt.find(m.sensors[std::size_t(of.sensor)], table, touch);
+      sensor_points.find(m.sensors[std::size_t(of.sensor)], table, touch);
   if (points.count == 0) return;
   const int stride = points.stride;
-  set_anchors(table, touch, before, felt.index(), points, felt.scratch());
-  double* const s = felt.scratch();
+  set_anchors(table, touch, before, sensor_points.index(), points, sensor_points.scratch());
+  double* const s = sensor_points.scratch();
   table.advance(touch, points, s, nullptr);
   for (int c = 0; c < 3; ++c)
     std::copy_n(s + c * stride, points.count, points.anchors + (3 + c) * stride);
@@ -98,7 +98,7 @@ inline void advance_anchors(const CompiledModel& m, const kernels::KernelTable& 
     for (int k = 0; k < points.count; ++k) {
       if (!(s[3 * stride + k] > 0)) continue;
       const double* anchor = points.anchors + 3 * part * stride + k;
-      after.push_back({of.first + part * of.contact.n_points + felt.index()[k],
+      after.push_back({of.first + part * of.contact.n_points + sensor_points.index()[k],
                        {anchor[0], anchor[stride], anchor[2 * stride]}});
     }
 }

@@ -77,10 +77,10 @@ struct Search {
   StageFactors<L>& factors;
   NewtonReport& report;
   LaneBits searching;
-  LaneBits on_trial = 0;   ///< lanes whose x is a trial along delta
-  LaneBits waiting = 0;    ///< lanes whose x is accepted and that wait for a Jacobian
-  LaneBits spared = 0;     ///< lanes that ended without the last evaluation
-  LaneBits by_secant = 0;  ///< lanes whose factor takes friction by its secant
+  LaneBits on_trial = 0;      ///< lanes whose x is a trial along delta
+  LaneBits waiting = 0;       ///< lanes whose x is accepted and that wait for a Jacobian
+  LaneBits spared = 0;        ///< lanes that ended without the last evaluation
+  LaneBits secant_lanes = 0;  ///< lanes whose factor takes friction by its secant
   std::array<double, L> alpha{}, delta_norm{};
   std::array<double, L> last{};    ///< scaled residual of the last accepted point
   std::array<double, L> lowest{};  ///< lowest scaled residual of all accepted points
@@ -281,7 +281,7 @@ struct Search {
       if (!has(accepted, l)) continue;
       factors.lanes |= 1U << l;
       factors.any |= 1U << l;
-      by_secant = secants[l] > 0 ? by_secant | (1U << l) : by_secant & ~(1U << l);
+      secant_lanes = secants[l] > 0 ? secant_lanes | (1U << l) : secant_lanes & ~(1U << l);
       factors.pivoted &= ~(1U << l);
       if (w.sound[l] > 0) continue;
       factors.pivoted |= 1U << l;
@@ -333,7 +333,7 @@ LaneBits solve_stage(const CompiledModel& model, const kernels::KernelTable& tab
     s.searching = s.spared;
     s.locate(false);
   }
-  s.factors.lanes &= ~s.by_secant;
+  s.factors.lanes &= ~s.secant_lanes;
   for (int l = 0; l < L; ++l) w.stage.friction_tangent[l] = 1;
   LaneBits converged = 0;
   for (int l = 0; l < L; ++l)

@@ -139,10 +139,10 @@ void describe_gradients(const h5::Id& scene, const DatasetLayout& layout) {
   for (const GradientArray& array : layout.gradients) {
     const h5::Id group = h5::create_group(all, array.name);
     h5::write_attribute(group, "meaning", array.meaning);
-    h5::write_attribute(group, "rows", array.by_row ? kByRow : "one for the episode");
-    if (array.by_names.empty()) continue;
-    h5::write_attribute(group, "by_names", std::span<const std::string>(array.by_names));
-    h5::write_attribute(group, "by_units", std::span<const std::string>(array.by_units));
+    h5::write_attribute(group, "rows", array.per_row ? kByRow : "one for the episode");
+    if (array.wrt_names.empty()) continue;
+    h5::write_attribute(group, "by_names", std::span<const std::string>(array.wrt_names));
+    h5::write_attribute(group, "by_units", std::span<const std::string>(array.wrt_units));
   }
 }
 
@@ -156,13 +156,13 @@ void add_attributes(const h5::Id& object, const std::string& prefix,
 std::string line_of_difference(const std::string& there, const std::string& here) {
   std::istringstream a(there), b(here);
   for (int line = 1;; ++line) {
-    std::string of_a, of_b;
-    const bool more_a = static_cast<bool>(std::getline(a, of_a)),
-               more_b = static_cast<bool>(std::getline(b, of_b));
+    std::string line_a, line_b;
+    const bool more_a = static_cast<bool>(std::getline(a, line_a)),
+               more_b = static_cast<bool>(std::getline(b, line_b));
     if (!more_a && !more_b) return "they differ in how they end";
-    if (more_a == more_b && of_a == of_b) continue;
-    return fmt::format("line {} is '{}' there, '{}' here", line, of_a.substr(0, kLongText),
-                       of_b.substr(0, kLongText));
+    if (more_a == more_b && line_a == line_b) continue;
+    return fmt::format("line {} is '{}' there, '{}' here", line, line_a.substr(0, kLongText),
+                       line_b.substr(0, kLongText));
   }
 }
 

@@ -39,7 +39,7 @@ std::vector<std::string> differences(const std::vector<Setting>& there,
 /// How a file describes a derivative that each of its demos has.
 struct GradientSaid {
   std::string name, meaning;
-  bool by_row = false;  ///< a row for each action
+  bool per_row = false;  ///< a row for each action
 };
 /// Returns the descriptions by name; most files have none.
 std::vector<GradientSaid> gradients_said(const h5::Id& scene);

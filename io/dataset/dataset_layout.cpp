@@ -138,19 +138,19 @@ double DatasetLayout::episode_bytes() const {
     return static_cast<double>(
         std::accumulate(shape.begin(), shape.end(), std::uint64_t{1}, std::multiplies<>()));
   };
-  double numbers = 0, of_samples = 0;
+  double numbers = 0, sample_numbers = 0;
   for (const std::vector<std::uint64_t>& shape : observation_shapes()) numbers += size_of(shape);
   for (const DatasetSample& sample : samples())
-    of_samples += static_cast<double>(sample.rows) * size_of(sample.shape);
+    sample_numbers += static_cast<double>(sample.rows) * size_of(sample.shape);
   const double r = static_cast<double>(rows());
-  const double of_actions = static_cast<double>(action_names().size()) * sizeof(float);
+  const double action_bytes = static_cast<double>(action_names().size()) * sizeof(float);
   constexpr double kRewardAndDone = sizeof(float) + 1;
-  double of_gradients = 0;
+  double gradient_bytes = 0;
   for (const GradientArray& array : gradients)
-    of_gradients += sizeof(double) * static_cast<double>(array.width()) * (array.by_row ? r : 1);
+    gradient_bytes += sizeof(double) * static_cast<double>(array.width()) * (array.per_row ? r : 1);
   const auto width = static_cast<double>(single ? sizeof(float) : sizeof(double));
-  return ((r + 1) * numbers + of_samples) * width + r * (of_actions + kRewardAndDone) +
-         of_gradients;
+  return ((r + 1) * numbers + sample_numbers) * width + r * (action_bytes + kRewardAndDone) +
+         gradient_bytes;
 }
 
 std::int64_t DatasetLayout::episodes_per_shard() const {

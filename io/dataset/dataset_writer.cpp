@@ -136,7 +136,7 @@ struct DatasetWriter::Impl {
 
   /// Describes the first shard that does not belong to this data set; empty if there is none. Other
   /// processes may be about to replace it.
-  [[nodiscard]] std::string of_another_run() const {
+  [[nodiscard]] std::string foreign_shard() const {
     const std::vector<Setting> here = settings_of(layout);
     std::vector<std::string> files = folder.shards();
     for (const std::string& file : files) {
@@ -153,10 +153,10 @@ struct DatasetWriter::Impl {
 
   void check_space(double episodes) const {
     // The size of chunks is not known in advance, and neither is the length of a task's episode.
-    const double of_episode =
+    const double episode_bytes =
         has_chunks(layout) ? static_cast<double>(format.data_bytes(layout.task ? 1 : layout.rows()))
                            : layout.episode_bytes();
-    const double needed = of_episode * episodes, available = folder.free_bytes();
+    const double needed = episode_bytes * episodes, available = folder.free_bytes();
     if (needed > available)
       throw IoError(fmt::format("{}: needs at least {:.0f} bytes and the disk has {:.0f} free",
                                 output.folder, needed, available));
@@ -226,7 +226,7 @@ bool DatasetWriter::complete() {
     return false;
   }
   if (impl_->all_there()) {
-    impl_->obstacle = impl_->of_another_run();
+    impl_->obstacle = impl_->foreign_shard();
     if (impl_->obstacle.empty()) return true;
   }
   impl_->folder.let_go();

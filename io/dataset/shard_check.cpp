@@ -101,8 +101,8 @@ class ShardChecker {
       throw IoError(fmt::format("its episodes have {} steps and a row every {}; expected a row",
                                 steps, every));
     rows_ = steps / every;
-    of_task_ = !h5::read_text(scene_, "task").starts_with("none");
-    if (of_task_) policies_ = std::ssize(h5::read_texts(scene_, "policies"));
+    is_task_ = !h5::read_text(scene_, "task").starts_with("none");
+    if (is_task_) policies_ = std::ssize(h5::read_texts(scene_, "policies"));
     gradients_ = gradients_said(scene_);
     samples_ = samples_said(scene_, every, rows_);
   }
@@ -171,16 +171,16 @@ class ShardChecker {
 
   void add_demo(const h5::Id& demo, std::int64_t episode) {
     const std::int64_t rows = number(demo, "num_samples");
-    if (of_task_ ? rows < 1 || rows > rows_ : rows != rows_)
+    if (is_task_ ? rows < 1 || rows > rows_ : rows != rows_)
       return fail(fmt::format("demo_{} has {} rows, expected {}{}", episode, rows,
-                              of_task_ ? "1 to " : "", rows_));
-    if (const std::int64_t by = of_task_ ? number(demo, "policy") : 0;
-        of_task_ && (by < 0 || by >= policies_))
+                              is_task_ ? "1 to " : "", rows_));
+    if (const std::int64_t by = is_task_ ? number(demo, "policy") : 0;
+        is_task_ && (by < 0 || by >= policies_))
       fail(fmt::format("demo_{}: its policy is {}; expected 0 to {}, one of 'policies' in /scene",
                        episode, by, policies_ - 1));
     // These values need no checksum: without a task every reward is 0, and only the last row ends
     // the episode.
-    if (of_task_) {
+    if (is_task_) {
       add<float>(demo, "rewards", episode, names_.size() + 1, 0, rows);
     } else {
       check_list<float>(demo, "rewards", episode, rows, 0);
@@ -188,7 +188,7 @@ class ShardChecker {
     check_list<std::int8_t>(demo, "dones", episode, rows, 1);
     add<float>(demo, "actions", episode, 0, 0, rows);
     const h5::Id obs = h5::open_group(demo, "obs"), final_obs = h5::open_group(demo, "final_obs");
-    felt_.assign(touch_.empty() ? 0 : static_cast<std::size_t>(rows), 0);
+    touching_.assign(touch_.empty() ? 0 : static_cast<std::size_t>(rows), 0);
     for (std::size_t k = 0; k < names_.size(); ++k) {
       const bool touch = std::find(touch_.begin(), touch_.end(), names_[k]) != touch_.end();
       if (single_) {
@@ -218,7 +218,7 @@ class ShardChecker {
 
   void check_felt(const h5::Id& demo, std::int64_t episode) {
     const std::int64_t said = number(demo, "touching"),
-                       there = std::count(felt_.begin(), felt_.end(), 1);
+                       there = std::count(touching_.begin(), touching_.end(), 1);
     if (said != there)
       fail(fmt::format("demo_{}: 'touching' is {}; something is felt in {} of its rows", episode,
                        said, there));
@@ -242,7 +242,7 @@ class ShardChecker {
     if (dims.empty())
       return fail(fmt::format("demo_{}: {} is one number; expected a list", episode, said.name));
     add<double>(demo, said.name, episode, index, 0,
-                said.by_row ? rows : static_cast<std::int64_t>(dims[0]));
+                said.per_row ? rows : static_cast<std::int64_t>(dims[0]));
   }
 
   /// A list of zeros whose last number is `last`.
@@ -343,7 +343,7 @@ class ShardChecker {
       check_finite(buffer, full, first + row, width);
       for (std::size_t i = 0; touch && i < count[0]; ++i)
         if (any_number(std::span<const T>(buffer).subspan(i * width, width)))
-          felt_[static_cast<std::size_t>(row) + i] = 1;
+          touching_[static_cast<std::size_t>(row) + i] = 1;
       if (summed_)
         sum_.add(episode, index, first + row, static_cast<std::int64_t>(count[0]),
                  width * sizeof(T), buffer.data());
@@ -354,10 +354,10 @@ class ShardChecker {
   std::vector<std::string> problems_, not_finite_;
   h5::Id file_, scene_;
   std::vector<std::string> names_, touch_;  // of observations; of those that are touch
-  std::vector<char> felt_;                  // per row of the demo at hand
+  std::vector<char> touching_;              // per row of the demo at hand
   std::vector<GradientSaid> gradients_;
   std::vector<SampleSaid> samples_;
-  bool single_ = false, of_task_ = false;
+  bool single_ = false, is_task_ = false;
   std::int64_t rows_ = 0, end_ = 0, policies_ = 0;
   std::tuple<std::vector<float>, std::vector<double>> buffers_;
   ContentSum sum_;

@@ -82,8 +82,8 @@ void warn_of_dense_meshes(const Scene& scene, const SceneNode& root) {
 static void warn_of_second_contact(const Scene& scene, const SceneNode& root,
                                    const PairContactDescription& c) {
   const auto same_pair = [&](const PairContactDescription& other) {
-    return !other.by_area() && std::minmax(other.general_body, other.primitive_body) ==
-                                   std::minmax(c.general_body, c.primitive_body);
+    return !other.per_area() && std::minmax(other.general_body, other.primitive_body) ==
+                                    std::minmax(c.general_body, c.primitive_body);
   };
   const bool twice = std::ranges::any_of(scene.pair_contacts, same_pair) ||
                      (c.on_ground && std::ranges::any_of(scene.ground_contacts, [&](const auto& g) {
@@ -103,7 +103,7 @@ void warn_of_coarse_points(const Scene& scene, const SceneNode& root) {
         ->body.shape;
   };
   for (const PairContactDescription& c : scene.pair_contacts) {
-    if (c.by_area()) {
+    if (c.per_area()) {
       warn_of_second_contact(scene, root, c);
       continue;
     }

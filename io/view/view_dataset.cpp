@@ -99,11 +99,11 @@ class DatasetView {
     if (every < 1) throw IoError(fmt::format("{}: a row every {} steps", path_, every));
     const std::vector<SampleSaid> samples = samples_said(scene, every, steps / every);
     // The observations of a task have names of their own, which may be those of sensors.
-    const bool of_task = !value_of(dataset_.settings, "policy").empty();
+    const bool is_task = !value_of(dataset_.settings, "policy").empty();
     for (ViewSensor& sensor : scene_->sensors()) {
       std::string name;
       for (const std::string& reading : {sensor.name, sensor.name + ".ideal"})
-        if (!of_task && name.empty() && h5::has_link(obs, reading)) name = reading;
+        if (!is_task && name.empty() && h5::has_link(obs, reading)) name = reading;
       std::optional<SampleSaid> sampled;
       for (const SampleSaid& sample : samples)
         if (name.empty() && (sample.name == sensor.name || sample.name == sensor.name + ".ideal"))

@@ -154,10 +154,10 @@ class Sweep {
   [[nodiscard]] double tolerance_in_force(StepperOptions options) const {
     const Model& model = episodes_.start.model();
     options.sleep = 0;
-    options.differentiable = of_gradients();
+    options.differentiable = compares_gradients();
     return Stepper(model, options).tolerance();
   }
-  [[nodiscard]] bool of_gradients() const {
+  [[nodiscard]] bool compares_gradients() const {
     return options_.quantity == AccuracyQuantity::gradient;
   }
 
@@ -166,14 +166,14 @@ class Sweep {
   void give_tolerance(AccuracySetting& setting) const {
     const double step = episodes_.interval() / setting.parts;
     std::optional<double> tolerance = options_.tolerance;
-    if (!tolerance && !of_gradients() && setting.accuracy == 0)
+    if (!tolerance && !compares_gradients() && setting.accuracy == 0)
       tolerance = episodes_.start.model().following_tolerance(setting.integrator, step);
     setting.tolerance = tolerance_in_force({.integrator = setting.integrator,
                                             .timestep = step,
                                             .tolerance = tolerance,
                                             .accuracy = setting.accuracy});
     setting.follows =
-        !of_gradients() && !options_.tolerance && !episodes_.start.model().solver().tolerance;
+        !compares_gradients() && !options_.tolerance && !episodes_.start.model().solver().tolerance;
   }
 
   /// Plays a setting up to kPasses times; the least times count. Returns false when stopped.
@@ -210,8 +210,8 @@ class Sweep {
     const auto steps =
         static_cast<double>(std::max<std::int64_t>(1, outcome.counts.simulation_steps));
     point.evaluations = static_cast<double>(outcome.counts.newton_iterations) / steps;
-    point.split =
-        of_gradients() ? std::nan("") : static_cast<double>(outcome.counts.split_steps) / steps;
+    point.split = compares_gradients() ? std::nan("")
+                                       : static_cast<double>(outcome.counts.split_steps) / steps;
     point.rate = outcome.simulated_seconds / (outcome.step_seconds + outcome.read_seconds[p]);
     point.failed = static_cast<int>(outcome.failures.size());
     point.status = status_of(outcome, episodes_.start.environments());
@@ -281,15 +281,15 @@ class Sweep {
     for (std::size_t i = 0; i < report_.points.size(); ++i)
       if (suffices(report_.points[i])) sure = std::max(sure, report_.points[i].rate);
     // Of a setting's precisions the fastest that may do counts.
-    std::vector<std::pair<double, std::size_t>> by_rate;
+    std::vector<std::pair<double, std::size_t>> ranked;
     for (std::size_t i = 0; i < report_.points.size(); i += precisions()) {
       double fastest = 0;
       for (const AccuracyPoint& p : std::span(report_.points).subspan(i, precisions()))
         if (meets_target(p.error) && !meets_target(p.bound)) fastest = std::max(fastest, p.rate);
-      if (fastest > kWorthALook * sure) by_rate.emplace_back(fastest, i);
+      if (fastest > kWorthALook * sure) ranked.emplace_back(fastest, i);
     }
-    std::ranges::sort(by_rate, std::greater<>());
-    for (const auto& [rate, i] : by_rate) found.push_back(i);
+    std::ranges::sort(ranked, std::greater<>());
+    for (const auto& [rate, i] : ranked) found.push_back(i);
     if (found.size() > kMostLooks) found.resize(kMostLooks);
     return found;
   }
@@ -329,7 +329,7 @@ class Sweep {
     const Model& model = episodes_.start.model();
     const AccuracySetting setting = {model.integrator(), episodes_.every, tolerance_in_force({}),
                                      Stepper(model).accuracy(),
-                                     !of_gradients() && !model.solver().tolerance};
+                                     !compares_gradients() && !model.solver().tolerance};
     const auto swept = std::ranges::find(report_.points, setting, &AccuracyPoint::setting);
     if (swept != report_.points.end()) {
       report_.own = *swept;

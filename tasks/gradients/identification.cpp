@@ -414,15 +414,15 @@ FieldMisfit::FieldMisfit(const Model& model, const FieldSequence& recorded)
                       "of the scene",
                       reading.size(), numbers_of_fields(model)));
     std::vector<double>& squares = squares_.emplace_back();
-    const double* of_sensor = reading.data();
+    const double* sensor_field = reading.data();
     for (std::size_t s = 0; s < tiles_.size(); ++s) {
       for (const std::vector<TilePoint>& points : tiles_[s]) {
         double& sum = squares.emplace_back(0);
         for (const TilePoint& p : points)
           for (int c = 0; c < 3; ++c)
-            sum += 0.5 * of_sensor[3 * p.point + c] * of_sensor[3 * p.point + c];
+            sum += 0.5 * sensor_field[3 * p.point + c] * sensor_field[3 * p.point + c];
       }
-      of_sensor += 3 * model.sensors()[s].points;
+      sensor_field += 3 * model.sensors()[s].points;
     }
   }
 }
@@ -472,7 +472,7 @@ Identification identify(const Scene& scene, const RecordedRun& run, const FieldS
   if (!std::isfinite(value.misfit))
     throw InputError(scene.path + ": the rollout fails at the start of the fit");
   const Matrix J = problem.jacobian(x);
-  const Vector by_differences = J.transpose().lazyProduct(problem.residuals(x));
+  const Vector difference_gradient = J.transpose().lazyProduct(problem.residuals(x));
   Identification best;
   std::vector<FitEnds> fits;
   for (int k = 0; k < options.starts; ++k) {
@@ -499,7 +499,8 @@ Identification identify(const Scene& scene, const RecordedRun& run, const FieldS
   find_suspect(problem, best);
   if (!best.residual.is_noise())
     for (double& deviation : best.deviation) deviation *= std::sqrt(1 + best.residual.excess);
-  best.gradient_difference = (value.gradient - by_differences).norm() / by_differences.norm();
+  best.gradient_difference =
+      (value.gradient - difference_gradient).norm() / difference_gradient.norm();
   best.fits = std::move(fits);
   return best;
 }

@@ -37,10 +37,10 @@ class ReturnChecker : public GradientChecker {
     gradient.action.resize(numbers);
     gradient.u.resize(numbers);
     u_name_ = "actions";
-    by_u_ = std::move(gradient.u);
-    by_q_ = std::move(gradient.q);
-    by_v_ = std::move(gradient.v);
-    by_numbers_ = std::move(gradient.parameters);
+    grad_u_ = std::move(gradient.u);
+    grad_q_ = std::move(gradient.q);
+    grad_v_ = std::move(gradient.v);
+    grad_numbers_ = std::move(gradient.parameters);
     rollout_.emplace(task, o.stepper, Precision::f64);
     rollout_->start(o.seed, {&o.episode, 1});
     const Snapshot first = view_of(rollout_->batch(), rollout_->data(), 0).now();

@@ -42,10 +42,10 @@ void RunTrace::add(const Batch& batch) {
     for (std::size_t e = 0; e < row.size(); ++e) {
       readout.read(batch, static_cast<int>(e), frame);
       const std::span<const double> field = frame.values();
-      int felt = 0;
+      int loaded_points = 0;
       for (std::size_t i = 0; i + 2 < field.size(); i += 3)
-        felt += field[i] != 0 || field[i + 1] != 0 || field[i + 2] != 0 ? 1 : 0;
-      row[e].felt.push_back(felt);
+        loaded_points += field[i] != 0 || field[i + 1] != 0 || field[i + 2] != 0 ? 1 : 0;
+      row[e].loaded_points.push_back(loaded_points);
     }
   }
 }
@@ -75,10 +75,10 @@ void RunTrace::compare(std::size_t state, const Decisions& a, const Decisions& b
       return fmt::format("'{}' is {} in one run and {} in the other", model_.v_names()[i],
                          limit_text(a.contact.beyond[i]), limit_text(b.contact.beyond[i]));
     });
-  for (std::size_t s = 0; s < a.felt.size(); ++s)
-    say(a.felt[s] != b.felt[s], [&] {
+  for (std::size_t s = 0; s < a.loaded_points.size(); ++s)
+    say(a.loaded_points[s] != b.loaded_points[s], [&] {
       return fmt::format("{} points of sensor '{}' feel a force in one run and {} in the other",
-                         a.felt[s], model_.sensors()[s].name, b.felt[s]);
+                         a.loaded_points[s], model_.sensors()[s].name, b.loaded_points[s]);
     });
 }
 

@@ -28,7 +28,7 @@ class RunTrace {
  private:
   struct Decisions {
     ContactState contact;
-    std::vector<int> felt;  // (sensors) points with a force
+    std::vector<int> loaded_points;  // (sensors) points with a force
     StepStatus status = StepStatus::converged;
   };
   void compare(std::size_t state, const Decisions& a, const Decisions& b, std::vector<bool>& said,

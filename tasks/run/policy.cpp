@@ -81,15 +81,15 @@ std::vector<std::string> Policy::players() const {
 
 int Policy::player(std::uint64_t seed, std::int64_t episode) const {
   if (variation_.random_share == 0) return 0;
-  const bool by_chance =
+  const bool is_random =
       uniform({seed, episode, 0, Purpose::policy, kPlayer}) < variation_.random_share;
-  return by_chance ? 1 : 0;
+  return is_random ? 1 : 0;
 }
 
 void Policy::act(const TaskView& view, std::span<const double> observation,
                  std::span<double> action) const {
-  const bool by_chance = player(view.seed, view.episode) > 0;
-  switch (by_chance ? PolicyKind::random : kind_) {
+  const bool is_random = player(view.seed, view.episode) > 0;
+  switch (is_random ? PolicyKind::random : kind_) {
     case PolicyKind::random: draw(view, action); return;
     case PolicyKind::hold: std::fill(action.begin(), action.end(), 0.0); return;
     case PolicyKind::csv: {
