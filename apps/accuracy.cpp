@@ -76,11 +76,11 @@ int report_sweep(const AccuracySubject& subject, const Console& console, const M
                  const AccuracyReport& report, int signal, TextOutput& svg, TextOutput& csv) {
   console.print(pitch_table(report.pitches, model) + order_text(report, model) + "\n" +
                 advice_text(subject, report, model));
-  if (svg.wanted() && can_draw(report))
+  if (svg.requested() && can_draw(report))
     svg.write(accuracy_svg(subject, report), console);
-  else if (svg.wanted())
+  else if (svg.requested())
     console.note("no picture: no setting has both an error and a cost");
-  if (csv.wanted()) csv.write(accuracy_csv(subject, report), console);
+  if (csv.requested()) csv.write(accuracy_csv(subject, report), console);
   int code = exit_code(console, !report.resolved || report.advice < 0, report.reference.counts);
   if (report.stopped) code = signal == SIGINT ? kInterrupted : kTerminated;
   Json result = accuracy_json(subject, report, model);

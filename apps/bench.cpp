@@ -188,8 +188,8 @@ int measure(const BenchArguments& options, const Console& console, BenchSetting&
     console.print(found.text);
     more["own_error"] = found.json;
   }
-  if (svg.wanted()) svg.write(bench_svg(setting, runs), console);
-  if (csv.wanted()) csv.write(bench_csv(setting, entries), console);
+  if (svg.requested()) svg.write(bench_svg(setting, runs), console);
+  if (csv.requested()) csv.write(bench_csv(setting, entries), console);
   return report(options, console, setting, model, more, entries);
 }
 
@@ -270,8 +270,8 @@ int bench(const BenchArguments& options, const Console& console) {
   const ControlProgram controls(model, model.timestep(), seed);
   if (!model.scene().control && model.nu() > 0)
     console.note("the scene has no <control>: every control is 0");
-  const RolloutOutputs wanted = record_of(options.record, model).outputs;
-  if (wanted.fields && (wanted.bodies || wanted.end_effectors))
+  const RolloutOutputs requested = record_of(options.record, model).outputs;
+  if (requested.fields && (requested.bodies || requested.end_effectors))
     console.note("bench reads sensors alone: bodies and variables are left out");
   BenchSetting setting = setting_of(options, model, controls);
   const std::vector<int> threads = thread_counts(options);

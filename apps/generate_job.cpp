@@ -95,7 +95,7 @@ const char* size_compared(const DatasetLayout& layout) {
 
 }  // namespace
 
-GradientKind gradients_wanted(const GenerateOptions& options, bool is_task) {
+GradientKind requested_gradients(const GenerateOptions& options, bool is_task) {
   const GradientKind kind = gradient_kind_named(options.gradients);
   if (options.tape_memory && kind != GradientKind::returns)
     throw InputError(fmt::format("--tape-memory with --gradients {}; expected --gradients return",

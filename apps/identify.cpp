@@ -165,7 +165,7 @@ int identify_numbers(const IdentifyArguments& a, const Console& console) {
                   a.recording.empty() ? "simulated" : a.recording, report.recorded.readings.size(),
                   run.every, model.timestep(), report.peak));
   print(console, report);
-  if (picture.wanted()) {
+  if (picture.requested()) {
     const Scene found = with_numbers(scene, a.numbers, report.fit.values());
     picture.write(draw(report, simulate_fields(found, run), model.timestep()), console);
   }

@@ -150,29 +150,29 @@ void PolicyProgram::introduce(std::uint64_t seed, const std::string& version) {
   check_policy_name(who(), name_);
 }
 
-void PolicyProgram::answer(const PolicyQuestion& question, std::span<double> actions) {
+void PolicyProgram::answer(const PolicyInputs& inputs, std::span<double> actions) {
   const std::lock_guard lock(mutex_);
   if (failure_) std::rethrow_exception(failure_);  // other threads do not wait for it again
   try {
-    ask(question, actions);
+    exchange(inputs, actions);
   } catch (...) {
     failure_ = std::current_exception();
     throw;
   }
 }
 
-void PolicyProgram::ask(const PolicyQuestion& question, std::span<double> actions) {
+void PolicyProgram::exchange(const PolicyInputs& inputs, std::span<double> actions) {
   if (stopping()) stopped_ = true;
   if (stopped_) return std::fill(actions.begin(), actions.end(), 0.0);
   // Without its shell, for example, what it has started may still answer.
   if (siginfo_t how; has_ended(how)) fail_ended();
-  const auto n = static_cast<std::int64_t>(question.episodes.size());
+  const auto n = static_cast<std::int64_t>(inputs.episodes.size());
   char* at = put(bytes_.data(), std::span(&n, 1));
-  at = put(at, question.episodes);
-  at = put(at, question.actions);
-  for (std::size_t i = 0; i < question.observations.size(); ++i) {
+  at = put(at, inputs.episodes);
+  at = put(at, inputs.actions);
+  for (std::size_t i = 0; i < inputs.observations.size(); ++i) {
     // The number that a Python environment shows, to the bit.
-    const auto shown = static_cast<float>(question.observations[i] * factors_[i % factors_.size()]);
+    const auto shown = static_cast<float>(inputs.observations[i] * factors_[i % factors_.size()]);
     std::memcpy(at, &shown, sizeof shown);
     at += sizeof shown;
   }
@@ -194,7 +194,7 @@ void PolicyProgram::ask(const PolicyQuestion& question, std::span<double> action
     if (!std::isfinite(actions[i]))
       throw InputError(fmt::format(
           "{} answers {} as number {} of action {} of episode {}; expected a finite number", who(),
-          actions[i], i % width, question.actions[e], question.episodes[e]));
+          actions[i], i % width, inputs.actions[e], inputs.episodes[e]));
   }
 }
 

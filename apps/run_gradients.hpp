@@ -19,12 +19,12 @@
 namespace tangere::apps {
 
 struct GradientArguments {
-  std::string loss;     ///< "": none are wanted
+  std::string loss;     ///< "": none are requested
   bool points = false;  ///< also by place and coefficients of tactile points
   std::optional<double> tape_memory;
 
   void add(CLI::App& app);
-  [[nodiscard]] bool wanted() const { return !loss.empty(); }
+  [[nodiscard]] bool requested() const { return !loss.empty(); }
   /// Throws InputError for companions without --gradients.
   void check() const;
 };
@@ -35,11 +35,11 @@ class RunGradients {
   /// if memory does not suffice.
   RunGradients(const GradientArguments& arguments, const Batch& batch, const Stepper& stepper,
                const RolloutOptions& rollout);
-  [[nodiscard]] bool wanted() const { return start_.has_value(); }
+  [[nodiscard]] bool requested() const { return start_.has_value(); }
   /// Returns false if a signal stopped it.
   bool write(const ControlProgram& controls, const RolloutOptions& rollout,
              const StopSignals& signals, TrajectoryFile& output);
-  /// What was written; null if nothing is wanted.
+  /// What was written; null if nothing is requested.
   [[nodiscard]] Json json() const;
 
  private:

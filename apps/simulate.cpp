@@ -282,7 +282,7 @@ int write_run(const SimulateArguments& options, const Console& console, const Ba
 
 int simulate_task(const SimulateArguments& options, const Console& console, const ProgramInfo& info,
                   const Task& task, Precision precision) {
-  refuse_with_task(task, {{"--gradients", options.gradients.wanted()},
+  refuse_with_task(task, {{"--gradients", options.gradients.requested()},
                           {"--steps", options.steps.has_value()},
                           {"--state-from", !options.state_from.empty()},
                           {"--timestep", options.solver.timestep.has_value()},
@@ -337,7 +337,7 @@ int simulate(const SimulateArguments& options, const Console& console, const Pro
   const Model model(
       read_scene_for(options.scene, options.allow_unknown, console, options.solver.requested()));
   warn_about_geometry(console, model);
-  solver.differentiable = options.gradients.wanted();
+  solver.differentiable = options.gradients.requested();
   Stepper stepper(model, solver);
   warn_about_steps(console, model, stepper);
   const Start start(options, stepper);
@@ -367,7 +367,7 @@ int simulate(const SimulateArguments& options, const Console& console, const Pro
       [&](const ProgressCallback& progress) {
         RolloutSummary summary =
             run_rollout(batch, steppers, controls, rollout, output, progress, signals.token());
-        if (gradients.wanted() && !summary.stopped)
+        if (gradients.requested() && !summary.stopped)
           summary.stopped = !gradients.write(controls, rollout, signals, output);
         return summary;
       },

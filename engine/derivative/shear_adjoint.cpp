@@ -190,7 +190,7 @@ void ShearAdjoint<L>::pull_back_reading(const CompiledModel& m, const kernels::K
                 *const anchor_bar = s_out + rows, *const anchor_out = anchor_bar + 2 * rows;
   std::fill_n(none, 6 * rows, 0.0);
   const std::vector<double>& bar = loss.kept[std::size_t(lane)];
-  look_up_anchors(
+  find_anchors(
       reading.after, of, sensor_points.index(), points,
       [&](std::size_t entry, int c) { return bar[3 * entry + std::size_t(c)]; }, anchor_bar);
   kernels::ShearCotangentSums sums{};

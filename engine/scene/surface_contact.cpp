@@ -28,7 +28,7 @@ constexpr double kAcrossThin = 2.5;         // pitches of a round body across th
 constexpr double kAcrossPlace = 0.7;        // pitch in half widths of the place of contact
 constexpr double kAcrossFace = 1.4;         // the same of faces on which a rod lies
 constexpr double kAlongRod = 16;            // rings of a rod that lies on a face
-constexpr double kFine = 1.5, kUneven = 4;  // pitches over the wanted one: near enough, uneven
+constexpr double kFine = 1.5, kUneven = 4;  // pitches over the target one: near enough, uneven
 constexpr double kThin = 4;                 // least thickness, in depths under the lighter weight
 constexpr double kUsualGravity = 9.81;      // where the scene has none [m/s²]
 
@@ -168,7 +168,7 @@ SurfacePitch fitting_pitch(const Scene& scene, const SurfaceContactDescription& 
       pitch.bounded = true;
     }
   }
-  pitch.coarse = pitch.across > kUneven * pitch.wanted;
+  pitch.coarse = pitch.across > kUneven * pitch.target;
   return pitch;
 }
 
@@ -186,7 +186,7 @@ std::array<double, 2> shares(const Scene& scene, const SurfaceContactDescription
   const auto alone = [](bool first_only) {
     return std::array{first_only ? 1.0 : 0.0, first_only ? 0.0 : 1.0};
   };
-  const auto is_fine = [](const SurfacePitch& p) { return p.across <= kFine * p.wanted; };
+  const auto is_fine = [](const SurfacePitch& p) { return p.across <= kFine * p.target; };
   const bool fine1 = is_fine(fitting_pitch(scene, d, true)),
              fine2 = is_fine(fitting_pitch(scene, d, false));
   if (fine1 != fine2) return alone(fine1);
@@ -292,7 +292,7 @@ std::vector<std::string> add_surface_contact(Scene& scene, const SurfaceContactD
         "weight its contact with '{}' is uneven unless they are {:.2g} m apart; expected a smaller "
         "kn, or a pitch of {:.2g}",
         d.source.prefix(), scene.pair_contacts.back().areas.size(), first ? d.body1 : d.body2,
-        pitch.across, first ? d.body2 : d.body1, pitch.wanted, pitch.wanted));
+        pitch.across, first ? d.body2 : d.body1, pitch.target, pitch.target));
   }
   if (std::string thin = thin_warning(scene, d); !thin.empty()) warnings.push_back(std::move(thin));
   return warnings;

@@ -37,9 +37,9 @@ inline PointRange a_range(const kernels::ShearSpringContact& of) {
 
 /// Writes two sets of three numbers of points, (6, stride): those of the entries of b, then of a.
 template <class Number>
-void look_up_anchors(std::span<const ShearEntry> memory, const kernels::ShearSpringContact& of,
-                     const int* index, const kernels::ShearSpringPoints& points,
-                     const Number& number, double* out) {
+void find_anchors(std::span<const ShearEntry> memory, const kernels::ShearSpringContact& of,
+                  const int* index, const kernels::ShearSpringPoints& points, const Number& number,
+                  double* out) {
   std::size_t next = 0;
   shear_of_points(memory, b_range(of), index, points.count, points.stride, number, out, next);
   shear_of_points(memory, a_range(of), index, points.count, points.stride, number,
@@ -64,7 +64,7 @@ inline void set_anchors(const kernels::KernelTable& table, const kernels::ShearS
             end = (points.count + kernels::kGroup - 1) / kernels::kGroup * kernels::kGroup;
   for (int c = 3; c < 6; ++c) std::fill_n(points.anchors + c * stride, end, 0.0);
   table.recall(touch, points);
-  look_up_anchors(
+  find_anchors(
       memory, *touch.of, index, points,
       [&](std::size_t entry, int c) { return memory[entry].s[c]; }, kept);
   double* const is_kept = kept + 6 * stride;

@@ -46,7 +46,7 @@ void describe_task(const h5::Id& scene, const DatasetLayout& layout) {
   h5::write_scalar<double>(scene, "action_high", task.action.high);
   std::vector<std::string> units, meanings;
   for (const EpisodeChannel& channel : layout.channels())
-    if (channel.wanted) units.push_back(channel.unit), meanings.push_back(channel.meaning);
+    if (channel.requested) units.push_back(channel.unit), meanings.push_back(channel.meaning);
   h5::write_attribute(scene, "observation_units", std::span<const std::string>(units));
   h5::write_attribute(scene, "observation_meanings", std::span<const std::string>(meanings));
 }

@@ -93,7 +93,7 @@ std::vector<std::string> DatasetLayout::action_names() const {
 std::vector<std::string> DatasetLayout::observation_names() const {
   std::vector<std::string> names;
   for (const EpisodeChannel& channel : channels())
-    if (channel.wanted && !channel.times.given()) names.push_back(channel.name);
+    if (channel.requested && !channel.times.given()) names.push_back(channel.name);
   return names;
 }
 
@@ -101,7 +101,7 @@ std::vector<std::size_t> DatasetLayout::recorded() const {
   const std::vector<EpisodeChannel> all = channels();
   std::vector<std::size_t> places;
   for (std::size_t k = 0; k < all.size(); ++k)
-    if (all[k].wanted && !all[k].times.given()) places.push_back(k);
+    if (all[k].requested && !all[k].times.given()) places.push_back(k);
   return places;
 }
 
@@ -109,7 +109,7 @@ std::vector<DatasetSample> DatasetLayout::samples() const {
   const std::vector<EpisodeChannel> all = channels();
   std::vector<DatasetSample> list;
   for (std::size_t k = 0; k < all.size(); ++k)
-    if (all[k].wanted && all[k].times.given())
+    if (all[k].requested && all[k].times.given())
       list.push_back(
           {all[k].name, all[k].shape, k, all[k].times, all[k].times.before(rows() + 1, rows())});
   return list;
@@ -119,7 +119,7 @@ std::vector<std::size_t> DatasetLayout::touch() const {
   std::vector<std::size_t> places;
   std::size_t stored = 0;
   for (const EpisodeChannel& channel : channels()) {
-    if (!channel.wanted || channel.times.given()) continue;
+    if (!channel.requested || channel.times.given()) continue;
     if (channel.touch) places.push_back(stored);
     ++stored;
   }
@@ -129,7 +129,7 @@ std::vector<std::size_t> DatasetLayout::touch() const {
 std::vector<std::vector<std::uint64_t>> DatasetLayout::observation_shapes() const {
   std::vector<std::vector<std::uint64_t>> shapes;
   for (const EpisodeChannel& channel : channels())
-    if (channel.wanted && !channel.times.given()) shapes.push_back(channel.shape);
+    if (channel.requested && !channel.times.given()) shapes.push_back(channel.shape);
   return shapes;
 }
 

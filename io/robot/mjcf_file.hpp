@@ -77,7 +77,7 @@ class MjcfFile {
   bool align_free = false;  ///< free joints are aligned with the inertia of their bodies
   std::array<int, 2> inertia_groups{0, 5};
   std::vector<int> disabled_groups;   ///< of actuators
-  std::vector<double> keyframe_ctrl;  ///< of the wanted keyframe, by actuator; may be short
+  std::vector<double> keyframe_ctrl;  ///< of the requested keyframe, by actuator; may be short
   std::map<std::string, MjcfMesh> meshes;
   std::map<std::string, std::array<double, 4>> materials;
   std::map<std::string, MjcfJoint> joints;
@@ -113,10 +113,10 @@ class MjcfFile {
 void read_mjcf_bodies(MjcfFile& file, const RobotNode& world);
 /// Reads an <actuator> section.
 void read_mjcf_actuators(MjcfFile& file, const RobotNode& section);
-/// Returns the key `wanted` of the <keyframe> sections, by its name or, without one, its number
+/// Returns the key `requested` of the <keyframe> sections, by its name or, without one, its number
 /// from 0; none for "". Lists the others, and keeps its controls for the actuators.
 std::optional<RobotNode> find_mjcf_keyframe(MjcfFile& file, const std::vector<RobotNode>& sections,
-                                            const std::string& wanted);
+                                            const std::string& requested);
 /// Gives the scene the start of a key, after all bodies and actuators.
 void read_mjcf_keyframe(MjcfFile& file, const RobotNode& key);
 

@@ -137,7 +137,7 @@ class Keyframe {
 }  // namespace
 
 std::optional<RobotNode> find_mjcf_keyframe(MjcfFile& file, const std::vector<RobotNode>& sections,
-                                            const std::string& wanted) {
+                                            const std::string& requested) {
   std::vector<std::string> names;
   std::vector<RobotNode> keys;
   for (const RobotNode& section : sections)
@@ -153,14 +153,14 @@ std::optional<RobotNode> find_mjcf_keyframe(MjcfFile& file, const std::vector<Ro
       names.push_back(key.text("name", fmt::format("{}", keys.size())));
       keys.push_back(key);
     }
-  const auto at = std::find(names.begin(), names.end(), wanted);
+  const auto at = std::find(names.begin(), names.end(), requested);
   for (const RobotNode& key : keys)
-    if (wanted.empty() || at == names.end() || &key != &keys[std::size_t(at - names.begin())])
+    if (requested.empty() || at == names.end() || &key != &keys[std::size_t(at - names.begin())])
       key.idle(std::string("<key>: ") + kUse);
-  if (wanted.empty()) return std::nullopt;
+  if (requested.empty()) return std::nullopt;
   if (at == names.end())
-    throw InputError(fmt::format("--keyframe {}: {} has no keyframe of this name{}", wanted,
-                                 file.robot.scene.path, suggestion(wanted, names)));
+    throw InputError(fmt::format("--keyframe {}: {} has no keyframe of this name{}", requested,
+                                 file.robot.scene.path, suggestion(requested, names)));
   const RobotNode& key = keys[std::size_t(at - names.begin())];
   if (key.has("ctrl")) file.keyframe_ctrl = key.numbers("ctrl");
   return key;

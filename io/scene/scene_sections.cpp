@@ -23,15 +23,15 @@ constexpr std::size_t kPublished = 3;        // among the words of `law`
 template <class Name>
 int find_named(const Scene& scene, const SceneNode& node, const char* attribute, const char* kind,
                Name&& name_of) {
-  const std::string wanted = node.text(attribute);
+  const std::string requested = node.text(attribute);
   std::vector<std::string> names;
   if (attribute == std::string_view("body2")) names.emplace_back(kGroundName);
   for (std::size_t i = 0; i < scene.links.size(); ++i) {
     names.push_back(name_of(scene.links[i]));
-    if (names.back() == wanted) return static_cast<int>(i);
+    if (names.back() == requested) return static_cast<int>(i);
   }
-  node.fail(fmt::format("{}=\"{}\": no {} has this name{}", attribute, wanted, kind,
-                        suggestion(wanted, names)));
+  node.fail(fmt::format("{}=\"{}\": no {} has this name{}", attribute, requested, kind,
+                        suggestion(requested, names)));
 }
 
 /// Reads law, ramp and coefficients of a contact of either kind.

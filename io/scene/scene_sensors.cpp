@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Reads sensors of a scene file, by layout, and which of their readings are wanted.
+// Reads sensors of a scene file, by layout, and which of their readings are requested.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -256,8 +256,8 @@ void read_sensors(Scene& scene, const SceneNode& section) {
     d.law = static_cast<ContactLaw>(node.word("law"));
     node.read(d.coefficients);
     node.read(d);
-    d.remembers_readings = node.word("memory") == 1;
-    if (d.remembers_readings && d.every == 0)
+    d.shear_at_readings = node.word("memory") == 1;
+    if (d.shear_at_readings && d.every == 0)
       node.fail(
           "memory=\"read\" without every; expected both: memory advances every so many steps");
     if (node.has("pressure_sign")) {

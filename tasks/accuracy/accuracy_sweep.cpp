@@ -29,15 +29,15 @@ constexpr int kPasses = 3;
 constexpr double kEnoughSeconds = 0.3;  // of CPU time, after which a pass is not repeated
 constexpr double kBlur = 10, kFineEnough = 40;
 /// Confirmation runs: least speedup over the best confirmed setting, and largest count.
-constexpr double kWorthALook = 1.1;
-constexpr int kMostLooks = 3;
+constexpr double kWorthRepeating = 1.1;
+constexpr int kMostRepeats = 3;
 
-/// Share of the errors that are 0.3 to 3 times `wanted`. NaN entries do not count.
-double share_near(double wanted, const std::vector<double>& errors) {
-  if (!(wanted > 0)) return std::nan("");
+/// Share of the errors that are 0.3 to 3 times `requested`. NaN entries do not count.
+double share_near(double requested, const std::vector<double>& errors) {
+  if (!(requested > 0)) return std::nan("");
   const auto known = std::ranges::count_if(errors, [](double x) { return !std::isnan(x); });
-  const auto near =
-      std::ranges::count_if(errors, [&](double x) { return x >= 0.3 * wanted && x <= 3 * wanted; });
+  const auto near = std::ranges::count_if(
+      errors, [&](double x) { return x >= 0.3 * requested && x <= 3 * requested; });
   return static_cast<double>(near) / static_cast<double>(known);
 }
 
@@ -286,11 +286,11 @@ class Sweep {
       double fastest = 0;
       for (const AccuracyPoint& p : std::span(report_.points).subspan(i, precisions()))
         if (meets_target(p.error) && !meets_target(p.bound)) fastest = std::max(fastest, p.rate);
-      if (fastest > kWorthALook * sure) ranked.emplace_back(fastest, i);
+      if (fastest > kWorthRepeating * sure) ranked.emplace_back(fastest, i);
     }
     std::ranges::sort(ranked, std::greater<>());
     for (const auto& [rate, i] : ranked) found.push_back(i);
-    if (found.size() > kMostLooks) found.resize(kMostLooks);
+    if (found.size() > kMostRepeats) found.resize(kMostRepeats);
     return found;
   }
 

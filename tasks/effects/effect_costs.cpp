@@ -53,7 +53,7 @@ TimedParts parts_of(const Model& model, const Effect& effect) {
 /// Returns the bytes of one environment's state and readings.
 std::size_t bytes_of(const Model& model) {
   std::size_t bytes = model.state_bytes_per_environment();
-  for (const FieldOutput of : asked_fields(model.scene()))
+  for (const FieldOutput of : requested_fields(model.scene()))
     bytes += sizeof(double) * numbers_of(model.sensors()[as_size(of.sensor)].points, of.form);
   return bytes;
 }

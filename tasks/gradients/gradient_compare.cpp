@@ -36,15 +36,15 @@ double norm_of(std::span<const double> x) {
 /// Makes an error that is not finite infinite, so that it is the worst.
 double finite_error(double error) { return std::isfinite(error) ? error : HUGE_VAL; }
 
-/// Returns the entries to compare: all of `all`, or `wanted` of them at random.
-std::vector<std::size_t> chosen(std::vector<std::size_t> all, std::size_t wanted,
+/// Returns the entries to compare: all of `all`, or `requested` of them at random.
+std::vector<std::size_t> chosen(std::vector<std::size_t> all, std::size_t requested,
                                 std::uint64_t seed, std::uint32_t purpose) {
-  if (wanted == 0 || all.size() <= wanted) return all;
-  for (std::size_t i = 0; i < wanted; ++i) {
+  if (requested == 0 || all.size() <= requested) return all;
+  for (std::size_t i = 0; i < requested; ++i) {
     const RandomKey key{seed, 0, static_cast<std::int64_t>(i), Purpose::control, purpose};
     std::swap(all[i], all[i + std::size_t(uniform(key, 0, double(all.size() - i) - 1e-9))]);
   }
-  all.resize(wanted);
+  all.resize(requested);
   std::sort(all.begin(), all.end());
   return all;
 }

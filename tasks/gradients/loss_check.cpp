@@ -232,13 +232,13 @@ bool checks_points(const Model& model, const RolloutLoss& loss, const CheckOptio
 
 LossGradient gradient_of(const Batch& start, const StepControls& controls, const RolloutLoss& loss,
                          const CheckOptions& options) {
-  TapeOptions wanted;
-  wanted.length = options.length;
-  wanted.stepper = options.stepper;
-  wanted.parameters = true;
-  wanted.points = checks_points(start.model(), loss, options);
+  TapeOptions requested;
+  requested.length = options.length;
+  requested.stepper = options.stepper;
+  requested.parameters = true;
+  requested.points = checks_points(start.model(), loss, options);
   const RolloutLoss* const losses[] = {&loss};
-  return rollout_gradients(start, controls, wanted, losses).losses[0];
+  return rollout_gradients(start, controls, requested, losses).losses[0];
 }
 
 class LossChecker : public GradientChecker {
