@@ -126,7 +126,7 @@ int run_sweep(const AccuracyArguments& o, const Console& console, const Model& m
     console.print(accuracy_row(points));
   };
   const int more = std::min(kMoreEnvironments * environments_of(o), kMostEnvironments);
-  listener.second_look = [&] {
+  listener.before_confirmation = [&] {
     console.print(fmt::format("\nwith {} more environments, settings that may be cheaper:", more));
   };
   FreshEpisodes fresh;

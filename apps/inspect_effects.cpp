@@ -23,10 +23,10 @@ std::string share_text(const MeasuredShare& m) {
 
 /// Pads by columns on the screen: "µ" and "±" are two bytes each.
 std::string padded(const std::string& text, std::size_t width, bool right = false) {
-  const auto seen = std::size_t(std::count_if(text.begin(), text.end(), [](char c) {
+  const auto columns = std::size_t(std::count_if(text.begin(), text.end(), [](char c) {
     return (static_cast<unsigned char>(c) & 0xC0U) != 0x80U;
   }));
-  const std::string blanks(width > seen ? width - seen : 0, ' ');
+  const std::string blanks(width > columns ? width - columns : 0, ' ');
   return right ? blanks + text : text + blanks;
 }
 

@@ -33,8 +33,8 @@ static_assert(std::endian::native == std::endian::little,
 
 constexpr const char* kProtocol = "tangere policy 1";
 constexpr std::size_t kLongestLine = 4096;
-constexpr int kLookForStop = 100;  // [ms]
-constexpr double kTimeToEnd = 5;   // [s]
+constexpr int kStopPoll = 100;    // [ms]
+constexpr double kTimeToEnd = 5;  // [s]
 
 double now() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
@@ -119,19 +119,19 @@ void PolicyProgram::introduce(std::uint64_t seed, const std::string& version) {
   const TaskSpec& spec = task_.spec();
   Json observations = Json::array();
   for (const TensorSpec& tensor : spec.observations) observations.push_back(described(tensor));
-  const Json said{{"protocol", kProtocol},
-                  {"version", version},
-                  {"task", spec.name},
-                  {"seed", seed},
-                  {"horizon", spec.horizon},
-                  {"observations", observations},
-                  {"action",
-                   {{"name", spec.action.name},
-                    {"shape", spec.action.shape},
-                    {"low", spec.action.low},
-                    {"high", spec.action.high}}}};
+  const Json greeting{{"protocol", kProtocol},
+                      {"version", version},
+                      {"task", spec.name},
+                      {"seed", seed},
+                      {"horizon", spec.horizon},
+                      {"observations", observations},
+                      {"action",
+                       {{"name", spec.action.name},
+                        {"shape", spec.action.shape},
+                        {"low", spec.action.low},
+                        {"high", spec.action.high}}}};
   const double deadline = now() + timeout_;
-  const std::string line = said.dump() + "\n";
+  const std::string line = greeting.dump() + "\n";
   // What a program said before it ended is heard: it explains more than that it ended.
   static_cast<void>(write(line.data(), line.size(), deadline));
   const std::string heard = read_line(deadline);
@@ -201,7 +201,7 @@ void PolicyProgram::exchange(const PolicyInputs& inputs, std::span<double> actio
 void PolicyProgram::wait_for(short events, double deadline) {
   pollfd waiting{socket_.get(), events, 0};
   while (!stopping()) {
-    const int ready = poll(&waiting, 1, kLookForStop);
+    const int ready = poll(&waiting, 1, kStopPoll);
     if (ready > 0 && now() <= deadline) return;  // the deadline also limits partial reads
     if (ready < 0 && errno != EINTR)
       throw IoError(fmt::format("cannot wait for {}: {}", who(), std::strerror(errno)));

@@ -86,7 +86,7 @@ bool size_matters(const CompiledModel& m, int body) {
 }
 
 /// Whether some contact of a body has shear springs.
-bool is_remembered(const CompiledModel& m, int body) {
+bool has_shear_springs(const CompiledModel& m, int body) {
   return std::any_of(m.shear_springs.begin(), m.shear_springs.end(), [body](const auto& of) {
     return of.contact.body1 == body || of.contact.body2 == body;
   });
@@ -127,7 +127,8 @@ void NumberGradients::add_bodies() {
         std::holds_alternative<AbstractShape>(d.shape);  // its inertia stays as given
     if (massive) add_with_masses({Owner::body, given ? Field::mass : Field::density, d.name}, {});
     // How anchors depend on sizes is not worked out.
-    const bool known = size_matters(m, b) && !is_remembered(m, b) && !has_feedback(m.scene, d.name);
+    const bool known =
+        size_matters(m, b) && !has_shear_springs(m, b) && !has_feedback(m.scene, d.name);
     for (int which = 0; which < kSizeIndices && known; ++which) {
       const SizeNumber* const size = row_of(d.shape).size(which);
       if (size == nullptr) continue;

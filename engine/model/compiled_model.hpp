@@ -173,7 +173,7 @@ struct VaryingPlace {
 };
 
 /// Size of a ShearEntry [bytes].
-inline constexpr std::size_t kRememberedBytes = 32;
+inline constexpr std::size_t kShearEntryBytes = 32;
 
 struct CompiledModel {
   Scene scene;

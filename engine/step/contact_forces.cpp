@@ -16,7 +16,7 @@ namespace {
 // Floors of the scale, as shares of the bodies' weight: of all contacts, and of contacts without
 // sensors in components with sensors. Otherwise a light ball that settles on stiff ground under a
 // heavy pad would determine the substeps.
-constexpr double kGraze = 0.01, kUnfelt = 0.05;
+constexpr double kGraze = 0.01, kUnsensed = 0.05;
 
 /// A ball around some points.
 struct Ball {
@@ -52,7 +52,7 @@ ContactForces::ContactForces(const CompiledModel& m) : floor_(2 * std::size_t(m.
     const std::size_t c = std::size_t(component_of(i));
     const double weight = gravity * m.links[std::size_t(i)].mass;
     floor_[2 * c] += kGraze * weight;
-    floor_[2 * c + 1] += kUnfelt * weight;
+    floor_[2 * c + 1] += kUnsensed * weight;
   }
   const auto is_sensed = [&](int link) {
     return std::ranges::any_of(m.sensors, [&](const CompiledSensor& s) { return s.link == link; });

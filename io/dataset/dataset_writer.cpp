@@ -56,7 +56,7 @@ struct DatasetWriter::Impl {
     // This comes before shards are counted one by one, because a typing mistake may mean
     // billions.
     if (makes_all()) check_space(static_cast<double>(layout.episodes));
-    for (const std::int64_t shard : to_make()) look_at(shard);
+    for (const std::int64_t shard : to_make()) inspect_shard(shard);
     double episodes = 0;
     for (const EpisodeRange& range : missing)
       episodes += static_cast<double>(range.end - range.first);
@@ -91,7 +91,7 @@ struct DatasetWriter::Impl {
   }
 
   /// An existing shard is complete, because only complete ones get the name.
-  void look_at(std::int64_t shard) {
+  void inspect_shard(std::int64_t shard) {
     const EpisodeRange range = layout.shard_episodes(shard);
     const std::string path = folder.shard_path(shard);
     if (output.existing == ExistingShards::replace || !std::filesystem::exists(path)) {
@@ -111,7 +111,7 @@ struct DatasetWriter::Impl {
     if (there.first != range.first || there.end != range.end)
       throw InputError(fmt::format("'{}' holds episodes {} to {}; expected {} to {}", path,
                                    there.first, there.end - 1, range.first, range.end - 1));
-    const std::optional<EpisodeSteps> steps = steps_said(file);
+    const std::optional<EpisodeSteps> steps = stored_steps(file);
     if (!steps)
       throw InputError(fmt::format(
           "'{}' does not store in how many steps contacts missed bodies, as older versions did "

@@ -136,12 +136,12 @@ DemoMembers members_of(const h5::Id& demo) {
                                    h5::dimensions(h5::open_dataset(samples, name)).at(0));
   }
   members.actions = array_of(demo, "actions");
-  const std::vector<std::string> said = h5::attribute_names(demo);
-  members.is_task = std::binary_search(said.begin(), said.end(), "terminated");
+  const std::vector<std::string> names = h5::attribute_names(demo);
+  members.is_task = std::binary_search(names.begin(), names.end(), "terminated");
   if (members.is_task)
     members.policies = std::ssize(h5::read_texts(h5::open_group(demo, "/scene"), "policies"));
-  members.varies = std::binary_search(said.begin(), said.end(), "randomized");
-  members.has_touch = !touch_said(h5::open_group(demo, "/scene")).empty();
+  members.varies = std::binary_search(names.begin(), names.end(), "randomized");
+  members.has_touch = !stored_touch(h5::open_group(demo, "/scene")).empty();
   return members;
 }
 

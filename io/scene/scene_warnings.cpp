@@ -56,7 +56,7 @@ class SensorWarnings {
     if (on_the_ground())
       add("does not feel the ground, which touches that body; expected a body of type plane in its "
           "place, where it should");
-    warn_of_unfelt();
+    warn_of_unsensed();
     warn_of_place();
   }
 
@@ -92,7 +92,7 @@ class SensorWarnings {
                            : "";
   }
 
-  void warn_of_unfelt() {
+  void warn_of_unsensed() {
     std::set<std::string> unsensed;
     for (const PairContactDescription& c : scene_.pair_contacts) {
       const std::string other = other_of(c);

@@ -66,7 +66,7 @@ class Sweep {
 
   AccuracyReport run() {
     if (!find_reference()) return stop();
-    if (!report_.resolved) look_for_vibration();
+    if (!report_.resolved) check_vibration();
     if (report_.reference.environments == 0) return std::move(report_);  // the reference failed
     if (!measure_points() || !recompute_snapshots()) return stop();
     measure_orders();
@@ -140,7 +140,7 @@ class Sweep {
   }
 
   /// Measures vibration in the environment with the median reference error.
-  void look_for_vibration() {
+  void check_vibration() {
     if (episodes_.start.model().sensors().empty() || report_.reference.environments == 0) return;
     const double middle = quantile(errors_of_environments_, 0.5);
     const auto at = std::ranges::find(errors_of_environments_, middle);
@@ -275,7 +275,7 @@ class Sweep {
   }
 
   /// First points of the settings that may be cheaper than the best that is sure, fastest first.
-  [[nodiscard]] std::vector<std::size_t> worth_a_look() const {
+  [[nodiscard]] std::vector<std::size_t> worth_repeating() const {
     double sure = 0;
     std::vector<std::size_t> found;
     for (std::size_t i = 0; i < report_.points.size(); ++i)
@@ -297,31 +297,31 @@ class Sweep {
   /// A few environments can be much worse than the rest, and the bound of 64 takes the worst of
   /// them. More environments bound the same quantile by a smaller error.
   bool recompute_snapshots() {
-    const std::vector<std::size_t> candidates = worth_a_look();
+    const std::vector<std::size_t> candidates = worth_repeating();
     if (!report_.resolved || !fresh_ || candidates.empty()) return true;
     const std::optional<FixedEpisodes> episodes = fresh_();
     if (!episodes) return false;
-    if (listener_.second_look) listener_.second_look();
+    if (listener_.before_confirmation) listener_.before_confirmation();
     const std::unique_ptr<AccuracyRun> run =
         make_accuracy_run(*episodes, options_.quantity, options_.threads);
     const AccuracyOutcome made = run->make_reference(report_.reference.setting, listener_.stop);
     if (made.stopped) return false;
     failed_again_ = static_cast<int>(made.failures.size());
     for (const std::size_t first : candidates) {
-      const AccuracyOutcome seen = run->compare(report_.points[first].setting, listener_.stop);
-      if (seen.stopped) return false;
+      const AccuracyOutcome repeated = run->compare(report_.points[first].setting, listener_.stop);
+      if (repeated.stopped) return false;
       const std::span points = std::span(report_.points).subspan(first, precisions());
-      for (std::size_t p = 0; p < points.size(); ++p) add(seen, p, points[p]);
+      for (std::size_t p = 0; p < points.size(); ++p) add(repeated, p, points[p]);
       if (listener_.setting) listener_.setting(points);
     }
     return true;
   }
 
-  void add(const AccuracyOutcome& seen, std::size_t precision, AccuracyPoint& point) const {
-    const std::vector<double>& more = seen.error[precision];
+  void add(const AccuracyOutcome& repeated, std::size_t precision, AccuracyPoint& point) const {
+    const std::vector<double>& more = repeated.error[precision];
     point.errors.insert(point.errors.end(), more.begin(), more.end());
-    if (point.failed == 0) point.status = status_of(seen, static_cast<int>(more.size()));
-    point.failed += static_cast<int>(seen.failures.size());
+    if (point.failed == 0) point.status = status_of(repeated, static_cast<int>(more.size()));
+    point.failed += static_cast<int>(repeated.failures.size());
     set_errors(point);
   }
 

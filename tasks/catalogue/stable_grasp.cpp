@@ -19,7 +19,7 @@ namespace tangere {
 namespace {
 
 constexpr int kBlocks = 11, kRows = 13, kCols = 10, kPads = 2;
-constexpr int kSteps = 180, kLook = 60, kGrasps = 10;
+constexpr int kSteps = 180, kFirstSnapshot = 60, kGrasps = 10;
 constexpr double kReach = 0.05, kFarthest = 0.11;  // reach of an action and of the hand [m]
 constexpr double kLevel = 0.02, kLifted = 5e-3;    // [rad], [m]
 constexpr double kSuccess = 100, kTilt = 10;       // of the reward
@@ -248,7 +248,7 @@ TaskSpec declare_stable_grasp(Friction friction) {
   spec.observations.back().touch = true;
   spec.steps_per_action = kSteps;
   spec.control_every = 1;
-  spec.snapshots = {kLook, kSteps};
+  spec.snapshots = {kFirstSnapshot, kSteps};
   spec.horizon = kGrasps - 1;
   spec.warm_up = true;
   spec.settling_steps = 50;

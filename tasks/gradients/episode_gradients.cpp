@@ -183,7 +183,7 @@ EpisodeGradients task_returns(const Task& task, const TaskActions& actions, std:
 }
 
 /// Refuses scenes in which a state is more than q and v.
-void check_remembers_nothing(const Model& model) {
+void check_no_shear_springs(const Model& model) {
   if (model.has_shear_springs())
     throw InputError("scene '" + model.scene().name +
                      "' has contacts with ks; expected none: the derivative of a state by the one "
@@ -199,7 +199,7 @@ EpisodeGradients scene_jacobians(const Model& model, const ControlProgram& contr
     std::vector<RowChain> chains;
   };
   const std::size_t nu = as_size(model.nu()), nv = as_size(model.nv());
-  check_remembers_nothing(model);
+  check_no_shear_springs(model);
   const auto s = std::make_shared<Scratch>(
       Scratch{Stepper(model, {.differentiable = true}), StepJacobians(model),
               BlockTape(model, model.integrator(), run.every),
@@ -235,7 +235,7 @@ EpisodeGradients scene_jacobians(const Model& model, const ControlProgram& contr
 
 EpisodeGradients task_jacobians(const Task& task, const TaskActions& actions,
                                 const EpisodeOptions& run) {
-  check_remembers_nothing(task.model());
+  check_no_shear_springs(task.model());
   struct Scratch {
     TaskRollout rollout;
     ActionJacobians jacobians;

@@ -257,7 +257,7 @@ void add_weakest(const Eigen::SelfAdjointEigenSolver<Matrix>& modes, std::vector
 }
 
 /// Computes deviations and correlations of the parameters from the information F.
-void judge_information(const Matrix& F, const Matrix& J, Identification& out) {
+void set_deviations(const Matrix& F, const Matrix& J, Identification& out) {
   const Eigen::Index n = F.cols();
   const Eigen::SelfAdjointEigenSolver<Matrix> modes(F);
   // Smaller eigenvalues are rounding errors of the largest.
@@ -299,7 +299,7 @@ void set_flags(const Problem& problem, const Fit& fit, double stated_noise, Iden
   const double scale = out.noise > 0 ? 1 / (out.noise * out.noise) : 1;
   const Matrix F = scale * information(J);
   out.information.assign(F.data(), F.data() + F.size());
-  judge_information(F, J, out);
+  set_deviations(F, J, out);
 }
 
 /// Whether a fit replaces the best one so far. Of equal fits the first converged one stays.

@@ -51,11 +51,11 @@ void RunTrace::add(const Batch& batch) {
 }
 
 void RunTrace::compare(std::size_t state, const Decisions& a, const Decisions& b,
-                       std::vector<bool>& said, std::vector<std::string>& to) const {
+                       std::vector<bool>& reported, std::vector<std::string>& to) const {
   std::size_t at = 0;
   const auto say = [&](bool differs, const auto& text) {
-    if (differs && !said[at]) to.push_back(fmt::format("in state {} {}", state, text()));
-    said[at] = said[at] || differs;
+    if (differs && !reported[at]) to.push_back(fmt::format("in state {} {}", state, text()));
+    reported[at] = reported[at] || differs;
     ++at;
   };
   say(a.status != b.status, [&] {
@@ -85,11 +85,11 @@ void RunTrace::compare(std::size_t state, const Decisions& a, const Decisions& b
 std::vector<std::string> RunTrace::differences(int environment, const RunTrace& other,
                                                int environment_of_other) const {
   std::vector<std::string> texts;
-  std::vector<bool> said(1 + model_.contacts().size() + as_size(model_.nv()) +
-                         model_.sensors().size());
+  std::vector<bool> reported(1 + model_.contacts().size() + as_size(model_.nv()) +
+                             model_.sensors().size());
   for (std::size_t t = 0; t < std::min(states_.size(), other.states_.size()); ++t)
     compare(t, states_[t][as_size(environment)], other.states_[t][as_size(environment_of_other)],
-            said, texts);
+            reported, texts);
   return texts;
 }
 

@@ -31,8 +31,8 @@ class RunTrace {
     std::vector<int> loaded_points;  // (sensors) points with a force
     StepStatus status = StepStatus::converged;
   };
-  void compare(std::size_t state, const Decisions& a, const Decisions& b, std::vector<bool>& said,
-               std::vector<std::string>& to) const;
+  void compare(std::size_t state, const Decisions& a, const Decisions& b,
+               std::vector<bool>& reported, std::vector<std::string>& to) const;
 
   Model model_;                                 // for names
   std::vector<std::vector<Decisions>> states_;  // (states, environments)
