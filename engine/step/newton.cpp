@@ -37,8 +37,8 @@
 // lane needs one, it therefore also comes after g.
 //
 // A Jacobian of the group costs as much as six residuals. A lane that turns out to need one after g
-// alone therefore waits at its point. The next evaluation includes the Jacobian if another lane
-// needs or should need one, too. Else the lane waits on, until no other lane searches.
+// alone therefore stays at its point. The next evaluation includes the Jacobian if another lane
+// needs or should need one, too. Else the lane stays there until no other lane searches.
 #include "engine/step/newton.hpp"
 
 #include <cmath>
@@ -77,10 +77,10 @@ struct Search {
   StageFactors<L>& factors;
   NewtonReport& report;
   LaneBits searching;
-  LaneBits on_trial = 0;      ///< lanes whose x is a trial along delta
-  LaneBits waiting = 0;       ///< lanes whose x is accepted and that wait for a Jacobian
-  LaneBits spared = 0;        ///< lanes that ended without the last evaluation
-  LaneBits secant_lanes = 0;  ///< lanes whose factor takes friction by its secant
+  LaneBits on_trial = 0;       ///< lanes whose x is a trial along delta
+  LaneBits need_jacobian = 0;  ///< lanes whose x is accepted and that need a Jacobian
+  LaneBits spared = 0;         ///< lanes that ended without the last evaluation
+  LaneBits secant_lanes = 0;   ///< lanes whose factor takes friction by its secant
   std::array<double, L> alpha{}, delta_norm{};
   std::array<double, L> last{};    ///< scaled residual of the last accepted point
   std::array<double, L> lowest{};  ///< lowest scaled residual of all accepted points
@@ -125,7 +125,7 @@ struct Search {
     locate(first);
     LaneBits open = 0;
     for (int l = 0; l < L; ++l)
-      if (has(searching, l) && (has(waiting, l) || !(expected[l] <= limits.tolerance)))
+      if (has(searching, l) && (has(need_jacobian, l) || !(expected[l] <= limits.tolerance)))
         open |= 1U << l;
     with_jacobian = !factors.weighted || !factors.floored ||
                     (open != 0 && (lone(open) < 0 || open == searching));
@@ -155,7 +155,7 @@ struct Search {
     on_trial &= ~(1U << l);
   }
 
-  /// Tests the trials at the present x. Lanes with an accepted, unconverged point then wait for a
+  /// Tests the trials at the present x. Lanes with an accepted, unconverged point then need a
   /// direction.
   void test_trials() {
     LaneRow residual, test_norm{};
@@ -167,7 +167,7 @@ struct Search {
       weighted_norms(w.test, test_norm);
     }
     for (int l = 0; l < L; ++l) {
-      if (!has(searching & ~waiting, l)) continue;
+      if (!has(searching & ~need_jacobian, l)) continue;
       ++report.iterations[l];
       const double ratio = residual[l] / last[l];
       if (has(on_trial, l) && alpha[l] == 1) factors.share[l] = has(chord, l) ? ratio : 2 * ratio;
@@ -184,7 +184,7 @@ struct Search {
           on_trial |= 1U << l;
           take_chord(l, test_norm[l]);
         } else {
-          waiting |= 1U << l;
+          need_jacobian |= 1U << l;
           expected[l] = 0;
         }
       } else if (descends(l, test_norm[l], residual[l])) {
@@ -196,7 +196,7 @@ struct Search {
         } else if (stalls(l, residual[l])) {
           stop(l, StepStatus::not_converged);
         } else {
-          waiting |= 1U << l;
+          need_jacobian |= 1U << l;
           const double next = ratio * ratio, share = 2 * next;  // a Newton step squares the ratio
           expected[l] = residual[l] * next * share * share * share;
         }
@@ -268,10 +268,10 @@ struct Search {
     for (int i = 0; i < n(); ++i) w.stage.x[i][l] = w.base[i][l];
   }
 
-  /// Computes new directions at the points that wait for one. The full step along each is the next
+  /// Computes new directions at the points that need one. The full step along each is the next
   /// trial.
   void new_directions() {
-    const LaneBits accepted = std::exchange(waiting, 0);
+    const LaneBits accepted = std::exchange(need_jacobian, 0);
     if (!with_jacobian) kernel().evaluate(model.view, w.stage, lone(accepted));
     set_floor(accepted);
     // Lanes that have ended keep their factors for the next stage.
@@ -327,7 +327,8 @@ LaneBits solve_stage(const CompiledModel& model, const kernels::KernelTable& tab
     s.evaluate(first);
     first = false;
     s.test_trials();
-    if (s.waiting != 0 && (s.with_jacobian || s.waiting == s.searching)) s.new_directions();
+    if (s.need_jacobian != 0 && (s.with_jacobian || s.need_jacobian == s.searching))
+      s.new_directions();
   }
   if (s.spared != 0) {  // v and candidates where they ended
     s.searching = s.spared;
