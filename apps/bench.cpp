@@ -270,8 +270,8 @@ int bench(const BenchArguments& options, const Console& console) {
   const ControlProgram controls(model, model.timestep(), seed);
   if (!model.scene().control && model.nu() > 0)
     console.note("the scene has no <control>: every control is 0");
-  const RolloutOutputs requested = record_of(options.record, model).outputs;
-  if (requested.fields && (requested.bodies || requested.end_effectors))
+  const RolloutOutputs recorded = record_of(options.record, model).outputs;
+  if (recorded.fields && (recorded.bodies || recorded.end_effectors))
     console.note("bench reads sensors alone: bodies and variables are left out");
   BenchSetting setting = setting_of(options, model, controls);
   const std::vector<int> threads = thread_counts(options);
