@@ -245,10 +245,9 @@ struct DualStage::Impl {
 
   /// Returns the anchor of point k of a sensor at this touch (engine/step/kept_anchors.hpp).
   template <class Shape>
-  [[nodiscard]] kernels::Anchor<D> sensed_anchor(const Shape& shape,
-                                                 const kernels::LoadedTouch<D>& t,
-                                                 const kernels::ShearSpringContact& of, int k,
-                                                 const std::vector<D>& s_start) const {
+  [[nodiscard]] kernels::Anchor<D> skin_anchor(const Shape& shape, const kernels::LoadedTouch<D>& t,
+                                               const kernels::ShearSpringContact& of, int k,
+                                               const std::vector<D>& s_start) const {
     const D* const b = &s_start[3 * std::size_t(of.first + k)];
     const kernels::Vec3<D> xi = place(of, k);
     if (m.shear_interval(of) == 0)
@@ -263,15 +262,15 @@ struct DualStage::Impl {
 
   /// Calls f(shape, touch, k, point) for every point of a sensor against one body.
   template <class F>
-  void meet_sensed(const kernels::ShearSpringContact& of,
-                   const std::vector<kernels::LinkPose<D>>& poses, const std::vector<D>& s_start,
-                   const F& f) const {
+  void meet_skin(const kernels::ShearSpringContact& of,
+                 const std::vector<kernels::LinkPose<D>>& poses, const std::vector<D>& s_start,
+                 const F& f) const {
     const kernels::LoadedTouch<D> t = touch(of, poses);
     with_touched_shape(of, [&](const auto& shape) {
       for (int k = 0; k < of.contact.n_points; ++k)
         f(shape, t, k,
           kernels::meet_elastic(shape, t, law_of(of, k, t), place(of, k),
-                                sensed_anchor(shape, t, of, k, s_start)));
+                                skin_anchor(shape, t, of, k, s_start)));
     });
   }
 
@@ -504,7 +503,7 @@ void DualStage::update_sensor_shear_state(const std::vector<D>& q, const std::ve
   const std::vector<kernels::LinkPose<D>> poses = i.poses_at(q, twist);
   for (const kernels::ShearSpringContact& of : i.m.shear_springs) {
     if (!is_due(i.m, of, steps)) continue;
-    i.meet_sensed(of, poses, s_start, [&](const auto& shape, const auto& t, int k, const auto& p) {
+    i.meet_skin(of, poses, s_start, [&](const auto& shape, const auto& t, int k, const auto& p) {
       kernels::Anchor<D> after = {kernels::zero3<D>(), kernels::zero3<D>(), D(0.0)};
       if (p.d < D(0.0)) after = kernels::recalled(shape, t, i.place(of, k), p.hold * p.s);
       D* const b = &s_start[3 * std::size_t(of.first + k)];
@@ -553,23 +552,21 @@ void DualStage::field(int sensor, const double* column, std::span<const double> 
                       std::span<const double> points, std::span<double> field,
                       std::span<double> field_dot) {
   Impl& i = *impl_;
-  const CompiledSensor& compiled_sensor = i.m.sensors[std::size_t(sensor)];
+  const CompiledSensor& skin = i.m.sensors[std::size_t(sensor)];
   kernels::kinematics(i.view, i.arguments(*this));
   auto number = std::size_t(i.m.view.rows.sensor(sensor));
-  const Coefficients<D> coefficients =
-      transformed(compiled_sensor.parameters, [&](const Parameter& p) {
-        const double tangent = numbers.empty() ? 0.0 : numbers[number];
-        ++number;
-        return D(p.row < 0 ? p.value : column[p.row * kBlock], tangent);
-      });
-  if (compiled_sensor.elastic) set_points(sensor, points);
+  const Coefficients<D> coefficients = transformed(skin.parameters, [&](const Parameter& p) {
+    const double tangent = numbers.empty() ? 0.0 : numbers[number];
+    ++number;
+    return D(p.row < 0 ? p.value : column[p.row * kBlock], tangent);
+  });
+  if (skin.elastic) set_points(sensor, points);
   const auto springs = [&](const Coefficients<D>& law, bool elastic, std::span<double> value,
                            std::span<double> change) {
     if (elastic) return elastic_field(sensor, law, value, change);
     read_dual_field(i.m, sensor, i.links, law, column, numbers, points, value, change);
   };
-  if (!compiled_sensor.layer)
-    return springs(coefficients, compiled_sensor.elastic, field, field_dot);
+  if (!skin.layer) return springs(coefficients, skin.elastic, field, field_dot);
   if (!points.empty())
     throw InputError("derivatives by points of a sensor with a layer; expected no <layer>");
   read_dual_layer(i.m, sensor, i.links, coefficients, column, numbers, springs, field, field_dot);
@@ -580,17 +577,17 @@ void DualStage::field(int sensor, const double* column, std::span<const double> 
 void DualStage::elastic_field(int sensor, const Coefficients<D>& law, std::span<double> field,
                               std::span<double> field_dot) {
   Impl& i = *impl_;
-  const CompiledSensor& compiled_sensor = i.m.sensors[std::size_t(sensor)];
+  const CompiledSensor& skin = i.m.sensors[std::size_t(sensor)];
   i.sensor_laws[std::size_t(sensor)] = law;
   std::fill(field.begin(), field.end(), 0.0);
   std::fill(field_dot.begin(), field_dot.end(), 0.0);
   const std::vector<kernels::LinkPose<D>> poses = i.poses_at(centre, r);
   for (const kernels::ShearSpringContact& of : i.m.shear_springs) {
     if (of.sensor != sensor) continue;
-    i.meet_sensed(of, poses, s_start, [&](const auto&, const auto&, int k, const auto& p) {
+    i.meet_skin(of, poses, s_start, [&](const auto&, const auto&, int k, const auto& p) {
       const D f[3] = {p.force.x, p.force.y, p.force.z};
-      const double* axes = &compiled_sensor.point_axes[9 * std::size_t(k)];
-      const auto to = 3 * std::size_t(compiled_sensor.in_field[std::size_t(k)]);
+      const double* axes = &skin.point_axes[9 * std::size_t(k)];
+      const auto to = 3 * std::size_t(skin.in_field[std::size_t(k)]);
       for (std::size_t c = 0; c < 3; ++c)
         for (std::size_t e = 0; e < 3; ++e) {
           if (!field.empty()) field[to + c] += axes[3 * c + e] * f[e].value;
