@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Writes lines to streams. main notices a stream that cannot be written when it flushes stdout.
+// Writes lines to streams. main detects a stream that cannot be written when it flushes stdout.
 #include "apps/console.hpp"
 
 #include <fmt/format.h>

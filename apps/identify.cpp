@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // tangere identify: finds numbers of a scene from recorded tactile fields. Without a recording it
-// tries how well they can be found: it simulates one, adds noise and starts from wrong numbers.
+// measures how well they can be found: it simulates one, adds noise and starts from wrong numbers.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 

@@ -21,7 +21,7 @@ std::string share_text(const MeasuredShare& m) {
   return fmt::format("{:.1f} % ± {:.1f}", 100 * m.share + 0.0, 100 * m.spread);
 }
 
-/// Pads by what is seen: "µ" and "±" are two bytes each.
+/// Pads by columns on the screen: "µ" and "±" are two bytes each.
 std::string padded(const std::string& text, std::size_t width, bool right = false) {
   const auto columns = std::size_t(std::count_if(text.begin(), text.end(), [](char c) {
     return (static_cast<unsigned char>(c) & 0xC0U) != 0x80U;

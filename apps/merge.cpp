@@ -21,7 +21,7 @@ namespace {
 
 int merge(const std::string& path, MergeOptions options, const Console& console) {
   const StopSignals signals;  // before anything is written and until it is gone or complete
-  // Alone: whoever replaces shards shares the folder, and would mix them in while links are made.
+  // Alone: processes that replace shards share the folder, and would mix them in meanwhile.
   std::optional<FolderLock> lock;
   if (std::filesystem::is_directory(path)) lock.emplace(path);
   if (lock && !lock->take(FolderLock::Kind::alone))

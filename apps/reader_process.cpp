@@ -106,7 +106,7 @@ std::span<char> shared_note() {
     code = kInputOutput;
   }
 #ifdef __SANITIZE_ADDRESS__
-  __lsan_do_leak_check();  // it would otherwise look at the end of main
+  __lsan_do_leak_check();  // else it runs at the end of main
 #endif
   _exit(code);
 }

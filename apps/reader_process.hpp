@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The HDF5 library trusts the insides of a file: a damaged heap or tree can crash it. Commands that
-// read files run in a child process, so that a crash becomes a message too.
+// The HDF5 library does not check the insides of a file: a damaged heap or tree can crash it.
+// Commands that read files run in a child process, so that a crash becomes a message too.
 #pragma once
 
 #include <functional>

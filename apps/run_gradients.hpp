@@ -19,7 +19,7 @@
 namespace tangere::apps {
 
 struct GradientArguments {
-  std::string loss;     ///< "": none are wanted
+  std::string loss;     ///< "": none are requested
   bool points = false;  ///< also by place and coefficients of tactile points
   std::optional<double> tape_memory;
 
@@ -39,7 +39,7 @@ class RunGradients {
   /// Returns false if a signal stopped it.
   bool write(const ControlProgram& controls, const RolloutOptions& rollout,
              const StopSignals& signals, TrajectoryFile& output);
-  /// What was written; null if nothing is wanted.
+  /// What was written; null if nothing is requested.
   [[nodiscard]] Json json() const;
 
  private:

@@ -28,6 +28,8 @@
 #include "kernels/table/isa.hpp"
 #include "tasks/gradients/gradients.hpp"
 #include "tasks/gradients/losses.hpp"
+#include "tasks/run/block_worker.hpp"
+#include "tasks/run/episode_program.hpp"
 #include "tasks/run/episodes.hpp"
 #include "tasks/run/rollout.hpp"
 

@@ -23,6 +23,7 @@
 #include "tasks/gradients/losses.hpp"
 #include "tasks/gradients/task_tape.hpp"
 #include "tasks/run/benchmark_fields.hpp"
+#include "tasks/run/vector_task.hpp"
 
 namespace tangere {
 namespace {

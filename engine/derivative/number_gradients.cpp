@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <optional>
 
+#include "engine/derivative/block_cotangent.hpp"
 #include "engine/model/compiled_model.hpp"
 #include "engine/model/link_inertia.hpp"
 #include "engine/model/model.hpp"

@@ -8,10 +8,12 @@
 #include <string>
 #include <vector>
 
-#include "engine/derivative/block_cotangent.hpp"
+#include "engine/model/model.hpp"
 #include "engine/step/batch.hpp"
 
 namespace tangere {
+
+struct BlockCotangent;
 
 struct NumberInfo {
   SceneNumber number;

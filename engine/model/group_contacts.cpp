@@ -16,7 +16,7 @@ namespace tangere {
 namespace {
 
 /// Appends the indices of `items` to `order` group by group, in the order of first appearance.
-/// `same` tells which items belong together. Returns where each group begins, and the end.
+/// `same`: whether two items belong together. Returns where each group begins, and the end.
 template <class Item, class Same>
 std::vector<int> gather(const std::vector<Item>& items, const Same& same, std::vector<int>& order) {
   std::vector<int> begins;

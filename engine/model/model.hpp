@@ -17,6 +17,7 @@ namespace tangere {
 
 struct CompiledModel;  // private to the engine
 
+/// A handle: copies share one compiled scene.
 class Model {
  public:
   /// Compiles a scene. Throws InputError (file:line) for references to names that do not exist,
@@ -29,7 +30,7 @@ class Model {
   [[nodiscard]] int nu() const;             ///< controls: motors in file order, one control per dof
   [[nodiscard]] int nb() const;             ///< bodies of the scene, folded or not, in file order
   [[nodiscard]] int moving_bodies() const;  ///< bodies that are not fixed in the world
-  [[nodiscard]] double mass(int body) const;  ///< [kg]
+  [[nodiscard]] double mass(int body) const;  ///< [kg], of body 0 … nb() - 1 in file order
   [[nodiscard]] double timestep() const;      ///< [s]
   /// The scene's scheme; SDIRK3 if the scene has an accuracy that its scheme cannot keep
   /// (keeping_accuracy()).
@@ -42,8 +43,7 @@ class Model {
   /// Whether some contact or sensor has shear springs (k_s, docs/shear.md).
   [[nodiscard]] bool has_shear_springs() const;
   [[nodiscard]] std::span<const SensorInfo> sensors() const;
-  [[nodiscard]] std::span<const EndEffectorInfo> end_effectors()
-      const;  ///< end effectors, in file order
+  [[nodiscard]] std::span<const EndEffectorInfo> end_effectors() const;  ///< in file order
   [[nodiscard]] std::span<const ContactInfo> contacts() const;
   [[nodiscard]] std::span<const MeshInfo> meshes() const;  ///< those with a distance, by body
   /// What effects_of() lists for the scene, with the variants of the kernels.
@@ -54,12 +54,11 @@ class Model {
   [[nodiscard]] std::span<const std::string> u_names() const;
   [[nodiscard]] std::span<const std::string> q_units() const;  ///< "m", "rad", "1"
   [[nodiscard]] std::span<const std::string> v_units() const;
-  [[nodiscard]] std::span<const std::string> u_units()
-      const;  ///< "1": controls are dimensionless for force motors
+  [[nodiscard]] std::span<const std::string> u_units() const;  ///< "1" of force motors, "m", "rad"
   [[nodiscard]] std::span<const std::string> body_names() const;
   [[nodiscard]] std::size_t state_bytes_per_environment() const;  ///< in a Batch
 
-  /// Whether both are the same compiled scene, not only equal ones.
+  /// Whether both share one compiled scene; two compilations of equal scenes differ.
   friend bool operator==(const Model& a, const Model& b) { return a.compiled_ == b.compiled_; }
 
  private:

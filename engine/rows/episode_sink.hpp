@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The interface between a run of many episodes and whoever stores it. Only here do tasks/ (which
-// produces) and io/ (which stores) meet when episodes are generated.
+// The interface between a run of many episodes and their storage: tasks/ produces the rows, io/
+// stores them.
 #pragma once
 
 #include <cstdint>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A scene as its author wrote it: names, SI units, defaults filled in. No other type holds strings.
-// io/scene/scene_reader.hpp reads it from XML. Model turns it into index arrays.
+// A scene as its author wrote it, in SI units, with defaults filled in. Its parts refer to each
+// other by name. io/scene/scene_reader.hpp reads it from XML. Model compiles it to indices.
 #pragma once
 
 #include <array>
@@ -13,7 +13,7 @@
 #include "engine/base/error.hpp"
 #include "engine/base/vector3.hpp"
 #include "engine/scene/number_address.hpp"
-#include "engine/scene/outer_pose.hpp"
+#include "engine/scene/pose.hpp"
 #include "engine/scene/scheme.hpp"
 #include "engine/scene/sensor_imperfections.hpp"
 #include "kernels/contact/contact_types.hpp"
@@ -118,6 +118,7 @@ struct AbstractShape {
 using Shape = std::variant<SphereShape, CuboidShape, CylinderShape, CapsuleShape, EllipsoidShape,
                            PlaneShape, MeshShape, AbstractShape>;
 
+/// A rigid body of uniform density, or one given by its mass (AbstractShape).
 struct BodyDescription {
   std::string name;
   Shape shape;
@@ -154,8 +155,8 @@ struct MotorDescription {
 /// Rectangular array of tactile points: p(i, j) = corner0 + i Δ0 axis0 + j Δ1 axis1, in the body
 /// frame [m].
 struct RectArray {
-  Vector3 corner0{}, corner1{};
-  Vector3 axis0{}, axis1{};  ///< unit, orthogonal
+  Vector3 corner0{}, corner1{};  ///< the first point and the last
+  Vector3 axis0{}, axis1{};      ///< unit, orthogonal
   int rows = 1, cols = 1;
 };
 
@@ -192,6 +193,7 @@ struct LayerDescription {
   Source source;
 };
 
+/// A tactile sensor: points of a skin on `body`, each with the coefficients of a penalty contact.
 struct TactileDescription {
   std::string name;
   std::string body;
@@ -232,14 +234,16 @@ struct EndEffectorDescription {
   Source source;
 };
 
+/// The half-space below a plane through `position`, world frame.
 struct GroundDescription {
-  Vector3 position{0, 0, 0};
-  Vector3 normal{0, 0, 1};  ///< unit, pointing out of the half-space
+  Vector3 position{0, 0, 0};  ///< [m]
+  Vector3 normal{0, 0, 1};    ///< unit, pointing out of the half-space
 };
 
 inline constexpr double kUsualRamp = 1e-5;       ///< [m]
 inline constexpr double kUsualRampShare = 1e-3;  ///< of a body's extent
 
+/// Contact points of `body` against the ground.
 struct GroundContactDescription {
   std::string body;
   ContactCoefficients coefficients{};
@@ -350,10 +354,10 @@ struct SolverOptions {
 
 struct Scene {
   std::string name;
-  std::string path;  ///< file it was read from, "" if none
-  std::string text;  ///< the file as read, stored with every dataset
-  Vector3 gravity{0, 0, -9.8};
-  double timestep = 5e-3;  ///< [s]
+  std::string path;             ///< file it was read from, "" if none
+  std::string text;             ///< the file as read, stored with every dataset
+  Vector3 gravity{0, 0, -9.8};  ///< world frame [m/s²]
+  double timestep = 5e-3;       ///< [s]
   Integrator integrator = Integrator::default_integrator;
   SolverOptions solver;
   std::optional<GroundDescription> ground;

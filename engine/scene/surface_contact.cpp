@@ -28,7 +28,7 @@ constexpr double kAcrossThin = 2.5;         // pitches of a round body across th
 constexpr double kAcrossPlace = 0.7;        // pitch in half widths of the place of contact
 constexpr double kAcrossFace = 1.4;         // the same of faces on which a rod lies
 constexpr double kAlongRod = 16;            // rings of a rod that lies on a face
-constexpr double kFine = 1.5, kUneven = 4;  // pitches over the wanted one: near enough, uneven
+constexpr double kFine = 1.5, kUneven = 4;  // pitches over the target one: near enough, uneven
 constexpr double kThin = 4;                 // least thickness, in depths under the lighter weight
 constexpr double kUsualGravity = 9.81;      // where the scene has none [m/s²]
 

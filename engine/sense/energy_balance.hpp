@@ -32,6 +32,15 @@ struct StepEnergyBalance {
 /// `h`: [s]. Both ends under the controls of the step.
 StepEnergyBalance between(const EnergyBalance& start, const EnergyBalance& end, double h);
 
+/// Totals over all steps and environments of a run.
+struct EnergyBalanceSummary {
+  double motors = 0, taken = 0, made = 0;  ///< sums over environments and steps [J]
+  /// The largest |sum of integrator errors| of an environment, divided by the largest of: kinetic +
+  /// elastic energy, work of motors, dissipation.
+  double worst_share = 0;
+  int worst_environment = 0;
+};
+
 /// Scratch for audits of batches of a model. One per thread.
 class EnergyBalanceReader {
  public:

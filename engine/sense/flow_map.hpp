@@ -25,7 +25,7 @@ double normalised_flow(std::span<const ShearField<double>> fields, std::span<dou
 double normalised_flow(std::span<const ShearField<float>> fields, std::span<float> flow,
                        double smallest = 0);
 
-/// Where derivatives by a ShearField are added. Empty spans ask for none.
+/// Where derivatives by a ShearField are added. Empty spans: none is computed.
 struct ShearCotangent {
   std::span<double> force, before;
 };

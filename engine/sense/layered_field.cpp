@@ -72,7 +72,7 @@ Vec3<double> LayeredField::to_pad(const Vec3<double>& b) const {
           a[2] * b.x + a[5] * b.y + a[8] * b.z};
 }
 
-/// Whether a shape may touch a point of a tile. A mesh knows its distance near the surface only.
+/// Whether a shape may touch a point of a tile. A mesh has a distance near its surface only.
 bool LayeredField::reaches(int target, int tile) const {
   const kernels::TouchShape& s = shapes_[static_cast<std::size_t>(target)];
   if (s.grid != nullptr) return true;

@@ -12,7 +12,8 @@
 
 namespace tangere {
 
-/// Reads any batch of its model. Owns the scratch of one thread. Allocates only when made.
+/// Reads any batch of its model, and owns the scratch of one thread. Only the constructor
+/// allocates.
 ///
 /// Tactile fields are in [N]: f·axis0, f·axis1, -f·(axis0 × axis1), where f is the force on the
 /// sensor's body. They are exactly zero where nothing touches, unless the sensor is imperfect:
@@ -55,7 +56,7 @@ class Readout {
   void tactile(const Batch& batch, int environment, int sensor, std::span<double> force);
   void tactile(const Batch& batch, int environment, int sensor, std::span<float> force);
 
-  /// Reads the frame's form of the field of its sensor.
+  /// Reads the sensor and the form that the frame was made for.
   template <class T>
   void read(const Batch& batch, int environment, DenseFrame<T>& frame);
   template <class T>
@@ -63,7 +64,7 @@ class Readout {
 
   /// Reads the environments from 16 block on, numbers_of(points, form) each, one array per
   /// environment. Arrays beyond the batch's last environment are left alone and may be missing.
-  /// Flat pads of up to kSmallPad points are read in all environments at once.
+  /// Flat pads of up to 512 points are read in all environments at once.
   void read_block(const Batch& batch, int block, FieldOutput output,
                   std::span<const std::span<double>> readings);
   void read_block(const Batch& batch, int block, FieldOutput output,

@@ -272,11 +272,11 @@ void Batch::set_state(int environment, std::span<const double> q, std::span<cons
   has_history_[lane] = 1;
 }
 
-void Batch::set_shear_state(int environment, std::span<const ShearEntry> memory) {
+void Batch::set_shear_state(int environment, std::span<const ShearEntry> state) {
   const std::size_t lane = this->lane(environment);
   const int points = compiled(model_).shear_spring_points;
   int last = -1;
-  for (const ShearEntry& e : memory) {
+  for (const ShearEntry& e : state) {
     if (e.point <= last || e.point >= points)
       throw InputError("shear state: point " + std::to_string(e.point) + " after point " +
                        std::to_string(last) + "; expected rising numbers below " +
@@ -286,7 +286,7 @@ void Batch::set_shear_state(int environment, std::span<const ShearEntry> memory)
         throw InputError("shear state: point " + std::to_string(e.point) + " is not finite");
     last = e.point;
   }
-  shear_[lane].assign(memory.begin(), memory.end());
+  shear_[lane].assign(state.begin(), state.end());
 }
 
 void Batch::set_sleep(int environment, const SleepState& state) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The state of many environments in blocks of 16 lanes, [block][row][lane]. It is exactly what a
-// checkpoint stores.
+// The state of many environments in blocks of kernels::kBlock = 16 lanes, [block][row][lane]. It is
+// exactly what a checkpoint stores.
 #pragma once
 
 #include <cstdint>
@@ -13,6 +13,7 @@
 #include "engine/step/candidate_store.hpp"
 #include "engine/step/shear_state.hpp"
 #include "engine/step/sleep_state.hpp"
+#include "kernels/numbers/block.hpp"
 
 namespace tangere {
 
@@ -38,7 +39,8 @@ inline bool failed(StepStatus s) { return static_cast<std::int8_t>(s) < 0; }
 
 /// Everything in one block that a step may change.
 struct BlockState {
-  AlignedVector<double> rows;
+  AlignedVector<double> rows;  ///< as Batch::block()
+  // (16), by lane
   std::vector<StepStatus> status;
   std::vector<std::uint8_t> has_history;
   std::vector<std::int64_t> steps;
@@ -51,8 +53,9 @@ struct BlockState {
 /// exist and for an array of another length than its shape says.
 class Batch {
  public:
-  /// Makes `environments` states drawn from the scene's <initial> and <randomize>, keyed by
-  /// (seed, first_episode + e). Throws InputError when environments < 1 or allocation fails.
+  /// Makes `environments` states: environment e starts as the scene's <initial> says, with numbers
+  /// drawn from <randomize> by the key (seed, first_episode + e). Throws InputError when
+  /// environments < 1 or allocation fails.
   Batch(const Model& model, int environments, std::uint64_t seed = 0,
         std::int64_t first_episode = 0);
 
@@ -60,6 +63,7 @@ class Batch {
   [[nodiscard]] int environments() const { return environments_; }
   [[nodiscard]] int blocks() const { return blocks_; }
   [[nodiscard]] std::uint64_t seed() const { return seed_; }
+  /// Number of the episode that an environment is in; it keys the draws.
   [[nodiscard]] std::int64_t episode(int environment) const { return episode_[lane(environment)]; }
 
   /// Draws another episode into one environment, with the same bits as in a new batch. Environments
@@ -102,7 +106,7 @@ class Batch {
   }
   /// Sets it, to resume from a stored state. Throws InputError unless the points are ascending and
   /// exist in the scene.
-  void set_shear_state(int environment, std::span<const ShearEntry> memory);
+  void set_shear_state(int environment, std::span<const ShearEntry> state);
 
   /// Sleep state of an environment (docs/sleeping.md). Empty unless a stepper with sleep enabled
   /// stepped it. reset() and every set_ function wake all bodies.
@@ -114,15 +118,17 @@ class Batch {
   /// state one step before is set to the present one. Throws InputError unless it fits the scene.
   void set_sleep(int environment, const SleepState& state);
 
-  /// Sets the newest state alone, for differences. Quaternions are taken as they are; history,
-  /// status and shear state are kept. Before the first step of an episode it is also the earlier
-  /// states that sensors with lag read.
+  /// Sets the newest state alone, for finite differences. Quaternions are not normalised; history,
+  /// status and shear state are kept. Before the first step of an episode the earlier states that
+  /// sensors with lag read are set, too.
   void displace_state(int environment, std::span<const double> q, std::span<const double> v);
 
   /// Freezes an environment as a failed step would. Throws InputError when `status` is not a
   /// failure.
   void set_failed(int environment, StepStatus status);
 
+  /// Result of the last step: status, evaluations of the residual in all its parts, and the scaled
+  /// residual at its end, dimensionless.
   [[nodiscard]] StepStatus status(int environment) const { return status_[lane(environment)]; }
   [[nodiscard]] std::int32_t iterations(int environment) const {
     return iterations_[lane(environment)];
@@ -156,8 +162,8 @@ class Batch {
   /// from now on; the state, its history and status stay. The value is not checked. Throws
   /// InputError for a number of the starting state.
   void set_randomized_value(int environment, int k, double value);
-  /// Sets all that are parameters in an environment: `values` (their count) in order. One that has
-  /// its value already stays, with what depends on it. Throws as set_randomized_values().
+  /// Sets all that are parameters in an environment: `values` (their count) in order. What depends
+  /// on a number is computed again only if its value changes. Throws like set_randomized_values().
   void set_all_randomized(int environment, std::span<const double> values);
   /// Sets some of them in some environments, and checks them: `values` (environments, numbers) in
   /// SI. Throws InputError, and sets none, for a number of the starting state, for a value that the

@@ -37,8 +37,8 @@
 // lane needs one, it therefore also comes after g.
 //
 // A Jacobian of the group costs as much as six residuals. A lane that turns out to need one after g
-// alone therefore waits at its point. The next evaluation includes the Jacobian if another lane
-// needs or should need one, too. Else the lane waits on, until no other lane searches.
+// alone therefore stays at its point. The next evaluation includes the Jacobian if another lane
+// needs or should need one, too. Else the lane stays there until no other lane searches.
 #include "engine/step/newton.hpp"
 
 #include <cmath>
@@ -78,7 +78,7 @@ struct Search {
   NewtonReport& report;
   LaneBits searching;
   LaneBits on_trial = 0;       ///< lanes whose x is a trial along delta
-  LaneBits need_jacobian = 0;  ///< lanes whose x is accepted and that wait for a Jacobian
+  LaneBits need_jacobian = 0;  ///< lanes whose x is accepted and that need a Jacobian
   LaneBits spared = 0;         ///< lanes that ended without the last evaluation
   LaneBits secant_lanes = 0;   ///< lanes whose factor takes friction by its secant
   std::array<double, L> alpha{}, delta_norm{};
@@ -155,7 +155,7 @@ struct Search {
     on_trial &= ~(1U << l);
   }
 
-  /// Tests the trials at the present x. Lanes with an accepted, unconverged point then wait for a
+  /// Tests the trials at the present x. Lanes with an accepted, unconverged point then need a
   /// direction.
   void test_trials() {
     LaneRow residual, test_norm{};
@@ -268,7 +268,7 @@ struct Search {
     for (int i = 0; i < n(); ++i) w.stage.x[i][l] = w.base[i][l];
   }
 
-  /// Computes new directions at the points that wait for one. The full step along each is the next
+  /// Computes new directions at the points that need one. The full step along each is the next
   /// trial.
   void new_directions() {
     const LaneBits accepted = std::exchange(need_jacobian, 0);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// One implicit step of a batch: predict, detect, Newton in lanes, commit. Lanes that fail are split
-// and solved alone.
+// One implicit step of a batch: first guess, contact detection, Newton's method in lanes, new
+// states. Lanes without a solution are solved again alone, in shorter parts.
 #pragma once
 
 #include <memory>
@@ -13,13 +13,15 @@ namespace tangere {
 
 class BlockTape;
 
-/// Returns the scheme that a stepper of these options takes. Throws like its constructor.
+/// Returns the scheme of a Stepper with these options. Throws like its constructor.
 Integrator integrator_in_force(const Model& model, const StepperOptions& options);
 
-/// Owns the scratch of one thread. Steps any batch of its model. Results do not depend on which
-/// Stepper ran.
+/// Steps any batch of its model, and owns the scratch of one thread. Results do not depend on which
+/// Stepper of a model and its options takes a step.
 class Stepper {
  public:
+  /// Throws InputError for a number of `options` that is out of its range, for an accuracy that the
+  /// scheme cannot keep, and for sleep where the scene has ks or the steps are differentiable.
   explicit Stepper(const Model& model, const StepperOptions& options = {});
   ~Stepper();
   Stepper(Stepper&&) noexcept;
@@ -27,18 +29,20 @@ class Stepper {
 
   [[nodiscard]] double timestep() const;        ///< the one in force [s]
   [[nodiscard]] Integrator integrator() const;  ///< the one in force
-  [[nodiscard]] double tolerance() const;
-  [[nodiscard]] double accuracy() const;  ///< 0: every step is one part
-  [[nodiscard]] double sleep() const;     ///< 0: no body sleeps
+  [[nodiscard]] double tolerance() const;       ///< of the scaled residual, dimensionless
+  [[nodiscard]] double accuracy() const;        ///< relative, of the parts of a step; 0: one part
+  [[nodiscard]] double sleep() const;           ///< share of its size, per body; 0: no body sleeps
 
-  /// Advances every environment that has not failed by one step. `controls`: (E, nu), clipped to
-  /// the motors' range. Throws InputError for a batch of another Model and for controls of another
-  /// length.
+  /// Advances every environment that is neither failed nor held by one step of timestep(). Where no
+  /// solution is found, the environment keeps its state and gets a negative StepStatus; this is no
+  /// exception. `controls`: (E, nu), in [-1, 1] for force motors and in units of q for position
+  /// motors, clipped to the motors' range. Throws InputError for a batch of another Model and for
+  /// controls of another length.
   void step(Batch& batch, std::span<const double> controls);
 
   /// The same for one block of 16. `controls`: (E, nu) of the whole batch. The resulting states are
-  /// added to `tape`. Also throws InputError for a block that does not exist, and if there is a
-  /// tape and bodies may sleep.
+  /// added to `tape`, if there is one. Also throws InputError for a block that does not exist, and
+  /// if there is a tape and bodies may sleep.
   void step_block(Batch& batch, int block, std::span<const double> controls,
                   BlockTape* tape = nullptr);
 

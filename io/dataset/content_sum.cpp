@@ -2,8 +2,8 @@
 // content_sum = Σ over rows of mix(key(episode, dataset, row, bytes of the row), L), modulo 2⁶⁴
 // L           = Σ over 32-bit words of the row: B(k / 256) · W(k mod 256) · word k, modulo 2⁶⁴
 //
-// B and W are odd and look random. So L differs if one word differs, and L of zeros is 0. Compilers
-// vectorise the inner sum if W is kept in halves (io/CMakeLists.txt sets -O3).
+// B and W are odd and pseudorandom. So L differs if one word differs, and L of zeros is 0.
+// Compilers vectorise the inner sum if W is kept in halves (io/CMakeLists.txt sets -O3).
 #include "io/dataset/content_sum.hpp"
 
 #include <algorithm>
@@ -20,7 +20,7 @@ constexpr std::uint64_t mix(std::uint64_t hash, std::uint64_t word) {
   return hash ^ (hash >> 32);
 }
 
-/// Odd, and looks random. Factors of blocks and of words have numbers of their own.
+/// Odd and pseudorandom. Factors of blocks and of words have numbers of their own.
 constexpr std::uint64_t factor(std::uint64_t number) {
   return mix(mix(mix(0x6A09E667F3BCC909ULL, number), number), number) | 1;
 }

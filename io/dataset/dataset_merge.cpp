@@ -22,12 +22,12 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::size_t kBatch = 16;  // demos that are laid out together
-// Descriptions that were used are forgotten in shards as they are by default. In larger ones, or in
+// Descriptions that were used are evicted in shards as they are by default. In larger ones, or in
 // copying, the library would take longer for each the more there are.
 constexpr std::int64_t kFewEpisodes = 4096;
 constexpr std::size_t kValidShare = 10;  // one demo in ten is kept for validation
 
-/// SplitMix64: which demos are for validation looks random and is the same for everybody.
+/// SplitMix64: the demos for validation are pseudorandom and the same in every copy.
 std::uint64_t scramble(std::uint64_t x) {
   x += 0x9E3779B97F4A7C15ULL;
   x = (x ^ (x >> 30)) * 0xBF58476D1CE4E5B9ULL;

@@ -53,7 +53,7 @@ struct DatasetWriter::Impl {
         folder(o.folder, o.existing, o.only.has_value()),
         format(layout) {
     if (output.existing != ExistingShards::replace) check_settings();
-    // This comes before shards are counted one by one, because a typing mistake may ask for
+    // This comes before shards are counted one by one, because a typing mistake may mean
     // billions.
     if (makes_all()) check_space(static_cast<double>(layout.episodes));
     for (const std::int64_t shard : to_make()) inspect_shard(shard);
@@ -215,7 +215,7 @@ void DatasetWriter::finish(std::int64_t first_episode, std::span<const FailedEpi
 
 bool DatasetWriter::complete() {
   impl_->folder.let_go();
-  // Every process lets go first. So the last one to check sees all shards, and no earlier one
+  // Every process lets go first. So the last one to check finds all shards, and no earlier one
   // blocks it.
   if (!impl_->all_there()) return false;
   if (!impl_->folder.hold_alone()) {

@@ -20,14 +20,15 @@ struct DatasetOutput {
   std::optional<std::vector<std::int64_t>> only = {};
 };
 
-/// Distributes episodes to shards. A shard gets its name when all its episodes have been written
-/// and read back. A shard destroyed before that leaves nothing behind.
+/// Writes each episode to its shard. A shard is a temporary file until all its episodes have been
+/// written and read back; then it gets its name. Temporary files that are left are removed by the
+/// destructor. Functions that read or write throw IoError when they cannot.
 class DatasetWriter : public EpisodeSink {
  public:
-  /// Creates the folder and touches no shard. Throws InputError for names that no file can hold,
-  /// and for shards to keep that have other settings, naming what differs. Throws IoError if the
-  /// folder cannot be written, another process writes it, it has shards that are neither to be kept
-  /// nor replaced, or the disk has no room for the data set.
+  /// Creates the folder, and changes no shard in it. Throws InputError for names that no file can
+  /// hold, and for shards to keep that have other settings, naming what differs. Throws IoError if
+  /// the folder cannot be written, another process writes it, it has shards that are neither to be
+  /// kept nor replaced, or the disk has no room for the data set.
   DatasetWriter(const DatasetOutput& output, const DatasetLayout& layout);
   ~DatasetWriter() override;
 
@@ -48,8 +49,8 @@ class DatasetWriter : public EpisodeSink {
   /// Paths of the complete shards, kept ones among them, in ascending order.
   [[nodiscard]] std::vector<std::string> shards() const;
   /// Whether the data set is complete and no other process writes into its folder or can do so from
-  /// now on. If several processes end at the same time, at least one gets true. This writer must
-  /// not write afterwards. If the data set is not complete, other processes may.
+  /// now on. Of several processes that end at the same time, at least one gets true. Do not write
+  /// afterwards. If the data set is not complete, other processes may write.
   [[nodiscard]] bool complete();
   /// Why complete() returned false although all shards exist; else empty.
   [[nodiscard]] const std::string& obstacle() const;

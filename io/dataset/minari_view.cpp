@@ -79,7 +79,7 @@ std::string bound(double value) {
 
 MinariView::MinariView(const std::string& folder, const h5::Id& shard, const DemoMembers& members)
     : members_(members) {
-  // Minari shows whatever the file has and looks for its space, so both lack what is too large.
+  // Minari shows all that the file has and computes its space, so both lack what is too large.
   std::erase_if(members_.observations, [this](const DemoArray& array) {
     if (too_large(array)) left_out_.push_back(array.name);
     return too_large(array);

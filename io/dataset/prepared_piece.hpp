@@ -34,7 +34,7 @@ struct PieceSlice {
 };
 
 /// R of an episode of the piece. An episode that failed in its first action has no row. It gets
-/// one, which no reader sees.
+/// one, which readers skip.
 std::int64_t rows_of_episode(const DatasetLayout& layout, const EpisodeRows& piece, int episode);
 
 /// Slices of an episode of the piece, per dataset. Only tasks have rewards. Dones have no slice,

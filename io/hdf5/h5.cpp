@@ -42,7 +42,7 @@ bool may_lead_to(const std::filesystem::path& from, const std::filesystem::path&
   return to.parent_path().empty() || (!up.empty() && to.parent_path() == up);
 }
 
-/// What the library asks before it follows a link to another file; a negative answer refuses.
+/// Called by the library before it follows a link to another file; a negative result refuses.
 herr_t allow_link(const char* from, const char*, const char* to, const char*, unsigned*, hid_t,
                   void*) noexcept try {
   if (!may_lead_to(from, to)) return -1;
@@ -52,8 +52,8 @@ herr_t allow_link(const char* from, const char*, const char* to, const char*, un
   return -1;
 }
 
-/// Whether a description has a message of type 7: a list of external files. Much faster than to ask
-/// for the properties, which copies all of them.
+/// Whether a description has a message of type 7: a list of external files. Much faster than the
+/// list of properties, which copies all of them.
 bool has_external_list(const Id& dataset) {
 #if H5_VERSION_GE(1, 12, 0)
   H5O_native_info_t info;

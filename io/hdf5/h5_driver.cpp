@@ -54,7 +54,8 @@ struct CheckedFile {
     any_failure = true;
   }
 
-  /// Calls `use` with `written`, if there is one. The library knows no exceptions.
+  /// Calls `use` with `written`, if there is one. No exception may pass through the library, which
+  /// is in C.
   template <class Use>
   void keep_track(const Use& use) noexcept {
     if (written == nullptr || failure->any()) return;

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "engine/model/model.hpp"
+#include "engine/scene/outer_pose.hpp"
 #include "engine/sense/readout.hpp"
 #include "engine/step/batch.hpp"
 #include "io/picture/body_faces.hpp"
@@ -153,7 +154,7 @@ class Picture {
     };
     for (int tries = 0; tries < 40 && taken(at); ++tries) at.y += 12;
     labels_.push_back({at.x, at.y, width});
-    // Its white edge is a text of its own: not every program knows paint-order.
+    // Its white edge is a text of its own: not every program supports paint-order.
     return svg::text(at.x, at.y, name,
                      "font-size=\"11\" fill=\"#fff\" stroke=\"#fff\" stroke-width=\"3\"") +
            svg::text(at.x, at.y, name, fmt::format("font-size=\"11\" fill=\"{}\"", colour).c_str());

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 
+#include "engine/scene/outer_pose.hpp"
 #include "engine/scene/shapes.hpp"
 #include "io/robot/mesh_solid.hpp"
 #include "io/robot/mjcf_file.hpp"

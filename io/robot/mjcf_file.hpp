@@ -77,7 +77,7 @@ class MjcfFile {
   bool align_free = false;  ///< free joints are aligned with the inertia of their bodies
   std::array<int, 2> inertia_groups{0, 5};
   std::vector<int> disabled_groups;   ///< of actuators
-  std::vector<double> keyframe_ctrl;  ///< of the wanted keyframe, by actuator; may be short
+  std::vector<double> keyframe_ctrl;  ///< of the requested keyframe, by actuator; may be short
   std::map<std::string, MjcfMesh> meshes;
   std::map<std::string, std::array<double, 4>> materials;
   std::map<std::string, MjcfJoint> joints;

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "engine/scene/outer_pose.hpp"
 #include "io/robot/mjcf_file.hpp"
 
 namespace tangere {

@@ -9,6 +9,7 @@
 #include <cmath>
 #include <filesystem>
 
+#include "engine/scene/outer_pose.hpp"
 #include "io/robot/mjcf_file.hpp"
 #include "io/robot/mjcf_words.hpp"
 

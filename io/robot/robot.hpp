@@ -86,7 +86,7 @@ class RobotNames {
  public:
   /// `requested`, or `requested` with the next free number behind it.
   std::string free_name(const std::string& requested);
-  /// Keeps a name that a file gives for whoever has it there.
+  /// Reserves a name that a file gives to one of its own elements.
   void keep(const std::string& name) { names_.insert(name); }
 
  private:

@@ -9,6 +9,7 @@
 #include <limits>
 
 #include "engine/model/model.hpp"
+#include "engine/scene/outer_pose.hpp"
 #include "engine/scene/shapes.hpp"
 #include "engine/scene/surface_contact.hpp"
 #include "engine/scene/surface_points.hpp"

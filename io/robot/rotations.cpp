@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Plain formulas: a robot is read once.
 #include "io/robot/rotations.hpp"
+#include "engine/scene/outer_pose.hpp"
 
 #include <cctype>
 #include <cmath>

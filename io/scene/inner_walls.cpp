@@ -122,7 +122,7 @@ class Walls {
 
   void find() {
     if (!(whole_ > 0)) return;
-    std::map<Key, std::vector<int>> back;  // faces whose normal looks away, by plane
+    std::map<Key, std::vector<int>> back;  // faces whose normal points away, by plane
     for (std::size_t f = 0; f < faces_.size(); ++f) {
       const std::array<double, 4> p = plane(faces_[f]);
       if (faces_[f].area > 0 && !is_front(faces_[f]))

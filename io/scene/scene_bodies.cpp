@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "engine/scene/outer_pose.hpp"
 #include "engine/scene/scene_faults.hpp"
 #include "engine/scene/scene_number.hpp"
 #include "engine/scene/schema.hpp"

@@ -9,6 +9,7 @@
 #include <cmath>
 #include <map>
 
+#include "engine/scene/outer_pose.hpp"
 #include "io/files/nearest_name.hpp"
 #include "io/files/text_file.hpp"
 #include "io/scene/scene_sections.hpp"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Reads sensors of a scene file, by layout, and which of their readings are wanted.
+// Reads sensors of a scene file, by layout, and which of their readings are requested.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -8,6 +8,7 @@
 
 #include "engine/scene/field_form.hpp"
 #include "engine/scene/imperfection_checks.hpp"
+#include "engine/scene/outer_pose.hpp"
 #include "engine/scene/sensed_bodies.hpp"
 #include "engine/scene/skin_material.hpp"
 #include "io/files/name_list.hpp"

@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "engine/base/error.hpp"
+#include "engine/scene/outer_pose.hpp"
 #include "io/files/word_reader.hpp"
 
 namespace tangere {

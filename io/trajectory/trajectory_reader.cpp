@@ -163,7 +163,7 @@ struct TrajectoryReader::Impl {
       throw IoError(fmt::format("{}: sensor '{}' has {} dimensions; expected 4 or 5", path, name,
                                 dims.size()));
     }
-    // Whoever looks for the newest field goes through all of them.
+    // A search for the newest field goes through all of them.
     if (dims[0] > static_cast<hsize_t>(std::max<std::int64_t>(steps, 0)))
       throw IoError(fmt::format("{}: sensor '{}' claims {} fields of {} steps: the file is damaged",
                                 path, name, dims[0], steps));

@@ -140,7 +140,7 @@ EntryRows<N> entries_at(const ModelView& model, const StageArgs<N>& a, int i, in
           p.ordinals + (i - p.tree_dof[row]) * width + (k - first), width};
 }
 
-/// Calls `f` with the kind of a joint as a template argument, so that asking for the kind costs
+/// Calls `f` with the kind of a joint as a template argument, so that the choice of the kind costs
 /// nothing.
 template <class F>
 void with_kind(JointKind kind, const F& f) {

@@ -172,7 +172,7 @@ void add_environments(nb::module_& m) {
       .def("status", &Environments::status, "(E) int8, as in Batch.status.")
       .def(
           "scripted", [](Environments& self) { return self.actions_of(0); },
-          "(E, action): what the task's own script would do. It may look at the whole state.")
+          "(E, action): what the task's own script would do. It may use the whole state.")
       .def(
           "random", [](Environments& self) { return self.actions_of(1); },
           "(E, action): uniform within the bounds, the same for the same seed and episode.")

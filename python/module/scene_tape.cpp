@@ -48,7 +48,7 @@ Scene with_points(Scene scene, const Model& model, std::span<const double> moved
 }
 
 /// Whether a number that has a derivative is the same in all environments: contact points follow
-/// from a size, and <randomize> does not know every number.
+/// from a size, and <randomize> does not take every number.
 bool is_shared(const Scene& scene, const std::string& name) {
   for (const SceneNumber& number : variable_numbers(scene)) {
     if (name_of(number) != name) continue;

@@ -11,7 +11,7 @@
 `tangere.scene_builder` builds scenes without files, `tangere.robots` makes them of robots.
 `tangere.gym` has the environments, `tangere.scene_env` those of a task written in Python,
 `tangere.torch` and `tangere.jax` gradients through PyTorch and JAX, `tangere.data` data sets for
-learning, `tangere.policy` policies that the command asks. `tangere.lerobot`, `tangere.robomimic`,
+learning, `tangere.policy` policies that the command calls. `tangere.lerobot`, `tangere.robomimic`,
 `tangere.d3rlpy` and `tangere.sb3` connect to the libraries of these names. All but
 `tangere.scene_builder`, `tangere.robots`, `tangere.gym`, `tangere.scene_env` and `tangere.policy`
 need packages that `import tangere` does not import.

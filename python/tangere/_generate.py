@@ -62,8 +62,8 @@ def generate(
 
     Parameters
     ----------
-    what: a task's name, the path of a scene, a class of `tangere.VectorSceneEnv`, or the id with
-        which Gymnasium knows a task.
+    what: a task's name, the path of a scene, a class of `tangere.VectorSceneEnv`, or the id
+        under which a task is registered with Gymnasium.
     output: folder of the data set.
     policy: a name, such as "random", or for a task a function as `tangere.policy.serve` takes.
         None: the script of the task, the controls of a scene. A class has "random" or a function,

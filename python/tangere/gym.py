@@ -231,7 +231,7 @@ class VectorTaskEnv(EpisodesEnv):
         return self._observe(), reward, terminated, truncated, info
 
     def scripted_action(self) -> np.ndarray:
-        """(E, na): what the task's own script does here. It may look at the whole state."""
+        """(E, na): what the task's own script does here. It may use the whole state."""
         return self._env.scripted()
 
     def state(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -394,7 +394,7 @@ class TaskEnv(Remade, SingleEnv):
         return self._vector.observation_scale
 
     def scripted_action(self) -> np.ndarray:
-        """(na): what the task's own script does here. It may look at the whole state."""
+        """(na): what the task's own script does here. It may use the whole state."""
         return self._vector.scripted_action()[0]
 
     def state(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A policy in Python that `tangere generate --program` asks for actions.
+"""A policy in Python that `tangere generate --program` calls for actions.
 
     # my_policy.py
     import tangere.policy

@@ -284,7 +284,7 @@ class Insertion : public Task {
 /// Estimates the error from the rim's forces. An error in x loads one finger more than the other.
 /// An error in y turns the box about the grip. The script then moves the box back by the mean
 /// offset that misses the hole. A box with a yaw error stands on two opposite corners, with the
-/// same forces for both signs, so the script tries one, then the other.
+/// same forces for both signs, so the script takes one, then the other.
 void Insertion::scripted(const TaskView& view, std::span<const double> o,
                          std::span<double> action) const {
   std::array<double, kPads> up{};

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "tasks/catalogue/task.hpp"
 #include "tasks/gradients/gradients.hpp"
 
 namespace tangere {

@@ -11,9 +11,10 @@
 #include "engine/rows/episode_sink.hpp"
 #include "engine/step/batch.hpp"
 #include "tasks/gradients/tape_options.hpp"
-#include "tasks/gradients/task_rollout.hpp"
 
 namespace tangere {
+
+class Task;
 
 /// Owns the threads and their scratch. Use it for many rollouts of one model, as in a descent.
 class GradientRollouts {

@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "engine/base/as_size.hpp"
+#include "kernels/numbers/block.hpp"
 
 namespace tangere {
 

@@ -9,6 +9,7 @@
 #include "engine/derivative/loss.hpp"
 #include "engine/sense/readout.hpp"
 #include "tasks/gradients/tape_block.hpp"
+#include "tasks/run/step_tally.hpp"
 
 namespace tangere {
 

@@ -9,13 +9,18 @@
 
 #include "engine/base/precision.hpp"
 #include "engine/step/stepper.hpp"
-#include "tasks/run/step_tally.hpp"
+#include "tasks/run/step_counts.hpp"
 
 namespace tangere {
+
+struct TaskView;
 
 /// Fills the controls (nu) of one environment's step. Several threads call it, possibly more than
 /// once for a step.
 using StepControls = std::function<void(std::int64_t step, int environment, std::span<double> u)>;
+/// Fills the action of an episode from `view` and `observation`. Several threads call it.
+using TaskActions = std::function<void(const TaskView& view, std::span<const double> observation,
+                                       std::span<double> action)>;
 
 struct TapeOptions {
   /// Steps of a scene's rollout; actions of a task's episode at most, 0: the task's horizon.

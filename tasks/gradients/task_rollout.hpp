@@ -4,20 +4,16 @@
 #pragma once
 
 #include <array>
-#include <functional>
 #include <memory>
 #include <optional>
 #include <vector>
 
 #include "engine/step/tape.hpp"
 #include "kernels/numbers/block.hpp"
+#include "tasks/gradients/tape_options.hpp"
 #include "tasks/run/block_worker.hpp"
 
 namespace tangere {
-
-/// Fills the action of an episode from `view` and `observation`. Several threads call it.
-using TaskActions = std::function<void(const TaskView& view, std::span<const double> observation,
-                                       std::span<double> action)>;
 
 /// The start of an action, for every lane.
 struct ActionRecord {

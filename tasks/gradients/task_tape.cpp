@@ -221,10 +221,10 @@ void TaskTape::step(std::span<const double> actions, std::span<const double> var
   ++i.taken;
 }
 
-void TaskTape::reverse(const ActionCotangents& by, std::span<double> action_bar,
+void TaskTape::reverse(const ActionCotangents& results_bar, std::span<double> action_bar,
                        std::span<double> parameter_bar) {
   Impl& i = *impl_;
-  i.check_cotangents(by);
+  i.check_cotangents(results_bar);
   expect_numbers(parameter_bar.size(), i.e * i.numbers, true, "derivatives by the scene's numbers");
   expect_numbers(action_bar.size(), i.e * i.width, false, "derivatives by actions");
   i.check_sound();
@@ -234,14 +234,14 @@ void TaskTape::reverse(const ActionCotangents& by, std::span<double> action_bar,
         i.taken));
   if (i.phase == Phase::forward) i.begin_reverse();
   i.each(Phase::back, [&](TaskBlock& block, int b) {
-    block.reverse(i.left - 1, i.of(by, b), i.of(action_bar, b), i.of(parameter_bar, b));
+    block.reverse(i.left - 1, i.of(results_bar, b), i.of(action_bar, b), i.of(parameter_bar, b));
   });
   --i.left;
 }
 
-void TaskTape::reverse_start(const ActionCotangents& by, const StartCotangents& out) {
+void TaskTape::reverse_start(const ActionCotangents& results_bar, const StartCotangents& out) {
   Impl& i = *impl_;
-  i.check_cotangents(by);
+  i.check_cotangents(results_bar);
   expect_numbers(out.q.size(), i.e * i.nv, true, "derivatives by the first q");
   expect_numbers(out.v.size(), i.e * i.nv, true, "derivatives by the first v");
   expect_numbers(out.parameters.size(), i.e * i.numbers, true,
@@ -258,8 +258,9 @@ void TaskTape::reverse_start(const ActionCotangents& by, const StartCotangents& 
                     i.to_reverse(), i.taken));
   if (i.phase == Phase::forward) i.begin_reverse();
   i.each(Phase::done, [&](TaskBlock& block, int b) {
-    block.reverse_reset(i.of(by, b), {i.of(out.q, b), i.of(out.v, b), i.of(out.parameters, b),
-                                      i.of(out.points, b), i.of(out.shear_state, b)});
+    block.reverse_reset(i.of(results_bar, b),
+                        {i.of(out.q, b), i.of(out.v, b), i.of(out.parameters, b),
+                         i.of(out.points, b), i.of(out.shear_state, b)});
   });
 }
 

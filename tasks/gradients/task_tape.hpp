@@ -15,10 +15,10 @@
 
 namespace tangere {
 
-/// E environments of one task. Environment e plays episode first + e, once. Its bits are those of a
-/// VectorTask that solves to the same tolerance; they depend neither on E, nor on threads, nor on
-/// tape_bytes, nor on the other environments. An environment whose episode has ended, or whose
-/// simulation has failed, keeps its last state and observation.
+/// E environments of one task. Environment e plays episode first_episode + e, once. Its bits are
+/// those of a VectorTask that solves to the same tolerance; they depend neither on E, nor on
+/// threads, nor on tape_bytes, nor on the other environments. An environment whose episode has
+/// ended, or whose simulation has failed, keeps its last state and observation.
 class TaskTape {
  public:
   /// Makes E environments and resets them. `task` must outlive this object. Throws
@@ -31,7 +31,7 @@ class TaskTape {
   TaskTape& operator=(TaskTape&&) noexcept;
 
   /// Starts episodes first_episode … first_episode + E - 1 of a seed and clears the tape. `record`:
-  /// whether its steps can be reversed; without it no state is kept.
+  /// whether its actions can be reversed; otherwise no state is kept.
   void reset(std::uint64_t seed, std::int64_t first_episode, bool record = true);
   /// Moves the states in which the first actions begin: q (E, nq) with quaternions of unit length,
   /// v (E, nv) and, unless empty, shear states (E, points, 3)
@@ -50,7 +50,7 @@ class TaskTape {
 
   [[nodiscard]] const Task& task() const;
   [[nodiscard]] int environments() const;
-  [[nodiscard]] std::int64_t taken() const;  ///< steps since the reset
+  [[nodiscard]] std::int64_t taken() const;  ///< actions since the reset
   /// Views of the results of the last reset or step. They stay valid as long as the object;
   /// reverse() does not change them.
   [[nodiscard]] std::span<const double> observations() const;  ///< (E, observation)
@@ -70,23 +70,24 @@ class TaskTape {
   /// View for a policy with access to the state: the current q, v and task state.
   [[nodiscard]] TaskView view(int environment) const;
 
-  /// Reverses the last step that is not reversed yet; the first call begins at the last step.
-  /// In: cotangents of the results of that step; an empty span means zeros. Out: ∂L/∂actions (E,
-  /// action) through this step and later ones. It is 0 for a component beyond its bounds and for an
-  /// environment that did not take the action. Cotangents of the repeated last observation of an
-  /// ended episode count for its last action. Throws InputError when every
-  /// step is reversed, and when a task has no Task::observe_vjp or restart_state_vjp that it would
-  /// need; then only reset() is possible. `parameter_bar`, (E, NumberGradients::count()) or empty:
-  /// derivatives by the scene's numbers that the step brought, while they held; 0 without them.
-  void reverse(const ActionCotangents& by, std::span<double> action_bar,
+  /// Reverses the last action that is not reversed yet; the first call begins at the last action.
+  /// In: cotangents of the results of that action; an empty span means zeros. Out: ∂L/∂actions (E,
+  /// action) through this action and later ones. It is 0 for a component beyond its bounds and for
+  /// an environment that did not take the action. Cotangents of the repeated last observation of an
+  /// ended episode count for its last action. Throws InputError when every action is reversed, and
+  /// when a task has no Task::observe_vjp or restart_state_vjp that it would need; then only
+  /// reset() is possible. `parameter_bar`, (E, NumberGradients::count()) or empty: derivatives by
+  /// the values of the scene's numbers that step() set with this action, as long as they held; 0 if
+  /// it set none.
+  void reverse(const ActionCotangents& results_bar, std::span<double> action_bar,
                std::span<double> parameter_bar = {});
   /// Ends the reverse pass. In: cotangents of the observation at the reset and of the states at the
   /// first action (rewards are ignored). Out: cotangents of these states and, if options request
   /// them, of the scene's numbers while those of the start held and of points of sensors. The
   /// reset, all random draws and snapshots of a warm-up before its last one count as constant.
-  /// Throws InputError while steps are left to reverse, and at a second call.
-  void reverse_start(const ActionCotangents& by, const StartCotangents& out);
-  /// Begins another reverse pass over the same steps, from the last one.
+  /// Throws InputError while actions are left to reverse, and at a second call.
+  void reverse_start(const ActionCotangents& results_bar, const StartCotangents& out);
+  /// Begins another reverse pass over the same actions, from the last one.
   void begin_reverse();
 
   /// Simulation steps recomputed from checkpoints since construction, counted by block.

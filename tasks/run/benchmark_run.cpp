@@ -18,6 +18,8 @@
 #include "tasks/run/benchmark_fields.hpp"
 #include "tasks/run/block_threads.hpp"
 #include "tasks/run/checksum.hpp"
+#include "tasks/run/episode_program.hpp"
+#include "tasks/run/step_tally.hpp"
 
 namespace tangere {
 namespace {

@@ -11,6 +11,7 @@
 #include "engine/step/batch.hpp"
 #include "engine/step/control.hpp"
 #include "tasks/run/benchmark_options.hpp"
+#include "tasks/run/policy.hpp"
 
 namespace tangere {
 

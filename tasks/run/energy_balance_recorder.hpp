@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "engine/sense/energy_balance.hpp"
-#include "tasks/run/energy_balance_summary.hpp"
 #include "tasks/run/step_tally.hpp"
 
 namespace tangere {

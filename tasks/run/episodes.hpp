@@ -25,8 +25,9 @@ namespace tangere {
 /// for an episode are keyed by (seed, episode), so neither `threads` nor `blocks_in_flight` changes
 /// a bit. Throws InputError when a number is out of its range, when steps is no multiple of every,
 /// and when the controls are too short, were laid out for another timestep, or change while an
-/// action is held. `progress` gets environment steps after each row of each block; `stop` ends the
-/// run without finishing a block. Rethrows exceptions of the sink after all threads have ended.
+/// action is held. `progress` gets environment steps after each row of each block; a requested
+/// `stop` ends the run, and unfinished blocks are lost. Rethrows exceptions of the sink after all
+/// threads have ended.
 EpisodeSummary run_episodes(const Model& model, const StepperOptions& solver,
                             const ControlProgram& controls, const EpisodeOptions& options,
                             EpisodeSink& sink, const ProgressCallback& progress = {},
@@ -43,14 +44,14 @@ EpisodeSummary run_episodes(const Task& task, const Policy& policy, const Episod
 std::vector<EpisodeRange> checked_ranges(const std::vector<EpisodeRange>& ranges,
                                          std::int64_t episodes);
 
-/// Returns K: `every` if positive, else the interval of the scene's sensors, else 1. Throws
-/// InputError when the sensors disagree.
+/// Returns K, the steps of an action: `every` if positive, else the interval of the scene's
+/// sensors, else 1. Throws InputError when sensors have different intervals.
 int action_interval(const Model& model, int every);
 
 /// Threads that this process may run at once.
 int available_threads();
 
-/// Memory of a run [bytes].
+/// Memory of a run besides the model [bytes].
 double episode_bytes(const Model& model, const EpisodeOptions& options);
 double episode_bytes(const Task& task, const EpisodeOptions& options);
 

@@ -23,7 +23,7 @@ class Recorder {
  public:
   enum class When {
     step,    ///< after a step, before counts and the task's snapshot
-    action,  ///< after a task has seen the end of an action
+    action,  ///< after the end of a task's action
     row      ///< after all of that, and before the first step
   };
 

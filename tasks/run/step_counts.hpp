@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Counts of steps and evaluations, for rollouts, episodes, benchmarks, cases and tasks.
+// Counts of steps and evaluations, and failed environments, for rollouts, episodes, benchmarks,
+// cases and tasks.
 #pragma once
 
 #include <cstdint>
@@ -46,6 +47,13 @@ struct StepCounts {
     bodies_asleep += other.bodies_asleep;
     return *this;
   }
+};
+
+/// An environment for which no solution was found. It keeps the state before that step.
+struct FailedEnvironment {
+  int environment;
+  std::int64_t step;  ///< the first that failed; -1: before this run
+  StepStatus status;  ///< why
 };
 
 /// Counts of actions, steps and episodes of a task's environments.

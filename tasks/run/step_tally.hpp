@@ -8,17 +8,9 @@
 #include <vector>
 
 #include "engine/step/batch.hpp"
-#include "kernels/numbers/block.hpp"
 #include "tasks/run/step_counts.hpp"
 
 namespace tangere {
-
-/// An environment for which no solution was found. It keeps the state before that step.
-struct FailedEnvironment {
-  int environment;
-  std::int64_t step;  ///< the first that failed; -1: before this run
-  StepStatus status;  ///< why
-};
 
 /// Number of environments in a block.
 inline int lanes_of(const Batch& batch, int block) {

@@ -6,9 +6,9 @@
 // when the program ends, how many calls of that kind there were. Kinds: write, sync, rename, close,
 // truncate, open, read, thread, memory. Allocations by HDF5 and zlib are not among memory: HDF5
 // uses about one in thirty without a check, and stores a chunk as it is where zlib gets no memory
-// (docs/failures.md). Two more kinds are those
-// of a disk that lies: the n-th write or truncation (lost) does nothing, or the n-th write puts
-// zeros in place of the bytes (zeros), and says that it succeeded.
+// (docs/failures.md). Two more kinds are those of a disk that lies: the n-th write or truncation
+// (lost) does nothing, or the n-th write puts zeros in place of the bytes (zeros), and says that it
+// succeeded.
 #include <dlfcn.h>
 #include <fcntl.h>
 #include <link.h>

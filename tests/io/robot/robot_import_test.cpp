@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <fstream>
 
+#include "engine/scene/outer_pose.hpp"
 #include "io/robot/robot_import.hpp"
 #include "io/robot/rotations.hpp"
 #include "io/scene/scene_reader.hpp"

@@ -9,6 +9,7 @@
 
 #include "engine/model/compile.hpp"
 #include "engine/scene/mass_properties.hpp"
+#include "engine/scene/outer_pose.hpp"
 #include "engine/scene/shapes.hpp"
 #include "engine/sense/readout.hpp"
 #include "io/robot/robot_import.hpp"
