@@ -181,7 +181,7 @@ class FieldReader {
     double least = HUGE_VAL;
     for (int k = 0; k < kRounds; ++k) {
       const auto start = std::chrono::steady_clock::now();
-      for (auto& of_sensor : frames) readout_.read_block(batch_, 0, std::span(of_sensor));
+      for (auto& blocks : frames) readout_.read_block(batch_, 0, std::span(blocks));
       least = std::min(
           least, std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
     }

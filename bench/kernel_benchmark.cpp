@@ -80,7 +80,7 @@ class Group {
 
   static const kernels::KernelTable& table() { return kernels::active_kernels(); }
   [[nodiscard]] const kernels::ModelView& view() const { return compiled(model_).view; }
-  [[nodiscard]] const CompiledModel& of_model() const { return compiled(model_); }
+  [[nodiscard]] const CompiledModel& compiled_model() const { return compiled(model_); }
   Workspace& work() { return work_; }
 
  private:
@@ -115,14 +115,14 @@ void BM_Kinematics(benchmark::State& s) {
 void BM_FindCandidates(benchmark::State& s) {
   run(s, kGroup, [](Group& g) {
     g.work().own_candidates.searched = 0;
-    find_candidates(g.of_model(), g.table(), g.work(), kAllLanes);
+    find_candidates(g.compiled_model(), g.table(), g.work(), kAllLanes);
   });
 }
 void BM_ListsToRows(benchmark::State& s) {
   run(s, kGroup, [](Group& g) {
     g.work().own_candidates.all_in_rows = 0;
     std::ranges::fill(g.work().own_candidates.in_rows, kNoLane);
-    lists_to_rows(g.of_model(), g.table(), g.work(), kAllLanes);
+    lists_to_rows(g.compiled_model(), g.table(), g.work(), kAllLanes);
   });
 }
 void BM_Residual(benchmark::State& s) {

@@ -57,7 +57,7 @@ Controls along_the_aisle(int environments, int steps) {
 }
 
 /// The scene's own controls, from its first step on.
-Controls of_scene(const Model& model, int environments, int steps) {
+Controls scene_controls(const Model& model, int environments, int steps) {
   const ControlProgram program(model, model.timestep(), 0);
   const auto nu = static_cast<std::size_t>(model.nu());
   Controls all(static_cast<std::size_t>(steps));
@@ -183,7 +183,7 @@ void nobody_sleeps(benchmark::State& state, const std::string& name) {
   if (name == "ten_boxes") of.gravity[1] = 0.05 * of.gravity[2];
   const Model model(of);
   compare(state, model, 1e-14, environments, {},
-          of_scene(model, environments, environments == 1 ? 300 : 100));
+          scene_controls(model, environments, environments == 1 ? 300 : 100));
 }
 
 }  // namespace

@@ -169,7 +169,7 @@ void block(benchmark::State& state, int resolution, bool pressure = false) {
   for (Touch<kernels::LaneRow>& touch : touches)
     for (std::size_t k = 0; k < sizeof(Touch<double>) / sizeof(double); ++k)
       std::fill_n(reinterpret_cast<kernels::LaneRow*>(&touch)[k].lane, kernels::kGroup, from[k]);
-  const Touch<kernels::LaneRow>* of_shape[] = {touches.data()};
+  const Touch<kernels::LaneRow>* shape_touches[] = {touches.data()};
   std::array<std::vector<Real>, kLanes> arrays;
   std::array<Real*, kLanes> dense;
   for (std::size_t l = 0; l < kLanes; ++l) {
@@ -177,7 +177,7 @@ void block(benchmark::State& state, int resolution, bool pressure = false) {
     dense[l] = arrays[l].data();
   }
   const kernels::TactileBlockArgs<Real> args{&pad,     ContactLaw::clamped, 1,       &kMiddle.shape,
-                                             of_shape, dense.data(),        pressure};
+                                             shape_touches, dense.data(),        pressure};
   for (auto _ : state) {
     run(args);
     benchmark::ClobberMemory();

@@ -77,7 +77,7 @@ EXPERIMENTS = [
     Experiment("ppo-insertion", "ppo.py insertion", 5, 140, "insertion, all", "83 %, 4.81",
                first_seed=5),
     Experiment("ppo-grasp", "ppo.py stable_grasp", 5, 90, "stable grasp, flow", "98.5 %, 2.1"),
-    Experiment("ppo-cap-blind", "ppo.py cap_opening_blind", 5, 470,
+    Experiment("ppo-cap-blind", "ppo.py cap_opening_blind", 3, 470,
                "cap, blind, imitates 3/10", "59.7 %", first_seed=5),
     Experiment("ppo-cap", "ppo.py cap_opening", 5, 300,
                "cap, touch, imitates 4/5", "87.3 %", first_seed=5),

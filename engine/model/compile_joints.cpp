@@ -306,11 +306,11 @@ void check_masses(const CompiledModel& m) {
     for (int k = 0; k < joint.link_count; ++k) {
       const auto link = std::size_t(joint.link + k);
       if (!(carried[link].mass > 0))
-        fail(i, "moves nothing that has mass; expected a body with mass on it or on a joint that it "
-                "carries");
+        fail(i, "moves nothing that has mass; expected a body with mass on it or on a joint that "
+                "it carries");
       if (!turns_inertia(m, m.links[link], carried[link]))
-        fail(i, "turns points of mass alone, about themselves; expected a body with an inertia on it "
-                "or on a joint that it carries");
+        fail(i, "turns points of mass alone, about themselves; expected a body with an inertia on "
+                "it or on a joint that it carries");
     }
   }
 }

@@ -114,8 +114,8 @@ int add_link(Robot& robot, RobotNames& names, const std::string& name, int paren
 
 /// A piece that is a mass alone. `inertia`: xx xy xz yy yz zz in the frame `pose` at the centre of
 /// mass. Where a principal moment is not positive, another inertia takes its place, and the robot
-/// lists that. `may_be_point`: an inertia of zeros is kept. Without a mass there is no piece. Throws
-/// InputError at `source` if the mass is negative.
+/// lists that. `may_be_point`: an inertia of zeros is kept. Without a mass there is no piece.
+/// Throws InputError at `source` if the mass is negative.
 std::optional<RobotPiece> inertial_piece(Robot& robot, double mass, std::array<double, 6> inertia,
                                          const Pose& pose, const std::string& origin,
                                          const Source& source, bool may_be_point = false);

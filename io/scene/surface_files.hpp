@@ -18,11 +18,11 @@ struct FileSurface {
   std::string fault;           ///< why the faces are no closed surface with a volume, with the file
 };
 
-/// Reads an OBJ file, or an STL or PLY file where the path ends in .stl or .ply, in its own unit, or
-/// a COLLADA file where it ends in .dae, in metres.
-/// Vertices that differ by rounding are merged if the surface would otherwise be open, and inner
-/// walls of flush parts are removed. Throws IoError if the file cannot be read, InputError with
-/// file:line if it is not of its format or has no vertices.
+/// Reads an OBJ file, or an STL or PLY file where the path ends in .stl or .ply, in its own unit;
+/// or a COLLADA file where it ends in .dae, in metres. Vertices that differ by rounding are merged
+/// if the surface would otherwise be open, and inner walls of flush parts are removed. Throws
+/// IoError if the file cannot be read, InputError with file:line if it is not of its format or has
+/// no vertices.
 FileSurface read_faces(const std::string& path);
 
 /// Does the same with triangles that are read already. `name` stands in front of the fault.

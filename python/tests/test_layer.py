@@ -63,7 +63,8 @@ def test_the_surface_moves_with_gradients():
         tangere.Model(tangere.Scene.from_string(text, str(GEL)))
     scene = tangere.Scene.from_string(text.replace(varies, ""), str(GEL))
     sim = tt.Simulation(scene, 1, 60, every=60, read=["gel.surface", "gel.markers"], threads=1)
-    weights = torch.randn(48, 64, 3, generator=torch.Generator().manual_seed(2), dtype=torch.float64)
+    draw = torch.Generator().manual_seed(2)
+    weights = torch.randn(48, 64, 3, generator=draw, dtype=torch.float64)
 
     def surface(u):
         s = sim.step(sim.reset(seed=3), u)

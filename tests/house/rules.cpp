@@ -498,6 +498,14 @@ static void check_columns(const std::string& path, int number, const std::string
         {path, number, std::to_string(columns) + " columns, at most " + std::to_string(most)});
 }
 
+/// Finds names that begin with of_ or by_ outside of texts: they say a relation and no quantity.
+static void check_names(const std::string& path, int number, const std::string& line,
+                        std::vector<Violation>& found) {
+  static const std::regex kRelation("(^|[^A-Za-z0-9_\"])((of|by)_[a-z]\\w*)");
+  if (std::smatch match; std::regex_search(line, match, kRelation))
+    found.push_back({path, number, "'" + match.str(2) + "'; expected the name of a quantity"});
+}
+
 std::vector<Violation> check_sources(const Tree& tree) {
   constexpr std::size_t kMostLines = 600;
   std::vector<Violation> found;
@@ -521,6 +529,9 @@ std::vector<Violation> check_sources(const Tree& tree) {
     for (std::size_t i = 0; i < lines.size(); ++i)
       check_columns(path, static_cast<int>(i) + 1, lines[i],
                     narrow ? kMostColumns : kMostScriptColumns, found);
+    if (is_cpp(path) && top_of(path) != "tests" && top_of(path) != "examples")
+      for (std::size_t i = 0; i < lines.size(); ++i)
+        check_names(path, static_cast<int>(i) + 1, lines[i], found);
     if (is_cpp(path) && (lines.size() < 2 || !lines[1].starts_with("//")))
       found.push_back({path, 2, "expected a comment that says why the file exists"});
   }

@@ -56,7 +56,8 @@ std::vector<Violation> check_own_headers(const Tree& tree);
 std::vector<Violation> check_circles(const Tree& tree);
 
 /// SPDX line first, then a comment that says why the file exists; at most 600 lines. In C++, Python
-/// and JavaScript, at most 100 columns; in shell and CMake, at most 120.
+/// and JavaScript, at most 100 columns; in shell and CMake, at most 120. Names of C++ outside of
+/// tests and examples do not begin with of_ or by_.
 std::vector<Violation> check_sources(const Tree& tree);
 
 /// Every folder with sources has a README.md, its own or, below tests and examples, that of the

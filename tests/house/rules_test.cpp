@@ -182,6 +182,7 @@ TEST(HouseRules, SeeAHeadlessOrOverlongSource) {
       {"engine/empty.cpp", ""},
       {"engine/longest.cpp", longest},
       {"engine/mute.cpp", "// SPDX-License-Identifier: Apache-2.0\n#include <vector>\n"},
+      {"engine/relation.cpp", head + "// e\nint by_mass = 0;\nread(\"of_mass\");\n"},
       {"engine/too_long.cpp", too_long},
       {"engine/wide.cpp", head + "// " + marks + "\n// e\u0304" + std::string(96, 'x') + "\n"},
       {"io/page/wide.js",
@@ -195,8 +196,9 @@ TEST(HouseRules, SeeAHeadlessOrOverlongSource) {
           Says("cmake/wide.sh", 2, "121 columns"), Says("engine/bare.hpp", 1, "SPDX"),
           Says("engine/bare.hpp", 2, "why"), Says("engine/empty.cpp", 1, "SPDX"),
           Says("engine/empty.cpp", 2, "why"), Says("engine/mute.cpp", 2, "why"),
-          Says("engine/too_long.cpp", 0, "601 lines"), Says("engine/wide.cpp", 3, "102 columns"),
-          Says("io/page/wide.js", 2, "101 columns"), Says("tests/CMakeLists.txt", 1, "SPDX")));
+          Says("engine/relation.cpp", 3, "'by_mass'"), Says("engine/too_long.cpp", 0, "601 lines"),
+          Says("engine/wide.cpp", 3, "102 columns"), Says("io/page/wide.js", 2, "101 columns"),
+          Says("tests/CMakeLists.txt", 1, "SPDX")));
 }
 
 TEST(HouseRules, SeeAnUndocumentedFolderAndADeadLink) {
