@@ -15,8 +15,8 @@
 
 namespace tangere {
 
-/// Returns a number of points, rounded up to whole vectors, and one vector more: a search that finds
-/// so many points writes no more.
+/// Returns a number of points, rounded up to whole vectors, and one vector more: a search that
+/// finds so many points writes no more.
 inline int stride_of(int points) {
   return (points + kernels::kGroup - 1) / kernels::kGroup * kernels::kGroup + kernels::kGroup;
 }
