@@ -61,7 +61,8 @@ void check_arguments(const AccuracyArguments& o) {
 /// Refuses states and controls that would not fit.
 void check_size(const AccuracyArguments& o, const Model& model, std::int64_t steps) {
   const int environments = environments_of(o);
-  const double environment_bytes = 3.0 * static_cast<double>(model.state_bytes_per_environment()) +
+  const double environment_bytes = 3.0 * static_cast<double>(model.state_bytes_per_environment() +
+                                                             Stepper::candidate_bytes(model)) +
                                    static_cast<double>(steps) * model.nu() * sizeof(double);
   check_memory(environment_bytes * environments,
                fmt::format("--envs {} of {} steps", environments, steps));

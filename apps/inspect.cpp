@@ -170,6 +170,7 @@ Json as_json(const Model& model) {
           {"effects", effects_json(model.effects())},
           {"stages", list_of(model.stages(), stage_json)},
           {"state_bytes_per_environment", model.state_bytes_per_environment()},
+          {"candidate_bytes_per_environment", Stepper::candidate_bytes(model)},
           {"workspace_bytes", Stepper::workspace_bytes(model)},
           {"instruction_set", kernels::active_isa_name()}};
 }
@@ -247,10 +248,11 @@ std::string as_text(const Model& model) {
   for (const StageInfo& s : model.stages())
     text += fmt::format("  {:<16} {}: {}\n", s.name, s.of, s.variant);
   return text + fmt::format(
-                    "\nmemory: {} bytes per environment, {} bytes of workspace per thread\n"
+                    "\nmemory: {} bytes per environment, about {} more of contact candidates, {} "
+                    "bytes of workspace per thread\n"
                     "instruction set: {}",
-                    model.state_bytes_per_environment(), Stepper::workspace_bytes(model),
-                    kernels::active_isa_name());
+                    model.state_bytes_per_environment(), Stepper::candidate_bytes(model),
+                    Stepper::workspace_bytes(model), kernels::active_isa_name());
 }
 
 /// `task`: null for a scene alone.

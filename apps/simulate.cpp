@@ -53,7 +53,8 @@ void check_arguments(const SimulateArguments& options) {
 }
 
 void check_size(const Model& model, int environments, int threads, const RolloutOptions& rollout) {
-  const double state = static_cast<double>(model.state_bytes_per_environment());
+  const double state =
+      static_cast<double>(model.state_bytes_per_environment() + Stepper::candidate_bytes(model));
   check_memory(state * environments + rollout_bytes(model, environments, rollout.outputs) +
                    threads * static_cast<double>(Stepper::workspace_bytes(model)),
                fmt::format("--envs {}", environments));

@@ -7,9 +7,10 @@
 MuJoCo is the wheel that python/requirements.txt pins. It runs whole episodes in its own C++ loop
 (mujoco.rollout), so no time of Python counts beyond one call per 16 episodes. Both engines simulate
 a pad that presses a light ball onto the ground and rolls it about, for 1.75 s, with the same
-masses, controls and places. What a contact is differs: a soft constraint there, a penalty at 2 168
-points here. With a field both compute 20 x 20 points after every step; MuJoCo's have a depth and
-two speeds, and no force. CPU time of the process; the least of all turns counts.
+masses, controls, places and pairs that may touch. What a contact is differs: a soft constraint
+there, a penalty at 2 168 points here. With a field both compute 20 x 20 points after every step;
+MuJoCo's have a depth and two speeds, and no force. CPU time of the process; the least of all turns
+counts.
 """
 
 import argparse
@@ -64,7 +65,7 @@ def peer(field: bool) -> mujoco.MjModel:
     sensor = '<sensor><tactile geom="pad" mesh="skin"/></sensor>' if field else ""
     return mujoco.MjModel.from_xml_string(f"""<mujoco>
   <option timestep="{STEP}" gravity="0 0 -9.8" integrator="implicitfast" cone="elliptic"/>
-  <default><geom {CONTACT}/></default>
+  <default><geom {CONTACT} contype="0" conaffinity="1"/></default>
   <asset>{skin()}</asset>
   <worldbody>
     <geom type="plane" size="1 1 0.1" friction="0.8"/>
@@ -72,7 +73,8 @@ def peer(field: bool) -> mujoco.MjModel:
       <geom name="pad" type="box" size="0.025 0.025 0.005" density="1000" friction="1"/>
     </body>
     <body pos="0 0 0.02"><freejoint/>
-      <geom name="ball" type="sphere" size="0.02" density="1" friction="0.8"/>
+      <geom name="ball" type="sphere" size="0.02" density="1" friction="0.8"
+            contype="1" conaffinity="0"/>
     </body>
   </worldbody>
   <actuator>{motors}</actuator>{sensor}

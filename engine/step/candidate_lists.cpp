@@ -77,7 +77,7 @@ CandidateLists<L>::CandidateLists(const CompiledModel& m)
 template <int L>
 void CandidateLists<L>::reserve(const CompiledModel& m, std::size_t pair, int points) {
   const List old = lists[pair];
-  const int needed = (points + kGroup - 1) / kGroup * kGroup + kGroup;
+  const int needed = stride_of(points);
   if (needed <= old.stride) return;
   List& list = lists[pair];
   Storage storage;
@@ -108,13 +108,21 @@ void CandidateLists<L>::clear(LaneBits lanes) {
 }
 
 template <int L>
-std::size_t CandidateLists<L>::most_bytes(const CompiledModel& m) {
-  std::size_t bytes = 0;
-  for (const kernels::PairContact& pair : m.pairs) {
-    List list{};
-    list.stride = search_stride(pair);
-    bytes += lay_out<L>(pair, nullptr, list) * sizeof(double);
-    if (pair.memory >= 0) bytes += std::size_t(L * list.stride) * sizeof(int);
+std::size_t CandidateLists<L>::bytes(const CompiledModel& m, int most) {
+  const CandidateLists empty(m);
+  std::size_t bytes =
+      sizeof(CandidateLists) + empty.lists.size() * (sizeof(List) + sizeof(Storage)) +
+      (empty.references.size() + empty.faces.size() + empty.sizes.size()) * sizeof(Row<L>);
+  for (const kernels::LinkPair& links : m.link_pairs) {
+    int left = most;
+    for (int i = links.first; i < links.first + links.count && left > 0; ++i) {
+      const kernels::PairContact& pair = m.pairs[std::size_t(m.pair_order[std::size_t(i)])];
+      List list{};
+      list.stride = stride_of(std::min(pair.n_points, left));
+      left -= pair.n_points;
+      bytes += lay_out<L>(pair, nullptr, list) * sizeof(double);
+      if (pair.memory >= 0) bytes += std::size_t(L * list.stride) * sizeof(int);
+    }
   }
   return bytes;
 }

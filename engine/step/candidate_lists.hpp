@@ -5,6 +5,7 @@
 // from one step to the next.
 #pragma once
 
+#include <climits>
 #include <vector>
 
 #include "engine/base/aligned.hpp"
@@ -14,12 +15,12 @@
 
 namespace tangere {
 
-/// Returns the number of a pair's points, rounded up to whole vectors, and one vector more: a
-/// search for points writes no more.
-inline int search_stride(const kernels::PairContact& pair) {
-  return (pair.n_points + kernels::kGroup - 1) / kernels::kGroup * kernels::kGroup +
-         kernels::kGroup;
+/// Returns a number of points, rounded up to whole vectors, and one vector more: a search that
+/// finds so many points writes no more.
+inline int stride_of(int points) {
+  return (points + kernels::kGroup - 1) / kernels::kGroup * kernels::kGroup + kernels::kGroup;
 }
+inline int search_stride(const kernels::PairContact& pair) { return stride_of(pair.n_points); }
 
 template <int L>
 class CandidateLists {
@@ -35,8 +36,9 @@ class CandidateLists {
   void reserve(const CompiledModel& model, std::size_t pair, int points);
   /// Empties the lists of `lanes`, which have none then.
   void clear(LaneBits lanes);
-  /// Bytes of the lists of a scene if they hold all points of all pairs.
-  static std::size_t most_bytes(const CompiledModel& model);
+  /// Returns the bytes of the lists of a scene if they hold all points of all pairs, but at most
+  /// `most` of two links.
+  static std::size_t bytes(const CompiledModel& model, int most = INT_MAX);
 
   std::vector<List> lists;
   /// (n_link_pairs, 12) poses at which the lists were made.

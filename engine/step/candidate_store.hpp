@@ -3,6 +3,7 @@
 // without them a step has the same bits and takes longer.
 #pragma once
 
+#include <cstddef>
 #include <memory>
 #include <vector>
 
@@ -22,10 +23,14 @@ class CandidateStore {
   CandidateStore& operator=(const CandidateStore& of);
   CandidateStore& operator=(CandidateStore&&) noexcept;
 
-  /// Returns the lists of a group, or of its only lane that is stepped. `whole`: whether `model` is
-  /// that of the batch, or it without inert contacts.
+  /// Returns the lists of a group, or those of lane `lane` of it that is stepped alone. `whole`:
+  /// whether `model` is that of the batch, or it without inert contacts.
   template <int L>
-  CandidateLists<L>& lists(std::size_t group, const CompiledModel& model, bool whole);
+  CandidateLists<L>& lists(std::size_t group, int lane, const CompiledModel& model, bool whole);
+
+  /// Estimates the memory of the lists of a group [bytes]: as if two links touched with 192 points,
+  /// or with all if they have fewer. 0 where lists are not kept.
+  static std::size_t group_bytes(const CompiledModel& model);
 
  private:
   struct Group;

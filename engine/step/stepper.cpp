@@ -17,12 +17,38 @@
 #include "engine/step/sleep.hpp"
 #include "engine/step/step_settings.hpp"
 #include "engine/step/tape.hpp"
+#include "kernels/table/isa.hpp"
 
 namespace tangere {
 
 using kernels::kBlock;
 using kernels::kGroup;
 using kernels::Row;
+
+/// Lanes of one group of a block. Environment `first` + l is in lane l.
+struct GroupOfBlock {
+  double* rows;  ///< row r of lane l: rows[r * kBlock + l]
+  int first;
+  LaneBits live = 0, history = 0;
+};
+
+/// Whether lanes are stepped one after another, by kernels of one lane: the bits are the same. A
+/// group takes as long as two lanes alone for each register of a row.
+static bool few(LaneBits lanes) {
+  const int count = std::popcount(lanes), registers = kGroup / kernels::active_register_width();
+  return count < kGroup && count < 2 * registers;
+}
+
+/// Calls f with a group of each of the live lanes alone, and the lane.
+template <class F>
+static void for_each_alone(const GroupOfBlock& g, const F& f) {
+  for (int l = 0; l < kGroup; ++l) {
+    if (!has(g.live, l)) continue;
+    GroupOfBlock one = g;
+    one.live = 1U << l;
+    f(one, l);
+  }
+}
 
 /// Stores a lane's state before a step replaces it, for sensors with lag.
 static void store_past_state(const BlockLayout& layout, double* column, std::int64_t steps) {
@@ -41,13 +67,6 @@ struct ModelStepper {
       : step(m, s),
         work(m, s.integrator.scheme().most_inner_stages()),
         single(m, s.integrator.scheme().most_inner_stages()) {}
-};
-
-/// Lanes of one group of a block. Environment `first` + l is in lane l.
-struct GroupOfBlock {
-  double* rows;  ///< row r of lane l: rows[r * kBlock + l]
-  int first;
-  LaneBits live = 0, history = 0;
 };
 
 /// Model, step and scratch of a group: the whole model, or its awake sub-model.
@@ -168,7 +187,7 @@ struct Stepper::Impl {
     w.stage.group = 0;
     const KeptLists<L> kept{w};
     if (!sleeping && keeps_lists(stepped.model))
-      w.use(batch.candidates_.lists<L>(as_size(g.first / kGroup), stepped.model,
+      w.use(batch.candidates_.lists<L>(as_size(g.first / kGroup), lane, stepped.model,
                                        &stepped.model == &m));
     const LaneBits live = g.live >> lane;
     NewtonReport report;
@@ -264,8 +283,7 @@ struct Stepper::Impl {
       GroupOfBlock alike = g;
       for (int l = 0; l < kGroup; ++l)
         if (!has(left, l) || !same(state(l), state(first))) alike.live &= ~(1U << l);
-      // Two lanes one after the other take no longer than a group.
-      if (state(first).bodies > 0 && std::popcount(alike.live) <= 2) alike.live = 1U << first;
+      if (few(alike.live)) alike.live = 1U << first;
       left &= ~alike.live;
       const bool alone = (alike.live & (alike.live - 1)) == 0;
       left |= alone ? step_alike(batch, machine.single, alike, first, controls)
@@ -349,6 +367,33 @@ struct Stepper::Impl {
                                      machine.single);
     }
   }
+
+  /// Steps the live lanes of a group: all bodies.
+  template <int L>
+  void step_whole(Batch& batch, BasicWorkspace<L>& w, GroupOfBlock g, int lane,
+                  std::span<const double> controls, ModelStepper& by, BlockTape* tape) {
+    set_motors_of(batch, w, g, lane, controls);
+    if (g.live != 0) step_lanes(batch, whole(by), w, g, lane, tape);
+  }
+
+  /// Steps the live lanes of a group and checks them.
+  void step_group(Batch& batch, const GroupOfBlock& g, std::span<const double> controls,
+                  ModelStepper& by, BlockTape* tape) {
+    if (g.live == 0) return;
+    if (sleeping) {
+      step_sleepers(batch, g, controls);
+    } else if (!few(g.live)) {
+      step_whole(batch, by.work, g, 0, controls, by, tape);
+    } else {
+      for_each_alone(g, [&](const GroupOfBlock& one, int lane) {
+        step_whole(batch, by.single, one, lane, controls, by, tape);
+      });
+    }
+    if (!few(g.live)) return check_overlaps<kGroup>(batch, g, 0, g.live, by.single);
+    for_each_alone(g, [&](const GroupOfBlock& one, int lane) {
+      check_overlaps<1>(batch, one, lane, one.live, by.single);
+    });
+  }
 };
 
 Stepper::Stepper(const Model& model, const StepperOptions& options)
@@ -391,29 +436,17 @@ void Stepper::step_block(Batch& batch, int block, std::span<const double> contro
       if (batch.has_history_[e] != 0) g.history |= 1U << l;
       if (!i.sleeping && !batch.sleep_[e].asleep.empty()) batch.sleep_[e].wake();
     }
-    const LaneBits stepped = g.live;
-    // A lone environment goes through kernels of one lane: the same bits, a third of the time.
-    const bool alone = g.live != 0 && (g.live & (g.live - 1)) == 0;
-    const int lane = alone ? __builtin_ctz(g.live) : 0;
-    if (i.sleeping) {
-      i.step_sleepers(batch, g, controls);
-    } else if (alone) {
-      i.set_motors_of(batch, machine.single, g, lane, controls);
-      if (g.live != 0) i.step_lanes(batch, i.whole(machine), machine.single, g, lane, tape);
-    } else {
-      i.set_motors_of(batch, machine.work, g, lane, controls);
-      if (g.live != 0) i.step_lanes(batch, i.whole(machine), machine.work, g, lane, tape);
-    }
-    if (alone)
-      i.check_overlaps<1>(batch, g, lane, stepped, machine.single);
-    else if (stepped != 0)
-      i.check_overlaps<kGroup>(batch, g, 0, stepped, machine.single);
+    i.step_group(batch, g, controls, machine, tape);
   }
   if (tape != nullptr) tape->append(batch, block);
 }
 
 std::size_t Stepper::workspace_bytes(const Model& model) {
   return Workspace::bytes(compiled(model));
+}
+
+std::size_t Stepper::candidate_bytes(const Model& model) {
+  return CandidateStore::group_bytes(compiled(model)) / kGroup;
 }
 
 Integrator integrator_in_force(const Model& model, const StepperOptions& options) {

@@ -48,6 +48,9 @@ class Stepper {
 
   /// Size of the scratch of a stepper of this model [bytes].
   static std::size_t workspace_bytes(const Model& model);
+  /// Estimated memory of the contact candidates that steps leave in a batch, of each of its
+  /// environments [bytes].
+  static std::size_t candidate_bytes(const Model& model);
 
  private:
   void check(const Batch& batch, std::span<const double> controls) const;

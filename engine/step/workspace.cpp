@@ -101,7 +101,7 @@ std::size_t BasicWorkspace<L>::bytes(const CompiledModel& m) {
   const std::size_t watched =
       2 * poses * sizeof(kernels::LinkPose<LaneRow>) + w.search.size() * sizeof(double);
   // In scenes of many link pairs, few of the lists are ever made.
-  const std::size_t listed = m.link_balls.empty() ? CandidateLists<L>::most_bytes(m) : 0;
+  const std::size_t listed = m.link_balls.empty() ? CandidateLists<L>::bytes(m) : 0;
   return shear_bytes + watched + listed + w.memory.size() * sizeof(LaneRow) + w.scratch.size();
 }
 

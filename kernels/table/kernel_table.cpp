@@ -6,6 +6,7 @@
 #include <cstdlib>
 #include <cstring>
 #include <string>
+#include <string_view>
 
 #include "kernels/numbers/one_lane.hpp"
 #include "kernels/table/processor.hpp"
@@ -122,6 +123,10 @@ std::span<const KernelTable* const> available_kernels() {
 }
 const KernelTable& active_kernels() { return *registry().active; }
 const char* active_isa_name() { return active_kernels().name; }
+int active_register_width() {
+  const std::string_view name = active_isa_name();
+  return name == "avx512" ? 8 : name == "avx2" ? 4 : name == "sse2" ? 2 : 1;
+}
 const char* isa_error() { return registry().error.c_str(); }
 void use_kernels(const KernelTable& table) { registry().active = &table; }
 

@@ -105,7 +105,8 @@ double TaskBlock::bytes(const Task& task, const TapeOptions& o, std::int64_t blo
   // Cotangents of snapshots, and snapshots of a warm-up, have the size of snapshots.
   const double moments = (task.spec().warm_up ? 3 : 2) * BlockWorker::bytes(task);
   return std::min(double(blocks) * bytes_with(task, o, o.length), o.tape_bytes) +
-         double(blocks) * (moments + double(Stepper::workspace_bytes(task.model())));
+         double(blocks) * (moments + double(Stepper::workspace_bytes(task.model()) +
+                                            kBlock * Stepper::candidate_bytes(task.model())));
 }
 
 void TaskBlock::start(std::uint64_t seed, EpisodeRange episodes, bool record) {

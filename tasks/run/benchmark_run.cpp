@@ -308,10 +308,10 @@ BenchmarkResult run_benchmark(const Batch& start, const Task& task, const Policy
 }
 
 double benchmark_bytes(const Model& model, int environments, const BenchmarkOptions& options) {
-  const double per_environment = static_cast<double>(model.state_bytes_per_environment()) +
-                                 field_bytes(model, options, options.frames) +
-                                 model.nu() * static_cast<double>(sizeof(double)) +
-                                 sizeof(std::uint64_t);
+  const double per_environment =
+      static_cast<double>(model.state_bytes_per_environment() + Stepper::candidate_bytes(model)) +
+      field_bytes(model, options, options.frames) +
+      model.nu() * static_cast<double>(sizeof(double)) + sizeof(std::uint64_t);
   const double per_thread = static_cast<double>(Stepper::workspace_bytes(model));
   return environments * per_environment + options.threads * per_thread;
 }

@@ -247,8 +247,9 @@ double bytes_of(const EpisodeSource& source, const EpisodeOptions& options, doub
   const std::int64_t blocks = (options.episodes + kBlockEpisodes - 1) / kBlockEpisodes;
   const double slots =
       static_cast<double>(std::min<std::int64_t>(blocks, options.blocks_in_flight));
-  const double state =
-      static_cast<double>(source.model->state_bytes_per_environment()) * kBlockEpisodes;
+  const double state = static_cast<double>(source.model->state_bytes_per_environment() +
+                                           Stepper::candidate_bytes(*source.model)) *
+                       kBlockEpisodes;
   return slots * (piece_bytes(source, options) + state + scratch +
                   static_cast<double>(Stepper::workspace_bytes(*source.model)));
 }

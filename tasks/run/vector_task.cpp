@@ -145,7 +145,8 @@ VectorCounts VectorTask::counts() const {
 }
 
 double VectorTask::bytes(const Task& task, int environments, int threads) {
-  const double state = static_cast<double>(task.model().state_bytes_per_environment());
+  const double state = static_cast<double>(task.model().state_bytes_per_environment() +
+                                           Stepper::candidate_bytes(task.model()));
   return environments * (state + EnvironmentData::bytes(task)) +
          threads * (BlockWorker::bytes(task) +
                     static_cast<double>(Stepper::workspace_bytes(task.model())));

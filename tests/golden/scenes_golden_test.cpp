@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Compares the bits of states, fields, gradients and shards with those in hashes.txt, for every
-// instruction set that was built and for 1, 9 and 40 environments.
+// instruction set that was built and for 1, 2, 9 and 40 environments.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -152,7 +152,7 @@ Row computed(const Row& row) {
   Row result = row;
   const Model model(read_scene(TANGERE_SOURCE_DIR "/scenes/" + row.scene).scene);
   const EnvironmentHashes many = run(model, kMostEnvironments, row.steps);
-  for (const int environments : {1, 9}) {
+  for (const int environments : {1, 2, 9}) {
     const EnvironmentHashes few = run(model, environments, row.steps);
     for (int e = 0; e < environments; ++e) {
       const auto i = std::size_t(e);

@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: Apache-2.0
+// Counts the memory that steps of shipped scenes leave in a batch, and compares it with what the
+// memory checks of commands count for it.
+#include <gtest/gtest.h>
+#include <malloc.h>
+
+#include <string>
+#include <vector>
+
+#include "engine/step/control.hpp"
+#include "engine/step/stepper.hpp"
+#include "io/scene/scene_reader.hpp"
+#include "tests/sanitized.hpp"
+
+namespace tangere {
+namespace {
+
+constexpr int kEnvironments = 16;
+
+double allocated_bytes() {
+  const struct mallinfo2 heap = mallinfo2();
+  return double(heap.uordblks) + double(heap.hblkhd);
+}
+
+/// Takes steps of a scene's own controls. Returns the bytes that they leave.
+double run(const Model& model, Stepper& stepper) {
+  Batch batch(model, kEnvironments, 1);
+  const ControlProgram controls(model, model.timestep(), 1);
+  const auto nu = std::size_t(model.nu());
+  std::vector<double> u(kEnvironments * nu);
+  const double before = allocated_bytes();
+  for (int step = 0; step < 300; ++step) {
+    for (int e = 0; e < kEnvironments; ++e)
+      controls.evaluate(step, e, std::span(u).subspan(std::size_t(e) * nu, nu));
+    stepper.step(batch, u);
+  }
+  return allocated_bytes() - before;
+}
+
+TEST(CandidateBytes, CoverTheListsOfShippedScenes) {
+  if (kSanitized) GTEST_SKIP() << "a sanitizer's heap does not count";
+  for (const std::string name : {"rolling_ball", "stable_grasp", "cap_opening", "insertion",
+                                 "box_pushing", "mug", "hard/stack_equal"}) {
+    const Model model(read_scene(TANGERE_SOURCE_DIR "/scenes/" + name + ".xml").scene);
+    Stepper stepper(model);
+    run(model, stepper);  // the stepper's own memory grows
+    const double left = run(model, stepper) / kEnvironments;
+    const auto counted = double(Stepper::candidate_bytes(model));
+    EXPECT_LE(left, counted) << name;
+    EXPECT_GE(left, counted / 16) << name;
+  }
+}
+
+TEST(CandidateBytes, AreNoneWhereListsAreNotKept) {
+  const Model model(read_scene(TANGERE_SOURCE_DIR "/scenes/grip_rod.xml").scene);
+  EXPECT_EQ(Stepper::candidate_bytes(model), 0u);
+}
+
+}  // namespace
+}  // namespace tangere
