@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: Apache-2.0
+// Errors are shares of the largest recorded force.
+#include "apps/calibrate_report.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+namespace tangere::apps {
+namespace {
+
+std::string interval_text(const FittedNumber& n) {
+  if (!std::isfinite(n.high)) return "not known";
+  return fmt::format("{:.4g} to {:.4g}", n.low, n.high);
+}
+
+std::string start_text(const std::string& number, const SkinAttributes& start) {
+  const auto at = start.find(number);
+  return at == start.end() ? "0" : fmt::format("{:.4g}", at->second);
+}
+
+std::string error_text(const char* what, const PressError& error) {
+  if (error.rows == 0) return "";
+  return fmt::format(
+      "{}, {} row{}: off by {:.2g} % of the peak (root mean square), {:.2g} % at most; {:.2g} % of "
+      "a row's own force at most\n",
+      what, error.rows, error.rows == 1 ? "" : "s", 100 * error.root_mean_square,
+      100 * error.largest, 100 * error.largest_by_row);
+}
+
+Json error_json(const PressError& error) {
+  if (error.rows == 0) return nullptr;
+  return {{"rows", error.rows},
+          {"root_mean_square", error.root_mean_square},
+          {"largest", error.largest},
+          {"largest_by_row", error.largest_by_row}};
+}
+
+}  // namespace
+
+std::string label_of(const std::string& number, bool by_area) {
+  if (number == "modulus") return "modulus [Pa]";
+  if (number == "kn" || number == "ks")
+    return fmt::format("{} [{}]", number, by_area ? "N/m³" : "N/m");
+  if (number == "relaxation") return "relaxation [s]";
+  return number == "zero" ? "zero of the depth [m]" : number;
+}
+
+std::string report_text(const Calibration& found, const SkinAttributes& start, bool by_area) {
+  std::string text =
+      fmt::format("{:<24}{:>12}   {:<26}{}\n", "number", "fitted", "95 % interval", "layout");
+  for (const FittedNumber& n : found.numbers)
+    text += fmt::format("{:<24}{:>12.5g}   {:<26}{}\n", label_of(n.name, by_area), n.value,
+                        interval_text(n), start_text(n.name, start));
+  text += error_text("normal force", found.normal);
+  text += error_text("held out", found.normal_held_out);
+  text += error_text("shear force", found.shear);
+  text += error_text("held out", found.shear_held_out);
+  for (const UntoldNumber& n : found.untold)
+    text += fmt::format("not told: {}: {}\n", label_of(n.name, by_area), n.reason);
+  if (!found.converged) text += "the fit has not come to an end\n";
+  text.pop_back();
+  return text;
+}
+
+void report_json(const Calibration& found, const Console& console) {
+  Json numbers = Json::array(), untold = Json::array();
+  for (const FittedNumber& n : found.numbers)
+    numbers.push_back(
+        {{"number", n.name}, {"value", n.value}, {"low", finite(n.low)}, {"high", finite(n.high)}});
+  for (const UntoldNumber& n : found.untold)
+    untold.push_back({{"number", n.name}, {"reason", n.reason}});
+  console.result({{"command", "calibrate"},
+                  {"exit_code", static_cast<int>(found.converged ? kDone : kSomeFailed)},
+                  {"numbers", numbers},
+                  {"untold", untold},
+                  {"held_out", found.held_out},
+                  {"normal", error_json(found.normal)},
+                  {"normal_held_out", error_json(found.normal_held_out)},
+                  {"shear", error_json(found.shear)},
+                  {"shear_held_out", error_json(found.shear_held_out)},
+                  {"converged", found.converged}});
+}
+
+}  // namespace tangere::apps
