@@ -102,7 +102,7 @@ TEST(Command, TopLevelHelpNamesEverySubcommandAndExitCode) {
   const Folder folder;
   const Outcome help = run(folder, {"--help"});
   EXPECT_EQ(help.exit_code, 0);
-  EXPECT_THAT(subcommands(), testing::SizeIs(16));
+  EXPECT_THAT(subcommands(), testing::SizeIs(17));
   for (const char* code : {"0 done", "1 finished", "2 usage", "3 input", "75 ", "130 "})
     EXPECT_THAT(help.out, HasSubstr(code));
 }
