@@ -19,12 +19,15 @@
 namespace tangere::apps {
 namespace {
 
-constexpr double kUsualFriction = 0.6, kUsualShearShare = 0.4;  // where the layout has none
+// Where the layout has none.
+constexpr double kUsualFriction = 0.6, kUsualShearShare = 0.4, kUsualRelaxation = 1e-3;
+constexpr int kMostKnots = 100;
 
 struct CalibrateArguments {
-  std::string recording, sensor, output;
+  std::string recording, sensor, output, check;
   std::vector<std::string> numbers;
   Indenter indenter;
+  std::optional<int> table;
   std::optional<double> hold_out;
   bool overwrite = false;
 };
@@ -37,61 +40,118 @@ void check_arguments(const CalibrateArguments& a) {
         "--hold-out {}; expected a number of rows, or a share of them below 1", *a.hold_out));
 }
 
-bool is_by_area(const Scene& scene) { return scene.sensors[0].cell > 0; }
+/// A layout, and what a fit changes in it.
+struct Fitted {
+  LayoutFile layout;
+  int knots = 0;         ///< of a table
+  bool by_area = false;  ///< whether coefficients count by area
+  SkinNumbers start;     ///< attributes that can be fitted
+};
 
-/// The attributes that can be fitted, as the layout has them.
-SkinAttributes attributes_at_start(const LayoutFile& layout, const Scene& scene) {
-  const TactileDescription& d = scene.sensors[0];
-  const double area = is_by_area(scene) ? d.cell : 1, kn = d.coefficients.kn / area,
+/// The attributes that can be fitted, as the layout has them, where it has any.
+SkinNumbers attributes_at_start(const LayoutFile& layout, const TactileDescription& d) {
+  const double area = d.cell > 0 ? d.cell : 1, kn = d.coefficients.kn / area,
                ks = d.coefficients.ks / area, mu = d.coefficients.mu;
-  SkinAttributes start;
+  SkinNumbers start;
   if (d.layer || (d.material && !layout.has("kn")))
     start["modulus"] = d.material ? d.material->modulus : 1;
   else
     start["kn"] = kn > 0 ? kn : 1;
-  if (d.material && (d.layer || !layout.has("damping")))
-    start["relaxation"] = d.material->relaxation > 0 ? d.material->relaxation : 1e-3;
-  start["ks"] = ks > 0 ? ks : kUsualShearShare * kn;
+  const bool relaxes = d.table || (d.material && (d.layer || !layout.has("damping")));
+  const double tau = d.table ? d.table->relaxation : d.material ? d.material->relaxation : 0;
+  if (relaxes) start["relaxation"] = tau > 0 ? tau : kUsualRelaxation;
+  start["ks"] = ks > 0 ? ks : kUsualShearShare * (kn > 0 ? kn : 1);
   start["mu"] = mu > 0 ? mu : kUsualFriction;
   return start;
 }
 
+/// Makes room for a table. Shear springs that follow from a modulus stay.
+void prepare_for_table(Fitted& fitted, const TactileDescription& d) {
+  if (d.layer) throw InputError("--table with a layout that has <layer>; expected one of them");
+  if (d.cell == 0 && (d.coefficients.ks > 0 || d.coefficients.kt > 0))
+    throw InputError(fmt::format("--table with ks or kt by point in {}; expected per=\"area\"",
+                                 fitted.layout.source().file));
+  if (d.material) {
+    fitted.layout.set("ks", fmt::format("{:.5g}", d.coefficients.ks / d.cell));
+    fitted.layout.set("kt", fmt::format("{:.5g}", d.coefficients.kt / d.cell));
+  }
+  for (const char* const name : {"modulus", "thickness", "kn", "damping", "per"})
+    fitted.layout.remove(name);
+}
+
+/// Sets the attributes among the numbers. `digits`: of what is written; 17 keep every bit.
+void set_numbers(const SkinNumbers& numbers, int digits, Fitted& fitted) {
+  const auto text = [&](double x) { return fmt::format("{:.{}g}", x, digits); };
+  for (const auto& [name, value] : numbers)
+    if (fitted.start.contains(name)) fitted.layout.set(name, text(value));
+  if (fitted.knots == 0) return;
+  std::string depths = "0", pressures = "0";
+  for (int k = 1; k <= fitted.knots; ++k) {
+    depths += " " + text(numbers.at("table_depth") * k / fitted.knots);
+    pressures += " " + text(numbers.at(table_number(k)));
+  }
+  fitted.layout.set("pressure_depth", depths);
+  fitted.layout.set("pressure", pressures);
+}
+
+Fitted read_fitted(const CalibrateArguments& a) {
+  Fitted fitted{
+      LayoutFile(layout_text("--sensor", a.sensor), a.sensor), a.table.value_or(0), false, {}};
+  const Scene scene = press_scene(fitted.layout, a.indenter);
+  const TactileDescription& d = scene.sensors[0];
+  if (fitted.knots > 0) prepare_for_table(fitted, d);
+  fitted.start = attributes_at_start(fitted.layout, d);
+  if (fitted.knots > 0) {
+    fitted.start.erase("modulus"), fitted.start.erase("kn");
+    fitted.start.try_emplace("relaxation", kUsualRelaxation);
+  } else if (d.table) {
+    throw InputError(a.sensor + " has a table of pressures; expected --table");
+  }
+  fitted.by_area = d.cell > 0 || fitted.knots > 0;
+  return fitted;
+}
+
 /// Returns the layout with the fitted attributes. Its sensor's name says that it was measured.
-std::string measured_layout(LayoutFile layout, const Calibration& found,
-                            const std::string& recording) {
-  for (const auto& [name, value] : found.attributes())
-    layout.set(name, fmt::format("{:.5g}", value));
-  std::string name = layout.name();
+std::string measured_layout(Fitted fitted, const Calibration& found, const std::string& recording) {
+  SkinNumbers numbers = found.found;
+  for (const UntoldNumber& number : found.untold) numbers.erase(number.name);
+  set_numbers(numbers, 5, fitted);
+  std::string name = fitted.layout.name();
   if (name.ends_with("_guess")) name.resize(name.size() - 6);
   if (name.find("measured") == std::string::npos) name += "_measured";
-  layout.set("name", name);
-  std::vector<std::string> fitted;
-  for (const auto& [number, value] : found.attributes()) fitted.push_back(number);
-  layout.add_comment(fmt::format("{}: measured, fitted by 'tangere calibrate' to {}",
-                                 fmt::join(fitted, ", "),
-                                 std::filesystem::path(recording).filename().string()));
-  return layout.text();
+  fitted.layout.set("name", name);
+  std::vector<std::string> names;
+  for (const FittedNumber& number : found.numbers)
+    if (fitted.start.contains(number.name)) names.push_back(number.name);
+  if (fitted.knots > 0) names.emplace_back("pressure");
+  fitted.layout.add_comment(fmt::format("{}: measured, fitted by 'tangere calibrate' to {}",
+                                        fmt::join(names, ", "),
+                                        std::filesystem::path(recording).filename().string()));
+  return fitted.layout.text();
 }
 
 int run_calibrate(const CalibrateArguments& a, const Console& console) {
   check_arguments(a);
   const PressRecording recording = read_press(a.recording, console);
-  const std::string text = layout_text("--sensor", a.sensor);
-  LayoutFile layout(text, a.sensor);
+  const std::optional<PressRecording> other =
+      a.check.empty() ? std::nullopt : std::optional(read_press(a.check, console));
   TextOutput output(a.output, a.overwrite);
-  const Scene scene = press_scene(layout, a.indenter);
-  CalibrationRequest request;
-  request.start = attributes_at_start(layout, scene);
-  request.numbers = a.numbers;
-  request.hold_out = a.hold_out.value_or(0);
-  request.scene = [&](const SkinAttributes& attributes) {
-    for (const auto& [name, value] : attributes) layout.set(name, fmt::format("{}", value));
-    return press_scene(layout, a.indenter);
-  };
+  Fitted fitted = read_fitted(a);
+  const CalibrationRequest request{.scene =
+                                       [&](const SkinNumbers& numbers) {
+                                         set_numbers(numbers, 17, fitted);
+                                         return press_scene(fitted.layout, a.indenter);
+                                       },
+                                   .start = fitted.start,
+                                   .knots = fitted.knots,
+                                   .numbers = a.numbers,
+                                   .hold_out = a.hold_out.value_or(0)};
   const Calibration found = calibrate(request, recording);
-  console.print(report_text(found, request.start, is_by_area(scene)));
-  output.write(measured_layout(LayoutFile(text, a.sensor), found, a.recording), console);
-  report_json(found, console);
+  CalibrationReport report{found, fitted.start, fitted.by_area, fitted.knots, {}};
+  if (other) report.other = check_calibration(request, found.found, *other);
+  console.print(report_text(report));
+  output.write(measured_layout(read_fitted(a), found, a.recording), console);
+  report_json(report, console);
   return found.converged ? kDone : kSomeFailed;
 }
 
@@ -115,11 +175,16 @@ Command add_calibrate(CLI::App& program) {
   add_positive_number(app, "--ball", a.indenter.ball, "Radius of a ball that presses [m]");
   add_positive_number(app, "--flat", a.indenter.flat,
                       "Radius of a flat, round end that presses [m]");
+  add_whole_number<int>(app, "--table", a.table, 1, kMostKnots,
+                        "Fit a table of N pressures by depth in place of modulus or kn");
   add_texts(app, "--fit", a.numbers, "NAME",
-            "Fit this number and no others but those named so: modulus or kn, zero (of the depth), "
-            "relaxation, ks, mu [default: all that the recording tells]");
+            "Fit this number and no others but those named so: modulus, kn or pressure (the "
+            "table), zero (of the depth), relaxation, ks, mu, lag (of the force), slider (beside "
+            "the skin) [default: all but the last two that the recording tells]");
   add_positive_number(app, "--hold-out", a.hold_out,
                       "Rows that are compared and not fitted: how many, or a share below 1");
+  add_text(app, "--check", a.check, "OTHER.csv",
+           "Another recording, whose normal forces are compared with those of the fit");
   add_overwrite_option(app, a.overwrite);
   add_console_options(app, *console);
   return {&app, [=](const ProgramInfo&) { return run_calibrate(*arguments, *console); }};

@@ -9,12 +9,17 @@
 
 namespace tangere::apps {
 
-/// "modulus [Pa]", "ks [N/m³]" …; `by_area`: coefficients count per area.
-std::string label_of(const std::string& number, bool by_area);
-/// A table of the numbers, beside those at which the fit began, the errors, and what the recording
-/// does not tell.
-std::string report_text(const Calibration& found, const SkinAttributes& start, bool by_area);
+struct CalibrationReport {
+  const Calibration& found;
+  const SkinNumbers& start;  ///< at which the fit began
+  bool by_area;              ///< whether coefficients count by area
+  int knots;                 ///< of a table
+  PressError other;          ///< of another recording
+};
+
+/// A table of the numbers, the errors, and what the recording does not tell.
+std::string report_text(const CalibrationReport& report);
 /// Prints the JSON object.
-void report_json(const Calibration& found, const Console& console);
+void report_json(const CalibrationReport& report, const Console& console);
 
 }  // namespace tangere::apps

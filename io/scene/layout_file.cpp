@@ -60,21 +60,12 @@ bool LayoutFile::has(const std::string& attribute) const {
   return impl_->sensor->Attribute(attribute.c_str()) != nullptr;
 }
 
-bool LayoutFile::has_part(const std::string& element) const {
-  return impl_->sensor->FirstChildElement(element.c_str()) != nullptr;
-}
-
 void LayoutFile::set(const std::string& attribute, const std::string& value) {
   impl_->sensor->SetAttribute(attribute.c_str(), value.c_str());
 }
 
-void LayoutFile::set_part(const std::string& element,
-                          const std::vector<std::pair<std::string, std::string>>& attributes) {
-  if (tinyxml2::XMLElement* const old = impl_->sensor->FirstChildElement(element.c_str()))
-    impl_->sensor->DeleteChild(old);
-  tinyxml2::XMLElement* const part = impl_->document.NewElement(element.c_str());
-  for (const auto& [name, value] : attributes) part->SetAttribute(name.c_str(), value.c_str());
-  impl_->sensor->InsertEndChild(part);
+void LayoutFile::remove(const std::string& attribute) {
+  impl_->sensor->DeleteAttribute(attribute.c_str());
 }
 
 Source LayoutFile::source() const { return SceneNode(*impl_->sensor, impl_->context).source(); }

@@ -7,7 +7,6 @@
 #include <memory>
 #include <span>
 #include <string>
-#include <vector>
 
 #include "io/scene/scene_node.hpp"
 
@@ -32,11 +31,8 @@ class LayoutFile {
 
   [[nodiscard]] std::string name() const;  ///< of the sensor; "skin" without one
   [[nodiscard]] bool has(const std::string& attribute) const;
-  [[nodiscard]] bool has_part(const std::string& element) const;
   void set(const std::string& attribute, const std::string& value);
-  /// Appends a child of the sensor, in place of one of this name.
-  void set_part(const std::string& element,
-                const std::vector<std::pair<std::string, std::string>>& attributes);
+  void remove(const std::string& attribute);
 
   /// Line of the sensor, for messages.
   [[nodiscard]] Source source() const;

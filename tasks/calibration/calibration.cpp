@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Two fits by least squares, of the normal and then of the shear force. Stiffnesses and friction
-// are fitted as logarithms, the relaxation as the square of a root, the zero in shares of the
-// depth.
+// Two fits, of the normal and then of the shear force. A slider beside the skin has at the depths
+// d > 0 of a path the force s' = clamp(s + k (d' - d), ±F), and 0 outside.
 #include "tasks/calibration/calibration.hpp"
 
 #include <fmt/format.h>
@@ -11,18 +10,21 @@
 #include <cmath>
 
 #include "engine/base/error.hpp"
-#include "tasks/calibration/least_squares.hpp"
 
 namespace tangere {
 namespace {
 
-constexpr double kNoInfluence = 1e-6;  // root mean square change, of the peak, by a whole number
 constexpr double kStuck = 1e3, kSlipStart = 0.9;  // of the largest ratio of shear to normal force
 constexpr double kStiffStart = 3;                 // of the spring that fits without slip
-constexpr double kLeastSlip = 0.03;               // share of the forces that slip, by their squares
-constexpr double kSmallest = 0.01;  // of the peak: smaller forces have no error of their own
+constexpr double kSliderStart = 0.1;              // of the peak
+constexpr double kSmallest = 0.05;  // of the peak: smaller forces have no error of their own
 
-const std::string kZero = "zero", kRelaxation = "relaxation", kShear = "ks", kFriction = "mu";
+const std::string kDepth = "table_depth";
+
+double number_or(const SkinNumbers& numbers, const std::string& name, double otherwise) {
+  const auto at = numbers.find(name);
+  return at == numbers.end() ? otherwise : at->second;
+}
 
 double peak_of(std::span<const double> force) {
   double peak = 0;
@@ -46,127 +48,6 @@ PressError error_of(std::span<const double> computed, std::span<const double> re
   return out;
 }
 
-/// How a number follows from an x of the fit, which begins at 1: differences are shares of x.
-struct Scale {
-  enum class Kind { exponential, square, linear } kind;
-  double unit;  ///< the start; linear: the number at x = 2
-
-  [[nodiscard]] double value(double x) const {
-    if (kind == Kind::exponential) return unit * std::exp(x - 1);
-    return kind == Kind::square ? unit * x * x : unit * (x - 1);
-  }
-  /// Returns the end of an interval of half width `half` on one side.
-  [[nodiscard]] double end(double x, double half) const {
-    if (std::isinf(half)) return kind == Kind::exponential && half < 0 ? 0 : half;
-    return kind == Kind::square ? value(x) + 2 * unit * x * half : value(x + half);
-  }
-};
-
-Scale scale_of(const std::string& name, double start, double depth) {
-  if (name == kZero) return {Scale::Kind::linear, depth};
-  return {name == kRelaxation ? Scale::Kind::square : Scale::Kind::exponential, start};
-}
-
-/// Computes forces at all rows from attributes and the zero of the depth.
-using Forces = std::function<std::vector<double>(const SkinAttributes&, double zero)>;
-
-/// One of the two fits.
-class Fit {
- public:
-  Fit(Forces forces, std::span<const double> recorded, std::vector<int> rows, double depth)
-      : forces_(std::move(forces)),
-        recorded_(recorded),
-        rows_(std::move(rows)),
-        peak_(peak_of(recorded)),
-        depth_(depth) {}
-
-  /// Fits `names` from `start`, with `fixed` attributes. Those that turn out not to be told are
-  /// listed and left out.
-  void run(std::vector<std::string> names, const SkinAttributes& start, SkinAttributes fixed,
-           Calibration& out) {
-    for (;;) {
-      names_ = names;
-      fixed_ = fixed;
-      scales_.clear();
-      std::vector<double> x;
-      for (const std::string& name : names) {
-        scales_.push_back(scale_of(name, name == kZero ? 0 : start.at(name), depth_));
-        x.push_back(1);
-      }
-      if (names.empty()) break;
-      found_ = minimise([&](std::span<const double> at) { return residuals(at); }, x);
-      const std::size_t weak = weakest();
-      if (weak == names.size()) break;
-      out.untold.push_back({names[weak], reason(names[weak])});
-      if (names[weak] == kFriction) fixed[kFriction] = scales_[weak].value(found_.x[weak]);
-      names.erase(names.begin() + std::ptrdiff_t(weak));
-    }
-    if (names.empty()) return;
-    out.converged = out.converged && found_.converged;
-    for (std::size_t k = 0; k < names.size(); ++k) {
-      const double x = found_.x[k], half = found_.half_interval[k];
-      out.numbers.push_back(
-          {names[k], scales_[k].value(x), scales_[k].end(x, -half), scales_[k].end(x, half)});
-    }
-  }
-  [[nodiscard]] std::vector<double> computed() const {
-    return forces(names_.empty() ? std::vector<double>{} : found_.x);
-  }
-
- private:
-  [[nodiscard]] std::vector<double> forces(std::span<const double> x) const {
-    SkinAttributes attributes = fixed_;
-    double zero = 0;
-    for (std::size_t k = 0; k < names_.size(); ++k)
-      (names_[k] == kZero ? zero : attributes[names_[k]]) = scales_[k].value(x[k]);
-    return forces_(attributes, zero);
-  }
-  /// Over the peak, at the rows that are fitted.
-  [[nodiscard]] std::vector<double> residuals(std::span<const double> x) const {
-    const std::vector<double> computed = forces(x);
-    std::vector<double> out;
-    for (const int row : rows_)
-      out.push_back((computed[std::size_t(row)] - recorded_[std::size_t(row)]) / peak_);
-    return out;
-  }
-  /// Whether a friction that is a hundredth larger leaves the forces as they are.
-  [[nodiscard]] bool holds(std::size_t friction) const {
-    std::vector<double> x = found_.x;
-    const std::vector<double> now = residuals(x);
-    x[friction] += 0.01;
-    const std::vector<double> then = residuals(x);
-    double squares = 0;
-    for (std::size_t k = 0; k < now.size(); ++k) squares += std::pow(then[k] - now[k], 2);
-    return std::sqrt(squares / double(now.size())) < 0.01 * kLeastSlip;
-  }
-  /// Returns the first number that has no influence, or whose interval includes none of it.
-  [[nodiscard]] std::size_t weakest() const {
-    for (std::size_t k = 0; k < names_.size(); ++k) {
-      if (found_.influence[k] < kNoInfluence) return k;
-      if (names_[k] == kFriction && holds(k)) return k;
-      if (names_[k] == kRelaxation && !(scales_[k].end(found_.x[k], -found_.half_interval[k]) > 0))
-        return k;
-    }
-    return names_.size();
-  }
-  static std::string reason(const std::string& name) {
-    if (name == kFriction)
-      return "nothing slips, so it exceeds every ratio of shear to normal force";
-    if (name == kRelaxation) return "the rates of the recording do not show it";
-    if (name == kShear) return "everything slips";
-    return "the forces do not change with it";
-  }
-
-  Forces forces_;
-  std::span<const double> recorded_;
-  std::vector<int> rows_;
-  double peak_, depth_;
-  std::vector<std::string> names_;
-  SkinAttributes fixed_;
-  std::vector<Scale> scales_;
-  LeastSquares found_;
-};
-
 void check(const PressRecording& r) {
   if (r.rows() == 0) throw InputError("a recording without depths; expected one row at least");
   for (const auto& [name, column] : {std::pair{"force", &r.force},
@@ -187,47 +68,92 @@ void check(const PressRecording& r) {
     throw InputError("a recording without any force; expected a press of the skin");
 }
 
-/// Why a recording cannot tell a number, whatever the fit finds; "" if it may.
-std::string reason_against(const std::string& name, const PressRecording& r,
-                           std::span<const int> rows) {
+/// Why the columns cannot tell a number; "" if they may.
+std::string reason_against(const std::string& name, const PressRecording& r, int rows) {
   const auto [least, most] = std::ranges::minmax(r.depth);
-  if (name == kZero && !(most > least)) return "all rows have one depth";
-  if (name == kZero && rows.size() < 2) return "one row is fitted";
-  if (name == kRelaxation && r.time.empty()) return "the recording has no times";
+  if ((name == kZero || name == kSlider || name == kTable) && !(most > least))
+    return "all rows have one depth";
+  if (name == kZero && rows < 2) return "one row is fitted";
+  if ((name == kRelaxation || name == kLag) && r.time.empty()) return "the recording has no times";
   if ((name == kShear || name == kFriction) && r.shear.empty()) return "nothing is sheared";
   return "";
 }
 
-/// Splits what is fitted into numbers of the normal and of the shear force.
-void choose_numbers(const CalibrationRequest& request, const PressRecording& recording,
-                    std::span<const int> rows, std::vector<std::string>& normal,
-                    std::vector<std::string>& shear, Calibration& out) {
-  std::vector<std::string> known;
+struct Names {
+  std::vector<std::string> normal, shear;
+};
+
+/// Chooses what is fitted, by normal and by shear forces. `rows`: how many are fitted.
+Names choose_numbers(const CalibrationRequest& request, const PressRecording& recording, int rows,
+                     std::vector<UntoldNumber>& untold) {
+  std::vector<std::string> usual, known;
   for (const char* const name : {"modulus", "kn"})
-    if (request.start.contains(name)) known.emplace_back(name);
-  known.push_back(kZero);
-  for (const std::string& name : {kRelaxation, kShear, kFriction})
-    if (request.start.contains(name)) known.push_back(name);
+    if (request.start.contains(name) && request.knots == 0) usual.emplace_back(name);
+  usual.emplace_back(request.knots > 0 ? kTable : kZero);
+  for (const char* const name : {kRelaxation, kShear, kFriction})
+    if (request.start.contains(name)) usual.emplace_back(name);
+  known = usual;
+  if (request.knots > 0) known.emplace_back(kZero);
+  for (const char* const name : {kLag, kSlider}) known.emplace_back(name);
   for (const std::string& name : request.numbers)
     if (std::ranges::count(known, name) == 0)
       throw InputError(
           fmt::format("'{}' cannot be fitted; expected some of {}", name, fmt::join(known, ", ")));
-  for (const std::string& name : known) {
+  Names out;
+  for (const std::string& name : request.numbers.empty() ? usual : known) {
     const bool wanted = std::ranges::count(request.numbers, name) > 0;
     if (!request.numbers.empty() && !wanted) continue;
     if (const std::string reason = reason_against(name, recording, rows); !reason.empty()) {
       if (wanted) throw InputError(fmt::format("'{}' cannot be fitted: {}", name, reason));
-      out.untold.push_back({name, reason});
-    } else {
-      (name == kShear || name == kFriction ? shear : normal).push_back(name);
+      untold.push_back({name, reason});
+      continue;
     }
+    auto& list = name == kShear || name == kFriction ? out.shear : out.normal;
+    list.push_back(name);
+    if (name == kSlider) list.emplace_back(kSliderForce);
+  }
+  if (request.knots > 0 && std::ranges::count(out.normal, kTable) == 0)
+    throw InputError(
+        "a table without 'pressure' among the fitted numbers, or with one depth alone");
+  return out;
+}
+
+/// The depths that act at the rows: those of `lag` earlier, and nearer by the zero.
+std::vector<double> acting_depths(const PressRecording& r, const SkinNumbers& numbers) {
+  const double lag = number_or(numbers, kLag, 0), zero = number_or(numbers, kZero, 0);
+  std::vector<double> out = r.depth;
+  for (std::size_t row = 0; row < r.rows() && lag > 0; ++row) {
+    const double then = std::max(r.time[row] - lag, r.time[0]);
+    const auto after = std::upper_bound(r.time.begin() + 1, r.time.end() - 1, then);
+    const auto k = std::size_t(after - r.time.begin());
+    out[row] = r.depth[k - 1] +
+               (r.depth[k] - r.depth[k - 1]) * (then - r.time[k - 1]) / (r.time[k] - r.time[k - 1]);
+  }
+  for (double& d : out) d += zero;
+  return out;
+}
+
+/// Adds the slider, if there is one. The indenter does not pull.
+void add_slider(std::span<const double> depth, const SkinNumbers& numbers,
+                std::vector<double>& force) {
+  const double stiffness = number_or(numbers, kSlider, 0);
+  if (stiffness == 0) return;
+  const double most = numbers.at(kSliderForce);
+  double s = 0;
+  for (std::size_t k = 0; k < depth.size(); ++k) {
+    const double before = std::max(depth[k > 0 ? k - 1 : 0], 0.0);
+    s = depth[k] > 0 ? std::clamp(s + stiffness * (depth[k] - before), -most, most) : 0;
+    force[k] = std::max(force[k] + s, 0.0);
   }
 }
 
-std::vector<double> shifted(std::span<const double> depth, double zero) {
-  std::vector<double> out(depth.begin(), depth.end());
-  for (double& d : out) d += zero;
-  return out;
+std::vector<double> normal_forces(const CalibrationRequest& request, const PressRecording& r,
+                                  const SkinNumbers& numbers) {
+  PressRecording acting;
+  acting.time = r.time, acting.depth = acting_depths(r, numbers);
+  std::vector<double> force = press_forces(request.scene(numbers), acting.depth, acting.rates());
+  add_slider(acting.depth, numbers, force);
+  return force;
 }
 
 /// Returns the factor of the computed forces that fits best; not finite where all are 0.
@@ -238,10 +164,19 @@ double best_factor(std::span<const double> computed, std::span<const double> rec
   return both / square;
 }
 
-/// Scales the stiffness at the start so that the forces have the recorded size.
-void scale_start(std::span<const double> computed, std::span<const double> recorded,
-                 SkinAttributes& start) {
-  const double factor = best_factor(computed, recorded);
+/// Returns the last depth of a table [m]. On its way a fit may try zeros beyond all depths.
+double table_depth(double deepest, const SkinNumbers& numbers) {
+  constexpr double kShallowest = 0.01;
+  return std::max(deepest + number_or(numbers, kZero, 0), kShallowest * deepest);
+}
+
+/// Chooses stiffness or table, and slider, so that forces have the recorded size.
+void scale_start(const CalibrationRequest& request, const PressRecording& r, double depth,
+                 SkinNumbers& start) {
+  SkinNumbers straight;
+  for (int k = 1; k <= request.knots; ++k) straight[table_number(k)] = k;
+  if (request.knots > 0) straight[kDepth] = depth;
+  const double factor = best_factor(normal_forces(request, r, straight), r.force);
   if (!std::isfinite(factor))
     throw InputError(
         "the sensor feels nothing at any depth of the recording; expected depths in m, positive "
@@ -250,33 +185,40 @@ void scale_start(std::span<const double> computed, std::span<const double> recor
     throw InputError("forces against the press; expected forces that are positive in compression");
   for (const char* const name : {"modulus", "kn"})
     if (start.contains(name)) start[name] *= factor;
+  for (int k = 1; k <= request.knots; ++k) start[table_number(k)] = factor;  // increments
+  start[kSlider] = peak_of(r.force) / depth;
+  start[kSliderForce] = kSliderStart * peak_of(r.force);
+  if (!r.time.empty()) start[kLag] = (r.time.back() - r.time.front()) / double(r.rows());
 }
 
 /// Chooses a friction that some row exceeds and a spring that reaches it, because the fit does not
 /// move a friction at which nothing slips.
-void scale_shear_start(const Forces& shear, const SkinAttributes& fixed,
+void scale_shear_start(const Forces& shear, const SkinNumbers& fixed,
                        std::span<const double> normal, std::span<const double> recorded,
-                       SkinAttributes& start) {
+                       SkinNumbers& start) {
   double ratio = 0;
   for (std::size_t k = 0; k < normal.size(); ++k)
     if (normal[k] > 0) ratio = std::max(ratio, std::abs(recorded[k]) / normal[k]);
   if (!(ratio > 0)) return;
-  SkinAttributes stuck = fixed;
+  SkinNumbers stuck = fixed;
   stuck[kShear] = start.at(kShear);
   stuck[kFriction] = kStuck * ratio;
-  const double factor = best_factor(shear(stuck, 0), recorded);
+  const double factor = best_factor(shear(stuck), recorded);
   if (factor > 0 && std::isfinite(factor)) start[kShear] *= kStiffStart * factor;
   start[kFriction] = kSlipStart * ratio;
 }
 
-}  // namespace
-
-SkinAttributes Calibration::attributes() const {
-  SkinAttributes out;
-  for (const FittedNumber& number : numbers)
-    if (number.name != kZero) out[number.name] = number.value;
-  return out;
+/// Runs a fit and adds what it found.
+void add_fit(ForceFit& fit, const std::vector<std::string>& names, const SkinNumbers& start,
+             Calibration& out) {
+  fit.run(names, start, out.found);
+  out.found = fit.found();
+  out.converged = out.converged && fit.converged();
+  for (const FittedNumber& number : fit.numbers()) out.numbers.push_back(number);
+  out.untold.insert(out.untold.end(), fit.untold().begin(), fit.untold().end());
 }
+
+}  // namespace
 
 std::vector<int> held_out_rows(double hold_out, int rows) {
   const double share = hold_out < 1 ? hold_out : hold_out / rows;
@@ -296,39 +238,43 @@ Calibration calibrate(const CalibrationRequest& request, const PressRecording& r
   std::vector<int> rows;
   for (int row = 0; row < int(recording.rows()); ++row)
     if (!std::ranges::binary_search(out.held_out, row)) rows.push_back(row);
-  std::vector<std::string> normal, shear;
-  choose_numbers(request, recording, rows, normal, shear, out);
-
-  const std::vector<double> rates = recording.rates();
-  const auto press = [&](const SkinAttributes& attributes, double zero) {
-    return press_forces(request.scene(attributes), shifted(recording.depth, zero), rates);
-  };
-  SkinAttributes start = request.start;
-  if (!normal.empty() && start.contains(normal.front()) && normal.front() != kRelaxation)
-    scale_start(press({}, 0), recording.force, start);
+  const Names names = choose_numbers(request, recording, int(rows.size()), out.untold);
   const double depth = *std::ranges::max_element(recording.depth);
-  Fit along(press, recording.force, rows, depth);
-  along.run(normal, start, {}, out);
-  out.force = along.computed();
-  out.normal = error_of(out.force, recording.force, rows);
-  out.normal_held_out = error_of(out.force, recording.force, out.held_out);
-  if (shear.empty()) return out;
 
-  double zero = 0;
-  for (const FittedNumber& number : out.numbers)
-    if (number.name == kZero) zero = number.value;
-  const std::vector<double> depths = shifted(recording.depth, zero);
-  const auto path = [&](const SkinAttributes& attributes, double) {
-    return shear_forces(request.scene(attributes), depths, recording.shear);
+  SkinNumbers start = request.start;
+  if (!names.normal.empty()) scale_start(request, recording, depth, start);
+  const auto press = [&](SkinNumbers numbers) {
+    if (request.knots > 0) numbers[kDepth] = table_depth(depth, numbers);
+    return normal_forces(request, recording, numbers);
   };
-  if (shear.size() == 2)
-    scale_shear_start(path, out.attributes(), out.force, recording.shear_force, start);
-  Fit across(path, recording.shear_force, rows, depth);
-  across.run(shear, start, out.attributes(), out);
-  out.shear_force = across.computed();
-  out.shear = error_of(out.shear_force, recording.shear_force, rows);
-  out.shear_held_out = error_of(out.shear_force, recording.shear_force, out.held_out);
+  ForceFit along(press, recording.force, rows, depth, request.knots);
+  add_fit(along, names.normal, start, out);
+  if (request.knots > 0) out.found[kDepth] = table_depth(depth, out.found);
+  const std::vector<double> normal = normal_forces(request, recording, out.found);
+  out.normal = error_of(normal, recording.force, rows);
+  out.normal_held_out = error_of(normal, recording.force, out.held_out);
+  if (names.shear.empty()) return out;
+
+  const std::vector<double> depths = acting_depths(recording, out.found);
+  const auto path = [&](const SkinNumbers& numbers) {
+    return shear_forces(request.scene(numbers), depths, recording.shear);
+  };
+  if (names.shear.size() == 2)
+    scale_shear_start(path, out.found, normal, recording.shear_force, start);
+  ForceFit across(path, recording.shear_force, rows, depth, 0);
+  add_fit(across, names.shear, start, out);
+  const std::vector<double> shear = path(out.found);
+  out.shear = error_of(shear, recording.shear_force, rows);
+  out.shear_held_out = error_of(shear, recording.shear_force, out.held_out);
   return out;
+}
+
+PressError check_calibration(const CalibrationRequest& request, const SkinNumbers& found,
+                             const PressRecording& recording) {
+  check(recording);
+  std::vector<int> rows(recording.rows());
+  for (std::size_t k = 0; k < rows.size(); ++k) rows[k] = int(k);
+  return error_of(normal_forces(request, recording, found), recording.force, rows);
 }
 
 }  // namespace tangere

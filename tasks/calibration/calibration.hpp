@@ -3,67 +3,61 @@
 #pragma once
 
 #include <functional>
-#include <map>
 #include <optional>
-#include <span>
 #include <string>
 #include <vector>
 
+#include "tasks/calibration/force_fit.hpp"
 #include "tasks/calibration/press.hpp"
 
 namespace tangere {
 
-/// Attributes of a sensor by their names in scene files, in the units of its layout.
-using SkinAttributes = std::map<std::string, double>;
-
 struct CalibrationRequest {
-  /// Makes the scene of placed_indenter(), with these attributes in place of the sensor's own.
-  std::function<Scene(const SkinAttributes&)> scene;
+  /// Makes the scene of placed_indenter(), with the attributes among these numbers in place of the
+  /// sensor's own. A table has `knots` pressures [Pa] "pressure[1]", … after 0, evenly spread up to
+  /// the depth "table_depth" [m].
+  std::function<Scene(const SkinNumbers&)> scene;
   /// Attributes that may be fitted, with positive values at which the fit begins: `modulus` or
   /// `kn`, and of `relaxation`, `ks` and `mu` those that the sensor can have.
-  SkinAttributes start;
-  /// Names out of start and "zero" that are fitted. Empty: all that the recording may tell.
-  std::vector<std::string> numbers;
+  SkinNumbers start;
+  /// Pressures of a table, which is fitted in place of a modulus; 0: none.
+  int knots = 0;
+  /// What is fitted: names out of start, "pressure" (the table), "zero" [m] which is added to every
+  /// depth, "lag" [s] of the force behind the depth, and "slider", a spring [N/m] beside the skin
+  /// that slips at "slider_force" [N]. Empty: all out of start and "zero", or all and "pressure",
+  /// as far as the recording can tell them.
+  std::vector<std::string> numbers{};
   /// Rows that are compared and not fitted, of all; as held_out_rows().
   double hold_out = 0;
 };
 
-struct FittedNumber {
-  std::string name;  ///< "modulus", "kn", "relaxation", "ks", "mu", or "zero" [m]
-  double value = 0;
-  double low = 0, high = 0;  ///< 95 % interval; infinite where it is not known
-};
-/// A number that the recording does not tell, and why.
-struct UntoldNumber {
-  std::string name, reason;
-};
 /// How far computed forces are off, over the largest recorded one.
 struct PressError {
   int rows = 0;
   double root_mean_square = 0, largest = 0;
-  double largest_by_row = 0;  ///< over the row's own force, of rows above a hundredth of the peak
+  double largest_by_row = 0;  ///< over the row's own force, of rows above a twentieth of the peak
 };
 
 struct Calibration {
   std::vector<FittedNumber> numbers;
   std::vector<UntoldNumber> untold;
-  std::vector<double> force, shear_force;  ///< computed at every row [N]; shear may be empty
-  std::vector<int> held_out;               ///< rows
+  SkinNumbers found;          ///< all numbers that were fitted, and "table_depth"
+  std::vector<int> held_out;  ///< rows
   PressError normal, normal_held_out, shear, shear_held_out;
   bool converged = true;
-
-  /// The fitted attributes: all numbers but zero.
-  [[nodiscard]] SkinAttributes attributes() const;
 };
 
 /// Returns which of `rows` are held out, evenly spread: a count from 1 on, or a share below 1.
 /// Throws InputError unless one row is left to fit.
 std::vector<int> held_out_rows(double hold_out, int rows);
 
-/// Fits. Normal forces give stiffness, zero and relaxation; then shear forces give ks and mu.
-/// Throws InputError for a recording without force, for columns of unlike lengths, for times that
-/// do not ascend, for a path that the sensor does not feel, and for a requested number of which the
-/// recording has no row.
+/// Fits. Normal forces give all but ks and mu, which shear forces give then. Throws InputError for
+/// a recording without force, for columns of unlike lengths, for times that do not ascend, for a
+/// path that the sensor does not feel, and for a requested number that the columns cannot tell.
 Calibration calibrate(const CalibrationRequest& request, const PressRecording& recording);
+
+/// Compares the normal forces of another recording with those of the numbers that were found.
+PressError check_calibration(const CalibrationRequest& request, const SkinNumbers& found,
+                             const PressRecording& recording);
 
 }  // namespace tangere

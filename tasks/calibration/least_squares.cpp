@@ -17,6 +17,7 @@ using Matrix = Eigen::MatrixXd;
 
 constexpr double kDifference = 1e-10;  // relative error of the residuals, of which steps are roots
 constexpr double kWeakest = 1e-9;      // eigenvalue of normalised columns that is an error
+constexpr Eigen::Index kMostPasses = 200;
 
 struct Problem {
   using Scalar = double;
@@ -38,7 +39,7 @@ struct Problem {
 };
 using Differences = Eigen::NumericalDiff<Problem, Eigen::Central>;
 
-/// Fills in intervals and influences from the Jacobian at the minimum.
+/// Fills in covariance and influences from the Jacobian at the minimum.
 void judge(const Matrix& J, double squares, LeastSquares& out) {
   const Eigen::Index n = J.cols(), freedom = J.rows() - n;
   Vector size(n);
@@ -46,17 +47,15 @@ void judge(const Matrix& J, double squares, LeastSquares& out) {
     size[k] = J.col(k).norm();
     out.influence.push_back(size[k] / std::sqrt(double(J.rows())));
   }
-  out.half_interval.assign(std::size_t(n), HUGE_VAL);
   if (freedom < 1 || !(size.minCoeff() > 0)) return;
   const Matrix scaled = J * size.cwiseInverse().asDiagonal();
   const Eigen::SelfAdjointEigenSolver<Matrix> modes(scaled.transpose().lazyProduct(scaled));
   if (modes.eigenvalues()[0] < kWeakest) return;
-  const double wide = student_95(int(freedom)) * std::sqrt(squares / double(freedom));
-  for (Eigen::Index k = 0; k < n; ++k) {
-    const Vector share = modes.eigenvectors().row(k).transpose();
-    const double variance = (share.array().square() / modes.eigenvalues().array()).sum();
-    out.half_interval[std::size_t(k)] = wide * std::sqrt(variance) / size[k];
-  }
+  const Matrix axes = size.cwiseInverse().asDiagonal() * modes.eigenvectors(),
+               shares = axes * modes.eigenvalues().cwiseInverse().asDiagonal();
+  const Matrix covariance = squares / double(freedom) * shares.lazyProduct(axes.transpose());
+  out.covariance.assign(covariance.data(), covariance.data() + covariance.size());
+  out.student = student_95(int(freedom));
 }
 
 }  // namespace
@@ -66,7 +65,7 @@ LeastSquares minimise(const Residuals& residuals, std::vector<double> x) {
   Differences problem(Problem{residuals, n, m}, kDifference);
   Eigen::LevenbergMarquardt<Differences> method(problem);
   method.parameters.ftol = method.parameters.xtol = 1e-10;
-  method.parameters.maxfev = 200;
+  method.parameters.maxfev = kMostPasses * (2 * n + 1);
   Vector at = Eigen::Map<const Vector>(x.data(), n);
   using Status = Eigen::LevenbergMarquardtSpace::Status;
   const Status status = method.minimize(at);
@@ -80,6 +79,14 @@ LeastSquares minimise(const Residuals& residuals, std::vector<double> x) {
   problem.df(at, J);
   judge(J, r.squaredNorm(), out);
   return out;
+}
+
+double LeastSquares::half_interval(std::span<const double> gradient) const {
+  if (covariance.empty()) return HUGE_VAL;
+  const auto n = Eigen::Index(x.size());
+  const Eigen::Map<const Matrix> C(covariance.data(), n, n);
+  const Eigen::Map<const Vector> g(gradient.data(), n);
+  return student * std::sqrt(g.dot(C * g));
 }
 
 double student_95(int freedom) {

@@ -108,7 +108,7 @@ void drop_imperfections(Scene& scene, int element, Ablation way) {
 
 void drop_layer(Scene& scene, int element) {
   for (std::size_t k = 0; k < scene.sensors.size(); ++k)
-    if (is_meant(element, k)) scene.sensors[k].layer.reset();
+    if (is_meant(element, k)) scene.sensors[k].layer.reset(), scene.sensors[k].table.reset();
 }
 
 void drop_markers(Scene& scene, int element, Ablation way) {

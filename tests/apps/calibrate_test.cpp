@@ -18,6 +18,7 @@ namespace {
 
 using nlohmann::json;
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 constexpr double kPoints = 37;  // of a pitch of 1 mm within 3.5 mm
 constexpr double kArea = 1e-6;  // of a point [m²]
@@ -146,7 +147,8 @@ TEST(Calibrate, AShearShowsItsSpringAndItsFriction) {
   EXPECT_THAT(reason(answer, "zero"), HasSubstr("one depth"));
 
   folder.write("shear.csv", sheared(9));
-  const json stuck = run_json(folder, words);
+  const json stuck = run_json(folder, words + Words{"-o", "stuck.xml"});
+  EXPECT_THAT(folder.read("stuck.xml"), HasSubstr("mu=\"1\"")) << "as in the layout";
   EXPECT_NEAR(number(stuck, "ks")["value"], 40, 1e-3 * 40);
   EXPECT_THAT(reason(stuck, "mu"), HasSubstr("nothing slips"));
 }
@@ -160,7 +162,7 @@ TEST(Calibrate, TwoPressesOfAGelPredictTwoOthers) {
   gel.replace(gel.find(springs), springs.size(), "><layer margin=\"1.5e-3\"/></tactile>");
   folder.write("gel.xml", gel);
   const std::vector<std::string> rows = {"0.5,1.6503", "1.0,5.9641", "1.5,13.5257", "2.0,23.2532"};
-  for (const auto& order : {std::array{0, 1, 2, 3}, {1, 0, 3, 2}, {0, 1, 3, 2}}) {
+  for (const auto& order : {std::array{0, 1, 2, 3}, {1, 0, 3, 2}}) {
     std::string text = "depth_mm,force_N\n";
     for (const int k : order) text += rows[std::size_t(k)] + "\n";
     folder.write("press.csv", text);
@@ -169,6 +171,54 @@ TEST(Calibrate, TwoPressesOfAGelPredictTwoOthers) {
     EXPECT_LE(answer["normal_held_out"]["largest_by_row"], 0.05) << text;
     EXPECT_NEAR(number(answer, "modulus")["value"], 4.28e5, 0.06 * 4.28e5);
   }
+}
+
+/// A table that is pushed by a flat end carries its area times the pressure.
+TEST(Calibrate, ATableIsFound) {
+  const Folder folder;
+  folder.write("skin.xml", layout("modulus=\"1e5\" thickness=\"4e-3\" mu=\"0.5\""));
+  // Pressures of a straight line and a steeper one, which their cubics reproduce at the knots.
+  folder.write("press.csv", table("depth_m,force_N", 3, [](int k) {
+                 const double depth = 1e-4 * (k + 1), pressure = k == 0 ? 2e3 : k == 1 ? 4e3 : 9e3;
+                 return std::vector<double>{depth, kPoints * kArea * pressure};
+               }));
+  const json answer = run_json(folder, {"calibrate", "press.csv", "--sensor", "skin.xml", "--flat",
+                                        "0.0035", "--table", "3", "-o", "out.xml"});
+  EXPECT_NEAR(number(answer, "pressure[1]")["value"], 2e3, 1);
+  EXPECT_NEAR(number(answer, "pressure[2]")["value"], 4e3, 1);
+  EXPECT_NEAR(number(answer, "pressure[3]")["value"], 9e3, 1);
+  EXPECT_NEAR(answer["table_depth"], 3e-4, 1e-15);
+  const std::string written = folder.read("out.xml");
+  EXPECT_THAT(written, HasSubstr("pressure_depth=\"0 0.0001 0.0002 0.0003\""));
+  EXPECT_THAT(written, HasSubstr("ks=\"2.3e+07\""));
+  EXPECT_THAT(written, Not(HasSubstr("modulus=")));
+  // The written layout is one, and its own press is the recorded one.
+  const json again = run_json(folder, {"calibrate", "press.csv", "--sensor", "out.xml", "--flat",
+                                       "0.0035", "--table", "3", "--check", "press.csv"});
+  EXPECT_LT(again["other"]["largest"], 1e-3);
+}
+
+/// A printed lattice, half of whose rows predict the other half (tests/data/skin_loops).
+TEST(Calibrate, ALatticeIsATableAndASlider) {
+  const Folder folder;
+  folder.write("lattice.xml",
+               "<sensor unit=\"m-kg\"><tactile name=\"lattice\" type=\"rect_array\" "
+               "resolution=\"4 4\" rect_pos0=\"-0.0075 0.0075 0\" rect_pos1=\"0.0075 -0.0075 0\" "
+               "axis0=\"0 -1 0\" axis1=\"1 0 0\" per=\"area\" kn=\"1e7\"/></sensor>");
+  const Words words = {"calibrate",  TANGERE_TEST_DATA "/skin_loops/shear.csv",
+                       "--sensor",   "lattice.xml",
+                       "--flat",     "0.05",
+                       "--hold-out", "0.5",
+                       "--table",    "16",
+                       "--fit",      "pressure"};
+  const json table = run_json(folder, words),
+             both = run_json(folder,
+                             words + Words{"--fit", "slider", "--fit", "zero", "--fit", "lag"});
+  EXPECT_LT(table["normal_held_out"]["root_mean_square"], 0.065);
+  EXPECT_GT(table["normal_held_out"]["root_mean_square"], 0.05);
+  EXPECT_LT(both["normal_held_out"]["root_mean_square"], 0.0135);
+  EXPECT_LT(number(both, "slider_force")["high"], 3);
+  EXPECT_GT(number(both, "slider_force")["low"], 1);
 }
 
 const std::string kTable = "depth,force\n1e-4,1\n2e-4,2\n";
@@ -189,6 +239,9 @@ TEST(Calibrate, SaysWhatIsWrong) {
   EXPECT_THAT(err("depth,force,depth\n1,2,1\n", flat), HasSubstr("two columns 'depth'"));
   EXPECT_THAT(err("1,2\n", flat), HasSubstr("p.csv:1: no names of columns"));
   EXPECT_THAT(err(kTable, flat + Words{"--fit", "mu"}), HasSubstr("nothing is sheared"));
+  EXPECT_THAT(err(kTable, flat + Words{"--fit", "lag"}), HasSubstr("has no times"));
+  EXPECT_THAT(err(kTable, flat + Words{"--table", "3", "--fit", "zero"}),
+              HasSubstr("a table without 'pressure'"));
   EXPECT_THAT(err(kTable, flat + Words{"--fit", "ke"}), HasSubstr("expected some of kn, zero"));
   EXPECT_THAT(err(kTable, flat + Words{"--hold-out", "2"}), HasSubstr("2 of 2 rows are held out"));
   EXPECT_THAT(err("depth,force\n-1e-4,1\n", flat), HasSubstr("feels nothing"));
