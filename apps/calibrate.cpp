@@ -33,8 +33,10 @@ struct CalibrateArguments {
 };
 
 void check_arguments(const CalibrateArguments& a) {
-  if (a.indenter.ball.has_value() == a.indenter.flat.has_value())
-    throw InputError("expected one of --ball and --flat: the indenter");
+  if (int(a.indenter.ball.has_value()) + int(a.indenter.flat.has_value()) +
+          int(!a.indenter.box.empty()) !=
+      1)
+    throw InputError("expected one of --ball, --flat and --box: the indenter");
   if (a.hold_out && *a.hold_out >= 1 && *a.hold_out != std::floor(*a.hold_out))
     throw InputError(fmt::format(
         "--hold-out {}; expected a number of rows, or a share of them below 1", *a.hold_out));
@@ -175,6 +177,8 @@ Command add_calibrate(CLI::App& program) {
   add_positive_number(app, "--ball", a.indenter.ball, "Radius of a ball that presses [m]");
   add_positive_number(app, "--flat", a.indenter.flat,
                       "Radius of a flat, round end that presses [m]");
+  add_positive_numbers(app, "--box", a.indenter.box, 2,
+                       "Sides along x and y of a flat, rectangular end that presses [m]");
   add_whole_number<int>(app, "--table", a.table, 1, kMostKnots,
                         "Fit a table of N pressures by depth in place of modulus or kn");
   add_texts(app, "--fit", a.numbers, "NAME",

@@ -16,6 +16,9 @@ const std::vector<std::string> kLeftOut = {"imperfections", "markers", "feedback
 std::string shape_text(const Indenter& of) {
   constexpr double kLength = 0.1;
   if (of.ball) return fmt::format("type=\"sphere\" radius=\"{0}\" pos=\"0 0 {0}\"", *of.ball);
+  if (!of.box.empty())
+    return fmt::format("type=\"cuboid\" size=\"{} {} {}\" pos=\"0 0 {}\"", of.box[0], of.box[1],
+                       kLength, kLength / 2);
   return fmt::format("type=\"cylinder\" radius=\"{}\" length=\"{}\" pos=\"0 0 {}\"", *of.flat,
                      kLength, kLength / 2);
 }

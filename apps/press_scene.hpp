@@ -8,9 +8,10 @@
 
 namespace tangere::apps {
 
-/// A ball, or the flat end of a cylinder; one of them is given [m].
+/// A ball, or the flat end of a cylinder or of a cuboid; one of them is given [m].
 struct Indenter {
   std::optional<double> ball, flat;  ///< radii
+  std::vector<double> box;           ///< lengths along x and y
 };
 
 /// Returns the scene for tasks/calibration/press.hpp, without imperfections and feedback of the

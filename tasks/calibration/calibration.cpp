@@ -176,6 +176,8 @@ void scale_start(const CalibrationRequest& request, const PressRecording& r, dou
   SkinNumbers straight;
   for (int k = 1; k <= request.knots; ++k) straight[table_number(k)] = k;
   if (request.knots > 0) straight[kDepth] = depth;
+  for (const char* const name : {"modulus", "kn"})
+    if (start.contains(name)) straight[name] = start[name];
   const double factor = best_factor(normal_forces(request, r, straight), r.force);
   if (!std::isfinite(factor))
     throw InputError(

@@ -77,6 +77,12 @@ TEST(Calibrate, StiffnessAndZeroOfAPressAreFound) {
   EXPECT_THAT(written, HasSubstr("kn=\"123\""));
   EXPECT_THAT(written, HasSubstr("name=\"skin_measured\""));
   EXPECT_THAT(written, HasSubstr("fitted by 'tangere calibrate' to press.csv"));
+
+  // Seven columns of three points under a rectangle, and a layout without a stiffness.
+  folder.write("skin.xml", layout("mu=\"1\""));
+  const json box = run_json(
+      folder, {"calibrate", "press.csv", "--sensor", "skin.xml", "--box", "0.0067,0.0027"});
+  EXPECT_NEAR(number(box, "kn")["value"], 123 * kPoints / 21, 1e-3);
 }
 
 TEST(Calibrate, TheIntervalIsThatOfTheNoise) {
@@ -233,7 +239,9 @@ TEST(Calibrate, SaysWhatIsWrong) {
     return outcome.err;
   };
   const Words flat = {"--flat", "0.0035"};
-  EXPECT_THAT(err(kTable, {}), HasSubstr("expected one of --ball and --flat"));
+  EXPECT_THAT(err(kTable, {}), HasSubstr("expected one of --ball, --flat and --box"));
+  EXPECT_THAT(err(kTable, {"--box", "0.01"}), HasSubstr("expected 2 positive numbers"));
+  EXPECT_THAT(err(kTable, flat + Words{"--box", "1,1"}), HasSubstr("expected one of"));
   EXPECT_THAT(err("depth,forc\n1,2\n", flat), HasSubstr("no column 'force' among depth, forc"));
   EXPECT_THAT(err("depth_in,force\n1,2\n", flat), HasSubstr("is in 'in'; expected m or mm"));
   EXPECT_THAT(err("depth,force,depth\n1,2,1\n", flat), HasSubstr("two columns 'depth'"));
