@@ -39,10 +39,10 @@ std::string start_text(const std::string& number, const SkinNumbers& start) {
 std::string error_text(const char* what, const PressError& error) {
   if (error.rows == 0) return "";
   return fmt::format(
-      "{}, {} row{}: off by {:.2g} % of the peak (root mean square), {:.2g} % at most; {:.2g} % of "
-      "a row's own force at most\n",
-      what, error.rows, error.rows == 1 ? "" : "s", 100 * error.root_mean_square,
-      100 * error.largest, 100 * error.largest_by_row);
+      "{}, {} row{}: off by {} of the peak (root mean square), {} at most; {} of a row's own force "
+      "at most\n",
+      what, error.rows, error.rows == 1 ? "" : "s", percent(error.root_mean_square),
+      percent(error.largest), percent(error.largest_by_row));
 }
 
 Json error_json(const PressError& error) {

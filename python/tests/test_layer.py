@@ -41,7 +41,8 @@ def test_environments_have_gels_of_their_own():
 
 @pytest.mark.parametrize("table", [False, True])
 def test_gradients_agree_with_differences(table, tmp_path):
-    sim = tt.Simulation(with_table(tmp_path) if table else GEL, 2, 60, every=20, read=["gel"], threads=1)
+    scene = with_table(tmp_path) if table else GEL
+    sim = tt.Simulation(scene, 2, 60, every=20, read=["gel"], threads=1)
     draw = torch.Generator().manual_seed(1)
     weights = torch.randn(3, generator=draw, dtype=torch.float64)
     name = "tactile gel kn"
