@@ -159,14 +159,19 @@ TEST(Calibrate, AShearShowsItsSpringAndItsFriction) {
   EXPECT_THAT(reason(stuck, "mu"), HasSubstr("nothing slips"));
 }
 
-/// Forces on a GelSight Mini (FEATS, Helmut et al.).
-TEST(Calibrate, TwoPressesOfAGelPredictTwoOthers) {
-  const Folder folder;
+/// Writes the layout of a GelSight Mini with a layer, gel.xml.
+void write_gel(const Folder& folder) {
   std::string gel = folder.read(scene("sensors/gelsight_mini_measured.xml"));
   const std::string springs = " kn=\"3.13e8\"/>";
   ASSERT_THAT(gel, HasSubstr(springs));
   gel.replace(gel.find(springs), springs.size(), "><layer margin=\"1.5e-3\"/></tactile>");
   folder.write("gel.xml", gel);
+}
+
+/// Forces on a GelSight Mini (FEATS, Helmut et al.).
+TEST(Calibrate, TwoPressesOfAGelPredictTwoOthers) {
+  const Folder folder;
+  write_gel(folder);
   const std::vector<std::string> rows = {"0.5,1.6503", "1.0,5.9641", "1.5,13.5257", "2.0,23.2532"};
   for (const auto& order : {std::array{0, 1, 2, 3}, {1, 0, 3, 2}}) {
     std::string text = "depth_mm,force_N\n";
@@ -177,6 +182,22 @@ TEST(Calibrate, TwoPressesOfAGelPredictTwoOthers) {
     EXPECT_LE(answer["normal_held_out"]["largest_by_row"], 0.05) << text;
     EXPECT_NEAR(number(answer, "modulus")["value"], 4.28e5, 0.06 * 4.28e5);
   }
+}
+
+/// Finite elements of a gel of 0.428 MPa under a ball of 7.5 mm with friction 1, pressed 0.75 mm and
+/// moved along x: the material is found, and one shear predicts another.
+TEST(Calibrate, AShearedGelOfFiniteElementsIsFound) {
+  const Folder folder;
+  write_gel(folder);
+  folder.write("shear.csv",
+               "depth_mm,force_N,shear_mm,shear_force_N\n0.75,3.18433,0,0\n"
+               "0.75,3.18795,0.2,0.60406\n0.75,3.19709,0.5,1.42649\n");
+  const json answer =
+      run_json(folder, {"calibrate", "shear.csv", "--sensor", "gel.xml", "--ball", "0.0075",
+                        "--fit", "modulus", "--fit", "ks", "--hold-out", "1"});
+  EXPECT_NEAR(number(answer, "modulus")["value"], 4.28e5, 0.015 * 4.28e5);
+  EXPECT_LT(answer["normal_held_out"]["largest"], 0.01);
+  EXPECT_LT(answer["shear_held_out"]["largest"], 0.04);
 }
 
 /// A table that is pushed by a flat end carries its area times the pressure.
