@@ -184,8 +184,8 @@ TEST(Calibrate, TwoPressesOfAGelPredictTwoOthers) {
   }
 }
 
-/// Finite elements of a gel of 0.428 MPa under a ball of 7.5 mm with friction 1, pressed 0.75 mm and
-/// moved along x: the material is found, and one shear predicts another.
+/// Finite elements of a gel of 0.428 MPa under a ball of 7.5 mm with friction 1, pressed 0.75 mm
+/// and moved along x: the material is found, and one shear predicts another.
 TEST(Calibrate, AShearedGelOfFiniteElementsIsFound) {
   const Folder folder;
   write_gel(folder);
