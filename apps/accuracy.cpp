@@ -61,9 +61,9 @@ void check_arguments(const AccuracyArguments& o) {
 /// Refuses states and controls that would not fit.
 void check_size(const AccuracyArguments& o, const Model& model, std::int64_t steps) {
   const int environments = environments_of(o);
-  const double of_environment = 3.0 * static_cast<double>(model.state_bytes_per_environment()) +
-                                static_cast<double>(steps) * model.nu() * sizeof(double);
-  check_memory(of_environment * environments,
+  const double environment_bytes = 3.0 * static_cast<double>(model.state_bytes_per_environment()) +
+                                   static_cast<double>(steps) * model.nu() * sizeof(double);
+  check_memory(environment_bytes * environments,
                fmt::format("--envs {} of {} steps", environments, steps));
 }
 
@@ -76,11 +76,11 @@ int report_sweep(const AccuracySubject& subject, const Console& console, const M
                  const AccuracyReport& report, int signal, TextOutput& svg, TextOutput& csv) {
   console.print(pitch_table(report.pitches, model) + order_text(report, model) + "\n" +
                 advice_text(subject, report, model));
-  if (svg.wanted() && can_draw(report))
+  if (svg.requested() && can_draw(report))
     svg.write(accuracy_svg(subject, report), console);
-  else if (svg.wanted())
+  else if (svg.requested())
     console.note("no picture: no setting has both an error and a cost");
-  if (csv.wanted()) csv.write(accuracy_csv(subject, report), console);
+  if (csv.requested()) csv.write(accuracy_csv(subject, report), console);
   int code = exit_code(console, !report.resolved || report.advice < 0, report.reference.counts);
   if (report.stopped) code = signal == SIGINT ? kInterrupted : kTerminated;
   Json result = accuracy_json(subject, report, model);
@@ -126,7 +126,7 @@ int run_sweep(const AccuracyArguments& o, const Console& console, const Model& m
     console.print(accuracy_row(points));
   };
   const int more = std::min(kMoreEnvironments * environments_of(o), kMostEnvironments);
-  listener.second_look = [&] {
+  listener.before_confirmation = [&] {
     console.print(fmt::format("\nwith {} more environments, settings that may be cheaper:", more));
   };
   FreshEpisodes fresh;

@@ -57,10 +57,10 @@ FrameKind frames_named(const std::string& name) {
   return named_value("frames", name, {FrameKind::dense, FrameKind::compact, FrameKind::none});
 }
 
-/// `of_benchmark`: memory of the benchmark besides the batch from which it starts [bytes].
-void check_size(const Model& model, int environments, double of_benchmark) {
+/// `extra_bytes`: memory of the benchmark besides the batch from which it starts [bytes].
+void check_size(const Model& model, int environments, double extra_bytes) {
   const double start = static_cast<double>(model.state_bytes_per_environment()) * environments;
-  check_memory(start + of_benchmark, fmt::format("--envs {}", environments));
+  check_memory(start + extra_bytes, fmt::format("--envs {}", environments));
 }
 
 void note_idle_threads(const Console& console, int environments, int most_threads) {
@@ -80,7 +80,7 @@ void print_passes(const Console& console, const BenchRun& run) {
 }
 
 int report(const BenchArguments& options, const Console& console, const BenchSetting& setting,
-           const Model& model, const Json& of_task, const Json& entries) {
+           const Model& model, const Json& task_json, const Json& entries) {
   const bool any_failed = !entries.at(0).at("failed").empty();
   const ExitCode code = any_failed ? kSomeFailed : kDone;
   Json result{{"command", "bench"},
@@ -96,7 +96,7 @@ int report(const BenchArguments& options, const Console& console, const BenchSet
               {"svg", options.svg.empty() ? Json() : Json(options.svg)},
               {"csv", options.csv.empty() ? Json() : Json(options.csv)},
               {"runs", entries}};
-  result.update(of_task);
+  result.update(task_json);
   console.result(result);
   return code;
 }
@@ -161,7 +161,7 @@ BenchSetting setting_of(const BenchArguments& options, const Model& model,
 /// Calls `run` with setting.options.threads set to each of `threads` and reports the results.
 template <class Run>
 int measure(const BenchArguments& options, const Console& console, BenchSetting& setting,
-            const std::vector<int>& threads, const Model& model, const Json& of_task,
+            const std::vector<int>& threads, const Model& model, const Json& task_json,
             const Run& run, const std::function<BenchError(const std::stop_token&)>& error = {}) {
   const StopSignals signals;
   TextOutput svg(options.svg, options.overwrite), csv(options.csv, options.overwrite);
@@ -180,7 +180,7 @@ int measure(const BenchArguments& options, const Console& console, BenchSetting&
   }
   console.print(bench_footing(setting, runs.front()));
   list_failures(console, "environment", failures_of(runs.front()), "--json names all");
-  Json more = of_task;
+  Json more = task_json;
   if (error) {
     const BenchError found = error(signals.token());
     if (signals.received() != 0)
@@ -188,8 +188,8 @@ int measure(const BenchArguments& options, const Console& console, BenchSetting&
     console.print(found.text);
     more["own_error"] = found.json;
   }
-  if (svg.wanted()) svg.write(bench_svg(setting, runs), console);
-  if (csv.wanted()) csv.write(bench_csv(setting, entries), console);
+  if (svg.requested()) svg.write(bench_svg(setting, runs), console);
+  if (csv.requested()) csv.write(bench_csv(setting, entries), console);
   return report(options, console, setting, model, more, entries);
 }
 
@@ -240,10 +240,10 @@ int bench_task(const BenchArguments& options, const Console& console, const Task
   check_size(task.model(), setting.environments,
              benchmark_bytes(task, setting.environments, setting.options));
   const Batch start(task.model(), setting.environments, options.seed.value_or(0));
-  const Json of_task{{"task", task.spec().name},
-                     {"policy", to_string(kind)},
-                     {"steps_per_action", task.spec().steps_per_action}};
-  return measure(options, console, setting, threads, task.model(), of_task,
+  const Json task_json{{"task", task.spec().name},
+                       {"policy", to_string(kind)},
+                       {"steps_per_action", task.spec().steps_per_action}};
+  return measure(options, console, setting, threads, task.model(), task_json,
                  [&](const std::stop_token& stop) {
                    return run_benchmark(start, task, policy, setting.options, stop);
                  });
@@ -270,8 +270,8 @@ int bench(const BenchArguments& options, const Console& console) {
   const ControlProgram controls(model, model.timestep(), seed);
   if (!model.scene().control && model.nu() > 0)
     console.note("the scene has no <control>: every control is 0");
-  const RolloutOutputs wanted = record_of(options.record, model).outputs;
-  if (wanted.fields && (wanted.bodies || wanted.end_effectors))
+  const RolloutOutputs recorded = record_of(options.record, model).outputs;
+  if (recorded.fields && (recorded.bodies || recorded.end_effectors))
     console.note("bench reads sensors alone: bodies and variables are left out");
   BenchSetting setting = setting_of(options, model, controls);
   const std::vector<int> threads = thread_counts(options);

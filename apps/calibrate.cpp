@@ -45,9 +45,9 @@ void check_arguments(const CalibrateArguments& a) {
 /// A layout, and what a fit changes in it.
 struct Fitted {
   LayoutFile layout;
-  int knots = 0;         ///< of a table
-  bool by_area = false;  ///< whether coefficients count by area
-  SkinNumbers start;     ///< attributes that can be fitted
+  int knots = 0;          ///< of a table
+  bool per_area = false;  ///< whether coefficients count by area
+  SkinNumbers start;      ///< attributes that can be fitted
 };
 
 /// The attributes that can be fitted, as the layout has them, where it has any.
@@ -109,7 +109,7 @@ Fitted read_fitted(const CalibrateArguments& a) {
   } else if (d.table) {
     throw InputError(a.sensor + " has a table of pressures; expected --table");
   }
-  fitted.by_area = d.cell > 0 || fitted.knots > 0;
+  fitted.per_area = d.cell > 0 || fitted.knots > 0;
   return fitted;
 }
 
@@ -149,7 +149,7 @@ int run_calibrate(const CalibrateArguments& a, const Console& console) {
                                    .numbers = a.numbers,
                                    .hold_out = a.hold_out.value_or(0)};
   const Calibration found = calibrate(request, recording);
-  CalibrationReport report{found, fitted.start, fitted.by_area, fitted.knots, {}};
+  CalibrationReport report{found, fitted.start, fitted.per_area, fitted.knots, {}};
   if (other) report.other = check_calibration(request, found.found, *other);
   console.print(report_text(report));
   output.write(measured_layout(read_fitted(a), found, a.recording), console);

@@ -22,7 +22,7 @@ std::string label_of(const std::string& number, const CalibrationReport& of) {
       {"modulus", "Pa"}, {"relaxation", "s"}, {"zero", "m"},
       {"lag", "s"},      {"slider", "N/m"},   {"slider_force", "N"}};
   if (number == "kn" || number == "ks")
-    return fmt::format("{} [{}]", number, of.by_area ? "N/m³" : "N/m");
+    return fmt::format("{} [{}]", number, of.per_area ? "N/m³" : "N/m");
   for (int k = 1; k <= of.knots; ++k)
     if (number == table_number(k))
       return fmt::format("pressure at {:.3g} m [Pa]",

@@ -12,7 +12,7 @@ namespace tangere::apps {
 struct CalibrationReport {
   const Calibration& found;
   const SkinNumbers& start;  ///< at which the fit began
-  bool by_area;              ///< whether coefficients count by area
+  bool per_area;             ///< whether coefficients count by area
   int knots;                 ///< of a table
   PressError other;          ///< of another recording
 };

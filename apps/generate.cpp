@@ -168,14 +168,14 @@ int generate_task(const GenerateOptions& options, const Console& console, const 
   const Policy policy =
       program ? Policy(
                     task, program->name(),
-                    [&program](const PolicyQuestion& question, std::span<double> actions) {
-                      program->answer(question, actions);
+                    [&program](const PolicyInputs& inputs, std::span<double> actions) {
+                      program->answer(inputs, actions);
                     },
                     variation)
               : make_policy(task, kind, options.controls, variation);
   Job job;
   job.run = episode_options(options, task);
-  const GradientKind gradients = gradients_wanted(options, true);
+  const GradientKind gradients = requested_gradients(options, true);
   const TaskActions actions = [&](const TaskView& view, std::span<const double> observation,
                                   std::span<double> action) {
     policy.act(view, observation, action);
@@ -257,7 +257,7 @@ int generate(GenerateOptions options, const Console& console, const ProgramInfo&
   const Record record = record_of(options.record, model);
   refuse_memory(record, "a data set");
   job.run.record = record.requested;
-  const GradientKind gradients = gradients_wanted(options, false);
+  const GradientKind gradients = requested_gradients(options, false);
   std::unique_ptr<RolloutLoss> loss;
   if (!options.loss.empty()) loss = make_loss(loss_named(options.loss), model, job.run.every);
   const auto plan_of = [&](const EpisodeOptions& run) {

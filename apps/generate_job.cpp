@@ -62,11 +62,11 @@ double measured_rate(const Job& job, const std::stop_token& stop) {
   some.ranges.clear();
   some.episodes = std::min<std::int64_t>(job.run.episodes, 16LL * job.run.threads);
   NoSink sink;
-  const bool by_steps = !job.layout.task;  // a task plays whole episodes
-  if (by_steps) some.steps = std::min<std::int64_t>(job.run.steps, some.every);
+  const bool adjusts_steps = !job.layout.task;  // a task plays whole episodes
+  if (adjusts_steps) some.steps = std::min<std::int64_t>(job.run.steps, some.every);
   for (;;) {
     const EpisodeSummary summary = job.simulate(some, sink, {}, stop).summary;
-    if (summary.stopped || !by_steps || some.steps >= job.run.steps || summary.seconds > 0.5)
+    if (summary.stopped || !adjusts_steps || some.steps >= job.run.steps || summary.seconds > 0.5)
       return static_cast<double>(summary.environment_steps) / summary.seconds;
     some.steps = std::min(job.run.steps, some.steps * 4);
   }
@@ -95,16 +95,16 @@ const char* size_compared(const DatasetLayout& layout) {
 
 }  // namespace
 
-GradientKind gradients_wanted(const GenerateOptions& options, bool of_task) {
+GradientKind requested_gradients(const GenerateOptions& options, bool is_task) {
   const GradientKind kind = gradient_kind_named(options.gradients);
   if (options.tape_memory && kind != GradientKind::returns)
     throw InputError(fmt::format("--tape-memory with --gradients {}; expected --gradients return",
                                  options.gradients));
-  if (!options.loss.empty() && (of_task || kind != GradientKind::returns))
+  if (!options.loss.empty() && (is_task || kind != GradientKind::returns))
     throw InputError(fmt::format("--loss {} with {}; expected a scene and --gradients return",
                                  options.loss,
-                                 of_task ? "a task" : "--gradients " + options.gradients));
-  if (!of_task && kind == GradientKind::returns && options.loss.empty())
+                                 is_task ? "a task" : "--gradients " + options.gradients));
+  if (!is_task && kind == GradientKind::returns && options.loss.empty())
     throw InputError(
         "--gradients return of a scene, which has no rewards; expected --loss as well");
   return kind;
@@ -163,8 +163,8 @@ int dry_run(const GenerateOptions& options, const Console& console, const Job& j
             const StopSignals& signals) {
   job.layout.check();
   const Extent extent = extent_of(options, job.layout, output_for(options, job.layout, console));
-  const double of_one = job.layout.episode_bytes(),
-               bytes = of_one * static_cast<double>(extent.episodes);
+  const double bytes_per_episode = job.layout.episode_bytes(),
+               bytes = bytes_per_episode * static_cast<double>(extent.episodes);
   const double free = free_bytes_at(options.output), rate = measured_rate(job, signals.token());
   if (signals.received() != 0)
     return report_stop(console, "generate", signals.received(), "while it measured");
@@ -180,7 +180,7 @@ int dry_run(const GenerateOptions& options, const Console& console, const Job& j
       "as measured now, without output\neffects: {}\nnothing was written",
       extent.episodes, job.layout.steps, job.layout.rows(),
       extent.shards.size() == 1 ? "1 shard" : fmt::format("{} shards", extent.shards.size()),
-      extent.kept, of_one, bytes, size_compared(job.layout), free, job.run.threads,
+      extent.kept, bytes_per_episode, bytes, size_compared(job.layout), free, job.run.threads,
       job.memory_bytes, seconds, rate, fmt::join(job.effects, ", ")));
   console.result({{"command", "generate"},
                   {"exit_code", static_cast<int>(kDone)},
@@ -193,7 +193,7 @@ int dry_run(const GenerateOptions& options, const Console& console, const Job& j
                   {"steps", job.layout.steps},
                   {"every", job.layout.every},
                   {"rows_per_episode", job.layout.rows()},
-                  {"bytes_per_episode", of_one},
+                  {"bytes_per_episode", bytes_per_episode},
                   {"bytes", bytes},
                   {"free_bytes", free},
                   {"memory_bytes", job.memory_bytes},

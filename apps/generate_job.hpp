@@ -35,7 +35,7 @@ struct Job {
 
 /// Returns what --gradients and its companions request. Throws InputError for options that do not
 /// go together.
-GradientKind gradients_wanted(const GenerateOptions& options, bool of_task);
+GradientKind requested_gradients(const GenerateOptions& options, bool is_task);
 /// Size of the tapes of one thread [bytes].
 double tape_bytes(const GenerateOptions& options, int threads);
 

@@ -94,12 +94,12 @@ int report_shards(const GenerateOptions& options, const Console& console, const 
                   const JobResult& done, DatasetWriter& output) {
   const EpisodeSummary& summary = done.summary;
   const EpisodeOptions& run = job.run;
-  StepCounts of_all = summary.counts;
-  of_all.simulation_steps += output.kept_steps().taken;
-  of_all.tunnelled_steps += output.kept_steps().tunnelled;
-  of_all.overlapping_steps += output.kept_steps().overlapping;
+  StepCounts all_counts = summary.counts;
+  all_counts.simulation_steps += output.kept_steps().taken;
+  all_counts.tunnelled_steps += output.kept_steps().tunnelled;
+  all_counts.overlapping_steps += output.kept_steps().overlapping;
   const ExitCode code =
-      exit_code(console, !summary.failures.empty() || output.kept_failed() > 0, of_all);
+      exit_code(console, !summary.failures.empty() || output.kept_failed() > 0, all_counts);
   const Shards shards(output);
   const Merged merged = merge_if_complete(options, output);
   list_failures(console, "episode", failures_of(summary), "--json and the shards name all");

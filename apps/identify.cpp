@@ -64,13 +64,13 @@ int interval_of(const Model& model) {
 }
 
 /// Checks that sensor s of the file is that of the scene, read after steps every, 2 every, …
-void check_sensor(const TrajectoryReader& file, std::size_t s, const SensorInfo& of_scene,
+void check_sensor(const TrajectoryReader& file, std::size_t s, const SensorInfo& expected,
                   int every) {
   const SensorLayout& found = file.sensors()[s];
   const std::string where = fmt::format("{}: sensor '{}'", file.path(), found.name);
-  if (found.points != of_scene.points)
+  if (found.points != expected.points)
     throw InputError(fmt::format("{} has {} points; expected {}, as in the scene", where,
-                                 found.points, of_scene.points));
+                                 found.points, expected.points));
   if (!file.has_field(s)) throw InputError(where + " has pressure or shear; expected whole fields");
   if (found.every != every)
     throw InputError(fmt::format("{} was read every {} steps; expected every {}, as in the scene",
@@ -165,7 +165,7 @@ int identify_numbers(const IdentifyArguments& a, const Console& console) {
                   a.recording.empty() ? "simulated" : a.recording, report.recorded.readings.size(),
                   run.every, model.timestep(), report.peak));
   print(console, report);
-  if (picture.wanted()) {
+  if (picture.requested()) {
     const Scene found = with_numbers(scene, a.numbers, report.fit.values());
     picture.write(draw(report, simulate_fields(found, run), model.timestep()), console);
   }

@@ -261,7 +261,7 @@ int report(const Model& model, const TaskSpec* task, const InspectArguments& opt
   if (options.effects) {
     TextOutput svg(options.svg, options.overwrite);
     const EffectCosts costs = measure_effects(model);
-    if (svg.wanted())
+    if (svg.requested())
       svg.write(
           effect_costs_svg(costs, model.scene().name,
                            fmt::format("{}, {}", processor_name(), kernels::active_isa_name())),

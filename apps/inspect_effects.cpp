@@ -23,10 +23,10 @@ std::string share_text(const MeasuredShare& m) {
 
 /// Pads by what is seen: "µ" and "±" are two bytes each.
 std::string padded(const std::string& text, std::size_t width, bool right = false) {
-  const auto seen = std::size_t(std::count_if(text.begin(), text.end(), [](char c) {
+  const auto columns = std::size_t(std::count_if(text.begin(), text.end(), [](char c) {
     return (static_cast<unsigned char>(c) & 0xC0U) != 0x80U;
   }));
-  const std::string blanks(width > seen ? width - seen : 0, ' ');
+  const std::string blanks(width > columns ? width - columns : 0, ' ');
   return right ? blanks + text : text + blanks;
 }
 
@@ -77,13 +77,13 @@ std::string row(const EffectCost& c, std::size_t width) {
 
 /// Rows of a table of their own: they are no part of a step.
 std::string run_costs_text(const EffectCosts& costs) {
-  if (costs.of_runs.empty()) return "";
+  if (costs.run_costs.empty()) return "";
   std::size_t width = 10;
-  for (const RunCost& c : costs.of_runs) width = std::max(width, c.name.size());
+  for (const RunCost& c : costs.run_costs) width = std::max(width, c.name.size());
   std::string text = fmt::format(
       "\n  {} {} {} {:>7}  {}\n", padded("what a run adds", std::max<std::size_t>(width, 15)),
       padded("share", 9, true), padded("time", 9, true), "bytes", "requested by");
-  for (const RunCost& c : costs.of_runs)
+  for (const RunCost& c : costs.run_costs)
     text +=
         fmt::format("  {} {} {} {:>7}  {}{}\n", padded(c.name, std::max<std::size_t>(width, 15)),
                     padded(fmt::format("{:.1f} %", 100 * c.share), 9, true),
@@ -188,7 +188,7 @@ std::string effect_costs_text(const EffectCosts& costs, const std::string& instr
 
 Json run_costs_json(const EffectCosts& costs) {
   Json list = Json::array();
-  for (const RunCost& c : costs.of_runs)
+  for (const RunCost& c : costs.run_costs)
     list.push_back({{"name", c.name},
                     {"on", c.on},
                     {"requested_by", c.requested_by},
@@ -218,7 +218,7 @@ std::string effect_costs_svg(const EffectCosts& costs, const std::string& scene,
     if (c.effect.on && c.measured && is_shown(costs, c))
       shares.bars.push_back({c.effect.name, c.measured->share, c.measured->spread,
                              is_part(c.effect.effect.kind) ? 1 : 0});
-  for (const RunCost& c : costs.of_runs) shares.bars.push_back({c.name, c.share, 0, 2});
+  for (const RunCost& c : costs.run_costs) shares.bars.push_back({c.name, c.share, 0, 2});
   return render_share_svg(shares);
 }
 

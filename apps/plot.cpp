@@ -31,12 +31,12 @@ bool is_scene(const std::string& path) { return std::filesystem::path(path).exte
 
 /// Refuses options of the other kind of picture.
 void check_arguments(const PlotArguments& options) {
-  const bool of_fields =
+  const bool field_options =
                  !options.sensor.empty() || options.environment || options.frame || options.strip,
-             of_scene = options.turn || options.lift;
-  if (is_scene(options.input) && of_fields)
+             scene_options = options.turn || options.lift;
+  if (is_scene(options.input) && field_options)
     throw InputError("--sensor, --env, --frame and --strip with a scene; expected a trajectory");
-  if (!is_scene(options.input) && of_scene)
+  if (!is_scene(options.input) && scene_options)
     throw InputError("--turn or --lift with a trajectory; expected a scene, F.xml");
 }
 

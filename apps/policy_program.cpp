@@ -33,8 +33,8 @@ static_assert(std::endian::native == std::endian::little,
 
 constexpr const char* kProtocol = "tangere policy 1";
 constexpr std::size_t kLongestLine = 4096;
-constexpr int kLookForStop = 100;  // [ms]
-constexpr double kTimeToEnd = 5;   // [s]
+constexpr int kStopPoll = 100;    // [ms]
+constexpr double kTimeToEnd = 5;  // [s]
 
 double now() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
@@ -119,19 +119,19 @@ void PolicyProgram::introduce(std::uint64_t seed, const std::string& version) {
   const TaskSpec& spec = task_.spec();
   Json observations = Json::array();
   for (const TensorSpec& tensor : spec.observations) observations.push_back(described(tensor));
-  const Json said{{"protocol", kProtocol},
-                  {"version", version},
-                  {"task", spec.name},
-                  {"seed", seed},
-                  {"horizon", spec.horizon},
-                  {"observations", observations},
-                  {"action",
-                   {{"name", spec.action.name},
-                    {"shape", spec.action.shape},
-                    {"low", spec.action.low},
-                    {"high", spec.action.high}}}};
+  const Json greeting{{"protocol", kProtocol},
+                      {"version", version},
+                      {"task", spec.name},
+                      {"seed", seed},
+                      {"horizon", spec.horizon},
+                      {"observations", observations},
+                      {"action",
+                       {{"name", spec.action.name},
+                        {"shape", spec.action.shape},
+                        {"low", spec.action.low},
+                        {"high", spec.action.high}}}};
   const double deadline = now() + timeout_;
-  const std::string line = said.dump() + "\n";
+  const std::string line = greeting.dump() + "\n";
   // What a program said before it ended is heard: it explains more than that it ended.
   static_cast<void>(write(line.data(), line.size(), deadline));
   const std::string heard = read_line(deadline);
@@ -150,29 +150,29 @@ void PolicyProgram::introduce(std::uint64_t seed, const std::string& version) {
   check_policy_name(who(), name_);
 }
 
-void PolicyProgram::answer(const PolicyQuestion& question, std::span<double> actions) {
+void PolicyProgram::answer(const PolicyInputs& inputs, std::span<double> actions) {
   const std::lock_guard lock(mutex_);
   if (failure_) std::rethrow_exception(failure_);  // other threads do not wait for it again
   try {
-    ask(question, actions);
+    exchange(inputs, actions);
   } catch (...) {
     failure_ = std::current_exception();
     throw;
   }
 }
 
-void PolicyProgram::ask(const PolicyQuestion& question, std::span<double> actions) {
+void PolicyProgram::exchange(const PolicyInputs& inputs, std::span<double> actions) {
   if (stopping()) stopped_ = true;
   if (stopped_) return std::fill(actions.begin(), actions.end(), 0.0);
   // Without its shell, for example, what it has started may still answer.
   if (siginfo_t how; has_ended(how)) fail_ended();
-  const auto n = static_cast<std::int64_t>(question.episodes.size());
+  const auto n = static_cast<std::int64_t>(inputs.episodes.size());
   char* at = put(bytes_.data(), std::span(&n, 1));
-  at = put(at, question.episodes);
-  at = put(at, question.actions);
-  for (std::size_t i = 0; i < question.observations.size(); ++i) {
+  at = put(at, inputs.episodes);
+  at = put(at, inputs.actions);
+  for (std::size_t i = 0; i < inputs.observations.size(); ++i) {
     // The number that a Python environment shows, to the bit.
-    const auto shown = static_cast<float>(question.observations[i] * factors_[i % factors_.size()]);
+    const auto shown = static_cast<float>(inputs.observations[i] * factors_[i % factors_.size()]);
     std::memcpy(at, &shown, sizeof shown);
     at += sizeof shown;
   }
@@ -194,14 +194,14 @@ void PolicyProgram::ask(const PolicyQuestion& question, std::span<double> action
     if (!std::isfinite(actions[i]))
       throw InputError(fmt::format(
           "{} answers {} as number {} of action {} of episode {}; expected a finite number", who(),
-          actions[i], i % width, question.actions[e], question.episodes[e]));
+          actions[i], i % width, inputs.actions[e], inputs.episodes[e]));
   }
 }
 
 void PolicyProgram::wait_for(short events, double deadline) {
   pollfd waiting{socket_.get(), events, 0};
   while (!stopping()) {
-    const int ready = poll(&waiting, 1, kLookForStop);
+    const int ready = poll(&waiting, 1, kStopPoll);
     if (ready > 0 && now() <= deadline) return;  // the deadline also limits partial reads
     if (ready < 0 && errno != EINTR)
       throw IoError(fmt::format("cannot wait for {}: {}", who(), std::strerror(errno)));

@@ -36,7 +36,7 @@ class PolicyProgram {
   /// Sends a question and reads the answer; calls of threads are serialised. Throws IoError if the
   /// program has ended or is late, InputError if its answer has another size or a number that is
   /// not finite.
-  void answer(const PolicyQuestion& question, std::span<double> actions);
+  void answer(const PolicyInputs& inputs, std::span<double> actions);
 
  private:
   class Socket {
@@ -54,7 +54,7 @@ class PolicyProgram {
   };
 
   void start();
-  void ask(const PolicyQuestion& question, std::span<double> actions);
+  void exchange(const PolicyInputs& inputs, std::span<double> actions);
   void introduce(std::uint64_t seed, const std::string& version);
   [[nodiscard]] bool write(const char* bytes, std::size_t count, double deadline);
   [[nodiscard]] bool read(char* bytes, std::size_t count, double deadline);

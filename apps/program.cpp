@@ -67,7 +67,7 @@ const Command& chosen_command(const Program& program) {
   return *command;
 }
 
-bool asks_for_json(int argc, char** argv) {
+bool requests_json(int argc, char** argv) {
   return std::any_of(argv, argv + argc, [](const std::string& a) { return a == "--json"; });
 }
 
@@ -79,7 +79,7 @@ Json error_object(const std::string& command, ExitCode code, const std::string& 
 
 int run(const Command& command, const std::string& name, int argc, char** argv) {
   keep_inputs();
-  const bool json = asks_for_json(argc, argv);
+  const bool json = requests_json(argc, argv);
   end_by_signals(
       [&](ExitCode code, const std::string& what) {
         return json ? error_object(name, code, what).dump(2) + "\n" : std::string();
@@ -97,7 +97,7 @@ int run(const Command& command, const std::string& name, int argc, char** argv) 
 /// --json, because the parser may have stopped before it.
 int report(const Program& program, int argc, char** argv, ExitCode code, const std::string& what) {
   Console console;
-  console.json = asks_for_json(argc, argv);
+  console.json = requests_json(argc, argv);
   console.fail("tangere: " + what);
   console.result(error_object(program.parser.chosen_name(), code, what));
   return code;

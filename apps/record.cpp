@@ -25,14 +25,14 @@ TimedName requested_output(const std::string& word, const std::string& where, co
   }
   const std::string& name = requested.name;
   const std::optional<FieldOutput> reading = find_output(sensors, name);
-  const bool of_sensor = reading.has_value(),
+  const bool is_sensor = reading.has_value(),
              other = is_plain_output(name) || find_body_output(model.scene(), name);
-  if (of_sensor && other)
+  if (is_sensor && other)
     throw InputError(where + ": '" + name + "' is a sensor, too; expected one of another name");
   if (reading)
     if (const std::string reason = reason_against(model.scene(), *reading); !reason.empty())
       throw InputError(fmt::format("{}: '{}', but {}", where, word, reason));
-  if (!of_sensor && !other)
+  if (!is_sensor && !other)
     throw InputError(fmt::format("{}: unknown observation '{}'{}", where, name,
                                  suggestion(name, output_names(model.scene()))));
   return requested;

@@ -146,7 +146,7 @@ bool RunGradients::write(const ControlProgram& controls, const RolloutOptions& r
 }
 
 Json RunGradients::json() const {
-  if (!wanted()) return nullptr;
+  if (!requested()) return nullptr;
   const double sum = std::accumulate(value_.begin(), value_.end(), 0.0);
   return {{"loss_name", name_},
           {"mean_loss", sum / static_cast<double>(value_.size())},

@@ -24,7 +24,7 @@ struct GradientArguments {
   std::optional<double> tape_memory;
 
   void add(CLI::App& app);
-  [[nodiscard]] bool wanted() const { return !loss.empty(); }
+  [[nodiscard]] bool requested() const { return !loss.empty(); }
   /// Throws InputError for companions without --gradients.
   void check() const;
 };
@@ -35,7 +35,7 @@ class RunGradients {
   /// if memory does not suffice.
   RunGradients(const GradientArguments& arguments, const Batch& batch, const Stepper& stepper,
                const RolloutOptions& rollout);
-  [[nodiscard]] bool wanted() const { return start_.has_value(); }
+  [[nodiscard]] bool requested() const { return start_.has_value(); }
   /// Returns false if a signal stopped it.
   bool write(const ControlProgram& controls, const RolloutOptions& rollout,
              const StopSignals& signals, TrajectoryFile& output);

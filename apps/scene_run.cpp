@@ -84,11 +84,11 @@ std::string sleep_text(double sleep, int moving_bodies, const StepCounts& counts
   return fmt::format("bodies asleep: {:.2f} of {} on average\n", mean.get<double>(), moving_bodies);
 }
 
-void apply_solver_options(SolverOptions& of_scene, const SolverOptions& requested) {
-  if (requested.accuracy) of_scene.accuracy = requested.accuracy;
-  if (!of_scene.tolerance) of_scene.tolerance = requested.tolerance;
-  if (of_scene.sleep == 0) of_scene.sleep = requested.sleep;
-  of_scene.keep_inert_contacts |= requested.keep_inert_contacts;
+void apply_solver_options(SolverOptions& scene_options, const SolverOptions& requested) {
+  if (requested.accuracy) scene_options.accuracy = requested.accuracy;
+  if (!scene_options.tolerance) scene_options.tolerance = requested.tolerance;
+  if (scene_options.sleep == 0) scene_options.sleep = requested.sleep;
+  scene_options.keep_inert_contacts |= requested.keep_inert_contacts;
 }
 
 Scene read_scene_for(const std::string& path, bool allow_unknown, const Console& console,

@@ -55,7 +55,7 @@ Scene read_scene_for(const std::string& path, bool allow_unknown, const Console&
 
 /// Applies solver options of the command line: accuracy in place of the scene's; tolerance and
 /// sleep if the scene has none.
-void apply_solver_options(SolverOptions& of_scene, const SolverOptions& requested);
+void apply_solver_options(SolverOptions& scene_options, const SolverOptions& requested);
 
 /// The controls of the table at `path`, or the scene's own if `path` is empty.
 ControlProgram make_controls(const std::string& path, std::uint64_t seed, const Model& model,

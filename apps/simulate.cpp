@@ -127,7 +127,7 @@ Json sensors_json(const Model& model, const RolloutOptions& rollout) {
 
 int report(const SimulateArguments& options, const Console& console, const Batch& batch,
            const RunFacts& facts, const RolloutOptions& rollout, const RolloutSummary& summary,
-           const TaskReport& of_task) {
+           const TaskReport& task_report) {
   const ExitCode code = exit_code(console, !summary.failures.empty(), summary.counts);
   const auto bytes = std::filesystem::file_size(options.output);
   const std::int64_t environment_steps = summary.counts.simulation_steps;
@@ -142,7 +142,7 @@ int report(const SimulateArguments& options, const Console& console, const Batch
                   batch.environments(), summary.steps, summary.seconds, rate, per_step,
                   split_text(summary.counts), summary.failures.size(),
                   sleep_text(facts.sleep, batch.model().moving_bodies(), summary.counts),
-                  audit_text(summary.audit), of_task.line, options.output, bytes));
+                  audit_text(summary.audit), task_report.line, options.output, bytes));
   const Json costly = note_costly_steps(console, integrator_named(facts.integrator), facts.accuracy,
                                         summary.counts);
   Json result{{"command", "simulate"},
@@ -166,7 +166,7 @@ int report(const SimulateArguments& options, const Console& console, const Batch
                  {"costly", costly},
                  {"audit", audit_json(summary.audit)},
                  {"failed", failures_json("environment", failures_of(summary))}});
-  result.update(of_task.keys);
+  result.update(task_report.keys);
   console.result(result);
   return code;
 }
@@ -264,7 +264,7 @@ template <class Run>
 int write_run(const SimulateArguments& options, const Console& console, const Batch& batch,
               const RunFacts& facts, const RolloutOptions& rollout, TrajectoryFile& output,
               const StopSignals& signals, const Run& run,
-              const std::function<TaskReport()>& of_task) {
+              const std::function<TaskReport()>& task_report) {
   console.detail(fmt::format("environments: {}, steps: {}, {}, h = {} s", batch.environments(),
                              rollout.steps, facts.integrator, facts.timestep));
   RolloutSummary summary;
@@ -277,12 +277,12 @@ int write_run(const SimulateArguments& options, const Console& console, const Ba
     return report_stop(console, "simulate", signals.received(),
                        fmt::format("after {} of {} steps", summary.steps, rollout.steps));
   output.commit();
-  return report(options, console, batch, facts, rollout, summary, of_task());
+  return report(options, console, batch, facts, rollout, summary, task_report());
 }
 
 int simulate_task(const SimulateArguments& options, const Console& console, const ProgramInfo& info,
                   const Task& task, Precision precision) {
-  refuse_with_task(task, {{"--gradients", options.gradients.wanted()},
+  refuse_with_task(task, {{"--gradients", options.gradients.requested()},
                           {"--steps", options.steps.has_value()},
                           {"--state-from", !options.state_from.empty()},
                           {"--timestep", options.solver.timestep.has_value()},
@@ -337,7 +337,7 @@ int simulate(const SimulateArguments& options, const Console& console, const Pro
   const Model model(
       read_scene_for(options.scene, options.allow_unknown, console, options.solver.requested()));
   warn_about_geometry(console, model);
-  solver.differentiable = options.gradients.wanted();
+  solver.differentiable = options.gradients.requested();
   Stepper stepper(model, solver);
   warn_about_steps(console, model, stepper);
   const Start start(options, stepper);
@@ -367,14 +367,14 @@ int simulate(const SimulateArguments& options, const Console& console, const Pro
       [&](const ProgressCallback& progress) {
         RolloutSummary summary =
             run_rollout(batch, steppers, controls, rollout, output, progress, signals.token());
-        if (gradients.wanted() && !summary.stopped)
+        if (gradients.requested() && !summary.stopped)
           summary.stopped = !gradients.write(controls, rollout, signals, output);
         return summary;
       },
       [&] {
-        TaskReport of_run;
-        of_run.keys["gradients"] = gradients.json();
-        return of_run;
+        TaskReport run_report;
+        run_report.keys["gradients"] = gradients.json();
+        return run_report;
       });
 }
 

@@ -45,12 +45,12 @@ double ratio_of(const SkinArguments& a, double thickness) {
 }
 
 /// The coefficients of points that stand for an area [m²].
-Json shared(const ContactCoefficients& by_area, double area, double friction) {
-  return {{"kn", by_area.kn * area},
-          {"kt", by_area.kt * area},
+Json shared(const ContactCoefficients& per_area, double area, double friction) {
+  return {{"kn", per_area.kn * area},
+          {"kt", per_area.kt * area},
           {"mu", friction},
-          {"damping", by_area.damping * area},
-          {"ks", by_area.ks * area}};
+          {"damping", per_area.damping * area},
+          {"ks", per_area.ks * area}};
 }
 
 std::string attributes(const Json& c) {
@@ -66,12 +66,12 @@ int skin(const SkinArguments& a, const Console& console) {
                pitch = required(a.pitch, "--pitch", "the distance between neighbouring points [m]"),
                contact_pitch = a.contact_pitch.value_or(pitch), friction = a.friction.value_or(0.6),
                ratio = ratio_of(a, t), stiffness = ratio * E / t;
-  const ContactCoefficients by_area =
+  const ContactCoefficients per_area =
       skin_springs(stiffness, a.time.value_or(SkinMaterial{}.relaxation),
                    a.depth.value_or(kUsualDampingDepth * t));
-  const Json tactile = shared(by_area, pitch * pitch, friction),
-             contact = shared(by_area, contact_pitch * contact_pitch, friction),
-             surface = shared(by_area, 1, friction);
+  const Json tactile = shared(per_area, pitch * pitch, friction),
+             contact = shared(per_area, contact_pitch * contact_pitch, friction),
+             surface = shared(per_area, 1, friction);
   console.print(fmt::format("<tactile {}/>\n<general_primitive_contact {}/>\n<surface_contact {}/>",
                             attributes(tactile), attributes(contact), attributes(surface)));
   constexpr double kPerSquareMillimetre = 1e-6;
@@ -79,7 +79,7 @@ int skin(const SkinArguments& a, const Console& console) {
       "per mm² of skin: kn {:.4g} N/m, ks {:.4g} N/m. kn by area is {:.3g} E/t; it is {:.3g} to "
       "{:.3g} E/t under balls with √(R d) from 1 to {} of the thickness. Under contacts much wider "
       "than the skin is thick ks is E/(3 t). Measure kn with a press test.",
-      by_area.kn * kPerSquareMillimetre, by_area.ks * kPerSquareMillimetre, ratio,
+      per_area.kn * kPerSquareMillimetre, per_area.ks * kPerSquareMillimetre, ratio,
       stiffness_ratio(kMostSize), stiffness_ratio(kLeastSize), kLeastSize));
   console.result({{"command", "skin"},
                   {"exit_code", static_cast<int>(kDone)},

@@ -16,7 +16,7 @@ class TextOutput {
  public:
   /// An empty path stands for no output. Throws IoError like PartFile.
   TextOutput(const std::string& path, bool overwrite);
-  [[nodiscard]] bool wanted() const { return file_.has_value(); }
+  [[nodiscard]] bool requested() const { return file_.has_value(); }
   /// Writes the text and prints a line about it; does nothing without an output path.
   void write(const std::string& text, const Console& console);
 

@@ -25,8 +25,8 @@ template <int L>
 struct Lanes {
   BasicWorkspace<L> work;
   AdjointWorkspace<L> adjoint;
-  Lanes(const CompiledModel& m, const AdjointOptions& wanted, int inner_stages)
-      : work(m, inner_stages), adjoint(m, wanted.losses, wanted.parameters, inner_stages) {}
+  Lanes(const CompiledModel& m, const AdjointOptions& requested, int inner_stages)
+      : work(m, inner_stages), adjoint(m, requested.losses, requested.parameters, inner_stages) {}
 };
 
 /// The step of one group. Environment `first` + l of the block is in lane l.
@@ -49,21 +49,22 @@ struct Adjoint::Impl {
   /// A block as it was before the step: states from the tape, parameters from the batch.
   AlignedVector<double> rows;
 
-  Impl(const Model& m, const StepSettings& s, const AdjointOptions& wanted)
+  Impl(const Model& m, const StepSettings& s, const AdjointOptions& requested)
       : model(m),
         settings(s),
         group(compiled(model)),
-        eight(compiled(model), wanted, s.integrator.scheme().most_inner_stages()),
-        one(compiled(model), wanted, s.integrator.scheme().most_inner_stages()),
-        losses(std::size_t(wanted.losses)),
+        eight(compiled(model), requested, s.integrator.scheme().most_inner_stages()),
+        one(compiled(model), requested, s.integrator.scheme().most_inner_stages()),
+        losses(std::size_t(requested.losses)),
         rows(std::size_t(compiled(model).layout.rows * kBlock)) {
     const std::size_t nv = std::size_t(m.nv()) * kBlock, nu = std::size_t(m.nu()) * kBlock;
     for (BlockCotangent& c : losses) {
       for (auto* x : {&c.q, &c.v, &c.previous_q, &c.previous_v}) x->assign(nv, 0.0);
       c.u.assign(nu, 0.0);
-      if (wanted.points)
+      if (requested.points)
         c.points.assign(std::size_t(kBlock) * std::size_t(tactile_points(m) * kPointNumbers), 0.0);
-      if (wanted.parameters) c.parameters.assign(std::size_t(parameter_rows(model) * kBlock), 0.0);
+      if (requested.parameters)
+        c.parameters.assign(std::size_t(parameter_rows(model) * kBlock), 0.0);
     }
   }
 
@@ -283,8 +284,8 @@ struct Adjoint::Impl {
   }
 };
 
-Adjoint::Adjoint(const Model& model, const StepperOptions& options, const AdjointOptions& wanted)
-    : impl_(std::make_unique<Impl>(model, step_settings(model, options), wanted)) {
+Adjoint::Adjoint(const Model& model, const StepperOptions& options, const AdjointOptions& requested)
+    : impl_(std::make_unique<Impl>(model, step_settings(model, options), requested)) {
   refuse_sleep(model, impl_->settings);
 }
 Adjoint::~Adjoint() = default;
@@ -309,7 +310,7 @@ void Adjoint::reverse_step(const Batch& batch, int block, const BlockTape& tape,
                            std::span<const double> controls) {
   impl_->restore(batch, block, tape, step);
   const std::size_t nu = std::size_t(batch.model().nu());
-  const std::span<const double> of_block = controls.subspan(std::size_t(block * kBlock) * nu);
+  const std::span<const double> block_controls = controls.subspan(std::size_t(block * kBlock) * nu);
   for (int first = 0; first < kBlock; first += kGroup) {
     GroupStepContext g{tape, step, first};
     for (int l = 0; l < kGroup; ++l) {
@@ -324,9 +325,9 @@ void Adjoint::reverse_step(const Batch& batch, int block, const BlockTape& tape,
     if ((g.live & (g.live - 1)) == 0) {
       g.first += __builtin_ctz(g.live);
       g.live = 1;
-      impl_->reverse<1>(g, of_block);
+      impl_->reverse<1>(g, block_controls);
     } else {
-      impl_->reverse<kGroup>(g, of_block);
+      impl_->reverse<kGroup>(g, block_controls);
     }
   }
 }

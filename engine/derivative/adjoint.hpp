@@ -23,7 +23,7 @@ struct AdjointOptions {
 class Adjoint {
  public:
   explicit Adjoint(const Model& model, const StepperOptions& options = {},
-                   const AdjointOptions& wanted = {});
+                   const AdjointOptions& requested = {});
   ~Adjoint();
   Adjoint(Adjoint&&) noexcept;
   Adjoint& operator=(Adjoint&&) noexcept;

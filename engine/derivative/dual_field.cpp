@@ -53,18 +53,18 @@ void read_dual_field(const CompiledModel& m, int sensor,
                      const Coefficients<D>& coefficients, const double* column,
                      std::span<const double> numbers, std::span<const double> points,
                      std::span<double> field, std::span<double> field_dot) {
-  const CompiledSensor& felt = m.sensors[std::size_t(sensor)];
-  const kernels::PadTiles pad = felt.tiles();
+  const CompiledSensor& skin = m.sensors[std::size_t(sensor)];
+  const kernels::PadTiles pad = skin.tiles();
   const kernels::Mat3<double> turn =
-      transpose(felt.pad.R) * m.bodies[std::size_t(felt.body)].frame.R;
+      transpose(skin.pad.R) * m.bodies[std::size_t(skin.body)].frame.R;
   std::fill(field.begin(), field.end(), 0.0);
   std::fill(field_dot.begin(), field_dot.end(), 0.0);
-  const kernels::LinkPose<D> hand = dual_pose(links, felt.link);
-  for (const int number : felt.targets) {
+  const kernels::LinkPose<D> hand = dual_pose(links, skin.link);
+  for (const int number : skin.targets) {
     const CompiledBody& body = m.bodies[std::size_t(number)];
     const kernels::LinkPose<D> other = dual_pose(links, body.link);
     kernels::Touch<D> t;
-    kernels::pad_touch(&hand, felt.pad, &other, body.frame, t);
+    kernels::pad_touch(&hand, skin.pad, &other, body.frame, t);
     const kernels::Vec3<D> size = dual_size(m, number, column, numbers);
     const auto add = [&](const auto& shape) {
       for (int k = 0; k < pad.tiles() * kernels::kTactileTile; ++k) {
@@ -74,7 +74,7 @@ void read_dual_field(const CompiledModel& m, int sensor,
           return points.empty() ? 0.0 : points[std::size_t(p.index * kernels::kPointNumbers + n)];
         };
         const kernels::Vec3<double> moves = turn * kernels::Vec3<double>{own(0), own(1), own(2)};
-        kernels::LawParameters<D> law = {coefficients, felt.law, 0.0};
+        kernels::LawParameters<D> law = {coefficients, skin.law, 0.0};
         for (std::size_t n = 0; n < kCoefficients; ++n)
           law[n] = D(p.factors[factor_index(n)]) * law[n] +
                    D(0.0, n < kPointCoefficients ? own(3 + int(n)) : 0.0);

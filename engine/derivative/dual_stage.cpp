@@ -48,8 +48,8 @@ struct DualStage::Impl {
   std::vector<std::vector<D>> listed_anchors;  ///< of each pair
   std::vector<D> ground_anchors;
   std::vector<Coefficients<D>> sensor_laws;
-  std::vector<std::vector<double>> point_tangents;  ///< of each sensor; empty: zeros
-  std::vector<kernels::Vec3<double>> felt_sizes;    ///< of each body in this environment
+  std::vector<std::vector<double>> point_tangents;   ///< of each sensor; empty: zeros
+  std::vector<kernels::Vec3<double>> touched_sizes;  ///< of each body in this environment
 
   explicit Impl(const CompiledModel& model)
       : m(model),
@@ -126,7 +126,7 @@ struct DualStage::Impl {
     ground_anchors.assign(std::size_t(kernels::kAnchorNumbers * m.ground_anchors), D(0.0));
     sensor_laws.resize(m.sensors.size());
     point_tangents.resize(m.sensors.size());
-    felt_sizes.resize(m.bodies.size());
+    touched_sizes.resize(m.bodies.size());
   }
 
   /// Returns the tangent of a body's contact point, link axes, with the body's size.
@@ -219,7 +219,7 @@ struct DualStage::Impl {
       kernels::with_distance<D>(
           of.contact.shape,
           of.ground ? kernels::zero3<D>()
-                    : kernels::broadcast<D>(felt_sizes[std::size_t(of.contact.body2)]),
+                    : kernels::broadcast<D>(touched_sizes[std::size_t(of.contact.body2)]),
           f, of.contact.grid);
     }
   }
@@ -245,7 +245,7 @@ struct DualStage::Impl {
 
   /// Returns the anchor of point k of a sensor at this touch (engine/step/kept_anchors.hpp).
   template <class Shape>
-  [[nodiscard]] kernels::Anchor<D> felt_anchor(const Shape& shape, const kernels::LoadedTouch<D>& t,
+  [[nodiscard]] kernels::Anchor<D> skin_anchor(const Shape& shape, const kernels::LoadedTouch<D>& t,
                                                const kernels::ShearSpringContact& of, int k,
                                                const std::vector<D>& s_start) const {
     const D* const b = &s_start[3 * std::size_t(of.first + k)];
@@ -262,7 +262,7 @@ struct DualStage::Impl {
 
   /// Calls f(shape, touch, k, point) for every point of a sensor against one body.
   template <class F>
-  void meet_felt(const kernels::ShearSpringContact& of,
+  void meet_skin(const kernels::ShearSpringContact& of,
                  const std::vector<kernels::LinkPose<D>>& poses, const std::vector<D>& s_start,
                  const F& f) const {
     const kernels::LoadedTouch<D> t = touch(of, poses);
@@ -270,7 +270,7 @@ struct DualStage::Impl {
       for (int k = 0; k < of.contact.n_points; ++k)
         f(shape, t, k,
           kernels::meet_elastic(shape, t, law_of(of, k, t), place(of, k),
-                                felt_anchor(shape, t, of, k, s_start)));
+                                skin_anchor(shape, t, of, k, s_start)));
     });
   }
 
@@ -432,8 +432,8 @@ void DualStage::set_numbers(const double* column, std::span<const double> tangen
     i.inertia[k] = tangents.empty() ? 0 : tangents[first + k];
   for (std::size_t k = 0; k < i.stretch.size(); ++k)
     i.stretch[k] = tangents.empty() ? 0 : tangents[sizes + k];
-  for (std::size_t b = 0; b < i.felt_sizes.size(); ++b)
-    i.felt_sizes[b] =
+  for (std::size_t b = 0; b < i.touched_sizes.size(); ++b)
+    i.touched_sizes[b] =
         kernels::load_vector<double>(i.m.bodies[b].size, i.m.bodies[b].size_row, column, 0);
   for (std::size_t k = 0; k < i.sensor_laws.size(); ++k) {
     auto row = std::size_t(i.view.rows.sensor(static_cast<int>(k)));
@@ -503,7 +503,7 @@ void DualStage::update_sensor_shear_state(const std::vector<D>& q, const std::ve
   const std::vector<kernels::LinkPose<D>> poses = i.poses_at(q, twist);
   for (const kernels::ShearSpringContact& of : i.m.shear_springs) {
     if (!is_due(i.m, of, steps)) continue;
-    i.meet_felt(of, poses, s_start, [&](const auto& shape, const auto& t, int k, const auto& p) {
+    i.meet_skin(of, poses, s_start, [&](const auto& shape, const auto& t, int k, const auto& p) {
       kernels::Anchor<D> after = {kernels::zero3<D>(), kernels::zero3<D>(), D(0.0)};
       if (p.d < D(0.0)) after = kernels::recalled(shape, t, i.place(of, k), p.hold * p.s);
       D* const b = &s_start[3 * std::size_t(of.first + k)];
@@ -543,30 +543,30 @@ void DualStage::residual() {
   i.put_ground_anchors();
   kernels::residual<false>(i.view, a);
   if (!i.heavier || i.frozen) return;
-  std::vector<D> of_mass(g.size());
-  i.weigh(a, of_mass);
-  for (std::size_t k = 0; k < g.size(); ++k) g[k].epsilon += of_mass[k].value;
+  std::vector<D> mass_product(g.size());
+  i.weigh(a, mass_product);
+  for (std::size_t k = 0; k < g.size(); ++k) g[k].epsilon += mass_product[k].value;
 }
 
 void DualStage::field(int sensor, const double* column, std::span<const double> numbers,
                       std::span<const double> points, std::span<double> field,
                       std::span<double> field_dot) {
   Impl& i = *impl_;
-  const CompiledSensor& felt = i.m.sensors[std::size_t(sensor)];
+  const CompiledSensor& skin = i.m.sensors[std::size_t(sensor)];
   kernels::kinematics(i.view, i.arguments(*this));
   auto number = std::size_t(i.m.view.rows.sensor(sensor));
-  const Coefficients<D> coefficients = transformed(felt.parameters, [&](const Parameter& p) {
+  const Coefficients<D> coefficients = transformed(skin.parameters, [&](const Parameter& p) {
     const double tangent = numbers.empty() ? 0.0 : numbers[number];
     ++number;
     return D(p.row < 0 ? p.value : column[p.row * kBlock], tangent);
   });
-  if (felt.elastic) set_points(sensor, points);
+  if (skin.elastic) set_points(sensor, points);
   const auto springs = [&](const Coefficients<D>& law, bool elastic, std::span<double> value,
                            std::span<double> change) {
     if (elastic) return elastic_field(sensor, law, value, change);
     read_dual_field(i.m, sensor, i.links, law, column, numbers, points, value, change);
   };
-  if (!felt.layer) return springs(coefficients, felt.elastic, field, field_dot);
+  if (!skin.layer) return springs(coefficients, skin.elastic, field, field_dot);
   if (!points.empty())
     throw InputError("derivatives by points of a sensor with a layer or a table; expected springs");
   read_dual_layer(i.m, sensor, i.links, coefficients, column, numbers, springs, field, field_dot);
@@ -577,17 +577,17 @@ void DualStage::field(int sensor, const double* column, std::span<const double> 
 void DualStage::elastic_field(int sensor, const Coefficients<D>& law, std::span<double> field,
                               std::span<double> field_dot) {
   Impl& i = *impl_;
-  const CompiledSensor& felt = i.m.sensors[std::size_t(sensor)];
+  const CompiledSensor& skin = i.m.sensors[std::size_t(sensor)];
   i.sensor_laws[std::size_t(sensor)] = law;
   std::fill(field.begin(), field.end(), 0.0);
   std::fill(field_dot.begin(), field_dot.end(), 0.0);
   const std::vector<kernels::LinkPose<D>> poses = i.poses_at(centre, r);
   for (const kernels::ShearSpringContact& of : i.m.shear_springs) {
     if (of.sensor != sensor) continue;
-    i.meet_felt(of, poses, s_start, [&](const auto&, const auto&, int k, const auto& p) {
+    i.meet_skin(of, poses, s_start, [&](const auto&, const auto&, int k, const auto& p) {
       const D f[3] = {p.force.x, p.force.y, p.force.z};
-      const double* axes = &felt.point_axes[9 * std::size_t(k)];
-      const auto to = 3 * std::size_t(felt.in_field[std::size_t(k)]);
+      const double* axes = &skin.point_axes[9 * std::size_t(k)];
+      const auto to = 3 * std::size_t(skin.in_field[std::size_t(k)]);
       for (std::size_t c = 0; c < 3; ++c)
         for (std::size_t e = 0; e < 3; ++e) {
           if (!field.empty()) field[to + c] += axes[3 * c + e] * f[e].value;

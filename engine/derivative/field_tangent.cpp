@@ -52,7 +52,7 @@ struct FieldTangent::Impl {
   ImperfectField imperfections;
   std::vector<double> whole, ideal;  ///< (points, 3) of an imperfect sensor
   std::vector<int> all;              ///< its tiles
-  std::vector<double> of_tiles;      ///< (tiles, 3, 64)
+  std::vector<double> tile_values;   ///< (tiles, 3, 64)
 
   explicit Impl(const Model& m)
       : model(m), reader(m), links(compiled(m).links.size()), imperfections(m) {
@@ -65,7 +65,7 @@ struct FieldTangent::Impl {
     }
     touches.resize(targets);
     ideal.resize(whole.size());
-    of_tiles.resize(all.size() * 3 * kernels::kTactileTile);
+    tile_values.resize(all.size() * 3 * kernels::kTactileTile);
     std::iota(all.begin(), all.end(), 0);
   }
 
@@ -85,9 +85,10 @@ struct FieldTangent::Impl {
     const kernels::PadTiles pad = s.tiles();
     const auto every = std::span(all).first(std::size_t(pad.tiles()));
     const auto field = std::span(whole).first(3 * std::size_t(s.points()));
-    ideal_field(s, every, of_tiles);
+    ideal_field(s, every, tile_values);
     for (const int tile : every)
-      expand_tile<3>(pad, tile, of_tiles.data() + 3 * kernels::kTactileTile * tile, field.data());
+      expand_tile<3>(pad, tile, tile_values.data() + 3 * kernels::kTactileTile * tile,
+                     field.data());
     read_ideal(reader, s, reader.arguments<double>(s.number, lane / kGroup, lane % kGroup), ideal);
     imperfections.push_forward(s, key_of(*batch, kBlock * block + lane),
                                std::span(ideal).first(field.size()), field);
@@ -109,8 +110,8 @@ struct FieldTangent::Impl {
     const LinkPose<double> one = pose(s.link), two = pose(body.link);
     const LinkTangent first = tangent(s.link), second = tangent(body.link);
     const Frame<double> second_in_first = relative(one.world, two.world);
-    const auto in_pad = [&](const Vec6<double>& of_second, const Vec6<double>& of_first) {
-      return motion_to_child(s.pad, motion_to_parent(second_in_first, of_second) - of_first);
+    const auto in_pad = [&](const Vec6<double>& motion2, const Vec6<double>& motion1) {
+      return motion_to_child(s.pad, motion_to_parent(second_in_first, motion2) - motion1);
     };
     const Vec6<double> Z = motion_to_child(s.pad, motion_to_parent(second_in_first, two.V));
     const Vec6<double> displacement = in_pad(second.pose, first.pose);

@@ -50,7 +50,7 @@ struct MotorPullback {
     const double lambda = o.tau[motor.dof][lane], P = number(motor.P);
     o.v_centre[motor.dof][lane] -= number(motor.D) * lambda;
     const kernels::Link& link = m.links[std::size_t(motor.link)];
-    if (o.parameters != nullptr) by_gains(motor, k, lambda, o);
+    if (o.parameters != nullptr) pull_back_gains(motor, k, lambda, o);
     if (link.kind != kernels::JointKind::spherical) {
       o.q_centre[motor.dof][lane] -= P * lambda;
       u_bar[k * kernels::kBlock] += P * lambda;
@@ -62,18 +62,19 @@ struct MotorPullback {
     const kernels::RotationVector<double> psi = way(link, goal);
     kernels::Vec3<double> pull = {0, 0, 0};
     (&pull.x)[motor.component] = P * lambda;
-    const kernels::Vec3<double> by_q = transposed_times(inverse_left_jacobian(psi), pull);
-    const kernels::Vec3<double> by_u =
+    const kernels::Vec3<double> q_bar = transposed_times(inverse_left_jacobian(psi), pull);
+    const kernels::Vec3<double> goal_bar =
         transposed_times(right_jacobian(goal, kernels::rotation_series(goal)),
                          transposed_times(inverse_right_jacobian(psi), pull));
-    const double to_q[3] = {by_q.x, by_q.y, by_q.z}, to_u[3] = {by_u.x, by_u.y, by_u.z};
+    const double q_parts[3] = {q_bar.x, q_bar.y, q_bar.z},
+                 goal_parts[3] = {goal_bar.x, goal_bar.y, goal_bar.z};
     for (int i = 0; i < 3; ++i) {
-      o.q_centre[link.v + i][lane] -= to_q[i];
-      u_bar[(first + i) * kernels::kBlock] += to_u[i];
+      o.q_centre[link.v + i][lane] -= q_parts[i];
+      u_bar[(first + i) * kernels::kBlock] += goal_parts[i];
     }
   }
 
-  void by_gains(const CompiledMotor& motor, int k, double lambda, LossRows<L>& o) const {
+  void pull_back_gains(const CompiledMotor& motor, int k, double lambda, LossRows<L>& o) const {
     CompiledMotor unit = motor;  // P = 1, D = 0: the error alone
     unit.P = {1, -1}, unit.D = {0, -1}, unit.low = -HUGE_VAL, unit.high = HUGE_VAL;
     const auto by = [&](kernels::DofNumber which) -> double& {

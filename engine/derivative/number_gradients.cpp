@@ -75,17 +75,17 @@ bool size_matters(const CompiledModel& m, int body) {
   const auto touches = [body](const kernels::PairContact& p) {
     return p.body1 == body || p.body2 == body;
   };
-  const auto feels = [body](const CompiledSensor& s) {
+  const auto senses_body = [body](const CompiledSensor& s) {
     return std::find(s.targets.begin(), s.targets.end(), body) != s.targets.end();
   };
   return (b.link >= 0 && b.mass > 0) || std::any_of(m.pairs.begin(), m.pairs.end(), touches) ||
          std::any_of(m.grounds.begin(), m.grounds.end(),
                      [body](const auto& g) { return g.body == body; }) ||
-         std::any_of(m.sensors.begin(), m.sensors.end(), feels);
+         std::any_of(m.sensors.begin(), m.sensors.end(), senses_body);
 }
 
 /// Whether some contact of a body has shear springs.
-bool is_remembered(const CompiledModel& m, int body) {
+bool has_shear_springs(const CompiledModel& m, int body) {
   return std::any_of(m.shear_springs.begin(), m.shear_springs.end(), [body](const auto& of) {
     return of.contact.body1 == body || of.contact.body2 == body;
   });
@@ -126,7 +126,8 @@ void NumberGradients::add_bodies() {
         std::holds_alternative<AbstractShape>(d.shape);  // its inertia stays as given
     if (massive) add_with_masses({Owner::body, given ? Field::mass : Field::density, d.name}, {});
     // How anchors depend on sizes is not worked out.
-    const bool known = size_matters(m, b) && !is_remembered(m, b) && !has_feedback(m.scene, d.name);
+    const bool known =
+        size_matters(m, b) && !has_shear_springs(m, b) && !has_feedback(m.scene, d.name);
     for (int which = 0; which < kSizeIndices && known; ++which) {
       const SizeNumber* const size = row_of(d.shape).size(which);
       if (size == nullptr) continue;
@@ -172,8 +173,8 @@ NumberGradients::Masses NumberGradients::masses_by(std::size_t k, const Batch& b
   return masses_by(infos_[k].number, body, sized ? *sized : d.shape, density);
 }
 
-NumberGradients::Terms NumberGradients::of_dofs(std::size_t joint, int which, int first,
-                                                int end) const {
+NumberGradients::Terms NumberGradients::dof_terms(std::size_t joint, int which, int first,
+                                                  int end) const {
   const CompiledModel& m = compiled(model_);
   Terms terms;
   for (int k = first; k < end; ++k)
@@ -188,7 +189,7 @@ void NumberGradients::add_joints() {
               slides = d.turning ? n - (d.type == JointType::free ? 3 : 1) : n;
     if (n == 0) continue;
     const auto add_effect = [&](Field field, int which, int first, int end) {
-      add({Owner::joint, field, d.name}, of_dofs(i, which, first, end));
+      add({Owner::joint, field, d.name}, dof_terms(i, which, first, end));
     };
     add_effect(Field::damping, kernels::kDofDamping, 0, slides);
     add_effect(Field::armature, kernels::kDofArmature, 0, slides);
@@ -221,8 +222,8 @@ void NumberGradients::add_motors() {
     std::size_t joint = 0;
     while (scene.links[joint].joint.name != d.joint) ++joint;
     const int n = dof_count(scene.links[joint].joint.type);
-    add({Owner::motor, Field::P, d.joint}, of_dofs(joint, kernels::kDofP, 0, n));
-    add({Owner::motor, Field::D, d.joint}, of_dofs(joint, kernels::kDofD, 0, n));
+    add({Owner::motor, Field::P, d.joint}, dof_terms(joint, kernels::kDofP, 0, n));
+    add({Owner::motor, Field::D, d.joint}, dof_terms(joint, kernels::kDofD, 0, n));
   }
 }
 

@@ -57,7 +57,7 @@ class NumberGradients {
   void add_place(std::size_t joint);
   void add_motors();
   /// Terms of number `which` of the dofs `first` … `end` - 1 of a joint.
-  [[nodiscard]] Terms of_dofs(std::size_t joint, int which, int first, int end) const;
+  [[nodiscard]] Terms dof_terms(std::size_t joint, int which, int first, int end) const;
   /// How the masses of a body's link change with a number of a body of this shape and density.
   [[nodiscard]] Masses masses_by(const SceneNumber& number, int body, const Shape& shape,
                                  double density) const;

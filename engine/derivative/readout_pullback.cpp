@@ -50,7 +50,7 @@ struct ReadoutPullback::Impl {
   std::vector<kernels::TouchCotangent<double>> touches;
   std::vector<kernels::Touch<double>> frictionless;
   std::vector<int> tiles;  ///< tiles of a whole field that are not zero
-  std::vector<double> of_tiles;
+  std::vector<double> tile_values;
   AlignedVector<double> own;  ///< (tiles, kPointNumbers, 64)
   ImperfectField imperfections;
   ElasticField elastic;
@@ -111,14 +111,14 @@ struct ReadoutPullback::Impl {
     met[std::size_t(group)] = sensor;
   }
 
-  /// Fills `tiles` and `of_tiles` with those of a whole field that are not zero.
+  /// Fills `tiles` and `tile_values` with those of a whole field that are not zero.
   void gather(const CompiledSensor& s, std::span<const double> field) {
     const kernels::PadTiles pad = s.tiles();
     tiles.clear();
-    of_tiles.resize(std::size_t(pad.tiles()) * 3 * kernels::kTactileTile);
+    tile_values.resize(std::size_t(pad.tiles()) * 3 * kernels::kTactileTile);
     for (int tile = 0; tile < pad.tiles(); ++tile)
       if (gather_tile(pad, tile, field.data(),
-                      of_tiles.data() + 3 * kernels::kTactileTile * tiles.size()))
+                      tile_values.data() + 3 * kernels::kTactileTile * tiles.size()))
         tiles.push_back(tile);
   }
 
@@ -182,7 +182,7 @@ struct ReadoutPullback::Impl {
     if (!pressure) pull_back_springs(lane, s, bar.whole, parameters);
     for (std::size_t k = 0; pressure && k < numbers; ++k) bar.normal[k] += bar.whole[k];
     gather(s, bar.normal);
-    pull_back(lane, s.number, tiles, of_tiles, parameters, {}, true);
+    pull_back(lane, s.number, tiles, tile_values, parameters, {}, true);
   }
 
   void pull_back_springs(int lane, const CompiledSensor& s, std::span<const double> cotangent,
@@ -192,7 +192,7 @@ struct ReadoutPullback::Impl {
       return pull_back_elastic(lane, s, parameters, {});
     }
     gather(s, cotangent);
-    pull_back(lane, s.number, tiles, of_tiles, parameters, {});
+    pull_back(lane, s.number, tiles, tile_values, parameters, {});
   }
 
   /// Pulls the cotangent in `whole` of a sensor's reading back: of its field or of its pressure.
@@ -228,7 +228,7 @@ struct ReadoutPullback::Impl {
       if (s.layer) return pull_back_layered(lane, s, true, cotangent, parameters, points);
     }
     gather(s, cotangent);
-    pull_back(lane, s.number, tiles, of_tiles, parameters, points, pressure);
+    pull_back(lane, s.number, tiles, tile_values, parameters, points, pressure);
   }
 
   template <class F>

@@ -80,18 +80,18 @@ void ShearAdjoint<L>::add_to_state(const CompiledModel& m, const kernels::Kernel
                                    const Row<L>* v, Cotangents& links, Row<L>* q_bar, Row<L>* v_bar,
                                    Row<L>* parameters) {
   std::fill(rows_.begin(), rows_.end(), Row<L>{});
-  Row<L>*const by_q = rows_.data(), *const by_v = by_q + m.nv, *const by_place = by_v + m.nv;
+  Row<L>*const q_sum = rows_.data(), *const v_sum = q_sum + m.nv, *const place_sum = v_sum + m.nv;
   table.stage<L>().pull_back_poses(m.view, w.stage, q, v, w.zero, scratch_.data(), links.data(),
-                                   by_q, by_v, parameters == nullptr ? nullptr : by_place);
+                                   q_sum, v_sum, parameters == nullptr ? nullptr : place_sum);
   const auto add = [&](Row<L>* to, const Row<L>* from, int count) {
     for (int i = 0; i < count; ++i)
       for (int l = 0; l < L; ++l)
         if (has(lanes, l)) to[i][l] += from[i][l];
   };
-  add(q_bar, by_q, m.nv);
-  add(v_bar, by_v, m.nv);
+  add(q_bar, q_sum, m.nv);
+  add(v_bar, v_sum, m.nv);
   if (parameters != nullptr)
-    add(parameters + m.view.rows.places, by_place, kernels::kPlaceNumbers * m.view.n_links);
+    add(parameters + m.view.rows.places, place_sum, kernels::kPlaceNumbers * m.view.n_links);
 }
 
 /// Pulls one contact back. `points`: of a sensor's points, or empty. `own`: scratch.
@@ -106,13 +106,13 @@ void ShearAdjoint<L>::pull_back_points(const CompiledModel& m, const kernels::Ke
   table.pull_back_memory(pullback);
   if (points.empty()) return;
   const CompiledSensor& sensor = m.sensors[std::size_t(pullback.end->of->sensor)];
-  w.shear.felt.add_to_points(m, sensor, pullback.points, own, points);
+  w.shear.sensor_points.add_to_points(m, sensor, pullback.points, own, points);
 }
 
 /// Pulls back through all contacts: the final shear state, or the forces along a slip.
 template <int L>
 void ShearAdjoint<L>::pull_back(const CompiledModel& m, const kernels::KernelTable& table,
-                                BasicWorkspace<L>& w, LaneBits lanes, bool of_forces,
+                                BasicWorkspace<L>& w, LaneBits lanes, bool from_forces,
                                 LossRows<L>& loss, int number) {
   for (int l = 0; l < L; ++l) {
     if (!has(lanes, l)) continue;
@@ -121,7 +121,7 @@ void ShearAdjoint<L>::pull_back(const CompiledModel& m, const kernels::KernelTab
     const std::vector<double>& bar = loss.memory[lane];
     std::vector<double>& before = loss.memory_before[lane];
     before.resize(3 * now.size());
-    if (!of_forces && bar.empty()) continue;
+    if (!from_forces && bar.empty()) continue;
     const auto one = [&](const ShearSpringContact& of, const int* index,
                          const ShearSpringPoints& points) {
       const std::size_t rows = 3 * std::size_t(points.stride);
@@ -129,7 +129,7 @@ void ShearAdjoint<L>::pull_back(const CompiledModel& m, const kernels::KernelTab
                     *const s_out = s_bar + rows;
       std::size_t next = 0;
       shear_of_points(now, of, index, points.count, points.stride, s_start, next);
-      if (!of_forces)
+      if (!from_forces)
         shear_of_points(
             after, of, index, points.count, points.stride,
             [&](std::size_t entry, int c) { return bar[3 * entry + std::size_t(c)]; }, s_bar, next);
@@ -137,19 +137,19 @@ void ShearAdjoint<L>::pull_back(const CompiledModel& m, const kernels::KernelTab
       const ShearSpringTouch start = start_touch_of(m, table, w, of, l),
                              end = touch_of(m, w, of, at_touches_, l);
       Vec6<double> slip{};
-      if (of_forces) slip = touch_of(m, w, of, slip_touches_, l).twist;
+      if (from_forces) slip = touch_of(m, w, of, slip_touches_, l).twist;
       kernels::ShearCotangentSums sums{};
       kernels::ShearPullback pullback = {&start,
                                          &end,
                                          points,
                                          s_start,
-                                         of_forces ? nullptr : s_bar,
+                                         from_forces ? nullptr : s_bar,
                                          nullptr,
-                                         of_forces ? &slip : nullptr,
+                                         from_forces ? &slip : nullptr,
                                          s_out,
                                          &sums};
       pull_back_points(m, table, w, pullback, points_of(m, of, loss.points[lane]), s_out + rows);
-      if (!of_forces) hand_on<L>(of, at_, sums.end.displacement, sums.end.twist, l, end_);
+      if (!from_forces) hand_on<L>(of, at_, sums.end.displacement, sums.end.twist, l, end_);
       hand_on<L>(of, w.shear.start, sums.start, Vec6<double>{}, l, start_[std::size_t(number)]);
       if (loss.parameters != nullptr)
         for (std::size_t k = 0; k < kCoefficients; ++k)
@@ -157,7 +157,7 @@ void ShearAdjoint<L>::pull_back(const CompiledModel& m, const kernels::KernelTab
       add_to_entries(now, of, index, points, s_out, before);
     };
     for_each_contact(m, w, l, one);
-    if (!of_forces) for_each_touching_sensor(m, table, w, at_touches_, l, one);
+    if (!from_forces) for_each_touching_sensor(m, table, w, at_touches_, l, one);
   }
 }
 
@@ -179,24 +179,25 @@ template <int L>
 void ShearAdjoint<L>::pull_back_reading(const CompiledModel& m, const kernels::KernelTable& table,
                                         BasicWorkspace<L>& w, const ShearSpringContact& of,
                                         int lane, const TapedReading& reading, LossRows<L>& loss) {
-  TouchingSensorPoints& felt = w.shear.felt;
+  TouchingSensorPoints& sensor_points = w.shear.sensor_points;
   const ShearSpringTouch touch = touch_of(m, w, of, at_touches_, lane);
-  const ShearSpringPoints points = felt.find(m.sensors[std::size_t(of.sensor)], table, touch);
+  const ShearSpringPoints points =
+      sensor_points.find(m.sensors[std::size_t(of.sensor)], table, touch);
   if (points.count == 0) return;
-  set_anchors(table, touch, reading.before, felt.index(), points, felt.scratch());
+  set_anchors(table, touch, reading.before, sensor_points.index(), points, sensor_points.scratch());
   const std::size_t rows = 3 * std::size_t(points.stride);
   double *const none = numbers_.data(), *const s_out = none + rows,
                 *const anchor_bar = s_out + rows, *const anchor_out = anchor_bar + 2 * rows;
   std::fill_n(none, 6 * rows, 0.0);
   const std::vector<double>& bar = loss.kept[std::size_t(lane)];
-  look_up_anchors(
-      reading.after, of, felt.index(), points,
+  find_anchors(
+      reading.after, of, sensor_points.index(), points,
       [&](std::size_t entry, int c) { return bar[3 * entry + std::size_t(c)]; }, anchor_bar);
   kernels::ShearCotangentSums sums{};
   kernels::ShearPullback pullback = {&touch,  &touch,  points, none, nullptr,
                                      nullptr, nullptr, s_out,  &sums};
   pullback.anchor_bar = anchor_bar;
-  pullback.kept = felt.scratch() + 6 * points.stride;
+  pullback.kept = sensor_points.scratch() + 6 * points.stride;
   pullback.anchor_out = anchor_out;
   pull_back_points(m, table, w, pullback, points_of(m, of, loss.points[std::size_t(lane)]),
                    anchor_out + 2 * rows);
@@ -205,7 +206,7 @@ void ShearAdjoint<L>::pull_back_reading(const CompiledModel& m, const kernels::K
   if (loss.parameters != nullptr)
     for (std::size_t k = 0; k < kCoefficients; ++k)
       loss.parameters[std::size_t(of.number) + k][lane] += sums.end.law[k];
-  add_to_anchors(reading.before, of, felt.index(), points, anchor_out, kept_before_);
+  add_to_anchors(reading.before, of, sensor_points.index(), points, anchor_out, kept_before_);
 }
 
 template <int L>

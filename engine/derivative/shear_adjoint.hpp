@@ -69,7 +69,7 @@ class ShearAdjoint {
   using Cotangents = AlignedVector<kernels::MotionCotangent<kernels::Row<L>>>;
   using Poses = AlignedVector<kernels::LinkPose<kernels::Row<L>>>;
   void pull_back(const CompiledModel& model, const kernels::KernelTable& table,
-                 BasicWorkspace<L>& w, LaneBits lanes, bool of_forces, LossRows<L>& loss,
+                 BasicWorkspace<L>& w, LaneBits lanes, bool from_forces, LossRows<L>& loss,
                  int number);
   void pull_back_points(const CompiledModel& model, const kernels::KernelTable& table,
                         const BasicWorkspace<L>& w, kernels::ShearPullback& pullback,

@@ -188,15 +188,15 @@ struct Tangent::Impl {
                    const std::vector<DualState>& inner) {
     const Duals way = row.r_before == 0 ? Duals() : difference(m(), before.q, at.q);
     for (std::size_t i = 0; i < at.v.size(); ++i) {
-      D by_x = way.empty() ? D(0.0) : scaled(row.r_before, way[i]);
-      D by_v = scaled(row.s_centre, at.v[i]);
-      if (row.s_before != 0) by_v += scaled(row.s_before, before.v[i]);
+      D x_sum = way.empty() ? D(0.0) : scaled(row.r_before, way[i]);
+      D v_sum = scaled(row.s_centre, at.v[i]);
+      if (row.s_before != 0) v_sum += scaled(row.s_before, before.v[i]);
       for (std::size_t j = 0; j < inner.size(); ++j) {
-        by_x += scaled(row.inner[j].r, inner[j].q[i]);
-        by_v += scaled(row.inner[j].s, inner[j].v[i] - at.v[i]);
+        x_sum += scaled(row.inner[j].r, inner[j].q[i]);
+        v_sum += scaled(row.inner[j].s, inner[j].v[i] - at.v[i]);
       }
-      stage.r[i] = by_x;
-      stage.s[i] = scaled(1 / row.s_divisor, by_v);
+      stage.r[i] = x_sum;
+      stage.s[i] = scaled(1 / row.s_divisor, v_sum);
     }
   }
 

@@ -123,16 +123,16 @@ class Compiler {
   /// Whether a contact or sensor of the scene needs the distance to a body.
   [[nodiscard]] bool is_touched(std::size_t body) const {
     const std::string& name = m_.scene.links[body].body.name;
-    const auto of_contact = [&](const PairContactDescription& d) {
+    const auto contact_needs = [&](const PairContactDescription& d) {
       return d.primitive_body == name;
     };
     // A sensor's signs are those of its own body's surface.
-    const auto of_sensor = [&](const TactileDescription& d) {
+    const auto sensor_needs = [&](const TactileDescription& d) {
       return d.body == name || std::ranges::binary_search(sensed_bodies(m_.scene, d), int(body));
     };
     const Scene& s = m_.scene;
-    return std::any_of(s.pair_contacts.begin(), s.pair_contacts.end(), of_contact) ||
-           std::any_of(s.sensors.begin(), s.sensors.end(), of_sensor);
+    return std::any_of(s.pair_contacts.begin(), s.pair_contacts.end(), contact_needs) ||
+           std::any_of(s.sensors.begin(), s.sensors.end(), sensor_needs);
   }
 
   /// Finds the bodies whose contact points are far apart for each other.
@@ -150,12 +150,12 @@ class Compiler {
   /// Adds the pairs with a mesh whose walls are thinner than the other's points are apart.
   void thin_walls() {
     for (const PairContactDescription& d : m_.scene.pair_contacts) {
-      if ((!d.points.empty() && !d.by_area()) || d.on_ground) continue;
+      if ((!d.points.empty() && !d.per_area()) || d.on_ground) continue;
       const CompiledBody& touched =
           m_.bodies[std::size_t(bodies_.find("body", d.primitive_body, d.source))];
       if (touched.grid == nullptr) continue;
       const int general = bodies_.find("body", d.general_body, d.source);
-      const double gap = d.by_area()
+      const double gap = d.per_area()
                              ? d.spacing
                              : contact_point_gap(m_.scene.links[std::size_t(general)].body.shape);
       if (gap > 0 && gap >= 2 * touched.inscribed * touched.size.x) add_coarse_pair(d);
@@ -276,7 +276,7 @@ class Compiler {
           pair.n_points <= kCorners)
         meet_faces(pair, first);
       pair.points = keep(m_.point_storage, std::move(points));
-      if (d.by_area()) {
+      if (d.per_area()) {
         std::vector<double> areas;
         for (const int k : order) areas.push_back(d.areas[std::size_t(k)]);
         pair.weights = keep(m_.point_storage, std::move(areas));

@@ -106,7 +106,7 @@ std::vector<double> order_points(CompiledSensor& s, PadPoints& points) {
 void add_sensors(CompiledModel& m, bool keep_anchors) {
   for (CompiledSensor& s : m.sensors) {
     const TactileDescription& d = m.scene.sensors[std::size_t(s.number)];
-    if (!has_shear_spring(s.parameters) || d.remembers_readings != keep_anchors) continue;
+    if (!has_shear_spring(s.parameters) || d.shear_at_readings != keep_anchors) continue;
     if (s.past_states() > 0)
       throw InputError(d.source.prefix() + "tactile sensor '" + d.name +
                        "' has ks and low_pass or delay; expected one of them: friction does not "

@@ -80,11 +80,11 @@ void vary_density(CompiledModel& m, int body, const RandomizationDescription& d,
   const int link = m.bodies[std::size_t(body)].link;
   if (link < 0) fail(d, "it is fixed in the world");
   VaryingInertia& varying = varying_inertia(m, link);
-  const InertiaRows of_density =
+  const InertiaRows per_density =
       inertia_rows(m.bodies[std::size_t(body)], mass_properties(b.shape, 1));
-  for (std::size_t i = 0; i < of_density.size(); ++i)
-    varying.constant[i] -= b.density * of_density[i];
-  varying.parts.push_back({body, row, of_density});
+  for (std::size_t i = 0; i < per_density.size(); ++i)
+    varying.constant[i] -= b.density * per_density[i];
+  varying.parts.push_back({body, row, per_density});
 }
 
 void vary_size(CompiledModel& m, int body, const RandomizationDescription& d, int row) {
@@ -179,7 +179,7 @@ void update_derived_rows(const CompiledModel& m, double* column) {
     if (varying.anew) sum = sum_anew(m, varying, column);
     for (const VaryingInertia::Part& part : varying.parts)
       for (std::size_t i = 0; i < sum.size() && !varying.anew; ++i)
-        sum[i] += column[part.row * kBlock] * part.of_density[i];
+        sum[i] += column[part.row * kBlock] * part.per_density[i];
     for (std::size_t i = 0; i < sum.size(); ++i)
       column[(varying.row + static_cast<int>(i)) * kBlock] = sum[i];
   }

@@ -139,12 +139,12 @@ struct BlockLayout {
 using InertiaRows = std::array<double, 10>;
 
 /// A link with bodies whose density varies. Rows `row` … of the block are constant + Σ density
-/// of_density.
+/// per_density.
 struct VaryingInertia {
   struct Part {
     int body;
-    int row;                 ///< row of the block that holds the density [kg/m³]
-    InertiaRows of_density;  ///< for a density of 1
+    int row;                  ///< row of the block that holds the density [kg/m³]
+    InertiaRows per_density;  ///< for a density of 1
   };
   int link = -1;
   int row = 0;
@@ -173,7 +173,7 @@ struct VaryingPlace {
 };
 
 /// Size of a ShearEntry [bytes].
-inline constexpr std::size_t kRememberedBytes = 32;
+inline constexpr std::size_t kShearEntryBytes = 32;
 
 struct CompiledModel {
   Scene scene;

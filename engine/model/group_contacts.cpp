@@ -89,22 +89,23 @@ void bound_pair(const CompiledModel& m, kernels::LinkPair& links) {
     low = {std::min(low.x, at.x), std::min(low.y, at.y), std::min(low.z, at.z)};
     high = {std::max(high.x, at.x), std::max(high.y, at.y), std::max(high.z, at.z)};
   }
-  double of_points = 0, of_shapes = 0, of_balls = 0;
+  double points_radius = 0, shapes_radius = 0, balls_radius = 0;
   bool faced = false;
-  bound(points.data(), static_cast<int>(points.size() / 3), links.points_middle, of_points);
+  bound(points.data(), static_cast<int>(points.size() / 3), links.points_middle, points_radius);
   links.shapes_middle = 0.5 * (low + high);
   for (const int k : members) {
     const kernels::PairContact& pair = m.pairs[std::size_t(k)];
     const kernels::Vec3<double> arm = pair.frame2.p - links.shapes_middle;
-    of_shapes = std::max(of_shapes, std::sqrt(dot(arm, arm)) + radius_of(pair) + 2 * pair.overhang);
-    of_balls = std::max(of_balls, pair.ball_radius);
+    shapes_radius =
+        std::max(shapes_radius, std::sqrt(dot(arm, arm)) + radius_of(pair) + 2 * pair.overhang);
+    balls_radius = std::max(balls_radius, pair.ball_radius);
     faced = faced || pair.faced;
   }
   const auto rounded_up = [](double x) { return x * (1 + 1e-9) + 1e-9; };  // as in bound()
-  links.points_radius = of_points + rounded_up(of_balls);
-  links.shapes_radius = rounded_up(of_shapes);
+  links.points_radius = points_radius + rounded_up(balls_radius);
+  links.shapes_radius = rounded_up(shapes_radius);
   // A chosen face has no bound in depth.
-  links.apart = faced ? INFINITY : of_points + rounded_up(of_balls + of_shapes);
+  links.apart = faced ? INFINITY : points_radius + rounded_up(balls_radius + shapes_radius);
 }
 
 /// Grows a ball so that it holds another one.

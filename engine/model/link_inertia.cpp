@@ -19,9 +19,9 @@ InertiaRows inertia_rows(const kernels::Link& link) {
 }
 InertiaRows inertia_rows(const CompiledBody& body, const MassProperties& properties) {
   kernels::Link link{};
-  CompiledBody of_these = body;
-  of_these.mass = properties.mass;
-  add_inertia(link, of_these, properties);
+  CompiledBody copy = body;
+  copy.mass = properties.mass;
+  add_inertia(link, copy, properties);
   return inertia_rows(link);
 }
 

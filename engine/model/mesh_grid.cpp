@@ -57,7 +57,7 @@ class Crossings {
   Crossings(const MeshShape& mesh, const Nodes& nodes)
       : mesh_(mesh),
         nodes_(nodes),
-        of_line_(std::size_t(nodes.count[0]) * std::size_t(nodes.count[1])) {
+        crossings_(std::size_t(nodes.count[0]) * std::size_t(nodes.count[1])) {
     for (const std::array<int, 3>& t : mesh.triangles) add(t);
   }
 
@@ -78,7 +78,7 @@ class Crossings {
 
  private:
   std::vector<Crossing>& line(int i, int j) {
-    return of_line_[std::size_t(i) * std::size_t(nodes_.count[1]) + std::size_t(j)];
+    return crossings_[std::size_t(i) * std::size_t(nodes_.count[1]) + std::size_t(j)];
   }
   [[nodiscard]] const double* vertex(int k) const { return &mesh_.vertices[3 * std::size_t(k)]; }
   [[nodiscard]] double aside(int axis) const {
@@ -116,7 +116,7 @@ class Crossings {
 
   const MeshShape& mesh_;
   const Nodes& nodes_;
-  std::vector<std::vector<Crossing>> of_line_;
+  std::vector<std::vector<Crossing>> crossings_;
 };
 
 /// Returns the signed distance at every node.
@@ -124,10 +124,10 @@ std::vector<double> distances(const MeshShape& mesh, const Nodes& nodes) {
   const TriangleTree tree(mesh.vertices, mesh.triangles);
   Crossings crossings(mesh, nodes);
   std::vector<double> d(nodes.all());
-  int of_line = 0;  // the triangle nearest to the first node of the line before
+  int nearest_at_start = 0;  // the triangle nearest to the first node of the line before
   for (int i = 0; i < nodes.count[0]; ++i)
     for (int j = 0; j < nodes.count[1]; ++j) {
-      int nearest = of_line;
+      int nearest = nearest_at_start;
       crossings.for_each(i, j, [&](int k, int winding) {
         const Vec3<double> at = {nodes.place(0, i), nodes.place(1, j), nodes.place(2, k)};
         if (winding != 0 && winding != 1)
@@ -136,7 +136,7 @@ std::vector<double> distances(const MeshShape& mesh, const Nodes& nodes) {
               "does not overlap itself, or resolution=\"0\" for a mesh that nothing touches",
               at.x, at.y, at.z, winding));
         const double far = std::sqrt(tree.squared_distance(at, nearest));
-        if (k + 1 == nodes.count[2]) of_line = nearest;
+        if (k + 1 == nodes.count[2]) nearest_at_start = nearest;
         d[nodes.at(i, j, k)] = winding == 1 ? -far : far;
       });
     }

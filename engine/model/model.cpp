@@ -67,7 +67,7 @@ std::size_t Model::state_bytes_per_environment() const {
   // and the largest shear state.
   return sizeof(double) * compiled_->layout.rows + sizeof(std::int8_t) + sizeof(std::int32_t) +
          sizeof(double) + 1 + sizeof(std::int64_t) +
-         kRememberedBytes * std::size_t(compiled_->taped_points);
+         kShearEntryBytes * std::size_t(compiled_->taped_points);
 }
 
 }  // namespace tangere

@@ -47,8 +47,8 @@ class Filter {
   std::unique_ptr<ModelPart> part() { return std::move(part_); }
 
  private:
-  [[nodiscard]] int link(int of_whole) const {
-    return of_whole < 0 ? of_whole : link_[std::size_t(of_whole)];
+  [[nodiscard]] int link(int whole_link) const {
+    return whole_link < 0 ? whole_link : link_[std::size_t(whole_link)];
   }
 
   [[nodiscard]] bool stays(const kernels::ContactParameters& contact) const {

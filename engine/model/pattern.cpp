@@ -101,14 +101,14 @@ class Graph {
 std::vector<int> minimum_fill(const Structure& s) {
   Graph graph(s);
   std::vector<int> order;
-  std::vector<int> waiting(s.size());
-  std::iota(waiting.begin(), waiting.end(), 0);
-  while (!waiting.empty()) {
-    const auto best = std::min_element(waiting.begin(), waiting.end(),
+  std::vector<int> remaining(s.size());
+  std::iota(remaining.begin(), remaining.end(), 0);
+  while (!remaining.empty()) {
+    const auto best = std::min_element(remaining.begin(), remaining.end(),
                                        [&](int i, int j) { return graph.fill(i) < graph.fill(j); });
     order.push_back(*best);
     graph.eliminate(*best);
-    waiting.erase(best);
+    remaining.erase(best);
   }
   return order;
 }

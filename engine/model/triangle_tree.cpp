@@ -101,12 +101,12 @@ double TriangleTree::squared_distance(const Vec3<double>& at, int& nearest) cons
     }
     return square;
   };
-  struct Waiting {
+  struct Pending {
     double square;
     int node;
   };
-  std::array<Waiting, 64> stack;  // halves of halves: less than 64 levels
-  int waiting = 0;
+  std::array<Pending, 64> stack;  // halves of halves: less than 64 levels
+  int pending = 0;
   stack[0] = {to_box(nodes_[0].box), 0};
   const auto to = [&](int k) {
     const Vec3<double> way = to_triangle(at, triangles_[std::size_t(k)]);
@@ -114,8 +114,8 @@ double TriangleTree::squared_distance(const Vec3<double>& at, int& nearest) cons
   };
   double best = to(nearest);
   if (!(best >= 0)) best = HUGE_VAL;  // a triangle without area may have no nearest place
-  for (waiting = 1; waiting > 0;) {
-    const Waiting next = stack[std::size_t(--waiting)];
+  for (pending = 1; pending > 0;) {
+    const Pending next = stack[std::size_t(--pending)];
     if (next.square >= best) continue;
     const Node& node = nodes_[std::size_t(next.node)];
     if (node.count > 0) {
@@ -128,8 +128,8 @@ double TriangleTree::squared_distance(const Vec3<double>& at, int& nearest) cons
     const double left = to_box(nodes_[std::size_t(node.first)].box),
                  right = to_box(nodes_[std::size_t(node.first) + 1].box);
     const bool swapped = right < left;  // visit the nearer one first
-    stack[std::size_t(waiting++)] = {std::max(left, right), node.first + (swapped ? 0 : 1)};
-    stack[std::size_t(waiting++)] = {std::min(left, right), node.first + (swapped ? 1 : 0)};
+    stack[std::size_t(pending++)] = {std::max(left, right), node.first + (swapped ? 0 : 1)};
+    stack[std::size_t(pending++)] = {std::min(left, right), node.first + (swapped ? 1 : 0)};
   }
   return best;
 }

@@ -38,7 +38,7 @@ class ChannelList {
                                             .shape = std::move(shape),
                                             .unit = unit,
                                             .meaning = meaning,
-                                            .wanted = record_.empty() || one != nullptr,
+                                            .requested = record_.empty() || one != nullptr,
                                             .times = {times.every / every_, times.final}});
   }
 

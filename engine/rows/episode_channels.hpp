@@ -26,7 +26,7 @@ struct EpisodeChannel {
   std::string unit, meaning;         ///< of a task's episodes
   std::vector<int> bodies = {};      ///< of Kind::bodies
   FieldOutput reading = {};          ///< of Kind::reading
-  bool wanted = true;
+  bool requested = true;
   OutputTimes times = {};  ///< in rows; none: at every row
   /// Touch: all its numbers are 0 without contact. Of a sensor with imperfections only the ideal
   /// field and the markers are, and a task with such a sensor has none.

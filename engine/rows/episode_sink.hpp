@@ -29,10 +29,10 @@ struct EpisodeEnd {
 struct GradientArray {
   std::string name;                  ///< "grad_actions"
   std::vector<std::uint64_t> shape;  ///< of one row, or of the whole array
-  bool by_row = false;               ///< one array for every row with an action
+  bool per_row = false;              ///< one array for every row with an action
   std::string meaning;
   /// Names and units of the numbers that the derivatives are by, along the last dimension.
-  std::vector<std::string> by_names, by_units;
+  std::vector<std::string> wrt_names, wrt_units;
   [[nodiscard]] std::size_t width() const {
     std::size_t numbers = 1;
     for (const std::uint64_t n : shape) numbers *= n;

@@ -211,11 +211,11 @@ std::vector<CoarseContact> coarse_contacts(const Scene& scene, ComparedWidth com
                                                                              scene,
                                                                              c.primitive_body);
     if (one == nullptr || two == nullptr || !may_push(scene, c)) continue;
-    if (!c.points.empty() && !c.by_area()) continue;
+    if (!c.points.empty() && !c.per_area()) continue;
     const Shape &points = one->body.shape, &touched = two->body.shape;
     const double width = width_of(touched, compared);
     if (width == 0) continue;
-    if (c.by_area()) {
+    if (c.per_area()) {
       if (c.spacing >= width * (1 - kAsWide)) found.push_back({k, c.spacing, width, false});
       continue;
     }
@@ -245,7 +245,7 @@ std::vector<std::string> coarse_contact_lines(const Scene& scene) {
   constexpr std::size_t kMostLines = 5;
   std::vector<CoarseContact> found = coarse_contacts(scene, ComparedWidth::second);
   std::erase_if(found, [&](const CoarseContact& c) {  // those that surface_contact.cpp warns of
-    return scene.pair_contacts[c.contact].by_area();
+    return scene.pair_contacts[c.contact].per_area();
   });
   std::vector<std::string> lines;
   for (const CoarseContact& coarse : found) {

@@ -119,9 +119,9 @@ std::string coefficient_text(const Scene& scene, const Element& d, Field field) 
   number.field = field;
   const char* const name = number_kind(number.owner, field).name;
   if (varies(scene, number, field)) return fmt::format("{} varies", name);
-  bool by_area = false;
-  if constexpr (std::is_same_v<Element, PairContactDescription>) by_area = d.by_area();
-  const std::string unit = to_string(coefficient_unit(number.owner, field, d.law, by_area));
+  bool per_area = false;
+  if constexpr (std::is_same_v<Element, PairContactDescription>) per_area = d.per_area();
+  const std::string unit = to_string(coefficient_unit(number.owner, field, d.law, per_area));
   return fmt::format("{} {}{}", name, d.coefficients[coefficient_index(field)],
                      unit == "1" ? "" : " " + unit);
 }
@@ -187,10 +187,10 @@ EffectInfo find_elements(const Scene& scene, int element) {
 // --- imperfections, markers and feedback of sensors ---
 
 /// `source_of` returns the line of a sensor that requests the effect; no value: it has none.
-/// `text_of_one` describes the effect of one sensor; `off` is the text without it.
+/// `sensor_text` describes the effect of one sensor; `off` is the text without it.
 template <class SourceOf, class TextOf>
 EffectInfo find_in_sensors(const Scene& scene, int element, const SourceOf& source_of,
-                           const TextOf& text_of_one, const char* off) {
+                           const TextOf& sensor_text, const char* off) {
   EffectInfo info;
   std::size_t on = 0;
   for (std::size_t k = 0; k < scene.sensors.size(); ++k) {
@@ -206,7 +206,7 @@ EffectInfo find_in_sensors(const Scene& scene, int element, const SourceOf& sour
         "{} of {} declared", on,
         scene.sensors.size() == 1 ? "1 sensor" : fmt::format("{} sensors", scene.sensors.size()));
   else
-    info.reason = info.on ? text_of_one(scene.sensors[std::size_t(element)]) : off;
+    info.reason = info.on ? sensor_text(scene.sensors[std::size_t(element)]) : off;
   return info;
 }
 
@@ -297,14 +297,14 @@ EffectInfo find_sleeping(const Scene& scene, int /*element*/) {
 struct Row {
   EffectKind kind;
   const char* name;
-  const char* of_element;  ///< what follows an element's name; not empty for a part
+  const char* suffix;  ///< what follows an element's name; not empty for a part
   EffectInfo (*find)(const Scene&, int element);
   std::optional<Owner> owner{};  ///< element_owner()
 };
 
 template <Owner Of, Kind K>
-constexpr Row element_row(const char* name, const char* of_element = "") {
-  return {K, name, of_element, find_elements<Of, pair_kind(K)>, Of};
+constexpr Row element_row(const char* name, const char* suffix = "") {
+  return {K, name, suffix, find_elements<Of, pair_kind(K)>, Of};
 }
 
 constexpr Row kTable[] = {
@@ -350,7 +350,7 @@ const Row& row_of(EffectKind kind) { return kTable[static_cast<std::size_t>(kind
 std::vector<std::string> element_names(const Scene& scene, EffectKind kind) {
   std::vector<std::string> names;
   const auto add = [&](const auto& all) {
-    for (const auto& d : all) names.push_back(owner_of(first_number(d)) + row_of(kind).of_element);
+    for (const auto& d : all) names.push_back(owner_of(first_number(d)) + row_of(kind).suffix);
   };
   const std::optional<Owner> owner = row_of(kind).owner;
   if (owner == Owner::contact) add(scene.pair_contacts);
@@ -381,7 +381,7 @@ int element_count(const Scene& scene, EffectKind kind) {
   return static_cast<int>(element_names(scene, kind).size());
 }
 std::optional<NumberOwner> element_owner(EffectKind kind) { return row_of(kind).owner; }
-bool is_part(EffectKind kind) { return *row_of(kind).of_element != '\0'; }
+bool is_part(EffectKind kind) { return *row_of(kind).suffix != '\0'; }
 
 const char* to_string(EffectKind kind) { return row_of(kind).name; }
 

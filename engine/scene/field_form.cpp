@@ -116,7 +116,7 @@ std::vector<FieldOutput> whole_fields(const Scene& scene) {
   return outputs;
 }
 
-std::vector<FieldOutput> asked_fields(const Scene& scene) {
+std::vector<FieldOutput> requested_fields(const Scene& scene) {
   if (!scene.outputs) return whole_fields(scene);
   const std::vector<std::string> sensors = sensor_names(scene);
   std::vector<FieldOutput> outputs;

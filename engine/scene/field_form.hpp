@@ -78,7 +78,7 @@ void check_outputs(std::span<const FieldOutput> outputs, std::size_t sensors);
 std::vector<FieldOutput> whole_fields(const Scene& scene);
 /// Returns the sensor outputs of the scene's <outputs>, with their times; without <outputs>, the
 /// field of every sensor.
-std::vector<FieldOutput> asked_fields(const Scene& scene);
+std::vector<FieldOutput> requested_fields(const Scene& scene);
 /// Returns all names of outputs, the plain ones included.
 std::vector<std::string> output_names(std::span<const std::string> sensors);
 /// The same with the names of single bodies.

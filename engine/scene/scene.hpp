@@ -213,7 +213,7 @@ struct TactileDescription {
   int every = 0;                     ///< read every k-th step; 0: not given, the caller chooses
   /// Whether the shear state is updated only at steps that are multiples of `every`, which must
   /// then be given, instead of every step.
-  bool remembers_readings = false;
+  bool shear_at_readings = false;
   std::optional<int> pressure_sign;  ///< +1 or -1; found from the geometry when not given
   Source source;
   /// Names of bodies that it senses, or ignores (sensed_bodies.hpp); at most one list is given.
@@ -283,7 +283,7 @@ struct PairContactDescription {
   /// first.
   bool second_half = false;
 
-  [[nodiscard]] bool by_area() const { return !areas.empty(); }
+  [[nodiscard]] bool per_area() const { return !areas.empty(); }
   /// The first part of the contact's name; the second is primitive_body.
   [[nodiscard]] std::string first_name() const {
     return sensor.empty() ? general_body : "tactile " + sensor;

@@ -225,10 +225,10 @@ std::string contact_fault(const Scene& scene, const PairContactDescription& d) {
         "mesh as general_body"
         " with points nearer to each other than the sphere is wide",
         d.general_body, d.primitive_body);
-  if (d.areas.size() != (d.by_area() ? d.points.size() / 3 : 0))
+  if (d.areas.size() != (d.per_area() ? d.points.size() / 3 : 0))
     return fmt::format("'{}' has {} areas for {} points; expected as many", d.first_name(),
                        d.areas.size(), d.points.size() / 3);
-  return value_fault(d.by_area() ? kSurfaceContact : kPairContact, d.coefficients);
+  return value_fault(d.per_area() ? kSurfaceContact : kPairContact, d.coefficients);
 }
 
 std::string markers_fault(const TactileDescription& sensor) {

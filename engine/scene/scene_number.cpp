@@ -49,7 +49,7 @@ bool with_law(const Scene& scene, const SceneNumber& n, const Function& f) {
   }
 }
 
-const double* of_body(const BodyDescription& body, const SceneNumber& n) {
+const double* body_number(const BodyDescription& body, const SceneNumber& n) {
   if (n.field == Field::density) return &body.density;
   if (n.field != Field::mass)
     // NOLINTNEXTLINE(cppcoreguidelines-pro-type-const-cast): returned as const
@@ -58,7 +58,7 @@ const double* of_body(const BodyDescription& body, const SceneNumber& n) {
   return abstract == nullptr ? nullptr : &abstract->mass;
 }
 
-const double* of_start(const Scene& scene, const SceneNumber& n) {
+const double* start_number(const Scene& scene, const SceneNumber& n) {
   for (const InitialState& state : scene.initial) {
     const std::vector<double>& x = n.field == Field::q ? state.q : state.v;
     if (state.joint == n.name && n.component >= 0 && std::size_t(n.component) < x.size())
@@ -67,11 +67,12 @@ const double* of_start(const Scene& scene, const SceneNumber& n) {
   return nullptr;
 }
 
-const double* of_joint(const Scene& scene, const JointDescription& joint, const SceneNumber& n) {
+const double* joint_number(const Scene& scene, const JointDescription& joint,
+                           const SceneNumber& n) {
   const JointEffects* const turning = joint.turning ? &*joint.turning : nullptr;
   switch (n.field) {
     case Field::q:
-    case Field::v: return of_start(scene, n);
+    case Field::v: return start_number(scene, n);
     case Field::pos:
       return n.component < 0 || n.component > 2 ? nullptr
                                                 : &joint.pose.position[std::size_t(n.component)];
@@ -96,7 +97,8 @@ const double* find_number(const Scene& scene, const SceneNumber& n) {
   if (n.owner == Owner::body || n.owner == Owner::joint) {
     const LinkDescription* const link = link_of(scene, n);
     if (link == nullptr) return nullptr;
-    return n.owner == Owner::body ? of_body(link->body, n) : of_joint(scene, link->joint, n);
+    return n.owner == Owner::body ? body_number(link->body, n)
+                                  : joint_number(scene, link->joint, n);
   }
   with_law(scene, n, [&](const ContactCoefficients& c, ContactLaw) {
     found = &c[coefficient_index(n.field)];
@@ -126,17 +128,17 @@ const Attribute& number_kind(NumberOwner owner, NumberField field) {
   // Dofs that turn may have effects of their own, which files give by the same attribute.
   if (field == Field::turning_damping) field = Field::damping;
   if (field == Field::turning_stiffness) field = Field::stiffness;
-  const Attribute* of_field = nullptr;
+  const Attribute* same_field = nullptr;
   for (const Attribute& row : schema()) {
     // Numbers of a <surface_contact> are those of a contact, whose rows come first.
     if (row.field != field || row.elements == kSurfaceContact) continue;
     if ((row.elements & element_of(owner)) != 0) return row;
-    of_field = &row;
+    same_field = &row;
   }
   int other = 0;
-  while (of_field != nullptr && (of_field->elements & element_of(Owner(other))) == 0) ++other;
+  while (same_field != nullptr && (same_field->elements & element_of(Owner(other))) == 0) ++other;
   throw InputError(std::string("a ") + owner_name(owner) + " has no '" +
-                   (of_field == nullptr ? "?" : of_field->name) + "'; a " + kOwners[other] +
+                   (same_field == nullptr ? "?" : same_field->name) + "'; a " + kOwners[other] +
                    " has one");
 }
 
@@ -175,10 +177,10 @@ std::string name_of(const SceneNumber& n) {
   return text;
 }
 
-Unit coefficient_unit(Owner owner, Field field, ContactLaw law, bool by_area) {
+Unit coefficient_unit(Owner owner, Field field, ContactLaw law, bool per_area) {
   const Attribute& kind = number_kind(owner, field);
-  return by_area ? attribute_of(kSurfaceContact, kind.name).unit
-                 : kind.unit_of(law == ContactLaw::linear);
+  return per_area ? attribute_of(kSurfaceContact, kind.name).unit
+                  : kind.unit_of(law == ContactLaw::linear);
 }
 
 std::vector<Unit> units_of(const Scene& scene, const SceneNumber& n) {
@@ -188,7 +190,8 @@ std::vector<Unit> units_of(const Scene& scene, const SceneNumber& n) {
     with_law(scene, n, [&](const ContactCoefficients&, ContactLaw own) { law = own; });
     const bool area =
         n.owner == Owner::contact && std::ranges::any_of(scene.pair_contacts, [&](const auto& c) {
-          return c.by_area() && first_number(c).name == n.name && c.primitive_body == n.second_name;
+          return c.per_area() && first_number(c).name == n.name &&
+                 c.primitive_body == n.second_name;
         });
     return {coefficient_unit(n.owner, n.field, law, area)};
   }

@@ -52,8 +52,8 @@ std::string owner_of(const SceneNumber& number);
 /// Returns the units of a number that the scene has. A joint that slides and turns has two units.
 /// Throws InputError.
 std::vector<Unit> units_of(const Scene& scene, const SceneNumber& number);
-/// Returns the unit of a coefficient of a contact or sensor. `by_area`: it counts per area.
-Unit coefficient_unit(NumberOwner owner, NumberField field, ContactLaw law, bool by_area);
+/// Returns the unit of a coefficient of a contact or sensor. `per_area`: it counts per area.
+Unit coefficient_unit(NumberOwner owner, NumberField field, ContactLaw law, bool per_area);
 /// Returns them as text: "N/m, N m/rad".
 std::string unit_of(const Scene& scene, const SceneNumber& number);
 

@@ -170,9 +170,9 @@ constinit const Integrator Integrator::default_integrator{kBdf1};
 constinit const Integrator Integrator::reference{kSdirk4};
 constinit const Integrator Integrator::second_reference{kSdirk2};
 
-Integrator keeping_accuracy(Integrator of_scene, double accuracy) {
-  const bool keeps = !of_scene.scheme().estimate.empty() && of_scene.scheme().order > 1;
-  return accuracy > 0 && !keeps ? Integrator::sdirk3 : of_scene;
+Integrator keeping_accuracy(Integrator integrator, double accuracy) {
+  const bool keeps = !integrator.scheme().estimate.empty() && integrator.scheme().order > 1;
+  return accuracy > 0 && !keeps ? Integrator::sdirk3 : integrator;
 }
 
 std::span<const Integrator> integrators() {

@@ -85,7 +85,7 @@ class Integrator {
 
 /// The scheme with which steps of a scene keep an accuracy (0: they need not): SDIRK3 in place of
 /// one that has no estimate or is of order 1.
-Integrator keeping_accuracy(Integrator of_scene, double accuracy);
+Integrator keeping_accuracy(Integrator integrator, double accuracy);
 
 /// Returns the schemes of the table.
 std::span<const Integrator> integrators();

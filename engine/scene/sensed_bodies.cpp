@@ -12,9 +12,9 @@ namespace tangere {
 
 namespace {
 
-class Feeling {
+class Sensing {
  public:
-  Feeling(const Scene& scene, const TactileDescription& sensor)
+  Sensing(const Scene& scene, const TactileDescription& sensor)
       : scene_(scene),
         sensor_(sensor),
         body_(find(sensor.body, "body")),
@@ -34,7 +34,7 @@ class Feeling {
     for (const std::string& name : sensor.ignores) find(name, "ignores");
   }
 
-  [[nodiscard]] bool feels(int k) const {
+  [[nodiscard]] bool senses(int k) const {
     const int link = moving_link(scene_, k);
     const std::string& name = scene_.links[std::size_t(k)].body.name;
     if (link == own_ || !has_distance(shape(k))) return false;
@@ -105,11 +105,11 @@ int moving_link(const Scene& scene, int link) {
 }
 
 std::vector<int> sensed_bodies(const Scene& scene, const TactileDescription& sensor) {
-  const Feeling feeling(scene, sensor);
-  std::vector<int> felt;
+  const Sensing sensing(scene, sensor);
+  std::vector<int> sensed;
   for (int k = 0; k < static_cast<int>(scene.links.size()); ++k)
-    if (feeling.feels(k)) felt.push_back(k);
-  return felt;
+    if (sensing.senses(k)) sensed.push_back(k);
+  return sensed;
 }
 
 }  // namespace tangere

@@ -99,11 +99,11 @@ MassProperties mass_slope(const Shape& shape, double density, int which) {
 }
 
 /// Volume, its moment and its second moments grow with the third, fourth and fifth power.
-MassProperties scaled_mass(const Shape& shape, double density, double s, double by_mass,
-                           double by_centre, double by_inertia) {
+MassProperties scaled_mass(const Shape& shape, double density, double s, double mass_factor,
+                           double centre_factor, double inertia_factor) {
   const MassProperties one = mesh_mass(std::get<MeshShape>(shape), density);
-  return {by_mass * s * s * one.mass, by_centre * one.centre,
-          (by_inertia * s * s * s * s) * one.inertia};
+  return {mass_factor * s * s * one.mass, centre_factor * one.centre,
+          (inertia_factor * s * s * s * s) * one.inertia};
 }
 MassProperties mesh_mass_of(const Shape& shape, double density) {
   const double s = std::get<MeshShape>(shape).scale;

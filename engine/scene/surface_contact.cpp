@@ -168,7 +168,7 @@ SurfacePitch fitting_pitch(const Scene& scene, const SurfaceContactDescription& 
       pitch.bounded = true;
     }
   }
-  pitch.coarse = pitch.across > kUneven * pitch.wanted;
+  pitch.coarse = pitch.across > kUneven * pitch.target;
   return pitch;
 }
 
@@ -183,10 +183,10 @@ std::array<double, 2> shares(const Scene& scene, const SurfaceContactDescription
   const bool first = one != nullptr && has_surface(*one),
              second = two != nullptr && has_surface(*two);
   if (!first || !second) return {first ? 1.0 : 0.0, second ? 1.0 : 0.0};
-  const auto alone = [](bool by_first) {
-    return std::array{by_first ? 1.0 : 0.0, by_first ? 0.0 : 1.0};
+  const auto alone = [](bool first_only) {
+    return std::array{first_only ? 1.0 : 0.0, first_only ? 0.0 : 1.0};
   };
-  const auto is_fine = [](const SurfacePitch& p) { return p.across <= kFine * p.wanted; };
+  const auto is_fine = [](const SurfacePitch& p) { return p.across <= kFine * p.target; };
   const bool fine1 = is_fine(fitting_pitch(scene, d, true)),
              fine2 = is_fine(fitting_pitch(scene, d, false));
   if (fine1 != fine2) return alone(fine1);
@@ -233,7 +233,7 @@ std::string thin_warning(const Scene& scene, const SurfaceContactDescription& d)
 std::string contact_fault(const Scene& scene, const SurfaceContactDescription& d) {
   if (d.body1 == d.body2) return "body '" + d.body1 + "' against itself; expected two bodies";
   for (const PairContactDescription& c : scene.pair_contacts)
-    if (c.by_area() &&
+    if (c.per_area() &&
         std::minmax(c.general_body, c.primitive_body) == std::minmax(d.body1, d.body2))
       return fmt::format("'{}' and '{}' touch already (line {}); expected one contact of them",
                          d.body1, d.body2, c.source.line);
@@ -292,7 +292,7 @@ std::vector<std::string> add_surface_contact(Scene& scene, const SurfaceContactD
         "weight its contact with '{}' is uneven unless they are {:.2g} m apart; expected a smaller "
         "kn, or a pitch of {:.2g}",
         d.source.prefix(), scene.pair_contacts.back().areas.size(), first ? d.body1 : d.body2,
-        pitch.across, first ? d.body2 : d.body1, pitch.wanted, pitch.wanted));
+        pitch.across, first ? d.body2 : d.body1, pitch.target, pitch.target));
   }
   if (std::string thin = thin_warning(scene, d); !thin.empty()) warnings.push_back(std::move(thin));
   return warnings;

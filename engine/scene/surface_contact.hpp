@@ -30,9 +30,9 @@ struct SurfaceContactDescription {
 /// Distances of neighbouring points of one surface.
 struct SurfacePitch {
   double across, along;  ///< as surface_points() takes them [m]
-  double wanted;         ///< `across` without the bound on the number of points [m]
-  bool bounded = false;  ///< `wanted` would take too many points
-  bool coarse = false;   ///< the contact is uneven, because `across` is far from `wanted`
+  double target;         ///< `across` without the bound on the number of points [m]
+  bool bounded = false;  ///< `target` would take too many points
+  bool coarse = false;   ///< the contact is uneven, because `across` is far from `target`
 };
 
 /// Returns distances at which points of a body resolve its contact with another one, or the ground:

@@ -14,11 +14,11 @@ using kernels::ShearSpringPoints;
 using kernels::ShearSpringTouch;
 using kernels::Vec3;
 
-ElasticField::ElasticField(const Model& model) : model_(model), felt_(compiled(model)) {
+ElasticField::ElasticField(const Model& model) : model_(model), sensor_points_(compiled(model)) {
   std::size_t most = 0;
   for (const CompiledSensor& s : compiled(model).sensors)
     if (s.elastic) most = std::max(most, std::size_t(s.points() + 2 * kGroup));
-  remembered_.resize(3 * most);
+  s_start_.resize(3 * most);
   s_.resize(4 * most);
   force_.resize(3 * most);
   own_.resize(kernels::kPointNumbers * most);
@@ -43,14 +43,15 @@ void ElasticField::for_each_touched(const PadReader& reader, const Batch& batch,
         [&](const kernels::Parameter& p) {
           return p.row < 0 ? p.value : kernels::row_of(batch.block(block), p.row, group)[lane];
         });
-    const ShearSpringPoints points = felt_.find(m.sensors[std::size_t(sensor)], table, touch);
+    const ShearSpringPoints points =
+        sensor_points_.find(m.sensors[std::size_t(sensor)], table, touch);
     if (points.count == 0) continue;
     if (m.shear_interval(of) > 0) {
-      set_anchors(table, touch, memory, felt_.index(), points, felt_.scratch());
+      set_anchors(table, touch, memory, sensor_points_.index(), points, sensor_points_.scratch());
     } else {
-      shear_of_points(memory, of, felt_.index(), points.count, points.stride, remembered_.data(),
-                      next);
-      std::copy_n(remembered_.data(), 3 * points.stride, points.anchors + 3 * points.stride);
+      shear_of_points(memory, of, sensor_points_.index(), points.count, points.stride,
+                      s_start_.data(), next);
+      std::copy_n(s_start_.data(), 3 * points.stride, points.anchors + 3 * points.stride);
       table.recall(touch, points);
     }
     f(of, touch, points);
@@ -66,7 +67,7 @@ void ElasticField::read(const PadReader& reader, const Batch& batch, int environ
                        const ShearSpringPoints& points) {
                      kernels::active_kernels().advance(touch, points, s_.data(), force_.data());
                      for (int k = 0; k < points.count; ++k) {
-                       const auto point = std::size_t(felt_.index()[k]);
+                       const auto point = std::size_t(sensor_points_.index()[k]);
                        const double* const axes = &s.point_axes[9 * point];
                        double* const to = &field[3 * std::size_t(s.in_field[point])];
                        for (int c = 0; c < 3; ++c)
@@ -87,7 +88,7 @@ std::span<const ElasticField::Share> ElasticField::pull_back(
                      std::fill(force_.begin(), force_.end(), 0.0);
                      std::fill(s_.begin(), s_.end(), 0.0);
                      for (int k = 0; k < points.count; ++k) {
-                       const auto point = std::size_t(felt_.index()[k]);
+                       const auto point = std::size_t(sensor_points_.index()[k]);
                        const double* const axes = &s.point_axes[9 * point];
                        const double* const from = &cotangent[3 * std::size_t(s.in_field[point])];
                        for (int c = 0; c < 3; ++c)
@@ -95,14 +96,14 @@ std::span<const ElasticField::Share> ElasticField::pull_back(
                            force_[std::size_t(i * points.stride + k)] += axes[3 * c + i] * from[c];
                      }
                      kernels::ShearCotangentSums sums{};
-                     kernels::ShearPullback pullback = {
-                         &touch,  &touch,    points, remembered_.data(), nullptr, force_.data(),
-                         nullptr, s_.data(), &sums};
+                     kernels::ShearPullback pullback = {&touch,          &touch,    points,
+                                                        s_start_.data(), nullptr,   force_.data(),
+                                                        nullptr,         s_.data(), &sums};
                      const bool keeps = compiled(model_).shear_interval(of) > 0;
                      if (keeps) {
-                       std::fill(remembered_.begin(), remembered_.end(), 0.0);
+                       std::fill(s_start_.begin(), s_start_.end(), 0.0);
                        std::fill(anchors_.begin(), anchors_.end(), 0.0);
-                       pullback.kept = felt_.scratch() + 6 * points.stride;
+                       pullback.kept = sensor_points_.scratch() + 6 * points.stride;
                        pullback.anchor_out = anchors_.data();
                      }
                      if (!points_bar.empty()) {
@@ -111,15 +112,16 @@ std::span<const ElasticField::Share> ElasticField::pull_back(
                      }
                      kernels::active_kernels().pull_back_memory(pullback);
                      if (!points_bar.empty())
-                       felt_.add_to_points(compiled(model_), s, points, own_.data(), points_bar);
+                       sensor_points_.add_to_points(compiled(model_), s, points, own_.data(),
+                                                    points_bar);
                      sums.end.displacement += sums.start;
                      shares_.push_back({&of, sums.end});
                      if (keeps) {
-                       add_to_anchors(batch.shear_state(environment), of, felt_.index(), points,
-                                      anchors_.data(), memory);
+                       add_to_anchors(batch.shear_state(environment), of, sensor_points_.index(),
+                                      points, anchors_.data(), memory);
                      } else {
-                       add_to_entries(batch.shear_state(environment), of, felt_.index(), points,
-                                      s_.data(), memory);
+                       add_to_entries(batch.shear_state(environment), of, sensor_points_.index(),
+                                      points, s_.data(), memory);
                      }
                    });
   return shares_;

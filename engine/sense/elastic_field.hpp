@@ -39,10 +39,10 @@ class ElasticField {
   void for_each_touched(const PadReader& reader, const Batch& batch, int environment, int sensor,
                         const F& f);
   Model model_;
-  TouchingSensorPoints felt_;
+  TouchingSensorPoints sensor_points_;
   std::vector<Share> shares_;
-  AlignedVector<double> remembered_, s_, force_;  // (3, stride), (4, stride), (3, stride)
-  AlignedVector<double> anchors_, own_;           // (6, stride), (kPointNumbers, stride)
+  AlignedVector<double> s_start_, s_, force_;  // (3, stride), (4, stride), (3, stride)
+  AlignedVector<double> anchors_, own_;        // (6, stride), (kPointNumbers, stride)
 };
 
 }  // namespace tangere

@@ -91,8 +91,8 @@ void normalised_flow_vjp(std::span<const ShearField<double>> fields,
       add_shear(out[f], k, from[0] / longest, from[1] / longest);
   // F = S/L, where L is the length at `place`.
   const Shear s = shear_at(fields[field_of_longest], place);
-  const double by_length = -product / (longest * longest);
-  add_shear(out[field_of_longest], place, by_length * s.x / longest, by_length * s.y / longest);
+  const double length_bar = -product / (longest * longest);
+  add_shear(out[field_of_longest], place, length_bar * s.x / longest, length_bar * s.y / longest);
 }
 
 double normalised_flow(std::span<const ShearField<double>> fields, std::span<double> flow,

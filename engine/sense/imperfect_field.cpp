@@ -14,7 +14,7 @@
 namespace tangere {
 namespace {
 
-double of_component(const NormalAndShear& pair, int component) {
+double component_of(const NormalAndShear& pair, int component) {
   return component == 2 ? pair.normal : pair.shear;
 }
 
@@ -31,16 +31,16 @@ class Draws {
     noises_ = !(of_.noise == NormalAndShear{});
     if (of_.sensor_gain != 0)
       sensor_ = 1 + normal(random_key(0, Purpose::sensor_gain, 0), 0, of_.sensor_gain);
-    if (!points_) of_point_ = {};
-    if (!noises_) of_step_ = {};
+    if (!points_) point_normals_ = {};
+    if (!noises_) step_normals_ = {};
     alive_.fill(1);
   }
 
   /// Draws for the points from `first` on.
   void draw(int first) {
-    if (points_) fill(random_key(0, Purpose::sensor_point, first), of_point_);
-    if (noises_) fill(random_key(key_.step, Purpose::sensor_noise, first), of_step_);
-    for (int l = 0; l < kRandomRun; ++l) gain_[l] = sensor_ + of_.gain * of_point_[3][l];
+    if (points_) fill(random_key(0, Purpose::sensor_point, first), point_normals_);
+    if (noises_) fill(random_key(key_.step, Purpose::sensor_noise, first), step_normals_);
+    for (int l = 0; l < kRandomRun; ++l) gain_[l] = sensor_ + of_.gain * point_normals_[3][l];
     if (of_.dead == 0) return;
     random_run(random_key(0, Purpose::dead_point, first), words_);
     const auto deadly = static_cast<std::uint64_t>(of_.dead * 0x1p32);
@@ -49,11 +49,11 @@ class Draws {
 
   /// Scales a component of the 64 points, and adds to it.
   void add_to(int component, Run& x) const {
-    const double bias = of_component(of_.bias, component),
-                 noise = of_component(of_.noise, component);
+    const double bias = component_of(of_.bias, component),
+                 noise = component_of(of_.noise, component);
     const auto c = std::size_t(component);
     for (int l = 0; l < kRandomRun; ++l)
-      x[l] = gain_[l] * x[l] + bias * of_point_[c][l] + noise * of_step_[c][l];
+      x[l] = gain_[l] * x[l] + bias * point_normals_[c][l] + noise * step_normals_[c][l];
   }
   [[nodiscard]] const Run& gain() const { return gain_; }
   /// 1, or 0 for dead points.
@@ -73,7 +73,7 @@ class Draws {
   bool points_ = false, noises_ = false;
   double sensor_ = 1;
   RandomWords words_;
-  RandomNormals of_point_, of_step_;
+  RandomNormals point_normals_, step_normals_;
   Run gain_, alive_;
 };
 
@@ -88,8 +88,8 @@ double rounded(double x) {
 /// Returns the largest magnitude that a component can read [N]; 0: there is none. Of readings that
 /// are rounded, it is the largest multiple that saturation allows.
 double largest_reading(const SensorImperfections& of, int component) {
-  const double limit = of_component(of.saturation, component),
-               step = of_component(of.quantisation, component);
+  const double limit = component_of(of.saturation, component),
+               step = component_of(of.quantisation, component);
   return step == 0 ? limit : step * std::floor(limit / step * (1 + 1e-12));
 }
 
@@ -171,7 +171,7 @@ void spoil_points(const CompiledSensor& s, const ReadingKey& key, int first_comp
     for (int c = 0; c < Components; ++c) {
       const int component = first_component + c;
       draws.add_to(component, x[c]);
-      digitise(largest_reading(of, component), of_component(of.quantisation, component),
+      digitise(largest_reading(of, component), component_of(of.quantisation, component),
                draws.alive(), x[c]);
     }
     for (int l = 0; l < end - first; ++l)

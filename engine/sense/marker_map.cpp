@@ -68,21 +68,21 @@ void MarkerMap::displace(std::span<const double> field, std::span<double> displa
   std::copy(moved.begin(), moved.end(), displacement.begin());
 }
 
-void MarkerMap::pull_back(std::span<const double> of_displacement,
-                          std::span<double> of_field) const {
+void MarkerMap::pull_back(std::span<const double> displacement_bar,
+                          std::span<double> field_bar) const {
   const Impl& m = *impl_;
   const double press = m.of.pressure_sign * m.of.bulge;
   thread_local std::vector<double> moved;  // (points, 2)
-  moved.assign(of_displacement.begin(), of_displacement.end());
+  moved.assign(displacement_bar.begin(), displacement_bar.end());
   m.spread(true, moved);
   for (std::size_t k = 0; k < moved.size(); ++k)
-    of_field[k / 2 * 3 + k % 2] += m.of.compliance * moved[k];
+    field_bar[k / 2 * 3 + k % 2] += m.of.compliance * moved[k];
   if (press == 0) return;
   m.for_differences([&](std::size_t point, std::size_t axis, std::size_t ahead, std::size_t behind,
                         double per_distance) {
     const double x = press * per_distance * moved[2 * point + axis];
-    of_field[3 * ahead + 2] -= x;
-    of_field[3 * behind + 2] += x;
+    field_bar[3 * ahead + 2] -= x;
+    field_bar[3 * behind + 2] += x;
   });
 }
 

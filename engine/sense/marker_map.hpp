@@ -29,7 +29,7 @@ class MarkerMap {
   void displace(std::span<const double> field, std::span<double> displacement) const;
   /// Pulls the cotangent of the displacements, (points, 2), back to the field and adds it, (points,
   /// 3).
-  void pull_back(std::span<const double> of_displacement, std::span<double> of_field) const;
+  void pull_back(std::span<const double> displacement_bar, std::span<double> field_bar) const;
 
  private:
   struct Impl;

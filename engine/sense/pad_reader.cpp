@@ -44,7 +44,7 @@ PadReader::PadReader(const Model& model)
   }
   active.resize(tiles);
   touches_.resize(kGroups * targets);
-  touch_of_group_.resize(targets);
+  group_touches_.resize(targets);
   one_.resize(targets);
   one_shapes_.resize(targets);
   sizes_.resize(std::size_t{3} * kGroups * targets);
@@ -136,12 +136,12 @@ kernels::TactileBlockArgs<Real> PadReader::block_arguments(int sensor, int group
   const CompiledSensor& s = compiled(model_).sensors[std::size_t(sensor)];
   const Pad& pad = pads_[std::size_t(sensor)];
   for (std::size_t k = 0; k < s.targets.size(); ++k)
-    touch_of_group_[k] = &touches_[kGroups * k + std::size_t(group)];
+    group_touches_[k] = &touches_[kGroups * k + std::size_t(group)];
   return {&pad.tiles,
           s.law,
           static_cast<int>(s.targets.size()),
           pad.shapes.data(),
-          touch_of_group_.data(),
+          group_touches_.data(),
           nullptr};
 }
 

@@ -51,7 +51,7 @@ class PadReader {
   AlignedVector<kernels::LinkPose<kernels::LaneRow>> links_;  // (kGroups, n_links)
   std::vector<Pad> pads_;                                     // per sensor
   AlignedVector<kernels::Touch<kernels::LaneRow>> touches_;   // (targets, kGroups)
-  std::vector<const kernels::Touch<kernels::LaneRow>*> touch_of_group_;
+  std::vector<const kernels::Touch<kernels::LaneRow>*> group_touches_;
   std::vector<kernels::Touch<double>> one_;      // (targets) of one environment
   std::vector<kernels::TouchShape> one_shapes_;  // (targets)
   AlignedVector<kernels::LaneRow> sizes_;  // (targets, kGroups, 3) of shapes whose size varies

@@ -45,7 +45,7 @@ struct Readout::Impl {
   LayerReading layered;
   std::vector<std::optional<MarkerMap>> markers;    // (sensors) of those that have them
   std::vector<double> displacement, elastic_field;  // (points, 2), (points, 3)
-  std::vector<double> one_reading, block_readings, of_tiles;
+  std::vector<double> one_reading, block_readings, tile_values;
   std::vector<double> earlier;     // fields of small pads in the states of `past`
   std::optional<PastStates> past;  // for sensors with lag
 
@@ -68,7 +68,7 @@ struct Readout::Impl {
       }
       if (!s.imperfect && !s.elastic && !s.layer && !marked) continue;
       grow(one_reading, 3 * points);
-      grow(of_tiles, std::size_t(s.n_tiles()) * 3 * kTactileTile);
+      grow(tile_values, std::size_t(s.n_tiles()) * 3 * kTactileTile);
       if (small(s)) grow(block_readings, 3 * kBlock * points);
     }
     if (compiled(m).layout.past_states > 0) {
@@ -292,10 +292,10 @@ struct Readout::Impl {
     const kernels::PadTiles pad = sensor_of(sensor).tiles();
     const std::span<const int> tiles = all_tiles(sensor);
     for (const int tile : tiles)
-      gather_tile(pad, tile, field.data(), of_tiles.data() + 3 * kTactileTile * tile);
+      gather_tile(pad, tile, field.data(), tile_values.data() + 3 * kTactileTile * tile);
     const int sign = compiled(model).sensor_info[std::size_t(sensor)].pressure_sign;
     const FieldSum total =
-        field_sum(pad, in_body[std::size_t(sensor)], sign, tiles, of_tiles.data());
+        field_sum(pad, in_body[std::size_t(sensor)], sign, tiles, tile_values.data());
     std::transform(total.begin(), total.end(), sum, [](double x) { return static_cast<T>(x); });
   }
 

@@ -64,11 +64,12 @@ void CompactFrame<T>::expand(std::span<T> dense) const {
 }
 
 template <class T>
-void CompactFrame<T>::spread(std::span<const T> of_tiles, std::span<T> dense) const {
+void CompactFrame<T>::spread(std::span<const T> tile_values, std::span<T> dense) const {
   const kernels::PadTiles pad = compiled(model_).sensors[std::size_t(sensor_)].tiles();
   clear_tiles_between<T>(pad, tiles(), 3, dense.data());
   for (std::size_t k = 0; k < std::size_t(count_); ++k)
-    expand_tile<3>(pad, tiles_[k], of_tiles.data() + 3 * kernels::kTactileTile * k, dense.data());
+    expand_tile<3>(pad, tiles_[k], tile_values.data() + 3 * kernels::kTactileTile * k,
+                   dense.data());
 }
 
 static_assert(kTilePoints == kernels::kTactileTile);

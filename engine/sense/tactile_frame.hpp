@@ -62,7 +62,7 @@ class CompactFrame {
   /// Writes the whole field, (points, 3), zeros included.
   void expand(std::span<T> dense) const;
   /// Writes numbers for the same tiles, laid out as values(), as a whole field.
-  void spread(std::span<const T> of_tiles, std::span<T> dense) const;
+  void spread(std::span<const T> tile_values, std::span<T> dense) const;
 
  private:
   friend class Readout;

@@ -49,8 +49,9 @@ LaneBits solve_stages(const CompiledModel& model, const StepSettings& settings, 
     const LaneBits lost = softens ? lanes & ~found : kNoLane;
     lanes = found;
     if (lost != 0) {
-      const LaneBits by_softer = solve_from_softer(model, table, w, lost, limits, factors, report);
-      lanes |= by_softer, softened |= by_softer;
+      const LaneBits from_softer =
+          solve_from_softer(model, table, w, lost, limits, factors, report);
+      lanes |= from_softer, softened |= from_softer;
     }
     if (k == inner) break;
     // With an explicit tolerance, each stage starts from a fresh factorisation.

@@ -20,9 +20,9 @@ namespace {
 template <int L, class List>
 std::size_t lay_out(const kernels::PairContact& pair, double* base, List& list) {
   std::size_t used = 0;
-  const auto part = [&]<class T>(T*& to, bool wanted, int numbers) {
-    to = base == nullptr || !wanted ? nullptr : reinterpret_cast<T*>(base + used);
-    if (wanted) used += std::size_t(L * numbers) * std::size_t(list.stride);
+  const auto part = [&]<class T>(T*& to, bool requested, int numbers) {
+    to = base == nullptr || !requested ? nullptr : reinterpret_cast<T*>(base + used);
+    if (requested) used += std::size_t(L * numbers) * std::size_t(list.stride);
   };
   const bool elastic = pair.memory >= 0, weighted = pair.weights != nullptr;
   part(list.own, true, 3);

@@ -16,7 +16,7 @@ namespace {
 // Floors of the scale, as shares of the bodies' weight: of all contacts, and of contacts without
 // sensors in components with sensors. Otherwise a light ball that settles on stiff ground under a
 // heavy pad would determine the substeps.
-constexpr double kGraze = 0.01, kUnfelt = 0.05;
+constexpr double kGraze = 0.01, kUnsensed = 0.05;
 
 /// A ball around some points.
 struct Ball {
@@ -52,16 +52,16 @@ ContactForces::ContactForces(const CompiledModel& m) : floor_(2 * std::size_t(m.
     const std::size_t c = std::size_t(component_of(i));
     const double weight = gravity * m.links[std::size_t(i)].mass;
     floor_[2 * c] += kGraze * weight;
-    floor_[2 * c + 1] += kUnfelt * weight;
+    floor_[2 * c + 1] += kUnsensed * weight;
   }
-  const auto felt = [&](int link) {
+  const auto is_sensed = [&](int link) {
     return std::ranges::any_of(m.sensors, [&](const CompiledSensor& s) { return s.link == link; });
   };
   const auto add = [&](int link1, int link2, const std::vector<Ball>& points) {
     const int c = component_of(link1 < 0 ? link2 : link1);
-    const bool unfelt = senses[std::size_t(c)] != 0 && !felt(link1) && !felt(link2);
+    const bool unsensed = senses[std::size_t(c)] != 0 && !is_sensed(link1) && !is_sensed(link2);
     const Ball ball = around(points);
-    contacts_.push_back({2 * c + (unfelt ? 1 : 0), 6 * contacts_.size(), ball.middle,
+    contacts_.push_back({2 * c + (unsensed ? 1 : 0), 6 * contacts_.size(), ball.middle,
                          ball.radius > 0 ? 1 / ball.radius : 0});
   };
   for (const kernels::LinkPair& links : m.link_pairs) {

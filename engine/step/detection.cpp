@@ -155,8 +155,8 @@ static void search_lane(const CompiledModel& model, const kernels::KernelTable& 
   auto& list = w.candidates->lists[k];
   if (list.stride == 0) w.candidates->reserve(model, k, 1);
   for (;;) {
-    const auto own = [&](auto* numbers, int of_point) {
-      return numbers == nullptr ? nullptr : numbers + of_point * list.stride * lane;
+    const auto own = [&](auto* numbers, int per_point) {
+      return numbers == nullptr ? nullptr : numbers + per_point * list.stride * lane;
     };
     const int count =
         table.find_candidates({&pair, size_of<L>(pair, w.stage, lane), pose, kWider * list.margin,

@@ -23,10 +23,10 @@ void displace(const Model& model, std::span<double> q, int dof, double e) {
   }
 }
 
-void add_along_dofs(const Model& model, std::span<const double> q, std::span<const double> by_q,
+void add_along_dofs(const Model& model, std::span<const double> q, std::span<const double> q_bar,
                     std::span<double> out) {
   for (const kernels::Link& link : compiled(model).links) {
-    const double *a = &q[std::size_t(link.q)], *p = &by_q[std::size_t(link.q)];
+    const double *a = &q[std::size_t(link.q)], *p = &q_bar[std::size_t(link.q)];
     double* to = &out[std::size_t(link.v)];
     if (link.kind != kernels::JointKind::spherical) {
       for (int k = 0; k < kernels::dofs(link.kind); ++k) to[k] += p[k];
@@ -38,10 +38,10 @@ void add_along_dofs(const Model& model, std::span<const double> q, std::span<con
   }
 }
 
-void add_by_coordinates(const Model& model, std::span<const double> q,
-                        std::span<const double> by_dofs, std::span<double> out) {
+void add_along_coordinates(const Model& model, std::span<const double> q,
+                           std::span<const double> dof_bar, std::span<double> out) {
   for (const kernels::Link& link : compiled(model).links) {
-    const double *a = &q[std::size_t(link.q)], *w = &by_dofs[std::size_t(link.v)];
+    const double *a = &q[std::size_t(link.q)], *w = &dof_bar[std::size_t(link.v)];
     double* to = &out[std::size_t(link.q)];
     if (link.kind != kernels::JointKind::spherical) {
       for (int k = 0; k < kernels::dofs(link.kind); ++k) to[k] += w[k];

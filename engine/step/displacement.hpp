@@ -12,15 +12,15 @@ namespace tangere {
 /// Computes q ⊕ e along one dof, in place. Rotations are on the right.
 void displace(const Model& model, std::span<double> q, int dof, double e);
 
-/// Turns the derivatives `by_q`, (nq), by coordinates at q into derivatives along the dofs of v and
-/// adds them to `out`, (nv). `by_q` treats the four coordinates of a quaternion as free.
-void add_along_dofs(const Model& model, std::span<const double> q, std::span<const double> by_q,
+/// Turns `q_bar`, (nq) derivatives by coordinates at q, into derivatives along the dofs of v and
+/// adds them to `out`, (nv). `q_bar` treats the four coordinates of a quaternion as free.
+void add_along_dofs(const Model& model, std::span<const double> q, std::span<const double> q_bar,
                     std::span<double> out);
 
 /// Turns derivatives along the dofs of v, (nv), into derivatives by coordinates at q and adds them
 /// to `out`, (nq). Those by the four coordinates of a quaternion have no part along the quaternion,
 /// which would change its length.
-void add_by_coordinates(const Model& model, std::span<const double> q,
-                        std::span<const double> by_dofs, std::span<double> out);
+void add_along_coordinates(const Model& model, std::span<const double> q,
+                           std::span<const double> dof_bar, std::span<double> out);
 
 }  // namespace tangere

@@ -120,7 +120,7 @@ Row<L> ErrorEstimate::error(const kernels::KernelTable& table, BasicWorkspace<L>
   const int n = model_.nv;
   kernels::Stage<L>& s = w.stage;
   const auto& kernel = table.stage<L>();
-  const auto [start, end, by_displacement, by_velocity] = w.wrenches;
+  const auto [start, end, displacement_wrenches, velocity_wrenches] = w.wrenches;
   std::copy_n(s.x, n, w.base);
   weigh_displacement(scheme_, n, h, w);
   evaluate_elsewhere(model_, table, w, lanes, report);
@@ -150,9 +150,9 @@ Row<L> ErrorEstimate::error(const kernels::KernelTable& table, BasicWorkspace<L>
               has(touched, l) ? contact_forces_.change<L>(start, end, end, start, l) : missed[l]);
   }
   solve_by_factor(model_, table, w, factors, w.test);
-  const double c0 = scheme_.stages.back().c0, by_test = -c0 * scheme_.estimate.front();
+  const double c0 = scheme_.stages.back().c0, test_share = -c0 * scheme_.estimate.front();
   Row<L> factor;
-  for (int l = 0; l < L; ++l) factor[l] = c0 / h[l] * by_test;
+  for (int l = 0; l < L; ++l) factor[l] = c0 / h[l] * test_share;
   for (int c = 0; c < model_.components(); ++c) {
     const std::span<const int> dofs = dofs_of_component(model_, c);
     LaneBits gone = contact_forces_.parted<L>(start, end, c);
@@ -171,11 +171,11 @@ Row<L> ErrorEstimate::error(const kernels::KernelTable& table, BasicWorkspace<L>
     evaluate_elsewhere(model_, table, w, touching, report);
     kernel.contact_wrenches(model_.view, s, wrenches);
   };
-  move(w.delta, 1, by_displacement);
-  move(w.test, by_test, by_velocity);
+  move(w.delta, 1, displacement_wrenches);
+  move(w.test, test_share, velocity_wrenches);
   for (int l = 0; l < L; ++l)
     if (has(touching, l))
-      raise(l, contact_forces_.change<L>(start, end, by_displacement, by_velocity, l));
+      raise(l, contact_forces_.change<L>(start, end, displacement_wrenches, velocity_wrenches, l));
   return error;
 }
 

@@ -37,9 +37,9 @@ inline PointRange a_range(const kernels::ShearSpringContact& of) {
 
 /// Writes two sets of three numbers of points, (6, stride): those of the entries of b, then of a.
 template <class Number>
-void look_up_anchors(std::span<const ShearEntry> memory, const kernels::ShearSpringContact& of,
-                     const int* index, const kernels::ShearSpringPoints& points,
-                     const Number& number, double* out) {
+void find_anchors(std::span<const ShearEntry> memory, const kernels::ShearSpringContact& of,
+                  const int* index, const kernels::ShearSpringPoints& points, const Number& number,
+                  double* out) {
   std::size_t next = 0;
   shear_of_points(memory, b_range(of), index, points.count, points.stride, number, out, next);
   shear_of_points(memory, a_range(of), index, points.count, points.stride, number,
@@ -64,7 +64,7 @@ inline void set_anchors(const kernels::KernelTable& table, const kernels::ShearS
             end = (points.count + kernels::kGroup - 1) / kernels::kGroup * kernels::kGroup;
   for (int c = 3; c < 6; ++c) std::fill_n(points.anchors + c * stride, end, 0.0);
   table.recall(touch, points);
-  look_up_anchors(
+  find_anchors(
       memory, *touch.of, index, points,
       [&](std::size_t entry, int c) { return memory[entry].s[c]; }, kept);
   double* const is_kept = kept + 6 * stride;
@@ -81,15 +81,15 @@ inline void set_anchors(const kernels::KernelTable& table, const kernels::ShearS
 /// Appends the anchors after a step that ends at `touch`, from those before it.
 inline void advance_anchors(const CompiledModel& m, const kernels::KernelTable& table,
                             const kernels::ShearSpringTouch& touch,
-                            std::span<const ShearEntry> before, TouchingSensorPoints& felt,
+                            std::span<const ShearEntry> before, TouchingSensorPoints& sensor_points,
                             ShearState& after) {
   const kernels::ShearSpringContact& of = *touch.of;
   const kernels::ShearSpringPoints points =
-      felt.find(m.sensors[std::size_t(of.sensor)], table, touch);
+      sensor_points.find(m.sensors[std::size_t(of.sensor)], table, touch);
   if (points.count == 0) return;
   const int stride = points.stride;
-  set_anchors(table, touch, before, felt.index(), points, felt.scratch());
-  double* const s = felt.scratch();
+  set_anchors(table, touch, before, sensor_points.index(), points, sensor_points.scratch());
+  double* const s = sensor_points.scratch();
   table.advance(touch, points, s, nullptr);
   for (int c = 0; c < 3; ++c)
     std::copy_n(s + c * stride, points.count, points.anchors + (3 + c) * stride);
@@ -98,7 +98,7 @@ inline void advance_anchors(const CompiledModel& m, const kernels::KernelTable& 
     for (int k = 0; k < points.count; ++k) {
       if (!(s[3 * stride + k] > 0)) continue;
       const double* anchor = points.anchors + 3 * part * stride + k;
-      after.push_back({of.first + part * of.contact.n_points + felt.index()[k],
+      after.push_back({of.first + part * of.contact.n_points + sensor_points.index()[k],
                        {anchor[0], anchor[stride], anchor[2 * stride]}});
     }
 }

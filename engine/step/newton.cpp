@@ -77,10 +77,10 @@ struct Search {
   StageFactors<L>& factors;
   NewtonReport& report;
   LaneBits searching;
-  LaneBits on_trial = 0;   ///< lanes whose x is a trial along delta
-  LaneBits waiting = 0;    ///< lanes whose x is accepted and that wait for a Jacobian
-  LaneBits spared = 0;     ///< lanes that ended without the last evaluation
-  LaneBits by_secant = 0;  ///< lanes whose factor takes friction by its secant
+  LaneBits on_trial = 0;       ///< lanes whose x is a trial along delta
+  LaneBits need_jacobian = 0;  ///< lanes whose x is accepted and that wait for a Jacobian
+  LaneBits spared = 0;         ///< lanes that ended without the last evaluation
+  LaneBits secant_lanes = 0;   ///< lanes whose factor takes friction by its secant
   std::array<double, L> alpha{}, delta_norm{};
   std::array<double, L> last{};    ///< scaled residual of the last accepted point
   std::array<double, L> lowest{};  ///< lowest scaled residual of all accepted points
@@ -125,7 +125,7 @@ struct Search {
     locate(first);
     LaneBits open = 0;
     for (int l = 0; l < L; ++l)
-      if (has(searching, l) && (has(waiting, l) || !(expected[l] <= limits.tolerance)))
+      if (has(searching, l) && (has(need_jacobian, l) || !(expected[l] <= limits.tolerance)))
         open |= 1U << l;
     with_jacobian = !factors.weighted || !factors.floored ||
                     (open != 0 && (lone(open) < 0 || open == searching));
@@ -167,7 +167,7 @@ struct Search {
       weighted_norms(w.test, test_norm);
     }
     for (int l = 0; l < L; ++l) {
-      if (!has(searching & ~waiting, l)) continue;
+      if (!has(searching & ~need_jacobian, l)) continue;
       ++report.iterations[l];
       const double ratio = residual[l] / last[l];
       if (has(on_trial, l) && alpha[l] == 1) factors.share[l] = has(chord, l) ? ratio : 2 * ratio;
@@ -184,7 +184,7 @@ struct Search {
           on_trial |= 1U << l;
           take_chord(l, test_norm[l]);
         } else {
-          waiting |= 1U << l;
+          need_jacobian |= 1U << l;
           expected[l] = 0;
         }
       } else if (descends(l, test_norm[l], residual[l])) {
@@ -196,7 +196,7 @@ struct Search {
         } else if (stalls(l, residual[l])) {
           stop(l, StepStatus::not_converged);
         } else {
-          waiting |= 1U << l;
+          need_jacobian |= 1U << l;
           const double next = ratio * ratio, share = 2 * next;  // a Newton step squares the ratio
           expected[l] = residual[l] * next * share * share * share;
         }
@@ -271,7 +271,7 @@ struct Search {
   /// Computes new directions at the points that wait for one. The full step along each is the next
   /// trial.
   void new_directions() {
-    const LaneBits accepted = std::exchange(waiting, 0);
+    const LaneBits accepted = std::exchange(need_jacobian, 0);
     if (!with_jacobian) kernel().evaluate(model.view, w.stage, lone(accepted));
     set_floor(accepted);
     // Lanes that have ended keep their factors for the next stage.
@@ -281,7 +281,7 @@ struct Search {
       if (!has(accepted, l)) continue;
       factors.lanes |= 1U << l;
       factors.any |= 1U << l;
-      by_secant = secants[l] > 0 ? by_secant | (1U << l) : by_secant & ~(1U << l);
+      secant_lanes = secants[l] > 0 ? secant_lanes | (1U << l) : secant_lanes & ~(1U << l);
       factors.pivoted &= ~(1U << l);
       if (w.sound[l] > 0) continue;
       factors.pivoted |= 1U << l;
@@ -327,13 +327,14 @@ LaneBits solve_stage(const CompiledModel& model, const kernels::KernelTable& tab
     s.evaluate(first);
     first = false;
     s.test_trials();
-    if (s.waiting != 0 && (s.with_jacobian || s.waiting == s.searching)) s.new_directions();
+    if (s.need_jacobian != 0 && (s.with_jacobian || s.need_jacobian == s.searching))
+      s.new_directions();
   }
   if (s.spared != 0) {  // v and candidates where they ended
     s.searching = s.spared;
     s.locate(false);
   }
-  s.factors.lanes &= ~s.by_secant;
+  s.factors.lanes &= ~s.secant_lanes;
   for (int l = 0; l < L; ++l) w.stage.friction_tangent[l] = 1;
   LaneBits converged = 0;
   for (int l = 0; l < L; ++l)

@@ -24,16 +24,16 @@ void set_stage(const CompiledModel& m, const Scheme& scheme, int k, const kernel
   if (row.r_before != 0) state_difference(m, w.q_before, w.q0, s.r);
   for (int i = 0; i < m.nv; ++i)
     for (int l = 0; l < L; ++l) {
-      double by_x = row.r_before == 0 ? 0 : row.r_before * s.r[i][l];
-      double by_v = row.s_centre * w.v0[i][l];
-      if (row.s_before != 0) by_v += row.s_before * w.v_before[i][l];
+      double x_sum = row.r_before == 0 ? 0 : row.r_before * s.r[i][l];
+      double v_sum = row.s_centre * w.v0[i][l];
+      if (row.s_before != 0) v_sum += row.s_before * w.v_before[i][l];
       for (int j = 0; j < k; ++j) {
         const InnerWeight& inner = row.inner[std::size_t(j)];
-        by_x += inner.r * w.x_inner[j * m.nv + i][l];
-        by_v += inner.s * (w.v_inner[j * m.nv + i][l] - w.v0[i][l]);
+        x_sum += inner.r * w.x_inner[j * m.nv + i][l];
+        v_sum += inner.s * (w.v_inner[j * m.nv + i][l] - w.v0[i][l]);
       }
-      s.r[i][l] = by_x;
-      s.s[i][l] = by_v / row.s_divisor;
+      s.r[i][l] = x_sum;
+      s.s[i][l] = v_sum / row.s_divisor;
     }
 }
 

@@ -240,16 +240,17 @@ void for_each_touching_sensor(const CompiledModel& m, const kernels::KernelTable
                               BasicWorkspace<L>& w,
                               const AlignedVector<kernels::LinkPose<kernels::Row<L>>>& end,
                               int lane, const F& f) {
-  TouchingSensorPoints& felt = w.shear.felt;
+  TouchingSensorPoints& sensor_points = w.shear.sensor_points;
   for (const kernels::ShearSpringContact& of : m.shear_springs) {
     if (of.sensor < 0 || m.shear_interval(of) > 0) continue;
     const kernels::ShearSpringPoints points =
-        felt.find(m.sensors[std::size_t(of.sensor)], table, touch_of(m, w, of, end, lane));
+        sensor_points.find(m.sensors[std::size_t(of.sensor)], table, touch_of(m, w, of, end, lane));
     if (points.count == 0) continue;
-    shear_of_points(w.shear.now[std::size_t(lane)], of, felt.index(), points.count, points.stride,
-                    points.anchors + 3 * points.stride, w.shear.next[std::size_t(lane)]);
+    shear_of_points(w.shear.now[std::size_t(lane)], of, sensor_points.index(), points.count,
+                    points.stride, points.anchors + 3 * points.stride,
+                    w.shear.next[std::size_t(lane)]);
     table.recall(start_touch_of(m, table, w, of, lane), points);
-    f(of, felt.index(), points);
+    f(of, sensor_points.index(), points);
   }
 }
 

@@ -84,15 +84,16 @@ void advance_pairs(const CompiledModel& m, const kernels::KernelTable& table, Ba
 template <int L>
 void advance_sensor(const CompiledModel& m, const kernels::KernelTable& table, BasicWorkspace<L>& w,
                     const ShearSpringContact& of, int lane, EntryWriter& out) {
-  TouchingSensorPoints& felt = w.shear.felt;
+  TouchingSensorPoints& sensor_points = w.shear.sensor_points;
   const kernels::ShearSpringTouch end = touch_of(m, w, of, w.shear.end_touches, lane);
-  const ShearSpringPoints points = felt.find_near(m.sensors[std::size_t(of.sensor)], table, end);
+  const ShearSpringPoints points =
+      sensor_points.find_near(m.sensors[std::size_t(of.sensor)], table, end);
   if (points.count == 0) return;
   const kernels::ShearSpringTouch start = start_touch_of(m, table, w, of, lane);
   kernels::ShearUpdate update = {&start,
                                  &end,
                                  points,
-                                 felt.index(),
+                                 sensor_points.index(),
                                  entries_from(w.shear, of.first, lane),
                                  out.room(points.count)};
   table.advance_entries(update);
@@ -169,29 +170,29 @@ template <int L>
 void update_shear_state(const CompiledModel& m, const kernels::KernelTable& table,
                         BasicWorkspace<L>& w, LaneBits lanes) {
   if (m.shear_springs.empty() || lanes == 0) return;
-  ShearLanes<L>& of_lanes = w.shear;
+  ShearLanes<L>& shear = w.shear;
   if constexpr (L > 1)
     if (std::popcount(lanes) >= kFewLanes) lists_to_rows(m, table, w, lanes);
   consider(m, w, lanes);
   find_touches(m, table, w, w.q1, w.v1);
   int first_on_ground = 0;
-  of_lanes.grounded.clear();
+  shear.grounded.clear();
   if (m.ground_anchors > 0) {
     first_on_ground = m.shear_springs[std::size_t(ground_contacts(m).first)].first;
-    table.stage<L>().advance_ground(m.view, w.stage, of_lanes.end_touches.data(),
-                                    of_lanes.near.data(), of_lanes.ground.data());
-    find_grounded(m, of_lanes);
+    table.stage<L>().advance_ground(m.view, w.stage, shear.end_touches.data(), shear.near.data(),
+                                    shear.ground.data());
+    find_grounded(m, shear);
   }
   std::array<EntryWriter, L> out;
-  for (int l = 0; l < L; ++l) out[std::size_t(l)] = EntryWriter(of_lanes.after[std::size_t(l)]);
+  for (int l = 0; l < L; ++l) out[std::size_t(l)] = EntryWriter(shear.after[std::size_t(l)]);
   advance_pairs<L>(m, table, w, out);
   for (int l = 0; l < L; ++l) {
     if (!has(lanes, l)) continue;
     EntryWriter& to = out[std::size_t(l)];
-    advance_grounded(of_lanes, first_on_ground, l, to);
-    for (const int k : of_lanes.touching) {
+    advance_grounded(shear, first_on_ground, l, to);
+    for (const int k : shear.touching) {
       const ShearSpringContact& of = m.shear_springs[std::size_t(k)];
-      if (of.sensor >= 0 && has(of_lanes.near[std::size_t(k)], l))
+      if (of.sensor >= 0 && has(shear.near[std::size_t(k)], l))
         advance_sensor(m, table, w, of, l, to);
     }
     to.finish();
@@ -201,7 +202,7 @@ void update_shear_state(const CompiledModel& m, const kernels::KernelTable& tabl
 template <int L>
 void update_sensor_shear_state(const CompiledModel& m, const kernels::KernelTable& table,
                                BasicWorkspace<L>& w, std::span<const ReadingLane> lanes) {
-  ShearLanes<L>& of_lanes = w.shear;
+  ShearLanes<L>& shear = w.shear;
   const auto due = [&](const ShearSpringContact& of) {
     LaneBits bits = 0;
     for (int l = 0; l < L; ++l)
@@ -209,23 +210,23 @@ void update_sensor_shear_state(const CompiledModel& m, const kernels::KernelTabl
     return bits;
   };
   LaneBits any = 0;
-  for (std::size_t k = 0; k < of_lanes.near.size(); ++k)
-    any |= of_lanes.near[k] = due(m.shear_springs[k]);
+  for (std::size_t k = 0; k < shear.near.size(); ++k)
+    any |= shear.near[k] = due(m.shear_springs[k]);
   if (any == 0) return;
   find_touches(m, table, w, w.q0, w.v0);
   for (int l = 0; l < L; ++l) {
     if (!has(any, l)) continue;
     const ReadingLane& lane = lanes[std::size_t(l)];
-    ShearState &now = *lane.shear, &after = of_lanes.after[std::size_t(l)];
+    ShearState &now = *lane.shear, &after = shear.after[std::size_t(l)];
     after.clear();
     for (const ShearSpringContact& of : m.shear_springs) {
       if (m.shear_interval(of) == 0) break;  // those that keep anchors come first
       if (!is_due(m, of, lane.steps)) {
         const auto kept = entries_of(now, m, of);
         after.insert(after.end(), kept.begin(), kept.end());
-      } else if (has(of_lanes.near[std::size_t(&of - m.shear_springs.data())], l)) {
-        advance_anchors(m, table, touch_of(m, w, of, of_lanes.end_touches, l), now, of_lanes.felt,
-                        after);
+      } else if (has(shear.near[std::size_t(&of - m.shear_springs.data())], l)) {
+        advance_anchors(m, table, touch_of(m, w, of, shear.end_touches, l), now,
+                        shear.sensor_points, after);
       }
     }
     after.insert(after.end(), now.begin() + kept_entries(m, now), now.end());

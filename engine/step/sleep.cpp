@@ -36,8 +36,8 @@ constexpr double kFallTimes = 2;
 /// eight different parts that are awake, they are stepped one after the other. With more than a
 /// third each that takes longer than all of the model in all lanes at once.
 constexpr int kFewestPerAwake = 3;
-/// Distance queries search up to kFarLook times the needed distance, in steps of kFiner.
-constexpr double kFarLook = 64, kFiner = 4;
+/// Distance queries search up to kFarSearch times the needed distance, in steps of kFiner.
+constexpr double kFarSearch = 64, kFiner = 4;
 
 /// From the sum of a quaternion's changes to an angle: θ = 4 asin(|Δq|/2) ≤ π/√2 |Δq| up to a half
 /// turn, and more in a step is an error.
@@ -209,7 +209,7 @@ void for_pairs(const CompiledModel& m, const kernels::LinkPair& links, const dou
 /// `reach` where it is not known to be as large as that.
 double Sleep::distance_to_contact(const kernels::LinkPair& links, const double* column,
                                   double reach, const SingleWorkspace& single) const {
-  double way = kFarLook * reach;
+  double way = kFarSearch * reach;
   for_pairs(model_, links, column, single,
             [&](const kernels::PairContact& pair, const Frame<double>& at, const auto& size) {
               kernels::with_touched<double>(

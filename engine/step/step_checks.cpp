@@ -161,11 +161,11 @@ StepChecks::StepChecks(const CompiledModel& model, const StepSettings& settings)
       bounded_energy_(settings.bounded_energy),
       cut_(settings.accuracy > 0),
       tunnelling_(model) {
-  std::vector<double> of_dof(std::size_t(model.nv));  // a link's mass counts at its first dof
-  for (const kernels::Link& link : model.links) of_dof[std::size_t(link.v)] = link.mass;
+  std::vector<double> dof_mass(std::size_t(model.nv));  // a link's mass counts at its first dof
+  for (const kernels::Link& link : model.links) dof_mass[std::size_t(link.v)] = link.mass;
   for (int c = 0; c < model.components(); ++c) {
     double sum = 0;
-    for (const int i : dofs_of_component(model, c)) sum += of_dof[std::size_t(i)];
+    for (const int i : dofs_of_component(model, c)) sum += dof_mass[std::size_t(i)];
     component_mass_.push_back(sum);
   }
 }

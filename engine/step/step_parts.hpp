@@ -25,8 +25,9 @@ class StepParts {
   /// The next part will be shorter. `ratio`: estimated error over what is allowed; infinite where
   /// no root was found. Must not be called when finest().
   void shorten(double ratio) {
-    const double wanted = std::ceil(std::log2(ratio) / kPower);
-    halved_ += std::isfinite(wanted) ? std::clamp(static_cast<int>(wanted), 1, kMostHalvings) : 1;
+    const double requested = std::ceil(std::log2(ratio) / kPower);
+    halved_ +=
+        std::isfinite(requested) ? std::clamp(static_cast<int>(requested), 1, kMostHalvings) : 1;
     halved_ = std::min(halved_, finest_);
   }
   /// Call after an accepted part. Doubles the next length if the estimate predicts acceptance.

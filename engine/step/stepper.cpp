@@ -173,13 +173,14 @@ struct Stepper::Impl {
     const LaneBits live = g.live >> lane;
     NewtonReport report;
     SolveLog log;
-    const int of_block = g.first % kBlock + lane;
-    if (tape != nullptr && tape->next_inner() != nullptr) log.inner = tape->next_inner() + of_block;
+    const int lane_in_block = g.first % kBlock + lane;
+    if (tape != nullptr && tape->next_inner() != nullptr)
+      log.inner = tape->next_inner() + lane_in_block;
     stepped.step.advance(kernels::active_kernels(), w, stepped.alone, live, g.history >> lane,
                          report, tape == nullptr ? nullptr : &log);
     for (int l = 0; l < L; ++l)
       if (std::vector<TapedSolve>& solves = log.special[std::size_t(l)]; !solves.empty())
-        tape->add({tape->steps(), of_block + l, std::move(solves)});
+        tape->add({tape->steps(), lane_in_block + l, std::move(solves)});
     LaneBits again = 0;
     if (sleeping) again = wake_touched(batch, stepped, w, g, lane, live, report);
     LaneBits moved = 0;

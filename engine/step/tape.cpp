@@ -11,7 +11,7 @@
 namespace tangere {
 
 using kernels::kBlock;
-static_assert(sizeof(ShearEntry) == kRememberedBytes);
+static_assert(sizeof(ShearEntry) == kShearEntryBytes);
 
 int BlockTape::rows(const Model& model, Integrator integrator) {
   return model.nq() + model.nv() * (1 + integrator.scheme().inner_stages());

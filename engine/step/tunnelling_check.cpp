@@ -78,15 +78,15 @@ void TunnellingCheck::bound_slab_pairs() {
     for (const Slab& wall : slabs_) {
       LinkPairBound& gate = link_pair_bounds_[wall.link_pair_bound];
       const bool own = wall.link == gate.link;
-      f(own ? gate.of_link : gate.of_other, wall.at.p, std::sqrt(dot(wall.half, wall.half)));
-      f(own ? gate.of_other : gate.of_link, wall.middle, 0.0);
+      f(own ? gate.link_ball : gate.other_ball, wall.at.p, std::sqrt(dot(wall.half, wall.half)));
+      f(own ? gate.other_ball : gate.link_ball, wall.middle, 0.0);
     }
   };
   std::vector<double> count(link_pair_bounds_.size(), 0.0);
   for (const Slab& wall : slabs_) ++count[wall.link_pair_bound];
   for_sides([](Ball& ball, const Vec3<double>& at, double) { ball.centre += at; });
   for (std::size_t k = 0; k < link_pair_bounds_.size(); ++k)
-    for (Ball* ball : {&link_pair_bounds_[k].of_link, &link_pair_bounds_[k].of_other})
+    for (Ball* ball : {&link_pair_bounds_[k].link_ball, &link_pair_bounds_[k].other_ball})
       ball->centre = (1 / count[k]) * ball->centre;
   for_sides([](Ball& ball, const Vec3<double>& at, double radius) {
     const Vec3<double> arm = at - ball.centre;
@@ -105,9 +105,9 @@ void TunnellingCheck::bound_link_pairs() {
     const auto [first, end] =
         std::ranges::equal_range(slabs_, found->second, {}, &Slab::link_pair_bound);
     for (const Slab& wall : std::ranges::subrange(first, end)) {
-      const bool of_shapes = wall.link == links.link2 && wall.other == links.link1;
-      const Vec3<double>& at = of_shapes ? links.shapes_middle : links.points_middle;
-      const Vec3<double>& other = of_shapes ? links.points_middle : links.shapes_middle;
+      const bool link_has_shapes = wall.link == links.link2 && wall.other == links.link1;
+      const Vec3<double>& at = link_has_shapes ? links.shapes_middle : links.points_middle;
+      const Vec3<double>& other = link_has_shapes ? links.points_middle : links.shapes_middle;
       bound.radius_sum =
           std::max(bound.radius_sum,
                    length(wall.at.p - at) + length(wall.middle - other) + length(wall.half));
@@ -144,7 +144,7 @@ bool TunnellingCheck::stay_apart(const LinkPairBound& gate,
   };
   const auto length = [](const Vec3<double>& a) { return std::sqrt(dot(a, a)); };
   const Frame<double> from = other_in_link(before), to = other_in_link(after);
-  const Vec3<double>&a = gate.of_link.centre, &b = gate.of_other.centre;
+  const Vec3<double>&a = gate.link_ball.centre, &b = gate.other_ball.centre;
   double square = 0;
   for (int i = 0; i < 9; ++i) {
     const double turn = to.R.m[i / 3][i % 3] - from.R.m[i / 3][i % 3];
@@ -153,7 +153,7 @@ bool TunnellingCheck::stay_apart(const LinkPairBound& gate,
   const Vec3<double> start = from.R * b + from.p, end = to.R * b + to.p;
   const double own = length(end - start), back = length(transposed_times(to.R, a - to.p) -
                                                         transposed_times(from.R, a - from.p));
-  const double radius = gate.of_link.radius + gate.of_other.radius;
+  const double radius = gate.link_ball.radius + gate.other_ball.radius;
   return length(start - a) > radius + std::max(own, back) + std::sqrt(square) * radius;
 }
 
@@ -268,10 +268,10 @@ Vec3<double> TunnellingCheck::middle_in(const Slab& wall,
     return link < 0 ? Frame<double>{kernels::diagonal(1.0), {0, 0, 0}}
                     : frame_in_lane<L>(poses[std::size_t(link)], lane);
   };
-  const Frame<double> of_slab = pose(wall.link), of_other = pose(wall.other);
+  const Frame<double> slab_pose = pose(wall.link), other_pose = pose(wall.other);
   const Vec3<double> arm =
-      (of_other.R * wall.middle + of_other.p) - (of_slab.R * wall.at.p + of_slab.p);
-  return transposed_times(wall.at.R, transposed_times(of_slab.R, arm));
+      (other_pose.R * wall.middle + other_pose.p) - (slab_pose.R * wall.at.p + slab_pose.p);
+  return transposed_times(wall.at.R, transposed_times(slab_pose.R, arm));
 }
 
 bool TunnellingCheck::came_through(const Slab& wall, const Vec3<double>& half,

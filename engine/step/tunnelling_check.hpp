@@ -83,7 +83,7 @@ class TunnellingCheck {
   struct LinkPairBound {
     int link, other;
     double half;
-    Ball of_link{}, of_other{};
+    Ball link_ball{}, other_ball{};
   };
   void bound_slab_pairs();
   void bound_link_pairs();

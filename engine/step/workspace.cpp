@@ -71,7 +71,7 @@ void BasicWorkspace<L>::make_memory(const CompiledModel& m) {
   shear.grounded.reserve(std::size_t(m.ground_anchors));
   shear.ground_anchors.resize(most_on_ground * kernels::kAnchorNumbers);
   shear.s.resize(4 * most);
-  shear.felt = TouchingSensorPoints(m);
+  shear.sensor_points = TouchingSensorPoints(m);
   shear.start.resize(m.links.size());
   shear.end.resize(m.links.size());
   shear.start_touches.resize(m.shear_springs.size());

@@ -48,7 +48,7 @@ struct ShearLanes {
   AlignedVector<double> ground_anchors;   ///< (kAnchorNumbers, largest stride) of one lane
   AlignedVector<double> s;                ///< (4, largest stride)
   std::array<std::size_t, L> next{};      ///< where shear_of_points() was in `now`
-  TouchingSensorPoints felt;
+  TouchingSensorPoints sensor_points;
 };
 
 template <int L>

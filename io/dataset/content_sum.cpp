@@ -45,14 +45,14 @@ constexpr Factors kFactors = factors_of_words();
 std::uint64_t sum_in_block(const unsigned char* bytes, std::size_t first, std::size_t count) {
   const std::uint32_t* const low = kFactors.low.data() + first;
   const std::uint32_t* const high = kFactors.high.data() + first;
-  std::uint64_t of_low = 0, of_high = 0;
+  std::uint64_t low_sum = 0, high_sum = 0;
   for (std::size_t k = 0; k < count; ++k) {
     std::uint32_t word = 0;
     std::memcpy(&word, bytes + k * kWord, kWord);
-    of_low += std::uint64_t{word} * low[k];
-    of_high += std::uint64_t{word} * high[k];
+    low_sum += std::uint64_t{word} * low[k];
+    high_sum += std::uint64_t{word} * high[k];
   }
-  return of_low + (of_high << 32);
+  return low_sum + (high_sum << 32);
 }
 
 /// The hash of a row up to format_version 5. It hashes four words side by side.

@@ -46,7 +46,7 @@ void describe_task(const h5::Id& scene, const DatasetLayout& layout) {
   h5::write_scalar<double>(scene, "action_high", task.action.high);
   std::vector<std::string> units, meanings;
   for (const EpisodeChannel& channel : layout.channels())
-    if (channel.wanted) units.push_back(channel.unit), meanings.push_back(channel.meaning);
+    if (channel.requested) units.push_back(channel.unit), meanings.push_back(channel.meaning);
   h5::write_attribute(scene, "observation_units", std::span<const std::string>(units));
   h5::write_attribute(scene, "observation_meanings", std::span<const std::string>(meanings));
 }
@@ -139,10 +139,10 @@ void describe_gradients(const h5::Id& scene, const DatasetLayout& layout) {
   for (const GradientArray& array : layout.gradients) {
     const h5::Id group = h5::create_group(all, array.name);
     h5::write_attribute(group, "meaning", array.meaning);
-    h5::write_attribute(group, "rows", array.by_row ? kByRow : "one for the episode");
-    if (array.by_names.empty()) continue;
-    h5::write_attribute(group, "by_names", std::span<const std::string>(array.by_names));
-    h5::write_attribute(group, "by_units", std::span<const std::string>(array.by_units));
+    h5::write_attribute(group, "rows", array.per_row ? kByRow : "one for the episode");
+    if (array.wrt_names.empty()) continue;
+    h5::write_attribute(group, "by_names", std::span<const std::string>(array.wrt_names));
+    h5::write_attribute(group, "by_units", std::span<const std::string>(array.wrt_units));
   }
 }
 
@@ -156,13 +156,13 @@ void add_attributes(const h5::Id& object, const std::string& prefix,
 std::string line_of_difference(const std::string& there, const std::string& here) {
   std::istringstream a(there), b(here);
   for (int line = 1;; ++line) {
-    std::string of_a, of_b;
-    const bool more_a = static_cast<bool>(std::getline(a, of_a)),
-               more_b = static_cast<bool>(std::getline(b, of_b));
+    std::string line_a, line_b;
+    const bool more_a = static_cast<bool>(std::getline(a, line_a)),
+               more_b = static_cast<bool>(std::getline(b, line_b));
     if (!more_a && !more_b) return "they differ in how they end";
-    if (more_a == more_b && of_a == of_b) continue;
-    return fmt::format("line {} is '{}' there, '{}' here", line, of_a.substr(0, kLongText),
-                       of_b.substr(0, kLongText));
+    if (more_a == more_b && line_a == line_b) continue;
+    return fmt::format("line {} is '{}' there, '{}' here", line, line_a.substr(0, kLongText),
+                       line_b.substr(0, kLongText));
   }
 }
 
@@ -197,7 +197,7 @@ constexpr const char *kTaken = "simulation_steps", *kTunnelled = "tunnelled_step
                      *kOverlapping = "overlapping_steps";
 
 /// A count that a file may claim: sums over as many shards as there may be do not overflow.
-std::int64_t step_count_said(const h5::Id& file, const char* name, std::int64_t most) {
+std::int64_t stored_step_count(const h5::Id& file, const char* name, std::int64_t most) {
   const auto value = h5::read_number<std::int64_t>(file, name);
   if (value < 0 || value > most)
     throw IoError(
@@ -273,14 +273,15 @@ std::vector<std::string> differences(const std::vector<Setting>& there,
   return lines;
 }
 
-std::vector<std::string> touch_said(const h5::Id& scene) {
+std::vector<std::string> stored_touch(const h5::Id& scene) {
   const std::string text = h5::read_text(scene, "touch");
   if (const std::optional<std::vector<std::string>> names = names_in(text)) return *names;
   throw IoError(fmt::format("'touch' of /scene is {}; expected a JSON list of names", text));
 }
 
-std::vector<SampleSaid> samples_said(const h5::Id& scene, std::int64_t every, std::int64_t rows) {
-  std::vector<SampleSaid> list;
+std::vector<StoredSample> stored_samples(const h5::Id& scene, std::int64_t every,
+                                         std::int64_t rows) {
+  std::vector<StoredSample> list;
   if (H5Aexists(scene.get(), "samples") <= 0) return list;
   const std::vector<std::string> names = h5::read_texts(scene, "samples");
   const std::vector<std::int64_t> steps = h5::read_numbers<std::int64_t>(scene, "sample_every");
@@ -297,8 +298,8 @@ std::vector<SampleSaid> samples_said(const h5::Id& scene, std::int64_t every, st
   return list;
 }
 
-std::vector<GradientSaid> gradients_said(const h5::Id& scene) {
-  std::vector<GradientSaid> list;
+std::vector<StoredGradient> stored_gradients(const h5::Id& scene) {
+  std::vector<StoredGradient> list;
   if (!h5::has_link(scene, kGradients)) return list;
   const h5::Id all = h5::open_group(scene, kGradients);
   for (const std::string& name : h5::link_names(all)) {
@@ -314,16 +315,16 @@ void write_steps(const h5::Id& file, const EpisodeSteps& steps) {
   h5::write_scalar<std::int64_t>(file, kOverlapping, steps.overlapping);
 }
 
-std::optional<EpisodeSteps> steps_said(const h5::Id& file) {
+std::optional<EpisodeSteps> stored_steps(const h5::Id& file) {
   if (H5Aexists(file.get(), kTaken) <= 0) return {};
   EpisodeSteps steps;
   steps.taken =
-      step_count_said(file, kTaken, std::numeric_limits<std::int64_t>::max() / kMostShards);
+      stored_step_count(file, kTaken, std::numeric_limits<std::int64_t>::max() / kMostShards);
   // Shards of earlier programs have another name for it.
   const char* const tunnelled =
       H5Aexists(file.get(), "passed_steps") > 0 ? "passed_steps" : kTunnelled;
-  steps.tunnelled = step_count_said(file, tunnelled, steps.taken);
-  steps.overlapping = step_count_said(file, kOverlapping, steps.taken - steps.tunnelled);
+  steps.tunnelled = stored_step_count(file, tunnelled, steps.taken);
+  steps.overlapping = stored_step_count(file, kOverlapping, steps.taken - steps.tunnelled);
   return steps;
 }
 

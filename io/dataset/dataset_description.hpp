@@ -37,32 +37,33 @@ std::vector<std::string> differences(const std::vector<Setting>& there,
                                      const std::vector<Setting>& here);
 
 /// How a file describes a derivative that each of its demos has.
-struct GradientSaid {
+struct StoredGradient {
   std::string name, meaning;
-  bool by_row = false;  ///< a row for each action
+  bool per_row = false;  ///< a row for each action
 };
 /// Returns the descriptions by name; most files have none.
-std::vector<GradientSaid> gradients_said(const h5::Id& scene);
+std::vector<StoredGradient> stored_gradients(const h5::Id& scene);
 
 /// How a file describes an observation that is not stored at every row.
-struct SampleSaid {
+struct StoredSample {
   std::string name;
   OutputTimes times;      ///< in rows
   std::int64_t rows = 0;  ///< of an episode
 };
 /// Returns them in the order of the file; most have none. `every`: steps of a row; `rows`: R.
 /// Throws IoError for times that contradict them.
-std::vector<SampleSaid> samples_said(const h5::Id& scene, std::int64_t every, std::int64_t rows);
+std::vector<StoredSample> stored_samples(const h5::Id& scene, std::int64_t every,
+                                         std::int64_t rows);
 
 /// Returns the stored observations that are touch. Throws IoError if /scene has no such list.
-std::vector<std::string> touch_said(const h5::Id& scene);
+std::vector<std::string> stored_touch(const h5::Id& scene);
 
 /// Writes the sums over the episodes of one file as attributes of the root: "simulation_steps",
 /// "tunnelled_steps", "overlapping_steps".
 void write_steps(const h5::Id& file, const EpisodeSteps& steps);
 /// Reads them; none: an older version wrote the file. Throws IoError for counts that contradict
 /// each other.
-std::optional<EpisodeSteps> steps_said(const h5::Id& file);
+std::optional<EpisodeSteps> stored_steps(const h5::Id& file);
 /// Adds those of another file. None if one of the two has none.
 void add_steps(std::optional<EpisodeSteps>& sum, const std::optional<EpisodeSteps>& more);
 

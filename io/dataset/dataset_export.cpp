@@ -95,7 +95,7 @@ class CsvExport {
         for (std::size_t k = 0; k < width; ++k) line += fmt::format(",{}/{}", name, k);
       }
     }
-    for (const SampleSaid& sample : samples_said(scene, 1, 1))
+    for (const StoredSample& sample : stored_samples(scene, 1, 1))
       result_.left_out.push_back(sample.name);
     result_.columns = std::count(line.begin(), line.end(), ',') + 1;
     part_.write(line + "\n");

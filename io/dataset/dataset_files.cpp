@@ -128,7 +128,7 @@ void summarise_file(const std::string& path, DatasetSummary& summary) {
   }
   summary.failed +=
       static_cast<std::int64_t>(h5::link_names(h5::open_group(file, "failed")).size());
-  add_steps(summary.steps, steps_said(file));
+  add_steps(summary.steps, stored_steps(file));
   summary.bytes += fs::file_size(path);
 }
 

@@ -93,7 +93,7 @@ std::vector<std::string> DatasetLayout::action_names() const {
 std::vector<std::string> DatasetLayout::observation_names() const {
   std::vector<std::string> names;
   for (const EpisodeChannel& channel : channels())
-    if (channel.wanted && !channel.times.given()) names.push_back(channel.name);
+    if (channel.requested && !channel.times.given()) names.push_back(channel.name);
   return names;
 }
 
@@ -101,7 +101,7 @@ std::vector<std::size_t> DatasetLayout::recorded() const {
   const std::vector<EpisodeChannel> all = channels();
   std::vector<std::size_t> places;
   for (std::size_t k = 0; k < all.size(); ++k)
-    if (all[k].wanted && !all[k].times.given()) places.push_back(k);
+    if (all[k].requested && !all[k].times.given()) places.push_back(k);
   return places;
 }
 
@@ -109,7 +109,7 @@ std::vector<DatasetSample> DatasetLayout::samples() const {
   const std::vector<EpisodeChannel> all = channels();
   std::vector<DatasetSample> list;
   for (std::size_t k = 0; k < all.size(); ++k)
-    if (all[k].wanted && all[k].times.given())
+    if (all[k].requested && all[k].times.given())
       list.push_back(
           {all[k].name, all[k].shape, k, all[k].times, all[k].times.before(rows() + 1, rows())});
   return list;
@@ -119,7 +119,7 @@ std::vector<std::size_t> DatasetLayout::touch() const {
   std::vector<std::size_t> places;
   std::size_t stored = 0;
   for (const EpisodeChannel& channel : channels()) {
-    if (!channel.wanted || channel.times.given()) continue;
+    if (!channel.requested || channel.times.given()) continue;
     if (channel.touch) places.push_back(stored);
     ++stored;
   }
@@ -129,7 +129,7 @@ std::vector<std::size_t> DatasetLayout::touch() const {
 std::vector<std::vector<std::uint64_t>> DatasetLayout::observation_shapes() const {
   std::vector<std::vector<std::uint64_t>> shapes;
   for (const EpisodeChannel& channel : channels())
-    if (channel.wanted && !channel.times.given()) shapes.push_back(channel.shape);
+    if (channel.requested && !channel.times.given()) shapes.push_back(channel.shape);
   return shapes;
 }
 
@@ -138,19 +138,19 @@ double DatasetLayout::episode_bytes() const {
     return static_cast<double>(
         std::accumulate(shape.begin(), shape.end(), std::uint64_t{1}, std::multiplies<>()));
   };
-  double numbers = 0, of_samples = 0;
+  double numbers = 0, sample_numbers = 0;
   for (const std::vector<std::uint64_t>& shape : observation_shapes()) numbers += size_of(shape);
   for (const DatasetSample& sample : samples())
-    of_samples += static_cast<double>(sample.rows) * size_of(sample.shape);
+    sample_numbers += static_cast<double>(sample.rows) * size_of(sample.shape);
   const double r = static_cast<double>(rows());
-  const double of_actions = static_cast<double>(action_names().size()) * sizeof(float);
+  const double action_bytes = static_cast<double>(action_names().size()) * sizeof(float);
   constexpr double kRewardAndDone = sizeof(float) + 1;
-  double of_gradients = 0;
+  double gradient_bytes = 0;
   for (const GradientArray& array : gradients)
-    of_gradients += sizeof(double) * static_cast<double>(array.width()) * (array.by_row ? r : 1);
+    gradient_bytes += sizeof(double) * static_cast<double>(array.width()) * (array.per_row ? r : 1);
   const auto width = static_cast<double>(single ? sizeof(float) : sizeof(double));
-  return ((r + 1) * numbers + of_samples) * width + r * (of_actions + kRewardAndDone) +
-         of_gradients;
+  return ((r + 1) * numbers + sample_numbers) * width + r * (action_bytes + kRewardAndDone) +
+         gradient_bytes;
 }
 
 std::int64_t DatasetLayout::episodes_per_shard() const {

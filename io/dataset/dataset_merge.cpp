@@ -137,7 +137,7 @@ class Merger {
     put(data, name, batch);
     for (const std::string& episode : h5::link_names(failed)) failed_.push_back({name, episode});
     rows_ += h5::read_number<std::int64_t>(data, "total");
-    add_steps(steps_, steps_said(from));
+    add_steps(steps_, stored_steps(from));
     sum_ += h5::read_number<std::uint64_t>(from, "content_sum");  // modulo 2⁶⁴, as within a shard
   }
 
@@ -242,7 +242,7 @@ class Merger {
     };
     result_.train = write("train", [](const MaskedDemo& demo) { return !demo.valid; });
     result_.valid = write("valid", [](const MaskedDemo& demo) { return demo.valid; });
-    if (!touch_said(h5::open_group(file_.file(), "scene")).empty())
+    if (!stored_touch(h5::open_group(file_.file(), "scene")).empty())
       result_.touching =
           write_parts("touching", [](const MaskedDemo& demo) { return demo.touches; });
     if (policies_.empty()) return;

@@ -56,7 +56,7 @@ struct DatasetWriter::Impl {
     // This comes before shards are counted one by one, because a typing mistake may ask for
     // billions.
     if (makes_all()) check_space(static_cast<double>(layout.episodes));
-    for (const std::int64_t shard : to_make()) look_at(shard);
+    for (const std::int64_t shard : to_make()) inspect_shard(shard);
     double episodes = 0;
     for (const EpisodeRange& range : missing)
       episodes += static_cast<double>(range.end - range.first);
@@ -91,7 +91,7 @@ struct DatasetWriter::Impl {
   }
 
   /// An existing shard is complete, because only complete ones get the name.
-  void look_at(std::int64_t shard) {
+  void inspect_shard(std::int64_t shard) {
     const EpisodeRange range = layout.shard_episodes(shard);
     const std::string path = folder.shard_path(shard);
     if (output.existing == ExistingShards::replace || !std::filesystem::exists(path)) {
@@ -111,7 +111,7 @@ struct DatasetWriter::Impl {
     if (there.first != range.first || there.end != range.end)
       throw InputError(fmt::format("'{}' holds episodes {} to {}; expected {} to {}", path,
                                    there.first, there.end - 1, range.first, range.end - 1));
-    const std::optional<EpisodeSteps> steps = steps_said(file);
+    const std::optional<EpisodeSteps> steps = stored_steps(file);
     if (!steps)
       throw InputError(fmt::format(
           "'{}' does not store in how many steps contacts missed bodies, as older versions did "
@@ -136,7 +136,7 @@ struct DatasetWriter::Impl {
 
   /// Describes the first shard that does not belong to this data set; empty if there is none. Other
   /// processes may be about to replace it.
-  [[nodiscard]] std::string of_another_run() const {
+  [[nodiscard]] std::string foreign_shard() const {
     const std::vector<Setting> here = settings_of(layout);
     std::vector<std::string> files = folder.shards();
     for (const std::string& file : files) {
@@ -153,10 +153,10 @@ struct DatasetWriter::Impl {
 
   void check_space(double episodes) const {
     // The size of chunks is not known in advance, and neither is the length of a task's episode.
-    const double of_episode =
+    const double episode_bytes =
         has_chunks(layout) ? static_cast<double>(format.data_bytes(layout.task ? 1 : layout.rows()))
                            : layout.episode_bytes();
-    const double needed = of_episode * episodes, available = folder.free_bytes();
+    const double needed = episode_bytes * episodes, available = folder.free_bytes();
     if (needed > available)
       throw IoError(fmt::format("{}: needs at least {:.0f} bytes and the disk has {:.0f} free",
                                 output.folder, needed, available));
@@ -226,7 +226,7 @@ bool DatasetWriter::complete() {
     return false;
   }
   if (impl_->all_there()) {
-    impl_->obstacle = impl_->of_another_run();
+    impl_->obstacle = impl_->foreign_shard();
     if (impl_->obstacle.empty()) return true;
   }
   impl_->folder.let_go();

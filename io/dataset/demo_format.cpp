@@ -40,7 +40,7 @@ DemoAttributes::DemoAttributes(const DemoFacts& facts) : samples_(bytes_of_numbe
 }
 
 DemoFormat::DemoFormat(const DatasetLayout& layout)
-    : of_task_(layout.task.has_value()),
+    : is_task_(layout.task.has_value()),
       single_(layout.single),
       randomized_(layout.randomized_names.size()),
       names_(layout.observation_names()),
@@ -68,7 +68,8 @@ DemoFormat::DemoFormat(const DatasetLayout& layout)
   for (const GradientArray& array : gradients_) {
     const auto from =
         array.shape.begin() +
-        (array.by_row ? 0 : 1);  // one per episode: the array's own first dimension counts its rows
+        (array.per_row ? 0
+                       : 1);  // one per episode: the array's own first dimension counts its rows
     shapes_.emplace_back(from, array.shape.end());
     types_.push_back(NumberType::float64);
     titles_.push_back(array.name);
@@ -83,12 +84,12 @@ DemoFormat::DemoFormat(const DatasetLayout& layout)
     row_bytes_.push_back(std::accumulate(shapes_[k].begin(), shapes_[k].end(),
                                          h5::bytes_of(types_[k]), std::multiplies<>()));
   filters_ = file_filters(layout.compression, h5::bytes_of(number));
-  h5::Bytes of_one;
+  h5::Bytes header;
   DemoFacts facts{1, std::nullopt, std::vector<double>(randomized_), std::nullopt};
-  if (of_task_) facts.end.emplace();
+  if (is_task_) facts.end.emplace();
   if (!touch_.empty()) facts.touching = 0;
-  static_cast<void>(describe(of_one, 0, facts, std::vector<std::uint64_t>(datasets()), 0));
-  header_bytes_ = of_one.size();
+  static_cast<void>(describe(header, 0, facts, std::vector<std::uint64_t>(datasets()), 0));
+  header_bytes_ = header.size();
 }
 
 std::int64_t DemoFormat::rows_of(std::size_t dataset, std::int64_t rows) const {
@@ -96,7 +97,7 @@ std::int64_t DemoFormat::rows_of(std::size_t dataset, std::int64_t rows) const {
   if (dataset < gradient(0)) return 1;
   if (dataset >= sample(0)) return samples_[dataset - sample(0)].rows;
   const GradientArray& array = gradients_[dataset - gradient(0)];
-  return array.by_row ? rows : static_cast<std::int64_t>(array.shape.at(0));
+  return array.per_row ? rows : static_cast<std::int64_t>(array.shape.at(0));
 }
 
 std::int64_t DemoFormat::chunk_rows(std::size_t dataset, std::int64_t rows) const {

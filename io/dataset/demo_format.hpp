@@ -107,7 +107,7 @@ class DemoFormat {
   void describe_dataset(h5::Bytes& out, std::size_t dataset, std::int64_t rows,
                         std::uint64_t address, std::span<const h5::FileText> texts = {}) const;
 
-  bool of_task_, single_;
+  bool is_task_, single_;
   std::size_t randomized_;
   std::vector<std::string> names_, titles_;  // of observations; of datasets
   std::vector<std::size_t> touch_, sources_, gradient_sources_;

@@ -136,12 +136,12 @@ DemoMembers members_of(const h5::Id& demo) {
                                    h5::dimensions(h5::open_dataset(samples, name)).at(0));
   }
   members.actions = array_of(demo, "actions");
-  const std::vector<std::string> said = h5::attribute_names(demo);
-  members.of_task = std::binary_search(said.begin(), said.end(), "terminated");
-  if (members.of_task)
+  const std::vector<std::string> names = h5::attribute_names(demo);
+  members.is_task = std::binary_search(names.begin(), names.end(), "terminated");
+  if (members.is_task)
     members.policies = std::ssize(h5::read_texts(h5::open_group(demo, "/scene"), "policies"));
-  members.varies = std::binary_search(said.begin(), said.end(), "randomized");
-  members.feels = !touch_said(h5::open_group(demo, "/scene")).empty();
+  members.varies = std::binary_search(names.begin(), names.end(), "randomized");
+  members.has_touch = !stored_touch(h5::open_group(demo, "/scene")).empty();
   return members;
 }
 
@@ -153,7 +153,7 @@ DemoFacts facts_of(const h5::Id& demo, const DemoMembers& members) {
   facts.rows = h5::read_number<std::int64_t>(demo, "num_samples");
   if (facts.rows < 1 || facts.rows > kMostRows)
     throw IoError(fmt::format("a demo has {} rows; expected 1 to {}", facts.rows, kMostRows));
-  if (members.of_task) {
+  if (members.is_task) {
     const double total = h5::read_number<double>(demo, "return");
     const auto policy = h5::read_number<std::int64_t>(demo, "policy");
     if (policy < 0 || policy >= members.policies)
@@ -163,10 +163,11 @@ DemoFacts facts_of(const h5::Id& demo, const DemoMembers& members) {
                            static_cast<int>(policy)};
   }
   if (members.varies) facts.randomized = h5::read_numbers<double>(demo, "randomized");
-  if (members.feels) facts.touching = h5::read_number<std::int64_t>(demo, "touching");
-  if (const std::int64_t felt = facts.touching.value_or(0); felt < 0 || felt > facts.rows)
+  if (members.has_touch) facts.touching = h5::read_number<std::int64_t>(demo, "touching");
+  if (const std::int64_t touching = facts.touching.value_or(0);
+      touching < 0 || touching > facts.rows)
     throw IoError(
-        fmt::format("something is felt in {} of its rows; expected 0 to {}", felt, facts.rows));
+        fmt::format("something is felt in {} of its rows; expected 0 to {}", touching, facts.rows));
   return facts;
 }
 

@@ -30,8 +30,8 @@ struct DemoMembers {
   std::vector<std::pair<DemoArray, std::uint64_t>> samples;  ///< below samples, with their rows
   DemoArray actions;
   std::vector<std::string> besides;  ///< grad_…, the loss and samples, among `names`
-  bool of_task = false, varies = false, feels = false;  ///< feels: touch is stored
-  std::int64_t policies = 0;                            ///< that played, for a task
+  bool is_task = false, varies = false, has_touch = false;  ///< feels: touch is stored
+  std::int64_t policies = 0;                                ///< that played, for a task
 };
 
 /// Reads the members of a demo. Throws IoError.

@@ -91,7 +91,7 @@ MinariView::MinariView(const std::string& folder, const h5::Id& shard, const Dem
   for (auto parts = std::count(id_.begin(), id_.end(), '/') + 3; parts > 0; --parts)
     to_folder_ += "../";
   seed_ = h5::read_number<std::uint64_t>(scene, "seed");
-  if (members.of_task) {
+  if (members.is_task) {
     task_ = h5::read_text(scene, "task");
     if (H5Aexists(scene.get(), "python_class") > 0)
       python_class_ = h5::read_text(scene, "python_class");
@@ -100,7 +100,7 @@ MinariView::MinariView(const std::string& folder, const h5::Id& shard, const Dem
     low_ = bound(h5::read_number<double>(scene, "action_low"));
     high_ = bound(h5::read_number<double>(scene, "action_high"));
   }
-  if (members.of_task) hide_states();
+  if (members.is_task) hide_states();
   folder_ = (fs::path(folder) / "minari" / id_ / "data").string();
   std::error_code error;
   // A link on the way would lead the view, and what --overwrite removes, elsewhere.

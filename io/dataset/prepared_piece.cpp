@@ -187,12 +187,12 @@ class Cutter {
 };
 
 /// Marks rows of an observation in which not all numbers are 0.
-void mark_felt(const DemoFormat& format, const PieceSlice& slice, std::vector<char>& felt) {
-  for (std::size_t row = 0; row < felt.size(); ++row)
-    if (felt[row] == 0 &&
+void mark_touching(const DemoFormat& format, const PieceSlice& slice, std::vector<char>& touching) {
+  for (std::size_t row = 0; row < touching.size(); ++row)
+    if (touching[row] == 0 &&
         any_of_type(format.single(),
                     slice.bytes().subspan(row * slice.rows.row_bytes, slice.rows.row_bytes)))
-      felt[row] = 1;
+      touching[row] = 1;
 }
 
 }  // namespace
@@ -236,13 +236,13 @@ PreparedPiece prepare_piece(const DatasetLayout& layout, const DemoFormat& forma
   for (int e = 0; e < piece.episodes; ++e) {
     const std::int64_t rows = rows_of_episode(layout, piece, e);
     const std::vector<PieceSlice> slices = slices_of(format, piece, e, rows);
-    std::vector<char> felt;
+    std::vector<char> touching;
     for (std::size_t dataset = 0; dataset < slices.size(); ++dataset) {
       const PieceSlice& slice = slices[dataset];
       const PlacedRows& r = slice.rows;
       if (r.rows == 0) continue;
       const bool touch = format.is_touch(dataset);
-      if (touch) felt.resize(as_size(r.rows), 0);
+      if (touch) touching.resize(as_size(r.rows), 0);
       const std::int64_t each = format.chunk_rows(dataset, rows);
       if (each > 0 && slice.first % each != 0)
         throw std::logic_error("a piece begins within a chunk");
@@ -251,16 +251,16 @@ PreparedPiece prepare_piece(const DatasetLayout& layout, const DemoFormat& forma
         for (std::size_t k = 0; k < content.size(); ++k) {
           prepared.sums[as_size(e)].add(r.episode, r.name, r.first_row + std::int64_t(k),
                                         r.row_bytes, content[k].sum);
-          if (touch && content[k].any) felt[k] = 1;
+          if (touch && content[k].any) touching[k] = 1;
         }
         continue;
       }
       prepared.sums[as_size(e)].add(r.episode, r.name, r.first_row, r.rows, r.row_bytes,
                                     slice.data);
-      if (touch) mark_felt(format, slice, felt);
+      if (touch) mark_touching(format, slice, touching);
       if (each > 0) cutter.cut_rows(e, dataset, slice, each);
     }
-    prepared.touching.push_back(std::count(felt.begin(), felt.end(), 1));
+    prepared.touching.push_back(std::count(touching.begin(), touching.end(), 1));
   }
   return prepared;
 }

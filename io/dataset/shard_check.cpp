@@ -21,8 +21,8 @@ namespace {
 
 constexpr std::size_t kReadBytes = std::size_t{4} << 20;
 
-constexpr std::int64_t kMostLooks = 1'000'000;  // for episodes that a damaged file only claims
-constexpr std::size_t kMostProblems = 100;      // of a shard; more lines would not help
+constexpr std::int64_t kMostLookups = 1'000'000;  // for episodes that a damaged file only claims
+constexpr std::size_t kMostProblems = 100;        // of a shard; more lines would not help
 
 class ShardChecker {
  public:
@@ -45,7 +45,7 @@ class ShardChecker {
     const h5::Id data = h5::open_group(file_, "data"), failed = h5::open_group(file_, "failed");
     check_attributes(file_);
     check_attributes(data);
-    if (end_ - content_.first_episode > kMostLooks && !count_episodes(data, failed))
+    if (end_ - content_.first_episode > kMostLookups && !count_episodes(data, failed))
       return {content_, problems_};
     for (std::int64_t episode = content_.first_episode; episode < end_; ++episode)
       add_episode(data, failed, episode);
@@ -87,9 +87,9 @@ class ShardChecker {
   void read_description() {
     content_.first_episode = within(file_, "first_episode", 0);
     end_ = content_.first_episode + within(file_, "episodes", 0);
-    content_.steps = steps_said(file_);
+    content_.steps = stored_steps(file_);
     names_ = h5::read_texts(scene_, "observations");
-    touch_ = touch_said(scene_);
+    touch_ = stored_touch(scene_);
     for (const std::string& name : touch_)
       if (std::count(touch_.begin(), touch_.end(), name) > 1 ||
           std::find(names_.begin(), names_.end(), name) == names_.end())
@@ -101,10 +101,10 @@ class ShardChecker {
       throw IoError(fmt::format("its episodes have {} steps and a row every {}; expected a row",
                                 steps, every));
     rows_ = steps / every;
-    of_task_ = !h5::read_text(scene_, "task").starts_with("none");
-    if (of_task_) policies_ = std::ssize(h5::read_texts(scene_, "policies"));
-    gradients_ = gradients_said(scene_);
-    samples_ = samples_said(scene_, every, rows_);
+    is_task_ = !h5::read_text(scene_, "task").starts_with("none");
+    if (is_task_) policies_ = std::ssize(h5::read_texts(scene_, "policies"));
+    gradients_ = stored_gradients(scene_);
+    samples_ = stored_samples(scene_, every, rows_);
   }
   /// Reads every attribute, also those that nothing else here needs.
   static void check_attributes(const h5::Id& object) {
@@ -171,16 +171,16 @@ class ShardChecker {
 
   void add_demo(const h5::Id& demo, std::int64_t episode) {
     const std::int64_t rows = number(demo, "num_samples");
-    if (of_task_ ? rows < 1 || rows > rows_ : rows != rows_)
+    if (is_task_ ? rows < 1 || rows > rows_ : rows != rows_)
       return fail(fmt::format("demo_{} has {} rows, expected {}{}", episode, rows,
-                              of_task_ ? "1 to " : "", rows_));
-    if (const std::int64_t by = of_task_ ? number(demo, "policy") : 0;
-        of_task_ && (by < 0 || by >= policies_))
+                              is_task_ ? "1 to " : "", rows_));
+    if (const std::int64_t by = is_task_ ? number(demo, "policy") : 0;
+        is_task_ && (by < 0 || by >= policies_))
       fail(fmt::format("demo_{}: its policy is {}; expected 0 to {}, one of 'policies' in /scene",
                        episode, by, policies_ - 1));
     // These values need no checksum: without a task every reward is 0, and only the last row ends
     // the episode.
-    if (of_task_) {
+    if (is_task_) {
       add<float>(demo, "rewards", episode, names_.size() + 1, 0, rows);
     } else {
       check_list<float>(demo, "rewards", episode, rows, 0);
@@ -188,7 +188,7 @@ class ShardChecker {
     check_list<std::int8_t>(demo, "dones", episode, rows, 1);
     add<float>(demo, "actions", episode, 0, 0, rows);
     const h5::Id obs = h5::open_group(demo, "obs"), final_obs = h5::open_group(demo, "final_obs");
-    felt_.assign(touch_.empty() ? 0 : static_cast<std::size_t>(rows), 0);
+    touching_.assign(touch_.empty() ? 0 : static_cast<std::size_t>(rows), 0);
     for (std::size_t k = 0; k < names_.size(); ++k) {
       const bool touch = std::find(touch_.begin(), touch_.end(), names_[k]) != touch_.end();
       if (single_) {
@@ -200,7 +200,7 @@ class ShardChecker {
       }
     }
     if (!touch_.empty())
-      check_felt(demo, episode);
+      check_touching(demo, episode);
     else if (H5Aexists(demo.get(), "touching") > 0)
       fail(fmt::format("demo_{}: 'touching' is there; /scene names no touch", episode));
     for (std::size_t k = 0; k < gradients_.size(); ++k)
@@ -216,33 +216,33 @@ class ShardChecker {
     ++content_.demos;
   }
 
-  void check_felt(const h5::Id& demo, std::int64_t episode) {
-    const std::int64_t said = number(demo, "touching"),
-                       there = std::count(felt_.begin(), felt_.end(), 1);
-    if (said != there)
+  void check_touching(const h5::Id& demo, std::int64_t episode) {
+    const std::int64_t stored = number(demo, "touching"),
+                       there = std::count(touching_.begin(), touching_.end(), 1);
+    if (stored != there)
       fail(fmt::format("demo_{}: 'touching' is {}; something is felt in {} of its rows", episode,
-                       said, there));
+                       stored, there));
   }
 
-  void add_sample(const h5::Id& samples, const SampleSaid& said, std::int64_t episode,
+  void add_sample(const h5::Id& samples, const StoredSample& stored, std::int64_t episode,
                   std::size_t index) {
     if (single_)
-      add<float>(samples, said.name, episode, index, 0, said.rows);
+      add<float>(samples, stored.name, episode, index, 0, stored.rows);
     else
-      add<double>(samples, said.name, episode, index, 0, said.rows);
+      add<double>(samples, stored.name, episode, index, 0, stored.rows);
   }
 
-  void add_gradient(const h5::Id& demo, const GradientSaid& said, std::int64_t episode,
+  void add_gradient(const h5::Id& demo, const StoredGradient& stored, std::int64_t episode,
                     std::size_t index, std::int64_t rows) {
-    const h5::Id dataset = h5::open_dataset(demo, said.name);
-    if (h5::read_text(dataset, "meaning") != said.meaning)
+    const h5::Id dataset = h5::open_dataset(demo, stored.name);
+    if (h5::read_text(dataset, "meaning") != stored.meaning)
       fail(fmt::format("demo_{}: the meaning of {} differs from that in /scene", episode,
-                       said.name));
+                       stored.name));
     const h5::Dims dims = h5::dimensions(dataset);
     if (dims.empty())
-      return fail(fmt::format("demo_{}: {} is one number; expected a list", episode, said.name));
-    add<double>(demo, said.name, episode, index, 0,
-                said.by_row ? rows : static_cast<std::int64_t>(dims[0]));
+      return fail(fmt::format("demo_{}: {} is one number; expected a list", episode, stored.name));
+    add<double>(demo, stored.name, episode, index, 0,
+                stored.per_row ? rows : static_cast<std::int64_t>(dims[0]));
   }
 
   /// A list of zeros whose last number is `last`.
@@ -343,7 +343,7 @@ class ShardChecker {
       check_finite(buffer, full, first + row, width);
       for (std::size_t i = 0; touch && i < count[0]; ++i)
         if (any_number(std::span<const T>(buffer).subspan(i * width, width)))
-          felt_[static_cast<std::size_t>(row) + i] = 1;
+          touching_[static_cast<std::size_t>(row) + i] = 1;
       if (summed_)
         sum_.add(episode, index, first + row, static_cast<std::int64_t>(count[0]),
                  width * sizeof(T), buffer.data());
@@ -354,10 +354,10 @@ class ShardChecker {
   std::vector<std::string> problems_, not_finite_;
   h5::Id file_, scene_;
   std::vector<std::string> names_, touch_;  // of observations; of those that are touch
-  std::vector<char> felt_;                  // per row of the demo at hand
-  std::vector<GradientSaid> gradients_;
-  std::vector<SampleSaid> samples_;
-  bool single_ = false, of_task_ = false;
+  std::vector<char> touching_;              // per row of the demo at hand
+  std::vector<StoredGradient> gradients_;
+  std::vector<StoredSample> samples_;
+  bool single_ = false, is_task_ = false;
   std::int64_t rows_ = 0, end_ = 0, policies_ = 0;
   std::tuple<std::vector<float>, std::vector<double>> buffers_;
   ContentSum sum_;

@@ -85,9 +85,9 @@ ShardFile::Block& ShardFile::block_of(const EpisodeRows& rows) {
 /// Demos of a scene have one size, so the place of a block follows from its number. Blocks of a
 /// task come in ascending order.
 void ShardFile::give_place(Block& block, std::int64_t first_episode) {
-  const std::uint64_t of_demo = format_.header_bytes() + format_.data_bytes(layout_.rows());
+  const std::uint64_t demo_bytes = format_.header_bytes() + format_.data_bytes(layout_.rows());
   const auto before = static_cast<std::uint64_t>(first_episode - first_episode_);
-  block.base = layout_.task ? free_ : begin_ + before * of_demo;
+  block.base = layout_.task ? free_ : begin_ + before * demo_bytes;
   std::uint64_t at = block.base + block.demos.size() * format_.header_bytes();
   for (Demo& demo : block.demos)
     for (std::size_t k = 0; k < format_.datasets(); ++k) {

@@ -168,8 +168,8 @@ bool WrittenBytes::is_of(std::uint64_t device, std::uint64_t number) const {
   return fstat(descriptor_, &info) == 0 && info.st_dev == device && info.st_ino == number;
 }
 
-void WrittenBytes::tell_difference(std::uint64_t begin, std::uint64_t end, const std::string& name,
-                                   std::int64_t number) const {
+void WrittenBytes::throw_difference(std::uint64_t begin, std::uint64_t end, const std::string& name,
+                                    std::int64_t number) const {
   throw IoError(fmt::format(
       "'{}' is damaged: bytes {} to {} ({}) are not what was written when they are read back",
       path_, begin, end - 1, number < 0 ? name : fmt::format("{}{}", name, number)));
@@ -182,7 +182,7 @@ void WrittenBytes::compare(std::uint64_t offset, std::uint64_t bytes) const {
   for (; next != pieces_.end() && next->first < offset + bytes; ++next) {
     const auto& [first, piece] = *next;
     if (reader.sum(first, piece.end) != piece.sum)
-      tell_difference(first, piece.end, *piece.name, piece.number);
+      throw_difference(first, piece.end, *piece.name, piece.number);
   }
 }
 
@@ -191,12 +191,12 @@ void WrittenBytes::compare_all() {
   Reader reader(descriptor_, path_, kMostRead);
   std::uint64_t at = 0;
   const auto compare_unused = [&](std::uint64_t end) {
-    if (at < end && reader.sum(at, end) != 0) tell_difference(at, end, "unused", -1);
+    if (at < end && reader.sum(at, end) != 0) throw_difference(at, end, "unused", -1);
   };
   for (const auto& [first, piece] : pieces_) {
     compare_unused(first);
     if (reader.sum(first, piece.end) != piece.sum)
-      tell_difference(first, piece.end, *piece.name, piece.number);
+      throw_difference(first, piece.end, *piece.name, piece.number);
     at = piece.end;
   }
   compare_unused(size_);

@@ -50,8 +50,8 @@ class WrittenBytes {
     std::int64_t number;
   };
   void clear_sums(std::uint64_t begin, std::uint64_t end);
-  [[noreturn]] void tell_difference(std::uint64_t begin, std::uint64_t end, const std::string& name,
-                                    std::int64_t number) const;
+  [[noreturn]] void throw_difference(std::uint64_t begin, std::uint64_t end,
+                                     const std::string& name, std::int64_t number) const;
 
   int descriptor_;
   std::string path_;

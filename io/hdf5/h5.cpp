@@ -194,7 +194,7 @@ void close_file(Id& file, const std::string& path) {
   if (H5Fflush(file.get(), H5F_SCOPE_GLOBAL) < 0) reason = last_reason();
   if (H5Fclose(file.get()) < 0 && reason.empty()) reason = last_reason();
   file.release();  // also where closing failed: a second try would find a file half closed
-  if (failure != nullptr && failure->any()) failure->tell(fmt::format("cannot write '{}'", path));
+  if (failure != nullptr && failure->any()) failure->raise(fmt::format("cannot write '{}'", path));
   if (failure == nullptr) reason = "HDF5 does not say whether its writes succeeded";
   if (!reason.empty()) throw IoError(fmt::format("cannot write '{}': {}", path, reason));
 }

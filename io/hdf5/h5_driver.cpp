@@ -248,7 +248,7 @@ hid_t driver_id() {
 
 }  // namespace
 
-void WriteFailure::tell(const std::string& doing) const {
+void WriteFailure::raise(const std::string& doing) const {
   if (error == ENOMEM) throw std::bad_alloc();
   if (!damage.empty()) throw IoError(damage);
   throw IoError(fmt::format("{}: {}", doing, std::strerror(error)));

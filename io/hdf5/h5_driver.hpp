@@ -21,7 +21,7 @@ struct WriteFailure {
   [[nodiscard]] bool any() const { return error != 0; }
   /// Throws IoError with the reason, or std::bad_alloc where memory ran out. `doing`: "cannot write
   /// 'run.h5'".
-  [[noreturn]] void tell(const std::string& doing) const;
+  [[noreturn]] void raise(const std::string& doing) const;
 };
 
 /// Makes `access` open files with this driver, which adds all that it writes to `written` and

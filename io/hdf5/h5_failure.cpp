@@ -60,7 +60,7 @@ void fail(std::string_view operation, const Id& object, std::string_view child,
   }
   const std::string doing =
       fmt::format("cannot {} '{}' in '{}'", operation, where, file_name(object.get()));
-  if (failure != nullptr && failure->any()) failure->tell(doing);
+  if (failure != nullptr && failure->any()) failure->raise(doing);
   throw IoError(fmt::format("{}: {}", doing, reason));
 }
 

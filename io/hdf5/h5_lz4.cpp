@@ -34,20 +34,20 @@ bool decompress(const unsigned char* in, std::size_t size, unsigned char* out, s
   constexpr std::size_t kLength = 4;
   for (std::uint64_t done = 0; done < total;) {
     if (size < kLength) return false;
-    const std::uint64_t wanted = std::min(block, total - done), packed = big_endian(in, kLength);
+    const std::uint64_t requested = std::min(block, total - done), packed = big_endian(in, kLength);
     in += kLength;
     size -= kLength;
-    if (packed > size || packed > INT32_MAX || wanted > INT32_MAX) return false;
-    if (packed == wanted) {
-      std::memcpy(out + done, in, wanted);
+    if (packed > size || packed > INT32_MAX || requested > INT32_MAX) return false;
+    if (packed == requested) {
+      std::memcpy(out + done, in, requested);
     } else if (LZ4_decompress_safe(reinterpret_cast<const char*>(in),
                                    reinterpret_cast<char*>(out + done), static_cast<int>(packed),
-                                   static_cast<int>(wanted)) != static_cast<int>(wanted)) {
+                                   static_cast<int>(requested)) != static_cast<int>(requested)) {
       return false;
     }
     in += packed;
     size -= packed;
-    done += wanted;
+    done += requested;
   }
   return true;
 }

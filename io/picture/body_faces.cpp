@@ -90,14 +90,14 @@ Surface thinned(const Surface& s, int cells) {
     for (std::size_t c = 0; c < 3; ++c)
       low[c] = std::min(low[c], v[c]), high[c] = std::max(high[c], v[c]);
   const double longest = std::max({high[0] - low[0], high[1] - low[1], high[2] - low[2]});
-  std::map<std::array<int, 3>, int> of_cell;
+  std::map<std::array<int, 3>, int> cell_vertex;
   std::vector<int> becomes, count;
   Surface out;
   for (const Vector3& v : s.vertices) {
     std::array<int, 3> cell{};
     for (std::size_t c = 0; c < 3; ++c)
       cell[c] = static_cast<int>(std::floor((v[c] - low[c]) / longest * cells));
-    const auto [found, fresh] = of_cell.emplace(cell, static_cast<int>(out.vertices.size()));
+    const auto [found, fresh] = cell_vertex.emplace(cell, static_cast<int>(out.vertices.size()));
     if (fresh) out.vertices.push_back({0, 0, 0}), count.push_back(0);
     const auto k = static_cast<std::size_t>(found->second);
     out.vertices[k] = out.vertices[k] + v;

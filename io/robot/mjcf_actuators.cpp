@@ -182,8 +182,8 @@ class Actuators {
     motor.control = MotorControl::force;
     const double slope = gear * law.gain;
     const bool bounded = use.range[0] > -kNone && use.range[1] < kNone,
-               by_force = !bounded && force[0] > -kNone && force[1] < kNone;
-    if (by_force) {
+               has_force_range = !bounded && force[0] > -kNone && force[1] < kNone;
+    if (has_force_range) {
       motor.low = force[slope < 0 ? 1 : 0];
       motor.high = force[slope < 0 ? 0 : 1];
     } else {
@@ -197,7 +197,7 @@ class Actuators {
     use.shift = 0 - (motor.high + motor.low) / (motor.high - motor.low);
     const std::string factor =
         std::abs(use.scale - 1) > 1e-12 ? fmt::format(" times {:g}", use.scale) : "";
-    if (!bounded && !by_force)
+    if (!bounded && !has_force_range)
       node.changed(
           fmt::format("<{}> without ctrlrange: the control of '{}' is that of the file{} "
                       "from -1 to 1",

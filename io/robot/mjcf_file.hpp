@@ -113,10 +113,10 @@ class MjcfFile {
 void read_mjcf_bodies(MjcfFile& file, const RobotNode& world);
 /// Reads an <actuator> section.
 void read_mjcf_actuators(MjcfFile& file, const RobotNode& section);
-/// Returns the key `wanted` of the <keyframe> sections, by its name or, without one, its number
+/// Returns the key `requested` of the <keyframe> sections, by its name or, without one, its number
 /// from 0; none for "". Lists the others, and keeps its controls for the actuators.
 std::optional<RobotNode> find_mjcf_keyframe(MjcfFile& file, const std::vector<RobotNode>& sections,
-                                            const std::string& wanted);
+                                            const std::string& requested);
 /// Gives the scene the start of a key, after all bodies and actuators.
 void read_mjcf_keyframe(MjcfFile& file, const RobotNode& key);
 

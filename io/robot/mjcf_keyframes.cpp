@@ -52,11 +52,11 @@ class Keyframe {
     std::size_t n = 0;
     for (const LinkDescription& link : file_.robot.scene.links)
       n += std::size_t(count(link.joint.type));
-    return of_size(attribute, n, "the joints that are read");
+    return sized_numbers(attribute, n, "the joints that are read");
   }
 
-  [[nodiscard]] std::vector<double> of_size(const char* attribute, std::size_t n,
-                                            const char* of) const {
+  [[nodiscard]] std::vector<double> sized_numbers(const char* attribute, std::size_t n,
+                                                  const char* of) const {
     std::vector<double> x = node_.numbers(attribute);
     if (x.size() != n)
       node_.fail(fmt::format("{} has {} numbers; {} have {}", attribute, x.size(), of, n));
@@ -119,7 +119,7 @@ class Keyframe {
 
   void read_controls() const {
     std::vector<double> given(file_.controls.size(), 0.0);  // MuJoCo's, without an attribute
-    if (node_.has("ctrl")) given = of_size("ctrl", given.size(), "the actuators");
+    if (node_.has("ctrl")) given = sized_numbers("ctrl", given.size(), "the actuators");
     std::vector<double>& controls = file_.robot.controls.emplace();
     controls.assign(file_.robot.scene.motors.size(), 0.0);
     for (std::size_t k = 0; k < given.size(); ++k) {
@@ -137,7 +137,7 @@ class Keyframe {
 }  // namespace
 
 std::optional<RobotNode> find_mjcf_keyframe(MjcfFile& file, const std::vector<RobotNode>& sections,
-                                            const std::string& wanted) {
+                                            const std::string& requested) {
   std::vector<std::string> names;
   std::vector<RobotNode> keys;
   for (const RobotNode& section : sections)
@@ -153,14 +153,14 @@ std::optional<RobotNode> find_mjcf_keyframe(MjcfFile& file, const std::vector<Ro
       names.push_back(key.text("name", fmt::format("{}", keys.size())));
       keys.push_back(key);
     }
-  const auto at = std::find(names.begin(), names.end(), wanted);
+  const auto at = std::find(names.begin(), names.end(), requested);
   for (const RobotNode& key : keys)
-    if (wanted.empty() || at == names.end() || &key != &keys[std::size_t(at - names.begin())])
+    if (requested.empty() || at == names.end() || &key != &keys[std::size_t(at - names.begin())])
       key.idle(std::string("<key>: ") + kUse);
-  if (wanted.empty()) return std::nullopt;
+  if (requested.empty()) return std::nullopt;
   if (at == names.end())
-    throw InputError(fmt::format("--keyframe {}: {} has no keyframe of this name{}", wanted,
-                                 file.robot.scene.path, suggestion(wanted, names)));
+    throw InputError(fmt::format("--keyframe {}: {} has no keyframe of this name{}", requested,
+                                 file.robot.scene.path, suggestion(requested, names)));
   const RobotNode& key = keys[std::size_t(at - names.begin())];
   if (key.has("ctrl")) file.keyframe_ctrl = key.numbers("ctrl");
   return key;

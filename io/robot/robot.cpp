@@ -54,10 +54,11 @@ RobotPlace find_place(const Robot& robot, const std::string& name, const std::st
                                robot.sites.empty() ? "" : " or site", suggestion(name, names)));
 }
 
-std::string RobotNames::free_name(const std::string& wanted) {
-  if (names_.insert(wanted).second) return wanted;
+std::string RobotNames::free_name(const std::string& requested) {
+  if (names_.insert(requested).second) return requested;
   for (int k = 2;; ++k)
-    if (std::string name = fmt::format("{}_{}", wanted, k); names_.insert(name).second) return name;
+    if (std::string name = fmt::format("{}_{}", requested, k); names_.insert(name).second)
+      return name;
 }
 
 int add_link(Robot& robot, RobotNames& names, const std::string& name, int parent,

@@ -84,8 +84,8 @@ RobotPlace find_place(const Robot& robot, const std::string& name, const std::st
 /// Gives new links, joints and bodies names that no other has.
 class RobotNames {
  public:
-  /// `wanted`, or `wanted` with the next free number behind it.
-  std::string free_name(const std::string& wanted);
+  /// `requested`, or `requested` with the next free number behind it.
+  std::string free_name(const std::string& requested);
   /// Keeps a name that a file gives for whoever has it there.
   void keep(const std::string& name) { names_.insert(name); }
 

@@ -40,18 +40,18 @@ std::vector<int> ends_of(const std::vector<Edge>& edges) {
 /// " The nearest corners …" of open edges that do not share an edge, if they nearly meet.
 std::string gap_text(const MeshShape& mesh, const std::vector<Edge>& open) {
   const std::vector<int> ends = ends_of(open);
-  std::vector<int> by_x = ends;
-  std::sort(by_x.begin(), by_x.end(), [&](int a, int b) {
+  std::vector<int> ends_along_x = ends;
+  std::sort(ends_along_x.begin(), ends_along_x.end(), [&](int a, int b) {
     return mesh.vertices[3 * std::size_t(a)] < mesh.vertices[3 * std::size_t(b)];
   });
   const double size = longest_side(mesh);
   double least = kNearlyMeet * size;
   Edge nearest{-1, -1};
-  for (std::size_t i = 0; i < by_x.size(); ++i)
-    for (std::size_t j = i + 1; j < by_x.size(); ++j) {
-      const Vector3 a = place(mesh, by_x[i]), b = place(mesh, by_x[j]);
+  for (std::size_t i = 0; i < ends_along_x.size(); ++i)
+    for (std::size_t j = i + 1; j < ends_along_x.size(); ++j) {
+      const Vector3 a = place(mesh, ends_along_x[i]), b = place(mesh, ends_along_x[j]);
       if (b[0] - a[0] >= least) break;
-      const Edge pair = std::minmax(by_x[i], by_x[j]);
+      const Edge pair = std::minmax(ends_along_x[i], ends_along_x[j]);
       const double apart = distance(a, b);
       if (apart >= least || std::binary_search(open.begin(), open.end(), pair)) continue;
       least = apart;

@@ -149,12 +149,12 @@ class HullBuilder {
     const int apex = *std::max_element(outside.begin(), outside.end(), [&](int p, int q) {
       return height(face(f), p) < height(face(f), q);
     });
-    std::vector<int> seen = {f}, left;
+    std::vector<int> visible = {f}, left;
     face(f).gone = true;
     const std::size_t first = faces_.size();
     std::map<int, int> starts, ends;  // new faces by the corner where their edge starts, or ends
-    for (std::size_t i = 0; i < seen.size(); ++i) {
-      const int now = seen[i];
+    for (std::size_t i = 0; i < visible.size(); ++i) {
+      const int now = visible[i];
       left.insert(left.end(), face(now).outside.begin(), face(now).outside.end());
       face(now).outside.clear();
       for (std::size_t k = 0; k < 3; ++k) {
@@ -162,7 +162,7 @@ class HullBuilder {
         if (face(other).gone) continue;
         if (height(face(other), apex) > 0) {
           face(other).gone = true;
-          seen.push_back(other);
+          visible.push_back(other);
           continue;
         }
         const int from = face(now).corners[k], to = face(now).corners[(k + 1) % 3];

@@ -40,9 +40,9 @@ void read_head(const tinyxml2::XMLElement& root, SceneContext& context) {
   node.check_attributes(scene ? std::vector<std::string>{"model", "name"}
                               : std::vector<std::string>{"unit", "name"});
   const tinyxml2::XMLElement* const option = root.FirstChildElement("option");
-  const SceneNode of_unit = scene && option != nullptr ? SceneNode(*option, context) : node;
+  const SceneNode unit_node = scene && option != nullptr ? SceneNode(*option, context) : node;
   const bool metres =
-      (!scene || option != nullptr) && of_unit.choice("unit", {"cm-g", "m-kg"}, 0) == 1;
+      (!scene || option != nullptr) && unit_node.choice("unit", {"cm-g", "m-kg"}, 0) == 1;
   if (!metres) context.use_centimetres_and_grams();
 }
 

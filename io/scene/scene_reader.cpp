@@ -95,8 +95,8 @@ class TreeReader {
     if (bodies == 0) node.fail("link '" + link.name + "' has no <body>");
     const int index = static_cast<int>(scene_.links.size());
     scene_.links.push_back(std::move(link));
-    Pose& of_body = scene_.links.back().body.pose;
-    if (in_world) of_body = in_parent(of_body, index);
+    Pose& body_pose = scene_.links.back().body.pose;
+    if (in_world) body_pose = in_parent(body_pose, index);
     for (const SceneNode& child : inner) read_link(child, index, depth + 1);
   }
 
@@ -207,12 +207,12 @@ void read_root(const SceneNode& root, Scene& scene) {
   // Elements of the user's file replace those of included files.
   const auto once = [&](const char* name, auto&& read) {
     const auto own = [&](const SceneNode& s) { return &s.context() == &root.context(); };
-    const bool by_itself = std::any_of(sections.begin(), sections.end(), [&](const SceneNode& s) {
+    const bool has_own = std::any_of(sections.begin(), sections.end(), [&](const SceneNode& s) {
       return s.name() == name && own(s);
     });
     int count = 0;
     each(name, [&](const SceneNode& s) {
-      if (by_itself && !own(s)) return;
+      if (has_own && !own(s)) return;
       if (++count > 1) s.fail("given twice; expected once");
       read(s);
     });

@@ -199,7 +199,7 @@ void read_coefficient_variation(const Scene& scene, const SceneElement& node,
       const auto connects = [&](const std::string& a, const std::string& b) {
         return c.general_body == a && c.primitive_body == b;
       };
-      if (!c.by_area() || c.second_half || !(connects(one, two) || connects(two, one)))
+      if (!c.per_area() || c.second_half || !(connects(one, two) || connects(two, one)))
         return false;
       n.name = c.general_body, n.second_name = c.primitive_body;
       return true;
@@ -211,7 +211,7 @@ void read_coefficient_variation(const Scene& scene, const SceneElement& node,
     n.name = node.text("general_body");
     n.second_name = node.text("primitive_body");
     declared(scene.pair_contacts, [&](const PairContactDescription& c) {
-      return !c.by_area() && c.first_name() == n.name && c.primitive_body == n.second_name;
+      return !c.per_area() && c.first_name() == n.name && c.primitive_body == n.second_name;
     });
   } else if (node.of() == kVaryGround) {
     find_body(scene, node, "body");

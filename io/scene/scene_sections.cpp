@@ -23,15 +23,15 @@ constexpr std::size_t kPublished = 3;        // among the words of `law`
 template <class Name>
 int find_named(const Scene& scene, const SceneNode& node, const char* attribute, const char* kind,
                Name&& name_of) {
-  const std::string wanted = node.text(attribute);
+  const std::string requested = node.text(attribute);
   std::vector<std::string> names;
   if (attribute == std::string_view("body2")) names.emplace_back(kGroundName);
   for (std::size_t i = 0; i < scene.links.size(); ++i) {
     names.push_back(name_of(scene.links[i]));
-    if (names.back() == wanted) return static_cast<int>(i);
+    if (names.back() == requested) return static_cast<int>(i);
   }
-  node.fail(fmt::format("{}=\"{}\": no {} has this name{}", attribute, wanted, kind,
-                        suggestion(wanted, names)));
+  node.fail(fmt::format("{}=\"{}\": no {} has this name{}", attribute, requested, kind,
+                        suggestion(requested, names)));
 }
 
 /// Reads law, ramp and coefficients of a contact of either kind.
@@ -82,8 +82,8 @@ void warn_of_dense_meshes(const Scene& scene, const SceneNode& root) {
 static void warn_of_second_contact(const Scene& scene, const SceneNode& root,
                                    const PairContactDescription& c) {
   const auto same_pair = [&](const PairContactDescription& other) {
-    return !other.by_area() && std::minmax(other.general_body, other.primitive_body) ==
-                                   std::minmax(c.general_body, c.primitive_body);
+    return !other.per_area() && std::minmax(other.general_body, other.primitive_body) ==
+                                    std::minmax(c.general_body, c.primitive_body);
   };
   const bool twice = std::ranges::any_of(scene.pair_contacts, same_pair) ||
                      (c.on_ground && std::ranges::any_of(scene.ground_contacts, [&](const auto& g) {
@@ -103,7 +103,7 @@ void warn_of_coarse_points(const Scene& scene, const SceneNode& root) {
         ->body.shape;
   };
   for (const PairContactDescription& c : scene.pair_contacts) {
-    if (c.by_area()) {
+    if (c.per_area()) {
       warn_of_second_contact(scene, root, c);
       continue;
     }

@@ -227,23 +227,23 @@ void add_feedback(Scene& scene, const SceneNode& node, const TactileDescription&
   pair.coefficients = d.coefficients;
   pair.law = d.law;
   pair.source = d.source;
-  const std::vector<int> felt = sensed_bodies(scene, d);
-  for (const int other : felt) {
+  const std::vector<int> sensed = sensed_bodies(scene, d);
+  for (const int other : sensed) {
     const BodyDescription& touched = scene.links[std::size_t(other)].body;
     for (const PairContactDescription& c : scene.pair_contacts)
       if (c.sensor.empty() && !c.second_half &&
           ((c.general_body == d.body && c.primitive_body == touched.name) ||
-           (c.by_area() && c.general_body == touched.name && c.primitive_body == d.body)))
+           (c.per_area() && c.general_body == touched.name && c.primitive_body == d.body)))
         node.context().warnings.push_back(fmt::format(
             "{}<{}>: '{}' and '{}' touch by the body's points and by those "
             "of its tactile sensor '{}', which has feedback. Where both lie, the contact is as "
             "many times stiffer, and the field shows its own share alone",
-            c.source.prefix(), c.by_area() ? "surface_contact" : "general_primitive_contact",
+            c.source.prefix(), c.per_area() ? "surface_contact" : "general_primitive_contact",
             d.body, touched.name, d.name));
     pair.primitive_body = touched.name;
     scene.pair_contacts.push_back(pair);
   }
-  if (felt.empty())
+  if (sensed.empty())
     node.fail(
         fmt::format("feedback of '{}' would touch nothing; expected a body with a distance "
                     "that moves against '{}'",
@@ -280,8 +280,8 @@ void read_sensors(Scene& scene, const SceneNode& section) {
     d.law = static_cast<ContactLaw>(node.word("law"));
     node.read(d.coefficients);
     node.read(d);
-    d.remembers_readings = node.word("memory") == 1;
-    if (d.remembers_readings && d.every == 0)
+    d.shear_at_readings = node.word("memory") == 1;
+    if (d.shear_at_readings && d.every == 0)
       node.fail(
           "memory=\"read\" without every; expected both: memory advances every so many steps");
     if (node.has("pressure_sign")) {

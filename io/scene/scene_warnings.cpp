@@ -37,12 +37,13 @@ class SensorWarnings {
       const BodyDescription& body = scene_.links[k].body;
       if (!has_distance(body.shape)) without.insert(body.name);
     }
-    for (const int k : sensed_bodies(scene_, sensor_)) felt_.insert(moving_link(scene_, k));
-    if (felt_.empty())
+    for (const int k : sensed_bodies(scene_, sensor_))
+      sensed_groups_.insert(moving_link(scene_, k));
+    if (sensed_groups_.empty())
       return add(without.empty()
                      ? "can feel nothing: no body that it feels moves against it; bodies that a "
                        "joint connects with it are felt if 'feels' names them" +
-                           of_the_ground()
+                           ground_hint()
                      : "can feel nothing: a sensor feels shapes with a distance, and " +
                            listed(without) + " has none");
     const bool touched = std::any_of(scene_.pair_contacts.begin(), scene_.pair_contacts.end(),
@@ -51,11 +52,11 @@ class SensorWarnings {
       return add(
           "reads forces that nothing exerts: no contact is declared between that body, or one "
           "that is rigidly joined to it, and another, so bodies pass through it" +
-          of_the_ground());
+          ground_hint());
     if (on_the_ground())
       add("does not feel the ground, which touches that body; expected a body of type plane in its "
           "place, where it should");
-    warn_of_unfelt();
+    warn_of_unsensed();
     warn_of_place();
   }
 
@@ -85,24 +86,24 @@ class SensorWarnings {
     return std::any_of(scene_.ground_contacts.begin(), scene_.ground_contacts.end(),
                        [&](const auto& c) { return c.body == sensor_.body; });
   }
-  [[nodiscard]] std::string of_the_ground() const {
+  [[nodiscard]] std::string ground_hint() const {
     return on_the_ground() ? ". No sensor feels the ground; expected a body of type plane in its "
                              "place, where it should"
                            : "";
   }
 
-  void warn_of_unfelt() {
-    std::set<std::string> unfelt;
+  void warn_of_unsensed() {
+    std::set<std::string> unsensed;
     for (const PairContactDescription& c : scene_.pair_contacts) {
       const std::string other = other_of(c);
-      if (!other.empty() && !felt_.contains(group_of(other)) && !has_a_distance(other))
-        unfelt.insert(other);
+      if (!other.empty() && !sensed_groups_.contains(group_of(other)) && !has_a_distance(other))
+        unsensed.insert(other);
     }
-    if (unfelt.empty()) return;
+    if (unsensed.empty()) return;
     add(
         fmt::format("does not feel {}, which touches that body: a sensor feels shapes with a "
                     "distance, and {} none",
-                    listed(unfelt), unfelt.size() == 1 ? "it has" : "they have"));
+                    listed(unsensed), unsensed.size() == 1 ? "it has" : "they have"));
   }
 
   /// Bodies stop at the surface of the sensor's own body, so points well below it read zero, and
@@ -154,7 +155,7 @@ class SensorWarnings {
   const TactileDescription& sensor_;
   const SceneNode& root_;
   int own_;
-  std::set<int> felt_;  // groups of sensed bodies
+  std::set<int> sensed_groups_;  // groups of sensed bodies
 };
 
 }  // namespace

@@ -125,8 +125,8 @@ struct PlyElement {
 
   [[nodiscard]] int find(std::initializer_list<const char*> names) const {
     for (std::size_t k = 0; k < properties.size(); ++k)
-      for (const char* wanted : names)
-        if (properties[k].name == wanted) return static_cast<int>(k);
+      for (const char* requested : names)
+        if (properties[k].name == requested) return static_cast<int>(k);
     return -1;
   }
 };

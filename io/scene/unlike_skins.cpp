@@ -105,29 +105,29 @@ struct Pressed {
 };
 Pressed pressed_by(const TactileDescription& d, const PairContactDescription& c, bool own,
                    const Shape& shape, Densities& estimates) {
-  if (c.by_area()) return {c.coefficients.kn, true};
+  if (c.per_area()) return {c.coefficients.kn, true};
   const double density = own && d.points.empty() ? points_on_face(shape, d.array) : 0;
   if (density > 0) return {c.coefficients.kn * density, true};
   return {c.coefficients.kn * estimates.of(c.general_body, shape), false};
 }
 
 /// The warning of a sensor and a contact of its body, or "".
-std::string unlike(const Scene& scene, const TactileDescription& d, double felt,
+std::string unlike(const Scene& scene, const TactileDescription& d, double sensed,
                    const PairContactDescription& c, Densities& estimates) {
   const bool own = c.general_body == d.body;
   const Shape* const shape = shape_of(scene, c.general_body);
   if ((!own && c.primitive_body != d.body) || shape == nullptr || c.second_half ||
-      (!c.points.empty() && !c.by_area()))
+      (!c.points.empty() && !c.per_area()))
     return "";
   const auto [pressed, known] = pressed_by(d, c, own, *shape, estimates);
   if (!(pressed > 0)) return "";
-  const double share = felt / pressed, most = known ? kUnlike : kUnlikeByEstimate;
+  const double share = sensed / pressed, most = known ? kUnlike : kUnlikeByEstimate;
   if (share < most && share > 1 / most) return "";
   return fmt::format(
       "{}<tactile>: kn of '{}' is {:.3g} N/m per mm² of skin, that of its contact with '{}' is "
       "{}{:.3g}, so the field shows {}{:.2g} times the force; expected about the same of both, as "
       "'tangere skin' gives them",
-      d.source.prefix(), d.name, felt * 1e-6, own ? c.primitive_body : c.general_body,
+      d.source.prefix(), d.name, sensed * 1e-6, own ? c.primitive_body : c.general_body,
       known ? "" : "about ", pressed * 1e-6, known ? "" : "about ", share);
 }
 
@@ -136,10 +136,10 @@ std::string unlike(const Scene& scene, const TactileDescription& d, double felt,
 void warn_of_unlike_skins(const Scene& scene, const SceneNode& root) {
   Densities estimates;
   for (const TactileDescription& d : scene.sensors) {
-    const double felt = d.coefficients.kn * points_of_sensor(d);
-    if (!(felt > 0)) continue;
+    const double sensed = d.coefficients.kn * points_of_sensor(d);
+    if (!(sensed > 0)) continue;
     for (const PairContactDescription& c : scene.pair_contacts)
-      if (const std::string text = unlike(scene, d, felt, c, estimates); !text.empty()) {
+      if (const std::string text = unlike(scene, d, sensed, c, estimates); !text.empty()) {
         root.context().warnings.push_back(text);
         break;
       }

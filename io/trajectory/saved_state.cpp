@@ -157,8 +157,8 @@ void restore_state(const SavedState& from, bool continues, Batch& batch) {
                                  from.environments));
   const auto nq = static_cast<std::size_t>(model.nq()), nv = static_cast<std::size_t>(model.nv());
   const ShearStateArrays points = shear_state_arrays(model);
-  const bool remembers = model.has_shear_springs() && from.memory;
-  if (remembers) check_points(from, points);
+  const bool has_memory = model.has_shear_springs() && from.memory;
+  if (has_memory) check_points(from, points);
   const bool sleeps = continues && from.sleep_state;
   if (sleeps)
     check_names(from, "trees that may sleep", from.sleep_state->trees, sleeping_trees(model));
@@ -174,7 +174,7 @@ void restore_state(const SavedState& from, bool continues, Batch& batch) {
       batch.set_state(e, part(from.q, nq), part(from.v, nv));
     }
     if (continues) batch.set_steps(e, from.step);  // the noise of sensors goes on
-    if (remembers) {
+    if (has_memory) {
       std::fill(displacements.begin(), displacements.end(), 0.0);
       for (const ShearEntry& entry : from.memory->environments[static_cast<std::size_t>(e)])
         std::copy_n(entry.s, 3, &displacements[3 * static_cast<std::size_t>(entry.point)]);

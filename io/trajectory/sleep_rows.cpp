@@ -38,8 +38,8 @@ std::optional<SavedSleep> read_sleep(const h5::Id& file, std::int64_t at, std::s
   const h5::Id group = h5::open_group(file, "sleep");
   SavedSleep saved{h5::read_texts(group, "trees"), {}};
   const auto E = static_cast<hsize_t>(environments);
-  const h5::Dims of_u = h5::dimensions(h5::open_dataset(group, "u"));
-  const hsize_t trees = saved.trees.size(), nu = of_u.empty() ? 0 : of_u.back();
+  const h5::Dims u_dims = h5::dimensions(h5::open_dataset(group, "u"));
+  const hsize_t trees = saved.trees.size(), nu = u_dims.empty() ? 0 : u_dims.back();
   const auto islands = get<std::int32_t>(group, "island", at, rows, {E, trees}),
              rested = get<std::int32_t>(group, "rested", at, rows, {E, trees});
   const auto u = get<double>(group, "u", at, rows, {E, nu}),

@@ -97,15 +97,15 @@ class DatasetView {
     const auto steps = h5::read_number<std::int64_t>(scene, "steps"),
                every = h5::read_number<std::int64_t>(scene, "every");
     if (every < 1) throw IoError(fmt::format("{}: a row every {} steps", path_, every));
-    const std::vector<SampleSaid> samples = samples_said(scene, every, steps / every);
+    const std::vector<StoredSample> samples = stored_samples(scene, every, steps / every);
     // The observations of a task have names of their own, which may be those of sensors.
-    const bool of_task = !value_of(dataset_.settings, "policy").empty();
+    const bool is_task = !value_of(dataset_.settings, "policy").empty();
     for (ViewSensor& sensor : scene_->sensors()) {
       std::string name;
       for (const std::string& reading : {sensor.name, sensor.name + ".ideal"})
-        if (!of_task && name.empty() && h5::has_link(obs, reading)) name = reading;
-      std::optional<SampleSaid> sampled;
-      for (const SampleSaid& sample : samples)
+        if (!is_task && name.empty() && h5::has_link(obs, reading)) name = reading;
+      std::optional<StoredSample> sampled;
+      for (const StoredSample& sample : samples)
         if (name.empty() && (sample.name == sensor.name || sample.name == sensor.name + ".ideal"))
           sampled = sample, name = sample.name;
       if (name.empty() || !h5::has_link(scene, "sensors")) {
@@ -154,7 +154,7 @@ class DatasetView {
   /// not read at every row, its samples.
   void add_fields(std::size_t sensor, const Demo& which, const h5::Id& demo, ViewEpisode& episode) {
     const ViewSensor& view = data_.sensors[sensor];
-    const std::optional<SampleSaid>& sampled = sampled_[sensor];
+    const std::optional<StoredSample>& sampled = sampled_[sensor];
     const std::size_t width = 3 * static_cast<std::size_t>(view.points);
     const auto open = [&](const char* group, std::int64_t rows) {
       h5::Id fields = h5::open_dataset(h5::open_group(demo, group), readings_[sensor]);
@@ -213,7 +213,7 @@ class DatasetView {
   std::unique_ptr<ViewScene> scene_;
   ViewData data_;
   std::vector<std::string> q_names_, randomized_, readings_;
-  std::vector<std::optional<SampleSaid>> sampled_;  // (sensors) those that are not in every row
+  std::vector<std::optional<StoredSample>> sampled_;  // (sensors) those that are not in every row
   std::vector<int> signs_;
   double interval_ = 0;  // of rows [s]
 };

@@ -32,7 +32,7 @@ std::int64_t stride_for(const std::vector<std::int64_t>& rows, std::size_t numbe
     total += static_cast<double>(count), longest = std::max(longest, count);
   // frames_of() may add the last row.
   const std::int64_t most = std::max(1, options.frames - 1);
-  const std::int64_t by_frames = longest <= options.frames ? 1 : (longest + most - 1) / most;
+  const std::int64_t frame_stride = longest <= options.frames ? 1 : (longest + most - 1) / most;
   const double room =
       options.bytes - kFixedBytes - kBytesOfNumber * static_cast<double>(numbers * rows.size());
   const double needed = kBytesOfNumber * static_cast<double>(numbers) * total;
@@ -41,8 +41,8 @@ std::int64_t stride_for(const std::vector<std::int64_t>& rows, std::size_t numbe
         fmt::format("a page of {} episodes takes more than {:.0f} MB with two frames each; ask for "
                     "fewer: --episodes",
                     rows.size(), options.bytes / 1e6));
-  const auto by_bytes = static_cast<std::int64_t>(std::ceil(needed / room));
-  return std::max({std::int64_t{1}, by_frames, by_bytes});
+  const auto byte_stride = static_cast<std::int64_t>(std::ceil(needed / room));
+  return std::max({std::int64_t{1}, frame_stride, byte_stride});
 }
 
 std::size_t numbers_per_frame(const Scene& scene, const std::vector<ViewSensor>& sensors,

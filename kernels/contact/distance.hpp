@@ -69,7 +69,7 @@ Distance<N> distance_at(const Shape& shape, const Vec3<N>& y) {
 
 /// Returns f<Pad>() for the Pad of every shape, in the order of PrimitiveShape.
 template <class P, class F, template <class> class... S>
-constexpr auto by_pad(const F& f, ShapeList<S...>) {
+constexpr auto per_pad(const F& f, ShapeList<S...>) {
   return std::array{f.template operator()<typename S<double>::template Pad<P>>()...};
 }
 

@@ -205,10 +205,10 @@ bool accumulate_elastic_ground(PairSums<N>& sums, const LawParameters<N>& law, c
     const Vec3<N>&t = p.tangential.direction, A = p.x2 - p.arm;
     // k (P - t tᵀ) δr and what m does; σ = β'_d (P r - t (t·P r)) by δd
     const Vec3<N> along = mul_add(-p.eta, m, p.r);
-    const Vec3<N> by_d = (stiffness * p.beta_d) * (along - dot(t, along) * t);
-    r.f_rho += outer(k * m - by_d, m) + outer(k * t, t) - diagonal(k);
+    const Vec3<N> f_d = (stiffness * p.beta_d) * (along - dot(t, along) * t);
+    r.f_rho += outer(k * m - f_d, m) + outer(k * t, t) - diagonal(k);
     r.f_theta += skew(mul_add(k, A, k_eta * m)) + outer(k * m, cross(p.r + A, m)) -
-                 outer(t, k * cross(t, A) + k_eta * cross(t, m)) + outer(by_d, cross(m, centre));
+                 outer(t, k * cross(t, A) + k_eta * cross(t, m)) + outer(f_d, cross(m, centre));
     add_ground_derivative(sums, p, r);
   }
   return true;

@@ -120,8 +120,8 @@ struct PointDerivative {
 /// Derivatives of f by n, u and d at a point.
 template <class N>
 struct ForceDerivative {
-  Mat3<N> by_n, by_u;
-  Vec3<N> by_d;
+  Mat3<N> f_n, f_u;
+  Vec3<N> f_d;
 };
 ///   δḋ = u·δn + n·δu;  δv_t = δu - n δḋ - ḋ δn
 template <class N>
@@ -175,13 +175,13 @@ PointDerivative<N> differentiate(const LawParameters<N>& law, const PointContact
   r.x_rho = kFlat ? nn : nn - p.gap * n_rho;
   r.x_theta = (-p.gap) * n_theta;
   const ForceDerivative<N> f = differentiate_force(law, p);
-  r.f_u = f.by_u;
+  r.f_u = f.f_u;
   // δu = -ω × δx₂.
   const Mat3<N> u_rho = cross_columns(-omega, r.x_rho);
   const Mat3<N> u_theta = cross_columns(-omega, r.x_theta);
-  r.f_rho = r.f_u * u_rho - outer(f.by_d, n);
-  if constexpr (!kFlat) r.f_rho += f.by_n * n_rho;
-  r.f_theta = r.f_u * u_theta + f.by_n * n_theta;
+  r.f_rho = r.f_u * u_rho - outer(f.f_d, n);
+  if constexpr (!kFlat) r.f_rho += f.f_n * n_rho;
+  r.f_theta = r.f_u * u_theta + f.f_n * n_theta;
   return r;
 }
 
@@ -264,9 +264,9 @@ GroundDerivative<N> differentiate_ground(const LawParameters<N>& law, const Vec6
                                          const Vec3<N>& centre, const N& radius,
                                          const PointContact<N>& p) {
   const N gate = select(p.d < N(0.0), N(1.0), N(0.0));
-  const ForceDerivative<N> by = differentiate_force(law, p);
-  const Mat3<N> f_u = gate * by.by_u, f_m = gate * by.by_n;
-  const Mat3<N> f_d = gate * outer(by.by_d, p.n);  // by ρ; by θ: -f_d [ξ_c]
+  const ForceDerivative<N> force = differentiate_force(law, p);
+  const Mat3<N> f_u = gate * force.f_u, f_m = gate * force.f_n;
+  const Mat3<N> f_d = gate * outer(force.f_d, p.n);  // by ρ; by θ: -f_d [ξ_c]
   const Mat3<N> m_theta = skew(p.n);
   const Mat3<N> xi_theta = (-radius) * m_theta;
   const Mat3<N> u_theta = cross_columns(V.a, xi_theta);

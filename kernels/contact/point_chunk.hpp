@@ -35,9 +35,9 @@ struct PointChunk {
 /// Evaluates the law at the touching points of a chunk, which stand for `areas` [m²]. It is a call
 /// of its own: inlined, it would slow down points whose coefficients count per point.
 template <bool Derivatives, class Motion, class N>
-[[gnu::noinline]] void fill_by_area(const Motion& z, const LawParameters<N>& law, const N* areas,
-                                    const typename Motion::Place* place,
-                                    PointChunk<typename Motion::Point>& chunk) {
+[[gnu::noinline]] void fill_per_area(const Motion& z, const LawParameters<N>& law, const N* areas,
+                                     const typename Motion::Place* place,
+                                     PointChunk<typename Motion::Point>& chunk) {
   for (int c = 0; c < chunk.count; ++c) {
     const int i = chunk.touching[c];
     LawParameters<N> own = law;
@@ -63,7 +63,7 @@ void fill_chunk(const Motion& z, const LawParameters<N>& law, const typename Mot
     chunk.touch[i] = find_distance(z, place[i], chunk.point[i], pass[i]);
     if (any(chunk.touch[i])) chunk.touching[chunk.count++] = i;
   }
-  if (areas != nullptr) return fill_by_area<Derivatives>(z, law, areas, place, chunk);
+  if (areas != nullptr) return fill_per_area<Derivatives>(z, law, areas, place, chunk);
   for (int c = 0; c < chunk.count; ++c)
     find_slide(z, chunk.point[chunk.touching[c]], pass[chunk.touching[c]]);
   for (int c = 0; c < chunk.count; ++c) {

@@ -24,8 +24,8 @@ template <class N>
 struct LinkAdjoint {
   Vec6<N> twist;  ///< Λ
   Vec6<N> rate;   ///< S q̇
-  Vec6<N> by_v;   ///< V̄
-  Vec6<N> by_a;   ///< Ā
+  Vec6<N> V_bar;  ///< V̄
+  Vec6<N> A_bar;  ///< Ā
 };
 
 template <class N>
@@ -81,18 +81,18 @@ void adjoint_outward(const ModelView& model, const StageArgs<N>& a, const Adjoin
       o.rate = along_joint<K>(link, a.v);
     });
     if (link.parent >= 0) o.twist += motion_to_child(link, s.local, d.links[link.parent].twist);
-    o.by_v = o.by_a = zero6<N>();
+    o.V_bar = o.A_bar = zero6<N>();
     if (!link.has_mass) continue;
     const LinkInertia<N> own = load_inertia<N>(link, a.block, a.group);
     if (link.never_rotates) {
-      o.by_a.l = own.mass * o.twist.l;
+      o.A_bar.l = own.mass * o.twist.l;
       continue;
     }
     const auto times = [&](const Vec6<N>& x) {
       return inertia_times(own.mass, own.moment, own.inertia, x);
     };
-    o.by_a = times(o.twist);
-    o.by_v = -(cross_wrench(o.twist, times(s.V)) + times(cross_motion(s.V, o.twist)));
+    o.A_bar = times(o.twist);
+    o.V_bar = -(cross_wrench(o.twist, times(s.V)) + times(cross_motion(s.V, o.twist)));
   }
 }
 
@@ -121,14 +121,14 @@ void adjoint_contacts(const ModelView& model, const StageArgs<N>& a, const Adjoi
     const ContactScratch<N>& o = a.contacts[k];
     if (!o.near) return;
     const Vec6<N> w = transposed_damping(o.sums, adjoint_slip(pair, o, d.links));
-    if (pair.link1 >= 0) d.links[pair.link1].by_v -= w;
-    if (pair.link2 >= 0) d.links[pair.link2].by_v += wrench_to_child(o.link2_in_1, w);
+    if (pair.link1 >= 0) d.links[pair.link1].V_bar -= w;
+    if (pair.link2 >= 0) d.links[pair.link2].V_bar += wrench_to_child(o.link2_in_1, w);
   });
   for (int k = 0; k < model.n_grounded; ++k) {
     const ContactScratch<N>& o = a.contacts[model.n_link_pairs + k];
     if (!o.near) continue;
     LinkAdjoint<N>& link = d.links[model.grounded[k].link];
-    link.by_v += transposed_damping(o.sums, link.twist);
+    link.V_bar += transposed_damping(o.sums, link.twist);
   }
 }
 
@@ -155,27 +155,27 @@ void adjoint_targets(const ModelView& model, const StageArgs<N>& a, const Link& 
     const Vec3<N> goal = {u[0], u[1], u[2]};
     const RotationVector<N> error = rotation_vector<false>(conjugate(q) * quaternion_exp(goal));
     pulled(0, error.phi.x), pulled(1, error.phi.y), pulled(2, error.phi.z);
-    const Vec3<N> by_psi =
+    const Vec3<N> psi_bar =
         transposed_times(inverse_right_jacobian(error), Vec3<N>{pull[0], pull[1], pull[2]});
-    const Vec3<N> by_u = transposed_times(right_jacobian(goal, rotation_series(goal)), by_psi);
-    target[link.v] = by_u.x, target[link.v + 1] = by_u.y, target[link.v + 2] = by_u.z;
+    const Vec3<N> u_bar = transposed_times(right_jacobian(goal, rotation_series(goal)), psi_bar);
+    target[link.v] = u_bar.x, target[link.v + 1] = u_bar.y, target[link.v + 2] = u_bar.z;
   }
 }
 
 /// Adds the joint effects of one joint to the sweep's Cᵀ λ and M λ.
 template <JointKind K, class N>
 void adjoint_effects(const ModelView& model, const StageArgs<N>& a, const AdjointArgs<N>& d,
-                     const Link& link, N* by_v) {
+                     const Link& link, N* Ct_lambda) {
   if (link.effects & kDamping)
     for (int k = 0; k < dofs(K); ++k)
-      by_v[k] = mul_add(load_parameter(a, model.effects[link.v + k].damping), d.lambda[link.v + k],
-                        by_v[k]);
+      Ct_lambda[k] = mul_add(load_parameter(a, model.effects[link.v + k].damping),
+                             d.lambda[link.v + k], Ct_lambda[k]);
   if (!(link.effects & kBeyondDamping)) return;
   JointLoad<N> load;
   joint_load<K, true>(model, a, link, load);
   for (int k = 0; k < dofs(K); ++k) {
     const N& lambda = d.lambda[link.v + k];
-    by_v[k] = mul_add(load.by_v[k], lambda, by_v[k]);
+    Ct_lambda[k] = mul_add(load.d_dv[k], lambda, Ct_lambda[k]);
     d.mass_lambda[link.v + k] = mul_add(load.armature[k], lambda, d.mass_lambda[link.v + k]);
   }
   if (link.effects & kPositionServo) adjoint_targets<K>(model, a, link, d.lambda, d.target);
@@ -189,25 +189,25 @@ void adjoint_inward(const ModelView& model, const StageArgs<N>& a, const Adjoint
     const Link& link = model.links[i];
     const LinkScratch<N>& s = a.links[i];
     LinkAdjoint<N>& o = d.links[i];
-    Vec6<N> projected = o.by_v;
+    Vec6<N> projected = o.V_bar;
     if (!link.never_rotates) {
-      o.by_v += cross_wrench(o.rate, o.by_a);
-      projected = o.by_v - cross_wrench(s.V, o.by_a);
+      o.V_bar += cross_wrench(o.rate, o.A_bar);
+      projected = o.V_bar - cross_wrench(s.V, o.A_bar);
     }
     with_kind(link.kind, [&]<JointKind K>() {
-      N by_v[3];
+      N Ct_lambda[3];
       for (int k = 0; k < dofs(K); ++k) {
-        const N mass = project<K>(link, k, o.by_a);
+        const N mass = project<K>(link, k, o.A_bar);
         d.mass_lambda[link.v + k] = mass;
-        by_v[k] = mul_add(a.c0_over_h, mass, project<K>(link, k, projected));
+        Ct_lambda[k] = mul_add(a.c0_over_h, mass, project<K>(link, k, projected));
       }
-      adjoint_effects<K>(model, a, d, link, by_v);
-      for (int k = 0; k < dofs(K); ++k) d.nu[link.v + k] = d.v_bar[link.v + k] - by_v[k];
+      adjoint_effects<K>(model, a, d, link, Ct_lambda);
+      for (int k = 0; k < dofs(K); ++k) d.nu[link.v + k] = d.v_bar[link.v + k] - Ct_lambda[k];
     });
     if (link.parent < 0) continue;
     LinkAdjoint<N>& parent = d.links[link.parent];
-    parent.by_v += wrench_to_parent(link, s.local, o.by_v);
-    parent.by_a += wrench_to_parent(link, s.local, o.by_a);
+    parent.V_bar += wrench_to_parent(link, s.local, o.V_bar);
+    parent.A_bar += wrench_to_parent(link, s.local, o.A_bar);
   }
 }
 
@@ -249,14 +249,14 @@ void adjoint_history(const ModelView& model, const StageArgs<N>& a, const Adjoin
   N from_centre = a.c0_over_h;
   for (int i = 0; i < h.count; ++i) from_centre = from_centre + N(h.older[i].rho) * a.inverse_h;
   from_centre = -from_centre;
-  const N by_centre = N(-h.s_centre) * a.inverse_h;
+  const N centre_factor = N(-h.s_centre) * a.inverse_h;
   for (int i = 0; i < model.n_links; ++i) {
     const Link& link = model.links[i];
     const bool turning = link.kind == JointKind::spherical;
     if (turning) adjoint_turning_history(a, d, link, a.links[i]);
     for (int k = link.v; k < link.v + dofs(link.kind); ++k) {
       if (!turning) d.q_centre[k] = mul_add(from_centre, d.nu[k], d.q_centre[k]);
-      d.v_centre[k] = mul_add(by_centre, d.mass_lambda[k], d.v_centre[k]);
+      d.v_centre[k] = mul_add(centre_factor, d.mass_lambda[k], d.v_centre[k]);
       for (int j = 0; j < h.count; ++j) {
         const OlderState<N>& o = h.older[j];
         if (!turning && o.rho != 0) o.q[k] = mul_add(N(o.rho) * a.inverse_h, d.nu[k], o.q[k]);

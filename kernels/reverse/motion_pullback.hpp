@@ -38,15 +38,15 @@ void pull_back_links(const ModelView& model, const StageArgs<N>& a, LinkMotion<N
     const Link& link = model.links[i];
     const LinkMotion<N>& o = scratch[i];
     const MotionCotangent<N>& c = links[i];
-    const Vec6<N> by_q = c.pose - cross_wrench(o.Vp, c.twist);
+    const Vec6<N> q_wrench = c.pose - cross_wrench(o.Vp, c.twist);
     with_kind(link.kind, [&]<JointKind K>() {
       for (int k = 0; k < dofs(K); ++k) {
-        q_bar[link.v + k] += project<K>(link, k, by_q);
+        q_bar[link.v + k] += project<K>(link, k, q_wrench);
         v_bar[link.v + k] += project<K>(link, k, c.twist);
       }
     });
     if (places != nullptr) {
-      const Vec3<N> moved = o.local.R * by_q.l;
+      const Vec3<N> moved = o.local.R * q_wrench.l;
       N* const place = places + kPlaceNumbers * i;
       place[0] += moved.x, place[1] += moved.y, place[2] += moved.z;
     }

@@ -68,14 +68,14 @@ void add_point(const Shape& shape, const Frame<N>& at, const Vec6<N>& W,
   }
   TouchCotangent<N> unused;
   unused.twist = unused.displacement = zero6<N>();
-  const PlaceCotangent<N> of_force = pull_back_motion<Shape>(law, p, W.a, f_bar, unused);
-  const PlaceCotangent<N> of_arm = pull_back_place<Shape>(p, cross(p.force, slip.a));
-  const Vec3<N> rho = of_force.rho + of_arm.rho;
-  sum.size += pull_back_size(shape, p, at.R, at.p, xi, rho, of_force.d + of_arm.d);
+  const PlaceCotangent<N> from_force = pull_back_motion<Shape>(law, p, W.a, f_bar, unused);
+  const PlaceCotangent<N> from_arm = pull_back_place<Shape>(p, cross(p.force, slip.a));
+  const Vec3<N> rho = from_force.rho + from_arm.rho;
+  sum.size += pull_back_size(shape, p, at.R, at.p, xi, rho, from_force.d + from_arm.d);
   if constexpr (requires { shape.grown; }) {
     sum.stretch.x -= pull_back_force(law, p, f_bar).d;  // at fixed ξ, d falls as the ball grows
   } else {
-    sum.stretch += gate * stretch_share(body, xi, of_force.x + of_arm.x - rho);
+    sum.stretch += gate * stretch_share(body, xi, from_force.x + from_arm.x - rho);
   }
 }
 
@@ -247,10 +247,10 @@ void joint_parameters(const ModelView& model, const StageArgs<N>& a, const Link&
     const Quat<N> rest = quaternion_exp(Vec3<N>{N(e[0].rest), N(e[1].rest), N(e[2].rest)});
     out[kDofStiffness] -= dot(rotation_vector<false>(conjugate(rest) * q).phi, of);
     const RotationVector<N> at = rotation_vector<true>(q);
-    const Vec3<N> by_force = transposed_times(inverse_left_jacobian(at), of);
-    out[kDofLimitStiffness] += by_force.x * beyond_limits(e[0], at.phi.x);
-    out[kDofNumbers + kDofLimitStiffness] += by_force.y * beyond_limits(e[1], at.phi.y);
-    out[2 * kDofNumbers + kDofLimitStiffness] += by_force.z * beyond_limits(e[2], at.phi.z);
+    const Vec3<N> force_bar = transposed_times(inverse_left_jacobian(at), of);
+    out[kDofLimitStiffness] += force_bar.x * beyond_limits(e[0], at.phi.x);
+    out[kDofNumbers + kDofLimitStiffness] += force_bar.y * beyond_limits(e[1], at.phi.y);
+    out[2 * kDofNumbers + kDofLimitStiffness] += force_bar.z * beyond_limits(e[2], at.phi.z);
     if (link.effects & kPositionServo) {
       const Vec3<N> psi =
           rotation_vector<false>(conjugate(q) * quaternion_exp(Vec3<N>{u[0], u[1], u[2]})).phi;
@@ -264,7 +264,7 @@ void joint_parameters(const ModelView& model, const StageArgs<N>& a, const Link&
 template <class N>
 void contact_places(const ModelView& model, const StageArgs<N>& a, const LinkAdjoint<N>* links,
                     N* out) {
-  const auto by_place = [](const PairSums<N>& sums, const Vec6<N>& y) {
+  const auto place_bar = [](const PairSums<N>& sums, const Vec6<N>& y) {
     return transposed_times(sums.k[0][1], y.a) + transposed_times(sums.k[1][1], y.l);
   };
   const auto subtract = [out](int link, const Vec3<N>& x) {
@@ -277,7 +277,7 @@ void contact_places(const ModelView& model, const StageArgs<N>& a, const LinkAdj
     if (!o.near) continue;
     const Vec6<N> y = adjoint_slip(pair, o, links);
     const Vec3<N> second = pair.link1 < 0 ? y.a : y.a + links[pair.link1].twist.a;  // of Ad Λ₂
-    const Vec3<N> e = by_place(o.sums, y) + cross(o.Z.a, transposed_damping(o.sums, y).l) +
+    const Vec3<N> e = place_bar(o.sums, y) + cross(o.Z.a, transposed_damping(o.sums, y).l) +
                       cross(second, o.sums.wrench.l);
     if (pair.link1 >= 0) subtract(pair.link1, -e);
     if (pair.link2 >= 0) subtract(pair.link2, transposed_times(o.link2_in_1.R, e));
@@ -286,7 +286,7 @@ void contact_places(const ModelView& model, const StageArgs<N>& a, const LinkAdj
     const ContactScratch<N>& o = a.contacts[model.n_link_pairs + k];
     if (!o.near) continue;
     const int link = model.grounded[k].link;
-    subtract(link, by_place(o.sums, links[link].twist));
+    subtract(link, place_bar(o.sums, links[link].twist));
   }
 }
 
@@ -306,7 +306,7 @@ void place_parameters(const ModelView& model, const StageArgs<N>& a, const LinkA
       add3(out + kPlaceNumbers * link.parent, up);
       const LinkAdjoint<N>& o = links[i];
       const Vec6<N> lambda = motion_to_child(link, s.local, links[link.parent].twist);
-      sum -= cross(s.F.l, lambda.a) + cross(o.by_a.l, s.Ap.a) + cross(o.by_v.l, s.Vp.a);
+      sum -= cross(s.F.l, lambda.a) + cross(o.A_bar.l, s.Ap.a) + cross(o.V_bar.l, s.Vp.a);
     }
     sum = s.local.R * sum;
     own[0] = sum.x, own[1] = sum.y, own[2] = sum.z;

@@ -85,8 +85,8 @@ Lanes<A> point_factors(const PadTiles& pad, int tile, int k, std::size_t c) {
 /// factors.
 template <class A>
 LawParameters<Lanes<A>> law_of_points(const PadTiles& pad, int tile, int k,
-                                      const LawParameters<Lanes<A>>& of_sensor) {
-  LawParameters<Lanes<A>> law = of_sensor;
+                                      const LawParameters<Lanes<A>>& sensor_law) {
+  LawParameters<Lanes<A>> law = sensor_law;
   if (pad.factors == nullptr) return law;
   for (std::size_t c = 0; c < kPointCoefficients; ++c)
     law[c] = law[c] * point_factors<A>(pad, tile, k, c);
@@ -127,12 +127,12 @@ void pull_back_points(const PadTiles& pad, int tile, int k, const double* field,
   const PlaceCotangent<N> place = pull_back_motion<Shape>(law, p, m.omega, f_bar, sums);
   if constexpr (!OfLaw) return;
   sums.size += pull_back_size(shape, p, m.Q, m.c, xi, place.rho, place.d);
-  Coefficients<N> of_law = {N(0.0), N(0.0), N(0.0), N(0.0)};
-  pull_back_law(law, p, f_bar, of_law);
-  if (own != nullptr) add_to_points<A>(place, of_law, own + k);
+  Coefficients<N> law_bar = {N(0.0), N(0.0), N(0.0), N(0.0)};
+  pull_back_law(law, p, f_bar, law_bar);
+  if (own != nullptr) add_to_points<A>(place, law_bar, own + k);
   for (std::size_t c = 0; c < kPointCoefficients; ++c) {
     const N factor = pad.factors == nullptr ? N(1.0) : point_factors<A>(pad, tile, k, c);
-    sums.law[c] = mul_add(factor, of_law[c], sums.law[c]);
+    sums.law[c] = mul_add(factor, law_bar[c], sums.law[c]);
   }
 }
 
@@ -160,7 +160,7 @@ void pull_back_touch(const TactilePullback& a, int touch, TouchCotangent<double>
           if (!reaches(shape, m, *a.pad, tile)) continue;
           const double* field = a.cotangents + 3 * kTactileTile * i;
           double* own =
-              a.of_points == nullptr ? nullptr : a.of_points + kPointNumbers * kTactileTile * i;
+              a.points_bar == nullptr ? nullptr : a.points_bar + kPointNumbers * kTactileTile * i;
           for (int k = 0; k < kTactileTile; k += kGroup)
             pull_back_points<A, OfLaw>(*a.pad, tile, k, field, shape, m, own, sums);
         }
@@ -175,8 +175,8 @@ void pull_back_touch(const TactilePullback& a, int touch, TouchCotangent<double>
 template <class A>
 void pull_back_field(const TactilePullback& a) {
   for (int k = 0; k < a.n_touches; ++k)
-    a.of_law || a.of_points != nullptr ? pull_back_touch<A, true>(a, k, a.out[k])
-                                       : pull_back_touch<A, false>(a, k, a.out[k]);
+    a.with_law || a.points_bar != nullptr ? pull_back_touch<A, true>(a, k, a.out[k])
+                                          : pull_back_touch<A, false>(a, k, a.out[k]);
 }
 
 }  // namespace tangere::kernels

@@ -68,10 +68,10 @@ struct OwnCotangent {
 };
 /// Adds eight points. A point's ks keeps its ratio to kt.
 template <class A>
-void add_own(const OwnCotangent<Lanes<A>>& own, const Coefficients<double>& of_sensor, double* rows,
-             int stride) {
+void add_own(const OwnCotangent<Lanes<A>>& own, const Coefficients<double>& sensor_law,
+             double* rows, int stride) {
   using N = Lanes<A>;
-  const N ratio(of_sensor.kt == 0 ? 0 : of_sensor.ks / of_sensor.kt);
+  const N ratio(sensor_law.kt == 0 ? 0 : sensor_law.ks / sensor_law.kt);
   const N numbers[kPointNumbers] = {
       own.xi.x,   own.xi.y,       own.xi.z, own.law.kn, mul_add(ratio, own.law.ks, own.law.kt),
       own.law.mu, own.law.damping};
@@ -117,12 +117,12 @@ void pull_back_memory(const ShearPullback& m) {
   const LoadedTouch<N> start = loaded<N>(*m.start), end = loaded<N>(*m.end);
   const int stride = m.points.stride;
   const N zero(0.0), one(1.0);
-  Vec6<N> y = zero6<N>(), of_start = zero6<N>();
+  Vec6<N> y = zero6<N>(), start_bar = zero6<N>();
   if (m.slip != nullptr) y = {broadcast<N>(m.slip->a), broadcast<N>(m.slip->l)};
-  TouchCotangent<N> of_end;
-  of_end.displacement = of_end.twist = zero6<N>();
-  of_end.law = {zero, zero, zero, zero, zero};
-  of_end.size = zero3<N>();
+  TouchCotangent<N> end_bar;
+  end_bar.displacement = end_bar.twist = zero6<N>();
+  end_bar.law = {zero, zero, zero, zero, zero};
+  end_bar.size = zero3<N>();
   with_shape<N>(*m.end, [&]<class Shape>(const Shape& shape) {
     for (int k = 0; k < m.points.count; k += kGroup) {
       const Vec3<N> xi = load3<A>(m.points.places, stride, k);
@@ -140,31 +140,32 @@ void pull_back_memory(const ShearPullback& m) {
       if (m.anchor_bar != nullptr) {
         const Anchor<N> after = {gate * load3<A>(m.anchor_bar, stride, k),
                                  gate * load3<A>(m.anchor_bar + 3 * stride, stride, k), zero};
-        s_bar += pull_back_recall(shape, end, xi, p.hold * p.s, after, of_end.displacement, own.xi);
+        s_bar +=
+            pull_back_recall(shape, end, xi, p.hold * p.s, after, end_bar.displacement, own.xi);
       }
       if (m.slip != nullptr) {
         f_bar = (-gate) * (y.l + cross(y.a, p.x2));
         x_bar = cross(y.a, p.force);
       }
       Anchor<N> bar = pull_back_elastic<Shape>(end, law, coefficient_scales<A>(m.points, k), p, xi,
-                                               anchor, f_bar, x_bar, s_bar, of_end, own);
+                                               anchor, f_bar, x_bar, s_bar, end_bar, own);
       if (m.kept != nullptr) {
         const N kept = load_lanes<A>(m.kept + k), found = one - kept;
         store3(kept * bar.b, m.anchor_out, stride, k);
         store3(kept * bar.a, m.anchor_out + 3 * stride, stride, k);
         bar = {found * bar.b, found * bar.a, found * bar.gap};
       }
-      const Vec3<N> s =
-          pull_back_recall(shape, start, xi, load3<A>(m.s_start, stride, k), bar, of_start, own.xi);
+      const Vec3<N> s = pull_back_recall(shape, start, xi, load3<A>(m.s_start, stride, k), bar,
+                                         start_bar, own.xi);
       if (m.own != nullptr) add_own<A>(own, m.end->law, m.own + k, stride);
       store3(load3<A>(m.s_out, stride, k) + s, m.s_out, stride, k);
     }
   });
-  const N* from = &of_end.displacement.a.x;
+  const N* from = &end_bar.displacement.a.x;
   double* to = &m.out->end.displacement.a.x;
   for (std::size_t i = 0; i < sizeof(TouchCotangent<double>) / sizeof(double); ++i)
     to[i] += lane_sum(from[i]);
-  const N* begin = &of_start.a.x;
+  const N* begin = &start_bar.a.x;
   double* by = &m.out->start.a.x;
   for (int i = 0; i < 6; ++i) by[i] += lane_sum(begin[i]);
 }

@@ -96,15 +96,16 @@ Vec3<N> chosen_faces(const PairContact& pair, const Frame<N>& at, const Vec3<N>&
   const N zero(0.0), one(1.0), radius(pair.hull.radius);
   Approach<N> a;
   a.y = transposed_times(at.R, broadcast<N>(pair.hull.frame.p) - at.p);
-  const Vec3<N> by_ball = {half.x + radius, half.y + radius, half.z + radius};
-  const N apart = max(abs(a.y.x) - by_ball.x, max(abs(a.y.y) - by_ball.y, abs(a.y.z) - by_ball.z));
+  const Vec3<N> ball_sum = {half.x + radius, half.y + radius, half.z + radius};
+  const N apart =
+      max(abs(a.y.x) - ball_sum.x, max(abs(a.y.y) - ball_sum.y, abs(a.y.z) - ball_sum.z));
   const auto far = apart > zero;
-  a.sum = by_ball;
+  a.sum = ball_sum;
   a.around = zero;
   if (any(apart <= zero)) {
     Approach<N> near = a;
     measure(pair, at, half, near);
-    a.sum = select(far, by_ball, near.sum);
+    a.sum = select(far, ball_sum, near.sum);
     a.around = select(far, zero, near.around);
   }
   const Vec3<N> gap = {abs(a.y.x) - a.sum.x, abs(a.y.y) - a.sum.y, abs(a.y.z) - a.sum.z};

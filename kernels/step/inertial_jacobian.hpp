@@ -123,15 +123,15 @@ void joint_rates(const Link& link, LinkScratch<N>& o) {
 
 /// Combines a joint's columns by q and v into its columns by x. T is a number or a wrench.
 template <JointKind K, class T, class N>
-void combine(const LinkScratch<N>& o, const N& c0_over_h, const T* by_q, const T* by_v, T* by_x) {
+void combine(const LinkScratch<N>& o, const N& c0_over_h, const T* d_dq, const T* d_dv, T* d_dx) {
   if constexpr (K != JointKind::spherical) {
-    for (int k = 0; k < dofs(K); ++k) by_x[k] = mul_add(c0_over_h, by_v[k], by_q[k]);
+    for (int k = 0; k < dofs(K); ++k) d_dx[k] = mul_add(c0_over_h, d_dv[k], d_dq[k]);
   } else {
     for (int k = 0; k < 3; ++k) {
-      T sum = o.chart.m[0][k] * by_q[0];
-      for (int j = 1; j < 3; ++j) sum = mul_add(o.chart.m[j][k], by_q[j], sum);
-      for (int j = 0; j < 3; ++j) sum = mul_add(o.chart_rate.m[j][k], by_v[j], sum);
-      by_x[k] = sum;
+      T sum = o.chart.m[0][k] * d_dq[0];
+      for (int j = 1; j < 3; ++j) sum = mul_add(o.chart.m[j][k], d_dq[j], sum);
+      for (int j = 0; j < 3; ++j) sum = mul_add(o.chart_rate.m[j][k], d_dv[j], sum);
+      d_dx[k] = sum;
     }
   }
 }
@@ -139,7 +139,7 @@ void combine(const LinkScratch<N>& o, const N& c0_over_h, const T* by_q, const T
 /// Wrenches of a joint's columns by x and by a, and of its rows, Bᶜᵀ S, which have no force.
 template <class N>
 struct JointWrenches {
-  Vec6<N> by_x[3], by_a[3];
+  Vec6<N> d_dx[3], d_da[3];
   Vec3<N> row[3];
 };
 
@@ -154,56 +154,56 @@ void joint_wrenches(const Link& link, const LinkScratch<N>& o, const N& c0_over_
                     JointWrenches<N>& w) {
   if (slides(K) && link.never_rotates) {  // only the force by a matters
     for (int k = 0; k < dofs(K); ++k) {
-      w.by_a[k] = {zero3<N>(), o.mass * joint_axis<K, N>(link, k)};
-      w.by_x[k] = {zero3<N>(), (c0_over_h * c0_over_h) * w.by_a[k].l};
+      w.d_da[k] = {zero3<N>(), o.mass * joint_axis<K, N>(link, k)};
+      w.d_dx[k] = {zero3<N>(), (c0_over_h * c0_over_h) * w.d_da[k].l};
       w.row[k] = zero3<N>();
     }
     return;
   }
-  Vec6<N> by_q[3], by_v[3];
+  Vec6<N> d_dq[3], d_dv[3];
   for (int k = 0; k < dofs(K); ++k) {
     const Vec6<N> rate = o.psi_dot[k] + o.s_dot[k];
     if constexpr (slides(K)) {
-      w.by_a[k] = {cross_axis<K>(link, k, o.moment), o.mass * joint_axis<K, N>(link, k)};
+      w.d_da[k] = {cross_axis<K>(link, k, o.moment), o.mass * joint_axis<K, N>(link, k)};
       w.row[k] = N(2.0) * cross_axis<K>(link, k, o.momentum);
-      by_v[k] = inertia_times_linear(o, rate.l);
-      by_q[k] = inertia_times_linear(o, o.psi_ddot[k].l);
+      d_dv[k] = inertia_times_linear(o, rate.l);
+      d_dq[k] = inertia_times_linear(o, o.psi_ddot[k].l);
     } else {
-      w.by_a[k] = {times_axis<K>(link, k, o.inertia), -cross_axis<K>(link, k, o.moment)};
+      w.d_da[k] = {times_axis<K>(link, k, o.inertia), -cross_axis<K>(link, k, o.moment)};
       w.row[k] = times_axis<K>(link, k, transpose(o.bias));
-      by_v[k] =
+      d_dv[k] =
           inertia_times(o.mass, o.moment, o.inertia, rate) +
           Vec6<N>{times_axis<K>(link, k, o.bias), N(-2.0) * cross_axis<K>(link, k, o.momentum)};
       if (link.parent_never_rotates) {
-        by_q[k] = inertia_times_linear(o, o.psi_ddot[k].l);
+        d_dq[k] = inertia_times_linear(o, o.psi_ddot[k].l);
       } else {
-        by_q[k] =
+        d_dq[k] =
             bias_times(o, o.psi_dot[k]) + inertia_times(o.mass, o.moment, o.inertia, o.psi_ddot[k]);
       }
     }
-    by_v[k] = mul_add(c0_over_h, w.by_a[k], by_v[k]);
+    d_dv[k] = mul_add(c0_over_h, w.d_da[k], d_dv[k]);
   }
-  combine<K>(o, c0_over_h, by_q, by_v, w.by_x);
+  combine<K>(o, c0_over_h, d_dq, d_dv, w.d_dx);
 }
 
 /// Adds the entries of dof d with the dofs of one ancestor's joint. Everything is in the ancestor's
 /// axes.
 template <JointKind K, class N>
 void ancestor_entries(const ModelView& model, const StageArgs<N>& a, int up, int d,
-                      const Vec6<N>& by_x, const Vec6<N>& by_a, const Vec3<N>& row) {
+                      const Vec6<N>& d_dx, const Vec6<N>& d_da, const Vec3<N>& row) {
   const Link& ancestor = model.links[up];
   const LinkScratch<N>& p = a.links[up];
   const EntryRows<N> column = entries_at(model, a, ancestor.v, d),
                      row_of_dof = entries_at(model, a, d, ancestor.v);
   N q[3], v[3], x[3];
   for (int j = 0; j < dofs(K); ++j) {
-    column(j, 0) = project<K>(ancestor, j, by_x);
-    v[j] = a.c0_over_h * project<K>(ancestor, j, by_a);
+    column(j, 0) = project<K>(ancestor, j, d_dx);
+    v[j] = a.c0_over_h * project<K>(ancestor, j, d_da);
     q[j] = N(0.0);
     if (slides(K) && ancestor.never_rotates) continue;
     if constexpr (!slides(K)) v[j] += along_axis<K>(ancestor, j, row);
-    v[j] += dot(by_a, p.psi_dot[j] + p.s_dot[j]);
-    q[j] = dot(row, p.psi_dot[j].a) + dot(by_a, p.psi_ddot[j]);
+    v[j] += dot(d_da, p.psi_dot[j] + p.s_dot[j]);
+    q[j] = dot(row, p.psi_dot[j].a) + dot(d_da, p.psi_ddot[j]);
   }
   combine<K>(p, a.c0_over_h, q, v, x);
   for (int j = 0; j < dofs(K); ++j) row_of_dof(0, j) = x[j];
@@ -218,17 +218,17 @@ void walk_ancestors(const ModelView& model, const StageArgs<N>& a, int i, JointW
     const Frame<N>& local = a.links[i].local;
     for (int k = 0; k < count; ++k) {
       if (!model.links[up].never_rotates) {
-        w.by_x[k] = wrench_to_parent(link, local, w.by_x[k]);
-        w.by_a[k] = wrench_to_parent(link, local, w.by_a[k]);
+        w.d_dx[k] = wrench_to_parent(link, local, w.d_dx[k]);
+        w.d_da[k] = wrench_to_parent(link, local, w.d_da[k]);
         if (link.may_rotate) w.row[k] = local.R * w.row[k];
       } else if (link.may_rotate) {  // nothing above turns, so torques no longer matter
-        w.by_x[k].l = local.R * w.by_x[k].l;
-        w.by_a[k].l = local.R * w.by_a[k].l;
+        w.d_dx[k].l = local.R * w.d_dx[k].l;
+        w.d_da[k].l = local.R * w.d_da[k].l;
       }
     }
     with_kind(model.links[up].kind, [&]<JointKind K>() {
       for (int k = 0; k < count; ++k)
-        ancestor_entries<K>(model, a, up, first + k, w.by_x[k], w.by_a[k], w.row[k]);
+        ancestor_entries<K>(model, a, up, first + k, w.d_dx[k], w.d_da[k], w.row[k]);
     });
   }
 }
@@ -245,20 +245,20 @@ void joint_jacobian(const ModelView& model, const StageArgs<N>& a, int i) {
   joint_wrenches<K>(link, o, a.c0_over_h, w);
   for (int j = 0; j < dofs(K); ++j) {
     const int d = link.v + j;
-    a.mass_diagonal[d] = project<K>(link, j, w.by_a[j]);
-    for (int k = 0; k < dofs(K); ++k) entry(j, k) = project<K>(link, j, w.by_x[k]);
+    a.mass_diagonal[d] = project<K>(link, j, w.d_da[j]);
+    for (int k = 0; k < dofs(K); ++k) entry(j, k) = project<K>(link, j, w.d_dx[k]);
   }
   if (link.effects != 0) add_effect_entries<K>(model, a, link);
   if (link.parent < 0) return;
   // Moving the joint turns the subtree's wrench as well: S × F, by x.
   for (int k = 0; k < dofs(K); ++k) {
     if constexpr (slides(K)) {
-      if (!link.never_rotates) w.by_x[k].a -= cross_axis<K>(link, k, o.F.l);
+      if (!link.never_rotates) w.d_dx[k].a -= cross_axis<K>(link, k, o.F.l);
     } else {
       const Vec3<N> s = K == JointKind::spherical
                             ? Vec3<N>{o.chart.m[0][k], o.chart.m[1][k], o.chart.m[2][k]}
                             : joint_axis<K, N>(link, k);
-      w.by_x[k] += Vec6<N>{cross(s, o.F.a), cross(s, o.F.l)};
+      w.d_dx[k] += Vec6<N>{cross(s, o.F.a), cross(s, o.F.l)};
     }
   }
   walk_ancestors(model, a, i, w);

@@ -66,12 +66,12 @@ Vec6<N> times_column(const Mat3<N> (&m)[2][2], const JointColumns<N>& c, int k) 
 /// body 1's axes, null when it is fixed in the world.
 template <JointKind K, class N>
 void column_wrenches(const LinkScratch<N>& link, const ContactScratch<N>& o,
-                     const JointColumns<N>& c, const Vec6<N>* Z, const N& c0_over_h, Vec6<N>* by_x,
+                     const JointColumns<N>& c, const Vec6<N>* Z, const N& c0_over_h, Vec6<N>* d_dx,
                      Vec6<N>* reaction) {
-  Vec6<N> by_q[3], by_v[3], turn[3];
+  Vec6<N> d_dq[3], d_dv[3], turn[3];
   for (int k = 0; k < dofs(K); ++k) {
-    by_v[k] = times_column<K>(o.sums.d, c, k);
-    by_q[k] = times_column<K>(o.sums.k, c, k);
+    d_dv[k] = times_column<K>(o.sums.d, c, k);
+    d_dq[k] = times_column<K>(o.sums.k, c, k);
     const Vec6<N>& S = c.S[k];
     if (Z != nullptr || c.rates) {
       Vec6<N> rate = c.rates ? c.psi_dot[k] : zero6<N>();
@@ -79,17 +79,17 @@ void column_wrenches(const LinkScratch<N>& link, const ContactScratch<N>& o,
         rate.l -= cross(Z->a, S.l);
         if constexpr (!slides(K)) rate -= {cross(Z->a, S.a), cross(Z->l, S.a)};
       }
-      by_q[k] += times<slides(K)>(o.sums.d, rate);
+      d_dq[k] += times<slides(K)>(o.sums.d, rate);
     }
     if (Z != nullptr)
       turn[k] =
           slides(K) ? Vec6<N>{cross(S.l, o.sums.wrench.l), zero3<N>()} : turned(o.sums.wrench, S);
   }
-  combine<K>(link, c0_over_h, by_q, by_v, by_x);
+  combine<K>(link, c0_over_h, d_dq, d_dv, d_dx);
   if (Z == nullptr) return;
   const Vec6<N> none[3] = {zero6<N>(), zero6<N>(), zero6<N>()};
   combine<K>(link, c0_over_h, turn, none, reaction);
-  for (int k = 0; k < dofs(K); ++k) reaction[k] = by_x[k] - reaction[k];
+  for (int k = 0; k < dofs(K); ++k) reaction[k] = d_dx[k] - reaction[k];
 }
 
 /// Adds ± Sᵀ w for every row of one joint and every column of another.
@@ -131,14 +131,14 @@ void contact_jacobian(const ModelView& model, const StageArgs<N>& a, int body1, 
   for (int c = 0; c < total; ++c) {
     if (shared(c)) continue;
     const Link& column = model.links[joints[c].link];
-    Vec6<N> by_x[3], reaction[3];
+    Vec6<N> d_dx[3], reaction[3];
     with_kind(column.kind, [&]<JointKind K>() {
-      column_wrenches<K>(a.links[joints[c].link], o, joints[c], Z, a.c0_over_h, by_x, reaction);
+      column_wrenches<K>(a.links[joints[c].link], o, joints[c], Z, a.c0_over_h, d_dx, reaction);
     });
     for (int r = 0; r < total; ++r) {
       const bool first_body = r < n1;
       with_kind(model.links[joints[r].link].kind, [&]<JointKind K>() {
-        add_block<K>(model, a, joints[r], column, first_body || Z == nullptr ? by_x : reaction,
+        add_block<K>(model, a, joints[r], column, first_body || Z == nullptr ? d_dx : reaction,
                      first_body == (c < n1));
       });
     }

@@ -25,10 +25,10 @@ namespace tangere::kernels {
 template <class N>
 struct JointLoad {
   N force[3];
-  N magnitude[3];   ///< sum of the magnitudes of its parts, without inertia
-  N by_q[3];        ///< diagonal; joints that do not turn freely
-  Mat3<N> by_turn;  ///< by the right tangent; spherical joints
-  N by_v[3];        ///< diagonal; includes c₀/h times the armature
+  N magnitude[3];    ///< sum of the magnitudes of its parts, without inertia
+  N d_dq[3];         ///< diagonal; joints that do not turn freely
+  Mat3<N> d_dtheta;  ///< by the right tangent; spherical joints
+  N d_dv[3];         ///< diagonal; includes c₀/h times the armature
   N armature[3];
 };
 
@@ -68,19 +68,19 @@ void add_plain_effects(const StageArgs<N>& a, const Link& link, const DofEffects
   if (link.effects & kSpring) {
     const N stiffness = load_parameter(a, e.stiffness);
     add_force(out, k, stiffness * (N(e.rest) - q));
-    out.by_q[k] += stiffness;
+    out.d_dq[k] += stiffness;
   }
   if (link.effects & kLimit) {
     N slope;
     add_force(out, k, limit_force(e, load_parameter(a, e.limit_stiffness), q, slope));
-    out.by_q[k] += slope;
+    out.d_dq[k] += slope;
   }
   if (link.effects & kPositionServo) {
     const N P = load_parameter(a, e.P), D = load_parameter(a, e.D);
     N inside;
     add_force(out, k, motor_force(e, P, D, a.target[link.v + k] - q, a.v[link.v + k], inside));
-    out.by_q[k] += inside * P;
-    out.by_v[k] += inside * D;
+    out.d_dq[k] += inside * P;
+    out.d_dv[k] += inside * D;
   }
 }
 
@@ -103,11 +103,11 @@ void add_turning_limits(const StageArgs<N>& a, const DofEffects* e, const Quat<N
   const Mat3<N> inverse = inverse_left_jacobian(at);
   add_torque(out, inverse * force);
   if constexpr (Derivatives) {
-    Mat3<N> by_phi = -inverse_left_jacobian_derivative(at, force);
+    Mat3<N> d_dphi = -inverse_left_jacobian_derivative(at, force);
     for (int i = 0; i < 3; ++i)
       for (int k = 0; k < 3; ++k)
-        by_phi.m[i][k] = mul_add(inverse.m[i][k], slope[k], by_phi.m[i][k]);
-    out.by_turn += by_phi * inverse_right_jacobian(at);
+        d_dphi.m[i][k] = mul_add(inverse.m[i][k], slope[k], d_dphi.m[i][k]);
+    out.d_dtheta += d_dphi * inverse_right_jacobian(at);
   }
 }
 
@@ -123,17 +123,17 @@ void add_turning_motor(const StageArgs<N>& a, const Link& link, const DofEffects
     const N P = load_parameter(a, e[i].P), D = load_parameter(a, e[i].D);
     N inside;
     add_force(out, i, motor_force(e[i], P, D, psi[i], a.v[link.v + i], inside));
-    out.by_v[i] += inside * D;
+    out.d_dv[i] += inside * D;
     if constexpr (Derivatives)
       for (int k = 0; k < 3; ++k)
-        out.by_turn.m[i][k] = mul_add(inside * P, slope.m[i][k], out.by_turn.m[i][k]);
+        out.d_dtheta.m[i][k] = mul_add(inside * P, slope.m[i][k], out.d_dtheta.m[i][k]);
   }
 }
 
 template <bool Derivatives, class N>
 void add_turning_effects(const StageArgs<N>& a, const Link& link, const DofEffects* e,
                          JointLoad<N>& out) {
-  out.by_turn = zero33<N>();
+  out.d_dtheta = zero33<N>();
   const N *c = a.centre + link.q, *x = a.x + link.v;
   const Quat<N> q = Quat<N>{c[0], c[1], c[2], c[3]} * quaternion_exp(Vec3<N>{x[0], x[1], x[2]});
   if (link.effects & kSpring) {
@@ -141,7 +141,7 @@ void add_turning_effects(const StageArgs<N>& a, const Link& link, const DofEffec
     const RotationVector<N> turn = rotation_vector<false>(conjugate(rest) * q);
     const N stiffness = load_parameter(a, e[0].stiffness);
     add_torque(out, -(stiffness * turn.phi));
-    if constexpr (Derivatives) out.by_turn += stiffness * inverse_right_jacobian(turn);
+    if constexpr (Derivatives) out.d_dtheta += stiffness * inverse_right_jacobian(turn);
   }
   if (link.effects & kLimit) add_turning_limits<Derivatives>(a, e, q, out);
   if (link.effects & kPositionServo) add_turning_motor<Derivatives>(a, link, e, q, out);
@@ -165,11 +165,11 @@ void joint_load(const ModelView& model, const StageArgs<N>& a, const Link& link,
   const DofEffects* e = model.effects + link.v;
   for (int k = 0; k < dofs(K); ++k) {
     const int d = link.v + k;
-    out.force[k] = out.magnitude[k] = out.by_q[k] = out.by_v[k] = out.armature[k] = N(0.0);
+    out.force[k] = out.magnitude[k] = out.d_dq[k] = out.d_dv[k] = out.armature[k] = N(0.0);
     if (link.effects & kArmature) {
       out.armature[k] = load_parameter(a, e[k].armature);
       out.force[k] -= out.armature[k] * mul_add(a.c0_over_h, a.v[d], a.inverse_h * a.s[d]);
-      out.by_v[k] = a.c0_over_h * out.armature[k];
+      out.d_dv[k] = a.c0_over_h * out.armature[k];
     }
     if constexpr (K != JointKind::spherical)
       if (link.effects & kPositionDependent) add_plain_effects(a, link, e[k], k, out);
@@ -192,14 +192,14 @@ template <JointKind K, class N>
 
 /// Adds the derivatives of a force by v, which are diagonal, to the joint's block of A.
 template <JointKind K, class N>
-void add_by_v(const ModelView& model, const StageArgs<N>& a, const Link& link, int j,
-              const N& by_v) {
+void add_v_derivative(const ModelView& model, const StageArgs<N>& a, const Link& link, int j,
+                      const N& d_dv) {
   const EntryRows<N> entry = entries_at(model, a, link.v + j, link.v);
   if constexpr (K != JointKind::spherical) {
-    entry(0, j) = mul_add(a.c0_over_h, by_v, entry(0, j));
+    entry(0, j) = mul_add(a.c0_over_h, d_dv, entry(0, j));
   } else {
     const LinkScratch<N>& o = a.links[&link - model.links];
-    for (int k = 0; k < 3; ++k) entry(0, k) = mul_add(o.chart_rate.m[j][k], by_v, entry(0, k));
+    for (int k = 0; k < 3; ++k) entry(0, k) = mul_add(o.chart_rate.m[j][k], d_dv, entry(0, k));
   }
 }
 
@@ -210,16 +210,16 @@ template <JointKind K, class N>
   joint_load<K, true>(model, a, link, load);
   for (int j = 0; j < dofs(K); ++j) {
     a.mass_diagonal[link.v + j] += load.armature[j];
-    add_by_v<K>(model, a, link, j, load.by_v[j]);
+    add_v_derivative<K>(model, a, link, j, load.d_dv[j]);
     if (!(link.effects & kPositionDependent)) continue;
     const EntryRows<N> entry = entries_at(model, a, link.v + j, link.v);
     if constexpr (K != JointKind::spherical) {
-      entry(0, j) += load.by_q[j];
+      entry(0, j) += load.d_dq[j];
     } else {
       const Mat3<N>& chart = a.links[&link - model.links].chart;
       for (int k = 0; k < 3; ++k)
         for (int i = 0; i < 3; ++i)
-          entry(0, k) = mul_add(load.by_turn.m[j][i], chart.m[i][k], entry(0, k));
+          entry(0, k) = mul_add(load.d_dtheta.m[j][i], chart.m[i][k], entry(0, k));
     }
   }
 }
@@ -229,7 +229,7 @@ template <JointKind K, class N>
 void add_effect_entries(const ModelView& model, const StageArgs<N>& a, const Link& link) {
   if (link.effects & kDamping)
     for (int j = 0; j < dofs(K); ++j)
-      add_by_v<K>(model, a, link, j, load_parameter(a, model.effects[link.v + j].damping));
+      add_v_derivative<K>(model, a, link, j, load_parameter(a, model.effects[link.v + j].damping));
   if (link.effects & kBeyondDamping) add_load_entries<K>(model, a, link);
 }
 

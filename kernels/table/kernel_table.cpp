@@ -94,16 +94,16 @@ struct Registry {
       return;
     }
     active = tables[0];
-    const char* wanted = std::getenv("TANGERE_ISA");
-    if (wanted == nullptr || *wanted == '\0') return;
+    const char* requested = std::getenv("TANGERE_ISA");
+    if (requested == nullptr || *requested == '\0') return;
     for (std::size_t i = 0; i < count; ++i) {
-      if (std::strcmp(wanted, tables[i]->name) == 0) {
+      if (std::strcmp(requested, tables[i]->name) == 0) {
         active = tables[i];
         return;
       }
     }
     error =
-        "TANGERE_ISA=" + std::string(wanted) +
+        "TANGERE_ISA=" + std::string(requested) +
         ": an instruction set that this machine does not run or this program was built without; "
         "expected one of " +
         names;

@@ -202,8 +202,8 @@ void write_dense(const PadTiles& pad, int tile, const Real* from, Real* dense) {
 
 /// Returns f<Shape>() for every shape. A shape is then chosen once per tile or chunk of tiles.
 template <class P, class F>
-constexpr auto by_shape(const F& f) {
-  return by_pad<P>(f, Shapes{});
+constexpr auto per_shape(const F& f) {
+  return per_pad<P>(f, Shapes{});
 }
 
 /// Returns which of eight spheres a shape comes near to.
@@ -248,7 +248,7 @@ inline bool may_touch(NearShapes near, int k) { return k >= 64 || ((near >> k) &
 
 template <class P>
 NearShapes near_shapes(const TactileArgs<typename P::Real>& a) {
-  static constexpr auto kNear = by_shape<P>([]<class Shape>() { return &near_parts<P, Shape>; });
+  static constexpr auto kNear = per_shape<P>([]<class Shape>() { return &near_parts<P, Shape>; });
   NearShapes near = 0;
   for (int k = 0; k < a.n_touches && k < 64; ++k) {
     const bool here = kNear[std::size_t(a.shapes[k].shape)](*a.pad, a.shapes[k], a.touches[k]);
@@ -266,7 +266,8 @@ class NearEights {
   /// Goes on to the eight tiles from `first` on, a multiple of eight. Returns false where nothing
   /// may touch the 64 tiles that begin there.
   bool move(int first) {
-    static constexpr auto kNear = by_shape<P>([]<class Shape>() { return &near_eights<P, Shape>; });
+    static constexpr auto kNear =
+        per_shape<P>([]<class Shape>() { return &near_eights<P, Shape>; });
     const int eight = first / kGroup;
     bit_ = 1U << (eight % kGroup);
     if (!many_ || eight % kGroup != 0) return true;
@@ -293,7 +294,7 @@ template <class P, ContactLaw Law>
 int tactile_field(const TactileArgs<typename P::Real>& a) {
   using Real = typename P::Real;
   static constexpr auto kForce =
-      by_shape<P>([]<class Shape>() { return &chunk_force<P, Law, Shape>; });
+      per_shape<P>([]<class Shape>() { return &chunk_force<P, Law, Shape>; });
   const NearShapes near = near_shapes<P>(a);
   if (near == 0 && a.n_touches <= 64) return 0;
   NearEights<P> eights(a, near);

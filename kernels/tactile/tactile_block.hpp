@@ -126,7 +126,7 @@ void write_lanes(const TactileBlockArgs<typename P::Real>& a, int tile, const ty
 template <class P>
 NearShapes near_shapes(const TactileBlockArgs<typename P::Real>& a) {
   using D = Lanes<typename P::Architecture>;
-  static constexpr auto kNear = by_shape<P>([]<class Shape>() { return &near_pad<P, Shape, D>; });
+  static constexpr auto kNear = per_shape<P>([]<class Shape>() { return &near_pad<P, Shape, D>; });
   NearShapes near = 0;
   for (int k = 0; k < a.n_touches && k < 64; ++k)
     for (int g = 0; g < P::kLanes / kGroup; ++g) {
@@ -140,7 +140,7 @@ NearShapes near_shapes(const TactileBlockArgs<typename P::Real>& a) {
 template <class P, ContactLaw Law>
 void tactile_block(const TactileBlockArgs<typename P::Real>& a) {
   static constexpr auto kForce =
-      by_shape<P>([]<class Shape>() { return &tile_lanes<P, Law, Shape>; });
+      per_shape<P>([]<class Shape>() { return &tile_lanes<P, Law, Shape>; });
   const NearShapes near = near_shapes<P>(a);
   if (near == 0 && a.n_touches <= 64) return;
   typename P::N buffer[P::kComponents * kTactileTile];

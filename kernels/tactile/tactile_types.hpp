@@ -119,9 +119,9 @@ struct TactilePullback {
   int count;                     ///< tiles
   const int* tiles;              ///< (count)
   const double* cotangents;      ///< (count, 3, 64) of the field [loss/N]
-  bool of_law;  ///< also differentiate by coefficients and shapes' sizes; else those are zero
+  bool with_law;  ///< also differentiate by coefficients and shapes' sizes; else those are zero
   /// (count, kPointNumbers, 64) derivatives by every point's own numbers, added to; or nullptr.
-  double* of_points;
+  double* points_bar;
   TouchCotangent<double>* out;  ///< (n_touches), pad axes and origin; body 1 is the sensor's
 };
 

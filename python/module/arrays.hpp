@@ -133,7 +133,7 @@ struct type_caster<tangere::python::Argument<T>> {
   bool from_python(handle source, std::uint8_t flags, cleanup_list* cleanup) noexcept {
     make_caster<typename Value::Base> caster;
     try {
-      if (!of_numbers(source)) return false;
+      if (!holds_numbers(source)) return false;
     } catch (const python_error&) {
       return false;
     }
@@ -155,7 +155,7 @@ struct type_caster<tangere::python::Argument<T>> {
     }
   }
   /// Complex numbers would lose a part, and None would become NaN.
-  static bool of_numbers(handle source) {
+  static bool holds_numbers(handle source) {
     const object array = hasattr(source, "dtype")
                              ? borrow(source)
                              : module_::import_("numpy").attr("asarray")(source);

@@ -288,9 +288,9 @@ nb::tuple SceneTape::reverse_start(const Argument<double>& observation_bar) {
     std::ranges::fill(q, 0.0);
     std::ranges::fill(points, 0.0);
     for (std::size_t e = 0; e < count(); ++e) {
-      add_by_coordinates(model(), std::span(first_q_).subspan(e * nq(), nq()),
-                         std::span<const double>(along).subspan(e * nv(), nv()),
-                         q.subspan(e * nq(), nq()));
+      add_along_coordinates(model(), std::span(first_q_).subspan(e * nq(), nq()),
+                            std::span<const double>(along).subspan(e * nv(), nv()),
+                            q.subspan(e * nq(), nq()));
       if (!each.empty()) add_points(e, std::span(each).subspan(e * points.size()), points);
     }
   }
@@ -362,13 +362,13 @@ nb::tuple SceneTape::reverse_bodies(const Argument<double>& q, const Argument<do
   using kernels::kBlock;
   const std::size_t nb = as_size(model().nb());
   const auto bar = numbers_of(body_bar, {count(), nb, kMotion}, "derivatives by bodies");
-  std::span<double> by_q, by_v;
-  auto q_bar = new_array<double>({count(), nq()}, by_q),
-       v_bar = new_array<double>({count(), nv()}, by_v);
+  std::span<double> q_bar_data, v_bar_data;
+  auto q_bar = new_array<double>({count(), nq()}, q_bar_data),
+       v_bar = new_array<double>({count(), nv()}, v_bar_data);
   const auto work = [&] {
     const nb::gil_scoped_release free;
     Posed& states = posed(q, v, varying);
-    std::ranges::fill(by_q, 0.0);
+    std::ranges::fill(q_bar_data, 0.0);
     std::vector<double> at(nq()), along(nv());
     BlockCotangent c;
     for (std::size_t first = 0; first < count(); first += kBlock) {
@@ -387,10 +387,10 @@ nb::tuple SceneTape::reverse_bodies(const Argument<double>& q, const Argument<do
         const std::size_t e = first + l;
         for (std::size_t i = 0; i < nv(); ++i) {
           along[i] = c.q[i * kBlock + l];
-          by_v[e * nv() + i] = c.v[i * kBlock + l];
+          v_bar_data[e * nv() + i] = c.v[i * kBlock + l];
         }
         states.batch.get_q(static_cast<int>(e), at);
-        add_by_coordinates(model(), at, along, by_q.subspan(e * nq(), nq()));
+        add_along_coordinates(model(), at, along, q_bar_data.subspan(e * nq(), nq()));
       }
     }
   };

@@ -29,15 +29,15 @@ constexpr int kPasses = 3;
 constexpr double kEnoughSeconds = 0.3;  // of CPU time, after which a pass is not repeated
 constexpr double kBlur = 10, kFineEnough = 40;
 /// Confirmation runs: least speedup over the best confirmed setting, and largest count.
-constexpr double kWorthALook = 1.1;
-constexpr int kMostLooks = 3;
+constexpr double kWorthRepeating = 1.1;
+constexpr int kMostRepeats = 3;
 
-/// Share of the errors that are 0.3 to 3 times `wanted`. NaN entries do not count.
-double share_near(double wanted, const std::vector<double>& errors) {
-  if (!(wanted > 0)) return std::nan("");
+/// Share of the errors that are 0.3 to 3 times `requested`. NaN entries do not count.
+double share_near(double requested, const std::vector<double>& errors) {
+  if (!(requested > 0)) return std::nan("");
   const auto known = std::ranges::count_if(errors, [](double x) { return !std::isnan(x); });
-  const auto near =
-      std::ranges::count_if(errors, [&](double x) { return x >= 0.3 * wanted && x <= 3 * wanted; });
+  const auto near = std::ranges::count_if(
+      errors, [&](double x) { return x >= 0.3 * requested && x <= 3 * requested; });
   return static_cast<double>(near) / static_cast<double>(known);
 }
 
@@ -66,7 +66,7 @@ class Sweep {
 
   AccuracyReport run() {
     if (!find_reference()) return stop();
-    if (!report_.resolved) look_for_vibration();
+    if (!report_.resolved) check_vibration();
     if (report_.reference.environments == 0) return std::move(report_);  // the reference failed
     if (!measure_points() || !recompute_snapshots()) return stop();
     measure_orders();
@@ -140,7 +140,7 @@ class Sweep {
   }
 
   /// Measures vibration in the environment with the median reference error.
-  void look_for_vibration() {
+  void check_vibration() {
     if (episodes_.start.model().sensors().empty() || report_.reference.environments == 0) return;
     const double middle = quantile(errors_of_environments_, 0.5);
     const auto at = std::ranges::find(errors_of_environments_, middle);
@@ -154,10 +154,10 @@ class Sweep {
   [[nodiscard]] double tolerance_in_force(StepperOptions options) const {
     const Model& model = episodes_.start.model();
     options.sleep = 0;
-    options.differentiable = of_gradients();
+    options.differentiable = compares_gradients();
     return Stepper(model, options).tolerance();
   }
-  [[nodiscard]] bool of_gradients() const {
+  [[nodiscard]] bool compares_gradients() const {
     return options_.quantity == AccuracyQuantity::gradient;
   }
 
@@ -166,14 +166,14 @@ class Sweep {
   void give_tolerance(AccuracySetting& setting) const {
     const double step = episodes_.interval() / setting.parts;
     std::optional<double> tolerance = options_.tolerance;
-    if (!tolerance && !of_gradients() && setting.accuracy == 0)
+    if (!tolerance && !compares_gradients() && setting.accuracy == 0)
       tolerance = episodes_.start.model().following_tolerance(setting.integrator, step);
     setting.tolerance = tolerance_in_force({.integrator = setting.integrator,
                                             .timestep = step,
                                             .tolerance = tolerance,
                                             .accuracy = setting.accuracy});
     setting.follows =
-        !of_gradients() && !options_.tolerance && !episodes_.start.model().solver().tolerance;
+        !compares_gradients() && !options_.tolerance && !episodes_.start.model().solver().tolerance;
   }
 
   /// Plays a setting up to kPasses times; the least times count. Returns false when stopped.
@@ -210,8 +210,8 @@ class Sweep {
     const auto steps =
         static_cast<double>(std::max<std::int64_t>(1, outcome.counts.simulation_steps));
     point.evaluations = static_cast<double>(outcome.counts.newton_iterations) / steps;
-    point.split =
-        of_gradients() ? std::nan("") : static_cast<double>(outcome.counts.split_steps) / steps;
+    point.split = compares_gradients() ? std::nan("")
+                                       : static_cast<double>(outcome.counts.split_steps) / steps;
     point.rate = outcome.simulated_seconds / (outcome.step_seconds + outcome.read_seconds[p]);
     point.failed = static_cast<int>(outcome.failures.size());
     point.status = status_of(outcome, episodes_.start.environments());
@@ -275,53 +275,53 @@ class Sweep {
   }
 
   /// First points of the settings that may be cheaper than the best that is sure, fastest first.
-  [[nodiscard]] std::vector<std::size_t> worth_a_look() const {
+  [[nodiscard]] std::vector<std::size_t> worth_repeating() const {
     double sure = 0;
     std::vector<std::size_t> found;
     for (std::size_t i = 0; i < report_.points.size(); ++i)
       if (suffices(report_.points[i])) sure = std::max(sure, report_.points[i].rate);
     // Of a setting's precisions the fastest that may do counts.
-    std::vector<std::pair<double, std::size_t>> by_rate;
+    std::vector<std::pair<double, std::size_t>> ranked;
     for (std::size_t i = 0; i < report_.points.size(); i += precisions()) {
       double fastest = 0;
       for (const AccuracyPoint& p : std::span(report_.points).subspan(i, precisions()))
         if (meets_target(p.error) && !meets_target(p.bound)) fastest = std::max(fastest, p.rate);
-      if (fastest > kWorthALook * sure) by_rate.emplace_back(fastest, i);
+      if (fastest > kWorthRepeating * sure) ranked.emplace_back(fastest, i);
     }
-    std::ranges::sort(by_rate, std::greater<>());
-    for (const auto& [rate, i] : by_rate) found.push_back(i);
-    if (found.size() > kMostLooks) found.resize(kMostLooks);
+    std::ranges::sort(ranked, std::greater<>());
+    for (const auto& [rate, i] : ranked) found.push_back(i);
+    if (found.size() > kMostRepeats) found.resize(kMostRepeats);
     return found;
   }
 
   /// A few environments can be much worse than the rest, and the bound of 64 takes the worst of
   /// them. More environments bound the same quantile by a smaller error.
   bool recompute_snapshots() {
-    const std::vector<std::size_t> candidates = worth_a_look();
+    const std::vector<std::size_t> candidates = worth_repeating();
     if (!report_.resolved || !fresh_ || candidates.empty()) return true;
     const std::optional<FixedEpisodes> episodes = fresh_();
     if (!episodes) return false;
-    if (listener_.second_look) listener_.second_look();
+    if (listener_.before_confirmation) listener_.before_confirmation();
     const std::unique_ptr<AccuracyRun> run =
         make_accuracy_run(*episodes, options_.quantity, options_.threads);
     const AccuracyOutcome made = run->make_reference(report_.reference.setting, listener_.stop);
     if (made.stopped) return false;
     failed_again_ = static_cast<int>(made.failures.size());
     for (const std::size_t first : candidates) {
-      const AccuracyOutcome seen = run->compare(report_.points[first].setting, listener_.stop);
-      if (seen.stopped) return false;
+      const AccuracyOutcome repeated = run->compare(report_.points[first].setting, listener_.stop);
+      if (repeated.stopped) return false;
       const std::span points = std::span(report_.points).subspan(first, precisions());
-      for (std::size_t p = 0; p < points.size(); ++p) add(seen, p, points[p]);
+      for (std::size_t p = 0; p < points.size(); ++p) add(repeated, p, points[p]);
       if (listener_.setting) listener_.setting(points);
     }
     return true;
   }
 
-  void add(const AccuracyOutcome& seen, std::size_t precision, AccuracyPoint& point) const {
-    const std::vector<double>& more = seen.error[precision];
+  void add(const AccuracyOutcome& repeated, std::size_t precision, AccuracyPoint& point) const {
+    const std::vector<double>& more = repeated.error[precision];
     point.errors.insert(point.errors.end(), more.begin(), more.end());
-    if (point.failed == 0) point.status = status_of(seen, static_cast<int>(more.size()));
-    point.failed += static_cast<int>(seen.failures.size());
+    if (point.failed == 0) point.status = status_of(repeated, static_cast<int>(more.size()));
+    point.failed += static_cast<int>(repeated.failures.size());
     set_errors(point);
   }
 
@@ -329,7 +329,7 @@ class Sweep {
     const Model& model = episodes_.start.model();
     const AccuracySetting setting = {model.integrator(), episodes_.every, tolerance_in_force({}),
                                      Stepper(model).accuracy(),
-                                     !of_gradients() && !model.solver().tolerance};
+                                     !compares_gradients() && !model.solver().tolerance};
     const auto swept = std::ranges::find(report_.points, setting, &AccuracyPoint::setting);
     if (swept != report_.points.end()) {
       report_.own = *swept;

@@ -91,7 +91,7 @@ struct AccuracyListener {
   std::stop_token stop;                                         ///< ends it before any sample
   std::function<void(const AccuracyReference&)> reference;      ///< each attempt, ever finer
   std::function<void(std::span<const AccuracyPoint>)> setting;  ///< in every precision
-  std::function<void()> second_look{};                          ///< before the confirmation run
+  std::function<void()> before_confirmation{};                  ///< before the confirmation run
 };
 
 /// Makes episodes of the same kind with random numbers that no others have; none when stopped.

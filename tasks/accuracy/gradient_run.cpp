@@ -20,14 +20,14 @@ constexpr double kTapeBytes = 2.5e8;  // of a thread; longer episodes are played
 class SampledLoss : public RolloutLoss {
  public:
   SampledLoss(const FixedEpisodes& episodes, int parts)
-      : episodes_(episodes), parts_(parts), of_samples_(loss_of(episodes.start.model(), parts)) {}
+      : episodes_(episodes), parts_(parts), loss_(loss_of(episodes.start.model(), parts)) {}
   [[nodiscard]] bool reads_fields(std::int64_t step) const override {
-    return of_samples_->reads_fields(step);
+    return loss_->reads_fields(step);
   }
   double evaluate(const LossPoint& at, const LossCotangent& out) const override {
     const int samples = episodes_.samples_of[as_size(at.environment)];
     if (at.step == 0 || at.step % parts_ != 0 || at.step / parts_ > samples) return 0;
-    return of_samples_->evaluate(at, out);
+    return loss_->evaluate(at, out);
   }
 
  private:
@@ -37,7 +37,7 @@ class SampledLoss : public RolloutLoss {
 
   const FixedEpisodes& episodes_;
   int parts_;
-  std::unique_ptr<RolloutLoss> of_samples_;
+  std::unique_ptr<RolloutLoss> loss_;
 };
 
 TapeOptions options_of(const FixedEpisodes& episodes, const AccuracySetting& setting, int threads) {
@@ -58,9 +58,9 @@ TapeOptions options_of(const FixedEpisodes& episodes, const AccuracySetting& set
 GradientRun::GradientRun(const FixedEpisodes& episodes, int threads)
     : episodes_(episodes), threads_(threads) {
   const Model& model = episodes.start.model();
-  const bool by_controls = model.nu() > 0;
-  rows_ = by_controls ? as_size(episodes.samples) : 2;
-  width_ = as_size(by_controls ? model.nu() : model.nv());
+  const bool has_controls = model.nu() > 0;
+  rows_ = has_controls ? as_size(episodes.samples) : 2;
+  width_ = as_size(has_controls ? model.nu() : model.nv());
 }
 
 AccuracyOutcome GradientRun::play(const AccuracySetting& setting, const std::stop_token& stop,

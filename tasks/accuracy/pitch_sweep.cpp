@@ -143,10 +143,10 @@ class Rung {
       distance += (here[k] - there[k]) * (here[k] - there[k]);
       strayed += (here[3 + k] - there[3 + k]) * (here[3 + k] - there[3 + k]);
     }
-    const bool felt = here[0] != 0 || here[1] != 0 || here[2] != 0;
+    const bool loaded = here[0] != 0 || here[1] != 0 || here[2] != 0;
     square_[index(s, e)] += square;
     distance_[index(s, e)] += distance;
-    if (felt) strayed_[index(s, e)] += square * strayed;
+    if (loaded) strayed_[index(s, e)] += square * strayed;
   }
 
   /// Fills in the errors of a sensor. Environments without a force do not count.
@@ -207,7 +207,7 @@ class Pitches {
     return true;
   }
 
-  [[nodiscard]] PitchSweep of_sensor(std::size_t s, double target) const {
+  [[nodiscard]] PitchSweep sensor_sweep(std::size_t s, double target) const {
     PitchSweep sweep;
     sweep.sensor = static_cast<int>(s);
     sweep.left_out = reason_against_sweep(episodes_.start.model().scene().sensors[s]);
@@ -288,7 +288,7 @@ std::vector<PitchSweep> sweep_pitches(const FixedEpisodes& episodes, double targ
   if (!pitches.play(stop)) return {};
   std::vector<PitchSweep> sweeps;
   for (std::size_t s = 0; s < episodes.start.model().sensors().size(); ++s)
-    sweeps.push_back(pitches.of_sensor(s, target));
+    sweeps.push_back(pitches.sensor_sweep(s, target));
   return sweeps;
 }
 

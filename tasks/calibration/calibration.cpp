@@ -101,10 +101,10 @@ Names choose_numbers(const CalibrationRequest& request, const PressRecording& re
           fmt::format("'{}' cannot be fitted; expected some of {}", name, fmt::join(known, ", ")));
   Names out;
   for (const std::string& name : request.numbers.empty() ? usual : known) {
-    const bool wanted = std::ranges::count(request.numbers, name) > 0;
-    if (!request.numbers.empty() && !wanted) continue;
+    const bool requested = std::ranges::count(request.numbers, name) > 0;
+    if (!request.numbers.empty() && !requested) continue;
     if (const std::string reason = reason_against(name, recording, rows); !reason.empty()) {
-      if (wanted) throw InputError(fmt::format("'{}' cannot be fitted: {}", name, reason));
+      if (requested) throw InputError(fmt::format("'{}' cannot be fitted: {}", name, reason));
       untold.push_back({name, reason});
       continue;
     }

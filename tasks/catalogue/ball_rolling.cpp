@@ -64,9 +64,9 @@ class BallRolling : public Task {
 
   void reward_vjp(const TaskView& view, double weight, const ViewCotangent& out) const override {
     for (std::size_t k = 0; k < 2; ++k) {
-      const double by_ball = weight * 2 * to_goal(view, k) / (kLength * kLength);
-      out.snapshots.back().q[ball_v_ + k] += by_ball;
-      out.task_state[k] -= by_ball;
+      const double ball_bar = weight * 2 * to_goal(view, k) / (kLength * kLength);
+      out.snapshots.back().q[ball_v_ + k] += ball_bar;
+      out.task_state[k] -= ball_bar;
     }
     for (std::size_t k = 0; k < 3; ++k) out.action[k] -= weight * 2 * kEffort * view.action[k];
   }

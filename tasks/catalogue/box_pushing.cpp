@@ -90,14 +90,14 @@ class BoxPushing : public Task {
     // Every joint here slides or turns about one axis: coordinates and dofs have the same places.
     const Snapshot& now = view.now();
     const SnapshotCotangent& to = out.snapshots.back();
-    const std::array<double, 3> by_goal = in_hand_vjp(
+    const std::array<double, 3> goal_bar = in_hand_vjp(
         now, {view.task_state[kGoal], view.task_state[kGoal + 1], view.task_state[kGoal + 2]},
         weight, to);
-    for (std::size_t k = 0; k < 3; ++k) out.task_state[kGoal + k] += by_goal[k];
+    for (std::size_t k = 0; k < 3; ++k) out.task_state[kGoal + k] += goal_bar[k];
     if (observation_ == PushObservation::privileged) {
-      const std::array<double, 3> by_box = in_hand_vjp(now, box_pose(now), weight.subspan(3), to);
-      for (std::size_t k = 0; k < 2; ++k) to.q[box_ + k] += by_box[k];
-      to.q[box_turn_] += by_box[2];
+      const std::array<double, 3> box_bar = in_hand_vjp(now, box_pose(now), weight.subspan(3), to);
+      for (std::size_t k = 0; k < 2; ++k) to.q[box_ + k] += box_bar[k];
+      to.q[box_turn_] += box_bar[2];
     }
     if (observation_ == PushObservation::tactile)
       for (std::size_t i = 0; i < to.tactile.size(); ++i) to.tactile[i] += weight[3 + i];
@@ -124,17 +124,17 @@ class BoxPushing : public Task {
     const SnapshotCotangent& to = out.snapshots.back();
     // Every joint here slides or turns about one axis: coordinates and dofs have the same places.
     for (std::size_t k = 0; k < 2; ++k) {
-      const double by_place = weight * 2 * kPosition * off[k] / square(kLengthUnit);
-      to.q[box_ + k] -= by_place;
-      out.task_state[kGoal + k] += by_place;
+      const double place_bar = weight * 2 * kPosition * off[k] / square(kLengthUnit);
+      to.q[box_ + k] -= place_bar;
+      out.task_state[kGoal + k] += place_bar;
       const double gap =
           weight * 2 * (now.end_effectors[kTip + k] - now.end_effectors[kFace + k]) / square(kGap);
       to.end_effectors[kTip + k] -= gap;
       to.end_effectors[kFace + k] += gap;
     }
-    const double by_yaw = weight * 2 * kAngle * off[2] / square(kAngleUnit);
-    to.q[box_turn_] -= by_yaw;
-    out.task_state[kGoal + 2] += by_yaw;
+    const double yaw_bar = weight * 2 * kAngle * off[2] / square(kAngleUnit);
+    to.q[box_turn_] -= yaw_bar;
+    out.task_state[kGoal + 2] += yaw_bar;
     for (std::size_t k = 0; k < 3; ++k) {
       const double a = view.action[k];
       if (std::abs(a) <= kMostDrive)
@@ -200,11 +200,11 @@ class BoxPushing : public Task {
     std::array<double, 3> o{};
     in_hand(now, pose, o);
     const double c = std::cos(now.q[turn_]), s = std::sin(now.q[turn_]);
-    const double by_x = c * weight[0] - s * weight[1], by_y = s * weight[0] + c * weight[1];
-    to.end_effectors[kTip] -= by_x;
-    to.end_effectors[kTip + 1] -= by_y;
+    const double x_bar = c * weight[0] - s * weight[1], y_bar = s * weight[0] + c * weight[1];
+    to.end_effectors[kTip] -= x_bar;
+    to.end_effectors[kTip + 1] -= y_bar;
     to.q[turn_] += weight[0] * o[1] - weight[1] * o[0] - weight[2];
-    return {by_x, by_y, weight[2]};
+    return {x_bar, y_bar, weight[2]};
   }
 
   PushObservation observation_;

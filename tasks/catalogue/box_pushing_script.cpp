@@ -95,11 +95,11 @@ std::array<double, 3> PushScript::controls(const PushState& s) const {
   const Vector2 slid = turned(s.turn, {s.slide[0] + tip_[0], s.slide[1] + tip_[1]});
   const Vector2 tip = {base_[0] + slid[0], base_[1] + slid[1]};
   const Vector2 arm = turned(s.box[2], {face_[0] + g.press, face_[1]});
-  const Vector2 wanted = {
+  const Vector2 requested = {
       speed * to[0] - turn_rate * arm[1] + g.grip * (s.box[0] + arm[0] - tip[0]),
       speed * to[1] + turn_rate * arm[0] + g.grip * (s.box[1] + arm[1] - tip[1])};
   // In the axes of the hand, which turn: d(slide)/dt = Rᵀ wanted - rate × (slide + tip).
-  const Vector2 in_hand = turned(-s.turn, wanted);
+  const Vector2 in_hand = turned(-s.turn, requested);
   const Vector2 rate = {in_hand[0] + turn_rate * (s.slide[1] + tip_[1]),
                         in_hand[1] - turn_rate * (s.slide[0] + tip_[0])};
   // Friction of the ground on the box: a force at the tip, which also turns the hand.

@@ -189,7 +189,7 @@ class CapOpening : public Task {
                       path, tip.name, kPoints, kSide, kSide));
   }
   /// Returns the cap in a finger's frame. The fingers are 120° apart.
-  static CapSeen cap(std::span<const double> memory, std::size_t finger) {
+  static CapView cap(std::span<const double> memory, std::size_t finger) {
     const double turn = 2 * std::numbers::pi / kFingers * static_cast<double>(finger),
                  c = std::cos(turn), s = std::sin(turn);
     const double x = memory[kFingers + 1], y = memory[kFingers + 2];

@@ -46,14 +46,14 @@ CapScript::CapScript(const Scene& scene) {
   below_ = hip_height - height;
 }
 
-CapScript::Place CapScript::place(const FingerAngles& q, const CapSeen& cap) const {
+CapScript::Place CapScript::place(const FingerAngles& q, const CapView& cap) const {
   const double out = hip_ - upper_ * std::sin(q[1]) - lower_ * std::sin(q[1] + q[2]) - cap.out;
   const double down = upper_ * std::cos(q[1]) + lower_ * std::cos(q[1] + q[2]),
                along = down * std::sin(q[0]) - cap.left;
   return {std::hypot(out, along), std::atan2(along, out)};
 }
 
-FingerAngles CapScript::angles_at(const Place& place, const CapSeen& cap) const {
+FingerAngles CapScript::angles_at(const Place& place, const CapView& cap) const {
   const double along = place.out * std::sin(place.around) + cap.left;
   const double in = hip_ - place.out * std::cos(place.around) - cap.out;
   const double down = std::hypot(along, below_), reach = std::hypot(in, down);
@@ -64,20 +64,20 @@ FingerAngles CapScript::angles_at(const Place& place, const CapSeen& cap) const 
   return {std::atan2(along, below_), upper, lower};
 }
 
-double CapScript::gap(const FingerAngles& q, const CapSeen& cap) const {
+double CapScript::gap(const FingerAngles& q, const CapView& cap) const {
   return place(q, cap).out - cap.radius - tip_;
 }
 
-double CapScript::end(const CapSeen& cap) const {
+double CapScript::end(const CapView& cap) const {
   return std::min(kWidest, kFarthest / (cap.radius + tip_));
 }
 
-bool CapScript::presses(const FingerAngles& q, const CapSeen& cap, bool now) const {
+bool CapScript::presses(const FingerAngles& q, const CapView& cap, bool now) const {
   const double around = place(q, cap).around;
   return now ? around < end(cap) : std::abs(around + end(cap)) < kReached;
 }
 
-FingerAngles CapScript::targets(const FingerAngles& q, const CapSeen& cap, bool pressing) const {
+FingerAngles CapScript::targets(const FingerAngles& q, const CapView& cap, bool pressing) const {
   const double around = place(q, cap).around, off = gap(q, cap), middle = cap.radius + tip_;
   if (pressing && off < kTouching) {  // a target inward of the tip and ahead along the cap
     const double inward = middle - kInto;

@@ -15,7 +15,7 @@ using FingerAngles = std::array<double, 3>;
 
 /// A cap in a finger's frame: its radius, and the position of its axis relative to the axis around
 /// which the fingers stand, along the finger's radius and to its left [m].
-struct CapSeen {
+struct CapView {
   double radius = 0, out = 0, left = 0;
 };
 
@@ -25,11 +25,11 @@ class CapScript {
   explicit CapScript(const Scene& scene);
 
   /// Distance from the cap to the tip [m]; negative if they overlap.
-  [[nodiscard]] double gap(const FingerAngles& q, const CapSeen& cap) const;
+  [[nodiscard]] double gap(const FingerAngles& q, const CapView& cap) const;
   /// Whether a finger presses next, given whether it does now.
-  [[nodiscard]] bool presses(const FingerAngles& q, const CapSeen& cap, bool now) const;
+  [[nodiscard]] bool presses(const FingerAngles& q, const CapView& cap, bool now) const;
   /// Target angles.
-  [[nodiscard]] FingerAngles targets(const FingerAngles& q, const CapSeen& cap,
+  [[nodiscard]] FingerAngles targets(const FingerAngles& q, const CapView& cap,
                                      bool pressing) const;
 
  private:
@@ -38,11 +38,11 @@ class CapScript {
   struct Place {
     double out, around;
   };
-  [[nodiscard]] Place place(const FingerAngles& q, const CapSeen& cap) const;
+  [[nodiscard]] Place place(const FingerAngles& q, const CapView& cap) const;
   /// Angle at which a stroke ends [rad]; it begins at the negative of this.
-  [[nodiscard]] double end(const CapSeen& cap) const;
+  [[nodiscard]] double end(const CapView& cap) const;
   /// Angles that put a tip at `place`, at the height of the cap's middle.
-  [[nodiscard]] FingerAngles angles_at(const Place& place, const CapSeen& cap) const;
+  [[nodiscard]] FingerAngles angles_at(const Place& place, const CapView& cap) const;
 
   double hip_ = 0, upper_ = 0,
          lower_ = 0;  // distance of the hip from its axis, lengths of the links [m]

@@ -150,16 +150,16 @@ class Insertion : public Task {
   void observe_vjp(const TaskView& view, std::span<const double> weight,
                    const ViewCotangent& out) const override {
     const Readings read(view);
-    std::array<double, 2 * kPads * kPoints> by_flow{};
-    std::array<ShearCotangent, kPads> by_pads;
+    std::array<double, 2 * kPads * kPoints> flow_bar{};
+    std::array<ShearCotangent, kPads> pads_bar;
     for (std::size_t pad = 0; pad < kPads; ++pad) {
-      by_pads[pad] = {out.snapshots[1].tactile.subspan(3 * kPoints * pad, 3 * kPoints),
-                      out.snapshots[0].tactile.subspan(3 * kPoints * pad, 3 * kPoints)};
+      pads_bar[pad] = {out.snapshots[1].tactile.subspan(3 * kPoints * pad, 3 * kPoints),
+                       out.snapshots[0].tactile.subspan(3 * kPoints * pad, 3 * kPoints)};
       for (std::size_t p = 0; p < kPoints; ++p)
         for (std::size_t c = 0; c < 2; ++c)
-          by_flow[(pad * kPoints + p) * 2 + c] = weight[(2 * pad + c) * kPoints + p];
+          flow_bar[(pad * kPoints + p) * 2 + c] = weight[(2 * pad + c) * kPoints + p];
     }
-    normalised_flow_vjp(read.pads(), by_flow, by_pads, kTooLittle);
+    normalised_flow_vjp(read.pads(), flow_bar, pads_bar, kTooLittle);
   }
 
   StepOutcome evaluate(const TaskView& view) const override {
@@ -172,9 +172,9 @@ class Insertion : public Task {
 
   void reward_vjp(const TaskView& view, double weight, const ViewCotangent& out) const override {
     if (evaluate(view).success) return;
-    std::array<double, 3> by_off = off(view);
-    for (std::size_t k = 0; k < 3; ++k) by_off[k] *= -weight * 2 / (kOff[k] * kOff[k]);
-    off_vjp(by_off, out);
+    std::array<double, 3> off_bar = off(view);
+    for (std::size_t k = 0; k < 3; ++k) off_bar[k] *= -weight * 2 / (kOff[k] * kOff[k]);
+    off_vjp(off_bar, out);
   }
 
   void controls_vjp(const TaskView&, int, std::span<const double> weight,
@@ -252,10 +252,10 @@ class Insertion : public Task {
     return e;
   }
 
-  void off_vjp(const std::array<double, 3>& by_off, const ViewCotangent& out) const {
-    for (std::size_t k = 0; k < 3; ++k) out.task_state[kBefore + k] += by_off[k];
+  void off_vjp(const std::array<double, 3>& off_bar, const ViewCotangent& out) const {
+    for (std::size_t k = 0; k < 3; ++k) out.task_state[kBefore + k] += off_bar[k];
     for (std::size_t a = 0; a < moved_.size(); ++a)
-      out.action[a] += kAct[moved_[a]] * by_off[moved_[a]];
+      out.action[a] += kAct[moved_[a]] * off_bar[moved_[a]];
   }
 
   void hold(const TaskView& view, std::span<double> q, std::span<double> v) const {
@@ -305,12 +305,13 @@ void Insertion::scripted(const TaskView& view, std::span<const double> o,
   const double total = up[0] + up[1], apart = (up[1] - up[0]) / total,
                turning = 10 * moment / square;
   std::array<double, 3> move{};
-  const bool feels = total > 0;
-  if (feels && slides() && std::abs(apart) > kApartNoise) move[0] = -std::copysign(kShift, apart);
-  if (feels && slides() && std::abs(turning) > kTurningNoise)
+  const bool has_force = total > 0;
+  if (has_force && slides() && std::abs(apart) > kApartNoise)
+    move[0] = -std::copysign(kShift, apart);
+  if (has_force && slides() && std::abs(turning) > kTurningNoise)
     move[1] = -std::copysign(kShift, turning);
   const bool straight = move[0] == 0 && move[1] == 0;
-  if (feels && straight && !turns()) {
+  if (has_force && straight && !turns()) {
     // The box is off, but no reading exceeds the noise: take the largest.
     const std::size_t k = std::abs(apart) / kApartNoise > std::abs(turning) / kTurningNoise ? 0 : 1;
     move[k] = -std::copysign(kShift, k == 0 ? apart : turning);

@@ -62,9 +62,9 @@ NamedReading reading_named(const Model& model, const std::string& name) {
 /// What is read of a sensor to compute an output.
 FieldOutput read_for(const Model& model, const FieldOutput& output) {
   if (output.form == FieldForm::pressure) return {output.sensor, FieldForm::pressure};
-  const bool of_ideal = output.form == FieldForm::ideal || output.form == FieldForm::markers,
+  const bool needs_ideal = output.form == FieldForm::ideal || output.form == FieldForm::markers,
              imperfect = is_imperfect(model.scene().sensors[as_size(output.sensor)].imperfections);
-  return {output.sensor, of_ideal && imperfect ? FieldForm::ideal : FieldForm::field};
+  return {output.sensor, needs_ideal && imperfect ? FieldForm::ideal : FieldForm::field};
 }
 
 std::vector<std::string> default_readings(const Model& model) {

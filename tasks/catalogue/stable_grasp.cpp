@@ -19,7 +19,7 @@ namespace tangere {
 namespace {
 
 constexpr int kBlocks = 11, kRows = 13, kCols = 10, kPads = 2;
-constexpr int kSteps = 180, kLook = 60, kGrasps = 10;
+constexpr int kSteps = 180, kFirstSnapshot = 60, kGrasps = 10;
 constexpr double kReach = 0.05, kFarthest = 0.11;  // reach of an action and of the hand [m]
 constexpr double kLevel = 0.02, kLifted = 5e-3;    // [rad], [m]
 constexpr double kSuccess = 100, kTilt = 10;       // of the reward
@@ -129,15 +129,15 @@ class StableGrasp : public Task {
     const std::array<ShearField<double>, kPads> pads{
         ShearField<double>{field.first(field.size() / 2)},
         ShearField<double>{field.subspan(field.size() / 2)}};
-    const std::array<ShearCotangent, kPads> by_pads{ShearCotangent{to.first(to.size() / 2), {}},
-                                                    ShearCotangent{to.subspan(to.size() / 2), {}}};
-    std::array<double, std::size_t{kPads} * kRows * kCols * 2> by_flow{};
+    const std::array<ShearCotangent, kPads> pads_bar{ShearCotangent{to.first(to.size() / 2), {}},
+                                                     ShearCotangent{to.subspan(to.size() / 2), {}}};
+    std::array<double, std::size_t{kPads} * kRows * kCols * 2> flow_bar{};
     constexpr std::size_t kPoints = std::size_t{kRows} * kCols;
     for (std::size_t pad = 0; pad < kPads; ++pad)
       for (std::size_t p = 0; p < kPoints; ++p)
         for (std::size_t c = 0; c < 2; ++c)
-          by_flow[(pad * kPoints + p) * 2 + c] = weight[(2 * pad + c) * kPoints + p];
-    normalised_flow_vjp(pads, by_flow, by_pads, kTooLittle);
+          flow_bar[(pad * kPoints + p) * 2 + c] = weight[(2 * pad + c) * kPoints + p];
+    normalised_flow_vjp(pads, flow_bar, pads_bar, kTooLittle);
   }
 
   StepOutcome evaluate(const TaskView& view) const override {
@@ -152,9 +152,9 @@ class StableGrasp : public Task {
     const double* const r = &lifted(view).q[bar_ + 3];
     const double zx = 2 * (r[1] * r[3] - r[0] * r[2]), zz = 1 - 2 * (r[1] * r[1] + r[2] * r[2]);
     const double at = slope(lifted(view));
-    const double by_slope = -weight * kTilt * (at < 0 ? -1 : 1) / std::sqrt(1 - at * at);
-    out.snapshots.front().q[bar_v_ + 3] += by_slope * zz;
-    out.snapshots.front().q[bar_v_ + 5] -= by_slope * zx;
+    const double slope_bar = -weight * kTilt * (at < 0 ? -1 : 1) / std::sqrt(1 - at * at);
+    out.snapshots.front().q[bar_v_ + 3] += slope_bar * zz;
+    out.snapshots.front().q[bar_v_ + 5] -= slope_bar * zx;
   }
 
   void controls_vjp(const TaskView& view, int step, std::span<const double> weight,
@@ -168,10 +168,10 @@ class StableGrasp : public Task {
   void begin_action_vjp(const TaskView& view, std::span<double> memory,
                         const ViewCotangent& out) const override {
     if (view.actions == 0) out.snapshots.back().q[bar_v_ + 2] += std::exchange(memory[kRest], 0.0);
-    const double by_place =
+    const double place_bar =
         within_reach(view.task_state[kPlace], view.action[0]) ? memory[kPlace] : 0;
-    out.action[0] += by_place * kReach;
-    memory[kPlace] = by_place + std::exchange(memory[kBefore], 0.0);
+    out.action[0] += place_bar * kReach;
+    memory[kPlace] = place_bar + std::exchange(memory[kBefore], 0.0);
   }
 
   /// Moves towards the heavier side. The bar slides and turns in the grip at rates proportional to
@@ -248,7 +248,7 @@ TaskSpec declare_stable_grasp(Friction friction) {
   spec.observations.back().touch = true;
   spec.steps_per_action = kSteps;
   spec.control_every = 1;
-  spec.snapshots = {kLook, kSteps};
+  spec.snapshots = {kFirstSnapshot, kSteps};
   spec.horizon = kGrasps - 1;
   spec.warm_up = true;
   spec.settling_steps = 50;

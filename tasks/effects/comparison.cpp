@@ -116,7 +116,7 @@ StepTimes measure_times(TimedModel& model, double tolerance, int rounds) {
   int instants = 0, readings = 0;
   double first = 0, repeated = 0, stages = 0;
   for (int i = 0; i < model.instants(); ++i) {
-    std::vector<double> steps, of_first, fields;
+    std::vector<double> steps, first_passes, fields;
     model.solve_to(tolerance);
     const TimedStep step = model.time_step(i);  // also warms caches
     if (step.steps == 0) continue;              // every environment has failed before
@@ -126,10 +126,10 @@ StepTimes measure_times(TimedModel& model, double tolerance, int rounds) {
     times.step += lower_quartile(steps);
     model.solve_to(kAnything);
     const double least = model.time_step(i).group_passes;
-    for (int round = 0; round < rounds; ++round) of_first.push_back(model.time_step(i).seconds);
+    for (int round = 0; round < rounds; ++round) first_passes.push_back(model.time_step(i).seconds);
     stages += least;
-    first += lower_quartile(of_first);
-    repeated += step.group_passes / least * lower_quartile(of_first);
+    first += lower_quartile(first_passes);
+    repeated += step.group_passes / least * lower_quartile(first_passes);
     if (!reads_at(model, i)) continue;
     for (int round = 0; round < rounds; ++round) fields.push_back(reading_time(model, i));
     times.reading += lower_quartile(fields);
@@ -138,7 +138,7 @@ StepTimes measure_times(TimedModel& model, double tolerance, int rounds) {
   model.solve_to(tolerance);
   if (instants == 0) return times;
   times.first_pass = first / times.step;
-  times.of_first_pass = repeated / times.step;
+  times.scaled_first_pass = repeated / times.step;
   times.stages = stages / instants;
   times.passes /= instants;
   times.step /= instants;
@@ -173,11 +173,12 @@ ModelComparison compare(TimedModel& with, TimedModel& without, const StepTimes& 
   }
   with.solve_to(tolerance), without.solve_to(tolerance);
   result.passes = parts.steps ? result.passes / std::max(1, instants) : times.passes;
-  const double of_step = parts.once          ? times.first_pass
-                         : parts.passes == 1 ? times.of_first_pass
-                                             : 1;
+  const double step_factor = parts.once          ? times.first_pass
+                             : parts.passes == 1 ? times.scaled_first_pass
+                                                 : 1;
   const auto share = [&](const std::vector<std::size_t>& which) {
-    return (of_step * times.step * saved(steps, which) + times.reading * saved(readings, which)) /
+    return (step_factor * times.step * saved(steps, which) +
+            times.reading * saved(readings, which)) /
            times.whole();
   };
   std::vector<std::size_t> which(as_size(rounds));

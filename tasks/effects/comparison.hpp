@@ -35,7 +35,7 @@ struct StepTimes {
   double first_pass = 1;
   /// First-pass cost scaled by evaluations per step. Above 1, because a step predicts and searches
   /// once.
-  double of_first_pass = 1;
+  double scaled_first_pass = 1;
 
   [[nodiscard]] double whole() const { return step + reading; }
 };

@@ -53,7 +53,7 @@ TimedParts parts_of(const Model& model, const Effect& effect) {
 /// Returns the bytes of one environment's state and readings.
 std::size_t bytes_of(const Model& model) {
   std::size_t bytes = model.state_bytes_per_environment();
-  for (const FieldOutput of : asked_fields(model.scene()))
+  for (const FieldOutput of : requested_fields(model.scene()))
     bytes += sizeof(double) * numbers_of(model.sensors()[as_size(of.sensor)].points, of.form);
   return bytes;
 }
@@ -130,9 +130,9 @@ struct Measurement {
 void measure_sleep(const Measurement& m, const EffectCostOptions& options, EffectCost& cost) {
   const SleepGain gain =
       measure_sleep_gain(m.model, options.environments, options.seed, kLeastRounds);
-  const double of_step = m.times.whole() > 0 ? m.times.step / m.times.whole() : 0;
+  const double step_share = m.times.whole() > 0 ? m.times.step / m.times.whole() : 0;
   cost.bytes = static_cast<std::int64_t>(gain.bytes);
-  cost.measured = MeasuredShare{of_step * gain.added.share, of_step * gain.added.spread};
+  cost.measured = MeasuredShare{step_share * gain.added.share, step_share * gain.added.spread};
   cost.note = fmt::format(
       "of the steps of a run, in which {:.1f} bodies sleep on average; the head's "
       "step is without it",
@@ -196,7 +196,7 @@ EffectCosts measure_effects(const Model& model, const EffectCostOptions& options
       costs.effects.push_back(measure(m, info, options));
     }
   }
-  costs.of_runs = measure_run_costs(m.timed, m.times, kLeastRounds);
+  costs.run_costs = measure_run_costs(m.timed, m.times, kLeastRounds);
   return costs;
 }
 

@@ -45,7 +45,7 @@ struct EffectCosts {
   StepTimes times{};                ///< of the scene as it is
   MeasuredShare itself{};           ///< the scene against itself: noise of the measurement
   std::vector<EffectCost> effects;  ///< parallel to Model::effects()
-  std::vector<RunCost> of_runs;     ///< cost of optional outputs
+  std::vector<RunCost> run_costs;   ///< cost of optional outputs
 };
 
 /// Whether the elements of a kind are timed one by one: up to 12 contacts or sensors, or up to 4 of

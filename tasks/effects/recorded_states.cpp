@@ -33,7 +33,7 @@ RecordedStates record_states(const Model& model, int environments, int instants,
   const ControlProgram program(model, model.timestep(), seed);
   const std::int64_t planned = program.steps();
   const std::int64_t steps = planned < 0 ? kOpenRunSteps : std::min(planned, kMostRunSteps);
-  const std::int64_t wanted = std::min<std::int64_t>(instants, steps);
+  const std::int64_t requested = std::min<std::int64_t>(instants, steps);
   RecordedStates recorded{model, environments, planned, steps, {}, 0, {}};
   for (std::size_t k = 0; k < model.scene().randomizations.size(); ++k) {
     recorded.numbers.emplace_back();
@@ -44,7 +44,7 @@ RecordedStates record_states(const Model& model, int environments, int instants,
   for (std::int64_t step = 0; step < steps; ++step) {
     write_controls(program, step, batch, u);
     const auto next = static_cast<std::int64_t>(recorded.instants.size());
-    if (next < wanted && step == (2 * next + 1) * steps / (2 * wanted)) {
+    if (next < requested && step == (2 * next + 1) * steps / (2 * requested)) {
       RecordedInstant now;
       now.step = step;
       copy_states(batch, now.q, now.v);

@@ -101,9 +101,9 @@ std::vector<RunCost> measure_run_costs(TimedModel& timed, const StepTimes& times
   std::vector<Work> works;
   std::span<const double> controls;
   std::optional<Batch> end;
-  const auto first_block = [&](const std::function<void(int)>& of_one) {
+  const auto first_block = [&](const std::function<void(int)>& run_one) {
     const int count = std::min(end->environments(), StepBack::kBlockEnvironments);
-    for (int e = 0; e < count; ++e) of_one(e);
+    for (int e = 0; e < count; ++e) run_one(e);
     return count;
   };
   const auto add = [&](const char* name, const Requested& requested, double numbers, Work work) {

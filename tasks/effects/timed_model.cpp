@@ -40,7 +40,7 @@ TimedModel::TimedModel(const Model& model, const RecordedStates& recorded,
       batch_(model, recorded.environments),
       stepper_(model, options),
       readout_(model),
-      outputs_(asked_fields(model.scene())) {
+      outputs_(requested_fields(model.scene())) {
   const std::vector<std::size_t> columns = columns_of(model, recorded.model);
   const std::size_t nq = as_size(model.nq()), nv = as_size(model.nv());
   const std::size_t nu = as_size(recorded.model.nu());

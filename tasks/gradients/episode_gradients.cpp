@@ -60,10 +60,14 @@ Named actions_of(const Task& task) {
   return n;
 }
 
-GradientArray array(const char* name, std::vector<std::uint64_t> shape, bool by_row,
+GradientArray array(const char* name, std::vector<std::uint64_t> shape, bool per_row,
                     std::string meaning, Named by) {
-  return {
-      name, std::move(shape), by_row, std::move(meaning), std::move(by.names), std::move(by.units)};
+  return {name,
+          std::move(shape),
+          per_row,
+          std::move(meaning),
+          std::move(by.names),
+          std::move(by.units)};
 }
 
 /// Arrays for the derivatives of `of`: "the return" or "the loss".
@@ -115,14 +119,14 @@ void make_room(const std::vector<GradientArray>& arrays, int episodes, std::int6
                std::vector<std::vector<double>>& out) {
   out.resize(arrays.size());
   for (std::size_t k = 0; k < arrays.size(); ++k)
-    out[k].assign(as_size(episodes) * arrays[k].width() * (arrays[k].by_row ? as_size(rows) : 1),
+    out[k].assign(as_size(episodes) * arrays[k].width() * (arrays[k].per_row ? as_size(rows) : 1),
                   0.0);
 }
 
 double bytes_of(const std::vector<GradientArray>& arrays, std::int64_t rows) {
   double numbers = 0;
   for (const GradientArray& a : arrays)
-    numbers += double(a.width()) * (a.by_row ? double(rows) : 1);
+    numbers += double(a.width()) * (a.per_row ? double(rows) : 1);
   return 8.0 * kBlock * numbers;
 }
 
@@ -179,7 +183,7 @@ EpisodeGradients task_returns(const Task& task, const TaskActions& actions, std:
 }
 
 /// Refuses scenes in which a state is more than q and v.
-void check_remembers_nothing(const Model& model) {
+void check_no_shear_springs(const Model& model) {
   if (model.has_shear_springs())
     throw InputError("scene '" + model.scene().name +
                      "' has contacts with ks; expected none: the derivative of a state by the one "
@@ -195,7 +199,7 @@ EpisodeGradients scene_jacobians(const Model& model, const ControlProgram& contr
     std::vector<RowChain> chains;
   };
   const std::size_t nu = as_size(model.nu()), nv = as_size(model.nv());
-  check_remembers_nothing(model);
+  check_no_shear_springs(model);
   const auto s = std::make_shared<Scratch>(
       Scratch{Stepper(model, {.differentiable = true}), StepJacobians(model),
               BlockTape(model, model.integrator(), run.every),
@@ -231,7 +235,7 @@ EpisodeGradients scene_jacobians(const Model& model, const ControlProgram& contr
 
 EpisodeGradients task_jacobians(const Task& task, const TaskActions& actions,
                                 const EpisodeOptions& run) {
-  check_remembers_nothing(task.model());
+  check_no_shear_springs(task.model());
   struct Scratch {
     TaskRollout rollout;
     ActionJacobians jacobians;

@@ -36,15 +36,15 @@ double norm_of(std::span<const double> x) {
 /// Makes an error that is not finite infinite, so that it is the worst.
 double finite_error(double error) { return std::isfinite(error) ? error : HUGE_VAL; }
 
-/// Returns the entries to compare: all of `all`, or `wanted` of them at random.
-std::vector<std::size_t> chosen(std::vector<std::size_t> all, std::size_t wanted,
+/// Returns the entries to compare: all of `all`, or `requested` of them at random.
+std::vector<std::size_t> chosen(std::vector<std::size_t> all, std::size_t requested,
                                 std::uint64_t seed, std::uint32_t purpose) {
-  if (wanted == 0 || all.size() <= wanted) return all;
-  for (std::size_t i = 0; i < wanted; ++i) {
+  if (requested == 0 || all.size() <= requested) return all;
+  for (std::size_t i = 0; i < requested; ++i) {
     const RandomKey key{seed, 0, static_cast<std::int64_t>(i), Purpose::control, purpose};
     std::swap(all[i], all[i + std::size_t(uniform(key, 0, double(all.size() - i) - 1e-9))]);
   }
-  all.resize(wanted);
+  all.resize(requested);
   std::sort(all.begin(), all.end());
   return all;
 }
@@ -217,7 +217,7 @@ void GradientChecker::add(const Comparison& c, std::uint32_t purpose,
 
 void GradientChecker::check_controls() {
   const auto move = [](std::size_t i) { return [i](CheckInputs& x, double e) { x.u[i] += e; }; };
-  add({u_name_, by_u_, all_of(by_u_.size()),
+  add({u_name_, grad_u_, all_of(grad_u_.size()),
        [&](std::size_t i) { return difference(kControlScale, move(i)); },
        [&](std::size_t i) { return control_name(i); },
        [&](std::size_t i) { return decisions(kControlScale, move(i)); }},
@@ -230,7 +230,7 @@ void GradientChecker::check_positions() {
   const auto move = [this](std::size_t i) {
     return [this, i](CheckInputs& x, double e) { displace(model_, x.q, static_cast<int>(i), e); };
   };
-  add({"q", by_q_, all_of(by_q_.size()), [&](std::size_t i) { return difference(1, move(i)); },
+  add({"q", grad_q_, all_of(grad_q_.size()), [&](std::size_t i) { return difference(1, move(i)); },
        [&](std::size_t i) { return std::string(model_.v_names()[i]); },
        [&](std::size_t i) { return decisions(1, move(i)); }},
       1, [&](const std::vector<double>& d) {
@@ -240,7 +240,7 @@ void GradientChecker::check_positions() {
 
 void GradientChecker::check_velocities() {
   const auto move = [](std::size_t i) { return [i](CheckInputs& x, double e) { x.v[i] += e; }; };
-  add({"v", by_v_, all_of(by_v_.size()),
+  add({"v", grad_v_, all_of(grad_v_.size()),
        [&](std::size_t i) { return difference(kVelocityScale, move(i)); },
        [&](std::size_t i) { return std::string(model_.v_names()[i]); },
        [&](std::size_t i) { return decisions(kVelocityScale, move(i)); }},
@@ -251,7 +251,7 @@ void GradientChecker::check_velocities() {
 
 /// Takes relative changes, because units differ.
 void GradientChecker::check_numbers() {
-  const RelativeGradient r(parameters_, model_.scene(), varying_, by_numbers_);
+  const RelativeGradient r(parameters_, model_.scene(), varying_, grad_numbers_);
   const auto move = [&](std::size_t k) {
     return [&, k](Scene& scene, std::vector<double>& varying, double e) {
       const SceneNumber& number = parameters_.infos()[k].number;

@@ -99,7 +99,7 @@ class GradientChecker {
   NumberGradients parameters_;
   CheckInputs at_;
   std::vector<double> varying_;
-  std::vector<double> by_u_, by_q_, by_v_, by_numbers_;  // the gradient
+  std::vector<double> grad_u_, grad_q_, grad_v_, grad_numbers_;  // the gradient
   const char* u_name_ = "u";
   GradientCheck out_;
 

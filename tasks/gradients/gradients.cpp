@@ -72,8 +72,8 @@ void run_blocks(BlockThreads& threads, std::vector<Worker>& workers, int blocks,
   for (Worker& worker : workers) worker.begin(stop);
   threads.for_each(blocks, workers,
                    [&](Worker& worker, int b) { run(worker, b, failures[as_size(b)]); });
-  for (const auto& of_block : failures)
-    out.failures.insert(out.failures.end(), of_block.begin(), of_block.end());
+  for (const auto& block_failures : failures)
+    out.failures.insert(out.failures.end(), block_failures.begin(), block_failures.end());
   std::ranges::sort(out.failures, {}, &FailedEnvironment::environment);
   for (const Worker& worker : workers) {
     out.newton_iterations += worker.newton_iterations();
@@ -168,9 +168,9 @@ TaskGradients empty_gradients(const Task& task, std::int64_t episodes, const Tap
 double gradient_bytes(const Model& model, int environments, const TapeOptions& o, int losses) {
   const Integrator scheme = integrator_in_force(model, o.stepper);
   const double tape = std::min(double(BlockTape::bytes(model, scheme, o.length)), o.tape_bytes);
-  const double of_points = kBlock * double(point_count(model, o)) * losses;  // each thread's sums
+  const double point_sums = kBlock * double(point_count(model, o)) * losses;  // each thread's sums
   return 8 * numbers_of(model, o, model.nu()) * environments * losses +
-         o.threads * (tape + 2 * double(Stepper::workspace_bytes(model)) + 8 * of_points);
+         o.threads * (tape + 2 * double(Stepper::workspace_bytes(model)) + 8 * point_sums);
 }
 
 double gradient_bytes(const Task& task, std::int64_t episodes, const TapeOptions& requested) {

@@ -257,7 +257,7 @@ void add_weakest(const Eigen::SelfAdjointEigenSolver<Matrix>& modes, std::vector
 }
 
 /// Computes deviations and correlations of the parameters from the information F.
-void judge_information(const Matrix& F, const Matrix& J, Identification& out) {
+void set_deviations(const Matrix& F, const Matrix& J, Identification& out) {
   const Eigen::Index n = F.cols();
   const Eigen::SelfAdjointEigenSolver<Matrix> modes(F);
   // Smaller eigenvalues are rounding errors of the largest.
@@ -299,7 +299,7 @@ void set_flags(const Problem& problem, const Fit& fit, double stated_noise, Iden
   const double scale = out.noise > 0 ? 1 / (out.noise * out.noise) : 1;
   const Matrix F = scale * information(J);
   out.information.assign(F.data(), F.data() + F.size());
-  judge_information(F, J, out);
+  set_deviations(F, J, out);
 }
 
 /// Whether a fit replaces the best one so far. Of equal fits the first converged one stays.
@@ -414,15 +414,15 @@ FieldMisfit::FieldMisfit(const Model& model, const FieldSequence& recorded)
                       "of the scene",
                       reading.size(), numbers_of_fields(model)));
     std::vector<double>& squares = squares_.emplace_back();
-    const double* of_sensor = reading.data();
+    const double* sensor_field = reading.data();
     for (std::size_t s = 0; s < tiles_.size(); ++s) {
       for (const std::vector<TilePoint>& points : tiles_[s]) {
         double& sum = squares.emplace_back(0);
         for (const TilePoint& p : points)
           for (int c = 0; c < 3; ++c)
-            sum += 0.5 * of_sensor[3 * p.point + c] * of_sensor[3 * p.point + c];
+            sum += 0.5 * sensor_field[3 * p.point + c] * sensor_field[3 * p.point + c];
       }
-      of_sensor += 3 * model.sensors()[s].points;
+      sensor_field += 3 * model.sensors()[s].points;
     }
   }
 }
@@ -472,7 +472,7 @@ Identification identify(const Scene& scene, const RecordedRun& run, const FieldS
   if (!std::isfinite(value.misfit))
     throw InputError(scene.path + ": the rollout fails at the start of the fit");
   const Matrix J = problem.jacobian(x);
-  const Vector by_differences = J.transpose().lazyProduct(problem.residuals(x));
+  const Vector difference_gradient = J.transpose().lazyProduct(problem.residuals(x));
   Identification best;
   std::vector<FitEnds> fits;
   for (int k = 0; k < options.starts; ++k) {
@@ -499,7 +499,8 @@ Identification identify(const Scene& scene, const RecordedRun& run, const FieldS
   find_suspect(problem, best);
   if (!best.residual.is_noise())
     for (double& deviation : best.deviation) deviation *= std::sqrt(1 + best.residual.excess);
-  best.gradient_difference = (value.gradient - by_differences).norm() / by_differences.norm();
+  best.gradient_difference =
+      (value.gradient - difference_gradient).norm() / difference_gradient.norm();
   best.fits = std::move(fits);
   return best;
 }

@@ -177,12 +177,12 @@ class Directions {
       sum += bar.q_bar()[i] * state.q[i] + bar.v_bar()[i] * state.v[i];
     for (std::size_t i = 0; i < u_dot.size(); ++i) sum += bar.u_bar()[i] * u_dot[i];
     for (std::size_t k = 0; k < model.sensors().size() && s_.loss.reads_fields(t); ++k) {
-      std::vector<double> change(bar.field(k).dense_size()), of_tiles(change.size());
+      std::vector<double> change(bar.field(k).dense_size()), tile_values(change.size());
       tangent.field(batch, 0, 0, *tape_, t, static_cast<int>(k), rows,
                     points.empty() ? std::span<const double>{} : points[k], state, change);
       // The cotangents have the layout of the tiles. Spread them as the frame spreads its values.
-      bar.field(k).spread(bar.field_bar(k), of_tiles);
-      sum += std::inner_product(change.begin(), change.end(), of_tiles.begin(), 0.0);
+      bar.field(k).spread(bar.field_bar(k), tile_values);
+      sum += std::inner_product(change.begin(), change.end(), tile_values.begin(), 0.0);
     }
     if (s_.loss.reads_end_effectors(t)) {
       const std::span<const double> x_bar = bar.end_effectors_bar();
@@ -232,13 +232,13 @@ bool checks_points(const Model& model, const RolloutLoss& loss, const CheckOptio
 
 LossGradient gradient_of(const Batch& start, const StepControls& controls, const RolloutLoss& loss,
                          const CheckOptions& options) {
-  TapeOptions wanted;
-  wanted.length = options.length;
-  wanted.stepper = options.stepper;
-  wanted.parameters = true;
-  wanted.points = checks_points(start.model(), loss, options);
+  TapeOptions requested;
+  requested.length = options.length;
+  requested.stepper = options.stepper;
+  requested.parameters = true;
+  requested.points = checks_points(start.model(), loss, options);
   const RolloutLoss* const losses[] = {&loss};
-  return rollout_gradients(start, controls, wanted, losses).losses[0];
+  return rollout_gradients(start, controls, requested, losses).losses[0];
 }
 
 class LossChecker : public GradientChecker {
@@ -251,10 +251,10 @@ class LossChecker : public GradientChecker {
     for (std::size_t k = 0; k < model_.scene().randomizations.size(); ++k)
       varying_.push_back(s.start.randomized_value(0, static_cast<int>(k)));
     at_ = s.at;
-    by_u_ = first(g.u, s.at.u.size());
-    by_q_ = first(g.q, s.at.v.size());
-    by_v_ = first(g.v, s.at.v.size());
-    by_numbers_ = first(g.parameters, std::size_t(parameters_.count()));
+    grad_u_ = first(g.u, s.at.u.size());
+    grad_q_ = first(g.q, s.at.v.size());
+    grad_v_ = first(g.v, s.at.v.size());
+    grad_numbers_ = first(g.parameters, std::size_t(parameters_.count()));
     out_.loss = g.value[0];
     out_.length = s.options.length;
   }

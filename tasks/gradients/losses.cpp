@@ -184,8 +184,8 @@ const std::vector<LossKind>& loss_kinds() {
 }
 
 std::unique_ptr<RolloutLoss> make_loss(LossKind kind, const Model& model, int every) {
-  const bool of_fields = kind == LossKind::tactile || kind == LossKind::shear;
-  if (of_fields && model.sensors().empty())
+  const bool reads_fields = kind == LossKind::tactile || kind == LossKind::shear;
+  if (reads_fields && model.sensors().empty())
     throw InputError(std::string("loss '") + to_string(kind) +
                      "': the scene has no tactile sensor");
   if (kind == LossKind::end_effectors && model.end_effectors().empty())

@@ -25,8 +25,8 @@ class ReturnChecker : public GradientChecker {
   ReturnChecker(const Task& task, const TaskMaker& make, const TaskActions& actions,
                 const CheckOptions& o)
       : GradientChecker(task.model(), o), task_(task), make_(make) {
-    TaskGradients gradient =
-        task_gradients(task, within_bounds(actions), o.seed, {o.episode, o.episode + 1}, wanted());
+    TaskGradients gradient = task_gradients(task, within_bounds(actions), o.seed,
+                                            {o.episode, o.episode + 1}, requested());
     if (!gradient.failures.empty())
       throw InputError(fmt::format("action {} of episode {} of task {} finds no solution: {}",
                                    gradient.failures[0].step, o.episode, task.spec().name,
@@ -37,10 +37,10 @@ class ReturnChecker : public GradientChecker {
     gradient.action.resize(numbers);
     gradient.u.resize(numbers);
     u_name_ = "actions";
-    by_u_ = std::move(gradient.u);
-    by_q_ = std::move(gradient.q);
-    by_v_ = std::move(gradient.v);
-    by_numbers_ = std::move(gradient.parameters);
+    grad_u_ = std::move(gradient.u);
+    grad_q_ = std::move(gradient.q);
+    grad_v_ = std::move(gradient.v);
+    grad_numbers_ = std::move(gradient.parameters);
     rollout_.emplace(task, o.stepper, Precision::f64);
     rollout_->start(o.seed, {&o.episode, 1});
     const Snapshot first = view_of(rollout_->batch(), rollout_->data(), 0).now();
@@ -59,12 +59,12 @@ class ReturnChecker : public GradientChecker {
       for (double& a : action) a = std::clamp(a, low, high);
     };
   }
-  [[nodiscard]] TapeOptions wanted() const {
-    TapeOptions wanted;
-    wanted.length = options_.length;
-    wanted.stepper = options_.stepper;
-    wanted.parameters = true;
-    return wanted;
+  [[nodiscard]] TapeOptions requested() const {
+    TapeOptions requested;
+    requested.length = options_.length;
+    requested.stepper = options_.stepper;
+    requested.parameters = true;
+    return requested;
   }
 
   [[nodiscard]] std::vector<double> values(const Scene* other,

@@ -25,7 +25,7 @@ void add_product(std::span<double> to, std::span<const double> a, std::span<cons
     }
 }
 
-std::span<const double> of_lane(const std::vector<double>& all, int lane) {
+std::span<const double> lane_row(const std::vector<double>& all, int lane) {
   const std::size_t width = all.size() / kBlock;
   return std::span(all).subspan(as_size(lane) * width, width);
 }
@@ -143,7 +143,7 @@ void ActionJacobians::evaluate(TaskRollout& rollout, const ActionRecord& r, std:
         if (!r.taken[as_size(l)]) continue;
         const Snapshot first = rollout.first_moment(tape, l);
         controls_[as_size(l)] = control_rows(
-            task_, rollout.view(r, action, l, of_lane(r.task_state, l), {&first, 1}), t);
+            task_, rollout.view(r, action, l, lane_row(r.task_state, l), {&first, 1}), t);
       }
     }
     steps_.evaluate(rollout.batch(), 0, tape, t, rollout.u());
@@ -163,7 +163,7 @@ void ActionJacobians::compose(TaskRollout& rollout, const ActionRecord& r, std::
   chains_[as_size(lane)].get(chain);
   RowJacobian& out = rows_[as_size(lane)];
   out = {chain.state, chain.previous, std::vector<double>(state_ * width_)};
-  std::vector<double> by_memory(state_ * memory_);
+  std::vector<double> d_dmemory(state_ * memory_);
   const auto row = [](std::vector<double>& all, std::size_t i, std::size_t width) {
     return std::span(all).subspan(i * width, width);
   };
@@ -171,34 +171,34 @@ void ActionJacobians::compose(TaskRollout& rollout, const ActionRecord& r, std::
     const std::span<const double> others = row(chain.others, i, width_ + memory_);
     std::copy_n(others.begin(), width_, row(out.others, i, width_).begin());
     std::copy_n(others.begin() + static_cast<std::ptrdiff_t>(width_), memory_,
-                row(by_memory, i, memory_).begin());
+                row(d_dmemory, i, memory_).begin());
   }
   if (!r.taken[as_size(lane)]) return;
-  const Snapshot seen{of_lane(r.q, lane), of_lane(r.v, lane), {}, {}};
+  const Snapshot seen{lane_row(r.q, lane), lane_row(r.v, lane), {}, {}};
   std::vector<double> rows;
   // Adds a number of each row, `by`, times row k of `rows`.
   const auto add_row = [&](std::size_t i, std::size_t k, double by) {
     const std::span<const double> from = std::span(rows).subspan(k * (state_ + width_ + memory_));
     add_times(row(out.state, i, state_), by, from);
     add_times(row(out.others, i, width_), by, from.subspan(state_));
-    add_times(row(by_memory, i, memory_), by, from.subspan(state_ + width_));
+    add_times(row(d_dmemory, i, memory_), by, from.subspan(state_ + width_));
   };
   if (task_.spec().restarts) {
     std::fill(out.state.begin(), out.state.end(), 0.0);
     std::fill(out.previous.begin(), out.previous.end(), 0.0);
-    rows =
-        restart_rows(task_, rollout.view(r, action, lane, of_lane(r.task_state, lane), {&seen, 1}));
+    rows = restart_rows(task_,
+                        rollout.view(r, action, lane, lane_row(r.task_state, lane), {&seen, 1}));
     for (std::size_t k = 0; k < state_; ++k)
       for (std::size_t i = 0; i < state_; ++i) add_row(i, k, chain.state[i * state_ + k]);
   }
   // The task state before the action counts as constant.
-  const std::vector<double> kept = by_memory;
-  rows = memory_rows(task_, rollout.view(r, action, lane, of_lane(r.found, lane), {&seen, 1}));
+  const std::vector<double> kept = d_dmemory;
+  rows = memory_rows(task_, rollout.view(r, action, lane, lane_row(r.found, lane), {&seen, 1}));
   for (std::size_t k = 0; k < memory_; ++k)
     for (std::size_t i = 0; i < state_; ++i) add_row(i, k, kept[i * memory_ + k]);
   const TensorSpec& spec = task_.spec().action;
   for (std::size_t k = 0; k < width_; ++k) {
-    const double requested = of_lane(r.chosen, lane)[k];
+    const double requested = lane_row(r.chosen, lane)[k];
     for (std::size_t i = 0; i < state_ && (requested < spec.low || requested > spec.high); ++i)
       out.others[i * width_ + k] = 0;
   }

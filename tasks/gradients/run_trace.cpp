@@ -42,20 +42,20 @@ void RunTrace::add(const Batch& batch) {
     for (std::size_t e = 0; e < row.size(); ++e) {
       readout.read(batch, static_cast<int>(e), frame);
       const std::span<const double> field = frame.values();
-      int felt = 0;
+      int loaded_points = 0;
       for (std::size_t i = 0; i + 2 < field.size(); i += 3)
-        felt += field[i] != 0 || field[i + 1] != 0 || field[i + 2] != 0 ? 1 : 0;
-      row[e].felt.push_back(felt);
+        loaded_points += field[i] != 0 || field[i + 1] != 0 || field[i + 2] != 0 ? 1 : 0;
+      row[e].loaded_points.push_back(loaded_points);
     }
   }
 }
 
 void RunTrace::compare(std::size_t state, const Decisions& a, const Decisions& b,
-                       std::vector<bool>& said, std::vector<std::string>& to) const {
+                       std::vector<bool>& reported, std::vector<std::string>& to) const {
   std::size_t at = 0;
   const auto say = [&](bool differs, const auto& text) {
-    if (differs && !said[at]) to.push_back(fmt::format("in state {} {}", state, text()));
-    said[at] = said[at] || differs;
+    if (differs && !reported[at]) to.push_back(fmt::format("in state {} {}", state, text()));
+    reported[at] = reported[at] || differs;
     ++at;
   };
   say(a.status != b.status, [&] {
@@ -75,21 +75,21 @@ void RunTrace::compare(std::size_t state, const Decisions& a, const Decisions& b
       return fmt::format("'{}' is {} in one run and {} in the other", model_.v_names()[i],
                          limit_text(a.contact.beyond[i]), limit_text(b.contact.beyond[i]));
     });
-  for (std::size_t s = 0; s < a.felt.size(); ++s)
-    say(a.felt[s] != b.felt[s], [&] {
+  for (std::size_t s = 0; s < a.loaded_points.size(); ++s)
+    say(a.loaded_points[s] != b.loaded_points[s], [&] {
       return fmt::format("{} points of sensor '{}' feel a force in one run and {} in the other",
-                         a.felt[s], model_.sensors()[s].name, b.felt[s]);
+                         a.loaded_points[s], model_.sensors()[s].name, b.loaded_points[s]);
     });
 }
 
 std::vector<std::string> RunTrace::differences(int environment, const RunTrace& other,
                                                int environment_of_other) const {
   std::vector<std::string> texts;
-  std::vector<bool> said(1 + model_.contacts().size() + as_size(model_.nv()) +
-                         model_.sensors().size());
+  std::vector<bool> reported(1 + model_.contacts().size() + as_size(model_.nv()) +
+                             model_.sensors().size());
   for (std::size_t t = 0; t < std::min(states_.size(), other.states_.size()); ++t)
     compare(t, states_[t][as_size(environment)], other.states_[t][as_size(environment_of_other)],
-            said, texts);
+            reported, texts);
   return texts;
 }
 

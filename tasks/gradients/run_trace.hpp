@@ -28,11 +28,11 @@ class RunTrace {
  private:
   struct Decisions {
     ContactState contact;
-    std::vector<int> felt;  // (sensors) points with a force
+    std::vector<int> loaded_points;  // (sensors) points with a force
     StepStatus status = StepStatus::converged;
   };
-  void compare(std::size_t state, const Decisions& a, const Decisions& b, std::vector<bool>& said,
-               std::vector<std::string>& to) const;
+  void compare(std::size_t state, const Decisions& a, const Decisions& b,
+               std::vector<bool>& reported, std::vector<std::string>& to) const;
 
   Model model_;                                 // for names
   std::vector<std::vector<Decisions>> states_;  // (states, environments)

@@ -417,7 +417,7 @@ void TaskBlock::reverse_reset(const ActionCotangents& by, const StartCotangents&
   add_start_to_shown();
   clear_snapshots();
   const std::vector<double> no_action(task_.spec().action.size());
-  std::vector<double> by_no_action(no_action.size()),
+  std::vector<double> unused_action_bar(no_action.size()),
       task_state_bar(as_size(task_.spec().task_state));
   for (int l = 0; l < lanes(); ++l) {
     TaskView view = rollout_.start_view(l);
@@ -432,7 +432,7 @@ void TaskBlock::reverse_reset(const ActionCotangents& by, const StartCotangents&
     if (taken_ > 0) view.task_state = part(records_[0].found, l);
     view.snapshots = seen;
     reverse_observation(view, l,
-                        {cotangents(l).last(seen.size()), by_no_action, task_state_bar,
+                        {cotangents(l).last(seen.size()), unused_action_bar, task_state_bar,
                          part(adjoint_.loss(0).points, l)});
   }
   add_snapshot(snapshots_bar_.size() - 1);

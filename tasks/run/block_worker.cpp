@@ -103,10 +103,10 @@ double BlockWorker::bytes(const Task& task) {
   return static_cast<double>(task.spec().snapshots.size() * kBlock * numbers * sizeof(double));
 }
 
-std::span<double> BlockWorker::part(std::vector<double>& of_snapshots, std::size_t moment,
+std::span<double> BlockWorker::part(std::vector<double>& snapshots, std::size_t moment,
                                     int lane) const {
-  const std::size_t width = of_snapshots.size() / (task_.spec().snapshots.size() * kBlock);
-  return std::span(of_snapshots).subspan((moment * kBlock + as_size(lane)) * width, width);
+  const std::size_t width = snapshots.size() / (task_.spec().snapshots.size() * kBlock);
+  return std::span(snapshots).subspan((moment * kBlock + as_size(lane)) * width, width);
 }
 
 void BlockWorker::act(Batch& batch, Stepper& stepper, EnvironmentData& data, int block,
@@ -236,10 +236,8 @@ void BlockWorker::take_action(Batch& batch, EnvironmentData& data, int environme
 
 void BlockWorker::read_snapshot(const Batch& batch, int block, std::size_t moment) {
   const int first = block * kBlock;
-  const auto place = [&](std::vector<double>& of_snapshots) {
-    return [this, &of_snapshots, moment, first](int e) {
-      return part(of_snapshots, moment, e - first);
-    };
+  const auto place = [&](std::vector<double>& snapshots) {
+    return [this, &snapshots, moment, first](int e) { return part(snapshots, moment, e - first); };
   };
   read_states(batch, block, place(q_), place(v_));
   if (task_.end_effectors_size() > 0)

@@ -71,7 +71,7 @@ class BlockWorker {
                    std::span<const double> actions);
   void read_snapshot(const Batch& batch, int block, std::size_t moment);
   void conclude_one(Batch& batch, EnvironmentData& data, int environment, VectorCounts& counts);
-  [[nodiscard]] std::span<double> part(std::vector<double>& of_snapshots, std::size_t moment,
+  [[nodiscard]] std::span<double> part(std::vector<double>& snapshots, std::size_t moment,
                                        int lane) const;
 
   const Task& task_;

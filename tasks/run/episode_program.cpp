@@ -42,7 +42,7 @@ TaskProgram::TaskProgram(const Task& task, const Policy& policy,
       at_end_(at_end) {
   workers_.reserve(static_cast<std::size_t>(in_turn));
   for (int b = 0; b < in_turn; ++b) workers_.emplace_back(task, precision);
-  if (!policy.asks_together()) return;
+  if (!policy.is_batched()) return;
   seen_.resize(kBlock * task.spec().observation_size());
   chosen_.resize(kBlock * task.spec().action.size());
 }
@@ -85,7 +85,7 @@ void TaskProgram::choose_together(const Batch& batch, int block) {
 }
 
 void TaskProgram::choose(const Batch& batch, int block) {
-  if (policy_.asks_together()) return choose_together(batch, block);
+  if (policy_.is_batched()) return choose_together(batch, block);
   const std::size_t width = task_.spec().action.size(), seen = task_.spec().observation_size();
   const auto first = static_cast<std::size_t>(block) * kBlock,
              last = first + static_cast<std::size_t>(lanes_of(batch, block));

@@ -93,7 +93,7 @@ std::span<T> EpisodeSlot<T>::numbers(std::size_t name, int episode, int row) {
 template <class T>
 std::size_t EpisodeSlot<T>::taken_rows(std::size_t name, int rows) const {
   const EpisodeChannel& taken = source_.channels[name];
-  if (!taken.wanted) return 0;
+  if (!taken.requested) return 0;
   if (taken.times.final) return 1;
   const std::int64_t every = std::max<std::int64_t>(1, taken.times.every);
   return static_cast<std::size_t>((rows + every - 1) / every);

@@ -20,7 +20,7 @@ std::size_t number_bytes(const EpisodeOptions& options) {
 double row_bytes(const EpisodeSource& source, const EpisodeOptions& options) {
   double bytes = static_cast<double>(source.action + (source.whole ? 1 : 0)) * sizeof(float);
   for (const EpisodeChannel& channel : source.channels)
-    if (channel.wanted && !channel.times.final)
+    if (channel.requested && !channel.times.final)
       bytes += static_cast<double>(channel.width() * number_bytes(options)) /
                static_cast<double>(std::max<std::int64_t>(1, channel.times.every));
   return bytes;
@@ -55,10 +55,10 @@ void check_held(const ControlProgram& controls, const EpisodeOptions& options, i
 }  // namespace
 
 bool is_taken(const EpisodeSource& source, std::size_t name, std::int64_t row) {
-  return source.channels[name].wanted && source.channels[name].times.at(row, source.rows);
+  return source.channels[name].requested && source.channels[name].times.at(row, source.rows);
 }
 std::size_t taken_before(const EpisodeSource& source, std::size_t name, std::int64_t row) {
-  if (!source.channels[name].wanted) return 0;
+  if (!source.channels[name].requested) return 0;
   return static_cast<std::size_t>(source.channels[name].times.before(row, source.rows));
 }
 

@@ -54,12 +54,12 @@ Policy::Policy(const Task& task, PolicyKind kind, std::vector<std::vector<double
           fmt::format("a row of {} numbers in a table of actions; expected {}", row.size(), width));
 }
 
-Policy::Policy(const Task& task, std::string name, PolicyAnswer answer,
+Policy::Policy(const Task& task, std::string name, PolicyFunction function,
                const PolicyVariation& variation)
     : task_(task),
       kind_(PolicyKind::program),
       name_(std::move(name)),
-      answer_(std::move(answer)),
+      function_(std::move(function)),
       variation_(variation) {
   check(variation);
 }
@@ -81,15 +81,15 @@ std::vector<std::string> Policy::players() const {
 
 int Policy::player(std::uint64_t seed, std::int64_t episode) const {
   if (variation_.random_share == 0) return 0;
-  const bool by_chance =
+  const bool is_random =
       uniform({seed, episode, 0, Purpose::policy, kPlayer}) < variation_.random_share;
-  return by_chance ? 1 : 0;
+  return is_random ? 1 : 0;
 }
 
 void Policy::act(const TaskView& view, std::span<const double> observation,
                  std::span<double> action) const {
-  const bool by_chance = player(view.seed, view.episode) > 0;
-  switch (by_chance ? PolicyKind::random : kind_) {
+  const bool is_random = player(view.seed, view.episode) > 0;
+  switch (is_random ? PolicyKind::random : kind_) {
     case PolicyKind::random: draw(view, action); return;
     case PolicyKind::hold: std::fill(action.begin(), action.end(), 0.0); return;
     case PolicyKind::csv: {
@@ -108,7 +108,7 @@ void Policy::act(const TaskView& view, std::span<const double> observation,
 void Policy::act(std::span<const TaskView> views, std::span<const double> observations,
                  std::span<double> actions) const {
   const std::size_t width = task_.spec().action.size(), seen = task_.spec().observation_size();
-  if (!asks_together()) {
+  if (!is_batched()) {
     for (std::size_t e = 0; e < views.size(); ++e)
       act(views[e], observations.subspan(e * seen, seen), actions.subspan(e * width, width));
     return;
@@ -118,7 +118,7 @@ void Policy::act(std::span<const TaskView> views, std::span<const double> observ
     episodes.at(e) = views[e].episode;
     taken[e] = views[e].actions;
   }
-  answer_(
+  function_(
       {std::span(episodes).first(views.size()), std::span(taken).first(views.size()), observations},
       actions);
   for (std::size_t e = 0; e < views.size(); ++e)

@@ -34,14 +34,14 @@ struct PolicyVariation {
 };
 
 /// Inputs of an external policy for the next actions of n environments.
-struct PolicyQuestion {
+struct PolicyInputs {
   std::span<const std::int64_t> episodes;  ///< (n) their numbers
   std::span<const std::int64_t> actions;   ///< (n) actions taken in them so far
   std::span<const double> observations;    ///< (n, observation)
 };
 /// Writes (n, action). Many threads may call it at once. The environments of a call are those of
 /// one block of 16 whose episodes have not ended, for any number of threads.
-using PolicyAnswer = std::function<void(const PolicyQuestion&, std::span<double> actions)>;
+using PolicyFunction = std::function<void(const PolicyInputs&, std::span<double> actions)>;
 
 class Policy {
  public:
@@ -51,11 +51,11 @@ class Policy {
   Policy(const Task& task, PolicyKind kind, std::vector<std::vector<double>> table = {},
          const PolicyVariation& variation = {});
   /// A program called `name`. Throws InputError for a noise or a share out of its range.
-  Policy(const Task& task, std::string name, PolicyAnswer answer,
+  Policy(const Task& task, std::string name, PolicyFunction function,
          const PolicyVariation& variation = {});
 
   /// Whether act() for many environments is one question and not one for each.
-  [[nodiscard]] bool asks_together() const { return static_cast<bool>(answer_); }
+  [[nodiscard]] bool is_batched() const { return static_cast<bool>(function_); }
 
   /// Names of those that play: the kind, and "random" where it has a share.
   [[nodiscard]] std::vector<std::string> players() const;
@@ -80,7 +80,7 @@ class Policy {
   const Task& task_;
   PolicyKind kind_;
   std::string name_;
-  PolicyAnswer answer_;
+  PolicyFunction function_;
   std::vector<std::vector<double>> table_;
   PolicyVariation variation_;
 };

@@ -29,13 +29,13 @@ Distance<Lanes<A>> wide_distance(const double* size, const Vec3<Lanes<A>>& high,
 template <template <class> class Shape, class A>
 Distance<LanesF<A>> wide_distance(const double* size, const Vec3<LanesF<A>>& high,
                                   const Vec3<LanesF<A>>& low, const Vec3<LanesF<A>>& offset) {
-  const auto of_half = [&](int half) {
+  const auto half_distance = [&](int half) {
     const auto wide = [half](const Vec3<LanesF<A>>& x) {
       return Vec3<Lanes<A>>{widen(x.x, half), widen(x.y, half), widen(x.z, half)};
     };
     return wide_distance<Shape>(size, wide(high) + wide(low), Vec3<Lanes<A>>{}, wide(offset));
   };
-  const Distance<Lanes<A>> first = of_half(0), second = of_half(1);
+  const Distance<Lanes<A>> first = half_distance(0), second = half_distance(1);
   return {narrow(first.d, second.d),
           {narrow(first.n.x, second.n.x), narrow(first.n.y, second.n.y),
            narrow(first.n.z, second.n.z)}};

@@ -135,17 +135,17 @@ void spline_at(const DistanceGrid& g, const GridPlace<N>& at, SplineValue<N, Ord
                                          plain_value(at.whole[2]));
   N sums[kSplineSums<Order>][4];
   for (int k = 0; k < 4; ++k) {
-    N of_y[Order + 1][4];
+    N y_sums[Order + 1][4];
     for (int i = 0; i < 4; ++i)
       for (int o = 0; o <= Order; ++o) {
         const float* at_row = c + i * kQuad + k;
-        of_y[o][i] = y.w[o][0] * N(double(at_row[0]));
+        y_sums[o][i] = y.w[o][0] * N(double(at_row[0]));
         for (int j = 1; j < 4; ++j)
-          of_y[o][i] = mul_add(y.w[o][j], N(double(at_row[j * g.plane])), of_y[o][i]);
+          y_sums[o][i] = mul_add(y.w[o][j], N(double(at_row[j * g.plane])), y_sums[o][i]);
       }
     for (int s = 0; s < kSplineSums<Order>; ++s) {
       const N(&w)[4] = x.w[kSplineX[s]];
-      const N(&r)[4] = of_y[kSplineY[s]];
+      const N(&r)[4] = y_sums[kSplineY[s]];
       sums[s][k] = mul_add(w[2], r[2], w[0] * r[0]) + mul_add(w[3], r[3], w[1] * r[1]);
     }
   }
@@ -271,7 +271,7 @@ template <class A>
 template <int Order, class A>
 [[gnu::always_inline]] inline void sum_rows(const float* c, const DistanceGrid& g, const double* x,
                                             const double* y, int stride, double (*out)[4]) {
-  Lanes<A> of_y[Order + 1][2];
+  Lanes<A> y_sums[Order + 1][2];
   for (int j = 0; j < 4; ++j) {
     const float* from = c + j * g.plane;
     // Rows 0 and 1, then 2 and 3: each vector has two neighbours along x.
@@ -279,16 +279,16 @@ template <int Order, class A>
     for (int o = 0; o <= Order; ++o) {
       const Lanes<A> w(y[stride * (4 * o + j)]);
       for (int half = 0; half < 2; ++half)
-        of_y[o][half] = j == 0 ? w * rows[half] : mul_add(w, rows[half], of_y[o][half]);
+        y_sums[o][half] = j == 0 ? w * rows[half] : mul_add(w, rows[half], y_sums[o][half]);
     }
   }
-  Lanes<A> of_x[Order + 1][2];
+  Lanes<A> x_weights[Order + 1][2];
   for (int o = 0; o <= Order; ++o)
     for (int half = 0; half < 2; ++half)
-      of_x[o][half] =
+      x_weights[o][half] =
           two_halves<A>(x[stride * (4 * o + 2 * half)], x[stride * (4 * o + 2 * half + 1)]);
   for (int s = 0; s < kSplineSums<Order>; ++s) {
-    const Lanes<A>*w = of_x[kSplineX[s]], *r = of_y[kSplineY[s]];
+    const Lanes<A>*w = x_weights[kSplineX[s]], *r = y_sums[kSplineY[s]];
     add_halves(mul_add(w[1], r[1], w[0] * r[0]), out[s]);
   }
 }
@@ -320,10 +320,10 @@ void spline_at(const DistanceGrid& g, const GridPlace<Lanes<A>>& at,
   alignas(64) double whole[3][kGroup], x[kWeights][kGroup], y[kWeights][kGroup];
   for (int c = 0; c < 3; ++c) store_lanes(at.whole[c], whole[c]);
   {
-    const SplineWeights<N, Order> of_x(at.rest[0]), of_y(at.rest[1]);
+    const SplineWeights<N, Order> x_weights(at.rest[0]), y_weights(at.rest[1]);
     for (int w = 0; w < kWeights; ++w) {
-      store_lanes((&of_x.w[0][0])[w], x[w]);
-      store_lanes((&of_y.w[0][0])[w], y[w]);
+      store_lanes((&x_weights.w[0][0])[w], x[w]);
+      store_lanes((&y_weights.w[0][0])[w], y[w]);
     }
   }
   double own[kGroup][kSplineSums<Order>][4];

@@ -159,9 +159,9 @@ void sum_places_f(const DistanceGrid& g, const int (&cell)[kLanesF],
                   const SplineWeights<LanesF<A>, 1>& x, const SplineWeights<LanesF<A>, 1>& y,
                   LanesF<A> (*out)[4]) {
   using N = LanesF<A>;
-  alignas(64) float of_y[2][4][kLanesF];
+  alignas(64) float y_weights[2][4][kLanesF];
   for (int o = 0; o < 2; ++o)
-    for (int b = 0; b < 4; ++b) store_lanes(y.w[o][b], of_y[o][b]);
+    for (int b = 0; b < 4; ++b) store_lanes(y.w[o][b], y_weights[o][b]);
 #pragma GCC unroll 1
   for (int j = 0; j < 4; ++j) {
     N sum[2][4];
@@ -172,7 +172,7 @@ void sum_places_f(const DistanceGrid& g, const int (&cell)[kLanesF],
       for (int b = 0; b < 4; ++b) {
         const N rows = load_four_rows<A>(c + b * g.plane);
         for (int o = 0; o < 2; ++o) {
-          const N w(double{of_y[o][b][place]});
+          const N w(double{y_weights[o][b][place]});
           sum[o][q] = b == 0 ? w * rows : mul_add(w, rows, sum[o][q]);
         }
       }
@@ -195,14 +195,14 @@ template <class A>
                                               LanesF<A> (*out)[4]) {
   using N = LanesF<A>;
   for (int k = 0; k < 4; ++k) {
-    N of_y[2][4];
+    N y_sums[2][4];
     for (int i = 0; i < 4; ++i)
       for (int j = 0; j < 4; ++j) {
         const N at(double{c[i * kQuad + j * g.plane + k]});
         for (int o = 0; o < 2; ++o)
-          of_y[o][i] = j == 0 ? y.w[o][0] * at : mul_add(y.w[o][j], at, of_y[o][i]);
+          y_sums[o][i] = j == 0 ? y.w[o][0] * at : mul_add(y.w[o][j], at, y_sums[o][i]);
       }
-    for (int s = 0; s < 3; ++s) out[s][k] = sum_over_x(x.w[kSplineX[s]], of_y[kSplineY[s]]);
+    for (int s = 0; s < 3; ++s) out[s][k] = sum_over_x(x.w[kSplineX[s]], y_sums[kSplineY[s]]);
   }
 }
 

@@ -163,7 +163,7 @@ Scene skin_that_waits() {
   Scene s = elastic_skin();
   for (auto& t : s.sensors) {
     t.array.rows = 13, t.array.cols = 21;
-    t.every = 2, t.remembers_readings = true;
+    t.every = 2, t.shear_at_readings = true;
   }
   return s;
 }

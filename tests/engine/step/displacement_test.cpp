@@ -20,7 +20,7 @@ TEST(Displacement, DerivativesAlongDofsComeBackFromCoordinates) {
   Batch batch(model, 1);
   batch.get_q(0, q);
   for (int dof = 0; dof < model.nv(); ++dof) displace(model, q, dof, random.normal());
-  add_by_coordinates(model, q, along, by_q);
+  add_along_coordinates(model, q, along, by_q);
   add_along_dofs(model, q, by_q, back);
   for (std::size_t k = 0; k < along.size(); ++k) EXPECT_NEAR(back[k], along[k], 1e-13) << k;
   // Along a displacement, both give the same derivative.

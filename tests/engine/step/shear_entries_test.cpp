@@ -91,7 +91,7 @@ TEST(ShearEntries, AnEnvironmentHasThemFromAnyNeighbours) {
 struct SkinStep {
   std::shared_ptr<const CompiledModel> m = compile(skin_and_brick());
   const ShearSpringContact& of = contact(*m);
-  TouchingSensorPoints felt{*m};
+  TouchingSensorPoints sensor_points{*m};
   ShearSpringTouch start = touch(0, 0), end = touch(2e-4, 0.01);
 
   /// The skin's against the box.
@@ -128,9 +128,9 @@ struct SkinStep {
 /// readings take.
 void expect_entries_of_rows(const KernelTable& table, SkinStep& step, const ShearState& memory) {
   const CompiledSensor& sensor = step.m->sensors[0];
-  const ShearSpringPoints points = step.felt.find(sensor, table, step.end);
+  const ShearSpringPoints points = step.sensor_points.find(sensor, table, step.end);
   ASSERT_GT(points.count, 40) << table.name;
-  const int* const index = step.felt.index();
+  const int* const index = step.sensor_points.index();
   for (int k = 0; k < points.count; ++k)
     for (int c = 0; c < 3; ++c)
       ASSERT_EQ(points.places[c * points.stride + k], step.of.contact.points[3 * index[k] + c]);

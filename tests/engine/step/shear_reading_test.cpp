@@ -36,7 +36,7 @@ Scene dragged(int every, double mu) {
   skin.coefficients = {100, 0.1, mu, 0, 60};
   skin.array = {{-0.015, -0.015, 0.005}, {0.015, 0.015, 0.005}, {1, 0, 0}, {0, 1, 0}, 4, 4};
   skin.every = every;
-  skin.remembers_readings = every > 0;
+  skin.shear_at_readings = every > 0;
   s.sensors.push_back(skin);
   return s;
 }

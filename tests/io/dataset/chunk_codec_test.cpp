@@ -276,8 +276,8 @@ TEST(ChunkCodec, RowsThatWaitBesideChunksAreBoundedAsWell) {
   l.gradients_of = "jacobians";
   l.gradients = {{"grad_wide", {64, 64}, true, "numbers that are not compressed", {}, {}}};
   for (int k = 0; k < 64; ++k) {
-    l.gradients[0].by_names.push_back(std::to_string(k));
-    l.gradients[0].by_units.emplace_back("1");
+    l.gradients[0].wrt_names.push_back(std::to_string(k));
+    l.gradients[0].wrt_units.emplace_back("1");
   }
   double spilled = 0;
   const std::string shard =

@@ -99,7 +99,7 @@ TEST(DatasetMerge, LeavesOutWhatFailedAndNumbersEpisodesForMinari) {
       EXPECT_EQ(result.demos, 22);
       EXPECT_EQ(result.failed, 18);
       EXPECT_EQ(result.steps, (EpisodeSteps{288, 1 + 2 + 3, 10 + 26 + 42}));
-      EXPECT_EQ(steps_said(h5::open_file(result.file)), result.steps);
+      EXPECT_EQ(stored_steps(h5::open_file(result.file)), result.steps);
       EXPECT_EQ(summarise(dataset).steps, result.steps);
       EXPECT_EQ(examine_dataset(dataset).steps, result.steps);
       EXPECT_EQ(result.train + result.valid, 22);
@@ -135,7 +135,7 @@ TEST(DatasetMerge, HasNoCountsOfStepsWhereAShardHasNone) {
   change(dataset.files[1], [](hid_t file) { H5Adelete(file, "simulation_steps"); });
   const MergeResult result = merge_dataset(dataset, {});
   EXPECT_EQ(result.steps, std::nullopt);
-  EXPECT_EQ(steps_said(h5::open_file(result.file)), std::nullopt);
+  EXPECT_EQ(stored_steps(h5::open_file(result.file)), std::nullopt);
   EXPECT_EQ(summarise(dataset).steps, std::nullopt);
   const DatasetReport report = examine_dataset(dataset);
   EXPECT_EQ(report.steps, std::nullopt);

@@ -29,7 +29,7 @@ TEST(Sensors, ThatRememberReadingsSayHowOftenTheyAreRead) {
   EXPECT_THAT(feedback_refusal(waits),
               AllOf(HasSubstr("s.xml:17:"), HasSubstr("memory=\"read\" without every")));
   const Scene scene = feedback_scene(with("memory=\"read\"", "memory=\"read\" every=\"5\"", waits));
-  EXPECT_TRUE(scene.sensors[0].remembers_readings);
+  EXPECT_TRUE(scene.sensors[0].shear_at_readings);
   EXPECT_THAT(feedback_refusal(with("memory=\"read\"", "memory=\"reed\"", waits)),
               HasSubstr("did you mean 'read'"));
 }

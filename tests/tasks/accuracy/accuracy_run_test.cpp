@@ -314,7 +314,7 @@ TEST(AccuracySweep, LooksAgainAtWhatMayBeCheaper) {
   int looks = 0;
   std::stop_source seen;  // what comes after the second look takes long
   listener.stop = seen.get_token();
-  listener.second_look = [&] { ++looks; };
+  listener.before_confirmation = [&] { ++looks; };
   listener.setting = [&](std::span<const AccuracyPoint> points) {
     if (points[0].errors.size() == 63 && points[0].setting.integrator == Integrator::sdirk2 &&
         points[0].setting.parts == 1)

@@ -127,7 +127,7 @@ TEST(TaskEpisodes, OfAProgramAreAskedForInBlocks) {
   const auto task = task_named("stable_grasp");          // episodes of one to nine actions
   const std::size_t width = task->spec().action.size(), size = task->spec().observation_size();
   const auto played = [&](int threads, Keeper& keeper, Requested& asked) {
-    const Policy policy(*task, "half", [&](const PolicyQuestion& question, std::span<double> to) {
+    const Policy policy(*task, "half", [&](const PolicyInputs& question, std::span<double> to) {
       const std::lock_guard lock(asked.mutex);
       EXPECT_EQ(question.observations.size(), question.episodes.size() * size);
       EXPECT_EQ(to.size(), question.episodes.size() * width);
@@ -167,7 +167,7 @@ TEST(TaskEpisodes, OfAProgramAreAskedForInBlocks) {
 TEST(TaskEpisodes, EndWithWhatAProgramThrows) {
   const auto task = task_named("dummy");
   for (const int threads : {1, 4}) {
-    const Policy policy(*task, "broken", [](const PolicyQuestion& question, std::span<double> to) {
+    const Policy policy(*task, "broken", [](const PolicyInputs& question, std::span<double> to) {
       if (question.actions[0] > 3) throw InputError("no answer");
       std::fill(to.begin(), to.end(), 0.0);
     });
