@@ -195,6 +195,24 @@ void add_positive_number(CLI::App& command, const std::string& flags, std::optio
   command.add_option_function<std::string>(flags, read, description)->type_name("X");
 }
 
+void add_positive_numbers(CLI::App& command, const std::string& flags, std::vector<double>& values,
+                          std::size_t count, const std::string& description) {
+  const auto read = [&values, count, name = long_name(flags)](const std::string& text) {
+    std::istringstream words(text + ',');
+    for (std::string word; std::getline(words, word, ',');) {
+      double number = 0;
+      const bool positive = parse(word, number) && number > 0 && std::isfinite(number);
+      values.push_back(positive ? number : 0);
+    }
+    if (values.size() != count || std::ranges::count(values, 0.0) > 0)
+      throw InputError(fmt::format("{} {}: expected {} positive numbers separated by commas", name,
+                                   text, count));
+  };
+  std::string type = "X";
+  for (std::size_t k = 1; k < count; ++k) type += ",X";
+  command.add_option_function<std::string>(flags, read, description)->type_name(type);
+}
+
 void add_memory_size(CLI::App& command, const std::string& flags, std::optional<double>& bytes,
                      const std::string& description) {
   static const std::map<std::string, double> units{

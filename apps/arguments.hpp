@@ -80,6 +80,10 @@ void add_whole_numbers(CLI::App& command, const std::string& flags, std::vector<
 void add_positive_number(CLI::App& command, const std::string& flags, std::optional<double>& value,
                          const std::string& description);
 
+/// The same for `count` positive finite numbers separated by commas, "0.01,0.02".
+void add_positive_numbers(CLI::App& command, const std::string& flags, std::vector<double>& values,
+                          std::size_t count, const std::string& description);
+
 /// The same for a size in bytes: a positive number and B, kB, MB, GB, TB (powers of 1000) or KiB,
 /// MiB, GiB, TiB (of 1024).
 void add_memory_size(CLI::App& command, const std::string& flags, std::optional<double>& bytes,

@@ -36,6 +36,7 @@ Command add_plot(CLI::App& program);
 Command add_bench(CLI::App& program);
 Command add_gradcheck(CLI::App& program);
 Command add_identify(CLI::App& program);
+Command add_calibrate(CLI::App& program);
 Command add_accuracy(CLI::App& program);
 Command add_stress(CLI::App& program);
 Command add_skin(CLI::App& program);

@@ -4,23 +4,19 @@
 #include <fmt/ranges.h>
 
 #include <charconv>
-#include <filesystem>
 #include <nlohmann/json.hpp>
 
 #include "apps/arguments.hpp"
 #include "apps/command.hpp"
+#include "apps/layout_text.hpp"
 #include "apps/run_options.hpp"
 #include "apps/task_run.hpp"
-#include "io/files/nearest_name.hpp"
 #include "io/files/part_file.hpp"
-#include "io/files/text_file.hpp"
 #include "io/robot/robot_import.hpp"
 #include "io/robot/rotations.hpp"
 
 namespace tangere::apps {
 namespace {
-
-constexpr std::size_t kLargestLayout = std::size_t{16} << 20;
 
 struct ImportArguments {
   std::string robot, output, base, keyframe;
@@ -51,14 +47,6 @@ std::vector<double> numbers_of(const std::string& what, const std::string& text)
     if (next == end) return out;
     p = next + 1;
   }
-}
-
-std::string layout_text(const std::string& what, const std::string& layout) {
-  if (const char* const text = program_scene("sensors/" + layout + ".xml")) return text;
-  if (std::filesystem::exists(layout) || layout.find_first_of("./") != std::string::npos)
-    return read_text_file(layout, kLargestLayout, "a layout");
-  throw InputError(fmt::format("{}: '{}' is neither a file nor a layout of the program{}", what,
-                               layout, suggestion(layout, program_sensors())));
 }
 
 PadRequest read_pad(const std::string& text) {

@@ -50,9 +50,10 @@ struct Program {
                              kCompiler);
         },
         "Print version, instruction set and compiler");
-    for (const auto add : {add_inspect, add_import, add_simulate, add_generate, add_validate,
-                           add_info, add_merge, add_export, add_plot, add_view, add_bench,
-                           add_gradcheck, add_identify, add_accuracy, add_stress, add_skin})
+    for (const auto add :
+         {add_inspect, add_import, add_simulate, add_generate, add_validate, add_info, add_merge,
+          add_export, add_plot, add_view, add_bench, add_gradcheck, add_identify, add_calibrate,
+          add_accuracy, add_stress, add_skin})
       commands.push_back(add(parser.root()));
   }
 };

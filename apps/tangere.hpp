@@ -25,6 +25,7 @@
 // Gradients and identification.
 #include "engine/derivative/number_gradients.hpp"
 #include "engine/derivative/tactile_point_numbers.hpp"
+#include "tasks/calibration/calibration.hpp"
 #include "tasks/gradients/gradients.hpp"
 #include "tasks/gradients/identification.hpp"
 #include "tasks/gradients/losses.hpp"

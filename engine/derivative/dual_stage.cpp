@@ -568,7 +568,7 @@ void DualStage::field(int sensor, const double* column, std::span<const double> 
   };
   if (!skin.layer) return springs(coefficients, skin.elastic, field, field_dot);
   if (!points.empty())
-    throw InputError("derivatives by points of a sensor with a layer; expected no <layer>");
+    throw InputError("derivatives by points of a sensor with a layer or a table; expected springs");
   read_dual_layer(i.m, sensor, i.links, coefficients, column, numbers, springs, field, field_dot);
 }
 

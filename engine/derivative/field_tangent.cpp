@@ -157,7 +157,7 @@ void FieldTangent::field(int sensor, std::span<const int> tiles, std::span<doubl
                      "' has ks: its field has no tangent by one state alone; expected ks=\"0\"");
   if (s.layer)
     throw InputError("tactile sensor '" + m.scene.sensors[std::size_t(sensor)].name +
-                     "' has a layer: its field has no tangent here; expected no <layer>");
+                     "' has a layer or a table: its field has no tangent here; expected springs");
   const int group = i.lane / kGroup;
   if (i.met_group != group || i.met_sensor != sensor)
     i.reader.find_touches(*i.batch, i.block, group, sensor);

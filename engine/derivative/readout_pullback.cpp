@@ -160,7 +160,7 @@ struct ReadoutPullback::Impl {
     if (!points.empty())
       throw InputError("derivatives by the points of tactile sensor '" +
                        model.scene().sensors[std::size_t(s.number)].name +
-                       "', which has a layer; expected a sensor without <layer>");
+                       "', which has a layer or a table; expected a sensor of springs");
     const std::size_t numbers = 3 * std::size_t(s.points());
     layer_bar.assign(cotangent.begin(), cotangent.end());
     read_layered(s, lane, pressure, std::span(expanded).first(numbers));

@@ -362,6 +362,7 @@ class Compiler {
       sensor.number = static_cast<int>(i);
       compile_imperfections(d, m_.scene.timestep, sensor, info);
       if (d.layer) sensor.layer = compile_sensor_layer(d, sensor, info.pressure_sign);
+      if (d.table) sensor.layer = compile_pressure_table(d, sensor, info.pressure_sign);
       if (d.markers) check_markers(d, info.pressure_sign);
       m_.layout.past_states = std::max(m_.layout.past_states, info.past_states);
       sensor.parameters = constants(d.coefficients);

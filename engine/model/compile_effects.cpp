@@ -99,6 +99,7 @@ std::string effects_variant(std::uint8_t effects) {
 
 std::string field_variant(const CompiledSensor& s) {
   const std::string law = std::string("law ") + to_string(s.law);
+  if (s.layer && s.layer->table) return "pressures by a table; springs of " + law;
   if (s.layer)
     return std::to_string(s.layer->grid.rows) + " × " + std::to_string(s.layer->grid.cols) +
            " coupled cells of a layer; springs of law " + to_string(s.law);

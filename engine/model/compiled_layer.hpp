@@ -1,24 +1,31 @@
 // SPDX-License-Identifier: Apache-2.0
-// The coupled layer of a sensor, compiled (docs/layer.md).
+// The law of a sensor's pressure where its points are no linear springs, compiled: a coupled layer
+// (docs/layer.md) or a table (docs/table.md).
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "engine/model/layer_compliance.hpp"
+#include "engine/model/monotone_cubic.hpp"
 #include "engine/model/surface_compliance.hpp"
 
 namespace tangere {
 
 struct CompiledLayer {
-  LayerGrid grid;
+  /// Pressure [Pa] by depth [m], of points that are not coupled; the numbers of cells are then not
+  /// set. None: the layer below.
+  std::optional<MonotoneCubic> table{};
+  LayerGrid grid{};
   int side = 1;                      ///< points along the side of a cell
   std::vector<int> cell_of_point;    ///< (points) row-major
   std::vector<CellWeights> weights;  ///< (points) row-major
   LayerCompliance compliance;
-  double modulus = 0;     ///< E [Pa] where kn is `stiffness`; it changes in proportion to kn
+  double modulus = 0;     ///< E [Pa], of a table 1, where kn is `stiffness`; proportional to kn
   double stiffness = 0;   ///< kn of the scene [N/m]
   double relaxation = 0;  ///< τ [s]
   double area = 0;        ///< for which a point stands [m²]
+  double deepest = 0;     ///< where depth ends [m]
   int outward = 1;        ///< 1 or -1: whether the pad's z points out of the skin
   std::array<int, 2> direction{1, 1};          ///< 1 or -1: whether rows count along axis0, cols
                                                ///< along axis1

@@ -102,7 +102,7 @@ struct CompiledSensor {
   std::vector<double> weights{};
   std::array<LateralSpread, 2> spread{};         ///< from row to row, and from column to column
   bool elastic = false;                          ///< its points have shear springs (k_s)
-  std::shared_ptr<const CompiledLayer> layer{};  ///< couples its points; null: none
+  std::shared_ptr<const CompiledLayer> layer{};  ///< of its pressures; null: springs
   /// Steps between updates of the shear state. If > 0, the state stores the anchors b and a of each
   /// point (first all b, then all a). 0: updated at every step; the state stores s.
   int shear_interval = 0;

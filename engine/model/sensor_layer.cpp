@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "engine/base/error.hpp"
@@ -18,12 +19,26 @@ namespace {
 constexpr double kUsualCell = 0.2;      // of the thickness
 constexpr double kLeastCell = 0.75;     // of the points' distance
 constexpr double kMostPitch = 1.0 / 3;  // of the points, by the thickness
-constexpr double kRounding = 1e-9;       // relative, of a pitch
+constexpr double kRounding = 1e-9;      // relative, of a pitch
 constexpr double kThickest = 4;         // thickness by the pad's longer side
 constexpr double kMostMargin = 6;       // by the thickness; sides farther away have no effect
 
 [[noreturn]] void fail(const TactileDescription& d, const std::string& message) {
+  if (d.table) throw InputError(d.source.prefix() + "pressure of '" + d.name + "': " + message);
   throw InputError(d.layer->source.prefix() + "<layer> of '" + d.name + "': " + message);
+}
+
+/// Refuses sensors that read springs alone.
+void check_sensor(const TactileDescription& d, const CompiledSensor& sensor) {
+  if (!d.points.empty()) fail(d, "points in a list; expected a flat array, type=\"rect_array\"");
+  if (sensor.past_states() > 0)
+    fail(d, "delay, low_pass or hysteresis; expected a sensor without them");
+}
+
+/// Distances of neighbouring points of an array, from row to row and from column to column [m].
+std::array<double, 2> pitch_of(const RectArray& a) {
+  const Vector3 way = a.corner1 - a.corner0;
+  return {std::abs(dot(way, a.axis0)) / (a.rows - 1), std::abs(dot(way, a.axis1)) / (a.cols - 1)};
 }
 
 /// Returns the points of a cell's side: as many as come nearest to its size.
@@ -46,16 +61,28 @@ std::optional<double> margin_of(const TactileDescription& d) {
 
 }  // namespace
 
+std::shared_ptr<const CompiledLayer> compile_pressure_table(const TactileDescription& d,
+                                                            const CompiledSensor& sensor,
+                                                            int pressure_sign) {
+  check_sensor(d, sensor);
+  const auto [height, width] = pitch_of(d.array);
+  auto law = std::make_shared<CompiledLayer>();
+  law->table.emplace(d.table->depth, d.table->pressure);
+  law->modulus = 1;
+  law->area = height * width;
+  law->stiffness = d.coefficients.kn > 0 ? d.coefficients.kn : d.table->stiffness() * law->area;
+  law->relaxation = d.table->relaxation;
+  law->deepest = d.table->thickness > 0 ? d.table->thickness : 2 * d.table->depth.back();
+  law->outward = pressure_sign;
+  return law;
+}
+
 std::shared_ptr<const CompiledLayer> compile_sensor_layer(const TactileDescription& d,
                                                           const CompiledSensor& sensor,
                                                           int pressure_sign) {
-  if (!d.points.empty()) fail(d, "points in a list; expected a flat array, type=\"rect_array\"");
+  check_sensor(d, sensor);
   if (!d.material) fail(d, "no material; expected modulus and thickness");
-  if (sensor.past_states() > 0)
-    fail(d, "delay, low_pass or hysteresis; expected a sensor without them");
-  const Vector3 way = d.array.corner1 - d.array.corner0;
-  const double height = std::abs(dot(way, d.array.axis0)) / (d.array.rows - 1),
-               width = std::abs(dot(way, d.array.axis1)) / (d.array.cols - 1);
+  const auto [height, width] = pitch_of(d.array);
   const double t = d.material->thickness, pitch = std::max(height, width);
   if (!(pitch <= kMostPitch * t * (1 + kRounding)))
     fail(d,
@@ -85,6 +112,7 @@ std::shared_ptr<const CompiledLayer> compile_sensor_layer(const TactileDescripti
       d.coefficients.kn > 0 ? d.coefficients.kn : skin_springs(*d.material).kn * height * width;
   layer->relaxation = d.material->relaxation;
   layer->area = height * width;
+  layer->deepest = t;
   layer->outward = pressure_sign;
   layer->direction = {dot(way, d.array.axis0) < 0 ? -1 : 1, dot(way, d.array.axis1) < 0 ? -1 : 1};
   if (d.markers) layer->surface.emplace(layer->grid);

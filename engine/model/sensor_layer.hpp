@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Compiles the coupled layer of a sensor (docs/layer.md).
+// Compiles the coupled layer of a sensor (docs/layer.md), or its table (docs/table.md).
 #pragma once
 
 #include <memory>
@@ -10,6 +10,12 @@ namespace tangere {
 
 /// Cells of a layer, at most: their compliance has 8 bytes for each pair.
 inline constexpr int kMostLayerCells = 4096;
+
+/// Compiles the table of a sensor that has one. Throws InputError (file:line) for a sensor that
+/// cannot have one. Arguments: as below.
+std::shared_ptr<const CompiledLayer> compile_pressure_table(const TactileDescription& d,
+                                                            const CompiledSensor& sensor,
+                                                            int pressure_sign);
 
 /// Throws InputError (file:line) for a sensor that cannot have a layer. `sensor`: with its points,
 /// imperfections and body. `pressure_sign`: as in SensorInfo.

@@ -251,14 +251,16 @@ EffectInfo find_layer(const Scene& scene, int element) {
   return find_in_sensors(
       scene, element,
       [](const TactileDescription& d) {
-        return d.layer ? std::optional(d.layer->source) : std::nullopt;
+        if (d.layer) return std::optional(d.layer->source);
+        return d.table ? std::optional(d.source) : std::nullopt;
       },
       [](const TactileDescription& d) {
+        if (d.table) return fmt::format("a table of {} pressures", d.table->pressure.size());
         return d.material
                    ? fmt::format("{} Pa, {} m thick", d.material->modulus, d.material->thickness)
                    : std::string("no material");
       },
-      "no <layer>");
+      "no <layer> and no table of pressures");
 }
 
 EffectInfo find_feedback(const Scene& scene, int element) {

@@ -193,6 +193,17 @@ struct LayerDescription {
   Source source;
 };
 
+/// Pressure of a skin that is no elastic layer, by its depth (docs/table.md).
+struct PressureTable {
+  std::vector<double> depth;     ///< [m], from 0, ascending
+  std::vector<double> pressure;  ///< [Pa], from 0, not falling
+  double thickness = 0;          ///< where depth ends [m]; 0: at twice the last depth
+  double relaxation = 5e-3;      ///< τ [s]
+
+  /// Mean stiffness by area [N/m³].
+  [[nodiscard]] double stiffness() const { return pressure.back() / depth.back(); }
+};
+
 /// A tactile sensor: points of a skin on `body`, each with the coefficients of a penalty contact.
 struct TactileDescription {
   std::string name;
@@ -217,6 +228,8 @@ struct TactileDescription {
   std::optional<SkinMaterial> material{};
   /// Couples its points; needs a material. None: every point is a spring of its own.
   std::optional<LayerDescription> layer{};
+  /// Takes the place of kn in readings. None: the pressure is linear in depth.
+  std::optional<PressureTable> table{};
 };
 
 /// Lists the points of a sensor in field order: those of an array row by row, with its axes. The

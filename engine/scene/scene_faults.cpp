@@ -120,6 +120,34 @@ std::string tie_fault(const Scene& scene, const RandomizationDescription& d) {
   return own.values.size() == other.values.size() ? "" : fault(length(own), length(other));
 }
 
+std::string table_fault(const TactileDescription& d) {
+  const PressureTable& table = *d.table;
+  if (d.layer || d.material) return "a sensor with a material; expected one of them";
+  constexpr std::size_t kMost = 1000;
+  const std::size_t n = table.depth.size();
+  if (n < 2 || n > kMost || table.pressure.size() != n)
+    return fmt::format("{} depths and {} pressures; expected as many of both, 2 to {}", n,
+                       table.pressure.size(), kMost);
+  if (table.depth[0] != 0 || table.pressure[0] != 0)
+    return fmt::format("begins with {} Pa at {} m; expected 0 at 0", table.pressure[0],
+                       table.depth[0]);
+  for (std::size_t k = 1; k < n; ++k) {
+    if (!(table.depth[k] > table.depth[k - 1]))
+      return fmt::format("depth {} m after {} m; expected ascending depths", table.depth[k],
+                         table.depth[k - 1]);
+    if (!(table.pressure[k] >= table.pressure[k - 1]))
+      return fmt::format("{} Pa after {} Pa; expected pressures that do not fall",
+                         table.pressure[k], table.pressure[k - 1]);
+  }
+  if (!(table.pressure[n - 1] > 0)) return "is 0 at all depths; expected a positive pressure";
+  if (table.thickness != 0 && !(table.thickness >= table.depth[n - 1]))
+    return fmt::format("depths up to {} m in a skin of {} m; expected a thickness of at least that",
+                       table.depth[n - 1], table.thickness);
+  return table.relaxation >= 0
+             ? ""
+             : fmt::format("relaxation {}; expected zero or more", table.relaxation);
+}
+
 }  // namespace
 
 std::string joint_fault(const JointDescription& joint) {
@@ -245,6 +273,7 @@ void check_scene(const Scene& scene) {
   for (const TactileDescription& d : scene.sensors) {
     check(d.source, "tactile sensor '" + d.name + "': ", value_fault(kTactile, d.coefficients));
     if (d.markers) check(d.markers->source, "markers of '" + d.name + "': ", markers_fault(d));
+    if (d.table) check(d.source, "pressure of '" + d.name + "': ", table_fault(d));
     if (d.layer)
       check(d.layer->source, "layer of '" + d.name + "': ", value_fault(kLayer, *d.layer));
   }

@@ -88,7 +88,7 @@ bool LayeredField::reaches(int target, int tile) const {
 void LayeredField::add_point(int index, const Vec3<double>& xi, double normal) {
   constexpr double kSteepest = 10;  // |slant|: 1/cos of 84°
   const CompiledLayer& layer = *sensor_->layer;
-  const double deepest = layer.grid.thickness;
+  const double deepest = layer.deepest;
   Point best{index, -1, xi, 0, false, normal, {}};
   for (std::size_t k = 0; k < shapes_.size(); ++k) {
     const kernels::TouchShape& s = shapes_[k];
@@ -113,6 +113,10 @@ void LayeredField::add_point(int index, const Vec3<double>& xi, double normal) {
   if (best.target < 0) return;
   depth_[static_cast<std::size_t>(index)] = best.at.depth;
   points_.push_back(best);
+}
+
+std::span<const double> LayeredField::pressure() const {
+  return sensor_->layer->table ? table_.pressure() : layer_.pressure();
 }
 
 void LayeredField::find_points(const SpringFields& springs) {
@@ -154,10 +158,11 @@ void LayeredField::read(const CompiledSensor& sensor, const kernels::TactileArgs
   whole_.assign(springs.whole.begin(), springs.whole.end());
   normal_.assign(springs.normal.begin(), springs.normal.end());
   find_points(springs);
-  layer_.solve(layer, depth_, layer.modulus * (kn_ / layer.stiffness));
+  const double modulus = layer.modulus * (kn_ / layer.stiffness);
+  layer.table ? table_.solve(layer, depth_, modulus) : layer_.solve(layer, depth_, modulus);
   std::fill(field.begin(), field.end(), 0.0);
   for (const Point& p : points_) {
-    const double load = layer.area * layer_.pressure()[static_cast<std::size_t>(p.index)];
+    const double load = layer.area * pressure()[static_cast<std::size_t>(p.index)];
     Vec3<double> f = load * in_field(p.at.slant);
     if (p.normal > 0) f += (load / p.normal) * friction_at(p).along;
     put(field, p.index, f);
@@ -192,7 +197,7 @@ void LayeredField::pull_back(std::span<const double> field_bar, bool sizes, Cota
   slant_bar_.clear();
   for (const Point& p : points_) {
     const auto at = static_cast<std::size_t>(p.index);
-    const double load = layer.area * layer_.pressure()[at];
+    const double load = layer.area * pressure()[at];
     const Vec3<double> bar = vector_at(field_bar, p.index);
     double load_bar = dot(bar, in_field(p.at.slant));
     Vec3<double> slant_bar = load * to_pad(bar);
@@ -214,7 +219,7 @@ void LayeredField::pull_back(std::span<const double> field_bar, bool sizes, Cota
     slant_bar_.push_back(slant_bar);
     out.stiffness += load_bar * load / kn_;
   }
-  layer_.pull_back(load_bar_, depth_bar_);
+  layer.table ? table_.pull_back(load_bar_, depth_bar_) : layer_.pull_back(load_bar_, depth_bar_);
   for (kernels::TouchCotangent<double>& t : out.touches) t = {};
   for (std::size_t i = 0; i < points_.size(); ++i)
     if (!points_[i].deepest) pull_back_point(points_[i], slant_bar_[i], sizes, out);
@@ -256,13 +261,14 @@ void LayeredField::push_forward(const SpringFields& springs_dot, std::span<const
     depth_dot[static_cast<std::size_t>(p.index)] = at.depth.epsilon;
     slants_dot.push_back({at.slant.x.epsilon, at.slant.y.epsilon, at.slant.z.epsilon});
   }
-  layer_.push_forward(depth_dot, pressure_dot);
+  layer.table ? table_.push_forward(depth_dot, pressure_dot)
+              : layer_.push_forward(depth_dot, pressure_dot);
   std::fill(field_dot.begin(), field_dot.end(), 0.0);
   for (std::size_t i = 0; i < points_.size(); ++i) {
     const Point& p = points_[i];
     const auto at = static_cast<std::size_t>(p.index);
     const Vec3<double>& slant_dot = slants_dot[i];
-    const double load = layer.area * layer_.pressure()[at],
+    const double load = layer.area * pressure()[at],
                  load_dot = layer.area * pressure_dot[at] + load * stiffness_dot / kn_;
     Vec3<double> f = load_dot * in_field(p.at.slant) + load * in_field(slant_dot);
     if (p.normal > 0) {

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// Field of a sensor with a coupled layer (docs/layer.md). With the force N n and the friction T of
-// the springs at a point, the layer's pressure p there, and the normal m = slant/|slant| of the
-// surface that presses, the force on the sensor's body is
+// Field of a sensor with a coupled layer (docs/layer.md) or a table (docs/table.md). With the force
+// N n and the friction T of the springs at a point, the pressure p of the layer or the table there,
+// and the normal m = slant/|slant| of the surface that presses, the force on the sensor's body is
 //   f = 𝒜 p (slant + T'/N),  T' = T - m (m·T)
-// so that friction has the cone of the layer's load. Where N is 0 there is no friction.
+// so that friction has the cone of that load. Where N is 0 there is no friction.
 #pragma once
 
 #include <span>
@@ -12,6 +12,7 @@
 #include "engine/model/compiled_model.hpp"
 #include "engine/sense/gel_layer.hpp"
 #include "engine/sense/layer_depth.hpp"
+#include "engine/sense/table_pressure.hpp"
 #include "kernels/numbers/dual.hpp"
 #include "kernels/tactile/tactile_types.hpp"
 
@@ -46,7 +47,7 @@ class LayeredField {
                     std::span<const kernels::Vec3<kernels::Dual<double>>> sizes,
                     double stiffness_dot, std::span<double> field_dot);
 
-  /// Linear systems that the last read() solved.
+  /// Linear systems that the last read() of a layer solved.
   [[nodiscard]] int systems() const { return layer_.systems(); }
 
  private:
@@ -62,6 +63,7 @@ class LayeredField {
   struct Friction {
     kernels::Vec3<double> springs, along, normal;
   };
+  [[nodiscard]] std::span<const double> pressure() const;
   void find_points(const SpringFields& springs);
   void add_point(int index, const kernels::Vec3<double>& xi, double normal);
   void pull_back_point(const Point& p, const kernels::Vec3<double>& slant_bar, bool sizes,
@@ -85,6 +87,7 @@ class LayeredField {
   std::vector<double> depth_bar_, load_bar_;      // (points) cotangents
   std::vector<kernels::Vec3<double>> slant_bar_;  // parallel to points_
   GelLayer layer_;
+  TablePressure table_;
 };
 
 }  // namespace tangere

@@ -67,13 +67,18 @@ double parse_number(std::string_view field, const std::string& place) {
   return number;
 }
 
+/// Returns a name of a header without its quotes.
+std::string_view unquoted(std::string_view word) {
+  if (word.size() > 1 && (word.front() == '"' || word.front() == '\'') &&
+      word.back() == word.front())
+    return word.substr(1, word.size() - 2);
+  return word;
+}
+
 void check_header(const std::vector<std::string_view>& header, std::span<const std::string> names,
                   const std::string& place) {
   for (std::size_t column = 0; column < header.size(); ++column) {
-    std::string_view word = header[column];
-    if (word.size() > 1 && (word.front() == '"' || word.front() == '\'') &&
-        word.back() == word.front())
-      word = word.substr(1, word.size() - 2);
+    const std::string_view word = unquoted(header[column]);
     const auto named = std::find(names.begin(), names.end(), word);
     if (named != names.end() && *named != names[column])
       throw InputError(fmt::format(
@@ -82,17 +87,13 @@ void check_header(const std::vector<std::string_view>& header, std::span<const s
   }
 }
 
-}  // namespace
-
-std::vector<std::vector<double>> read_csv(const std::string& path, std::size_t columns,
-                                          std::span<const std::string> names) {
+/// Calls row(fields, place) for every line that is neither empty nor a comment.
+template <class Row>
+void for_each_row(const std::string& path, const Row& row) {
   require_regular_file(path, "a csv file");
   std::ifstream file(path);
   if (!file) throw IoError(path + ": cannot be opened for reading");
-
-  std::vector<std::vector<double>> rows;
   std::vector<char> buffer(kLongestLine);
-  bool first = true;
   Source source{path, 0};
   while (file.getline(buffer.data(), kLongestLine)) {
     ++source.line;
@@ -101,25 +102,77 @@ std::vector<std::vector<double>> read_csv(const std::string& path, std::size_t c
     if (source.line == 1 && line.starts_with(kByteOrderMark))
       line.remove_prefix(kByteOrderMark.size());
     line = trim(line);
-    if (line.empty() || line.front() == '#') continue;
-    const std::vector<std::string_view> fields = split(line);
-    if (fields.size() != columns)
-      throw InputError(fmt::format("{}{} column{}; expected {}, one per control", source.prefix(),
-                                   fields.size(), fields.size() == 1 ? "" : "s", columns));
-    if (std::exchange(first, false) && std::all_of(fields.begin(), fields.end(), is_word)) {
-      check_header(fields, names, source.prefix());
-      continue;
-    }
-    std::vector<double>& row = rows.emplace_back();
-    for (std::size_t c = 0; c < columns; ++c)
-      row.push_back(parse_number(fields[c], fmt::format("{}column {}", source.prefix(), c + 1)));
+    if (!line.empty() && line.front() != '#') row(split(line), source.prefix());
   }
   if (file.bad()) throw IoError(path + ": reading failed");
   if (!file.eof())
     throw InputError(fmt::format("{}:{}: line longer than {} bytes; expected a table of numbers",
                                  path, source.line + 1, kLongestLine));
-  if (rows.empty()) throw InputError(path + ": no rows of numbers; expected at least one");
+}
+
+void check_count(std::size_t found, std::size_t expected, const char* each,
+                 const std::string& place) {
+  if (found != expected)
+    throw InputError(fmt::format("{}{} column{}; expected {}, {}", place, found,
+                                 found == 1 ? "" : "s", expected, each));
+}
+
+std::vector<std::string> column_names(const std::vector<std::string_view>& header,
+                                      const std::string& place) {
+  if (!std::all_of(header.begin(), header.end(), is_word))
+    throw InputError(place + "no names of columns; expected them in the first row");
+  std::vector<std::string> names;
+  for (const std::string_view word : header) {
+    if (std::find(names.begin(), names.end(), unquoted(word)) != names.end())
+      throw InputError(
+          fmt::format("{}two columns '{}'; expected different names", place, unquoted(word)));
+    names.emplace_back(unquoted(word));
+  }
+  return names;
+}
+
+double number_at(const std::vector<std::string_view>& fields, std::size_t column,
+                 const std::string& place) {
+  return parse_number(fields[column], fmt::format("{}column {}", place, column + 1));
+}
+
+[[noreturn]] void fail_empty(const std::string& path) {
+  throw InputError(path + ": no rows of numbers; expected at least one");
+}
+
+}  // namespace
+
+std::vector<std::vector<double>> read_csv(const std::string& path, std::size_t columns,
+                                          std::span<const std::string> names) {
+  std::vector<std::vector<double>> rows;
+  bool first = true;
+  for_each_row(path, [&](const std::vector<std::string_view>& fields, const std::string& place) {
+    check_count(fields.size(), columns, "one per control", place);
+    if (std::exchange(first, false) && std::all_of(fields.begin(), fields.end(), is_word)) {
+      check_header(fields, names, place);
+      return;
+    }
+    std::vector<double>& row = rows.emplace_back();
+    for (std::size_t c = 0; c < columns; ++c) row.push_back(number_at(fields, c, place));
+  });
+  if (rows.empty()) fail_empty(path);
   return rows;
+}
+
+NamedColumns read_named_columns(const std::string& path) {
+  NamedColumns out;
+  for_each_row(path, [&](const std::vector<std::string_view>& fields, const std::string& place) {
+    if (out.names.empty()) {
+      out.names = column_names(fields, place);
+      out.columns.resize(out.names.size());
+      return;
+    }
+    check_count(fields.size(), out.names.size(), "as in the header", place);
+    for (std::size_t c = 0; c < fields.size(); ++c)
+      out.columns[c].push_back(number_at(fields, c, place));
+  });
+  if (out.names.empty() || out.columns[0].empty()) fail_empty(path);
+  return out;
 }
 
 }  // namespace tangere

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tables of numbers from a spreadsheet, a script or an editor: controls, one row per step.
+// Tables of numbers from a spreadsheet, a script or an editor: controls, one row per step, and
+// recordings with named columns.
 #pragma once
 
 #include <cstddef>
@@ -16,5 +17,12 @@ namespace tangere {
 /// ("file:line: …") for any other mistake in it, including a table without rows.
 std::vector<std::vector<double>> read_csv(const std::string& path, std::size_t columns,
                                           std::span<const std::string> names = {});
+
+struct NamedColumns {
+  std::vector<std::string> names;
+  std::vector<std::vector<double>> columns;  ///< parallel to names, all of one length
+};
+/// Reads a table whose first row has a different name for each column. Otherwise as read_csv().
+NamedColumns read_named_columns(const std::string& path);
 
 }  // namespace tangere

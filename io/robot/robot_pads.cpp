@@ -10,8 +10,8 @@
 
 #include "io/robot/rotations.hpp"
 #include "io/robot/scene_writer.hpp"
+#include "io/scene/layout_file.hpp"
 #include "io/scene/scene_node.hpp"
-#include "io/scene/xml_document.hpp"
 
 namespace tangere {
 namespace {
@@ -49,14 +49,6 @@ Pose place_of(const PadRequest& pad, const RobotPlace& place, const std::string&
   return pose;
 }
 
-void check_metres(const tinyxml2::XMLElement& root, SceneContext& context) {
-  const SceneNode node(root, context);
-  if (node.name() != "sensor") node.fail("not a layout; expected the root <sensor unit=\"m-kg\">");
-  node.check_attributes({"unit", "name"});
-  if (node.choice("unit", {"cm-g", "m-kg"}, 0) != 1)
-    node.fail("unit=\"cm-g\"; expected unit=\"m-kg\", which the scene has");
-}
-
 /// Attributes of a layout that name a file lie beside the layout, not beside the scene.
 void refuse_files(const SceneNode& sensor) {
   for (const char* name : {"spec", "filename"})
@@ -65,18 +57,6 @@ void refuse_files(const SceneNode& sensor) {
           fmt::format("{}: a layout that names a file; write it into the scene with "
                       "<include file=\"…\"/>",
                       name));
-}
-
-/// The elements inside a sensor, such as <imperfections>.
-std::string children_text(const tinyxml2::XMLElement& sensor) {
-  std::string text;
-  for (const auto* child = sensor.FirstChildElement(); child != nullptr;
-       child = child->NextSiblingElement()) {
-    tinyxml2::XMLPrinter printer(nullptr, true);
-    child->Accept(&printer);
-    text += fmt::format("      {}\n", printer.CStr());
-  }
-  return text;
 }
 
 /// Returns the attribute `ignores` of a skin on `link`: bodies without contact in the file, and
@@ -116,9 +96,7 @@ std::string pads_text(const Robot& robot, const std::vector<PadRequest>& pads,
     tinyxml2::XMLDocument document;
     SceneContext context;
     context.file = pad.layout_name;
-    const tinyxml2::XMLElement& root =
-        parse_xml(document, pad.layout, pad.layout_name, "the root <sensor>", context.warnings);
-    check_metres(root, context);
+    const tinyxml2::XMLElement& root = parse_layout(document, pad.layout, context);
     text += fmt::format("    <!-- {} on {} '{}' -->\n", comment_text(pad.layout_name),
                         found.site == nullptr ? "link" : "site", comment_text(pad.link));
     for (const SceneNode& sensor : SceneNode(root, context).children({"tactile"})) {
@@ -136,7 +114,7 @@ std::string pads_text(const Robot& robot, const std::vector<PadRequest>& pads,
           text += fmt::format(" {}=\"{}\"", known, attribute_text(a->Value()));
       }
       if (!sensor.has("feels") && !sensor.has("ignores")) text += ignores_text(robot, link);
-      const std::string inside = children_text(sensor.element());
+      const std::string inside = parts_text(sensor.element());
       text += inside.empty() ? "/>\n" : ">\n" + inside + "    </tactile>\n";
     }
   }

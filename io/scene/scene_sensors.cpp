@@ -79,11 +79,12 @@ double cell_of(const SceneElement& node, const std::string& type, std::size_t n)
 }
 
 /// Turns coefficients by area into those of points that stand for `cell` [m²]. Those that the
-/// element does not give itself follow from its material, if it has one.
+/// element does not give itself follow from its material or its table, if it has one.
 void share_area(const SceneElement& node, double cell, TactileDescription& d) {
   d.cell = cell;
-  const std::optional<ContactCoefficients> springs =
-      d.material ? std::optional(skin_springs(*d.material)) : std::nullopt;
+  std::optional<ContactCoefficients> springs;
+  if (d.material) springs = skin_springs(*d.material);
+  if (d.table) springs.emplace().kn = d.table->stiffness();
   static constexpr const char* kNames[] = {"kn", "kt", "mu", "damping", "ks"};
   for (std::size_t k = 0; k < kCoefficients; ++k) {
     if (!scales_with_area(k)) continue;
@@ -94,19 +95,41 @@ void share_area(const SceneElement& node, double cell, TactileDescription& d) {
   }
 }
 
+void refuse_per_point(const SceneElement& node, const char* with) {
+  if (node.has("per") && node.text("per") == "point")
+    node.fail(fmt::format(
+        "{} and per=\"point\": a skin's coefficients count per area; expected one of them", with));
+}
+
+/// Reads `pressure` and `pressure_depth`, with `thickness` and `relaxation`, if they are there.
+std::optional<PressureTable> read_pressures(const SceneElement& node, const std::string& type) {
+  if (!node.row("pressure").serves(type)) return std::nullopt;
+  if (node.has("pressure") != node.has("pressure_depth"))
+    node.fail("pressure or pressure_depth alone; expected both or none");
+  if (!node.has("pressure")) return std::nullopt;
+  if (node.has("modulus")) node.fail("modulus and pressure; expected one of them");
+  refuse_per_point(node, "pressure");
+  PressureTable table{.depth = node.numbers("pressure_depth"),
+                      .pressure = node.numbers("pressure"),
+                      .relaxation = node.number("relaxation")};
+  if (node.has("thickness")) table.thickness = node.number("thickness");
+  if (table.depth.size() < 2 || table.depth.size() != table.pressure.size())
+    node.fail(fmt::format("{} numbers of pressure_depth and {} of pressure; expected as many",
+                          table.depth.size(), table.pressure.size()));
+  return table;
+}
+
 /// Reads `modulus`, `thickness` and `relaxation`, if there are any.
 std::optional<SkinMaterial> read_material(const SceneElement& node, const std::string& type) {
   if (!node.row("modulus").serves(type)) return std::nullopt;
   if (!node.has("modulus")) {
+    if (node.has("pressure")) return std::nullopt;
     for (const char* part : {"thickness", "relaxation"})
       if (node.has(part)) node.fail(fmt::format("{} without modulus; expected both", part));
     return std::nullopt;
   }
   if (!node.has("thickness")) node.fail("modulus without thickness; expected both");
-  if (node.has("per") && node.text("per") == "point")
-    node.fail(
-        "modulus and per=\"point\": a skin's coefficients count per area; expected one of "
-        "them");
+  refuse_per_point(node, "modulus");
   SkinMaterial material;
   node.read(material, false, type);
   return material;
@@ -189,8 +212,9 @@ void add_feedback(Scene& scene, const SceneNode& node, const TactileDescription&
     node.fail(
         "feedback and ks: a contact and the reading of its skin would each remember a touch "
         "in their own way; expected one of them");
-  if (d.layer)
-    node.fail("feedback and <layer>: the contact would have springs; expected one of them");
+  if (d.layer || d.table)
+    node.fail(fmt::format("feedback and {}: the contact would have springs; expected one of them",
+                          d.layer ? "<layer>" : "pressure"));
   PairContactDescription pair;
   for (const TactilePoint& p : tactile_points(d)) {
     if (p.factors != TactilePoint{}.factors)
@@ -272,7 +296,8 @@ void read_sensors(Scene& scene, const SceneNode& section) {
       d.points = read_points(node, type);
     }
     d.material = read_material(node, type);
-    if (d.material || (node.word("per") == 1 && node.row("per").serves(type)))
+    d.table = read_pressures(node, type);
+    if (d.material || d.table || (node.word("per") == 1 && node.row("per").serves(type)))
       share_area(node,
                  d.points.empty() ? cell_of(node, d.array) : cell_of(node, type, d.points.size()),
                  d);

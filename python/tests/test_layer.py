@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A sensor whose points a layer couples: readings, the builder and gradients."""
+"""Sensors whose points a layer couples, or whose pressures a table gives: readings, gradients."""
 
 from __future__ import annotations
+
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,6 +14,19 @@ import tangere  # noqa: E402
 import tangere.torch as tt  # noqa: E402
 
 GEL = tangere.scenes()["gel_press"]
+TABLE = 'pressure_depth="0 5e-4 1e-3 2e-3" pressure="0 1e5 1.5e5 6e5" thickness="4e-3"'
+
+
+def with_table(folder):
+    """Returns the path of the same press with a table in place of the layer."""
+    text = Path(GEL).read_text()
+    for old, new in (('modulus="4.28e5" thickness="4e-3"', TABLE),
+                     ('<layer cell="0.75e-3" margin="1e-3"/>', "")):  # fmt: skip
+        assert old in text
+        text = text.replace(old, new)
+    path = folder / "table.xml"
+    path.write_text(text)
+    return str(path)
 
 
 def test_environments_have_gels_of_their_own():
@@ -24,8 +39,10 @@ def test_environments_have_gels_of_their_own():
     assert len(np.unique(field[..., 2].max((1, 2)))) == 3  # kn is drawn, and E follows it
 
 
-def test_gradients_agree_with_differences():
-    sim = tt.Simulation(GEL, 2, 60, every=20, read=["gel"], threads=1)
+@pytest.mark.parametrize("table", [False, True])
+def test_gradients_agree_with_differences(table, tmp_path):
+    scene = with_table(tmp_path) if table else GEL
+    sim = tt.Simulation(scene, 2, 60, every=20, read=["gel"], threads=1)
     draw = torch.Generator().manual_seed(1)
     weights = torch.randn(3, generator=draw, dtype=torch.float64)
     name = "tactile gel kn"

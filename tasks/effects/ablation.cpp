@@ -110,7 +110,7 @@ void drop_layer(Scene& scene, int element) {
   for (std::size_t k = 0; k < scene.sensors.size(); ++k) {
     TactileDescription& sensor = scene.sensors[k];
     if (!is_meant(element, k)) continue;
-    sensor.layer.reset();
+    sensor.layer.reset(), sensor.table.reset();
     // Nothing else moves its markers.
     if (sensor.markers && sensor.markers->stiffness == 0 && !(sensor.coefficients.ks > 0))
       sensor.markers.reset();

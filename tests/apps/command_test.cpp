@@ -39,6 +39,7 @@ TEST(Command, HelpEndsWithAnExampleThatWorks) {
   std::filesystem::create_directory_symlink(TANGERE_SOURCE_DIR "/scenes", folder.path("scenes"));
   const std::string gripper = file_bytes(TANGERE_SOURCE_DIR "/examples/grasp/gripper.urdf");
   folder.write("gripper.urdf", std::regex_replace(gripper, std::regex("<mimic[^>]*>"), ""));
+  folder.write("press.csv", "depth_mm,force_N\n0.5,1.65\n1,5.96\n1.5,13.5\n2,23.3\n");
   for (const std::string& name : subcommands()) {
     const Outcome help = run(folder, {name, "--help"});
     EXPECT_EQ(help.exit_code, 0) << name;
@@ -49,9 +50,10 @@ TEST(Command, HelpEndsWithAnExampleThatWorks) {
     const Outcome outcome = run(folder, example);
     EXPECT_EQ(outcome.exit_code, 0) << help.out << outcome.err;
   }
-  std::vector<std::string> files = {"ball.h5",   "ball.html", "ball.svg",     "balls",
-                                    "balls.csv", "fit.svg",   "gripper.urdf", "gripper.xml",
-                                    "scenes",    "speed.svg"};
+  std::vector<std::string> files = {"ball.h5",      "ball.html",   "ball.svg",
+                                    "balls",        "balls.csv",   "fit.svg",
+                                    "gripper.urdf", "gripper.xml", "my_gel_measured.xml",
+                                    "press.csv",    "scenes",      "speed.svg"};
   if (kSanitized) files.pop_back();  // of `bench`
   EXPECT_THAT(folder.files(), testing::ElementsAreArray(files));
 }
@@ -100,7 +102,7 @@ TEST(Command, TopLevelHelpNamesEverySubcommandAndExitCode) {
   const Folder folder;
   const Outcome help = run(folder, {"--help"});
   EXPECT_EQ(help.exit_code, 0);
-  EXPECT_THAT(subcommands(), testing::SizeIs(16));
+  EXPECT_THAT(subcommands(), testing::SizeIs(17));
   for (const char* code : {"0 done", "1 finished", "2 usage", "3 input", "75 ", "130 "})
     EXPECT_THAT(help.out, HasSubstr(code));
 }

@@ -54,6 +54,7 @@ const std::map<std::string, Folder, std::less<>>& folders() {
       {"tasks/catalogue", {{"engine", "kernels"}, of_tasks}},
       {"tasks/run", {{"tasks/catalogue", "engine", "kernels"}, of_tasks}},
       {"tasks/gradients", {{"tasks/run", "tasks/catalogue", "engine", "kernels"}, of_tasks}},
+      {"tasks/calibration", {{"engine", "kernels"}, of_tasks}},
       {"tasks/accuracy",
        {{"tasks/gradients", "tasks/run", "tasks/catalogue", "engine", "kernels"}, of_tasks}},
       {"tasks/stress", {{"tasks/run", "engine", "kernels"}, of_tasks}},
@@ -312,9 +313,13 @@ std::vector<Violation> check_heavy_headers(const Tree& tree) {
   // reach it.
   static const std::map<std::string, std::map<std::string, int>> allowed{
       {"CLI/", {{"apps", 1}}},
-      {"Eigen/", {{"engine/derivative", 1}, {"engine/step", 1}, {"tasks/gradients", 1}}},
+      {"Eigen/",
+       {{"engine/derivative", 1},
+        {"engine/step", 1},
+        {"tasks/calibration", 1},
+        {"tasks/gradients", 1}}},
       {"hdf5.h", {{"io/hdf5", 9}, {"io/dataset", 10}, {"io/trajectory", 6}, {"io/view", 4}}},
-      {"nlohmann/json.hpp", {{"apps", 31}, {"io/dataset", 2}, {"io/view", 1}}},
+      {"nlohmann/json.hpp", {{"apps", 32}, {"io/dataset", 2}, {"io/view", 1}}},
       {"tbb/flow_graph.h", {{"tasks/run", 1}}},
       {"regex", {}},
       {"iostream", {}}};
@@ -342,6 +347,7 @@ std::vector<Violation> check_heavy_headers(const Tree& tree) {
 std::vector<Violation> check_own_headers(const Tree& tree) {
   static const std::map<std::string, std::string> shared{
       {"apps/bench.cpp", "a subcommand: apps/command.hpp"},
+      {"apps/calibrate.cpp", "a subcommand: apps/command.hpp"},
       {"apps/export.cpp", "a subcommand: apps/command.hpp"},
       {"apps/generate.cpp", "a subcommand: apps/command.hpp"},
       {"apps/gradcheck.cpp", "a subcommand: apps/command.hpp"},

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests derivatives of readings of a coupled layer: in dual numbers, in reverse and by differences.
+// Tests derivatives of readings of a coupled layer and of a table of pressures: in dual numbers, in
+// reverse and by differences.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -34,6 +35,14 @@ Scene layer_scene(PrimitiveShape shape, Pad pad) {
   return s;
 }
 
+/// The same pad with pressures by depth.
+Scene table_scene(PrimitiveShape shape, Pad pad) {
+  Scene s = testing::pad_scene(shape, ContactLaw::clamped, pad);
+  s.sensors[0].table = PressureTable{{0, 0.003, 0.008, 0.015}, {0, 1e4, 2e4, 2e5}, 0.02, 0.01};
+  s.sensors[0].feels = {"thing"};
+  return s;
+}
+
 struct LayerRead {
   Batch batch;
   BlockTape tape;
@@ -56,12 +65,13 @@ Numbers layer_numbers(Random& random, std::size_t n, double size) {
   return x;
 }
 
-class LayerGradient : public ::testing::TestWithParam<std::tuple<PrimitiveShape, Pad>> {};
+using SceneOf = Scene (*)(PrimitiveShape, Pad);
+class LayerGradient : public ::testing::TestWithParam<std::tuple<SceneOf, PrimitiveShape, Pad>> {};
 
 /// By the state, by kn (of which E is a multiple) and by the size of the shape.
 TEST_P(LayerGradient, DualNumbersReverseAndDifferencesAgree) {
-  const auto [shape, pad] = GetParam();
-  const Scene scene = layer_scene(shape, pad);
+  const auto [scene_of, shape, pad] = GetParam();
+  const Scene scene = scene_of(shape, pad);
   const Model model(scene);
   const CompiledModel& m = compiled(model);
   Random random(11);
@@ -130,34 +140,37 @@ TEST_P(LayerGradient, DualNumbersReverseAndDifferencesAgree) {
 
 INSTANTIATE_TEST_SUITE_P(
     Shapes, LayerGradient,
-    ::testing::Combine(::testing::Values(PrimitiveShape::sphere, PrimitiveShape::cuboid,
+    ::testing::Combine(::testing::Values(&layer_scene, &table_scene),
+                       ::testing::Values(PrimitiveShape::sphere, PrimitiveShape::cuboid,
                                          PrimitiveShape::cylinder, PrimitiveShape::capsule,
                                          PrimitiveShape::ellipsoid, PrimitiveShape::mesh),
                        ::testing::Values(Pad::flat, Pad::skewed)));
 
 /// p is proportional to E, so by kn the normal force has the derivative N/kn.
 TEST(LayerGradient, NormalForcesAreProportionalToKn) {
-  const Model model(layer_scene(PrimitiveShape::sphere, Pad::flat));
-  const CompiledModel& m = compiled(model);
-  Random random(11);
-  double most = 0;
-  for (int trial = 0; trial < 12; ++trial) {
-    PadState s = testing::random_pad_state(model, random);
-    std::fill(s.v.begin(), s.v.end(), 0.0);
-    LayerRead at(model, s);
-    Numbers dp(std::size_t(m.view.rows.count));
-    dp[std::size_t(m.view.rows.sensor(0))] = 1;
-    const Numbers here = at.field();
-    Numbers duals(here.size());
-    const Numbers none(std::size_t(model.nv()));
-    Tangent(model).field(at.batch, 0, kLayerLane, at.tape, 0, 0, dp, {}, {none, none, {}, {}},
-                         duals);
-    for (std::size_t i = 2; i < here.size(); i += 3) {
-      EXPECT_NEAR(duals[i], here[i] / 200, 1e-12 * std::abs(here[i]));
-      most = std::max(most, std::abs(here[i]));
+  for (const SceneOf scene_of : {layer_scene, table_scene}) {
+    const Model model(scene_of(PrimitiveShape::sphere, Pad::flat));
+    const CompiledModel& m = compiled(model);
+    Random random(11);
+    double most = 0;
+    for (int trial = 0; trial < 12; ++trial) {
+      PadState s = testing::random_pad_state(model, random);
+      std::fill(s.v.begin(), s.v.end(), 0.0);
+      LayerRead at(model, s);
+      Numbers dp(std::size_t(m.view.rows.count));
+      dp[std::size_t(m.view.rows.sensor(0))] = 1;
+      const Numbers here = at.field();
+      Numbers duals(here.size());
+      const Numbers none(std::size_t(model.nv()));
+      Tangent(model).field(at.batch, 0, kLayerLane, at.tape, 0, 0, dp, {}, {none, none, {}, {}},
+                           duals);
+      for (std::size_t i = 2; i < here.size(); i += 3) {
+        EXPECT_NEAR(duals[i], here[i] / 200, 1e-12 * std::abs(here[i]));
+        most = std::max(most, std::abs(here[i]));
+      }
     }
+    EXPECT_GT(most, 1e-3);
   }
-  EXPECT_GT(most, 1e-3);
 }
 
 TEST(LayerGradient, WhatHasNoDerivativeIsRefused) {

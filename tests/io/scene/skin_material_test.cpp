@@ -81,6 +81,28 @@ TEST(SkinMaterial, CentimetresAndGramsGiveTheSame) {
   for (std::size_t k = 0; k < kCoefficients; ++k) EXPECT_NEAR(a[k], b[k], 1e-12 * b[k]) << k;
 }
 
+/// A table counts by area, as a material does. 0.1 Pa are 1 g/(cm s²).
+TEST(SkinMaterial, ATableOfPressuresCountsByArea) {
+  const Scene scene =
+      pressed(kPad + R"(pressure_depth="0 1e-3 2e-3" pressure="0 1e4 6e4" ks="1e7" mu="0.5"/>)");
+  const TactileDescription& d = scene.sensors[0];
+  ASSERT_TRUE(d.table);
+  EXPECT_EQ(d.table->relaxation, 5e-3);
+  EXPECT_NEAR(d.coefficients.kn, 3e7 * 4e-6, 1e-12);
+  EXPECT_NEAR(d.coefficients.ks, 1e7 * 4e-6, 1e-12);
+  EXPECT_EQ(d.coefficients.damping, 0);
+  const std::string pad =
+      R"(<tactile name="pad" body="plate" type="rect_array" resolution="11 11" axis0="0 -1 0"
+         axis1="1 0 0" rect_pos0="-1 1 0" rect_pos1="1 -1 0" pressure_depth="0 0.1 0.2"
+         pressure="0 1e5 6e5" thickness="0.4"/>)";
+  const PressureTable grams = *pressed(pad, "", "cm-g").sensors[0].table;
+  EXPECT_NEAR(grams.thickness, 4e-3, 1e-15);
+  for (std::size_t k = 0; k < 3; ++k) {
+    EXPECT_NEAR(grams.depth[k], d.table->depth[k], 1e-15);
+    EXPECT_NEAR(grams.pressure[k], d.table->pressure[k], 1e-9);
+  }
+}
+
 TEST(SkinMaterial, PointsOfCurvedPadsStandForTheirAreas) {
   const Scene dome = pressed(
       R"(<tactile name="dome" body="ball" type="hemisphere" radius="7.5e-3" count="100"
@@ -109,6 +131,15 @@ TEST(SkinMaterial, PartsThatDoNotFitAreErrors) {
   EXPECT_THAT(fault(R"(modulus="0" thickness="4e-3")"), HasSubstr("modulus=\"0\""));
   EXPECT_THAT(fault(R"(modulus="2e5" thickness="4e-3" per="point")"),
               HasSubstr("count per area; expected one of them"));
+  const std::string table = R"(pressure_depth="0 1e-3" pressure="0 1e4" )";
+  EXPECT_EQ(fault(table), "");
+  EXPECT_THAT(fault(R"(pressure="0 1e4")"), HasSubstr("alone; expected both or none"));
+  EXPECT_THAT(fault(R"(pressure_depth="0 1e-3" pressure="0 1 2")"),
+              HasSubstr("2 numbers of pressure_depth and 3 of pressure"));
+  EXPECT_THAT(fault(table + R"(modulus="2e5" thickness="4e-3")"),
+              HasSubstr("modulus and pressure; expected one of them"));
+  EXPECT_THAT(fault(table + R"(per="point")"), HasSubstr("pressure and per=\"point\""));
+  EXPECT_THAT(fault(table + R"(feedback="true")"), HasSubstr("feedback and pressure"));
 }
 
 /// c of the formula at the sizes of its head comment, and the share of a size-independent one.

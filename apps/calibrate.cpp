@@ -1,0 +1,197 @@
+// SPDX-License-Identifier: Apache-2.0
+// tangere calibrate: fits a sensor's layout to a recorded press.
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <cmath>
+#include <filesystem>
+
+#include "apps/arguments.hpp"
+#include "apps/calibrate_report.hpp"
+#include "apps/command.hpp"
+#include "apps/layout_text.hpp"
+#include "apps/press_scene.hpp"
+#include "apps/press_table.hpp"
+#include "apps/run_options.hpp"
+#include "apps/text_output.hpp"
+#include "engine/base/error.hpp"
+
+namespace tangere::apps {
+namespace {
+
+// Where the layout has none.
+constexpr double kUsualFriction = 0.6, kUsualShearShare = 0.4, kUsualRelaxation = 1e-3;
+constexpr int kMostKnots = 100;
+
+struct CalibrateArguments {
+  std::string recording, sensor, output, check;
+  std::vector<std::string> numbers;
+  Indenter indenter;
+  std::optional<int> table;
+  std::optional<double> hold_out;
+  bool overwrite = false;
+};
+
+void check_arguments(const CalibrateArguments& a) {
+  if (int(a.indenter.ball.has_value()) + int(a.indenter.flat.has_value()) +
+          int(!a.indenter.box.empty()) !=
+      1)
+    throw InputError("expected one of --ball, --flat and --box: the indenter");
+  if (a.hold_out && *a.hold_out >= 1 && *a.hold_out != std::floor(*a.hold_out))
+    throw InputError(fmt::format(
+        "--hold-out {}; expected a number of rows, or a share of them below 1", *a.hold_out));
+}
+
+/// A layout, and what a fit changes in it.
+struct Fitted {
+  LayoutFile layout;
+  int knots = 0;          ///< of a table
+  bool per_area = false;  ///< whether coefficients count by area
+  SkinNumbers start;      ///< attributes that can be fitted
+};
+
+/// The attributes that can be fitted, as the layout has them, where it has any.
+SkinNumbers attributes_at_start(const LayoutFile& layout, const TactileDescription& d) {
+  const double area = d.cell > 0 ? d.cell : 1, kn = d.coefficients.kn / area,
+               ks = d.coefficients.ks / area, mu = d.coefficients.mu;
+  SkinNumbers start;
+  if (d.layer || (d.material && !layout.has("kn")))
+    start["modulus"] = d.material ? d.material->modulus : 1;
+  else
+    start["kn"] = kn > 0 ? kn : 1;
+  const bool relaxes = d.table || (d.material && (d.layer || !layout.has("damping")));
+  const double tau = d.table ? d.table->relaxation : d.material ? d.material->relaxation : 0;
+  if (relaxes) start["relaxation"] = tau > 0 ? tau : kUsualRelaxation;
+  start["ks"] = ks > 0 ? ks : kUsualShearShare * (kn > 0 ? kn : 1);
+  start["mu"] = mu > 0 ? mu : kUsualFriction;
+  return start;
+}
+
+/// Makes room for a table. Shear springs that follow from a modulus stay.
+void prepare_for_table(Fitted& fitted, const TactileDescription& d) {
+  if (d.layer) throw InputError("--table with a layout that has <layer>; expected one of them");
+  if (d.cell == 0 && (d.coefficients.ks > 0 || d.coefficients.kt > 0))
+    throw InputError(fmt::format("--table with ks or kt by point in {}; expected per=\"area\"",
+                                 fitted.layout.source().file));
+  if (d.material) {
+    fitted.layout.set("ks", fmt::format("{:.5g}", d.coefficients.ks / d.cell));
+    fitted.layout.set("kt", fmt::format("{:.5g}", d.coefficients.kt / d.cell));
+  }
+  for (const char* const name : {"modulus", "thickness", "kn", "damping", "per"})
+    fitted.layout.remove(name);
+}
+
+/// Sets the attributes among the numbers. `digits`: of what is written; 17 keep every bit.
+void set_numbers(const SkinNumbers& numbers, int digits, Fitted& fitted) {
+  const auto text = [&](double x) { return fmt::format("{:.{}g}", x, digits); };
+  for (const auto& [name, value] : numbers)
+    if (fitted.start.contains(name)) fitted.layout.set(name, text(value));
+  if (fitted.knots == 0) return;
+  std::string depths = "0", pressures = "0";
+  for (int k = 1; k <= fitted.knots; ++k) {
+    depths += " " + text(numbers.at("table_depth") * k / fitted.knots);
+    pressures += " " + text(numbers.at(table_number(k)));
+  }
+  fitted.layout.set("pressure_depth", depths);
+  fitted.layout.set("pressure", pressures);
+}
+
+Fitted read_fitted(const CalibrateArguments& a) {
+  Fitted fitted{
+      LayoutFile(layout_text("--sensor", a.sensor), a.sensor), a.table.value_or(0), false, {}};
+  const Scene scene = press_scene(fitted.layout, a.indenter);
+  const TactileDescription& d = scene.sensors[0];
+  if (fitted.knots > 0) prepare_for_table(fitted, d);
+  fitted.start = attributes_at_start(fitted.layout, d);
+  if (fitted.knots > 0) {
+    fitted.start.erase("modulus"), fitted.start.erase("kn");
+    fitted.start.try_emplace("relaxation", kUsualRelaxation);
+  } else if (d.table) {
+    throw InputError(a.sensor + " has a table of pressures; expected --table");
+  }
+  fitted.per_area = d.cell > 0 || fitted.knots > 0;
+  return fitted;
+}
+
+/// Returns the layout with the fitted attributes. Its sensor's name says that it was measured.
+std::string measured_layout(Fitted fitted, const Calibration& found, const std::string& recording) {
+  SkinNumbers numbers = found.found;
+  for (const UntoldNumber& number : found.untold) numbers.erase(number.name);
+  set_numbers(numbers, 5, fitted);
+  std::string name = fitted.layout.name();
+  if (name.ends_with("_guess")) name.resize(name.size() - 6);
+  if (name.find("measured") == std::string::npos) name += "_measured";
+  fitted.layout.set("name", name);
+  std::vector<std::string> names;
+  for (const FittedNumber& number : found.numbers)
+    if (fitted.start.contains(number.name)) names.push_back(number.name);
+  if (fitted.knots > 0) names.emplace_back("pressure");
+  fitted.layout.add_comment(fmt::format("{}: measured, fitted by 'tangere calibrate' to {}",
+                                        fmt::join(names, ", "),
+                                        std::filesystem::path(recording).filename().string()));
+  return fitted.layout.text();
+}
+
+int run_calibrate(const CalibrateArguments& a, const Console& console) {
+  check_arguments(a);
+  const PressRecording recording = read_press(a.recording, console);
+  const std::optional<PressRecording> other =
+      a.check.empty() ? std::nullopt : std::optional(read_press(a.check, console));
+  TextOutput output(a.output, a.overwrite);
+  Fitted fitted = read_fitted(a);
+  const CalibrationRequest request{.scene =
+                                       [&](const SkinNumbers& numbers) {
+                                         set_numbers(numbers, 17, fitted);
+                                         return press_scene(fitted.layout, a.indenter);
+                                       },
+                                   .start = fitted.start,
+                                   .knots = fitted.knots,
+                                   .numbers = a.numbers,
+                                   .hold_out = a.hold_out.value_or(0)};
+  const Calibration found = calibrate(request, recording);
+  CalibrationReport report{found, fitted.start, fitted.per_area, fitted.knots, {}};
+  if (other) report.other = check_calibration(request, found.found, *other);
+  console.print(report_text(report));
+  output.write(measured_layout(read_fitted(a), found, a.recording), console);
+  report_json(report, console);
+  return found.converged ? kDone : kSomeFailed;
+}
+
+}  // namespace
+
+Command add_calibrate(CLI::App& program) {
+  const auto arguments = std::make_shared<CalibrateArguments>();
+  const auto console = std::make_shared<Console>();
+  CalibrateArguments& a = *arguments;
+  CLI::App& app = add_command(program, "calibrate", "Fit a sensor's layout to a recorded press",
+                              "tangere calibrate press.csv --sensor gelsight_mini_measured --ball "
+                              "0.0075 -o my_gel_measured.xml");
+  add_text(
+      app, "RECORDING", a.recording, "",
+      "Table (CSV) with a header: depth and force, and if recorded time, shear and shear_force")
+      .required();
+  add_text(app, "--sensor", a.sensor, "LAYOUT",
+           "Layout of the sensor, whose skin faces z: a file, or one of the program's")
+      .required();
+  add_text(app, "-o,--output", a.output, "FILE.xml", "Layout to write, with the fitted attributes");
+  add_positive_number(app, "--ball", a.indenter.ball, "Radius of a ball that presses [m]");
+  add_positive_number(app, "--flat", a.indenter.flat,
+                      "Radius of a flat, round end that presses [m]");
+  add_positive_numbers(app, "--box", a.indenter.box, 2,
+                       "Sides along x and y of a flat, rectangular end that presses [m]");
+  add_whole_number<int>(app, "--table", a.table, 1, kMostKnots,
+                        "Fit a table of N pressures by depth in place of modulus or kn");
+  add_texts(app, "--fit", a.numbers, "NAME",
+            "Fit this number and no others but those named so: modulus, kn or pressure (the "
+            "table), zero (of the depth), relaxation, ks, mu, lag (of the force), slider (beside "
+            "the skin) [default: all but the last two that the recording tells]");
+  add_positive_number(app, "--hold-out", a.hold_out,
+                      "Rows that are compared and not fitted: how many, or a share below 1");
+  add_text(app, "--check", a.check, "OTHER.csv",
+           "Another recording, whose normal forces are compared with those of the fit");
+  add_overwrite_option(app, a.overwrite);
+  add_console_options(app, *console);
+  return {&app, [=](const ProgramInfo&) { return run_calibrate(*arguments, *console); }};
+}
+
+}  // namespace tangere::apps

@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a calibration found, for people and for programs.
+#pragma once
+
+#include <string>
+
+#include "apps/console.hpp"
+#include "tasks/calibration/calibration.hpp"
+
+namespace tangere::apps {
+
+struct CalibrationReport {
+  const Calibration& found;
+  const SkinNumbers& start;  ///< at which the fit began
+  bool per_area;             ///< whether coefficients count by area
+  int knots;                 ///< of a table
+  PressError other;          ///< of another recording
+};
+
+/// A table of the numbers, the errors, and what the recording does not tell.
+std::string report_text(const CalibrationReport& report);
+/// Prints the JSON object.
+void report_json(const CalibrationReport& report, const Console& console);
+
+}  // namespace tangere::apps

@@ -1,0 +1,282 @@
+// SPDX-License-Identifier: Apache-2.0
+// Two fits, of the normal and then of the shear force. A slider beside the skin has at the depths
+// d > 0 of a path the force s' = clamp(s + k (d' - d), ±F), and 0 outside.
+#include "tasks/calibration/calibration.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "engine/base/error.hpp"
+
+namespace tangere {
+namespace {
+
+constexpr double kStuck = 1e3, kSlipStart = 0.9;  // of the largest ratio of shear to normal force
+constexpr double kStiffStart = 3;                 // of the spring that fits without slip
+constexpr double kSliderStart = 0.1;              // of the peak
+constexpr double kSmallest = 0.05;  // of the peak: smaller forces have no error of their own
+
+const std::string kDepth = "table_depth";
+
+double number_or(const SkinNumbers& numbers, const std::string& name, double otherwise) {
+  const auto at = numbers.find(name);
+  return at == numbers.end() ? otherwise : at->second;
+}
+
+double peak_of(std::span<const double> force) {
+  double peak = 0;
+  for (const double f : force) peak = std::max(peak, std::abs(f));
+  return peak;
+}
+
+PressError error_of(std::span<const double> computed, std::span<const double> recorded,
+                    std::span<const int> rows) {
+  PressError out;
+  const double peak = peak_of(recorded);
+  for (const int row : rows) {
+    const double f = recorded[std::size_t(row)], off = std::abs(computed[std::size_t(row)] - f);
+    out.root_mean_square += off * off;
+    out.largest = std::max(out.largest, off / peak);
+    if (std::abs(f) > kSmallest * peak)
+      out.largest_by_row = std::max(out.largest_by_row, off / std::abs(f));
+  }
+  out.rows = int(rows.size());
+  if (out.rows > 0) out.root_mean_square = std::sqrt(out.root_mean_square / out.rows) / peak;
+  return out;
+}
+
+void check(const PressRecording& r) {
+  if (r.rows() == 0) throw InputError("a recording without depths; expected one row at least");
+  for (const auto& [name, column] : {std::pair{"force", &r.force},
+                                     {"time", &r.time},
+                                     {"shear", &r.shear},
+                                     {"shear force", &r.shear_force}})
+    if (column->size() != r.rows() && (!column->empty() || column == &r.force))
+      throw InputError(
+          fmt::format("a recording of {} depths and {} numbers of {}; expected as many", r.rows(),
+                      column->size(), name));
+  if (r.shear.empty() != r.shear_force.empty())
+    throw InputError("shear without its force, or the force without it; expected both or none");
+  for (std::size_t k = 1; k < r.time.size(); ++k)
+    if (!(r.time[k] > r.time[k - 1]))
+      throw InputError(fmt::format("row {}: time {} s after {} s; expected ascending times", k + 1,
+                                   r.time[k], r.time[k - 1]));
+  if (!(peak_of(r.force) > 0))
+    throw InputError("a recording without any force; expected a press of the skin");
+}
+
+/// Why the columns cannot tell a number; "" if they may.
+std::string reason_against(const std::string& name, const PressRecording& r, int rows) {
+  const auto [least, most] = std::ranges::minmax(r.depth);
+  if ((name == kZero || name == kSlider || name == kTable) && !(most > least))
+    return "all rows have one depth";
+  if (name == kZero && rows < 2) return "one row is fitted";
+  if ((name == kRelaxation || name == kLag) && r.time.empty()) return "the recording has no times";
+  if ((name == kShear || name == kFriction) && r.shear.empty()) return "nothing is sheared";
+  return "";
+}
+
+struct Names {
+  std::vector<std::string> normal, shear;
+};
+
+/// Chooses what is fitted, by normal and by shear forces. `rows`: how many are fitted.
+Names choose_numbers(const CalibrationRequest& request, const PressRecording& recording, int rows,
+                     std::vector<UntoldNumber>& untold) {
+  std::vector<std::string> usual, known;
+  for (const char* const name : {"modulus", "kn"})
+    if (request.start.contains(name) && request.knots == 0) usual.emplace_back(name);
+  usual.emplace_back(request.knots > 0 ? kTable : kZero);
+  for (const char* const name : {kRelaxation, kShear, kFriction})
+    if (request.start.contains(name)) usual.emplace_back(name);
+  known = usual;
+  if (request.knots > 0) known.emplace_back(kZero);
+  for (const char* const name : {kLag, kSlider}) known.emplace_back(name);
+  for (const std::string& name : request.numbers)
+    if (std::ranges::count(known, name) == 0)
+      throw InputError(
+          fmt::format("'{}' cannot be fitted; expected some of {}", name, fmt::join(known, ", ")));
+  Names out;
+  for (const std::string& name : request.numbers.empty() ? usual : known) {
+    const bool requested = std::ranges::count(request.numbers, name) > 0;
+    if (!request.numbers.empty() && !requested) continue;
+    if (const std::string reason = reason_against(name, recording, rows); !reason.empty()) {
+      if (requested) throw InputError(fmt::format("'{}' cannot be fitted: {}", name, reason));
+      untold.push_back({name, reason});
+      continue;
+    }
+    auto& list = name == kShear || name == kFriction ? out.shear : out.normal;
+    list.push_back(name);
+    if (name == kSlider) list.emplace_back(kSliderForce);
+  }
+  if (request.knots > 0 && std::ranges::count(out.normal, kTable) == 0)
+    throw InputError(
+        "a table without 'pressure' among the fitted numbers, or with one depth alone");
+  return out;
+}
+
+/// The depths that act at the rows: those of `lag` earlier, and nearer by the zero.
+std::vector<double> acting_depths(const PressRecording& r, const SkinNumbers& numbers) {
+  const double lag = number_or(numbers, kLag, 0), zero = number_or(numbers, kZero, 0);
+  std::vector<double> out = r.depth;
+  for (std::size_t row = 0; row < r.rows() && lag > 0; ++row) {
+    const double then = std::max(r.time[row] - lag, r.time[0]);
+    const auto after = std::upper_bound(r.time.begin() + 1, r.time.end() - 1, then);
+    const auto k = std::size_t(after - r.time.begin());
+    out[row] = r.depth[k - 1] +
+               (r.depth[k] - r.depth[k - 1]) * (then - r.time[k - 1]) / (r.time[k] - r.time[k - 1]);
+  }
+  for (double& d : out) d += zero;
+  return out;
+}
+
+/// Adds the slider, if there is one. The indenter does not pull.
+void add_slider(std::span<const double> depth, const SkinNumbers& numbers,
+                std::vector<double>& force) {
+  const double stiffness = number_or(numbers, kSlider, 0);
+  if (stiffness == 0) return;
+  const double most = numbers.at(kSliderForce);
+  double s = 0;
+  for (std::size_t k = 0; k < depth.size(); ++k) {
+    const double before = std::max(depth[k > 0 ? k - 1 : 0], 0.0);
+    s = depth[k] > 0 ? std::clamp(s + stiffness * (depth[k] - before), -most, most) : 0;
+    force[k] = std::max(force[k] + s, 0.0);
+  }
+}
+
+std::vector<double> normal_forces(const CalibrationRequest& request, const PressRecording& r,
+                                  const SkinNumbers& numbers) {
+  PressRecording acting;
+  acting.time = r.time, acting.depth = acting_depths(r, numbers);
+  std::vector<double> force = press_forces(request.scene(numbers), acting.depth, acting.rates());
+  add_slider(acting.depth, numbers, force);
+  return force;
+}
+
+/// Returns the factor of the computed forces that fits best; not finite where all are 0.
+double best_factor(std::span<const double> computed, std::span<const double> recorded) {
+  double both = 0, square = 0;
+  for (std::size_t k = 0; k < computed.size(); ++k)
+    both += computed[k] * recorded[k], square += computed[k] * computed[k];
+  return both / square;
+}
+
+/// Returns the last depth of a table [m]. On its way a fit may try zeros beyond all depths.
+double table_depth(double deepest, const SkinNumbers& numbers) {
+  constexpr double kShallowest = 0.01;
+  return std::max(deepest + number_or(numbers, kZero, 0), kShallowest * deepest);
+}
+
+/// Chooses stiffness or table, and slider, so that forces have the recorded size.
+void scale_start(const CalibrationRequest& request, const PressRecording& r, double depth,
+                 SkinNumbers& start) {
+  SkinNumbers straight;
+  for (int k = 1; k <= request.knots; ++k) straight[table_number(k)] = k;
+  if (request.knots > 0) straight[kDepth] = depth;
+  for (const char* const name : {"modulus", "kn"})
+    if (start.contains(name)) straight[name] = start[name];
+  const double factor = best_factor(normal_forces(request, r, straight), r.force);
+  if (!std::isfinite(factor))
+    throw InputError(
+        "the sensor feels nothing at any depth of the recording; expected depths in m, positive "
+        "into the skin, and a layout whose skin faces z");
+  if (!(factor > 0))
+    throw InputError("forces against the press; expected forces that are positive in compression");
+  for (const char* const name : {"modulus", "kn"})
+    if (start.contains(name)) start[name] *= factor;
+  for (int k = 1; k <= request.knots; ++k) start[table_number(k)] = factor;  // increments
+  start[kSlider] = peak_of(r.force) / depth;
+  start[kSliderForce] = kSliderStart * peak_of(r.force);
+  if (!r.time.empty()) start[kLag] = (r.time.back() - r.time.front()) / double(r.rows());
+}
+
+/// Chooses a friction that some row exceeds and a spring that reaches it, because the fit does not
+/// move a friction at which nothing slips.
+void scale_shear_start(const Forces& shear, const SkinNumbers& fixed,
+                       std::span<const double> normal, std::span<const double> recorded,
+                       SkinNumbers& start) {
+  double ratio = 0;
+  for (std::size_t k = 0; k < normal.size(); ++k)
+    if (normal[k] > 0) ratio = std::max(ratio, std::abs(recorded[k]) / normal[k]);
+  if (!(ratio > 0)) return;
+  SkinNumbers stuck = fixed;
+  stuck[kShear] = start.at(kShear);
+  stuck[kFriction] = kStuck * ratio;
+  const double factor = best_factor(shear(stuck), recorded);
+  if (factor > 0 && std::isfinite(factor)) start[kShear] *= kStiffStart * factor;
+  start[kFriction] = kSlipStart * ratio;
+}
+
+/// Runs a fit and adds what it found.
+void add_fit(ForceFit& fit, const std::vector<std::string>& names, const SkinNumbers& start,
+             Calibration& out) {
+  fit.run(names, start, out.found);
+  out.found = fit.found();
+  out.converged = out.converged && fit.converged();
+  for (const FittedNumber& number : fit.numbers()) out.numbers.push_back(number);
+  out.untold.insert(out.untold.end(), fit.untold().begin(), fit.untold().end());
+}
+
+}  // namespace
+
+std::vector<int> held_out_rows(double hold_out, int rows) {
+  const double share = hold_out < 1 ? hold_out : hold_out / rows;
+  std::vector<int> out;
+  for (int row = 0; row < rows; ++row)
+    if (std::floor((row + 1) * share + 1e-9) > std::floor(row * share + 1e-9)) out.push_back(row);
+  if (std::ssize(out) >= rows)
+    throw InputError(
+        fmt::format("{} of {} rows are held out; expected one to fit at least", out.size(), rows));
+  return out;
+}
+
+Calibration calibrate(const CalibrationRequest& request, const PressRecording& recording) {
+  check(recording);
+  Calibration out;
+  out.held_out = held_out_rows(request.hold_out, int(recording.rows()));
+  std::vector<int> rows;
+  for (int row = 0; row < int(recording.rows()); ++row)
+    if (!std::ranges::binary_search(out.held_out, row)) rows.push_back(row);
+  const Names names = choose_numbers(request, recording, int(rows.size()), out.untold);
+  const double depth = *std::ranges::max_element(recording.depth);
+
+  SkinNumbers start = request.start;
+  if (!names.normal.empty()) scale_start(request, recording, depth, start);
+  const auto press = [&](SkinNumbers numbers) {
+    if (request.knots > 0) numbers[kDepth] = table_depth(depth, numbers);
+    return normal_forces(request, recording, numbers);
+  };
+  ForceFit along(press, recording.force, rows, depth, request.knots);
+  add_fit(along, names.normal, start, out);
+  if (request.knots > 0) out.found[kDepth] = table_depth(depth, out.found);
+  const std::vector<double> normal = normal_forces(request, recording, out.found);
+  out.normal = error_of(normal, recording.force, rows);
+  out.normal_held_out = error_of(normal, recording.force, out.held_out);
+  if (names.shear.empty()) return out;
+
+  const std::vector<double> depths = acting_depths(recording, out.found);
+  const auto path = [&](const SkinNumbers& numbers) {
+    return shear_forces(request.scene(numbers), depths, recording.shear);
+  };
+  if (names.shear.size() == 2)
+    scale_shear_start(path, out.found, normal, recording.shear_force, start);
+  ForceFit across(path, recording.shear_force, rows, depth, 0);
+  add_fit(across, names.shear, start, out);
+  const std::vector<double> shear = path(out.found);
+  out.shear = error_of(shear, recording.shear_force, rows);
+  out.shear_held_out = error_of(shear, recording.shear_force, out.held_out);
+  return out;
+}
+
+PressError check_calibration(const CalibrationRequest& request, const SkinNumbers& found,
+                             const PressRecording& recording) {
+  check(recording);
+  std::vector<int> rows(recording.rows());
+  for (std::size_t k = 0; k < rows.size(); ++k) rows[k] = int(k);
+  return error_of(normal_forces(request, recording, found), recording.force, rows);
+}
+
+}  // namespace tangere

@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: Apache-2.0
+// Fits a skin's numbers to a recorded press (docs/calibration.md).
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "tasks/calibration/force_fit.hpp"
+#include "tasks/calibration/press.hpp"
+
+namespace tangere {
+
+struct CalibrationRequest {
+  /// Makes the scene of placed_indenter(), with the attributes among these numbers in place of the
+  /// sensor's own. A table has `knots` pressures [Pa] "pressure[1]", … after 0, evenly spread up to
+  /// the depth "table_depth" [m].
+  std::function<Scene(const SkinNumbers&)> scene;
+  /// Attributes that may be fitted, with positive values at which the fit begins: `modulus` or
+  /// `kn`, and of `relaxation`, `ks` and `mu` those that the sensor can have.
+  SkinNumbers start;
+  /// Pressures of a table, which is fitted in place of a modulus; 0: none.
+  int knots = 0;
+  /// What is fitted: names out of start, "pressure" (the table), "zero" [m] which is added to every
+  /// depth, "lag" [s] of the force behind the depth, and "slider", a spring [N/m] beside the skin
+  /// that slips at "slider_force" [N]. Empty: all out of start and "zero", or all and "pressure",
+  /// as far as the recording can tell them.
+  std::vector<std::string> numbers{};
+  /// Rows that are compared and not fitted, of all; as held_out_rows().
+  double hold_out = 0;
+};
+
+/// How far computed forces are off, over the largest recorded one.
+struct PressError {
+  int rows = 0;
+  double root_mean_square = 0, largest = 0;
+  double largest_by_row = 0;  ///< over the row's own force, of rows above a twentieth of the peak
+};
+
+struct Calibration {
+  std::vector<FittedNumber> numbers;
+  std::vector<UntoldNumber> untold;
+  SkinNumbers found;          ///< all numbers that were fitted, and "table_depth"
+  std::vector<int> held_out;  ///< rows
+  PressError normal, normal_held_out, shear, shear_held_out;
+  bool converged = true;
+};
+
+/// Returns which of `rows` are held out, evenly spread: a count from 1 on, or a share below 1.
+/// Throws InputError unless one row is left to fit.
+std::vector<int> held_out_rows(double hold_out, int rows);
+
+/// Fits. Normal forces give all but ks and mu, which shear forces give then. Throws InputError for
+/// a recording without force, for columns of unlike lengths, for times that do not ascend, for a
+/// path that the sensor does not feel, and for a requested number that the columns cannot tell.
+Calibration calibrate(const CalibrationRequest& request, const PressRecording& recording);
+
+/// Compares the normal forces of another recording with those of the numbers that were found.
+PressError check_calibration(const CalibrationRequest& request, const SkinNumbers& found,
+                             const PressRecording& recording);
+
+}  // namespace tangere

@@ -1,0 +1,141 @@
+// SPDX-License-Identifier: Apache-2.0
+// Stiffnesses and friction are fitted as logarithms, the zero in shares of the depth, and what may
+// vanish (times, increments of a table) as squares.
+#include "tasks/calibration/force_fit.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace tangere {
+namespace {
+
+constexpr double kNoInfluence = 1e-6;  // root mean square change, of the peak, by a whole number
+constexpr double kLeastSlip = 0.03;    // share of the forces that slip, by their squares
+
+bool is_of_table(const std::string& name) { return name.starts_with("pressure["); }
+
+std::string reason(const std::string& name) {
+  if (name == kFriction) return "nothing slips, so it exceeds every ratio of shear to normal force";
+  if (name == kRelaxation) return "the rates of the recording do not show it";
+  if (name == kShear) return "everything slips";
+  return "the forces do not change with it";
+}
+
+}  // namespace
+
+std::string table_number(int k) { return fmt::format("pressure[{}]", k); }
+
+double ForceFit::Scale::value(double x) const {
+  if (kind == Kind::exponential) return unit * std::exp(x - 1);
+  return kind == Kind::square ? unit * x * x : unit * (x - 1);
+}
+double ForceFit::Scale::slope(double x) const {
+  if (kind == Kind::exponential) return value(x);
+  return kind == Kind::square ? 2 * unit * x : unit;
+}
+
+ForceFit::ForceFit(Forces forces, std::span<const double> recorded, std::vector<int> rows,
+                   double depth, int knots)
+    : forces_(std::move(forces)),
+      recorded_(recorded),
+      rows_(std::move(rows)),
+      peak_(0),
+      depth_(depth),
+      knots_(knots) {
+  for (const double f : recorded_) peak_ = std::max(peak_, std::abs(f));
+}
+
+ForceFit::Scale ForceFit::scale_of(const std::string& name, const SkinNumbers& start) const {
+  if (name == kZero) return {Scale::Kind::linear, depth_};
+  const bool vanishes = name == kRelaxation || name == kLag || is_of_table(name);
+  return {vanishes ? Scale::Kind::square : Scale::Kind::exponential, start.at(name)};
+}
+
+void ForceFit::run(std::vector<std::string> names, const SkinNumbers& start, SkinNumbers fixed) {
+  for (std::size_t at = 0; at < names.size(); ++at) {
+    if (names[at] != kTable) continue;
+    names.erase(names.begin() + std::ptrdiff_t(at));
+    for (int k = knots_; k > 0; --k)
+      names.insert(names.begin() + std::ptrdiff_t(at), table_number(k));
+  }
+  for (;;) {
+    names_ = names;
+    fixed_ = fixed;
+    scales_.clear();
+    for (const std::string& name : names) scales_.push_back(scale_of(name, start));
+    if (names.empty()) return;
+    found_ = minimise([&](std::span<const double> x) { return residuals(x); },
+                      std::vector<double>(names.size(), 1.0));
+    const std::size_t weak = weakest();
+    if (weak == names.size()) return;
+    untold_.push_back({names[weak], reason(names[weak])});
+    if (names[weak] == kFriction) fixed[kFriction] = scales_[weak].value(found_.x[weak]);
+    names.erase(names.begin() + std::ptrdiff_t(weak));
+  }
+}
+
+SkinNumbers ForceFit::numbers_at(std::span<const double> x) const {
+  SkinNumbers out = fixed_;
+  double pressure = 0;
+  for (std::size_t k = 0; k < names_.size(); ++k) {
+    const double value = scales_[k].value(x[k]);
+    out[names_[k]] = is_of_table(names_[k]) ? pressure += value : value;
+  }
+  return out;
+}
+
+/// Over the peak, at the rows that are fitted.
+std::vector<double> ForceFit::residuals(std::span<const double> x) const {
+  const std::vector<double> computed = forces_(numbers_at(x));
+  std::vector<double> out;
+  for (const int row : rows_)
+    out.push_back((computed[std::size_t(row)] - recorded_[std::size_t(row)]) / peak_);
+  return out;
+}
+
+/// Whether a friction that is a hundredth larger leaves the forces as they are.
+bool ForceFit::holds(std::size_t friction) const {
+  std::vector<double> x = found_.x;
+  const std::vector<double> now = residuals(x);
+  x[friction] += 0.01;
+  const std::vector<double> then = residuals(x);
+  double squares = 0;
+  for (std::size_t k = 0; k < now.size(); ++k) squares += std::pow(then[k] - now[k], 2);
+  return std::sqrt(squares / double(now.size())) < 0.01 * kLeastSlip;
+}
+
+/// Returns the first number that has no influence, or whose interval goes beyond 0.
+std::size_t ForceFit::weakest() const {
+  for (std::size_t k = 0; k < names_.size(); ++k) {
+    if (is_of_table(names_[k])) continue;
+    if (found_.influence[k] < kNoInfluence) return k;
+    if (names_[k] == kFriction && holds(k)) return k;
+    if (names_[k] == kRelaxation && !(interval(k).low > 0)) return k;
+  }
+  return names_.size();
+}
+
+/// Returns number k with its interval. Pressures of a table are sums of its increments.
+FittedNumber ForceFit::interval(std::size_t k) const {
+  std::vector<double> gradient(names_.size());
+  gradient[k] = scales_[k].slope(found_.x[k]);
+  double value = scales_[k].value(found_.x[k]);
+  for (std::size_t j = k; j > 0 && is_of_table(names_[k]) && is_of_table(names_[j - 1]); --j) {
+    gradient[j - 1] = scales_[j - 1].slope(found_.x[j - 1]);
+    value += scales_[j - 1].value(found_.x[j - 1]);
+  }
+  const double half = found_.half_interval(gradient);
+  if (scales_[k].kind == Scale::Kind::exponential)
+    return {names_[k], value, value * std::exp(-half / value), value * std::exp(half / value)};
+  return {names_[k], value, value - half, value + half};
+}
+
+std::vector<FittedNumber> ForceFit::numbers() const {
+  std::vector<FittedNumber> out;
+  for (std::size_t k = 0; k < names_.size(); ++k) out.push_back(interval(k));
+  return out;
+}
+
+}  // namespace tangere

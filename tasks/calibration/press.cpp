@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: Apache-2.0
+// A press is a row of states. Shear has memory, so the indenter is driven along the path by a motor
+// that is stiff against its mass.
+#include "tasks/calibration/press.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "engine/sense/readout.hpp"
+#include "engine/step/stepper.hpp"
+
+namespace tangere {
+namespace {
+
+constexpr FieldOutput kSum{0, FieldForm::sum};
+
+/// Reads the force on the skin [N].
+Vector3 force_on_skin(Readout& readout, const Batch& batch) {
+  std::array<double, 6> sum{};
+  std::span<double> reading = sum;
+  readout.read_block(batch, 0, kSum, {&reading, 1});
+  return {sum[0], sum[1], sum[2]};
+}
+
+}  // namespace
+
+std::vector<double> PressRecording::rates() const {
+  std::vector<double> out(rows(), 0.0);
+  for (std::size_t k = 0; k < rows() && time.size() > 1; ++k) {
+    const std::size_t a = k > 0 ? k - 1 : 0, b = std::min(k + 1, rows() - 1);
+    out[k] = (depth[b] - depth[a]) / (time[b] - time[a]);
+  }
+  return out;
+}
+
+Scene placed_indenter(const Scene& scene) {
+  Vector3 low{HUGE_VAL, HUGE_VAL, HUGE_VAL}, high{-HUGE_VAL, -HUGE_VAL, -HUGE_VAL};
+  for (const TactilePoint& p : tactile_points(scene.sensors.at(0)))
+    for (std::size_t i = 0; i < 3; ++i) {
+      low[i] = std::min(low[i], p.position[i]);
+      high[i] = std::max(high[i], p.position[i]);
+    }
+  Scene out = scene;
+  TactileDescription& sensor = out.sensors[0];
+  const Vector3 &a = sensor.array.axis0, &b = sensor.array.axis1;
+  if (!sensor.pressure_sign) sensor.pressure_sign = a[0] * b[1] - a[1] * b[0] < 0 ? -1 : 1;
+  out.links.at(1).joint.pose.position = {(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, high[2]};
+  return out;
+}
+
+std::vector<double> press_forces(const Scene& scene, std::span<const double> depth,
+                                 std::span<const double> rate) {
+  Scene smooth = scene;
+  ContactCoefficients& c = smooth.sensors.at(0).coefficients;
+  c.kt = c.mu = c.ks = 0;
+  const Model model(smooth);
+  Readout readout(model);
+  Batch batch(model, 1);
+  std::vector<double> out;
+  for (std::size_t k = 0; k < depth.size(); ++k) {
+    const std::array<double, 3> q{0, 0, -depth[k]}, v{0, 0, -rate[k]};
+    batch.set_state(0, q, v);
+    out.push_back(-force_on_skin(readout, batch)[2]);
+  }
+  return out;
+}
+
+std::vector<double> shear_forces(const Scene& scene, std::span<const double> depth,
+                                 std::span<const double> shear) {
+  Scene slow = scene;
+  TactileDescription& sensor = slow.sensors.at(0);
+  sensor.coefficients.kt = sensor.coefficients.damping = 0;
+  if (sensor.material) sensor.material->relaxation = 0;
+  const Model model(slow);
+  Stepper stepper(model);
+  Readout readout(model);
+  Batch batch(model, 1);
+  const std::array<double, 3> start{shear.front(), 0, 1e-3}, rest{};
+  batch.set_state(0, start, rest);
+  std::vector<double> out;
+  for (std::size_t k = 0; k < depth.size(); ++k) {
+    stepper.step(batch, std::array<double, 3>{shear[k], 0, -depth[k]});
+    out.push_back(force_on_skin(readout, batch)[0]);
+  }
+  return out;
+}
+
+}  // namespace tangere

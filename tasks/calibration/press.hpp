@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: Apache-2.0
+// Forces of a skin under an indenter that follows a given path: what a press bench records.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "engine/model/model.hpp"
+
+namespace tangere {
+
+/// A recorded press, one number for each row. Vectors of columns that were not recorded are empty.
+struct PressRecording {
+  std::vector<double> time;         ///< [s], ascending
+  std::vector<double> depth;        ///< of the indenter below the first touch [m]
+  std::vector<double> force;        ///< along the skin's normal, positive in compression [N]
+  std::vector<double> shear;        ///< displacement of the indenter along the skin's x [m]
+  std::vector<double> shear_force;  ///< of the indenter on the skin along x [N]
+
+  [[nodiscard]] std::size_t rows() const { return depth.size(); }
+  /// Returns the rate of the depth [m/s] by differences between neighbours; zeros without times.
+  [[nodiscard]] std::vector<double> rates() const;
+};
+
+/// Returns the scene with its indenter above the middle of the skin, at the depth 0. `scene`: link
+/// 0 is fixed and carries the one sensor, whose skin faces z; link 1 has a joint of type
+/// translational and a body whose lowest point is the joint's origin.
+Scene placed_indenter(const Scene& scene);
+
+/// Computes the force along the normal at each depth [m] and rate [m/s], without friction [N].
+/// `scene`: of placed_indenter().
+std::vector<double> press_forces(const Scene& scene, std::span<const double> depth,
+                                 std::span<const double> rate);
+
+/// Computes the force along x at each row of a path, which begins outside the skin above its first
+/// row [N]. It is slow: forces by rates are left out. `scene`: of placed_indenter(), with a
+/// position motor at the joint.
+std::vector<double> shear_forces(const Scene& scene, std::span<const double> depth,
+                                 std::span<const double> shear);
+
+}  // namespace tangere

@@ -1,0 +1,285 @@
+// SPDX-License-Identifier: Apache-2.0
+// Tests `tangere calibrate` as a user runs it, against closed forms: under a flat end of n points a
+// bed of springs carries N = n k_n d (1 + τ ḋ/δ) and the shear min(n k_s x, μ N).
+#include <gmock/gmock.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <functional>
+#include <iomanip>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "tests/apps/program.hpp"
+
+namespace tangere::apps {
+namespace {
+
+using nlohmann::json;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+constexpr double kPoints = 37;  // of a pitch of 1 mm within 3.5 mm
+constexpr double kArea = 1e-6;  // of a point [m²]
+constexpr double kThickness = 4e-3;
+
+/// 11 x 11 points. `more`: attributes.
+std::string layout(const std::string& more) {
+  return "<sensor unit=\"m-kg\"><tactile name=\"skin_guess\" type=\"rect_array\" resolution=\"11 "
+         "11\" "
+         "rect_pos0=\"-0.005 0.005 0\" rect_pos1=\"0.005 -0.005 0\" axis0=\"0 -1 0\" axis1=\"1 0 "
+         "0\" " +
+         more + "/></sensor>";
+}
+
+/// Rows of a table whose columns follow from the row.
+std::string table(const std::string& header, int rows,
+                  const std::function<std::vector<double>(int)>& row) {
+  std::ostringstream text;
+  text << std::setprecision(17) << header << "\n";
+  for (int k = 0; k < rows; ++k) {
+    const char* between = "";
+    for (const double x : row(k)) text << between << x, between = ",";
+    text << "\n";
+  }
+  return text.str();
+}
+
+json number(const json& answer, const std::string& name) {
+  for (const json& n : answer["numbers"])
+    if (n["number"] == name) return n;
+  return {};
+}
+std::string reason(const json& answer, const std::string& name) {
+  for (const json& n : answer["untold"])
+    if (n["number"] == name) return n["reason"];
+  return "told";
+}
+
+TEST(Calibrate, StiffnessAndZeroOfAPressAreFound) {
+  const Folder folder;
+  folder.write("skin.xml", layout("kn=\"50\" kt=\"0.1\""));
+  folder.write("press.csv", table("depth_mm,force_mN", 9, [](int k) {
+                 const double depth = 0.02 * (k + 1);  // [mm], of which the zero is 0.03 mm off
+                 return std::vector<double>{depth, 1e3 * kPoints * 123 * (depth + 0.03) * 1e-3};
+               }));
+  const json answer = run_json(folder, {"calibrate", "press.csv", "--sensor", "skin.xml", "--flat",
+                                        "0.0035", "--hold-out", "0.34", "-o", "out.xml"});
+  EXPECT_NEAR(number(answer, "kn")["value"], 123, 1e-6 * 123);
+  EXPECT_NEAR(number(answer, "zero")["value"], 3e-5, 1e-10);
+  EXPECT_EQ(answer["normal"]["rows"], 6);
+  EXPECT_EQ(answer["normal_held_out"]["rows"], 3);
+  EXPECT_LT(answer["normal_held_out"]["largest"], 1e-6);
+  EXPECT_EQ(reason(answer, "relaxation"), "told") << "springs without a material have none";
+  EXPECT_THAT(reason(answer, "mu"), HasSubstr("nothing is sheared"));
+  const std::string written = folder.read("out.xml");
+  EXPECT_THAT(written, HasSubstr("kn=\"123\""));
+  EXPECT_THAT(written, HasSubstr("name=\"skin_measured\""));
+  EXPECT_THAT(written, HasSubstr("fitted by 'tangere calibrate' to press.csv"));
+
+  // Seven columns of three points under a rectangle, and a layout without a stiffness.
+  folder.write("skin.xml", layout("mu=\"1\""));
+  const json box = run_json(
+      folder, {"calibrate", "press.csv", "--sensor", "skin.xml", "--box", "0.0067,0.0027"});
+  EXPECT_NEAR(number(box, "kn")["value"], 123 * kPoints / 21, 1e-3);
+}
+
+TEST(Calibrate, TheIntervalIsThatOfTheNoise) {
+  const Folder folder;
+  folder.write("skin.xml", layout("kn=\"50\""));
+  constexpr double kNoise = 2e-4;  // [N], in turns
+  folder.write(
+      "press.csv", table("depth_m,force_N", 40, [](int k) {
+        const double depth = 5e-6 * (k + 1);
+        return std::vector<double>{depth, kPoints * 80 * depth + (k % 2 ? kNoise : -kNoise)};
+      }));
+  const json answer = run_json(folder, {"calibrate", "press.csv", "--sensor", "skin.xml", "--flat",
+                                        "0.0035", "--fit", "kn"});
+  double squares = 0;
+  for (int k = 1; k <= 40; ++k) squares += std::pow(kPoints * 5e-6 * k, 2);
+  const json kn = number(answer, "kn");
+  const double half = 2.0227 * kNoise * std::sqrt(40 / 39.0 / squares);
+  EXPECT_NEAR((double(kn["high"]) - double(kn["low"])) / 2, half, 0.01 * half);
+  EXPECT_LT(kn["low"], 80);
+  EXPECT_GT(kn["high"], 80);
+}
+
+TEST(Calibrate, AFilmRelaxes) {
+  const Folder folder;
+  folder.write("skin.xml", layout("modulus=\"1e5\" thickness=\"4e-3\" mu=\"0.5\""));
+  const auto press = [&](double tau) {
+    folder.write(
+        "press.csv", table("time_ms,depth_mm,force_N", 41, [tau](int k) {
+          const bool in = k <= 20;  // in at 10 mm/s, out at 2 mm/s
+          const double t = in ? 1e-3 * k : 0.02 + 5e-3 * (k - 20);
+          const double d = in ? 0.01 * t : 2e-4 - 0.002 * (t - 0.02), rate = k == 20 ? 0
+                                                                             : in    ? 0.01
+                                                                                     : -0.002;
+          const double kn = 2.3 * 2e5 / kThickness * kArea, depth = kThickness / 10;
+          return std::vector<double>{1e3 * t, 1e3 * d, kPoints * kn * d * (1 + tau * rate / depth)};
+        }));
+    return run_json(folder, {"calibrate", "press.csv", "--sensor", "skin.xml", "--flat", "0.0035",
+                             "--fit", "modulus", "--fit", "relaxation"});
+  };
+  const json answer = press(0.008);
+  EXPECT_NEAR(number(answer, "modulus")["value"], 2e5, 1e-4 * 2e5);
+  EXPECT_NEAR(number(answer, "relaxation")["value"], 0.008, 1e-3 * 0.008);
+  EXPECT_THAT(reason(press(0), "relaxation"), HasSubstr("do not show it"));
+}
+
+/// A press of 0.05 mm, then a shear of up to 0.06 mm and back.
+std::string sheared(double friction) {
+  constexpr double kNormal = kPoints * 100 * 5e-5, kShear = kPoints * 40;
+  double slider = 0, before = 0;
+  return table("depth_mm,force_N,shear_mm,shear_force_N", 61, [&](int k) {
+    const double x = 2e-6 * (k <= 30 ? k : 60 - k);
+    slider = std::clamp(slider + kShear * (x - before), -friction * kNormal, friction * kNormal);
+    before = x;
+    return std::vector<double>{0.05, kNormal, 1e3 * x, slider};
+  });
+}
+
+TEST(Calibrate, AShearShowsItsSpringAndItsFriction) {
+  const Folder folder;
+  folder.write("skin.xml", layout("kn=\"50\" ks=\"10\" mu=\"1\""));
+  folder.write("shear.csv", sheared(0.2));
+  const Words words = {"calibrate", "shear.csv", "--sensor", "skin.xml", "--flat", "0.0035"};
+  const json answer = run_json(folder, words);
+  EXPECT_NEAR(number(answer, "kn")["value"], 100, 1e-6 * 100);
+  EXPECT_NEAR(number(answer, "ks")["value"], 40, 1e-3 * 40);
+  EXPECT_NEAR(number(answer, "mu")["value"], 0.2, 1e-3 * 0.2);
+  EXPECT_LT(answer["shear"]["largest"], 1e-3);
+  EXPECT_THAT(reason(answer, "zero"), HasSubstr("one depth"));
+
+  folder.write("shear.csv", sheared(9));
+  const json stuck = run_json(folder, words + Words{"-o", "stuck.xml"});
+  EXPECT_THAT(folder.read("stuck.xml"), HasSubstr("mu=\"1\"")) << "as in the layout";
+  EXPECT_NEAR(number(stuck, "ks")["value"], 40, 1e-3 * 40);
+  EXPECT_THAT(reason(stuck, "mu"), HasSubstr("nothing slips"));
+}
+
+/// Writes the layout of a GelSight Mini with a layer, gel.xml.
+void write_gel(const Folder& folder) {
+  std::string gel = folder.read(scene("sensors/gelsight_mini_measured.xml"));
+  const std::string springs = " kn=\"3.13e8\"/>";
+  ASSERT_THAT(gel, HasSubstr(springs));
+  gel.replace(gel.find(springs), springs.size(), "><layer margin=\"1.5e-3\"/></tactile>");
+  folder.write("gel.xml", gel);
+}
+
+/// Forces on a GelSight Mini (FEATS, Helmut et al.).
+TEST(Calibrate, TwoPressesOfAGelPredictTwoOthers) {
+  const Folder folder;
+  write_gel(folder);
+  const std::vector<std::string> rows = {"0.5,1.6503", "1.0,5.9641", "1.5,13.5257", "2.0,23.2532"};
+  for (const auto& order : {std::array{0, 1, 2, 3}, {1, 0, 3, 2}}) {
+    std::string text = "depth_mm,force_N\n";
+    for (const int k : order) text += rows[std::size_t(k)] + "\n";
+    folder.write("press.csv", text);
+    const json answer = run_json(folder, {"calibrate", "press.csv", "--sensor", "gel.xml", "--ball",
+                                          "0.0075", "--hold-out", "2"});
+    EXPECT_LE(answer["normal_held_out"]["largest_by_row"], 0.05) << text;
+    EXPECT_NEAR(number(answer, "modulus")["value"], 4.28e5, 0.06 * 4.28e5);
+  }
+}
+
+/// Finite elements of a gel of 0.428 MPa under a ball of 7.5 mm with friction 1, pressed 0.75 mm
+/// and moved along x: the material is found, and one shear predicts another.
+TEST(Calibrate, AShearedGelOfFiniteElementsIsFound) {
+  const Folder folder;
+  write_gel(folder);
+  folder.write("shear.csv",
+               "depth_mm,force_N,shear_mm,shear_force_N\n0.75,3.18433,0,0\n"
+               "0.75,3.18795,0.2,0.60406\n0.75,3.19709,0.5,1.42649\n");
+  const json answer =
+      run_json(folder, {"calibrate", "shear.csv", "--sensor", "gel.xml", "--ball", "0.0075",
+                        "--fit", "modulus", "--fit", "ks", "--hold-out", "1"});
+  EXPECT_NEAR(number(answer, "modulus")["value"], 4.28e5, 0.015 * 4.28e5);
+  EXPECT_LT(answer["normal_held_out"]["largest"], 0.01);
+  EXPECT_LT(answer["shear_held_out"]["largest"], 0.04);
+}
+
+/// A table that is pushed by a flat end carries its area times the pressure.
+TEST(Calibrate, ATableIsFound) {
+  const Folder folder;
+  folder.write("skin.xml", layout("modulus=\"1e5\" thickness=\"4e-3\" mu=\"0.5\""));
+  // Pressures of a straight line and a steeper one, which their cubics reproduce at the knots.
+  folder.write("press.csv", table("depth_m,force_N", 3, [](int k) {
+                 const double depth = 1e-4 * (k + 1), pressure = k == 0 ? 2e3 : k == 1 ? 4e3 : 9e3;
+                 return std::vector<double>{depth, kPoints * kArea * pressure};
+               }));
+  const json answer = run_json(folder, {"calibrate", "press.csv", "--sensor", "skin.xml", "--flat",
+                                        "0.0035", "--table", "3", "-o", "out.xml"});
+  EXPECT_NEAR(number(answer, "pressure[1]")["value"], 2e3, 1);
+  EXPECT_NEAR(number(answer, "pressure[2]")["value"], 4e3, 1);
+  EXPECT_NEAR(number(answer, "pressure[3]")["value"], 9e3, 1);
+  EXPECT_NEAR(answer["table_depth"], 3e-4, 1e-15);
+  const std::string written = folder.read("out.xml");
+  EXPECT_THAT(written, HasSubstr("pressure_depth=\"0 0.0001 0.0002 0.0003\""));
+  EXPECT_THAT(written, HasSubstr("ks=\"2.3e+07\""));
+  EXPECT_THAT(written, Not(HasSubstr("modulus=")));
+  // The written layout is one, and its own press is the recorded one.
+  const json again = run_json(folder, {"calibrate", "press.csv", "--sensor", "out.xml", "--flat",
+                                       "0.0035", "--table", "3", "--check", "press.csv"});
+  EXPECT_LT(again["other"]["largest"], 1e-3);
+}
+
+/// A printed lattice, half of whose rows predict the other half (tests/data/skin_loops).
+TEST(Calibrate, ALatticeIsATableAndASlider) {
+  const Folder folder;
+  folder.write("lattice.xml",
+               "<sensor unit=\"m-kg\"><tactile name=\"lattice\" type=\"rect_array\" "
+               "resolution=\"4 4\" rect_pos0=\"-0.0075 0.0075 0\" rect_pos1=\"0.0075 -0.0075 0\" "
+               "axis0=\"0 -1 0\" axis1=\"1 0 0\" per=\"area\" kn=\"1e7\"/></sensor>");
+  const Words words = {"calibrate",  TANGERE_TEST_DATA "/skin_loops/shear.csv",
+                       "--sensor",   "lattice.xml",
+                       "--flat",     "0.05",
+                       "--hold-out", "0.5",
+                       "--table",    "8",
+                       "--fit",      "pressure"};
+  const json table = run_json(folder, words),
+             both = run_json(folder,
+                             words + Words{"--fit", "slider", "--fit", "zero", "--fit", "lag"});
+  EXPECT_LT(table["normal_held_out"]["root_mean_square"], 0.065);
+  EXPECT_GT(table["normal_held_out"]["root_mean_square"], 0.05);
+  EXPECT_LT(both["normal_held_out"]["root_mean_square"], 0.0145);
+  EXPECT_LT(number(both, "slider_force")["high"], 3);
+  EXPECT_GT(number(both, "slider_force")["low"], 1);
+}
+
+const std::string kTable = "depth,force\n1e-4,1\n2e-4,2\n";
+
+TEST(Calibrate, SaysWhatIsWrong) {
+  const Folder folder;
+  folder.write("skin.xml", layout("kn=\"50\""));
+  const auto err = [&](const std::string& text, const Words& more) {
+    folder.write("p.csv", text);
+    const Outcome outcome = run(folder, Words{"calibrate", "p.csv", "--sensor", "skin.xml"} + more);
+    EXPECT_EQ(outcome.exit_code, 2) << outcome.out;
+    return outcome.err;
+  };
+  const Words flat = {"--flat", "0.0035"};
+  EXPECT_THAT(err(kTable, {}), HasSubstr("expected one of --ball, --flat and --box"));
+  EXPECT_THAT(err(kTable, {"--box", "0.01"}), HasSubstr("expected 2 positive numbers"));
+  EXPECT_THAT(err(kTable, flat + Words{"--box", "1,1"}), HasSubstr("expected one of"));
+  EXPECT_THAT(err("depth,forc\n1,2\n", flat), HasSubstr("no column 'force' among depth, forc"));
+  EXPECT_THAT(err("depth_in,force\n1,2\n", flat), HasSubstr("is in 'in'; expected m or mm"));
+  EXPECT_THAT(err("depth,force,depth\n1,2,1\n", flat), HasSubstr("two columns 'depth'"));
+  EXPECT_THAT(err("1,2\n", flat), HasSubstr("p.csv:1: no names of columns"));
+  EXPECT_THAT(err(kTable, flat + Words{"--fit", "mu"}), HasSubstr("nothing is sheared"));
+  EXPECT_THAT(err(kTable, flat + Words{"--fit", "lag"}), HasSubstr("has no times"));
+  EXPECT_THAT(err(kTable, flat + Words{"--table", "3", "--fit", "zero"}),
+              HasSubstr("a table without 'pressure'"));
+  EXPECT_THAT(err(kTable, flat + Words{"--fit", "ke"}), HasSubstr("expected some of kn, zero"));
+  EXPECT_THAT(err(kTable, flat + Words{"--hold-out", "2"}), HasSubstr("2 of 2 rows are held out"));
+  EXPECT_THAT(err("depth,force\n-1e-4,1\n", flat), HasSubstr("feels nothing"));
+  EXPECT_THAT(err("depth,force\n1e-4,-1\n", flat), HasSubstr("positive in compression"));
+  EXPECT_THAT(err("time,depth,force\n1,1e-4,1\n1,1e-4,1\n", flat), HasSubstr("ascending times"));
+  EXPECT_THAT(err("depth,force,shear\n1e-4,1,1e-4\n", flat), HasSubstr("expected both or none"));
+  folder.write("skin.xml", "<sensor unit=\"m-kg\"/>");
+  EXPECT_THAT(err(kTable, flat), HasSubstr("skin.xml:1: <sensor>: 0 sensors; expected one"));
+}
+
+}  // namespace
+}  // namespace tangere::apps
