@@ -69,6 +69,8 @@ SkinNumbers attributes_at_start(const LayoutFile& layout, const TactileDescripti
 
 /// Makes room for a table. Shear springs that follow from a modulus stay.
 void prepare_for_table(Fitted& fitted, const TactileDescription& d) {
+  if (!d.points.empty())
+    throw InputError("--table with points that are no array; expected type=\"rect_array\"");
   if (d.layer) throw InputError("--table with a layout that has <layer>; expected one of them");
   if (d.cell == 0 && (d.coefficients.ks > 0 || d.coefficients.kt > 0))
     throw InputError(fmt::format("--table with ks or kt by point in {}; expected per=\"area\"",
@@ -126,9 +128,10 @@ std::string measured_layout(Fitted fitted, const Calibration& found, const std::
   for (const FittedNumber& number : found.numbers)
     if (fitted.start.contains(number.name)) names.push_back(number.name);
   if (fitted.knots > 0) names.emplace_back("pressure");
-  fitted.layout.add_comment(fmt::format("{}: measured, fitted by 'tangere calibrate' to {}",
-                                        fmt::join(names, ", "),
-                                        std::filesystem::path(recording).filename().string()));
+  fitted.layout.add_comment(
+      fmt::format("{}: measured, fitted by 'tangere calibrate' to {}, {} rows, to {} of the peak",
+                  fmt::join(names, ", "), std::filesystem::path(recording).filename().string(),
+                  found.normal.rows, percent(found.normal.root_mean_square)));
   return fitted.layout.text();
 }
 

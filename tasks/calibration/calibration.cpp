@@ -184,7 +184,9 @@ void scale_start(const CalibrationRequest& request, const PressRecording& r, dou
         "the sensor feels nothing at any depth of the recording; expected depths in m, positive "
         "into the skin, and a layout whose skin faces z");
   if (!(factor > 0))
-    throw InputError("forces against the press; expected forces that are positive in compression");
+    throw InputError(
+        "forces against those of the press; expected forces that are positive in compression, and "
+        "depths that are smaller than a ball's radius");
   for (const char* const name : {"modulus", "kn"})
     if (start.contains(name)) start[name] *= factor;
   for (int k = 1; k <= request.knots; ++k) start[table_number(k)] = factor;  // increments
@@ -195,18 +197,20 @@ void scale_start(const CalibrationRequest& request, const PressRecording& r, dou
 
 /// Chooses a friction that some row exceeds and a spring that reaches it, because the fit does not
 /// move a friction at which nothing slips.
-void scale_shear_start(const Forces& shear, const SkinNumbers& fixed,
-                       std::span<const double> normal, std::span<const double> recorded,
-                       SkinNumbers& start) {
+void scale_shear_start(const Forces& shear, const std::vector<std::string>& names,
+                       const SkinNumbers& fixed, std::span<const double> normal,
+                       std::span<const double> recorded, SkinNumbers& start) {
   double ratio = 0;
   for (std::size_t k = 0; k < normal.size(); ++k)
     if (normal[k] > 0) ratio = std::max(ratio, std::abs(recorded[k]) / normal[k]);
   if (!(ratio > 0)) return;
-  SkinNumbers stuck = fixed;
-  stuck[kShear] = start.at(kShear);
-  stuck[kFriction] = kStuck * ratio;
-  const double factor = best_factor(shear(stuck), recorded);
-  if (factor > 0 && std::isfinite(factor)) start[kShear] *= kStiffStart * factor;
+  if (std::ranges::count(names, kShear) > 0) {
+    SkinNumbers stuck = fixed;
+    stuck[kShear] = start.at(kShear);
+    stuck[kFriction] = kStuck * ratio;
+    const double factor = best_factor(shear(stuck), recorded);
+    if (factor > 0 && std::isfinite(factor)) start[kShear] *= kStiffStart * factor;
+  }
   start[kFriction] = kSlipStart * ratio;
 }
 
@@ -261,8 +265,8 @@ Calibration calibrate(const CalibrationRequest& request, const PressRecording& r
   const auto path = [&](const SkinNumbers& numbers) {
     return shear_forces(request.scene(numbers), depths, recording.shear);
   };
-  if (names.shear.size() == 2)
-    scale_shear_start(path, out.found, normal, recording.shear_force, start);
+  if (std::ranges::count(names.shear, kFriction) > 0)
+    scale_shear_start(path, names.shear, out.found, normal, recording.shear_force, start);
   ForceFit across(path, recording.shear_force, rows, depth, 0);
   add_fit(across, names.shear, start, out);
   const std::vector<double> shear = path(out.found);

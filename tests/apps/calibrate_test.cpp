@@ -76,7 +76,7 @@ TEST(Calibrate, StiffnessAndZeroOfAPressAreFound) {
   const std::string written = folder.read("out.xml");
   EXPECT_THAT(written, HasSubstr("kn=\"123\""));
   EXPECT_THAT(written, HasSubstr("name=\"skin_measured\""));
-  EXPECT_THAT(written, HasSubstr("fitted by 'tangere calibrate' to press.csv"));
+  EXPECT_THAT(written, HasSubstr("fitted by 'tangere calibrate' to press.csv, 6 rows, to "));
 
   // Seven columns of three points under a rectangle, and a layout without a stiffness.
   folder.write("skin.xml", layout("mu=\"1\""));
@@ -151,6 +151,11 @@ TEST(Calibrate, AShearShowsItsSpringAndItsFriction) {
   EXPECT_NEAR(number(answer, "mu")["value"], 0.2, 1e-3 * 0.2);
   EXPECT_LT(answer["shear"]["largest"], 1e-3);
   EXPECT_THAT(reason(answer, "zero"), HasSubstr("one depth"));
+
+  folder.write("known.xml", layout("kn=\"100\" ks=\"40\" mu=\"1\""));
+  const json friction = run_json(folder, {"calibrate", "shear.csv", "--sensor", "known.xml",
+                                          "--flat", "0.0035", "--fit", "mu"});
+  EXPECT_NEAR(number(friction, "mu")["value"], 0.2, 1e-3 * 0.2);
 
   folder.write("shear.csv", sheared(9));
   const json stuck = run_json(folder, words + Words{"-o", "stuck.xml"});
@@ -277,6 +282,14 @@ TEST(Calibrate, SaysWhatIsWrong) {
   EXPECT_THAT(err("depth,force\n1e-4,-1\n", flat), HasSubstr("positive in compression"));
   EXPECT_THAT(err("time,depth,force\n1,1e-4,1\n1,1e-4,1\n", flat), HasSubstr("ascending times"));
   EXPECT_THAT(err("depth,force,shear\n1e-4,1,1e-4\n", flat), HasSubstr("expected both or none"));
+  folder.write("skin.xml", layout("kn=\"50\" ks=\"10\""));
+  EXPECT_THAT(err(kTable, flat + Words{"--table", "3"}), HasSubstr("ks or kt by point"));
+  folder.write("skin.xml", layout("pressure_depth=\"0 1e-3\" pressure=\"0 1e4\""));
+  EXPECT_THAT(err(kTable, flat), HasSubstr("has a table of pressures; expected --table"));
+  folder.write("skin.xml",
+               "<sensor unit=\"m-kg\"><tactile type=\"hemisphere\" radius=\"0.01\" count=\"50\" "
+               "modulus=\"1e5\" thickness=\"3e-3\"/></sensor>");
+  EXPECT_THAT(err(kTable, flat + Words{"--table", "3"}), HasSubstr("expected type=\"rect_array\""));
   folder.write("skin.xml", "<sensor unit=\"m-kg\"/>");
   EXPECT_THAT(err(kTable, flat), HasSubstr("skin.xml:1: <sensor>: 0 sensors; expected one"));
 }
