@@ -10,6 +10,7 @@
 
 #include "engine/base/error.hpp"
 #include "engine/model/compiled_layer.hpp"
+#include "engine/model/lateral_spread.hpp"
 #include "engine/scene/frames.hpp"
 #include "engine/scene/skin_material.hpp"
 
@@ -36,9 +37,9 @@ void check_sensor(const TactileDescription& d, const CompiledSensor& sensor) {
 }
 
 /// Distances of neighbouring points of an array, from row to row and from column to column [m].
-std::array<double, 2> pitch_of(const RectArray& a) {
-  const Vector3 way = a.corner1 - a.corner0;
-  return {std::abs(dot(way, a.axis0)) / (a.rows - 1), std::abs(dot(way, a.axis1)) / (a.cols - 1)};
+std::array<double, 2> distances(const RectArray& array) {
+  const std::array<double, 2> along = pitches(array);
+  return {std::abs(along[0]), std::abs(along[1])};
 }
 
 /// Returns the points of a cell's side: as many as come nearest to its size.
@@ -65,7 +66,7 @@ std::shared_ptr<const CompiledLayer> compile_pressure_table(const TactileDescrip
                                                             const CompiledSensor& sensor,
                                                             int pressure_sign) {
   check_sensor(d, sensor);
-  const auto [height, width] = pitch_of(d.array);
+  const auto [height, width] = distances(d.array);
   auto law = std::make_shared<CompiledLayer>();
   law->table.emplace(d.table->depth, d.table->pressure);
   law->modulus = 1;
@@ -82,7 +83,7 @@ std::shared_ptr<const CompiledLayer> compile_sensor_layer(const TactileDescripti
                                                           int pressure_sign) {
   check_sensor(d, sensor);
   if (!d.material) fail(d, "no material; expected modulus and thickness");
-  const auto [height, width] = pitch_of(d.array);
+  const auto [height, width] = distances(d.array);
   const double t = d.material->thickness, pitch = std::max(height, width);
   if (!(pitch <= kMostPitch * t * (1 + kRounding)))
     fail(d,
@@ -114,7 +115,7 @@ std::shared_ptr<const CompiledLayer> compile_sensor_layer(const TactileDescripti
   layer->area = height * width;
   layer->deepest = t;
   layer->outward = pressure_sign;
-  layer->direction = {dot(way, d.array.axis0) < 0 ? -1 : 1, dot(way, d.array.axis1) < 0 ? -1 : 1};
+  for (std::size_t k = 0; k < 2; ++k) layer->direction[k] = pitches(d.array)[k] < 0 ? -1 : 1;
   if (d.markers) layer->surface.emplace(layer->grid);
   return layer;
 }
