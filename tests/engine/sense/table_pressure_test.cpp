@@ -17,7 +17,7 @@ namespace {
 using ::testing::HasSubstr;
 using Numbers = std::vector<double>;
 
-constexpr double kBallRadius = 7.5e-3, kTablePitch = 1e-3;
+constexpr double kPressingRadius = 7.5e-3, kTablePitch = 1e-3;
 const Numbers kTableDepth = {0, 0.5e-3, 1e-3, 3e-3}, kTablePressure = {0, 1e5, 1.1e5, 6e5};
 
 /// A ball above the middle of 21 x 21 points at height 0.
@@ -25,8 +25,8 @@ Scene table_skin(double relaxation = 0) {
   Scene s;
   s.links = {testing::link("plate", JointType::fixed, {0, 0, -0.005},
                            CuboidShape{{0.03, 0.03, 0.01}, {2, 2, 2}}, 1000),
-             testing::link("ball", JointType::translational, {0, 0, kBallRadius},
-                           SphereShape{kBallRadius}, 1000)};
+             testing::link("ball", JointType::translational, {0, 0, kPressingRadius},
+                           SphereShape{kPressingRadius}, 1000)};
   TactileDescription t;
   t.name = "skin";
   t.body = "plate";
@@ -51,8 +51,8 @@ Numbers table_field(const Scene& scene, const Numbers& q, const Numbers& v = {0,
 /// Depth of the ball's underside at point k of the field [m].
 double ball_depth_at(std::size_t k, double press) {
   const double x = 1e-3 * (double(k % 21) - 10), y = 1e-3 * (double(k / 21) - 10);
-  const double square = kBallRadius * kBallRadius - x * x - y * y;
-  return square > 0 ? press - kBallRadius + std::sqrt(square) : -1;
+  const double square = kPressingRadius * kPressingRadius - x * x - y * y;
+  return square > 0 ? press - kPressingRadius + std::sqrt(square) : -1;
 }
 
 TEST(TablePressure, EveryPointCarriesThePressureOfItsDepth) {

@@ -15,7 +15,7 @@
 namespace tangere {
 namespace {
 
-constexpr int kEnvironments = 16;
+constexpr int kListedEnvironments = 16;
 
 double allocated_bytes() {
   const struct mallinfo2 heap = mallinfo2();
@@ -24,13 +24,13 @@ double allocated_bytes() {
 
 /// Takes steps of a scene's own controls. Returns the bytes that they leave.
 double run(const Model& model, Stepper& stepper) {
-  Batch batch(model, kEnvironments, 1);
+  Batch batch(model, kListedEnvironments, 1);
   const ControlProgram controls(model, model.timestep(), 1);
   const auto nu = std::size_t(model.nu());
-  std::vector<double> u(kEnvironments * nu);
+  std::vector<double> u(kListedEnvironments * nu);
   const double before = allocated_bytes();
   for (int step = 0; step < 300; ++step) {
-    for (int e = 0; e < kEnvironments; ++e)
+    for (int e = 0; e < kListedEnvironments; ++e)
       controls.evaluate(step, e, std::span(u).subspan(std::size_t(e) * nu, nu));
     stepper.step(batch, u);
   }
@@ -44,7 +44,7 @@ TEST(CandidateBytes, CoverTheListsOfShippedScenes) {
     const Model model(read_scene(TANGERE_SOURCE_DIR "/scenes/" + name + ".xml").scene);
     Stepper stepper(model);
     run(model, stepper);  // the stepper's own memory grows
-    const double left = run(model, stepper) / kEnvironments;
+    const double left = run(model, stepper) / kListedEnvironments;
     const auto counted = double(Stepper::candidate_bytes(model));
     EXPECT_LE(left, counted) << name;
     EXPECT_GE(left, counted / 16) << name;
