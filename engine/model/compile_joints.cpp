@@ -304,7 +304,7 @@ void check_masses(const CompiledModel& m) {
   for (std::size_t i = 0; i < m.joints.size(); ++i) {
     const CompiledJoint& joint = m.joints[i];
     for (int k = 0; k < joint.link_count; ++k) {
-      const auto link = std::size_t(joint.link + k);
+      const auto link = std::size_t(joint.first_link + k);
       if (!(carried[link].mass > 0))
         fail(i, "moves nothing that has mass; expected a body with mass on it or on a joint that it "
                 "carries");
