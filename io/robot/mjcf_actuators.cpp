@@ -3,12 +3,16 @@
 // force f of the actuator acts on the joint as G f:
 //   motor     f = c                        a force motor from G c_low to G c_high, of any sign
 //   position  f = kp (c - G q) - kv G v    P = kp G², D = kv G², target c/G - ref
+//             with dampratio Z instead of kv: D = 2 Z sqrt(P I), I = 1/(M⁻¹)jj where all joints
+//             are at rest, which is kv = 2 Z sqrt(kp m) with m = 1/(J M⁻¹ Jᵀ)
 //   velocity  f = kv (c - G v)             a force motor from G kv c_low on, and damping kv G²
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
+#include "io/robot/effective_inertia.hpp"
 #include "io/robot/mjcf_file.hpp"
 #include "io/robot/mjcf_words.hpp"
 
@@ -21,6 +25,7 @@ using Range = std::array<double, 2>;
 /// Force per control and per state: f = gain c - kp (G q) - kv (G v).
 struct Law {
   double gain = 1, kp = 0, kv = 0;
+  double damping_ratio = 0;  ///< from which kv follows, if it is not 0
 };
 
 const char* joint_attribute(const RobotNode& node) {
@@ -69,6 +74,7 @@ class Actuators {
     use.range = control;
     if (law.kp > 0) {
       set_position(node, law, gear, end, control, force, motor);
+      if (law.damping_ratio > 0) keep_ratio(node, law.damping_ratio, end.link);
       use.scale = 1 / gear;
       use.shift = 0 - end.ref;
     } else {
@@ -79,7 +85,37 @@ class Actuators {
     scene_.motors.push_back(motor);
   }
 
+  /// Gives motors with a damping ratio their damping, after all are read.
+  void damp() const {
+    if (ratios_.empty()) return;
+    std::vector<int> dofs;
+    for (const Ratio& ratio : ratios_) dofs.push_back(ratio.dof);
+    const std::vector<double> inertias = effective_inertias(scene_, dofs);
+    for (std::size_t k = 0; k < ratios_.size(); ++k) {
+      MotorDescription& motor = scene_.motors[ratios_[k].motor];
+      motor.D = 2 * ratios_[k].value * std::sqrt(motor.P * inertias[k]);
+    }
+  }
+
  private:
+  struct Ratio {
+    std::size_t motor;
+    int dof;
+    double value;
+  };
+
+  /// Keeps the damping ratio of the motor that is added next.
+  void keep_ratio(const RobotNode& node, double value, int link) {
+    int dof = 0;
+    for (int k = 0; k < link; ++k) dof += dof_count(scene_.links[std::size_t(k)].joint.type);
+    ratios_.push_back({scene_.motors.size(), dof, value});
+    node.changed(fmt::format(
+        "<{}> dampratio: its damping is a number, by the rule of MuJoCo 4.0.0: kv = 2 dampratio "
+        "sqrt(kp m) with m = 1/(J M^-1 J^T) at the reference pose; some older versions have "
+        "another m",
+        node.name()));
+  }
+
   static Range scaled(const Range& x, double by) {
     return by > 0 ? Range{by * x[0], by * x[1]} : Range{by * x[1], by * x[0]};
   }
@@ -124,7 +160,10 @@ class Actuators {
   static bool read_law(const RobotNode& node, Law& law) {
     if (node.name() == "position") {
       law.kp = law.gain = node.positive("kp", 1.0);
-      law.kv = node.not_negative("kv", 0.0);
+      if (node.given("kv") && node.given("dampratio"))
+        node.fail("both 'kv' and 'dampratio'; expected one");
+      if (!node.given("dampratio")) law.kv = node.not_negative("kv", 0.0);
+      if (!node.given("kv")) law.damping_ratio = node.not_negative("dampratio", 0.0);
     } else if (node.name() == "velocity") {
       law.kv = law.gain = node.not_negative("kv", 1.0);
     } else if (node.name() == "general") {
@@ -154,6 +193,10 @@ class Actuators {
     law.kv = 0 - bias[2];
     const bool spring = law.kp == law.gain && law.kp > 0;
     const bool damper = law.kp == 0;
+    if (spring && law.kv < 0) {  // MuJoCo takes a positive one for a damping ratio
+      law.damping_ratio = 0 - law.kv;
+      law.kv = 0;
+    }
     if (bias[0] != 0 || law.kv < 0 || !(spring || damper)) {
       node.lost("<general> whose bias is no spring to the control with damping");
       return false;
@@ -228,6 +271,7 @@ class Actuators {
 
   MjcfWhole& whole_;
   Scene& scene_;
+  std::vector<Ratio> ratios_;
 };
 
 /// An actuator of a model, or one that drives a copy.
@@ -275,6 +319,7 @@ void read_mjcf_actuators(MjcfWhole& whole) {
   });
   Actuators actuators(whole);
   for (const Drive& drive : drives) actuators.read(drive.node, *drive.scope, drive.joint);
+  actuators.damp();
 }
 
 }  // namespace tangere

@@ -26,9 +26,9 @@ struct MjcfPart {
   [[nodiscard]] std::string own_class() const;
 };
 
-/// The parts of the body of which `body` has node, class and scope: bodies, joints, geoms, sites and
-/// the inertial. Throws InputError for frames and models nested too deep, and for what an <attach>
-/// names and no model has.
+/// The parts of the body of which `body` has node, class and scope: bodies, joints, geoms, sites
+/// and the inertial. Throws InputError for frames and models nested too deep, and for what an
+/// <attach> names and no model has.
 std::vector<MjcfPart> body_parts(MjcfWhole& whole, const MjcfPart& body);
 /// The same of a <worldbody>: bodies, geoms and sites.
 std::vector<MjcfPart> world_parts(MjcfWhole& whole, const MjcfPart& world);

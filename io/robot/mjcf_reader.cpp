@@ -229,11 +229,14 @@ void MjcfFile::read_defaults(const RobotNode& node, const std::string& parent) {
     part.check(mjcf_words(part.name()));
     const bool drives =
         std::find(kActuators.begin(), kActuators.end(), part.name()) != kActuators.end();
-    static const std::vector<std::string> gains = {"kp",     "kv",      "gainprm",  "biasprm",
-                                                   "dynprm", "dyntype", "gaintype", "biastype"};
+    static const std::vector<std::string> gains = {
+        "kp", "kv", "dampratio", "gainprm", "biasprm", "dynprm", "dyntype", "gaintype", "biastype"};
     for (const tinyxml2::XMLAttribute* a = part.element().FirstAttribute(); a != nullptr;
          a = a->Next()) {
       const SceneContext::Default value{a->Value(), part.source().line};
+      // Of kv and dampratio the innermost class has one.
+      for (const auto& [one, other] : {std::pair{"kv", "dampratio"}, {"dampratio", "kv"}})
+        if (std::string_view(a->Name()) == one) context.defaults[part.name()].erase(other);
       const bool gain = std::find(gains.begin(), gains.end(), a->Name()) != gains.end();
       if (drives && !gain)
         for (const std::string& actuator : kActuators)
