@@ -306,8 +306,8 @@ TEST_F(RobotKinds, APointerOfGitLfsIsNamed) {
 }
 
 /// A skin does not feel what the file keeps from touching its link: geoms without contact, and
-/// links of an <exclude>, with all their shapes.
-TEST_F(RobotKinds, SkinsIgnoreWhatTouchesNothing) {
+/// links of an <exclude>, with all their shapes. Contacts leave out geoms without contact.
+TEST_F(RobotKinds, GeomsThatTouchNothingHaveAMassAlone) {
   const std::string text =
       "<mujoco><worldbody><body name=\"palm\"><joint name=\"p\" type=\"slide\"/>"
       "<geom type=\"box\" size=\"0.02 0.02 0.02\"/>"
@@ -320,7 +320,8 @@ TEST_F(RobotKinds, SkinsIgnoreWhatTouchesNothing) {
       "<body name=\"cover\" pos=\"0 0 0.1\"><joint name=\"c\"/>"
       "<geom type=\"box\" size=\"0.01 0.01 0.01\" contype=\"0\" conaffinity=\"0\"/></body>"
       "<body name=\"finger\" pos=\"0 0 0.2\"><joint name=\"f\"/>"
-      "<geom type=\"box\" size=\"0.01 0.01 0.01\"/></body>"
+      "<geom type=\"box\" size=\"0.01 0.01 0.01\"/>"
+      "<geom type=\"box\" size=\"0.03 0.01 0.01\" contype=\"0\" conaffinity=\"0\"/></body>"
       "</body></worldbody><contact><exclude body1=\"thumb\" body2=\"tip\"/></contact></mujoco>";
   std::ofstream(folder_ / "robot.xml") << text;
   const std::string layout =
@@ -332,11 +333,23 @@ TEST_F(RobotKinds, SkinsIgnoreWhatTouchesNothing) {
   options.pads = {{"tip", "skin.xml", layout, {}, "+x"}};
   const ImportedScene made = import_robot(folder_ / "robot.xml", folder_ / "scene.xml", options);
   const Scene scene = parse_scene(made.text, folder_ / "scene.xml").scene;
-  EXPECT_THAT(scene.sensors.at(0).ignores, ElementsAre("cover", "thumb", "thumb_shape"));
+  EXPECT_THAT(scene.sensors.at(0).ignores,
+              ElementsAre("cover", "finger_shape", "thumb", "thumb_shape"));
   std::vector<std::string> felt;
   for (const int k : sensed_bodies(scene, scene.sensors[0]))
     felt.push_back(scene.links[std::size_t(k)].body.name);
   EXPECT_THAT(felt, ElementsAre("finger")) << "the palm is a neighbour";
+  EXPECT_NEAR(Model(scene).mass(6), 8 * 3000 * 1e-6, 1e-12) << "a picture has a mass";
+  const auto touched = [&](const std::string& link) {
+    options.touches = {{"tip", link}};
+    return parse_scene(import_robot(folder_ / "robot.xml", folder_ / "scene.xml", options).text,
+                       folder_ / "scene.xml")
+        .scene.pair_contacts.size();
+  };
+  EXPECT_EQ(touched("finger"), 2U) << "one pair of surfaces, with the points of both";
+  EXPECT_THAT([&] { touched("cover"); },
+              ::testing::ThrowsMessage<InputError>(
+                  HasSubstr("no shape to touch with: its geoms have contype and conaffinity 0")));
 }
 
 }  // namespace
