@@ -23,9 +23,9 @@ const std::string kBox = "<geom type=\"box\" size=\"0.01 0.01 0.01\"/>";
 
 class RobotCopies : public ::testing::Test {
  protected:
-  ImportedScene import(const std::string& text) {
+  ImportedScene import(const std::string& text, const RobotOptions& options = {}) {
     write("robot.xml", text);
-    return import_robot(folder_ / "robot.xml", folder_ / "scene.xml");
+    return import_robot(folder_ / "robot.xml", folder_ / "scene.xml", options);
   }
   std::string fault_of(const std::string& text) {
     try {
@@ -79,6 +79,24 @@ TEST_F(RobotCopies, ActuatorsAreThereForEachCopy) {
                            "<motor joint=\"z\"/></actuator>")),
               ElementsAre("r-0", "k0-0", "k1-0", "r-1", "k0-1", "k1-1", "z", "motor z", "motor r-0",
                           "motor k0-0", "motor k1-0", "motor r-1", "motor k0-1", "motor k1-1"));
+}
+
+/// Each copy of an <exclude> names bodies of one copy, or what is not copied.
+TEST_F(RobotCopies, ExcludesAreThereForEachCopy) {
+  RobotOptions options;
+  options.pads = {{"bj1",
+                   "skin.xml",
+                   "<sensor unit=\"m-kg\"><tactile name=\"skin\" type=\"rect_array\" "
+                   "rect_pos0=\"-0.01 -0.01 0\" rect_pos1=\"0.01 0.01 0\" axis0=\"1 0 0\" "
+                   "axis1=\"0 1 0\" resolution=\"2 2\" kn=\"1\"/></sensor>",
+                   {},
+                   "+x"}};
+  const std::string text = world(copies("count=\"2\"", body("j", body("k"))) + body("z"),
+                                 "<contact><exclude body1=\"bj\" body2=\"bk\"/>"
+                                 "<exclude body1=\"bz\" body2=\"bj\"/></contact>");
+  EXPECT_THAT(
+      parse_scene(import(text, options).text, folder_ / "scene.xml").scene.sensors.at(0).ignores,
+      ElementsAre("bk1", "bz"));
 }
 
 TEST_F(RobotCopies, MistakesInCopiesNameTheLine) {
