@@ -22,7 +22,7 @@ namespace {
 
 std::string find_mesh(const RobotNode& node, const std::string& name, const std::string& folder,
                       const std::optional<std::string>& other_folder) {
-  const fs::path robot = fs::path(node.robot().scene.path).parent_path();
+  const fs::path robot = fs::path(node.context().outermost().file).parent_path();
   std::vector<std::string> tried;
   constexpr std::string_view kPackage = "package://", kFile = "file://";
   std::string plain = name;

@@ -3,12 +3,16 @@
 // force f of the actuator acts on the joint as G f:
 //   motor     f = c                        a force motor from G c_low to G c_high, of any sign
 //   position  f = kp (c - G q) - kv G v    P = kp G², D = kv G², target c/G - ref
+//             with dampratio Z instead of kv: D = 2 Z sqrt(P I), I = 1/(M⁻¹)jj where all joints
+//             are at rest, which is kv = 2 Z sqrt(kp m) with m = 1/(J M⁻¹ Jᵀ)
 //   velocity  f = kv (c - G v)             a force motor from G kv c_low on, and damping kv G²
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
+#include "io/robot/effective_inertia.hpp"
 #include "io/robot/mjcf_file.hpp"
 #include "io/robot/mjcf_words.hpp"
 
@@ -21,27 +25,33 @@ using Range = std::array<double, 2>;
 /// Force per control and per state: f = gain c - kp (G q) - kv (G v).
 struct Law {
   double gain = 1, kp = 0, kv = 0;
+  double damping_ratio = 0;  ///< from which kv follows, if it is not 0
 };
+
+const char* joint_attribute(const RobotNode& node) {
+  return node.has("jointinparent") ? "jointinparent" : "joint";
+}
 
 class Actuators {
  public:
-  explicit Actuators(MjcfFile& file) : file_(file), scene_(file.robot.scene) {}
+  explicit Actuators(MjcfWhole& whole) : whole_(whole), scene_(whole.robot.scene) {}
 
-  void read(const RobotNode& node) {
-    file_.controls.emplace_back();
+  /// `drives`: the name in the scene of the joint that the actuator names; "" if there is none.
+  void read(const RobotNode& node, const MjcfScope& scope, const std::string& drives) {
+    whole_.controls.emplace_back();
     if (std::find(kActuators.begin(), kActuators.end(), node.name()) == kActuators.end())
       return node.lost("<" + node.name() + ">: an actuator that scenes do not have");
     node.check(mjcf_words(node.name()));
     const int group = node.integer("group", 0, std::numeric_limits<int>::max(), 0);
-    if (std::find(file_.disabled_groups.begin(), file_.disabled_groups.end(), group) !=
-        file_.disabled_groups.end())
+    if (std::find(whole_.disabled_groups.begin(), whole_.disabled_groups.end(), group) !=
+        whole_.disabled_groups.end())
       return node.changed("<" + node.name() +
                           "> of a group that <option actuatorgroupdisable> switches off: no motor");
     Law law;
     if (!read_law(node, law)) return;
-    const std::string name = joint_of(node);
-    if (name.empty()) return;
-    const MjcfJoint& end = file_.joints.at(name);
+    if (!drives_joint(node, drives)) return;
+    const std::string& name = drives;
+    const MjcfJoint& end = whole_.joints.at(name);
     LinkDescription& link = scene_.links[std::size_t(end.link)];
     if (link.joint.type != JointType::revolute && link.joint.type != JointType::prismatic)
       return node.lost("<" + node.name() + "> of a ball or a free joint");
@@ -53,17 +63,18 @@ class Actuators {
     MotorDescription motor;
     motor.joint = name;
     motor.source = node.source();
-    const Range control = control_range(node, end);
-    Range force = scaled(range(node, "forcerange", "forcelimited"), gear);
+    const Range control = control_range(node, *scope.file, end);
+    Range force = scaled(range(node, *scope.file, "forcerange", "forcelimited"), gear);
     if (end.actuator_range)
       force = {std::max(force[0], (*end.actuator_range)[0]),
                std::min(force[1], (*end.actuator_range)[1])};
     if (!(force[0] < force[1])) node.fail("its ranges leave no force");
-    MjcfControl& use = file_.controls.back();
+    MjcfControl& use = whole_.controls.back();
     use.motor = static_cast<int>(scene_.motors.size());
     use.range = control;
     if (law.kp > 0) {
       set_position(node, law, gear, end, control, force, motor);
+      if (law.damping_ratio > 0) keep_ratio(node, law.damping_ratio, end.link);
       use.scale = 1 / gear;
       use.shift = 0 - end.ref;
     } else {
@@ -74,14 +85,45 @@ class Actuators {
     scene_.motors.push_back(motor);
   }
 
+  /// Gives motors with a damping ratio their damping, after all are read.
+  void damp() const {
+    if (ratios_.empty()) return;
+    std::vector<int> dofs;
+    for (const Ratio& ratio : ratios_) dofs.push_back(ratio.dof);
+    const std::vector<double> inertias = effective_inertias(scene_, dofs);
+    for (std::size_t k = 0; k < ratios_.size(); ++k) {
+      MotorDescription& motor = scene_.motors[ratios_[k].motor];
+      motor.D = 2 * ratios_[k].value * std::sqrt(motor.P * inertias[k]);
+    }
+  }
+
  private:
+  struct Ratio {
+    std::size_t motor;
+    int dof;
+    double value;
+  };
+
+  /// Keeps the damping ratio of the motor that is added next.
+  void keep_ratio(const RobotNode& node, double value, int link) {
+    int dof = 0;
+    for (int k = 0; k < link; ++k) dof += dof_count(scene_.links[std::size_t(k)].joint.type);
+    ratios_.push_back({scene_.motors.size(), dof, value});
+    node.changed(fmt::format(
+        "<{}> dampratio: its damping is a number, by the rule of MuJoCo 4.0.0: kv = 2 dampratio "
+        "sqrt(kp m) with m = 1/(J M^-1 J^T) at the reference pose; some older versions have "
+        "another m",
+        node.name()));
+  }
+
   static Range scaled(const Range& x, double by) {
     return by > 0 ? Range{by * x[0], by * x[1]} : Range{by * x[1], by * x[0]};
   }
 
-  [[nodiscard]] Range range(const RobotNode& node, const char* name, const char* limited) const {
+  static Range range(const RobotNode& node, const MjcfFile& file, const char* name,
+                     const char* limited) {
     const int word = node.choice(limited, {"auto", "true", "false"}, 0);
-    const bool on = word == 1 || (word == 0 && file_.auto_limits);
+    const bool on = word == 1 || (word == 0 && file.auto_limits);
     if (!node.has(name) || !on) return {-kNone, kNone};
     const std::vector<double> x = node.numbers(name, 2);
     if (!(x[0] < x[1]))
@@ -90,36 +132,38 @@ class Actuators {
   }
 
   /// The range of the control: ctrlrange, or a part of the joint's range about its middle.
-  [[nodiscard]] Range control_range(const RobotNode& node, const MjcfJoint& end) const {
+  static Range control_range(const RobotNode& node, const MjcfFile& file, const MjcfJoint& end) {
     const double part = node.has("inheritrange") ? node.not_negative("inheritrange") : 0;
-    if (part == 0 || node.has("ctrlrange")) return range(node, "ctrlrange", "ctrllimited");
+    if (part == 0 || node.has("ctrlrange")) return range(node, file, "ctrlrange", "ctrllimited");
     if (!end.range) node.fail("inheritrange of a joint without a range; expected one");
     const auto& [low, high] = *end.range;
     const double middle = 0.5 * (low + high), half = 0.5 * part * (high - low);
     return {middle - half, middle + half};
   }
 
-  /// The joint that the actuator drives; "" if it drives something else, which is listed.
-  std::string joint_of(const RobotNode& node) const {
+  /// Whether the actuator drives a joint. Lists what else it drives.
+  bool drives_joint(const RobotNode& node, const std::string& joint) const {
     for (const char* other : {"tendon", "site", "body", "cranksite", "slidersite", "refsite"})
       if (node.has(other)) {
         node.lost(fmt::format("<{}> on a {}: scenes drive joints", node.name(), other));
-        return "";
+        return false;
       }
-    const char* const attribute = node.has("jointinparent") ? "jointinparent" : "joint";
-    std::string name = node.text(attribute);
+    if (!joint.empty()) return true;
+    const char* const attribute = joint_attribute(node);
+    const std::string name = node.text(attribute);
     std::vector<std::string> names;
-    for (const auto& [known, joint] : file_.joints) names.push_back(known);
-    if (!file_.joints.contains(name))
-      node.fail(fmt::format("{}=\"{}\": no joint has this name{}", attribute, name,
-                            suggestion(name, names)));
-    return name;
+    for (const auto& [known, end] : whole_.joints) names.push_back(known);
+    node.fail(fmt::format("{}=\"{}\": no joint has this name{}", attribute, name,
+                          suggestion(name, names)));
   }
 
   static bool read_law(const RobotNode& node, Law& law) {
     if (node.name() == "position") {
       law.kp = law.gain = node.positive("kp", 1.0);
-      law.kv = node.not_negative("kv", 0.0);
+      if (node.given("kv") && node.given("dampratio"))
+        node.fail("both 'kv' and 'dampratio'; expected one");
+      if (!node.given("dampratio")) law.kv = node.not_negative("kv", 0.0);
+      if (!node.given("kv")) law.damping_ratio = node.not_negative("dampratio", 0.0);
     } else if (node.name() == "velocity") {
       law.kv = law.gain = node.not_negative("kv", 1.0);
     } else if (node.name() == "general") {
@@ -149,6 +193,10 @@ class Actuators {
     law.kv = 0 - bias[2];
     const bool spring = law.kp == law.gain && law.kp > 0;
     const bool damper = law.kp == 0;
+    if (spring && law.kv < 0) {  // MuJoCo takes a positive one for a damping ratio
+      law.damping_ratio = 0 - law.kv;
+      law.kv = 0;
+    }
     if (bias[0] != 0 || law.kv < 0 || !(spring || damper)) {
       node.lost("<general> whose bias is no spring to the control with damping");
       return false;
@@ -216,22 +264,62 @@ class Actuators {
 
   /// The control that the actuator being read must be able to have: 1, or more in a keyframe.
   [[nodiscard]] double most_control() const {
-    const std::size_t at = file_.controls.size() - 1;
-    return at < file_.keyframe_ctrl.size() ? std::max(1.0, std::abs(file_.keyframe_ctrl[at])) : 1.0;
+    const std::size_t at = whole_.controls.size() - 1;
+    return at < whole_.keyframe_ctrl.size() ? std::max(1.0, std::abs(whole_.keyframe_ctrl[at]))
+                                            : 1.0;
   }
 
-  MjcfFile& file_;
+  MjcfWhole& whole_;
   Scene& scene_;
+  std::vector<Ratio> ratios_;
 };
+
+/// An actuator of a model, or one that drives a copy.
+struct Drive {
+  RobotNode node;
+  const MjcfScope* scope;  ///< of the copy, or of the model
+  std::string joint;       ///< in the scene; "": none is found
+};
+
+/// Adds the actuators of a section, one for each copy of its joint.
+void add_drives(const MjcfWhole& whole, const MjcfScope& model, const RobotNode& section,
+                std::vector<Drive>& out) {
+  static const Words known = [] {
+    Words words;
+    for (const std::string& name : kActuators) words.push_back({name.c_str()});
+    for (const char* other : kOtherActuators) words.push_back({other});
+    return words;
+  }();
+  for (const RobotNode& part : section.parts(known)) {
+    const RobotNode node = model.file->with_class(part, "main");
+    const char* const attribute = joint_attribute(node);
+    const auto copies = node.has(attribute)
+                            ? whole.joint_names.copies.find({model.model, node.text(attribute)})
+                            : whole.joint_names.copies.end();
+    if (copies != whole.joint_names.copies.end())
+      for (const MjcfCopy& copy : copies->second) out.push_back({node, copy.scope, copy.name});
+    else if (model.model > 0 && node.has(attribute))
+      node.idle("<" + node.name() + "> of a part of a model that is not attached");
+    else
+      out.push_back({node, &model, ""});
+  }
+}
 
 }  // namespace
 
-void read_mjcf_actuators(MjcfFile& file, const RobotNode& section) {
-  Words known;
-  for (const std::string& name : kActuators) known.push_back({name.c_str()});
-  for (const char* other : kOtherActuators) known.push_back({other});
-  Actuators actuators(file);
-  for (const RobotNode& part : section.parts(known)) actuators.read(file.with_class(part, "main"));
+/// Copies follow the others, and the actuators of a model those of the model that attaches it, as
+/// in MuJoCo: keyframes have controls in this order.
+void read_mjcf_actuators(MjcfWhole& whole) {
+  std::vector<Drive> drives;
+  for (const MjcfScope* model : whole.models)
+    for (const RobotNode& section : model->file->sections)
+      if (section.name() == "actuator") add_drives(whole, *model, section, drives);
+  std::stable_sort(drives.begin(), drives.end(), [&](const Drive& a, const Drive& b) {
+    return whole.order(*a.scope) < whole.order(*b.scope);
+  });
+  Actuators actuators(whole);
+  for (const Drive& drive : drives) actuators.read(drive.node, *drive.scope, drive.joint);
+  actuators.damp();
 }
 
 }  // namespace tangere

@@ -11,57 +11,30 @@
 #include "engine/scene/shapes.hpp"
 #include "io/robot/mesh_solid.hpp"
 #include "io/robot/mjcf_file.hpp"
+#include "io/robot/mjcf_parts.hpp"
 #include "io/robot/mjcf_words.hpp"
 #include "io/scene/convex_hull.hpp"
 
 namespace tangere {
 namespace {
 
-constexpr int kDeepestBodies = 90;  // bodies in bodies; a scene's limit is 200 links
-
-const Words kWorldParts = {{"body"},
-                           {"geom"},
-                           {"frame"},
-                           {"site"},
-                           {"camera", Fate::idle, kSight},
-                           {"light", Fate::idle, kSight},
-                           {"composite", Fate::lost, "bodies made by MuJoCo; write them out"},
-                           {"flexcomp", Fate::lost, "bodies that bend; scenes have none"},
-                           {"replicate", Fate::lost, "copies made by MuJoCo; write them out"},
-                           {"attach", Fate::lost, "a model inside a model"},
-                           {"plugin", Fate::lost, "plug-ins of MuJoCo"}};
-Words body_parts() {
-  Words words = kWorldParts;
-  for (const char* name : {"joint", "freejoint", "inertial"}) words.push_back({name});
-  return words;
-}
-
-/// A child of a body, with the frames around it and the class that they give it.
-struct Placed {
-  RobotNode node;
-  Pose frame;
-  std::string defaults;
-};
-
 class Bodies {
  public:
-  explicit Bodies(MjcfFile& file) : file_(file), robot_(file.robot) {}
+  explicit Bodies(MjcfWhole& whole) : whole_(whole), robot_(whole.robot) {}
 
-  void read_world(const RobotNode& world) {
-    world.check({{"name", Fate::idle, kSight}});
-    std::vector<Placed> parts;
-    gather(world, {}, "main", kWorldParts, parts, 0);
+  void read_world(const RobotNode& world, const MjcfScope& scope) {
+    const std::vector<MjcfPart> parts = world_parts(whole_, {world, {}, "main", &scope});
     std::vector<RobotPiece> fixed;
-    for (const Placed& part : parts)
+    for (const MjcfPart& part : parts)
       if (part.node.name() == "geom") read_world_geom(part, fixed);
     if (!fixed.empty()) {
       JointDescription joint;
-      joint.name = file_.names.free_name("world");
+      joint.name = whole_.names.free_name("world");
       joint.source = world.source();
       for (RobotPiece& piece : fixed) piece.density = 0;
-      add_link(robot_, file_.names, joint.name, -1, joint, fixed, "<worldbody>", world.source());
+      add_link(robot_, whole_.names, joint.name, -1, joint, fixed, "<worldbody>", world.source());
     }
-    for (const Placed& part : parts) {
+    for (const MjcfPart& part : parts) {
       if (part.node.name() == "body") read_body(part, -1, {}, 0);
       if (part.node.name() == "site") read_site(part, -1, {});
     }
@@ -70,32 +43,16 @@ class Bodies {
   /// Keeps all names that the file gives, so that made-up ones differ from them.
   void keep_names(const tinyxml2::XMLElement& element, int depth) {
     if (depth > 2 * kDeepestBodies) return;  // such a file is refused later
-    if (const char* name = element.Attribute("name")) file_.names.keep(name);
+    if (const char* name = element.Attribute("name")) whole_.names.keep(name);
     for (const auto* e = element.FirstChildElement(); e != nullptr; e = e->NextSiblingElement())
       keep_names(*e, depth + 1);
   }
 
  private:
-  void gather(const RobotNode& node, const Pose& frame, const std::string& defaults,
-              const Words& known, std::vector<Placed>& out, int depth) {
-    if (depth > kDeepestBodies)
-      node.fail(fmt::format("frames nested deeper than {}", kDeepestBodies));
-    for (const RobotNode& part : node.parts(known)) {
-      if (part.name() != "frame") {
-        out.push_back({part, frame, defaults});
-        continue;
-      }
-      part.check(with_rotations({{"name", Fate::read}, {"childclass"}}));
-      gather(part, compose(frame, file_.read_pose(part)),
-             part.has("childclass") ? file_.known_class(part, "childclass") : defaults, known, out,
-             depth + 1);
-    }
-  }
-
-  void read_world_geom(const Placed& part, std::vector<RobotPiece>& out) {
-    const RobotNode geom = file_.with_class(part.node, part.defaults);
+  void read_world_geom(const MjcfPart& part, std::vector<RobotPiece>& out) {
+    const MjcfPart geom = part.with_class();
     std::vector<RobotPiece> pieces;
-    read_geom(geom, part.frame, false, pieces);
+    read_geom(geom, false, pieces);
     if (pieces.empty()) return;
     const RobotPiece& piece = pieces.front();
     Scene& scene = robot_.scene;
@@ -104,10 +61,10 @@ class Bodies {
       return;
     }
     scene.ground = GroundDescription{piece.pose.position, outer_direction(piece.pose, {0, 0, 1})};
-    geom.changed("<geom> type=\"plane\" of the world: it is the scene's <ground>");
+    geom.node.changed("<geom> type=\"plane\" of the world: it is the scene's <ground>");
   }
 
-  void read_body(const Placed& placed, int parent, const Pose& parent_offset, int depth) {
+  void read_body(const MjcfPart& placed, int parent, const Pose& parent_offset, int depth) {
     const RobotNode& node = placed.node;
     if (depth > kDeepestBodies)
       node.fail(fmt::format("bodies nested deeper than {}", kDeepestBodies));
@@ -118,29 +75,27 @@ class Bodies {
                                {"sleep", Fate::idle, "a setting of MuJoCo's solver"},
                                {"user", Fate::idle, "numbers for other programs"}}));
     if (node.flag("mocap", false)) node.lost("<body> mocap: moved by another program");
-    const std::string defaults =
-        node.has("childclass") ? file_.known_class(node, "childclass") : placed.defaults;
-    const std::string name = node.has("name") ? unique_body(node) : file_.names.free_name("body");
-    const Pose place = compose(parent_offset, compose(placed.frame, file_.read_pose(node)));
-    static const Words known = body_parts();
-    std::vector<Placed> parts;
-    gather(node, {}, defaults, known, parts, 0);
+    const std::string name =
+        node.has("name") ? unique_body(placed) : whole_.names.free_name("body");
+    const Pose place = compose(parent_offset, compose(placed.frame, placed.file().read_pose(node)));
+    const std::vector<MjcfPart> parts =
+        body_parts(whole_, {node, {}, placed.own_class(), placed.scope});
     Pose offset;  // of the body's frame in that of its link
-    const int index = add_chain(node, name, parent, place, parts, offset);
-    for (const Placed& part : parts) {
+    const int index = add_chain(placed, name, parent, place, parts, offset);
+    for (const MjcfPart& part : parts) {
       if (part.node.name() == "body") read_body(part, index, offset, depth + 1);
       if (part.node.name() == "site") read_site(part, index, offset);
     }
   }
 
   /// Keeps the place of a site. `offset`: of its body's frame in that of the link.
-  void read_site(const Placed& part, int link, const Pose& offset) {
-    const RobotNode node = file_.with_class(part.node, part.defaults);
+  void read_site(const MjcfPart& part, int link, const Pose& offset) {
+    const RobotNode node = part.with_class().node;
     node.check(mjcf_words("site"));
-    const Pose own = node.has("fromto") ? read_ends(node).pose : file_.read_pose(node);
+    const Pose own = node.has("fromto") ? read_ends(node).pose : part.file().read_pose(node);
     if (!node.given("name")) return node.idle("<site> without a name: " + std::string(kSight));
     if (link < 0) return node.idle("<site> of the world: a place that does not move");
-    const std::string name = node.text("name");
+    const std::string name = part.scope->full_name(node.text("name"));
     const RobotSite site{link, compose(offset, compose(part.frame, own)), node.source()};
     const auto [first, is_new] = robot_.sites.try_emplace(name, site);
     if (!is_new)
@@ -148,28 +103,24 @@ class Bodies {
                             place_in(robot_, first->second.source)));
   }
 
-  std::string unique_body(const RobotNode& node) {
-    std::string name = node.text("name");
-    const auto [first, is_new] = bodies_.try_emplace(name, place_in(robot_, node.source()));
-    if (!is_new)
-      node.fail(fmt::format("body name '{}' is used twice, first in {}", name, first->second));
-    return name;
+  std::string unique_body(const MjcfPart& part) {
+    return whole_.keep_name(whole_.body_names, part.node, *part.scope);
   }
 
   /// Adds the links of a body: one for each joint, or one that does not move.
-  int add_chain(const RobotNode& node, const std::string& name, int parent, const Pose& place,
-                const std::vector<Placed>& parts, Pose& offset) {
+  int add_chain(const MjcfPart& body, const std::string& name, int parent, const Pose& place,
+                const std::vector<MjcfPart>& parts, Pose& offset) {
+    const RobotNode& node = body.node;
     std::vector<JointDescription> chain;
     std::vector<MjcfJoint> ends;
     Vector3 anchor = {0, 0, 0};
-    for (const Placed& part : parts) {
+    for (const MjcfPart& part : parts) {
       const bool free_joint = part.node.name() == "freejoint";
       if (part.node.name() != "joint" && !free_joint) continue;
-      const RobotNode joint_node = file_.with_class(part.node, part.defaults);
       MjcfJoint end;
       Vector3 at{};
-      JointDescription joint = free_joint ? read_free_joint(part.node, name, end)
-                                          : read_joint(joint_node, part.frame, name, at, end);
+      JointDescription joint = free_joint ? read_free_joint(part, name, end)
+                                          : read_joint(part.with_class(), name, at, end);
       if (joint.type == JointType::free && (parent >= 0 || !chain.empty()))
         part.node.fail(
             "a free joint inside another body, or beside another joint; expected it "
@@ -185,29 +136,30 @@ class Bodies {
     }
     offset.position = {0 - anchor[0], 0 - anchor[1], 0 - anchor[2]};
     if (chain.empty()) {
-      const bool moves = file_.free_base && parent < 0;
+      const bool moves = whole_.free_base && parent < 0;
       JointDescription fixed;
       fixed.type = moves ? JointType::free : JointType::fixed;
-      fixed.name = file_.names.free_name(name + (moves ? "_free" : "_fixed"));
+      fixed.name = whole_.names.free_name(name + (moves ? "_free" : "_fixed"));
       fixed.pose = place;
       fixed.source = node.source();
       chain.push_back(fixed);
       ends.push_back({-2});
     }
     std::optional<Pose> inertia;
-    const std::vector<RobotPiece> pieces = read_pieces(node, parts, offset, inertia);
-    const bool has_bodies = std::any_of(
-        parts.begin(), parts.end(), [](const Placed& part) { return part.node.name() == "body"; });
+    const std::vector<RobotPiece> pieces = read_pieces(body, parts, offset, inertia);
+    const bool has_bodies = std::any_of(parts.begin(), parts.end(), [](const MjcfPart& part) {
+      return part.node.name() == "body";
+    });
     ends.back().is_aligned &= !has_bodies;
     ends.back().inertia = inertia;
     for (std::size_t k = 0; k + 1 < chain.size(); ++k) {
-      const std::string link = file_.names.free_name(name + "_" + chain[k].name);
-      parent = add_link(robot_, file_.names, link, parent, chain[k], {},
+      const std::string link = whole_.names.free_name(name + "_" + chain[k].name);
+      parent = add_link(robot_, whole_.names, link, parent, chain[k], {},
                         "a joint of body '" + name + "'", chain[k].source);
       keep_joint(chain[k].name, ends[k], parent);
     }
     const int index =
-        add_link(robot_, file_.names, name, parent, chain.back(), pieces, "<body>", node.source());
+        add_link(robot_, whole_.names, name, parent, chain.back(), pieces, "<body>", node.source());
     keep_joint(chain.back().name, ends.back(), index);
     return index;
   }
@@ -215,46 +167,45 @@ class Bodies {
   void keep_joint(const std::string& name, MjcfJoint joint, int link) {
     if (joint.link == -2) return;  // the fixed joint of a body without joints
     joint.link = link;
-    file_.joints[name] = joint;
+    whole_.joints[name] = joint;
   }
 
-  std::string joint_name(const RobotNode& node, const std::string& body) {
-    if (!node.given("name")) return file_.names.free_name(body + "_joint");
-    std::string name = node.text("name");
-    const auto [first, is_new] = joints_.try_emplace(name, place_in(robot_, node.source()));
-    if (!is_new)
-      node.fail(fmt::format("joint name '{}' is used twice, first in {}", name, first->second));
-    return name;
+  std::string joint_name(const MjcfPart& part, const std::string& body) {
+    if (!part.node.given("name")) return whole_.names.free_name(body + "_joint");
+    return whole_.keep_name(whole_.joint_names, part.node, *part.scope);
   }
 
-  JointDescription read_free_joint(const RobotNode& node, const std::string& body, MjcfJoint& end) {
+  JointDescription read_free_joint(const MjcfPart& part, const std::string& body, MjcfJoint& end) {
+    const RobotNode& node = part.node;
     node.check({{"name"}, {"group", Fate::idle, kSight}, {"align"}});
     JointDescription joint;
     joint.type = JointType::free;
     const int align = node.choice("align", {"auto", "true", "false"}, 0);
-    end.is_aligned = align == 1 || (align == 0 && file_.align_free);
-    joint.name = joint_name(node, body);
+    end.is_aligned = align == 1 || (align == 0 && part.file().align_free);
+    joint.name = joint_name(part, body);
     joint.source = node.source();
     return joint;
   }
 
-  JointDescription read_joint(const RobotNode& node, const Pose& frame, const std::string& body,
-                              Vector3& anchor, MjcfJoint& end) {
+  JointDescription read_joint(const MjcfPart& part, const std::string& body, Vector3& anchor,
+                              MjcfJoint& end) {
+    const RobotNode& node = part.node;
+    const MjcfFile& file = part.file();
     node.check(mjcf_words("joint"));
     JointDescription joint;
     constexpr JointType kMjcfJointTypes[] = {JointType::revolute, JointType::prismatic,
                                              JointType::spherical, JointType::free};
     joint.type = kMjcfJointTypes[node.choice("type", {"hinge", "slide", "ball", "free"}, 0)];
-    joint.name = joint_name(node, body);
+    joint.name = joint_name(part, body);
     joint.source = node.source();
     const bool turns = joint.type == JointType::revolute;
     const bool single = turns || joint.type == JointType::prismatic;
-    const auto measure = [&](double x) { return turns ? file_.angle(x) : x; };
-    anchor = outer_point(frame, node.vector("pos", Vector3{0, 0, 0}));
-    if (single) joint.axis0 = outer_direction(frame, node.direction("axis", Vector3{0, 0, 1}));
-    joint.damping = file_.has_dampers ? node.not_negative("damping", 0.0) : 0;
+    const auto measure = [&](double x) { return turns ? file.angle(x) : x; };
+    anchor = outer_point(part.frame, node.vector("pos", Vector3{0, 0, 0}));
+    if (single) joint.axis0 = outer_direction(part.frame, node.direction("axis", Vector3{0, 0, 1}));
+    joint.damping = whole_.has_dampers ? node.not_negative("damping", 0.0) : 0;
     joint.armature = node.not_negative("armature", 0.0);
-    joint.stiffness = file_.has_springs ? node.not_negative("stiffness", 0.0) : 0;
+    joint.stiffness = whole_.has_springs ? node.not_negative("stiffness", 0.0) : 0;
     if (single) {
       end.ref = measure(node.number("ref", 0.0));
       const double rest = measure(node.number("springref", 0.0)) - end.ref;
@@ -263,13 +214,13 @@ class Bodies {
         node.changed(fmt::format("<joint> ref: the coordinate of '{}' is that of the file minus {}",
                                  joint.name, end.ref));
     }
-    end.is_aligned = joint.type == JointType::free && file_.align_free;
+    end.is_aligned = joint.type == JointType::free && file.align_free;
     if (joint.type == JointType::free && joint.stiffness != 0) {
       node.lost("<joint> stiffness: a spring of a free joint to its place in the world");
       joint.stiffness = 0;
     }
-    read_range(node, measure, end, joint);
-    if (node.has("actuatorfrcrange") && limited(node, "actuatorfrclimited")) {
+    read_range(part, measure, end, joint);
+    if (node.has("actuatorfrcrange") && limited(part, "actuatorfrclimited")) {
       const std::vector<double> x = node.numbers("actuatorfrcrange", 2);
       if (!(x[0] < x[1])) node.fail("actuatorfrcrange: expected low, then high");
       end.actuator_range = {x[0], x[1]};
@@ -277,26 +228,27 @@ class Bodies {
     return joint;
   }
 
-  [[nodiscard]] bool limited(const RobotNode& node, const char* attribute) const {
-    const int word = node.choice(attribute, {"auto", "true", "false"}, 0);
-    return word == 1 || (word == 0 && file_.auto_limits);
+  [[nodiscard]] static bool limited(const MjcfPart& part, const char* attribute) {
+    const int word = part.node.choice(attribute, {"auto", "true", "false"}, 0);
+    return word == 1 || (word == 0 && part.file().auto_limits);
   }
 
   template <class Measure>
-  void read_range(const RobotNode& node, Measure&& measure, MjcfJoint& end,
+  void read_range(const MjcfPart& part, Measure&& measure, MjcfJoint& end,
                   JointDescription& joint) const {
+    const RobotNode& node = part.node;
     if (joint.type == JointType::free) {  // has no limits, whatever its class says
       if (node.has("range")) node.idle("<joint> range of a free joint");
       return;
     }
-    const bool on = limited(node, "limited");
+    const bool on = limited(part, "limited");
     if (!node.has("range")) {
       if (node.has("limited") && on && node.text("limited") == "true")
         node.fail("limited=\"true\" without a range; expected range=\"low high\"");
       return;
     }
     const std::vector<double> x = node.numbers("range", 2);
-    if (!file_.has_limits) return;
+    if (!whole_.has_limits) return;
     if (!on) return node.idle("<joint> range of a joint that is not limited");
     if (joint.type == JointType::spherical)
       return node.lost("<joint> range of a ball joint: the angle of a cone");
@@ -308,30 +260,31 @@ class Bodies {
 
   /// The geoms of a body and its mass, in the frame of its link. `principal`: the frame of its
   /// inertia in that of the body, where the file gives it: by diaginertia or one primitive.
-  std::vector<RobotPiece> read_pieces(const RobotNode& node, const std::vector<Placed>& parts,
+  std::vector<RobotPiece> read_pieces(const MjcfPart& body, const std::vector<MjcfPart>& parts,
                                       const Pose& offset, std::optional<Pose>& principal) {
     std::optional<RobotPiece> inertial;
     bool has_inertial = false;
-    for (const Placed& part : parts) {
+    for (const MjcfPart& part : parts) {
       if (part.node.name() != "inertial") continue;
       if (has_inertial) part.node.fail("given twice; expected once");
       has_inertial = true;
-      inertial = read_inertial(part.node);
-      if (part.node.has("diaginertia")) principal = compose(part.frame, file_.read_pose(part.node));
+      inertial = read_inertial(part);
+      if (part.node.has("diaginertia"))
+        principal = compose(part.frame, part.file().read_pose(part.node));
       if (inertial) inertial->pose = compose(offset, compose(part.frame, inertial->pose));
     }
-    if (has_inertial && file_.inertia_from == InertiaFrom::geoms) {
-      node.changed("<inertial>: left out, because inertiafromgeom=\"true\"");
+    const InertiaFrom from = body.file().inertia_from;
+    if (has_inertial && from == InertiaFrom::geoms) {
+      body.node.changed("<inertial>: left out, because inertiafromgeom=\"true\"");
       inertial.reset();
       principal.reset();
       has_inertial = false;
     }
-    const bool massive = !has_inertial && file_.inertia_from != InertiaFrom::inertials;
+    const bool massive = !has_inertial && from != InertiaFrom::inertials;
     std::vector<RobotPiece> pieces;
-    for (const Placed& part : parts) {
+    for (const MjcfPart& part : parts) {
       if (part.node.name() != "geom") continue;
-      const RobotNode geom = file_.with_class(part.node, part.defaults);
-      read_geom(geom, part.frame, massive, pieces);
+      read_geom(part.with_class(), massive, pieces);
     }
     const auto heavy = [](const RobotPiece& piece) {
       return piece.density > 0 || std::holds_alternative<AbstractShape>(piece.shape);
@@ -346,7 +299,8 @@ class Bodies {
     return pieces;
   }
 
-  std::optional<RobotPiece> read_inertial(const RobotNode& node) {
+  std::optional<RobotPiece> read_inertial(const MjcfPart& part) {
+    const RobotNode& node = part.node;
     node.check(with_rotations({{"mass"}, {"diaginertia"}, {"fullinertia"}}));
     const double mass = node.not_negative("mass");
     if (node.has("fullinertia") == node.has("diaginertia"))
@@ -359,16 +313,17 @@ class Bodies {
       const std::vector<double> x = node.numbers("fullinertia", 6);  // xx yy zz xy xz yz
       inertia = {x[0], x[3], x[4], x[1], x[5], x[2]};
     }
-    if (file_.balance_inertia && balance_inertia(inertia))
+    if (part.file().balance_inertia && balance_inertia(inertia))
       node.changed("<inertial>: all moments are their mean, as balanceinertia says");
-    return inertial_piece(robot_, mass, inertia, file_.read_pose(node), "<inertial>",
+    return inertial_piece(robot_, mass, inertia, part.file().read_pose(node), "<inertial>",
                           node.source());
   }
 
   /// Appends a geom, unless it is for pictures only, and its mass where that stands apart.
   /// `massive`: it may have a mass of its own.
-  void read_geom(const RobotNode& node, const Pose& frame, bool massive,
-                 std::vector<RobotPiece>& out) {
+  void read_geom(const MjcfPart& part, bool massive, std::vector<RobotPiece>& out) {
+    const RobotNode& node = part.node;
+    const MjcfFile& file = part.file();
     node.check(mjcf_words("geom"));
     static_cast<void>(node.parts({{"plugin", Fate::lost, "plug-ins of MuJoCo"}}));
     RobotPiece piece;
@@ -376,7 +331,7 @@ class Bodies {
     piece.source = node.source();
     const int group = node.integer("group", 0, 1000, 0);
     const bool counts =
-        massive && group >= file_.inertia_groups[0] && group <= file_.inertia_groups[1];
+        massive && group >= file.inertia_groups[0] && group <= file.inertia_groups[1];
     const bool touches = node.integer("contype", std::numeric_limits<int>::min(),
                                       std::numeric_limits<int>::max(), 1) != 0 ||
                          node.integer("conaffinity", std::numeric_limits<int>::min(),
@@ -387,9 +342,9 @@ class Bodies {
     if (!touches && !heavy) return node.idle("<geom> that touches nothing: " + std::string(kSight));
     piece.touches = touches;
     const MjcfMesh* mesh = nullptr;
-    if (!read_shape(node, piece, mesh)) return;
-    piece.pose = compose(frame, piece.pose);
-    read_colour(node, piece);
+    if (!read_shape(part, piece, mesh)) return;
+    piece.pose = compose(part.frame, piece.pose);
+    read_colour(part, piece);
     std::optional<RobotPiece> apart;
     if (heavy && !std::holds_alternative<PlaneShape>(piece.shape)) {
       if (node.flag("shellinertia", false))
@@ -430,10 +385,12 @@ class Bodies {
                           node.source());
   }
 
-  void read_colour(const RobotNode& node, RobotPiece& piece) const {
+  static void read_colour(const MjcfPart& part, RobotPiece& piece) {
+    const RobotNode& node = part.node;
     if (node.has("material")) {
-      const auto material = file_.materials.find(node.text("material"));
-      if (material != file_.materials.end()) piece.rgba = material->second;
+      const auto& materials = part.file().materials;
+      const auto material = materials.find(node.text("material"));
+      if (material != materials.end()) piece.rgba = material->second;
     }
     if (!node.has("rgba")) return;
     const std::vector<double> x = node.numbers("rgba", 4);
@@ -464,7 +421,8 @@ class Bodies {
   }
 
   /// Reads type, size and place. Returns false for a shape that scenes do not have.
-  bool read_shape(const RobotNode& node, RobotPiece& piece, const MjcfMesh*& mesh) {
+  bool read_shape(const MjcfPart& part, RobotPiece& piece, const MjcfMesh*& mesh) {
+    const RobotNode& node = part.node;
     static const std::vector<std::string> types = {
         "sphere", "capsule", "cylinder", "box", "ellipsoid", "plane", "mesh", "hfield", "sdf"};
     const std::string type = types[std::size_t(
@@ -473,7 +431,7 @@ class Bodies {
       node.lost("<geom> type=\"" + type + "\"");
       return false;
     }
-    piece.pose = file_.read_pose(node);
+    piece.pose = part.file().read_pose(node);
     const bool stretched = node.has("fromto") && (type == "capsule" || type == "cylinder" ||
                                                   type == "box" || type == "ellipsoid");
     double half = 0;  // of the length along z, where two ends give it
@@ -483,7 +441,7 @@ class Bodies {
       piece.pose = ends.pose;
     }
     if (type == "mesh") {
-      mesh = &file_.mesh_named(node, node.text("mesh"));
+      mesh = &part.file().mesh_named(node, node.text("mesh"));
       if (!mesh->mesh) return false;
       piece.pose = compose(piece.pose, mesh->origin);
       piece.shape = mesh->mesh->shape;
@@ -524,17 +482,19 @@ class Bodies {
     return true;
   }
 
-  MjcfFile& file_;
+  MjcfWhole& whole_;
   Robot& robot_;
-  std::map<std::string, std::string> bodies_, joints_;  // name, place
 };
 
 }  // namespace
 
-void read_mjcf_bodies(MjcfFile& file, const RobotNode& world) {
-  Bodies bodies(file);
-  bodies.keep_names(world.element(), 0);
-  bodies.read_world(world);
+void read_mjcf_bodies(MjcfWhole& whole, const MjcfScope& scope) {
+  Bodies bodies(whole);
+  for (const RobotNode& section : scope.file->sections) {
+    if (section.name() != "worldbody") continue;
+    bodies.keep_names(section.element(), 0);
+    bodies.read_world(section, scope);
+  }
 }
 
 }  // namespace tangere

@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the parts of a MJCF file share while it is read: settings of <compiler>, default classes,
-// assets, and the joints that actuators refer to.
+// What the parts of a MJCF file share while it is read: settings of <compiler>, default classes and
+// assets of a model, and names and joints of all models.
 #pragma once
 
 #include <array>
+#include <deque>
 #include <limits>
 #include <map>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -59,11 +61,68 @@ inline constexpr const char* kOtherActuators[] = {"intvelocity", "damper",      
                                                   "muscle",      "adhesion",    "plugin",
                                                   "dcmotor",     "orientation", "pid"};
 
+class MjcfFile;
+
+/// Where elements stand in a whole of models: <attach> puts a prefix before the names of a model,
+/// and <replicate> a suffix behind those of a copy.
+struct MjcfScope {
+  MjcfFile* file;
+  int model = 0;  ///< number of the attached model, from 1; 0: the file that the user names
+  std::string prefix = {}, suffix = {};
+  const MjcfScope* outer = nullptr;  ///< of the <attach>; null: the file that the user names
+  /// A number for each <replicate> and <attach> around it, and that of the copy.
+  std::vector<int> copies = {};
+
+  /// The name in the scene of what the file calls `name`.
+  [[nodiscard]] std::string full_name(std::string name) const;
+};
+
+/// One of the things to which a name of a model refers.
+struct MjcfCopy {
+  std::string name;        ///< in the scene
+  const MjcfScope* scope;  ///< in the model that has the name
+};
+
+/// Names of joints or bodies, which differ from each other in the scene.
+struct MjcfNames {
+  const char* what;                                ///< "joint"
+  std::map<std::string, std::string> places = {};  ///< by name in the scene: "line 7"
+  /// By number of a model and name there: copies, in the order of the scene. In a model that
+  /// attaches another, names of the other have the prefix.
+  std::map<std::pair<int, std::string>, std::vector<MjcfCopy>> copies = {};
+};
+
+/// What all models of a file share.
+struct MjcfWhole {
+  Robot& robot;
+  bool has_limits = true, has_springs = true, has_dampers = true;  ///< by <flag>
+  bool merges_options = false;                                     ///< <compiler conflict="merge">
+  std::vector<int> disabled_groups = {};                           ///< of actuators
+  bool free_base = false;  ///< bodies of the world without joints move freely
+  RobotNames names = {};
+  MjcfNames body_names = {"body"}, joint_names = {"joint"};
+  std::map<std::string, MjcfJoint> joints = {};  ///< by name in the scene
+  std::deque<MjcfScope> scopes = {};
+  std::map<int, int> ranks = {};  ///< of a <replicate> or <attach>: its place in the order of names
+  std::vector<const MjcfScope*> models = {};  ///< by number
+  std::vector<double> keyframe_ctrl = {};     ///< of the requested keyframe; may be short
+  std::vector<MjcfControl> controls = {};
+
+  /// Returns the name in the scene of a node with a name. Fails at the node if it is used twice.
+  std::string keep_name(MjcfNames& kind, const RobotNode& node, const MjcfScope& scope);
+  /// By which MuJoCo sorts what copies refer to, after all names are kept.
+  [[nodiscard]] std::vector<int> order(const MjcfScope& scope) const;
+};
+
 class MjcfFile {
  public:
-  explicit MjcfFile(const RobotNode& root) : robot(root.robot()) {}
+  MjcfFile(const RobotNode& node, MjcfWhole& shared, const MjcfFile* from)
+      : whole(shared), outer(from), root(node) {}
 
-  Robot& robot;
+  MjcfWhole& whole;
+  const MjcfFile* outer;  ///< whose <model> names this file; null: the user names it
+  RobotNode root;         ///< <mujoco>
+  std::vector<RobotNode> sections;
   bool degrees = true;
   std::string euler_sequence = "xyz";
   std::string mesh_folder;
@@ -71,18 +130,12 @@ class MjcfFile {
   bool auto_limits = true;
   InertiaFrom inertia_from = InertiaFrom::automatic;
   bool balance_inertia = false;
-  double total_mass = 0;  ///< to which all masses are scaled [kg]; 0: they are not
-  bool has_limits = true, has_springs = true, has_dampers = true;  ///< by <flag>
-  bool free_base = false;   ///< bodies of the world without joints move freely
+  double total_mass = 0;    ///< to which all masses are scaled [kg]; 0: they are not
   bool align_free = false;  ///< free joints are aligned with the inertia of their bodies
   std::array<int, 2> inertia_groups{0, 5};
-  std::vector<int> disabled_groups;   ///< of actuators
-  std::vector<double> keyframe_ctrl;  ///< of the requested keyframe, by actuator; may be short
   std::map<std::string, MjcfMesh> meshes;
   std::map<std::string, std::array<double, 4>> materials;
-  std::map<std::string, MjcfJoint> joints;
-  std::vector<MjcfControl> controls;
-  RobotNames names;
+  std::map<std::string, std::unique_ptr<MjcfFile>> models;  ///< that an <attach> may name
 
   [[nodiscard]] double angle(double x) const {
     return degrees ? x * 3.14159265358979323846 / 180 : x;
@@ -98,6 +151,10 @@ class MjcfFile {
   /// Moves the warnings of all classes and included files to `out`.
   void take_warnings(std::vector<std::string>& out);
 
+  /// The rotation of three angles in the units and the order of the file.
+  [[nodiscard]] Quaternion euler(const Vector3& x) const {
+    return from_euler({angle(x[0]), angle(x[1]), angle(x[2])}, euler_sequence);
+  }
   /// Reads pos and one of quat, axisangle, euler, xyaxes, zaxis.
   [[nodiscard]] Pose read_pose(const RobotNode& node) const;
 
@@ -109,15 +166,31 @@ class MjcfFile {
   std::map<std::pair<std::string, std::string>, SceneContext> contexts_;  // of a file, a class
 };
 
-/// Reads <worldbody> and all bodies in it.
-void read_mjcf_bodies(MjcfFile& file, const RobotNode& world);
-/// Reads an <actuator> section.
-void read_mjcf_actuators(MjcfFile& file, const RobotNode& section);
+/// Reads the sections of a model that its bodies refer to.
+void read_mjcf_settings(MjcfFile& file);
+/// Reads the file of a <model>.
+void read_mjcf_model(MjcfFile& file, const RobotNode& asset);
+
+/// A copy that a <replicate> makes.
+struct MjcfReplica {
+  Pose pose;
+  const MjcfScope* scope;
+};
+/// The copies of a <replicate>.
+std::vector<MjcfReplica> replicas(MjcfWhole& whole, const RobotNode& node, const MjcfScope& scope);
+/// The scope of the model that an <attach> names.
+const MjcfScope& attached_scope(MjcfWhole& whole, const RobotNode& node, const MjcfScope& outer);
+
+/// Reads all bodies of the file that the user names.
+void read_mjcf_bodies(MjcfWhole& whole, const MjcfScope& scope);
+/// Reads the actuators of all models, after the bodies.
+void read_mjcf_actuators(MjcfWhole& whole);
 /// Returns the key `requested` of the <keyframe> sections, by its name or, without one, its number
 /// from 0; none for "". Lists the others, and keeps its controls for the actuators.
-std::optional<RobotNode> find_mjcf_keyframe(MjcfFile& file, const std::vector<RobotNode>& sections,
+std::optional<RobotNode> find_mjcf_keyframe(MjcfWhole& whole,
+                                            const std::vector<RobotNode>& sections,
                                             const std::string& requested);
 /// Gives the scene the start of a key, after all bodies and actuators.
-void read_mjcf_keyframe(MjcfFile& file, const RobotNode& key);
+void read_mjcf_keyframe(MjcfWhole& whole, const RobotNode& key);
 
 }  // namespace tangere

@@ -17,10 +17,10 @@ const char* const kUse = "stored states; --keyframe NAME starts from one";
 
 class Keyframe {
  public:
-  Keyframe(const MjcfFile& file, const RobotNode& node) : file_(file), node_(node) {}
+  Keyframe(const MjcfWhole& whole, const RobotNode& node) : whole_(whole), node_(node) {}
 
   void read() {
-    Scene& scene = file_.robot.scene;
+    Scene& scene = whole_.robot.scene;
     std::vector<double> q = numbers("qpos", position_count), v = numbers("qvel", dof_count);
     std::size_t iq = 0, iv = 0;
     for (const LinkDescription& link : scene.links) {
@@ -51,7 +51,7 @@ class Keyframe {
   [[nodiscard]] std::vector<double> numbers(const char* attribute, int (*count)(JointType)) const {
     if (!node_.has(attribute)) return {};
     std::size_t n = 0;
-    for (const LinkDescription& link : file_.robot.scene.links)
+    for (const LinkDescription& link : whole_.robot.scene.links)
       n += std::size_t(count(link.joint.type));
     return sized_numbers(attribute, n, "the joints that are read");
   }
@@ -73,7 +73,7 @@ class Keyframe {
 
   [[nodiscard]] std::vector<double> coordinates(const JointDescription& joint,
                                                 std::span<const double> q) const {
-    if (q.size() == 1) return {q[0] - file_.joints.at(joint.name).ref};
+    if (q.size() == 1) return {q[0] - whole_.joints.at(joint.name).ref};
     if (joint.type == JointType::spherical) {
       const Quaternion turn = unit(q);
       return {turn.begin(), turn.end()};
@@ -93,8 +93,8 @@ class Keyframe {
   /// The frame of a body whose place and velocity a key gives, in that of the body: its own, or
   /// that of its inertia.
   [[nodiscard]] Pose key_frame(const JointDescription& joint) const {
-    const auto known = file_.joints.find(joint.name);  // none: a joint of --base free
-    if (known == file_.joints.end() || !known->second.is_aligned) return {};
+    const auto known = whole_.joints.find(joint.name);  // none: a joint of --base free
+    if (known == whole_.joints.end() || !known->second.is_aligned) return {};
     if (!known->second.inertia)
       node_.fail(fmt::format(
           "the free joint '{}' is aligned with the inertia of its body (align, alignfree), whose "
@@ -119,25 +119,26 @@ class Keyframe {
   }
 
   void read_controls() const {
-    std::vector<double> given(file_.controls.size(), 0.0);  // MuJoCo's, without an attribute
+    std::vector<double> given(whole_.controls.size(), 0.0);  // MuJoCo's, without an attribute
     if (node_.has("ctrl")) given = sized_numbers("ctrl", given.size(), "the actuators");
-    std::vector<double>& controls = file_.robot.controls.emplace();
-    controls.assign(file_.robot.scene.motors.size(), 0.0);
+    std::vector<double>& controls = whole_.robot.controls.emplace();
+    controls.assign(whole_.robot.scene.motors.size(), 0.0);
     for (std::size_t k = 0; k < given.size(); ++k) {
-      const MjcfControl& c = file_.controls[k];
+      const MjcfControl& c = whole_.controls[k];
       if (c.motor < 0) continue;
       const double x = c.scale * std::clamp(given[k], c.range[0], c.range[1]) + c.shift;
       controls[std::size_t(c.motor)] = std::clamp(x, c.least, c.most);
     }
   }
 
-  const MjcfFile& file_;
+  const MjcfWhole& whole_;
   const RobotNode& node_;
 };
 
 }  // namespace
 
-std::optional<RobotNode> find_mjcf_keyframe(MjcfFile& file, const std::vector<RobotNode>& sections,
+std::optional<RobotNode> find_mjcf_keyframe(MjcfWhole& whole,
+                                            const std::vector<RobotNode>& sections,
                                             const std::string& requested) {
   std::vector<std::string> names;
   std::vector<RobotNode> keys;
@@ -161,12 +162,12 @@ std::optional<RobotNode> find_mjcf_keyframe(MjcfFile& file, const std::vector<Ro
   if (requested.empty()) return std::nullopt;
   if (at == names.end())
     throw InputError(fmt::format("--keyframe {}: {} has no keyframe of this name{}", requested,
-                                 file.robot.scene.path, suggestion(requested, names)));
+                                 whole.robot.scene.path, suggestion(requested, names)));
   const RobotNode& key = keys[std::size_t(at - names.begin())];
-  if (key.has("ctrl")) file.keyframe_ctrl = key.numbers("ctrl");
+  if (key.has("ctrl")) whole.keyframe_ctrl = key.numbers("ctrl");
   return key;
 }
 
-void read_mjcf_keyframe(MjcfFile& file, const RobotNode& key) { Keyframe(file, key).read(); }
+void read_mjcf_keyframe(MjcfWhole& whole, const RobotNode& key) { Keyframe(whole, key).read(); }
 
 }  // namespace tangere

@@ -57,7 +57,7 @@ const Words kCompiler = {{"angle"},
                          {"fitaabb", Fate::idle, "no primitive is fitted to a mesh"},
                          {"usethread", Fate::idle, kSolverSetting},
                          {"saveinertial", Fate::idle, kSolverSetting},
-                         {"conflict", Fate::idle, kSolverSetting}};
+                         {"conflict"}};
 
 Words solver_words() {
   Words words = {{"timestep"},
@@ -87,9 +87,14 @@ void read_compiler(MjcfFile& file, const RobotNode& node) {
   if (node.has("meshdir")) file.mesh_folder = node.text("meshdir");
   file.strip_path = node.flag("strippath", file.strip_path);
   file.auto_limits = node.flag("autolimits", file.auto_limits);
+  if (node.has("conflict"))
+    file.whole.merges_options |= node.choice("conflict", {"warning", "merge", "error"}) == 1;
   if (node.has("coordinate")) static_cast<void>(node.choice("coordinate", {"local"}));
   file.balance_inertia = node.flag("balanceinertia", file.balance_inertia);
-  if (node.has("settotalmass")) file.total_mass = std::max(node.number("settotalmass"), 0.0);
+  if (node.has("settotalmass") && file.outer != nullptr)
+    node.lost("<compiler> settotalmass of an attached model");
+  else if (node.has("settotalmass"))
+    file.total_mass = std::max(node.number("settotalmass"), 0.0);
   file.align_free = node.flag("alignfree", file.align_free);
   if (node.has("eulerseq")) {
     file.euler_sequence = node.text("eulerseq");
@@ -109,7 +114,7 @@ void read_compiler(MjcfFile& file, const RobotNode& node) {
   }
 }
 
-void read_flag(MjcfFile& file, const RobotNode& flag, const std::string& name,
+void read_flag(MjcfWhole& whole, const RobotNode& flag, const std::string& name,
                const std::string& value) {
   const auto is = [&](std::initializer_list<std::string_view> names) {
     return std::find(names.begin(), names.end(), name) != names.end();
@@ -122,28 +127,28 @@ void read_flag(MjcfFile& file, const RobotNode& flag, const std::string& name,
   if (is({"contact", "equality", "frictionloss"}))
     return flag.idle(text + "a scene has none but those that it names");
   if (is({"actuation", "clampctrl"})) return flag.lost(text + "switches forces");
-  if (name == "gravity") file.robot.scene.gravity = {0, 0, 0};
-  if (is({"limit", "constraint"})) file.has_limits = false;
-  if (is({"spring", "passive"})) file.has_springs = false;
-  if (is({"damper", "passive"})) file.has_dampers = false;
+  if (name == "gravity") whole.robot.scene.gravity = {0, 0, 0};
+  if (is({"limit", "constraint"})) whole.has_limits = false;
+  if (is({"spring", "passive"})) whole.has_springs = false;
+  if (is({"damper", "passive"})) whole.has_dampers = false;
   flag.changed(text + "the scene is without what it switches off");
 }
 
-void read_option(MjcfFile& file, const RobotNode& node) {
+void read_option(MjcfWhole& whole, const RobotNode& node) {
   static const Words words = solver_words();
   node.check(words);
-  Scene& scene = file.robot.scene;
+  Scene& scene = whole.robot.scene;
   scene.timestep = node.positive("timestep", scene.timestep);
   scene.gravity = node.vector("gravity", scene.gravity);
   if (node.has("actuatorgroupdisable"))
     for (const double group : node.numbers("actuatorgroupdisable"))
-      file.disabled_groups.push_back(static_cast<int>(group));
+      whole.disabled_groups.push_back(static_cast<int>(group));
   if (node.given("integrator"))
     node.changed("<option> integrator: the scene steps by BDF2, with an implicit solver");
   for (const RobotNode& flag : node.parts({{"flag"}}))
     for (const tinyxml2::XMLAttribute* a = flag.element().FirstAttribute(); a != nullptr;
          a = a->Next())
-      read_flag(file, flag, a->Name(), a->Value());
+      read_flag(whole, flag, a->Name(), a->Value());
 }
 
 void read_mesh(MjcfFile& file, const RobotNode& node) {
@@ -168,8 +173,12 @@ void read_asset(MjcfFile& file, const RobotNode& section) {
                        {"texture", Fate::idle, kSight},
                        {"skin", Fate::idle, kSight},
                        {"hfield", Fate::lost, "height fields; scenes have none"},
-                       {"model", Fate::lost, "models inside a model"}};
+                       {"model"}};
   for (const RobotNode& part : section.parts(known)) {
+    if (part.name() == "model") {
+      read_mjcf_model(file, part);
+      continue;
+    }
     const RobotNode node = file.with_class(part, "main");
     if (node.name() == "mesh") {
       read_mesh(file, node);
@@ -195,6 +204,7 @@ void MjcfFile::read_defaults(const RobotNode& node, const std::string& parent) {
   if (!top) context = classes_.at(parent);
   context.warnings.clear();
   context.file = node.context().file;
+  context.includer = node.context().includer;
   context.allow_unknown = node.context().allow_unknown;
   if (top && name != "main") classes_["main"] = context;
   Words known = {{"default"},
@@ -219,11 +229,14 @@ void MjcfFile::read_defaults(const RobotNode& node, const std::string& parent) {
     part.check(mjcf_words(part.name()));
     const bool drives =
         std::find(kActuators.begin(), kActuators.end(), part.name()) != kActuators.end();
-    static const std::vector<std::string> gains = {"kp",     "kv",      "gainprm",  "biasprm",
-                                                   "dynprm", "dyntype", "gaintype", "biastype"};
+    static const std::vector<std::string> gains = {
+        "kp", "kv", "dampratio", "gainprm", "biasprm", "dynprm", "dyntype", "gaintype", "biastype"};
     for (const tinyxml2::XMLAttribute* a = part.element().FirstAttribute(); a != nullptr;
          a = a->Next()) {
       const SceneContext::Default value{a->Value(), part.source().line};
+      // Of kv and dampratio the innermost class has one.
+      for (const auto& [one, other] : {std::pair{"kv", "dampratio"}, {"dampratio", "kv"}})
+        if (std::string_view(a->Name()) == one) context.defaults[part.name()].erase(other);
       const bool gain = std::find(gains.begin(), gains.end(), a->Name()) != gains.end();
       if (drives && !gain)
         for (const std::string& actuator : kActuators)
@@ -243,6 +256,7 @@ RobotNode MjcfFile::with_class(const RobotNode& node, const std::string& inherit
   if (is_new) {
     at->second = classes_[name];
     at->second.file = file;
+    at->second.includer = node.context().includer;
     at->second.allow_unknown = node.context().allow_unknown;
     at->second.warnings.clear();
   }
@@ -303,11 +317,14 @@ void MjcfFile::read_origin(MjcfMesh& mesh, const Vector3& scale) {
 
 void MjcfFile::take_warnings(std::vector<std::string>& out) {
   const auto take = [&](SceneContext& context) {
-    for (std::string& warning : context.warnings) out.push_back(std::move(warning));
+    for (std::string& warning : context.warnings)
+      if (std::find(out.begin(), out.end(), warning) == out.end())  // copies give it again
+        out.push_back(std::move(warning));
     context.warnings.clear();
   };
-  for (const auto& included : robot.included) take(included->context);
+  for (const auto& included : whole.robot.included) take(included->context);
   for (auto& [key, context] : contexts_) take(context);
+  for (auto& [name, model] : models) model->take_warnings(out);
 }
 
 Quaternion MjcfFile::read_orientation(const RobotNode& node) const {
@@ -323,10 +340,7 @@ Quaternion MjcfFile::read_orientation(const RobotNode& node) const {
   const std::string_view kind = chosen;
   if (kind == "quat") return node.quaternion("quat");
   if (kind == "zaxis") return from_z(node.direction("zaxis"));
-  if (kind == "euler") {
-    const Vector3 x = node.vector("euler");
-    return from_euler({angle(x[0]), angle(x[1]), angle(x[2])}, euler_sequence);
-  }
+  if (kind == "euler") return euler(node.vector("euler"));
   const auto unit = [&](const Vector3& a) {
     const double length = std::sqrt(dot(a, a));
     if (!(length > 1e-100) || !std::isfinite(length))
@@ -348,41 +362,76 @@ Pose MjcfFile::read_pose(const RobotNode& node) const {
   return {node.vector("pos", Vector3{0, 0, 0}), read_orientation(node)};
 }
 
+void read_mjcf_settings(MjcfFile& file) {
+  file.sections = file.root.parts(kSections);
+  const auto each = [&](const char* name, auto&& read) {
+    for (const RobotNode& s : file.sections)
+      if (s.name() == name) read(s);
+  };
+  each("compiler", [&](const RobotNode& s) { read_compiler(file, s); });
+  each("option", [&](const RobotNode& s) {
+    if (file.outer == nullptr)
+      read_option(file.whole, s);
+    else if (file.whole.merges_options)
+      s.lost("<option> of an attached model, which conflict=\"merge\" merges");
+    else
+      s.idle("<option> of an attached model: MuJoCo takes those of the model that attaches it");
+  });
+  each("default", [&](const RobotNode& s) { file.read_defaults(s, ""); });
+  each("asset", [&](const RobotNode& s) { read_asset(file, s); });
+  if (file.outer != nullptr)
+    each("keyframe", [&](const RobotNode& s) { s.idle("<keyframe> of an attached model"); });
+}
+
+namespace {
+
+/// Keeps the pairs of an <exclude>, of which copies have one each.
+void read_exclude(MjcfWhole& whole, int model, const RobotNode& exclude) {
+  exclude.check({{"name", Fate::idle, kSight}, {"body1"}, {"body2"}});
+  exclude.idle("<exclude>: a scene has only the contacts that it names");
+  const auto& copies = whole.body_names.copies;
+  const auto first = copies.find({model, exclude.text("body1")}),
+             second = copies.find({model, exclude.text("body2")});
+  if (first == copies.end() || second == copies.end()) return;
+  for (const MjcfCopy& a : first->second)
+    for (const MjcfCopy& b : second->second) {
+      const std::vector<int>&x = a.scope->copies, &y = b.scope->copies;
+      const auto common = static_cast<std::ptrdiff_t>(std::min(x.size(), y.size()));
+      if (std::equal(x.begin(), x.begin() + common, y.begin()))
+        whole.robot.excluded.push_back({a.name, b.name});
+    }
+}
+
+}  // namespace
+
 void read_mjcf(const RobotNode& root, const std::string& keyframe, bool free_base) {
   Robot& robot = root.robot();
   robot.format = "MJCF";
   root.check({{"model"}});
-  Scene& scene = robot.scene;
-  scene.name = root.text("model", "robot");
-  scene.timestep = 0.002;  // MuJoCo's
-  const std::vector<RobotNode> sections = root.parts(kSections);
-  MjcfFile file(root);
-  file.free_base = free_base;
-  const auto each = [&](const char* name, auto&& read) {
-    for (const RobotNode& s : sections)
-      if (s.name() == name) read(s);
-  };
-  each("compiler", [&](const RobotNode& s) { read_compiler(file, s); });
-  each("option", [&](const RobotNode& s) { read_option(file, s); });
-  each("default", [&](const RobotNode& s) { file.read_defaults(s, ""); });
-  each("asset", [&](const RobotNode& s) { read_asset(file, s); });
-  each("worldbody", [&](const RobotNode& s) { read_mjcf_bodies(file, s); });
-  if (file.total_mass > 0) scale_masses(scene, file.total_mass);
+  robot.scene.name = root.text("model", "robot");
+  robot.scene.timestep = 0.002;  // MuJoCo's
+  MjcfWhole whole{robot};
+  whole.free_base = free_base;
+  MjcfFile file(root, whole, nullptr);
+  read_mjcf_settings(file);
+  whole.models.push_back(&whole.scopes.emplace_back(MjcfScope{&file}));
+  read_mjcf_bodies(whole, *whole.models.front());
+  if (file.total_mass > 0) scale_masses(robot.scene, file.total_mass);
   std::vector<RobotNode> keyframes;
-  each("keyframe", [&](const RobotNode& s) { keyframes.push_back(s); });
-  const std::optional<RobotNode> key = find_mjcf_keyframe(file, keyframes, keyframe);
-  each("actuator", [&](const RobotNode& s) { read_mjcf_actuators(file, s); });
-  each("contact", [&](const RobotNode& s) {
-    for (const RobotNode& exclude :
-         s.parts({{"pair", Fate::lost,
-                   "a contact with coefficients of MuJoCo's; --contact A=B adds one"},
-                  {"exclude"}})) {
-      exclude.check({{"name", Fate::idle, kSight}, {"body1"}, {"body2"}});
-      file.robot.excluded.push_back({exclude.text("body1"), exclude.text("body2")});
-      exclude.idle("<exclude>: a scene has only the contacts that it names");
+  for (const RobotNode& s : file.sections)
+    if (s.name() == "keyframe") keyframes.push_back(s);
+  const std::optional<RobotNode> key = find_mjcf_keyframe(whole, keyframes, keyframe);
+  read_mjcf_actuators(whole);
+  for (const MjcfScope* model : whole.models)
+    for (const RobotNode& section : model->file->sections) {
+      if (section.name() != "contact") continue;
+      for (const RobotNode& exclude :
+           section.parts({{"pair", Fate::lost,
+                           "a contact with coefficients of MuJoCo's; --contact A=B adds one"},
+                          {"exclude"}}))
+        read_exclude(whole, model->model, exclude);
     }
-  });
-  if (key) read_mjcf_keyframe(file, *key);
+  if (key) read_mjcf_keyframe(whole, *key);
   file.take_warnings(root.context().warnings);
 }
 

@@ -141,8 +141,7 @@ std::map<std::string, Words> all_words() {
   all["general"].push_back({"ffrange", Fate::lost, "a force beside the control"});
   all["general"].push_back({"dynprm", Fate::idle, "for actuators with a state"});
   all["motor"] = actuator_words({});
-  all["position"] = actuator_words({"kp", "kv", "inheritrange"});
-  all["position"].push_back({"dampratio", Fate::zero, "chooses the damping from the inertia"});
+  all["position"] = actuator_words({"kp", "kv", "inheritrange", "dampratio"});
   all["position"].push_back({"timeconst", Fate::zero, "filters the control"});
   all["velocity"] = actuator_words({"kv"});
   return all;

@@ -20,7 +20,7 @@ void Remarks::add(const Source& at, const std::string& text) {
   const std::string key = at.file + ": " + text;
   std::vector<int>& lines = places_[key];
   if (lines.empty()) texts_.push_back(key);
-  if (lines.empty() || lines.back() != at.line) lines.push_back(at.line);
+  if (std::find(lines.begin(), lines.end(), at.line) == lines.end()) lines.push_back(at.line);
 }
 
 std::vector<std::string> Remarks::lines() const {

@@ -51,7 +51,7 @@ struct Robot {
   /// In SI. Every source is a line of the robot's file, so errors of a model name it. Its path is
   /// the file that the user names.
   Scene scene;
-  std::vector<std::shared_ptr<RobotFile>> included;  ///< files that <include> has brought in
+  std::vector<std::shared_ptr<RobotFile>> included;  ///< files that this one has brought in
   std::map<std::string, MeshFile> meshes;            ///< by body
   std::map<std::string, std::string> origins;  ///< by link: what of the file it was, for a comment
   std::set<std::string> pieces;  ///< links made for further shapes of the link that they hang on

@@ -121,7 +121,7 @@ void add_motors(Robot& robot, const std::vector<MotorRequest>& requests, const s
   }
 }
 
-/// The bodies of a link that have a shape.
+/// The bodies of a link that have a shape, but for those that touch nothing in the file.
 std::vector<std::string> shapes_of(const Robot& robot, const std::string& name,
                                    const std::string& what, const std::string& file) {
   std::vector<std::string> names, shapes;
@@ -131,15 +131,21 @@ std::vector<std::string> shapes_of(const Robot& robot, const std::string& name,
     throw InputError(
         fmt::format("{}: {} has no link '{}'{}", what, file, name, suggestion(name, names)));
   const auto index = static_cast<int>(link - names.begin());
+  const char* pictures = "";
   for (std::size_t k = 0; k < names.size(); ++k) {
     const LinkDescription& l = robot.scene.links[k];
     const bool piece = l.parent == index && robot.pieces.contains(l.name);
-    if ((static_cast<int>(k) == index || piece) &&
-        !std::holds_alternative<AbstractShape>(l.body.shape))
+    if ((static_cast<int>(k) != index && !piece) ||
+        std::holds_alternative<AbstractShape>(l.body.shape))
+      continue;
+    if (std::ranges::find(robot.untouched, l.body.name) == robot.untouched.end())
       shapes.push_back(l.body.name);
+    else
+      pictures = ": its geoms have contype and conaffinity 0";
   }
   if (shapes.empty())
-    throw InputError(fmt::format("{}: link '{}' has no shape to touch with", what, name));
+    throw InputError(
+        fmt::format("{}: link '{}' has no shape to touch with{}", what, name, pictures));
   return shapes;
 }
 

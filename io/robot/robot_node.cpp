@@ -32,22 +32,38 @@ const Word* word_in(const Words& words, std::string_view name) {
   return at == words.end() ? nullptr : &*at;
 }
 
-/// Reads the file that an <include> names and returns its root. The robot keeps it. MuJoCo takes a
-/// file once, from the folder of the file that the user names. So does this, and rings cannot be.
-/// Throws what reading and parsing a file throws, each with the line of the <include>.
+/// The root of the file that an <include> names. MuJoCo takes a file once in a model, from the
+/// folder of the model's file. So does this, and rings cannot be.
 RobotNode included_root(const RobotNode& include) {
   include.check({{"file"}});
   Robot& robot = include.robot();
-  const std::string& main = robot.scene.path;
-  const std::string path =
-      (fs::path(main).parent_path() / include.text("file")).lexically_normal().string();
-  bool known = same_file(path, main);
-  for (const auto& other : robot.included) known |= same_file(path, other->context.file);
+  SceneContext& model = include.context().outermost();
+  const std::string path = path_beside(include, include.text("file"));
+  bool known = same_file(path, model.file);
+  for (const auto& other : robot.included) {
+    if (other->element == &include.element())  // of copies
+      return {*other->document.RootElement(), other->context, robot};
+    known |= &other->context.outermost() == &model && same_file(path, other->context.file);
+  }
   if (known) include.fail(fmt::format("{} is there already; MuJoCo includes a file once", path));
+  return read_mjcf_root(include, path, &model);
+}
+
+}  // namespace
+
+std::string path_beside(const RobotNode& node, const std::string& name) {
+  const fs::path folder = fs::path(node.context().outermost().file).parent_path();
+  return (folder / name).lexically_normal().string();
+}
+
+RobotNode read_mjcf_root(const RobotNode& node, const std::string& path, SceneContext* includer) {
+  Robot& robot = node.robot();
   const auto file = std::make_shared<RobotFile>();
   robot.included.push_back(file);
+  file->element = &node.element();
   file->context.file = path;
-  file->context.allow_unknown = include.context().allow_unknown;
+  file->context.includer = includer;
+  file->context.allow_unknown = node.context().allow_unknown;
   try {
     const std::string text = read_text_file(path, kLargestInclude, "a MJCF file");
     const RobotNode root(
@@ -58,11 +74,9 @@ RobotNode included_root(const RobotNode& include) {
     root.check({{"model"}});
     return root;
   } catch (const IoError& e) {
-    throw IoError(include.source().prefix() + "<include>: " + e.what());
+    throw IoError(node.source().prefix() + "<" + node.name() + ">: " + e.what());
   }
 }
-
-}  // namespace
 
 bool RobotNode::given(const char* attribute) const {
   return element().Attribute(attribute) != nullptr;

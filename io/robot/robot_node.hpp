@@ -14,10 +14,12 @@
 
 namespace tangere {
 
-/// A file that an <include> has brought in. Its elements refer to both.
+/// A file that an <include>, or a <model> that is attached, has brought in. Its elements refer to
+/// the document and the context.
 struct RobotFile {
   tinyxml2::XMLDocument document;
   SceneContext context;
+  const tinyxml2::XMLElement* element = nullptr;  ///< which names the file
 };
 
 /// What becomes of an attribute or a child element.
@@ -67,5 +69,13 @@ class RobotNode : public SceneNode {
 
   Robot* robot_;
 };
+
+/// Reads the MJCF file that lies at `path` beside the file of the model in which `node` stands, and
+/// returns its root. The robot keeps the file. `includer`: the context of the model of which the
+/// file is a part; null: the file is a model. Throws what reading and parsing a file throws, each
+/// with the line of the node.
+RobotNode read_mjcf_root(const RobotNode& node, const std::string& path, SceneContext* includer);
+/// The path of a file that `name` gives beside the file of the model in which the node stands.
+std::string path_beside(const RobotNode& node, const std::string& name);
 
 }  // namespace tangere

@@ -84,7 +84,7 @@ void run_robot(const std::string& folder) {
 /// The robots of a format, with the files that they name beside them.
 auto robots(std::initializer_list<const char*> names) {
   return [names = std::vector<std::string>(names.begin(), names.end())](const std::string& folder) {
-    for (const char* beside : {"meshes", "part.xml"})
+    for (const char* beside : {"meshes", "part.xml", "models_part.xml"})
       fs::copy(std::string(kRobots) + beside, fs::path(folder) / beside,
                fs::copy_options::recursive);
     std::vector<std::string> corpus;
@@ -285,23 +285,24 @@ std::vector<Target> text_targets() {
                     static_cast<void>(mesh_points(read_surface(folder + "/" + file), 0.1, 10'000));
                   }};
   };
-  return {{"scene", false, "mutant", scenes, [=](const auto& f) { run_scene(in(f)); }},
-          {"urdf", false, "mutant", robots({"hand.urdf", "gripper.urdf"}), run_robot},
-          {"mjcf", false, "mutant",
-           robots({"machine.xml", "meshes.xml", "arm.xml", "including.xml"}), run_robot},
-          hostile("mjcf_includes", "mujoco", "<body name=\"x\"/>",
-                  robots({"including.xml", "machine.xml"}), run_robot),
-          hostile("scene_includes", "tangere", "<robot/>", scenes,
-                  [=](const auto& f) { run_scene(in(f)); }),
-          {"table", false, "mutant", tables,
-           [=](const auto& f) { static_cast<void>(read_csv(in(f), 3, names)); }},
-          surface("obj", meshes),
-          surface("stl", stl_files),
-          surface("ply", ply_files),
-          {"contact_points", false, "mutant", contact_points,
-           [=](const auto& f) { static_cast<void>(read_contact_points(in(f))); }},
-          {"layout", false, "mutant", layouts,
-           [=](const auto& f) { static_cast<void>(read_tactile_points(in(f))); }}};
+  return {
+      {"scene", false, "mutant", scenes, [=](const auto& f) { run_scene(in(f)); }},
+      {"urdf", false, "mutant", robots({"hand.urdf", "gripper.urdf"}), run_robot},
+      {"mjcf", false, "mutant",
+       robots({"machine.xml", "meshes.xml", "arm.xml", "including.xml", "models.xml"}), run_robot},
+      hostile("mjcf_includes", "mujoco", "<body name=\"x\"/>",
+              robots({"including.xml", "machine.xml"}), run_robot),
+      hostile("scene_includes", "tangere", "<robot/>", scenes,
+              [=](const auto& f) { run_scene(in(f)); }),
+      {"table", false, "mutant", tables,
+       [=](const auto& f) { static_cast<void>(read_csv(in(f), 3, names)); }},
+      surface("obj", meshes),
+      surface("stl", stl_files),
+      surface("ply", ply_files),
+      {"contact_points", false, "mutant", contact_points,
+       [=](const auto& f) { static_cast<void>(read_contact_points(in(f))); }},
+      {"layout", false, "mutant", layouts,
+       [=](const auto& f) { static_cast<void>(read_tactile_points(in(f))); }}};
 }
 
 }  // namespace tangere::fuzz

@@ -370,7 +370,7 @@ std::vector<Violation> check_own_headers(const Tree& tree) {
       {"io/robot/mjcf_actuators.cpp", "a part of mjcf_file.hpp"},
       {"io/robot/mjcf_keyframes.cpp", "a part of mjcf_file.hpp"},
       {"io/robot/mjcf_bodies.cpp", "a part of mjcf_file.hpp"},
-      {"io/robot/mjcf_keyframes.cpp", "a part of mjcf_file.hpp"},
+      {"io/robot/mjcf_models.cpp", "a part of mjcf_file.hpp"},
       {"io/scene/scene_bodies.cpp", "a part of scene_sections.hpp"},
       {"io/scene/scene_end_effectors.cpp", "a part of scene_sections.hpp"},
       {"io/scene/scene_joints.cpp", "a part of scene_sections.hpp"},

@@ -43,6 +43,7 @@ def relative(quat, other):
 
 def load(path, aligned=False):
     assets = {p.name: p.read_bytes() for p in (HERE / "meshes").iterdir()}
+    assets |= {p.name: p.read_bytes() for p in HERE.glob("*part.xml")}
     text = path.read_text().replace("package://robots/meshes/", "").replace('meshdir="meshes"', "")
     if not aligned:
         text = text.replace('align="true"', "").replace('alignfree="true"', "")
@@ -187,5 +188,5 @@ def write(path):
     (HERE / f"{path.stem}_reference.txt").write_text(text)
 
 
-for robot in ("hand.urdf", "machine.xml", "meshes.xml", "kinds.xml"):
+for robot in ("hand.urdf", "machine.xml", "meshes.xml", "kinds.xml", "models.xml"):
     write(HERE / robot)

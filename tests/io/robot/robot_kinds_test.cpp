@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // What import makes of robots that say things in less common ways: what it takes over, what it
 // lists, and what it refuses. tests/data/robots/kinds.xml compares the motion with MuJoCo's.
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 
@@ -127,10 +129,8 @@ TEST_F(RobotKinds, WordsThatChangeAForceAreNotIdle) {
     EXPECT_THAT(import(driven("<motor joint=\"j\" " + std::string(more) + "/>")).lost,
                 ElementsAre(HasSubstr("<motor> ")))
         << more;
-  for (const char* more : {"dampratio=\"1\"", "timeconst=\"0.1\""})
-    EXPECT_THAT(import(driven("<position joint=\"j\" " + std::string(more) + "/>")).lost,
-                ElementsAre(HasSubstr("<position> ")))
-        << more;
+  EXPECT_THAT(import(driven("<position joint=\"j\" timeconst=\"0.1\"/>")).lost,
+              ElementsAre(HasSubstr("<position> timeconst")));
   EXPECT_THAT(import(driven("<pid joint=\"j\" kp=\"1\"/>")).lost,
               ElementsAre(HasSubstr("<pid>: an actuator that scenes do not have")));
   const ImportedScene off = import(
@@ -149,6 +149,55 @@ TEST_F(RobotKinds, TargetsOfAKeyframeKeepToAnInheritedRange) {
     EXPECT_THAT(std::get<ConstantControl>(scene(driven(motor, ctrl), "k").control.value()).values,
                 ElementsAre(DoubleNear(target, 1e-15)));
   EXPECT_THAT(import(driven(motor)).changed, Contains(HasSubstr("targets of position motors")));
+}
+
+/// A pendulum has the inertia m (l² + 0.4 r²) and armature, whatever the gear. MuJoCo 4.0.0 gave kv
+/// of the chain, whose other joints are free.
+TEST_F(RobotKinds, ADampingRatioIsThatOfTheInertiaThatMoves) {
+  const auto damping = [&](const std::string& joint, const std::string& motor) {
+    return scene(
+               "<mujoco><compiler angle=\"radian\"/><worldbody>"
+               "<body name=\"a\" euler=\"0.3 0 0\"><joint name=\"a\" axis=\"0 1 0\" "
+               "armature=\"0.01\" ref=\"0.5\"/><geom size=\"0.05\" pos=\"0.1 0 0.2\"/>" +
+               joint + "</body></worldbody><actuator>" + motor + "</actuator></mujoco>")
+        .motors.at(0)
+        .D;
+  };
+  const double mass = 1000 * 4 * M_PI / 3 * std::pow(0.05, 3);
+  const double inertia = mass * (0.05 + 0.4 * 0.0025) + 0.01;
+  EXPECT_NEAR(damping("", "<position joint=\"a\" kp=\"3\" dampratio=\"0.7\"/>"),
+              1.4 * std::sqrt(3 * inertia), 1e-12);
+  EXPECT_NEAR(damping("", "<position joint=\"a\" kp=\"3\" dampratio=\"0.7\" gear=\"-2\"/>"),
+              1.4 * std::sqrt(12 * inertia), 1e-12);
+  EXPECT_NEAR(damping("",
+                      "<general joint=\"a\" biastype=\"affine\" gainprm=\"3\" "
+                      "biasprm=\"0 -3 0.7\"/>"),
+              1.4 * std::sqrt(3 * inertia), 1e-12);
+  const std::string chain =
+      "<body pos=\"0.3 0 0.1\"><joint name=\"b\" type=\"slide\" axis=\"1 0 0\"/>"
+      "<geom type=\"capsule\" size=\"0.03 0.1\" euler=\"0 1 0\"/><body pos=\"0 0 0.1\">"
+      "<joint name=\"c\" axis=\"0 0 1\"/><geom pos=\"0.1 0.1 0\" size=\"0.04\"/></body></body>";
+  for (const auto& [joint, gear, kv] : {std::tuple{"a", 1.0, 0.924723197554299},
+                                        {"b", 2.0, 1.055962746398851},
+                                        {"c", -2.0, 0.08355074914081963}})
+    EXPECT_NEAR(damping(chain, fmt::format("<position joint=\"{}\" kp=\"3\" dampratio=\"0.7\" "
+                                           "gear=\"{}\"/>",
+                                           joint, gear)) /
+                    (gear * gear),
+                kv, 1e-12)
+        << joint;
+  const std::string both = "<position joint=\"j\" kv=\"1\" dampratio=\"1\"/>";
+  EXPECT_THAT(fault_of(driven(both)), HasSubstr("both 'kv' and 'dampratio'"));
+  const auto with_class = [&](const std::string& given, const std::string& own) {
+    const std::string text = driven("<position joint=\"j\" " + own + "/>");
+    return scene("<mujoco><default><position " + given + "/></default>" + text.substr(8))
+        .motors.at(0)
+        .D;
+  };
+  EXPECT_EQ(with_class("dampratio=\"1\"", "kv=\"2\""), 2);
+  EXPECT_EQ(with_class("kv=\"2\"", "dampratio=\"1\""), with_class("dampratio=\"1\"", ""));
+  EXPECT_THAT(import(driven("<position joint=\"j\" dampratio=\"1\"/>")).changed,
+              Contains(AllOf(HasSubstr("dampratio"), HasSubstr("MuJoCo 4.0.0"))));
 }
 
 TEST_F(RobotKinds, AFreeJointHasNoLimitsOfItsClass) {
@@ -257,8 +306,8 @@ TEST_F(RobotKinds, APointerOfGitLfsIsNamed) {
 }
 
 /// A skin does not feel what the file keeps from touching its link: geoms without contact, and
-/// links of an <exclude>, with all their shapes.
-TEST_F(RobotKinds, SkinsIgnoreWhatTouchesNothing) {
+/// links of an <exclude>, with all their shapes. Contacts leave out geoms without contact.
+TEST_F(RobotKinds, GeomsThatTouchNothingHaveAMassAlone) {
   const std::string text =
       "<mujoco><worldbody><body name=\"palm\"><joint name=\"p\" type=\"slide\"/>"
       "<geom type=\"box\" size=\"0.02 0.02 0.02\"/>"
@@ -271,7 +320,8 @@ TEST_F(RobotKinds, SkinsIgnoreWhatTouchesNothing) {
       "<body name=\"cover\" pos=\"0 0 0.1\"><joint name=\"c\"/>"
       "<geom type=\"box\" size=\"0.01 0.01 0.01\" contype=\"0\" conaffinity=\"0\"/></body>"
       "<body name=\"finger\" pos=\"0 0 0.2\"><joint name=\"f\"/>"
-      "<geom type=\"box\" size=\"0.01 0.01 0.01\"/></body>"
+      "<geom type=\"box\" size=\"0.01 0.01 0.01\"/>"
+      "<geom type=\"box\" size=\"0.03 0.01 0.01\" contype=\"0\" conaffinity=\"0\"/></body>"
       "</body></worldbody><contact><exclude body1=\"thumb\" body2=\"tip\"/></contact></mujoco>";
   std::ofstream(folder_ / "robot.xml") << text;
   const std::string layout =
@@ -283,11 +333,23 @@ TEST_F(RobotKinds, SkinsIgnoreWhatTouchesNothing) {
   options.pads = {{"tip", "skin.xml", layout, {}, "+x"}};
   const ImportedScene made = import_robot(folder_ / "robot.xml", folder_ / "scene.xml", options);
   const Scene scene = parse_scene(made.text, folder_ / "scene.xml").scene;
-  EXPECT_THAT(scene.sensors.at(0).ignores, ElementsAre("cover", "thumb", "thumb_shape"));
+  EXPECT_THAT(scene.sensors.at(0).ignores,
+              ElementsAre("cover", "finger_shape", "thumb", "thumb_shape"));
   std::vector<std::string> felt;
   for (const int k : sensed_bodies(scene, scene.sensors[0]))
     felt.push_back(scene.links[std::size_t(k)].body.name);
   EXPECT_THAT(felt, ElementsAre("finger")) << "the palm is a neighbour";
+  EXPECT_NEAR(Model(scene).mass(6), 8 * 3000 * 1e-6, 1e-12) << "a picture has a mass";
+  const auto touched = [&](const std::string& link) {
+    options.touches = {{"tip", link}};
+    return parse_scene(import_robot(folder_ / "robot.xml", folder_ / "scene.xml", options).text,
+                       folder_ / "scene.xml")
+        .scene.pair_contacts.size();
+  };
+  EXPECT_EQ(touched("finger"), 2U) << "one pair of surfaces, with the points of both";
+  EXPECT_THAT([&] { touched("cover"); },
+              ::testing::ThrowsMessage<InputError>(
+                  HasSubstr("no shape to touch with: its geoms have contype and conaffinity 0")));
 }
 
 }  // namespace

@@ -66,6 +66,15 @@ double largest_error(Scene scene, const Table& truth) {
   return worst;
 }
 
+/// <replicate>, and <attach> of a body of another file in a frame.
+TEST(RobotMotion, CopiesMoveWhereMujocoPutsThem) {
+  const ImportedScene made = import_robot(kFolder + "copies.xml", "scene.xml", {});
+  EXPECT_THAT(made.lost, IsEmpty());
+  EXPECT_LT(
+      largest_error(parse_scene(made.text, "scene.xml").scene, read_table(kFolder + "copies.csv")),
+      5e-5);
+}
+
 /// Moments that no solid has, and a point of mass on a fixed joint.
 TEST(RobotMotion, OddInertiasMoveAsTheyAreWritten) {
   const ImportedScene made = import_robot(kFolder + "odd_inertia.urdf", "scene.xml", {});

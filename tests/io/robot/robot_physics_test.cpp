@@ -215,6 +215,12 @@ TEST(RobotPhysics, OtherKindsOfMjcfMoveAsInMujoco) {
   options.keyframe = "thrown";
   compare("kinds.xml", "kinds_reference.txt", options);
 }
+TEST(RobotPhysics, CopiesAndAttachedModelsMoveAsInMujoco) {
+  RobotOptions options;
+  options.keyframe = "set";
+  options.end_effectors = {"mark-0", "mark-2"};
+  compare("models.xml", "models_reference.txt", options);
+}
 
 }  // namespace
 }  // namespace tangere
