@@ -169,7 +169,7 @@ void write_gel(const Folder& folder) {
   std::string gel = folder.read(scene("sensors/gelsight_mini_measured.xml"));
   const std::string springs = " kn=\"3.13e8\"/>";
   ASSERT_THAT(gel, HasSubstr(springs));
-  gel.replace(gel.find(springs), springs.size(), "><layer margin=\"1.5e-3\"/></tactile>");
+  gel.replace(gel.find(springs), springs.size(), "><layer margin=\"3.2e-3\"/></tactile>");
   folder.write("gel.xml", gel);
 }
 
@@ -184,8 +184,8 @@ TEST(Calibrate, TwoPressesOfAGelPredictTwoOthers) {
     folder.write("press.csv", text);
     const json answer = run_json(folder, {"calibrate", "press.csv", "--sensor", "gel.xml", "--ball",
                                           "0.0075", "--hold-out", "2"});
-    EXPECT_LE(answer["normal_held_out"]["largest_by_row"], 0.05) << text;
-    EXPECT_NEAR(number(answer, "modulus")["value"], 4.28e5, 0.06 * 4.28e5);
+    EXPECT_LE(answer["normal_held_out"]["largest_by_row"], 0.04) << text;
+    EXPECT_NEAR(number(answer, "modulus")["value"], 4.28e5, 0.08 * 4.28e5);
   }
 }
 
