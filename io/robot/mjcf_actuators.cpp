@@ -298,7 +298,9 @@ void add_drives(const MjcfWhole& whole, const MjcfScope& model, const RobotNode&
                             : whole.joint_names.copies.end();
     if (copies != whole.joint_names.copies.end())
       for (const MjcfCopy& copy : copies->second) out.push_back({node, copy.scope, copy.name});
-    else if (model.model > 0 && node.has(attribute))
+    else if (model.outer != nullptr && model.outer->file == model.file)
+      continue;  // not in the part of the file that is attached again
+    else if (model.outer != nullptr && node.has(attribute))
       node.idle("<" + node.name() + "> of a part of a model that is not attached");
     else
       out.push_back({node, &model, ""});

@@ -178,7 +178,7 @@ struct MjcfReplica {
 };
 /// The copies of a <replicate>.
 std::vector<MjcfReplica> replicas(MjcfWhole& whole, const RobotNode& node, const MjcfScope& scope);
-/// The scope of the model that an <attach> names.
+/// The scope of the model that an <attach> names, or else of the same file.
 const MjcfScope& attached_scope(MjcfWhole& whole, const RobotNode& node, const MjcfScope& outer);
 
 /// Reads all bodies of the file that the user names.

@@ -14,10 +14,25 @@ namespace {
 
 constexpr int kMostScopes = 10000;  // copies and attached models of a file
 
+/// A part of names, which may be empty.
+std::string affix(const RobotNode& node, const char* attribute) {
+  const char* const text = node.element().Attribute(attribute);
+  return text == nullptr ? "" : text;
+}
+
 const MjcfScope& add_scope(MjcfWhole& whole, const RobotNode& node, MjcfScope scope) {
   if (whole.scopes.size() >= kMostScopes)
     node.fail(fmt::format("more than {} copies and attached models", kMostScopes));
   return whole.scopes.emplace_back(std::move(scope));
+}
+
+MjcfFile& model_named(const MjcfFile& file, const RobotNode& attach) {
+  const std::string name = attach.text("model");
+  const auto found = file.models.find(name);
+  if (found != file.models.end()) return *found->second;
+  std::vector<std::string> all;
+  for (const auto& [known, model] : file.models) all.push_back(known);
+  attach.fail(fmt::format("model=\"{}\": no <model> has this name{}", name, suggestion(name, all)));
 }
 
 }  // namespace
@@ -52,9 +67,14 @@ std::vector<int> MjcfWhole::order(const MjcfScope& scope) const {
 }
 
 std::vector<MjcfReplica> replicas(MjcfWhole& whole, const RobotNode& node, const MjcfScope& scope) {
-  node.check({{"count"}, {"sep"}, {"offset"}, {"euler"}, {"childclass"}});
+  node.check({{"count"},
+              {"sep"},
+              {"offset"},
+              {"euler"},
+              {"childclass"},
+              {"prefix", Fate::idle, "MuJoCo does not read it"}});
   const int count = node.integer("count", 0, kMostScopes);
-  const std::string separator = node.text("sep", "");
+  const std::string separator = affix(node, "sep");
   const Vector3 offset = node.vector("offset", Vector3{0, 0, 0}),
                 euler = node.vector("euler", Vector3{0, 0, 0});
   const std::size_t digits = fmt::format("{}", count).size();
@@ -89,16 +109,12 @@ void read_mjcf_model(MjcfFile& file, const RobotNode& asset) {
 const MjcfScope& attached_scope(MjcfWhole& whole, const RobotNode& node, const MjcfScope& outer) {
   node.check({{"model"}, {"body"}, {"frame"}, {"prefix"}});
   if (node.has("body") && node.has("frame")) node.fail("both 'body' and 'frame'; expected one");
-  const std::string name = node.text("model");
-  const auto found = outer.file->models.find(name);
-  if (found == outer.file->models.end()) {
-    std::vector<std::string> all;
-    for (const auto& [known, model] : outer.file->models) all.push_back(known);
-    node.fail(fmt::format("model=\"{}\": no <model> has this name{}", name, suggestion(name, all)));
-  }
-  MjcfScope scope{found->second.get()};
+  if (!node.has("body") && !node.has("frame") && !node.has("model"))
+    node.fail("none of 'model', 'body' and 'frame'; expected one");
+  MjcfScope scope{node.has("model") ? &model_named(*outer.file, node) : outer.file};
   scope.model = static_cast<int>(whole.models.size());
-  scope.prefix = node.text("prefix");
+  if (!node.given("prefix")) node.fail("attribute 'prefix' is missing; \"\" is none");
+  scope.prefix = affix(node, "prefix");
   scope.outer = &outer;
   scope.copies = outer.copies;
   scope.copies.insert(scope.copies.end(), {static_cast<int>(whole.scopes.size()), 0});

@@ -75,7 +75,7 @@ class Gathering {
   /// the frames around the body or the frame.
   void attach(const MjcfPart& place, int depth) {
     const MjcfScope& scope = attached_scope(whole_, place.node, *place.scope);
-    const bool whole = !place.node.has("body") && !place.node.has("frame");
+    const bool whole = place.node.text("body", "world") == "world" && !place.node.has("frame");
     std::vector<std::string> names;
     for (const RobotNode& section : scope.file->sections) {
       if (section.name() != "worldbody") continue;
@@ -93,8 +93,10 @@ class Gathering {
     if (whole) return;
     const char* const kind = place.node.has("body") ? "body" : "frame";
     const std::string name = place.node.text(kind);
-    place.node.fail(fmt::format("{}=\"{}\": no {} of model '{}' has this name{}", kind, name, kind,
-                                place.node.text("model"), suggestion(name, names)));
+    const std::string model =
+        place.node.has("model") ? fmt::format("model '{}'", place.node.text("model")) : "this file";
+    place.node.fail(fmt::format("{}=\"{}\": no {} of {} has this name{}", kind, name, kind, model,
+                                suggestion(name, names)));
   }
 
   /// Finds the body or the frame that an <attach> names, and keeps the names of the others.

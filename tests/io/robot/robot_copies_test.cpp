@@ -99,6 +99,21 @@ TEST_F(RobotCopies, ExcludesAreThereForEachCopy) {
       ElementsAre("bk1", "bz"));
 }
 
+/// An <attach> without a model is of the same file.
+TEST_F(RobotCopies, APartOfTheFileIsAttachedAgain) {
+  EXPECT_THAT(
+      joints(world(
+          body("o") + copies("count=\"2\"", "<attach body=\"bo\" prefix=\"q_\"/>") + body("z"),
+          "<actuator><motor joint=\"o\"/><motor joint=\"z\"/></actuator>")),
+      ElementsAre("o", "q_o0", "q_o1", "z", "motor o", "motor z", "motor q_o0", "motor q_o1"));
+  EXPECT_THAT(fault_of(world(body("o", "<attach body=\"bo\" prefix=\"q_\"/>"))),
+              HasSubstr("<body>: bodies nested deeper than 90"));
+  EXPECT_THAT(fault_of(world(body("o") + "<attach body=\"bp\" prefix=\"q_\"/>")),
+              HasSubstr("<attach>: body=\"bp\": no body of this file has this name"));
+  EXPECT_THAT(fault_of(world(body("o") + "<attach prefix=\"q_\"/>")),
+              HasSubstr("<attach>: none of 'model', 'body' and 'frame'"));
+}
+
 TEST_F(RobotCopies, MistakesInCopiesNameTheLine) {
   EXPECT_THAT(fault_of(world(copies("", body("j")))), HasSubstr(":2: <replicate>: "));
   EXPECT_THAT(fault_of(world(copies("count=\"-1\"", body("j")))), HasSubstr(":2: <replicate>: "));
@@ -146,6 +161,8 @@ TEST_F(RobotAttached, APrefixStandsBeforeAllNames) {
   EXPECT_THAT(
       joints(whole(attach("prefix=\"a_\"") + attach("body=\"bk\" prefix=\"c_\""))),
       ElementsAre("a_j", "a_k", "a_o", "a_mj", "c_k", "motor a_o", "motor a_k", "motor c_k"));
+  EXPECT_THAT(joints(whole(attach("body=\"world\" prefix=\"\""))),
+              ElementsAre("j", "k", "o", "mj", "motor o", "motor k"));
 }
 
 TEST_F(RobotAttached, APartKeepsItsSettingsAndFolder) {
@@ -177,7 +194,8 @@ TEST_F(RobotAttached, MistakesNameTheLine) {
                         "did you mean 'bj'"));
   EXPECT_THAT(fault_of(whole("<attach model=\"q\" prefix=\"a\"/>")),
               HasSubstr(":2: <attach>: model=\"q\": no <model> has this name; did you mean 'p'"));
-  EXPECT_THAT(fault_of(whole(attach("body=\"bj\""))), HasSubstr(":2: <attach>: "));
+  EXPECT_THAT(fault_of(whole(attach("body=\"bj\""))),
+              HasSubstr(":2: <attach>: attribute 'prefix' is missing"));
   EXPECT_THAT(fault_of(whole(attach("prefix=\"a\"") + attach("prefix=\"a\""))),
               HasSubstr("body name 'abj' is used twice"));
   write("parts/part.xml",
