@@ -81,9 +81,8 @@ EXPERIMENTS = [
                "cap, blind, imitates 3/10", "59.7 %", first_seed=5),
     Experiment("ppo-cap", "ppo.py cap_opening", 5, 300,
                "cap, touch, imitates 4/5", "87.3 %", first_seed=5),
-    *(Experiment(f"skin-{name}-{skin}", f"ppo.py {task} --skin {skin} {OTHER_SKINS[skin]}", 3,
-                 seconds, f"{task}, {skin}")
-      for name, task, seconds in (("grasp", "stable_grasp", 60), ("insertion", "insertion", 150))
+    *(Experiment(f"skin-{skin}", f"ppo.py stable_grasp --skin {skin} {OTHER_SKINS[skin]}", 3, 60,
+                 f"stable grasp, {skin}")
       for skin in ("springs", "layer")),
     Experiment("bc-push", CLONED, 3, 450, "box pushing, goal and touch, visits",
                data=f"pushes {PUSHES}", first_seed=5),

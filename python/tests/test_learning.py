@@ -110,9 +110,15 @@ def test_every_skin_is_one_of_every_task_with_pads():
     from skins import SKINS, skin_scene
 
     for task in ("stable_grasp", "insertion"):
+        found = {}
         for skin in SKINS:
-            env = tangere.make_vec(task, 1, threads=1, scene=skin_scene(task, skin))
-            assert len(env.model.sensors) == 2
+            batch = tangere.Batch(tangere.Model(skin_scene(task, skin)), 4, seed=1, threads=1)
+            run = batch.run(batch.scene_controls(150), every=10, fields=["left_pad.ideal"])
+            force = np.abs(run.fields["left_pad.ideal"]).sum((2, 3)).max(0)  # (E, 3)
+            found[skin] = np.stack([force[:, :2].sum(1), force[:, 2]])
+        assert found["springs"].min() > 0.01
+        for skin in SKINS:  # all of them feel the grip
+            assert np.all(np.abs(np.log(found[skin] / found["springs"])) < np.log(2)), (task, skin)
 
 
 def test_images_have_one_size():
