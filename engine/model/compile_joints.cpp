@@ -285,12 +285,14 @@ bool turns_inertia(const CompiledModel& m, const kernels::Link& link, const Comp
   constexpr double kRounding = 1e-13;  // relative
   const Mat3<double>& I = of.inertia;
   const double least = kRounding * (I.m[0][0] + I.m[1][1] + I.m[2][2]);
+  const auto armature = [&](int k) {
+    return m.dof_effects[std::size_t(link.v + k)].armature.value - least;
+  };
   if (link.kind == kernels::JointKind::revolute)
-    return dot(link.axis, I * link.axis) > least ||
-           m.dof_effects[std::size_t(link.v)].armature.value > 0;
+    return dot(link.axis, I * link.axis) + armature(0) > 0;
   return link.kind != kernels::JointKind::spherical ||
-         is_inertia({I.m[0][0] - least, I.m[0][1], I.m[0][2], I.m[1][1] - least, I.m[1][2],
-                     I.m[2][2] - least});
+         is_inertia({I.m[0][0] + armature(0), I.m[0][1], I.m[0][2], I.m[1][1] + armature(1),
+                     I.m[1][2], I.m[2][2] + armature(2)});
 }
 
 }  // namespace
@@ -306,11 +308,13 @@ void check_masses(const CompiledModel& m) {
     for (int k = 0; k < joint.link_count; ++k) {
       const auto link = std::size_t(joint.first_link + k);
       if (!(carried[link].mass > 0))
-        fail(i, "moves nothing that has mass; expected a body with mass on it or on a joint that "
-                "it carries");
+        fail(i,
+             "moves nothing that has mass; expected a body with mass on it or on a joint that "
+             "it carries");
       if (!turns_inertia(m, m.links[link], carried[link]))
-        fail(i, "turns points of mass alone, about themselves; expected a body with an inertia on "
-                "it or on a joint that it carries");
+        fail(i,
+             "turns points of mass alone, about themselves where joints are at rest; expected a "
+             "body with an inertia on it or on a joint that it carries");
     }
   }
 }

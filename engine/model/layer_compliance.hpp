@@ -18,7 +18,8 @@
 //
 // At a free side of the layer the stress across it vanishes. Cells have images behind the sides,
 // mirrored and with the opposite sign: behind a side across axis 0, (q_0, q_1, q_2) becomes
-// (q_0, -q_1, -q_2).
+// (q_0, -q_1, -q_2). So the normal stress across the side vanishes, which an incompressible gel
+// sees from afar; its shear stresses do not, and the side keeps its height.
 #pragma once
 
 #include <array>

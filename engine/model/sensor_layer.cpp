@@ -22,6 +22,8 @@ constexpr double kLeastCell = 0.75;     // of the points' distance
 constexpr double kMostPitch = 1.0 / 3;  // of the points, by the thickness
 constexpr double kRounding = 1e-9;      // relative, of a pitch
 constexpr double kThickest = 4;         // thickness by the pad's longer side
+constexpr double kLeastWidth = 0.5;     // of a gel with sides, by the thickness
+constexpr double kMostSurface = 256e6;  // of the surface's compliance [bytes]
 constexpr double kMostMargin = 6;       // by the thickness; sides farther away have no effect
 
 [[noreturn]] void fail(const TactileDescription& d, const std::string& message) {
@@ -53,6 +55,18 @@ int cell_side(const TactileDescription& d, double pitch) {
     fail(d, fmt::format("cells of {:.3g} m; expected at most the pad's shorter side, {:.3g} m",
                         size, least * pitch));
   return std::max(1, static_cast<int>(std::lround(size / pitch)));
+}
+
+/// Refuses free sides that are so near to each other that images of images would count: the
+/// compliance would not be positive definite.
+void check_sides(const TactileDescription& d, const LayerGrid& grid) {
+  if (!grid.margin) return;
+  const double least = std::min(grid.height * grid.rows, grid.width * grid.cols) + 2 * *grid.margin;
+  if (!(least >= kLeastWidth * grid.thickness))
+    fail(d, fmt::format(
+                "free sides {:.3g} m apart; expected at least half the thickness, {:.3g} m, or "
+                "no margin",
+                least, kLeastWidth * grid.thickness));
 }
 
 std::optional<double> margin_of(const TactileDescription& d) {
@@ -103,6 +117,7 @@ std::shared_ptr<const CompiledLayer> compile_sensor_layer(const TactileDescripti
   if (layer->grid.cells() > kMostLayerCells)
     fail(d, fmt::format("{} × {} cells; expected at most {} of them: a larger cell",
                         layer->grid.rows, layer->grid.cols, kMostLayerCells));
+  check_sides(d, layer->grid);
   for (int i = 0; i < sensor.points(); ++i)
     layer->cell_of_point.push_back(i / sensor.cols / layer->side * layer->grid.cols +
                                    i % sensor.cols / layer->side);
@@ -116,7 +131,14 @@ std::shared_ptr<const CompiledLayer> compile_sensor_layer(const TactileDescripti
   layer->deepest = t;
   layer->outward = pressure_sign;
   for (std::size_t k = 0; k < 2; ++k) layer->direction[k] = pitches(d.array)[k] < 0 ? -1 : 1;
-  if (d.markers) layer->surface.emplace(layer->grid);
+  if (d.markers) {
+    if (const double bytes = SurfaceCompliance::bytes(layer->grid); !(bytes <= kMostSurface))
+      fail(d, fmt::format(
+                  "the surface of {} × {} cells takes {:.0f} MB; expected at most {:.0f}: larger "
+                  "cells, or the longer side along the rows",
+                  layer->grid.rows, layer->grid.cols, bytes / 1e6, kMostSurface / 1e6));
+    layer->surface.emplace(layer->grid);
+  }
   return layer;
 }
 

@@ -37,9 +37,19 @@ std::vector<double> folded_table(const LayerGrid& grid, int a, int b, int rows,
 
 }  // namespace
 
+/// Offsets along axis 0.
+static int offset_rows(const LayerGrid& grid) {
+  const std::optional<int> below = doubled_margins(grid)[0];
+  return below ? 2 * grid.rows + *below : grid.rows;
+}
+
+double SurfaceCompliance::bytes(const LayerGrid& grid) {
+  return 9.0 * sizeof(double) * offset_rows(grid) * grid.cols * grid.cols;
+}
+
 SurfaceCompliance::SurfaceCompliance(const LayerGrid& grid)
     : rows_(grid.rows), cols_(grid.cols), below_(doubled_margins(grid)[0]) {
-  const int rows = below_ ? 2 * rows_ + *below_ : rows_;
+  const int rows = offset_rows(grid);
   for (int a = 0; a < 3; ++a)
     for (int b = 0; b < 3; ++b)
       tables_[std::size_t(a)][std::size_t(b)] =

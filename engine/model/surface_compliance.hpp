@@ -15,6 +15,8 @@ namespace tangere {
 class SurfaceCompliance {
  public:
   explicit SurfaceCompliance(const LayerGrid& grid);
+  /// Memory that it would take [bytes].
+  static double bytes(const LayerGrid& grid);
 
   /// Computes displacements u = C q, (3, cells) [m], from tractions q, (3, cells) [Pa].
   void displace(std::span<const double> traction, std::span<double> displacement) const;

@@ -117,10 +117,11 @@ void GelLayer::solve_system() {
 
 /// Returns P of one cell where all others stay as they are: the root of
 /// k Σ max(0, δ - others - C' P)/m² - P, which falls with P.
-double GelLayer::relaxed(int i) const {
+double GelLayer::relaxed(int i) {
   const auto at = static_cast<std::size_t>(i);
   const double own = coupling(i, i), others = yield_[at] - own * load_[at];
-  std::vector<double> free;
+  std::vector<double>& free = rhs_;  // depths that the others leave
+  free.clear();
   for (const int s : touching_)
     if (cell(s) == at) free.push_back(depth_[static_cast<std::size_t>(s)] - others);
   const auto excess = [&](double p) {

@@ -49,7 +49,7 @@ class GelLayer {
               const std::vector<int>& to, std::vector<double>& out) const;
   void relax();
   void share_loads();
-  [[nodiscard]] double relaxed(int cell) const;
+  [[nodiscard]] double relaxed(int cell);
   [[nodiscard]] double coupling(int i, int j) const;
   [[nodiscard]] double between_cells(int point) const;
   [[nodiscard]] std::size_t cell(int point) const;

@@ -13,7 +13,7 @@
 namespace tangere {
 
 /// Reads any batch of its model, and owns the scratch of one thread. Only the constructor
-/// allocates.
+/// allocates; displacements of markers and surfaces have scratch of each thread besides.
 ///
 /// Tactile fields are in [N]: f·axis0, f·axis1, -f·(axis0 × axis1), where f is the force on the
 /// sensor's body. They are exactly zero where nothing touches, unless the sensor is imperfect:

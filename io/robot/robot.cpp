@@ -150,8 +150,8 @@ std::optional<RobotPiece> inertial_piece(Robot& robot, double mass, std::array<d
   } else if (!is_solid_inertia(inertia)) {
     robot.changed.add(source,
                       origin +
-                          ": no solid has this inertia (a principal moment is above the sum "
-                          "of the others); it is taken as it is");
+                          ": no solid has this inertia (a principal moment is not below the "
+                          "sum of the others); it is taken as it is");
   }
   RobotPiece piece;
   piece.shape = AbstractShape{mass, inertia, {}};

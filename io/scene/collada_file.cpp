@@ -23,9 +23,10 @@ namespace {
 using tinyxml2::XMLElement;
 
 constexpr std::size_t kMostBytes = std::size_t{256} << 20U;
-constexpr std::size_t kMostTriangles = 10'000'000;
-constexpr int kDeepest = 100;     // of nodes in nodes
-constexpr double kLargest = 1e6;  // of a position, as of other surface files
+constexpr std::size_t kMostTriangles = 10'000'000, kMostPositions = 10'000'000;
+constexpr int kMostNodes = 100'000;  // that the scene visits
+constexpr int kDeepest = 100;        // of nodes in nodes
+constexpr double kLargest = 1e6;     // of a position, as of other surface files
 
 /// An affine map x → A x + b, rows of (A b).
 using Affine = std::array<double, 12>;
@@ -138,14 +139,16 @@ class ColladaFile {
   template <class T>
   std::vector<T> numbers(const XMLElement& of) const {
     std::vector<T> out;
-    const char* const text = of.GetText();
-    if (text == nullptr) return out;
+    std::string text;  // comments may stand between its parts
+    for (const tinyxml2::XMLNode* n = of.FirstChild(); n != nullptr; n = n->NextSibling())
+      if (n->ToText() != nullptr) text += std::string(n->Value()) + " ";
     const std::string_view all(text);
     for (std::size_t k = 0; k < all.size();) {
       k = all.find_first_not_of(" \t\r\n", k);
       if (k == std::string_view::npos) break;
       const std::size_t end = std::min(all.find_first_of(" \t\r\n", k), all.size());
       T x{};
+      if (all[k] == '+') ++k;
       const auto [at, error] = std::from_chars(all.data() + k, all.data() + end, x);
       if (error != std::errc() || at != all.data() + end || !(std::abs(double(x)) <= 1e9))
         fail(of, fmt::format("<{}> has '{}'; expected numbers of at most 1e9", of.Name(),
@@ -188,6 +191,7 @@ class ColladaFile {
 
   /// Adds what a node, or a scene of nodes, has.
   void add_nodes(const XMLElement& in, const Affine& placed, int depth) {
+    if (++nodes_ > kMostNodes) fail(in, fmt::format("more than {} nodes", kMostNodes));
     if (depth > kDeepest) fail(in, fmt::format("nodes nested deeper than {}", kDeepest));
     Affine map = placed;
     for (const XMLElement* e = in.FirstChildElement(); e != nullptr; e = e->NextSiblingElement()) {
@@ -233,9 +237,11 @@ class ColladaFile {
         out.stride = accessor->UnsignedAttribute("stride", 1);
         out.offset = accessor->UnsignedAttribute("offset", 0);
       }
-    if (out.stride < 3 || out.offset > out.numbers.size())
-      fail(source, fmt::format("positions {} numbers apart from number {}; expected x y z of each",
-                               out.stride, out.offset));
+    if (out.stride < 3 || out.offset + 3 > out.numbers.size())
+      fail(source,
+           fmt::format("{} numbers of positions, {} apart from number {} on; expected x y z of "
+                       "each",
+                       out.numbers.size(), out.stride, out.offset));
     return out;
   }
 
@@ -251,6 +257,8 @@ class ColladaFile {
         if (!(std::abs(c) <= kLargest))
           fail(vertices, fmt::format("a position of {:g} m; expected at most {:g}", c, kLargest));
       mesh_.positions.push_back(placed);
+      if (mesh_.positions.size() > kMostPositions)
+        fail(vertices, fmt::format("more than {} positions", kMostPositions));
     }
     return {at->second, from.count()};
   }
@@ -329,6 +337,7 @@ class ColladaFile {
   const XMLElement* root_ = nullptr;
   std::map<std::string, const XMLElement*, std::less<>> ids_;
   RawMesh mesh_;
+  int nodes_ = 0;
 };
 
 }  // namespace

@@ -61,7 +61,7 @@ bool is_exempt(void* caller) {
 
 int find_exempt(dl_phdr_info* library, std::size_t, void*) {
   for (Exempt& e : exempt) {
-    if (std::strstr(library->dlpi_name, e.library) == nullptr) continue;
+    if (e.begin != 0 || std::strstr(library->dlpi_name, e.library) == nullptr) continue;
     for (int i = 0; i < library->dlpi_phnum; ++i) {
       const ElfW(Phdr)& segment = library->dlpi_phdr[i];
       if (segment.p_type != PT_LOAD || (segment.p_flags & PF_X) == 0) continue;

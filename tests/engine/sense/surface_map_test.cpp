@@ -19,8 +19,12 @@ using ::testing::HasSubstr;
 using Numbers = std::vector<double>;
 constexpr int kRows = 12, kCols = 10;
 
-/// A ball that presses and slides on a gel, off its middle. `flipped`: rows count against axis0.
-Scene pressed_gel(bool flipped = false) {
+/// How the points of a gel are counted: along its axes, rows or columns against them, or with axis1
+/// turned round, so that axis0 × axis1 points into the gel.
+enum class Count { along, rows_against, cols_against, turned };
+
+/// A ball that presses and slides on a gel, off its middle.
+Scene pressed_gel(Count count = Count::along) {
   Scene s;
   s.gravity = {0, 0, 0};
   s.links = {testing::link("plate", JointType::fixed, {0, 0, -0.005},
@@ -33,7 +37,9 @@ Scene pressed_gel(bool flipped = false) {
   t.source = {"gel.xml", 9};
   t.array = {
       {-0.0055, -0.0045, 0.005}, {0.0055, 0.0045, 0.005}, {1, 0, 0}, {0, 1, 0}, kRows, kCols};
-  if (flipped) std::swap(t.array.corner0[0], t.array.corner1[0]);
+  const std::size_t swapped = count == Count::rows_against ? 0 : 1;
+  if (count != Count::along) std::swap(t.array.corner0[swapped], t.array.corner1[swapped]);
+  if (count == Count::turned) t.array.axis1 = {0, -1, 0};
   t.material = SkinMaterial{0.4e6, 4e-3, 0};
   t.layer = LayerDescription{0.475, 1e-3, 1e-3, {}};
   t.coefficients = {40, 20, 0.8, 0};
@@ -67,13 +73,22 @@ TEST(SurfaceMap, GoesDownBeneathABodyAndUpBesideIt) {
   EXPECT_GT(at(u, 6, 4, 1), at(u, 6, 4, 0));
 }
 
-TEST(SurfaceMap, DoesNotDependOnTheWayRowsAreCounted) {
-  const Numbers u = read(Model(pressed_gel()), FieldForm::surface),
-                v = read(Model(pressed_gel(true)), FieldForm::surface);
-  for (int i = 0; i < kRows; ++i)
-    for (int k = 0; k < 3 * kCols; ++k)
-      EXPECT_NEAR(u[std::size_t(3 * kCols * i + k)],
-                  v[std::size_t(3 * kCols * (kRows - 1 - i) + k)], 1e-12);
+TEST(SurfaceMap, DoesNotDependOnTheWayPointsAreCounted) {
+  const Numbers u = read(Model(pressed_gel()), FieldForm::surface);
+  for (const Count count : {Count::rows_against, Count::cols_against, Count::turned}) {
+    const Model model(pressed_gel(count));
+    EXPECT_EQ(model.sensors()[0].pressure_sign, count == Count::turned ? -1 : 1);
+    const Numbers v = read(model, FieldForm::surface);
+    for (int i = 0; i < kRows; ++i)
+      for (int j = 0; j < kCols; ++j)
+        for (int axis = 0; axis < 3; ++axis) {
+          const int row = count == Count::rows_against ? kRows - 1 - i : i,
+                    col = count == Count::rows_against ? j : kCols - 1 - j;
+          const double sign = count == Count::turned && axis == 1 ? -1 : 1;
+          EXPECT_NEAR(u[std::size_t(3 * (kCols * i + j) + axis)],
+                      sign * v[std::size_t(3 * (kCols * row + col) + axis)], 1e-12);
+        }
+  }
 }
 
 TEST(SurfaceMap, MarkersMoveAlong) {
@@ -131,6 +146,11 @@ TEST(SurfaceMap, WhatCannotBeIsRefusedWithItsLine) {
   drawn.distribution = {Distribution::Kind::uniform, 30, 50, {}};
   s.randomizations.push_back(drawn);
   refused(s, "gel.xml:10: markers of 'gel': its kn varies");
+  s = pressed_gel();
+  s.sensors[0].material->thickness = 0.04;
+  s.sensors[0].layer->source = {"gel.xml", 11};
+  s.sensors[0].layer->cell = 1e-3;
+  refused(s, "gel.xml:11: <layer> of 'gel': free sides 0.012 m apart; expected at least half");
 }
 
 }  // namespace

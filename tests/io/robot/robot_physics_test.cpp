@@ -23,13 +23,13 @@ namespace {
 
 using Dense = testing::DenseDynamics<double>;
 using Vector = Eigen::VectorXd;
-using Numbers = std::vector<double>;
+using Doubles = std::vector<double>;
 const std::string kRobots = TANGERE_TEST_DATA "/robots/";
 constexpr double kClose = 1e-9;
 
 struct ReferenceState {
-  std::map<std::string, Numbers> q, v, u, bias, acceleration;  // by joint
-  std::map<std::string, Numbers> pose, site;                   // by body, by site
+  std::map<std::string, Doubles> q, v, u, bias, acceleration;  // by joint
+  std::map<std::string, Doubles> pose, site;                   // by body, by site
 };
 struct RobotReference {
   std::map<std::string, double> mass;
@@ -44,7 +44,7 @@ RobotReference read_reference(const std::string& path) {
     std::string kind, name;
     words >> kind >> name;
     if (kind.empty() || kind == "#") continue;
-    Numbers numbers;
+    Doubles numbers;
     for (double x = 0; words >> x;) numbers.push_back(x);
     if (kind == "mass") {
       out.mass[name] = numbers.at(0);
@@ -65,9 +65,9 @@ RobotReference read_reference(const std::string& path) {
 }
 
 /// Puts the numbers of each joint where the scene has them.
-Vector in_order(const Scene& scene, const std::map<std::string, Numbers>& by_joint,
+Vector in_order(const Scene& scene, const std::map<std::string, Doubles>& by_joint,
                 int (*count)(JointType)) {
-  Numbers all;
+  Doubles all;
   for (const LinkDescription& link : scene.links) {
     const int n = count(link.joint.type);
     if (n == 0) continue;
@@ -177,7 +177,7 @@ void compare(const std::string& robot, const std::string& name, const RobotOptio
     expect_close(dense.acceleration(q, v, u), theirs, "acceleration");
     expect_close(kernel_acceleration(scene, q, v, u), theirs, "acceleration by kernels");
     batch.set_state(0, {q.data(), std::size_t(q.size())}, {v.data(), std::size_t(v.size())});
-    Numbers poses(7 * scene.links.size()), twists(6 * scene.links.size());
+    Doubles poses(7 * scene.links.size()), twists(6 * scene.links.size());
     readout.bodies(batch, 0, poses, twists);
     for (const auto& [body, pose] : state.pose) {
       const auto i = std::size_t(index.at(body));
@@ -191,7 +191,7 @@ void compare(const std::string& robot, const std::string& name, const RobotOptio
       for (std::size_t k = 0; k < 3; ++k) EXPECT_NEAR(at.position[k], pose[k], kClose) << body;
       for (std::size_t k = 0; k < 4; ++k) EXPECT_NEAR(sign * turn[k], pose[3 + k], kClose) << body;
     }
-    Numbers ends(3 * scene.end_effectors.size());
+    Doubles ends(3 * scene.end_effectors.size());
     readout.end_effectors(batch, 0, ends, {});
     for (std::size_t e = 0; e < scene.end_effectors.size(); ++e)
       for (std::size_t k = 0; k < 3; ++k)

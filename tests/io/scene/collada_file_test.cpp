@@ -84,6 +84,12 @@ TEST_F(ColladaFile, HasFacesOfEveryKind) {
               sixth, 1e-15);
 }
 
+TEST_F(ColladaFile, CommentsDoNotEndNumbers) {
+  std::string text = dae(kTriangles);
+  text.replace(text.find("0 1 0 0 0 1<"), 5, "+0 <!-- so --> 1 0");
+  EXPECT_NEAR(volume(text), 1.0 / 6, 1e-15);
+}
+
 TEST_F(ColladaFile, IsWhereItsNodesPutIt) {
   const RawMesh moved =
       read(dae(kTriangles,
@@ -147,6 +153,18 @@ TEST_F(ColladaFile, WhatCannotBeReadIsAnErrorWithItsLine) {
                         "</library_nodes>" +
                             placed("<instance_node url=\"#n\"/>"))),
               HasSubstr("nodes nested deeper than 100"));
+  std::string bomb;  // 2^32 nodes
+  for (int k = 0; k < 32; ++k) {
+    const std::string next = "<instance_node url=\"#n" + std::to_string(k + 1) + "\"/>";
+    bomb += "<node id=\"n" + std::to_string(k) + "\">" + next + next + "</node>";
+  }
+  EXPECT_THAT(
+      error(dae(kTriangles, "<library_nodes>" + bomb + "<node id=\"n32\"/></library_nodes>" +
+                                placed("<instance_node url=\"#n0\"/>"))),
+      HasSubstr("more than 100000 nodes"));
+  std::string none = dae(kTriangles);
+  none.replace(none.find("0 0 0 1 0 0 0 1 0 0 0 1"), 23, "");
+  EXPECT_THAT(error(none), HasSubstr("0 numbers of positions"));
 }
 
 }  // namespace
