@@ -141,11 +141,12 @@ int run_calibrate(const CalibrateArguments& a, const Console& console) {
   const std::optional<PressRecording> other =
       a.check.empty() ? std::nullopt : std::optional(read_press(a.check, console));
   TextOutput output(a.output, a.overwrite);
-  Fitted fitted = read_fitted(a);
+  const Fitted fitted = read_fitted(a);
   const CalibrationRequest request{.scene =
                                        [&](const SkinNumbers& numbers) {
-                                         set_numbers(numbers, 17, fitted);
-                                         return press_scene(fitted.layout, a.indenter);
+                                         Fitted trial = fitted;
+                                         set_numbers(numbers, 17, trial);
+                                         return press_scene(trial.layout, a.indenter);
                                        },
                                    .start = fitted.start,
                                    .knots = fitted.knots,
@@ -155,7 +156,7 @@ int run_calibrate(const CalibrateArguments& a, const Console& console) {
   CalibrationReport report{found, fitted.start, fitted.per_area, fitted.knots, {}};
   if (other) report.other = check_calibration(request, found.found, *other);
   console.print(report_text(report));
-  output.write(measured_layout(read_fitted(a), found, a.recording), console);
+  output.write(measured_layout(fitted, found, a.recording), console);
   report_json(report, console);
   return found.converged ? kDone : kSomeFailed;
 }

@@ -37,6 +37,7 @@ struct LayoutFile::Impl {
   tinyxml2::XMLDocument document;
   SceneContext context;
   tinyxml2::XMLElement* sensor = nullptr;
+  Source source;  // copies of a document have no lines
 };
 
 LayoutFile::LayoutFile(const std::string& text, const std::string& name)
@@ -47,6 +48,13 @@ LayoutFile::LayoutFile(const std::string& text, const std::string& name)
     root.fail(fmt::format("{} sensors; expected one <tactile>", root.children({"tactile"}).size()));
   impl_->sensor = impl_->document.RootElement()->FirstChildElement("tactile");
   if (impl_->sensor == nullptr) root.fail("a sensor from another file; expected one <tactile>");
+  impl_->source = SceneNode(*impl_->sensor, impl_->context).source();
+}
+LayoutFile::LayoutFile(const LayoutFile& other) : impl_(std::make_unique<Impl>()) {
+  impl_->context.file = other.impl_->context.file;
+  impl_->source = other.impl_->source;
+  other.impl_->document.DeepCopy(&impl_->document);
+  impl_->sensor = impl_->document.RootElement()->FirstChildElement("tactile");
 }
 LayoutFile::~LayoutFile() = default;
 LayoutFile::LayoutFile(LayoutFile&&) noexcept = default;
@@ -68,7 +76,7 @@ void LayoutFile::remove(const std::string& attribute) {
   impl_->sensor->DeleteAttribute(attribute.c_str());
 }
 
-Source LayoutFile::source() const { return SceneNode(*impl_->sensor, impl_->context).source(); }
+Source LayoutFile::source() const { return impl_->source; }
 
 std::string LayoutFile::tactile_text(const std::string& body,
                                      std::span<const std::string> without) const {

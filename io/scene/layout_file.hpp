@@ -26,6 +26,7 @@ class LayoutFile {
   /// `name`: for messages. Throws InputError for text that is no layout of one sensor.
   LayoutFile(const std::string& text, const std::string& name);
   ~LayoutFile();
+  LayoutFile(const LayoutFile& other);
   LayoutFile(LayoutFile&&) noexcept;
   LayoutFile& operator=(LayoutFile&&) noexcept;
 

@@ -128,6 +128,30 @@ TEST(Calibrate, AFilmRelaxes) {
   EXPECT_THAT(reason(press(0), "relaxation"), HasSubstr("do not show it"));
 }
 
+/// A relaxation that is not told is that of the layout while the modulus is fitted: the written
+/// layout has the error of the fit.
+TEST(Calibrate, ANumberThatIsNotToldIsTheLayouts) {
+  const Folder folder;
+  folder.write("skin.xml",
+               layout("modulus=\"1e5\" thickness=\"4e-3\" mu=\"0.5\" relaxation=\"0.02\""));
+  folder.write("press.csv", table("time,depth,force", 20, [](int k) {
+                 const double depth = 1e-5 * (k + 1), kn = 2.3 * 2e5 / kThickness * kArea;
+                 return std::vector<double>{1e-3 * k, depth, kPoints * kn * depth};
+               }));
+  const auto fit = [&](const char* skin, const Words& more) {
+    return run_json(folder,
+                    Words{"calibrate", "press.csv", "--sensor", skin, "--flat", "0.0035"} + more);
+  };
+  const json first = fit("skin.xml", {"--fit", "modulus", "--fit", "relaxation", "-o", "out.xml"});
+  ASSERT_THAT(reason(first, "relaxation"), HasSubstr("do not show it"));
+  EXPECT_THAT(folder.read("out.xml"), HasSubstr("relaxation=\"0.02\""));
+  const json again = fit("out.xml", {"--fit", "modulus"});
+  EXPECT_NEAR(number(again, "modulus")["value"], double(number(first, "modulus")["value"]),
+              1e-3 * double(number(first, "modulus")["value"]));
+  EXPECT_NEAR(again["normal"]["root_mean_square"], double(first["normal"]["root_mean_square"]),
+              1e-4);
+}
+
 /// A press of 0.05 mm, then a shear of up to 0.06 mm and back.
 std::string sheared(double friction) {
   constexpr double kNormal = kPoints * 100 * 5e-5, kShear = kPoints * 40;
