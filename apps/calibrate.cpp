@@ -48,6 +48,7 @@ struct Fitted {
   int knots = 0;          ///< of a table
   bool per_area = false;  ///< whether coefficients count by area
   SkinNumbers start;      ///< attributes that can be fitted
+  double friction = 0;    ///< of the layout
 };
 
 /// The attributes that can be fitted, as the layout has them, where it has any.
@@ -105,6 +106,7 @@ Fitted read_fitted(const CalibrateArguments& a) {
   const TactileDescription& d = scene.sensors[0];
   if (fitted.knots > 0) prepare_for_table(fitted, d);
   fitted.start = attributes_at_start(fitted.layout, d);
+  fitted.friction = d.coefficients.mu;
   if (fitted.knots > 0) {
     fitted.start.erase("modulus"), fitted.start.erase("kn");
     fitted.start.try_emplace("relaxation", kUsualRelaxation);
@@ -132,6 +134,14 @@ std::string measured_layout(Fitted fitted, const Calibration& found, const std::
       fmt::format("{}: measured, fitted by 'tangere calibrate' to {}, {} rows, to {} of the peak",
                   fmt::join(names, ", "), std::filesystem::path(recording).filename().string(),
                   found.normal.rows, percent(found.normal.root_mean_square)));
+  if (found.least_friction > fitted.friction) {
+    const std::string mu = fmt::format("{:.5g}", found.least_friction);
+    fitted.layout.set(kFriction, mu);
+    fitted.layout.add_comment(fmt::format(
+        "mu: a lower bound, because nothing slips: {} is the largest ratio of shear to normal "
+        "force in {}",
+        mu, std::filesystem::path(recording).filename().string()));
+  }
   return fitted.layout.text();
 }
 

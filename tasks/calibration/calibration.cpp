@@ -214,6 +214,15 @@ void scale_shear_start(const Forces& shear, const std::vector<std::string>& name
   start[kFriction] = kSlipStart * ratio;
 }
 
+/// Returns the largest ratio of shear to normal force, of rows whose normal force counts.
+double largest_ratio(const PressRecording& r) {
+  const double least = kSmallest * peak_of(r.force);
+  double ratio = 0;
+  for (std::size_t k = 0; k < r.rows(); ++k)
+    if (r.force[k] > least) ratio = std::max(ratio, std::abs(r.shear_force[k]) / r.force[k]);
+  return ratio;
+}
+
 /// Runs a fit and adds what it found.
 void add_fit(ForceFit& fit, const std::vector<std::string>& names, const SkinNumbers& start,
              Calibration& out) {
@@ -269,6 +278,8 @@ Calibration calibrate(const CalibrationRequest& request, const PressRecording& r
     scale_shear_start(path, names.shear, out.found, normal, recording.shear_force, start);
   ForceFit across(path, recording.shear_force, rows, depth, 0);
   add_fit(across, names.shear, start, out);
+  if (std::ranges::count(across.untold(), kFriction, &UntoldNumber::name) > 0)
+    out.least_friction = largest_ratio(recording);
   const std::vector<double> shear = path(out.found);
   out.shear = error_of(shear, recording.shear_force, rows);
   out.shear_held_out = error_of(shear, recording.shear_force, out.held_out);

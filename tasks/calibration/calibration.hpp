@@ -44,6 +44,9 @@ struct Calibration {
   SkinNumbers found;          ///< all numbers that were fitted, and "table_depth"
   std::vector<int> held_out;  ///< rows
   PressError normal, normal_held_out, shear, shear_held_out;
+  /// Where nothing slips, so that mu is not told: the largest recorded ratio of shear to normal
+  /// force, which is a lower bound of mu; else 0.
+  double least_friction = 0;
   bool converged = true;
 };
 

@@ -186,6 +186,12 @@ TEST(Calibrate, AShearShowsItsSpringAndItsFriction) {
   EXPECT_THAT(folder.read("stuck.xml"), HasSubstr("mu=\"1\"")) << "as in the layout";
   EXPECT_NEAR(number(stuck, "ks")["value"], 40, 1e-3 * 40);
   EXPECT_THAT(reason(stuck, "mu"), HasSubstr("nothing slips"));
+
+  // A friction of the layout that would slip gives way to the largest ratio.
+  folder.write("skin.xml", layout("kn=\"50\" ks=\"10\" mu=\"0.1\""));
+  run_json(folder, words + Words{"-o", "bound.xml"});
+  EXPECT_THAT(folder.read("bound.xml"), HasSubstr("mu=\"0.48\""));  // 40 · 6e-5 / (100 · 5e-5)
+  EXPECT_THAT(folder.read("bound.xml"), HasSubstr("mu: a lower bound"));
 }
 
 /// Writes the layout of a GelSight Mini with a layer, gel.xml.
