@@ -75,6 +75,7 @@ std::string reason_against(const std::string& name, const PressRecording& r, int
     return "all rows have one depth";
   if (name == kZero && rows < 2) return "one row is fitted";
   if ((name == kRelaxation || name == kLag) && r.time.empty()) return "the recording has no times";
+  if ((name == kRelaxation || name == kLag) && r.rows() < 2) return "the recording has one row";
   if ((name == kShear || name == kFriction) && r.shear.empty()) return "nothing is sheared";
   return "";
 }
@@ -122,7 +123,7 @@ Names choose_numbers(const CalibrationRequest& request, const PressRecording& re
 std::vector<double> acting_depths(const PressRecording& r, const SkinNumbers& numbers) {
   const double lag = number_or(numbers, kLag, 0), zero = number_or(numbers, kZero, 0);
   std::vector<double> out = r.depth;
-  for (std::size_t row = 0; row < r.rows() && lag > 0; ++row) {
+  for (std::size_t row = 0; row < r.rows() && r.rows() > 1 && lag > 0; ++row) {
     const double then = std::max(r.time[row] - lag, r.time[0]);
     const auto after = std::upper_bound(r.time.begin() + 1, r.time.end() - 1, then);
     const auto k = std::size_t(after - r.time.begin());
@@ -289,6 +290,10 @@ Calibration calibrate(const CalibrationRequest& request, const PressRecording& r
 PressError check_calibration(const CalibrationRequest& request, const SkinNumbers& found,
                              const PressRecording& recording) {
   check(recording);
+  for (const char* const name : {kLag, kRelaxation})
+    if (found.contains(name) && recording.time.empty())
+      throw InputError(fmt::format(
+          "the other recording has no times, and '{}' was fitted; expected times", name));
   std::vector<int> rows(recording.rows());
   for (std::size_t k = 0; k < rows.size(); ++k) rows[k] = int(k);
   return error_of(normal_forces(request, recording, found), recording.force, rows);

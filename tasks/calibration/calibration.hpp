@@ -60,6 +60,8 @@ std::vector<int> held_out_rows(double hold_out, int rows);
 Calibration calibrate(const CalibrationRequest& request, const PressRecording& recording);
 
 /// Compares the normal forces of another recording with those of the numbers that were found.
+/// Throws InputError for columns as calibrate(), and for one without times if a lag or a relaxation
+/// was found.
 PressError check_calibration(const CalibrationRequest& request, const SkinNumbers& found,
                              const PressRecording& recording);
 

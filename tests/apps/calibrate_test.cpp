@@ -194,6 +194,31 @@ TEST(Calibrate, AShearShowsItsSpringAndItsFriction) {
   EXPECT_THAT(folder.read("bound.xml"), HasSubstr("mu: a lower bound"));
 }
 
+/// A lag needs times, also of the other recording, and more than one row.
+TEST(Calibrate, ALagNeedsTimes) {
+  const Folder folder;
+  folder.write("skin.xml", layout("kn=\"50\""));
+  const auto late = [](int k) {
+    const double before = 1e-5 * std::max(k - 0.5, 0.0);
+    return std::vector<double>{0.1 * k, 1e-5 * k, kPoints * 100 * before};
+  };
+  folder.write("press.csv", table("time,depth,force", 20, late));
+  folder.write("slow.csv", "depth,force\n1e-4,0.37\n");
+  folder.write("row.csv", "time,depth,force\n1,1e-4,0.37\n");
+  const Words flat = {"--sensor", "skin.xml", "--flat", "0.0035"},
+              fit = Words{"calibrate", "press.csv", "--fit", "kn", "--fit", "lag"} + flat;
+  const Outcome slow = run(folder, fit + Words{"--check", "slow.csv"});
+  EXPECT_EQ(slow.exit_code, 2) << slow.out;
+  EXPECT_THAT(slow.err, HasSubstr("has no times, and 'lag' was fitted"));
+  const json row = run_json(folder, fit + Words{"--check", "row.csv"});
+  EXPECT_NEAR(number(row, "lag")["value"], 0.05, 1e-3);
+  EXPECT_LT(row["other"]["largest"], 0.01);
+  const Outcome one =
+      run(folder, Words{"calibrate", "row.csv", "--fit", "kn", "--fit", "lag"} + flat);
+  EXPECT_EQ(one.exit_code, 2) << one.out;
+  EXPECT_THAT(one.err, HasSubstr("has one row"));
+}
+
 /// Writes the layout of a GelSight Mini with a layer, gel.xml.
 void write_gel(const Folder& folder) {
   std::string gel = folder.read(scene("sensors/gelsight_mini_measured.xml"));
