@@ -219,6 +219,19 @@ TEST(Calibrate, ALagNeedsTimes) {
   EXPECT_THAT(one.err, HasSubstr("has one row"));
 }
 
+/// A slider that never slips is a spring; its force is not told.
+TEST(Calibrate, ASliderThatDoesNotSlipIsASpring) {
+  const Folder folder;
+  folder.write("skin.xml", layout("kn=\"100\""));
+  folder.write("press.csv", table("depth,force", 20, [](int k) {
+                 return std::vector<double>{1e-5 * k, (kPoints * 100 + 2000) * 1e-5 * k};
+               }));
+  const json answer = run_json(folder, {"calibrate", "press.csv", "--sensor", "skin.xml", "--flat",
+                                        "0.0035", "--fit", "slider"});
+  EXPECT_THAT(reason(answer, "slider_force"), HasSubstr("does not slip"));
+  EXPECT_NEAR(number(answer, "slider")["value"], 2000, 1);
+}
+
 /// Writes the layout of a GelSight Mini with a layer, gel.xml.
 void write_gel(const Folder& folder) {
   std::string gel = folder.read(scene("sensors/gelsight_mini_measured.xml"));
