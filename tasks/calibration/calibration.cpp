@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 
 #include "engine/base/error.hpp"
 
@@ -68,15 +69,18 @@ void check(const PressRecording& r) {
     throw InputError("a recording without any force; expected a press of the skin");
 }
 
+bool varies(std::span<const double> column) {
+  return std::ranges::adjacent_find(column, std::ranges::not_equal_to()) != column.end();
+}
+
 /// Why the columns cannot tell a number; "" if they may.
 std::string reason_against(const std::string& name, const PressRecording& r, int rows) {
-  const auto [least, most] = std::ranges::minmax(r.depth);
-  if ((name == kZero || name == kSlider || name == kTable) && !(most > least))
+  if ((name == kZero || name == kSlider || name == kTable) && !varies(r.depth))
     return "all rows have one depth";
   if (name == kZero && rows < 2) return "one row is fitted";
   if ((name == kRelaxation || name == kLag) && r.time.empty()) return "the recording has no times";
   if ((name == kRelaxation || name == kLag) && r.rows() < 2) return "the recording has one row";
-  if ((name == kShear || name == kFriction) && r.shear.empty()) return "nothing is sheared";
+  if ((name == kShear || name == kFriction) && !varies(r.shear)) return "nothing is sheared";
   return "";
 }
 
@@ -255,6 +259,8 @@ Calibration calibrate(const CalibrationRequest& request, const PressRecording& r
   for (int row = 0; row < int(recording.rows()); ++row)
     if (!std::ranges::binary_search(out.held_out, row)) rows.push_back(row);
   const Names names = choose_numbers(request, recording, int(rows.size()), out.untold);
+  if (!names.shear.empty() && !(peak_of(recording.shear_force) > 0))
+    throw InputError("a shear without any force; expected shear forces, or no columns of a shear");
   const double depth = *std::ranges::max_element(recording.depth);
 
   SkinNumbers start = request.start;

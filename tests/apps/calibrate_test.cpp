@@ -73,6 +73,10 @@ TEST(Calibrate, StiffnessAndZeroOfAPressAreFound) {
   EXPECT_LT(answer["normal_held_out"]["largest"], 1e-6);
   EXPECT_EQ(reason(answer, "relaxation"), "told") << "springs without a material have none";
   EXPECT_THAT(reason(answer, "mu"), HasSubstr("nothing is sheared"));
+  folder.write("still.csv", "depth,force,shear,shear_force\n1e-5,1,0,0\n2e-5,2,0,0\n");
+  const json still =
+      run_json(folder, {"calibrate", "still.csv", "--sensor", "skin.xml", "--flat", "0.0035"});
+  EXPECT_THAT(reason(still, "ks"), HasSubstr("nothing is sheared"));
   const std::string written = folder.read("out.xml");
   EXPECT_THAT(written, HasSubstr("kn=\"123\""));
   EXPECT_THAT(written, HasSubstr("name=\"skin_measured\""));
@@ -350,6 +354,8 @@ TEST(Calibrate, SaysWhatIsWrong) {
   EXPECT_THAT(err("depth,force\n1e-4,-1\n", flat), HasSubstr("positive in compression"));
   EXPECT_THAT(err("time,depth,force\n1,1e-4,1\n1,1e-4,1\n", flat), HasSubstr("ascending times"));
   EXPECT_THAT(err("depth,force,shear\n1e-4,1,1e-4\n", flat), HasSubstr("expected both or none"));
+  EXPECT_THAT(err("depth,force,shear,shear_force\n1e-4,1,0,0\n1e-4,1,1e-4,0\n", flat),
+              HasSubstr("a shear without any force"));
   folder.write("skin.xml", layout("kn=\"50\" ks=\"10\""));
   EXPECT_THAT(err(kTable, flat + Words{"--table", "3"}), HasSubstr("ks or kt by point"));
   folder.write("skin.xml", layout("pressure_depth=\"0 1e-3\" pressure=\"0 1e4\""));
