@@ -4,6 +4,7 @@
 #include <fmt/ranges.h>
 
 #include <cmath>
+#include <cstdlib>
 #include <filesystem>
 
 #include "apps/arguments.hpp"
@@ -68,10 +69,23 @@ SkinNumbers attributes_at_start(const LayoutFile& layout, const TactileDescripti
   return start;
 }
 
+/// Refuses what no scene has beside a table, and what press_scene() leaves out.
+void check_for_table(const LayoutFile& layout) {
+  const auto refuse = [&](const std::string& what) {
+    throw InputError(fmt::format("{}--table with {}; expected a layout without it",
+                                 layout.source().prefix(), what));
+  };
+  if (layout.get("feedback") == "true") refuse("feedback");
+  for (const char* const name : {"delay", "low_pass", "hysteresis"})
+    if (std::strtod(layout.get("imperfections", name).c_str(), nullptr) != 0)
+      refuse(fmt::format("{} in <imperfections>", name));
+}
+
 /// Makes room for a table. Shear springs that follow from a modulus stay.
 void prepare_for_table(Fitted& fitted, const TactileDescription& d) {
   if (!d.points.empty())
     throw InputError("--table with points that are no array; expected type=\"rect_array\"");
+  check_for_table(fitted.layout);
   if (d.layer) throw InputError("--table with a layout that has <layer>; expected one of them");
   if (d.cell == 0 && (d.coefficients.ks > 0 || d.coefficients.kt > 0))
     throw InputError(fmt::format("--table with ks or kt by point in {}; expected per=\"area\"",

@@ -68,6 +68,16 @@ bool LayoutFile::has(const std::string& attribute) const {
   return impl_->sensor->Attribute(attribute.c_str()) != nullptr;
 }
 
+std::string LayoutFile::get(const std::string& attribute) const {
+  const char* const text = impl_->sensor->Attribute(attribute.c_str());
+  return text == nullptr ? "" : text;
+}
+std::string LayoutFile::get(const std::string& part, const std::string& attribute) const {
+  const auto* const element = impl_->sensor->FirstChildElement(part.c_str());
+  const char* const text = element == nullptr ? nullptr : element->Attribute(attribute.c_str());
+  return text == nullptr ? "" : text;
+}
+
 void LayoutFile::set(const std::string& attribute, const std::string& value) {
   impl_->sensor->SetAttribute(attribute.c_str(), value.c_str());
 }

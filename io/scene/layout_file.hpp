@@ -32,6 +32,9 @@ class LayoutFile {
 
   [[nodiscard]] std::string name() const;  ///< of the sensor; "skin" without one
   [[nodiscard]] bool has(const std::string& attribute) const;
+  /// Text of an attribute, of the sensor or of its <part>; "" without one.
+  [[nodiscard]] std::string get(const std::string& attribute) const;
+  [[nodiscard]] std::string get(const std::string& part, const std::string& attribute) const;
   void set(const std::string& attribute, const std::string& value);
   void remove(const std::string& attribute);
 

@@ -258,10 +258,13 @@ Calibration calibrate(const CalibrationRequest& request, const PressRecording& r
   std::vector<int> rows;
   for (int row = 0; row < int(recording.rows()); ++row)
     if (!std::ranges::binary_search(out.held_out, row)) rows.push_back(row);
+  const double depth = *std::ranges::max_element(recording.depth);
+  if (request.knots > 0 && !(depth > 0))
+    throw InputError(
+        fmt::format("a table up to the depth {} m; expected depths positive into the skin", depth));
   const Names names = choose_numbers(request, recording, int(rows.size()), out.untold);
   if (!names.shear.empty() && !(peak_of(recording.shear_force) > 0))
     throw InputError("a shear without any force; expected shear forces, or no columns of a shear");
-  const double depth = *std::ranges::max_element(recording.depth);
 
   SkinNumbers start = request.start;
   if (!names.normal.empty()) scale_start(request, recording, depth, start);

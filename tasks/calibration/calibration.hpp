@@ -14,8 +14,9 @@ namespace tangere {
 
 struct CalibrationRequest {
   /// Makes the scene of placed_indenter(), with the attributes among these numbers in place of the
-  /// sensor's own. Others are the sensor's own, whatever scenes were made before. A table has `knots` pressures [Pa] "pressure[1]", … after 0, evenly spread up to
-  /// the depth "table_depth" [m].
+  /// sensor's own. Others are the sensor's own, whatever scenes were made before. A table has
+  /// `knots` pressures [Pa] "pressure[1]", … after 0, evenly spread up to the depth "table_depth"
+  /// [m].
   std::function<Scene(const SkinNumbers&)> scene;
   /// Attributes that may be fitted, with positive values at which the fit begins: `modulus` or
   /// `kn`, and of `relaxation`, `ks` and `mu` those that the sensor can have.

@@ -358,6 +358,16 @@ TEST(Calibrate, SaysWhatIsWrong) {
               HasSubstr("a shear without any force"));
   folder.write("skin.xml", layout("kn=\"50\" ks=\"10\""));
   EXPECT_THAT(err(kTable, flat + Words{"--table", "3"}), HasSubstr("ks or kt by point"));
+  folder.write("skin.xml", layout("kn=\"50\" feedback=\"true\""));
+  EXPECT_THAT(err(kTable, flat + Words{"--table", "3"}), HasSubstr("--table with feedback"));
+  std::string late = layout("kn=\"50\"");
+  late.replace(late.find("/></sensor>"), 2, "><imperfections delay=\"0.1\"/></tactile>");
+  folder.write("skin.xml", late);
+  EXPECT_THAT(err(kTable, flat + Words{"--table", "3"}),
+              HasSubstr("skin.xml:1: --table with delay in <imperfections>"));
+  folder.write("skin.xml", layout("kn=\"50\""));
+  EXPECT_THAT(err("depth,force\n-1e-4,1\n-2e-4,2\n", flat + Words{"--table", "3"}),
+              HasSubstr("expected depths positive into the skin"));
   folder.write("skin.xml", layout("pressure_depth=\"0 1e-3\" pressure=\"0 1e4\""));
   EXPECT_THAT(err(kTable, flat), HasSubstr("has a table of pressures; expected --table"));
   folder.write("skin.xml",
