@@ -325,6 +325,20 @@ TEST(Calibrate, ALatticeIsATableAndASlider) {
   EXPECT_GT(number(both, "slider_force")["low"], 1);
 }
 
+TEST(Calibrate, OtherColumnsAreNamedAndNotUsed) {
+  const Folder folder;
+  folder.write("skin.xml", layout("kn=\"50\""));
+  folder.write("press.csv",
+               "time_index,depth [mm],force_std,force (mN),shear_force_std\n"
+               "7,0.1,9,370,9\n7,0.2,9,740,9\n");
+  const Outcome outcome =
+      run(folder, {"calibrate", "press.csv", "--sensor", "skin.xml", "--flat", "0.0035", "--json"});
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_NEAR(number(json::parse(outcome.out), "kn")["value"], 100, 1e-3);
+  for (const char* const name : {"time_index", "force_std", "shear_force_std"})
+    EXPECT_THAT(outcome.err, HasSubstr(std::string("column '") + name + "' is not used"));
+}
+
 const std::string kTable = "depth,force\n1e-4,1\n2e-4,2\n";
 
 TEST(Calibrate, SaysWhatIsWrong) {
@@ -341,7 +355,8 @@ TEST(Calibrate, SaysWhatIsWrong) {
   EXPECT_THAT(err(kTable, {"--box", "0.01"}), HasSubstr("expected 2 positive numbers"));
   EXPECT_THAT(err(kTable, flat + Words{"--box", "1,1"}), HasSubstr("expected one of"));
   EXPECT_THAT(err("depth,forc\n1,2\n", flat), HasSubstr("no column 'force' among depth, forc"));
-  EXPECT_THAT(err("depth_in,force\n1,2\n", flat), HasSubstr("is in 'in'; expected m or mm"));
+  EXPECT_THAT(err("depth_in,force\n1,2\n", flat),
+              HasSubstr("no column 'depth' among depth_in, force; expected one in m or mm"));
   EXPECT_THAT(err("depth,force,depth\n1,2,1\n", flat), HasSubstr("two columns 'depth'"));
   EXPECT_THAT(err("1,2\n", flat), HasSubstr("p.csv:1: no names of columns"));
   EXPECT_THAT(err(kTable, flat + Words{"--fit", "mu"}), HasSubstr("nothing is sheared"));
