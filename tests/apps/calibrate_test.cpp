@@ -17,6 +17,7 @@ namespace tangere::apps {
 namespace {
 
 using nlohmann::json;
+using ::testing::EndsWith;
 using ::testing::HasSubstr;
 using ::testing::Not;
 
@@ -325,6 +326,24 @@ TEST(Calibrate, ALatticeIsATableAndASlider) {
   EXPECT_GT(number(both, "slider_force")["low"], 1);
 }
 
+const std::string kTable = "depth,force\n1e-4,1\n2e-4,2\n";
+
+TEST(Calibrate, WhatTheLayoutHasNotAndWhatIsNotFittedIsNotInvented) {
+  const Folder folder;
+  folder.write("press.csv", kTable);
+  folder.write("skin.xml", layout("mu=\"1\""));
+  const Outcome none =
+      run(folder, {"calibrate", "press.csv", "--sensor", "skin.xml", "--flat", "0.0035"});
+  const std::string row = none.out.substr(none.out.find("kn [N/m]"));
+  EXPECT_THAT(row.substr(0, row.find('\n')), Not(EndsWith("1"))) << "no kn in the layout";
+
+  folder.write("skin.xml", layout("kn=\"270\""));
+  run_json(folder, {"calibrate", "press.csv", "--sensor", "skin.xml", "--flat", "0.0035", "--fit",
+                    "zero", "-o", "out.xml"});
+  EXPECT_THAT(folder.read("out.xml"), HasSubstr("name=\"skin_guess\""));
+  EXPECT_THAT(folder.read("out.xml"), Not(HasSubstr("measured")));
+}
+
 TEST(Calibrate, OtherColumnsAreNamedAndNotUsed) {
   const Folder folder;
   folder.write("skin.xml", layout("kn=\"50\""));
@@ -338,8 +357,6 @@ TEST(Calibrate, OtherColumnsAreNamedAndNotUsed) {
   for (const char* const name : {"time_index", "force_std", "shear_force_std"})
     EXPECT_THAT(outcome.err, HasSubstr(std::string("column '") + name + "' is not used"));
 }
-
-const std::string kTable = "depth,force\n1e-4,1\n2e-4,2\n";
 
 TEST(Calibrate, SaysWhatIsWrong) {
   const Folder folder;
