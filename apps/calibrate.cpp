@@ -4,6 +4,7 @@
 #include <fmt/ranges.h>
 
 #include <cmath>
+#include <cstdlib>
 #include <filesystem>
 
 #include "apps/arguments.hpp"
@@ -48,29 +49,46 @@ struct Fitted {
   int knots = 0;          ///< of a table
   bool per_area = false;  ///< whether coefficients count by area
   SkinNumbers start;      ///< attributes that can be fitted
+  SkinNumbers own;        ///< of these, those that the layout has
 };
 
-/// The attributes that can be fitted, as the layout has them, where it has any.
-SkinNumbers attributes_at_start(const LayoutFile& layout, const TactileDescription& d) {
+/// Sets the attributes that can be fitted, as the layout has them, where it has any.
+void set_start(const TactileDescription& d, Fitted& fitted) {
+  const LayoutFile& layout = fitted.layout;
   const double area = d.cell > 0 ? d.cell : 1, kn = d.coefficients.kn / area,
                ks = d.coefficients.ks / area, mu = d.coefficients.mu;
-  SkinNumbers start;
+  const auto add = [&](const char* name, double own, double otherwise) {
+    if (own > 0) fitted.own[name] = own;
+    fitted.start[name] = own > 0 ? own : otherwise;
+  };
   if (d.layer || (d.material && !layout.has("kn")))
-    start["modulus"] = d.material ? d.material->modulus : 1;
+    add("modulus", d.material ? d.material->modulus : 0, 1);
   else
-    start["kn"] = kn > 0 ? kn : 1;
+    add("kn", kn, 1);
   const bool relaxes = d.table || (d.material && (d.layer || !layout.has("damping")));
   const double tau = d.table ? d.table->relaxation : d.material ? d.material->relaxation : 0;
-  if (relaxes) start["relaxation"] = tau > 0 ? tau : kUsualRelaxation;
-  start["ks"] = ks > 0 ? ks : kUsualShearShare * (kn > 0 ? kn : 1);
-  start["mu"] = mu > 0 ? mu : kUsualFriction;
-  return start;
+  if (relaxes) add("relaxation", tau, kUsualRelaxation);
+  add("ks", ks, kUsualShearShare * (kn > 0 ? kn : 1));
+  add("mu", mu, kUsualFriction);
+}
+
+/// Refuses what no scene has beside a table, and what press_scene() leaves out.
+void check_for_table(const LayoutFile& layout) {
+  const auto refuse = [&](const std::string& what) {
+    throw InputError(fmt::format("{}--table with {}; expected a layout without it",
+                                 layout.source().prefix(), what));
+  };
+  if (layout.get("feedback") == "true") refuse("feedback");
+  for (const char* const name : {"delay", "low_pass", "hysteresis"})
+    if (std::strtod(layout.get("imperfections", name).c_str(), nullptr) != 0)
+      refuse(fmt::format("{} in <imperfections>", name));
 }
 
 /// Makes room for a table. Shear springs that follow from a modulus stay.
 void prepare_for_table(Fitted& fitted, const TactileDescription& d) {
   if (!d.points.empty())
     throw InputError("--table with points that are no array; expected type=\"rect_array\"");
+  check_for_table(fitted.layout);
   if (d.layer) throw InputError("--table with a layout that has <layer>; expected one of them");
   if (d.cell == 0 && (d.coefficients.ks > 0 || d.coefficients.kt > 0))
     throw InputError(fmt::format("--table with ks or kt by point in {}; expected per=\"area\"",
@@ -100,11 +118,11 @@ void set_numbers(const SkinNumbers& numbers, int digits, Fitted& fitted) {
 
 Fitted read_fitted(const CalibrateArguments& a) {
   Fitted fitted{
-      LayoutFile(layout_text("--sensor", a.sensor), a.sensor), a.table.value_or(0), false, {}};
+      LayoutFile(layout_text("--sensor", a.sensor), a.sensor), a.table.value_or(0), false, {}, {}};
   const Scene scene = press_scene(fitted.layout, a.indenter);
   const TactileDescription& d = scene.sensors[0];
   if (fitted.knots > 0) prepare_for_table(fitted, d);
-  fitted.start = attributes_at_start(fitted.layout, d);
+  set_start(d, fitted);
   if (fitted.knots > 0) {
     fitted.start.erase("modulus"), fitted.start.erase("kn");
     fitted.start.try_emplace("relaxation", kUsualRelaxation);
@@ -115,23 +133,39 @@ Fitted read_fitted(const CalibrateArguments& a) {
   return fitted;
 }
 
-/// Returns the layout with the fitted attributes. Its sensor's name says that it was measured.
+void name_as_measured(LayoutFile& layout) {
+  std::string name = layout.name();
+  if (name.ends_with("_guess")) name.resize(name.size() - 6);
+  if (name.find("measured") == std::string::npos) name += "_measured";
+  layout.set("name", name);
+}
+
+/// Returns the layout with the fitted attributes. If there are any, its sensor's name says that
+/// they were measured.
 std::string measured_layout(Fitted fitted, const Calibration& found, const std::string& recording) {
   SkinNumbers numbers = found.found;
   for (const UntoldNumber& number : found.untold) numbers.erase(number.name);
   set_numbers(numbers, 5, fitted);
-  std::string name = fitted.layout.name();
-  if (name.ends_with("_guess")) name.resize(name.size() - 6);
-  if (name.find("measured") == std::string::npos) name += "_measured";
-  fitted.layout.set("name", name);
   std::vector<std::string> names;
   for (const FittedNumber& number : found.numbers)
     if (fitted.start.contains(number.name)) names.push_back(number.name);
   if (fitted.knots > 0) names.emplace_back("pressure");
-  fitted.layout.add_comment(
-      fmt::format("{}: measured, fitted by 'tangere calibrate' to {}, {} rows, to {} of the peak",
-                  fmt::join(names, ", "), std::filesystem::path(recording).filename().string(),
-                  found.normal.rows, percent(found.normal.root_mean_square)));
+  const std::string file = std::filesystem::path(recording).filename().string();
+  if (!names.empty()) {
+    name_as_measured(fitted.layout);
+    fitted.layout.add_comment(fmt::format(
+        "{}: measured, fitted by 'tangere calibrate' to {}, {} rows, to {} of the peak",
+        fmt::join(names, ", "), file, found.normal.rows, percent(found.normal.root_mean_square)));
+  }
+  const auto own = fitted.own.find(kFriction);
+  if (found.least_friction > (own == fitted.own.end() ? 0 : own->second)) {
+    const std::string mu = fmt::format("{:.5g}", found.least_friction);
+    fitted.layout.set(kFriction, mu);
+    fitted.layout.add_comment(
+        fmt::format("mu: a lower bound, because nothing slips: {} is the largest ratio of shear to "
+                    "normal force in {}",
+                    mu, file));
+  }
   return fitted.layout.text();
 }
 
@@ -141,21 +175,22 @@ int run_calibrate(const CalibrateArguments& a, const Console& console) {
   const std::optional<PressRecording> other =
       a.check.empty() ? std::nullopt : std::optional(read_press(a.check, console));
   TextOutput output(a.output, a.overwrite);
-  Fitted fitted = read_fitted(a);
+  const Fitted fitted = read_fitted(a);
   const CalibrationRequest request{.scene =
                                        [&](const SkinNumbers& numbers) {
-                                         set_numbers(numbers, 17, fitted);
-                                         return press_scene(fitted.layout, a.indenter);
+                                         Fitted trial = fitted;
+                                         set_numbers(numbers, 17, trial);
+                                         return press_scene(trial.layout, a.indenter);
                                        },
                                    .start = fitted.start,
                                    .knots = fitted.knots,
                                    .numbers = a.numbers,
                                    .hold_out = a.hold_out.value_or(0)};
   const Calibration found = calibrate(request, recording);
-  CalibrationReport report{found, fitted.start, fitted.per_area, fitted.knots, {}};
+  CalibrationReport report{found, fitted.own, fitted.per_area, fitted.knots, {}};
   if (other) report.other = check_calibration(request, found.found, *other);
   console.print(report_text(report));
-  output.write(measured_layout(read_fitted(a), found, a.recording), console);
+  output.write(measured_layout(fitted, found, a.recording), console);
   report_json(report, console);
   return found.converged ? kDone : kSomeFailed;
 }

@@ -31,9 +31,9 @@ std::string label_of(const std::string& number, const CalibrationReport& of) {
   return unit == kUnits.end() ? number : fmt::format("{} [{}]", number, unit->second);
 }
 
-std::string start_text(const std::string& number, const SkinNumbers& start) {
-  const auto at = start.find(number);
-  return at == start.end() ? "" : fmt::format("{:.4g}", at->second);
+std::string own_text(const std::string& number, const SkinNumbers& own) {
+  const auto at = own.find(number);
+  return at == own.end() ? "" : fmt::format("{:.4g}", at->second);
 }
 
 std::string error_text(const char* what, const PressError& error) {
@@ -61,7 +61,7 @@ std::string report_text(const CalibrationReport& report) {
       fmt::format("{:<28}{:>12}   {:<26}{}\n", "number", "fitted", "95 % interval", "layout");
   for (const FittedNumber& n : found.numbers)
     text += fmt::format("{:<28}{:>12.5g}   {:<26}{}\n", label_of(n.name, report), n.value,
-                        interval_text(n), start_text(n.name, report.start));
+                        interval_text(n), own_text(n.name, report.own));
   text += error_text("normal force", found.normal);
   text += error_text("held out", found.normal_held_out);
   text += error_text("the other recording", report.other);

@@ -11,10 +11,10 @@ namespace tangere::apps {
 
 struct CalibrationReport {
   const Calibration& found;
-  const SkinNumbers& start;  ///< at which the fit began
-  bool per_area;             ///< whether coefficients count by area
-  int knots;                 ///< of a table
-  PressError other;          ///< of another recording
+  const SkinNumbers& own;  ///< of the layout, where it has any
+  bool per_area;           ///< whether coefficients count by area
+  int knots;               ///< of a table
+  PressError other;        ///< of another recording
 };
 
 /// A table of the numbers, the errors, and what the recording does not tell.

@@ -10,8 +10,8 @@
 namespace tangere::apps {
 
 /// Reads `depth` and `force`, and if they are there `time`, `shear` and `shear_force`, in SI or in
-/// ms, mm and mN. A note names columns that are not read. Throws InputError for a missing column
-/// and an unknown unit.
+/// ms, mm and mN. A note names columns that are not read, those in other units among them. Throws
+/// InputError for a missing column and for a second one.
 PressRecording read_press(const std::string& path, const Console& console);
 
 }  // namespace tangere::apps

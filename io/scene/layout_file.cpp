@@ -37,6 +37,7 @@ struct LayoutFile::Impl {
   tinyxml2::XMLDocument document;
   SceneContext context;
   tinyxml2::XMLElement* sensor = nullptr;
+  Source source;  // copies of a document have no lines
 };
 
 LayoutFile::LayoutFile(const std::string& text, const std::string& name)
@@ -47,6 +48,13 @@ LayoutFile::LayoutFile(const std::string& text, const std::string& name)
     root.fail(fmt::format("{} sensors; expected one <tactile>", root.children({"tactile"}).size()));
   impl_->sensor = impl_->document.RootElement()->FirstChildElement("tactile");
   if (impl_->sensor == nullptr) root.fail("a sensor from another file; expected one <tactile>");
+  impl_->source = SceneNode(*impl_->sensor, impl_->context).source();
+}
+LayoutFile::LayoutFile(const LayoutFile& other) : impl_(std::make_unique<Impl>()) {
+  impl_->context.file = other.impl_->context.file;
+  impl_->source = other.impl_->source;
+  other.impl_->document.DeepCopy(&impl_->document);
+  impl_->sensor = impl_->document.RootElement()->FirstChildElement("tactile");
 }
 LayoutFile::~LayoutFile() = default;
 LayoutFile::LayoutFile(LayoutFile&&) noexcept = default;
@@ -60,6 +68,16 @@ bool LayoutFile::has(const std::string& attribute) const {
   return impl_->sensor->Attribute(attribute.c_str()) != nullptr;
 }
 
+std::string LayoutFile::get(const std::string& attribute) const {
+  const char* const text = impl_->sensor->Attribute(attribute.c_str());
+  return text == nullptr ? "" : text;
+}
+std::string LayoutFile::get(const std::string& part, const std::string& attribute) const {
+  const auto* const element = impl_->sensor->FirstChildElement(part.c_str());
+  const char* const text = element == nullptr ? nullptr : element->Attribute(attribute.c_str());
+  return text == nullptr ? "" : text;
+}
+
 void LayoutFile::set(const std::string& attribute, const std::string& value) {
   impl_->sensor->SetAttribute(attribute.c_str(), value.c_str());
 }
@@ -68,7 +86,7 @@ void LayoutFile::remove(const std::string& attribute) {
   impl_->sensor->DeleteAttribute(attribute.c_str());
 }
 
-Source LayoutFile::source() const { return SceneNode(*impl_->sensor, impl_->context).source(); }
+Source LayoutFile::source() const { return impl_->source; }
 
 std::string LayoutFile::tactile_text(const std::string& body,
                                      std::span<const std::string> without) const {

@@ -26,11 +26,15 @@ class LayoutFile {
   /// `name`: for messages. Throws InputError for text that is no layout of one sensor.
   LayoutFile(const std::string& text, const std::string& name);
   ~LayoutFile();
+  LayoutFile(const LayoutFile& other);
   LayoutFile(LayoutFile&&) noexcept;
   LayoutFile& operator=(LayoutFile&&) noexcept;
 
   [[nodiscard]] std::string name() const;  ///< of the sensor; "skin" without one
   [[nodiscard]] bool has(const std::string& attribute) const;
+  /// Text of an attribute, of the sensor or of its <part>; "" without one.
+  [[nodiscard]] std::string get(const std::string& attribute) const;
+  [[nodiscard]] std::string get(const std::string& part, const std::string& attribute) const;
   void set(const std::string& attribute, const std::string& value);
   void remove(const std::string& attribute);
 

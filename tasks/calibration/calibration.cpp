@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 
 #include "engine/base/error.hpp"
 
@@ -68,14 +69,18 @@ void check(const PressRecording& r) {
     throw InputError("a recording without any force; expected a press of the skin");
 }
 
+bool varies(std::span<const double> column) {
+  return std::ranges::adjacent_find(column, std::ranges::not_equal_to()) != column.end();
+}
+
 /// Why the columns cannot tell a number; "" if they may.
 std::string reason_against(const std::string& name, const PressRecording& r, int rows) {
-  const auto [least, most] = std::ranges::minmax(r.depth);
-  if ((name == kZero || name == kSlider || name == kTable) && !(most > least))
+  if ((name == kZero || name == kSlider || name == kTable) && !varies(r.depth))
     return "all rows have one depth";
   if (name == kZero && rows < 2) return "one row is fitted";
   if ((name == kRelaxation || name == kLag) && r.time.empty()) return "the recording has no times";
-  if ((name == kShear || name == kFriction) && r.shear.empty()) return "nothing is sheared";
+  if ((name == kRelaxation || name == kLag) && r.rows() < 2) return "the recording has one row";
+  if ((name == kShear || name == kFriction) && !varies(r.shear)) return "nothing is sheared";
   return "";
 }
 
@@ -122,7 +127,7 @@ Names choose_numbers(const CalibrationRequest& request, const PressRecording& re
 std::vector<double> acting_depths(const PressRecording& r, const SkinNumbers& numbers) {
   const double lag = number_or(numbers, kLag, 0), zero = number_or(numbers, kZero, 0);
   std::vector<double> out = r.depth;
-  for (std::size_t row = 0; row < r.rows() && lag > 0; ++row) {
+  for (std::size_t row = 0; row < r.rows() && r.rows() > 1 && lag > 0; ++row) {
     const double then = std::max(r.time[row] - lag, r.time[0]);
     const auto after = std::upper_bound(r.time.begin() + 1, r.time.end() - 1, then);
     const auto k = std::size_t(after - r.time.begin());
@@ -214,6 +219,15 @@ void scale_shear_start(const Forces& shear, const std::vector<std::string>& name
   start[kFriction] = kSlipStart * ratio;
 }
 
+/// Returns the largest ratio of shear to normal force, of rows whose normal force counts.
+double largest_ratio(const PressRecording& r) {
+  const double least = kSmallest * peak_of(r.force);
+  double ratio = 0;
+  for (std::size_t k = 0; k < r.rows(); ++k)
+    if (r.force[k] > least) ratio = std::max(ratio, std::abs(r.shear_force[k]) / r.force[k]);
+  return ratio;
+}
+
 /// Runs a fit and adds what it found.
 void add_fit(ForceFit& fit, const std::vector<std::string>& names, const SkinNumbers& start,
              Calibration& out) {
@@ -244,8 +258,13 @@ Calibration calibrate(const CalibrationRequest& request, const PressRecording& r
   std::vector<int> rows;
   for (int row = 0; row < int(recording.rows()); ++row)
     if (!std::ranges::binary_search(out.held_out, row)) rows.push_back(row);
-  const Names names = choose_numbers(request, recording, int(rows.size()), out.untold);
   const double depth = *std::ranges::max_element(recording.depth);
+  if (request.knots > 0 && !(depth > 0))
+    throw InputError(
+        fmt::format("a table up to the depth {} m; expected depths positive into the skin", depth));
+  const Names names = choose_numbers(request, recording, int(rows.size()), out.untold);
+  if (!names.shear.empty() && !(peak_of(recording.shear_force) > 0))
+    throw InputError("a shear without any force; expected shear forces, or no columns of a shear");
 
   SkinNumbers start = request.start;
   if (!names.normal.empty()) scale_start(request, recording, depth, start);
@@ -269,6 +288,8 @@ Calibration calibrate(const CalibrationRequest& request, const PressRecording& r
     scale_shear_start(path, names.shear, out.found, normal, recording.shear_force, start);
   ForceFit across(path, recording.shear_force, rows, depth, 0);
   add_fit(across, names.shear, start, out);
+  if (std::ranges::count(across.untold(), kFriction, &UntoldNumber::name) > 0)
+    out.least_friction = largest_ratio(recording);
   const std::vector<double> shear = path(out.found);
   out.shear = error_of(shear, recording.shear_force, rows);
   out.shear_held_out = error_of(shear, recording.shear_force, out.held_out);
@@ -278,6 +299,10 @@ Calibration calibrate(const CalibrationRequest& request, const PressRecording& r
 PressError check_calibration(const CalibrationRequest& request, const SkinNumbers& found,
                              const PressRecording& recording) {
   check(recording);
+  for (const char* const name : {kLag, kRelaxation})
+    if (found.contains(name) && recording.time.empty())
+      throw InputError(fmt::format(
+          "the other recording has no times, and '{}' was fitted; expected times", name));
   std::vector<int> rows(recording.rows());
   for (std::size_t k = 0; k < rows.size(); ++k) rows[k] = int(k);
   return error_of(normal_forces(request, recording, found), recording.force, rows);

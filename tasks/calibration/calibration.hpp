@@ -14,8 +14,9 @@ namespace tangere {
 
 struct CalibrationRequest {
   /// Makes the scene of placed_indenter(), with the attributes among these numbers in place of the
-  /// sensor's own. A table has `knots` pressures [Pa] "pressure[1]", … after 0, evenly spread up to
-  /// the depth "table_depth" [m].
+  /// sensor's own. Others are the sensor's own, whatever scenes were made before. A table has
+  /// `knots` pressures [Pa] "pressure[1]", … after 0, evenly spread up to the depth "table_depth"
+  /// [m].
   std::function<Scene(const SkinNumbers&)> scene;
   /// Attributes that may be fitted, with positive values at which the fit begins: `modulus` or
   /// `kn`, and of `relaxation`, `ks` and `mu` those that the sensor can have.
@@ -44,6 +45,9 @@ struct Calibration {
   SkinNumbers found;          ///< all numbers that were fitted, and "table_depth"
   std::vector<int> held_out;  ///< rows
   PressError normal, normal_held_out, shear, shear_held_out;
+  /// Where nothing slips, so that mu is not told: the largest recorded ratio of shear to normal
+  /// force, which is a lower bound of mu; else 0.
+  double least_friction = 0;
   bool converged = true;
 };
 
@@ -52,11 +56,14 @@ struct Calibration {
 std::vector<int> held_out_rows(double hold_out, int rows);
 
 /// Fits. Normal forces give all but ks and mu, which shear forces give then. Throws InputError for
-/// a recording without force, for columns of unlike lengths, for times that do not ascend, for a
-/// path that the sensor does not feel, and for a requested number that the columns cannot tell.
+/// a recording without force, for a shear without any, for columns of unlike lengths, for times
+/// that do not ascend, for a path that the sensor does not feel, for a requested number that the
+/// columns cannot tell, and for a table without a positive depth.
 Calibration calibrate(const CalibrationRequest& request, const PressRecording& recording);
 
 /// Compares the normal forces of another recording with those of the numbers that were found.
+/// Throws InputError for columns as calibrate(), and for one without times if a lag or a relaxation
+/// was found.
 PressError check_calibration(const CalibrationRequest& request, const SkinNumbers& found,
                              const PressRecording& recording);
 

@@ -20,6 +20,7 @@ std::string reason(const std::string& name) {
   if (name == kFriction) return "nothing slips, so it exceeds every ratio of shear to normal force";
   if (name == kRelaxation) return "the rates of the recording do not show it";
   if (name == kShear) return "everything slips";
+  if (name == kSliderForce) return "the slider does not slip, so it exceeds the slider's forces";
   return "the forces do not change with it";
 }
 
@@ -71,7 +72,8 @@ void ForceFit::run(std::vector<std::string> names, const SkinNumbers& start, Ski
     const std::size_t weak = weakest();
     if (weak == names.size()) return;
     untold_.push_back({names[weak], reason(names[weak])});
-    if (names[weak] == kFriction) fixed[kFriction] = scales_[weak].value(found_.x[weak]);
+    if (names[weak] == kFriction || names[weak] == kSliderForce)  // so that it stays without slip
+      fixed[names[weak]] = scales_[weak].value(found_.x[weak]);
     names.erase(names.begin() + std::ptrdiff_t(weak));
   }
 }

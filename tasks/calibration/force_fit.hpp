@@ -45,7 +45,7 @@ class ForceFit {
            int knots);
 
   /// Fits `names` from `start`, with `fixed` numbers. Those that turn out not to be told are listed
-  /// in untold() and left out.
+  /// in untold() and left out, so that the fit of the rest is without them.
   void run(std::vector<std::string> names, const SkinNumbers& start, SkinNumbers fixed);
 
   [[nodiscard]] std::vector<FittedNumber> numbers() const;

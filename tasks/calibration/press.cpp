@@ -3,10 +3,13 @@
 // that is stiff against its mass.
 #include "tasks/calibration/press.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
 
+#include "engine/base/error.hpp"
 #include "engine/sense/readout.hpp"
 #include "engine/step/stepper.hpp"
 
@@ -81,6 +84,11 @@ std::vector<double> shear_forces(const Scene& scene, std::span<const double> dep
   std::vector<double> out;
   for (std::size_t k = 0; k < depth.size(); ++k) {
     stepper.step(batch, std::array<double, 3>{shear[k], 0, -depth[k]});
+    if (failed(batch.status(0)))
+      throw InputError(fmt::format(
+          "row {}: the step to depth {} m and shear {} m failed: {}; expected a shorter "
+          "way from row to row",
+          k + 1, depth[k], shear[k], to_string(batch.status(0))));
     out.push_back(force_on_skin(readout, batch)[0]);
   }
   return out;

@@ -34,7 +34,7 @@ std::vector<double> press_forces(const Scene& scene, std::span<const double> dep
 
 /// Computes the force along x at each row of a path, which begins outside the skin above its first
 /// row [N]. It is slow: forces by rates are left out. `scene`: of placed_indenter(), with a
-/// position motor at the joint.
+/// position motor at the joint. Throws InputError for a step that fails, with its row.
 std::vector<double> shear_forces(const Scene& scene, std::span<const double> depth,
                                  std::span<const double> shear);
 

@@ -17,6 +17,7 @@ namespace tangere::apps {
 namespace {
 
 using nlohmann::json;
+using ::testing::EndsWith;
 using ::testing::HasSubstr;
 using ::testing::Not;
 
@@ -73,6 +74,10 @@ TEST(Calibrate, StiffnessAndZeroOfAPressAreFound) {
   EXPECT_LT(answer["normal_held_out"]["largest"], 1e-6);
   EXPECT_EQ(reason(answer, "relaxation"), "told") << "springs without a material have none";
   EXPECT_THAT(reason(answer, "mu"), HasSubstr("nothing is sheared"));
+  folder.write("still.csv", "depth,force,shear,shear_force\n1e-5,1,0,0\n2e-5,2,0,0\n");
+  const json still =
+      run_json(folder, {"calibrate", "still.csv", "--sensor", "skin.xml", "--flat", "0.0035"});
+  EXPECT_THAT(reason(still, "ks"), HasSubstr("nothing is sheared"));
   const std::string written = folder.read("out.xml");
   EXPECT_THAT(written, HasSubstr("kn=\"123\""));
   EXPECT_THAT(written, HasSubstr("name=\"skin_measured\""));
@@ -105,27 +110,47 @@ TEST(Calibrate, TheIntervalIsThatOfTheNoise) {
   EXPECT_GT(kn["high"], 80);
 }
 
+/// A film of 2e5 Pa that goes in by 0.2 mm at 10 mm/s, and out at 2 mm/s.
+std::string film(double tau) {
+  return table("time_ms,depth_mm,force_N", 41, [tau](int k) {
+    const bool in = k <= 20;
+    const double t = in ? 1e-3 * k : 0.02 + 5e-3 * (k - 20);
+    const double d = in ? 0.01 * t : 2e-4 - 0.002 * (t - 0.02);
+    const double rate = k == 20 ? 0 : in ? 0.01 : -0.002;
+    const double kn = 2.3 * 2e5 / kThickness * kArea, depth = kThickness / 10;
+    return std::vector<double>{1e3 * t, 1e3 * d, kPoints * kn * d * (1 + tau * rate / depth)};
+  });
+}
+const Words kFitFilm = {"calibrate", "press.csv", "--sensor", "skin.xml",
+                        "--flat",    "0.0035",    "--fit",    "modulus"};
+
 TEST(Calibrate, AFilmRelaxes) {
   const Folder folder;
   folder.write("skin.xml", layout("modulus=\"1e5\" thickness=\"4e-3\" mu=\"0.5\""));
-  const auto press = [&](double tau) {
-    folder.write(
-        "press.csv", table("time_ms,depth_mm,force_N", 41, [tau](int k) {
-          const bool in = k <= 20;  // in at 10 mm/s, out at 2 mm/s
-          const double t = in ? 1e-3 * k : 0.02 + 5e-3 * (k - 20);
-          const double d = in ? 0.01 * t : 2e-4 - 0.002 * (t - 0.02), rate = k == 20 ? 0
-                                                                             : in    ? 0.01
-                                                                                     : -0.002;
-          const double kn = 2.3 * 2e5 / kThickness * kArea, depth = kThickness / 10;
-          return std::vector<double>{1e3 * t, 1e3 * d, kPoints * kn * d * (1 + tau * rate / depth)};
-        }));
-    return run_json(folder, {"calibrate", "press.csv", "--sensor", "skin.xml", "--flat", "0.0035",
-                             "--fit", "modulus", "--fit", "relaxation"});
-  };
-  const json answer = press(0.008);
+  folder.write("press.csv", film(0.008));
+  const json answer = run_json(folder, kFitFilm + Words{"--fit", "relaxation"});
   EXPECT_NEAR(number(answer, "modulus")["value"], 2e5, 1e-4 * 2e5);
   EXPECT_NEAR(number(answer, "relaxation")["value"], 0.008, 1e-3 * 0.008);
-  EXPECT_THAT(reason(press(0), "relaxation"), HasSubstr("do not show it"));
+  folder.write("press.csv", film(0));
+  EXPECT_THAT(reason(run_json(folder, kFitFilm + Words{"--fit", "relaxation"}), "relaxation"),
+              HasSubstr("do not show it"));
+}
+
+/// A relaxation that is not told is that of the layout while the modulus is fitted, so the written
+/// layout has the error of the fit.
+TEST(Calibrate, ANumberThatIsNotToldIsTheLayouts) {
+  const Folder folder;
+  folder.write("skin.xml",
+               layout("modulus=\"1e5\" thickness=\"4e-3\" mu=\"0.5\" relaxation=\"0.02\""));
+  folder.write("press.csv", film(0));
+  const json both = run_json(folder, kFitFilm + Words{"--fit", "relaxation", "-o", "out.xml"}),
+             alone = run_json(folder, kFitFilm);
+  ASSERT_THAT(reason(both, "relaxation"), HasSubstr("do not show it"));
+  EXPECT_THAT(folder.read("out.xml"), HasSubstr("relaxation=\"0.02\""));
+  const double modulus = number(alone, "modulus")["value"], error = alone["normal"]["largest"];
+  EXPECT_GT(error, 0.1) << "of a relaxation that the press does not have";
+  EXPECT_NEAR(number(both, "modulus")["value"], modulus, 1e-3 * modulus);
+  EXPECT_NEAR(both["normal"]["largest"], error, 1e-3);
 }
 
 /// A press of 0.05 mm, then a shear of up to 0.06 mm and back.
@@ -162,6 +187,50 @@ TEST(Calibrate, AShearShowsItsSpringAndItsFriction) {
   EXPECT_THAT(folder.read("stuck.xml"), HasSubstr("mu=\"1\"")) << "as in the layout";
   EXPECT_NEAR(number(stuck, "ks")["value"], 40, 1e-3 * 40);
   EXPECT_THAT(reason(stuck, "mu"), HasSubstr("nothing slips"));
+
+  // A friction of the layout that would slip gives way to the largest ratio.
+  folder.write("skin.xml", layout("kn=\"50\" ks=\"10\" mu=\"0.1\""));
+  run_json(folder, words + Words{"-o", "bound.xml"});
+  EXPECT_THAT(folder.read("bound.xml"), HasSubstr("mu=\"0.48\""));  // 40 · 6e-5 / (100 · 5e-5)
+  EXPECT_THAT(folder.read("bound.xml"), HasSubstr("mu: a lower bound"));
+}
+
+/// A lag needs times, also of the other recording, and more than one row.
+TEST(Calibrate, ALagNeedsTimes) {
+  const Folder folder;
+  folder.write("skin.xml", layout("kn=\"50\""));
+  const auto late = [](int k) {
+    const double before = 1e-5 * std::max(k - 0.5, 0.0);
+    return std::vector<double>{0.1 * k, 1e-5 * k, kPoints * 100 * before};
+  };
+  folder.write("press.csv", table("time,depth,force", 20, late));
+  folder.write("slow.csv", "depth,force\n1e-4,0.37\n");
+  folder.write("row.csv", "time,depth,force\n1,1e-4,0.37\n");
+  const Words flat = {"--sensor", "skin.xml", "--flat", "0.0035"},
+              fit = Words{"calibrate", "press.csv", "--fit", "kn", "--fit", "lag"} + flat;
+  const Outcome slow = run(folder, fit + Words{"--check", "slow.csv"});
+  EXPECT_EQ(slow.exit_code, 2) << slow.out;
+  EXPECT_THAT(slow.err, HasSubstr("has no times, and 'lag' was fitted"));
+  const json row = run_json(folder, fit + Words{"--check", "row.csv"});
+  EXPECT_NEAR(number(row, "lag")["value"], 0.05, 1e-3);
+  EXPECT_LT(row["other"]["largest"], 0.01);
+  const Outcome one =
+      run(folder, Words{"calibrate", "row.csv", "--fit", "kn", "--fit", "lag"} + flat);
+  EXPECT_EQ(one.exit_code, 2) << one.out;
+  EXPECT_THAT(one.err, HasSubstr("has one row"));
+}
+
+/// A slider that never slips is a spring; its force is not told.
+TEST(Calibrate, ASliderThatDoesNotSlipIsASpring) {
+  const Folder folder;
+  folder.write("skin.xml", layout("kn=\"100\""));
+  folder.write("press.csv", table("depth,force", 20, [](int k) {
+                 return std::vector<double>{1e-5 * k, (kPoints * 100 + 2000) * 1e-5 * k};
+               }));
+  const json answer = run_json(folder, {"calibrate", "press.csv", "--sensor", "skin.xml", "--flat",
+                                        "0.0035", "--fit", "slider"});
+  EXPECT_THAT(reason(answer, "slider_force"), HasSubstr("does not slip"));
+  EXPECT_NEAR(number(answer, "slider")["value"], 2000, 1);
 }
 
 /// Writes the layout of a GelSight Mini with a layer, gel.xml.
@@ -255,6 +324,36 @@ TEST(Calibrate, ALatticeIsATableAndASlider) {
 
 const std::string kTable = "depth,force\n1e-4,1\n2e-4,2\n";
 
+TEST(Calibrate, WhatTheLayoutHasNotAndWhatIsNotFittedIsNotInvented) {
+  const Folder folder;
+  folder.write("press.csv", kTable);
+  folder.write("skin.xml", layout("mu=\"1\""));
+  const Outcome none =
+      run(folder, {"calibrate", "press.csv", "--sensor", "skin.xml", "--flat", "0.0035"});
+  const std::string row = none.out.substr(none.out.find("kn [N/m]"));
+  EXPECT_THAT(row.substr(0, row.find('\n')), Not(EndsWith("1"))) << "no kn in the layout";
+
+  folder.write("skin.xml", layout("kn=\"270\""));
+  run_json(folder, {"calibrate", "press.csv", "--sensor", "skin.xml", "--flat", "0.0035", "--fit",
+                    "zero", "-o", "out.xml"});
+  EXPECT_THAT(folder.read("out.xml"), HasSubstr("name=\"skin_guess\""));
+  EXPECT_THAT(folder.read("out.xml"), Not(HasSubstr("measured")));
+}
+
+TEST(Calibrate, OtherColumnsAreNamedAndNotUsed) {
+  const Folder folder;
+  folder.write("skin.xml", layout("kn=\"50\""));
+  folder.write("press.csv",
+               "time_index,depth [mm],force_std,force (mN),shear_force_std\n"
+               "7,0.1,9,370,9\n7,0.2,9,740,9\n");
+  const Outcome outcome =
+      run(folder, {"calibrate", "press.csv", "--sensor", "skin.xml", "--flat", "0.0035", "--json"});
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_NEAR(number(json::parse(outcome.out), "kn")["value"], 100, 1e-3);
+  for (const char* const name : {"time_index", "force_std", "shear_force_std"})
+    EXPECT_THAT(outcome.err, HasSubstr(std::string("column '") + name + "' is not used"));
+}
+
 TEST(Calibrate, SaysWhatIsWrong) {
   const Folder folder;
   folder.write("skin.xml", layout("kn=\"50\""));
@@ -269,7 +368,8 @@ TEST(Calibrate, SaysWhatIsWrong) {
   EXPECT_THAT(err(kTable, {"--box", "0.01"}), HasSubstr("expected 2 positive numbers"));
   EXPECT_THAT(err(kTable, flat + Words{"--box", "1,1"}), HasSubstr("expected one of"));
   EXPECT_THAT(err("depth,forc\n1,2\n", flat), HasSubstr("no column 'force' among depth, forc"));
-  EXPECT_THAT(err("depth_in,force\n1,2\n", flat), HasSubstr("is in 'in'; expected m or mm"));
+  EXPECT_THAT(err("depth_in,force\n1,2\n", flat),
+              HasSubstr("no column 'depth' among depth_in, force; expected one in m or mm"));
   EXPECT_THAT(err("depth,force,depth\n1,2,1\n", flat), HasSubstr("two columns 'depth'"));
   EXPECT_THAT(err("1,2\n", flat), HasSubstr("p.csv:1: no names of columns"));
   EXPECT_THAT(err(kTable, flat + Words{"--fit", "mu"}), HasSubstr("nothing is sheared"));
@@ -282,8 +382,20 @@ TEST(Calibrate, SaysWhatIsWrong) {
   EXPECT_THAT(err("depth,force\n1e-4,-1\n", flat), HasSubstr("positive in compression"));
   EXPECT_THAT(err("time,depth,force\n1,1e-4,1\n1,1e-4,1\n", flat), HasSubstr("ascending times"));
   EXPECT_THAT(err("depth,force,shear\n1e-4,1,1e-4\n", flat), HasSubstr("expected both or none"));
+  EXPECT_THAT(err("depth,force,shear,shear_force\n1e-4,1,0,0\n1e-4,1,1e-4,0\n", flat),
+              HasSubstr("a shear without any force"));
   folder.write("skin.xml", layout("kn=\"50\" ks=\"10\""));
   EXPECT_THAT(err(kTable, flat + Words{"--table", "3"}), HasSubstr("ks or kt by point"));
+  folder.write("skin.xml", layout("kn=\"50\" feedback=\"true\""));
+  EXPECT_THAT(err(kTable, flat + Words{"--table", "3"}), HasSubstr("--table with feedback"));
+  std::string late = layout("kn=\"50\"");
+  late.replace(late.find("/></sensor>"), 2, "><imperfections delay=\"0.1\"/></tactile>");
+  folder.write("skin.xml", late);
+  EXPECT_THAT(err(kTable, flat + Words{"--table", "3"}),
+              HasSubstr("skin.xml:1: --table with delay in <imperfections>"));
+  folder.write("skin.xml", layout("kn=\"50\""));
+  EXPECT_THAT(err("depth,force\n-1e-4,1\n-2e-4,2\n", flat + Words{"--table", "3"}),
+              HasSubstr("expected depths positive into the skin"));
   folder.write("skin.xml", layout("pressure_depth=\"0 1e-3\" pressure=\"0 1e4\""));
   EXPECT_THAT(err(kTable, flat), HasSubstr("has a table of pressures; expected --table"));
   folder.write("skin.xml",
