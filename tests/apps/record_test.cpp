@@ -87,7 +87,7 @@ TEST(Record, AnythingElseOfATrajectoryStillWorks) {
   EXPECT_EQ(none.exit_code, 2);
   EXPECT_THAT(none.err, HasSubstr("the run recorded no tactile field, pressure or shear"));
   EXPECT_THAT(run(folder, {"plot", "sum.h5", "-o", "sum.svg", "--sensor", "pad"}).err,
-              HasSubstr("of sensor 'pad' the run recorded only the sum, markers or flow"));
+              HasSubstr("of sensor 'pad' the run recorded only the sum, markers, surface or flow"));
   run_json(folder, {"simulate", "stable_grasp", "-o", "task.h5", "--record", "left_pad.sum"});
   EXPECT_EQ(shape(folder, "task.h5", "tactile/left_pad/sum").back(), 6U);
 }
@@ -391,7 +391,7 @@ TEST(Record, MarkersAreRecordedWhereASensorHasThem) {
   const Outcome none = run(folder, {"simulate", ball, "-o", "x.h5", "--record", "pad.markers"});
   EXPECT_EQ(none.exit_code, 2);
   EXPECT_THAT(none.err, HasSubstr("--record: 'pad.markers', but "));
-  EXPECT_THAT(none.err, HasSubstr("sensor 'pad' has no <markers>; expected them in its <tactile>"));
+  EXPECT_THAT(none.err, HasSubstr("sensor 'pad' has no <markers>; expected it in its <tactile>"));
   std::string text = file_bytes(ball);
   const std::size_t tag = text.find("<tactile name"), end = text.find("/>", tag);
   text.replace(end, 2, "><markers stiffness=\"20\"/></tactile>");
@@ -431,7 +431,7 @@ TEST(Record, MarkersAreRecordedWhereASensorHasThem) {
            {"simulate", "gel.xml", "-o", "only.h5", "--steps", "20", "--record", "pad.markers"});
   EXPECT_EQ(run(folder, {"view", "only.h5", "-o", "only.html"}).exit_code, 0);
   EXPECT_THAT(run(folder, {"plot", "only.h5", "-o", "only.svg", "--sensor", "pad"}).err,
-              HasSubstr("recorded only the sum, markers or flow"));
+              HasSubstr("recorded only the sum, markers, surface or flow"));
   const Outcome check = run(folder, {"gradcheck", ball, "--loss", "markers"});
   EXPECT_EQ(check.exit_code, 2);
   EXPECT_THAT(check.err, HasSubstr("no sensor of the scene has <markers>"));
