@@ -176,8 +176,8 @@ void block(benchmark::State& state, int resolution, bool pressure = false) {
     arrays[l].resize(std::size_t(sensor.points()) * 3);
     dense[l] = arrays[l].data();
   }
-  const kernels::TactileBlockArgs<Real> args{&pad,     ContactLaw::clamped, 1,       &kMiddle.shape,
-                                             shape_touches, dense.data(),        pressure};
+  const kernels::TactileBlockArgs<Real> args{
+      &pad, ContactLaw::clamped, 1, &kMiddle.shape, shape_touches, dense.data(), pressure};
   for (auto _ : state) {
     run(args);
     benchmark::ClobberMemory();
