@@ -254,7 +254,7 @@ TEST(Calibrate, TwoPressesOfAGelPredictTwoOthers) {
     const json answer = run_json(folder, {"calibrate", "press.csv", "--sensor", "gel.xml", "--ball",
                                           "0.0075", "--hold-out", "2"});
     EXPECT_LE(answer["normal_held_out"]["largest_by_row"], 0.04) << text;
-    EXPECT_NEAR(number(answer, "modulus")["value"], 4.28e5, 0.08 * 4.28e5);
+    EXPECT_NEAR(number(answer, "modulus")["value"], 4.28e5, 0.1 * 4.28e5);
   }
 }
 
