@@ -535,8 +535,7 @@ void add_batches(nb::module_& m) {
            "it; 'pad.sum' (E, 6): force [N] and where it presses [m], body axes; 'pad.flow' the\n"
            "shear over its largest length; 'pad.ideal' the field without imperfections;\n"
            "'pad.markers' the displacement of markers [m], 'pad.surface' that of a layer's\n"
-           "surface [m]. `out`: an array to fill instead of a\n"
-           "new one.")
+           "surface [m]. `out`: an array to fill instead of a new one.")
       .def("set_state", &PythonBatch::set_state, "q"_a, "v"_a, "envs"_a = nb::none(),
            "Sets states: `q` (n, nq) or (nq), `v` (n, nv) or (nv), of the environments listed in\n"
            "`envs` (indices, or a mask (E)), or of all. Releases a failed environment; drops the\n"
