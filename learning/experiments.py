@@ -82,7 +82,7 @@ EXPERIMENTS = [
     Experiment("ppo-cap", "ppo.py cap_opening", 5, 300,
                "cap, touch, imitates 4/5", "87.3 %", first_seed=5),
     *(Experiment(f"skin-{skin}", f"ppo.py stable_grasp --skin {skin} {OTHER_SKINS[skin]}", 3, 60,
-                 f"stable grasp, {skin}")
+                 skin)
       for skin in ("springs", "layer")),
     Experiment("bc-push", CLONED, 3, 450, "box pushing, goal and touch, visits",
                data=f"pushes {PUSHES}", first_seed=5),
