@@ -117,7 +117,7 @@ def test_every_skin_is_one_of_every_task_with_pads():
             force = np.abs(run.fields["left_pad.ideal"]).sum((2, 3)).max(0)  # (E, 3)
             found[skin] = np.stack([force[:, :2].sum(1), force[:, 2]])
         assert found["springs"].min() > 0.01
-        for skin in SKINS:  # all of them feel the grip
+        for skin in SKINS:  # all of them have the force of the grip
             assert np.all(np.abs(np.log(found[skin] / found["springs"])) < np.log(2)), (task, skin)
 
 

@@ -57,7 +57,7 @@ std::vector<int> held_out_rows(double hold_out, int rows);
 
 /// Fits. Normal forces give all but ks and mu, which shear forces give then. Throws InputError for
 /// a recording without force, for a shear without any, for columns of unlike lengths, for times
-/// that do not ascend, for a path that the sensor does not feel, for a requested number that the
+/// that do not ascend, for a path on which the sensor has no force, for a requested number that the
 /// columns cannot tell, and for a table without a positive depth.
 Calibration calibrate(const CalibrationRequest& request, const PressRecording& recording);
 

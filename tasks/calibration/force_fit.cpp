@@ -14,7 +14,7 @@ namespace {
 constexpr double kNoInfluence = 1e-6;  // root mean square change, of the peak, by a whole number
 constexpr double kLeastSlip = 0.03;    // share of the forces that slip, by their squares
 
-bool is_of_table(const std::string& name) { return name.starts_with("pressure["); }
+bool is_table_number(const std::string& name) { return name.starts_with("pressure["); }
 
 std::string reason(const std::string& name) {
   if (name == kFriction) return "nothing slips, so it exceeds every ratio of shear to normal force";
@@ -50,7 +50,7 @@ ForceFit::ForceFit(Forces forces, std::span<const double> recorded, std::vector<
 
 ForceFit::Scale ForceFit::scale_of(const std::string& name, const SkinNumbers& start) const {
   if (name == kZero) return {Scale::Kind::linear, depth_};
-  const bool vanishes = name == kRelaxation || name == kLag || is_of_table(name);
+  const bool vanishes = name == kRelaxation || name == kLag || is_table_number(name);
   return {vanishes ? Scale::Kind::square : Scale::Kind::exponential, start.at(name)};
 }
 
@@ -83,7 +83,7 @@ SkinNumbers ForceFit::numbers_at(std::span<const double> x) const {
   double pressure = 0;
   for (std::size_t k = 0; k < names_.size(); ++k) {
     const double value = scales_[k].value(x[k]);
-    out[names_[k]] = is_of_table(names_[k]) ? pressure += value : value;
+    out[names_[k]] = is_table_number(names_[k]) ? pressure += value : value;
   }
   return out;
 }
@@ -111,7 +111,7 @@ bool ForceFit::holds(std::size_t friction) const {
 /// Returns the first number that has no influence, or whose interval goes beyond 0.
 std::size_t ForceFit::weakest() const {
   for (std::size_t k = 0; k < names_.size(); ++k) {
-    if (is_of_table(names_[k])) continue;
+    if (is_table_number(names_[k])) continue;
     if (found_.influence[k] < kNoInfluence) return k;
     if (names_[k] == kFriction && holds(k)) return k;
     if (names_[k] == kRelaxation && !(interval(k).low > 0)) return k;
@@ -124,7 +124,8 @@ FittedNumber ForceFit::interval(std::size_t k) const {
   std::vector<double> gradient(names_.size());
   gradient[k] = scales_[k].slope(found_.x[k]);
   double value = scales_[k].value(found_.x[k]);
-  for (std::size_t j = k; j > 0 && is_of_table(names_[k]) && is_of_table(names_[j - 1]); --j) {
+  for (std::size_t j = k; j > 0 && is_table_number(names_[k]) && is_table_number(names_[j - 1]);
+       --j) {
     gradient[j - 1] = scales_[j - 1].slope(found_.x[j - 1]);
     value += scales_[j - 1].value(found_.x[j - 1]);
   }
