@@ -56,7 +56,8 @@ Json joint_effects_json(const Scene& scene) {
                    {"stiffness", e.stiffness},
                    {"rest", e.stiffness != 0 && !n.rest->empty() ? Json(*n.rest) : Json()},
                    {"limits", e.limits ? Json(*e.limits) : Json()},
-                   {"lim_stiffness", e.limit_stiffness}});
+                   {"lim_stiffness", e.limit_stiffness},
+                   {"friction", e.friction}});
   }
   return out;
 }
@@ -73,6 +74,7 @@ std::string joint_effects_text(const Scene& scene) {
       parts.push_back(n.rest->empty() ? fmt::format("stiffness {:.6g}", e.stiffness)
                                       : fmt::format("stiffness {:.6g} about {:.6g}", e.stiffness,
                                                     fmt::join(*n.rest, " ")));
+    if (e.friction != 0) parts.push_back(fmt::format("dry friction {:.6g}", e.friction));
     if (e.limits && e.limit_stiffness != 0)
       parts.push_back(fmt::format("limits {:.6g} {:.6g} of stiffness {:.6g}", (*e.limits)[0],
                                   (*e.limits)[1], e.limit_stiffness));

@@ -75,8 +75,9 @@ Record record_of(const std::string& option, const Model& model) {
   const TimedName* const v = record.find("v");
   if (q != nullptr) outputs.states = q->times;
   if (v != nullptr) outputs.states = v->times;
-  if (record.find("memory") != nullptr && !model.has_shear_springs())
-    throw InputError(record.where + ": 'memory', but no contact or sensor of the scene has ks");
+  if (record.find("memory") != nullptr && !model.has_shear_state())
+    throw InputError(record.where +
+                     ": 'memory', but nothing in the scene has ks or friction of joints");
   outputs.fields.emplace();
   const std::vector<std::string> sensors = sensor_names(model.scene());
   for (const TimedName& requested : record.requested)
@@ -94,7 +95,7 @@ Record record_of(const std::string& option, const Model& model) {
 
 void take_memory(Record& record, const Model& model) {
   RolloutOutputs& outputs = record.outputs;
-  outputs.memory = model.has_shear_springs();
+  outputs.memory = model.has_shear_state();
   outputs.shear_times = outputs.states.given() ? outputs.states : OutputTimes{.final = true};
   if (const TimedName* const requested = record.find("memory"))
     outputs.shear_times = requested->times;

@@ -205,11 +205,12 @@ struct Start {
   void print(const Console& console, const Model& model, const Scene& scene,
              const Stepper& stepper) const {
     if (!saved) return;
-    if (model.has_shear_springs() && !saved->memory)
-      console.note(fmt::format(
-          "row {} of {} does not hold the shear state{}: contacts with ks begin unsheared; "
-          "simulate stores it at its last row, and with --record memory at every row",
-          saved->row, saved->path, rows_with_memory(*saved)));
+    if (model.has_shear_state() && !saved->memory)
+      console.note(
+          fmt::format("row {} of {} does not hold the shear state{}: contacts with ks and joints "
+                      "with friction begin unsheared; "
+                      "simulate stores it at its last row, and with --record memory at every row",
+                      saved->row, saved->path, rows_with_memory(*saved)));
     if (!continues)
       console.note(
           fmt::format("{} was made by {} with steps of {} s, this run takes {} with {} s: it "

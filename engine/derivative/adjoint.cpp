@@ -106,7 +106,7 @@ struct Adjoint::Impl {
     gather(w.q1, g.tape.state(g.step + 1), m.nq, g.first);
     gather(w.x_inner, g.tape.inner(g.step), settings.integrator.scheme().inner_stages() * m.nv,
            g.first);
-    for (int l = 0; l < L && !m.shear_springs.empty(); ++l) {
+    for (int l = 0; l < L && m.has_shear_state(); ++l) {
       const auto after = g.tape.memory(g.step + 1, g.first + l);
       set_memory(x, l, without_kept(g.tape.memory(g.step, g.first + l)), without_kept(after));
       for (std::size_t k = 0; k < losses.size(); ++k) {
@@ -159,7 +159,7 @@ struct Adjoint::Impl {
       const TapedSolve& solve = special.solves[k];
       set(w.q1, solve.q);
       set(w.x_inner, solve.inner);
-      if (!compiled(model).shear_springs.empty())
+      if (compiled(model).has_shear_state())
         set_memory(x, lane,
                    k > 0 ? std::span<const ShearEntry>(special.solves[k - 1].memory)
                          : without_kept(g.tape.memory(g.step, g.first + lane)),
@@ -247,8 +247,9 @@ struct Adjoint::Impl {
       c.previous_q[at] = o.q_before[i][lane];
       c.previous_v[at] = o.v_before[i][lane];
     }
+    fold_followers(m, c, column);
     if (!c.past.empty()) go_back(c, column);
-    if (!m.shear_springs.empty()) {
+    if (m.has_shear_state()) {
       std::vector<double>& memory = c.shear[std::size_t(column)];
       const std::vector<double>& rest = o.memory_before[std::size_t(lane)];
       memory = o.kept[std::size_t(lane)];
@@ -258,6 +259,17 @@ struct Adjoint::Impl {
     if (o.parameters == nullptr) return;
     for (int i = 0; i < parameter_rows(model); ++i)
       c.parameters[std::size_t(i * kBlock + column)] += o.parameters[i][lane];
+  }
+
+  /// Adds the cotangents of joints that follow others to those of their leaders.
+  static void fold_followers(const CompiledModel& m, BlockCotangent& c, int column) {
+    for (const kernels::Follower& f : m.followers)
+      for (auto* of : {&c.q, &c.v, &c.previous_q, &c.previous_v}) {
+        const auto at = [&](int dof) -> double& {
+          return (*of)[std::size_t(dof * kBlock + column)];
+        };
+        at(f.leader_v) += f.ratio * std::exchange(at(f.v), 0.0);
+      }
   }
 
   /// Adds the cotangents of the state one step before, and moves those of earlier ones up.

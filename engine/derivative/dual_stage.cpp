@@ -47,6 +47,7 @@ struct DualStage::Impl {
   std::vector<kernels::Anchor<D>> anchors;
   std::vector<std::vector<D>> listed_anchors;  ///< of each pair
   std::vector<D> ground_anchors;
+  std::vector<D> dry_anchors, stage_dry_anchors;  ///< (nv) with tangents, and those of a stage
   std::vector<Coefficients<D>> sensor_laws;
   std::vector<std::vector<double>> point_tangents;   ///< of each sensor; empty: zeros
   std::vector<kernels::Vec3<double>> touched_sizes;  ///< of each body in this environment
@@ -107,6 +108,7 @@ struct DualStage::Impl {
     stretch.assign(std::size_t(kernels::kSizeNumbers * view.n_solids), 0.0);
     const std::size_t nv = std::size_t(m.nv);
     force_scale.resize(nv), mass_diagonal.resize(nv), excess.resize(1);
+    dry_anchors.assign(nv, D(0.0)), stage_dry_anchors.assign(nv, D(0.0));
     links.resize(m.links.size()), columns.resize(2 * m.links.size());
     contacts.resize(std::size_t(view.n_link_pairs + view.n_grounded));
     faces.assign(3 * pairs.size(), D(0.0));
@@ -175,6 +177,23 @@ struct DualStage::Impl {
         put_anchor(of.first + i,
                    &ground_anchors[std::size_t(kernels::kAnchorNumbers * (first + i))]);
     }
+  }
+
+  void put_dry_anchors() {
+    for (const DryDof& dof : m.dry_dofs) {
+      const D& z = dry_anchors[std::size_t(dof.v)];
+      stage_dry_anchors[std::size_t(dof.v)] = frozen ? D(z.value) : z;
+    }
+  }
+  /// Returns the law of a joint's dry friction at its coordinate and rate.
+  [[nodiscard]] kernels::DryFriction<D> dry_friction_at(const DryDof& dof, const D& q,
+                                                        const D& v) const {
+    return kernels::dry_friction(m.dof_effects[std::size_t(dof.v)], q, v,
+                                 dry_anchors[std::size_t(dof.v)]);
+  }
+  /// Returns the elastic displacement of dry friction in a shear state.
+  D& dry_displacement(std::vector<D>& state, const DryDof& dof) const {
+    return state[3 * std::size_t(m.shear_spring_points + (&dof - m.dry_dofs.data()))];
   }
 
   /// Returns a contact with shear springs at the poses of all links.
@@ -383,6 +402,7 @@ struct DualStage::Impl {
     a.s = s.s.data();
     a.tau = s.tau.data();
     a.target = s.target.data();
+    a.dry_anchor = stage_dry_anchors.data();
     a.c0_over_h = D(s.c0_over_h);
     a.inverse_h = D(s.inverse_h);
     a.block = block.data();
@@ -406,7 +426,7 @@ struct DualStage::Impl {
 DualStage::DualStage(const CompiledModel& model) : impl_(std::make_unique<Impl>(model)) {
   centre.resize(std::size_t(model.nq));
   for (auto* p : {&x, &r, &s, &tau, &target, &v, &g}) p->assign(std::size_t(model.nv), D(0.0));
-  s_start.assign(3 * std::size_t(model.shear_spring_points), D(0.0));
+  s_start.assign(3 * std::size_t(model.shear_state_points()), D(0.0));
 }
 DualStage::~DualStage() = default;
 
@@ -462,6 +482,9 @@ void DualStage::choose_faces() {
 
 void DualStage::recall() {
   Impl& i = *impl_;
+  for (const DryDof& dof : i.m.dry_dofs)
+    i.dry_anchors[std::size_t(dof.v)] =
+        centre[std::size_t(dof.q)] - i.dry_displacement(s_start, dof);
   if (i.m.shear_springs.empty()) return;
   const std::vector<D> still(v.size(), D(0.0));
   const std::vector<kernels::LinkPose<D>> poses = i.poses_at(centre, still);
@@ -480,6 +503,11 @@ void DualStage::recall() {
 
 void DualStage::advance(const std::vector<D>& q, const std::vector<D>& twist) {
   Impl& i = *impl_;
+  for (const DryDof& dof : i.m.dry_dofs) {
+    const D &at = q[std::size_t(dof.q)], &rate = twist[std::size_t(dof.v)];
+    i.dry_displacement(s_start, dof) =
+        i.dry_friction_at(dof, at, rate).hold * (at - i.dry_anchors[std::size_t(dof.v)]);
+  }
   if (i.m.shear_springs.empty()) return;
   const std::vector<kernels::LinkPose<D>> poses = i.poses_at(q, twist);
   for (const kernels::ShearSpringContact& of : i.m.shear_springs) {
@@ -541,6 +569,7 @@ void DualStage::residual() {
   kernels::kinematics(i.view, a);
   i.find_touching();
   i.put_ground_anchors();
+  i.put_dry_anchors();
   kernels::residual<false>(i.view, a);
   if (!i.heavier || i.frozen) return;
   std::vector<D> mass_product(g.size());

@@ -21,7 +21,7 @@ AdjointWorkspace<L>::AdjointWorkspace(const CompiledModel& model, int loss_count
       shear_adjoint(model, loss_count),
       q_stage(std::size_t(model.nq)) {
   const std::size_t nv = std::size_t(model.nv), inner = std::size_t(inner_stages),
-                    per_loss = 8 + 2 * inner, shared = 8 + 2 * (1 + inner);
+                    per_loss = 9 + 2 * inner, shared = 9 + 2 * (1 + inner);
   const std::size_t count = parameters ? std::size_t(model.view.rows.sensors) : 0,
                     all = parameters ? std::size_t(model.view.rows.count) : 0;
   shear.assign(nv * (per_loss * losses.size() + shared) + all * losses.size() + count, Row{});
@@ -31,12 +31,13 @@ AdjointWorkspace<L>::AdjointWorkspace(const CompiledModel& model, int loss_count
     at += rows;
   };
   for (LossRows<L>& l : losses) {
-    for (Row** p :
-         {&l.q, &l.v, &l.q_centre, &l.v_centre, &l.q_before, &l.v_before, &l.tau, &l.target})
+    for (Row** p : {&l.q, &l.v, &l.q_centre, &l.v_centre, &l.q_before, &l.v_before, &l.tau,
+                    &l.target, &l.dry_anchor})
       take(*p, nv);
     for (Row** p : {&l.q_inner, &l.v_inner}) take(*p, inner * nv);
   }
-  for (Row** p : {&rhs, &lambda, &nu, &mass_lambda, &target, &difference, &q_centre, &v_centre})
+  for (Row** p :
+       {&rhs, &lambda, &nu, &mass_lambda, &target, &dry_anchor, &difference, &q_centre, &v_centre})
     take(*p, nv);
   for (Row** p : {&q_older, &v_older}) take(*p, (1 + inner) * nv);
   for (LossRows<L>& l : losses) l.parameters = nullptr;
@@ -79,11 +80,12 @@ template <int L>
 void GroupAdjoint::solve(const StageContext<L>& s) const {
   BasicWorkspace<L>& w = s.w;
   AdjointWorkspace<L>& a = s.a;
+  fold_followers(model_, a.rhs);
   solve_watched<true>(model_, s.table, w, s.lanes, a.rhs, a.lambda, a.sound);
   for (int l = 0; l < L; ++l) {
     if (!has(s.lanes, l) || a.sound[l] > 0) continue;
     factor_pivoted(model_, w, l, true);
-    w.pivoted.solve(l, a.rhs, a.lambda);
+    solve_pivoted(model_, w, l, a.rhs, a.lambda);
   }
 }
 
@@ -126,6 +128,7 @@ void GroupAdjoint::hand_on(const StageContext<L>& s, const Scheme& scheme, int s
                                       a.nu,
                                       a.mass_lambda,
                                       a.target,
+                                      a.dry_anchor,
                                       a.q_centre,
                                       a.v_centre,
                                       history_of(s, scheme, stage)};
@@ -145,6 +148,7 @@ void GroupAdjoint::hand_on(const StageContext<L>& s, const Scheme& scheme, int s
   add_lanes(loss.v_inner, a.v_older + before * n, stage * n, s.lanes);
   add_lanes(loss.tau, a.lambda, n, s.lanes);
   add_lanes(loss.target, a.target, n, s.lanes);
+  add_lanes(loss.dry_anchor, a.dry_anchor, n, s.lanes);
   if (loss.parameters == nullptr) return;
   const int count = model_.view.rows.sensors;
   clear(a.numbers, count);
@@ -193,6 +197,7 @@ void GroupAdjoint::reverse_stages(const StageContext<L>& s, const Scheme& scheme
   const int last = scheme.inner_stages();
   for (const LossRows<L>& o : s.a.losses)
     for (Row<L>* rows : {o.q_inner, o.v_inner}) clear(rows, last * model_.nv);
+  for (const LossRows<L>& o : s.a.losses) clear(o.dry_anchor, model_.nv);
   start_solve(model_, s.table, w, s.lanes);
   begin_shear(model_, s.table, w);
   s.a.shear_adjoint.begin(model_);

@@ -19,7 +19,7 @@ struct AdjointWorkspace {
   AlignedVector<Row> shear;
   std::vector<LossRows<L>> losses;
   // One stage: the linear system and its results in all lanes, before the mask is applied.
-  Row *rhs, *lambda, *nu, *mass_lambda, *target, *difference, *q_centre, *v_centre;
+  Row *rhs, *lambda, *nu, *mass_lambda, *target, *dry_anchor, *difference, *q_centre, *v_centre;
   Row *q_older, *v_older;  ///< (nv) for each state that a stage may depend on, one after another
   Row* numbers = nullptr;  ///< (parameter_numbers), or null
   Row sound;

@@ -203,6 +203,9 @@ void NumberGradients::add_joints() {
     add_effect(Field::armature, kernels::kDofArmature, 0, slides);
     add_effect(Field::stiffness, kernels::kDofStiffness, 0, slides);
     if (d.limits) add_effect(Field::lim_stiffness, kernels::kDofLimitStiffness, 0, slides);
+    const auto first_link = std::size_t(compiled(model_).joints[i].first_link);
+    if ((compiled(model_).links[first_link].effects & kernels::kDryFriction) != 0)
+      add_effect(Field::friction, kernels::kDofFriction, 0, slides);
     if (d.turning) {
       add_effect(Field::turning_damping, kernels::kDofDamping, slides, n);
       add_effect(Field::turning_stiffness, kernels::kDofStiffness, slides, n);

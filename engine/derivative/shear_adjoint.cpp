@@ -3,6 +3,7 @@
 #include "engine/derivative/shear_adjoint.hpp"
 
 #include "engine/derivative/link_cotangents.hpp"
+#include "engine/step/dry_friction_state.hpp"
 #include "engine/step/kept_anchors.hpp"
 
 namespace tangere {
@@ -165,6 +166,7 @@ template <int L>
 void ShearAdjoint<L>::reverse_end(const CompiledModel& m, const kernels::KernelTable& table,
                                   BasicWorkspace<L>& w, LaneBits lanes, LossRows<L>& loss,
                                   int number) {
+  reverse_dry_end(m, w, lanes, loss);
   if (m.shear_springs.empty()) return;
   std::fill(end_.begin(), end_.end(), MotionCotangent<Row<L>>{});
   table.stage<L>().poses_at(m.view, w.stage, w.q1, w.stage.v, w.zero, at_.data());
@@ -172,6 +174,43 @@ void ShearAdjoint<L>::reverse_end(const CompiledModel& m, const kernels::KernelT
                               at_touches_.data());
   pull_back(m, table, w, lanes, false, loss, number);
   add_to_state(m, table, w, lanes, w.q1, w.stage.v, end_, loss.q, loss.v, loss.parameters);
+}
+
+/// The elastic displacements of joints with dry friction, s' = (q - z)/max(1, |y|).
+template <int L>
+void ShearAdjoint<L>::reverse_dry_end(const CompiledModel& m, const BasicWorkspace<L>& w,
+                                      LaneBits lanes, LossRows<L>& loss) const {
+  for (int l = 0; l < L; ++l) {
+    const std::vector<double>& bar = loss.memory[std::size_t(l)];
+    if (!has(lanes, l) || bar.empty()) continue;
+    const ShearState& after = w.shear.after[std::size_t(l)];
+    for (const ShearEntry& entry : dry_entries(m, after)) {
+      const DryDof& dof = dry_dof_of(m, entry);
+      const kernels::DofEffects& e = m.dof_effects[std::size_t(dof.v)];
+      const auto [share, hold, rigid] = dry_friction_at_end(m, w, dof, w.stage.v, l);
+      const double s_bar = bar[3 * std::size_t(&entry - after.data())],
+                   s = w.q1[dof.q][l] - w.stage.dry_anchor[dof.v][l],
+                   d_hold = -(1 - rigid) * share * hold * hold * e.friction_rate,
+                   place_bar = s_bar * (hold + s * d_hold);
+      loss.q[dof.v][l] += place_bar;
+      loss.v[dof.v][l] += s_bar * s * d_hold * e.friction_time;
+      loss.dry_anchor[dof.v][l] -= place_bar;
+    }
+  }
+}
+
+/// Anchors are z = q₀ - s₀.
+template <int L>
+void ShearAdjoint<L>::finish_dry(const CompiledModel& m, const BasicWorkspace<L>& w, LaneBits lanes,
+                                 LossRows<L>& loss) const {
+  for (int l = 0; l < L; ++l) {
+    if (!has(lanes, l)) continue;
+    for (const DryDof& dof : m.dry_dofs) loss.q_centre[dof.v][l] += loss.dry_anchor[dof.v][l];
+    const ShearState& now = w.shear.now[std::size_t(l)];
+    for (const ShearEntry& entry : dry_entries(m, now))
+      loss.memory_before[std::size_t(l)][3 * std::size_t(&entry - now.data())] -=
+          loss.dry_anchor[dry_dof_of(m, entry).v][l];
+  }
 }
 
 /// Pulls one contact of one lane back.
@@ -262,6 +301,7 @@ void ShearAdjoint<L>::reverse_forces(const CompiledModel& m, const kernels::Kern
 template <int L>
 void ShearAdjoint<L>::finish(const CompiledModel& m, const kernels::KernelTable& table,
                              BasicWorkspace<L>& w, LaneBits lanes, LossRows<L>& loss, int number) {
+  finish_dry(m, w, lanes, loss);
   if (m.shear_springs.empty()) return;
   add_to_state(m, table, w, lanes, w.q0, w.v0, start_[std::size_t(number)], loss.q_centre,
                loss.v_centre, loss.parameters);

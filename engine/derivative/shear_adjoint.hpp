@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Adjoint of the shear state through one solve (docs/shear.md). Turns cotangents of the shear state
+// Adjoint of the shear state through one solve (docs/shear.md), that of joints included. Turns cotangents of the shear state
 // after the solve into those of the shear state and the state before it, in three parts:
 //   (i)   the final shear state depends on the final state: this part is added to (q̄, v̄) before
 //         the stages are reversed;
@@ -24,6 +24,7 @@ struct LossRows {
   Rows q_before, v_before;  ///< out: of the one before that
   Rows q_inner, v_inner;    ///< of inner stages, (nv) each, one after another
   Rows tau, target;         ///< out: of forces known when the step begins, and of motors' targets
+  Rows dry_anchor;          ///< of the anchors of dry friction in one solve
   Rows parameters;          ///< out: (parameter_rows), or null
   /// Out: of every tactile point's own numbers, (tactile points, kPointNumbers), or empty.
   std::array<std::span<double>, L> points{};
@@ -66,6 +67,10 @@ class ShearAdjoint {
               LaneBits lanes, LossRows<L>& loss, int number);
 
  private:
+  void reverse_dry_end(const CompiledModel& model, const BasicWorkspace<L>& w, LaneBits lanes,
+                       LossRows<L>& loss) const;
+  void finish_dry(const CompiledModel& model, const BasicWorkspace<L>& w, LaneBits lanes,
+                  LossRows<L>& loss) const;
   using Cotangents = AlignedVector<kernels::MotionCotangent<kernels::Row<L>>>;
   using Poses = AlignedVector<kernels::LinkPose<kernels::Row<L>>>;
   void pull_back(const CompiledModel& model, const kernels::KernelTable& table,

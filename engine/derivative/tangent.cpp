@@ -137,6 +137,15 @@ struct Tangent::Impl {
 
   /// Computes the tangent of x with g(x) = 0 at the value of x. Leaves the v of that x in the
   /// stage.
+  /// Turns Gᵀ A, whose rows of followers are 0, into Gᵀ A G with ones on their diagonal.
+  void fold_followers(Eigen::MatrixXd& A) const {
+    for (const kernels::Follower& f : m().followers) {
+      A.col(f.leader_v) += f.ratio * A.col(f.v);
+      A.col(f.v).setZero();
+      A(f.v, f.v) = 1;
+    }
+  }
+
   Duals solve(const std::vector<double>& x) {
     const std::size_t n = x.size();
     const auto size = static_cast<Eigen::Index>(n);
@@ -157,9 +166,12 @@ struct Tangent::Impl {
       for (std::size_t i = 0; i < n; ++i) A(Eigen::Index(i), Eigen::Index(j)) = s.g[i].epsilon;
     }
     s.freeze_numbers(false);
+    fold_followers(A);
     s.centre = centre, s.r = r, s.s = acceleration, s.tau = tau, s.target = target;
     const Eigen::VectorXd dot = A.partialPivLu().solve(rhs);
     for (std::size_t i = 0; i < n; ++i) s.x[i].epsilon = dot[Eigen::Index(i)];
+    for (const kernels::Follower& f : m().followers)
+      s.x[std::size_t(f.v)].epsilon = f.ratio * s.x[std::size_t(f.leader_v)].epsilon;
     s.rates();
     return s.x;
   }

@@ -8,6 +8,7 @@
 
 #include "engine/model/body_shape.hpp"
 #include "engine/model/compile_effects.hpp"
+#include "engine/model/compile_followers.hpp"
 #include "engine/model/compile_imperfections.hpp"
 #include "engine/model/compile_joints.hpp"
 #include "engine/model/compile_markers.hpp"
@@ -60,6 +61,7 @@ class Compiler {
     compile_joint_effects(m_);
     check_masses(m_);
     compile_motors(m_, joints_);
+    compile_followers(m_, joints_);
     compile_initial_state(m_, joints_);
     unknown_scales();
     coarse_pairs();
@@ -455,7 +457,10 @@ class Compiler {
   }
 
   void components() {
-    auto [dofs, begin] = find_components(m_.links, touching_);
+    std::vector<std::pair<int, int>> coupled = touching_;
+    for (const kernels::Follower& f : m_.followers)
+      coupled.emplace_back(link_of_dof(m_, f.v), link_of_dof(m_, f.leader_v));
+    auto [dofs, begin] = find_components(m_.links, coupled);
     m_.component_dofs = std::move(dofs);
     m_.component_begin = std::move(begin);
   }
@@ -516,8 +521,9 @@ class Compiler {
   }
 
   void symbolic() {
-    m_.pattern = prefers_blocks(m_.links, touching_) ? block_pattern(m_.links, m_.nv)
-                                                     : analyse_pattern(m_.links, m_.nv, touching_);
+    m_.pattern = m_.followers.empty() && prefers_blocks(m_.links, touching_)
+                     ? block_pattern(m_.links, m_.nv)
+                     : analyse_pattern(m_.links, m_.nv, touching_, m_.followers);
   }
 
   CompiledModel m_;
@@ -544,6 +550,7 @@ std::shared_ptr<const CompiledModel> compile(const Scene& scene) {
     m->solids.push_back(solid_of(m->scene.links[k].body.shape, m->bodies[k]));
   point_view(*m);
   compile_shear_springs(*m);
+  compile_dry_friction(*m);
   v.n_shear_springs = static_cast<int>(m->shear_springs.size());
   v.memories = m->shear_springs.data();
   return m;

@@ -90,6 +90,7 @@ std::string effects_variant(std::uint8_t effects) {
       {kernels::kArmature, "armature"},
       {kernels::kSpring, "spring"},
       {kernels::kLimit, "limits"},
+      {kernels::kDryFriction, "dry friction"},
       {kernels::kPositionServo, "position motor"}};
   std::string text;
   for (const auto& [bit, name] : names)

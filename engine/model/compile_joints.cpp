@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 
+#include "engine/model/compile_followers.hpp"
 #include "engine/scene/frames.hpp"
 #include "engine/scene/scene_number.hpp"
 #include "engine/scene/schema.hpp"
@@ -68,9 +69,10 @@ constexpr EffectOfDof kEffectsOfDof[kJointEffects] = {
     {&kernels::DofEffects::damping, kernels::kDamping},
     {&kernels::DofEffects::armature, kernels::kArmature},
     {&kernels::DofEffects::stiffness, kernels::kSpring},
-    {&kernels::DofEffects::limit_stiffness, kernels::kLimit}};
+    {&kernels::DofEffects::limit_stiffness, kernels::kLimit},
+    {&kernels::DofEffects::friction, kernels::kDryFriction}};
 
-kernels::DofEffects dof_effects(const JointEffects& e, double rest) {
+kernels::DofEffects dof_effects(const JointEffects& e, double rest, bool turns) {
   constexpr double kNone = HUGE_VAL;
   kernels::DofEffects out{};
   for (std::size_t k = 0; k < kJointEffects; ++k) out.*kEffectsOfDof[k].number = {e[k], -1};
@@ -81,6 +83,8 @@ kernels::DofEffects dof_effects(const JointEffects& e, double rest) {
   out.high = high;
   out.force_low = -kNone;
   out.force_high = kNone;
+  out.friction_rate = 1 / (e.friction_break > 0 ? e.friction_break : default_friction_break(turns));
+  out.friction_time = e.friction_time;
   return out;
 }
 
@@ -91,13 +95,12 @@ std::uint8_t flags_of(const JointEffects& e) {
   return static_cast<std::uint8_t>(flags);
 }
 
-/// Returns the elementary link of one dof.
+}  // namespace
+
 int link_of_dof(const CompiledModel& m, int dof) {
   for (int i = 0;; ++i)
     if (dof < m.links[std::size_t(i)].v + kernels::dofs(m.links[std::size_t(i)].kind)) return i;
 }
-
-}  // namespace
 
 CompiledJoint add_joint(CompiledModel& m, const JointDescription& d, int parent,
                         const Frame<double>& frame) {
@@ -174,10 +177,20 @@ void compile_joint_effects(CompiledModel& m) {
     for (int k = 0; k < count; ++k) {
       const int dof = m.joints[i].v + k;
       const JointEffects& e = joint_effects_of_dof(d, k);
-      m.dof_effects[std::size_t(dof)] = dof_effects(e, d.rest.empty() ? 0 : d.rest[std::size_t(k)]);
+      m.dof_effects[std::size_t(dof)] =
+          dof_effects(e, d.rest.empty() ? 0 : d.rest[std::size_t(k)], dof_turns(d.type, k));
       m.links[std::size_t(link_of_dof(m, dof))].effects |= flags_of(e);
     }
   }
+}
+
+void compile_dry_friction(CompiledModel& m) {
+  for (const Link& link : m.links)
+    for (int k = 0; k < kernels::dofs(link.kind); ++k) {
+      const kernels::Parameter& bound = m.dof_effects[std::size_t(link.v + k)].friction;
+      if (bound.value != 0 || bound.row >= 0) m.dry_dofs.push_back({link.v + k, link.q + k});
+    }
+  m.taped_points += static_cast<int>(m.dry_dofs.size());
 }
 
 void compile_motors(CompiledModel& m, const NameIndex& joints) {
@@ -226,6 +239,7 @@ void compile_initial_state(CompiledModel& m, const NameIndex& joints) {
     copy("q", d.q, position_count(type), m.initial_q.data() + m.joints[i].q);
     copy("v", d.v, dof_count(type), m.initial_v.data() + m.joints[i].v);
   }
+  place_followers(m);
 }
 
 void vary_joint(CompiledModel& m, int joint, const RandomizationDescription& d, int row) {

@@ -13,8 +13,14 @@ namespace tangere {
 CompiledJoint add_joint(CompiledModel& m, const JointDescription& d, int parent,
                         const kernels::Frame<double>& frame);
 
+/// Returns the elementary link of a dof.
+int link_of_dof(const CompiledModel& m, int dof);
+
 /// Sets damping, springs, armature and limits per dof, and the flags of the links.
 void compile_joint_effects(CompiledModel& m);
+
+/// Fills CompiledModel::dry_dofs, after the contacts with shear springs.
+void compile_dry_friction(CompiledModel& m);
 
 /// Makes one motor per dof of every driven joint.
 void compile_motors(CompiledModel& m, const NameIndex& joints);

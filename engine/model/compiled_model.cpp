@@ -63,6 +63,10 @@ void point_view(CompiledModel& m) {
   rows.sensors = rows.place(v.n_links);
   rows.count = rows.sensor(static_cast<int>(m.sensors.size()));
   v.pattern = m.pattern.view();
+  v.n_followers = static_cast<int>(m.followers.size());
+  v.followers = m.followers.data();
+  v.n_folded = static_cast<int>(m.pattern.folded.size());
+  v.folded = m.pattern.folded.data();
 }
 
 }  // namespace tangere

@@ -120,6 +120,11 @@ struct CompiledSensor {
   [[nodiscard]] kernels::PadTiles tiles() const;
 };
 
+/// A dof with dry friction, and its coordinate.
+struct DryDof {
+  int v, q;
+};
+
 /// An end effector.
 struct CompiledEndEffector {
   int link = -1;                  ///< -1: fixed in the world
@@ -198,9 +203,18 @@ struct CompiledModel {
   /// Bodies whose contact points are far apart for each other (contact_resolution.hpp).
   std::vector<std::array<int, 2>> coarse_pairs;
   int shear_spring_points = 0;  ///< points of all `shear_springs`
-  /// The same with the points of a sensor counted once, not once for every sensed body.
+  /// Entries of a shear state at most: the points of a sensor count once, not once for every
+  /// sensed body; dofs with dry friction count, too.
   int taped_points = 0;
   int ground_anchors = 0;  ///< points of those on the ground
+  /// Joints' dofs with dry friction, ascending. The shear state has an entry for each, numbered
+  /// after the points of `shear_springs`, with the elastic displacement in its first component.
+  std::vector<DryDof> dry_dofs;
+  [[nodiscard]] bool has_shear_state() const { return !shear_springs.empty() || !dry_dofs.empty(); }
+  /// Numbers of entries that the shear state may have.
+  [[nodiscard]] int shear_state_points() const {
+    return shear_spring_points + static_cast<int>(dry_dofs.size());
+  }
   /// Number of points of sensors with shear_interval > 0; they come first among
   /// shear_spring_points. Steps do not change their entries.
   int kept_points = 0;
@@ -225,6 +239,8 @@ struct CompiledModel {
   std::vector<VaryingSize> varying_sizes;
   std::vector<VaryingPlace> varying_places;
   std::vector<kernels::DofEffects> dof_effects;  ///< (nv)
+  /// Dofs that follow others, each with a leader that follows none.
+  std::vector<kernels::Follower> followers;
   /// (nv) magnitude to which an unknown is rounded: extent of the scene [m], 1 [rad].
   std::vector<double> unknown_scale;
   /// Dofs of bodies that can reach each other by joints and contacts, component by component: those

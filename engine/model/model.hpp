@@ -40,8 +40,11 @@ class Model {
   /// (docs/solver.md). In force where neither scene nor caller names one.
   [[nodiscard]] double following_tolerance(Integrator integrator, double timestep) const;
   [[nodiscard]] std::span<const double> initial_q() const;  ///< (nq) where the scene starts
-  /// Whether some contact or sensor has shear springs (k_s, docs/shear.md).
-  [[nodiscard]] bool has_shear_springs() const;
+  /// Whether some contact or sensor has shear springs (k_s, docs/shear.md), or some joint dry
+  /// friction.
+  [[nodiscard]] bool has_shear_state() const;
+  /// Whether some joint follows another.
+  [[nodiscard]] bool has_followers() const;
   [[nodiscard]] std::span<const SensorInfo> sensors() const;
   [[nodiscard]] std::span<const EndEffectorInfo> end_effectors() const;  ///< in file order
   [[nodiscard]] std::span<const ContactInfo> contacts() const;

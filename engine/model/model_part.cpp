@@ -170,7 +170,8 @@ std::unique_ptr<ModelPart> without_inert_contacts(const CompiledModel& whole) {
     return std::ranges::all_of(contacts,
                                [](const auto& c) { return can_exert_force(c.parameters); });
   };
-  if (!whole.shear_springs.empty() || (all_push(whole.pairs) && all_push(whole.grounds)))
+  if (whole.has_shear_state() || !whole.followers.empty() ||
+      (all_push(whole.pairs) && all_push(whole.grounds)))
     return nullptr;
   const std::vector<int> one_tree(whole.links.size(), 0);
   const std::uint8_t stays = 0;

@@ -221,8 +221,39 @@ std::vector<int> first_dofs(const std::vector<kernels::Link>& links) {
 
 }  // namespace
 
+namespace {
+
+/// The structure of Gᵀ A G, where followers keep a diagonal entry. `leader`: of every dof, itself
+/// if it follows none.
+Structure folded(const Structure& s, const std::vector<int>& leader) {
+  Structure out(s.size(), std::vector<char>(s.size(), 0));
+  for (std::size_t i = 0; i < s.size(); ++i) {
+    out[i][i] = 1;
+    for (std::size_t j = 0; j < s.size(); ++j)
+      if (s[i][j] != 0) out[std::size_t(leader[i])][std::size_t(leader[j])] = 1;
+  }
+  return out;
+}
+
+/// Numbers the entries of `written` that `solved` does not have, after those of `solved`, and lists
+/// what they, and entries of followers, add to others.
+void fold_entries(PatternStorage& p, const Structure& written, const std::vector<int>& leader,
+                  const std::vector<double>& ratio) {
+  p.assembled = p.entries;
+  const auto at = [&](int i, int j) -> int& { return p.slot[std::size_t(i) * p.n + j]; };
+  for (int i = 0; i < p.n; ++i)
+    for (int j = 0; j < p.n; ++j) {
+      if (!written[i][j] || (leader[i] == i && leader[j] == j)) continue;
+      if (at(i, j) < 0) at(i, j) = p.assembled++;
+      p.folded.push_back({at(leader[i], leader[j]), at(i, j), ratio[i] * ratio[j]});
+    }
+}
+
+}  // namespace
+
 PatternStorage analyse_pattern(const std::vector<kernels::Link>& links, int nv,
-                               const std::vector<std::pair<int, int>>& touching) {
+                               const std::vector<std::pair<int, int>>& touching,
+                               const std::vector<kernels::Follower>& followers) {
   Structure alone(nv, std::vector<char>(nv, 0));
   for (int i = 0; i < static_cast<int>(links.size()); ++i) couple(alone, support(links, i));
   Structure s = alone;
@@ -232,6 +263,12 @@ PatternStorage analyse_pattern(const std::vector<kernels::Link>& links, int nv,
     both.insert(both.end(), other.begin(), other.end());
     couple(s, both);
   }
+  const Structure written = s;
+  std::vector<int> leader(nv);
+  std::iota(leader.begin(), leader.end(), 0);
+  std::vector<double> ratio(nv, 1.0);
+  for (const kernels::Follower& f : followers) leader[f.v] = f.leader_v, ratio[f.v] = f.ratio;
+  if (!followers.empty()) s = folded(s, leader), alone = folded(alone, leader);
 
   PatternStorage p;
   p.n = nv;
@@ -267,6 +304,7 @@ PatternStorage analyse_pattern(const std::vector<kernels::Link>& links, int nv,
     }
   p.whole = part_of(s, f, p, at);
   p.apart = part_of(alone, fill_alone, p, at);
+  fold_entries(p, written, leader, ratio);
   return p;
 }
 
@@ -285,7 +323,7 @@ PatternStorage block_pattern(const std::vector<kernels::Link>& links, int nv) {
     p.entries += size * size;
     largest = std::max(largest, size);
   }
-  p.factor_entries = p.entries;
+  p.assembled = p.factor_entries = p.entries;
   p.ordinals.resize(std::size_t(largest) * largest);
   std::iota(p.ordinals.begin(), p.ordinals.end(), 0);
   return p;
@@ -319,6 +357,7 @@ kernels::PatternPart PatternPartStorage::view() const {
 kernels::Pattern PatternStorage::view() const {
   return {n,
           entries,
+          assembled,
           diagonal_entry.data(),
           tree_dof.empty() ? 0 : static_cast<int>(tree_dof.size()) - 1,
           tree.data(),

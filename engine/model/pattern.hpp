@@ -20,10 +20,11 @@ struct PatternPartStorage {
 
 /// The storage behind kernels::Pattern.
 struct PatternStorage {
-  int n = 0, entries = 0, factor_entries = 0;
+  int n = 0, entries = 0, assembled = 0, factor_entries = 0;
   std::vector<int> diagonal_entry, tree, tree_dof, ordinals;
   std::vector<int> slot, entry_column, permutation, scatter, diagonal;
   std::vector<int> row_begin, factor_column;
+  std::vector<kernels::FoldedEntry> folded;  ///< of dofs that follow others
   PatternPartStorage whole, apart;
   [[nodiscard]] kernels::Pattern view() const;
 };
@@ -35,9 +36,11 @@ using Structure = std::vector<std::vector<char>>;
 /// the order.
 std::vector<int> minimum_fill(const Structure& s);
 
-/// Finds a minimum-fill elimination of the structure that the tree and all contacts make.
+/// Finds a minimum-fill elimination of the structure that the tree, all contacts and the dofs that
+/// follow others make.
 PatternStorage analyse_pattern(const std::vector<kernels::Link>& links, int nv,
-                               const std::vector<std::pair<int, int>>& touching);
+                               const std::vector<std::pair<int, int>>& touching,
+                               const std::vector<kernels::Follower>& followers = {});
 
 /// Returns the pattern in blocks of trees.
 PatternStorage block_pattern(const std::vector<kernels::Link>& links, int nv);

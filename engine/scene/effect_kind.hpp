@@ -12,6 +12,7 @@ enum class EffectKind : std::uint8_t {
   joint_damping,
   joint_springs,
   joint_limits,
+  joint_friction,
   armature,
   force_motors,
   position_motors,
@@ -34,6 +35,6 @@ enum class EffectKind : std::uint8_t {
   varying_parameters,
   sleeping,
 };
-inline constexpr int kEffectKinds = 26;
+inline constexpr int kEffectKinds = 27;
 
 }  // namespace tangere

@@ -314,6 +314,7 @@ constexpr Row kTable[] = {
     {Kind::joint_damping, "joint damping", "", find_in_joints<Field::damping>},
     {Kind::joint_springs, "joint springs", "", find_in_joints<Field::stiffness>},
     {Kind::joint_limits, "joint limits", "", find_in_joints<Field::lim_stiffness>},
+    {Kind::joint_friction, "joint friction", "", find_in_joints<Field::friction>},
     {Kind::armature, "armature", "", find_in_joints<Field::armature>},
     {Kind::force_motors, "force motors", "", find_motors<MotorControl::force>},
     {Kind::position_motors, "position motors", "", find_motors<MotorControl::position>},

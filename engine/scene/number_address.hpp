@@ -20,6 +20,7 @@ enum class NumberField {
   armature = 32,
   stiffness,
   lim_stiffness,
+  friction,
   turning_damping,
   turning_stiffness,
   P,

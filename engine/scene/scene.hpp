@@ -37,8 +37,13 @@ struct JointEffects {
   double stiffness = 0;        ///< force = -stiffness (q - rest) [N/m or N m/rad]
   double limit_stiffness = 0;  ///< force per distance of q outside the limits [N/m or N m/rad]
   std::optional<std::array<double, 2>> limits;  ///< low, high [m or rad]
+  double friction = 0;                          ///< bound of dry friction [N or N m]
+  /// Of dry friction (kernels/step/dry_friction.hpp): the elastic displacement at which a joint
+  /// breaks away [m or rad], 0: that of default_friction_break(); and damping over stiffness of
+  /// one that sticks [s].
+  double friction_break = 0, friction_time = 1e-3;
 
-  /// The four numbers, in the order of effect_field().
+  /// The numbers that may vary, in the order of effect_field().
   double& operator[](std::size_t k) { return this->*kOrder[k]; }
   const double& operator[](std::size_t k) const { return this->*kOrder[k]; }
   /// Whether number k acts. A stiffness of limits acts where there are limits.
@@ -49,9 +54,11 @@ struct JointEffects {
  private:
   static constexpr double JointEffects::*kOrder[] = {
       &JointEffects::damping, &JointEffects::armature, &JointEffects::stiffness,
-      &JointEffects::limit_stiffness};
+      &JointEffects::limit_stiffness, &JointEffects::friction};
 };
-inline constexpr std::size_t kJointEffects = 4;
+inline constexpr std::size_t kJointEffects = 5;
+/// Displacement at which a joint with dry friction breaks away, where none is given [m or rad].
+constexpr double default_friction_break(bool turns) { return turns ? 1e-3 : 5e-5; }
 
 struct JointDescription : JointEffects {
   std::string name;
@@ -64,6 +71,10 @@ struct JointDescription : JointEffects {
   std::vector<double> rest;
   /// free2d, free: effects of the dofs that turn, where they differ from those that slide.
   std::optional<JointEffects> turning;
+  /// Revolute, prismatic: the joint that this one follows, q = ratio q_leader + offset; empty: none.
+  /// ratio [m or rad of this joint per m or rad of the leader], offset [m or rad].
+  std::string follows;
+  double ratio = 1, offset = 0;
   Source source;
 };
 

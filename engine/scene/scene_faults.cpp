@@ -53,16 +53,30 @@ double least_of(const Distribution& d) {
   return d.values.empty() ? 0 : *std::ranges::min_element(d.values);
 }
 
+constexpr const char* kTurnsFreely =
+    "friction of a joint that turns freely; expected a joint of another type";
+
+bool turns_freely(JointType type) {
+  return type == JointType::spherical || type == JointType::free;
+}
+
+std::string friction_fault(const JointDescription& joint) {
+  return turns_freely(joint.type) && joint.friction != 0 ? kTurnsFreely : "";
+}
+
 std::string joint_variation_fault(const JointDescription& joint, const SceneNumber& n) {
   const int count = n.field == Field::pos ? 3
                     : n.field == Field::q ? position_count(joint.type)
                                           : dof_count(joint.type);
   if (dof_count(joint.type) == 0) return "the joint is fixed; expected one that moves";
+  if (is_of_start(n) && !joint.follows.empty())
+    return fmt::format("its place is that of '{}', which it follows", joint.follows);
   if (is_of_start(n) || n.field == Field::pos)
     return n.component >= 0 && n.component < count
                ? ""
                : fmt::format("index {} is none of 0 to {}", n.component, count - 1);
   if (joint.turning) return "its dofs do not share one number";
+  if (n.field == Field::friction && turns_freely(joint.type)) return kTurnsFreely;
   if (n.field == Field::lim_stiffness && !joint.limits) return "the joint has no 'lim'";
   return effect_index(n.field) < kJointEffects ? ""
                                                : "no dof of the joint turns by a number of its own";
@@ -155,8 +169,8 @@ std::string joint_fault(const JointDescription& joint) {
   if (!joint.rest.empty() && joint.rest.size() != std::size_t(dof_count(joint.type)))
     return fmt::format("rest has {} numbers; expected {}", joint.rest.size(),
                        dof_count(joint.type));
-  return first_of(value_fault<JointEffects>(kJoint, joint), limits_fault(joint),
-                  value_fault(kJoint, turning), limits_fault(turning));
+  return first_of(friction_fault(joint), value_fault<JointEffects>(kJoint, joint),
+                  limits_fault(joint), value_fault(kJoint, turning), limits_fault(turning));
 }
 
 std::string body_fault(const BodyDescription& body) {

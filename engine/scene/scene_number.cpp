@@ -81,6 +81,7 @@ const double* joint_number(const Scene& scene, const JointDescription& joint,
     case Field::damping: return &joint.damping;
     case Field::armature: return &joint.armature;
     case Field::stiffness: return &joint.stiffness;
+    case Field::friction: return &joint.friction;
     default: return &joint.limit_stiffness;
   }
 }

@@ -23,6 +23,8 @@ using J = JointEffects;
 
 constexpr const char *kNone = "", *kNeeded = nullptr;
 constexpr const char* kMoving = "revolute prismatic planar translational free2d spherical free";
+constexpr const char* kSingle = "revolute prismatic";
+constexpr const char* kDry = "revolute prismatic planar translational free2d";
 constexpr int kParameter = kVaries | kGradient;
 constexpr int kMostPoints = 1 << 20;  // of a surface, and of a sensor
 constexpr int kMostOnEdge = 1000;     // contact points along one edge or around one ring
@@ -150,6 +152,16 @@ constexpr Attribute kSchema[] = {
     coefficient(kJoint, "lim_stiffness", F::lim_stiffness, &J::limit_stiffness, U::N_per_m,
                 E::joint_limits, "force per distance outside lim", Or{U::N_m_per_rad},
                 Flags{kGradient}, Types{kMoving}),
+    coefficient(kJoint, "friction", F::friction, &J::friction, U::N, E::joint_friction,
+                "bound of dry friction", Or{U::N_m}, Flags{kGradient}, Types{kDry}),
+    row(kJoint, "friction_break", "0", U::m,
+        "displacement at which friction breaks; 0: 0.05 mm, 1 mrad", Or{U::rad}, Types{kDry},
+        &J::friction_break, B::not_negative, Flags{kInDefault}),
+    row(kJoint, "friction_time", "0.001", U::s, "damping of dry friction over its stiffness",
+        Types{kDry}, &J::friction_time, B::not_negative, Flags{kInDefault}),
+    row(kJoint, "follows", kNone, U::one, "a joint: q = ratio q of it + offset", Types{kSingle}),
+    row(kJoint, "ratio", "1", U::one, "in units of both coordinates", Types{kSingle}),
+    row(kJoint, "offset", "0", U::m, "of q, with follows", Or{U::rad}, Types{kSingle}),
     ignored(kJoint | kBody, "mu"),
     ignored(kBody, "damping"),
     ignored(kJoint | kBody, "format"),

@@ -5,7 +5,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "engine/model/compile_followers.hpp"
 #include "engine/step/detection.hpp"
+#include "engine/step/factors.hpp"
 #include "engine/step/scheme_stage.hpp"
 #include "engine/step/shear_anchors.hpp"
 #include "engine/step/shear_update.hpp"
@@ -44,6 +46,7 @@ LaneBits solve_stages(const CompiledModel& model, const StepSettings& settings, 
   for (int k = 0; k <= inner; ++k) {
     set_stage(model, *a.scheme, k, a.h, w);
     guess_stage(model, *a.scheme, k, a.h, w);
+    expand_followers(model, w.stage.x);
     std::copy_n(w.stage.x, n, w.x_guess);
     const LaneBits found = solve_stage(model, table, w, lanes, limits, factors, report);
     const LaneBits lost = softens ? lanes & ~found : kNoLane;
@@ -93,6 +96,12 @@ LaneBits finish(const CompiledModel& model, const Row<L>& h, BasicWorkspace<L>& 
       w.q1[link.q + 3][l] = q.z;
     }
   }
+  for (const kernels::Follower& f : model.followers)  // exactly, so that rounding does not add up
+    for (int l = 0; l < L; ++l)
+      if (has(lanes, l))
+        place_follower(
+            f, [&](int i) -> double& { return w.q1[i][l]; },
+            [&](int i) -> double& { return w.v1[i][l]; });
   return resolved;
 }
 

@@ -7,6 +7,7 @@
 #include <limits>
 #include <new>
 
+#include "engine/model/compile_followers.hpp"
 #include "engine/model/compile_variations.hpp"
 #include "engine/model/model_part.hpp"
 #include "engine/model/random.hpp"
@@ -149,6 +150,10 @@ void Batch::draw_episode(std::size_t lane) {
       own[row * kBlock] = number_in(m.scene, m.scene.randomizations[k].number);
     }
   }
+  for (const kernels::Follower& f : m.followers)
+    place_follower(
+        f, [&](int i) -> double& { return own[(m.layout.q + i) * kBlock]; },
+        [&](int i) -> double& { return own[(m.layout.v + i) * kBlock]; });
   update_derived_rows(m, own);
   complete_state(lane);
 }
@@ -168,6 +173,25 @@ void Batch::reset(int environment, std::int64_t episode) {
   clearance_[lane] = 0;
 }
 
+namespace {
+
+/// Throws InputError where a state does not have followers where their leaders put them.
+void check_followers(const CompiledModel& m, std::span<const double> q, std::span<const double> v) {
+  constexpr double kRounding = 1e-9;
+  const auto check = [](const std::string& name, double found, double expected) {
+    if (std::abs(found - expected) > kRounding * (1 + std::abs(expected)))
+      throw InputError("state: '" + name + "' is " + std::to_string(found) + "; expected " +
+                       std::to_string(expected) + " by the joint that it follows");
+  };
+  for (const kernels::Follower& f : m.followers) {
+    check(m.q_names[std::size_t(f.q)], q[std::size_t(f.q)],
+          f.ratio * q[std::size_t(f.leader_q)] + f.offset);
+    check(m.v_names[std::size_t(f.v)], v[std::size_t(f.v)], f.ratio * v[std::size_t(f.leader_v)]);
+  }
+}
+
+}  // namespace
+
 void Batch::displace_state(int environment, std::span<const double> q, std::span<const double> v) {
   displace(lane(environment), q, v);
   if (steps(environment) == 0) fill_past_states(lane(environment));
@@ -177,6 +201,7 @@ void Batch::displace(std::size_t lane, std::span<const double> q, std::span<cons
   const CompiledModel& m = compiled(model_);
   check_size("q", q.size(), as_size(m.nq));
   check_size("v", v.size(), as_size(m.nv));
+  check_followers(m, q, v);
   double* const own = column(lane);
   for (int i = 0; i < m.nq; ++i) own[(m.layout.q + i) * kBlock] = q[std::size_t(i)];
   for (int i = 0; i < m.nv; ++i) own[(m.layout.v + i) * kBlock] = v[std::size_t(i)];
@@ -274,7 +299,7 @@ void Batch::set_state(int environment, std::span<const double> q, std::span<cons
 
 void Batch::set_shear_state(int environment, std::span<const ShearEntry> state) {
   const std::size_t lane = this->lane(environment);
-  const int points = compiled(model_).shear_spring_points;
+  const int points = compiled(model_).shear_state_points();
   int last = -1;
   for (const ShearEntry& e : state) {
     if (e.point <= last || e.point >= points)

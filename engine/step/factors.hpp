@@ -9,6 +9,22 @@ namespace tangere {
 
 inline bool in_blocks(const CompiledModel& m) { return m.view.pattern.slot == nullptr; }
 
+/// Sets followers' numbers of a solution x = G y.
+template <int L>
+void expand_followers(const CompiledModel& m, kernels::Row<L>* x) {
+  for (const kernels::Follower& f : m.followers)
+    for (int l = 0; l < L; ++l) x[f.v][l] = f.ratio * x[f.leader_v][l];
+}
+/// Turns a right-hand side b into Gᵀ b.
+template <int L>
+void fold_followers(const CompiledModel& m, kernels::Row<L>* b) {
+  for (const kernels::Follower& f : m.followers)
+    for (int l = 0; l < L; ++l) {
+      b[f.leader_v][l] += f.ratio * b[f.v][l];
+      b[f.v][l] = 0;
+    }
+}
+
 /// Factors A of the lanes in `lanes`. Lanes in `kept` keep their factors.
 template <int L>
 void factor(const CompiledModel& m, const kernels::KernelTable& table, BasicWorkspace<L>& w,
@@ -24,11 +40,14 @@ void factor(const CompiledModel& m, const kernels::KernelTable& table, BasicWork
   table.stage<L>().factor(m.view, w.stage, (kept & ~lanes) == 0 ? nullptr : &accept);
 }
 
-/// Solves out = A⁻¹ b by the present factors of `lanes`.
+/// Solves out = A⁻¹ b by the present factors of `lanes`. b of followers is 0.
 template <int L>
 void solve(const CompiledModel& m, const kernels::KernelTable& table, BasicWorkspace<L>& w,
            LaneBits lanes, const kernels::Row<L>* b, kernels::Row<L>* out) {
-  if (!in_blocks(m)) return table.stage<L>().solve(m.view, w.stage, b, out);
+  if (!in_blocks(m)) {
+    table.stage<L>().solve(m.view, w.stage, b, out);
+    return expand_followers(m, out);
+  }
   for (int l = 0; l < L; ++l)
     if (has(lanes, l)) w.block_factors.solve(table, l, b, out);
 }
@@ -41,11 +60,20 @@ void solve_watched(const CompiledModel& m, const kernels::KernelTable& table, Ba
                    kernels::Row<L>& sound) {
   if (!in_blocks(m)) {
     const kernels::StageKernels<L>& k = table.stage<L>();
-    return (Transposed ? k.solve_transposed : k.solve_watched)(m.view, w.stage, b, out, &sound);
+    (Transposed ? k.solve_transposed : k.solve_watched)(m.view, w.stage, b, out, &sound);
+    return expand_followers(m, out);
   }
   for (int l = 0; l < L; ++l)
     if (has(lanes, l))
       sound[l] = w.block_factors.solve_watched(table, Transposed, l, b, out) ? 1 : 0;
+}
+
+/// Solves out = A⁻¹ b of one lane by its factor with row exchanges. b of followers is 0.
+template <int L>
+void solve_pivoted(const CompiledModel& m, BasicWorkspace<L>& w, int lane, const kernels::Row<L>* b,
+                   kernels::Row<L>* out) {
+  w.pivoted.solve(lane, b, out);
+  for (const kernels::Follower& f : m.followers) out[f.v][lane] = f.ratio * out[f.leader_v][lane];
 }
 
 /// Factors A of one lane, or Aᵀ, with row exchanges.

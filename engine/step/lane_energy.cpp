@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 
+#include "engine/step/dry_friction_state.hpp"
 #include "engine/step/rotation_log.hpp"
 #include "engine/step/shear_lane.hpp"
 #include "engine/step/state_difference.hpp"
@@ -277,6 +278,11 @@ double energy_of_friction(const CompiledModel& model, const BasicWorkspace<L>& w
         square += areas == nullptr ? s * s : areas[memory[e].point - contact.first] * s * s;
     if (contact.sensor < 0 && square > 0)
       sum += 0.5 * number_of<L>(contact.contact.parameters.ks, w.stage, lane) * square;
+  }
+  for (const ShearEntry& entry : dry_entries(model, memory)) {
+    const kernels::DofEffects& dof = model.dof_effects[std::size_t(dry_dof_of(model, entry).v)];
+    sum += 0.5 * number_of<L>(dof.friction, w.stage, lane) * dof.friction_rate * entry.s[0] *
+           entry.s[0];
   }
   return sum;
 }

@@ -163,7 +163,7 @@ struct Search {
     if ((factors.lanes & searching) != 0) {
       solve(model, table, w, factors.lanes & searching, w.stage.g, w.test);
       for (int l = 0; l < L; ++l)
-        if (has(factors.pivoted & searching, l)) w.pivoted.solve(l, w.stage.g, w.test);
+        if (has(factors.pivoted & searching, l)) solve_pivoted(model, w, l, w.stage.g, w.test);
       weighted_norms(w.test, test_norm);
     }
     for (int l = 0; l < L; ++l) {
@@ -286,7 +286,7 @@ struct Search {
       if (w.sound[l] > 0) continue;
       factors.pivoted |= 1U << l;
       factor_pivoted(model, w, l, false);
-      w.pivoted.solve(l, w.stage.g, w.test);
+      solve_pivoted(model, w, l, w.stage.g, w.test);
     }
     LaneRow norm;
     weighted_norms(w.test, norm);
@@ -359,7 +359,7 @@ void solve_by_factor(const CompiledModel& model, const kernels::KernelTable& tab
                      BasicWorkspace<L>& w, const StageFactors<L>& factors, kernels::Row<L>* out) {
   solve(model, table, w, factors.any, w.stage.g, out);
   for (int l = 0; l < L; ++l)
-    if (has(factors.pivoted & factors.any, l)) w.pivoted.solve(l, w.stage.g, out);
+    if (has(factors.pivoted & factors.any, l)) solve_pivoted(model, w, l, w.stage.g, out);
 }
 
 #define TANGERE_FOR_LANES(L)                                                          \

@@ -31,7 +31,8 @@ void PivotedFactors::factor(const kernels::Pattern& p, const BlockEntries& block
   for (int i = 0; i < p.n; ++i)
     for (int j = 0; j < p.n; ++j) {
       const int slot = p.slot != nullptr ? p.slot[i * p.n + j] : blocks.entry(p, i, j);
-      (transposed ? dense(j, i) : dense(i, j)) = slot < 0 ? 0 : A[slot][lane];
+      const bool stored = slot >= 0 && (p.slot == nullptr || slot < p.entries);
+      (transposed ? dense(j, i) : dense(i, j)) = stored ? A[slot][lane] : 0;
     }
   numbers_->lu[std::size_t(lane)].compute(dense);
 }

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "engine/step/dry_friction_state.hpp"
 #include "engine/step/shear_lane.hpp"
 
 namespace tangere {
@@ -28,6 +29,7 @@ static bool put_ground(const CompiledModel& m, int first, const std::array<Shear
 
 template <int L>
 void begin_shear(const CompiledModel& m, const kernels::KernelTable& table, BasicWorkspace<L>& w) {
+  set_dry_anchors(m, w);
   if (m.shear_springs.empty()) return;
   ShearLanes<L>& lanes = w.shear;
   table.stage<L>().poses_at(m.view, w.stage, w.q0, w.v0, w.zero, lanes.start.data());

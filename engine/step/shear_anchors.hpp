@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-// Anchors of points with shear springs, from the state in which a solve begins.
+// Anchors of points with shear springs and of joints with dry friction, from the state in which a solve begins.
 #pragma once
 
 #include "engine/step/workspace.hpp"
 
 namespace tangere {
 
-/// Prepares a solve that begins at q0 with w.shear.now: poses there, and anchors on the
-/// ground.
+/// Prepares a solve that begins at q0 with w.shear.now: poses there, and anchors on the ground and
+/// of joints.
 template <int L>
 void begin_shear(const CompiledModel& model, const kernels::KernelTable& table,
                  BasicWorkspace<L>& w);

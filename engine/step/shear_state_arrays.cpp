@@ -63,6 +63,17 @@ ShearStateArrays shear_state_arrays(const Model& model) {
       if (!anchors) break;
     }
   }
+  for (const LinkDescription& link : m.scene.links) {
+    const auto dry = std::ranges::count_if(m.dry_dofs, [&](const DryDof& dof) {
+      const int first = m.joints[std::size_t(&link - m.scene.links.data())].v;
+      return dof.v >= first && dof.v < first + dof_count(link.joint.type);
+    });
+    if (dry == 0) continue;
+    out.contacts.push_back({owner_of({NumberOwner::joint, NumberField::friction, link.joint.name}),
+                            std::vector<Vector3>(std::size_t(dry))});
+    for (std::ptrdiff_t k = 0; k < dry; ++k)
+      out.row_of.push_back(static_cast<int>(out.row_of.size()));
+  }
   return out;
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The shear state as dense arrays for files and Python: all points of all contacts with shear
-// springs, contact after contact, points of a sensor in the order of its field.
+// springs, contact after contact, points of a sensor in the order of its field, then the dofs with
+// dry friction.
 #pragma once
 
 #include <span>
@@ -13,18 +14,20 @@
 
 namespace tangere {
 
-/// The points of one contact with shear springs.
+/// The points of one contact with shear springs, or the dofs of one joint with dry friction.
 struct ShearSpringPlaces {
   /// "contact pad box", "ground box", of a sensor "tactile pad box"; of one with memory="read"
-  /// "tactile pad box b" and "tactile pad box a", its anchors.
+  /// "tactile pad box b" and "tactile pad box a", its anchors; of a joint "joint elbow".
   std::string name;
-  std::vector<Vector3> places;  ///< of its points, axes of the moving frame that carries them [m]
+  /// Of its points, axes of the moving frame that carries them [m]; of a joint's dofs zeros.
+  std::vector<Vector3> places;
 };
 
-/// The points of a model that have shear springs. Row r of an array (points, 3) is the elastic
+/// The points of a model that have shear springs, then the dofs with dry friction. Row r of an array (points, 3) is the elastic
 /// displacement of point r [m], in the axes of the moving frame that carries it; for a sensor with
 /// memory="read" its anchor b in these axes, or a in those of the touched shape. Zeros: no
-/// displacement, or no contact.
+/// displacement, or no contact. Of a dof with dry friction it has the elastic displacement [m or
+/// rad] and two zeros.
 struct ShearStateArrays {
   std::vector<ShearSpringPlaces> contacts;
   std::vector<int> row_of;  ///< (points) row of ShearEntry::point

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "engine/step/detection.hpp"
+#include "engine/step/dry_friction_state.hpp"
 #include "engine/step/kept_anchors.hpp"
 
 namespace tangere {
@@ -166,10 +167,10 @@ void find_grounded(const CompiledModel& m, ShearLanes<L>& lanes) {
 
 }  // namespace
 
+/// Writes the entries of all points that touch.
 template <int L>
-void update_shear_state(const CompiledModel& m, const kernels::KernelTable& table,
-                        BasicWorkspace<L>& w, LaneBits lanes) {
-  if (m.shear_springs.empty() || lanes == 0) return;
+static void update_touches(const CompiledModel& m, const kernels::KernelTable& table,
+                           BasicWorkspace<L>& w, LaneBits lanes) {
   ShearLanes<L>& shear = w.shear;
   if constexpr (L > 1)
     if (std::popcount(lanes) >= kFewLanes) lists_to_rows(m, table, w, lanes);
@@ -197,6 +198,18 @@ void update_shear_state(const CompiledModel& m, const kernels::KernelTable& tabl
     }
     to.finish();
   }
+}
+
+template <int L>
+void update_shear_state(const CompiledModel& m, const kernels::KernelTable& table,
+                        BasicWorkspace<L>& w, LaneBits lanes) {
+  if (!m.has_shear_state() || lanes == 0) return;
+  if (m.shear_springs.empty()) {
+    for (ShearState& after : w.shear.after) after.clear();
+  } else {
+    update_touches(m, table, w, lanes);
+  }
+  append_dry_friction(m, w, lanes);
 }
 
 template <int L>

@@ -30,11 +30,16 @@ void check_sleep(const Model& model, double sleep) {
     throw InputError(model.solver().sleep_source.prefix() + "sleep " + std::to_string(sleep) +
                      "; expected the share of its size that a body may move and still rest, below "
                      "1 (0.001 is usual), or 0 for bodies that never sleep");
-  if (sleep > 0 && model.has_shear_springs())
+  if (sleep > 0 && model.has_shear_state())
     throw InputError(
         model.solver().sleep_source.prefix() +
-        "bodies cannot sleep in a scene with ks: the shear state of their contacts would stand "
-        "still, too; expected contacts and sensors without ks, or no sleep");
+        "bodies cannot sleep in a scene with ks or friction of joints: its shear state would stand "
+        "still, too; expected neither, or no sleep");
+  if (sleep > 0 && model.has_followers())
+    throw InputError(
+        model.solver().sleep_source.prefix() +
+        "bodies cannot sleep in a scene with joints that follow others; expected none, "
+        "or no sleep");
 }
 
 }  // namespace

@@ -178,7 +178,7 @@ struct Stepper::Impl {
     gather(w.v0, m.layout.v, stepped.v);
     gather(w.q_before, m.layout.previous_q, stepped.q);
     gather(w.v_before, m.layout.previous_v, stepped.v);
-    if (!m.shear_springs.empty())
+    if (m.has_shear_state())
       for (int l = 0; l < L; ++l) {
         const ShearState& memory = batch.shear_[std::size_t(g.first + lane + l)];
         w.shear.now[std::size_t(l)].assign(memory.begin() + kept_entries(m, memory), memory.end());
@@ -213,7 +213,7 @@ struct Stepper::Impl {
       if (failed(report.status[l])) continue;
       if (m.layout.past_states > 0) store_past_state(m.layout, g.rows + lane + l, batch.steps_[e]);
       ++batch.steps_[e];
-      if (!m.shear_springs.empty()) {
+      if (m.has_shear_state()) {
         ShearState& memory = batch.shear_[e];
         ShearState& now = w.shear.now[std::size_t(l)];
         if (m.kept_points == 0) {

@@ -70,7 +70,7 @@ void BlockTape::append(const Batch& batch, int block) {
 }
 
 void BlockTape::keep_memory(const Batch& batch, int block) {
-  if (compiled(model_).shear_springs.empty()) return;
+  if (!compiled(model_).has_shear_state()) return;
   for (int l = 0; l < kBlock; ++l) {
     if (const int e = block * kBlock + l; e < batch.environments()) {
       const ShearState& m = batch.shear_state(e);

@@ -26,11 +26,11 @@ std::size_t lay_out(const CompiledModel& m, BasicWorkspace<L>& w, Row<L>* base) 
   };
   kernels::Stage<L>& s = w.stage;
   rows(s.centre, m.nq);
-  for (LaneRow** p : {&s.x, &s.r, &s.s, &s.tau, &s.target, &s.v, &s.g, &s.force_scale,
-                      &s.mass_diagonal, &s.weight, &s.inverse_weight})
+  for (LaneRow** p : {&s.x, &s.r, &s.s, &s.tau, &s.target, &s.dry_anchor, &s.v, &s.g,
+                      &s.force_scale, &s.mass_diagonal, &s.weight, &s.inverse_weight})
     rows(*p, m.nv);
   const bool in_blocks = m.pattern.slot.empty();
-  rows(s.A, in_blocks ? 0 : m.pattern.entries);
+  rows(s.A, in_blocks ? 0 : m.pattern.assembled);
   rows(s.LU, in_blocks ? 0 : m.pattern.factor_entries);
   rows(s.work, in_blocks ? m.nv : std::max(m.pattern.factor_entries, 5 * m.nv));
   rows(s.excess, 1);
@@ -58,6 +58,8 @@ std::size_t lay_out(const CompiledModel& m, BasicWorkspace<L>& w, Row<L>* base) 
 /// Allocates the buffers of the shear state.
 template <int L>
 void BasicWorkspace<L>::make_memory(const CompiledModel& m) {
+  for (auto* lanes : {&shear.now, &shear.after})
+    for (ShearState& lane : *lanes) lane.reserve(std::size_t(m.taped_points + kGroup));
   if (m.shear_springs.empty()) return;
   std::size_t most_on_ground = 0, most = 0;
   for (const kernels::ShearSpringContact& of : m.shear_springs) {
@@ -79,8 +81,6 @@ void BasicWorkspace<L>::make_memory(const CompiledModel& m) {
   shear.start_known.resize(m.shear_springs.size());
   shear.near.resize(m.shear_springs.size());
   shear.touching.reserve(m.shear_springs.size());
-  for (auto* lanes : {&shear.now, &shear.after})
-    for (ShearState& lane : *lanes) lane.reserve(std::size_t(m.taped_points + kGroup));
 }
 
 template <int L>

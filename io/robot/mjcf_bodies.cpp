@@ -206,6 +206,11 @@ class Bodies {
     joint.damping = whole_.has_dampers ? node.not_negative("damping", 0.0) : 0;
     joint.armature = node.not_negative("armature", 0.0);
     joint.stiffness = whole_.has_springs ? node.not_negative("stiffness", 0.0) : 0;
+    const double friction = whole_.has_friction ? node.not_negative("frictionloss", 0.0) : 0;
+    if (single)
+      joint.friction = friction;
+    else if (friction != 0)
+      node.lost("<joint> frictionloss: dry friction of a joint that turns freely");
     if (single) {
       end.ref = measure(node.number("ref", 0.0));
       const double rest = measure(node.number("springref", 0.0)) - end.ref;

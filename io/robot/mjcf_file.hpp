@@ -95,10 +95,11 @@ struct MjcfNames {
 /// What all models of a file share.
 struct MjcfWhole {
   Robot& robot;
-  bool has_limits = true, has_springs = true, has_dampers = true;  ///< by <flag>
-  bool merges_options = false;                                     ///< <compiler conflict="merge">
-  std::vector<int> disabled_groups = {};                           ///< of actuators
-  bool free_base = false;  ///< bodies of the world without joints move freely
+  bool has_limits = true, has_springs = true, has_dampers = true,
+       has_friction = true;               ///< by <flag>
+  bool merges_options = false;            ///< <compiler conflict="merge">
+  std::vector<int> disabled_groups = {};  ///< of actuators
+  bool free_base = false;                 ///< bodies of the world without joints move freely
   RobotNames names = {};
   MjcfNames body_names = {"body"}, joint_names = {"joint"};
   std::map<std::string, MjcfJoint> joints = {};  ///< by name in the scene
@@ -183,6 +184,8 @@ const MjcfScope& attached_scope(MjcfWhole& whole, const RobotNode& node, const M
 
 /// Reads all bodies of the file that the user names.
 void read_mjcf_bodies(MjcfWhole& whole, const MjcfScope& scope);
+/// Reads the constraints of all models, after the bodies.
+void read_mjcf_equalities(MjcfWhole& whole);
 /// Reads the actuators of all models, after the bodies.
 void read_mjcf_actuators(MjcfWhole& whole);
 /// Returns the key `requested` of the <keyframe> sections, by its name or, without one, its number

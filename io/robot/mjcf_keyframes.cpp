@@ -41,6 +41,7 @@ class Keyframe {
       };
       if (zero(state.v)) state.v.clear();
       if (nq == 1 && zero(state.q)) state.q.clear();
+      if (!link.joint.follows.empty()) continue;  // its leader says where it is
       if (!state.q.empty() || !state.v.empty()) scene.initial.push_back(std::move(state));
     }
     read_controls();

@@ -30,7 +30,7 @@ const Words kSections = {
     {"custom", Fate::idle, "numbers for other programs"},
     {"sensor", Fate::idle, "readings of MuJoCo; --pad LINK=LAYOUT adds a skin"},
     {"keyframe"},
-    {"equality", Fate::lost, "constraints between bodies or joints; scenes have none"},
+    {"equality"},
     {"tendon", Fate::lost, "tendons; scenes have none"},
     {"deformable", Fate::lost, "bodies that bend; scenes have none"},
     {"extension", Fate::lost, "plug-ins of MuJoCo"}};
@@ -124,11 +124,12 @@ void read_flag(MjcfWhole& whole, const RobotNode& flag, const std::string& name,
            "equality", "clampctrl", "frictionloss"}) ||
       value == "enable")
     return flag.idle(text + kSolverSetting);
-  if (is({"contact", "equality", "frictionloss"}))
+  if (is({"contact", "equality"}))
     return flag.idle(text + "a scene has none but those that it names");
   if (is({"actuation", "clampctrl"})) return flag.lost(text + "switches forces");
   if (name == "gravity") whole.robot.scene.gravity = {0, 0, 0};
   if (is({"limit", "constraint"})) whole.has_limits = false;
+  if (is({"frictionloss", "constraint"})) whole.has_friction = false;
   if (is({"spring", "passive"})) whole.has_springs = false;
   if (is({"damper", "passive"})) whole.has_dampers = false;
   flag.changed(text + "the scene is without what it switches off");
@@ -421,6 +422,7 @@ void read_mjcf(const RobotNode& root, const std::string& keyframe, bool free_bas
   for (const RobotNode& s : file.sections)
     if (s.name() == "keyframe") keyframes.push_back(s);
   const std::optional<RobotNode> key = find_mjcf_keyframe(whole, keyframes, keyframe);
+  read_mjcf_equalities(whole);
   read_mjcf_actuators(whole);
   for (const MjcfScope* model : whole.models)
     for (const RobotNode& section : model->file->sections) {

@@ -59,7 +59,7 @@ Words joint_words() {
           {"ref"},
           {"actuatorfrcrange"},
           {"actuatorfrclimited"},
-          {"frictionloss", Fate::zero, "dry friction of a joint"},
+          {"frictionloss"},
           {"springdamper", Fate::zero, "chooses stiffness and damping from a frequency"},
           {"springyield", Fate::zero, "bounds the force of the spring"},
           {"actuatorgravcomp", Fate::idle, "of bodies without weight"},

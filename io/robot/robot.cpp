@@ -33,6 +33,40 @@ std::vector<std::string> Remarks::lines() const {
   return out;
 }
 
+void check_followers(Robot& robot) {
+  std::vector<LinkDescription>& links = robot.scene.links;
+  const auto joint_named = [&](const std::string& name) -> JointDescription* {
+    const auto found =
+        std::ranges::find_if(links, [&](const auto& l) { return l.joint.name == name; });
+    return found == links.end() ? nullptr : &found->joint;
+  };
+  /// Whether the leaders of a joint end in one that follows none.
+  const auto ends = [&](const JointDescription* joint) {
+    for (std::size_t k = 0; k <= links.size() && joint != nullptr; ++k) {
+      if (joint->follows.empty()) return true;
+      joint = joint_named(joint->follows);
+    }
+    return joint == nullptr;
+  };
+  for (LinkDescription& link : links) {
+    JointDescription& joint = link.joint;
+    if (joint.follows.empty()) continue;
+    const JointDescription* const leader = joint_named(joint.follows);
+    if (leader == nullptr)
+      throw InputError(joint.source.prefix() + "joint '" + joint.name + "' follows '" +
+                       joint.follows + "': no joint has this name");
+    const char* fault = nullptr;
+    if (dof_count(joint.type) != 1 || dof_count(leader->type) != 1)
+      fault = "which is not between two joints of one degree of freedom each";
+    else if (!ends(&joint))
+      fault = "which follows it in turn";
+    if (fault == nullptr) continue;
+    robot.lost.add(joint.source,
+                   fmt::format("joint '{}' follows '{}', {}", joint.name, joint.follows, fault));
+    joint.follows.clear();
+  }
+}
+
 std::string place_in(const Robot& robot, const Source& source) {
   if (source.file == robot.scene.path) return fmt::format("line {}", source.line);
   return fmt::format("line {} of {}", source.line,

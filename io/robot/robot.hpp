@@ -70,6 +70,10 @@ struct Robot {
 /// "line 7", or "line 7 of hand.xml" in a file that <include> has brought in.
 std::string place_in(const Robot& robot, const Source& source);
 
+/// Lists and drops followers that scenes cannot have. Throws InputError for a leader that is no
+/// joint.
+void check_followers(Robot& robot);
+
 /// A link, or a place on one, that an option names.
 struct RobotPlace {
   const LinkDescription* link;

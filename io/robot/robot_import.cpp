@@ -283,6 +283,7 @@ ImportedScene import_robot(const fs::path& path, const fs::path& output,
   Robot robot = read_robot(read_text_file(name, kLargestRobot, "a robot's file"), name, options,
                            out.warnings);
   refuse_deep(robot.scene);
+  check_followers(robot);
   add_motors(robot, options.motors, name);
   const bool still = stands_still(robot.scene);
   if (!still) stiffen_limits(robot);

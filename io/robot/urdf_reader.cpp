@@ -52,7 +52,7 @@ const Words kJointChildren = {{"origin"},
                               {"axis"},
                               {"limit"},
                               {"dynamics"},
-                              {"mimic", Fate::lost, "ties a joint to another; scenes cannot"},
+                              {"mimic"},
                               {"calibration", Fate::idle, kSoftware},
                               {"joint_properties", Fate::idle, kSoftware},
                               {"safety_controller", Fate::idle, kSoftware}};
@@ -266,15 +266,27 @@ class UrdfReader {
     if (out.type == "spherical") joint.type = JointType::spherical;
     read_limit(node, parts, out);
     if (const auto dynamics = last_of(parts, "dynamics")) {
-      Words words = {{"damping"}, {"friction", Fate::zero, "dry friction of a joint"}};
+      Words words = {{"damping"}, {"friction"}};
       for (const char* other : {"D", "K", "mu_coulomb", "mu_viscous"})
         words.push_back({other, Fate::idle, kSoftware});
       dynamics->check(words);
       joint.damping = dynamics->not_negative("damping", 0.0);
-      if (joint.type == JointType::fixed && joint.damping != 0) {
-        joint.damping = 0;
+      joint.friction = dynamics->not_negative("friction", 0.0);
+      if (joint.friction != 0 &&
+          (joint.type == JointType::free || joint.type == JointType::spherical)) {
+        joint.friction = 0;
+        dynamics->lost("<dynamics> friction: dry friction of a joint that turns freely");
+      }
+      if (joint.type == JointType::fixed && (joint.damping != 0 || joint.friction != 0)) {
+        joint.damping = joint.friction = 0;
         dynamics->idle("<dynamics> of a fixed joint");
       }
+    }
+    if (const auto mimic = last_of(parts, "mimic")) {
+      mimic->check({{"joint"}, {"multiplier"}, {"offset"}});
+      joint.follows = mimic->text("joint");
+      joint.ratio = mimic->number("multiplier", 1.0);
+      joint.offset = mimic->number("offset", 0.0);
     }
     joints_.push_back(std::move(out));
   }

@@ -2,6 +2,7 @@
 // Reads what acts on the joints of a scene file: damping, springs, limits, motors.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -100,6 +101,26 @@ void read_joint_effects(const SceneElement& node, JointDescription& joint) {
     node.warn("'rest' has no effect without 'stiffness'");
   if (node.has("lim") && joint.limit_stiffness == 0)
     node.warn("'lim' has no effect without 'lim_stiffness'");
+}
+
+void read_follower(const SceneElement& node, JointDescription& joint) {
+  joint.follows = node.text("follows", "");
+  for (const char* name : {"ratio", "offset"})
+    if (joint.follows.empty() && node.has(name))
+      node.warn(fmt::format("'{}' has no effect without 'follows'", name));
+  if (joint.follows.empty()) return;
+  joint.ratio = node.number("ratio");
+  joint.offset = node.number("offset", dof_turns(joint.type, 0));
+}
+
+void scale_followers(Scene& scene, const SceneContext& c) {
+  for (LinkDescription& link : scene.links) {
+    JointDescription& joint = link.joint;
+    const auto leader = std::ranges::find_if(
+        scene.links, [&](const LinkDescription& l) { return l.joint.name == joint.follows; });
+    if (joint.follows.empty() || leader == scene.links.end()) continue;
+    joint.ratio *= coordinate_scale(joint.type, 0, c) / coordinate_scale(leader->joint.type, 0, c);
+  }
 }
 
 std::vector<double> control_scales(const Scene& scene, const SceneContext& c) {

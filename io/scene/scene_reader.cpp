@@ -125,6 +125,7 @@ class TreeReader {
     node.read(joint.pose);
     if (node.word("frame") == 1) place_in_world(joint, parent);
     read_joint_effects(node, joint);
+    read_follower(node, joint);
     return joint;
   }
 
@@ -236,6 +237,7 @@ void read_root(const SceneNode& root, Scene& scene) {
   TreeReader tree(scene);
   each("robot", [&](const SceneNode& s) { tree.read_robot(s); });
   tree.name_bodies();
+  scale_followers(scene, c);
   if (scene.links.empty()) root.fail("no <link> in any <robot>: there is nothing to simulate");
   each("actuator", [&](const SceneNode& s) { read_actuators(scene, s); });
   each("contact", [&](const SceneNode& s) { read_contacts(scene, s); });

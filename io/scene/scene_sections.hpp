@@ -68,5 +68,9 @@ std::vector<double> control_scales(const Scene& scene, const SceneContext& conte
 
 /// Reads damping, armature, spring and limits of a joint whose type is known.
 void read_joint_effects(const SceneElement& node, JointDescription& joint);
+/// Reads which joint a joint follows, with the ratio of the file's units.
+void read_follower(const SceneElement& node, JointDescription& joint);
+/// Turns the ratios of all joints into SI.
+void scale_followers(Scene& scene, const SceneContext& context);
 
 }  // namespace tangere

@@ -157,7 +157,7 @@ void restore_state(const SavedState& from, bool continues, Batch& batch) {
                                  from.environments));
   const auto nq = static_cast<std::size_t>(model.nq()), nv = static_cast<std::size_t>(model.nv());
   const ShearStateArrays points = shear_state_arrays(model);
-  const bool has_memory = model.has_shear_springs() && from.memory;
+  const bool has_memory = model.has_shear_state() && from.memory;
   if (has_memory) check_points(from, points);
   const bool sleeps = continues && from.sleep_state;
   if (sleeps)

@@ -34,7 +34,8 @@ struct AdjointArgs {
   N* rhs;                  ///< (nv) out: Jᵀ q̄ + V_xᵀ v̄
   const N* lambda;         ///< (nv) the solution
   N *nu, *mass_lambda;     ///< (nv) out: ν and M λ
-  N* target;  ///< (nv) out: cotangents of position motors' targets; zero where there are none
+  N* target;      ///< (nv) out: cotangents of position motors' targets; zero where there are none
+  N* dry_anchor;  ///< (nv) out: of Stage::dry_anchor; zero where there is no dry friction
   N *q_centre, *v_centre;  ///< (nv) added to
   StageHistory<N> history;
   LinkAdjoint<N>* links;  ///< (n_links) scratch
@@ -162,6 +163,19 @@ void adjoint_targets(const ModelView& model, const StageArgs<N>& a, const Link& 
   }
 }
 
+/// Computes cotangents of the anchors of one joint's dry friction: (∂force/∂z)ᵀ λ.
+template <JointKind K, class N>
+void adjoint_dry_friction(const ModelView& model, const StageArgs<N>& a, const Link& link,
+                          const N* lambda, N* anchor) {
+  for (int k = 0; k < dofs(K); ++k) {
+    const int d = link.v + k;
+    const DofEffects& e = model.effects[d];
+    const DryFriction<N> at =
+        dry_friction(e, a.centre[link.q + k] + a.x[d], a.v[d], a.dry_anchor[d]);
+    anchor[d] = at.rigid * load_parameter(a, e.friction) * N(e.friction_rate) * lambda[d];
+  }
+}
+
 /// Adds the joint effects of one joint to the sweep's Cᵀ λ and M λ.
 template <JointKind K, class N>
 void adjoint_effects(const ModelView& model, const StageArgs<N>& a, const AdjointArgs<N>& d,
@@ -179,12 +193,13 @@ void adjoint_effects(const ModelView& model, const StageArgs<N>& a, const Adjoin
     d.mass_lambda[link.v + k] = mul_add(load.armature[k], lambda, d.mass_lambda[link.v + k]);
   }
   if (link.effects & kPositionServo) adjoint_targets<K>(model, a, link, d.lambda, d.target);
+  if (link.effects & kDryFriction) adjoint_dry_friction<K>(model, a, link, d.lambda, d.dry_anchor);
 }
 
 /// Computes M λ, ν and the targets' cotangents, leaves first.
 template <class N>
 void adjoint_inward(const ModelView& model, const StageArgs<N>& a, const AdjointArgs<N>& d) {
-  for (int i = 0; i < model.nv; ++i) d.target[i] = N(0.0);
+  for (int i = 0; i < model.nv; ++i) d.target[i] = d.dry_anchor[i] = N(0.0);
   for (int i = model.n_links - 1; i >= 0; --i) {
     const Link& link = model.links[i];
     const LinkScratch<N>& s = a.links[i];

@@ -239,6 +239,9 @@ void joint_parameters(const ModelView& model, const StageArgs<N>& a, const Link&
       const N& of = lambda[link.v + k];
       out[kDofNumbers * k + kDofStiffness] += of * (N(e[k].rest) - q);
       out[kDofNumbers * k + kDofLimitStiffness] += of * beyond_limits(e[k], q);
+      if (link.effects & kDryFriction)
+        out[kDofNumbers * k + kDofFriction] -=
+            of * dry_friction(e[k], q, a.v[link.v + k], a.dry_anchor[link.v + k]).share;
       if (link.effects & kPositionServo) motor(k, u[k] - q);
     }
   } else {

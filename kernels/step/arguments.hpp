@@ -14,6 +14,8 @@ namespace tangere::kernels {
 template <int L>
 struct Stage {
   Row<L>*centre, *x, *r, *s, *tau, *target;  // inputs
+  Row<L>* dry_anchor;  ///< (nv) q at which the spring of dry friction is slack; read where the
+                       ///< joint has any
   Row<L> c0_over_h, inverse_h;
   const double* block;
   int group;
@@ -98,6 +100,7 @@ struct StageAdjoint {
   Row<L>*rhs, *lambda;
   Row<L>*nu, *mass_lambda;  ///< out: v̄ - Cᵀ λ and M λ
   Row<L>* target;           ///< out: of the targets of position motors; zero where there are none
+  Row<L>* dry_anchor;       ///< out: of Stage::dry_anchor; zero where there is no dry friction
   Row<L>*q_centre, *v_centre;  ///< added to
   StageHistory<Row<L>> history;
 };

@@ -148,7 +148,7 @@ void contact_jacobian(const ModelView& model, const StageArgs<N>& a, int body1, 
 /// Computes A at the x of the last residual<true>().
 template <class N>
 void jacobian(const ModelView& model, const StageArgs<N>& a) {
-  const int entries = a.block_first != nullptr ? a.block_entries : model.pattern.entries;
+  const int entries = a.block_first != nullptr ? a.block_entries : model.pattern.assembled;
   for (int e = 0; e < entries; ++e) a.A[e] = N(0.0);
   composite_sweep(model, a);
   for (int i = 0; i < model.n_links; ++i)
@@ -166,6 +166,7 @@ void jacobian(const ModelView& model, const StageArgs<N>& a) {
     const ContactScratch<N>& o = a.contacts[model.n_link_pairs + k];
     if (o.near) contact_jacobian<N>(model, a, model.grounded[k].link, -1, o, nullptr);
   }
+  fold_jacobian(model, a);
   without_negative_zeros(a.A, entries);
 }
 

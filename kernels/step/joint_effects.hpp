@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// Forces on the dofs of a joint: damping, armature, springs, limits and position motors, with their
-// derivatives. Per dof
+// Forces on the dofs of a joint: damping, armature, springs, limits, dry friction and position
+// motors, with their derivatives. Per dof
 //
 //   f = -c v - I_a a - k (q - rest) + k_l max(0, lo - q) - k_l max(0, q - hi)
-//       + clip(P (u - q) - D v, range)
+//       - τ clip((q - z + t_f v)/θ_b, ±1) + clip(P (u - q) - D v, range)
 //
 // A spherical joint has rotation vectors in place of q: φ = log q, φ_s = log(rest⁻¹ q),
 // ψ = log(q⁻¹ exp u). Torques in body axes: spring -k φ_s (the gradient of k|φ_s|²/2, as
@@ -16,6 +16,7 @@
 #pragma once
 
 #include "kernels/numbers/rotation_vector.hpp"
+#include "kernels/step/dry_friction.hpp"
 #include "kernels/step/stage.hpp"
 
 namespace tangere::kernels {
@@ -74,6 +75,17 @@ void add_plain_effects(const StageArgs<N>& a, const Link& link, const DofEffects
     N slope;
     add_force(out, k, limit_force(e, load_parameter(a, e.limit_stiffness), q, slope));
     out.d_dq[k] += slope;
+  }
+  if (link.effects & kDryFriction) {
+    const int d = link.v + k;
+    const N bound = load_parameter(a, e.friction);
+    const DryFriction<N> at = dry_friction(e, q, a.v[d], a.dry_anchor[d]);
+    add_force(out, k, -(bound * at.share));
+    // By the secant where it slips: of friction_tangent 0.
+    const N slope = bound * N(e.friction_rate) *
+                    (at.rigid + (N(1.0) - at.rigid) * (N(1.0) - a.friction_tangent) * at.hold);
+    out.d_dq[k] += slope;
+    out.d_dv[k] += slope * N(e.friction_time);
   }
   if (link.effects & kPositionServo) {
     const N P = load_parameter(a, e.P), D = load_parameter(a, e.D);

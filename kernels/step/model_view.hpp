@@ -29,9 +29,10 @@ enum JointEffect : std::uint8_t {
   kArmature = 2,
   kSpring = 4,
   kLimit = 8,
-  kPositionServo = 16
+  kPositionServo = 16,
+  kDryFriction = 32
 };
-inline constexpr int kPositionDependent = kSpring | kLimit | kPositionServo,
+inline constexpr int kPositionDependent = kSpring | kLimit | kPositionServo | kDryFriction,
                      kBeyondDamping = kPositionDependent | kArmature;
 
 /// One elementary joint and everything that moves rigidly with it.
@@ -70,6 +71,9 @@ struct DofEffects {
   double low, high;              ///< limits [m, rad]
   Parameter P, D;                ///< gains of a position motor evaluated at the end of the step
   double force_low, force_high;  ///< range of the motor's force; infinite: none
+  Parameter friction;            ///< bound of dry friction [N or N m]
+  double friction_rate;          ///< 1/θ_b of dry friction [1/m or 1/rad]
+  double friction_time;          ///< t_f of dry friction [s]
 };
 
 /// Parameters of a link (mass, moment, inertia xx xy xz yy yz zz; Link::frame.p), of a solid (its
@@ -82,12 +86,13 @@ enum DofNumber : int {
   kDofD,
   kDofArmature,
   kDofLimitStiffness,
+  kDofFriction,
   kDofNumbers
 };
 /// Where a dof's effects keep these parameters.
 inline constexpr Parameter DofEffects::*kDofParameters[kDofNumbers] = {
-    &DofEffects::damping, &DofEffects::stiffness, &DofEffects::P,
-    &DofEffects::D,       &DofEffects::armature,  &DofEffects::limit_stiffness};
+    &DofEffects::damping,  &DofEffects::stiffness,       &DofEffects::P,       &DofEffects::D,
+    &DofEffects::armature, &DofEffects::limit_stiffness, &DofEffects::friction};
 
 /// The row of each parameter among the derivatives by parameters: coefficients of pairs, of ground
 /// contacts, inertia of links, parameters of dofs, of solids, places of links, coefficients of
@@ -264,8 +269,10 @@ struct PatternPart {
 /// a scene of many trees, A is stored in blocks, one for each tree and two for each two trees that
 /// contacts couple at present (Stage::block_first); then only the first rows below are set.
 struct Pattern {
-  int n;                      ///< dofs
-  int entries;                ///< stored entries of G_q, C and A; in blocks: of trees alone
+  int n;        ///< dofs
+  int entries;  ///< stored entries of G_q, C and A; in blocks: of trees alone
+  /// Entries that kernels write to. Those from `entries` on are folded into others (Follower).
+  int assembled;
   const int* diagonal_entry;  ///< (n): index of entry (i, i)
   int n_trees;
   const int* tree;      ///< (n) of each dof; dofs of a tree are adjacent
@@ -292,6 +299,19 @@ struct EliminationRun {
   int source, target, length;
 };
 
+/// A dof that follows another: x = ratio x_leader, with all coordinates kept. With x = G y, where y
+/// has the other dofs, the solver's system is g_r = Gᵀ g, A_r = Gᵀ A G. It is stored on all dofs:
+/// g of a follower is 0, and its row and column of A are a diagonal entry.
+struct Follower {
+  int v, leader_v, q, leader_q;
+  double ratio, offset;
+};
+/// A[target] += factor A[source].
+struct FoldedEntry {
+  int target, source;
+  double factor;
+};
+
 struct ModelView {
   int n_links, nq, nv;
   const Link* links;
@@ -316,6 +336,9 @@ struct ModelView {
   const ShearSpringContact* memories;
   Frame<double> ground;  ///< frame of the ground in the world; its third axis is the normal
   Pattern pattern;
+  int n_followers, n_folded;
+  const Follower* followers;
+  const FoldedEntry* folded;
 };
 
 /// Start of the row that holds the environments of lanes 8 g … 8 g + 7 of a block.

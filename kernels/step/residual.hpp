@@ -9,6 +9,7 @@
 
 #include "kernels/contact/elastic_contact.hpp"
 #include "kernels/step/faces.hpp"
+#include "kernels/step/followers.hpp"
 #include "kernels/step/joint_effects.hpp"
 #include "kernels/step/low_points.hpp"
 #include "kernels/step/point_sums.hpp"
@@ -562,6 +563,7 @@ void residual(const ModelView& model, const StageArgs<N>& a) {
     const ContactScratch<N>& o = a.contacts[model.n_link_pairs + k];
     if (o.near) add_force_scale(model, a, model.grounded[k].link, o.sums.wrench);
   }
+  fold_residual(model, a);
   without_negative_zeros(a.g, model.nv);
 }
 

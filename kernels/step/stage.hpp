@@ -71,12 +71,13 @@ struct JointColumns {
 
 template <class N>
 struct StageArgs {
-  const N* centre;  ///< (nq) quaternions w x y z
-  const N* x;       ///< (nv)
-  const N* r;       ///< (nv) history of ẋ
-  const N* s;       ///< (nv) history of a
-  const N* tau;     ///< (nv) actuator force
-  const N* target;  ///< (nv) targets of position motors
+  const N* centre;      ///< (nq) quaternions w x y z
+  const N* x;           ///< (nv)
+  const N* r;           ///< (nv) history of ẋ
+  const N* s;           ///< (nv) history of a
+  const N* tau;         ///< (nv) actuator force
+  const N* target;      ///< (nv) targets of position motors
+  const N* dry_anchor;  ///< (nv) as in Stage
   N c0_over_h, inverse_h;
   N friction_tangent = N(1.0);  ///< for derivatives; see kernels/contact/contact_law.hpp
   N normal_share = N(1.0), friction_share = N(1.0);  ///< as in Stage

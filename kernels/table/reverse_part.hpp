@@ -21,6 +21,7 @@ AdjointArgs<N> adjoint_arguments(const StageAdjoint<L>& d, LinkAdjoint<N>* links
                    view(d.nu),
                    view(d.mass_lambda),
                    view(d.target),
+                   view(d.dry_anchor),
                    view(d.q_centre),
                    view(d.v_centre),
                    {d.history.s_centre, d.history.count, {}},

@@ -111,6 +111,7 @@ struct StageView {
     a.s = view(s.s);
     a.tau = view(s.tau);
     a.target = view(s.target);
+    a.dry_anchor = view(s.dry_anchor);
     a.c0_over_h = *view(&s.c0_over_h);
     a.inverse_h = *view(&s.inverse_h);
     a.friction_tangent = *view(&s.friction_tangent);

@@ -127,7 +127,7 @@ void add_model(nb::module_& m) {
           [](const Model& s) {
             const std::vector<std::string> sensors = sensor_names(s.scene());
             std::vector<std::string> names = output_names(sensors);
-            if (!s.has_shear_springs()) std::erase(names, "memory");
+            if (!s.has_shear_state()) std::erase(names, "memory");
             std::erase_if(names, [&](const std::string& name) {
               const auto output = find_output(sensors, name);
               return output && !reason_against(s.scene(), *output).empty();

@@ -301,9 +301,8 @@ def test_a_robot_is_that_of_the_command(name, command, tmp_path):
 
 
 def test_a_robot_is_extended():
-    with pytest.warns(UserWarning, match="motion differs by it: .*<mimic>"):
-        b = import_robot(ROBOTS / "gripper.urdf", pads={"left_finger": ("digit_guess", "-y")},
-                         motors={"left_slide": (2000, 100)}, drop=True)  # fmt: skip
+    b = import_robot(ROBOTS / "gripper.urdf", pads={"left_finger": ("digit_guess", "-y")},
+                     motors={"left_slide": (2000, 100)})  # fmt: skip
     ball = b.robot.link("ball", parent="palm")
     ball.joint("ball", "free3d", pos=(0, 0, 0.1))
     ball.body("sphere", radius=0.01, density=500)
@@ -330,7 +329,7 @@ def test_requests_for_a_robot_are_checked():
     assert "a gain P above 0" in fault(motors={"slide": -1})
     assert "did you mean 'slide'" in fault(motors={"slid": "force"})
     assert "expected 'fixed' or 'free'" in fault(base="loose")
-    with pytest.raises(tangere.InputError, match="mimic(.|\n)*drop=True"):
-        import_robot(ROBOTS / "gripper.urdf")
+    with pytest.raises(tangere.InputError, match="connect(.|\n)*drop=True"):
+        import_robot(ROBOTS / "arm.xml")
     with pytest.raises(OSError):
         import_robot(ROBOTS / "missing.urdf")

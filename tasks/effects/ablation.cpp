@@ -228,6 +228,7 @@ void drop(Scene& scene, const Effect& effect, Ablation way) {
     case Kind::joint_damping: drop_from_joints(scene, Field::damping, way); break;
     case Kind::joint_springs: drop_from_joints(scene, Field::stiffness, way); break;
     case Kind::joint_limits: drop_from_joints(scene, Field::lim_stiffness, way); break;
+    case Kind::joint_friction: drop_from_joints(scene, Field::friction, way); break;
     case Kind::armature: drop_from_joints(scene, Field::armature, way); break;
     case Kind::force_motors: drop_motors(scene, MotorControl::force, way); break;
     case Kind::position_motors: drop_motors(scene, MotorControl::position, way); break;

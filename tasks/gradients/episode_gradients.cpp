@@ -184,9 +184,10 @@ EpisodeGradients task_returns(const Task& task, const TaskActions& actions, std:
 
 /// Refuses scenes in which a state is more than q and v.
 void check_no_shear_springs(const Model& model) {
-  if (model.has_shear_springs())
+  if (model.has_shear_state())
     throw InputError("scene '" + model.scene().name +
-                     "' has contacts with ks; expected none: the derivative of a state by the one "
+                     "' has contacts with ks or friction of joints; expected none: the derivative "
+                     "of a state by the one "
                      "before leaves out the shear state");
 }
 

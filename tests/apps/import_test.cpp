@@ -5,6 +5,7 @@
 
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <regex>
 
 #include "tests/apps/program.hpp"
 
@@ -27,26 +28,35 @@ TEST(Import, AGripperAndAnObjectBecomeADataSet) {
                          "--pad",   "left_finger=gelsight_mini_measured@-y",
                          "--pad",   "right_finger=gelsight_mini_measured@+y",
                          "--motor", "lift=2000,100",
-                         "--motor", "left_slide=400,20",
-                         "--motor", "right_slide=400,20"};
-  const Outcome refused = run(folder, command);
-  EXPECT_EQ(refused.exit_code, 2);
-  EXPECT_THAT(refused.err, HasSubstr("<mimic>: ties a joint to another; scenes cannot (line "));
-  EXPECT_FALSE(std::filesystem::exists(folder.path("grasp/gripper.xml")));
-  const json made = run_json(folder, command + Words{"--drop"});
+                         "--motor", "left_slide=800,40"};
+  const json made = run_json(folder, command);
   EXPECT_EQ(made["format"], "URDF");
   EXPECT_EQ(made["joints"], 3);
-  EXPECT_EQ(made["motors"], 3);
+  EXPECT_EQ(made["motors"], 2);
   EXPECT_EQ(made["sensors"], 2);
-  EXPECT_THAT(made["lost"], SizeIs(1));
-  EXPECT_EQ(run(folder, command + Words{"--drop"}).exit_code, 3) << "an output is kept";
+  EXPECT_THAT(made["lost"], SizeIs(0));
+  EXPECT_EQ(run(folder, command).exit_code, 3) << "an output is kept";
   EXPECT_EQ(run_json(folder, {"inspect", "grasp/grasp.xml"})["u_names"],
-            json({"lift.rate", "left_slide.rate", "right_slide.rate"}));
+            json({"lift.rate", "left_slide.rate"}));
   run_json(folder, {"simulate", "grasp/grasp.xml", "-o", "run.h5", "--steps", "20"});
   run_json(folder, {"view", "run.h5", "-o", "run.html"});
   run_json(folder, {"generate", "grasp/grasp.xml", "-o", "data", "--episodes", "2", "--steps", "20",
                     "--every", "10"});
   run_json(folder, {"view", "data", "-o", "data.html", "--scene", "grasp/grasp.xml"});
+}
+
+TEST(Import, AFileThatLosesMotionIsRefusedWithoutDrop) {
+  const Folder folder;
+  folder.write("gripper.urdf", std::regex_replace(file_bytes(kGrasp + "/gripper.urdf"),
+                                                  std::regex("<mimic joint=\"left_slide\"/>"),
+                                                  "<mimic joint=\"right_slide\"/>"));
+  const Words command = {"import", "gripper.urdf", "-o", "gripper.xml"};
+  const Outcome refused = run(folder, command);
+  EXPECT_EQ(refused.exit_code, 2);
+  EXPECT_THAT(refused.err, HasSubstr("joint 'right_slide' follows 'right_slide', which follows it "
+                                     "in turn (line "));
+  EXPECT_FALSE(std::filesystem::exists(folder.path("gripper.xml")));
+  EXPECT_THAT(run_json(folder, command + Words{"--drop"})["lost"], SizeIs(1));
 }
 
 TEST(Import, WhatIsNoRequestIsSaid) {

@@ -111,7 +111,7 @@ TEST(MemoryFiles, SayWhatARowLacks) {
   const Words onward{"--state-from", "first.h5", "--steps", "1"};
   const std::string told = simulate(folder, "on.h5", onward + Words{"--row", "50"});
   EXPECT_THAT(told, HasSubstr("row 50 of first.h5 does not hold the shear state (row 60 "
-                              "does): contacts with ks begin unsheared"));
+                              "does): contacts with ks and joints with friction begin unsheared"));
   EXPECT_THAT(array_of(folder.path("on.h5"), "memory/step").values, ElementsAre(1));
   // Where rows of q are thinned, each of them can be continued.
   simulate(folder, "thin.h5", {"--steps", "60", "--record", "q/25,v/25"});

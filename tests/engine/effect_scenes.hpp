@@ -64,13 +64,14 @@ inline Scene scene_that_sleeps() {
   return s;
 }
 
-/// The same with shear springs, which is not to be had together with sleep.
+/// The same with shear springs and dry friction of a joint, which are not to be had together with sleep.
 inline Scene scene_that_remembers() {
   Scene s = scene_that_sleeps();
   s.solver.sleep = 0;
   for (PairContactDescription& d : s.pair_contacts) d.coefficients.ks = 20;
   for (GroundContactDescription& d : s.ground_contacts) d.coefficients.ks = 500;
   for (TactileDescription& d : s.sensors) d.coefficients.ks = 0.5;
+  s.links[3].joint.friction = 0.02;
   return s;
 }
 

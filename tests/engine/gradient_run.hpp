@@ -212,9 +212,11 @@ inline double best_difference(const std::function<double(double)>& f, double sta
   return best_of_differences(steps, values.data());
 }
 
+/// `complete`: puts what follows from the rest of a start in its place, or empty.
 inline RunGradient differences_of_run(const Model& model, const StepperOptions& options,
                                       const RunInput& in, const StateLoss& loss,
-                                      double start = 1e-3) {
+                                      double start = 1e-3,
+                                      const std::function<void(RunInput&)>& complete = {}) {
   // All runs with other states and controls go in one batch.
   const std::vector<double> steps = difference_steps(start);
   std::vector<RunInput> runs;
@@ -223,6 +225,7 @@ inline RunGradient differences_of_run(const Model& model, const StepperOptions& 
       for (const double at : {e, -e, 2 * e, -2 * e}) {
         runs.push_back(in);
         change(runs.back(), at);
+        if (complete) complete(runs.back());
       }
   };
   for (int i = 0; i < model.nv(); ++i) {

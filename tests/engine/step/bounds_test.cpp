@@ -17,7 +17,7 @@ namespace {
 
 using Numbers = std::vector<double>;
 
-constexpr int kEnvironments = 18;  // two blocks, the second one with two environments
+constexpr int kBoundEnvironments = 18;  // two blocks, the second one with two environments
 
 const Model& ball() {
   static const Model model(read_scene(TANGERE_SOURCE_DIR "/scenes/rolling_ball_small.xml").scene);
@@ -41,7 +41,7 @@ void expect_refused_indices(const char* what, int count, const std::function<voi
 }
 
 TEST(Bounds, ABatchRefusesEnvironmentsThatDoNotExist) {
-  Batch batch(ball(), kEnvironments, 1);
+  Batch batch(ball(), kBoundEnvironments, 1);
   Numbers q(size_of(ball().nq())), v(size_of(ball().nv()));
   batch.get_q(0, q);
   const std::vector<std::pair<const char*, std::function<void(int)>>> calls = {
@@ -65,7 +65,7 @@ TEST(Bounds, ABatchRefusesEnvironmentsThatDoNotExist) {
       {"residual", [&](int e) { (void)batch.residual(e); }},
       {"has_history", [&](int e) { (void)batch.has_history(e); }},
       {"set_failed", [&](int e) { batch.set_failed(e, StepStatus::not_converged); }}};
-  for (const auto& [what, call] : calls) expect_refused_indices(what, kEnvironments, call);
+  for (const auto& [what, call] : calls) expect_refused_indices(what, kBoundEnvironments, call);
   const std::vector<std::pair<const char*, std::function<void(int)>>> of_blocks = {
       {"block", [&](int b) { (void)batch.block(b); }},
       {"save_block", [&](int b) { (void)batch.save_block(b); }},
@@ -77,11 +77,11 @@ TEST(Bounds, ABatchRefusesEnvironmentsThatDoNotExist) {
                          [&](int k) { (void)batch.randomized_value(0, k); });
   expect_refused_indices("is_parameter", randomized, [&](int k) { (void)batch.is_parameter(k); });
   EXPECT_THROW(batch.set_randomized_value(0, randomized, 1), InputError);
-  EXPECT_THROW(batch.set_randomized_value(kEnvironments, 0, 1), InputError);
+  EXPECT_THROW(batch.set_randomized_value(kBoundEnvironments, 0, 1), InputError);
 }
 
 TEST(Bounds, ABatchRefusesArraysOfAnotherLength) {
-  Batch batch(ball(), kEnvironments, 1);
+  Batch batch(ball(), kBoundEnvironments, 1);
   const std::size_t nq = size_of(ball().nq()), nv = size_of(ball().nv());
   Numbers q(nq), v(nv);
   batch.get_q(0, q);
@@ -113,27 +113,27 @@ TEST(Bounds, ABatchRefusesArraysOfAnotherLength) {
 }
 
 TEST(Bounds, AStepperRefusesControlsOfAnotherLength) {
-  Batch batch(ball(), kEnvironments, 1);
+  Batch batch(ball(), kBoundEnvironments, 1);
   Stepper stepper(ball());
-  const std::size_t controls = size_of(kEnvironments) * size_of(ball().nu());
+  const std::size_t controls = size_of(kBoundEnvironments) * size_of(ball().nu());
   ASSERT_GT(controls, 0u);
   expect_refused_sizes("step", controls, [&](std::size_t n) { stepper.step(batch, Numbers(n)); });
   expect_refused_sizes("step_block", controls,
                        [&](std::size_t n) { stepper.step_block(batch, 1, Numbers(n)); });
   expect_refused_indices("step_block", 2,
                          [&](int b) { stepper.step_block(batch, b, Numbers(controls)); });
-  Batch other(Model(ball().scene()), kEnvironments, 1);
+  Batch other(Model(ball().scene()), kBoundEnvironments, 1);
   EXPECT_THROW(stepper.step(other, Numbers(controls)), InputError);
 }
 
 TEST(Bounds, AReadoutRefusesWhatDoesNotExist) {
-  const Batch batch(ball(), kEnvironments, 1);
+  const Batch batch(ball(), kBoundEnvironments, 1);
   Readout readout(ball());
   const std::size_t field = 3 * size_of(ball().sensors()[0].points);
   const int sensors = int(ball().sensors().size());
   Numbers force(field);
   std::vector<float> single(field);
-  expect_refused_indices("tactile", kEnvironments,
+  expect_refused_indices("tactile", kBoundEnvironments,
                          [&](int e) { readout.tactile(batch, e, 0, force); });
   expect_refused_indices("tactile", sensors, [&](int s) { readout.tactile(batch, 0, s, force); });
   expect_refused_indices("tactile", sensors, [&](int s) { readout.tactile(batch, 0, s, single); });
@@ -171,7 +171,7 @@ TEST(Bounds, AReadoutRefusesWhatDoesNotExist) {
   DenseFrame<double> own(ball(), 0), foreign(other, 0);
   EXPECT_NO_THROW(readout.read(batch, 0, own));
   EXPECT_THROW(readout.read(batch, 0, foreign), InputError);
-  EXPECT_THROW(readout.read(batch, kEnvironments, own), InputError);
+  EXPECT_THROW(readout.read(batch, kBoundEnvironments, own), InputError);
   EXPECT_THROW(readout.read(Batch(other, 1), 0, own), InputError);
 }
 

@@ -19,7 +19,7 @@
 namespace tangere {
 namespace {
 
-constexpr int kEnvironments = 19;  // the last group has three lanes
+constexpr int kKeptEnvironments = 19;  // the last group has three lanes
 
 /// A pad on balls of different radii that turn under it.
 Scene balls_of_many_sizes() {
@@ -84,9 +84,9 @@ void expect_same_bits(const Scene& scene, const std::vector<double>& control) {
   const Model model(scene);
   Stepper stepper(model), other(model);
   BlockTape tape(model, stepper.integrator(), 4);
-  Batch batch(model, kEnvironments, 3);
+  Batch batch(model, kKeptEnvironments, 3);
   std::vector<double> u;
-  for (int e = 0; e < kEnvironments; ++e) u.insert(u.end(), control.begin(), control.end());
+  for (int e = 0; e < kKeptEnvironments; ++e) u.insert(u.end(), control.begin(), control.end());
   const BlockState saved = batch.save_block(0);
   for (int t = 0; t < 80; ++t) {
     disturb(batch, saved, t);

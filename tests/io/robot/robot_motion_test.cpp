@@ -84,5 +84,29 @@ TEST(RobotMotion, OddInertiasMoveAsTheyAreWritten) {
             5e-5);
 }
 
+/// Dry friction: a swing loses 2 τ/k in each half swing, a wheel stops, a pendulum is held.
+TEST(RobotMotion, DryJointsMoveByCoulombsLaw) {
+  RobotOptions options;
+  options.keyframe = "start";
+  const ImportedScene made = import_robot(kFolder + "dry_joints.xml", "scene.xml", options);
+  EXPECT_THAT(made.lost, IsEmpty());
+  Scene scene = parse_scene(made.text, "scene.xml").scene;
+  scene.integrator = Integrator::sdirk2;
+  scene.timestep = 2.5e-4;
+  const Model model(scene);
+  Batch batch(model, 1);
+  Stepper stepper(model);
+  std::vector<double> q(std::size_t(model.nq()));
+  double time = 0, settled = 0;
+  for (const std::vector<double>& row : read_table(kFolder + "dry_joints.csv").rows) {
+    for (; time < row[0] - 1e-9; time += scene.timestep) stepper.step(batch, {});
+    batch.get_q(0, q);
+    for (std::size_t k = 0; k < 3; ++k) EXPECT_NEAR(q[k], row[1 + k], 2e-2) << time << " s";
+    if (std::abs(time - 0.5) < 1e-9) settled = q[2];
+  }
+  EXPECT_GT(time, 0.9);
+  EXPECT_NEAR(q[2], settled, 1e-8) << "the held joint does not creep";
+}
+
 }  // namespace
 }  // namespace tangere
