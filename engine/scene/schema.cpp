@@ -211,6 +211,7 @@ constexpr Attribute kSchema[] = {
     row(kMotor, "joint", kNeeded, U::one, "a joint whose dofs all slide or all turn"),
     row(kMotor, "ctrl", kNeeded, U::one, "u: a force from -1 to 1, or a target",
         Words{"force position"}),
+    row(kMotor, "name", "", U::one, "of its controls; that of its joint if left out"),
     row(kMotor, "ctrl_range", kNone, U::N, "least and largest force; ctrl force needs it",
         Or{U::N_m}, Flags{kInDefault}),
     row(kMotor, "P", kNeeded, U::N_per_m, "force P (u - q) - D v", Or{U::N_m_per_rad},
@@ -221,7 +222,9 @@ constexpr Attribute kSchema[] = {
         Flags{kInDefault | kParameter}),
     row(kMotor, "timing", "end", U::one, "start: the force is that of the step's start",
         Types{"position"}, Words{"end start"}, Flags{kInDefault}),
-    ignored(kMotor, "name"),
+    row(kMotor, "scale", kNone, U::one, "force or target per u [N, N m, m, rad]"),
+    row(kMotor, "offset", "0", U::one, "force or target at u = 0, in the unit of scale"),
+    row(kMotor, "u_range", kNone, U::one, "to which u is clipped before; low high"),
 
     row(kGroundContact, "body", kNeeded, U::one, "its points touch the ground"),
     row(kPairContact, "general_body", kNeeded, U::one, "its points touch"),
