@@ -53,7 +53,6 @@ def silence(model: mujoco.MjModel) -> None:
         model.opt.disableflags |= getattr(mujoco.mjtDisableBit, "mjDSBL_" + flag)
     model.opt.density = model.opt.viscosity = 0
     model.opt.wind[:] = 0
-    model.body_gravcomp[:] = 0
     if model.ntendon:
         model.tendon_stiffness[:] = model.tendon_damping[:] = model.tendon_armature[:] = 0
 
@@ -64,6 +63,8 @@ class Pair:
     def __init__(self, model: mujoco.MjModel, text: str, name: str, urdf: bool) -> None:
         self.theirs, self.data = model, mujoco.MjData(model)
         silence(model)
+        if "gravity_share" not in text:
+            model.body_gravcomp[:] = 0
         text = re.sub(r' lim="[^"]*" lim_stiffness="[^"]*"', "", text)
         text = re.sub(r"<initial>.*?</initial>", "", text, flags=re.S)
         self.ours = tangere.Model(tangere.Scene.from_string(text, name))

@@ -95,6 +95,7 @@ struct MjcfWhole {
   std::deque<MjcfScope> scopes = {};
   std::map<int, int> ranks = {};  ///< of a <replicate> or <attach>: its place in the order of names
   std::vector<const MjcfScope*> models = {};  ///< by number
+  std::map<int, Source> gravcomp = {};        ///< bodies that have it, by link of the scene
   std::vector<int> motors = {};  ///< by actuator of the file: that of the scene; -1: left out
 
   /// Returns the name in the scene of a node with a name. Fails at the node if it is used twice.
@@ -172,6 +173,8 @@ const MjcfScope& attached_scope(MjcfWhole& whole, const RobotNode& node, const M
 
 /// Reads all bodies of the file that the user names.
 void read_mjcf_bodies(MjcfWhole& whole, const MjcfScope& scope);
+/// Gives the bodies of each tree their share of gravity, after all bodies are read.
+void read_mjcf_gravity(MjcfWhole& whole);
 /// Reads the actuators of all models, after the bodies.
 void read_mjcf_actuators(MjcfWhole& whole);
 /// Returns the key `requested` of the <keyframe> sections, by its name or, without one, its number

@@ -56,7 +56,7 @@ class DenseDynamics {
       if (l.parent >= 0) at = joints[std::size_t(l.parent)];
       move(l.joint, q, v, q_[i], v_[i], at);
       joints.push_back(at);
-      add_body(l.body, masses_[i], at, v, gravity, t);
+      add_body(l.body, masses_[i], at, v, S(l.body.gravity_share) * gravity, t);
       joint_forces(l.joint, q, v, q_[i], v_[i], t);
     }
     motor_forces(q, v, u, t.force);

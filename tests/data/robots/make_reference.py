@@ -135,7 +135,8 @@ def write(path):
             a, d = model.jnt_qposadr[j], model.jnt_dofadr[j]
             coordinates = q[a : a + Q_COUNT[kind]].copy()
             rates, bias, acceleration = (
-                x[d : d + V_COUNT[kind]].copy() for x in (v, data.qfrc_bias, data.qacc_smooth)
+                x[d : d + V_COUNT[kind]].copy()
+                for x in (v, data.qfrc_bias - data.qfrc_gravcomp, data.qacc_smooth)
             )
             if kind in (HINGE, SLIDE):
                 coordinates -= model.qpos0[a]

@@ -120,13 +120,15 @@ TEST_P(AdjointScheme, MotorsTimedAtTheStartMatchDifferences) {
   EXPECT_GT(compared, 150);
 }
 
-/// Scale, offset, ranges of u beyond which the derivative is 0, and several motors of a joint.
+/// Scale, offset, ranges of u beyond which the derivative is 0, and several motors of a joint; also
+/// shares of gravity.
 TEST_P(AdjointScheme, MotorsThatMapTheirControlsMatchDifferences) {
   std::size_t motors = 0;
   int compared = 0;
   for (unsigned seed = 1; seed <= 6; ++seed) {
     Scene s = testing::random_machine(seed, 3 + static_cast<int>(seed % 3));
     testing::map_controls(s, seed);
+    testing::share_gravity(s, seed);
     if (seed % 2 == 0)
       for (MotorDescription& m : s.motors) m.timing = MotorTiming::start;
     motors += s.motors.size();

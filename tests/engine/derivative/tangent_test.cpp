@@ -159,6 +159,7 @@ TEST_P(TangentScheme, MachinesHaveTheSameProducts) {
     if (seed % 2 == 0)
       for (MotorDescription& m : s.motors) m.timing = MotorTiming::start;
     if (seed % 3 == 0) testing::map_controls(s, seed);
+    if (seed % 5 == 0) testing::share_gravity(s, seed);
     const Model model(s);
     const Products p = products(model, testing::options(GetParam(), s.timestep, 1e-9),
                                 random_input(model, seed, 5), seed, 0);

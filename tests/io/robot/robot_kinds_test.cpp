@@ -207,6 +207,33 @@ TEST_F(RobotKinds, AnInheritedRangeBoundsTheControl) {
   EXPECT_THAT(std::get<ConstantControl>(made.control.value()).values, ElementsAre(-3));
 }
 
+/// Bodies of one tree have one share of gravity. That of a body on an upright axis alone does not
+/// matter, as its weight does no work.
+TEST_F(RobotKinds, LiftedBodiesHaveAShareOfGravity) {
+  const auto arm = [](const std::string& base, const std::string& upper, const std::string& lower,
+                      const std::string& axis) {
+    return "<mujoco><worldbody><body name=\"base\"" + base + "><joint axis=\"" + axis +
+           "\"/><geom size=\"0.1\" pos=\"0.1 0 0\"/><body name=\"upper\"" + upper +
+           "><joint axis=\"0 1 0\"/><geom size=\"0.1\" pos=\"0 0 1\"/>"
+           "<geom size=\"0.1\" pos=\"0 0 2\"/><body name=\"lower\"" +
+           lower +
+           " pos=\"0 0 2\"><joint axis=\"0 1 0\"/><geom size=\"0.1\" pos=\"0 0 1\"/>"
+           "</body></body></body></worldbody></mujoco>";
+  };
+  const std::string all = " gravcomp=\"1\"", some = " gravcomp=\"0.25\"";
+  const auto shares = [&](const std::string& text) {
+    std::vector<double> out;
+    for (const LinkDescription& l : scene(text).links) out.push_back(l.body.gravity_share);
+    return out;
+  };
+  EXPECT_THAT(shares(arm("", all, all, "0 0 1")), ElementsAre(0, 0, 0, 0));
+  EXPECT_THAT(shares(arm(some, some, some, "1 0 0")), ElementsAre(0.75, 0.75, 0.75, 0.75));
+  for (const std::string& mixed : {arm("", all, all, "1 0 0"), arm(all, all, some, "0 0 1")}) {
+    EXPECT_THAT(import(mixed).lost, ElementsAre(HasSubstr("<body> gravcomp"))) << mixed;
+    EXPECT_THAT(shares(mixed), ElementsAre(1, 1, 1, 1)) << mixed;
+  }
+}
+
 /// A pendulum has the inertia m (l² + 0.4 r²) and armature, whatever the gear. MuJoCo 4.0.0 gave kv
 /// of the chain, whose other joints are free.
 TEST_F(RobotKinds, ADampingRatioIsThatOfTheInertiaThatMoves) {

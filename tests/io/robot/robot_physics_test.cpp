@@ -218,7 +218,7 @@ TEST(RobotPhysics, OtherKindsOfMjcfMoveAsInMujoco) {
   options.keyframe = "thrown";
   compare("kinds.xml", "kinds_reference.txt", options);
 }
-TEST(RobotPhysics, ActuatorsAreThoseOfMujoco) {
+TEST(RobotPhysics, ActuatorsAndLiftedBodiesAreThoseOfMujoco) {
   RobotOptions options;
   options.keyframe = "on";
   compare("servos.xml", "servos_reference.txt", options);
