@@ -53,7 +53,6 @@ def silence(model: mujoco.MjModel) -> None:
         model.opt.disableflags |= getattr(mujoco.mjtDisableBit, "mjDSBL_" + flag)
     model.opt.density = model.opt.viscosity = 0
     model.opt.wind[:] = 0
-    model.body_gravcomp[:] = 0
     if model.ntendon:
         model.tendon_stiffness[:] = model.tendon_damping[:] = model.tendon_armature[:] = 0
 
@@ -64,6 +63,8 @@ class Pair:
     def __init__(self, model: mujoco.MjModel, text: str, name: str, urdf: bool) -> None:
         self.theirs, self.data = model, mujoco.MjData(model)
         silence(model)
+        if "gravity_share" not in text:
+            model.body_gravcomp[:] = 0
         text = re.sub(r' lim="[^"]*" lim_stiffness="[^"]*"', "", text)
         text = re.sub(r"<initial>.*?</initial>", "", text, flags=re.S)
         self.ours = tangere.Model(tangere.Scene.from_string(text, name))
@@ -98,7 +99,7 @@ class Pair:
         mujoco.mj_normalizeQuat(model, data.qpos)
 
     def drive(self, rng: np.random.Generator) -> np.ndarray:
-        """Draws controls of the scene and gives MuJoCo those of the same forces."""
+        """Draws controls, which are the same on both sides."""
         model, u, used = self.theirs, np.zeros(len(self.motors)), set()
         for k, motor in enumerate(self.motors):
             joint = motor["index"]
@@ -110,14 +111,8 @@ class Pair:
                 and model.actuator_trnid[i, 0] == joint
             )
             used.add(i)
-            gear, gain = model.actuator_gear[i, 0], model.actuator_gainprm[i, 0]
-            if motor["ctrl"] == "position":
-                u[k] = rng.uniform(-0.2, 0.2)
-                self.data.ctrl[i] = gear * (u[k] + model.qpos0[model.jnt_qposadr[joint]])
-            else:
-                u[k] = rng.uniform(-0.5, 0.5)
-                low, high = (float(x) for x in motor["ctrl_range"].split())
-                self.data.ctrl[i] = (low + 0.5 * (u[k] + 1) * (high - low)) / (gear * gain)
+            low, high = (float(x) for x in motor.get("u_range", "-0.3 0.3").split())
+            self.data.ctrl[i] = u[k] = rng.uniform(max(low, -1e3), min(high, 1e3))
         for i in set(range(model.nu)) - used:
             model.actuator_gainprm[i] = model.actuator_biasprm[i] = 0
             model.actuator_gaintype[i] = model.actuator_biastype[i] = 0

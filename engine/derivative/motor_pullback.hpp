@@ -2,9 +2,10 @@
 // Motors in reverse: turns cotangents of forces and targets into those of the controls and of the
 // state at the beginning of a step.
 //
-// Force motors: u ↦ low + (u + 1)/2 (high - low), constant beyond |u| = 1. Position motors timed at
-// the start: clip(P ψ - D v), ψ = u - q or log(q⁻¹ exp u), with ∂ψ/∂q = -J_l⁻¹(ψ) and
-// ∂ψ/∂u = J_r⁻¹(ψ) J_r(u). At a bound of a range the derivative is that of its inside.
+// Force motors: u ↦ low + (u + 1)/2 (high - low), constant beyond |u| = 1, or clip(t). Position
+// motors timed at the start: clip(P ψ - D v), ψ = t - q or log(q⁻¹ exp t), with ∂ψ/∂q = -J_l⁻¹(ψ)
+// and ∂ψ/∂t = J_r⁻¹(ψ) J_r(t). t is the input of the motor, u or scale clip(u) + offset. At a bound
+// of a range the derivative is that of its inside.
 #pragma once
 
 #include "engine/derivative/group_adjoint.hpp"
@@ -28,10 +29,9 @@ struct MotorPullback {
       const CompiledMotor& motor = m.motors[std::size_t(k)];
       double& out = u_bar[k * kernels::kBlock];
       if (motor.control == MotorControl::force) {
-        if (std::abs(u[std::size_t(k)]) <= 1)
-          out += 0.5 * (motor.high - motor.low) * o.tau[motor.dof][lane];
+        out += force_slope(motor, u[std::size_t(k)]) * o.tau[motor.dof][lane];
       } else if (motor.timing == MotorTiming::end) {
-        out += o.target[motor.dof][lane];
+        out += motor_input_slope(motor, u[std::size_t(k)]) * o.target[motor.dof][lane];
       } else {
         at_start(motor, k, o, u_bar);
       }
@@ -44,6 +44,13 @@ struct MotorPullback {
     return p.row < 0 ? p.value : row(p.row);
   }
 
+  /// Of a force motor: the derivative of its force by u.
+  static double force_slope(const CompiledMotor& motor, double u) {
+    if (!motor.maps) return std::abs(u) <= 1 ? 0.5 * (motor.high - motor.low) : 0;
+    const double force = motor_input(motor, u);
+    return force >= motor.low && force <= motor.high ? motor_input_slope(motor, u) : 0;
+  }
+
   void at_start(const CompiledMotor& motor, int k, LossRows<L>& o, double* u_bar) const {
     const double force = unclipped(motor, k);
     if (force < motor.low || force > motor.high) return;
@@ -53,12 +60,12 @@ struct MotorPullback {
     if (o.parameters != nullptr) pull_back_gains(motor, k, lambda, o);
     if (link.kind != kernels::JointKind::spherical) {
       o.q_centre[motor.dof][lane] -= P * lambda;
-      u_bar[k * kernels::kBlock] += P * lambda;
+      u_bar[k * kernels::kBlock] += motor_input_slope(motor, u[std::size_t(k)]) * P * lambda;
       return;
     }
     const int first = k - motor.component;
-    const kernels::Vec3<double> goal = {u[std::size_t(first)], u[std::size_t(first) + 1],
-                                        u[std::size_t(first) + 2]};
+    const auto input = [&](int i) { return motor_input(motor, u[std::size_t(first + i)]); };
+    const kernels::Vec3<double> goal = {input(0), input(1), input(2)};
     const kernels::RotationVector<double> psi = way(link, goal);
     kernels::Vec3<double> pull = {0, 0, 0};
     (&pull.x)[motor.component] = P * lambda;
@@ -70,7 +77,8 @@ struct MotorPullback {
                  goal_parts[3] = {goal_bar.x, goal_bar.y, goal_bar.z};
     for (int i = 0; i < 3; ++i) {
       o.q_centre[link.v + i][lane] -= q_parts[i];
-      u_bar[(first + i) * kernels::kBlock] += goal_parts[i];
+      u_bar[(first + i) * kernels::kBlock] +=
+          motor_input_slope(motor, u[std::size_t(first + i)]) * goal_parts[i];
     }
   }
 

@@ -279,14 +279,20 @@ struct Tangent::Impl {
     for (std::size_t k = 0; k < std::size_t(m().nu); ++k) {
       const CompiledMotor& motor = m().motors[k];
       const auto dof = std::size_t(motor.dof);
+      const auto clipped = [&](const D& force) {
+        return force.value < motor.low    ? D(motor.low)
+               : force.value > motor.high ? D(motor.high)
+                                          : force;
+      };
       if (motor.control == MotorControl::force) {
         const double half = 0.5 * (motor.high - motor.low);
-        stage.tau[dof] = D(motor.low + (std::clamp(u[k], -1.0, 1.0) + 1) * half,
-                           std::abs(u[k]) <= 1 ? half * u_dot[k] : 0);
+        stage.tau[dof] += motor.maps ? clipped(input_of(motor, u[k], u_dot[k]))
+                                     : D(motor.low + (std::clamp(u[k], -1.0, 1.0) + 1) * half,
+                                         std::abs(u[k]) <= 1 ? half * u_dot[k] : 0);
         continue;
       }
       if (motor.timing == MotorTiming::end) {
-        stage.target[dof] = D(u[k], u_dot[k]);
+        stage.target[dof] = input_of(motor, u[k], u_dot[k]);
         continue;
       }
       const auto gain = [&](const kernels::Parameter& p, kernels::DofNumber which) {
@@ -294,21 +300,24 @@ struct Tangent::Impl {
         const int row = m().view.rows.dof(motor.dof, which);
         return D(value, numbers_dot.empty() ? 0 : numbers_dot[std::size_t(row)]);
       };
-      const D force = gain(motor.P, kernels::kDofP) * error_of(motor, k, at, u, u_dot) -
-                      gain(motor.D, kernels::kDofD) * at.v[dof];
-      stage.tau[dof] = force.value < motor.low    ? D(motor.low)
-                       : force.value > motor.high ? D(motor.high)
-                                                  : force;
+      stage.tau[dof] += clipped(gain(motor.P, kernels::kDofP) * error_of(motor, k, at, u, u_dot) -
+                                gain(motor.D, kernels::kDofD) * at.v[dof]);
     }
   }
 
+  static D input_of(const CompiledMotor& motor, double u, double u_dot) {
+    return D(motor_input(motor, u), motor_input_slope(motor, u) * u_dot);
+  }
   [[nodiscard]] D error_of(const CompiledMotor& motor, std::size_t k, const DualState& at,
                            std::span<const double> u, std::span<const double> u_dot) const {
     const Link& link = m().links[std::size_t(motor.link)];
     if (link.kind != JointKind::spherical)
-      return D(u[k], u_dot[k]) - at.q[std::size_t(link.q + motor.component)];
-    const std::size_t f = k - std::size_t(motor.component);
-    const Vec3<D> goal = {D(u[f], u_dot[f]), D(u[f + 1], u_dot[f + 1]), D(u[f + 2], u_dot[f + 2])};
+      return input_of(motor, u[k], u_dot[k]) - at.q[std::size_t(link.q + motor.component)];
+    const auto input = [&](int i) {
+      const std::size_t at_u = k - std::size_t(motor.component) + std::size_t(i);
+      return input_of(motor, u[at_u], u_dot[at_u]);
+    };
+    const Vec3<D> goal = {input(0), input(1), input(2)};
     const Vec3<D> way = kernels::rotation_vector<false>(conjugate(quat_at(at.q, link.q)) *
                                                         kernels::quaternion_exp(goal))
                             .phi;

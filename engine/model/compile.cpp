@@ -17,6 +17,7 @@
 #include "engine/model/compile_variations.hpp"
 #include "engine/model/components.hpp"
 #include "engine/model/contact_tiles.hpp"
+#include "engine/model/gravity_shares.hpp"
 #include "engine/model/group_contacts.hpp"
 #include "engine/model/inner_faces.hpp"
 #include "engine/model/link_inertia.hpp"
@@ -60,6 +61,7 @@ class Compiler {
       throw InputError(where() + "nothing in the scene can move: every joint is fixed");
     compile_joint_effects(m_);
     check_masses(m_);
+    compile_gravity_shares(m_);
     compile_motors(m_, joints_);
     compile_followers(m_, joints_);
     compile_initial_state(m_, joints_);

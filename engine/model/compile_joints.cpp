@@ -202,11 +202,26 @@ void compile_motors(CompiledModel& m, const NameIndex& joints) {
       Link& link = m.links[std::size_t(at)];
       const auto [low, high] =
           d.turning && dof_turns(type, k) ? *d.turning : std::array{d.low, d.high};
-      m.motors.push_back(
-          {dof, low, high, d.control, d.timing, at, dof - link.v, {d.P, -1}, {d.D, -1}});
-      m.u_names.push_back(m.v_names[std::size_t(dof)]);
+      m.motors.push_back({dof,
+                          low,
+                          high,
+                          d.control,
+                          d.timing,
+                          at,
+                          dof - link.v,
+                          {d.P, -1},
+                          {d.D, -1},
+                          d.maps(),
+                          d.scale.value_or(1),
+                          d.offset,
+                          d.u_range[0],
+                          d.u_range[1]});
+      const std::string& rate = m.v_names[std::size_t(dof)];
+      m.u_names.push_back(d.name.empty()         ? rate
+                          : dof_count(type) == 1 ? d.name
+                                                 : d.name + rate.substr(d.joint.size()));
       const bool position = d.control == MotorControl::position;
-      m.u_units.emplace_back(!position ? "1" : dof_turns(type, k) ? "rad" : "m");
+      m.u_units.emplace_back(!position || d.scale ? "1" : dof_turns(type, k) ? "rad" : "m");
       if (!position || d.timing == MotorTiming::start) continue;
       link.effects |= kernels::kPositionServo;
       kernels::DofEffects& e = m.dof_effects[std::size_t(dof)];

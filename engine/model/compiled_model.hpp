@@ -42,9 +42,10 @@ struct CompiledJoint {
   kernels::Frame<double> frame;         ///< joint frame in that link
 };
 
-/// Motor on one dof. Force motors: force = low + (clip(u) + 1)/2 (high - low). Position motors
-/// evaluated at the end of the step are effects of their joint (kernels/step/joint_effects.hpp),
-/// and u is their target.
+/// Motor on one dof. Its input is u or, where it maps, scale clip(u, u_low, u_high) + offset. Force
+/// motors: force = low + (clip(u) + 1)/2 (high - low), or the input clipped to the range. Position
+/// motors evaluated at the end of the step are effects of their joint
+/// (kernels/step/joint_effects.hpp), and the input is their target.
 struct CompiledMotor {
   int dof;
   double low, high;
@@ -52,6 +53,8 @@ struct CompiledMotor {
   MotorTiming timing;
   int link, component;  ///< elementary link, and the index of the dof within it
   kernels::Parameter P, D;
+  bool maps;
+  double scale, offset, u_low, u_high;
 };
 
 /// Flat pads with at most this many points are read in all environments at once.

@@ -48,7 +48,7 @@ struct EpisodeRows {
   std::int64_t first_row = 0;
   int rows = 0;
   int action_rows = 0;             ///< `rows`, or one less when the last row is among them
-  std::span<const float> actions;  ///< (episodes, action_rows, nu) in [-1, 1]
+  std::span<const float> actions;  ///< (episodes, action_rows, nu), within bounds
   /// q and v, then the observations of a task, or the end effectors (if any), bodies (if requested)
   /// and sensors of a scene. Each is (episodes, rows at which it is taken, width).
   std::span<const Observation> observations;

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <array>
+#include <limits>
 #include <optional>
 #include <span>
 #include <string>
@@ -137,6 +138,7 @@ struct BodyDescription {
   double density = 1;  ///< [kg/m³]; 0: massless, so something with mass must move with it
   std::array<double, 4> rgba{0.7, 0.7, 0.7, 1};
   Source source;
+  double gravity_share = 1;  ///< of gravity that acts on it; the same in a tree of joints that move
 };
 
 /// A link: one joint to the parent link (or the world) and one body that moves with it.
@@ -148,8 +150,10 @@ struct LinkDescription {
 };
 
 /// Force motor: u in [-1, 1] per dof of the joint is clipped and mapped linearly to [low, high].
-/// Position motor: u is the target of q (spherical: a rotation vector), and the force is
-/// P (u - q) - D v, clipped to [low, high].
+/// With `scale`, the force is scale u + offset, clipped to [low, high]. Position motor: the target
+/// of q (spherical: a rotation vector) is u + offset or scale u + offset, and the force is
+/// P (target - q) - D v, clipped to [low, high].
+/// A joint may have several motors, of which at most one is a position motor.
 struct MotorDescription {
   std::string joint;
   double low = -1;  ///< force at u = -1 [N or N m]; position: smallest force, -infinity for none
@@ -161,6 +165,20 @@ struct MotorDescription {
   /// free2d, free: low and high of the dofs that turn, where they differ from those that slide
   /// [N m].
   std::optional<std::array<double, 2>> turning = {};
+  std::string name = {};  ///< of its controls; empty: that of the joint
+  /// Force or target per u, where u has no unit [N, N m, m, rad]. A force motor without it has
+  /// neither offset nor u_range.
+  std::optional<double> scale = {};
+  double offset = 0;  ///< force or target at u = 0
+  static constexpr double kNoBound = std::numeric_limits<double>::infinity();
+  std::array<double, 2> u_range = {-kNoBound, kNoBound};  ///< to which u is clipped first
+
+  /// The name of its controls, before that of the dof.
+  [[nodiscard]] const std::string& control_name() const { return name.empty() ? joint : name; }
+  /// Whether u differs from what the law of the motor without scale, offset and u_range reads.
+  [[nodiscard]] bool maps() const {
+    return scale || offset != 0 || u_range != std::array{-kNoBound, kNoBound};
+  }
 };
 
 /// Rectangular array of tactile points: p(i, j) = corner0 + i Δ0 axis0 + j Δ1 axis1, in the body

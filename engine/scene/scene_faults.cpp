@@ -187,20 +187,44 @@ std::string body_fault(const BodyDescription& body) {
   return slenderness_fault(body.shape);
 }
 
+/// Returns an error text for how a motor maps its control; "" if there is none. `link`: of its
+/// joint, or null.
+static std::string input_fault(const LinkDescription* link, const MotorDescription& motor) {
+  if (!motor.maps()) return "";
+  if (!motor.scale && motor.control == MotorControl::force)
+    return "offset and u_range of a force motor need 'scale': without it, u counts from -1 to 1 "
+           "between the ends of ctrl_range";
+  if (link != nullptr && link->joint.type == JointType::free2d)
+    return "joint '" + motor.joint + "' slides and turns, so its dofs cannot share 'scale'";
+  if (motor.scale && (*motor.scale == 0 || !std::isfinite(*motor.scale)))
+    return fmt::format("scale=\"{}\"; expected a finite number other than 0", *motor.scale);
+  if (!std::isfinite(motor.offset))
+    return fmt::format("offset=\"{}\"; expected a finite number", motor.offset);
+  const auto [low, high] = motor.u_range;
+  return low < high ? "" : fmt::format("u_range=\"{} {}\": expected low, then high", low, high);
+}
+
 std::string motor_fault(const Scene& scene, const MotorDescription& motor) {
   const LinkDescription* const link = link_with_joint(scene, motor.joint);
   if (link != nullptr && dof_count(link->joint.type) == 0)
     return "joint '" + motor.joint + "' is fixed; a motor needs a joint that moves";
+  const bool position = motor.control == MotorControl::position;
   for (const MotorDescription& other : scene.motors) {
     if (&other == &motor) break;
-    if (other.joint == motor.joint) return "joint '" + motor.joint + "' already has a motor";
+    if (position && other.joint == motor.joint && other.control == MotorControl::position)
+      return "joint '" + motor.joint + "' already has a position motor; expected one at most";
+    if (other.control_name() == motor.control_name())
+      return "another motor has the name '" + motor.control_name() +
+             "' already; expected a name of its own (a motor without one has that of its joint)";
   }
-  if (std::string fault = value_fault(kMotor, motor); !fault.empty()) return fault;
+  if (std::string fault = first_of(value_fault(kMotor, motor), input_fault(link, motor));
+      !fault.empty())
+    return fault;
   const std::array<double, 2> sliding = {motor.low, motor.high};
   for (const auto& [low, high] : {sliding, motor.turning.value_or(sliding)}) {
     const std::string range = fmt::format("ctrl_range=\"{} {}\": expected ", low, high);
-    if (motor.control == MotorControl::position && !(low <= high)) return range + "low, then high";
-    if (motor.control == MotorControl::force && !(std::isfinite(low) && std::isfinite(high)))
+    if ((position || motor.scale) && !(low <= high)) return range + "low, then high";
+    if (!position && !motor.scale && !(std::isfinite(low) && std::isfinite(high)))
       return range + "a finite range";
   }
   return "";

@@ -92,7 +92,8 @@ const double* find_number(const Scene& scene, const SceneNumber& n) {
   const double* found = nullptr;
   if (n.owner == Owner::motor) {
     for (const MotorDescription& motor : scene.motors)
-      if (motor.joint == n.name) found = n.field == Field::P ? &motor.P : &motor.D;
+      if (motor.joint == n.name && motor.control == MotorControl::position)
+        found = n.field == Field::P ? &motor.P : &motor.D;
     return found;
   }
   if (n.owner == Owner::body || n.owner == Owner::joint) {

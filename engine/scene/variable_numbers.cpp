@@ -42,9 +42,11 @@ std::vector<SceneNumber> variable_numbers(const Scene& scene) {
     for (int axis = 0; axis < 3; ++axis)
       add({NumberOwner::joint, NumberField::pos, link.joint.name, axis});
   }
-  for (const MotorDescription& motor : scene.motors)
+  for (const MotorDescription& motor : scene.motors) {
+    if (motor.control != MotorControl::position) continue;
     for (const NumberField gain : {NumberField::P, NumberField::D})
       add({NumberOwner::motor, gain, motor.joint});
+  }
   return numbers;
 }
 

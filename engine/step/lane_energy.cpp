@@ -63,8 +63,9 @@ struct LaneAt {
       sum.moving +=
           0.5 * (mass * dot(slide, slide) + 2 * dot(turn, cross(c, slide)) + dot(turn, J * turn));
       const Frame<double> at = world(static_cast<int>(i));
-      sum.total -= dot(model.view.gravity, mass * at.p + at.R * c);
-      if (terms != nullptr) sum.total -= mass * dot(model.view.gravity, model.origin);
+      const Vec3<double> gravity = link.gravity_share * model.view.gravity;
+      sum.total -= dot(gravity, mass * at.p + at.R * c);
+      if (terms != nullptr) sum.total -= mass * dot(gravity, model.origin);
     }
   }
 

@@ -13,10 +13,25 @@
 
 namespace tangere {
 
+/// Returns the target of a position motor at the control u [m or rad], or the force of a force
+/// motor that maps, before its range [N or N m].
+inline double motor_input(const CompiledMotor& motor, double u) {
+  if (!motor.maps) return u;
+  return motor.scale * std::clamp(u, motor.u_low, motor.u_high) + motor.offset;
+}
+/// Its derivative by u. At a bound of u it is that of the inside.
+inline double motor_input_slope(const CompiledMotor& motor, double u) {
+  if (!motor.maps) return 1;
+  return u >= motor.u_low && u <= motor.u_high ? motor.scale : 0;
+}
+
 /// Returns the force of a motor [N or N m]. `state`: one environment's column of its block. `u`:
 /// controls of the motor's joint, from the first dof of its elementary link on.
 inline double force_at_start(const CompiledModel& m, const CompiledMotor& motor,
                              const double* state, const double* u) {
+  const auto input = [&](int component) { return motor_input(motor, u[component]); };
+  if (motor.control == MotorControl::force && motor.maps)
+    return std::clamp(input(motor.component), motor.low, motor.high);
   if (motor.control == MotorControl::force)
     return motor.low +
            (std::clamp(u[motor.component], -1.0, 1.0) + 1) * (0.5 * (motor.high - motor.low));
@@ -26,10 +41,10 @@ inline double force_at_start(const CompiledModel& m, const CompiledMotor& motor,
   const int q = m.layout.q + link.q;
   const auto to_target = [&] {
     if (link.kind != kernels::JointKind::spherical)
-      return u[motor.component] - row(q + motor.component);
+      return input(motor.component) - row(q + motor.component);
     const kernels::Quat<double> here = {row(q), row(q + 1), row(q + 2), row(q + 3)};
     const kernels::Quat<double> there =
-        kernels::quaternion_exp(kernels::Vec3<double>{u[0], u[1], u[2]});
+        kernels::quaternion_exp(kernels::Vec3<double>{input(0), input(1), input(2)});
     const kernels::Vec3<double> way = rotation_log(conjugate(here) * there);  // in body axes
     return motor.component == 0 ? way.x : motor.component == 1 ? way.y : way.z;
   };
@@ -37,9 +52,9 @@ inline double force_at_start(const CompiledModel& m, const CompiledMotor& motor,
                     motor.low, motor.high);
 }
 
-/// Sets the motors of one lane: forces of those that are evaluated at the start of the step,
-/// targets of the others. `state`: the lane's column of its block. Returns false if a control is
-/// not finite.
+/// Sets the motors of one lane: the sum of the forces of those that are evaluated at the start of
+/// the step, targets of the others. `state`: the lane's column of its block. Returns false if a
+/// control is not finite.
 template <int L>
 bool set_motors(const CompiledModel& m, BasicWorkspace<L>& w, int lane, const double* state,
                 std::span<const double> u) {
@@ -48,9 +63,9 @@ bool set_motors(const CompiledModel& m, BasicWorkspace<L>& w, int lane, const do
     if (!std::isfinite(u[k])) return false;
     const CompiledMotor& motor = m.motors[k];
     if (motor.control == MotorControl::position && motor.timing == MotorTiming::end) {
-      w.stage.target[motor.dof][lane] = u[k];
+      w.stage.target[motor.dof][lane] = motor_input(motor, u[k]);
     } else {
-      w.stage.tau[motor.dof][lane] =
+      w.stage.tau[motor.dof][lane] +=
           force_at_start(m, motor, state, u.data() + (k - std::size_t(motor.component)));
     }
   }

@@ -48,7 +48,8 @@ double last_pivot(Matrix M, std::size_t dof) {
 
 }  // namespace
 
-std::vector<double> effective_inertias(const Scene& scene, const std::vector<int>& dofs) {
+std::vector<double> effective_inertias(Scene scene, const std::vector<int>& dofs) {
+  scene.motors.clear();
   const Matrix M = mass_matrix(Model(scene));
   std::vector<double> out;
   for (const int dof : dofs) out.push_back(last_pivot(M, std::size_t(dof)));

@@ -10,6 +10,6 @@ namespace tangere {
 
 /// Returns 1/(M⁻¹)_jj for each dof j of `dofs` [kg or kg m²], armature included. M is the mass
 /// matrix of the scene where all coordinates are 0. Throws what Model does.
-std::vector<double> effective_inertias(const Scene& scene, const std::vector<int>& dofs);
+std::vector<double> effective_inertias(Scene scene, const std::vector<int>& dofs);
 
 }  // namespace tangere

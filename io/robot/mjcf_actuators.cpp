@@ -1,16 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
-// Actuators on hinges and slides. With the gear G the length of the transmission is G q, and the
-// force f of the actuator acts on the joint as G f:
-//   motor     f = c                        a force motor from G c_low to G c_high, of any sign
-//   position  f = kp (c - G q) - kv G v    P = kp G², D = kv G², target c/G - ref
-//             with dampratio Z instead of kv: D = 2 Z sqrt(P I), I = 1/(M⁻¹)jj where all joints
-//             are at rest, which is kv = 2 Z sqrt(kp m) with m = 1/(J M⁻¹ Jᵀ)
-//   velocity  f = kv (c - G v)             a force motor from G kv c_low on, and damping kv G²
+// Actuators on hinges and slides. With the gear G the length of the transmission is G (q + ref),
+// where q is the scene's coordinate. The force f of the actuator acts on the joint as G f:
+//   f = g c + b - kp G (q + ref) - kv G v
+//   kp > 0    a position motor: P = kp G², D = kv G², target (g c + b)/(kp G) - ref
+//   kp = 0    a force motor G (g c + b), and damping kv G² of the joint
+// motor: g = 1; position: g = kp; velocity: g = kv; all with b = 0. With dampratio Z instead of kv,
+// D = 2 Z sqrt(P I), I = 1/(M⁻¹)jj where all joints are at rest, which is kv = 2 Z sqrt(kp m) with
+// m = 1/(J M⁻¹ Jᵀ). The scene's control is the file's c.
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 
 #include "io/robot/effective_inertia.hpp"
 #include "io/robot/mjcf_file.hpp"
@@ -22,9 +24,9 @@ namespace {
 constexpr double kNone = std::numeric_limits<double>::infinity();
 using Range = std::array<double, 2>;
 
-/// Force per control and per state: f = gain c - kp (G q) - kv (G v).
+/// Force per control and per state: f = gain c + bias - kp G (q + ref) - kv G v.
 struct Law {
-  double gain = 1, kp = 0, kv = 0;
+  double gain = 1, bias = 0, kp = 0, kv = 0;
   double damping_ratio = 0;  ///< from which kv follows, if it is not 0
 };
 
@@ -38,7 +40,7 @@ class Actuators {
 
   /// `drives`: the name in the scene of the joint that the actuator names; "" if there is none.
   void read(const RobotNode& node, const MjcfScope& scope, const std::string& drives) {
-    whole_.controls.emplace_back();
+    whole_.motors.push_back(-1);
     if (std::find(kActuators.begin(), kActuators.end(), node.name()) == kActuators.end())
       return node.lost("<" + node.name() + ">: an actuator that scenes do not have");
     node.check(mjcf_words(node.name()));
@@ -55,37 +57,62 @@ class Actuators {
     LinkDescription& link = scene_.links[std::size_t(end.link)];
     if (link.joint.type != JointType::revolute && link.joint.type != JointType::prismatic)
       return node.lost("<" + node.name() + "> of a ball or a free joint");
-    if (std::any_of(scene_.motors.begin(), scene_.motors.end(),
-                    [&](const MotorDescription& m) { return m.joint == name; }))
-      return node.lost("<" + node.name() + ">: a second actuator of joint '" + name + "'");
     const double gear = node.has("gear") ? node.numbers("gear").at(0) : 1;
     if (node.has("gear") && gear == 0) node.fail("gear=\"0\"; expected another number");
     MotorDescription motor;
     motor.joint = name;
+    motor.name = free_name(name, scope.full_name(node.text("name", name)));
     motor.source = node.source();
-    const Range control = control_range(node, *scope.file, end);
+    motor.u_range = control_range(node, *scope.file, end);
     Range force = scaled(range(node, *scope.file, "forcerange", "forcelimited"), gear);
     if (end.actuator_range)
       force = {std::max(force[0], (*end.actuator_range)[0]),
                std::min(force[1], (*end.actuator_range)[1])};
     if (!(force[0] < force[1])) node.fail("its ranges leave no force");
-    MjcfControl& use = whole_.controls.back();
-    use.motor = static_cast<int>(scene_.motors.size());
-    use.range = control;
+    motor.low = force[0];
+    motor.high = force[1];
     if (law.kp > 0) {
-      set_position(node, law, gear, end, control, force, motor);
+      set_position(law, gear, end.ref, motor);
       if (law.damping_ratio > 0) keep_ratio(node, law.damping_ratio, end.link);
-      use.scale = 1 / gear;
-      use.shift = 0 - end.ref;
     } else {
-      set_force(node, law, gear, force, link.joint, motor, use);
-      use.least = -1;
-      use.most = 1;
+      set_force(node, law, gear, link.joint, motor);
     }
+    whole_.motors.back() = static_cast<int>(scene_.motors.size());
     scene_.motors.push_back(motor);
   }
 
-  /// Gives motors with a damping ratio their damping, after all are read.
+  /// Gives motors with a damping ratio their damping, and each joint at most one position motor,
+  /// after all are read.
+  void finish() {
+    damp();
+    std::map<std::string, std::vector<std::size_t>> position_motors;  // by joint
+    for (std::size_t k = 0; k < scene_.motors.size(); ++k)
+      if (scene_.motors[k].control == MotorControl::position)
+        position_motors[scene_.motors[k].joint].push_back(k);
+    std::vector<std::size_t> lost;
+    for (const auto& [joint, motors] : position_motors) {
+      const auto clips = [&](std::size_t k) { return is_clipped(scene_.motors[k]); };
+      const auto clipped = std::find_if(motors.begin(), motors.end(), clips);
+      const std::size_t kept = clipped == motors.end() ? motors.front() : *clipped;
+      for (const std::size_t k : motors) {
+        if (k == kept) continue;
+        if (clips(k))
+          lost.push_back(k);
+        else
+          make_spring(scene_.motors[k]);
+      }
+    }
+    std::sort(lost.rbegin(), lost.rend());
+    for (const std::size_t k : lost) leave_out(static_cast<int>(k));
+  }
+
+ private:
+  struct Ratio {
+    std::size_t motor;
+    int dof;
+    double value;
+  };
+
   void damp() const {
     if (ratios_.empty()) return;
     std::vector<int> dofs;
@@ -97,12 +124,49 @@ class Actuators {
     }
   }
 
- private:
-  struct Ratio {
-    std::size_t motor;
-    int dof;
-    double value;
-  };
+  static bool is_clipped(const MotorDescription& motor) {
+    return motor.low > -kNone || motor.high < kNone;
+  }
+
+  /// The name of a motor's controls: none for the first motor of a joint, whose name they have.
+  [[nodiscard]] std::string free_name(const std::string& joint, std::string requested) const {
+    const auto drives = [&](const MotorDescription& m) { return m.joint == joint; };
+    if (std::none_of(scene_.motors.begin(), scene_.motors.end(), drives)) return "";
+    const auto taken = [&](const std::string& name) {
+      return whole_.joints.contains(name) ||
+             std::any_of(scene_.motors.begin(), scene_.motors.end(),
+                         [&](const MotorDescription& m) { return m.name == name; });
+    };
+    std::string name = requested;
+    for (int k = 2; taken(name); ++k) name = fmt::format("{}_{}", requested, k);
+    return name;
+  }
+
+  /// Turns a position motor whose force is not clipped into a force motor beside a spring and
+  /// damping: P (t - q) - D v = P t - P q - D v.
+  void make_spring(MotorDescription& motor) {
+    JointDescription& joint = scene_.links[std::size_t(whole_.joints.at(motor.joint).link)].joint;
+    const double rest = joint.rest.empty() ? 0 : joint.rest[0];
+    if (rest != 0) joint.rest = {joint.stiffness * rest / (joint.stiffness + motor.P)};
+    joint.stiffness += motor.P;
+    joint.damping += motor.D;
+    motor.control = MotorControl::force;
+    motor.scale = motor.P * motor.scale.value_or(1);
+    motor.offset *= motor.P;
+    motor.P = motor.D = 0;
+    whole_.robot.changed.add(motor.source,
+                             "a second actuator with a target, of joint '" + motor.joint +
+                                 "': a force motor, and stiffness and damping of the joint");
+  }
+
+  void leave_out(int motor) {
+    const auto at = scene_.motors.begin() + motor;
+    whole_.robot.lost.add(
+        at->source, "a second actuator with a target and a forcerange, of joint '" + at->joint +
+                        "': a joint has one position motor");
+    scene_.motors.erase(at);
+    for (int& k : whole_.motors) k = k == motor ? -1 : k > motor ? k - 1 : k;
+  }
 
   /// Keeps the damping ratio of the motor that is added next.
   void keep_ratio(const RobotNode& node, double value, int link) {
@@ -165,7 +229,7 @@ class Actuators {
       if (!node.given("dampratio")) law.kv = node.not_negative("kv", 0.0);
       if (!node.given("kv")) law.damping_ratio = node.not_negative("dampratio", 0.0);
     } else if (node.name() == "velocity") {
-      law.kv = law.gain = node.not_negative("kv", 1.0);
+      law.kv = law.gain = node.positive("kv", 1.0);
     } else if (node.name() == "general") {
       return read_general(node, law);
     }
@@ -189,84 +253,52 @@ class Actuators {
     bias.resize(std::max<std::size_t>(bias.size(), 3));
     if (bias_type == "none") bias = {0, 0, 0};
     law.gain = gain.empty() ? 1 : gain[0];
+    law.bias = bias[0];
     law.kp = 0 - bias[1];
     law.kv = 0 - bias[2];
-    const bool spring = law.kp == law.gain && law.kp > 0;
-    const bool damper = law.kp == 0;
-    if (spring && law.kv < 0) {  // MuJoCo takes a positive one for a damping ratio
-      law.damping_ratio = 0 - law.kv;
+    if (law.kp == law.gain && law.kp > 0 && law.kv < 0) {
+      law.damping_ratio = 0 - law.kv;  // MuJoCo takes a positive one for a damping ratio
       law.kv = 0;
     }
-    if (bias[0] != 0 || law.kv < 0 || !(spring || damper)) {
-      node.lost("<general> whose bias is no spring to the control with damping");
+    if (law.kp < 0 || law.kv < 0) {
+      node.lost("<general> with a bias that drives its joint: negative stiffness or damping");
+      return false;
+    }
+    if (law.gain == 0) {
+      node.lost("<general> with gain 0: a force without a control");
       return false;
     }
     return true;
   }
 
-  void set_position(const RobotNode& node, const Law& law, double gear, const MjcfJoint& end,
-                    const Range& control, const Range& force, MotorDescription& motor) const {
+  static void set_position(const Law& law, double gear, double ref, MotorDescription& motor) {
     motor.control = MotorControl::position;
     motor.P = law.kp * gear * gear;
     motor.D = law.kv * gear * gear;
-    motor.low = force[0];
-    motor.high = force[1];
-    if (control[0] > -kNone || control[1] < kNone)
-      node.changed("<" + node.name() + "> ctrlrange: targets of position motors are not clipped");
-    if (gear != 1)
-      node.changed(
-          fmt::format("<{}> gear: the target of '{}' is the joint's coordinate, the "
-                      "file's control over {}",
-                      node.name(), motor.joint, gear));
-    if (end.ref != 0)
-      node.changed(fmt::format("<{}>: the target of '{}' is less by its joint's ref", node.name(),
-                               motor.joint));
+    const double scale = law.gain / (law.kp * gear);
+    if (scale != 1) motor.scale = scale;
+    motor.offset = law.bias / (law.kp * gear) - ref;
   }
 
-  /// The scene's control is -1 where the file's is lowest. Where force per control is negative, the
-  /// motor's range therefore runs from high to low.
-  void set_force(const RobotNode& node, const Law& law, double gear, const Range& force,
-                 JointDescription& joint, MotorDescription& motor, MjcfControl& use) const {
+  /// Where the file's control is from -1 to 1 and is the only bound, it needs no scale.
+  void set_force(const RobotNode& node, const Law& law, double gear, JointDescription& joint,
+                 MotorDescription& motor) const {
     motor.control = MotorControl::force;
     const double slope = gear * law.gain;
-    const bool bounded = use.range[0] > -kNone && use.range[1] < kNone,
-               has_force_range = !bounded && force[0] > -kNone && force[1] < kNone;
-    if (has_force_range) {
-      motor.low = force[slope < 0 ? 1 : 0];
-      motor.high = force[slope < 0 ? 0 : 1];
+    if (law.bias == 0 && motor.u_range == Range{-1, 1} && !is_clipped(motor)) {
+      motor.low = -slope;
+      motor.high = slope;
+      motor.u_range = {-kNone, kNone};
     } else {
-      const double most = bounded ? 1 : most_control();
-      const Range control = bounded ? use.range : Range{-most, most};
-      motor.low = std::clamp(slope * control[0], force[0], force[1]);
-      motor.high = std::clamp(slope * control[1], force[0], force[1]);
+      motor.scale = slope;
+      motor.offset = gear * law.bias;
     }
-    if (slope == 0 || motor.low == motor.high) node.fail("its ranges leave no force");
-    use.scale = 2 * slope / (motor.high - motor.low);
-    use.shift = 0 - (motor.high + motor.low) / (motor.high - motor.low);
-    const std::string factor =
-        std::abs(use.scale - 1) > 1e-12 ? fmt::format(" times {:g}", use.scale) : "";
-    if (!bounded && !has_force_range)
-      node.changed(
-          fmt::format("<{}> without ctrlrange: the control of '{}' is that of the file{} "
-                      "from -1 to 1",
-                      node.name(), motor.joint, factor));
-    else if (!factor.empty() || std::abs(use.shift) > 1e-12)
-      node.changed(fmt::format("<{}>: the control of '{}' is that of the file{}{}", node.name(),
-                               motor.joint, factor,
-                               use.shift == 0 ? "" : fmt::format(" {:+g}", use.shift)));
     if (law.kv == 0) return;
     joint.damping += law.kv * gear * gear;
     node.changed(fmt::format("<{}>: a motor for the control, and damping of joint '{}'",
                              node.name(), motor.joint));
-    if (force[0] > -kNone || force[1] < kNone)
+    if (motor.scale && is_clipped(motor))
       node.lost("<" + node.name() + "> forcerange: the damping is not clipped");
-  }
-
-  /// The control that the actuator being read must be able to have: 1, or more in a keyframe.
-  [[nodiscard]] double most_control() const {
-    const std::size_t at = whole_.controls.size() - 1;
-    return at < whole_.keyframe_ctrl.size() ? std::max(1.0, std::abs(whole_.keyframe_ctrl[at]))
-                                            : 1.0;
   }
 
   MjcfWhole& whole_;
@@ -321,7 +353,7 @@ void read_mjcf_actuators(MjcfWhole& whole) {
   });
   Actuators actuators(whole);
   for (const Drive& drive : drives) actuators.read(drive.node, *drive.scope, drive.joint);
-  actuators.damp();
+  actuators.finish();
 }
 
 }  // namespace tangere

@@ -71,7 +71,7 @@ class Bodies {
     node.check(with_rotations({{"name"},
                                {"childclass"},
                                {"mocap"},
-                               {"gravcomp", Fate::zero, "takes away a body's weight"},
+                               {"gravcomp"},
                                {"sleep", Fate::idle, "a setting of MuJoCo's solver"},
                                {"user", Fate::idle, "numbers for other programs"}}));
     if (node.flag("mocap", false)) node.lost("<body> mocap: moved by another program");
@@ -81,7 +81,13 @@ class Bodies {
     const std::vector<MjcfPart> parts =
         body_parts(whole_, {node, {}, placed.own_class(), placed.scope});
     Pose offset;  // of the body's frame in that of its link
+    const std::size_t before = robot_.scene.links.size();
     const int index = add_chain(placed, name, parent, place, parts, offset);
+    if (const double lift = node.number("gravcomp", 0.0); lift != 0) {
+      for (std::size_t k = before; k < robot_.scene.links.size(); ++k)
+        robot_.scene.links[k].body.gravity_share = 1 - lift;
+      whole_.gravcomp[index] = node.source();
+    }
     for (const MjcfPart& part : parts) {
       if (part.node.name() == "body") read_body(part, index, offset, depth + 1);
       if (part.node.name() == "site") read_site(part, index, offset);

@@ -43,16 +43,6 @@ struct MjcfJoint {
   std::optional<Pose> inertia = {};
 };
 
-/// An actuator of the file, in its order, and how its control becomes one of the scene:
-/// scale · c + shift, with c and the result within bounds.
-struct MjcfControl {
-  static constexpr double kNone = std::numeric_limits<double>::infinity();
-  int motor = -1;  ///< of the scene; -1: the actuator is left out
-  double scale = 1, shift = 0;
-  std::array<double, 2> range{-kNone, kNone};
-  double least = -kNone, most = kNone;
-};
-
 enum class InertiaFrom { automatic, geoms, inertials };
 
 /// In defaults all actuators share the attributes of <general>.
@@ -106,8 +96,8 @@ struct MjcfWhole {
   std::deque<MjcfScope> scopes = {};
   std::map<int, int> ranks = {};  ///< of a <replicate> or <attach>: its place in the order of names
   std::vector<const MjcfScope*> models = {};  ///< by number
-  std::vector<double> keyframe_ctrl = {};     ///< of the requested keyframe; may be short
-  std::vector<MjcfControl> controls = {};
+  std::map<int, Source> gravcomp = {};        ///< bodies that have it, by link of the scene
+  std::vector<int> motors = {};  ///< by actuator of the file: that of the scene; -1: left out
 
   /// Returns the name in the scene of a node with a name. Fails at the node if it is used twice.
   std::string keep_name(MjcfNames& kind, const RobotNode& node, const MjcfScope& scope);
@@ -184,6 +174,8 @@ const MjcfScope& attached_scope(MjcfWhole& whole, const RobotNode& node, const M
 
 /// Reads all bodies of the file that the user names.
 void read_mjcf_bodies(MjcfWhole& whole, const MjcfScope& scope);
+/// Gives the bodies of each tree their share of gravity, after all bodies are read.
+void read_mjcf_gravity(MjcfWhole& whole);
 /// Reads the constraints of all models, after the bodies.
 void read_mjcf_equalities(MjcfWhole& whole);
 /// Reads the actuators of all models, after the bodies.

@@ -120,16 +120,12 @@ class Keyframe {
   }
 
   void read_controls() const {
-    std::vector<double> given(whole_.controls.size(), 0.0);  // MuJoCo's, without an attribute
+    std::vector<double> given(whole_.motors.size(), 0.0);  // MuJoCo's, without an attribute
     if (node_.has("ctrl")) given = sized_numbers("ctrl", given.size(), "the actuators");
     std::vector<double>& controls = whole_.robot.controls.emplace();
     controls.assign(whole_.robot.scene.motors.size(), 0.0);
-    for (std::size_t k = 0; k < given.size(); ++k) {
-      const MjcfControl& c = whole_.controls[k];
-      if (c.motor < 0) continue;
-      const double x = c.scale * std::clamp(given[k], c.range[0], c.range[1]) + c.shift;
-      controls[std::size_t(c.motor)] = std::clamp(x, c.least, c.most);
-    }
+    for (std::size_t k = 0; k < given.size(); ++k)
+      if (whole_.motors[k] >= 0) controls[std::size_t(whole_.motors[k])] = given[k];
   }
 
   const MjcfWhole& whole_;
@@ -164,9 +160,7 @@ std::optional<RobotNode> find_mjcf_keyframe(MjcfWhole& whole,
   if (at == names.end())
     throw InputError(fmt::format("--keyframe {}: {} has no keyframe of this name{}", requested,
                                  whole.robot.scene.path, suggestion(requested, names)));
-  const RobotNode& key = keys[std::size_t(at - names.begin())];
-  if (key.has("ctrl")) whole.keyframe_ctrl = key.numbers("ctrl");
-  return key;
+  return keys[std::size_t(at - names.begin())];
 }
 
 void read_mjcf_keyframe(MjcfWhole& whole, const RobotNode& key) { Keyframe(whole, key).read(); }

@@ -417,6 +417,7 @@ void read_mjcf(const RobotNode& root, const std::string& keyframe, bool free_bas
   read_mjcf_settings(file);
   whole.models.push_back(&whole.scopes.emplace_back(MjcfScope{&file}));
   read_mjcf_bodies(whole, *whole.models.front());
+  read_mjcf_gravity(whole);
   if (file.total_mass > 0) scale_masses(robot.scene, file.total_mass);
   std::vector<RobotNode> keyframes;
   for (const RobotNode& s : file.sections)

@@ -44,6 +44,14 @@ struct RobotSite {
   Source source;
 };
 
+/// A skin that the robot's file has.
+struct RobotSkin {
+  std::string name, link;
+  Pose pose;           ///< in the link's frame
+  std::string layout;  ///< attributes of <tactile>: type, points, stiffness
+  Source source;
+};
+
 struct RobotFile;  // io/robot/robot_node.hpp
 
 struct Robot {
@@ -60,6 +68,7 @@ struct Robot {
       excluded;                           ///< pairs of links that do not touch each other
   std::map<std::string, double> efforts;  ///< by joint: largest force or torque [N or N m]
   std::map<std::string, RobotSite> sites;
+  std::vector<RobotSkin> skins;
   /// By motor of the scene: the control that a keyframe gives it. No value without a keyframe.
   std::optional<std::vector<double>> controls;
   Remarks idle;     ///< left out, and of no effect on the motion

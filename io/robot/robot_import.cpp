@@ -39,6 +39,18 @@ double two_digits(double x) {
   return std::ceil(x / unit - 1e-9) * unit;
 }
 
+/// The largest force of a motor, as far as its ranges bound it; 0 if they do not.
+double largest_force(const MotorDescription& m) {
+  double largest = 0;
+  const auto add = [&](double force) {
+    if (std::isfinite(force)) largest = std::max(largest, std::abs(force));
+  };
+  add(m.low), add(m.high);
+  if (m.control == MotorControl::force && m.scale)
+    for (const double u : m.u_range) add(std::clamp(*m.scale * u + m.offset, m.low, m.high));
+  return largest;
+}
+
 /// Chooses the stiffness of limits: under the weight of what hangs on the joint, or its motor's
 /// largest force, it yields by kYieldAngle or kYieldLength.
 void stiffen_limits(Robot& robot) {
@@ -69,9 +81,7 @@ void stiffen_limits(Robot& robot) {
     if (const auto effort = robot.efforts.find(joint.name); effort != robot.efforts.end())
       load = std::max(load, effort->second);
     for (const MotorDescription& m : scene.motors)
-      if (m.joint == joint.name)
-        for (const double f : {m.low, m.high})
-          if (std::isfinite(f)) load = std::max(load, std::abs(f));
+      if (m.joint == joint.name) load = std::max(load, largest_force(m));
     joint.limit_stiffness = two_digits(load / (turns ? kYieldAngle : kYieldLength));
   }
 }

@@ -82,12 +82,37 @@ std::string ignores_text(const Robot& robot, const LinkDescription& link) {
                                      attribute_text(fmt::to_string(fmt::join(names, ","))));
 }
 
+/// A name that no other sensor has. Files use '/' as a separator.
+std::string sensor_name(std::set<std::string>& names, std::string requested) {
+  std::replace(requested.begin(), requested.end(), '/', '_');
+  std::string name = requested;
+  for (int k = 2; !names.insert(name).second; ++k) name = fmt::format("{}_{}", requested, k);
+  return name;
+}
+
+/// The skins that the robot's file has.
+std::string own_skins_text(const Robot& robot, std::set<std::string>& names,
+                           const std::string& file) {
+  std::string text;
+  for (const RobotSkin& skin : robot.skins) {
+    const LinkDescription& link = *find_place(robot, skin.link, "<sensor>", file).link;
+    text += fmt::format("    <!-- {}: <sensor>; its stiffness is a guess -->\n",
+                        comment_text(place_in(robot, skin.source)));
+    text +=
+        fmt::format("    <tactile name=\"{}\" body=\"{}\"{}{}{}/>\n",
+                    attribute_text(sensor_name(names, skin.name)), attribute_text(link.body.name),
+                    pose_text(compose(inverse(link.body.pose), skin.pose)), skin.layout,
+                    ignores_text(robot, link));
+  }
+  return text;
+}
+
 }  // namespace
 
 std::string pads_text(const Robot& robot, const std::vector<PadRequest>& pads,
                       const std::string& file) {
-  std::string text;
   std::set<std::string> names;
+  std::string text = own_skins_text(robot, names, file);
   for (const PadRequest& pad : pads) {
     const std::string what = fmt::format("--pad {}={}", pad.link, pad.layout_name);
     const RobotPlace found = find_place(robot, pad.link, what, file);
@@ -101,10 +126,7 @@ std::string pads_text(const Robot& robot, const std::vector<PadRequest>& pads,
                         found.site == nullptr ? "link" : "site", comment_text(pad.link));
     for (const SceneNode& sensor : SceneNode(root, context).children({"tactile"})) {
       refuse_files(sensor);
-      std::string name = pad.link + "_" + sensor.text("name", "skin");
-      std::replace(name.begin(), name.end(), '/', '_');  // files use it as a separator
-      for (int k = 2; !names.insert(name).second; ++k)
-        name = fmt::format("{}_{}_{}", pad.link, sensor.text("name", "skin"), k);
+      const std::string name = sensor_name(names, pad.link + "_" + sensor.text("name", "skin"));
       const Pose own{sensor.vector("pos", Vector3{0, 0, 0}), sensor.quaternion("quat")};
       text += fmt::format("    <tactile name=\"{}\" body=\"{}\"{}", attribute_text(name),
                           attribute_text(link.body.name), pose_text(compose(place, own)));

@@ -176,15 +176,22 @@ class Writer {
       const bool position = m.control == MotorControl::position;
       out_ += fmt::format("    <motor joint=\"{}\" ctrl=\"{}\"", attribute_text(m.joint),
                           position ? "position" : "force");
+      if (!m.name.empty()) out_ += fmt::format(" name=\"{}\"", attribute_text(m.name));
       out_ += members_text(kMotor, m, position ? "position" : "force");
-      if (std::isfinite(m.low) || std::isfinite(m.high))
-        out_ += fmt::format(" ctrl_range=\"{} {}\"", number_text(bounded(m.low)),
-                            number_text(bounded(m.high)));
+      write_range("ctrl_range", m.low, m.high);
+      if (m.scale) out_ += fmt::format(" scale=\"{}\"", number_text(*m.scale));
+      if (m.offset != 0) out_ += fmt::format(" offset=\"{}\"", number_text(m.offset));
+      write_range("u_range", m.u_range[0], m.u_range[1]);
       out_ += m.source.line > 0
                   ? fmt::format("/>  <!-- {} -->\n", comment_text(place_in(robot_, m.source)))
                   : "/>\n";
     }
     out_ += "  </actuator>\n";
+  }
+  void write_range(const char* name, double low, double high) {
+    if (std::isfinite(low) || std::isfinite(high))
+      out_ +=
+          fmt::format(" {}=\"{} {}\"", name, number_text(bounded(low)), number_text(bounded(high)));
   }
 
   /// The start and the controls of a keyframe.

@@ -12,6 +12,8 @@
 #include "io/robot/mesh_files.hpp"
 #include "io/robot/mjcf_words.hpp"
 #include "io/robot/rotations.hpp"
+#include "io/robot/urdf_parts.hpp"
+#include "io/robot/urdf_skins.hpp"
 
 namespace tangere {
 namespace {
@@ -31,7 +33,7 @@ const Words kRobotChildren = {
     {"mujoco"},
     {"drake", Fate::idle, kSoftware},
     {"ros2_control", Fate::idle, kSoftware},
-    {"sensor", Fate::idle, "no sensor of touch; --pad LINK=LAYOUT adds one"},
+    {"sensor"},
     {"group", Fate::idle, kSoftware},
     {"disable_collisions", Fate::idle, kSoftware},
     {"deformable", Fate::lost, "a body that bends; scenes have none"}};
@@ -99,37 +101,6 @@ const Words kCompiler = {{"meshdir"},
                          {"saveinertial", Fate::idle, kSolverSetting},
                          {"conflict", Fate::idle, kSolverSetting}};
 
-/// The child of this name, the last if there are several; none if it is missing.
-std::optional<RobotNode> last_of(const std::vector<RobotNode>& parts, const std::string& name) {
-  std::optional<RobotNode> found;
-  for (const RobotNode& part : parts) {
-    if (part.name() != name) continue;
-    if (found)
-      part.warn(
-          fmt::format("given twice, first in line {}; the last counts (other readers take the "
-                      "first, or refuse the file)",
-                      found->source().line));
-    found.emplace(part);
-  }
-  return found;
-}
-
-RobotNode required(const RobotNode& node, const std::vector<RobotNode>& parts,
-                   const std::string& name) {
-  const std::optional<RobotNode> found = last_of(parts, name);
-  if (!found) node.fail("has no <" + name + ">");
-  return *found;
-}
-
-Pose read_origin(const std::optional<RobotNode>& node) {
-  if (!node) return {};
-  node->check({{"xyz"}, {"rpy"}});
-  const Pose pose{node->vector("xyz", Vector3{0, 0, 0}),
-                  from_rpy(node->vector("rpy", Vector3{0, 0, 0}))};
-  static_cast<void>(node->parts({}));
-  return pose;
-}
-
 /// A joint of the file, with the names of its links.
 struct Joint {
   JointDescription joint;
@@ -151,7 +122,7 @@ class UrdfReader {
     for (const RobotNode& node : parts)
       if (node.name() == "mujoco") read_extension(node);
     for (const RobotNode& node : parts) {
-      if (node.name() == "mujoco") continue;
+      if (node.name() == "mujoco" || node.name() == "sensor") continue;
       if (node.name() == "link") {
         node.check({{"name"}, {"type", Fate::idle, kSoftware}, {"concave", Fate::idle, kSoftware}});
         const std::string name = node.text("name");
@@ -164,6 +135,13 @@ class UrdfReader {
       }
     }
     if (links.empty()) root_.fail("has no <link>");
+    for (const RobotNode& node : parts) {
+      if (node.name() != "sensor") continue;
+      if (is_skin(node))
+        read_skin(node, link_names_);
+      else
+        node.idle("<sensor>: no sensor of touch; --pad LINK=LAYOUT adds one");
+    }
     for (const Joint& joint : joints_) check_ends(joint);
     for (const std::string& name : link_names_) names_.keep(name);
     for (const Joint& joint : joints_) names_.keep(joint.joint.name);

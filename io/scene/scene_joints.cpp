@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "engine/scene/scene_faults.hpp"
 #include "io/scene/scene_sections.hpp"
@@ -52,6 +51,19 @@ bool has_effect(const JointEffects& e) {
   return false;
 }
 
+/// Reads what a motor makes of its control. With scale, u has no unit.
+void read_input(const SceneElement& node, bool turns, MotorDescription& motor) {
+  const bool position = motor.control == MotorControl::position;
+  const Unit sliding = position ? Unit::m : Unit::N, turning = position ? Unit::rad : Unit::N_m;
+  const double unit = node.context().factor(turns ? turning : sliding);
+  if (node.has("scale")) motor.scale = unit * node.number("scale");
+  motor.offset = unit * node.number("offset");
+  if (!node.has("u_range")) return;
+  const std::vector<double> range = node.numbers("u_range", 2);
+  const double u_unit = motor.scale || !position ? 1 : unit;
+  motor.u_range = {u_unit * range[0], u_unit * range[1]};
+}
+
 /// Reads range and gains of a motor. Its dofs all slide or all turn, except those of a force motor
 /// on a free2d joint. There the range's numbers are forces and torques at once.
 void read_motor(const SceneElement& node, JointType type, MotorDescription& motor) {
@@ -60,10 +72,11 @@ void read_motor(const SceneElement& node, JointType type, MotorDescription& moto
   const char* const kind = position ? "position" : "force";
   node.check(kind);
   node.read(motor, turns, kind);
-  if (position) {
-    motor.timing = static_cast<MotorTiming>(node.word("timing"));
-    motor.high = std::numeric_limits<double>::infinity();
-    motor.low = -motor.high;
+  read_input(node, turns, motor);
+  if (position) motor.timing = static_cast<MotorTiming>(node.word("timing"));
+  if (position || motor.scale) {
+    motor.low = -MotorDescription::kNoBound;
+    motor.high = MotorDescription::kNoBound;
     if (!node.has("ctrl_range")) return;
   }
   const std::vector<double> range = node.numbers("ctrl_range", 2, turns);
@@ -128,8 +141,10 @@ std::vector<double> control_scales(const Scene& scene, const SceneContext& c) {
   for (const MotorDescription& m : scene.motors)
     for (const LinkDescription& l : scene.links)
       for (int k = 0; l.joint.name == m.joint && k < dof_count(l.joint.type); ++k)
-        scales.push_back(
-            m.control == MotorControl::position && !dof_turns(l.joint.type, k) ? c.length : 1);
+        scales.push_back(m.control == MotorControl::position && !m.scale &&
+                                 !dof_turns(l.joint.type, k)
+                             ? c.length
+                             : 1);
   return scales;
 }
 
@@ -145,6 +160,7 @@ void read_actuators(Scene& scene, const SceneNode& section) {
     motor.source = node.source();
     const JointType type = scene.links[std::size_t(find_joint(scene, node, "joint"))].joint.type;
     motor.joint = node.text("joint");
+    motor.name = node.text("name", "");
     motor.control = static_cast<MotorControl>(node.word("ctrl"));
     check_driven(node, type, motor);
     read_motor(node, type, motor);

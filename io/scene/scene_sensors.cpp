@@ -141,6 +141,28 @@ std::vector<TactilePoint> read_spec(const SceneElement& node) {
   return points;
 }
 
+/// Reads the points that an element itself has.
+std::vector<TactilePoint> read_list(const SceneElement& node) {
+  constexpr std::size_t kNumbers = 9;
+  const std::vector<double> x = node.numbers("points");
+  if (x.empty() || x.size() % kNumbers != 0)
+    node.fail(fmt::format(
+        "points has {} numbers; expected position, normal and axis0 of each, three numbers each",
+        x.size()));
+  std::vector<TactilePoint> points;
+  for (std::size_t k = 0; k < x.size(); k += kNumbers) {
+    const auto three = [&](std::size_t i) { return Vector3{x[k + i], x[k + i + 1], x[k + i + 2]}; };
+    const Vector3 normal = three(3), across = cross(normal, three(6));
+    if (!(dot(across, across) > 0))
+      node.fail(
+          fmt::format("points: the normal and axis0 of point {} have no length or lie along "
+                      "each other; expected two directions",
+                      k / kNumbers));
+    points.push_back(listed_point(node.context().length * three(0), unit(normal), unit(across)));
+  }
+  return points;
+}
+
 std::vector<TactilePoint> read_surface(const SceneElement& node) {
   const MeshShape mesh = read_mesh(node);
   const double pitch = node.number("pitch");
@@ -169,7 +191,7 @@ std::vector<TactilePoint> read_hemisphere(const SceneElement& node) {
 
 std::vector<TactilePoint> read_points(const SceneElement& node, const std::string& type) {
   std::vector<TactilePoint> points;
-  if (type == "abstract") points = read_spec(node);
+  if (type == "abstract") points = node.has("points") ? read_list(node) : read_spec(node);
   if (type == "mesh") points = read_surface(node);
   if (type == "hemisphere") points = read_hemisphere(node);
   if (type == "cylinder") {

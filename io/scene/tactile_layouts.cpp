@@ -70,6 +70,10 @@ std::array<double, 2> square_place(const Vector3& n) {
 
 }  // namespace
 
+TactilePoint listed_point(const Vector3& position, const Vector3& normal, const Vector3& axis1) {
+  return point_at(position, normal, cross(axis1, normal));
+}
+
 std::vector<TactilePoint> hemisphere_points(double radius, int count) {
   std::vector<TactilePoint> points;
   const double golden = M_PI * (3 - std::sqrt(5.0));

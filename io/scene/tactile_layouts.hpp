@@ -30,6 +30,9 @@ std::vector<TactilePoint> cylinder_points(double radius, double length, int alon
 /// `most`.
 std::vector<TactilePoint> mesh_points(const MeshShape& mesh, double pitch, std::size_t most);
 
+/// Returns a point at `position` [m] from unit vectors that are orthogonal: axis1 = normal × axis0.
+TactilePoint listed_point(const Vector3& position, const Vector3& normal, const Vector3& axis1);
+
 /// Reads a count, then a line for each point: "position" "row col" "normal" "axis0" "axis1",
 /// optionally followed by "kn kt mu damping" as factors of the sensor's coefficients, of which that
 /// of kt is of ks, too. Directions are normalised. Positions are in the file's unit. Throws IoError

@@ -56,6 +56,7 @@ struct Link {
   int inertia_row = -1;  ///< ≥ 0: mass, mass · centre and inertia (xx xy xz yy yz zz) are read
                          ///< from ten rows of the block instead
   int place_row = -1;    ///< ≥ 0: frame.p is read from three rows of the block instead
+  double gravity_share = 1;  ///< of gravity that acts on it; the same in a whole tree
 };
 
 /// A number of the scene: the same for all environments, or one row of the batch.

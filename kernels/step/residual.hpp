@@ -4,7 +4,7 @@
 //
 //   V = V_p + S q̇,  A = A_p + S q̈ + V × (S q̇),  F = I A + V ×* I V - w_ext,  F_p += X* F
 //   g = Sᵀ F - τ - joint effects (kernels/step/joint_effects.hpp)
-// The base accelerates at -gravity, so gravity needs no term of its own.
+// The base of a tree accelerates at -gravity times its share, so gravity needs no term of its own.
 #pragma once
 
 #include "kernels/contact/elastic_contact.hpp"
@@ -101,7 +101,7 @@ void outward_sweep(const ModelView& model, const StageArgs<N>& a) {
     if (link.parent < 0) {
       o.world = o.local;
       o.Vp = zero6<N>();
-      const Vec3<N> rising = -broadcast<N>(model.gravity);
+      const Vec3<N> rising = -broadcast<N>(link.gravity_share * model.gravity);
       o.Ap = {zero3<N>(), link.may_rotate ? transposed_times(o.local.R, rising) : rising};
     } else {
       const LinkScratch<N>& p = a.links[link.parent];

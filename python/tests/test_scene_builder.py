@@ -75,6 +75,20 @@ def gripper() -> SceneBuilder:
 
 
 @pytest.mark.parametrize("path", SCENES, ids=lambda p: p.stem)
+def test_a_motor_maps_its_control_and_another_drives_the_same_joint() -> None:
+    b = gripper()
+    b.find("motor", joint="hand").set(scale=1e-3, offset=-0.01, u_range=(0, 255))
+    b.actuator.motor("left", "force", name="boost", scale=2)
+    model = tangere.Model(b.scene())
+    assert model.u_names == ["hand.rate", "left.rate", "right.rate", "boost"]
+    ends = []
+    for hand, left, boost in [(255, 0.8, 0), (1000, 0.4, 1)]:  # 0.4 of 5 N is 2 N more
+        batch = tangere.Batch(model, num_envs=1)
+        batch.run(np.tile([hand, left, 0.8, boost], (20, 1, 1)))
+        ends.append(batch.q)
+    np.testing.assert_allclose(ends[0], ends[1], atol=1e-12)
+
+
 def test_a_scene_that_is_read_and_written_is_the_same(path, tmp_path):
     with warnings.catch_warnings(record=True) as of_file:
         warnings.simplefilter("always")

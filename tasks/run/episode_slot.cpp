@@ -224,7 +224,8 @@ void EpisodeSlot<T>::keep_action(int row) {
     float* const to = actions_.data() + (as_size(e) * as_size(action_rows_) + as_size(row)) * width;
     for (std::size_t k = 0; k < width; ++k) {
       const double x = from[as_size(e) * width + k];
-      to[k] = static_cast<float>(task != nullptr ? x : std::clamp(x, -1.0, 1.0));
+      to[k] = static_cast<float>(
+          task != nullptr ? x : std::clamp(x, source_.bounds[k][0], source_.bounds[k][1]));
     }
   }
 }

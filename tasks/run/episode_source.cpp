@@ -7,6 +7,7 @@
 #include <algorithm>
 
 #include "engine/base/as_size.hpp"
+#include "engine/scene/control_bounds.hpp"
 #include "tasks/run/block_reader.hpp"
 
 namespace tangere {
@@ -38,12 +39,14 @@ int whole_rows(int most) {
 
 /// Every action is held for K steps, so the controls must not change within them. Each kind of
 /// control changes at the same steps in every episode, so checking one episode is enough.
-void check_held(const ControlProgram& controls, const EpisodeOptions& options, int nu) {
-  std::vector<double> action(as_size(nu)), u(as_size(nu));
+void check_held(const ControlProgram& controls, const EpisodeOptions& options,
+                const std::vector<std::array<double, 2>>& bounds) {
+  std::vector<double> action(bounds.size()), u(bounds.size());
   for (std::int64_t t = 0; options.every > 1 && t < options.steps; ++t) {
     std::vector<double>& now = t % options.every == 0 ? action : u;
     controls.evaluate(t, 0, now);
-    for (double& x : now) x = std::clamp(x, -1.0, 1.0);
+    for (std::size_t k = 0; k < now.size(); ++k)
+      now[k] = std::clamp(now[k], bounds[k][0], bounds[k][1]);
     if (t % options.every != 0 && u != action)
       throw InputError(fmt::format(
           "the controls change at step {}, but an action is held for {} steps; expected "
@@ -67,6 +70,7 @@ EpisodeSource shape_of(const Model& model, const EpisodeOptions& options) {
   s.model = &model;
   s.rows = action_rows(options);
   s.action = as_size(model.nu());
+  s.bounds = control_bounds(model.scene());
   s.channels = episode_channels(model, nullptr, options.record, options.every);
   return s;
 }
@@ -91,7 +95,7 @@ EpisodeSource source_of(const Model& model, const StepperOptions& solver,
                                  controls.timestep(), timestep));
   check_sensor_memory(model, timestep);
   controls.check_covers(options.steps);
-  check_held(controls, options, model.nu());
+  check_held(controls, options, s.bounds);
   s.program = [&controls, every = options.every](const Batch&) {
     return std::make_unique<SceneProgram>(controls, every);
   };

@@ -2,6 +2,7 @@
 // What many episodes play, of a scene or a task, and what their rows hold.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -22,9 +23,10 @@ inline constexpr int kBlockEpisodes = 16;  // lanes of a block of a Batch: one s
 struct EpisodeSource {
   const Model* model = nullptr;
   StepperOptions solver;
-  std::int64_t rows = 0;                 ///< R, actions of an episode, at most
-  std::size_t action = 0;                ///< numbers in one action
-  std::vector<EpisodeChannel> channels;  ///< of a row, besides the action
+  std::int64_t rows = 0;                      ///< R, actions of an episode, at most
+  std::size_t action = 0;                     ///< numbers in one action
+  std::vector<std::array<double, 2>> bounds;  ///< of a scene's controls; a task has its own
+  std::vector<EpisodeChannel> channels;       ///< of a row, besides the action
   /// Episodes may end at any time. Their length is then known only at the end, so their blocks
   /// leave whole and in ascending order.
   bool whole = false;

@@ -281,7 +281,7 @@ void Recorder::add_solver() {
          .shape = {environments_, as_size(model_.nu())},
          .names = copy(model_.u_names()),
          .units = copy(model_.u_units()),
-         .meaning = "as given; clipped to [-1, 1], then mapped to the motor's range"},
+         .meaning = "as given; motors clip them and map them to forces and targets"},
         at([this](auto, int) { return u_; }));
   if (all)
     add({.name = "solver/iterations",

@@ -87,6 +87,14 @@ TEST(Import, WhatIsNoRequestIsSaid) {
   EXPECT_THAT(folder.files(), ElementsAre());
 }
 
+/// The number of points that the name of a layout has, as 10x8 or 19; 0 if it has none.
+int points_in(const std::string& name) {
+  std::smatch found;
+  if (std::regex_search(name, found, std::regex("_(\\d+)x(\\d+)")))
+    return std::stoi(found[1]) * std::stoi(found[2]);
+  return std::regex_search(name, found, std::regex("_(\\d+)_")) ? std::stoi(found[1]) : 0;
+}
+
 TEST(Import, EveryLayoutLoads) {
   const Folder folder;
   for (const auto& entry :
@@ -96,7 +104,11 @@ TEST(Import, EveryLayoutLoads) {
     const json made = run_json(folder, {"import", kHand, "-o", name + ".xml", "--pad",
                                         "finger=" + name + "@0,0,0.06", "--quiet"});
     EXPECT_EQ(made["sensors"], 1) << name;
-    EXPECT_EQ(run_json(folder, {"inspect", name + ".xml"})["sensors"][0]["pressure_sign"], 1);
+    const json sensor = run_json(folder, {"inspect", name + ".xml"})["sensors"][0];
+    EXPECT_EQ(sensor["pressure_sign"], 1) << name;
+    if (const int points = points_in(name); points > 0) {
+      EXPECT_EQ(sensor["points"], points) << name;
+    }
   }
 }
 

@@ -56,7 +56,7 @@ class DenseDynamics {
       if (l.parent >= 0) at = joints[std::size_t(l.parent)];
       move(l.joint, q, v, q_[i], v_[i], at);
       joints.push_back(at);
-      add_body(l.body, masses_[i], at, v, gravity, t);
+      add_body(l.body, masses_[i], at, v, S(l.body.gravity_share) * gravity, t);
       joint_forces(l.joint, q, v, q_[i], v_[i], t);
     }
     motor_forces(q, v, u, t.force);
@@ -299,14 +299,22 @@ class DenseDynamics {
       for (std::size_t i = 0; i < scene_.links.size(); ++i) {
         const JointType type = scene_.links[i].joint.type;
         if (scene_.links[i].joint.name != motor.joint) continue;
+        const auto input = [&](std::size_t control) {
+          const S value = S(u[control]);
+          if (!motor.maps()) return value;
+          const S within = std::min(std::max(value, S(motor.u_range[0])), S(motor.u_range[1]));
+          return S(motor.scale.value_or(1)) * within + S(motor.offset);
+        };
         V3 way = V3::Zero();
         if (type == JointType::spherical)
-          way = log(quat_at(q, q_[i]).conjugate() * exp(V3(S(u[at]), S(u[at + 1]), S(u[at + 2]))));
+          way =
+              log(quat_at(q, q_[i]).conjugate() * exp(V3(input(at), input(at + 1), input(at + 2))));
         for (int k = 0; k < dof_count(type); ++k, ++at) {
-          const S low = S(motor.low), high = S(motor.high), value = S(u[at]);
+          const S low = S(motor.low), high = S(motor.high), value = input(at);
           if (motor.control == MotorControl::force) {
             force[v_[i] + k] +=
-                low + (std::min(std::max(value, S(-1)), S(1)) + 1) * (high - low) / 2;
+                motor.scale ? std::min(std::max(value, low), high)
+                            : low + (std::min(std::max(value, S(-1)), S(1)) + 1) * (high - low) / 2;
             continue;
           }
           const S error = type == JointType::spherical ? way[k] : value - q[q_[i] + k];

@@ -67,6 +67,21 @@ inline Scene random_machine(unsigned seed, int links) {
   return s;
 }
 
+/// Gives all motors a scale, an offset and a range that random controls leave, and each joint that
+/// is driven a second motor.
+inline void map_controls(Scene& s, unsigned seed) {
+  Random random(seed + 7000);
+  std::vector<MotorDescription> more;
+  for (MotorDescription& m : s.motors) {
+    m.scale = (random.integer(0, 1) == 0 ? 1 : -1) * random.uniform(0.3, 2);
+    m.offset = random.uniform(-0.2, 0.2);
+    m.u_range = {-random.uniform(0.2, 0.5), random.uniform(0.2, 0.5)};
+    more.push_back({m.joint, -0.5, 0.6, {}});
+    more.back().name = m.joint + "_more";
+  }
+  s.motors.insert(s.motors.end(), more.begin(), more.end());
+}
+
 /// A tree on a fixed root. Its cuboids touch the root's body, whose points touch them.
 inline Scene random_machine_on_a_base(unsigned seed, int links) {
   Scene s = random_machine(seed, links);

@@ -368,6 +368,7 @@ std::vector<Violation> check_own_headers(const Tree& tree) {
       {"io/view/view_dataset.cpp", "a part of view_source.hpp"},
       {"io/view/view_trajectory.cpp", "a part of view_source.hpp"},
       {"io/robot/mjcf_actuators.cpp", "a part of mjcf_file.hpp"},
+      {"io/robot/mjcf_gravity.cpp", "a part of mjcf_file.hpp"},
       {"io/robot/mjcf_keyframes.cpp", "a part of mjcf_file.hpp"},
       {"io/robot/mjcf_bodies.cpp", "a part of mjcf_file.hpp"},
       {"io/robot/mjcf_models.cpp", "a part of mjcf_file.hpp"},

@@ -10,9 +10,9 @@ For every robot a file NAME_reference.txt of lines: "mass BODY kg" once, then fo
 the place of its last joint (or of the body, if it has none) and its quaternion w x y z, "site" with
 a site and its place. The last state of a file with keyframes is that of its last one. Coordinates
 are those of Tangere: those of a free joint are seen from where it starts, and ref is taken away.
-Bodies keep the frames that their file gives: where MuJoCo aligns a free joint with an inertia, the
-site BODY_origin says where that frame is in the keyframe. A motor without a range has the range of
-the keyframe's control.
+Controls are those of the file; a joint has those of its actuators in their order. Bodies keep the
+frames that their file gives: where MuJoCo aligns a free joint with an inertia, the site BODY_origin
+says where that frame is in the keyframe.
 Accelerations are those that MuJoCo calls smooth: without contacts and limits.
 """
 
@@ -80,33 +80,13 @@ def is_servo(model, i):
     return model.actuator_biasprm[i, 1] != 0
 
 
-def our_control(model, i, value):
-    """The control of actuator i for a motor of Tangere."""
-    joint = model.actuator_trnid[i, 0]
-    low, high = control_range(model, i)
-    if is_servo(model, i):  # the target
-        if model.actuator_ctrllimited[i]:
-            value = min(max(value, low), high)
-        return value / model.actuator_gear[i, 0] - model.qpos0[model.jnt_qposadr[joint]]
-    return our_force_control(model, i, 2 * (value - low) / (high - low) - 1)
-
-
-def our_force_control(model, i, value):
-    """A range of forces takes the place of what the range of controls reaches beyond it."""
-    if not model.actuator_forcelimited[i]:
-        return value
-    gain = model.actuator_gainprm[i, 0]
-    ends = gain * np.array(control_range(model, i))
-    force = ends[0] + (value + 1) / 2 * (ends[1] - ends[0])
-    ends = np.clip(ends, *model.actuator_forcerange[i])
-    return np.clip(2 * (force - ends[0]) / (ends[1] - ends[0]) - 1, -1, 1)
-
-
 def control_range(model, i):
-    if model.actuator_ctrllimited[i]:
-        return model.actuator_ctrlrange[i]
-    most = max([1.0] + [abs(x) for x in model.key_ctrl[-1:, i]])
-    return -most, most
+    """A range of controls, of which a limited one is a part."""
+    if not model.actuator_ctrllimited[i]:
+        return (-0.3, 0.3) if is_servo(model, i) else (-1, 1)
+    low, high = model.actuator_ctrlrange[i]
+    beyond = 0.2 * (high - low)
+    return low - beyond, high + beyond
 
 
 def is_off(model, i):
@@ -126,8 +106,7 @@ def draw_state(model, data, rng):
                 at += 3
             data.qpos[at : at + 4] = numbers[:4]
     for i in range(model.nu):
-        low, high = (-0.3, 0.3) if is_servo(model, i) else control_range(model, i)
-        data.ctrl[i] = rng.uniform(low, high)
+        data.ctrl[i] = rng.uniform(*control_range(model, i))
 
 
 def write(path):
@@ -150,13 +129,14 @@ def write(path):
         for i in range(model.nu):
             name = model.joint(model.actuator_trnid[i, 0]).name
             if not is_off(model, i):
-                text += line("u", name, our_control(model, i, data.ctrl[i]))
+                found.setdefault(("u", name), []).append(data.ctrl[i])
         for j in range(model.njnt):
             name, kind = model.joint(j).name, model.jnt_type[j]
             a, d = model.jnt_qposadr[j], model.jnt_dofadr[j]
             coordinates = q[a : a + Q_COUNT[kind]].copy()
             rates, bias, acceleration = (
-                x[d : d + V_COUNT[kind]].copy() for x in (v, data.qfrc_bias, data.qacc_smooth)
+                x[d : d + V_COUNT[kind]].copy()
+                for x in (v, data.qfrc_bias - data.qfrc_gravcomp, data.qacc_smooth)
             )
             if kind in (HINGE, SLIDE):
                 coordinates -= model.qpos0[a]
@@ -188,5 +168,5 @@ def write(path):
     (HERE / f"{path.stem}_reference.txt").write_text(text)
 
 
-for robot in ("hand.urdf", "machine.xml", "meshes.xml", "kinds.xml", "models.xml"):
+for robot in ("hand.urdf", "machine.xml", "meshes.xml", "kinds.xml", "models.xml", "servos.xml"):
     write(HERE / robot)

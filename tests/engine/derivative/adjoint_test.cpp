@@ -120,6 +120,26 @@ TEST_P(AdjointScheme, MotorsTimedAtTheStartMatchDifferences) {
   EXPECT_GT(compared, 150);
 }
 
+/// Scale, offset, ranges of u beyond which the derivative is 0, and several motors of a joint; also
+/// shares of gravity.
+TEST_P(AdjointScheme, MotorsThatMapTheirControlsMatchDifferences) {
+  std::size_t motors = 0;
+  int compared = 0;
+  for (unsigned seed = 1; seed <= 6; ++seed) {
+    Scene s = testing::random_machine(seed, 3 + static_cast<int>(seed % 3));
+    testing::map_controls(s, seed);
+    testing::share_gravity(s, seed);
+    if (seed % 2 == 0)
+      for (MotorDescription& m : s.motors) m.timing = MotorTiming::start;
+    motors += s.motors.size();
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    if (!testing::splits(s, GetParam(), seed, kSteps))
+      compared += testing::check_gradient(s, GetParam(), seed, kSteps, 1e-7);
+  }
+  EXPECT_GT(motors, 12U);
+  EXPECT_GT(compared, 150);
+}
+
 /// Steps of which some are cut. Differences hold where both runs cut alike.
 TEST_P(AdjointScheme, CutStepsMatchDifferences) {
   if (GetParam().scheme().estimate.empty()) return;  // refused: see StepParts

@@ -158,6 +158,8 @@ TEST_P(TangentScheme, MachinesHaveTheSameProducts) {
     Scene s = testing::random_machine(seed, 2 + static_cast<int>(seed % 5));
     if (seed % 2 == 0)
       for (MotorDescription& m : s.motors) m.timing = MotorTiming::start;
+    if (seed % 3 == 0) testing::map_controls(s, seed);
+    if (seed % 5 == 0) testing::share_gravity(s, seed);
     const Model model(s);
     const Products p = products(model, testing::options(GetParam(), s.timestep, 1e-9),
                                 random_input(model, seed, 5), seed, 0);

@@ -65,7 +65,7 @@ TEST(SceneFaults, HoldForScenesThatAProgramBuilds) {
   EXPECT_THAT(refusal([](Scene& s) { s.links[1].joint.armature = -2; }),
               HasSubstr("joint 'box': armature=\"-2\"; expected zero or more"));
   EXPECT_THAT(refusal([](Scene& s) { s.motors.push_back(s.motors[0]); }),
-              HasSubstr("joint 'ball' already has a motor"));
+              HasSubstr("another motor has the name 'ball' already"));
   EXPECT_THAT(refusal([](Scene& s) { s.solver.accuracy = 1; }),
               HasSubstr("accuracy=\"1\"; expected a positive number below 1"));
 }

@@ -124,6 +124,39 @@ TEST(Dynamics, MachinesMatchTheDenseDerivation) {
 }
 
 /// Deep trees of one joint type, because errors would grow with depth.
+TEST(Dynamics, SharesOfGravityMatchTheDenseDerivation) {
+  for (unsigned seed = 0; seed < 8; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    Scene s = testing::random_tree(seed, 2 + static_cast<int>(seed % 5));
+    testing::share_gravity(s, seed);
+    compare(s, seed, true);
+    EXPECT_NE(s.links[0].body.gravity_share, 1);
+  }
+}
+
+/// Gravity enters at the root of a tree. Bodies that stand in the world are in none.
+TEST(Dynamics, ATreeHasOneShareOfGravity) {
+  Scene s = testing::random_tree(3, 4);
+  for (LinkDescription& l : s.links) l.joint.type = JointType::revolute;
+  s.links[0].joint.type = JointType::fixed;
+  s.links[1].parent = s.links[2].parent = 0;
+  s.links[3].parent = 2;
+  s.links[0].body.gravity_share = 0.5;
+  s.links[1].body.gravity_share = 0;
+  static_cast<void>(compile(s));
+  s.links[3].body.gravity_share = 0.25;
+  try {
+    static_cast<void>(compile(s));
+    FAIL() << "two shares in a tree";
+  } catch (const InputError& error) {
+    EXPECT_NE(std::string(error.what())
+                  .find("body 'body3': gravity_share=\"0.25\", and \"1\" of body "
+                        "'body2'"),
+              std::string::npos)
+        << error.what();
+  }
+}
+
 TEST(Dynamics, DeepChainsMatchTheDenseDerivation) {
   for (JointType type :
        {JointType::revolute, JointType::prismatic, JointType::planar, JointType::translational,

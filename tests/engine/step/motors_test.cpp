@@ -165,6 +165,70 @@ TEST(PositionMotor, EveryEnvironmentHasItsOwnTarget) {
     EXPECT_NEAR(q_of(batch, e)[0], 0.01 * e - model.mass(0) * 9.8 / 500, 1e-9);
 }
 
+/// The motion under the controls `u`, one for each dof.
+std::vector<double> after_steps(const Scene& s, const std::vector<double>& u) {
+  const Model model(s);
+  Batch batch(model, 1);
+  run(model, batch, Integrator::bdf2, 2e-3, 50, u);
+  return q_of(batch);
+}
+
+/// scale, offset and u_range give the bits of the target that they stand for.
+TEST(MappedMotors, ATargetIsScaledAndItsControlClipped) {
+  Scene s;
+  s.links = {link("arm", JointType::revolute, {0, 0, 0}, kBox, 500),
+             link("ball", JointType::spherical, {1, 0, 0}, kBox, 500)};
+  s.links[0].joint.axis0 = {0, 1, 0};
+  for (const MotorTiming timing : {MotorTiming::end, MotorTiming::start}) {
+    s.motors = {position_motor("arm_joint", 20, 0.5), position_motor("ball_joint", 2, 0.1)};
+    for (MotorDescription& m : s.motors) m.timing = timing;
+    Scene mapped = s;
+    for (MotorDescription& m : mapped.motors)
+      m.scale = -0.01, m.offset = 0.3, m.u_range = {-20, 100};
+    const auto target = [](double u) { return -0.01 * u + 0.3; };
+    EXPECT_EQ(after_steps(mapped, {7, -5, 90, 0}),
+              after_steps(s, {target(7), target(-5), target(90), target(0)}));
+    EXPECT_EQ(after_steps(mapped, {-80, 100, 1e9, -20}),
+              after_steps(s, {target(-20), target(100), target(100), target(-20)}));
+    EXPECT_EQ(Model(mapped).u_units()[0], "1");
+    for (MotorDescription& m : mapped.motors) m.scale.reset();
+    EXPECT_EQ(after_steps(mapped, {0.5, 0, 0, 200}), after_steps(s, {0.8, 0.3, 0.3, 100.3}));
+    EXPECT_EQ(Model(mapped).u_units()[0], "rad");
+  }
+}
+
+TEST(MappedMotors, AForceIsScaledAndClippedTwice) {
+  Scene s = lift({"car_joint", -6, 100, {}});
+  s.motors[0].scale = 2, s.motors[0].offset = -1, s.motors[0].u_range = {-4, 3};
+  s.gravity = {0, 0, 0};
+  const Model model(s);
+  for (const auto& [u, force] : {std::pair{0.0, -1.0}, {2.0, 3.0}, {30.0, 5.0}, {-3.0, -6.0}}) {
+    Batch batch(model, 1);
+    run(model, batch, Integrator::bdf1, 0.01, 10, {u});
+    EXPECT_NEAR(v_of(batch)[0], 0.1 * force / model.mass(0), 1e-12) << u;
+  }
+}
+
+/// Force motors and a position motor of one joint act together, at either timing.
+TEST(MappedMotors, MotorsOfAJointAddUp) {
+  MotorDescription first{"car_joint", -4, 4, {}}, second = first,
+                                                  third = position_motor("car_joint", 80, 6);
+  second.name = "boost", second.scale = 3, second.offset = 1;
+  third.name = "hold";
+  for (const MotorTiming timing : {MotorTiming::end, MotorTiming::start}) {
+    third.timing = timing;
+    Scene s = lift(first), one = lift(third);
+    s.motors = {first, third, second};
+    const Model model(s);
+    EXPECT_EQ(model.u_names()[1], "hold");
+    EXPECT_EQ(model.u_names()[2], "boost");
+    Batch batch(model, 1);
+    run(model, batch, Integrator::bdf2, 2e-3, 50, {0.5, 0.1, -0.7});
+    one.gravity[2] += (0.5 * 4 + 3 * -0.7 + 1) / model.mass(0);  // the same force
+    EXPECT_NEAR(q_of(batch)[0], after_steps(one, {0.1})[0], 1e-12);
+  }
+}
+
 TEST(VariedJoints, ADrawnNumberActsLikeAConstantOne) {
   Scene s;
   s.links = {link("arm", JointType::revolute, {0, 0, 0}, kBox, 500),

@@ -63,6 +63,12 @@ std::string driven(const std::string& motor, const std::string& ctrl = "0",
          motor + "</actuator><keyframe><key name=\"k\" ctrl=\"" + ctrl + "\"/></keyframe></mujoco>";
 }
 
+/// The law of a force motor.
+double force_of(const MotorDescription& m, double u) {
+  if (!m.scale) return m.low + 0.5 * (std::clamp(u, -1.0, 1.0) + 1) * (m.high - m.low);
+  return std::clamp(*m.scale * std::clamp(u, m.u_range[0], m.u_range[1]) + m.offset, m.low, m.high);
+}
+
 /// The force of the imported motor under a control of the file: the reference is the law of the
 /// actuator.
 TEST_F(RobotKinds, MotorsExertTheForceOfTheFile) {
@@ -80,20 +86,71 @@ TEST_F(RobotKinds, MotorsExertTheForceOfTheFile) {
                         Case{"<motor joint=\"j\" gear=\"10\" ctrlrange=\"-1 1\" "
                              "forcerange=\"-0.5 0.5\"/>",
                              0.03, 0.3},
-                        Case{"<general joint=\"j\" gainprm=\"-4\" ctrlrange=\"-2 2\"/>", 1, -4}}) {
+                        Case{"<general joint=\"j\" gainprm=\"-4\" ctrlrange=\"-2 2\"/>", 1, -4},
+                        Case{"<general joint=\"j\" gainprm=\"-4\" biastype=\"affine\" "
+                             "biasprm=\"0.5 0 0\" gear=\"2\"/>",
+                             1, -7}}) {
     const Scene made = scene(driven(c.motor, std::to_string(c.control)), "k");
     const MotorDescription& motor = made.motors.at(0);
     const double u = std::get<ConstantControl>(made.control.value()).values.at(0);
-    EXPECT_GE(u, -1) << c.motor;
-    EXPECT_LE(u, 1) << c.motor;
-    EXPECT_NEAR(motor.low + 0.5 * (u + 1) * (motor.high - motor.low), c.force, 1e-12) << c.motor;
+    EXPECT_EQ(u, c.control) << c.motor;
+    EXPECT_NEAR(force_of(motor, u), c.force, 1e-12) << c.motor;
+    EXPECT_THAT(import(driven(c.motor)).changed, IsEmpty());
   }
-  EXPECT_THAT(import(driven("<motor joint=\"j\"/>", "5"), "k").changed,
-              Contains(HasSubstr("the control of 'j' is that of the file times 0.2 from -1 to 1")));
-  EXPECT_THAT(import(driven("<motor joint=\"j\" ctrlrange=\"0 4\"/>")).changed,
-              Contains(HasSubstr("the control of 'j' is that of the file times 0.5 -1")));
-  EXPECT_THAT(import(driven("<motor joint=\"j\" gear=\"-3\" ctrlrange=\"-1 1\"/>")).changed,
-              IsEmpty());
+}
+
+/// The target of the imported motor under a control of the file.
+TEST_F(RobotKinds, TargetsAreThoseOfTheFile) {
+  struct Case {
+    const char* motor;
+    double control, target, P;
+  };
+  const std::string affine = "<general joint=\"j\" biastype=\"affine\" ";
+  for (const auto& [attributes, control, target, P] :
+       {Case{"gainprm=\"5\" biasprm=\"0 -5 -1\"", 0.3, 0.3, 5},
+        Case{"gainprm=\"0.3137\" biasprm=\"0 -100 -10\" ctrlrange=\"0 255\"", 300, 0.3137 * 2.55,
+             100},
+        Case{"gainprm=\"2\" biasprm=\"1 -4 0\" gear=\"2\" ctrlrange=\"-1 1\"", 0.5, 0.25, 16},
+        Case{"gainprm=\"2\" biasprm=\"1 -4 0\" gear=\"-2\"", 0.5, -0.25, 16}}) {
+    const MotorDescription motor = scene(driven(affine + attributes + "/>")).motors.at(0);
+    EXPECT_EQ(motor.control, MotorControl::position) << attributes;
+    EXPECT_NEAR(motor.P, P, 1e-12) << attributes;
+    const double u = std::clamp(control, motor.u_range[0], motor.u_range[1]);
+    EXPECT_NEAR(motor.scale.value_or(1) * u + motor.offset, target, 1e-12) << attributes;
+  }
+  for (const char* bias : {"0 3 0", "0 -3 3", "0 0 1"})
+    EXPECT_THAT(import(driven(affine + "biasprm=\"" + bias + "\"/>")).lost,
+                ElementsAre(HasSubstr("negative stiffness or damping")))
+        << bias;
+  EXPECT_THAT(import(driven(affine + "gainprm=\"0\" biasprm=\"0 -3 0\"/>")).lost,
+              ElementsAre(HasSubstr("<general> with gain 0")));
+}
+
+/// Of two servos the one without a range of its force is a spring; tests/data/robots/servos.xml
+/// compares such a joint with MuJoCo.
+TEST_F(RobotKinds, AJointHasSeveralMotors) {
+  const std::string free = "<position name=\"j\" joint=\"j\" kp=\"3\" kv=\"0.5\"/>",
+                    clipped = "<position joint=\"j\" kp=\"2\" forcerange=\"-1 1\"/>",
+                    force = "<motor name=\"push\" joint=\"j\"/>";
+  const ImportedScene both = import(driven(free + clipped + force, "1 2 3"), "k");
+  EXPECT_THAT(both.lost, IsEmpty());
+  EXPECT_THAT(both.changed, Contains(HasSubstr("a second actuator with a target, of joint 'j'")));
+  const Scene s = parse_scene(both.text, folder_ / "scene.xml").scene;
+  ASSERT_EQ(s.motors.size(), 3U);
+  EXPECT_EQ(s.motors[0].control, MotorControl::force);
+  EXPECT_EQ(s.motors[0].scale, 3);
+  EXPECT_EQ(s.motors[1].P, 2);
+  EXPECT_EQ(s.motors[1].name, "j_2");
+  EXPECT_EQ(s.motors[2].name, "push");
+  EXPECT_EQ(s.links[0].joint.stiffness, 3);
+  EXPECT_EQ(s.links[0].joint.damping, 0.5);
+  EXPECT_THAT(std::get<ConstantControl>(s.control.value()).values, ElementsAre(1, 2, 3));
+  const ImportedScene lost = import(driven(clipped + free + clipped + force, "1 2 3 4"), "k");
+  EXPECT_THAT(lost.lost, ElementsAre(HasSubstr("a joint has one position motor")));
+  EXPECT_THAT(
+      std::get<ConstantControl>(parse_scene(lost.text, folder_ / "scene.xml").scene.control.value())
+          .values,
+      ElementsAre(1, 2, 4));
 }
 
 /// A range from high to low is the same motor under the opposite control.
@@ -143,12 +200,38 @@ TEST_F(RobotKinds, WordsThatChangeAForceAreNotIdle) {
 }
 
 /// Half of the range -1 to 2 about its middle is -0.25 to 1.25.
-TEST_F(RobotKinds, TargetsOfAKeyframeKeepToAnInheritedRange) {
-  const std::string motor = "<position joint=\"j\" kp=\"9\" inheritrange=\"0.5\"/>";
-  for (const auto& [ctrl, target] : {std::pair{"-3", -0.25}, {"0.5", 0.5}, {"2", 1.25}})
-    EXPECT_THAT(std::get<ConstantControl>(scene(driven(motor, ctrl), "k").control.value()).values,
-                ElementsAre(DoubleNear(target, 1e-15)));
-  EXPECT_THAT(import(driven(motor)).changed, Contains(HasSubstr("targets of position motors")));
+TEST_F(RobotKinds, AnInheritedRangeBoundsTheControl) {
+  const Scene made =
+      scene(driven("<position joint=\"j\" kp=\"9\" inheritrange=\"0.5\"/>", "-3"), "k");
+  EXPECT_THAT(made.motors.at(0).u_range, ElementsAre(-0.25, 1.25));
+  EXPECT_THAT(std::get<ConstantControl>(made.control.value()).values, ElementsAre(-3));
+}
+
+/// Bodies of one tree have one share of gravity. That of a body on an upright axis alone does not
+/// matter, as its weight does no work.
+TEST_F(RobotKinds, LiftedBodiesHaveAShareOfGravity) {
+  const auto arm = [](const std::string& base, const std::string& upper, const std::string& lower,
+                      const std::string& axis) {
+    return "<mujoco><worldbody><body name=\"base\"" + base + "><joint axis=\"" + axis +
+           "\"/><geom size=\"0.1\" pos=\"0.1 0 0\"/><body name=\"upper\"" + upper +
+           "><joint axis=\"0 1 0\"/><geom size=\"0.1\" pos=\"0 0 1\"/>"
+           "<geom size=\"0.1\" pos=\"0 0 2\"/><body name=\"lower\"" +
+           lower +
+           " pos=\"0 0 2\"><joint axis=\"0 1 0\"/><geom size=\"0.1\" pos=\"0 0 1\"/>"
+           "</body></body></body></worldbody></mujoco>";
+  };
+  const std::string all = " gravcomp=\"1\"", some = " gravcomp=\"0.25\"";
+  const auto shares = [&](const std::string& text) {
+    std::vector<double> out;
+    for (const LinkDescription& l : scene(text).links) out.push_back(l.body.gravity_share);
+    return out;
+  };
+  EXPECT_THAT(shares(arm("", all, all, "0 0 1")), ElementsAre(0, 0, 0, 0));
+  EXPECT_THAT(shares(arm(some, some, some, "1 0 0")), ElementsAre(0.75, 0.75, 0.75, 0.75));
+  for (const std::string& mixed : {arm("", all, all, "1 0 0"), arm(all, all, some, "0 0 1")}) {
+    EXPECT_THAT(import(mixed).lost, ElementsAre(HasSubstr("<body> gravcomp"))) << mixed;
+    EXPECT_THAT(shares(mixed), ElementsAre(1, 1, 1, 1)) << mixed;
+  }
 }
 
 /// A pendulum has the inertia m (l² + 0.4 r²) and armature, whatever the gear. MuJoCo 4.0.0 gave kv

@@ -12,6 +12,7 @@
 #include "engine/scene/outer_pose.hpp"
 #include "engine/scene/shapes.hpp"
 #include "engine/sense/readout.hpp"
+#include "engine/step/motor_force.hpp"
 #include "io/robot/robot_import.hpp"
 #include "io/robot/rotations.hpp"
 #include "io/scene/scene_reader.hpp"
@@ -99,9 +100,9 @@ Vector kernel_acceleration(const Scene& scene, const Vector& q, const Vector& v,
     const CompiledMotor& motor = m->motors[k];
     const auto dof = std::size_t(motor.dof);
     if (motor.control == MotorControl::position)
-      b.target[dof] = u[k];
+      b.target[dof] = motor_input(motor, u[k]);
     else
-      b.tau[dof] += motor.low + 0.5 * (u[k] + 1) * (motor.high - motor.low);
+      b.tau[dof] += force_at_start(*m, motor, nullptr, &u[k]);
   }
   const auto residual = [&](const Vector& a) {
     for (int i = 0; i < m->nv; ++i) b.s[std::size_t(i)] = a[i];
@@ -169,7 +170,9 @@ void compare(const std::string& robot, const std::string& name, const RobotOptio
     const Vector v = in_order(scene, state.v, dof_count);
     ASSERT_EQ(q.size(), model.nq());
     std::vector<double> u;
-    for (const MotorDescription& motor : scene.motors) u.push_back(state.u.at(motor.joint).at(0));
+    std::map<std::string, std::size_t> used;  // motors of a joint
+    for (const MotorDescription& motor : scene.motors)
+      u.push_back(state.u.at(motor.joint).at(used[motor.joint]++));
     if (!options.keyframe.empty() && &state == &reference.states.back())
       expect_start(scene, Batch(model, 1, 1), q, v, u);
     expect_close(dense.terms(q, v, u).bias, in_order(scene, state.bias, dof_count), "bias");
@@ -214,6 +217,11 @@ TEST(RobotPhysics, OtherKindsOfMjcfMoveAsInMujoco) {
   RobotOptions options;
   options.keyframe = "thrown";
   compare("kinds.xml", "kinds_reference.txt", options);
+}
+TEST(RobotPhysics, ActuatorsAndLiftedBodiesAreThoseOfMujoco) {
+  RobotOptions options;
+  options.keyframe = "on";
+  compare("servos.xml", "servos_reference.txt", options);
 }
 TEST(RobotPhysics, CopiesAndAttachedModelsMoveAsInMujoco) {
   RobotOptions options;

@@ -95,6 +95,29 @@ TEST(SceneJoints, ASceneOfEveryJointRuns) {
   }
 }
 
+/// Targets and forces have units, and the controls of motors with a scale have none.
+TEST(SceneJoints, AMotorMapsItsControl) {
+  const Scene s =
+      parse_scene(
+          R"(<redmax><robot><link name="a"><joint name="a" type="prismatic" axis="0 0 1"/>
+<body name="a" type="sphere" radius="1"/></link><link name="b"><joint name="b" type="revolute"
+axis="0 0 1"/><body name="b" type="sphere" radius="1" pos="2 0 0"/></link></robot><actuator>
+<motor joint="a" ctrl="position" P="1" scale="0.5" offset="3" u_range="0 255"/>
+<motor joint="b" ctrl="position" P="1" scale="0.5" offset="3" u_range="-1 2"/>
+<motor joint="a" name="push" ctrl="force" scale="4" offset="-1"/>
+</actuator><control><constant value="100 1 2"/></control></redmax>)",
+          "s.xml")
+          .scene;
+  EXPECT_DOUBLE_EQ(*s.motors[0].scale, 0.005);
+  EXPECT_DOUBLE_EQ(s.motors[0].offset, 0.03);
+  EXPECT_EQ(s.motors[0].u_range[1], 255);
+  EXPECT_DOUBLE_EQ(*s.motors[1].scale, 0.5);
+  EXPECT_DOUBLE_EQ(*s.motors[2].scale, 4e-5);
+  EXPECT_DOUBLE_EQ(s.motors[2].offset, -1e-5);
+  EXPECT_EQ(s.motors[2].low, -HUGE_VAL);
+  EXPECT_EQ(std::get<ConstantControl>(*s.control).values, (std::vector<double>{100, 1, 2}));
+}
+
 /// A chain of links, nested or by name.
 std::string chain(const std::string& links) {
   return "<tangere><option unit=\"m-kg\"/><robot>" + links + "</robot></tangere>";

@@ -218,5 +218,34 @@ TEST(TactileLayouts, ScenesPutThemOnBodiesInTheirUnit) {
   }
 }
 
+TEST(TactileLayouts, AnElementMayHaveItsPoints) {
+  const auto read = [](const std::string& points) {
+    return parse_scene(R"(<redmax><option unit="cm-g"/><robot><link name="a"><joint name="a"
+type="free3d"/><body name="a" type="sphere" radius="2"/></link></robot><sensor>
+<tactile body="a" type="abstract" points=")" +
+                           points + R"(" pos="0 0 1"/></sensor></redmax>)",
+                       "s.xml")
+        .scene;
+  };
+  const Scene s = read("1 2 3 0 0 2 1 0 5  0 0 1 3 0 0 0 0 1");
+  ASSERT_EQ(s.sensors[0].points.size(), 2U);
+  const TactilePoint &first = s.sensors[0].points[0], &second = s.sensors[0].points[1];
+  EXPECT_DOUBLE_EQ(first.position[2], 0.04);
+  EXPECT_EQ(first.normal, (Vector3{0, 0, 1}));
+  EXPECT_EQ(first.axis0, (Vector3{1, 0, 0})) << "across the normal";
+  EXPECT_EQ(second.axis0, (Vector3{0, 0, 1}));
+  for (const TactilePoint& p : s.sensors[0].points) expect_frame(p);
+  const auto refusal = [&](const std::string& points) {
+    try {
+      read(points);
+    } catch (const InputError& error) {
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  EXPECT_THAT(refusal("1 2 3 0 0 1"), HasSubstr("s.xml:3: <tactile>: points has 6 numbers"));
+  EXPECT_THAT(refusal("0 0 0 0 0 1 0 0 2"), HasSubstr("axis0 of point 0"));
+}
+
 }  // namespace
 }  // namespace tangere

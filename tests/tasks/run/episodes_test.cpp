@@ -252,6 +252,23 @@ TEST(Episodes, ActionsAreClippedAndRandomControlsDifferByEpisode) {
   EXPECT_EQ(random.episodes.at(2).actions.substr(0, 12), bytes_of(std::span<const float>(first)));
 }
 
+/// Targets are kept as they are, and clipped to a range of u.
+TEST(Episodes, ActionsHaveTheBoundsOfTheirMotors) {
+  Scene scene = small_ball().scene();
+  MotorDescription& motor = scene.motors.at(0);
+  motor.scale = 0.1, motor.u_range = {-20, 255};
+  const Model model(scene);
+  EpisodeOptions o = options();
+  o.episodes = 1;
+  o.steps = 2;
+  o.every = 1;
+  const CsvControl table{{{2, 0, -70}, {300, 0, -10}}, "u.csv"};
+  Recorder recorder(2);
+  run_episodes(model, {}, ControlProgram(model, 5e-3, kSeed, table), o, recorder);
+  const std::vector<float> expected{2, 0, -20, 255, 0, -10};
+  EXPECT_EQ(recorder.episodes.at(0).actions, bytes_of(std::span<const float>(expected)));
+}
+
 TEST(Episodes, SolverOptionsReachTheStepper) {
   EpisodeOptions o = options();
   o.episodes = 1;
