@@ -263,13 +263,11 @@ struct Adjoint::Impl {
 
   /// Adds the cotangents of joints that follow others to those of their leaders.
   static void fold_followers(const CompiledModel& m, BlockCotangent& c, int column) {
-    for (const kernels::Follower& f : m.followers)
-      for (auto* of : {&c.q, &c.v, &c.previous_q, &c.previous_v}) {
-        const auto at = [&](int dof) -> double& {
-          return (*of)[std::size_t(dof * kBlock + column)];
-        };
-        at(f.leader_v) += f.ratio * std::exchange(at(f.v), 0.0);
-      }
+    for (auto* of : {&c.q, &c.v, &c.previous_q, &c.previous_v}) {
+      const auto at = [&](int dof) -> double& { return (*of)[std::size_t(dof * kBlock + column)]; };
+      for (const kernels::FollowerTie& t : m.ties) at(t.leader_v) += t.ratio * at(t.v);
+      for (const kernels::Follower& f : m.followers) at(f.v) = 0;
+    }
   }
 
   /// Adds the cotangents of the state one step before, and moves those of earlier ones up.

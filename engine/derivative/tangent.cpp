@@ -139,8 +139,8 @@ struct Tangent::Impl {
   /// stage.
   /// Turns Gᵀ A, whose rows of followers are 0, into Gᵀ A G with ones on their diagonal.
   void fold_followers(Eigen::MatrixXd& A) const {
+    for (const kernels::FollowerTie& t : m().ties) A.col(t.leader_v) += t.ratio * A.col(t.v);
     for (const kernels::Follower& f : m().followers) {
-      A.col(f.leader_v) += f.ratio * A.col(f.v);
       A.col(f.v).setZero();
       A(f.v, f.v) = 1;
     }
@@ -170,8 +170,8 @@ struct Tangent::Impl {
     s.centre = centre, s.r = r, s.s = acceleration, s.tau = tau, s.target = target;
     const Eigen::VectorXd dot = A.partialPivLu().solve(rhs);
     for (std::size_t i = 0; i < n; ++i) s.x[i].epsilon = dot[Eigen::Index(i)];
-    for (const kernels::Follower& f : m().followers)
-      s.x[std::size_t(f.v)].epsilon = f.ratio * s.x[std::size_t(f.leader_v)].epsilon;
+    for (const kernels::FollowerTie& t : m().ties)  // dot of a follower is 0
+      s.x[std::size_t(t.v)].epsilon += t.ratio * s.x[std::size_t(t.leader_v)].epsilon;
     s.rates();
     return s.x;
   }

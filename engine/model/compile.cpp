@@ -460,8 +460,8 @@ class Compiler {
 
   void components() {
     std::vector<std::pair<int, int>> coupled = touching_;
-    for (const kernels::Follower& f : m_.followers)
-      coupled.emplace_back(link_of_dof(m_, f.v), link_of_dof(m_, f.leader_v));
+    for (const kernels::FollowerTie& t : m_.ties)
+      coupled.emplace_back(link_of_dof(m_, t.v), link_of_dof(m_, t.leader_v));
     auto [dofs, begin] = find_components(m_.links, coupled);
     m_.component_dofs = std::move(dofs);
     m_.component_begin = std::move(begin);
@@ -525,7 +525,7 @@ class Compiler {
   void symbolic() {
     m_.pattern = m_.followers.empty() && prefers_blocks(m_.links, touching_)
                      ? block_pattern(m_.links, m_.nv)
-                     : analyse_pattern(m_.links, m_.nv, touching_, m_.followers);
+                     : analyse_pattern(m_.links, m_.nv, touching_, m_.ties);
   }
 
   CompiledModel m_;

@@ -5,79 +5,87 @@
 
 #include <algorithm>
 #include <cmath>
-
-#include "engine/scene/scene_number.hpp"
+#include <map>
 
 namespace tangere {
 namespace {
 
-/// The joint at the end of a chain of followers, and the coordinate in terms of its.
-struct Leader {
-  std::size_t joint;
-  double ratio, offset;
+/// A coordinate in terms of joints that follow none.
+struct Combination {
+  std::map<std::size_t, double> ratios;  ///< by joint
+  double offset = 0;
 };
 
-Leader leader_of(const CompiledModel& m, const NameIndex& joints, std::size_t follower) {
-  Leader out{follower, 1, 0};
-  for (std::size_t passed = 0; !m.scene.links[out.joint].joint.follows.empty(); ++passed) {
-    const JointDescription& d = m.scene.links[out.joint].joint;
-    const auto fail = [&](const std::string& text) {
-      throw InputError(d.source.prefix() + "joint '" + d.name + "' follows '" + d.follows + "', " +
-                       text);
-    };
-    if (passed > m.scene.links.size()) fail("which follows it in turn; expected no circle");
-    const auto next = std::size_t(joints.find("joint", d.follows, d.source));
-    if (dof_count(m.scene.links[next].joint.type) != 1)
-      fail(fmt::format("which has {} degrees of freedom; expected a revolute or prismatic joint",
-                       dof_count(m.scene.links[next].joint.type)));
-    out.offset += out.ratio * d.offset;
-    out.ratio *= d.ratio;
-    out.joint = next;
-  }
-  return out;
-}
+class Followers {
+ public:
+  Followers(const CompiledModel& m, const NameIndex& joints) : m_(m), joints_(joints) {}
 
-/// Returns where the scene gives a joint's initial state or draws it; null: it does not.
-const Source* given_start(const Scene& scene, const std::string& joint) {
-  for (const InitialState& d : scene.initial)
-    if (d.joint == joint) return &d.source;
-  return nullptr;
-}
+  /// Adds `factor` times the coordinate of a joint. `depth`: followers on the way to it.
+  void add(std::size_t joint, double factor, std::size_t depth, Combination& out) const {
+    const JointDescription& d = m_.scene.links[joint].joint;
+    if (dof_count(d.type) != 1)
+      fail(d, fmt::format("has {} degrees of freedom; expected a revolute or prismatic joint where "
+                          "one follows",
+                          dof_count(d.type)));
+    if (depth > m_.scene.links.size()) fail(d, "follows itself; expected no circle");
+    if (d.follows.empty()) {
+      out.ratios[joint] += factor;
+      return;
+    }
+    if (d.ratio.size() != d.follows.size())
+      fail(d, fmt::format("follows {} joints with {} ratios; expected as many", d.follows.size(),
+                          d.ratio.size()));
+    out.offset += factor * d.offset;
+    for (std::size_t k = 0; k < d.follows.size(); ++k)
+      add(std::size_t(joints_.find("joint", d.follows[k], d.source)), factor * d.ratio[k],
+          depth + 1, out);
+  }
+
+ private:
+  [[noreturn]] static void fail(const JointDescription& d, const std::string& text) {
+    throw InputError(d.source.prefix() + "joint '" + d.name + "' " + text);
+  }
+
+  const CompiledModel& m_;
+  const NameIndex& joints_;
+};
 
 }  // namespace
 
 void compile_followers(CompiledModel& m, const NameIndex& joints) {
   for (std::size_t i = 0; i < m.scene.links.size(); ++i) {
-    const JointDescription& d = m.scene.links[i].joint;
-    if (d.follows.empty()) continue;
-    if (dof_count(d.type) != 1)
-      throw InputError(d.source.prefix() + "joint '" + d.name + "' follows '" + d.follows +
-                       "' and has " + std::to_string(dof_count(d.type)) +
-                       " degrees of freedom; expected a revolute or prismatic joint");
-    const Leader leader = leader_of(m, joints, i);
-    const CompiledJoint &own = m.joints[i], &other = m.joints[leader.joint];
-    m.followers.push_back({own.v, other.v, own.q, other.q, leader.ratio, leader.offset});
+    if (m.scene.links[i].joint.follows.empty()) continue;
+    Combination of;
+    Followers(m, joints).add(i, 1, 0, of);
+    const CompiledJoint& own = m.joints[i];
+    m.followers.push_back({own.v, own.q, of.offset});
+    for (const auto& [leader, ratio] : of.ratios)
+      m.ties.push_back({own.v, own.q, m.joints[leader].v, m.joints[leader].q, ratio});
   }
 }
 
-void place_followers(CompiledModel& m) {
+void place_initial_followers(CompiledModel& m) {
+  const std::vector<double> q = m.initial_q, v = m.initial_v;
+  place_followers(
+      m, [&](int i) -> double& { return m.initial_q[std::size_t(i)]; },
+      [&](int i) -> double& { return m.initial_v[std::size_t(i)]; });
+  constexpr double kRounding = 1e-6;  // of files that give both
+  const auto differs = [](double given, double placed) {
+    return std::abs(given - placed) > kRounding * (1 + std::abs(placed));
+  };
   for (const kernels::Follower& f : m.followers) {
-    const double q = m.initial_q[std::size_t(f.q)], v = m.initial_v[std::size_t(f.v)];
-    place_follower(
-        f, [&](int i) -> double& { return m.initial_q[std::size_t(i)]; },
-        [&](int i) -> double& { return m.initial_v[std::size_t(i)]; });
     const auto of = std::ranges::find(m.joints, f.v, &CompiledJoint::v);
     const JointDescription& d = m.scene.links[std::size_t(of - m.joints.begin())].joint;
-    const Source* const given = given_start(m.scene, d.name);
-    const double follows_q = m.initial_q[std::size_t(f.q)],
-                 follows_v = m.initial_v[std::size_t(f.v)];
-    constexpr double kRounding = 1e-6;  // of files that give both
-    if (given != nullptr && (std::abs(q - follows_q) > kRounding * (1 + std::abs(follows_q)) ||
-                             std::abs(v - follows_v) > kRounding * (1 + std::abs(follows_v))))
-      throw InputError(given->prefix() +
-                       fmt::format("joint '{}' starts at {} with rate {}, but by its leader '{}' "
-                                   "(line {}) at {} with {}; expected no start of its own",
-                                   d.name, q, v, d.follows, d.source.line, follows_q, follows_v));
+    const auto given = std::ranges::find(m.scene.initial, d.name, &InitialState::joint);
+    const auto iq = std::size_t(f.q), iv = std::size_t(f.v);
+    if (given == m.scene.initial.end() ||
+        !(differs(q[iq], m.initial_q[iq]) || differs(v[iv], m.initial_v[iv])))
+      continue;
+    throw InputError(given->source.prefix() +
+                     fmt::format("joint '{}' starts at {} with rate {}, but by what it follows "
+                                 "(line {}) at {} with {}; expected no start of its own",
+                                 d.name, q[iq], v[iv], d.source.line, m.initial_q[iq],
+                                 m.initial_v[iv]));
   }
 }
 

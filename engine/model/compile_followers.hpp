@@ -7,20 +7,23 @@
 
 namespace tangere {
 
-/// Fills CompiledModel::followers. Chains are resolved: of a follower of a follower, ratios
+/// Fills CompiledModel::followers and ties. Chains are resolved: of a follower of a follower, ratios
 /// multiply. Throws InputError (file:line) for a leader that is unknown, of several dofs, or in a
 /// circle.
 void compile_followers(CompiledModel& m, const NameIndex& joints);
 
 /// Sets the initial state of followers from their leaders'. Throws InputError where the scene gives
 /// another one.
-void place_followers(CompiledModel& m);
+void place_initial_followers(CompiledModel& m);
 
-/// Sets a follower's coordinate and rate from its leader's. `q`(i), `v`(i): references.
+/// Sets the coordinates and rates of followers from their leaders'. `q`(i), `v`(i): references.
 template <class Q, class V>
-void place_follower(const kernels::Follower& f, const Q& q, const V& v) {
-  q(f.q) = f.ratio * q(f.leader_q) + f.offset;
-  v(f.v) = f.ratio * v(f.leader_v);
+void place_followers(const CompiledModel& m, const Q& q, const V& v) {
+  for (const kernels::Follower& f : m.followers) q(f.q) = f.offset, v(f.v) = 0;
+  for (const kernels::FollowerTie& t : m.ties) {
+    q(t.q) += t.ratio * q(t.leader_q);
+    v(t.v) += t.ratio * v(t.leader_v);
+  }
 }
 
 }  // namespace tangere

@@ -254,7 +254,7 @@ void compile_initial_state(CompiledModel& m, const NameIndex& joints) {
     copy("q", d.q, position_count(type), m.initial_q.data() + m.joints[i].q);
     copy("v", d.v, dof_count(type), m.initial_v.data() + m.joints[i].v);
   }
-  place_followers(m);
+  place_initial_followers(m);
 }
 
 void vary_joint(CompiledModel& m, int joint, const RandomizationDescription& d, int row) {
@@ -334,6 +334,7 @@ void check_masses(const CompiledModel& m) {
   };
   for (std::size_t i = 0; i < m.joints.size(); ++i) {
     const CompiledJoint& joint = m.joints[i];
+    if (!m.scene.links[i].joint.follows.empty()) continue;  // those that it follows have a mass
     for (int k = 0; k < joint.link_count; ++k) {
       const auto link = std::size_t(joint.first_link + k);
       if (!(carried[link].mass > 0))

@@ -65,6 +65,8 @@ void point_view(CompiledModel& m) {
   v.pattern = m.pattern.view();
   v.n_followers = static_cast<int>(m.followers.size());
   v.followers = m.followers.data();
+  v.n_ties = static_cast<int>(m.ties.size());
+  v.ties = m.ties.data();
   v.n_folded = static_cast<int>(m.pattern.folded.size());
   v.folded = m.pattern.folded.data();
 }

@@ -223,29 +223,44 @@ std::vector<int> first_dofs(const std::vector<kernels::Link>& links) {
 
 namespace {
 
-/// The structure of Gᵀ A G, where followers keep a diagonal entry. `leader`: of every dof, itself
-/// if it follows none.
-Structure folded(const Structure& s, const std::vector<int>& leader) {
+/// The free dofs in whose terms a dof is, with their ratios: itself if it follows none.
+using FreeDofs = std::vector<std::vector<std::pair<int, double>>>;
+
+FreeDofs free_dofs(int nv, const std::vector<kernels::FollowerTie>& ties) {
+  FreeDofs out(static_cast<std::size_t>(nv));
+  for (const kernels::FollowerTie& t : ties) out[std::size_t(t.v)].emplace_back(t.leader_v, t.ratio);
+  for (int i = 0; i < nv; ++i)
+    if (out[std::size_t(i)].empty()) out[std::size_t(i)].emplace_back(i, 1.0);
+  return out;
+}
+
+bool is_free(const FreeDofs& of, int i) { return of[std::size_t(i)].front().first == i; }
+
+/// The structure of Gᵀ A G, where followers keep a diagonal entry.
+Structure folded(const Structure& s, const FreeDofs& free) {
   Structure out(s.size(), std::vector<char>(s.size(), 0));
   for (std::size_t i = 0; i < s.size(); ++i) {
     out[i][i] = 1;
     for (std::size_t j = 0; j < s.size(); ++j)
-      if (s[i][j] != 0) out[std::size_t(leader[i])][std::size_t(leader[j])] = 1;
+      for (const auto& [row, row_ratio] : free[i])
+        for (const auto& [column, column_ratio] : free[j])
+          if (s[i][j] != 0) out[std::size_t(row)][std::size_t(column)] = 1;
   }
   return out;
 }
 
-/// Numbers the entries of `written` that `solved` does not have, after those of `solved`, and lists
-/// what they, and entries of followers, add to others.
-void fold_entries(PatternStorage& p, const Structure& written, const std::vector<int>& leader,
-                  const std::vector<double>& ratio) {
+/// Numbers the entries of `written` that the solved structure does not have, after those that it
+/// has, and lists what they, and entries of followers, add to others.
+void fold_entries(PatternStorage& p, const Structure& written, const FreeDofs& free) {
   p.assembled = p.entries;
   const auto at = [&](int i, int j) -> int& { return p.slot[std::size_t(i) * p.n + j]; };
   for (int i = 0; i < p.n; ++i)
     for (int j = 0; j < p.n; ++j) {
-      if (!written[i][j] || (leader[i] == i && leader[j] == j)) continue;
+      if (!written[i][j] || (is_free(free, i) && is_free(free, j))) continue;
       if (at(i, j) < 0) at(i, j) = p.assembled++;
-      p.folded.push_back({at(leader[i], leader[j]), at(i, j), ratio[i] * ratio[j]});
+      for (const auto& [row, row_ratio] : free[std::size_t(i)])
+        for (const auto& [column, column_ratio] : free[std::size_t(j)])
+          p.folded.push_back({at(row, column), at(i, j), row_ratio * column_ratio});
     }
 }
 
@@ -253,7 +268,7 @@ void fold_entries(PatternStorage& p, const Structure& written, const std::vector
 
 PatternStorage analyse_pattern(const std::vector<kernels::Link>& links, int nv,
                                const std::vector<std::pair<int, int>>& touching,
-                               const std::vector<kernels::Follower>& followers) {
+                               const std::vector<kernels::FollowerTie>& ties) {
   Structure alone(nv, std::vector<char>(nv, 0));
   for (int i = 0; i < static_cast<int>(links.size()); ++i) couple(alone, support(links, i));
   Structure s = alone;
@@ -264,11 +279,8 @@ PatternStorage analyse_pattern(const std::vector<kernels::Link>& links, int nv,
     couple(s, both);
   }
   const Structure written = s;
-  std::vector<int> leader(nv);
-  std::iota(leader.begin(), leader.end(), 0);
-  std::vector<double> ratio(nv, 1.0);
-  for (const kernels::Follower& f : followers) leader[f.v] = f.leader_v, ratio[f.v] = f.ratio;
-  if (!followers.empty()) s = folded(s, leader), alone = folded(alone, leader);
+  const FreeDofs free = free_dofs(nv, ties);
+  if (!ties.empty()) s = folded(s, free), alone = folded(alone, free);
 
   PatternStorage p;
   p.n = nv;
@@ -304,7 +316,7 @@ PatternStorage analyse_pattern(const std::vector<kernels::Link>& links, int nv,
     }
   p.whole = part_of(s, f, p, at);
   p.apart = part_of(alone, fill_alone, p, at);
-  fold_entries(p, written, leader, ratio);
+  fold_entries(p, written, free);
   return p;
 }
 

@@ -40,7 +40,7 @@ std::vector<int> minimum_fill(const Structure& s);
 /// follow others make.
 PatternStorage analyse_pattern(const std::vector<kernels::Link>& links, int nv,
                                const std::vector<std::pair<int, int>>& touching,
-                               const std::vector<kernels::Follower>& followers = {});
+                               const std::vector<kernels::FollowerTie>& ties = {});
 
 /// Returns the pattern in blocks of trees.
 PatternStorage block_pattern(const std::vector<kernels::Link>& links, int nv);

@@ -72,10 +72,11 @@ struct JointDescription : JointEffects {
   std::vector<double> rest;
   /// free2d, free: effects of the dofs that turn, where they differ from those that slide.
   std::optional<JointEffects> turning;
-  /// Revolute, prismatic: the joint that this one follows, q = ratio q_leader + offset; empty: none.
-  /// ratio [m or rad of this joint per m or rad of the leader], offset [m or rad].
-  std::string follows;
-  double ratio = 1, offset = 0;
+  /// Revolute, prismatic: the joints that this one follows, q = Σ ratio q_leader + offset; empty:
+  /// none. ratio [m or rad of this joint per m or rad of the leader], offset [m or rad].
+  std::vector<std::string> follows;
+  std::vector<double> ratio;
+  double offset = 0;
   Source source;
 };
 

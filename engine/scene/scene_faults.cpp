@@ -70,7 +70,7 @@ std::string joint_variation_fault(const JointDescription& joint, const SceneNumb
                                           : dof_count(joint.type);
   if (dof_count(joint.type) == 0) return "the joint is fixed; expected one that moves";
   if (is_of_start(n) && !joint.follows.empty())
-    return fmt::format("its place is that of '{}', which it follows", joint.follows);
+    return fmt::format("its place is that of '{}', which it follows", joint.follows[0]);
   if (is_of_start(n) || n.field == Field::pos)
     return n.component >= 0 && n.component < count
                ? ""

@@ -96,12 +96,11 @@ LaneBits finish(const CompiledModel& model, const Row<L>& h, BasicWorkspace<L>& 
       w.q1[link.q + 3][l] = q.z;
     }
   }
-  for (const kernels::Follower& f : model.followers)  // exactly, so that rounding does not add up
-    for (int l = 0; l < L; ++l)
-      if (has(lanes, l))
-        place_follower(
-            f, [&](int i) -> double& { return w.q1[i][l]; },
-            [&](int i) -> double& { return w.v1[i][l]; });
+  for (int l = 0; l < L && !model.followers.empty(); ++l)  // exactly: rounding does not add up
+    if (has(lanes, l))
+      place_followers(
+          model, [&](int i) -> double& { return w.q1[i][l]; },
+          [&](int i) -> double& { return w.v1[i][l]; });
   return resolved;
 }
 

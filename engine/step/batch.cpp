@@ -150,10 +150,9 @@ void Batch::draw_episode(std::size_t lane) {
       own[row * kBlock] = number_in(m.scene, m.scene.randomizations[k].number);
     }
   }
-  for (const kernels::Follower& f : m.followers)
-    place_follower(
-        f, [&](int i) -> double& { return own[(m.layout.q + i) * kBlock]; },
-        [&](int i) -> double& { return own[(m.layout.v + i) * kBlock]; });
+  place_followers(
+      m, [&](int i) -> double& { return own[(m.layout.q + i) * kBlock]; },
+      [&](int i) -> double& { return own[(m.layout.v + i) * kBlock]; });
   update_derived_rows(m, own);
   complete_state(lane);
 }
@@ -177,16 +176,21 @@ namespace {
 
 /// Throws InputError where a state does not have followers where their leaders put them.
 void check_followers(const CompiledModel& m, std::span<const double> q, std::span<const double> v) {
+  if (m.followers.empty()) return;
   constexpr double kRounding = 1e-9;
   const auto check = [](const std::string& name, double found, double expected) {
     if (std::abs(found - expected) > kRounding * (1 + std::abs(expected)))
       throw InputError("state: '" + name + "' is " + std::to_string(found) + "; expected " +
                        std::to_string(expected) + " by the joint that it follows");
   };
+  std::vector<double> placed_q(q.begin(), q.end()), placed_v(v.begin(), v.end());
+  place_followers(
+      m, [&](int i) -> double& { return placed_q[std::size_t(i)]; },
+      [&](int i) -> double& { return placed_v[std::size_t(i)]; });
   for (const kernels::Follower& f : m.followers) {
-    check(m.q_names[std::size_t(f.q)], q[std::size_t(f.q)],
-          f.ratio * q[std::size_t(f.leader_q)] + f.offset);
-    check(m.v_names[std::size_t(f.v)], v[std::size_t(f.v)], f.ratio * v[std::size_t(f.leader_v)]);
+    const auto iq = std::size_t(f.q), iv = std::size_t(f.v);
+    check(m.q_names[iq], q[iq], placed_q[iq]);
+    check(m.v_names[iv], v[iv], placed_v[iv]);
   }
 }
 

@@ -9,20 +9,21 @@ namespace tangere {
 
 inline bool in_blocks(const CompiledModel& m) { return m.view.pattern.slot == nullptr; }
 
-/// Sets followers' numbers of a solution x = G y.
+/// Sets followers' numbers of a solution x = G y, in lanes from `first` to `end`.
 template <int L>
-void expand_followers(const CompiledModel& m, kernels::Row<L>* x) {
+void expand_followers(const CompiledModel& m, kernels::Row<L>* x, int first = 0, int end = L) {
   for (const kernels::Follower& f : m.followers)
-    for (int l = 0; l < L; ++l) x[f.v][l] = f.ratio * x[f.leader_v][l];
+    for (int l = first; l < end; ++l) x[f.v][l] = 0;
+  for (const kernels::FollowerTie& t : m.ties)
+    for (int l = first; l < end; ++l) x[t.v][l] += t.ratio * x[t.leader_v][l];
 }
 /// Turns a right-hand side b into Gᵀ b.
 template <int L>
 void fold_followers(const CompiledModel& m, kernels::Row<L>* b) {
+  for (const kernels::FollowerTie& t : m.ties)
+    for (int l = 0; l < L; ++l) b[t.leader_v][l] += t.ratio * b[t.v][l];
   for (const kernels::Follower& f : m.followers)
-    for (int l = 0; l < L; ++l) {
-      b[f.leader_v][l] += f.ratio * b[f.v][l];
-      b[f.v][l] = 0;
-    }
+    for (int l = 0; l < L; ++l) b[f.v][l] = 0;
 }
 
 /// Factors A of the lanes in `lanes`. Lanes in `kept` keep their factors.
@@ -73,7 +74,7 @@ template <int L>
 void solve_pivoted(const CompiledModel& m, BasicWorkspace<L>& w, int lane, const kernels::Row<L>* b,
                    kernels::Row<L>* out) {
   w.pivoted.solve(lane, b, out);
-  for (const kernels::Follower& f : m.followers) out[f.v][lane] = f.ratio * out[f.leader_v][lane];
+  expand_followers(m, out, lane, lane + 1);
 }
 
 /// Factors A of one lane, or Aᵀ, with row exchanges.

@@ -50,6 +50,13 @@ double last_pivot(Matrix M, std::size_t dof) {
 
 std::vector<double> effective_inertias(Scene scene, const std::vector<int>& dofs) {
   scene.motors.clear();
+  for (LinkDescription& link : scene.links) {  // as in the file's mass matrix
+    const bool weightless = link.joint.follows.size() > 0 &&
+                            std::holds_alternative<AbstractShape>(link.body.shape) &&
+                            std::get<AbstractShape>(link.body.shape).mass == 0;
+    if (weightless) link.joint.type = JointType::fixed;  // tendons come last
+    link.joint.follows.clear();
+  }
   const Matrix M = mass_matrix(Model(scene));
   std::vector<double> out;
   for (const int dof : dofs) out.push_back(last_pivot(M, std::size_t(dof)));

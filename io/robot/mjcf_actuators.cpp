@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Actuators on hinges and slides. With the gear G the length of the transmission is G (q + ref),
+// Actuators on hinges, slides and fixed tendons. With the gear G the length of the transmission is G (q + ref),
 // where q is the scene's coordinate. The force f of the actuator acts on the joint as G f:
 //   f = g c + b - kp G (q + ref) - kv G v
 //   kp > 0    a position motor: P = kp G², D = kv G², target (g c + b)/(kp G) - ref
@@ -73,7 +73,10 @@ class Actuators {
     motor.high = force[1];
     if (law.kp > 0) {
       set_position(law, gear, end.ref, motor);
-      if (law.damping_ratio > 0) keep_ratio(node, law.damping_ratio, end.link);
+      if (law.damping_ratio > 0 && whole_.tendons.contains(name))
+        node.lost("<" + node.name() + "> dampratio on a tendon");
+      else if (law.damping_ratio > 0)
+        keep_ratio(node, law.damping_ratio, end.link);
     } else {
       set_force(node, law, gear, link.joint, motor);
     }
@@ -207,12 +210,16 @@ class Actuators {
 
   /// Whether the actuator drives a joint. Lists what else it drives.
   bool drives_joint(const RobotNode& node, const std::string& joint) const {
-    for (const char* other : {"tendon", "site", "body", "cranksite", "slidersite", "refsite"})
+    for (const char* other : {"site", "body", "cranksite", "slidersite", "refsite"})
       if (node.has(other)) {
-        node.lost(fmt::format("<{}> on a {}: scenes drive joints", node.name(), other));
+        node.lost(fmt::format("<{}> on a {}: scenes drive joints and tendons", node.name(), other));
         return false;
       }
     if (!joint.empty()) return true;
+    if (node.has("tendon")) {
+      node.lost("<" + node.name() + "> on a tendon that is not read");
+      return false;
+    }
     const char* const attribute = joint_attribute(node);
     const std::string name = node.text(attribute);
     std::vector<std::string> names;
@@ -324,6 +331,11 @@ void add_drives(const MjcfWhole& whole, const MjcfScope& model, const RobotNode&
   }();
   for (const RobotNode& part : section.parts(known)) {
     const RobotNode node = model.file->with_class(part, "main");
+    if (node.has("tendon")) {
+      const auto tendon = whole.tendon_names.find({model.model, node.text("tendon")});
+      out.push_back({node, &model, tendon == whole.tendon_names.end() ? "" : tendon->second});
+      continue;
+    }
     const char* const attribute = joint_attribute(node);
     const auto copies = node.has(attribute)
                             ? whole.joint_names.copies.find({model.model, node.text(attribute)})

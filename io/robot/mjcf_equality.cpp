@@ -42,9 +42,9 @@ void tie_joints(MjcfWhole& whole, const RobotNode& node, const std::string& firs
   JointDescription& joint = whole.robot.scene.links[std::size_t(whole.joints.at(first).link)].joint;
   if (!joint.follows.empty())
     return node.lost(fmt::format("<joint> of <equality>: joint '{}' follows '{}' already", first,
-                                 joint.follows));
-  joint.follows = second;
-  joint.ratio = c[1];
+                                 joint.follows[0]));
+  joint.follows = {second};
+  joint.ratio = {c[1]};
   joint.offset = c[0];
 }
 

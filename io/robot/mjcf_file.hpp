@@ -7,6 +7,7 @@
 #include <deque>
 #include <limits>
 #include <map>
+#include <set>
 #include <memory>
 #include <optional>
 #include <string>
@@ -92,7 +93,10 @@ struct MjcfWhole {
   bool free_base = false;                 ///< bodies of the world without joints move freely
   RobotNames names = {};
   MjcfNames body_names = {"body"}, joint_names = {"joint"};
-  std::map<std::string, MjcfJoint> joints = {};  ///< by name in the scene
+  std::map<std::string, MjcfJoint> joints = {};  ///< by name in the scene, those of tendons included
+  std::set<std::string> tendons = {};            ///< joints that stand for tendons
+  /// By number of a model and name there: the joint of a tendon.
+  std::map<std::pair<int, std::string>, std::string> tendon_names = {};
   std::deque<MjcfScope> scopes = {};
   std::map<int, int> ranks = {};  ///< of a <replicate> or <attach>: its place in the order of names
   std::vector<const MjcfScope*> models = {};  ///< by number
@@ -176,6 +180,8 @@ const MjcfScope& attached_scope(MjcfWhole& whole, const RobotNode& node, const M
 void read_mjcf_bodies(MjcfWhole& whole, const MjcfScope& scope);
 /// Gives the bodies of each tree their share of gravity, after all bodies are read.
 void read_mjcf_gravity(MjcfWhole& whole);
+/// Reads the tendons of all models, after the bodies.
+void read_mjcf_tendons(MjcfWhole& whole);
 /// Reads the constraints of all models, after the bodies.
 void read_mjcf_equalities(MjcfWhole& whole);
 /// Reads the actuators of all models, after the bodies.

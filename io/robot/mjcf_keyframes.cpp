@@ -26,7 +26,7 @@ class Keyframe {
     for (const LinkDescription& link : scene.links) {
       const auto nq = std::size_t(position_count(link.joint.type)),
                  nv = std::size_t(dof_count(link.joint.type));
-      if (nv == 0) continue;
+      if (nv == 0 || whole_.tendons.contains(link.joint.name)) continue;
       InitialState state;
       state.joint = link.joint.name;
       state.source = node_.source();
@@ -53,7 +53,7 @@ class Keyframe {
     if (!node_.has(attribute)) return {};
     std::size_t n = 0;
     for (const LinkDescription& link : whole_.robot.scene.links)
-      n += std::size_t(count(link.joint.type));
+      if (!whole_.tendons.contains(link.joint.name)) n += std::size_t(count(link.joint.type));
     return sized_numbers(attribute, n, "the joints that are read");
   }
 

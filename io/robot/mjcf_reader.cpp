@@ -31,7 +31,7 @@ const Words kSections = {
     {"sensor", Fate::idle, "readings of MuJoCo; --pad LINK=LAYOUT adds a skin"},
     {"keyframe"},
     {"equality"},
-    {"tendon", Fate::lost, "tendons; scenes have none"},
+    {"tendon"},
     {"deformable", Fate::lost, "bodies that bend; scenes have none"},
     {"extension", Fate::lost, "plug-ins of MuJoCo"}};
 
@@ -218,7 +218,7 @@ void MjcfFile::read_defaults(const RobotNode& node, const std::string& parent) {
                  {"light", Fate::idle, kSight},
                  {"pair", Fate::idle, "of pairs of geoms, which --contact names"},
                  {"equality", Fate::idle, "of constraints"},
-                 {"tendon", Fate::idle, "of tendons"}};
+                 {"tendon"}};
   for (const char* other : kOtherActuators)
     known.push_back({other, Fate::idle, "of actuators that are not read"});
   for (const std::string& actuator : kActuators) known.push_back({actuator.c_str()});
@@ -243,7 +243,7 @@ void MjcfFile::read_defaults(const RobotNode& node, const std::string& parent) {
         for (const std::string& actuator : kActuators)
           context.defaults[actuator][a->Name()] = value;
       else
-        context.defaults[part.name()][a->Name()] = value;
+        context.defaults[part.name() == "tendon" ? "fixed" : part.name()][a->Name()] = value;
     }
   }
   if (top && name != "main") classes_["main"] = context;
@@ -423,6 +423,7 @@ void read_mjcf(const RobotNode& root, const std::string& keyframe, bool free_bas
   for (const RobotNode& s : file.sections)
     if (s.name() == "keyframe") keyframes.push_back(s);
   const std::optional<RobotNode> key = find_mjcf_keyframe(whole, keyframes, keyframe);
+  read_mjcf_tendons(whole);
   read_mjcf_equalities(whole);
   read_mjcf_actuators(whole);
   for (const MjcfScope* model : whole.models)

@@ -72,9 +72,33 @@ Words joint_words() {
           {"solimpfriction", Fate::idle, kSolverSetting}};
 }
 
+Words tendon_words() {
+  Words words = {{"name"},
+                 {"class"},
+                 {"limited"},
+                 {"range"},
+                 {"stiffness"},
+                 {"springlength"},
+                 {"damping"},
+                 {"armature"},
+                 {"frictionloss"},
+                 {"actuatorfrcrange", Fate::lost, "bounds the sum of actuators of a tendon"},
+                 {"actuatorfrclimited", Fate::idle, "of a bound"},
+                 {"margin", Fate::idle, "of MuJoCo's limits; here limits are springs"},
+                 {"user", Fate::idle, kUser}};
+  for (const char* name : {"group", "width", "material", "rgba"})
+    words.push_back({name, Fate::idle, kSight});
+  for (const char* name : {"solreflimit", "solimplimit"})
+    words.push_back({name, Fate::idle, "of MuJoCo's limits; here limits are springs"});
+  for (const char* name : {"solreffriction", "solimpfriction"})
+    words.push_back({name, Fate::idle, kSolverSetting});
+  return words;
+}
+
 std::map<std::string, Words> all_words() {
   std::map<std::string, Words> all;
   all["joint"] = joint_words();
+  all["tendon"] = tendon_words();
   all["geom"] = with_rotations({{"name"},
                                 {"class"},
                                 {"type"},

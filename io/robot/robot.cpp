@@ -33,37 +33,44 @@ std::vector<std::string> Remarks::lines() const {
   return out;
 }
 
-void check_followers(Robot& robot) {
-  std::vector<LinkDescription>& links = robot.scene.links;
-  const auto joint_named = [&](const std::string& name) -> JointDescription* {
-    const auto found =
-        std::ranges::find_if(links, [&](const auto& l) { return l.joint.name == name; });
-    return found == links.end() ? nullptr : &found->joint;
-  };
-  /// Whether the leaders of a joint end in one that follows none.
-  const auto ends = [&](const JointDescription* joint) {
-    for (std::size_t k = 0; k <= links.size() && joint != nullptr; ++k) {
-      if (joint->follows.empty()) return true;
-      joint = joint_named(joint->follows);
+namespace {
+
+/// Finds what keeps joints from following others.
+class FollowerCheck {
+ public:
+  explicit FollowerCheck(const std::vector<LinkDescription>& links) : links_(links) {}
+
+  /// Null: nothing does. Throws InputError for a leader that is no joint.
+  [[nodiscard]] const char* fault(const JointDescription& joint, std::size_t depth = 0) const {
+    if (depth > links_.size()) return "which follows it in turn";
+    for (const std::string& name : joint.follows) {
+      const auto leader =
+          std::ranges::find_if(links_, [&](const auto& l) { return l.joint.name == name; });
+      if (leader == links_.end())
+        throw InputError(joint.source.prefix() + "joint '" + joint.name + "' follows '" + name +
+                         "': no joint has this name");
+      if (dof_count(joint.type) != 1 || dof_count(leader->joint.type) != 1)
+        return "which is not between joints of one degree of freedom each";
+      if (const char* const of = fault(leader->joint, depth + 1)) return of;
     }
-    return joint == nullptr;
-  };
-  for (LinkDescription& link : links) {
+    return nullptr;
+  }
+
+ private:
+  const std::vector<LinkDescription>& links_;
+};
+
+}  // namespace
+
+void check_followers(Robot& robot) {
+  for (LinkDescription& link : robot.scene.links) {
     JointDescription& joint = link.joint;
-    if (joint.follows.empty()) continue;
-    const JointDescription* const leader = joint_named(joint.follows);
-    if (leader == nullptr)
-      throw InputError(joint.source.prefix() + "joint '" + joint.name + "' follows '" +
-                       joint.follows + "': no joint has this name");
-    const char* fault = nullptr;
-    if (dof_count(joint.type) != 1 || dof_count(leader->type) != 1)
-      fault = "which is not between two joints of one degree of freedom each";
-    else if (!ends(&joint))
-      fault = "which follows it in turn";
+    const char* const fault = FollowerCheck(robot.scene.links).fault(joint);
     if (fault == nullptr) continue;
-    robot.lost.add(joint.source,
-                   fmt::format("joint '{}' follows '{}', {}", joint.name, joint.follows, fault));
+    robot.lost.add(joint.source, fmt::format("joint '{}' follows '{}', {}", joint.name,
+                                             fmt::join(joint.follows, " "), fault));
     joint.follows.clear();
+    joint.ratio.clear();
   }
 }
 

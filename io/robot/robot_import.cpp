@@ -51,37 +51,63 @@ double largest_force(const MotorDescription& m) {
   return largest;
 }
 
-/// Chooses the stiffness of limits: under the weight of what hangs on the joint, or its motor's
-/// largest force, it yields by kYieldAngle or kYieldLength.
-void stiffen_limits(Robot& robot) {
-  Scene& scene = robot.scene;
-  const Model model(scene);
-  const double g = std::max(std::sqrt(dot(scene.gravity, scene.gravity)), 1.0);
-  std::vector<Pose> at;
-  for (const LinkDescription& link : scene.links)
-    at.push_back(link.parent < 0 ? link.joint.pose
-                                 : compose(at[std::size_t(link.parent)], link.joint.pose));
-  for (std::size_t i = 0; i < scene.links.size(); ++i) {
-    JointDescription& joint = scene.links[i].joint;
-    if (!joint.limits) continue;
+/// The force or torque that a limit should hold: the weight of what hangs on the joint, or its
+/// motors' largest force. Of a joint without mass, those of the joints that it follows.
+class LimitLoads {
+ public:
+  explicit LimitLoads(const Robot& robot)
+      : robot_(robot), scene_(robot.scene), model_(scene_) {
+    for (const LinkDescription& link : scene_.links)
+      at_.push_back(link.parent < 0 ? link.joint.pose
+                                    : compose(at_[std::size_t(link.parent)], link.joint.pose));
+  }
+
+  [[nodiscard]] double load(std::size_t i) const {
+    const JointDescription& joint = scene_.links[i].joint;
+    double load = weight(i);
+    if (const auto effort = robot_.efforts.find(joint.name); effort != robot_.efforts.end())
+      load = std::max(load, effort->second);
+    for (const MotorDescription& m : scene_.motors)
+      if (m.joint == joint.name) load = std::max(load, largest_force(m));
+    for (std::size_t k = 0; k < joint.follows.size() && weight(i) == 0; ++k)
+      for (std::size_t leader = 0; leader < scene_.links.size(); ++leader)
+        if (scene_.links[leader].joint.name == joint.follows[k] && joint.ratio[k] != 0)
+          load = std::max(load, this->load(leader) / std::abs(joint.ratio[k]));
+    return load;
+  }
+
+ private:
+  [[nodiscard]] double weight(std::size_t i) const {
+    const double g = std::max(std::sqrt(dot(scene_.gravity, scene_.gravity)), 1.0);
     double mass = 0, reach = kLeastReach;
-    for (std::size_t k = i; k < scene.links.size(); ++k) {
+    for (std::size_t k = i; k < scene_.links.size(); ++k) {
       auto up = static_cast<int>(k);
-      while (up > static_cast<int>(i)) up = scene.links[std::size_t(up)].parent;
+      while (up > static_cast<int>(i)) up = scene_.links[std::size_t(up)].parent;
       if (up != static_cast<int>(i)) continue;
-      mass += model.mass(static_cast<int>(k));
-      const Vector3 p = outer_point(at[k], scene.links[k].body.pose.position);
-      const Vector3 way = {p[0] - at[i].position[0], p[1] - at[i].position[1],
-                           p[2] - at[i].position[2]};
+      mass += model_.mass(static_cast<int>(k));
+      const Vector3 p = outer_point(at_[k], scene_.links[k].body.pose.position);
+      const Vector3 way = {p[0] - at_[i].position[0], p[1] - at_[i].position[1],
+                           p[2] - at_[i].position[2]};
       reach = std::max(reach, std::sqrt(dot(way, way)));
     }
-    double load = mass * g;
+    return scene_.links[i].joint.type == JointType::revolute ? mass * g * reach : mass * g;
+  }
+
+  const Robot& robot_;
+  const Scene& scene_;
+  Model model_;
+  std::vector<Pose> at_;
+};
+
+/// Chooses the stiffness of limits that have none: under their load they yield by kYieldAngle or
+/// kYieldLength.
+void stiffen_limits(Robot& robot) {
+  const LimitLoads loads(robot);
+  for (std::size_t i = 0; i < robot.scene.links.size(); ++i) {
+    JointDescription& joint = robot.scene.links[i].joint;
+    if (!joint.limits || joint.limit_stiffness != 0) continue;
+    const double load = loads.load(i);
     const bool turns = joint.type == JointType::revolute;
-    if (turns) load *= reach;
-    if (const auto effort = robot.efforts.find(joint.name); effort != robot.efforts.end())
-      load = std::max(load, effort->second);
-    for (const MotorDescription& m : scene.motors)
-      if (m.joint == joint.name) load = std::max(load, largest_force(m));
     joint.limit_stiffness = two_digits(load / (turns ? kYieldAngle : kYieldLength));
   }
 }

@@ -114,9 +114,9 @@ class Writer {
       out_ += fmt::format(" lim=\"{} {}\"", number_text((*joint.limits)[0]),
                           number_text((*joint.limits)[1]));
     if (!joint.follows.empty())
-      out_ +=
-          fmt::format(" follows=\"{}\" ratio=\"{}\" offset=\"{}\"", attribute_text(joint.follows),
-                      number_text(joint.ratio), number_text(joint.offset));
+      out_ += fmt::format(" follows=\"{}\" ratio=\"{}\" offset=\"{}\"",
+                          attribute_text(fmt::format("{}", fmt::join(joint.follows, " "))),
+                          numbers_text(joint.ratio), number_text(joint.offset));
     out_ += "/>\n";
   }
 

@@ -262,8 +262,8 @@ class UrdfReader {
     }
     if (const auto mimic = last_of(parts, "mimic")) {
       mimic->check({{"joint"}, {"multiplier"}, {"offset"}});
-      joint.follows = mimic->text("joint");
-      joint.ratio = mimic->number("multiplier", 1.0);
+      joint.follows = {mimic->text("joint")};
+      joint.ratio = {mimic->number("multiplier", 1.0)};
       joint.offset = mimic->number("offset", 0.0);
     }
     joints_.push_back(std::move(out));

@@ -117,22 +117,27 @@ void read_joint_effects(const SceneElement& node, JointDescription& joint) {
 }
 
 void read_follower(const SceneElement& node, JointDescription& joint) {
-  joint.follows = node.text("follows", "");
   for (const char* name : {"ratio", "offset"})
-    if (joint.follows.empty() && node.has(name))
+    if (!node.has("follows") && node.has(name))
       node.warn(fmt::format("'{}' has no effect without 'follows'", name));
-  if (joint.follows.empty()) return;
-  joint.ratio = node.number("ratio");
+  if (!node.has("follows")) return;
+  joint.follows = words_of(node.text("follows").c_str());
+  if (joint.follows.empty()) node.fail("follows=\"\"; expected names of joints");
+  joint.ratio = node.has("ratio") ? node.numbers("ratio", joint.follows.size())
+                                  : std::vector<double>(joint.follows.size(), 1.0);
   joint.offset = node.number("offset", dof_turns(joint.type, 0));
 }
 
 void scale_followers(Scene& scene, const SceneContext& c) {
   for (LinkDescription& link : scene.links) {
     JointDescription& joint = link.joint;
-    const auto leader = std::ranges::find_if(
-        scene.links, [&](const LinkDescription& l) { return l.joint.name == joint.follows; });
-    if (joint.follows.empty() || leader == scene.links.end()) continue;
-    joint.ratio *= coordinate_scale(joint.type, 0, c) / coordinate_scale(leader->joint.type, 0, c);
+    for (std::size_t k = 0; k < joint.follows.size(); ++k) {
+      const auto leader = std::ranges::find_if(
+          scene.links, [&](const LinkDescription& l) { return l.joint.name == joint.follows[k]; });
+      if (leader != scene.links.end())
+        joint.ratio[k] *=
+            coordinate_scale(joint.type, 0, c) / coordinate_scale(leader->joint.type, 0, c);
+    }
   }
 }
 

@@ -11,27 +11,35 @@ namespace tangere::kernels {
 /// g_r = Gᵀ g, and the same of the magnitudes of forces.
 template <class N>
 void fold_residual(const ModelView& model, const StageArgs<N>& a) {
-  for (int i = 0; i < model.n_followers; ++i) {
-    const Follower& f = model.followers[i];
-    a.g[f.leader_v] = mul_add(N(f.ratio), a.g[f.v], a.g[f.leader_v]);
-    a.force_scale[f.leader_v] =
-        mul_add(N(std::abs(f.ratio)), a.force_scale[f.v], a.force_scale[f.leader_v]);
-    a.g[f.v] = a.force_scale[f.v] = N(0.0);
+  for (int i = 0; i < model.n_ties; ++i) {
+    const FollowerTie& t = model.ties[i];
+    a.g[t.leader_v] = mul_add(N(t.ratio), a.g[t.v], a.g[t.leader_v]);
+    a.force_scale[t.leader_v] =
+        mul_add(N(std::abs(t.ratio)), a.force_scale[t.v], a.force_scale[t.leader_v]);
   }
+  for (int i = 0; i < model.n_followers; ++i)
+    a.g[model.followers[i].v] = a.force_scale[model.followers[i].v] = N(0.0);
 }
 
-/// A_r = Gᵀ A G. The diagonal entry of a follower has the units of the others.
+/// The mass of a follower in norms: its own is that of its leaders.
+inline constexpr double kFollowerMass = 1e-30;
+
+/// A_r = Gᵀ A G, and the diagonal of the mass matrix, without the masses between dofs.
 template <class N>
 void fold_jacobian(const ModelView& model, const StageArgs<N>& a) {
   for (int k = 0; k < model.n_folded; ++k) {
     const FoldedEntry& f = model.folded[k];
     a.A[f.target] = mul_add(N(f.factor), a.A[f.source], a.A[f.target]);
   }
+  for (int i = 0; i < model.n_ties; ++i) {
+    const FollowerTie& t = model.ties[i];
+    N& mass = a.mass_diagonal[t.leader_v];
+    mass = mul_add(N(t.ratio * t.ratio), a.mass_diagonal[t.v], mass);
+  }
   for (int i = 0; i < model.n_followers; ++i) {
-    const Follower& f = model.followers[i];
-    const N& mass = a.mass_diagonal[f.v];
-    a.mass_diagonal[f.leader_v] = mul_add(N(f.ratio * f.ratio), mass, a.mass_diagonal[f.leader_v]);
-    a.A[model.pattern.diagonal_entry[f.v]] = a.c0_over_h * a.c0_over_h * mass;
+    const int v = model.followers[i].v;
+    a.mass_diagonal[v] = N(kFollowerMass);
+    a.A[model.pattern.diagonal_entry[v]] = a.c0_over_h * a.c0_over_h * N(kFollowerMass);
   }
 }
 

@@ -300,12 +300,17 @@ struct EliminationRun {
   int source, target, length;
 };
 
-/// A dof that follows another: x = ratio x_leader, with all coordinates kept. With x = G y, where y
+/// A dof that follows others: x = Σ ratio x_leader, with all coordinates kept. With x = G y, where y
 /// has the other dofs, the solver's system is g_r = Gᵀ g, A_r = Gᵀ A G. It is stored on all dofs:
 /// g of a follower is 0, and its row and column of A are a diagonal entry.
 struct Follower {
-  int v, leader_v, q, leader_q;
-  double ratio, offset;
+  int v, q;
+  double offset;  ///< of q
+};
+/// One leader of a follower, which follows none.
+struct FollowerTie {
+  int v, q, leader_v, leader_q;
+  double ratio;
 };
 /// A[target] += factor A[source].
 struct FoldedEntry {
@@ -337,8 +342,9 @@ struct ModelView {
   const ShearSpringContact* memories;
   Frame<double> ground;  ///< frame of the ground in the world; its third axis is the normal
   Pattern pattern;
-  int n_followers, n_folded;
+  int n_followers, n_ties, n_folded;
   const Follower* followers;
+  const FollowerTie* ties;  ///< (n_ties) follower after follower
   const FoldedEntry* folded;
 };
 

@@ -28,8 +28,8 @@ Scene two_rails() {
              link("second", JointType::prismatic, {0, 1, 0}, box, 500)};
   for (LinkDescription& l : s.links) l.joint.axis0 = {1, 0, 0};
   JointDescription& second = s.links[1].joint;
-  second.follows = "first_joint";
-  second.ratio = -2;
+  second.follows = {"first_joint"};
+  second.ratio = {-2};
   second.offset = 0.1;
   s.motors.push_back({"first_joint", -10, 10, {}});
   s.motors.push_back({"second_joint", -10, 10, {}});
@@ -64,8 +64,8 @@ Scene following_machine(unsigned seed, int links) {
       leader = &l.joint;
       continue;
     }
-    l.joint.follows = leader->name;
-    l.joint.ratio = random.uniform(-1.5, 1.5);
+    l.joint.follows = {leader->name};
+    l.joint.ratio = {random.uniform(-1.5, 1.5)};
     l.joint.offset = random.uniform(-0.1, 0.1);
     // A chain: the next one may follow this follower.
     leader = random.uniform(0, 1) < 0.5 ? &l.joint : nullptr;
@@ -87,7 +87,7 @@ std::vector<Tie> ties(const Scene& s, int (*count)(JointType)) {
   for (const LinkDescription& l : s.links) {
     first[l.joint.name] = at;
     if (!l.joint.follows.empty())
-      out.push_back({at, first.at(l.joint.follows), l.joint.ratio, l.joint.offset});
+      out.push_back({at, first.at(l.joint.follows[0]), l.joint.ratio[0], l.joint.offset});
     at += std::size_t(count(l.joint.type));
   }
   return out;
@@ -220,6 +220,38 @@ TEST(FollowersGradient, ByTheStartIsThatOfLeaderAndFollower) {
   EXPECT_NEAR(adjoint.v[0] - 2 * adjoint.v[1], dv, 1e-7 * (1 + std::abs(dv)));
 }
 
+/// A joint without mass that follows two is a tendon: its spring, damping and motor act on both.
+/// With ℓ = 2 q₁ + q₂ and a spring k, masses m₁ and m₂ oscillate along (2/m₁, 1/m₂) with
+/// ω² = k (4/m₁ + 1/m₂), and ℓ(t) = ℓ₀ cos ω t.
+TEST(Tendon, SwingsByClosedForm) {
+  Scene s = two_rails();
+  s.links[1].joint.follows.clear();
+  s.motors.clear();
+  LinkDescription tendon = link("tendon", JointType::prismatic, {0, 3, 0}, SphereShape{1e-3}, 0);
+  tendon.joint.follows = {"first_joint", "second_joint"};
+  tendon.joint.ratio = {2, 1};
+  tendon.joint.stiffness = 20;
+  s.links.push_back(tendon);
+  s.motors.push_back({"tendon_joint", -10, 10, {}});
+  const Model model(s);
+  Batch batch(model, 1);
+  batch.set_state(0, std::vector<double>{0.01, 0.03, 0.05}, std::vector<double>{0, 0, 0});
+  Stepper stepper(model, testing::options(Integrator::sdirk3, 1e-3));
+  const double omega = std::sqrt(20 * (4 / 1.0 + 1 / 0.5));
+  for (int t = 0; t < 500; ++t) stepper.step(batch, std::vector<double>{0});
+  const std::vector<double> q = testing::q_of(batch);
+  EXPECT_NEAR(q[2], 0.05 * std::cos(0.5 * omega), 1e-7);
+  EXPECT_EQ(q[2], 2 * q[0] + q[1]);
+  EXPECT_NEAR(q[0] - 0.01, 1 * (q[1] - 0.03), 1e-12) << "both are moved as 2/m1 and 1/m2";
+  // At the load of its motor, the tendon's length is force over stiffness.
+  s.links[2].joint.damping = 20;
+  const Model held(s);
+  Batch loaded(held, 1);
+  Stepper settle(held, testing::options(Integrator::bdf1, 1e-2));
+  for (int t = 0; t < 3000; ++t) settle.step(loaded, std::vector<double>{0.1});
+  EXPECT_NEAR(testing::q_of(loaded)[2], 1.0 / 20, 1e-9);
+}
+
 TEST(FollowersFaults, SayWhatWasExpected) {
   const auto fault = [](const auto& change) {
     Scene s = two_rails();
@@ -231,9 +263,9 @@ TEST(FollowersFaults, SayWhatWasExpected) {
     }
     return std::string();
   };
-  EXPECT_NE(fault([](Scene& s) { s.links[1].joint.follows = "third"; }).find("third"),
+  EXPECT_NE(fault([](Scene& s) { s.links[1].joint.follows = {"third"}; }).find("third"),
             std::string::npos);
-  EXPECT_NE(fault([](Scene& s) { s.links[0].joint.follows = "second_joint"; }).find("no circle"),
+  EXPECT_NE(fault([](Scene& s) { s.links[0].joint.follows = {"second_joint"}, s.links[0].joint.ratio = {1}; }).find("no circle"),
             std::string::npos);
   EXPECT_NE(fault([](Scene& s) {
               s.links[0].joint.type = JointType::free;

@@ -176,9 +176,7 @@ TEST(RobotImport, ListsWhatChangesTheMotion) {
   const ImportedScene arm = import_robot(kRobots + "arm.xml", kRobots + "scene.xml");
   const std::string file = kRobots + "arm.xml: ";
   EXPECT_THAT(arm.lost,
-              ElementsAre(file + "<tendon>: tendons; scenes have none (line 17)",
-                          file + "<connect>: a closed loop; scenes have none (line 21)",
-                          file + "<motor> on a tendon: scenes drive joints (line 24)",
+              ElementsAre(file + "<connect>: a closed loop; scenes have none (line 21)",
                           file + "<muscle>: an actuator that scenes do not have (line 27)"));
   EXPECT_THAT(arm.idle, Contains(HasSubstr("<geom> friction: coefficients of MuJoCo's contacts")));
   EXPECT_THAT(arm.idle, Contains(HasSubstr("<key>: stored states")));

@@ -2,6 +2,7 @@
 // Imported mechanisms move as their closed forms say (tests/data/README.md).
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <cmath>
 #include <fstream>
 #include <sstream>
@@ -81,6 +82,55 @@ TEST(RobotMotion, OddInertiasMoveAsTheyAreWritten) {
   EXPECT_THAT(made.lost, IsEmpty());
   EXPECT_LT(largest_error(parse_scene(made.text, "scene.xml").scene,
                           read_table(kFolder + "odd_inertia.csv")),
+            5e-5);
+}
+
+/// Largest difference of joints' coordinates from the first columns of the table, up to 0.5 s, with
+/// the scene's constant controls. Columns are those of MJCF, where no joint has ref.
+double largest_joint_error(Scene scene, const Table& truth, std::size_t joints) {
+  scene.integrator = Integrator::sdirk2;
+  scene.timestep = 2.5e-4;
+  const Model model(scene);
+  Batch batch(model, 1);
+  Stepper stepper(model);
+  std::vector<double> u(std::size_t(model.nu())), q(std::size_t(model.nq()));
+  if (const auto* given = std::get_if<ConstantControl>(&scene.control)) u = given->values;
+  double worst = 0, time = 0;
+  for (const std::vector<double>& row : truth.rows) {
+    if (row[0] > 0.5) break;
+    for (; time < row[0] - 1e-9; time += scene.timestep) stepper.step(batch, u);
+    batch.get_q(0, q);
+    for (std::size_t k = 0; k < joints; ++k) {
+      const auto at = std::ranges::find_if(
+          model.q_names(), [&](const std::string& name) {
+            return name.starts_with(truth.names[1 + k] + ".");
+          });
+      worst = std::max(worst, std::abs(q.at(std::size_t(at - model.q_names().begin())) -
+                                       row[1 + k]));
+    }
+  }
+  EXPECT_GT(time, 0.4);
+  return worst;
+}
+
+/// A joint that slides by half of another, and one that turns 1.3 times as far.
+TEST(RobotMotion, MimicJointsFollowTheirLeaders) {
+  const ImportedScene made = import_robot(kFolder + "mimic_gripper.urdf", "scene.xml", {});
+  EXPECT_THAT(made.lost, IsEmpty());
+  const Scene scene = parse_scene(made.text, "scene.xml").scene;
+  const Table truth = read_table(kFolder + "mimic_gripper.csv");
+  EXPECT_LT(largest_error(scene, truth), 5e-5);
+  EXPECT_LT(largest_joint_error(scene, truth, 4), 5e-5);
+}
+
+/// A tendon along three joints, with a spring, damping and an affine actuator that is clipped.
+TEST(RobotMotion, ATendonPullsItsJoints) {
+  RobotOptions options;
+  options.keyframe = "on";
+  const ImportedScene made = import_robot(kFolder + "tendon_finger.xml", "scene.xml", options);
+  EXPECT_THAT(made.lost, IsEmpty());
+  EXPECT_LT(largest_joint_error(parse_scene(made.text, "scene.xml").scene,
+                                read_table(kFolder + "tendon_finger.csv"), 3),
             5e-5);
 }
 
