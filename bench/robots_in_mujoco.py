@@ -65,7 +65,7 @@ class Pair:
         silence(model)
         if "gravity_share" not in text:
             model.body_gravcomp[:] = 0
-        text = re.sub(r' lim="[^"]*" lim_stiffness="[^"]*"', "", text)
+        text = re.sub(r' lim(_stiffness)?="[^"]*"', "", text)
         text = re.sub(r"<initial>.*?</initial>", "", text, flags=re.S)
         self.ours = tangere.Model(tangere.Scene.from_string(text, name))
         joints = [j for j in attributes(text, "joint") if j.get("type", "fixed") != "fixed"]

@@ -74,11 +74,12 @@ def gripper() -> SceneBuilder:
     return b
 
 
-@pytest.mark.parametrize("path", SCENES, ids=lambda p: p.stem)
 def test_a_motor_maps_its_control_and_another_drives_the_same_joint() -> None:
     b = gripper()
     b.find("motor", joint="hand").set(scale=1e-3, offset=-0.01, u_range=(0, 255))
     b.actuator.motor("left", "force", name="boost", scale=2)
+    for time in (0, 0.2):
+        b.find("at", time=time).set(value=(0, 0.8, 0.8, 0))
     model = tangere.Model(b.scene())
     assert model.u_names == ["hand.rate", "left.rate", "right.rate", "boost"]
     ends = []
@@ -89,6 +90,7 @@ def test_a_motor_maps_its_control_and_another_drives_the_same_joint() -> None:
     np.testing.assert_allclose(ends[0], ends[1], atol=1e-12)
 
 
+@pytest.mark.parametrize("path", SCENES, ids=lambda p: p.stem)
 def test_a_scene_that_is_read_and_written_is_the_same(path, tmp_path):
     with warnings.catch_warnings(record=True) as of_file:
         warnings.simplefilter("always")
