@@ -228,7 +228,8 @@ using FreeDofs = std::vector<std::vector<std::pair<int, double>>>;
 
 FreeDofs free_dofs(int nv, const std::vector<kernels::FollowerTie>& ties) {
   FreeDofs out(static_cast<std::size_t>(nv));
-  for (const kernels::FollowerTie& t : ties) out[std::size_t(t.v)].emplace_back(t.leader_v, t.ratio);
+  for (const kernels::FollowerTie& t : ties)
+    out[std::size_t(t.v)].emplace_back(t.leader_v, t.ratio);
   for (int i = 0; i < nv; ++i)
     if (out[std::size_t(i)].empty()) out[std::size_t(i)].emplace_back(i, 1.0);
   return out;

@@ -7,9 +7,9 @@
 #include <deque>
 #include <limits>
 #include <map>
-#include <set>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -93,8 +93,9 @@ struct MjcfWhole {
   bool free_base = false;                 ///< bodies of the world without joints move freely
   RobotNames names = {};
   MjcfNames body_names = {"body"}, joint_names = {"joint"};
-  std::map<std::string, MjcfJoint> joints = {};  ///< by name in the scene, those of tendons included
-  std::set<std::string> tendons = {};            ///< joints that stand for tendons
+  std::map<std::string, MjcfJoint> joints =
+      {};                              ///< by name in the scene, those of tendons included
+  std::set<std::string> tendons = {};  ///< joints that stand for tendons
   /// By number of a model and name there: the joint of a tendon.
   std::map<std::pair<int, std::string>, std::string> tendon_names = {};
   std::deque<MjcfScope> scopes = {};

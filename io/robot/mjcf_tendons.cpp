@@ -12,8 +12,8 @@
 namespace tangere {
 namespace {
 
-const Words kTendons = {{"fixed"},
-                        {"spatial", Fate::lost, "a tendon along places of bodies; scenes have none"}};
+const Words kTendons = {
+    {"fixed"}, {"spatial", Fate::lost, "a tendon along places of bodies; scenes have none"}};
 
 class Tendon {
  public:
@@ -33,8 +33,8 @@ class Tendon {
     MjcfJoint end;
     end.ref = zero_;
     end.range = range_;
-    end.link = add_link(whole_.robot, whole_.names, joint_.name, -1, joint_, {},
-                        "<fixed> tendon", node_.source());
+    end.link = add_link(whole_.robot, whole_.names, joint_.name, -1, joint_, {}, "<fixed> tendon",
+                        node_.source());
     whole_.joints[joint_.name] = end;
     whole_.tendons.insert(joint_.name);
     whole_.tendon_names[{model_.model, node_.text("name", "")}] = joint_.name;

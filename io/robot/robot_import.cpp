@@ -55,8 +55,7 @@ double largest_force(const MotorDescription& m) {
 /// motors' largest force. Of a joint without mass, those of the joints that it follows.
 class LimitLoads {
  public:
-  explicit LimitLoads(const Robot& robot)
-      : robot_(robot), scene_(robot.scene), model_(scene_) {
+  explicit LimitLoads(const Robot& robot) : robot_(robot), scene_(robot.scene), model_(scene_) {
     for (const LinkDescription& link : scene_.links)
       at_.push_back(link.parent < 0 ? link.joint.pose
                                     : compose(at_[std::size_t(link.parent)], link.joint.pose));

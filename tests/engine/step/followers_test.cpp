@@ -265,7 +265,9 @@ TEST(FollowersFaults, SayWhatWasExpected) {
   };
   EXPECT_NE(fault([](Scene& s) { s.links[1].joint.follows = {"third"}; }).find("third"),
             std::string::npos);
-  EXPECT_NE(fault([](Scene& s) { s.links[0].joint.follows = {"second_joint"}, s.links[0].joint.ratio = {1}; }).find("no circle"),
+  EXPECT_NE(fault([](Scene& s) {
+              s.links[0].joint.follows = {"second_joint"}, s.links[0].joint.ratio = {1};
+            }).find("no circle"),
             std::string::npos);
   EXPECT_NE(fault([](Scene& s) {
               s.links[0].joint.type = JointType::free;

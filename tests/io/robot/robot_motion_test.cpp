@@ -94,19 +94,18 @@ double largest_joint_error(Scene scene, const Table& truth, std::size_t joints) 
   Batch batch(model, 1);
   Stepper stepper(model);
   std::vector<double> u(std::size_t(model.nu())), q(std::size_t(model.nq()));
-  if (const auto* given = std::get_if<ConstantControl>(&scene.control)) u = given->values;
+  if (scene.control) u = std::get<ConstantControl>(*scene.control).values;
   double worst = 0, time = 0;
   for (const std::vector<double>& row : truth.rows) {
     if (row[0] > 0.5) break;
     for (; time < row[0] - 1e-9; time += scene.timestep) stepper.step(batch, u);
     batch.get_q(0, q);
     for (std::size_t k = 0; k < joints; ++k) {
-      const auto at = std::ranges::find_if(
-          model.q_names(), [&](const std::string& name) {
-            return name.starts_with(truth.names[1 + k] + ".");
-          });
-      worst = std::max(worst, std::abs(q.at(std::size_t(at - model.q_names().begin())) -
-                                       row[1 + k]));
+      const auto at = std::ranges::find_if(model.q_names(), [&](const std::string& name) {
+        return name.starts_with(truth.names[1 + k] + ".");
+      });
+      worst =
+          std::max(worst, std::abs(q.at(std::size_t(at - model.q_names().begin())) - row[1 + k]));
     }
   }
   EXPECT_GT(time, 0.4);
