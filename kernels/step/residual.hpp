@@ -308,12 +308,22 @@ void start(PairSums<N>& sums) {
   }
 }
 
+/// Adds sums; without derivatives, only those of the wrench.
+template <bool Derivatives, class N>
+void add_sums(const PairSums<N>& from, PairSums<N>& to) {
+  to.wrench += from.wrench;
+  if constexpr (Derivatives)
+    for (int i = 0; i < 2; ++i)
+      for (int j = 0; j < 2; ++j) to.k[i][j] += from.k[i][j], to.d[i][j] += from.d[i][j];
+}
+
 /// Computes the sums over all shapes of two links. Flat and bent faces share their sums, which are
 /// about body 1's origin; those with shear springs share sums of their own.
 template <bool Derivatives, class N>
 void sum_link_pair(const ModelView& model, const LinkPair& links, const StageArgs<N>& a,
                    ContactScratch<N>& o) {
   start<Derivatives>(o.sums);
+  if (links.layer >= 0) add_sums<Derivatives>(a.layer_sums[links.layer], o.sums);
   PointSums<Derivatives, FaceSums, N> faces;
   PointSums<Derivatives, ElasticFaceSums, N> elastic_faces;
   bool any_face = false, any_elastic = false;
@@ -321,7 +331,7 @@ void sum_link_pair(const ModelView& model, const LinkPair& links, const StageArg
     const int k = model.pair_order[links.first + i];
     const PairContact& pair = model.pairs[k];
     const CandidateList<N>& list = a.candidates[k];
-    if (!has_candidates(list, a.lone)) continue;
+    if (pair.layer_pad >= 0 || !has_candidates(list, a.lone)) continue;
     LawParameters<N> law = load_law<N>(pair.parameters, pair.law, pair.ramp, a.block, a.group);
     soften(a, law);
     const auto frame = [&] { return compose(o.link2_in_1, broadcast<N>(pair.frame2)); };
@@ -541,6 +551,21 @@ void place_balls(const ModelView& model, const StageArgs<N>& a, N* out) {
     const Vec3<N> at = ball_centre(model, a, i);
     out[3 * i] = at.x, out[3 * i + 1] = at.y, out[3 * i + 2] = at.z;
   }
+}
+
+/// Copies the motion of the link pairs with layers at the x of kinematics(), (those,
+/// kPairMotionNumbers). That of links that are apart is not set.
+template <class N>
+void pair_motions(const ModelView& model, const StageArgs<N>& a, N* out) {
+  for_each_link_pair(model, a, [&](int g) {
+    if (model.link_pairs[g].layer < 0 || is_apart(a, g)) return;
+    const ContactScratch<N>& o = a.contacts[g];
+    N* const to = out + kPairMotionNumbers * model.link_pairs[g].layer;
+    for (int i = 0; i < 9; ++i) to[i] = o.link2_in_1.R.m[i / 3][i % 3];
+    to[9] = o.link2_in_1.p.x, to[10] = o.link2_in_1.p.y, to[11] = o.link2_in_1.p.z;
+    to[12] = o.W.a.x, to[13] = o.W.a.y, to[14] = o.W.a.z;
+    to[15] = o.W.l.x, to[16] = o.W.l.y, to[17] = o.W.l.z;
+  });
 }
 
 /// Computes g at the x of kinematics() and leaves everything that the Jacobian needs in the
