@@ -308,4 +308,46 @@ void GelLayer::push_forward(std::span<const double> depth_dot, std::span<double>
   }
 }
 
+// On pressing cells w = δ̄ - P m²/(k n).
+void GelLayer::push_forward(std::span<const Directions> depth_dot,
+                            std::span<Directions> pressure_dot) {
+  const auto add = [](Directions& to, double factor, const Directions& x) {
+    for (std::size_t k = 0; k < x.size(); ++k) to[k] += factor * x[k];
+  };
+  const auto scale = [](Directions& x, double factor) {
+    for (double& a : x) a *= factor;
+  };
+  const std::size_t n = pressing_.size();
+  mean_dot_.resize(count_.size());
+  for (const int i : pressing_) mean_dot_[static_cast<std::size_t>(i)] = {};
+  for (const int s : touching_)
+    if (const std::size_t i = cell(s); presses_[static_cast<std::size_t>(s)] != 0)
+      add(mean_dot_[i], 1.0 / count_[i], depth_dot[static_cast<std::size_t>(s)]);
+  std::vector<Directions>& x = cell_dot_;
+  x.clear();
+  for (const int i : pressing_) x.push_back(mean_dot_[static_cast<std::size_t>(i)]);
+  for (std::size_t a = 0; a < n; ++a) {
+    const double* const u = &factor_[a * n];
+    scale(x[a], 1 / u[a]);
+    for (std::size_t b = a + 1; b < n; ++b) add(x[b], -u[b], x[a]);
+  }
+  for (std::size_t a = n; a-- > 0;) {
+    const double* const u = &factor_[a * n];
+    for (std::size_t b = a + 1; b < n; ++b) add(x[a], -u[b], x[b]);
+    scale(x[a], 1 / u[a]);
+  }
+  const double whole = layer_->side * layer_->side * layer_->compliance.own;
+  for (std::size_t a = 0; a < n; ++a) {
+    const auto i = static_cast<std::size_t>(pressing_[a]);
+    add(mean_dot_[i], -whole / count_[i], x[a]);
+  }
+  for (const int s : touching_) {
+    const auto at = static_cast<std::size_t>(s);
+    Directions& out = pressure_dot[at] = {};
+    if (presses_[at] == 0) continue;
+    add(out, modulus_ * stiffness_, depth_dot[at]);
+    add(out, -modulus_ * stiffness_, mean_dot_[cell(s)]);
+  }
+}
+
 }  // namespace tangere

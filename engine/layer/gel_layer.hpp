@@ -14,6 +14,7 @@
 // point.
 #pragma once
 
+#include <array>
 #include <cmath>
 #include <span>
 #include <vector>
@@ -46,6 +47,10 @@ class GelLayer {
   void pull_back(std::span<const double> pressure_bar, std::span<double> depth_bar);
   /// Computes how the pressures change with the depths, (points), at a given E.
   void push_forward(std::span<const double> depth_dot, std::span<double> pressure_dot);
+  /// The same along several directions, for a layer that is the contact: (points), of which those
+  /// with δ > least_depth() are read and set.
+  using Directions = std::array<double, 12>;
+  void push_forward(std::span<const Directions> depth_dot, std::span<Directions> pressure_dot);
 
  private:
   bool update_pressing();
@@ -73,6 +78,7 @@ class GelLayer {
   std::vector<double> mean_, load_, yield_, sum_;  ///< (cells) δ̄, P at E = 1, w, R
   std::vector<double> load_bar_, yield_bar_;       ///< (cells) cotangents, or tangents
   std::vector<double> factor_, rhs_;  ///< (pressing, pressing) U with M = Uᵀ U; (pressing)
+  std::vector<Directions> mean_dot_, cell_dot_;  ///< (cells); (pressing)
   int systems_ = 0;
 };
 

@@ -3,6 +3,7 @@
 #include "engine/layer/layer_contact.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 namespace tangere {
@@ -43,6 +44,18 @@ void add_column(Mat3<double> (&to)[2][2], int k, const Vec6<double>& x) {
   for (int i = 0; i < 6; ++i) to[i / 3][k / 3].m[i % 3][k % 3] += rows[i];
 }
 
+Vec6<double> unit_motion(int k) {
+  Vec6<double> unit = kernels::zero6<double>();
+  (k < 3 ? &unit.a.x : &unit.l.x)[k % 3] = 1;
+  return unit;
+}
+double component(const Vec6<double>& x, int k) { return (k < 3 ? &x.a.x : &x.l.x)[k % 3]; }
+
+void set_column(Slopes& to, int k, const Vec3<double>& x) {
+  Mat3<double>& of = k < 3 ? to.turn : to.shift;
+  of.m[0][k % 3] = x.x, of.m[1][k % 3] = x.y, of.m[2][k % 3] = x.z;
+}
+
 }  // namespace
 
 void LayerContact::begin(const LayerPad& pad) {
@@ -57,35 +70,39 @@ void LayerContact::add_body(const LayerShape& shape, const LayerBody<double>& bo
   bodies_.push_back(body);
 }
 
-template <class N>
-LayerForce<N> LayerContact::force(const Point& p, const LayerBody<N>& body,
-                                  const Anchor<N>& anchor) const {
-  const LayerShape& of = shapes_[static_cast<std::size_t>(p.body)];
-  LayerForce<N> out;
-  kernels::with_distance<N>(
-      of.shape, body.size,
-      [&](const auto& shape) {
-        out = layer_force(shape, of, body.touch, p.xi, *pad_->layer, p.known, anchor);
-      },
-      of.grid);
+/// Calls f with the shape of a body at its size.
+template <class N, class F>
+void LayerContact::with_shape(int body, const Vec3<N>& size, const F& f) const {
+  const LayerShape& of = shapes_[static_cast<std::size_t>(body)];
+  kernels::with_distance<N>(of.shape, size, f, of.grid);
+}
+
+LayerForce<D> LayerContact::force(const Point& p, const LayerBody<D>& body,
+                                  const Anchor<D>& anchor) const {
+  LayerForce<D> out{};
+  with_shape<D>(p.body, body.size, [&](const auto& shape) {
+    out.at = layer_depth(shape, body.touch, p.xi, *pad_->layer, p.known);
+    add_friction(shape, shapes_[static_cast<std::size_t>(p.body)], body.touch, p.xi, p.known,
+                 anchor, out);
+  });
   return out;
 }
 
 void LayerContact::add_point(int candidate, int index, const Vec3<double>& place,
                              const Anchor<double>& anchor) {
-  const LayerShape& of = shapes_.back();
   const LayerBody<double>& body = bodies_.back();
   const kernels::Frame<double>& frame = pad_->frame;
   Vec3<double> xi = transposed_times(frame.R, place - frame.p);
   xi.z = 0;  // but for rounding
+  const int number = static_cast<int>(shapes_.size()) - 1;
   std::optional<KnownDepth> known;
-  kernels::with_distance<double>(
-      of.shape, body.size,
-      [&](const auto& shape) { known = find_depth(shape, body.touch, xi, *pad_->layer); }, of.grid);
-  if (!known) return;
-  Point p{index, static_cast<int>(shapes_.size()) - 1, candidate, xi, *known, in_pad(anchor), {}};
-  p.force = force(p, body, p.anchor);
-  if (!(p.force.at.depth > -pad_->layer->bulge()) || !std::isfinite(p.force.at.depth)) return;
+  LayerDepth<double> at{};
+  with_shape<double>(number, body.size, [&](const auto& shape) {
+    known = find_depth(shape, body.touch, xi, *pad_->layer);
+    if (known) at = layer_depth(shape, body.touch, xi, *pad_->layer, *known);
+  });
+  if (!known || !(at.depth > -pad_->layer->bulge()) || !std::isfinite(at.depth)) return;
+  const Point p{index, number, candidate, xi, *known, in_pad(anchor), {at, {0, 0, 0}, 0}};
   int& slot = slot_[static_cast<std::size_t>(index)];
   if (slot < 0) {
     slot = static_cast<int>(points_.size());
@@ -100,6 +117,13 @@ void LayerContact::solve() {
   depth_.assign(slot_.size(), least_depth(*pad_->layer));
   for (const Point& p : points_) depth_[static_cast<std::size_t>(p.index)] = p.force.at.depth;
   layer_.solve(*pad_->layer, depth_, pad_->layer->modulus / pad_->layer->stiffness);
+  for (Point& p : points_) {
+    if (!(load(p) > 0)) continue;
+    const auto number = static_cast<std::size_t>(p.body);
+    with_shape<double>(p.body, bodies_[number].size, [&](const auto& shape) {
+      add_friction(shape, shapes_[number], bodies_[number].touch, p.xi, p.known, p.anchor, p.force);
+    });
+  }
 }
 
 double LayerContact::load(const Point& p) const {
@@ -173,19 +197,80 @@ Vec6<double> LayerContact::change(std::span<const LayerBody<D>> bodies,
   return wrench_to_parent(pad_->frame, change_in_pad(bodies, anchors));
 }
 
+/// Slopes at a point, outside of the shape by dual numbers.
+LayerSlopes LayerContact::slopes(const Point& p) const {
+  const auto number = static_cast<std::size_t>(p.body);
+  const LayerShape& of = shapes_[number];
+  const LayerBody<double>& body = bodies_[number];
+  LayerSlopes out{};
+  if (p.known.by != DepthBy::gap) {
+    with_shape<double>(p.body, body.size, [&](const auto& shape) {
+      out = layer_slopes(shape, of, body.touch, p.xi, *pad_->layer, p.known, p.anchor, p.force);
+    });
+    return out;
+  }
+  for (int k = 0; k < 6; ++k) {
+    const LayerForce<D> f =
+        force(p, moved(body, unit_motion(k), kernels::zero6<double>()), dual(p.anchor));
+    (k < 3 ? &out.depth.a.x : &out.depth.l.x)[k % 3] = f.at.depth.epsilon;
+    set_column(out.slant, k, change_of(f.at.slant));
+  }
+  return out;
+}
+
+/// Computes the derivatives of w by displacement and twist, (12) in pad axes.
+std::array<Vec6<double>, 12> LayerContact::columns_in_pad() {
+  depth_slopes_.resize(depth_.size());
+  load_slopes_.resize(depth_.size());
+  slopes_.resize(points_.size());
+  for (std::size_t i = 0; i < points_.size(); ++i) {
+    GelLayer::Directions& depth = depth_slopes_[static_cast<std::size_t>(points_[i].index)];
+    depth = {};
+    if (!(load(points_[i]) > 0)) continue;
+    slopes_[i] = slopes(points_[i]);
+    for (int k = 0; k < 6; ++k) {
+      depth[std::size_t(k)] = component(slopes_[i].depth, k);
+      depth[std::size_t(k + 6)] = component(slopes_[i].depth_by_twist, k);
+    }
+  }
+  layer_.push_forward(depth_slopes_, load_slopes_);
+  std::array<Vec6<double>, 12> out;
+  out.fill(kernels::zero6<double>());
+  for (std::size_t i = 0; i < points_.size(); ++i) {
+    const Point& p = points_[i];
+    const double P = load(p), F = friction_load(p), slope = F > 0 ? point_stiffness(p) : 0,
+                 per_load =
+                     bodies_[static_cast<std::size_t>(p.body)].touch.law.kn * pad_->layer->area;
+    if (!(P > 0)) continue;
+    const auto at = static_cast<std::size_t>(p.index);
+    const LayerForce<double>& force = p.force;
+    const Vec3<double> f = P * force.at.slant + F * force.friction;
+    for (int k = 0; k < 12; ++k) {
+      const bool by_twist = k >= 6;
+      const double P_dot = per_load * load_slopes_[at][std::size_t(k)],
+                   F_dot = F < P ? slope * depth_slopes_[at][std::size_t(k)] : P_dot;
+      const Slopes& friction = by_twist ? slopes_[i].friction_by_twist : slopes_[i].friction;
+      Vec3<double> f_dot =
+          P_dot * force.at.slant + F_dot * force.friction + F * column(friction, k % 6);
+      if (!by_twist) f_dot += P * column(slopes_[i].slant, k);
+      out[std::size_t(k)] += {cross(force.at.place, f_dot), f_dot};
+      if (!by_twist) out[std::size_t(k)].a += cross(column(slopes_[i].place, k), f);
+    }
+  }
+  return out;
+}
+
 void LayerContact::add_to(kernels::PairSums<double>& sums, bool derivatives) {
   sums.wrench += wrench();
   if (!derivatives || points_.empty()) return;
-  const Vec6<double> none = kernels::zero6<double>();
+  const std::array<Vec6<double>, 12> columns = columns_in_pad();
   for (int k = 0; k < 12; ++k) {
-    Vec6<double> unit = none;
-    (k % 6 < 3 ? &unit.a.x : &unit.l.x)[k % 3] = 1;
     // ε and δW of the link in pad axes.
-    const Vec6<double> in_pad = motion_to_child(pad_->frame, unit);
-    moved_.clear();
-    for (const LayerBody<double>& body : bodies_)
-      moved_.push_back(k < 6 ? moved(body, in_pad, none) : moved(body, none, in_pad));
-    add_column(k < 6 ? sums.k : sums.d, k % 6, change(moved_));
+    const Vec6<double> in_pad = motion_to_child(pad_->frame, unit_motion(k % 6));
+    Vec6<double> sum = kernels::zero6<double>();
+    for (int i = 0; i < 6; ++i)
+      sum += component(in_pad, i) * columns[std::size_t(i + (k < 6 ? 0 : 6))];
+    add_column(k < 6 ? sums.k : sums.d, k % 6, wrench_to_parent(pad_->frame, sum));
   }
 }
 

@@ -3,14 +3,15 @@
 // points (engine/layer/gel_layer.hpp) and the forces f_s (engine/layer/layer_force.hpp), which act
 // at x_s, the wrench on the pad's link is
 //   w = Σ (x_s × f_s; f_s)
-// and its change along any direction follows from dual numbers of depths, slants and friction.
+// Its derivatives by motion are those of engine/layer/layer_slopes.hpp; its change along any other
+// direction follows from dual numbers.
 #pragma once
 
 #include <span>
 #include <vector>
 
 #include "engine/layer/gel_layer.hpp"
-#include "engine/layer/layer_force.hpp"
+#include "engine/layer/layer_slopes.hpp"
 #include "engine/model/compiled_model.hpp"
 #include "kernels/numbers/dual.hpp"
 
@@ -83,21 +84,25 @@ class LayerContact {
 
  private:
   [[nodiscard]] double point_stiffness(const Point& p) const;
-  template <class N>
-  [[nodiscard]] LayerForce<N> force(const Point& p, const LayerBody<N>& body,
-                                    const kernels::Anchor<N>& anchor) const;
+  [[nodiscard]] LayerSlopes slopes(const Point& p) const;
+  [[nodiscard]] std::array<kernels::Vec6<double>, 12> columns_in_pad();
+  template <class N, class F>
+  void with_shape(int body, const kernels::Vec3<N>& size, const F& f) const;
+  [[nodiscard]] LayerForce<D> force(const Point& p, const LayerBody<D>& body,
+                                    const kernels::Anchor<D>& anchor) const;
   [[nodiscard]] kernels::Vec6<double> change_in_pad(std::span<const LayerBody<D>> bodies,
                                                     std::span<const kernels::Anchor<D>> anchors);
 
   const LayerPad* pad_ = nullptr;
   std::vector<LayerShape> shapes_;
   std::vector<LayerBody<double>> bodies_;
-  std::vector<LayerBody<D>> moved_;
   std::vector<Point> points_;
   std::vector<int> slot_;                     // (points) number in points_, or -1
   std::vector<double> depth_;                 // (points)
   std::vector<double> depth_dot_, load_dot_;  // (points)
   std::vector<LayerForce<D>> changes_;        // parallel to points_
+  std::vector<LayerSlopes> slopes_;           // the same
+  std::vector<GelLayer::Directions> depth_slopes_, load_slopes_;  // (points)
   GelLayer layer_;
 };
 

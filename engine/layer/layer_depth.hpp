@@ -99,21 +99,37 @@ N relaxation_at(const CompiledLayer& layer, const N& depth) {
   return share < N(0.0) ? N(0.0) : share < N(1.0) ? whole * share : whole;
 }
 
-/// Finds δ of a point; none where the point is outside the shape, or farther than the bulge.
+/// Returns min(δ, -c d(ξ)) of a point inside a convex shape: the distance is convex along the
+/// normal, so Newton's method descends to its root from below the shape.
+template <class Shape>
+KnownDepth find_contact_depth(const Shape& shape, const kernels::Touch<double>& t,
+                              const kernels::Vec3<double>& xi, double outward, double inside) {
+  const double most = kSteepest * inside;
+  double depth = most;
+  for (int step = 0; step < 50; ++step) {
+    const kernels::Distance<double> found =
+        distance_in_pad(shape, t, {xi.x, xi.y, xi.z - outward * depth});
+    if (depth == most && found.d < 0) return {most, DepthBy::side};
+    const double next = depth - found.d / (-outward * found.n.z);
+    if (std::abs(found.d) <= kClose * depth || !(next < depth && next > 0)) break;
+    depth = next;
+  }
+  return {depth, DepthBy::underside};
+}
+
+/// Finds δ of a point; none where the point is outside the shape, or farther than the bulge. The
+/// shapes of a contact are convex.
 template <class Shape>
 std::optional<KnownDepth> find_depth(const Shape& shape, const kernels::Touch<double>& t,
                                      const kernels::Vec3<double>& xi, const CompiledLayer& layer) {
-  double most = layer.deepest;
   if (layer.feedback) {
     const double d = distance_in_pad(shape, t, xi).d;
-    if (d >= 0 && d < layer.bulge()) return KnownDepth{-d, DepthBy::gap};
-    most = -kSteepest * d;
+    if (d < 0) return find_contact_depth(shape, t, xi, layer.outward, -d);
+    return d < layer.bulge() ? std::optional(KnownDepth{-d, DepthBy::gap}) : std::nullopt;
   }
-  if (!(most > 0)) return std::nullopt;
-  const auto found = find_underside(shape, t, xi, layer.outward, most);
+  const auto found = find_underside(shape, t, xi, layer.outward, layer.deepest);
   if (!found) return std::nullopt;
-  if (*found < most) return KnownDepth{*found, DepthBy::underside};
-  return KnownDepth{most, layer.feedback ? DepthBy::side : DepthBy::end};
+  return KnownDepth{*found, *found < layer.deepest ? DepthBy::underside : DepthBy::end};
 }
 
 /// Returns depth and slant at a point whose δ is known. With dual numbers their derivatives follow

@@ -65,17 +65,17 @@ kernels::Vec3<N> friction_by_load(const Shape& shape, const LayerShape& of,
   return -(scale / normal) * p.w;
 }
 
-/// Returns what the force at a point consists of, at a known depth.
+/// Sets the friction of a point whose depth and slant are set.
 template <class Shape, class N>
-LayerForce<N> layer_force(const Shape& shape, const LayerShape& of, const kernels::Touch<N>& t,
-                          const kernels::Vec3<double>& xi, const CompiledLayer& layer,
-                          const KnownDepth& known, const kernels::Anchor<N>& anchor) {
-  LayerForce<N> out = {layer_depth(shape, t, xi, layer, known), kernels::zero3<N>(), N(0.0)};
-  if (!(t.law.mu > N(0.0)) || known.by == DepthBy::gap) return out;
+void add_friction(const Shape& shape, const LayerShape& of, const kernels::Touch<N>& t,
+                  const kernels::Vec3<double>& xi, const KnownDepth& known,
+                  const kernels::Anchor<N>& anchor, LayerForce<N>& out) {
+  out.friction = kernels::zero3<N>();
+  out.normal = N(0.0);
+  if (!(t.law.mu > N(0.0)) || known.by == DepthBy::gap) return;
   const kernels::Vec3<N>& slant = out.at.slant;
   const kernels::Vec3<N> friction = friction_by_load(shape, of, t, xi, anchor, out.normal);
   out.friction = friction - (dot(slant, friction) / dot(slant, slant)) * slant;
-  return out;
 }
 
 }  // namespace tangere
