@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Derivatives of the wrenches of layers by the coefficients of their contacts and by the sizes of
-// the bodies that press them, by dual numbers. With the slip Y along λ (kernels/reverse/adjoint.hpp)
-// each is -Yᵀ ∂w/∂p.
+// the bodies that press them, by dual numbers. With the slip Y along λ
+// (kernels/reverse/adjoint.hpp) each is -Yᵀ ∂w/∂p.
 #pragma once
 
 #include "engine/derivative/shear_adjoint.hpp"

@@ -246,15 +246,15 @@ std::array<Vec6<double>, 12> LayerContact::columns_in_pad() {
     const LayerForce<double>& force = p.force;
     const Vec3<double> f = P * force.at.slant + F * force.friction;
     for (int k = 0; k < 12; ++k) {
-      const bool by_twist = k >= 6;
+      const bool twists = k >= 6;
       const double P_dot = per_load * load_slopes_[at][std::size_t(k)],
                    F_dot = F < P ? slope * depth_slopes_[at][std::size_t(k)] : P_dot;
-      const Slopes& friction = by_twist ? slopes_[i].friction_by_twist : slopes_[i].friction;
+      const Slopes& friction = twists ? slopes_[i].friction_by_twist : slopes_[i].friction;
       Vec3<double> f_dot =
           P_dot * force.at.slant + F_dot * force.friction + F * column(friction, k % 6);
-      if (!by_twist) f_dot += P * column(slopes_[i].slant, k);
+      if (!twists) f_dot += P * column(slopes_[i].slant, k);
       out[std::size_t(k)] += {cross(force.at.place, f_dot), f_dot};
-      if (!by_twist) out[std::size_t(k)].a += cross(column(slopes_[i].place, k), f);
+      if (!twists) out[std::size_t(k)].a += cross(column(slopes_[i].place, k), f);
     }
   }
   return out;

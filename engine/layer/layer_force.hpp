@@ -27,8 +27,8 @@ struct LayerShape {
   const kernels::DistanceGrid* grid;
   ContactLaw law;
   double ramp;
-  bool elastic;    ///< its springs have anchors
-  bool by_secant;  ///< derivatives take friction by its secant
+  bool elastic;  ///< its springs have anchors
+  bool secant;   ///< derivatives take friction by its secant
 };
 
 template <class N>
@@ -61,7 +61,7 @@ kernels::Vec3<N> friction_by_load(const Shape& shape, const LayerShape& of,
     scale = kernels::friction(law, p.normal, p.vt).scale;
     p.w = p.vt;
   }
-  if (of.by_secant) scale = constant_of(scale);
+  if (of.secant) scale = constant_of(scale);
   return -(scale / normal) * p.w;
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Derivatives of the force at a point (engine/layer/layer_force.hpp) by the motion of the shape: its
-// displacement (θ; ρ) and the change of its twist, pad axes at the pad's origin. With the slope
+// Derivatives of the force at a point (engine/layer/layer_force.hpp) by the motion of the shape:
+// its displacement (θ; ρ) and the change of its twist, pad axes at the pad's origin. With the slope
 // δn = n_ρ ρ₂ + n_θ θ of the normal at a fixed place x, ρ₂ = ρ + θ × x
 // (kernels/contact/pair_contact.hpp), and φ = -n·o
 //   δ̇ = slant·ρ₂;  an underside moves by -δ̇ o, so that δn gains n_ρ o δ̇, and
@@ -44,9 +44,10 @@ struct LayerSlopes {
 };
 
 /// Returns M by (ρ₂, θ) as one by (θ, ρ): ρ₂ = ρ - [x] θ.
-inline Slopes about_origin(const kernels::Mat3<double>& by_rho,
-                           const kernels::Mat3<double>& by_theta, const kernels::Vec3<double>& x) {
-  return {by_theta - times_skew(by_rho, x), by_rho};
+inline Slopes about_origin(const kernels::Mat3<double>& rho_slope,
+                           const kernels::Mat3<double>& theta_slope,
+                           const kernels::Vec3<double>& x) {
+  return {theta_slope - times_skew(rho_slope, x), rho_slope};
 }
 
 /// Computes the slopes of depth, slant and place.
@@ -80,7 +81,7 @@ void depth_slopes(const Shape& shape, const kernels::Touch<double>& t, const Com
 
 /// Slopes of a spring's force by displacement and twist.
 struct SpringSlopes {
-  Slopes by_motion, by_twist;
+  Slopes motion, twist;
 };
 template <class Shape, class Point>
 SpringSlopes spring_slopes(const kernels::LawParameters<double>& law, const Point& p,
@@ -97,7 +98,7 @@ void friction_slopes(const Shape& shape, const LayerShape& of, const kernels::To
                      const kernels::Vec3<double>& xi, const kernels::Anchor<double>& anchor,
                      const LayerForce<double>& force, LayerSlopes& out) {
   kernels::LawParameters<double> law = {t.law, of.law, of.ramp};
-  law.friction_tangent = of.by_secant ? 0 : 1;
+  law.friction_tangent = of.secant ? 0 : 1;
   kernels::ElasticPoint<double> p;
   kernels::find_place(shape, t.Q, t.c, xi, p);
   kernels::find_motion(law, t.omega, t.v, p);
@@ -122,8 +123,8 @@ void friction_slopes(const Shape& shape, const LayerShape& of, const kernels::To
     if (slant != nullptr) out_by = out_by + (-along / square) * *slant;
     return out_by;
   };
-  out.friction = across(whole.by_motion, normal.by_motion, &out.slant);
-  out.friction_by_twist = across(whole.by_twist, normal.by_twist, nullptr);
+  out.friction = across(whole.motion, normal.motion, &out.slant);
+  out.friction_by_twist = across(whole.twist, normal.twist, nullptr);
 }
 
 /// Returns the slopes of the force at a point inside the shape. Outside, where edges are round,

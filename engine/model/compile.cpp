@@ -397,7 +397,8 @@ class Compiler {
       const std::string& name = m_.scene.sensors[std::size_t(sensor.number)].name;
       for (std::size_t k = 0; k < m_.pairs.size(); ++k)
         if (m_.scene.pair_contacts[k].sensor == name)
-          m_.pairs[k].layer_pad = static_cast<int>(m_.layer_pads.size());
+          m_.pairs[k].layer_pad = static_cast<int>(m_.layer_pads.size()),
+          m_.contact_info[k].law = "of the layer";
       m_.layer_pads.push_back({sensor.layer, sensor.pad, sensor_points_[name]});
     }
     number_layers(m_);

@@ -51,7 +51,8 @@ Vec3<double> vector_at(std::span<const double> field, int point) {
 
 void add_force(std::span<double> field, int point, const Vec3<double>& f) {
   double* const to = &field[static_cast<std::size_t>(3 * point)];
-  to[0] += f.x, to[1] += f.y, to[2] += f.z;
+  const double x[] = {f.x, f.y, f.z};
+  for (int k = 0; k < 3; ++k) to[k] = to[k] == 0 ? x[k] : to[k] + x[k];  // keeps -0
 }
 
 }  // namespace
@@ -84,7 +85,8 @@ bool LayeredField::reaches(int target, int tile) const {
       });
 }
 
-/// Lists a point that a shape of a group presses, with the deepest of its shapes. `normal`: N of the springs.
+/// Lists a point that a shape of a group presses, with the deepest of its shapes. `normal`: N of
+/// the springs.
 void LayeredField::add_point(int index, int group, const Vec3<double>& xi, double normal) {
   constexpr double kMostSlant = 10;  // 1/cos of 84°
   const CompiledLayer& layer = *sensor_->layer;
@@ -128,7 +130,7 @@ double LayeredField::point_stiffness() const {
   return layer.area * layer.modulus * kn_ / (layer.stiffness * layer.compliance.own);
 }
 
-/// The load that friction has: where the layer is the contact, that of engine/layer/layer_force.hpp.
+/// The load that friction has: of a contact, that of engine/layer/layer_force.hpp.
 double LayeredField::friction_load(const Point& p) const {
   const double load = sensor_->layer->area * pressure(p);
   if (!sensor_->layer->feedback) return load;

@@ -30,8 +30,8 @@ struct Stage {
     Row<L>* reference;  ///< (12) pose of link 2 in link 1 at which the list was made; pairs of the
                         ///< same links share it
     double margin;
-    /// (L, stride) of each lane's points in PairContact::points; null in pairs without shear springs
-    /// and layers.
+    /// (L, stride) of each lane's points in PairContact::points; null in pairs without shear
+    /// springs and layers.
     int* own_index;
     // Anchors of the points; null in pairs without shear springs.
     double* own_anchors;  ///< (L, kAnchorNumbers, stride)
@@ -56,8 +56,8 @@ struct Stage {
   Row<L>* ground_anchors;  ///< (points with shear springs, kAnchorNumbers)
   /// (link pairs with layers, kPairSumNumbers) as StageArgs::layer_sums, each as PairSums.
   Row<L>* layer_sums = nullptr;
-  Row<L>* faces;           ///< (n_pairs, 3) faces that count in this solve (kernels/step/faces.hpp)
-  std::byte* scratch;      ///< scratch_bytes(model)
+  Row<L>* faces;       ///< (n_pairs, 3) faces that count in this solve (kernels/step/faces.hpp)
+  std::byte* scratch;  ///< scratch_bytes(model)
   /// (n_link_pairs) square of the distance from LinkPair::points_middle to shapes_middle [m²], of
   /// links that are apart.
   Row<L>* between;

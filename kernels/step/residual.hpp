@@ -553,21 +553,6 @@ void place_balls(const ModelView& model, const StageArgs<N>& a, N* out) {
   }
 }
 
-/// Copies the motion of the link pairs with layers at the x of kinematics(), (those,
-/// kPairMotionNumbers). That of links that are apart is not set.
-template <class N>
-void pair_motions(const ModelView& model, const StageArgs<N>& a, N* out) {
-  for_each_link_pair(model, a, [&](int g) {
-    if (model.link_pairs[g].layer < 0 || is_apart(a, g)) return;
-    const ContactScratch<N>& o = a.contacts[g];
-    N* const to = out + kPairMotionNumbers * model.link_pairs[g].layer;
-    for (int i = 0; i < 9; ++i) to[i] = o.link2_in_1.R.m[i / 3][i % 3];
-    to[9] = o.link2_in_1.p.x, to[10] = o.link2_in_1.p.y, to[11] = o.link2_in_1.p.z;
-    to[12] = o.W.a.x, to[13] = o.W.a.y, to[14] = o.W.a.z;
-    to[15] = o.W.l.x, to[16] = o.W.l.y, to[17] = o.W.l.z;
-  });
-}
-
 /// Computes g at the x of kinematics() and leaves everything that the Jacobian needs in the
 /// scratch.
 template <bool Derivatives, class N>

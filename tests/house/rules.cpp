@@ -13,7 +13,6 @@
 namespace tangere::house {
 namespace fs = std::filesystem;
 namespace {
-
 using Names = std::set<std::string, std::less<>>;
 
 struct Folder {
