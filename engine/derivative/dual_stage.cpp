@@ -7,6 +7,9 @@
 
 #include "engine/derivative/dual_field.hpp"
 #include "engine/derivative/dual_layer.hpp"
+#include "engine/derivative/dual_layer_contacts.hpp"
+#include "engine/derivative/stretched_point.hpp"
+#include "engine/model/group_contacts.hpp"
 #include "engine/step/kept_anchors.hpp"
 #include "kernels/shear/update_shear_state.hpp"
 #include "kernels/step/link_poses.hpp"
@@ -43,6 +46,8 @@ struct DualStage::Impl {
   std::vector<std::vector<D>> points, references, areas;
   std::vector<kernels::CandidateList<D>> lists;
   std::vector<D> faces;
+  std::vector<std::vector<int>> listed_points;  ///< of each pair, by their places in `points`
+  DualLayerContacts layers{m};
   // Shear state: anchors of all points, and those in the order of the kernels.
   std::vector<kernels::Anchor<D>> anchors;
   std::vector<std::vector<D>> listed_anchors;  ///< of each pair
@@ -124,6 +129,7 @@ struct DualStage::Impl {
       listed_anchors.back().assign(std::size_t(kernels::kAnchorNumbers * p.n_points), D(0.0));
       lists.back().anchors = listed_anchors.back().data();
     }
+    listed_points.resize(pairs.size());
     anchors.resize(std::size_t(m.shear_spring_points));
     ground_anchors.assign(std::size_t(kernels::kAnchorNumbers * m.ground_anchors), D(0.0));
     sensor_laws.resize(m.sensors.size());
@@ -133,19 +139,8 @@ struct DualStage::Impl {
 
   /// Returns the tangent of a body's contact point, link axes, with the body's size.
   [[nodiscard]] kernels::Vec3<double> stretched(int body, const kernels::Vec3<double>& at) const {
-    const kernels::Solid& s = m.solids[std::size_t(body)];
-    if (!s.stretches) return kernels::zero3<double>();
-    const double* by = &stretch[std::size_t(kernels::kSizeNumbers * body)];
-    const kernels::Vec3<double> y = transposed_times(s.frame.R, at - s.frame.p);
-    const kernels::Vec3<D> size = {{s.size.x, by[0]}, {s.size.y, by[1]}, {s.size.z, by[2]}};
-    return s.frame.R * kernels::with_distance<D>(s.shape, size, [&]<class Shape>(const Shape&) {
-             if constexpr (requires { Shape::stretched(size, s.size, y); }) {
-               const kernels::Vec3<D> moved = Shape::stretched(size, s.size, y);
-               return kernels::Vec3<double>{moved.x.epsilon, moved.y.epsilon, moved.z.epsilon};
-             } else {
-               return kernels::zero3<double>();
-             }
-           });
+    return stretched_point(m.solids[std::size_t(body)],
+                           &stretch[std::size_t(kernels::kSizeNumbers * body)], at);
   }
 
   /// Sets the tangents of the points that touch the ground.
@@ -348,18 +343,20 @@ struct DualStage::Impl {
         const kernels::Vec3<double> side = {chosen[0].value, chosen[1].value, chosen[2].value};
         std::vector<D>& list = points[std::size_t(at)];
         int count = 0;
+        listed_points[std::size_t(at)].clear();
         for (int i = 0; i < pair.n_points; ++i) {
           const double* p = pair.points + 3 * i;
           const kernels::Vec3<double> y =
               transposed_times(shape.R, kernels::Vec3<double>{p[0], p[1], p[2]} - shape.p);
           const double d = kernels::with_touched<double>(
               pair, size, side, [&](const auto& s) { return distance_at(s, y).d; });
-          if (!(d < 1e-9)) continue;  // [m], above rounding
+          if (!(d < 1e-9 + bulge_of(m, pair))) continue;  // [m], above rounding
           const kernels::Vec3<double> moves =
               frozen ? kernels::zero3<double>() : stretched(pair.body1, {p[0], p[1], p[2]});
           list[std::size_t(3 * count)] = {p[0], moves.x};
           list[std::size_t(3 * count + 1)] = {p[1], moves.y};
           list[std::size_t(3 * count + 2)] = {p[2], moves.z};
+          listed_points[std::size_t(at)].push_back(i);
           if (pair.weights != nullptr) areas[std::size_t(at)][std::size_t(count)] = pair.weights[i];
           if (pair.memory >= 0)
             put_anchor(m.shear_springs[std::size_t(pair.memory)].first + i,
@@ -409,6 +406,7 @@ struct DualStage::Impl {
     a.group = 0;
     a.candidates = lists.data();
     a.ground_anchors = ground_anchors.data();
+    a.layer_sums = layers.sums();
     a.faces = faces.data();
     a.lone = -1;
     a.links = links.data();
@@ -568,6 +566,8 @@ void DualStage::residual() {
   const auto a = i.arguments(*this);
   kernels::kinematics(i.view, a);
   i.find_touching();
+  i.layers.compute(i.view, i.contacts, {i.points, i.listed_points, i.listed_anchors},
+                   i.block.data());
   i.put_ground_anchors();
   i.put_dry_anchors();
   kernels::residual<false>(i.view, a);

@@ -5,8 +5,10 @@
 
 #include <algorithm>
 
+#include "engine/derivative/layer_parameters.hpp"
 #include "engine/step/detection.hpp"
 #include "engine/step/factors.hpp"
+#include "engine/step/layer_sums.hpp"
 #include "engine/step/scheme_stage.hpp"
 #include "engine/step/shear_anchors.hpp"
 
@@ -71,6 +73,7 @@ void GroupAdjoint::assemble(const StageContext<L>& s) const {
   find_candidates(model_, s.table, w, s.lanes);
   if constexpr (L > 1)
     if (s.lone() < 0) lists_to_rows(model_, s.table, w, s.lanes);
+  set_layer_sums(model_, s.table, w, s.lanes, true);
   kernel.evaluate(model_.view, w.stage, s.lone());
   factor(model_, s.table, w, s.lanes, kNoLane);
 }
@@ -211,12 +214,13 @@ void GroupAdjoint::reverse_stages(const StageContext<L>& s, const Scheme& scheme
       std::copy_n(w.x_inner + k * model_.nv, model_.nv, w.stage.x);
     }
     assemble(s);
-    if (!model_.shear_springs.empty()) find_stage(s);
+    if (!model_.shear_springs.empty() || !model_.layer_pads.empty()) find_stage(s);
     for (std::size_t n = 0; n < s.a.losses.size(); ++n) {
       LossRows<L>& o = s.a.losses[n];
       if (k == last)
         s.a.shear_adjoint.reverse_end(model_, s.table, w, s.lanes, o, static_cast<int>(n));
       hand_on(s, scheme, k, o);
+      add_layer_parameters(model_, s.table, w, s.lanes, s.a.q_stage.data(), s.a.lambda, o);
       s.a.shear_adjoint.reverse_forces(model_, s.table, w, s.lanes, s.a.q_stage.data(), s.a.lambda,
                                        o, static_cast<int>(n));
     }

@@ -5,6 +5,7 @@
 #include "engine/derivative/link_cotangents.hpp"
 #include "engine/step/dry_friction_state.hpp"
 #include "engine/step/kept_anchors.hpp"
+#include "engine/step/layer_sums.hpp"
 
 namespace tangere {
 
@@ -45,6 +46,25 @@ void hand_on(const ShearSpringContact& of, const AlignedVector<LinkPose<Row<L>>>
   const Vec6<double> pose = displacement + cross_wrench(Z, twist);
   const auto link = [&](int k) { return k < 0 ? nullptr : &links[std::size_t(k)]; };
   hand_on_to_links<L>(second_in_first, pose, twist, lane, link(first), link(second));
+}
+
+/// Computes cotangents of the friction of the listed points of a layer's pair, (3, stride) in body
+/// 1's axes, from the slip along λ.
+template <int L>
+void friction_of_layer(const CompiledModel& m, BasicWorkspace<L>& w, const ShearSpringContact& of,
+                       const Vec6<double>& slip, int lane, int stride, double* out) {
+  std::fill_n(out, 3 * stride, 0.0);
+  const int pad = m.pairs[std::size_t(of.pair)].layer_pad;
+  for_each_layer(m, w, [&](const kernels::LinkPair& links, int k) {
+    if (k != pad || links.link1 != of.contact.link1 || links.link2 != of.contact.link2) return;
+    solve_layer(m, w, links, pad, lane);
+    for (const LayerContact::Point& p : w.layer_contact->points()) {
+      if (w.layer_members[std::size_t(p.body)] != of.pair) continue;
+      const kernels::Vec3<double> bar = w.layer_contact->friction_bar(p, -slip);
+      out[p.candidate] = bar.x, out[stride + p.candidate] = bar.y;
+      out[2 * stride + p.candidate] = bar.z;
+    }
+  });
 }
 
 }  // namespace
@@ -139,20 +159,23 @@ void ShearAdjoint<L>::pull_back(const CompiledModel& m, const kernels::KernelTab
                              end = touch_of(m, w, of, at_touches_, l);
       Vec6<double> slip{};
       if (from_forces) slip = touch_of(m, w, of, slip_touches_, l).twist;
+      const bool layered =
+          from_forces && of.pair >= 0 && m.pairs[std::size_t(of.pair)].layer_pad >= 0;
+      if (layered) friction_of_layer<L>(m, w, of, slip, l, points.stride, s_bar);
       kernels::ShearCotangentSums sums{};
       kernels::ShearPullback pullback = {&start,
                                          &end,
                                          points,
                                          s_start,
                                          from_forces ? nullptr : s_bar,
-                                         nullptr,
-                                         from_forces ? &slip : nullptr,
+                                         layered ? s_bar : nullptr,
+                                         from_forces && !layered ? &slip : nullptr,
                                          s_out,
                                          &sums};
       pull_back_points(m, table, w, pullback, points_of(m, of, loss.points[lane]), s_out + rows);
       if (!from_forces) hand_on<L>(of, at_, sums.end.displacement, sums.end.twist, l, end_);
       hand_on<L>(of, w.shear.start, sums.start, Vec6<double>{}, l, start_[std::size_t(number)]);
-      if (loss.parameters != nullptr)
+      if (loss.parameters != nullptr && !layered)  // layer_parameters.hpp
         for (std::size_t k = 0; k < kCoefficients; ++k)
           loss.parameters[std::size_t(of.number) + k][l] += sums.end.law[k];
       add_to_entries(now, of, index, points, s_out, before);

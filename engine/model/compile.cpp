@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 #include "engine/model/body_shape.hpp"
 #include "engine/model/compile_effects.hpp"
@@ -15,6 +16,7 @@
 #include "engine/model/compile_sensor.hpp"
 #include "engine/model/compile_shear_springs.hpp"
 #include "engine/model/compile_variations.hpp"
+#include "engine/model/compiled_layer.hpp"
 #include "engine/model/components.hpp"
 #include "engine/model/contact_tiles.hpp"
 #include "engine/model/gravity_shares.hpp"
@@ -75,6 +77,7 @@ class Compiler {
     group_contacts(m_);
     components();
     sensors();
+    layer_pads();
     end_effectors();
     randomizations();
     find_inner_faces(m_);
@@ -286,6 +289,7 @@ class Compiler {
         pair.weights = keep(m_.point_storage, std::move(areas));
       }
       lay_out_tiles(m_, pair, tiles);
+      if (!d.sensor.empty()) sensor_points_[d.sensor] = std::move(order);
       contacts_.add("contact", d.first_name() + " " + d.primitive_body,
                     static_cast<int>(m_.pairs.size()), d.source);
       m_.pairs.push_back(pair);
@@ -372,9 +376,37 @@ class Compiler {
       sensor.parameters = constants(d.coefficients);
       for (const int t : sensed_bodies(m_.scene, d))
         if (m_.bodies[t].touchable) sensor.targets.push_back(t);
+      sensor.target_groups = target_groups(sensor);
       m_.sensors.push_back(std::move(sensor));
       m_.sensor_info.push_back(std::move(info));
     }
+  }
+
+  [[nodiscard]] std::vector<int> target_groups(const CompiledSensor& sensor) const {
+    std::vector<int> links, groups;
+    for (const int target : sensor.targets) {
+      const bool apart = sensor.layer && sensor.layer->feedback;
+      const int link = apart ? m_.bodies[std::size_t(target)].link : 0;
+      const auto known = std::ranges::find(links, link);
+      groups.push_back(static_cast<int>(known - links.begin()));
+      if (known == links.end()) links.push_back(link);
+    }
+    return groups;
+  }
+
+  /// Makes the layers of sensors the contacts of their points.
+  void layer_pads() {
+    for (const CompiledSensor& sensor : m_.sensors) {
+      if (!sensor.layer || !sensor.layer->feedback) continue;
+      const std::string& name = m_.scene.sensors[std::size_t(sensor.number)].name;
+      for (std::size_t k = 0; k < m_.pairs.size(); ++k)
+        if (m_.scene.pair_contacts[k].sensor == name)
+          m_.pairs[k].layer_pad = static_cast<int>(m_.layer_pads.size()),
+          m_.contact_info[k].law = "of the layer";
+      m_.layer_pads.push_back({sensor.layer, sensor.pad, sensor_points_[name]});
+    }
+    number_layers(m_);
+    for (kernels::PairContact& pair : m_.pairs) pair.extent += bulge_of(m_, pair);
   }
 
   void end_effectors() {
@@ -531,8 +563,9 @@ class Compiler {
   CompiledModel m_;
   NameIndex links_, joints_, bodies_, sensors_, contacts_, grounds_;
   std::vector<std::pair<int, int>> touching_;
-  double reach_of_moved_ = 0;  ///< of a scene that is far away [m]
-  CompiledBody ground_;        ///< the ground, as a plane that is fixed in the world
+  std::map<std::string, std::vector<int>> sensor_points_;  ///< in the order of their contacts
+  double reach_of_moved_ = 0;                              ///< of a scene that is far away [m]
+  CompiledBody ground_;  ///< the ground, as a plane that is fixed in the world
 };
 
 }  // namespace

@@ -26,7 +26,10 @@ struct CompiledLayer {
   double relaxation = 0;  ///< τ [s]
   double area = 0;        ///< for which a point stands [m²]
   double deepest = 0;     ///< where depth ends [m]
+  bool feedback = false;  ///< the layer is the contact as well
   int outward = 1;        ///< 1 or -1: whether the pad's z points out of the skin
+  /// Of a contact: how far above the surface a body may be that the gel's bulge touches [m].
+  [[nodiscard]] double bulge() const { return feedback ? 0.1 * grid.thickness : 0; }
   std::array<int, 2> direction{1, 1};          ///< 1 or -1: whether rows count along axis0, cols
                                                ///< along axis1
   std::optional<SurfaceCompliance> surface{};  ///< of a sensor with markers

@@ -92,7 +92,10 @@ struct CompiledSensor {
   kernels::ContactParameters parameters{};
   ContactLaw law = ContactLaw::clamped;
   std::vector<int> targets;  ///< sensed bodies
-  bool sizes_vary = false;   ///< some of their sizes vary
+  /// (targets) Of a layer that is the contact: number of the body's link among theirs. Bodies of
+  /// one link share the layer. Else zeros.
+  std::vector<int> target_groups;
+  bool sizes_vary = false;  ///< some of their sizes vary
   SensorImperfections imperfections{};
   bool imperfect = false;            ///< some imperfection is on
   int number = 0;                    ///< of the sensor in the scene
@@ -126,6 +129,13 @@ struct CompiledSensor {
 /// A dof with dry friction, and its coordinate.
 struct DryDof {
   int v, q;
+};
+
+/// A sensor's pad whose layer is its contact.
+struct LayerPad {
+  std::shared_ptr<const CompiledLayer> layer;
+  kernels::Frame<double> frame;  ///< of the pad in its link, as in CompiledSensor
+  std::vector<int> in_field;     ///< (points) number in the field of point k of its contacts
 };
 
 /// An end effector.
@@ -199,6 +209,8 @@ struct CompiledModel {
   std::vector<CompiledMotor> motors;  ///< one per control
   std::vector<CompiledSensor> sensors;
   std::vector<CompiledEndEffector> end_effectors;
+  std::vector<LayerPad> layer_pads;
+  int layer_link_pairs = 0;  ///< link pairs that they touch
   std::vector<kernels::PairContact> pairs;
   std::vector<kernels::GroundContact> grounds;
   std::vector<kernels::Solid> solids;  ///< parallel to bodies

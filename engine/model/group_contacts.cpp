@@ -7,6 +7,7 @@
 #include <span>
 
 #include "engine/model/body_shape.hpp"
+#include "engine/model/compiled_layer.hpp"
 #include "engine/model/compiled_model.hpp"
 #include "engine/scene/shapes.hpp"
 #include "kernels/contact/distance.hpp"
@@ -98,7 +99,7 @@ void bound_pair(const CompiledModel& m, kernels::LinkPair& links) {
     const kernels::Vec3<double> arm = pair.frame2.p - links.shapes_middle;
     shapes_radius =
         std::max(shapes_radius, std::sqrt(dot(arm, arm)) + radius_of(pair) + 2 * pair.overhang);
-    balls_radius = std::max(balls_radius, pair.ball_radius);
+    balls_radius = std::max({balls_radius, pair.ball_radius, bulge_of(m, pair)});
     faced = faced || pair.faced;
   }
   const auto rounded_up = [](double x) { return x * (1 + 1e-9) + 1e-9; };  // as in bound()
@@ -130,6 +131,21 @@ void hold(kernels::LinkBall& ball, const kernels::Vec3<double>& centre, double r
 
 void bound_links(CompiledModel& m) {
   for (kernels::LinkPair& links : m.link_pairs) bound_pair(m, links);
+}
+
+double bulge_of(const CompiledModel& m, const kernels::PairContact& pair) {
+  return pair.layer_pad < 0 ? 0 : m.layer_pads[std::size_t(pair.layer_pad)].layer->bulge();
+}
+
+void number_layers(CompiledModel& m) {
+  m.layer_link_pairs = 0;
+  for (kernels::LinkPair& links : m.link_pairs) {
+    links.layer = -1;
+    for (int i = links.first; i < links.first + links.count; ++i)
+      if (m.pairs[std::size_t(m.pair_order[std::size_t(i)])].layer_pad >= 0)
+        links.layer = m.layer_link_pairs;
+    if (links.layer >= 0) ++m.layer_link_pairs;
+  }
 }
 
 void find_link_balls(CompiledModel& m) {

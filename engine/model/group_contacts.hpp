@@ -18,6 +18,12 @@ void group_contacts(CompiledModel& m);
 /// when it is known which sizes vary.
 void bound_links(CompiledModel& m);
 
+/// Returns how far above its points a pair's layer may touch [m]; 0 without a layer.
+double bulge_of(const CompiledModel& m, const kernels::PairContact& pair);
+
+/// Numbers the pairs of links that pads with layers touch.
+void number_layers(CompiledModel& m);
+
 /// Scenes with fewer pairs of links consider all of them in every step.
 inline constexpr std::size_t kManyLinkPairs = 128;
 /// Puts a ball around all contact points and all shapes of every link, in scenes of many link

@@ -28,6 +28,8 @@ class Filter {
     grounds();
     components();
     find_link_balls(m_);
+    m_.layer_pads = whole.layer_pads;
+    number_layers(m_);
     m_.solids = whole.solids;
     for (const CompiledSensor& s : whole.sensors) {  // only their links matter for a step
       m_.sensors.emplace_back();

@@ -124,8 +124,11 @@ std::shared_ptr<const CompiledLayer> compile_sensor_layer(const TactileDescripti
   layer->weights = cell_weights(layer->grid, layer->side, sensor.rows, sensor.cols);
   layer->compliance = compile_layer(layer->grid);
   layer->modulus = d.material->modulus;
-  layer->stiffness =
-      d.coefficients.kn > 0 ? d.coefficients.kn : skin_springs(*d.material).kn * height * width;
+  layer->feedback = d.layer->feedback;
+  // A contact has its kn from the material.
+  layer->stiffness = d.coefficients.kn > 0 && !layer->feedback
+                         ? d.coefficients.kn
+                         : skin_springs(*d.material).kn * height * width;
   layer->relaxation = d.material->relaxation;
   layer->area = height * width;
   layer->deepest = t;

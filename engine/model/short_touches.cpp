@@ -80,8 +80,9 @@ std::vector<std::string> short_touches(const Model& model, Integrator integrator
         touch / steps_needed(integrator), to_string(integrator)));
   };
   for (std::size_t k = 0; k < m.pairs.size(); ++k)
-    add(model.contacts()[k], m.pairs[k].parameters, m.pairs[k].law,
-        inverse_mass(m, m.pairs[k].link1) + inverse_mass(m, m.pairs[k].link2));
+    if (m.pairs[k].layer_pad < 0)  // a layer relaxes
+      add(model.contacts()[k], m.pairs[k].parameters, m.pairs[k].law,
+          inverse_mass(m, m.pairs[k].link1) + inverse_mass(m, m.pairs[k].link2));
   for (std::size_t g = 0; g < m.grounds.size(); ++g)
     add(model.contacts()[m.pairs.size() + g], m.grounds[g].parameters, m.grounds[g].law,
         inverse_mass(m, m.grounds[g].link));

@@ -221,6 +221,7 @@ struct LayerDescription {
   double cell = 0;                 ///< side of a cell [m]; 0: follows the thickness
   std::optional<double> margin{};  ///< from the cells to free sides [m]; none: no sides
   Source source;
+  bool feedback = false;  ///< the layer is the contact of the sensor's points
 };
 
 /// Pressure of a skin that is no elastic layer, by its depth (docs/table.md).

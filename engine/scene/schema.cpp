@@ -361,6 +361,8 @@ constexpr Attribute kSchema[] = {
     row(kLayer, "margin", kNone, U::m,
         "from the outermost cells to the skin's free sides; no sides if left out",
         &LayerDescription::margin, B::not_negative),
+    row(kLayer, "feedback", "false", U::one, "true: the layer is the contact as well",
+        Words{"false true"}, E::feedback),
 
     row(kEndEffector, "name", "", U::one, "endeffector and its place in the file if left out"),
     row(kEndEffector, "joint", kNeeded, U::one, "it moves with this joint"),

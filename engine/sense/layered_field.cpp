@@ -49,9 +49,10 @@ Vec3<double> vector_at(std::span<const double> field, int point) {
   return {f[0], f[1], f[2]};
 }
 
-void put(std::span<double> field, int point, const Vec3<double>& f) {
+void add_force(std::span<double> field, int point, const Vec3<double>& f) {
   double* const to = &field[static_cast<std::size_t>(3 * point)];
-  to[0] = f.x, to[1] = f.y, to[2] = f.z;
+  const double x[] = {f.x, f.y, f.z};
+  for (int k = 0; k < 3; ++k) to[k] = to[k] == 0 ? x[k] : to[k] + x[k];  // keeps -0
 }
 
 }  // namespace
@@ -80,48 +81,73 @@ bool LayeredField::reaches(int target, int tile) const {
   return kernels::with_distance<double>(
       s.shape, Vec3<double>{s.size[0], s.size[1], s.size[2]}, [&](const auto& shape) {
         return !(distance_in_pad(shape, touches_[static_cast<std::size_t>(target)], centre).d >
-                 pad_.radius[tile]);
+                 pad_.radius[tile] + sensor_->layer->bulge());
       });
 }
 
-/// Lists a point that a shape presses, with the deepest of its shapes. `normal`: N of the springs.
-void LayeredField::add_point(int index, const Vec3<double>& xi, double normal) {
-  constexpr double kSteepest = 10;  // |slant|: 1/cos of 84°
+/// Lists a point that a shape of a group presses, with the deepest of its shapes. `normal`: N of
+/// the springs.
+void LayeredField::add_point(int index, int group, const Vec3<double>& xi, double normal) {
+  constexpr double kMostSlant = 10;  // 1/cos of 84°
   const CompiledLayer& layer = *sensor_->layer;
-  const double deepest = layer.deepest;
-  Point best{index, -1, xi, 0, false, normal, {}};
+  Point best{index, group, -1, xi, {}, normal, {}};
   for (std::size_t k = 0; k < shapes_.size(); ++k) {
     const kernels::TouchShape& s = shapes_[k];
+    if (sensor_->target_groups[k] != group) continue;
     if (s.grid != nullptr && !(normal > 0)) continue;
     kernels::with_distance<double>(
         s.shape, Vec3<double>{s.size[0], s.size[1], s.size[2]},
         [&](const auto& shape) {
-          const auto known = find_underside(shape, touches_[k], xi, layer.outward, deepest);
+          const auto known = find_depth(shape, touches_[k], xi, layer);
           if (!known) return;
-          const bool below = *known == deepest;
-          const LayerDepth<double> at =
-              below ? deepest_depth<double>(xi, layer.outward, deepest)
-                    : layer_depth(shape, touches_[k], xi, layer.outward, *known, layer.relaxation);
-          const bool presses = at.depth > 0 && std::isfinite(at.depth) &&
-                               dot(at.slant, at.slant) < kSteepest * kSteepest;
+          const LayerDepth<double> at = layer_depth(shape, touches_[k], xi, layer, *known);
+          const bool presses = at.depth > -layer.bulge() && std::isfinite(at.depth) &&
+                               dot(at.slant, at.slant) < kMostSlant * kMostSlant;
           if (presses && (best.target < 0 || at.depth > best.at.depth))
-            best.target = static_cast<int>(k), best.known = *known, best.deepest = below,
-            best.at = at;
+            best.target = static_cast<int>(k), best.known = *known, best.at = at;
         },
         s.grid);
   }
   if (best.target < 0) return;
-  depth_[static_cast<std::size_t>(index)] = best.at.depth;
+  depth_[place(best)] = best.at.depth;
   points_.push_back(best);
 }
 
-std::span<const double> LayeredField::pressure() const {
-  return sensor_->layer->table ? table_.pressure() : layer_.pressure();
+/// Where the numbers of a point are in arrays of groups.
+std::size_t LayeredField::place(const Point& p) const {
+  return static_cast<std::size_t>(p.group * sensor_->points() + p.index);
+}
+
+double LayeredField::pressure(const Point& p) const {
+  const auto at = static_cast<std::size_t>(p.index);
+  return sensor_->layer->table ? table_.pressure()[at]
+                               : layers_[static_cast<std::size_t>(p.group)].pressure()[at];
+}
+
+/// a k of a point on a layer [N/m].
+double LayeredField::point_stiffness() const {
+  const CompiledLayer& layer = *sensor_->layer;
+  return layer.area * layer.modulus * kn_ / (layer.stiffness * layer.compliance.own);
+}
+
+/// The load that friction has: of a contact, that of engine/layer/layer_force.hpp.
+double LayeredField::friction_load(const Point& p) const {
+  const double load = sensor_->layer->area * pressure(p);
+  if (!sensor_->layer->feedback) return load;
+  return std::min(load, point_stiffness() * std::max(0.0, p.at.depth));
+}
+
+template <class F>
+void LayeredField::for_each_law(const F& f) {
+  const auto count = static_cast<std::size_t>(sensor_->points());
+  if (sensor_->layer->table) return f(table_, std::size_t{0}, count);
+  for (std::size_t g = 0; g < layers_.size(); ++g) f(layers_[g], g * count, count);
 }
 
 void LayeredField::find_points(const SpringFields& springs) {
   points_.clear();
-  depth_.assign(static_cast<std::size_t>(sensor_->points()), 0.0);
+  depth_.assign(layers_.size() * static_cast<std::size_t>(sensor_->points()),
+                least_depth(*sensor_->layer));
   if (!(kn_ > 0)) return;
   for (int tile = 0; tile < pad_.tiles(); ++tile) {
     bool reached = false;
@@ -131,10 +157,11 @@ void LayeredField::find_points(const SpringFields& springs) {
     const double* const offset = pad_.offsets + 2 * kernels::kTactileTile * pad_.kind[tile];
     for_points_of_tile(pad_, tile, [&](int slot, int index) {
       const Vec3<double> n = vector_at(springs.normal, index);
-      add_point(
-          index,
-          {pad_.x[tile] + offset[slot], pad_.y[tile] + offset[kernels::kTactileTile + slot], 0},
-          std::sqrt(dot(n, n)));
+      for (int group = 0; group < static_cast<int>(layers_.size()); ++group)
+        add_point(
+            index, group,
+            {pad_.x[tile] + offset[slot], pad_.y[tile] + offset[kernels::kTactileTile + slot], 0},
+            std::sqrt(dot(n, n)));
     });
   }
 }
@@ -157,15 +184,20 @@ void LayeredField::read(const CompiledSensor& sensor, const kernels::TactileArgs
   touches_.assign(touch.touches, touch.touches + touch.n_touches);
   whole_.assign(springs.whole.begin(), springs.whole.end());
   normal_.assign(springs.normal.begin(), springs.normal.end());
+  int groups = 1;
+  for (const int g : sensor.target_groups) groups = std::max(groups, g + 1);
+  layers_.resize(static_cast<std::size_t>(groups));
   find_points(springs);
   const double modulus = layer.modulus * (kn_ / layer.stiffness);
-  layer.table ? table_.solve(layer, depth_, modulus) : layer_.solve(layer, depth_, modulus);
+  for_each_law([&](auto& law, std::size_t first, std::size_t count) {
+    law.solve(layer, std::span(depth_).subspan(first, count), modulus);
+  });
   std::fill(field.begin(), field.end(), 0.0);
   for (const Point& p : points_) {
-    const double load = layer.area * pressure()[static_cast<std::size_t>(p.index)];
+    const double load = layer.area * pressure(p);
     Vec3<double> f = load * in_field(p.at.slant);
-    if (p.normal > 0) f += (load / p.normal) * friction_at(p).along;
-    put(field, p.index, f);
+    if (p.normal > 0) f += (friction_load(p) / p.normal) * friction_at(p).along;
+    add_force(field, p.index, f);
   }
   // A state that is not finite is one in the springs' field.
   for (std::size_t k = 0; k < field.size(); ++k)
@@ -176,15 +208,11 @@ void LayeredField::read(const CompiledSensor& sensor, const kernels::TactileArgs
 LayerDepth<D> LayeredField::moved(const Point& p, const Touch<D>& touch,
                                   const Vec3<D>& size) const {
   const CompiledLayer& layer = *sensor_->layer;
-  if (p.deepest) return deepest_depth<D>(p.xi, layer.outward, p.known);
   const kernels::TouchShape& s = shapes_[static_cast<std::size_t>(p.target)];
   LayerDepth<D> out;
   kernels::with_distance<D>(
       s.shape, size,
-      [&](const auto& shape) {
-        out = layer_depth(shape, touch, p.xi, layer.outward, p.known, layer.relaxation);
-      },
-      s.grid);
+      [&](const auto& shape) { out = layer_depth(shape, touch, p.xi, layer, p.known); }, s.grid);
   return out;
 }
 
@@ -194,42 +222,52 @@ void LayeredField::pull_back(std::span<const double> field_bar, bool sizes, Cota
   out.stiffness = 0;
   load_bar_.assign(depth_.size(), 0.0);
   depth_bar_.resize(depth_.size());
-  slant_bar_.clear();
+  slant_bar_.clear(), held_bar_.clear();
   for (const Point& p : points_) {
-    const auto at = static_cast<std::size_t>(p.index);
-    const double load = layer.area * pressure()[at];
+    held_bar_.push_back(0);
+    const double load = layer.area * pressure(p);
     const Vec3<double> bar = vector_at(field_bar, p.index);
     double load_bar = dot(bar, in_field(p.at.slant));
     Vec3<double> slant_bar = load * to_pad(bar);
     if (p.normal > 0) {
       const Friction f = friction_at(p);
-      const double share = load / p.normal, along = dot(bar, f.along) / p.normal,
-                   out_of_plane = dot(f.normal, bar), sticks_out = dot(f.normal, f.springs);
-      load_bar += along;
+      const double held = friction_load(p), share = held / p.normal,
+                   along = dot(bar, f.along) / p.normal, out_of_plane = dot(f.normal, bar),
+                   sticks_out = dot(f.normal, f.springs);
+      if (held < load) {
+        if (held > 0) held_bar_.back() = along * point_stiffness();
+        out.stiffness += along * held / kn_;
+      } else {
+        load_bar += along;
+      }
       const Vec3<double> friction_bar = share * (bar - out_of_plane * f.normal);
-      put(out.whole, p.index, friction_bar);
-      put(out.normal, p.index,
-          -friction_bar - (share * along / p.normal) * vector_at(normal_, p.index));
+      add_force(out.whole, p.index, friction_bar);
+      add_force(out.normal, p.index,
+                -friction_bar - (share * along / p.normal) * vector_at(normal_, p.index));
       const Vec3<double> m_bar = -share * (sticks_out * bar + out_of_plane * f.springs);
       const double size = std::sqrt(dot(p.at.slant, p.at.slant));
       slant_bar += (1 / size) * to_pad(m_bar) -
                    (dot(m_bar, in_field(p.at.slant)) / (size * size * size)) * p.at.slant;
     }
-    load_bar_[at] = layer.area * load_bar;
+    load_bar_[place(p)] = layer.area * load_bar;
     slant_bar_.push_back(slant_bar);
     out.stiffness += load_bar * load / kn_;
   }
-  layer.table ? table_.pull_back(load_bar_, depth_bar_) : layer_.pull_back(load_bar_, depth_bar_);
+  for_each_law([&](auto& law, std::size_t first, std::size_t count) {
+    law.pull_back(std::span(load_bar_).subspan(first, count),
+                  std::span(depth_bar_).subspan(first, count));
+  });
+  for (std::size_t i = 0; i < points_.size(); ++i) depth_bar_[place(points_[i])] += held_bar_[i];
   for (kernels::TouchCotangent<double>& t : out.touches) t = {};
   for (std::size_t i = 0; i < points_.size(); ++i)
-    if (!points_[i].deepest) pull_back_point(points_[i], slant_bar_[i], sizes, out);
+    if (points_[i].known.by != DepthBy::end) pull_back_point(points_[i], slant_bar_[i], sizes, out);
 }
 
 /// Adds the cotangents of the motion and of the size of the shape at a point.
 void LayeredField::pull_back_point(const Point& p, const Vec3<double>& slant_bar, bool sizes,
                                    Cotangents& out) const {
   const auto target = static_cast<std::size_t>(p.target);
-  const double depth_bar = depth_bar_[static_cast<std::size_t>(p.index)];
+  const double depth_bar = depth_bar_[place(p)];
   kernels::TouchCotangent<double>& to = out.touches[target];
   const double* const own = shapes_[target].size;
   const Vec3<double> size = {own[0], own[1], own[2]}, none = {0, 0, 0};
@@ -245,7 +283,8 @@ void LayeredField::pull_back_point(const Point& p, const Vec3<double>& slant_bar
       along_axes([&](const Vec3<double>& e) { return change(e, none, none); }),
       along_axes([&](const Vec3<double>& e) { return change(none, e, none); })};
   if (sizes) to.size += along_axes([&](const Vec3<double>& e) { return change(none, none, e); });
-  const Vec3<double> rate = (depth_bar * sensor_->layer->relaxation) * p.at.slant;
+  const Vec3<double> rate =
+      (depth_bar * relaxation_at(*sensor_->layer, p.known.depth)) * p.at.slant;
   to.twist += kernels::Vec6<double>{cross(p.at.place, rate), rate};
 }
 
@@ -258,18 +297,19 @@ void LayeredField::push_forward(const SpringFields& springs_dot, std::span<const
   for (const Point& p : points_) {
     const auto target = static_cast<std::size_t>(p.target);
     const LayerDepth<D> at = moved(p, touches[target], sizes[target]);
-    depth_dot[static_cast<std::size_t>(p.index)] = at.depth.epsilon;
+    depth_dot[place(p)] = at.depth.epsilon;
     slants_dot.push_back({at.slant.x.epsilon, at.slant.y.epsilon, at.slant.z.epsilon});
   }
-  layer.table ? table_.push_forward(depth_dot, pressure_dot)
-              : layer_.push_forward(depth_dot, pressure_dot);
+  for_each_law([&](auto& law, std::size_t first, std::size_t count) {
+    law.push_forward(std::span(depth_dot).subspan(first, count),
+                     std::span(pressure_dot).subspan(first, count));
+  });
   std::fill(field_dot.begin(), field_dot.end(), 0.0);
   for (std::size_t i = 0; i < points_.size(); ++i) {
     const Point& p = points_[i];
-    const auto at = static_cast<std::size_t>(p.index);
     const Vec3<double>& slant_dot = slants_dot[i];
-    const double load = layer.area * pressure()[at],
-                 load_dot = layer.area * pressure_dot[at] + load * stiffness_dot / kn_;
+    const double load = layer.area * pressure(p),
+                 load_dot = layer.area * pressure_dot[place(p)] + load * stiffness_dot / kn_;
     Vec3<double> f = load_dot * in_field(p.at.slant) + load * in_field(slant_dot);
     if (p.normal > 0) {
       const Friction now = friction_at(p);
@@ -283,11 +323,14 @@ void LayeredField::push_forward(const SpringFields& springs_dot, std::span<const
       const Vec3<double> along_dot =
           springs - dot(now.normal, now.springs) * m_dot -
           (dot(m_dot, now.springs) + dot(now.normal, springs)) * now.normal;
-      const double inverse = 1 / p.normal,
+      const double held = friction_load(p), slope = held > 0 ? point_stiffness() : 0,
+                   held_dot = held < load ? slope * depth_dot[place(p)] + held * stiffness_dot / kn_
+                                          : load_dot,
+                   inverse = 1 / p.normal,
                    inverse_dot = -dot(n, n_dot) * inverse * inverse * inverse;
-      f += (load_dot * inverse + load * inverse_dot) * now.along + (load * inverse) * along_dot;
+      f += (held_dot * inverse + held * inverse_dot) * now.along + (held * inverse) * along_dot;
     }
-    put(field_dot, p.index, f);
+    add_force(field_dot, p.index, f);
   }
 }
 

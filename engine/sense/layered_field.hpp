@@ -3,15 +3,16 @@
 // N n and the friction T of the springs at a point, the pressure p of the layer or the table there,
 // and the normal m = slant/|slant| of the surface that presses, the force on the sensor's body is
 //   f = 𝒜 p (slant + T'/N),  T' = T - m (m·T)
-// so that friction has the cone of that load. Where N is 0 there is no friction.
+// so that friction has the cone of that load. Where N is 0 there is no friction. Where the layer is
+// the contact, each group of bodies of one link has a layer of its own.
 #pragma once
 
 #include <span>
 #include <vector>
 
+#include "engine/layer/gel_layer.hpp"
+#include "engine/layer/layer_depth.hpp"
 #include "engine/model/compiled_model.hpp"
-#include "engine/sense/gel_layer.hpp"
-#include "engine/sense/layer_depth.hpp"
 #include "engine/sense/table_pressure.hpp"
 #include "kernels/numbers/dual.hpp"
 #include "kernels/tactile/tactile_types.hpp"
@@ -48,14 +49,13 @@ class LayeredField {
                     double stiffness_dot, std::span<double> field_dot);
 
   /// Linear systems that the last read() of a layer solved.
-  [[nodiscard]] int systems() const { return layer_.systems(); }
+  [[nodiscard]] int systems() const { return layers_.front().systems(); }
 
  private:
   struct Point {
-    int index, target;
+    int index, group, target;
     kernels::Vec3<double> xi;  ///< pad axes [m]
-    double known;              ///< δ [m]
-    bool deepest;              ///< the shape goes on below the layer
+    KnownDepth known;          ///< δ
     double normal;             ///< N [N]
     LayerDepth<double> at;
   };
@@ -63,9 +63,15 @@ class LayeredField {
   struct Friction {
     kernels::Vec3<double> springs, along, normal;
   };
-  [[nodiscard]] std::span<const double> pressure() const;
+  [[nodiscard]] double pressure(const Point& p) const;
+  [[nodiscard]] std::size_t place(const Point& p) const;
+  [[nodiscard]] double point_stiffness() const;
+  [[nodiscard]] double friction_load(const Point& p) const;
+  /// Calls f with the law of each group, and where its points begin.
+  template <class F>
+  void for_each_law(const F& f);
   void find_points(const SpringFields& springs);
-  void add_point(int index, const kernels::Vec3<double>& xi, double normal);
+  void add_point(int index, int group, const kernels::Vec3<double>& xi, double normal);
   void pull_back_point(const Point& p, const kernels::Vec3<double>& slant_bar, bool sizes,
                        Cotangents& out) const;
   [[nodiscard]] bool reaches(int target, int tile) const;
@@ -83,10 +89,11 @@ class LayeredField {
   std::vector<kernels::Touch<double>> touches_;
   std::vector<Point> points_;
   std::vector<double> whole_, normal_;            // (points, 3)
-  std::vector<double> depth_;                     // (points)
-  std::vector<double> depth_bar_, load_bar_;      // (points) cotangents
+  std::vector<double> depth_;                     // (groups, points)
+  std::vector<double> depth_bar_, load_bar_;      // (groups, points) cotangents
   std::vector<kernels::Vec3<double>> slant_bar_;  // parallel to points_
-  GelLayer layer_;
+  std::vector<double> held_bar_;                  // of depths, by the loads of friction
+  std::vector<GelLayer> layers_;  // of each group of targets (CompiledSensor::target_groups)
   TablePressure table_;
 };
 

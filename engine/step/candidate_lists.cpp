@@ -15,6 +15,9 @@ using kernels::Row;
 
 namespace {
 
+/// Whether lists of a pair have the numbers of their points.
+bool has_index(const kernels::PairContact& pair) { return pair.memory >= 0 || pair.layer_pad >= 0; }
+
 /// Hands out the parts of a list of `list.stride` points from `base`; null: counts alone. Returns
 /// how many doubles they are. A lane alone needs no rows.
 template <int L, class List>
@@ -85,7 +88,7 @@ void CandidateLists<L>::reserve(const CompiledModel& m, std::size_t pair, int po
   list.stride = std::min(needed * 5 / 4 / kGroup * kGroup, search_stride(m.pairs[pair]));
   storage.numbers.resize(lay_out<L>(m.pairs[pair], nullptr, list));
   lay_out<L>(m.pairs[pair], storage.numbers.data(), list);
-  if (m.pairs[pair].memory >= 0) {
+  if (has_index(m.pairs[pair])) {
     storage.index.resize(std::size_t(L * list.stride));
     list.own_index = storage.index.data();
   }
@@ -121,7 +124,7 @@ std::size_t CandidateLists<L>::bytes(const CompiledModel& m, int most) {
       list.stride = stride_of(std::min(pair.n_points, left));
       left -= pair.n_points;
       bytes += lay_out<L>(pair, nullptr, list) * sizeof(double);
-      if (pair.memory >= 0) bytes += std::size_t(L * list.stride) * sizeof(int);
+      if (has_index(pair)) bytes += std::size_t(L * list.stride) * sizeof(int);
     }
   }
   return bytes;

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <utility>
 
+#include "engine/model/group_contacts.hpp"
 #include "engine/step/factors.hpp"
 #include "engine/step/shear_anchors.hpp"
 
@@ -153,22 +154,22 @@ static void search_lane(const CompiledModel& model, const kernels::KernelTable& 
                         BasicWorkspace<L>& w, std::size_t k, int lane, const double* pose) {
   const kernels::PairContact& pair = model.pairs[k];
   auto& list = w.candidates->lists[k];
+  const double margin = kWider * list.margin + bulge_of(model, pair);
   if (list.stride == 0) w.candidates->reserve(model, k, 1);
   for (;;) {
     const auto own = [&](auto* numbers, int per_point) {
       return numbers == nullptr ? nullptr : numbers + per_point * list.stride * lane;
     };
-    const int count =
-        table.find_candidates({&pair, size_of<L>(pair, w.stage, lane), pose, kWider * list.margin,
-                               own(list.own, 3), list.stride, faces_of<L>(w.stage, k, lane),
-                               own(list.own_index, 1), own(list.own_weights, 1)});
+    const int count = table.find_candidates(
+        {&pair, size_of<L>(pair, w.stage, lane), pose, margin, own(list.own, 3), list.stride,
+         faces_of<L>(w.stage, k, lane), own(list.own_index, 1), own(list.own_weights, 1)});
     if (count <= list.stride - kernels::kGroup) {
       list.own_count[lane] = count;
       break;
     }
     w.candidates->reserve(model, k, count);
   }
-  if (list.own_index != nullptr) set_list_anchors(model, table, w, static_cast<int>(k), lane);
+  if (list.own_anchors != nullptr) set_list_anchors(model, table, w, static_cast<int>(k), lane);
 }
 
 /// Searches the points of pair k in the lanes where they may be near.

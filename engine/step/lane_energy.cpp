@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 
+#include "engine/layer/layer_contact.hpp"
 #include "engine/step/dry_friction_state.hpp"
 #include "engine/step/rotation_log.hpp"
 #include "engine/step/shear_lane.hpp"
@@ -214,15 +215,52 @@ struct LaneAt {
     sum.moving += 0.5 * number(pair.parameters.kn) * square;
   }
 
+  /// Solves a pad's layer against the bodies of another link that move with W, with or without
+  /// friction.
+  void solve_layer(const kernels::LinkPair& links, int pad, const Frame<double>& link2_in_1,
+                   const kernels::Vec6<double>& W, bool friction, LayerContact& contact) const {
+    const LayerPad& of = model.layer_pads[std::size_t(pad)];
+    contact.begin(of);
+    for (int i = links.first; i < links.first + links.count; ++i) {
+      const auto& pair = model.pairs[std::size_t(model.pair_order[std::size_t(i)])];
+      if (pair.layer_pad != pad) continue;
+      Coefficients<double> law =
+          transformed(pair.parameters, [this](const kernels::Parameter& p) { return number(p); });
+      if (!friction) law.mu = 0;
+      contact.add_body(
+          {pair.shape, pair.grid, pair.law, pair.ramp, false, false},
+          layer_body<double>(of, pair.frame2, link2_in_1, W, law, size(pair.size, pair.size_row)));
+      for (int k = 0; k < pair.n_points; ++k)
+        contact.add_point(k, of.in_field[std::size_t(k)],
+                          {pair.points[3 * k], pair.points[3 * k + 1], pair.points[3 * k + 2]}, {});
+    }
+    contact.solve();
+  }
+
+  void add_layers(const kernels::LinkPair& links, const Frame<double>& link2_in_1) {
+    LayerContact contact;
+    for (int pad = 0; pad < static_cast<int>(model.layer_pads.size()); ++pad) {
+      solve_layer(links, pad, link2_in_1, kernels::zero6<double>(), false, contact);
+      sum.moving += contact.energy();
+      if (terms == nullptr || contact.points().empty()) continue;
+      const auto W = motion_to_parent(link2_in_1, twist(links.link2)) - twist(links.link1);
+      const double stored = dot(contact.wrench(), W);
+      solve_layer(links, pad, link2_in_1, W, true, contact);
+      terms->taken += dot(contact.wrench(), W) - stored;
+    }
+  }
+
   void add_contacts(const kernels::KernelTable& table, double* found) {
     for (const kernels::LinkPair& links : model.link_pairs) {
       const Frame<double> link2_in_1 = relative(world(links.link1), world(links.link2));
       const Vec3<double> arm =
           link2_in_1.R * links.shapes_middle + link2_in_1.p - links.points_middle;
       if (dot(arm, arm) >= links.apart * links.apart) continue;
-      for (int i = 0; i < links.count; ++i)
-        add_pair(table, std::size_t(model.pair_order[std::size_t(links.first + i)]), link2_in_1,
-                 found);
+      for (int i = 0; i < links.count; ++i) {
+        const auto k = std::size_t(model.pair_order[std::size_t(links.first + i)]);
+        if (model.pairs[k].layer_pad < 0) add_pair(table, k, link2_in_1, found);
+      }
+      if (links.layer >= 0) add_layers(links, link2_in_1);
     }
     for (const kernels::GroundContact& ground : model.grounds) {
       const Frame<double> at = world(ground.link);

@@ -47,6 +47,7 @@
 #include "engine/step/component_norms.hpp"
 #include "engine/step/detection.hpp"
 #include "engine/step/factors.hpp"
+#include "engine/step/layer_sums.hpp"
 
 namespace tangere {
 
@@ -129,6 +130,7 @@ struct Search {
         open |= 1U << l;
     with_jacobian = !factors.weighted || !factors.floored ||
                     (open != 0 && (lone(open) < 0 || open == searching));
+    set_layer_sums(model, table, w, searching, with_jacobian);
     (with_jacobian ? kernel().evaluate : kernel().residual)(model.view, w.stage, lone(searching));
     if (!std::exchange(factors.weighted, true)) kernel().set_weights(model.view, w.stage);
     if (!std::exchange(factors.floored, true)) set_floor(searching);
@@ -272,7 +274,10 @@ struct Search {
   /// trial.
   void new_directions() {
     const LaneBits accepted = std::exchange(need_jacobian, 0);
-    if (!with_jacobian) kernel().evaluate(model.view, w.stage, lone(accepted));
+    if (!with_jacobian) {
+      set_layer_sums(model, table, w, accepted, true);
+      kernel().evaluate(model.view, w.stage, lone(accepted));
+    }
     set_floor(accepted);
     // Lanes that have ended keep their factors for the next stage.
     factor(model, table, w, accepted, factors.lanes);
@@ -349,6 +354,7 @@ void evaluate_elsewhere(const CompiledModel& model, const kernels::KernelTable& 
   StageFactors<L> none;
   Search<L> s{model, table, w, unused, none, report, lanes};
   s.locate(false);
+  set_layer_sums(model, table, w, lanes, false);
   s.kernel().residual(model.view, w.stage, s.lone(lanes));
   for (int l = 0; l < L; ++l)
     if (has(lanes, l)) ++report.iterations[l];

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "engine/layer/layer_contact.hpp"
 #include "kernels/contact/elastic_contact.hpp"
 #include "kernels/step/low_points.hpp"
 
@@ -50,6 +51,8 @@ std::size_t lay_out(const CompiledModel& m, BasicWorkspace<L>& w, Row<L>* base) 
   rows(w.near.link_poses, 12 * link_pairs);
   rows(w.near.shape_poses, 12 * static_cast<int>(m.pairs.size()));
   rows(s.ground_anchors, kernels::kAnchorNumbers * m.ground_anchors);
+  rows(s.layer_sums, kernels::kPairSumNumbers * m.layer_link_pairs);
+  rows(w.pair_motions, kernels::kPairMotionNumbers * m.layer_link_pairs);
   return used;
 }
 
@@ -116,7 +119,8 @@ BasicWorkspace<L>::BasicWorkspace(const CompiledModel& m, int inner)
       stage{},
       inner_stages(inner),
       pivoted(L),
-      block_factors(m.view.pattern, L) {
+      block_factors(m.view.pattern, L),
+      layer_contact(std::make_shared<LayerContact>()) {
   memory.assign(lay_out<L>(m, *this, nullptr), LaneRow{});
   lay_out<L>(m, *this, memory.data());
   make_memory(m);

@@ -5,6 +5,7 @@
 
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -50,6 +51,8 @@ struct ShearLanes {
   std::array<std::size_t, L> next{};      ///< where shear_of_points() was in `now`
   TouchingSensorPoints sensor_points;
 };
+
+class LayerContact;
 
 template <int L>
 struct BasicWorkspace {
@@ -97,6 +100,9 @@ struct BasicWorkspace {
   Rows blocks;  ///< storage of stage.A
   BlockFactors block_factors;
   ShearLanes<L> shear;
+  LaneRow* pair_motions;  ///< (link pairs with layers, kPairMotionNumbers)
+  std::shared_ptr<LayerContact> layer_contact;
+  std::vector<int> layer_members;  ///< the pairs of its bodies
 };
 using Workspace = BasicWorkspace<kernels::kGroup>;
 using SingleWorkspace = BasicWorkspace<1>;

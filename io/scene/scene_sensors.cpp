@@ -220,6 +220,7 @@ void read_parts(const SceneNode& node, TactileDescription& sensor) {
     } else if (couples) {
       element.read(sensor.layer.emplace());
       sensor.layer->source = part.source();
+      sensor.layer->feedback = element.word("feedback") == 1;
     } else {
       element.read(sensor.imperfections);
       sensor.imperfections.source = part.source();
@@ -228,15 +229,20 @@ void read_parts(const SceneNode& node, TactileDescription& sensor) {
   }
 }
 
+/// Whether a declared contact is one of two bodies.
+bool is_contact_of(const PairContactDescription& c, const std::string& one,
+                   const std::string& other) {
+  return c.sensor.empty() && !c.second_half &&
+         ((c.general_body == one && c.primitive_body == other) ||
+          (c.general_body == other && c.primitive_body == one && c.per_area()));
+}
+
+const char* element_of(const PairContactDescription& c) {
+  return c.per_area() ? "surface_contact" : "general_primitive_contact";
+}
+
 /// Adds contacts of the points of a sensor: a pair with every sensed body.
-void add_feedback(Scene& scene, const SceneNode& node, const TactileDescription& d) {
-  if (d.coefficients.ks != 0)
-    node.fail(
-        "feedback and ks: a contact and the reading of its skin would each remember a touch "
-        "in their own way; expected one of them");
-  if (d.layer || d.table)
-    node.fail(fmt::format("feedback and {}: the contact would have springs; expected one of them",
-                          d.layer ? "<layer>" : "pressure"));
+void add_contacts(Scene& scene, const SceneNode& node, const TactileDescription& d) {
   PairContactDescription pair;
   for (const TactilePoint& p : tactile_points(d)) {
     if (p.factors != TactilePoint{}.factors)
@@ -252,18 +258,7 @@ void add_feedback(Scene& scene, const SceneNode& node, const TactileDescription&
   pair.source = d.source;
   const std::vector<int> sensed = sensed_bodies(scene, d);
   for (const int other : sensed) {
-    const BodyDescription& touched = scene.links[std::size_t(other)].body;
-    for (const PairContactDescription& c : scene.pair_contacts)
-      if (c.sensor.empty() && !c.second_half &&
-          ((c.general_body == d.body && c.primitive_body == touched.name) ||
-           (c.per_area() && c.general_body == touched.name && c.primitive_body == d.body)))
-        node.context().warnings.push_back(fmt::format(
-            "{}<{}>: '{}' and '{}' touch by the body's points and by those "
-            "of its tactile sensor '{}', which has feedback. Where both lie, the contact is as "
-            "many times stiffer, and the field shows its own share alone",
-            c.source.prefix(), c.per_area() ? "surface_contact" : "general_primitive_contact",
-            d.body, touched.name, d.name));
-    pair.primitive_body = touched.name;
+    pair.primitive_body = scene.links[std::size_t(other)].body.name;
     scene.pair_contacts.push_back(pair);
   }
   if (sensed.empty())
@@ -271,6 +266,54 @@ void add_feedback(Scene& scene, const SceneNode& node, const TactileDescription&
         fmt::format("feedback of '{}' would touch nothing; expected a body with a distance "
                     "that moves against '{}'",
                     d.name, d.body));
+}
+
+/// Lets the points of a sensor touch as springs.
+void add_feedback(Scene& scene, const SceneNode& node, const TactileDescription& d) {
+  if (d.coefficients.ks != 0)
+    node.fail(
+        "feedback and ks: a contact and the reading of its skin would each remember a touch "
+        "in their own way; expected one of them");
+  if (d.layer)
+    node.fail("feedback and <layer>: the contact would have springs; expected feedback in <layer>");
+  if (d.table)
+    node.fail("feedback and pressure: the contact would have springs; expected one of them");
+  for (const int other : sensed_bodies(scene, d))
+    for (const PairContactDescription& c : scene.pair_contacts)
+      if (const std::string& touched = scene.links[std::size_t(other)].body.name;
+          is_contact_of(c, d.body, touched))
+        node.context().warnings.push_back(fmt::format(
+            "{}<{}>: '{}' and '{}' touch by the body's points and by those "
+            "of its tactile sensor '{}', which has feedback. Where both lie, the contact is as "
+            "many times stiffer, and the field shows its own share alone",
+            c.source.prefix(), element_of(c), d.body, touched, d.name));
+  add_contacts(scene, node, d);
+}
+
+/// Lets the layer of a sensor be its contact. Its normal force relaxes by itself.
+void add_layer_feedback(Scene& scene, const SceneElement& node, TactileDescription& d) {
+  const auto fail = [&](const std::string& what) {
+    throw InputError(d.layer->source.prefix() + "<layer> of '" + d.name + "': feedback and " +
+                     what);
+  };
+  if (node.word("feedback") == 1) fail("feedback=\"true\" of the sensor; expected that of <layer>");
+  if (node.gives("kn")) fail("kn; expected modulus, which is the layer's");
+  if (node.gives("damping")) fail("damping; expected relaxation, by which the layer damps");
+  if (d.shear_at_readings) fail("memory=\"read\"; expected friction that advances at every step");
+  for (const int other : sensed_bodies(scene, d)) {
+    const BodyDescription& touched = scene.links[std::size_t(other)].body;
+    if (std::holds_alternative<MeshShape>(touched.shape))
+      fail(
+          fmt::format("the mesh '{}', whose distance is known near its surface alone; expected "
+                      "another shape, or ignores=\"{}\"",
+                      touched.name, touched.name));
+    for (const PairContactDescription& c : scene.pair_contacts)
+      if (is_contact_of(c, d.body, touched.name) || is_contact_of(c, touched.name, d.body))
+        fail(fmt::format("{}<{}> of '{}' and '{}', which would count twice; expected one of them",
+                         c.source.prefix(), element_of(c), c.general_body, c.primitive_body));
+  }
+  d.coefficients.damping = 0;
+  add_contacts(scene, node, d);
 }
 
 /// Reads names between commas; blanks beside a comma do not count.
@@ -327,7 +370,10 @@ void read_sensors(Scene& scene, const SceneNode& section) {
     for (const auto& [name, list] : {std::pair{"feels", &d.feels}, {"ignores", &d.ignores}})
       if (node.has(name)) *list = body_names(node, name);
     static_cast<void>(sensed_bodies(scene, d));  // checks the names
-    if (node.word("feedback") == 1) add_feedback(scene, node, d);
+    if (d.layer && d.layer->feedback)
+      add_layer_feedback(scene, node, d);
+    else if (node.word("feedback") == 1)
+      add_feedback(scene, node, d);
     scene.sensors.push_back(std::move(d));
   }
 }

@@ -106,7 +106,8 @@ void link_pair_parameters(const ModelView& model, const StageArgs<N>& a, const L
   for (int m = links.first; m < links.first + links.count; ++m) {
     const int k = model.pair_order[m];
     const PairContact& pair = model.pairs[k];
-    if (pair.memory >= 0) continue;  // kernels/shear/shear_pullback.hpp
+    // kernels/shear/shear_pullback.hpp, or a coupled layer
+    if (pair.memory >= 0 || pair.layer_pad >= 0) continue;
     const LawParameters<N> law =
         load_law<N>(pair.parameters, pair.law, pair.ramp, a.block, a.group);
     const Frame<N> at = compose(o.link2_in_1, broadcast<N>(pair.frame2));

@@ -32,8 +32,10 @@ struct Stage {
     Row<L>* reference;  ///< (12) pose of link 2 in link 1 at which the list was made; pairs of the
                         ///< same links share it
     double margin;
+    /// (L, stride) of each lane's points in PairContact::points; null in pairs without shear
+    /// springs and layers.
+    int* own_index;
     // Anchors of the points; null in pairs without shear springs.
-    int* own_index;       ///< (L, stride) of each lane's points in PairContact::points
     double* own_anchors;  ///< (L, kAnchorNumbers, stride)
     Row<L>* anchors;      ///< (stride, kAnchorNumbers)
     // Areas of the points; null in pairs whose coefficients count per point.
@@ -54,8 +56,10 @@ struct Stage {
   /// 0: the last Jacobian has zeros in all lanes wherever contacts alone couple dofs.
   unsigned char* coupled;
   Row<L>* ground_anchors;  ///< (points with shear springs, kAnchorNumbers)
-  Row<L>* faces;           ///< (n_pairs, 3) faces that count in this solve (kernels/step/faces.hpp)
-  std::byte* scratch;      ///< scratch_bytes(model)
+  /// (link pairs with layers, kPairSumNumbers) as StageArgs::layer_sums, each as PairSums.
+  Row<L>* layer_sums = nullptr;
+  Row<L>* faces;       ///< (n_pairs, 3) faces that count in this solve (kernels/step/faces.hpp)
+  std::byte* scratch;  ///< scratch_bytes(model)
   /// (n_link_pairs) square of the distance from LinkPair::points_middle to shapes_middle [m²], of
   /// links that are apart.
   Row<L>* between;

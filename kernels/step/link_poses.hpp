@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// World poses and twists of all links of eight environments, and those of a shape against a pad.
+// World poses and twists of all links of eight environments, and those of a shape against a pad
+// and of pairs of links.
 #pragma once
 
 #include "kernels/step/arguments.hpp"
@@ -43,6 +44,21 @@ void pad_touch(const LinkPose<N>* sensor, const Frame<double>& pad_frame, const 
   out.c = shape.p;
   out.omega = twist.a;
   out.v = twist.l;
+}
+
+/// Copies the motion of the link pairs with layers at the x of kinematics(), (those,
+/// kPairMotionNumbers). That of links that are apart is not set.
+template <class N>
+void pair_motions(const ModelView& model, const StageArgs<N>& a, N* out) {
+  for_each_link_pair(model, a, [&](int g) {
+    if (model.link_pairs[g].layer < 0 || is_apart(a, g)) return;
+    const ContactScratch<N>& o = a.contacts[g];
+    N* const to = out + kPairMotionNumbers * model.link_pairs[g].layer;
+    for (int i = 0; i < 9; ++i) to[i] = o.link2_in_1.R.m[i / 3][i % 3];
+    to[9] = o.link2_in_1.p.x, to[10] = o.link2_in_1.p.y, to[11] = o.link2_in_1.p.z;
+    to[12] = o.W.a.x, to[13] = o.W.a.y, to[14] = o.W.a.z;
+    to[15] = o.W.l.x, to[16] = o.W.l.y, to[17] = o.W.l.z;
+  });
 }
 
 }  // namespace tangere::kernels

@@ -164,6 +164,9 @@ struct PairContact {
   /// > 0: body 1 is a ball of this radius, and `points` is its centre (ball_contact.hpp) [m].
   double ball_radius = 0;
   double ball_tangent = 0;  ///< tangent of `ball_radius`, used by dual numbers alone
+  /// ≥ 0: index into the pads of layers that are contacts. Its force is in the layer sums of its
+  /// links, which are computed outside of the kernels.
+  int layer_pad = -1;
 };
 inline constexpr int kContactTile = 32;
 inline constexpr double kFarAway =
@@ -185,7 +188,13 @@ struct LinkPair {
   Vec3<double> points_middle, shapes_middle;
   double apart;
   double points_radius, shapes_radius;  ///< of these two balls, also where there are faces [m]
+  int layer = -1;  ///< ≥ 0: index into StageArgs::layer_sums, if some member has a layer
 };
+
+/// Numbers of PairSums: a wrench, and two matrices (6, 6) in blocks.
+inline constexpr int kPairSumNumbers = 6 + 2 * 36;
+/// Numbers of a pair's motion: pose of link 2 in link 1, R row-major, then p; then the twist W.
+inline constexpr int kPairMotionNumbers = 12 + 6;
 
 /// A ball that holds everything of a link that touches other links.
 struct LinkBall {

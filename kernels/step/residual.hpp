@@ -309,12 +309,22 @@ void start(PairSums<N>& sums) {
   }
 }
 
+/// Adds sums; without derivatives, only those of the wrench.
+template <bool Derivatives, class N>
+void add_sums(const PairSums<N>& from, PairSums<N>& to) {
+  to.wrench += from.wrench;
+  if constexpr (Derivatives)
+    for (int i = 0; i < 2; ++i)
+      for (int j = 0; j < 2; ++j) to.k[i][j] += from.k[i][j], to.d[i][j] += from.d[i][j];
+}
+
 /// Computes the sums over all shapes of two links. Flat and bent faces share their sums, which are
 /// about body 1's origin; those with shear springs share sums of their own.
 template <bool Derivatives, class N>
 void sum_link_pair(const ModelView& model, const LinkPair& links, const StageArgs<N>& a,
                    ContactScratch<N>& o) {
   start<Derivatives>(o.sums);
+  if (links.layer >= 0) add_sums<Derivatives>(a.layer_sums[links.layer], o.sums);
   PointSums<Derivatives, FaceSums, N> faces;
   PointSums<Derivatives, ElasticFaceSums, N> elastic_faces;
   bool any_face = false, any_elastic = false;
@@ -322,7 +332,7 @@ void sum_link_pair(const ModelView& model, const LinkPair& links, const StageArg
     const int k = model.pair_order[links.first + i];
     const PairContact& pair = model.pairs[k];
     const CandidateList<N>& list = a.candidates[k];
-    if (!has_candidates(list, a.lone)) continue;
+    if (pair.layer_pad >= 0 || !has_candidates(list, a.lone)) continue;
     LawParameters<N> law = load_law<N>(pair.parameters, pair.law, pair.ramp, a.block, a.group);
     soften(a, law);
     const auto frame = [&] { return compose(o.link2_in_1, broadcast<N>(pair.frame2)); };

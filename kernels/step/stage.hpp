@@ -92,6 +92,8 @@ struct StageArgs {
   N* ball_moves = nullptr;
   unsigned char* coupled;   ///< as in Stage; null: not computed
   const N* ground_anchors;  ///< (points with shear springs, kAnchorNumbers)
+  /// (link pairs with layers) sums of their layers' contacts, for link pairs that are not apart.
+  const PairSums<N>* layer_sums = nullptr;
   const N* faces;  ///< (n_pairs, 3) faces that count in this solve (kernels/step/faces.hpp)
   int lone;  ///< the only lane whose result matters; its contacts are summed across points. -1: all
              ///< lanes matter

@@ -33,6 +33,9 @@ struct StageKernels {
                    const Row<L>* zero, LinkPose<Row<L>>* out);
   /// Tests the bounds of pairs against shapes at the poses of kinematics().
   void (*near_pairs)(const ModelView&, const Stage<L>&, NearPairs<L>& out);
+  /// Copies the motion of the link pairs with layers at the x of kinematics(), (those,
+  /// kPairMotionNumbers). That of links that are apart is not set.
+  void (*pair_motions)(const ModelView&, const Stage<L>&, Row<L>* out);
   /// Computes g, v and force_scale at the x of kinematics(). `lone`: the only lane whose result
   /// matters; -1: all lanes matter.
   void (*residual)(const ModelView&, const Stage<L>&, int lone);

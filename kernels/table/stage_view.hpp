@@ -103,6 +103,8 @@ struct StageView {
     a.apart = s.apart;
     a.coupled = s.coupled;
     a.ground_anchors = view(s.ground_anchors);
+    static_assert(sizeof(PairSums<N>) == kPairSumNumbers * sizeof(N));
+    a.layer_sums = reinterpret_cast<const PairSums<N>*>(s.layer_sums);
     a.faces = view(s.faces);
     a.lone = lone;
     a.centre = view(s.centre);

@@ -43,6 +43,9 @@ void add_step_kernels(StageKernels<L>& k) {
   k.near_pairs = [](const ModelView& m, const Stage<L>& s, NearPairs<L>& out) {
     kernels::near_pairs(m, View::arguments(m, s, -1), out);
   };
+  k.pair_motions = [](const ModelView& m, const Stage<L>& s, Row<L>* out) {
+    kernels::pair_motions(m, View::arguments(m, s, -1), View::view(out));
+  };
   k.residual = [](const ModelView& m, const Stage<L>& s, int lone) {
     kernels::residual<false>(m, View::arguments(m, s, lone));
   };

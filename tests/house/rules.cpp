@@ -13,7 +13,6 @@
 namespace tangere::house {
 namespace fs = std::filesystem;
 namespace {
-
 using Names = std::set<std::string, std::less<>>;
 
 struct Folder {
@@ -44,11 +43,15 @@ const std::map<std::string, Folder, std::less<>>& folders() {
       {"engine/base", {{}, of_engine}},
       {"engine/scene", {{"engine/base", "kernels"}, of_engine}},
       {"engine/model", {{"engine/scene", "engine/base", "kernels"}, of_engine}},
-      {"engine/step", {{"engine/model", "engine/scene", "engine/base", "kernels"}, of_engine}},
+      {"engine/layer", {{"engine/model", "engine/scene", "engine/base", "kernels"}, of_engine}},
+      {"engine/step",
+       {{"engine/layer", "engine/model", "engine/scene", "engine/base", "kernels"}, of_engine}},
       {"engine/sense",
-       {{"engine/step", "engine/model", "engine/scene", "engine/base", "kernels"}, of_engine}},
+       {{"engine/step", "engine/layer", "engine/model", "engine/scene", "engine/base", "kernels"},
+        of_engine}},
       {"engine/derivative",
-       {{"engine/sense", "engine/step", "engine/model", "engine/scene", "engine/base", "kernels"},
+       {{"engine/sense", "engine/step", "engine/layer", "engine/model", "engine/scene",
+         "engine/base", "kernels"},
         of_engine}},
       {"engine/rows", {{"engine/step", "engine/model", "engine/scene", "engine/base"}, of_engine}},
       {"tasks/catalogue", {{"engine", "kernels"}, of_tasks}},

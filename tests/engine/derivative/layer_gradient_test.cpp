@@ -35,6 +35,13 @@ Scene layer_scene(PrimitiveShape shape, Pad pad) {
   return s;
 }
 
+/// The same layer by the law that it has where it is the contact.
+Scene contact_scene(PrimitiveShape shape, Pad pad) {
+  Scene s = layer_scene(shape, pad);
+  s.sensors[0].layer->feedback = true;
+  return s;
+}
+
 /// The same pad with pressures by depth.
 Scene table_scene(PrimitiveShape shape, Pad pad) {
   Scene s = testing::pad_scene(shape, ContactLaw::clamped, pad);
@@ -144,6 +151,14 @@ INSTANTIATE_TEST_SUITE_P(
                        ::testing::Values(PrimitiveShape::sphere, PrimitiveShape::cuboid,
                                          PrimitiveShape::cylinder, PrimitiveShape::capsule,
                                          PrimitiveShape::ellipsoid, PrimitiveShape::mesh),
+                       ::testing::Values(Pad::flat, Pad::skewed)));
+
+INSTANTIATE_TEST_SUITE_P(
+    Contacts, LayerGradient,
+    ::testing::Combine(::testing::Values(&contact_scene),
+                       ::testing::Values(PrimitiveShape::sphere, PrimitiveShape::cuboid,
+                                         PrimitiveShape::cylinder, PrimitiveShape::capsule,
+                                         PrimitiveShape::ellipsoid),
                        ::testing::Values(Pad::flat, Pad::skewed)));
 
 /// p is proportional to E, so by kn the normal force has the derivative N/kn.

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Tests the pressures of a coupled layer against its equations and closed forms (docs/layer.md).
 // Lengths in mm, moduli in MPa.
-#include "engine/sense/gel_layer.hpp"
+#include "engine/layer/gel_layer.hpp"
 
 #include <gtest/gtest.h>
 

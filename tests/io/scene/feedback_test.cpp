@@ -57,5 +57,34 @@ TEST(Feedback, RefusesAndWarns) {
               Contains(AllOf(HasSubstr("s.xml:16:"), HasSubstr("'table' and 'ball' touch"))));
 }
 
+TEST(Feedback, OfALayerRefusesWhatItWouldNotCompute) {
+  const std::string gel = with(
+      R"(kn="400" kt="0.2"
+ mu="0.7" damping="20" feedback="true"/>)",
+      R"(modulus="4e4" thickness="4e-3" mu="1"><layer feedback="true"/></tactile>)", kTable);
+  const Scene scene = feedback_scene(gel);
+  ASSERT_EQ(scene.pair_contacts.size(), 1U);
+  EXPECT_EQ(scene.pair_contacts[0].first_name(), "tactile skin");
+  EXPECT_EQ(scene.pair_contacts[0].coefficients.damping, 0);
+  EXPECT_GT(scene.pair_contacts[0].coefficients.ks, 0);
+  EXPECT_THAT(
+      feedback_refusal(with(
+          "<sensor>",
+          R"(<contact><surface_contact body1="ball" body2="table" kn="1e8"/></contact><sensor>)",
+          gel)),
+      AllOf(HasSubstr("<layer> of 'skin': feedback and s.xml:16: <surface_contact>"),
+            HasSubstr("'ball' and 'table', which would count twice")));
+  EXPECT_THAT(feedback_refusal(with("mu=\"1\">", "mu=\"1\" damping=\"2\">", gel)),
+              HasSubstr("feedback and damping; expected relaxation"));
+  EXPECT_THAT(feedback_refusal(with("mu=\"1\">", "mu=\"1\" feedback=\"true\">", gel)),
+              HasSubstr("expected that of <layer>"));
+  EXPECT_THAT(feedback_refusal(with("mu=\"1\">", "mu=\"1\" every=\"2\" memory=\"read\">", gel)),
+              HasSubstr("friction that advances at every step"));
+  EXPECT_THAT(
+      feedback_refusal(with("<layer feedback=\"true\"/>", "<layer/>",
+                            with("mu=\"1\">", "mu=\"1\" ks=\"0\" feedback=\"true\">", gel))),
+      HasSubstr("expected feedback in <layer>"));
+}
+
 }  // namespace
 }  // namespace tangere

@@ -114,7 +114,7 @@ TEST(ShippedScenes, AreAllRunHere) {
                                      "rolling_ball",  "rolling_ball_small",
                                      "stable_grasp",  "stable_grasp_elastic",
                                      "ten_boxes",     "grip_rod",
-                                     "gel_press"};
+                                     "gel_press",     "gel_grasp"};
   EXPECT_EQ(found, run) << "a scene without a test of what it does, or a test without a scene";
 }
 
@@ -142,6 +142,19 @@ TEST(ShippedScenes, AGelPressesABallAndRollsIt) {
     EXPECT_GT(r.touch(r.at(0.12), e, 0).pressure, 1);
     EXPECT_GT(r.touch(r.at(0.12), e, 0).points, 100);
     EXPECT_GT(r.q(r.at(0.48), e, "ball.x") - r.q(0, e, "ball.x"), 1e-3);
+  }
+}
+
+/// The gels are the only contact of the fingers.
+TEST(ShippedScenes, GelsGripARodAndHoldIt) {
+  const SceneRun r("gel_grasp");
+  EXPECT_EQ(r.steps, 500);
+  EXPECT_EQ(r.failed, 0);
+  for (int e = 0; e < kEnvironments; ++e) {
+    EXPECT_GT(r.touch(r.at(0.9), e, 0).pressure, 3);
+    const auto height = [&](double time) { return r.body(r.at(time), e, "rod", 2); };
+    EXPECT_NEAR(height(0.98) - r.body(0, e, "rod", 2), 0.04, 1e-3);
+    EXPECT_NEAR(height(0.98), height(0.8), 1e-6) << "it slides out of the fingers";
   }
 }
 

@@ -2,7 +2,7 @@
 // The layer is solved with E = 1: its pressures are proportional to E. Sums run over points and
 // cells in order, and the factorisation adds rows to rows, so that results depend on the depths
 // alone.
-#include "engine/sense/gel_layer.hpp"
+#include "engine/layer/gel_layer.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -163,6 +163,7 @@ void GelLayer::share_loads() {
   const int whole = layer_->side * layer_->side;
   for (const int i : near_) sum_[static_cast<std::size_t>(i)] = 0;
   for (const int s : touching_) {
+    if (layer_->feedback) break;
     const auto at = static_cast<std::size_t>(s);
     left_[at] = std::max(0.0, depth_[at] - between_cells(s));
     sum_[cell(s)] += left_[at];
@@ -197,7 +198,7 @@ void GelLayer::solve(const CompiledLayer& layer, std::span<const double> depth, 
   std::vector<double>& marks = sum_;
   double most = 0;
   for (std::size_t s = 0; s < depth.size(); ++s) {
-    if (!(depth[s] > 0)) continue;
+    if (!(depth[s] > least_depth(layer))) continue;
     touching_.push_back(static_cast<int>(s));
     most = std::max(most, depth[s]);
     marks[cell(static_cast<int>(s))] = 1;
@@ -281,8 +282,10 @@ void GelLayer::push_forward(std::span<const double> depth_dot, std::span<double>
   for (std::size_t a = 0; a < rhs_.size(); ++a)
     load_dot[static_cast<std::size_t>(pressing_[a])] = rhs_[a];
   couple(pressing_, load_dot, near_, yield_dot);
-  std::vector<double> left_dot(depth_.size()), sum_dot(sum_.size());
+  std::vector<double> left_dot(layer_->feedback ? 0 : depth_.size()),
+      sum_dot(layer_->feedback ? 0 : sum_.size());
   for (const int s : touching_) {
+    if (layer_->feedback) break;
     const auto at = static_cast<std::size_t>(s);
     if (!(left_[at] > 0)) continue;
     const CellWeights& w = layer_->weights[at];
@@ -302,6 +305,48 @@ void GelLayer::push_forward(std::span<const double> depth_dot, std::span<double>
     else if (presses_[at] != 0)
       own = stiffness_ * (depth_dot[at] - yield_dot[i]);
     pressure_dot[at] = modulus_ * own;
+  }
+}
+
+// On pressing cells w = δ̄ - P m²/(k n).
+void GelLayer::push_forward(std::span<const Directions> depth_dot,
+                            std::span<Directions> pressure_dot) {
+  const auto add = [](Directions& to, double factor, const Directions& x) {
+    for (std::size_t k = 0; k < x.size(); ++k) to[k] += factor * x[k];
+  };
+  const auto scale = [](Directions& x, double factor) {
+    for (double& a : x) a *= factor;
+  };
+  const std::size_t n = pressing_.size();
+  mean_dot_.resize(count_.size());
+  for (const int i : pressing_) mean_dot_[static_cast<std::size_t>(i)] = {};
+  for (const int s : touching_)
+    if (const std::size_t i = cell(s); presses_[static_cast<std::size_t>(s)] != 0)
+      add(mean_dot_[i], 1.0 / count_[i], depth_dot[static_cast<std::size_t>(s)]);
+  std::vector<Directions>& x = cell_dot_;
+  x.clear();
+  for (const int i : pressing_) x.push_back(mean_dot_[static_cast<std::size_t>(i)]);
+  for (std::size_t a = 0; a < n; ++a) {
+    const double* const u = &factor_[a * n];
+    scale(x[a], 1 / u[a]);
+    for (std::size_t b = a + 1; b < n; ++b) add(x[b], -u[b], x[a]);
+  }
+  for (std::size_t a = n; a-- > 0;) {
+    const double* const u = &factor_[a * n];
+    for (std::size_t b = a + 1; b < n; ++b) add(x[a], -u[b], x[b]);
+    scale(x[a], 1 / u[a]);
+  }
+  const double whole = layer_->side * layer_->side * layer_->compliance.own;
+  for (std::size_t a = 0; a < n; ++a) {
+    const auto i = static_cast<std::size_t>(pressing_[a]);
+    add(mean_dot_[i], -whole / count_[i], x[a]);
+  }
+  for (const int s : touching_) {
+    const auto at = static_cast<std::size_t>(s);
+    Directions& out = pressure_dot[at] = {};
+    if (presses_[at] == 0) continue;
+    add(out, modulus_ * stiffness_, depth_dot[at]);
+    add(out, -modulus_ * stiffness_, mean_dot_[cell(s)]);
   }
 }
 

@@ -9,9 +9,13 @@
 // changes n_i until they agree with P. The points of a cell share its load by the depths that the
 // layer leaves, with w between cells by bilinear weights B:
 //   p_s = m² P_i r_s/R_i,  r = max(0, δ - B w),  R_i = Σ r_s over the cell
-// or p_s = k max(0, δ_s - w_i) where R_i is 0.
+// or p_s = k max(0, δ_s - w_i) where R_i is 0, and at all points where the layer is the contact:
+// then p is the derivative of an energy by the depths, which is a ½ Σ p_s δ_s, a the area of a
+// point.
 #pragma once
 
+#include <array>
+#include <cmath>
 #include <span>
 #include <vector>
 
@@ -19,12 +23,16 @@
 
 namespace tangere {
 
+/// The depth of a point that nothing can press. Points that only the bulge of the gel may press
+/// have negative depths.
+inline double least_depth(const CompiledLayer& layer) { return layer.feedback ? -HUGE_VAL : 0; }
+
 /// Solves one sensor's layer at a time. Owns the scratch of one thread, which grows with the number
 /// of cells in contact.
 class GelLayer {
  public:
-  /// Solves the layer for depths δ, (points) [m], with E = `modulus` [Pa]. Points with δ ≤ 0 do not
-  /// press. The functions below refer to this solution.
+  /// Solves the layer for depths δ, (points) [m], with E = `modulus` [Pa]. Points with
+  /// δ ≤ least_depth() do not press. The functions below refer to this solution.
   void solve(const CompiledLayer& layer, std::span<const double> depth, double modulus);
 
   /// p, (points) [Pa]; 0 where a point does not press.
@@ -39,6 +47,10 @@ class GelLayer {
   void pull_back(std::span<const double> pressure_bar, std::span<double> depth_bar);
   /// Computes how the pressures change with the depths, (points), at a given E.
   void push_forward(std::span<const double> depth_dot, std::span<double> pressure_dot);
+  /// The same along several directions, for a layer that is the contact: (points), of which those
+  /// with δ > least_depth() are read and set.
+  using Directions = std::array<double, 12>;
+  void push_forward(std::span<const Directions> depth_dot, std::span<Directions> pressure_dot);
 
  private:
   bool update_pressing();
@@ -58,7 +70,7 @@ class GelLayer {
   double stiffness_ = 0;                         ///< k at E = 1 [1/m]
   double modulus_ = 0;                           ///< E [Pa]
   double rounding_ = 0;                          ///< differences of depths that are rounding [m]
-  std::vector<int> touching_;                    ///< points with δ > 0
+  std::vector<int> touching_;                    ///< points with δ > least_depth()
   std::vector<double> depth_, left_, pressure_;  ///< (points) δ, r, p
   std::vector<char> presses_;                    ///< (points) δ_s > w_i
   std::vector<int> near_, pressing_;  ///< cells that touching points are in or near; with n_i > 0
@@ -66,6 +78,7 @@ class GelLayer {
   std::vector<double> mean_, load_, yield_, sum_;  ///< (cells) δ̄, P at E = 1, w, R
   std::vector<double> load_bar_, yield_bar_;       ///< (cells) cotangents, or tangents
   std::vector<double> factor_, rhs_;  ///< (pressing, pressing) U with M = Uᵀ U; (pressing)
+  std::vector<Directions> mean_dot_, cell_dot_;  ///< (cells); (pressing)
   int systems_ = 0;
 };
 

@@ -1,0 +1,114 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copies one lane's numbers to the contact of a layer, and its sums back to rows.
+#include "engine/step/layer_sums.hpp"
+
+#include "engine/step/shear_lane.hpp"
+
+namespace tangere {
+
+using kernels::Row;
+
+namespace {
+
+/// Returns the coefficients of a pair in one lane, softened as those of other contacts.
+template <int L>
+Coefficients<double> softened_law(const kernels::PairContact& pair, const kernels::Stage<L>& stage,
+                                  int lane) {
+  Coefficients<double> law = transformed(
+      pair.parameters, [&](const kernels::Parameter& p) { return number_of<L>(p, stage, lane); });
+  law.kn *= stage.normal_share[lane];
+  law.damping *= stage.normal_share[lane];
+  law.kt *= stage.friction_share[lane];
+  law.ks *= stage.friction_share[lane];
+  return law;
+}
+
+template <int L>
+kernels::Vec3<double> size_in_lane(const kernels::PairContact& pair, const kernels::Stage<L>& stage,
+                                   int lane) {
+  if (pair.size_row < 0) return pair.size;
+  const auto number = [&](int i) { return number_of<L>({0, pair.size_row + i}, stage, lane); };
+  return {number(0), number(1), number(2)};
+}
+
+/// Adds the candidates of a pair.
+template <int L>
+void add_candidates(const LayerPad& pad, const typename kernels::Stage<L>::List& list, int lane,
+                    LayerContact& contact) {
+  const double* const place = list.own + 3 * list.stride * lane;
+  const double* const anchors =
+      list.own_anchors == nullptr ? nullptr
+                                  : list.own_anchors + kernels::kAnchorNumbers * list.stride * lane;
+  const auto number = [&](int k, int i) {
+    return anchors == nullptr ? 0.0 : anchors[i * list.stride + k];
+  };
+  for (int k = 0; k < list.own_count[lane]; ++k) {
+    const int index = pad.in_field[std::size_t(list.own_index[list.stride * lane + k])];
+    contact.add_point(k, index, {place[k], place[list.stride + k], place[2 * list.stride + k]},
+                      kernels::load_anchor<double>([&](int i) { return number(k, i); }));
+  }
+}
+
+}  // namespace
+
+template <int L>
+void solve_layer(const CompiledModel& m, BasicWorkspace<L>& w, const kernels::LinkPair& links,
+                 int pad, int lane) {
+  const Row<L>* const row = w.pair_motions + kernels::kPairMotionNumbers * links.layer;
+  kernels::Frame<double> link2_in_1;
+  for (int i = 0; i < 9; ++i) link2_in_1.R.m[i / 3][i % 3] = row[i][lane];
+  link2_in_1.p = {row[9][lane], row[10][lane], row[11][lane]};
+  const kernels::Vec6<double> twist = {{row[12][lane], row[13][lane], row[14][lane]},
+                                       {row[15][lane], row[16][lane], row[17][lane]}};
+  const LayerPad& of = m.layer_pads[std::size_t(pad)];
+  w.layer_members.clear();
+  w.layer_contact->begin(of);
+  for (int i = links.first; i < links.first + links.count; ++i) {
+    const int k = m.pair_order[std::size_t(i)];
+    const kernels::PairContact& pair = m.pairs[std::size_t(k)];
+    const auto& list = w.candidates->lists[std::size_t(k)];
+    if (pair.layer_pad != pad || list.own_count[lane] == 0) continue;
+    w.layer_members.push_back(k);
+    const Coefficients<double> law = softened_law<L>(pair, w.stage, lane);
+    w.layer_contact->add_body({pair.shape, pair.grid, pair.law, pair.ramp, pair.memory >= 0,
+                               w.stage.friction_tangent[lane] == 0},
+                              layer_body<double>(of, pair.frame2, link2_in_1, twist, law,
+                                                 size_in_lane<L>(pair, w.stage, lane)));
+    add_candidates<L>(of, list, lane, *w.layer_contact);
+  }
+  w.layer_contact->solve();
+}
+
+template <int L>
+void set_layer_sums(const CompiledModel& m, const kernels::KernelTable& table, BasicWorkspace<L>& w,
+                    LaneBits lanes, bool derivatives) {
+  if (m.layer_pads.empty()) return;
+  table.stage<L>().pair_motions(m.view, w.stage, w.pair_motions);
+  Row<L>* const rows = w.stage.layer_sums;
+  for (int i = 0; i < kernels::kPairSumNumbers * m.layer_link_pairs; ++i)
+    for (int l = 0; l < L; ++l)
+      if (has(lanes, l)) rows[i][l] = 0;
+  for_each_layer(m, w, [&](const kernels::LinkPair& links, int pad) {
+    for (int l = 0; l < L; ++l) {
+      if (!has(lanes, l)) continue;
+      solve_layer(m, w, links, pad, l);
+      if (w.layer_contact->points().empty()) continue;
+      auto sums = kernels::PairSums<double>::zero();
+      w.layer_contact->add_to(sums, derivatives);
+      const double* const from = &sums.wrench.a.x;
+      Row<L>* const to = rows + kernels::kPairSumNumbers * links.layer;
+      for (int i = 0; i < kernels::kPairSumNumbers; ++i) to[i][l] += from[i];
+    }
+  });
+}
+
+#define TANGERE_FOR_LANES(L)                                                                    \
+  template void solve_layer(const CompiledModel&, BasicWorkspace<L>&, const kernels::LinkPair&, \
+                            int, int);                                                          \
+  template void set_layer_sums(const CompiledModel&, const kernels::KernelTable&,               \
+                               BasicWorkspace<L>&, LaneBits, bool);
+TANGERE_FOR_LANES(kernels::kGroup)
+TANGERE_FOR_LANES(1)
+#undef TANGERE_FOR_LANES
+
+}  // namespace tangere
