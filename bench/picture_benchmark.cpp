@@ -15,8 +15,9 @@ constexpr double kPitch = 4e-4, kRadius = 4e-3, kDeepest = 1e-3;  // [m]
 PictureDescription picture_of(const benchmark::State& state, double noise) {
   PictureDescription picture;
   picture.rows = static_cast<int>(state.range(2)), picture.cols = static_cast<int>(state.range(3));
-  picture.gel = default_gel();
-  picture.gel.reach = 8e-4;
+  Gel gel = default_gel();
+  gel.reach = 8e-4;
+  picture.gel = std::make_shared<const Gel>(std::move(gel));
   picture.noise = noise;
   return picture;
 }

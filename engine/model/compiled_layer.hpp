@@ -29,7 +29,7 @@ struct CompiledLayer {
   int outward = 1;        ///< 1 or -1: whether the pad's z points out of the skin
   std::array<int, 2> direction{1, 1};          ///< 1 or -1: whether rows count along axis0, cols
                                                ///< along axis1
-  std::optional<SurfaceCompliance> surface{};  ///< of a sensor with markers
+  std::optional<SurfaceCompliance> surface{};  ///< of a sensor with markers or pictures
 };
 
 }  // namespace tangere

@@ -34,8 +34,7 @@ TANGERE_CLONES void interleave(const std::uint8_t* planes, std::uint8_t* to, std
 
 PictureGrid picture_grid(const PictureDescription& picture, int rows, int cols, double pitch_x,
                          double pitch_y) {
-  const std::array<double, 2> size =
-      picture.size.value_or(std::array<double, 2>{rows * pitch_y, cols * pitch_x});
+  const std::array<double, 2> size = shown_size(picture, rows, cols, {pitch_y, pitch_x});
   return {rows, cols, pitch_x, pitch_y, picture.rows, picture.cols, size[1], size[0]};
 }
 
@@ -44,10 +43,10 @@ GelCamera<T>::GelCamera(const PictureGrid& grid, const PictureDescription& pictu
     : grid_(grid),
       noise_(picture.noise),
       gain_(picture.gain),
-      membrane_(grid.rows, grid.cols, picture.gel.reach.value_or(reach) / grid.pitch_x,
-                picture.gel.reach.value_or(reach) / grid.pitch_y),
-      image_(grid, picture.gel.blur),
-      colour_(picture.gel, grid.height, grid.width),
+      membrane_(grid.rows, grid.cols, picture.gel->reach.value_or(reach) / grid.pitch_x,
+                picture.gel->reach.value_or(reach) / grid.pitch_y),
+      image_(grid, picture.gel->blur),
+      colour_(*picture.gel, grid.height, grid.width),
       depth_(static_cast<std::size_t>(grid.points())),
       surface_(depth_.size()),
       p_(static_cast<std::size_t>(grid.width)),
@@ -121,14 +120,14 @@ void GelCamera<T>::read(bool markers, std::span<T> colours) {
 }
 
 template <class T>
-void GelCamera<T>::read(bool markers, std::span<std::uint8_t> colours) {
-  if constexpr (std::is_same_v<T, float>)
-    for (int row = 0; row < grid_.height; ++row) {
-      paint(row, markers);
-      round_row(planes_.data(), bytes_.data(), planes_.size());
-      interleave(bytes_.data(), colours.data() + static_cast<std::size_t>(row) * planes_.size(),
-                 p_.size());
-    }
+void GelCamera<T>::read(bool markers,
+                        std::span<std::uint8_t> colours) requires std::is_same_v<T, float> {
+  for (int row = 0; row < grid_.height; ++row) {
+    paint(row, markers);
+    round_row(planes_.data(), bytes_.data(), planes_.size());
+    interleave(bytes_.data(), colours.data() + static_cast<std::size_t>(row) * planes_.size(),
+               p_.size());
+  }
 }
 
 template <class T>

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// The camera behind a gel: from the depth of a body at the points of a pad to the gel's surface, and
-// from there to pictures (docs/pictures.md).
+// The camera behind a gel: from the depth of a body at the points of a pad to the gel's surface,
+// and from there to pictures (docs/pictures.md).
 #pragma once
 
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <type_traits>
 #include <vector>
 
 #include "engine/picture/camera_noise.hpp"
@@ -41,7 +42,7 @@ class GelCamera {
   /// Computes colours, (height, width, 3), from 0 to 255. `markers`: with printed markers.
   void read(bool markers, std::span<T> colours);
   /// The same, rounded to whole levels.
-  void read(bool markers, std::span<std::uint8_t> colours);
+  void read(bool markers, std::span<std::uint8_t> colours) requires std::is_same_v<T, float>;
 
   /// Computes the cotangent of the surface from those of the height, (height, width), and of the
   /// colours, (height, width, 3); one of them may be empty. Clamped numbers have no derivative, and

@@ -30,7 +30,7 @@ class GelColour {
 
   /// Returns the background of a row, (3, width): R of all pixels, then G, then B.
   [[nodiscard]] std::span<const T> background(int row) const;
-  /// Computes the colours of a row, (3, width), from its slopes, (width) each. They are not clamped.
+  /// Computes the colours of a row, (3, width), not clamped, from its slopes, (width) each.
   void shade(int row, std::span<const T> p, std::span<const T> q, std::span<T> planes) const;
   /// Computes the cotangents of the slopes of a row from those of its colours, (3, width).
   void pull_back(int row, std::span<const T> p, std::span<const T> q, std::span<const T> planes_bar,

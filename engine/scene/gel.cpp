@@ -24,4 +24,10 @@ Gel default_gel() {
   return gel;
 }
 
+std::array<double, 2> shown_size(const PictureDescription& picture, int rows, int cols,
+                                 const std::array<double, 2>& pitch) {
+  return picture.size.value_or(
+      std::array<double, 2>{rows * std::abs(pitch[0]), cols * std::abs(pitch[1])});
+}
+
 }  // namespace tangere

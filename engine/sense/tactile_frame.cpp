@@ -31,8 +31,9 @@ DenseFrame<T>::DenseFrame(const Model& model, int sensor, FieldForm form)
       form_(form),
       values_(numbers_of(checked(model, sensor).points(), form)),
       written_(std::size_t(checked(model, sensor).n_tiles())) {
-  if (form == FieldForm::sum)
-    throw InputError("a frame of a sum; expected a field, a pressure or a shear");
+  if (form == FieldForm::sum || is_picture(form))
+    throw InputError(std::string("a frame of the reading '") + to_string(form) +
+                     "'; expected a field, a pressure or a shear");
 }
 
 template <class T>

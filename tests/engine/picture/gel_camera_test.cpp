@@ -30,10 +30,16 @@ Gel random_gel(unsigned seed) {
   return gel;
 }
 
+Gel grey_gel(float level) {
+  Gel gel;
+  gel.background = {1, 1, {level, level, level}};
+  return gel;
+}
+
 PictureDescription picture_of(Gel gel, int rows, int cols) {
   PictureDescription picture;
   picture.rows = rows, picture.cols = cols;
-  picture.gel = std::move(gel);
+  picture.gel = std::make_shared<const Gel>(std::move(gel));
   return picture;
 }
 
@@ -75,7 +81,7 @@ TEST(GelCamera, ShowsTheBackgroundWhereNothingTouches) {
   GelCamera<float> camera = camera_of<float>(picture, 9, 11);
   const std::vector<std::uint8_t> found = bytes(camera, std::vector<float>(99));
   for (std::size_t k = 0; k < found.size(); ++k)
-    ASSERT_EQ(found[k], picture.gel.background.levels[k]) << k;
+    ASSERT_EQ(found[k], picture.gel->background.levels[k]) << k;
   std::vector<float> height(12 * 16, 1);
   camera.read_height(height);
   EXPECT_EQ(height, std::vector<float>(12 * 16, 0));
@@ -83,8 +89,8 @@ TEST(GelCamera, ShowsTheBackgroundWhereNothingTouches) {
 
 TEST(GelCamera, AveragesTheBackgroundOverLargerPixels) {
   const PictureDescription picture = picture_of(random_gel(2), 6, 4);
-  const GelColour<double> colour(picture.gel, 6, 4);
-  const std::vector<float>& given = picture.gel.background.levels;
+  const GelColour<double> colour(*picture.gel, 6, 4);
+  const std::vector<float>& given = picture.gel->background.levels;
   double sum = 0;  // of pixel (1, 2), green
   for (int i = 2; i < 4; ++i)
     for (int j = 8; j < 12; ++j) sum += given[std::size_t((i * 16 + j) * 3 + 1)];
@@ -171,8 +177,7 @@ TEST(GelCamera, IsLinearInItsLamps) {
 
 TEST(GelCamera, MovesPrintedMarkersWithTheField) {
   for (const double radius : {6.0, 2.0}) {
-    PictureDescription picture = picture_of({}, 240, 320);
-    picture.gel.background = {1, 1, {200, 200, 200}};
+    PictureDescription picture = picture_of(grey_gel(200), 240, 320);
     picture.markers = {9, 7};
     const double pixel = kPitch * 30 / 240;
     picture.marker_radius = radius * pixel;
@@ -198,8 +203,7 @@ TEST(GelCamera, MovesPrintedMarkersWithTheField) {
 }
 
 TEST(GelCamera, DrawsNoiseByPixelAndStepAndGainsByEpisode) {
-  PictureDescription picture = picture_of({}, 60, 80);
-  picture.gel.background = {1, 1, {100, 100, 100}};
+  PictureDescription picture = picture_of(grey_gel(100), 60, 80);
   picture.noise = 2, picture.gain = 0.05;
   GelCamera<double> camera = camera_of<double>(picture, 9, 12);
   const auto drawn = [&](const CameraKey& key) {

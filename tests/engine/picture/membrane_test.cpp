@@ -13,19 +13,19 @@ namespace tangere {
 namespace {
 
 using Numbers = std::vector<double>;
-constexpr double kPitch = 1e-4, kReach = 5e-4, kRadius = 4e-3;  // [m]
+constexpr double kDistance = 1e-4, kDentReach = 5e-4, kBallRadius = 4e-3;  // [m]
 
 struct Grid {
   int rows, cols;
-  [[nodiscard]] double x(int col) const { return (col - (cols - 1) / 2) * kPitch; }
-  [[nodiscard]] double y(int row) const { return (row - (rows - 1) / 2) * kPitch; }
+  [[nodiscard]] double x(int col) const { return (col - (cols - 1) / 2) * kDistance; }
+  [[nodiscard]] double y(int row) const { return (row - (rows - 1) / 2) * kDistance; }
   [[nodiscard]] std::size_t size() const { return std::size_t(rows) * std::size_t(cols); }
 };
 
 /// Depth of a round body of radius R whose lowest point is `deepest` below the surface.
 double round_depth(double distance, double deepest) {
-  const double square = kRadius * kRadius - distance * distance;
-  return square > 0 ? std::max(0.0, deepest - kRadius + std::sqrt(square)) : 0;
+  const double square = kBallRadius * kBallRadius - distance * distance;
+  return square > 0 ? std::max(0.0, deepest - kBallRadius + std::sqrt(square)) : 0;
 }
 
 template <class F>
@@ -37,7 +37,7 @@ Numbers on(const Grid& grid, const F& f) {
 }
 
 Numbers settled(const Grid& grid, const Numbers& depth) {
-  Membrane<double> membrane(grid.rows, grid.cols, kReach / kPitch, kReach / kPitch);
+  Membrane<double> membrane(grid.rows, grid.cols, kDentReach / kDistance, kDentReach / kDistance);
   Numbers height(grid.size());
   membrane.settle(depth, height);
   return height;
@@ -45,28 +45,29 @@ Numbers settled(const Grid& grid, const Numbers& depth) {
 
 TEST(Membrane, FallsExponentiallyBesideACylinder) {
   const Grid grid{101, 161};
-  const double a = 1.2e-3, at_edge = kReach * a / std::sqrt(kRadius * kRadius - a * a),
-               deepest = at_edge + kRadius - std::sqrt(kRadius * kRadius - a * a);
+  const double a = 1.2e-3, at_edge = kDentReach * a / std::sqrt(kBallRadius * kBallRadius - a * a),
+               deepest = at_edge + kBallRadius - std::sqrt(kBallRadius * kBallRadius - a * a);
   const Numbers height =
       settled(grid, on(grid, [&](double x, double) { return round_depth(x, deepest); }));
   for (int j = 0; j < grid.cols; ++j) {
-    const double x = std::abs(grid.x(j)),
-                 expected = x > a ? at_edge * std::exp(-(x - a) / kReach) : round_depth(x, deepest);
+    const double x = std::abs(grid.x(j)), expected = x > a
+                                                         ? at_edge * std::exp(-(x - a) / kDentReach)
+                                                         : round_depth(x, deepest);
     EXPECT_NEAR(height[std::size_t(50 * grid.cols + j)], expected, 1e-3 * deepest) << "x " << x;
   }
 }
 
 TEST(Membrane, FallsAsABesselFunctionBesideABall) {
   const Grid grid{161, 161};
-  const double a = 1.2e-3, t = a / kReach,
-               at_edge = kReach * std::cyl_bessel_k(0.0, t) / std::cyl_bessel_k(1.0, t) * a /
-                         std::sqrt(kRadius * kRadius - a * a),
-               deepest = at_edge + kRadius - std::sqrt(kRadius * kRadius - a * a);
+  const double a = 1.2e-3, t = a / kDentReach,
+               at_edge = kDentReach * std::cyl_bessel_k(0.0, t) / std::cyl_bessel_k(1.0, t) * a /
+                         std::sqrt(kBallRadius * kBallRadius - a * a),
+               deepest = at_edge + kBallRadius - std::sqrt(kBallRadius * kBallRadius - a * a);
   const Numbers height = settled(
       grid, on(grid, [&](double x, double y) { return round_depth(std::hypot(x, y), deepest); }));
   for (int j = 0; j < grid.cols; ++j) {
     const double x = std::abs(grid.x(j)),
-                 expected = x > a ? at_edge * std::cyl_bessel_k(0.0, x / kReach) /
+                 expected = x > a ? at_edge * std::cyl_bessel_k(0.0, x / kDentReach) /
                                         std::cyl_bessel_k(0.0, t)
                                   : round_depth(x, deepest);
     EXPECT_NEAR(height[std::size_t(80 * grid.cols + j)], expected, 1e-3 * deepest) << "x " << x;
