@@ -57,6 +57,19 @@ struct PictureReading<T>::Impl {
     if (description.markers && description.picture->markers[0] > 0) markers.emplace(model, number);
   }
 
+  /// Whether the pad's z points out of the skin, 1 or -1.
+  [[nodiscard]] int outward() const {
+    return compiled(model).sensor_info[std::size_t(sensor.number)].pressure_sign;
+  }
+  /// Computes the cotangent of the surface at the points, in the picture's order.
+  std::vector<T> surface_bar(FieldForm form, std::span<const T> picture_bar) {
+    const std::span<const T> none;
+    const bool height = form == FieldForm::height;
+    std::vector<T> bar(depth.size());
+    camera.pull_back(form == FieldForm::rgb_marker, height ? picture_bar : none,
+                     height ? none : picture_bar, bar);
+    return bar;
+  }
   /// The number of a point in the picture's order.
   [[nodiscard]] std::size_t place(std::size_t point) const {
     if (!description.picture->mirror) return point;
@@ -106,8 +119,7 @@ bool PictureReading<T>::needs_field(FieldForm form) const {
 template <class T>
 void PictureReading<T>::set_touches(const kernels::TactileArgs<double>& touch) {
   Impl& m = *impl_;
-  const int outward = compiled(m.model).sensor_info[std::size_t(m.sensor.number)].pressure_sign;
-  read_depths(m.sensor, touch, outward, thickness_of(m.description), m.depth);
+  read_depths(m.sensor, touch, m.outward(), thickness_of(m.description), m.depth);
   m.points.resize(m.depth.size());
   for (std::size_t k = 0; k < m.depth.size(); ++k)
     m.points[m.place(k)] = static_cast<T>(m.depth[k]);
@@ -140,15 +152,26 @@ template <class T>
 void PictureReading<T>::pull_back(FieldForm form, std::span<const double> field,
                                   std::span<const T> picture_bar, std::span<double> field_bar) {
   Impl& m = *impl_;
-  const bool height = form == FieldForm::height;
-  const std::span<const T> none;
-  std::vector<T> surface_bar(m.depth.size());
-  m.camera.pull_back(form == FieldForm::rgb_marker, height ? picture_bar : none,
-                     height ? none : picture_bar, surface_bar);
+  const std::vector<T> surface_bar = m.surface_bar(form, picture_bar);
   m.moved.assign(3 * m.depth.size(), 0.0);
   for (std::size_t k = 0; k < m.depth.size(); ++k)
     m.moved[3 * k + 2] = -static_cast<double>(surface_bar[m.place(k)]);
   m.surface->pull_back(field, m.moved, field_bar);
+}
+
+template <class T>
+void PictureReading<T>::pull_back_touches(FieldForm form, const kernels::TactileArgs<double>& touch,
+                                          std::span<const T> picture_bar, bool sizes,
+                                          std::span<kernels::TouchCotangent<double>> touches) {
+  Impl& m = *impl_;
+  const std::vector<T> surface_bar = m.surface_bar(form, picture_bar);
+  m.points.resize(m.depth.size());
+  m.camera.pull_back_depth(surface_bar, m.points);
+  std::vector<double> depth_bar(m.depth.size());
+  for (std::size_t k = 0; k < depth_bar.size(); ++k)
+    depth_bar[k] = static_cast<double>(m.points[m.place(k)]);
+  pull_back_depths(m.sensor, touch, m.outward(), thickness_of(m.description), depth_bar, sizes,
+                   touches);
 }
 
 template class PictureReading<float>;

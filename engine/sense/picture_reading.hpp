@@ -48,6 +48,11 @@ class PictureReading {
   /// taken last, and adds it to `field_bar`, (points, 3). The motion of markers has no derivative.
   void pull_back(FieldForm form, std::span<const double> field, std::span<const T> picture_bar,
                  std::span<double> field_bar);
+  /// Pulls the cotangent of a picture back to the shapes that were taken last, where
+  /// needs_depth(): pull_back_depths().
+  void pull_back_touches(FieldForm form, const kernels::TactileArgs<double>& touch,
+                         std::span<const T> picture_bar, bool sizes,
+                         std::span<kernels::TouchCotangent<double>> touches);
 
  private:
   struct Impl;

@@ -85,40 +85,28 @@ def test_data_sets_have_bytes(command, tmp_path, compress):
     np.testing.assert_array_equal(episodes[1]["gel.rgb"], pictures)
 
 
-def test_gradients_of_a_layer_agree_with_differences():
+@pytest.mark.parametrize("layer", [True, False])
+def test_gradients_agree_with_differences(layer):
     torch = pytest.importorskip("torch", reason="PyTorch is not installed")
     import tangere.torch as tt
 
-    sim = tt.Simulation(model(), 1, 60, every=60, read=["gel.rgb", "gel.height"], threads=1)
-    draw = torch.Generator().manual_seed(2)
-    weights = torch.randn(24, 32, 3, generator=draw, dtype=torch.float64)
+    sim = tt.Simulation(
+        model(layer=layer), 1, 60, every=60, read=["gel.rgb", "gel.height"], threads=1
+    )
+    rows = torch.linspace(-1, 1, 24, dtype=torch.float64)[:, None, None]
 
     def loss(u):
         s = sim.step(sim.reset(seed=3), u)
         assert s["gel.rgb"].shape == (1, 24, 32, 3)
-        return (s["gel.rgb"] * weights).sum() + 1e5 * (s["gel.height"] * weights[..., :1]).sum()
+        return (s["gel.rgb"] * rows).sum() + 1e5 * (s["gel.height"] * (1 + rows)).sum()
 
-    u = torch.zeros(1, 3, dtype=torch.float64)
-    u[:, 2] = -0.001
-    u.requires_grad_()
+    u = torch.tensor([[2e-4, 1e-4, -0.001]], dtype=torch.float64, requires_grad=True)
     loss(u).backward()
-    along = 1e-4 * torch.randn(u.shape, generator=draw, dtype=torch.float64)
+    along = torch.tensor([[3e-5, -2e-5, -1e-4]], dtype=torch.float64)
     expected = float((u.grad * along).sum())
     errors = []
-    for step in (1e-2, 1e-3, 1e-4):
+    for step in (1e-1, 3e-2, 1e-2):  # pictures of springs are computed in single precision
         with torch.no_grad():
             sides = [loss(u + sign * step * along) for sign in (1, -1)]
         errors.append(abs(float(sides[0] - sides[1]) / (2 * step) / expected - 1))
-    assert min(errors) < 1e-4, errors
-
-
-def test_pictures_of_springs_have_no_gradients():
-    torch = pytest.importorskip("torch", reason="PyTorch is not installed")
-    import tangere.torch as tt
-
-    sim = tt.Simulation(model(layer=False), 1, 60, every=60, read=["gel.rgb"], threads=1)
-    u = torch.full((1, 3), -0.001, dtype=torch.float64, requires_grad=True)
-    s = sim.step(sim.reset(seed=3), u)
-    assert float(s["gel.rgb"].detach().std()) > 0
-    with pytest.raises(tangere.InputError, match="of 'gel.rgb': its sensor has no <layer>"):
-        s["gel.rgb"].sum().backward()
+    assert min(errors) < (1e-3 if layer else 1e-2), errors

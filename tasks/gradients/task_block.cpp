@@ -322,15 +322,6 @@ void TaskBlock::add_shear_state(std::span<const double> bar, int lane) {
     to[k] += bar[shear_arrays_.first_of(entries[k / 3]) + k % 3];
 }
 
-/// Throws InputError unless the cotangent of a picture is 0: it is one of bodies' depth.
-void TaskBlock::refuse_derivative(const FieldOutput& output,
-                                  std::span<const double> picture_bar) const {
-  if (std::ranges::all_of(picture_bar, [](double x) { return x == 0; })) return;
-  throw InputError(fmt::format(
-      "the derivative of '{}': its sensor has no <layer>; expected one, or a loss without it",
-      output_name(task_.model().sensors()[as_size(output.sensor)].name, output.form)));
-}
-
 void TaskBlock::add_readings(std::size_t moment, int lane) {
   const std::span<const double> end_effectors = part(snapshots_bar_[moment].end_effectors, lane),
                                 bodies = part(snapshots_bar_[moment].bodies, lane);
@@ -347,7 +338,7 @@ void TaskBlock::add_readings(std::size_t moment, int lane) {
     const std::size_t numbers = numbers_of(task_.model().sensors()[as_size(s)], output.form);
     const std::span<double> points = c.points_of(task_.model(), s, lane);
     if (is_picture(output.form))
-      refuse_derivative(output, fields.first(numbers));
+      pullback_.picture(lane, output, fields.first(numbers), c.parameters);
     else if (output.form == FieldForm::pressure)
       pullback_.pressure(lane, s, fields.first(numbers), c.parameters, points);
     else if (output.form == FieldForm::ideal)

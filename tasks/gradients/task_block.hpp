@@ -74,7 +74,6 @@ class TaskBlock : public TapeBlock {
   void reverse_observation(const TaskView& view, int lane, const ViewCotangent& to);
   void add_snapshot(std::size_t moment);
   void add_readings(std::size_t moment, int lane);
-  void refuse_derivative(const FieldOutput& output, std::span<const double> picture_bar) const;
   void add_shear_state(std::span<const double> bar, int lane);
   void reverse_controls(const ActionRecord& r, std::int64_t action, int step,
                         const BlockTape& tape);
