@@ -319,8 +319,8 @@ void add_storage_options(CLI::App& app, GenerateOptions& o) {
            "Derivatives beside the rows: none, return (of the task's, or of a scene's --loss) or "
            "jacobians (of each row's state by the row before); not with --sleep [default: none]");
   add_text(app, "--loss", o.loss, "NAME",
-           "Loss of a scene, with --gradients return: final, path, tactile, shear, variables or "
-           "markers; fields count at rows");
+           "Loss of a scene, with --gradients return: final, path, tactile, shear, variables, "
+           "markers or pictures; fields count at rows");
   add_memory_size(
       app, "--tape-memory", o.tape_memory,
       "With --gradients return: memory for the states that all threads keep; with less than all of "

@@ -29,11 +29,11 @@ DenseFrame<T>::DenseFrame(const Model& model, int sensor, FieldForm form)
     : model_(model),
       sensor_(sensor),
       form_(form),
-      values_(numbers_of(checked(model, sensor).points(), form)),
+      values_(numbers_of(compiled(model).sensor_info[std::size_t(checked(model, sensor).number)],
+                         form)),
       written_(std::size_t(checked(model, sensor).n_tiles())) {
-  if (form == FieldForm::sum || is_picture(form))
-    throw InputError(std::string("a frame of the reading '") + to_string(form) +
-                     "'; expected a field, a pressure or a shear");
+  if (form == FieldForm::sum)
+    throw InputError("a frame of a sum; expected a field, a pressure or a shear");
 }
 
 template <class T>
