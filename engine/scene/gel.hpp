@@ -59,7 +59,7 @@ struct PictureDescription {
   Source source;
 };
 
-/// Height and width that a picture shows [m]. `pitch`: between rows and columns of points, any sign.
+/// Height and width that a picture shows [m]. `pitch`: between rows and columns of points.
 std::array<double, 2> shown_size(const PictureDescription& picture, int rows, int cols,
                                  const std::array<double, 2>& pitch);
 

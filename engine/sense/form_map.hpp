@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Forms of a field as functions of the field of their sensor (engine/scene/field_form.hpp), and
 // their pullbacks. `ideal`, `markers`, `surface` and pictures are functions of the ideal field.
-// Shear, markers and surface are linear; a flow is a quotient. Of a sum, with a point's place x_i and its
-// pressing force p_i = max(0, sign f_3,i):
+// Shear, markers and surface are linear; a flow is a quotient. Of a sum, with a point's place x_i
+// and its pressing force p_i = max(0, sign f_3,i):
 //
 //   F = Σ_i R_iᵀ f_i,  c = Σ_i p_i x_i / P,  P = Σ_i p_i,  ∂c/∂p_i = (x_i - c)/P,  ∂c/∂x_i = p_i/P
 #pragma once

@@ -37,7 +37,7 @@ def pressed(of, envs: int = 2):
     """Returns a batch after steps in which each environment is pressed deeper than the last."""
     batch = tangere.Batch(of, envs, seed=1)
     u = np.zeros((60, envs, 3))
-    u[:, :, 2] = -0.0005 * (1 + np.arange(envs))
+    u[:, :, 2] = -0.001 - 0.0003 * np.arange(envs)
     return batch, batch.run(u, every=60, fields=READINGS)
 
 

@@ -126,11 +126,11 @@ TEST(Pictures, ThreeRoutesAgree) {
   std::erase_if(scene.randomizations,
                 [](const auto& d) { return d.number.field == NumberField::kn; });
   PictureDescription& picture = scene.sensors[0].picture.emplace();
-  picture.rows = 18, picture.cols = 24;
+  picture.rows = 9, picture.cols = 12;
   picture.gel = std::make_shared<const Gel>(default_gel());
-  expect_right(check(scene, LossKind::pictures, 60, 20), 1e-5);
+  expect_right(check(scene, LossKind::pictures, 40, 40), 1e-5);
   scene.sensors[0].layer.reset();
-  EXPECT_THROW(check(scene, LossKind::pictures, 60, 20), InputError);
+  EXPECT_THROW(check(scene, LossKind::pictures, 40, 40), InputError);
 }
 
 /// The published gradient is 5 to 107 % off: the contact point of a sphere moves over it.
