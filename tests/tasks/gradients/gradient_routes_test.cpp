@@ -128,9 +128,10 @@ TEST(Pictures, ThreeRoutesAgree) {
   PictureDescription& picture = scene.sensors[0].picture.emplace();
   picture.rows = 9, picture.cols = 12;
   picture.gel = std::make_shared<const Gel>(default_gel());
-  expect_right(check(scene, LossKind::pictures, 40, 40), 1e-5);
+  scene.sensors[0].array.rows = 24, scene.sensors[0].array.cols = 32;
+  expect_right(check(scene, LossKind::pictures, 60, 60), 1e-5);
   scene.sensors[0].layer.reset();
-  EXPECT_THROW(check(scene, LossKind::pictures, 40, 40), InputError);
+  EXPECT_THROW(check(scene, LossKind::pictures, 60, 60), InputError);
 }
 
 /// The published gradient is 5 to 107 % off: the contact point of a sphere moves over it.
