@@ -8,6 +8,7 @@
 #include <filesystem>
 
 #include "apps/arguments.hpp"
+#include "apps/calibrate_pictures.hpp"
 #include "apps/calibrate_report.hpp"
 #include "apps/command.hpp"
 #include "apps/layout_text.hpp"
@@ -25,15 +26,19 @@ constexpr double kUsualFriction = 0.6, kUsualShearShare = 0.4, kUsualRelaxation 
 constexpr int kMostKnots = 100;
 
 struct CalibrateArguments {
-  std::string recording, sensor, output, check;
+  std::string recording, sensor, output, check, pictures;
   std::vector<std::string> numbers;
   Indenter indenter;
   std::optional<int> table;
-  std::optional<double> hold_out;
+  std::optional<double> hold_out, pixel;
   bool overwrite = false;
 };
 
 void check_arguments(const CalibrateArguments& a) {
+  if (a.recording.empty() || a.sensor.empty())
+    throw InputError(fmt::format("{} is missing; expected RECORDING and --sensor, or --pictures",
+                                 a.recording.empty() ? "RECORDING" : "--sensor"));
+  if (a.pixel) throw InputError("--pixel without --pictures; expected both");
   if (int(a.indenter.ball.has_value()) + int(a.indenter.flat.has_value()) +
           int(!a.indenter.box.empty()) !=
       1)
@@ -170,6 +175,12 @@ std::string measured_layout(Fitted fitted, const Calibration& found, const std::
 }
 
 int run_calibrate(const CalibrateArguments& a, const Console& console) {
+  if (!a.pictures.empty()) {
+    if (!a.recording.empty() || !a.sensor.empty())
+      throw InputError("--pictures beside RECORDING or --sensor; expected one of them");
+    return run_calibrate_pictures({a.pictures, a.indenter.ball, a.pixel, a.output, a.overwrite},
+                                  console);
+  }
   check_arguments(a);
   const PressRecording recording = read_press(a.recording, console);
   const std::optional<PressRecording> other =
@@ -206,12 +217,15 @@ Command add_calibrate(CLI::App& program) {
                               "0.0075 -o my_gel_measured.xml");
   add_text(
       app, "RECORDING", a.recording, "",
-      "Table (CSV) with a header: depth and force, and if recorded time, shear and shear_force")
-      .required();
+      "Table (CSV) with a header: depth and force, and if recorded time, shear and shear_force");
   add_text(app, "--sensor", a.sensor, "LAYOUT",
-           "Layout of the sensor, whose skin faces z: a file, or one of the program's")
-      .required();
-  add_text(app, "-o,--output", a.output, "FILE.xml", "Layout to write, with the fitted attributes");
+           "Layout of the sensor, whose skin faces z: a file, or one of the program's");
+  add_text(app, "--pictures", a.pictures, "FOLDER",
+           "Fit a camera gel to photographs of a ball that presses it: background.png, presses.csv "
+           "(file, x_px, y_px, radius_px) and the files that it names; with --ball and --pixel");
+  add_positive_number(app, "--pixel", a.pixel, "Side of a pixel of the photographs [m]");
+  add_text(app, "-o,--output", a.output, "FILE.xml",
+           "Layout to write, with the fitted attributes; of --pictures the gel file");
   add_positive_number(app, "--ball", a.indenter.ball, "Radius of a ball that presses [m]");
   add_positive_number(app, "--flat", a.indenter.flat,
                       "Radius of a flat, round end that presses [m]");

@@ -197,6 +197,11 @@ std::string sensors_text(const Model& model) {
                         s.every > 0 ? fmt::format("every {} steps", s.every) : "every step",
                         s.pressure_sign > 0 ? "positive (+1)" : "negative (-1)",
                         model.scene().sensors[k].markers ? ", markers" : "");
+    if (s.picture[0] > 0) {
+      text.pop_back();
+      text += fmt::format(", pictures of {} x {} pixels, gel '{}'\n", s.picture[0], s.picture[1],
+                          model.scene().sensors[k].picture->gel->name);
+    }
   }
   return text;
 }

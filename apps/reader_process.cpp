@@ -112,7 +112,7 @@ std::span<char> shared_note() {
 }
 
 /// Signals by which the system ends a process for what it did itself.
-bool is_crash(int signal) {
+bool crashed(int signal) {
   return signal == SIGSEGV || signal == SIGBUS || signal == SIGABRT || signal == SIGFPE ||
          signal == SIGILL;
 }
@@ -155,7 +155,7 @@ int run_in_child(const std::function<int()>& command) {
         "the HDF5 library did not come back within {} s of computing ({:g} s where it reads no "
         "numbers); it had last read {}; a file over which the library loops is damaged",
         limit.count(), static_cast<double>(limit.count()) / h5::kTicksOfNumbers, reading));
-  if (!is_crash(signal) || reading.empty()) {  // a closed pipe, a limit: end as the child did
+  if (!crashed(signal) || reading.empty()) {  // a closed pipe, a limit: end as the child did
     signals.restore();
     std::signal(signal, SIG_DFL);
     raise(signal);

@@ -388,8 +388,9 @@ void chunk(benchmark::State& state, const char* compression) {
   const std::size_t bytes = numbers.size() * sizeof(float);
   std::size_t size = 0;
   for (auto _ : state)
-    size =
-        compressed(l, reinterpret_cast<const unsigned char*>(numbers.data()), bytes, bytes).size();
+    size = compressed(l, sizeof(float), reinterpret_cast<const unsigned char*>(numbers.data()),
+                      bytes, bytes)
+               .size();
   state.counters["MB/s"] = benchmark::Counter(
       1e-6 * static_cast<double>(bytes) * static_cast<double>(state.iterations()),
       benchmark::Counter::kIsRate);

@@ -35,12 +35,12 @@ void NumberGradients::add(const SceneNumber& number, Terms terms, int body) {
 }
 
 /// Whether a coefficient has no derivative: with ks = 0 there is no shear state, and kn of a layer
-/// with markers is constant (compile_markers()).
+/// with markers or pictures is constant (compile.cpp).
 static bool is_constant(const Scene& scene, const SceneNumber& of) {
   if (of.field == Field::ks) return number_in(scene, of) == 0 && randomization_of(scene, of) < 0;
   return of.field == Field::kn && of.owner == Owner::tactile &&
          std::any_of(scene.sensors.begin(), scene.sensors.end(), [&](const auto& sensor) {
-           return sensor.name == of.name && sensor.layer && sensor.markers;
+           return sensor.name == of.name && sensor.layer && (sensor.markers || sensor.picture);
          });
 }
 

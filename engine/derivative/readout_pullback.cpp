@@ -19,6 +19,7 @@
 #include "engine/sense/layer_reading.hpp"
 #include "engine/sense/pad_reader.hpp"
 #include "engine/sense/past_states.hpp"
+#include "engine/sense/picture_reading.hpp"
 
 namespace tangere {
 
@@ -56,6 +57,8 @@ struct ReadoutPullback::Impl {
   ElasticField elastic;
   LayerReading layered;
   std::vector<double> layer_bar;
+  /// (sensors) of those of which a picture was pulled back.
+  std::vector<std::unique_ptr<PictureReading<double>>> pictures;
   std::array<std::vector<double>, kBlock> memory;  ///< cotangents of the shear state
   std::vector<double> whole, ideal, expanded;      ///< (points, 3) of one sensor
   /// For each lane, (1 + past states, 2, nv) cotangents of the present and of earlier states, by
@@ -166,23 +169,51 @@ struct ReadoutPullback::Impl {
     read_layered(s, lane, pressure, std::span(expanded).first(numbers));
     LayeredField::Cotangents& bar = layered.pull_back(layer_bar, !parameters.empty(),
                                                       std::span(touches).first(s.targets.size()));
-    const CompiledModel& m = compiled(model);
-    used[std::size_t(lane / kGroup)] = true;
-    const auto add = [&](int at, double x) {
-      if (!parameters.empty()) parameters[std::size_t(at * kBlock + lane)] += x;
-    };
-    add(m.view.rows.sensor(s.number), bar.stiffness);
-    for (std::size_t k = 0; k < s.targets.size(); ++k) {
-      hand_on(touches[k], s.link, s.pad, m.bodies[std::size_t(s.targets[k])].link, lane / kGroup,
-              lane % kGroup);
-      const int size = m.view.rows.solid(s.targets[k]);
-      add(size, touches[k].size.x), add(size + 1, touches[k].size.y),
-          add(size + 2, touches[k].size.z);
-    }
+    if (!parameters.empty())
+      parameters[std::size_t(compiled(model).view.rows.sensor(s.number) * kBlock + lane)] +=
+          bar.stiffness;
+    add_touches(lane, s, parameters);
     if (!pressure) pull_back_springs(lane, s, bar.whole, parameters);
     for (std::size_t k = 0; pressure && k < numbers; ++k) bar.normal[k] += bar.whole[k];
     gather(s, bar.normal);
     pull_back(lane, s.number, tiles, tile_values, parameters, {}, true);
+  }
+
+  /// Pulls the cotangent of a picture of the bodies' depth back.
+  void pull_back_picture(int lane, FieldOutput of, std::span<const double> cotangent,
+                         std::span<double> parameters) {
+    const CompiledSensor& s = compiled(model).sensors[std::size_t(of.sensor)];
+    if (s.layer && !s.layer->table)
+      throw InputError(
+          "a picture of a layer follows from the field; expected the field's cotangent");
+    pictures.resize(compiled(model).sensors.size());
+    std::unique_ptr<PictureReading<double>>& reading = pictures[std::size_t(of.sensor)];
+    if (!reading) reading = std::make_unique<PictureReading<double>>(model, of.sensor);
+    find_touches(lane / kGroup, s.number);
+    const auto field = std::span(expanded).first(3 * std::size_t(s.points()));
+    if (reading->needs_field(of.form)) {
+      read(s, lane, false, field);
+      reading->set_field(of.form, field);
+    }
+    const auto touch = arguments(s, lane, false);
+    reading->set_touches(touch);
+    reading->set_draws(key_of(*batch, kBlock * block + lane));
+    const auto bars = std::span(touches).first(s.targets.size());
+    reading->pull_back_touches(of.form, touch, cotangent, !parameters.empty(), bars);
+    add_touches(lane, s, parameters);
+  }
+
+  /// Adds the cotangents of motions and sizes in `touches`.
+  void add_touches(int lane, const CompiledSensor& s, std::span<double> parameters) {
+    const CompiledModel& m = compiled(model);
+    used[std::size_t(lane / kGroup)] = true;
+    for (std::size_t k = 0; k < s.targets.size(); ++k) {
+      hand_on(touches[k], s.link, s.pad, m.bodies[std::size_t(s.targets[k])].link, lane / kGroup,
+              lane % kGroup);
+      const int size = m.view.rows.solid(s.targets[k]);
+      for (int c = 0; c < 3 && !parameters.empty(); ++c)
+        parameters[std::size_t((size + c) * kBlock + lane)] += (&touches[k].size.x)[c];
+    }
   }
 
   void pull_back_springs(int lane, const CompiledSensor& s, std::span<const double> cotangent,
@@ -453,6 +484,11 @@ void ReadoutPullback::ideal_field(int lane, int sensor, std::span<const double> 
                                   std::span<double> parameters, std::span<double> points) {
   impl_->pull_back_ideal(lane, compiled(impl_->model).sensors[std::size_t(sensor)], false,
                          cotangents, parameters, points);
+}
+
+void ReadoutPullback::picture(int lane, FieldOutput output, std::span<const double> cotangents,
+                              std::span<double> parameters) {
+  impl_->pull_back_picture(lane, output, cotangents, parameters);
 }
 
 void ReadoutPullback::end_effector(int lane, int end_effector, std::span<const double> cotangent) {

@@ -48,6 +48,10 @@ class ReadoutPullback {
   /// The same for `cotangents` of the field without the sensor's imperfections, (points, 3).
   void ideal_field(int lane, int sensor, std::span<const double> cotangents,
                    std::span<double> parameters = {}, std::span<double> points = {});
+  /// The same for `cotangents` of a picture of a sensor without a layer, before it is rounded:
+  /// numbers_of(sensor, form). The motion of printed markers has no derivative.
+  void picture(int lane, FieldOutput output, std::span<const double> cotangents,
+               std::span<double> parameters = {});
   /// Takes the cotangent of an end effector's world position, (3).
   void end_effector(int lane, int end_effector, std::span<const double> cotangent);
   /// Takes the cotangents of a body's pose (7) and twist (6), as Readout::bodies() returns them.

@@ -132,6 +132,24 @@ std::optional<KnownDepth> find_depth(const Shape& shape, const kernels::Touch<do
   return KnownDepth{*found, *found < layer.deepest ? DepthBy::underside : DepthBy::end};
 }
 
+/// Returns δ and its slant at a point whose underside has the depth `known`. With dual numbers their
+/// derivatives follow from one more step of Newton's method.
+template <class Shape, class N>
+LayerDepth<N> underside_at(const Shape& shape, const kernels::Touch<N>& t,
+                           const kernels::Vec3<double>& xi, const N& outward, double known) {
+  const auto below = [&](const N& depth) {
+    return kernels::Vec3<N>{N(xi.x), N(xi.y), N(xi.z) - outward * depth};
+  };
+  LayerDepth<N> out;
+  const kernels::Distance<N> first = distance_in_pad(shape, t, below(N(known)));
+  out.depth = N(known) - first.d / (-outward * first.n.z);
+  out.place = below(out.depth);
+  const kernels::Distance<N> found = distance_in_pad(shape, t, out.place);
+  const N inverse = N(1.0) / (-outward * found.n.z);
+  out.slant = inverse * found.n;
+  return out;
+}
+
 /// Returns depth and slant at a point whose δ is known. With dual numbers their derivatives follow
 /// from one more step of Newton's method. δ does not change with a shape that goes on below.
 template <class Shape, class N>
@@ -155,12 +173,8 @@ LayerDepth<N> layer_depth(const Shape& shape, const kernels::Touch<N>& t,
     depth = -slope * found.d;
     out.slant = slope * found.n;
   } else {
-    const kernels::Distance<N> first = distance_in_pad(shape, t, below(N(known.depth)));
-    depth = N(known.depth) - first.d / (-outward * first.n.z);
-    out.place = below(depth);
-    const kernels::Distance<N> found = distance_in_pad(shape, t, out.place);
-    const N inverse = N(1.0) / (-outward * found.n.z);
-    out.slant = inverse * found.n;
+    out = underside_at(shape, t, xi, outward, known.depth);
+    depth = out.depth;
   }
   out.depth = depth + relaxation_at(layer, depth) * dot(out.slant, t.v + cross(t.omega, out.place));
   return out;

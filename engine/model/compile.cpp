@@ -348,15 +348,21 @@ class Compiler {
   }
 
   /// Throws InputError for markers that cannot be computed.
-  void check_markers(const TactileDescription& d, int pressure_sign) const {
+  static void check_markers(const TactileDescription& d, int pressure_sign) {
     static_cast<void>(compile_markers(d, pressure_sign));
+  }
+
+  /// Throws InputError where the surface of a layer is read and cannot be computed.
+  void check_surface(const TactileDescription& d) const {
     SceneNumber kn = first_number(d);
     kn.field = NumberField::kn;
     if (d.layer && randomization_of(m_.scene, kn) >= 0)
       throw InputError(
-          d.markers->source.prefix() + "markers of '" + d.name +
+          (d.markers ? d.markers->source : d.picture->source).prefix() +
+          (d.markers ? "markers of '" : "picture of '") + d.name +
           "': its kn varies, but the surface moves with the scene's modulus; expected a "
-          "constant kn, or no <markers>");
+          "constant kn, or no " +
+          (d.markers ? "<markers>" : "<picture>"));
   }
 
   void sensors() {
@@ -372,6 +378,8 @@ class Compiler {
       if (d.layer) sensor.layer = compile_sensor_layer(d, sensor, info.pressure_sign);
       if (d.table) sensor.layer = compile_pressure_table(d, sensor, info.pressure_sign);
       if (d.markers) check_markers(d, info.pressure_sign);
+      if (d.picture) info.picture = {d.picture->rows, d.picture->cols};
+      if (d.markers || d.picture) check_surface(d);
       m_.layout.past_states = std::max(m_.layout.past_states, info.past_states);
       sensor.parameters = constants(d.coefficients);
       for (const int t : sensed_bodies(m_.scene, d))

@@ -91,13 +91,13 @@ void set_lag_weights(const TactileDescription& d, double h, CompiledSensor& s) {
 
 void compile_imperfections(const TactileDescription& d, double timestep, CompiledSensor& s,
                            SensorInfo& info) {
+  s.name_bits = bits_of(d.name);
   check_imperfections(d.imperfections, d.name, has_grid(d));
   if (!is_imperfect(d.imperfections)) return;
   if (s.points() > kMostRandomPoints)
     fail(d, fmt::format("{} points; expected {} at most", s.points(), kMostRandomPoints));
   info.imperfect = s.imperfect = true;
   s.imperfections = d.imperfections;
-  s.name_bits = bits_of(d.name);
   if (has_lag(d.imperfections)) set_lag_weights(d, timestep, s);
   info.past_states = s.past_states();
   if (!has_grid(d)) return;

@@ -32,7 +32,7 @@ struct CompiledLayer {
   [[nodiscard]] double bulge() const { return feedback ? 0.1 * grid.thickness : 0; }
   std::array<int, 2> direction{1, 1};          ///< 1 or -1: whether rows count along axis0, cols
                                                ///< along axis1
-  std::optional<SurfaceCompliance> surface{};  ///< of a sensor with markers
+  std::optional<SurfaceCompliance> surface{};  ///< of a sensor with markers or pictures
 };
 
 }  // namespace tangere

@@ -5,8 +5,10 @@
 #include <array>
 #include <cstddef>
 #include <string>
+#include <vector>
 
 #include "engine/scene/effects.hpp"
+#include "engine/scene/field_form.hpp"
 
 namespace tangere {
 
@@ -20,7 +22,14 @@ struct SensorInfo {
   int pressure_sign = 1;   ///< +1: the third component is positive under pressure; -1: negative
   bool imperfect = false;  ///< its readings differ from the ideal field (docs/sensors.md)
   int past_states = 0;     ///< earlier states on which a reading depends
+  /// Pixels of its pictures from top to bottom and from left to right; 0: it has none.
+  std::array<int, 2> picture{};
 };
+/// Numbers of a whole reading of a sensor.
+std::size_t numbers_of(const SensorInfo& sensor, FieldForm form);
+/// Its shape: {rows, cols, numbers of a point}, {points, numbers}, {height, width, numbers of a
+/// pixel} or {6}.
+std::vector<std::size_t> reading_shape(const SensorInfo& sensor, FieldForm form);
 
 /// An end effector after compilation.
 struct EndEffectorInfo {

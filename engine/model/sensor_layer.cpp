@@ -134,7 +134,7 @@ std::shared_ptr<const CompiledLayer> compile_sensor_layer(const TactileDescripti
   layer->deepest = t;
   layer->outward = pressure_sign;
   for (std::size_t k = 0; k < 2; ++k) layer->direction[k] = pitches(d.array)[k] < 0 ? -1 : 1;
-  if (d.markers) {
+  if (d.markers || d.picture) {
     if (const double bytes = SurfaceCompliance::bytes(layer->grid); !(bytes <= kMostSurface))
       fail(d, fmt::format(
                   "the surface of {} × {} cells takes {:.0f} MB; expected at most {:.0f}: larger "

@@ -47,7 +47,7 @@ class ChannelList {
     EpisodeChannel& channel = add(ChannelKind::reading, output_name(sensor.name, reading.form),
                                   reading_shape(sensor, reading.form));
     channel.reading = {reading.sensor, reading.form};
-    channel.touch = perfect(sensor) || is_ideal(reading.form);
+    channel.touch = (perfect(sensor) || is_ideal(reading.form)) && !is_colour(reading.form);
   }
 
   [[nodiscard]] std::vector<EpisodeChannel> take() { return std::move(all_); }
@@ -98,9 +98,7 @@ std::vector<EpisodeChannel> episode_channels(const RunFacts& facts,
   for (int s = 0; s < std::ssize(sensors); ++s)
     if (record.empty()) list.add_reading(sensors, {s});
   for (int s = 0; s < std::ssize(sensors) && !record.empty(); ++s)
-    for (const FieldForm form :
-         {FieldForm::field, FieldForm::pressure, FieldForm::shear, FieldForm::sum, FieldForm::ideal,
-          FieldForm::markers, FieldForm::surface, FieldForm::flow})
+    for (const FieldForm form : field_forms())
       if (list.requested(output_name(sensors[static_cast<std::size_t>(s)].name, form)) != nullptr)
         list.add_reading(sensors, {s, form});
   return list.take();

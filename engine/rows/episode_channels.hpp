@@ -33,6 +33,8 @@ struct EpisodeChannel {
   bool touch = false;
 
   [[nodiscard]] std::size_t width() const;  ///< numbers of a row
+  /// Whether its numbers are bytes, in any precision: those of a picture in colours.
+  [[nodiscard]] bool is_bytes() const { return kind == Kind::reading && is_colour(reading.form); }
 };
 
 /// Returns the observations that episodes may have, those that are not recorded among them: q and

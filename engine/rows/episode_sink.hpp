@@ -13,8 +13,9 @@
 
 namespace tangere {
 
-/// The numbers of one observation as they are stored: float64 or float32.
-using Observation = std::variant<std::span<const double>, std::span<const float>>;
+/// The numbers of one observation as they are stored: float64, float32, or bytes of colours.
+using Observation =
+    std::variant<std::span<const double>, std::span<const float>, std::span<const std::uint8_t>>;
 
 /// How an episode of a task ended.
 struct EpisodeEnd {

@@ -7,6 +7,7 @@
 #include <algorithm>
 
 #include "engine/base/error.hpp"
+#include "engine/model/lateral_spread.hpp"
 #include "engine/scene/imperfection_checks.hpp"
 
 namespace tangere {
@@ -14,6 +15,18 @@ namespace {
 
 std::vector<double> numbers(const std::array<double, 3>& vector) {
   return {vector.begin(), vector.end()};
+}
+
+/// What is known of the pictures of a sensor that has some.
+Attributes picture_facts_of(const TactileDescription& d) {
+  const PictureDescription& of = *d.picture;
+  const std::array<double, 2> size = shown_size(of, d.array.rows, d.array.cols, pitches(d.array));
+  return {{"gel", of.gel->name},
+          {"gel_checksum", fmt::format("{:016x}", of.gel->checksum)},
+          {"pixel_size", std::vector<double>{size[0] / of.rows, size[1] / of.cols}},
+          {"mirror", std::int64_t{of.mirror ? 1 : 0}},
+          {"noise", of.noise},
+          {"gain", of.gain}};
 }
 
 }  // namespace
@@ -43,6 +56,8 @@ SensorLayout sensor_layout(const SensorInfo& info, const TactileDescription& des
   layout.axis1 = description.array.axis1;
   layout.imperfections = text_of(description.imperfections);
   layout.list = description.points;
+  layout.picture = info.picture;
+  if (description.picture) layout.picture_facts = picture_facts_of(description);
   return layout;
 }
 
@@ -53,11 +68,11 @@ void check_sensor_name(const std::string& name) {
 }
 
 std::vector<std::uint64_t> reading_shape(const SensorLayout& sensor, FieldForm form) {
-  if (form == FieldForm::sum) return {numbers_of(sensor.points, form)};
-  const auto components = static_cast<std::uint64_t>(components_of(form));
-  if (!sensor.rectangular()) return {static_cast<std::uint64_t>(sensor.points), components};
-  return {static_cast<std::uint64_t>(sensor.rows), static_cast<std::uint64_t>(sensor.cols),
-          components};
+  SensorInfo info;
+  info.rows = sensor.rows, info.cols = sensor.cols, info.points = sensor.points;
+  info.picture = sensor.picture;
+  const std::vector<std::size_t> shape = reading_shape(info, form);
+  return {shape.begin(), shape.end()};
 }
 
 const char* dataset_of(FieldForm form) {
@@ -76,12 +91,22 @@ std::string components_text(const SensorLayout& sensor, FieldForm form) {
     case FieldForm::surface:
       return "displacement of the surface along axis0, axis1 and out of the layer";
     case FieldForm::flow: return across + ", over their largest length in this reading";
+    case FieldForm::height: return "height of the gel's surface towards the camera";
+    case FieldForm::rgb: return "R, G, B of the gel without printed markers, row 0 on top";
+    case FieldForm::rgb_marker: return "R, G, B of the gel with printed markers, row 0 on top";
     case FieldForm::sum: break;
   }
   return "force x y z on the body [N], then x y z of its centre of pressure [m]; body axes";
 }
 
 Attributes reading_attributes(const SensorLayout& s, FieldForm form) {
+  if (is_picture(form)) {
+    Attributes list{{"units", std::string(is_colour(form) ? "grey levels" : "m")},
+                    {"body", s.body},
+                    {"components", components_text(s, form)}};
+    list.insert(list.end(), s.picture_facts.begin(), s.picture_facts.end());
+    return list;
+  }
   Attributes list{
       {"units", form == FieldForm::sum    ? "N, N, N, m, m, m"
                 : is_displacement(form)   ? "m"

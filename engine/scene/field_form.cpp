@@ -11,9 +11,10 @@
 namespace tangere {
 
 namespace {
-constexpr FieldForm kForms[] = {FieldForm::field,   FieldForm::pressure, FieldForm::shear,
-                                FieldForm::sum,     FieldForm::ideal,    FieldForm::markers,
-                                FieldForm::surface, FieldForm::flow};
+constexpr FieldForm kForms[] = {FieldForm::field,   FieldForm::pressure,  FieldForm::shear,
+                                FieldForm::sum,     FieldForm::ideal,     FieldForm::markers,
+                                FieldForm::surface, FieldForm::flow,      FieldForm::height,
+                                FieldForm::rgb,     FieldForm::rgb_marker};
 constexpr const char* kPlain[] = {"q", "v", "variables", "bodies", "memory"};
 constexpr const char* kBodyOutput = "bodies.";  // followed by the name of one
 }  // namespace
@@ -28,6 +29,9 @@ const char* to_string(FieldForm form) {
     case FieldForm::markers: return "markers";
     case FieldForm::surface: return "surface";
     case FieldForm::flow: return "flow";
+    case FieldForm::height: return "height";
+    case FieldForm::rgb: return "rgb";
+    case FieldForm::rgb_marker: return "rgb_marker";
   }
   return "unknown";
 }
@@ -36,7 +40,10 @@ int components_of(FieldForm form) {
   switch (form) {
     case FieldForm::field:
     case FieldForm::ideal:
+    case FieldForm::rgb:
+    case FieldForm::rgb_marker:
     case FieldForm::surface: return 3;
+    case FieldForm::height:
     case FieldForm::pressure: return 1;
     case FieldForm::shear:
     case FieldForm::flow:
@@ -46,7 +53,11 @@ int components_of(FieldForm form) {
   return 0;
 }
 
-bool is_ideal(FieldForm form) { return form == FieldForm::ideal || is_displacement(form); }
+std::span<const FieldForm> field_forms() { return kForms; }
+
+bool is_ideal(FieldForm form) {
+  return form == FieldForm::ideal || is_displacement(form) || is_picture(form);
+}
 
 std::size_t numbers_of(int points, FieldForm form) {
   if (form == FieldForm::sum) return std::tuple_size_v<FieldSum>;
@@ -93,10 +104,21 @@ bool has_output(const Scene& scene, const std::string& word) {
 
 std::string reason_against(const Scene& scene, const FieldOutput& output) {
   const TactileDescription& sensor = scene.sensors[static_cast<std::size_t>(output.sensor)];
-  const char* const missing = !is_displacement(output.form)                        ? nullptr
-                              : !sensor.markers                                    ? "<markers>"
-                              : output.form == FieldForm::surface && !sensor.layer ? "<layer>"
-                                                                                   : nullptr;
+  const auto missing_part = [&]() -> const char* {
+    switch (output.form) {
+      case FieldForm::markers: return sensor.markers ? nullptr : "<markers>";
+      case FieldForm::surface:
+        return !sensor.markers ? "<markers>" : !sensor.layer ? "<layer>" : nullptr;
+      case FieldForm::height:
+      case FieldForm::rgb: return sensor.picture ? nullptr : "<picture>";
+      case FieldForm::rgb_marker:
+        if (!sensor.picture || sensor.picture->markers[0] == 0)
+          return "<picture> with markers=\"columns rows\"";
+        return sensor.markers ? nullptr : "<markers>";
+      default: return nullptr;
+    }
+  };
+  const char* const missing = missing_part();
   if (missing == nullptr) return "";
   return sensor.source.prefix() + "sensor '" + sensor.name + "' has no " + missing +
          "; expected it in its <tactile>";

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Quantities of a tactile field: the whole field, pressure, shear, flow, sum, or displacements of
-// markers and of the surface. Only requested quantities are computed and stored.
+// Quantities of a sensor: its whole field, pressure, shear, flow, sum, displacements of markers and
+// of the surface, or pictures of its gel. Only requested quantities are computed and stored.
 #pragma once
 
 #include <array>
@@ -15,14 +15,17 @@
 namespace tangere {
 
 enum class FieldForm {
-  field,     ///< (points, 3) [N]: f·axis0, f·axis1, -f·(axis0 × axis1)
-  pressure,  ///< (points, 1) [N]: the third of these, without friction (docs/outputs.md)
-  shear,     ///< (points, 2) [N]: the first two
-  sum,       ///< (6): force on the body [N], then where it presses [m], body axes
-  ideal,     ///< the field without the sensor's imperfections
-  markers,   ///< (points, 2) [m]: where the ideal field pushes them, along axis0 and axis1
-  surface,   ///< (points, 3) [m]: how a layer's surface moves, the third number out of the layer
-  flow,      ///< (points, 2): the shear over its largest length on this sensor; 0 without shear
+  field,       ///< (points, 3) [N]: f·axis0, f·axis1, -f·(axis0 × axis1)
+  pressure,    ///< (points, 1) [N]: the third of these, without friction (docs/outputs.md)
+  shear,       ///< (points, 2) [N]: the first two
+  sum,         ///< (6): force on the body [N], then where it presses [m], body axes
+  ideal,       ///< the field without the sensor's imperfections
+  markers,     ///< (points, 2) [m]: where the ideal field pushes them, along axis0 and axis1
+  surface,     ///< (points, 3) [m]: how a layer's surface moves, the third number out of the layer
+  flow,        ///< (points, 2): the shear over its largest length on this sensor; 0 without shear
+  height,      ///< (height, width, 1) [m]: a gel's surface in a picture, towards the camera
+  rgb,         ///< (height, width, 3), 0 to 255: a picture of a gel (docs/pictures.md)
+  rgb_marker,  ///< the same with printed markers
 };
 
 /// Force x y z on the body [N], then its centre x y z [m]: the mean of the points' places, each
@@ -31,12 +34,12 @@ enum class FieldForm {
 using FieldSum = std::array<double, 6>;
 
 /// The words of files and options: "field", "pressure", "shear", "sum", "ideal", "markers",
-/// "surface", "flow".
+/// "surface", "flow", "height", "rgb", "rgb_marker".
 const char* to_string(FieldForm form);
 
-/// Numbers of a point; 0 for a sum.
+/// Numbers of a point, or of a pixel; 0 for a sum.
 int components_of(FieldForm form);
-/// Numbers of a whole reading.
+/// Numbers of a whole reading that is no picture.
 std::size_t numbers_of(int points, FieldForm form);
 
 /// One reading of one sensor.
@@ -48,8 +51,12 @@ struct FieldOutput {
 };
 
 /// Whether a reading is that of an ideal sensor, whatever the sensor's imperfections: the ideal
-/// field, and how it moves markers and the surface.
+/// field, how it moves markers and the surface, and pictures.
 bool is_ideal(FieldForm form);
+/// Whether a reading is a picture of a gel: its shape is that of <picture>.
+inline bool is_picture(FieldForm form) { return form >= FieldForm::height; }
+/// Whether a reading is a picture in colours, which files keep as bytes.
+inline bool is_colour(FieldForm form) { return form > FieldForm::height; }
 /// Whether a reading has displacements [m].
 inline bool is_displacement(FieldForm form) {
   return form == FieldForm::markers || form == FieldForm::surface;
@@ -61,8 +68,11 @@ inline FieldOutput undivided(FieldOutput of) {
   return of;
 }
 
+/// All of them, in the order of the enumeration.
+std::span<const FieldForm> field_forms();
+
 /// Returns "pad" for a field, else "pad.pressure", "pad.shear", "pad.sum", "pad.ideal",
-/// "pad.markers", "pad.surface" or "pad.flow".
+/// "pad.markers", "pad.surface", "pad.flow", "pad.height", "pad.rgb" or "pad.rgb_marker".
 std::string output_name(const std::string& sensor, FieldForm form);
 /// Returns the names of a scene's sensors, in file order.
 std::vector<std::string> sensor_names(const Scene& scene);

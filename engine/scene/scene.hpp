@@ -13,6 +13,7 @@
 
 #include "engine/base/error.hpp"
 #include "engine/base/vector3.hpp"
+#include "engine/scene/gel.hpp"
 #include "engine/scene/number_address.hpp"
 #include "engine/scene/pose.hpp"
 #include "engine/scene/scheme.hpp"
@@ -261,6 +262,8 @@ struct TactileDescription {
   std::optional<LayerDescription> layer{};
   /// Takes the place of kn in readings. None: the pressure is linear in depth.
   std::optional<PressureTable> table{};
+  /// What a camera behind its gel sees. None: it has no pictures.
+  std::optional<PictureDescription> picture{};
 };
 
 /// Lists the points of a sensor in field order: those of an array row by row, with its axes. The

@@ -273,6 +273,18 @@ std::string markers_fault(const TactileDescription& sensor) {
   return sensor.markers ? value_fault(kMarkers, *sensor.markers) : "";
 }
 
+std::string picture_fault(const TactileDescription& sensor) {
+  const PictureDescription& of = *sensor.picture;
+  if (!sensor.points.empty()) return "points in a list; expected a flat array, type=\"rect_array\"";
+  if (sensor.array.rows < 2 || sensor.array.cols < 2)
+    return fmt::format("{} x {} points; expected at least 2 x 2", sensor.array.rows,
+                       sensor.array.cols);
+  if (of.gel == nullptr) return "no gel; expected one, such as default_gel()";
+  if (of.markers[0] > 0 && !sensor.markers)
+    return "markers without <markers>, which says how they move; expected both";
+  return value_fault(kGelPicture, of);
+}
+
 std::string varying_value_fault(const SceneNumber& n, double value) {
   const Attribute& row = number_kind(n.owner, n.field);
   if (std::string fault = row.fault(value); !fault.empty()) return fault;
@@ -311,6 +323,7 @@ void check_scene(const Scene& scene) {
   for (const TactileDescription& d : scene.sensors) {
     check(d.source, "tactile sensor '" + d.name + "': ", value_fault(kTactile, d.coefficients));
     if (d.markers) check(d.markers->source, "markers of '" + d.name + "': ", markers_fault(d));
+    if (d.picture) check(d.picture->source, "picture of '" + d.name + "': ", picture_fault(d));
     if (d.table) check(d.source, "pressure of '" + d.name + "': ", table_fault(d));
     if (d.layer)
       check(d.layer->source, "layer of '" + d.name + "': ", value_fault(kLayer, *d.layer));

@@ -18,6 +18,8 @@ std::string motor_fault(const Scene& scene, const MotorDescription& motor);
 std::string contact_fault(const Scene& scene, const GroundContactDescription& contact);
 std::string contact_fault(const Scene& scene, const PairContactDescription& contact);
 std::string markers_fault(const TactileDescription& sensor);
+/// The sensor has a picture.
+std::string picture_fault(const TactileDescription& sensor);
 /// `variation` may be one of the scene's, or the one that follows them.
 std::string variation_fault(const Scene& scene, const RandomizationDescription& variation);
 /// Of a value in SI that a varying number is set to.

@@ -120,8 +120,8 @@ const double& found_number(const Scene& scene, const SceneNumber& number) {
 
 }  // namespace
 
-std::uint32_t element_of(NumberOwner owner) {
-  constexpr std::uint32_t kElementOf[] = {kPairContact, kGroundContact,         kTactile,
+std::uint64_t element_of(NumberOwner owner) {
+  constexpr std::uint64_t kElementOf[] = {kPairContact, kGroundContact,         kTactile,
                                           kBody,        kJoint | kInitialJoint, kMotor};
   return kElementOf[static_cast<int>(owner)];
 }

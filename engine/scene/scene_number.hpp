@@ -16,7 +16,7 @@ namespace tangere {
 
 struct Attribute;  // engine/scene/schema.hpp
 /// Returns the elements whose attributes are the numbers of an owner (schema.hpp).
-std::uint32_t element_of(NumberOwner owner);
+std::uint64_t element_of(NumberOwner owner);
 /// Returns the row of the schema for a field. Throws InputError where an owner has no such field.
 const Attribute& number_kind(NumberOwner owner, NumberField field);
 

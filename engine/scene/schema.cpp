@@ -63,16 +63,16 @@ constexpr void set(Attribute& a, Value T::*member) {
 }
 
 template <class... Columns>
-constexpr Attribute row(std::uint32_t of, const char* name, const char* usual, Unit unit,
+constexpr Attribute row(std::uint64_t of, const char* name, const char* usual, Unit unit,
                         const char* text, Columns... columns) {
   Attribute a{of, name, usual, unit, text};
   (set(a, columns), ...);
   return a;
 }
-constexpr Attribute picture(std::uint32_t of, const char* name, int flags = 0) {
+constexpr Attribute picture(std::uint64_t of, const char* name, int flags = 0) {
   return row(of, name, kNone, U::one, "", Flags{kPicture | flags});
 }
-constexpr Attribute ignored(std::uint32_t of, const char* name) {
+constexpr Attribute ignored(std::uint64_t of, const char* name) {
   return row(of, name, kNone, U::one, "", Types{""}, Flags{kIgnored});
 }
 template <class... Columns>
@@ -92,7 +92,7 @@ constexpr Attribute imperfection(const char* name, Value I::*member, Unit unit, 
              E::sensor_imperfections, columns...);
 }
 template <class T, class... Columns>
-constexpr Attribute coefficient(std::uint32_t of, const char* name, NumberField field,
+constexpr Attribute coefficient(std::uint64_t of, const char* name, NumberField field,
                                 double T::*member, Unit unit, EffectKind effect, const char* text,
                                 Columns... columns) {
   return row(of, name, "0", unit, text, member, field, effect, B::not_negative,
@@ -363,6 +363,27 @@ constexpr Attribute kSchema[] = {
         &LayerDescription::margin, B::not_negative),
     row(kLayer, "feedback", "false", U::one, "true: the layer is the contact as well",
         Words{"false true"}, E::feedback),
+    row(kGelPicture, "gel", "", U::one, "file of the camera's gel; three lamps if left out"),
+    row(kGelPicture, "rows", "240", U::one, "pixels from top to bottom", &PictureDescription::rows,
+        Between{B::integer, 1, 2048}),
+    row(kGelPicture, "cols", "320", U::one, "pixels from left to right", &PictureDescription::cols,
+        Between{B::integer, 1, 2048}),
+    row(kGelPicture, "size", "", U::m,
+        "height and width; the points and half their distance around if left out", B::positive),
+    row(kGelPicture, "mirror", "false", U::one, "true: left and right are exchanged",
+        Words{"false true"}),
+    row(kGelPicture, "noise", "0", U::one, "deviation of every number in a step, grey levels",
+        &PictureDescription::noise, B::not_negative),
+    row(kGelPicture, "gain", "0", U::one, "deviation of a factor per channel and episode",
+        &PictureDescription::gain, B::not_negative),
+    row(kGelPicture, "markers", "", U::one, "columns and rows of printed markers",
+        Between{B::integer, 1, 1024}),
+    row(kGelPicture, "marker_pitch", kNone, U::m,
+        "between printed markers; spread over the picture if left out",
+        &PictureDescription::marker_pitch, B::positive),
+    row(kGelPicture, "marker_radius", kNone, U::m,
+        "of printed markers; a tenth of their distance if left out",
+        &PictureDescription::marker_radius, B::positive),
 
     row(kEndEffector, "name", "", U::one, "endeffector and its place in the file if left out"),
     row(kEndEffector, "joint", kNeeded, U::one, "it moves with this joint"),
@@ -440,7 +461,8 @@ constexpr const char* kElementNames[] = {"option",
                                          "body",
                                          "surface_contact",
                                          "surface_contact",
-                                         "layer"};
+                                         "layer",
+                                         "picture"};
 static_assert(std::size(kElementNames) == kElements);
 
 constexpr Holder kHolders[] = {
@@ -456,7 +478,7 @@ constexpr Holder kHolders[] = {
     {"randomize", kVarying, true},
     {"link", kJoint | kBody | kLink},
     {"body", kVisual | kCollision},
-    {"tactile", kImperfections | kMarkers | kLayer},
+    {"tactile", kImperfections | kMarkers | kLayer | kGelPicture},
     {"piecewise", kAt},
 };
 
@@ -465,14 +487,14 @@ constexpr Holder kHolders[] = {
 std::span<const Attribute> schema() { return kSchema; }
 std::span<const Holder> holders() { return kHolders; }
 
-std::uint32_t elements_inside(std::string_view holder) {
+std::uint64_t elements_inside(std::string_view holder) {
   const auto found =
       std::ranges::find_if(kHolders, [&](const Holder& h) { return holder == h.name; });
   return found == std::end(kHolders) ? 0 : found->elements;
 }
 
 const char* to_string(Element element) {
-  return kElementNames[std::countr_zero(static_cast<std::uint32_t>(element))];
+  return kElementNames[std::countr_zero(static_cast<std::uint64_t>(element))];
 }
 
 const Attribute& attribute_of(Element element, std::string_view name) {

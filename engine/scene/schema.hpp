@@ -21,42 +21,43 @@
 namespace tangere {
 
 /// Elements of a scene file as bits: a row may serve several.
-enum Element : std::uint32_t {
-  kOption = 1U << 0,
-  kSolver = 1U << 1,
-  kGround = 1U << 2,
-  kRobot = 1U << 3,
-  kLink = 1U << 4,
-  kJoint = 1U << 5,
-  kBody = 1U << 6,
-  kVisual = 1U << 7,
-  kCollision = 1U << 8,
-  kMotor = 1U << 9,
-  kGroundContact = 1U << 10,
-  kPairContact = 1U << 11,
-  kTactile = 1U << 12,
-  kImperfections = 1U << 13,
-  kMarkers = 1U << 14,
-  kEndEffector = 1U << 15,
-  kInitialJoint = 1U << 16,
-  kConstant = 1U << 17,
-  kPiecewise = 1U << 18,
-  kAt = 1U << 19,
-  kCsv = 1U << 20,
-  kRandom = 1U << 21,
-  kOutputs = 1U << 22,
-  kVaryJoint = 1U << 23,  ///< in <randomize>, like those below
-  kVaryMotor = 1U << 24,
-  kVaryGround = 1U << 25,
-  kVaryPair = 1U << 26,
-  kVaryTactile = 1U << 27,
-  kVaryBody = 1U << 28,
-  kSurfaceContact = 1U << 29,
-  kVarySurface = 1U << 30,  ///< in <randomize>
-  kLayer = 1U << 31,
+enum Element : std::uint64_t {
+  kOption = 1ULL << 0,
+  kSolver = 1ULL << 1,
+  kGround = 1ULL << 2,
+  kRobot = 1ULL << 3,
+  kLink = 1ULL << 4,
+  kJoint = 1ULL << 5,
+  kBody = 1ULL << 6,
+  kVisual = 1ULL << 7,
+  kCollision = 1ULL << 8,
+  kMotor = 1ULL << 9,
+  kGroundContact = 1ULL << 10,
+  kPairContact = 1ULL << 11,
+  kTactile = 1ULL << 12,
+  kImperfections = 1ULL << 13,
+  kMarkers = 1ULL << 14,
+  kEndEffector = 1ULL << 15,
+  kInitialJoint = 1ULL << 16,
+  kConstant = 1ULL << 17,
+  kPiecewise = 1ULL << 18,
+  kAt = 1ULL << 19,
+  kCsv = 1ULL << 20,
+  kRandom = 1ULL << 21,
+  kOutputs = 1ULL << 22,
+  kVaryJoint = 1ULL << 23,  ///< in <randomize>, like those below
+  kVaryMotor = 1ULL << 24,
+  kVaryGround = 1ULL << 25,
+  kVaryPair = 1ULL << 26,
+  kVaryTactile = 1ULL << 27,
+  kVaryBody = 1ULL << 28,
+  kSurfaceContact = 1ULL << 29,
+  kVarySurface = 1ULL << 30,  ///< in <randomize>
+  kLayer = 1ULL << 31,
+  kGelPicture = 1ULL << 32,
 };
-inline constexpr int kElements = 32;
-inline constexpr std::uint32_t kContacts = kGroundContact | kPairContact,
+inline constexpr int kElements = 33;
+inline constexpr std::uint64_t kContacts = kGroundContact | kPairContact,
                                kTouching = kContacts | kTactile,
                                kVarying = kVaryJoint | kVaryMotor | kVaryGround | kVaryPair |
                                           kVaryTactile | kVaryBody | kVarySurface;
@@ -66,13 +67,13 @@ const char* to_string(Element element);
 /// A part of a scene file that holds elements: the root, a section, or an element.
 struct Holder {
   const char* name;
-  std::uint32_t elements;  ///< Element bits of what it holds
+  std::uint64_t elements;  ///< Element bits of what it holds
   bool section = false;    ///< stands in the root and has no attributes
 };
 /// All of them: the root <tangere>, then the sections, then elements that hold others.
 std::span<const Holder> holders();
 /// Returns the Element bits of what the holder of this name holds; 0 if there is none.
-std::uint32_t elements_inside(std::string_view holder);
+std::uint64_t elements_inside(std::string_view holder);
 
 /// Which values an attribute may have. Numbers are finite.
 enum class Bound : std::uint8_t { any, not_negative, positive, share, range, integer };
@@ -96,13 +97,13 @@ using Member = std::variant<
     double ContactCoefficients::*, int TactileDescription::*, double SensorImperfections::*,
     NormalAndShear SensorImperfections::*, double MarkersDescription::*, double SkinMaterial::*,
     double LayerDescription::*, std::optional<double> LayerDescription::*,
-    Vector3 EndEffectorDescription::*, double EndEffectorDescription::*,
-    std::array<double, 4> EndEffectorDescription::*, double PiecewiseControl::*,
-    double RandomControl::*>;
+    int PictureDescription::*, double PictureDescription::*, Vector3 EndEffectorDescription::*,
+    double EndEffectorDescription::*, std::array<double, 4> EndEffectorDescription::*,
+    double PiecewiseControl::*, double RandomControl::*>;
 
 /// An attribute of one or several elements.
 struct Attribute {
-  std::uint32_t elements = 0;  ///< Element bits
+  std::uint64_t elements = 0;  ///< Element bits
   const char* name = "";
   /// The value where a file gives none, as in a file; "": there is none; nullptr: must be given.
   const char* default_text = "";

@@ -12,6 +12,7 @@
 #include "engine/sense/field_sum.hpp"
 #include "engine/sense/flow_map.hpp"
 #include "engine/sense/marker_map.hpp"
+#include "engine/sense/picture_reading.hpp"
 
 namespace tangere {
 
@@ -64,6 +65,7 @@ struct FormMap::Impl {
   int pressure_sign;
   std::optional<Mat3<double>> turn;  // of a skewed pad
   std::optional<MarkerMap> markers;
+  std::size_t size;  // of the form
 
   Impl(const Model& m, FieldOutput of) : model(m), output(of) {
     check_outputs({&of, 1}, m.sensors().size());
@@ -77,6 +79,10 @@ struct FormMap::Impl {
     pressure_sign = m.sensors()[std::size_t(of.sensor)].pressure_sign;
     if (pad.skewed) turn = perpendicular_from_stored(pad);
     if (is_displacement(of.form)) markers.emplace(m, of.sensor);
+    size = numbers_of(m.sensors()[std::size_t(of.sensor)], of.form);
+    if (is_picture(of.form) && !m.scene().sensors[std::size_t(of.sensor)].layer)
+      throw InputError("pictures of sensor '" + m.sensors()[std::size_t(of.sensor)].name +
+                       "', which has no <layer>, do not follow from its field");
   }
 
   [[nodiscard]] std::size_t points() const { return std::size_t(pad.rows) * std::size_t(pad.cols); }
@@ -142,9 +148,7 @@ FormMap::FormMap(FormMap&&) noexcept = default;
 FormMap& FormMap::operator=(FormMap&&) noexcept = default;
 
 std::size_t FormMap::field_size() const { return 3 * impl_->points(); }
-std::size_t FormMap::size() const {
-  return numbers_of(static_cast<int>(impl_->points()), impl_->output.form);
-}
+std::size_t FormMap::size() const { return impl_->size; }
 
 void FormMap::evaluate(std::span<const double> field, std::span<double> form) const {
   const Impl& m = *impl_;
@@ -158,6 +162,14 @@ void FormMap::evaluate(std::span<const double> field, std::span<double> form) co
     case FieldForm::sum: m.sum(field, form); return;
     case FieldForm::markers:
     case FieldForm::surface: m.markers->displace(field, form); return;
+    case FieldForm::height:
+    case FieldForm::rgb:
+    case FieldForm::rgb_marker: {
+      PictureReading<double> picture(m.model, m.output.sensor);
+      picture.set_field(m.output.form, field);
+      picture.read(m.output.form, form);
+      return;
+    }
     case FieldForm::flow: {
       const ShearField<double> shear{field};
       normalised_flow({&shear, 1}, form);
@@ -181,6 +193,14 @@ void FormMap::pull_back(std::span<const double> field, std::span<const double> f
     case FieldForm::sum: m.pull_back_sum(field, form_bar, field_bar, point_bar); return;
     case FieldForm::markers:
     case FieldForm::surface: m.markers->pull_back(field, form_bar, field_bar); return;
+    case FieldForm::height:
+    case FieldForm::rgb:
+    case FieldForm::rgb_marker: {
+      PictureReading<double> picture(m.model, m.output.sensor);
+      picture.set_field(m.output.form, field);
+      picture.pull_back(m.output.form, field, form_bar, field_bar);
+      return;
+    }
     case FieldForm::flow: {
       const ShearField<double> shear{field};
       const ShearCotangent to{field_bar, {}};

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Forms of a field as functions of the field of their sensor (engine/scene/field_form.hpp), and
-// their pullbacks. `ideal`, `markers` and `surface` are functions of the ideal field. Shear,
-// markers and surface are linear; a flow is a quotient. Of a sum, with a point's place x_i and its
-// pressing force p_i = max(0, sign f_3,i):
+// their pullbacks. `ideal`, `markers`, `surface` and pictures are functions of the ideal field.
+// Shear, markers and surface are linear; a flow is a quotient. Of a sum, with a point's place x_i
+// and its pressing force p_i = max(0, sign f_3,i):
 //
 //   F = Σ_i R_iᵀ f_i,  c = Σ_i p_i x_i / P,  P = Σ_i p_i,  ∂c/∂p_i = (x_i - c)/P,  ∂c/∂x_i = p_i/P
 #pragma once
@@ -19,19 +19,20 @@ namespace tangere {
 /// scratch at its first call.
 class FormMap {
  public:
-  /// Throws InputError for a sensor that does not exist, for markers of a sensor without them, and
-  /// for `pressure`, which leaves friction out: the field does not determine it.
+  /// Throws InputError for a sensor that does not exist, for markers of a sensor without them, for
+  /// `pressure`, which leaves friction out, and for pictures of a sensor without a layer: the field
+  /// does not determine them.
   FormMap(const Model& model, FieldOutput output);
   ~FormMap();
   FormMap(FormMap&&) noexcept;
   FormMap& operator=(FormMap&&) noexcept;
 
   [[nodiscard]] std::size_t field_size() const;  ///< 3 points
-  [[nodiscard]] std::size_t size() const;        ///< numbers_of(points, form)
+  [[nodiscard]] std::size_t size() const;        ///< numbers_of(sensor, form)
 
   /// Computes the form, (size), from the field, (field_size) [N]. The bits are those of
   /// Readout::read_block(), but the sum of a pad whose axes are not perpendicular differs by
-  /// rounding.
+  /// rounding, and pictures are in double precision, without noise and gains.
   void evaluate(std::span<const double> field, std::span<double> form) const;
   /// Adds to `field_bar`, (field_size), the pullback of `form_bar`, (size), at `field`. A flow
   /// changes with the first point of the largest shear. Points that do not press have no derivative

@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "engine/sense/dense_tiles.hpp"
+#include "engine/sense/pad_depth.hpp"
 
 namespace tangere {
 
@@ -71,18 +72,6 @@ Vec3<double> LayeredField::to_pad(const Vec3<double>& b) const {
   const double* const a = pad_.axes;
   return {a[0] * b.x + a[3] * b.y + a[6] * b.z, a[1] * b.x + a[4] * b.y + a[7] * b.z,
           a[2] * b.x + a[5] * b.y + a[8] * b.z};
-}
-
-/// Whether a shape may touch a point of a tile. A mesh has a distance near its surface only.
-bool LayeredField::reaches(int target, int tile) const {
-  const kernels::TouchShape& s = shapes_[static_cast<std::size_t>(target)];
-  if (s.grid != nullptr) return true;
-  const Vec3<double> centre = {pad_.x[tile], pad_.y[tile], pad_.z[tile]};
-  return kernels::with_distance<double>(
-      s.shape, Vec3<double>{s.size[0], s.size[1], s.size[2]}, [&](const auto& shape) {
-        return !(distance_in_pad(shape, touches_[static_cast<std::size_t>(target)], centre).d >
-                 pad_.radius[tile] + sensor_->layer->bulge());
-      });
 }
 
 /// Lists a point that a shape of a group presses, with the deepest of its shapes. `normal`: N of
@@ -152,7 +141,7 @@ void LayeredField::find_points(const SpringFields& springs) {
   for (int tile = 0; tile < pad_.tiles(); ++tile) {
     bool reached = false;
     for (std::size_t k = 0; k < shapes_.size() && !reached; ++k)
-      reached = reaches(static_cast<int>(k), tile);
+      reached = reaches_tile(pad_, tile, shapes_[k], touches_[k], sensor_->layer->bulge());
     if (!reached) continue;
     const double* const offset = pad_.offsets + 2 * kernels::kTactileTile * pad_.kind[tile];
     for_points_of_tile(pad_, tile, [&](int slot, int index) {

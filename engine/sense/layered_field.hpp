@@ -74,7 +74,6 @@ class LayeredField {
   void add_point(int index, int group, const kernels::Vec3<double>& xi, double normal);
   void pull_back_point(const Point& p, const kernels::Vec3<double>& slant_bar, bool sizes,
                        Cotangents& out) const;
-  [[nodiscard]] bool reaches(int target, int tile) const;
   [[nodiscard]] Friction friction_at(const Point& p) const;
   [[nodiscard]] LayerDepth<kernels::Dual<double>> moved(
       const Point& p, const kernels::Touch<kernels::Dual<double>>& touch,

@@ -3,6 +3,7 @@
 // state and changes nothing.
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <span>
 
@@ -12,16 +13,18 @@
 
 namespace tangere {
 
-/// Reads any batch of its model, and owns the scratch of one thread. Only the constructor
-/// allocates; displacements of markers and surfaces have scratch of each thread besides.
+/// Reads any batch of its model, and owns the scratch of one thread. Only the constructor and the
+/// first picture of a sensor allocate; displacements of markers and surfaces have scratch of each
+/// thread besides.
 ///
 /// Tactile fields are in [N]: f·axis0, f·axis1, -f·(axis0 × axis1), where f is the force on the
 /// sensor's body. They are exactly zero where nothing touches, unless the sensor is imperfect:
 /// then every reading of it but FieldForm::ideal has its imperfections, and the same reading taken
 /// twice in a step has the same noise. Every body that can move relative to the sensor is sensed.
 /// Every way of reading gives the same numbers: those of the readout's precision, converted where T
-/// is the other type. T is float or double. A flow is that of the shear in T. FieldForm::markers
-/// and surface throw InputError for a sensor without them. Every function throws InputError for a
+/// is the other type. T is float or double. A flow is that of the shear in T. Pictures are computed
+/// in single precision. FieldForm::markers, surface and pictures throw InputError for a sensor
+/// without them. Every function throws InputError for a
 /// batch or frame of another Model, for an environment, block, sensor or body that does not exist,
 /// and for an array of another length than its shape says.
 class Readout {
@@ -62,13 +65,16 @@ class Readout {
   template <class T>
   void read(const Batch& batch, int environment, CompactFrame<T>& frame);
 
-  /// Reads the environments from 16 block on, numbers_of(points, form) each, one array per
+  /// Reads the environments from 16 block on, numbers_of(sensor, form) each, one array per
   /// environment. Arrays beyond the batch's last environment are left alone and may be missing.
   /// Flat pads of up to 512 points are read in all environments at once.
   void read_block(const Batch& batch, int block, FieldOutput output,
                   std::span<const std::span<double>> readings);
   void read_block(const Batch& batch, int block, FieldOutput output,
                   std::span<const std::span<float>> readings);
+  /// The same of a picture in colours, rounded to whole grey levels; other forms are refused.
+  void read_block(const Batch& batch, int block, FieldOutput output,
+                  std::span<const std::span<std::uint8_t>> pictures);
   /// The same into one frame per environment, all of the same sensor and form.
   template <class T>
   void read_block(const Batch& batch, int block, std::span<DenseFrame<T>> frames);

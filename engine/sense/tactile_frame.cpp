@@ -29,7 +29,8 @@ DenseFrame<T>::DenseFrame(const Model& model, int sensor, FieldForm form)
     : model_(model),
       sensor_(sensor),
       form_(form),
-      values_(numbers_of(checked(model, sensor).points(), form)),
+      values_(numbers_of(compiled(model).sensor_info[std::size_t(checked(model, sensor).number)],
+                         form)),
       written_(std::size_t(checked(model, sensor).n_tiles())) {
   if (form == FieldForm::sum)
     throw InputError("a frame of a sum; expected a field, a pressure or a shear");

@@ -29,6 +29,11 @@ constexpr std::size_t kLeastLastBytes = 8 << 10, kLeastTiledBytes = 8 << 10;
 // of a curved pad. Tiles that nothing touches are left out.
 constexpr std::uint64_t kTileSide = 16, kLargeSide = 128, kTilePoints = 256;
 
+/// Bytes of a number of an observation.
+std::size_t number_bytes(const DatasetLayout& layout, bool is_bytes) {
+  return is_bytes ? 1 : layout.single ? sizeof(float) : sizeof(double);
+}
+
 std::size_t numbers_of(const std::vector<std::uint64_t>& shape) {
   return std::accumulate(shape.begin(), shape.end(), std::size_t{1}, std::multiplies<>());
 }
@@ -113,10 +118,12 @@ std::vector<unsigned char> lz4(const std::vector<unsigned char>& plain) {
   return out;
 }
 
+/// Pictures in colours are bytes and nowhere zero, so they have no tiles.
 ChunkPlan chunk_plan(const DatasetLayout& layout, const std::vector<std::uint64_t>& shape,
-                     std::size_t row_bytes, double together) {
-  const bool sparse =
-      layout.sparse && (shape.size() == 2 || shape.size() == 3) && row_bytes >= kLeastTiledBytes;
+                     bool is_bytes, double together) {
+  const std::size_t row_bytes = numbers_of(shape) * number_bytes(layout, is_bytes);
+  const bool sparse = layout.sparse && !is_bytes && (shape.size() == 2 || shape.size() == 3) &&
+                      row_bytes >= kLeastTiledBytes;
   ChunkPlan plan;
   plan.tile = shape;
   if (sparse) {
@@ -142,16 +149,17 @@ ChunkPlan chunk_plan(const DatasetLayout& layout, const std::vector<std::uint64_
 
 std::vector<ChunkPlan> chunk_plans(const DatasetLayout& layout) {
   const std::vector<std::vector<std::uint64_t>> shapes = layout.observation_shapes();
-  const std::size_t width = layout.single ? sizeof(float) : sizeof(double);
+  const std::vector<bool> is_bytes = layout.observation_bytes();
   double together = 0;
-  for (const auto& shape : shapes) together += static_cast<double>(numbers_of(shape) * width);
+  for (std::size_t k = 0; k < shapes.size(); ++k)
+    together += static_cast<double>(numbers_of(shapes[k]) * number_bytes(layout, is_bytes[k]));
   const std::vector<DatasetSample> samples = layout.samples();
   std::vector<ChunkPlan> plans;
   plans.reserve(shapes.size() + samples.size());
-  for (const auto& shape : shapes)
-    plans.push_back(chunk_plan(layout, shape, numbers_of(shape) * width, together));
+  for (std::size_t k = 0; k < shapes.size(); ++k)
+    plans.push_back(chunk_plan(layout, shapes[k], is_bytes[k], together));
   for (const DatasetSample& sample : samples)
-    plans.push_back(chunk_plan(layout, sample.shape, numbers_of(sample.shape) * width, 1));
+    plans.push_back(chunk_plan(layout, sample.shape, sample.is_bytes, 1));
   return plans;
 }
 
@@ -170,9 +178,14 @@ bool has_tiles(const DatasetLayout& layout) {
 std::vector<h5::FileFilter> file_filters(const std::string& compression, std::size_t number_bytes) {
   constexpr std::uint16_t kDeflate = 1, kShuffle = 2;
   if (compression == "none") return {};
-  const h5::FileFilter shuffled{kShuffle, {}, {static_cast<std::uint32_t>(number_bytes)}};
-  if (compression == "lz4") return {shuffled, {h5::kLz4Filter, "lz4", {0}}};
-  return {shuffled, {kDeflate, {}, {kDeflateLevel}}};
+  std::vector<h5::FileFilter> filters;
+  if (number_bytes > 1)
+    filters.push_back({kShuffle, {}, {static_cast<std::uint32_t>(number_bytes)}});
+  if (compression == "lz4")
+    filters.push_back({h5::kLz4Filter, "lz4", {0}});
+  else
+    filters.push_back({kDeflate, {}, {kDeflateLevel}});
+  return filters;
 }
 
 void shuffle(const unsigned char* data, std::size_t used, std::size_t width,
@@ -182,15 +195,18 @@ void shuffle(const unsigned char* data, std::size_t used, std::size_t width,
     split<std::uint32_t>(data, given, out.data(), numbers);
   else if (width == sizeof(std::uint64_t))
     split<std::uint64_t>(data, given, out.data(), numbers);
+  else if (width == 1)
+    std::copy_n(data, given, out.begin());
   else
-    throw std::logic_error("numbers that are neither of four nor of eight bytes");
+    throw std::logic_error("numbers that are neither of one, nor of four, nor of eight bytes");
   for (std::size_t b = 0; b < width; ++b)
     std::fill_n(out.begin() + static_cast<std::ptrdiff_t>(b * numbers + given), numbers - given,
                 static_cast<unsigned char>(0));
 }
 
-std::vector<unsigned char> compressed(const DatasetLayout& layout, const unsigned char* data,
-                                      std::size_t used, std::size_t bytes) {
+std::vector<unsigned char> compressed(const DatasetLayout& layout, std::size_t width,
+                                      const unsigned char* data, std::size_t used,
+                                      std::size_t bytes) {
   if (layout.compression == "none") {
     std::vector<unsigned char> same(data, data + used);
     same.resize(bytes, 0);
@@ -198,7 +214,7 @@ std::vector<unsigned char> compressed(const DatasetLayout& layout, const unsigne
   }
   thread_local std::vector<unsigned char> plain;
   plain.resize(bytes);
-  shuffle(data, used, layout.single ? sizeof(float) : sizeof(double), plain);
+  shuffle(data, used, width, plain);
   return layout.compression == "lz4" ? lz4(plain) : deflated(plain);
 }
 

@@ -34,9 +34,11 @@ bool has_tiles(const DatasetLayout& layout);
 
 /// The filters that a file declares for chunks of numbers of `number_bytes` each.
 std::vector<h5::FileFilter> file_filters(const std::string& compression, std::size_t number_bytes);
-/// Returns the bytes on disk of a chunk of `bytes`: `used` bytes of data, then zeros. Thread-safe.
-std::vector<unsigned char> compressed(const DatasetLayout& layout, const unsigned char* data,
-                                      std::size_t used, std::size_t bytes);
+/// Returns the bytes on disk of a chunk of `bytes`: `used` bytes of data, then zeros. `width`:
+/// bytes of a number. Thread-safe.
+std::vector<unsigned char> compressed(const DatasetLayout& layout, std::size_t width,
+                                      const unsigned char* data, std::size_t used,
+                                      std::size_t bytes);
 
 /// Shuffles as HDF5 does: byte 0 of all numbers, then byte 1 of all, and so on. `out` has room for
 /// all numbers. Numbers from `used` bytes on are zeros. `width`: bytes of a number.

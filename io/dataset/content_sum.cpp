@@ -133,5 +133,6 @@ bool any_number(std::span<const T> numbers) {
 
 template bool any_number(std::span<const float>);
 template bool any_number(std::span<const double>);
+template bool any_number(std::span<const std::uint8_t>);
 
 }  // namespace tangere

@@ -126,6 +126,13 @@ void describe_numbers(const h5::Id& scene, const DatasetLayout& layout) {
       readings.push_back(channel.name);
       components.push_back(components_text(sensor, of.form));
     }
+    for (const RunAttribute& fact : sensor.picture_facts)
+      if (std::any_of(channels.begin(), channels.end(), [&](const EpisodeChannel& channel) {
+            return channel.kind == EpisodeChannel::Kind::reading &&
+                   is_picture(channel.reading.form) &&
+                   &layout.sensors[static_cast<std::size_t>(channel.reading.sensor)] == &sensor;
+          }))
+        h5::write_attributes(group, {{"picture_" + fact.name, fact.value}});
     if (readings.empty()) continue;
     h5::write_attribute(group, "readings", std::span<const std::string>(readings));
     h5::write_attribute(group, "reading_components", std::span<const std::string>(components));

@@ -110,8 +110,8 @@ std::vector<DatasetSample> DatasetLayout::samples() const {
   std::vector<DatasetSample> list;
   for (std::size_t k = 0; k < all.size(); ++k)
     if (all[k].requested && all[k].times.given())
-      list.push_back(
-          {all[k].name, all[k].shape, k, all[k].times, all[k].times.before(rows() + 1, rows())});
+      list.push_back({all[k].name, all[k].shape, all[k].is_bytes(), k, all[k].times,
+                      all[k].times.before(rows() + 1, rows())});
   return list;
 }
 
@@ -133,24 +133,32 @@ std::vector<std::vector<std::uint64_t>> DatasetLayout::observation_shapes() cons
   return shapes;
 }
 
+std::vector<bool> DatasetLayout::observation_bytes() const {
+  std::vector<bool> bytes;
+  for (const EpisodeChannel& channel : channels())
+    if (channel.requested && !channel.times.given()) bytes.push_back(channel.is_bytes());
+  return bytes;
+}
+
 double DatasetLayout::episode_bytes() const {
-  const auto size_of = [](const std::vector<std::uint64_t>& shape) {
-    return static_cast<double>(
-        std::accumulate(shape.begin(), shape.end(), std::uint64_t{1}, std::multiplies<>()));
+  const std::size_t width = single ? sizeof(float) : sizeof(double);
+  const auto size_of = [width](const std::vector<std::uint64_t>& shape, bool is_bytes) {
+    return static_cast<double>(std::accumulate(
+        shape.begin(), shape.end(), is_bytes ? std::size_t{1} : width, std::multiplies<>()));
   };
-  double numbers = 0, sample_numbers = 0;
-  for (const std::vector<std::uint64_t>& shape : observation_shapes()) numbers += size_of(shape);
+  double row_bytes = 0, sample_bytes = 0;
+  const std::vector<std::vector<std::uint64_t>> shapes = observation_shapes();
+  const std::vector<bool> is_bytes = observation_bytes();
+  for (std::size_t k = 0; k < shapes.size(); ++k) row_bytes += size_of(shapes[k], is_bytes[k]);
   for (const DatasetSample& sample : samples())
-    sample_numbers += static_cast<double>(sample.rows) * size_of(sample.shape);
+    sample_bytes += static_cast<double>(sample.rows) * size_of(sample.shape, sample.is_bytes);
   const double r = static_cast<double>(rows());
   const double action_bytes = static_cast<double>(action_names().size()) * sizeof(float);
   constexpr double kRewardAndDone = sizeof(float) + 1;
   double gradient_bytes = 0;
   for (const GradientArray& array : gradients)
     gradient_bytes += sizeof(double) * static_cast<double>(array.width()) * (array.per_row ? r : 1);
-  const auto width = static_cast<double>(single ? sizeof(float) : sizeof(double));
-  return ((r + 1) * numbers + sample_numbers) * width + r * (action_bytes + kRewardAndDone) +
-         gradient_bytes;
+  return (r + 1) * row_bytes + sample_bytes + r * (action_bytes + kRewardAndDone) + gradient_bytes;
 }
 
 std::int64_t DatasetLayout::episodes_per_shard() const {

@@ -40,6 +40,7 @@ struct PlayedBy {
 struct DatasetSample {
   std::string name;
   std::vector<std::uint64_t> shape;  ///< of a row
+  bool is_bytes = false;             ///< a picture in colours
   std::size_t source = 0;            ///< index in pieces of episodes
   OutputTimes times;                 ///< in rows
   std::int64_t rows = 0;             ///< of an episode
@@ -89,6 +90,8 @@ struct DatasetLayout : RunFacts {
   [[nodiscard]] std::vector<std::size_t> touch() const;
   /// Shapes of one row of each stored observation: {nq}, {nv}, {n, 3}, {rows, cols, 3} …
   [[nodiscard]] std::vector<std::vector<std::uint64_t>> observation_shapes() const;
+  /// Which of them are bytes: pictures in colours.
+  [[nodiscard]] std::vector<bool> observation_bytes() const;
   /// Size of one episode's numbers on disk, without HDF5's own data [bytes].
   [[nodiscard]] double episode_bytes() const;
   /// As many episodes as stay below shard_bytes, a multiple of 16. Depends on the data set alone.

@@ -47,7 +47,8 @@ DemoFormat::DemoFormat(const DatasetLayout& layout)
       touch_(layout.touch()),
       sources_(layout.recorded()),
       samples_(layout.samples()),
-      plans_(chunk_plans(layout)) {
+      plans_(chunk_plans(layout)),
+      compression_(layout.compression) {
   using h5::NumberType;
   const NumberType number = layout.single ? NumberType::float32 : NumberType::float64;
   gradient_sources_.resize(layout.gradients.size());
@@ -63,7 +64,8 @@ DemoFormat::DemoFormat(const DatasetLayout& layout)
   for (const char* group : {"obs/", "final_obs/"}) {
     for (const std::string& name : names_) titles_.push_back(group + name);
     shapes_.insert(shapes_.end(), observed.begin(), observed.end());
-    types_.insert(types_.end(), observed.size(), number);
+    for (const bool is_bytes : layout.observation_bytes())
+      types_.push_back(is_bytes ? NumberType::uint8 : number);
   }
   for (const GradientArray& array : gradients_) {
     const auto from =
@@ -76,14 +78,13 @@ DemoFormat::DemoFormat(const DatasetLayout& layout)
   }
   for (const DatasetSample& sample : samples_) {
     shapes_.push_back(sample.shape);
-    types_.push_back(number);
+    types_.push_back(sample.is_bytes ? NumberType::uint8 : number);
     titles_.push_back("samples/" + sample.name);
   }
   for (std::string& title : titles_) title += " of demo_";
   for (std::size_t k = 0; k < shapes_.size(); ++k)
     row_bytes_.push_back(std::accumulate(shapes_[k].begin(), shapes_[k].end(),
                                          h5::bytes_of(types_[k]), std::multiplies<>()));
-  filters_ = file_filters(layout.compression, h5::bytes_of(number));
   h5::Bytes header;
   DemoFacts facts{1, std::nullopt, std::vector<double>(randomized_), std::nullopt};
   if (is_task_) facts.end.emplace();
@@ -128,6 +129,7 @@ h5::Bytes DemoFormat::texts() const {
 void DemoFormat::describe_dataset(h5::Bytes& out, std::size_t dataset, std::int64_t rows,
                                   std::uint64_t address,
                                   std::span<const h5::FileText> texts) const {
+  const std::vector<h5::FileFilter> filters = file_filters(compression_, number_bytes(dataset));
   h5::FileDataset file;
   file.type = types_[dataset];
   file.dims = {static_cast<std::uint64_t>(rows_of(dataset, rows))};
@@ -137,7 +139,7 @@ void DemoFormat::describe_dataset(h5::Bytes& out, std::size_t dataset, std::int6
     const std::vector<std::uint64_t>& tile = plan(dataset).tile;
     file.chunk = {static_cast<std::uint64_t>(chunk)};
     file.chunk.insert(file.chunk.end(), tile.begin(), tile.end());
-    file.filters = filters_;
+    file.filters = filters;
   }
   file.texts = texts;
   h5::add_dataset(out, file);

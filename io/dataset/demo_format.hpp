@@ -60,6 +60,10 @@ class DemoFormat {
   /// "obs/pad of demo_": its number follows.
   [[nodiscard]] const std::string& title(std::size_t dataset) const { return titles_[dataset]; }
   [[nodiscard]] std::size_t row_bytes(std::size_t dataset) const { return row_bytes_[dataset]; }
+  /// Bytes of a number of a dataset.
+  [[nodiscard]] std::size_t number_bytes(std::size_t dataset) const {
+    return h5::bytes_of(types_[dataset]);
+  }
   [[nodiscard]] std::size_t rank(std::size_t dataset) const { return shapes_[dataset].size() + 1; }
   /// Rows of a dataset in a demo of `rows`.
   [[nodiscard]] std::int64_t rows_of(std::size_t dataset, std::int64_t rows) const;
@@ -117,7 +121,7 @@ class DemoFormat {
   std::vector<std::vector<std::uint64_t>> shapes_;  // of a row, per dataset
   std::vector<h5::NumberType> types_;
   std::vector<std::size_t> row_bytes_;
-  std::vector<h5::FileFilter> filters_;
+  std::string compression_;
   std::size_t header_bytes_ = 0;
 };
 

@@ -104,8 +104,10 @@ class ShownObservations {
 
 h5::NumberType type_of(const h5::Id& dataset) {
   const h5::Id type(H5Dget_type(dataset.get()));
-  return H5Tget_size(type.get()) == sizeof(float) ? h5::NumberType::float32
-                                                  : h5::NumberType::float64;
+  const std::size_t bytes = H5Tget_size(type.get());
+  return bytes == 1               ? h5::NumberType::uint8
+         : bytes == sizeof(float) ? h5::NumberType::float32
+                                  : h5::NumberType::float64;
 }
 
 DemoArray array_of(const h5::Id& group, const std::string& name) {

@@ -108,11 +108,12 @@ class Cutter {
     const std::size_t bytes = slice.rows.row_bytes;
     for (std::int64_t row = 0; row < slice.rows.rows; row += each) {
       const std::size_t used = as_size(std::min(each, slice.rows.rows - row));
-      chunks_.push_back({episode,
-                         dataset,
-                         {static_cast<std::uint64_t>(slice.first + row), 0, 0},
-                         compressed(layout_, slice.data + as_size(row) * bytes, used * bytes,
-                                    as_size(each) * bytes)});
+      chunks_.push_back(
+          {episode,
+           dataset,
+           {static_cast<std::uint64_t>(slice.first + row), 0, 0},
+           compressed(layout_, format_.number_bytes(dataset), slice.data + as_size(row) * bytes,
+                      used * bytes, as_size(each) * bytes)});
     }
   }
 
@@ -134,8 +135,8 @@ class Cutter {
           if (*mark++ != 0) {
             cut_tile(cells, data, r, c, content);
             chunks_.push_back({episode, dataset, cells.first(slice.first + row, r, c),
-                               compressed(layout_, tile_.data(), tile_.size(),
-                                          as_size(each) * cells.tile_bytes())});
+                               compressed(layout_, format_.number_bytes(dataset), tile_.data(),
+                                          tile_.size(), as_size(each) * cells.tile_bytes())});
           }
     }
     return content_;

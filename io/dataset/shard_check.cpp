@@ -191,13 +191,11 @@ class ShardChecker {
     touching_.assign(touch_.empty() ? 0 : static_cast<std::size_t>(rows), 0);
     for (std::size_t k = 0; k < names_.size(); ++k) {
       const bool touch = std::find(touch_.begin(), touch_.end(), names_[k]) != touch_.end();
-      if (single_) {
-        add<float>(obs, names_[k], episode, k + 1, 0, rows, touch);
-        add<float>(final_obs, names_[k], episode, k + 1, rows, 1);
-      } else {
-        add<double>(obs, names_[k], episode, k + 1, 0, rows, touch);
-        add<double>(final_obs, names_[k], episode, k + 1, rows, 1);
-      }
+      in_type_of(obs, names_[k], [&](auto zero) {
+        using T = decltype(zero);
+        add<T>(obs, names_[k], episode, k + 1, 0, rows, touch);
+        add<T>(final_obs, names_[k], episode, k + 1, rows, 1);
+      });
     }
     if (!touch_.empty())
       check_touching(demo, episode);
@@ -210,8 +208,8 @@ class ShardChecker {
                  names_.size() + 2 + gradients_.size() + k);
     if (h5::has_link(demo, "next_obs"))
       for (const std::string& name : names_)
-        single_ ? check_next<float>(demo, name, episode, rows)
-                : check_next<double>(demo, name, episode, rows);
+        in_type_of(obs, name,
+                   [&](auto zero) { check_next<decltype(zero)>(demo, name, episode, rows); });
     content_.rows += rows;
     ++content_.demos;
   }
@@ -226,10 +224,20 @@ class ShardChecker {
 
   void add_sample(const h5::Id& samples, const StoredSample& stored, std::int64_t episode,
                   std::size_t index) {
-    if (single_)
-      add<float>(samples, stored.name, episode, index, 0, stored.rows);
+    in_type_of(samples, stored.name, [&](auto zero) {
+      add<decltype(zero)>(samples, stored.name, episode, index, 0, stored.rows);
+    });
+  }
+
+  /// Calls body(T{}) with a number of an observation: a byte of a picture, or the type of the
+  /// others.
+  template <class Body>
+  void in_type_of(const h5::Id& group, const std::string& name, const Body& body) {
+    const h5::Id dataset = h5::open_dataset(group, name), type(H5Dget_type(dataset.get()));
+    if (H5Tget_size(type.get()) == 1)
+      body(std::uint8_t{});
     else
-      add<double>(samples, stored.name, episode, index, 0, stored.rows);
+      single_ ? body(float{}) : body(double{});
   }
 
   void add_gradient(const h5::Id& demo, const StoredGradient& stored, std::int64_t episode,
@@ -311,9 +319,9 @@ class ShardChecker {
   template <class T>
   void check_finite(const std::vector<T>& numbers, const std::string& name, std::int64_t first,
                     std::size_t width) {
-    if (!finite_ || not_finite_.size() >= kMostProblems) return;
+    if (!std::is_floating_point_v<T> || !finite_ || not_finite_.size() >= kMostProblems) return;
     const auto bad =
-        std::find_if(numbers.begin(), numbers.end(), [](T x) { return !std::isfinite(x); });
+        std::find_if(numbers.begin(), numbers.end(), [](T x) { return !std::isfinite(double(x)); });
     if (bad == numbers.end()) return;
     const auto at = static_cast<std::size_t>(bad - numbers.begin());
     not_finite_.push_back(fmt::format("{}: row {} has a number that is {}; expected finite numbers",
@@ -359,7 +367,7 @@ class ShardChecker {
   std::vector<StoredSample> samples_;
   bool single_ = false, is_task_ = false;
   std::int64_t rows_ = 0, end_ = 0, policies_ = 0;
-  std::tuple<std::vector<float>, std::vector<double>> buffers_;
+  std::tuple<std::vector<float>, std::vector<double>, std::vector<std::uint8_t>> buffers_;
   ContentSum sum_;
   ShardContent content_;
 };

@@ -175,4 +175,28 @@ NamedColumns read_named_columns(const std::string& path) {
   return out;
 }
 
+std::optional<std::size_t> NamedFields::find(const std::string& name) const {
+  const auto found = std::find(names.begin(), names.end(), name);
+  if (found == names.end()) return std::nullopt;
+  return static_cast<std::size_t>(found - names.begin());
+}
+
+double NamedFields::number(const Row& row, std::size_t column) const {
+  return parse_number(row.fields[column], fmt::format("{}{}", row.place, names[column]));
+}
+
+NamedFields read_named_fields(const std::string& path) {
+  NamedFields out;
+  for_each_row(path, [&](const std::vector<std::string_view>& fields, const std::string& place) {
+    if (out.names.empty()) {
+      out.names = column_names(fields, place);
+      return;
+    }
+    check_count(fields.size(), out.names.size(), "as in the header", place);
+    out.rows.push_back({place, {fields.begin(), fields.end()}});
+  });
+  if (out.rows.empty()) fail_empty(path);
+  return out;
+}
+
 }  // namespace tangere

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -24,5 +25,23 @@ struct NamedColumns {
 };
 /// Reads a table whose first row has a different name for each column. Otherwise as read_csv().
 NamedColumns read_named_columns(const std::string& path);
+
+/// A table of words and numbers with named columns.
+struct NamedFields {
+  struct Row {
+    std::string place;  ///< "file:line: ", for messages
+    std::vector<std::string> fields;
+  };
+  std::vector<std::string> names;
+  std::vector<Row> rows;
+
+  /// Returns the index of a column; none if there is none of this name.
+  [[nodiscard]] std::optional<std::size_t> find(const std::string& name) const;
+  /// Returns a field as a number. Throws InputError ("file:line: …") if it is none.
+  [[nodiscard]] double number(const Row& row, std::size_t column) const;
+};
+/// Reads a table whose first row has a different name for each column; fields are any texts.
+/// Otherwise as read_csv().
+NamedFields read_named_fields(const std::string& path);
 
 }  // namespace tangere

@@ -121,6 +121,7 @@ void add_type(Bytes& out, NumberType type) {
     case NumberType::float32: return add_float(out, 4, kExponentOf32);
     case NumberType::float64: return add_float(out, 8, kExponentOf64);
     case NumberType::int8: return add_integer(out, 1);
+    case NumberType::uint8: return add_integer(out, 1, false);
     case NumberType::int64: return add_integer(out, 8);
     case NumberType::uint64: return add_integer(out, 8, false);
     case NumberType::boolean: return add_boolean(out);
@@ -162,7 +163,9 @@ void add_fill(Bytes& out, const FileDataset& dataset) {
   if (dataset.view) {
     out.number<std::uint8_t>(kLate | kFilledIfSet | kNumberFollows);
     out.number(static_cast<std::uint32_t>(bytes_of(dataset.type)));
-    if (dataset.type == NumberType::float32)
+    if (dataset.type == NumberType::uint8)
+      out.number<std::uint8_t>(0);
+    else if (dataset.type == NumberType::float32)
       out.number(std::bit_cast<std::uint32_t>(std::numeric_limits<float>::quiet_NaN()));
     else
       out.number(std::bit_cast<std::uint64_t>(std::numeric_limits<double>::quiet_NaN()));
@@ -322,6 +325,7 @@ std::size_t bytes_of(NumberType type) {
     case NumberType::int64:
     case NumberType::uint64: return 8;
     case NumberType::int8:
+    case NumberType::uint8:
     case NumberType::boolean: return 1;
   }
   return 0;

@@ -71,14 +71,14 @@ std::size_t SceneElement::word(const char* name) const {
   return std::size_t(choice(name, words));
 }
 
-static std::vector<Element> elements_of(std::uint32_t bits) {
+static std::vector<Element> elements_of(std::uint64_t bits) {
   std::vector<Element> out;
   for (int k = 0; k < kElements; ++k)
-    if ((bits & 1U << k) != 0) out.push_back(static_cast<Element>(1U << k));
+    if ((bits & 1ULL << k) != 0) out.push_back(static_cast<Element>(1ULL << k));
   return out;
 }
 
-std::vector<std::string> element_names(std::uint32_t elements) {
+std::vector<std::string> element_names(std::uint64_t elements) {
   std::vector<std::string> names;
   for (const Element element : elements_of(elements)) names.emplace_back(to_string(element));
   return names;

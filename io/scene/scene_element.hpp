@@ -44,7 +44,7 @@ class SceneElement : public SceneNode {
 };
 
 /// The names of these elements in scene files.
-std::vector<std::string> element_names(std::uint32_t elements);
+std::vector<std::string> element_names(std::uint64_t elements);
 /// The children that the schema allows in an element.
 std::vector<SceneNode> children_of(const SceneNode& node);
 /// The elements in a section, which has no attributes.

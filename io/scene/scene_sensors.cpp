@@ -13,6 +13,7 @@
 #include "engine/scene/skin_material.hpp"
 #include "io/files/name_list.hpp"
 #include "io/files/nearest_name.hpp"
+#include "io/scene/gel_file.hpp"
 #include "io/scene/scene_sections.hpp"
 #include "io/scene/tactile_layouts.hpp"
 
@@ -204,6 +205,24 @@ std::vector<TactilePoint> read_points(const SceneElement& node, const std::strin
   return points;
 }
 
+PictureDescription read_picture(const SceneElement& node) {
+  PictureDescription picture;
+  node.read(picture);
+  picture.source = node.source();
+  if (node.has("size")) {
+    const std::vector<double> size = node.numbers("size", 2);
+    picture.size = {size[0], size[1]};
+  }
+  picture.mirror = node.word("mirror") == 1;
+  if (node.has("markers")) {
+    const std::vector<double> counts = node.numbers("markers", 2);
+    picture.markers = {int(counts[0]), int(counts[1])};
+  }
+  picture.gel = std::make_shared<const Gel>(node.has("gel") ? read_beside(node, "gel", read_gel)
+                                                            : default_gel());
+  return picture;
+}
+
 /// Reads what <tactile> holds, each at most once.
 void read_parts(const SceneNode& node, TactileDescription& sensor) {
   std::vector<std::string> found;
@@ -211,8 +230,12 @@ void read_parts(const SceneNode& node, TactileDescription& sensor) {
     if (std::ranges::count(found, part.name()) > 0)
       part.fail("a second time in one <tactile>; expected one");
     found.push_back(part.name());
-    const bool marks = part.name() == "markers", couples = part.name() == "layer";
-    const SceneElement element(part, marks ? kMarkers : couples ? kLayer : kImperfections);
+    const bool marks = part.name() == "markers", couples = part.name() == "layer",
+               shows = part.name() == "picture";
+    const SceneElement element(part, marks     ? kMarkers
+                                     : couples ? kLayer
+                                     : shows   ? kGelPicture
+                                               : kImperfections);
     element.check();
     if (marks) {
       element.read(sensor.markers.emplace());
@@ -221,6 +244,8 @@ void read_parts(const SceneNode& node, TactileDescription& sensor) {
       element.read(sensor.layer.emplace());
       sensor.layer->source = part.source();
       sensor.layer->feedback = element.word("feedback") == 1;
+    } else if (shows) {
+      sensor.picture = read_picture(element);
     } else {
       element.read(sensor.imperfections);
       sensor.imperfections.source = part.source();

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Computes a checksum of the contents of a scene's other files (meshes, lists of points, tables).
+// Computes a checksum of the contents of a scene's other files (meshes, lists of points, gels,
+// tables).
 #pragma once
 
 #include <string>

@@ -53,10 +53,8 @@ struct TrajectoryReader::Impl {
          {FieldForm::field, FieldForm::ideal, FieldForm::pressure, FieldForm::shear})
       if (h5::has_link(group, dataset_of(form))) found.push_back(form);
     if (found.empty()) {
-      constexpr FieldForm kWithoutPicture[] = {FieldForm::sum, FieldForm::markers,
-                                               FieldForm::surface, FieldForm::flow};
-      if (std::none_of(std::begin(kWithoutPicture), std::end(kWithoutPicture),
-                       [&](FieldForm form) { return h5::has_link(group, dataset_of(form)); }))
+      if (std::ranges::none_of(
+              field_forms(), [&](FieldForm form) { return h5::has_link(group, dataset_of(form)); }))
         throw IoError(
             fmt::format("{}: sensor '{}' has no reading: the file is damaged", path, name));
       sums.push_back(name);

@@ -7,6 +7,7 @@
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
+#include <variant>
 
 #include <cmath>
 
@@ -64,12 +65,8 @@ FieldOutput PythonBatch::reading_named(const std::string& name) const {
 }
 
 Shape PythonBatch::shape_of_reading(FieldOutput output) const {
-  const SensorInfo& sensor = model().sensors()[as_size(output.sensor)];
-  if (output.form == FieldForm::sum) return {6};
-  Shape shape{as_size(sensor.points)};
-  if (sensor.rows > 0) shape = {as_size(sensor.rows), as_size(sensor.cols)};
-  if (const int components = components_of(output.form); components > 1)
-    shape.push_back(as_size(components));
+  Shape shape = reading_shape(model().sensors()[as_size(output.sensor)], output.form);
+  if (output.form == FieldForm::pressure) shape.pop_back();
   return shape;
 }
 
@@ -84,8 +81,10 @@ nb::object PythonBatch::read(FieldOutput output, const nb::object& out) {
   } else {
     nb::ndarray<T, nb::c_contig, nb::device::cpu> given;
     if (!nb::try_cast(out, given, false))
-      throw InputError(fmt::format("out is no writable contiguous array of {}",
-                                   sizeof(T) == 4 ? "float32" : "float64"));
+      throw InputError(
+          fmt::format("out is no writable contiguous array of {}", sizeof(T) == 1   ? "uint8"
+                                                                   : sizeof(T) == 4 ? "float32"
+                                                                                    : "float64"));
     const Shape found(given.shape_ptr(), given.shape_ptr() + given.ndim());
     if (found != shape)
       throw InputError(fmt::format("out of shape ({}); expected ({})", fmt::join(found, ", "),
@@ -104,6 +103,8 @@ nb::object PythonBatch::read(FieldOutput output, const nb::object& out) {
 
 nb::object PythonBatch::tactile(const std::string& reading, const nb::object& out) {
   const FieldOutput output = reading_named(reading);
+  if (is_colour(output.form)) return read<std::uint8_t>(output, out);
+  if (is_picture(output.form)) return read<float>(output, out);
   return precision_ == Precision::f64 ? read<double>(output, out) : read<float>(output, out);
 }
 
@@ -144,8 +145,8 @@ Run PythonBatch::run_as(std::span<const double> u, std::size_t steps, std::size_
                         const std::vector<std::string>& readings, const std::vector<int>& moving) {
   struct Requested {
     FieldOutput output;
-    std::size_t width;
-    std::span<T> numbers;
+    std::size_t width = 0;
+    std::variant<std::span<T>, std::span<std::uint8_t>> numbers{};
   };
   const std::size_t frames = steps / every, nq = as_size(model().nq()), nv = as_size(model().nv()),
                     nu = as_size(model().nu());
@@ -160,11 +161,16 @@ Run PythonBatch::run_as(std::span<const double> u, std::size_t steps, std::size_
   for (const std::string& name : readings) {
     if (run.readings.contains(name))
       throw InputError(fmt::format("reading '{}' is listed twice; expected each once", name));
-    requested.push_back({reading_named(name), 0, {}});
-    Shape shape = shape_of_reading(requested.back().output);
+    Requested& one = requested.emplace_back(Requested{reading_named(name)});
+    Shape shape = shape_of_reading(one.output);
     shape.insert(shape.begin(), {frames, count()});
-    run.readings[name] = nb::cast(new_array<T>(shape, requested.back().numbers));
-    requested.back().width = requested.back().numbers.size() / (frames * count());
+    if (is_colour(one.output.form)) one.numbers = std::span<std::uint8_t>();
+    std::visit(
+        [&]<class Number>(std::span<Number>& numbers) {
+          run.readings[name] = nb::cast(new_array<Number>(shape, numbers));
+          one.width = numbers.size() / (frames * count());
+        },
+        one.numbers);
   }
   const auto row = [&](auto numbers, std::size_t frame, int e, std::size_t width) {
     return numbers.subspan((frame * count() + as_size(e)) * width, width);
@@ -182,8 +188,12 @@ Run PythonBatch::run_as(std::span<const double> u, std::size_t steps, std::size_
             batch_, block, [&](int e) { return row(q, frame, e, nq); },
             [&](int e) { return row(v, frame, e, nv); });
         for (const Requested& a : requested)
-          read_field<T>(worker.readout, batch_, block, a.output,
-                        [&](int e) { return row(a.numbers, frame, e, a.width); });
+          std::visit(
+              [&]<class Number>(std::span<Number> numbers) {
+                read_field<Number>(worker.readout, batch_, block, a.output,
+                                   [&](int e) { return row(numbers, frame, e, a.width); });
+              },
+              a.numbers);
       }
     });
     std::copy(batch_.statuses().begin(), batch_.statuses().end(), statuses.begin());
@@ -527,15 +537,18 @@ void add_batches(nb::module_& m) {
            "motors' ranges. InputError: another shape.")
       .def("run", &PythonBatch::run, "u"_a, "every"_a = 1, "fields"_a = std::vector<std::string>(),
            "envs"_a = nb::none(), kRunText)
-      .def("tactile", &PythonBatch::tactile, "reading"_a, "out"_a = nb::none(),
-           nb::sig("def tactile(self, reading: str, out: numpy.typing.NDArray | None = None) -> "
-                   "numpy.typing.NDArray"),
-           "Reads one sensor in all environments: 'pad' (E, rows, cols, 3) or (E, points, 3),\n"
-           "shear, shear, normal force of each point [N]; 'pad.pressure' and 'pad.shear' parts of\n"
-           "it; 'pad.sum' (E, 6): force [N] and where it presses [m], body axes; 'pad.flow' the\n"
-           "shear over its largest length; 'pad.ideal' the field without imperfections;\n"
-           "'pad.markers' the displacement of markers [m], 'pad.surface' that of a layer's\n"
-           "surface [m]. `out`: an array to fill instead of a new one.")
+      .def(
+          "tactile", &PythonBatch::tactile, "reading"_a, "out"_a = nb::none(),
+          nb::sig("def tactile(self, reading: str, out: numpy.typing.NDArray | None = None) -> "
+                  "numpy.typing.NDArray"),
+          "Reads one sensor in all environments: 'pad' (E, rows, cols, 3) or (E, points, 3),\n"
+          "shear, shear, normal force of each point [N]; 'pad.pressure' and 'pad.shear' parts of\n"
+          "it; 'pad.sum' (E, 6): force [N] and where it presses [m], body axes; 'pad.flow' the\n"
+          "shear over its largest length; 'pad.ideal' the field without imperfections;\n"
+          "'pad.markers' the displacement of markers [m], 'pad.surface' that of a layer's\n"
+          "surface [m]; 'pad.height' (E, H, W, 1) float32 the surface of a gel [m], 'pad.rgb' and\n"
+          "'pad.rgb_marker' (E, H, W, 3) uint8 pictures of it. `out`: an array to fill instead of "
+          "a new one.")
       .def("set_state", &PythonBatch::set_state, "q"_a, "v"_a, "envs"_a = nb::none(),
            "Sets states: `q` (n, nq) or (nq), `v` (n, nv) or (nv), of the environments listed in\n"
            "`envs` (indices, or a mask (E)), or of all. Releases a failed environment; drops the\n"

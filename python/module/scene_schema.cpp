@@ -60,7 +60,7 @@ nb::list scene_schema() {
   for (const Holder& holder : holders()) {
     nb::list elements;
     for (int k = 0; k < kElements; ++k)
-      if (const auto e = static_cast<Element>(1U << k); (holder.elements & e) != 0)
+      if (const auto e = static_cast<Element>(1ULL << k); (holder.elements & e) != 0)
         elements.append(element_in(holder, e));
     nb::dict d;
     d["name"] = holder.name;

@@ -59,9 +59,17 @@ NamedReading reading_named(const Model& model, const std::string& name) {
                                fmt::join(known_names(model), ", ")));
 }
 
+/// Whether an output is a function of the field. A pressure leaves friction out, and pictures of a
+/// sensor without a layer show the depth of bodies.
+bool has_map(const Model& model, const FieldOutput& output) {
+  if (is_picture(output.form))
+    return model.scene().sensors[as_size(output.sensor)].layer.has_value();
+  return output.form != FieldForm::pressure;
+}
+
 /// What is read of a sensor to compute an output.
 FieldOutput read_for(const Model& model, const FieldOutput& output) {
-  if (output.form == FieldForm::pressure) return {output.sensor, FieldForm::pressure};
+  if (!has_map(model, output)) return {output.sensor, output.form};
   const bool imperfect = is_imperfect(model.scene().sensors[as_size(output.sensor)].imperfections);
   return {output.sensor, is_ideal(output.form) && imperfect ? FieldForm::ideal : FieldForm::field};
 }
@@ -74,13 +82,13 @@ std::vector<std::string> default_readings(const Model& model) {
 
 TensorSpec field_spec(const SensorInfo& sensor, FieldOutput output) {
   TensorSpec spec{output_name(sensor.name, output.form), {6}, "N, m", "reading of a sensor"};
-  spec.touch = true;
+  spec.touch = !is_colour(output.form);
   if (output.form == FieldForm::sum) return spec;
-  spec.unit = is_displacement(output.form) ? "m" : output.form == FieldForm::flow ? "1" : "N";
-  spec.shape = {as_size(sensor.points)};
-  if (sensor.rows > 0) spec.shape = {as_size(sensor.rows), as_size(sensor.cols)};
-  if (const int components = components_of(output.form); components > 1)
-    spec.shape.push_back(as_size(components));
+  const bool is_length = is_displacement(output.form) || output.form == FieldForm::height;
+  const bool has_unit = output.form != FieldForm::flow && !is_colour(output.form);
+  spec.unit = is_length ? "m" : has_unit ? "N" : "1";
+  spec.shape = reading_shape(sensor, output.form);
+  if (output.form == FieldForm::pressure) spec.shape.pop_back();
   return spec;
 }
 
@@ -140,11 +148,11 @@ SceneTask::SceneTask(const Scene& scene, int steps, int horizon,
       const FieldOutput source = read_for(model(), *reading.field);
       Field field{{}, 0, 0, as_size(first_tactile_point(model(), source.sensor))};
       for (const FieldOutput& other : fields()) {
-        field.size = numbers_of(model().sensors()[as_size(other.sensor)].points, other.form);
+        field.size = numbers_of(model().sensors()[as_size(other.sensor)], other.form);
         if (other == source) break;
         field.first += field.size;
       }
-      if (source.form != FieldForm::pressure) field.map.emplace(model(), *reading.field);
+      if (has_map(model(), *reading.field)) field.map.emplace(model(), *reading.field);
       readings_.emplace_back(std::move(field));
     } else if (reading.bodies > 0) {
       for (int b = 0; b < reading.bodies; ++b)

@@ -30,17 +30,17 @@ Task::Task(const Scene& scene, TaskSpec spec)
   check_outputs(fields_, model_.sensors().size());
   for (const FieldOutput& output : fields_)
     if (output.form != FieldForm::field && output.form != FieldForm::pressure &&
-        output.form != FieldForm::ideal)
-      throw InputError(
-          fmt::format("task '{}' reads the {} of a sensor; expected field, pressure or ideal",
-                      spec_.name, to_string(output.form)));
+        output.form != FieldForm::ideal && !is_picture(output.form))
+      throw InputError(fmt::format(
+          "task '{}' reads the {} of a sensor; expected field, pressure, ideal or a picture",
+          spec_.name, to_string(output.form)));
   if (spec_.reads_tactile && fields_.empty()) fields_ = whole_fields(scene);
 }
 
 std::size_t Task::tactile_size() const {
   std::size_t numbers = 0;
   for (const FieldOutput& output : fields_)
-    numbers += numbers_of(model_.sensors()[std::size_t(output.sensor)].points, output.form);
+    numbers += numbers_of(model_.sensors()[std::size_t(output.sensor)], output.form);
   return numbers;
 }
 

@@ -7,7 +7,7 @@
 #include <optional>
 
 #include "engine/scene/imperfection_checks.hpp"
-#include "engine/sense/marker_map.hpp"
+#include "engine/sense/form_map.hpp"
 #include "engine/step/displacement.hpp"
 
 namespace tangere {
@@ -78,21 +78,33 @@ class Fields : public RolloutLoss {
   std::size_t components_;
 };
 
-/// Markers move linearly with the field, so its cotangent is the transposed map of theirs.
-class Markers : public RolloutLoss {
+/// Readings that are functions of the ideal field: displacements of markers, or pictures less those
+/// of no field. The cotangent of the field is the pullback of theirs.
+class Readings : public RolloutLoss {
  public:
-  Markers(const Model& model, int every) : model_(model), every_(every) {
+  Readings(const Model& model, LossKind kind, int every) : model_(model), every_(every) {
+    const bool pictures = kind == LossKind::pictures;
+    if (pictures) scale_ = 1.0 / 255;
     bool any = false;
     for (const TactileDescription& d : model.scene().sensors) {
+      const int sensor = static_cast<int>(maps_.size());
       maps_.emplace_back();
-      if (!d.markers) continue;
+      if (pictures ? !d.picture : !d.markers) continue;
       any = true;
-      if (is_imperfect(d.imperfections) || !d.points.empty())
-        throw InputError(d.source.prefix() + "loss 'markers': sensor '" + d.name +
-                         "' is imperfect or a list of points; expected an ideal rect_array");
-      maps_.back().emplace(model, static_cast<int>(maps_.size()) - 1);
+      if (is_imperfect(d.imperfections) || !d.points.empty() || (pictures && !d.layer))
+        throw InputError(
+            d.source.prefix() + "loss '" + to_string(kind) + "': sensor '" + d.name +
+            (pictures ? "' is imperfect or has no <layer>; expected an ideal one with a layer"
+                      : "' is imperfect or a list of points; expected an ideal rect_array"));
+      const FormMap& map = maps_.back().emplace(
+          model, FieldOutput{sensor, pictures ? FieldForm::rgb : FieldForm::markers});
+      rest_.resize(maps_.size());
+      rest_.back().resize(map.size());
+      map.evaluate(std::vector<double>(map.field_size()), rest_.back());
     }
-    if (!any) throw InputError("loss 'markers': no sensor of the scene has <markers>");
+    if (!any)
+      throw InputError(std::string("loss '") + to_string(kind) + "': no sensor of the scene has " +
+                       (pictures ? "<picture>" : "<markers>"));
   }
   [[nodiscard]] bool reads_fields(std::int64_t step) const override {
     return step > 0 && step % every_ == 0;
@@ -100,15 +112,18 @@ class Markers : public RolloutLoss {
   double evaluate(const LossPoint& at, const LossCotangent& out) const override {
     double squares = 0;
     for (std::size_t s = 0; s < at.fields.size(); ++s) {
-      const SensorInfo& info = model_.sensors()[s];
       if (!maps_[s]) continue;
-      const auto points = static_cast<std::size_t>(info.points);
-      std::vector<double> field(3 * points), moved(2 * points), cotangent(3 * points);
+      std::vector<double> field(maps_[s]->field_size()), form(maps_[s]->size()),
+          cotangent(field.size());
       at.fields[s]->expand(field);
-      maps_[s]->displace(field, moved);
-      for (const double x : moved) squares += x * x;
-      maps_[s]->pull_back(field, moved, cotangent);
-      add_to_tiles(*at.fields[s], info, cotangent, out.fields[s]);
+      maps_[s]->evaluate(field, form);
+      for (std::size_t k = 0; k < form.size(); ++k) {
+        const double x = scale_ * (form[k] - rest_[s][k]);
+        squares += x * x;
+        form[k] = scale_ * x;
+      }
+      maps_[s]->pull_back(field, form, cotangent);
+      add_to_tiles(*at.fields[s], model_.sensors()[s], cotangent, out.fields[s]);
     }
     return 0.5 * squares;
   }
@@ -130,7 +145,9 @@ class Markers : public RolloutLoss {
 
   Model model_;
   int every_;
-  std::vector<std::optional<MarkerMap>> maps_;  // (sensors) of those that have markers
+  double scale_ = 1;
+  std::vector<std::optional<FormMap>> maps_;  // (sensors) of those that have the reading
+  std::vector<std::vector<double>> rest_;     // (sensors) the reading of no field
 };
 
 class EndEffectors : public RolloutLoss {
@@ -157,6 +174,7 @@ const char* to_string(LossKind value) {
     case LossKind::shear: return "shear";
     case LossKind::end_effectors: return "variables";
     case LossKind::markers: return "markers";
+    case LossKind::pictures: return "pictures";
   }
   return "unknown";
 }
@@ -172,14 +190,16 @@ const char* loss_meaning(LossKind value) {
     case LossKind::end_effectors: return "half the squares of the end effectors' last positions";
     case LossKind::markers:
       return "half the squares of all markers' displacements, summed over fields";
+    case LossKind::pictures:
+      return "half the squares of all pictures less their background, over 255, summed over fields";
   }
   return "";
 }
 
 const std::vector<LossKind>& loss_kinds() {
-  static const std::vector<LossKind> kinds = {LossKind::final_state,   LossKind::path,
-                                              LossKind::tactile,       LossKind::shear,
-                                              LossKind::end_effectors, LossKind::markers};
+  static const std::vector<LossKind> kinds = {
+      LossKind::final_state,   LossKind::path,    LossKind::tactile, LossKind::shear,
+      LossKind::end_effectors, LossKind::markers, LossKind::pictures};
   return kinds;
 }
 
@@ -195,7 +215,8 @@ std::unique_ptr<RolloutLoss> make_loss(LossKind kind, const Model& model, int ev
     case LossKind::path: return std::make_unique<Path>();
     case LossKind::tactile: return std::make_unique<Fields>(every, 3);
     case LossKind::shear: return std::make_unique<Fields>(every, 2);
-    case LossKind::markers: return std::make_unique<Markers>(model, every);
+    case LossKind::markers:
+    case LossKind::pictures: return std::make_unique<Readings>(model, kind, every);
     case LossKind::end_effectors: break;
   }
   return std::make_unique<EndEffectors>();

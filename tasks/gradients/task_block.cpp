@@ -335,9 +335,11 @@ void TaskBlock::add_readings(std::size_t moment, int lane) {
   BlockCotangent& c = adjoint_.loss(0);
   for (const FieldOutput& output : task_.fields()) {
     const int s = output.sensor;
-    const std::size_t numbers = numbers_of(task_.model().sensors()[as_size(s)].points, output.form);
+    const std::size_t numbers = numbers_of(task_.model().sensors()[as_size(s)], output.form);
     const std::span<double> points = c.points_of(task_.model(), s, lane);
-    if (output.form == FieldForm::pressure)
+    if (is_picture(output.form))
+      pullback_.picture(lane, output, fields.first(numbers), c.parameters);
+    else if (output.form == FieldForm::pressure)
       pullback_.pressure(lane, s, fields.first(numbers), c.parameters, points);
     else if (output.form == FieldForm::ideal)
       pullback_.ideal_field(lane, s, fields.first(numbers), c.parameters, points);

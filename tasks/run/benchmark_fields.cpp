@@ -56,8 +56,7 @@ template <class T>
 double bytes_of(const SensorInfo& sensor, FieldForm form, FrameKind kind) {
   if (kind == FrameKind::none) return 0;
   if (form == FieldForm::sum) return sizeof(FieldSum);
-  if (kind == FrameKind::dense)
-    return static_cast<double>(numbers_of(sensor.points, form) * sizeof(T));
+  if (kind == FrameKind::dense) return static_cast<double>(numbers_of(sensor, form) * sizeof(T));
   const auto tiles_along = [](int points) { return (points + kTileSide - 1) / kTileSide; };
   return double(tiles_along(sensor.rows)) * tiles_along(sensor.cols) *
          (3.0 * kTileSide * kTileSide * sizeof(T) + sizeof(int));

@@ -41,7 +41,8 @@ void read_end_effectors(Readout& readout, const Batch& batch, int block, const P
     readout.read_end_effectors(batch, block, places_of<double>(batch, block, place));
 }
 
-/// Reads one sensor in one form, numbers_of(points, form). T: double or float.
+/// Reads one sensor in one form, numbers_of(sensor, form). T: double or float, or a byte for a
+/// picture in colours.
 template <class T, class Place>
 void read_field(Readout& readout, const Batch& batch, int block, FieldOutput output,
                 const Place& place) {
@@ -49,14 +50,14 @@ void read_field(Readout& readout, const Batch& batch, int block, FieldOutput out
   readout.read_block(batch, block, output, std::span<const std::span<T>>(places));
 }
 
-/// Reads some fields, one after the other: numbers_of(points, form) of each.
+/// Reads some fields, one after the other: numbers_of(sensor, form) of each.
 template <class T, class Place>
 void read_fields(Readout& readout, const Batch& batch, int block,
                  std::span<const FieldOutput> outputs, const Place& place) {
   std::size_t offset = 0;
   for (const FieldOutput& output : outputs) {
-    const std::size_t numbers = numbers_of(
-        batch.model().sensors()[static_cast<std::size_t>(output.sensor)].points, output.form);
+    const std::size_t numbers =
+        numbers_of(batch.model().sensors()[static_cast<std::size_t>(output.sensor)], output.form);
     read_field<T>(readout, batch, block, output,
                   [&](int e) { return place(e).subspan(offset, numbers); });
     offset += numbers;

@@ -27,11 +27,13 @@ EpisodeSlot<T>::EpisodeSlot(const EpisodeSource& source, const EpisodeOptions& o
       readout_(*source.model, options.precision),
       u_(kBlockEpisodes * as_size(source.model->nu())),
       values_(source.channels.size()),
+      bytes_(source.channels.size()),
       actions_(kBlockEpisodes * as_size(piece_rows_) * source.action),
       rewards_(source.whole ? kBlockEpisodes * as_size(piece_rows_) : 0),
       observations_(source.channels.size()) {
   for (std::size_t name = 0; name < values_.size(); ++name) {
-    values_[name].resize(kBlockEpisodes * taken_rows(name, piece_rows_) * width(name));
+    const std::size_t count = kBlockEpisodes * taken_rows(name, piece_rows_) * width(name);
+    source.channels[name].is_bytes() ? bytes_[name].resize(count) : values_[name].resize(count);
     if (source.channels[name].kind != Kind::reading)
       small_.resize(std::max(small_.size(), width(name)));
   }
@@ -73,20 +75,26 @@ bool EpisodeSlot<T>::simulate(const std::function<bool()>& stopped,
   }
   next_row_ += rows_;
   if (last()) collect();
-  for (std::size_t name = 0; name < values_.size(); ++name)
-    observations_[name] = std::span<const T>(values_[name])
-                              .first(as_size(batch_->environments()) * width(name) *
-                                     (taken_before(source_, name, next_row_) -
-                                      taken_before(source_, name, first_row_)));
+  for (std::size_t name = 0; name < values_.size(); ++name) {
+    const std::size_t count =
+        as_size(batch_->environments()) * width(name) *
+        (taken_before(source_, name, next_row_) - taken_before(source_, name, first_row_));
+    if (source_.channels[name].is_bytes())
+      observations_[name] = std::span<const std::uint8_t>(bytes_[name]).first(count);
+    else
+      observations_[name] = std::span<const T>(values_[name]).first(count);
+  }
   return true;
 }
 
 template <class T>
-std::span<T> EpisodeSlot<T>::numbers(std::size_t name, int episode, int row) {
+template <class Number>
+std::span<Number> EpisodeSlot<T>::numbers(std::vector<std::vector<Number>>& values,
+                                          std::size_t name, int episode, int row) {
   const std::size_t numbers = width(name), before = taken_before(source_, name, first_row_),
                     at = taken_before(source_, name, first_row_ + row) - before,
                     rows = taken_before(source_, name, first_row_ + rows_) - before;
-  return std::span(values_[name]).subspan((as_size(episode) * rows + at) * numbers, numbers);
+  return std::span(values[name]).subspan((as_size(episode) * rows + at) * numbers, numbers);
 }
 
 /// Returns the most rows at which a name is taken among as many in a row.
@@ -106,7 +114,7 @@ bool EpisodeSlot<T>::takes(std::size_t name, int row) const {
 
 template <class T>
 void EpisodeSlot<T>::put(std::size_t name, int episode, int row, std::span<const double> from) {
-  std::transform(from.begin(), from.end(), numbers(name, episode, row).begin(),
+  std::transform(from.begin(), from.end(), numbers(values_, name, episode, row).begin(),
                  [](double x) { return static_cast<T>(x); });
 }
 
@@ -148,9 +156,12 @@ void EpisodeSlot<T>::observe_scene(int row) {
   for (std::size_t name = kThird; name < source_.channels.size(); ++name) {
     const EpisodeChannel& channel = source_.channels[name];
     if (!takes(name, row)) continue;
-    if (channel.kind == Kind::reading) {
+    if (channel.is_bytes()) {
+      read_field<std::uint8_t>(readout_, *batch_, 0, channel.reading,
+                               [&](int e) { return numbers(bytes_, name, e, row); });
+    } else if (channel.kind == Kind::reading) {
       read_field<T>(readout_, *batch_, 0, channel.reading,
-                    [&](int e) { return numbers(name, e, row); });
+                    [&](int e) { return numbers(values_, name, e, row); });
     } else if (channel.kind == Kind::bodies) {
       observe_bodies(name, row);
     } else {

@@ -39,7 +39,10 @@ class EpisodeSlot {
   [[nodiscard]] const std::vector<FailedEpisode>& failures() const { return failures_; }
 
  private:
-  [[nodiscard]] std::span<T> numbers(std::size_t name, int episode, int row);
+  /// The numbers of an episode's row in values_ or bytes_.
+  template <class Number>
+  [[nodiscard]] std::span<Number> numbers(std::vector<std::vector<Number>>& values,
+                                          std::size_t name, int episode, int row);
   [[nodiscard]] std::size_t width(std::size_t name) const { return source_.channels[name].width(); }
   [[nodiscard]] std::size_t taken_rows(std::size_t name, int rows) const;
   [[nodiscard]] bool takes(std::size_t name, int row) const;
@@ -69,8 +72,9 @@ class EpisodeSlot {
   std::vector<double> u_;               // (episodes, nu)
   std::vector<double> small_;           // one episode, before conversion
   std::vector<std::vector<T>> values_;  // per name: (episodes, rows at which it is taken, width)
-  std::vector<float> actions_;          // (episodes, action rows, action)
-  std::vector<float> rewards_;          // of a task: (episodes, action rows)
+  std::vector<std::vector<std::uint8_t>> bytes_;  // the same of pictures in colours
+  std::vector<float> actions_;                    // (episodes, action rows, action)
+  std::vector<float> rewards_;                    // of a task: (episodes, action rows)
   std::vector<Observation> observations_;
   std::vector<bool> playing_;
   std::vector<EpisodeEnd> ends_;

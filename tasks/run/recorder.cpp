@@ -22,7 +22,7 @@ constexpr OutputTimes kAlways{};
 constexpr const char* kStepsOfRow = "steps of this run before each row";
 
 std::size_t numbers_in(const Model& model, FieldOutput output) {
-  return numbers_of(model.sensors()[as_size(output.sensor)].points, output.form);
+  return numbers_of(model.sensors()[as_size(output.sensor)], output.form);
 }
 
 std::vector<std::string> recorded_bodies(const Model& model, const RolloutOutputs& outputs) {
@@ -346,7 +346,6 @@ void Recorder::add_readings() {
     const SensorLayout layout =
         sensor_layout(info, model_.scene().sensors[as_size(output.sensor)], 1);
     check_sensor_name(layout.name);
-    largest_reading_ = std::max(largest_reading_, numbers_in(model_, output));
     const std::string group = "tactile/" + layout.name + "/";
     const OutputTimes times = reading_times(model_, output, options_);
     Channel channel{.name = group + dataset_of(output.form), .shape = {environments_}};
@@ -355,15 +354,13 @@ void Recorder::add_readings() {
     for (RunAttribute& one : reading_attributes(layout, output.form))
       channel.more.push_back(std::move(one));
     if (output.form != FieldForm::sum) channel.storage = Channel::Storage::per_environment;
-    const Source source{When::row, times, false, 1, [this, output](auto, int) {
-                          const std::span<double> numbers =
-                              std::span(reading_).first(environments_ * numbers_in(model_, output));
-                          threads_->for_each(
-                              batch_.blocks(), readouts_, [&](Readout& readout, int block) {
-                                read_field<double>(readout, batch_, block, output,
-                                                   [&](int e) { return part(numbers, e); });
-                              });
-                          return std::span<const double>(numbers);
+    channel.type = is_colour(output.form)    ? NumberType::uint8
+                   : is_picture(output.form) ? NumberType::float32
+                                             : NumberType::float64;
+    const Source source{When::row, times, false, 1, [this, output](auto, int) -> Numbers {
+                          if (is_colour(output.form)) return read_as(output, bytes_);
+                          if (is_picture(output.form)) return read_as(output, heights_);
+                          return read_as(output, reading_);
                         }};
     const auto same = std::find_if(first.begin(), first.end(), [&](const FieldOutput& other) {
       return other.sensor == output.sensor;
@@ -380,6 +377,18 @@ void Recorder::add_readings() {
     first.push_back(output);
     for (Table& table : point_tables(layout, group)) recording_.tables.push_back(std::move(table));
   }
+}
+
+/// Reads an output of all environments into a buffer of its type.
+template <class T>
+std::span<const T> Recorder::read_as(FieldOutput output, std::vector<T>& buffer) {
+  const std::size_t width = numbers_in(model_, output);
+  buffer.resize(std::max(buffer.size(), environments_ * width));
+  threads_->for_each(batch_.blocks(), readouts_, [&](Readout& readout, int block) {
+    read_field<T>(readout, batch_, block, output,
+                  [&](int e) { return std::span(buffer).subspan(as_size(e) * width, width); });
+  });
+  return std::span<const T>(buffer).first(environments_ * width);
 }
 
 void Recorder::add_randomized() {
@@ -434,7 +443,6 @@ void Recorder::resize_buffers() {
   twist_.resize(e * bodies_ * kTwistWidth);
   if (options_.outputs.end_effectors)
     end_effectors_.resize(e * model_.end_effectors().size() * kPositionWidth);
-  reading_.resize(e * largest_reading_);
   shear_.resize(std::min<std::size_t>(e, kernels::kBlock) * 3 * shear_points_.count());
   iterations_.resize(e);
   status_.resize(e);

@@ -75,6 +75,8 @@ class Recorder {
   void add_task();
   void resize_buffers();
   void read_shear(int block);
+  template <class T>
+  std::span<const T> read_as(FieldOutput output, std::vector<T>& buffer);
   [[nodiscard]] std::span<double> part(std::span<double> all, int environment) const;
 
   const Batch& batch_;
@@ -94,11 +96,13 @@ class Recorder {
   std::vector<Readout> readouts_;  // one for each thread
   std::optional<EnergyBalanceRecorder> audit_;
   ShearStateArrays shear_points_;
-  std::size_t bodies_ = 0, largest_reading_ = 0;  // recorded; numbers of an environment
+  std::size_t bodies_ = 0;  // recorded
   std::int64_t row_ = 0;
   double time_ = 0;
   std::vector<double> q_, v_, pose_, twist_, end_effectors_;  // (E, …)
   std::vector<double> reading_;                               // shared by the sensors
+  std::vector<float> heights_;                                // of pictures
+  std::vector<std::uint8_t> bytes_;                           // of pictures in colours
   std::vector<double> shear_;                                 // (16, points, 3)
   std::vector<double> sleep_u_, clearance_;                   // (E, nu), (E)
   std::vector<std::int32_t> iterations_, island_, rested_;    // (E), (E, trees)

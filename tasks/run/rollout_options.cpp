@@ -16,8 +16,7 @@ constexpr int kMotionWidth = 13, kEndEffectorWidth = 3;
 std::size_t largest_reading(const Model& model, const RolloutOutputs& outputs) {
   std::size_t largest = 0;
   for (const FieldOutput output : fields_of(model, outputs))
-    largest =
-        std::max(largest, numbers_of(model.sensors()[as_size(output.sensor)].points, output.form));
+    largest = std::max(largest, numbers_of(model.sensors()[as_size(output.sensor)], output.form));
   return largest;
 }
 

@@ -23,10 +23,11 @@ struct Folder {
 /// A folder whose own folders have rows has no row itself, because each source is in one of them.
 /// In a row, "kernels" stands for all of its folders.
 const std::map<std::string, Folder, std::less<>>& folders() {
-  static const Names of_kernels{"Eigen",    "tbb", "oneapi", "hdf5",    "H5",
-                                "tinyxml2", "CLI", "fmt",    "nlohmann"};
-  static const Names of_engine{"hdf5", "H5", "tinyxml2", "CLI", "nlohmann"};
-  static const Names of_tasks{"hdf5", "H5", "tinyxml2", "CLI", "nlohmann", "xsimd"};
+  static const Names of_kernels{"Eigen",    "tbb", "oneapi", "hdf5",     "H5",
+                                "tinyxml2", "CLI", "fmt",    "nlohmann", "png"};
+  static const Names of_engine{"hdf5", "H5", "tinyxml2", "CLI", "nlohmann", "png"};
+  static const Names of_tasks{"hdf5", "H5", "tinyxml2", "CLI", "nlohmann", "xsimd", "png"};
+  static const Names of_apps{"hdf5", "H5", "tinyxml2", "xsimd", "png"};
   static const Names of_io{"CLI", "tbb", "oneapi", "xsimd"};
   static const std::map<std::string, Folder, std::less<>> table{
       {"kernels/numbers", {{}, of_kernels}},
@@ -46,12 +47,14 @@ const std::map<std::string, Folder, std::less<>>& folders() {
       {"engine/layer", {{"engine/model", "engine/scene", "engine/base", "kernels"}, of_engine}},
       {"engine/step",
        {{"engine/layer", "engine/model", "engine/scene", "engine/base", "kernels"}, of_engine}},
+      {"engine/picture", {{"engine/model", "engine/scene", "engine/base", "kernels"}, of_engine}},
       {"engine/sense",
-       {{"engine/step", "engine/layer", "engine/model", "engine/scene", "engine/base", "kernels"},
+       {{"engine/picture", "engine/step", "engine/layer", "engine/model", "engine/scene",
+         "engine/base", "kernels"},
         of_engine}},
       {"engine/derivative",
-       {{"engine/sense", "engine/step", "engine/layer", "engine/model", "engine/scene",
-         "engine/base", "kernels"},
+       {{"engine/sense", "engine/picture", "engine/step", "engine/layer", "engine/model",
+         "engine/scene", "engine/base", "kernels"},
         of_engine}},
       {"engine/rows", {{"engine/step", "engine/model", "engine/scene", "engine/base"}, of_engine}},
       {"tasks/catalogue", {{"engine", "kernels"}, of_tasks}},
@@ -72,9 +75,8 @@ const std::map<std::string, Folder, std::less<>>& folders() {
       {"io/view",
        {{"io/picture", "io/dataset", "io/trajectory", "io/scene", "io/hdf5", "io/files", "engine"},
         of_io}},
-      {"apps", {{"tasks", "io", "engine", "kernels"}, {"hdf5", "H5", "tinyxml2", "xsimd"}}},
-      {"python/module",
-       {{"tasks", "io", "engine", "kernels"}, {"hdf5", "H5", "tinyxml2", "xsimd"}}},
+      {"apps", {{"tasks", "io", "engine", "kernels"}, of_apps}},
+      {"python/module", {{"tasks", "io", "engine", "kernels"}, of_apps}},
       {"cmake", {{}, {}}},
       {"bench", {{"tasks", "io", "engine", "kernels"}, {}}},
       {"tests", {{"apps", "tasks", "io", "engine", "kernels"}, {}}},
@@ -319,10 +321,10 @@ std::vector<Violation> check_heavy_headers(const Tree& tree) {
       {"Eigen/",
        {{"engine/derivative", 1},
         {"engine/step", 1},
-        {"tasks/calibration", 1},
+        {"tasks/calibration", 2},
         {"tasks/gradients", 1}}},
       {"hdf5.h", {{"io/hdf5", 9}, {"io/dataset", 10}, {"io/trajectory", 6}, {"io/view", 4}}},
-      {"nlohmann/json.hpp", {{"apps", 32}, {"io/dataset", 2}, {"io/view", 1}}},
+      {"nlohmann/json.hpp", {{"apps", 33}, {"io/dataset", 2}, {"io/view", 1}}},
       {"tbb/flow_graph.h", {{"tasks/run", 1}}},
       {"regex", {}},
       {"iostream", {}}};
@@ -464,6 +466,7 @@ std::string listed(const Names& rooms) {
 std::vector<Violation> check_circles(const Tree& tree) {
   // Of a listed pair, one is a part of the other in a file of its own.
   static const std::set<Names> allowed{
+      {"engine/sense/readout", "engine/sense/readout_impl"},
       {"io/picture/scene_plot", "io/picture/projection"},
       {"io/robot/robot_import", "io/robot/robot_pads"},
       {"io/robot/robot_node", "io/robot/mjcf_include"},

@@ -120,6 +120,20 @@ TEST(Markers, ThreeRoutesAgree) {
   }
 }
 
+/// Pictures of a layer follow from its field.
+TEST(Pictures, ThreeRoutesAgree) {
+  Scene scene = shipped("gel_press");
+  std::erase_if(scene.randomizations,
+                [](const auto& d) { return d.number.field == NumberField::kn; });
+  PictureDescription& picture = scene.sensors[0].picture.emplace();
+  picture.rows = 9, picture.cols = 12;
+  picture.gel = std::make_shared<const Gel>(default_gel());
+  scene.sensors[0].array.rows = 24, scene.sensors[0].array.cols = 32;
+  expect_right(check(scene, LossKind::pictures, 60, 60), 1e-5);
+  scene.sensors[0].layer.reset();
+  EXPECT_THROW(check(scene, LossKind::pictures, 60, 60), InputError);
+}
+
 /// The published gradient is 5 to 107 % off: the contact point of a sphere moves over it.
 TEST(PublishedFaults, RollingBallGradientIsRight) {
   for (const Integrator scheme : {Integrator::bdf1, Integrator::bdf2}) {
