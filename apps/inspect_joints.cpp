@@ -14,6 +14,7 @@ namespace {
 struct Named {
   std::string joint;
   const JointEffects* effects;
+  const JointDescription* leaders;
   const std::vector<double>* rest;
 };
 
@@ -29,8 +30,10 @@ std::vector<Named> named_effects(const Scene& scene) {
   for (const LinkDescription& l : scene.links) {
     const JointDescription& j = l.joint;
     if (j.type == JointType::fixed) continue;
-    if (any(j)) list.push_back({j.turning ? j.name + " (sliding)" : j.name, &j, &j.rest});
-    if (j.turning && any(*j.turning)) list.push_back({j.name + " (turning)", &*j.turning, &j.rest});
+    if (any(j) || !j.follows.empty())
+      list.push_back({j.turning ? j.name + " (sliding)" : j.name, &j, &j, &j.rest});
+    if (j.turning && any(*j.turning))
+      list.push_back({j.name + " (turning)", &*j.turning, &j, &j.rest});
   }
   return list;
 }
@@ -57,7 +60,10 @@ Json joint_effects_json(const Scene& scene) {
                    {"rest", e.stiffness != 0 && !n.rest->empty() ? Json(*n.rest) : Json()},
                    {"limits", e.limits ? Json(*e.limits) : Json()},
                    {"lim_stiffness", e.limit_stiffness},
-                   {"friction", e.friction}});
+                   {"friction", e.friction},
+                   {"follows", n.leaders->follows},
+                   {"ratio", n.leaders->ratio},
+                   {"offset", n.leaders->offset}});
   }
   return out;
 }
@@ -78,6 +84,10 @@ std::string joint_effects_text(const Scene& scene) {
     if (e.limits && e.limit_stiffness != 0)
       parts.push_back(fmt::format("limits {:.6g} {:.6g} of stiffness {:.6g}", (*e.limits)[0],
                                   (*e.limits)[1], e.limit_stiffness));
+    const JointDescription& d = *n.leaders;
+    for (std::size_t k = 0; k < d.follows.size(); ++k)
+      parts.push_back(fmt::format("follows {} by {:.6g}", d.follows[k], d.ratio[k]));
+    if (d.offset != 0) parts.push_back(fmt::format("offset {:.6g}", d.offset));
     text += fmt::format("  {}: {}\n", n.joint, fmt::join(parts, ", "));
   }
   return text;

@@ -7,7 +7,9 @@
 #include <nlohmann/json.hpp>
 #include <regex>
 
+#include "tests/apps/arrays.hpp"
 #include "tests/apps/program.hpp"
+#include "tests/files.hpp"
 
 namespace tangere::apps {
 namespace {
@@ -43,6 +45,37 @@ TEST(Import, AGripperAndAnObjectBecomeADataSet) {
   run_json(folder, {"generate", "grasp/grasp.xml", "-o", "data", "--episodes", "2", "--steps", "20",
                     "--every", "10"});
   run_json(folder, {"view", "data", "-o", "data.html", "--scene", "grasp/grasp.xml"});
+}
+
+/// docs/hands.md, word for word: upside down the hand holds the egg.
+TEST(Import, AHandTurnsAnEggOver) {
+  const Folder folder;
+  std::filesystem::copy(TANGERE_SOURCE_DIR "/examples/hand", folder.path("hand"),
+                        std::filesystem::copy_options::recursive);
+  const json made = run_json(
+      folder, {"import",  "hand/hand.urdf",
+               "-o",      "hand/hand.xml",
+               "--pad",   "thumb_tip=uskin_4x4_guess@-x",
+               "--pad",   "index_tip=uskin_4x4_guess@-x",
+               "--pad",   "middle_tip=uskin_4x4_guess@-x",
+               "--motor", "wrist=20,1",
+               "--motor", "thumb_knuckle=2,0.02",
+               "--motor", "index_knuckle=2,0.02",
+               "--motor", "middle_knuckle=2,0.02"});
+  EXPECT_THAT(made["lost"], SizeIs(0));
+  EXPECT_EQ(made["joints"], 7);
+  const json told = run_json(folder, {"simulate", "hand/hand_egg.xml", "-o", "run.h5"});
+  EXPECT_THAT(told["failed"], SizeIs(0));
+  const auto q = array_of(folder.path("run.h5"), "q");
+  constexpr std::size_t kWidth = 14, kEgg = 7, kTurned = 750, kEnd = 1000;
+  const auto at = [&](std::size_t row, std::size_t k) { return q.values[row * kWidth + k]; };
+  for (std::size_t k = kEgg; k < kWidth; ++k) EXPECT_NEAR(at(kEnd, k), at(kTurned, k), 1e-4);
+  EXPECT_LT(at(kEnd, kEgg + 2), -0.04) << "below the wrist, where it began above";
+  for (std::size_t row = 0; row <= kEnd; ++row) EXPECT_EQ(at(row, 2), 0.8 * at(row, 1));
+  run_json(folder, {"view", "run.h5", "-o", "run.html"});
+  run_json(folder, {"generate", "hand/hand_egg.xml", "-o", "set", "--episodes", "2", "--steps",
+                    "20", "--every", "5"});
+  run_json(folder, {"info", "set"});
 }
 
 TEST(Import, AFileThatLosesMotionIsRefusedWithoutDrop) {
