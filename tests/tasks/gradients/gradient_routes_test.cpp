@@ -128,7 +128,8 @@ TEST(Pictures, ThreeRoutesAgree) {
   PictureDescription& picture = scene.sensors[0].picture.emplace();
   picture.rows = 9, picture.cols = 12;
   picture.gel = std::make_shared<const Gel>(default_gel());
-  scene.sensors[0].array.rows = 24, scene.sensors[0].array.cols = 32;
+  scene.sensors[0].array.rows = 16, scene.sensors[0].array.cols = 20;
+  scene.sensors[0].layer->cell = 0;
   expect_right(check(scene, LossKind::pictures, 60, 60), 1e-5);
   scene.sensors[0].layer.reset();
   EXPECT_THROW(check(scene, LossKind::pictures, 60, 60), InputError);
