@@ -17,7 +17,7 @@ namespace {
 
 using ::testing::HasSubstr;
 using Numbers = std::vector<double>;
-constexpr int kRows = 12, kCols = 10;
+constexpr int kMapRows = 12, kMapCols = 10;
 
 /// How the points of a gel are counted: along its axes, rows or columns against them, or with axis1
 /// turned round, so that axis0 × axis1 points into the gel.
@@ -36,7 +36,7 @@ Scene pressed_gel(Count count = Count::along) {
   t.body = "plate";
   t.source = {"gel.xml", 9};
   t.array = {
-      {-0.0055, -0.0045, 0.005}, {0.0055, 0.0045, 0.005}, {1, 0, 0}, {0, 1, 0}, kRows, kCols};
+      {-0.0055, -0.0045, 0.005}, {0.0055, 0.0045, 0.005}, {1, 0, 0}, {0, 1, 0}, kMapRows, kMapCols};
   const std::size_t swapped = count == Count::rows_against ? 0 : 1;
   if (count != Count::along) std::swap(t.array.corner0[swapped], t.array.corner1[swapped]);
   if (count == Count::turned) t.array.axis1 = {0, -1, 0};
@@ -64,7 +64,7 @@ TEST(SurfaceMap, GoesDownBeneathABodyAndUpBesideIt) {
   const Model model(pressed_gel());
   const Numbers u = read(model, FieldForm::surface), f = read(model, FieldForm::field);
   const auto at = [&](const Numbers& x, int row, int col, int axis) {
-    return x[std::size_t(3 * (kCols * row + col) + axis)];
+    return x[std::size_t(3 * (kMapCols * row + col) + axis)];
   };
   EXPECT_NEAR(at(u, 6, 4, 2), -0.55e-3, 0.1e-3);  // the middle of the contact is at (6.5, 3.8)
   EXPECT_GT(at(u, 0, 4, 2), 0);
@@ -79,14 +79,14 @@ TEST(SurfaceMap, DoesNotDependOnTheWayPointsAreCounted) {
     const Model model(pressed_gel(count));
     EXPECT_EQ(model.sensors()[0].pressure_sign, count == Count::turned ? -1 : 1);
     const Numbers v = read(model, FieldForm::surface);
-    for (int i = 0; i < kRows; ++i)
-      for (int j = 0; j < kCols; ++j)
+    for (int i = 0; i < kMapRows; ++i)
+      for (int j = 0; j < kMapCols; ++j)
         for (int axis = 0; axis < 3; ++axis) {
-          const int row = count == Count::rows_against ? kRows - 1 - i : i,
-                    col = count == Count::rows_against ? j : kCols - 1 - j;
+          const int row = count == Count::rows_against ? kMapRows - 1 - i : i,
+                    col = count == Count::rows_against ? j : kMapCols - 1 - j;
           const double sign = count == Count::turned && axis == 1 ? -1 : 1;
-          EXPECT_NEAR(u[std::size_t(3 * (kCols * i + j) + axis)],
-                      sign * v[std::size_t(3 * (kCols * row + col) + axis)], 1e-12);
+          EXPECT_NEAR(u[std::size_t(3 * (kMapCols * i + j) + axis)],
+                      sign * v[std::size_t(3 * (kMapCols * row + col) + axis)], 1e-12);
         }
   }
 }
@@ -120,7 +120,7 @@ TEST(SurfaceMap, WhatCannotBeIsRefusedWithItsLine) {
     try {
       const Model model(scene);
       Batch batch(model, 1, 0);
-      Numbers u(std::size_t(3 * kRows * kCols));
+      Numbers u(std::size_t(3 * kMapRows * kMapCols));
       const std::span<double> to(u);
       Readout(model).read_block(batch, 0, {0, FieldForm::surface}, {&to, 1});
       ADD_FAILURE() << text;
