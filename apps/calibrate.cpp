@@ -174,10 +174,27 @@ std::string measured_layout(Fitted fitted, const Calibration& found, const std::
   return fitted.layout.text();
 }
 
+/// Refuses what a fit to photographs does not use.
+void check_for_pictures(const CalibrateArguments& a) {
+  std::vector<std::string> others;
+  for (const auto& [name, given] : {std::pair{"RECORDING", !a.recording.empty()},
+                                    {"--sensor", !a.sensor.empty()},
+                                    {"--flat", a.indenter.flat.has_value()},
+                                    {"--box", !a.indenter.box.empty()},
+                                    {"--table", a.table.has_value()},
+                                    {"--fit", !a.numbers.empty()},
+                                    {"--hold-out", a.hold_out.has_value()},
+                                    {"--check", !a.check.empty()}})
+    if (given) others.emplace_back(name);
+  if (!others.empty())
+    throw InputError(
+        fmt::format("--pictures beside {}; expected --pictures with --ball and --pixel alone",
+                    fmt::join(others, ", ")));
+}
+
 int run_calibrate(const CalibrateArguments& a, const Console& console) {
   if (!a.pictures.empty()) {
-    if (!a.recording.empty() || !a.sensor.empty())
-      throw InputError("--pictures beside RECORDING or --sensor; expected one of them");
+    check_for_pictures(a);
     return run_calibrate_pictures({a.pictures, a.indenter.ball, a.pixel, a.output, a.overwrite},
                                   console);
   }

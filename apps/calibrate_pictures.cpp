@@ -82,6 +82,12 @@ Photographs read_photographs(const std::string& folder) {
   return out;
 }
 
+/// Returns the last name of a path, also where it ends with '/'.
+std::string folder_name(const std::string& folder) {
+  const std::filesystem::path path = std::filesystem::path(folder).lexically_normal();
+  return (path.has_filename() ? path : path.parent_path()).filename().string();
+}
+
 /// How far a label was moved [pixels].
 double moved(const BallPress& press, const PressScore& score) {
   return std::hypot(score.refined.x - press.label.x, score.refined.y - press.label.y);
@@ -101,10 +107,11 @@ std::string scores_text(const Photographs& of, const GelFit& fit) {
   }
   text += fmt::format("{:<20}{:>9.2f}{:>8.3f}{:>11.2f}{:>8.3f}\n", "mean", mean.psnr, mean.ssim,
                       mean.aligned_psnr, mean.aligned_ssim);
-  return text + fmt::format(
-                    "each predicted from the others; worst: {}\ndepth {:.3g} of the imprint's "
-                    "radius, reach {:.3g} m, blur {:.3g} m",
-                    of.files[worst], fit.depth_ratio, *fit.gel.reach, fit.gel.blur);
+  return text +
+         fmt::format(
+             "each predicted by the lamps of the others; worst: {}\ndepth {:.3g} of the imprint's "
+             "radius, reach {:.3g} m, blur {:.3g} m",
+             of.files[worst], fit.depth_ratio, *fit.gel.reach, fit.gel.blur);
 }
 
 void print_json(const Photographs& of, const GelFit& fit, const Console& console) {
@@ -150,16 +157,15 @@ int run_calibrate_pictures(const PictureCalibration& a, const Console& console) 
   console.print(scores_text(photographs, fit));
   if (xml) {
     const PressScore mean = fit.mean();
-    const std::string text = gel_text(
-        fit.gel, picture,
-        {{"photographs", std::filesystem::path(a.folder).lexically_normal().filename().string()},
-         {"ball", fmt::format("{:.6g}", *a.ball)},
-         {"depth_ratio", fmt::format("{:.4g}", fit.depth_ratio)},
-         {"presses", fmt::format("{}", fit.scores.size())},
-         {"psnr", fmt::format("{:.2f}", mean.psnr)},
-         {"ssim", fmt::format("{:.3f}", mean.ssim)},
-         {"refined_psnr", fmt::format("{:.2f}", mean.aligned_psnr)},
-         {"refined_ssim", fmt::format("{:.3f}", mean.aligned_ssim)}});
+    const std::string text = gel_text(fit.gel, picture,
+                                      {{"photographs", folder_name(a.folder)},
+                                       {"ball", fmt::format("{:.6g}", *a.ball)},
+                                       {"depth_ratio", fmt::format("{:.4g}", fit.depth_ratio)},
+                                       {"presses", fmt::format("{}", fit.scores.size())},
+                                       {"psnr", fmt::format("{:.2f}", mean.psnr)},
+                                       {"ssim", fmt::format("{:.3f}", mean.ssim)},
+                                       {"refined_psnr", fmt::format("{:.2f}", mean.aligned_psnr)},
+                                       {"refined_ssim", fmt::format("{:.3f}", mean.aligned_ssim)}});
     png->write(photographs.background_bytes);
     png->commit();
     xml->write(text);

@@ -39,6 +39,15 @@ struct GroupStepContext {
 
 }  // namespace
 
+void fold_followers(const Model& model, BlockCotangent& c, int lane) {
+  const CompiledModel& m = compiled(model);
+  for (auto* of : {&c.q, &c.v, &c.previous_q, &c.previous_v}) {
+    const auto at = [&](int dof) -> double& { return (*of)[std::size_t(dof * kBlock + lane)]; };
+    for (const kernels::FollowerTie& t : m.ties) at(t.leader_v) += t.ratio * at(t.v);
+    for (const kernels::Follower& f : m.followers) at(f.v) = 0;
+  }
+}
+
 struct Adjoint::Impl {
   Model model;
   StepSettings settings;
@@ -247,8 +256,8 @@ struct Adjoint::Impl {
       c.previous_q[at] = o.q_before[i][lane];
       c.previous_v[at] = o.v_before[i][lane];
     }
-    fold_followers(m, c, column);
     if (!c.past.empty()) go_back(c, column);
+    fold_followers(model, c, column);
     if (m.has_shear_state()) {
       std::vector<double>& memory = c.shear[std::size_t(column)];
       const std::vector<double>& rest = o.memory_before[std::size_t(lane)];
@@ -259,15 +268,6 @@ struct Adjoint::Impl {
     if (o.parameters == nullptr) return;
     for (int i = 0; i < parameter_rows(model); ++i)
       c.parameters[std::size_t(i * kBlock + column)] += o.parameters[i][lane];
-  }
-
-  /// Adds the cotangents of joints that follow others to those of their leaders.
-  static void fold_followers(const CompiledModel& m, BlockCotangent& c, int column) {
-    for (auto* of : {&c.q, &c.v, &c.previous_q, &c.previous_v}) {
-      const auto at = [&](int dof) -> double& { return (*of)[std::size_t(dof * kBlock + column)]; };
-      for (const kernels::FollowerTie& t : m.ties) at(t.leader_v) += t.ratio * at(t.v);
-      for (const kernels::Follower& f : m.followers) at(f.v) = 0;
-    }
   }
 
   /// Adds the cotangents of the state one step before, and moves those of earlier ones up.

@@ -18,6 +18,11 @@ struct AdjointOptions {
   bool points = false;      ///< also differentiate by every tactile point's own numbers
 };
 
+/// Adds the cotangents of joints that follow others, of one lane, to those of their leaders, and
+/// clears them. reverse_step() does that with those before the step; a caller that then adds to
+/// those of the start does it again.
+void fold_followers(const Model& model, BlockCotangent& cotangent, int lane);
+
 /// Owns the scratch of one thread. Reverses steps of any batch of its model that a Stepper with the
 /// same options took.
 class Adjoint {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Adjoint of the shear state through one solve (docs/shear.md), that of joints included. Turns cotangents of the shear state
-// after the solve into those of the shear state and the state before it, in three parts:
+// Adjoint of the shear state through one solve (docs/shear.md), that of joints included. Turns
+// cotangents of the shear state after the solve into those of the shear state and the state before
+// it, in three parts:
 //   (i)   the final shear state depends on the final state: this part is added to (q̄, v̄) before
 //         the stages are reversed;
 //   (iii) the forces of every stage depend on the anchors, with the weight of λ;

@@ -135,8 +135,6 @@ struct Tangent::Impl {
       : model(m), settings(s), stage(compiled(model)), imperfections(m) {}
   [[nodiscard]] const CompiledModel& m() const { return compiled(model); }
 
-  /// Computes the tangent of x with g(x) = 0 at the value of x. Leaves the v of that x in the
-  /// stage.
   /// Turns Gᵀ A, whose rows of followers are 0, into Gᵀ A G with ones on their diagonal.
   void fold_followers(Eigen::MatrixXd& A) const {
     for (const kernels::FollowerTie& t : m().ties) A.col(t.leader_v) += t.ratio * A.col(t.v);
@@ -146,6 +144,8 @@ struct Tangent::Impl {
     }
   }
 
+  /// Computes the tangent of x with g(x) = 0 at the value of x. Leaves the v of that x in the
+  /// stage.
   Duals solve(const std::vector<double>& x) {
     const std::size_t n = x.size();
     const auto size = static_cast<Eigen::Index>(n);

@@ -60,8 +60,6 @@ class LayerContact {
   [[nodiscard]] kernels::Vec6<double> wrench() const;
   /// Energy that the layer stores at depths without δ̇ [J].
   [[nodiscard]] double energy() const;
-  /// Linear systems that solve() needed.
-  [[nodiscard]] int systems() const { return layer_.systems(); }
 
   /// Returns the change of w where the bodies change as their dual numbers say. `anchors`: of the
   /// points, b in pad axes; empty: they stay.

@@ -132,8 +132,8 @@ std::optional<KnownDepth> find_depth(const Shape& shape, const kernels::Touch<do
   return KnownDepth{*found, *found < layer.deepest ? DepthBy::underside : DepthBy::end};
 }
 
-/// Returns δ and its slant at a point whose underside has the depth `known`. With dual numbers their
-/// derivatives follow from one more step of Newton's method.
+/// Returns δ and its slant at a point whose underside has the depth `known`. With dual numbers
+/// their derivatives follow from one more step of Newton's method.
 template <class Shape, class N>
 LayerDepth<N> underside_at(const Shape& shape, const kernels::Touch<N>& t,
                            const kernels::Vec3<double>& xi, const N& outward, double known) {

@@ -594,8 +594,6 @@ std::shared_ptr<const CompiledModel> compile(const Scene& scene) {
   point_view(*m);
   compile_shear_springs(*m);
   compile_dry_friction(*m);
-  v.n_shear_springs = static_cast<int>(m->shear_springs.size());
-  v.memories = m->shear_springs.data();
   return m;
 }
 

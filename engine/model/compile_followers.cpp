@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <optional>
+#include <utility>
 
 namespace tangere {
 namespace {
@@ -18,27 +20,32 @@ struct Combination {
 
 class Followers {
  public:
-  Followers(const CompiledModel& m, const NameIndex& joints) : m_(m), joints_(joints) {}
+  Followers(const CompiledModel& m, const NameIndex& joints)
+      : m_(m), joints_(joints), known_(m.scene.links.size()), begun_(m.scene.links.size()) {}
 
-  /// Adds `factor` times the coordinate of a joint. `depth`: followers on the way to it.
-  void add(std::size_t joint, double factor, std::size_t depth, Combination& out) const {
+  /// Returns the coordinate of a joint.
+  const Combination& combination(std::size_t joint) {
+    std::optional<Combination>& out = known_[joint];
+    if (out) return *out;
     const JointDescription& d = m_.scene.links[joint].joint;
     if (dof_count(d.type) != 1)
       fail(d, fmt::format("has {} degrees of freedom; expected a revolute or prismatic joint where "
                           "one follows",
                           dof_count(d.type)));
-    if (depth > m_.scene.links.size()) fail(d, "follows itself; expected no circle");
-    if (d.follows.empty()) {
-      out.ratios[joint] += factor;
-      return;
-    }
+    if (std::exchange(begun_[joint], 1) != 0) fail(d, "follows itself; expected no circle");
     if (d.ratio.size() != d.follows.size())
       fail(d, fmt::format("follows {} joints with {} ratios; expected as many", d.follows.size(),
                           d.ratio.size()));
-    out.offset += factor * d.offset;
-    for (std::size_t k = 0; k < d.follows.size(); ++k)
-      add(std::size_t(joints_.find("joint", d.follows[k], d.source)), factor * d.ratio[k],
-          depth + 1, out);
+    Combination sum;
+    if (d.follows.empty()) sum.ratios[joint] = 1;
+    if (!d.follows.empty()) sum.offset = d.offset;
+    for (std::size_t k = 0; k < d.follows.size(); ++k) {
+      const Combination& leader =
+          combination(std::size_t(joints_.find("joint", d.follows[k], d.source)));
+      sum.offset += d.ratio[k] * leader.offset;
+      for (const auto& [of, ratio] : leader.ratios) sum.ratios[of] += d.ratio[k] * ratio;
+    }
+    return out.emplace(std::move(sum));
   }
 
  private:
@@ -48,15 +55,17 @@ class Followers {
 
   const CompiledModel& m_;
   const NameIndex& joints_;
+  std::vector<std::optional<Combination>> known_;  ///< of each joint
+  std::vector<char> begun_;
 };
 
 }  // namespace
 
 void compile_followers(CompiledModel& m, const NameIndex& joints) {
+  Followers followers(m, joints);
   for (std::size_t i = 0; i < m.scene.links.size(); ++i) {
     if (m.scene.links[i].joint.follows.empty()) continue;
-    Combination of;
-    Followers(m, joints).add(i, 1, 0, of);
+    const Combination& of = followers.combination(i);
     const CompiledJoint& own = m.joints[i];
     m.followers.push_back({own.v, own.q, of.offset});
     for (const auto& [leader, ratio] : of.ratios)
@@ -74,7 +83,8 @@ void place_initial_followers(CompiledModel& m) {
     return std::abs(given - placed) > kRounding * (1 + std::abs(placed));
   };
   for (const kernels::Follower& f : m.followers) {
-    const auto of = std::ranges::find(m.joints, f.v, &CompiledJoint::v);
+    const auto of = std::ranges::find_if(
+        m.joints, [&](const CompiledJoint& j) { return j.v == f.v && j.link_count > 0; });
     const JointDescription& d = m.scene.links[std::size_t(of - m.joints.begin())].joint;
     const auto given = std::ranges::find(m.scene.initial, d.name, &InitialState::joint);
     const auto iq = std::size_t(f.q), iv = std::size_t(f.v);

@@ -177,6 +177,8 @@ void compile_shear_springs(CompiledModel& m) {
   }
   add_grounds(m);
   add_sensors(m, false);
+  m.view.n_shear_springs = static_cast<int>(m.shear_springs.size());
+  m.view.memories = m.shear_springs.data();
 }
 
 }  // namespace tangere

@@ -11,11 +11,11 @@ namespace {
 
 constexpr float kWhite = 255;
 
-/// Rounds half up to bytes.
+/// Rounds half up to bytes. What is not a number becomes 0.
 TANGERE_CLONES void round_row(const float* from, std::uint8_t* to, std::size_t count) {
 #pragma GCC ivdep
   for (std::size_t i = 0; i < count; ++i) {
-    const float level = from[i] < 0 ? 0.0F : from[i] > kWhite ? kWhite : from[i];
+    const float level = !(from[i] > 0) ? 0.0F : from[i] > kWhite ? kWhite : from[i];
     to[i] = static_cast<std::uint8_t>(static_cast<int>(level + 0.5F));
   }
 }
@@ -39,13 +39,14 @@ PictureGrid picture_grid(const PictureDescription& picture, int rows, int cols, 
 }
 
 template <class T>
-GelCamera<T>::GelCamera(const PictureGrid& grid, const PictureDescription& picture, double reach)
+GelCamera<T>::GelCamera(const PictureGrid& grid, const PictureDescription& picture, double reach,
+                        Outside outside)
     : grid_(grid),
       noise_(picture.noise),
       gain_(picture.gain),
       membrane_(grid.rows, grid.cols, picture.gel->reach.value_or(reach) / grid.pitch_x,
                 picture.gel->reach.value_or(reach) / grid.pitch_y),
-      image_(grid, picture.gel->blur),
+      image_(grid, picture.gel->blur, outside),
       colour_(*picture.gel, grid.height, grid.width),
       depth_(static_cast<std::size_t>(grid.points())),
       surface_(depth_.size()),

@@ -18,13 +18,14 @@
 namespace tangere {
 
 /// T: float or double. Owns the scratch of one thread. Only the constructor and pull_back()
-/// allocate. Arrays of
-/// points are (rows, cols) of the grid; pictures are (height, width, channels), row 0 on top.
+/// allocate. Arrays of points are (rows, cols) of the grid; pictures are (height, width, channels),
+/// row 0 on top.
 template <class T>
 class GelCamera {
  public:
-  /// `reach`: ℓ [m] where the gel has none.
-  GelCamera(const PictureGrid& grid, const PictureDescription& picture, double reach);
+  /// `reach`: ℓ [m] where the gel has none. `outside`: the surface outside of the grid.
+  GelCamera(const PictureGrid& grid, const PictureDescription& picture, double reach,
+            Outside outside = Outside::zero);
 
   [[nodiscard]] const PictureGrid& grid() const { return grid_; }
 
@@ -41,7 +42,7 @@ class GelCamera {
   void read_height(std::span<T> height) const;
   /// Computes colours, (height, width, 3), from 0 to 255. `markers`: with printed markers.
   void read(bool markers, std::span<T> colours);
-  /// The same, rounded to whole levels.
+  /// The same, rounded to whole levels; 0 for what is not a number.
   void read(bool markers, std::span<std::uint8_t> colours) requires std::is_same_v<T, float>;
 
   /// Computes the cotangent of the surface from those of the height, (height, width), and of the

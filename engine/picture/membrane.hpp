@@ -29,7 +29,6 @@ class Membrane {
   ///   (1 - ℓ²∇²) λ = h̄ off A,  λ = 0 on A,  δ̄ = h̄ + Σ l² λ_neighbour on A, 0 elsewhere
   void pull_back(std::span<const T> depth, std::span<const T> height, std::span<const T> height_bar,
                  std::span<T> depth_bar);
-  [[nodiscard]] int sweeps() const { return sweeps_; }
 
  private:
   void load(std::span<const T> grid, std::vector<T>& split) const;

@@ -28,11 +28,12 @@ SplineWeights<T> spline_weights(double at, int points, Outside outside) {
 }
 
 template <class T>
-std::vector<SplineWeights<T>> pixel_weights(int pixels, double size, int points, double pitch) {
+std::vector<SplineWeights<T>> pixel_weights(int pixels, double size, int points, double pitch,
+                                            Outside outside) {
   std::vector<SplineWeights<T>> weights;
   for (int k = 0; k < pixels; ++k) {
     const double place = ((k + 0.5) / pixels - 0.5) * size;
-    weights.push_back(spline_weights<T>(place / pitch + 0.5 * (points - 1), points, Outside::zero));
+    weights.push_back(spline_weights<T>(place / pitch + 0.5 * (points - 1), points, outside));
     for (T& x : weights.back().slope) x = static_cast<T>(static_cast<double>(x) / pitch);
   }
   return weights;
@@ -40,7 +41,7 @@ std::vector<SplineWeights<T>> pixel_weights(int pixels, double size, int points,
 
 template SplineWeights<float> spline_weights(double, int, Outside);
 template SplineWeights<double> spline_weights(double, int, Outside);
-template std::vector<SplineWeights<float>> pixel_weights(int, double, int, double);
-template std::vector<SplineWeights<double>> pixel_weights(int, double, int, double);
+template std::vector<SplineWeights<float>> pixel_weights(int, double, int, double, Outside);
+template std::vector<SplineWeights<double>> pixel_weights(int, double, int, double, Outside);
 
 }  // namespace tangere

@@ -35,6 +35,7 @@ SplineWeights<T> spline_weights(double at, int points, Outside outside);
 
 /// Returns the weights at all pixels of an axis of `size` [m] over points `pitch` [m] apart.
 template <class T>
-std::vector<SplineWeights<T>> pixel_weights(int pixels, double size, int points, double pitch);
+std::vector<SplineWeights<T>> pixel_weights(int pixels, double size, int points, double pitch,
+                                            Outside outside);
 
 }  // namespace tangere

@@ -27,19 +27,37 @@ std::vector<T> half_kernel(double blur, double pitch) {
   return kernel;
 }
 
-/// Blurs along one axis: `count` numbers `step` apart. Outside they are 0.
+/// Blurs along one axis: `count` numbers `step` apart.
 template <class T>
-void blur_line(const std::vector<T>& kernel, const T* from, T* to, int count, std::ptrdiff_t step) {
+void blur_line(const std::vector<T>& kernel, Outside outside, const T* from, T* to, int count,
+               std::ptrdiff_t step) {
   const int reach = static_cast<int>(kernel.size()) - 1;
+  const bool nearest = outside == Outside::nearest;
+  const T first = nearest ? from[0] : T(0), last = nearest ? from[(count - 1) * step] : T(0);
   for (int i = 0; i < count; ++i) {
     T sum = kernel[0] * from[i * step];
     for (int k = 1; k <= reach; ++k) {
-      const T before = i >= k ? from[(i - k) * step] : T(0),
-              behind = i + k < count ? from[(i + k) * step] : T(0);
+      const T before = i >= k ? from[(i - k) * step] : first,
+              behind = i + k < count ? from[(i + k) * step] : last;
       sum += kernel[static_cast<std::size_t>(k)] * (before + behind);
     }
     to[i * step] = sum;
   }
+}
+
+/// The transpose. With zeros outside it is blur_line() itself.
+template <class T>
+void pull_back_line(const std::vector<T>& kernel, Outside outside, const T* from, T* to, int count,
+                    std::ptrdiff_t step) {
+  if (outside == Outside::zero) return blur_line(kernel, outside, from, to, count, step);
+  const int reach = static_cast<int>(kernel.size()) - 1;
+  for (int i = 0; i < count; ++i) to[i * step] = kernel[0] * from[i * step];
+  for (int i = 0; i < count; ++i)
+    for (int k = 1; k <= reach; ++k) {
+      const T share = kernel[static_cast<std::size_t>(k)] * from[i * step];
+      to[std::max(i - k, 0) * step] += share;
+      to[std::min(i + k, count - 1) * step] += share;
+    }
 }
 
 /// to = Σ weight_k from_k over four rows.
@@ -69,12 +87,13 @@ void add_scaled(double weight, const double* from, double* to, std::size_t count
 }  // namespace
 
 template <class T>
-SurfaceImage<T>::SurfaceImage(const PictureGrid& grid, double blur)
+SurfaceImage<T>::SurfaceImage(const PictureGrid& grid, double blur, Outside outside)
     : grid_(grid),
+      outside_(outside),
       kernel_x_(half_kernel<T>(blur, grid.pitch_x)),
       kernel_y_(half_kernel<T>(blur, grid.pitch_y)),
-      columns_(pixel_weights<T>(grid.width, grid.size_x, grid.cols, grid.pitch_x)),
-      lines_(pixel_weights<T>(grid.height, grid.size_y, grid.rows, grid.pitch_y)),
+      columns_(pixel_weights<T>(grid.width, grid.size_x, grid.cols, grid.pitch_x, outside)),
+      lines_(pixel_weights<T>(grid.height, grid.size_y, grid.rows, grid.pitch_y, outside)),
       blurred_(static_cast<std::size_t>(grid.points())),
       passed_(blurred_.size()),
       across_(static_cast<std::size_t>(grid.rows) * static_cast<std::size_t>(grid.width)),
@@ -96,13 +115,30 @@ template <class T>
 void SurfaceImage<T>::blur(std::vector<T>& grid) {
   if (kernel_x_.size() > 1) {
     for (int i = 0; i < grid_.rows; ++i)
-      blur_line(kernel_x_, grid.data() + i * grid_.cols, passed_.data() + i * grid_.cols,
+      blur_line(kernel_x_, outside_, grid.data() + i * grid_.cols, passed_.data() + i * grid_.cols,
                 grid_.cols, 1);
     std::swap(grid, passed_);
   }
   if (kernel_y_.size() > 1) {
     for (int j = 0; j < grid_.cols; ++j)
-      blur_line(kernel_y_, grid.data() + j, passed_.data() + j, grid_.rows, grid_.cols);
+      blur_line(kernel_y_, outside_, grid.data() + j, passed_.data() + j, grid_.rows, grid_.cols);
+    std::swap(grid, passed_);
+  }
+}
+
+/// Axes do not matter to each other, so those of the transpose come in the same order.
+template <class T>
+void SurfaceImage<T>::pull_back_blur(std::vector<T>& grid) {
+  if (kernel_x_.size() > 1) {
+    for (int i = 0; i < grid_.rows; ++i)
+      pull_back_line(kernel_x_, outside_, grid.data() + i * grid_.cols,
+                     passed_.data() + i * grid_.cols, grid_.cols, 1);
+    std::swap(grid, passed_);
+  }
+  if (kernel_y_.size() > 1) {
+    for (int j = 0; j < grid_.cols; ++j)
+      pull_back_line(kernel_y_, outside_, grid.data() + j, passed_.data() + j, grid_.rows,
+                     grid_.cols);
     std::swap(grid, passed_);
   }
 }
@@ -192,7 +228,7 @@ void SurfaceImage<T>::take(std::span<T> surface_bar) {
         to[columns_[x].point[k]] +=
             columns_[x].value[k] * value[x] + columns_[x].slope[k] * slope[x];
   }
-  blur(blurred_);  // its own transpose
+  pull_back_blur(blurred_);
   std::copy(blurred_.begin(), blurred_.end(), surface_bar.begin());
 }
 

@@ -16,8 +16,8 @@ namespace tangere {
 template <class T>
 class SurfaceImage {
  public:
-  /// `blur`: b [m].
-  SurfaceImage(const PictureGrid& grid, double blur);
+  /// `blur`: b [m]. `outside`: the surface outside of the grid.
+  SurfaceImage(const PictureGrid& grid, double blur, Outside outside = Outside::zero);
 
   /// Takes the surface, (rows, cols) [m].
   void set(std::span<const T> surface);
@@ -37,10 +37,12 @@ class SurfaceImage {
 
  private:
   void blur(std::vector<T>& grid);
+  void pull_back_blur(std::vector<T>& grid);
   [[nodiscard]] std::span<T> line(std::vector<T>& rows, int row) const;
   [[nodiscard]] std::span<const T> line(const std::vector<T>& rows, int row) const;
 
   PictureGrid grid_;
+  Outside outside_;
   std::vector<T> kernel_x_, kernel_y_;  // from the middle outwards; one number: no blur
   std::vector<SplineWeights<T>> columns_, lines_;
   std::vector<T> blurred_, passed_;  // (rows, cols)

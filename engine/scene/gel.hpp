@@ -34,7 +34,7 @@ struct GelBackground {
 struct Gel {
   std::string name;                  ///< of its file, without ending
   std::uint64_t checksum = 0;        ///< of its files; 0: not from a file
-  double pixel = 0;                  ///< of the background [m]; 0: not known
+  double pixel = 0;                  ///< of the background [m], for a warning; 0: not known
   std::optional<double> reach = {};  ///< ℓ: how far a dent reaches [m]; none: 0.2 thickness
   double blur = 0;                   ///< deviation of a Gaussian b [m]
   GelLamps lamps{};

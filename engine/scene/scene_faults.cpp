@@ -61,7 +61,8 @@ bool turns_freely(JointType type) {
 }
 
 std::string friction_fault(const JointDescription& joint) {
-  return turns_freely(joint.type) && joint.friction != 0 ? kTurnsFreely : "";
+  const bool dry = joint.friction != 0 || (joint.turning && joint.turning->friction != 0);
+  return turns_freely(joint.type) && dry ? kTurnsFreely : "";
 }
 
 std::string joint_variation_fault(const JointDescription& joint, const SceneNumber& n) {

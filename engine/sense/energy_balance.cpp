@@ -2,6 +2,7 @@
 // Energies are those of the step checks (engine/step/lane_energy.hpp).
 #include "engine/sense/energy_balance.hpp"
 
+#include "engine/step/dry_friction_state.hpp"
 #include "engine/step/lane_energy.hpp"
 #include "engine/step/motor_force.hpp"
 #include "kernels/step/stage.hpp"
@@ -43,6 +44,9 @@ struct EnergyBalanceReader::Impl {
     w.stage.block = column;
     w.stage.group = 0;
     set_motors(m, w, 0, column, u);
+    const std::span<const ShearEntry> memory = batch.shear_state(environment);
+    w.shear.now[0].assign(memory.begin(), memory.end());
+    set_dry_anchors(m, w);
     const kernels::KernelTable& table = kernels::active_kernels();
     const auto& stage = table.stage<1>();
     if (m.view.faced) stage.choose_faces_at(m.view, w.stage, w.q0, w.zero, w.stage.faces);

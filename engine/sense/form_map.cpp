@@ -4,8 +4,11 @@
 #include "engine/sense/form_map.hpp"
 
 #include <algorithm>
+#include <mutex>
 #include <numeric>
 #include <optional>
+#include <utility>
+#include <vector>
 
 #include "engine/model/compiled_model.hpp"
 #include "engine/sense/dense_tiles.hpp"
@@ -66,6 +69,8 @@ struct FormMap::Impl {
   std::optional<Mat3<double>> turn;  // of a skewed pad
   std::optional<MarkerMap> markers;
   std::size_t size;  // of the form
+  mutable std::mutex guard;
+  mutable std::vector<std::unique_ptr<PictureReading<double>>> idle;  // scratch of pictures
 
   Impl(const Model& m, FieldOutput of) : model(m), output(of) {
     check_outputs({&of, 1}, m.sensors().size());
@@ -86,6 +91,23 @@ struct FormMap::Impl {
   }
 
   [[nodiscard]] std::size_t points() const { return std::size_t(pad.rows) * std::size_t(pad.cols); }
+
+  /// Calls f with a reading of pictures that no other thread uses meanwhile.
+  template <class F>
+  void with_picture(const F& f) const {
+    std::unique_ptr<PictureReading<double>> reading;
+    {
+      const std::lock_guard lock(guard);
+      if (!idle.empty()) {
+        reading = std::move(idle.back());
+        idle.pop_back();
+      }
+    }
+    if (!reading) reading = std::make_unique<PictureReading<double>>(model, output.sensor);
+    f(*reading);
+    const std::lock_guard lock(guard);
+    idle.push_back(std::move(reading));
+  }
 
   void sum(std::span<const double> field, std::span<double> to) const {
     thread_local std::vector<double> values, turned;
@@ -164,12 +186,11 @@ void FormMap::evaluate(std::span<const double> field, std::span<double> form) co
     case FieldForm::surface: m.markers->displace(field, form); return;
     case FieldForm::height:
     case FieldForm::rgb:
-    case FieldForm::rgb_marker: {
-      PictureReading<double> picture(m.model, m.output.sensor);
-      picture.set_field(m.output.form, field);
-      picture.read(m.output.form, form);
-      return;
-    }
+    case FieldForm::rgb_marker:
+      return m.with_picture([&](PictureReading<double>& picture) {
+        picture.set_field(m.output.form, field);
+        picture.read(m.output.form, form);
+      });
     case FieldForm::flow: {
       const ShearField<double> shear{field};
       normalised_flow({&shear, 1}, form);
@@ -195,12 +216,11 @@ void FormMap::pull_back(std::span<const double> field, std::span<const double> f
     case FieldForm::surface: m.markers->pull_back(field, form_bar, field_bar); return;
     case FieldForm::height:
     case FieldForm::rgb:
-    case FieldForm::rgb_marker: {
-      PictureReading<double> picture(m.model, m.output.sensor);
-      picture.set_field(m.output.form, field);
-      picture.pull_back(m.output.form, field, form_bar, field_bar);
-      return;
-    }
+    case FieldForm::rgb_marker:
+      return m.with_picture([&](PictureReading<double>& picture) {
+        picture.set_field(m.output.form, field);
+        picture.pull_back(m.output.form, field, form_bar, field_bar);
+      });
     case FieldForm::flow: {
       const ShearField<double> shear{field};
       const ShearCotangent to{field_bar, {}};

@@ -48,9 +48,6 @@ class LayeredField {
                     std::span<const kernels::Vec3<kernels::Dual<double>>> sizes,
                     double stiffness_dot, std::span<double> field_dot);
 
-  /// Linear systems that the last read() of a layer solved.
-  [[nodiscard]] int systems() const { return layers_.front().systems(); }
-
  private:
   struct Point {
     int index, group, target;

@@ -3,6 +3,7 @@
 #include "engine/sense/pad_depth.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <vector>
 
 #include "engine/layer/layer_depth.hpp"
@@ -41,6 +42,18 @@ Vec3<double> size_slopes(const TouchShape& s, const Touch<double>& touch,
                 {s.size[2], k == 2 ? 1.0 : 0}},
         [&](const auto& shape) { (&slopes.x)[k] = distance_at(shape, at).d.epsilon; }, s.grid);
   return slopes;
+}
+
+/// Whether the place of every shape is a number.
+bool is_placed(const kernels::TactileArgs<double>& touch) {
+  for (int k = 0; k < touch.n_touches; ++k) {
+    const Touch<double>& t = touch.touches[k];
+    double sum = t.c.x + t.c.y + t.c.z;
+    for (const auto& row : t.Q.m)
+      for (const double x : row) sum += x;
+    if (std::isnan(sum)) return false;
+  }
+  return true;
 }
 
 }  // namespace
@@ -85,7 +98,9 @@ static void for_undersides(const CompiledSensor& sensor, const kernels::TactileA
 
 void read_depths(const CompiledSensor& sensor, const kernels::TactileArgs<double>& touch,
                  int outward, double deepest, std::span<double> depth) {
-  std::fill(depth.begin(), depth.end(), 0.0);
+  const bool placed = is_placed(touch);
+  std::fill(depth.begin(), depth.end(), placed ? 0.0 : std::nan(""));
+  if (!placed) return;
   for_undersides(sensor, touch, outward, deepest,
                  [&](int, const auto&, std::size_t index, const Vec3<double>&, double found) {
                    depth[index] = std::max(depth[index], found);

@@ -19,7 +19,7 @@ bool reaches_tile(const kernels::PadTiles& pad, int tile, const kernels::TouchSh
 
 /// Computes δ ≥ 0 of every point, (points) [m]. `touch`: the shapes in pad axes
 /// (PadReader::arguments()). `outward`: 1 or -1, whether the pad's z points out of the skin.
-/// `deepest`: where depth ends [m].
+/// `deepest`: where depth ends [m]. NaN at all points where the place of a shape is none.
 void read_depths(const CompiledSensor& sensor, const kernels::TactileArgs<double>& touch,
                  int outward, double deepest, std::span<double> depth);
 

@@ -19,6 +19,7 @@ constexpr double kUsualReach = 0.2;       // of the thickness
 
 double thickness_of(const TactileDescription& d) {
   if (d.material) return d.material->thickness;
+  if (d.table) return d.table->thickness > 0 ? d.table->thickness : 2 * d.table->depth.back();
   if (d.markers && d.markers->thickness > 0) return d.markers->thickness;
   return kUsualThickness;
 }
@@ -48,7 +49,8 @@ struct PictureReading<T>::Impl {
       : model(m),
         sensor(compiled(model).sensors[std::size_t(number)]),
         description(model.scene().sensors[std::size_t(number)]),
-        camera(grid_of(description), *description.picture, kUsualReach * thickness_of(description)),
+        camera(grid_of(description), *description.picture, kUsualReach * thickness_of(description),
+               description.layer ? Outside::nearest : Outside::zero),
         depth(std::size_t(sensor.points())) {
     const std::array<double, 2> pitch = pitches(description.array);
     direction = {(pitch[1] < 0) != description.picture->mirror ? -1.0 : 1.0,

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Pictures of a sensor's gel: the depth of the bodies, or the surface of its layer, and how its
-// markers move, as a camera behind the gel sees them (docs/pictures.md).
+// Pictures that a camera behind a sensor's gel has: of the depth of the bodies, or the surface of
+// its layer, and of how its markers move (docs/pictures.md).
 #pragma once
 
 #include <memory>

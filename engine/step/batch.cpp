@@ -174,10 +174,11 @@ void Batch::reset(int environment, std::int64_t episode) {
 
 namespace {
 
-/// Throws InputError where a state does not have followers where their leaders put them.
+/// Throws InputError where a state has followers elsewhere than their leaders put them, by more
+/// than rounding to float.
 void check_followers(const CompiledModel& m, std::span<const double> q, std::span<const double> v) {
   if (m.followers.empty()) return;
-  constexpr double kRounding = 1e-9;
+  constexpr double kRounding = 1e-5;
   const auto check = [](const std::string& name, double found, double expected) {
     if (std::abs(found - expected) > kRounding * (1 + std::abs(expected)))
       throw InputError("state: '" + name + "' is " + std::to_string(found) + "; expected " +
@@ -209,6 +210,9 @@ void Batch::displace(std::size_t lane, std::span<const double> q, std::span<cons
   double* const own = column(lane);
   for (int i = 0; i < m.nq; ++i) own[(m.layout.q + i) * kBlock] = q[std::size_t(i)];
   for (int i = 0; i < m.nv; ++i) own[(m.layout.v + i) * kBlock] = v[std::size_t(i)];
+  place_followers(
+      m, [&](int i) -> double& { return own[(m.layout.q + i) * kBlock]; },
+      [&](int i) -> double& { return own[(m.layout.v + i) * kBlock]; });
   sleep_[lane].wake();
   clearance_[lane] = 0;
 }

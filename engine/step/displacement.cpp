@@ -2,13 +2,15 @@
 // δq = q ⊗ (0, θ)/2 for quaternions. Other coordinates are dofs.
 #include "engine/step/displacement.hpp"
 
+#include "engine/model/compile_followers.hpp"
 #include "engine/model/compiled_model.hpp"
 #include "engine/model/model.hpp"
 
 namespace tangere {
 
-void displace(const Model& model, std::span<double> q, int dof, double e) {
-  for (const kernels::Link& link : compiled(model).links) {
+/// Computes q ⊕ e along one dof.
+static void displace_alone(const CompiledModel& m, std::span<double> q, int dof, double e) {
+  for (const kernels::Link& link : m.links) {
     if (dof < link.v || dof >= link.v + kernels::dofs(link.kind)) continue;
     if (link.kind != kernels::JointKind::spherical) {
       q[std::size_t(link.q + dof - link.v)] += e;
@@ -21,6 +23,22 @@ void displace(const Model& model, std::span<double> q, int dof, double e) {
     a[0] = r.w, a[1] = r.x, a[2] = r.y, a[3] = r.z;
     return;
   }
+}
+
+void displace(const Model& model, std::span<double> q, int dof, double e) {
+  const CompiledModel& m = compiled(model);
+  displace_alone(m, q, dof, e);
+  double unused = 0;
+  place_followers(
+      m, [&](int i) -> double& { return q[std::size_t(i)]; },
+      [&](int) -> double& { return unused; });
+}
+
+void complete_followers(const Model& model, std::span<double> along) {
+  const CompiledModel& m = compiled(model);
+  for (const kernels::Follower& f : m.followers) along[std::size_t(f.v)] = 0;
+  for (const kernels::FollowerTie& t : m.ties)
+    along[std::size_t(t.v)] += t.ratio * along[std::size_t(t.leader_v)];
 }
 
 void add_along_dofs(const Model& model, std::span<const double> q, std::span<const double> q_bar,

@@ -9,8 +9,12 @@
 
 namespace tangere {
 
-/// Computes q ⊕ e along one dof, in place. Rotations are on the right.
+/// Computes q ⊕ e along one dof, in place. Rotations are on the right. Joints that follow others go
+/// along; alone they stay.
 void displace(const Model& model, std::span<double> q, int dof, double e);
+
+/// Sets velocities, or changes along dofs, (nv), of joints that follow others from their leaders'.
+void complete_followers(const Model& model, std::span<double> along);
 
 /// Turns `q_bar`, (nq) derivatives by coordinates at q, into derivatives along the dofs of v and
 /// adds them to `out`, (nv). `q_bar` treats the four coordinates of a quaternion as free.

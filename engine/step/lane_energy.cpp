@@ -101,6 +101,16 @@ struct LaneAt {
       }
   }
 
+  /// Adds what the spring of dry friction holds, and what friction takes from the motion.
+  void add_dry(const kernels::Link& link, int k, double place, double rate) {
+    const kernels::DofEffects& e = model.dof_effects[std::size_t(link.v + k)];
+    const double bound = number(e.friction), anchor = w.stage.dry_anchor[link.v + k][lane];
+    const auto at = kernels::dry_friction(e, place, rate, anchor);
+    const double stretch = place - anchor;
+    sum.moving += 0.5 * bound * e.friction_rate * stretch * stretch;
+    terms->taken += bound * rate * (at.share - at.rigid * e.friction_rate * stretch);
+  }
+
   void add_joints(const Row<L>* q, const Row<L>* v) {
     for (const kernels::Link& link : model.links) {
       if ((link.effects & kernels::kBeyondDamping) == 0) continue;
@@ -119,6 +129,8 @@ struct LaneAt {
         for (int k = 0; k < kernels::dofs(link.kind); ++k) {
           const double place = q[link.q + k][lane];
           add_held(link, k, place, place - e[k].rest, target[k][lane] - place, rate(k));
+          if (terms != nullptr && (link.effects & kernels::kDryFriction) != 0)
+            add_dry(link, k, place, rate(k));
         }
         continue;
       }

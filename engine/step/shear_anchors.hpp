@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Anchors of points with shear springs and of joints with dry friction, from the state in which a solve begins.
+// Anchors of points with shear springs and of joints with dry friction, from the state in which a
+// solve begins.
 #pragma once
 
 #include "engine/step/workspace.hpp"

@@ -23,8 +23,8 @@ struct ShearSpringPlaces {
   std::vector<Vector3> places;
 };
 
-/// The points of a model that have shear springs, then the dofs with dry friction. Row r of an array (points, 3) is the elastic
-/// displacement of point r [m], in the axes of the moving frame that carries it; for a sensor with
+/// The points of a model that have shear springs, then the dofs with dry friction. Row r of an
+/// array (points, 3) is the elastic displacement of point r [m], in the axes of the moving frame that carries it; for a sensor with
 /// memory="read" its anchor b in these axes, or a in those of the touched shape. Zeros: no
 /// displacement, or no contact. Of a dof with dry friction it has the elastic displacement [m or
 /// rad] and two zeros.

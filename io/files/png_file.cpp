@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// libpng's simplified interface converts all kinds of PNG to RGB.
+// libpng's simplified interface converts all kinds of PNG to RGB. Files of 16 bits that do not say
+// how they encode light hold grey levels as others do, not linear light.
 #include "io/files/png_file.hpp"
 
 #include <fmt/format.h>
@@ -32,11 +33,13 @@ Photograph parse_png(const std::string& bytes, const std::string& name) {
   if (png.image.width > kLargestPhotograph || png.image.height > kLargestPhotograph)
     fail(fmt::format("{} x {} pixels, more than {} along a side", png.image.width, png.image.height,
                      kLargestPhotograph));
+  if ((png.image.format & PNG_FORMAT_FLAG_ALPHA) != 0)
+    fail("it has transparency, which no photograph has");
+  png.image.flags |= PNG_IMAGE_FLAG_16BIT_sRGB;
   png.image.format = PNG_FORMAT_RGB;
   Photograph photograph{static_cast<int>(png.image.height), static_cast<int>(png.image.width), {}};
   photograph.levels.resize(PNG_IMAGE_SIZE(png.image));
-  const png_color black{0, 0, 0};
-  if (png_image_finish_read(&png.image, &black, photograph.levels.data(), 0, nullptr) == 0)
+  if (png_image_finish_read(&png.image, nullptr, photograph.levels.data(), 0, nullptr) == 0)
     fail(png.image.message);
   return photograph;
 }

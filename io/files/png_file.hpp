@@ -16,9 +16,9 @@ struct Photograph {
 
 inline constexpr int kLargestPhotograph = 8192;  ///< pixels along a side
 
-/// Reads a PNG file: RGB, or grey levels, which become equal numbers; palettes and 16 bits are
-/// converted, transparency is left out. Throws IoError as require_regular_file() does; InputError
-/// for a file that is no PNG, is damaged, or is larger.
+/// Reads a PNG file: RGB, or grey levels, which become equal numbers. Palettes are converted, and
+/// 16 bits to the nearest of 8. Throws IoError as require_regular_file() does; InputError for a
+/// file that is no PNG, is damaged, is larger, or has transparency.
 Photograph read_png(const std::string& path);
 /// The same of the bytes of a file. `name`: for messages.
 Photograph parse_png(const std::string& bytes, const std::string& name);

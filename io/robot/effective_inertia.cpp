@@ -46,20 +46,39 @@ double last_pivot(Matrix M, std::size_t dof) {
   return M[n - 1][n - 1];
 }
 
+/// Adds the armature of a tendon, cᵀ I_a c. `first`: of each link, its first dof.
+void add_armature(const Scene& scene, const JointDescription& tendon, const std::vector<int>& first,
+                  Matrix& M) {
+  std::vector<std::pair<std::size_t, double>> row;
+  for (std::size_t k = 0; k < tendon.follows.size(); ++k)
+    for (std::size_t i = 0; i < scene.links.size(); ++i)
+      if (scene.links[i].joint.name == tendon.follows[k])
+        row.emplace_back(std::size_t(first[i]), tendon.ratio[k]);
+  for (const auto& [i, c] : row)
+    for (const auto& [j, d] : row) M[i][j] += c * tendon.armature * d;
+}
+
 }  // namespace
 
-std::vector<double> effective_inertias(Scene scene, const std::vector<int>& dofs) {
+std::vector<double> effective_inertias(Scene scene, const std::vector<int>& dofs,
+                                       const std::set<std::string>& tendons) {
   scene.motors.clear();
-  for (LinkDescription& link : scene.links) {  // as in the file's mass matrix
-    const bool weightless = link.joint.follows.size() > 0 &&
-                            std::holds_alternative<AbstractShape>(link.body.shape) &&
-                            std::get<AbstractShape>(link.body.shape).mass == 0;
-    if (weightless) link.joint.type = JointType::fixed;  // tendons come last
+  std::vector<JointDescription> with_armature;
+  std::vector<int> first;
+  int dof = 0;
+  for (LinkDescription& link : scene.links) {
+    first.push_back(dof);
+    if (tendons.contains(link.joint.name)) {
+      with_armature.push_back(link.joint);
+      link.joint.type = JointType::fixed;
+    }
     link.joint.follows.clear();
+    dof += dof_count(link.joint.type);
   }
-  const Matrix M = mass_matrix(Model(scene));
+  Matrix M = mass_matrix(Model(scene));
+  for (const JointDescription& tendon : with_armature) add_armature(scene, tendon, first, M);
   std::vector<double> out;
-  for (const int dof : dofs) out.push_back(last_pivot(M, std::size_t(dof)));
+  for (const int j : dofs) out.push_back(last_pivot(M, std::size_t(j)));
   return out;
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Actuators on hinges, slides and fixed tendons. With the gear G the length of the transmission is G (q + ref),
-// where q is the scene's coordinate. The force f of the actuator acts on the joint as G f:
+// Actuators on hinges, slides and fixed tendons. With the gear G the length of the transmission is
+// G (q + ref), where q is the scene's coordinate. The force f of the actuator acts on the joint as G f:
 //   f = g c + b - kp G (q + ref) - kv G v
 //   kp > 0    a position motor: P = kp G², D = kv G², target (g c + b)/(kp G) - ref
 //   kp = 0    a force motor G (g c + b), and damping kv G² of the joint
@@ -120,7 +120,7 @@ class Actuators {
     if (ratios_.empty()) return;
     std::vector<int> dofs;
     for (const Ratio& ratio : ratios_) dofs.push_back(ratio.dof);
-    const std::vector<double> inertias = effective_inertias(scene_, dofs);
+    const std::vector<double> inertias = effective_inertias(scene_, dofs, whole_.tendons);
     for (std::size_t k = 0; k < ratios_.size(); ++k) {
       MotorDescription& motor = scene_.motors[ratios_[k].motor];
       motor.D = 2 * ratios_[k].value * std::sqrt(motor.P * inertias[k]);

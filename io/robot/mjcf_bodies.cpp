@@ -220,6 +220,7 @@ class Bodies {
     if (single) {
       end.ref = measure(node.number("ref", 0.0));
       const double rest = measure(node.number("springref", 0.0)) - end.ref;
+      end.spring = rest;
       if (joint.stiffness != 0 && rest != 0) joint.rest = {rest};
       if (end.ref != 0)
         node.changed(fmt::format("<joint> ref: the coordinate of '{}' is that of the file minus {}",

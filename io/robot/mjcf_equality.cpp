@@ -80,12 +80,14 @@ void read_joint_equality(MjcfWhole& whole, const MjcfScope& model, const RobotNo
 }  // namespace
 
 void read_mjcf_equalities(MjcfWhole& whole) {
+  if (!whole.has_equalities) return;
   for (const MjcfScope* model : whole.models)
     for (const RobotNode& section : model->file->sections) {
       if (section.name() != "equality") continue;
       for (const RobotNode& part : section.parts(kEqualities))
         if (part.name() == "joint") read_joint_equality(whole, *model, part);
     }
+  check_followers(whole.robot);
 }
 
 }  // namespace tangere

@@ -34,8 +34,9 @@ struct MjcfMesh {
 
 /// A joint of the file, for actuators: those of hinges and slides can be driven.
 struct MjcfJoint {
-  int link = -1;   ///< of the scene
-  double ref = 0;  ///< the file's coordinate where ours is zero [m or rad]
+  int link = -1;      ///< of the scene
+  double ref = 0;     ///< the file's coordinate where ours is zero [m or rad]
+  double spring = 0;  ///< springref, in our coordinate
   std::optional<std::array<double, 2>> actuator_range = {};  ///< [N or N m]
   std::optional<std::array<double, 2>> range = {};  ///< in the file's coordinate [m or rad]
   /// A free joint whose frame MuJoCo aligns with the inertia of its body, which keyframes refer to.
@@ -86,8 +87,8 @@ struct MjcfNames {
 /// What all models of a file share.
 struct MjcfWhole {
   Robot& robot;
-  bool has_limits = true, has_springs = true, has_dampers = true,
-       has_friction = true;               ///< by <flag>
+  bool has_limits = true, has_springs = true, has_dampers = true, has_friction = true,
+       has_equalities = true;             ///< by <flag>
   bool merges_options = false;            ///< <compiler conflict="merge">
   std::vector<int> disabled_groups = {};  ///< of actuators
   bool free_base = false;                 ///< bodies of the world without joints move freely

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 #include "engine/scene/outer_pose.hpp"
 #include "io/robot/mjcf_file.hpp"
@@ -41,13 +42,27 @@ class Keyframe {
       };
       if (zero(state.v)) state.v.clear();
       if (nq == 1 && zero(state.q)) state.q.clear();
-      if (!link.joint.follows.empty()) continue;  // its leader says where it is
+      if (nq == 1 && nv == 1 && !q.empty()) given_[link.joint.name] = state.q[0];
+      if (!link.joint.follows.empty()) continue;  // its leaders say where it is
       if (!state.q.empty() || !state.v.empty()) scene.initial.push_back(std::move(state));
     }
+    for (const LinkDescription& link : scene.links) check_follower(link.joint);
     read_controls();
   }
 
  private:
+  /// Lists a start that is not that of the joints that a joint follows.
+  void check_follower(const JointDescription& joint) const {
+    const auto own = given_.find(joint.name);
+    if (joint.follows.empty() || own == given_.end()) return;
+    double place = joint.offset;
+    for (std::size_t k = 0; k < joint.follows.size(); ++k)
+      if (const auto leader = given_.find(joint.follows[k]); leader != given_.end())
+        place += joint.ratio[k] * leader->second;
+    if (std::abs(own->second - place) > 1e-6)
+      node_.changed("<key> qpos of a joint that follows others: it starts where they put it");
+  }
+
   /// One number for each coordinate or dof of the scene; none if the attribute is not there.
   [[nodiscard]] std::vector<double> numbers(const char* attribute, int (*count)(JointType)) const {
     if (!node_.has(attribute)) return {};
@@ -130,6 +145,7 @@ class Keyframe {
 
   const MjcfWhole& whole_;
   const RobotNode& node_;
+  std::map<std::string, double> given_;  ///< coordinates of joints with one
 };
 
 }  // namespace

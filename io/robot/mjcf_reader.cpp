@@ -124,8 +124,8 @@ void read_flag(MjcfWhole& whole, const RobotNode& flag, const std::string& name,
            "equality", "clampctrl", "frictionloss"}) ||
       value == "enable")
     return flag.idle(text + kSolverSetting);
-  if (is({"contact", "equality"}))
-    return flag.idle(text + "a scene has none but those that it names");
+  if (is({"contact"})) return flag.idle(text + "a scene has none but those that it names");
+  if (is({"equality", "constraint"})) whole.has_equalities = false;
   if (is({"actuation", "clampctrl"})) return flag.lost(text + "switches forces");
   if (name == "gravity") whole.robot.scene.gravity = {0, 0, 0};
   if (is({"limit", "constraint"})) whole.has_limits = false;
@@ -217,7 +217,7 @@ void MjcfFile::read_defaults(const RobotNode& node, const std::string& parent) {
                  {"camera", Fate::idle, kSight},
                  {"light", Fate::idle, kSight},
                  {"pair", Fate::idle, "of pairs of geoms, which --contact names"},
-                 {"equality", Fate::idle, "of constraints"},
+                 {"equality"},
                  {"tendon"}};
   for (const char* other : kOtherActuators)
     known.push_back({other, Fate::idle, "of actuators that are not read"});
@@ -225,6 +225,11 @@ void MjcfFile::read_defaults(const RobotNode& node, const std::string& parent) {
   for (const RobotNode& part : node.parts(known)) {
     if (part.name() == "default") {
       read_defaults(part, name);
+      continue;
+    }
+    if (part.name() == "equality") {
+      if (!part.flag("active", true))
+        part.lost("<equality> active of a default: constraints are taken as active");
       continue;
     }
     part.check(mjcf_words(part.name()));

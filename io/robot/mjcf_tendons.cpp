@@ -60,6 +60,7 @@ class Tendon {
       joint_.follows.push_back(found->second[0].name);
       joint_.ratio.push_back(coefficient);
       zero_ += coefficient * leader.ref;
+      spring_ += coefficient * leader.spring;
     }
     if (joint_.follows.empty()) node_.fail("a tendon without joints");
     joint_.type = turns ? JointType::revolute : JointType::prismatic;
@@ -70,11 +71,12 @@ class Tendon {
   void read_spring() {
     const double stiffness = whole_.has_springs ? node_.not_negative("stiffness", 0.0) : 0;
     if (stiffness == 0) return;
-    std::vector<double> rest = {-1};  // MuJoCo's word for the length at the reference pose
+    std::vector<double> rest = {-1};  // MuJoCo's word for the length where springs of joints rest
     if (node_.has("springlength")) rest = node_.numbers("springlength");
     if (rest.empty() || rest.size() > 2)
       node_.fail(fmt::format("springlength has {} numbers; expected 1 or 2", rest.size()));
-    for (double& length : rest) length = rest[0] == -1 ? 0 : length - zero_;
+    const bool follows_joints = rest[0] == -1;
+    for (double& length : rest) length = follows_joints ? spring_ : length - zero_;
     if (rest.size() == 1 || rest[0] == rest[1]) {
       joint_.stiffness = stiffness;
       if (rest[0] != 0) joint_.rest = {rest[0]};
@@ -100,7 +102,8 @@ class Tendon {
   const MjcfScope& model_;
   const RobotNode& node_;
   JointDescription joint_;
-  double zero_ = 0;  ///< the file's length where ours is 0
+  double zero_ = 0;    ///< the file's length where ours is 0
+  double spring_ = 0;  ///< our length where the springs of all joints rest
   std::optional<std::array<double, 2>> range_;
 };
 

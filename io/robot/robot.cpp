@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <set>
 #include <variant>
 
 #include "engine/scene/shapes.hpp"
@@ -35,40 +36,50 @@ std::vector<std::string> Remarks::lines() const {
 
 namespace {
 
-/// Finds what keeps joints from following others.
-class FollowerCheck {
- public:
-  explicit FollowerCheck(const std::vector<LinkDescription>& links) : links_(links) {}
+const JointDescription* joint_named(const Robot& robot, const std::string& name) {
+  const auto found = std::ranges::find_if(
+      robot.scene.links, [&](const LinkDescription& l) { return l.joint.name == name; });
+  return found == robot.scene.links.end() ? nullptr : &found->joint;
+}
 
-  /// Null: nothing does. Throws InputError for a leader that is no joint.
-  [[nodiscard]] const char* fault(const JointDescription& joint, std::size_t depth = 0) const {
-    if (depth > links_.size()) return "which follows it in turn";
-    for (const std::string& name : joint.follows) {
-      const auto leader =
-          std::ranges::find_if(links_, [&](const auto& l) { return l.joint.name == name; });
-      if (leader == links_.end())
-        throw InputError(joint.source.prefix() + "joint '" + joint.name + "' follows '" + name +
-                         "': no joint has this name");
-      if (dof_count(joint.type) != 1 || dof_count(leader->joint.type) != 1)
-        return "which is not between joints of one degree of freedom each";
-      if (const char* const of = fault(leader->joint, depth + 1)) return of;
-    }
-    return nullptr;
+/// Whether the leaders of a joint, and theirs, lead to `target`. `passed`: joints already visited.
+bool leads_to(const Robot& robot, const JointDescription& joint, const JointDescription& target,
+              std::set<const JointDescription*>& passed) {
+  for (const std::string& name : joint.follows) {
+    const JointDescription* const leader = joint_named(robot, name);
+    if (leader == &target) return true;
+    if (leader != nullptr && passed.insert(leader).second &&
+        leads_to(robot, *leader, target, passed))
+      return true;
   }
+  return false;
+}
 
- private:
-  const std::vector<LinkDescription>& links_;
-};
+/// What keeps a joint from following others; null: nothing. Throws InputError for a leader that is
+/// no joint.
+const char* follower_fault(const Robot& robot, const JointDescription& joint) {
+  for (const std::string& name : joint.follows) {
+    const JointDescription* const leader = joint_named(robot, name);
+    if (leader == nullptr)
+      throw InputError(joint.source.prefix() + "joint '" + joint.name + "' follows '" + name +
+                       "': no joint has this name");
+    if (dof_count(joint.type) != 1 || dof_count(leader->type) != 1)
+      return "which is not between joints of one degree of freedom each";
+    if (name.find_first_of(" \t") != std::string::npos) return "whose name has a blank";
+  }
+  std::set<const JointDescription*> passed;
+  return leads_to(robot, joint, joint, passed) ? "which follows it in turn" : nullptr;
+}
 
 }  // namespace
 
 void check_followers(Robot& robot) {
   for (LinkDescription& link : robot.scene.links) {
     JointDescription& joint = link.joint;
-    const char* const fault = FollowerCheck(robot.scene.links).fault(joint);
+    const char* const fault = follower_fault(robot, joint);
     if (fault == nullptr) continue;
     robot.lost.add(joint.source, fmt::format("joint '{}' follows '{}', {}", joint.name,
-                                             fmt::join(joint.follows, " "), fault));
+                                             fmt::join(joint.follows, "', '"), fault));
     joint.follows.clear();
     joint.ratio.clear();
   }

@@ -55,13 +55,15 @@ double largest_force(const MotorDescription& m) {
 /// motors' largest force. Of a joint without mass, those of the joints that it follows.
 class LimitLoads {
  public:
-  explicit LimitLoads(const Robot& robot) : robot_(robot), scene_(robot.scene), model_(scene_) {
+  explicit LimitLoads(const Robot& robot)
+      : robot_(robot), scene_(robot.scene), model_(scene_), known_(scene_.links.size()) {
     for (const LinkDescription& link : scene_.links)
       at_.push_back(link.parent < 0 ? link.joint.pose
                                     : compose(at_[std::size_t(link.parent)], link.joint.pose));
   }
 
-  [[nodiscard]] double load(std::size_t i) const {
+  [[nodiscard]] double load(std::size_t i) {
+    if (known_[i]) return *known_[i];
     const JointDescription& joint = scene_.links[i].joint;
     double load = weight(i);
     if (const auto effort = robot_.efforts.find(joint.name); effort != robot_.efforts.end())
@@ -72,7 +74,7 @@ class LimitLoads {
       for (std::size_t leader = 0; leader < scene_.links.size(); ++leader)
         if (scene_.links[leader].joint.name == joint.follows[k] && joint.ratio[k] != 0)
           load = std::max(load, this->load(leader) / std::abs(joint.ratio[k]));
-    return load;
+    return known_[i].emplace(load);
   }
 
  private:
@@ -96,12 +98,13 @@ class LimitLoads {
   const Scene& scene_;
   Model model_;
   std::vector<Pose> at_;
+  std::vector<std::optional<double>> known_;  ///< loads
 };
 
 /// Chooses the stiffness of limits that have none: under their load they yield by kYieldAngle or
 /// kYieldLength.
 void stiffen_limits(Robot& robot) {
-  const LimitLoads loads(robot);
+  LimitLoads loads(robot);
   for (std::size_t i = 0; i < robot.scene.links.size(); ++i) {
     JointDescription& joint = robot.scene.links[i].joint;
     if (!joint.limits || joint.limit_stiffness != 0) continue;
@@ -111,12 +114,24 @@ void stiffen_limits(Robot& robot) {
   }
 }
 
+/// The coordinate of a joint of one dof at the start. Followers that are read are in no circle.
+double start_of_joint(const Scene& scene, const std::string& joint) {
+  const auto link = std::ranges::find_if(
+      scene.links, [&](const LinkDescription& l) { return l.joint.name == joint; });
+  if (link != scene.links.end() && !link->joint.follows.empty()) {
+    double q = link->joint.offset;
+    for (std::size_t k = 0; k < link->joint.follows.size(); ++k)
+      q += link->joint.ratio[k] * start_of_joint(scene, link->joint.follows[k]);
+    return q;
+  }
+  for (const InitialState& s : scene.initial)
+    if (s.joint == joint && s.q.size() == 1) return s.q[0];
+  return 0;
+}
+
 /// A control with which a motor without keyframe value keeps its joint at the start.
 double resting_control(const Scene& scene, const MotorDescription& motor) {
-  if (motor.control != MotorControl::position) return 0;
-  for (const InitialState& s : scene.initial)
-    if (s.joint == motor.joint && s.q.size() == 1) return s.q[0];
-  return 0;
+  return motor.control == MotorControl::position ? start_of_joint(scene, motor.joint) : 0;
 }
 
 void add_motors(Robot& robot, const std::vector<MotorRequest>& requests, const std::string& file) {

@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 
 #include "engine/base/hash.hpp"
@@ -18,19 +19,50 @@ namespace {
 
 constexpr const char* kChannels[] = {"red", "green", "blue"};
 constexpr const char* kShadeNames[] = {"nx", "ny", "nz", "nxx", "nxy", "nyy", "nxz", "nyz"};
+constexpr double kLongestOfGel = 0.1;   // of a gel's lengths [m]
+constexpr double kBrightestLamp = 1e5;  // a number of a lamp [grey levels]
 static_assert(std::size(kChannels) == kColours && std::size(kShadeNames) == kShades);
 
 void read_channel(const SceneNode& node, std::size_t channel, GelLamps& lamps) {
   node.check_attributes({std::begin(kShadeNames), std::end(kShadeNames)});
   for (std::size_t j = 0; j < kShades; ++j) {
     const std::vector<double> x = node.numbers(kShadeNames[j], kShadePlaces);
+    for (const double level : x)
+      if (!(std::abs(level) <= kBrightestLamp))
+        node.fail_at(
+            kShadeNames[j],
+            fmt::format("{}=\"{}\"; expected numbers from {} to {} grey levels", kShadeNames[j],
+                        node.text(kShadeNames[j]), -kBrightestLamp, kBrightestLamp));
     std::copy(x.begin(), x.end(), lamps[channel][j].begin());
   }
 }
 
+/// Returns a length that a gel has [m].
+double gel_length(const SceneNode& root, const char* attribute, double x) {
+  if (!(x <= kLongestOfGel))
+    root.fail_at(attribute,
+                 fmt::format("{}=\"{}\"; expected {} m at most", attribute, x, kLongestOfGel));
+  return x;
+}
+
+/// Returns a text as the value of an attribute.
+std::string quoted_text(const std::string& text) {
+  std::string out = "\"";
+  for (const char c : text) {
+    switch (c) {
+      case '&': out += "&amp;"; break;
+      case '<': out += "&lt;"; break;
+      case '>': out += "&gt;"; break;
+      case '"': out += "&quot;"; break;
+      default: out += c;
+    }
+  }
+  return out + "\"";
+}
+
 }  // namespace
 
-Gel read_gel(const std::string& path) {
+Gel read_gel(const std::string& path, std::vector<std::string>& warnings) {
   constexpr std::size_t kMostBytes = std::size_t{1} << 20;
   const std::string text = read_text_file(path, kMostBytes, "a gel, XML with the root <gel>");
   SceneContext context;
@@ -42,9 +74,9 @@ Gel read_gel(const std::string& path) {
   root.check_attributes({"background", "pixel", "reach", "blur"});
   Gel gel;
   gel.name = std::filesystem::path(path).stem().string();
-  if (root.has("pixel")) gel.pixel = root.positive("pixel");
-  if (root.has("reach")) gel.reach = root.not_negative("reach");
-  gel.blur = root.not_negative("blur", 0.0);
+  if (root.has("pixel")) gel.pixel = gel_length(root, "pixel", root.positive("pixel"));
+  if (root.has("reach")) gel.reach = gel_length(root, "reach", root.not_negative("reach"));
+  gel.blur = gel_length(root, "blur", root.not_negative("blur", 0.0));
   std::array<bool, kColours> found{};
   for (const SceneNode& node : root.children({"red", "green", "blue", "fit"})) {
     if (node.name() == "fit") continue;
@@ -70,18 +102,19 @@ Gel read_gel(const std::string& path) {
   gel.background = {
       photograph.rows, photograph.cols, {photograph.levels.begin(), photograph.levels.end()}};
   gel.checksum = hash_bytes(bytes, hash_bytes(text));
+  warnings.insert(warnings.end(), context.warnings.begin(), context.warnings.end());
   return gel;
 }
 
 std::string gel_text(const Gel& gel, const std::string& background,
                      const std::vector<std::pair<std::string, std::string>>& notes) {
-  std::string text = fmt::format("<gel background=\"{}\"", background);
+  std::string text = fmt::format("<gel background={}", quoted_text(background));
   if (gel.pixel > 0) text += fmt::format(" pixel=\"{:.6g}\"", gel.pixel);
   if (gel.reach) text += fmt::format(" reach=\"{:.6g}\"", *gel.reach);
   text += fmt::format(" blur=\"{:.6g}\">\n", gel.blur);
   if (!notes.empty()) {
     text += "  <fit";
-    for (const auto& [name, value] : notes) text += fmt::format(" {}=\"{}\"", name, value);
+    for (const auto& [name, value] : notes) text += fmt::format(" {}={}", name, quoted_text(value));
     text += "/>\n";
   }
   for (std::size_t c = 0; c < kColours; ++c) {

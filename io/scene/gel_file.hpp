@@ -4,14 +4,17 @@
 #pragma once
 
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "engine/scene/gel.hpp"
 
 namespace tangere {
 
-/// Reads a gel and its background, a PNG file beside it. Throws IoError for files that cannot be
-/// read, InputError (file:line) for what is no gel.
-Gel read_gel(const std::string& path);
+/// Reads a gel and its background, a PNG file beside it. Adds what has no effect to `warnings`
+/// (file:line). Throws IoError for files that cannot be read, InputError (file:line) for what is no
+/// gel, for lengths above 0.1 m and for lamps beyond 1e5 grey levels.
+Gel read_gel(const std::string& path, std::vector<std::string>& warnings);
 
 /// Text of a gel file. `background`: name of its PNG file, beside it; `notes`: attributes of
 /// <fit>, what it was fitted to and how well; none: no <fit>.

@@ -112,6 +112,9 @@ void read_joint_effects(const SceneElement& node, JointDescription& joint) {
   if (node.has("rest")) joint.rest = read_rest(node, joint.type);
   if (node.has("rest") && joint.stiffness == 0)
     node.warn("'rest' has no effect without 'stiffness'");
+  for (const char* name : {"friction_break", "friction_time"})
+    if (node.has(name) && !node.has("friction"))
+      node.warn(fmt::format("'{}' has no effect without 'friction'", name));
   if (node.has("lim") && joint.limit_stiffness == 0)
     node.warn("'lim' has no effect without 'lim_stiffness'");
 }
@@ -128,16 +131,13 @@ void read_follower(const SceneElement& node, JointDescription& joint) {
   joint.offset = node.number("offset", dof_turns(joint.type, 0));
 }
 
-void scale_followers(Scene& scene, const SceneContext& c) {
-  for (LinkDescription& link : scene.links) {
-    JointDescription& joint = link.joint;
-    for (std::size_t k = 0; k < joint.follows.size(); ++k) {
-      const auto leader = std::ranges::find_if(
-          scene.links, [&](const LinkDescription& l) { return l.joint.name == joint.follows[k]; });
-      if (leader != scene.links.end())
-        joint.ratio[k] *=
-            coordinate_scale(joint.type, 0, c) / coordinate_scale(leader->joint.type, 0, c);
-    }
+void scale_ratios(const Scene& scene, double length, JointDescription& joint) {
+  const auto factor = [&](JointType type) { return dof_turns(type, 0) ? 1 : length; };
+  for (std::size_t k = 0; k < joint.follows.size(); ++k) {
+    const auto leader = std::ranges::find_if(
+        scene.links, [&](const LinkDescription& l) { return l.joint.name == joint.follows[k]; });
+    if (leader != scene.links.end())
+      joint.ratio[k] *= factor(joint.type) / factor(leader->joint.type);
   }
 }
 

@@ -42,6 +42,13 @@ class TreeReader {
 
   /// Gives bodies without a name that of their link, with a number behind it if another body has
   /// that name.
+  /// Turns the ratios of joints that follow others into SI, once all are read.
+  void scale_followers() {
+    for (LinkDescription& link : scene_.links)
+      if (!link.joint.follows.empty())
+        scale_ratios(scene_, lengths_.at(link.joint.name), link.joint);
+  }
+
   void name_bodies() {
     for (LinkDescription& link : scene_.links) {
       if (!link.body.name.empty()) continue;
@@ -126,6 +133,7 @@ class TreeReader {
     if (node.word("frame") == 1) place_in_world(joint, parent);
     read_joint_effects(node, joint);
     read_follower(node, joint);
+    lengths_[joint.name] = node.context().length;
     return joint;
   }
 
@@ -148,7 +156,8 @@ class TreeReader {
   }
 
   Scene& scene_;
-  std::map<std::string, int> names_;  // kind/name, line
+  std::map<std::string, int> names_;       // kind/name, line
+  std::map<std::string, double> lengths_;  // of the file of each joint: factor to metres
 };
 
 void read_option(Scene& scene, const SceneElement& node) {
@@ -237,7 +246,7 @@ void read_root(const SceneNode& root, Scene& scene) {
   TreeReader tree(scene);
   each("robot", [&](const SceneNode& s) { tree.read_robot(s); });
   tree.name_bodies();
-  scale_followers(scene, c);
+  tree.scale_followers();
   if (scene.links.empty()) root.fail("no <link> in any <robot>: there is nothing to simulate");
   each("actuator", [&](const SceneNode& s) { read_actuators(scene, s); });
   each("contact", [&](const SceneNode& s) { read_contacts(scene, s); });

@@ -70,7 +70,7 @@ std::vector<double> control_scales(const Scene& scene, const SceneContext& conte
 void read_joint_effects(const SceneElement& node, JointDescription& joint);
 /// Reads which joint a joint follows, with the ratio of the file's units.
 void read_follower(const SceneElement& node, JointDescription& joint);
-/// Turns the ratios of all joints into SI.
-void scale_followers(Scene& scene, const SceneContext& context);
+/// Turns the ratios of a joint into SI. `length`: of the file in which it stands, factor to metres.
+void scale_ratios(const Scene& scene, double length, JointDescription& joint);
 
 }  // namespace tangere

@@ -218,9 +218,36 @@ PictureDescription read_picture(const SceneElement& node) {
     const std::vector<double> counts = node.numbers("markers", 2);
     picture.markers = {int(counts[0]), int(counts[1])};
   }
-  picture.gel = std::make_shared<const Gel>(node.has("gel") ? read_beside(node, "gel", read_gel)
-                                                            : default_gel());
+  const auto read = [&](const std::string& path) {
+    return read_gel(path, node.context().outermost().warnings);
+  };
+  picture.gel =
+      std::make_shared<const Gel>(node.has("gel") ? read_beside(node, "gel", read) : default_gel());
   return picture;
+}
+
+/// Warns of a gel whose background shows another size than the picture.
+void check_gel_size(const SceneElement& node, const TactileDescription& d) {
+  constexpr double kMostApart = 0.2;
+  const PictureDescription& picture = *d.picture;
+  const Gel& gel = *picture.gel;
+  if (gel.pixel == 0 || !d.points.empty()) return;
+  const RectArray& a = d.array;
+  const Vector3 way = a.corner1 - a.corner0;
+  const std::array<double, 2> shown = shown_size(
+      picture, a.rows, a.cols,
+      {dot(way, a.axis0) / std::max(a.rows - 1, 1), dot(way, a.axis1) / std::max(a.cols - 1, 1)});
+  const std::array<double, 2> whole{gel.pixel * gel.background.rows,
+                                    gel.pixel * gel.background.cols};
+  if (std::abs(whole[0] - shown[0]) <= kMostApart * shown[0] &&
+      std::abs(whole[1] - shown[1]) <= kMostApart * shown[1])
+    return;
+  constexpr double kMillimetre = 1e-3;
+  node.warn(fmt::format(
+      "the picture shows {:.3g} x {:.3g} mm, and the background of the gel '{}', by its pixel, "
+      "{:.3g} x {:.3g} mm; the background is stretched to the picture. Expected a size within {} %",
+      shown[0] / kMillimetre, shown[1] / kMillimetre, gel.name, whole[0] / kMillimetre,
+      whole[1] / kMillimetre, 100 * kMostApart));
 }
 
 /// Reads what <tactile> holds, each at most once.
@@ -246,6 +273,7 @@ void read_parts(const SceneNode& node, TactileDescription& sensor) {
       sensor.layer->feedback = element.word("feedback") == 1;
     } else if (shows) {
       sensor.picture = read_picture(element);
+      check_gel_size(element, sensor);
     } else {
       element.read(sensor.imperfections);
       sensor.imperfections.source = part.source();
@@ -260,6 +288,18 @@ bool is_contact_of(const PairContactDescription& c, const std::string& one,
   return c.sensor.empty() && !c.second_half &&
          ((c.general_body == one && c.primitive_body == other) ||
           (c.general_body == other && c.primitive_body == one && c.per_area()));
+}
+
+/// Refuses feedback of a sensor that touches a body whose own sensor touches the sensor's body.
+void refuse_facing(const Scene& scene, const TactileDescription& d, const std::string& touched) {
+  for (const PairContactDescription& c : scene.pair_contacts)
+    if (!c.sensor.empty() && c.general_body == touched && c.primitive_body == d.body)
+      throw InputError(fmt::format(
+          "{}<tactile> of '{}': feedback and {}<tactile> of '{}', which has feedback: both are "
+          "contacts of '{}' and '{}', which would count twice; expected ignores=\"{}\" of '{}' or "
+          "ignores=\"{}\" of '{}'",
+          d.source.prefix(), d.name, c.source.prefix(), c.sensor, d.body, touched, touched, d.name,
+          d.body, c.sensor));
 }
 
 const char* element_of(const PairContactDescription& c) {
@@ -284,6 +324,7 @@ void add_contacts(Scene& scene, const SceneNode& node, const TactileDescription&
   const std::vector<int> sensed = sensed_bodies(scene, d);
   for (const int other : sensed) {
     pair.primitive_body = scene.links[std::size_t(other)].body.name;
+    refuse_facing(scene, d, pair.primitive_body);
     scene.pair_contacts.push_back(pair);
   }
   if (sensed.empty())
@@ -297,8 +338,8 @@ void add_contacts(Scene& scene, const SceneNode& node, const TactileDescription&
 void add_feedback(Scene& scene, const SceneNode& node, const TactileDescription& d) {
   if (d.coefficients.ks != 0)
     node.fail(
-        "feedback and ks: a contact and the reading of its skin would each remember a touch "
-        "in their own way; expected one of them");
+        "feedback and ks: the contact and the reading of its skin would have anchors of their own, "
+        "which differ; expected one of them");
   if (d.layer)
     node.fail("feedback and <layer>: the contact would have springs; expected feedback in <layer>");
   if (d.table)

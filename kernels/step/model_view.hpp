@@ -309,8 +309,8 @@ struct EliminationRun {
   int source, target, length;
 };
 
-/// A dof that follows others: x = Σ ratio x_leader, with all coordinates kept. With x = G y, where y
-/// has the other dofs, the solver's system is g_r = Gᵀ g, A_r = Gᵀ A G. It is stored on all dofs:
+/// A dof that follows others: x = Σ ratio x_leader, with all coordinates kept. With x = G y, where
+/// y has the other dofs, the solver's system is g_r = Gᵀ g, A_r = Gᵀ A G. It is stored on all dofs:
 /// g of a follower is 0, and its row and column of A are a diagonal entry.
 struct Follower {
   int v, q;

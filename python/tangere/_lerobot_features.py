@@ -10,6 +10,9 @@ c ≤ 3, or (channels, rows, cols):
              of (points, c) over k points that follow each other
     picture  round(127.5 + 127.5 x / range), cut at 0 and 255: three components of a pad; without a
              third one this is 128, as 0 is
+
+An observation of bytes (height, width, 3) is a picture already, such as `pad.rgb`, which shows a
+gel. Its bytes are written as they are, whatever is said of touch.
 """
 
 from __future__ import annotations
@@ -35,6 +38,7 @@ STATE, ENVIRONMENT = "observation.state", "observation.environment_state"
 _RESERVED = {*BOOKKEEPING, "success"}  # columns and arrays that are not observations
 _RESERVED_FIELDS = {"state", "environment_state", "images"}  # what others are joined to
 _MOST_NUMBERS = 600  # of a reading in a grid
+_PICTURE_AXES = ["height", "width", "channels"]
 
 
 @dataclass
@@ -42,7 +46,8 @@ class Feature:
     """A column: the arrays that it is made of, and what info.json says of it.
 
     blocks: KEY → points along a side of a block, over which the key's reading is averaged.
-    pad, range: of a picture: which pad it shows, and the number that a component's 0 and 255 mean.
+    pad, range: of a picture of touch: which pad it shows, and for each component x the number that
+    255 means; 0 means -x. Without range a picture's bytes are those of the array.
     """
 
     name: str
@@ -60,6 +65,8 @@ class Feature:
 
     def rows(self, arrays: dict[str, np.ndarray]) -> np.ndarray:
         """(rows, *shape), of a picture as uint8."""
+        if self.is_picture and not self.range:
+            return np.asarray(arrays[self.keys[0]])
         if self.is_picture:
             shown = 127.5 + 127.5 * _pad(arrays[self.keys[0]], self.pad) / np.asarray(self.range)
             whole = np.full((len(shown), *self.shape), 128, np.uint8)
@@ -122,6 +129,11 @@ def _by_pads(rows: np.ndarray) -> np.ndarray:
     return np.moveaxis(rows.reshape(len(rows), -1, c, *shape[-2:]), 2, -1)
 
 
+def _is_shown(rows: np.ndarray) -> bool:
+    """Whether an observation, (n, *shape), is pictures in colours."""
+    return rows.dtype == np.uint8 and rows.ndim == 4 and rows.shape[-1] == 3
+
+
 def _pad(rows: np.ndarray, pad: int) -> np.ndarray:
     return np.asarray(_by_pads(np.asarray(rows))[:, pad], np.float64)
 
@@ -131,28 +143,30 @@ def features_of(
 ) -> list[Feature]:
     """The columns of a data set, without those for bookkeeping.
 
-    Vectors become one state, as policies of lerobot expect. Fields keep their shape, unless `touch`
-    says how a policy reads them. Raises InputError for names that the format uses, and for touch
-    that cannot be written so.
+    Vectors become one state, as policies of lerobot expect. Pictures in colours stay what they are.
+    Fields keep their shape, unless `touch` says how a policy reads them. Raises InputError for
+    names that the format uses, and for touch that cannot be written so.
     """
     if touch not in (None, *get_args(Touch)):
         raise _core.InputError(f"touch {touch!r}; expected None, 'state' or 'image'")
-    shapes = {key: np.shape(rows)[1:] for key, rows in episodes[chosen[0]].items()}
+    arrays = {key: np.asarray(rows) for key, rows in episodes[chosen[0]].items()}
+    shapes = {key: rows.shape[1:] for key, rows in arrays.items()}
     for key in episodes.keys:
         if key in _RESERVED or (key in _RESERVED_FIELDS and len(shapes[key]) > 1):
             raise _core.InputError(
                 f"{episodes.path}: an observation is called {key!r}, which the format has for "
                 "something else; expected another name of the sensor"
             )
-    seen = [key for key in episodes.keys if key not in episodes.privileged]
+    shown = [key for key in episodes.keys if _is_shown(arrays[key])]
+    seen = [key for key in episodes.keys if key not in episodes.privileged and key not in shown]
     fields = [key for key in seen if len(shapes[key]) > 1]
     felt = [key for key in fields if key in episodes.touch or key.split(".")[0] in episodes.sensors]
     if touch and not felt:
         raise _core.InputError(
-            f"{episodes.path}: touch {touch!r} of a data set without a reading of a sensor; its "
-            f"observations are {episodes.keys}"
+            f"{episodes.path}: touch {touch!r} of a data set without a reading of a sensor that "
+            f"is no picture in colours; its observations are {episodes.keys}"
         )
-    hidden = episodes.privileged if privileged else []
+    hidden = [key for key in episodes.privileged if privileged and key not in shown]
     if touch is None:
         features = _joined(STATE, [k for k in seen if k not in fields], episodes, shapes)
         features += [Feature(f"observation.{key}", [key], shapes[key]) for key in fields]
@@ -167,6 +181,11 @@ def features_of(
             features += [
                 picture for key in felt for picture in _pictures(key, episodes, chosen, shapes[key])
             ]
+    features += [
+        Feature(f"observation.images.{key}", [key], shapes[key], "image", _PICTURE_AXES)
+        for key in shown
+        if privileged or key not in episodes.privileged
+    ]
     action = [str(name) for name in episodes.attributes["action_names"]]
     features.append(Feature("action", ["actions"], (len(action),), names=action))
     features.append(Feature("next.reward", ["rewards"], (1,)))
@@ -214,11 +233,10 @@ def _pictures(
         )
     most = np.max([_by_pads(np.abs(episodes[i][key])).max((0, 1, 2, 3)) for i in chosen], axis=0)
     pads, rows, cols = _by_pads(episodes[chosen[0]][key]).shape[1:4]
-    names = ["height", "width", "channels"]
     return [
         Feature(
             f"observation.images.{key}" + (f"_{pad}" if pads > 1 else ""), [key], (rows, cols, 3),
-            "image", names, pad=pad, range=[float(x) if x > 0 else 1.0 for x in most],
+            "image", _PICTURE_AXES, pad=pad, range=[float(x) if x > 0 else 1.0 for x in most],
         )
         for pad in range(pads)
     ]  # fmt: skip

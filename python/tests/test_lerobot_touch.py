@@ -127,6 +127,53 @@ def test_channels_of_pads_are_told_apart(grasps, tmp_path):
         assert (pixels[..., 2] == 128).all()
 
 
+@pytest.fixture(scope="module")
+def colours(generate, tmp_path_factory):
+    """Presses of a gel with a picture of 6 × 8 pixels."""
+    text = tangere.scenes()["gel_press"].read_text()
+    layer = '<layer cell="0.75e-3" margin="1e-3"/>'
+    varies = '<tactile name="gel" field="kn" uniform="2e8 3e8"/>'
+    assert layer in text and varies in text
+    press = tmp_path_factory.mktemp("scene") / "press.xml"
+    press.write_text(
+        text.replace(varies, "").replace(layer, layer + '<markers/><picture rows="6" cols="8"/>')
+    )
+    return generate(str(press), "--episodes", "2", "--seed", "4", "--every", "25",
+                    "--record", "q,v,gel,gel.rgb")  # fmt: skip
+
+
+@pytest.mark.parametrize("touch", [None, "state", "image"])
+def test_colours_of_a_gel_are_written_as_they_are(colours, tmp_path, touch):
+    done = lerobot.export(colours, tmp_path / "out", touch=touch)
+    assert [name for name in done.features if "rgb" in name] == ["observation.images.gel.rgb"]
+    rgb = stored(colours, "gel.rgb")
+    assert rgb.dtype == np.uint8 and rgb.shape[1:] == (6, 8, 3) and len(np.unique(rgb)) > 10
+    files = rows_of(tmp_path / "out", "observation.images.gel.rgb")
+    np.testing.assert_array_equal(np.stack([unpacked(file["bytes"]) for file in files]), rgb)
+    columns = json.loads((tmp_path / "out/meta/tangere.json").read_text())["columns"]
+    column = next(c for c in columns if c["name"] == "observation.images.gel.rgb")
+    assert column["dtype"] == "image" and "range" not in column
+    info = json.loads((tmp_path / "out/meta/info.json").read_text())
+    said = info["features"]["observation.images.gel.rgb"]
+    assert said["shape"] == [6, 8, 3] and said["names"] == ["height", "width", "channels"]
+    others = [c for c in columns if c["name"].startswith("observation.")]
+    assert [c["keys"] for c in others if "gel.rgb" in c["keys"]] == [["gel.rgb"]]
+
+
+def test_colours_alone_are_no_touch(colours, tmp_path):
+    from tangere._lerobot_features import features_of
+    from tangere.data import Episodes
+
+    episodes = Episodes(colours)
+    episodes.keys = ["gel.rgb"]
+    episodes.touch, episodes.privileged = [], []
+    assert [f.name for f in features_of(episodes, [0], False, None)][:1] == [
+        "observation.images.gel.rgb"
+    ]  # fmt: skip
+    with pytest.raises(tangere.InputError, match="that is no picture in colours"):
+        features_of(episodes, [0], False, "image")
+
+
 def test_touch_that_cannot_be_written_is_refused(generate, pushes, tmp_path, capsys):
     bare = generate("dummy", "--episodes", "1")
     for data, touch, message in (

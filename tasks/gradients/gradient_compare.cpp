@@ -233,18 +233,25 @@ void GradientChecker::check_positions() {
   add({"q", grad_q_, all_of(grad_q_.size()), [&](std::size_t i) { return difference(1, move(i)); },
        [&](std::size_t i) { return std::string(model_.v_names()[i]); },
        [&](std::size_t i) { return decisions(1, move(i)); }},
-      1, [&](const std::vector<double>& d) {
+      1, [&](std::vector<double> d) {
+        complete_followers(model_, d);
         return along({{}, d, {}, {}});
       });
 }
 
 void GradientChecker::check_velocities() {
-  const auto move = [](std::size_t i) { return [i](CheckInputs& x, double e) { x.v[i] += e; }; };
+  const auto move = [this](std::size_t i) {
+    return [this, i](CheckInputs& x, double e) {
+      x.v[i] += e;
+      complete_followers(model_, x.v);
+    };
+  };
   add({"v", grad_v_, all_of(grad_v_.size()),
        [&](std::size_t i) { return difference(kVelocityScale, move(i)); },
        [&](std::size_t i) { return std::string(model_.v_names()[i]); },
        [&](std::size_t i) { return decisions(kVelocityScale, move(i)); }},
-      2, [&](const std::vector<double>& d) {
+      2, [&](std::vector<double> d) {
+        complete_followers(model_, d);
         return along({{}, {}, d, {}});
       });
 }

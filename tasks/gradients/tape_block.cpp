@@ -92,8 +92,14 @@ void TapeBlock::reverse_tape(Batch& batch, int block) {
 void TapeBlock::get_start(int loss, const Batch& batch, int environment, std::span<double> q,
                           std::span<double> v, std::span<double> parameters,
                           std::span<double> points) const {
-  const BlockCotangent& c = adjoint_.loss(loss);
   const std::size_t lane = as_size(environment % kBlock);
+  BlockCotangent folded;
+  const bool follows = batch.model().has_followers();
+  if (follows) {
+    folded = adjoint_.loss(loss);
+    fold_followers(batch.model(), folded, static_cast<int>(lane));
+  }
+  const BlockCotangent& c = follows ? folded : adjoint_.loss(loss);
   for (std::size_t i = 0; i < q.size(); ++i) q[i] = c.q[i * kBlock + lane];
   for (std::size_t i = 0; i < v.size(); ++i) v[i] = c.v[i * kBlock + lane];
   if (!parameters.empty()) parameters_.gradient(c, batch, environment, parameters);

@@ -11,6 +11,7 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "io/files/png_file.hpp"
 #include "tests/apps/program.hpp"
 
 namespace tangere::apps {
@@ -352,6 +353,91 @@ TEST(Calibrate, OtherColumnsAreNamedAndNotUsed) {
   EXPECT_NEAR(number(json::parse(outcome.out), "kn")["value"], 100, 1e-3);
   for (const char* const name : {"time_index", "force_std", "shear_force_std"})
     EXPECT_THAT(outcome.err, HasSubstr(std::string("column '") + name + "' is not used"));
+}
+
+constexpr int kPhotoHeight = 48, kPhotoWidth = 64;  // pixels
+constexpr double kPhotoBallRadius = 10;             // [pixels], of 0.2 mm
+
+/// A press of a ball in the imprint of radius r around (x, y), whose slope fades beside it: the
+/// colours are linear in the normal. r = 0: the untouched gel.
+std::string drawn_photograph(double x, double y, double r) {
+  Photograph photograph{kPhotoHeight, kPhotoWidth, {}};
+  for (int i = 0; i < kPhotoHeight; ++i)
+    for (int j = 0; j < kPhotoWidth; ++j) {
+      const double dx = j + 0.5 - x, dy = i + 0.5 - y, distance = std::hypot(dx, dy),
+                   sine = std::min(distance, r) / kPhotoBallRadius,
+                   steep = sine / std::sqrt(1 - sine * sine) *
+                           (distance > r && r > 0 ? std::exp(2 * (1 - distance / r)) : 1),
+                   nz = 1 / std::sqrt(1 + steep * steep),
+                   nx = distance > 0 ? steep * nz * dx / distance : 0,
+                   ny = distance > 0 ? steep * nz * dy / distance : 0;
+      for (const double level : {110 + 90 * nx, 120 + 90 * ny, 100 - 60 * nx + 40 * (nz - 1)})
+        photograph.levels.push_back(static_cast<std::uint8_t>(std::lround(level)));
+    }
+  return png_bytes(photograph);
+}
+
+/// Writes the photographs of six presses into presses/.
+void draw_presses(const Folder& folder) {
+  std::filesystem::create_directory(folder.path("presses"));
+  folder.write("presses/background.png", drawn_photograph(0, 0, 0));
+  std::ostringstream rows;
+  rows << "file,x_px,y_px,radius_px\n";
+  for (int k = 0; k < 6; ++k) {
+    const double x = 14 + 18 * (k % 3), y = 14 + 20.0 * (k / 3), r = 5.5 + 0.25 * k;
+    const std::string name = "press_" + std::to_string(k) + ".png";
+    folder.write("presses/" + name, drawn_photograph(x, y, r));
+    rows << name << "," << x << "," << y << "," << r << "\n";
+  }
+  folder.write("presses/presses.csv", rows.str());
+}
+
+const Words kOfPhotographs = {"calibrate", "--pictures", "presses/", "--ball",
+                              "2e-3",      "--pixel",    "2e-4"};
+
+TEST(Calibrate, AGelOfDrawnPhotographsIsFound) {
+  const Folder folder;
+  draw_presses(folder);
+  const json answer = run_json(folder, kOfPhotographs + Words{"-o", "gel.xml"});
+  EXPECT_GT(answer["mean"]["psnr"], 25);
+  EXPECT_GT(answer["mean"]["refined_ssim"], 0.8);
+  ASSERT_EQ(answer["presses"].size(), 6U);
+  EXPECT_EQ(answer["presses"][5]["file"], "press_5.png");
+  const std::string gel = folder.read("gel.xml");
+  EXPECT_THAT(gel, HasSubstr("background=\"gel_background.png\" pixel=\"0.0002\""));
+  EXPECT_THAT(gel, HasSubstr("<fit photographs=\"presses\" ball=\"0.002\""));
+  EXPECT_EQ(folder.read("gel_background.png"), folder.read("presses/background.png"));
+}
+
+TEST(Calibrate, SaysWhatIsWrongWithPhotographs) {
+  const Folder folder;
+  draw_presses(folder);
+  const auto err = [&](const Words& words) {
+    const Outcome outcome = run(folder, words);
+    EXPECT_EQ(outcome.exit_code, 2) << outcome.out;
+    return outcome.err;
+  };
+  for (const auto& [name, value] : {std::pair{"--sensor", "skin.xml"},
+                                    {"--flat", "0.01"},
+                                    {"--box", "0.01,0.01"},
+                                    {"--table", "3"},
+                                    {"--fit", "kn"},
+                                    {"--hold-out", "2"},
+                                    {"--check", "other.csv"}})
+    EXPECT_THAT(err(kOfPhotographs + Words{name, value}),
+                HasSubstr(std::string("--pictures beside ") + name + "; expected"));
+  EXPECT_THAT(err(kOfPhotographs + Words{"press.csv", "--table", "3", "--check", "other.csv"}),
+              HasSubstr("--pictures beside RECORDING, --table, --check; expected"));
+  EXPECT_THAT(err({"calibrate", "--pictures", "presses", "--ball", "2e-3"}),
+              HasSubstr("--pictures without --ball or --pixel"));
+  folder.write("presses/presses.csv", "file,x_px,y_px\npress_0.png,14,14\n");
+  EXPECT_THAT(
+      err(kOfPhotographs),
+      HasSubstr("presses.csv: no column 'radius_px'; expected file, x_px, y_px, radius_px"));
+  folder.write("presses/presses.csv", "file,x_px,y_px,radius_px\npress_0.png,14,14,5\n");
+  EXPECT_THAT(err(kOfPhotographs), HasSubstr("1 presses; expected at least 3"));
+  folder.write("presses/presses.csv", "file,x_px,y_px,radius_px\npress_0.png,14,99,5\n");
+  EXPECT_THAT(err(kOfPhotographs), HasSubstr("presses.csv:2: an imprint at (14, 99)"));
 }
 
 TEST(Calibrate, SaysWhatIsWrong) {

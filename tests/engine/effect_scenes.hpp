@@ -64,7 +64,8 @@ inline Scene scene_that_sleeps() {
   return s;
 }
 
-/// The same with shear springs and dry friction of a joint, which are not to be had together with sleep.
+/// The same with shear springs and dry friction of a joint, which are not to be had together with
+/// sleep.
 inline Scene scene_that_remembers() {
   Scene s = scene_that_sleeps();
   s.solver.sleep = 0;

@@ -34,6 +34,8 @@ inline void expect_tangent(const Model& model, const StepperOptions& options, co
   };
   const std::size_t nv = std::size_t(model.nv()), nu = std::size_t(model.nu());
   StateTangent state{draw(nv), draw(nv), std::vector<double>(nv), std::vector<double>(nv)};
+  complete_followers(model, state.q);
+  complete_followers(model, state.v);
   const NumberGradients numbers(model);
   std::vector<double> change = draw(std::size_t(numbers.count()));
   for (std::size_t k = 0; k < change.size(); ++k) change[k] *= size_of(numbers.infos()[k]);

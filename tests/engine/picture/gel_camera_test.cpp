@@ -15,7 +15,7 @@ namespace tangere {
 namespace {
 
 using Numbers = std::vector<double>;
-constexpr double kPitch = 4e-4, kRadius = 4e-3;  // [m]
+constexpr double kPitch = 4e-4, kImprintRadius = 4e-3;  // [m]
 
 Gel random_gel(unsigned seed) {
   testing::Random random(seed);
@@ -55,8 +55,9 @@ std::vector<T> ball(int rows, int cols, double x, double y, double deepest = 8e-
   for (int i = 0; i < rows; ++i)
     for (int j = 0; j < cols; ++j) {
       const double u = (j - 0.5 * (cols - 1)) * kPitch - x, v = (i - 0.5 * (rows - 1)) * kPitch - y,
-                   square = kRadius * kRadius - u * u - v * v;
-      depth.push_back(T(square > 0 ? std::max(0.0, deepest - kRadius + std::sqrt(square)) : 0));
+                   square = kImprintRadius * kImprintRadius - u * u - v * v;
+      depth.push_back(
+          T(square > 0 ? std::max(0.0, deepest - kImprintRadius + std::sqrt(square)) : 0));
     }
   return depth;
 }
@@ -97,23 +98,59 @@ TEST(GelCamera, AveragesTheBackgroundOverLargerPixels) {
   EXPECT_NEAR(colour.background(1)[4 + 2], sum / 8, 1e-5);
 }
 
-TEST(GelCamera, SeesTheNormalsOfABall) {
+TEST(GelCamera, ShowsTheNormalsOfABall) {
   Gel gel;
   gel.lamps[1][2][0] = 200;  // n_z - 1
   gel.background = {1, 1, {200, 200, 200}};
   GelCamera<double> camera = camera_of<double>(picture_of(gel, 300, 300), 30, 30);
   const double deepest = 1.6e-3, reach = 0.8 * 2.7e-3;  // of a contact of 2.7 mm or more
   const Numbers found = colours<double>(camera, ball<double>(30, 30, 0, 0, deepest));
-  int seen = 0;
+  int compared = 0;
   for (int i = 0; i < 300; ++i)
     for (int j = 0; j < 300; ++j) {
       const double pixel = 0.1 * kPitch, distance = std::hypot(i - 149.5, j - 149.5) * pixel;
       if (distance > reach) continue;
-      ++seen;
+      ++compared;
       const double n_z = found[std::size_t(3 * (300 * i + j) + 1)] / 200;
-      ASSERT_NEAR(n_z, std::sqrt(1 - distance * distance / (kRadius * kRadius)), 0.005) << distance;
+      ASSERT_NEAR(n_z, std::sqrt(1 - distance * distance / (kImprintRadius * kImprintRadius)),
+                  0.005)
+          << distance;
     }
-  EXPECT_GT(seen, 5000);
+  EXPECT_GT(compared, 5000);
+}
+
+/// A camera of the surface of a layer, which is blurred over several points.
+GelCamera<double> layer_camera(const Gel& gel, int rows, int cols) {
+  const PictureDescription picture = picture_of(gel, 24, 32);
+  return {picture_grid(picture, rows, cols, kPitch, kPitch), picture, 0, Outside::nearest};
+}
+
+TEST(GelCamera, ContinuesTheSurfaceOfALayerBeyondItsPoints) {
+  GelCamera<double> camera = layer_camera(random_gel(8), 9, 12);
+  camera.set_surface(Numbers(9 * 12, 3e-4));
+  Numbers height(24 * 32), picture(3 * height.size());
+  camera.read_height(height);
+  for (const double h : height) ASSERT_NEAR(h, 3e-4, 1e-15);
+  camera.read(false, std::span<double>(picture));
+  GelCamera<double> untouched = layer_camera(random_gel(8), 9, 12);
+  const Numbers background = colours<double>(untouched, Numbers(9 * 12));
+  for (std::size_t k = 0; k < picture.size(); ++k) ASSERT_NEAR(picture[k], background[k], 1e-6);
+}
+
+TEST(GelCamera, PullsBackToTheSurfaceOfALayer) {
+  GelCamera<double> camera = layer_camera(random_gel(9), 9, 12);
+  testing::Random random(10);
+  Numbers surface(9 * 12), height(24 * 32), height_bar(height.size()), surface_bar(surface.size());
+  for (double& x : surface) x = random.uniform(-1, 1);
+  for (double& x : height_bar) x = random.uniform(-1, 1);
+  camera.set_surface(surface);
+  camera.read_height(height);
+  camera.pull_back(false, height_bar, {}, surface_bar);
+  double along = 0, transposed = 0;
+  for (std::size_t k = 0; k < height.size(); ++k) along += height_bar[k] * height[k];
+  for (std::size_t k = 0; k < surface.size(); ++k) transposed += surface_bar[k] * surface[k];
+  EXPECT_NEAR(along, transposed, 1e-12 * double(height.size()));
+  EXPECT_GT(std::abs(along), 1e-3);
 }
 
 /// What is odd in an axis changes its sign with it.
@@ -229,6 +266,12 @@ TEST(GelCamera, DrawsNoiseByPixelAndStepAndGainsByEpisode) {
     EXPECT_GT(std::abs(gains[c] - 1), 1e-3);
   }
   EXPECT_NE(first, later);
+}
+
+TEST(GelCamera, HasBytesOfZeroForWhatIsNotANumber) {
+  GelCamera<float> camera = camera_of<float>(picture_of(grey_gel(100), 12, 16), 9, 11);
+  const std::vector<std::uint8_t> found = bytes(camera, std::vector<float>(99, NAN));
+  EXPECT_EQ(found, std::vector<std::uint8_t>(3 * 12 * 16, 0));
 }
 
 /// The bytes are the same on every instruction set and machine.

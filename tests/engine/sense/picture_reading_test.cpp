@@ -105,6 +105,31 @@ TEST(PictureReading, ShowsTheBallWhereItPressesAndAsDeep) {
   EXPECT_NEAR(highest(picture<double>(other, FieldForm::height))[1], kColsOfPad - 1 - col, 0.6);
 }
 
+TEST(PictureReading, EndsAtTheThicknessOfATable) {
+  for (const double thickness : {0.0, 0.5e-3}) {
+    Scene scene = pictured_gel();
+    TactileDescription& gel = scene.sensors[0];
+    gel.material.reset();
+    gel.table = PressureTable{{0, 0.1e-3, 0.2e-3}, {0, 1e3, 2e3}, thickness, 0};
+    gel.coefficients = {gel.table->stiffness() * 1e-6, 0, 0, 0, 0};
+    gel.markers.reset();
+    gel.picture->markers = {};
+    const double deepest = thickness > 0 ? thickness : 0.4e-3;
+    const Numbers heights = picture<double>(scene, FieldForm::height);
+    const double highest_of_all = *std::max_element(heights.begin(), heights.end());
+    EXPECT_LE(highest_of_all, deepest * (1 + 1e-6));
+    EXPECT_GT(highest_of_all, 0.8 * deepest);
+  }
+}
+
+TEST(PictureReading, HasNoHeightsWhereNoPlaceIsKnown) {
+  const Scene scene = pictured_gel();
+  for (const double h : picture<double>(scene, FieldForm::height, NAN))
+    ASSERT_TRUE(std::isnan(h)) << h;
+  for (const std::uint8_t level : picture<std::uint8_t>(scene, FieldForm::rgb, NAN))
+    ASSERT_EQ(level, 0);
+}
+
 TEST(PictureReading, OfALayerShowsItsSurface) {
   Scene scene = pictured_gel();
   scene.sensors[0].layer = LayerDescription{0.475, 1e-3, 1e-3, {}};

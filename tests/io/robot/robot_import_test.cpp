@@ -337,6 +337,29 @@ TEST(RobotImport, AddsSkinsMotorsAndContacts) {
   EXPECT_THROW(import_robot(kRobots + "gripper.urdf", kRobots + "scene.xml", options), InputError);
 }
 
+/// Constraints between joints, whose coordinates are less ref in both.
+TEST(RobotImport, JointEqualitiesAreKept) {
+  const auto made = [](const std::string& equality, const std::string& flag = "enable") {
+    const std::string text =
+        "<mujoco><compiler angle=\"radian\"/><option><flag equality=\"" + flag +
+        "\"/></option><worldbody><body name=\"a\"><joint name=\"one\" ref=\"0.2\"/><geom "
+        "size=\"0.1\"/></body><body name=\"b\"><joint name=\"two\"/><geom size=\"0.1\"/></body>"
+        "</worldbody><equality><joint joint1=\"one\" joint2=\"two\" " +
+        equality + "/></equality></mujoco>";
+    const testing::Folder folder;
+    std::ofstream(folder / "robot.xml") << text;
+    return import_robot(folder / "robot.xml", folder / "scene.xml", {});
+  };
+  const ImportedScene plain = made("polycoef=\"0.1 -2 0 0 0\"");
+  EXPECT_THAT(plain.lost, IsEmpty());
+  EXPECT_THAT(plain.text, HasSubstr("follows=\"two\" ratio=\"-2\" offset=\"0.1\""));
+  EXPECT_THAT(made("").text, HasSubstr("follows=\"two\" ratio=\"1\" offset=\"0\""));
+  for (const auto& [equality, flag] :
+       {std::pair{"active=\"false\"", "enable"}, {"polycoef=\"0 1 0 0 0\"", "disable"}})
+    EXPECT_THAT(made(equality, flag).text, Not(HasSubstr("follows"))) << equality;
+  EXPECT_THAT(made("polycoef=\"0 1 0.5 0 0\"").lost, ElementsAre(HasSubstr("polynomial")));
+}
+
 TEST(RobotImport, AKeyframeIsTheStart) {
   RobotOptions options;
   options.keyframe = "0";

@@ -57,6 +57,32 @@ TEST(Feedback, RefusesAndWarns) {
               Contains(AllOf(HasSubstr("s.xml:16:"), HasSubstr("'table' and 'ball' touch"))));
 }
 
+TEST(Feedback, OfBodiesThatFaceEachOtherCountsOnce) {
+  const std::string palm =
+      R"(<tactile name="palm" body="ball" type="rect_array" rect_pos0="-0.01 -0.01 -0.02"
+ rect_pos1="0.01 0.01 -0.02" axis0="1 0 0" axis1="0 1 0" resolution="3 3" kn="1" )";
+  const auto beside = [&](const std::string& more, const std::string& scene) {
+    return with("</sensor>", palm + more + "/></sensor>", scene);
+  };
+  const std::string layer = with(
+      R"(kn="400" kt="0.2"
+ mu="0.7" damping="20" feedback="true"/>)",
+      R"(modulus="4e4" thickness="4e-3" mu="1"><layer feedback="true"/></tactile>)", kTable);
+  for (const std::string& scene : {kTable, layer})
+    EXPECT_THAT(feedback_refusal(beside("feedback=\"true\"", scene)),
+                AllOf(HasSubstr("<tactile> of 'palm': feedback and s.xml:17: <tactile> of 'skin'"),
+                      HasSubstr("contacts of 'ball' and 'table', which would count twice"),
+                      HasSubstr("expected ignores=\"table\" of 'palm' or ignores=\"ball\" of "
+                                "'skin'")));
+  EXPECT_EQ(feedback_refusal(beside("", kTable)), "");
+  // Two skins of one body are two parts of its surface.
+  const std::string second =
+      R"(<tactile name="edge" body="table" type="rect_array" rect_pos0="0.014 -0.01 0.01"
+ rect_pos1="0.018 0.01 0.01" axis0="1 0 0" axis1="0 1 0" resolution="3 3" kn="1"
+ feedback="true"/></sensor>)";
+  EXPECT_EQ(feedback_scene(with("</sensor>", second, kTable)).pair_contacts.size(), 2U);
+}
+
 TEST(Feedback, OfALayerRefusesWhatItWouldNotCompute) {
   const std::string gel = with(
       R"(kn="400" kt="0.2"

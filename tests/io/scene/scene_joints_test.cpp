@@ -71,6 +71,39 @@ TEST(SceneJoints, EveryJointEffectAndMotorComesThroughInSi) {
   EXPECT_DOUBLE_EQ(s.randomizations[6].distribution.b, 10);
 }
 
+/// A slide that follows a hinge, in cm and g: its ratio is in cm/rad, its offset in cm.
+TEST(SceneJoints, FollowersAndDryFrictionComeThroughInSi) {
+  const std::string body = "\" type=\"cuboid\" size=\"1 1 1\" density=\"1\"/></link>";
+  const SceneFile file = parse_scene(
+      "<tangere><robot><link name=\"a\"><joint name=\"turn\" type=\"revolute\" axis=\"0 0 1\" "
+      "friction=\"2e5\" friction_break=\"0.01\"/><body name=\"a" +
+          body +
+          "<link name=\"b\"><joint name=\"slide\" type=\"prismatic\" axis=\"1 0 0\" "
+          "follows=\"turn\" "
+          "ratio=\"3\" offset=\"2\" friction=\"1e5\" friction_break=\"0.01\"/><body name=\"b" +
+          body +
+          "<link name=\"c\"><joint name=\"back\" type=\"revolute\" axis=\"0 1 0\" follows=\"slide "
+          "turn\" "
+          "ratio=\"0.5 4\" friction_time=\"0.1\"/><body name=\"c" +
+          body + "</robot></tangere>",
+      "scene.xml");
+  const JointDescription &turn = file.scene.links[0].joint, &slide = file.scene.links[1].joint,
+                         &back = file.scene.links[2].joint;
+  EXPECT_DOUBLE_EQ(turn.friction, 2e5 * 1e-7);
+  EXPECT_DOUBLE_EQ(turn.friction_break, 0.01);
+  EXPECT_DOUBLE_EQ(slide.friction, 1e5 * 1e-5);
+  EXPECT_DOUBLE_EQ(slide.friction_break, 1e-4);
+  EXPECT_EQ(slide.follows, std::vector<std::string>{"turn"});
+  EXPECT_DOUBLE_EQ(slide.ratio[0], 0.03);
+  EXPECT_DOUBLE_EQ(slide.offset, 0.02);
+  EXPECT_DOUBLE_EQ(back.ratio[0], 50);
+  EXPECT_DOUBLE_EQ(back.ratio[1], 4);
+  ASSERT_EQ(file.warnings.size(), 1U);
+  EXPECT_THAT(file.warnings[0], HasSubstr("'friction_time' has no effect without 'friction'"));
+  const Model model(file.scene);  // back follows turn by 0.5/cm · 3 cm + 4
+  EXPECT_DOUBLE_EQ(model.initial_q()[2], 50 * 0.02);
+}
+
 TEST(SceneJoints, ASceneOfEveryJointRuns) {
   const Model model(read_scene(kFolder + "every_joint.xml").scene);
   EXPECT_EQ(model.nv(), 1 + 3 + 3 + 1 + 1 + 2 + 3 + 3 + 3 * 6 + 3);
