@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+// Each joint becomes a combination of joints that follow none, once, leaders first.
 #include "engine/model/compile_followers.hpp"
 
 #include <fmt/format.h>
@@ -33,7 +34,7 @@ class Followers {
                           "one follows",
                           dof_count(d.type)));
     if (std::exchange(begun_[joint], 1) != 0) fail(d, "follows itself; expected no circle");
-    if (d.ratio.size() != d.follows.size())
+    if (!d.follows.empty() && d.ratio.size() != d.follows.size())
       fail(d, fmt::format("follows {} joints with {} ratios; expected as many", d.follows.size(),
                           d.ratio.size()));
     Combination sum;

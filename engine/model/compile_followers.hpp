@@ -8,8 +8,8 @@
 namespace tangere {
 
 /// Fills CompiledModel::followers and ties. Chains are resolved: of a follower of a follower, the
-/// ratios multiply. Throws InputError (file:line) for a leader that is unknown, of several dofs, or in a
-/// circle.
+/// ratios multiply. Throws InputError (file:line) for a leader that is unknown, of several dofs, or
+/// in a circle.
 void compile_followers(CompiledModel& m, const NameIndex& joints);
 
 /// Sets the initial state of followers from their leaders'. Throws InputError where the scene gives

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+// Lane by lane: few joints have dry friction.
 #include "engine/step/dry_friction_state.hpp"
 
 namespace tangere {

@@ -24,10 +24,10 @@ struct ShearSpringPlaces {
 };
 
 /// The points of a model that have shear springs, then the dofs with dry friction. Row r of an
-/// array (points, 3) is the elastic displacement of point r [m], in the axes of the moving frame that carries it; for a sensor with
-/// memory="read" its anchor b in these axes, or a in those of the touched shape. Zeros: no
-/// displacement, or no contact. Of a dof with dry friction it has the elastic displacement [m or
-/// rad] and two zeros.
+/// array (points, 3) is the elastic displacement of point r [m], in the axes of the moving frame
+/// that carries it; for a sensor with memory="read" its anchor b in these axes, or a in those of
+/// the touched shape. Zeros: no displacement, or no contact. Of a dof with dry friction it has the
+/// elastic displacement [m or rad] and two zeros.
 struct ShearStateArrays {
   std::vector<ShearSpringPlaces> contacts;
   std::vector<int> row_of;  ///< (points) row of ShearEntry::point

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Actuators on hinges, slides and fixed tendons. With the gear G the length of the transmission is
-// G (q + ref), where q is the scene's coordinate. The force f of the actuator acts on the joint as G f:
+// G (q + ref), where q is the scene's coordinate. The force f of the actuator acts on the joint as
+// G f:
 //   f = g c + b - kp G (q + ref) - kv G v
 //   kp > 0    a position motor: P = kp G², D = kv G², target (g c + b)/(kp G) - ref
 //   kp = 0    a force motor G (g c + b), and damping kv G² of the joint

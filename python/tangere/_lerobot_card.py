@@ -81,7 +81,7 @@ def _columns(episodes: Episodes, features: Sequence[Feature]) -> list[str]:
                 mean = any(name.startswith(f"{key}.mean") for name in feature.names or [])
                 block = f"over blocks of {feature.blocks[key]} points along each side"
                 what += f", means {'over each pad' if mean else block}"
-            if feature.is_picture:
+            if feature.is_picture and feature.range:
                 ranges = ", ".join(f"{x:g}" for x in feature.range)
                 what += f", pad {feature.pad}: 0, 128 and 255 are -range, 0 and range, ({ranges})"
             unit = units.get(key) or ("" if key in ("q", "v") else _unit_of_sensor(episodes, key))

@@ -52,16 +52,12 @@ TEST(Import, AHandTurnsAnEggOver) {
   const Folder folder;
   std::filesystem::copy(TANGERE_SOURCE_DIR "/examples/hand", folder.path("hand"),
                         std::filesystem::copy_options::recursive);
-  const json made = run_json(
-      folder, {"import",  "hand/hand.urdf",
-               "-o",      "hand/hand.xml",
-               "--pad",   "thumb_tip=uskin_4x4_guess@-x",
-               "--pad",   "index_tip=uskin_4x4_guess@-x",
-               "--pad",   "middle_tip=uskin_4x4_guess@-x",
-               "--motor", "wrist=20,1",
-               "--motor", "thumb_knuckle=2,0.02",
-               "--motor", "index_knuckle=2,0.02",
-               "--motor", "middle_knuckle=2,0.02"});
+  const json made =
+      run_json(folder, {"import", "hand/hand.urdf", "-o", "hand/hand.xml", "--pad",
+                        "thumb_tip=uskin_4x4_guess@-x", "--pad", "index_tip=uskin_4x4_guess@-x",
+                        "--pad", "middle_tip=uskin_4x4_guess@-x", "--motor", "wrist=20,1",
+                        "--motor", "thumb_knuckle=2,0.02", "--motor", "index_knuckle=2,0.02",
+                        "--motor", "middle_knuckle=2,0.02"});
   EXPECT_THAT(made["lost"], SizeIs(0));
   EXPECT_EQ(made["joints"], 7);
   const json told = run_json(folder, {"simulate", "hand/hand_egg.xml", "-o", "run.h5"});
@@ -75,7 +71,8 @@ TEST(Import, AHandTurnsAnEggOver) {
   run_json(folder, {"view", "run.h5", "-o", "run.html"});
   run_json(folder, {"generate", "hand/hand_egg.xml", "-o", "set", "--episodes", "2", "--steps",
                     "20", "--every", "5"});
-  run_json(folder, {"info", "set"});
+  EXPECT_EQ(run(folder, {"info", "set"}).exit_code, 0);
+  run_json(folder, {"view", "set", "-o", "set.html", "--scene", "hand/hand_egg.xml"});
 }
 
 TEST(Import, AFileThatLosesMotionIsRefusedWithoutDrop) {

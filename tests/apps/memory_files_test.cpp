@@ -127,8 +127,8 @@ TEST(MemoryFiles, IsRefusedWhereThereIsNone) {
   const std::string ball = scene("rolling_ball_small.xml");
   const Outcome none = run(folder, {"simulate", ball, "-o", "a.h5", "--record", "memory"});
   EXPECT_EQ(none.exit_code, 2);
-  EXPECT_THAT(none.err, HasSubstr("--record: 'memory', but no contact or sensor of the scene has "
-                                  "ks"));
+  EXPECT_THAT(none.err, HasSubstr("--record: 'memory', but nothing in the scene has ks or friction "
+                                  "of joints"));
   const Outcome set =
       run(folder, {"generate", kElastic, "-o", "set", "--episodes", "1", "--record", "q,memory"});
   EXPECT_EQ(set.exit_code, 2);

@@ -336,8 +336,8 @@ TEST(Effects, BytesGoWithTheEffect) {
   EXPECT_LT(bytes_of(without(scene, {EffectKind::feedback})).second, workspace);
   // The shear state takes nothing where none does.
   Scene forgetful = scenes_of_all_effects().back(), plain = scene;
-  for (const EffectKind kind :
-       {EffectKind::pair_memory, EffectKind::ground_memory, EffectKind::tactile_memory}) {
+  for (const EffectKind kind : {EffectKind::pair_memory, EffectKind::ground_memory,
+                                EffectKind::tactile_memory, EffectKind::joint_friction}) {
     const std::size_t before = bytes_of(forgetful).first;
     forgetful = without(forgetful, {kind});
     EXPECT_LT(bytes_of(forgetful).first, before) << to_string(kind);

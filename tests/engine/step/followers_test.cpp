@@ -232,6 +232,7 @@ TEST(FollowersGradient, ByTheStartIsThatOfLeaderAndFollower) {
 TEST(Tendon, SwingsByClosedForm) {
   Scene s = two_rails();
   s.links[1].joint.follows.clear();
+  s.links[1].joint.ratio.clear();
   s.motors.clear();
   LinkDescription tendon = link("tendon", JointType::prismatic, {0, 3, 0}, SphereShape{1e-3}, 0);
   tendon.joint.follows = {"first_joint", "second_joint"};

@@ -363,7 +363,7 @@ TEST(RobotImport, JointEqualitiesAreKept) {
 TEST(RobotImport, AKeyframeIsTheStart) {
   RobotOptions options;
   options.keyframe = "0";
-  // Of four actuators the second and the third are read.
+  // Of four actuators the first three are read: of a tendon and of joints.
   const std::string arm = file_bytes(kRobots + "arm.xml");
   const auto with_key = [&](const std::string& key) {
     std::string text = arm;
@@ -381,13 +381,13 @@ TEST(RobotImport, AKeyframeIsTheStart) {
   EXPECT_THAT(scene.initial[0].v, IsEmpty());
   EXPECT_THAT(scene.initial[1].q, ElementsAre(0.2));
   EXPECT_THAT(scene.initial[1].v, ElementsAre(-3.0));
-  EXPECT_THAT(std::get<ConstantControl>(scene.control.value()).values, ElementsAre(0.6, 7));
+  EXPECT_THAT(std::get<ConstantControl>(scene.control.value()).values, ElementsAre(5, 0.6, 7));
   // A motor of our own holds its joint where it starts.
   options.motors = {{"wrist", 4.0, 1.0}};
   EXPECT_THAT(std::get<ConstantControl>(
                   parse_scene(import(arm, options).text, "scene.xml").scene.control.value())
                   .values,
-              ElementsAre(0.0, 0.0, 0.2));
+              ElementsAre(0.0, 0.0, 0.0, 0.2));
   EXPECT_THAT(std::get<ConstantControl>(
                   parse_scene(import(mjcf("<joint name=\"wrist\"/><geom size=\"0.1\"/>",
                                           "<keyframe><key qpos=\"0.3\"/></keyframe>"),

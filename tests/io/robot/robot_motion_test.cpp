@@ -19,13 +19,13 @@ using ::testing::IsEmpty;
 const std::string kFolder = TANGERE_TEST_DATA "/robots/";
 
 /// Rows of a table of numbers below one line of names.
-struct Table {
+struct MotionTable {
   std::vector<std::string> names;
   std::vector<std::vector<double>> rows;
 };
 
-Table read_table(const std::string& path) {
-  Table out;
+MotionTable read_table(const std::string& path) {
+  MotionTable out;
   std::ifstream file(path);
   for (std::string line; std::getline(file, line);) {
     std::istringstream words(line);
@@ -41,7 +41,7 @@ Table read_table(const std::string& path) {
 }
 
 /// Largest difference of a body's place from the table, up to 0.5 s [m].
-double largest_error(Scene scene, const Table& truth) {
+double largest_error(Scene scene, const MotionTable& truth) {
   scene.integrator = Integrator::sdirk2;
   scene.timestep = 2.5e-4;
   const Model model(scene);
@@ -87,7 +87,7 @@ TEST(RobotMotion, OddInertiasMoveAsTheyAreWritten) {
 
 /// Largest difference of joints' coordinates from the first columns of the table, up to 0.5 s, with
 /// the scene's constant controls. Columns are those of MJCF, where no joint has ref.
-double largest_joint_error(Scene scene, const Table& truth, std::size_t joints) {
+double largest_joint_error(Scene scene, const MotionTable& truth, std::size_t joints) {
   scene.integrator = Integrator::sdirk2;
   scene.timestep = 2.5e-4;
   const Model model(scene);
@@ -117,7 +117,7 @@ TEST(RobotMotion, MimicJointsFollowTheirLeaders) {
   const ImportedScene made = import_robot(kFolder + "mimic_gripper.urdf", "scene.xml", {});
   EXPECT_THAT(made.lost, IsEmpty());
   const Scene scene = parse_scene(made.text, "scene.xml").scene;
-  const Table truth = read_table(kFolder + "mimic_gripper.csv");
+  const MotionTable truth = read_table(kFolder + "mimic_gripper.csv");
   EXPECT_LT(largest_error(scene, truth), 5e-5);
   EXPECT_LT(largest_joint_error(scene, truth, 4), 5e-5);
 }

@@ -32,6 +32,7 @@ std::string scene_with(const std::string& lines) {
 <robot>
 <link name="skin">
 <joint name="skin" type="revolute" axis="0 0 1" damping="0.2" armature="0.1" stiffness="3" )"
+         R"(friction="0.7" )"
          R"(lim="-1 1" lim_stiffness="5"/>
 <body name="skin" type="cuboid" size="0.05 0.05 0.01" density="1000" )"
          R"(general_contact_resolution="4 4 2"/>
@@ -121,6 +122,7 @@ const Row kRows[] = {
     {R"(joint name="slide" field="damping")", "joint slide damping", "N s/m", true, 0.3},
     {R"(joint name="skin" field="armature")", "joint skin armature", "kg m^2", true, 0.1},
     {R"(joint name="skin" field="stiffness")", "joint skin stiffness", "N m/rad", true, 3},
+    {R"(joint name="skin" field="friction")", "joint skin friction", "N m", true, 0.7},
     {R"(joint name="slide" field="lim_stiffness")", "joint slide lim_stiffness", "N/m", true, 6},
     {"", "joint puck damping", "N s/m", true, 0.4},
     {"", "joint puck turning damping", "N m s/rad", true, 0.4},
