@@ -45,11 +45,13 @@ void add_column(Mat3<double> (&to)[2][2], int k, const Vec6<double>& x) {
 }
 
 Vec6<double> unit_motion(int k) {
-  Vec6<double> unit = kernels::zero6<double>();
-  (k < 3 ? &unit.a.x : &unit.l.x)[k % 3] = 1;
-  return unit;
+  const auto one = [k](int i) { return i == k ? 1.0 : 0.0; };
+  return {{one(0), one(1), one(2)}, {one(3), one(4), one(5)}};
 }
-double component(const Vec6<double>& x, int k) { return (k < 3 ? &x.a.x : &x.l.x)[k % 3]; }
+double component(const Vec6<double>& x, int k) {
+  const double all[] = {x.a.x, x.a.y, x.a.z, x.l.x, x.l.y, x.l.z};
+  return all[k];
+}
 
 void set_column(Slopes& to, int k, const Vec3<double>& x) {
   Mat3<double>& of = k < 3 ? to.turn : to.shift;
