@@ -211,12 +211,14 @@ LayerSlopes LayerContact::slopes(const Point& p) const {
     });
     return out;
   }
+  double depth[6];
   for (int k = 0; k < 6; ++k) {
     const LayerForce<D> f =
         force(p, moved(body, unit_motion(k), kernels::zero6<double>()), dual(p.anchor));
-    (k < 3 ? &out.depth.a.x : &out.depth.l.x)[k % 3] = f.at.depth.epsilon;
+    depth[k] = f.at.depth.epsilon;
     set_column(out.slant, k, change_of(f.at.slant));
   }
+  out.depth = {{depth[0], depth[1], depth[2]}, {depth[3], depth[4], depth[5]}};
   return out;
 }
 
