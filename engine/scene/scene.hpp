@@ -262,7 +262,7 @@ struct TactileDescription {
   std::optional<LayerDescription> layer{};
   /// Takes the place of kn in readings. None: the pressure is linear in depth.
   std::optional<PressureTable> table{};
-  /// What a camera behind its gel sees. None: it has no pictures.
+  /// Picture of a camera behind its gel. None: the sensor has no pictures.
   std::optional<PictureDescription> picture{};
 };
 

@@ -27,7 +27,7 @@ class PictureReading {
   PictureReading(PictureReading&&) noexcept;
   PictureReading& operator=(PictureReading&&) noexcept;
 
-  /// Whether pictures of a form follow from the ideal field alone: those of a sensor with a layer.
+  /// Whether pictures follow from the depth of the bodies: those of a sensor without a layer.
   [[nodiscard]] bool needs_depth() const;
   /// Whether a form needs the ideal field.
   [[nodiscard]] bool needs_field(FieldForm form) const;
