@@ -18,8 +18,8 @@
 //
 // At a free side of the layer the stress across it vanishes. Cells have images behind the sides,
 // mirrored and with the opposite sign: behind a side across axis 0, (q_0, q_1, q_2) becomes
-// (q_0, -q_1, -q_2). So the normal stress across the side vanishes, which an incompressible gel
-// sees from afar; its shear stresses do not, and the side keeps its height.
+// (q_0, -q_1, -q_2). So the normal stress across the side vanishes, whose effect reaches farthest
+// in an incompressible gel. The side's shear stresses do not vanish, and it keeps its height.
 #pragma once
 
 #include <array>
