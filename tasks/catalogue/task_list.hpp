@@ -65,4 +65,9 @@ enum class InsertionMotion { both, translation, rotation };
 TaskSpec declare_insertion(InsertionMotion motion, Friction friction);
 std::unique_ptr<Task> make_insertion(const Scene& scene, InsertionMotion motion, Friction friction);
 
+/// Observations besides angles and goal: touch or none.
+enum class InHandObservation { tactile, blind };
+TaskSpec declare_in_hand(InHandObservation observation);
+std::unique_ptr<Task> make_in_hand(const Scene& scene, InHandObservation observation);
+
 }  // namespace tangere

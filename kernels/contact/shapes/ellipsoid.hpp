@@ -7,10 +7,12 @@
 // S falls and is convex. 1/√S is concave and nearly straight, so Newton's method on it rises to the
 // root from below. Every term is at most 1 and no divisor is less than w, which gives the bounds
 //   max(a |y| - a² + c²) ≤ w ≤ |a y|
-// Geometric bisection comes first: near the middle plane of the shortest axis, where the two
-// nearest points meet, the bounds are many orders of magnitude apart. The number of steps is fixed,
-// so that a lane has the same bits whatever its neighbours. With h the distance of the tangent
-// plane from the centre,
+// Geometric bisection comes first where the bounds are more than a factor of 2 apart: near the
+// middle plane of the shortest axis, where the two nearest points meet, they are many orders of
+// magnitude apart. A lane takes the steps that its own numbers need and waits for its neighbours
+// unchanged, so it has the same bits whatever they are. Near the surface of an egg these are 0 or 1
+// bisections and 3 steps of Newton's method. With h the distance of the tangent plane from the
+// centre,
 //   n = g/|g|, g = y / (w + a² - c²);  h = |a n|;  d = n·y - h
 // d is the largest of n·y - h over all unit n. An error of n enters squared, and only downwards.
 //   κ₁ + κ₂ = h (Σ A - n·A n), κ₁ κ₂ = h⁴/(a b c)², A = diag(1/a²): curvatures of the surface at x
@@ -32,6 +34,7 @@ struct EllipsoidDistance {
   template <class P>
   using Pad = GeneralPad<P, EllipsoidDistance>;
   static constexpr int kBisections = 8, kNewtonSteps = 6;
+  static constexpr double kNearlySolved = 1e-8;  // of S - 1 before the last step
   Vec3<N> axes;
 
   static EllipsoidDistance of(const Vec3<N>& size) { return {size}; }
@@ -54,18 +57,22 @@ struct EllipsoidDistance {
     N low = max(reach.x - over.x, max(reach.y - over.y, reach.z - over.z));
     N high = root(dot(reach, reach));
     for (int k = 0; k < kBisections; ++k) {
+      const auto apart = high > low + low;
+      if (!any(apart)) break;
       const N middle = root(low * high);
       const Vec3<N> u = quotient(reach, middle);
       const auto below = dot(u, u) > one;
-      low = select(below, middle, low);
-      high = select(below, high, middle);
+      low = select(apart, select(below, middle, low), low);
+      high = select(apart, select(below, high, middle), high);
     }
-    for (int k = 0; k < kNewtonSteps; ++k) {
+    auto searching = low < low + one;
+    for (int k = 0; k < kNewtonSteps && any(searching); ++k) {
       const Vec3<N> by = quotient({one, one, one}, low);
       const Vec3<N> u = {reach.x * by.x, reach.y * by.y, reach.z * by.z};
       const N S = dot(u, u);
       const N fall = mul_add(u.x * u.x, by.x, mul_add(u.y * u.y, by.y, u.z * u.z * by.z));
-      low = low + S * (root(S) - one) / fall;
+      low = select(searching, low + S * (root(S) - one) / fall, low);
+      searching = searching & (S > N(1 + kNearlySolved));  // the step squared the error
     }
     const Vec3<N> g = quotient(off, low);
     const N inverse = inverse_sqrt(dot(g, g));
