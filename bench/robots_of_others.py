@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Which robots in a folder import, what the others lack, and whether they move as in MuJoCo.
 
-    python3 bench/robots_of_others.py FOLDER [--skip NAME] [--json out.json]
+    python3 bench/robots_of_others.py FOLDER [--skip NAME] [--json out.json] [--gallery out/hands]
 
 Every URDF and MJCF file below FOLDER is imported by `tangere import --drop`, and its scene takes 20
 steps. What has no joint that moves is imported with `--base free`, and takes no steps if it has no
@@ -11,11 +11,16 @@ stop; then it counts each reason and names a file that has it. Where the modules
 `mujoco` and `tangere` are there, MuJoCo reads each file too (robots_in_mujoco.py): files that it
 refuses as well are counted apart, and masses and accelerations are compared.
 
+`--gallery` makes a folder with a drawing of every robot that imports whole, and a page that shows
+them all: index.html. The drawings stay on your machine; what robots look like belongs to their
+makers.
+
     python3 -m venv out/venv && out/venv/bin/pip install mujoco==4.0.0 gymnasium==1.4.0
     PYTHONPATH=build/release/python out/venv/bin/python bench/robots_of_others.py FOLDER
 """
 
 import argparse
+import html
 import json
 import re
 import subprocess
@@ -61,8 +66,9 @@ def call(tangere: Path, *words: object) -> tuple[int, dict]:
         return done.returncode, {"error": done.stderr[-300:]}
 
 
-def tried(path: Path, tangere: Path, folder: Path) -> dict:
-    """Imports a robot and steps its scene. Returns what became of it."""
+def tried(path: Path, tangere: Path, folder: Path, drawing: Path | None = None) -> dict:
+    """Imports a robot and steps its scene. Returns what became of it. `drawing`: the file for the
+    picture of a robot that imports whole; none: no picture."""
     scene = folder / "robot.xml"
     words = ["import", path, "-o", scene, "--drop", "--overwrite"]
     code, result = call(tangere, *words)
@@ -78,6 +84,12 @@ def tried(path: Path, tangere: Path, folder: Path) -> dict:
         kind = "crashed" if code not in (2, 3) else "by both" if both else "refused"
         return out | {"result": kind, "reason": result.get("error", "")}
     out["result"] = "dropped" if out["lost"] else "whole"
+    if drawing and out["result"] == "whole" and not still:
+        code, told = call(tangere, "plot", scene, "-o", drawing, "--overwrite")
+        if code == 0:
+            out |= {"drawing": drawing.name, "joints": result["joints"], "motors": result["motors"]}
+        else:
+            print(f"{path}: no drawing: {told.get('error', told)}", file=sys.stderr)
     if still:
         return out
     code, result = call(
@@ -129,12 +141,33 @@ def print_table(folder: Path, rows: list[dict]) -> None:
     print_counts("beside MuJoCo:", [r for r in rows if "peer" in r], lambda r: r["peer"])
 
 
+def write_gallery(folder: Path, gallery: Path, rows: list[dict]) -> None:
+    """Writes index.html beside the drawings."""
+    drawn = [r for r in rows if "drawing" in r]
+    figures = "\n".join(
+        f'<figure><img src="{r["drawing"]}" alt="" loading="lazy"><figcaption>'
+        f"{html.escape(str(Path(r['file']).relative_to(folder)))}<br>"
+        f"{r['joints']} joints, {r['motors']} motors</figcaption></figure>"
+        for r in drawn
+    )
+    style = (
+        "body{font-family:sans-serif;display:flex;flex-wrap:wrap;gap:1em}"
+        "figure{width:18em;margin:0;overflow-wrap:anywhere}img{width:100%}"
+    )
+    (gallery / "index.html").write_text(
+        f'<!doctype html><meta charset="utf-8"><title>{len(drawn)} robots that import whole'
+        f"</title><style>{style}</style>\n{figures}\n"
+    )
+    print(f"{len(drawn)} drawings: {gallery / 'index.html'}")
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("folder", type=Path)
     parser.add_argument("--tangere", type=Path, default=ROOT / "build/release/tangere")
     parser.add_argument("--skip", default="", help="leave out paths that have this in them")
     parser.add_argument("--json", type=Path, help="write what became of each file")
+    parser.add_argument("--gallery", type=Path, help="a folder for drawings and a page of them")
     given = parser.parse_args()
     files = [
         path
@@ -144,11 +177,19 @@ def main() -> None:
         and not (given.skip and given.skip in str(path))
         and is_robot(path)
     ]
+    if given.gallery:
+        given.gallery.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory() as name:
-        rows = [tried(path, given.tangere, Path(name)) for path in files]
+        rows = [
+            tried(path, given.tangere, Path(name),
+                  given.gallery and given.gallery / f"robot_{k:04}.svg")
+            for k, path in enumerate(files)
+        ]  # fmt: skip
     if given.json:
         given.json.write_text(json.dumps(rows, indent=1))
     print_table(given.folder, rows)
+    if given.gallery:
+        write_gallery(given.folder, given.gallery, rows)
 
 
 if __name__ == "__main__":
