@@ -262,6 +262,7 @@ void read_root(const SceneNode& root, Scene& scene) {
   once("randomize", [&](const SceneNode& s) { read_randomize(scene, s); });
   once("outputs", [&](const SceneNode& s) { read_outputs(scene, s); });
   warn_of_sensors(scene, root);
+  warn_of_starts(scene, root);
 }
 
 }  // namespace

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// Warns of sensors whose readings are always zero, or are forces without contact, and of those that
-// do not sense what touches their body.
+// Warns of sensors whose readings are always zero, or are forces without contact, of those that do
+// not sense what touches their body, and of joints that start outside their limits.
 #include "io/scene/scene_warnings.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <optional>
 #include <set>
@@ -158,7 +159,56 @@ class SensorWarnings {
   std::set<int> sensed_groups_;  // groups of sensed bodies
 };
 
+/// Coordinate of a joint at the start, [m] or [rad]; a joint that follows others has theirs.
+/// `depth`: joints that followed one another so far; a circle ends the search.
+double start_of(const Scene& scene, const JointDescription& joint, std::size_t depth = 0) {
+  if (!joint.follows.empty() && joint.ratio.size() == joint.follows.size() &&
+      depth < scene.links.size()) {
+    double sum = joint.offset;
+    for (std::size_t k = 0; k < joint.follows.size(); ++k)
+      for (const LinkDescription& link : scene.links)
+        if (link.joint.name == joint.follows[k])
+          sum += joint.ratio[k] * start_of(scene, link.joint, depth + 1);
+    return sum;
+  }
+  for (const InitialState& state : scene.initial)
+    if (state.joint == joint.name && state.q.size() == 1) return state.q[0];
+  return 0;
+}
+
 }  // namespace
+
+void warn_of_starts(const Scene& scene, const SceneNode& root) {
+  constexpr double kRounding = 1e-9;  // of the limits
+  constexpr std::size_t kListed = 8;  // joints in the message
+  std::string listed;
+  std::size_t count = 0;
+  const Source* first = nullptr;
+  for (const LinkDescription& link : scene.links) {
+    const JointDescription& joint = link.joint;
+    if (joint.type != JointType::revolute && joint.type != JointType::prismatic) continue;
+    const bool drawn =
+        std::ranges::any_of(scene.randomizations, [&](const RandomizationDescription& d) {
+          return d.number.owner == NumberOwner::joint && d.number.name == joint.name &&
+                 d.number.field == NumberField::q;
+        });
+    if (!joint.limits || joint.limit_stiffness <= 0 || drawn) continue;
+    const auto [low, high] = *joint.limits;
+    const double q = start_of(scene, joint), slack = kRounding * (std::abs(low) + std::abs(high));
+    if (q >= low - slack && q <= high + slack) continue;
+    if (first == nullptr) first = &joint.source;
+    if (++count > kListed) continue;
+    listed += fmt::format("{}'{}' at {:.4g} with limits {:.4g} {:.4g}", listed.empty() ? "" : ", ",
+                          joint.name, q, low, high);
+  }
+  if (count == 0) return;
+  if (count > kListed) listed += fmt::format(", and {} more", count - kListed);
+  root.context().warnings.push_back(
+      fmt::format("{}<joint>: {} outside {}, in m or rad: {}; the springs of limits push from the "
+                  "first step on; expected another 'q' of <initial>, or other limits",
+                  first->prefix(), count == 1 ? "a joint starts" : "joints start",
+                  count == 1 ? "its limits" : "their limits", listed));
+}
 
 void warn_of_sensors(const Scene& scene, const SceneNode& root) {
   for (const TactileDescription& sensor : scene.sensors) SensorWarnings(scene, sensor, root).warn();

@@ -25,7 +25,8 @@ constexpr int kActions = 7;  // with the grip before them 10 s
 constexpr double kDegree = std::numbers::pi / 180;
 constexpr double kGoals = 60 * kDegree, kStarts = 45 * kDegree;  // largest goal and start
 constexpr double kNear = 10 * kDegree, kUnit = 30 * kDegree;     // of success, of the reward
-constexpr double kEnd = 10;                                      // reward at the end
+constexpr double kEncoder = 0.01;    // deviation of a measured angle: encoder and play [rad]
+constexpr double kEnd = 10;          // reward at the end
 constexpr double kDropped = -0.025;  // height of a dropped object, from its place [m]
 constexpr int kCloseFrom = 10, kCloseTo = 70, kLeaveFrom = 100, kLeaveTo = 150;  // of the grip
 constexpr double kGone = -0.08;  // target of the stand when it has left [m]
@@ -92,7 +93,9 @@ class InHand : public Task {
 
   void observe(const TaskView& view, std::span<double> o) const override {
     const Snapshot& now = view.now();
-    std::copy_n(&now.q[finger_], kAngles, o.begin());
+    for (std::size_t k = 0; k < kAngles; ++k)
+      o[k] = now.q[finger_ + k] + task_normal(view.seed, view.episode, 1 + view.actions,
+                                              static_cast<std::uint32_t>(k), kEncoder);
     o[kAngles] = view.task_state[kGoal];
     if (observation_ == InHandObservation::blind) return;
     std::copy(now.tactile.begin(), now.tactile.end(), o.begin() + kAngles + 1);
@@ -184,7 +187,11 @@ TaskSpec declare_in_hand(InHandObservation observation) {
       {},
       -1,
       1};
-  spec.observations = {{"angles", {kAngles}, "rad", "swing, upper and lower of each finger", {0.5}},
+  spec.observations = {{"angles",
+                        {kAngles},
+                        "rad",
+                        "swing, upper and lower of each finger, with noise of 0.01 rad",
+                        {0.5}},
                        {"goal", {1}, "rad", "where the object's long axis is to point", {0.5}}};
   spec.steps_per_action = InHandGait::kSteps;
   spec.control_every = 1;

@@ -95,5 +95,36 @@ TEST(SceneWarnings, SkinsUnlikeThePointsOfWhatTouchesThemAreTold) {
   EXPECT_THAT(g.warnings(), ElementsAre(HasSubstr("shows about 5e+02 times")));
 }
 
+/// An arm whose joint 'a' starts at `q`; 'b' follows it: q_b = 2 q_a + 3.
+std::vector<std::string> starts(const std::string& q, const std::string& more = "",
+                                const std::string& stiffness = "100") {
+  const auto link = [&](const std::string& name, const std::string& rest, const std::string& in) {
+    return "<link name='" + name + "'><joint name='" + name + "' type='revolute' axis='0 0 1' " +
+           rest + " lim_stiffness='" + stiffness + "'/><body name='" + name +
+           "' type='sphere' radius='0.1' density='100' pos='1 0 0'/>" + in + "</link>";
+  };
+  return parse_scene("<tangere><option unit='m-kg'/><robot>\n" +
+                         link("a", "lim='-1 1'",
+                              link("b", "lim='-0.5 0.5' follows='a' ratio='2' offset='3'", "")) +
+                         "</robot><initial><joint name='a' q='" + q + "'/></initial>" + more +
+                         "</tangere>",
+                     "arm.xml")
+      .warnings;
+}
+
+TEST(SceneWarnings, AStartOutsideTheLimitsIsTold) {
+  EXPECT_THAT(starts("-1.5"),
+              ElementsAre(HasSubstr("arm.xml:2: <joint>: a joint starts outside its "
+                                    "limits, in m or rad: 'a' at -1.5 with limits "
+                                    "-1 1")))
+      << "b is at 0";
+  EXPECT_THAT(starts("0"), ElementsAre(HasSubstr("'b' at 3 with limits -0.5 0.5")));
+  EXPECT_THAT(starts("1.1"), ElementsAre(HasSubstr("joints start outside their limits")));
+  EXPECT_THAT(starts("-1.5", "", "0"), IsEmpty()) << "limits without springs do not push";
+  EXPECT_THAT(starts("-1.5", "<randomize><joint name='a' q='0' uniform='-1 1'/></randomize>"),
+              IsEmpty())
+      << "the start is drawn";
+}
+
 }  // namespace
 }  // namespace tangere
