@@ -49,10 +49,12 @@ PUSHES = "box_pushing --episodes 5000 --seed 1"
 MIXED = "box_pushing --episodes 1000 --seed 1 --noise 0.3 --mix random=0.5"
 DERIVED = "box_pushing --episodes 150 --seed 1 --noise 0.3 --gradients jacobians"
 CAPS = "cap_opening --episodes 300 --seed 1"
+TURNS = "in_hand --episodes 1000 --seed 1"
 GRASPS = "stable_grasp --episodes 1000 --seed 1"
 INSERTIONS = "insertion --episodes 5000 --seed 1"
 THROUGH_TIME = "gd.py box_pushing --touch 0.05"
 CLONED = "dagger.py out/learning/pushes --rounds 60 --updates 100"
+TURNED = "dagger.py out/learning/turns --rounds 10 --updates 150 --visits 200"
 CAPPED = "bc.py out/learning/caps --epochs 20 --before 3 --width 512"
 
 OTHER_SKINS = {
@@ -95,6 +97,9 @@ EXPERIMENTS = [
     Experiment("bc-cap", CAPPED, 3, 200, "cap, touch", data=f"caps {CAPS}"),
     Experiment("bc-cap-blind", f"{CAPPED} --without tactile", 3, 60, "cap, blind",
                data=f"caps {CAPS}"),
+    Experiment("bc-in-hand", TURNED, 2, 330, "in hand, touch, visits", data=f"turns {TURNS}"),
+    Experiment("bc-in-hand-blind", f"{TURNED} --without tactile", 2, 330, "in hand, blind, visits",
+               data=f"turns {TURNS}"),
     *(Experiment(f"match-{name}", f"matching.py out/learning/derived --match {weight}", 3, 60,
                  text, data=f"derived {DERIVED}")
       for name, weight, text in (("none", 0, "rows alone"), ("some", 0.01, "weight 0.01"),

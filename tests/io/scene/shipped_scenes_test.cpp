@@ -110,12 +110,27 @@ TEST(ShippedScenes, AreAllRunHere) {
   const std::set<std::string> run = {"box_pushing",   "box_pushing_elastic",
                                      "cap_opening",   "cap_opening_elastic",
                                      "identify_ball", "insertion",
+                                     "in_hand",
                                      "mug",           "insertion_elastic",
                                      "rolling_ball",  "rolling_ball_small",
                                      "stable_grasp",  "stable_grasp_elastic",
                                      "ten_boxes",     "grip_rod",
                                      "gel_press",     "gel_grasp"};
   EXPECT_EQ(found, run) << "a scene without a test of what it does, or a test without a scene";
+}
+
+/// Two strokes turn the egg by 0.35 rad or more each, and it stays in the hand.
+TEST(ShippedScenes, FourFingersTurnAnEgg) {
+  const SceneRun r("in_hand");
+  EXPECT_EQ(r.failed, 0);
+  for (int e = 0; e < kEnvironments; ++e) {
+    const auto yaw = [&](int step) {
+      return 2 * std::atan2(r.q(step, e, "object.qz"), r.q(step, e, "object.qw"));
+    };
+    EXPECT_GT(r.q(r.steps - 1, e, "object.z"), -0.025) << e;
+    EXPECT_GT(yaw(r.steps - 1) - yaw(r.at(1.3)), 0.7) << e;
+    for (int tip = 0; tip < 4; ++tip) EXPECT_GT(r.touch(r.at(1.3), e, tip).pressure, 0.5) << e;
+  }
 }
 
 TEST(ShippedScenes, RollingBallRolls) {
