@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Writes pebble.obj, in metres: a closed surface that is longer than it is wide, with one blunt end.
+"""Writes pebble.obj, in metres: a closed surface, longer than it is wide, with one blunt end.
 
     python3 scenes/meshes/make_pebble.py > scenes/meshes/pebble.obj
 

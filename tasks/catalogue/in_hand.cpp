@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// In hand: four fingers turn an object below a palm about the palm's axis until its long axis points
-// where the goal says. How the object lies, its size, mass and friction and the gains of the motors
-// are not observed. An action is 250 steps of a gait (in_hand_gait.hpp).
+// In hand: four fingers turn an object below a palm about the palm's axis until its long axis
+// points where the goal says. How the object lies, its size, mass and friction and the gains of the
+// motors are not observed. An action is 250 steps of a gait (in_hand_gait.hpp).
 //   reward = -(e/30°)², +10 if |e| < 10° after the last action, -10 if the object drops (the
 //   episode ends)
-// e: angle from the object's x axis, projected on the horizontal plane, to the goal. The axis has no
-// sense: e lies in [-90°, 90°).
+// e: angle from the object's x axis, projected on the horizontal plane, to the goal. The axis has
+// no sense: e lies in [-90°, 90°).
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -122,7 +122,7 @@ class InHand : public Task {
     if (height(view.now()) < kDropped) return;
     const double e_bar = -2 * weight * to_goal(view) / (kUnit * kUnit);
     out.task_state[kGoal] += e_bar;
-    // δR = R [θ]: the x axis r₀ changes by θ_z r₁ - θ_y r₂, where r₁ and r₂ are the y and z axes.
+    // δR = R [θ]: the x axis r₀ changes by θ_z r₁ - θ_y r₂, with the y and z axes r₁ and r₂.
     const Axes r = axes(view.now());
     const double square = r[0][0] * r[0][0] + r[0][1] * r[0][1];
     const auto turned = [&](const std::array<double, 2>& by) {

@@ -8,7 +8,7 @@
 //   swing = atan2(y, k),  cos lower = (r² - a² - b²)/(2 a b)
 //   upper = atan2(x, d) - atan2(b sin lower, a + b cos lower)
 // A finger presses with force F towards the axis if its motors of gain P have targets
-//   q - P⁻¹ F ∂ρ/∂q,  with x = a sin upper + b sin(upper + lower), d = a cos upper + b cos(…)
+//   q - P⁻¹ F ∂ρ/∂q,  with x = a sin upper + b sin(upper + lower) and d the same with cosines
 #include "tasks/catalogue/in_hand_gait.hpp"
 
 #include <Eigen/Core>

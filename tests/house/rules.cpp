@@ -322,6 +322,7 @@ std::vector<Violation> check_heavy_headers(const Tree& tree) {
        {{"engine/derivative", 1},
         {"engine/step", 1},
         {"tasks/calibration", 2},
+        {"tasks/catalogue", 1},
         {"tasks/gradients", 1}}},
       {"hdf5.h", {{"io/hdf5", 9}, {"io/dataset", 10}, {"io/trajectory", 6}, {"io/view", 4}}},
       {"nlohmann/json.hpp", {{"apps", 33}, {"io/dataset", 2}, {"io/view", 1}}},
@@ -377,18 +378,13 @@ std::vector<Violation> check_own_headers(const Tree& tree) {
       {"io/scene/scene_joints.cpp", "a part of scene_sections.hpp"},
       {"io/scene/scene_runs.cpp", "a part of scene_sections.hpp"},
       {"io/scene/scene_sensors.cpp", "a part of scene_sections.hpp"},
-      {"tasks/catalogue/ball_rolling.cpp", "a task: task_list.cpp"},
-      {"tasks/catalogue/box_pushing.cpp", "a task: task_list.cpp"},
-      {"tasks/catalogue/cap_opening.cpp", "a task: task_list.cpp"},
-      {"tasks/catalogue/dummy_task.cpp", "a task: task_list.cpp"},
-      {"tasks/catalogue/in_hand.cpp", "a task: task_list.cpp"},
-      {"tasks/catalogue/insertion.cpp", "a task: task_list.cpp"},
-      {"tasks/catalogue/stable_grasp.cpp", "a task: task_list.cpp"},
       {"tasks/gradients/loss_check.cpp", "a part of gradient_check.hpp"},
       {"tasks/gradients/return_check.cpp", "a part of gradient_check.hpp"}};
   std::vector<Violation> found;
   for (const auto& [path, text] : tree) {
-    const bool is_part = shared.contains(path) || path.starts_with("io/robot/mjcf_");
+    // Every task is declared in task_list.hpp.
+    const bool is_part = shared.contains(path) || path.starts_with("io/robot/mjcf_") ||
+                         path.starts_with("tasks/catalogue/");
     if (!is_tested_source(path) || is_part) continue;
     const std::string header = path.substr(0, path.size() - 3) + "hpp";
     if (!tree.contains(header))

@@ -119,7 +119,7 @@ TEST(ShippedScenes, AreAllRunHere) {
   EXPECT_EQ(found, run) << "a scene without a test of what it does, or a test without a scene";
 }
 
-/// Two strokes turn the egg by 0.35 rad or more each, and it stays in the hand.
+/// Two strokes turn the egg by 0.3 rad or more each, and it stays in the hand.
 TEST(ShippedScenes, FourFingersTurnAnEgg) {
   const SceneRun r("in_hand");
   EXPECT_EQ(r.failed, 0);
@@ -128,7 +128,7 @@ TEST(ShippedScenes, FourFingersTurnAnEgg) {
       return 2 * std::atan2(r.q(step, e, "object.qz"), r.q(step, e, "object.qw"));
     };
     EXPECT_GT(r.q(r.steps - 1, e, "object.z"), -0.025) << e;
-    EXPECT_GT(yaw(r.steps - 1) - yaw(r.at(1.3)), 0.7) << e;
+    EXPECT_GT(yaw(r.steps - 1) - yaw(r.at(1.3)), 0.6) << e;
     for (int tip = 0; tip < 4; ++tip) EXPECT_GT(r.touch(r.at(1.3), e, tip).pressure, 0.5) << e;
   }
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests the task in_hand: its draws, rewards, gait, other objects, and a long hold. The tests of all
-// tasks cover its derivatives and script.
+// Tests the task in_hand: its draws, rewards, gait, other objects, and a long hold. The tests of
+// all tasks cover its derivatives and script.
 #include <gmock/gmock.h>
 
 #include <cmath>
