@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Joints and motors of a scene as text and as JSON.
+// Joints, motors and loops of a scene as text and as JSON.
 #include "apps/inspect_joints.hpp"
 
 #include <fmt/format.h>
@@ -7,6 +7,9 @@
 
 #include <cmath>
 #include <nlohmann/json.hpp>
+
+#include "engine/sense/loop_readings.hpp"
+#include "engine/step/batch.hpp"
 
 namespace tangere::apps {
 namespace {
@@ -124,6 +127,50 @@ std::string motors_text(const Scene& scene) {
     }
   }
   return text;
+}
+
+namespace {
+
+const char* kind_of(const LoopDescription& loop) { return loop.weld ? "weld" : "connect"; }
+std::string second_of(const LoopDescription& loop) {
+  return loop.body2.empty() ? "the world" : loop.body2;
+}
+
+}  // namespace
+
+Json loops_json(const Model& model) {
+  Json out = Json::array();
+  if (!model.has_loops()) return out;
+  const std::vector<LoopReading> readings = loop_readings(model, Batch(model, 1, 0), 0);
+  for (std::size_t k = 0; k < readings.size(); ++k) {
+    const LoopDescription& d = model.scene().loops[k];
+    Json loop = {{"name", d.name},           {"kind", kind_of(d)},
+                 {"body1", d.body1},         {"body2", d.body2.empty() ? Json() : Json(d.body2)},
+                 {"stiffness", d.stiffness}, {"damping", d.damping},
+                 {"gap", readings[k].gap}};
+    if (d.weld) {
+      loop["turning_stiffness"] = d.turning_stiffness;
+      loop["turning_damping"] = d.turning_damping;
+      loop["turn"] = readings[k].turn;
+    }
+    out.push_back(loop);
+  }
+  return out;
+}
+
+std::string loops_text(const Model& model) {
+  if (!model.has_loops()) return "";
+  const std::vector<LoopReading> readings = loop_readings(model, Batch(model, 1, 0), 0);
+  std::string text = fmt::format("loops ({})\n", readings.size());
+  for (std::size_t k = 0; k < readings.size(); ++k) {
+    const LoopDescription& d = model.scene().loops[k];
+    text += fmt::format("  {}: {} of {} and {}, stiffness {:.6g}, damping {:.6g}", d.name,
+                        kind_of(d), d.body1, second_of(d), d.stiffness, d.damping);
+    if (d.weld)
+      text += fmt::format(", turning {:.6g}, {:.6g}", d.turning_stiffness, d.turning_damping);
+    text += fmt::format(", gap {:.3g} at the start\n", readings[k].gap);
+  }
+  return text + '\n';
 }
 
 }  // namespace tangere::apps

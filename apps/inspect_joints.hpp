@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Reports joints and motors for `tangere inspect`.
+// Reports joints, motors and loops for `tangere inspect`.
 #pragma once
 
 #include <string>
@@ -16,5 +16,9 @@ std::string joint_effects_text(const Scene& scene);
 /// Motors in file order. A missing bound of a range is null.
 Json motors_json(const Scene& scene);
 std::string motors_text(const Scene& scene);
+
+/// Loops in file order, with the gap at the start [m].
+Json loops_json(const Model& model);
+std::string loops_text(const Model& model);
 
 }  // namespace tangere::apps

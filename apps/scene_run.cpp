@@ -9,6 +9,7 @@
 
 #include "apps/named_value.hpp"
 #include "engine/model/short_touches.hpp"
+#include "engine/sense/loop_readings.hpp"
 #include "engine/sense/start_overlaps.hpp"
 #include "io/files/csv.hpp"
 #include "io/scene/scene_reader.hpp"
@@ -129,7 +130,7 @@ void warn_about_geometry(const Console& console, const Model& model) {
           "or a smaller 'error'",
           mesh.body, mesh.cell, 100 * mesh.unresolved));
   for (const auto& lines : {start_overlaps(model), sensors_inside(model), unchecked_overlaps(model),
-                            rounded_places(model)})
+                            rounded_places(model), open_loops(model)})
     for (const std::string& line : lines) console.note("warning: " + line);
 }
 

@@ -23,6 +23,7 @@ struct DualStage::Impl {
   std::vector<kernels::PairContact> pairs;
   std::vector<kernels::GroundContact> grounds;
   std::vector<kernels::DofEffects> effects;
+  std::vector<kernels::Loop> loops;
   std::vector<kernels::Link> bodies;       ///< links with the environment's masses
   std::vector<kernels::Parameter> origin;  ///< for every row: where its number comes from
   std::vector<int> number;                 ///< for every row: the index of its number, -1: none
@@ -59,6 +60,7 @@ struct DualStage::Impl {
         pairs(model.pairs),
         grounds(model.grounds),
         effects(model.dof_effects),
+        loops(model.loops),
         bodies(model.links) {
     const auto row = [this](kernels::Parameter& p, int which) {
       origin.push_back(p);
@@ -77,6 +79,9 @@ struct DualStage::Impl {
       for (int k = 0; k < kernels::kDofNumbers; ++k)
         row(e.*kernels::kDofParameters[k], view.rows.dof(dof, k));
     }
+    for (int k = 0; k < view.n_loops; ++k)
+      for (int i = 0; i < kernels::kLoopNumbers; ++i)
+        row(loops[std::size_t(k)].*kernels::kLoopParameters[i], view.rows.loop(k) + i);
     // `first`: row of the block that holds the first number, or -1: the numbers are `values`.
     const auto side_by_side = [this](int& first, int count, const double* values, int which) {
       const int from = first;
@@ -105,6 +110,7 @@ struct DualStage::Impl {
     view.pairs = pairs.data();
     view.grounds = grounds.data();
     view.effects = effects.data();
+    view.loops = loops.data();
     block.assign(origin.size() * kernels::kBlock, 0.0);
     inertia.assign(std::size_t(kernels::kInertiaNumbers * view.n_links), 0.0);
     stretch.assign(std::size_t(kernels::kSizeNumbers * view.n_solids), 0.0);
@@ -112,7 +118,7 @@ struct DualStage::Impl {
     force_scale.resize(nv), mass_diagonal.resize(nv), excess.resize(1);
     dry_anchors.assign(nv, DualNumber(0.0)), stage_dry_anchors.assign(nv, DualNumber(0.0));
     links.resize(m.links.size()), columns.resize(2 * m.links.size());
-    contacts.resize(std::size_t(view.n_link_pairs + view.n_grounded));
+    contacts.resize(std::size_t(view.n_link_pairs + view.n_grounded + view.n_loops));
     faces.assign(3 * pairs.size(), DualNumber(0.0));
     for (const kernels::PairContact& p : pairs) {
       points.emplace_back(std::size_t(3 * p.n_points), DualNumber(0.0));
@@ -393,6 +399,7 @@ struct DualStage::Impl {
     kernels::ModelView weight = view;
     weight.links = light.data();
     weight.n_link_pairs = weight.n_grounded = weight.n_pairs = weight.n_grounds = 0;
+    weight.n_loops = 0;
     std::vector<DualNumber> no_tau(g.size(), DualNumber(0.0));
     kernels::StageArgs<DualNumber> b = a;
     b.g = g.data();

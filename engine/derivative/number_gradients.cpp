@@ -26,6 +26,7 @@ NumberGradients::NumberGradients(const Model& model) : model_(model) {
   add_bodies();
   add_joints();
   add_motors();
+  add_loops();
 }
 
 void NumberGradients::add(const SceneNumber& number, Terms terms, int body) {
@@ -236,6 +237,14 @@ void NumberGradients::add_motors() {
     add({Owner::motor, Field::P, d.joint}, dof_terms(joint, kernels::kDofP, 0, n));
     add({Owner::motor, Field::D, d.joint}, dof_terms(joint, kernels::kDofD, 0, n));
   }
+}
+
+void NumberGradients::add_loops() {
+  const Scene& scene = model_.scene();
+  for (std::size_t i = 0; i < scene.loops.size(); ++i)
+    for (std::size_t k = 0; k < (scene.loops[i].weld ? 4U : 2U); ++k)
+      add({Owner::loop, loop_field(k), scene.loops[i].name},
+          {{compiled(model_).view.rows.loop(static_cast<int>(i)) + static_cast<int>(k), 1}});
 }
 
 void NumberGradients::gradient(const BlockCotangent& cotangent, const Batch& batch, int environment,

@@ -22,7 +22,7 @@ struct NumberInfo {
 };
 
 /// Coefficients of contacts and sensors, densities (or masses) and sizes of bodies, effects and
-/// places of joints, gains of position motors. Each appears once: a number that a scene gives
+/// places of joints, gains of position motors, numbers of loops. Each appears once: a number that a scene gives
 /// for a whole joint has one derivative. Every gradient by them has their order.
 class NumberGradients {
  public:
@@ -58,6 +58,7 @@ class NumberGradients {
   void add_joints();
   void add_place(std::size_t joint);
   void add_motors();
+  void add_loops();
   /// Terms of number `which` of the dofs `first` … `end` - 1 of a joint.
   [[nodiscard]] Terms dof_terms(std::size_t joint, int which, int first, int end) const;
   /// How the masses of a body's link change with a number of a body of this shape and density.

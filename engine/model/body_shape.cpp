@@ -45,6 +45,14 @@ kernels::Hull hull_of(const CompiledBody& body) {
   return {body.frame, straight, round, most > 0, std::sqrt(dot(straight, straight)) + most};
 }
 
+void meet_faces(kernels::PairContact& pair, const CompiledBody& body) {
+  constexpr double kOverhang = 1e-3;
+  pair.faced = true;
+  pair.hull = hull_of(body);
+  const Vec3<double>&a = pair.size, &b = pair.hull.straight, &c = pair.hull.round;
+  pair.overhang = kOverhang * std::min({a.x, a.y, a.z, b.x + c.x, b.y + c.y, b.z + c.z});
+}
+
 double points_outward(const CompiledBody& body, const Vec3<double>& at,
                       const Vec3<double>& direction) {
   if (!body.touchable) return dot(direction, at - body.centre);

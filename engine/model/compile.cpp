@@ -12,6 +12,7 @@
 #include "engine/model/compile_followers.hpp"
 #include "engine/model/compile_imperfections.hpp"
 #include "engine/model/compile_joints.hpp"
+#include "engine/model/compile_loops.hpp"
 #include "engine/model/compile_markers.hpp"
 #include "engine/model/compile_sensor.hpp"
 #include "engine/model/compile_shear_springs.hpp"
@@ -75,6 +76,7 @@ class Compiler {
     pair_contacts();
     ground_contacts();
     group_contacts(m_);
+    compile_loops(m_, bodies_);
     components();
     sensors();
     layer_pads();
@@ -280,7 +282,7 @@ class Compiler {
       pair.body2 = b2;
       if (ball) pair.ball_radius = first.size.x;
       if (pair.shape == PrimitiveShape::cuboid && d.points.empty() && is_convex(general) &&
-          pair.n_points <= kCorners)
+          pair.n_points <= kMostFacePoints)
         meet_faces(pair, first);
       pair.points = keep(m_.point_storage, std::move(points));
       if (d.per_area()) {
@@ -297,22 +299,6 @@ class Compiler {
           {d.first_name(), d.primitive_body, pair.n_points, law_name(d.law, d.ramp)});
       touching_.emplace_back(pair.link1, pair.link2);
     }
-  }
-
-  /// Bodies with more points have some inside the face that they touch, so the nearest face serves
-  /// them, and a point that slides over the edge of a chosen face loses its force at once.
-  static constexpr int kCorners = 8;
-
-  /// Sets up contact of a convex body with single faces of a cuboid. Points beyond the face's edges
-  /// by up to a thousandth of the smaller body still touch it: otherwise rounding would decide
-  /// whether corners of flush boxes touch. This is far above rounding and the sway of stacks, and
-  /// far below the spacing of contact points.
-  static void meet_faces(kernels::PairContact& pair, const CompiledBody& body) {
-    constexpr double kOverhang = 1e-3;
-    pair.faced = true;
-    pair.hull = hull_of(body);
-    const Vec3<double>&a = pair.size, &b = pair.hull.straight, &c = pair.hull.round;
-    pair.overhang = kOverhang * std::min({a.x, a.y, a.z, b.x + c.x, b.y + c.y, b.z + c.z});
   }
 
   void ground_contacts() {
@@ -502,6 +488,7 @@ class Compiler {
     std::vector<std::pair<int, int>> coupled = touching_;
     for (const kernels::FollowerTie& t : m_.ties)
       coupled.emplace_back(link_of_dof(m_, t.v), link_of_dof(m_, t.leader_v));
+    for (const kernels::Loop& loop : m_.loops) coupled.emplace_back(loop.link1, loop.link2);
     auto [dofs, begin] = find_components(m_.links, coupled);
     m_.component_dofs = std::move(dofs);
     m_.component_begin = std::move(begin);
@@ -552,6 +539,7 @@ class Compiler {
       case NumberOwner::tactile:
         coefficient(m_.sensors[at(sensors_, "tactile sensor", n.name)].parameters);
         break;
+      case NumberOwner::loop: vary_loop(m_, d, row); break;
       case NumberOwner::body: vary_body(m_, int(at(bodies_, "body", n.name)), d, row); break;
       case NumberOwner::joint:
       case NumberOwner::motor: {
@@ -563,9 +551,10 @@ class Compiler {
   }
 
   void symbolic() {
-    m_.pattern = m_.followers.empty() && prefers_blocks(m_.links, touching_)
-                     ? block_pattern(m_.links, m_.nv)
-                     : analyse_pattern(m_.links, m_.nv, touching_, m_.ties);
+    const bool blocks =
+        m_.followers.empty() && m_.loops.empty() && prefers_blocks(m_.links, touching_);
+    m_.pattern = blocks ? block_pattern(m_.links, m_.nv)
+                        : analyse_pattern(m_.links, m_.nv, touching_, m_.ties, m_.loops);
   }
 
   CompiledModel m_;

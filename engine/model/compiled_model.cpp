@@ -60,7 +60,8 @@ void point_view(CompiledModel& m) {
   rows.dofs = rows.link(v.n_links);
   rows.solids = rows.dof(v.nv, 0);
   rows.places = rows.solid(v.n_solids);
-  rows.sensors = rows.place(v.n_links);
+  rows.loops = rows.place(v.n_links);
+  rows.sensors = rows.loop(static_cast<int>(m.loops.size()));
   rows.count = rows.sensor(static_cast<int>(m.sensors.size()));
   v.pattern = m.pattern.view();
   v.n_followers = static_cast<int>(m.followers.size());
@@ -69,6 +70,8 @@ void point_view(CompiledModel& m) {
   v.ties = m.ties.data();
   v.n_folded = static_cast<int>(m.pattern.folded.size());
   v.folded = m.pattern.folded.data();
+  v.n_loops = static_cast<int>(m.loops.size());
+  v.loops = m.loops.data();
 }
 
 }  // namespace tangere

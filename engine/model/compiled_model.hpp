@@ -256,6 +256,7 @@ struct CompiledModel {
   std::vector<kernels::DofEffects> dof_effects;  ///< (nv)
   std::vector<kernels::Follower> followers;      ///< dofs that follow others
   std::vector<kernels::FollowerTie> ties;        ///< their leaders
+  std::vector<kernels::Loop> loops;              ///< parallel to scene.loops
   /// (nv) magnitude to which an unknown is rounded: extent of the scene [m], 1 [rad].
   std::vector<double> unknown_scale;
   /// Dofs of bodies that can reach each other by joints and contacts, component by component: those

@@ -45,6 +45,8 @@ class Model {
   [[nodiscard]] bool has_shear_state() const;
   /// Whether some joint follows another.
   [[nodiscard]] bool has_followers() const;
+  /// Whether some links are closed to loops.
+  [[nodiscard]] bool has_loops() const;
   [[nodiscard]] std::span<const SensorInfo> sensors() const;
   [[nodiscard]] std::span<const EndEffectorInfo> end_effectors() const;  ///< in file order
   [[nodiscard]] std::span<const ContactInfo> contacts() const;

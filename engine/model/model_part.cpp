@@ -26,6 +26,7 @@ class Filter {
     dofs();
     pairs();
     grounds();
+    loops();
     components();
     find_link_balls(m_);
     m_.layer_pads = whole.layer_pads;
@@ -40,8 +41,9 @@ class Filter {
     m_.moved = whole.moved;
     m_.fall_time = whole.fall_time;
     // As in the whole, whose bits its steps have.
-    m_.pattern = whole.pattern.slot.empty() ? block_pattern(m_.links, m_.nv)
-                                            : analyse_pattern(m_.links, m_.nv, touching_);
+    m_.pattern = whole.pattern.slot.empty()
+                     ? block_pattern(m_.links, m_.nv)
+                     : analyse_pattern(m_.links, m_.nv, touching_, {}, m_.loops);
     m_.view = whole.view;
     point_view(m_);
   }
@@ -86,7 +88,9 @@ class Filter {
   /// bits that they have where all are awake.
   void components() {
     if (pushing_alone_) {
-      auto [dofs, begin] = find_components(m_.links, touching_);
+      std::vector<std::pair<int, int>> coupled = touching_;
+      for (const kernels::Loop& loop : m_.loops) coupled.emplace_back(loop.link1, loop.link2);
+      auto [dofs, begin] = find_components(m_.links, coupled);
       m_.component_dofs = std::move(dofs);
       m_.component_begin = std::move(begin);
       return;
@@ -143,6 +147,14 @@ class Filter {
     }
   }
 
+  void loops() {
+    for (kernels::Loop loop : whole_.loops) {
+      loop.link1 = link(loop.link1);
+      loop.link2 = link(loop.link2);
+      if (loop.link1 != kGone && loop.link2 != kGone) m_.loops.push_back(loop);
+    }
+  }
+
   const CompiledModel& whole_;
   std::unique_ptr<ModelPart> part_;
   CompiledModel& m_;
@@ -153,12 +165,20 @@ class Filter {
 
 }  // namespace
 
-std::vector<int> trees_of(const std::vector<kernels::Link>& links) {
+std::vector<int> trees_of(const CompiledModel& m) {
   std::vector<int> tree;
-  tree.reserve(links.size());
+  tree.reserve(m.links.size());
   int trees = 0;
-  for (const kernels::Link& l : links)
+  for (const kernels::Link& l : m.links)
     tree.push_back(l.parent < 0 ? trees++ : tree[std::size_t(l.parent)]);
+  for (const kernels::Loop& loop : m.loops) {
+    if (loop.link1 < 0 || loop.link2 < 0) continue;
+    const auto [low, high] =
+        std::minmax({tree[std::size_t(loop.link1)], tree[std::size_t(loop.link2)]});
+    if (low == high) continue;
+    for (int& t : tree)
+      if (t >= high) t = t == high ? low : t - 1;
+  }
   return tree;
 }
 

@@ -12,8 +12,8 @@
 
 namespace tangere {
 
-/// Returns the tree of each link. Joints make a tree; the world connects nothing.
-std::vector<int> trees_of(const std::vector<kernels::Link>& links);
+/// Returns the tree of each link. Joints and loops make a tree; the world connects nothing.
+std::vector<int> trees_of(const CompiledModel& m);
 
 /// Whether a contact with these coefficients can ever have a force: friction is bounded by μ|N|.
 inline bool can_exert_force(const kernels::ContactParameters& p) {

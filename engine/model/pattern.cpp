@@ -269,16 +269,19 @@ void fold_entries(PatternStorage& p, const Structure& written, const FreeDofs& f
 
 PatternStorage analyse_pattern(const std::vector<kernels::Link>& links, int nv,
                                const std::vector<std::pair<int, int>>& touching,
-                               const std::vector<kernels::FollowerTie>& ties) {
+                               const std::vector<kernels::FollowerTie>& ties,
+                               const std::vector<kernels::Loop>& closed) {
   Structure alone(nv, std::vector<char>(nv, 0));
   for (int i = 0; i < static_cast<int>(links.size()); ++i) couple(alone, support(links, i));
-  Structure s = alone;
-  for (const auto& [first, second] : touching) {
+  const auto couple_links = [&](Structure& of, int first, int second) {
     std::vector<int> both = support(links, first);
     const std::vector<int> other = support(links, second);
     both.insert(both.end(), other.begin(), other.end());
-    couple(s, both);
-  }
+    couple(of, both);
+  };
+  for (const kernels::Loop& loop : closed) couple_links(alone, loop.link1, loop.link2);
+  Structure s = alone;
+  for (const auto& [first, second] : touching) couple_links(s, first, second);
   const Structure written = s;
   const FreeDofs free = free_dofs(nv, ties);
   if (!ties.empty()) s = folded(s, free), alone = folded(alone, free);

@@ -36,11 +36,12 @@ using Structure = std::vector<std::vector<char>>;
 /// the order.
 std::vector<int> minimum_fill(const Structure& s);
 
-/// Finds a minimum-fill elimination of the structure that the tree, all contacts and the dofs that
-/// follow others make.
+/// Finds a minimum-fill elimination of the structure that the tree, all contacts, the dofs that
+/// follow others and loops make. `closed`: the links of loops, which couple without touching.
 PatternStorage analyse_pattern(const std::vector<kernels::Link>& links, int nv,
                                const std::vector<std::pair<int, int>>& touching,
-                               const std::vector<kernels::FollowerTie>& ties = {});
+                               const std::vector<kernels::FollowerTie>& ties = {},
+                               const std::vector<kernels::Loop>& closed = {});
 
 /// Returns the pattern in blocks of trees.
 PatternStorage block_pattern(const std::vector<kernels::Link>& links, int nv);

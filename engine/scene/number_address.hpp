@@ -7,7 +7,7 @@
 namespace tangere {
 
 /// The owner of a number. The number's name begins with this word.
-enum class NumberOwner { contact, ground, tactile, body, joint, motor };
+enum class NumberOwner { contact, ground, tactile, body, joint, motor, loop };
 
 /// The first fields are the coefficients of contacts and sensors in the order of Coefficients, also
 /// those that have no word here; then come effects of joints, and numbers of a size, each in order.

@@ -328,6 +328,23 @@ struct PairContactDescription {
   }
 };
 
+/// Closes a loop of links: springs hold a point of body 1 at a point of body 2; in a weld, they
+/// also hold the axes of a frame of body 2 at those of body 1 (docs/dynamics.md).
+struct LoopDescription {
+  std::string name;
+  std::string body1, body2;  ///< body 2 empty: the world
+  bool weld = false;
+  Vector3 position1{0, 0, 0};          ///< of the point, frame of body 1 [m]
+  std::optional<Vector3> position2{};  ///< in body 2 or the world [m]; none: as at the start
+  /// Of the axes of body 1 in body 2 (or the world), w x y z; none: as at the start. Welds only.
+  std::optional<Quaternion> orientation2{};
+  double stiffness = 0;          ///< [N/m]
+  double damping = 0;            ///< [N s/m]
+  double turning_stiffness = 0;  ///< of a weld [N m/rad]
+  double turning_damping = 0;    ///< of a weld [N m s/rad]
+  Source source;
+};
+
 /// Starting state of one joint; empty vectors leave the default (q = 0 or the identity, v = 0).
 struct InitialState {
   std::string joint;
@@ -414,6 +431,7 @@ struct Scene {
   std::vector<EndEffectorDescription> end_effectors;
   std::vector<GroundContactDescription> ground_contacts;
   std::vector<PairContactDescription> pair_contacts;
+  std::vector<LoopDescription> loops;
   std::vector<InitialState> initial;
   std::optional<ControlDescription> control;
   std::vector<RandomizationDescription> randomizations;

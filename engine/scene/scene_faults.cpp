@@ -115,6 +115,14 @@ std::string varying_number_fault(const Scene& scene, const SceneNumber& n) {
                                  [&](const auto& c) { return c.sensor == n.name; })
                  ? "the sensor has feedback, so its coefficients act on the motion as well"
                  : "";
+    case NumberOwner::loop:
+      return std::ranges::any_of(scene.loops,
+                                 [&](const LoopDescription& loop) {
+                                   return loop.name == n.name &&
+                                          (loop.weld || loop_index(n.field) < 2);
+                                 })
+                 ? ""
+                 : "the scene has no such loop, or it is no weld";
     default: return "";
   }
 }
@@ -270,6 +278,18 @@ std::string contact_fault(const Scene& scene, const PairContactDescription& d) {
   return value_fault(d.per_area() ? kSurfaceContact : kPairContact, d.coefficients);
 }
 
+std::string loop_fault(const Scene& scene, const LoopDescription& loop) {
+  if (loop.body1 == loop.body2) return "body '" + loop.body1 + "' with itself; expected two bodies";
+  for (const LoopDescription& other : scene.loops) {
+    if (&other == &loop) break;
+    if (other.name == loop.name)
+      return "another loop has the name '" + loop.name + "' already; expected a name of its own";
+  }
+  if (!loop.weld && (loop.orientation2 || loop.turning_stiffness != 0 || loop.turning_damping != 0))
+    return "a point has no axes; expected a weld, or neither axes nor springs that turn";
+  return value_fault(loop.weld ? kWeld : kConnect, loop);
+}
+
 std::string markers_fault(const TactileDescription& sensor) {
   return sensor.markers ? value_fault(kMarkers, *sensor.markers) : "";
 }
@@ -321,6 +341,8 @@ void check_scene(const Scene& scene) {
     check(d.source, "", contact_fault(scene, d));
   for (const PairContactDescription& d : scene.pair_contacts)
     check(d.source, "", contact_fault(scene, d));
+  for (const LoopDescription& d : scene.loops)
+    check(d.source, "loop '" + d.name + "': ", loop_fault(scene, d));
   for (const TactileDescription& d : scene.sensors) {
     check(d.source, "tactile sensor '" + d.name + "': ", value_fault(kTactile, d.coefficients));
     if (d.markers) check(d.markers->source, "markers of '" + d.name + "': ", markers_fault(d));

@@ -17,6 +17,8 @@ std::string body_fault(const BodyDescription& body);
 std::string motor_fault(const Scene& scene, const MotorDescription& motor);
 std::string contact_fault(const Scene& scene, const GroundContactDescription& contact);
 std::string contact_fault(const Scene& scene, const PairContactDescription& contact);
+/// `loop` may be one of the scene's, or the one that follows them.
+std::string loop_fault(const Scene& scene, const LoopDescription& loop);
 std::string markers_fault(const TactileDescription& sensor);
 /// The sensor has a picture.
 std::string picture_fault(const TactileDescription& sensor);

@@ -12,7 +12,8 @@ namespace {
 using Owner = NumberOwner;
 using Field = NumberField;
 
-constexpr const char* kOwners[] = {"contact", "ground", "tactile", "body", "joint", "motor"};
+constexpr const char* kOwners[] = {"contact", "ground", "tactile", "body",
+                                   "joint",   "motor",  "loop"};
 
 bool is_turning(Field field) {
   return field == Field::turning_damping || field == Field::turning_stiffness;
@@ -86,6 +87,14 @@ const double* joint_number(const Scene& scene, const JointDescription& joint,
   }
 }
 
+const double* loop_number(const Scene& scene, const SceneNumber& n) {
+  const auto at = std::ranges::find(scene.loops, n.name, &LoopDescription::name);
+  if (at == scene.loops.end()) return nullptr;
+  const bool turns = n.field == Field::turning_stiffness || n.field == Field::turning_damping;
+  if (turns && !at->weld) return nullptr;
+  return &((*at).*kLoopNumbers[loop_index(n.field)]);
+}
+
 /// Returns nullptr where the scene has no such number.
 const double* find_number(const Scene& scene, const SceneNumber& n) {
   number_kind(n.owner, n.field);  // throws if there is no such kind
@@ -96,6 +105,7 @@ const double* find_number(const Scene& scene, const SceneNumber& n) {
         found = n.field == Field::P ? &motor.P : &motor.D;
     return found;
   }
+  if (n.owner == Owner::loop) return loop_number(scene, n);
   if (n.owner == Owner::body || n.owner == Owner::joint) {
     const LinkDescription* const link = link_of(scene, n);
     if (link == nullptr) return nullptr;
@@ -121,15 +131,15 @@ const double& found_number(const Scene& scene, const SceneNumber& number) {
 }  // namespace
 
 std::uint64_t element_of(NumberOwner owner) {
-  constexpr std::uint64_t kElementOf[] = {kPairContact, kGroundContact,         kTactile,
-                                          kBody,        kJoint | kInitialJoint, kMotor};
+  constexpr std::uint64_t kElementOf[] = {kPairContact,           kGroundContact, kTactile, kBody,
+                                          kJoint | kInitialJoint, kMotor,         kLoops};
   return kElementOf[static_cast<int>(owner)];
 }
 
 const Attribute& number_kind(NumberOwner owner, NumberField field) {
   // Dofs that turn may have effects of their own, which files give by the same attribute.
-  if (field == Field::turning_damping) field = Field::damping;
-  if (field == Field::turning_stiffness) field = Field::stiffness;
+  if (owner != Owner::loop && field == Field::turning_damping) field = Field::damping;
+  if (owner != Owner::loop && field == Field::turning_stiffness) field = Field::stiffness;
   const Attribute* same_field = nullptr;
   for (const Attribute& row : schema()) {
     // Numbers of a <surface_contact> are those of a contact, whose rows come first.
@@ -174,7 +184,8 @@ std::string owner_of(const SceneNumber& n) {
 
 std::string name_of(const SceneNumber& n) {
   const Attribute& kind = number_kind(n.owner, n.field);
-  std::string text = owner_of(n) + (is_turning(n.field) ? " turning " : " ") + kind.name;
+  const bool by_word = is_turning(n.field) && n.owner != Owner::loop;
+  std::string text = owner_of(n) + (by_word ? " turning " : " ") + kind.name;
   if (kind.has(kIndexed)) text.append(1, '[').append(std::to_string(n.component)).append(1, ']');
   return text;
 }
@@ -187,6 +198,7 @@ Unit coefficient_unit(Owner owner, Field field, ContactLaw law, bool per_area) {
 
 std::vector<Unit> units_of(const Scene& scene, const SceneNumber& n) {
   const Attribute& kind = number_kind(n.owner, n.field);
+  if (n.owner == Owner::loop) return {kind.unit};
   if (n.owner != Owner::joint && n.owner != Owner::motor) {
     ContactLaw law{};
     with_law(scene, n, [&](const ContactCoefficients&, ContactLaw own) { law = own; });

@@ -35,6 +35,20 @@ constexpr std::size_t effect_index(NumberField field) {
                                        : static_cast<std::size_t>(field) + 1 -
                                              static_cast<std::size_t>(NumberField::armature);
 }
+/// The numbers of a loop, and the field of each. loop_index() is the inverse.
+inline constexpr double LoopDescription::*kLoopNumbers[] = {
+    &LoopDescription::stiffness, &LoopDescription::damping, &LoopDescription::turning_stiffness,
+    &LoopDescription::turning_damping};
+constexpr NumberField loop_field(std::size_t k) {
+  constexpr NumberField kFields[] = {NumberField::stiffness, NumberField::damping,
+                                     NumberField::turning_stiffness, NumberField::turning_damping};
+  return kFields[k];
+}
+constexpr std::size_t loop_index(NumberField field) {
+  std::size_t k = 0;
+  while (loop_field(k) != field) ++k;
+  return k;
+}
 inline constexpr int kScaleIndex = kSizeIndices - 1;  ///< of the scale of a mesh in size_number()
 /// Returns number `which` of a body's size (size_number). size_index() is the inverse.
 SceneNumber size_of_body(const std::string& body, int which);
@@ -45,7 +59,7 @@ inline bool is_of_start(const SceneNumber& number) {
 }
 
 /// Returns "contact pad ball kn", "ground ball mu", "tactile pad kt", "body ball density",
-/// "body pad size[0]", "joint arm damping", "joint arm q[0]", "motor arm P".
+/// "body pad size[0]", "joint arm damping", "joint arm q[0]", "motor arm P", "loop NAME stiffness".
 std::string name_of(const SceneNumber& number);
 /// Returns the words with which name_of() begins, without the field: "contact pad ball".
 std::string owner_of(const SceneNumber& number);

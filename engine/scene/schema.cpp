@@ -20,6 +20,7 @@ using E = EffectKind;
 using C = ContactCoefficients;
 using I = SensorImperfections;
 using J = JointEffects;
+using L = LoopDescription;
 
 constexpr const char *kNone = "", *kNeeded = nullptr;
 constexpr const char* kMoving = "revolute prismatic planar translational free2d spherical free";
@@ -384,6 +385,21 @@ constexpr Attribute kSchema[] = {
         "of printed markers; a tenth of their distance if left out",
         &PictureDescription::marker_radius, B::positive),
 
+    row(kLoops, "name", "", U::one, "those of its bodies if left out"),
+    row(kLoops, "body1", kNeeded, U::one, "a body that moves"),
+    row(kLoops, "body2", "", U::one, "another; the world if left out"),
+    row(kLoops, "pos1", "0 0 0", U::m, "the point, in the frame of body1", &L::position1),
+    row(kLoops, "pos2", kNone, U::m, "in that of body2; where it starts if left out"),
+    row(kWeld, "quat2", kNone, U::one, "of body1's axes in body2; as at the start if left out"),
+    row(kLoops, "stiffness", kNeeded, U::N_per_m, "force by the gap", &L::stiffness, F::stiffness,
+        B::positive, Flags{kParameter}),
+    row(kLoops, "damping", "0", U::N_s_per_m, "force by the rate of the gap", &L::damping,
+        F::damping, B::not_negative, Flags{kParameter}),
+    row(kWeld, "turning_stiffness", kNeeded, U::N_m_per_rad, "torque by the turn",
+        &L::turning_stiffness, F::turning_stiffness, B::positive, Flags{kParameter}),
+    row(kWeld, "turning_damping", "0", U::N_m_s_per_rad, "torque by the rate of the turn",
+        &L::turning_damping, F::turning_damping, B::not_negative, Flags{kParameter}),
+
     row(kEndEffector, "name", "", U::one, "endeffector and its place in the file if left out"),
     row(kEndEffector, "joint", kNeeded, U::one, "it moves with this joint"),
     row(kEndEffector, "pos", kNeeded, U::m, "in the joint's moving frame",
@@ -408,7 +424,8 @@ constexpr Attribute kSchema[] = {
     row(kRandom, "period", "0.1", U::s, "time between knots", &RandomControl::period, B::positive),
     row(kOutputs, "record", kNeeded, U::one, "names of outputs, between commas"),
 
-    row(kVaryJoint | kVaryTactile | kVaryBody, "name", kNeeded, U::one, "whose number varies"),
+    row(kVaryJoint | kVaryTactile | kVaryBody | kVaryConnect | kVaryWeld, "name", kNeeded, U::one,
+        "whose number varies"),
     row(kVaryMotor, "joint", kNeeded, U::one, "of the motor"),
     row(kVaryGround, "body", kNeeded, U::one, "of the contact"),
     row(kVaryPair, "general_body", kNeeded, U::one, "of the contact"),
@@ -461,7 +478,11 @@ constexpr const char* kElementNames[] = {"option",
                                          "surface_contact",
                                          "surface_contact",
                                          "layer",
-                                         "picture"};
+                                         "picture",
+                                         "connect",
+                                         "weld",
+                                         "connect",
+                                         "weld"};
 static_assert(std::size(kElementNames) == kElements);
 
 constexpr Holder kHolders[] = {
@@ -470,6 +491,7 @@ constexpr Holder kHolders[] = {
     {"robot", kLink, true},
     {"actuator", kMotor, true},
     {"contact", kContacts | kSurfaceContact, true},
+    {"loop", kLoops, true},
     {"sensor", kTactile, true},
     {"variable", kEndEffector, true},
     {"initial", kInitialJoint, true},

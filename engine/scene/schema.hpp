@@ -55,12 +55,17 @@ enum Element : std::uint64_t {
   kVarySurface = 1ULL << 30,  ///< in <randomize>
   kLayer = 1ULL << 31,
   kGelPicture = 1ULL << 32,
+  kConnect = 1ULL << 33,
+  kWeld = 1ULL << 34,
+  kVaryConnect = 1ULL << 35,  ///< in <randomize>, like the next
+  kVaryWeld = 1ULL << 36,
 };
-inline constexpr int kElements = 33;
+inline constexpr int kElements = 37;
 inline constexpr std::uint64_t kContacts = kGroundContact | kPairContact,
-                               kTouching = kContacts | kTactile,
+                               kTouching = kContacts | kTactile, kLoops = kConnect | kWeld,
                                kVarying = kVaryJoint | kVaryMotor | kVaryGround | kVaryPair |
-                                          kVaryTactile | kVaryBody | kVarySurface;
+                                          kVaryTactile | kVaryBody | kVarySurface | kVaryConnect |
+                                          kVaryWeld;
 /// The name in scene files.
 const char* to_string(Element element);
 
@@ -94,10 +99,11 @@ using Member = std::variant<
     std::optional<double> SolverOptions::*, int SolverOptions::*, Vector3 GroundDescription::*,
     Vector3 Pose::*, Quaternion Pose::*, double JointEffects::*, double BodyDescription::*,
     std::array<double, 4> BodyDescription::*, double AbstractShape::*, double MotorDescription::*,
-    double ContactCoefficients::*, int TactileDescription::*, double SensorImperfections::*,
-    NormalAndShear SensorImperfections::*, double MarkersDescription::*, double SkinMaterial::*,
-    double LayerDescription::*, std::optional<double> LayerDescription::*,
-    int PictureDescription::*, double PictureDescription::*, Vector3 EndEffectorDescription::*,
+    double ContactCoefficients::*, double LoopDescription::*, Vector3 LoopDescription::*,
+    int TactileDescription::*, double SensorImperfections::*, NormalAndShear SensorImperfections::*,
+    double MarkersDescription::*, double SkinMaterial::*, double LayerDescription::*,
+    std::optional<double> LayerDescription::*, int PictureDescription::*,
+    double PictureDescription::*, Vector3 EndEffectorDescription::*,
     double EndEffectorDescription::*, std::array<double, 4> EndEffectorDescription::*,
     double PiecewiseControl::*, double RandomControl::*>;
 

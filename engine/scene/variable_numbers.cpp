@@ -47,6 +47,9 @@ std::vector<SceneNumber> variable_numbers(const Scene& scene) {
     for (const NumberField gain : {NumberField::P, NumberField::D})
       add({NumberOwner::motor, gain, motor.joint});
   }
+  for (const LoopDescription& loop : scene.loops)
+    for (std::size_t k = 0; k < (loop.weld ? 4U : 2U); ++k)
+      add({NumberOwner::loop, loop_field(k), loop.name});
   return numbers;
 }
 

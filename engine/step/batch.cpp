@@ -25,6 +25,7 @@ Purpose purpose_of(const SceneNumber& number) {
   if (is_of_start(number)) return Purpose::initial_state;
   switch (number.owner) {
     case NumberOwner::contact:
+    case NumberOwner::loop:
     case NumberOwner::ground: return Purpose::contact;
     case NumberOwner::joint:
       return number.field == NumberField::pos ? Purpose::body : Purpose::joint;
@@ -325,7 +326,7 @@ void Batch::set_shear_state(int environment, std::span<const ShearEntry> state) 
 void Batch::set_sleep(int environment, const SleepState& state) {
   const std::size_t lane = this->lane(environment);
   const CompiledModel& m = compiled(model_);
-  const std::vector<int> tree = trees_of(m.links);
+  const std::vector<int> tree = trees_of(m);
   const int trees = tree.empty() ? 0 : std::ranges::max(tree) + 1;
   const auto is_island = [&](int t) { return t >= -1 && t < trees; };
   if (!state.asleep.empty() &&

@@ -13,6 +13,7 @@
 #include "engine/step/state_difference.hpp"
 #include "kernels/contact/pair_contact.hpp"
 #include "kernels/step/faces.hpp"
+#include "kernels/step/loops.hpp"
 #include "kernels/step/low_points.hpp"
 
 namespace tangere {
@@ -151,6 +152,22 @@ struct LaneAt {
     if (link < 0) return kernels::zero6<double>();
     const auto& V = poses[std::size_t(link)].V;
     return {{V.a.x[lane], V.a.y[lane], V.a.z[lane]}, {V.l.x[lane], V.l.y[lane], V.l.z[lane]}};
+  }
+
+  /// Adds what the springs of loops hold, and what their damping takes.
+  void add_loops() {
+    for (const kernels::Loop& loop : model.loops) {
+      const Frame<double> second = relative(world(loop.link1), world(loop.link2));
+      const kernels::Vec6<double> W =
+          motion_to_parent(second, twist(loop.link2)) - twist(loop.link1);
+      const kernels::LoopState<double> s = kernels::loop_state(loop, second, W);
+      sum.moving += 0.5 * number(loop.stiffness) * dot(s.gap, s.gap);
+      if (loop.weld)
+        sum.moving += 0.5 * number(loop.turning_stiffness) * dot(s.turned.phi, s.turned.phi);
+      if (terms == nullptr) continue;
+      terms->taken += number(loop.damping) * dot(s.u, s.u);
+      if (loop.weld) terms->taken += number(loop.turning_damping) * dot(W.a, W.a);
+    }
   }
 
   /// Returns the power that a touching point dissipates: the negative power of its force less the
@@ -302,6 +319,7 @@ LaneEnergy energy_of_bodies(const CompiledModel& model, const BasicWorkspace<L>&
   LaneAt<L> at{model, w, poses, lane};
   at.add_motion();
   at.add_joints(q, v);
+  at.add_loops();
   at.sum.total += at.sum.moving;
   return at.sum;
 }
@@ -347,6 +365,7 @@ EnergyTerms energy_terms(const CompiledModel& model, const kernels::KernelTable&
   terms.height = at.sum.total;
   at.add_powers(w.v0);
   at.add_joints(w.q0, w.v0);
+  at.add_loops();
   at.add_contacts(table, w.search.data());
   terms.held = at.sum.moving - terms.motion;
   return terms;

@@ -3,10 +3,10 @@
 //
 //   E = Σ (m v² + 2 ω·(c × v) + ω·Jω)/2 + I_a v²/2 - Σ gravity·(m p + R c)
 //       + Σ k (q - rest)²/2 + Σ k_l (q beyond a limit)²/2 + Σ f (e - f/2P) + Σ k_n d²/2
-//       + Σ k_s |s|²/2
+//       + Σ k_s |s|²/2 + Σ k |gap|²/2 + Σ k_t |turn|²/2
 // with c the mass times centre of mass and J the inertia of a link about its origin, e the distance
-// of a position motor from its target, f = clip(P e, range), and s the elastic displacement of a
-// contact point with a shear spring. Damping and slip only dissipate energy; gravity, springs,
+// of a position motor from its target, f = clip(P e, range), s the elastic displacement of a
+// contact point with a shear spring, and gap and turn those of loops. Damping and slip only dissipate energy; gravity, springs,
 // limits, motors with constant target and contacts with constant faces are conservative. So E can
 // rise only by the work of forces that are known at the start of the step.
 #pragma once

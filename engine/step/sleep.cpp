@@ -48,7 +48,7 @@ double length(const Vec3<double>& a) { return std::sqrt(dot(a, a)); }
 }  // namespace
 
 Sleep::Sleep(const CompiledModel& model, double share, double h)
-    : model_(model), tree_(trees_of(model.links)) {
+    : model_(model), tree_(trees_of(model)) {
   const std::size_t trees = tree_.empty() ? 0 : std::size_t(std::ranges::max(tree_)) + 1;
   label_.resize(trees);
   dofs_.resize(trees);

@@ -11,7 +11,7 @@ namespace tangere {
 
 std::vector<std::string> sleeping_trees(const Model& model) {
   const CompiledModel& m = compiled(model);
-  const std::vector<int> tree = trees_of(m.links);
+  const std::vector<int> tree = trees_of(m);
   std::vector<std::string> names(tree.empty() ? 0 : std::size_t(std::ranges::max(tree)) + 1);
   for (std::size_t b = 0; b < m.bodies.size(); ++b) {
     if (m.bodies[b].link < 0) continue;

@@ -88,6 +88,7 @@ class Bodies {
         robot_.scene.links[k].body.gravity_share = 1 - lift;
       whole_.gravcomp[index] = node.source();
     }
+    whole_.body_frames[name] = {index, offset};
     for (const MjcfPart& part : parts) {
       if (part.node.name() == "body") read_body(part, index, offset, depth + 1);
       if (part.node.name() == "site") read_site(part, index, offset);

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Constraints of MJCF: a joint that follows another,
 //   q₁ - ref₁ = Σ_k c_k (q₂ - ref₂)^k
-// where our coordinates are already less ref. Scenes have those of degree 1.
+// where our coordinates are already less ref. Scenes have those of degree 1. Loops are in
+// mjcf_loops.cpp.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -13,8 +14,8 @@ namespace tangere {
 namespace {
 
 const Words kEqualities = {{"joint"},
-                           {"connect", Fate::lost, "a closed loop; scenes have none"},
-                           {"weld", Fate::lost, "a body tied to another; scenes have none"},
+                           {"connect"},
+                           {"weld"},
                            {"tendon", Fate::lost, "a tendon tied to another; scenes have none"},
                            {"flex", Fate::lost, "bodies that bend; scenes have none"},
                            {"flexvert", Fate::lost, "bodies that bend; scenes have none"},
@@ -85,7 +86,10 @@ void read_mjcf_equalities(MjcfWhole& whole) {
     for (const RobotNode& section : model->file->sections) {
       if (section.name() != "equality") continue;
       for (const RobotNode& part : section.parts(kEqualities))
-        if (part.name() == "joint") read_joint_equality(whole, *model, part);
+        if (part.name() == "joint")
+          read_joint_equality(whole, *model, part);
+        else if (part.name() == "connect" || part.name() == "weld")
+          read_mjcf_loop(whole, *model, model->file->with_class(part, "main"));
     }
   check_followers(whole.robot);
 }

@@ -99,6 +99,8 @@ struct MjcfWhole {
   std::set<std::string> tendons = {};  ///< joints that stand for tendons
   /// By number of a model and name there: the joint of a tendon.
   std::map<std::pair<int, std::string>, std::string> tendon_names = {};
+  /// By name of a body in the scene: its link, and its frame in that of the link.
+  std::map<std::string, std::pair<int, Pose>> body_frames = {};
   std::deque<MjcfScope> scopes = {};
   std::map<int, int> ranks = {};  ///< of a <replicate> or <attach>: its place in the order of names
   std::vector<const MjcfScope*> models = {};  ///< by number
@@ -186,6 +188,8 @@ void read_mjcf_gravity(MjcfWhole& whole);
 void read_mjcf_tendons(MjcfWhole& whole);
 /// Reads the constraints of all models, after the bodies.
 void read_mjcf_equalities(MjcfWhole& whole);
+/// Reads a <connect> or a <weld>.
+void read_mjcf_loop(MjcfWhole& whole, const MjcfScope& model, const RobotNode& node);
 /// Reads the actuators of all models, after the bodies.
 void read_mjcf_actuators(MjcfWhole& whole);
 /// Returns the key `requested` of the <keyframe> sections, by its name or, without one, its number

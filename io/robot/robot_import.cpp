@@ -30,6 +30,7 @@ namespace fs = std::filesystem;
 constexpr std::size_t kLargestRobot = std::size_t{64} << 20;
 constexpr const char* kRoots = "the root <robot> (URDF) or <mujoco> (MJCF)";
 constexpr double kYieldAngle = 0.01, kYieldLength = 1e-3;  // of a limit under its load [rad], [m]
+constexpr double kLoopGap = 1e-6;                          // of a loop under its load [m]
 constexpr double kLeastReach = 0.01;  // between a joint and what hangs on it [m]
 constexpr int kDeepestLinks = 200;    // of a scene
 
@@ -77,6 +78,19 @@ class LimitLoads {
     return known_[i].emplace(load);
   }
 
+  /// Where a point of a link's body is in the world with all joints at 0.
+  [[nodiscard]] Vector3 place(std::size_t link, const Vector3& in_body) const {
+    return outer_point(compose(at_[link], scene_.links[link].body.pose), in_body);
+  }
+  /// How far a point is from a joint [m].
+  [[nodiscard]] double distance(std::size_t joint, const Vector3& point) const {
+    const Vector3& p = at_[joint].position;
+    const Vector3 way = {point[0] - p[0], point[1] - p[1], point[2] - p[2]};
+    return std::max(kLeastReach, std::sqrt(dot(way, way)));
+  }
+  /// Whether a joint moves nothing itself, as that of a tendon.
+  [[nodiscard]] bool has_no_mass(std::size_t joint) const { return weight(joint) == 0; }
+
  private:
   [[nodiscard]] double weight(std::size_t i) const {
     const double g = std::max(std::sqrt(dot(scene_.gravity, scene_.gravity)), 1.0);
@@ -111,6 +125,50 @@ void stiffen_limits(Robot& robot) {
     const double load = loads.load(i);
     const bool turns = joint.type == JointType::revolute;
     joint.limit_stiffness = two_digits(load / (turns ? kYieldAngle : kYieldLength));
+  }
+}
+
+/// The force that a loop should hold at a point: the loads of the joints on the way to it, and of
+/// tendons on them.
+double loop_load(const Scene& scene, LimitLoads& loads, std::size_t link, const Vector3& point) {
+  double load = 0;
+  for (auto i = static_cast<int>(link); i >= 0; i = scene.links[std::size_t(i)].parent) {
+    const JointDescription& joint = scene.links[std::size_t(i)].joint;
+    if (joint.type == JointType::fixed) continue;
+    const bool turns = joint.type == JointType::revolute;
+    const double reach = turns ? loads.distance(std::size_t(i), point) : 1;
+    load = std::max(load, loads.load(std::size_t(i)) / reach);
+    for (std::size_t k = 0; k < scene.links.size(); ++k) {
+      const JointDescription& tendon = scene.links[k].joint;
+      for (std::size_t n = 0; n < tendon.follows.size(); ++n)
+        if (tendon.follows[n] == joint.name && loads.has_no_mass(k))
+          load = std::max(load, loads.load(k) * std::abs(tendon.ratio[n]) / reach);
+    }
+  }
+  return load;
+}
+
+/// Chooses the stiffness of loops: under their load they yield by kLoopGap.
+void stiffen_loops(Robot& robot) {
+  if (robot.scene.loops.empty()) return;
+  LimitLoads loads(robot);
+  for (LoopDescription& loop : robot.scene.loops) {
+    const auto link_of = [&](const std::string& body) {
+      return std::size_t(std::ranges::find_if(robot.scene.links,
+                                              [&](const auto& l) { return l.body.name == body; }) -
+                         robot.scene.links.begin());
+    };
+    const std::size_t one = link_of(loop.body1);
+    const Vector3 point = loads.place(one, loop.position1);
+    double load = loop_load(robot.scene, loads, one, point), reach = loads.distance(one, point);
+    if (!loop.body2.empty()) {
+      const std::size_t two = link_of(loop.body2);
+      load = std::max(load, loop_load(robot.scene, loads, two, point));
+      reach = std::max(reach, loads.distance(two, point));
+    }
+    loop.stiffness = two_digits(load / kLoopGap);
+    if (loop.weld)
+      loop.turning_stiffness = two_digits(loop.turning_stiffness * loop.stiffness * reach * reach);
   }
 }
 
@@ -337,6 +395,7 @@ ImportedScene import_robot(const fs::path& path, const fs::path& output,
   add_motors(robot, options.motors, name);
   const bool still = stands_still(robot.scene);
   if (!still) stiffen_limits(robot);
+  if (!still) stiffen_loops(robot);
   SceneSections sections;
   sections.contacts = contacts_text(robot, options.touches, name);
   if (!sections.contacts.empty())

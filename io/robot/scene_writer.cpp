@@ -69,6 +69,7 @@ class Writer {
     }
     if (!scene_.motors.empty()) write_motors();
     section("contact", sections.contacts);
+    write_loops();
     section("sensor", sections.sensors);
     section("variable", sections.places);
     write_start();
@@ -192,6 +193,23 @@ class Writer {
     if (std::isfinite(low) || std::isfinite(high))
       out_ +=
           fmt::format(" {}=\"{} {}\"", name, number_text(bounded(low)), number_text(bounded(high)));
+  }
+
+  void write_loops() {
+    std::string text;
+    for (const LoopDescription& loop : scene_.loops) {
+      text += fmt::format("    <{} name=\"{}\" body1=\"{}\"", loop.weld ? "weld" : "connect",
+                          attribute_text(loop.name), attribute_text(loop.body1));
+      if (!loop.body2.empty()) text += fmt::format(" body2=\"{}\"", attribute_text(loop.body2));
+      text += members_text(loop.weld ? kWeld : kConnect, loop);
+      if (loop.position2) text += fmt::format(" pos2=\"{}\"", vector_text(*loop.position2));
+      if (loop.orientation2) {
+        const Quaternion& q = *loop.orientation2;
+        text += fmt::format(" quat2=\"{}\"", numbers_text({q[0], q[1], q[2], q[3]}));
+      }
+      text += fmt::format("/>  <!-- {} -->\n", comment_text(place_in(robot_, loop.source)));
+    }
+    section("loop", text);
   }
 
   /// The start and the controls of a keyframe.

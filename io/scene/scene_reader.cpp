@@ -250,6 +250,7 @@ void read_root(const SceneNode& root, Scene& scene) {
   if (scene.links.empty()) root.fail("no <link> in any <robot>: there is nothing to simulate");
   each("actuator", [&](const SceneNode& s) { read_actuators(scene, s); });
   each("contact", [&](const SceneNode& s) { read_contacts(scene, s); });
+  each("loop", [&](const SceneNode& s) { read_loops(scene, s); });
   warn_of_dense_meshes(scene, root);
   warn_of_coarse_points(scene, root);
   each("sensor", [&](const SceneNode& s) { read_sensors(scene, s); });

@@ -153,6 +153,21 @@ void read_body_variation(const Scene& scene, const SceneElement& node,
   }
 }
 
+/// Reads a number of a loop.
+void read_loop_variation(const Scene& scene, const SceneElement& node,
+                         RandomizationDescription& d) {
+  const bool weld = node.of() == kVaryWeld;
+  d.number.owner = NumberOwner::loop;
+  d.number.name = node.text("name");
+  std::vector<std::string> names;
+  for (const LoopDescription& loop : scene.loops)
+    if (loop.weld == weld) names.push_back(loop.name);
+  if (std::ranges::find(names, d.number.name) == names.end())
+    node.fail("no " + node.name() + " of <loop> is named '" + d.number.name + "'" +
+              suggestion(d.number.name, names));
+  d.number.field = read_field(node, NumberOwner::loop);
+}
+
 /// Points of a contact of surfaces follow the kn of the scene. Warns where far larger ones are
 /// drawn.
 void warn_of_stiffer_draws(const Scene& scene, const SceneElement& node,
@@ -290,6 +305,8 @@ void read_randomize(Scene& scene, const SceneNode& section) {
       read_joint_variation(scene, node, d);
     } else if (node.of() == kVaryJoint) {
       read_state_variation(scene, node, d);
+    } else if (node.of() == kVaryConnect || node.of() == kVaryWeld) {
+      read_loop_variation(scene, node, d);
     } else if (node.of() == kVaryBody) {
       read_body_variation(scene, node, d);
     } else {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Reads actuators and contacts of a scene file.
+// Reads actuators, contacts and loops of a scene file.
 #include "io/scene/scene_sections.hpp"
 
 #include <fmt/format.h>
@@ -25,7 +25,8 @@ int find_named(const Scene& scene, const SceneNode& node, const char* attribute,
                Name&& name_of) {
   const std::string requested = node.text(attribute);
   std::vector<std::string> names;
-  if (attribute == std::string_view("body2")) names.emplace_back(kGroundName);
+  if (attribute == std::string_view("body2") && node.name() == to_string(kSurfaceContact))
+    names.emplace_back(kGroundName);
   for (std::size_t i = 0; i < scene.links.size(); ++i) {
     names.push_back(name_of(scene.links[i]));
     if (names.back() == requested) return static_cast<int>(i);
@@ -163,6 +164,27 @@ void read_contacts(Scene& scene, const SceneNode& section) {
       node.refuse(contact_fault(scene, d));
       scene.pair_contacts.push_back(std::move(d));
     }
+  }
+}
+
+void read_loops(Scene& scene, const SceneNode& section) {
+  for (const SceneElement& node : elements_in(section)) {
+    node.check();
+    LoopDescription d;
+    d.source = node.source();
+    d.weld = node.of() == kWeld;
+    find_body(scene, node, "body1");
+    d.body1 = node.text("body1");
+    if (node.has("body2")) {
+      find_body(scene, node, "body2");
+      d.body2 = node.text("body2");
+    }
+    node.read(d);
+    d.name = node.text("name", d.body1 + " " + (d.body2.empty() ? "world" : d.body2));
+    if (node.has("pos2")) d.position2 = node.vector("pos2");
+    if (node.has("quat2")) d.orientation2 = node.quaternion("quat2");
+    node.refuse(loop_fault(scene, d));
+    scene.loops.push_back(std::move(d));
   }
 }
 

@@ -17,6 +17,7 @@ BodyDescription read_body(const SceneNode& node);
 bool placed_in_world(const SceneNode& node, const BodyDescription& body);
 void read_actuators(Scene& scene, const SceneNode& section);
 void read_contacts(Scene& scene, const SceneNode& section);
+void read_loops(Scene& scene, const SceneNode& section);
 /// In the published dialect (root <redmax>), warns of meshes that touch with all their vertices:
 /// the published simulator takes about one in 50.
 void warn_of_dense_meshes(const Scene& scene, const SceneNode& root);

@@ -104,11 +104,10 @@ Vec6<N> transposed_damping(const PairSums<N>& s, const Vec6<N>& y) {
           transposed_times(s.d[0][1], y.a) + transposed_times(s.d[1][1], y.l)};
 }
 
-/// Returns Y of a pair of links: the rate at which body 2 moves against body 1 along λ, in body 1's
+/// Returns Y of a pair of links or a loop: the rate at which body 2 moves against body 1 along λ, in body 1's
 /// axes at its origin.
-template <class N>
-Vec6<N> adjoint_slip(const LinkPair& pair, const ContactScratch<N>& o,
-                     const LinkAdjoint<N>* links) {
+template <class Pair, class N>
+Vec6<N> adjoint_slip(const Pair& pair, const ContactScratch<N>& o, const LinkAdjoint<N>* links) {
   Vec6<N> y = pair.link2 < 0 ? zero6<N>() : motion_to_parent(o.link2_in_1, links[pair.link2].twist);
   if (pair.link1 >= 0) y -= links[pair.link1].twist;
   return y;
@@ -117,14 +116,15 @@ Vec6<N> adjoint_slip(const LinkPair& pair, const ContactScratch<N>& o,
 /// Adds the share of contacts to V̄: w₁ depends on W = Ad V₂ - V₁.
 template <class N>
 void adjoint_contacts(const ModelView& model, const StageArgs<N>& a, const AdjointArgs<N>& d) {
-  for_each_link_pair(model, a, [&](int k) {
-    const LinkPair& pair = model.link_pairs[k];
-    const ContactScratch<N>& o = a.contacts[k];
-    if (!o.near) return;
+  const auto add = [&](const auto& pair, const ContactScratch<N>& o) {
     const Vec6<N> w = transposed_damping(o.sums, adjoint_slip(pair, o, d.links));
     if (pair.link1 >= 0) d.links[pair.link1].V_bar -= w;
     if (pair.link2 >= 0) d.links[pair.link2].V_bar += wrench_to_child(o.link2_in_1, w);
+  };
+  for_each_link_pair(model, a, [&](int k) {
+    if (a.contacts[k].near) add(model.link_pairs[k], a.contacts[k]);
   });
+  for (int k = 0; k < model.n_loops; ++k) add(model.loops[k], loop_scratch(model, a, k));
   for (int k = 0; k < model.n_grounded; ++k) {
     const ContactScratch<N>& o = a.contacts[model.n_link_pairs + k];
     if (!o.near) continue;

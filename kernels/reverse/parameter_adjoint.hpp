@@ -275,17 +275,17 @@ void contact_places(const ModelView& model, const StageArgs<N>& a, const LinkAdj
     N* const to = out + kPlaceNumbers * link;
     to[0] -= x.x, to[1] -= x.y, to[2] -= x.z;
   };
-  for (int k = 0; k < model.n_link_pairs; ++k) {
-    const LinkPair& pair = model.link_pairs[k];
-    const ContactScratch<N>& o = a.contacts[k];
-    if (!o.near) continue;
+  const auto add = [&](const auto& pair, const ContactScratch<N>& o) {
     const Vec6<N> y = adjoint_slip(pair, o, links);
     const Vec3<N> second = pair.link1 < 0 ? y.a : y.a + links[pair.link1].twist.a;  // of Ad Λ₂
     const Vec3<N> e = place_bar(o.sums, y) + cross(o.Z.a, transposed_damping(o.sums, y).l) +
                       cross(second, o.sums.wrench.l);
     if (pair.link1 >= 0) subtract(pair.link1, -e);
     if (pair.link2 >= 0) subtract(pair.link2, transposed_times(o.link2_in_1.R, e));
-  }
+  };
+  for (int k = 0; k < model.n_link_pairs; ++k)
+    if (a.contacts[k].near) add(model.link_pairs[k], a.contacts[k]);
+  for (int k = 0; k < model.n_loops; ++k) add(model.loops[k], loop_scratch(model, a, k));
   for (int k = 0; k < model.n_grounded; ++k) {
     const ContactScratch<N>& o = a.contacts[model.n_link_pairs + k];
     if (!o.near) continue;
@@ -317,6 +317,23 @@ void place_parameters(const ModelView& model, const StageArgs<N>& a, const LinkA
   }
 }
 
+/// Adds the derivatives by the numbers of every loop.
+template <class N>
+void loop_parameters(const ModelView& model, const StageArgs<N>& a, const LinkAdjoint<N>* links,
+                     N* out) {
+  for (int k = 0; k < model.n_loops; ++k, out += kLoopNumbers) {
+    const ContactScratch<N>& o = loop_scratch(model, a, k);
+    const Vec6<N> slip = adjoint_slip(model.loops[k], o, links);
+    const LoopState<N> s = loop_state(model.loops[k], o.link2_in_1, o.W);
+    const Vec3<N> f_bar = slip.l + cross(slip.a, s.x2);
+    out[0] += dot(f_bar, s.gap);
+    out[1] += dot(f_bar, s.u);
+    if (!model.loops[k].weld) continue;
+    out[2] -= dot(slip.a, s.turned.phi);
+    out[3] -= dot(slip.a, o.W.a);
+  }
+}
+
 /// Adds all derivatives to `out`, zeros at first, in the order of ParameterRows.
 template <class N>
 void parameter_products(const ModelView& model, const StageArgs<N>& a, const AdjointArgs<N>& d,
@@ -330,6 +347,7 @@ void parameter_products(const ModelView& model, const StageArgs<N>& a, const Adj
     });
   }
   place_parameters(model, a, d.links, out + model.rows.places);
+  loop_parameters(model, a, d.links, out + model.rows.loops);
 }
 
 }  // namespace tangere::kernels

@@ -166,6 +166,11 @@ void jacobian(const ModelView& model, const StageArgs<N>& a) {
     const ContactScratch<N>& o = a.contacts[model.n_link_pairs + k];
     if (o.near) contact_jacobian<N>(model, a, model.grounded[k].link, -1, o, nullptr);
   }
+  for (int k = 0; k < model.n_loops; ++k) {  // the pattern counts them as part of their trees
+    const ContactScratch<N>& o = loop_scratch(model, a, k);
+    contact_jacobian(model, a, model.loops[k].link1, model.loops[k].link2, o,
+                     model.loops[k].link2 < 0 ? nullptr : &o.Z);
+  }
   fold_jacobian(model, a);
   without_negative_zeros(a.A, entries);
 }

@@ -79,7 +79,7 @@ struct DofEffects {
 
 /// Parameters of a link (mass, moment, inertia xx xy xz yy yz zz; Link::frame.p), of a solid (its
 /// size as contacts see it, with masses held fixed) and of a dof that have a derivative.
-inline constexpr int kInertiaNumbers = 10, kSizeNumbers = 3, kPlaceNumbers = 3;
+inline constexpr int kInertiaNumbers = 10, kSizeNumbers = 3, kPlaceNumbers = 3, kLoopNumbers = 4;
 enum DofNumber : int {
   kDofDamping,
   kDofStiffness,
@@ -96,10 +96,10 @@ inline constexpr Parameter DofEffects::*kDofParameters[kDofNumbers] = {
     &DofEffects::armature, &DofEffects::limit_stiffness, &DofEffects::friction};
 
 /// The row of each parameter among the derivatives by parameters: coefficients of pairs, of ground
-/// contacts, inertia of links, parameters of dofs, of solids, places of links, coefficients of
-/// sensors. The compiler of models sets it. Kernels compute the rows before `sensors`.
+/// contacts, inertia of links, parameters of dofs, of solids, places of links, numbers of loops,
+/// coefficients of sensors. The compiler of models sets it. Kernels compute the rows before `sensors`.
 struct ParameterRows {
-  int grounds = 0, links = 0, dofs = 0, solids = 0, places = 0,
+  int grounds = 0, links = 0, dofs = 0, solids = 0, places = 0, loops = 0,
       sensors = 0;  ///< first row of each kind
   int count = 0;
   [[nodiscard]] int pair(int k) const { return kCoefficients * k; }
@@ -108,6 +108,7 @@ struct ParameterRows {
   [[nodiscard]] int dof(int k, int which) const { return dofs + kDofNumbers * k + which; }
   [[nodiscard]] int solid(int k) const { return solids + kSizeNumbers * k; }
   [[nodiscard]] int place(int k) const { return places + kPlaceNumbers * k; }
+  [[nodiscard]] int loop(int k) const { return loops + kLoopNumbers * k; }
   [[nodiscard]] int sensor(int k) const { return sensors + kCoefficients * k; }
 };
 
@@ -248,6 +249,19 @@ struct ShearSpringContact {
   int stride = 0;
 };
 
+/// Closes a loop: springs hold a point of link 1 at one of link 2, and in a weld the axes of two
+/// frames (kernels/step/loops.hpp).
+struct Loop {
+  int link1, link2;              ///< -1: fixed in the world; then its frame is a world frame
+  Frame<double> frame1, frame2;  ///< in link 1 and link 2; the points are their origins
+  bool weld;
+  Parameter stiffness, damping;                  ///< [N/m, N s/m]
+  Parameter turning_stiffness, turning_damping;  ///< of a weld [N m/rad, N m s/rad]
+};
+/// Its numbers that have a derivative, in this order.
+inline constexpr Parameter Loop::*kLoopParameters[kLoopNumbers] = {
+    &Loop::stiffness, &Loop::damping, &Loop::turning_stiffness, &Loop::turning_damping};
+
 /// A body of the scene, for derivatives by its size. Its own contact points keep their place on its
 /// surface.
 struct Solid {
@@ -355,6 +369,8 @@ struct ModelView {
   const Follower* followers;
   const FollowerTie* ties;  ///< (n_ties) follower after follower
   const FoldedEntry* folded;
+  int n_loops;
+  const Loop* loops;
 };
 
 /// Start of the row that holds the environments of lanes 8 g … 8 g + 7 of a block.

@@ -11,7 +11,9 @@
 #include "kernels/step/faces.hpp"
 #include "kernels/step/followers.hpp"
 #include "kernels/step/joint_effects.hpp"
+#include "kernels/step/loops.hpp"
 #include "kernels/step/low_points.hpp"
+#include "kernels/step/pair_motion.hpp"
 #include "kernels/step/point_sums.hpp"
 #include "kernels/step/stage.hpp"
 
@@ -131,23 +133,6 @@ void inertial_wrenches(const ModelView& model, const StageArgs<N>& a) {
     o.F = inertia_times(mass, moment, inertia, o.A) +
           cross_wrench(o.V, inertia_times(mass, moment, inertia, o.V));
   }
-}
-
-/// Returns link 2 in link 1. The world has its own frame.
-template <class N>
-Frame<N> link_pair_pose(const LinkPair& pair, const StageArgs<N>& a) {
-  const Frame<N> origin = {diagonal(N(1.0)), zero3<N>()};
-  const Frame<N>& w1 = pair.link1 < 0 ? origin : a.links[pair.link1].world;
-  const Frame<N>& w2 = pair.link2 < 0 ? origin : a.links[pair.link2].world;
-  return relative(w1, w2);
-}
-
-/// Computes relative pose and twist of two links. The world has no twist.
-template <class N>
-void pair_motion(const LinkPair& pair, const StageArgs<N>& a, ContactScratch<N>& o) {
-  o.link2_in_1 = link_pair_pose(pair, a);
-  o.Z = pair.link2 < 0 ? zero6<N>() : motion_to_parent(o.link2_in_1, a.links[pair.link2].V);
-  o.W = pair.link1 < 0 ? o.Z : o.Z - a.links[pair.link1].V;
 }
 
 /// Returns a bound on the approach of any point of body 1 to a shape since the lists were built,
@@ -467,20 +452,6 @@ void inward_sweep(const ModelView& model, const StageArgs<N>& a) {
   }
 }
 
-/// Adds |generalised force| of one contact wrench on a link to the scale of every dof that moves
-/// the link.
-template <class N>
-void add_force_scale(const ModelView& model, const StageArgs<N>& a, int link, Vec6<N> wrench) {
-  for (int i = link; i >= 0; i = model.links[i].parent) {
-    with_kind(model.links[i].kind, [&]<JointKind K>() {
-      for (int k = 0; k < dofs(K); ++k)
-        a.force_scale[model.links[i].v + k] += abs(project<K>(model.links[i], k, wrench));
-    });
-    if (model.links[i].parent >= 0)
-      wrench = wrench_to_parent(model.links[i], a.links[i].local, wrench);
-  }
-}
-
 /// Computes poses and motions at x, and how far each lane has outrun its candidate lists.
 template <class N>
 void kinematics(const ModelView& model, const StageArgs<N>& a) {
@@ -560,6 +531,7 @@ template <bool Derivatives, class N>
 void residual(const ModelView& model, const StageArgs<N>& a) {
   inertial_wrenches(model, a);
   contact_sweep<Derivatives>(model, a);
+  loop_sweep<Derivatives>(model, a);
   inward_sweep(model, a);
   for_each_link_pair(model, a, [&](int k) {
     const ContactScratch<N>& o = a.contacts[k];
@@ -573,6 +545,7 @@ void residual(const ModelView& model, const StageArgs<N>& a) {
     const ContactScratch<N>& o = a.contacts[model.n_link_pairs + k];
     if (o.near) add_force_scale(model, a, model.grounded[k].link, o.sums.wrench);
   }
+  add_loop_scales(model, a);
   fold_residual(model, a);
   without_negative_zeros(a.g, model.nv);
 }

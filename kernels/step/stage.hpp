@@ -99,7 +99,7 @@ struct StageArgs {
              ///< lanes matter
   // scratch
   LinkScratch<N>* links;                ///< (n_links)
-  ContactScratch<N>* contacts;          ///< (n_link_pairs + n_grounded)
+  ContactScratch<N>* contacts;          ///< (n_link_pairs + n_grounded + n_loops)
   JointColumns<N>* columns;             ///< (2 n_links) motion columns of a pair
   std::uint64_t* low_points = nullptr;  ///< scratch of for_each_low_point(); null: it has none
   // results

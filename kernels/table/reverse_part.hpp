@@ -38,7 +38,7 @@ void add_adjoint_kernels(StageKernels<L>& k) {
   using View = StageView<N, L>;
   k.scratch_bytes = [](const ModelView& m) -> std::size_t {
     return sizeof(LinkScratch<N>) * m.n_links +
-           sizeof(ContactScratch<N>) * (m.n_link_pairs + m.n_grounded) +
+           sizeof(ContactScratch<N>) * (m.n_link_pairs + m.n_grounded + m.n_loops) +
            sizeof(CandidateList<N>) * m.n_pairs + sizeof(JointColumns<N>) * 2 * m.n_links +
            sizeof(LinkAdjoint<N>) * m.n_links +
            sizeof(std::uint64_t) * low_words(m.most_ground_points) + 6 * alignof(N);

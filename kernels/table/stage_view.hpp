@@ -96,7 +96,8 @@ struct StageView {
   static StageArgs<N> arguments(const ModelView& m, const StageOf& s, int lone, Scratch& scratch) {
     StageArgs<N> a;
     a.links = scratch.template take<LinkScratch<N>>(m.n_links);
-    a.contacts = scratch.template take<ContactScratch<N>>(m.n_link_pairs + m.n_grounded);
+    a.contacts =
+        scratch.template take<ContactScratch<N>>(m.n_link_pairs + m.n_grounded + m.n_loops);
     a.columns = scratch.template take<JointColumns<N>>(2 * m.n_links);
     a.low_points = scratch.template take<std::uint64_t>(low_words(m.most_ground_points));
     a.candidates = lists_of(m, s, lone, scratch);

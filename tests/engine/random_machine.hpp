@@ -5,6 +5,7 @@
 
 #include <cmath>
 
+#include "engine/scene/sensed_bodies.hpp"
 #include "tests/engine/random_scene.hpp"
 
 namespace tangere::testing {
@@ -109,6 +110,34 @@ inline Scene random_machine_on_a_base(unsigned seed, int links) {
           {l.body.name, s.links[0].body.name, c, ContactLaw::clamped, 1e-5, {}});
   }
   return s;
+}
+
+/// Closes loops between bodies that move against each other, or with the world; half are welds.
+inline void close_loops(Scene& s, unsigned seed, int count) {
+  Random random(seed + 11000);
+  const int bodies = static_cast<int>(s.links.size());
+  for (int tries = 0; tries < 20 && static_cast<int>(s.loops.size()) < count; ++tries) {
+    const int one = random.integer(0, bodies - 1), two = random.integer(-1, bodies - 1);
+    if (moving_link(s, one) == (two < 0 ? -1 : moving_link(s, two))) continue;
+    const auto place = [&] {
+      return Vector3{random.uniform(-0.05, 0.05), random.uniform(-0.05, 0.05),
+                     random.uniform(-0.05, 0.05)};
+    };
+    LoopDescription d;
+    d.name = "loop" + std::to_string(s.loops.size());
+    d.body1 = s.links[std::size_t(one)].body.name;
+    if (two >= 0) d.body2 = s.links[std::size_t(two)].body.name;
+    d.position1 = place();
+    if (random.integer(0, 1) == 1) d.position2 = place();
+    d.stiffness = random.uniform(50, 500);
+    d.damping = random.uniform(0.1, 1);
+    d.weld = s.loops.size() % 2 == 1;
+    if (d.weld) {
+      d.turning_stiffness = random.uniform(0.5, 5);
+      d.turning_damping = random.uniform(0.01, 0.1);
+    }
+    s.loops.push_back(d);
+  }
 }
 
 }  // namespace tangere::testing

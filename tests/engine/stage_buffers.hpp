@@ -23,7 +23,7 @@ class StageBuffers {
       v->assign(nv, N(0.0));
     A.assign(entries, N(0.0));
     links_.resize(m.links.size());
-    contacts_.resize(m.link_pairs.size() + m.grounded.size());
+    contacts_.resize(m.link_pairs.size() + m.grounded.size() + m.loops.size());
     columns_.resize(2 * m.links.size());
     excess_.assign(1, N(0.0));
     faces.assign(3 * m.pairs.size(), N(0.0));
@@ -83,7 +83,7 @@ class StageBuffers {
   }
   /// What contact_wrenches() copies after one of these.
   std::vector<N> wrenches() {
-    std::vector<N> out(6 * contacts_.size());
+    std::vector<N> out(6 * (contacts_.size() - model_.loops.size()));
     kernels::contact_wrenches(model_.view, arguments(1, 1, nullptr), out.data());
     return out;
   }

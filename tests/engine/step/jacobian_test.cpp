@@ -92,6 +92,24 @@ TEST(Jacobian, MachinesMatchDualNumbers) {
   }
 }
 
+TEST(Jacobian, LoopsMatchDualNumbers) {
+  std::size_t loops = 0;
+  for (unsigned seed = 1; seed <= 40; ++seed) {
+    Scene scene = testing::random_machine(seed, 2 + static_cast<int>(seed % 9));
+    testing::close_loops(scene, seed, 3);
+    loops += scene.loops.size();
+    const auto m = compile(scene);
+    StageBuffers<double> b(*m);
+    Random random(seed);
+    for (int k = 0; k < 5; ++k) {
+      testing::randomise(b, *m, random, kStep);
+      SCOPED_TRACE("seed " + std::to_string(seed));
+      compare_with_dual_numbers(*m, b, 1e-11);
+    }
+  }
+  EXPECT_GT(loops, 60U);
+}
+
 TEST(Jacobian, ContactsWithFixedBodiesMatchDualNumbers) {
   int touched = 0;
   for (unsigned seed = 1; seed <= 30; ++seed) {

@@ -6,7 +6,9 @@
 #include <cmath>
 #include <fstream>
 #include <sstream>
+#include <utility>
 
+#include "engine/sense/loop_readings.hpp"
 #include "engine/sense/readout.hpp"
 #include "engine/step/stepper.hpp"
 #include "io/robot/robot_import.hpp"
@@ -155,6 +157,55 @@ TEST(RobotMotion, DryJointsMoveByCoulombsLaw) {
   }
   EXPECT_GT(time, 0.9);
   EXPECT_NEAR(q[2], settled, 1e-8) << "the held joint does not creep";
+}
+
+/// The scene with damped loops, as SDIRK2 needs them (docs/dynamics.md).
+Scene damped_loops(Scene scene) {
+  constexpr double kTime = 0.02;  // [s]
+  for (LoopDescription& loop : scene.loops) {
+    loop.damping = kTime * loop.stiffness;
+    loop.turning_damping = kTime * loop.turning_stiffness;
+  }
+  return scene;
+}
+
+/// Largest gap and turn of loops in a run of 0.5 s by the scheme of the file.
+std::pair<double, double> largest_gap(const Scene& scene) {
+  const Model model(scene);
+  Batch batch(model, 1);
+  Stepper stepper(model);
+  double gap = 0, turn = 0;
+  for (double time = 0; time < 0.5; time += model.timestep()) {
+    stepper.step(batch, {});
+    for (const LoopReading& loop : loop_readings(model, batch, 0))
+      gap = std::max(gap, loop.gap), turn = std::max(turn, loop.turn);
+  }
+  return {gap, turn};
+}
+
+/// A crank, a coupler and a rocker that a <connect> closes.
+TEST(RobotMotion, AFourBarLinkageStaysClosed) {
+  const ImportedScene made = import_robot(kFolder + "four_bar.xml", "scene.xml", {});
+  EXPECT_THAT(made.lost, IsEmpty());
+  const Scene scene = parse_scene(made.text, "scene.xml").scene;
+  ASSERT_EQ(scene.loops.size(), 1U);
+  const MotionTable truth = read_table(kFolder + "four_bar.csv");
+  EXPECT_LT(largest_error(damped_loops(scene), truth), 2e-5);
+  EXPECT_LT(largest_joint_error(damped_loops(scene), truth, 3), 3e-4);
+  EXPECT_LT(largest_gap(scene).first, 1e-5);
+}
+
+/// An object that a <weld> holds in the hand of an arm.
+TEST(RobotMotion, AWeldHoldsAnObject) {
+  const ImportedScene made = import_robot(kFolder + "weld_arm.xml", "scene.xml", {});
+  EXPECT_THAT(made.lost, IsEmpty());
+  const Scene scene = parse_scene(made.text, "scene.xml").scene;
+  ASSERT_EQ(scene.loops.size(), 1U);
+  EXPECT_TRUE(scene.loops[0].weld);
+  const MotionTable truth = read_table(kFolder + "weld_arm.csv");
+  EXPECT_LT(largest_error(damped_loops(scene), truth), 3e-4);
+  EXPECT_LT(largest_joint_error(damped_loops(scene), truth, 2), 3e-4);
+  EXPECT_LT(largest_gap(scene).first, 1e-5);
 }
 
 }  // namespace

@@ -68,6 +68,11 @@ std::string scene_with(const std::string& lines) {
 <general_primitive_contact general_body="skin" primitive_body="ball" kn="5" kt="2" mu="0.7" )"
          R"(damping="1"/>
 </contact>
+<loop>
+<connect name="pin" body1="brick" body2="wedge" stiffness="800" damping="12"/>
+<weld name="tie" body1="can" body2="puck" stiffness="900" turning_stiffness="14" )"
+         R"(turning_damping="0.13"/>
+</loop>
 <sensor>
 <tactile name="skin" body="skin" type="rect_array" rect_pos0="-0.02 0.02 -0.005" )"
          R"(rect_pos1="0.02 -0.02 -0.005" axis0="0 -1 0" axis1="1 0 0" resolution="5 7" )"
@@ -129,6 +134,12 @@ const Row kRows[] = {
     {"", "joint puck turning stiffness", "N m/rad", true, 0.5},
     {R"(motor joint="skin" field="P")", "motor skin P", "N m/rad", true, 7},
     {R"(motor joint="slide" field="D")", "motor slide D", "N s/m", true, 0.6},
+    {R"(connect name="pin" field="stiffness")", "loop pin stiffness", "N/m", true, 800},
+    {R"(connect name="pin" field="damping")", "loop pin damping", "N s/m", true, 12},
+    {R"(weld name="tie" field="turning_stiffness")", "loop tie turning_stiffness", "N m/rad", true,
+     14},
+    {R"(weld name="tie" field="turning_damping")", "loop tie turning_damping", "N m s/rad", true,
+     0.13},
 };
 
 Scene read(const std::string& lines) { return parse_scene(scene_with(lines), "s.xml").scene; }
@@ -205,8 +216,9 @@ TEST(SceneNumbers, NoKindIsForgotten) {
   }
   for (const Attribute& kind : schema()) {
     if (!kind.field) continue;
-    for (const auto owner : {NumberOwner::contact, NumberOwner::ground, NumberOwner::tactile,
-                             NumberOwner::body, NumberOwner::joint, NumberOwner::motor}) {
+    for (const auto owner :
+         {NumberOwner::contact, NumberOwner::ground, NumberOwner::tactile, NumberOwner::body,
+          NumberOwner::joint, NumberOwner::motor, NumberOwner::loop}) {
       if ((kind.elements & element_of(owner)) == 0) continue;
       const std::string of = owner_of({owner, *kind.field, ""});
       const bool indexed = kind.has(kIndexed);
