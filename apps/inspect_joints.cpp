@@ -104,6 +104,8 @@ Json motors_json(const Scene& scene) {
                   {"control", position ? "position" : "force"},
                   {"range", Json::array({finite(m.low), finite(m.high)})}};
     if (m.turning) motor["turning_range"] = *m.turning;
+    if (m.scale) motor["scale"] = *m.scale, motor["offset"] = m.offset;
+    if (!position && m.D > 0) motor["D"] = m.D;
     if (position) {
       motor["P"] = m.P;
       motor["D"] = m.D;
@@ -117,7 +119,10 @@ Json motors_json(const Scene& scene) {
 std::string motors_text(const Scene& scene) {
   std::string text = fmt::format("motors ({})\n", scene.motors.size());
   for (const MotorDescription& m : scene.motors) {
-    if (m.control == MotorControl::force) {
+    if (m.control == MotorControl::force && m.scale) {
+      text += fmt::format("  {}: force {:.6g} u + {:.6g}{}, {}\n", m.joint, *m.scale, m.offset,
+                          m.D > 0 ? fmt::format(" - {:.6g} v", m.D) : "", range_text(m));
+    } else if (m.control == MotorControl::force) {
       text += force_text(m.turning ? m.joint + " (sliding)" : m.joint, m.low, m.high);
       if (m.turning) text += force_text(m.joint + " (turning)", (*m.turning)[0], (*m.turning)[1]);
     } else {

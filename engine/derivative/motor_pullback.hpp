@@ -28,10 +28,10 @@ struct MotorPullback {
     for (int k = 0; k < m.nu; ++k) {
       const CompiledMotor& motor = m.motors[std::size_t(k)];
       double& out = u_bar[k * kernels::kBlock];
-      if (motor.control == MotorControl::force) {
-        out += force_slope(motor, u[std::size_t(k)]) * o.tau[motor.dof][lane];
-      } else if (motor.timing == MotorTiming::end) {
+      if (motor.at_end) {
         out += motor_input_slope(motor, u[std::size_t(k)]) * o.target[motor.dof][lane];
+      } else if (motor.control == MotorControl::force) {
+        out += force_slope(motor, u[std::size_t(k)]) * o.tau[motor.dof][lane];
       } else {
         at_start(motor, k, o, u_bar);
       }

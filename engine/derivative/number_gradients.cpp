@@ -230,11 +230,12 @@ void NumberGradients::add_place(std::size_t joint) {
 void NumberGradients::add_motors() {
   const Scene& scene = model_.scene();
   for (const MotorDescription& d : scene.motors) {
-    if (d.control != MotorControl::position) continue;
+    if (!d.has_gains()) continue;
     std::size_t joint = 0;
     while (scene.links[joint].joint.name != d.joint) ++joint;
     const int n = dof_count(scene.links[joint].joint.type);
-    add({Owner::motor, Field::P, d.joint}, dof_terms(joint, kernels::kDofP, 0, n));
+    if (d.control == MotorControl::position)
+      add({Owner::motor, Field::P, d.joint}, dof_terms(joint, kernels::kDofP, 0, n));
     add({Owner::motor, Field::D, d.joint}, dof_terms(joint, kernels::kDofD, 0, n));
   }
 }

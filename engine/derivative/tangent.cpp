@@ -284,15 +284,15 @@ struct Tangent::Impl {
                : force.value > motor.high ? D(motor.high)
                                           : force;
       };
+      if (motor.at_end) {
+        stage.target[dof] = input_of(motor, u[k], u_dot[k]);
+        continue;
+      }
       if (motor.control == MotorControl::force) {
         const double half = 0.5 * (motor.high - motor.low);
         stage.tau[dof] += motor.maps ? clipped(input_of(motor, u[k], u_dot[k]))
                                      : D(motor.low + (std::clamp(u[k], -1.0, 1.0) + 1) * half,
                                          std::abs(u[k]) <= 1 ? half * u_dot[k] : 0);
-        continue;
-      }
-      if (motor.timing == MotorTiming::end) {
-        stage.target[dof] = input_of(motor, u[k], u_dot[k]);
         continue;
       }
       const auto gain = [&](const kernels::Parameter& p, kernels::DofNumber which) {

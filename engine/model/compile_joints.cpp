@@ -215,18 +215,20 @@ void compile_motors(CompiledModel& m, const NameIndex& joints) {
                           d.scale.value_or(1),
                           d.offset,
                           d.u_range[0],
-                          d.u_range[1]});
+                          d.u_range[1],
+                          d.acts_at_end()});
       const std::string& rate = m.v_names[std::size_t(dof)];
       m.u_names.push_back(d.name.empty()         ? rate
                           : dof_count(type) == 1 ? d.name
                                                  : d.name + rate.substr(d.joint.size()));
       const bool position = d.control == MotorControl::position;
       m.u_units.emplace_back(!position || d.scale ? "1" : dof_turns(type, k) ? "rad" : "m");
-      if (!position || d.timing == MotorTiming::start) continue;
+      if (!d.acts_at_end()) continue;
       link.effects |= kernels::kPositionServo;
       kernels::DofEffects& e = m.dof_effects[std::size_t(dof)];
-      e.P = {d.P, -1};
+      e.P = {position ? d.P : 1, -1};
       e.D = {d.D, -1};
+      e.q_apart = position ? 0 : 1;
       e.force_low = low;
       e.force_high = high;
     }
@@ -265,7 +267,8 @@ void vary_joint(CompiledModel& m, int joint, const RandomizationDescription& d, 
     const bool P = field == NumberField::P;
     for (CompiledMotor& motor : m.motors) {
       const int k = motor.dof - compiled.v;
-      if (motor.control != MotorControl::position || k < 0 || k >= dof_count(of.type)) continue;
+      const bool has = motor.control == MotorControl::position || (motor.at_end && !P);
+      if (!has || k < 0 || k >= dof_count(of.type)) continue;
       kernels::DofEffects& e = m.dof_effects[std::size_t(motor.dof)];
       (P ? motor.P : motor.D).row = row;
       (P ? e.P : e.D).row = row;

@@ -45,7 +45,8 @@ struct CompiledJoint {
 /// Motor on one dof. Its input is u or, where it maps, scale clip(u, u_low, u_high) + offset. Force
 /// motors: force = low + (clip(u) + 1)/2 (high - low), or the input clipped to the range. Position
 /// motors evaluated at the end of the step are effects of their joint
-/// (kernels/step/joint_effects.hpp), and the input is their target.
+/// (kernels/step/joint_effects.hpp), and the input is their target. So are force motors with D:
+/// clip(input - D v, range).
 struct CompiledMotor {
   int dof;
   double low, high;
@@ -55,6 +56,7 @@ struct CompiledMotor {
   kernels::Parameter P, D;
   bool maps;
   double scale, offset, u_low, u_high;
+  bool at_end;  ///< its force is an effect of its joint, and the input is its target
 };
 
 /// Flat pads with at most this many points are read in all environments at once.

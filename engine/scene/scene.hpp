@@ -154,15 +154,16 @@ struct LinkDescription {
 /// Force motor: u in [-1, 1] per dof of the joint is clipped and mapped linearly to [low, high].
 /// With `scale`, the force is scale u + offset, clipped to [low, high]. Position motor: the target
 /// of q (spherical: a rotation vector) is u + offset or scale u + offset, and the force is
-/// P (target - q) - D v, clipped to [low, high].
-/// A joint may have several motors, of which at most one is a position motor.
+/// P (target - q) - D v, clipped to [low, high]. A force motor with D servoes the velocity: its
+/// force is scale u + offset - D v, clipped.
+/// A joint may have several motors, of which at most one has gains.
 struct MotorDescription {
   std::string joint;
   double low = -1;  ///< force at u = -1 [N or N m]; position: smallest force, -infinity for none
   double high = 1;  ///< force at u = +1; position: largest force, infinity for none
   Source source;
   MotorControl control = MotorControl::force;
-  double P = 0, D = 0;                    ///< position: gains [N/m, N s/m or N m/rad, N m s/rad]
+  double P = 0, D = 0;                    ///< gains [N/m, N s/m or N m/rad, N m s/rad]
   MotorTiming timing = MotorTiming::end;  ///< position motors: when q and v are taken for the force
   /// free2d, free: low and high of the dofs that turn, where they differ from those that slide
   /// [N m].
@@ -175,6 +176,13 @@ struct MotorDescription {
   static constexpr double kNoBound = std::numeric_limits<double>::infinity();
   std::array<double, 2> u_range = {-kNoBound, kNoBound};  ///< to which u is clipped first
 
+  /// Whether its force depends on the state at the end of the step: position motors, and force
+  /// motors with D, whose force is scale u + offset - D v, clipped to [low, high].
+  [[nodiscard]] bool acts_at_end() const {
+    return control == MotorControl::position ? timing == MotorTiming::end : D > 0;
+  }
+  /// Whether it has a gain D, or P as well.
+  [[nodiscard]] bool has_gains() const { return control == MotorControl::position || D > 0; }
   /// The name of its controls, before that of the dof.
   [[nodiscard]] const std::string& control_name() const { return name.empty() ? joint : name; }
   /// Whether u differs from what the law of the motor without scale, offset and u_range reads.

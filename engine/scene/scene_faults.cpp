@@ -104,12 +104,14 @@ std::string varying_number_fault(const Scene& scene, const SceneNumber& n) {
     case NumberOwner::body:
       return with_body == nullptr ? "" : body_variation_fault(with_body->body, n);
     case NumberOwner::motor:
-      return std::ranges::any_of(scene.motors,
-                                 [&](const MotorDescription& m) {
-                                   return m.joint == n.name && m.control == MotorControl::position;
-                                 })
+      return std::ranges::any_of(
+                 scene.motors,
+                 [&](const MotorDescription& m) {
+                   return m.joint == n.name && m.has_gains() &&
+                          (n.field == Field::D || m.control == MotorControl::position);
+                 })
                  ? ""
-                 : "the joint has no position motor; force motors have no gains";
+                 : "the joint has no position motor; force motors have no P, and D if they give it";
     case NumberOwner::tactile:
       return std::ranges::any_of(scene.pair_contacts,
                                  [&](const auto& c) { return c.sensor == n.name; })
@@ -199,6 +201,11 @@ std::string body_fault(const BodyDescription& body) {
 /// Returns an error text for how a motor maps its control; "" if there is none. `link`: of its
 /// joint, or null.
 static std::string input_fault(const LinkDescription* link, const MotorDescription& motor) {
+  if (motor.control == MotorControl::force && motor.D != 0 && !motor.scale)
+    return "D of a force motor needs 'scale': its force is scale u + offset - D v";
+  if (motor.control == MotorControl::force && motor.D != 0 && link != nullptr &&
+      (turns_freely(link->joint.type) || link->joint.type == JointType::free2d))
+    return "joint '" + motor.joint + "' turns freely, or slides and turns: expected no D";
   if (!motor.maps()) return "";
   if (!motor.scale && motor.control == MotorControl::force)
     return "offset and u_range of a force motor need 'scale': without it, u counts from -1 to 1 "
@@ -220,8 +227,9 @@ std::string motor_fault(const Scene& scene, const MotorDescription& motor) {
   const bool position = motor.control == MotorControl::position;
   for (const MotorDescription& other : scene.motors) {
     if (&other == &motor) break;
-    if (position && other.joint == motor.joint && other.control == MotorControl::position)
-      return "joint '" + motor.joint + "' already has a position motor; expected one at most";
+    if (motor.has_gains() && other.joint == motor.joint && other.has_gains())
+      return "joint '" + motor.joint +
+             "' already has a position motor, or a force motor with D; expected one at most";
     if (other.control_name() == motor.control_name())
       return "another motor has the name '" + motor.control_name() +
              "' already; expected a name of its own (a motor without one has that of its joint)";

@@ -101,7 +101,8 @@ const double* find_number(const Scene& scene, const SceneNumber& n) {
   const double* found = nullptr;
   if (n.owner == Owner::motor) {
     for (const MotorDescription& motor : scene.motors)
-      if (motor.joint == n.name && motor.control == MotorControl::position)
+      if (motor.joint == n.name && motor.has_gains() &&
+          (n.field == Field::D || motor.control == MotorControl::position))
         found = n.field == Field::P ? &motor.P : &motor.D;
     return found;
   }

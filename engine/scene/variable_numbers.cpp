@@ -43,7 +43,7 @@ std::vector<SceneNumber> variable_numbers(const Scene& scene) {
       add({NumberOwner::joint, NumberField::pos, link.joint.name, axis});
   }
   for (const MotorDescription& motor : scene.motors) {
-    if (motor.control != MotorControl::position) continue;
+    if (!motor.has_gains()) continue;
     for (const NumberField gain : {NumberField::P, NumberField::D})
       add({NumberOwner::motor, gain, motor.joint});
   }

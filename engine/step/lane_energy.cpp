@@ -83,6 +83,12 @@ struct LaneAt {
     }
     if ((link.effects & kernels::kPositionServo) == 0) return;
     const double P = number(e.P);
+    if (e.q_apart > 0) {  // `error` has no q to be taken from; it stores nothing
+      if (terms != nullptr)
+        terms->motors +=
+            rate * std::clamp(P * (error + place) - number(e.D) * rate, e.force_low, e.force_high);
+      return;
+    }
     if (terms != nullptr) {
       terms->motors += rate * std::clamp(P * error - number(e.D) * rate, e.force_low, e.force_high);
       return;

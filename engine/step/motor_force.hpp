@@ -62,7 +62,7 @@ bool set_motors(const CompiledModel& m, BasicWorkspace<L>& w, int lane, const do
   for (std::size_t k = 0; k < std::size_t(m.nu); ++k) {
     if (!std::isfinite(u[k])) return false;
     const CompiledMotor& motor = m.motors[k];
-    if (motor.control == MotorControl::position && motor.timing == MotorTiming::end) {
+    if (motor.at_end) {
       w.stage.target[motor.dof][lane] = motor_input(motor, u[k]);
     } else {
       w.stage.tau[motor.dof][lane] +=

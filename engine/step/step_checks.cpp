@@ -16,6 +16,7 @@
 #include "engine/step/detection.hpp"
 #include "engine/step/lane_energy.hpp"
 #include "engine/step/rotation_defect.hpp"
+#include "engine/step/shear_lane.hpp"
 
 namespace tangere {
 
@@ -112,6 +113,19 @@ LaneBits velocity_jumps(const CompiledModel& model, const std::vector<double>& c
   return found & lanes;
 }
 
+/// Returns what force motors with D do in a step of one lane [J].
+template <int L>
+double servo_work(const CompiledModel& model, const BasicWorkspace<L>& w, int lane) {
+  double work = 0;
+  for (const CompiledMotor& motor : model.motors) {
+    if (motor.control != MotorControl::force || !motor.at_end) continue;
+    const double force = w.stage.target[motor.dof][lane] -
+                         number_of<L>(motor.D, w.stage, lane) * w.v1[motor.dof][lane];
+    work += std::clamp(force, motor.low, motor.high) * w.stage.x[motor.dof][lane];
+  }
+  return work;
+}
+
 /// Returns the lanes whose solve created energy.
 template <int L>
 LaneBits energy_gains(const CompiledModel& model, const std::vector<double>& component_mass,
@@ -127,6 +141,7 @@ LaneBits energy_gains(const CompiledModel& model, const std::vector<double>& com
                      after = energy_of_bodies(model, w, w.poses_after, w.q1, w.v1, l);
     double gain = after.total - before.total;
     for (int i = 0; i < model.nv; ++i) gain -= w.stage.tau[i][l] * w.stage.x[i][l];
+    gain -= servo_work(model, w, l);
     const ShearLanes<L>& memory = w.shear;
     const double held = energy_of_contacts(model, table, w, w.poses_before, l) +
                         energy_of_friction(model, w, memory.now[std::size_t(l)], l),

@@ -4,7 +4,8 @@
 // G f:
 //   f = g c + b - kp G (q + ref) - kv G v
 //   kp > 0    a position motor: P = kp G², D = kv G², target (g c + b)/(kp G) - ref
-//   kp = 0    a force motor G (g c + b), and damping kv G² of the joint
+//   kp = 0    a force motor G (g c + b), and damping kv G² of the joint or, with a forcerange, D
+//             of the motor
 // motor: g = 1; position: g = kp; velocity: g = kv; all with b = 0. With dampratio Z instead of kv,
 // D = 2 Z sqrt(P I), I = 1/(M⁻¹)jj where all joints are at rest, which is kv = 2 Z sqrt(kp m) with
 // m = 1/(J M⁻¹ Jᵀ). The scene's control is the file's c.
@@ -91,8 +92,7 @@ class Actuators {
     damp();
     std::map<std::string, std::vector<std::size_t>> position_motors;  // by joint
     for (std::size_t k = 0; k < scene_.motors.size(); ++k)
-      if (scene_.motors[k].control == MotorControl::position)
-        position_motors[scene_.motors[k].joint].push_back(k);
+      if (scene_.motors[k].has_gains()) position_motors[scene_.motors[k].joint].push_back(k);
     std::vector<std::size_t> lost;
     for (const auto& [joint, motors] : position_motors) {
       const auto clips = [&](std::size_t k) { return is_clipped(scene_.motors[k]); };
@@ -302,11 +302,15 @@ class Actuators {
       motor.offset = gear * law.bias;
     }
     if (law.kv == 0) return;
+    if (is_clipped(motor)) {
+      motor.scale = slope;
+      motor.offset = gear * law.bias;
+      motor.D = law.kv * gear * gear;
+      return;
+    }
     joint.damping += law.kv * gear * gear;
     node.changed(fmt::format("<{}>: a motor for the control, and damping of joint '{}'",
                              node.name(), motor.joint));
-    if (motor.scale && is_clipped(motor))
-      node.lost("<" + node.name() + "> forcerange: the damping is not clipped");
   }
 
   MjcfWhole& whole_;

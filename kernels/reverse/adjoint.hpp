@@ -148,7 +148,7 @@ void adjoint_targets(const ModelView& model, const StageArgs<N>& a, const Link& 
   };
   if constexpr (K != JointKind::spherical) {
     for (int k = 0; k < dofs(K); ++k) {
-      pulled(k, u[k] - (c[k] + x[k]));
+      pulled(k, motor_error(e[k], u[k], N(c[k] + x[k])));
       target[link.v + k] = pull[k];
     }
   } else {  // ψ = log(q⁻¹ exp u): δψ = J_r⁻¹(ψ) J_r(u) δu

@@ -243,7 +243,7 @@ void joint_parameters(const ModelView& model, const StageArgs<N>& a, const Link&
       if (link.effects & kDryFriction)
         out[kDofNumbers * k + kDofFriction] -=
             of * dry_friction(e[k], q, a.v[link.v + k], a.dry_anchor[link.v + k]).share;
-      if (link.effects & kPositionServo) motor(k, u[k] - q);
+      if (link.effects & kPositionServo) motor(k, motor_error(e[k], u[k], q));
     }
   } else {
     const Quat<N> q = Quat<N>{c[0], c[1], c[2], c[3]} * quaternion_exp(Vec3<N>{x[0], x[1], x[2]});

@@ -5,6 +5,8 @@
 //   f = -c v - I_a a - k (q - rest) + k_l max(0, lo - q) - k_l max(0, q - hi)
 //       - τ clip((q - z + t_f v)/θ_b, ±1) + clip(P (u - q) - D v, range)
 //
+// where a motor that servoes its velocity has P = 1 and no q.
+//
 // A spherical joint has rotation vectors in place of q: φ = log q, φ_s = log(rest⁻¹ q),
 // ψ = log(q⁻¹ exp u). Torques in body axes: spring -k φ_s (the gradient of k|φ_s|²/2, as
 // J_r⁻ᵀ(φ) φ = φ); limits J_r⁻ᵀ(φ) f(φ), f per component; motor clip(P ψ - D ω). By the right
@@ -52,6 +54,12 @@ N limit_force(const DofEffects& e, const N& stiffness, const N& q, N& slope) {
   return select(q < low, stiffness * (low - q), select(q > high, stiffness * (high - q), zero));
 }
 
+/// Returns what P of a motor multiplies, for joints that do not turn freely.
+template <class N>
+N motor_error(const DofEffects& e, const N& target, const N& q) {
+  return target - N(1 - e.q_apart) * q;
+}
+
 /// Returns the force of a position motor at the distance `error` from its target. `inside` is 1
 /// where the force is not clipped.
 template <class N>
@@ -90,8 +98,9 @@ void add_plain_effects(const StageArgs<N>& a, const Link& link, const DofEffects
   if (link.effects & kPositionServo) {
     const N P = load_parameter(a, e.P), D = load_parameter(a, e.D);
     N inside;
-    add_force(out, k, motor_force(e, P, D, a.target[link.v + k] - q, a.v[link.v + k], inside));
-    out.d_dq[k] += inside * P;
+    const N error = motor_error(e, a.target[link.v + k], q);
+    add_force(out, k, motor_force(e, P, D, error, a.v[link.v + k], inside));
+    out.d_dq[k] += inside * P * N(1 - e.q_apart);
     out.d_dv[k] += inside * D;
   }
 }

@@ -72,9 +72,11 @@ struct DofEffects {
   double low, high;              ///< limits [m, rad]
   Parameter P, D;                ///< gains of a position motor evaluated at the end of the step
   double force_low, force_high;  ///< range of the motor's force; infinite: none
-  Parameter friction;            ///< bound of dry friction [N or N m]
-  double friction_rate;          ///< 1/θ_b of dry friction [1/m or 1/rad]
-  double friction_time;          ///< t_f of dry friction [s]
+  /// 1: q does not enter the motor's force, which is P u - D v. 0: it is P (u - q) - D v.
+  double q_apart;
+  Parameter friction;    ///< bound of dry friction [N or N m]
+  double friction_rate;  ///< 1/θ_b of dry friction [1/m or 1/rad]
+  double friction_time;  ///< t_f of dry friction [s]
 };
 
 /// Parameters of a link (mass, moment, inertia xx xy xz yy yz zz; Link::frame.p), of a solid (its

@@ -3,6 +3,7 @@
 // are fixed in the world.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 
 #include "engine/scene/sensed_bodies.hpp"
@@ -68,8 +69,8 @@ inline Scene random_machine(unsigned seed, int links) {
   return s;
 }
 
-/// Gives all motors a scale, an offset and a range that random controls leave, and each joint that
-/// is driven a second motor.
+/// Gives all motors a scale, an offset and a range that random controls leave, force motors a D, and
+/// each joint that is driven a second motor.
 inline void map_controls(Scene& s, unsigned seed) {
   Random random(seed + 7000);
   std::vector<MotorDescription> more;
@@ -81,6 +82,14 @@ inline void map_controls(Scene& s, unsigned seed) {
     more.back().name = m.joint + "_more";
   }
   s.motors.insert(s.motors.end(), more.begin(), more.end());
+  Random gains(seed + 7500);
+  for (MotorDescription& m : s.motors) {
+    const auto of = std::find_if(s.links.begin(), s.links.end(),
+                                 [&](const auto& l) { return l.joint.name == m.joint; });
+    const double D = gains.uniform(0.05, 0.5);
+    if (m.control == MotorControl::force && m.scale && of->joint.type != JointType::spherical)
+      m.D = D;
+  }
 }
 
 /// A tree on a fixed root. Its cuboids touch the root's body, whose points touch them.

@@ -229,6 +229,54 @@ TEST(MappedMotors, MotorsOfAJointAddUp) {
   }
 }
 
+/// A force motor with D: far from the wanted velocity it pushes with the bound, near it the velocity
+/// approaches as exp(-D t/m), with any D.
+TEST(Motors, AServoOfVelocityIsClippedAsAWhole) {
+  Scene s = lift({"car_joint", -40, 40, {}});
+  s.gravity = {0, 0, 0};
+  MotorDescription& motor = s.motors[0];
+  motor.D = 50;
+  motor.scale = 50;  // u is the velocity
+  const Model model(s);
+  const double m = model.mass(0), h = 1e-3;
+  Batch batch(model, 1);
+  Stepper stepper(model, testing::options(Integrator::sdirk3, h));
+  int t = 0;
+  for (; 50 * (2 - 40 * h * (t + 1) / m) > 40; ++t) stepper.step(batch, std::vector<double>{2});
+  EXPECT_GT(t, 10);
+  EXPECT_NEAR(v_of(batch)[0], 40 * h * t / m, 1e-9) << "with the bound";
+  for (int k = 0; k < 3; ++k) stepper.step(batch, std::vector<double>{2});
+  const double v = v_of(batch)[0];
+  for (int k = 0; k < 100; ++k) stepper.step(batch, std::vector<double>{2});
+  EXPECT_NEAR(v_of(batch)[0], 2 - (2 - v) * std::exp(-50 * 0.1 / m), 1e-6);
+  s.motors[0].D = s.motors[0].scale.emplace(1e9);
+  const Model stiff(s);
+  Batch soon(stiff, 1);
+  Stepper large(stiff, testing::options(Integrator::bdf1, 0.1));
+  for (int k = 0; k < 100; ++k) large.step(soon, std::vector<double>{0.5});
+  EXPECT_NEAR(v_of(soon)[0], 0.5, 1e-6);
+}
+
+TEST(Motors, FaultsOfServosSayWhatWasExpected) {
+  const auto fault = [](const auto& change) {
+    Scene s = lift({"car_joint", -1, 1, {}});
+    change(s);
+    try {
+      const Model model(s);
+    } catch (const InputError& e) {
+      return std::string(e.what());
+    }
+    return std::string();
+  };
+  EXPECT_NE(fault([](Scene& s) { s.motors[0].D = 2; }).find("needs 'scale'"), std::string::npos);
+  EXPECT_NE(fault([](Scene& s) {
+              s.motors[0].D = 2, s.motors[0].scale = 1;
+              s.motors.push_back(position_motor("car_joint", 1, 1));
+              s.motors.back().name = "other";
+            }).find("or a force motor with D; expected one at most"),
+            std::string::npos);
+}
+
 TEST(VariedJoints, ADrawnNumberActsLikeAConstantOne) {
   Scene s;
   s.links = {link("arm", JointType::revolute, {0, 0, 0}, kBox, 500),
