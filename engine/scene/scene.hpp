@@ -140,7 +140,7 @@ struct BodyDescription {
   double density = 1;  ///< [kg/m³]; 0: massless, so something with mass must move with it
   std::array<double, 4> rgba{0.7, 0.7, 0.7, 1};
   Source source;
-  double gravity_share = 1;  ///< of gravity that acts on it; the same in a tree of joints that move
+  double gravity_share = 1;  ///< of gravity that acts on it; the same on one link
 };
 
 /// A link: one joint to the parent link (or the world) and one body that moves with it.

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// gravcomp lifts a body by a part of its weight. A scene has one share of gravity for all bodies of
-// a tree of joints. The share of a body that its joints cannot lift does not matter.
+// gravcomp lifts a body by a part of its weight. A scene has one share of gravity for bodies that
+// move rigidly together. The share of a body that its joints cannot lift does not matter.
 #include <algorithm>
 #include <cmath>
 #include <set>
@@ -36,33 +36,39 @@ void read_mjcf_gravity(MjcfWhole& whole) {
   if (whole.gravcomp.empty()) return;
   std::vector<LinkDescription>& links = whole.robot.scene.links;
   std::vector<Pose> at;
-  std::vector<int> root;  // the first link of the tree that moves; -1: it stands in the world
+  std::vector<int> root;  // the link that it moves with; -1: it stands in the world
   std::vector<bool> lifted;
-  std::map<int, double> shares;  // by root
+  std::vector<std::size_t> tree;
+  std::map<int, double> shares;         // by root
+  std::map<std::size_t, double> usual;  // by tree: of its first body that joints lift
   std::set<int> mixed;
   for (std::size_t i = 0; i < links.size(); ++i) {
     const JointDescription& joint = links[i].joint;
     const auto up = std::size_t(links[i].parent);
     const bool first = links[i].parent < 0;
     at.push_back(first ? joint.pose : compose(at[up], joint.pose));
-    root.push_back(!first && root[up] >= 0          ? root[up]
-                   : joint.type == JointType::fixed ? -1
-                                                    : static_cast<int>(i));
+    root.push_back(joint.type != JointType::fixed ? static_cast<int>(i) : first ? -1 : root[up]);
+    tree.push_back(first ? i : tree[up]);
     lifted.push_back((!first && lifted[up]) || lifts(joint, at.back(), whole.robot.scene.gravity));
     if (!lifted.back() || !has_mass(links[i].body)) continue;
     const double share = links[i].body.gravity_share;
     if (shares.try_emplace(root[i], share).first->second != share) mixed.insert(root[i]);
+    usual.try_emplace(tree[i], share);
   }
   for (std::size_t i = 0; i < links.size(); ++i) {
-    const auto share = shares.find(root[i]);
-    const bool counts = has_mass(links[i].body) && share != shares.end();
-    links[i].body.gravity_share = counts && !mixed.contains(root[i]) ? share->second : 1;
+    double& share = links[i].body.gravity_share;
+    if (!has_mass(links[i].body) || root[i] < 0 || mixed.contains(root[i]))
+      share = 1;
+    else if (const auto own = shares.find(root[i]); own != shares.end())
+      share = own->second;
+    else  // its weight does no work
+      share = usual.contains(tree[i]) ? usual.at(tree[i]) : 1;
   }
   for (const auto& [link, source] : whole.gravcomp)
     if (mixed.contains(root[std::size_t(link)]))
       whole.robot.lost.add(source,
-                           "<body> gravcomp: it is not that of all bodies of the tree of joints, "
-                           "which have one share of gravity");
+                           "<body> gravcomp: it is not that of all bodies that move rigidly with "
+                           "it, which have one share of gravity");
 }
 
 }  // namespace tangere

@@ -65,7 +65,7 @@ const char* follower_fault(const Robot& robot, const JointDescription& joint) {
                        "': no joint has this name");
     if (dof_count(joint.type) != 1 || dof_count(leader->type) != 1)
       return "which is not between joints of one degree of freedom each";
-    if (name.find_first_of(" \t") != std::string::npos) return "whose name has a blank";
+    if (name.find(',') != std::string::npos) return "whose name has a comma";
   }
   std::set<const JointDescription*> passed;
   return leads_to(robot, joint, joint, passed) ? "which follows it in turn" : nullptr;

@@ -41,6 +41,16 @@ std::string members_text(Element element, const T& of, std::string_view type = {
   return text;
 }
 
+/// Names between blanks, or between commas where one has a blank.
+std::string leaders_text(const std::vector<std::string>& names) {
+  const auto has_blank = [](const std::string& name) {
+    return name.find_first_of(" \t") != std::string::npos;
+  };
+  if (!std::any_of(names.begin(), names.end(), has_blank))
+    return fmt::format("{}", fmt::join(names, " "));
+  return fmt::format("{}{}", fmt::join(names, ", "), names.size() == 1 ? "," : "");
+}
+
 const char* joint_word(JointType type) {
   return type == JointType::free ? "free3d" : to_string(type);
 }
@@ -116,8 +126,8 @@ class Writer {
                           number_text((*joint.limits)[1]));
     if (!joint.follows.empty())
       out_ += fmt::format(" follows=\"{}\" ratio=\"{}\" offset=\"{}\"",
-                          attribute_text(fmt::format("{}", fmt::join(joint.follows, " "))),
-                          numbers_text(joint.ratio), number_text(joint.offset));
+                          attribute_text(leaders_text(joint.follows)), numbers_text(joint.ratio),
+                          number_text(joint.offset));
     out_ += "/>\n";
   }
 

@@ -96,6 +96,22 @@ void check_driven(const SceneNode& node, JointType type, const MotorDescription&
               "slides and turns, so its dofs cannot share P and D; expected ctrl=\"force\"");
 }
 
+/// Splits names between blanks or, if there is a comma, between commas.
+std::vector<std::string> leaders_of(const std::string& text) {
+  if (text.find(',') == std::string::npos) return words_of(text.c_str());
+  std::vector<std::string> names;
+  for (std::size_t at = 0; at < text.size();) {
+    const std::size_t end = std::min(text.find(',', at), text.size());
+    const std::size_t first = text.find_first_not_of(' ', at);
+    if (first < end) {
+      const std::size_t last = text.find_last_not_of(' ', end - 1);
+      names.push_back(text.substr(first, last + 1 - first));
+    }
+    at = end + 1;
+  }
+  return names;
+}
+
 }  // namespace
 
 double coordinate_scale(JointType type, int index, const SceneContext& c) {
@@ -124,7 +140,7 @@ void read_follower(const SceneElement& node, JointDescription& joint) {
     if (!node.has("follows") && node.has(name))
       node.warn(fmt::format("'{}' has no effect without 'follows'", name));
   if (!node.has("follows")) return;
-  joint.follows = words_of(node.text("follows").c_str());
+  joint.follows = leaders_of(node.text("follows"));
   if (joint.follows.empty()) node.fail("follows=\"\"; expected names of joints");
   joint.ratio = node.has("ratio") ? node.numbers("ratio", joint.follows.size())
                                   : std::vector<double>(joint.follows.size(), 1.0);

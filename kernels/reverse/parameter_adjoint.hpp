@@ -199,10 +199,10 @@ void inertia_parameters(const ModelView& model, const StageArgs<N>& a, const Lin
   for (int i = 0; i < model.n_links; ++i, out += kInertiaNumbers) {
     const LinkScratch<N>& s = a.links[i];
     if (model.links[i].never_rotates) {
-      out[0] -= dot(links[i].twist.l, s.A.l);
+      out[0] -= dot(links[i].twist.l, felt_acceleration(model, model.links[i], s).l);
       continue;
     }
-    subtract_inertia(links[i].twist, s.A, out);
+    subtract_inertia(links[i].twist, felt_acceleration(model, model.links[i], s), out);
     subtract_inertia(-cross_motion(s.V, links[i].twist), s.V, out);
   }
 }

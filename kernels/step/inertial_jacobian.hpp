@@ -12,6 +12,10 @@
 //   ∂ID_j/∂v_i = S_jᵀ(Bᶜ S_i + Iᶜ (Ψ̇_i + Ṡ_i))
 //       ∂ID_i/∂v_j = S_iᵀ(Bᶜ S_j + Iᶜ (Ψ̇_j + Ṡ_j))
 //   M_ji = S_jᵀ Iᶜ S_i
+// Lifts: with the composites m', c' of lift times mass and moment, and a gravity in a joint's axes,
+//   ∂ID_j/∂q_i += S_jᵀ (c' × l; m' l),  l = a × s_i;  ∂ID_i/∂q_j += (s_i × c' + m' S_i)·(a × s_j)
+// where s is the angular part of S.
+//
 // B of a rigid body acts on the angular part alone, as (bias; -2 [momentum]). It keeps this form
 // when moved and summed.
 #pragma once
@@ -68,6 +72,23 @@ void add_composites(const Link& link, const LinkScratch<N>& o, LinkScratch<N>& p
   p.bias += bias;
 }
 
+/// Sums lifts over subtrees, after the masses of single links are set.
+template <class N>
+void composite_lifts(const ModelView& model, const StageArgs<N>& a) {
+  for (int i = 0; i < model.n_links; ++i) {
+    const N lift(model.links[i].lift);
+    a.links[i].lift_mass = lift * a.links[i].mass;
+    a.links[i].lift_moment = lift * a.links[i].moment;
+  }
+  for (int i = model.n_links - 1; i >= 0; --i) {
+    if (model.links[i].parent < 0) continue;
+    const LinkScratch<N>& o = a.links[i];
+    LinkScratch<N>& p = a.links[model.links[i].parent];
+    p.lift_mass += o.lift_mass;
+    p.lift_moment += o.local.R * o.lift_moment + o.lift_mass * o.local.p;
+  }
+}
+
 /// Sets the own inertia and bias of each link, then sums them over subtrees. A link that never
 /// turns needs only its mass.
 template <class N>
@@ -87,6 +108,7 @@ void composite_sweep(const ModelView& model, const StageArgs<N>& a) {
       o.bias = zero33<N>();
     }
   }
+  if (model.lifted) composite_lifts(model, a);
   for (int i = model.n_links - 1; i >= 0; --i) {
     const int parent = model.links[i].parent;
     if (parent < 0) continue;
@@ -141,6 +163,7 @@ template <class N>
 struct JointWrenches {
   Vec6<N> d_dx[3], d_da[3];
   Vec3<N> row[3];
+  Vec3<N> lift_row[3];  ///< set in models with lifts alone
 };
 
 /// Returns I m for a motion without angular part.
@@ -150,13 +173,13 @@ Vec6<N> inertia_times_linear(const LinkScratch<N>& o, const Vec3<N>& l) {
 }
 
 template <JointKind K, class N>
-void joint_wrenches(const Link& link, const LinkScratch<N>& o, const N& c0_over_h,
-                    JointWrenches<N>& w) {
+void joint_wrenches(const ModelView& model, const Link& link, const LinkScratch<N>& o,
+                    const N& c0_over_h, JointWrenches<N>& w) {
   if (slides(K) && link.never_rotates) {  // only the force by a matters
     for (int k = 0; k < dofs(K); ++k) {
       w.d_da[k] = {zero3<N>(), o.mass * joint_axis<K, N>(link, k)};
       w.d_dx[k] = {zero3<N>(), (c0_over_h * c0_over_h) * w.d_da[k].l};
-      w.row[k] = zero3<N>();
+      w.row[k] = w.lift_row[k] = zero3<N>();
     }
     return;
   }
@@ -182,6 +205,14 @@ void joint_wrenches(const Link& link, const LinkScratch<N>& o, const N& c0_over_
       }
     }
     d_dv[k] = mul_add(c0_over_h, w.d_da[k], d_dv[k]);
+    if (!model.lifted) continue;
+    if constexpr (slides(K)) {
+      w.lift_row[k] = o.lift_mass * joint_axis<K, N>(link, k);
+    } else {
+      w.lift_row[k] = -cross_axis<K>(link, k, o.lift_moment);
+      const Vec3<N> l = cross_axis<K>(link, k, gravity_in(model, o));
+      d_dq[k] += Vec6<N>{cross(o.lift_moment, l), o.lift_mass * l};
+    }
   }
   combine<K>(o, c0_over_h, d_dq, d_dv, w.d_dx);
 }
@@ -190,7 +221,8 @@ void joint_wrenches(const Link& link, const LinkScratch<N>& o, const N& c0_over_
 /// axes.
 template <JointKind K, class N>
 void ancestor_entries(const ModelView& model, const StageArgs<N>& a, int up, int d,
-                      const Vec6<N>& d_dx, const Vec6<N>& d_da, const Vec3<N>& row) {
+                      const Vec6<N>& d_dx, const Vec6<N>& d_da, const Vec3<N>& row,
+                      const Vec3<N>& lift_row) {
   const Link& ancestor = model.links[up];
   const LinkScratch<N>& p = a.links[up];
   const EntryRows<N> column = entries_at(model, a, ancestor.v, d),
@@ -204,6 +236,8 @@ void ancestor_entries(const ModelView& model, const StageArgs<N>& a, int up, int
     if constexpr (!slides(K)) v[j] += along_axis<K>(ancestor, j, row);
     v[j] += dot(d_da, p.psi_dot[j] + p.s_dot[j]);
     q[j] = dot(row, p.psi_dot[j].a) + dot(d_da, p.psi_ddot[j]);
+    if constexpr (!slides(K))
+      if (model.lifted) q[j] += dot(lift_row, cross_axis<K>(ancestor, j, gravity_in(model, p)));
   }
   combine<K>(p, a.c0_over_h, q, v, x);
   for (int j = 0; j < dofs(K); ++j) row_of_dof(0, j) = x[j];
@@ -221,6 +255,7 @@ void walk_ancestors(const ModelView& model, const StageArgs<N>& a, int i, JointW
         w.d_dx[k] = wrench_to_parent(link, local, w.d_dx[k]);
         w.d_da[k] = wrench_to_parent(link, local, w.d_da[k]);
         if (link.may_rotate) w.row[k] = local.R * w.row[k];
+        if (model.lifted && link.may_rotate) w.lift_row[k] = local.R * w.lift_row[k];
       } else if (link.may_rotate) {  // nothing above turns, so torques no longer matter
         w.d_dx[k].l = local.R * w.d_dx[k].l;
         w.d_da[k].l = local.R * w.d_da[k].l;
@@ -228,7 +263,7 @@ void walk_ancestors(const ModelView& model, const StageArgs<N>& a, int i, JointW
     }
     with_kind(model.links[up].kind, [&]<JointKind K>() {
       for (int k = 0; k < count; ++k)
-        ancestor_entries<K>(model, a, up, first + k, w.d_dx[k], w.d_da[k], w.row[k]);
+        ancestor_entries<K>(model, a, up, first + k, w.d_dx[k], w.d_da[k], w.row[k], w.lift_row[k]);
     });
   }
 }
@@ -242,7 +277,7 @@ void joint_jacobian(const ModelView& model, const StageArgs<N>& a, int i) {
   const EntryRows<N> entry = entries_at(model, a, link.v, link.v);
   if (!link.never_rotates) joint_rates<K>(link, o);
   JointWrenches<N> w;
-  joint_wrenches<K>(link, o, a.c0_over_h, w);
+  joint_wrenches<K>(model, link, o, a.c0_over_h, w);
   for (int j = 0; j < dofs(K); ++j) {
     const int d = link.v + j;
     a.mass_diagonal[d] = project<K>(link, j, w.d_da[j]);

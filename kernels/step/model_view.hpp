@@ -56,7 +56,8 @@ struct Link {
   int inertia_row = -1;  ///< ≥ 0: mass, mass · centre and inertia (xx xy xz yy yz zz) are read
                          ///< from ten rows of the block instead
   int place_row = -1;    ///< ≥ 0: frame.p is read from three rows of the block instead
-  double gravity_share = 1;  ///< of gravity that acts on it; the same in a whole tree
+  double gravity_share = 1;  ///< of gravity that acts on it
+  double lift = 0;           ///< the share of its tree's root less its own
 };
 
 /// A number of the scene: the same for all environments, or one row of the batch.
@@ -347,6 +348,7 @@ struct ModelView {
   int n_links, nq, nv;
   const Link* links;
   Vec3<double> gravity;  ///< world axes [m/s²]
+  bool lifted;           ///< some link has a lift
   Vec3<double> ground_point, ground_normal;
   const DofEffects* effects;  ///< (nv)
   int n_pairs, n_grounds;

@@ -4,7 +4,8 @@
 //
 //   V = V_p + S q̇,  A = A_p + S q̈ + V × (S q̇),  F = I A + V ×* I V - w_ext,  F_p += X* F
 //   g = Sᵀ F - τ - joint effects (kernels/step/joint_effects.hpp)
-// The base of a tree accelerates at -gravity times its share, so gravity needs no term of its own.
+// The base of a tree accelerates at -gravity times the share of its root, so gravity needs no term
+// of its own. A link with another share has a lift: I (0; lift gravity) is added to F.
 #pragma once
 
 #include "kernels/contact/elastic_contact.hpp"
@@ -117,6 +118,19 @@ void outward_sweep(const ModelView& model, const StageArgs<N>& a) {
   }
 }
 
+/// Returns gravity in a link's axes.
+template <class N>
+Vec3<N> gravity_in(const ModelView& model, const LinkScratch<N>& o) {
+  return transposed_times(o.world.R, broadcast<N>(model.gravity));
+}
+
+/// Returns the acceleration that a link's masses feel. That of the base has the share of the root.
+template <class N>
+Vec6<N> felt_acceleration(const ModelView& model, const Link& link, const LinkScratch<N>& o) {
+  if (!model.lifted || link.lift == 0) return o.A;
+  return {o.A.a, o.A.l + N(link.lift) * gravity_in(model, o)};
+}
+
 /// Computes the inertial wrench of every link about its own origin.
 template <class N>
 void inertial_wrenches(const ModelView& model, const StageArgs<N>& a) {
@@ -127,10 +141,10 @@ void inertial_wrenches(const ModelView& model, const StageArgs<N>& a) {
     if (!link.has_mass) continue;
     const auto [mass, moment, inertia] = load_inertia<N>(link, a.block, a.group);
     if (link.never_rotates) {  // its torque does no work
-      o.F.l = mass * o.A.l;
+      o.F.l = mass * felt_acceleration(model, link, o).l;
       continue;
     }
-    o.F = inertia_times(mass, moment, inertia, o.A) +
+    o.F = inertia_times(mass, moment, inertia, felt_acceleration(model, link, o)) +
           cross_wrench(o.V, inertia_times(mass, moment, inertia, o.V));
   }
 }

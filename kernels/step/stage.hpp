@@ -28,6 +28,8 @@ struct LinkScratch {
   Mat3<N> inertia;
   Mat3<N> bias;  ///< composite B: B m = (bias m.a; -2 momentum × m.a)
   Vec3<N> momentum;
+  N lift_mass;  ///< composite of the subtree, each part times its lift: mass, mass · centre
+  Vec3<N> lift_moment;
   Vec6<N> psi_dot[3], psi_ddot[3],
       s_dot[3];  ///< per dof: Ψ̇ = Vp × S, Ψ̈ = Ap × S + Vp × Ψ̇, Ṡ = V × S
 };

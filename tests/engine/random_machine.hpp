@@ -137,11 +137,13 @@ inline void close_loops(Scene& s, unsigned seed, int count) {
     d.body1 = s.links[std::size_t(one)].body.name;
     if (two >= 0) d.body2 = s.links[std::size_t(two)].body.name;
     d.position1 = place();
-    if (random.integer(0, 1) == 1) d.position2 = place();
+    d.position2 = place();  // without it, the point follows places of joints
     d.stiffness = random.uniform(50, 500);
     d.damping = random.uniform(0.1, 1);
     d.weld = s.loops.size() % 2 == 1;
     if (d.weld) {
+      const kernels::Quat<double> q = random.quaternion();
+      d.orientation2 = Quaternion{q.w, q.x, q.y, q.z};
       d.turning_stiffness = random.uniform(0.5, 5);
       d.turning_damping = random.uniform(0.01, 0.1);
     }

@@ -60,12 +60,13 @@ inline Scene random_tree(unsigned seed, int links) {
   return s;
 }
 
-/// Gives each tree a share of gravity of its own.
+/// Gives each link that moves a share of gravity of its own.
 inline void share_gravity(Scene& s, unsigned seed) {
   Random random(seed + 8000);
   for (LinkDescription& l : s.links)
-    l.body.gravity_share = l.parent < 0 ? random.uniform(-0.5, 1.5)
-                                        : s.links[std::size_t(l.parent)].body.gravity_share;
+    l.body.gravity_share = l.parent < 0 || l.joint.type != JointType::fixed
+                               ? random.uniform(-0.5, 1.5)
+                               : s.links[std::size_t(l.parent)].body.gravity_share;
 }
 
 /// Lets the coefficients of a contact count per area: the body's own points stand for areas around

@@ -134,8 +134,8 @@ TEST(Dynamics, SharesOfGravityMatchTheDenseDerivation) {
   }
 }
 
-/// Gravity enters at the root of a tree. Bodies that stand in the world are in none.
-TEST(Dynamics, ATreeHasOneShareOfGravity) {
+/// Bodies that stand in the world have no share that matters.
+TEST(Dynamics, ALinkHasOneShareOfGravity) {
   Scene s = testing::random_tree(3, 4);
   for (LinkDescription& l : s.links) l.joint.type = JointType::revolute;
   s.links[0].joint.type = JointType::fixed;
@@ -143,11 +143,12 @@ TEST(Dynamics, ATreeHasOneShareOfGravity) {
   s.links[3].parent = 2;
   s.links[0].body.gravity_share = 0.5;
   s.links[1].body.gravity_share = 0;
-  static_cast<void>(compile(s));
   s.links[3].body.gravity_share = 0.25;
+  static_cast<void>(compile(s));
+  s.links[3].joint.type = JointType::fixed;
   try {
     static_cast<void>(compile(s));
-    FAIL() << "two shares in a tree";
+    FAIL() << "two shares of a link";
   } catch (const InputError& error) {
     EXPECT_NE(std::string(error.what())
                   .find("body 'body3': gravity_share=\"0.25\", and \"1\" of body "

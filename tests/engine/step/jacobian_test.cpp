@@ -92,6 +92,21 @@ TEST(Jacobian, MachinesMatchDualNumbers) {
   }
 }
 
+TEST(Jacobian, SharesOfGravityMatchDualNumbers) {
+  for (unsigned seed = 1; seed <= 40; ++seed) {
+    Scene scene = testing::random_tree(seed, 2 + static_cast<int>(seed % 9));
+    testing::share_gravity(scene, seed);
+    const auto m = compile(scene);
+    StageBuffers<double> b(*m);
+    Random random(seed);
+    for (int k = 0; k < 3; ++k) {
+      testing::randomise(b, *m, random, kStep);
+      SCOPED_TRACE("seed " + std::to_string(seed));
+      compare_with_dual_numbers(*m, b, 1e-11);
+    }
+  }
+}
+
 TEST(Jacobian, LoopsMatchDualNumbers) {
   std::size_t loops = 0;
   for (unsigned seed = 1; seed <= 40; ++seed) {

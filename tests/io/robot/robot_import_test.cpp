@@ -2,6 +2,7 @@
 // What import says about robots that it cannot take over whole, and what it writes.
 #include <gmock/gmock.h>
 
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 
@@ -17,6 +18,7 @@ namespace {
 
 using ::testing::AllOf;
 using ::testing::Contains;
+using ::testing::DoubleNear;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
@@ -358,6 +360,80 @@ TEST(RobotImport, JointEqualitiesAreKept) {
        {std::pair{"active=\"false\"", "enable"}, {"polycoef=\"0 1 0 0 0\"", "disable"}})
     EXPECT_THAT(made(equality, flag).text, Not(HasSubstr("follows"))) << equality;
   EXPECT_THAT(made("polycoef=\"0 1 0.5 0 0\"").lost, ElementsAre(HasSubstr("polynomial")));
+}
+
+/// A leader may have a blank in its name.
+TEST(RobotImport, LeadersMayHaveBlanks) {
+  const testing::Folder folder;
+  std::ofstream(folder / "robot.xml")
+      << "<mujoco><worldbody><body><joint name=\"left finger\"/><geom size=\"0.1\"/></body><body>"
+         "<joint name=\"two\"/><geom size=\"0.1\"/></body></worldbody><equality>"
+         "<joint joint1=\"two\" joint2=\"left finger\"/></equality><tendon><fixed name=\"t\">"
+         "<joint joint=\"left finger\" coef=\"2\"/><joint joint=\"two\" "
+         "coef=\"3\"/></fixed></tendon>"
+         "</mujoco>";
+  const ImportedScene made = import_robot(folder / "robot.xml", folder / "scene.xml", {});
+  EXPECT_THAT(made.lost, IsEmpty());
+  EXPECT_THAT(made.text, HasSubstr("follows=\"left finger,\""));
+  const Scene scene = parse_scene(made.text, "scene.xml").scene;
+  EXPECT_THAT(scene.links[1].joint.follows, ElementsAre("left finger"));
+  EXPECT_THAT(scene.links[2].joint.follows, ElementsAre("left finger", "two"));
+}
+
+/// Loops that scenes cannot have, that hold nothing, or that are not on.
+TEST(RobotImport, LoopsAreKeptWhereTheyHoldSomething) {
+  const auto made = [](const std::string& equality) {
+    const testing::Folder folder;
+    std::ofstream(folder / "robot.xml")
+        << "<mujoco><default><equality solref=\"0.01 1\"/></default><worldbody>"
+           "<body name=\"a\" pos=\"0.1 0 0\"><joint axis=\"0 1 0\" pos=\"0 0 0.2\"/>"
+           "<geom size=\"0.1\" pos=\"0 0.3 0\"/><site name=\"s\" pos=\"0 0 1\"/>"
+           "<body name=\"tip\"><geom size=\"0.1\"/></body></body>"
+           "<body name=\"b\" pos=\"0.5 0 0\" euler=\"0 0 90\"><joint axis=\"0 1 0\"/>"
+           "<geom size=\"0.1\"/><site name=\"t\"/></body></worldbody><equality>" +
+               equality + "</equality></mujoco>";
+    return import_robot(folder / "robot.xml", folder / "scene.xml", {});
+  };
+  const auto loop = [&](const std::string& equality) {
+    const ImportedScene imported = made(equality);
+    EXPECT_THAT(imported.lost, IsEmpty()) << equality;
+    const Scene scene = parse_scene(imported.text, "scene.xml").scene;
+    return scene.loops.at(0);
+  };
+  // The body's own frame is the geom's.
+  const LoopDescription pin = loop("<connect body1=\"a\" body2=\"b\" anchor=\"0.1 0 0.4\"/>");
+  EXPECT_THAT(pin.position1,
+              ElementsAre(DoubleNear(0.1, 1e-15), DoubleNear(-0.3, 1e-15), DoubleNear(0.4, 1e-15)));
+  // 0.2 0 0.4 in the world is -0.3 0 0.4 from b, whose x is the world's y.
+  EXPECT_THAT(*pin.position2,
+              ElementsAre(DoubleNear(0, 1e-15), DoubleNear(0.3, 1e-15), DoubleNear(0.4, 1e-15)));
+  EXPECT_GT(pin.stiffness, 1e4);
+  EXPECT_EQ(pin.damping, 0);
+  const LoopDescription sites = loop("<connect name=\"n\" site1=\"s\" site2=\"t\"/>");
+  EXPECT_EQ(sites.name, "n");
+  EXPECT_THAT(sites.position1, ElementsAre(0, DoubleNear(-0.3, 1e-15), DoubleNear(1, 1e-15)));
+  EXPECT_THAT(*sites.position2, ElementsAre(0, 0, 0));
+  const LoopDescription world = loop("<weld body1=\"b\"/>");
+  EXPECT_EQ(world.body2, "");
+  EXPECT_TRUE(world.weld);
+  EXPECT_THAT(world.position1, ElementsAre(DoubleNear(0, 1e-15), DoubleNear(0.5, 1e-15), 0));
+  EXPECT_THAT(*world.position2, ElementsAre(0, 0, 0));
+  EXPECT_NEAR(std::abs((*world.orientation2)[3]), std::sqrt(0.5), 1e-12);
+  const LoopDescription posed =
+      loop("<weld body1=\"a\" body2=\"b\" relpose=\"0 0 1 1 0 0 0\" anchor=\"0 0 2\"/>");
+  EXPECT_THAT(posed.position1, ElementsAre(0, DoubleNear(-0.3, 1e-15), DoubleNear(3, 1e-15)));
+  EXPECT_THAT(*posed.position2, ElementsAre(0, 0, 2));
+  EXPECT_NEAR(std::abs((*posed.orientation2)[0]), 1, 1e-12);
+  EXPECT_FALSE(loop("<weld body1=\"a\" body2=\"b\" torquescale=\"0\"/>").weld);
+  for (const char* none : {"<connect body1=\"a\" body2=\"b\" anchor=\"0 0 0\" active=\"false\"/>",
+                           "<weld body1=\"a\" body2=\"tip\"/>"}) {
+    const ImportedScene imported = made(none);
+    EXPECT_THAT(imported.lost, IsEmpty()) << none;
+    EXPECT_THAT(imported.text, Not(HasSubstr("<loop>"))) << none;
+  }
+  EXPECT_THROW(made("<connect body1=\"a\" body2=\"nobody\" anchor=\"0 0 0\"/>"), InputError);
+  EXPECT_THAT(made("<connect site1=\"s\" site2=\"nowhere\"/>").lost,
+              ElementsAre(HasSubstr("no site of a body")));
 }
 
 TEST(RobotImport, AKeyframeIsTheStart) {
