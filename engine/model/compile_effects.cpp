@@ -161,6 +161,8 @@ void list_stages(CompiledModel& m) {
         counted(std::size_t(grounded.count), "body", "bodies") +
             (m.grounds[std::size_t(first)].radius > 0 ? ", sphere" : ", points"));
   }
+  if (!m.loops.empty())
+    add("loops", counted(m.loops.size(), "loop", "loops"), "springs, one block each");
   for (std::size_t j = 0; j < m.joints.size(); ++j) {
     std::uint8_t effects = 0;
     for (int i = 0; i < m.joints[j].link_count; ++i)
@@ -169,7 +171,7 @@ void list_stages(CompiledModel& m) {
     if (effects != 0) add("joint effects", m.scene.links[j].joint.name, effects_variant(effects));
   }
   add("Jacobian", counted(std::size_t(m.pattern.entries), "entry", "entries"),
-      "composite inertia, one block per contact");
+      "composite inertia, one block per contact and loop");
   add("factor and solve", counted(std::size_t(m.pattern.factor_entries), "entry", "entries"),
       m.pattern.slot.empty() ? "and blocks of trees that touch"
       : m.pattern.factor_entries == m.pattern.entries
