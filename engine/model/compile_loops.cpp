@@ -50,7 +50,7 @@ std::vector<Frame<double>> initial_frames(const CompiledModel& m) {
 void compile_loops(CompiledModel& m, const NameIndex& bodies) {
   if (m.scene.loops.empty()) return;
   const std::vector<Frame<double>> world = initial_frames(m);
-  const auto of_link = [&](int link) {
+  const auto frame_at = [&](int link) {
     return link < 0 ? kIdentityFrame : world[std::size_t(link)];
   };
   NameIndex names;
@@ -69,7 +69,7 @@ void compile_loops(CompiledModel& m, const NameIndex& bodies) {
     loop.link1 = one.link;
     loop.link2 = two.link;
     loop.frame1 = {one.frame.R, one.frame.R * vec3_of(d.position1) + one.frame.p};
-    loop.frame2 = relative(of_link(two.link), compose(of_link(one.link), loop.frame1));
+    loop.frame2 = relative(frame_at(two.link), compose(frame_at(one.link), loop.frame1));
     if (d.position2) loop.frame2.p = two.frame.R * vec3_of(*d.position2) + two.frame.p;
     if (d.orientation2) loop.frame2.R = two.frame.R * to_frame({{0, 0, 0}, *d.orientation2}).R;
     loop.weld = d.weld;

@@ -185,8 +185,8 @@ std::string owner_of(const SceneNumber& n) {
 
 std::string name_of(const SceneNumber& n) {
   const Attribute& kind = number_kind(n.owner, n.field);
-  const bool by_word = is_turning(n.field) && n.owner != Owner::loop;
-  std::string text = owner_of(n) + (by_word ? " turning " : " ") + kind.name;
+  const bool turns_by_word = is_turning(n.field) && n.owner != Owner::loop;
+  std::string text = owner_of(n) + (turns_by_word ? " turning " : " ") + kind.name;
   if (kind.has(kIndexed)) text.append(1, '[').append(std::to_string(n.component)).append(1, ']');
   return text;
 }

@@ -233,7 +233,7 @@ constexpr Attribute kSchema[] = {
     row(kMotor, "P", kNeeded, U::N_per_m, "force P (u - q) - D v", Or{U::N_m_per_rad},
         Types{"position"}, &MotorDescription::P, B::not_negative, F::P,
         Flags{kInDefault | kParameter}),
-    row(kMotor, "D", "0", U::N_s_per_m, "force P (u - q) - D v, or scale u + offset - D v",
+    row(kMotor, "D", "0", U::N_s_per_m, "the same; of a force: scale u + offset - D v",
         Or{U::N_m_s_per_rad}, Types{"position force"}, &MotorDescription::D, B::not_negative, F::D,
         Flags{kInDefault | kParameter}),
     row(kMotor, "timing", "end", U::one, "start: the force is that of the step's start",

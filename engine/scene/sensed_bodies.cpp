@@ -39,7 +39,7 @@ class Sensing {
     const std::string& name = scene_.links[std::size_t(k)].body.name;
     if (link == own_ || !has_distance(shape(k))) return false;
     if (!sensor_.feels.empty()) return has(sensor_.feels, name);
-    return !has(sensor_.ignores, name) && (!jointed(k) || in_contact(link));
+    return !has(sensor_.ignores, name) && ((!jointed(k) && !looped(k)) || in_contact(link));
   }
 
  private:
@@ -74,6 +74,22 @@ class Sensing {
     };
     const int one = rigid_root(link), two = rigid_root(body_);
     return hangs_on(one, two) || hangs_on(two, one);
+  }
+
+  /// Whether a loop connects what is rigidly joined to a link with what is to the sensor's.
+  [[nodiscard]] bool looped(int link) const {
+    const int one = rigid_root(link), two = rigid_root(body_);
+    return std::ranges::any_of(scene_.loops, [&](const LoopDescription& loop) {
+      const auto root = [&](const std::string& body) {
+        const auto found = std::ranges::find_if(
+            scene_.links, [&](const LinkDescription& l) { return l.body.name == body; });
+        return found == scene_.links.end()
+                   ? -1
+                   : rigid_root(static_cast<int>(found - scene_.links.begin()));
+      };
+      const int first = root(loop.body1), second = root(loop.body2);
+      return (first == one && second == two) || (first == two && second == one);
+    });
   }
 
   /// Whether a contact of bodies of a link and the sensor's is declared.

@@ -14,9 +14,9 @@ int moving_link(const Scene& scene, int link);
 /// Returns the bodies that a sensor senses, as ascending indices into Scene::links: those with a
 /// distance function that can move relative to its body, and
 ///  - that it names in `feels`, or
-///  - without `feels`: that it does not name in `ignores`, and that no joint connects with its body
-///    unless a contact of the two is declared. Links that a joint connects overlap there in most
-///    robots. Bodies that are rigidly joined to a neighbour are neighbours, and the world is none.
+///  - without `feels`: that it does not name in `ignores`, and that no joint or loop connects with
+///    its body unless a contact of the two is declared. Links that a joint connects overlap there
+///    in most robots. Bodies rigidly joined to a neighbour are neighbours, and the world is none.
 /// Throws InputError, which names sensor and body, for unknown names, for bodies that cannot be
 /// sensed, and if both lists are given.
 std::vector<int> sensed_bodies(const Scene& scene, const TactileDescription& sensor);

@@ -5,10 +5,10 @@
 //       + Σ k (q - rest)²/2 + Σ k_l (q beyond a limit)²/2 + Σ f (e - f/2P) + Σ k_n d²/2
 //       + Σ k_s |s|²/2 + Σ k |gap|²/2 + Σ k_t |turn|²/2
 // with c the mass times centre of mass and J the inertia of a link about its origin, e the distance
-// of a position motor from its target, f = clip(P e, range), s the elastic displacement of a
-// contact point with a shear spring, and gap and turn those of loops. Damping and slip only dissipate energy; gravity, springs,
-// limits, motors with constant target and contacts with constant faces are conservative. So E can
-// rise only by the work of forces that are known at the start of the step.
+// of a position motor from its target, f = clip(P e, range), s the elastic displacement of a point
+// with a shear spring, gap and turn of a loop. Damping and slip only dissipate energy; gravity,
+// springs, limits, motors with constant target and contacts with constant faces are conservative.
+// So E can rise only by the work of forces that are known at the start of the step.
 #pragma once
 
 #include "engine/step/workspace.hpp"

@@ -104,8 +104,8 @@ Vec6<N> transposed_damping(const PairSums<N>& s, const Vec6<N>& y) {
           transposed_times(s.d[0][1], y.a) + transposed_times(s.d[1][1], y.l)};
 }
 
-/// Returns Y of a pair of links or a loop: the rate at which body 2 moves against body 1 along λ, in body 1's
-/// axes at its origin.
+/// Returns Y of a pair of links or a loop: the rate at which body 2 moves against body 1 along λ,
+/// in body 1's axes at its origin.
 template <class Pair, class N>
 Vec6<N> adjoint_slip(const Pair& pair, const ContactScratch<N>& o, const LinkAdjoint<N>* links) {
   Vec6<N> y = pair.link2 < 0 ? zero6<N>() : motion_to_parent(o.link2_in_1, links[pair.link2].twist);

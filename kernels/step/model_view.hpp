@@ -100,7 +100,7 @@ inline constexpr Parameter DofEffects::*kDofParameters[kDofNumbers] = {
 
 /// The row of each parameter among the derivatives by parameters: coefficients of pairs, of ground
 /// contacts, inertia of links, parameters of dofs, of solids, places of links, numbers of loops,
-/// coefficients of sensors. The compiler of models sets it. Kernels compute the rows before `sensors`.
+/// coefficients of sensors. The compiler of models sets it. Kernels compute those before `sensors`.
 struct ParameterRows {
   int grounds = 0, links = 0, dofs = 0, solids = 0, places = 0, loops = 0,
       sensors = 0;  ///< first row of each kind

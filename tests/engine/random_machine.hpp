@@ -69,8 +69,8 @@ inline Scene random_machine(unsigned seed, int links) {
   return s;
 }
 
-/// Gives all motors a scale, an offset and a range that random controls leave, force motors a D, and
-/// each joint that is driven a second motor.
+/// Gives all motors a scale, an offset and a range that random controls leave, force motors a D,
+/// and each joint that is driven a second motor.
 inline void map_controls(Scene& s, unsigned seed) {
   Random random(seed + 7000);
   std::vector<MotorDescription> more;

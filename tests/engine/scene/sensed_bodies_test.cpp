@@ -56,6 +56,12 @@ TEST(FeltBodies, NeighboursAreLeftOutUnlessTheyTouch) {
   EXPECT_THAT(felt(s), ElementsAre("palm", "thumb", "egg", "table"));
   s.pair_contacts.push_back({"proximal", "nail", {100, 0, 0, 0}, ContactLaw::clamped, {}, {}});
   EXPECT_THAT(felt(s), ElementsAre("palm", "proximal", "thumb", "egg", "table"));
+  // A loop makes neighbours, too.
+  LoopDescription pin;
+  pin.name = "pin", pin.body1 = "thumb", pin.body2 = "nail", pin.stiffness = 1;
+  s.loops.push_back(pin);
+  EXPECT_THAT(felt(s), ElementsAre("palm", "proximal", "egg", "table"));
+  s.loops.clear();
   // The world is nobody's neighbour: a skin on the palm feels a table that is fixed in it.
   s.sensors[0].body = "palm";
   EXPECT_THAT(felt(s), ElementsAre("distal", "nail", "egg", "table"));

@@ -229,8 +229,8 @@ TEST(MappedMotors, MotorsOfAJointAddUp) {
   }
 }
 
-/// A force motor with D: far from the wanted velocity it pushes with the bound, near it the velocity
-/// approaches as exp(-D t/m), with any D.
+/// A force motor with D: far from the wanted velocity it pushes with the bound, near it the
+/// velocity approaches as exp(-D t/m), with any D.
 TEST(Motors, AServoOfVelocityIsClippedAsAWhole) {
   Scene s = lift({"car_joint", -40, 40, {}});
   s.gravity = {0, 0, 0};

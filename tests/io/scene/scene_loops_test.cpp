@@ -27,13 +27,13 @@ std::string scene_with_loop(const std::string& inside, const std::string& unit =
                      unit, inside);
 }
 
-Scene read(const std::string& inside, const std::string& unit = "m-kg") {
+Scene read_loops_of(const std::string& inside, const std::string& unit = "m-kg") {
   return parse_scene(scene_with_loop(inside, unit), "loop.xml").scene;
 }
 
-std::string error_of(const std::string& inside) {
+std::string loop_error(const std::string& inside) {
   try {
-    static_cast<void>(Model(read(inside)));
+    static_cast<void>(Model(read_loops_of(inside)));
   } catch (const InputError& e) {
     return e.what();
   }
@@ -41,10 +41,10 @@ std::string error_of(const std::string& inside) {
 }
 
 TEST(SceneLoops, ComeThroughInSi) {
-  const Scene s = read(R"(<connect body1="one" body2="two" pos1="3 0 0" stiffness="5"/>
+  const Scene s = read_loops_of(R"(<connect body1="one" body2="two" pos1="3 0 0" stiffness="5"/>
 <weld name="tie" body1="two" pos2="1 2 3" quat2="0 0 0 2" stiffness="4" damping="2"
       turning_stiffness="7" turning_damping="6"/>)",
-                       "cm-g");
+                                "cm-g");
   ASSERT_EQ(s.loops.size(), 2U);
   const LoopDescription &pin = s.loops[0], &tie = s.loops[1];
   EXPECT_EQ(pin.name, "one two");
@@ -65,21 +65,21 @@ TEST(SceneLoops, ComeThroughInSi) {
 }
 
 TEST(SceneLoops, MistakesNameTheirLine) {
-  EXPECT_THAT(error_of(R"(<connect body1="on" body2="two" stiffness="5"/>)"),
+  EXPECT_THAT(loop_error(R"(<connect body1="on" body2="two" stiffness="5"/>)"),
               HasSubstr("loop.xml:8: <connect>: body1=\"on\": no body has this name; did you mean "
                         "'one'?"));
-  EXPECT_THAT(error_of(R"(<connect body1="one" body2="ground" stiffness="5"/>)"),
+  EXPECT_THAT(loop_error(R"(<connect body1="one" body2="ground" stiffness="5"/>)"),
               HasSubstr("body2=\"ground\": no body has this name"));
-  EXPECT_THAT(error_of(R"(<connect body1="one" body2="two"/>)"), HasSubstr("'stiffness'"));
-  EXPECT_THAT(error_of(R"(<connect body1="one" body2="two" stiffness="0"/>)"),
+  EXPECT_THAT(loop_error(R"(<connect body1="one" body2="two"/>)"), HasSubstr("'stiffness'"));
+  EXPECT_THAT(loop_error(R"(<connect body1="one" body2="two" stiffness="0"/>)"),
               HasSubstr("stiffness=\"0\"; expected a positive number"));
-  EXPECT_THAT(error_of(R"(<connect body1="one" body2="one" stiffness="1"/>)"),
+  EXPECT_THAT(loop_error(R"(<connect body1="one" body2="one" stiffness="1"/>)"),
               HasSubstr("body 'one' with itself; expected two bodies"));
-  EXPECT_THAT(error_of(R"(<connect body1="one" quat2="1 0 0 0" stiffness="1"/>)"),
+  EXPECT_THAT(loop_error(R"(<connect body1="one" quat2="1 0 0 0" stiffness="1"/>)"),
               HasSubstr("quat2"));
-  EXPECT_THAT(error_of(R"(<weld body1="one" body2="two" stiffness="1"/>)"),
+  EXPECT_THAT(loop_error(R"(<weld body1="one" body2="two" stiffness="1"/>)"),
               HasSubstr("'turning_stiffness'"));
-  EXPECT_THAT(error_of(R"(<connect body1="one" body2="two" stiffness="1"/>
+  EXPECT_THAT(loop_error(R"(<connect body1="one" body2="two" stiffness="1"/>
 <connect body1="one" body2="two" stiffness="1"/>)"),
               HasSubstr("loop.xml:9: <connect>: another loop has the name 'one two' already"));
 }
