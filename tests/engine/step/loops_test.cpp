@@ -260,7 +260,7 @@ class LoopsBySchemes : public ::testing::TestWithParam<Integrator> {};
 
 TEST_P(LoopsBySchemes, GradientsMatchDifferencesAndTangents) {
   int compared = 0, runs = 0;
-  for (unsigned seed = 1; seed <= 4; ++seed) {
+  for (unsigned seed = 1; seed <= 2; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     Scene scene = testing::random_machine(seed, 3 + static_cast<int>(seed % 3));
     testing::close_loops(scene, seed, 2);
@@ -270,8 +270,8 @@ TEST_P(LoopsBySchemes, GradientsMatchDifferencesAndTangents) {
     runs += testing::check_tangent(model, testing::options(GetParam(), scene.timestep, 1e-13),
                                    testing::random_input(model, seed, 4), seed);
   }
-  EXPECT_GT(compared, 150);
-  EXPECT_GE(runs, 2);
+  EXPECT_GT(compared, 80);
+  EXPECT_GE(runs, 1);
 }
 
 INSTANTIATE_TEST_SUITE_P(Schemes, LoopsBySchemes,
