@@ -55,8 +55,9 @@ enum Element : std::uint64_t {
   kVarySurface = 1ULL << 30,  ///< in <randomize>
   kLayer = 1ULL << 31,
   kGelPicture = 1ULL << 32,
+  kCamera = 1ULL << 33,
 };
-inline constexpr int kElements = 33;
+inline constexpr int kElements = 34;
 inline constexpr std::uint64_t kContacts = kGroundContact | kPairContact,
                                kTouching = kContacts | kTactile,
                                kVarying = kVaryJoint | kVaryMotor | kVaryGround | kVaryPair |
@@ -97,7 +98,8 @@ using Member = std::variant<
     double ContactCoefficients::*, int TactileDescription::*, double SensorImperfections::*,
     NormalAndShear SensorImperfections::*, double MarkersDescription::*, double SkinMaterial::*,
     double LayerDescription::*, std::optional<double> LayerDescription::*,
-    int PictureDescription::*, double PictureDescription::*, Vector3 EndEffectorDescription::*,
+    int PictureDescription::*, double PictureDescription::*, int CameraDescription::*,
+    double CameraDescription::*, Vector3 CameraDescription::*, Vector3 EndEffectorDescription::*,
     double EndEffectorDescription::*, std::array<double, 4> EndEffectorDescription::*,
     double PiecewiseControl::*, double RandomControl::*>;
 
