@@ -28,6 +28,12 @@ Edge edge_of(const Place& a, const Place& b, std::int64_t x, std::int64_t y) {
   return {dx * (y - a.y) - dy * (x - a.x) - (top_or_left ? 0 : 1), -dy * kParts, dx * kParts};
 }
 
+/// Whether corners are anticlockwise in the picture, whose rows count downwards.
+template <class Place>
+bool is_seen(const Place& a, const Place& b, const Place& c) {
+  return (c.x - a.x) * (b.y - a.y) - (c.y - a.y) * (b.x - a.x) > 0;
+}
+
 std::int64_t first_centre(std::int64_t place) { return (place - kHalf + kParts - 1) >> 8; }
 std::int64_t last_centre(std::int64_t place) { return (place - kHalf) >> 8; }
 
@@ -52,14 +58,14 @@ void SceneView::add(const ViewMesh& mesh, const ViewSolid& at) {
     if (corners_[k][2] > kNearest) places_[k] = place_of(corners_[k]);
   }
   for (const std::array<int, 3>& t : mesh.triangles) {
-    const std::size_t a = std::size_t(t[0]), b = std::size_t(t[1]), c = std::size_t(t[2]);
-    const std::array<Vector3, 3> corners{corners_[a], corners_[b], corners_[c]};
-    const int before = int(corners[0][2] > kNearest) + int(corners[1][2] > kNearest) +
-                       int(corners[2][2] > kNearest);
+    const std::size_t i = std::size_t(t[0]), j = std::size_t(t[1]), k = std::size_t(t[2]);
+    const Vector3 &a = corners_[i], &b = corners_[j], &c = corners_[k];
+    const int before = int(a[2] > kNearest) + int(b[2] > kNearest) + int(c[2] > kNearest);
+    if (before == 3 && !is_seen(places_[i], places_[j], places_[k])) continue;
     if (before == 3)
-      add_triangle(corners, {places_[a], places_[b], places_[c]}, at);
+      add_triangle({a, b, c}, {places_[i], places_[j], places_[k]}, at);
     else if (before > 0)
-      add_cut_triangle(corners, at);
+      add_cut_triangle({a, b, c}, at);
   }
 }
 
@@ -84,7 +90,7 @@ void SceneView::add_cut_triangle(const std::array<Vector3, 3>& corners, const Vi
 void SceneView::add_triangle(const std::array<Vector3, 3>& corners,
                              const std::array<Place, 3>& places, const ViewSolid& of) {
   const Place &a = places[0], &b = places[2], &c = places[1];  // clockwise: rows count downwards
-  if ((b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x) <= 0) return;  // seen from behind
+  if (!is_seen(places[0], places[1], places[2])) return;
   const auto clamp = [](std::int64_t x, int most) {
     return static_cast<int>(std::clamp<std::int64_t>(x, -1, most));
   };
@@ -110,7 +116,7 @@ void SceneView::add_triangle(const std::array<Vector3, 3>& corners,
   std::array<Edge, 3> edges{edge_of(a, b, x, y), edge_of(b, c, x, y), edge_of(c, a, x, y)};
   const auto per_u = static_cast<float>(normal[0] / plane);
   for (int i = first_row; i <= last_row; ++i) {
-    const double v = (i + 0.5 - 0.5 * grid_.rows) / focal_;
+    const double v = ray_row(i);
     const auto per_row = static_cast<float>((normal[1] * v + normal[2]) / plane);
     std::int64_t p = edges[0].start, q = edges[1].start, r = edges[2].start;
     const std::size_t row = std::size_t(i) * std::size_t(grid_.cols);

@@ -116,7 +116,8 @@ struct Hit {
   const float cap = (-along - root(rest)) / whole, beyond = std::abs(height - end);
   const float s = beyond > 0 ? cap : side, met = beyond > 0 ? rest : 1.0F;
   const float x = r.ox + s * r.dx, y = r.oy + s * r.dy, z = r.oz + s * r.dz - end;
-  return {(under > 0) & (met > 0) ? s : kNowhere,
+  const float least = under < met ? under : met;
+  return {least > 0 ? s : kNowhere,
           (row.light[0] * x + (row.light[1] * y + row.light[2] * z)) / radius};
 }
 
@@ -270,9 +271,7 @@ SceneView::SceneView(const ViewGrid& grid)
     u_.push_back(static_cast<float>((j + 0.5 - 0.5 * grid.cols) / focal_));
 }
 
-float SceneView::ray_row(int row) const {
-  return static_cast<float>((row + 0.5 - 0.5 * grid_.rows) / focal_);
-}
+double SceneView::ray_row(int row) const { return (row + 0.5 - 0.5 * grid_.rows) / focal_; }
 
 void SceneView::begin(const Vector3& light, double ambient) {
   light_ = light, ambient_ = ambient;
@@ -340,7 +339,7 @@ void SceneView::add(const ViewSolid& solid) {
   row.u = u_.data();
   row.first = pixels.first_col, row.end = pixels.end_col;
   for (int i = pixels.first_row; i < pixels.end_row; ++i) {
-    const double v = (i + 0.5 - 0.5 * grid_.rows) / focal_;
+    const double v = ray_row(i);
     for (std::size_t k = 0; k < 3; ++k) {
       const Vector3& axis = solid.axes[k];
       const double scale = unit_of(solid, k),
@@ -349,6 +348,8 @@ void SceneView::add(const ViewSolid& solid) {
       row.o[k] = static_cast<float>(begin / scale);
       row.d[k] = static_cast<float>((axis[1] * v + axis[2]) / scale);
     }
+    if (plane && row.d[2] + row.x[2] * u_.front() >= 0 && row.d[2] + row.x[2] * u_.back() >= 0)
+      continue;  // above the horizon
     const std::size_t first = std::size_t(i) * std::size_t(grid_.cols);
     row.depth = depth_.data() + first;
     row.numbers = numbers_.data() + first;

@@ -84,7 +84,8 @@ class SceneView {
                     const ViewSolid& of);
   void add_cut_triangle(const std::array<Vector3, 3>& corners, const ViewSolid& of);
   [[nodiscard]] Place place_of(const Vector3& corner) const;
-  [[nodiscard]] float ray_row(int row) const;
+  /// v of the rays of a row.
+  [[nodiscard]] double ray_row(int row) const;
 
   ViewGrid grid_;
   double focal_;  // [pixels]

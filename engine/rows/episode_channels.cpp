@@ -95,10 +95,13 @@ std::vector<EpisodeChannel> episode_channels(const RunFacts& facts,
   list.add(ChannelKind::v, "v", {facts.v_names.size()}, "v_units", "velocities");
   if (facts.task) {
     const bool all_perfect = std::all_of(sensors.begin(), sensors.end(), perfect);
-    for (const TensorSpec& tensor : facts.task->observations)
-      list.add(ChannelKind::task, tensor.name, {tensor.shape.begin(), tensor.shape.end()},
-               tensor.unit, tensor.meaning)
-          .touch = tensor.touch && all_perfect;
+    for (const TensorSpec& tensor : facts.task->observations) {
+      EpisodeChannel& channel =
+          list.add(ChannelKind::task, tensor.name, {tensor.shape.begin(), tensor.shape.end()},
+                   tensor.unit, tensor.meaning);
+      channel.touch = tensor.touch && all_perfect;
+      channel.task_bytes = tensor.own_bytes;
+    }
     return list.take();
   }
   if (!facts.end_effector_names.empty())

@@ -32,11 +32,12 @@ struct EpisodeChannel {
   /// Touch: all its numbers are 0 without contact. Of a sensor with imperfections only the ideal
   /// field and the markers are, and a task with such a sensor has none.
   bool touch = false;
+  std::size_t task_bytes = 0;  ///< TensorSpec::own_bytes
 
   [[nodiscard]] std::size_t width() const;  ///< numbers of a row
   /// Bytes of a number whose type does not follow the precision of the run; else 0.
   [[nodiscard]] std::size_t own_bytes() const {
-    return kind == Kind::reading ? tangere::own_bytes(reading.form) : 0;
+    return kind == Kind::reading ? tangere::own_bytes(reading.form) : task_bytes;
   }
 };
 

@@ -24,7 +24,7 @@ using kernels::kGroup;
 using kernels::Vec3;
 
 constexpr std::array<double, 3> kGroundColour{0.62, 0.62, 0.6};
-constexpr std::size_t kMostKeptBytes = 32U << 20;  // of pictures of a block, for each thread
+constexpr std::size_t kMostKeptBytes = 64U << 20;  // of pictures of a block, for each thread
 constexpr float kWhiteLevel = 255;
 
 /// Whether its place is numbers.

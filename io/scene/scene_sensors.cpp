@@ -411,6 +411,7 @@ void read_sensors(Scene& scene, const SceneNode& section) {
       node.fail("name \"" + d.name + "\" holds '/', which files use as a separator");
     for (const TactileDescription& other : scene.sensors)
       if (other.name == d.name) node.fail("tactile name '" + d.name + "' is used twice");
+    check_free_name(scene, node, d.name);
     static_cast<void>(node.word("type"));  // checks it
     const std::string type = node.text("type");
     node.check(type);

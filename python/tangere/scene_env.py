@@ -149,6 +149,7 @@ class VectorSceneEnv(EpisodesEnv):
             key: _box(array) for key, array in seen.items()
         }
         self._shapes = {key: array.shape for key, array in seen.items()}
+        self._types = {key: array.dtype for key, array in seen.items()}
         width = sum(array[0].size for array in seen.values())
         self.single_observation_space = (
             spaces.Box(-np.inf, np.inf, (width,), np.float32) if flatten else spaces.Dict(boxes)

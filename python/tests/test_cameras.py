@@ -86,6 +86,31 @@ def test_environments_keep_bytes_and_render_them(watched):
     check_env(tangere.SceneEnv(Watch, scene=watched, render_mode="rgb_array"))
 
 
+def test_data_sets_of_a_class_keep_bytes(watched, tmp_path):
+    from tangere.data import generate
+
+    class Seen(Watch):
+        scene = watched
+
+        def observe(self):
+            return super().observe() | {"ids": self.batch.tactile("eye.ids")}
+
+    folder = tmp_path / "set"
+    generate(Seen, folder, 3, policy="random", seed=2)
+    with h5py.File(next(folder.glob("shard*.h5"))) as shard:
+        demo = shard["data/demo_1"]
+        types = {key: demo[f"obs/{key}"].dtype for key in ("eye", "depth", "ids")}
+        assert types == {"eye": np.uint8, "depth": np.float32, "ids": np.int16}
+        pictures, last = demo["obs/eye"][:], demo["final_obs/eye"][0]
+        actions = demo["actions"][:]
+    env = Seen(1, seed=2, first_episode=1)
+    seen, _ = env.reset()
+    for picture, action in zip(pictures, actions, strict=True):
+        np.testing.assert_array_equal(picture, seen["eye"][0])
+        seen, *_ = env.step(action[None])
+    np.testing.assert_array_equal(last, seen["eye"][0])
+
+
 def test_a_task_renders_what_its_camera_sees(watched, tmp_path):
     env = tangere.make_env("ball_rolling_small", scene=watched, render_mode="rgb_array")
     env.reset(seed=3)

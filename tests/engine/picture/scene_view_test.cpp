@@ -170,7 +170,9 @@ TEST(SceneView, APlaneHasTheDepthOfItsRays) {
       const std::size_t k = std::size_t(i * kPixels + j);
       const bool seen = down > 0 && t < 10;
       ASSERT_EQ(view.numbers()[k], seen ? 3 : kNoSolid) << i;
-      if (seen) ASSERT_NEAR(view.depth()[k], t, kShort * std::max(1.0, t)) << i << ' ' << j;
+      if (seen) {
+        ASSERT_NEAR(view.depth()[k], t, kShort * std::max(1.0, t)) << i << ' ' << j;
+      }
     }
   view.begin({0, -1, 0}, 0.3);
   view.add(floor_below(-0.2));  // the camera is inside
