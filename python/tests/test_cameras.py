@@ -97,7 +97,7 @@ def test_data_sets_of_a_class_keep_bytes(watched, tmp_path):
 
     folder = tmp_path / "set"
     generate(Seen, folder, 3, policy="random", seed=2)
-    with h5py.File(next(folder.glob("shard*.h5"))) as shard:
+    with h5py.File(next(folder.glob("shard-*.h5"))) as shard:
         demo = shard["data/demo_1"]
         types = {key: demo[f"obs/{key}"].dtype for key in ("eye", "depth", "ids")}
         assert types == {"eye": np.uint8, "depth": np.float32, "ids": np.int16}
@@ -165,3 +165,18 @@ def test_simulations_refuse_them(watched):
 
     with pytest.raises(tangere.InputError, match="eye.rgb"):
         tt.Simulation(tangere.Scene(watched), 1, 10, read=["eye.rgb"])
+
+
+def test_a_builder_adds_them_and_mistakes_name_its_line():
+    b = tangere.SceneBuilder("ball", gravity=(0, 0, 0))
+    b.ground()
+    ball = b.robot.link("ball")
+    ball.joint("ball", "free3d", pos=(0, 0, 0.1))
+    ball.body("sphere", radius=0.05, density=100, rgba=(1, 0, 0, 1))
+    b.sensor.camera("above", pos=(0, 0, 1), look=(0, 0, 0), up=(0, 1, 0), rows=9, cols=9)
+    batch = tangere.Batch(tangere.Model(b.scene()), 1)
+    assert batch.tactile("above.ids")[0, 4, 4, 0] == 0
+    assert batch.tactile("above.depth")[0, 4, 4, 0] == pytest.approx(0.85, abs=1e-4)
+    b.sensor.camera("below", pos=(0, 0, -1), look=(0, 0, 0))
+    with pytest.raises(tangere.InputError, match=r"test_cameras.py:\d+: .*lies along the view"):
+        b.scene()

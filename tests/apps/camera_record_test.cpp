@@ -74,7 +74,7 @@ TEST(CameraRecord, ShardsHaveTheSameBytesOnAnyNumberOfThreads) {
       run_json(folder, {"generate", from, "--episodes", "17", "--steps", "40", "--every", "20",
                         "--output", out, "--threads", threads, "--compress", compress, "--record",
                         "q,eye.rgb,eye.ids,eye.depth/40"});
-      const std::string shard = folder.path(out + "/shard_00000.h5");
+      const std::string shard = folder.path(out + "/shard-00000.h5");
       bytes.push_back(file_bytes(shard));
       if (threads == "2") continue;
       const Found rgb = found(shard, "data/demo_3/obs/eye.rgb"),

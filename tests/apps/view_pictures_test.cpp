@@ -21,11 +21,12 @@ using ::testing::HasSubstr;
 
 constexpr int kHigh = 24, kWide = 32;
 
-std::string watched_ball(const Folder& folder) {
+std::string watched_ball(const Folder& folder, const std::string& noise = "0") {
   std::string text = file_bytes(scene("rolling_ball_small.xml"));
   text.insert(text.find("</sensor>"),
               "<camera name=\"eye\" pos=\"0 -0.25 0.2\" look=\"0 0 0.02\" rows=\"24\" "
-              "cols=\"32\"/>\n");
+              "cols=\"32\" noise=\"" +
+                  noise + "\"/>\n");
   return folder.write("watched.xml", text);
 }
 
@@ -68,7 +69,7 @@ TEST(ViewPictures, AreThoseOfADataSetWithItsLastState) {
   const ViewData data = read_view(folder.path("set"), {});
   ASSERT_EQ(data.pictures.size(), 1U);
   EXPECT_THAT(data.episodes[1].pictures[0].at, ElementsAre(0, 1, 2, 3, 4));
-  const h5::Id file = h5::open_file(folder.path("set/shard_00000.h5")),
+  const h5::Id file = h5::open_file(folder.path("set/shard-00000.h5")),
                last = h5::open_dataset(file, "data/demo_1/final_obs/eye.rgb");
   std::vector<std::uint8_t> levels(3 * kHigh * kWide);
   h5::read_box<std::uint8_t>(last, {0, 0, 0, 0}, {1, kHigh, kWide, 3}, levels.data());
@@ -77,12 +78,12 @@ TEST(ViewPictures, AreThoseOfADataSetWithItsLastState) {
 
 TEST(ViewPictures, StayBelowTheSizeOfThePage) {
   const Folder folder;
-  run_json(folder, {"simulate", watched_ball(folder), "--output", "run.h5", "--steps", "400",
+  run_json(folder, {"simulate", watched_ball(folder, "30"), "--output", "run.h5", "--steps", "400",
                     "--envs", "4", "--every", "1", "--seed", "3", "--record", "q,eye.rgb"});
   const ViewData whole = read_view(folder.path("run.h5"), {});
   EXPECT_EQ(whole.episodes[0].pictures[0].files.size(), 400U);
   ViewOptions options;
-  options.bytes = 2.2e6;
+  options.bytes = 3e6;
   const ViewData data = read_view(folder.path("run.h5"), options);
   EXPECT_LE(static_cast<double>(render_view_page(data).size()), options.bytes);
   EXPECT_LT(data.episodes[0].pictures[0].files.size(), 400U);
