@@ -147,7 +147,7 @@ BenchSetting setting_of(const BenchArguments& options, const Model& model,
                              .outputs = record_of(options.record, model).outputs};
   setting.options.frames = frames_named(options.frames);
   std::vector<std::string> names;
-  for (const FieldOutput of : fields_of(model, setting.options.rollout.outputs))
+  for (const FieldOutput of : sensor_fields_of(model, setting.options.rollout.outputs))
     names.push_back(
         output_name(model.sensors()[static_cast<std::size_t>(of.sensor)].name, of.form) +
         to_string(of.times));

@@ -312,8 +312,8 @@ void add_storage_options(CLI::App& app, GenerateOptions& o) {
   add_text(app, "--record", o.record, "LIST",
            "Observations to store, separated by commas: q, v, variables, bodies or bodies.NAME, a "
            "sensor's field (pad), pad.pressure, pad.shear, pad.sum, pad.ideal, pad.markers, "
-           "pad.surface, pad.flow, pad.height, pad.rgb or pad.rgb_marker; pad/10 is every 10th "
-           "step, q/final the end alone; of a task its "
+           "pad.surface, pad.flow, pad.height, pad.rgb or pad.rgb_marker, a camera's eye.rgb, "
+           "eye.depth or eye.ids; pad/10 is every 10th step, q/final the end alone; of a task its "
            "observations [default: the scene's <outputs>, or all but bodies]");
   add_text(app, "--gradients", o.gradients, "KIND",
            "Derivatives beside the rows: none, return (of the task's, or of a scene's --loss) or "

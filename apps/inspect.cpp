@@ -7,6 +7,7 @@
 
 #include "apps/arguments.hpp"
 #include "apps/command.hpp"
+#include "apps/inspect_cameras.hpp"
 #include "apps/inspect_effects.hpp"
 #include "apps/inspect_joints.hpp"
 #include "apps/inspect_task.hpp"
@@ -122,6 +123,22 @@ Json sensors_json(const Model& model) {
   return sensors;
 }
 
+Json cameras_json(const Scene& scene) {
+  return list_of(scene.cameras, [&](const CameraDescription& c) {
+    const PictureCost cost = picture_cost(scene, c);
+    return Json{{"name", c.name},
+                {"body", c.body},
+                {"rows", c.rows},
+                {"cols", c.cols},
+                {"fov", c.fov},
+                {"rays", cost.rays},
+                {"triangles", cost.triangles},
+                {"rgb_bytes", cost.rgb_bytes},
+                {"depth_bytes", cost.depth_bytes},
+                {"ids_bytes", cost.ids_bytes}};
+  });
+}
+
 Json contact_json(const ContactInfo& c) {
   return {{"first", c.first}, {"second", c.second}, {"points", c.points}, {"law", c.law}};
 }
@@ -161,6 +178,7 @@ Json as_json(const Model& model) {
           {"contacts", list_of(model.contacts(), contact_json)},
           {"meshes", list_of(model.meshes(), mesh_json)},
           {"sensors", sensors_json(model)},
+          {"cameras", cameras_json(scene)},
           {"variables", list_of(model.end_effectors(), end_effector_json)},
           {"outputs", scene.outputs ? Json(scene.outputs->record) : Json()},
           {"control", control_name(scene)},
@@ -246,7 +264,8 @@ std::string as_text(const Model& model) {
   for (const ContactInfo& c : model.contacts())
     text += fmt::format("  {} on {}: {} point{}, law {}\n", c.first, c.second, c.points,
                         c.points == 1 ? "" : "s", c.law);
-  text += '\n' + sensors_text(model) + end_effectors_text(model) + '\n' + outputs_text(scene);
+  text += '\n' + sensors_text(model) + cameras_text(scene) + end_effectors_text(model) + '\n' +
+          outputs_text(scene);
   text += "\neffects\n";
   for (const EffectInfo& e : model.effects())
     if (e.effect.element < 0)

@@ -16,7 +16,6 @@ namespace {
 
 /// A word and what it means; throws for one that the scene does not have.
 TimedName requested_output(const std::string& word, const std::string& where, const Model& model) {
-  const std::vector<std::string> sensors = sensor_names(model.scene());
   TimedName requested;
   try {
     requested = split_times(word);
@@ -24,11 +23,12 @@ TimedName requested_output(const std::string& word, const std::string& where, co
     throw InputError(where + ": " + error.what());
   }
   const std::string& name = requested.name;
-  const std::optional<FieldOutput> reading = find_output(sensors, name);
+  const std::optional<FieldOutput> reading = find_output(model.scene(), name);
   const bool is_sensor = reading.has_value(),
              other = is_plain_output(name) || find_body_output(model.scene(), name);
   if (is_sensor && other)
-    throw InputError(where + ": '" + name + "' is a sensor, too; expected one of another name");
+    throw InputError(where + ": '" + name +
+                     "' is that of a sensor or camera, too; expected one of another name");
   if (reading)
     if (const std::string reason = reason_against(model.scene(), *reading); !reason.empty())
       throw InputError(fmt::format("{}: '{}', but {}", where, word, reason));
@@ -79,9 +79,8 @@ Record record_of(const std::string& option, const Model& model) {
     throw InputError(record.where +
                      ": 'memory', but nothing in the scene has ks or friction of joints");
   outputs.fields.emplace();
-  const std::vector<std::string> sensors = sensor_names(model.scene());
   for (const TimedName& requested : record.requested)
-    if (std::optional<FieldOutput> field = find_output(sensors, requested.name)) {
+    if (std::optional<FieldOutput> field = find_output(model.scene(), requested.name)) {
       field->times = requested.times;
       outputs.fields->push_back(*field);
     }

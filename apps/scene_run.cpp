@@ -189,11 +189,11 @@ Json settings_json(const RunFacts& facts) {
 
 void note_empty_sensors(const Console& console, const Model& model, const RolloutOptions& rollout) {
   for (const FieldOutput of : fields_of(model, rollout.outputs)) {
-    const SensorInfo& sensor = model.sensors()[static_cast<std::size_t>(of.sensor)];
     if (tactile_frames(model, of, rollout) == 0)
-      console.note(fmt::format("sensor {} is read every {} steps: no field in {} steps",
-                               sensor.name, reading_times(model, of, rollout).every,
-                               rollout.steps));
+      console.note(fmt::format(
+          "{} {} is read every {} steps: no {} in {} steps", is_view(of.form) ? "camera" : "sensor",
+          source_name(model.scene(), of), reading_times(model, of, rollout).every,
+          is_view(of.form) ? "picture" : "field", rollout.steps));
   }
 }
 

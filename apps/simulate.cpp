@@ -121,7 +121,7 @@ Json audit_json(const std::optional<EnergyBalanceSummary>& audit) {
 Json sensors_json(const Model& model, const RolloutOptions& rollout) {
   Json sensors = Json::array();
   for (const FieldOutput of : fields_of(model, rollout.outputs))
-    sensors.push_back({{"name", model.sensors()[static_cast<std::size_t>(of.sensor)].name},
+    sensors.push_back({{"name", source_name(model.scene(), of)},
                        {"form", to_string(of.form)},
                        {"every", reading_times(model, of, rollout).every},
                        {"frames", tactile_frames(model, of, rollout)}});
@@ -404,7 +404,7 @@ Command add_simulate(CLI::App& program) {
       "What to compute and store besides q, v, u and the solver's numbers, separated by "
       "commas: bodies or bodies.NAME, variables, memory (of friction), a sensor's field "
       "(pad), pad.pressure, pad.shear, pad.sum, pad.ideal, pad.markers, pad.surface, pad.flow, "
-      "pad.height, pad.rgb or pad.rgb_marker; "
+      "pad.height, pad.rgb or pad.rgb_marker, a camera's eye.rgb, eye.depth or eye.ids; "
       "pad/10 is every 10th step, q/final the end alone [default: the scene's <outputs>, else "
       "bodies, "
       "variables and all fields]");

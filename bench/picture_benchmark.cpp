@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-// Time of a picture of a gel and of its pullback, by the size of the field and of the picture.
+// Time of a picture of a gel and of its pullback, by the size of the field and of the picture; and
+// of a picture of a camera, by its side.
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
 #include <cmath>
 
 #include "engine/picture/gel_camera.hpp"
+#include "engine/picture/scene_view.hpp"
 
 namespace tangere {
 namespace {
@@ -86,6 +88,77 @@ void sizes(benchmark::internal::Benchmark* b) {
   b->Unit(benchmark::kMicrosecond);
 }
 
+/// A table with 18 solids of five kinds, a ball of 1 984 triangles and the ground, from a corner.
+struct Table {
+  std::vector<ViewSolid> solids;
+  std::vector<double> vertices;
+  std::vector<std::array<int, 3>> triangles;
+  ViewSolid mesh;
+  Vector3 light;
+
+  Table() {
+    const Vector3 eye{0.05, -0.5, 0.35}, forward = unit(Vector3{0, 0, 0.03} - eye),
+                                         right = unit(cross(forward, {0, 0, 1})),
+                                         down = cross(forward, right);
+    const auto seen = [&](const Vector3& v) {
+      return Vector3{dot(v, right), dot(v, down), dot(v, forward)};
+    };
+    light = seen(unit({0.35, -0.6, 0.75}));
+    const auto placed = [&](SolidKind kind, double turn, const Vector3& at, const Vector3& size) {
+      const Vector3 x = unit({std::cos(turn), std::sin(turn), 0.5 * std::sin(3 * turn)}),
+                    y = unit(cross(x, {0.1, 0.3, 1})), z = cross(x, y);
+      ViewSolid solid{kind, static_cast<std::int32_t>(solids.size())};
+      solid.axes = {seen(x), seen(y), seen(z)};
+      solid.origin = seen(at - eye);
+      solid.size = size;
+      solid.colour = {0.8, 0.5, 0.3};
+      return solid;
+    };
+    ViewSolid ground{SolidKind::half_space, 20};
+    ground.axes = {seen({1, 0, 0}), seen({0, 1, 0}), seen({0, 0, 1})};
+    ground.origin = seen(Vector3{0, 0, 0} - eye);
+    ground.square = 0.05;
+    ground.colour = {0.6, 0.6, 0.6};
+    const Vector3 sizes[] = {{0.03, 0.03, 0.03},
+                             {0.03, 0.02, 0.04},
+                             {0.02, 0.03, 0.025},
+                             {0.02, 0.03, 0},
+                             {0.02, 0.03, 0}};
+    for (int k = 0; k < 18; ++k)
+      solids.push_back(placed(static_cast<SolidKind>(k % 5), k,
+                              {0.07 * (k % 6) - 0.18, 0.09 * (k / 6) - 0.1, 0.03}, sizes[k % 5]));
+    solids.push_back(ground);
+    mesh = placed(SolidKind::ball, 0, {0, 0.15, 0.05}, {1, 1, 1});
+    constexpr int kRings = 32;
+    for (int i = 0; i <= kRings; ++i)
+      for (int j = 0; j < kRings; ++j) {
+        const double lift = M_PI * i / kRings, turn = 2 * M_PI * j / kRings;
+        for (const double x :
+             {std::sin(lift) * std::cos(turn), std::sin(lift) * std::sin(turn), std::cos(lift)})
+          vertices.push_back(0.04 * x);
+        const int a = i * kRings + j, b = i * kRings + (j + 1) % kRings;
+        if (i > 0 && i < kRings) triangles.push_back({a, a + kRings, b});
+        if (i < kRings - 1) triangles.push_back({b, a + kRings, b + kRings});
+      }
+  }
+};
+
+void BM_Camera(benchmark::State& state) {
+  const Table table;
+  const int side = static_cast<int>(state.range(0));
+  SceneView view({side, side, 45, 10});
+  std::vector<std::uint8_t> bytes(3 * view.grid().pixels());
+  for (auto _ : state) {
+    view.begin(table.light, 0.35);
+    for (const ViewSolid& solid : table.solids) view.add(solid);
+    view.add(ViewMesh{table.vertices, table.triangles, 1}, table.mesh);
+    unpack_colours(view.colours(), bytes);
+    benchmark::DoNotOptimize(bytes.data());
+  }
+  state.SetItemsProcessed(state.iterations());
+}
+
+BENCHMARK(BM_Camera)->Arg(64)->Arg(84)->Arg(128)->Arg(224)->Unit(benchmark::kMicrosecond);
 BENCHMARK(BM_Picture)->Apply(sizes);
 BENCHMARK(BM_NoisyPicture)->Apply(sizes);
 BENCHMARK(BM_PicturePullback<float>)->Apply(sizes);

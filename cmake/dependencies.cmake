@@ -26,6 +26,7 @@ find_library(LIBDEFLATE_LIBRARY deflate REQUIRED)
 find_path(LIBLZ4_INCLUDE_DIR lz4.h REQUIRED)
 find_library(LIBLZ4_LIBRARY lz4 REQUIRED)
 find_package(PNG REQUIRED)
+find_package(JPEG REQUIRED)
 # xxHash is used as a header alone.
 find_path(XXHASH_INCLUDE_DIR xxhash.h REQUIRED)
 add_library(tangere_xxhash INTERFACE)

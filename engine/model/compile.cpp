@@ -404,6 +404,7 @@ class Compiler {
   }
 
   void end_effectors() {
+    m_.cameras = compile_cameras(m_.scene);
     NameIndex names;
     for (const EndEffectorDescription& d : m_.scene.end_effectors) {
       names.add("endeffector", d.name, static_cast<int>(m_.end_effectors.size()), d.source);
@@ -414,7 +415,6 @@ class Compiler {
   }
 
   // --- state and what varies ---
-
   /// Returns where bodies are at rest, then where links are.
   [[nodiscard]] std::vector<Vec3<double>> places() const {
     std::vector<Frame<double>> world;

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "engine/base/aligned.hpp"
+#include "engine/model/compile_cameras.hpp"
 #include "engine/model/mesh_grid.hpp"
 #include "engine/model/model_info.hpp"
 #include "engine/model/pattern.hpp"
@@ -211,6 +212,7 @@ struct CompiledModel {
   std::vector<CompiledMotor> motors;  ///< one per control
   std::vector<CompiledSensor> sensors;
   std::vector<CompiledEndEffector> end_effectors;
+  std::vector<CompiledCamera> cameras;
   std::vector<LayerPad> layer_pads;
   int layer_link_pairs = 0;  ///< link pairs that they touch
   std::vector<kernels::PairContact> pairs;

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "engine/base/as_size.hpp"
 #include "engine/base/error.hpp"
 #include "engine/model/compile.hpp"
 #include "kernels/table/isa.hpp"
@@ -70,6 +71,20 @@ std::size_t Model::state_bytes_per_environment() const {
   return sizeof(double) * compiled_->layout.rows + sizeof(std::int8_t) + sizeof(std::int32_t) +
          sizeof(double) + 1 + sizeof(std::int64_t) +
          kShearEntryBytes * std::size_t(compiled_->taped_points);
+}
+
+std::size_t numbers_of(const Model& model, const FieldOutput& output) {
+  const std::size_t k = as_size(output.sensor);
+  if (!is_view(output.form)) return numbers_of(model.sensors()[k], output.form);
+  const CameraDescription& camera = model.scene().cameras[k];
+  return numbers_of(camera.rows * camera.cols, output.form);
+}
+
+std::vector<std::size_t> reading_shape(const Model& model, const FieldOutput& output) {
+  const std::size_t k = as_size(output.sensor);
+  if (!is_view(output.form)) return reading_shape(model.sensors()[k], output.form);
+  const CameraDescription& camera = model.scene().cameras[k];
+  return {as_size(camera.rows), as_size(camera.cols), as_size(components_of(output.form))};
 }
 
 }  // namespace tangere

@@ -31,6 +31,11 @@ std::size_t numbers_of(const SensorInfo& sensor, FieldForm form);
 /// pixel} or {6}.
 std::vector<std::size_t> reading_shape(const SensorInfo& sensor, FieldForm form);
 
+class Model;
+/// The same of a sensor or camera of a model.
+std::size_t numbers_of(const Model& model, const FieldOutput& output);
+std::vector<std::size_t> reading_shape(const Model& model, const FieldOutput& output);
+
 /// An end effector after compilation.
 struct EndEffectorInfo {
   std::string name;

@@ -13,10 +13,11 @@
 namespace tangere {
 
 /// Numbers of one type. NumberType has the order of the alternatives.
-using Numbers = std::variant<std::span<const double>, std::span<const float>,
-                             std::span<const std::int64_t>, std::span<const std::int32_t>,
-                             std::span<const std::int8_t>, std::span<const std::uint8_t>>;
-enum class NumberType { float64, float32, int64, int32, int8, uint8 };
+using Numbers =
+    std::variant<std::span<const double>, std::span<const float>, std::span<const std::int64_t>,
+                 std::span<const std::int32_t>, std::span<const std::int8_t>,
+                 std::span<const std::uint8_t>, std::span<const std::int16_t>>;
+enum class NumberType { float64, float32, int64, int32, int8, uint8, int16 };
 
 /// A named fact about a run, a group of channels or a channel.
 struct RunAttribute {

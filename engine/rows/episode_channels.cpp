@@ -50,6 +50,14 @@ class ChannelList {
     channel.touch = (perfect(sensor) || is_ideal(reading.form)) && !is_colour(reading.form);
   }
 
+  /// Adds a picture of a camera, if it is requested.
+  void add_view(const CameraLayout& camera, FieldOutput reading) {
+    const std::string name = output_name(camera.name, reading.form);
+    if (requested(name) == nullptr) return;
+    add(ChannelKind::reading, name, view_shape(camera, reading.form)).reading = {reading.sensor,
+                                                                                 reading.form};
+  }
+
   [[nodiscard]] std::vector<EpisodeChannel> take() { return std::move(all_); }
 
  private:
@@ -79,6 +87,7 @@ std::size_t EpisodeChannel::width() const {
 
 std::vector<EpisodeChannel> episode_channels(const RunFacts& facts,
                                              std::span<const SensorLayout> sensors,
+                                             std::span<const CameraLayout> cameras,
                                              std::span<const std::string> bodies,
                                              std::span<const TimedName> record, int every) {
   ChannelList list(record, every);
@@ -86,10 +95,13 @@ std::vector<EpisodeChannel> episode_channels(const RunFacts& facts,
   list.add(ChannelKind::v, "v", {facts.v_names.size()}, "v_units", "velocities");
   if (facts.task) {
     const bool all_perfect = std::all_of(sensors.begin(), sensors.end(), perfect);
-    for (const TensorSpec& tensor : facts.task->observations)
-      list.add(ChannelKind::task, tensor.name, {tensor.shape.begin(), tensor.shape.end()},
-               tensor.unit, tensor.meaning)
-          .touch = tensor.touch && all_perfect;
+    for (const TensorSpec& tensor : facts.task->observations) {
+      EpisodeChannel& channel =
+          list.add(ChannelKind::task, tensor.name, {tensor.shape.begin(), tensor.shape.end()},
+                   tensor.unit, tensor.meaning);
+      channel.touch = tensor.touch && all_perfect;
+      channel.task_bytes = tensor.own_bytes;
+    }
     return list.take();
   }
   if (!facts.end_effector_names.empty())
@@ -101,6 +113,9 @@ std::vector<EpisodeChannel> episode_channels(const RunFacts& facts,
     for (const FieldForm form : field_forms())
       if (list.requested(output_name(sensors[static_cast<std::size_t>(s)].name, form)) != nullptr)
         list.add_reading(sensors, {s, form});
+  for (int c = 0; c < std::ssize(cameras); ++c)
+    for (const FieldForm form : view_forms())
+      list.add_view(cameras[static_cast<std::size_t>(c)], {c, form});
   return list.take();
 }
 
@@ -115,7 +130,8 @@ std::vector<EpisodeChannel> episode_channels(const Model& model, const TaskSpec*
   std::vector<SensorLayout> sensors;
   for (std::size_t s = 0; s < model.sensors().size(); ++s)
     sensors.push_back(sensor_layout(model.sensors()[s], model.scene().sensors[s], every));
-  return episode_channels(facts, sensors, model.body_names(), record, every);
+  return episode_channels(facts, sensors, camera_layouts(model.scene()), model.body_names(), record,
+                          every);
 }
 
 }  // namespace tangere

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "engine/rows/camera_layout.hpp"
 #include "engine/rows/run_facts.hpp"
 #include "engine/rows/sensor_layout.hpp"
 #include "engine/scene/field_form.hpp"
@@ -31,19 +32,24 @@ struct EpisodeChannel {
   /// Touch: all its numbers are 0 without contact. Of a sensor with imperfections only the ideal
   /// field and the markers are, and a task with such a sensor has none.
   bool touch = false;
+  std::size_t task_bytes = 0;  ///< TensorSpec::own_bytes
 
   [[nodiscard]] std::size_t width() const;  ///< numbers of a row
-  /// Whether its numbers are bytes, in any precision: those of a picture in colours.
-  [[nodiscard]] bool is_bytes() const { return kind == Kind::reading && is_colour(reading.form); }
+  /// Bytes of a number whose type does not follow the precision of the run; else 0.
+  [[nodiscard]] std::size_t own_bytes() const {
+    return kind == Kind::reading ? tangere::own_bytes(reading.form) : task_bytes;
+  }
 };
 
 /// Returns the observations that episodes may have, those that are not recorded among them: q and
 /// v, then all that a task observes, or the end effectors (if any), and what `record` names of
-/// bodies and sensors of a scene. `facts`: names of coordinates and end effectors, and the task;
-/// `bodies`: names; `record`: names, with times in steps; none: everything except bodies.
+/// bodies, sensors and cameras of a scene. `facts`: names of coordinates and end effectors, and the
+/// task; `bodies`: names; `record`: names, with times in steps; none: everything except bodies and
+/// cameras.
 /// `every`: steps of a row. Throws InputError for times that are no multiple of it.
 std::vector<EpisodeChannel> episode_channels(const RunFacts& facts,
                                              std::span<const SensorLayout> sensors,
+                                             std::span<const CameraLayout> cameras,
                                              std::span<const std::string> bodies,
                                              std::span<const TimedName> record, int every);
 /// The same of a model; `task`: null for a scene.

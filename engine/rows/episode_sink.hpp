@@ -13,9 +13,10 @@
 
 namespace tangere {
 
-/// The numbers of one observation as they are stored: float64, float32, or bytes of colours.
-using Observation =
-    std::variant<std::span<const double>, std::span<const float>, std::span<const std::uint8_t>>;
+/// The numbers of one observation as they are stored: float64, float32, bytes of colours, or
+/// numbers of bodies.
+using Observation = std::variant<std::span<const double>, std::span<const float>,
+                                 std::span<const std::uint8_t>, std::span<const std::int16_t>>;
 
 /// How an episode of a task ended.
 struct EpisodeEnd {

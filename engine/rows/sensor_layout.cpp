@@ -8,6 +8,7 @@
 
 #include "engine/base/error.hpp"
 #include "engine/model/lateral_spread.hpp"
+#include "engine/rows/camera_layout.hpp"
 #include "engine/scene/imperfection_checks.hpp"
 
 namespace tangere {
@@ -94,6 +95,9 @@ std::string components_text(const SensorLayout& sensor, FieldForm form) {
     case FieldForm::height: return "height of the gel's surface towards the camera";
     case FieldForm::rgb: return "R, G, B of the gel without printed markers, row 0 on top";
     case FieldForm::rgb_marker: return "R, G, B of the gel with printed markers, row 0 on top";
+    case FieldForm::view_rgb:
+    case FieldForm::view_depth:
+    case FieldForm::view_ids: return view_text(form);
     case FieldForm::sum: break;
   }
   return "force x y z on the body [N], then x y z of its centre of pressure [m]; body axes";

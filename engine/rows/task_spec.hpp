@@ -26,6 +26,8 @@ struct TensorSpec {
   double low = -kUnbounded, high = kUnbounded;  ///< bounds of every number
   bool privileged = false;                      ///< a robot could not measure it
   bool touch = false;                           ///< tactile: all numbers are 0 without contact
+  /// As EpisodeChannel::own_bytes(): 1 for pictures in colours, 2 for numbers of bodies, else 0.
+  std::size_t own_bytes = 0;
 
   [[nodiscard]] std::size_t size() const;
 };

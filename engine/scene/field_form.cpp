@@ -15,6 +15,7 @@ constexpr FieldForm kForms[] = {FieldForm::field,   FieldForm::pressure,  FieldF
                                 FieldForm::sum,     FieldForm::ideal,     FieldForm::markers,
                                 FieldForm::surface, FieldForm::flow,      FieldForm::height,
                                 FieldForm::rgb,     FieldForm::rgb_marker};
+constexpr FieldForm kViews[] = {FieldForm::view_rgb, FieldForm::view_depth, FieldForm::view_ids};
 constexpr const char* kPlain[] = {"q", "v", "variables", "bodies", "memory"};
 constexpr const char* kBodyOutput = "bodies.";  // followed by the name of one
 }  // namespace
@@ -32,6 +33,9 @@ const char* to_string(FieldForm form) {
     case FieldForm::height: return "height";
     case FieldForm::rgb: return "rgb";
     case FieldForm::rgb_marker: return "rgb_marker";
+    case FieldForm::view_rgb: return "rgb";
+    case FieldForm::view_depth: return "depth";
+    case FieldForm::view_ids: return "ids";
   }
   return "unknown";
 }
@@ -42,8 +46,11 @@ int components_of(FieldForm form) {
     case FieldForm::ideal:
     case FieldForm::rgb:
     case FieldForm::rgb_marker:
+    case FieldForm::view_rgb:
     case FieldForm::surface: return 3;
     case FieldForm::height:
+    case FieldForm::view_depth:
+    case FieldForm::view_ids:
     case FieldForm::pressure: return 1;
     case FieldForm::shear:
     case FieldForm::flow:
@@ -54,6 +61,7 @@ int components_of(FieldForm form) {
 }
 
 std::span<const FieldForm> field_forms() { return kForms; }
+std::span<const FieldForm> view_forms() { return kViews; }
 
 bool is_ideal(FieldForm form) {
   return form == FieldForm::ideal || is_displacement(form) || is_picture(form);
@@ -74,6 +82,11 @@ std::vector<std::string> sensor_names(const Scene& scene) {
   return names;
 }
 
+const std::string& source_name(const Scene& scene, const FieldOutput& output) {
+  const auto k = static_cast<std::size_t>(output.sensor);
+  return is_view(output.form) ? scene.cameras[k].name : scene.sensors[k].name;
+}
+
 bool is_plain_output(const std::string& name) {
   return std::any_of(std::begin(kPlain), std::end(kPlain),
                      [&](std::string_view plain) { return plain == name; });
@@ -88,6 +101,15 @@ std::optional<FieldOutput> find_output(std::span<const std::string> sensors,
   return std::nullopt;
 }
 
+std::optional<FieldOutput> find_output(const Scene& scene, const std::string& name) {
+  if (const auto of = find_output(sensor_names(scene), name)) return of;
+  for (const FieldForm form : kViews)
+    for (std::size_t c = 0; c < scene.cameras.size(); ++c)
+      if (output_name(scene.cameras[c].name, form) == name)
+        return FieldOutput{static_cast<int>(c), form};
+  return std::nullopt;
+}
+
 std::string body_output(const std::string& body) { return kBodyOutput + body; }
 
 std::optional<int> find_body_output(const Scene& scene, const std::string& name) {
@@ -98,11 +120,11 @@ std::optional<int> find_body_output(const Scene& scene, const std::string& name)
 
 bool has_output(const Scene& scene, const std::string& word) {
   const std::string name = split_times(word).name;
-  return is_plain_output(name) || find_body_output(scene, name) ||
-         find_output(sensor_names(scene), name);
+  return is_plain_output(name) || find_body_output(scene, name) || find_output(scene, name);
 }
 
 std::string reason_against(const Scene& scene, const FieldOutput& output) {
+  if (is_view(output.form)) return "";
   const TactileDescription& sensor = scene.sensors[static_cast<std::size_t>(output.sensor)];
   const auto missing_part = [&]() -> const char* {
     switch (output.form) {
@@ -124,17 +146,20 @@ std::string reason_against(const Scene& scene, const FieldOutput& output) {
          "; expected it in its <tactile>";
 }
 
-void check_outputs(std::span<const FieldOutput> outputs, std::size_t sensors) {
+void check_outputs(const Scene& scene, std::span<const FieldOutput> outputs) {
   for (std::size_t k = 0; k < outputs.size(); ++k) {
     const FieldOutput of = outputs[k];
-    if (of.sensor < 0 || static_cast<std::size_t>(of.sensor) >= sensors)
-      throw InputError("an output of sensor " + std::to_string(of.sensor) + "; the scene has " +
-                       std::to_string(sensors));
+    const bool view = is_view(of.form);
+    const std::string kind = view ? "camera" : "sensor";
+    if (const std::size_t count = view ? scene.cameras.size() : scene.sensors.size();
+        of.sensor < 0 || static_cast<std::size_t>(of.sensor) >= count)
+      throw InputError("an output of " + kind + ' ' + std::to_string(of.sensor) +
+                       "; the scene has " + std::to_string(count));
     const auto before = outputs.first(k);
     if (std::any_of(before.begin(), before.end(), [&](const FieldOutput& other) {
           return other.sensor == of.sensor && other.form == of.form;
         }))
-      throw InputError("the " + std::string(to_string(of.form)) + " of sensor " +
+      throw InputError("the " + std::string(to_string(of.form)) + " of " + kind + ' ' +
                        std::to_string(of.sensor) + " is listed twice; expected it once");
   }
 }
@@ -148,11 +173,10 @@ std::vector<FieldOutput> whole_fields(const Scene& scene) {
 
 std::vector<FieldOutput> requested_fields(const Scene& scene) {
   if (!scene.outputs) return whole_fields(scene);
-  const std::vector<std::string> sensors = sensor_names(scene);
   std::vector<FieldOutput> outputs;
   for (const std::string& word : scene.outputs->record) {
     const TimedName timed = split_times(word);
-    if (std::optional<FieldOutput> of = find_output(sensors, timed.name)) {
+    if (std::optional<FieldOutput> of = find_output(scene, timed.name)) {
       of->times = timed.times;
       outputs.push_back(*of);
     }
@@ -174,6 +198,8 @@ std::vector<std::string> output_names(const Scene& scene) {
     const std::optional<FieldOutput> of = find_output(sensors, name);
     return of && !reason_against(scene, *of).empty();
   });
+  for (const CameraDescription& camera : scene.cameras)
+    for (const FieldForm form : kViews) names.push_back(output_name(camera.name, form));
   for (const LinkDescription& link : scene.links) names.push_back(body_output(link.body.name));
   return names;
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Quantities of a sensor: its whole field, pressure, shear, flow, sum, displacements of markers and
-// of the surface, or pictures of its gel. Only requested quantities are computed and stored.
+// of the surface, or pictures of its gel; and those of a camera. Only requested quantities are
+// computed and stored.
 #pragma once
 
 #include <array>
@@ -26,6 +27,9 @@ enum class FieldForm {
   height,      ///< (height, width, 1) [m]: a gel's surface in a picture, towards the camera
   rgb,         ///< (height, width, 3), 0 to 255: a picture of a gel (docs/pictures.md)
   rgb_marker,  ///< the same with printed markers
+  view_rgb,    ///< (height, width, 3), 0 to 255: what a camera of the scene sees
+  view_depth,  ///< (height, width, 1) [m]: along the camera's axis
+  view_ids,    ///< (height, width, 1): number of the body; -1 nothing, one after the last: ground
 };
 
 /// Force x y z on the body [N], then its centre x y z [m]: the mean of the points' places, each
@@ -34,7 +38,7 @@ enum class FieldForm {
 using FieldSum = std::array<double, 6>;
 
 /// The words of files and options: "field", "pressure", "shear", "sum", "ideal", "markers",
-/// "surface", "flow", "height", "rgb", "rgb_marker".
+/// "surface", "flow", "height", "rgb", "rgb_marker"; of a camera "rgb", "depth", "ids".
 const char* to_string(FieldForm form);
 
 /// Numbers of a point, or of a pixel; 0 for a sum.
@@ -42,9 +46,9 @@ int components_of(FieldForm form);
 /// Numbers of a whole reading that is no picture.
 std::size_t numbers_of(int points, FieldForm form);
 
-/// One reading of one sensor.
+/// One reading of one sensor or camera.
 struct FieldOutput {
-  int sensor = 0;
+  int sensor = 0;  ///< of a form of cameras: the camera
   FieldForm form = FieldForm::field;
   OutputTimes times = {};  ///< none: as often as the run reads this sensor
   friend bool operator==(const FieldOutput&, const FieldOutput&) = default;
@@ -53,10 +57,19 @@ struct FieldOutput {
 /// Whether a reading is that of an ideal sensor, whatever the sensor's imperfections: the ideal
 /// field, how it moves markers and the surface, and pictures.
 bool is_ideal(FieldForm form);
-/// Whether a reading is a picture of a gel: its shape is that of <picture>.
+/// Whether a reading is that of a camera, not of a sensor.
+inline bool is_view(FieldForm form) { return form >= FieldForm::view_rgb; }
+/// Whether a reading is a picture: its shape is that of <picture> or <camera>.
 inline bool is_picture(FieldForm form) { return form >= FieldForm::height; }
 /// Whether a reading is a picture in colours, which files keep as bytes.
-inline bool is_colour(FieldForm form) { return form > FieldForm::height; }
+inline bool is_colour(FieldForm form) {
+  return form == FieldForm::rgb || form == FieldForm::rgb_marker || form == FieldForm::view_rgb;
+}
+/// Bytes of a number whose type does not follow the precision of a run: 1 of colours (uint8), 2 of
+/// numbers of bodies (int16), else 0.
+inline std::size_t own_bytes(FieldForm form) {
+  return is_colour(form) ? 1 : form == FieldForm::view_ids ? 2 : 0;
+}
 /// Whether a reading has displacements [m].
 inline bool is_displacement(FieldForm form) {
   return form == FieldForm::markers || form == FieldForm::surface;
@@ -68,20 +81,26 @@ inline FieldOutput undivided(FieldOutput of) {
   return of;
 }
 
-/// All of them, in the order of the enumeration.
+/// All of sensors, in the order of the enumeration.
 std::span<const FieldForm> field_forms();
+/// All of cameras.
+std::span<const FieldForm> view_forms();
 
 /// Returns "pad" for a field, else "pad.pressure", "pad.shear", "pad.sum", "pad.ideal",
 /// "pad.markers", "pad.surface", "pad.flow", "pad.height", "pad.rgb" or "pad.rgb_marker".
 std::string output_name(const std::string& sensor, FieldForm form);
 /// Returns the names of a scene's sensors, in file order.
 std::vector<std::string> sensor_names(const Scene& scene);
+/// Returns the name of the sensor or camera of an output.
+const std::string& source_name(const Scene& scene, const FieldOutput& output);
 /// Whether a name is that of an output of no sensor: q, v, variables (positions of end effectors),
 /// bodies (poses and twists) or memory (the shear state).
 bool is_plain_output(const std::string& name);
 /// Returns the reading of this name; none where no sensor has it.
 std::optional<FieldOutput> find_output(std::span<const std::string> sensors,
                                        const std::string& name);
+/// The same of a scene's sensors and cameras.
+std::optional<FieldOutput> find_output(const Scene& scene, const std::string& name);
 /// Returns the name of the motion of one body: "bodies.box".
 std::string body_output(const std::string& body);
 /// Returns the index of the body whose motion has this name, "bodies.box"; none where there is no
@@ -92,16 +111,17 @@ std::optional<int> find_body_output(const Scene& scene, const std::string& name)
 bool has_output(const Scene& scene, const std::string& word);
 /// Returns why a scene lacks a reading, as in "sensor 'pad' has no <markers>"; "" where it has it.
 std::string reason_against(const Scene& scene, const FieldOutput& output);
-/// Throws InputError for a sensor that is not there and for an output that is listed twice.
-void check_outputs(std::span<const FieldOutput> outputs, std::size_t sensors);
+/// Throws InputError for a sensor or camera that is not there and for an output that is listed
+/// twice.
+void check_outputs(const Scene& scene, std::span<const FieldOutput> outputs);
 /// Returns the field of every sensor: the outputs of a scene without <outputs>.
 std::vector<FieldOutput> whole_fields(const Scene& scene);
-/// Returns the sensor outputs of the scene's <outputs>, with their times; without <outputs>, the
-/// field of every sensor.
+/// Returns the outputs of sensors and cameras of the scene's <outputs>, with their times; without
+/// it, the field of every sensor.
 std::vector<FieldOutput> requested_fields(const Scene& scene);
 /// Returns all names of outputs, the plain ones included.
 std::vector<std::string> output_names(std::span<const std::string> sensors);
-/// The same with the names of single bodies.
+/// The same with those of cameras and the names of single bodies.
 std::vector<std::string> output_names(const Scene& scene);
 
 }  // namespace tangere

@@ -5,6 +5,7 @@
 
 #include <array>
 #include <limits>
+#include <memory>
 #include <optional>
 #include <span>
 #include <string>
@@ -13,6 +14,7 @@
 
 #include "engine/base/error.hpp"
 #include "engine/base/vector3.hpp"
+#include "engine/scene/camera.hpp"
 #include "engine/scene/gel.hpp"
 #include "engine/scene/number_address.hpp"
 #include "engine/scene/pose.hpp"
@@ -141,6 +143,8 @@ struct BodyDescription {
   std::array<double, 4> rgba{0.7, 0.7, 0.7, 1};
   Source source;
   double gravity_share = 1;  ///< of gravity that acts on it; the same on one link
+  /// What cameras see of an abstract body, body frame; null: nothing.
+  std::shared_ptr<const MeshShape> surface = nullptr;
 };
 
 /// A link: one joint to the parent link (or the world) and one body that moves with it.
@@ -436,6 +440,7 @@ struct Scene {
   std::vector<LinkDescription> links;
   std::vector<MotorDescription> motors;
   std::vector<TactileDescription> sensors;
+  std::vector<CameraDescription> cameras;
   std::vector<EndEffectorDescription> end_effectors;
   std::vector<GroundContactDescription> ground_contacts;
   std::vector<PairContactDescription> pair_contacts;

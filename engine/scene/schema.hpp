@@ -59,8 +59,9 @@ enum Element : std::uint64_t {
   kWeld = 1ULL << 34,
   kVaryConnect = 1ULL << 35,  ///< in <randomize>, like the next
   kVaryWeld = 1ULL << 36,
+  kCamera = 1ULL << 37,
 };
-inline constexpr int kElements = 37;
+inline constexpr int kElements = 38;
 inline constexpr std::uint64_t kContacts = kGroundContact | kPairContact,
                                kTouching = kContacts | kTactile, kLoops = kConnect | kWeld,
                                kVarying = kVaryJoint | kVaryMotor | kVaryGround | kVaryPair |
@@ -100,10 +101,11 @@ using Member = std::variant<
     Vector3 Pose::*, Quaternion Pose::*, double JointEffects::*, double BodyDescription::*,
     std::array<double, 4> BodyDescription::*, double AbstractShape::*, double MotorDescription::*,
     double ContactCoefficients::*, double LoopDescription::*, Vector3 LoopDescription::*,
-    int TactileDescription::*, double SensorImperfections::*, NormalAndShear SensorImperfections::*,
-    double MarkersDescription::*, double SkinMaterial::*, double LayerDescription::*,
-    std::optional<double> LayerDescription::*, int PictureDescription::*,
-    double PictureDescription::*, Vector3 EndEffectorDescription::*,
+    int TactileDescription::*, double SensorImperfections::*,
+    NormalAndShear SensorImperfections::*, double MarkersDescription::*, double SkinMaterial::*,
+    double LayerDescription::*, std::optional<double> LayerDescription::*,
+    int PictureDescription::*, double PictureDescription::*, int CameraDescription::*,
+    double CameraDescription::*, Vector3 CameraDescription::*, Vector3 EndEffectorDescription::*,
     double EndEffectorDescription::*, std::array<double, 4> EndEffectorDescription::*,
     double PiecewiseControl::*, double RandomControl::*>;
 

@@ -73,7 +73,8 @@ struct FormMap::Impl {
   mutable std::vector<std::unique_ptr<PictureReading<double>>> idle;  // scratch of pictures
 
   Impl(const Model& m, FieldOutput of) : model(m), output(of) {
-    check_outputs({&of, 1}, m.sensors().size());
+    check_outputs(m.scene(), {&of, 1});
+    if (is_view(of.form)) throw InputError("pictures of a camera do not follow from a field");
     const std::string reason = reason_against(m.scene(), of);
     if (!reason.empty()) throw InputError(reason);
     const CompiledSensor& s = compiled(m).sensors[std::size_t(of.sensor)];
@@ -187,6 +188,9 @@ void FormMap::evaluate(std::span<const double> field, std::span<double> form) co
     case FieldForm::height:
     case FieldForm::rgb:
     case FieldForm::rgb_marker:
+    case FieldForm::view_rgb:  // those of cameras are refused by the constructor
+    case FieldForm::view_depth:
+    case FieldForm::view_ids:
       return m.with_picture([&](PictureReading<double>& picture) {
         picture.set_field(m.output.form, field);
         picture.read(m.output.form, form);
@@ -217,6 +221,9 @@ void FormMap::pull_back(std::span<const double> field, std::span<const double> f
     case FieldForm::height:
     case FieldForm::rgb:
     case FieldForm::rgb_marker:
+    case FieldForm::view_rgb:
+    case FieldForm::view_depth:
+    case FieldForm::view_ids:
       return m.with_picture([&](PictureReading<double>& picture) {
         picture.set_field(m.output.form, field);
         picture.pull_back(m.output.form, field, form_bar, field_bar);

@@ -75,16 +75,25 @@ void Readout::read_block(const Batch& batch, int block, FieldOutput output,
 void Readout::read_block(const Batch& batch, int block, FieldOutput output,
                          std::span<const std::span<std::uint8_t>> pictures) {
   Impl& m = *impl_;
-  checked_index("sensor", output.sensor, std::ssize(m.model.sensors()));
   if (!is_colour(output.form))
     throw InputError(std::string("bytes of the reading '") + to_string(output.form) +
                      "'; expected rgb or rgb_marker");
+  if (is_view(output.form)) return m.view_block(batch, block, output, pictures);
+  checked_index("sensor", output.sensor, std::ssize(m.model.sensors()));
   m.check_has(output);
   check_block(m.model, batch, block, "picture", pictures,
               numbers_of(m.model.sensors()[std::size_t(output.sensor)], output.form));
   m.place_block(batch, block, output.sensor);
   for (int e = 0; e < Impl::environments_of(batch, block); ++e)
     m.write_picture(batch, kBlock * block + e, output, pictures[std::size_t(e)].data());
+}
+
+void Readout::read_block(const Batch& batch, int block, FieldOutput output,
+                         std::span<const std::span<std::int16_t>> numbers) {
+  if (output.form != FieldForm::view_ids)
+    throw InputError(std::string("whole numbers of the reading '") + to_string(output.form) +
+                     "'; expected ids of a camera");
+  impl_->view_block(batch, block, output, numbers);
 }
 
 template <class T>

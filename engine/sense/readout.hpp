@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The readings of a batch: poses and twists of bodies, end effectors, tactile fields. Reads the
-// state and changes nothing.
+// The readings of a batch: poses and twists of bodies, end effectors, tactile fields, pictures of
+// cameras. Reads the state and changes nothing.
 #pragma once
 
 #include <cstdint>
@@ -65,7 +65,7 @@ class Readout {
   template <class T>
   void read(const Batch& batch, int environment, CompactFrame<T>& frame);
 
-  /// Reads the environments from 16 block on, numbers_of(sensor, form) each, one array per
+  /// Reads the environments from 16 block on, numbers_of(model, output) each, one array per
   /// environment. Arrays beyond the batch's last environment are left alone and may be missing.
   /// Flat pads of up to 512 points are read in all environments at once.
   void read_block(const Batch& batch, int block, FieldOutput output,
@@ -75,6 +75,9 @@ class Readout {
   /// The same of a picture in colours, rounded to whole grey levels; other forms are refused.
   void read_block(const Batch& batch, int block, FieldOutput output,
                   std::span<const std::span<std::uint8_t>> pictures);
+  /// The same of the numbers of bodies that a camera sees; other forms are refused.
+  void read_block(const Batch& batch, int block, FieldOutput output,
+                  std::span<const std::span<std::int16_t>> numbers);
   /// The same into one frame per environment, all of the same sensor and form.
   template <class T>
   void read_block(const Batch& batch, int block, std::span<DenseFrame<T>> frames);

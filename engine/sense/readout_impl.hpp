@@ -13,6 +13,7 @@
 #include "engine/model/compiled_model.hpp"
 #include "engine/model/model.hpp"
 #include "engine/scene/frames.hpp"
+#include "engine/sense/camera_reading.hpp"
 #include "engine/sense/dense_tiles.hpp"
 #include "engine/sense/elastic_field.hpp"
 #include "engine/sense/field_sum.hpp"
@@ -48,8 +49,9 @@ struct Readout::Impl {
   std::vector<std::optional<MarkerMap>> markers;  // (sensors) of those that have them
   // (sensors) of those of which a picture was read.
   std::vector<std::optional<PictureReading<float>>> pictures;
-  std::vector<float> picture;                       // of one environment, before conversion
-  std::vector<double> displacement, elastic_field;  // (points, 3)
+  std::vector<std::optional<CameraReading>> cameras;  // those of which a picture was read
+  std::vector<float> picture;                         // of one environment, before conversion
+  std::vector<double> displacement, elastic_field;    // (points, 3)
   std::vector<double> one_reading, block_readings, tile_values;
   std::vector<double> earlier;     // fields of small pads in the states of `past`
   std::optional<PastStates> past;  // for sensors with lag
@@ -77,6 +79,7 @@ struct Readout::Impl {
       if (small(s)) grow(block_readings, 3 * kBlock * points);
     }
     pictures.resize(compiled(m).sensors.size());
+    cameras.resize(compiled(m).cameras.size());
     if (compiled(m).layout.past_states > 0) {
       earlier.resize(block_readings.size());
       past.emplace(m);
@@ -513,9 +516,25 @@ struct Readout::Impl {
     write(batch, environment, {sensor}, force.data());
   }
 
+  /// Reads what a camera sees in the environments of a block.
+  template <class T>
+  void view_block(const Batch& batch, int number, FieldOutput of,
+                  std::span<const std::span<T>> views) {
+    checked_index("camera", of.sensor, std::ssize(cameras));
+    check_block(model, batch, number, "picture", views, numbers_of(model, of));
+    std::optional<CameraReading>& camera = cameras[std::size_t(of.sensor)];
+    if (!camera) camera.emplace(model, of.sensor);
+    for (int e = 0; e < environments_of(batch, number); ++e) {
+      if (e % kGroup == 0) reader.move(batch, number, e / kGroup);
+      camera->set(reader, batch, kBlock * number + e);
+      camera->read(of.form, views[std::size_t(e)]);
+    }
+  }
+
   template <class T>
   void block_spans(const Batch& batch, int number, FieldOutput of,
                    std::span<const std::span<T>> readings) {
+    if (is_view(of.form)) return view_block(batch, number, of, readings);
     checked_index("sensor", of.sensor, std::ssize(model.sensors()));
     check_block(model, batch, number, "reading", readings,
                 numbers_of(model.sensors()[std::size_t(of.sensor)], of.form));

@@ -30,8 +30,8 @@ constexpr std::size_t kLeastLastBytes = 8 << 10, kLeastTiledBytes = 8 << 10;
 constexpr std::uint64_t kTileSide = 16, kLargeSide = 128, kTilePoints = 256;
 
 /// Bytes of a number of an observation.
-std::size_t number_bytes(const DatasetLayout& layout, bool is_bytes) {
-  return is_bytes ? 1 : layout.single ? sizeof(float) : sizeof(double);
+std::size_t number_bytes(const DatasetLayout& layout, std::size_t own) {
+  return own > 0 ? own : layout.single ? sizeof(float) : sizeof(double);
 }
 
 std::size_t numbers_of(const std::vector<std::uint64_t>& shape) {
@@ -118,11 +118,11 @@ std::vector<unsigned char> lz4(const std::vector<unsigned char>& plain) {
   return out;
 }
 
-/// Pictures in colours are bytes and nowhere zero, so they have no tiles.
+/// Pictures in colours and numbers of bodies are nowhere zero, so they have no tiles.
 ChunkPlan chunk_plan(const DatasetLayout& layout, const std::vector<std::uint64_t>& shape,
-                     bool is_bytes, double together) {
-  const std::size_t row_bytes = numbers_of(shape) * number_bytes(layout, is_bytes);
-  const bool sparse = layout.sparse && !is_bytes && (shape.size() == 2 || shape.size() == 3) &&
+                     std::size_t own, double together) {
+  const std::size_t row_bytes = numbers_of(shape) * number_bytes(layout, own);
+  const bool sparse = layout.sparse && own == 0 && (shape.size() == 2 || shape.size() == 3) &&
                       row_bytes >= kLeastTiledBytes;
   ChunkPlan plan;
   plan.tile = shape;
@@ -149,17 +149,17 @@ ChunkPlan chunk_plan(const DatasetLayout& layout, const std::vector<std::uint64_
 
 std::vector<ChunkPlan> chunk_plans(const DatasetLayout& layout) {
   const std::vector<std::vector<std::uint64_t>> shapes = layout.observation_shapes();
-  const std::vector<bool> is_bytes = layout.observation_bytes();
+  const std::vector<std::size_t> own_bytes = layout.observation_bytes();
   double together = 0;
   for (std::size_t k = 0; k < shapes.size(); ++k)
-    together += static_cast<double>(numbers_of(shapes[k]) * number_bytes(layout, is_bytes[k]));
+    together += static_cast<double>(numbers_of(shapes[k]) * number_bytes(layout, own_bytes[k]));
   const std::vector<DatasetSample> samples = layout.samples();
   std::vector<ChunkPlan> plans;
   plans.reserve(shapes.size() + samples.size());
   for (std::size_t k = 0; k < shapes.size(); ++k)
-    plans.push_back(chunk_plan(layout, shapes[k], is_bytes[k], together));
+    plans.push_back(chunk_plan(layout, shapes[k], own_bytes[k], together));
   for (const DatasetSample& sample : samples)
-    plans.push_back(chunk_plan(layout, sample.shape, sample.is_bytes, 1));
+    plans.push_back(chunk_plan(layout, sample.shape, sample.own_bytes, 1));
   return plans;
 }
 
@@ -191,14 +191,16 @@ std::vector<h5::FileFilter> file_filters(const std::string& compression, std::si
 void shuffle(const unsigned char* data, std::size_t used, std::size_t width,
              std::vector<unsigned char>& out) {
   const std::size_t numbers = out.size() / width, given = used / width;
-  if (width == sizeof(std::uint32_t))
+  if (width == sizeof(std::uint16_t))
+    split<std::uint16_t>(data, given, out.data(), numbers);
+  else if (width == sizeof(std::uint32_t))
     split<std::uint32_t>(data, given, out.data(), numbers);
   else if (width == sizeof(std::uint64_t))
     split<std::uint64_t>(data, given, out.data(), numbers);
   else if (width == 1)
     std::copy_n(data, given, out.begin());
   else
-    throw std::logic_error("numbers that are neither of one, nor of four, nor of eight bytes");
+    throw std::logic_error("numbers that are neither of one, two, four nor eight bytes");
   for (std::size_t b = 0; b < width; ++b)
     std::fill_n(out.begin() + static_cast<std::ptrdiff_t>(b * numbers + given), numbers - given,
                 static_cast<unsigned char>(0));

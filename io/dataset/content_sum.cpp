@@ -134,5 +134,6 @@ bool any_number(std::span<const T> numbers) {
 template bool any_number(std::span<const float>);
 template bool any_number(std::span<const double>);
 template bool any_number(std::span<const std::uint8_t>);
+template bool any_number(std::span<const std::int16_t>);
 
 }  // namespace tangere

@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <charconv>
 #include <limits>
+#include <optional>
 #include <sstream>
 
 #include "engine/base/error.hpp"
@@ -62,6 +63,31 @@ void describe_run(const h5::Id& scene, const DatasetLayout& layout) {
   h5::write_attribute(scene, "tactile", layout.sparse ? "sparse" : "dense");
   h5::write_attribute(scene, "tangere_version", layout.version);
   h5::write_attribute(scene, "instruction_set", layout.instruction_set);
+}
+
+/// Describes the cameras whose pictures are stored.
+void describe_cameras(const h5::Id& scene, const DatasetLayout& layout) {
+  const std::vector<EpisodeChannel> channels = layout.channels();
+  std::optional<h5::Id> cameras;
+  for (std::size_t c = 0; c < layout.cameras.size(); ++c) {
+    std::vector<std::string> readings, components;
+    for (const EpisodeChannel& channel : channels) {
+      const FieldOutput of = channel.reading;
+      if (channel.kind != EpisodeChannel::Kind::reading || !is_view(of.form) ||
+          static_cast<std::size_t>(of.sensor) != c)
+        continue;
+      readings.push_back(channel.name);
+      components.emplace_back(view_text(of.form));
+    }
+    if (readings.empty()) continue;
+    if (!cameras) cameras.emplace(h5::create_group(scene, "cameras"));
+    const CameraLayout& camera = layout.cameras[c];
+    const h5::Id group = h5::create_group(*cameras, camera.name);
+    h5::write_attributes(group, camera.facts);
+    h5::write_attributes(group, {{"names", camera.bodies}});
+    h5::write_attribute(group, "readings", std::span<const std::string>(readings));
+    h5::write_attribute(group, "reading_components", std::span<const std::string>(components));
+  }
 }
 
 /// What is not stored at every row, and the steps between: 0 for the last state alone.
@@ -121,7 +147,7 @@ void describe_numbers(const h5::Id& scene, const DatasetLayout& layout) {
     for (const EpisodeChannel& channel : channels) {
       const FieldOutput of = channel.reading;
       if (channel.kind != EpisodeChannel::Kind::reading || of.form == FieldForm::field ||
-          &layout.sensors[static_cast<std::size_t>(of.sensor)] != &sensor)
+          is_view(of.form) || &layout.sensors[static_cast<std::size_t>(of.sensor)] != &sensor)
         continue;
       readings.push_back(channel.name);
       components.push_back(components_text(sensor, of.form));
@@ -129,7 +155,7 @@ void describe_numbers(const h5::Id& scene, const DatasetLayout& layout) {
     for (const RunAttribute& fact : sensor.picture_facts)
       if (std::any_of(channels.begin(), channels.end(), [&](const EpisodeChannel& channel) {
             return channel.kind == EpisodeChannel::Kind::reading &&
-                   is_picture(channel.reading.form) &&
+                   is_picture(channel.reading.form) && !is_view(channel.reading.form) &&
                    &layout.sensors[static_cast<std::size_t>(channel.reading.sensor)] == &sensor;
           }))
         h5::write_attributes(group, {{"picture_" + fact.name, fact.value}});
@@ -137,6 +163,7 @@ void describe_numbers(const h5::Id& scene, const DatasetLayout& layout) {
     h5::write_attribute(group, "readings", std::span<const std::string>(readings));
     h5::write_attribute(group, "reading_components", std::span<const std::string>(components));
   }
+  describe_cameras(scene, layout);
 }
 
 void describe_gradients(const h5::Id& scene, const DatasetLayout& layout) {

@@ -13,6 +13,7 @@ DatasetLayout dataset_layout_from(const Model& model, const Stepper& stepper,
   static_cast<RunFacts&>(layout) = run_facts(model, stepper, requested, requested.seed);
   for (std::size_t i = 0; i < model.sensors().size(); ++i)
     layout.sensors.push_back(sensor_layout(model.sensors()[i], scene.sensors[i], requested.every));
+  layout.cameras = camera_layouts(scene);
   layout.tables = tables_of(scene);
   layout.body_names.assign(model.body_names().begin(), model.body_names().end());
   return layout;

@@ -110,7 +110,7 @@ std::vector<DatasetSample> DatasetLayout::samples() const {
   std::vector<DatasetSample> list;
   for (std::size_t k = 0; k < all.size(); ++k)
     if (all[k].requested && all[k].times.given())
-      list.push_back({all[k].name, all[k].shape, all[k].is_bytes(), k, all[k].times,
+      list.push_back({all[k].name, all[k].shape, all[k].own_bytes(), k, all[k].times,
                       all[k].times.before(rows() + 1, rows())});
   return list;
 }
@@ -133,25 +133,25 @@ std::vector<std::vector<std::uint64_t>> DatasetLayout::observation_shapes() cons
   return shapes;
 }
 
-std::vector<bool> DatasetLayout::observation_bytes() const {
-  std::vector<bool> bytes;
+std::vector<std::size_t> DatasetLayout::observation_bytes() const {
+  std::vector<std::size_t> bytes;
   for (const EpisodeChannel& channel : channels())
-    if (channel.requested && !channel.times.given()) bytes.push_back(channel.is_bytes());
+    if (channel.requested && !channel.times.given()) bytes.push_back(channel.own_bytes());
   return bytes;
 }
 
 double DatasetLayout::episode_bytes() const {
   const std::size_t width = single ? sizeof(float) : sizeof(double);
-  const auto size_of = [width](const std::vector<std::uint64_t>& shape, bool is_bytes) {
-    return static_cast<double>(std::accumulate(
-        shape.begin(), shape.end(), is_bytes ? std::size_t{1} : width, std::multiplies<>()));
+  const auto size_of = [width](const std::vector<std::uint64_t>& shape, std::size_t own) {
+    return static_cast<double>(
+        std::accumulate(shape.begin(), shape.end(), own > 0 ? own : width, std::multiplies<>()));
   };
   double row_bytes = 0, sample_bytes = 0;
   const std::vector<std::vector<std::uint64_t>> shapes = observation_shapes();
-  const std::vector<bool> is_bytes = observation_bytes();
-  for (std::size_t k = 0; k < shapes.size(); ++k) row_bytes += size_of(shapes[k], is_bytes[k]);
+  const std::vector<std::size_t> own_bytes = observation_bytes();
+  for (std::size_t k = 0; k < shapes.size(); ++k) row_bytes += size_of(shapes[k], own_bytes[k]);
   for (const DatasetSample& sample : samples())
-    sample_bytes += static_cast<double>(sample.rows) * size_of(sample.shape, sample.is_bytes);
+    sample_bytes += static_cast<double>(sample.rows) * size_of(sample.shape, sample.own_bytes);
   const double r = static_cast<double>(rows());
   const double action_bytes = static_cast<double>(action_names().size()) * sizeof(float);
   constexpr double kRewardAndDone = sizeof(float) + 1;

@@ -40,7 +40,7 @@ struct PlayedBy {
 struct DatasetSample {
   std::string name;
   std::vector<std::uint64_t> shape;  ///< of a row
-  bool is_bytes = false;             ///< a picture in colours
+  std::size_t own_bytes = 0;         ///< EpisodeChannel::own_bytes()
   std::size_t source = 0;            ///< index in pieces of episodes
   OutputTimes times;                 ///< in rows
   std::int64_t rows = 0;             ///< of an episode
@@ -52,6 +52,7 @@ struct DatasetLayout : RunFacts {
   int every = 1;              ///< K: row j is the state after j K steps
   bool single = false;        ///< observations are float32, else float64
   std::vector<SensorLayout> sensors;
+  std::vector<CameraLayout> cameras;
   std::vector<std::string> body_names;    ///< of a scene
   PlayedBy played_by;                     ///< of a task
   std::string python_class;               ///< of a task written in Python: "MODULE:CLASS"
@@ -78,7 +79,7 @@ struct DatasetLayout : RunFacts {
   /// All observations, in the order of pieces of episodes. Throws InputError for times that are no
   /// multiple of K.
   [[nodiscard]] std::vector<EpisodeChannel> channels() const {
-    return episode_channels(*this, sensors, body_names, record, every);
+    return episode_channels(*this, sensors, cameras, body_names, record, every);
   }
   /// Indices in that list of the observations that are stored at every row, ascending.
   [[nodiscard]] std::vector<std::size_t> recorded() const;
@@ -90,8 +91,8 @@ struct DatasetLayout : RunFacts {
   [[nodiscard]] std::vector<std::size_t> touch() const;
   /// Shapes of one row of each stored observation: {nq}, {nv}, {n, 3}, {rows, cols, 3} …
   [[nodiscard]] std::vector<std::vector<std::uint64_t>> observation_shapes() const;
-  /// Which of them are bytes: pictures in colours.
-  [[nodiscard]] std::vector<bool> observation_bytes() const;
+  /// EpisodeChannel::own_bytes() of each.
+  [[nodiscard]] std::vector<std::size_t> observation_bytes() const;
   /// Size of one episode's numbers on disk, without HDF5's own data [bytes].
   [[nodiscard]] double episode_bytes() const;
   /// As many episodes as stay below shard_bytes, a multiple of 16. Depends on the data set alone.

@@ -16,6 +16,11 @@ std::array<unsigned char, sizeof(T)> bytes_of_number(T value) {
   return std::bit_cast<std::array<unsigned char, sizeof(T)>>(value);
 }
 
+/// The type of an observation by EpisodeChannel::own_bytes().
+h5::NumberType type_of_observation(std::size_t own, h5::NumberType number) {
+  return own == 1 ? h5::NumberType::uint8 : own == 2 ? h5::NumberType::int16 : number;
+}
+
 }  // namespace
 
 DemoAttributes::DemoAttributes(const DemoFacts& facts) : samples_(bytes_of_number(facts.rows)) {
@@ -64,8 +69,8 @@ DemoFormat::DemoFormat(const DatasetLayout& layout)
   for (const char* group : {"obs/", "final_obs/"}) {
     for (const std::string& name : names_) titles_.push_back(group + name);
     shapes_.insert(shapes_.end(), observed.begin(), observed.end());
-    for (const bool is_bytes : layout.observation_bytes())
-      types_.push_back(is_bytes ? NumberType::uint8 : number);
+    for (const std::size_t own : layout.observation_bytes())
+      types_.push_back(type_of_observation(own, number));
   }
   for (const GradientArray& array : gradients_) {
     const auto from =
@@ -78,7 +83,7 @@ DemoFormat::DemoFormat(const DatasetLayout& layout)
   }
   for (const DatasetSample& sample : samples_) {
     shapes_.push_back(sample.shape);
-    types_.push_back(sample.is_bytes ? NumberType::uint8 : number);
+    types_.push_back(type_of_observation(sample.own_bytes, number));
     titles_.push_back("samples/" + sample.name);
   }
   for (std::string& title : titles_) title += " of demo_";

@@ -106,6 +106,7 @@ h5::NumberType type_of(const h5::Id& dataset) {
   const h5::Id type(H5Dget_type(dataset.get()));
   const std::size_t bytes = H5Tget_size(type.get());
   return bytes == 1               ? h5::NumberType::uint8
+         : bytes == 2             ? h5::NumberType::int16
          : bytes == sizeof(float) ? h5::NumberType::float32
                                   : h5::NumberType::float64;
 }

@@ -60,6 +60,7 @@ std::string nested(const std::vector<std::uint64_t>& shape, std::size_t from,
 std::string box(const DemoArray& array, const std::string& low, const std::string& high) {
   return fmt::format(R"({{"type": "Box", "dtype": "{}", "shape": [{}], "low": {}, "high": {}}})",
                      array.type == h5::NumberType::uint8     ? "uint8"
+                     : array.type == h5::NumberType::int16   ? "int16"
                      : array.type == h5::NumberType::float32 ? "float32"
                                                              : "float64",
                      fmt::join(array.shape, ", "), nested(array.shape, 0, low),

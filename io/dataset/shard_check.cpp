@@ -229,13 +229,15 @@ class ShardChecker {
     });
   }
 
-  /// Calls body(T{}) with a number of an observation: a byte of a picture, or the type of the
-  /// others.
+  /// Calls body(T{}) with a number of an observation: a byte of a picture, the number of a body,
+  /// or the type of the others.
   template <class Body>
   void in_type_of(const h5::Id& group, const std::string& name, const Body& body) {
     const h5::Id dataset = h5::open_dataset(group, name), type(H5Dget_type(dataset.get()));
     if (H5Tget_size(type.get()) == 1)
       body(std::uint8_t{});
+    else if (H5Tget_size(type.get()) == 2)
+      body(std::int16_t{});
     else
       single_ ? body(float{}) : body(double{});
   }
@@ -367,7 +369,9 @@ class ShardChecker {
   std::vector<StoredSample> samples_;
   bool single_ = false, is_task_ = false;
   std::int64_t rows_ = 0, end_ = 0, policies_ = 0;
-  std::tuple<std::vector<float>, std::vector<double>, std::vector<std::uint8_t>> buffers_;
+  std::tuple<std::vector<float>, std::vector<double>, std::vector<std::uint8_t>,
+             std::vector<std::int16_t>>
+      buffers_;
   ContentSum sum_;
   ShardContent content_;
 };

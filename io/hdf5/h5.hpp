@@ -61,8 +61,8 @@ struct Storage {
   bool compress = false;  ///< shuffle, then deflate level 1; needs a chunk shape
 };
 
-/// T: double, float, std::int8_t, std::uint8_t, std::int32_t, std::int64_t, std::uint64_t. On disk:
-/// little endian.
+/// T: double, float, std::int8_t, std::uint8_t, std::int16_t, std::int32_t, std::int64_t,
+/// std::uint64_t. On disk: little endian.
 template <class T>
 Id create_dataset(const Id& parent, const std::string& name, const Dims& dims,
                   const Storage& storage = {});

@@ -53,6 +53,7 @@ auto with_type(NumberType type, const Body& body) {
     case NumberType::int32: return body(std::int32_t{});
     case NumberType::int8: return body(std::int8_t{});
     case NumberType::uint8: return body(std::uint8_t{});
+    case NumberType::int16: return body(std::int16_t{});
     case NumberType::float64: break;
   }
   return body(double{});
@@ -203,6 +204,7 @@ Channel read_channel(const Id& dataset, const std::string& name) {
     channel.type = real         ? bytes == 4 ? NumberType::float32 : NumberType::float64
                    : bytes == 8 ? NumberType::int64
                    : bytes == 4 ? NumberType::int32
+                   : bytes == 2 ? NumberType::int16
                    : H5Tget_sign(type.get()) == H5T_SGN_NONE ? NumberType::uint8
                                                              : NumberType::int8;
   }

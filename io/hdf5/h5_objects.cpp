@@ -122,6 +122,7 @@ void add_type(Bytes& out, NumberType type) {
     case NumberType::float64: return add_float(out, 8, kExponentOf64);
     case NumberType::int8: return add_integer(out, 1);
     case NumberType::uint8: return add_integer(out, 1, false);
+    case NumberType::int16: return add_integer(out, 2);
     case NumberType::int64: return add_integer(out, 8);
     case NumberType::uint64: return add_integer(out, 8, false);
     case NumberType::boolean: return add_boolean(out);
@@ -165,6 +166,8 @@ void add_fill(Bytes& out, const FileDataset& dataset) {
     out.number(static_cast<std::uint32_t>(bytes_of(dataset.type)));
     if (dataset.type == NumberType::uint8)
       out.number<std::uint8_t>(0);
+    else if (dataset.type == NumberType::int16)
+      out.number<std::int16_t>(-1);
     else if (dataset.type == NumberType::float32)
       out.number(std::bit_cast<std::uint32_t>(std::numeric_limits<float>::quiet_NaN()));
     else
@@ -320,6 +323,7 @@ void set_end_of_file(std::span<unsigned char, kSuperblockBytes> superblock, std:
 
 std::size_t bytes_of(NumberType type) {
   switch (type) {
+    case NumberType::int16: return 2;
     case NumberType::float32: return 4;
     case NumberType::float64:
     case NumberType::int64:

@@ -63,7 +63,7 @@ void set_end_of_file(std::span<unsigned char, kSuperblockBytes> superblock, std:
                      std::uint64_t root = kNowhere);
 
 /// Types of the format.
-enum class NumberType { float32, float64, int8, uint8, int64, uint64, boolean };
+enum class NumberType { float32, float64, int8, uint8, int16, int64, uint64, boolean };
 std::size_t bytes_of(NumberType type);
 
 struct FileFilter {

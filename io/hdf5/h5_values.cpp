@@ -51,6 +51,11 @@ struct Types<std::uint8_t> {
   static hid_t disk() { return H5T_STD_U8LE; }
 };
 template <>
+struct Types<std::int16_t> {
+  static hid_t memory() { return H5T_NATIVE_INT16; }
+  static hid_t disk() { return H5T_STD_I16LE; }
+};
+template <>
 struct Types<std::int32_t> {
   static hid_t memory() { return H5T_NATIVE_INT32; }
   static hid_t disk() { return H5T_STD_I32LE; }
@@ -287,6 +292,7 @@ TANGERE_H5_TYPE(double)
 TANGERE_H5_TYPE(float)
 TANGERE_H5_TYPE(std::int8_t)
 TANGERE_H5_TYPE(std::uint8_t)
+TANGERE_H5_TYPE(std::int16_t)
 TANGERE_H5_TYPE(std::int32_t)
 TANGERE_H5_TYPE(std::int64_t)
 TANGERE_H5_TYPE(std::uint64_t)

@@ -12,6 +12,7 @@
 #include "engine/scene/outer_pose.hpp"
 #include "io/files/nearest_name.hpp"
 #include "io/files/text_file.hpp"
+#include "io/scene/scene_cameras.hpp"
 #include "io/scene/scene_sections.hpp"
 #include "io/scene/scene_warnings.hpp"
 #include "io/scene/unlike_skins.hpp"
@@ -254,6 +255,7 @@ void read_root(const SceneNode& root, Scene& scene) {
   warn_of_dense_meshes(scene, root);
   warn_of_coarse_points(scene, root);
   each("sensor", [&](const SceneNode& s) { read_sensors(scene, s); });
+  show_abstract_bodies(scene);
   warn_of_unlike_skins(scene, root);
   each("variable", [&](const SceneNode& s) { read_end_effectors(scene, s); });
   name_end_effectors(scene);

@@ -14,6 +14,7 @@
 #include "io/files/name_list.hpp"
 #include "io/files/nearest_name.hpp"
 #include "io/scene/gel_file.hpp"
+#include "io/scene/scene_cameras.hpp"
 #include "io/scene/scene_sections.hpp"
 #include "io/scene/tactile_layouts.hpp"
 
@@ -397,6 +398,10 @@ std::vector<std::string> body_names(const SceneNode& node, const char* attribute
 
 void read_sensors(Scene& scene, const SceneNode& section) {
   for (const SceneElement& node : elements_in(section)) {
+    if (node.of() == kCamera) {
+      read_camera(scene, node);
+      continue;
+    }
     TactileDescription d;
     d.source = node.source();
     find_body(scene, node, "body");
@@ -406,6 +411,7 @@ void read_sensors(Scene& scene, const SceneNode& section) {
       node.fail("name \"" + d.name + "\" holds '/', which files use as a separator");
     for (const TactileDescription& other : scene.sensors)
       if (other.name == d.name) node.fail("tactile name '" + d.name + "' is used twice");
+    check_free_name(scene, node, d.name);
     static_cast<void>(node.word("type"));  // checks it
     const std::string type = node.text("type");
     node.check(type);
@@ -450,7 +456,6 @@ void read_outputs(Scene& scene, const SceneNode& section) {
   outputs.source = section.source();
   outputs.record =
       split_names(section.source().prefix() + "<outputs>: record", section.text("record"));
-  const std::vector<std::string> sensors = sensor_names(scene);
   for (const std::string& word : outputs.record) {
     std::string name;
     try {
@@ -458,7 +463,7 @@ void read_outputs(Scene& scene, const SceneNode& section) {
     } catch (const InputError& error) {
       section.fail(fmt::format("record has {}", error.what()));
     }
-    if (const std::optional<FieldOutput> of = find_output(sensors, name)) {
+    if (const std::optional<FieldOutput> of = find_output(scene, name)) {
       if (const std::string reason = reason_against(scene, *of); !reason.empty())
         section.fail(fmt::format("record has '{}', but {}", word, reason));
     } else if (!is_plain_output(name) && !find_body_output(scene, name)) {

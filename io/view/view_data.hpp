@@ -44,6 +44,18 @@ struct ViewField {
   std::vector<float> values;     ///< (fields, cells, 3): f·axis0, f·axis1, pressure [N]
 };
 
+/// A gel or a camera whose pictures are shown.
+struct ViewPicture {
+  std::string name;        ///< of the output: "pad.rgb", "eye.rgb"
+  int rows = 0, cols = 0;  ///< pixels
+};
+
+/// Its pictures in an episode.
+struct ViewShown {
+  std::vector<std::int32_t> at;    ///< (frames) index of the newest picture; -1: none yet
+  std::vector<std::string> files;  ///< JPEG
+};
+
 struct ViewEpisode {
   std::string label;                 ///< "environment 3", "episode 12"
   int shapes = 0;                    ///< index in ViewData::shapes
@@ -53,6 +65,7 @@ struct ViewEpisode {
   std::vector<float> end_effectors;  ///< (frames, end effectors, 3), world [m]
   std::vector<ViewTrace> traces;     ///< reward, coordinates, forces, status
   std::vector<ViewField> fields;     ///< (sensors)
+  std::vector<ViewShown> pictures;   ///< (pictures)
 };
 
 struct ViewData {
@@ -60,6 +73,7 @@ struct ViewData {
   Scene scene;                      ///< as the file holds it
   std::vector<std::vector<LinkDescription>> shapes;  ///< bodies, for each set of sizes that occurs
   std::vector<ViewSensor> sensors;
+  std::vector<ViewPicture> pictures;
   std::vector<ViewEpisode> episodes;
   std::vector<std::string> notes;  ///< what was left out, in words
   std::int64_t stride = 1;         ///< rows of the file for a frame

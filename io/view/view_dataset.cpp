@@ -8,6 +8,7 @@
 #include "engine/base/error.hpp"
 #include "io/dataset/dataset_description.hpp"
 #include "io/dataset/dataset_files.hpp"
+#include "io/view/view_pictures.hpp"
 #include "io/view/view_source.hpp"
 
 namespace tangere {
@@ -48,9 +49,12 @@ class DatasetView {
     std::vector<std::int64_t> rows;
     for (const Demo& demo : demos_) rows.push_back(demo.rows + 1);
     const std::size_t traces = q_names_.size() + 2 * data_.sensors.size() + 1;
-    data_.stride =
-        stride_for(rows, numbers_per_frame(data_.scene, data_.sensors, traces), options_);
+    find_pictures(file);
+    data_.stride = stride_for(rows, numbers_per_frame(data_.scene, data_.sensors, traces),
+                              pictures_.empty() ? options_ : beside_pictures(options_));
+    if (!pictures_.empty()) sample_pictures(rows);
     for (const Demo& demo : demos_) add_demo(demo);
+    if (!pictures_.empty()) thin_pictures(data_, every_picture_, options_);
     return std::move(data_);
   }
 
@@ -121,6 +125,70 @@ class DatasetView {
     }
   }
 
+  /// Lists the pictures in colours: observations of bytes, (rows, height, width, 3).
+  void find_pictures(const h5::Id& file) {
+    const h5::Id scene = h5::open_group(file, "scene"),
+                 demo = h5::open_group(h5::open_group(file, "data"),
+                                       fmt::format("demo_{}", demos_.front().number));
+    const auto take = [&](const char* group, const std::string& name,
+                          const std::optional<StoredSample>& sampled) {
+      const h5::Id dataset = h5::open_dataset(h5::open_group(demo, group), name),
+                   type(H5Dget_type(dataset.get()));
+      const h5::Dims dims = h5::dimensions(dataset);
+      if (H5Tget_class(type.get()) != H5T_INTEGER || H5Tget_size(type.get()) != 1 ||
+          dims.size() != 4 || dims[3] != 3)
+        return;
+      data_.pictures.push_back({name, static_cast<int>(dims[1]), static_cast<int>(dims[2])});
+      pictures_.push_back(sampled);
+    };
+    for (const std::string& name : h5::read_texts(scene, "observations")) take("obs", name, {});
+    const auto steps = h5::read_number<std::int64_t>(scene, "steps"),
+               every = h5::read_number<std::int64_t>(scene, "every");
+    for (const StoredSample& sample : stored_samples(scene, every, steps / every))
+      take("samples", sample.name, sample);
+  }
+
+  /// Finds how many pictures the page has room for.
+  void sample_pictures(const std::vector<std::int64_t>& rows) {
+    std::vector<std::string> samples;
+    const h5::Id file = h5::open_file(demos_.front().file),
+                 demo = h5::open_group(h5::open_group(file, "data"),
+                                       fmt::format("demo_{}", demos_.front().number));
+    for (std::size_t p = 0; p < pictures_.size(); ++p)
+      samples.push_back(page_picture(data_.pictures[p], read_picture(p, demos_.front(), demo, 0)));
+    std::int64_t frames = 0;
+    for (const std::int64_t count : rows) frames += std::ssize(frames_of(count, data_.stride));
+    every_picture_ = picture_stride(samples, frames, options_);
+  }
+
+  /// Picture k of an episode: a row of obs, then that of final_obs; or a sample.
+  [[nodiscard]] std::vector<std::uint8_t> read_picture(std::size_t p, const Demo& which,
+                                                       const h5::Id& demo, std::int64_t k) const {
+    const ViewPicture& picture = data_.pictures[p];
+    const bool at_end = !pictures_[p] && k == which.rows;
+    const std::int64_t rows = at_end ? 1 : pictures_[p] ? pictures_[p]->rows : which.rows;
+    const h5::Id dataset = h5::open_dataset(h5::open_group(demo, pictures_[p] ? "samples"
+                                                                 : at_end     ? "final_obs"
+                                                                              : "obs"),
+                                            picture.name);
+    const h5::Dims shape{static_cast<hsize_t>(rows), static_cast<hsize_t>(picture.rows),
+                         static_cast<hsize_t>(picture.cols), 3};
+    check_shape(dataset, shape, picture.name);
+    std::vector<std::uint8_t> levels(shape[1] * shape[2] * shape[3]);
+    h5::read_box<std::uint8_t>(dataset, {at_end ? 0 : static_cast<hsize_t>(k), 0, 0, 0},
+                               {1, shape[1], shape[2], shape[3]}, levels.data());
+    return levels;
+  }
+
+  void add_shown(std::size_t p, const Demo& which, const h5::Id& demo, ViewEpisode& episode) {
+    std::vector<std::int64_t> taken;  // rows
+    for (std::int64_t row = 0; row <= which.rows; ++row)
+      if (!pictures_[p] || pictures_[p]->times.at(row, which.rows)) taken.push_back(row);
+    add_pictures(
+        data_.pictures[p], taken, [&](std::int64_t k) { return read_picture(p, which, demo, k); },
+        every_picture_, episode);
+  }
+
   void add_demo(const Demo& which) {
     const h5::Id file = h5::open_file(which.file);
     const h5::Id demo =
@@ -147,6 +215,7 @@ class DatasetView {
     }
     for (std::size_t s = 0; s < data_.sensors.size(); ++s) add_fields(s, which, demo, episode);
     add_reward(which, demo, episode);
+    for (std::size_t p = 0; p < pictures_.size(); ++p) add_shown(p, which, demo, episode);
     data_.episodes.push_back(std::move(episode));
   }
 
@@ -213,7 +282,9 @@ class DatasetView {
   std::unique_ptr<ViewScene> scene_;
   ViewData data_;
   std::vector<std::string> q_names_, randomized_, readings_;
-  std::vector<std::optional<StoredSample>> sampled_;  // (sensors) those that are not in every row
+  std::vector<std::optional<StoredSample>> sampled_;   // (sensors) those that are not in every row
+  std::vector<std::optional<StoredSample>> pictures_;  // those that are not in every row
+  int every_picture_ = 1;
   std::vector<int> signs_;
   double interval_ = 0;  // of rows [s]
 };

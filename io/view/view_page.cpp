@@ -117,6 +117,13 @@ Json episode_of(const ViewEpisode& e) {
         {{"group", t.group}, {"name", t.name}, {"unit", t.unit}, {"values", packed(t.values)}});
   for (const ViewField& f : e.fields)
     fields.push_back({{"at", packed(f.at)}, {"values", packed(f.values)}});
+  Json pictures = Json::array();
+  for (const ViewShown& shown : e.pictures) {
+    Json files = Json::array();
+    for (const std::string& file : shown.files)
+      files.push_back(base64(reinterpret_cast<const unsigned char*>(file.data()), file.size()));
+    pictures.push_back({{"at", packed(shown.at)}, {"jpeg", std::move(files)}});
+  }
   return {{"label", e.label},
           {"shapes", e.shapes},
           {"rows", packed(std::vector<std::int32_t>(e.rows.begin(), e.rows.end()))},
@@ -124,7 +131,8 @@ Json episode_of(const ViewEpisode& e) {
           {"poses", packed(e.poses)},
           {"end_effectors", packed(e.end_effectors)},
           {"traces", std::move(traces)},
-          {"fields", std::move(fields)}};
+          {"fields", std::move(fields)},
+          {"pictures", std::move(pictures)}};
 }
 
 /// Puts `text` in place of the first `mark`.
@@ -145,6 +153,10 @@ std::string view_json(const ViewData& data) {
   for (const auto& links : data.shapes) page["shapes"].push_back(bodies_of(links));
   page["sensors"] = Json::array();
   for (const ViewSensor& sensor : data.sensors) page["sensors"].push_back(sensor_of(sensor));
+  page["pictures"] = Json::array();
+  for (const ViewPicture& picture : data.pictures)
+    page["pictures"].push_back(
+        {{"name", picture.name}, {"rows", picture.rows}, {"cols", picture.cols}});
   page["end_effectors"] = Json::array();
   for (const EndEffectorDescription& end : data.scene.end_effectors)
     page["end_effectors"].push_back(

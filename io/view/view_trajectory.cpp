@@ -8,6 +8,7 @@
 #include "io/hdf5/h5_channels.hpp"
 #include "io/trajectory/row_steps.hpp"
 #include "io/trajectory/trajectory_reader.hpp"
+#include "io/view/view_pictures.hpp"
 #include "io/view/view_source.hpp"
 
 namespace tangere {
@@ -41,7 +42,10 @@ class TrajectoryView {
       throw IoError(path + ": the run recorded no state, so nothing says where bodies are");
     check_shape(q, {rows(), environments(), q_names_.size()}, "q");
     for (const Channel& channel : h5::list_channels(file_))
-      if (is_curve(channel)) curves_.push_back({channel, row_steps(file_, channel.name)});
+      if (is_curve(channel))
+        curves_.push_back({channel, row_steps(file_, channel.name)});
+      else if (is_picture(channel))
+        pictures_.push_back({channel, row_steps(file_, channel.name)});
   }
 
   ViewData read() {
@@ -61,8 +65,11 @@ class TrajectoryView {
     for (const Curve& curve : curves_) traces += curve.channel.width() / environments();
     data_.stride = stride_for(
         std::vector<std::int64_t>(static_cast<std::size_t>(count), std::ssize(state_steps_)),
-        numbers_per_frame(data_.scene, data_.sensors, traces), options_);
+        numbers_per_frame(data_.scene, data_.sensors, traces),
+        pictures_.empty() ? options_ : beside_pictures(options_));
+    take_pictures(first, count);
     for (std::int64_t e = first; e < first + count; ++e) add_environment(e);
+    if (!pictures_.empty()) thin_pictures(data_, every_picture_, options_);
     return std::move(data_);
   }
 
@@ -82,6 +89,39 @@ class TrajectoryView {
       if (group == other) return false;
     if (shape.empty() || shape[0] != environments()) return false;
     return shape.size() == 1 || (shape.size() == 2 && shape[1] == channel.names.size());
+  }
+
+  /// Pictures in colours of each environment: tactile/pad/rgb, cameras/eye/rgb.
+  [[nodiscard]] bool is_picture(const Channel& channel) const {
+    const std::vector<std::uint64_t>& shape = channel.shape;
+    return channel.type == NumberType::uint8 && shape.size() == 4 && shape[0] == environments() &&
+           shape[3] == 3 && channel.name.find('/') < channel.name.rfind('/');
+  }
+
+  /// Lists the pictures, and finds how many of them the page has room for.
+  void take_pictures(std::int64_t first, std::int64_t count) {
+    std::vector<std::string> samples;
+    for (const Curve& picture : pictures_) {
+      const std::vector<std::uint64_t>& shape = picture.channel.shape;
+      std::string name = picture.channel.name.substr(picture.channel.name.find('/') + 1);
+      name[name.rfind('/')] = '.';
+      data_.pictures.push_back({name, static_cast<int>(shape[1]), static_cast<int>(shape[2])});
+      if (!picture.steps.empty())
+        samples.push_back(page_picture(data_.pictures.back(), read_picture(picture, 0, first)));
+    }
+    const std::int64_t frames = std::ssize(frames_of(std::ssize(state_steps_), data_.stride));
+    every_picture_ = picture_stride(samples, frames * count, options_);
+  }
+
+  [[nodiscard]] std::vector<std::uint8_t> read_picture(const Curve& picture, std::int64_t k,
+                                                       std::int64_t environment) const {
+    const std::vector<std::uint64_t>& shape = picture.channel.shape;
+    std::vector<std::uint8_t> levels(shape[1] * shape[2] * shape[3]);
+    h5::read_box<std::uint8_t>(
+        h5::open_dataset(file_, picture.channel.name),
+        {static_cast<hsize_t>(k), static_cast<hsize_t>(environment), 0, 0, 0},
+        {1, 1, shape[1], shape[2], shape[3]}, levels.data());
+    return levels;
   }
 
   [[nodiscard]] std::string text(const char* name) const {
@@ -152,6 +192,11 @@ class TrajectoryView {
     }
     for (std::size_t s = 0; s < data_.sensors.size(); ++s) add_fields(s, environment, episode);
     for (const Curve& curve : curves_) add_curve(curve, environment, episode);
+    for (std::size_t p = 0; p < pictures_.size(); ++p)
+      add_pictures(
+          data_.pictures[p], pictures_[p].steps,
+          [&](std::int64_t k) { return read_picture(pictures_[p], k, environment); },
+          every_picture_, episode);
     data_.episodes.push_back(std::move(episode));
   }
 
@@ -227,7 +272,8 @@ class TrajectoryView {
   std::int64_t steps_ = 0;
   std::int64_t first_step_ = 0;  // of a run that went on from another's state
   std::vector<std::int64_t> state_steps_;
-  std::vector<Curve> curves_;
+  std::vector<Curve> curves_, pictures_;
+  int every_picture_ = 1;
   std::vector<std::string> q_names_;
   std::vector<std::size_t> recorded_;  // (sensors) indices in the reader
 };

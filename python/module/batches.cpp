@@ -50,22 +50,22 @@ void PythonBatch::take_step(Worker& worker, int block, std::span<const double> u
 }
 
 FieldOutput PythonBatch::reading_named(const std::string& name) const {
-  const std::vector<std::string> sensors = sensor_names(model().scene());
-  if (const auto output = find_output(sensors, name)) {
+  if (const auto output = find_output(model().scene(), name)) {
     const std::string reason = reason_against(model().scene(), *output);
     if (!reason.empty()) throw InputError(fmt::format("reading '{}': {}", name, reason));
     return *output;
   }
   std::vector<std::string> names;
-  for (const std::string& n : output_names(sensors))
-    if (!is_plain_output(n)) names.push_back(n);
+  for (const std::string& n : output_names(model().scene()))
+    if (!is_plain_output(n) && !find_body_output(model().scene(), n)) names.push_back(n);
   throw InputError(fmt::format("no reading is named '{}'; expected one of: {}", name,
-                               names.empty() ? "nothing, because the scene has no sensor"
-                                             : fmt::format("{}", fmt::join(names, ", "))));
+                               names.empty()
+                                   ? "nothing, because the scene has neither sensor nor camera"
+                                   : fmt::format("{}", fmt::join(names, ", "))));
 }
 
 Shape PythonBatch::shape_of_reading(FieldOutput output) const {
-  Shape shape = reading_shape(model().sensors()[as_size(output.sensor)], output.form);
+  Shape shape = reading_shape(model(), output);
   if (output.form == FieldForm::pressure) shape.pop_back();
   return shape;
 }
@@ -83,6 +83,7 @@ nb::object PythonBatch::read(FieldOutput output, const nb::object& out) {
     if (!nb::try_cast(out, given, false))
       throw InputError(
           fmt::format("out is no writable contiguous array of {}", sizeof(T) == 1   ? "uint8"
+                                                                   : sizeof(T) == 2 ? "int16"
                                                                    : sizeof(T) == 4 ? "float32"
                                                                                     : "float64"));
     const Shape found(given.shape_ptr(), given.shape_ptr() + given.ndim());
@@ -104,6 +105,7 @@ nb::object PythonBatch::read(FieldOutput output, const nb::object& out) {
 nb::object PythonBatch::tactile(const std::string& reading, const nb::object& out) {
   const FieldOutput output = reading_named(reading);
   if (is_colour(output.form)) return read<std::uint8_t>(output, out);
+  if (output.form == FieldForm::view_ids) return read<std::int16_t>(output, out);
   if (is_picture(output.form)) return read<float>(output, out);
   return precision_ == Precision::f64 ? read<double>(output, out) : read<float>(output, out);
 }
@@ -146,7 +148,7 @@ Run PythonBatch::run_as(std::span<const double> u, std::size_t steps, std::size_
   struct Requested {
     FieldOutput output;
     std::size_t width = 0;
-    std::variant<std::span<T>, std::span<std::uint8_t>> numbers{};
+    std::variant<std::span<T>, std::span<std::uint8_t>, std::span<std::int16_t>> numbers{};
   };
   const std::size_t frames = steps / every, nq = as_size(model().nq()), nv = as_size(model().nv()),
                     nu = as_size(model().nu());
@@ -165,6 +167,7 @@ Run PythonBatch::run_as(std::span<const double> u, std::size_t steps, std::size_
     Shape shape = shape_of_reading(one.output);
     shape.insert(shape.begin(), {frames, count()});
     if (is_colour(one.output.form)) one.numbers = std::span<std::uint8_t>();
+    if (one.output.form == FieldForm::view_ids) one.numbers = std::span<std::int16_t>();
     std::visit(
         [&]<class Number>(std::span<Number>& numbers) {
           run.readings[name] = nb::cast(new_array<Number>(shape, numbers));
@@ -541,14 +544,16 @@ void add_batches(nb::module_& m) {
           "tactile", &PythonBatch::tactile, "reading"_a, "out"_a = nb::none(),
           nb::sig("def tactile(self, reading: str, out: numpy.typing.NDArray | None = None) -> "
                   "numpy.typing.NDArray"),
-          "Reads one sensor in all environments: 'pad' (E, rows, cols, 3) or (E, points, 3),\n"
+          "Reads one sensor or camera in all environments: 'pad' (E, rows, cols, 3) or (E, points, "
+          "3),\n"
           "shear, shear, normal force of each point [N]; 'pad.pressure' and 'pad.shear' parts of\n"
           "it; 'pad.sum' (E, 6): force [N] and where it presses [m], body axes; 'pad.flow' the\n"
           "shear over its largest length; 'pad.ideal' the field without imperfections;\n"
           "'pad.markers' the displacement of markers [m], 'pad.surface' that of a layer's\n"
           "surface [m]; 'pad.height' (E, H, W, 1) float32 the surface of a gel [m], 'pad.rgb' and\n"
-          "'pad.rgb_marker' (E, H, W, 3) uint8 pictures of it. `out`: an array to fill instead of "
-          "a new one.")
+          "'pad.rgb_marker' (E, H, W, 3) uint8 pictures of it; of a camera 'eye.rgb', 'eye.depth'\n"
+          "[m] and 'eye.ids' (E, H, W, 1) int16, nb for the ground, -1 for nothing. `out`: an\n"
+          "array to fill instead of a new one.")
       .def("set_state", &PythonBatch::set_state, "q"_a, "v"_a, "envs"_a = nb::none(),
            "Sets states: `q` (n, nq) or (nq), `v` (n, nv) or (nv), of the environments listed in\n"
            "`envs` (indices, or a mask (E)), or of all. Releases a failed environment; drops the\n"

@@ -11,6 +11,7 @@
 #include "python/module/options.hpp"
 #include "python/module/varying_numbers.hpp"
 #include "tasks/catalogue/task_list.hpp"
+#include "tasks/run/block_reader.hpp"
 #include "tasks/run/policy.hpp"
 
 namespace tangere::python {
@@ -82,6 +83,23 @@ class Environments {
   nb::tuple faces(const Whole<int>& environment, double half_space) {
     const InUse::Turn turn(in_use_);
     return face_arrays(vector_.batch(), environment.value("env"), half_space);
+  }
+  /// (E, rows, cols, 3) what a camera of the scene sees.
+  Array<std::uint8_t> camera(const std::string& name) {
+    const auto output = find_output(model().scene(), name + ".rgb");
+    if (!output || !is_view(output->form))
+      throw InputError(fmt::format("the scene has no camera '{}'", name));
+    Shape shape = reading_shape(model(), *output);
+    shape.insert(shape.begin(), count());
+    std::span<std::uint8_t> numbers;
+    auto array = new_array<std::uint8_t>(shape, numbers);
+    const std::size_t width = numbers.size() / count();
+    const InUse::Turn turn(in_use_);
+    const nb::gil_scoped_release free;
+    for (int block = 0; block < vector_.batch().blocks(); ++block)
+      read_field<std::uint8_t>(readout_, vector_.batch(), block, *output,
+                               [&](int e) { return numbers.subspan(as_size(e) * width, width); });
+    return array;
   }
   nb::dict randomized() {
     const InUse::Turn turn(in_use_);
@@ -186,6 +204,8 @@ void add_environments(nb::module_& m) {
            "Poses (E, nb, 7) and twists (E, nb, 6), as Batch.bodies().")
       .def("faces", &Environments::faces, "env"_a, "half_space"_a = 0.0, nb::sig(kFacesSignature),
            kFacesText)
+      .def("camera", &Environments::camera, "name"_a,
+           "(E, rows, cols, 3): what a camera of the scene sees.")
       .def("randomized", &Environments::randomized, nb::sig(kRandomizedSignature), kRandomizedText)
       .def("counts", &Environments::counts, nb::sig("def counts(self) -> dict[str, int]"),
            "Since the last reset: environment_steps, simulation_steps, newton_iterations, and "

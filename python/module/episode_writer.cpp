@@ -57,6 +57,17 @@ DatasetLayout layout_of(const Model& model, const TaskSpec& task, std::int64_t e
   return dataset_layout_from(model, Stepper(model), layout);
 }
 
+/// The numbers of an observation. `held` keeps its array.
+template <class T>
+std::span<const T> observed(const nb::object& array, const Shape& shape,
+                            std::vector<nb::object>& held, const char* type) {
+  nb::ndarray<const T, nb::c_contig, nb::device::cpu> given;
+  if (!nb::try_cast(array, given))
+    throw InputError(fmt::format("an observation that is no array of {}", type));
+  held.push_back(nb::cast(given));
+  return numbers_of(Argument<T>(given), shape, "an observation");
+}
+
 /// Keeps the GIL while it calls HDF5. h5py may share the library, whose calls then end in Python:
 /// two threads that hold one lock each and need the other one would wait for ever.
 class EpisodeWriter {
@@ -64,8 +75,10 @@ class EpisodeWriter {
   EpisodeWriter(const std::string& folder, DatasetLayout layout, ExistingShards existing)
       : folder_(folder), layout_(std::move(layout)) {
     writer_.emplace(DatasetOutput{folder, existing, {}}, layout_);
-    for (const EpisodeChannel& channel : layout_.channels())
+    for (const EpisodeChannel& channel : layout_.channels()) {
       shapes_.emplace_back(channel.shape.begin(), channel.shape.end());
+      own_bytes_.push_back(channel.own_bytes());
+    }
   }
 
   [[nodiscard]] std::vector<std::pair<std::int64_t, std::int64_t>> missing() {
@@ -75,7 +88,7 @@ class EpisodeWriter {
   }
 
   void write(const Whole<std::int64_t>& first, const Argument<float>& actions,
-             const std::vector<Argument<float>>& observations, const Argument<float>& rewards,
+             const std::vector<nb::object>& observations, const Argument<float>& rewards,
              const Argument<double>& randomized, const Argument<std::int64_t>& lengths,
              const Argument<double>& returns, const Argument<bool>& terminated,
              const Argument<bool>& success, const std::vector<Failure>& failures,
@@ -91,12 +104,13 @@ class EpisodeWriter {
 
   std::string folder_;
   DatasetLayout layout_;
-  std::vector<Shape> shapes_;  // of a row of each observation
+  std::vector<Shape> shapes_;           // of a row of each observation
+  std::vector<std::size_t> own_bytes_;  // EpisodeChannel::own_bytes()
   std::optional<DatasetWriter> writer_;
 };
 
 void EpisodeWriter::write(const Whole<std::int64_t>& first, const Argument<float>& actions,
-                          const std::vector<Argument<float>>& observations,
+                          const std::vector<nb::object>& observations,
                           const Argument<float>& rewards, const Argument<double>& randomized,
                           const Argument<std::int64_t>& lengths, const Argument<double>& returns,
                           const Argument<bool>& terminated, const Argument<bool>& success,
@@ -122,10 +136,16 @@ void EpisodeWriter::write(const Whole<std::int64_t>& first, const Argument<float
     throw InputError(
         fmt::format("{} observations; expected {}", observations.size(), shapes_.size()));
   std::vector<Observation> rows;
+  std::vector<nb::object> held;
   for (std::size_t k = 0; k < shapes_.size(); ++k) {
     Shape shape{n, most + 1};
     shape.insert(shape.end(), shapes_[k].begin(), shapes_[k].end());
-    rows.emplace_back(numbers_of(observations[k], shape, "an observation"));
+    if (own_bytes_[k] == 1)
+      rows.emplace_back(observed<std::uint8_t>(observations[k], shape, held, "uint8"));
+    else if (own_bytes_[k] == 2)
+      rows.emplace_back(observed<std::int16_t>(observations[k], shape, held, "int16"));
+    else
+      rows.emplace_back(observed<float>(observations[k], shape, held, "float32"));
   }
   piece.observations = rows;
   const auto total = numbers_of(returns, {n}, "returns");
@@ -203,18 +223,18 @@ void add_episode_writer(nb::module_& m) {
           "written, is in use, has shards, or the disk has no room.")
       .def("missing", &EpisodeWriter::missing,
            "Ranges [first, end) of episodes to write, in whole blocks of 16 except the last.")
-      .def(
-          "write", &EpisodeWriter::write, "first_episode"_a, "actions"_a, "observations"_a,
-          "rewards"_a, "randomized"_a, "lengths"_a, "returns"_a, "terminated"_a, "success"_a,
-          "failures"_a, "steps"_a,
-          "Writes n episodes from a multiple of 16 on: 16, fewer at the end. Blocks come in\n"
-          "ascending order. Of at most H actions: `actions` (n, H, na), `observations` of q, v "
-          "and\n"
-          "the task (n, H + 1, …), `rewards` (n, H), each float32 and with anything after the end\n"
-          "of an episode; `randomized` (n, k) float64; `lengths`, `returns`, `terminated`,\n"
-          "`success` (n); `failures`: (episode, first step, status, q, v) of each that failed;\n"
-          "`steps`: taken, tunnelled and overlapping ones of all. InputError: another shape.\n"
-          "IoError: it cannot be written.")
+      .def("write", &EpisodeWriter::write, "first_episode"_a, "actions"_a, "observations"_a,
+           "rewards"_a, "randomized"_a, "lengths"_a, "returns"_a, "terminated"_a, "success"_a,
+           "failures"_a, "steps"_a,
+           "Writes n episodes from a multiple of 16 on: 16, fewer at the end. Blocks come in\n"
+           "ascending order. Of at most H actions: `actions` (n, H, na), `observations` of q, v "
+           "and\n"
+           "the task (n, H + 1, …), `rewards` (n, H), each float32 (pictures: uint8, int16) and\n"
+           "with anything after the end\n"
+           "of an episode; `randomized` (n, k) float64; `lengths`, `returns`, `terminated`,\n"
+           "`success` (n); `failures`: (episode, first step, status, q, v) of each that failed;\n"
+           "`steps`: taken, tunnelled and overlapping ones of all. InputError: another shape.\n"
+           "IoError: it cannot be written.")
       .def("finish", &EpisodeWriter::finish, nb::sig("def finish(self) -> dict[str, object]"),
            "Merges the shards and closes the data set. Returns paths and names of what was made.")
       .def("close", &EpisodeWriter::close,

@@ -80,6 +80,16 @@ void add_scene(nb::module_& m) {
 }
 
 void add_sensor(nb::module_& m) {
+  nb::class_<CameraDescription>(m, "Camera", "A camera of a model.")
+      .def_ro("name", &CameraDescription::name)
+      .def_ro("body", &CameraDescription::body, "The body that carries it; '' in the world.")
+      .def_ro("rows", &CameraDescription::rows, "Pixels from top to bottom.")
+      .def_ro("cols", &CameraDescription::cols, "Pixels from left to right.")
+      .def_ro("fov", &CameraDescription::fov, "Degrees from the upper edge to the lower one.")
+      .def_ro("far", &CameraDescription::far, "Depth of the sky [m].")
+      .def("__repr__", [](const CameraDescription& c) {
+        return fmt::format("<Camera {}: {} x {} pixels>", c.name, c.rows, c.cols);
+      });
   nb::class_<SensorInfo>(m, "Sensor", "A tactile sensor of a model.")
       .def_ro("name", &SensorInfo::name)
       .def_ro("body", &SensorInfo::body, "The body that carries it.")
@@ -122,15 +132,14 @@ void add_model(nb::module_& m) {
                    [](const Model& s) {
                      return std::vector<SensorInfo>(s.sensors().begin(), s.sensors().end());
                    })
+      .def_prop_ro("cameras", [](const Model& s) { return s.scene().cameras; })
       .def_prop_ro(
           "readings",
           [](const Model& s) {
-            const std::vector<std::string> sensors = sensor_names(s.scene());
-            std::vector<std::string> names = output_names(sensors);
+            std::vector<std::string> names = output_names(s.scene());
             if (!s.has_shear_state()) std::erase(names, "memory");
             std::erase_if(names, [&](const std::string& name) {
-              const auto output = find_output(sensors, name);
-              return output && !reason_against(s.scene(), *output).empty();
+              return find_body_output(s.scene(), name).has_value();
             });
             return names;
           },

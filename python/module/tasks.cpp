@@ -17,11 +17,13 @@ void add_tasks(nb::module_& m) {
           "__init__",
           [](TensorSpec* self, const std::string& name, const std::vector<std::size_t>& shape,
              const std::string& unit, const std::string& meaning, double low, double high,
-             bool privileged, bool touch) {
-            new (self) TensorSpec{name, shape, unit, meaning, {}, low, high, privileged, touch};
+             bool privileged, bool touch, std::size_t own_bytes) {
+            new (self)
+                TensorSpec{name, shape, unit, meaning, {}, low, high, privileged, touch, own_bytes};
           },
           "name"_a, "shape"_a, "unit"_a = "", "meaning"_a = "", "low"_a = -TensorSpec::kUnbounded,
-          "high"_a = TensorSpec::kUnbounded, "privileged"_a = false, "touch"_a = false)
+          "high"_a = TensorSpec::kUnbounded, "privileged"_a = false, "touch"_a = false,
+          "own_bytes"_a = 0)
       .def_ro("name", &TensorSpec::name)
       .def_prop_ro(
           "shape", [](const TensorSpec& t) { return nb::tuple(nb::cast(t.shape)); },
@@ -35,6 +37,8 @@ void add_tasks(nb::module_& m) {
       .def_ro("privileged", &TensorSpec::privileged, "A robot could not measure it.")
       .def_ro("touch", &TensorSpec::touch,
               "What pads feel: all numbers are 0 where nothing is felt.")
+      .def_ro("own_bytes", &TensorSpec::own_bytes,
+              "1: uint8, a picture in colours; 2: int16, numbers of bodies; 0: float32.")
       .def("__repr__", [](const TensorSpec& t) {
         return fmt::format("TensorSpec('{}', ({}), '{}')", t.name, fmt::join(t.shape, ", "),
                            t.unit);

@@ -24,6 +24,7 @@ from pathlib import Path
 from . import _core
 from ._core import (
     Batch,
+    Camera,
     Environments,
     InputError,
     IoError,
@@ -48,6 +49,7 @@ from .scene_env import SceneEnv, VectorSceneEnv, register_scene_env
 
 __all__ = [
     "Batch",
+    "Camera",
     "Environments",
     "InputError",
     "IoError",

@@ -12,7 +12,8 @@ c ≤ 3, or (channels, rows, cols):
              third one this is 128, as 0 is
 
 An observation of bytes (height, width, 3) is a picture already, such as `pad.rgb`, which shows a
-gel. Its bytes are written as they are, whatever is said of touch.
+gel. Its bytes are written as they are, whatever is said of touch. What else cameras of the scene
+see, depths and numbers of bodies, are arrays of their own.
 """
 
 from __future__ import annotations
@@ -174,9 +175,11 @@ def features_of(
     else:
         whole = {key: max(shapes[key]) for key in felt}
         grid = {key: _least_block(shapes[key]) for key in felt} if touch == "state" else {}
-        plain = [key for key in seen if key not in felt]
+        views = [key for key in fields if key.rpartition(".")[0] in episodes.cameras]
+        plain = [key for key in seen if key not in felt and key not in views]
         features = _joined(STATE, plain + felt, episodes, shapes, whole)
         features += _joined(ENVIRONMENT, [*grid, *hidden], episodes, shapes, grid)
+        features += [Feature(f"observation.{key}", [key], shapes[key]) for key in views]
         if touch == "image":
             features += [
                 picture for key in felt for picture in _pictures(key, episodes, chosen, shapes[key])

@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What `render_mode` of environments stands for: pictures as arrays, or a window with them."""
+"""What `render_mode` of environments stands for: pictures as arrays, or a window with them.
+
+Arrays are what the first camera of the scene sees; without a camera, and in the window, bodies are
+drawn from the side.
+"""
 
 from __future__ import annotations
 
@@ -39,7 +43,14 @@ class Rendering:
     ) -> Pictures | None:
         """A picture of every environment, or None where they are shown in the window."""
         self.show(env, episodes)
-        return self._draw(env, episodes, len(episodes)) if self.mode == "rgb_array" else None
+        if self.mode != "rgb_array":
+            return None
+        if env.model.cameras:
+            name = env.model.cameras[0].name
+            if isinstance(env, _core.Batch):
+                return tuple(env.tactile(f"{name}.rgb"))
+            return tuple(env.camera(name))
+        return self._draw(env, episodes, len(episodes))
 
     def show(self, env: _core.Environments | _core.Batch, episodes: NDArray[np.int64]) -> None:
         """Shows the environments if there is a window."""

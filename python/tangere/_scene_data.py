@@ -123,6 +123,7 @@ def _spec(env: VectorSceneEnv) -> _core.TaskSpec:
         _core.TensorSpec(
             key, shape[1:], env.units.get(key, ""),
             privileged=key in env.privileged, touch=key in env.touch,
+            own_bytes=0 if env._types[key] == np.float32 else env._types[key].itemsize,
         )  # fmt: skip
         for key, shape in env._shapes.items()
         if key not in _STATE
@@ -161,7 +162,10 @@ class _Run:
         state = {"q": (env.model.nq,), "v": (env.model.nv,)}
         shapes = state | {key: shape[1:] for key, shape in env._shapes.items() if key not in _STATE}
         try:  # memory is taken when rows are written
-            self.rows = {k: np.empty((slots, most + 1, *s), np.float32) for k, s in shapes.items()}
+            self.rows = {
+                k: np.empty((slots, most + 1, *s), env._types.get(k, np.float32))
+                for k, s in shapes.items()
+            }
             self.actions = np.empty((slots, most, self.width), np.float32)
             self.rewards = np.empty((slots, most), np.float32)
         except MemoryError:

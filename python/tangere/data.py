@@ -70,6 +70,8 @@ class Episodes:
                     self._describe(file)
                     sensors = file["scene"].get("sensors", {})
                     self.sensors = {name: dict(sensors[name].attrs) for name in sensors}
+                    cameras = file["scene"].get("cameras", {})
+                    self.cameras = {name: dict(cameras[name].attrs) for name in cameras}
                 for name, demo in file["data"].items():
                     rows = int(demo.attrs["num_samples"])
                     found.append((int(name.removeprefix("demo_")), name, number, rows))

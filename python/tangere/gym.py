@@ -247,7 +247,8 @@ class VectorTaskEnv(EpisodesEnv):
         return self._env.randomized()
 
     def render(self) -> tuple[np.ndarray, ...] | None:
-        """A picture (384, 512, 3) uint8 of every environment. None without `render_mode`, and with
+        """A picture of every environment: (384, 512, 3) uint8, or what the first camera of the
+        scene sees, if it has one. None without `render_mode`, and with
         "human", which shows the first 16 environments in a window.
 
         Bodies and the ground, seen from the side and above without perspective. Fields of sensors
@@ -330,7 +331,7 @@ class SingleEnv(gymnasium.Env):
         return self._vector.model
 
     def render(self) -> np.ndarray | None:
-        """A picture (384, 512, 3) uint8, or None, as in `VectorTaskEnv`."""
+        """A picture, or None, as in `VectorTaskEnv`."""
         pictures = self._vector.render()
         return None if pictures is None else pictures[0]
 

@@ -28,7 +28,7 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from . import _core
-from ._arrays import numbers, singles
+from ._arrays import is_picture, numbers, singles
 from ._rendering import MODES, RenderMode, Rendering
 from ._vector_env import AUTORESET, Autoreset, EpisodesEnv, Observation
 from ._vector_env import check_choices, checked_seed, final_info, system_seed
@@ -60,7 +60,7 @@ class VectorSceneEnv(EpisodesEnv):
     and threads. `info` has `success`, `starting`, `episode_id` and `status`, (E) each; a negative
     `status` says that the simulation failed: the environment stands still, its episode is
     truncated, and `reward` is what the method returns for the last state. Observations are float32
-    in the units that `observe` returns, rewards float64.
+    in the units that `observe` returns, pictures in uint8 or int16 as they are; rewards float64.
 
     Parameters
     ----------
@@ -146,10 +146,10 @@ class VectorSceneEnv(EpisodesEnv):
         self._start_all()
         seen = self._arrays()
         boxes: dict[str, spaces.Space[Any]] = {
-            key: spaces.Box(-np.inf, np.inf, array.shape[1:], np.float32)
-            for key, array in seen.items()
+            key: _box(array) for key, array in seen.items()
         }
         self._shapes = {key: array.shape for key, array in seen.items()}
+        self._types = {key: array.dtype for key, array in seen.items()}
         width = sum(array[0].size for array in seen.values())
         self.single_observation_space = (
             spaces.Box(-np.inf, np.inf, (width,), np.float32) if flatten else spaces.Dict(boxes)
@@ -263,7 +263,8 @@ class VectorSceneEnv(EpisodesEnv):
         return self._observe(), reward, terminated, truncated, info
 
     def render(self) -> tuple[NDArray[np.uint8], ...] | None:
-        """A picture (384, 512, 3) uint8 of every environment, or None, as in `VectorTaskEnv`."""
+        """A picture of every environment, (384, 512, 3) uint8 or what the scene's first camera
+        sees, or None, as in `VectorTaskEnv`."""
         return self._rendering.render(self._batch, self.episodes)
 
     def close_extras(self, **_: Any) -> None:
@@ -359,13 +360,14 @@ class VectorSceneEnv(EpisodesEnv):
         seen = self.observe()
         if not isinstance(seen, dict) or not seen:
             raise self._fault(f"observe() {type(seen).__name__}", "a dict KEY → (E, …)")
-        arrays = {k: singles(numbers(a)) for k, a in seen.items()}
+        given = {k: numbers(a) for k, a in seen.items()}
+        arrays = {k: a.copy() if is_picture(a) else singles(a) for k, a in given.items()}
         for key, array in arrays.items():
             if array.ndim < 1 or len(array) != self.num_envs:
                 raise self._fault(f"observe()[{key!r}] of shape {array.shape}",
                                   f"({self.num_envs}, …)")  # fmt: skip
             # A sum costs less than a test of each number, and is not finite where one is not.
-            if not np.isfinite(array.sum()):
+            if array.dtype == np.float32 and not np.isfinite(array.sum()):
                 failed = self._batch.status < 0  # also because a state is out of float32's range
                 array[failed] = np.nan_to_num(array[failed])
                 if not np.isfinite(array).all():
@@ -380,7 +382,8 @@ class VectorSceneEnv(EpisodesEnv):
             raise self._fault(f"observe() of shapes {shapes}", f"{self._shapes}")
         if not self.flatten:
             return arrays
-        return np.concatenate([a.reshape(self.num_envs, -1) for a in arrays.values()], axis=1)
+        flat = [a.reshape(self.num_envs, -1) for a in arrays.values()]
+        return np.concatenate(flat, axis=1, dtype=np.float32)
 
     def _info(self) -> dict[str, Any]:
         every = np.ones(self.num_envs, bool)
@@ -391,6 +394,15 @@ class VectorSceneEnv(EpisodesEnv):
             "status": self._batch.status,
         }
         return info | {f"_{key}": every.copy() for key in info}
+
+
+def _box(array: NDArray[Any]) -> spaces.Box:
+    """The space of an observation whose first (E, …) is given."""
+    if array.dtype == np.uint8:
+        return spaces.Box(0, 255, array.shape[1:], np.uint8)
+    if array.dtype == np.int16:
+        return spaces.Box(-32768, 32767, array.shape[1:], np.int16)
+    return spaces.Box(-np.inf, np.inf, array.shape[1:], np.float32)
 
 
 class SceneEnv(SingleEnv):

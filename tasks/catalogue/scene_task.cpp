@@ -148,7 +148,7 @@ SceneTask::SceneTask(const Scene& scene, int steps, int horizon,
       const FieldOutput source = read_for(model(), *reading.field);
       Field field{{}, 0, 0, as_size(first_tactile_point(model(), source.sensor))};
       for (const FieldOutput& other : fields()) {
-        field.size = numbers_of(model().sensors()[as_size(other.sensor)], other.form);
+        field.size = numbers_of(model(), other);
         if (other == source) break;
         field.first += field.size;
       }

@@ -27,7 +27,7 @@ std::size_t place_of(const Scene& scene, const std::string& name, int (*count)(J
 Task::Task(const Scene& scene, TaskSpec spec)
     : model_((spec.check(), scene)), spec_(std::move(spec)), fields_(spec_.fields) {
   if (spec_.control_every == 0) spec_.control_every = spec_.steps_per_action;
-  check_outputs(fields_, model_.sensors().size());
+  check_outputs(model_.scene(), fields_);
   for (const FieldOutput& output : fields_)
     if (output.form != FieldForm::field && output.form != FieldForm::pressure &&
         output.form != FieldForm::ideal && !is_picture(output.form))
@@ -39,8 +39,7 @@ Task::Task(const Scene& scene, TaskSpec spec)
 
 std::size_t Task::tactile_size() const {
   std::size_t numbers = 0;
-  for (const FieldOutput& output : fields_)
-    numbers += numbers_of(model_.sensors()[std::size_t(output.sensor)], output.form);
+  for (const FieldOutput& output : fields_) numbers += numbers_of(model_, output);
   return numbers;
 }
 

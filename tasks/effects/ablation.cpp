@@ -214,10 +214,9 @@ void drop_varying(Scene& scene, Ablation way) {
 /// Removes outputs of sensors and markers that are gone.
 void keep_known_outputs(Scene& scene) {
   if (!scene.outputs) return;
-  const std::vector<std::string> sensors = sensor_names(scene);
   std::erase_if(scene.outputs->record, [&](const std::string& word) {
     if (!has_output(scene, word)) return true;
-    const std::optional<FieldOutput> of = find_output(sensors, split_times(word).name);
+    const std::optional<FieldOutput> of = find_output(scene, split_times(word).name);
     return of && !reason_against(scene, *of).empty();
   });
 }

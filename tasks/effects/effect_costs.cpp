@@ -54,7 +54,7 @@ TimedParts parts_of(const Model& model, const Effect& effect) {
 std::size_t bytes_of(const Model& model) {
   std::size_t bytes = model.state_bytes_per_environment();
   for (const FieldOutput of : requested_fields(model.scene()))
-    bytes += sizeof(double) * numbers_of(model.sensors()[as_size(of.sensor)], of.form);
+    bytes += sizeof(double) * numbers_of(model, of);
   return bytes;
 }
 

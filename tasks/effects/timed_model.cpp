@@ -41,6 +41,7 @@ TimedModel::TimedModel(const Model& model, const RecordedStates& recorded,
       stepper_(model, options),
       readout_(model),
       outputs_(requested_fields(model.scene())) {
+  std::erase_if(outputs_, [](const FieldOutput& of) { return is_view(of.form); });
   const std::vector<std::size_t> columns = columns_of(model, recorded.model);
   const std::size_t nq = as_size(model.nq()), nv = as_size(model.nv());
   const std::size_t nu = as_size(recorded.model.nu());

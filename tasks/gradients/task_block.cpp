@@ -335,7 +335,7 @@ void TaskBlock::add_readings(std::size_t moment, int lane) {
   BlockCotangent& c = adjoint_.loss(0);
   for (const FieldOutput& output : task_.fields()) {
     const int s = output.sensor;
-    const std::size_t numbers = numbers_of(task_.model().sensors()[as_size(s)], output.form);
+    const std::size_t numbers = numbers_of(task_.model(), output);
     const std::span<double> points = c.points_of(task_.model(), s, lane);
     if (is_picture(output.form))
       pullback_.picture(lane, output, fields.first(numbers), c.parameters);

@@ -67,7 +67,7 @@ double bytes_of(const SensorInfo& sensor, FieldForm form, FrameKind kind) {
 BenchmarkFields::BenchmarkFields(const Model& model, int environments,
                                  const BenchmarkOptions& options, FrameKind kind)
     : outputs_(kind == FrameKind::none ? std::vector<FieldOutput>{}
-                                       : fields_of(model, options.rollout.outputs)),
+                                       : sensor_fields_of(model, options.rollout.outputs)),
       sums_(outputs_.size()) {
   const bool wide = options.precision == Precision::f64;
   const auto all = [&]<class Frame>() { frames_ = make<Frame>(model, outputs_, environments); };
@@ -114,7 +114,7 @@ std::uint64_t BenchmarkFields::chain(std::uint64_t checksum, int environment, st
 
 double field_bytes(const Model& model, const BenchmarkOptions& options, FrameKind kind) {
   double bytes = 0;
-  for (const FieldOutput of : fields_of(model, options.rollout.outputs)) {
+  for (const FieldOutput of : sensor_fields_of(model, options.rollout.outputs)) {
     const SensorInfo& sensor = model.sensors()[as_size(of.sensor)];
     bytes += options.precision == Precision::f64 ? bytes_of<double>(sensor, of.form, kind)
                                                  : bytes_of<float>(sensor, of.form, kind);

@@ -41,8 +41,8 @@ void read_end_effectors(Readout& readout, const Batch& batch, int block, const P
     readout.read_end_effectors(batch, block, places_of<double>(batch, block, place));
 }
 
-/// Reads one sensor in one form, numbers_of(sensor, form). T: double or float, or a byte for a
-/// picture in colours.
+/// Reads one sensor or camera in one form, numbers_of(model, output). T: double or float, or a byte
+/// for a picture in colours, or an int16 for numbers of bodies.
 template <class T, class Place>
 void read_field(Readout& readout, const Batch& batch, int block, FieldOutput output,
                 const Place& place) {
@@ -56,8 +56,7 @@ void read_fields(Readout& readout, const Batch& batch, int block,
                  std::span<const FieldOutput> outputs, const Place& place) {
   std::size_t offset = 0;
   for (const FieldOutput& output : outputs) {
-    const std::size_t numbers =
-        numbers_of(batch.model().sensors()[static_cast<std::size_t>(output.sensor)], output.form);
+    const std::size_t numbers = numbers_of(batch.model(), output);
     read_field<T>(readout, batch, block, output,
                   [&](int e) { return place(e).subspan(offset, numbers); });
     offset += numbers;

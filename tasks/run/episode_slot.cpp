@@ -28,12 +28,16 @@ EpisodeSlot<T>::EpisodeSlot(const EpisodeSource& source, const EpisodeOptions& o
       u_(kBlockEpisodes * as_size(source.model->nu())),
       values_(source.channels.size()),
       bytes_(source.channels.size()),
+      ids_(source.channels.size()),
       actions_(kBlockEpisodes * as_size(piece_rows_) * source.action),
       rewards_(source.whole ? kBlockEpisodes * as_size(piece_rows_) : 0),
       observations_(source.channels.size()) {
   for (std::size_t name = 0; name < values_.size(); ++name) {
     const std::size_t count = kBlockEpisodes * taken_rows(name, piece_rows_) * width(name);
-    source.channels[name].is_bytes() ? bytes_[name].resize(count) : values_[name].resize(count);
+    const std::size_t own = source.channels[name].own_bytes();
+    if (own == 0) values_[name].resize(count);
+    if (own == 1) bytes_[name].resize(count);
+    if (own == 2) ids_[name].resize(count);
     if (source.channels[name].kind != Kind::reading)
       small_.resize(std::max(small_.size(), width(name)));
   }
@@ -79,8 +83,10 @@ bool EpisodeSlot<T>::simulate(const std::function<bool()>& stopped,
     const std::size_t count =
         as_size(batch_->environments()) * width(name) *
         (taken_before(source_, name, next_row_) - taken_before(source_, name, first_row_));
-    if (source_.channels[name].is_bytes())
+    if (const std::size_t own = source_.channels[name].own_bytes(); own == 1)
       observations_[name] = std::span<const std::uint8_t>(bytes_[name]).first(count);
+    else if (own == 2)
+      observations_[name] = std::span<const std::int16_t>(ids_[name]).first(count);
     else
       observations_[name] = std::span<const T>(values_[name]).first(count);
   }
@@ -156,9 +162,12 @@ void EpisodeSlot<T>::observe_scene(int row) {
   for (std::size_t name = kThird; name < source_.channels.size(); ++name) {
     const EpisodeChannel& channel = source_.channels[name];
     if (!takes(name, row)) continue;
-    if (channel.is_bytes()) {
+    if (channel.own_bytes() == 1) {
       read_field<std::uint8_t>(readout_, *batch_, 0, channel.reading,
                                [&](int e) { return numbers(bytes_, name, e, row); });
+    } else if (channel.own_bytes() == 2) {
+      read_field<std::int16_t>(readout_, *batch_, 0, channel.reading,
+                               [&](int e) { return numbers(ids_, name, e, row); });
     } else if (channel.kind == Kind::reading) {
       read_field<T>(readout_, *batch_, 0, channel.reading,
                     [&](int e) { return numbers(values_, name, e, row); });

@@ -73,6 +73,7 @@ class EpisodeSlot {
   std::vector<double> small_;           // one episode, before conversion
   std::vector<std::vector<T>> values_;  // per name: (episodes, rows at which it is taken, width)
   std::vector<std::vector<std::uint8_t>> bytes_;  // the same of pictures in colours
+  std::vector<std::vector<std::int16_t>> ids_;    // the same of numbers of bodies
   std::vector<float> actions_;                    // (episodes, action rows, action)
   std::vector<float> rewards_;                    // of a task: (episodes, action rows)
   std::vector<Observation> observations_;

@@ -8,6 +8,7 @@
 #include <string>
 
 #include "engine/base/as_size.hpp"
+#include "engine/rows/camera_layout.hpp"
 #include "engine/rows/sensor_layout.hpp"
 #include "engine/scene/scene_number.hpp"
 #include "engine/step/sleeping_trees.hpp"
@@ -21,9 +22,7 @@ constexpr int kPoseWidth = 7, kTwistWidth = 6, kPositionWidth = 3;
 constexpr OutputTimes kAlways{};
 constexpr const char* kStepsOfRow = "steps of this run before each row";
 
-std::size_t numbers_in(const Model& model, FieldOutput output) {
-  return numbers_of(model.sensors()[as_size(output.sensor)], output.form);
-}
+std::size_t numbers_in(const Model& model, FieldOutput output) { return numbers_of(model, output); }
 
 std::vector<std::string> recorded_bodies(const Model& model, const RolloutOutputs& outputs) {
   const auto all = model.body_names();
@@ -63,6 +62,7 @@ Recorder::Recorder(const Batch& batch, std::span<const Stepper> steppers,
   if (steppers.front().sleep() > 0) add_sleep();
   if (options.outputs.memory) add_shear(options.outputs.shear_times);
   add_readings();
+  add_views();
   add_randomized();
   if (task != nullptr) add_task();
 }
@@ -341,7 +341,7 @@ void Recorder::add_audit() {
 /// Readings of a sensor share their list of steps, unless they are taken at other times.
 void Recorder::add_readings() {
   std::vector<FieldOutput> first;  // of each sensor
-  for (const FieldOutput output : fields_of(model_, options_.outputs)) {
+  for (const FieldOutput output : sensor_fields_of(model_, options_.outputs)) {
     const SensorInfo& info = model_.sensors()[as_size(output.sensor)];
     const SensorLayout layout =
         sensor_layout(info, model_.scene().sensors[as_size(output.sensor)], 1);
@@ -376,6 +376,44 @@ void Recorder::add_readings() {
     if (!is_first) continue;
     first.push_back(output);
     for (Table& table : point_tables(layout, group)) recording_.tables.push_back(std::move(table));
+  }
+}
+
+/// Pictures of a camera share their list of steps, unless they are taken at other times.
+void Recorder::add_views() {
+  std::vector<FieldOutput> first;  // of each camera
+  for (const FieldOutput output : fields_of(model_, options_.outputs)) {
+    if (!is_view(output.form)) continue;
+    const CameraLayout layout =
+        camera_layout(model_.scene(), model_.scene().cameras[as_size(output.sensor)]);
+    const std::string group = "cameras/" + layout.name + "/";
+    const OutputTimes times = reading_times(model_, output, options_);
+    const std::size_t own = own_bytes(output.form);
+    Channel channel{.name = group + to_string(output.form),
+                    .type = own == 1   ? NumberType::uint8
+                            : own == 2 ? NumberType::int16
+                                       : NumberType::float32,
+                    .shape = {environments_},
+                    .storage = Channel::Storage::per_environment};
+    for (const std::uint64_t n : view_shape(layout, output.form)) channel.shape.push_back(n);
+    channel.more = view_attributes(layout, output.form);
+    const Source source{When::row, times, false, 1, [this, output, own](auto, int) -> Numbers {
+                          if (own == 1) return read_as(output, bytes_);
+                          if (own == 2) return read_as(output, ids_);
+                          return read_as(output, heights_);
+                        }};
+    const auto same = std::find_if(first.begin(), first.end(), [&](const FieldOutput& other) {
+      return other.sensor == output.sensor;
+    });
+    const std::string steps = same == first.end() ? group + "step" : channel.name + "_step";
+    const bool alone = same == first.end() || times != reading_times(model_, *same, options_);
+    add(std::move(channel), source);
+    if (alone)
+      add_steps(steps,
+                options_.outputs.states.given() ? "steps of this run before each picture"
+                                                : "row of /q of which each picture is",
+                source);
+    if (same == first.end()) first.push_back(output);
   }
 }
 

@@ -71,6 +71,7 @@ class Recorder {
   void add_solver();
   void add_audit();
   void add_readings();
+  void add_views();
   void add_randomized();
   void add_task();
   void resize_buffers();
@@ -103,6 +104,7 @@ class Recorder {
   std::vector<double> reading_;                               // shared by the sensors
   std::vector<float> heights_;                                // of pictures
   std::vector<std::uint8_t> bytes_;                           // of pictures in colours
+  std::vector<std::int16_t> ids_;                             // of bodies in pictures
   std::vector<double> shear_;                                 // (16, points, 3)
   std::vector<double> sleep_u_, clearance_;                   // (E, nu), (E)
   std::vector<std::int32_t> iterations_, island_, rested_;    // (E), (E, trees)

@@ -16,7 +16,7 @@ constexpr int kMotionWidth = 13, kEndEffectorWidth = 3;
 std::size_t largest_reading(const Model& model, const RolloutOutputs& outputs) {
   std::size_t largest = 0;
   for (const FieldOutput output : fields_of(model, outputs))
-    largest = std::max(largest, numbers_of(model.sensors()[as_size(output.sensor)], output.form));
+    largest = std::max(largest, numbers_of(model, output));
   return largest;
 }
 
@@ -29,8 +29,14 @@ std::size_t bodies_in(const Model& model, const RolloutOutputs& outputs) {
 
 std::vector<FieldOutput> fields_of(const Model& model, const RolloutOutputs& outputs) {
   if (!outputs.fields) return whole_fields(model.scene());
-  check_outputs(*outputs.fields, model.sensors().size());
+  check_outputs(model.scene(), *outputs.fields);
   return *outputs.fields;
+}
+
+std::vector<FieldOutput> sensor_fields_of(const Model& model, const RolloutOutputs& outputs) {
+  std::vector<FieldOutput> fields = fields_of(model, outputs);
+  std::erase_if(fields, [](const FieldOutput& of) { return is_view(of.form); });
+  return fields;
 }
 
 int tactile_interval(const SensorInfo& sensor, const RolloutOptions& options) {
@@ -40,6 +46,7 @@ int tactile_interval(const SensorInfo& sensor, const RolloutOptions& options) {
 
 OutputTimes reading_times(const Model& model, FieldOutput output, const RolloutOptions& options) {
   if (output.times.given()) return output.times;
+  if (is_view(output.form)) return {std::max(1, options.every)};
   return {tactile_interval(model.sensors()[static_cast<std::size_t>(output.sensor)], options)};
 }
 

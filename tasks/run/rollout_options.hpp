@@ -36,6 +36,8 @@ struct RolloutOptions {
 
 /// Returns what is read of tactile fields. Throws InputError as check_outputs() does.
 std::vector<FieldOutput> fields_of(const Model& model, const RolloutOutputs& outputs);
+/// The same without pictures of cameras.
+std::vector<FieldOutput> sensor_fields_of(const Model& model, const RolloutOutputs& outputs);
 /// Steps between the fields of a sensor under these options, where a reading has no times of its
 /// own.
 int tactile_interval(const SensorInfo& sensor, const RolloutOptions& options);

@@ -80,6 +80,14 @@ class Player {
       sensor.canvas.dataset.sensor = sensor.sensor.name;
       $("maps").append(card);
     }
+    this.pictures = data.pictures.map((p, k) => new PictureView(p, k, () => this.redraw()));
+    for (const picture of this.pictures) {
+      const card = document.createElement("div");
+      card.className = "card";
+      picture.canvas = card.appendChild(document.createElement("canvas"));
+      picture.canvas.dataset.picture = picture.picture.name;
+      $("maps").append(card);
+    }
     const groups = [...new Set(data.episodes.flatMap((e) => e.traces.map((t) => t.group)))];
     this.panels = groups.map((group) => {
       const card = document.createElement("div");
@@ -320,15 +328,32 @@ class Player {
       g.clearRect(0, 0, width, height);
       sensor.drawMap(g, width, height, sensor.at(episode, frame), episode, frame, ink, soft);
     }
+    this.drawPictures(ink);
     for (const panel of this.panels) panel.draw(episode, frame, ink, soft, line);
     if (this.stage) this.compose();
   }
 
-  // The scene, the maps and the curves in one picture, for files.
+  drawPictures(ink) {
+    const ratio = window.devicePixelRatio || 1;
+    for (const picture of this.pictures) {
+      const { canvas } = picture, width = 260, height = picture.height(width) + 20;
+      this.fit(canvas, width, height);
+      canvas.style.width = `${width}px`; canvas.style.height = `${height}px`;
+      const g = canvas.getContext("2d");
+      g.setTransform(ratio, 0, 0, ratio, 0, 0);
+      // While a picture is decoded, the one before stays; before the first there is none.
+      if (picture.at(this.episode, this.frame) || !picture.isTaken(this.episode, this.frame))
+        g.clearRect(0, 0, width, height);
+      picture.draw(g, width, height, this.episode, this.frame, ink);
+    }
+  }
+
+  // The scene, the maps, the pictures and the curves in one picture, for files.
   compose() {
     const [ink, soft, , panel] = this.inks(), view = $("view");
     const ratio = window.devicePixelRatio || 1, room = (size) => size > 0 ? size + gap : 0;
-    const side = this.sensors.filter((s) => s.canvas).map((s) => s.canvas);
+    const side = [...this.sensors.filter((s) => s.canvas), ...this.pictures]
+      .map((s) => s.canvas);
     const low = this.panels.map((p) => p.canvas), gap = Math.round(10 * ratio);
     const wide = room(Math.max(0, ...side.map((c) => c.width)));
     const tall = room(Math.max(0, ...low.map((c) => c.height)));

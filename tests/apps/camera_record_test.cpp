@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: Apache-2.0
+// Pictures of cameras in trajectories and data sets: names, shapes, types, times, and the same
+// bytes on any number of threads.
+#include <gmock/gmock.h>
+#include <hdf5.h>
+
+#include <nlohmann/json.hpp>
+
+#include "io/hdf5/h5.hpp"
+#include "tests/apps/program.hpp"
+#include "tests/files.hpp"
+
+namespace tangere::apps {
+namespace {
+
+using nlohmann::json;
+using ::testing::HasSubstr;
+
+/// The small rolling ball with a camera of 12 x 16 pixels.
+std::string watched_scene(const Folder& folder) {
+  std::string text = file_bytes(scene("rolling_ball_small.xml"));
+  text.insert(text.find("</sensor>"),
+              "<camera name=\"eye\" pos=\"0 -0.25 0.2\" look=\"0 0 0.02\" rows=\"12\" "
+              "cols=\"16\" noise=\"2\"/>\n");
+  return folder.write("watched.xml", text);
+}
+
+struct Found {
+  h5::Dims dims;
+  std::size_t bytes = 0;  // of a number
+  bool is_signed = false;
+  std::vector<double> numbers;
+};
+Found found(const std::string& path, const std::string& name) {
+  const h5::Id file = h5::open_file(path), d = h5::open_dataset(file, name),
+               type(H5Dget_type(d.get()));
+  Found it{h5::dimensions(d), H5Tget_size(type.get()), H5Tget_sign(type.get()) == H5T_SGN_2, {}};
+  std::size_t count = 1;
+  for (const hsize_t n : it.dims) count *= n;
+  it.numbers.resize(count);
+  h5::read_box<double>(d, h5::Dims(it.dims.size(), 0), it.dims, it.numbers.data());
+  return it;
+}
+
+TEST(CameraRecord, ATrajectoryHasPicturesAtTheirTimes) {
+  const Folder folder;
+  const std::string from = watched_scene(folder);
+  run_json(folder, {"simulate", from, "--output", "run.h5", "--steps", "120", "--every", "60",
+                    "--envs", "2", "--seed", "3", "--record", "eye.rgb,eye.depth/final,eye.ids"});
+  const std::string file = folder.path("run.h5");
+  const Found rgb = found(file, "cameras/eye/rgb"), depth = found(file, "cameras/eye/depth"),
+              ids = found(file, "cameras/eye/ids");
+  EXPECT_EQ(rgb.dims, (h5::Dims{2, 2, 12, 16, 3}));
+  EXPECT_EQ(rgb.bytes, 1U);
+  EXPECT_EQ(depth.dims, (h5::Dims{1, 2, 12, 16, 1}));
+  EXPECT_EQ(depth.bytes, 4U);
+  EXPECT_EQ(ids.dims, (h5::Dims{2, 2, 12, 16, 1}));
+  EXPECT_EQ(ids.bytes, 2U);
+  EXPECT_TRUE(ids.is_signed);
+  EXPECT_THAT(ids.numbers, ::testing::Contains(1.0));  // the ball
+  EXPECT_THAT(depth.numbers, ::testing::Each(::testing::Gt(0.1)));
+  EXPECT_EQ(found(file, "cameras/eye/step").numbers, (std::vector<double>{60, 120}));
+  EXPECT_EQ(found(file, "cameras/eye/depth_step").numbers, (std::vector<double>{120}));
+  EXPECT_EQ(run(folder, {"info", "run.h5"}).exit_code, 0);
+}
+
+TEST(CameraRecord, ShardsHaveTheSameBytesOnAnyNumberOfThreads) {
+  const Folder folder;
+  const std::string from = watched_scene(folder);
+  for (const std::string compress : {"none", "deflate"}) {
+    std::vector<std::string> bytes;
+    for (const std::string threads : {"1", "2"}) {
+      const std::string out = compress + threads;
+      run_json(folder, {"generate", from, "--episodes", "17", "--steps", "40", "--every", "20",
+                        "--output", out, "--threads", threads, "--compress", compress, "--record",
+                        "q,eye.rgb,eye.ids,eye.depth/40"});
+      const std::string shard = folder.path(out + "/shard-00000.h5");
+      bytes.push_back(file_bytes(shard));
+      if (threads == "2") continue;
+      const Found rgb = found(shard, "data/demo_3/obs/eye.rgb"),
+                  ids = found(shard, "data/demo_3/obs/eye.ids"),
+                  depth = found(shard, "data/demo_3/samples/eye.depth");
+      EXPECT_EQ(rgb.dims, (h5::Dims{2, 12, 16, 3}));
+      EXPECT_EQ(rgb.bytes, 1U);
+      EXPECT_EQ(ids.dims, (h5::Dims{2, 12, 16, 1}));
+      EXPECT_EQ(ids.bytes, 2U);
+      EXPECT_TRUE(ids.is_signed);
+      EXPECT_THAT(ids.numbers, ::testing::Contains(1.0));
+      EXPECT_EQ(depth.dims, (h5::Dims{2, 12, 16, 1}));
+      EXPECT_EQ(run(folder, {"validate", out}).exit_code, 0);
+    }
+    EXPECT_EQ(bytes[0], bytes[1]) << compress;
+  }
+}
+
+TEST(CameraRecord, InspectSaysWhatAPictureCosts) {
+  const Folder folder;
+  const std::string from = watched_scene(folder);
+  const json said = run_json(folder, {"inspect", from});
+  EXPECT_EQ(said["cameras"][0]["name"], "eye");
+  EXPECT_EQ(said["cameras"][0]["rays"], 192);
+  EXPECT_EQ(said["cameras"][0]["rgb_bytes"], 576);
+  EXPECT_EQ(said["cameras"][0]["ids_bytes"], 384);
+  EXPECT_THAT(run(folder, {"inspect", from}).out,
+              HasSubstr("eye in the world: 12 x 16 pixels, 45 degrees; a picture: 192 rays"));
+}
+
+}  // namespace
+}  // namespace tangere::apps

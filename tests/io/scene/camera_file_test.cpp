@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: Apache-2.0
+// Tests <camera> of scene files: its attributes, its outputs, and messages with their line.
+#include <gmock/gmock.h>
+
+#include "engine/scene/field_form.hpp"
+#include "io/scene/scene_reader.hpp"
+#include "tests/io/scene/scene_text.hpp"
+
+namespace tangere {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using testing::kScene;
+
+std::string with_camera(const std::string& attributes) {
+  std::string text = kScene;
+  text.insert(text.find("</sensor>"), "<camera " + attributes + "/>\n");
+  return text;
+}
+Scene scene_of(const std::string& attributes) {
+  return parse_scene(with_camera(attributes), "eye.xml").scene;
+}
+std::string message(const std::string& attributes) {
+  try {
+    static_cast<void>(scene_of(attributes));
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  return "";
+}
+const std::string kPlace = "name=\"eye\" pos=\"0 -0.4 0.3\" look=\"0 0 0.02\"";
+/// The line of the camera.
+std::string line() {
+  const std::string text = with_camera(kPlace);
+  const auto before = text.substr(0, text.find("<camera"));
+  return "eye.xml:" + std::to_string(1 + std::count(before.begin(), before.end(), '\n')) + ": ";
+}
+
+TEST(CameraFile, HasItsDefaultsAndItsNumbers) {
+  const Scene plain = scene_of(kPlace);
+  ASSERT_EQ(plain.cameras.size(), 1U);
+  EXPECT_EQ(plain.cameras[0].rows, 128);
+  EXPECT_EQ(plain.cameras[0].far, 10);
+  EXPECT_EQ(plain.cameras[0].body, "");
+  EXPECT_THAT(plain.cameras[0].up, ElementsAre(0, 0, 1));
+  const CameraDescription all =
+      scene_of(
+          "name=\"wrist\" body=\"pad\" pos=\"0 0 0.1\" look=\"0 0 0\" up=\"0 1 0\" fov=\"60\" "
+          "rows=\"24\" cols=\"32\" far=\"2\" light=\"0 0 1\" ambient=\"0.5\" noise=\"1\" "
+          "gain=\"0.1\"")
+          .cameras[0];
+  EXPECT_EQ(all.body, "pad");
+  EXPECT_EQ(all.fov, 60);
+  EXPECT_EQ(all.rows * 100 + all.cols, 2432);
+  EXPECT_EQ(all.far, 2);
+  EXPECT_THAT(all.light, ElementsAre(0, 0, 1));
+  EXPECT_EQ(all.ambient + all.noise + all.gain, 1.6);
+}
+
+TEST(CameraFile, CountsInTheUnitsOfTheFile) {
+  std::string text = with_camera("name=\"eye\" pos=\"0 -40 30\" look=\"0 0 2\" far=\"300\"");
+  const std::string unit = "unit=\"m-kg\"";
+  text.replace(text.find(unit), unit.size(), "unit=\"cm-g\"");
+  const Scene scene = parse_scene(text, "eye.xml").scene;
+  EXPECT_THAT(scene.cameras[0].position, ElementsAre(0, -0.4, 0.3));
+  EXPECT_EQ(scene.cameras[0].far, 3);
+}
+
+TEST(CameraFile, ItsPicturesAreOutputs) {
+  std::string text = with_camera(kPlace);
+  text.insert(text.find("<robot>"), "<outputs record=\"q,eye.rgb/10,eye.ids\"/>\n");
+  const Scene scene = parse_scene(text, "eye.xml").scene;
+  const std::vector<FieldOutput> outputs = requested_fields(scene);
+  ASSERT_EQ(outputs.size(), 2U);
+  EXPECT_EQ(outputs[0].form, FieldForm::view_rgb);
+  EXPECT_EQ(outputs[0].times.every, 10);
+  EXPECT_EQ(outputs[1].form, FieldForm::view_ids);
+  EXPECT_THAT(output_names(scene), ::testing::IsSupersetOf({"eye.rgb", "eye.depth", "eye.ids"}));
+  text.replace(text.find("eye.ids"), 7, "eye.id");
+  EXPECT_THAT([&] { parse_scene(text, "eye.xml"); },
+              ::testing::ThrowsMessage<InputError>(HasSubstr("'eye.id'; did you mean 'eye.ids'?")));
+}
+
+TEST(CameraFile, MistakesAreErrorsWithTheirLine) {
+  EXPECT_THAT(message("pos=\"0 0 1\" look=\"0 0 0\""), HasSubstr(line()));
+  EXPECT_THAT(message(kPlace + " body=\"bal\""), HasSubstr("did you mean 'ball'?"));
+  EXPECT_THAT(message("name=\"eye\" pos=\"0 0 1\" look=\"0 0 0\""),
+              HasSubstr(line() + "<camera>: up=\"0 0 1\" lies along the view"));
+  EXPECT_THAT(message("name=\"skin\" pos=\"0 -1 1\" look=\"0 0 0\""),
+              HasSubstr("a tactile sensor is named 'skin'"));
+  EXPECT_THAT(message("name=\"a/b\" pos=\"0 -1 1\" look=\"0 0 0\""), HasSubstr("without '/'"));
+  EXPECT_THAT(message(kPlace + "/>\n<camera " + kPlace), HasSubstr("'eye' is used twice"));
+  EXPECT_THAT(message(kPlace + " rows=\"4000\""), HasSubstr("rows=\"4000\""));
+  EXPECT_THAT(message(kPlace + " fov=\"0\""), HasSubstr("fov=\"0\""));
+  EXPECT_THAT(message(kPlace + " far=\"-1\""), HasSubstr("far=\"-1\""));
+  EXPECT_THAT(message(kPlace + " zoom=\"2\""), HasSubstr("zoom"));
+  EXPECT_THAT(message("name=\"eye\" pos=\"0 0 1\""), HasSubstr("look"));
+}
+
+TEST(CameraFile, ACameraBeforeASensorTakesItsName) {
+  std::string text = kScene;
+  text.insert(text.find("<sensor>") + 8,
+              "\n<camera name=\"skin\" pos=\"0 -1 1\" look=\"0 0 0\"/>\n");
+  EXPECT_THAT([&] { parse_scene(text, "eye.xml"); },
+              ::testing::ThrowsMessage<InputError>(HasSubstr("a camera is named 'skin'")));
+}
+
+}  // namespace
+}  // namespace tangere
