@@ -55,8 +55,9 @@ enum Element : std::uint64_t {
   kVarySurface = 1ULL << 30,  ///< in <randomize>
   kLayer = 1ULL << 31,
   kGelPicture = 1ULL << 32,
+  kChannels = 1ULL << 33,
 };
-inline constexpr int kElements = 33;
+inline constexpr int kElements = 34;
 inline constexpr std::uint64_t kContacts = kGroundContact | kPairContact,
                                kTouching = kContacts | kTactile,
                                kVarying = kVaryJoint | kVaryMotor | kVaryGround | kVaryPair |
@@ -97,9 +98,10 @@ using Member = std::variant<
     double ContactCoefficients::*, int TactileDescription::*, double SensorImperfections::*,
     NormalAndShear SensorImperfections::*, double MarkersDescription::*, double SkinMaterial::*,
     double LayerDescription::*, std::optional<double> LayerDescription::*,
-    int PictureDescription::*, double PictureDescription::*, Vector3 EndEffectorDescription::*,
-    double EndEffectorDescription::*, std::array<double, 4> EndEffectorDescription::*,
-    double PiecewiseControl::*, double RandomControl::*>;
+    int PictureDescription::*, double PictureDescription::*, double ChannelsDescription::*,
+    Vector3 EndEffectorDescription::*, double EndEffectorDescription::*,
+    std::array<double, 4> EndEffectorDescription::*, double PiecewiseControl::*,
+    double RandomControl::*>;
 
 /// An attribute of one or several elements.
 struct Attribute {

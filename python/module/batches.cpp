@@ -458,7 +458,9 @@ static void add_statuses(nb::module_& m) {
       .value("not_converged", StepStatus::not_converged, "No solution was found.")
       .value("non_finite", StepStatus::non_finite, "A control or state was not finite.")
       .value("rotation", StepStatus::rotation, "A joint turned by pi or more.")
-      .value("singular", StepStatus::singular, "The Jacobian could not be factored.");
+      .value("singular", StepStatus::singular, "The Jacobian could not be factored.")
+      .value("unsolved_layer", StepStatus::unsolved_layer,
+             "The pressures of a layer that is a contact were not found.");
 }
 
 static void add_coordinates(nb::class_<PythonBatch>& batch) {
@@ -537,18 +539,18 @@ void add_batches(nb::module_& m) {
            "motors' ranges. InputError: another shape.")
       .def("run", &PythonBatch::run, "u"_a, "every"_a = 1, "fields"_a = std::vector<std::string>(),
            "envs"_a = nb::none(), kRunText)
-      .def(
-          "tactile", &PythonBatch::tactile, "reading"_a, "out"_a = nb::none(),
-          nb::sig("def tactile(self, reading: str, out: numpy.typing.NDArray | None = None) -> "
-                  "numpy.typing.NDArray"),
-          "Reads one sensor in all environments: 'pad' (E, rows, cols, 3) or (E, points, 3),\n"
-          "shear, shear, normal force of each point [N]; 'pad.pressure' and 'pad.shear' parts of\n"
-          "it; 'pad.sum' (E, 6): force [N] and where it presses [m], body axes; 'pad.flow' the\n"
-          "shear over its largest length; 'pad.ideal' the field without imperfections;\n"
-          "'pad.markers' the displacement of markers [m], 'pad.surface' that of a layer's\n"
-          "surface [m]; 'pad.height' (E, H, W, 1) float32 the surface of a gel [m], 'pad.rgb' and\n"
-          "'pad.rgb_marker' (E, H, W, 3) uint8 pictures of it. `out`: an array to fill instead of "
-          "a new one.")
+      .def("tactile", &PythonBatch::tactile, "reading"_a, "out"_a = nb::none(),
+           nb::sig("def tactile(self, reading: str, out: numpy.typing.NDArray | None = None) -> "
+                   "numpy.typing.NDArray"),
+           "Reads one sensor in all environments: 'pad' (E, rows, cols, 3) or (E, points, 3),\n"
+           "shear, shear, normal force of each point [N]; 'pad.pressure' and 'pad.shear' parts of\n"
+           "it; 'pad.sum' (E, 6): force [N] and where it presses [m], body axes; 'pad.flow' the\n"
+           "shear over its largest length; 'pad.ideal' the field without imperfections;\n"
+           "'pad.markers' the displacement of markers [m], 'pad.surface' that of a layer's\n"
+           "surface [m]; 'pad.channels' (E, channels) what the hardware returns;\n"
+           "'pad.height' (E, H, W, 1) float32 the surface of a gel [m], 'pad.rgb' and\n"
+           "'pad.rgb_marker' (E, H, W, 3) uint8 pictures of it. `out`: an array to fill instead of "
+           "a new one.")
       .def("set_state", &PythonBatch::set_state, "q"_a, "v"_a, "envs"_a = nb::none(),
            "Sets states: `q` (n, nq) or (nq), `v` (n, nv) or (nv), of the environments listed in\n"
            "`envs` (indices, or a mask (E)), or of all. Releases a failed environment; drops the\n"
