@@ -289,7 +289,10 @@ std::string picture_fault(const TactileDescription& sensor) {
 std::string channels_fault(const TactileDescription& sensor) {
   const ChannelsDescription& of = *sensor.channels;
   if (of.map == nullptr) return "no map; expected one";
-  const bool grid = sensor.points.empty();
+  // A list may be the points of an array that were moved.
+  const bool grid =
+      sensor.points.empty() ||
+      std::ssize(sensor.points) == std::ptrdiff_t{sensor.array.rows} * sensor.array.cols;
   std::string fault =
       channel_map_fault(*of.map, grid ? sensor.array.rows : 0, grid ? sensor.array.cols : 0);
   if (fault.empty()) fault = value_fault(kChannels, of);

@@ -7,6 +7,7 @@
 
 #include "engine/base/error.hpp"
 #include "engine/model/compiled_model.hpp"
+#include "engine/model/lateral_spread.hpp"
 #include "engine/model/random_run.hpp"
 
 namespace tangere {
@@ -25,8 +26,8 @@ ChannelReading::ChannelReading(const Model& model, int sensor) {
   const SensorInfo& info = model.sensors()[std::size_t(sensor)];
   flaws_ = *d.channels;
   map_ = d.channels->map;
-  const bool grid = info.rows > 0;
-  weights_ = node_weights(*map_, grid ? info.rows : 1, grid ? info.cols : info.points);
+  weights_ = has_grid(d) ? node_weights(*map_, d.array.rows, d.array.cols)
+                         : node_weights(*map_, 1, info.points);
   pressure_sign_ = info.pressure_sign;
   name_bits_ = compiled(model).sensors[std::size_t(sensor)].name_bits;
 }
