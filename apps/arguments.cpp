@@ -195,6 +195,15 @@ void add_positive_number(CLI::App& command, const std::string& flags, std::optio
   command.add_option_function<std::string>(flags, read, description)->type_name("X");
 }
 
+void add_number(CLI::App& command, const std::string& flags, double& value,
+                const std::string& description) {
+  const auto read = [&value, name = long_name(flags)](const std::string& text) {
+    if (!parse(text, value) || !std::isfinite(value))
+      throw InputError(fmt::format("{} {}: expected a number", name, text));
+  };
+  command.add_option_function<std::string>(flags, read, description)->type_name("X");
+}
+
 void add_positive_numbers(CLI::App& command, const std::string& flags, std::vector<double>& values,
                           std::size_t count, const std::string& description) {
   const auto read = [&values, count, name = long_name(flags)](const std::string& text) {

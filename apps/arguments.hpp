@@ -80,6 +80,10 @@ void add_whole_numbers(CLI::App& command, const std::string& flags, std::vector<
 void add_positive_number(CLI::App& command, const std::string& flags, std::optional<double>& value,
                          const std::string& description);
 
+/// The same for one finite number of either sign.
+void add_number(CLI::App& command, const std::string& flags, double& value,
+                const std::string& description);
+
 /// The same for `count` positive finite numbers separated by commas, "0.01,0.02".
 void add_positive_numbers(CLI::App& command, const std::string& flags, std::vector<double>& values,
                           std::size_t count, const std::string& description);

@@ -327,7 +327,8 @@ Command add_bench(CLI::App& program) {
   add_text(
       app, "--record", o.record, "LIST",
       "Readings to take, separated by commas: a sensor's field (pad), pad.pressure, "
-      "pad.shear, pad.sum, pad.ideal, pad.markers, pad.surface, pad.flow, pad.height, "
+      "pad.shear, pad.sum, pad.ideal, pad.markers, pad.surface, pad.flow, "
+      "pad.channels, pad.height, "
       "pad.rgb or pad.rgb_marker, with times as in "
       "pad/10 or pad/final. q alone takes none. [default: the scene's <outputs>, else all fields]");
   add_whole_number<int>(app, "--repeat", o.repeat, 1, kMostPasses,

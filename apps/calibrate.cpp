@@ -8,6 +8,7 @@
 #include <filesystem>
 
 #include "apps/arguments.hpp"
+#include "apps/calibrate_channels.hpp"
 #include "apps/calibrate_pictures.hpp"
 #include "apps/calibrate_report.hpp"
 #include "apps/command.hpp"
@@ -26,19 +27,17 @@ constexpr double kUsualFriction = 0.6, kUsualShearShare = 0.4, kUsualRelaxation 
 constexpr int kMostKnots = 100;
 
 struct CalibrateArguments {
-  std::string recording, sensor, output, check, pictures;
+  std::string recording, sensor, output, check, pictures, channels, loads, unit;
   std::vector<std::string> numbers;
   Indenter indenter;
   std::optional<int> table;
   std::optional<double> hold_out, pixel;
+  std::vector<double> nodes;
+  double zero = 0;
   bool overwrite = false;
 };
 
-void check_arguments(const CalibrateArguments& a) {
-  if (a.recording.empty() || a.sensor.empty())
-    throw InputError(fmt::format("{} is missing; expected RECORDING and --sensor, or --pictures",
-                                 a.recording.empty() ? "RECORDING" : "--sensor"));
-  if (a.pixel) throw InputError("--pixel without --pictures; expected both");
+void check_indenter(const CalibrateArguments& a) {
   if (int(a.indenter.ball.has_value()) + int(a.indenter.flat.has_value()) +
           int(!a.indenter.box.empty()) !=
       1)
@@ -46,6 +45,43 @@ void check_arguments(const CalibrateArguments& a) {
   if (a.hold_out && *a.hold_out >= 1 && *a.hold_out != std::floor(*a.hold_out))
     throw InputError(fmt::format(
         "--hold-out {}; expected a number of rows, or a share of them below 1", *a.hold_out));
+}
+
+/// Refuses options of one kind of fit beside another.
+void refuse(const char* kind, const std::vector<std::pair<const char*, bool>>& options,
+            const char* expected) {
+  std::vector<std::string> others;
+  for (const auto& [name, given] : options)
+    if (given) others.emplace_back(name);
+  if (!others.empty())
+    throw InputError(fmt::format("{} {}; expected {}", fmt::join(others, ", "), kind, expected));
+}
+
+void check_arguments(const CalibrateArguments& a) {
+  refuse("without --channels",
+         {{"--nodes", !a.nodes.empty()},
+          {"--loads", !a.loads.empty()},
+          {"--unit", !a.unit.empty()},
+          {"--zero", a.zero != 0}},
+         "both");
+  if (a.recording.empty() || a.sensor.empty())
+    throw InputError(fmt::format("{} is missing; expected RECORDING and --sensor, or --pictures",
+                                 a.recording.empty() ? "RECORDING" : "--sensor"));
+  if (a.pixel) throw InputError("--pixel without --pictures; expected both");
+  check_indenter(a);
+}
+
+int run_channels(const CalibrateArguments& a, const Console& console) {
+  refuse("beside --channels",
+         {{"--pictures", !a.pictures.empty()},
+          {"--pixel", a.pixel.has_value()},
+          {"--table", a.table.has_value()},
+          {"--fit", !a.numbers.empty()}},
+         "a fit of the skin's numbers of its own, before");
+  check_indenter(a);
+  return run_calibrate_channels({a.recording, a.sensor, a.check, a.indenter, a.channels, a.output,
+                                 a.nodes, a.loads, a.unit, a.zero, a.hold_out, a.overwrite},
+                                console);
 }
 
 /// A layout, and what a fit changes in it.
@@ -193,6 +229,7 @@ void check_for_pictures(const CalibrateArguments& a) {
 }
 
 int run_calibrate(const CalibrateArguments& a, const Console& console) {
+  if (!a.channels.empty()) return run_channels(a, console);
   if (!a.pictures.empty()) {
     check_for_pictures(a);
     return run_calibrate_pictures({a.pictures, a.indenter.ball, a.pixel, a.output, a.overwrite},
@@ -240,9 +277,21 @@ Command add_calibrate(CLI::App& program) {
   add_text(app, "--pictures", a.pictures, "FOLDER",
            "Fit a camera gel to photographs of a ball that presses it: background.png, presses.csv "
            "(file, x_px, y_px, radius_px) and the files that it names; with --ball and --pixel");
+  add_text(app, "--channels", a.channels, "FILE.xml",
+           "Fit what the hardware returns to a table with columns channel_NAME, depth, and x and y "
+           "or shear; write the map from the sensor's field to the channels");
+  add_positive_numbers(app, "--nodes", a.nodes, 2,
+                       "With --channels: rows and columns of nodes whose loads channels follow "
+                       "[default: 3,3]");
+  add_text(app, "--loads", a.loads, "NAME",
+           "With --channels: of a node, pressure or force, with those along the skin [default: "
+           "force if the table has shear]");
+  add_text(app, "--unit", a.unit, "NAME", "With --channels: their unit [default: 1]");
+  add_number(app, "--zero", a.zero,
+             "With --channels: length that is added to every depth [m] [default: 0]");
   add_positive_number(app, "--pixel", a.pixel, "Side of a pixel of the photographs [m]");
   add_text(app, "-o,--output", a.output, "FILE.xml",
-           "Layout to write, with the fitted attributes; of --pictures the gel file");
+           "Layout to write, with the fitted attributes or channels; of --pictures the gel file");
   add_positive_number(app, "--ball", a.indenter.ball, "Radius of a ball that presses [m]");
   add_positive_number(app, "--flat", a.indenter.flat,
                       "Radius of a flat, round end that presses [m]");
@@ -254,10 +303,12 @@ Command add_calibrate(CLI::App& program) {
             "Fit this number and no others but those named so: modulus, kn or pressure (the "
             "table), zero (of the depth), relaxation, ks, mu, lag (of the force), slider (beside "
             "the skin) [default: all but the last two that the recording tells]");
-  add_positive_number(app, "--hold-out", a.hold_out,
-                      "Rows that are compared and not fitted: how many, or a share below 1");
+  add_positive_number(
+      app, "--hold-out", a.hold_out,
+      "Rows that are compared and not fitted: how many, or a share below 1 [default: "
+      "none; of --channels 0.2]");
   add_text(app, "--check", a.check, "OTHER.csv",
-           "Another recording, whose normal forces are compared with those of the fit");
+           "Another recording, whose normal forces or channels are compared with those of the fit");
   add_overwrite_option(app, a.overwrite);
   add_console_options(app, *console);
   return {&app, [=](const ProgramInfo&) { return run_calibrate(*arguments, *console); }};

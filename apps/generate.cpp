@@ -312,15 +312,16 @@ void add_storage_options(CLI::App& app, GenerateOptions& o) {
   add_text(app, "--record", o.record, "LIST",
            "Observations to store, separated by commas: q, v, variables, bodies or bodies.NAME, a "
            "sensor's field (pad), pad.pressure, pad.shear, pad.sum, pad.ideal, pad.markers, "
-           "pad.surface, pad.flow, pad.height, pad.rgb or pad.rgb_marker, a camera's eye.rgb, "
-           "eye.depth or eye.ids; pad/10 is every 10th step, q/final the end alone; of a task its "
+           "pad.surface, pad.flow, pad.channels, pad.height, pad.rgb or pad.rgb_marker, a camera's "
+           "eye.rgb, eye.depth or eye.ids; pad/10 is every 10th step, q/final the end alone; of a "
+           "task its "
            "observations [default: the scene's <outputs>, or all but bodies]");
   add_text(app, "--gradients", o.gradients, "KIND",
            "Derivatives beside the rows: none, return (of the task's, or of a scene's --loss) or "
            "jacobians (of each row's state by the row before); not with --sleep [default: none]");
   add_text(app, "--loss", o.loss, "NAME",
            "Loss of a scene, with --gradients return: final, path, tactile, shear, variables, "
-           "markers or pictures; fields count at rows");
+           "markers, pictures or channels; fields count at rows");
   add_memory_size(
       app, "--tape-memory", o.tape_memory,
       "With --gradients return: memory for the states that all threads keep; with less than all of "

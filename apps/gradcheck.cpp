@@ -244,11 +244,12 @@ Command add_gradcheck(CLI::App& program) {
   add_text(app, "SCENE", o.scene, "",
            "Scene file (XML), or the name of a task, whose return is then the loss")
       .required();
-  add_text(app, "--loss", o.loss, "NAME",
-           "Loss of a scene: final (half squares of the last state), path (of all velocities), "
-           "tactile or shear (of fields), markers (of their displacements), pictures (of gels with "
-           "a layer) or variables (of end effectors at the end) [default: tactile, or final "
-           "without a sensor]");
+  add_text(
+      app, "--loss", o.loss, "NAME",
+      "Loss of a scene: final (half squares of the last state), path (of all velocities), "
+      "tactile or shear (of fields), markers (of their displacements), channels, pictures (of "
+      "gels with a layer) or variables (of end effectors at the end) [default: tactile, or final "
+      "without a sensor]");
   add_steps_option(app, o.steps,
                    "For a scene: length of the rollout [default: as the controls, 100 at most]");
   add_whole_number<std::int64_t>(

@@ -118,7 +118,8 @@ Json sensors_json(const Model& model) {
                        {"points", s.points},
                        {"every", s.every},
                        {"pressure_sign", s.pressure_sign},
-                       {"markers", model.scene().sensors[k].markers.has_value()}});
+                       {"markers", model.scene().sensors[k].markers.has_value()},
+                       {"channels", s.channels}});
   }
   return sensors;
 }
@@ -220,6 +221,11 @@ std::string sensors_text(const Model& model) {
       text.pop_back();
       text += fmt::format(", pictures of {} x {} pixels, gel '{}'\n", s.picture[0], s.picture[1],
                           model.scene().sensors[k].picture->gel->name);
+    }
+    if (s.channels > 0) {
+      const ChannelMap& map = *model.scene().sensors[k].channels->map;
+      text.pop_back();
+      text += fmt::format(", {} channels in {}, map '{}'\n", s.channels, map.unit, map.name);
     }
   }
   return text;

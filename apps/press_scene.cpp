@@ -11,7 +11,7 @@ namespace tangere::apps {
 namespace {
 
 const std::vector<std::string> kLeftOut = {"imperfections", "markers", "feedback", "memory",
-                                           "every",         "feels",   "ignores"};
+                                           "every",         "feels",   "ignores",  "channels"};
 
 std::string shape_text(const Indenter& of) {
   constexpr double kLength = 0.1;

@@ -15,10 +15,10 @@
 namespace tangere::apps {
 
 void GradientArguments::add(CLI::App& app) {
-  add_text(
-      app, "--gradients", loss, "LOSS",
-      "For a scene: also write derivatives of a loss by controls, start and the scene's "
-      "numbers: final, path, tactile, shear, variables, markers or pictures; not with --sleep");
+  add_text(app, "--gradients", loss, "LOSS",
+           "For a scene: also write derivatives of a loss by controls, start and the scene's "
+           "numbers: final, path, tactile, shear, variables, markers, pictures or channels; not "
+           "with --sleep");
   add_flag(app, "--point-gradients", points,
            "With --gradients: also by place and coefficients of every tactile point");
   add_memory_size(app, "--tape-memory", tape_memory,

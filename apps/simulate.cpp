@@ -404,7 +404,8 @@ Command add_simulate(CLI::App& program) {
       "What to compute and store besides q, v, u and the solver's numbers, separated by "
       "commas: bodies or bodies.NAME, variables, memory (of friction), a sensor's field "
       "(pad), pad.pressure, pad.shear, pad.sum, pad.ideal, pad.markers, pad.surface, pad.flow, "
-      "pad.height, pad.rgb or pad.rgb_marker, a camera's eye.rgb, eye.depth or eye.ids; "
+      "pad.channels, pad.height, pad.rgb or pad.rgb_marker, a camera's eye.rgb, eye.depth or "
+      "eye.ids; "
       "pad/10 is every 10th step, q/final the end alone [default: the scene's <outputs>, else "
       "bodies, "
       "variables and all fields]");

@@ -10,10 +10,10 @@
 namespace tangere {
 namespace {
 
-/// Newton iterations before relaxation takes over. Two to four are usual.
-constexpr int kMostSystems = 30;
-constexpr int kMostSweeps = 2000;
 constexpr double kRounding = 1e-13;  ///< relative, of depths and of a sweep's largest change
+constexpr double kEnough = 1e-9;     ///< relative, of the last sweep's largest change
+constexpr int kMostWarm = 3;         ///< systems from the last solution
+constexpr double kClear = 1e-10;     ///< relative, of what presses or does not, beyond rounding
 
 }  // namespace
 
@@ -74,12 +74,19 @@ void GelLayer::set_up() {
       mean_[cell(s)] += depth_[static_cast<std::size_t>(s)];
   for (const int i : pressing_)
     mean_[static_cast<std::size_t>(i)] /= count_[static_cast<std::size_t>(i)];
-  factor();
+  bool same = factored_.size() == 2 * pressing_.size();
+  for (std::size_t a = 0; a < pressing_.size() && same; ++a)
+    same = factored_[2 * a] == pressing_[a] &&
+           factored_[2 * a + 1] == count_[static_cast<std::size_t>(pressing_[a])];
+  if (!same) factor();
 }
 
 /// Factors M of the pressing cells, right-looking: rows are added to rows.
 void GelLayer::factor() {
   const std::size_t n = pressing_.size();
+  factored_.clear();
+  for (const int i : pressing_)
+    factored_.push_back(i), factored_.push_back(count_[static_cast<std::size_t>(i)]);
   factor_.resize(n * n);
   for (std::size_t a = 0; a < n; ++a) {
     double* const u = &factor_[a * n];
@@ -140,12 +147,20 @@ double GelLayer::relaxed(int i) {
   return low;
 }
 
+/// Writes the solution in rhs_ to its cells, and 0 to the other near ones.
+void GelLayer::put_solution(std::vector<double>& cells) const {
+  for (const int i : near_) cells[static_cast<std::size_t>(i)] = 0;
+  for (std::size_t a = 0; a < rhs_.size(); ++a)
+    cells[static_cast<std::size_t>(pressing_[a])] = rhs_[a];
+}
+
 /// Changes one cell after the other until nothing changes. The energy is convex, so this ends where
-/// Newton's method may cycle.
-void GelLayer::relax() {
+/// Newton's method may cycle. Returns whether the last change was small enough.
+bool GelLayer::relax() {
   std::fill(load_.begin(), load_.end(), 0.0);
-  for (int sweep = 0; sweep < kMostSweeps; ++sweep) {
-    double change = 0, most = 0;
+  double change = HUGE_VAL, most = 0;
+  for (int sweep = 0; sweep < layer_->most_sweeps; ++sweep) {
+    change = most = 0;
     for (const int i : near_) {
       couple(near_, load_, {i}, yield_);
       const double now = relaxed(i);
@@ -156,6 +171,7 @@ void GelLayer::relax() {
     if (change <= kRounding * most) break;
   }
   couple(near_, load_, near_, yield_);
+  return change <= kEnough * most;
 }
 
 /// Sets r, R and p from P and w.
@@ -184,11 +200,9 @@ std::vector<double> GelLayer::loads() const {
   return out;
 }
 
-void GelLayer::solve(const CompiledLayer& layer, std::span<const double> depth, double modulus) {
-  layer_ = &layer;
-  modulus_ = modulus;
-  stiffness_ = 1 / layer.compliance.own;
-  const auto cells = static_cast<std::size_t>(layer.grid.cells());
+/// Lists the points that may press, and cells that they are in; of a reading also near.
+void GelLayer::find_touching(std::span<const double> depth) {
+  const auto cells = static_cast<std::size_t>(layer_->grid.cells());
   depth_.assign(depth.begin(), depth.end());
   presses_.assign(depth.size(), 0);
   count_.assign(cells, 0);
@@ -198,32 +212,103 @@ void GelLayer::solve(const CompiledLayer& layer, std::span<const double> depth, 
   std::vector<double>& marks = sum_;
   double most = 0;
   for (std::size_t s = 0; s < depth.size(); ++s) {
-    if (!(depth[s] > least_depth(layer))) continue;
+    if (!(depth[s] > least_depth(*layer_))) continue;
     touching_.push_back(static_cast<int>(s));
     most = std::max(most, depth[s]);
     marks[cell(static_cast<int>(s))] = 1;
-    for (const int i : layer.weights[s].cell) marks[static_cast<std::size_t>(i)] = 1;
+    if (layer_->feedback) continue;
+    for (const int i : layer_->weights[s].cell) marks[static_cast<std::size_t>(i)] = 1;
   }
   for (std::size_t i = 0; i < cells; ++i)
     if (marks[i] > 0) near_.push_back(static_cast<int>(i));
   rounding_ = kRounding * most;
-  bool changed = update_pressing();
-  for (systems_ = 0; changed && systems_ < kMostSystems; ++systems_) {
-    set_up();
-    rhs_.clear();
-    for (const int i : pressing_) rhs_.push_back(mean_[static_cast<std::size_t>(i)]);
-    solve_system();
-    for (const int i : near_) load_[static_cast<std::size_t>(i)] = 0;
-    for (std::size_t a = 0; a < rhs_.size(); ++a)
-      load_[static_cast<std::size_t>(pressing_[a])] = rhs_[a];
-    couple(pressing_, load_, near_, yield_);
+}
+
+/// Computes P and w where the present points press.
+void GelLayer::solve_pressing() {
+  ++systems_;
+  set_up();
+  rhs_.clear();
+  for (const int i : pressing_) rhs_.push_back(mean_[static_cast<std::size_t>(i)]);
+  solve_system();
+  put_solution(load_);
+  if (!layer_->feedback) return couple(pressing_, load_, near_, yield_);
+  // On pressing cells w = δ̄ - P m²/(k n), which costs no product.
+  const double whole = layer_->side * layer_->side * layer_->compliance.own;
+  idle_.clear();
+  for (const int i : near_)
+    if (count_[static_cast<std::size_t>(i)] == 0) idle_.push_back(i);
+  couple(pressing_, load_, idle_, yield_);
+  for (const int i : pressing_) {
+    const auto at = static_cast<std::size_t>(i);
+    yield_[at] = mean_[at] - whole / count_[at] * load_[at];
+  }
+}
+
+/// Whether every point presses, or does not, by more than rounding. Then no other set of points
+/// solves the layer.
+bool GelLayer::is_clear() const {
+  return std::ranges::none_of(touching_, [&](int s) {
+    const double excess = depth_[static_cast<std::size_t>(s)] - yield_[cell(s)];
+    return std::abs(excess) <= kClear / kRounding * rounding_;
+  });
+}
+
+/// Begins with the points of the last solution. Returns false where the result is not the only one.
+bool GelLayer::solve_warm() {
+  bool any = false;
+  for (const int s : last_pressing_) {
+    if (!(depth_[static_cast<std::size_t>(s)] > least_depth(*layer_))) continue;
+    presses_[static_cast<std::size_t>(s)] = 1;
+    ++count_[cell(s)];
+    any = true;
+  }
+  bool changed = any;
+  for (int k = 0; changed && k < kMostWarm; ++k) {
+    solve_pressing();
     changed = update_pressing();
   }
-  if (changed) {
-    relax();
-    static_cast<void>(update_pressing());
-    set_up();
+  if (any && !changed && is_clear()) return true;
+  std::fill(presses_.begin(), presses_.end(), 0);
+  for (const int i : near_) {
+    const auto at = static_cast<std::size_t>(i);
+    count_[at] = 0, load_[at] = yield_[at] = 0;
   }
+  pressing_.clear();
+  return false;
+}
+
+void GelLayer::solve_cold() {
+  bool changed = update_pressing();
+  for (int k = 0; changed && k < layer_->most_systems; ++k) {
+    solve_pressing();
+    changed = update_pressing();
+  }
+  if (!changed) return;
+  solved_ = relax();
+  static_cast<void>(update_pressing());
+  if (!solved_) return set_up();
+  // The bits of a solution do not depend on the way to it, if it is clear what presses.
+  solve_pressing();
+  if (!update_pressing()) return;
+  solved_ = relax();
+  static_cast<void>(update_pressing());
+  set_up();
+}
+
+void GelLayer::solve(const CompiledLayer& layer, std::span<const double> depth, double modulus) {
+  if (layer.number == 0 || number_ != layer.number) last_pressing_.clear(), factored_.clear();
+  layer_ = &layer;
+  number_ = layer.number;
+  modulus_ = modulus;
+  stiffness_ = 1 / layer.compliance.own;
+  solved_ = true;
+  systems_ = 0;
+  find_touching(depth);
+  if (layer.most_systems == 0 || last_pressing_.empty() || !solve_warm()) solve_cold();
+  last_pressing_.clear();
+  for (const int s : touching_)
+    if (presses_[static_cast<std::size_t>(s)] != 0) last_pressing_.push_back(s);
   share_loads();
 }
 
@@ -259,8 +344,7 @@ void GelLayer::pull_back(std::span<const double> pressure_bar, std::span<double>
     rhs_.push_back(sum);
   }
   solve_system();
-  for (std::size_t a = 0; a < rhs_.size(); ++a)
-    load_bar_[static_cast<std::size_t>(pressing_[a])] = rhs_[a];  // λ
+  put_solution(load_bar_);  // λ
   for (const int s : touching_) {
     const std::size_t i = cell(s), at = static_cast<std::size_t>(s);
     if (presses_[at] != 0) depth_bar[at] += load_bar_[i] / count_[i];
@@ -278,9 +362,7 @@ void GelLayer::push_forward(std::span<const double> depth_dot, std::span<double>
   rhs_.clear();
   for (const int i : pressing_) rhs_.push_back(load_dot[static_cast<std::size_t>(i)]);
   solve_system();
-  for (const int i : near_) load_dot[static_cast<std::size_t>(i)] = 0;
-  for (std::size_t a = 0; a < rhs_.size(); ++a)
-    load_dot[static_cast<std::size_t>(pressing_[a])] = rhs_[a];
+  put_solution(load_dot);
   couple(pressing_, load_dot, near_, yield_dot);
   std::vector<double> left_dot(layer_->feedback ? 0 : depth_.size()),
       sum_dot(layer_->feedback ? 0 : sum_.size());

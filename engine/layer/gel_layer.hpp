@@ -28,11 +28,13 @@ namespace tangere {
 inline double least_depth(const CompiledLayer& layer) { return layer.feedback ? -HUGE_VAL : 0; }
 
 /// Solves one sensor's layer at a time. Owns the scratch of one thread, which grows with the number
-/// of cells in contact.
+/// of cells in contact. A solution begins with the points that pressed in the last one, and uses
+/// its factor again where they are the same; its bits depend on the depths alone.
 class GelLayer {
  public:
   /// Solves the layer for depths δ, (points) [m], with E = `modulus` [Pa]. Points with
-  /// δ ≤ least_depth() do not press. The functions below refer to this solution.
+  /// δ ≤ least_depth() do not press. The functions below refer to this solution, which is exact but
+  /// for rounding where solved().
   void solve(const CompiledLayer& layer, std::span<const double> depth, double modulus);
 
   /// p, (points) [Pa]; 0 where a point does not press.
@@ -41,6 +43,9 @@ class GelLayer {
   [[nodiscard]] std::vector<double> loads() const;
   /// Linear systems that solve() needed.
   [[nodiscard]] int systems() const { return systems_; }
+  /// Whether the pressures were found. Two to four systems usually give them; where Newton's method
+  /// cycles, relaxation does, up to a limit (CompiledLayer).
+  [[nodiscard]] bool solved() const { return solved_; }
 
   /// Computes the cotangent of the depths, (points), from that of the pressures. Which points press
   /// stays fixed. p is proportional to E.
@@ -54,12 +59,18 @@ class GelLayer {
 
  private:
   bool update_pressing();
+  void find_touching(std::span<const double> depth);
+  [[nodiscard]] bool solve_warm();
+  void solve_cold();
+  void solve_pressing();
   void set_up();
   void factor();
   void solve_system();
   void couple(const std::vector<int>& from, const std::vector<double>& x,
               const std::vector<int>& to, std::vector<double>& out) const;
-  void relax();
+  [[nodiscard]] bool relax();
+  [[nodiscard]] bool is_clear() const;
+  void put_solution(std::vector<double>& cells) const;
   void share_loads();
   [[nodiscard]] double relaxed(int cell);
   [[nodiscard]] double coupling(int i, int j) const;
@@ -67,19 +78,24 @@ class GelLayer {
   [[nodiscard]] std::size_t cell(int point) const;
 
   const CompiledLayer* layer_ = nullptr;
+  std::uint64_t number_ = 0;                     ///< of the layer of the last solution
   double stiffness_ = 0;                         ///< k at E = 1 [1/m]
   double modulus_ = 0;                           ///< E [Pa]
   double rounding_ = 0;                          ///< differences of depths that are rounding [m]
   std::vector<int> touching_;                    ///< points with δ > least_depth()
   std::vector<double> depth_, left_, pressure_;  ///< (points) δ, r, p
   std::vector<char> presses_;                    ///< (points) δ_s > w_i
+  std::vector<int> last_pressing_;               ///< points that pressed in the last solution
   std::vector<int> near_, pressing_;  ///< cells that touching points are in or near; with n_i > 0
+  std::vector<int> idle_;             ///< near ones with n_i = 0
   std::vector<int> count_;            ///< (cells) n_i
   std::vector<double> mean_, load_, yield_, sum_;  ///< (cells) δ̄, P at E = 1, w, R
   std::vector<double> load_bar_, yield_bar_;       ///< (cells) cotangents, or tangents
   std::vector<double> factor_, rhs_;  ///< (pressing, pressing) U with M = Uᵀ U; (pressing)
+  std::vector<int> factored_;         ///< cells of the factor, each before its n_i
   std::vector<Directions> mean_dot_, cell_dot_;  ///< (cells); (pressing)
   int systems_ = 0;
+  bool solved_ = true;
 };
 
 }  // namespace tangere

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Forces are summed in pad axes at the pad's origin.
+// Forces are summed in pad axes at the pad's origin. What runs for every point is inlined whole
+// (flatten): compilers leave the small operations of vectors apart in units of this size, which
+// takes a third of the time.
 #include "engine/layer/layer_contact.hpp"
 
 #include <algorithm>
@@ -53,6 +55,25 @@ double component(const Vec6<double>& x, int k) {
   return all[k];
 }
 
+/// Adds factor · w dᵀ.
+void add_outer(const Vec6<double>& w, double factor, const GelLayer::Directions& d,
+               std::array<GelLayer::Directions, 6>& rows) {
+  const double scaled[] = {factor * w.a.x, factor * w.a.y, factor * w.a.z,
+                           factor * w.l.x, factor * w.l.y, factor * w.l.z};
+  for (std::size_t r = 0; r < rows.size(); ++r)
+    for (std::size_t k = 0; k < d.size(); ++k) rows[r][k] += scaled[r] * d[k];
+}
+
+/// Adds the wrench of a force at x that changes by M, along three directions from `first` on.
+void add_force(const Mat3<double>& m, const Vec3<double>& x, std::size_t first,
+               std::array<GelLayer::Directions, 6>& rows) {
+  for (std::size_t k = 0; k < 3; ++k) {
+    const Vec3<double> f = {m.m[0][k], m.m[1][k], m.m[2][k]}, moment = cross(x, f);
+    rows[0][first + k] += moment.x, rows[1][first + k] += moment.y, rows[2][first + k] += moment.z;
+    rows[3][first + k] += f.x, rows[4][first + k] += f.y, rows[5][first + k] += f.z;
+  }
+}
+
 void set_column(Slopes& to, int k, const Vec3<double>& x) {
   Mat3<double>& of = k < 3 ? to.turn : to.shift;
   of.m[0][k % 3] = x.x, of.m[1][k % 3] = x.y, of.m[2][k % 3] = x.z;
@@ -60,8 +81,10 @@ void set_column(Slopes& to, int k, const Vec3<double>& x) {
 
 }  // namespace
 
-void LayerContact::begin(const LayerPad& pad) {
+void LayerContact::begin(const LayerPad& pad, std::size_t slot) {
   pad_ = &pad;
+  at_ = slot;
+  if (layers_.size() <= slot) layers_.resize(slot + 1);
   for (const Point& p : points_) slot_[static_cast<std::size_t>(p.index)] = -1;
   slot_.resize(pad.in_field.size(), -1);
   shapes_.clear(), bodies_.clear(), points_.clear();
@@ -70,6 +93,7 @@ void LayerContact::begin(const LayerPad& pad) {
 void LayerContact::add_body(const LayerShape& shape, const LayerBody<double>& body) {
   shapes_.push_back(shape);
   bodies_.push_back(body);
+  down_ = down_in_shape(body.touch, pad_->layer->outward);
 }
 
 /// Calls f with the shape of a body at its size.
@@ -90,21 +114,21 @@ LayerForce<D> LayerContact::force(const Point& p, const LayerBody<D>& body,
   return out;
 }
 
-void LayerContact::add_point(int candidate, int index, const Vec3<double>& place,
-                             const Anchor<double>& anchor) {
+[[gnu::flatten]] void LayerContact::add_point(int candidate, int index, const Vec3<double>& place,
+                                              const Anchor<double>& anchor) {
   const LayerBody<double>& body = bodies_.back();
   const kernels::Frame<double>& frame = pad_->frame;
   Vec3<double> xi = transposed_times(frame.R, place - frame.p);
   xi.z = 0;  // but for rounding
   const int number = static_cast<int>(shapes_.size()) - 1;
-  std::optional<KnownDepth> known;
-  LayerDepth<double> at{};
+  std::optional<DepthOfContact> found;
   with_shape<double>(number, body.size, [&](const auto& shape) {
-    known = find_depth(shape, body.touch, xi, *pad_->layer);
-    if (known) at = layer_depth(shape, body.touch, xi, *pad_->layer, *known);
+    found = contact_depth(shape, body.touch, xi, *pad_->layer, down_);
   });
-  if (!known || !(at.depth > -pad_->layer->bulge()) || !std::isfinite(at.depth)) return;
-  const Point p{index, number, candidate, xi, *known, in_pad(anchor), {at, {0, 0, 0}, 0}};
+  if (!found || !(found->at.depth > -pad_->layer->bulge()) || !std::isfinite(found->at.depth))
+    return;
+  const Point p{
+      index, number, candidate, xi, found->known, in_pad(anchor), {found->at, {0, 0, 0}, 0}};
   int& slot = slot_[static_cast<std::size_t>(index)];
   if (slot < 0) {
     slot = static_cast<int>(points_.size());
@@ -118,7 +142,7 @@ void LayerContact::add_point(int candidate, int index, const Vec3<double>& place
 void LayerContact::solve() {
   depth_.assign(slot_.size(), least_depth(*pad_->layer));
   for (const Point& p : points_) depth_[static_cast<std::size_t>(p.index)] = p.force.at.depth;
-  layer_.solve(*pad_->layer, depth_, pad_->layer->modulus / pad_->layer->stiffness);
+  layer().solve(*pad_->layer, depth_, pad_->layer->modulus / pad_->layer->stiffness);
   for (Point& p : points_) {
     if (!(load(p) > 0)) continue;
     const auto number = static_cast<std::size_t>(p.body);
@@ -130,7 +154,7 @@ void LayerContact::solve() {
 
 double LayerContact::load(const Point& p) const {
   return bodies_[static_cast<std::size_t>(p.body)].touch.law.kn * pad_->layer->area *
-         layer_.pressure()[static_cast<std::size_t>(p.index)];
+         layer().pressure()[static_cast<std::size_t>(p.index)];
 }
 
 /// min(P, a k depth), where k is that of a point on the layer.
@@ -173,7 +197,7 @@ Vec6<double> LayerContact::change_in_pad(std::span<const LayerBody<D>> bodies,
                         anchors.empty() ? dual(p.anchor) : anchors[i]);
     depth_dot_[static_cast<std::size_t>(p.index)] = changes_[i].at.depth.epsilon;
   }
-  layer_.push_forward(depth_dot_, load_dot_);
+  layer().push_forward(depth_dot_, load_dot_);
   Vec6<double> sum = kernels::zero6<double>();
   for (std::size_t i = 0; i < points_.size(); ++i) {
     const Point& p = points_[i];
@@ -200,7 +224,7 @@ Vec6<double> LayerContact::change(std::span<const LayerBody<D>> bodies,
 }
 
 /// Slopes at a point, outside of the shape by dual numbers.
-LayerSlopes LayerContact::slopes(const Point& p) const {
+[[gnu::flatten]] LayerSlopes LayerContact::slopes(const Point& p) const {
   const auto number = static_cast<std::size_t>(p.body);
   const LayerShape& of = shapes_[number];
   const LayerBody<double>& body = bodies_[number];
@@ -223,7 +247,7 @@ LayerSlopes LayerContact::slopes(const Point& p) const {
 }
 
 /// Computes the derivatives of w by displacement and twist, (12) in pad axes.
-std::array<Vec6<double>, 12> LayerContact::columns_in_pad() {
+[[gnu::flatten]] std::array<Vec6<double>, 12> LayerContact::columns_in_pad() {
   depth_slopes_.resize(depth_.size());
   load_slopes_.resize(depth_.size());
   slopes_.resize(points_.size());
@@ -237,9 +261,9 @@ std::array<Vec6<double>, 12> LayerContact::columns_in_pad() {
       depth[std::size_t(k + 6)] = component(slopes_[i].depth_by_twist, k);
     }
   }
-  layer_.push_forward(depth_slopes_, load_slopes_);
-  std::array<Vec6<double>, 12> out;
-  out.fill(kernels::zero6<double>());
+  layer().push_forward(depth_slopes_, load_slopes_);
+  // Rows of w, each along the 12 directions.
+  std::array<GelLayer::Directions, 6> rows{};
   for (std::size_t i = 0; i < points_.size(); ++i) {
     const Point& p = points_[i];
     const double P = load(p), F = friction_load(p), slope = F > 0 ? point_stiffness(p) : 0,
@@ -248,19 +272,27 @@ std::array<Vec6<double>, 12> LayerContact::columns_in_pad() {
     if (!(P > 0)) continue;
     const auto at = static_cast<std::size_t>(p.index);
     const LayerForce<double>& force = p.force;
-    const Vec3<double> f = P * force.at.slant + F * force.friction;
-    for (int k = 0; k < 12; ++k) {
-      const bool twists = k >= 6;
-      const double P_dot = per_load * load_slopes_[at][std::size_t(k)],
-                   F_dot = F < P ? slope * depth_slopes_[at][std::size_t(k)] : P_dot;
-      const Slopes& friction = twists ? slopes_[i].friction_by_twist : slopes_[i].friction;
-      Vec3<double> f_dot =
-          P_dot * force.at.slant + F_dot * force.friction + F * column(friction, k % 6);
-      if (!twists) f_dot += P * column(slopes_[i].slant, k);
-      out[std::size_t(k)] += {cross(force.at.place, f_dot), f_dot};
-      if (!twists) out[std::size_t(k)].a += cross(column(slopes_[i].place, k), f);
-    }
+    const Vec3<double>&x = force.at.place, f = P * force.at.slant + F * force.friction,
+          loaded = force.at.slant + (F < P ? 0.0 : 1.0) * force.friction;
+    // Loads and friction change, while slants stay.
+    add_outer({cross(x, loaded), loaded}, per_load, load_slopes_[at], rows);
+    if (F < P)
+      add_outer({cross(x, force.friction), force.friction}, slope, depth_slopes_[at], rows);
+    const LayerSlopes& by = slopes_[i];
+    const Slopes turned = P * by.slant + F * by.friction;
+    add_force(turned.turn, x, 0, rows), add_force(turned.shift, x, 3, rows);
+    add_force(F * by.friction_by_twist.turn, x, 6, rows);
+    add_force(F * by.friction_by_twist.shift, x, 9, rows);
+    if (p.known.by == DepthBy::underside)
+      for (int k = 0; k < 6; ++k) {
+        const Vec3<double> moment = cross(column(by.place, k), f);
+        rows[0][std::size_t(k)] += moment.x, rows[1][std::size_t(k)] += moment.y,
+            rows[2][std::size_t(k)] += moment.z;
+      }
   }
+  std::array<Vec6<double>, 12> out;
+  for (std::size_t k = 0; k < out.size(); ++k)
+    out[k] = {{rows[0][k], rows[1][k], rows[2][k]}, {rows[3][k], rows[4][k], rows[5][k]}};
   return out;
 }
 

@@ -42,8 +42,9 @@ class LayerContact {
     LayerForce<double> force;
   };
 
-  /// Begins a contact without bodies.
-  void begin(const LayerPad& pad);
+  /// Begins a contact without bodies. The solver of a slot begins where it was last: contacts that
+  /// change little from one call to the next have slots of their own. Results do not depend on it.
+  void begin(const LayerPad& pad, std::size_t slot = 0);
   void add_body(const LayerShape& shape, const LayerBody<double>& body);
   /// Adds a point of the last body at `place`, the pad's link's axes, if the body touches it. Where
   /// two bodies are at a point, the deeper one counts. `anchor`: b in the link's axes.
@@ -51,6 +52,8 @@ class LayerContact {
                  const kernels::Anchor<double>& anchor);
   /// Solves the layer.
   void solve();
+  /// Whether the layer's pressures were found.
+  [[nodiscard]] bool solved() const { return layer().solved(); }
 
   [[nodiscard]] const std::vector<Point>& points() const { return points_; }
   [[nodiscard]] const std::vector<LayerBody<double>>& bodies() const { return bodies_; }
@@ -81,6 +84,8 @@ class LayerContact {
   [[nodiscard]] std::vector<LayerBody<D>> still_bodies() const;
 
  private:
+  [[nodiscard]] GelLayer& layer() { return layers_[at_]; }
+  [[nodiscard]] const GelLayer& layer() const { return layers_[at_]; }
   [[nodiscard]] double point_stiffness(const Point& p) const;
   [[nodiscard]] LayerSlopes slopes(const Point& p) const;
   [[nodiscard]] std::array<kernels::Vec6<double>, 12> columns_in_pad();
@@ -94,6 +99,7 @@ class LayerContact {
   const LayerPad* pad_ = nullptr;
   std::vector<LayerShape> shapes_;
   std::vector<LayerBody<double>> bodies_;
+  kernels::Vec3<double> down_{};  // into the pad, axes of the last body's shape
   std::vector<Point> points_;
   std::vector<int> slot_;                     // (points) number in points_, or -1
   std::vector<double> depth_;                 // (points)
@@ -101,7 +107,8 @@ class LayerContact {
   std::vector<LayerForce<D>> changes_;        // parallel to points_
   std::vector<LayerSlopes> slopes_;           // the same
   std::vector<GelLayer::Directions> depth_slopes_, load_slopes_;  // (points)
-  GelLayer layer_;
+  std::vector<GelLayer> layers_;                                  // by slot
+  std::size_t at_ = 0;                                            // the present slot
 };
 
 }  // namespace tangere

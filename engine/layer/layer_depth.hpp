@@ -99,22 +99,49 @@ N relaxation_at(const CompiledLayer& layer, const N& depth) {
   return share < N(0.0) ? N(0.0) : share < N(1.0) ? whole * share : whole;
 }
 
-/// Returns min(δ, -c d(ξ)) of a point inside a convex shape: the distance is convex along the
-/// normal, so Newton's method descends to its root from below the shape.
+/// A depth of a contact, and the distance with its gradient where it ends, shape axes.
+struct ContactDepth {
+  KnownDepth known;
+  kernels::Distance<double> found;
+};
+
+/// Finds δ of a point ξ = `start` of a layer that is the contact, with -o = `down`, both in the
+/// axes of a convex shape; none where the point is farther than the bulge. The distance is convex
+/// along the normal. So the root of its tangent at ξ is below the shape's underside, and Newton's
+/// method descends to the underside from there.
 template <class Shape>
-KnownDepth find_contact_depth(const Shape& shape, const kernels::Touch<double>& t,
-                              const kernels::Vec3<double>& xi, double outward, double inside) {
-  const double most = kSteepest * inside;
-  double depth = most;
+std::optional<ContactDepth> find_contact_depth(const Shape& shape,
+                                               const kernels::Vec3<double>& start,
+                                               const kernels::Vec3<double>& down, double bulge) {
+  const kernels::Distance<double> at = distance_at(shape, start);
+  if (!(at.d < 0)) {
+    if (!(at.d < bulge)) return std::nullopt;
+    return ContactDepth{{-at.d, DepthBy::gap}, at};
+  }
+  const double most = -kSteepest * at.d, slope = dot(at.n, down);
+  double depth = slope * most > -at.d ? -at.d / slope : most;
+  kernels::Distance<double> found = at;
   for (int step = 0; step < 50; ++step) {
-    const kernels::Distance<double> found =
-        distance_in_pad(shape, t, {xi.x, xi.y, xi.z - outward * depth});
-    if (depth == most && found.d < 0) return {most, DepthBy::side};
-    const double next = depth - found.d / (-outward * found.n.z);
+    found = distance_at(shape, start + depth * down);
+    if (depth == most && found.d < 0) return ContactDepth{{most, DepthBy::side}, at};
+    if (step == 0 && found.d < -kClose * depth) {  // a distance that is not quite convex
+      depth = most;
+      continue;
+    }
+    const double next = depth - found.d / dot(found.n, down);
     if (std::abs(found.d) <= kClose * depth || !(next < depth && next > 0)) break;
     depth = next;
   }
-  return {depth, DepthBy::underside};
+  return ContactDepth{{depth, DepthBy::underside}, found};
+}
+
+/// Returns a place of the pad in the axes of a shape, and the direction into the pad.
+inline kernels::Vec3<double> in_shape(const kernels::Touch<double>& t,
+                                      const kernels::Vec3<double>& place) {
+  return transposed_times(t.Q, place - t.c);
+}
+inline kernels::Vec3<double> down_in_shape(const kernels::Touch<double>& t, double outward) {
+  return transposed_times(t.Q, kernels::Vec3<double>{0, 0, -outward});
 }
 
 /// Finds δ of a point; none where the point is outside the shape, or farther than the bulge. The
@@ -123,9 +150,9 @@ template <class Shape>
 std::optional<KnownDepth> find_depth(const Shape& shape, const kernels::Touch<double>& t,
                                      const kernels::Vec3<double>& xi, const CompiledLayer& layer) {
   if (layer.feedback) {
-    const double d = distance_in_pad(shape, t, xi).d;
-    if (d < 0) return find_contact_depth(shape, t, xi, layer.outward, -d);
-    return d < layer.bulge() ? std::optional(KnownDepth{-d, DepthBy::gap}) : std::nullopt;
+    const auto found =
+        find_contact_depth(shape, in_shape(t, xi), down_in_shape(t, layer.outward), layer.bulge());
+    return found ? std::optional(found->known) : std::nullopt;
   }
   const auto found = find_underside(shape, t, xi, layer.outward, layer.deepest);
   if (!found) return std::nullopt;
@@ -177,6 +204,38 @@ LayerDepth<N> layer_depth(const Shape& shape, const kernels::Touch<N>& t,
     depth = out.depth;
   }
   out.depth = depth + relaxation_at(layer, depth) * dot(out.slant, t.v + cross(t.omega, out.place));
+  return out;
+}
+
+/// Depth and slant of a point of a contact, and by which surface.
+struct DepthOfContact {
+  KnownDepth known;
+  LayerDepth<double> at;
+};
+
+/// Finds δ of a point of a contact, and depth and slant there, as find_depth() and layer_depth() do
+/// one after the other. `down`: of down_in_shape().
+template <class Shape>
+std::optional<DepthOfContact> contact_depth(const Shape& shape, const kernels::Touch<double>& t,
+                                            const kernels::Vec3<double>& xi,
+                                            const CompiledLayer& layer,
+                                            const kernels::Vec3<double>& down) {
+  const kernels::Vec3<double> start = in_shape(t, xi);
+  std::optional<ContactDepth> found = find_contact_depth(shape, start, down, layer.bulge());
+  if (!found) return std::nullopt;
+  DepthOfContact out{found->known, {}};
+  double depth = found->known.depth, scale = found->known.by == DepthBy::side ? kSteepest : 1;
+  if (found->known.by == DepthBy::underside) {
+    depth -= found->found.d / dot(found->found.n, down);
+    found->found = distance_at(shape, start + depth * down);
+    scale = 1 / dot(found->found.n, down);
+    out.at.place = {xi.x, xi.y, xi.z - layer.outward * depth};
+  } else {
+    out.at.place = xi;
+  }
+  out.at.slant = scale * (t.Q * found->found.n);
+  out.at.depth =
+      depth + relaxation_at(layer, depth) * dot(out.at.slant, t.v + cross(t.omega, out.at.place));
   return out;
 }
 

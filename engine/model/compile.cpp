@@ -333,11 +333,6 @@ class Compiler {
     }
   }
 
-  /// Throws InputError for markers that cannot be computed.
-  static void check_markers(const TactileDescription& d, int pressure_sign) {
-    static_cast<void>(compile_markers(d, pressure_sign));
-  }
-
   /// Throws InputError where the surface of a layer is read and cannot be computed.
   void check_surface(const TactileDescription& d) const {
     SceneNumber kn = first_number(d);
@@ -363,8 +358,9 @@ class Compiler {
       compile_imperfections(d, m_.scene.timestep, sensor, info);
       if (d.layer) sensor.layer = compile_sensor_layer(d, sensor, info.pressure_sign);
       if (d.table) sensor.layer = compile_pressure_table(d, sensor, info.pressure_sign);
-      if (d.markers) check_markers(d, info.pressure_sign);
+      if (d.markers) static_cast<void>(compile_markers(d, info.pressure_sign));  // checks them
       if (d.picture) info.picture = {d.picture->rows, d.picture->cols};
+      if (d.channels) info.channels = static_cast<int>(d.channels->map->channels());
       if (d.markers || d.picture) check_surface(d);
       m_.layout.past_states = std::max(m_.layout.past_states, info.past_states);
       sensor.parameters = constants(d.coefficients);
@@ -393,6 +389,7 @@ class Compiler {
     for (const CompiledSensor& sensor : m_.sensors) {
       if (!sensor.layer || !sensor.layer->feedback) continue;
       const std::string& name = m_.scene.sensors[std::size_t(sensor.number)].name;
+      check_layer_contacts(m_, sensor);
       for (std::size_t k = 0; k < m_.pairs.size(); ++k)
         if (m_.scene.pair_contacts[k].sensor == name)
           m_.pairs[k].layer_pad = static_cast<int>(m_.layer_pads.size()),

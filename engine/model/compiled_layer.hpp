@@ -3,6 +3,7 @@
 // (docs/layer.md) or a table (docs/table.md).
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <vector>
 
@@ -17,7 +18,12 @@ struct CompiledLayer {
   /// set. None: the layer below.
   std::optional<MonotoneCubic> table{};
   LayerGrid grid{};
+  /// Different for each compiled layer, so that a solver tells whether it still has the factor of
+  /// this one. 0: a layer that was not compiled, of which nothing is used again.
+  std::uint64_t number = 0;
   int side = 1;                      ///< points along the side of a cell
+  int most_systems = 30;             ///< of Newton's method before relaxation takes over
+  int most_sweeps = 2000;            ///< of relaxation before the layer counts as unsolved
   std::vector<int> cell_of_point;    ///< (points) row-major
   std::vector<CellWeights> weights;  ///< (points) row-major
   LayerCompliance compliance;

@@ -24,11 +24,12 @@ struct SensorInfo {
   int past_states = 0;     ///< earlier states on which a reading depends
   /// Pixels of its pictures from top to bottom and from left to right; 0: it has none.
   std::array<int, 2> picture{};
+  int channels = 0;  ///< of its hardware; 0: it has none
 };
 /// Numbers of a whole reading of a sensor.
 std::size_t numbers_of(const SensorInfo& sensor, FieldForm form);
 /// Its shape: {rows, cols, numbers of a point}, {points, numbers}, {height, width, numbers of a
-/// pixel} or {6}.
+/// pixel}, {channels} or {6}.
 std::vector<std::size_t> reading_shape(const SensorInfo& sensor, FieldForm form);
 
 class Model;

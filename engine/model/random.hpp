@@ -24,20 +24,22 @@ std::array<std::uint32_t, 4> philox4x32(std::array<std::uint32_t, 4> counter,
 /// Purpose of a number, so that no two uses share one. Stored seeds depend on the values: never
 /// renumber.
 enum class Purpose : std::uint8_t {
-  initial_state = 0,   ///< <randomize> of a joint's starting coordinates or velocities
-  contact = 1,         ///< <randomize> of a contact's coefficients
-  tactile = 2,         ///< <randomize> of a sensor's coefficients
-  control = 3,         ///< knots of a random control
-  joint = 4,           ///< <randomize> of a joint's effects or a motor's gains
-  body = 5,            ///< <randomize> of a body
-  task = 6,            ///< draws of a task at a reset or during an episode
-  policy = 7,          ///< actions of a policy that draws them
-  sensor_noise = 8,    ///< noise of a tactile point in a step
-  sensor_point = 9,    ///< gain and bias of a tactile point
-  dead_point = 10,     ///< whether a tactile point is dead
-  sensor_gain = 11,    ///< gain of a sensor
-  picture_noise = 12,  ///< noise of a pixel in a step
-  picture_gain = 13,   ///< gains of a camera's channels
+  initial_state = 0,     ///< <randomize> of a joint's starting coordinates or velocities
+  contact = 1,           ///< <randomize> of a contact's coefficients
+  tactile = 2,           ///< <randomize> of a sensor's coefficients
+  control = 3,           ///< knots of a random control
+  joint = 4,             ///< <randomize> of a joint's effects or a motor's gains
+  body = 5,              ///< <randomize> of a body
+  task = 6,              ///< draws of a task at a reset or during an episode
+  policy = 7,            ///< actions of a policy that draws them
+  sensor_noise = 8,      ///< noise of a tactile point in a step
+  sensor_point = 9,      ///< gain and bias of a tactile point
+  dead_point = 10,       ///< whether a tactile point is dead
+  sensor_gain = 11,      ///< gain of a sensor
+  picture_noise = 12,    ///< noise of a pixel in a step
+  picture_gain = 13,     ///< gains of a camera's channels
+  channel_noise = 14,    ///< noise of a sensor's channel in a step
+  channel_episode = 15,  ///< gain, offset and drift of a sensor's channel
 };
 
 /// Identifies one random number. Different keys give independent numbers. The same key always gives

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
 
 #include "engine/base/error.hpp"
@@ -123,6 +124,8 @@ std::shared_ptr<const CompiledLayer> compile_sensor_layer(const TactileDescripti
                                    i % sensor.cols / layer->side);
   layer->weights = cell_weights(layer->grid, layer->side, sensor.rows, sensor.cols);
   layer->compliance = compile_layer(layer->grid);
+  static std::atomic<std::uint64_t> compiled_layers{0};
+  layer->number = ++compiled_layers;
   layer->modulus = d.material->modulus;
   layer->feedback = d.layer->feedback;
   // A contact has its kn from the material.
@@ -143,6 +146,20 @@ std::shared_ptr<const CompiledLayer> compile_sensor_layer(const TactileDescripti
     layer->surface.emplace(layer->grid);
   }
   return layer;
+}
+
+void check_layer_contacts(const CompiledModel& m, const CompiledSensor& sensor) {
+  const TactileDescription& d = m.scene.sensors[std::size_t(sensor.number)];
+  for (const int target : sensor.targets) {
+    bool touched = false;
+    for (std::size_t k = 0; k < m.pairs.size(); ++k)
+      touched =
+          touched || (m.scene.pair_contacts[k].sensor == d.name && m.pairs[k].body2 == target);
+    if (!touched)
+      fail(d, fmt::format("feedback, but no contact with '{}', which it senses; expected the "
+                          "contacts of add_sensor_contacts()",
+                          m.scene.links[std::size_t(target)].body.name));
+  }
 }
 
 }  // namespace tangere

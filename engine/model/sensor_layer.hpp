@@ -23,4 +23,8 @@ std::shared_ptr<const CompiledLayer> compile_sensor_layer(const TactileDescripti
                                                           const CompiledSensor& sensor,
                                                           int pressure_sign);
 
+/// Throws InputError (file:line) where a sensor's layer is the contact, but a sensed body has no
+/// contact with its points.
+void check_layer_contacts(const CompiledModel& model, const CompiledSensor& sensor);
+
 }  // namespace tangere

@@ -30,6 +30,21 @@ Attributes picture_facts_of(const TactileDescription& d) {
           {"gain", of.gain}};
 }
 
+/// What is known of the channels of a sensor that has some.
+Attributes channel_facts_of(const TactileDescription& d) {
+  const ChannelsDescription& of = *d.channels;
+  return {{"units", of.map->unit},
+          {"names", of.map->names},
+          {"map", of.map->name},
+          {"map_checksum", fmt::format("{:016x}", of.map->checksum)},
+          {"noise", of.noise},
+          {"bias", of.bias},
+          {"gain", of.gain},
+          {"drift", of.drift},
+          {"saturation", of.saturation},
+          {"quantisation", of.quantisation}};
+}
+
 }  // namespace
 
 std::array<double, 2> SensorLayout::pitch() const {
@@ -59,6 +74,8 @@ SensorLayout sensor_layout(const SensorInfo& info, const TactileDescription& des
   layout.list = description.points;
   layout.picture = info.picture;
   if (description.picture) layout.picture_facts = picture_facts_of(description);
+  layout.channels = info.channels;
+  if (description.channels) layout.channel_facts = channel_facts_of(description);
   return layout;
 }
 
@@ -72,6 +89,7 @@ std::vector<std::uint64_t> reading_shape(const SensorLayout& sensor, FieldForm f
   SensorInfo info;
   info.rows = sensor.rows, info.cols = sensor.cols, info.points = sensor.points;
   info.picture = sensor.picture;
+  info.channels = sensor.channels;
   const std::vector<std::size_t> shape = reading_shape(info, form);
   return {shape.begin(), shape.end()};
 }
@@ -92,6 +110,7 @@ std::string components_text(const SensorLayout& sensor, FieldForm form) {
     case FieldForm::surface:
       return "displacement of the surface along axis0, axis1 and out of the layer";
     case FieldForm::flow: return across + ", over their largest length in this reading";
+    case FieldForm::channels: return "what the hardware returns, channel by channel";
     case FieldForm::height: return "height of the gel's surface towards the camera";
     case FieldForm::rgb: return "R, G, B of the gel without printed markers, row 0 on top";
     case FieldForm::rgb_marker: return "R, G, B of the gel with printed markers, row 0 on top";
@@ -109,6 +128,11 @@ Attributes reading_attributes(const SensorLayout& s, FieldForm form) {
                     {"body", s.body},
                     {"components", components_text(s, form)}};
     list.insert(list.end(), s.picture_facts.begin(), s.picture_facts.end());
+    return list;
+  }
+  if (form == FieldForm::channels) {
+    Attributes list{{"body", s.body}, {"components", components_text(s, form)}};
+    list.insert(list.end(), s.channel_facts.begin(), s.channel_facts.end());
     return list;
   }
   Attributes list{

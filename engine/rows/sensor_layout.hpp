@@ -19,6 +19,7 @@ struct SensorLayout {
   int rows = 0, cols = 0;        ///< of a rectangular array, points row-major; both 0 for a list
   int points = 0;                ///< rows * cols for a rectangular array
   std::array<int, 2> picture{};  ///< pixels down and across of its pictures; 0: it has none
+  int channels = 0;              ///< of its hardware; 0: it has none
   int every = 1;          ///< K: fields are read after steps K, 2K, … of the first run of a chain
   int pressure_sign = 1;  ///< times the third force component: positive under pressure
   /// Rectangular arrays: p(i, j) = corner0 + i pitch0 axis0 + j pitch1 axis1, body frame [m].
@@ -27,6 +28,7 @@ struct SensorLayout {
 
   std::string imperfections;       ///< text_of() those of the sensor; "": none
   Attributes picture_facts;        ///< of its pictures: the gel, metres a pixel, flaws
+  Attributes channel_facts;        ///< of its channels: unit, names, their map, flaws
   std::vector<TactilePoint> list;  ///< a list of points in the field's order; empty for arrays
 
   [[nodiscard]] bool rectangular() const { return rows > 0; }
@@ -42,7 +44,7 @@ SensorLayout sensor_layout(const SensorInfo& info, const TactileDescription& des
 void check_sensor_name(const std::string& name);
 
 /// Returns the shape of one reading: {rows, cols, components}, {points, components}, {height,
-/// width, components} of a picture, or {6}.
+/// width, components} of a picture, {channels} or {6}.
 std::vector<std::uint64_t> reading_shape(const SensorLayout& sensor, FieldForm form);
 /// Returns the name of a reading's dataset in a trajectory: "force" for a field, else the form's.
 const char* dataset_of(FieldForm form);
@@ -51,6 +53,7 @@ std::string components_text(const SensorLayout& sensor, FieldForm form);
 
 /// Returns units, body, pressure_sign, components, frame, imperfections and, for a rectangular
 /// array, its place. Of a picture: units, body, components and picture_facts.
+/// Of channels: body, components and channel_facts.
 Attributes reading_attributes(const SensorLayout& sensor, FieldForm form);
 /// For a list of points, returns position, normal, axis0, axis1 (points, 3) and, if they have an
 /// image, pixel (points, 2). `group`: stands before their names.

@@ -11,10 +11,10 @@
 namespace tangere {
 
 namespace {
-constexpr FieldForm kForms[] = {FieldForm::field,   FieldForm::pressure,  FieldForm::shear,
-                                FieldForm::sum,     FieldForm::ideal,     FieldForm::markers,
-                                FieldForm::surface, FieldForm::flow,      FieldForm::height,
-                                FieldForm::rgb,     FieldForm::rgb_marker};
+constexpr FieldForm kForms[] = {FieldForm::field,   FieldForm::pressure, FieldForm::shear,
+                                FieldForm::sum,     FieldForm::ideal,    FieldForm::markers,
+                                FieldForm::surface, FieldForm::flow,     FieldForm::channels,
+                                FieldForm::height,  FieldForm::rgb,      FieldForm::rgb_marker};
 constexpr FieldForm kViews[] = {FieldForm::view_rgb, FieldForm::view_depth, FieldForm::view_ids};
 constexpr const char* kPlain[] = {"q", "v", "variables", "bodies", "memory"};
 constexpr const char* kBodyOutput = "bodies.";  // followed by the name of one
@@ -30,6 +30,7 @@ const char* to_string(FieldForm form) {
     case FieldForm::markers: return "markers";
     case FieldForm::surface: return "surface";
     case FieldForm::flow: return "flow";
+    case FieldForm::channels: return "channels";
     case FieldForm::height: return "height";
     case FieldForm::rgb: return "rgb";
     case FieldForm::rgb_marker: return "rgb_marker";
@@ -55,7 +56,8 @@ int components_of(FieldForm form) {
     case FieldForm::shear:
     case FieldForm::flow:
     case FieldForm::markers: return 2;
-    case FieldForm::sum: break;
+    case FieldForm::sum:
+    case FieldForm::channels: break;
   }
   return 0;
 }
@@ -64,7 +66,8 @@ std::span<const FieldForm> field_forms() { return kForms; }
 std::span<const FieldForm> view_forms() { return kViews; }
 
 bool is_ideal(FieldForm form) {
-  return form == FieldForm::ideal || is_displacement(form) || is_picture(form);
+  return form == FieldForm::ideal || form == FieldForm::channels || is_displacement(form) ||
+         is_picture(form);
 }
 
 std::size_t numbers_of(int points, FieldForm form) {
@@ -131,6 +134,7 @@ std::string reason_against(const Scene& scene, const FieldOutput& output) {
       case FieldForm::markers: return sensor.markers ? nullptr : "<markers>";
       case FieldForm::surface:
         return !sensor.markers ? "<markers>" : !sensor.layer ? "<layer>" : nullptr;
+      case FieldForm::channels: return sensor.channels ? nullptr : "<channels>";
       case FieldForm::height:
       case FieldForm::rgb: return sensor.picture ? nullptr : "<picture>";
       case FieldForm::rgb_marker:

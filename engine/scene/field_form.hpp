@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Quantities of a sensor: its whole field, pressure, shear, flow, sum, displacements of markers and
-// of the surface, or pictures of its gel; and those of a camera. Only requested quantities are
+// of the surface, channels of its hardware, or pictures of its gel; and those of a camera. Only
+// requested quantities are
 // computed and stored.
 #pragma once
 
@@ -24,6 +25,7 @@ enum class FieldForm {
   markers,     ///< (points, 2) [m]: where the ideal field pushes them, along axis0 and axis1
   surface,     ///< (points, 3) [m]: how a layer's surface moves, the third number out of the layer
   flow,        ///< (points, 2): the shear over its largest length on this sensor; 0 without shear
+  channels,    ///< (channels) what its hardware returns, in the map's unit (docs/channels.md)
   height,      ///< (height, width, 1) [m]: a gel's surface in a picture, towards the camera
   rgb,         ///< (height, width, 3), 0 to 255: a picture of a gel (docs/pictures.md)
   rgb_marker,  ///< the same with printed markers
@@ -38,12 +40,12 @@ enum class FieldForm {
 using FieldSum = std::array<double, 6>;
 
 /// The words of files and options: "field", "pressure", "shear", "sum", "ideal", "markers",
-/// "surface", "flow", "height", "rgb", "rgb_marker"; of a camera "rgb", "depth", "ids".
+/// "surface", "flow", "channels", "height", "rgb", "rgb_marker"; of a camera "rgb", "depth", "ids".
 const char* to_string(FieldForm form);
 
-/// Numbers of a point, or of a pixel; 0 for a sum.
+/// Numbers of a point, or of a pixel; 0 for a sum and for channels.
 int components_of(FieldForm form);
-/// Numbers of a whole reading that is no picture.
+/// Numbers of a whole reading that is no picture and has no channels.
 std::size_t numbers_of(int points, FieldForm form);
 
 /// One reading of one sensor or camera.
@@ -55,7 +57,8 @@ struct FieldOutput {
 };
 
 /// Whether a reading is that of an ideal sensor, whatever the sensor's imperfections: the ideal
-/// field, how it moves markers and the surface, and pictures.
+/// field, how it moves markers and the surface, channels, which have flaws of their own, and
+/// pictures.
 bool is_ideal(FieldForm form);
 /// Whether a reading is that of a camera, not of a sensor.
 inline bool is_view(FieldForm form) { return form >= FieldForm::view_rgb; }
@@ -87,7 +90,8 @@ std::span<const FieldForm> field_forms();
 std::span<const FieldForm> view_forms();
 
 /// Returns "pad" for a field, else "pad.pressure", "pad.shear", "pad.sum", "pad.ideal",
-/// "pad.markers", "pad.surface", "pad.flow", "pad.height", "pad.rgb" or "pad.rgb_marker".
+/// "pad.markers", "pad.surface", "pad.flow", "pad.channels", "pad.height", "pad.rgb" or
+/// "pad.rgb_marker".
 std::string output_name(const std::string& sensor, FieldForm form);
 /// Returns the names of a scene's sensors, in file order.
 std::vector<std::string> sensor_names(const Scene& scene);

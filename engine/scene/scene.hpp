@@ -15,6 +15,7 @@
 #include "engine/base/error.hpp"
 #include "engine/base/vector3.hpp"
 #include "engine/scene/camera.hpp"
+#include "engine/scene/channels.hpp"
 #include "engine/scene/gel.hpp"
 #include "engine/scene/number_address.hpp"
 #include "engine/scene/pose.hpp"
@@ -234,7 +235,9 @@ struct LayerDescription {
   double cell = 0;                 ///< side of a cell [m]; 0: follows the thickness
   std::optional<double> margin{};  ///< from the cells to free sides [m]; none: no sides
   Source source;
-  bool feedback = false;  ///< the layer is the contact of the sensor's points
+  /// The layer is the contact of the sensor's points. It needs their contacts
+  /// (engine/scene/sensor_contacts.hpp), which the scene reader adds.
+  bool feedback = false;
 };
 
 /// Pressure of a skin that is no elastic layer, by its depth (docs/table.md).
@@ -276,6 +279,8 @@ struct TactileDescription {
   std::optional<PressureTable> table{};
   /// Picture of a camera behind its gel. None: the sensor has no pictures.
   std::optional<PictureDescription> picture{};
+  /// What its hardware returns. None: the sensor has no channels.
+  std::optional<ChannelsDescription> channels{};
 };
 
 /// Lists the points of a sensor in field order: those of an array row by row, with its axes. The

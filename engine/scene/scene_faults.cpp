@@ -314,6 +314,25 @@ std::string picture_fault(const TactileDescription& sensor) {
   return value_fault(kGelPicture, of);
 }
 
+std::string channels_fault(const TactileDescription& sensor) {
+  const ChannelsDescription& of = *sensor.channels;
+  if (of.map == nullptr) return "no map; expected one";
+  // A list may be the points of an array that were moved.
+  const bool grid =
+      sensor.points.empty() ||
+      std::ssize(sensor.points) == std::ptrdiff_t{sensor.array.rows} * sensor.array.cols;
+  std::string fault =
+      channel_map_fault(*of.map, grid ? sensor.array.rows : 0, grid ? sensor.array.cols : 0);
+  if (fault.empty()) fault = value_fault(kChannels, of);
+  if (fault.empty() && of.saturation != 0 && of.quantisation > of.saturation)
+    fault = fmt::format(
+        "quantisation=\"{}\" with saturation=\"{}\": every channel is 0; expected a quantisation "
+        "of "
+        "no more than the saturation",
+        of.quantisation, of.saturation);
+  return fault;
+}
+
 std::string varying_value_fault(const SceneNumber& n, double value) {
   const Attribute& row = number_kind(n.owner, n.field);
   if (std::string fault = row.fault(value); !fault.empty()) return fault;
@@ -355,6 +374,7 @@ void check_scene(const Scene& scene) {
     check(d.source, "tactile sensor '" + d.name + "': ", value_fault(kTactile, d.coefficients));
     if (d.markers) check(d.markers->source, "markers of '" + d.name + "': ", markers_fault(d));
     if (d.picture) check(d.picture->source, "picture of '" + d.name + "': ", picture_fault(d));
+    if (d.channels) check(d.channels->source, "channels of '" + d.name + "': ", channels_fault(d));
     if (d.table) check(d.source, "pressure of '" + d.name + "': ", table_fault(d));
     if (d.layer)
       check(d.layer->source, "layer of '" + d.name + "': ", value_fault(kLayer, *d.layer));

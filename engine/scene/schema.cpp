@@ -426,6 +426,20 @@ constexpr Attribute kSchema[] = {
     row(kCamera, "gain", "0", U::one, "deviation of a factor per channel and episode",
         &CameraDescription::gain, B::not_negative),
 
+    row(kChannels, "file", kNeeded, U::one, "file of the map from the field to channels"),
+    row(kChannels, "noise", "0", U::one, "deviation from step to step, in the channels' unit",
+        &ChannelsDescription::noise, B::not_negative),
+    row(kChannels, "bias", "0", U::one, "deviation of a channel's offset, by episode",
+        &ChannelsDescription::bias, B::not_negative),
+    row(kChannels, "gain", "0", U::one, "deviation of a channel's gain about 1, by episode",
+        &ChannelsDescription::gain, Between{B::range, 0, 1}),
+    row(kChannels, "drift", "0", U::one, "deviation of the rate of a channel's offset, 1/s",
+        &ChannelsDescription::drift, B::not_negative),
+    row(kChannels, "saturation", "0", U::one, "largest channel; 0: none",
+        &ChannelsDescription::saturation, B::not_negative),
+    row(kChannels, "quantisation", "0", U::one, "channels are multiples of it; 0: not rounded",
+        &ChannelsDescription::quantisation, B::not_negative),
+
     row(kEndEffector, "name", "", U::one, "endeffector and its place in the file if left out"),
     row(kEndEffector, "joint", kNeeded, U::one, "it moves with this joint"),
     row(kEndEffector, "pos", kNeeded, U::m, "in the joint's moving frame",
@@ -509,7 +523,8 @@ constexpr const char* kElementNames[] = {"option",
                                          "weld",
                                          "connect",
                                          "weld",
-                                         "camera"};
+                                         "camera",
+                                         "channels"};
 static_assert(std::size(kElementNames) == kElements);
 
 constexpr Holder kHolders[] = {
@@ -526,7 +541,7 @@ constexpr Holder kHolders[] = {
     {"randomize", kVarying, true},
     {"link", kJoint | kBody | kLink},
     {"body", kVisual | kCollision},
-    {"tactile", kImperfections | kMarkers | kLayer | kGelPicture},
+    {"tactile", kImperfections | kMarkers | kLayer | kGelPicture | kChannels},
     {"piecewise", kAt},
 };
 

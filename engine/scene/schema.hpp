@@ -60,8 +60,9 @@ enum Element : std::uint64_t {
   kVaryConnect = 1ULL << 35,  ///< in <randomize>, like the next
   kVaryWeld = 1ULL << 36,
   kCamera = 1ULL << 37,
+  kChannels = 1ULL << 38,
 };
-inline constexpr int kElements = 38;
+inline constexpr int kElements = 39;
 inline constexpr std::uint64_t kContacts = kGroundContact | kPairContact,
                                kTouching = kContacts | kTactile, kLoops = kConnect | kWeld,
                                kVarying = kVaryJoint | kVaryMotor | kVaryGround | kVaryPair |
@@ -101,10 +102,10 @@ using Member = std::variant<
     Vector3 Pose::*, Quaternion Pose::*, double JointEffects::*, double BodyDescription::*,
     std::array<double, 4> BodyDescription::*, double AbstractShape::*, double MotorDescription::*,
     double ContactCoefficients::*, double LoopDescription::*, Vector3 LoopDescription::*,
-    int TactileDescription::*, double SensorImperfections::*,
-    NormalAndShear SensorImperfections::*, double MarkersDescription::*, double SkinMaterial::*,
-    double LayerDescription::*, std::optional<double> LayerDescription::*,
-    int PictureDescription::*, double PictureDescription::*, int CameraDescription::*,
+    int TactileDescription::*, double SensorImperfections::*, NormalAndShear SensorImperfections::*,
+    double MarkersDescription::*, double SkinMaterial::*, double LayerDescription::*,
+    std::optional<double> LayerDescription::*, int PictureDescription::*,
+    double PictureDescription::*, double ChannelsDescription::*, int CameraDescription::*,
     double CameraDescription::*, Vector3 CameraDescription::*, Vector3 EndEffectorDescription::*,
     double EndEffectorDescription::*, std::array<double, 4> EndEffectorDescription::*,
     double PiecewiseControl::*, double RandomControl::*>;

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "engine/model/compiled_model.hpp"
+#include "engine/sense/channel_reading.hpp"
 #include "engine/sense/dense_tiles.hpp"
 #include "engine/sense/field_sum.hpp"
 #include "engine/sense/flow_map.hpp"
@@ -68,6 +69,7 @@ struct FormMap::Impl {
   int pressure_sign;
   std::optional<Mat3<double>> turn;  // of a skewed pad
   std::optional<MarkerMap> markers;
+  std::optional<ChannelReading> channels;
   std::size_t size;  // of the form
   mutable std::mutex guard;
   mutable std::vector<std::unique_ptr<PictureReading<double>>> idle;  // scratch of pictures
@@ -85,6 +87,7 @@ struct FormMap::Impl {
     pressure_sign = m.sensors()[std::size_t(of.sensor)].pressure_sign;
     if (pad.skewed) turn = perpendicular_from_stored(pad);
     if (is_displacement(of.form)) markers.emplace(m, of.sensor);
+    if (of.form == FieldForm::channels) channels.emplace(m, of.sensor);
     size = numbers_of(m.sensors()[std::size_t(of.sensor)], of.form);
     if (is_picture(of.form) && !m.scene().sensors[std::size_t(of.sensor)].layer)
       throw InputError("pictures of sensor '" + m.sensors()[std::size_t(of.sensor)].name +
@@ -185,6 +188,7 @@ void FormMap::evaluate(std::span<const double> field, std::span<double> form) co
     case FieldForm::sum: m.sum(field, form); return;
     case FieldForm::markers:
     case FieldForm::surface: m.markers->displace(field, form); return;
+    case FieldForm::channels: m.channels->evaluate(field, form); return;
     case FieldForm::height:
     case FieldForm::rgb:
     case FieldForm::rgb_marker:
@@ -218,6 +222,7 @@ void FormMap::pull_back(std::span<const double> field, std::span<const double> f
     case FieldForm::sum: m.pull_back_sum(field, form_bar, field_bar, point_bar); return;
     case FieldForm::markers:
     case FieldForm::surface: m.markers->pull_back(field, form_bar, field_bar); return;
+    case FieldForm::channels: m.channels->pull_back(field, form_bar, field_bar); return;
     case FieldForm::height:
     case FieldForm::rgb:
     case FieldForm::rgb_marker:

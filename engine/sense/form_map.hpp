@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Forms of a field as functions of the field of their sensor (engine/scene/field_form.hpp), and
-// their pullbacks. `ideal`, `markers`, `surface` and pictures are functions of the ideal field.
-// Shear, markers and surface are linear; a flow is a quotient. Of a sum, with a point's place x_i
-// and its pressing force p_i = max(0, sign f_3,i):
+// their pullbacks. `ideal`, `markers`, `surface`, `channels` and pictures are functions of the
+// ideal field. Shear, markers and surface are linear; channels are quadratic; a flow is a quotient.
+// Of a sum, with a point's place x_i and its pressing force p_i = max(0, sign f_3,i):
 //
 //   F = Σ_i R_iᵀ f_i,  c = Σ_i p_i x_i / P,  P = Σ_i p_i,  ∂c/∂p_i = (x_i - c)/P,  ∂c/∂x_i = p_i/P
 #pragma once
@@ -32,7 +32,8 @@ class FormMap {
 
   /// Computes the form, (size), from the field, (field_size) [N]. The bits are those of
   /// Readout::read_block(), but the sum of a pad whose axes are not perpendicular differs by
-  /// rounding, and pictures are in double precision, without noise and gains.
+  /// rounding; pictures are in double precision, without noise and gains; channels are without
+  /// their flaws.
   void evaluate(std::span<const double> field, std::span<double> form) const;
   /// Adds to `field_bar`, (field_size), the pullback of `form_bar`, (size), at `field`. A flow
   /// changes with the first point of the largest shear. Points that do not press have no derivative

@@ -189,8 +189,10 @@ void LayeredField::read(const CompiledSensor& sensor, const kernels::TactileArgs
     add_force(field, p.index, f);
   }
   // A state that is not finite is one in the springs' field.
+  bool solved = true;
+  for (const GelLayer& one : layers_) solved = solved && (layer.table || one.solved());
   for (std::size_t k = 0; k < field.size(); ++k)
-    if (!std::isfinite(whole_[k])) field[k] = std::numeric_limits<double>::quiet_NaN();
+    if (!solved || !std::isfinite(whole_[k])) field[k] = std::numeric_limits<double>::quiet_NaN();
 }
 
 /// Returns depth and slant where a shape moves as its dual numbers say.

@@ -27,7 +27,8 @@ struct SpringFields {
 /// Owns the scratch of one thread.
 class LayeredField {
  public:
-  /// Computes the field, (points, 3) [N]. `touch`: the shapes in pad axes (PadReader::arguments()).
+  /// Computes the field, (points, 3) [N]; of a layer whose pressures are not found no numbers.
+  /// `touch`: the shapes in pad axes (PadReader::arguments()).
   void read(const CompiledSensor& sensor, const kernels::TactileArgs<double>& touch,
             const SpringFields& springs, std::span<double> field);
 

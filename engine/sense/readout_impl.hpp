@@ -14,6 +14,7 @@
 #include "engine/model/model.hpp"
 #include "engine/scene/frames.hpp"
 #include "engine/sense/camera_reading.hpp"
+#include "engine/sense/channel_reading.hpp"
 #include "engine/sense/dense_tiles.hpp"
 #include "engine/sense/elastic_field.hpp"
 #include "engine/sense/field_sum.hpp"
@@ -46,12 +47,14 @@ struct Readout::Impl {
   ImperfectField imperfections;
   ElasticField elastic;
   LayerReading layered;
-  std::vector<std::optional<MarkerMap>> markers;  // (sensors) of those that have them
+  std::vector<std::optional<MarkerMap>> markers;        // (sensors) of those that have them
+  std::vector<std::optional<ChannelReading>> channels;  // (sensors) of those that have them
   // (sensors) of those of which a picture was read.
   std::vector<std::optional<PictureReading<float>>> pictures;
   std::vector<std::optional<CameraReading>> cameras;  // those of which a picture was read
   std::vector<float> picture;                         // of one environment, before conversion
   std::vector<double> displacement, elastic_field;    // (points, 3)
+  std::vector<double> channel_values;
   std::vector<double> one_reading, block_readings, tile_values;
   std::vector<double> earlier;     // fields of small pads in the states of `past`
   std::optional<PastStates> past;  // for sensors with lag
@@ -73,7 +76,13 @@ struct Readout::Impl {
         markers.back().emplace(m, s.number);
         grow(displacement, 3 * points);
       }
-      if (!s.imperfect && !s.elastic && !s.layer && !marked) continue;
+      const bool channelled = m.sensors()[std::size_t(s.number)].channels > 0;
+      channels.emplace_back();
+      if (channelled) {
+        channels.back().emplace(m, s.number);
+        grow(channel_values, channels.back()->size());
+      }
+      if (!s.imperfect && !s.elastic && !s.layer && !marked && !channelled) continue;
       grow(one_reading, 3 * points);
       grow(tile_values, std::size_t(s.n_tiles()) * 3 * kTactileTile);
       if (small(s)) grow(block_readings, 3 * kBlock * points);
@@ -169,9 +178,13 @@ struct Readout::Impl {
     const CompiledSensor& s = sensor_of(of.sensor);
     return s.layer != nullptr || (s.elastic && of.form != FieldForm::pressure);
   }
+  /// Whether a reading is computed from the whole ideal field, or from no field.
+  static bool is_derived(FieldForm form) {
+    return is_displacement(form) || form == FieldForm::channels || is_picture(form);
+  }
   /// Whether a reading needs more than the kernels' field.
   [[nodiscard]] bool imperfect(FieldOutput of) const {
-    return is_displacement(of.form) || is_picture(of.form) || is_elastic(of) ||
+    return is_derived(of.form) || is_elastic(of) ||
            (of.form != FieldForm::ideal && sensor_of(of.sensor).imperfect);
   }
   /// Turns an ideal field into the reading of an imperfect sensor, in the readout's precision.
@@ -286,6 +299,18 @@ struct Readout::Impl {
     std::transform(moved.begin(), moved.end(), to, [](double x) { return static_cast<T>(x); });
   }
 
+  /// Writes what the hardware returns, after find_touches().
+  template <class T>
+  void write_channels(const Batch& batch, int environment, FieldOutput of, T* to) {
+    check_has(of);
+    const ChannelReading& reading = *channels[std::size_t(of.sensor)];
+    const auto values = std::span(channel_values).first(reading.size());
+    reading.evaluate(read_ideal_field(batch, environment, of.sensor), values);
+    const auto time = static_cast<double>(batch.steps(environment)) * model.scene().timestep;
+    reading.apply_flaws(key_of(batch, environment), time, values);
+    std::transform(values.begin(), values.end(), to, [](double x) { return static_cast<T>(x); });
+  }
+
   /// Writes a picture, after find_touches(). T: double, float or a byte.
   template <class T>
   void write_picture(const Batch& batch, int environment, FieldOutput of, T* to) {
@@ -313,6 +338,7 @@ struct Readout::Impl {
   void write_imperfect(const Batch& batch, int environment, FieldOutput of, T* to) {
     if (is_displacement(of.form)) return write_displacements(batch, environment, of, to);
     if (is_picture(of.form)) return write_picture(batch, environment, of, to);
+    if (of.form == FieldForm::channels) return write_channels(batch, environment, of, to);
     if constexpr (std::is_same_v<T, double>)
       if (of.form != FieldForm::sum) {
         const std::size_t numbers = numbers_of(sensor_of(of.sensor).points(), of.form);
@@ -476,9 +502,7 @@ struct Readout::Impl {
              const One& one) {
     const int environments = environments_of(batch, number);
     place_block(batch, number, of.sensor);
-    const bool derived =
-        of.form == FieldForm::sum || is_displacement(of.form) || is_picture(of.form);
-    if (!derived && together(batch, number, of.sensor)) {
+    if (of.form != FieldForm::sum && !is_derived(of.form) && together(batch, number, of.sensor)) {
       const FieldOutput computed = undivided(of);
       imperfect(computed) ? fill_imperfect_block(batch, number, computed, dense)
                           : fill_block(computed, environments, dense);

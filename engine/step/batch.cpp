@@ -69,7 +69,7 @@ std::span<const StepStatus> step_statuses() {
   using enum StepStatus;
   static constexpr StepStatus kAll[] = {converged, split,       accuracy_not_met, tunnelled,
                                         damped,    overlapping, not_converged,    non_finite,
-                                        rotation,  singular};
+                                        rotation,  singular,    unsolved_layer};
   return kAll;
 }
 
@@ -87,6 +87,7 @@ const char* to_string(StepStatus value) {
     case StepStatus::non_finite: return "a control or state was not finite";
     case StepStatus::rotation: return "a joint turned by pi or more in one step";
     case StepStatus::singular: return "the Jacobian is singular";
+    case StepStatus::unsolved_layer: return "the pressures of a layer were not found";
   }
   return "unknown";
 }

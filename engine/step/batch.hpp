@@ -25,12 +25,13 @@ enum class StepStatus : std::int8_t {
                          ///< energy or rotated a body too far
   tunnelled = 3,         ///< converged, but a body passed through one of its contact partners
   damped = 4,            ///< converged by BDF1 or in parts: the scheme would have created energy
-  overlapping = 5,     ///< converged, but bodies of a contact overlap and none of its points is as
-                       ///< deep (engine/step/interpenetration.hpp)
-  not_converged = -1,  ///< no root found down to h/256
-  non_finite = -2,     ///< a control or state was NaN or infinite
-  rotation = -3,       ///< a joint turned by π or more in one step
-  singular = -4,       ///< the Jacobian could not be factored, pivoting included
+  overlapping = 5,      ///< converged, but bodies of a contact overlap and none of its points is as
+                        ///< deep (engine/step/interpenetration.hpp)
+  not_converged = -1,   ///< no root found down to h/256
+  non_finite = -2,      ///< a control or state was NaN or infinite
+  rotation = -3,        ///< a joint turned by π or more in one step
+  singular = -4,        ///< the Jacobian could not be factored, pivoting included
+  unsolved_layer = -5,  ///< the pressures of a layer that is a contact were not found
 };
 const char* to_string(StepStatus value);
 /// Returns all of them.

@@ -251,14 +251,17 @@ struct LaneAt {
   }
 
   /// Solves a pad's layer against the bodies of another link that move with W, with or without
-  /// friction.
-  void solve_layer(const kernels::LinkPair& links, int pad, const Frame<double>& link2_in_1,
-                   const kernels::Vec6<double>& W, bool friction, LayerContact& contact) const {
+  /// friction. Returns the pairs of these bodies.
+  std::vector<int> solve_layer(const kernels::LinkPair& links, int pad,
+                               const Frame<double>& link2_in_1, const kernels::Vec6<double>& W,
+                               bool friction, LayerContact& contact) const {
     const LayerPad& of = model.layer_pads[std::size_t(pad)];
+    std::vector<int> members;
     contact.begin(of);
     for (int i = links.first; i < links.first + links.count; ++i) {
       const auto& pair = model.pairs[std::size_t(model.pair_order[std::size_t(i)])];
       if (pair.layer_pad != pad) continue;
+      members.push_back(model.pair_order[std::size_t(i)]);
       Coefficients<double> law =
           transformed(pair.parameters, [this](const kernels::Parameter& p) { return number(p); });
       if (!friction) law.mu = 0;
@@ -270,6 +273,32 @@ struct LaneAt {
                           {pair.points[3 * k], pair.points[3 * k + 1], pair.points[3 * k + 2]}, {});
     }
     contact.solve();
+    return members;
+  }
+
+  /// Adds what the shear springs of points on layers hold, in proportion to the layers' loads.
+  void add_sheared_layers(const ShearState& memory) {
+    LayerContact contact;
+    for (const kernels::LinkPair& links : model.link_pairs) {
+      if (links.layer < 0) continue;
+      const Frame<double> link2_in_1 = relative(world(links.link1), world(links.link2));
+      for (int pad = 0; pad < static_cast<int>(model.layer_pads.size()); ++pad) {
+        const std::vector<int> members =
+            solve_layer(links, pad, link2_in_1, kernels::zero6<double>(), true, contact);
+        for (const LayerContact::Point& p : contact.points()) {
+          if (!(p.force.normal > 0)) continue;
+          const kernels::PairContact& pair = model.pairs[std::size_t(members[std::size_t(p.body)])];
+          if (pair.memory < 0) continue;
+          const int row = model.shear_springs[std::size_t(pair.memory)].first + p.candidate;
+          const auto entry = std::ranges::lower_bound(memory, row, {}, &ShearEntry::point);
+          if (entry == memory.end() || entry->point != row) continue;
+          double square = 0;
+          for (const double x : entry->s) square += x * x;
+          sum.moving +=
+              0.5 * number(pair.parameters.ks) * square * contact.friction_load(p) / p.force.normal;
+        }
+      }
+    }
   }
 
   void add_layers(const kernels::LinkPair& links, const Frame<double>& link2_in_1) {
@@ -341,8 +370,11 @@ double energy_of_contacts(const CompiledModel& model, const kernels::KernelTable
 
 template <int L>
 double energy_of_friction(const CompiledModel& model, const BasicWorkspace<L>& w,
-                          const ShearState& memory, int lane) {
-  double sum = 0;
+                          const AlignedVector<LinkPose<Row<L>>>& poses, const ShearState& memory,
+                          int lane) {
+  LaneAt<L> at{model, w, poses, lane};
+  if (!model.layer_pads.empty() && !memory.empty()) at.add_sheared_layers(memory);
+  double sum = at.sum.moving;
   std::size_t e = 0;
   for (const kernels::ShearSpringContact& contact : model.shear_springs) {  // by rising point
     double square = 0;
@@ -351,7 +383,8 @@ double energy_of_friction(const CompiledModel& model, const BasicWorkspace<L>& w
     for (; e < memory.size() && memory[e].point < end; ++e)
       for (const double s : memory[e].s)
         square += areas == nullptr ? s * s : areas[memory[e].point - contact.first] * s * s;
-    if (contact.sensor < 0 && square > 0)
+    const bool layered = contact.pair >= 0 && model.pairs[std::size_t(contact.pair)].layer_pad >= 0;
+    if (contact.sensor < 0 && square > 0 && !layered)
       sum += 0.5 * number_of<L>(contact.contact.parameters.ks, w.stage, lane) * square;
   }
   for (const ShearEntry& entry : dry_entries(model, memory)) {
@@ -385,7 +418,8 @@ EnergyTerms energy_terms(const CompiledModel& model, const kernels::KernelTable&
                                      BasicWorkspace<L>&, const AlignedVector<LinkPose<Row<L>>>&, \
                                      int);                                                       \
   template double energy_of_friction(const CompiledModel&, const BasicWorkspace<L>&,             \
-                                     const ShearState&, int);
+                                     const AlignedVector<LinkPose<Row<L>>>&, const ShearState&,  \
+                                     int);
 TANGERE_FOR_LANES(kernels::kGroup)
 TANGERE_FOR_LANES(1)
 #undef TANGERE_FOR_LANES

@@ -35,9 +35,12 @@ double energy_of_contacts(const CompiledModel& model, const kernels::KernelTable
                           const AlignedVector<kernels::LinkPose<kernels::Row<L>>>& poses, int lane);
 
 /// Computes the energy of the shear springs of contacts in one lane [J]: Σ k_s |s|²/2 over the
-/// points of `memory`. Sensors act on no body, so their springs are left out.
+/// points of `memory`, on a layer times the load that friction has there over the normal force of
+/// the point's spring (engine/layer/layer_force.hpp). Sensors act on no body, so their springs are
+/// left out. `poses`: of the links, at which layers are solved.
 template <int L>
 double energy_of_friction(const CompiledModel& model, const BasicWorkspace<L>& w,
+                          const AlignedVector<kernels::LinkPose<kernels::Row<L>>>& poses,
                           const ShearState& memory, int lane);
 
 /// Energy balance of one environment: stored energy, and power of motors and damping.

@@ -2,6 +2,8 @@
 // Copies one lane's numbers to the contact of a layer, and its sums back to rows.
 #include "engine/step/layer_sums.hpp"
 
+#include <limits>
+
 #include "engine/step/shear_lane.hpp"
 
 namespace tangere {
@@ -62,7 +64,8 @@ void solve_layer(const CompiledModel& m, BasicWorkspace<L>& w, const kernels::Li
                                        {row[15][lane], row[16][lane], row[17][lane]}};
   const LayerPad& of = m.layer_pads[std::size_t(pad)];
   w.layer_members.clear();
-  w.layer_contact->begin(of);
+  const std::size_t slot = m.layer_pads.size() * std::size_t(links.layer) + std::size_t(pad);
+  w.layer_contact->begin(of, L * slot + std::size_t(lane));
   for (int i = links.first; i < links.first + links.count; ++i) {
     const int k = m.pair_order[std::size_t(i)];
     const kernels::PairContact& pair = m.pairs[std::size_t(k)];
@@ -80,9 +83,10 @@ void solve_layer(const CompiledModel& m, BasicWorkspace<L>& w, const kernels::Li
 }
 
 template <int L>
-void set_layer_sums(const CompiledModel& m, const kernels::KernelTable& table, BasicWorkspace<L>& w,
-                    LaneBits lanes, bool derivatives) {
-  if (m.layer_pads.empty()) return;
+LaneBits set_layer_sums(const CompiledModel& m, const kernels::KernelTable& table,
+                        BasicWorkspace<L>& w, LaneBits lanes, bool derivatives) {
+  LaneBits unsolved = 0;
+  if (m.layer_pads.empty()) return unsolved;
   table.stage<L>().pair_motions(m.view, w.stage, w.pair_motions);
   Row<L>* const rows = w.stage.layer_sums;
   for (int i = 0; i < kernels::kPairSumNumbers * m.layer_link_pairs; ++i)
@@ -95,18 +99,22 @@ void set_layer_sums(const CompiledModel& m, const kernels::KernelTable& table, B
       if (w.layer_contact->points().empty()) continue;
       auto sums = kernels::PairSums<double>::zero();
       w.layer_contact->add_to(sums, derivatives);
+      const bool solved = w.layer_contact->solved();
+      if (!solved) unsolved |= 1U << l;
       const double* const from = &sums.wrench.a.x;
       Row<L>* const to = rows + kernels::kPairSumNumbers * links.layer;
-      for (int i = 0; i < kernels::kPairSumNumbers; ++i) to[i][l] += from[i];
+      for (int i = 0; i < kernels::kPairSumNumbers; ++i)
+        to[i][l] += solved ? from[i] : std::numeric_limits<double>::quiet_NaN();
     }
   });
+  return unsolved;
 }
 
 #define TANGERE_FOR_LANES(L)                                                                    \
   template void solve_layer(const CompiledModel&, BasicWorkspace<L>&, const kernels::LinkPair&, \
                             int, int);                                                          \
-  template void set_layer_sums(const CompiledModel&, const kernels::KernelTable&,               \
-                               BasicWorkspace<L>&, LaneBits, bool);
+  template LaneBits set_layer_sums(const CompiledModel&, const kernels::KernelTable&,           \
+                                   BasicWorkspace<L>&, LaneBits, bool);
 TANGERE_FOR_LANES(kernels::kGroup)
 TANGERE_FOR_LANES(1)
 #undef TANGERE_FOR_LANES

@@ -9,10 +9,11 @@
 namespace tangere {
 
 /// Computes Stage::layer_sums of `lanes` at the poses of kinematics(), from the present candidates.
-/// `derivatives`: not of the wrench alone.
+/// `derivatives`: not of the wrench alone. Returns the lanes in which a layer has no pressures;
+/// their sums are not numbers.
 template <int L>
-void set_layer_sums(const CompiledModel& model, const kernels::KernelTable& table,
-                    BasicWorkspace<L>& w, LaneBits lanes, bool derivatives);
+LaneBits set_layer_sums(const CompiledModel& model, const kernels::KernelTable& table,
+                        BasicWorkspace<L>& w, LaneBits lanes, bool derivatives);
 
 /// Solves the contact of a pad with the bodies of a pair of links in one lane, at the motion that
 /// set_layer_sums() found. Leaves it in w.layer_contact, and the pairs of its bodies in

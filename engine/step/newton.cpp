@@ -81,6 +81,7 @@ struct Search {
   LaneBits on_trial = 0;       ///< lanes whose x is a trial along delta
   LaneBits need_jacobian = 0;  ///< lanes whose x is accepted and that need a Jacobian
   LaneBits spared = 0;         ///< lanes that ended without the last evaluation
+  LaneBits unsolved = 0;       ///< lanes in which a layer has no pressures at the present x
   LaneBits secant_lanes = 0;   ///< lanes whose factor takes friction by its secant
   std::array<double, L> alpha{}, delta_norm{};
   std::array<double, L> last{};    ///< scaled residual of the last accepted point
@@ -130,7 +131,7 @@ struct Search {
         open |= 1U << l;
     with_jacobian = !factors.weighted || !factors.floored ||
                     (open != 0 && (lone(open) < 0 || open == searching));
-    set_layer_sums(model, table, w, searching, with_jacobian);
+    unsolved = set_layer_sums(model, table, w, searching, with_jacobian);
     (with_jacobian ? kernel().evaluate : kernel().residual)(model.view, w.stage, lone(searching));
     if (!std::exchange(factors.weighted, true)) kernel().set_weights(model.view, w.stage);
     if (!std::exchange(factors.floored, true)) set_floor(searching);
@@ -178,7 +179,7 @@ struct Search {
         stop(l, StepStatus::converged);
       } else if (!has(on_trial, l)) {
         if (!std::isfinite(residual[l])) {
-          stop(l, StepStatus::non_finite);
+          stop(l, has(unsolved, l) ? StepStatus::unsolved_layer : StepStatus::non_finite);
           continue;
         }
         last[l] = lowest[l] = factors.start[l] = residual[l];

@@ -116,7 +116,9 @@ LaneBits solve_from_softer(const CompiledModel& model, const kernels::KernelTabl
   if (model.pairs.empty() && model.grounds.empty()) return kNoLane;
   LaneBits open = lanes;
   for (int l = 0; l < L; ++l)
-    if (report.status[l] == StepStatus::non_finite) open &= ~(1U << l);
+    if (report.status[l] == StepStatus::non_finite ||
+        report.status[l] == StepStatus::unsolved_layer)
+      open &= ~(1U << l);
   LaneBits found = 0;
   for (const Softening& by : kSoftenings)
     if ((open & ~found) != 0)

@@ -144,9 +144,10 @@ LaneBits energy_gains(const CompiledModel& model, const std::vector<double>& com
     gain -= servo_work(model, w, l);
     const ShearLanes<L>& memory = w.shear;
     const double held = energy_of_contacts(model, table, w, w.poses_before, l) +
-                        energy_of_friction(model, w, memory.now[std::size_t(l)], l),
-                 holds = energy_of_contacts(model, table, w, w.poses_after, l) +
-                         energy_of_friction(model, w, memory.after[std::size_t(l)], l);
+                        energy_of_friction(model, w, w.poses_before, memory.now[std::size_t(l)], l),
+                 holds =
+                     energy_of_contacts(model, table, w, w.poses_after, l) +
+                     energy_of_friction(model, w, w.poses_after, memory.after[std::size_t(l)], l);
     if (gain + holds - held > kMayCreate * std::max(before.moving + held, after.moving + holds))
       found |= 1U << l;
   }

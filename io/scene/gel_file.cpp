@@ -45,21 +45,6 @@ double gel_length(const SceneNode& root, const char* attribute, double x) {
   return x;
 }
 
-/// Returns a text as the value of an attribute.
-std::string quoted_text(const std::string& text) {
-  std::string out = "\"";
-  for (const char c : text) {
-    switch (c) {
-      case '&': out += "&amp;"; break;
-      case '<': out += "&lt;"; break;
-      case '>': out += "&gt;"; break;
-      case '"': out += "&quot;"; break;
-      default: out += c;
-    }
-  }
-  return out + "\"";
-}
-
 }  // namespace
 
 Gel read_gel(const std::string& path, std::vector<std::string>& warnings) {

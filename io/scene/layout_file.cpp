@@ -82,6 +82,13 @@ void LayoutFile::set(const std::string& attribute, const std::string& value) {
   impl_->sensor->SetAttribute(attribute.c_str(), value.c_str());
 }
 
+void LayoutFile::set(const std::string& part, const std::string& attribute,
+                     const std::string& value) {
+  tinyxml2::XMLElement* element = impl_->sensor->FirstChildElement(part.c_str());
+  if (element == nullptr) element = impl_->sensor->InsertNewChildElement(part.c_str());
+  element->SetAttribute(attribute.c_str(), value.c_str());
+}
+
 void LayoutFile::remove(const std::string& attribute) {
   impl_->sensor->DeleteAttribute(attribute.c_str());
 }

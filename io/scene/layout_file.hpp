@@ -44,6 +44,8 @@ class LayoutFile {
   /// named.
   [[nodiscard]] std::string tactile_text(const std::string& body,
                                          std::span<const std::string> without) const;
+  /// Sets an attribute of a <part> of the sensor, which is added if it is not there.
+  void set(const std::string& part, const std::string& attribute, const std::string& value);
   /// Adds a comment before the sensor.
   void add_comment(const std::string& text);
   /// The file.

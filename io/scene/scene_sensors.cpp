@@ -10,9 +10,11 @@
 #include "engine/scene/imperfection_checks.hpp"
 #include "engine/scene/outer_pose.hpp"
 #include "engine/scene/sensed_bodies.hpp"
+#include "engine/scene/sensor_contacts.hpp"
 #include "engine/scene/skin_material.hpp"
 #include "io/files/name_list.hpp"
 #include "io/files/nearest_name.hpp"
+#include "io/scene/channel_file.hpp"
 #include "io/scene/gel_file.hpp"
 #include "io/scene/scene_cameras.hpp"
 #include "io/scene/scene_sections.hpp"
@@ -251,6 +253,17 @@ void check_gel_size(const SceneElement& node, const TactileDescription& d) {
       whole[1] / kMillimetre, 100 * kMostApart));
 }
 
+ChannelsDescription read_channels(const SceneElement& node) {
+  ChannelsDescription channels;
+  node.read(channels);
+  channels.source = node.source();
+  channels.map =
+      std::make_shared<const ChannelMap>(read_beside(node, "file", [&](const std::string& path) {
+        return read_channel_map(path, node.context().outermost().warnings);
+      }));
+  return channels;
+}
+
 /// Reads what <tactile> holds, each at most once.
 void read_parts(const SceneNode& node, TactileDescription& sensor) {
   std::vector<std::string> found;
@@ -259,10 +272,11 @@ void read_parts(const SceneNode& node, TactileDescription& sensor) {
       part.fail("a second time in one <tactile>; expected one");
     found.push_back(part.name());
     const bool marks = part.name() == "markers", couples = part.name() == "layer",
-               shows = part.name() == "picture";
+               shows = part.name() == "picture", returns = part.name() == "channels";
     const SceneElement element(part, marks     ? kMarkers
                                      : couples ? kLayer
                                      : shows   ? kGelPicture
+                                     : returns ? kChannels
                                                : kImperfections);
     element.check();
     if (marks) {
@@ -275,6 +289,8 @@ void read_parts(const SceneNode& node, TactileDescription& sensor) {
     } else if (shows) {
       sensor.picture = read_picture(element);
       check_gel_size(element, sensor);
+    } else if (returns) {
+      sensor.channels = read_channels(element);
     } else {
       element.read(sensor.imperfections);
       sensor.imperfections.source = part.source();
@@ -291,48 +307,8 @@ bool is_contact_of(const PairContactDescription& c, const std::string& one,
           (c.general_body == other && c.primitive_body == one && c.per_area()));
 }
 
-/// Refuses feedback of a sensor that touches a body whose own sensor touches the sensor's body.
-void refuse_facing(const Scene& scene, const TactileDescription& d, const std::string& touched) {
-  for (const PairContactDescription& c : scene.pair_contacts)
-    if (!c.sensor.empty() && c.general_body == touched && c.primitive_body == d.body)
-      throw InputError(fmt::format(
-          "{}<tactile> of '{}': feedback and {}<tactile> of '{}', which has feedback: both are "
-          "contacts of '{}' and '{}', which would count twice; expected ignores=\"{}\" of '{}' or "
-          "ignores=\"{}\" of '{}'",
-          d.source.prefix(), d.name, c.source.prefix(), c.sensor, d.body, touched, touched, d.name,
-          d.body, c.sensor));
-}
-
 const char* element_of(const PairContactDescription& c) {
   return c.per_area() ? "surface_contact" : "general_primitive_contact";
-}
-
-/// Adds contacts of the points of a sensor: a pair with every sensed body.
-void add_contacts(Scene& scene, const SceneNode& node, const TactileDescription& d) {
-  PairContactDescription pair;
-  for (const TactilePoint& p : tactile_points(d)) {
-    if (p.factors != TactilePoint{}.factors)
-      node.fail(
-          "feedback needs points with the sensor's own coefficients, and this layout has "
-          "factors of them");
-    pair.points.insert(pair.points.end(), p.position.begin(), p.position.end());
-  }
-  pair.general_body = d.body;
-  pair.sensor = d.name;
-  pair.coefficients = d.coefficients;
-  pair.law = d.law;
-  pair.source = d.source;
-  const std::vector<int> sensed = sensed_bodies(scene, d);
-  for (const int other : sensed) {
-    pair.primitive_body = scene.links[std::size_t(other)].body.name;
-    refuse_facing(scene, d, pair.primitive_body);
-    scene.pair_contacts.push_back(pair);
-  }
-  if (sensed.empty())
-    node.fail(
-        fmt::format("feedback of '{}' would touch nothing; expected a body with a distance "
-                    "that moves against '{}'",
-                    d.name, d.body));
 }
 
 /// Lets the points of a sensor touch as springs.
@@ -354,7 +330,7 @@ void add_feedback(Scene& scene, const SceneNode& node, const TactileDescription&
             "of its tactile sensor '{}', which has feedback. Where both lie, the contact is as "
             "many times stiffer, and the field shows its own share alone",
             c.source.prefix(), element_of(c), d.body, touched, d.name));
-  add_contacts(scene, node, d);
+  add_sensor_contacts(scene, d);
 }
 
 /// Lets the layer of a sensor be its contact. Its normal force relaxes by itself.
@@ -380,7 +356,7 @@ void add_layer_feedback(Scene& scene, const SceneElement& node, TactileDescripti
                          c.source.prefix(), element_of(c), c.general_body, c.primitive_body));
   }
   d.coefficients.damping = 0;
-  add_contacts(scene, node, d);
+  add_sensor_contacts(scene, d);
 }
 
 /// Reads names between commas; blanks beside a comma do not count.

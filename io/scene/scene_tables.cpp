@@ -56,8 +56,10 @@ std::string tables_of(const Scene& scene) {
       sum.add<int>(point.pixel);
       sum.add<double>(point.factors);
     }
-  for (const TactileDescription& sensor : scene.sensors)
+  for (const TactileDescription& sensor : scene.sensors) {
     if (sensor.picture) sum.add<std::uint64_t>(std::array{sensor.picture->gel->checksum});
+    if (sensor.channels) sum.add<std::uint64_t>(std::array{sensor.channels->map->checksum});
+  }
   if (scene.control)
     if (const auto* table = std::get_if<CsvControl>(&*scene.control))
       for (const std::vector<double>& row : table->rows) sum.add<double>(row);

@@ -61,4 +61,18 @@ const tinyxml2::XMLElement& parse_xml(tinyxml2::XMLDocument& document, const std
   return *root;
 }
 
+std::string quoted_text(const std::string& text) {
+  std::string out = "\"";
+  for (const char c : text) {
+    switch (c) {
+      case '&': out += "&amp;"; break;
+      case '<': out += "&lt;"; break;
+      case '>': out += "&gt;"; break;
+      case '"': out += "&quot;"; break;
+      default: out += c;
+    }
+  }
+  return out + "\"";
+}
+
 }  // namespace tangere

@@ -16,4 +16,7 @@ const tinyxml2::XMLElement& parse_xml(tinyxml2::XMLDocument& document, const std
                                       const std::string& name, const std::string& expected,
                                       std::vector<std::string>& warnings);
 
+/// Returns a text as the value of an attribute, with its quotes.
+std::string quoted_text(const std::string& text);
+
 }  // namespace tangere

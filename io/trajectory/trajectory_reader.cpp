@@ -203,8 +203,9 @@ std::size_t TrajectoryReader::find_sensor(const std::string& name) const {
     if (name.empty() || names.back() == name) return i;
   }
   if (std::find(impl_->sums.begin(), impl_->sums.end(), name) != impl_->sums.end())
-    throw InputError(impl_->path + ": of sensor '" + name +
-                     "' the run recorded only the sum, markers, surface, flow or pictures");
+    throw InputError(
+        impl_->path + ": of sensor '" + name +
+        "' the run recorded only the sum, markers, surface, flow, channels or pictures");
   if (names.empty())
     throw InputError(impl_->path + ": the run recorded no tactile field, pressure or shear");
   throw InputError(impl_->path + ": no sensor is named '" + name + "'" + suggestion(name, names));

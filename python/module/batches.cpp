@@ -461,7 +461,9 @@ static void add_statuses(nb::module_& m) {
       .value("not_converged", StepStatus::not_converged, "No solution was found.")
       .value("non_finite", StepStatus::non_finite, "A control or state was not finite.")
       .value("rotation", StepStatus::rotation, "A joint turned by pi or more.")
-      .value("singular", StepStatus::singular, "The Jacobian could not be factored.");
+      .value("singular", StepStatus::singular, "The Jacobian could not be factored.")
+      .value("unsolved_layer", StepStatus::unsolved_layer,
+             "The pressures of a layer that is a contact were not found.");
 }
 
 static void add_coordinates(nb::class_<PythonBatch>& batch) {
@@ -550,7 +552,8 @@ void add_batches(nb::module_& m) {
           "it; 'pad.sum' (E, 6): force [N] and where it presses [m], body axes; 'pad.flow' the\n"
           "shear over its largest length; 'pad.ideal' the field without imperfections;\n"
           "'pad.markers' the displacement of markers [m], 'pad.surface' that of a layer's\n"
-          "surface [m]; 'pad.height' (E, H, W, 1) float32 the surface of a gel [m], 'pad.rgb' and\n"
+          "surface [m]; 'pad.channels' (E, channels) what the hardware returns;\n"
+          "'pad.height' (E, H, W, 1) float32 the surface of a gel [m], 'pad.rgb' and\n"
           "'pad.rgb_marker' (E, H, W, 3) uint8 pictures of it; of a camera 'eye.rgb', 'eye.depth'\n"
           "[m] and 'eye.ids' (E, H, W, 1) int16, nb for the ground, -1 for nothing. `out`: an\n"
           "array to fill instead of a new one.")

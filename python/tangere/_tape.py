@@ -111,8 +111,8 @@ class SimulationBase:
         steps: calls of step() after a reset(), at most.
         every: steps of the simulation in each.
         read: names of what s[name] holds, for each environment: "pad" (rows, cols, 3) [N],
-            "pad.sum" (6), "pad.pressure", "pad.shear", "pad.flow", "pad.markers", "pad.surface" of
-            sensors;
+            "pad.sum" (6), "pad.pressure", "pad.shear", "pad.flow", "pad.markers",
+            "pad.surface", "pad.channels" of sensors;
             "bodies" (nb, 13) or "bodies.box" (13): x y z, quaternion w x y z, angular and linear
             velocity; "variables" (n, 3), the end effectors, or one by its name (3); "shear_state"
             (points, 3) [m] of contacts with ks. None: end effectors and all fields.

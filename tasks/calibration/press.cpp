@@ -26,6 +26,24 @@ Vector3 force_on_skin(Readout& readout, const Batch& batch) {
   return {sum[0], sum[1], sum[2]};
 }
 
+/// Drives the indenter along a path, and calls f after each row.
+void drive(const Model& model, std::span<const double> depth, std::span<const double> shear,
+           const std::function<void(const Batch&)>& f) {
+  Stepper stepper(model);
+  Batch batch(model, 1);
+  const std::array<double, 3> start{shear.front(), 0, 1e-3}, rest{};
+  batch.set_state(0, start, rest);
+  for (std::size_t k = 0; k < depth.size(); ++k) {
+    stepper.step(batch, std::array<double, 3>{shear[k], 0, -depth[k]});
+    if (failed(batch.status(0)))
+      throw InputError(fmt::format(
+          "row {}: the step to depth {} m and shear {} m failed: {}; expected a shorter "
+          "way from row to row",
+          k + 1, depth[k], shear[k], to_string(batch.status(0))));
+    f(batch);
+  }
+}
+
 }  // namespace
 
 std::vector<double> PressRecording::rates() const {
@@ -69,29 +87,43 @@ std::vector<double> press_forces(const Scene& scene, std::span<const double> dep
   return out;
 }
 
-std::vector<double> shear_forces(const Scene& scene, std::span<const double> depth,
-                                 std::span<const double> shear) {
+Scene without_rates(const Scene& scene) {
   Scene slow = scene;
   TactileDescription& sensor = slow.sensors.at(0);
   sensor.coefficients.kt = sensor.coefficients.damping = 0;
   if (sensor.material) sensor.material->relaxation = 0;
-  const Model model(slow);
-  Stepper stepper(model);
+  return slow;
+}
+
+std::vector<double> shear_forces(const Scene& scene, std::span<const double> depth,
+                                 std::span<const double> shear) {
+  const Model model(without_rates(scene));
   Readout readout(model);
-  Batch batch(model, 1);
-  const std::array<double, 3> start{shear.front(), 0, 1e-3}, rest{};
-  batch.set_state(0, start, rest);
   std::vector<double> out;
-  for (std::size_t k = 0; k < depth.size(); ++k) {
-    stepper.step(batch, std::array<double, 3>{shear[k], 0, -depth[k]});
-    if (failed(batch.status(0)))
-      throw InputError(fmt::format(
-          "row {}: the step to depth {} m and shear {} m failed: {}; expected a shorter "
-          "way from row to row",
-          k + 1, depth[k], shear[k], to_string(batch.status(0))));
-    out.push_back(force_on_skin(readout, batch)[0]);
-  }
+  drive(model, depth, shear,
+        [&](const Batch& batch) { out.push_back(force_on_skin(readout, batch)[0]); });
   return out;
+}
+
+void for_fields(const Model& model, double zero, std::span<const double> depth,
+                std::span<const double> x, std::span<const double> y, std::span<const double> shear,
+                const std::function<void(std::span<const double>)>& f) {
+  Readout readout(model);
+  std::vector<double> field(3 * std::size_t(model.sensors()[0].points)), acting;
+  std::span<double> reading = field;
+  const auto read = [&](const Batch& batch) {
+    readout.read_block(batch, 0, {0, FieldForm::ideal}, {&reading, 1});
+    f(field);
+  };
+  for (const double d : depth) acting.push_back(d + zero);
+  if (!shear.empty()) return drive(model, acting, shear, read);
+  Batch batch(model, 1);
+  for (std::size_t k = 0; k < acting.size(); ++k) {
+    batch.set_state(0,
+                    std::array<double, 3>{x.empty() ? 0 : x[k], y.empty() ? 0 : y[k], -acting[k]},
+                    std::array<double, 3>{});
+    read(batch);
+  }
 }
 
 }  // namespace tangere

@@ -2,6 +2,7 @@
 // Forces of a skin under an indenter that follows a given path: what a press bench records.
 #pragma once
 
+#include <functional>
 #include <span>
 #include <vector>
 
@@ -37,5 +38,15 @@ std::vector<double> press_forces(const Scene& scene, std::span<const double> dep
 /// position motor at the joint. Throws InputError for a step that fails, with its row.
 std::vector<double> shear_forces(const Scene& scene, std::span<const double> depth,
                                  std::span<const double> shear);
+
+/// Returns the scene with its sensor's forces by rates left out.
+Scene without_rates(const Scene& scene);
+
+/// Calls f with the ideal field, (points, 3) [N], at each row, after `zero` [m] is added to its
+/// depth. `x`, `y`: of the indenter from the middle of the skin, or empty: there. `shear`: not
+/// empty: the rows are a path as in shear_forces(). `model`: of such a scene.
+void for_fields(const Model& model, double zero, std::span<const double> depth,
+                std::span<const double> x, std::span<const double> y, std::span<const double> shear,
+                const std::function<void(std::span<const double>)>& f);
 
 }  // namespace tangere

@@ -88,6 +88,7 @@ TensorSpec field_spec(const SensorInfo& sensor, FieldOutput output) {
   const bool has_unit = output.form != FieldForm::flow && !is_colour(output.form);
   spec.unit = is_length ? "m" : has_unit ? "N" : "1";
   spec.shape = reading_shape(sensor, output.form);
+  if (output.form == FieldForm::channels) spec.unit = "the channels'";
   if (output.form == FieldForm::pressure) spec.shape.pop_back();
   return spec;
 }

@@ -78,33 +78,37 @@ class Fields : public RolloutLoss {
   std::size_t components_;
 };
 
-/// Readings that are functions of the ideal field: displacements of markers, or pictures less those
-/// of no field. The cotangent of the field is the pullback of theirs.
+/// Readings that are functions of the ideal field: displacements of markers, channels or pictures,
+/// less those of no field. The cotangent of the field is the pullback of theirs.
 class Readings : public RolloutLoss {
  public:
   Readings(const Model& model, LossKind kind, int every) : model_(model), every_(every) {
-    const bool pictures = kind == LossKind::pictures;
+    const bool pictures = kind == LossKind::pictures, channels = kind == LossKind::channels;
+    const FieldForm form = pictures   ? FieldForm::rgb
+                           : channels ? FieldForm::channels
+                                      : FieldForm::markers;
     if (pictures) scale_ = 1.0 / 255;
     bool any = false;
     for (const TactileDescription& d : model.scene().sensors) {
       const int sensor = static_cast<int>(maps_.size());
       maps_.emplace_back();
-      if (pictures ? !d.picture : !d.markers) continue;
+      if (!reason_against(model.scene(), {sensor, form}).empty()) continue;
       any = true;
       if (is_imperfect(d.imperfections) || !d.points.empty() || (pictures && !d.layer))
         throw InputError(
             d.source.prefix() + "loss '" + to_string(kind) + "': sensor '" + d.name +
             (pictures ? "' is imperfect or has no <layer>; expected an ideal one with a layer"
                       : "' is imperfect or a list of points; expected an ideal rect_array"));
-      const FormMap& map = maps_.back().emplace(
-          model, FieldOutput{sensor, pictures ? FieldForm::rgb : FieldForm::markers});
+      const FormMap& map = maps_.back().emplace(model, FieldOutput{sensor, form});
       rest_.resize(maps_.size());
       rest_.back().resize(map.size());
       map.evaluate(std::vector<double>(map.field_size()), rest_.back());
     }
     if (!any)
       throw InputError(std::string("loss '") + to_string(kind) + "': no sensor of the scene has " +
-                       (pictures ? "<picture>" : "<markers>"));
+                       (pictures   ? "<picture>"
+                        : channels ? "<channels>"
+                                   : "<markers>"));
   }
   [[nodiscard]] bool reads_fields(std::int64_t step) const override {
     return step > 0 && step % every_ == 0;
@@ -175,6 +179,7 @@ const char* to_string(LossKind value) {
     case LossKind::end_effectors: return "variables";
     case LossKind::markers: return "markers";
     case LossKind::pictures: return "pictures";
+    case LossKind::channels: return "channels";
   }
   return "unknown";
 }
@@ -192,14 +197,16 @@ const char* loss_meaning(LossKind value) {
       return "half the squares of all markers' displacements, summed over fields";
     case LossKind::pictures:
       return "half the squares of all pictures less their background, over 255, summed over fields";
+    case LossKind::channels:
+      return "half the squares of all channels less those of no field, summed over fields";
   }
   return "";
 }
 
 const std::vector<LossKind>& loss_kinds() {
   static const std::vector<LossKind> kinds = {
-      LossKind::final_state,   LossKind::path,    LossKind::tactile, LossKind::shear,
-      LossKind::end_effectors, LossKind::markers, LossKind::pictures};
+      LossKind::final_state,   LossKind::path,    LossKind::tactile,  LossKind::shear,
+      LossKind::end_effectors, LossKind::markers, LossKind::pictures, LossKind::channels};
   return kinds;
 }
 
@@ -216,7 +223,8 @@ std::unique_ptr<RolloutLoss> make_loss(LossKind kind, const Model& model, int ev
     case LossKind::tactile: return std::make_unique<Fields>(every, 3);
     case LossKind::shear: return std::make_unique<Fields>(every, 2);
     case LossKind::markers:
-    case LossKind::pictures: return std::make_unique<Readings>(model, kind, every);
+    case LossKind::pictures:
+    case LossKind::channels: return std::make_unique<Readings>(model, kind, every);
     case LossKind::end_effectors: break;
   }
   return std::make_unique<EndEffectors>();

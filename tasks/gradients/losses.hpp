@@ -21,6 +21,7 @@ enum class LossKind {
   markers,        ///< ½ Σ |u|² of all markers' displacements, every k-th step
   /// ½ Σ |(C - B)/255|² of all pictures by their background, before rounding, every k-th step.
   pictures,
+  channels,  ///< ½ Σ |y - y₀|² of all channels by those of no field, every k-th step
 };
 const char* to_string(LossKind value);
 /// Describes the loss in words, for files.
@@ -29,8 +30,8 @@ const char* loss_meaning(LossKind value);
 const std::vector<LossKind>& loss_kinds();
 
 /// `every`: steps between fields. Throws InputError for a loss on sensors or end effectors that the
-/// scene does not have, for one on markers where their sensor is imperfect or a list of points, and
-/// for one on pictures of sensors without a layer.
+/// scene does not have, for one on markers or channels where their sensor is imperfect or a list of
+/// points, and for one on pictures of sensors without a layer.
 std::unique_ptr<RolloutLoss> make_loss(LossKind kind, const Model& model, int every);
 
 }  // namespace tangere

@@ -86,10 +86,9 @@ TEST(Record, AnythingElseOfATrajectoryStillWorks) {
   const Outcome none = run(folder, {"plot", "sum.h5", "-o", "sum.svg"});
   EXPECT_EQ(none.exit_code, 2);
   EXPECT_THAT(none.err, HasSubstr("the run recorded no tactile field, pressure or shear"));
-  EXPECT_THAT(
-      run(folder, {"plot", "sum.h5", "-o", "sum.svg", "--sensor", "pad"}).err,
-      HasSubstr(
-          "of sensor 'pad' the run recorded only the sum, markers, surface, flow or pictures"));
+  EXPECT_THAT(run(folder, {"plot", "sum.h5", "-o", "sum.svg", "--sensor", "pad"}).err,
+              HasSubstr("of sensor 'pad' the run recorded only the sum, markers, surface, flow, "
+                        "channels or pictures"));
   run_json(folder, {"simulate", "stable_grasp", "-o", "task.h5", "--record", "left_pad.sum"});
   EXPECT_EQ(shape(folder, "task.h5", "tactile/left_pad/sum").back(), 6U);
 }
@@ -433,7 +432,7 @@ TEST(Record, MarkersAreRecordedWhereASensorHasThem) {
            {"simulate", "gel.xml", "-o", "only.h5", "--steps", "20", "--record", "pad.markers"});
   EXPECT_EQ(run(folder, {"view", "only.h5", "-o", "only.html"}).exit_code, 0);
   EXPECT_THAT(run(folder, {"plot", "only.h5", "-o", "only.svg", "--sensor", "pad"}).err,
-              HasSubstr("recorded only the sum, markers, surface, flow or pictures"));
+              HasSubstr("recorded only the sum, markers, surface, flow, channels or pictures"));
   const Outcome check = run(folder, {"gradcheck", ball, "--loss", "markers"});
   EXPECT_EQ(check.exit_code, 2);
   EXPECT_THAT(check.err, HasSubstr("no sensor of the scene has <markers>"));

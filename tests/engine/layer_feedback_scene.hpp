@@ -93,6 +93,10 @@ class LayerProbe {
     });
     return sum;
   }
+  /// Sets the poses of the links at the start of the solve.
+  void find_poses() {
+    table_.stage<1>().poses_at(m_.view, w_.stage, w_.q0, w_.v0, w_.zero, w_.poses_before.data());
+  }
   SingleWorkspace& work() { return w_; }
   const CompiledModel& compiled_model() const { return m_; }
 

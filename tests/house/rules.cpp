@@ -321,11 +321,11 @@ std::vector<Violation> check_heavy_headers(const Tree& tree) {
       {"Eigen/",
        {{"engine/derivative", 1},
         {"engine/step", 1},
-        {"tasks/calibration", 2},
+        {"tasks/calibration", 3},
         {"tasks/catalogue", 1},
         {"tasks/gradients", 1}}},
       {"hdf5.h", {{"io/hdf5", 9}, {"io/dataset", 10}, {"io/trajectory", 6}, {"io/view", 4}}},
-      {"nlohmann/json.hpp", {{"apps", 33}, {"io/dataset", 2}, {"io/view", 1}}},
+      {"nlohmann/json.hpp", {{"apps", 34}, {"io/dataset", 2}, {"io/view", 1}}},
       {"tbb/flow_graph.h", {{"tasks/run", 1}}},
       {"regex", {}},
       {"iostream", {}}};

@@ -10,6 +10,7 @@
 #include "engine/derivative/readout_pullback.hpp"
 #include "engine/derivative/tangent.hpp"
 #include "engine/model/compiled_model.hpp"
+#include "engine/scene/sensor_contacts.hpp"
 #include "engine/sense/readout.hpp"
 #include "engine/step/tape.hpp"
 #include "tests/engine/field_loss.hpp"
@@ -39,6 +40,7 @@ Scene layer_scene(PrimitiveShape shape, Pad pad) {
 Scene contact_scene(PrimitiveShape shape, Pad pad) {
   Scene s = layer_scene(shape, pad);
   s.sensors[0].layer->feedback = true;
+  add_sensor_contacts(s, s.sensors[0]);
   return s;
 }
 

@@ -195,6 +195,58 @@ TEST(GelLayer, SmallContacts) {
   EXPECT_GT(gel.pressure()[44], 0);
 }
 
+/// Relaxation alone finds the pressures of Newton's method. At a limit the layer is unsolved.
+TEST(GelLayer, SaysWhetherItIsSolved) {
+  CompiledLayer layer = layer_of(9, 2, 0.8, 4, 0.475, 0.4);
+  const Numbers depth = depths(layer, ball(5, 0.7));
+  GelLayer newton, relaxed;
+  newton.solve(layer, depth, 0.4);
+  EXPECT_TRUE(newton.solved());
+  layer.most_systems = 0;
+  relaxed.solve(layer, depth, 0.4);
+  EXPECT_TRUE(relaxed.solved());
+  EXPECT_EQ(relaxed.systems(), 1) << "the last, of what presses after it";
+  for (std::size_t s = 0; s < depth.size(); ++s)
+    EXPECT_NEAR(relaxed.pressure()[s], newton.pressure()[s], 1e-9) << s;
+  layer.most_sweeps = 2;
+  relaxed.solve(layer, depth, 0.4);
+  EXPECT_FALSE(relaxed.solved());
+  relaxed.solve(layer, Numbers(depth.size()), 0.4);
+  EXPECT_TRUE(relaxed.solved()) << "nothing presses";
+}
+
+/// A solver that goes on from its last solution has the bits of one that begins anew, and needs
+/// fewer systems.
+TEST(GelLayer, TheLastSolutionDoesNotMatterToTheBits) {
+  std::mt19937_64 random(11);
+  std::normal_distribution<double> normal;
+  for (const bool feedback : {false, true})
+    for (const int side : {1, 2}) {
+      CompiledLayer layer = layer_of(14, side, 0.8, 4, 0.475, 0.4);
+      layer.number = 1;
+      layer.feedback = feedback;
+      GelLayer kept;
+      int warm = 0, cold = 0;
+      double x = 0, depth = 0.6;
+      for (int step = 0; step < 60; ++step) {
+        // Mostly a slow slide, now and then a leap, a lift, or a flat body.
+        x = step % 13 == 12 ? 2 * normal(random) : x + 0.01 * normal(random);
+        depth = step % 17 == 16 ? -0.1 : 0.6 + 0.01 * normal(random);
+        const Numbers depths_now =
+            step % 19 == 18 ? depths(layer, [&](double u, double) { return u < 2 ? 0.2 : 0.0; })
+                            : depths(layer, ball(5, depth, x));
+        GelLayer fresh;
+        kept.solve(layer, depths_now, 0.4);
+        fresh.solve(layer, depths_now, 0.4);
+        warm += kept.systems(), cold += fresh.systems();
+        ASSERT_TRUE(kept.solved());
+        for (std::size_t s = 0; s < depths_now.size(); ++s)
+          ASSERT_EQ(kept.pressure()[s], fresh.pressure()[s]) << side << ' ' << step << ' ' << s;
+      }
+      EXPECT_LT(warm, cold) << side;
+    }
+}
+
 TEST(GelLayer, DerivativesAgreeWithDifferences) {
   const CompiledLayer layer = layer_of(10, 2, 0.8, 4, 0.475, 0.4);
   const Numbers depth = depths(layer, ball(5, 0.7));

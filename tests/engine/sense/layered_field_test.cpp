@@ -207,6 +207,12 @@ TEST(LayeredField, SensorsThatCannotHaveALayerAreRefused) {
   EXPECT_EQ(fault([](TactileDescription&) {}), "");
   EXPECT_THAT(fault([](TactileDescription& d) { d.material.reset(); }),
               HasSubstr("no material; expected modulus and thickness"));
+  EXPECT_THAT(fault([](TactileDescription& d) {
+                d.points = {{{0, 0, 0.005}, {0, 0, 1}, {1, 0, 0}, {0, 1, 0}},
+                            {{0, 1e-3, 0.004}, {0, 0.6, 0.8}, {1, 0, 0}, {0, 0.8, -0.6}}};
+              }),
+              HasSubstr("points in a list; expected a flat array"))
+      << "a layer on a curved skin has not been verified";
   EXPECT_THAT(fault([](TactileDescription& d) { d.material->thickness = 1e-3; }),
               HasSubstr("expected at most a third of the thickness"));
   EXPECT_THAT(fault([](TactileDescription& d) { d.imperfections.delay = 0.01; }),

@@ -1,15 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 // Tests <layer feedback="true">: the layer's wrench against its energy, its field and its Jacobian,
 // and motions with it.
-#include <gtest/gtest.h>
+#include <gmock/gmock.h>
 
 #include <array>
 #include <cmath>
 #include <iostream>
 
 #include "engine/derivative/dual_stage.hpp"
+#include "engine/model/compiled_layer.hpp"
+#include "engine/scene/sensor_contacts.hpp"
 #include "engine/sense/readout.hpp"
 #include "engine/step/displacement.hpp"
+#include "engine/step/lane_energy.hpp"
 #include "engine/step/stepper.hpp"
 #include "tests/engine/layer_feedback_scene.hpp"
 #include "tests/engine/runs.hpp"
@@ -318,6 +321,108 @@ TEST(LayerFeedback, TheBitsAreTheSameAloneAndInABatch) {
       EXPECT_EQ(testing::q_of(all, e), testing::q_of(alone[std::size_t(e)])) << step << ' ' << e;
     }
   }
+}
+
+/// A step whose layer has no pressures fails and says so, and a reading has no numbers.
+TEST(LayerFeedback, AnUnsolvedLayerHasAStatus) {
+  const Model model = gel_model(gel_table());
+  Batch batch(model, 1, 0);
+  Stepper stepper(model);
+  for (int step = 0; step < 30; ++step) stepper.step(batch, {});
+  ASSERT_FALSE(failed(batch.status(0)));
+  const Numbers q = testing::q_of(batch);
+  const auto& layer = compiled(model).sensors[0].layer;
+  ASSERT_EQ(layer.get(), compiled(model).layer_pads[0].layer.get());
+  auto& limits = const_cast<CompiledLayer&>(*layer);
+  limits.most_systems = 0, limits.most_sweeps = 2;
+  stepper.step(batch, {});
+  EXPECT_EQ(batch.status(0), StepStatus::unsolved_layer) << to_string(batch.status(0));
+  EXPECT_EQ(testing::q_of(batch), q);
+  Numbers field(std::size_t(3 * model.sensors()[0].points));
+  Readout(model).tactile(batch, 0, 0, field);
+  EXPECT_TRUE(std::isnan(field[0]));
+}
+
+/// Where all points stick and have moved alike, the energy of friction is half its force times the
+/// way.
+TEST(LayerFeedback, TheEnergyOfFrictionIsItsWork) {
+  const Model model = gel_model(gel_table(R"(type="cuboid" size="0.03 0.03 0.039")", R"(mu="50")"));
+  LayerProbe probe(model);
+  const CompiledModel& m = probe.compiled_model();
+  SingleWorkspace& w = probe.work();
+  const double way = 2e-5;
+  ShearState& memory = w.shear.now[0];
+  for (const kernels::ShearSpringContact& of : m.shear_springs)
+    if (of.sensor < 0)
+      for (int k = 0; k < of.contact.n_points; ++k) {
+        ShearEntry entry{};
+        entry.point = of.first + k;
+        entry.s[0] = way;
+        memory.push_back(entry);
+      }
+  const ShearState kept = memory;
+  Numbers q = testing::q_of(Batch(model, 1));
+  q[2] -= 3e-4;
+  probe.place(q, Numbers(std::size_t(model.nv())));
+  const double side = std::abs(probe.wrench()[3]);
+  EXPECT_GT(side, 0.1);
+  probe.find_poses();
+  const double energy = energy_of_friction(m, w, w.poses_before, kept, 0);
+  EXPECT_NEAR(energy, 0.5 * side * way, 1e-9 * energy);
+  double springs = 0;
+  for (const ShearEntry& entry : kept) springs += 0.5 * entry.s[0] * entry.s[0];
+  springs *= m.pairs[0].parameters.ks.value;
+  EXPECT_GT(std::abs(energy / springs - 1), 0.02) << "as if the layer were a bed of springs";
+}
+
+/// A block that rests on a gel sleeps, keeps its place and its field, and wakes.
+TEST(LayerFeedback, ABodyOnAGelSleeps) {
+  const Model model =
+      gel_model(testing::with("v=\"0.05 -0.02 0 0 0 3\"", "v=\"0 0 0 0 0 0\"",
+                              gel_table(R"(type="cuboid" size="0.016 0.016 0.039")", kViscous)));
+  StepperOptions options;
+  options.sleep = kUsualSleep;
+  Batch batch(model, 1, 0), awake(model, 1, 0);
+  Stepper with(model, options), without(model);
+  for (int step = 0; step < 800; ++step) with.step(batch, {}), without.step(awake, {});
+  ASSERT_EQ(batch.sleep(0).bodies, 1);
+  const Numbers slept = testing::q_of(batch);
+  Readout readout(model);
+  Numbers field(std::size_t(3 * model.sensors()[0].points)), other(field);
+  readout.tactile(batch, 0, 0, field);
+  readout.tactile(awake, 0, 0, other);
+  double pressed = 0, off = 0;
+  for (std::size_t k = 2; k < field.size(); k += 3)
+    pressed += std::abs(field[k]), off += std::abs(field[k] - other[k]);
+  EXPECT_GT(pressed, 0.2);
+  EXPECT_LT(off, 1e-3 * pressed);
+  for (int step = 0; step < 50; ++step) with.step(batch, {});
+  EXPECT_EQ(testing::q_of(batch), slept);
+  Numbers v(std::size_t(model.nv()));
+  v[0] = 0.1;
+  batch.set_state(0, slept, v);
+  with.step(batch, {});
+  EXPECT_EQ(batch.sleep(0).bodies, 0);
+  EXPECT_NE(testing::q_of(batch), slept);
+}
+
+/// A scene that is made in C++ needs the contacts that the reader adds.
+TEST(LayerFeedback, WithoutContactsIsRefused) {
+  Scene scene = parse_scene(gel_table(), "gel.xml").scene;
+  const auto contacts = scene.pair_contacts;
+  scene.pair_contacts.clear();
+  try {
+    const Model model(scene);
+    ADD_FAILURE() << "expected a refusal";
+  } catch (const InputError& error) {
+    EXPECT_THAT(error.what(), ::testing::HasSubstr("feedback, but no contact with 'ball'"));
+    EXPECT_THAT(error.what(), ::testing::HasSubstr("add_sensor_contacts()"));
+  }
+  add_sensor_contacts(scene, scene.sensors[0]);
+  ASSERT_EQ(scene.pair_contacts.size(), contacts.size());
+  EXPECT_EQ(scene.pair_contacts[0].points, contacts[0].points);
+  const Model model(scene);
+  EXPECT_EQ(compiled(model).pairs[0].layer_pad, 0);
 }
 
 }  // namespace

@@ -120,6 +120,27 @@ TEST(Markers, ThreeRoutesAgree) {
   }
 }
 
+/// Channels are quadratic in the field.
+TEST(Channels, ThreeRoutesAgree) {
+  for (const bool shear : {false, true}) {
+    ChannelMap map;
+    map.rows = 2, map.cols = 3, map.shear = shear;
+    map.names = {"one", "two"};
+    map.offset = {4, -3};
+    for (std::size_t k = 0; k < 2 * map.loads(); ++k)
+      map.linear.push_back(std::cos(1.0 + double(k)));
+    for (std::size_t k = 0; k < 2 * map.pairs(); ++k)
+      map.quadratic.push_back(3 * std::sin(2.0 + double(k)));
+    Scene scene = shipped("rolling_ball_small");
+    scene.sensors[0].channels.emplace();
+    scene.sensors[0].channels->noise = 2;  // of readings, not of the loss
+    scene.sensors[0].channels->map = std::make_shared<const ChannelMap>(map);
+    expect_right(check(scene, LossKind::channels, 120, 6), 1e-6);
+    scene.sensors[0].channels.reset();
+    EXPECT_THROW(check(scene, LossKind::channels, 120, 6), InputError);
+  }
+}
+
 /// Pictures of a layer follow from its field.
 TEST(Pictures, ThreeRoutesAgree) {
   Scene scene = shipped("gel_press");
