@@ -486,47 +486,15 @@ constexpr Attribute kSchema[] = {
     row(kVarying, "tie", kNone, U::one, "a word; numbers with the same are drawn together"),
 };
 
+// clang-format off
 constexpr const char* kElementNames[] = {
-    "option",
-    "solver_option",
-    "ground",
-    "robot",
-    "link",
-    "joint",
-    "body",
-    "visual",
-    "collision",
-    "motor",
-    "ground_contact",
-    "general_primitive_contact",
-    "tactile",
-    "imperfections",
-    "markers",
-    "endeffector",
-    "joint",
-    "constant",
-    "piecewise",
-    "at",
-    "csv",
-    "random",
-    "outputs",
-    "joint",
-    "motor",
-    "ground_contact",
-    "general_primitive_contact",
-    "tactile",
-    "body",
-    "surface_contact",
-    "surface_contact",
-    "layer",
-    "picture",
-    "connect",
-    "weld",
-    "connect",
-    "weld",
-    "camera",
-    "channels",
-};
+    "option", "solver_option", "ground", "robot", "link", "joint", "body", "visual", "collision",
+    "motor", "ground_contact", "general_primitive_contact", "tactile", "imperfections", "markers",
+    "endeffector", "joint", "constant", "piecewise", "at", "csv", "random", "outputs", "joint",
+    "motor", "ground_contact", "general_primitive_contact", "tactile", "body", "surface_contact",
+    "surface_contact", "layer", "picture", "connect", "weld", "connect", "weld", "camera",
+    "channels"};
+// clang-format on
 static_assert(std::size(kElementNames) == kElements);
 
 constexpr Holder kHolders[] = {
