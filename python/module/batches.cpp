@@ -485,6 +485,18 @@ static void add_coordinates(nb::class_<PythonBatch>& batch) {
           nb::rv_policy::automatic, "(B, 16, nv) float64, read only: the velocities, as q_view.");
 }
 
+constexpr const char* kTactileText =
+    "Reads one sensor or camera in all environments: 'pad' (E, rows, cols, 3) or (E, points, "
+    "3),\n"
+    "shear, shear, normal force of each point [N]; 'pad.pressure' and 'pad.shear' parts of\n"
+    "it; 'pad.sum' (E, 6): force [N] and where it presses [m], body axes; 'pad.flow' the\n"
+    "shear over its largest length; 'pad.ideal' the field without imperfections;\n"
+    "'pad.markers' the displacement of markers [m], 'pad.surface' that of a layer's\n"
+    "surface [m]; 'pad.channels' (E, channels) what the hardware returns;\n"
+    "'pad.height' (E, H, W, 1) float32 the surface of a gel [m], 'pad.rgb' and\n"
+    "'pad.rgb_marker' (E, H, W, 3) uint8 pictures of it; of a camera 'eye.rgb', 'eye.depth'\n"
+    "[m] and 'eye.ids' (E, H, W, 1) int16, nb for the ground, -1 for nothing. `out`: an\n"
+    "array to fill instead of a new one.";
 constexpr const char* kRunText =
     "Takes T steps with the controls `u`, (T, E, nu), in one call. Keeps the state after every\n"
     "`every` steps, and the readings named in `fields`. `envs`: the environments that are stepped\n"
@@ -542,21 +554,10 @@ void add_batches(nb::module_& m) {
            "motors' ranges. InputError: another shape.")
       .def("run", &PythonBatch::run, "u"_a, "every"_a = 1, "fields"_a = std::vector<std::string>(),
            "envs"_a = nb::none(), kRunText)
-      .def(
-          "tactile", &PythonBatch::tactile, "reading"_a, "out"_a = nb::none(),
-          nb::sig("def tactile(self, reading: str, out: numpy.typing.NDArray | None = None) -> "
-                  "numpy.typing.NDArray"),
-          "Reads one sensor or camera in all environments: 'pad' (E, rows, cols, 3) or (E, points, "
-          "3),\n"
-          "shear, shear, normal force of each point [N]; 'pad.pressure' and 'pad.shear' parts of\n"
-          "it; 'pad.sum' (E, 6): force [N] and where it presses [m], body axes; 'pad.flow' the\n"
-          "shear over its largest length; 'pad.ideal' the field without imperfections;\n"
-          "'pad.markers' the displacement of markers [m], 'pad.surface' that of a layer's\n"
-          "surface [m]; 'pad.channels' (E, channels) what the hardware returns;\n"
-          "'pad.height' (E, H, W, 1) float32 the surface of a gel [m], 'pad.rgb' and\n"
-          "'pad.rgb_marker' (E, H, W, 3) uint8 pictures of it; of a camera 'eye.rgb', 'eye.depth'\n"
-          "[m] and 'eye.ids' (E, H, W, 1) int16, nb for the ground, -1 for nothing. `out`: an\n"
-          "array to fill instead of a new one.")
+      .def("tactile", &PythonBatch::tactile, "reading"_a, "out"_a = nb::none(),
+           nb::sig("def tactile(self, reading: str, out: numpy.typing.NDArray | None = None) -> "
+                   "numpy.typing.NDArray"),
+           kTactileText)
       .def("set_state", &PythonBatch::set_state, "q"_a, "v"_a, "envs"_a = nb::none(),
            "Sets states: `q` (n, nq) or (nq), `v` (n, nv) or (nv), of the environments listed in\n"
            "`envs` (indices, or a mask (E)), or of all. Releases a failed environment; drops the\n"
