@@ -77,7 +77,6 @@ INSTANTIATE_TEST_SUITE_P(
                       Checked{"cap_opening", PolicyKind::scripted, 20},
                       Checked{"cap_opening_blind", PolicyKind::random, 20},
                       Checked{"stable_grasp", PolicyKind::random, 2, 0, 3},
-                      Checked{"in_hand", PolicyKind::scripted, 1, 0, 3},
                       Checked{"insertion", PolicyKind::random, 3},
                       Checked{"insertion_translation", PolicyKind::random, 2},
                       Checked{"insertion_rotation", PolicyKind::random, 2, 1},
