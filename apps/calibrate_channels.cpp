@@ -25,8 +25,9 @@ ChannelRequest request_of(const ChannelCalibration& a, const ChannelRecording& r
   const std::vector<double> nodes =
       a.nodes.empty() ? std::vector{kUsualNodes, kUsualNodes} : a.nodes;
   for (const double n : nodes)
-    if (n != std::floor(n))
-      throw InputError(fmt::format("--nodes {},{}; expected whole numbers", nodes[0], nodes[1]));
+    if (n != std::floor(n) || n < 1 || n > kMostNodes)
+      throw InputError(fmt::format("--nodes {},{}; expected whole numbers from 1 to {}", nodes[0],
+                                   nodes[1], kMostNodes));
   out.rows = int(nodes[0]), out.cols = int(nodes[1]);
   if (!a.loads.empty() && a.loads != "pressure" && a.loads != "force")
     throw InputError(fmt::format("--loads {}; expected pressure or force", a.loads));

@@ -8,6 +8,7 @@
 #include "engine/scene/variable_numbers.hpp"
 #include "engine/sense/energy_balance.hpp"
 #include "engine/sense/flow_map.hpp"
+#include "engine/sense/loop_readings.hpp"
 #include "engine/sense/readout.hpp"
 #include "engine/step/control.hpp"
 #include "engine/step/shear_state_arrays.hpp"

@@ -54,7 +54,7 @@ void compile_loops(CompiledModel& m, const NameIndex& bodies) {
     return link < 0 ? kIdentityFrame : world[std::size_t(link)];
   };
   NameIndex names;
-  for (const LoopDescription& d : m.scene.loops) {
+  for (LoopDescription& d : m.scene.loops) {
     names.add("loop", d.name, 0, d.source);
     const CompiledBody& one = m.bodies[std::size_t(bodies.find("body", d.body1, d.source))];
     CompiledBody two;
@@ -72,6 +72,11 @@ void compile_loops(CompiledModel& m, const NameIndex& bodies) {
     loop.frame2 = relative(frame_at(two.link), compose(frame_at(one.link), loop.frame1));
     if (d.position2) loop.frame2.p = two.frame.R * vec3_of(*d.position2) + two.frame.p;
     if (d.orientation2) loop.frame2.R = two.frame.R * to_frame({{0, 0, 0}, *d.orientation2}).R;
+    // The place that is found is kept: a scene with another number has the same one.
+    const Vec3<double> place = transpose(two.frame.R) * (loop.frame2.p - two.frame.p);
+    if (!d.position2) d.position2 = Vector3{place.x, place.y, place.z};
+    const kernels::Quat<double> turn = quaternion_of(transpose(two.frame.R) * loop.frame2.R);
+    if (d.weld && !d.orientation2) d.orientation2 = Quaternion{turn.w, turn.x, turn.y, turn.z};
     loop.weld = d.weld;
     for (std::size_t k = 0; k < kernels::kLoopNumbers; ++k)
       loop.*kernels::kLoopParameters[k] = {d.*kLoopNumbers[k], -1};

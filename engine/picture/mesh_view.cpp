@@ -7,6 +7,7 @@
 //   1/t = m·(u, v, 1) / m·a
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "engine/picture/scene_view.hpp"
 
@@ -15,6 +16,7 @@ namespace {
 
 constexpr std::int64_t kParts = 256, kHalf = kParts / 2;  // of a pixel
 constexpr double kFarthest = 1 << 29;                     // of a corner, in parts
+constexpr double kGuard = 8192;  // pixels from the middle beyond which triangles are cut off
 
 /// E(x, y) = (b - a) x (p - a) of an edge from a to b, zero or more on the inner side.
 struct Edge {
@@ -57,34 +59,56 @@ void SceneView::add(const ViewMesh& mesh, const ViewSolid& at) {
       corners_[k][i] = at.origin[i] + (x * at.axes[0][i] + (y * at.axes[1][i] + z * at.axes[2][i]));
     if (corners_[k][2] > kNearest) places_[k] = place_of(corners_[k]);
   }
+  const double wide = kGuard / focal_;
+  const auto fits = [wide](const Vector3& p) {
+    return std::abs(p[0]) <= wide * p[2] && std::abs(p[1]) <= wide * p[2];
+  };
   for (const std::array<int, 3>& t : mesh.triangles) {
     const std::size_t i = std::size_t(t[0]), j = std::size_t(t[1]), k = std::size_t(t[2]);
     const Vector3 &a = corners_[i], &b = corners_[j], &c = corners_[k];
     const int before = int(a[2] > kNearest) + int(b[2] > kNearest) + int(c[2] > kNearest);
-    if (before == 3 && !is_seen(places_[i], places_[j], places_[k])) continue;
-    if (before == 3)
+    const bool whole = before == 3 && fits(a) && fits(b) && fits(c);
+    if (whole && !is_seen(places_[i], places_[j], places_[k])) continue;
+    if (whole)
       add_triangle({a, b, c}, {places_[i], places_[j], places_[k]}, at);
     else if (before > 0)
       add_cut_triangle({a, b, c}, at);
   }
 }
 
-/// Cuts off what lies behind the nearest depth.
+/// Cuts off what lies behind the nearest depth, and what is so far outside of the picture that it
+/// has no place on the grid. A cut goes from the inner corner to the outer one, so two triangles
+/// have the same place on their common edge.
 void SceneView::add_cut_triangle(const std::array<Vector3, 3>& corners, const ViewSolid& of) {
-  std::array<Vector3, 4> cut;
-  std::size_t count = 0;
-  for (std::size_t k = 0; k < 3; ++k) {
-    const Vector3 &a = corners[k], &b = corners[(k + 1) % 3];
-    const bool in = a[2] > kNearest;
-    if (in) cut[count++] = a;
-    if (in == (b[2] > kNearest)) continue;
-    Vector3 at = a + ((kNearest - a[2]) / (b[2] - a[2])) * (b - a);
-    at[2] = kNearest;
-    cut[count++] = at;
+  constexpr std::size_t kPlanes = 5;
+  const double wide = kGuard / focal_;
+  const std::array<Vector3, kPlanes> inward{
+      {{0, 0, 1}, {1, 0, wide}, {-1, 0, wide}, {0, 1, wide}, {0, -1, wide}}};
+  std::array<Vector3, 3 + kPlanes> kept{corners[0], corners[1], corners[2]}, next;
+  std::size_t count = 3;
+  for (std::size_t plane = 0; plane < kPlanes; ++plane) {
+    const auto inside = [&](const Vector3& p) {
+      return dot(inward[plane], p) - (plane == 0 ? kNearest : 0);
+    };
+    std::size_t n = 0;
+    for (std::size_t k = 0; k < count; ++k) {
+      const Vector3 &a = kept[k], &b = kept[(k + 1) % count];
+      const double at_a = inside(a), at_b = inside(b);
+      if (at_a > 0) next[n++] = a;
+      if ((at_a > 0) == (at_b > 0)) continue;
+      const Vector3 &in = at_a > 0 ? a : b, &out = at_a > 0 ? b : a;
+      const double at_in = std::max(at_a, at_b), at_out = std::min(at_a, at_b);
+      next[n] = in + (at_in / (at_in - at_out)) * (out - in);
+      if (plane == 0) next[n][2] = kNearest;
+      ++n;
+    }
+    std::swap(kept, next);
+    count = n;
+    if (count < 3) return;
   }
   for (std::size_t k = 2; k < count; ++k)
-    add_triangle({cut[0], cut[k - 1], cut[k]},
-                 {place_of(cut[0]), place_of(cut[k - 1]), place_of(cut[k])}, of);
+    add_triangle({kept[0], kept[k - 1], kept[k]},
+                 {place_of(kept[0]), place_of(kept[k - 1]), place_of(kept[k])}, of);
 }
 
 void SceneView::add_triangle(const std::array<Vector3, 3>& corners,

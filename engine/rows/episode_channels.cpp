@@ -47,7 +47,9 @@ class ChannelList {
     EpisodeChannel& channel = add(ChannelKind::reading, output_name(sensor.name, reading.form),
                                   reading_shape(sensor, reading.form));
     channel.reading = {reading.sensor, reading.form};
-    channel.touch = (perfect(sensor) || is_ideal(reading.form)) && !is_colour(reading.form);
+    // Channels have offsets, which need no touch.
+    channel.touch = (perfect(sensor) || is_ideal(reading.form)) && !is_colour(reading.form) &&
+                    reading.form != FieldForm::channels;
   }
 
   /// Adds a picture of a camera, if it is requested.

@@ -13,7 +13,7 @@ std::string channel_map_fault(const ChannelMap& map, int rows, int cols) {
   const std::size_t n = map.channels();
   if (n == 0) return "no channel; expected one at least";
   if (n > kMostChannels) return fmt::format("{} channels; expected at most {}", n, kMostChannels);
-  if (map.rows < 1 || map.cols < 1 || map.rows * map.cols > kMostNodes)
+  if (map.rows < 1 || map.cols < 1 || map.rows > kMostNodes || map.cols > kMostNodes / map.rows)
     return fmt::format("{} x {} nodes; expected at least one and at most {}", map.rows, map.cols,
                        kMostNodes);
   if (rows == 0 && map.rows * map.cols > 1)

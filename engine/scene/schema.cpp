@@ -416,7 +416,7 @@ constexpr Attribute kSchema[] = {
         Between{B::integer, 1, 2048}),
     row(kCamera, "far", "", U::m,
         "depth of the sky, behind which nothing is seen; 10 m if left out", &CameraDescription::far,
-        B::positive),
+        Between{B::range, 1e-12, 1e9}),
     row(kCamera, "light", "0.35 -0.6 0.75", U::one, "points to a lamp far away, world axes",
         &CameraDescription::light),
     row(kCamera, "ambient", "0.35", U::one, "share of light from everywhere",

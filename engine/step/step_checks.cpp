@@ -113,15 +113,19 @@ LaneBits velocity_jumps(const CompiledModel& model, const std::vector<double>& c
   return found & lanes;
 }
 
-/// Returns what force motors with D do in a step of one lane [J].
+/// Returns the largest work that force motors with D do in a step of one lane [J]: by the force at
+/// its start or at its end.
 template <int L>
 double servo_work(const CompiledModel& model, const BasicWorkspace<L>& w, int lane) {
   double work = 0;
   for (const CompiledMotor& motor : model.motors) {
     if (motor.control != MotorControl::force || !motor.at_end) continue;
-    const double force = w.stage.target[motor.dof][lane] -
-                         number_of<L>(motor.D, w.stage, lane) * w.v1[motor.dof][lane];
-    work += std::clamp(force, motor.low, motor.high) * w.stage.x[motor.dof][lane];
+    const auto work_at = [&](double v) {
+      const double force =
+          w.stage.target[motor.dof][lane] - number_of<L>(motor.D, w.stage, lane) * v;
+      return std::clamp(force, motor.low, motor.high) * w.stage.x[motor.dof][lane];
+    };
+    work += std::max(work_at(w.v0[motor.dof][lane]), work_at(w.v1[motor.dof][lane]));
   }
   return work;
 }

@@ -79,6 +79,12 @@ std::uint64_t key_of(std::int64_t episode, std::size_t name, std::int64_t row) {
 }  // namespace
 
 void RowSum::add(std::size_t offset, std::span<const unsigned char> bytes) {
+  if (const std::size_t rest = bytes.size() % kWord; rest > 0) {  // the end of a row of bytes
+    std::array<unsigned char, kWord> last{};
+    std::copy(bytes.end() - static_cast<std::ptrdiff_t>(rest), bytes.end(), last.begin());
+    add(offset + bytes.size() - rest, last);
+    bytes = bytes.first(bytes.size() - rest);
+  }
   for (std::size_t word = offset / kWord; !bytes.empty();) {
     const std::size_t first = word % kBlock, count = std::min(kBlock - first, bytes.size() / kWord);
     sum_ += factor(kBlock + word / kBlock) * sum_in_block(bytes.data(), first, count);

@@ -13,7 +13,8 @@ namespace tangere {
 /// the row may be added in any order. Parts of zeros may be left out.
 class RowSum {
  public:
-  /// Adds bytes that begin at byte `offset` of the row. Both counts are multiples of 4.
+  /// Adds bytes that begin at byte `offset` of the row, a multiple of 4. Their count is one, too,
+  /// unless they end the row: then zeros fill the last word.
   void add(std::size_t offset, std::span<const unsigned char> bytes);
   [[nodiscard]] std::uint64_t value() const { return sum_; }
 
@@ -28,8 +29,7 @@ class ContentSum {
   /// `whole_rows`: as up to format_version 5, where zeros were hashed as well.
   explicit ContentSum(bool whole_rows = false) : whole_rows_(whole_rows) {}
 
-  /// `name` numbers the dataset: 0 actions, then the observations. `rows` rows of `row_bytes` each,
-  /// a multiple of 4.
+  /// `name` numbers the dataset: 0 actions, then the observations. `rows` rows of `row_bytes` each.
   void add(std::int64_t episode, std::size_t name, std::int64_t first_row, std::int64_t rows,
            std::size_t row_bytes, const void* data);
   /// Adds a row whose numbers have this sum. Not with `whole_rows`.

@@ -15,6 +15,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <utility>
 
 #include "io/robot/effective_inertia.hpp"
 #include "io/robot/mjcf_file.hpp"
@@ -96,11 +97,21 @@ class Actuators {
     std::vector<std::size_t> lost;
     for (const auto& [joint, motors] : position_motors) {
       const auto clips = [&](std::size_t k) { return is_clipped(scene_.motors[k]); };
-      const auto clipped = std::find_if(motors.begin(), motors.end(), clips);
-      const std::size_t kept = clipped == motors.end() ? motors.front() : *clipped;
+      const auto has_target = [&](std::size_t k) {
+        return scene_.motors[k].control == MotorControl::position;
+      };
+      const auto first = [&](const auto& is) {
+        return std::find_if(motors.begin(), motors.end(), is);
+      };
+      auto chosen = first([&](std::size_t k) { return clips(k) && has_target(k); });
+      if (chosen == motors.end()) chosen = first(has_target);
+      if (chosen == motors.end()) chosen = first(clips);
+      const std::size_t kept = chosen == motors.end() ? motors.front() : *chosen;
       for (const std::size_t k : motors) {
         if (k == kept) continue;
-        if (clips(k))
+        if (!has_target(k))
+          make_damper(scene_.motors[k]);
+        else if (clips(k))
           lost.push_back(k);
         else
           make_spring(scene_.motors[k]);
@@ -161,6 +172,15 @@ class Actuators {
     whole_.robot.changed.add(motor.source,
                              "a second actuator with a target, of joint '" + motor.joint +
                                  "': a force motor, and stiffness and damping of the joint");
+  }
+
+  /// Gives the joint the damping of a force motor with D beside another motor with gains.
+  void make_damper(MotorDescription& motor) {
+    for (LinkDescription& link : scene_.links)
+      if (link.joint.name == motor.joint) link.joint.damping += std::exchange(motor.D, 0.0);
+    whole_.robot.lost.add(
+        motor.source, "that the damping of a velocity servo is clipped, of joint '" + motor.joint +
+                          "': another of its motors has gains");
   }
 
   void leave_out(int motor) {

@@ -15,8 +15,8 @@ void read_camera(Scene& scene, const SceneElement& node) {
   CameraDescription d;
   d.source = node.source();
   d.name = node.text("name");
-  if (d.name.empty() || d.name.find('/') != std::string::npos)
-    node.fail("name \"" + d.name + "\"; expected a name without '/', which files use");
+  if (d.name.empty() || d.name == "." || d.name.find_first_of("/,") != std::string::npos)
+    node.fail("name \"" + d.name + "\"; expected a name without '/' and ',', and not '.'");
   if (node.has("body") && !node.text("body").empty()) {
     find_body(scene, node, "body");
     d.body = node.text("body");

@@ -73,6 +73,7 @@ void read_motor(const SceneElement& node, JointType type, MotorDescription& moto
   node.check(kind);
   node.read(motor, turns, kind);
   read_input(node, turns, motor);
+  if (!position && !motor.scale) motor.D = 0;  // as the published reader, which ignores it
   if (position) motor.timing = static_cast<MotorTiming>(node.word("timing"));
   if (position || motor.scale) {
     motor.low = -MotorDescription::kNoBound;
@@ -96,17 +97,20 @@ void check_driven(const SceneNode& node, JointType type, const MotorDescription&
               "slides and turns, so its dofs cannot share P and D; expected ctrl=\"force\"");
 }
 
-/// Splits names between blanks or, if there is a comma, between commas.
+/// Splits names between blanks or, if there is a comma, between commas. A name between commas may
+/// have blanks, and nothing needs to follow the last comma. An empty name stays, so that it is
+/// reported as unknown.
 std::vector<std::string> leaders_of(const std::string& text) {
   if (text.find(',') == std::string::npos) return words_of(text.c_str());
+  constexpr const char* kBlanks = " \t\r\n";
   std::vector<std::string> names;
-  for (std::size_t at = 0; at < text.size();) {
+  for (std::size_t at = 0; at <= text.size();) {
     const std::size_t end = std::min(text.find(',', at), text.size());
-    const std::size_t first = text.find_first_not_of(' ', at);
-    if (first < end) {
-      const std::size_t last = text.find_last_not_of(' ', end - 1);
-      names.push_back(text.substr(first, last + 1 - first));
-    }
+    const std::size_t first = std::min(text.find_first_not_of(kBlanks, at), end);
+    const bool is_empty = first == end;
+    if (is_empty && end == text.size()) break;
+    const std::size_t last = is_empty ? first : text.find_last_not_of(kBlanks, end - 1) + 1;
+    names.push_back(text.substr(first, last - first));
     at = end + 1;
   }
   return names;

@@ -159,22 +159,47 @@ class SensorWarnings {
   std::set<int> sensed_groups_;  // groups of sensed bodies
 };
 
-/// Coordinate of a joint at the start, [m] or [rad]; a joint that follows others has theirs.
-/// `depth`: joints that followed one another so far; a circle ends the search.
-double start_of(const Scene& scene, const JointDescription& joint, std::size_t depth = 0) {
-  if (!joint.follows.empty() && joint.ratio.size() == joint.follows.size() &&
-      depth < scene.links.size()) {
-    double sum = joint.offset;
-    for (std::size_t k = 0; k < joint.follows.size(); ++k)
-      for (const LinkDescription& link : scene.links)
-        if (link.joint.name == joint.follows[k])
-          sum += joint.ratio[k] * start_of(scene, link.joint, depth + 1);
-    return sum;
+/// Coordinates of joints at the start, [m] or [rad]; joints that follow others have theirs.
+class Starts {
+ public:
+  explicit Starts(const Scene& scene) : scene_(scene), starts_(scene.links.size()) {}
+
+  struct Start {
+    double q = 0;
+    bool drawn = false;  ///< by <randomize>, or that of a joint that it follows
+  };
+  Start at(std::size_t k) {
+    if (starts_[k]) return *starts_[k];
+    starts_[k].emplace();  // what a circle of joints reads; compiling the scene refuses it
+    const JointDescription& joint = scene_.links[k].joint;
+    Start start{joint.follows.empty() ? given(joint.name) : joint.offset, is_drawn(joint.name)};
+    for (std::size_t i = 0; i < std::min(joint.follows.size(), joint.ratio.size()); ++i)
+      for (std::size_t leader = 0; leader < starts_.size(); ++leader) {
+        if (scene_.links[leader].joint.name != joint.follows[i]) continue;
+        const Start of = at(leader);
+        start.q += joint.ratio[i] * of.q;
+        start.drawn = start.drawn || of.drawn;
+      }
+    starts_[k] = start;
+    return start;
   }
-  for (const InitialState& state : scene.initial)
-    if (state.joint == joint.name && state.q.size() == 1) return state.q[0];
-  return 0;
-}
+
+ private:
+  [[nodiscard]] double given(const std::string& joint) const {
+    for (const InitialState& state : scene_.initial)
+      if (state.joint == joint && state.q.size() == 1) return state.q[0];
+    return 0;
+  }
+  [[nodiscard]] bool is_drawn(const std::string& joint) const {
+    return std::ranges::any_of(scene_.randomizations, [&](const RandomizationDescription& d) {
+      return d.number.owner == NumberOwner::joint && d.number.name == joint &&
+             d.number.field == NumberField::q;
+    });
+  }
+
+  const Scene& scene_;
+  std::vector<std::optional<Start>> starts_;  // (links); empty: not computed yet
+};
 
 }  // namespace
 
@@ -184,17 +209,15 @@ void warn_of_starts(const Scene& scene, const SceneNode& root) {
   std::string listed;
   std::size_t count = 0;
   const Source* first = nullptr;
-  for (const LinkDescription& link : scene.links) {
-    const JointDescription& joint = link.joint;
+  Starts starts(scene);
+  for (std::size_t k = 0; k < scene.links.size(); ++k) {
+    const JointDescription& joint = scene.links[k].joint;
     if (joint.type != JointType::revolute && joint.type != JointType::prismatic) continue;
-    const bool drawn =
-        std::ranges::any_of(scene.randomizations, [&](const RandomizationDescription& d) {
-          return d.number.owner == NumberOwner::joint && d.number.name == joint.name &&
-                 d.number.field == NumberField::q;
-        });
-    if (!joint.limits || joint.limit_stiffness <= 0 || drawn) continue;
+    if (!joint.limits || joint.limit_stiffness <= 0) continue;
+    const auto [q, drawn] = starts.at(k);
+    if (drawn) continue;
     const auto [low, high] = *joint.limits;
-    const double q = start_of(scene, joint), slack = kRounding * (std::abs(low) + std::abs(high));
+    const double slack = kRounding * (std::abs(low) + std::abs(high));
     if (q >= low - slack && q <= high + slack) continue;
     if (first == nullptr) first = &joint.source;
     if (++count > kListed) continue;

@@ -17,15 +17,26 @@
 
 namespace tangere::kernels {
 
-/// Returns the quaternion of a rotation by less than π; closer to π than 1 mrad it is inexact.
+/// Returns a quaternion of a rotation, by the largest of 4 w², 4 x², 4 y² and 4 z².
 template <class N>
 Quat<N> quaternion_of(const Mat3<N>& R) {
-  constexpr double kLeast = 1e-6;
-  const N square = N(1.0) + ((R.m[0][0] + R.m[1][1]) + R.m[2][2]);
-  const N w = N(0.5) * sqrt(select(square < N(kLeast), N(kLeast), square));
-  const N scale = N(0.25) / w;
-  return {w, scale * (R.m[2][1] - R.m[1][2]), scale * (R.m[0][2] - R.m[2][0]),
-          scale * (R.m[1][0] - R.m[0][1])};
+  const N one(1.0), x = R.m[0][0], y = R.m[1][1], z = R.m[2][2];
+  const N wx = R.m[2][1] - R.m[1][2], wy = R.m[0][2] - R.m[2][0], wz = R.m[1][0] - R.m[0][1];
+  const N xy = R.m[1][0] + R.m[0][1], xz = R.m[0][2] + R.m[2][0], yz = R.m[2][1] + R.m[1][2];
+  N most = one + ((x + y) + z);
+  Quat<N> q{most, wx, wy, wz};  // times 2 √most
+  const auto larger = [&](const N& square, const Quat<N>& other) {
+    const auto is_larger = square > most;
+    most = select(is_larger, square, most);
+    q = {select(is_larger, other.w, q.w), select(is_larger, other.x, q.x),
+         select(is_larger, other.y, q.y), select(is_larger, other.z, q.z)};
+  };
+  const N xx = one + (x - (y + z)), yy = one + (y - (x + z)), zz = one + (z - (x + y));
+  larger(xx, {wx, xx, xy, xz});
+  larger(yy, {wy, xy, yy, yz});
+  larger(zz, {wz, xz, yz, zz});
+  const N scale = N(0.5) / sqrt(most);
+  return {scale * q.w, scale * q.x, scale * q.y, scale * q.z};
 }
 
 /// What holds a loop together at the present poses, link 1's axes.

@@ -345,7 +345,7 @@ def test_requests_for_a_robot_are_checked():
     assert "a gain P above 0" in fault(motors={"slide": -1})
     assert "did you mean 'slide'" in fault(motors={"slid": "force"})
     assert "expected 'fixed' or 'free'" in fault(base="loose")
-    with pytest.raises(tangere.InputError, match="connect(.|\n)*drop=True"):
+    with pytest.raises(tangere.InputError, match="muscle(.|\n)*drop=True"):
         import_robot(ROBOTS / "arm.xml")
     with pytest.raises(OSError):
         import_robot(ROBOTS / "missing.urdf")

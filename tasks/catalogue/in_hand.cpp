@@ -47,6 +47,7 @@ class InHand : public Task {
         object_(coordinate("object")),
         object_v_(dof("object")) {
     const Scene& s = model().scene();
+    check_joints(s);
     if (s.motors.size() != kAngles + 1 || s.sensors.size() != kFingers)
       throw InputError(s.path + ": in_hand needs twelve motors of fingers, one of the stand, and " +
                        "four tactile sensors");
@@ -142,6 +143,31 @@ class InHand : public Task {
 
  private:
   static constexpr std::size_t kTaxels = 64;
+
+  /// Throws InputError unless the fingers' motors come finger by finger and the stand's last, every
+  /// finger's joint turns about one axis, and the object moves freely.
+  static void check_joints(const Scene& s) {
+    const auto joint = [&](const std::string& name) -> const JointDescription& {
+      for (const LinkDescription& link : s.links)
+        if (link.joint.name == name) return link.joint;
+      throw InputError(s.path + ": in_hand needs a joint '" + name + "'");
+    };
+    for (std::size_t k = 0; k <= kAngles; ++k) {
+      const std::string name = k == kAngles ? "stand"
+                                            : std::array{"swing_", "upper_", "lower_"}[k % 3] +
+                                                  std::to_string(k / 3 + 1);
+      const JointDescription& at = joint(name);
+      if (at.type != (k == kAngles ? JointType::prismatic : JointType::revolute))
+        throw InputError(at.source.prefix() + "in_hand: joint '" + name + "' must be " +
+                         (k == kAngles ? "prismatic" : "revolute"));
+      if (k < s.motors.size() && s.motors[k].joint != name)
+        throw InputError(s.motors[k].source.prefix() + "in_hand: motor " + std::to_string(k + 1) +
+                         " is that of joint '" + s.motors[k].joint + "'; expected '" + name + "'");
+    }
+    if (joint("object").type != JointType::free)
+      throw InputError(joint("object").source.prefix() +
+                       "in_hand: joint 'object' must be free3d: fingers turn and lift it");
+  }
   /// Horizontal parts of the object's axes.
   using Axes = std::array<std::array<double, 2>, 3>;
 

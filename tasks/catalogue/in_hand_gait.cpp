@@ -58,6 +58,14 @@ InHandGait::InHandGait(const Scene& scene, const std::string& object) {
                      ": in_hand needs the joints palm, swing_1, lower_1, tip_1 and, below the "
                      "palm, " +
                      object + ", and position motors of swing_1, upper_1 and lower_1");
+  std::array<double, kAngles> u{};
+  for (const double turn : {-1.0, 1.0})
+    for (const double lift : {-1.0, 1.0}) {
+      targets(std::array{turn, lift, 0.0, 0.0}, kRelease[0] + kOff, u);
+      if (!std::ranges::all_of(u, [](double q) { return std::isfinite(q); }))
+        throw InputError(scene.path +
+                         ": in_hand: the fingers are too short for the object's place");
+    }
 }
 
 template <class S>

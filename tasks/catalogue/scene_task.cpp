@@ -82,7 +82,7 @@ std::vector<std::string> default_readings(const Model& model) {
 
 TensorSpec field_spec(const SensorInfo& sensor, FieldOutput output) {
   TensorSpec spec{output_name(sensor.name, output.form), {6}, "N, m", "reading of a sensor"};
-  spec.touch = !is_colour(output.form);
+  spec.touch = !is_colour(output.form) && output.form != FieldForm::channels;
   if (output.form == FieldForm::sum) return spec;
   const bool is_length = is_displacement(output.form) || output.form == FieldForm::height;
   const bool has_unit = output.form != FieldForm::flow && !is_colour(output.form);

@@ -30,9 +30,9 @@ Task::Task(const Scene& scene, TaskSpec spec)
   check_outputs(model_.scene(), fields_);
   for (const FieldOutput& output : fields_)
     if (output.form != FieldForm::field && output.form != FieldForm::pressure &&
-        output.form != FieldForm::ideal && !is_picture(output.form))
+        output.form != FieldForm::ideal && (!is_picture(output.form) || is_view(output.form)))
       throw InputError(fmt::format(
-          "task '{}' reads the {} of a sensor; expected field, pressure, ideal or a picture",
+          "task '{}' reads {}; expected field, pressure, ideal or a picture of a sensor",
           spec_.name, to_string(output.form)));
   if (spec_.reads_tactile && fields_.empty()) fields_ = whole_fields(scene);
 }

@@ -166,6 +166,39 @@ TEST(Loops, WeldsHoldTorques) {
 }
 
 /// The balance of energy closes: what motors and gravity put in, dampers take.
+/// A weld that starts half a turn away, about any axis, is open by π and pulls.
+TEST(Loops, WeldsHalfATurnAwayAreOpen) {
+  for (const Quaternion& turn : {Quaternion{0, 1, 0, 0}, Quaternion{0, 0, 1, 0},
+                                 Quaternion{0, 0, 0, 1}, Quaternion{0, 0.6, 0, -0.8}}) {
+    Scene s;
+    s.links = {link("box", JointType::free, {0, 0, 1}, CuboidShape{{0.1, 0.2, 0.3}, {}}, 1000)};
+    LoopDescription weld;
+    weld.name = "weld";
+    weld.body1 = "box";
+    weld.weld = true;
+    weld.orientation2 = turn;
+    weld.stiffness = 1e5;
+    weld.turning_stiffness = 7;
+    s.loops.push_back(weld);
+    const Model model(s);
+    const LoopReading r = loop_readings(model, Batch(model, 1), 0).at(0);
+    EXPECT_NEAR(r.turn, std::acos(-1.0), 1e-12);
+    EXPECT_NEAR(r.torque, 7 * std::acos(-1.0), 1e-10);
+    EXPECT_EQ(open_loops(model).size(), 1U);
+  }
+}
+
+/// Where a loop has no place of its own in body 2, it keeps the one that it starts with: a scene
+/// with a joint elsewhere has the same loop, as its derivatives say.
+TEST(Loops, KeepThePlaceThatTheyStartWith) {
+  const Model model(parallelogram(0.02));
+  ASSERT_TRUE(model.scene().loops[0].position2);
+  EXPECT_NEAR((*model.scene().loops[0].position2)[2], -0.15, 1e-12);
+  Scene moved = model.scene();
+  moved.links[2].joint.pose.position[0] += 0.01;
+  EXPECT_NEAR(loop_readings(Model(moved), Batch(Model(moved), 1), 0).at(0).gap, 0.01, 1e-9);
+}
+
 TEST(Loops, BalanceTheirEnergy) {
   Scene scene = parallelogram(0);
   scene.loops[0].stiffness = 1e4;

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <random>
 #include <vector>
 
@@ -98,6 +99,20 @@ TEST(ContentSum, OfWholeRowsIsThatOfTheFormatBefore) {
   ContentSum sum(true);
   sum.add(3, 2, 5, 2, 40, bytes.data());
   EXPECT_EQ(sum.value(), 0x399EF4996D695742ULL);
+}
+
+/// Rows of bytes may have any size, such as those of a picture of 5 × 5 pixels.
+TEST(ContentSum, ARowOfBytesEndsWithZeros) {
+  const std::array<unsigned char, 8> row{1, 2, 3, 4, 5, 6, 7, 0};
+  for (const std::size_t size : {1U, 2U, 3U, 5U, 6U, 7U}) {
+    std::array<unsigned char, 8> padded{};
+    std::copy_n(row.begin(), size, padded.begin());
+    RowSum sum, expected;
+    sum.add(4, std::span(row).first(size));
+    expected.add(4, padded);
+    EXPECT_EQ(sum.value(), expected.value()) << size;
+    EXPECT_NE(sum.value(), 0U);
+  }
 }
 
 TEST(ContentSum, FindsWhatIsNotZero) {

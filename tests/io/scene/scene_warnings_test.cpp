@@ -128,5 +128,26 @@ TEST(SceneWarnings, AStartOutsideTheLimitsIsTold) {
       << "the start is drawn";
 }
 
+/// Each joint follows the two before it, so joint n has as many paths to the first as Fibonacci's
+/// number n.
+TEST(SceneWarnings, StartsOfManyFollowersAreFoundOnce) {
+  std::string links, ends;
+  for (int k = 0; k < 60; ++k) {
+    const std::string name = "j" + std::to_string(k);
+    links += "<link name='" + name + "'><joint name='" + name +
+             "' type='revolute' axis='0 0 1' lim='-1 1' lim_stiffness='10'";
+    if (k > 1)
+      links += " ratio='0.5 0.5' follows='j" + std::to_string(k - 1) + " j" +
+               std::to_string(k - 2) + "'";
+    links += "/><body name='" + name + "' type='sphere' radius='0.1' density='100'/>";
+    ends += "</link>";
+  }
+  EXPECT_THAT(
+      parse_scene("<tangere><option unit='m-kg'/><robot>" + links + ends + "</robot></tangere>",
+                  "chain.xml")
+          .warnings,
+      IsEmpty());
+}
+
 }  // namespace
 }  // namespace tangere

@@ -181,6 +181,15 @@ TEST(InHand, RefusesOtherHands) {
   for (LinkDescription& link : scene.links)
     if (link.joint.name == "lower_1") link.joint.name = "elbow";
   EXPECT_THROW(InHandGait(scene, "object"), InputError);
+  for (const char* const name : {"object", "swing_3", "stand"}) {
+    scene = in_hand_scene();
+    for (LinkDescription& link : scene.links)
+      if (link.joint.name == name) link.joint.type = JointType::spherical;
+    EXPECT_THROW(static_cast<void>(make_task("in_hand", scene)), InputError) << name;
+  }
+  scene = in_hand_scene();
+  std::swap(scene.motors[1], scene.motors[2]);
+  EXPECT_THROW(static_cast<void>(make_task("in_hand", scene)), InputError);
   scene = in_hand_scene();
   scene.sensors[2].points.pop_back();
   EXPECT_THROW(static_cast<void>(make_task("in_hand", scene)), InputError);
