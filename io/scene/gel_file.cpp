@@ -17,11 +17,11 @@
 namespace tangere {
 namespace {
 
-constexpr const char* kChannels[] = {"red", "green", "blue"};
+constexpr const char* kColourNames[] = {"red", "green", "blue"};
 constexpr const char* kShadeNames[] = {"nx", "ny", "nz", "nxx", "nxy", "nyy", "nxz", "nyz"};
 constexpr double kLongestOfGel = 0.1;   // of a gel's lengths [m]
 constexpr double kBrightestLamp = 1e5;  // a number of a lamp [grey levels]
-static_assert(std::size(kChannels) == kColours && std::size(kShadeNames) == kShades);
+static_assert(std::size(kColourNames) == kColours && std::size(kShadeNames) == kShades);
 
 void read_channel(const SceneNode& node, std::size_t channel, GelLamps& lamps) {
   node.check_attributes({std::begin(kShadeNames), std::end(kShadeNames)});
@@ -66,14 +66,14 @@ Gel read_gel(const std::string& path, std::vector<std::string>& warnings) {
   for (const SceneNode& node : root.children({"red", "green", "blue", "fit"})) {
     if (node.name() == "fit") continue;
     const auto channel =
-        static_cast<std::size_t>(std::ranges::find(kChannels, node.name()) - std::begin(kChannels));
+        static_cast<std::size_t>(std::ranges::find(kColourNames, node.name()) - std::begin(kColourNames));
     if (found[channel]) node.fail("a second time in one <gel>; expected one");
     found[channel] = true;
     read_channel(node, channel, gel.lamps);
   }
   for (std::size_t c = 0; c < kColours; ++c)
     if (!found[c])
-      root.fail(fmt::format("no <{}>; expected the lamps of each channel", kChannels[c]));
+      root.fail(fmt::format("no <{}>; expected the lamps of each channel", kColourNames[c]));
   const std::string picture =
       (std::filesystem::path(path).parent_path() / root.text("background")).string();
   constexpr std::size_t kMostPicture = std::size_t{256} << 20;
@@ -103,7 +103,7 @@ std::string gel_text(const Gel& gel, const std::string& background,
     text += "/>\n";
   }
   for (std::size_t c = 0; c < kColours; ++c) {
-    text += fmt::format("  <{}", kChannels[c]);
+    text += fmt::format("  <{}", kColourNames[c]);
     for (std::size_t j = 0; j < kShades; ++j)
       text +=
           fmt::format("{}{}=\"{:.6g} {:.6g} {:.6g}\"", j % 2 == 0 && j > 0 ? "\n    " : " ",
