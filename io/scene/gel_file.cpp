@@ -65,8 +65,8 @@ Gel read_gel(const std::string& path, std::vector<std::string>& warnings) {
   std::array<bool, kColours> found{};
   for (const SceneNode& node : root.children({"red", "green", "blue", "fit"})) {
     if (node.name() == "fit") continue;
-    const auto channel =
-        static_cast<std::size_t>(std::ranges::find(kColourNames, node.name()) - std::begin(kColourNames));
+    const auto channel = static_cast<std::size_t>(std::ranges::find(kColourNames, node.name()) -
+                                                  std::begin(kColourNames));
     if (found[channel]) node.fail("a second time in one <gel>; expected one");
     found[channel] = true;
     read_channel(node, channel, gel.lamps);
