@@ -173,7 +173,8 @@ std::string loops_text(const Model& model) {
                         kind_of(d), d.body1, second_of(d), d.stiffness, d.damping);
     if (d.weld)
       text += fmt::format(", turning {:.6g}, {:.6g}", d.turning_stiffness, d.turning_damping);
-    text += fmt::format(", gap {:.3g} at the start\n", readings[k].gap);
+    text += fmt::format(", at the start open by {:.3g} m", readings[k].gap);
+    text += d.weld ? fmt::format(" and {:.3g} rad\n", readings[k].turn) : "\n";
   }
   return text + '\n';
 }

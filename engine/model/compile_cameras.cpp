@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <array>
+#include <string>
 
 #include "engine/base/hash.hpp"
 #include "engine/scene/frames.hpp"
@@ -17,6 +18,8 @@ namespace {
 [[noreturn]] void refuse_camera(const CameraDescription& d, const std::string& what) {
   throw InputError(d.source.prefix() + "camera '" + d.name + "': " + what);
 }
+
+constexpr std::size_t kMostBodies = 32766;  // the ground has the number after them
 
 int body_of(const Scene& scene, const CameraDescription& d) {
   if (d.body.empty()) return -1;
@@ -40,6 +43,10 @@ std::vector<CompiledCamera> compile_cameras(const Scene& scene) {
   std::vector<CompiledCamera> all;
   for (const CameraDescription& d : scene.cameras) {
     check_camera_name(scene, d);
+    if (scene.links.size() > kMostBodies)
+      refuse_camera(d, "the scene has " + std::to_string(scene.links.size()) +
+                           " bodies; expected at most " + std::to_string(kMostBodies) +
+                           ", whose numbers are 16-bit");
     if (const std::string fault = value_fault(kCamera, d); !fault.empty()) refuse_camera(d, fault);
     if (const std::string fault = camera_fault(d); !fault.empty()) refuse_camera(d, fault);
     CompiledCamera camera;

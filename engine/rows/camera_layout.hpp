@@ -14,7 +14,7 @@ namespace tangere {
 struct CameraLayout {
   std::string name;
   int rows = 0, cols = 0;  ///< pixels
-  /// Where it stands, how it sees, and its flaws.
+  /// Its place and axes, angle of view, and errors of its readings.
   Attributes facts;
   std::vector<std::string> bodies;  ///< what the numbers of its pixels stand for, from 0
 };

@@ -159,7 +159,7 @@ struct LinkDescription {
 /// Force motor: u in [-1, 1] per dof of the joint is clipped and mapped linearly to [low, high].
 /// With `scale`, the force is scale u + offset, clipped to [low, high]. Position motor: the target
 /// of q (spherical: a rotation vector) is u + offset or scale u + offset, and the force is
-/// P (target - q) - D v, clipped to [low, high]. A force motor with D servoes the velocity: its
+/// P (target - q) - D v, clipped to [low, high]. A force motor with D controls a velocity: its
 /// force is scale u + offset - D v, clipped.
 /// A joint may have several motors, of which at most one has gains.
 struct MotorDescription {

@@ -5,10 +5,18 @@
 #include <algorithm>
 
 #include "engine/scene/camera.hpp"
+#include "engine/scene/field_form.hpp"
 #include "io/scene/convex_hull.hpp"
 #include "io/scene/scene_sections.hpp"
 
 namespace tangere {
+
+/// Whether a sensor's name is that of a camera or of one of its outputs, such as "eye.rgb".
+static bool hides(const std::string& sensor, const std::string& camera) {
+  return sensor == camera || std::ranges::any_of(view_forms(), [&](FieldForm form) {
+           return sensor == output_name(camera, form);
+         });
+}
 
 void read_camera(Scene& scene, const SceneElement& node) {
   node.check();
@@ -24,17 +32,18 @@ void read_camera(Scene& scene, const SceneElement& node) {
   for (const CameraDescription& other : scene.cameras)
     if (other.name == d.name) node.fail("camera name '" + d.name + "' is used twice");
   for (const TactileDescription& sensor : scene.sensors)
-    if (sensor.name == d.name)
-      node.fail("a tactile sensor is named '" + d.name + "'; expected a name of its own");
+    if (hides(sensor.name, d.name))
+      node.fail("a tactile sensor is named '" + sensor.name + "'; expected a name of its own");
   node.read(d);
   node.refuse(camera_fault(d));
   scene.cameras.push_back(std::move(d));
 }
 
 void check_free_name(const Scene& scene, const SceneNode& node, const std::string& sensor) {
-  const auto same = [&](const CameraDescription& camera) { return camera.name == sensor; };
+  const auto same = [&](const CameraDescription& camera) { return hides(sensor, camera.name); };
   if (std::ranges::any_of(scene.cameras, same))
-    node.fail("a camera is named '" + sensor + "'; expected a name of its own");
+    node.fail("a camera is named '" + sensor +
+              "' or has an output of this name; expected a name of its own");
 }
 
 void show_abstract_bodies(Scene& scene) {

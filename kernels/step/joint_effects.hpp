@@ -5,7 +5,7 @@
 //   f = -c v - I_a a - k (q - rest) + k_l max(0, lo - q) - k_l max(0, q - hi)
 //       - τ clip((q - z + t_f v)/θ_b, ±1) + clip(P (u - q) - D v, range)
 //
-// where a motor that servoes its velocity has P = 1 and no q.
+// where a force motor with D has P = 1, and q does not enter.
 //
 // A spherical joint has rotation vectors in place of q: φ = log q, φ_s = log(rest⁻¹ q),
 // ψ = log(q⁻¹ exp u). Torques in body axes: spring -k φ_s (the gradient of k|φ_s|²/2, as

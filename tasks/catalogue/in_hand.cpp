@@ -30,8 +30,8 @@ constexpr double kEnd = 10;          // reward at the end
 constexpr double kDropped = -0.025;  // height of a dropped object, from its place [m]
 constexpr int kCloseFrom = 10, kCloseTo = 70, kLeaveFrom = 100, kLeaveTo = 150;  // of the grip
 constexpr double kGone = -0.08;  // target of the stand when it has left [m]
-// What the script knows: turn of the object at turn = 1 [rad]; the height at which it is held, and
-// the part of what it loses in an action that a lift makes up for.
+// Constants of the script: turn of the object at turn = 1 [rad]; height at which it holds the
+// object, and by which the object sinks in an action [m].
 constexpr double kTurns = 0.42, kKept = -3e-3, kLost = 2.5e-3;
 // Task state: the goal [rad], the Phase.
 constexpr std::size_t kGoal = 0, kPhase = 1;

@@ -66,29 +66,28 @@ void compare_with_dual_numbers(const CompiledModel& m, StageBuffers<double>& b, 
   }
 }
 
+/// Compares at so many random states of a scene.
+void compare_at_random_states(const Scene& scene, unsigned seed, int states) {
+  const auto m = compile(scene);
+  StageBuffers<double> b(*m);
+  Random random(seed);
+  for (int k = 0; k < states; ++k) {
+    testing::randomise(b, *m, random, kStep);
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    compare_with_dual_numbers(*m, b, 1e-11);
+  }
+}
+
 TEST(Jacobian, TreesMatchDualNumbers) {
   for (unsigned seed = 1; seed <= 40; ++seed) {
-    const auto m = compile(testing::random_tree(seed, 2 + static_cast<int>(seed % 9)));
-    StageBuffers<double> b(*m);
-    Random random(seed);
-    for (int k = 0; k < 5; ++k) {
-      testing::randomise(b, *m, random, kStep);
-      SCOPED_TRACE("seed " + std::to_string(seed));
-      compare_with_dual_numbers(*m, b, 1e-11);
-    }
+    compare_at_random_states(testing::random_tree(seed, 2 + static_cast<int>(seed % 9)), seed, 5);
   }
 }
 
 TEST(Jacobian, MachinesMatchDualNumbers) {
   for (unsigned seed = 1; seed <= 60; ++seed) {
-    const auto m = compile(testing::random_machine(seed, 2 + static_cast<int>(seed % 9)));
-    StageBuffers<double> b(*m);
-    Random random(seed);
-    for (int k = 0; k < 5; ++k) {
-      testing::randomise(b, *m, random, kStep);
-      SCOPED_TRACE("seed " + std::to_string(seed));
-      compare_with_dual_numbers(*m, b, 1e-11);
-    }
+    compare_at_random_states(testing::random_machine(seed, 2 + static_cast<int>(seed % 9)), seed,
+                             5);
   }
 }
 
@@ -96,14 +95,7 @@ TEST(Jacobian, SharesOfGravityMatchDualNumbers) {
   for (unsigned seed = 1; seed <= 40; ++seed) {
     Scene scene = testing::random_tree(seed, 2 + static_cast<int>(seed % 9));
     testing::share_gravity(scene, seed);
-    const auto m = compile(scene);
-    StageBuffers<double> b(*m);
-    Random random(seed);
-    for (int k = 0; k < 3; ++k) {
-      testing::randomise(b, *m, random, kStep);
-      SCOPED_TRACE("seed " + std::to_string(seed));
-      compare_with_dual_numbers(*m, b, 1e-11);
-    }
+    compare_at_random_states(scene, seed, 3);
   }
 }
 
@@ -113,14 +105,7 @@ TEST(Jacobian, LoopsMatchDualNumbers) {
     Scene scene = testing::random_machine(seed, 2 + static_cast<int>(seed % 9));
     testing::close_loops(scene, seed, 3);
     loops += scene.loops.size();
-    const auto m = compile(scene);
-    StageBuffers<double> b(*m);
-    Random random(seed);
-    for (int k = 0; k < 5; ++k) {
-      testing::randomise(b, *m, random, kStep);
-      SCOPED_TRACE("seed " + std::to_string(seed));
-      compare_with_dual_numbers(*m, b, 1e-11);
-    }
+    compare_at_random_states(scene, seed, 5);
   }
   EXPECT_GT(loops, 60U);
 }

@@ -106,5 +106,20 @@ TEST(CameraFile, ACameraBeforeASensorTakesItsName) {
               ::testing::ThrowsMessage<InputError>(HasSubstr("a camera is named 'skin'")));
 }
 
+/// A sensor "eye.rgb" and the colours of a camera "eye" would be one output.
+TEST(CameraFile, ASensorDoesNotHideAnOutput) {
+  std::string text = kScene;
+  text.replace(text.find("name=\"skin\""), 11, "name=\"eye.rgb\"");
+  const std::string camera = "\n<camera name=\"eye\" pos=\"0 -1 1\" look=\"0 0 0\"/>\n";
+  const std::size_t before = text.find("<sensor>") + 8, behind = text.find("</sensor>");
+  ASSERT_NE(behind, std::string::npos);
+  for (const std::size_t at : {before, behind}) {
+    std::string both = text;
+    both.insert(at, camera);
+    EXPECT_THAT([&] { parse_scene(both, "eye.xml"); },
+                ::testing::ThrowsMessage<InputError>(HasSubstr("'eye.rgb'")));
+  }
+}
+
 }  // namespace
 }  // namespace tangere
