@@ -10,8 +10,8 @@
 // Geometric bisection comes first where the bounds are more than a factor of 2 apart: near the
 // middle plane of the shortest axis, where the two nearest points meet, they are many orders of
 // magnitude apart. A lane that has converged keeps its value while others iterate, so its bits do
-// not depend on them. Near the surface of an egg there are 0 or 1 bisections and 3 steps of Newton's
-// method. With h the distance of the tangent plane from the centre,
+// not depend on them. Near the surface of an egg there are 0 or 1 bisections and 3 steps of
+// Newton's method. With h the distance of the tangent plane from the centre,
 //   n = g/|g|, g = y / (w + a² - c²);  h = |a n|;  d = n·y - h
 // d is the largest of n·y - h over all unit n. An error of n enters squared, and only downwards.
 //   κ₁ + κ₂ = h (Σ A - n·A n), κ₁ κ₂ = h⁴/(a b c)², A = diag(1/a²): curvatures of the surface at x
