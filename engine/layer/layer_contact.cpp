@@ -8,6 +8,14 @@
 #include <array>
 #include <cmath>
 
+// Sanitizers instrument every operation: inlined whole, these functions compile for a quarter of an
+// hour.
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#define TANGERE_INLINE_WHOLE
+#else
+#define TANGERE_INLINE_WHOLE [[gnu::flatten]]
+#endif
+
 namespace tangere {
 
 using kernels::Anchor;
@@ -114,8 +122,9 @@ LayerForce<D> LayerContact::force(const Point& p, const LayerBody<D>& body,
   return out;
 }
 
-[[gnu::flatten]] void LayerContact::add_point(int candidate, int index, const Vec3<double>& place,
-                                              const Anchor<double>& anchor) {
+TANGERE_INLINE_WHOLE void LayerContact::add_point(int candidate, int index,
+                                                  const Vec3<double>& place,
+                                                  const Anchor<double>& anchor) {
   const LayerBody<double>& body = bodies_.back();
   const kernels::Frame<double>& frame = pad_->frame;
   Vec3<double> xi = transposed_times(frame.R, place - frame.p);
@@ -224,7 +233,7 @@ Vec6<double> LayerContact::change(std::span<const LayerBody<D>> bodies,
 }
 
 /// Slopes at a point, outside of the shape by dual numbers.
-[[gnu::flatten]] LayerSlopes LayerContact::slopes(const Point& p) const {
+TANGERE_INLINE_WHOLE LayerSlopes LayerContact::slopes(const Point& p) const {
   const auto number = static_cast<std::size_t>(p.body);
   const LayerShape& of = shapes_[number];
   const LayerBody<double>& body = bodies_[number];
@@ -247,7 +256,7 @@ Vec6<double> LayerContact::change(std::span<const LayerBody<D>> bodies,
 }
 
 /// Computes the derivatives of w by displacement and twist, (12) in pad axes.
-[[gnu::flatten]] std::array<Vec6<double>, 12> LayerContact::columns_in_pad() {
+TANGERE_INLINE_WHOLE std::array<Vec6<double>, 12> LayerContact::columns_in_pad() {
   depth_slopes_.resize(depth_.size());
   load_slopes_.resize(depth_.size());
   slopes_.resize(points_.size());
