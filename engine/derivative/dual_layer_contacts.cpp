@@ -6,6 +6,7 @@
 
 namespace tangere {
 
+using kernels::kGroup;
 using kernels::Vec3;
 using D = kernels::Dual<double>;
 
@@ -37,6 +38,22 @@ kernels::Anchor<D> anchor_at(const std::vector<D>& all, std::size_t k) {
 DualLayerContacts::DualLayerContacts(const CompiledModel& model)
     : pads_(model.layer_pads), sums_(std::size_t(model.layer_link_pairs)) {}
 
+/// Copies the values of a pair's candidates.
+LayerCandidates DualLayerContacts::values_in_rows(const DualCandidates& candidates,
+                                                  std::size_t pair) {
+  const std::vector<int>& numbers = candidates.numbers[pair];
+  const std::size_t count = numbers.size(), stride = (count + kGroup - 1) / kGroup * kGroup;
+  rows_.assign((3 + kernels::kAnchorNumbers) * stride, 0.0);
+  const auto copy = [&](const std::vector<D>& from, std::size_t each, double* to) {
+    for (std::size_t k = 0; !from.empty() && k < each * count; ++k)
+      to[k % each * stride + k / each] = from[k].value;
+  };
+  copy(candidates.places[pair], 3, rows_.data());
+  copy(candidates.anchors[pair], kernels::kAnchorNumbers, rows_.data() + 3 * stride);
+  return {rows_.data(), rows_.data() + 3 * stride, numbers.data(), static_cast<int>(stride),
+          static_cast<int>(count)};
+}
+
 void DualLayerContacts::add_bodies(const kernels::ModelView& view, const kernels::LinkPair& links,
                                    const kernels::ContactScratch<D>& motion, int pad,
                                    const DualCandidates& candidates, const double* block) {
@@ -51,14 +68,8 @@ void DualLayerContacts::add_bodies(const kernels::ModelView& view, const kernels
                       kernels::load_law<D>(pair.parameters, pair.law, pair.ramp, block, 0),
                       kernels::load_vector<D>(pair.size, pair.size_row, block, 0)));
     contact_.add_body({pair.shape, pair.grid, pair.law, pair.ramp, pair.memory >= 0, false},
-                      values_of<LayerBody<double>>(bodies_.back()));
-    const std::vector<int>& numbers = candidates.numbers[at];
-    for (std::size_t k = 0; k < numbers.size(); ++k) {
-      const D* const x = &candidates.places[at][3 * k];
-      contact_.add_point(static_cast<int>(k), of.in_field[std::size_t(numbers[k])],
-                         {x[0].value, x[1].value, x[2].value},
-                         values_of<kernels::Anchor<double>>(anchor_at(candidates.anchors[at], k)));
-    }
+                      values_of<kernels::LayerBody<double>>(bodies_.back()),
+                      values_in_rows(candidates, at));
   }
 }
 
@@ -70,16 +81,16 @@ void DualLayerContacts::compute(const kernels::ModelView& view,
     const kernels::LinkPair& links = view.link_pairs[g];
     for (int pad = 0; links.layer >= 0 && pad < static_cast<int>(pads_.size()); ++pad) {
       members_.clear(), bodies_.clear();
-      contact_.begin(pads_[std::size_t(pad)]);
+      contact_.begin(kernels::active_kernels(), pads_[std::size_t(pad)]);
       add_bodies(view, links, contacts[g], pad, candidates, block);
-      if (contact_.points().empty()) continue;
+      if (contact_.empty()) continue;
       contact_.solve();
       std::vector<kernels::Anchor<D>> anchors;
-      for (const LayerContact::Point& p : contact_.points()) {
+      contact_.for_each_point([&](const LayerContact::Point& p) {
         const auto pair = std::size_t(members_[std::size_t(p.body)]);
         anchors.push_back(contact_.in_pad(
             anchor_at(candidates.anchors[pair], static_cast<std::size_t>(p.candidate))));
-      }
+      });
       const kernels::Vec6<double> value = contact_.wrench(),
                                   change = contact_.change(bodies_, anchors);
       sums_[std::size_t(links.layer)].wrench +=

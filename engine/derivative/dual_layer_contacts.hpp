@@ -31,6 +31,7 @@ class DualLayerContacts {
   [[nodiscard]] const kernels::PairSums<D>* sums() const { return sums_.data(); }
 
  private:
+  LayerCandidates values_in_rows(const DualCandidates& candidates, std::size_t pair);
   void add_bodies(const kernels::ModelView& view, const kernels::LinkPair& links,
                   const kernels::ContactScratch<D>& motion, int pad,
                   const DualCandidates& candidates, const double* block);
@@ -38,8 +39,9 @@ class DualLayerContacts {
   const std::vector<LayerPad>& pads_;
   std::vector<kernels::PairSums<D>> sums_;
   LayerContact contact_;
-  std::vector<int> members_;          // pairs of its bodies
-  std::vector<LayerBody<D>> bodies_;  // parallel
+  std::vector<int> members_;                   // pairs of its bodies
+  std::vector<kernels::LayerBody<D>> bodies_;  // parallel
+  AlignedVector<double> rows_;                 // values of candidates: places, then anchors
 };
 
 }  // namespace tangere

@@ -18,7 +18,7 @@ template <int L>
 void subtract_shares(const CompiledModel& m, BasicWorkspace<L>& w, const Vec6<double>& slip,
                      int lane, LossRows<L>& loss) {
   LayerContact& contact = *w.layer_contact;
-  std::vector<LayerBody<LayerContact::D>> bodies = contact.still_bodies();
+  std::vector<kernels::LayerBody<LayerContact::D>> bodies = contact.still_bodies();
   for (std::size_t b = 0; b < bodies.size(); ++b) {
     const int k = w.layer_members[b];
     const auto subtract = [&](int row, LayerContact::D& number) {
@@ -45,8 +45,8 @@ void add_layer_parameters(const CompiledModel& m, const kernels::KernelTable& ta
   for_each_layer(m, w, [&](const kernels::LinkPair& links, int pad) {
     for (int l = 0; l < L; ++l) {
       if (!has(lanes, l)) continue;
-      solve_layer(m, w, links, pad, l);
-      if (w.layer_contact->points().empty()) continue;
+      solve_layer(m, table, w, links, pad, l);
+      if (w.layer_contact->empty()) continue;
       const LinkPose<double> one = pose_of<L>(poses, links.link1, l),
                              two = pose_of<L>(poses, links.link2, l);
       const Vec6<double> slip = motion_to_parent(relative(one.world, two.world), two.V) - one.V;

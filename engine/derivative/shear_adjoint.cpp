@@ -51,19 +51,20 @@ void hand_on(const ShearSpringContact& of, const AlignedVector<LinkPose<Row<L>>>
 /// Computes cotangents of the friction of the listed points of a layer's pair, (3, stride) in body
 /// 1's axes, from the slip along λ.
 template <int L>
-void friction_of_layer(const CompiledModel& m, BasicWorkspace<L>& w, const ShearSpringContact& of,
-                       const Vec6<double>& slip, int lane, int stride, double* out) {
+void friction_of_layer(const CompiledModel& m, const kernels::KernelTable& table,
+                       BasicWorkspace<L>& w, const ShearSpringContact& of, const Vec6<double>& slip,
+                       int lane, int stride, double* out) {
   std::fill_n(out, 3 * stride, 0.0);
   const int pad = m.pairs[std::size_t(of.pair)].layer_pad;
   for_each_layer(m, w, [&](const kernels::LinkPair& links, int k) {
     if (k != pad || links.link1 != of.contact.link1 || links.link2 != of.contact.link2) return;
-    solve_layer(m, w, links, pad, lane);
-    for (const LayerContact::Point& p : w.layer_contact->points()) {
-      if (w.layer_members[std::size_t(p.body)] != of.pair) continue;
+    solve_layer(m, table, w, links, pad, lane);
+    w.layer_contact->for_each_point([&](const LayerContact::Point& p) {
+      if (w.layer_members[std::size_t(p.body)] != of.pair) return;
       const kernels::Vec3<double> bar = w.layer_contact->friction_bar(p, -slip);
       out[p.candidate] = bar.x, out[stride + p.candidate] = bar.y;
       out[2 * stride + p.candidate] = bar.z;
-    }
+    });
   });
 }
 
@@ -161,7 +162,7 @@ void ShearAdjoint<L>::pull_back(const CompiledModel& m, const kernels::KernelTab
       if (from_forces) slip = touch_of(m, w, of, slip_touches_, l).twist;
       const bool layered =
           from_forces && of.pair >= 0 && m.pairs[std::size_t(of.pair)].layer_pad >= 0;
-      if (layered) friction_of_layer<L>(m, w, of, slip, l, points.stride, s_bar);
+      if (layered) friction_of_layer<L>(m, table, w, of, slip, l, points.stride, s_bar);
       kernels::ShearCotangentSums sums{};
       kernels::ShearPullback pullback = {&start,
                                          &end,

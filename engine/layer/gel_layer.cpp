@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The layer is solved with E = 1: its pressures are proportional to E. Sums run over points and
-// cells in order, and the factorisation adds rows to rows, so that results depend on the depths
-// alone.
+// cells in order, so that results depend on the depths alone.
 #include "engine/layer/gel_layer.hpp"
 
 #include <algorithm>
@@ -81,7 +80,7 @@ void GelLayer::set_up() {
   if (!same) factor();
 }
 
-/// Factors M of the pressing cells, right-looking: rows are added to rows.
+/// Factors M of the pressing cells.
 void GelLayer::factor() {
   const std::size_t n = pressing_.size();
   factored_.clear();
@@ -94,32 +93,13 @@ void GelLayer::factor() {
     u[a] += layer_->compliance.own * layer_->side * layer_->side /
             count_[static_cast<std::size_t>(pressing_[a])];
   }
-  for (std::size_t a = 0; a < n; ++a) {
-    double* const u = &factor_[a * n];
-    const double inverse = 1 / std::sqrt(u[a]);
-    for (std::size_t b = a; b < n; ++b) u[b] *= inverse;
-    for (std::size_t b = a + 1; b < n; ++b) {
-      double* const below = &factor_[b * n];
-      const double f = u[b];
-      for (std::size_t c = b; c < n; ++c) below[c] -= f * u[c];
-    }
-  }
+  kernels::active_kernels().factor_layer(factor_.data(), static_cast<int>(n));
 }
 
 /// Solves M x = rhs_ in place.
 void GelLayer::solve_system() {
-  const std::size_t n = pressing_.size();
-  std::vector<double>& x = rhs_;
-  for (std::size_t a = 0; a < n; ++a) {
-    const double* const u = &factor_[a * n];
-    x[a] /= u[a];
-    for (std::size_t b = a + 1; b < n; ++b) x[b] -= u[b] * x[a];
-  }
-  for (std::size_t a = n; a-- > 0;) {
-    const double* const u = &factor_[a * n];
-    for (std::size_t b = a + 1; b < n; ++b) x[a] -= u[b] * x[b];
-    x[a] /= u[a];
-  }
+  kernels::active_kernels().solve_layer(factor_.data(), static_cast<int>(pressing_.size()),
+                                        rhs_.data());
 }
 
 /// Returns P of one cell where all others stay as they are: the root of
@@ -232,16 +212,19 @@ void GelLayer::solve_pressing() {
   for (const int i : pressing_) rhs_.push_back(mean_[static_cast<std::size_t>(i)]);
   solve_system();
   put_solution(load_);
-  if (!layer_->feedback) return couple(pressing_, load_, near_, yield_);
-  // On pressing cells w = δ̄ - P m²/(k n), which costs no product.
+  // Of a contact, w = δ̄ - P m²/(k n) on pressing cells, which costs no product.
   const double whole = layer_->side * layer_->side * layer_->compliance.own;
   idle_.clear();
   for (const int i : near_)
-    if (count_[static_cast<std::size_t>(i)] == 0) idle_.push_back(i);
-  couple(pressing_, load_, idle_, yield_);
+    if (count_[static_cast<std::size_t>(i)] == 0 || !layer_->feedback) idle_.push_back(i);
+  kernels::active_kernels().couple_cells({layer_->compliance.table.data(), layer_->grid.cells(),
+                                          pressing_.data(), rhs_.data(),
+                                          static_cast<int>(pressing_.size()), idle_.data(),
+                                          static_cast<int>(idle_.size()), yield_.data()});
   for (const int i : pressing_) {
     const auto at = static_cast<std::size_t>(i);
-    yield_[at] = mean_[at] - whole / count_[at] * load_[at];
+    yield_[at] = layer_->feedback ? mean_[at] - whole / count_[at] * load_[at]
+                                  : yield_[at] - layer_->compliance.own * load_[at];
   }
 }
 
@@ -390,46 +373,18 @@ void GelLayer::push_forward(std::span<const double> depth_dot, std::span<double>
   }
 }
 
-// On pressing cells w = δ̄ - P m²/(k n).
-void GelLayer::push_forward(std::span<const Directions> depth_dot,
-                            std::span<Directions> pressure_dot) {
-  const auto add = [](Directions& to, double factor, const Directions& x) {
-    for (std::size_t k = 0; k < x.size(); ++k) to[k] += factor * x[k];
-  };
-  const auto scale = [](Directions& x, double factor) {
-    for (double& a : x) a *= factor;
-  };
-  const std::size_t n = pressing_.size();
-  mean_dot_.resize(count_.size());
-  for (const int i : pressing_) mean_dot_[static_cast<std::size_t>(i)] = {};
-  for (const int s : touching_)
-    if (const std::size_t i = cell(s); presses_[static_cast<std::size_t>(s)] != 0)
-      add(mean_dot_[i], 1.0 / count_[i], depth_dot[static_cast<std::size_t>(s)]);
-  std::vector<Directions>& x = cell_dot_;
-  x.clear();
-  for (const int i : pressing_) x.push_back(mean_dot_[static_cast<std::size_t>(i)]);
-  for (std::size_t a = 0; a < n; ++a) {
-    const double* const u = &factor_[a * n];
-    scale(x[a], 1 / u[a]);
-    for (std::size_t b = a + 1; b < n; ++b) add(x[b], -u[b], x[a]);
-  }
-  for (std::size_t a = n; a-- > 0;) {
-    const double* const u = &factor_[a * n];
-    for (std::size_t b = a + 1; b < n; ++b) add(x[a], -u[b], x[b]);
-    scale(x[a], 1 / u[a]);
-  }
+void GelLayer::clear_cells(AlignedVector<double>& cells) const {
+  cells.resize(kernels::kCellNumbers * count_.size());
+  for (const int i : pressing_)
+    std::fill_n(&cells[kernels::kCellNumbers * std::size_t(i)], kernels::kCellNumbers, 0.0);
+}
+
+void GelLayer::add_yield_slopes(const kernels::KernelTable& table,
+                                const AlignedVector<double>& cells, std::span<double> rows) {
+  work_.resize(kernels::kCellWrench * pressing_.size());
   const double whole = layer_->side * layer_->side * layer_->compliance.own;
-  for (std::size_t a = 0; a < n; ++a) {
-    const auto i = static_cast<std::size_t>(pressing_[a]);
-    add(mean_dot_[i], -whole / count_[i], x[a]);
-  }
-  for (const int s : touching_) {
-    const auto at = static_cast<std::size_t>(s);
-    Directions& out = pressure_dot[at] = {};
-    if (presses_[at] == 0) continue;
-    add(out, modulus_ * stiffness_, depth_dot[at]);
-    add(out, -modulus_ * stiffness_, mean_dot_[cell(s)]);
-  }
+  table.add_yield_slopes({factor_.data(), static_cast<int>(pressing_.size()), factored_.data(),
+                          factored_.data() + 1, 2, whole, cells.data(), work_.data(), rows.data()});
 }
 
 }  // namespace tangere

@@ -14,12 +14,13 @@
 // point.
 #pragma once
 
-#include <array>
 #include <cmath>
 #include <span>
 #include <vector>
 
+#include "engine/base/aligned.hpp"
 #include "engine/model/compiled_layer.hpp"
+#include "kernels/table/kernel_table.hpp"
 
 namespace tangere {
 
@@ -52,10 +53,12 @@ class GelLayer {
   void pull_back(std::span<const double> pressure_bar, std::span<double> depth_bar);
   /// Computes how the pressures change with the depths, (points), at a given E.
   void push_forward(std::span<const double> depth_dot, std::span<double> pressure_dot);
-  /// The same along several directions, for a layer that is the contact: (points), of which those
-  /// with δ > least_depth() are read and set.
-  using Directions = std::array<double, 12>;
-  void push_forward(std::span<const Directions> depth_dot, std::span<Directions> pressure_dot);
+  /// Sets the sums of pressing cells, (cells, kernels::kCellNumbers), to zero.
+  void clear_cells(AlignedVector<double>& cells) const;
+  /// Adds what the yield of a layer that is the contact changes in the slopes of a wrench, (6,
+  /// kernels::kLayerDirections), from sums of kernels::LayerSlopeSums.
+  void add_yield_slopes(const kernels::KernelTable& table, const AlignedVector<double>& cells,
+                        std::span<double> rows);
 
  private:
   bool update_pressing();
@@ -87,13 +90,13 @@ class GelLayer {
   std::vector<char> presses_;                    ///< (points) δ_s > w_i
   std::vector<int> last_pressing_;               ///< points that pressed in the last solution
   std::vector<int> near_, pressing_;  ///< cells that touching points are in or near; with n_i > 0
-  std::vector<int> idle_;             ///< near ones with n_i = 0
+  std::vector<int> idle_;             ///< near ones whose yield is a product
   std::vector<int> count_;            ///< (cells) n_i
   std::vector<double> mean_, load_, yield_, sum_;  ///< (cells) δ̄, P at E = 1, w, R
   std::vector<double> load_bar_, yield_bar_;       ///< (cells) cotangents, or tangents
   std::vector<double> factor_, rhs_;  ///< (pressing, pressing) U with M = Uᵀ U; (pressing)
   std::vector<int> factored_;         ///< cells of the factor, each before its n_i
-  std::vector<Directions> mean_dot_, cell_dot_;  ///< (cells); (pressing)
+  AlignedVector<double> work_;        ///< (pressing, kernels::kCellWrench)
   int systems_ = 0;
   bool solved_ = true;
 };

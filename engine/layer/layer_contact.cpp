@@ -1,24 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
-// Forces are summed in pad axes at the pad's origin. What runs for every point is inlined whole
-// (flatten): compilers leave the small operations of vectors apart in units of this size, which
-// takes a third of the time.
+// Forces are summed in pad axes at the pad's origin.
 #include "engine/layer/layer_contact.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
-// Sanitizers instrument every operation: inlined whole, these functions compile for a quarter of an
-// hour.
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-#define TANGERE_INLINE_WHOLE
-#else
-#define TANGERE_INLINE_WHOLE [[gnu::flatten]]
-#endif
+#include "kernels/layer/layer_force.hpp"
 
 namespace tangere {
 
 using kernels::Anchor;
+using kernels::kGroup;
+using kernels::kLayerDirections;
+using kernels::LayerBody;
+using kernels::LayerShape;
 using kernels::Mat3;
 using kernels::Vec3;
 using kernels::Vec6;
@@ -26,27 +21,9 @@ using D = kernels::Dual<double>;
 
 namespace {
 
-Vec3<D> dual(const Vec3<double>& x, const Vec3<double>& dot = {0, 0, 0}) {
-  return {{x.x, dot.x}, {x.y, dot.y}, {x.z, dot.z}};
-}
+Vec3<D> dual(const Vec3<double>& x) { return {x.x, x.y, x.z}; }
 Vec3<double> change_of(const Vec3<D>& x) { return {x.x.epsilon, x.y.epsilon, x.z.epsilon}; }
 Anchor<D> dual(const Anchor<double>& a) { return {dual(a.b), dual(a.a), a.gap}; }
-
-/// A body that moves by displacement and change of twist, pad axes at the pad's origin.
-LayerBody<D> moved(const LayerBody<double>& body, const Vec6<double>& displacement,
-                   const Vec6<double>& twist) {
-  const kernels::Touch<double>& t = body.touch;
-  LayerBody<D> out;
-  const Mat3<double> turned = kernels::skew(displacement.a) * t.Q;
-  for (int i = 0; i < 9; ++i)
-    out.touch.Q.m[i / 3][i % 3] = {t.Q.m[i / 3][i % 3], turned.m[i / 3][i % 3]};
-  out.touch.c = dual(t.c, displacement.l + cross(displacement.a, t.c));
-  out.touch.omega = dual(t.omega, twist.a);
-  out.touch.v = dual(t.v, twist.l);
-  out.touch.law = transformed(t.law, [](double x) { return D(x); });
-  out.size = dual(body.size);
-  return out;
-}
 
 /// Adds column `k` of a 6 × 6 matrix in blocks.
 void add_column(Mat3<double> (&to)[2][2], int k, const Vec6<double>& x) {
@@ -63,167 +40,177 @@ double component(const Vec6<double>& x, int k) {
   return all[k];
 }
 
-/// Adds factor · w dᵀ.
-void add_outer(const Vec6<double>& w, double factor, const GelLayer::Directions& d,
-               std::array<GelLayer::Directions, 6>& rows) {
-  const double scaled[] = {factor * w.a.x, factor * w.a.y, factor * w.a.z,
-                           factor * w.l.x, factor * w.l.y, factor * w.l.z};
-  for (std::size_t r = 0; r < rows.size(); ++r)
-    for (std::size_t k = 0; k < d.size(); ++k) rows[r][k] += scaled[r] * d[k];
-}
-
-/// Adds the wrench of a force at x that changes by M, along three directions from `first` on.
-void add_force(const Mat3<double>& m, const Vec3<double>& x, std::size_t first,
-               std::array<GelLayer::Directions, 6>& rows) {
-  for (std::size_t k = 0; k < 3; ++k) {
-    const Vec3<double> f = {m.m[0][k], m.m[1][k], m.m[2][k]}, moment = cross(x, f);
-    rows[0][first + k] += moment.x, rows[1][first + k] += moment.y, rows[2][first + k] += moment.z;
-    rows[3][first + k] += f.x, rows[4][first + k] += f.y, rows[5][first + k] += f.z;
-  }
-}
-
-void set_column(Slopes& to, int k, const Vec3<double>& x) {
-  Mat3<double>& of = k < 3 ? to.turn : to.shift;
-  of.m[0][k % 3] = x.x, of.m[1][k % 3] = x.y, of.m[2][k % 3] = x.z;
-}
+Vec3<double> lane_of(const Vec3<kernels::LaneRow>& x, int l) { return {x.x[l], x.y[l], x.z[l]}; }
 
 }  // namespace
 
-void LayerContact::begin(const LayerPad& pad, std::size_t slot) {
+void LayerContact::begin(const kernels::KernelTable& table, const LayerPad& pad, std::size_t slot) {
+  for (int k = 0; k < kGroup * eights_; ++k)
+    if (index_[std::size_t(k)] >= 0) slot_[std::size_t(index_[std::size_t(k)])] = -1;
+  table_ = &table;
   pad_ = &pad;
   at_ = slot;
   if (layers_.size() <= slot) layers_.resize(slot + 1);
-  for (const Point& p : points_) slot_[static_cast<std::size_t>(p.index)] = -1;
   slot_.resize(pad.in_field.size(), -1);
-  shapes_.clear(), bodies_.clear(), points_.clear();
+  bodies_.clear();
+  eights_ = 0;
+  wrench_ = kernels::zero6<double>();
 }
 
-void LayerContact::add_body(const LayerShape& shape, const LayerBody<double>& body) {
-  shapes_.push_back(shape);
-  bodies_.push_back(body);
-  down_ = down_in_shape(body.touch, pad_->layer->outward);
-}
-
-/// Calls f with the shape of a body at its size.
-template <class N, class F>
-void LayerContact::with_shape(int body, const Vec3<N>& size, const F& f) const {
-  const LayerShape& of = shapes_[static_cast<std::size_t>(body)];
-  kernels::with_distance<N>(of.shape, size, f, of.grid);
-}
-
-LayerForce<D> LayerContact::force(const Point& p, const LayerBody<D>& body,
-                                  const Anchor<D>& anchor) const {
-  LayerForce<D> out{};
-  with_shape<D>(p.body, body.size, [&](const auto& shape) {
-    out.at = layer_depth(shape, body.touch, p.xi, *pad_->layer, p.known);
-    add_friction(shape, shapes_[static_cast<std::size_t>(p.body)], body.touch, p.xi, p.known,
-                 anchor, out);
-  });
-  return out;
-}
-
-TANGERE_INLINE_WHOLE void LayerContact::add_point(int candidate, int index,
-                                                  const Vec3<double>& place,
-                                                  const Anchor<double>& anchor) {
-  const LayerBody<double>& body = bodies_.back();
-  const kernels::Frame<double>& frame = pad_->frame;
-  Vec3<double> xi = transposed_times(frame.R, place - frame.p);
-  xi.z = 0;  // but for rounding
-  const int number = static_cast<int>(shapes_.size()) - 1;
-  std::optional<DepthOfContact> found;
-  with_shape<double>(number, body.size, [&](const auto& shape) {
-    found = contact_depth(shape, body.touch, xi, *pad_->layer, down_);
-  });
-  if (!found || !(found->at.depth > -pad_->layer->bulge()) || !std::isfinite(found->at.depth))
+/// Leaves the deeper one of two bodies at a point.
+void LayerContact::keep_deepest(int k) {
+  const auto depth = [this](int i) {
+    return points_[std::size_t(i / kGroup)].at.depth[i % kGroup];
+  };
+  int& number = index_[std::size_t(k)];
+  int& slot = slot_[std::size_t(number)];
+  if (slot >= 0 && !(depth(k) > depth(slot))) {
+    number = -1;
     return;
-  const Point p{
-      index, number, candidate, xi, found->known, in_pad(anchor), {found->at, {0, 0, 0}, 0}};
-  int& slot = slot_[static_cast<std::size_t>(index)];
-  if (slot < 0) {
-    slot = static_cast<int>(points_.size());
-    points_.push_back(p);
-  } else if (Point& other = points_[static_cast<std::size_t>(slot)];
-             p.force.at.depth > other.force.at.depth) {
-    other = p;
+  }
+  if (slot >= 0) index_[std::size_t(slot)] = -1;
+  slot = k;
+}
+
+void LayerContact::add_body(const LayerShape& shape, const LayerBody<double>& body,
+                            const LayerCandidates& candidates) {
+  const std::size_t most = std::size_t(eights_ + candidates.count / kGroup + 2);
+  if (points_.size() < most) {
+    points_.resize(most);
+    for (auto* numbers : {&index_, &candidate_, &cell_}) numbers->resize(kGroup * most);
+  }
+  const int first = eights_,
+            found = table_->find_layer_points(
+                {&shape, &body, contact_law(*pad_->layer), pad_->frame, candidates.places,
+                 candidates.anchors, candidates.stride, candidates.count,
+                 &points_[std::size_t(first)], &candidate_[std::size_t(kGroup * first)]}),
+            count = (found + kGroup - 1) / kGroup;
+  bodies_.push_back({shape, body, first, count});
+  eights_ += count;
+  for (int k = kGroup * first; k < kGroup * eights_; ++k) {
+    const int candidate = candidate_[std::size_t(k)];
+    index_[std::size_t(k)] = -1;
+    if (candidate < 0) continue;
+    const int number = candidates.index == nullptr ? candidate : candidates.index[candidate];
+    index_[std::size_t(k)] = pad_->in_field[std::size_t(number)];
+    keep_deepest(k);
+  }
+}
+
+kernels::LayerPoints LayerContact::points_of(const Body& body) {
+  return {&body.shape, &body.motion, contact_law(*pad_->layer), points_.data() + body.first,
+          body.count};
+}
+
+/// a k [N/m].
+double LayerContact::point_stiffness(const Body& body) const {
+  const CompiledLayer& layer = *pad_->layer;
+  return body.motion.touch.law.kn * layer.area * layer.modulus /
+         (layer.stiffness * layer.compliance.own);
+}
+
+/// Sets P and min(P, a k depth).
+void LayerContact::set_loads(const Body& body) {
+  const double stiffness = point_stiffness(body),
+               area = body.motion.touch.law.kn * pad_->layer->area;
+  for (int k = kGroup * body.first; k < kGroup * (body.first + body.count); ++k) {
+    kernels::LayerEight& eight = points_[std::size_t(k / kGroup)];
+    const int l = k % kGroup, index = index_[std::size_t(k)];
+    const double load =
+        index < 0 ? 0 : area * layers_[at_].pressure()[static_cast<std::size_t>(index)];
+    eight.load[l] = load;
+    eight.friction_load[l] = std::min(load, stiffness * std::max(0.0, eight.at.depth[l]));
+    cell_[std::size_t(k)] =
+        load > 0 ? pad_->layer->cell_of_point[static_cast<std::size_t>(index)] : -1;
   }
 }
 
 void LayerContact::solve() {
   depth_.assign(slot_.size(), least_depth(*pad_->layer));
-  for (const Point& p : points_) depth_[static_cast<std::size_t>(p.index)] = p.force.at.depth;
-  layer().solve(*pad_->layer, depth_, pad_->layer->modulus / pad_->layer->stiffness);
-  for (Point& p : points_) {
-    if (!(load(p) > 0)) continue;
-    const auto number = static_cast<std::size_t>(p.body);
-    with_shape<double>(p.body, bodies_[number].size, [&](const auto& shape) {
-      add_friction(shape, shapes_[number], bodies_[number].touch, p.xi, p.known, p.anchor, p.force);
-    });
+  for (int k = 0; k < kGroup * eights_; ++k)
+    if (const int index = index_[std::size_t(k)]; index >= 0)
+      depth_[static_cast<std::size_t>(index)] =
+          points_[std::size_t(k / kGroup)].at.depth[k % kGroup];
+  layers_[at_].solve(*pad_->layer, depth_, pad_->layer->modulus / pad_->layer->stiffness);
+  for (const Body& body : bodies_) {
+    set_loads(body);
+    table_->add_layer_forces(points_of(body), &wrench_.a.x);
   }
 }
 
-double LayerContact::load(const Point& p) const {
-  return bodies_[static_cast<std::size_t>(p.body)].touch.law.kn * pad_->layer->area *
-         layer().pressure()[static_cast<std::size_t>(p.index)];
+LayerContact::Point LayerContact::point(int k) const {
+  const kernels::LayerEight& e = points_[std::size_t(k / kGroup)];
+  const int l = k % kGroup;
+  int body = 0;
+  while (k >= kGroup * (bodies_[std::size_t(body)].first + bodies_[std::size_t(body)].count))
+    ++body;
+  return {index_[std::size_t(k)],
+          body,
+          candidate_[std::size_t(k)],
+          lane_of(e.xi, l),
+          {e.known[l], static_cast<DepthBy>(e.by[l])},
+          {lane_of(e.anchor.b, l), lane_of(e.anchor.a, l), e.anchor.gap[l]},
+          {e.at.depth[l], lane_of(e.at.slant, l), lane_of(e.at.place, l)},
+          e.load[l],
+          e.friction_load[l],
+          lane_of(e.friction, l),
+          e.normal[l]};
 }
 
-/// min(P, a k depth), where k is that of a point on the layer.
-double LayerContact::friction_load(const Point& p) const {
-  return std::min(load(p), point_stiffness(p) * std::max(0.0, p.force.at.depth));
-}
-
-/// a k [N/m].
-double LayerContact::point_stiffness(const Point& p) const {
-  const CompiledLayer& layer = *pad_->layer;
-  return bodies_[static_cast<std::size_t>(p.body)].touch.law.kn * layer.area * layer.modulus /
-         (layer.stiffness * layer.compliance.own);
-}
-
-Vec6<double> LayerContact::wrench() const {
-  Vec6<double> sum = kernels::zero6<double>();
-  for (const Point& p : points_) {
-    const Vec3<double> f = load(p) * p.force.at.slant + friction_load(p) * p.force.friction;
-    sum += {cross(p.force.at.place, f), f};
-  }
-  return wrench_to_parent(pad_->frame, sum);
-}
+Vec6<double> LayerContact::wrench() const { return wrench_to_parent(pad_->frame, wrench_); }
 
 double LayerContact::energy() const {
   double sum = 0;
-  for (const Point& p : points_) sum += 0.5 * load(p) * p.known.depth;
+  for_each_point([&](const Point& p) { sum += 0.5 * p.load * p.known.depth; });
   return sum;
+}
+
+LayerContact::PointChange LayerContact::changed(const Point& p, const LayerBody<D>& body,
+                                                const Anchor<D>& anchor) const {
+  const LayerShape& of = bodies_[static_cast<std::size_t>(p.body)].shape;
+  PointChange out{};
+  kernels::with_distance<D>(
+      of.shape, body.size,
+      [&](const auto& shape) {
+        out.at = layer_depth(shape, body.touch, p.xi, *pad_->layer, p.known);
+        out.friction = layer_friction(shape, of, body.touch, dual(p.xi), D(double(p.known.by)),
+                                      anchor, out.at.slant)
+                           .by_load;
+      },
+      of.grid);
+  return out;
 }
 
 Vec6<double> LayerContact::change_in_pad(std::span<const LayerBody<D>> bodies,
                                          std::span<const Anchor<D>> anchors) {
   depth_dot_.resize(depth_.size());
   load_dot_.resize(depth_.size());
-  changes_.resize(points_.size());
-  for (std::size_t i = 0; i < points_.size(); ++i) {
-    const Point& p = points_[i];
-    depth_dot_[static_cast<std::size_t>(p.index)] = 0;
-    if (!(load(p) > 0)) continue;
-    changes_[i] = force(p, bodies[static_cast<std::size_t>(p.body)],
-                        anchors.empty() ? dual(p.anchor) : anchors[i]);
-    depth_dot_[static_cast<std::size_t>(p.index)] = changes_[i].at.depth.epsilon;
-  }
-  layer().push_forward(depth_dot_, load_dot_);
+  changes_.clear();
+  for_each_point([&](const Point& p) {
+    double& depth_dot = depth_dot_[static_cast<std::size_t>(p.index)] = 0;
+    changes_.emplace_back();
+    if (!(p.load > 0)) return;
+    changes_.back() = changed(p, bodies[static_cast<std::size_t>(p.body)],
+                              anchors.empty() ? dual(p.anchor) : anchors[changes_.size() - 1]);
+    depth_dot = changes_.back().at.depth.epsilon;
+  });
+  layers_[at_].push_forward(depth_dot_, load_dot_);
   Vec6<double> sum = kernels::zero6<double>();
-  for (std::size_t i = 0; i < points_.size(); ++i) {
-    const Point& p = points_[i];
-    if (!(load(p) > 0)) continue;
-    const D& kn = bodies[static_cast<std::size_t>(p.body)].touch.law.kn;
-    const auto at = static_cast<std::size_t>(p.index);
-    const double relative = kn.epsilon / kn.value, P = load(p), F = friction_load(p),
+  std::size_t next = 0;
+  for_each_point([&](const Point& p) {
+    const PointChange& change = changes_[next++];
+    if (!(p.load > 0)) return;
+    const auto body = static_cast<std::size_t>(p.body), at = static_cast<std::size_t>(p.index);
+    const D& kn = bodies[body].touch.law.kn;
+    const double relative = kn.epsilon / kn.value, P = p.load, F = p.friction_load,
                  P_dot = kn.value * pad_->layer->area * load_dot_[at] + relative * P,
-                 slope = F > 0 ? point_stiffness(p) : 0,
+                 slope = F > 0 ? point_stiffness(bodies_[body]) : 0,
                  F_dot = F < P ? slope * depth_dot_[at] + relative * F : P_dot;
-    const LayerForce<double>& force = p.force;
-    const LayerForce<D>& change = changes_[i];
-    const Vec3<double> f = P * force.at.slant + F * force.friction,
-                       f_dot = P_dot * force.at.slant + P * change_of(change.at.slant) +
-                               F_dot * force.friction + F * change_of(change.friction);
-    sum += {cross(change_of(change.at.place), f) + cross(force.at.place, f_dot), f_dot};
-  }
+    const Vec3<double> f = P * p.at.slant + F * p.friction,
+                       f_dot = P_dot * p.at.slant + P * change_of(change.at.slant) +
+                               F_dot * p.friction + F * change_of(change.friction);
+    sum += {cross(change_of(change.at.place), f) + cross(p.at.place, f_dot), f_dot};
+  });
   return sum;
 }
 
@@ -232,105 +219,48 @@ Vec6<double> LayerContact::change(std::span<const LayerBody<D>> bodies,
   return wrench_to_parent(pad_->frame, change_in_pad(bodies, anchors));
 }
 
-/// Slopes at a point, outside of the shape by dual numbers.
-TANGERE_INLINE_WHOLE LayerSlopes LayerContact::slopes(const Point& p) const {
-  const auto number = static_cast<std::size_t>(p.body);
-  const LayerShape& of = shapes_[number];
-  const LayerBody<double>& body = bodies_[number];
-  LayerSlopes out{};
-  if (p.known.by != DepthBy::gap) {
-    with_shape<double>(p.body, body.size, [&](const auto& shape) {
-      out = layer_slopes(shape, of, body.touch, p.xi, *pad_->layer, p.known, p.anchor, p.force);
-    });
-    return out;
-  }
-  double depth[6];
-  for (int k = 0; k < 6; ++k) {
-    const LayerForce<D> f =
-        force(p, moved(body, unit_motion(k), kernels::zero6<double>()), dual(p.anchor));
-    depth[k] = f.at.depth.epsilon;
-    set_column(out.slant, k, change_of(f.at.slant));
-  }
-  out.depth = {{depth[0], depth[1], depth[2]}, {depth[3], depth[4], depth[5]}};
-  return out;
-}
-
-/// Computes the derivatives of w by displacement and twist, (12) in pad axes.
-TANGERE_INLINE_WHOLE std::array<Vec6<double>, 12> LayerContact::columns_in_pad() {
-  depth_slopes_.resize(depth_.size());
-  load_slopes_.resize(depth_.size());
-  slopes_.resize(points_.size());
-  for (std::size_t i = 0; i < points_.size(); ++i) {
-    GelLayer::Directions& depth = depth_slopes_[static_cast<std::size_t>(points_[i].index)];
-    depth = {};
-    if (!(load(points_[i]) > 0)) continue;
-    slopes_[i] = slopes(points_[i]);
-    for (int k = 0; k < 6; ++k) {
-      depth[std::size_t(k)] = component(slopes_[i].depth, k);
-      depth[std::size_t(k + 6)] = component(slopes_[i].depth_by_twist, k);
-    }
-  }
-  layer().push_forward(depth_slopes_, load_slopes_);
-  // Rows of w, each along the 12 directions.
-  std::array<GelLayer::Directions, 6> rows{};
-  for (std::size_t i = 0; i < points_.size(); ++i) {
-    const Point& p = points_[i];
-    const double P = load(p), F = friction_load(p), slope = F > 0 ? point_stiffness(p) : 0,
-                 per_load =
-                     bodies_[static_cast<std::size_t>(p.body)].touch.law.kn * pad_->layer->area;
-    if (!(P > 0)) continue;
-    const auto at = static_cast<std::size_t>(p.index);
-    const LayerForce<double>& force = p.force;
-    const Vec3<double>&x = force.at.place, f = P * force.at.slant + F * force.friction,
-          loaded = force.at.slant + (F < P ? 0.0 : 1.0) * force.friction;
-    // Loads and friction change, while slants stay.
-    add_outer({cross(x, loaded), loaded}, per_load, load_slopes_[at], rows);
-    if (F < P)
-      add_outer({cross(x, force.friction), force.friction}, slope, depth_slopes_[at], rows);
-    const LayerSlopes& by = slopes_[i];
-    const Slopes turned = P * by.slant + F * by.friction;
-    add_force(turned.turn, x, 0, rows), add_force(turned.shift, x, 3, rows);
-    add_force(F * by.friction_by_twist.turn, x, 6, rows);
-    add_force(F * by.friction_by_twist.shift, x, 9, rows);
-    if (p.known.by == DepthBy::underside)
-      for (int k = 0; k < 6; ++k) {
-        const Vec3<double> moment = cross(column(by.place, k), f);
-        rows[0][std::size_t(k)] += moment.x, rows[1][std::size_t(k)] += moment.y,
-            rows[2][std::size_t(k)] += moment.z;
-      }
-  }
-  std::array<Vec6<double>, 12> out;
-  for (std::size_t k = 0; k < out.size(); ++k)
-    out[k] = {{rows[0][k], rows[1][k], rows[2][k]}, {rows[3][k], rows[4][k], rows[5][k]}};
-  return out;
-}
-
 void LayerContact::add_to(kernels::PairSums<double>& sums, bool derivatives) {
   sums.wrench += wrench();
-  if (!derivatives || points_.empty()) return;
-  const std::array<Vec6<double>, 12> columns = columns_in_pad();
-  for (int k = 0; k < 12; ++k) {
+  if (!derivatives || empty()) return;
+  double rows[6 * kLayerDirections] = {};
+  layers_[at_].clear_cells(cells_);
+  for (const Body& body : bodies_)
+    table_->add_layer_slopes({points_of(body), point_stiffness(body),
+                              &cell_[std::size_t(kGroup * body.first)], cells_.data(), rows});
+  layers_[at_].add_yield_slopes(*table_, cells_, rows);
+  for (int k = 0; k < kLayerDirections; ++k) {
     // ε and δW of the link in pad axes.
     const Vec6<double> in_pad = motion_to_child(pad_->frame, unit_motion(k % 6));
     Vec6<double> sum = kernels::zero6<double>();
-    for (int i = 0; i < 6; ++i)
-      sum += component(in_pad, i) * columns[std::size_t(i + (k < 6 ? 0 : 6))];
+    for (int i = 0; i < 6; ++i) {
+      const double* const of = rows + i + (k < 6 ? 0 : 6);
+      const auto row = [of](int r) { return of[kLayerDirections * r]; };
+      sum +=
+          component(in_pad, i) * Vec6<double>{{row(0), row(1), row(2)}, {row(3), row(4), row(5)}};
+    }
     add_column(k < 6 ? sums.k : sums.d, k % 6, wrench_to_parent(pad_->frame, sum));
   }
 }
 
 Vec3<double> LayerContact::friction_bar(const Point& p, const Vec6<double>& wrench_bar) const {
-  if (!(p.force.normal > 0)) return {0, 0, 0};
+  if (!(p.normal > 0)) return {0, 0, 0};
   const Vec6<double> bar = motion_to_child(pad_->frame, wrench_bar);
-  const Vec3<double>&slant = p.force.at.slant, f = bar.l + cross(bar.a, p.force.at.place);
-  return (friction_load(p) / p.force.normal) *
+  const Vec3<double>&slant = p.at.slant, f = bar.l + cross(bar.a, p.at.place);
+  return (p.friction_load / p.normal) *
          (pad_->frame.R * (f - (dot(slant, f) / dot(slant, slant)) * slant));
 }
 
 std::vector<LayerBody<D>> LayerContact::still_bodies() const {
-  const Vec6<double> none = kernels::zero6<double>();
   std::vector<LayerBody<D>> out;
-  for (const LayerBody<double>& body : bodies_) out.push_back(moved(body, none, none));
+  for (const Body& of : bodies_) {
+    const kernels::Touch<double>& t = of.motion.touch;
+    LayerBody<D> body;
+    body.touch.Q = kernels::broadcast<D>(t.Q);
+    body.touch.c = dual(t.c), body.touch.omega = dual(t.omega), body.touch.v = dual(t.v);
+    body.touch.law = transformed(t.law, [](double x) { return D(x); });
+    body.size = dual(of.motion.size);
+    out.push_back(body);
+  }
   return out;
 }
 

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // Contact of one pad's layer with the bodies of one link (docs/layer.md). With the loads of the
-// points (engine/layer/gel_layer.hpp) and the forces f_s (engine/layer/layer_force.hpp), which act
+// points (engine/layer/gel_layer.hpp) and the forces f_s (kernels/layer/layer_force.hpp), which act
 // at x_s, the wrench on the pad's link is
 //   w = Σ (x_s × f_s; f_s)
-// Its derivatives by motion are those of engine/layer/layer_slopes.hpp; its change along any other
+// Its derivatives by motion are those of kernels/layer/layer_slopes.hpp; its change along any other
 // direction follows from dual numbers.
 #pragma once
 
@@ -11,62 +11,78 @@
 #include <vector>
 
 #include "engine/layer/gel_layer.hpp"
-#include "engine/layer/layer_slopes.hpp"
+#include "engine/layer/layer_depth.hpp"
 #include "engine/model/compiled_model.hpp"
 #include "kernels/numbers/dual.hpp"
+#include "kernels/table/kernel_table.hpp"
 
 namespace tangere {
 
 /// Returns a body that presses a pad, from the pose and twist of its link in the pad's link.
 template <class N>
-LayerBody<N> layer_body(const LayerPad& pad, const kernels::Frame<double>& body,
-                        const kernels::Frame<N>& link2_in_1, const kernels::Vec6<N>& twist,
-                        const Coefficients<N>& law, const kernels::Vec3<N>& size) {
+kernels::LayerBody<N> layer_body(const LayerPad& pad, const kernels::Frame<double>& body,
+                                 const kernels::Frame<N>& link2_in_1, const kernels::Vec6<N>& twist,
+                                 const Coefficients<N>& law, const kernels::Vec3<N>& size) {
   const kernels::Frame<N> frame = kernels::broadcast<N>(pad.frame);
   const kernels::Frame<N> shape = relative(frame, compose(link2_in_1, kernels::broadcast<N>(body)));
   const kernels::Vec6<N> in_pad = motion_to_child(frame, twist);
   return {{shape.R, shape.p, in_pad.a, in_pad.l, law}, size};
 }
 
+/// Points of a pad that a body may touch.
+struct LayerCandidates {
+  const double* places;   ///< (3, stride) the pad's link's axes [m]
+  const double* anchors;  ///< (kernels::kAnchorNumbers, stride) b in the link's axes; null: zeros
+  const int* index;       ///< (count) numbers of the contact's points; null: 0 … count - 1
+  int stride;             ///< a multiple of eight
+  int count;
+};
+
 /// Owns the scratch of one thread.
 class LayerContact {
  public:
   using D = kernels::Dual<double>;
-  /// A point that a body touches.
+  /// A point that a body touches, pad axes.
   struct Point {
     int index, body;           ///< in the field; in the order of add_body()
-    int candidate;             ///< as add_point() got it
-    kernels::Vec3<double> xi;  ///< pad axes [m]
+    int candidate;             ///< its number among those of add_body()
+    kernels::Vec3<double> xi;  ///< [m]
     KnownDepth known;
     kernels::Anchor<double> anchor;  ///< b in pad axes
-    LayerForce<double> force;
+    LayerDepth<double> at;
+    double load, friction_load;      ///< P, and that of friction [N]
+    kernels::Vec3<double> friction;  ///< T'/N
+    double normal;                   ///< N [N]
   };
 
   /// Begins a contact without bodies. The solver of a slot begins where it was last: contacts that
   /// change little from one call to the next have slots of their own. Results do not depend on it.
-  void begin(const LayerPad& pad, std::size_t slot = 0);
-  void add_body(const LayerShape& shape, const LayerBody<double>& body);
-  /// Adds a point of the last body at `place`, the pad's link's axes, if the body touches it. Where
-  /// two bodies are at a point, the deeper one counts. `anchor`: b in the link's axes.
-  void add_point(int candidate, int index, const kernels::Vec3<double>& place,
-                 const kernels::Anchor<double>& anchor);
+  void begin(const kernels::KernelTable& table, const LayerPad& pad, std::size_t slot = 0);
+  /// Adds a body, and those of its candidates that it touches. Where two bodies are at a point, the
+  /// deeper one counts.
+  void add_body(const kernels::LayerShape& shape, const kernels::LayerBody<double>& body,
+                const LayerCandidates& candidates);
   /// Solves the layer.
   void solve();
   /// Whether the layer's pressures were found.
-  [[nodiscard]] bool solved() const { return layer().solved(); }
+  [[nodiscard]] bool solved() const { return layers_[at_].solved(); }
 
-  [[nodiscard]] const std::vector<Point>& points() const { return points_; }
-  [[nodiscard]] const std::vector<LayerBody<double>>& bodies() const { return bodies_; }
-  [[nodiscard]] double load(const Point& point) const;           ///< P_s [N]
-  [[nodiscard]] double friction_load(const Point& point) const;  ///< that of friction [N]
+  /// Whether no body touches a point.
+  [[nodiscard]] bool empty() const { return eights_ == 0; }
+  /// Calls f with every Point.
+  template <class F>
+  void for_each_point(const F& f) const {
+    for (int k = 0; k < kernels::kGroup * eights_; ++k)
+      if (index_[std::size_t(k)] >= 0) f(point(k));
+  }
   /// w, in the axes of the pad's link at its origin.
   [[nodiscard]] kernels::Vec6<double> wrench() const;
   /// Energy that the layer stores at depths without δ̇ [J].
   [[nodiscard]] double energy() const;
 
   /// Returns the change of w where the bodies change as their dual numbers say. `anchors`: of the
-  /// points, b in pad axes; empty: they stay.
-  kernels::Vec6<double> change(std::span<const LayerBody<D>> bodies,
+  /// points of for_each_point(), b in pad axes; empty: they stay.
+  kernels::Vec6<double> change(std::span<const kernels::LayerBody<D>> bodies,
                                std::span<const kernels::Anchor<D>> anchors = {});
   /// Adds w, and its derivatives by displacement and twist of the other link, to the sums.
   void add_to(kernels::PairSums<double>& sums, bool derivatives);
@@ -81,34 +97,44 @@ class LayerContact {
   [[nodiscard]] kernels::Vec3<double> friction_bar(const Point& point,
                                                    const kernels::Vec6<double>& wrench_bar) const;
   /// Returns bodies whose dual numbers do not change.
-  [[nodiscard]] std::vector<LayerBody<D>> still_bodies() const;
+  [[nodiscard]] std::vector<kernels::LayerBody<D>> still_bodies() const;
 
  private:
-  [[nodiscard]] GelLayer& layer() { return layers_[at_]; }
-  [[nodiscard]] const GelLayer& layer() const { return layers_[at_]; }
-  [[nodiscard]] double point_stiffness(const Point& p) const;
-  [[nodiscard]] LayerSlopes slopes(const Point& p) const;
-  [[nodiscard]] std::array<kernels::Vec6<double>, 12> columns_in_pad();
-  template <class N, class F>
-  void with_shape(int body, const kernels::Vec3<N>& size, const F& f) const;
-  [[nodiscard]] LayerForce<D> force(const Point& p, const LayerBody<D>& body,
+  struct Body {
+    kernels::LayerShape shape;
+    kernels::LayerBody<double> motion;
+    int first = 0, count = 0;  ///< eights of points
+  };
+  /// Forces at a point whose bodies change.
+  struct PointChange {
+    LayerDepth<D> at;
+    kernels::Vec3<D> friction;
+  };
+
+  [[nodiscard]] Point point(int k) const;
+  [[nodiscard]] kernels::LayerPoints points_of(const Body& body);
+  [[nodiscard]] double point_stiffness(const Body& body) const;
+  void keep_deepest(int k);
+  void set_loads(const Body& body);
+  [[nodiscard]] PointChange changed(const Point& p, const kernels::LayerBody<D>& body,
                                     const kernels::Anchor<D>& anchor) const;
-  [[nodiscard]] kernels::Vec6<double> change_in_pad(std::span<const LayerBody<D>> bodies,
+  [[nodiscard]] kernels::Vec6<double> change_in_pad(std::span<const kernels::LayerBody<D>> bodies,
                                                     std::span<const kernels::Anchor<D>> anchors);
 
+  const kernels::KernelTable* table_ = nullptr;
   const LayerPad* pad_ = nullptr;
-  std::vector<LayerShape> shapes_;
-  std::vector<LayerBody<double>> bodies_;
-  kernels::Vec3<double> down_{};  // into the pad, axes of the last body's shape
-  std::vector<Point> points_;
-  std::vector<int> slot_;                     // (points) number in points_, or -1
-  std::vector<double> depth_;                 // (points)
-  std::vector<double> depth_dot_, load_dot_;  // (points)
-  std::vector<LayerForce<D>> changes_;        // parallel to points_
-  std::vector<LayerSlopes> slopes_;           // the same
-  std::vector<GelLayer::Directions> depth_slopes_, load_slopes_;  // (points)
-  std::vector<GelLayer> layers_;                                  // by slot
-  std::size_t at_ = 0;                                            // the present slot
+  std::vector<Body> bodies_;
+  int eights_ = 0;
+  AlignedVector<kernels::LayerEight> points_;  // (eights)
+  std::vector<int> index_, candidate_, cell_;  // (8 eights) cell: -1 where it does not press
+  std::vector<int> slot_;                      // (points of the pad) number in index_, or -1
+  std::vector<double> depth_;                  // (points of the pad)
+  std::vector<double> depth_dot_, load_dot_;   // (points of the pad)
+  std::vector<PointChange> changes_;           // of for_each_point()
+  AlignedVector<double> cells_;                // (cells, kernels::kCellNumbers)
+  kernels::Vec6<double> wrench_{};             // pad axes
+  std::vector<GelLayer> layers_;               // by slot
+  std::size_t at_ = 0;                         // the present slot
 };
 
 }  // namespace tangere

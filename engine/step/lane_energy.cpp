@@ -255,9 +255,10 @@ struct LaneAt {
   std::vector<int> solve_layer(const kernels::LinkPair& links, int pad,
                                const Frame<double>& link2_in_1, const kernels::Vec6<double>& W,
                                bool friction, LayerContact& contact) const {
+    AlignedVector<double> places;
     const LayerPad& of = model.layer_pads[std::size_t(pad)];
     std::vector<int> members;
-    contact.begin(of);
+    contact.begin(kernels::active_kernels(), of);
     for (int i = links.first; i < links.first + links.count; ++i) {
       const auto& pair = model.pairs[std::size_t(model.pair_order[std::size_t(i)])];
       if (pair.layer_pad != pad) continue;
@@ -265,12 +266,15 @@ struct LaneAt {
       Coefficients<double> law =
           transformed(pair.parameters, [this](const kernels::Parameter& p) { return number(p); });
       if (!friction) law.mu = 0;
+      const int stride = (pair.n_points + kernels::kGroup - 1) / kernels::kGroup * kernels::kGroup;
+      places.assign(3 * std::size_t(stride), 0.0);
+      for (int k = 0; k < pair.n_points; ++k)
+        for (int axis = 0; axis < 3; ++axis)
+          places[std::size_t(axis * stride + k)] = pair.points[3 * k + axis];
       contact.add_body(
           {pair.shape, pair.grid, pair.law, pair.ramp, false, false},
-          layer_body<double>(of, pair.frame2, link2_in_1, W, law, size(pair.size, pair.size_row)));
-      for (int k = 0; k < pair.n_points; ++k)
-        contact.add_point(k, of.in_field[std::size_t(k)],
-                          {pair.points[3 * k], pair.points[3 * k + 1], pair.points[3 * k + 2]}, {});
+          layer_body<double>(of, pair.frame2, link2_in_1, W, law, size(pair.size, pair.size_row)),
+          {places.data(), nullptr, nullptr, stride, pair.n_points});
     }
     contact.solve();
     return members;
@@ -285,18 +289,17 @@ struct LaneAt {
       for (int pad = 0; pad < static_cast<int>(model.layer_pads.size()); ++pad) {
         const std::vector<int> members =
             solve_layer(links, pad, link2_in_1, kernels::zero6<double>(), true, contact);
-        for (const LayerContact::Point& p : contact.points()) {
-          if (!(p.force.normal > 0)) continue;
+        contact.for_each_point([&](const LayerContact::Point& p) {
+          if (!(p.normal > 0)) return;
           const kernels::PairContact& pair = model.pairs[std::size_t(members[std::size_t(p.body)])];
-          if (pair.memory < 0) continue;
+          if (pair.memory < 0) return;
           const int row = model.shear_springs[std::size_t(pair.memory)].first + p.candidate;
           const auto entry = std::ranges::lower_bound(memory, row, {}, &ShearEntry::point);
-          if (entry == memory.end() || entry->point != row) continue;
+          if (entry == memory.end() || entry->point != row) return;
           double square = 0;
           for (const double x : entry->s) square += x * x;
-          sum.moving +=
-              0.5 * number(pair.parameters.ks) * square * contact.friction_load(p) / p.force.normal;
-        }
+          sum.moving += 0.5 * number(pair.parameters.ks) * square * p.friction_load / p.normal;
+        });
       }
     }
   }
@@ -306,7 +309,7 @@ struct LaneAt {
     for (int pad = 0; pad < static_cast<int>(model.layer_pads.size()); ++pad) {
       solve_layer(links, pad, link2_in_1, kernels::zero6<double>(), false, contact);
       sum.moving += contact.energy();
-      if (terms == nullptr || contact.points().empty()) continue;
+      if (terms == nullptr || contact.empty()) continue;
       const auto W = motion_to_parent(link2_in_1, twist(links.link2)) - twist(links.link1);
       const double stored = dot(contact.wrench(), W);
       solve_layer(links, pad, link2_in_1, W, true, contact);

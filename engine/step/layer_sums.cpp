@@ -33,29 +33,21 @@ kernels::Vec3<double> size_in_lane(const kernels::PairContact& pair, const kerne
   return {number(0), number(1), number(2)};
 }
 
-/// Adds the candidates of a pair.
+/// Presents the candidates of a pair.
 template <int L>
-void add_candidates(const LayerPad& pad, const typename kernels::Stage<L>::List& list, int lane,
-                    LayerContact& contact) {
-  const double* const place = list.own + 3 * list.stride * lane;
-  const double* const anchors =
-      list.own_anchors == nullptr ? nullptr
-                                  : list.own_anchors + kernels::kAnchorNumbers * list.stride * lane;
-  const auto number = [&](int k, int i) {
-    return anchors == nullptr ? 0.0 : anchors[i * list.stride + k];
-  };
-  for (int k = 0; k < list.own_count[lane]; ++k) {
-    const int index = pad.in_field[std::size_t(list.own_index[list.stride * lane + k])];
-    contact.add_point(k, index, {place[k], place[list.stride + k], place[2 * list.stride + k]},
-                      kernels::load_anchor<double>([&](int i) { return number(k, i); }));
-  }
+LayerCandidates candidates_of(const typename kernels::Stage<L>::List& list, int lane) {
+  return {list.own + 3 * list.stride * lane,
+          list.own_anchors == nullptr
+              ? nullptr
+              : list.own_anchors + kernels::kAnchorNumbers * list.stride * lane,
+          list.own_index + list.stride * lane, list.stride, list.own_count[lane]};
 }
 
 }  // namespace
 
 template <int L>
-void solve_layer(const CompiledModel& m, BasicWorkspace<L>& w, const kernels::LinkPair& links,
-                 int pad, int lane) {
+void solve_layer(const CompiledModel& m, const kernels::KernelTable& table, BasicWorkspace<L>& w,
+                 const kernels::LinkPair& links, int pad, int lane) {
   const Row<L>* const row = w.pair_motions + kernels::kPairMotionNumbers * links.layer;
   kernels::Frame<double> link2_in_1;
   for (int i = 0; i < 9; ++i) link2_in_1.R.m[i / 3][i % 3] = row[i][lane];
@@ -65,7 +57,7 @@ void solve_layer(const CompiledModel& m, BasicWorkspace<L>& w, const kernels::Li
   const LayerPad& of = m.layer_pads[std::size_t(pad)];
   w.layer_members.clear();
   const std::size_t slot = m.layer_pads.size() * std::size_t(links.layer) + std::size_t(pad);
-  w.layer_contact->begin(of, L * slot + std::size_t(lane));
+  w.layer_contact->begin(table, of, L * slot + std::size_t(lane));
   for (int i = links.first; i < links.first + links.count; ++i) {
     const int k = m.pair_order[std::size_t(i)];
     const kernels::PairContact& pair = m.pairs[std::size_t(k)];
@@ -76,8 +68,8 @@ void solve_layer(const CompiledModel& m, BasicWorkspace<L>& w, const kernels::Li
     w.layer_contact->add_body({pair.shape, pair.grid, pair.law, pair.ramp, pair.memory >= 0,
                                w.stage.friction_tangent[lane] == 0},
                               layer_body<double>(of, pair.frame2, link2_in_1, twist, law,
-                                                 size_in_lane<L>(pair, w.stage, lane)));
-    add_candidates<L>(of, list, lane, *w.layer_contact);
+                                                 size_in_lane<L>(pair, w.stage, lane)),
+                              candidates_of<L>(list, lane));
   }
   w.layer_contact->solve();
 }
@@ -95,8 +87,8 @@ LaneBits set_layer_sums(const CompiledModel& m, const kernels::KernelTable& tabl
   for_each_layer(m, w, [&](const kernels::LinkPair& links, int pad) {
     for (int l = 0; l < L; ++l) {
       if (!has(lanes, l)) continue;
-      solve_layer(m, w, links, pad, l);
-      if (w.layer_contact->points().empty()) continue;
+      solve_layer(m, table, w, links, pad, l);
+      if (w.layer_contact->empty()) continue;
       auto sums = kernels::PairSums<double>::zero();
       w.layer_contact->add_to(sums, derivatives);
       const bool solved = w.layer_contact->solved();
@@ -110,10 +102,10 @@ LaneBits set_layer_sums(const CompiledModel& m, const kernels::KernelTable& tabl
   return unsolved;
 }
 
-#define TANGERE_FOR_LANES(L)                                                                    \
-  template void solve_layer(const CompiledModel&, BasicWorkspace<L>&, const kernels::LinkPair&, \
-                            int, int);                                                          \
-  template LaneBits set_layer_sums(const CompiledModel&, const kernels::KernelTable&,           \
+#define TANGERE_FOR_LANES(L)                                                                       \
+  template void solve_layer(const CompiledModel&, const kernels::KernelTable&, BasicWorkspace<L>&, \
+                            const kernels::LinkPair&, int, int);                                   \
+  template LaneBits set_layer_sums(const CompiledModel&, const kernels::KernelTable&,              \
                                    BasicWorkspace<L>&, LaneBits, bool);
 TANGERE_FOR_LANES(kernels::kGroup)
 TANGERE_FOR_LANES(1)

@@ -19,8 +19,8 @@ LaneBits set_layer_sums(const CompiledModel& model, const kernels::KernelTable& 
 /// set_layer_sums() found. Leaves it in w.layer_contact, and the pairs of its bodies in
 /// w.layer_members.
 template <int L>
-void solve_layer(const CompiledModel& model, BasicWorkspace<L>& w, const kernels::LinkPair& links,
-                 int pad, int lane);
+void solve_layer(const CompiledModel& model, const kernels::KernelTable& table,
+                 BasicWorkspace<L>& w, const kernels::LinkPair& links, int pad, int lane);
 
 /// Calls f(links, pad) for every pad and pair of links that are not apart.
 template <int L, class F>

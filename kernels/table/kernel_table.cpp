@@ -34,6 +34,8 @@ template <class Arch>
 void add_shear_kernels(KernelTable& k);
 template <class Arch>
 void add_block_kernels(KernelTable& k);
+template <class Arch>
+void add_layer_kernels(KernelTable& k);
 
 namespace {
 
@@ -54,6 +56,7 @@ KernelTable table_of(const char* name) {
   add_reading_pullback_kernels<Arch>(k);
   add_shear_kernels<Arch>(k);
   add_block_kernels<Arch>(k);
+  add_layer_kernels<Arch>(k);
   return k;
 }
 

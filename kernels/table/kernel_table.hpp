@@ -5,6 +5,7 @@
 
 #include <span>
 
+#include "kernels/layer/layer_types.hpp"
 #include "kernels/shear/shear_types.hpp"
 #include "kernels/step/arguments.hpp"
 #include "kernels/step/block_lu_types.hpp"
@@ -154,6 +155,20 @@ struct KernelTable {
                                double* x, double* work);
   bool (*solve_blocks_transposed)(const BlockPlan&, const double* A, const double* LU,
                                   const double* b, double* x, double* work);
+  /// Finds the points that a body touches on a layer that is the contact. Returns their number.
+  int (*find_layer_points)(const LayerSearch&);
+  /// Sets the friction of points with loads, and adds their wrench, (6).
+  void (*add_layer_forces)(const LayerPoints&, double* wrench);
+  /// Adds the slopes of the wrench of one body's points, and their sums over cells.
+  void (*add_layer_slopes)(const LayerSlopeSums&);
+  /// Overwrites the upper triangle of M, (n, n), by U with M = Uᵀ U.
+  void (*factor_layer)(double* U, int n);
+  /// Solves M x = b in place.
+  void (*solve_layer)(const double* U, int n, double* x);
+  /// Computes C x of a layer's compliance.
+  void (*couple_cells)(const LayerProduct&);
+  /// Adds what the yield of the cells changes in the slopes of the wrench.
+  void (*add_yield_slopes)(const LayerSystem&);
 
   template <int L>
   [[nodiscard]] const StageKernels<L>& stage() const {

@@ -88,7 +88,7 @@ class LayerProbe {
     set_layer_sums(m_, table_, w_, 1U, false);
     double sum = 0;
     for_each_layer(m_, w_, [&](const kernels::LinkPair& links, int pad) {
-      solve_layer(m_, w_, links, pad, 0);
+      solve_layer(m_, table_, w_, links, pad, 0);
       sum += w_.layer_contact->energy();
     });
     return sum;

@@ -40,6 +40,7 @@ const std::map<std::string, Folder, std::less<>>& folders() {
        {{"kernels/reverse", "kernels/step", "kernels/tactile", "kernels/contact",
          "kernels/numbers"},
         of_kernels}},
+      {"kernels/layer", {{"kernels/contact", "kernels/numbers"}, of_kernels}},
       {"kernels/table", {{"kernels"}, of_kernels}},
       {"engine/base", {{}, of_engine}},
       {"engine/scene", {{"engine/base", "kernels"}, of_engine}},
