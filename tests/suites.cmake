@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 # The suites that take seconds, longest first. They have the label slow. A fresh ctest starts them first, so that all
 # cores end together; afterwards it goes by the times that it has measured.
-set(long golden_test.GoldenScenes engine_test.All/AdjointScheme tasks_test.Scenes/EveryScene apps_fault_test.Calls/Fault tasks_test.Scripted
-  engine_test.All/Landing engine_test.Schemes/ShearGradient engine_test.MeshGrid engine_test.MeshContact
-  engine_test.Laws/ContactJacobian apps_test.Stress apps_test.InspectEffects tasks_test.PublishedFaults
-  tasks_test.Identification tasks_test.Tasks/EveryLoop tasks_test.Tasks/EveryTape apps_test.View
-  apps_test.Command apps_threads_test.GenerateGradients apps_threads_test.Tasks
-  apps_memory_test.DatasetCommand io_memory_test.ChunkCodec apps_threads_test.GenerateShards
+set(long golden_test.GoldenScenes engine_test.All/AdjointScheme tasks_test.Scenes/EveryScene
+  apps_fault_test.Calls/Fault tasks_test.Scripted engine_test.All/Landing engine_test.Schemes/ShearGradient
+  engine_test.MeshGrid engine_test.MeshContact engine_test.Laws/ContactJacobian apps_test.Stress
+  apps_test.InspectEffects tasks_test.PublishedFaults tasks_test.Identification tasks_test.Tasks/EveryLoop
+  tasks_test.Tasks/EveryTape apps_test.View apps_test.Command apps_threads_test.GenerateGradients
+  apps_threads_test.Tasks apps_memory_test.DatasetCommand io_memory_test.ChunkCodec apps_threads_test.GenerateShards
   tasks_memory_threads_test.Tasks/EveryTask tasks_memory_threads_test.BenchmarkRun apps_threads_test.GeneratePolicy
   apps_memory_test.DamagedFile apps_memory_test.Files/DamagedShard apps_threads_test.GenerateCompress
   fuzz_test.Files/Fuzz apps_test.Accuracy apps_test.GenerateStop engine_test.All/Touching

@@ -175,7 +175,7 @@ LayerContact::PointChange LayerContact::changed(const Point& p, const LayerBody<
         out.at = layer_depth(shape, body.touch, p.xi, *pad_->layer, p.known);
         out.friction = layer_friction(shape, of, body.touch, dual(p.xi), D(double(p.known.by)),
                                       anchor, out.at.slant)
-                           .by_load;
+                           .ratio;
       },
       of.grid);
   return out;

@@ -26,8 +26,8 @@ Dual<N> constant_of(const Dual<N>& x) {
 /// Friction at a point.
 template <class N>
 struct LayerFriction {
-  Vec3<N> by_load;  ///< T'/N
-  N normal;         ///< N [N]; 0: without friction
+  Vec3<N> ratio;  ///< T'/N
+  N normal;       ///< N [N]; 0: without friction
 };
 
 /// Returns the friction of a point where `by` is not the gap.
@@ -54,7 +54,7 @@ LayerFriction<N> layer_friction(const Shape& shape, const LayerShape& of, const 
   const N inverse = N(1.0) / select(acting, p.normal.force, N(1.0));
   const Vec3<N> whole = -(scale * inverse) * p.w;
   const N along = dot(slant, whole) / dot(slant, slant);
-  out.by_load = select(acting, whole - along * slant, zero3<N>());
+  out.ratio = select(acting, whole - along * slant, zero3<N>());
   return out;
 }
 

@@ -113,7 +113,7 @@ void add_layer_forces(const LayerPoints& of, double* w) {
         const LayerFriction<N> friction =
             layer_friction(shape, *of.shape, body.touch, p.xi, p.by, p.anchor, p.at.slant);
         const auto loaded_lanes = p.load > N(0.0);
-        p.friction = select(loaded_lanes, friction.by_load, zero3<N>());
+        p.friction = select(loaded_lanes, friction.ratio, zero3<N>());
         p.normal = select(loaded_lanes, friction.normal, N(0.0));
       }
       const Vec3<N> f = mul_add(p.load, p.at.slant, p.friction_load * p.friction);
@@ -205,10 +205,10 @@ void add_layer_slopes(const LayerSlopeSums& s) {
                           p.friction;
       const Vec6<N> a = {cross(x, loaded_force), loaded_force}, b = {cross(x, own), own};
       const N* const depth = &by.depth.a.x;
-      const N* const by_twist = &by.depth_by_twist.a.x;
+      const N* const twist = &by.depth_by_twist.a.x;
       N d[kLayerDirections];
       for (int k = 0; k < 6; ++k)
-        d[k] = select(pressing, depth[k], zero), d[6 + k] = select(pressing, by_twist[k], zero);
+        d[k] = select(pressing, depth[k], zero), d[6 + k] = select(pressing, twist[k], zero);
       sum.add_outer(a + b, d);
       add_to_cells<A>(a, d, s.cell + kGroup * i, s.cells);
     }

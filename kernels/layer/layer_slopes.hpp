@@ -102,8 +102,8 @@ void depth_slopes(const Shape& shape, const Touch<N>& t, const LayerLaw& law,
   const Vec6<N> shallow = {cross(p.at.place, p.at.slant), p.at.slant};  // of δ
   const N inverse = one / select(under, -dot(n, o), one);
   const Slopes<N> moving = normal + outer_slopes(n_rho * o, shallow);
-  const Slopes<N> of_underside = (diagonal(inverse) + outer((inverse * inverse) * n, o)) * moving;
-  out.slant = selected(under, of_underside, select(sideways, N(kSteepest), one) * normal);
+  const Slopes<N> underside = (diagonal(inverse) + outer((inverse * inverse) * n, o)) * moving;
+  out.slant = selected(under, underside, select(sideways, N(kSteepest), one) * normal);
   out.place = select(under, -one, zero) * outer_slopes(o, shallow);
   const N r = fading_relaxation(law, p.known);
   const auto fades = (p.known > zero) & (p.known < N(law.fading));
@@ -152,11 +152,11 @@ void friction_slopes(const Shape& shape, const LayerShape& of, const Touch<N>& t
   const Vec3<N> q = -inverse * held, &s = point.at.slant;
   const N square = one / dot(s, s), along = dot(s, q) * square;
   // T/N, then its part across the slant.
-  const auto by_load = [&](const Slopes<N>& f, const Slopes<N>& f0) {
+  const auto ratio = [&](const Slopes<N>& f, const Slopes<N>& f0) {
     return inverse * (f - f0 - outer_slopes(q, row_of(p.n, f0)));
   };
-  const Slopes<N> motion = by_load(whole.motion, normal.motion),
-                  twist = by_load(whole.twist, normal.twist);
+  const Slopes<N> motion = ratio(whole.motion, normal.motion),
+                  twist = ratio(whole.twist, normal.twist);
   const Vec6<N> along_motion = row_of(s, motion) + row_of(q - (N(2.0) * along) * s, out.slant);
   out.friction = motion - outer_slopes(square * s, along_motion) - along * out.slant;
   out.friction_by_twist = twist - outer_slopes(square * s, row_of(s, twist));

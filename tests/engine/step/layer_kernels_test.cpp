@@ -217,10 +217,10 @@ TEST(LayerKernels, ForcesAreThoseOfPlainNumbers) {
           const auto plain = layer_friction(shape, press.shape, press.body.touch, p.xi, p.by,
                                             p.anchor, p.at.slant);
           EXPECT_NEAR(p.normal, plain.normal, 1e-12);
-          expect_near(p.friction, plain.by_load, 1e-9);
-          const double size = std::sqrt(dot(plain.by_load, plain.by_load));
+          expect_near(p.friction, plain.ratio, 1e-9);
+          const double size = std::sqrt(dot(plain.ratio, plain.ratio));
           ++(size > 0.49 ? slipping : sticking);
-          const Vec3<double> f = p.load * p.at.slant + p.friction_load * plain.by_load;
+          const Vec3<double> f = p.load * p.at.slant + p.friction_load * plain.ratio;
           sum += {cross(p.at.place, f), f};
         }
       });
@@ -275,7 +275,7 @@ Expected expected_slopes(const Press& press, const Loaded& loaded, int direction
           layer_friction(shape, press.shape, body.touch, xi, at.by, anchor, at.at.slant);
       const double rise = loaded.stiffness * at.at.depth.epsilon;
       const D load(p.load, rise), friction_load(p.friction_load, p.friction_load > 0 ? rise : 0);
-      const Vec3<D> f = load * at.at.slant + friction_load * friction.by_load;
+      const Vec3<D> f = load * at.at.slant + friction_load * friction.ratio;
       const Vec3<D> moment = cross(at.at.place, f);
       out.wrench += {{moment.x.epsilon, moment.y.epsilon, moment.z.epsilon},
                      {f.x.epsilon, f.y.epsilon, f.z.epsilon}};
