@@ -50,7 +50,11 @@ CASES = [
 
 
 def gel(
-    bodies: list, skin: str, size: tuple[float, float], points: tuple[int, int]
+    bodies: list,
+    skin: str,
+    size: tuple[float, float],
+    points: tuple[int, int],
+    friction: str = 'mu="0" kt="0"',
 ) -> tangere.Scene:
     """Bodies that slide along z and touch a gel with their lowest points at q = 0."""
     rows, cols = points
@@ -67,7 +71,7 @@ def gel(
 <body name="plate" type="cuboid" size="{size[0]} {size[1]} 0.01" density="1000"/></link></robot>
 {links}
 <sensor><tactile name="gel" body="plate" type="rect_array" rect_pos0="{-x} {-y} 0.005"
- rect_pos1="{x} {y} 0.005" axis0="1 0 0" axis1="0 1 0" resolution="{rows} {cols}" mu="0" kt="0"
+ rect_pos1="{x} {y} 0.005" axis0="1 0 0" axis1="0 1 0" resolution="{rows} {cols}" {friction}
  {skin}</tactile></sensor></tangere>"""
     with warnings.catch_warnings():  # nothing but the sensor touches the bodies
         warnings.simplefilter("ignore")
@@ -145,6 +149,33 @@ def forces() -> str:
     return "\n".join(lines)
 
 
+def readings() -> str:
+    """The table of what a reading costs."""
+    lines = ["| pad | pressing points | layer | springs |", "|---|---|---|---|"]
+    rub, pads = 'mu="1" kt="0.01"', []
+    for points, cell, depths in (((24, 32), 0.75e-3, (0.35e-3, 0.7e-3, 1e-3)),
+                                 ((48, 64), 0.75e-3, (0.35e-3, 0.7e-3, 1e-3))):  # fmt: skip
+        for depth in depths:
+            times, pressing = [], 0
+            area = SIZE[0] * SIZE[1] / (points[0] * points[1])
+            for skin in (layer(cell, MARGIN), f'kn="{SPRINGS * area}">'):
+                model = tangere.Model(gel(BALL, skin, SIZE, points, rub))
+                batch = tangere.Batch(model, 1, precision="double")
+                batch.set_state(np.full(model.nq, -depth), np.full(model.nv, 0.01))
+                pressing = pressing or int((batch.tactile("gel")[0][..., 2] > 0).sum())
+                best = np.inf
+                for _ in range(5):
+                    start = time.process_time()
+                    for _ in range(200):
+                        batch.tactile("gel")
+                    best = min(best, (time.process_time() - start) / 200)
+                times.append(f"{1e6 * best:.0f} µs")
+            name = f"{points[0]} × {points[1]} points"
+            lines.append(f"| {'' if name in pads else name} | {pressing} | {' | '.join(times)} |")
+            pads.append(name)
+    return "\n".join(lines)
+
+
 def contacts() -> str:
     """The table of what a step costs with layers as contacts."""
     gels = (ROOT / "scenes/gel_grasp.xml").read_text()
@@ -168,7 +199,8 @@ def contacts() -> str:
     return "\n".join(lines)
 
 
-TABLES = {"fields": fields, "motions": motions, "forces": forces, "contacts": contacts}
+TABLES = {"fields": fields, "motions": motions, "forces": forces, "contacts": contacts,
+          "readings": readings}  # fmt: skip
 
 
 def main() -> None:
