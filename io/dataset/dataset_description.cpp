@@ -60,6 +60,8 @@ void describe_run(const h5::Id& scene, const DatasetLayout& layout) {
   h5::write_attribute(scene, "controls", layout.controls);
   h5::write_attributes(scene, attributes_of(layout, layout.steps, layout.every));
   h5::write_attribute(scene, "compression", layout.compression);
+  if (layout.has_jpeg())
+    h5::write_attribute(scene, "pictures", fmt::format("jpeg:{}", layout.jpeg_quality));
   h5::write_attribute(scene, "tactile", layout.sparse ? "sparse" : "dense");
   h5::write_attribute(scene, "tangere_version", layout.version);
   h5::write_attribute(scene, "instruction_set", layout.instruction_set);

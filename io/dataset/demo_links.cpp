@@ -35,7 +35,8 @@ std::vector<std::uint64_t> dims_of(std::uint64_t rows, const DemoArray& array) {
 }
 
 bool has_numbers(const DemoArray& array) {
-  return std::find(array.shape.begin(), array.shape.end(), 0) == array.shape.end();
+  return array.type != h5::NumberType::text &&
+         std::find(array.shape.begin(), array.shape.end(), 0) == array.shape.end();
 }
 
 /// Virtual datasets with the observations of a batch of demos, one row later or with one row more.
@@ -54,6 +55,7 @@ class ShownObservations {
   std::vector<h5::FileLink> add(const DemoFacts& facts) {
     std::vector<h5::FileLink> links;
     for (const DemoArray& array : arrays_) {
+      if (array.type == h5::NumberType::text) continue;  // of obs and final_obs differ in length
       links.push_back({array.name, base_ + out_.size()});
       h5::FileDataset dataset{array.type, dims_of(rows(facts), array)};
       if (has_numbers(array)) dataset.view = h5::FileView{texts_, next_++};
@@ -105,6 +107,7 @@ class ShownObservations {
 h5::NumberType type_of(const h5::Id& dataset) {
   const h5::Id type(H5Dget_type(dataset.get()));
   const std::size_t bytes = H5Tget_size(type.get());
+  if (H5Tget_class(type.get()) == H5T_STRING) return h5::NumberType::text;
   return bytes == 1               ? h5::NumberType::uint8
          : bytes == 2             ? h5::NumberType::int16
          : bytes == sizeof(float) ? h5::NumberType::float32
