@@ -411,7 +411,8 @@ class Windows:
     def _flattened(self, name: str) -> np.ndarray | None:
         """All rows in memory, if they are few enough."""
         first = self._of_episode(0, name)
-        shape, kind = first.shape[1:], np.dtype(_kept(first))
+        shape = first.shape[1:]
+        kind: np.dtype[Any] = np.dtype(_kept(first))
         size = len(self) * int(np.prod(shape)) * kind.itemsize
         if size > self._free:
             return None
