@@ -182,8 +182,8 @@ def tables() -> str:
     ))  # fmt: skip
     picture = "![Return against actions of training](results/box_pushing.svg)\n" if figure() else ""
     parts = (pushed, published("Place [m] and yaw [rad]", of_pushing), picture, reinforced,
-             published("Success, and actions until it", of_tasks), cloned, seen, skins, offline, matched,
-             earlier(), unclean(), missing())  # fmt: skip
+             published("Success, and actions until it", of_tasks), cloned, seen, skins, offline,
+             matched, earlier(), unclean(), missing())  # fmt: skip
     return "\n" + "\n".join(filter(None, parts)) + "\n"
 
 

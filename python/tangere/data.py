@@ -34,7 +34,8 @@ class Episodes:
     `path` is a folder of `tangere generate`, whose shards are read, or one file: a shard or
     robomimic.hdf5. Contiguous arrays of shards are mapped, not read: an array is a view of the
     file. Large fields in tiles and compressed ones are read, JPEG files become pictures, and up to
-    256 MB are kept. A process opens the files for itself, so an object may go to the workers of a loader.
+    256 MB are kept. A process opens the files for itself, so an object may go to the workers of a
+    loader.
     """
 
     def __init__(self, path: str | Path):
@@ -240,8 +241,8 @@ class Windows:
     "mask": (ahead)}: the observations up to one row, oldest first, the actions between them, and
     the actions from that row on. Rows before the start repeat the first observation, with actions
     of 0. Actions after the end repeat the last one, and `mask` is 0 there.
-    Observations are float32, pictures in colours uint8 unless they are scaled. `gradients`: names of derivatives stored for each action, such as
-    "grad_actions", that come along as (ahead, …).
+    Observations are float32, pictures in colours uint8 unless they are scaled. `gradients`: names of
+    derivatives stored for each action, such as "grad_actions", that come along as (ahead, …).
 
     Parameters
     ----------
@@ -436,7 +437,8 @@ class Windows:
     def _shown(self, key: str, rows: np.ndarray) -> np.ndarray:
         """Rows (…, rows, shape) of an observation, scaled and in the form that was asked for."""
         shown = rows
-        if rows.dtype != np.uint8 or (self._shift[key] != 0).any() or (self._factor[key] != 1).any():
+        scaled = (self._shift[key] != 0).any() or (self._factor[key] != 1).any()
+        if rows.dtype != np.uint8 or scaled:
             shown = (np.asarray(rows, np.float32) - self._shift[key]) * self._factor[key]
         shape = self._of_episode(0, key).shape[1:]
         if self.form == "stored" or len(shape) < 3 or shape[-1] != 3:

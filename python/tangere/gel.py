@@ -63,8 +63,11 @@ class GelSightDevice:
         x = ((np.arange(cols) - (cols + 1) / 2) / smaller)[None, :]
         lit = [self._lit(k, x, y, normals) for k in range(len(self.lamps))]
         if self.flat.size:
-            lit = [light / (scale / _resized(np.maximum(flat, _DARKEST), (rows, cols)))
-                   for light, flat, scale in zip(lit, self.flat, self.scale, strict=True)]  # fmt: skip
+            flats = [_resized(np.maximum(flat, _DARKEST), (rows, cols)) for flat in self.flat]
+            lit = [
+                light / (scale / flat)
+                for light, flat, scale in zip(lit, flats, self.scale, strict=True)
+            ]
         return np.minimum(np.stack(lit), 1)
 
     def _lit(self, lamp: int, x: Any, y: Any, normals: Numbers) -> Numbers:

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Calibrations of other makers: device files of GelSight, height maps and tables of Taxim, made here
-from known numbers, read back and fitted."""
+"""Calibrations of other makers: device files of GelSight, height maps and tables of Taxim, made
+here from known numbers, read back and fitted."""
 
 import json
 import struct
@@ -35,7 +35,8 @@ def grey_png(levels, filters):
         above = line
 
     def chunk(name, data):
-        return struct.pack(">I", len(data)) + name + data + struct.pack(">I", zlib.crc32(name + data))
+        check = struct.pack(">I", zlib.crc32(name + data))
+        return struct.pack(">I", len(data)) + name + data + check
 
     head = struct.pack(">IIBBBBB", cols, rows, 16, 0, 0, 0, 0)
     return (b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", head) + chunk(b"IDAT", zlib.compress(packed))
@@ -194,5 +195,7 @@ def test_mistakes_say_what_is_expected(device, tmp_path):
     np.savez(tmp_path / "polycalib.npz", bins=3, grad_r=np.zeros((3, 3, 6)))
     np.save(tmp_path / "bg.npy", np.zeros((4, 4, 3)))
     with pytest.raises(tangere.InputError, match="grad_g.*expected polycalib.npz of Taxim"):
-        gel.gel_from_taxim(tmp_path / "polycalib.npz", tmp_path / "bg.npy", tmp_path / "a.xml", 1e-4)
+        gel.gel_from_taxim(
+            tmp_path / "polycalib.npz", tmp_path / "bg.npy", tmp_path / "a.xml", 1e-4
+        )
     assert not (tmp_path / "a.xml").exists()
