@@ -175,7 +175,7 @@ class Episodes:
             self._open.move_to_end(episode)
             return self._open[episode]
         demo = self._demo(episode)
-        arrays = {key: self._array(episode, demo["obs"][key]) for key in demo["obs"]}
+        arrays = {key: self._array(episode, demo["obs"][key]) for key in self.keys}
         for name, item in demo.items():
             if not isinstance(item, h5py.Dataset):
                 continue
@@ -241,8 +241,8 @@ class Windows:
     "mask": (ahead)}: the observations up to one row, oldest first, the actions between them, and
     the actions from that row on. Rows before the start repeat the first observation, with actions
     of 0. Actions after the end repeat the last one, and `mask` is 0 there.
-    Observations are float32, pictures in colours uint8 unless they are scaled. `gradients`: names of
-    derivatives stored for each action, such as "grad_actions", that come along as (ahead, …).
+    Observations are float32, pictures in colours uint8 unless they are scaled. `gradients`: names
+    of derivatives stored for each action, such as "grad_actions", that come along as (ahead, …).
 
     Parameters
     ----------

@@ -163,6 +163,20 @@ def test_jpeg_files_are_pictures_for_readers(seen, stored, tmp_path):
     assert scaled["eye.rgb"].dtype == np.float32 and scaled["eye.rgb"].shape == (1, 3, 24, 32)
 
 
+def test_merged_files_have_names_without_dots(seen, stored):
+    for data in (seen, stored):
+        with h5py.File(data / "robomimic.hdf5") as merged:
+            demo = merged["data/demo_1"]
+            for name in ("eye.rgb", "eye.depth"):
+                plain = name.replace(".", "_")
+                np.testing.assert_array_equal(demo["obs"][plain][()], demo["obs"][name][()])
+                if name in demo["next_obs"]:
+                    np.testing.assert_array_equal(demo["next_obs"][plain][:-1],
+                                                  demo["obs"][name][1:])  # fmt: skip
+        one = Episodes(data / "robomimic.hdf5")
+        assert "eye_rgb" not in one[1] and one[1]["eye.rgb"].dtype == np.uint8
+
+
 def test_another_reader_opens_jpeg_files(stored):
     image = pytest.importorskip("pygame.image")
     surfarray = pytest.importorskip("pygame.surfarray")

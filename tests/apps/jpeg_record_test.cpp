@@ -106,10 +106,15 @@ TEST(JpegRecord, IsReadByEveryCommand) {
   const h5::Id merged = h5::open_file(folder.path("set/robomimic.hdf5"));
   EXPECT_EQ(h5::dimensions(h5::open_dataset(merged, "data/demo_2/obs/eye.rgb")), (h5::Dims{3}));
   EXPECT_THAT(h5::link_names(h5::open_group(merged, "data/demo_2/next_obs")),
-              ElementsAre("eye.ids", "pad", "q"));
+              ElementsAre("eye.ids", "eye_ids", "pad", "q"));
+  EXPECT_THAT(h5::link_names(h5::open_group(merged, "data/demo_2/obs")),
+              ElementsAre("eye.ids", "eye.rgb", "eye_ids", "eye_rgb", "pad", "q"));
   EXPECT_THAT(run(folder, {"merge", "set", "--overwrite"}).err, HasSubstr("eye.rgb"));
   EXPECT_EQ(run(folder, {"validate", "set"}).exit_code, 0);
   EXPECT_EQ(run(folder, {"merge", "set", "--copy", "--overwrite"}).exit_code, 0);
+  EXPECT_THAT(h5::link_names(h5::open_group(h5::open_file(folder.path("set/robomimic.hdf5")),
+                                            "data/demo_2/obs")),
+              ElementsAre("eye.ids", "eye.rgb", "eye_ids", "eye_rgb", "pad", "q"));
   EXPECT_EQ(run(folder, {"validate", "set"}).exit_code, 0);
   EXPECT_EQ(run(folder, {"info", "set"}).exit_code, 0);
   const json table = run_json(folder, {"export", "set", "--csv", "t.csv"});
