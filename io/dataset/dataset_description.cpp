@@ -130,6 +130,7 @@ void describe_numbers(const h5::Id& scene, const DatasetLayout& layout) {
     texts("randomized_names", layout.randomized_names);
     texts("randomized_units", layout.randomized_units);
   }
+  if (!layout.gained.empty()) texts("picture_gain_names", picture_gain_names(layout.gained));
   h5::write_attribute(scene, "observation_scale", observation_scale(layout));
   h5::write_attribute(scene, "privileged", privileged_observations(layout));
   h5::write_attribute(scene, "touch", touch_observations(layout));

@@ -10,6 +10,7 @@
 
 #include "engine/rows/episode_channels.hpp"
 #include "engine/rows/episode_sink.hpp"
+#include "engine/rows/picture_gains.hpp"
 
 namespace tangere {
 
@@ -57,6 +58,7 @@ struct DatasetLayout : RunFacts {
   bool single = false;        ///< observations are float32, else float64
   std::vector<SensorLayout> sensors;
   std::vector<CameraLayout> cameras;
+  std::vector<GainedPicture> gained;      ///< whose gains are stored with an episode
   std::vector<std::string> body_names;    ///< of a scene
   PlayedBy played_by;                     ///< of a task
   std::string python_class;               ///< of a task written in Python: "MODULE:CLASS"

@@ -42,12 +42,16 @@ DemoAttributes::DemoAttributes(const DemoFacts& facts) : samples_(bytes_of_numbe
                              facts.randomized.size() * sizeof(double));
   if (!randomized.empty())
     all_.push_back({"randomized", h5::NumberType::float64, true, randomized});
+  const std::span gains(reinterpret_cast<const unsigned char*>(facts.gains.data()),
+                        facts.gains.size() * sizeof(double));
+  if (!gains.empty()) all_.push_back({"picture_gains", h5::NumberType::float64, true, gains});
 }
 
 DemoFormat::DemoFormat(const DatasetLayout& layout)
     : is_task_(layout.task.has_value()),
       single_(layout.single),
       randomized_(layout.randomized_names.size()),
+      gains_(kColours * layout.gained.size()),
       names_(layout.observation_names()),
       touch_(layout.touch()),
       sources_(layout.recorded()),
@@ -95,7 +99,8 @@ DemoFormat::DemoFormat(const DatasetLayout& layout)
     row_bytes_.push_back(std::accumulate(shapes_[k].begin(), shapes_[k].end(),
                                          h5::bytes_of(types_[k]), std::multiplies<>()));
   h5::Bytes header;
-  DemoFacts facts{1, std::nullopt, std::vector<double>(randomized_), std::nullopt};
+  DemoFacts facts{1, std::nullopt, std::vector<double>(randomized_), std::vector<double>(gains_),
+                  std::nullopt};
   if (is_task_) facts.end.emplace();
   if (!touch_.empty()) facts.touching = 0;
   static_cast<void>(describe(header, 0, facts, std::vector<std::uint64_t>(datasets()),

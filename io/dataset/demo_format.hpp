@@ -22,6 +22,7 @@ struct DemoFacts {
   std::int64_t rows = 0;                 ///< R
   std::optional<EpisodeEnd> end;         ///< of a task
   std::vector<double> randomized;        ///< as many as the layout has names
+  std::vector<double> gains;             ///< of R, G, B of the layout's gained pictures
   std::optional<std::int64_t> touching;  ///< rows of obs with contact; none: not stored
 };
 
@@ -121,7 +122,7 @@ class DemoFormat {
                         std::span<const h5::FileText> texts = {}) const;
 
   bool is_task_, single_;
-  std::size_t randomized_;
+  std::size_t randomized_, gains_;
   std::vector<std::string> names_, titles_;  // of observations; of datasets
   std::vector<std::size_t> touch_, sources_, gradient_sources_;
   std::vector<GradientArray> gradients_;  // by name

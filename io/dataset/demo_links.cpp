@@ -183,6 +183,7 @@ DemoMembers members_of(const h5::Id& demo) {
   if (members.is_task)
     members.policies = std::ssize(h5::read_texts(h5::open_group(demo, "/scene"), "policies"));
   members.varies = std::binary_search(names.begin(), names.end(), "randomized");
+  members.has_gains = std::binary_search(names.begin(), names.end(), "picture_gains");
   members.has_touch = !stored_touch(h5::open_group(demo, "/scene")).empty();
   return members;
 }
@@ -205,6 +206,7 @@ DemoFacts facts_of(const h5::Id& demo, const DemoMembers& members) {
                            static_cast<int>(policy)};
   }
   if (members.varies) facts.randomized = h5::read_numbers<double>(demo, "randomized");
+  if (members.has_gains) facts.gains = h5::read_numbers<double>(demo, "picture_gains");
   if (members.has_touch) facts.touching = h5::read_number<std::int64_t>(demo, "touching");
   if (const std::int64_t touching = facts.touching.value_or(0);
       touching < 0 || touching > facts.rows)

@@ -34,6 +34,7 @@ struct DemoMembers {
   DemoArray actions;
   std::vector<std::string> besides;  ///< grad_…, the loss and samples, among `names`
   bool is_task = false, varies = false, has_touch = false;  ///< has_touch: touch is stored
+  bool has_gains = false;                                   ///< of pictures
   std::int64_t policies = 0;                                ///< that played, for a task
 };
 

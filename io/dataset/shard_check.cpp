@@ -104,6 +104,8 @@ class ShardChecker {
     rows_ = steps / every;
     is_task_ = !h5::read_text(scene_, "task").starts_with("none");
     if (is_task_) policies_ = std::ssize(h5::read_texts(scene_, "policies"));
+    if (H5Aexists(scene_.get(), "picture_gain_names") > 0)
+      gains_ = h5::read_texts(scene_, "picture_gain_names").size();
     gradients_ = stored_gradients(scene_);
     samples_ = stored_samples(scene_, every, rows_);
   }
@@ -179,6 +181,12 @@ class ShardChecker {
         is_task_ && (by < 0 || by >= policies_))
       fail(fmt::format("demo_{}: its policy is {}; expected 0 to {}, one of 'policies' in /scene",
                        episode, by, policies_ - 1));
+    if (const std::size_t gains = H5Aexists(demo.get(), "picture_gains") > 0
+                                      ? h5::read_numbers<double>(demo, "picture_gains").size()
+                                      : 0;
+        gains != gains_)
+      fail(fmt::format("demo_{}: it has {} 'picture_gains'; expected {}, those that /scene names",
+                       episode, gains, gains_));
     // These values need no checksum: without a task every reward is 0, and only the last row ends
     // the episode.
     if (is_task_) {
@@ -401,6 +409,7 @@ class ShardChecker {
   h5::Id file_, scene_;
   std::vector<std::string> names_, touch_;  // of observations; of those that are touch
   std::vector<char> touching_;              // per row of the demo at hand
+  std::size_t gains_ = 0;                   // of pictures, in a demo
   std::vector<StoredGradient> gradients_;
   std::vector<StoredSample> samples_;
   bool single_ = false, is_task_ = false;

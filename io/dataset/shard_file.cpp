@@ -74,6 +74,7 @@ ShardFile::Block& ShardFile::block_of(const EpisodeRows& rows) {
     if (!rows.randomized.empty())
       std::copy_n(rows.randomized.begin() + static_cast<std::ptrdiff_t>(i * varied), varied,
                   demo.facts.randomized.begin());
+    demo.facts.gains = picture_gains(layout_.gained, layout_.seed, rows.first_episode + e);
     if (!format_.touch().empty()) demo.facts.touching = 0;
     demo.addresses.resize(format_.datasets(), h5::kNowhere);
     demo.rows.resize(format_.datasets());
@@ -317,6 +318,7 @@ void ShardFile::record_failures() {
     const DemoFacts& facts = facts_of_failures_[failure.episode];
     if (facts.end) h5::write_scalar<std::int64_t>(group, "policy", facts.end->policy);
     if (!facts.randomized.empty()) h5::write_list<double>(group, "randomized", facts.randomized);
+    if (!facts.gains.empty()) h5::write_list<double>(group, "picture_gains", facts.gains);
   }
 }
 

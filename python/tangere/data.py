@@ -140,6 +140,15 @@ class Episodes:
             )
         return np.array([int(self._demo(i).attrs["touching"]) for i in range(len(self))])
 
+    def picture_gains(self, episode: int) -> dict[str, np.ndarray]:
+        """Factors that an episode drew for the channels of its pictures: the name of a sensor or
+        camera → (3), R, G, B. Empty where no picture has `gain`."""
+        if "picture_gain_names" not in self.attributes:
+            return {}
+        gains = np.asarray(self._demo(episode).attrs["picture_gains"]).reshape(-1, 3)
+        names = [str(name).rpartition(" ")[0] for name in self.attributes["picture_gain_names"]]
+        return dict(zip(names[::3], gains, strict=True))
+
     def terminated(self, episode: int) -> bool:
         """Whether the task ended the episode; False if it ran out of time, and for a scene."""
         return bool(self._demo(episode).attrs.get("terminated", 0))
@@ -175,7 +184,9 @@ class Episodes:
             self._open.move_to_end(episode)
             return self._open[episode]
         demo = self._demo(episode)
-        arrays = {key: self._array(episode, demo["obs"][key]) for key in self.keys}
+        again = {key.replace(".", "_") for key in self.keys} - set(self.keys)  # merged files have
+        arrays = {key: self._array(episode, demo["obs"][key])
+                  for key in demo["obs"] if key not in again}  # fmt: skip
         for name, item in demo.items():
             if not isinstance(item, h5py.Dataset):
                 continue

@@ -118,6 +118,26 @@ def test_data_sets_of_a_class_keep_bytes(watched, tmp_path):
     np.testing.assert_array_equal(last, seen["eye"][0])
 
 
+def test_data_sets_of_a_class_have_the_gains_of_pictures(watched, tmp_path):
+    from tangere.data import generate
+
+    gained = tmp_path / "gained.xml"
+    gained.write_text(watched.read_text().replace('name="eye"', 'name="eye" gain="0.1"'))
+
+    class Seen(Watch):
+        scene = gained
+
+    generate(Seen, tmp_path / "set", 3, policy="random", seed=2)
+    episodes = Episodes(tmp_path / "set")
+    plain = Watch(1, scene=watched, seed=2, first_episode=2)
+    seen, _ = plain.reset()
+    gains = episodes.picture_gains(2)
+    assert list(gains) == ["eye"] and gains["eye"].shape == (3,)
+    wanted = np.minimum(gains["eye"] * seen["eye"][0], 255)
+    assert np.abs(episodes[2]["eye"][0] - wanted).max() < 1.1
+    assert (gains["eye"] != episodes.picture_gains(1)["eye"]).all()
+
+
 def test_a_task_renders_what_its_camera_sees(watched, tmp_path):
     env = tangere.make_env("ball_rolling_small", scene=watched, render_mode="rgb_array")
     env.reset(seed=3)
@@ -204,6 +224,7 @@ def test_data_sets_name_the_camera_and_its_bodies(seen):
         kinds = [obs[f"eye.{form}"].dtype for form in ("rgb", "depth", "ids")]
         assert kinds == [np.uint8, np.float32, np.int16]
     episodes = Episodes(seen)
+    assert episodes.picture_gains(0) == {}
     assert "eye" in episodes.cameras and episodes[1]["eye.ids"].shape == (3, 24, 32, 1)
 
 

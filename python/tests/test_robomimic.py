@@ -90,7 +90,7 @@ EYE = '<camera name="eye" pos="0 -0.25 0.2" look="0 0 0.02" rows="32" cols="32"/
 
 
 def test_a_policy_learns_from_pictures(generate, tmp_path):
-    """Names without dots: PyTorch's ModuleDict, which robomimic keeps networks in, takes no dots."""
+    """By names without dots: robomimic keeps networks in a ModuleDict, which takes no dots."""
     train = pytest.importorskip("robomimic.scripts.train")
     import torch
     from robomimic.config import config_factory
