@@ -147,10 +147,12 @@ BenchSetting setting_of(const BenchArguments& options, const Model& model,
                              .outputs = record_of(options.record, model).outputs};
   setting.options.frames = frames_named(options.frames);
   std::vector<std::string> names;
-  for (const FieldOutput of : sensor_fields_of(model, setting.options.rollout.outputs))
-    names.push_back(
-        output_name(model.sensors()[static_cast<std::size_t>(of.sensor)].name, of.form) +
-        to_string(of.times));
+  for (const FieldOutput of : fields_of(model, setting.options.rollout.outputs)) {
+    const auto k = static_cast<std::size_t>(of.sensor);
+    const std::string& owner =
+        is_view(of.form) ? model.scene().cameras[k].name : model.sensors()[k].name;
+    names.push_back(output_name(owner, of.form) + to_string(of.times));
+  }
   if (setting.options.frames != FrameKind::none)
     setting.record = fmt::format("{}", fmt::join(names, ","));
   setting.options.repeat = options.repeat.value_or(setting.options.repeat);
@@ -272,7 +274,7 @@ int bench(const BenchArguments& options, const Console& console) {
     console.note("the scene has no <control>: every control is 0");
   const RolloutOutputs recorded = record_of(options.record, model).outputs;
   if (recorded.fields && (recorded.bodies || recorded.end_effectors))
-    console.note("bench reads sensors alone: bodies and variables are left out");
+    console.note("bench reads sensors and cameras alone: bodies and variables are left out");
   BenchSetting setting = setting_of(options, model, controls);
   const std::vector<int> threads = thread_counts(options);
   const int most_threads = *std::max_element(threads.begin(), threads.end());
@@ -329,7 +331,7 @@ Command add_bench(CLI::App& program) {
       "Readings to take, separated by commas: a sensor's field (pad), pad.pressure, "
       "pad.shear, pad.sum, pad.ideal, pad.markers, pad.surface, pad.flow, "
       "pad.channels, pad.height, "
-      "pad.rgb or pad.rgb_marker, with times as in "
+      "pad.rgb or pad.rgb_marker, a camera's eye.rgb, eye.depth or eye.ids, with times as in "
       "pad/10 or pad/final. q alone takes none. [default: the scene's <outputs>, else all fields]");
   add_whole_number<int>(app, "--repeat", o.repeat, 1, kMostPasses,
                         "Timed passes for each thread count [default: 3]");

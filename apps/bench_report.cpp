@@ -51,7 +51,7 @@ std::vector<Failure> failures_of(const BenchRun& run) {
 
 int common_interval(const Model& model, const RolloutOptions& rollout) {
   std::int64_t common = 0;
-  for (const FieldOutput of : sensor_fields_of(model, rollout.outputs)) {
+  for (const FieldOutput of : fields_of(model, rollout.outputs)) {
     const std::int64_t every = reading_times(model, of, rollout).every;
     if (every == 0) return 0;  // at the end alone
     if (common != 0 && common != every) return 0;

@@ -217,6 +217,7 @@ void check_word(const char* what, const std::string& word, const std::vector<std
 void check(GenerateOptions& options, const Console& console) {
   static_cast<void>(precision_named(options.precision));
   check_word("compression", options.compress, {"none", "deflate", "lz4"});
+  static_cast<void>(jpeg_quality_named(options.pictures));
   check_word("kind of tactile fields", options.tactile, {"dense", "sparse"});
   if (options.compress == "lz4")
     console.note(
@@ -309,6 +310,9 @@ void add_storage_options(CLI::App& app, GenerateOptions& o) {
            "plug-in to read [default: none]");
   add_text(app, "--tactile", o.tactile, "KIND",
            "Storage of large fields: sparse (no tiles of zeros) or dense [default: sparse]");
+  add_text(app, "--pictures", o.pictures, "KIND",
+           "Storage of pictures in colours: raw, or jpeg:QUALITY from 1 to 100, jpeg is jpeg:95 "
+           "[default: raw]");
   add_text(app, "--record", o.record, "LIST",
            "Observations to store, separated by commas: q, v, variables, bodies or bodies.NAME, a "
            "sensor's field (pad), pad.pressure, pad.shear, pad.sum, pad.ideal, pad.markers, "

@@ -87,6 +87,7 @@ GradientKind gradient_kind_named(const std::string& name) {
 
 /// Whether a data set takes more than its numbers, or what makes it smaller.
 const char* size_compared(const DatasetLayout& layout) {
+  if (layout.has_jpeg()) return "before pictures and other large observations are compressed";
   if (!has_chunks(layout)) return "at least";
   if (!has_tiles(layout)) return "before compression";
   if (layout.compression == "none") return "before tiles of zeros are left out";
@@ -155,7 +156,7 @@ Merged merge_if_complete(const GenerateOptions& options, DatasetWriter& output) 
   merged.keys["minari_left_out"] = result.minari_left_out;
   merged.line += fmt::format(", {} for Minari", result.minari_id);
   if (!result.minari_left_out.empty())
-    merged.line += fmt::format(" (too large for it: {})", fmt::join(result.minari_left_out, ", "));
+    merged.line += fmt::format(" (not for it: {})", fmt::join(result.minari_left_out, ", "));
   return merged;
 }
 

@@ -53,6 +53,8 @@ std::string command_of(const GenerateOptions& options, const EpisodeOptions& run
   if (options.accuracy) command += fmt::format(" --accuracy {}", *options.accuracy);
   if (options.sleep) command += " --sleep";
   if (options.compress != "none") command += " --compress " + options.compress;
+  if (const int quality = jpeg_quality_named(options.pictures); quality > 0)
+    command += fmt::format(" --pictures jpeg:{}", quality);
   if (options.tactile != "sparse") command += " --tactile " + options.tactile;
   if (!options.record.empty()) command += " --record " + options.record;
   if (options.shards) command += fmt::format(" --shards {}", *options.shards);
@@ -75,6 +77,7 @@ DatasetLayout make_layout(const GenerateOptions& options, const Model& model,
   description.command = command_of(options, run, played_by.policy);
   description.shards = options.shards.value_or(0);
   description.compression = options.compress;
+  description.jpeg_quality = jpeg_quality_named(options.pictures);
   description.record = task == nullptr ? run.record : split_if_any(options.record);
   description.sparse = options.tactile == "sparse";
   description.gradients_of =

@@ -10,7 +10,7 @@ namespace tangere::apps {
 
 struct GenerateOptions {
   std::string scene, output, controls, policy, shard, precision = "mixed", compress = "none",
-                                                      tactile = "sparse", record;
+                                                      pictures = "raw", tactile = "sparse", record;
   std::string gradients = "none", loss, mix, name, program;
   std::optional<std::int64_t> episodes, steps, shards;
   std::optional<int> every, threads;

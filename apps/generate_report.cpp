@@ -126,6 +126,7 @@ int report_shards(const GenerateOptions& options, const Console& console, const 
        {"peak_blocks_in_flight", summary.peak_blocks_in_flight},
        {"seconds", summary.seconds},
        {"compress", options.compress},
+       {"pictures", options.pictures},
        {"tactile", options.tactile},
        {"gradients", job.layout.gradients.empty() ? Json() : Json(job.layout.gradients_of)}});
   result.update(work_json(job, summary));

@@ -43,7 +43,7 @@ int merge(const std::string& path, MergeOptions options, const Console& console)
   if (!result.minari.empty())
     console.print(fmt::format("wrote {}: {} for Minari", result.minari, result.minari_id));
   if (!result.minari_left_out.empty())
-    console.note(fmt::format("too large for Minari, which does not show them: {}",
+    console.note(fmt::format("too large for Minari, or JPEG files, so it does not show them: {}",
                              fmt::join(result.minari_left_out, ", ")));
   Json keys{{"command", "merge"},
             {"exit_code", static_cast<int>(kDone)},

@@ -41,6 +41,7 @@ class StableGrasp(tangere.VectorSceneEnv):
     steps_per_action, horizon, actions = STEPS, 9, 1
     warm_up = True  # a first grasp at the middle
     touch, arrays = ("flow",), "torch"
+    fields = PADS  # that are read while the bar is lifted
 
     moved = torch.from_numpy(ramp(0, 10))[:, None]
     lift = torch.from_numpy(0.03 * (ramp(30, 50) - ramp(100, 50)))[:, None]  # [m]
@@ -90,7 +91,12 @@ class StableGrasp(tangere.VectorSceneEnv):
     def simulate(self, controls: torch.Tensor, envs: Array) -> None:
         begins = envs[self.lengths[envs] == 0]
         self.keep(begins, rest=self.batch.q[begins, -5])
-        run = self.batch.run(controls, every=LIFTED, fields=PADS, envs=envs)
+        run = self.batch.run(controls, every=LIFTED, fields=self.fields, envs=envs)
+        self.keep(envs, place=controls[-1, envs, 1])
+        self.lifted(run, envs)
+
+    def lifted(self, run: Any, envs: Array) -> None:
+        """Takes what is felt while the bar is lifted: the first frame."""
         shear = torch.stack([run.fields[pad][0, envs, ..., :2] for pad in PADS], 1)
         largest = shear.square().sum(-1).amax((1, 2, 3)).clamp(min=1e-12).sqrt()
         largest = largest[:, None, None, None, None]
@@ -101,7 +107,6 @@ class StableGrasp(tangere.VectorSceneEnv):
             flow=flow.moveaxis(-1, 2).reshape(-1, 4, 13, 10),
             tilt=torch.asin(torch.clamp(2 * (y * z + w * x), -1, 1)).abs(),
             height=run.q[0, envs, -5],
-            place=controls[-1, envs, 1],
         )
 
     def keep(self, envs: Array, **rows: torch.Tensor) -> None:

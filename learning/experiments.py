@@ -55,6 +55,7 @@ INSERTIONS = "insertion --episodes 5000 --seed 1"
 THROUGH_TIME = "gd.py box_pushing --touch 0.05"
 CLONED = "dagger.py out/learning/pushes --rounds 60 --updates 100"
 TURNED = "dagger.py out/learning/turns --rounds 10 --updates 150 --visits 200"
+SEEN = "pictures.py out/learning/pictures"
 CAPPED = "bc.py out/learning/caps --epochs 20 --before 3 --width 512"
 
 OTHER_SKINS = {
@@ -100,6 +101,14 @@ EXPERIMENTS = [
     Experiment("bc-in-hand", TURNED, 2, 330, "in hand, touch, visits", data=f"turns {TURNS}"),
     Experiment("bc-in-hand-blind", f"{TURNED} --without tactile", 2, 330, "in hand, blind, visits",
                data=f"turns {TURNS}"),
+    *(Experiment(f"see-{name}", f"{SEEN} --see {keys}", 3, 130, text)
+      for name, keys, text in (
+          ("flow", "flow", "flow of both pads"),
+          ("markers", "left.rgb_marker right.rgb_marker", "pictures of both gels, with markers"),
+          ("gels", "left.rgb right.rgb", "pictures of both gels, without markers"),
+          ("eye", "eye", "camera on the hand"),
+          ("eye-markers", "eye left.rgb_marker right.rgb_marker",
+           "camera and pictures with markers"))),
     *(Experiment(f"match-{name}", f"matching.py out/learning/derived --match {weight}", 3, 60,
                  text, data=f"derived {DERIVED}")
       for name, weight, text in (("none", 0, "rows alone"), ("some", 0.01, "weight 0.01"),

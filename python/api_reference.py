@@ -22,7 +22,7 @@ WIDTH = 100
 # In the order of the page; the compiled part is shown as tangere, from where it is used.
 MODULES = (
     "tangere", "scene_builder", "robots", "gym", "scene_env", "torch", "jax", "data", "policy",
-    "lerobot", "robomimic", "sb3", "d3rlpy",
+    "lerobot", "robomimic", "sb3", "d3rlpy", "gel",
 )  # fmt: skip
 HEAD = """# Python: every name
 

@@ -8,16 +8,6 @@
 
 namespace tangere {
 
-std::array<double, kColours> camera_gains(const CameraKey& key, double deviation) {
-  std::array<double, kColours> gains{1, 1, 1};
-  if (deviation == 0) return gains;
-  for (std::size_t c = 0; c < kColours; ++c)
-    gains[c] =
-        1 + normal({key.seed, key.episode, 0, Purpose::picture_gain, static_cast<std::uint32_t>(c)},
-                   0, deviation);
-  return gains;
-}
-
 template <class T>
 void add_camera_noise(const CameraKey& key, double deviation, int first, std::span<T> planes) {
   const std::size_t width = planes.size() / kColours;

@@ -30,6 +30,34 @@ TANGERE_CLONES void interleave(const std::uint8_t* planes, std::uint8_t* to, std
   }
 }
 
+template <class T>
+struct WeighedRow {
+  const T *planes, *colour_bar;  ///< levels (3, width); cotangents of clamped levels (width, 3)
+  T* planes_bar;                 ///< (3, width): factors, multiplied by the cotangents
+  std::size_t width;
+  std::array<T, kColours> gains;
+};
+
+template <class T>
+[[gnu::always_inline]] inline void weigh_pixels(const WeighedRow<T>& row) {
+  const std::size_t width = row.width;
+  const T *const r = row.planes, *const g = r + width, *const b = g + width;
+  const T* const bar = row.colour_bar;
+  T *const r_bar = row.planes_bar, *const g_bar = r_bar + width, *const b_bar = g_bar + width;
+  const std::array<T, kColours> gains = row.gains;
+  const auto share = [](T level, T gain, T cotangent) {
+    return level < T(0) || level > T(kWhite) ? T(0) : gain * cotangent;
+  };
+#pragma GCC ivdep
+  for (std::size_t i = 0; i < width; ++i) {
+    r_bar[i] *= share(r[i], gains[0], bar[3 * i]);
+    g_bar[i] *= share(g[i], gains[1], bar[3 * i + 1]);
+    b_bar[i] *= share(b[i], gains[2], bar[3 * i + 2]);
+  }
+}
+TANGERE_CLONES void weigh_row(const WeighedRow<float>& row) { weigh_pixels(row); }
+TANGERE_CLONES void weigh_row(const WeighedRow<double>& row) { weigh_pixels(row); }
+
 }  // namespace
 
 PictureGrid picture_grid(const PictureDescription& picture, int rows, int cols, double pitch_x,
@@ -145,13 +173,8 @@ void GelCamera<T>::pull_back(bool markers, std::span<const T> height_bar,
     // Factors of the markers, by painting a row of ones.
     std::fill(planes_bar.begin(), planes_bar.end(), T(1));
     if (markers) markers_->darken(row, planes_bar);
-    for (std::size_t c = 0; c < kColours; ++c)
-      for (std::size_t i = 0; i < width; ++i) {
-        const T level = planes_[c * width + i];
-        const bool clamped = level < T(0) || level > T(kWhite);
-        planes_bar[c * width + i] *=
-            clamped ? T(0) : gains_[c] * colour_bar[kColours * (first + i) + c];
-      }
+    weigh_row(
+        {planes_.data(), colour_bar.data() + kColours * first, planes_bar.data(), width, gains_});
     colour_.pull_back(row, p_, q_, planes_bar, p_bar_, q_bar_);
     image_.add_slopes(row, p_bar_, q_bar_);
   }

@@ -82,9 +82,9 @@ template <class T>
 }
 
 TANGERE_CLONES void pull_back_row(const RowPullback<float>& row) { pull_back_pixels(row); }
-void pull_back_row(const RowPullback<double>& row) { pull_back_pixels(row); }
+TANGERE_CLONES void pull_back_row(const RowPullback<double>& row) { pull_back_pixels(row); }
 TANGERE_CLONES void shade_row(const RowLoop<float>& row) { shade_pixels(row); }
-void shade_row(const RowLoop<double>& row) { shade_pixels(row); }
+TANGERE_CLONES void shade_row(const RowLoop<double>& row) { shade_pixels(row); }
 
 }  // namespace
 

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <limits>
 
+#include "engine/picture/clones.hpp"
+
 namespace tangere {
 namespace {
 
@@ -14,6 +16,48 @@ int sweeps_for(double reach) {
   constexpr int kFewest = 40, kMost = 400;
   return std::clamp(static_cast<int>(std::ceil(10 * reach)), kFewest, kMost);
 }
+
+/// Points of one colour of a row, and what is beside them.
+template <class T>
+struct HalfRow {
+  T* own;
+  const T *bound, *open, *left, *above, *below;
+  int count;
+  T x, y, omega;
+};
+
+/// An obstacle holds the membrane from below.
+template <class T>
+[[gnu::always_inline]] inline void settle_points(const HalfRow<T>& r) {
+  T* const own = r.own;
+  const T *const bound = r.bound, *const left = r.left, *const above = r.above,
+                 *const below = r.below;
+  const T x = r.x, y = r.y, omega = r.omega;
+#pragma GCC ivdep
+  for (int k = 0; k < r.count; ++k) {
+    const T mean = x * (left[k] + left[k + 1]) + y * (above[k] + below[k]);
+    own[k] = std::max(bound[k], own[k] + omega * (mean - own[k]));
+  }
+}
+
+/// Sources in `bound`; what is not open stays 0.
+template <class T>
+[[gnu::always_inline]] inline void spread_points(const HalfRow<T>& r) {
+  T* const own = r.own;
+  const T *const source = r.bound, *const open = r.open, *const left = r.left,
+                 *const above = r.above, *const below = r.below;
+  const T x = r.x, y = r.y, omega = r.omega;
+#pragma GCC ivdep
+  for (int k = 0; k < r.count; ++k) {
+    const T mean = x * (left[k] + left[k + 1]) + y * (above[k] + below[k]);
+    own[k] = open[k] * (own[k] + omega * (source[k] + mean - own[k]));
+  }
+}
+
+TANGERE_CLONES void settle_row(const HalfRow<float>& row) { settle_points(row); }
+TANGERE_CLONES void settle_row(const HalfRow<double>& row) { settle_points(row); }
+TANGERE_CLONES void spread_row(const HalfRow<float>& row) { spread_points(row); }
+TANGERE_CLONES void spread_row(const HalfRow<double>& row) { spread_points(row); }
 
 }  // namespace
 
@@ -45,8 +89,7 @@ void Membrane<T>::load(std::span<const T> grid, std::vector<T>& split) const {
     for (int j = 0; j < cols_; ++j) split[at(i, j)] = grid[static_cast<std::size_t>(i * cols_ + j)];
 }
 
-/// Calls update(h, bound, open, Σ l² h_neighbour/s), which returns the new h, for all points: first
-/// those whose row and column have an even sum.
+/// Calls update(row) for all points: first those whose row and column have an even sum.
 template <class T>
 template <class Update>
 void Membrane<T>::sweep(const Update& update) {
@@ -58,14 +101,8 @@ void Membrane<T>::sweep(const Update& update) {
       const T* const bound = bound_.data() + static_cast<std::size_t>(odd) * half_ + row;
       const T* const open = open_.data() + static_cast<std::size_t>(odd) * half_ + row;
       const T* const other = value_.data() + static_cast<std::size_t>(1 - odd) * half_ + row;
-      const T* const left = odd != 0 ? other : other - 1;
-      const T* const above = own - stride_;
-      const T* const below = own + stride_;
-      const int count = (cols_ + 1 - odd) / 2;
-#pragma GCC ivdep
-      for (int k = 0; k < count; ++k)
-        own[k] = update(own[k], bound[k], open[k],
-                        x_ * (left[k] + left[k + 1]) + y_ * (above[k] + below[k]));
+      update(HalfRow<T>{own, bound, open, odd != 0 ? other : other - 1, own - stride_,
+                        own + stride_, (cols_ + 1 - odd) / 2, x_, y_, omega_});
     }
 }
 
@@ -77,9 +114,7 @@ void Membrane<T>::settle(std::span<const T> depth, std::span<T> height) {
   }
   load(depth, bound_);
   value_ = bound_;
-  const T omega = omega_;
-  for (int n = 0; n < sweeps_; ++n)
-    sweep([omega](T h, T bound, T, T mean) { return std::max(bound, h + omega * (mean - h)); });
+  for (int n = 0; n < sweeps_; ++n) sweep([](const HalfRow<T>& row) { settle_row(row); });
   for (int i = 0; i < rows_; ++i)
     for (int j = 0; j < cols_; ++j)
       height[static_cast<std::size_t>(i * cols_ + j)] = value_[at(i, j)];
@@ -97,12 +132,8 @@ void Membrane<T>::pull_back(std::span<const T> depth, std::span<const T> height,
       bound_[at(i, j)] = scale * height_bar[k];
     }
   std::fill(value_.begin(), value_.end(), T(0));
-  const T omega = omega_;
   if (scale < T(1))
-    for (int n = 0; n < 3 * sweeps_; ++n)
-      sweep([omega](T l, T source, T open, T mean) {
-        return open * (l + omega * (source + mean - l));
-      });
+    for (int n = 0; n < 3 * sweeps_; ++n) sweep([](const HalfRow<T>& row) { spread_row(row); });
   for (int i = 0; i < rows_; ++i)
     for (int j = 0; j < cols_; ++j) {
       const auto k = static_cast<std::size_t>(i * cols_ + j);

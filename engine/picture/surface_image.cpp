@@ -60,19 +60,24 @@ void pull_back_line(const std::vector<T>& kernel, Outside outside, const T* from
     }
 }
 
-/// to = Σ weight_k from_k over four rows.
-TANGERE_CLONES void sum_of_four(const std::array<const float*, 4>& from,
-                                const std::array<float, 4>& weight, float* to, std::size_t count) {
-  const float *const a = from[0], *const b = from[1], *const c = from[2], *const d = from[3];
-  const float s = weight[0], t = weight[1], u = weight[2], v = weight[3];
+template <class T>
+[[gnu::always_inline]] inline void sum_rows(const std::array<const T*, 4>& from,
+                                            const std::array<T, 4>& weight, T* to,
+                                            std::size_t count) {
+  const T *const a = from[0], *const b = from[1], *const c = from[2], *const d = from[3];
+  const T s = weight[0], t = weight[1], u = weight[2], v = weight[3];
 #pragma GCC ivdep
   for (std::size_t i = 0; i < count; ++i) to[i] = (s * a[i] + t * b[i]) + (u * c[i] + v * d[i]);
 }
-void sum_of_four(const std::array<const double*, 4>& from, const std::array<double, 4>& weight,
-                 double* to, std::size_t count) {
-  for (std::size_t i = 0; i < count; ++i)
-    to[i] = (weight[0] * from[0][i] + weight[1] * from[1][i]) +
-            (weight[2] * from[2][i] + weight[3] * from[3][i]);
+/// to = Σ weight_k from_k over four rows.
+TANGERE_CLONES void sum_of_four(const std::array<const float*, 4>& from,
+                                const std::array<float, 4>& weight, float* to, std::size_t count) {
+  sum_rows(from, weight, to, count);
+}
+TANGERE_CLONES void sum_of_four(const std::array<const double*, 4>& from,
+                                const std::array<double, 4>& weight, double* to,
+                                std::size_t count) {
+  sum_rows(from, weight, to, count);
 }
 
 /// to += weight from.
@@ -80,7 +85,8 @@ TANGERE_CLONES void add_scaled(float weight, const float* from, float* to, std::
 #pragma GCC ivdep
   for (std::size_t i = 0; i < count; ++i) to[i] += weight * from[i];
 }
-void add_scaled(double weight, const double* from, double* to, std::size_t count) {
+TANGERE_CLONES void add_scaled(double weight, const double* from, double* to, std::size_t count) {
+#pragma GCC ivdep
   for (std::size_t i = 0; i < count; ++i) to[i] += weight * from[i];
 }
 

@@ -122,6 +122,7 @@ std::vector<unsigned char> lz4(const std::vector<unsigned char>& plain) {
 ChunkPlan chunk_plan(const DatasetLayout& layout, const std::vector<std::uint64_t>& shape,
                      std::size_t own, double together) {
   const std::size_t row_bytes = numbers_of(shape) * number_bytes(layout, own);
+  if (layout.as_jpeg(shape, own)) return {0, shape};
   const bool sparse = layout.sparse && own == 0 && (shape.size() == 2 || shape.size() == 3) &&
                       row_bytes >= kLeastTiledBytes;
   ChunkPlan plan;

@@ -60,6 +60,8 @@ void describe_run(const h5::Id& scene, const DatasetLayout& layout) {
   h5::write_attribute(scene, "controls", layout.controls);
   h5::write_attributes(scene, attributes_of(layout, layout.steps, layout.every));
   h5::write_attribute(scene, "compression", layout.compression);
+  if (layout.has_jpeg())
+    h5::write_attribute(scene, "pictures", fmt::format("jpeg:{}", layout.jpeg_quality));
   h5::write_attribute(scene, "tactile", layout.sparse ? "sparse" : "dense");
   h5::write_attribute(scene, "tangere_version", layout.version);
   h5::write_attribute(scene, "instruction_set", layout.instruction_set);
@@ -128,6 +130,7 @@ void describe_numbers(const h5::Id& scene, const DatasetLayout& layout) {
     texts("randomized_names", layout.randomized_names);
     texts("randomized_units", layout.randomized_units);
   }
+  if (!layout.gained.empty()) texts("picture_gain_names", picture_gain_names(layout.gained));
   h5::write_attribute(scene, "observation_scale", observation_scale(layout));
   h5::write_attribute(scene, "privileged", privileged_observations(layout));
   h5::write_attribute(scene, "touch", touch_observations(layout));

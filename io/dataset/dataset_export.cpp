@@ -84,7 +84,7 @@ class CsvExport {
     const h5::Id obs = h5::open_group(demo, "obs");
     for (const std::string& name : h5::read_texts(scene, "observations")) {
       const std::size_t width = width_of(obs, name);
-      if (width > kWidest) {
+      if (width > kWidest || h5::has_files(h5::open_dataset(obs, name))) {
         result_.left_out.push_back(name);
         continue;
       }

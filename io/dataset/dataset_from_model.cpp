@@ -2,9 +2,26 @@
 // Row j of a data set is the state after j K steps, so its fields are those after K steps, too.
 #include "io/dataset/dataset_from_model.hpp"
 
+#include <algorithm>
+
 #include "io/scene/scene_tables.hpp"
 
 namespace tangere {
+namespace {
+
+/// Whether an episode of a scene has pictures in colours of it. What a task observes is not known.
+bool is_recorded(const DatasetLayout& layout, const GainedPicture& picture) {
+  if (layout.task) return true;
+  const std::vector<EpisodeChannel> channels = layout.channels();
+  return std::any_of(channels.begin(), channels.end(), [&](const EpisodeChannel& channel) {
+    const FieldOutput of = channel.reading;
+    return channel.kind == EpisodeChannel::Kind::reading && channel.requested &&
+           is_colour(of.form) && is_view(of.form) == picture.is_camera &&
+           of.sensor == picture.index;
+  });
+}
+
+}  // namespace
 
 DatasetLayout dataset_layout_from(const Model& model, const Stepper& stepper,
                                   const DatasetLayout& requested) {
@@ -16,6 +33,8 @@ DatasetLayout dataset_layout_from(const Model& model, const Stepper& stepper,
   layout.cameras = camera_layouts(scene);
   layout.tables = tables_of(scene);
   layout.body_names.assign(model.body_names().begin(), model.body_names().end());
+  for (const GainedPicture& picture : gained_pictures(model))
+    if (is_recorded(layout, picture)) layout.gained.push_back(picture);
   return layout;
 }
 

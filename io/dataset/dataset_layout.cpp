@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <charconv>
 #include <functional>
 #include <numeric>
 #include <set>
@@ -58,6 +59,25 @@ void check_set_name(const std::string& name) {
 }
 
 }  // namespace
+
+int jpeg_quality_named(const std::string& word) {
+  constexpr int kUsual = 95, kMost = 100;
+  constexpr std::string_view kBegin = "jpeg:";
+  if (word == "raw") return 0;
+  if (word == "jpeg") return kUsual;
+  int quality = 0;
+  const char* const end = word.data() + word.size();
+  const bool begins = word.starts_with(kBegin);
+  if (begins) {
+    const auto [at, error] = std::from_chars(word.data() + kBegin.size(), end, quality);
+    if (error != std::errc() || at != end) quality = 0;
+  }
+  if (quality < 1 || quality > kMost)
+    throw InputError(
+        fmt::format("pictures '{}'; expected raw, or jpeg:QUALITY with a whole number from 1 to {}",
+                    word.substr(0, kBegin.size() + 16), kMost));
+  return quality;
+}
 
 void check_policy_name(const std::string& who, const std::string& name) {
   constexpr std::size_t kLongest = 64;
@@ -140,6 +160,13 @@ std::vector<std::size_t> DatasetLayout::observation_bytes() const {
   return bytes;
 }
 
+bool DatasetLayout::has_jpeg() const {
+  const std::vector<EpisodeChannel> all = channels();
+  return std::any_of(all.begin(), all.end(), [this](const EpisodeChannel& channel) {
+    return channel.requested && as_jpeg(channel.shape, channel.own_bytes());
+  });
+}
+
 double DatasetLayout::episode_bytes() const {
   const std::size_t width = single ? sizeof(float) : sizeof(double);
   const auto size_of = [width](const std::vector<std::uint64_t>& shape, std::size_t own) {
@@ -205,6 +232,11 @@ void DatasetLayout::check() const {
     if (std::find(all.begin(), all.end(), one.name) == all.end())
       throw InputError(
           fmt::format("--record: unknown observation '{}'{}", one.name, suggestion(one.name, all)));
+  if (jpeg_quality > 0 && !has_jpeg())
+    throw InputError(
+        fmt::format("--pictures jpeg:{}: no picture in colours is stored; expected raw, or one of "
+                    "them in --record, such as pad.rgb",
+                    jpeg_quality));
   check_lengths(all);
   for (const SensorLayout& sensor : sensors) check_sensor_name(sensor.name);
   std::set<std::string> names;

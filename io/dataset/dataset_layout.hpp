@@ -10,6 +10,7 @@
 
 #include "engine/rows/episode_channels.hpp"
 #include "engine/rows/episode_sink.hpp"
+#include "engine/rows/picture_gains.hpp"
 
 namespace tangere {
 
@@ -27,6 +28,10 @@ constexpr std::int64_t kMostShards = 1'000'000;
 /// Throws InputError unless `name` can name a policy that `who` brings, because it becomes a mask
 /// and a part of the data set's id.
 void check_policy_name(const std::string& who, const std::string& name);
+
+/// Returns the quality of "jpeg:QUALITY", 95 for "jpeg", or 0 for "raw". Throws InputError for
+/// other words.
+int jpeg_quality_named(const std::string& word);
 
 /// The policy of the episodes of a task.
 struct PlayedBy {
@@ -53,6 +58,7 @@ struct DatasetLayout : RunFacts {
   bool single = false;        ///< observations are float32, else float64
   std::vector<SensorLayout> sensors;
   std::vector<CameraLayout> cameras;
+  std::vector<GainedPicture> gained;      ///< whose gains are stored with an episode
   std::vector<std::string> body_names;    ///< of a scene
   PlayedBy played_by;                     ///< of a task
   std::string python_class;               ///< of a task written in Python: "MODULE:CLASS"
@@ -63,6 +69,7 @@ struct DatasetLayout : RunFacts {
   std::int64_t shards = 0;                ///< number of shards; 0: as shard_bytes determines
   std::string compression =
       "none";                     ///< or "deflate", "lz4", for observations with rows large enough
+  int jpeg_quality = 0;           ///< 1 to 100: of pictures in colours; 0: they are stored raw
   bool sparse = true;             ///< parts of large fields that are zero are left out
   std::vector<TimedName> record;  ///< observations to store, with times in steps; none: all
   std::string gradients_of;       ///< the quantity that derivatives are of, in words; empty: none
@@ -91,9 +98,15 @@ struct DatasetLayout : RunFacts {
   [[nodiscard]] std::vector<std::size_t> touch() const;
   /// Shapes of one row of each stored observation: {nq}, {nv}, {n, 3}, {rows, cols, 3} …
   [[nodiscard]] std::vector<std::vector<std::uint64_t>> observation_shapes() const;
+  /// Whether an observation is stored as JPEG files. `own`: its EpisodeChannel::own_bytes().
+  [[nodiscard]] bool as_jpeg(const std::vector<std::uint64_t>& shape, std::size_t own) const {
+    return jpeg_quality > 0 && own == 1 && shape.size() == 3 && shape[2] == 3;
+  }
+  /// Whether any is.
+  [[nodiscard]] bool has_jpeg() const;
   /// EpisodeChannel::own_bytes() of each.
   [[nodiscard]] std::vector<std::size_t> observation_bytes() const;
-  /// Size of one episode's numbers on disk, without HDF5's own data [bytes].
+  /// Size of one episode's numbers on disk, without HDF5's own data [bytes]. Pictures count raw.
   [[nodiscard]] double episode_bytes() const;
   /// As many episodes as stay below shard_bytes, a multiple of 16. Depends on the data set alone.
   [[nodiscard]] std::int64_t episodes_per_shard() const;
@@ -104,7 +117,8 @@ struct DatasetLayout : RunFacts {
   [[nodiscard]] std::int64_t shard_of(std::int64_t episode) const;
   /// Throws InputError when a time is no multiple of K, when a sensor's name cannot be a name in a
   /// file, when set_name has characters that Minari refuses, when there are more shards than blocks
-  /// or than kMostShards, or when an observation to record does not exist.
+  /// or than kMostShards, when an observation to record does not exist, or when there are no
+  /// pictures to store as JPEG.
   void check() const;
 };
 

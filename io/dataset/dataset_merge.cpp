@@ -186,9 +186,16 @@ class Merger {
     h5::copy_group(data, name, copied_, name);
     const h5::Id made = h5::open_group(copied_, name), next = h5::create_group(made, "next_obs");
     for (const DemoArray& array : members_->observations)
-      h5::create_virtual(next, array.name, h5::open_dataset(made, "obs/" + array.name),
-                         {".", path + "/obs/" + array.name},
-                         {".", path + "/final_obs/" + array.name}, 1);
+      if (array.type != h5::NumberType::text)  // as links
+        h5::create_virtual(next, array.name, h5::open_dataset(made, "obs/" + array.name),
+                           {".", path + "/obs/" + array.name},
+                           {".", path + "/final_obs/" + array.name}, 1);
+    const h5::Id obs = h5::open_group(made, "obs");
+    for (const auto& [of, plain] : members_->plain_names) {
+      const DemoArray& array = members_->observations[of];
+      h5::link_again(obs, array.name, plain);
+      if (array.type != h5::NumberType::text) h5::link_again(next, array.name, plain);
+    }
   }
 
   void complete() {

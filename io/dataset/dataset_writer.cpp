@@ -154,8 +154,9 @@ struct DatasetWriter::Impl {
   void check_space(double episodes) const {
     // The size of chunks is not known in advance, and neither is the length of a task's episode.
     const double episode_bytes =
-        has_chunks(layout) ? static_cast<double>(format.data_bytes(layout.task ? 1 : layout.rows()))
-                           : layout.episode_bytes();
+        has_chunks(layout) || layout.has_jpeg()
+            ? static_cast<double>(format.data_bytes(layout.task ? 1 : layout.rows()))
+            : layout.episode_bytes();
     const double needed = episode_bytes * episodes, available = folder.free_bytes();
     if (needed > available)
       throw IoError(fmt::format("{}: needs at least {:.0f} bytes and the disk has {:.0f} free",

@@ -42,12 +42,16 @@ DemoAttributes::DemoAttributes(const DemoFacts& facts) : samples_(bytes_of_numbe
                              facts.randomized.size() * sizeof(double));
   if (!randomized.empty())
     all_.push_back({"randomized", h5::NumberType::float64, true, randomized});
+  const std::span gains(reinterpret_cast<const unsigned char*>(facts.gains.data()),
+                        facts.gains.size() * sizeof(double));
+  if (!gains.empty()) all_.push_back({"picture_gains", h5::NumberType::float64, true, gains});
 }
 
 DemoFormat::DemoFormat(const DatasetLayout& layout)
     : is_task_(layout.task.has_value()),
       single_(layout.single),
       randomized_(layout.randomized_names.size()),
+      gains_(kColours * layout.gained.size()),
       names_(layout.observation_names()),
       touch_(layout.touch()),
       sources_(layout.recorded()),
@@ -69,8 +73,10 @@ DemoFormat::DemoFormat(const DatasetLayout& layout)
   for (const char* group : {"obs/", "final_obs/"}) {
     for (const std::string& name : names_) titles_.push_back(group + name);
     shapes_.insert(shapes_.end(), observed.begin(), observed.end());
-    for (const std::size_t own : layout.observation_bytes())
-      types_.push_back(type_of_observation(own, number));
+    const std::vector<std::size_t> own = layout.observation_bytes();
+    for (std::size_t k = 0; k < own.size(); ++k)
+      types_.push_back(layout.as_jpeg(observed[k], own[k]) ? NumberType::text
+                                                           : type_of_observation(own[k], number));
   }
   for (const GradientArray& array : gradients_) {
     const auto from =
@@ -83,7 +89,9 @@ DemoFormat::DemoFormat(const DatasetLayout& layout)
   }
   for (const DatasetSample& sample : samples_) {
     shapes_.push_back(sample.shape);
-    types_.push_back(type_of_observation(sample.own_bytes, number));
+    types_.push_back(layout.as_jpeg(sample.shape, sample.own_bytes)
+                         ? NumberType::text
+                         : type_of_observation(sample.own_bytes, number));
     titles_.push_back("samples/" + sample.name);
   }
   for (std::string& title : titles_) title += " of demo_";
@@ -91,10 +99,12 @@ DemoFormat::DemoFormat(const DatasetLayout& layout)
     row_bytes_.push_back(std::accumulate(shapes_[k].begin(), shapes_[k].end(),
                                          h5::bytes_of(types_[k]), std::multiplies<>()));
   h5::Bytes header;
-  DemoFacts facts{1, std::nullopt, std::vector<double>(randomized_), std::nullopt};
+  DemoFacts facts{1, std::nullopt, std::vector<double>(randomized_), std::vector<double>(gains_),
+                  std::nullopt};
   if (is_task_) facts.end.emplace();
   if (!touch_.empty()) facts.touching = 0;
-  static_cast<void>(describe(header, 0, facts, std::vector<std::uint64_t>(datasets()), 0));
+  static_cast<void>(describe(header, 0, facts, std::vector<std::uint64_t>(datasets()),
+                             std::vector<std::uint32_t>(datasets(), 1), 0));
   header_bytes_ = header.size();
 }
 
@@ -118,7 +128,7 @@ std::int64_t DemoFormat::chunk_rows(std::size_t dataset, std::int64_t rows) cons
 std::size_t DemoFormat::data_bytes(std::int64_t rows) const {
   std::size_t bytes = 0;
   for (std::size_t k = 0; k < datasets(); ++k)
-    if (chunk_rows(k, rows) == 0)
+    if (chunk_rows(k, rows) == 0 && !as_jpeg(k))
       bytes += h5::aligned(static_cast<std::size_t>(rows_of(k, rows)) * row_bytes_[k]);
   return bytes;
 }
@@ -132,13 +142,16 @@ h5::Bytes DemoFormat::texts() const {
 }
 
 void DemoFormat::describe_dataset(h5::Bytes& out, std::size_t dataset, std::int64_t rows,
-                                  std::uint64_t address,
+                                  std::uint64_t address, std::uint32_t width,
                                   std::span<const h5::FileText> texts) const {
   const std::vector<h5::FileFilter> filters = file_filters(compression_, number_bytes(dataset));
   h5::FileDataset file;
   file.type = types_[dataset];
   file.dims = {static_cast<std::uint64_t>(rows_of(dataset, rows))};
-  file.dims.insert(file.dims.end(), shapes_[dataset].begin(), shapes_[dataset].end());
+  if (as_jpeg(dataset))
+    file.text_bytes = width;
+  else
+    file.dims.insert(file.dims.end(), shapes_[dataset].begin(), shapes_[dataset].end());
   file.address = address;
   if (const std::int64_t chunk = chunk_rows(dataset, rows); chunk > 0) {
     const std::vector<std::uint64_t>& tile = plan(dataset).tile;
@@ -153,11 +166,12 @@ void DemoFormat::describe_dataset(h5::Bytes& out, std::size_t dataset, std::int6
 std::uint64_t DemoFormat::describe_observations(h5::Bytes& out, std::uint64_t base,
                                                 std::int64_t rows, std::size_t first,
                                                 std::span<const std::string> names,
-                                                std::span<const std::uint64_t> addresses) const {
+                                                std::span<const std::uint64_t> addresses,
+                                                std::span<const std::uint32_t> widths) const {
   std::vector<h5::FileLink> links;
   for (std::size_t name = 0; name < names.size(); ++name) {
     links.push_back({names[name], base + out.size()});
-    describe_dataset(out, first + name, rows, addresses[first + name]);
+    describe_dataset(out, first + name, rows, addresses[first + name], widths[first + name]);
   }
   const std::uint64_t group = base + out.size();
   h5::add_group(out, links);
@@ -166,6 +180,7 @@ std::uint64_t DemoFormat::describe_observations(h5::Bytes& out, std::uint64_t ba
 
 std::uint64_t DemoFormat::describe(h5::Bytes& out, std::uint64_t base, const DemoFacts& facts,
                                    std::span<const std::uint64_t> addresses,
+                                   std::span<const std::uint32_t> widths,
                                    std::uint64_t texts) const {
   std::vector<h5::FileLink> links;
   for (const std::size_t dataset : {kActions, kRewards, kDones}) {
@@ -173,21 +188,22 @@ std::uint64_t DemoFormat::describe(h5::Bytes& out, std::uint64_t base, const Dem
     links.push_back({kNames[dataset], base + out.size()});
     describe_dataset(out, dataset, facts.rows, addresses[dataset]);
   }
-  links.push_back({"obs", describe_observations(out, base, facts.rows, obs(0), names_, addresses)});
   links.push_back(
-      {"final_obs", describe_observations(out, base, facts.rows, final_obs(0), names_, addresses)});
+      {"obs", describe_observations(out, base, facts.rows, obs(0), names_, addresses, widths)});
+  links.push_back({"final_obs", describe_observations(out, base, facts.rows, final_obs(0), names_,
+                                                      addresses, widths)});
   for (std::size_t k = 0; k < gradients_.size(); ++k) {
     const std::array meaning{
         h5::FileText{"meaning", texts, static_cast<std::uint32_t>(k),
                      static_cast<std::uint32_t>(gradients_[k].meaning.size())}};
     links.push_back({gradients_[k].name, base + out.size()});
-    describe_dataset(out, gradient(k), facts.rows, addresses[gradient(k)], meaning);
+    describe_dataset(out, gradient(k), facts.rows, addresses[gradient(k)], 1, meaning);
   }
   std::vector<std::string> sampled;
   for (const DatasetSample& one : samples_) sampled.push_back(one.name);
   if (!sampled.empty())
-    links.push_back(
-        {"samples", describe_observations(out, base, facts.rows, sample(0), sampled, addresses)});
+    links.push_back({"samples", describe_observations(out, base, facts.rows, sample(0), sampled,
+                                                      addresses, widths)});
   const std::uint64_t group = base + out.size();
   h5::add_group(out, links, DemoAttributes(facts).all());
   return group;

@@ -22,6 +22,7 @@ struct DemoFacts {
   std::int64_t rows = 0;                 ///< R
   std::optional<EpisodeEnd> end;         ///< of a task
   std::vector<double> randomized;        ///< as many as the layout has names
+  std::vector<double> gains;             ///< of R, G, B of the layout's gained pictures
   std::optional<std::int64_t> touching;  ///< rows of obs with contact; none: not stored
 };
 
@@ -71,6 +72,10 @@ class DemoFormat {
   [[nodiscard]] std::int64_t chunk_rows(std::size_t dataset, std::int64_t rows) const;
   /// Whether observations are float32, else float64.
   [[nodiscard]] bool single() const { return single_; }
+  /// Whether its rows are JPEG files, whose sizes are known once they are made.
+  [[nodiscard]] bool as_jpeg(std::size_t dataset) const {
+    return types_[dataset] == h5::NumberType::text;
+  }
   /// How an observation is cut into chunks.
   [[nodiscard]] const ChunkPlan& plan(std::size_t dataset) const {
     if (dataset >= sample(0)) return plans_[names_.size() + dataset - sample(0)];
@@ -90,7 +95,8 @@ class DemoFormat {
   [[nodiscard]] const std::vector<std::uint64_t>& shape(std::size_t dataset) const {
     return shapes_[dataset];
   }
-  /// Bytes of the contiguous datasets of a demo, each rounded up to a multiple of eight.
+  /// Bytes of the contiguous datasets of a demo, each rounded up to a multiple of eight, without
+  /// those of JPEG files.
   [[nodiscard]] std::size_t data_bytes(std::int64_t rows) const;
   /// Bytes of a demo's description, equal for all demos.
   [[nodiscard]] std::size_t header_bytes() const { return header_bytes_; }
@@ -100,19 +106,23 @@ class DemoFormat {
 
   /// Appends the description of a demo to bytes that begin at `base` in the file. Returns the
   /// address of its group. `addresses` has, for each dataset, the address of its numbers or of the
-  /// index of its chunks. `texts` is the address of texts().
+  /// index of its chunks. `widths` has the bytes of a row of JPEG files. `texts` is the address of
+  /// texts().
   std::uint64_t describe(h5::Bytes& out, std::uint64_t base, const DemoFacts& facts,
-                         std::span<const std::uint64_t> addresses, std::uint64_t texts) const;
+                         std::span<const std::uint64_t> addresses,
+                         std::span<const std::uint32_t> widths, std::uint64_t texts) const;
 
  private:
   std::uint64_t describe_observations(h5::Bytes& out, std::uint64_t base, std::int64_t rows,
                                       std::size_t first, std::span<const std::string> names,
-                                      std::span<const std::uint64_t> addresses) const;
+                                      std::span<const std::uint64_t> addresses,
+                                      std::span<const std::uint32_t> widths) const;
   void describe_dataset(h5::Bytes& out, std::size_t dataset, std::int64_t rows,
-                        std::uint64_t address, std::span<const h5::FileText> texts = {}) const;
+                        std::uint64_t address, std::uint32_t width = 1,
+                        std::span<const h5::FileText> texts = {}) const;
 
   bool is_task_, single_;
-  std::size_t randomized_;
+  std::size_t randomized_, gains_;
   std::vector<std::string> names_, titles_;  // of observations; of datasets
   std::vector<std::size_t> touch_, sources_, gradient_sources_;
   std::vector<GradientArray> gradients_;  // by name

@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <set>
 
 #include "engine/base/error.hpp"
 #include "io/dataset/dataset_description.hpp"
@@ -34,8 +35,24 @@ std::vector<std::uint64_t> dims_of(std::uint64_t rows, const DemoArray& array) {
   return dims;
 }
 
+using PlainNames = std::vector<std::pair<std::size_t, std::string>>;
+
+/// Names without dots, of observations that have some; none that another one has.
+PlainNames plain_names(const std::vector<DemoArray>& arrays) {
+  PlainNames found;
+  std::set<std::string> taken;
+  for (const DemoArray& array : arrays) taken.insert(array.name);
+  for (std::size_t k = 0; k < arrays.size(); ++k) {
+    std::string name = arrays[k].name;
+    std::replace(name.begin(), name.end(), '.', '_');
+    if (taken.insert(name).second) found.emplace_back(k, name);
+  }
+  return found;
+}
+
 bool has_numbers(const DemoArray& array) {
-  return std::find(array.shape.begin(), array.shape.end(), 0) == array.shape.end();
+  return array.type != h5::NumberType::text &&
+         std::find(array.shape.begin(), array.shape.end(), 0) == array.shape.end();
 }
 
 /// Virtual datasets with the observations of a batch of demos, one row later or with one row more.
@@ -50,11 +67,15 @@ class ShownObservations {
         skipped_(skipped),
         texts_(add_texts(file, demos)) {}
 
-  /// Appends the datasets of the next demo. Returns links to them.
-  std::vector<h5::FileLink> add(const DemoFacts& facts) {
+  /// Appends the datasets of the next demo. Returns links to them, by plain names as well.
+  std::vector<h5::FileLink> add(const DemoFacts& facts, const PlainNames& plain = {}) {
     std::vector<h5::FileLink> links;
-    for (const DemoArray& array : arrays_) {
+    for (std::size_t k = 0; k < arrays_.size(); ++k) {
+      const DemoArray& array = arrays_[k];
+      if (array.type == h5::NumberType::text) continue;  // of obs and final_obs differ in length
       links.push_back({array.name, base_ + out_.size()});
+      for (const auto& [of, name] : plain)
+        if (of == k) links.push_back({name, base_ + out_.size()});
       h5::FileDataset dataset{array.type, dims_of(rows(facts), array)};
       if (has_numbers(array)) dataset.view = h5::FileView{texts_, next_++};
       h5::add_dataset(out_, dataset);
@@ -62,8 +83,8 @@ class ShownObservations {
     return links;
   }
   /// The same in a group. Returns its address.
-  std::uint64_t add_group(const DemoFacts& facts) {
-    const std::vector<h5::FileLink> links = add(facts);
+  std::uint64_t add_group(const DemoFacts& facts, const PlainNames& plain = {}) {
+    const std::vector<h5::FileLink> links = add(facts, plain);
     const std::uint64_t group = base_ + out_.size();
     h5::add_group(out_, links);
     return group;
@@ -105,6 +126,7 @@ class ShownObservations {
 h5::NumberType type_of(const h5::Id& dataset) {
   const h5::Id type(H5Dget_type(dataset.get()));
   const std::size_t bytes = H5Tget_size(type.get());
+  if (H5Tget_class(type.get()) == H5T_STRING) return h5::NumberType::text;
   return bytes == 1               ? h5::NumberType::uint8
          : bytes == 2             ? h5::NumberType::int16
          : bytes == sizeof(float) ? h5::NumberType::float32
@@ -116,6 +138,22 @@ DemoArray array_of(const h5::Id& group, const std::string& name) {
   const h5::Dims dims = h5::dimensions(dataset);
   if (dims.empty()) throw IoError(fmt::format("{} is one number; expected rows", name));
   return {name, type_of(dataset), {dims.begin() + 1, dims.end()}};
+}
+
+/// Appends a group with links to the observations of a demo, by both names. Returns its address.
+std::uint64_t add_obs_links(Bytes& out, std::uint64_t base, const DemoMembers& members,
+                            std::string_view file, const LinkedDemo& demo) {
+  std::vector<std::string> paths;
+  for (const DemoArray& array : members.observations)
+    paths.push_back(path_of(demo.number, "obs", array.name));
+  std::vector<h5::FileLink> links;
+  for (std::size_t k = 0; k < paths.size(); ++k)
+    links.push_back({members.observations[k].name, h5::kNowhere, file, paths[k]});
+  for (const auto& [of, name] : members.plain_names)
+    links.push_back({name, h5::kNowhere, file, paths[of]});
+  const std::uint64_t group = base + out.size();
+  h5::add_group(out, links);
+  return group;
 }
 
 }  // namespace
@@ -132,6 +170,7 @@ DemoMembers members_of(const h5::Id& demo) {
   const h5::Id obs = h5::open_group(demo, "obs");
   for (const std::string& name : h5::link_names(obs))
     members.observations.push_back(array_of(obs, name));
+  members.plain_names = plain_names(members.observations);
   if (h5::has_link(demo, kSamples)) {
     const h5::Id samples = h5::open_group(demo, kSamples);
     for (const std::string& name : h5::link_names(samples))
@@ -144,6 +183,7 @@ DemoMembers members_of(const h5::Id& demo) {
   if (members.is_task)
     members.policies = std::ssize(h5::read_texts(h5::open_group(demo, "/scene"), "policies"));
   members.varies = std::binary_search(names.begin(), names.end(), "randomized");
+  members.has_gains = std::binary_search(names.begin(), names.end(), "picture_gains");
   members.has_touch = !stored_touch(h5::open_group(demo, "/scene")).empty();
   return members;
 }
@@ -166,6 +206,7 @@ DemoFacts facts_of(const h5::Id& demo, const DemoMembers& members) {
                            static_cast<int>(policy)};
   }
   if (members.varies) facts.randomized = h5::read_numbers<double>(demo, "randomized");
+  if (members.has_gains) facts.gains = h5::read_numbers<double>(demo, "picture_gains");
   if (members.has_touch) facts.touching = h5::read_number<std::int64_t>(demo, "touching");
   if (const std::int64_t touching = facts.touching.value_or(0);
       touching < 0 || touching > facts.rows)
@@ -207,9 +248,14 @@ std::vector<h5::FileMember> add_demo_links(Bytes& out, std::uint64_t base,
     std::vector<std::string> paths;
     for (const std::string& name : members.names) paths.push_back(path_of(demo.number, name));
     std::vector<h5::FileLink> links;
-    for (std::size_t k = 0; k < paths.size(); ++k)
-      links.push_back({members.names[k], h5::kNowhere, file, paths[k]});
-    links.push_back({"next_obs", next.add_group(demo.facts)});
+    for (std::size_t k = 0; k < paths.size(); ++k) {
+      const bool renamed = members.names[k] == "obs" && !members.plain_names.empty();
+      if (renamed)
+        links.push_back({"obs", add_obs_links(out, base, members, file, demo)});
+      else
+        links.push_back({members.names[k], h5::kNowhere, file, paths[k]});
+    }
+    links.push_back({"next_obs", next.add_group(demo.facts, members.plain_names)});
     groups.push_back({demo.number, base + out.size()});
     h5::add_group(out, links, DemoAttributes(demo.facts).all());
   }

@@ -26,11 +26,15 @@ struct DemoArray {
 struct DemoMembers {
   std::vector<std::string> names;       ///< of its links
   std::vector<DemoArray> observations;  ///< below obs
-  std::vector<DemoArray> states;        ///< of these, what Minari gets below infos instead
+  /// Second names of observations whose own has a dot, by index: robomimic builds no network for a
+  /// name with a dot.
+  std::vector<std::pair<std::size_t, std::string>> plain_names;
+  std::vector<DemoArray> states;  ///< of these, what Minari gets below infos instead
   std::vector<std::pair<DemoArray, std::uint64_t>> samples;  ///< below samples, with their rows
   DemoArray actions;
   std::vector<std::string> besides;  ///< grad_…, the loss and samples, among `names`
   bool is_task = false, varies = false, has_touch = false;  ///< has_touch: touch is stored
+  bool has_gains = false;                                   ///< of pictures
   std::int64_t policies = 0;                                ///< that played, for a task
 };
 
@@ -48,7 +52,8 @@ struct LinkedDemo {
 };
 
 /// Appends groups demo_<i> to bytes that begin at `base`: attributes and members of the demos of
-/// `file`, and next_obs, whose row j is row j + 1 of obs and whose last row is final_obs. `file` is
+/// `file`, and next_obs, whose row j is row j + 1 of obs and whose last row is final_obs.
+/// Observations have their plain names besides. `file` is
 /// relative to the folder of the file being written. Returns the groups.
 std::vector<h5::FileMember> add_demo_links(h5::Bytes& out, std::uint64_t base,
                                            const DemoMembers& members, std::string_view file,

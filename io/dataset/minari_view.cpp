@@ -67,7 +67,9 @@ std::string box(const DemoArray& array, const std::string& low, const std::strin
                      nested(array.shape, 0, high));
 }
 
-bool too_large(const DemoArray& array) {
+/// Minari has no observation of JPEG files.
+bool is_hidden(const DemoArray& array) {
+  if (array.type == h5::NumberType::text) return true;
   std::uint64_t numbers = 1;
   for (const std::uint64_t size : array.shape) numbers *= size;
   return numbers > kMostNumbers;
@@ -84,8 +86,8 @@ MinariView::MinariView(const std::string& folder, const h5::Id& shard, const Dem
     : members_(members) {
   // Minari shows all that the file has and computes its space, so both lack what is too large.
   std::erase_if(members_.observations, [this](const DemoArray& array) {
-    if (too_large(array)) left_out_.push_back(array.name);
-    return too_large(array);
+    if (is_hidden(array)) left_out_.push_back(array.name);
+    return is_hidden(array);
   });
   const h5::Id scene = h5::open_group(shard, "/scene");
   command_ = h5::read_text(h5::open_group(shard, "/"), "command");

@@ -8,6 +8,7 @@
 #include <stdexcept>
 
 #include "engine/base/as_size.hpp"
+#include "io/files/jpeg_file.hpp"
 
 namespace tangere {
 namespace {
@@ -196,6 +197,25 @@ void mark_touching(const DemoFormat& format, const PieceSlice& slice, std::vecto
       touching[row] = 1;
 }
 
+/// Makes JPEG files of the rows of a slice, and adds their bytes to the sum.
+PreparedPictures prepared_pictures(const DatasetLayout& layout, const DemoFormat& format,
+                                   int episode, std::size_t dataset, const PieceSlice& slice,
+                                   ContentSum& sum) {
+  const std::vector<std::uint64_t>& shape = format.shape(dataset);
+  const PlacedRows& r = slice.rows;
+  PreparedPictures pictures{episode, dataset, slice.first, {}};
+  for (std::int64_t row = 0; row < r.rows; ++row) {
+    const std::string file = jpeg_bytes(
+        static_cast<int>(shape[0]), static_cast<int>(shape[1]),
+        slice.bytes().subspan(as_size(row) * r.row_bytes, r.row_bytes), layout.jpeg_quality);
+    pictures.files.emplace_back(file.begin(), file.end());
+    RowSum bytes;
+    bytes.add(0, pictures.files.back());
+    sum.add(r.episode, r.name, r.first_row + row, file.size(), bytes);
+  }
+  return pictures;
+}
+
 }  // namespace
 
 std::int64_t rows_of_episode(const DatasetLayout& layout, const EpisodeRows& piece, int episode) {
@@ -242,6 +262,11 @@ PreparedPiece prepare_piece(const DatasetLayout& layout, const DemoFormat& forma
       const PieceSlice& slice = slices[dataset];
       const PlacedRows& r = slice.rows;
       if (r.rows == 0) continue;
+      if (format.as_jpeg(dataset)) {
+        prepared.pictures.push_back(
+            prepared_pictures(layout, format, e, dataset, slice, prepared.sums[as_size(e)]));
+        continue;
+      }
       const bool touch = format.is_touch(dataset);
       if (touch) touching.resize(as_size(r.rows), 0);
       const std::int64_t each = format.chunk_rows(dataset, rows);

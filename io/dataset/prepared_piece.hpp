@@ -49,10 +49,19 @@ struct PreparedChunk {
   std::vector<unsigned char> bytes;
 };
 
+/// Consecutive rows of a dataset of pictures, each a JPEG file.
+struct PreparedPictures {
+  int episode = 0;  ///< in the piece
+  std::size_t dataset = 0;
+  std::int64_t first = 0;  ///< row
+  std::vector<std::vector<unsigned char>> files;
+};
+
 struct PreparedPiece {
   std::vector<ContentSum> sums;        ///< per episode
   std::vector<std::int64_t> touching;  ///< per episode: rows of obs with contact
   std::vector<PreparedChunk> chunks;
+  std::vector<PreparedPictures> pictures;
 };
 
 /// Thread-safe.

@@ -13,6 +13,7 @@
 #include "engine/base/error.hpp"
 #include "io/dataset/content_sum.hpp"
 #include "io/dataset/dataset_description.hpp"
+#include "io/files/jpeg_file.hpp"
 #include "io/hdf5/h5.hpp"
 #include "io/hdf5/h5_listing.hpp"
 
@@ -103,6 +104,8 @@ class ShardChecker {
     rows_ = steps / every;
     is_task_ = !h5::read_text(scene_, "task").starts_with("none");
     if (is_task_) policies_ = std::ssize(h5::read_texts(scene_, "policies"));
+    if (H5Aexists(scene_.get(), "picture_gain_names") > 0)
+      gains_ = h5::read_texts(scene_, "picture_gain_names").size();
     gradients_ = stored_gradients(scene_);
     samples_ = stored_samples(scene_, every, rows_);
   }
@@ -178,6 +181,12 @@ class ShardChecker {
         is_task_ && (by < 0 || by >= policies_))
       fail(fmt::format("demo_{}: its policy is {}; expected 0 to {}, one of 'policies' in /scene",
                        episode, by, policies_ - 1));
+    if (const std::size_t gains = H5Aexists(demo.get(), "picture_gains") > 0
+                                      ? h5::read_numbers<double>(demo, "picture_gains").size()
+                                      : 0;
+        gains != gains_)
+      fail(fmt::format("demo_{}: it has {} 'picture_gains'; expected {}, those that /scene names",
+                       episode, gains, gains_));
     // These values need no checksum: without a task every reward is 0, and only the last row ends
     // the episode.
     if (is_task_) {
@@ -191,11 +200,8 @@ class ShardChecker {
     touching_.assign(touch_.empty() ? 0 : static_cast<std::size_t>(rows), 0);
     for (std::size_t k = 0; k < names_.size(); ++k) {
       const bool touch = std::find(touch_.begin(), touch_.end(), names_[k]) != touch_.end();
-      in_type_of(obs, names_[k], [&](auto zero) {
-        using T = decltype(zero);
-        add<T>(obs, names_[k], episode, k + 1, 0, rows, touch);
-        add<T>(final_obs, names_[k], episode, k + 1, rows, 1);
-      });
+      add_observation(obs, names_[k], episode, k + 1, 0, rows, touch);
+      add_observation(final_obs, names_[k], episode, k + 1, rows, 1);
     }
     if (!touch_.empty())
       check_touching(demo, episode);
@@ -208,8 +214,9 @@ class ShardChecker {
                  names_.size() + 2 + gradients_.size() + k);
     if (h5::has_link(demo, "next_obs"))
       for (const std::string& name : names_)
-        in_type_of(obs, name,
-                   [&](auto zero) { check_next<decltype(zero)>(demo, name, episode, rows); });
+        if (!h5::has_files(h5::open_dataset(obs, name)))  // no view shows those
+          in_type_of(obs, name,
+                     [&](auto zero) { check_next<decltype(zero)>(demo, name, episode, rows); });
     content_.rows += rows;
     ++content_.demos;
   }
@@ -224,9 +231,46 @@ class ShardChecker {
 
   void add_sample(const h5::Id& samples, const StoredSample& stored, std::int64_t episode,
                   std::size_t index) {
-    in_type_of(samples, stored.name, [&](auto zero) {
-      add<decltype(zero)>(samples, stored.name, episode, index, 0, stored.rows);
+    add_observation(samples, stored.name, episode, index, 0, stored.rows);
+  }
+
+  /// Adds a dataset whose row 0 is row `first` of the episode.
+  void add_observation(const h5::Id& group, const std::string& name, std::int64_t episode,
+                       std::size_t index, std::int64_t first, std::int64_t rows,
+                       bool touch = false) {
+    if (const h5::Id dataset = h5::open_dataset(group, name); h5::has_files(dataset))
+      return add_files(dataset, name, episode, index, first, rows);
+    in_type_of(group, name, [&](auto zero) {
+      add<decltype(zero)>(group, name, episode, index, first, rows, touch);
     });
+  }
+
+  /// The same of pictures in JPEG files, which must have one size.
+  void add_files(const h5::Id& dataset, const std::string& name, std::int64_t episode,
+                 std::size_t index, std::int64_t first, std::int64_t rows) {
+    const std::string full = fmt::format("demo_{}: {}", episode, name);
+    if (!has_rows(dataset, full, rows)) return;
+    constexpr std::int64_t kTogether = 64;
+    JpegSize size;
+    for (std::int64_t row = 0; row < rows; row += kTogether)
+      for (const std::string& file :
+           h5::read_files(dataset, static_cast<hsize_t>(row),
+                          static_cast<hsize_t>(std::min(kTogether, rows - row)))) {
+        const std::int64_t at = first++;
+        try {
+          const JpegSize found = jpeg_size(file, fmt::format("row {}", at));
+          if (size == JpegSize{}) size = found;
+          if (found != size)
+            return fail(fmt::format("{}: row {} has {} x {} pixels; expected {} x {}", full, at,
+                                    found.rows, found.cols, size.rows, size.cols));
+        } catch (const InputError& error) {
+          return fail(fmt::format("{}: {}", full, error.what()));
+        }
+        if (!summed_) continue;
+        RowSum bytes;
+        bytes.add(0, {reinterpret_cast<const unsigned char*>(file.data()), file.size()});
+        sum_.add(episode, index, at, file.size(), bytes);
+      }
   }
 
   /// Calls body(T{}) with a number of an observation: a byte of a picture, the number of a body,
@@ -365,6 +409,7 @@ class ShardChecker {
   h5::Id file_, scene_;
   std::vector<std::string> names_, touch_;  // of observations; of those that are touch
   std::vector<char> touching_;              // per row of the demo at hand
+  std::size_t gains_ = 0;                   // of pictures, in a demo
   std::vector<StoredGradient> gradients_;
   std::vector<StoredSample> samples_;
   bool single_ = false, is_task_ = false;

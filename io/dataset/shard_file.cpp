@@ -19,6 +19,7 @@ namespace {
 constexpr std::int64_t kBlockEpisodes = 16;
 constexpr std::size_t kMostHeld = std::size_t{64} << 20;
 constexpr const char* kSpill = ".spill";
+constexpr std::array<unsigned char, 4096> kZeros{};  // behind JPEG files
 
 template <class T>
 std::span<const unsigned char> bytes_of(std::span<const T> numbers) {
@@ -35,7 +36,7 @@ ShardFile::ShardFile(const std::string& path, const DatasetLayout& layout, const
       end_(range.end),
       unfinished_((range.end - range.first + kBlockEpisodes - 1) / kBlockEpisodes),
       next_(range.first),
-      cut_(has_chunks(layout)),
+      sizes_vary_(has_chunks(layout) || layout.has_jpeg()),
       held_bytes_(held_bytes),
       part_(path, overwrite),
       placed_(part_),
@@ -73,10 +74,13 @@ ShardFile::Block& ShardFile::block_of(const EpisodeRows& rows) {
     if (!rows.randomized.empty())
       std::copy_n(rows.randomized.begin() + static_cast<std::ptrdiff_t>(i * varied), varied,
                   demo.facts.randomized.begin());
+    demo.facts.gains = picture_gains(layout_.gained, layout_.seed, rows.first_episode + e);
     if (!format_.touch().empty()) demo.facts.touching = 0;
     demo.addresses.resize(format_.datasets(), h5::kNowhere);
     demo.rows.resize(format_.datasets());
     demo.chunks.resize(format_.datasets());
+    demo.pictures.resize(format_.datasets());
+    demo.widths.resize(format_.datasets(), 1);
   }
   if (!waits()) give_place(block, rows.first_episode);
   return block;
@@ -107,7 +111,7 @@ void ShardFile::write(const EpisodeRows& rows, PreparedPiece prepared) {
     write_slices(block, rows, e);
   }
   placed_.flush();
-  hold(block, rows.first_episode, prepared.chunks);
+  hold(block, rows.first_episode, prepared);
 }
 
 void ShardFile::write_slices(Block& block, const EpisodeRows& rows, int episode) {
@@ -124,7 +128,8 @@ void ShardFile::write_slices(Block& block, const EpisodeRows& rows, int episode)
             slice.bytes(), what);
       else if (rows.first_row == 0)
         placed_.add(demo.addresses[k], same, what);
-    } else if (format_.chunk_rows(k, demo.facts.rows) == 0 && slice.rows.rows > 0) {
+    } else if (format_.chunk_rows(k, demo.facts.rows) == 0 && !format_.as_jpeg(k) &&
+               slice.rows.rows > 0) {
       const std::span<const unsigned char> bytes = slice.bytes();
       demo.rows[k].push_back(hold({bytes.begin(), bytes.end()}, what));
     }
@@ -140,12 +145,22 @@ std::span<const unsigned char> ShardFile::constant(std::size_t dataset, std::int
   return {};
 }
 
-void ShardFile::hold(Block& block, std::int64_t first_episode, std::vector<PreparedChunk>& chunks) {
-  for (PreparedChunk& chunk : chunks) {
+void ShardFile::hold(Block& block, std::int64_t first_episode, PreparedPiece& prepared) {
+  for (PreparedChunk& chunk : prepared.chunks) {
     const BytesOf what{format_.title(chunk.dataset), first_episode + chunk.episode};
     const auto bytes = static_cast<std::uint32_t>(chunk.bytes.size());
     block.demos[static_cast<std::size_t>(chunk.episode)].chunks[chunk.dataset].push_back(
         {{chunk.first, 0, bytes}, hold(std::move(chunk.bytes), what)});
+  }
+  for (PreparedPictures& some : prepared.pictures) {
+    const BytesOf what{format_.title(some.dataset), first_episode + some.episode};
+    Demo& demo = block.demos[static_cast<std::size_t>(some.episode)];
+    for (std::size_t k = 0; k < some.files.size(); ++k) {
+      demo.widths[some.dataset] =
+          std::max(demo.widths[some.dataset], static_cast<std::uint32_t>(some.files[k].size()));
+      demo.pictures[some.dataset].push_back(
+          {some.first + static_cast<std::int64_t>(k), hold(std::move(some.files[k]), what)});
+    }
   }
 }
 
@@ -220,7 +235,7 @@ void ShardFile::give_place_to_held(Block& block) {
       const std::int64_t rows = format_.chunk_rows(k, demo.facts.rows);
       if (rows == 0) {
         at += h5::aligned(static_cast<std::uint64_t>(format_.rows_of(k, demo.facts.rows)) *
-                          format_.row_bytes(k));
+                          (format_.as_jpeg(k) ? demo.widths[k] : format_.row_bytes(k)));
         continue;
       }
       std::vector<h5::FileChunk> places;
@@ -248,6 +263,7 @@ void ShardFile::write_held(Block& block, std::int64_t first_episode) {
         at += rows.size;
       }
       for (Chunk& chunk : demo.chunks[k]) place(chunk.place.address, chunk.held, what);
+      write_pictures(demo, k, what);
     }
     if (read_back_.empty()) continue;
     placed_.flush();
@@ -256,12 +272,27 @@ void ShardFile::write_held(Block& block, std::int64_t first_episode) {
   if (spilled_bytes_ == 0) spill_.reset();
 }
 
+/// Every row has the bytes of the largest file. Zeros fill the others.
+void ShardFile::write_pictures(Demo& demo, std::size_t dataset, const BytesOf& what) {
+  const std::uint64_t width = demo.widths[dataset];
+  for (Picture& picture : demo.pictures[dataset]) {
+    std::uint64_t at = demo.addresses[dataset] + static_cast<std::uint64_t>(picture.row) * width;
+    const std::uint64_t end = at + width;
+    place(at, picture.held, what);
+    for (at += picture.held.size; at < end;) {
+      const std::uint64_t part = std::min<std::uint64_t>(end - at, kZeros.size());
+      placed_.add(at, std::span(kZeros).first(part), what);
+      at += part;
+    }
+  }
+}
+
 void ShardFile::close_block(Block& block, std::int64_t first_episode, const h5::Bytes& indexes) {
   h5::Bytes descriptions;
   for (std::size_t e = 0; e < block.demos.size(); ++e) {
     const Demo& demo = block.demos[e];
     const std::uint64_t group =
-        format_.describe(descriptions, block.base, demo.facts, demo.addresses, texts_);
+        format_.describe(descriptions, block.base, demo.facts, demo.addresses, demo.widths, texts_);
     if (demo.failed) continue;  // its bytes stay, but no link leads to them
     members_.push_back({first_episode + static_cast<std::int64_t>(e), group});
     rows_ += demo.facts.rows;
@@ -287,6 +318,7 @@ void ShardFile::record_failures() {
     const DemoFacts& facts = facts_of_failures_[failure.episode];
     if (facts.end) h5::write_scalar<std::int64_t>(group, "policy", facts.end->policy);
     if (!facts.randomized.empty()) h5::write_list<double>(group, "randomized", facts.randomized);
+    if (!facts.gains.empty()) h5::write_list<double>(group, "picture_gains", facts.gains);
   }
 }
 

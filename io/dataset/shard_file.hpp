@@ -51,13 +51,19 @@ class ShardFile {
     h5::FileChunk place;
     Held held;
   };
+  struct Picture {
+    std::int64_t row;
+    Held held;
+  };
   struct Demo {
     DemoFacts facts;
     bool failed = false;
     ContentSum sum;
-    std::vector<std::uint64_t> addresses;    // per dataset, once known
-    std::vector<std::vector<Held>> rows;     // per contiguous dataset, in order
-    std::vector<std::vector<Chunk>> chunks;  // per dataset
+    std::vector<std::uint64_t> addresses;        // per dataset, once known
+    std::vector<std::vector<Held>> rows;         // per contiguous dataset, in order
+    std::vector<std::vector<Chunk>> chunks;      // per dataset
+    std::vector<std::vector<Picture>> pictures;  // per dataset
+    std::vector<std::uint32_t> widths;           // per dataset: bytes of a row of JPEG files
   };
   struct Block {
     std::vector<Demo> demos;
@@ -67,16 +73,17 @@ class ShardFile {
 
   void describe();
   void complete_description(std::uint64_t data);
-  [[nodiscard]] bool waits() const { return cut_; }  // sizes are known when a block ends
+  [[nodiscard]] bool waits() const { return sizes_vary_; }  // sizes are known when a block ends
   Block& block_of(const EpisodeRows& rows);
   void give_place(Block& block, std::int64_t first_episode);
   void write_slices(Block& block, const EpisodeRows& rows, int episode);
   [[nodiscard]] std::span<const unsigned char> constant(std::size_t dataset,
                                                         std::int64_t rows) const;
-  void hold(Block& block, std::int64_t first_episode, std::vector<PreparedChunk>& chunks);
+  void hold(Block& block, std::int64_t first_episode, PreparedPiece& prepared);
   [[nodiscard]] Held hold(std::vector<unsigned char> bytes, const BytesOf& what);
   void place(std::uint64_t address, Held& held, const BytesOf& what);
   void give_place_to_held(Block& block);
+  void write_pictures(Demo& demo, std::size_t dataset, const BytesOf& what);
   void write_held(Block& block, std::int64_t first_episode);
   void close_block(Block& block, std::int64_t first_episode, const h5::Bytes& indexes);
   void record_failures();
@@ -85,7 +92,7 @@ class ShardFile {
   const DemoFormat& format_;
   std::int64_t first_episode_, end_, unfinished_,
       next_;                 // unfinished blocks; the first one without a place
-  bool cut_;                 // into chunks
+  bool sizes_vary_;          // chunks or JPEG files
   std::size_t& held_bytes_;  // in memory, of all shards
   PartFile part_;
   std::optional<PartFile> spill_;  // has no name

@@ -96,6 +96,10 @@ bool decompress(JpegErrors& errors, std::span<const char> bytes, int& rows, int&
   return true;
 }
 
+[[noreturn]] void fail(const std::string& name, const std::string& what) {
+  throw InputError(fmt::format("{}: {}; expected a picture as JPEG", name, what));
+}
+
 }  // namespace
 
 std::string jpeg_bytes(int rows, int cols, std::span<const std::uint8_t> levels, int quality) {
@@ -111,20 +115,26 @@ std::string jpeg_bytes(int rows, int cols, std::span<const std::uint8_t> levels,
   return file;
 }
 
-Photograph parse_jpeg(std::span<const char> bytes, const std::string& name) {
+JpegSize jpeg_size(std::span<const char> bytes, const std::string& name) {
   JpegErrors errors{};
   prepare(errors);
+  JpegSize size;
+  if (!decompress(errors, bytes, size.rows, size.cols, nullptr)) fail(name, errors.text);
+  if (size.rows > kLargestPhotograph || size.cols > kLargestPhotograph)
+    fail(name, fmt::format("{} x {} pixels; at most {} along a side", size.rows, size.cols,
+                           kLargestPhotograph));
+  return size;
+}
+
+Photograph parse_jpeg(std::span<const char> bytes, const std::string& name) {
+  const JpegSize size = jpeg_size(bytes, name);
   Photograph photograph;
-  const auto fail = [&](const std::string& what) {
-    throw InputError(fmt::format("{}: {}; expected a picture as JPEG", name, what));
-  };
-  if (!decompress(errors, bytes, photograph.rows, photograph.cols, nullptr)) fail(errors.text);
-  if (photograph.rows > kLargestPhotograph || photograph.cols > kLargestPhotograph)
-    fail(fmt::format("{} x {} pixels; at most {} along a side", photograph.rows, photograph.cols,
-                     kLargestPhotograph));
-  photograph.levels.resize(std::size_t{3} * photograph.rows * photograph.cols);
+  photograph.levels.resize(std::size_t{3} * static_cast<std::size_t>(size.rows) *
+                           static_cast<std::size_t>(size.cols));
+  JpegErrors errors{};
+  prepare(errors);
   if (!decompress(errors, bytes, photograph.rows, photograph.cols, photograph.levels.data()))
-    fail(errors.text);
+    fail(name, errors.text);
   return photograph;
 }
 

@@ -78,6 +78,11 @@ void write_box(const Id& dataset, const Dims& offset, const Dims& count, const T
 template <class T>
 void read_box(const Id& dataset, const Dims& offset, const Dims& count, T* data);
 
+/// Whether elements of a dataset are files: texts of one length, filled with zeros.
+[[nodiscard]] bool has_files(const Id& dataset);
+/// Reads files `first` to first + count - 1 of a list of them, without the zeros at their ends.
+std::vector<std::string> read_files(const Id& dataset, hsize_t first, hsize_t count);
+
 /// Text attributes are variable-length UTF-8, which h5py shows as str. Text must not contain NUL.
 void write_attribute(const Id& object, const std::string& name, std::string_view text);
 void write_attribute(const Id& object, const std::string& name, std::span<const std::string> texts);

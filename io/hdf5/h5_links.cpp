@@ -51,6 +51,13 @@ void link_external(const Id& group, const std::string& name, const std::string& 
         "link", name);
 }
 
+void link_again(const Id& group, const std::string& name, const std::string& as) {
+  const Quiet quiet;
+  if (H5Lcreate_hard(group.get(), name.c_str(), group.get(), as.c_str(), H5P_DEFAULT, H5P_DEFAULT) <
+      0)
+    fail("link again", group, name);
+}
+
 void copy_group(const Id& from, const std::string& name, const Id& to, const std::string& as) {
   const Id source = open_group(from, name), copy = create_group(to, as);
   copy_attributes(source, copy);

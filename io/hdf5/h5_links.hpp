@@ -15,6 +15,9 @@ namespace tangere::h5 {
 void link_external(const Id& group, const std::string& name, const std::string& file,
                    const std::string& path);
 
+/// Gives an object of a group a second name in it.
+void link_again(const Id& group, const std::string& name, const std::string& as);
+
 /// Copies a group and everything below it to another file under another name.
 void copy_group(const Id& from, const std::string& name, const Id& to, const std::string& as);
 

@@ -115,7 +115,16 @@ void add_boolean(Bytes& out) {
   out.number<std::uint8_t>(1);
 }
 
-void add_type(Bytes& out, NumberType type) {
+/// Bytes up to one length, with zeros behind a shorter text.
+void add_text_type(Bytes& out, std::uint32_t bytes) {
+  constexpr std::uint8_t kClass = 0x13, kFilledWithZeros = 1;
+  out.number(kClass);
+  out.number(kFilledWithZeros);
+  out.zeros(2);
+  out.number(bytes);
+}
+
+void add_type(Bytes& out, NumberType type, std::uint32_t text_bytes = 1) {
   constexpr std::uint8_t kExponentOf32 = 8, kExponentOf64 = 11;
   switch (type) {
     case NumberType::float32: return add_float(out, 4, kExponentOf32);
@@ -126,6 +135,7 @@ void add_type(Bytes& out, NumberType type) {
     case NumberType::int64: return add_integer(out, 8);
     case NumberType::uint64: return add_integer(out, 8, false);
     case NumberType::boolean: return add_boolean(out);
+    case NumberType::text: return add_text_type(out, text_bytes);
   }
 }
 
@@ -141,7 +151,8 @@ void add_layout(Bytes& out, const FileDataset& dataset) {
   }
   out.number(kVersion);
   if (dataset.chunk.empty()) {
-    std::uint64_t size = bytes_of(dataset.type);
+    std::uint64_t size =
+        dataset.type == NumberType::text ? dataset.text_bytes : bytes_of(dataset.type);
     for (const std::uint64_t n : dataset.dims) size *= n;
     out.number(kContiguous);
     out.number(size == 0 ? kNowhere : dataset.address);
@@ -330,7 +341,8 @@ std::size_t bytes_of(NumberType type) {
     case NumberType::uint64: return 8;
     case NumberType::int8:
     case NumberType::uint8:
-    case NumberType::boolean: return 1;
+    case NumberType::boolean:
+    case NumberType::text: return 1;
   }
   return 0;
 }
@@ -366,7 +378,7 @@ void add_texts(Bytes& out, std::span<const std::string_view> texts) {
 void add_dataset(Bytes& out, const FileDataset& dataset) {
   Header header(out);
   header.message(kDataspace, [&](Bytes& to) { add_dataspace(to, dataset.dims, false); });
-  header.message(kDatatype, [&](Bytes& to) { add_type(to, dataset.type); });
+  header.message(kDatatype, [&](Bytes& to) { add_type(to, dataset.type, dataset.text_bytes); });
   header.message(kFillValue, [&](Bytes& to) { add_fill(to, dataset); });
   header.message(kLayout, [&](Bytes& to) { add_layout(to, dataset); });
   if (!dataset.filters.empty())

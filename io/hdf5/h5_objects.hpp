@@ -62,8 +62,9 @@ inline constexpr std::size_t kSuperblockBytes = 48;
 void set_end_of_file(std::span<unsigned char, kSuperblockBytes> superblock, std::uint64_t end,
                      std::uint64_t root = kNowhere);
 
-/// Types of the format.
-enum class NumberType { float32, float64, int8, uint8, int16, int64, uint64, boolean };
+/// Types of the format. `text`: bytes, filled with zeros up to one length.
+enum class NumberType { float32, float64, int8, uint8, int16, int64, uint64, boolean, text };
+/// Bytes of a number. A text has those of its dataset: the result is 1.
 std::size_t bytes_of(NumberType type);
 
 struct FileFilter {
@@ -98,6 +99,7 @@ struct FileDataset {
   std::span<const FileText> texts = {};  ///< attributes
   std::optional<FileView> view =
       {};  ///< shows floating-point numbers of other datasets; none of its own
+  std::uint32_t text_bytes = 1;  ///< of each text
 };
 
 struct FileLink {

@@ -195,6 +195,35 @@ void read_box(const Id& dataset, const Dims& offset, const Dims& count, T* data)
     fail("read", dataset);
 }
 
+bool has_files(const Id& dataset) {
+  const Quiet quiet;
+  const Id type(H5Dget_type(dataset.get()));
+  return H5Tget_class(type.get()) == H5T_STRING && H5Tis_variable_str(type.get()) == 0;
+}
+
+std::vector<std::string> read_files(const Id& dataset, hsize_t first, hsize_t count) {
+  constexpr std::size_t kMostBytes = std::size_t{1} << 30;
+  const Quiet quiet;
+  const Id type(H5Dget_type(dataset.get()));
+  const std::size_t width = H5Tget_size(type.get());
+  if (!has_files(dataset) || width == 0 || count > kMostBytes / width)
+    throw IoError(fmt::format("{} has {} texts of {} bytes; expected files, less than {} bytes",
+                              place_of(dataset), count, width, kMostBytes));
+  std::vector<char> bytes(width * count);
+  const Box box(dataset, {first}, {count});
+  const LongCall reads_numbers;
+  if (H5Dread(dataset.get(), type.get(), box.memory.get(), box.disk.get(), H5P_DEFAULT,
+              bytes.data()) < 0)
+    fail("read", dataset);
+  std::vector<std::string> files;
+  for (hsize_t k = 0; k < count; ++k) {
+    std::string_view file(bytes.data() + k * width, width);
+    file = file.substr(0, file.find_last_not_of('\0') + 1);
+    files.emplace_back(file);
+  }
+  return files;
+}
+
 void write_attribute(const Id& object, const std::string& name, std::string_view text) {
   const Quiet quiet;
   const std::string copy(text);

@@ -8,6 +8,7 @@
 #include "engine/base/error.hpp"
 #include "io/dataset/dataset_description.hpp"
 #include "io/dataset/dataset_files.hpp"
+#include "io/files/jpeg_file.hpp"
 #include "io/view/view_pictures.hpp"
 #include "io/view/view_source.hpp"
 
@@ -135,6 +136,13 @@ class DatasetView {
       const h5::Id dataset = h5::open_dataset(h5::open_group(demo, group), name),
                    type(H5Dget_type(dataset.get()));
       const h5::Dims dims = h5::dimensions(dataset);
+      if (h5::has_files(dataset) && dims.size() == 1 && dims[0] > 0) {
+        const JpegSize size =
+            jpeg_size(h5::read_files(dataset, 0, 1).front(), h5::place_of(dataset));
+        data_.pictures.push_back({name, size.rows, size.cols});
+        pictures_.push_back(sampled);
+        return;
+      }
       if (H5Tget_class(type.get()) != H5T_INTEGER || H5Tget_size(type.get()) != 1 ||
           dims.size() != 4 || dims[3] != 3)
         return;
@@ -171,6 +179,17 @@ class DatasetView {
                                                                  : at_end     ? "final_obs"
                                                                               : "obs"),
                                             picture.name);
+    if (h5::has_files(dataset)) {
+      check_shape(dataset, {static_cast<hsize_t>(rows)}, picture.name);
+      const std::string file =
+          h5::read_files(dataset, at_end ? 0 : static_cast<hsize_t>(k), 1).front();
+      Photograph shown = parse_jpeg(file, h5::place_of(dataset));
+      if (shown.rows != picture.rows || shown.cols != picture.cols)
+        throw IoError(fmt::format("{}: a picture of {} x {} pixels; expected {} x {}",
+                                  h5::place_of(dataset), shown.rows, shown.cols, picture.rows,
+                                  picture.cols));
+      return std::move(shown.levels);
+    }
     const h5::Dims shape{static_cast<hsize_t>(rows), static_cast<hsize_t>(picture.rows),
                          static_cast<hsize_t>(picture.cols), 3};
     check_shape(dataset, shape, picture.name);

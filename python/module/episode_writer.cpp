@@ -197,14 +197,16 @@ void add_episode_writer(nb::module_& m) {
              const std::string& folder, const Whole<std::int64_t>& episodes,
              const Whole<std::uint64_t>& seed, const std::string& policy, const std::string& player,
              const std::string& python_class, const std::string& command,
-             const std::string& existing, const std::string& compression, bool sparse,
-             const std::string& set_name, const Whole<std::int64_t>& shards) {
+             const std::string& existing, const std::string& compression,
+             const std::string& pictures, bool sparse, const std::string& set_name,
+             const Whole<std::int64_t>& shards) {
             if (player != policy) check_policy_name("the policy", player);
             DatasetLayout layout = layout_of(model, task, episodes.value("episodes"),
                                              seed.value("seed"), {policy, {player}});
             layout.python_class = python_class;
             layout.command = command;
             layout.compression = compression;
+            layout.jpeg_quality = jpeg_quality_named(pictures);
             layout.sparse = sparse;
             layout.set_name = set_name;
             layout.shards = shards.value("shards");
@@ -212,7 +214,7 @@ void add_episode_writer(nb::module_& m) {
           },
           "model"_a, "task"_a, "folder"_a, "episodes"_a, "seed"_a, "policy"_a, "player"_a,
           "python_class"_a, "command"_a, "existing"_a = "refuse", "compression"_a = "none",
-          "sparse"_a = true, "set_name"_a = "", "shards"_a = 0,
+          "pictures"_a = "raw", "sparse"_a = true, "set_name"_a = "", "shards"_a = 0,
           "Creates the folder. `policy`: as requested; `player`: the name of the one that plays.\n"
           "`python_class`: \"MODULE:CLASS\" of the task. `command`: what makes the data set "
           "again.\n"

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// Pages on which a run moves. tangere/_view.py shows them in a notebook.
+// Pages on which a run moves, which tangere/_view.py shows in a notebook, and pictures of files.
 #include <nanobind/stl/filesystem.h>
 #include <nanobind/stl/map.h>
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
+#include "io/files/jpeg_file.hpp"
 #include "io/view/view_page.hpp"
 #include "io/view/view_reader.hpp"
 #include "io/view/view_run.hpp"
@@ -49,9 +50,35 @@ std::string page_of_run(const Model& model, const Argument<double>& time,
   return render_view_page(view_run(model, run, options));
 }
 
+/// (n, rows, cols, 3) of n JPEG files of one size.
+Array<std::uint8_t> decode_jpeg(const std::vector<nb::bytes>& files, const std::string& name) {
+  const auto bytes_of = [](const nb::bytes& file) { return std::span(file.c_str(), file.size()); };
+  const auto title = [&](std::size_t k) { return fmt::format("{}: picture {}", name, k); };
+  const JpegSize size = files.empty() ? JpegSize{} : jpeg_size(bytes_of(files[0]), title(0));
+  const std::size_t each = std::size_t{3} * as_size(size.rows) * as_size(size.cols);
+  std::span<std::uint8_t> levels;
+  Array<std::uint8_t> pictures =
+      new_array<std::uint8_t>({files.size(), as_size(size.rows), as_size(size.cols), 3}, levels);
+  std::vector<std::span<const char>> all;
+  for (const nb::bytes& file : files) all.push_back(bytes_of(file));
+  const nb::gil_scoped_release free;
+  for (std::size_t k = 0; k < all.size(); ++k) {
+    const Photograph one = parse_jpeg(all[k], title(k));
+    if (JpegSize{one.rows, one.cols} != size)
+      throw InputError(fmt::format("{} of {} x {} pixels; expected {} x {}", title(k), one.rows,
+                                   one.cols, size.rows, size.cols));
+    std::copy(one.levels.begin(), one.levels.end(), levels.begin() + std::ptrdiff_t(k * each));
+  }
+  return pictures;
+}
+
 }  // namespace
 
 void add_views(nb::module_& m) {
+  m.def("decode_jpeg", decode_jpeg, "files"_a, "name"_a = "",
+        "Pictures (n, rows, cols, 3) uint8 of n JPEG files, bytes each, of one size. `name`: of "
+        "their\n"
+        "place, for messages. InputError: bytes are no JPEG, or sizes differ.");
   m.def("view_file", page_of_file, "path"_a, "episode"_a = nb::none(), "episodes"_a = 16,
         "frames"_a = 1000, "The page of `tangere view` for a file or folder, as HTML.");
   m.def("view_run", page_of_run, "model"_a, "time"_a, "environments"_a, "names"_a, "values"_a,

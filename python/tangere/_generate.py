@@ -72,7 +72,8 @@ def generate(
     normalise: of the function's observations; a class has no scales.
     num_envs: environments of a class that play at once; they change no byte. None: 128.
     options: more words of the command, such as ("--compress", "deflate", "--overwrite"). A class
-        has those of storage: --overwrite, --resume, --compress, --tactile, --name and --shards.
+        has those of storage: --overwrite, --resume, --compress, --pictures, --tactile, --name and
+        --shards.
 
     Raises InputError and IoError as the command does, with its message, and passes on what the
     function raises. In both cases no half-written file has its final name.

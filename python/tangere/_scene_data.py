@@ -86,6 +86,8 @@ def _storage(options: Sequence[str], task: str) -> dict[str, Any]:
         value = next(words, "")
         if word == "--compress" and value in ("none", "deflate", "lz4"):
             given["compression"] = value
+        elif word == "--pictures" and value:
+            given["pictures"] = value
         elif word == "--tactile" and value in ("dense", "sparse"):
             given["sparse"] = value == "sparse"
         elif word == "--name" and value:
@@ -95,8 +97,8 @@ def _storage(options: Sequence[str], task: str) -> dict[str, Any]:
         else:
             raise _core.InputError(
                 f"options {list(options)} of {task}: {word!r} with {value!r}; expected --overwrite "
-                "or --resume, --compress none, deflate or lz4, --tactile dense or sparse, --name "
-                "NAME, --shards N"
+                "or --resume, --compress none, deflate or lz4, --pictures raw or jpeg:QUALITY, "
+                "--tactile dense or sparse, --name NAME, --shards N"
             )
     return given
 

@@ -33,8 +33,9 @@ class Episodes:
 
     `path` is a folder of `tangere generate`, whose shards are read, or one file: a shard or
     robomimic.hdf5. Contiguous arrays of shards are mapped, not read: an array is a view of the
-    file. Large fields in tiles and compressed ones are read, and up to 256 MB are kept. A process
-    opens the files for itself, so an object may go to the workers of a loader.
+    file. Large fields in tiles and compressed ones are read, JPEG files become pictures, and up to
+    256 MB are kept. A process opens the files for itself, so an object may go to the workers of a
+    loader.
     """
 
     def __init__(self, path: str | Path):
@@ -139,6 +140,15 @@ class Episodes:
             )
         return np.array([int(self._demo(i).attrs["touching"]) for i in range(len(self))])
 
+    def picture_gains(self, episode: int) -> dict[str, np.ndarray]:
+        """Factors that an episode drew for the channels of its pictures: the name of a sensor or
+        camera → (3), R, G, B. Empty where no picture has `gain`."""
+        if "picture_gain_names" not in self.attributes:
+            return {}
+        gains = np.asarray(self._demo(episode).attrs["picture_gains"]).reshape(-1, 3)
+        names = [str(name).rpartition(" ")[0] for name in self.attributes["picture_gain_names"]]
+        return dict(zip(names[::3], gains, strict=True))
+
     def terminated(self, episode: int) -> bool:
         """Whether the task ended the episode; False if it ran out of time, and for a scene."""
         return bool(self._demo(episode).attrs.get("terminated", 0))
@@ -146,7 +156,7 @@ class Episodes:
     def final(self, episode: int) -> dict[str, np.ndarray]:
         """The observations after the last action, KEY → (1, …)."""
         last = self._demo(episode)["final_obs"]
-        return {key: last[key][()] for key in last}
+        return {key: _values(last[key]) for key in last}
 
     def samples(self, episode: int) -> dict[str, tuple[np.ndarray, np.ndarray]]:
         """What is not stored at every row: KEY → (rows, array), both of one length.
@@ -161,7 +171,7 @@ class Episodes:
         for key, steps in zip(self.attributes["samples"], self.attributes["sample_every"]):
             last = int(self.lengths[episode])
             rows = np.arange(0, last + 1, int(steps) // every) if steps else np.array([last])
-            taken[str(key)] = (rows, stored[str(key)][()])
+            taken[str(key)] = (rows, _values(stored[str(key)]))
         return taken
 
     def __getitem__(self, episode: int) -> dict[str, np.ndarray]:
@@ -174,7 +184,9 @@ class Episodes:
             self._open.move_to_end(episode)
             return self._open[episode]
         demo = self._demo(episode)
-        arrays = {key: self._array(episode, demo["obs"][key]) for key in demo["obs"]}
+        again = {key.replace(".", "_") for key in self.keys} - set(self.keys)  # merged files have
+        arrays = {key: self._array(episode, demo["obs"][key])
+                  for key in demo["obs"] if key not in again}  # fmt: skip
         for name, item in demo.items():
             if not isinstance(item, h5py.Dataset):
                 continue
@@ -206,7 +218,7 @@ class Episodes:
         offset = dataset.id.get_offset()
         plain = offset is not None and dataset.dtype.kind in "fiu" and dataset.size > 0
         if not (plain and self._mapped):
-            return dataset[()]
+            return _values(dataset)
         number = self._shard_of[episode]
         if number not in self._maps:
             self._maps[number] = np.memmap(self._shards[number], mode="r")
@@ -217,8 +229,20 @@ class Episodes:
         return {**self.__dict__, "_maps": {}, "_files": {}, "_open": OrderedDict(), "_held": 0}
 
 
+def _values(dataset: h5py.Dataset) -> np.ndarray:
+    """What a dataset holds; JPEG files as pictures (rows, height, width, 3) uint8."""
+    if dataset.dtype.kind != "S":
+        return dataset[()]
+    return _core.decode_jpeg(dataset[()].tolist(), f"{dataset.file.filename}: {dataset.name}")
+
+
 def _copied(arrays: dict[str, np.ndarray]) -> int:
     return sum(a.nbytes for a in arrays.values() if a.flags.owndata)
+
+
+def _kept(rows: np.ndarray) -> type:
+    """The type in which rows are kept: bytes of pictures as they are."""
+    return np.uint8 if rows.dtype == np.uint8 and rows.ndim == 4 else np.float32
 
 
 class Windows:
@@ -228,8 +252,8 @@ class Windows:
     "mask": (ahead)}: the observations up to one row, oldest first, the actions between them, and
     the actions from that row on. Rows before the start repeat the first observation, with actions
     of 0. Actions after the end repeat the last one, and `mask` is 0 there.
-    Observations are float32. `gradients`: names of derivatives stored for each action, such as
-    "grad_actions", that come along as (ahead, …).
+    Observations are float32, pictures in colours uint8 unless they are scaled. `gradients`: names
+    of derivatives stored for each action, such as "grad_actions", that come along as (ahead, …).
 
     Parameters
     ----------
@@ -379,7 +403,7 @@ class Windows:
         return batch | {name: self._rows(name, actions) for name in self.gradients}
 
     def _rows(self, name: str, rows: np.ndarray) -> np.ndarray:
-        """Rows of an array, counted over the chosen episodes, as float32 (…, shape)."""
+        """Rows of an array, counted over the chosen episodes, (…, shape): float32, or bytes."""
         if name not in self._flat:
             self._flat[name] = self._flattened(name)
         flat = self._flat[name]
@@ -392,17 +416,20 @@ class Windows:
             self._of_episode(place, name)[wanted[places == place] - starts[places == place]]
             for place in np.unique(places)
         ]
-        found = np.concatenate(parts).astype(np.float32)[back]
+        found = np.concatenate(parts)
+        found = found.astype(_kept(found), copy=False)[back]
         return found.reshape(*rows.shape, *parts[0].shape[1:])
 
     def _flattened(self, name: str) -> np.ndarray | None:
         """All rows in memory, if they are few enough."""
-        shape = self._of_episode(0, name).shape[1:]
-        size = len(self) * int(np.prod(shape)) * 4
+        first = self._of_episode(0, name)
+        shape = first.shape[1:]
+        kind: np.dtype[Any] = np.dtype(_kept(first))
+        size = len(self) * int(np.prod(shape)) * kind.itemsize
         if size > self._free:
             return None
         self._free -= size
-        flat = np.empty((len(self), *shape), np.float32)
+        flat = np.empty((len(self), *shape), kind)
         for place, end in enumerate(self._ends):
             rows = self._of_episode(place, name)
             flat[end - len(rows) : end] = rows
@@ -420,7 +447,10 @@ class Windows:
 
     def _shown(self, key: str, rows: np.ndarray) -> np.ndarray:
         """Rows (…, rows, shape) of an observation, scaled and in the form that was asked for."""
-        shown = (np.asarray(rows, np.float32) - self._shift[key]) * self._factor[key]
+        shown = rows
+        scaled = (self._shift[key] != 0).any() or (self._factor[key] != 1).any()
+        if rows.dtype != np.uint8 or scaled:
+            shown = (np.asarray(rows, np.float32) - self._shift[key]) * self._factor[key]
         shape = self._of_episode(0, key).shape[1:]
         if self.form == "stored" or len(shape) < 3 or shape[-1] != 3:
             return shown

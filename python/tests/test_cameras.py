@@ -2,6 +2,7 @@
 """Cameras of a scene in Python: arrays of a batch and a run, observations of environments of one's
 own, pictures of render(), data sets and their export."""
 
+import io
 import subprocess
 
 import gymnasium
@@ -9,7 +10,7 @@ import numpy as np
 import pytest
 
 import tangere
-from tangere.data import Episodes
+from tangere.data import Episodes, Windows
 
 h5py = pytest.importorskip("h5py")
 
@@ -97,6 +98,12 @@ def test_data_sets_of_a_class_keep_bytes(watched, tmp_path):
 
     folder = tmp_path / "set"
     generate(Seen, folder, 3, policy="random", seed=2)
+    files = tmp_path / "files"
+    generate(Seen, files, 3, policy="random", seed=2, options=["--pictures", "jpeg:90"])
+    like, raw = Episodes(files)[2]["eye"], Episodes(folder)[2]["eye"]
+    assert like.shape == raw.shape and np.abs(like.astype(float) - raw).mean() < 6
+    with pytest.raises(tangere.InputError, match="pictures 'jpg'; expected raw, or jpeg:QUALITY"):
+        generate(Seen, tmp_path / "no", 1, policy="random", options=["--pictures", "jpg"])
     with h5py.File(next(folder.glob("shard-*.h5"))) as shard:
         demo = shard["data/demo_1"]
         types = {key: demo[f"obs/{key}"].dtype for key in ("eye", "depth", "ids")}
@@ -109,6 +116,26 @@ def test_data_sets_of_a_class_keep_bytes(watched, tmp_path):
         np.testing.assert_array_equal(picture, seen["eye"][0])
         seen, *_ = env.step(action[None])
     np.testing.assert_array_equal(last, seen["eye"][0])
+
+
+def test_data_sets_of_a_class_have_the_gains_of_pictures(watched, tmp_path):
+    from tangere.data import generate
+
+    gained = tmp_path / "gained.xml"
+    gained.write_text(watched.read_text().replace('name="eye"', 'name="eye" gain="0.1"'))
+
+    class Seen(Watch):
+        scene = gained
+
+    generate(Seen, tmp_path / "set", 3, policy="random", seed=2)
+    episodes = Episodes(tmp_path / "set")
+    plain = Watch(1, scene=watched, seed=2, first_episode=2)
+    seen, _ = plain.reset()
+    gains = episodes.picture_gains(2)
+    assert list(gains) == ["eye"] and gains["eye"].shape == (3,)
+    wanted = np.minimum(gains["eye"] * seen["eye"][0], 255)
+    assert np.abs(episodes[2]["eye"][0] - wanted).max() < 1.1
+    assert (gains["eye"] != episodes.picture_gains(1)["eye"]).all()
 
 
 def test_a_task_renders_what_its_camera_sees(watched, tmp_path):
@@ -128,6 +155,66 @@ def seen(generate, watched):
                     "20", "--record", "q,v,pad,eye.rgb,eye.depth,eye.ids")  # fmt: skip
 
 
+@pytest.fixture(scope="module")
+def stored(generate, watched):
+    """The same with JPEG files."""
+    return generate(str(watched), "--episodes", "2", "--seed", "4", "--steps", "60", "--every",
+                    "20", "--record", "q,v,pad,eye.rgb,eye.depth,eye.ids/40",
+                    "--pictures", "jpeg:95")  # fmt: skip
+
+
+def test_jpeg_files_are_pictures_for_readers(seen, stored, tmp_path):
+    raw, episodes = Episodes(seen), Episodes(stored)
+    assert str(episodes.attributes["pictures"]) == "jpeg:95"
+    for of, like in ((episodes[1], raw[1]), (episodes.final(1), raw.final(1))):
+        assert of["eye.rgb"].shape == like["eye.rgb"].shape and of["eye.rgb"].dtype == np.uint8
+        far = of["eye.rgb"].astype(float) - like["eye.rgb"]
+        assert 0 < np.sqrt((far**2).mean()) < 6
+        np.testing.assert_array_equal(of["eye.depth"], like["eye.depth"])
+    rows, ids = episodes.samples(1)["eye.ids"]
+    assert (list(rows), ids.dtype) == ([0, 2], np.int16)
+    windows = Windows(stored, ["eye.rgb", "pad"], before=1, split=None)
+    batch = windows.gather(np.array([0, 4]))["obs"]
+    assert batch["eye.rgb"].dtype == np.uint8 and batch["pad"].dtype == np.float32
+    np.testing.assert_array_equal(batch["eye.rgb"][1], episodes[1]["eye.rgb"][:2])
+    few = Windows(stored, ["eye.rgb"], before=1, split=None, memory=0)
+    np.testing.assert_array_equal(few.gather(np.array([0, 4]))["obs"]["eye.rgb"], batch["eye.rgb"])
+    scaled = Windows(stored, ["eye.rgb"], scale="standard", split=None, form="image")[0]["obs"]
+    assert scaled["eye.rgb"].dtype == np.float32 and scaled["eye.rgb"].shape == (1, 3, 24, 32)
+
+
+def test_merged_files_have_names_without_dots(seen, stored):
+    for data in (seen, stored):
+        with h5py.File(data / "robomimic.hdf5") as merged:
+            demo = merged["data/demo_1"]
+            for name in ("eye.rgb", "eye.depth"):
+                plain = name.replace(".", "_")
+                np.testing.assert_array_equal(demo["obs"][plain][()], demo["obs"][name][()])
+                if name in demo["next_obs"]:
+                    np.testing.assert_array_equal(demo["next_obs"][plain][:-1],
+                                                  demo["obs"][name][1:])  # fmt: skip
+        one = Episodes(data / "robomimic.hdf5")
+        assert "eye_rgb" not in one[1] and one[1]["eye.rgb"].dtype == np.uint8
+
+
+def test_another_reader_opens_jpeg_files(stored):
+    image = pytest.importorskip("pygame.image")
+    surfarray = pytest.importorskip("pygame.surfarray")
+    with h5py.File(next(stored.glob("shard*.h5"))) as shard:
+        files = shard["data/demo_1/obs/eye.rgb"]
+        assert files.dtype.kind == "S" and files.shape == (3,)
+        surfaces = [image.load(io.BytesIO(file)) for file in files]
+    pictures = [surfarray.array3d(s).transpose(1, 0, 2).astype(int) for s in surfaces]
+    assert np.abs(np.stack(pictures) - Episodes(stored)[1]["eye.rgb"]).max() <= 3
+
+
+def test_damaged_jpeg_files_are_refused(stored):
+    (file,) = Episodes(stored)._demo(0)["obs/eye.rgb"][:1].tolist()
+    with pytest.raises(tangere.InputError, match="here: picture 1: .* as JPEG"):
+        tangere._core.decode_jpeg([file, b"no picture"], "here")
+    assert tangere._core.decode_jpeg([file]).shape == (1, 24, 32, 3)
+
+
 def test_data_sets_name_the_camera_and_its_bodies(seen):
     with h5py.File(next(seen.glob("*.h5"))) as shard:
         eye = shard["scene/cameras/eye"]
@@ -137,17 +224,20 @@ def test_data_sets_name_the_camera_and_its_bodies(seen):
         kinds = [obs[f"eye.{form}"].dtype for form in ("rgb", "depth", "ids")]
         assert kinds == [np.uint8, np.float32, np.int16]
     episodes = Episodes(seen)
+    assert episodes.picture_gains(0) == {}
     assert "eye" in episodes.cameras and episodes[1]["eye.ids"].shape == (3, 24, 32, 1)
 
 
 @pytest.mark.parametrize("touch", [None, "state"])
-def test_lerobot_gets_colours_as_images(seen, tmp_path, touch):
+@pytest.mark.parametrize("data", ["seen", "stored"])
+def test_lerobot_gets_colours_as_images(request, data, tmp_path, touch):
     pytest.importorskip("pyarrow")
     from tangere import lerobot
 
-    done = lerobot.export(seen, tmp_path / "out", touch=touch)
+    done = lerobot.export(request.getfixturevalue(data), tmp_path / "out", touch=touch)
     assert "observation.images.eye.rgb" in done.features
-    assert "observation.eye.depth" in done.features and "observation.eye.ids" in done.features
+    assert "observation.eye.depth" in done.features
+    assert ("observation.eye.ids" in done.features) == (data == "seen")
 
 
 def test_a_mistake_names_file_and_line(command, watched, tmp_path):

@@ -86,6 +86,47 @@ def test_other_names_go_to_robomimics_own_class():
             env_utils.create_env(env_type=2, **arguments)
 
 
+EYE = '<camera name="eye" pos="0 -0.25 0.2" look="0 0 0.02" rows="32" cols="32"/>'
+
+
+def test_a_policy_learns_from_pictures(generate, tmp_path):
+    """By names without dots: robomimic keeps networks in a ModuleDict, which takes no dots."""
+    train = pytest.importorskip("robomimic.scripts.train")
+    import torch
+    from robomimic.config import config_factory
+
+    text = tangere.scenes()["rolling_ball_small"].read_text()
+    scene = tmp_path / "watched.xml"
+    scene.write_text(text.replace("</sensor>", EYE + "</sensor>"))
+    data = generate(str(scene), "--episodes", "4", "--steps", "60", "--every", "10", "--record",
+                    "q,pad.sum,eye.rgb,eye.depth")  # fmt: skip
+    config = config_factory("bc")
+    with config.unlocked():
+        config.train.data = str(data / "robomimic.hdf5")
+        config.train.output_dir = str(tmp_path / "out")
+        config.train.num_epochs, config.train.batch_size = 1, 4
+        config.train.cuda, config.train.hdf5_cache_mode = False, None
+        config.train.hdf5_load_next_obs = True
+        config.train.num_data_workers = 0
+        config.experiment.name, config.experiment.epoch_every_n_steps = "clone", 2
+        config.experiment.validate = config.experiment.render_video = False
+        config.experiment.rollout.enabled = config.experiment.save.enabled = False
+        config.experiment.logging.log_tb = False
+        config.experiment.logging.terminal_output_to_txt = False
+        config.observation.modalities.obs.low_dim = ["pad_sum"]
+        config.observation.modalities.obs.rgb = ["eye_rgb"]
+        config.observation.modalities.obs.depth = ["eye_depth"]
+        for kind in ("rgb", "depth"):
+            core = config.observation.encoder[kind].core_kwargs
+            core.backbone_class = "ResNet18Conv"
+            core.backbone_kwargs = {"pretrained": False, "input_coord_conv": False}
+    threads = torch.get_num_threads()
+    try:
+        train.train(config, torch.device("cpu"))
+    finally:
+        torch.set_num_threads(threads)
+
+
 def test_a_policy_is_trained_and_played(pushes, tmp_path, capsys):
     train = pytest.importorskip("robomimic.scripts.train")
     import torch

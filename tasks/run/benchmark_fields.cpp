@@ -33,7 +33,7 @@ std::vector<std::vector<Frame>> make(const Model& model, std::span<const FieldOu
                                      int environments) {
   std::vector<std::vector<Frame>> frames(outputs.size());
   for (std::size_t k = 0; k < frames.size(); ++k) {
-    if (outputs[k].form == FieldForm::sum) continue;
+    if (outputs[k].form == FieldForm::sum || is_view(outputs[k].form)) continue;
     frames[k].reserve(as_size(environments));
     for (int e = 0; e < environments; ++e)
       frames[k].push_back(make_frame(model, outputs[k], static_cast<const Frame*>(nullptr)));
@@ -62,13 +62,22 @@ double bytes_of(const SensorInfo& sensor, FieldForm form, FrameKind kind) {
          (3.0 * kTileSide * kTileSide * sizeof(T) + sizeof(int));
 }
 
+template <class T>
+std::uint64_t chain_picture(std::uint64_t checksum, const std::vector<T>& picture) {
+  return chain_bits(checksum,
+                    std::span<const float>(std::vector<float>(picture.begin(), picture.end())));
+}
+
 }  // namespace
 
 BenchmarkFields::BenchmarkFields(const Model& model, int environments,
                                  const BenchmarkOptions& options, FrameKind kind)
     : outputs_(kind == FrameKind::none ? std::vector<FieldOutput>{}
-                                       : sensor_fields_of(model, options.rollout.outputs)),
-      sums_(outputs_.size()) {
+                                       : fields_of(model, options.rollout.outputs)),
+      sums_(outputs_.size()),
+      colours_(outputs_.size()),
+      bodies_(outputs_.size()),
+      depths_(outputs_.size()) {
   const bool wide = options.precision == Precision::f64;
   const auto all = [&]<class Frame>() { frames_ = make<Frame>(model, outputs_, environments); };
   if (kind == FrameKind::dense && wide) all.template operator()<DenseFrame<double>>();
@@ -77,9 +86,32 @@ BenchmarkFields::BenchmarkFields(const Model& model, int environments,
   if (kind == FrameKind::compact && !wide) all.template operator()<CompactFrame<float>>();
   for (std::size_t k = 0; k < outputs_.size(); ++k)
     if (outputs_[k].form == FieldForm::sum) sums_[k].resize(as_size(environments));
+  for (std::size_t k = 0; k < outputs_.size(); ++k) {
+    if (!is_view(outputs_[k].form)) continue;
+    const std::size_t own = own_bytes(outputs_[k].form), width = numbers_of(model, outputs_[k]),
+                      count = as_size(environments);
+    if (own == 1)
+      colours_[k].assign(count, std::vector<std::uint8_t>(width));
+    else if (own == 2)
+      bodies_[k].assign(count, std::vector<std::int16_t>(width));
+    else
+      depths_[k].assign(count, std::vector<float>(width));
+  }
+}
+
+void BenchmarkFields::read_picture(Readout& readout, const Batch& batch, int block, std::size_t k) {
+  const auto into = [&]<class T>(std::vector<std::vector<T>>& pictures) {
+    if (!pictures.empty())
+      read_field<T>(readout, batch, block, outputs_[k],
+                    [&](int e) { return std::span(pictures[as_size(e)]); });
+  };
+  into(colours_[k]);
+  into(bodies_[k]);
+  into(depths_[k]);
 }
 
 void BenchmarkFields::read(Readout& readout, const Batch& batch, int block, std::size_t k) {
+  if (is_view(outputs_[k].form)) return read_picture(readout, batch, block, k);
   if (outputs_[k].form == FieldForm::sum) {
     read_field<double>(readout, batch, block, outputs_[k],
                        [&](int e) { return std::span(sums_[k][as_size(e)]); });
@@ -101,6 +133,9 @@ void BenchmarkFields::read(Readout& readout, const Batch& batch, int block, std:
 std::uint64_t BenchmarkFields::chain(std::uint64_t checksum, int environment, std::size_t k) const {
   if (outputs_[k].form == FieldForm::sum)
     return chain_bits(checksum, std::span<const double>(sums_[k][as_size(environment)]));
+  if (!colours_[k].empty()) return chain_picture(checksum, colours_[k][as_size(environment)]);
+  if (!bodies_[k].empty()) return chain_picture(checksum, bodies_[k][as_size(environment)]);
+  if (!depths_[k].empty()) return chain_picture(checksum, depths_[k][as_size(environment)]);
   return std::visit(
       [&](const auto& store) {
         if constexpr (std::is_same_v<std::decay_t<decltype(store)>, std::monostate>) {
@@ -114,7 +149,11 @@ std::uint64_t BenchmarkFields::chain(std::uint64_t checksum, int environment, st
 
 double field_bytes(const Model& model, const BenchmarkOptions& options, FrameKind kind) {
   double bytes = 0;
-  for (const FieldOutput of : sensor_fields_of(model, options.rollout.outputs)) {
+  for (const FieldOutput of : fields_of(model, options.rollout.outputs)) {
+    if (is_view(of.form) && kind != FrameKind::none)
+      bytes += static_cast<double>(numbers_of(model, of) *
+                                   (own_bytes(of.form) > 0 ? own_bytes(of.form) : sizeof(float)));
+    if (is_view(of.form)) continue;
     const SensorInfo& sensor = model.sensors()[as_size(of.sensor)];
     bytes += options.precision == Precision::f64 ? bytes_of<double>(sensor, of.form, kind)
                                                  : bytes_of<float>(sensor, of.form, kind);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Buffers for the tactile fields of a benchmark: one frame per output and environment, reused for
-// every reading.
+// Buffers for the tactile fields and the pictures of cameras of a benchmark: one for each output
+// and environment, reused for every reading.
 #pragma once
 
 #include <cstdint>
@@ -14,7 +14,7 @@ namespace tangere {
 
 class BenchmarkFields {
  public:
-  /// Throws InputError for compact frames of anything but whole fields.
+  /// Throws InputError for compact frames of anything but whole fields and pictures of cameras.
   BenchmarkFields(const Model& model, int environments, const BenchmarkOptions& options,
                   FrameKind kind);
 
@@ -28,11 +28,19 @@ class BenchmarkFields {
  private:
   template <template <class> class Frame, class T>
   using Store = std::vector<std::vector<Frame<T>>>;  // (outputs, environments); none for a sum
+  /// (outputs, environments): pictures of a camera; none for other outputs.
+  template <class T>
+  using Pictures = std::vector<std::vector<std::vector<T>>>;
+  void read_picture(Readout& readout, const Batch& batch, int block, std::size_t k);
+
   std::vector<FieldOutput> outputs_;
   std::vector<std::vector<FieldSum>> sums_;  // (outputs, environments); none for fields
   std::variant<std::monostate, Store<DenseFrame, double>, Store<DenseFrame, float>,
                Store<CompactFrame, double>, Store<CompactFrame, float>>
       frames_;
+  Pictures<std::uint8_t> colours_;
+  Pictures<std::int16_t> bodies_;
+  Pictures<float> depths_;
 };
 
 /// Bytes that the fields of one environment take.

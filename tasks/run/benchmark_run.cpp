@@ -185,13 +185,12 @@ class Benchmark {
     const std::span<const SensorInfo> sensors = batch_.model().sensors();
     for (std::size_t k = 0; k < fields_.outputs().size(); ++k) {
       const FieldOutput of = fields_.outputs()[k];
-      const SensorInfo& sensor = sensors[as_size(of.sensor)];
       if (!reading_times(batch_.model(), of, options_.rollout).at(done, options_.rollout.steps))
         continue;
       fields_.read(*worker.readout, batch_, first / kBlock, k);
       for (int e = first; e < last; ++e) {
         if (!steps.live(e)) continue;
-        tally.tactile_points += sensor.points;
+        if (!is_view(of.form)) tally.tactile_points += sensors[as_size(of.sensor)].points;
         if (checked) checksums_[as_size(e)] = fields_.chain(checksums_[as_size(e)], e, k);
       }
     }

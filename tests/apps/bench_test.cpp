@@ -8,6 +8,7 @@
 #include <chrono>
 #include <csignal>
 #include <nlohmann/json.hpp>
+#include <set>
 #include <sstream>
 #include <thread>
 
@@ -37,6 +38,29 @@ Words bench(const Words& more, const std::string& scene_file = kSmall) {
 json bench_json(const Folder& folder, const Words& more, int exit_code = 0,
                 const std::string& scene_file = kSmall) {
   return run_json(folder, bench(more, scene_file), exit_code);
+}
+
+TEST(Bench, TakesPicturesOfCameras) {
+  const Folder folder;
+  std::string text = file_bytes(kSmall);
+  text.insert(text.find("</sensor>"),
+              "<camera name=\"eye\" pos=\"0 -0.25 0.2\" look=\"0 0 0.02\" rows=\"12\" "
+              "cols=\"16\"/>\n");
+  const std::string watched = folder.write("watched.xml", text);
+  const auto checksums = [&](const std::string& record) {
+    const json runs = bench_json(folder,
+                                 {"--envs", "20", "--steps", "12", "--threads", "2,1", "--record",
+                                  record, "--seed", "3"},
+                                 0, watched)
+                          .at("runs");
+    EXPECT_EQ(runs[0].at("record"), record == "q" ? "" : record);
+    EXPECT_EQ(runs[0].at("checksum"), runs[1].at("checksum")) << record;
+    EXPECT_EQ(runs[0].at("tactile_points_per_second"), 0) << record;
+    return runs[0].at("checksum").get<std::string>();
+  };
+  const std::set<std::string> all{checksums("q"), checksums("eye.rgb/3"), checksums("eye.rgb/6"),
+                                  checksums("eye.depth/6"), checksums("eye.ids/final")};
+  EXPECT_EQ(all.size(), 5U);  // every picture counts
 }
 
 TEST(Bench, SaysWhatItMeasured) {

@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <hdf5.h>
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 
 #include "io/hdf5/h5.hpp"
@@ -91,6 +92,48 @@ TEST(CameraRecord, ShardsHaveTheSameBytesOnAnyNumberOfThreads) {
     }
     EXPECT_EQ(bytes[0], bytes[1]) << compress;
   }
+}
+
+TEST(CameraRecord, DemosHaveTheGainsOfTheirPictures) {
+  const Folder folder;
+  std::string text = file_bytes(watched_scene(folder));
+  text.replace(text.find("noise=\"2\""), 9, "gain=\"0.1\"");
+  const std::string gained = folder.write("gained.xml", text);
+  text.replace(text.find(" gain=\"0.1\""), 11, "");
+  const std::string plain = folder.write("plain.xml", text);
+  for (const std::string& from : {gained, plain})
+    run_json(folder,
+             {"generate", from, "--episodes", "18", "--steps", "20", "--every", "20", "--seed", "5",
+              "--output", from == gained ? "gained" : "plain", "--record", "q,eye.rgb"});
+  run_json(folder, {"generate", gained, "--episodes", "2", "--steps", "20", "--every", "20",
+                    "--output", "unseen", "--record", "q,eye.depth"});
+  const std::string shard = folder.path("gained/shard-00000.h5");
+  const h5::Id file = h5::open_file(shard);
+  EXPECT_EQ(h5::read_texts(h5::open_group(file, "scene"), "picture_gain_names"),
+            (std::vector<std::string>{"eye red", "eye green", "eye blue"}));
+  std::vector<double> first;
+  for (const std::string demo : {"data/demo_0", "data/demo_17"}) {
+    const std::vector<double> gains =
+        h5::read_numbers<double>(h5::open_group(file, demo), "picture_gains");
+    ASSERT_EQ(gains.size(), 3U);
+    EXPECT_NE(gains, first);
+    first = gains;
+    const Found with = found(shard, demo + "/obs/eye.rgb"),
+                without = found(folder.path("plain/shard-00000.h5"), demo + "/obs/eye.rgb");
+    for (std::size_t k = 0; k < with.numbers.size(); ++k)
+      EXPECT_NEAR(with.numbers[k], std::min(255.0, gains[k % 3] * without.numbers[k]), 1.1) << k;
+  }
+  const h5::Id merged = h5::open_file(folder.path("gained/robomimic.hdf5"));
+  EXPECT_EQ(h5::read_numbers<double>(h5::open_group(merged, "data/demo_17"), "picture_gains"),
+            first);
+  EXPECT_EQ(run(folder, {"validate", "gained"}).exit_code, 0);
+  for (const char* set : {"plain", "unseen"})
+    EXPECT_EQ(
+        H5Aexists(h5::open_group(h5::open_file(folder.path(set) + "/shard-00000.h5"), "data/demo_0")
+                      .get(),
+                  "picture_gains"),
+        0)
+        << set;
 }
 
 TEST(CameraRecord, InspectSaysWhatAPictureCosts) {

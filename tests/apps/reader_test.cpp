@@ -62,6 +62,15 @@ TEST(Readers, OfThePageReadADataSet) {
                          "--mix", "random=0.3", "--quiet"})
                 .exit_code,
             0);
+  std::string watched = file_bytes(scene("rolling_ball_small.xml"));
+  watched.insert(watched.find("</sensor>"),
+                 "<camera name=\"eye\" pos=\"0 -0.25 0.2\" look=\"0 0 0.02\" rows=\"24\" "
+                 "cols=\"32\"/>\n");
+  ASSERT_EQ(run(folder, {"generate", folder.write("watched.xml", watched), "--output", "files",
+                         "--episodes", "1", "--steps", "20", "--every", "10", "--record",
+                         "q,eye.rgb", "--pictures", "jpeg:95", "--quiet"})
+                .exit_code,
+            0);
   const std::vector<std::string> blocks = readers();
   ASSERT_GE(blocks.size(), 6U);
   int tried = 0;
