@@ -101,14 +101,13 @@ def generate(
             f"num_envs {num_envs} with {str(what)!r}; expected a class of tangere.VectorSceneEnv, "
             "or threads"
         )
-    words = [str(command_path()), "generate", str(what), "--output", str(output), "--json"]
+    words = ["generate", str(what), "--output", str(output)]
     words += ["--episodes", str(episodes), "--seed", str(seed), "--quiet", *options]
     if threads is not None:
         words += ["--threads", str(threads)]
     if not callable(policy):
         words += ["--policy", policy] if policy is not None else []
-        run = subprocess.run(words, stdin=subprocess.DEVNULL, capture_output=True, text=True)
-        return _result(run.returncode, run.stdout, run.stderr)
+        return run_command(words)
     assert name is not None
     with tempfile.TemporaryDirectory() as folder, socket.socket(socket.AF_UNIX) as listener:
         address = str(Path(folder) / "policy")
@@ -124,7 +123,7 @@ def generate(
             tempfile.TemporaryFile("w+") as out,
             tempfile.TemporaryFile("w+") as err,
             subprocess.Popen(
-                [*words, "--program", _PROGRAM],
+                [str(command_path()), *words, "--json", "--program", _PROGRAM],
                 stdin=subprocess.DEVNULL, stdout=out, stderr=err, env=environment,
             ) as process,
         ):  # fmt: skip
@@ -184,11 +183,21 @@ def _converse(
                     # Else the command has stopped, and says why.
 
 
-def _result(code: int, out: str, err: str) -> dict[str, Any]:
+def run_command(words: Sequence[str]) -> dict[str, Any]:
+    """Runs the command and returns what it says with --json. Raises InputError and IoError as the
+    command does, with its message."""
+    run = subprocess.run(
+        [str(command_path()), *words, "--json"],
+        stdin=subprocess.DEVNULL, capture_output=True, text=True,
+    )  # fmt: skip
+    return _result(run.returncode, run.stdout, run.stderr, words[0])
+
+
+def _result(code: int, out: str, err: str, command: str = "generate") -> dict[str, Any]:
     try:
         said = json.loads(out)
     except ValueError:
-        raise _core.IoError(f"tangere generate ended with code {code}: {err.strip()}") from None
+        raise _core.IoError(f"tangere {command} ended with code {code}: {err.strip()}") from None
     if "error" in said:
         raise (_core.InputError if code == 2 else _core.IoError)(said["error"])
     return dict(said)
