@@ -39,12 +39,12 @@ class Frames:
         self.ends = np.cumsum(self.lengths)
         self.solved = set(episodes.succeeded()) if episodes.task else set()
         self.types = {key: rows.dtype for key, rows in self._read(0).items()}
-        self.shapes = {key: rows.shape[1:] for key, rows in self.of(0).items()}
         if window > 1 and not any(self.is_touch(key) for key in episodes.keys):
             raise _core.InputError(
                 f"{episodes.path}: window {window} of a data set without a reading of a sensor; its "
                 f"observations are {episodes.keys}"
             )
+        self.shapes = {key: rows.shape[1:] for key, rows in self.of(0).items()}
 
     def __len__(self) -> int:
         return int(self.ends[-1])
@@ -177,5 +177,9 @@ def unit_and_meaning(episodes: Episodes, key: str) -> tuple[str, str]:
         dict(zip(keys, map(str, said.get(f"observation_{name}", []))))
         for name in ("units", "meanings")
     )
+    sensor = episodes.sensors.get(key.split(".")[0], {})
+    readings = [str(name) for name in sensor.get("readings", [])]
+    if key in readings:
+        meanings[key] = str(sensor["reading_components"][readings.index(key)])
     unit = units.get(key) or str(episodes.sensors.get(key, {}).get("units", ""))
     return "" if unit.endswith("_units") else unit, meanings.get(key, "")

@@ -6,14 +6,16 @@
         embodiment/joint                 (T, joints)  float32 [rad, m]
         observation/CAMERA/rgb           (T)          JPEG files, bytes of one length
         tactile/SENSOR/rgb, rgb_marker   (T)          JPEG files
-        tactile/SENSOR/depth             (T, H, W)    float32 [mm], as press_depth
         tactile/SENSOR/press_depth       (T, H, W)    float32 [mm], positive where pressed
-        tactile/SENSOR/marker            (T, 2, n, 2) float32 [pixels]: at rest, now; (x, y)
-        tactile/SENSOR/force             (T, …)       float32 [N], of Tangere
+        tactile/SENSOR/marker            (T, 2, n, 2) float32 [pixels]: at rest, now; (x, y); of
+                                         sensors with a picture
+        tactile/SENSOR/force             (T, …)       float32 [N], of Tangere; SENSOR is the
+                                         name of an observation where a task observes touch
         action, reward                   (T, na), (T) float32, of Tangere
     metadata.json                        of the data set
 
-Its writer hands RGB to an encoder that takes BGR, and its reader decodes to BGR: so the files show
+`depth` is the distance from a camera, which is not known here, so it is not written. UniVTAC's
+writer hands RGB to an encoder that takes BGR, and its reader decodes to BGR: so the files show
 red and blue exchanged, and the arrays that the reader gives are RGB. They are written so here.
 """
 
@@ -46,14 +48,21 @@ class UniVtac:
     kind, sign, origin = "UniVTAC data set", "metadata.json", "metadata.json"
 
     def __init__(self, frames: Frames, joints: str | None = None):
-        episodes = frames.episodes
+        episodes, self.frames = frames.episodes, frames
         if frames.window > 1:
             raise _core.InputError("univtac with a window; expected one row of touch a frame")
-        if not episodes.sensors:
+        touch = [key for key in episodes.keys if self._is_of_sensor(key)]
+        if not touch:
             raise _core.InputError(
-                f"{episodes.path}: no sensor for UniVTAC; its observations are {episodes.keys}"
+                f"{episodes.path}: no reading of a sensor for UniVTAC; its observations are "
+                f"{episodes.keys}"
             )
-        self.frames, self.fps = frames, max(1, round(1 / frames.seconds))
+        self.fps = max(1, round(1 / frames.seconds))
+        self._pixels = {  # of the pictures of each sensor
+            key.split(".")[0]: frames.shapes[key][:2]
+            for key in episodes.keys
+            if key.split(".")[-1] in ("rgb", "rgb_marker", "height")
+        }
         names = [str(name) for name in episodes.attributes["q_names"]]
         self._joints = joint_places(frames, joints or ",".join(names))
         count = len(frames.lengths)
@@ -112,30 +121,64 @@ class UniVtac:
         }  # fmt: skip
         write_json(folder / "metadata.json", said)
 
+    def _is_of_sensor(self, key: str) -> bool:
+        """Whether it is a reading of a sensor, or touch that a task observes."""
+        episodes = self.frames.episodes
+        return key.split(".")[0] in episodes.sensors or key in episodes.touch
+
     def _arrays(self, arrays: Arrays) -> Arrays:
         """PATH → rows of an episode."""
         frames, episodes = self.frames, self.frames.episodes
-        count = len(arrays["actions"])
         found: Arrays = {
-            "step": np.arange(count),
+            "step": np.arange(len(arrays["actions"])),
             "embodiment/joint": arrays["q"][:, self._joints].astype(np.float32),
             "action": arrays["actions"],
             "reward": arrays["rewards"],
         }
         for key in episodes.keys:
             owner, _, reading = key.partition(".")
-            shape = frames.shapes[key]
-            if is_picture(shape, frames.types[key]):
+            if is_picture(frames.shapes[key], frames.types[key]):
                 kind = "tactile" if owner in episodes.sensors else "observation"
                 found[f"{kind}/{owner}/{reading}"] = _jpeg_rows(picture_rows(arrays, key))
-            elif owner in episodes.sensors and reading == "height":
-                depth = (-1000 * arrays[key][..., 0]).astype(np.float32)
-                found |= {f"tactile/{owner}/{name}": depth for name in ("depth", "press_depth")}
-            elif owner in episodes.sensors and reading == "flow":
-                found[f"tactile/{owner}/marker"] = arrays[key].astype(np.float32)
-            elif owner in episodes.sensors and not reading:
+            elif not self._is_of_sensor(key):
+                continue
+            elif not reading:
                 found[f"tactile/{owner}/force"] = arrays[key].astype(np.float32)
+            elif reading == "height":
+                depth = (1000 * arrays[key][..., 0]).astype(np.float32)
+                found[f"tactile/{owner}/press_depth"] = depth
+            elif reading == "markers" and owner in self._pixels:
+                found[f"tactile/{owner}/marker"] = marker_pixels(
+                    arrays[key], episodes.sensors[owner], self._pixels[owner]
+                )
         return found
+
+
+def marker_pixels(
+    moved: np.ndarray, sensor: dict[str, Any], pixels: tuple[int, ...]
+) -> np.ndarray:
+    """(T, 2, n, 2) places of markers in a picture, at rest and now, (x, y) [pixels].
+
+    moved: (T, rows, cols, 2) displacements along axis0 and axis1 [m]. pixels: rows and columns of
+    the picture. The middle of the points is the middle of the picture; rows follow axis0.
+    """
+    rows, cols = moved.shape[1:3]
+    away = np.asarray(sensor["corner1"]) - np.asarray(sensor["corner0"])
+    size = np.asarray(sensor["picture_pixel_size"])  # down, across
+    pitch = [
+        float(np.dot(away, sensor[axis])) / (count - 1)
+        for axis, count in (("axis0", rows), ("axis1", cols))
+    ]
+    place = np.stack(np.meshgrid(
+        *(pitch[a] * (np.arange(count) - (count - 1) / 2) for a, count in enumerate((rows, cols))),
+        indexing="ij",
+    ), axis=-1)  # fmt: skip
+    both = np.stack([np.broadcast_to(place, moved.shape), place + moved], axis=1)
+    both = both / size + np.asarray(pixels) / 2
+    x, y = both[..., 1], both[..., 0]
+    if sensor.get("picture_mirror"):
+        x = pixels[1] - x
+    return np.stack([x, y], axis=-1).reshape(len(moved), 2, -1, 2).astype(np.float32)
 
 
 def _jpeg_rows(pictures: np.ndarray) -> np.ndarray:

@@ -221,7 +221,7 @@ def _joined(
 def _check_window(frames: Frames, felt: Sequence[str], touch: Touch | None) -> None:
     """Raises InputError where a window of touch has no form that a policy reads."""
     for key in felt if frames.window > 1 else []:
-        if touch == "image" or len(_grid_axes(frames.pads(key))) != 2:
+        if touch == "image" or len(frames.pads(key)) < 3:
             raise _core.InputError(
                 f"{frames.episodes.path}: touch {touch!r} of {key!r}, {frames.pads(key)}, with a "
                 f"window of {frames.window}; expected touch 'state' of rows and columns, or none"

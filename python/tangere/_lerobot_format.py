@@ -104,7 +104,7 @@ class LeRobot:
             for key, values in of.packed().items()
         }
         with open(folder / f".parts/{part:05d}.npz", "wb") as file:
-            np.savez(file, **packed)  # type: ignore[arg-type]
+            np.savez(file, **packed)
             sync(file)
 
     def _count(
