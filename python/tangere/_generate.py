@@ -8,9 +8,11 @@ and its data are.
 
 from __future__ import annotations
 
+import ctypes
 import json
 import os
 import shutil
+import signal
 import socket
 import subprocess
 import sys
@@ -183,14 +185,20 @@ def _converse(
                     # Else the command has stopped, and says why.
 
 
-def run_command(words: Sequence[str]) -> dict[str, Any]:
+def run_command(words: Sequence[str], dies_along: bool = False) -> dict[str, Any]:
     """Runs the command and returns what it says with --json. Raises InputError and IoError as the
-    command does, with its message."""
+    command does, with its message. dies_along: it is killed if this thread of the caller is."""
     run = subprocess.run(
         [str(command_path()), *words, "--json"],
         stdin=subprocess.DEVNULL, capture_output=True, text=True,
+        preexec_fn=_die_with_parent if dies_along else None,
     )  # fmt: skip
     return _result(run.returncode, run.stdout, run.stderr, words[0])
+
+
+def _die_with_parent() -> None:
+    """In a child, before its program starts: Linux kills it when its parent's thread ends."""
+    ctypes.CDLL(None).prctl(1, int(signal.SIGKILL))  # PR_SET_PDEATHSIG
 
 
 def _result(code: int, out: str, err: str, command: str = "generate") -> dict[str, Any]:
