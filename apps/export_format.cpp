@@ -35,7 +35,7 @@ if place:
     sys.path.insert(0, place)
 def missing(name, package):
     text = f"--to needs the Python package {name}, which {sys.executable} does not have; expected "
-    text += f"it from `{sys.executable} -m pip install {package}`, or TANGERE_PYTHON to name another"
+    text += f"it from `{sys.executable} -m pip install {package}`, or another TANGERE_PYTHON"
     if "--json" in words:
         print(json.dumps({"command": "export", "exit_code": 3, "error": text}))
     print(f"tangere export: {text}", file=sys.stderr)

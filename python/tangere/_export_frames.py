@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Frames of a data set, as all formats of `tangere.export` write them.
 
-A frame is a row of an episode, or with a window of n the rows j n … (j + 1) n - 1 of it. Then it has
+A frame is a row of an episode, or with a window of n the rows j n … (j + 1) n - 1 of it. Then it
+has
 
     observations  of row j n
     touch         of rows (j - 1) n + 1 … j n, the newest last: (n, …). Rows before the first repeat
@@ -41,8 +42,8 @@ class Frames:
         self.types = {key: rows.dtype for key, rows in self._read(0).items()}
         if window > 1 and not any(self.is_touch(key) for key in episodes.keys):
             raise _core.InputError(
-                f"{episodes.path}: window {window} of a data set without a reading of a sensor; its "
-                f"observations are {episodes.keys}"
+                f"{episodes.path}: window {window} of a data set without a reading of a sensor; "
+                f"its observations are {episodes.keys}"
             )
         self.shapes = {key: rows.shape[1:] for key, rows in self.of(0).items()}
 
@@ -111,8 +112,8 @@ class Frames:
         for key, rows in arrays.items():
             if len(rows) != count:
                 raise _core.InputError(
-                    f"{self.name(place)} has {len(rows)} rows of {key!r}; expected {count}, one for "
-                    "each action"
+                    f"{self.name(place)} has {len(rows)} rows of {key!r}; expected {count}, one "
+                    "for each action"
                 )
         success = np.zeros(count, bool)
         success[-1] = episode in self.solved

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """FTP-1's Zarr, as its loader and its converters have it, as a format of exports.
 
-    data/timestamps                     (T)               int64, frames from the start of the episode
+    data/timestamps                     (T)               int64, the frame in its episode
     data/sub_task_instruction           (T)               the text of the task
     data/SIDE_tactile_data_GROUP        (T, N, *shape)    float32 [N] of a field, uint8 of a picture
     data/SIDE_tactile_area_GROUP        (T, N)            int64: 0, 1 … of the pads

@@ -22,7 +22,6 @@ red and blue exchanged, and the arrays that the reader gives are RGB. They are w
 from __future__ import annotations
 
 import io
-import json
 from pathlib import Path
 from typing import Any
 
@@ -154,9 +153,7 @@ class UniVtac:
         return found
 
 
-def marker_pixels(
-    moved: np.ndarray, sensor: dict[str, Any], pixels: tuple[int, ...]
-) -> np.ndarray:
+def marker_pixels(moved: np.ndarray, sensor: dict[str, Any], pixels: tuple[int, ...]) -> np.ndarray:
     """(T, 2, n, 2) places of markers in a picture, at rest and now, (x, y) [pixels].
 
     moved: (T, rows, cols, 2) displacements along axis0 and axis1 [m]. pixels: rows and columns of

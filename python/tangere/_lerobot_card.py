@@ -35,8 +35,8 @@ def card(
         f"{text}. Simulated by Tangere, written as LeRobotDataset {info['codebase_version']}.",
         "",
         f"- {info['total_episodes']} episodes with {info['total_frames']} frames.{solved}",
-        f"- A frame is one action, which lasts {seconds * window:g} s. Time stamps are multiples of "
-        f"1/{info['fps']} s. A step of the simulation takes {float(said['timestep']):g} s.",
+        f"- A frame is one action, which lasts {seconds * window:g} s. Time stamps are multiples "
+        f"of 1/{info['fps']} s. A step of the simulation takes {float(said['timestep']):g} s.",
         *_window(window, seconds),
         f"- Numbers are float32 in SI units. Pictures are {_pictures(features)}.",
         "",
@@ -62,8 +62,8 @@ def _window(window: int, seconds: float) -> list[str]:
     if window == 1:
         return []
     return [
-        f"- Readings of sensors have {window} samples a frame along their first axis, {seconds:g} s "
-        "apart, the last one at the time of the frame. Before an episode begins they repeat its "
+        f"- Readings of sensors have {window} samples a frame along their first axis, {seconds:g} "
+        "s apart, the last one at the time of the frame. Before an episode begins they repeat its "
         "first sample."
     ]
 

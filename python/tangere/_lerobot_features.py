@@ -174,9 +174,7 @@ def features_of(
         features += _joined(ENVIRONMENT, [*grid, *hidden], episodes, shapes, grid)
         features += [Feature(f"observation.{key}", [key], shapes[key]) for key in views]
         if touch == "image":
-            features += [
-                picture for key in felt for picture in _pictures(key, frames)
-            ]
+            features += [picture for key in felt for picture in _pictures(key, frames)]
     features += [
         Feature(f"observation.images.{key}", [key], shapes[key], pictures, _PICTURE_AXES)
         for key in shown
@@ -212,9 +210,7 @@ def _joined(
         else:
             axes = [a for a in range(len(shape)) if not (mean and a in _grid_axes(shapes[key]))]
             title = f"{key}.mean" if mean else key
-            names += [
-                title + "".join(f"[{at[a]}]" for a in axes) for at in np.ndindex(*shape)
-            ]
+            names += [title + "".join(f"[{at[a]}]" for a in axes) for at in np.ndindex(*shape)]
     return [Feature(name, list(keys), (len(names),), names=names, blocks=blocks)] if keys else []
 
 

@@ -47,7 +47,8 @@ class LeRobot:
         self._license, self._megabytes = license, file_megabytes
         self._ends = _cut(frames, file_megabytes * 2**20)
         self.parts = [
-            int(frames.lengths[first:last].sum()) for first, last in zip([0, *self._ends], self._ends)
+            int(frames.lengths[first:last].sum())
+            for first, last in zip([0, *self._ends], self._ends)
         ]
 
     @property

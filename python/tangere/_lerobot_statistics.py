@@ -88,7 +88,9 @@ def _at_ranks(column: np.ndarray, *ranks: np.ndarray) -> list[np.ndarray]:
     found = []
     for rank in ranks:
         place = np.where(rank < below, rank, rank - zeros)
-        values = rest[np.clip(place, 0, max(len(rest) - 1, 0))] if len(rest) else np.zeros(len(rank))
+        values = (
+            rest[np.clip(place, 0, max(len(rest) - 1, 0))] if len(rest) else np.zeros(len(rank))
+        )
         found.append(np.where((rank >= below) & (rank < below + zeros), 0, values))
     return found
 

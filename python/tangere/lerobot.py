@@ -21,7 +21,7 @@ from ._lerobot_play import Checkpoint, FramePolicy, play
 from .data import Episodes
 from .export import Exported
 
-__all__ = ["Checkpoint", "Exported", "FramePolicy", "export", "main", "play"]
+__all__ = ["Checkpoint", "FramePolicy", "export", "main", "play"]
 
 
 def export(
@@ -43,7 +43,7 @@ def export(
     workers: int | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Exported:
-    """Writes a data set as LeRobotDataset v3.0: `tangere.export.export` with all options of lerobot.
+    """Writes a data set as LeRobotDataset v3.0: `tangere.export.export` with its options.
 
     Parameters
     ----------

@@ -5,8 +5,9 @@
     ray.init("auto")
     done = tangere.ray.generate("box_pushing", "/shared/pushes", 100_000)
 
-Needs the package ray, and a folder that all nodes see. A task makes one shard, so a worker that dies loses one at most: Ray starts the task again, elsewhere if need be, and
-`--resume` keeps what is complete. The bytes are those of one process.
+Needs the package ray, and a folder that all nodes see. A task makes one shard, so a worker that
+dies loses one at most: Ray starts the task again, elsewhere if need be, and `--resume` keeps what
+is complete. The bytes are those of one process.
 """
 
 from __future__ import annotations
@@ -52,8 +53,8 @@ def generate(
     progress: called with shards that are complete and all shards.
     task_options: for `ray.remote`, such as {"resources": {"simulation": 1}}.
 
-    Returns what `tangere merge` says: "output", "demos", "failed" … Raises InputError and IoError as
-    the command does, IoError without ray or if a task is lost after all retries.
+    Returns what `tangere merge` says: "output", "demos", "failed" … Raises InputError and IoError
+    as the command does, IoError without ray or if a task is lost after all retries.
     """
     ray = _ray()
     if isinstance(options, str):
@@ -73,9 +74,9 @@ def generate(
     words += ["--policy", policy] if policy is not None else []
     words += [*options, "--resume", "--no-merge", "--quiet"]
     run_command([*words, "--shards", str(shards), "--dry-run"])  # mistakes, before any task starts
-    remote = ray.remote(
-        **{"num_cpus": threads, "max_retries": retries} | (task_options or {})
-    )(_shard)
+    remote = ray.remote(**{"num_cpus": threads, "max_retries": retries} | (task_options or {}))(
+        _shard
+    )
     waiting = [remote.remote([*words, "--shard", f"{shard}/{shards}"]) for shard in range(shards)]
     done = 0
     try:
@@ -88,7 +89,9 @@ def generate(
             if progress:
                 progress(done, shards)
     except ray.exceptions.RayError as error:
-        raise _core.IoError(f"a task of {shards} is lost after {retries} retries: {error}") from None
+        raise _core.IoError(
+            f"a task of {shards} is lost after {retries} retries: {error}"
+        ) from None
     finally:
         for task in waiting:
             ray.cancel(task, force=True)

@@ -87,7 +87,9 @@ class _Url:
                 "fsspec`, and for s3:// s3fs"
             ) from None
         except ValueError as error:
-            raise _core.InputError(f"{url}: {error}; expected a folder or a URL of fsspec") from None
+            raise _core.InputError(
+                f"{url}: {error}; expected a folder or a URL of fsspec"
+            ) from None
         self._root = root.rstrip("/")
         self._whole = url.split("://")[0] in _WHOLE
 
@@ -154,8 +156,8 @@ def generate(
     storage: options of fsspec for the URL.
     progress: called with shards that are done and all shards of this process.
 
-    Returns "made" and "kept", numbers of shards, and "process" and "processes". Raises InputError if
-    the destination has shards of other settings, IoError if a shard cannot be made or moved.
+    Returns "made" and "kept", numbers of shards, and "process" and "processes". Raises InputError
+    if the destination has shards of other settings, IoError if a shard cannot be made or moved.
     """
     if isinstance(options, str):
         raise _core.InputError(f"options {options!r}; expected a list, such as [{options!r}]")
@@ -182,7 +184,7 @@ def generate(
             run_command([
                 *words, "--output", folder, "--shard", f"{shard}/{shards}", "--no-merge", "--quiet",
                 "--resume",
-            ], dies_along=True)  # fmt: skip
+            ])  # fmt: skip
             path = Path(folder) / name
             _move(place, path, put)
             path.unlink()
@@ -237,8 +239,8 @@ def _agree(place: Place, name: str, job: dict[str, Any]) -> None:
         for key, value in job.items():
             if there.get(key) != value:
                 raise _core.InputError(
-                    f"{name} has shards of {key} {there.get(key)!r}; expected {value!r}, or another "
-                    "destination"
+                    f"{name} has shards of {key} {there.get(key)!r}; expected {value!r}, or "
+                    "another destination"
                 )
         return
     with tempfile.TemporaryDirectory() as folder:
@@ -250,7 +252,9 @@ def _agree(place: Place, name: str, job: dict[str, Any]) -> None:
 def _listed(place: Place, put: str | None) -> set[str]:
     """Shards that are done. A command cannot be asked, so each leaves an empty mark."""
     names = set(place.sizes())
-    return {name.removesuffix(".done") for name in names if name.endswith(".done")} if put else names
+    return (
+        {name.removesuffix(".done") for name in names if name.endswith(".done")} if put else names
+    )
 
 
 def _move(place: Place, path: Path, put: str | None) -> None:
@@ -258,7 +262,9 @@ def _move(place: Place, path: Path, put: str | None) -> None:
         place.put(path)
         size = place.sizes().get(path.name)
         if size != path.stat().st_size:
-            raise _core.IoError(f"{path.name} has {size} bytes there; expected {path.stat().st_size}")
+            raise _core.IoError(
+                f"{path.name} has {size} bytes there; expected {path.stat().st_size}"
+            )
         return
     words = [
         word.replace("{path}", str(path)).replace("{name}", path.name) for word in shlex.split(put)

@@ -64,8 +64,8 @@ def test_zarr_has_every_number(pushes, tmp_path):
     root = zarr.open_group(str(tmp_path / "out"), mode="r")
     lengths = [100] * 20
     np.testing.assert_array_equal(root["meta/episode_ends"][:], np.cumsum(lengths))
-    for name, key in (("q", "obs/q"), ("v", "obs/v"), ("goal", "obs/goal"), ("action", "actions"),
-                      ("tactile", "obs/tactile"), ("reward", "rewards"), ("done", "dones")):  # fmt: skip
+    keys = {"action": "actions", "reward": "rewards", "done": "dones"}
+    for name, key in ({k: f"obs/{k}" for k in ("q", "v", "goal", "tactile")} | keys).items():
         wanted, array = stored(pushes, key), root[f"data/{name}"]
         assert array.dtype == wanted.dtype, name
         np.testing.assert_array_equal(array[:], wanted, err_msg=name)
@@ -327,7 +327,9 @@ def test_the_command_names_what_is_missing(pushes, command, tmp_path):
         return done.returncode, done.stderr
 
     assert run("out", "--to", "zarr", TANGERE_PYTHON="no-python")[0] == 3
-    assert "'no-python' cannot be started" in run("out", "--to", "zarr", TANGERE_PYTHON="no-python")[1]
+    assert (
+        "'no-python' cannot be started" in run("out", "--to", "zarr", TANGERE_PYTHON="no-python")[1]
+    )
     assert run("out", "--to", "zar") == (2, "tangere: unknown format 'zar'; did you mean 'zarr'?\n")
     for words, message in (
         (["out"], "out without --to; expected --to lerobot, zarr"),
