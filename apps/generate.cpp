@@ -18,7 +18,7 @@
 #include "apps/scene_run.hpp"
 #include "apps/stop_signals.hpp"
 #include "apps/task_run.hpp"
-#include "apps/workers.hpp"
+#include "io/dataset/workers.hpp"
 #include "io/files/nearest_name.hpp"
 #include "io/hdf5/reading_note.hpp"
 #include "tasks/gradients/episode_gradients.hpp"

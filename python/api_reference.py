@@ -21,8 +21,8 @@ PAGE = Path(__file__).parents[1] / "docs/python_api.md"
 WIDTH = 100
 # In the order of the page; the compiled part is shown as tangere, from where it is used.
 MODULES = (
-    "tangere", "scene_builder", "robots", "gym", "scene_env", "torch", "jax", "data", "policy",
-    "lerobot", "robomimic", "sb3", "d3rlpy", "gel",
+    "tangere", "scene_builder", "robots", "gym", "scene_env", "torch", "jax", "data", "export",
+    "policy", "lerobot", "robomimic", "sb3", "d3rlpy", "ray", "store", "gel",
 )  # fmt: skip
 HEAD = """# Python: every name
 

@@ -14,6 +14,7 @@
 #include "io/dataset/dataset_from_model.hpp"
 #include "io/dataset/dataset_merge.hpp"
 #include "io/dataset/dataset_writer.hpp"
+#include "io/dataset/workers.hpp"
 #include "kernels/table/isa.hpp"
 #include "python/module/arrays.hpp"
 #include "python/module/module.hpp"
@@ -241,6 +242,15 @@ void add_episode_writer(nb::module_& m) {
            "Merges the shards and closes the data set. Returns paths and names of what was made.")
       .def("close", &EpisodeWriter::close,
            "Ends the work. Shards that are not complete are removed.");
+  m.def(
+      "worker_from_environment",
+      [] {
+        const Worker worker = worker_from_environment();
+        return std::make_tuple(worker.index, worker.count, worker.source);
+      },
+      "Which of the processes that a scheduler has started this one is, as `tangere generate`\n"
+      "reads it: (index, count, the variables that say so). InputError names a variable that does\n"
+      "not fit.");
 }
 
 }  // namespace tangere::python

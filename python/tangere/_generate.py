@@ -8,9 +8,11 @@ and its data are.
 
 from __future__ import annotations
 
+import ctypes
 import json
 import os
 import shutil
+import signal
 import socket
 import subprocess
 import sys
@@ -102,14 +104,13 @@ def generate(
             f"num_envs {num_envs} with {str(what)!r}; expected a class of tangere.VectorSceneEnv, "
             "or threads"
         )
-    words = [str(command_path()), "generate", str(what), "--output", str(output), "--json"]
+    words = ["generate", str(what), "--output", str(output)]
     words += ["--episodes", str(episodes), "--seed", str(seed), "--quiet", *options]
     if threads is not None:
         words += ["--threads", str(threads)]
     if not callable(policy):
         words += ["--policy", policy] if policy is not None else []
-        run = subprocess.run(words, stdin=subprocess.DEVNULL, capture_output=True, text=True)
-        return _result(run.returncode, run.stdout, run.stderr)
+        return run_command(words)
     assert name is not None
     with tempfile.TemporaryDirectory() as folder, socket.socket(socket.AF_UNIX) as listener:
         address = str(Path(folder) / "policy")
@@ -125,7 +126,7 @@ def generate(
             tempfile.TemporaryFile("w+") as out,
             tempfile.TemporaryFile("w+") as err,
             subprocess.Popen(
-                [*words, "--program", _PROGRAM],
+                [str(command_path()), *words, "--json", "--program", _PROGRAM],
                 stdin=subprocess.DEVNULL, stdout=out, stderr=err, env=environment,
             ) as process,
         ):  # fmt: skip
@@ -185,11 +186,27 @@ def _converse(
                     # Else the command has stopped, and says why.
 
 
-def _result(code: int, out: str, err: str) -> dict[str, Any]:
+def run_command(words: Sequence[str], dies_along: bool = False) -> dict[str, Any]:
+    """Runs the command and returns what it says with --json. Raises InputError and IoError as the
+    command does, with its message. dies_along: it is killed if this thread of the caller is."""
+    run = subprocess.run(
+        [str(command_path()), *words, "--json"],
+        stdin=subprocess.DEVNULL, capture_output=True, text=True,
+        preexec_fn=_die_with_parent if dies_along else None,
+    )  # fmt: skip
+    return _result(run.returncode, run.stdout, run.stderr, words[0])
+
+
+def _die_with_parent() -> None:
+    """In a child, before its program starts: Linux kills it when its parent's thread ends."""
+    ctypes.CDLL(None).prctl(1, int(signal.SIGKILL))  # PR_SET_PDEATHSIG
+
+
+def _result(code: int, out: str, err: str, command: str = "generate") -> dict[str, Any]:
     try:
         said = json.loads(out)
     except ValueError:
-        raise _core.IoError(f"tangere generate ended with code {code}: {err.strip()}") from None
+        raise _core.IoError(f"tangere {command} ended with code {code}: {err.strip()}") from None
     if "error" in said:
         raise (_core.InputError if code == 2 else _core.IoError)(said["error"])
     return dict(said)

@@ -6,13 +6,14 @@ from __future__ import annotations
 import json
 from typing import Any, Sequence
 
+from ._export_frames import unit_and_meaning
 from ._lerobot_features import Feature
 from .data import Episodes
 
 
 def card(
     episodes: Episodes, features: Sequence[Feature], info: dict[str, Any], text: str,
-    successes: int, license: str,
+    successes: int, license: str, window: int,
 ) -> str:  # fmt: skip
     """The text of the file. `info` is that of meta/info.json."""
     said = episodes.attributes
@@ -34,9 +35,10 @@ def card(
         f"{text}. Simulated by Tangere, written as LeRobotDataset {info['codebase_version']}.",
         "",
         f"- {info['total_episodes']} episodes with {info['total_frames']} frames.{solved}",
-        f"- A frame is one action, which lasts {seconds:g} s. Time stamps are multiples of "
-        f"1/{info['fps']} s. A step of the simulation takes {float(said['timestep']):g} s.",
-        "- Numbers are float32 in SI units. Pictures are PNG.",
+        f"- A frame is one action, which lasts {seconds * window:g} s. Time stamps are multiples "
+        f"of 1/{info['fps']} s. A step of the simulation takes {float(said['timestep']):g} s.",
+        *_window(window, seconds),
+        f"- Numbers are float32 in SI units. Pictures are {_pictures(features)}.",
         "",
         "## Columns",
         "",
@@ -56,13 +58,22 @@ def card(
     return "\n".join(lines) + "\n"
 
 
+def _window(window: int, seconds: float) -> list[str]:
+    if window == 1:
+        return []
+    return [
+        f"- Readings of sensors have {window} samples a frame along their first axis, {seconds:g} "
+        "s apart, the last one at the time of the frame. Before an episode begins they repeat its "
+        "first sample."
+    ]
+
+
+def _pictures(features: Sequence[Feature]) -> str:
+    return "video, AV1" if any(feature.is_video for feature in features) else "PNG"
+
+
 def _columns(episodes: Episodes, features: Sequence[Feature]) -> list[str]:
     said = episodes.attributes
-    keys = [str(key) for key in said["observations"]]
-    units, meanings = (
-        dict(zip(keys, map(str, said.get(f"observation_{name}", []))))
-        for name in ("units", "meanings")
-    )
     about = {
         "action": f"{said.get('action_meaning', 'controls')} [{said.get('action_unit', '1')}]",
         "next.reward": "reward of the action",
@@ -84,15 +95,10 @@ def _columns(episodes: Episodes, features: Sequence[Feature]) -> list[str]:
             if feature.is_picture and feature.range:
                 ranges = ", ".join(f"{x:g}" for x in feature.range)
                 what += f", pad {feature.pad}: 0, 128 and 255 are -range, 0 and range, ({ranges})"
-            unit = units.get(key) or ("" if key in ("q", "v") else _unit_of_sensor(episodes, key))
-            if unit and not unit.endswith("_units"):
-                what += f" [{unit}]"
-            lines.append(f"  - {what}" + (f": {meanings[key]}" if meanings.get(key) else ""))
+            unit, meaning = unit_and_meaning(episodes, key)
+            what += f" [{unit}]" if unit else ""
+            lines.append(f"  - {what}" + (f": {meaning}" if meaning else ""))
     return lines
-
-
-def _unit_of_sensor(episodes: Episodes, key: str) -> str:
-    return str(episodes.sensors.get(key, {}).get("units", ""))
 
 
 def _sensors(episodes: Episodes) -> list[str]:

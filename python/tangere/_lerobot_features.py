@@ -24,9 +24,11 @@ from typing import Any, Literal, Sequence, get_args
 import numpy as np
 
 from . import _core
+from ._export_frames import Frames, by_pads, is_picture, picture_rows
 from .data import Episodes
 
 Touch = Literal["state", "image"]
+Pictures = Literal["image", "video"]
 
 BOOKKEEPING = {
     "timestamp": "float32",
@@ -62,12 +64,16 @@ class Feature:
 
     @property
     def is_picture(self) -> bool:
-        return self.dtype == "image"
+        return self.dtype in ("image", "video")
+
+    @property
+    def is_video(self) -> bool:
+        return self.dtype == "video"
 
     def rows(self, arrays: dict[str, np.ndarray]) -> np.ndarray:
         """(rows, *shape), of a picture as uint8."""
         if self.is_picture and not self.range:
-            return np.asarray(arrays[self.keys[0]])
+            return picture_rows(arrays, self.keys[0])
         if self.is_picture:
             shown = 127.5 + 127.5 * _pad(arrays[self.keys[0]], self.pad) / np.asarray(self.range)
             whole = np.full((len(shown), *self.shape), 128, np.uint8)
@@ -120,29 +126,14 @@ def _least_block(shape: Sequence[int]) -> int:
     return next(fits, longest)
 
 
-def _by_pads(rows: np.ndarray) -> np.ndarray:
-    """(n, *shape) → (n, pads, rows, cols, c)."""
-    shape = rows.shape[1:]
-    if shape[-1] <= 3:
-        return rows.reshape(len(rows), -1, *shape[-3:])
-    channels = int(np.prod(shape[:-2]))
-    c = next(c for c in (3, 2, 1) if channels % c == 0)
-    return np.moveaxis(rows.reshape(len(rows), -1, c, *shape[-2:]), 2, -1)
-
-
-def _is_shown(rows: np.ndarray) -> bool:
-    """Whether an observation, (n, *shape), is pictures in colours."""
-    return rows.dtype == np.uint8 and rows.ndim == 4 and rows.shape[-1] == 3
-
-
 def _pad(rows: np.ndarray, pad: int) -> np.ndarray:
-    return np.asarray(_by_pads(np.asarray(rows))[:, pad], np.float64)
+    return np.asarray(by_pads(np.asarray(rows))[:, pad], np.float64)
 
 
 def features_of(
-    episodes: Episodes, chosen: Sequence[int], privileged: bool, touch: Touch | None
+    frames: Frames, privileged: bool, touch: Touch | None, pictures: Pictures = "image"
 ) -> list[Feature]:
-    """The columns of a data set, without those for bookkeeping.
+    """The features of a data set, without those for bookkeeping. `pictures`: in rows or as video.
 
     Vectors become one state, as policies of lerobot expect. Pictures in colours stay what they are.
     Fields keep their shape, unless `touch` says how a policy reads them. Raises InputError for
@@ -150,23 +141,25 @@ def features_of(
     """
     if touch not in (None, *get_args(Touch)):
         raise _core.InputError(f"touch {touch!r}; expected None, 'state' or 'image'")
-    arrays = {key: np.asarray(rows) for key, rows in episodes[chosen[0]].items()}
-    shapes = {key: rows.shape[1:] for key, rows in arrays.items()}
+    if pictures not in get_args(Pictures):
+        raise _core.InputError(f"pictures {pictures!r}; expected 'image' or 'video'")
+    episodes, shapes = frames.episodes, frames.shapes
     for key in episodes.keys:
         if key in _RESERVED or (key in _RESERVED_FIELDS and len(shapes[key]) > 1):
             raise _core.InputError(
                 f"{episodes.path}: an observation is called {key!r}, which the format has for "
                 "something else; expected another name of the sensor"
             )
-    shown = [key for key in episodes.keys if _is_shown(arrays[key])]
+    shown = [key for key in episodes.keys if is_picture(shapes[key], frames.types[key])]
     seen = [key for key in episodes.keys if key not in episodes.privileged and key not in shown]
     fields = [key for key in seen if len(shapes[key]) > 1]
-    felt = [key for key in fields if key in episodes.touch or key.split(".")[0] in episodes.sensors]
+    felt = [key for key in fields if frames.is_touch(key)]
     if touch and not felt:
         raise _core.InputError(
             f"{episodes.path}: touch {touch!r} of a data set without a reading of a sensor that "
             f"is no picture in colours; its observations are {episodes.keys}"
         )
+    _check_window(frames, felt if touch else [], touch)
     hidden = [key for key in episodes.privileged if privileged and key not in shown]
     if touch is None:
         features = _joined(STATE, [k for k in seen if k not in fields], episodes, shapes)
@@ -181,11 +174,9 @@ def features_of(
         features += _joined(ENVIRONMENT, [*grid, *hidden], episodes, shapes, grid)
         features += [Feature(f"observation.{key}", [key], shapes[key]) for key in views]
         if touch == "image":
-            features += [
-                picture for key in felt for picture in _pictures(key, episodes, chosen, shapes[key])
-            ]
+            features += [picture for key in felt for picture in _pictures(key, frames)]
     features += [
-        Feature(f"observation.images.{key}", [key], shapes[key], "image", _PICTURE_AXES)
+        Feature(f"observation.images.{key}", [key], shapes[key], pictures, _PICTURE_AXES)
         for key in shown
         if privileged or key not in episodes.privileged
     ]
@@ -219,23 +210,31 @@ def _joined(
         else:
             axes = [a for a in range(len(shape)) if not (mean and a in _grid_axes(shapes[key]))]
             title = f"{key}.mean" if mean else key
-            names += [
-                title + "".join(f"[{at[a]}]" for a in axes) for at in np.ndindex(*shape)
-            ]
+            names += [title + "".join(f"[{at[a]}]" for a in axes) for at in np.ndindex(*shape)]
     return [Feature(name, list(keys), (len(names),), names=names, blocks=blocks)] if keys else []
 
 
-def _pictures(
-    key: str, episodes: Episodes, chosen: Sequence[int], shape: tuple[int, ...]
-) -> list[Feature]:
+def _check_window(frames: Frames, felt: Sequence[str], touch: Touch | None) -> None:
+    """Raises InputError where a window of touch has no form that a policy reads."""
+    for key in felt if frames.window > 1 else []:
+        if touch == "image" or len(frames.pads(key)) < 3:
+            raise _core.InputError(
+                f"{frames.episodes.path}: touch {touch!r} of {key!r}, {frames.pads(key)}, with a "
+                f"window of {frames.window}; expected touch 'state' of rows and columns, or none"
+            )
+
+
+def _pictures(key: str, frames: Frames) -> list[Feature]:
     """One picture for each pad. Its range is the largest number of the component, of all pads."""
+    shape = frames.shapes[key]
     if len(_grid_axes(shape)) != 2:
         raise _core.InputError(
-            f"{episodes.path}: touch 'image' of {key!r}, (points, {shape[-1]}), which has no rows "
-            "and columns; expected touch 'state'"
+            f"{frames.episodes.path}: touch 'image' of {key!r}, (points, {shape[-1]}), which has "
+            "no rows and columns; expected touch 'state'"
         )
-    most = np.max([_by_pads(np.abs(episodes[i][key])).max((0, 1, 2, 3)) for i in chosen], axis=0)
-    pads, rows, cols = _by_pads(episodes[chosen[0]][key]).shape[1:4]
+    fields = (frames.of(place)[key] for place in range(len(frames.chosen)))
+    most = np.max([by_pads(np.abs(field)).max((0, 1, 2, 3)) for field in fields], axis=0)
+    pads, rows, cols = by_pads(frames.of(0)[key]).shape[1:4]
     return [
         Feature(
             f"observation.images.{key}" + (f"_{pad}" if pads > 1 else ""), [key], (rows, cols, 3),

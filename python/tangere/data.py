@@ -53,6 +53,7 @@ class Episodes:
         self._shard_of: list[int] = []
         lengths: list[int] = []
         self.attributes: dict[str, Any] = {}
+        self.content = 0  # the checksum of all numbers, as of robomimic.hdf5
         found = []
         for number, shard in enumerate(shards):
             with h5py.File(shard, "r") as file:
@@ -73,6 +74,7 @@ class Episodes:
                     self.sensors = {name: dict(sensors[name].attrs) for name in sensors}
                     cameras = file["scene"].get("cameras", {})
                     self.cameras = {name: dict(cameras[name].attrs) for name in cameras}
+                self.content = (self.content + int(file.attrs["content_sum"])) % 2**64
                 for name, demo in file["data"].items():
                     rows = int(demo.attrs["num_samples"])
                     found.append((int(name.removeprefix("demo_")), name, number, rows))
@@ -85,6 +87,7 @@ class Episodes:
         self._process = os.getpid()
         self._maps: dict[int, np.memmap] = {}
         self._files: dict[int, h5py.File] = {}
+        self._rows: dict[str, tuple[tuple[int, ...], np.dtype]] = {}  # shape of a row, type
         self._open: OrderedDict[int, dict[str, np.ndarray]] = OrderedDict()
         self._held = 0  # bytes of arrays in _open that are no views of a file
 
@@ -202,6 +205,27 @@ class Episodes:
             self._held -= _copied(self._open.popitem(last=False)[1])
         return arrays
 
+    def arrays(self, episode: int, names: Sequence[str]) -> dict[str, np.ndarray]:
+        """Some of the arrays that `episodes[episode]` has: quicker for many episodes in order."""
+        if not self._mapped or episode in self._open:
+            whole = self[episode]
+            return {name: whole[name] for name in names}
+        demo = self._demo(episode).id
+        found = {}
+        for name in names:
+            path = (f"obs/{name}" if name in self.keys else name).encode()
+            stored = h5py.h5d.open(demo, path)
+            if name not in self._rows:
+                like = h5py.Dataset(stored)
+                self._rows[name] = (like.shape[1:], like.dtype)
+            shape, dtype = self._rows[name]
+            if stored.get_offset() is None or dtype.kind not in "fiu":
+                found[name] = _values(h5py.Dataset(stored))
+                continue
+            raw = self._bytes(episode, stored.get_offset(), stored.get_storage_size())
+            found[name] = raw.view(dtype).reshape(-1, *shape)
+        return found
+
     def _here(self) -> None:
         """After a fork the child opens its own files: HDF5 does not share them."""
         if self._process != os.getpid():
@@ -219,14 +243,18 @@ class Episodes:
         plain = offset is not None and dataset.dtype.kind in "fiu" and dataset.size > 0
         if not (plain and self._mapped):
             return _values(dataset)
+        part = self._bytes(episode, offset, dataset.size * dataset.dtype.itemsize)
+        return part.view(dataset.dtype).reshape(dataset.shape)
+
+    def _bytes(self, episode: int, offset: int, size: int) -> np.ndarray:
         number = self._shard_of[episode]
         if number not in self._maps:
             self._maps[number] = np.memmap(self._shards[number], mode="r")
-        part = self._maps[number][offset : offset + dataset.size * dataset.dtype.itemsize]
-        return part.view(dataset.dtype).reshape(dataset.shape)
+        return self._maps[number][offset : offset + size]
 
     def __getstate__(self) -> dict[str, Any]:
-        return {**self.__dict__, "_maps": {}, "_files": {}, "_open": OrderedDict(), "_held": 0}
+        empty: dict[str, Any] = {"_maps": {}, "_files": {}, "_rows": {}, "_open": OrderedDict()}
+        return self.__dict__ | empty | {"_held": 0}
 
 
 def _values(dataset: h5py.Dataset) -> np.ndarray:

@@ -69,6 +69,13 @@ def test_every_block_of_the_page_of_learning_runs(generate, capsys):
     assert "20 ['q', 'v', 'flow']" in said and "zeros" in said
 
 
+def test_every_block_of_the_page_of_formats_runs(generate, capsys):
+    pytest.importorskip("zarr", reason="zarr is not installed")
+    data = generate("box_pushing", "--episodes", "8", "--seed", "1")
+    assert run_blocks("docs/formats.md", {"DATA": str(data)}) == 2
+    assert "(100, 13, 10, 3) N" in capsys.readouterr().out
+
+
 def test_the_reference_is_made_of_the_docstrings():
     path = ROOT / "python/api_reference.py"
     spec = importlib.util.spec_from_file_location("api_reference", path)

@@ -161,17 +161,19 @@ def test_colours_of_a_gel_are_written_as_they_are(colours, tmp_path, touch):
 
 
 def test_colours_alone_are_no_touch(colours, tmp_path):
+    from tangere._export_frames import Frames
     from tangere._lerobot_features import features_of
     from tangere.data import Episodes
 
     episodes = Episodes(colours)
     episodes.keys = ["gel.rgb"]
     episodes.touch, episodes.privileged = [], []
-    assert [f.name for f in features_of(episodes, [0], False, None)][:1] == [
+    frames = Frames(episodes, [0])
+    assert [f.name for f in features_of(frames, False, None)][:1] == [
         "observation.images.gel.rgb"
     ]  # fmt: skip
     with pytest.raises(tangere.InputError, match="that is no picture in colours"):
-        features_of(episodes, [0], False, "image")
+        features_of(frames, False, "image")
 
 
 def test_touch_that_cannot_be_written_is_refused(generate, pushes, tmp_path, capsys):

@@ -1,0 +1,186 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Frames of a data set, as all formats of `tangere.export` write them.
+
+A frame is a row of an episode, or with a window of n the rows j n … (j + 1) n - 1 of it. Then it
+has
+
+    observations  of row j n
+    touch         of rows (j - 1) n + 1 … j n, the newest last: (n, …). Rows before the first repeat
+                  the first one
+    action        of all n rows, which must be the same
+    reward        the sum of those of the n rows
+    done, success true in the last frame of an episode
+
+Arrays are those of the files, without a change of type or unit.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Sequence
+
+import numpy as np
+
+from . import _core
+from .data import Episodes
+
+Arrays = dict[str, np.ndarray]
+
+
+class Frames:
+    """The frames of chosen episodes of a data set, in order.
+
+    chosen: indices of episodes, which have rows. window: rows of a frame.
+    """
+
+    def __init__(self, episodes: Episodes, chosen: Sequence[int], window: int = 1):
+        if not isinstance(window, int) or window < 1:
+            raise _core.InputError(f"window {window!r}; expected a whole number, 1 or above")
+        self.episodes, self.chosen, self.window = episodes, list(chosen), window
+        self.lengths = -(-episodes.lengths[self.chosen] // window)
+        self.ends = np.cumsum(self.lengths)
+        self.solved = set(episodes.succeeded()) if episodes.task else set()
+        self.types = {key: rows.dtype for key, rows in self._read(0).items()}
+        if window > 1 and not any(self.is_touch(key) for key in episodes.keys):
+            raise _core.InputError(
+                f"{episodes.path}: window {window} of a data set without a reading of a sensor; "
+                f"its observations are {episodes.keys}"
+            )
+        self.shapes = {key: rows.shape[1:] for key, rows in self.of(0).items()}
+
+    def __len__(self) -> int:
+        return int(self.ends[-1])
+
+    @property
+    def seconds(self) -> float:
+        """Between two frames of an episode [s]."""
+        attributes = self.episodes.attributes
+        return float(attributes["timestep"]) * int(attributes["every"]) * self.window
+
+    @property
+    def bytes(self) -> int:
+        """Of the numbers of a frame."""
+        return sum(
+            int(np.prod(shape)) * self.types[key].itemsize for key, shape in self.shapes.items()
+        )
+
+    def name(self, place: int) -> str:
+        """Of an episode, for messages."""
+        return f"{self.episodes.path}: {self.episodes.names[self.chosen[place]]}"
+
+    def is_touch(self, key: str) -> bool:
+        """Whether an observation is a reading of a sensor and no picture in colours."""
+        episodes = self.episodes
+        if self.types[key] == np.uint8:
+            return False
+        return key in episodes.touch or key.split(".")[0] in episodes.sensors
+
+    def pads(self, key: str) -> tuple[int, ...]:
+        """The shape of a reading at one time: without the axis of a window."""
+        return self.shapes[key][1:] if self.window > 1 and self.is_touch(key) else self.shapes[key]
+
+    def pads_apart(self, key: str, rows: np.ndarray) -> np.ndarray:
+        """A reading of frames (t, …) as (t, pads, *shape), with a window (t, pads, n, *shape)."""
+        shape = self.pads(key)
+        samples = rows.reshape(-1, *shape)
+        apart = by_pads(samples) if len(shape) >= 3 else samples[:, None]
+        if shape == self.shapes[key]:
+            return apart
+        return np.moveaxis(apart.reshape(len(rows), self.window, *apart.shape[1:]), 1, 2)
+
+    def of(self, place: int) -> Arrays:
+        """Observations by key, "actions", "rewards", "dones" and "success" of an episode."""
+        arrays = self._read(place)
+        return arrays if self.window == 1 else self._windowed(arrays, place)
+
+    def group(self, first: int, last: int) -> Arrays:
+        """Those of the episodes first … last - 1, one after the other."""
+        parts = [self.of(place) for place in range(first, last)]
+        return {key: np.concatenate([part[key] for part in parts]) for key in parts[0]}
+
+    def between(self, start: int, stop: int) -> Arrays:
+        """Frames start … stop - 1 of all."""
+        first, last = (int(np.searchsorted(self.ends, at, "right")) for at in (start, stop - 1))
+        before = int(self.ends[first] - self.lengths[first])
+        whole = self.group(first, last + 1)
+        return {key: rows[start - before : stop - before] for key, rows in whole.items()}
+
+    def _read(self, place: int) -> Arrays:
+        episode = self.chosen[place]
+        episodes = self.episodes
+        arrays = episodes.arrays(episode, [*episodes.keys, "actions", "rewards", "dones"])
+        count = len(arrays["actions"])
+        for key, rows in arrays.items():
+            if len(rows) != count:
+                raise _core.InputError(
+                    f"{self.name(place)} has {len(rows)} rows of {key!r}; expected {count}, one "
+                    "for each action"
+                )
+        success = np.zeros(count, bool)
+        success[-1] = episode in self.solved
+        arrays["success"] = success
+        return arrays
+
+    def _windowed(self, arrays: Arrays, place: int) -> Arrays:
+        n, count = self.window, len(arrays["actions"])
+        starts = np.arange(0, count, n)
+        taken: Arrays = {}
+        for key, rows in arrays.items():
+            if key == "rewards":
+                taken[key] = np.add.reduceat(rows, starts)
+            elif key in ("dones", "success"):
+                taken[key] = np.logical_or.reduceat(rows, starts)
+            elif key == "actions":
+                _check_held(rows, starts, n, self.name(place))
+                taken[key] = rows[starts]
+            elif self.is_touch(key):
+                at = np.maximum(starts[:, None] + np.arange(1 - n, 1), 0)
+                taken[key] = np.asarray(rows)[at]
+            else:
+                taken[key] = rows[starts]
+        return taken
+
+
+def _check_held(actions: np.ndarray, starts: np.ndarray, window: int, name: str) -> None:
+    held = np.repeat(actions[starts], window, axis=0)[: len(actions)]
+    changed = np.flatnonzero((held != actions).any(axis=1))
+    if len(changed):
+        raise _core.InputError(
+            f"{name}: the action changes in row {changed[0]}, within the {window} rows of a frame; "
+            "expected actions that are held as long, or a smaller window"
+        )
+
+
+def by_pads(rows: np.ndarray) -> np.ndarray:
+    """A reading in rows and columns, (n, *shape) → (n, pads, rows, cols, c)."""
+    shape = rows.shape[1:]
+    if shape[-1] <= 3:
+        return rows.reshape(len(rows), -1, *shape[-3:])
+    channels = int(np.prod(shape[:-2]))
+    c = next(c for c in (3, 2, 1) if channels % c == 0)
+    return np.moveaxis(rows.reshape(len(rows), -1, c, *shape[-2:]), 2, -1)
+
+
+def picture_rows(arrays: Arrays, key: str) -> np.ndarray:
+    """Pictures in colours, (n, height, width, 3) uint8: the one place where they are read."""
+    return np.asarray(arrays[key])
+
+
+def is_picture(shape: Sequence[int], dtype: Any) -> bool:
+    """Whether an observation of this shape of a row is a picture in colours."""
+    return dtype == np.uint8 and len(shape) == 3 and shape[-1] == 3
+
+
+def unit_and_meaning(episodes: Episodes, key: str) -> tuple[str, str]:
+    """What a data set says of an observation; empty where it says nothing in one word."""
+    said = episodes.attributes
+    keys = [str(name) for name in said["observations"]]
+    units, meanings = (
+        dict(zip(keys, map(str, said.get(f"observation_{name}", []))))
+        for name in ("units", "meanings")
+    )
+    sensor = episodes.sensors.get(key.split(".")[0], {})
+    readings = [str(name) for name in sensor.get("readings", [])]
+    if key in readings:
+        meanings[key] = str(sensor["reading_components"][readings.index(key)])
+    unit = units.get(key) or str(episodes.sensors.get(key, {}).get("units", ""))
+    return "" if unit.endswith("_units") else unit, meanings.get(key, "")

@@ -1,0 +1,143 @@
+# SPDX-License-Identifier: Apache-2.0
+"""FTP-1's Zarr, as its loader and its converters have it, as a format of exports.
+
+    data/timestamps                     (T)               int64, the frame in its episode
+    data/sub_task_instruction           (T)               the text of the task
+    data/SIDE_tactile_data_GROUP        (T, N, *shape)    float32 [N] of a field, uint8 of a picture
+    data/SIDE_tactile_area_GROUP        (T, N)            int64: 0, 1 … of the pads
+    data/SIDE_tactile_sensor_GROUP      (T)               the sensor's name
+    data/SIDE_tactile_type_GROUP        (T)               "state" of a field, "image" of a picture
+    data/camera_main_rgb                (T, H, W, 3)      uint8, of the first camera
+    data/SIDE_arm_joints                (T, joints)       float32 [rad, m], of the joints named
+    data/action, data/reward            (T, na), (T)      of Tangere; the loader makes its own
+    meta/episode_ends                   (episodes)        int64
+
+A group is a reading of sensors, with dots as underlines.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+import numpy as np
+
+from . import _core
+from ._export_frames import Arrays, Frames, is_picture, picture_rows
+from ._export_zarr import Column, ZarrStore, attributes_of
+from ._lerobot_format import task_text
+
+_AREA = np.dtype(np.int64)
+
+
+class Ftp1(ZarrStore):
+    """The format.
+
+    side: of the hand that carries the sensors. sensor: their name in the data. joints: coordinates
+    of the arm with commas, of `q_names`. task: the text; None: the task's name and its success.
+    """
+
+    def __init__(
+        self, frames: Frames, side: str = "right", sensor: str = "tangere",
+        joints: str | None = None, task: str | None = None,
+    ):  # fmt: skip
+        episodes = frames.episodes
+        if side not in ("left", "right"):
+            raise _core.InputError(f"side {side!r}; expected left or right")
+        self._text, self._sensor = task_text(frames, task), sensor
+        about = attributes_of(episodes)
+        self._groups: dict[str, str] = {}  # group → key
+        columns = {
+            "timestamps": Column((), np.dtype(np.int64), {"unit": f"{frames.seconds:g} s"}),
+            "sub_task_instruction": Column((), np.dtype(f"<U{len(self._text)}"), {}),
+        }
+        for key in episodes.keys:
+            picture = is_picture(frames.shapes[key], frames.types[key])
+            if not frames.is_touch(key) and key.split(".")[0] not in episodes.sensors:
+                continue
+            group = re.sub(r"\W", "_", key)
+            start = f"{side}_tactile"
+            first = frames.of(0)[key]
+            shape = (1, *first.shape[1:]) if picture else frames.pads_apart(key, first).shape[1:]
+            kind = "image" if picture else "state"
+            self._groups[group] = key
+            dtype = np.dtype(np.uint8 if picture else np.float32)
+            columns |= {
+                f"{start}_data_{group}": Column(shape, dtype, about[key]),
+                f"{start}_area_{group}": Column(shape[:1], _AREA, {}),
+                f"{start}_sensor_{group}": Column((), np.dtype(f"<U{len(sensor)}"), {}),
+                f"{start}_type_{group}": Column((), np.dtype(f"<U{len(kind)}"), {}),
+            }
+        if not self._groups:
+            raise _core.InputError(
+                f"{episodes.path}: no reading of a sensor for FTP-1; its observations are "
+                f"{episodes.keys}"
+            )
+        self._start, self._joints = f"{side}_tactile", joint_places(frames, joints)
+        if self._joints:
+            names = {"names": joints.split(",") if joints else []}
+            columns[f"{side}_arm_joints"] = Column(
+                (len(self._joints),), np.dtype(np.float32), names
+            )
+        self._arm = f"{side}_arm_joints"
+        self._camera = next((
+            key for key in episodes.keys
+            if key.rpartition(".")[0] in episodes.cameras
+            and is_picture(frames.shapes[key], frames.types[key])
+        ), None)  # fmt: skip
+        if self._camera:
+            shape = frames.shapes[self._camera]
+            columns["camera_main_rgb"] = Column(shape, np.dtype(np.uint8), {"key": self._camera})
+        columns["action"] = Column(frames.shapes["actions"], np.dtype(np.float32), about["action"])
+        columns["reward"] = Column((), np.dtype(np.float32), {})
+        super().__init__(frames, columns)
+
+    def job(self) -> dict[str, Any]:
+        said = {"text": self._text, "sensor": self._sensor, "joints": self._joints}
+        return super().job() | said
+
+    def arrays(self, frames: Arrays, start: int) -> Arrays:
+        count = len(frames["actions"])
+        ends, lengths = self.frames.ends, self.frames.lengths
+        at = np.arange(start, start + count)
+        place = np.searchsorted(ends, at, "right")
+        found: Arrays = {
+            "timestamps": at - (ends - lengths)[place],
+            "sub_task_instruction": np.full(count, self._text),
+            "action": frames["actions"],
+            "reward": frames["rewards"],
+        }
+        for group, key in self._groups.items():
+            column = self.columns[f"{self._start}_data_{group}"]
+            pads = column.shape[0]
+            picture = column.dtype == np.uint8
+            rows = (
+                picture_rows(frames, key)[:, None]
+                if picture
+                else self.frames.pads_apart(key, frames[key])
+            )
+            found |= {
+                f"{self._start}_data_{group}": rows.astype(column.dtype, copy=False),
+                f"{self._start}_area_{group}": np.tile(np.arange(pads), (count, 1)),
+                f"{self._start}_sensor_{group}": np.full(count, self._sensor),
+                f"{self._start}_type_{group}": np.full(count, "image" if picture else "state"),
+            }
+        if self._joints:
+            found[self._arm] = frames["q"][:, self._joints].astype(np.float32)
+        if self._camera:
+            found["camera_main_rgb"] = picture_rows(frames, self._camera)
+        return found
+
+
+def joint_places(frames: Frames, joints: str | None) -> list[int]:
+    """The places of coordinates in q, by their names with commas between them."""
+    if not joints:
+        return []
+    known = [str(name) for name in frames.episodes.attributes["q_names"]]
+    names = joints.split(",")
+    unknown = [name for name in names if name not in known]
+    if unknown:
+        raise _core.InputError(f"joints {unknown[0]!r}; expected names of q: {', '.join(known)}")
+    if "q" not in frames.shapes:
+        raise _core.InputError(f"{frames.episodes.path}: joints of a data set that has no q")
+    return [known.index(name) for name in names]

@@ -1,0 +1,280 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The folder of an export and its parts: what all formats share.
+
+A format cuts its frames into parts, which follow from the data set and the options alone. Each part
+is written by one process, so the bytes do not depend on how many there are. A folder is called
+OUTPUT.part until all parts are there:
+
+    .lock          held exclusively by a process that is alone or finishes, else shared
+    .start         held for a moment by a process that begins or ends
+    .parts/job.json    what the bytes depend on
+    .parts/00003       part 3 is complete; formats keep beside it what `finish` needs of it
+
+A run that was stopped or killed leaves OUTPUT.part. The next one goes on with it if it writes the
+same, and is told to or is one of many processes of a scheduler; otherwise it removes it.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import hashlib
+import json
+import os
+import shutil
+import threading
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, Callable, Iterator, Protocol
+
+from . import _core
+from ._export_pool import Pool
+
+Progress = Callable[[int, int], None]  # frames that are written, frames of this process
+
+
+class Format(Protocol):
+    """How the frames of a data set become files. It is pickled for the processes that write."""
+
+    sign: str  #: a file that a complete folder has, removed first
+    origin: str  #: a file of JSON that says where the data come from
+    kind: str  #: what such a folder is, for messages
+    parts: list[int]  #: frames of each
+    names: list[str]  #: of its arrays
+    fps: int  #: frames a second
+
+    def job(self) -> dict[str, Any]:
+        """All that the bytes depend on, without the data set."""
+
+    def begin(self, folder: Path) -> None:
+        """Prepares the empty folder, before any part."""
+
+    def write(self, folder: Path, part: int) -> None:
+        """Writes a part. It may find files of it that a killed run has left."""
+
+    def finish(self, folder: Path) -> None:
+        """Joins the parts; they are all there."""
+
+
+def identity(job: dict[str, Any]) -> str:
+    """A name of what is written: the same for the same bytes."""
+    text = json.dumps(job, sort_keys=True, default=str)
+    return hashlib.sha256(text.encode()).hexdigest()[:32]
+
+
+def run(
+    format: Format, job: dict[str, Any], output: Path, *, overwrite: bool, resume: bool,
+    workers: int, progress: Progress | None,
+) -> bool:  # fmt: skip
+    """Writes `output`. Returns whether it is complete: if other processes write parts of it, the
+    one that ends last completes it.
+
+    Raises InputError if `output` is there and is not to be replaced, or is of another kind, and if
+    other processes write something else there.
+    """
+    index, count, _ = _core.worker_from_environment()
+    folder = Folder(output, format, identity(job), overwrite)
+    if resume and folder.is_done():
+        return True
+    if count == 1:
+        with folder.alone(resume):
+            _write(format, folder, list(range(len(format.parts))), workers, progress)
+            folder.finish()
+        return True
+    mine = list(range(index, len(format.parts), count))
+    if folder.is_done():
+        return True
+    with folder.shared():
+        _write(format, folder, mine, workers, progress)
+    return folder.finish_if_last()
+
+
+def _write(
+    format: Format, folder: Folder, parts: list[int], workers: int, progress: Progress | None
+) -> None:
+    wanted = [part for part in parts if not folder.has(part)]
+    total = sum(format.parts[part] for part in parts)
+    done = total - sum(format.parts[part] for part in wanted)
+    lock = threading.Lock()
+
+    def end(part: int) -> None:
+        nonlocal done
+        folder.mark(part)
+        with lock:
+            done += format.parts[part]
+            if progress:
+                progress(done, total)
+
+    if progress:
+        progress(done, total)
+    if min(workers, len(wanted)) <= 1:
+        for part in wanted:
+            format.write(folder.part, part)
+            end(part)
+        return
+    Pool(format, folder.part, min(workers, len(wanted)), folder.lock).run(wanted, end)
+
+
+class Folder:
+    """OUTPUT.part and how it gets its name."""
+
+    def __init__(self, output: Path, format: Format, name: str, overwrite: bool):
+        self.output, self._format, self._name, self._overwrite = output, format, name, overwrite
+        self.lock = -1  # the descriptor of the lock, while it is held
+        self.part, self._old = (
+            output.with_name(output.name + end) for end in (".part", ".old.part")
+        )
+
+    def is_done(self) -> bool:
+        """Whether `output` is complete and what this job writes."""
+        path = self.output / self._format.origin
+        if not (self.output / self._format.sign).is_file() or not path.is_file():
+            return False
+        return json.loads(path.read_text(encoding="utf-8")).get("job") == self._name
+
+    def has(self, part: int) -> bool:
+        return (self.part / f".parts/{part:05d}").is_file()
+
+    def mark(self, part: int) -> None:
+        (self.part / f".parts/{part:05d}").touch()
+
+    @contextmanager
+    def alone(self, resume: bool) -> Iterator[None]:
+        """Holds the folder. If anything but a stop fails, it is removed."""
+        self._check_free()
+        self.part.mkdir(parents=True, exist_ok=True)
+        with open(self.part / ".lock", "w") as lock:
+            if not _locked(lock, fcntl.LOCK_EX):
+                raise _core.InputError(f"{self.part} is being written by another process")
+            try:
+                self.lock = lock.fileno()
+                self._begin(resume)
+                yield
+            except (KeyboardInterrupt, SystemExit):  # stopped: the parts stay for the next run
+                self._put_back()
+                raise
+            except BaseException:
+                shutil.rmtree(self.part, ignore_errors=True)
+                self._put_back()
+                raise
+
+    @contextmanager
+    def shared(self) -> Iterator[None]:
+        """Holds the folder together with others that write the same."""
+        self._check_free()
+        self.part.mkdir(parents=True, exist_ok=True)
+        with open(self.part / ".lock", "w") as lock:
+            with open(self.part / ".start", "w") as start:
+                fcntl.flock(start, fcntl.LOCK_EX)
+                if self._job() != self._name:
+                    if not _locked(lock, fcntl.LOCK_EX):
+                        raise _core.InputError(
+                            f"{self.part} is being written by another process, with other options "
+                            "or of another data set"
+                        )
+                    self._begin(resume=False)
+                fcntl.flock(lock, fcntl.LOCK_SH)
+            self.lock = lock.fileno()
+            yield
+
+    def finish_if_last(self) -> bool:
+        """Whether this process, or one before it, has completed `output`."""
+        if not self.part.is_dir():
+            return self.is_done()
+        with open(self.part / ".start", "w") as start, open(self.part / ".lock", "w") as lock:
+            fcntl.flock(start, fcntl.LOCK_EX)
+            if not self.part.is_dir() or self._job() != self._name:
+                return self.is_done()
+            if not all(self.has(part) for part in range(len(self._format.parts))):
+                return False
+            if not _locked(lock, fcntl.LOCK_EX):
+                return False  # another process ends soon, and finishes
+            self.finish()
+        return True
+
+    def finish(self) -> None:
+        """Joins the parts and gives the folder its name."""
+        self._format.finish(self.part)
+        path = self.part / self._format.origin
+        said = json.loads(path.read_text(encoding="utf-8"))
+        path.unlink()
+        write_json(path, said | {"job": self._name})
+        shutil.rmtree(self.part / ".parts")
+        if self.output.exists():
+            self.output.rename(self._old)
+        for name in (".lock", ".start"):
+            (self.part / name).unlink(missing_ok=True)
+        self.part.rename(self.output)
+        if self._old.exists():
+            self._remove(self._old)
+
+    def _job(self) -> str:
+        path = self.part / ".parts/job.json"
+        return json.loads(path.read_text())["job"] if path.is_file() else ""
+
+    def _begin(self, resume: bool) -> None:
+        if not (resume and self._job() == self._name):
+            _empty(self.part)
+        if self._old.exists() and (self.output.exists() or not self._is_whole(self._old)):
+            self._remove(self._old)
+        elif self._old.exists():  # a run was killed while it changed the names
+            self._old.rename(self.output)
+            self._check_free()
+        (self.part / ".parts").mkdir(exist_ok=True)
+        if self._job() != self._name:
+            self._format.begin(self.part)
+            write_json(self.part / ".parts/job.json", {"job": self._name})
+
+    def _put_back(self) -> None:
+        if self._old.exists() and not self.output.exists():
+            self._old.rename(self.output)
+
+    def _is_whole(self, folder: Path) -> bool:
+        return (folder / self._format.sign).is_file()
+
+    def _remove(self, folder: Path) -> None:
+        """Removes a data set so that what a killed process leaves of it is none."""
+        (folder / self._format.sign).unlink(missing_ok=True)
+        shutil.rmtree(folder)
+
+    def _check_free(self) -> None:
+        if self.output.exists() or self.output.is_symlink():
+            if not self._overwrite:
+                raise _core.InputError(f"{self.output} exists; expected a new folder, or overwrite")
+            if not self._is_whole(self.output):
+                raise _core.InputError(
+                    f"{self.output} is no {self._format.kind}; it is not overwritten"
+                )
+
+
+def _locked(file: Any, how: int) -> bool:
+    try:
+        fcntl.flock(file, how | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    return True
+
+
+def _empty(folder: Path) -> None:
+    for path in folder.iterdir():
+        if path.is_dir():
+            shutil.rmtree(path)
+        elif path.name not in (".lock", ".start"):
+            path.unlink()
+
+
+def write_json(path: Path, value: Any) -> None:
+    """Writes a new file, in UTF-8."""
+    write_text(path, json.dumps(value, indent=4, ensure_ascii=False, allow_nan=False) + "\n")
+
+
+def write_text(path: Path, text: str) -> None:
+    """Writes a new file, in UTF-8, to the disk."""
+    with open(path, "x", encoding="utf-8") as file:
+        file.write(text)
+        sync(file)
+
+
+def sync(file: Any) -> None:
+    """Brings an open file to the disk."""
+    file.flush()
+    os.fsync(file.fileno())

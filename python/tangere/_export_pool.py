@@ -1,0 +1,142 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Processes that write parts of an export.
+
+They are new Pythons, not forks: a fork of a process with threads may hang, and a process that
+`multiprocessing` starts runs the caller's program again. A process reads a pickled format and then
+numbers of parts from its standard input, and answers each with a line of JSON. It ends when its
+standard input does, so none outlives a caller that was killed. Until then it holds the lock of the
+folder, whose descriptor it inherits.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import pickle
+import queue
+import subprocess
+import sys
+import threading
+from pathlib import Path
+from typing import Any, Callable, Sequence
+
+from . import _core
+
+_PROGRAM = "import tangere._export_pool as pool; pool.serve()"
+_ERRORS: dict[str, type[BaseException]] = {
+    "InputError": _core.InputError, "IoError": _core.IoError, "OSError": OSError
+}  # fmt: skip
+
+
+class Pool:
+    """Writes parts of `format` into `folder` with `workers` processes, which inherit `lock`."""
+
+    def __init__(self, format: Any, folder: Path, workers: int, lock: int):
+        self._workers, self._lock = workers, lock
+        self._setting = pickle.dumps((format, folder))
+        self._left: queue.SimpleQueue[int] = queue.SimpleQueue()
+        self._failed: list[BaseException] = []
+        self._processes: list[subprocess.Popen[bytes]] = []
+
+    def run(self, parts: Sequence[int], end: Callable[[int], None]) -> None:
+        """Calls `end` with each part that is complete, from several threads. Raises what the first
+        process that failed has raised."""
+        for part in parts:
+            self._left.put(part)
+        threads = [threading.Thread(target=self._feed, args=(end,)) for _ in range(self._workers)]
+        try:
+            for thread in threads:
+                thread.start()
+            for thread in threads:
+                while thread.is_alive():  # so that a signal is served
+                    thread.join(0.1)
+        except BaseException:
+            self._stop()
+            for thread in threads:
+                thread.join()
+            raise
+        if self._failed:
+            raise self._failed[0]
+
+    def _feed(self, end: Callable[[int], None]) -> None:
+        path = os.pathsep.join(path for path in sys.path if path)
+        alone = {"PYTHONPATH": path, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+        process = subprocess.Popen(
+            [sys.executable, "-c", _PROGRAM], env=os.environ | alone,
+            stdin=subprocess.PIPE, stdout=subprocess.PIPE, start_new_session=True,
+            pass_fds=(self._lock,),
+        )  # fmt: skip
+        self._processes.append(process)
+        assert process.stdin and process.stdout
+        part = None
+        try:
+            process.stdin.write(len(self._setting).to_bytes(8, "little") + self._setting)
+            while not self._failed:
+                try:
+                    part = self._left.get_nowait()
+                except queue.Empty:
+                    break
+                process.stdin.write(b"%d\n" % part)
+                process.stdin.flush()
+                answer = json.loads(process.stdout.readline() or b"{}")
+                if answer.get("part") != part:
+                    raise _error_of(answer, part, process)
+                end(part)
+            process.stdin.close()
+        except BrokenPipeError:
+            self._fail(_error_of({}, part, process))
+        except BaseException as error:
+            self._fail(error)
+        finally:
+            process.stdout.close()
+            process.wait()
+
+    def _fail(self, error: BaseException) -> None:
+        self._failed.append(error)
+        self._stop()
+
+    def _stop(self) -> None:
+        self._failed.append(KeyboardInterrupt())
+        for process in self._processes:
+            if process.poll() is None:
+                process.terminate()
+
+
+def _error_of(
+    answer: dict[str, Any], part: int | None, process: subprocess.Popen[bytes]
+) -> BaseException:
+    if "error" in answer:
+        kind = _ERRORS[answer["error"]]
+        return kind(*answer["arguments"])
+    return _core.IoError(
+        f"the process that wrote part {part} of an export ended with code {process.wait()}"
+    )
+
+
+def serve() -> None:
+    """What a process of the pool does, until its standard input ends."""
+    out, sys.stdout = sys.stdout, sys.stderr  # nothing else may answer
+    source = sys.stdin.buffer
+    format, folder = pickle.loads(source.read(int.from_bytes(source.read(8), "little")))
+    parts: queue.SimpleQueue[int] = queue.SimpleQueue()
+
+    def listen() -> None:
+        for line in source:
+            parts.put(int(line))
+        os._exit(0)  # every part is answered, or the caller is gone
+
+    threading.Thread(target=listen, daemon=True).start()
+    while True:
+        out.write(json.dumps(_answer(format, folder, parts.get())) + "\n")
+        out.flush()
+
+
+def _answer(format: Any, folder: Path, part: int) -> dict[str, Any]:
+    try:
+        format.write(folder, part)
+        return {"part": part}
+    except (_core.InputError, _core.IoError) as error:
+        return {"error": type(error).__name__, "arguments": [str(error)]}
+    except OSError as error:
+        named = [str(error.filename)] if error.filename else []
+        return {"error": "OSError", "arguments": [error.errno, error.strerror, *named]}

@@ -1,0 +1,56 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The collection of examples/collection.py, with one episode of each part."""
+
+from __future__ import annotations
+
+import importlib.util
+import re
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import tangere
+from tangere.data import Episodes
+
+PATH = Path(__file__).parents[2] / "examples/collection.py"
+
+
+@pytest.fixture(scope="module")
+def collection():
+    spec = importlib.util.spec_from_file_location("collection", PATH)
+    module = importlib.util.module_from_spec(spec)
+    sys.modules["collection"] = module  # which its dataclass wants
+    spec.loader.exec_module(module)
+    module.LEAST = 1
+    return module
+
+
+def test_all_parts_are_made_and_named_by_the_card(collection, command, tmp_path, monkeypatch):
+    monkeypatch.setenv("TANGERE_PROGRAM", str(command))
+    monkeypatch.setattr(sys, "argv", ["collection.py", str(tmp_path), "--episodes", "1"])
+    assert collection.main() == 0
+    card = (tmp_path / "README.md").read_text()
+    for part in collection.PARTS:
+        data = Episodes(tmp_path / part.name)
+        assert len(data) == 1 and f"| {part.name} | 1 | {data.lengths[0]} |" in card
+        assert f"{data.content:016x}" in card and data.command in card
+    assert sum(part.share for part in collection.PARTS) == 100
+    mug = Episodes(tmp_path / "touch_mug")
+    assert np.abs(mug[0]["left_finger"]).max() > 0.02 and np.ptp(mug[0]["eye.rgb"]) > 50
+    assert {"body mug density", "tactile left_finger kn"} <= set(mug.attributes["randomized_names"])
+    depths = [
+        np.abs(Episodes(tmp_path / f"touch_gel_{kind}")[0]["gel.markers"]).max()
+        for kind in collection.GELS
+    ]
+    assert depths[0] > depths[1] > depths[2] > 0  # a softer gel gives way
+    before = (tmp_path / "box_pushing/shard-00000.h5").stat().st_mtime_ns
+    assert collection.main() == 0  # nothing is left to do
+    assert (tmp_path / "box_pushing/shard-00000.h5").stat().st_mtime_ns == before
+    assert re.findall("Licence: (.*?)[.] ", (tmp_path / "README.md").read_text()) == ["CC0-1.0"]
+
+
+def test_a_scene_that_has_changed_is_told(collection):
+    with pytest.raises(tangere.InputError, match="mug: no 'nothing like it'; expected the scene"):
+        collection.changed("mug", (("nothing like it", "x"),))
