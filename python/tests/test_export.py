@@ -340,6 +340,15 @@ def test_what_a_format_does_not_have_is_told(pushes, generate, tmp_path):
         exports.export(pushes, tmp_path / "mine", "zarr", overwrite=True)
 
 
+def test_a_library_that_is_missing_is_named(pushes, tmp_path, monkeypatch):
+    for to, module, package in (("univtac", "PIL", "pillow"), ("zarr", "zarr", "zarr")):
+        monkeypatch.delitem(sys.modules, f"tangere._export_{to}", raising=False)
+        monkeypatch.setitem(sys.modules, module, None)
+        with pytest.raises(tangere.IoError, match=f"expected it from `pip install {package}`"):
+            exports.export(pushes, tmp_path / "out", to)
+    assert not list(tmp_path.iterdir())
+
+
 def test_csv_is_that_of_the_command(pushes, command, tmp_path):
     done = exports.export(pushes, tmp_path / "python.csv", "csv")
     words = [command, "export", pushes, tmp_path / "command.csv", "--to", "csv"]
