@@ -74,7 +74,7 @@ class Episodes:
                     self.sensors = {name: dict(sensors[name].attrs) for name in sensors}
                     cameras = file["scene"].get("cameras", {})
                     self.cameras = {name: dict(cameras[name].attrs) for name in cameras}
-                self.content = (self.content + int(file.attrs["content_sum"])) % 2**64
+                self.content = (self.content + int(file.attrs.get("content_sum", 0))) % 2**64
                 for name, demo in file["data"].items():
                     rows = int(demo.attrs["num_samples"])
                     found.append((int(name.removeprefix("demo_")), name, number, rows))

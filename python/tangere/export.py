@@ -139,8 +139,9 @@ def _format(to: str, frames: Frames, options: dict[str, Any]) -> _export_job.For
     try:
         made = getattr(importlib.import_module(module), name)
     except ModuleNotFoundError as error:
+        package = {"PIL": "pillow"}.get(str(error.name), error.name)
         raise _core.IoError(
-            f"{to} needs the package {error.name}; expected it from `pip install {error.name}`"
+            f"{to} needs the package {package}; expected it from `pip install {package}`"
         ) from None
     known = [name for name in inspect.signature(made).parameters if name != "frames"]
     for option in options:

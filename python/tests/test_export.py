@@ -138,6 +138,46 @@ def test_univtac_has_its_groups(presses, tmp_path):
         assert np.abs(now - rest).max() > 0.1
 
 
+def test_videos_follow_one_another(generate, tmp_path):
+    av = pytest.importorskip("av", reason="av is not installed")
+    import pyarrow.parquet as pq
+
+    text = tangere.scenes()["rolling_ball_small"].read_text()
+    eye = '<camera name="eye" pos="0 -0.2 0.1" look="0 0 0" rows="64" cols="80"/></sensor>'
+    (tmp_path / "seen.xml").write_text(text.replace("</sensor>", eye))
+    data = generate(str(tmp_path / "seen.xml"), "--episodes", "3", "--steps", "60", "--every", "10",
+                    "--record", "pad,eye.rgb")  # fmt: skip
+    exports.export(data, tmp_path / "out", pictures="video", file_megabytes=0.2)
+    rows = pq.read_table(tmp_path / "out/meta/episodes/chunk-000/file-000.parquet").to_pylist()
+    name, rgb = "observation.images.eye.rgb", stored(data, "obs/eye.rgb")
+    info = json.loads((tmp_path / "out/meta/info.json").read_text())
+    assert (
+        info["features"][name]["dtype"] == "video"
+        and name not in pq.read_schema(tmp_path / "out/data/chunk-000/file-000.parquet").names
+    )
+    shown = 0
+    for row in rows:
+        place = {k: row[f"videos/{name}/{k}"] for k in ("chunk_index", "file_index")}
+        path = tmp_path / "out" / info["video_path"].format(video_key=name, **place)
+        with av.open(str(path)) as video:
+            frames = [frame.to_ndarray(format="rgb24") for frame in video.decode(video=0)]
+        start = round(row[f"videos/{name}/from_timestamp"] * info["fps"])
+        end = round(row[f"videos/{name}/to_timestamp"] * info["fps"])
+        part = rgb[row["dataset_from_index"] : row["dataset_to_index"]]
+        assert end - start == len(part)
+        for frame, wanted in zip(frames[start:end], part, strict=True):
+            assert np.abs(frame.astype(int) - wanted).mean() < 6
+            shown += 1
+    assert shown == len(rgb) and len(list(tmp_path.glob("out/videos/*/*/*.mp4"))) == 2
+    (tmp_path / "small.xml").write_text(
+        text.replace("</sensor>", eye.replace('rows="64"', 'rows="63"'))
+    )
+    small = generate(str(tmp_path / "small.xml"), "--episodes", "1", "--steps", "20", "--every",
+                     "10", "--record", "eye.rgb")  # fmt: skip
+    with pytest.raises(tangere.InputError, match="63 × 80 as video; expected even sizes of 64"):
+        exports.export(small, tmp_path / "none", pictures="video")
+
+
 def test_a_window_has_the_touch_between_frames(balls, tmp_path):
     exports.export(balls, tmp_path / "zarr", "zarr", window=20, privileged=True)
     root = zarr.open_group(str(tmp_path / "zarr"), mode="r")
@@ -298,6 +338,15 @@ def test_what_a_format_does_not_have_is_told(pushes, generate, tmp_path):
     (tmp_path / "mine").mkdir()
     with pytest.raises(tangere.InputError, match="is no Zarr data set; it is not overwritten"):
         exports.export(pushes, tmp_path / "mine", "zarr", overwrite=True)
+
+
+def test_a_library_that_is_missing_is_named(pushes, tmp_path, monkeypatch):
+    for to, module, package in (("univtac", "PIL", "pillow"), ("zarr", "zarr", "zarr")):
+        monkeypatch.delitem(sys.modules, f"tangere._export_{to}", raising=False)
+        monkeypatch.setitem(sys.modules, module, None)
+        with pytest.raises(tangere.IoError, match=f"expected it from `pip install {package}`"):
+            exports.export(pushes, tmp_path / "out", to)
+    assert not list(tmp_path.iterdir())
 
 
 def test_csv_is_that_of_the_command(pushes, command, tmp_path):
