@@ -118,15 +118,16 @@ void GelCamera<T>::read_height(std::span<T> height) const {
 }
 
 template <class T>
-void GelCamera<T>::paint(int row, bool markers) {
+void GelCamera<T>::paint(int row, bool markers, std::span<T> up) {
   if (image_.is_flat(row)) {
     std::fill(p_.begin(), p_.end(), T(0));
     std::fill(q_.begin(), q_.end(), T(0));
+    std::fill(up.begin(), up.end(), T(1));
     const std::span<const T> flat = colour_.background(row);
     std::copy(flat.begin(), flat.end(), planes_.begin());
   } else {
     image_.read_slopes(row, p_, q_);
-    colour_.shade(row, p_, q_, planes_);
+    colour_.shade(row, p_, q_, planes_, up);
   }
   if (markers) markers_->darken(row, planes_);
   if (!key_) return;
@@ -163,19 +164,19 @@ template <class T>
 void GelCamera<T>::pull_back(bool markers, std::span<const T> height_bar,
                              std::span<const T> colour_bar, std::span<T> surface_bar) {
   const std::size_t width = p_.size();
-  std::vector<T> planes_bar(planes_.size());
+  std::vector<T> planes_bar(planes_.size()), up(width);
   image_.begin_pull_back();
   for (int row = 0; row < grid_.height; ++row) {
     const auto first = static_cast<std::size_t>(row) * width;
     if (!height_bar.empty()) image_.add_heights(row, height_bar.subspan(first, width));
     if (colour_bar.empty()) continue;
-    paint(row, markers);
+    paint(row, markers, up);
     // Factors of the markers, by painting a row of ones.
     std::fill(planes_bar.begin(), planes_bar.end(), T(1));
     if (markers) markers_->darken(row, planes_bar);
     weigh_row(
         {planes_.data(), colour_bar.data() + kColours * first, planes_bar.data(), width, gains_});
-    colour_.pull_back(row, p_, q_, planes_bar, p_bar_, q_bar_);
+    colour_.pull_back(row, p_, q_, up, planes_bar, p_bar_, q_bar_);
     image_.add_slopes(row, p_bar_, q_bar_);
   }
   image_.take(surface_bar);

@@ -54,8 +54,8 @@ class GelCamera {
   void pull_back_depth(std::span<const T> surface_bar, std::span<T> depth_bar);
 
  private:
-  /// Fills planes_ with a row of the picture, not clamped yet.
-  void paint(int row, bool markers);
+  /// Fills planes_ with a row of the picture, not clamped yet. `up`: as of GelColour::shade().
+  void paint(int row, bool markers, std::span<T> up = {});
 
   PictureGrid grid_;
   double noise_, gain_;

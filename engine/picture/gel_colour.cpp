@@ -26,13 +26,14 @@ void average_line(const float* given, std::ptrdiff_t step, int from, T* out,
 template <class T>
 struct RowLoop {
   const T *p, *q, *x, *background;
-  T* planes;
+  T *planes, *up;  // up: N of the normals, where it is kept
   std::size_t width;
   const std::array<std::array<T, kShades>, kColours>*level, *tilt;
 };
 
-template <class T>
+template <bool kKeep, class T>
 [[gnu::always_inline]] inline void shade_pixels(const RowLoop<T>& row) {
+  T* const up = row.up;
   for (std::size_t c = 0; c < kColours; ++c) {
     const T *const p = row.p, *const q = row.q, *const x = row.x;
     const T* const background = row.background + c * row.width;
@@ -41,6 +42,7 @@ template <class T>
 #pragma GCC ivdep
     for (std::size_t i = 0; i < row.width; ++i) {
       const T z = T(1) / std::sqrt(T(1) + (p[i] * p[i] + q[i] * q[i]));
+      if constexpr (kKeep) up[i] = z;
       const T u = -p[i] * z, v = -q[i] * z, w = z - T(1);
       const T xx = u * u, xy = u * v, yy = v * v, xz = u * z, yz = v * z;
       const T level = ((a[0] * u + a[1] * v) + (a[2] * w + a[3] * xx)) +
@@ -54,7 +56,7 @@ template <class T>
 
 template <class T>
 struct RowPullback {
-  const T *p, *q, *x, *planes_bar;
+  const T *p, *q, *x, *up, *planes_bar;
   T *p_bar, *q_bar;
   std::size_t width;
   const std::array<std::array<T, kShades>, kColours>*level, *tilt;
@@ -62,13 +64,13 @@ struct RowPullback {
 
 template <class T>
 [[gnu::always_inline]] inline void pull_back_pixels(const RowPullback<T>& row) {
-  const T *const p = row.p, *const q = row.q, *const places = row.x;
+  const T *const p = row.p, *const q = row.q, *const places = row.x, *const up = row.up;
   const T *const r = row.planes_bar, *const g = r + row.width, *const b = g + row.width;
   T *const p_bar = row.p_bar, *const q_bar = row.q_bar;
   const auto level = *row.level, tilt = *row.tilt;
 #pragma GCC ivdep
   for (std::size_t i = 0; i < row.width; ++i) {
-    const T z = T(1) / std::sqrt(T(1) + (p[i] * p[i] + q[i] * q[i])), x = -p[i] * z, y = -q[i] * z;
+    const T z = up[i], x = -p[i] * z, y = -q[i] * z;
     const auto bar = [&](std::size_t j) {  // of φ_j
       return (r[i] * level[0][j] + g[i] * level[1][j] + b[i] * level[2][j]) +
              places[i] * (r[i] * tilt[0][j] + g[i] * tilt[1][j] + b[i] * tilt[2][j]);
@@ -83,8 +85,10 @@ template <class T>
 
 TANGERE_CLONES void pull_back_row(const RowPullback<float>& row) { pull_back_pixels(row); }
 TANGERE_CLONES void pull_back_row(const RowPullback<double>& row) { pull_back_pixels(row); }
-TANGERE_CLONES void shade_row(const RowLoop<float>& row) { shade_pixels(row); }
-TANGERE_CLONES void shade_row(const RowLoop<double>& row) { shade_pixels(row); }
+TANGERE_CLONES void shade_row(const RowLoop<float>& row) { shade_pixels<false>(row); }
+TANGERE_CLONES void shade_row(const RowLoop<double>& row) { shade_pixels<false>(row); }
+TANGERE_CLONES void shade_and_keep(const RowLoop<float>& row) { shade_pixels<true>(row); }
+TANGERE_CLONES void shade_and_keep(const RowLoop<double>& row) { shade_pixels<true>(row); }
 
 }  // namespace
 
@@ -134,20 +138,22 @@ typename GelColour<T>::Row GelColour<T>::row_of(int row) const {
 }
 
 template <class T>
-void GelColour<T>::shade(int row, std::span<const T> p, std::span<const T> q,
-                         std::span<T> planes) const {
+void GelColour<T>::shade(int row, std::span<const T> p, std::span<const T> q, std::span<T> planes,
+                         std::span<T> up) const {
   const Row of = row_of(row);
-  shade_row({p.data(), q.data(), x_.data(), background(row).data(), planes.data(), p.size(),
-             &of.level, &of.tilt});
+  const RowLoop<T> loop{p.data(),      q.data(),  x_.data(), background(row).data(),
+                        planes.data(), up.data(), p.size(),  &of.level,
+                        &of.tilt};
+  up.empty() ? shade_row(loop) : shade_and_keep(loop);
 }
 
 template <class T>
 void GelColour<T>::pull_back(int row, std::span<const T> p, std::span<const T> q,
-                             std::span<const T> planes_bar, std::span<T> p_bar,
-                             std::span<T> q_bar) const {
+                             std::span<const T> up, std::span<const T> planes_bar,
+                             std::span<T> p_bar, std::span<T> q_bar) const {
   const Row of = row_of(row);
-  pull_back_row({p.data(), q.data(), x_.data(), planes_bar.data(), p_bar.data(), q_bar.data(),
-                 p.size(), &of.level, &of.tilt});
+  pull_back_row({p.data(), q.data(), x_.data(), up.data(), planes_bar.data(), p_bar.data(),
+                 q_bar.data(), p.size(), &of.level, &of.tilt});
 }
 
 template class GelColour<float>;

@@ -30,11 +30,14 @@ class GelColour {
 
   /// Returns the background of a row, (3, width): R of all pixels, then G, then B.
   [[nodiscard]] std::span<const T> background(int row) const;
-  /// Computes the colours of a row, (3, width), not clamped, from its slopes, (width) each.
-  void shade(int row, std::span<const T> p, std::span<const T> q, std::span<T> planes) const;
-  /// Computes the cotangents of the slopes of a row from those of its colours, (3, width).
-  void pull_back(int row, std::span<const T> p, std::span<const T> q, std::span<const T> planes_bar,
-                 std::span<T> p_bar, std::span<T> q_bar) const;
+  /// Computes the colours of a row, (3, width), not clamped, from its slopes, (width) each. `up`:
+  /// N of its normals, (width), for pull_back(); empty: not needed.
+  void shade(int row, std::span<const T> p, std::span<const T> q, std::span<T> planes,
+             std::span<T> up = {}) const;
+  /// Computes the cotangents of the slopes of a row from those of its colours, (3, width). `up`: as
+  /// shade() gave it.
+  void pull_back(int row, std::span<const T> p, std::span<const T> q, std::span<const T> up,
+                 std::span<const T> planes_bar, std::span<T> p_bar, std::span<T> q_bar) const;
 
  private:
   struct Row {  ///< a + d y, and b, of all channels and φ
