@@ -11,6 +11,7 @@
 #include "engine/model/compile_variations.hpp"
 #include "engine/model/model_part.hpp"
 #include "engine/model/random.hpp"
+#include "engine/model/transmission_state.hpp"
 #include "engine/scene/scene_faults.hpp"
 #include "engine/scene/scene_number.hpp"
 #include "engine/scene/shapes.hpp"
@@ -156,6 +157,7 @@ void Batch::draw_episode(std::size_t lane) {
       m, [&](int i) -> double& { return own[(m.layout.q + i) * kBlock]; },
       [&](int i) -> double& { return own[(m.layout.v + i) * kBlock]; });
   update_derived_rows(m, own);
+  place_transmissions(lane);
   complete_state(lane);
 }
 
@@ -172,6 +174,14 @@ void Batch::reset(int environment, std::int64_t episode) {
   shear_[lane].clear();
   sleep_[lane] = {};
   clearance_[lane] = 0;
+}
+
+/// Sets the coordinates and rates of transmissions in a lane's state.
+void Batch::place_transmissions(std::size_t lane) {
+  const CompiledModel& m = compiled(model_);
+  if (m.transmissions.empty()) return;
+  double* const own = column(lane);
+  TransmissionState(m).place(own + m.layout.q * kBlock, own + m.layout.v * kBlock, kBlock, own);
 }
 
 namespace {
@@ -215,6 +225,7 @@ void Batch::displace(std::size_t lane, std::span<const double> q, std::span<cons
   place_followers(
       m, [&](int i) -> double& { return own[(m.layout.q + i) * kBlock]; },
       [&](int i) -> double& { return own[(m.layout.v + i) * kBlock]; });
+  place_transmissions(lane);
   sleep_[lane].wake();
   clearance_[lane] = 0;
 }
