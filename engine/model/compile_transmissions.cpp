@@ -40,6 +40,7 @@ class Transmissions {
     t.v = m_.joints[joint].v;
     t.q = m_.joints[joint].q;
     t.link = m_.joints[joint].link;
+    t.has_length = d.kind == TransmissionDescription::Kind::path || d.reference;
     t.first_piece = static_cast<int>(m_.transmission_pieces.size());
     d.kind == TransmissionDescription::Kind::path ? add_path() : add_wrench();
     t.pieces = static_cast<int>(m_.transmission_pieces.size()) - t.first_piece;

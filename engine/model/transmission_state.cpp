@@ -87,7 +87,7 @@ void TransmissionState::complete(const double* q, const double* v, int stride, c
     double along = 0, rate = 0;
     for (int k = 0; k < part.transmission.dofs; ++k) {
       const auto dof = std::size_t(part.dofs[k].v);
-      along += part.columns[k].slope * q_dot[dof];
+      if (part.transmission.has_length) along += part.columns[k].slope * q_dot[dof];
       rate += part.columns[k].slope * v_dot[dof] + part.columns[k].rate * q_dot[dof];
     }
     const auto by_places = [&](double q_bar, double v_bar) {
@@ -112,7 +112,8 @@ void TransmissionState::pull_back(const double* q, const double* v, int stride,
     double &own_q = at(q_bar, part.transmission.v), &own_v = at(v_bar, part.transmission.v);
     for (int k = 0; k < part.transmission.dofs; ++k) {
       const int dof = part.dofs[k].v;
-      at(q_bar, dof) += part.columns[k].slope * own_q + part.columns[k].rate * own_v;
+      at(q_bar, dof) += part.columns[k].rate * own_v;
+      if (part.transmission.has_length) at(q_bar, dof) += part.columns[k].slope * own_q;
       at(v_bar, dof) += part.columns[k].slope * own_v;
     }
     if (places != nullptr) add_places(part, own_q, own_v, places, out_stride);

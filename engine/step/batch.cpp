@@ -157,7 +157,6 @@ void Batch::draw_episode(std::size_t lane) {
       m, [&](int i) -> double& { return own[(m.layout.q + i) * kBlock]; },
       [&](int i) -> double& { return own[(m.layout.v + i) * kBlock]; });
   update_derived_rows(m, own);
-  place_transmissions(lane);
   complete_state(lane);
 }
 
@@ -260,6 +259,7 @@ void Batch::complete_state(std::size_t lane) {
     const double scale = 1 / std::sqrt(square);
     for (int k = 0; k < 4; ++k) at(first + k) *= scale;
   }
+  place_transmissions(lane);
   for (int i = 0; i < m.nq; ++i) at(m.layout.previous_q + i) = at(m.layout.q + i);
   for (int i = 0; i < m.nv; ++i) at(m.layout.previous_v + i) = at(m.layout.v + i);
   fill_past_states(lane);

@@ -21,7 +21,8 @@ void transmission_rhs(const ModelView& model, const StageArgs<N>& a, const Adjoi
         model, a, part,
         [&](int l, N& d_dq, N& d_dv) {
           const TransmissionColumn<N>& c = part.columns[l];
-          d_dq = d.q_bar[own] * c.slope + d.v_bar[own] * c.rate;
+          d_dq = d.v_bar[own] * c.rate;
+          if (part.transmission.has_length) d_dq += d.q_bar[own] * c.slope;
           d_dv = d.v_bar[own] * c.slope;
         },
         [&](int l, const N& d_dx) { d.rhs[part.dofs[l].v] += d_dx; });

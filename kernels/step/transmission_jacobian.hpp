@@ -88,7 +88,7 @@ OwnSlopes<N> own_slopes(const ModelView& model, const StageArgs<N>& a, const Tra
   if (!(link.effects & kBeyondDamping)) return s;
   JointLoad<N> load;
   joint_load<JointKind::prismatic, true>(model, a, link, load);
-  return {load.d_dq[0], s.by_v + load.d_dv[0], load.armature[0]};
+  return {t.has_length ? load.d_dq[0] : N(0.0), s.by_v + load.d_dv[0], load.armature[0]};
 }
 
 /// Turns derivatives of a number by displacements and by rates into those by x, joint by joint:

@@ -43,6 +43,7 @@ struct TransmissionDof {
 /// is that of the length, or the power of a wrench of size 1.
 struct Transmission {
   int v, q, link;
+  bool has_length;  ///< false: its coordinate stays 0
   int first_piece, pieces;
   int first_dof, dofs;
 };

@@ -258,11 +258,19 @@ TEST(TransmissionFaults, SayWhatWasExpected) {
   const auto has = [](const std::string& text, const char* part) {
     EXPECT_NE(text.find(part), std::string::npos) << text;
   };
-  has(fault([](Scene& s) { s.transmissions[0].joint = "rope"; }), "no joint is named 'rope'");
+  has(fault([](Scene& s) {
+        s.transmissions.push_back(s.transmissions[0]);
+        s.transmissions[1].joint = "rope";
+      }),
+      "no joint is named 'rope'");
   has(fault([](Scene& s) { s.transmissions[0].path[0].body = "cube"; }), "no body is named 'cube'");
   has(fault([](Scene& s) { s.transmissions[0].path.pop_back(); }), "expected points at both ends");
   has(fault([](Scene& s) { s.transmissions[0].path[0].body = ""; }), "expected one that moves");
-  has(fault([](Scene& s) { s.transmissions[0].joint = "ball_joint"; }), "moves a body");
+  has(fault([](Scene& s) {
+        s.transmissions.push_back(s.transmissions[0]);
+        s.transmissions[1].joint = "ball_joint";
+      }),
+      "moves a body");
   has(fault([](Scene& s) { s.transmissions.push_back(s.transmissions[0]); }), "given twice");
   has(fault([](Scene& s) {
         auto& path = s.transmissions[0].path;
