@@ -3,6 +3,7 @@
 // whose rates are v.
 #include "engine/model/transmission_state.hpp"
 
+#include <cmath>
 #include <numeric>
 
 #include "kernels/reverse/transmission_adjoint.hpp"
@@ -55,8 +56,12 @@ void TransmissionState::place(double* q, double* v, int stride, const double* co
   move_to(q, v, stride, column);
   for (const kernels::Transmission& t : m_.transmissions) {
     const auto iq = std::size_t(t.q), iv = std::size_t(t.v);
-    q[iq * std::size_t(stride)] = q_[iq] + x_[iv];
-    v[iv * std::size_t(stride)] = rates_[iv];
+    // Already there to rounding: kept as is, so that a stored state continues bit for bit.
+    const auto set = [](double& to, double x) {
+      if (!(std::abs(to - x) <= 1e-14 * (1 + std::abs(x)))) to = x;
+    };
+    set(q[iq * std::size_t(stride)], q_[iq] + x_[iv]);
+    set(v[iv * std::size_t(stride)], rates_[iv]);
   }
 }
 
