@@ -9,7 +9,6 @@
 #include <cmath>
 #include <set>
 
-#include "engine/model/compile_joints.hpp"
 #include "engine/model/transmission_state.hpp"
 #include "engine/scene/frames.hpp"
 

@@ -95,13 +95,13 @@ void TransmissionState::complete(const double* q, const double* v, int stride, c
       if (part.transmission.has_length) along += part.columns[k].slope * q_dot[dof];
       rate += part.columns[k].slope * v_dot[dof] + part.columns[k].rate * q_dot[dof];
     }
-    const auto by_places = [&](double q_bar, double v_bar) {
+    const auto place_change = [&](double q_bar, double v_bar) {
       std::vector<double> places(3 * links_.size());
       add_places(part, q_bar, v_bar, places.data(), 1);
       return std::inner_product(places.begin(), places.end(),
                                 numbers_dot.begin() + m_.view.rows.places, 0.0);
     };
-    if (!numbers_dot.empty()) along += by_places(1, 0), rate += by_places(0, 1);
+    if (!numbers_dot.empty()) along += place_change(1, 0), rate += place_change(0, 1);
     q_dot[std::size_t(part.transmission.v)] = along;
     v_dot[std::size_t(part.transmission.v)] = rate;
   });

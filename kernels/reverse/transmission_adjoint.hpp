@@ -17,7 +17,7 @@ template <class N>
 void transmission_rhs(const ModelView& model, const StageArgs<N>& a, const AdjointArgs<N>& d) {
   for_each_transmission(model, a, [&](const TransmissionPart<N>& part) {
     const int own = part.transmission.v;
-    by_x(
+    combine_dofs(
         model, a, part,
         [&](int l, N& d_dq, N& d_dv) {
           const TransmissionColumn<N>& c = part.columns[l];
@@ -83,21 +83,21 @@ void add_piece_places(const StageArgs<N>& a, const TransmissionPart<N>& part,
     for (int i = 0; i < p.points; ++i) pull[i] += weight(k) * part.columns[k].way[i];
   for (int i = 0; i < points; ++i) {
     const Vec3<N>& slope = p.points == 0 ? p.force : p.length.slope[i];
-    Vec3<N> of_point = zero3<N>();
+    Vec3<N> point_bar = zero3<N>();
     if (p.points > 0) {
-      of_point = weights.length * slope + p.length.second[i][0] * pull[0];
-      if (p.points == 2) of_point += p.length.second[i][1] * pull[1];
-      add(piece.round, -of_point);
+      point_bar = weights.length * slope + p.length.second[i][0] * pull[0];
+      if (p.points == 2) point_bar += p.length.second[i][1] * pull[1];
+      add(piece.round, -point_bar);
     }
     for (int k = 0; k < n; ++k) {
       const int times =
           int(moves(p.moved[i], k)) - int(p.points > 0 && moves(piece.moves_round, k));
       if (times == 0 || !part.columns[k].turns) continue;
       const Vec3<N> turned = (N(double(times)) * weight(k)) * cross(slope, part.columns[k].axis);
-      of_point += turned;
+      point_bar += turned;
       add(part.dofs[k].link, -turned);
     }
-    add(i == 0 ? piece.first : piece.second, of_point);
+    add(i == 0 ? piece.first : piece.second, point_bar);
   }
 }
 
@@ -109,8 +109,9 @@ void transmission_places(const ModelView& model, const StageArgs<N>& a, const Ad
     const Transmission& t = part.transmission;
     const OwnSlopes<N> own = own_slopes(model, a, t);
     const N& lambda = d.lambda[t.v];
-    const PlaceWeights<N> weights = {d.q_bar[t.v] - own.by_q * lambda,
-                                     d.v_bar[t.v] - own.by_v * lambda, *part.force, a.v, d.lambda};
+    const PlaceWeights<N> weights = {d.q_bar[t.v] - own.q_slope * lambda,
+                                     d.v_bar[t.v] - own.v_slope * lambda, *part.force, a.v,
+                                     d.lambda};
     for (int i = 0; i < t.pieces; ++i) add_piece_places(a, part, part.pieces[i], weights, out);
   });
 }

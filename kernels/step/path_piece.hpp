@@ -15,9 +15,6 @@
 // The tangent points drop out of all derivatives.
 #pragma once
 
-#include <limits>
-#include <numbers>
-
 #include "kernels/numbers/rotation_vector.hpp"
 #include "kernels/step/transmission_types.hpp"
 
@@ -40,6 +37,8 @@ N angle_by(const N& cosine, const N& sine) {
              Quat<N>{select(acute, large, small), select(acute, small, large), N(0.0), N(0.0)})
       .phi.x;
 }
+
+inline constexpr double kFullTurn = 6.283185307179586;  ///< 2 π
 
 /// Keeps divisors away from 0.
 template <class N>
@@ -114,7 +113,7 @@ PieceLength<N> circle_piece(const TransmissionPiece& piece, const Vec3<N>& x0, c
   if (piece.has_side) {
     const auto long_way = takes_long_way(p, x0, x1, r, side, excess);
     sign = select(long_way, N(-1.0), sign);
-    turn = select(long_way, N(2 * std::numbers::pi) - gamma, turn);
+    turn = select(long_way, N(kFullTurn) - gamma, turn);
     wraps = select(long_way, N(1.0), wraps);
   }
   const auto straight = inside | (wraps <= N(0.0));

@@ -78,24 +78,24 @@ void transmission_second(const StageArgs<N>& a, const TransmissionPart<N>& part)
 /// Derivatives of g of a transmission's joint.
 template <class N>
 struct OwnSlopes {
-  N by_q, by_v, armature;
+  N q_slope, v_slope, armature;
 };
 template <class N>
 OwnSlopes<N> own_slopes(const ModelView& model, const StageArgs<N>& a, const Transmission& t) {
   const Link& link = model.links[t.link];
   OwnSlopes<N> s = {N(0.0), N(0.0), N(0.0)};
-  if (link.effects & kDamping) s.by_v = load_parameter(a, model.effects[t.v].damping);
+  if (link.effects & kDamping) s.v_slope = load_parameter(a, model.effects[t.v].damping);
   if (!(link.effects & kBeyondDamping)) return s;
   JointLoad<N> load;
   joint_load<JointKind::prismatic, true>(model, a, link, load);
-  return {t.has_length ? load.d_dq[0] : N(0.0), s.by_v + load.d_dv[0], load.armature[0]};
+  return {t.has_length ? load.d_dq[0] : N(0.0), s.v_slope + load.d_dv[0], load.armature[0]};
 }
 
 /// Turns derivatives of a number by displacements and by rates into those by x, joint by joint:
 /// f(l, d_dq, d_dv) sets those of dof l, and add(l, d_dx) takes the result.
 template <class N, class F, class Add>
-void by_x(const ModelView& model, const StageArgs<N>& a, const TransmissionPart<N>& part,
-          const F& f, const Add& add) {
+void combine_dofs(const ModelView& model, const StageArgs<N>& a, const TransmissionPart<N>& part,
+                  const F& f, const Add& add) {
   for (int l = 0; l < part.transmission.dofs;) {
     const TransmissionDof& dof = part.dofs[l];
     with_kind(model.links[dof.link].kind, [&]<JointKind K>() {
@@ -119,12 +119,12 @@ void transmission_jacobian(const ModelView& model, const StageArgs<N>& a) {
       const N &J = part.columns[k].slope, *second = a.transmission_second + k * t.dofs;
       const int v = part.dofs[k].v;
       a.mass_diagonal[v] = mul_add(J * J, own.armature, a.mass_diagonal[v]);
-      by_x(
+      combine_dofs(
           model, a, part,
           [&](int l, N& d_dq, N& d_dv) {
             const TransmissionColumn<N>& c = part.columns[l];
-            d_dq = J * (own.by_q * c.slope + own.by_v * c.rate) + *part.force * second[l];
-            d_dv = J * own.by_v * c.slope;
+            d_dq = J * (own.q_slope * c.slope + own.v_slope * c.rate) + *part.force * second[l];
+            d_dv = J * own.v_slope * c.slope;
           },
           [&](int l, const N& d_dx) {
             N& entry = entries_at(model, a, v, part.dofs[l].v)(0, 0);

@@ -100,10 +100,10 @@ void set_ways(const TransmissionPart<N>& part, const TransmissionPiece& piece,
   for (int k = 0; k < part.transmission.dofs; ++k) {
     TransmissionColumn<N>& c = part.columns[k];
     for (int i = 0; i < p.points; ++i) {
-      const bool of_point = moves(p.moved[i], k), of_round = moves(piece.moves_round, k);
-      c.way[i] = of_point == of_round ? zero3<N>()
-                 : of_point           ? way_of(c, p.point[i])
-                                      : -way_of(c, p.point[i]);
+      const bool moves_point = moves(p.moved[i], k), moves_surface = moves(piece.moves_round, k);
+      c.way[i] = moves_point == moves_surface ? zero3<N>()
+                 : moves_point                ? way_of(c, p.point[i])
+                                              : -way_of(c, p.point[i]);
     }
   }
 }

@@ -20,7 +20,7 @@ using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
 /// A body on a hinge with a ball as its shape, sites, and a drum in the world.
-ImportedScene made(const std::string& after) {
+ImportedScene tendon_model(const std::string& after) {
   const testing::Folder folder;
   const std::string path = folder / "robot.xml";
   std::ofstream(path)
@@ -38,16 +38,16 @@ ImportedScene made(const std::string& after) {
   return import_robot(path, folder / "scene.xml", {});
 }
 
-Scene scene_of(const ImportedScene& made) { return parse_scene(made.text, "scene.xml").scene; }
+Scene tendon_scene(const ImportedScene& made) { return parse_scene(made.text, "scene.xml").scene; }
 
 TEST(RobotTendons, GoOverSitesGeomsAndPulleys) {
-  const ImportedScene whole = made(
+  const ImportedScene whole = tendon_model(
       R"(<tendon><spatial name="cord" stiffness="5" damping="2" range="0.1 0.9" limited="true">
 <site site="base"/><geom geom="drum" sidesite="side"/><site site="tip"/><pulley divisor="2"/>
 <site site="tip"/><site site="base"/></spatial></tendon>
 <actuator><motor name="pull" tendon="cord" gear="-3"/></actuator>)");
   EXPECT_THAT(whole.lost, IsEmpty());
-  const Scene s = scene_of(whole);
+  const Scene s = tendon_scene(whole);
   ASSERT_EQ(s.transmissions.size(), 1U);
   const std::vector<PathPart>& path = s.transmissions[0].path;
   ASSERT_EQ(path.size(), 6U);
@@ -68,11 +68,11 @@ TEST(RobotTendons, GoOverSitesGeomsAndPulleys) {
 }
 
 TEST(RobotTendons, ActuatorsAtSitesPushInTheirAxes) {
-  const ImportedScene whole = made(
+  const ImportedScene whole = tendon_model(
       R"(<actuator><motor name="push" site="tip" gear="0 2 0 0 0 4"/>
 <position name="reach" site="tip" refsite="base" kp="9" gear="1 0 0 0 0 0"/></actuator>)");
   EXPECT_THAT(whole.lost, IsEmpty());
-  const Scene s = scene_of(whole);
+  const Scene s = tendon_scene(whole);
   ASSERT_EQ(s.transmissions.size(), 2U);
   EXPECT_NEAR(s.transmissions[0].force[0], -2 * std::sin(0.3), 1e-12);
   EXPECT_NEAR(s.transmissions[0].force[1], 2 * std::cos(0.3), 1e-12);
@@ -83,9 +83,10 @@ TEST(RobotTendons, ActuatorsAtSitesPushInTheirAxes) {
 }
 
 TEST(RobotTendons, LoopsMayEndAtSitesOfTheWorld) {
-  const ImportedScene whole = made(R"(<equality><connect site1="tip" site2="base"/></equality>)");
+  const ImportedScene whole =
+      tendon_model(R"(<equality><connect site1="tip" site2="base"/></equality>)");
   EXPECT_THAT(whole.lost, IsEmpty());
-  const Scene s = scene_of(whole);
+  const Scene s = tendon_scene(whole);
   ASSERT_EQ(s.loops.size(), 1U);
   EXPECT_EQ(s.loops[0].body2, "");
   EXPECT_NEAR((*s.loops[0].position2)[2], 0.3, 1e-12);
@@ -93,7 +94,7 @@ TEST(RobotTendons, LoopsMayEndAtSitesOfTheWorld) {
 
 TEST(RobotTendons, ListWhatScenesDoNotHave) {
   const auto lost = [](const std::string& inside) {
-    return made("<tendon><spatial name=\"cord\">" + inside + "</spatial></tendon>").lost;
+    return tendon_model("<tendon><spatial name=\"cord\">" + inside + "</spatial></tendon>").lost;
   };
   EXPECT_THAT(lost(R"(<site site="base"/><geom geom="drum" sidesite="middle"/><site site="tip"/>)"),
               ElementsAre(HasSubstr("a path on its inside")));
@@ -102,7 +103,8 @@ TEST(RobotTendons, ListWhatScenesDoNotHave) {
   EXPECT_THAT(lost(R"(<site site="base"/><geom geom="b"/><site site="tip"/>)"),
               ElementsAre(HasSubstr("no named sphere or cylinder")));
   EXPECT_THAT(
-      made(R"(<actuator><motor site="tip" refsite="base" gear="0 0 0 1 0 0"/></actuator>)").lost,
+      tendon_model(R"(<actuator><motor site="tip" refsite="base" gear="0 0 0 1 0 0"/></actuator>)")
+          .lost,
       Contains(HasSubstr("refsite: a torque")));
 }
 

@@ -14,7 +14,7 @@ namespace {
 using ::testing::HasSubstr;
 
 /// A box on a hinge, a joint without mass, and sections from line 8 on.
-std::string scene_with(const std::string& inside, const std::string& unit = "m-kg") {
+std::string scene_with_cord(const std::string& inside, const std::string& unit = "m-kg") {
   return fmt::format(R"(<tangere model="cord">
 <option unit="{}" timestep="5e-3" integrator="BDF2"/>
 <robot><link name="box"><joint name="hinge" type="revolute" axis="0 1 0"/>
@@ -27,13 +27,13 @@ std::string scene_with(const std::string& inside, const std::string& unit = "m-k
                      unit, inside);
 }
 
-Scene read(const std::string& inside, const std::string& unit = "m-kg") {
-  return parse_scene(scene_with(inside, unit), "cord.xml").scene;
+Scene read_cord(const std::string& inside, const std::string& unit = "m-kg") {
+  return parse_scene(scene_with_cord(inside, unit), "cord.xml").scene;
 }
 
-std::string error(const std::string& inside) {
+std::string cord_error(const std::string& inside) {
   try {
-    static_cast<void>(Model(read(inside)));
+    static_cast<void>(Model(read_cord(inside)));
   } catch (const InputError& e) {
     return e.what();
   }
@@ -41,13 +41,13 @@ std::string error(const std::string& inside) {
 }
 
 TEST(SceneTransmissions, ComeThroughInSi) {
-  const Scene s = read(R"(<transmission><path joint="cord">
+  const Scene s = read_cord(R"(<transmission><path joint="cord">
 <point body="box" pos="200 0 0"/><wrap pos="1 2 3" radius="4" axis="0 0 2" side="9 2 3"/>
 <point pos="-300 0 0"/><pulley divisor="2"/><point/><wrap body="box" radius="1"/>
 <point body="box" pos="1 0 0"/></path></transmission>
 <actuator><motor body="box" name="push" pos="5 0 0" gear="0 0 1 20 0 0" ctrl="force"
 ctrl_range="-1 1"/></actuator>)",
-                       "cm-g");
+                            "cm-g");
   ASSERT_EQ(s.transmissions.size(), 2U);
   const TransmissionDescription &push = s.transmissions[0], &cord = s.transmissions[1];
   EXPECT_EQ(cord.joint, "cord");
@@ -71,7 +71,7 @@ ctrl_range="-1 1"/></actuator>)",
 }
 
 TEST(SceneTransmissions, WrenchesMayHaveAxesOfAnotherBody) {
-  const Scene s = read(R"(<transmission><wrench joint="cord" body="box" force="0 0 2"
+  const Scene s = read_cord(R"(<transmission><wrench joint="cord" body="box" force="0 0 2"
 reference="world" pos2="0 0 0.1"/></transmission>)");
   ASSERT_EQ(s.transmissions.size(), 1U);
   EXPECT_EQ(s.transmissions[0].reference, "");
@@ -80,7 +80,7 @@ reference="world" pos2="0 0 0.1"/></transmission>)");
 
 TEST(SceneTransmissions, MistakesNameTheirLine) {
   const auto path = [](const std::string& inside, const char* joint = "cord") {
-    return error(
+    return cord_error(
         fmt::format("<transmission><path joint=\"{}\">\n{}</path></transmission>", joint, inside));
   };
   const std::string points = R"(<point body="box" pos="1 0 0"/><point pos="0 0 3"/>)";
@@ -93,10 +93,10 @@ TEST(SceneTransmissions, MistakesNameTheirLine) {
               HasSubstr("radius=\"0\"; expected a positive number"));
   EXPECT_THAT(path(R"(<point body="box"/>)"), HasSubstr("cord.xml:8: transmission 'cord' ends at "
                                                         "no second point"));
-  EXPECT_THAT(error(R"(<actuator><motor body="box" gear="1 0 0 0 0 0" ctrl="force"
+  EXPECT_THAT(cord_error(R"(<actuator><motor body="box" gear="1 0 0 0 0 0" ctrl="force"
 ctrl_range="-1 1"/></actuator>)"),
               HasSubstr("a motor on a body has no name"));
-  EXPECT_THAT(error(R"(<actuator><motor body="box" name="push" gear="0 0 0 0 0 0" ctrl="force"
+  EXPECT_THAT(cord_error(R"(<actuator><motor body="box" name="push" gear="0 0 0 0 0 0" ctrl="force"
 ctrl_range="-1 1"/></actuator>)"),
               HasSubstr("neither a force nor a torque"));
 }
