@@ -176,6 +176,7 @@ Json as_json(const Model& model) {
           {"joint_effects", joint_effects_json(scene)},
           {"motors", motors_json(scene)},
           {"loops", loops_json(model)},
+          {"transmissions", transmissions_json(model)},
           {"contacts", list_of(model.contacts(), contact_json)},
           {"meshes", list_of(model.meshes(), mesh_json)},
           {"sensors", sensors_json(model)},
@@ -265,7 +266,7 @@ std::string as_text(const Model& model) {
   text += names_line("varying between environments", randomized_names(scene));
   text += ties_text(scene);
   text += '\n' + joint_effects_text(scene) + '\n' + motors_text(scene);
-  text += '\n' + loops_text(model);
+  text += '\n' + loops_text(model) + transmissions_text(model);
   text += fmt::format("contacts ({})\n", model.contacts().size());
   for (const ContactInfo& c : model.contacts())
     text += fmt::format("  {} on {}: {} point{}, law {}\n", c.first, c.second, c.points,

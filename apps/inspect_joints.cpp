@@ -163,6 +163,46 @@ Json loops_json(const Model& model) {
   return out;
 }
 
+namespace {
+
+std::string transmission_text(const TransmissionDescription& d) {
+  if (d.kind == TransmissionDescription::Kind::path)
+    return fmt::format("length of a path of {} parts", d.path.size());
+  return fmt::format("force {:.6g} and torque {:.6g} on {}", fmt::join(d.force, " "),
+                     fmt::join(d.torque, " "), d.body);
+}
+
+}  // namespace
+
+Json transmissions_json(const Model& model) {
+  Json out = Json::array();
+  const Batch batch(model, 1, 0);
+  std::vector<double> q(std::size_t(model.nq()));
+  batch.get_q(0, q);
+  for (const TransmissionDescription& d : model.scene().transmissions) {
+    const auto at = std::ranges::find_if(
+        model.q_names(), [&](const std::string& name) { return name.starts_with(d.joint + "."); });
+    const bool path = d.kind == TransmissionDescription::Kind::path;
+    Json one = {{"joint", d.joint},
+                {"kind", path ? "path" : "wrench"},
+                {"start", q[std::size_t(at - model.q_names().begin())]}};
+    if (!path) one.update({{"body", d.body}, {"force", d.force}, {"torque", d.torque}});
+    out.push_back(one);
+  }
+  return out;
+}
+
+std::string transmissions_text(const Model& model) {
+  const Json all = transmissions_json(model);
+  if (all.empty()) return "";
+  std::string text = fmt::format("transmissions ({})\n", all.size());
+  for (std::size_t k = 0; k < all.size(); ++k)
+    text += fmt::format("  {}: {}, {:.6g} at the start\n", all[k]["joint"].get<std::string>(),
+                        transmission_text(model.scene().transmissions[k]),
+                        all[k]["start"].get<double>());
+  return text;
+}
+
 std::string loops_text(const Model& model) {
   if (!model.has_loops()) return "";
   const std::vector<LoopReading> readings = loop_readings(model, Batch(model, 1, 0), 0);

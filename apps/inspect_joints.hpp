@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Reports joints, motors and loops for `tangere inspect`.
+// Reports joints, motors, loops and transmissions for `tangere inspect`.
 #pragma once
 
 #include <string>
@@ -20,5 +20,9 @@ std::string motors_text(const Scene& scene);
 /// Loops in file order, with the gap at the start [m].
 Json loops_json(const Model& model);
 std::string loops_text(const Model& model);
+
+/// Transmissions in file order, with their lengths at the start [m].
+Json transmissions_json(const Model& model);
+std::string transmissions_text(const Model& model);
 
 }  // namespace tangere::apps

@@ -9,6 +9,7 @@
 #include "engine/derivative/motor_pullback.hpp"
 #include "engine/derivative/number_gradients.hpp"
 #include "engine/derivative/tactile_point_numbers.hpp"
+#include "engine/model/transmission_state.hpp"
 #include "engine/step/kept_anchors.hpp"
 #include "engine/step/step_settings.hpp"
 
@@ -39,13 +40,32 @@ struct GroupStepContext {
 
 }  // namespace
 
-void fold_followers(const Model& model, BlockCotangent& c, int lane) {
-  const CompiledModel& m = compiled(model);
+/// Folds joints that follow others by ratios.
+static void fold_ratios(const CompiledModel& m, BlockCotangent& c, int lane) {
   for (auto* of : {&c.q, &c.v, &c.previous_q, &c.previous_v}) {
     const auto at = [&](int dof) -> double& { return (*of)[std::size_t(dof * kBlock + lane)]; };
     for (const kernels::FollowerTie& t : m.ties) at(t.leader_v) += t.ratio * at(t.v);
     for (const kernels::Follower& f : m.followers) at(f.v) = 0;
   }
+}
+
+/// Folds transmissions at a state into the cotangents of that state.
+static void fold_transmissions(const CompiledModel& m, const double* state, const double* column,
+                               double* q_bar, double* v_bar, BlockCotangent& c, int lane) {
+  double* const places = c.parameters.empty()
+                             ? nullptr
+                             : &c.parameters[std::size_t(m.view.rows.places * kBlock + lane)];
+  TransmissionState(m).pull_back(state, state + m.nq * kBlock, kBlock, column, q_bar, v_bar, places,
+                                 kBlock);
+}
+
+void fold_followers(const Model& model, BlockCotangent& c, int lane, const double* state,
+                    const double* block) {
+  const CompiledModel& m = compiled(model);
+  if (!m.transmissions.empty())
+    fold_transmissions(m, state + lane, block + lane, &c.q[std::size_t(lane)],
+                       &c.v[std::size_t(lane)], c, lane);
+  fold_ratios(m, c, lane);
 }
 
 struct Adjoint::Impl {
@@ -234,14 +254,14 @@ struct Adjoint::Impl {
     for (std::size_t k = 0; k < losses.size(); ++k)
       for (int l = 0; l < L; ++l)
         if (has(g.live, l))
-          scatter(x.adjoint.losses[k], losses[k], l, g.first + l, controls,
+          scatter(x.adjoint.losses[k], losses[k], l, g.first + l, g.step, controls,
                   kept_entries(m, g.tape.memory(g.step, g.first + l)));
   }
 
   /// Writes one lane's results to its column. Forces that are known at the start depend on the
   /// state there and on the controls. `kept`: entries of sensors that keep anchors before the step.
   template <int L>
-  void scatter(LossRows<L>& o, BlockCotangent& c, int lane, int column,
+  void scatter(LossRows<L>& o, BlockCotangent& c, int lane, int column, std::int64_t step,
                std::span<const double> controls, std::ptrdiff_t kept) {
     const CompiledModel& m = compiled(model);
     const std::span<const double> u =
@@ -257,7 +277,8 @@ struct Adjoint::Impl {
       c.previous_v[at] = o.v_before[i][lane];
     }
     if (!c.past.empty()) go_back(c, column);
-    fold_followers(model, c, column);
+    if (step == 0 && !m.transmissions.empty()) fold_start(c, column);
+    fold_ratios(m, c, column);
     if (m.has_shear_state()) {
       std::vector<double>& memory = c.shear[std::size_t(column)];
       const std::vector<double>& rest = o.memory_before[std::size_t(lane)];
@@ -268,6 +289,16 @@ struct Adjoint::Impl {
     if (o.parameters == nullptr) return;
     for (int i = 0; i < parameter_rows(model); ++i)
       c.parameters[std::size_t(i * kBlock + column)] += o.parameters[i][lane];
+  }
+
+  /// Folds transmissions at the first state of a tape and the one before it.
+  void fold_start(BlockCotangent& c, int column) {
+    const CompiledModel& m = compiled(model);
+    const double* const own = rows.data() + column;
+    const auto at = [column](AlignedVector<double>& x) { return &x[std::size_t(column)]; };
+    fold_transmissions(m, own + m.layout.q * kBlock, own, at(c.q), at(c.v), c, column);
+    fold_transmissions(m, own + m.layout.previous_q * kBlock, own, at(c.previous_q),
+                       at(c.previous_v), c, column);
   }
 
   /// Adds the cotangents of the state one step before, and moves those of earlier ones up.

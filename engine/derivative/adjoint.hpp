@@ -19,9 +19,11 @@ struct AdjointOptions {
 };
 
 /// Adds the cotangents of joints that follow others, of one lane, to those of their leaders, and
-/// clears them. reverse_step() does that with those before the step; a caller that then adds to
-/// those of the start does it again.
-void fold_followers(const Model& model, BlockCotangent& cotangent, int lane);
+/// clears them. reverse_step() does that with those before the first step of a tape; a caller that
+/// then adds to those of the start does it again. `state`: that of the block there
+/// (BlockTape::state). `block`: its numbers (Batch::block).
+void fold_followers(const Model& model, BlockCotangent& cotangent, int lane, const double* state,
+                    const double* block);
 
 /// Owns the scratch of one thread. Reverses steps of any batch of its model that a Stepper with the
 /// same options took.

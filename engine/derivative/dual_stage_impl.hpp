@@ -38,6 +38,8 @@ struct DualStage::Impl {
   std::vector<kernels::LinkScratch<DualNumber>> links;
   std::vector<kernels::ContactScratch<DualNumber>> contacts;
   std::vector<kernels::JointColumns<DualNumber>> columns;
+  std::vector<kernels::TransmissionColumn<DualNumber>> transmission_columns;
+  std::vector<DualNumber> transmission_force;
   std::vector<std::vector<double>> ground_tangents;  ///< of the points in the ground
   std::vector<std::vector<DualNumber>> points, references, areas;
   std::vector<kernels::CandidateList<DualNumber>> lists;
@@ -119,6 +121,8 @@ struct DualStage::Impl {
     dry_anchors.assign(nv, DualNumber(0.0)), stage_dry_anchors.assign(nv, DualNumber(0.0));
     links.resize(m.links.size()), columns.resize(2 * m.links.size());
     contacts.resize(std::size_t(view.n_link_pairs + view.n_grounded + view.n_loops));
+    transmission_columns.resize(m.transmission_dofs.size());
+    transmission_force.resize(m.transmissions.size());
     faces.assign(3 * pairs.size(), DualNumber(0.0));
     for (const kernels::PairContact& p : pairs) {
       points.emplace_back(std::size_t(3 * p.n_points), DualNumber(0.0));
@@ -429,6 +433,9 @@ struct DualStage::Impl {
     a.links = links.data();
     a.contacts = contacts.data();
     a.columns = columns.data();
+    a.transmission_columns = transmission_columns.data();
+    a.transmission_force = transmission_force.data();
+    a.own_x = s.x.data();
     a.v = s.v.data();
     a.g = s.g.data();
     a.force_scale = force_scale.data();

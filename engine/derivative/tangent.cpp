@@ -142,6 +142,7 @@ struct Tangent::Impl {
       A.col(f.v).setZero();
       A(f.v, f.v) = 1;
     }
+    for (const kernels::Transmission& t : m().transmissions) A(t.v, t.v) = 1;
   }
 
   /// Computes the tangent of x with g(x) = 0 at the value of x. Leaves the v of that x in the

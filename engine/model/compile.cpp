@@ -16,6 +16,7 @@
 #include "engine/model/compile_markers.hpp"
 #include "engine/model/compile_sensor.hpp"
 #include "engine/model/compile_shear_springs.hpp"
+#include "engine/model/compile_transmissions.hpp"
 #include "engine/model/compile_variations.hpp"
 #include "engine/model/compiled_layer.hpp"
 #include "engine/model/components.hpp"
@@ -67,6 +68,7 @@ class Compiler {
     compile_gravity_shares(m_);
     compile_motors(m_, joints_);
     compile_followers(m_, joints_);
+    compile_transmissions(m_, joints_, bodies_);
     compile_initial_state(m_, joints_);
     unknown_scales();
     coarse_pairs();
@@ -486,6 +488,9 @@ class Compiler {
     for (const kernels::FollowerTie& t : m_.ties)
       coupled.emplace_back(link_of_dof(m_, t.v), link_of_dof(m_, t.leader_v));
     for (const kernels::Loop& loop : m_.loops) coupled.emplace_back(loop.link1, loop.link2);
+    for (const kernels::Transmission& t : m_.transmissions)
+      for (int k = t.first_dof; k < t.first_dof + t.dofs; ++k)
+        coupled.emplace_back(t.link, m_.transmission_dofs[std::size_t(k)].link);
     auto [dofs, begin] = find_components(m_.links, coupled);
     m_.component_dofs = std::move(dofs);
     m_.component_begin = std::move(begin);
@@ -548,10 +553,11 @@ class Compiler {
   }
 
   void symbolic() {
-    const bool blocks =
-        m_.followers.empty() && m_.loops.empty() && prefers_blocks(m_.links, touching_);
-    m_.pattern = blocks ? block_pattern(m_.links, m_.nv)
-                        : analyse_pattern(m_.links, m_.nv, touching_, m_.ties, m_.loops);
+    const bool blocks = m_.followers.empty() && m_.loops.empty() && m_.transmissions.empty() &&
+                        prefers_blocks(m_.links, touching_);
+    m_.pattern =
+        blocks ? block_pattern(m_.links, m_.nv)
+               : analyse_pattern(m_.links, m_.nv, touching_, m_.ties, m_.loops, driven_dofs(m_));
   }
 
   CompiledModel m_;

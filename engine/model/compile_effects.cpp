@@ -163,6 +163,10 @@ void list_stages(CompiledModel& m) {
   }
   if (!m.loops.empty())
     add("loops", counted(m.loops.size(), "loop", "loops"), "springs, one block each");
+  if (!m.transmissions.empty())
+    add("transmissions", counted(m.transmissions.size(), "transmission", "transmissions"),
+        counted(m.transmission_pieces.size(), "piece", "pieces") + ", " +
+            counted(m.transmission_dofs.size(), "dof", "dofs"));
   for (std::size_t j = 0; j < m.joints.size(); ++j) {
     std::uint8_t effects = 0;
     for (int i = 0; i < m.joints[j].link_count; ++i)

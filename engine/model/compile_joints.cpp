@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "engine/model/compile_followers.hpp"
+#include "engine/model/compile_transmissions.hpp"
 #include "engine/scene/frames.hpp"
 #include "engine/scene/scene_number.hpp"
 #include "engine/scene/schema.hpp"
@@ -257,6 +258,7 @@ void compile_initial_state(CompiledModel& m, const NameIndex& joints) {
     copy("v", d.v, dof_count(type), m.initial_v.data() + m.joints[i].v);
   }
   place_initial_followers(m);
+  place_initial_transmissions(m);
 }
 
 void vary_joint(CompiledModel& m, int joint, const RandomizationDescription& d, int row) {
@@ -337,7 +339,8 @@ void check_masses(const CompiledModel& m) {
   };
   for (std::size_t i = 0; i < m.joints.size(); ++i) {
     const CompiledJoint& joint = m.joints[i];
-    if (!m.scene.links[i].joint.follows.empty()) continue;  // those that it follows have a mass
+    if (!m.scene.links[i].joint.follows.empty() || is_transmission(m.scene, m.scene.links[i].joint))
+      continue;  // those that it follows have a mass
     for (int k = 0; k < joint.link_count; ++k) {
       const auto link = std::size_t(joint.first_link + k);
       if (!(carried[link].mass > 0))

@@ -28,6 +28,17 @@ kernels::PadTiles CompiledSensor::tiles() const {
   return p;
 }
 
+void point_transmissions(const CompiledModel& m, kernels::ModelView& v) {
+  v.n_transmissions = static_cast<int>(m.transmissions.size());
+  v.transmissions = m.transmissions.data();
+  v.pieces = m.transmission_pieces.data();
+  v.n_transmission_dofs = static_cast<int>(m.transmission_dofs.size());
+  v.transmission_dofs = m.transmission_dofs.data();
+  v.most_transmission_dofs = 0;
+  for (const kernels::Transmission& t : m.transmissions)
+    v.most_transmission_dofs = std::max(v.most_transmission_dofs, t.dofs);
+}
+
 void point_view(CompiledModel& m) {
   kernels::ModelView& v = m.view;
   v.n_links = static_cast<int>(m.links.size());
@@ -72,6 +83,7 @@ void point_view(CompiledModel& m) {
   v.folded = m.pattern.folded.data();
   v.n_loops = static_cast<int>(m.loops.size());
   v.loops = m.loops.data();
+  point_transmissions(m, v);
 }
 
 }  // namespace tangere

@@ -257,10 +257,13 @@ struct CompiledModel {
   std::vector<VaryingInertia> varying_inertia;
   std::vector<VaryingSize> varying_sizes;
   std::vector<VaryingPlace> varying_places;
-  std::vector<kernels::DofEffects> dof_effects;  ///< (nv)
-  std::vector<kernels::Follower> followers;      ///< dofs that follow others
-  std::vector<kernels::FollowerTie> ties;        ///< their leaders
-  std::vector<kernels::Loop> loops;              ///< parallel to scene.loops
+  std::vector<kernels::DofEffects> dof_effects;      ///< (nv)
+  std::vector<kernels::Follower> followers;          ///< dofs that follow others
+  std::vector<kernels::FollowerTie> ties;            ///< their leaders
+  std::vector<kernels::Loop> loops;                  ///< parallel to scene.loops
+  std::vector<kernels::Transmission> transmissions;  ///< parallel to scene.transmissions
+  std::vector<kernels::TransmissionPiece> transmission_pieces;
+  std::vector<kernels::TransmissionDof> transmission_dofs;
   /// (nv) magnitude to which an unknown is rounded: extent of the scene [m], 1 [rad].
   std::vector<double> unknown_scale;
   /// Dofs of bodies that can reach each other by joints and contacts, component by component: those
@@ -291,5 +294,7 @@ inline constexpr double kFarAway = 1e6;
 
 /// Points the view at the model's own arrays. Gravity and the ground are left as they are.
 void point_view(CompiledModel& m);
+/// The same for transmissions alone.
+void point_transmissions(const CompiledModel& m, kernels::ModelView& view);
 
 }  // namespace tangere

@@ -47,7 +47,10 @@ double Model::following_tolerance(Integrator integrator, double timestep) const 
 }
 std::span<const double> Model::initial_q() const { return compiled_->initial_q; }
 bool Model::has_shear_state() const { return compiled_->has_shear_state(); }
-bool Model::has_followers() const { return !compiled_->followers.empty(); }
+bool Model::has_followers() const {
+  return !compiled_->followers.empty() || !compiled_->transmissions.empty();
+}
+bool Model::has_transmissions() const { return !compiled_->transmissions.empty(); }
 bool Model::has_loops() const { return !compiled_->loops.empty(); }
 std::span<const SensorInfo> Model::sensors() const { return compiled_->sensor_info; }
 std::span<const EndEffectorInfo> Model::end_effectors() const {

@@ -43,8 +43,10 @@ class Model {
   /// Whether some contact or sensor has shear springs (k_s, docs/shear.md), or some joint dry
   /// friction.
   [[nodiscard]] bool has_shear_state() const;
-  /// Whether some joint follows another.
+  /// Whether some joint follows others, also by a transmission.
   [[nodiscard]] bool has_followers() const;
+  /// Whether some joint is a transmission.
+  [[nodiscard]] bool has_transmissions() const;
   /// Whether some links are closed to loops.
   [[nodiscard]] bool has_loops() const;
   [[nodiscard]] std::span<const SensorInfo> sensors() const;

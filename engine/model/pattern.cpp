@@ -270,7 +270,8 @@ void fold_entries(PatternStorage& p, const Structure& written, const FreeDofs& f
 PatternStorage analyse_pattern(const std::vector<kernels::Link>& links, int nv,
                                const std::vector<std::pair<int, int>>& touching,
                                const std::vector<kernels::FollowerTie>& ties,
-                               const std::vector<kernels::Loop>& closed) {
+                               const std::vector<kernels::Loop>& closed,
+                               const std::vector<std::vector<int>>& driven) {
   Structure alone(nv, std::vector<char>(nv, 0));
   for (int i = 0; i < static_cast<int>(links.size()); ++i) couple(alone, support(links, i));
   const auto couple_links = [&](Structure& of, int first, int second) {
@@ -280,6 +281,7 @@ PatternStorage analyse_pattern(const std::vector<kernels::Link>& links, int nv,
     couple(of, both);
   };
   for (const kernels::Loop& loop : closed) couple_links(alone, loop.link1, loop.link2);
+  for (const std::vector<int>& dofs : driven) couple(alone, dofs);
   Structure s = alone;
   for (const auto& [first, second] : touching) couple_links(s, first, second);
   const Structure written = s;

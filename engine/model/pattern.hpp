@@ -37,11 +37,13 @@ using Structure = std::vector<std::vector<char>>;
 std::vector<int> minimum_fill(const Structure& s);
 
 /// Finds a minimum-fill elimination of the structure that the tree, all contacts, the dofs that
-/// follow others and loops make. `closed`: the links of loops, which couple without touching.
+/// follow others, loops and transmissions make. `closed`: the links of loops, which couple without
+/// touching. `driven`: the dofs of each transmission.
 PatternStorage analyse_pattern(const std::vector<kernels::Link>& links, int nv,
                                const std::vector<std::pair<int, int>>& touching,
                                const std::vector<kernels::FollowerTie>& ties = {},
-                               const std::vector<kernels::Loop>& closed = {});
+                               const std::vector<kernels::Loop>& closed = {},
+                               const std::vector<std::vector<int>>& driven = {});
 
 /// Returns the pattern in blocks of trees.
 PatternStorage block_pattern(const std::vector<kernels::Link>& links, int nv);

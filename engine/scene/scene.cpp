@@ -2,11 +2,17 @@
 // Names and sizes of a scene's enumerations. Those of shapes are in shapes.cpp.
 #include "engine/scene/scene.hpp"
 
+#include <algorithm>
 #include <iterator>
 
 #include "engine/scene/frames.hpp"
 
 namespace tangere {
+
+bool is_transmission(const Scene& scene, const JointDescription& joint) {
+  return std::ranges::find(scene.transmissions, joint.name, &TransmissionDescription::joint) !=
+         scene.transmissions.end();
+}
 
 std::vector<TactilePoint> tactile_points(const TactileDescription& sensor) {
   if (!sensor.points.empty()) return sensor.points;

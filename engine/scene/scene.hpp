@@ -362,6 +362,40 @@ struct LoopDescription {
   Source source;
 };
 
+/// One part of a path: a point of a body, a surface that the path goes around, or a pulley.
+struct PathPart {
+  enum class Kind { point, sphere, cylinder, pulley };
+  Kind kind = Kind::point;
+  std::string body = {};      ///< empty: the world
+  Vector3 position{0, 0, 0};  ///< of the point or the centre, frame of the body [m]
+  double radius = 0;          ///< of the surface [m]
+  Vector3 axis{0, 0, 1};      ///< of a cylinder without ends; unit, frame of the body
+  /// A point outside of the surface on the side of the path, frame of the body [m]; none: the path
+  /// takes the shorter way round.
+  std::optional<Vector3> side{};
+  double divisor = 1;  ///< of a pulley: of the lengths after it, up to the next pulley
+};
+
+/// Makes a joint of one dof without mass a length of other joints, or the power of a wrench: what
+/// acts on the joint acts through it (docs/dynamics.md).
+struct TransmissionDescription {
+  enum class Kind {
+    path,   ///< its coordinate is the length of a path [m]
+    wrench  ///< its rate is the power of a force and a torque on a body, and its coordinate 0
+  } kind = Kind::path;
+  std::string joint;
+  std::vector<PathPart> path{};
+  std::string body = {};      ///< of the wrench
+  Vector3 position{0, 0, 0};  ///< where its force acts, frame of the body [m]
+  Vector3 force{0, 0, 0};     ///< per force of the joint, axes of the body, or of `reference`
+  Vector3 torque{0, 0, 0};    ///< per force of the joint, axes of the body [m]
+  /// Of a wrench: the joint's coordinate is force · (point - point of this body), in its axes, and
+  /// there is no torque. Empty: none.
+  std::optional<std::string> reference{};
+  Vector3 reference_position{0, 0, 0};  ///< in the frame of `reference` [m]
+  Source source{};
+};
+
 /// Starting state of one joint; empty vectors leave the default (q = 0 or the identity, v = 0).
 struct InitialState {
   std::string joint;
@@ -450,6 +484,7 @@ struct Scene {
   std::vector<GroundContactDescription> ground_contacts;
   std::vector<PairContactDescription> pair_contacts;
   std::vector<LoopDescription> loops;
+  std::vector<TransmissionDescription> transmissions;
   std::vector<InitialState> initial;
   std::optional<ControlDescription> control;
   std::vector<RandomizationDescription> randomizations;
@@ -463,6 +498,8 @@ const char* to_string(ContactLaw value);
 const char* to_string(Distribution::Kind value);  ///< as in scene files
 /// The same, but "published" for law linear with ramp 0.
 const char* law_name(ContactLaw law, std::optional<double> ramp);
+/// Whether a joint is a transmission.
+bool is_transmission(const Scene& scene, const JointDescription& joint);
 /// Returns "sphere", "cuboid" …
 const char* shape_name(const Shape& shape);
 

@@ -298,6 +298,27 @@ std::string loop_fault(const Scene& scene, const LoopDescription& loop) {
   return value_fault(loop.weld ? kWeld : kConnect, loop);
 }
 
+std::string transmission_fault(const TransmissionDescription& transmission) {
+  const auto is_zero = [](const Vector3& x) { return x == Vector3{0, 0, 0}; };
+  if (transmission.kind == TransmissionDescription::Kind::wrench) {
+    if (transmission.reference && !is_zero(transmission.torque))
+      return "a torque along axes of another body has no length; expected a force alone";
+    return is_zero(transmission.force) && is_zero(transmission.torque)
+               ? "neither a force nor a torque; expected one"
+               : "";
+  }
+  for (const PathPart& part : transmission.path) {
+    const bool pulley = part.kind == PathPart::Kind::pulley;
+    const double number = pulley ? part.divisor : part.radius;
+    if (part.kind != PathPart::Kind::point && !(number > 0 && std::isfinite(number)))
+      return fmt::format("{}=\"{}\"; expected a positive number", pulley ? "divisor" : "radius",
+                         number);
+    if (part.kind == PathPart::Kind::cylinder && is_zero(part.axis))
+      return "axis=\"0 0 0\"; expected a direction";
+  }
+  return "";
+}
+
 std::string markers_fault(const TactileDescription& sensor) {
   return sensor.markers ? value_fault(kMarkers, *sensor.markers) : "";
 }
@@ -370,6 +391,8 @@ void check_scene(const Scene& scene) {
     check(d.source, "", contact_fault(scene, d));
   for (const LoopDescription& d : scene.loops)
     check(d.source, "loop '" + d.name + "': ", loop_fault(scene, d));
+  for (const TransmissionDescription& d : scene.transmissions)
+    check(d.source, "transmission '" + d.joint + "': ", transmission_fault(d));
   for (const TactileDescription& d : scene.sensors) {
     check(d.source, "tactile sensor '" + d.name + "': ", value_fault(kTactile, d.coefficients));
     if (d.markers) check(d.markers->source, "markers of '" + d.name + "': ", markers_fault(d));

@@ -19,6 +19,8 @@ std::string contact_fault(const Scene& scene, const GroundContactDescription& co
 std::string contact_fault(const Scene& scene, const PairContactDescription& contact);
 /// `loop` may be one of the scene's, or the one that follows them.
 std::string loop_fault(const Scene& scene, const LoopDescription& loop);
+/// Of the numbers of a transmission.
+std::string transmission_fault(const TransmissionDescription& transmission);
 std::string markers_fault(const TactileDescription& sensor);
 /// The sensor has a picture.
 std::string picture_fault(const TactileDescription& sensor);

@@ -224,7 +224,10 @@ constexpr Attribute kSchema[] = {
     row(kCollision, "pos", "0 0 0", U::m, "place of the points in the body", &Pose::position),
     row(kCollision, "quat", "1 0 0 0", U::one, "w x y z", &Pose::orientation),
 
-    row(kMotor, "joint", kNeeded, U::one, "a joint whose dofs all slide or all turn"),
+    row(kMotor, "joint", "", U::one, "a joint whose dofs all slide or all turn"),
+    row(kMotor, "body", kNone, U::one, "in place of a joint: it pushes this body"),
+    row(kMotor, "pos", "0 0 0", U::m, "of a force on the body, in its frame"),
+    row(kMotor, "gear", kNone, U::one, "force, then torque [m] per force of the motor, body axes"),
     row(kMotor, "ctrl", kNeeded, U::one, "u: a force from -1 to 1, or a target",
         Words{"force position"}),
     row(kMotor, "name", "", U::one, "of its controls; that of its joint if left out"),
@@ -400,6 +403,20 @@ constexpr Attribute kSchema[] = {
     row(kWeld, "turning_damping", "0", U::N_m_s_per_rad, "torque by the rate of the turn",
         &L::turning_damping, F::turning_damping, B::not_negative, Flags{kParameter}),
 
+    row(kPath | kWrench, "joint", kNeeded, U::one, "of one dof, on a link of its own without mass"),
+    row(kPoint | kWrap, "body", "", U::one, "with which it moves; the world if left out"),
+    row(kPoint | kWrap, "pos", "0 0 0", U::m, "of the point or the middle, in the body or world"),
+    row(kWrap, "radius", kNeeded, U::m, "of the surface"),
+    row(kWrap, "axis", kNone, U::one, "of a cylinder without ends; a sphere if left out"),
+    row(kWrap, "side", kNone, U::m, "a point on the path's side; the shorter way if left out"),
+    row(kPulley, "divisor", kNeeded, U::one, "of the lengths after it, up to the next pulley"),
+    row(kWrench, "body", kNeeded, U::one, "on which it acts"),
+    row(kWrench, "pos", "0 0 0", U::m, "where the force acts, in the frame of body"),
+    row(kWrench, "force", "0 0 0", U::one, "per force of the joint, in the axes of body"),
+    row(kWrench, "torque", "0 0 0", U::m, "per force of the joint, in the axes of body"),
+    row(kWrench, "reference", kNone, U::one, "a body, or world, in whose axes the force is then"),
+    row(kWrench, "pos2", "0 0 0", U::m, "a point of reference; q is force times the way from it"),
+
     row(kCamera, "name", kNeeded, U::one, "of its outputs"),
     row(kCamera, "body", "", U::one, "it moves with this body; it stands in the world if left out"),
     row(kCamera, "pos", kNeeded, U::m, "of the pinhole, in the body's frame or the world's",
@@ -493,7 +510,7 @@ constexpr const char* kElementNames[] = {
     "endeffector", "joint", "constant", "piecewise", "at", "csv", "random", "outputs", "joint",
     "motor", "ground_contact", "general_primitive_contact", "tactile", "body", "surface_contact",
     "surface_contact", "layer", "picture", "connect", "weld", "connect", "weld", "camera",
-    "channels"};
+    "channels", "path", "wrench", "point", "wrap", "pulley"};
 // clang-format on
 static_assert(std::size(kElementNames) == kElements);
 
@@ -504,6 +521,7 @@ constexpr Holder kHolders[] = {
     {"actuator", kMotor, true},
     {"contact", kContacts | kSurfaceContact, true},
     {"loop", kLoops, true},
+    {"transmission", kPath | kWrench, true},
     {"sensor", kTactile | kCamera, true},
     {"variable", kEndEffector, true},
     {"initial", kInitialJoint, true},
@@ -513,6 +531,7 @@ constexpr Holder kHolders[] = {
     {"body", kVisual | kCollision},
     {"tactile", kImperfections | kMarkers | kLayer | kGelPicture | kChannels},
     {"piecewise", kAt},
+    {"path", kPoint | kWrap | kPulley},
 };
 
 }  // namespace

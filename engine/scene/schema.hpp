@@ -61,8 +61,13 @@ enum Element : std::uint64_t {
   kVaryWeld = 1ULL << 36,
   kCamera = 1ULL << 37,
   kChannels = 1ULL << 38,
+  kPath = 1ULL << 39,  ///< in <transmission>, like the next
+  kWrench = 1ULL << 40,
+  kPoint = 1ULL << 41,  ///< in <path>, like those below
+  kWrap = 1ULL << 42,
+  kPulley = 1ULL << 43,
 };
-inline constexpr int kElements = 39;
+inline constexpr int kElements = 44;
 inline constexpr std::uint64_t kContacts = kGroundContact | kPairContact,
                                kTouching = kContacts | kTactile, kLoops = kConnect | kWeld,
                                kVarying = kVaryJoint | kVaryMotor | kVaryGround | kVaryPair |

@@ -11,6 +11,7 @@
 #include "engine/model/compile_variations.hpp"
 #include "engine/model/model_part.hpp"
 #include "engine/model/random.hpp"
+#include "engine/model/transmission_state.hpp"
 #include "engine/scene/scene_faults.hpp"
 #include "engine/scene/scene_number.hpp"
 #include "engine/scene/shapes.hpp"
@@ -174,6 +175,14 @@ void Batch::reset(int environment, std::int64_t episode) {
   clearance_[lane] = 0;
 }
 
+/// Sets the coordinates and rates of transmissions in a lane's state.
+void Batch::place_transmissions(std::size_t lane) {
+  const CompiledModel& m = compiled(model_);
+  if (m.transmissions.empty()) return;
+  double* const own = column(lane);
+  TransmissionState(m).place(own + m.layout.q * kBlock, own + m.layout.v * kBlock, kBlock, own);
+}
+
 namespace {
 
 /// Throws InputError where a state has followers elsewhere than their leaders put them, by more
@@ -215,6 +224,7 @@ void Batch::displace(std::size_t lane, std::span<const double> q, std::span<cons
   place_followers(
       m, [&](int i) -> double& { return own[(m.layout.q + i) * kBlock]; },
       [&](int i) -> double& { return own[(m.layout.v + i) * kBlock]; });
+  place_transmissions(lane);
   sleep_[lane].wake();
   clearance_[lane] = 0;
 }
@@ -249,6 +259,7 @@ void Batch::complete_state(std::size_t lane) {
     const double scale = 1 / std::sqrt(square);
     for (int k = 0; k < 4; ++k) at(first + k) *= scale;
   }
+  place_transmissions(lane);
   for (int i = 0; i < m.nq; ++i) at(m.layout.previous_q + i) = at(m.layout.q + i);
   for (int i = 0; i < m.nv; ++i) at(m.layout.previous_v + i) = at(m.layout.v + i);
   fill_past_states(lane);

@@ -189,6 +189,7 @@ class Batch {
   void write_state(std::size_t lane, std::span<const double> q, std::span<const double> v);
   void complete_state(std::size_t lane);
   void fill_past_states(std::size_t lane);
+  void place_transmissions(std::size_t lane);
   void draw_episode(std::size_t lane);
   void complete_numbers(std::size_t lane);
   [[nodiscard]] double* column(std::size_t lane);

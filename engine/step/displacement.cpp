@@ -5,6 +5,7 @@
 #include "engine/model/compile_followers.hpp"
 #include "engine/model/compiled_model.hpp"
 #include "engine/model/model.hpp"
+#include "engine/model/transmission_state.hpp"
 
 namespace tangere {
 
@@ -25,6 +26,13 @@ static void displace_alone(const CompiledModel& m, std::span<double> q, int dof,
   }
 }
 
+/// Sets the changes of joints that follow others by ratios.
+static void complete_changes(const CompiledModel& m, std::span<double> along) {
+  for (const kernels::Follower& f : m.followers) along[std::size_t(f.v)] = 0;
+  for (const kernels::FollowerTie& t : m.ties)
+    along[std::size_t(t.v)] += t.ratio * along[std::size_t(t.leader_v)];
+}
+
 void displace(const Model& model, std::span<double> q, int dof, double e) {
   const CompiledModel& m = compiled(model);
   displace_alone(m, q, dof, e);
@@ -34,11 +42,17 @@ void displace(const Model& model, std::span<double> q, int dof, double e) {
       [&](int) -> double& { return unused; });
 }
 
-void complete_followers(const Model& model, std::span<double> along) {
+void complete_velocities(const Model& model, std::span<double> v) {
+  complete_changes(compiled(model), v);
+}
+
+void complete_changes(const Model& model, const StateAt& at, std::span<const double> numbers_dot,
+                      std::span<double> q_dot, std::span<double> v_dot) {
   const CompiledModel& m = compiled(model);
-  for (const kernels::Follower& f : m.followers) along[std::size_t(f.v)] = 0;
-  for (const kernels::FollowerTie& t : m.ties)
-    along[std::size_t(t.v)] += t.ratio * along[std::size_t(t.leader_v)];
+  complete_changes(m, q_dot);
+  complete_changes(m, v_dot);
+  if (!m.transmissions.empty())
+    TransmissionState(m).complete(at.q, at.v, at.stride, at.column, numbers_dot, q_dot, v_dot);
 }
 
 void add_along_dofs(const Model& model, std::span<const double> q, std::span<const double> q_bar,

@@ -9,12 +9,24 @@
 
 namespace tangere {
 
-/// Computes q ⊕ e along one dof, in place. Rotations are on the right. Joints that follow others go
-/// along; alone they stay.
+/// Computes q ⊕ e along one dof, in place. Rotations are on the right. Joints that follow others by
+/// ratios go along; alone they stay. Batch::set_state() places those that are transmissions.
 void displace(const Model& model, std::span<double> q, int dof, double e);
 
-/// Sets velocities, or changes along dofs, (nv), of joints that follow others from their leaders'.
-void complete_followers(const Model& model, std::span<double> along);
+/// Sets velocities, (nv), of joints that follow others by ratios from their leaders'.
+void complete_velocities(const Model& model, std::span<double> v);
+
+/// A state of an environment and its numbers.
+struct StateAt {
+  const double *q, *v;  ///< (nq), (nv), `stride` apart
+  int stride;
+  const double* column;  ///< row r of the environment's block is column[16 r]; null: the scene's
+};
+
+/// Sets the changes of a state, (nv) each, of joints that follow others, transmissions included.
+/// `numbers_dot`: changes of the scene's numbers (parameter_rows()), or empty.
+void complete_changes(const Model& model, const StateAt& at, std::span<const double> numbers_dot,
+                      std::span<double> q_dot, std::span<double> v_dot);
 
 /// Turns `q_bar`, (nq) derivatives by coordinates at q, into derivatives along the dofs of v and
 /// adds them to `out`, (nv). `q_bar` treats the four coordinates of a quaternion as free.

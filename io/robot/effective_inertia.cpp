@@ -63,6 +63,7 @@ void add_armature(const Scene& scene, const JointDescription& tendon, const std:
 std::vector<double> effective_inertias(Scene scene, const std::vector<int>& dofs,
                                        const std::set<std::string>& tendons) {
   scene.motors.clear();
+  scene.transmissions.clear();
   std::vector<JointDescription> with_armature;
   std::vector<int> first;
   int dof = 0;

@@ -60,7 +60,8 @@ class Actuators {
     LinkDescription& link = scene_.links[std::size_t(end.link)];
     if (link.joint.type != JointType::revolute && link.joint.type != JointType::prismatic)
       return node.lost("<" + node.name() + "> of a ball or a free joint");
-    const double gear = node.has("gear") ? node.numbers("gear").at(0) : 1;
+    // That of a site is in its wrench.
+    const double gear = node.has("gear") && !node.has("site") ? node.numbers("gear").at(0) : 1;
     if (node.has("gear") && gear == 0) node.fail("gear=\"0\"; expected another number");
     MotorDescription motor;
     motor.joint = name;
@@ -231,7 +232,8 @@ class Actuators {
 
   /// Whether the actuator drives a joint. Lists what else it drives.
   bool drives_joint(const RobotNode& node, const std::string& joint) const {
-    for (const char* other : {"site", "body", "cranksite", "slidersite", "refsite"})
+    if (node.has("site")) return !joint.empty();  // else it is listed
+    for (const char* other : {"body", "cranksite", "slidersite", "refsite"})
       if (node.has(other)) {
         node.lost(fmt::format("<{}> on a {}: scenes drive joints and tendons", node.name(), other));
         return false;
@@ -346,7 +348,7 @@ struct Drive {
 };
 
 /// Adds the actuators of a section, one for each copy of its joint.
-void add_drives(const MjcfWhole& whole, const MjcfScope& model, const RobotNode& section,
+void add_drives(MjcfWhole& whole, const MjcfScope& model, const RobotNode& section,
                 std::vector<Drive>& out) {
   static const Words known = [] {
     Words words;
@@ -359,6 +361,12 @@ void add_drives(const MjcfWhole& whole, const MjcfScope& model, const RobotNode&
     if (node.has("tendon")) {
       const auto tendon = whole.tendon_names.find({model.model, node.text("tendon")});
       out.push_back({node, &model, tendon == whole.tendon_names.end() ? "" : tendon->second});
+      continue;
+    }
+    if (node.has("site")) {
+      const bool reads =
+          std::find(kActuators.begin(), kActuators.end(), node.name()) != kActuators.end();
+      out.push_back({node, &model, reads ? add_mjcf_wrench(whole, model, node) : ""});
       continue;
     }
     const char* const attribute = joint_attribute(node);

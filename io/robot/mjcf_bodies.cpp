@@ -37,6 +37,7 @@ class Bodies {
     for (const MjcfPart& part : parts) {
       if (part.node.name() == "body") read_body(part, -1, {}, 0);
       if (part.node.name() == "site") read_site(part, -1, {});
+      if (part.node.name() == "geom") keep_geom(part, -1, {});
     }
   }
 
@@ -92,6 +93,7 @@ class Bodies {
     for (const MjcfPart& part : parts) {
       if (part.node.name() == "body") read_body(part, index, offset, depth + 1);
       if (part.node.name() == "site") read_site(part, index, offset);
+      if (part.node.name() == "geom") keep_geom(part, index, offset);
     }
   }
 
@@ -101,13 +103,30 @@ class Bodies {
     node.check(mjcf_words("site"));
     const Pose own = node.has("fromto") ? read_ends(node).pose : part.file().read_pose(node);
     if (!node.given("name")) return node.idle("<site> without a name: " + std::string(kSight));
-    if (link < 0) return node.idle("<site> of the world: a place that does not move");
     const std::string name = part.scope->full_name(node.text("name"));
+    if (link < 0) whole_.world_sites[name] = compose(part.frame, own);
+    if (link < 0) return node.idle("<site> of the world: a place that does not move");
     const RobotSite site{link, compose(offset, compose(part.frame, own)), node.source()};
     const auto [first, is_new] = robot_.sites.try_emplace(name, site);
     if (!is_new)
       node.fail(fmt::format("site name '{}' is used twice, first in {}", name,
                             place_in(robot_, first->second.source)));
+  }
+
+  /// Keeps a geom that a tendon may go around. `offset`: of its body's frame in that of the link.
+  void keep_geom(const MjcfPart& part, int link, const Pose& offset) {
+    const MjcfPart geom = part.with_class();
+    const std::string type = geom.node.text("type", "sphere");
+    if (!geom.node.given("name") || (type != "sphere" && type != "cylinder")) return;
+    RobotPiece piece;
+    const MjcfMesh* mesh = nullptr;
+    if (geom.node.has("mesh") || !read_shape(geom, piece, mesh)) return;
+    const bool ball = std::holds_alternative<SphereShape>(piece.shape);
+    whole_.geoms[part.scope->full_name(geom.node.text("name"))] = {
+        {link, compose(offset, compose(part.frame, piece.pose))},
+        ball,
+        ball ? std::get<SphereShape>(piece.shape).radius
+             : std::get<CylinderShape>(piece.shape).radius};
   }
 
   std::string unique_body(const MjcfPart& part) {

@@ -55,6 +55,19 @@ inline constexpr const char* kOtherActuators[] = {"intvelocity", "damper",      
 
 class MjcfFile;
 
+/// A frame on a link, or in the world.
+struct MjcfPlace {
+  int link = -1;  ///< of the scene; -1: the world
+  Pose pose;      ///< in the link's frame
+};
+
+/// A geom around which a tendon may go.
+struct MjcfGeom {
+  MjcfPlace place;  ///< z: along a cylinder
+  bool ball = false;
+  double radius = 0;  ///< [m]
+};
+
 /// Where elements stand in a whole of models: <attach> puts a prefix before the names of a model,
 /// and <replicate> a suffix behind those of a copy.
 struct MjcfScope {
@@ -99,6 +112,8 @@ struct MjcfWhole {
   std::set<std::string> tendons = {};  ///< joints that stand for tendons
   /// By number of a model and name there: the joint of a tendon.
   std::map<std::pair<int, std::string>, std::string> tendon_names = {};
+  std::map<std::string, Pose> world_sites = {};  ///< sites of the world, by name in the scene
+  std::map<std::string, MjcfGeom> geoms = {};    ///< spheres and cylinders, by name in the scene
   /// By name of a body in the scene: its link, and its frame in that of the link.
   std::map<std::string, std::pair<int, Pose>> body_frames = {};
   std::deque<MjcfScope> scopes = {};
@@ -188,6 +203,17 @@ void read_mjcf_gravity(MjcfWhole& whole);
 void read_mjcf_tendons(MjcfWhole& whole);
 /// Reads the constraints of all models, after the bodies.
 void read_mjcf_equalities(MjcfWhole& whole);
+/// The place of the site that an attribute names; none if no site of a body that stands once has
+/// the name.
+std::optional<MjcfPlace> mjcf_site(const MjcfWhole& whole, const MjcfScope& model,
+                                   const RobotNode& node, const char* attribute);
+/// The same frame in the body of its link, or in the world.
+Pose in_body_frame(const Scene& scene, const MjcfPlace& place);
+/// The name of that body; "" in the world.
+std::string body_at(const Scene& scene, const MjcfPlace& place);
+/// Adds the joint of an actuator at a site. Returns its name; "" if the scene cannot have it, which
+/// is listed.
+std::string add_mjcf_wrench(MjcfWhole& whole, const MjcfScope& model, const RobotNode& node);
 /// Reads a <connect> or a <weld>.
 void read_mjcf_loop(MjcfWhole& whole, const MjcfScope& model, const RobotNode& node);
 /// Reads the actuators of all models, after the bodies.

@@ -30,12 +30,6 @@ Words loop_words(bool weld) {
   return words;
 }
 
-/// A frame on a link, or in the world.
-struct LoopPlace {
-  int link = -1;  ///< of the scene; -1: the world
-  Pose pose;      ///< in the link's frame
-};
-
 class LoopReader {
  public:
   LoopReader(MjcfWhole& whole, const MjcfScope& model, const RobotNode& node)
@@ -48,12 +42,12 @@ class LoopReader {
     LoopDescription d;
     d.source = node_.source();
     d.weld = weld;
-    std::optional<LoopPlace> one, two;
+    std::optional<MjcfPlace> one, two;
     if (node_.has("site1") || node_.has("site2")) {
       one = site("site1"), two = site("site2");
     } else {
       one = body("body1");
-      two = node_.has("body2") ? body("body2") : LoopPlace{};
+      two = node_.has("body2") ? body("body2") : MjcfPlace{};
       if (one && two) weld ? place_weld(*one, *two) : place_point(*one, *two);
     }
     if (!one || !two) return;
@@ -66,9 +60,9 @@ class LoopReader {
 
  private:
   /// The frame of a body, or nothing where it stands in several copies.
-  std::optional<LoopPlace> body(const char* attribute) {
+  std::optional<MjcfPlace> body(const char* attribute) {
     const std::string name = node_.text(attribute);
-    if (name == "world") return LoopPlace{};
+    if (name == "world") return MjcfPlace{};
     const auto found = whole_.body_names.copies.find({model_.model, name});
     if (found == whole_.body_names.copies.end())
       node_.fail(fmt::format("{}=\"{}\": no body has this name", attribute, name));
@@ -77,22 +71,19 @@ class LoopReader {
       return std::nullopt;
     }
     const auto& [link, offset] = whole_.body_frames.at(found->second[0].name);
-    return LoopPlace{link, offset};
+    return MjcfPlace{link, offset};
   }
 
-  std::optional<LoopPlace> site(const char* attribute) {
-    const std::string name = node_.text(attribute);
-    const auto found = whole_.robot.sites.find(model_.full_name(name));
-    if (found == whole_.robot.sites.end()) {
+  std::optional<MjcfPlace> site(const char* attribute) {
+    const std::optional<MjcfPlace> place = mjcf_site(whole_, model_, node_, attribute);
+    if (!place)
       node_.lost(
           fmt::format("<{}> {}: no site of a body that stands once", node_.name(), attribute));
-      return std::nullopt;
-    }
-    return LoopPlace{found->second.link, found->second.pose};
+    return place;
   }
 
   /// The frame of a link in the world, where all joints are at 0.
-  [[nodiscard]] Pose at_rest(const LoopPlace& place) const {
+  [[nodiscard]] Pose at_rest(const MjcfPlace& place) const {
     Pose pose = place.pose;
     for (int i = place.link; i >= 0; i = scene_.links[std::size_t(i)].parent)
       pose = compose(scene_.links[std::size_t(i)].joint.pose, pose);
@@ -100,7 +91,7 @@ class LoopReader {
   }
 
   /// From the frames of two bodies to a point: `anchor` is in body 1.
-  void place_point(LoopPlace& one, LoopPlace& two) const {
+  void place_point(MjcfPlace& one, MjcfPlace& two) const {
     const Pose anchor = {node_.vector("anchor"), {1, 0, 0, 0}};
     const Pose in_two = compose(inverse(at_rest(two)), compose(at_rest(one), anchor));
     one.pose = compose(one.pose, anchor);
@@ -109,7 +100,7 @@ class LoopReader {
 
   /// From the frames of two bodies to one frame: `anchor` is in body 2, `relpose` is body 2 in
   /// body 1, and a quaternion of zeros stands for the pose of the file.
-  void place_weld(LoopPlace& one, LoopPlace& two) const {
+  void place_weld(MjcfPlace& one, MjcfPlace& two) const {
     const Pose anchor = {node_.vector("anchor", Vector3{0, 0, 0}), {1, 0, 0, 0}};
     Pose second = compose(inverse(at_rest(one)), at_rest(two));
     if (node_.has("relpose")) {
@@ -131,17 +122,10 @@ class LoopReader {
     return link;
   }
 
-  /// The same frame in the body of its link.
-  [[nodiscard]] Pose in_body(const LoopPlace& place) const {
-    return place.link < 0
-               ? place.pose
-               : compose(inverse(scene_.links[std::size_t(place.link)].body.pose), place.pose);
-  }
-
-  void write(LoopDescription& d, const LoopPlace& one, const LoopPlace& two) {
-    const Pose first = in_body(one), second = in_body(two);
+  void write(LoopDescription& d, const MjcfPlace& one, const MjcfPlace& two) {
+    const Pose first = in_body_frame(scene_, one), second = in_body_frame(scene_, two);
     d.body1 = scene_.links[std::size_t(one.link)].body.name;
-    if (two.link >= 0) d.body2 = scene_.links[std::size_t(two.link)].body.name;
+    d.body2 = body_at(scene_, two);
     d.position1 = first.position;
     d.position2 = second.position;
     if (d.weld) d.orientation2 = compose(second, inverse(first)).orientation;

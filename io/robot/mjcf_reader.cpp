@@ -248,7 +248,10 @@ void MjcfFile::read_defaults(const RobotNode& node, const std::string& parent) {
         for (const std::string& actuator : kActuators)
           context.defaults[actuator][a->Name()] = value;
       else
-        context.defaults[part.name() == "tendon" ? "fixed" : part.name()][a->Name()] = value;
+        for (const std::string& of : part.name() == "tendon"
+                                         ? std::vector<std::string>{"fixed", "spatial"}
+                                         : std::vector<std::string>{part.name()})
+          context.defaults[of][a->Name()] = value;
     }
   }
   if (top && name != "main") classes_["main"] = context;

@@ -71,6 +71,7 @@ class LimitLoads {
       load = std::max(load, effort->second);
     for (const MotorDescription& m : scene_.motors)
       if (m.joint == joint.name) load = std::max(load, largest_force(m));
+    if (is_transmission(scene_, joint)) load = std::max(load, whole_weight());
     for (std::size_t k = 0; k < joint.follows.size() && weight(i) == 0; ++k)
       for (std::size_t leader = 0; leader < scene_.links.size(); ++leader)
         if (scene_.links[leader].joint.name == joint.follows[k] && joint.ratio[k] != 0)
@@ -92,6 +93,13 @@ class LimitLoads {
   [[nodiscard]] bool has_no_mass(std::size_t joint) const { return weight(joint) == 0; }
 
  private:
+  /// Of all links, which hang on a transmission at most.
+  [[nodiscard]] double whole_weight() const {
+    double mass = 0;
+    for (std::size_t k = 0; k < scene_.links.size(); ++k) mass += model_.mass(static_cast<int>(k));
+    return mass * std::max(std::sqrt(dot(scene_.gravity, scene_.gravity)), 1.0);
+  }
+
   [[nodiscard]] double weight(std::size_t i) const {
     const double g = std::max(std::sqrt(dot(scene_.gravity, scene_.gravity)), 1.0);
     double mass = 0, reach = kLeastReach;

@@ -80,6 +80,7 @@ class Writer {
     if (!scene_.motors.empty()) write_motors();
     section("contact", sections.contacts);
     write_loops();
+    write_transmissions();
     section("sensor", sections.sensors);
     section("variable", sections.places);
     write_start();
@@ -220,6 +221,49 @@ class Writer {
       text += fmt::format("/>  <!-- {} -->\n", comment_text(place_in(robot_, loop.source)));
     }
     section("loop", text);
+  }
+
+  static std::string body_text(const char* name, const std::string& body) {
+    return body.empty() ? "" : fmt::format(" {}=\"{}\"", name, attribute_text(body));
+  }
+
+  static std::string part_text(const PathPart& part) {
+    if (part.kind == PathPart::Kind::pulley)
+      return fmt::format("      <pulley divisor=\"{}\"/>\n", number_text(part.divisor));
+    const bool point = part.kind == PathPart::Kind::point;
+    std::string text = fmt::format("      <{}{} pos=\"{}\"", point ? "point" : "wrap",
+                                   body_text("body", part.body), vector_text(part.position));
+    if (!point) text += fmt::format(" radius=\"{}\"", number_text(part.radius));
+    if (part.kind == PathPart::Kind::cylinder)
+      text += fmt::format(" axis=\"{}\"", vector_text(part.axis));
+    if (part.side) text += fmt::format(" side=\"{}\"", vector_text(*part.side));
+    return text + "/>\n";
+  }
+
+  void write_transmissions() {
+    std::string text;
+    for (const TransmissionDescription& d : scene_.transmissions) {
+      const bool path = d.kind == TransmissionDescription::Kind::path;
+      text +=
+          fmt::format("    <{} joint=\"{}\"", path ? "path" : "wrench", attribute_text(d.joint));
+      const std::string origin = comment_text(place_in(robot_, d.source));
+      if (path) {
+        text += fmt::format(">  <!-- {} -->\n", origin);
+        for (const PathPart& part : d.path) text += part_text(part);
+        text += "    </path>\n";
+        continue;
+      }
+      text +=
+          body_text("body", d.body) +
+          fmt::format(" pos=\"{}\" force=\"{}\"", vector_text(d.position), vector_text(d.force));
+      if (d.torque != Vector3{0, 0, 0})
+        text += fmt::format(" torque=\"{}\"", vector_text(d.torque));
+      if (d.reference)
+        text += body_text("reference", d.reference->empty() ? "world" : *d.reference) +
+                fmt::format(" pos2=\"{}\"", vector_text(d.reference_position));
+      text += fmt::format("/>  <!-- {} -->\n", origin);
+    }
+    section("transmission", text);
   }
 
   /// The start and the controls of a keyframe.

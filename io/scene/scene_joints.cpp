@@ -183,9 +183,11 @@ void read_actuators(Scene& scene, const SceneNode& section) {
   for (const SceneElement& node : elements_in(section)) {
     MotorDescription motor;
     motor.source = node.source();
-    const JointType type = scene.links[std::size_t(find_joint(scene, node, "joint"))].joint.type;
-    motor.joint = node.text("joint");
-    motor.name = node.text("name", "");
+    const std::size_t link = node.has("body") ? read_motor_place(scene, node)
+                                              : std::size_t(find_joint(scene, node, "joint"));
+    const JointType type = scene.links[link].joint.type;
+    motor.joint = scene.links[link].joint.name;
+    if (!node.has("body")) motor.name = node.text("name", "");
     motor.control = static_cast<MotorControl>(node.word("ctrl"));
     check_driven(node, type, motor);
     read_motor(node, type, motor);

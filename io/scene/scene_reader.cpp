@@ -250,6 +250,7 @@ void read_root(const SceneNode& root, Scene& scene) {
   tree.scale_followers();
   if (scene.links.empty()) root.fail("no <link> in any <robot>: there is nothing to simulate");
   each("actuator", [&](const SceneNode& s) { read_actuators(scene, s); });
+  each("transmission", [&](const SceneNode& s) { read_transmissions(scene, s); });
   each("contact", [&](const SceneNode& s) { read_contacts(scene, s); });
   each("loop", [&](const SceneNode& s) { read_loops(scene, s); });
   warn_of_dense_meshes(scene, root);

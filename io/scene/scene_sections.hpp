@@ -18,6 +18,7 @@ bool placed_in_world(const SceneNode& node, const BodyDescription& body);
 void read_actuators(Scene& scene, const SceneNode& section);
 void read_contacts(Scene& scene, const SceneNode& section);
 void read_loops(Scene& scene, const SceneNode& section);
+void read_transmissions(Scene& scene, const SceneNode& section);
 /// In the published dialect (root <redmax>), warns of meshes that touch with all their vertices:
 /// the published simulator takes about one in 50.
 void warn_of_dense_meshes(const Scene& scene, const SceneNode& root);
@@ -66,6 +67,12 @@ int control_count(const Scene& scene);
 /// Factor to SI of each control. Targets of position motors are coordinates; controls of force
 /// motors have no unit.
 std::vector<double> control_scales(const Scene& scene, const SceneContext& context);
+
+/// Adds a link without mass whose joint is a wrench. Returns its index.
+std::size_t add_wrench_joint(Scene& scene, const std::string& name, const Source& source,
+                             const TransmissionDescription& wrench);
+/// The same for a motor that stands on a body.
+std::size_t read_motor_place(Scene& scene, const SceneElement& node);
 
 /// Reads damping, armature, spring and limits of a joint whose type is known.
 void read_joint_effects(const SceneElement& node, JointDescription& joint);

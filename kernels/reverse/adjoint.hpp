@@ -14,32 +14,11 @@
 //       Ā_p += X* Ā, V̄_p += X* V̄
 #pragma once
 
-#include "kernels/step/arguments.hpp"
+#include "kernels/reverse/adjoint_arguments.hpp"
+#include "kernels/reverse/transmission_adjoint.hpp"
 #include "kernels/step/inertial_jacobian.hpp"
 
 namespace tangere::kernels {
-
-/// Intermediate results of the sweeps per link, in the link's axes.
-template <class N>
-struct LinkAdjoint {
-  Vec6<N> twist;  ///< Λ
-  Vec6<N> rate;   ///< S q̇
-  Vec6<N> V_bar;  ///< V̄
-  Vec6<N> A_bar;  ///< Ā
-};
-
-template <class N>
-struct AdjointArgs {
-  const N *q_bar, *v_bar;  ///< (nv) cotangents of the stage's result, q by its right tangent
-  N* rhs;                  ///< (nv) out: Jᵀ q̄ + V_xᵀ v̄
-  const N* lambda;         ///< (nv) the solution
-  N *nu, *mass_lambda;     ///< (nv) out: ν and M λ
-  N* target;      ///< (nv) out: cotangents of position motors' targets; zero where there are none
-  N* dry_anchor;  ///< (nv) out: of Stage::dry_anchor; zero where there is no dry friction
-  N *q_centre, *v_centre;  ///< (nv) added to
-  StageHistory<N> history;
-  LinkAdjoint<N>* links;  ///< (n_links) scratch
-};
 
 /// Writes Jᵀ q̄ + V_xᵀ v̄.
 template <class N>
@@ -60,6 +39,7 @@ void adjoint_rhs(const ModelView& model, const StageArgs<N>& a, const AdjointArg
       d.rhs[k] = sum;
     }
   }
+  transmission_rhs(model, a, d);
 }
 
 /// Returns S x for one joint.
@@ -284,9 +264,11 @@ void adjoint_history(const ModelView& model, const StageArgs<N>& a, const Adjoin
 /// Computes from λ: ν, M λ, the cotangents of the motors' targets and those of the history.
 template <class N>
 void adjoint_products(const ModelView& model, const StageArgs<N>& a, const AdjointArgs<N>& d) {
+  expand_transmissions(model, a, d.lambda);
   adjoint_outward(model, a, d);
   adjoint_contacts(model, a, d);
   adjoint_inward(model, a, d);
+  hand_on_rates(model, a, d.nu);
   without_negative_zeros(d.nu, model.nv);
   without_negative_zeros(d.mass_lambda, model.nv);
   adjoint_history(model, a, d);

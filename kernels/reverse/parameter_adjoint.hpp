@@ -297,9 +297,11 @@ void contact_places(const ModelView& model, const StageArgs<N>& a, const LinkAdj
 /// Computes the derivatives by Link::frame.p of every link. A move ε of a subtree in the axes of
 /// its first link, without turning it, changes Λ, V and A there by Λ_p × ε, V_p × ε and A_p × ε.
 template <class N>
-void place_parameters(const ModelView& model, const StageArgs<N>& a, const LinkAdjoint<N>* links,
+void place_parameters(const ModelView& model, const StageArgs<N>& a, const AdjointArgs<N>& d,
                       N* out) {
+  const LinkAdjoint<N>* const links = d.links;
   contact_places(model, a, links, out);
+  transmission_places(model, a, d, out);
   for (int i = model.n_links - 1; i >= 0; --i) {
     const Link& link = model.links[i];
     const LinkScratch<N>& s = a.links[i];
@@ -346,7 +348,7 @@ void parameter_products(const ModelView& model, const StageArgs<N>& a, const Adj
       joint_parameters<K>(model, a, link, d.lambda, out + model.rows.dof(link.v, 0));
     });
   }
-  place_parameters(model, a, d.links, out + model.rows.places);
+  place_parameters(model, a, d, out + model.rows.places);
   loop_parameters(model, a, d.links, out + model.rows.loops);
 }
 

@@ -6,7 +6,7 @@
 // δw₁ - w₁ × S. Dofs that move both bodies alike have ε = 0 and only appear as rows.
 #pragma once
 
-#include "kernels/step/inertial_jacobian.hpp"
+#include "kernels/step/transmission_jacobian.hpp"
 
 namespace tangere::kernels {
 
@@ -171,6 +171,7 @@ void jacobian(const ModelView& model, const StageArgs<N>& a) {
     contact_jacobian(model, a, model.loops[k].link1, model.loops[k].link2, o,
                      model.loops[k].link2 < 0 ? nullptr : &o.Z);
   }
+  transmission_jacobian(model, a);
   fold_jacobian(model, a);
   without_negative_zeros(a.A, entries);
 }

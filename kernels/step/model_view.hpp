@@ -7,6 +7,7 @@
 #include "kernels/contact/contact_types.hpp"
 #include "kernels/contact/shapes/distance_grid.hpp"
 #include "kernels/numbers/linalg.hpp"
+#include "kernels/step/transmission_types.hpp"
 
 namespace tangere::kernels {
 
@@ -375,6 +376,11 @@ struct ModelView {
   const FoldedEntry* folded;
   int n_loops;
   const Loop* loops;
+  int n_transmissions;
+  const Transmission* transmissions;
+  const TransmissionPiece* pieces;
+  int n_transmission_dofs, most_transmission_dofs;  ///< of all together, and of one at most
+  const TransmissionDof* transmission_dofs;
 };
 
 /// Start of the row that holds the environments of lanes 8 g … 8 g + 7 of a block.

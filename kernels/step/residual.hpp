@@ -17,6 +17,7 @@
 #include "kernels/step/pair_motion.hpp"
 #include "kernels/step/point_sums.hpp"
 #include "kernels/step/stage.hpp"
+#include "kernels/step/transmissions.hpp"
 
 namespace tangere::kernels {
 
@@ -470,6 +471,7 @@ void inward_sweep(const ModelView& model, const StageArgs<N>& a) {
 template <class N>
 void kinematics(const ModelView& model, const StageArgs<N>& a) {
   outward_sweep(model, a);
+  transmission_motions(model, a);
   a.excess[0] = N(0.0);
   if (a.considered != nullptr) ball_motions(model, a);
   for_each_link_pair(model, a, [&](int k) {
@@ -560,6 +562,7 @@ void residual(const ModelView& model, const StageArgs<N>& a) {
     if (o.near) add_force_scale(model, a, model.grounded[k].link, o.sums.wrench);
   }
   add_loop_scales(model, a);
+  fold_transmissions(model, a);
   fold_residual(model, a);
   without_negative_zeros(a.g, model.nv);
 }

@@ -45,6 +45,17 @@ struct ContactScratch {
   bool near;  ///< some lane has a candidate, or a point in the ground; else nothing is added
 };
 
+/// What a transmission has to do with one of its dofs.
+template <class N>
+struct TransmissionColumn {
+  N slope;               ///< J: of the length, or of the wrench's power, by the dof's rate
+  N rate;                ///< ∂(J v) by the dof's displacement; set by transmission_jacobian()
+  Vec3<N> axis, origin;  ///< of the dof and of its joint, world axes; an axis that slides has none
+  bool turns;
+  Vec3<N> way[2];   ///< of the points of a piece relative to its surface, by the dof's rate
+  Vec3<N> pull[2];  ///< the piece's Hessian times these
+};
+
 /// Candidate points of a pair, per lane, and the pose at which they were found, which all pairs of
 /// the same links share.
 template <class N>
@@ -100,9 +111,13 @@ struct StageArgs {
   int lone;  ///< the only lane whose result matters; its contacts are summed across points. -1: all
              ///< lanes matter
   // scratch
-  LinkScratch<N>* links;                ///< (n_links)
-  ContactScratch<N>* contacts;          ///< (n_link_pairs + n_grounded + n_loops)
-  JointColumns<N>* columns;             ///< (2 n_links) motion columns of a pair
+  LinkScratch<N>* links;                                  ///< (n_links)
+  ContactScratch<N>* contacts;                            ///< (n_link_pairs + n_grounded + n_loops)
+  JointColumns<N>* columns;                               ///< (2 n_links) motion columns of a pair
+  TransmissionColumn<N>* transmission_columns = nullptr;  ///< (n_transmission_dofs)
+  N* transmission_force = nullptr;      ///< (n_transmissions) force on the joint of each [N, N m]
+  N* transmission_second = nullptr;     ///< (square of most_transmission_dofs) ∂J
+  N* own_x = nullptr;                   ///< `x`, of which kinematics() sets those of transmissions
   std::uint64_t* low_points = nullptr;  ///< scratch of for_each_low_point(); null: it has none
   // results
   N* v;              ///< (nv)

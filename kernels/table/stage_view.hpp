@@ -99,6 +99,11 @@ struct StageView {
     a.contacts =
         scratch.template take<ContactScratch<N>>(m.n_link_pairs + m.n_grounded + m.n_loops);
     a.columns = scratch.template take<JointColumns<N>>(2 * m.n_links);
+    a.transmission_columns = scratch.template take<TransmissionColumn<N>>(m.n_transmission_dofs);
+    a.transmission_force = scratch.template take<N>(m.n_transmissions);
+    a.transmission_second =
+        scratch.template take<N>(m.most_transmission_dofs * m.most_transmission_dofs);
+    a.own_x = view(s.x);
     a.low_points = scratch.template take<std::uint64_t>(low_words(m.most_ground_points));
     a.candidates = lists_of(m, s, lone, scratch);
     a.apart = s.apart;

@@ -226,6 +226,15 @@ void GradientChecker::check_controls() {
       });
 }
 
+/// The derivative along changes of the start and of numbers. Joints that follow others go along.
+double GradientChecker::along_start(std::vector<double> q, std::vector<double> v,
+                                    std::span<const double> numbers) {
+  if (!model_.has_followers()) return along({{}, q, v, numbers});
+  q.resize(std::size_t(model_.nv())), v.resize(std::size_t(model_.nv()));
+  complete_changes(model_, {at_.q.data(), at_.v.data(), 1, batch().block(0)}, numbers, q, v);
+  return along({{}, q, v, numbers});
+}
+
 void GradientChecker::check_positions() {
   const auto move = [this](std::size_t i) {
     return [this, i](CheckInputs& x, double e) { displace(model_, x.q, static_cast<int>(i), e); };
@@ -233,27 +242,21 @@ void GradientChecker::check_positions() {
   add({"q", grad_q_, all_of(grad_q_.size()), [&](std::size_t i) { return difference(1, move(i)); },
        [&](std::size_t i) { return std::string(model_.v_names()[i]); },
        [&](std::size_t i) { return decisions(1, move(i)); }},
-      1, [&](std::vector<double> d) {
-        complete_followers(model_, d);
-        return along({{}, d, {}, {}});
-      });
+      1, [&](std::vector<double> d) { return along_start(std::move(d), {}, {}); });
 }
 
 void GradientChecker::check_velocities() {
   const auto move = [this](std::size_t i) {
     return [this, i](CheckInputs& x, double e) {
       x.v[i] += e;
-      complete_followers(model_, x.v);
+      complete_velocities(model_, x.v);
     };
   };
   add({"v", grad_v_, all_of(grad_v_.size()),
        [&](std::size_t i) { return difference(kVelocityScale, move(i)); },
        [&](std::size_t i) { return std::string(model_.v_names()[i]); },
        [&](std::size_t i) { return decisions(kVelocityScale, move(i)); }},
-      2, [&](std::vector<double> d) {
-        complete_followers(model_, d);
-        return along({{}, {}, d, {}});
-      });
+      2, [&](std::vector<double> d) { return along_start({}, std::move(d), {}); });
 }
 
 /// Takes relative changes, because units differ.
@@ -272,7 +275,7 @@ void GradientChecker::check_numbers() {
       3, [&](const std::vector<double>& d) {
         std::vector<double> rows(std::size_t(parameter_rows(model_)));
         parameters_.spread(r.change(d), batch(), 0, rows);
-        return along({{}, {}, {}, rows});
+        return along_start({}, {}, rows);
       });
 }
 

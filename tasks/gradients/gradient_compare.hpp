@@ -80,6 +80,7 @@ class GradientChecker {
   /// `along`: the derivative along a direction, computed another way.
   void add(const Comparison& c, std::uint32_t purpose,
            const std::function<double(const std::vector<double>&)>& along);
+  double along_start(std::vector<double> q, std::vector<double> v, std::span<const double> numbers);
   void check_controls();
   void check_positions();
   void check_velocities();

@@ -97,7 +97,8 @@ void TapeBlock::get_start(int loss, const Batch& batch, int environment, std::sp
   const bool follows = batch.model().has_followers();
   if (follows) {
     folded = adjoint_.loss(loss);
-    fold_followers(batch.model(), folded, static_cast<int>(lane));
+    fold_followers(batch.model(), folded, static_cast<int>(lane), tapes_[0].state(0),
+                   batch.block(environment / kBlock));
   }
   const BlockCotangent& c = follows ? folded : adjoint_.loss(loss);
   for (std::size_t i = 0; i < q.size(); ++i) q[i] = c.q[i * kBlock + lane];

@@ -166,7 +166,7 @@ inline RunGradient adjoint_of_run(const Model& model, const StepperOptions& opti
       g.u[std::size_t((t - 1) * model.nu() + k)] =
           adjoint.loss(0).u[std::size_t(k * kBlock + lane)];
   }
-  fold_followers(model, adjoint.loss(0), lane);
+  fold_followers(model, adjoint.loss(0), lane, tape.state(0), batch.block(0));
   for (int i = 0; i < model.nv(); ++i) {
     g.q.push_back(adjoint.loss(0).q[std::size_t(i * kBlock + lane)]);
     g.v.push_back(adjoint.loss(0).v[std::size_t(i * kBlock + lane)]);

@@ -34,19 +34,18 @@ inline void expect_tangent(const Model& model, const StepperOptions& options, co
   };
   const std::size_t nv = std::size_t(model.nv()), nu = std::size_t(model.nu());
   StateTangent state{draw(nv), draw(nv), std::vector<double>(nv), std::vector<double>(nv)};
-  complete_followers(model, state.q);
-  complete_followers(model, state.v);
   const NumberGradients numbers(model);
   std::vector<double> change = draw(std::size_t(numbers.count()));
   for (std::size_t k = 0; k < change.size(); ++k) change[k] *= size_of(numbers.infos()[k]);
-  double reverse = by_points, forward = 0;
-  for (std::size_t i = 0; i < nv; ++i)
-    reverse += adjoint.q[i] * state.q[i] + adjoint.v[i] * state.v[i];
-  for (std::size_t k = 0; k < change.size(); ++k) reverse += adjoint.parameters[k] * change[k];
   Batch batch(model, 1);
   batch.set_state(0, in.q, in.v);
   std::vector<double> rows(std::size_t(parameter_rows(model)));
   numbers.spread(change, batch, 0, rows);
+  complete_changes(model, {in.q.data(), in.v.data(), 1, batch.block(0)}, rows, state.q, state.v);
+  double reverse = by_points, forward = 0;
+  for (std::size_t i = 0; i < nv; ++i)
+    reverse += adjoint.q[i] * state.q[i] + adjoint.v[i] * state.v[i];
+  for (std::size_t k = 0; k < change.size(); ++k) reverse += adjoint.parameters[k] * change[k];
   Stepper stepper(model, options);
   BlockTape tape(model, stepper.integrator(), steps);
   tape.start(batch, 0);

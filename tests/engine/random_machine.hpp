@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "engine/model/compile.hpp"
 #include "engine/scene/sensed_bodies.hpp"
 #include "tests/engine/random_scene.hpp"
 
@@ -148,6 +149,88 @@ inline void close_loops(Scene& s, unsigned seed, int count) {
       d.turning_damping = random.uniform(0.01, 0.1);
     }
     s.loops.push_back(d);
+  }
+}
+
+/// Adds a joint without mass, with effects and a motor, for a transmission.
+inline std::string add_transmission_joint(Scene& s, Random& random, const std::string& name,
+                                          double rest) {
+  LinkDescription l;
+  l.name = l.body.name = name;
+  l.joint.name = name;
+  l.joint.type = JointType::prismatic;
+  l.joint.axis0 = {1, 0, 0};
+  l.body.shape = AbstractShape{};
+  static_cast<JointEffects&>(l.joint) = random_effects(random, 0.7);
+  for (double& limit : *l.joint.limits) limit += rest;
+  l.joint.rest = {rest};
+  s.links.push_back(l);
+  MotorDescription motor{name, -2, 3, {}};
+  motor.control = MotorControl::position;
+  motor.P = random.uniform(1, 10);
+  motor.D = random.uniform(0, 0.1);
+  motor.offset = rest;
+  motor.low = -random.uniform(0.5, 2), motor.high = random.uniform(0.5, 2);
+  s.motors.push_back(motor);
+  return name;
+}
+
+/// Adds paths between bodies, every second one around a surface, and wrenches on bodies.
+inline void add_transmissions(Scene& s, unsigned seed, int count) {
+  Random random(seed + 13000);
+  const int bodies = static_cast<int>(s.links.size());
+  const auto place = [&](double size) {
+    return Vector3{random.uniform(-size, size), random.uniform(-size, size),
+                   random.uniform(-size, size)};
+  };
+  const auto body = [&] {
+    const int k = random.integer(-1, bodies - 1);
+    return k < 0 ? std::string() : s.links[std::size_t(k)].body.name;
+  };
+  for (int t = 0; t < count; ++t) {
+    TransmissionDescription d;
+    const std::string moved = s.links[std::size_t(random.integer(0, bodies - 1))].body.name;
+    if (t % 3 == 2) {
+      d.kind = TransmissionDescription::Kind::wrench;
+      d.body = moved;
+      d.position = place(0.1);
+      d.force = place(1), d.torque = place(0.2);
+      if (random.integer(0, 1) == 0) d.reference = body(), d.torque = {};
+      if (d.reference == d.body) d.reference.reset();
+    } else {
+      d.path = {{.body = body(), .position = place(0.3)}};
+      const bool around = random.integer(0, 3) != 0;
+      const bool ball = random.integer(0, 1) == 0;
+      if (around) {
+        PathPart part;
+        part.kind = ball ? PathPart::Kind::sphere : PathPart::Kind::cylinder;
+        part.body = body();
+        part.position = place(0.1);
+        part.radius = random.uniform(0.02, 0.06);
+        part.axis = place(1);
+        if (random.integer(0, 1) == 0) {
+          part.side = part.position;
+          for (double& x : *part.side) x += random.uniform(0.2, 0.4);
+        }
+        d.path.push_back(part);
+      }
+      d.path.push_back({.body = moved, .position = place(0.3)});
+      if (random.integer(0, 1) == 0) {
+        d.path.push_back({.kind = PathPart::Kind::pulley, .divisor = 2});
+        d.path.push_back({.body = body(), .position = place(0.3)});
+        d.path.push_back({.body = moved, .position = place(0.3)});
+      }
+    }
+    const double rest = d.kind == TransmissionDescription::Kind::path ? 0.5 : 0;
+    d.joint = add_transmission_joint(s, random, "cord" + std::to_string(t), rest);
+    s.transmissions.push_back(d);
+    try {
+      const auto compiled = compile(s);
+    } catch (const InputError&) {  // a side inside of a surface, or bodies that stand
+      s.transmissions.pop_back();
+      s.links.pop_back();
+      s.motors.pop_back();
+    }
   }
 }
 

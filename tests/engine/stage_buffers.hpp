@@ -25,6 +25,10 @@ class StageBuffers {
     links_.resize(m.links.size());
     contacts_.resize(m.link_pairs.size() + m.grounded.size() + m.loops.size());
     columns_.resize(2 * m.links.size());
+    transmission_columns_.resize(m.transmission_dofs.size());
+    transmission_force_.resize(m.transmissions.size());
+    transmission_second_.resize(std::size_t(m.view.most_transmission_dofs) *
+                                std::size_t(m.view.most_transmission_dofs));
     excess_.assign(1, N(0.0));
     faces.assign(3 * m.pairs.size(), N(0.0));
     for (const kernels::PairContact& p : m.pairs) {
@@ -61,6 +65,10 @@ class StageBuffers {
     a.links = links_.data();
     a.contacts = contacts_.data();
     a.columns = columns_.data();
+    a.transmission_columns = transmission_columns_.data();
+    a.transmission_force = transmission_force_.data();
+    a.transmission_second = transmission_second_.data();
+    a.own_x = x.data();
     a.v = v_out.data();
     a.g = g.data();
     a.force_scale = force_scale.data();
@@ -102,6 +110,8 @@ class StageBuffers {
   std::vector<kernels::LinkScratch<N>> links_;
   std::vector<kernels::ContactScratch<N>> contacts_;
   std::vector<kernels::JointColumns<N>> columns_;
+  std::vector<kernels::TransmissionColumn<N>> transmission_columns_;
+  std::vector<N> transmission_force_, transmission_second_;
   std::vector<N> excess_;
   std::vector<std::vector<N>> points_, references_, areas_;
   std::vector<kernels::CandidateList<N>> lists_;

@@ -380,6 +380,7 @@ std::vector<Violation> check_own_headers(const Tree& tree) {
       {"io/scene/scene_joints.cpp", "a part of scene_sections.hpp"},
       {"io/scene/scene_runs.cpp", "a part of scene_sections.hpp"},
       {"io/scene/scene_sensors.cpp", "a part of scene_sections.hpp"},
+      {"io/scene/scene_transmissions.cpp", "a part of scene_sections.hpp"},
       {"tasks/gradients/loss_check.cpp", "a part of gradient_check.hpp"},
       {"tasks/gradients/return_check.cpp", "a part of gradient_check.hpp"}};
   std::vector<Violation> found;

@@ -135,6 +135,28 @@ TEST(RobotMotion, ATendonPullsItsJoints) {
             5e-5);
 }
 
+/// Two actuators of a joint, gain and bias with a gear, a damping ratio, and a force at a site.
+TEST(RobotMotion, ActuatorsPushJointsAndSites) {
+  RobotOptions options;
+  options.keyframe = "on";
+  const ImportedScene made = import_robot(kFolder + "actuators.xml", "scene.xml", options);
+  EXPECT_THAT(made.lost, IsEmpty());
+  const Scene scene = parse_scene(made.text, "scene.xml").scene;
+  ASSERT_EQ(scene.transmissions.size(), 1U);
+  EXPECT_LT(largest_joint_error(scene, read_table(kFolder + "actuators.csv"), 3), 1e-4);
+}
+
+/// A tendon around a drum, by the side that a site says, and one straight across a joint.
+TEST(RobotMotion, TendonsGoAroundADrum) {
+  const ImportedScene made = import_robot(kFolder + "spatial_tendon.xml", "scene.xml", {});
+  EXPECT_THAT(made.lost, IsEmpty());
+  const Scene scene = parse_scene(made.text, "scene.xml").scene;
+  ASSERT_EQ(scene.transmissions.size(), 2U);
+  const MotionTable truth = read_table(kFolder + "spatial_tendon.csv");
+  EXPECT_LT(largest_joint_error(scene, truth, 2), 5e-5);
+  EXPECT_LT(largest_error(scene, truth), 5e-5);
+}
+
 /// Dry friction: a swing loses 2 τ/k in each half swing, a wheel stops, a pendulum is held.
 TEST(RobotMotion, DryJointsMoveByCoulombsLaw) {
   RobotOptions options;
