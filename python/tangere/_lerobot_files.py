@@ -19,8 +19,6 @@ import fcntl
 import json
 import os
 import shutil
-import struct
-import zlib
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Iterator
@@ -31,6 +29,7 @@ import pyarrow.parquet as pq
 
 from . import _core
 from ._lerobot_features import BOOKKEEPING, Feature
+from ._png import png
 
 CHUNK = 1000  # files of a folder
 _GROUP_BYTES = 1 << 25  # of rows that are written at once
@@ -254,21 +253,6 @@ def _arrow_array(rows: np.ndarray, feature: Feature) -> pa.Array:
         ends = np.arange(0, len(values) + 1, size, dtype=np.int32)
         values = pa.ListArray.from_arrays(pa.array(ends), values)
     return values
-
-
-def png(picture: np.ndarray) -> bytes:
-    """A PNG file of a picture (height, width, 3) uint8: no library for it is needed otherwise."""
-    height, width = picture.shape[:2]
-    lines = np.zeros((height, 1 + 3 * width), np.uint8)  # a line begins with its filter: none
-    lines[:, 1:] = picture.reshape(height, -1)
-
-    def chunk(kind: bytes, data: bytes) -> bytes:
-        end = struct.pack(">I", zlib.crc32(kind + data))
-        return struct.pack(">I", len(data)) + kind + data + end
-
-    header = struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)  # 8 bits of red, green, blue
-    parts = [(b"IHDR", header), (b"IDAT", zlib.compress(lines.tobytes())), (b"IEND", b"")]
-    return b"\x89PNG\r\n\x1a\n" + b"".join(chunk(*part) for part in parts)
 
 
 def write_task(folder: Path, task: str) -> None:
