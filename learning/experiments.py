@@ -101,14 +101,14 @@ EXPERIMENTS = [
     Experiment("bc-in-hand", TURNED, 2, 330, "in hand, touch, visits", data=f"turns {TURNS}"),
     Experiment("bc-in-hand-blind", f"{TURNED} --without tactile", 2, 330, "in hand, blind, visits",
                data=f"turns {TURNS}"),
-    *(Experiment(f"see-{name}", f"{SEEN} --see {keys}", 3, 130, text)
+    *(Experiment(f"see-{name}", f"{SEEN} --see {keys}", 2, 60, text)
       for name, keys, text in (
-          ("flow", "flow", "flow of both pads"),
           ("markers", "left.rgb_marker right.rgb_marker", "pictures of both gels, with markers"),
-          ("gels", "left.rgb right.rgb", "pictures of both gels, without markers"),
-          ("eye", "eye", "camera on the hand"),
+          ("flow", "flow", "flow of both pads"),
           ("eye-markers", "eye left.rgb_marker right.rgb_marker",
-           "camera and pictures with markers"))),
+           "camera and pictures with markers"),
+          ("eye", "eye", "camera on the hand"),
+          ("gels", "left.rgb right.rgb", "pictures of both gels, without markers"))),
     *(Experiment(f"match-{name}", f"matching.py out/learning/derived --match {weight}", 3, 60,
                  text, data=f"derived {DERIVED}")
       for name, weight, text in (("none", 0, "rows alone"), ("some", 0.01, "weight 0.01"),

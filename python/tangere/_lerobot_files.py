@@ -12,8 +12,6 @@ A picture is a PNG file in its row, or a frame of a video.
 from __future__ import annotations
 
 import json
-import struct
-import zlib
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +21,7 @@ import pyarrow.parquet as pq
 
 from ._export_job import sync
 from ._lerobot_features import BOOKKEEPING, Feature
+from ._png import png
 
 CHUNK = 1000  # files of a folder
 _GROUP_BYTES = 1 << 25  # of rows that are written at once
@@ -95,21 +94,6 @@ def arrow_array(rows: np.ndarray, feature: Feature) -> pa.Array:
     if feature.shape == (1,):
         return values
     return pa.FixedSizeListArray.from_arrays(values, feature.shape[0])
-
-
-def png(picture: np.ndarray) -> bytes:
-    """A PNG file of a picture (height, width, 3) uint8: no library for it is needed otherwise."""
-    height, width = picture.shape[:2]
-    lines = np.zeros((height, 1 + 3 * width), np.uint8)  # a line begins with its filter: none
-    lines[:, 1:] = picture.reshape(height, -1)
-
-    def chunk(kind: bytes, data: bytes) -> bytes:
-        end = struct.pack(">I", zlib.crc32(kind + data))
-        return struct.pack(">I", len(data)) + kind + data + end
-
-    header = struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)  # 8 bits of red, green, blue
-    parts = [(b"IHDR", header), (b"IDAT", zlib.compress(lines.tobytes())), (b"IEND", b"")]
-    return b"\x89PNG\r\n\x1a\n" + b"".join(chunk(*part) for part in parts)
 
 
 def write_episodes(path: Path, columns: dict[str, Any]) -> None:

@@ -32,7 +32,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import _core
-from ._lerobot_files import png
+from ._png import png
 
 Numbers = NDArray[np.float64]
 

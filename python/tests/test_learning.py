@@ -513,3 +513,11 @@ def test_curves_are_logged_for_tensorboard(generate, tmp_path, monkeypatch):
     losses = written.Scalars("loss")
     assert [point.step for point in losses] == [1, 2, 3]
     assert losses[0].value > losses[2].value > 0
+
+
+def test_a_clone_learns_from_pictures(tmp_path):
+    pytest.importorskip("h5py", reason="h5py is not installed")
+    found = run("pictures.py", str(tmp_path / "set"), "--demos", "8", "--episodes", "8",
+                "--epochs", "2", "--threads", "1", "--see", "eye", "left.rgb_marker")  # fmt: skip
+    assert found["keys"] == ["eye", "left.rgb_marker"] and found["rows"] > 0
+    assert 0 <= found["test"]["success"] <= 1 and found["script"]["success"] > 0.5
