@@ -10,10 +10,10 @@
 
 #include "apps/named_value.hpp"
 #include "apps/scene_run.hpp"
-#include "io/dataset/workers.hpp"
 #include "engine/base/error.hpp"
 #include "io/dataset/chunk_codec.hpp"
 #include "io/dataset/dataset_merge.hpp"
+#include "io/dataset/workers.hpp"
 
 namespace tangere::apps {
 namespace {
