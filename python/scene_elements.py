@@ -51,6 +51,10 @@ def class_name(holder: str) -> str:
     return "SceneElements" if holder == "tangere" else holder.capitalize()
 
 
+# Attributes that come first although others may stand in their place. None leaves them out.
+LEADING = {("actuator", "motor"): ("joint",)}
+
+
 def kind_of(element: dict[str, Any]) -> str:
     return class_name(element["name"]) if element["holds"] else "Element"
 
@@ -69,7 +73,12 @@ def class_of(holder: dict[str, Any], sections: list[dict[str, Any]]) -> Iterator
 
 def method_of(element: dict[str, Any], holder: str) -> Iterator[str]:
     name, kind = element["name"], kind_of(element)
-    first = [a for a in element["attributes"] if is_needed(a) and holder != "default"]
+    leading = LEADING.get((holder, name), ())
+    first = [
+        a
+        for a in element["attributes"]
+        if (is_needed(a) or a["name"] in leading) and holder != "default"
+    ]
     rest = [a for a in element["attributes"] if a not in first]
     yield from ["", f"    def {name}(", "        self,"]
     yield from (f"        {a['name']}: {type_of(a)}," for a in first)

@@ -73,7 +73,8 @@ def run(
     """
     index, count, _ = _core.worker_from_environment()
     folder = Folder(output, format, identity(job), overwrite)
-    if resume and folder.is_done():
+    if (resume or count > 1) and folder.is_done():
+        folder.remove_old()
         return True
     if count == 1:
         with folder.alone(resume):
@@ -81,11 +82,14 @@ def run(
             folder.finish()
         return True
     mine = list(range(index, len(format.parts), count))
-    if folder.is_done():
-        return True
-    with folder.shared():
-        _write(format, folder, mine, workers, progress)
-    return folder.finish_if_last()
+    try:
+        with folder.shared():
+            _write(format, folder, mine, workers, progress)
+        return folder.finish_if_last()
+    except (FileNotFoundError, _core.InputError):
+        if folder.is_done():  # another process has completed it meanwhile
+            return True
+        raise
 
 
 def _write(
@@ -129,7 +133,12 @@ class Folder:
         path = self.output / self._format.origin
         if not (self.output / self._format.sign).is_file() or not path.is_file():
             return False
-        return json.loads(path.read_text(encoding="utf-8")).get("job") == self._name
+        return _job_in(path) == self._name
+
+    def remove_old(self) -> None:
+        """Removes what a run left that was killed after it gave `output` its name."""
+        if self._old.exists() and self.output.exists():
+            shutil.rmtree(self._old, ignore_errors=True)
 
     def has(self, part: int) -> bool:
         return (self.part / f".parts/{part:05d}").is_file()
@@ -141,6 +150,7 @@ class Folder:
     def alone(self, resume: bool) -> Iterator[None]:
         """Holds the folder. If anything but a stop fails, it is removed."""
         self._check_free()
+        self._check_part()
         self.part.mkdir(parents=True, exist_ok=True)
         with open(self.part / ".lock", "w") as lock:
             if not _locked(lock, fcntl.LOCK_EX):
@@ -161,6 +171,7 @@ class Folder:
     def shared(self) -> Iterator[None]:
         """Holds the folder together with others that write the same."""
         self._check_free()
+        self._check_part()
         self.part.mkdir(parents=True, exist_ok=True)
         with open(self.part / ".lock", "w") as lock:
             with open(self.part / ".start", "w") as start:
@@ -196,8 +207,13 @@ class Folder:
         self._format.finish(self.part)
         path = self.part / self._format.origin
         said = json.loads(path.read_text(encoding="utf-8"))
-        path.unlink()
-        write_json(path, said | {"job": self._name})
+        new = path.with_name(path.name + ".new")
+        new.unlink(missing_ok=True)
+        write_json(new, said | {"job": self._name})
+        new.replace(path)
+        missing = [part for part in range(len(self._format.parts)) if not self.has(part)]
+        if missing:
+            raise _core.IoError(f"part {missing[0]} of {self.output} was not written")
         shutil.rmtree(self.part / ".parts")
         if self.output.exists():
             self.output.rename(self._old)
@@ -208,8 +224,7 @@ class Folder:
             self._remove(self._old)
 
     def _job(self) -> str:
-        path = self.part / ".parts/job.json"
-        return json.loads(path.read_text())["job"] if path.is_file() else ""
+        return _job_in(self.part / ".parts/job.json")
 
     def _begin(self, resume: bool) -> None:
         if not (resume and self._job() == self._name):
@@ -222,7 +237,10 @@ class Folder:
         (self.part / ".parts").mkdir(exist_ok=True)
         if self._job() != self._name:
             self._format.begin(self.part)
-            write_json(self.part / ".parts/job.json", {"job": self._name})
+            new = self.part / ".parts/job.json.new"
+            new.unlink(missing_ok=True)
+            write_json(new, {"job": self._name})
+            new.replace(self.part / ".parts/job.json")
 
     def _put_back(self) -> None:
         if self._old.exists() and not self.output.exists():
@@ -236,6 +254,14 @@ class Folder:
         (folder / self._format.sign).unlink(missing_ok=True)
         shutil.rmtree(folder)
 
+    def _check_part(self) -> None:
+        names = {path.name for path in self.part.iterdir()} if self.part.is_dir() else set()
+        if names and not names & {".lock", ".parts"}:
+            raise _core.InputError(
+                f"{self.part} exists and is no unfinished export; expected another name, or remove "
+                "it"
+            )
+
     def _check_free(self) -> None:
         if self.output.exists() or self.output.is_symlink():
             if not self._overwrite:
@@ -244,6 +270,14 @@ class Folder:
                 raise _core.InputError(
                     f"{self.output} is no {self._format.kind}; it is not overwritten"
                 )
+
+
+def _job_in(path: Path) -> str:
+    """The job that a file names; none if the file is missing or damaged."""
+    try:
+        return str(json.loads(path.read_text(encoding="utf-8"))["job"])
+    except (OSError, ValueError, KeyError, TypeError):
+        return ""
 
 
 def _locked(file: Any, how: int) -> bool:

@@ -61,11 +61,15 @@ class Pool:
     def _feed(self, end: Callable[[int], None]) -> None:
         path = os.pathsep.join(path for path in sys.path if path)
         alone = {"PYTHONPATH": path, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
-        process = subprocess.Popen(
-            [sys.executable, "-c", _PROGRAM], env=os.environ | alone,
-            stdin=subprocess.PIPE, stdout=subprocess.PIPE, start_new_session=True,
-            pass_fds=(self._lock,),
-        )  # fmt: skip
+        try:
+            process = subprocess.Popen(
+                [sys.executable, "-c", _PROGRAM], env=os.environ | alone,
+                stdin=subprocess.PIPE, stdout=subprocess.PIPE, start_new_session=True,
+                pass_fds=(self._lock,),
+            )  # fmt: skip
+        except BaseException as error:
+            self._fail(error)
+            return
         self._processes.append(process)
         assert process.stdin and process.stdout
         part = None

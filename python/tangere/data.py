@@ -125,7 +125,13 @@ class Episodes:
             known = list(file.get("mask", ()))
             if name not in known:
                 raise _core.InputError(f"{self.masks}: no mask {name!r}; it has {known}")
-            return self.named([n.decode() for n in file["mask"][name][()]])
+            names = [n.decode() for n in file["mask"][name][()]]
+        lost = [n for n in names if n not in self._index]
+        if lost:
+            raise _core.InputError(
+                f"{self.masks}: mask {name!r} names {lost[0]}, which the data set does not have"
+            )
+        return self.named(names)
 
     def succeeded(self) -> list[int]:
         """The episodes that ended in success."""

@@ -161,6 +161,13 @@ def generate(
     """
     if isinstance(options, str):
         raise _core.InputError(f"options {options!r}; expected a list, such as [{options!r}]")
+    if put is not None:
+        try:
+            shlex.split(put)
+        except ValueError as error:
+            raise _core.InputError(
+                f"put {put!r}: {error}; expected a command as a shell has it"
+            ) from None
     if shards < 1 or episodes < 1:
         raise _core.InputError(f"episodes {episodes}, shards {shards}; expected 1 or above")
     index, count, _ = _core.worker_from_environment()
@@ -218,6 +225,7 @@ def merge(
         )
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
+    _keep_job(folder, place.read(_JOB), str(destination))
     for done, name in enumerate(names):
         if progress:
             progress(done, shards)
@@ -230,6 +238,20 @@ def merge(
     if progress:
         progress(shards, shards)
     return run_command(["merge", str(folder), "--overwrite"])
+
+
+def _keep_job(folder: Path, job: bytes, destination: str) -> None:
+    """Notes what the shards of a folder are, or compares it: others may be as long."""
+    text = job.decode()
+    mine = folder / _JOB
+    kept = mine.read_text() if mine.is_file() else None
+    if kept != text and (kept is not None or any(folder.glob("shard-*.h5"))):
+        raise _core.InputError(
+            f"{folder} has shards of another set than {destination}; expected a new folder"
+        )
+    new = folder / f"{_JOB}.new"
+    new.write_text(text)
+    new.replace(mine)
 
 
 def _agree(place: Place, name: str, job: dict[str, Any]) -> None:
@@ -283,6 +305,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(
         prog="python -m tangere.store",
         description="Make a data set on machines that share no folder, or fetch and merge it.",
+        epilog="Words after -- are more options of tangere generate.",
     )
     which = parser.add_subparsers(dest="command", required=True)
     making = which.add_parser("generate", help="make this process' shards and move them")
@@ -293,12 +316,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
     making.add_argument("--seed", type=int, default=0, metavar="N")
     making.add_argument("--put", metavar="CMD", help="command that takes {path} away as {name}")
     making.add_argument("--scratch", metavar="DIR", help="local folder for a shard")
-    making.add_argument("options", nargs="*", help="after --: more words of tangere generate")
     merging = which.add_parser("merge", help="fetch all shards and merge them")
     merging.add_argument("destination", metavar="URL")
     merging.add_argument("folder", metavar="DIR")
-    given = vars(parser.parse_args(arguments))
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    cut = words.index("--") if "--" in words else len(words)
+    given = vars(parser.parse_args(words[:cut]))
     command = given.pop("command")
+    if command == "generate":
+        given["options"] = words[cut + 1 :]
+    elif words[cut + 1 :]:
+        parser.error(f"{words[cut + 1]!r} after --; expected nothing, merge takes no more words")
     try:
         said = generate(**given) if command == "generate" else merge(**given)
     except _core.InputError as error:

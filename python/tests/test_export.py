@@ -320,6 +320,23 @@ def test_a_process_that_fails_tells_why(pushes, tmp_path, monkeypatch):
     assert [path.name for path in tmp_path.iterdir()] == ["damaged"]
 
 
+def test_a_process_that_does_not_start_is_told(pushes, tmp_path, monkeypatch):
+    many_parts(monkeypatch)
+    monkeypatch.setattr(sys, "executable", str(tmp_path / "python"))
+    with pytest.raises(FileNotFoundError):
+        exports.export(pushes, tmp_path / "out", "zarr", workers=2)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_folder_that_is_no_export_keeps_its_files(pushes, tmp_path):
+    mine = tmp_path / "out.part"
+    mine.mkdir()
+    (mine / "notes.txt").write_text("mine")
+    with pytest.raises(tangere.InputError, match="is no unfinished export"):
+        exports.export(pushes, tmp_path / "out", "zarr")
+    assert (mine / "notes.txt").read_text() == "mine"
+
+
 def test_what_a_format_does_not_have_is_told(pushes, generate, tmp_path):
     bare = generate("dummy", "--episodes", "1")
     for data, to, options, message in (

@@ -63,6 +63,20 @@ def test_other_settings_and_mistakes_are_told(tmp_path):
     with pytest.raises(tangere.InputError, match="no tangere.json; expected a destination of"):
         store.merge(tmp_path, tmp_path / "set")
     assert store.main(["merge", str(tmp_path), str(tmp_path / "set")]) == 2
+    with pytest.raises(tangere.InputError, match="No closing quotation; expected a command"):
+        store.generate("stable_grasp", tmp_path / "put", 16, 1, put="cp {path'")
+
+
+def test_more_words_of_the_command_stand_behind_a_line(tmp_path):
+    words = ["stable_grasp", "--episodes", "16", "--shards", "1"]
+    there = [str(tmp_path / name) for name in ("a", "b")]
+    assert store.main(["generate", words[0], there[0], *words[1:], "--", "--threads", "1"]) == 0
+    assert store.main(["generate", words[0], there[1], *words[1:], "--seed", "5"]) == 0
+    with pytest.raises(SystemExit):
+        store.main(["merge", there[0], str(tmp_path / "set"), "--", "--threads", "1"])
+    store.merge(there[0], tmp_path / "set")
+    with pytest.raises(tangere.InputError, match="has shards of another set than"):
+        store.merge(there[1], tmp_path / "set")
 
 
 def test_a_command_takes_shards_away(tmp_path, wanted):

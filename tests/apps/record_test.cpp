@@ -202,7 +202,7 @@ TEST(Record, TheSceneAsksAndTheOptionAsksInstead) {
   EXPECT_EQ(shape(folder, "set/shard-00000.h5", "data/demo_0/obs/pad.sum"), (h5::Dims{1, 6}));
   EXPECT_EQ(shape(folder, "set/shard-00000.h5", "data/demo_0/obs/bodies").back(), 13U);
   EXPECT_THAT(run(folder, {"bench", "ball.xml", "--steps", "5", "--envs", "16"}).err,
-              HasSubstr("bench reads sensors alone"));
+              HasSubstr("bench reads sensors and cameras alone"));
   EXPECT_EQ(run_json(folder, {"inspect", "ball.xml"}).at("outputs"),
             json::array({"bodies", "pad.sum"}));
   EXPECT_THAT(run(folder, {"inspect", "ball.xml"}).out, HasSubstr("): bodies, pad.sum\n"));
