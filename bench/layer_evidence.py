@@ -93,9 +93,9 @@ def read(scene: tangere.Scene, depth: float, reading: str = "gel") -> np.ndarray
     return batch.tactile(reading)[0]
 
 
-def taxels(x: np.ndarray) -> np.ndarray:
-    """(ROWS, PER, COLS, PER, 3) of a gel of the truth's size: taxels of PER × PER points."""
-    return x.reshape(ROWS, PER, COLS, PER, 3)
+def taxels(x: np.ndarray, per: int = PER) -> np.ndarray:
+    """(ROWS, per, COLS, per, 3) of a gel of the truth's size: taxels of per × per points."""
+    return x.reshape(ROWS, per, COLS, per, 3)
 
 
 def error(found: np.ndarray, truth: np.ndarray) -> float:
@@ -106,13 +106,14 @@ def fields() -> str:
     """The table of normal fields."""
     lines = ["| body, depth | springs | cells of 0.75 mm | 0.375 mm | contact, 0.75 mm |",
              "|---|---|---|---|---|"]  # fmt: skip
-    area = (TAXEL / PER) ** 2
-    for name, bodies, depth, data in CASES:
+    name, bodies, depth, data = CASES[-1]
+    finer = (f"{name}, points 0.19 mm apart", bodies, depth, data, 2 * PER)
+    for name, bodies, depth, data, per in [*((*case, PER) for case in CASES), finer]:
         truth = np.loadtxt(DATA / f"{data}.txt", skiprows=1).reshape(ROWS, COLS)
-        cells = []
+        area, points, cells = (TAXEL / per) ** 2, (ROWS * per, COLS * per), []
         for skin in (f'kn="{SPRINGS * area}">', layer(0.75e-3, 1e-3), layer(0.375e-3, 1e-3),
                      layer(0.75e-3, 1e-3, "true")):  # fmt: skip
-            found = taxels(read(gel(bodies, skin, SIZE, POINTS), depth)).sum((1, 3))[..., 2]
+            found = taxels(read(gel(bodies, skin, SIZE, points), depth), per).sum((1, 3))[..., 2]
             total = found.sum() / truth.sum() - 1
             cells.append(f"{100 * error(found, truth):.1f} % ({100 * total:+.0f} %)")
         lines.append(f"| {name}, {1e3 * depth:g} mm | " + " | ".join(cells) + " |")

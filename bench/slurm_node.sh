@@ -108,7 +108,7 @@ cat >"$folder/srun.sh" <<JOB
 srun $program ${set_of[*]} --output $folder/srun
 JOB
 
-# Slurm lets a requeued task wait for two minutes, so that its node has forgotten it. Two seconds do here: tasks that
+# Slurm lets a requeued task wait for two minutes, so that its node has dropped it. Two seconds do here: tasks that
 # wait in two rounds start.
 waiting=""
 release() {

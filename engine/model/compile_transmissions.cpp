@@ -85,7 +85,7 @@ class Transmissions {
     const auto k = std::size_t(bodies_.find("body", body, source));
     const CompiledBody& of = m_.bodies[k];
     if (is_transmission(m_.scene, m_.scene.links[k].joint))
-      fail(source, "goes by body '" + body + "' of a transmission; expected a body that moves");
+      fail(source, "names body '" + body + "' of a transmission; expected a body that moves");
     p.link = of.link;
     p.at = of.frame.R * vec3_of(at) + of.frame.p;
     return p;
@@ -200,7 +200,8 @@ class Transmissions {
         m_.transmission_dofs.push_back({i, k, link.v + k});
     }
     t.dofs = static_cast<int>(m_.transmission_dofs.size()) - t.first_dof;
-    if (t.dofs == 0) fail(d_->source, "goes by bodies that stand; expected one that moves");
+    if (t.dofs == 0)
+      fail(d_->source, "has no degree of freedom that moves it; expected a body that moves");
     if (t.dofs > kernels::kMostTransmissionDofs)
       fail(d_->source, fmt::format("is moved by {} degrees of freedom; expected at most {}", t.dofs,
                                    kernels::kMostTransmissionDofs));

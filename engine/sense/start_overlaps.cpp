@@ -144,4 +144,39 @@ std::vector<std::string> rounded_places(const Model& model) {
   return found;
 }
 
+std::vector<std::string> paths_through_surfaces(const Model& model) {
+  const CompiledModel& m = compiled(model);
+  std::vector<std::string> found;
+  if (m.transmissions.empty()) return found;
+  const Batch batch(model, 1, 0);
+  PadReader reader(model);
+  reader.move(batch, 0, 0);
+  const auto placed = [&](int link, const Vec3<double>& at) {
+    const kernels::Frame<double> world = reader.link(link, 0, 0).world;
+    return world.R * at + world.p;
+  };
+  for (std::size_t t = 0; t < m.transmissions.size(); ++t) {
+    const kernels::Transmission& of = m.transmissions[t];
+    for (int k = of.first_piece; k < of.first_piece + of.pieces; ++k) {
+      const kernels::TransmissionPiece& piece = m.transmission_pieces[std::size_t(k)];
+      const bool cylinder = piece.kind == kernels::PieceKind::cylinder;
+      if (!cylinder && piece.kind != kernels::PieceKind::sphere) continue;
+      const Vec3<double> axis = reader.link(piece.round, 0, 0).world.R * piece.axis;
+      double least = piece.radius;
+      for (const auto& [link, at] : {std::pair{piece.first, piece.first_point},
+                                     std::pair{piece.second, piece.second_point}}) {
+        Vec3<double> arm = placed(link, at) - placed(piece.round, piece.centre);
+        if (cylinder) arm -= dot(arm, axis) * axis;
+        least = std::min(least, std::sqrt(dot(arm, arm)));
+      }
+      if (least < piece.radius)
+        found.push_back(fmt::format(
+            "the path of joint '{}' starts with a point {:.3g} m from the middle of a surface of "
+            "radius {:.3g} m, so it goes straight through the surface; expected points outside",
+            model.scene().transmissions[t].joint, least, piece.radius));
+    }
+  }
+  return found;
+}
+
 }  // namespace tangere

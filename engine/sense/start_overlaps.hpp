@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Checks of the initial state: bodies that overlap so deeply that contact springs eject them, and
-// bodies so far from the origin that their positions are rounded.
+// Checks of the initial state: bodies that overlap so deeply that contact springs eject them,
+// bodies so far from the origin that their positions are rounded, and paths that start inside
+// surfaces.
 #pragma once
 
 #include <string>
@@ -27,5 +28,10 @@ std::vector<std::string> unchecked_overlaps(const Model& model);
 /// Returns a line for each body whose position is rounded by more than 1e-9 of its size, because it
 /// starts far from the middle of its scene or the scene is far from the world's origin.
 std::vector<std::string> rounded_places(const Model& model);
+
+/// Returns a line for each path of a transmission with a point inside a surface that it goes
+/// around, at the starting state of the scene's first environment with seed 0: it goes straight
+/// through that surface.
+std::vector<std::string> paths_through_surfaces(const Model& model);
 
 }  // namespace tangere

@@ -96,7 +96,8 @@ void add_shape(const h5::Id& group, const std::string& name, const std::string& 
   const std::size_t bits = 8 * H5Tget_size(type.get());
   const H5T_class_t kind = H5Tget_class(type.get());
   const std::string word =
-      kind == H5T_ENUM ? "bool"
+      kind == H5T_ENUM     ? "bool"
+      : kind == H5T_STRING ? fmt::format("files of up to {} bytes", bits / 8)
       : kind == H5T_FLOAT
           ? fmt::format("float{}", bits)
           : fmt::format("{}int{}", H5Tget_sign(type.get()) == H5T_SGN_NONE ? "u" : "", bits);

@@ -182,12 +182,12 @@ void add_layer_slopes(const LayerSlopeSums& s) {
       if (!any(pressing)) continue;
       LayerSlopes<N> by;
       depth_slopes(shape, body.touch, s.of.law, p, by);
-      const auto rubbing = p.normal > zero;
+      const auto frictional = p.normal > zero;
       const Vec3<N>& x = p.at.place;
       Slopes<N> turned = p.load * by.slant;
-      if (any(rubbing)) {
+      if (any(frictional)) {
         friction_slopes(shape, *s.of.shape, body.touch, p, by);
-        const N F = select(rubbing, p.friction_load, zero);
+        const N F = select(frictional, p.friction_load, zero);
         turned = turned + F * by.friction;
         sum.add_force(F * by.friction_by_twist.turn, x, 6);
         sum.add_force(F * by.friction_by_twist.shift, x, 9);

@@ -65,8 +65,8 @@ struct PlaceWeights {
 template <class N>
 void add_piece_places(const StageArgs<N>& a, const TransmissionPart<N>& part,
                       const TransmissionPiece& piece, const PlaceWeights<N>& weights, N* out) {
-  const PieceAtWork<N> p = piece_at_work(a, piece);
-  set_ways(part, piece, p);
+  const PosedPiece<N> p = posed_piece(a, piece);
+  set_velocities(part, piece, p);
   const auto add = [&](int link, const Vec3<N>& x) {
     if (link < 0) return;
     const Vec3<N> own = transposed_times(a.links[link].world.R, x);
@@ -78,15 +78,15 @@ void add_piece_places(const StageArgs<N>& a, const TransmissionPart<N>& part,
     const int v = part.dofs[k].v;
     return weights.rate * weights.v[v] - weights.force * weights.lambda[v];
   };
-  Vec3<N> pull[2] = {zero3<N>(), zero3<N>()};
+  Vec3<N> change[2] = {zero3<N>(), zero3<N>()};
   for (int k = 0; k < n; ++k)
-    for (int i = 0; i < p.points; ++i) pull[i] += weight(k) * part.columns[k].way[i];
+    for (int i = 0; i < p.points; ++i) change[i] += weight(k) * part.columns[k].velocity[i];
   for (int i = 0; i < points; ++i) {
     const Vec3<N>& slope = p.points == 0 ? p.force : p.length.slope[i];
     Vec3<N> point_bar = zero3<N>();
     if (p.points > 0) {
-      point_bar = weights.length * slope + p.length.second[i][0] * pull[0];
-      if (p.points == 2) point_bar += p.length.second[i][1] * pull[1];
+      point_bar = weights.length * slope + p.length.second[i][0] * change[0];
+      if (p.points == 2) point_bar += p.length.second[i][1] * change[1];
       add(piece.round, -point_bar);
     }
     for (int k = 0; k < n; ++k) {

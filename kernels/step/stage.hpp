@@ -52,8 +52,8 @@ struct TransmissionColumn {
   N rate;                ///< ∂(J v) by the dof's displacement; set by transmission_jacobian()
   Vec3<N> axis, origin;  ///< of the dof and of its joint, world axes; an axis that slides has none
   bool turns;
-  Vec3<N> way[2];   ///< of the points of a piece relative to its surface, by the dof's rate
-  Vec3<N> pull[2];  ///< the piece's Hessian times these
+  Vec3<N> velocity[2];  ///< of the points of a piece relative to its surface, by the dof's rate
+  Vec3<N> change[2];    ///< of the slopes: the piece's Hessian times these
 };
 
 /// Candidate points of a pair, per lane, and the pose at which they were found, which all pairs of

@@ -15,30 +15,30 @@ namespace tangere::kernels {
 
 /// Adds to ∂J what G·∂r of one point of a piece is, for dofs k and l.
 template <class N>
-N turned_way(const TransmissionPart<N>& part, const TransmissionPiece& piece,
-             const PieceAtWork<N>& p, int point, int k, int l) {
+N second_of_point(const TransmissionPart<N>& part, const TransmissionPiece& piece,
+                  const PosedPiece<N>& p, int point, int k, int l) {
   const TransmissionColumn<N>&ck = part.columns[k], &cl = part.columns[l];
   const auto both = [&](std::uint64_t dofs) { return int(moves(dofs, k) && moves(dofs, l)); };
   Vec3<N> sum = zero3<N>();
   if (const int times = both(p.moved[point]) - both(piece.moves_round); times != 0) {
     const bool above = part.dofs[l].link <= part.dofs[k].link;
     const TransmissionColumn<N>&upper = above ? cl : ck, &lower = above ? ck : cl;
-    if (upper.turns) sum = N(double(times)) * cross(upper.axis, way_of(lower, p.point[point]));
+    if (upper.turns) sum = N(double(times)) * cross(upper.axis, velocity_at(lower, p.point[point]));
   }
-  if (moves(piece.moves_round, k) && ck.turns) sum -= cross(ck.axis, cl.way[point]);
-  if (moves(piece.moves_round, l) && cl.turns) sum -= cross(cl.axis, ck.way[point]);
+  if (moves(piece.moves_round, k) && ck.turns) sum -= cross(ck.axis, cl.velocity[point]);
+  if (moves(piece.moves_round, l) && cl.turns) sum -= cross(cl.axis, ck.velocity[point]);
   return dot(p.length.slope[point], sum);
 }
 
 /// Returns ∂J of a wrench, for dofs k and l.
 template <class N>
-N turned_wrench(const TransmissionPart<N>& part, const PieceAtWork<N>& p, int k, int l) {
+N second_of_wrench(const TransmissionPart<N>& part, const PosedPiece<N>& p, int k, int l) {
   if (part.dofs[l].link <= part.dofs[k].link) return N(0.0);
   const TransmissionColumn<N>&upper = part.columns[k], &lower = part.columns[l];
-  Vec3<N> way = zero3<N>();
-  if (upper.turns) way += cross(upper.axis, way_of(lower, p.point[0]));
-  if (lower.turns) way -= cross(lower.axis, way_of(upper, p.point[0]));
-  N sum = dot(p.force, way);
+  Vec3<N> velocity = zero3<N>();
+  if (upper.turns) velocity += cross(upper.axis, velocity_at(lower, p.point[0]));
+  if (lower.turns) velocity -= cross(lower.axis, velocity_at(upper, p.point[0]));
+  N sum = dot(p.force, velocity);
   if (upper.turns && lower.turns) sum += dot(p.torque, cross(upper.axis, lower.axis));
   return sum;
 }
@@ -50,22 +50,22 @@ void transmission_second(const StageArgs<N>& a, const TransmissionPart<N>& part)
   N* const second = a.transmission_second;
   for (int e = 0; e < n * n; ++e) second[e] = N(0.0);
   for (int piece = 0; piece < part.transmission.pieces; ++piece) {
-    const PieceAtWork<N> p = piece_at_work(a, part.pieces[piece]);
-    set_ways(part, part.pieces[piece], p);
+    const PosedPiece<N> p = posed_piece(a, part.pieces[piece]);
+    set_velocities(part, part.pieces[piece], p);
     for (int l = 0; l < n; ++l)
       for (int i = 0; i < p.points; ++i) {
         TransmissionColumn<N>& c = part.columns[l];
-        c.pull[i] = p.length.second[i][0] * c.way[0];
-        if (p.points == 2) c.pull[i] += p.length.second[i][1] * c.way[1];
+        c.change[i] = p.length.second[i][0] * c.velocity[0];
+        if (p.points == 2) c.change[i] += p.length.second[i][1] * c.velocity[1];
       }
     for (int k = 0; k < n; ++k)
       for (int l = 0; l < n; ++l) {
         N& to = second[k * n + l];
         for (int i = 0; i < p.points; ++i)
-          to += dot(part.columns[k].way[i], part.columns[l].pull[i]) +
-                turned_way(part, part.pieces[piece], p, i, k, l);
+          to += dot(part.columns[k].velocity[i], part.columns[l].change[i]) +
+                second_of_point(part, part.pieces[piece], p, i, k, l);
         if (p.points == 0 && moves(p.moved[0], k) && moves(p.moved[0], l))
-          to += turned_wrench(part, p, k, l);
+          to += second_of_wrench(part, p, k, l);
       }
   }
   for (int l = 0; l < n; ++l) {

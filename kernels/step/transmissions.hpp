@@ -40,15 +40,15 @@ Frame<N> world_of(const StageArgs<N>& a, int link) {
   return link < 0 ? Frame<N>{diagonal(N(1.0)), zero3<N>()} : a.links[link].world;
 }
 
-/// Returns C of a dof at a point.
+/// Returns C, the velocity of a point by the rate of a dof that moves it.
 template <class N>
-Vec3<N> way_of(const TransmissionColumn<N>& c, const Vec3<N>& point) {
+Vec3<N> velocity_at(const TransmissionColumn<N>& c, const Vec3<N>& point) {
   return c.turns ? cross(c.axis, point - c.origin) : c.axis;
 }
 
 /// A piece in world axes at the present poses.
 template <class N>
-struct PieceAtWork {
+struct PosedPiece {
   int points;  ///< 2, 1 or, of a wrench, 0
   Vec3<N> point[2];
   std::uint64_t moved[2];  ///< the dofs that move each point's link
@@ -57,8 +57,8 @@ struct PieceAtWork {
 };
 
 template <class N>
-PieceAtWork<N> piece_at_work(const StageArgs<N>& a, const TransmissionPiece& piece) {
-  PieceAtWork<N> p;
+PosedPiece<N> posed_piece(const StageArgs<N>& a, const TransmissionPiece& piece) {
+  PosedPiece<N> p;
   const Frame<N> first = world_of(a, piece.first), round = world_of(a, piece.round);
   p.point[0] = first.R * broadcast<N>(piece.first_point) + first.p;
   p.moved[0] = piece.moves_first;
@@ -95,27 +95,27 @@ PieceAtWork<N> piece_at_work(const StageArgs<N>& a, const TransmissionPiece& pie
 
 /// Sets r of every dof for the points of a piece.
 template <class N>
-void set_ways(const TransmissionPart<N>& part, const TransmissionPiece& piece,
-              const PieceAtWork<N>& p) {
+void set_velocities(const TransmissionPart<N>& part, const TransmissionPiece& piece,
+                    const PosedPiece<N>& p) {
   for (int k = 0; k < part.transmission.dofs; ++k) {
     TransmissionColumn<N>& c = part.columns[k];
     for (int i = 0; i < p.points; ++i) {
       const bool moves_point = moves(p.moved[i], k), moves_surface = moves(piece.moves_round, k);
-      c.way[i] = moves_point == moves_surface ? zero3<N>()
-                 : moves_point                ? way_of(c, p.point[i])
-                                              : -way_of(c, p.point[i]);
+      c.velocity[i] = moves_point == moves_surface ? zero3<N>()
+                      : moves_point                ? velocity_at(c, p.point[i])
+                                                   : -velocity_at(c, p.point[i]);
     }
   }
 }
 
 /// Adds J of one piece.
 template <class N>
-void add_slopes(const TransmissionPart<N>& part, const PieceAtWork<N>& p) {
+void add_slopes(const TransmissionPart<N>& part, const PosedPiece<N>& p) {
   for (int k = 0; k < part.transmission.dofs; ++k) {
     TransmissionColumn<N>& c = part.columns[k];
-    for (int i = 0; i < p.points; ++i) c.slope += dot(p.length.slope[i], c.way[i]);
+    for (int i = 0; i < p.points; ++i) c.slope += dot(p.length.slope[i], c.velocity[i]);
     if (p.points > 0 || !moves(p.moved[0], k)) continue;
-    c.slope += dot(p.force, way_of(c, p.point[0]));
+    c.slope += dot(p.force, velocity_at(c, p.point[0]));
     if (c.turns) c.slope += dot(p.torque, c.axis);
   }
 }
@@ -145,9 +145,9 @@ void transmission_motions(const ModelView& model, const StageArgs<N>& a) {
     set_columns(model, a, part);
     N length(0.0), rate(0.0);
     for (int i = 0; i < t.pieces; ++i) {
-      const PieceAtWork<N> p = piece_at_work(a, part.pieces[i]);
+      const PosedPiece<N> p = posed_piece(a, part.pieces[i]);
       length += p.length.length;
-      set_ways(part, part.pieces[i], p);
+      set_velocities(part, part.pieces[i], p);
       add_slopes(part, p);
     }
     for (int k = 0; k < t.dofs; ++k)

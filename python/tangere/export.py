@@ -130,7 +130,10 @@ def _chosen(episodes: Episodes, mask: str | None, only_success: bool) -> list[in
     solved = set(episodes.succeeded()) if only_success else set()
     chosen = [i for i in chosen if episodes.lengths[i] and (i in solved or not only_success)]
     if not chosen:
-        raise _core.InputError(f"{episodes.path}: no episode is left to write")
+        wanted = f"mask {mask!r}" if mask is not None else "all"
+        if only_success:
+            wanted += ", those that succeeded"
+        raise _core.InputError(f"{episodes.path}: no episode is left to write of {wanted}")
     return chosen
 
 

@@ -47,7 +47,7 @@ def generate(
     shards: files, and tasks. None: as many as `tangere generate` takes, at least one for each two
         processors of the cluster while a shard has 16 episodes or more.
     policy: a name, such as "random". None: the script of the task, the controls of a scene.
-    threads: of each task, which asks Ray for as many processors.
+    threads: of each task, which reserves as many processors.
     options: more words of the command, such as ("--compress", "deflate").
     retries: of a task whose worker dies; an error of the command is not tried again.
     progress: called with shards that are complete and all shards.

@@ -173,6 +173,8 @@ def generate(
     index, count, _ = _core.worker_from_environment()
     place = _place(destination, storage)
     words = ["generate", str(what), "--episodes", str(episodes), "--seed", str(seed), *options]
+    with tempfile.TemporaryDirectory(dir=scratch, prefix="tangere-") as folder:  # refuses mistakes
+        run_command([*words, "--output", folder, "--shards", str(shards), "--dry-run", "--quiet"])
     _agree(place, str(destination), {
         "words": words, "shards": shards, "tangere_version": __version__,
         "instruction_set": _core.instruction_set,

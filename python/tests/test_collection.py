@@ -21,7 +21,7 @@ PATH = Path(__file__).parents[2] / "examples/collection.py"
 def collection():
     spec = importlib.util.spec_from_file_location("collection", PATH)
     module = importlib.util.module_from_spec(spec)
-    sys.modules["collection"] = module  # which its dataclass wants
+    sys.modules["collection"] = module  # which its dataclass needs
     spec.loader.exec_module(module)
     module.LEAST = 1
     fewer = {"200": "80", "300": "100"}  # steps

@@ -60,6 +60,7 @@ def test_other_settings_and_mistakes_are_told(tmp_path):
     ):
         with pytest.raises((tangere.InputError, tangere.IoError), match=message):
             store.generate(*arguments, **options)
+    assert not (tmp_path / "none").exists()  # a mistake claims nothing
     with pytest.raises(tangere.InputError, match="no tangere.json; expected a destination of"):
         store.merge(tmp_path, tmp_path / "set")
     assert store.main(["merge", str(tmp_path), str(tmp_path / "set")]) == 2

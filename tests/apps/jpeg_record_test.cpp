@@ -116,7 +116,9 @@ TEST(JpegRecord, IsReadByEveryCommand) {
                                             "data/demo_2/obs")),
               ElementsAre("eye.ids", "eye.rgb", "eye_ids", "eye_rgb", "pad", "q"));
   EXPECT_EQ(run(folder, {"validate", "set"}).exit_code, 0);
-  EXPECT_EQ(run(folder, {"info", "set"}).exit_code, 0);
+  const Outcome told = run(folder, {"info", "set"});
+  EXPECT_EQ(told.exit_code, 0);
+  EXPECT_THAT(told.out, ::testing::ContainsRegex("eye.rgb .* files of up to [0-9]+ bytes"));
   const json table = run_json(folder, {"export", "set", "--csv", "t.csv"});
   EXPECT_THAT(table["left_out"].get<std::vector<std::string>>(), ::testing::Contains("eye.rgb"));
   make(folder, "set", {"--pictures", "jpeg:80", "--resume"});

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "engine/sense/energy_balance.hpp"
+#include "engine/sense/start_overlaps.hpp"
 #include "tests/engine/gradient_differences.hpp"
 #include "tests/engine/gradient_tangent.hpp"
 #include "tests/engine/random_machine.hpp"
@@ -118,6 +119,19 @@ TEST(Transmissions, HaveTheLengthsOfTheirPaths) {
 
 /// A force at a point of a hinged bar does the work of its lever; a force along axes of another
 /// body has a length.
+TEST(Transmissions, StartsInsideASurfaceAreNamed) {
+  Scene s = slider();  // the ball starts at x = 0.2
+  PathPart surface{.kind = Kind::sphere, .position = {0, 0.15, 0}};
+  surface.radius = 0.02;
+  s.transmissions[0].path.insert(s.transmissions[0].path.begin() + 1, surface);
+  EXPECT_TRUE(paths_through_surfaces(Model(s)).empty());
+  s.transmissions[0].path[1].position = {0.21, 0, 0};
+  const std::vector<std::string> lines = paths_through_surfaces(Model(s));
+  ASSERT_EQ(lines.size(), 1U);
+  EXPECT_NE(lines[0].find("'cord' starts with a point 0.01 m from the middle"), std::string::npos)
+      << lines[0];
+}
+
 TEST(Transmissions, ForcesActAtPoints) {
   Scene s;
   s.gravity = {0, 0, 0};
