@@ -106,8 +106,8 @@ def fields() -> str:
     """The table of normal fields."""
     lines = ["| body, depth | springs | cells of 0.75 mm | 0.375 mm | contact, 0.75 mm |",
              "|---|---|---|---|---|"]  # fmt: skip
-    name, bodies, depth, data = CASES[-1]
-    finer = (f"{name}, points 0.19 mm apart", bodies, depth, data, 2 * PER)
+    _, bodies, depth, data = CASES[-1]
+    finer = (f"punch, {2 * PER} × {2 * PER} points", bodies, depth, data, 2 * PER)
     for name, bodies, depth, data, per in [*((*case, PER) for case in CASES), finer]:
         truth = np.loadtxt(DATA / f"{data}.txt", skiprows=1).reshape(ROWS, COLS)
         area, points, cells = (TAXEL / per) ** 2, (ROWS * per, COLS * per), []

@@ -277,13 +277,13 @@ TEST(TransmissionFaults, SayWhatWasExpected) {
       "no joint is named 'rope'");
   has(fault([](Scene& s) { s.transmissions[0].path[0].body = "cube"; }), "no body is named 'cube'");
   has(fault([](Scene& s) { s.transmissions[0].path.pop_back(); }), "expected points at both ends");
-  has(fault([](Scene& s) { s.transmissions[0].path[0].body = ""; }), "expected one that moves");
+  has(fault([](Scene& s) { s.transmissions[0].path[0].body = ""; }), "no degree of freedom");
   has(fault([](Scene& s) { s.links[1].body.shape = SphereShape{0.1}; }), "moves a body");
   has(fault([](Scene& s) {
         s.transmissions.push_back(s.transmissions[0]);
         s.transmissions[1].joint = "ball_joint";
       }),
-      "goes by body 'ball' of a transmission");
+      "names body 'ball' of a transmission");
   has(fault([](Scene& s) { s.transmissions.push_back(s.transmissions[0]); }), "given twice");
   has(fault([](Scene& s) {
         auto& path = s.transmissions[0].path;
