@@ -255,8 +255,11 @@ class Folder:
         shutil.rmtree(folder)
 
     def _check_part(self) -> None:
-        names = {path.name for path in self.part.iterdir()} if self.part.is_dir() else set()
-        if names and not names & {".lock", ".parts"}:
+        """A run that was killed leaves one of these; the last two between two names."""
+        signs = (".lock", ".parts", self._format.sign, self._format.origin)
+        if not self.part.is_dir() or not any(self.part.iterdir()):
+            return
+        if not any((self.part / name).exists() for name in signs):
             raise _core.InputError(
                 f"{self.part} exists and is no unfinished export; expected another name, or remove "
                 "it"

@@ -227,6 +227,7 @@ def test_nothing_half_written_gets_the_name(pushes, tmp_path, monkeypatch):
     assert sorted(out.rglob("*")) == before  # the old one is still there
     (tmp_path / "out.part/data").mkdir(parents=True)  # what a killed run leaves
     (tmp_path / "out.part/data/left").touch()
+    (tmp_path / "out.part/.lock").touch()
     lerobot.export(pushes, out, overwrite=True, mask="valid")
     assert not list(out.rglob("left")) and not (out / ".lock").exists()
     assert sorted(path.name for path in tmp_path.iterdir()) == ["damaged", "out"]
