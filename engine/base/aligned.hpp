@@ -30,6 +30,14 @@ struct LaneAllocator {
   }
 };
 
+/// A unit of raw storage. A vector of single bytes visits each of them where it is destroyed.
+struct CacheLine {
+  alignas(kLaneAlignment) std::byte bytes[kLaneAlignment];
+};
+constexpr std::size_t cache_lines(std::size_t bytes) {
+  return (bytes + kLaneAlignment - 1) / kLaneAlignment;
+}
+
 template <class T>
 using AlignedVector = std::vector<T, LaneAllocator<T>>;
 

@@ -47,7 +47,7 @@ struct ReadoutPullback::Impl {
   std::array<AlignedVector<kernels::MotionCotangent<LaneRow>>, kGroups> links;
   std::array<bool, kGroups> used{};
   AlignedVector<LaneRow> rows;  ///< q, v, zeros, rates, q̄, v̄, places of one group
-  AlignedVector<std::byte> scratch;
+  AlignedVector<CacheLine> scratch;
   std::vector<kernels::TouchCotangent<double>> touches;
   std::vector<kernels::Touch<double>> frictionless;
   std::vector<int> tiles;  ///< tiles of a whole field that are not zero
@@ -81,7 +81,7 @@ struct ReadoutPullback::Impl {
     }
     ideal.resize(whole.size());
     expanded.resize(whole.size());
-    scratch.resize(bytes);
+    scratch.resize(cache_lines(bytes));
     touches.resize(targets);
   }
 
@@ -554,7 +554,7 @@ void ReadoutPullback::finish(BlockCotangent& out) {
     load(v, m.layout.v, m.nv);
     std::fill(q_bar, places + place_count, LaneRow{});
     kernels::active_kernels().pull_back_links(
-        m.view, {q, v, zero, rates, i.batch->block(i.block), g}, i.scratch.data(),
+        m.view, {q, v, zero, rates, i.batch->block(i.block), g}, i.scratch.data()->bytes,
         i.links[std::size_t(g)].data(), q_bar, v_bar, place_count > 0 ? places : nullptr);
     const auto add = [g](double* to, const LaneRow* from, int count) {
       for (int k = 0; k < count; ++k)

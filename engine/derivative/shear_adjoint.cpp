@@ -84,7 +84,7 @@ ShearAdjoint<L>::ShearAdjoint(const CompiledModel& m, int losses) {
   std::size_t bytes = 0, stride = 0;
   for (const kernels::KernelTable* table : kernels::available_kernels())
     bytes = std::max(bytes, table->pullback_bytes(m.view));
-  scratch_.resize(bytes);
+  scratch_.resize(cache_lines(bytes));
   for (const ShearSpringContact& of : m.shear_springs)
     stride = std::max(stride, std::size_t(of.contact.n_points + 2 * kGroup));
   numbers_.resize((18 + kernels::kPointNumbers) * stride);
@@ -103,8 +103,9 @@ void ShearAdjoint<L>::add_to_state(const CompiledModel& m, const kernels::Kernel
                                    Row<L>* parameters) {
   std::fill(rows_.begin(), rows_.end(), Row<L>{});
   Row<L>*const q_sum = rows_.data(), *const v_sum = q_sum + m.nv, *const place_sum = v_sum + m.nv;
-  table.stage<L>().pull_back_poses(m.view, w.stage, q, v, w.zero, scratch_.data(), links.data(),
-                                   q_sum, v_sum, parameters == nullptr ? nullptr : place_sum);
+  table.stage<L>().pull_back_poses(m.view, w.stage, q, v, w.zero, scratch_.data()->bytes,
+                                   links.data(), q_sum, v_sum,
+                                   parameters == nullptr ? nullptr : place_sum);
   const auto add = [&](Row<L>* to, const Row<L>* from, int count) {
     for (int i = 0; i < count; ++i)
       for (int l = 0; l < L; ++l)

@@ -94,7 +94,7 @@ class ShearAdjoint {
   Poses at_, slip_;                      ///< (n_links)
   Poses at_touches_, slip_touches_;      ///< (n_shear_springs), see StageKernels::touches_at
   AlignedVector<kernels::Row<L>> rows_;  ///< (nv) twice
-  AlignedVector<std::byte> scratch_;
+  AlignedVector<CacheLine> scratch_;
   AlignedVector<double> numbers_;    ///< (18, largest stride)
   std::vector<double> kept_before_;  ///< of one lane
 };

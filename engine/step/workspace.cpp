@@ -105,7 +105,8 @@ std::size_t BasicWorkspace<L>::bytes(const CompiledModel& m) {
       2 * poses * sizeof(kernels::LinkPose<LaneRow>) + w.search.size() * sizeof(double);
   // In scenes of many link pairs, few of the lists are ever made.
   const std::size_t listed = m.link_balls.empty() ? CandidateLists<L>::bytes(m) : 0;
-  return shear_bytes + watched + listed + w.memory.size() * sizeof(LaneRow) + w.scratch.size();
+  return shear_bytes + watched + listed + w.memory.size() * sizeof(LaneRow) +
+         w.scratch.size() * sizeof(CacheLine);
 }
 
 template <int L>
@@ -133,7 +134,7 @@ BasicWorkspace<L>::BasicWorkspace(const CompiledModel& m, int inner)
   std::size_t bytes = 0;  // the largest of all instruction sets, any of which may be chosen later
   for (const kernels::KernelTable* table : kernels::available_kernels())
     bytes = std::max(bytes, table->stage<L>().scratch_bytes(m.view));
-  scratch.resize(bytes);
+  scratch.resize(cache_lines(bytes));
   // Lanes that never lived hold unit quaternions, so that they compute with finite numbers.
   for (const kernels::Link& link : m.links) {
     if (link.kind != kernels::JointKind::spherical) continue;
@@ -144,7 +145,7 @@ BasicWorkspace<L>::BasicWorkspace(const CompiledModel& m, int inner)
   near.outrun = outrun.data();
   use(own_candidates);
   stage.coupled = coupled.data();
-  stage.scratch = scratch.data();
+  stage.scratch = scratch.data()->bytes;
 }
 
 template struct BasicWorkspace<kGroup>;

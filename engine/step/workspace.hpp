@@ -67,7 +67,7 @@ struct BasicWorkspace {
 
   using Rows = AlignedVector<LaneRow>;
   Rows memory;  ///< every row below, in one allocation
-  AlignedVector<std::byte> scratch;
+  AlignedVector<CacheLine> scratch;
   CandidateLists<L> own_candidates;
   CandidateLists<L>* candidates;  ///< the lists in use: own_candidates, or those of a batch's group
   std::vector<unsigned> near_lanes, outrun;  ///< storage of `near`

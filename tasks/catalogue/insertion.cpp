@@ -23,6 +23,8 @@ constexpr std::array<double, 3> kAct{0.02, 0.02,
                                      10 * kDegree};  // of an action, at most [m, m, rad]
 constexpr std::array<double, 3> kOff{6e-3, 6e-3, 10 * kDegree};  // largest e at the start
 constexpr double kInside = 0.0247;  // height of the box's lower corners [m]
+// Half the inner size of the hole [m]: a box whose middle is farther off fell beside the walls.
+constexpr std::array<double, 2> kHole{0.01975, 0.02725};
 constexpr double kSuccess = 10, kNoise = 1e-5,
                  kTooLittle = 1e-4;  // reward; noise of a reading, least shear [N]
 constexpr double kShift = 4.1e-3,
@@ -164,7 +166,7 @@ class Insertion : public Task {
 
   StepOutcome evaluate(const TaskView& view) const override {
     const std::array<double, 3> e = off(view);
-    const bool inside = highest_below(view.now()) < kInside;
+    const bool inside = is_above_hole(view.now()) && highest_below(view.now()) < kInside;
     double far = 0;
     for (std::size_t k = 0; k < 3; ++k) far += e[k] / kOff[k] * e[k] / kOff[k];
     return {inside ? kSuccess : -far, inside, inside};
@@ -232,6 +234,10 @@ class Insertion : public Task {
     }
   };
 
+  [[nodiscard]] bool is_above_hole(const Snapshot& m) const {
+    return std::abs(rest_[0] + m.q[box_]) < kHole[0] &&
+           std::abs(rest_[1] + m.q[box_ + 1]) < kHole[1];
+  }
   /// Height of the highest corner of the box's lower face [m]. A box that tilts in its grip is not
   /// inside.
   [[nodiscard]] double highest_below(const Snapshot& m) const {
@@ -336,7 +342,9 @@ TaskSpec declare_insertion(InsertionMotion motion, Friction friction) {
                  : !turns ? "The same; only the place is off and is corrected."
                           : "A held box is moved and turned until it goes into a hole.";
   spec.scene = "insertion.xml";
-  spec.success = "all corners of the box's lower face are below 24.7 mm at the end of an attempt";
+  spec.success =
+      "the box's middle is above the hole and all corners of its lower face are below 24.7 mm at "
+      "the end of an attempt";
   spec.action = {"correction",
                  {(turns ? 1U : 0U) + (slides ? 2U : 0U)},
                  "1",

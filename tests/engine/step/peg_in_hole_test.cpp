@@ -138,11 +138,9 @@ TEST(PegInHole, GradientsAgree) {
   testing::Random random(3);
   for (double& v : in.v) v += 0.01 * random.normal();
   in.u.resize(6);
-  for (const Integrator scheme : {Integrator::bdf2, Integrator::sdirk2}) {
-    const StepperOptions options = testing::options(scheme, scene.timestep, 1e-13);
-    EXPECT_GT(testing::check_gradient(model, options, in, 4, 1e-5), 12);
-    EXPECT_EQ(testing::check_tangent(model, options, in, 5), 1);
-  }
+  const StepperOptions options = testing::options(Integrator::sdirk2, scene.timestep, 1e-13);
+  EXPECT_GT(testing::check_gradient(model, options, in, 4, 1e-5), 12);
+  EXPECT_EQ(testing::check_tangent(model, options, in, 5), 1);
 }
 
 }  // namespace

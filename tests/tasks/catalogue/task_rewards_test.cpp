@@ -68,9 +68,13 @@ TEST(Rewards, OfStableGrasp) {
 TEST(Rewards, OfInsertion) {
   const auto task = task_named("insertion");
   const std::size_t box = place_of(*task, "box");
-  double rest = 0;
+  double rest_x = 0, rest_y = 0, rest = 0;
   for (const LinkDescription& link : task->model().scene().links)
-    if (link.joint.name == "box") rest = link.joint.pose.position[2];
+    if (link.joint.name == "box") {
+      rest_x = link.joint.pose.position[0];
+      rest_y = link.joint.pose.position[1];
+      rest = link.joint.pose.position[2];
+    }
   OwnView own(*task);
   own.memory[0] = 1 * kMillimetre, own.memory[1] = -2 * kMillimetre, own.memory[2] = 3 * kDegree;
   own.action = {0.1, 0.05, 0.2};  // times 20 mm, 20 mm and 10 degrees: e = (1 + 2, -2 + 1, 3 + 2)
@@ -97,6 +101,19 @@ TEST(Rewards, OfInsertion) {
   expect_pays(*task, own, outside, false, "inside with its middle, not with its corners");
   stand(24.4, -0.01);
   expect_pays(*task, own, 10, true, "tilted and inside");
+  const double hole_x = 19.75, hole_y = 27.25;
+  const auto place = [&](double x, double y) {  // of the box's middle [mm]
+    for (auto& q : own.q) {
+      q[box] = x * kMillimetre - rest_x;
+      q[box + 1] = y * kMillimetre - rest_y;
+    }
+  };
+  place(hole_x + 0.1, 0);
+  expect_pays(*task, own, outside, false, "fallen beside a wall along x");
+  place(0, -hole_y - 0.1);
+  expect_pays(*task, own, outside, false, "fallen beside a wall along y");
+  place(hole_x - 0.1, 0.1 - hole_y);
+  expect_pays(*task, own, 10, true, "above the hole");
   // Yaw alone moves: 3 + 2 degrees; x and y stay where they are: (1² + 2²)/36 + 1/4 = 14/36.
   const auto turning = task_named("insertion_rotation");
   OwnView other(*turning);

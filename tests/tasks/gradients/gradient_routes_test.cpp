@@ -151,7 +151,7 @@ TEST(Pictures, ThreeRoutesAgree) {
   picture.gel = std::make_shared<const Gel>(default_gel());
   scene.sensors[0].array.rows = 16, scene.sensors[0].array.cols = 20;
   scene.sensors[0].layer->cell = 0;
-  expect_right(check(scene, LossKind::pictures, 60, 60), 1e-5);
+  expect_right(check(scene, LossKind::pictures, 60, 15), 1e-5);
   scene.sensors[0].layer.reset();
   EXPECT_THROW(check(scene, LossKind::pictures, 60, 60), InputError);
 }
