@@ -164,6 +164,8 @@ constexpr Attribute kSchema[] = {
     row(kJoint, "ratio", "1", U::one, "a number for each, in units of both coordinates",
         Types{kSingle}),
     row(kJoint, "offset", "0", U::m, "of q, with follows", Or{U::rad}, Types{kSingle}),
+    row(kJoint, "powers", kNone, U::one, "c2 c3 c4: adds c2 q^2 + c3 q^3 + c4 q^4 of one joint",
+        Types{kSingle}),
     ignored(kJoint | kBody, "mu"),
     ignored(kBody, "damping"),
     ignored(kJoint | kBody, "format"),

@@ -46,7 +46,7 @@ LaneBits solve_stages(const CompiledModel& model, const StepSettings& settings, 
   for (int k = 0; k <= inner; ++k) {
     set_stage(model, *a.scheme, k, a.h, w);
     guess_stage(model, *a.scheme, k, a.h, w);
-    expand_followers(model, w.stage.x);
+    expand_followers(model, w.stage, w.stage.x);
     std::copy_n(w.stage.x, n, w.x_guess);
     const LaneBits found = solve_stage(model, table, w, lanes, limits, factors, report);
     const LaneBits lost = softens ? lanes & ~found : kNoLane;
@@ -96,7 +96,7 @@ LaneBits finish(const CompiledModel& model, const Row<L>& h, BasicWorkspace<L>& 
       w.q1[link.q + 3][l] = q.z;
     }
   }
-  for (int l = 0; l < L && !model.followers.empty(); ++l)  // exactly: rounding does not add up
+  for (int l = 0; l < L && model.has_followers(); ++l)  // exactly: rounding does not add up
     if (has(lanes, l))
       place_followers(
           model, [&](int i) -> double& { return w.q1[i][l]; },

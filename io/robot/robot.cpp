@@ -42,15 +42,20 @@ const JointDescription* joint_named(const Robot& robot, const std::string& name)
   return found == robot.scene.links.end() ? nullptr : &found->joint;
 }
 
-/// Whether the leaders of a joint, and theirs, lead to `target`. `passed`: joints already visited.
-bool leads_to(const Robot& robot, const JointDescription& joint, const JointDescription& target,
-              std::set<const JointDescription*>& passed) {
-  for (const std::string& name : joint.follows) {
-    const JointDescription* const leader = joint_named(robot, name);
-    if (leader == &target) return true;
-    if (leader != nullptr && passed.insert(leader).second &&
-        leads_to(robot, *leader, target, passed))
-      return true;
+/// Whether f(joint) holds for a leader of a joint, or one of theirs.
+template <class F>
+bool any_leader(const Robot& robot, const JointDescription& joint, const F& f) {
+  std::set<const JointDescription*> passed;
+  std::vector<const JointDescription*> open = {&joint};
+  while (!open.empty()) {
+    const JointDescription& next = *open.back();
+    open.pop_back();
+    for (const std::string& name : next.follows) {
+      const JointDescription* const leader = joint_named(robot, name);
+      if (leader == nullptr || !passed.insert(leader).second) continue;
+      if (f(*leader)) return true;
+      open.push_back(leader);
+    }
   }
   return false;
 }
@@ -67,8 +72,16 @@ const char* follower_fault(const Robot& robot, const JointDescription& joint) {
       return "which is not between joints of one degree of freedom each";
     if (name.find(',') != std::string::npos) return "whose name has a comma";
   }
-  std::set<const JointDescription*> passed;
-  return leads_to(robot, joint, joint, passed) ? "which follows it in turn" : nullptr;
+  const auto leader_is = [&](const auto& f) { return any_leader(robot, joint, f); };
+  if (leader_is([&](const JointDescription& l) { return &l == &joint; }))
+    return "which follows it in turn";
+  const bool by_one = leader_is([](const JointDescription& l) { return !l.powers.empty(); });
+  if (by_one && !joint.powers.empty()) return "by a polynomial of a polynomial";
+  if (by_one && joint.follows.size() > 1) return "of which one follows by a polynomial";
+  if (!joint.powers.empty() &&
+      leader_is([](const JointDescription& l) { return l.follows.size() > 1; }))
+    return "by a polynomial of several joints";
+  return nullptr;
 }
 
 }  // namespace
@@ -82,6 +95,7 @@ void check_followers(Robot& robot) {
                                              fmt::join(joint.follows, "', '"), fault));
     joint.follows.clear();
     joint.ratio.clear();
+    joint.powers.clear();
   }
 }
 
