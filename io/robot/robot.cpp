@@ -60,9 +60,9 @@ bool any_leader(const Robot& robot, const JointDescription& joint, const F& f) {
   return false;
 }
 
-/// What keeps a joint from following others; null: nothing. Throws InputError for a leader that is
+/// What keeps a joint from following others; "": nothing. Throws InputError for a leader that is
 /// no joint.
-const char* follower_fault(const Robot& robot, const JointDescription& joint) {
+std::string follower_fault(const Robot& robot, const JointDescription& joint) {
   for (const std::string& name : joint.follows) {
     const JointDescription* const leader = joint_named(robot, name);
     if (leader == nullptr)
@@ -75,13 +75,16 @@ const char* follower_fault(const Robot& robot, const JointDescription& joint) {
   const auto leader_is = [&](const auto& f) { return any_leader(robot, joint, f); };
   if (leader_is([&](const JointDescription& l) { return &l == &joint; }))
     return "which follows it in turn";
-  const bool by_one = leader_is([](const JointDescription& l) { return !l.powers.empty(); });
-  if (by_one && !joint.powers.empty()) return "by a polynomial of a polynomial";
-  if (by_one && joint.follows.size() > 1) return "of which one follows by a polynomial";
-  if (!joint.powers.empty() &&
-      leader_is([](const JointDescription& l) { return l.follows.size() > 1; }))
+  if (joint.powers.empty()) return "";
+  if (leader_is([](const JointDescription& l) { return !l.powers.empty(); }))
+    return "by a polynomial of a polynomial";
+  if (leader_is([](const JointDescription& l) { return l.follows.size() > 1; }))
     return "by a polynomial of several joints";
-  return nullptr;
+  for (const LinkDescription& link : robot.scene.links)  // a tendon, which would move nothing else
+    if (link.joint.follows.size() > 1 &&
+        any_leader(robot, link.joint, [&](const JointDescription& l) { return &l == &joint; }))
+      return fmt::format("by a polynomial, and '{}' follows it with others", link.joint.name);
+  return "";
 }
 
 }  // namespace
@@ -89,8 +92,8 @@ const char* follower_fault(const Robot& robot, const JointDescription& joint) {
 void check_followers(Robot& robot) {
   for (LinkDescription& link : robot.scene.links) {
     JointDescription& joint = link.joint;
-    const char* const fault = follower_fault(robot, joint);
-    if (fault == nullptr) continue;
+    const std::string fault = follower_fault(robot, joint);
+    if (fault.empty()) continue;
     robot.lost.add(joint.source, fmt::format("joint '{}' follows '{}', {}", joint.name,
                                              fmt::join(joint.follows, "', '"), fault));
     joint.follows.clear();

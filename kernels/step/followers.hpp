@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Systems of scenes in which dofs follow others (model_view.hpp, Follower; polynomial_followers.hpp).
+// Systems of scenes in which dofs follow others, by ratios (model_view.hpp, Follower) and by
+// polynomials (polynomial_followers.hpp).
 #pragma once
 
 #include <cmath>

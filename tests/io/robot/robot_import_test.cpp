@@ -386,7 +386,9 @@ TEST(RobotImport, PolynomialsOfPolynomialsAreListed) {
   const ImportedScene tendon = made(
       "</equality><tendon><fixed name=\"t\"><joint joint=\"two\" coef=\"2\"/><joint "
       "joint=\"three\" coef=\"1\"/></fixed></tendon>");
-  EXPECT_THAT(tendon.lost, ElementsAre(HasSubstr("of which one follows by a polynomial")));
+  EXPECT_THAT(tendon.lost, ElementsAre(HasSubstr("joint 'two' follows 'one', by a polynomial, and "
+                                                 "'t' follows it with others")));
+  EXPECT_THAT(tendon.text, HasSubstr("follows=\"two three\" ratio=\"2 1\""));
 }
 
 /// A leader may have a blank in its name.

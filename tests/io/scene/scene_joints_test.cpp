@@ -179,7 +179,7 @@ axis="0 0 1" follows="a" )" +
     return "";
   };
   EXPECT_THAT(fault("powers=\"1 2 3 4\""),
-              HasSubstr("s.xml:3: <joint>: powers has 4 numbers; expected 1 to 3"));
+              HasSubstr("s.xml:2: <joint>: powers has 4 numbers; expected 1 to 3"));
 }
 
 /// A chain of links, nested or by name.
