@@ -46,7 +46,7 @@ LaneBits solve_stages(const CompiledModel& model, const StepSettings& settings, 
   for (int k = 0; k <= inner; ++k) {
     set_stage(model, *a.scheme, k, a.h, w);
     guess_stage(model, *a.scheme, k, a.h, w);
-    expand_followers(model, w.stage, w.stage.x);
+    expand_followers(model, w.stage.x);
     std::copy_n(w.stage.x, n, w.x_guess);
     const LaneBits found = solve_stage(model, table, w, lanes, limits, factors, report);
     const LaneBits lost = softens ? lanes & ~found : kNoLane;

@@ -9,17 +9,21 @@ namespace tangere {
 
 inline bool in_blocks(const CompiledModel& m) { return m.view.pattern.slot == nullptr; }
 
-/// Sets followers' numbers of a solution x = G y at the x of a stage, in lanes from `first` to
-/// `end`. Of those that follow by polynomials, kinematics() sets the stage's x itself.
+/// Sets followers' numbers of a solution x = G y, in lanes from `first` to `end`. Those of dofs that
+/// follow by polynomials stay 0: kinematics() sets their x itself.
 template <int L>
-void expand_followers(const CompiledModel& m, const kernels::Stage<L>& stage, kernels::Row<L>* x,
-                      int first = 0, int end = L) {
+void expand_followers(const CompiledModel& m, kernels::Row<L>* x, int first = 0, int end = L) {
   for (const kernels::Follower& f : m.followers)
     for (int l = first; l < end; ++l) x[f.v][l] = 0;
   for (const kernels::FollowerTie& t : m.ties)
     for (int l = first; l < end; ++l) x[t.v][l] += t.ratio * x[t.leader_v][l];
+}
+/// Sets those too, of a change x of the stage's x.
+template <int L>
+void expand_polynomials(const CompiledModel& m, const kernels::Stage<L>& stage,
+                        kernels::Row<L>* x) {
   for (const kernels::PolynomialFollower& f : m.polynomials)
-    for (int l = first; l < end; ++l) {
+    for (int l = 0; l < L; ++l) {
       const double q = stage.centre[f.leader_q][l] + stage.x[f.leader_v][l];
       x[f.v][l] = kernels::polynomial_at(f.coefficients, q).slope * x[f.leader_v][l];
     }
@@ -60,7 +64,7 @@ void solve(const CompiledModel& m, const kernels::KernelTable& table, BasicWorks
            LaneBits lanes, const kernels::Row<L>* b, kernels::Row<L>* out) {
   if (!in_blocks(m)) {
     table.stage<L>().solve(m.view, w.stage, b, out);
-    return expand_followers(m, w.stage, out);
+    return expand_followers(m, out);
   }
   for (int l = 0; l < L; ++l)
     if (has(lanes, l)) w.block_factors.solve(table, l, b, out);
@@ -75,7 +79,7 @@ void solve_watched(const CompiledModel& m, const kernels::KernelTable& table, Ba
   if (!in_blocks(m)) {
     const kernels::StageKernels<L>& k = table.stage<L>();
     (Transposed ? k.solve_transposed : k.solve_watched)(m.view, w.stage, b, out, &sound);
-    return expand_followers(m, w.stage, out);
+    return expand_followers(m, out);
   }
   for (int l = 0; l < L; ++l)
     if (has(lanes, l))
@@ -87,7 +91,7 @@ template <int L>
 void solve_pivoted(const CompiledModel& m, BasicWorkspace<L>& w, int lane, const kernels::Row<L>* b,
                    kernels::Row<L>* out) {
   w.pivoted.solve(lane, b, out);
-  expand_followers(m, w.stage, out, lane, lane + 1);
+  expand_followers(m, out, lane, lane + 1);
 }
 
 /// Factors A of one lane, or Aᵀ, with row exchanges.
