@@ -9,8 +9,8 @@ namespace tangere {
 
 inline bool in_blocks(const CompiledModel& m) { return m.view.pattern.slot == nullptr; }
 
-/// Sets followers' numbers of a solution x = G y, in lanes from `first` to `end`. Those of dofs that
-/// follow by polynomials stay 0: kinematics() sets their x itself.
+/// Sets followers' numbers of a solution x = G y, in lanes from `first` to `end`. Those that follow
+/// by polynomials keep 0: kinematics() sets their x itself.
 template <int L>
 void expand_followers(const CompiledModel& m, kernels::Row<L>* x, int first = 0, int end = L) {
   for (const kernels::Follower& f : m.followers)
