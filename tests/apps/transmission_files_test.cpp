@@ -24,7 +24,8 @@ timestep="0.001"/><robot><link name="ball"><joint name="ball" type="prismatic" a
 damping="0.4"/><body name="cord" type="abstract" mass="0" inertia="0 0 0"/></link></robot>
 <transmission><path joint="cord"><point body="ball"/><point pos="0 0.3 0"/></path></transmission>
 <actuator><motor joint="cord" ctrl="force" ctrl_range="-2 2"/></actuator>
-<initial><joint name="ball" q="0.2"/></initial><control><constant value="0.25"/></control></tangere>)";
+<initial><joint name="ball" q="0.2"/></initial>
+<control><constant value="0.25"/></control></tangere>)";
   const std::string cord = folder.path("cord.xml");
   const Outcome made = run(folder, {"simulate", cord, "-o", "run.h5", "--steps", "5", "--envs", "2",
                                     "--record", "transmissions"});
