@@ -256,7 +256,7 @@ int generate(GenerateOptions options, const Console& console, const ProgramInfo&
   Job job;
   job.run = episode_options(options, model, controls);
   const Record record = record_of(options.record, model);
-  refuse_memory(record, "a data set");
+  refuse_trajectory_outputs(record, "a data set");
   job.run.record = record.requested;
   const GradientKind gradients = requested_gradients(options, false);
   std::unique_ptr<RolloutLoss> loss;

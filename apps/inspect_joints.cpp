@@ -66,7 +66,8 @@ Json joint_effects_json(const Scene& scene) {
                    {"friction", e.friction},
                    {"follows", n.leaders->follows},
                    {"ratio", n.leaders->ratio},
-                   {"offset", n.leaders->offset}});
+                   {"offset", n.leaders->offset},
+                   {"powers", n.leaders->powers}});
   }
   return out;
 }
@@ -90,6 +91,7 @@ std::string joint_effects_text(const Scene& scene) {
     const JointDescription& d = *n.leaders;
     for (std::size_t k = 0; k < d.follows.size(); ++k)
       parts.push_back(fmt::format("follows {} by {:.6g}", d.follows[k], d.ratio[k]));
+    if (!d.powers.empty()) parts.push_back(fmt::format("powers {:.6g}", fmt::join(d.powers, " ")));
     if (d.offset != 0) parts.push_back(fmt::format("offset {:.6g}", d.offset));
     text += fmt::format("  {}: {}\n", n.joint, fmt::join(parts, ", "));
   }

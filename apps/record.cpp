@@ -14,6 +14,8 @@
 namespace tangere::apps {
 namespace {
 
+constexpr const char* kTransmissions = "transmissions";
+
 /// A word and what it means; throws for one that the scene does not have.
 TimedName requested_output(const std::string& word, const std::string& where, const Model& model) {
   TimedName requested;
@@ -78,6 +80,15 @@ Record record_of(const std::string& option, const Model& model) {
   if (record.find("memory") != nullptr && !model.has_shear_state())
     throw InputError(record.where +
                      ": 'memory', but nothing in the scene has ks or friction of joints");
+  if (const TimedName* const forces = record.find(kTransmissions); forces != nullptr) {
+    if (model.scene().transmissions.empty())
+      throw InputError(record.where + ": 'transmissions', but the scene has none");
+    if (forces->times.given())
+      throw InputError(
+          record.where +
+          ": 'transmissions' with times; expected it alone: it is stored at each step");
+    outputs.transmissions = true;
+  }
   outputs.fields.emplace();
   for (const TimedName& requested : record.requested)
     if (std::optional<FieldOutput> field = find_output(model.scene(), requested.name)) {
@@ -100,12 +111,13 @@ void take_memory(Record& record, const Model& model) {
     outputs.shear_times = requested->times;
 }
 
-void refuse_memory(const Record& record, const std::string& who) {
-  if (record.find("memory") != nullptr)
-    throw InputError(
-        fmt::format("{}: 'memory', but {} does not hold it; expected other names: a "
-                    "trajectory of simulate holds it",
-                    record.where, who));
+void refuse_trajectory_outputs(const Record& record, const std::string& who) {
+  for (const char* name : {"memory", kTransmissions})
+    if (record.find(name) != nullptr)
+      throw InputError(
+          fmt::format("{}: '{}', but {} does not hold it; expected other names: a trajectory of "
+                      "simulate holds it",
+                      record.where, name, who));
 }
 
 void take_bodies(Record& record, const Model& model) {

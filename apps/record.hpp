@@ -25,8 +25,9 @@ Record record_of(const std::string& option, const Model& model);
 /// row, or if rows of q are thinned at each of them.
 void take_memory(Record& record, const Model& model);
 
-/// Throws InputError if the shear state is requested. `who`: what does not store it, "a data set".
-void refuse_memory(const Record& record, const std::string& who);
+/// Throws InputError if the shear state or forces of transmissions are requested. `who`: what does
+/// not store them, "a data set".
+void refuse_trajectory_outputs(const Record& record, const std::string& who);
 
 /// Joins the requested bodies to one output. Throws InputError if their times differ.
 void take_bodies(Record& record, const Model& model);

@@ -402,7 +402,8 @@ Command add_simulate(CLI::App& program) {
   add_text(
       app, "--record", o.record, "LIST",
       "What to compute and store besides q, v, u and the solver's numbers, separated by "
-      "commas: bodies or bodies.NAME, variables, memory (of friction), a sensor's field "
+      "commas: bodies or bodies.NAME, variables, memory (of friction), transmissions (their "
+      "forces), a sensor's field "
       "(pad), pad.pressure, pad.shear, pad.sum, pad.ideal, pad.markers, pad.surface, pad.flow, "
       "pad.channels, pad.height, pad.rgb or pad.rgb_marker, a camera's eye.rgb, eye.depth or "
       "eye.ids; "

@@ -59,12 +59,32 @@ static void fold_transmissions(const CompiledModel& m, const double* state, cons
                                  kBlock);
 }
 
+/// Folds dofs that follow by polynomials at a state into the cotangents of that state. q = p(q_l)
+/// and v = p'(q_l) v_l.
+static void fold_polynomials(const CompiledModel& m, const double* state, double* q_bar,
+                             double* v_bar) {
+  for (const kernels::PolynomialFollower& f : m.polynomials) {
+    const auto p = kernels::polynomial_at(f.coefficients, state[f.leader_q * kBlock]);
+    const double rate = state[(m.nq + f.leader_v) * kBlock];
+    double &own_q = q_bar[f.v * kBlock], &own_v = v_bar[f.v * kBlock];
+    q_bar[f.leader_v * kBlock] += p.slope * own_q + p.second * rate * own_v;
+    v_bar[f.leader_v * kBlock] += p.slope * own_v;
+    own_q = own_v = 0;
+  }
+}
+
+/// Folds what follows others by the state's own numbers. `state`, `column`: of the lane.
+static void fold_state(const CompiledModel& m, const double* state, const double* column,
+                       double* q_bar, double* v_bar, BlockCotangent& c, int lane) {
+  if (!m.transmissions.empty()) fold_transmissions(m, state, column, q_bar, v_bar, c, lane);
+  fold_polynomials(m, state, q_bar, v_bar);
+}
+
 void fold_followers(const Model& model, BlockCotangent& c, int lane, const double* state,
                     const double* block) {
   const CompiledModel& m = compiled(model);
-  if (!m.transmissions.empty())
-    fold_transmissions(m, state + lane, block + lane, &c.q[std::size_t(lane)],
-                       &c.v[std::size_t(lane)], c, lane);
+  fold_state(m, state + lane, block + lane, &c.q[std::size_t(lane)], &c.v[std::size_t(lane)], c,
+             lane);
   fold_ratios(m, c, lane);
 }
 
@@ -277,7 +297,7 @@ struct Adjoint::Impl {
       c.previous_v[at] = o.v_before[i][lane];
     }
     if (!c.past.empty()) go_back(c, column);
-    if (step == 0 && !m.transmissions.empty()) fold_start(c, column);
+    if (step == 0) fold_start(c, column);
     fold_ratios(m, c, column);
     if (m.has_shear_state()) {
       std::vector<double>& memory = c.shear[std::size_t(column)];
@@ -291,14 +311,14 @@ struct Adjoint::Impl {
       c.parameters[std::size_t(i * kBlock + column)] += o.parameters[i][lane];
   }
 
-  /// Folds transmissions at the first state of a tape and the one before it.
+  /// Folds followers at the first state of a tape and the one before it.
   void fold_start(BlockCotangent& c, int column) {
     const CompiledModel& m = compiled(model);
     const double* const own = rows.data() + column;
     const auto at = [column](AlignedVector<double>& x) { return &x[std::size_t(column)]; };
-    fold_transmissions(m, own + m.layout.q * kBlock, own, at(c.q), at(c.v), c, column);
-    fold_transmissions(m, own + m.layout.previous_q * kBlock, own, at(c.previous_q),
-                       at(c.previous_v), c, column);
+    fold_state(m, own + m.layout.q * kBlock, own, at(c.q), at(c.v), c, column);
+    fold_state(m, own + m.layout.previous_q * kBlock, own, at(c.previous_q), at(c.previous_v), c,
+               column);
   }
 
   /// Adds the cotangents of the state one step before, and moves those of earlier ones up.

@@ -40,6 +40,7 @@ struct DualStage::Impl {
   std::vector<kernels::JointColumns<DualNumber>> columns;
   std::vector<kernels::TransmissionColumn<DualNumber>> transmission_columns;
   std::vector<DualNumber> transmission_force;
+  std::vector<kernels::PolynomialScratch<DualNumber>> polynomials;
   std::vector<std::vector<double>> ground_tangents;  ///< of the points in the ground
   std::vector<std::vector<DualNumber>> points, references, areas;
   std::vector<kernels::CandidateList<DualNumber>> lists;
@@ -123,6 +124,7 @@ struct DualStage::Impl {
     contacts.resize(std::size_t(view.n_link_pairs + view.n_grounded + view.n_loops));
     transmission_columns.resize(m.transmission_dofs.size());
     transmission_force.resize(m.transmissions.size());
+    polynomials.resize(m.polynomials.size());
     faces.assign(3 * pairs.size(), DualNumber(0.0));
     for (const kernels::PairContact& p : pairs) {
       points.emplace_back(std::size_t(3 * p.n_points), DualNumber(0.0));
@@ -435,7 +437,9 @@ struct DualStage::Impl {
     a.columns = columns.data();
     a.transmission_columns = transmission_columns.data();
     a.transmission_force = transmission_force.data();
+    a.polynomials = polynomials.data();
     a.own_x = s.x.data();
+    a.own_r = s.r.data();
     a.v = s.v.data();
     a.g = s.g.data();
     a.force_scale = force_scale.data();

@@ -90,6 +90,7 @@ void GroupAdjoint::solve(const StageContext<L>& s) const {
     factor_pivoted(model_, w, l, true);
     solve_pivoted(model_, w, l, a.rhs, a.lambda);
   }
+  expand_polynomials(model_, w.stage, a.lambda);
 }
 
 /// Returns the states on which a stage depends besides its centre: the one before, then the earlier

@@ -135,13 +135,15 @@ struct Tangent::Impl {
       : model(m), settings(s), stage(compiled(model)), imperfections(m) {}
   [[nodiscard]] const CompiledModel& m() const { return compiled(model); }
 
-  /// Turns Gᵀ A, whose rows of followers are 0, into Gᵀ A G with ones on their diagonal.
+  /// Turns Gᵀ A, whose rows of followers are 0, into Gᵀ A G with ones on their diagonal. Columns of
+  /// leaders by a polynomial are whole already, because the stage sets their followers' x.
   void fold_followers(Eigen::MatrixXd& A) const {
     for (const kernels::FollowerTie& t : m().ties) A.col(t.leader_v) += t.ratio * A.col(t.v);
     for (const kernels::Follower& f : m().followers) {
       A.col(f.v).setZero();
       A(f.v, f.v) = 1;
     }
+    for (const kernels::PolynomialFollower& f : m().polynomials) A(f.v, f.v) = 1;
     for (const kernels::Transmission& t : m().transmissions) A(t.v, t.v) = 1;
   }
 

@@ -487,6 +487,8 @@ class Compiler {
     std::vector<std::pair<int, int>> coupled = touching_;
     for (const kernels::FollowerTie& t : m_.ties)
       coupled.emplace_back(link_of_dof(m_, t.v), link_of_dof(m_, t.leader_v));
+    for (const kernels::PolynomialFollower& f : m_.polynomials)
+      coupled.emplace_back(f.link, link_of_dof(m_, f.leader_v));
     for (const kernels::Loop& loop : m_.loops) coupled.emplace_back(loop.link1, loop.link2);
     for (const kernels::Transmission& t : m_.transmissions)
       for (int k = t.first_dof; k < t.first_dof + t.dofs; ++k)
@@ -553,11 +555,11 @@ class Compiler {
   }
 
   void symbolic() {
-    const bool blocks = m_.followers.empty() && m_.loops.empty() && m_.transmissions.empty() &&
+    const bool blocks = !m_.has_followers() && m_.loops.empty() && m_.transmissions.empty() &&
                         prefers_blocks(m_.links, touching_);
-    m_.pattern =
-        blocks ? block_pattern(m_.links, m_.nv)
-               : analyse_pattern(m_.links, m_.nv, touching_, m_.ties, m_.loops, driven_dofs(m_));
+    m_.pattern = blocks ? block_pattern(m_.links, m_.nv)
+                        : analyse_pattern(m_.links, m_.nv, touching_, {m_.ties, m_.polynomials},
+                                          m_.loops, driven_dofs(m_));
   }
 
   CompiledModel m_;

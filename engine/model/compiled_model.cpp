@@ -81,6 +81,10 @@ void point_view(CompiledModel& m) {
   v.ties = m.ties.data();
   v.n_folded = static_cast<int>(m.pattern.folded.size());
   v.folded = m.pattern.folded.data();
+  v.n_polynomials = static_cast<int>(m.polynomials.size());
+  v.polynomials = m.polynomials.data();
+  v.n_sloped = static_cast<int>(m.pattern.sloped.size());
+  v.sloped = m.pattern.sloped.data();
   v.n_loops = static_cast<int>(m.loops.size());
   v.loops = m.loops.data();
   point_transmissions(m, v);

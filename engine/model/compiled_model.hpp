@@ -257,9 +257,12 @@ struct CompiledModel {
   std::vector<VaryingInertia> varying_inertia;
   std::vector<VaryingSize> varying_sizes;
   std::vector<VaryingPlace> varying_places;
-  std::vector<kernels::DofEffects> dof_effects;      ///< (nv)
-  std::vector<kernels::Follower> followers;          ///< dofs that follow others
-  std::vector<kernels::FollowerTie> ties;            ///< their leaders
+  std::vector<kernels::DofEffects> dof_effects;          ///< (nv)
+  std::vector<kernels::Follower> followers;              ///< dofs that follow others
+  std::vector<kernels::FollowerTie> ties;                ///< their leaders
+  std::vector<kernels::PolynomialFollower> polynomials;  ///< dofs that follow by polynomials
+  /// Whether some dof follows others, not by a transmission.
+  [[nodiscard]] bool has_followers() const { return !followers.empty() || !polynomials.empty(); }
   std::vector<kernels::Loop> loops;                  ///< parallel to scene.loops
   std::vector<kernels::Transmission> transmissions;  ///< parallel to scene.transmissions
   std::vector<kernels::TransmissionPiece> transmission_pieces;

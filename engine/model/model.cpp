@@ -48,7 +48,7 @@ double Model::following_tolerance(Integrator integrator, double timestep) const 
 std::span<const double> Model::initial_q() const { return compiled_->initial_q; }
 bool Model::has_shear_state() const { return compiled_->has_shear_state(); }
 bool Model::has_followers() const {
-  return !compiled_->followers.empty() || !compiled_->transmissions.empty();
+  return compiled_->has_followers() || !compiled_->transmissions.empty();
 }
 bool Model::has_transmissions() const { return !compiled_->transmissions.empty(); }
 bool Model::has_loops() const { return !compiled_->loops.empty(); }

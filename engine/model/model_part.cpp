@@ -192,7 +192,7 @@ std::unique_ptr<ModelPart> without_inert_contacts(const CompiledModel& whole) {
     return std::ranges::all_of(contacts,
                                [](const auto& c) { return can_exert_force(c.parameters); });
   };
-  if (whole.has_shear_state() || !whole.followers.empty() || !whole.transmissions.empty() ||
+  if (whole.has_shear_state() || whole.has_followers() || !whole.transmissions.empty() ||
       (all_push(whole.pairs) && all_push(whole.grounds)))
     return nullptr;
   const std::vector<int> one_tree(whole.links.size(), 0);

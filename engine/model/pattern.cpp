@@ -223,13 +223,16 @@ std::vector<int> first_dofs(const std::vector<kernels::Link>& links) {
 
 namespace {
 
-/// The free dofs in whose terms a dof is, with their ratios: itself if it follows none.
+/// The free dofs in whose terms a dof is, with their ratios: itself if it follows none. Columns of
+/// one that follows by a polynomial have the ratio 1.
 using FreeDofs = std::vector<std::vector<std::pair<int, double>>>;
 
-FreeDofs free_dofs(int nv, const std::vector<kernels::FollowerTie>& ties) {
+FreeDofs free_dofs(int nv, const FollowingDofs& following) {
   FreeDofs out(static_cast<std::size_t>(nv));
-  for (const kernels::FollowerTie& t : ties)
+  for (const kernels::FollowerTie& t : following.ties)
     out[std::size_t(t.v)].emplace_back(t.leader_v, t.ratio);
+  for (const kernels::PolynomialFollower& f : following.polynomials)
+    out[std::size_t(f.v)].emplace_back(f.leader_v, 1.0);
   for (int i = 0; i < nv; ++i)
     if (out[std::size_t(i)].empty()) out[std::size_t(i)].emplace_back(i, 1.0);
   return out;
@@ -252,24 +255,36 @@ Structure folded(const Structure& s, const FreeDofs& free) {
 
 /// Numbers the entries of `written` that the solved structure does not have, after those that it
 /// has, and lists what they, and entries of followers, add to others.
-void fold_entries(PatternStorage& p, const Structure& written, const FreeDofs& free) {
+void fold_entries(PatternStorage& p, const Structure& written, const FreeDofs& free,
+                  const std::vector<kernels::PolynomialFollower>& polynomials) {
+  const auto polynomial_of = [&](int i) {
+    const auto of = std::ranges::find(polynomials, i, &kernels::PolynomialFollower::v);
+    return of == polynomials.end() ? -1 : static_cast<int>(of - polynomials.begin());
+  };
   p.assembled = p.entries;
   const auto at = [&](int i, int j) -> int& { return p.slot[std::size_t(i) * p.n + j]; };
-  for (int i = 0; i < p.n; ++i)
+  for (int i = 0; i < p.n; ++i) {
+    const int polynomial = polynomial_of(i);
     for (int j = 0; j < p.n; ++j) {
       if (!written[i][j] || (is_free(free, i) && is_free(free, j))) continue;
       if (at(i, j) < 0) at(i, j) = p.assembled++;
       for (const auto& [row, row_ratio] : free[std::size_t(i)])
-        for (const auto& [column, column_ratio] : free[std::size_t(j)])
-          p.folded.push_back({at(row, column), at(i, j), row_ratio * column_ratio});
+        for (const auto& [column, column_ratio] : free[std::size_t(j)]) {
+          const int target = at(row, column), source = at(i, j);
+          if (polynomial < 0)
+            p.folded.push_back({target, source, row_ratio * column_ratio});
+          else
+            p.sloped.push_back({target, source, column_ratio, polynomial});
+        }
     }
+  }
 }
 
 }  // namespace
 
 PatternStorage analyse_pattern(const std::vector<kernels::Link>& links, int nv,
                                const std::vector<std::pair<int, int>>& touching,
-                               const std::vector<kernels::FollowerTie>& ties,
+                               const FollowingDofs& following,
                                const std::vector<kernels::Loop>& closed,
                                const std::vector<std::vector<int>>& driven) {
   Structure alone(nv, std::vector<char>(nv, 0));
@@ -285,8 +300,9 @@ PatternStorage analyse_pattern(const std::vector<kernels::Link>& links, int nv,
   Structure s = alone;
   for (const auto& [first, second] : touching) couple_links(s, first, second);
   const Structure written = s;
-  const FreeDofs free = free_dofs(nv, ties);
-  if (!ties.empty()) s = folded(s, free), alone = folded(alone, free);
+  const FreeDofs free = free_dofs(nv, following);
+  if (!following.ties.empty() || !following.polynomials.empty())
+    s = folded(s, free), alone = folded(alone, free);
 
   PatternStorage p;
   p.n = nv;
@@ -322,7 +338,7 @@ PatternStorage analyse_pattern(const std::vector<kernels::Link>& links, int nv,
     }
   p.whole = part_of(s, f, p, at);
   p.apart = part_of(alone, fill_alone, p, at);
-  fold_entries(p, written, free);
+  fold_entries(p, written, free, following.polynomials);
   return p;
 }
 

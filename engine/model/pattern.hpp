@@ -25,12 +25,19 @@ struct PatternStorage {
   std::vector<int> slot, entry_column, permutation, scatter, diagonal;
   std::vector<int> row_begin, factor_column;
   std::vector<kernels::FoldedEntry> folded;  ///< of dofs that follow others
+  std::vector<kernels::SlopedEntry> sloped;  ///< of rows of those that follow by polynomials
   PatternPartStorage whole, apart;
   [[nodiscard]] kernels::Pattern view() const;
 };
 
 /// A symmetric structure: row by row, not 0 where there is an entry.
 using Structure = std::vector<std::vector<char>>;
+
+/// The dofs that follow others.
+struct FollowingDofs {
+  std::vector<kernels::FollowerTie> ties{};
+  std::vector<kernels::PolynomialFollower> polynomials{};
+};
 
 /// Eliminates at every step the index that creates fewest new entries; the lowest on ties. Returns
 /// the order.
@@ -41,7 +48,7 @@ std::vector<int> minimum_fill(const Structure& s);
 /// touching. `driven`: the dofs of each transmission.
 PatternStorage analyse_pattern(const std::vector<kernels::Link>& links, int nv,
                                const std::vector<std::pair<int, int>>& touching,
-                               const std::vector<kernels::FollowerTie>& ties = {},
+                               const FollowingDofs& following = {},
                                const std::vector<kernels::Loop>& closed = {},
                                const std::vector<std::vector<int>>& driven = {});
 

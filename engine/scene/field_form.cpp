@@ -16,7 +16,7 @@ constexpr FieldForm kForms[] = {FieldForm::field,   FieldForm::pressure, FieldFo
                                 FieldForm::surface, FieldForm::flow,     FieldForm::channels,
                                 FieldForm::height,  FieldForm::rgb,      FieldForm::rgb_marker};
 constexpr FieldForm kViews[] = {FieldForm::view_rgb, FieldForm::view_depth, FieldForm::view_ids};
-constexpr const char* kPlain[] = {"q", "v", "variables", "bodies", "memory"};
+constexpr const char* kPlain[] = {"q", "v", "variables", "bodies", "memory", "transmissions"};
 constexpr const char* kBodyOutput = "bodies.";  // followed by the name of one
 }  // namespace
 

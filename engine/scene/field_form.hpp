@@ -98,7 +98,7 @@ std::vector<std::string> sensor_names(const Scene& scene);
 /// Returns the name of the sensor or camera of an output.
 const std::string& source_name(const Scene& scene, const FieldOutput& output);
 /// Whether a name is that of an output of no sensor: q, v, variables (positions of end effectors),
-/// bodies (poses and twists) or memory (the shear state).
+/// bodies (poses and twists), memory (the shear state) or transmissions (their forces).
 bool is_plain_output(const std::string& name);
 /// Returns the reading of this name; none where no sensor has it.
 std::optional<FieldOutput> find_output(std::span<const std::string> sensors,

@@ -65,6 +65,9 @@ inline constexpr std::size_t kJointEffects = 5;
 /// Displacement at which a joint with dry friction breaks away, where none is given [m or rad].
 constexpr double default_friction_break(bool turns) { return turns ? 1e-3 : 5e-5; }
 
+/// Powers of a joint that follows another by a polynomial, from the second on.
+inline constexpr std::size_t kMostPowers = 3;
+
 struct JointDescription : JointEffects {
   std::string name;
   JointType type = JointType::fixed;
@@ -81,7 +84,17 @@ struct JointDescription : JointEffects {
   std::vector<std::string> follows;
   std::vector<double> ratio;
   double offset = 0;
+  /// With one leader: adds powers[k] q_leaderᵏ⁺², at most kMostPowers of them [m or rad of this
+  /// joint per power of the leader's].
+  std::vector<double> powers;
   Source source;
+
+  /// Returns the share of leader k, at its coordinate q_leader, in this joint's coordinate.
+  [[nodiscard]] double share_of_leader(std::size_t k, double q_leader) const {
+    double share = ratio[k] * q_leader, power = q_leader;
+    for (const double c : powers) share += c * (power *= q_leader);
+    return share;
+  }
 };
 
 struct CuboidShape {

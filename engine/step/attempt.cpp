@@ -96,7 +96,7 @@ LaneBits finish(const CompiledModel& model, const Row<L>& h, BasicWorkspace<L>& 
       w.q1[link.q + 3][l] = q.z;
     }
   }
-  for (int l = 0; l < L && !model.followers.empty(); ++l)  // exactly: rounding does not add up
+  for (int l = 0; l < L && model.has_followers(); ++l)  // exactly: rounding does not add up
     if (has(lanes, l))
       place_followers(
           model, [&](int i) -> double& { return w.q1[i][l]; },

@@ -188,7 +188,7 @@ namespace {
 /// Throws InputError where a state has followers elsewhere than their leaders put them, by more
 /// than rounding to float.
 void check_followers(const CompiledModel& m, std::span<const double> q, std::span<const double> v) {
-  if (m.followers.empty()) return;
+  if (!m.has_followers()) return;
   constexpr double kRounding = 1e-5;
   const auto check = [](const std::string& name, double found, double expected) {
     if (std::abs(found - expected) > kRounding * (1 + std::abs(expected)))
@@ -199,7 +199,7 @@ void check_followers(const CompiledModel& m, std::span<const double> q, std::spa
   place_followers(
       m, [&](int i) -> double& { return placed_q[std::size_t(i)]; },
       [&](int i) -> double& { return placed_v[std::size_t(i)]; });
-  for (const kernels::Follower& f : m.followers) {
+  for (const DofPlace& f : following_dofs(m)) {
     const auto iq = std::size_t(f.q), iv = std::size_t(f.v);
     check(m.q_names[iq], q[iq], placed_q[iq]);
     check(m.v_names[iv], v[iv], placed_v[iv]);

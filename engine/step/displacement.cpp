@@ -27,7 +27,7 @@ static void displace_alone(const CompiledModel& m, std::span<double> q, int dof,
 }
 
 /// Sets the changes of joints that follow others by ratios.
-static void complete_changes(const CompiledModel& m, std::span<double> along) {
+static void complete_ratios(const CompiledModel& m, std::span<double> along) {
   for (const kernels::Follower& f : m.followers) along[std::size_t(f.v)] = 0;
   for (const kernels::FollowerTie& t : m.ties)
     along[std::size_t(t.v)] += t.ratio * along[std::size_t(t.leader_v)];
@@ -42,15 +42,25 @@ void displace(const Model& model, std::span<double> q, int dof, double e) {
       [&](int) -> double& { return unused; });
 }
 
-void complete_velocities(const Model& model, std::span<double> v) {
-  complete_changes(compiled(model), v);
+void complete_velocities(const Model& model, std::span<const double> q, std::span<double> v) {
+  const CompiledModel& m = compiled(model);
+  complete_ratios(m, v);
+  for (const kernels::PolynomialFollower& f : m.polynomials)
+    v[std::size_t(f.v)] = kernels::polynomial_at(f.coefficients, q[std::size_t(f.leader_q)]).slope *
+                          v[std::size_t(f.leader_v)];
 }
 
 void complete_changes(const Model& model, const StateAt& at, std::span<const double> numbers_dot,
                       std::span<double> q_dot, std::span<double> v_dot) {
   const CompiledModel& m = compiled(model);
-  complete_changes(m, q_dot);
-  complete_changes(m, v_dot);
+  complete_ratios(m, q_dot);
+  complete_ratios(m, v_dot);
+  for (const kernels::PolynomialFollower& f : m.polynomials) {
+    const auto leader = std::size_t(f.leader_v), own = std::size_t(f.v);
+    const auto p = kernels::polynomial_at(f.coefficients, at.q[f.leader_q * at.stride]);
+    q_dot[own] = p.slope * q_dot[leader];
+    v_dot[own] = p.slope * v_dot[leader] + p.second * at.v[f.leader_v * at.stride] * q_dot[leader];
+  }
   if (!m.transmissions.empty())
     TransmissionState(m).complete(at.q, at.v, at.stride, at.column, numbers_dot, q_dot, v_dot);
 }

@@ -9,12 +9,12 @@
 
 namespace tangere {
 
-/// Computes q ⊕ e along one dof, in place. Rotations are on the right. Joints that follow others by
-/// ratios go along; alone they stay. Batch::set_state() places those that are transmissions.
+/// Computes q ⊕ e along one dof, in place. Rotations are on the right. Joints that follow others go
+/// along; alone they stay. Batch::set_state() places those that are transmissions.
 void displace(const Model& model, std::span<double> q, int dof, double e);
 
-/// Sets velocities, (nv), of joints that follow others by ratios from their leaders'.
-void complete_velocities(const Model& model, std::span<double> v);
+/// Sets velocities, (nv), of joints that follow others from their leaders', at q (nq).
+void complete_velocities(const Model& model, std::span<const double> q, std::span<double> v);
 
 /// A state of an environment and its numbers.
 struct StateAt {

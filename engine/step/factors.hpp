@@ -9,7 +9,8 @@ namespace tangere {
 
 inline bool in_blocks(const CompiledModel& m) { return m.view.pattern.slot == nullptr; }
 
-/// Sets followers' numbers of a solution x = G y, in lanes from `first` to `end`.
+/// Sets followers' numbers of a solution x = G y, in lanes from `first` to `end`. Those that follow
+/// by polynomials keep 0: kinematics() sets their x itself.
 template <int L>
 void expand_followers(const CompiledModel& m, kernels::Row<L>* x, int first = 0, int end = L) {
   for (const kernels::Follower& f : m.followers)
@@ -17,13 +18,29 @@ void expand_followers(const CompiledModel& m, kernels::Row<L>* x, int first = 0,
   for (const kernels::FollowerTie& t : m.ties)
     for (int l = first; l < end; ++l) x[t.v][l] += t.ratio * x[t.leader_v][l];
 }
-/// Turns a right-hand side b into Gᵀ b.
+/// Sets those too, of a change x of the stage's x.
+template <int L>
+void expand_polynomials(const CompiledModel& m, const kernels::Stage<L>& stage,
+                        kernels::Row<L>* x) {
+  for (const kernels::PolynomialFollower& f : m.polynomials)
+    for (int l = 0; l < L; ++l) {
+      const double q = stage.centre[f.leader_q][l] + stage.x[f.leader_v][l];
+      x[f.v][l] = kernels::polynomial_at(f.coefficients, q).slope * x[f.leader_v][l];
+    }
+}
+/// Turns a right-hand side b into Gᵀ b. Those that follow by polynomials have theirs by the
+/// leader's x already.
 template <int L>
 void fold_followers(const CompiledModel& m, kernels::Row<L>* b) {
   for (const kernels::FollowerTie& t : m.ties)
     for (int l = 0; l < L; ++l) b[t.leader_v][l] += t.ratio * b[t.v][l];
   for (const kernels::Follower& f : m.followers)
     for (int l = 0; l < L; ++l) b[f.v][l] = 0;
+  for (const kernels::PolynomialFollower& f : m.polynomials)
+    for (int l = 0; l < L; ++l) {
+      b[f.leader_v][l] += b[f.v][l];
+      b[f.v][l] = 0;
+    }
 }
 
 /// Factors A of the lanes in `lanes`. Lanes in `kept` keep their factors.

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Constraints of MJCF: a joint that follows another,
 //   q₁ - ref₁ = Σ_k c_k (q₂ - ref₂)^k
-// where our coordinates are already less ref. Scenes have those of degree 1. Loops are in
-// mjcf_loops.cpp.
+// where our coordinates are already less ref. Loops are in mjcf_loops.cpp.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -47,6 +46,8 @@ void tie_joints(MjcfWhole& whole, const RobotNode& node, const std::string& firs
   joint.follows = {second};
   joint.ratio = {c[1]};
   joint.offset = c[0];
+  joint.powers.assign(c.begin() + 2, c.end());
+  while (!joint.powers.empty() && joint.powers.back() == 0) joint.powers.pop_back();
 }
 
 void read_joint_equality(MjcfWhole& whole, const MjcfScope& model, const RobotNode& node) {
@@ -67,8 +68,6 @@ void read_joint_equality(MjcfWhole& whole, const MjcfScope& model, const RobotNo
   const std::vector<MjcfCopy> second = copies_of(whole, model, node.text("joint2"));
   if (second.empty())
     node.fail(fmt::format("joint2=\"{}\": no joint has this name", node.text("joint2")));
-  if (c[2] != 0 || c[3] != 0 || c[4] != 0)
-    return node.lost("<joint> of <equality> with a polynomial; scenes have straight lines");
   if (first.size() != second.size())
     return node.lost("<joint> of <equality> between a joint and copies of another");
   for (std::size_t k = 0; k < first.size(); ++k)

@@ -58,7 +58,7 @@ class Keyframe {
     double place = joint.offset;
     for (std::size_t k = 0; k < joint.follows.size(); ++k)
       if (const auto leader = given_.find(joint.follows[k]); leader != given_.end())
-        place += joint.ratio[k] * leader->second;
+        place += joint.share_of_leader(k, leader->second);
     if (std::abs(own->second - place) > 1e-6)
       node_.changed("<key> qpos of a joint that follows others: it starts where they put it");
   }

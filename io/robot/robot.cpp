@@ -42,22 +42,27 @@ const JointDescription* joint_named(const Robot& robot, const std::string& name)
   return found == robot.scene.links.end() ? nullptr : &found->joint;
 }
 
-/// Whether the leaders of a joint, and theirs, lead to `target`. `passed`: joints already visited.
-bool leads_to(const Robot& robot, const JointDescription& joint, const JointDescription& target,
-              std::set<const JointDescription*>& passed) {
-  for (const std::string& name : joint.follows) {
-    const JointDescription* const leader = joint_named(robot, name);
-    if (leader == &target) return true;
-    if (leader != nullptr && passed.insert(leader).second &&
-        leads_to(robot, *leader, target, passed))
-      return true;
+/// Whether f(joint) holds for a leader of a joint, or one of theirs.
+template <class F>
+bool any_leader(const Robot& robot, const JointDescription& joint, const F& f) {
+  std::set<const JointDescription*> passed;
+  std::vector<const JointDescription*> open = {&joint};
+  while (!open.empty()) {
+    const JointDescription& next = *open.back();
+    open.pop_back();
+    for (const std::string& name : next.follows) {
+      const JointDescription* const leader = joint_named(robot, name);
+      if (leader == nullptr || !passed.insert(leader).second) continue;
+      if (f(*leader)) return true;
+      open.push_back(leader);
+    }
   }
   return false;
 }
 
-/// What keeps a joint from following others; null: nothing. Throws InputError for a leader that is
+/// What keeps a joint from following others; "": nothing. Throws InputError for a leader that is
 /// no joint.
-const char* follower_fault(const Robot& robot, const JointDescription& joint) {
+std::string follower_fault(const Robot& robot, const JointDescription& joint) {
   for (const std::string& name : joint.follows) {
     const JointDescription* const leader = joint_named(robot, name);
     if (leader == nullptr)
@@ -67,8 +72,19 @@ const char* follower_fault(const Robot& robot, const JointDescription& joint) {
       return "which is not between joints of one degree of freedom each";
     if (name.find(',') != std::string::npos) return "whose name has a comma";
   }
-  std::set<const JointDescription*> passed;
-  return leads_to(robot, joint, joint, passed) ? "which follows it in turn" : nullptr;
+  const auto leader_is = [&](const auto& f) { return any_leader(robot, joint, f); };
+  if (leader_is([&](const JointDescription& l) { return &l == &joint; }))
+    return "which follows it in turn";
+  if (joint.powers.empty()) return "";
+  if (leader_is([](const JointDescription& l) { return !l.powers.empty(); }))
+    return "by a polynomial of a polynomial";
+  if (leader_is([](const JointDescription& l) { return l.follows.size() > 1; }))
+    return "by a polynomial of several joints";
+  for (const LinkDescription& link : robot.scene.links)  // a tendon, which would move nothing else
+    if (link.joint.follows.size() > 1 &&
+        any_leader(robot, link.joint, [&](const JointDescription& l) { return &l == &joint; }))
+      return fmt::format("by a polynomial, and '{}' follows it with others", link.joint.name);
+  return "";
 }
 
 }  // namespace
@@ -76,12 +92,13 @@ const char* follower_fault(const Robot& robot, const JointDescription& joint) {
 void check_followers(Robot& robot) {
   for (LinkDescription& link : robot.scene.links) {
     JointDescription& joint = link.joint;
-    const char* const fault = follower_fault(robot, joint);
-    if (fault == nullptr) continue;
+    const std::string fault = follower_fault(robot, joint);
+    if (fault.empty()) continue;
     robot.lost.add(joint.source, fmt::format("joint '{}' follows '{}', {}", joint.name,
                                              fmt::join(joint.follows, "', '"), fault));
     joint.follows.clear();
     joint.ratio.clear();
+    joint.powers.clear();
   }
 }
 

@@ -187,7 +187,7 @@ double start_of_joint(const Scene& scene, const std::string& joint) {
   if (link != scene.links.end() && !link->joint.follows.empty()) {
     double q = link->joint.offset;
     for (std::size_t k = 0; k < link->joint.follows.size(); ++k)
-      q += link->joint.ratio[k] * start_of_joint(scene, link->joint.follows[k]);
+      q += link->joint.share_of_leader(k, start_of_joint(scene, link->joint.follows[k]));
     return q;
   }
   for (const InitialState& s : scene.initial)

@@ -129,6 +129,7 @@ class Writer {
       out_ += fmt::format(" follows=\"{}\" ratio=\"{}\" offset=\"{}\"",
                           attribute_text(leaders_text(joint.follows)), numbers_text(joint.ratio),
                           number_text(joint.offset));
+    if (!joint.powers.empty()) out_ += fmt::format(" powers=\"{}\"", numbers_text(joint.powers));
     out_ += "/>\n";
   }
 

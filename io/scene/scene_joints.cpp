@@ -140,7 +140,7 @@ void read_joint_effects(const SceneElement& node, JointDescription& joint) {
 }
 
 void read_follower(const SceneElement& node, JointDescription& joint) {
-  for (const char* name : {"ratio", "offset"})
+  for (const char* name : {"ratio", "offset", "powers"})
     if (!node.has("follows") && node.has(name))
       node.warn(fmt::format("'{}' has no effect without 'follows'", name));
   if (!node.has("follows")) return;
@@ -149,6 +149,13 @@ void read_follower(const SceneElement& node, JointDescription& joint) {
   joint.ratio = node.has("ratio") ? node.numbers("ratio", joint.follows.size())
                                   : std::vector<double>(joint.follows.size(), 1.0);
   joint.offset = node.number("offset", dof_turns(joint.type, 0));
+  if (!node.has("powers")) return;
+  if (joint.follows.size() != 1)
+    node.fail(fmt::format("powers of a joint that follows {}; expected one", joint.follows.size()));
+  joint.powers = node.numbers("powers");
+  if (joint.powers.empty() || joint.powers.size() > kMostPowers)
+    node.fail(
+        fmt::format("powers has {} numbers; expected 1 to {}", joint.powers.size(), kMostPowers));
 }
 
 void scale_ratios(const Scene& scene, double length, JointDescription& joint) {
@@ -156,8 +163,11 @@ void scale_ratios(const Scene& scene, double length, JointDescription& joint) {
   for (std::size_t k = 0; k < joint.follows.size(); ++k) {
     const auto leader = std::ranges::find_if(
         scene.links, [&](const LinkDescription& l) { return l.joint.name == joint.follows[k]; });
-    if (leader != scene.links.end())
-      joint.ratio[k] *= factor(joint.type) / factor(leader->joint.type);
+    if (leader == scene.links.end()) continue;
+    const double unit = factor(leader->joint.type);
+    double scale = factor(joint.type) / unit;
+    joint.ratio[k] *= scale;
+    for (double& c : joint.powers) c *= scale /= unit;
   }
 }
 

@@ -177,7 +177,7 @@ class Starts {
       for (std::size_t leader = 0; leader < starts_.size(); ++leader) {
         if (scene_.links[leader].joint.name != joint.follows[i]) continue;
         const Start of = at(leader);
-        start.q += joint.ratio[i] * of.q;
+        start.q += joint.share_of_leader(i, of.q);
         start.drawn = start.drawn || of.drawn;
       }
     starts_[k] = start;

@@ -27,6 +27,10 @@ void adjoint_rhs(const ModelView& model, const StageArgs<N>& a, const AdjointArg
     const Link& link = model.links[i];
     const LinkScratch<N>& o = a.links[i];
     for (int k = link.v; k < link.v + dofs(link.kind); ++k) {
+      if (link.has_chart) {
+        d.rhs[k] = mul_add(o.chart_rate.m[0][0], d.v_bar[k], o.chart.m[0][0] * d.q_bar[k]);
+        continue;
+      }
       if (link.kind != JointKind::spherical) {
         d.rhs[k] = mul_add(a.c0_over_h, d.v_bar[k], d.q_bar[k]);
         continue;
@@ -269,6 +273,7 @@ void adjoint_products(const ModelView& model, const StageArgs<N>& a, const Adjoi
   adjoint_contacts(model, a, d);
   adjoint_inward(model, a, d);
   hand_on_rates(model, a, d.nu);
+  hand_on_polynomial_rates(model, a, d.nu);
   without_negative_zeros(d.nu, model.nv);
   without_negative_zeros(d.mass_lambda, model.nv);
   adjoint_history(model, a, d);

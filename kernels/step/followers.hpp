@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// Systems of scenes in which dofs follow others (model_view.hpp, Follower).
+// Systems of scenes in which dofs follow others, by ratios (model_view.hpp, Follower) and by
+// polynomials (polynomial_followers.hpp).
 #pragma once
 
 #include <cmath>
 
-#include "kernels/step/stage.hpp"
+#include "kernels/step/polynomial_followers.hpp"
 
 namespace tangere::kernels {
 
@@ -19,10 +20,8 @@ void fold_residual(const ModelView& model, const StageArgs<N>& a) {
   }
   for (int i = 0; i < model.n_followers; ++i)
     a.g[model.followers[i].v] = a.force_scale[model.followers[i].v] = N(0.0);
+  fold_polynomial_residual(model, a);
 }
-
-/// The mass of a follower in norms: its own is that of its leaders.
-inline constexpr double kFollowerMass = 1e-30;
 
 /// A_r = Gᵀ A G, and the diagonal of the mass matrix, without the masses between dofs.
 template <class N>
@@ -41,6 +40,7 @@ void fold_jacobian(const ModelView& model, const StageArgs<N>& a) {
     a.mass_diagonal[v] = N(kFollowerMass);
     a.A[model.pattern.diagonal_entry[v]] = a.c0_over_h * a.c0_over_h * N(kFollowerMass);
   }
+  fold_polynomial_jacobian(model, a);
 }
 
 }  // namespace tangere::kernels

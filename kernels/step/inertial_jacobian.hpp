@@ -3,7 +3,7 @@
 // wrenches of a joint's columns by q and by v are combined into wrenches by x before anything is
 // projected:
 //   A = G_q J + C V_x,  C = G_v + (c₀/h) M;
-//       J = 1, V_x = c₀/h except for spherical joints (kernels/step/stage.hpp)
+//       J = 1, V_x = c₀/h except for links with a chart (kernels/step/stage.hpp)
 //
 // Iᶜ, Bᶜ and Fᶜ are composites of subtrees (Fᶜ is the F of the inward sweep). For dof i and
 // ancestor-or-self j:
@@ -145,8 +145,13 @@ void joint_rates(const Link& link, LinkScratch<N>& o) {
 
 /// Combines a joint's columns by q and v into its columns by x. T is a number or a wrench.
 template <JointKind K, class T, class N>
-void combine(const LinkScratch<N>& o, const N& c0_over_h, const T* d_dq, const T* d_dv, T* d_dx) {
+void combine(const Link& link, const LinkScratch<N>& o, const N& c0_over_h, const T* d_dq,
+             const T* d_dv, T* d_dx) {
   if constexpr (K != JointKind::spherical) {
+    if (dofs(K) == 1 && link.has_chart) {
+      d_dx[0] = mul_add(o.chart_rate.m[0][0], d_dv[0], o.chart.m[0][0] * d_dq[0]);
+      return;
+    }
     for (int k = 0; k < dofs(K); ++k) d_dx[k] = mul_add(c0_over_h, d_dv[k], d_dq[k]);
   } else {
     for (int k = 0; k < 3; ++k) {
@@ -156,6 +161,18 @@ void combine(const LinkScratch<N>& o, const N& c0_over_h, const T* d_dq, const T
       d_dx[k] = sum;
     }
   }
+}
+
+/// Returns V_x of a joint that does not turn freely.
+template <JointKind K, class N>
+N rate_by_x(const Link& link, const LinkScratch<N>& o, const N& c0_over_h) {
+  return dofs(K) == 1 && link.has_chart ? o.chart_rate.m[0][0] : c0_over_h;
+}
+/// Turns what a unit of a joint's q does into what a unit of its x does.
+template <JointKind K, class T, class N>
+T along_x(const Link& link, const LinkScratch<N>& o, const T& d_dq) {
+  if (dofs(K) == 1 && link.has_chart) return o.chart.m[0][0] * d_dq;
+  return d_dq;
 }
 
 /// Wrenches of a joint's columns by x and by a, and of its rows, Bᶜᵀ S, which have no force.
@@ -178,7 +195,7 @@ void joint_wrenches(const ModelView& model, const Link& link, const LinkScratch<
   if (slides(K) && link.never_rotates) {  // only the force by a matters
     for (int k = 0; k < dofs(K); ++k) {
       w.d_da[k] = {zero3<N>(), o.mass * joint_axis<K, N>(link, k)};
-      w.d_dx[k] = {zero3<N>(), (c0_over_h * c0_over_h) * w.d_da[k].l};
+      w.d_dx[k] = {zero3<N>(), (c0_over_h * rate_by_x<K>(link, o, c0_over_h)) * w.d_da[k].l};
       w.row[k] = w.lift_row[k] = zero3<N>();
     }
     return;
@@ -214,7 +231,7 @@ void joint_wrenches(const ModelView& model, const Link& link, const LinkScratch<
       d_dq[k] += Vec6<N>{cross(o.lift_moment, l), o.lift_mass * l};
     }
   }
-  combine<K>(o, c0_over_h, d_dq, d_dv, w.d_dx);
+  combine<K>(link, o, c0_over_h, d_dq, d_dv, w.d_dx);
 }
 
 /// Adds the entries of dof d with the dofs of one ancestor's joint. Everything is in the ancestor's
@@ -239,7 +256,7 @@ void ancestor_entries(const ModelView& model, const StageArgs<N>& a, int up, int
     if constexpr (!slides(K))
       if (model.lifted) q[j] += dot(lift_row, cross_axis<K>(ancestor, j, gravity_in(model, p)));
   }
-  combine<K>(p, a.c0_over_h, q, v, x);
+  combine<K>(ancestor, p, a.c0_over_h, q, v, x);
   for (int j = 0; j < dofs(K); ++j) row_of_dof(0, j) = x[j];
 }
 
@@ -288,11 +305,11 @@ void joint_jacobian(const ModelView& model, const StageArgs<N>& a, int i) {
   // Moving the joint turns the subtree's wrench as well: S × F, by x.
   for (int k = 0; k < dofs(K); ++k) {
     if constexpr (slides(K)) {
-      if (!link.never_rotates) w.d_dx[k].a -= cross_axis<K>(link, k, o.F.l);
+      if (!link.never_rotates) w.d_dx[k].a -= along_x<K>(link, o, cross_axis<K>(link, k, o.F.l));
     } else {
       const Vec3<N> s = K == JointKind::spherical
                             ? Vec3<N>{o.chart.m[0][k], o.chart.m[1][k], o.chart.m[2][k]}
-                            : joint_axis<K, N>(link, k);
+                            : along_x<K>(link, o, joint_axis<K, N>(link, k));
       w.d_dx[k] += Vec6<N>{cross(s, o.F.a), cross(s, o.F.l)};
     }
   }

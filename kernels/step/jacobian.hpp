@@ -65,7 +65,7 @@ Vec6<N> times_column(const Mat3<N> (&m)[2][2], const JointColumns<N>& c, int k) 
 /// Computes δw₁ and the reaction by x of one joint's columns, without sign. `Z`: twist of body 2 in
 /// body 1's axes, null when it is fixed in the world.
 template <JointKind K, class N>
-void column_wrenches(const LinkScratch<N>& link, const ContactScratch<N>& o,
+void column_wrenches(const Link& link, const LinkScratch<N>& scratch, const ContactScratch<N>& o,
                      const JointColumns<N>& c, const Vec6<N>* Z, const N& c0_over_h, Vec6<N>* d_dx,
                      Vec6<N>* reaction) {
   Vec6<N> d_dq[3], d_dv[3], turn[3];
@@ -85,10 +85,10 @@ void column_wrenches(const LinkScratch<N>& link, const ContactScratch<N>& o,
       turn[k] =
           slides(K) ? Vec6<N>{cross(S.l, o.sums.wrench.l), zero3<N>()} : turned(o.sums.wrench, S);
   }
-  combine<K>(link, c0_over_h, d_dq, d_dv, d_dx);
+  combine<K>(link, scratch, c0_over_h, d_dq, d_dv, d_dx);
   if (Z == nullptr) return;
   const Vec6<N> none[3] = {zero6<N>(), zero6<N>(), zero6<N>()};
-  combine<K>(link, c0_over_h, turn, none, reaction);
+  combine<K>(link, scratch, c0_over_h, turn, none, reaction);
   for (int k = 0; k < dofs(K); ++k) reaction[k] = d_dx[k] - reaction[k];
 }
 
@@ -133,7 +133,8 @@ void contact_jacobian(const ModelView& model, const StageArgs<N>& a, int body1, 
     const Link& column = model.links[joints[c].link];
     Vec6<N> d_dx[3], reaction[3];
     with_kind(column.kind, [&]<JointKind K>() {
-      column_wrenches<K>(a.links[joints[c].link], o, joints[c], Z, a.c0_over_h, d_dx, reaction);
+      column_wrenches<K>(column, a.links[joints[c].link], o, joints[c], Z, a.c0_over_h, d_dx,
+                         reaction);
     });
     for (int r = 0; r < total; ++r) {
       const bool first_body = r < n1;

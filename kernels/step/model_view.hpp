@@ -7,6 +7,7 @@
 #include "kernels/contact/contact_types.hpp"
 #include "kernels/contact/shapes/distance_grid.hpp"
 #include "kernels/numbers/linalg.hpp"
+#include "kernels/numbers/polynomial.hpp"
 #include "kernels/step/transmission_types.hpp"
 
 namespace tangere::kernels {
@@ -59,6 +60,9 @@ struct Link {
   int place_row = -1;    ///< ≥ 0: frame.p is read from three rows of the block instead
   double gravity_share = 1;  ///< of gravity that acts on it
   double lift = 0;           ///< the share of its tree's root less its own
+  /// A dof that follows by a polynomial: its q and v go by LinkScratch::chart, as those of a
+  /// spherical joint do.
+  bool has_chart = false;
 };
 
 /// A number of the scene: the same for all environments, or one row of the batch.
@@ -345,6 +349,19 @@ struct FoldedEntry {
   double factor;
 };
 
+/// A dof that follows one that follows none by q = Σ c_k q_leaderᵏ (polynomial_followers.hpp).
+struct PolynomialFollower {
+  int v, q, link;
+  int leader_v, leader_q;
+  Polynomial coefficients;  ///< [SI of its q per power of the leader's]
+};
+/// A[target] += factor p' A[source], where p' is the slope of a polynomial follower: the row's.
+struct SlopedEntry {
+  int target, source;
+  double factor;
+  int follower;
+};
+
 struct ModelView {
   int n_links, nq, nv;
   const Link* links;
@@ -374,6 +391,9 @@ struct ModelView {
   const Follower* followers;
   const FollowerTie* ties;  ///< (n_ties) follower after follower
   const FoldedEntry* folded;
+  int n_polynomials, n_sloped;
+  const PolynomialFollower* polynomials;
+  const SlopedEntry* sloped;
   int n_loops;
   const Loop* loops;
   int n_transmissions;

@@ -470,6 +470,7 @@ void inward_sweep(const ModelView& model, const StageArgs<N>& a) {
 /// Computes poses and motions at x, and how far each lane has outrun its candidate lists.
 template <class N>
 void kinematics(const ModelView& model, const StageArgs<N>& a) {
+  polynomial_motions(model, a);
   outward_sweep(model, a);
   transmission_motions(model, a);
   a.excess[0] = N(0.0);

@@ -21,8 +21,8 @@ struct LinkScratch {
   Vec6<N> Vp, Ap;      ///< parent's twist and acceleration, in this link's axes
   Vec6<N> V, A;        ///< twist; acceleration, gravity included as -g at the base
   Vec6<N> F;           ///< wrench through the joint: inertial minus external, of the whole subtree
-  Mat3<N> chart;       ///< spherical: J = J_r(x)
-  Mat3<N> chart_rate;  ///< spherical: V_x = (c₀/h) J + D(x, ẋ)
+  Mat3<N> chart;       ///< spherical: J = J_r(x); Link::has_chart: p' in (0, 0)
+  Mat3<N> chart_rate;  ///< spherical: V_x = (c₀/h) J + D(x, ẋ); Link::has_chart: in (0, 0)
   N mass;  ///< composite of the subtree: mass, mass · centre, inertia about this origin
   Vec3<N> moment;
   Mat3<N> inertia;
@@ -54,6 +54,12 @@ struct TransmissionColumn {
   bool turns;
   Vec3<N> velocity[2];  ///< of the points of a piece relative to its surface, by the dof's rate
   Vec3<N> change[2];    ///< of the slopes: the piece's Hessian times these
+};
+
+/// Slopes of a polynomial follower, and its g before it is folded.
+template <class N>
+struct PolynomialScratch {
+  N slope, second, force;
 };
 
 /// Candidate points of a pair, per lane, and the pose at which they were found, which all pairs of
@@ -115,9 +121,11 @@ struct StageArgs {
   ContactScratch<N>* contacts;                            ///< (n_link_pairs + n_grounded + n_loops)
   JointColumns<N>* columns;                               ///< (2 n_links) motion columns of a pair
   TransmissionColumn<N>* transmission_columns = nullptr;  ///< (n_transmission_dofs)
-  N* transmission_force = nullptr;      ///< (n_transmissions) force on the joint of each [N, N m]
-  N* transmission_second = nullptr;     ///< (square of most_transmission_dofs) ∂J
-  N* own_x = nullptr;                   ///< `x`, of which kinematics() sets those of transmissions
+  N* transmission_force = nullptr;   ///< (n_transmissions) force on the joint of each [N, N m]
+  N* transmission_second = nullptr;  ///< (square of most_transmission_dofs) ∂J
+  PolynomialScratch<N>* polynomials = nullptr;  ///< (n_polynomials)
+  /// `x` and `r`, of which kinematics() sets those of transmissions (x) and polynomial followers.
+  N *own_x = nullptr, *own_r = nullptr;
   std::uint64_t* low_points = nullptr;  ///< scratch of for_each_low_point(); null: it has none
   // results
   N* v;              ///< (nv)

@@ -101,7 +101,7 @@ void combine_dofs(const ModelView& model, const StageArgs<N>& a, const Transmiss
     with_kind(model.links[dof.link].kind, [&]<JointKind K>() {
       N d_dq[3], d_dv[3], d_dx[3];
       for (int i = 0; i < dofs(K); ++i) f(l + i, d_dq[i], d_dv[i]);
-      combine<K>(a.links[dof.link], a.c0_over_h, d_dq, d_dv, d_dx);
+      combine<K>(model.links[dof.link], a.links[dof.link], a.c0_over_h, d_dq, d_dv, d_dx);
       for (int i = 0; i < dofs(K); ++i) add(l + i, d_dx[i]);
       l += dofs(K);
     });

@@ -43,7 +43,8 @@ void add_adjoint_kernels(StageKernels<L>& k) {
            sizeof(LinkAdjoint<N>) * m.n_links +
            sizeof(TransmissionColumn<N>) * m.n_transmission_dofs +
            sizeof(N) * (m.n_transmissions + m.most_transmission_dofs * m.most_transmission_dofs) +
-           sizeof(std::uint64_t) * low_words(m.most_ground_points) + 9 * alignof(N);
+           sizeof(PolynomialScratch<N>) * m.n_polynomials +
+           sizeof(std::uint64_t) * low_words(m.most_ground_points) + 10 * alignof(N);
   };
   k.adjoint_rhs = [](const ModelView& m, const Stage<L>& s, const StageAdjoint<L>& d) {
     kernels::adjoint_rhs(m, StageView<N, L>::arguments(m, s, -1), adjoint_arguments<N>(d, nullptr));

@@ -103,7 +103,9 @@ struct StageView {
     a.transmission_force = scratch.template take<N>(m.n_transmissions);
     a.transmission_second =
         scratch.template take<N>(m.most_transmission_dofs * m.most_transmission_dofs);
+    a.polynomials = scratch.template take<PolynomialScratch<N>>(m.n_polynomials);
     a.own_x = view(s.x);
+    a.own_r = view(s.r);
     a.low_points = scratch.template take<std::uint64_t>(low_words(m.most_ground_points));
     a.candidates = lists_of(m, s, lone, scratch);
     a.apart = s.apart;

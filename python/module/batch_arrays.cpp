@@ -2,11 +2,13 @@
 // Faces are those that pictures of scenes have (io/picture), cut into triangles.
 #include "python/module/batch_arrays.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 
 #include "engine/scene/scene_number.hpp"
 #include "engine/scene/shapes.hpp"
+#include "engine/sense/transmission_forces.hpp"
 #include "io/picture/body_faces.hpp"
 #include "io/scene/convex_hull.hpp"
 
@@ -61,6 +63,19 @@ nb::tuple body_arrays(Readout& readout, const Batch& batch) {
     readout.bodies(batch, static_cast<int>(e), pose.subspan(e * 7 * n, 7 * n),
                    twist.subspan(e * 6 * n, 6 * n));
   return nb::make_tuple(poses, twists);
+}
+
+Array<double> transmission_force_array(const Batch& batch, std::span<const double> controls) {
+  const Model& model = batch.model();
+  const auto environments = std::size_t(batch.environments());
+  const std::size_t nu = controls.size() / environments, n = model.scene().transmissions.size();
+  std::span<double> numbers;
+  auto array = new_array<double>({environments, n}, numbers);
+  for (std::size_t e = 0; e < environments && n > 0; ++e)
+    std::ranges::copy(
+        transmission_forces(model, batch, static_cast<int>(e), controls.subspan(e * nu, nu)),
+        &numbers[e * n]);
+  return array;
 }
 
 nb::tuple face_arrays(const Batch& batch, int environment, double half_space) {

@@ -12,6 +12,9 @@ namespace tangere::python {
 /// Returns (poses, twists) of all bodies, (E, nb, 7) and (E, nb, 6), as Readout::bodies does.
 nb::tuple body_arrays(Readout& readout, const Batch& batch);
 
+/// Returns transmission_forces() of every environment, (E, n). `controls`: (E, nu).
+Array<double> transmission_force_array(const Batch& batch, std::span<const double> controls);
+
 /// Returns (corners, body, rgba) of the triangles that bound the bodies of an environment, with the
 /// sizes that it has: (T, 3, 3) [m] in the frame of the body, (T), (T, 4). An abstract body is the
 /// hull of its contact points. A half-space is a square of this half edge [m]; the ground, body -1

@@ -239,6 +239,12 @@ Array<double> PythonBatch::end_effectors() {
   return array;
 }
 
+Array<double> PythonBatch::transmission_forces(const Argument<double>& u) {
+  const auto controls = rows_of(u, count(), as_size(model().nu()), "controls");
+  const InUse::Turn turn(in_use_);
+  return transmission_force_array(batch_, controls);
+}
+
 nb::tuple PythonBatch::bodies() {
   const InUse::Turn turn(in_use_);
   return body_arrays(workers_[0].readout, batch_);
@@ -534,6 +540,11 @@ void add_batches(nb::module_& m) {
                    "(E) int8, values of StepStatus: how the last step of each environment ended;\n"
                    "negative where it has failed and stands still.")
       .def("end_effectors", &PythonBatch::end_effectors, "(E, n, 3) places in the world [m].")
+      .def(
+          "transmission_forces", &PythonBatch::transmission_forces, "u"_a,
+          "(E, n) forces on the joints of Model.transmission_names [N; N m where they turn] under\n"
+          "the controls u, (E, nu) or (nu): by springs, damping, limits, dry friction and motors.\n"
+          "Positive forces lengthen.")
       .def("bodies", &PythonBatch::bodies,
            nb::sig("def bodies(self) -> tuple[numpy.typing.NDArray[numpy.float64], "
                    "numpy.typing.NDArray[numpy.float64]]"),

@@ -62,6 +62,7 @@ class PythonBatch {
                  const nb::object& environments);
   [[nodiscard]] Array<std::int64_t> steps();
   void set_steps(const std::vector<Whole<std::int64_t>>& steps, const nb::object& environments);
+  [[nodiscard]] Array<double> transmission_forces(const Argument<double>& u);
   [[nodiscard]] Array<double> shear_state();
   void set_shear_state(const Argument<double>& state, const nb::object& environments);
   void reset(const nb::object& environments,

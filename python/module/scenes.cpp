@@ -128,6 +128,13 @@ void add_model(nb::module_& m) {
                      for (const EndEffectorInfo& e : s.end_effectors()) names.push_back(e.name);
                      return names;
                    })
+      .def_prop_ro("transmission_names",
+                   [](const Model& s) {
+                     std::vector<std::string> names;
+                     for (const TransmissionDescription& d : s.scene().transmissions)
+                       names.push_back(d.joint);
+                     return names;
+                   })
       .def_prop_ro("sensors",
                    [](const Model& s) {
                      return std::vector<SensorInfo>(s.sensors().begin(), s.sensors().end());
@@ -138,6 +145,7 @@ void add_model(nb::module_& m) {
           [](const Model& s) {
             std::vector<std::string> names = output_names(s.scene());
             if (!s.has_shear_state()) std::erase(names, "memory");
+            if (s.scene().transmissions.empty()) std::erase(names, "transmissions");
             std::erase_if(names, [&](const std::string& name) {
               return find_body_output(s.scene(), name).has_value();
             });

@@ -455,3 +455,27 @@ def test_faces_have_the_sizes_that_an_episode_drew():
         corners, body, _ = env._env.faces(e)
         found = np.linalg.norm(corners[body == cap][..., :2], axis=-1).max()
         assert found == pytest.approx(radii[e], rel=1e-12)
+
+
+def test_transmissions_have_forces() -> None:
+    b = tangere.SceneBuilder()
+    b.option(gravity=(0, 0, 0), timestep=1e-3)
+    ball = b.robot.link("ball")
+    ball.joint("ball", "prismatic", axis=(1, 0, 0))
+    ball.body("sphere", radius=0.05, density=1000)
+    cord = b.robot.link("cord")
+    cord.joint("cord", "prismatic", axis=(1, 0, 0), stiffness=80, rest=0.25, damping=0.4)
+    cord.body("abstract", mass=0, inertia=(0, 0, 0))
+    path = b.transmission.path("cord")
+    path.point(body="ball")
+    path.point(pos=(0, 0.3, 0))
+    b.actuator.motor("cord", "force", ctrl_range=(-2, 2))
+    model = tangere.Model(b.scene())
+    assert model.transmission_names == ["cord"] and "transmissions" in model.readings
+    batch = tangere.Batch(model, num_envs=3)
+    u = np.array([[0.1], [0.2], [-0.3]])
+    batch.step(u)
+    (length, rate), force = (batch.q[:, 1], batch.v[:, 1]), batch.transmission_forces(u)
+    assert force.shape == (3, 1)
+    expected = 80 * (0.25 - length) - 0.4 * rate + 2 * u[:, 0]
+    np.testing.assert_allclose(force[:, 0], expected, atol=1e-12)

@@ -90,6 +90,22 @@ def test_a_motor_maps_its_control_and_another_drives_the_same_joint() -> None:
     np.testing.assert_allclose(ends[0], ends[1], atol=1e-12)
 
 
+def test_a_joint_follows_by_a_polynomial() -> None:
+    b = SceneBuilder()
+    for name, kind in (("crank", "revolute"), ("slider", "prismatic")):
+        link = b.robot.link(name)
+        link.joint(name, kind, axis=(1, 0, 0), pos=(0, 0.2, 0), damping=0.01)
+        link.body("cuboid", size=(0.05, 0.05, 0.05), density=800)
+    b.find("joint", name="slider").set(follows="crank", ratio=0.1, offset=0.05, powers=(0.2, -0.05))
+    b.actuator.motor("crank", "force", ctrl_range=(-0.01, 0.01))
+    batch = tangere.Batch(tangere.Model(b.scene()), num_envs=2)
+    batch.run(np.full((50, 2, 1), 0.5))
+    crank, slider = batch.q.T
+    assert abs(crank[0]) > 1e-3
+    expected = 0.05 + 0.1 * crank + 0.2 * crank**2 - 0.05 * crank**3
+    np.testing.assert_allclose(slider, expected, atol=1e-12)
+
+
 @pytest.mark.parametrize("path", SCENES, ids=lambda p: p.stem)
 def test_a_scene_that_is_read_and_written_is_the_same(path, tmp_path):
     with warnings.catch_warnings(record=True) as of_file:

@@ -35,7 +35,7 @@ std::vector<std::string> known_names(const Model& model) {
   std::vector<std::string> names = output_names(model.scene());
   std::erase_if(names, [&](const std::string& name) {
     const auto field = find_output(sensor_names(model.scene()), name);
-    return name == "q" || name == "v" || name == "memory" ||
+    return name == "q" || name == "v" || name == "memory" || name == "transmissions" ||
            (field && !reason_against(model.scene(), *field).empty());
   });
   for (const EndEffectorInfo& e : model.end_effectors()) names.push_back(e.name);

@@ -237,7 +237,10 @@ double GradientChecker::along_start(std::vector<double> q, std::vector<double> v
 
 void GradientChecker::check_positions() {
   const auto move = [this](std::size_t i) {
-    return [this, i](CheckInputs& x, double e) { displace(model_, x.q, static_cast<int>(i), e); };
+    return [this, i](CheckInputs& x, double e) {
+      displace(model_, x.q, static_cast<int>(i), e);
+      complete_velocities(model_, x.q, x.v);
+    };
   };
   add({"q", grad_q_, all_of(grad_q_.size()), [&](std::size_t i) { return difference(1, move(i)); },
        [&](std::size_t i) { return std::string(model_.v_names()[i]); },
@@ -249,7 +252,7 @@ void GradientChecker::check_velocities() {
   const auto move = [this](std::size_t i) {
     return [this, i](CheckInputs& x, double e) {
       x.v[i] += e;
-      complete_velocities(model_, x.v);
+      complete_velocities(model_, x.q, x.v);
     };
   };
   add({"v", grad_v_, all_of(grad_v_.size()),

@@ -11,6 +11,7 @@
 #include "engine/rows/camera_layout.hpp"
 #include "engine/rows/sensor_layout.hpp"
 #include "engine/scene/scene_number.hpp"
+#include "engine/sense/transmission_forces.hpp"
 #include "engine/step/sleeping_trees.hpp"
 #include "kernels/numbers/block.hpp"
 #include "tasks/run/block_reader.hpp"
@@ -59,6 +60,7 @@ Recorder::Recorder(const Batch& batch, std::span<const Stepper> steppers,
   add_motion();
   add_solver();
   if (options.outputs.audit) add_audit();
+  if (options.outputs.transmissions) add_transmissions();
   if (steppers.front().sleep() > 0) add_sleep();
   if (options.outputs.memory) add_shear(options.outputs.shear_times);
   add_readings();
@@ -336,6 +338,31 @@ void Recorder::add_audit() {
        .meaning = "work of the motors; what damping and friction took; what the scheme made: the "
                   "change of energy less the first, plus the second"},
       {When::step, kAlways, false, 1, [this](auto, int) { return audit_->passed(); }});
+}
+
+void Recorder::add_transmissions() {
+  std::vector<std::string> names, units;
+  for (const TransmissionDescription& d : model_.scene().transmissions) {
+    const auto link = std::ranges::find_if(
+        model_.scene().links, [&](const LinkDescription& l) { return l.joint.name == d.joint; });
+    names.push_back(d.joint);
+    units.emplace_back(dof_turns(link->joint.type, 0) ? "N m" : "N");
+  }
+  add({.name = "transmissions/force",
+       .shape = {environments_, names.size()},
+       .names = names,
+       .units = units,
+       .meaning = "on the joint at the end of the step, under its controls; positive lengthens"},
+      {When::step, kAlways, false, 1, [this](auto, int) {
+         forces_.clear();
+         const std::size_t nu = as_size(model_.nu());
+         for (int e = 0; e < batch_.environments(); ++e) {
+           const std::vector<double> one =
+               transmission_forces(model_, batch_, e, u_.subspan(as_size(e) * nu, nu));
+           forces_.insert(forces_.end(), one.begin(), one.end());
+         }
+         return std::span<const double>(forces_);
+       }});
 }
 
 /// Readings of a sensor share their list of steps, unless they are taken at other times.

@@ -70,6 +70,7 @@ class Recorder {
   void add_motion();
   void add_solver();
   void add_audit();
+  void add_transmissions();
   void add_readings();
   void add_views();
   void add_randomized();
@@ -100,15 +101,15 @@ class Recorder {
   std::size_t bodies_ = 0;  // recorded
   std::int64_t row_ = 0;
   double time_ = 0;
-  std::vector<double> q_, v_, pose_, twist_, end_effectors_;  // (E, …)
-  std::vector<double> reading_;                               // shared by the sensors
-  std::vector<float> heights_;                                // of pictures
-  std::vector<std::uint8_t> bytes_;                           // of pictures in colours
-  std::vector<std::int16_t> ids_;                             // of bodies in pictures
-  std::vector<double> shear_;                                 // (16, points, 3)
-  std::vector<double> sleep_u_, clearance_;                   // (E, nu), (E)
-  std::vector<std::int32_t> iterations_, island_, rested_;    // (E), (E, trees)
-  std::vector<std::int8_t> status_, resting_;                 // (E)
+  std::vector<double> q_, v_, pose_, twist_, end_effectors_, forces_;  // (E, …)
+  std::vector<double> reading_;                                        // shared by the sensors
+  std::vector<float> heights_;                                         // of pictures
+  std::vector<std::uint8_t> bytes_;                                    // of pictures in colours
+  std::vector<std::int16_t> ids_;                                      // of bodies in pictures
+  std::vector<double> shear_;                                          // (16, points, 3)
+  std::vector<double> sleep_u_, clearance_;                            // (E, nu), (E)
+  std::vector<std::int32_t> iterations_, island_, rested_;             // (E), (E, trees)
+  std::vector<std::int8_t> status_, resting_;                          // (E)
 };
 
 }  // namespace tangere

@@ -63,6 +63,7 @@ double rollout_bytes(const Model& model, int environments, const RolloutOutputs&
       double{kMotionWidth} * static_cast<double>(bodies_in(model, outputs)) +
       static_cast<double>((outputs.end_effectors ? model.end_effectors().size() : 0) *
                               kEndEffectorWidth +
+                          (outputs.transmissions ? model.scene().transmissions.size() : 0) +
                           largest_reading(model, outputs));
   constexpr double kFlags = sizeof(std::int32_t) + sizeof(std::int8_t);
   return environments * (numbers * sizeof(double) + kFlags) +

@@ -16,8 +16,9 @@ namespace tangere {
 struct RolloutOutputs {
   std::optional<std::vector<FieldOutput>> fields;  ///< none: the field of every sensor
   bool bodies = true, end_effectors = true;
-  bool audit = false;   ///< balance of energy and momentum
-  bool memory = false;  ///< shear state
+  bool audit = false;          ///< balance of energy and momentum
+  bool memory = false;         ///< shear state
+  bool transmissions = false;  ///< their forces at the end of each step
   /// Rows at which q and v, bodies, end effectors and shear state are written; none: every row. If
   /// `states` are given, controls are not written, and steps only if they end at a row of q.
   OutputTimes states = {}, body_times = {}, end_effector_times = {}, shear_times = {};

@@ -17,7 +17,7 @@ template <class N>
 class StageBuffers {
  public:
   explicit StageBuffers(const CompiledModel& m) : model_(m) {
-    const std::size_t nv = std::size_t(m.nv), entries = std::size_t(m.pattern.entries);
+    const std::size_t nv = std::size_t(m.nv), entries = std::size_t(m.pattern.assembled);
     centre.resize(std::size_t(m.nq));
     for (auto* v : {&x, &r, &s, &tau, &target, &v_out, &g, &force_scale, &mass})
       v->assign(nv, N(0.0));
@@ -27,6 +27,7 @@ class StageBuffers {
     columns_.resize(2 * m.links.size());
     transmission_columns_.resize(m.transmission_dofs.size());
     transmission_force_.resize(m.transmissions.size());
+    polynomials_.resize(m.polynomials.size());
     transmission_second_.resize(std::size_t(m.view.most_transmission_dofs) *
                                 std::size_t(m.view.most_transmission_dofs));
     excess_.assign(1, N(0.0));
@@ -68,7 +69,9 @@ class StageBuffers {
     a.transmission_columns = transmission_columns_.data();
     a.transmission_force = transmission_force_.data();
     a.transmission_second = transmission_second_.data();
+    a.polynomials = polynomials_.data();
     a.own_x = x.data();
+    a.own_r = r.data();
     a.v = v_out.data();
     a.g = g.data();
     a.force_scale = force_scale.data();
@@ -112,6 +115,7 @@ class StageBuffers {
   std::vector<kernels::JointColumns<N>> columns_;
   std::vector<kernels::TransmissionColumn<N>> transmission_columns_;
   std::vector<N> transmission_force_, transmission_second_;
+  std::vector<kernels::PolynomialScratch<N>> polynomials_;
   std::vector<N> excess_;
   std::vector<std::vector<N>> points_, references_, areas_;
   std::vector<kernels::CandidateList<N>> lists_;

@@ -3,8 +3,11 @@
 // contact, with every joint kind.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "engine/model/compile.hpp"
 #include "kernels/numbers/dual.hpp"
+#include "tests/engine/random_followers.hpp"
 #include "tests/engine/random_machine.hpp"
 #include "tests/engine/stage_buffers.hpp"
 
@@ -48,9 +51,10 @@ void copy_stage(const StageBuffers<double>& from, StageBuffers<N>& to) {
   copy(from.faces, to.faces);
 }
 
-bool is_transmission(const CompiledModel& m, int dof) {
-  return std::any_of(m.transmissions.begin(), m.transmissions.end(),
-                     [&](const kernels::Transmission& t) { return t.v == dof; });
+/// Whether a dof is eliminated: its row and column of A only keep A regular.
+bool is_eliminated(const CompiledModel& m, int dof) {
+  const auto is = [&](const auto& of) { return of.v == dof; };
+  return std::ranges::any_of(m.transmissions, is) || std::ranges::any_of(m.polynomials, is);
 }
 
 void compare_with_dual_numbers(const CompiledModel& m, StageBuffers<double>& b, double tolerance) {
@@ -63,7 +67,7 @@ void compare_with_dual_numbers(const CompiledModel& m, StageBuffers<double>& b, 
     dual.residual(kC0 / kStep, 1 / kStep);
     dual.x[std::size_t(j)].epsilon = 0;
     for (int i = 0; i < m.nv; ++i) {
-      if (is_transmission(m, i)) continue;  // a number that only keeps A regular
+      if (is_eliminated(m, i) || is_eliminated(m, j)) continue;
       EXPECT_DOUBLE_EQ(dual.g[std::size_t(i)].value, b.g[std::size_t(i)]);
       EXPECT_NEAR(dual.g[std::size_t(i)].epsilon, b.entry(b.A, i, j),
                   tolerance * scale[std::size_t(i)])
@@ -125,6 +129,18 @@ TEST(Jacobian, TransmissionsMatchDualNumbers) {
     compare_at_random_states(scene, seed, 5);
   }
   EXPECT_GT(transmissions, 80U);
+}
+
+TEST(Jacobian, PolynomialFollowersMatchDualNumbers) {
+  int polynomials = 0;
+  for (unsigned seed = 1; seed <= 40; ++seed) {
+    Scene scene = testing::following_machine(seed, 3 + static_cast<int>(seed % 7), 1, false);
+    if (seed % 3 == 1) testing::add_transmissions(scene, seed, 2);
+    if (seed % 3 == 2) testing::close_loops(scene, seed, 2);
+    polynomials += testing::count_polynomials(scene);
+    compare_at_random_states(scene, seed, 5);
+  }
+  EXPECT_GT(polynomials, 40);
 }
 
 TEST(Jacobian, ContactsWithFixedBodiesMatchDualNumbers) {

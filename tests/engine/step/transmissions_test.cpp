@@ -7,6 +7,7 @@
 
 #include "engine/sense/energy_balance.hpp"
 #include "engine/sense/start_overlaps.hpp"
+#include "engine/sense/transmission_forces.hpp"
 #include "tests/engine/gradient_differences.hpp"
 #include "tests/engine/gradient_tangent.hpp"
 #include "tests/engine/random_machine.hpp"
@@ -167,6 +168,44 @@ TEST(Transmissions, ForcesActAtPoints) {
     const double torque = u[0] * lever + u[1] * arm;
     EXPECT_NEAR((testing::v_of(batch)[0] - 0.7) / 1e-6, torque / inertia, 2e-5 * torque / inertia);
   }
+}
+
+/// By the sum of its parts, and by the acceleration that it gives the ball.
+TEST(Transmissions, SayTheirForces) {
+  Scene s = slider();
+  JointDescription& joint = s.links[1].joint;
+  joint.stiffness = 80;
+  joint.rest = {0.25};
+  joint.damping = 0.4;
+  joint.limits = {0, 0.35};
+  joint.limit_stiffness = 50;
+  joint.friction = 0.7;
+  s.motors.push_back({"cord", -3, 3, {}});
+  MotorDescription servo{"cord", -0.5, 0.5, {}};
+  servo.control = MotorControl::position;
+  servo.P = 4, servo.D = 0.2;
+  s.motors.push_back(servo);
+  s.motors.back().name = "servo";
+  const Model model(s);
+  Batch batch(model, 2);
+  const std::vector<double> u = {0.2, 0.3, 0.2, 0.3};
+  EXPECT_EQ(transmission_forces(model, Batch(model, 1), 0, std::span(u).first(2)).size(), 1U);
+  constexpr double h = 1e-5;
+  Stepper stepper(model, testing::options(Integrator::sdirk2, h, 1e-13));
+  for (int t = 0; t < 600; ++t) stepper.step(batch, u);  // until friction slips
+  const std::vector<double> q = testing::q_of(batch), v = testing::v_of(batch);
+  ASSERT_GT(q[1], 0.35);
+  ASSERT_GT(v[1], 1e-2);
+  const double expected = 80 * (0.25 - q[1]) - 0.4 * v[1] - 50 * (q[1] - 0.35) - 0.7 + 0.2 * 3 +
+                          std::clamp(4 * (0.3 - q[1]) - 0.2 * v[1], -0.5, 0.5);
+  const double force = transmission_forces(model, batch, 1, std::span(u).last(2)).at(0);
+  EXPECT_NEAR(force, expected, 1e-12);
+  stepper.step(batch, u);
+  const double after = transmission_forces(model, batch, 1, std::span(u).last(2)).at(0);
+  const double acceleration = (testing::v_of(batch)[0] - v[0]) / h;
+  EXPECT_NEAR(0.5 * acceleration, 0.5 * (force + after) * q[0] / q[1], 1e-4);
+  EXPECT_THROW(transmission_forces(model, batch, 2, std::span(u).first(2)), InputError);
+  EXPECT_THROW(transmission_forces(model, batch, 0, u), InputError);
 }
 
 TEST(Transmissions, BalanceTheirEnergy) {

@@ -358,7 +358,37 @@ TEST(RobotImport, JointEqualitiesAreKept) {
   for (const auto& [equality, flag] :
        {std::pair{"active=\"false\"", "enable"}, {"polycoef=\"0 1 0 0 0\"", "disable"}})
     EXPECT_THAT(made(equality, flag).text, Not(HasSubstr("follows"))) << equality;
-  EXPECT_THAT(made("polycoef=\"0 1 0.5 0 0\"").lost, ElementsAre(HasSubstr("polynomial")));
+  const ImportedScene curved = made("polycoef=\"0.1 0 0.5 0 -2\"");
+  EXPECT_THAT(curved.lost, IsEmpty());
+  EXPECT_THAT(curved.text,
+              HasSubstr("follows=\"two\" ratio=\"0\" offset=\"0.1\" powers=\"0.5 0 -2\""));
+  EXPECT_THAT(made("polycoef=\"0 1 0.5 0 0\"").text, HasSubstr("powers=\"0.5\""));
+}
+
+/// Chains that scenes do not have are listed with both names, and the rest is read.
+TEST(RobotImport, PolynomialsOfPolynomialsAreListed) {
+  const auto made = [](const std::string& equalities) {
+    const testing::Folder folder;
+    std::ofstream(folder / "robot.xml")
+        << "<mujoco><worldbody><body><joint name=\"one\"/><geom size=\"0.1\"/></body><body>"
+           "<joint name=\"two\"/><geom size=\"0.1\"/></body><body><joint name=\"three\"/>"
+           "<geom size=\"0.1\"/></body></worldbody><equality><joint joint1=\"two\" "
+           "joint2=\"one\" polycoef=\"0 1 1 0 0\"/>"
+        << equalities << "</mujoco>";
+    return import_robot(folder / "robot.xml", folder / "scene.xml", {});
+  };
+  const ImportedScene twice =
+      made("<joint joint1=\"three\" joint2=\"two\" polycoef=\"0 1 0 1 0\"/></equality>");
+  EXPECT_THAT(twice.lost, ElementsAre(HasSubstr("joint 'three' follows 'two', by a polynomial of "
+                                                "a polynomial")));
+  EXPECT_THAT(twice.text, HasSubstr("follows=\"one\" ratio=\"1\" offset=\"0\" powers=\"1\""));
+  EXPECT_THAT(twice.text, Not(HasSubstr("follows=\"two\"")));
+  const ImportedScene tendon = made(
+      "</equality><tendon><fixed name=\"t\"><joint joint=\"two\" coef=\"2\"/><joint "
+      "joint=\"three\" coef=\"1\"/></fixed></tendon>");
+  EXPECT_THAT(tendon.lost, ElementsAre(HasSubstr("joint 'two' follows 'one', by a polynomial, and "
+                                                 "'t' follows it with others")));
+  EXPECT_THAT(tendon.text, HasSubstr("follows=\"two three\" ratio=\"2 1\""));
 }
 
 /// A leader may have a blank in its name.

@@ -124,6 +124,16 @@ TEST(RobotMotion, MimicJointsFollowTheirLeaders) {
   EXPECT_LT(largest_joint_error(scene, truth, 4), 5e-5);
 }
 
+/// A joint with ref that follows another by five coefficients.
+TEST(RobotMotion, AJointFollowsByAPolynomial) {
+  const ImportedScene made = import_robot(kFolder + "poly_joint.xml", "scene.xml", {});
+  EXPECT_THAT(made.lost, IsEmpty());
+  const Scene scene = parse_scene(made.text, "scene.xml").scene;
+  const MotionTable truth = read_table(kFolder + "poly_joint.csv");
+  EXPECT_LT(largest_error(scene, truth), 1e-6);
+  EXPECT_LT(largest_joint_error(scene, truth, 2), 1e-5);
+}
+
 /// A tendon along three joints, with a spring, damping and an affine actuator that is clipped.
 TEST(RobotMotion, ATendonPullsItsJoints) {
   RobotOptions options;

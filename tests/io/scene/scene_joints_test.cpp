@@ -151,6 +151,37 @@ axis="0 0 1"/><body name="b" type="sphere" radius="1" pos="2 0 0"/></link></robo
   EXPECT_EQ(std::get<ConstantControl>(*s.control).values, (std::vector<double>{100, 1, 2}));
 }
 
+/// A slider that follows a hinge, and a hinge that follows a slider, in centimetres.
+TEST(SceneJoints, PowersHaveTheUnitsOfBothCoordinates) {
+  const auto scene_of = [](const std::string& attributes) {
+    return R"(<redmax><robot><link name="a"><joint name="a" type="revolute" axis="0 0 1"/>
+<body name="a" type="sphere" radius="1"/></link><link name="b"><joint name="b" type="prismatic"
+axis="0 0 1" follows="a" )" +
+           attributes + R"(/><body name="b" type="sphere" radius="1"/></link><link name="c">
+<joint name="c" type="prismatic" axis="0 0 1"/><body name="c" type="sphere" radius="1"/></link>
+<link name="d"><joint name="d" type="revolute" axis="0 0 1" follows="c" powers="2 3"/>
+<body name="d" type="sphere" radius="1"/></link></robot></redmax>)";
+  };
+  const Scene s = parse_scene(scene_of("ratio=\"0\" powers=\"2 3 4\""), "s.xml").scene;
+  const std::vector<double>&slides = s.links[1].joint.powers, &turns = s.links[3].joint.powers;
+  ASSERT_EQ(slides.size(), 3U);
+  EXPECT_DOUBLE_EQ(slides[0], 0.02);
+  EXPECT_DOUBLE_EQ(slides[2], 0.04);
+  ASSERT_EQ(turns.size(), 2U);
+  EXPECT_DOUBLE_EQ(turns[0], 2e4);
+  EXPECT_DOUBLE_EQ(turns[1], 3e6);
+  const auto fault = [&](const std::string& attributes) -> std::string {
+    try {
+      parse_scene(scene_of(attributes), "s.xml");
+    } catch (const InputError& error) {
+      return error.what();
+    }
+    return "";
+  };
+  EXPECT_THAT(fault("powers=\"1 2 3 4\""),
+              HasSubstr("s.xml:2: <joint>: powers has 4 numbers; expected 1 to 3"));
+}
+
 /// A chain of links, nested or by name.
 std::string chain(const std::string& links) {
   return "<tangere><option unit=\"m-kg\"/><robot>" + links + "</robot></tangere>";
