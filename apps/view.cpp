@@ -7,6 +7,8 @@
 #include "apps/arguments.hpp"
 #include "apps/command.hpp"
 #include "apps/run_options.hpp"
+#include "engine/base/error.hpp"
+#include "io/export/exported_set.hpp"
 #include "io/files/part_file.hpp"
 #include "io/view/view_page.hpp"
 #include "io/view/view_reader.hpp"
@@ -23,7 +25,17 @@ struct ViewArguments {
   bool overwrite = false;
 };
 
+/// An export has neither the scene nor, as a rule, where bodies are.
+void refuse_export(const std::string& path) {
+  const std::optional<ExportedSet> set = find_export(path);
+  if (!set) return;
+  throw InputError(fmt::format(
+      "'{}' is an export ({}), which has no scene; expected the data set of which it is made{}",
+      path, set->format, set->command.empty() ? "" : ": " + set->command));
+}
+
 int view(const ViewArguments& options, const Console& console) {
+  refuse_export(options.input);
   ViewOptions what = options.what;
   what.episodes = options.episodes.value_or(what.episodes);
   what.frames = options.frames.value_or(what.frames);

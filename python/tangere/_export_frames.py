@@ -7,6 +7,7 @@ has
     observations  of row j n
     touch         of rows (j - 1) n + 1 … j n, the newest last: (n, …). Rows before the first repeat
                   the first one
+                  the first one. Where rows are windows of k readings already: (n k, …)
     action        of all n rows, which must be the same
     reward        the sum of those of the n rows
     done, success true in the last frame of an episode
@@ -74,9 +75,26 @@ class Frames:
             return False
         return key in episodes.touch or key.split(".")[0] in episodes.sensors
 
+    def has_window(self, key: str) -> bool:
+        """Whether a frame has several readings, along the first axis of its shape."""
+        return key in self.episodes.windows or (self.window > 1 and self.is_touch(key))
+
+    @property
+    def windows(self) -> dict[str, dict[str, float]]:
+        """KEY → count of the readings of a frame, and the time between two of them [s]."""
+        apart = self.seconds / self.window
+        return {
+            key: {
+                "readings": self.shapes[key][0],
+                "seconds": self.episodes.windows.get(key, apart),
+            }
+            for key in self.episodes.keys
+            if self.has_window(key)
+        }
+
     def pads(self, key: str) -> tuple[int, ...]:
         """The shape of a reading at one time: without the axis of a window."""
-        return self.shapes[key][1:] if self.window > 1 and self.is_touch(key) else self.shapes[key]
+        return self.shapes[key][1:] if self.has_window(key) else self.shapes[key]
 
     def pads_apart(self, key: str, rows: np.ndarray) -> np.ndarray:
         """A reading of frames (t, …) as (t, pads, *shape), with a window (t, pads, n, *shape)."""
@@ -85,7 +103,7 @@ class Frames:
         apart = by_pads(samples) if len(shape) >= 3 else samples[:, None]
         if shape == self.shapes[key]:
             return apart
-        return np.moveaxis(apart.reshape(len(rows), self.window, *apart.shape[1:]), 1, 2)
+        return np.moveaxis(apart.reshape(len(rows), -1, *apart.shape[1:]), 1, 2)
 
     def of(self, place: int) -> Arrays:
         """Observations by key, "actions", "rewards", "dones" and "success" of an episode."""
@@ -133,8 +151,12 @@ class Frames:
                 _check_held(rows, starts, n, self.name(place))
                 taken[key] = rows[starts]
             elif self.is_touch(key):
-                at = np.maximum(starts[:, None] + np.arange(1 - n, 1), 0)
-                taken[key] = np.asarray(rows)[at]
+                at = starts[:, None] + np.arange(1 - n, 1)
+                found = np.asarray(rows)[np.maximum(at, 0)]
+                if key in self.episodes.windows:
+                    found[at < 0] = rows[0][0]  # the oldest one
+                    found = found.reshape(len(found), -1, *rows.shape[2:])
+                taken[key] = found
             else:
                 taken[key] = rows[starts]
         return taken
