@@ -17,6 +17,7 @@ Arrays are those of the files, without a change of type or unit.
 
 from __future__ import annotations
 
+import re
 from typing import Any, Sequence
 
 import numpy as np
@@ -25,6 +26,8 @@ from . import _core
 from .data import Episodes
 
 Arrays = dict[str, np.ndarray]
+
+_SIZE = re.compile(r"(body|joint) .*(size|radius|length|pos|quat)")  # what changes shapes and places
 
 
 class Frames:
@@ -67,6 +70,28 @@ class Frames:
     def name(self, place: int) -> str:
         """Of an episode, for messages."""
         return f"{self.episodes.path}: {self.episodes.names[self.chosen[place]]}"
+
+    def scene_note(self) -> dict[str, Any]:
+        """What `tangere view` needs beside the numbers of an export; empty without q."""
+        episodes, said = self.episodes, self.episodes.attributes
+        if "q" not in episodes.keys:
+            return {}
+        first = episodes.arrays(self.chosen[0], ["q"])["q"][0]
+        note: dict[str, Any] = {
+            "name": str(said["name"]), "text": str(said["text"]),
+            "q_names": [str(name) for name in said["q_names"]],
+            "q_start": [float(x) for x in first],
+            "sensors": {
+                name: {"pressure_sign": int(about["pressure_sign"]), "points": _points(about)}
+                for name, about in episodes.sensors.items()
+            },
+        }  # fmt: skip
+        drawn = [name for name in map(str, said.get("randomized_names", ())) if _SIZE.match(name)]
+        if drawn:
+            values = (episodes.randomized(i) for i in self.chosen)
+            note["randomized_names"] = drawn
+            note["randomized"] = [[of[name] for name in drawn] for of in values]
+        return {"scene": note}
 
     def is_touch(self, key: str) -> bool:
         """Whether an observation is a reading of a sensor and no picture in colours."""
@@ -160,6 +185,10 @@ class Frames:
             else:
                 taken[key] = rows[starts]
         return taken
+
+
+def _points(sensor: dict[str, Any]) -> int:
+    return int(np.prod(sensor["resolution"])) if "resolution" in sensor else int(sensor["points"])
 
 
 def _check_held(actions: np.ndarray, starts: np.ndarray, window: int, name: str) -> None:

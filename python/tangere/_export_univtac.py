@@ -113,6 +113,7 @@ class UniVtac:
             "seconds_per_frame": frames.seconds,
             "joints": [str(episodes.attributes["q_names"][i]) for i in self._joints],
             "joint_units": [str(episodes.attributes["q_units"][i]) for i in self._joints],
+            **frames.scene_note(),
             "datasets": self.names,
             "units": {name: unit for name in self.names if (unit := self._unit(name))},
             **({"newest_of_window": sorted(episodes.windows)} if episodes.windows else {}),

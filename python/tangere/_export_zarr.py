@@ -73,6 +73,7 @@ class ZarrStore:
                 "demos": [episodes.names[i] for i in self.frames.chosen],
                 "touch": episodes.touch,
                 "privileged": episodes.privileged,
+                **self.frames.scene_note(),
             }
         )
         data = root.create_group("data")

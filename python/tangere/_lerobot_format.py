@@ -216,6 +216,7 @@ class LeRobot:
             "task": episodes.task,
             "text": self.text,
             "units": self._units(),
+            **frames.scene_note(),
             "columns": [feature.recipe() for feature in self.features],
         }
 

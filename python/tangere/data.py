@@ -75,6 +75,9 @@ class Episodes:
                     self._describe(file)
                     sensors = file["scene"].get("sensors", {})
                     self.sensors = {name: dict(sensors[name].attrs) for name in sensors}
+                    for name in sensors:  # of a curved pad
+                        if "position" in sensors[name]:
+                            self.sensors[name]["points"] = len(sensors[name]["position"])
                     cameras = file["scene"].get("cameras", {})
                     self.cameras = {name: dict(cameras[name].attrs) for name in cameras}
                 self.content = (self.content + int(file.attrs.get("content_sum", 0))) % 2**64
@@ -162,6 +165,12 @@ class Episodes:
         gains = np.asarray(self._demo(episode).attrs["picture_gains"]).reshape(-1, 3)
         names = [str(name).rpartition(" ")[0] for name in self.attributes["picture_gain_names"]]
         return dict(zip(names[::3], gains, strict=True))
+
+    def randomized(self, episode: int) -> dict[str, float]:
+        """Name → what `<randomize>` drew for an episode. Empty where the scene draws nothing."""
+        names = [str(name) for name in self.attributes.get("randomized_names", ())]
+        values = self._demo(episode).attrs["randomized"] if names else ()
+        return dict(zip(names, map(float, values), strict=True))
 
     def terminated(self, episode: int) -> bool:
         """Whether the task ended the episode; False if it ran out of time, and for a scene."""

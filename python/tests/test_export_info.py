@@ -62,15 +62,6 @@ def test_every_format_is_described(sets, info, command, to):
     assert f"{to}: " in text and "episodes: 20, frames: 2000" in text
 
 
-def test_view_names_the_data_set(sets, command, tmp_path):
-    for to in FORMATS:
-        words = [command, "view", sets[to], "-o", tmp_path / "page.html"]
-        done = subprocess.run(words, capture_output=True, text=True)
-        assert done.returncode == 2 and f"is an export ({to}), which has no scene" in done.stderr
-        assert to == "csv" or "of which it is made: tangere generate box_pushing" in done.stderr
-    assert not list(tmp_path.iterdir())
-
-
 def test_damage_is_named(sets, info, tmp_path):
     def damaged(to, change):
         copy = tmp_path / f"{to}.{len(list(tmp_path.iterdir()))}"
