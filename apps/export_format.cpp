@@ -25,8 +25,8 @@ using Words = std::vector<std::string>;
 
 const Words kFormats{"lerobot", "zarr", "ftp1", "univtac"};
 
-// argv[1] is the folder of a package beside the program, or empty; argv[2] the module and argv[3] the
-// subcommand that it serves. A package that is missing is the world's mistake, so the code is 3.
+// argv[1] is the folder of a package beside the program, or empty; argv[2] is the module, argv[3]
+// the subcommand that it serves. A missing package is the world's mistake, so the code is 3.
 constexpr const char* kStart = R"(
 import importlib, importlib.util, json, sys
 place, module, command, words = sys.argv[1], sys.argv[2], sys.argv[3], sys.argv[4:]
@@ -35,8 +35,9 @@ if place:
     sys.path.insert(0, place)
 def missing(name, package):
     what = "--to" if command == "export" else "an export"
-    text = f"{what} needs the Python package {name}, which {sys.executable} does not have; expected "
-    text += f"it from `{sys.executable} -m pip install {package}`, or another TANGERE_PYTHON"
+    text = f"{what} needs the Python package {name}, which {sys.executable} does not have; "
+    text += f"expected it from `{sys.executable} -m pip install {package}`, "
+    text += "or another TANGERE_PYTHON"
     if "--json" in words:
         print(json.dumps({"command": command, "exit_code": 3, "error": text}))
     print(f"tangere {command}: {text}", file=sys.stderr)

@@ -27,8 +27,8 @@ struct ViewArguments {
   bool overwrite = false;
 };
 
-/// Replaces this process by the Python package, which has the libraries of the formats, if the input
-/// is an export.
+/// Replaces this process by the Python package, which has the libraries of the formats, if the
+/// input is an export.
 void view_if_export(const ViewArguments& options, const Console& console) {
   const std::optional<ExportedSet> set = find_export(options.input);
   if (!set) return;

@@ -27,7 +27,7 @@ from .data import Episodes
 
 Arrays = dict[str, np.ndarray]
 
-_SIZE = re.compile(r"(body|joint) .*(size|radius|length|pos|quat)")  # what changes shapes and places
+_SIZE = re.compile(r"(body|joint) .*(size|radius|length|pos|quat)")  # of shapes, places
 
 
 class Frames:

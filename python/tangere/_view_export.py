@@ -105,13 +105,13 @@ def _zarr(path: Path, said: dict[str, Any]) -> _Export:
         for side in ("left", "right")
     }
     data: Any = root["data"]
-    arrays = dict(data.arrays())
+    arrays: dict[str, Any] = dict(data.arrays())
 
     def read(episode: int) -> Arrays:
         part = slice(starts[episode], ends[episode])
         found: Arrays = {}
         for name, array in arrays.items():
-            key = ftp1.get(name, name)
+            key = str(ftp1.get(name, name))
             if not _is_wanted(key, said["scene"]) and name != "reward":
                 continue
             rows = np.asarray(array[part])
