@@ -28,7 +28,7 @@ Scene imperfect_scene() {
 }
 
 EpisodeOptions windowed(const Model& model, Precision precision = Precision::f64) {
-  EpisodeOptions o = options(2, precision);
+  EpisodeOptions o = testing::options(2, precision);
   o.episodes = 18;
   o.every = kRowSteps;
   const std::string pad = std::string(model.sensors()[0].name);
@@ -80,7 +80,7 @@ void expect_windows(const Model& model, Precision precision) {
     o.piece_bytes = piece;
     o.threads = piece == 1 ? 1 : 2;
     Recorder recorder(o.steps / o.every);
-    run(model, o, recorder);
+    testing::run(model, o, recorder);
     for (const std::int64_t e : {0, 3, 17}) {
       const std::vector<std::string>& found = recorder.episodes.at(e).observations;
       ASSERT_EQ(found.size(), first + 3);
@@ -123,7 +123,7 @@ TEST(Windows, AreOfDivisorsOfARow) {
     EpisodeOptions o = windowed(small_ball());
     o.record = {std::move(one)};
     Recorder recorder(o.steps / o.every);
-    run(small_ball(), o, recorder);
+    testing::run(small_ball(), o, recorder);
   };
   EXPECT_THAT(
       [&] {
