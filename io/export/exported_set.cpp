@@ -222,13 +222,22 @@ std::optional<ExportedSet> read_table(const fs::path& path) {
   return set;
 }
 
+/// Whether a folder has shards, and so is a data set whatever else lies there.
+bool has_shards(const fs::path& folder) {
+  std::error_code none;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder, none))
+    if (entry.path().filename().string().starts_with("shard-")) return true;
+  return false;
+}
+
 }  // namespace
 
 std::optional<ExportedSet> find_export(const std::string& path) {
   const fs::path place(path);
   std::error_code none;
   std::optional<ExportedSet> set;
-  if (fs::is_directory(place / ".parts", none) || fs::is_regular_file(place / ".lock", none))
+  if (has_shards(place)) return {};
+  if (fs::is_directory(place / ".parts", none))
     throw IoError(fmt::format(
         "'{}' is an export that is not complete; 'tangere export … --resume' goes on with it",
         path));

@@ -104,6 +104,14 @@ def test_damage_is_named(sets, info, tmp_path):
         assert message in damaged(to, change), (to, message)
 
 
+def test_a_data_set_is_one_whatever_lies_beside_it(pushes, info, tmp_path):
+    shutil.copytree(pushes, tmp_path / "set")
+    (tmp_path / "set/hdf5").mkdir()
+    (tmp_path / "set/.zgroup").write_text("{}")
+    code, said = info(tmp_path / "set")
+    assert code == 0 and said["demos"] == 20
+
+
 def test_what_is_no_export_of_tangere_is_told(sets, info, tmp_path):
     for to, name, message in (
         ("lerobot", "meta/tangere.json", "LeRobot data set that 'tangere export' did not write"),
@@ -119,5 +127,7 @@ def test_what_is_no_export_of_tangere_is_told(sets, info, tmp_path):
     (tmp_path / "out.part/.parts").mkdir(parents=True)
     code, said = info(tmp_path / "out.part")
     assert code == 3 and "is an export that is not complete" in said["error"]
+    (tmp_path / "empty").mkdir()
+    assert "has no shards" in info(tmp_path / "empty")[1]["error"]
     (tmp_path / "other.csv").write_text("a,b\n1,2\n")
     assert info(tmp_path / "other.csv")[0] == 3
